@@ -2,6 +2,8 @@
 //!
 //! What farms read is described in `docs/commands.md`: the last line of a command is its `end`, also where it failed.
 
+mod within;
+
 use std::{
     cell::RefCell,
     collections::VecDeque,
@@ -13,6 +15,7 @@ use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Map, Value, json};
 
+use self::within::{Told, Within};
 use super::output;
 
 /// How progress is told.
@@ -84,19 +87,34 @@ impl Job {
         self.before = now;
     }
 
+    /// What each of the last frames took; `None` where none was made yet.
+    fn frame_seconds(&self) -> Option<f64> {
+        let took: Duration = self.recent.iter().sum();
+        let many = self.recent.len();
+        (many > 0).then(|| took.as_secs_f64() / many as f64)
+    }
+
     /// Seconds that the frames left would take, each as long as the last ones; `None` where none was made yet.
     fn seconds_left(&self) -> Option<f64> {
-        let left = self.frames.saturating_sub(self.seen);
-        let took: Duration = self.recent.iter().sum();
-        match (left, self.recent.len()) {
-            (0, _) => Some(0.0),
-            (_, 0) => None,
-            (left, many) => {
-                let seconds = took.as_secs_f64() / many as f64 * left as f64;
-                Some((10.0 * seconds).round() / 10.0)
-            }
+        match self.frames.saturating_sub(self.seen) {
+            0 => Some(0.0),
+            left => self.frame_seconds().map(|each| tenths(each * left as f64)),
         }
     }
+
+    /// The same within a frame that has come as far as `told`: what is left of it, and the frames after it, each as long as the last
+    /// ones, or else as this one. `None` before its first part, and before there are frames.
+    fn seconds_left_within(&self, told: &Told) -> Option<f64> {
+        let left = told.left?.as_secs_f64();
+        let after = self.frames.checked_sub(self.seen + 1)?;
+        let own = told.elapsed.as_secs_f64() + left;
+        let each = self.frame_seconds().unwrap_or(own);
+        Some(tenths(left + after as f64 * each))
+    }
+}
+
+fn tenths(seconds: f64) -> f64 {
+    (10.0 * seconds).round() / 10.0
 }
 
 /// What a command has done in all.
@@ -110,6 +128,8 @@ struct State {
     failed: u64,
     /// `None` where nothing is known of it.
     bytes: Option<u64>,
+    /// What is under way within a frame, or before the first one.
+    within: Option<Within>,
     /// What the command itself says at its end.
     end: Map<String, Value>,
 }
@@ -138,6 +158,7 @@ impl Progress {
                 skipped: 0,
                 failed: 0,
                 bytes: None,
+                within: None,
                 end: Map::new(),
             }),
         }
@@ -154,12 +175,7 @@ impl Progress {
         let mut state = self.state.borrow_mut();
         state.job = Job::new(frames);
         state.is_set = false;
-        state.bar = (self.mode == Mode::Auto).then(|| {
-            let style =
-                ProgressStyle::with_template("{bar:40} {pos}/{len} [{elapsed} < {eta}] {msg}")
-                    .unwrap_or_else(|_| ProgressStyle::default_bar());
-            ProgressBar::new(frames).with_style(style)
-        });
+        state.bar = (self.mode == Mode::Auto).then(|| bar(frames));
     }
 
     /// A job has so many frames: it begins where none of these has, else it has come to have more or fewer.
@@ -214,6 +230,53 @@ impl Progress {
             }
         }
         bar.inc(1);
+    }
+
+    /// So many parts are done of what is called `name`: of a frame, or of what comes before the first one, as `of` says to farms. A bar
+    /// always shows it; else people hear of it every ten seconds, and of what comes before the frames when it begins; farms hear when it
+    /// begins and every second.
+    pub(super) fn part(&self, name: &str, (done, count): (u64, u64), event: Value) {
+        let mut state = self.state.borrow_mut();
+        let state = &mut *state;
+        let told = Within::step(&mut state.within, name, (done, count), Instant::now());
+        let is_before = state.job.frames == 0;
+        let left = told.left.map(|left| tenths(left.as_secs_f64()));
+        let job_left = state.job.seconds_left_within(&told);
+        let seconds = |left: Option<f64>, words: &str| {
+            let left = left.filter(|left| *left >= 1.0);
+            left.map_or(String::new(), |left| format!(", {left:.0} s {words}"))
+        };
+        let in_all = job_left.filter(|_| state.job.seen + 1 < state.job.frames);
+        let text = format!(
+            "{name}: {done} of {count}{}{}",
+            seconds(left, "left"),
+            seconds(in_all, "for all frames")
+        );
+        if self.mode == Mode::Auto && is_before {
+            let bar = state.bar.get_or_insert_with(|| bar(count));
+            bar.set_position(done);
+            bar.set_message(name.to_owned());
+        } else if let Some(bar) = &state.bar {
+            bar.set_message(text.clone());
+        }
+        let is_line = told.line || (is_before && done == 0);
+        if is_line {
+            match self.mode {
+                Mode::Plain => output::say(&text),
+                _ => output::log(&text),
+            }
+        }
+        if told.event
+            && self.is_json()
+            && let Value::Object(mut event) = event
+        {
+            event.insert("event".to_owned(), json!("part"));
+            event.insert("done".to_owned(), json!(done));
+            event.insert("count".to_owned(), json!(count));
+            event.insert("seconds_left".to_owned(), json!(left));
+            event.insert("job_seconds_left".to_owned(), json!(job_left));
+            output::event(&Value::Object(event));
+        }
     }
 
     fn count(&self, status: Status, mut event: Value) -> Value {
@@ -299,6 +362,12 @@ impl Progress {
     }
 }
 
+fn bar(length: u64) -> ProgressBar {
+    let style = ProgressStyle::with_template("{bar:40} {pos}/{len} [{elapsed} < {eta}] {msg}")
+        .unwrap_or_else(|_| ProgressStyle::default_bar());
+    ProgressBar::new(length).with_style(style)
+}
+
 /// The event of a fault that ends a command.
 fn failed(message: &str, code: u8) -> Value {
     json!({ "event": "error", "message": message, "exit_code": code })
@@ -335,6 +404,20 @@ mod tests {
         }
         // The eight last ones took 2 s each, and ten are left.
         assert_eq!(job.seconds_left(), Some(20.0));
+        // Within the next one, of which half is drawn in 3 s, and nine come after it.
+        let told = |left| Told {
+            line: false,
+            event: false,
+            elapsed: Duration::from_secs(3),
+            left,
+        };
+        let half = told(Some(Duration::from_secs(3)));
+        assert_eq!(job.seconds_left_within(&half), Some(21.0));
+        assert_eq!(job.seconds_left_within(&told(None)), None);
+        // The first one is all that is known of the others.
+        let first = Job::new(10);
+        assert_eq!(first.seconds_left_within(&half), Some(57.0));
+        assert_eq!(Job::new(0).seconds_left_within(&half), None);
         for _ in 0..10 {
             job.add(Status::Skipped, now);
         }

@@ -165,6 +165,11 @@ pub(super) fn tell(progress: &Progress, event: Event) {
             ),
             json!({ "event": "waiting", "frames": frames }),
         ),
+        Event::Part { frame, part } => progress.part(
+            &format!("frame {frame:4}"),
+            (part.done.into(), part.count.into()),
+            json!({ "of": "frame", "frame": frame }),
+        ),
         Event::Frame {
             frame,
             seconds,

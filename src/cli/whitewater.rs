@@ -138,6 +138,11 @@ fn dry_run(request: &Request, progress: &Progress) -> Result<u8, Failure> {
 
 fn tell(progress: &Progress, event: Event) {
     match event {
+        Event::Calibrated { done, count } => progress.part(
+            "thresholds are calibrated on the shot's frames",
+            (done as u64, count as u64),
+            json!({ "of": "calibration" }),
+        ),
         Event::Ready {
             device,
             water,

@@ -53,7 +53,7 @@ pub use image::{Attributes, Image};
 pub use moment::{Moment, REACH, Water, frames_around};
 pub use opaque::opaque;
 pub use plan::{Limits, Plan, Runs};
-pub use renderer::Renderer;
+pub use renderer::{Part, Renderer};
 pub use uniform::mirrors;
 
 /// What of a scene a picture needs beside the particles.

@@ -33,7 +33,7 @@ use swell_domain::{
     solver::PassTime,
 };
 use swell_gpu::adapter::{Context, GpuError, Needs};
-use swell_render::{Image, RenderError, Renderer};
+use swell_render::{Image, Part, RenderError, Renderer};
 use swell_scene::{
     Scene, SceneError,
     look::{FormatSpec, Look, LookError},
@@ -44,7 +44,7 @@ use self::near::Near;
 use self::pictures::{attributes, baked_note, is_current, name, pictures, whole_attributes};
 use self::set::{render_scene, solid_names};
 use self::whitewater::Whitewater;
-use self::writing::{Drawn, Writing};
+use self::writing::{Drawn, Writing, end_writing};
 use super::{
     Blame,
     device::{Gpu, PassTimes, shaders_note},
@@ -103,6 +103,13 @@ pub enum Event {
         left_out: usize,
         /// What of the look is allowed and hardly meant.
         warnings: Vec<String>,
+    },
+    /// How far the drawing of a frame has come: before its first part, and behind each.
+    Part {
+        /// The frame's number.
+        frame: u32,
+        /// Parts of its picture.
+        part: Part,
     },
     /// A frame is on the disk.
     Frame {
@@ -432,7 +439,7 @@ impl Job<'_> {
         let mut outcome = Outcome::default();
         let drawn = self.draw_all(frames, stop, (&mut outcome, tell));
         // However it ended, what was drawn before is kept.
-        let written = self.end_writing(&mut outcome, tell);
+        let written = end_writing(&mut self.writing, &mut outcome, tell);
         drawn.and(written).map(|()| outcome)
     }
 
@@ -450,8 +457,8 @@ impl Job<'_> {
                     outcome.interrupted = true;
                     return Ok(());
                 }
-                let done = self.frame(frame);
-                self.end_writing(outcome, tell)?;
+                let done = self.frame(frame, (&mut *outcome, &mut *tell));
+                end_writing(&mut self.writing, outcome, tell)?;
                 match done {
                     Ok(Done::Drawn(drawn)) => {
                         self.writing = Some(Writing::begin(*drawn, &self.folder, self.request));
@@ -488,26 +495,11 @@ impl Job<'_> {
         Ok(())
     }
 
-    /// Waits for the pictures that are being written, and tells of them.
-    fn end_writing(
+    fn frame(
         &mut self,
-        outcome: &mut Outcome,
-        tell: &mut dyn FnMut(Event),
-    ) -> Result<(), RenderJobError> {
-        if let Some(writing) = self.writing.take() {
-            let (frame, seconds, bytes) = writing.end()?;
-            outcome.rendered += 1;
-            tell(Event::Frame {
-                frame,
-                seconds,
-                skipped: false,
-                bytes,
-            });
-        }
-        Ok(())
-    }
-
-    fn frame(&mut self, frame: u32) -> Result<Done, RenderJobError> {
+        frame: u32,
+        told: (&mut Outcome, &mut dyn FnMut(Event)),
+    ) -> Result<Done, RenderJobError> {
         let begin = Instant::now();
         let request = self.request;
         let attributes = whole_attributes(&self.cache, request, self.whitewater.as_ref(), frame)?;
@@ -530,7 +522,7 @@ impl Job<'_> {
         if stands() {
             return Ok(Done::Stands);
         }
-        let image = self.draw(frame)?;
+        let image = self.draw(frame, told)?;
         Ok(Done::Drawn(Box::new(Drawn {
             frame,
             begin,
@@ -541,7 +533,11 @@ impl Job<'_> {
         })))
     }
 
-    fn draw(&mut self, frame: u32) -> Result<Image, RenderJobError> {
+    fn draw(
+        &mut self,
+        frame: u32,
+        (outcome, tell): (&mut Outcome, &mut dyn FnMut(Event)),
+    ) -> Result<Image, RenderJobError> {
         let look = &self.request.look;
         let around = self.near.around(&self.cache, look, frame)?;
         let mut renderer = match self.kept.take() {
@@ -559,9 +555,17 @@ impl Job<'_> {
             Some(stream) => stream.read(frame)?,
             None => Particles::default(),
         };
-        let picture = renderer
-            .render_moment(frame, &around.moment(&white))
-            .map_err(|error| told(error, look))?;
+        let mut written = Ok(());
+        let picture = renderer.render_parts(frame, &around.moment(&white), &mut |part| {
+            // The frame before is told of when it is there, and not when this one is drawn.
+            let is_there = self.writing.as_ref().is_some_and(Writing::is_finished);
+            if is_there && written.is_ok() {
+                written = end_writing(&mut self.writing, outcome, tell);
+            }
+            tell(Event::Part { frame, part });
+        });
+        written?;
+        let picture = picture.map_err(|error| told(error, look))?;
         for time in renderer.times() {
             let total = self.times.entry(time.pass);
             total.and_modify(|total| total.add(&time)).or_insert(time);

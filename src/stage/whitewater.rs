@@ -8,6 +8,7 @@ mod engine;
 mod error;
 mod expected;
 mod forecast;
+mod settled;
 mod water;
 
 use std::{
@@ -36,7 +37,12 @@ use super::{
     prepare::Start,
 };
 
-use self::{engine::Engine, forecast::Forecast, water::Water};
+use self::{
+    engine::Engine,
+    forecast::Forecast,
+    settled::{recorded, settle},
+    water::Water,
+};
 
 pub use self::{
     checked::Stream,
@@ -49,9 +55,6 @@ pub use self::{
 pub(super) const FOLDER: &str = "whitewater";
 /// The settings that a stream was made with, all of them, among its assets.
 const SETTINGS: &str = "whitewater.toml";
-/// Frames that a shot's thresholds are calibrated on, at most.
-const CALIBRATED_ON: usize = 16;
-
 /// What to make.
 #[derive(Clone, Debug)]
 pub struct Request {
@@ -74,6 +77,13 @@ pub struct Request {
 /// What a job has to tell while it runs.
 #[derive(Clone, Debug)]
 pub enum Event {
+    /// How far the thresholds are calibrated: before the first frame that they are calibrated on, and behind each.
+    Calibrated {
+        /// Frames looked at.
+        done: usize,
+        /// Of so many.
+        count: usize,
+    },
     /// The device is open, and the thresholds stand.
     Ready {
         /// Adapter and driver, or the f64 reference.
@@ -164,7 +174,25 @@ pub fn whitewater(
     let standing = standing(request, &directory, &manifest)?;
     let (settings, calibrated_on) = match &standing {
         Some(stream) => (recorded(stream, &directory, &scene)?, None),
-        None => settle(request, &scene, &mut engine, &mut water)?,
+        None => {
+            let settled = settle(
+                request,
+                &scene,
+                (&mut engine, &mut water),
+                (stop, &mut *tell),
+            )?;
+            let Some(settled) = settled else {
+                return Ok(Outcome {
+                    last_frame: cache.first_frame(),
+                    frames: 0,
+                    bytes: 0,
+                    directory,
+                    interrupted: true,
+                    passes: PassTimes::default(),
+                });
+            };
+            settled
+        }
     };
     engine.set(&settings)?;
     let mut stream = match standing {
@@ -434,50 +462,6 @@ fn standing(
 fn other(stream: &CacheReader, hash: &str) -> Option<&'static str> {
     let is_other = stream.manifest().scene_hash != hash;
     is_other.then_some("with other settings, or from another bake")
-}
-
-/// The settings that a stream was made with.
-fn recorded(
-    stream: &CacheReader,
-    directory: &Path,
-    scene: &Scene,
-) -> Result<Settings, WhitewaterError> {
-    let bytes = stream.asset(SETTINGS)?;
-    let text = String::from_utf8_lossy(&bytes);
-    let file = directory.join("assets").join(SETTINGS);
-    let settings = WhitewaterSettings::parse(&text, &file)?;
-    // All of them stand there: the shot decides nothing.
-    Ok(settings.settled(scene.particle_spacing(), &Thresholds::calibrate(&[])))
-}
-
-/// Settings of a new stream, and how many frames decided what they leave open.
-fn settle(
-    request: &Request,
-    scene: &Scene,
-    engine: &mut Engine,
-    water: &mut Water<'_>,
-) -> Result<(Settings, Option<usize>), WhitewaterError> {
-    let cache = water.cache();
-    let frames: Vec<u32> = match request.settings.needs_calibration() {
-        true => (cache.first_frame() + 1..=cache.last_frame())
-            .filter(|&frame| cache.has_particles(frame))
-            .collect(),
-        false => Vec::new(),
-    };
-    let step = frames.len().div_ceil(CALIBRATED_ON).max(1);
-    // The last frame is one of them.
-    let mut chosen: Vec<u32> = frames.into_iter().rev().step_by(step).collect();
-    chosen.reverse();
-    let mut all = Vec::new();
-    for &frame in &chosen {
-        let time = cache.entry(frame)?.clock.time;
-        let seconds = 1.0 / cache.manifest().frames_per_second;
-        all.extend(engine.survey(&water.at(frame)?, time, seconds)?);
-    }
-    let shot = Thresholds::calibrate(&all);
-    let settings = request.settings.settled(scene.particle_spacing(), &shot);
-    let calibrated = request.settings.needs_calibration().then_some(chosen.len());
-    Ok((settings, calibrated))
 }
 
 /// Of all that a stream's bytes depend on but the device: settings and bake.

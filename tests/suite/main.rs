@@ -79,6 +79,7 @@ mod render {
     mod listed;
     mod outlines;
     mod paged;
+    mod parts;
     mod pictures;
     mod planned;
     mod scaled;

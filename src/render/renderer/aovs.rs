@@ -1,6 +1,6 @@
 //! Channels beside the picture, back from the device.
 
-use super::Renderer;
+use super::{Renderer, parts::Parts};
 use crate::{
     RenderError,
     buffers::{NEXT_CAMERA, PARTICLES, aovs},
@@ -75,22 +75,19 @@ impl Renderer {
         frame: u32,
         setting: &Setting,
         ahead: &[Particle],
+        parts: &mut Parts<'_>,
     ) -> Result<Aovs, RenderError> {
         if !ahead.is_empty() {
             self.program.upload(PARTICLES, 0, ahead);
         }
         let filter = self.look.spec().output.aov_filter;
-        let samples = match filter {
-            AovFilterSpec::Centre => vec![Sample::STILL],
-            AovFilterSpec::Beauty => samples_of(&self.look),
-        };
         let mut means = Means::new(self.plan.extent.shaded());
         let mut last = Vec::new();
-        for sample in samples {
+        for sample in self.aov_samples() {
             let next = camera(&self.look, setting, f64::from(frame) + 1.0, sample, 0);
             self.program.upload(NEXT_CAMERA, 0, &[next]);
             let camera = camera(&self.look, setting, frame.into(), sample, 0);
-            self.sample(&camera, true)?;
+            self.sample(&camera, true, parts)?;
             last = self.read_bands(aovs, 1)?;
             if filter == AovFilterSpec::Beauty {
                 means.add(&last, sample.weight);
@@ -100,6 +97,14 @@ impl Renderer {
             AovFilterSpec::Centre => last,
             AovFilterSpec::Beauty => means.over(&last),
         }))
+    }
+
+    /// Samples that the channels are drawn with, where the look asks for any.
+    pub(super) fn aov_samples(&self) -> Vec<Sample> {
+        match self.look.spec().output.aov_filter {
+            AovFilterSpec::Centre => vec![Sample::STILL],
+            AovFilterSpec::Beauty => samples_of(&self.look),
+        }
     }
 
     /// The channels that the look asks for.

@@ -5,6 +5,7 @@ mod build;
 mod cloud;
 mod load;
 mod measured;
+mod parts;
 mod shade;
 mod splats;
 mod taken;
@@ -24,6 +25,8 @@ use super::samples::samples_of;
 use super::{Moment, RenderError, RenderScene, Water, sea::Sea, uniform};
 use build::room;
 use cloud::RayCloud;
+pub use parts::Part;
+use parts::Parts;
 use shade::draws_spray;
 use splats::Pages;
 use swell_domain::{particles::Particles, solver::PassTime};
@@ -50,8 +53,11 @@ pub struct Renderer {
     once: Option<Recording>,
     /// What follows from the water alone.
     light: Recording,
-    sample: Recording,
-    aovs: Recording,
+    /// Of a sample, band by band where rays are cast.
+    sample: Vec<Recording>,
+    aovs: Vec<Recording>,
+    /// Whether the last sample took long; at first none is known.
+    is_slow: bool,
     /// Particles that there is room for.
     capacity: usize,
     /// Blocks of water that there is room for.
@@ -105,8 +111,9 @@ impl Renderer {
             scene: scene.clone(),
             once: Some(record(&plan.once)),
             light: record(&plan.water),
-            sample: record(&plan.sample),
-            aovs: record(&plan.aovs),
+            sample: parts::record(&program, &plan.sample),
+            aovs: parts::record(&program, &plan.aovs),
+            is_slow: true,
             plan,
             program,
             capacity: room(0),
@@ -173,6 +180,22 @@ impl Renderer {
     /// # Errors
     /// As [`Renderer::render`]; [`RenderError::UnderWater`] where splats cannot draw what the camera sees.
     pub fn render_moment(&mut self, frame: u32, moment: &Moment<'_>) -> Result<Image, RenderError> {
+        self.render_parts(frame, moment, &mut |_| {})
+    }
+
+    /// As [`Renderer::render_moment`]; `tell` hears before the first part of the picture and behind each one how far it has come.
+    ///
+    /// # Errors
+    /// As [`Renderer::render_moment`].
+    pub fn render_parts(
+        &mut self,
+        frame: u32,
+        moment: &Moment<'_>,
+        tell: &mut dyn FnMut(Part),
+    ) -> Result<Image, RenderError> {
+        let samples = samples_of(&self.look).len();
+        let count = samples * self.sample.len() + self.aov_samples().len() * self.aovs.len();
+        let parts = &mut Parts::new(count, tell);
         let loaded = self.load(frame, moment)?;
         if let Some(whitewater) = &mut self.whitewater {
             let white = moment.white;
@@ -187,7 +210,7 @@ impl Renderer {
         let mut covers = wants_objects.then(|| Covers::new(self.plan.extent.shaded()));
         for (index, sample) in (0u32..).zip(samples_of(&self.look)) {
             let camera = camera(&self.look, &setting, frame.into(), sample, index);
-            self.sample(&camera, false)?;
+            self.sample(&camera, false, parts)?;
             if let Some(covers) = &mut covers {
                 covers.add(&self.read_bands(objects, 1)?, camera.weight);
             }
@@ -198,7 +221,7 @@ impl Renderer {
         image.view = Some(View::of(&eye, rate));
         image.exr_space = self.look.spec().output.colour_space;
         if !self.plan.aovs.is_empty() {
-            image.aovs = self.draw_aovs(frame, &setting, &loaded.ahead)?;
+            image.aovs = self.draw_aovs(frame, &setting, &loaded.ahead, parts)?;
         }
         image.matte = covers.map(|covers| {
             let spec = self.look.spec();
@@ -251,10 +274,10 @@ impl Renderer {
     /// Binds every command to the buffers as they are now.
     fn record(&mut self) {
         let pages = self.pages();
-        let record = |commands: &[Command]| Recording::new(&self.program, &pages.spread(commands));
-        self.light = record(&self.plan.water);
-        self.sample = record(&self.plan.sample);
-        self.aovs = record(&self.plan.aovs);
+        let spread = |commands: &[Command]| pages.spread(commands);
+        self.light = Recording::new(&self.program, &spread(&self.plan.water));
+        self.sample = parts::record(&self.program, &spread(&self.plan.sample));
+        self.aovs = parts::record(&self.program, &spread(&self.plan.aovs));
     }
 
     /// How its particles are shared out among dispatches.
@@ -284,7 +307,12 @@ impl Renderer {
     }
 
     /// Draws one sample, into the picture's mean or, with `aovs`, into the channels beside it.
-    fn sample(&mut self, camera: &uniform::Camera, aovs: bool) -> Result<(), RenderError> {
+    fn sample(
+        &mut self,
+        camera: &uniform::Camera,
+        aovs: bool,
+        parts: &mut Parts<'_>,
+    ) -> Result<(), RenderError> {
         if let Some(water) = &mut self.water {
             let grew = water.stand_at(camera.seconds, &mut self.program, &self.scene)?;
             if grew {
@@ -309,10 +337,7 @@ impl Renderer {
         if !aovs {
             self.light(camera)?;
         }
-        let recording = if aovs { &self.aovs } else { &self.sample };
-        recording.run(&self.program, self.timer.as_mut())?;
-        self.program.context.wait()?;
-        Ok(())
+        self.run_portions(aovs, parts)
     }
 }
 

@@ -7,7 +7,7 @@ use std::{
     time::Instant,
 };
 
-use super::{RenderJobError, Request, folder::Folder, pictures::write};
+use super::{Event, Outcome, RenderJobError, Request, folder::Folder, pictures::write};
 use swell_render::{Attributes, Image};
 use swell_scene::look::FormatSpec;
 
@@ -48,13 +48,37 @@ impl Writing {
         Self { frame, thread }
     }
 
+    /// Whether they are on the disk, or could not be written.
+    pub(super) fn is_finished(&self) -> bool {
+        self.thread.is_finished()
+    }
+
     /// Waits until they are on the disk: which frame, seconds that it took in all, and bytes.
     ///
     /// # Errors
     /// [`RenderJobError::Render`] or [`RenderJobError::Folder`] where a picture cannot be written.
-    pub(super) fn end(self) -> Result<(u32, f64, u64), RenderJobError> {
+    fn end(self) -> Result<(u32, f64, u64), RenderJobError> {
         let written = self.thread.join();
         let (seconds, bytes) = written.unwrap_or_else(|panic| std::panic::resume_unwind(panic))?;
         Ok((self.frame, seconds, bytes))
     }
+}
+
+/// Waits for the pictures that are being written, and tells of them.
+pub(super) fn end_writing(
+    writing: &mut Option<Writing>,
+    outcome: &mut Outcome,
+    tell: &mut dyn FnMut(Event),
+) -> Result<(), RenderJobError> {
+    if let Some(writing) = writing.take() {
+        let (frame, seconds, bytes) = writing.end()?;
+        outcome.rendered += 1;
+        tell(Event::Frame {
+            frame,
+            seconds,
+            skipped: false,
+            bytes,
+        });
+    }
+    Ok(())
 }

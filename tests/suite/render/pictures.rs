@@ -40,7 +40,7 @@ elevation_degrees = 40.0
 azimuth_degrees = 0.0
 ";
 
-const ALL_AOVS: &str =
+pub(super) const ALL_AOVS: &str =
     "[output]\nformats = [\"exr\"]\naovs = [\"Z\", \"N\", \"P\", \"forward\", \"thickness\"]\n";
 
 /// A tank of 8 × 4 × 6 m; the slab reaches past what the camera sees on all sides.

@@ -1,0 +1,104 @@
+//! How far something has come that takes long by itself: a frame, or what is done before the first one.
+
+use std::time::{Duration, Instant};
+
+/// Between two lines about one thing.
+const LINES: Duration = Duration::from_secs(10);
+/// Between two events about one thing.
+const EVENTS: Duration = Duration::from_secs(1);
+
+/// What is under way.
+pub(super) struct Within {
+    name: String,
+    begun: Instant,
+    line: Instant,
+    event: Instant,
+}
+
+/// What is to be told of a part, and what it lets expect.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Told {
+    /// Whether people have waited long enough for a line.
+    pub(super) line: bool,
+    /// Whether programs have for an event.
+    pub(super) event: bool,
+    /// Since it began.
+    pub(super) elapsed: Duration,
+    /// Until all parts are done, each taking as long as those before; `None` before the first.
+    pub(super) left: Option<Duration>,
+}
+
+impl Within {
+    /// `done` of `count` parts of what is called `name` are done now. Another name, or none that is done, begins anew.
+    pub(super) fn step(
+        under_way: &mut Option<Self>,
+        name: &str,
+        (done, count): (u64, u64),
+        now: Instant,
+    ) -> Told {
+        let same = under_way.as_mut().filter(|it| it.name == name && done > 0);
+        let Some(within) = same else {
+            *under_way = Some(Self {
+                name: name.to_owned(),
+                begun: now,
+                line: now,
+                event: now,
+            });
+            return Told {
+                line: false,
+                event: true,
+                elapsed: Duration::ZERO,
+                left: None,
+            };
+        };
+        let due = |last: &mut Instant, interval: Duration| {
+            let is_due = now - *last >= interval;
+            if is_due {
+                *last = now;
+            }
+            is_due
+        };
+        let elapsed = now - within.begun;
+        let parts = count.saturating_sub(done) as f64 / done as f64;
+        Told {
+            line: due(&mut within.line, LINES),
+            event: due(&mut within.event, EVENTS),
+            elapsed,
+            left: Some(elapsed.mul_f64(parts)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_are_told_now_and_then_with_the_time_left() {
+        let begin = Instant::now();
+        let mut under_way = None;
+        let mut step = |name: &str, done: u64, millis: u64| {
+            let now = begin + Duration::from_millis(millis);
+            Within::step(&mut under_way, name, (done, 64), now)
+        };
+        let told = step("frame 1", 0, 0);
+        assert_eq!((told.line, told.event, told.left), (false, true, None));
+        let told = step("frame 1", 1, 500);
+        assert_eq!((told.line, told.event), (false, false));
+        // 63 parts of half a second are left.
+        assert_eq!(told.left, Some(Duration::from_millis(31_500)));
+        let told = step("frame 1", 16, 8_000);
+        assert_eq!((told.line, told.event), (false, true));
+        assert_eq!(told.left, Some(Duration::from_secs(24)));
+        let told = step("frame 1", 20, 10_000);
+        assert_eq!((told.line, told.event), (true, true));
+        let told = step("frame 1", 21, 10_900);
+        assert_eq!((told.line, told.event), (false, false));
+        // The next frame counts from its own beginning.
+        let told = step("frame 2", 0, 40_000);
+        assert_eq!((told.event, told.left), (true, None));
+        let told = step("frame 2", 32, 42_000);
+        assert_eq!(told.left, Some(Duration::from_secs(2)));
+        assert_eq!((told.line, told.event), (false, true));
+    }
+}

@@ -1,0 +1,66 @@
+//! What a stream is made with: its own settings, and thresholds that the shot decides.
+
+use std::{
+    path::Path,
+    sync::atomic::{AtomicBool, Ordering},
+};
+
+use super::{Event, Request, SETTINGS, WhitewaterError, engine::Engine, water::Water};
+use swell_cache::CacheReader;
+use swell_domain::whitewater::{Settings, Thresholds};
+use swell_scene::{Scene, whitewater::WhitewaterSettings};
+
+/// Frames that a shot's thresholds are calibrated on, at most.
+const CALIBRATED_ON: usize = 16;
+
+/// The settings that a stream was made with.
+pub(super) fn recorded(
+    stream: &CacheReader,
+    directory: &Path,
+    scene: &Scene,
+) -> Result<Settings, WhitewaterError> {
+    let bytes = stream.asset(SETTINGS)?;
+    let text = String::from_utf8_lossy(&bytes);
+    let file = directory.join("assets").join(SETTINGS);
+    let settings = WhitewaterSettings::parse(&text, &file)?;
+    // All of them stand there: the shot decides nothing.
+    Ok(settings.settled(scene.particle_spacing(), &Thresholds::calibrate(&[])))
+}
+
+/// Settings of a new stream, and how many frames decided what they leave open; `None` where a signal ended it before.
+pub(super) fn settle(
+    request: &Request,
+    scene: &Scene,
+    (engine, water): (&mut Engine, &mut Water<'_>),
+    (stop, tell): (&AtomicBool, &mut dyn FnMut(Event)),
+) -> Result<Option<(Settings, Option<usize>)>, WhitewaterError> {
+    let cache = water.cache();
+    let frames: Vec<u32> = match request.settings.needs_calibration() {
+        true => (cache.first_frame() + 1..=cache.last_frame())
+            .filter(|&frame| cache.has_particles(frame))
+            .collect(),
+        false => Vec::new(),
+    };
+    let step = frames.len().div_ceil(CALIBRATED_ON).max(1);
+    // The last frame is one of them.
+    let mut chosen: Vec<u32> = frames.into_iter().rev().step_by(step).collect();
+    chosen.reverse();
+    let mut all = Vec::new();
+    let count = chosen.len();
+    for (done, &frame) in chosen.iter().enumerate() {
+        tell(Event::Calibrated { done, count });
+        if stop.load(Ordering::Relaxed) {
+            return Ok(None);
+        }
+        let time = cache.entry(frame)?.clock.time;
+        let seconds = 1.0 / cache.manifest().frames_per_second;
+        all.extend(engine.survey(&water.at(frame)?, time, seconds)?);
+    }
+    if count > 0 {
+        tell(Event::Calibrated { done: count, count });
+    }
+    let shot = Thresholds::calibrate(&all);
+    let settings = request.settings.settled(scene.particle_spacing(), &shot);
+    let calibrated = request.settings.needs_calibration().then_some(count);
+    Ok(Some((settings, calibrated)))
+}
