@@ -21,7 +21,7 @@ use super::{
     interrupt::{self, Interrupt},
     lint::DenyArgs,
     output,
-    progress::{Mode, Progress, Status},
+    progress::{Mode, Progress, Recurring, Status},
     set_variable, size,
 };
 
@@ -288,8 +288,8 @@ pub(super) fn tell(progress: &Progress, event: Event) {
             report,
             seconds,
         } => {
-            for (text, event) in warnings(frame, &report) {
-                progress.say(&text, event);
+            for warning in warnings(frame, &report) {
+                progress.recur(warning);
             }
             progress.frame(
                 &line(frame, &report, seconds),
@@ -338,61 +338,58 @@ const CROWDED: f64 = 1.0;
 /// Mean divergence of a pocket against the largest anywhere, above which it is not rounding.
 const INCOMPATIBLE: f64 = 1e-3;
 
-/// Warnings about a frame, each as a line and as a JSON event.
-fn warnings(frame: u32, report: &StepReport) -> Vec<(String, Value)> {
+/// Warnings about a frame.
+fn warnings(frame: u32, report: &StepReport) -> Vec<Recurring> {
     let mut warnings = Vec::new();
-    if report.density_error_mean > DENSE {
-        warnings.push((
-            format!(
-                "warning: frame {frame}: the water is {:.0} % too dense on average: its volume is not kept",
-                100.0 * report.density_error_mean
-            ),
-            json!({
-                "event": "warning", "what": "density", "frame": frame,
-                "density_error_mean": report.density_error_mean,
-            }),
-        ));
+    let mut warn = |what, size, text, event| {
+        warnings.push(Recurring {
+            what,
+            frame,
+            size,
+            text,
+            event,
+        });
+    };
+    let mean = report.density_error_mean;
+    if mean > DENSE {
+        let text = format!(
+            "the water is {:.0} % too dense on average: its volume is not kept",
+            100.0 * mean
+        );
+        warn("density", mean, text, json!({ "density_error_mean": mean }));
     }
     let Some(projection) = &report.projection else {
         return warnings;
     };
-    if report.density_error_max > CROWDED {
-        warnings.push((
-            format!(
-                "warning: frame {frame}: a cell holds {:.1} times the water that it has room for",
-                1.0 + report.density_error_max
-            ),
-            json!({
-                "event": "warning", "what": "crowded cell", "frame": frame,
-                "density_error_max": report.density_error_max,
-            }),
-        ));
+    let most = report.density_error_max;
+    if most > CROWDED {
+        let place = report.densest_at.map_or(String::new(), |at| {
+            let [x, y, z] = at.map(|metres| (1e3 * metres).round() / 1e3);
+            format!(", at [{x}, {y}, {z}]")
+        });
+        let text = format!(
+            "a cell holds {:.1} times the water that it has room for{place}",
+            1.0 + most
+        );
+        let event = json!({ "density_error_max": most, "place": report.densest_at });
+        warn("crowded cell", most, text, event);
     }
     if projection.missed > 0 {
-        warnings.push((
-            format!(
-                "warning: frame {frame}: {} solves missed their tolerance; of pressure the residual is up to {:.1e}, the divergence \
-                 up to {:.1e} /s, and where these are small it was an effect's solve that needed more iterations than it may take",
-                projection.missed, projection.residual, projection.divergence_after
-            ),
-            json!({
-                "event": "warning", "what": "missed projections", "frame": frame, "missed": projection.missed,
-                "residual": projection.residual,
-            }),
-        ));
+        let text = format!(
+            "{} solves missed their tolerance; of pressure the residual is up to {:.1e}, the divergence up to {:.1e} /s, and where \
+             these are small it was an effect's solve that needed more iterations than it may take",
+            projection.missed, projection.residual, projection.divergence_after
+        );
+        let event = json!({ "missed": projection.missed, "residual": projection.residual });
+        warn("missed projections", projection.missed.into(), text, event);
     }
-    if projection.incompatible > INCOMPATIBLE * projection.divergence_before {
-        warnings.push((
-            format!(
-                "warning: frame {frame}: water without air was squeezed by {:.1e} /s, which no pressure undoes: its volume \
-                 is not kept",
-                projection.incompatible
-            ),
-            json!({
-                "event": "warning", "what": "incompatible pocket", "frame": frame,
-                "incompatible": projection.incompatible,
-            }),
-        ));
+    let squeezed = projection.incompatible;
+    if squeezed > INCOMPATIBLE * projection.divergence_before {
+        let text = format!(
+            "water without air was squeezed by {squeezed:.1e} /s, which no pressure undoes: its volume is not kept"
+        );
+        let event = json!({ "incompatible": squeezed });
+        warn("incompatible pocket", squeezed, text, event);
     }
     warnings
 }
@@ -418,6 +415,7 @@ mod tests {
             volume: None,
             projection,
             exchange: None,
+            densest_at: Some([1.25, 0.5, 2.0]),
         }
     }
 
@@ -443,31 +441,30 @@ mod tests {
         };
         let told = warnings(5, &crowded);
         assert_eq!(told.len(), 1);
-        assert!(told[0].0.contains("frame 5: a cell holds 2.4 times"));
+        assert_eq!(
+            (told[0].frame, &*told[0].text),
+            (
+                5,
+                "a cell holds 2.4 times the water that it has room for, at [1.25, 0.5, 2]"
+            )
+        );
         let missed = Projection { missed: 2, ..good };
         let warnings = warnings(7, &report(Some(missed)));
-        assert!(warnings[0].0.contains("frame 7: 2 solves missed"));
-        assert_eq!(warnings[0].1["missed"], 2);
+        assert!(warnings[0].text.starts_with("2 solves missed"));
+        assert_eq!(warnings[0].event["missed"], 2);
         let dense = StepReport {
             density_error_mean: 0.4,
             ..report(None)
         };
         let warnings = self::warnings(3, &dense);
-        assert!(
-            warnings[0]
-                .0
-                .contains("frame 3: the water is 40 % too dense")
-        );
+        assert!(warnings[0].text.starts_with("the water is 40 % too dense"));
         let squeezed = Projection {
             incompatible: 0.5,
             ..good
         };
         let warnings = self::warnings(7, &report(Some(squeezed)));
-        assert!(
-            warnings[0]
-                .0
-                .contains("frame 7: water without air was squeezed by 5.0e-1 /s")
-        );
+        let text = "water without air was squeezed by 5.0e-1 /s";
+        assert!(warnings[0].text.starts_with(text));
     }
 
     #[test]

@@ -15,7 +15,7 @@ use super::{
     failed::{failed_in_all, frame_failed, refuse_failed},
     interrupt::{self, Interrupt},
     output,
-    progress::{Mode, Progress, Status},
+    progress::{Mode, Progress, Recurring, Status},
     size,
 };
 
@@ -232,11 +232,14 @@ fn tell(progress: &Progress, event: Event) {
                 );
             }
         }
-        Event::Warning(text) => {
-            progress.say(
-                &format!("warning: {text}"),
-                json!({ "event": "warning", "what": "volume", "text": text }),
-            );
+        Event::Warning { frame, off, text } => {
+            progress.recur(Recurring {
+                what: "volume",
+                frame,
+                size: off,
+                text,
+                event: json!({}),
+            });
         }
         Event::Frame {
             frame,

@@ -2,6 +2,7 @@
 //!
 //! What farms read is described in `docs/commands.md`: the last line of a command is its `end`, also where it failed.
 
+mod recurring;
 mod within;
 
 use std::{
@@ -15,7 +16,11 @@ use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Map, Value, json};
 
-use self::within::{Told, Within};
+pub(super) use self::recurring::Recurring;
+use self::{
+    recurring::Recurrences,
+    within::{Told, Within},
+};
 use super::output;
 
 /// How progress is told.
@@ -130,6 +135,8 @@ struct State {
     bytes: Option<u64>,
     /// What is under way within a frame, or before the first one.
     within: Option<Within>,
+    /// Warnings of the job's frames.
+    recurrences: Recurrences,
     /// What the command itself says at its end.
     end: Map<String, Value>,
 }
@@ -159,6 +166,7 @@ impl Progress {
                 failed: 0,
                 bytes: None,
                 within: None,
+                recurrences: Recurrences::default(),
                 end: Map::new(),
             }),
         }
@@ -171,6 +179,7 @@ impl Progress {
 
     /// A job of so many frames begins.
     pub(super) fn begin(&self, frames: u64) {
+        self.sum_up();
         self.finish();
         let mut state = self.state.borrow_mut();
         state.job = Job::new(frames);
@@ -202,6 +211,22 @@ impl Progress {
             },
         }
         output::log(text);
+    }
+
+    /// A warning about a frame: said where it is the first of its kind in the job, else at the job's end, of the worst frame.
+    pub(super) fn recur(&self, warning: Recurring) {
+        let said = self.state.borrow_mut().recurrences.add(warning);
+        if let Some((text, event)) = said {
+            self.say(&text, event);
+        }
+    }
+
+    /// The end of a job: where the warnings that its frames had were worst.
+    fn sum_up(&self) {
+        let said = self.state.borrow_mut().recurrences.end();
+        for (text, event) in said {
+            self.say(&text, event);
+        }
     }
 
     /// What only farms read.
@@ -324,6 +349,7 @@ impl Progress {
 
     /// [`Self::tell_end`], and the line that the command ends with.
     pub(super) fn conclude(&self, text: &str, event: Value) {
+        self.sum_up();
         self.tell_end(event);
         match self.mode {
             Mode::Json | Mode::None => output::log(text),
@@ -341,6 +367,7 @@ impl Progress {
     /// What went wrong, in whatever mode.
     pub(super) fn fail(&self, message: &str, code: u8) {
         self.finish();
+        self.sum_up();
         output::say(&format!("swell: {message}"));
         self.tell(failed(message, code));
     }
@@ -348,6 +375,7 @@ impl Progress {
     /// The last event. Nothing is told behind it.
     pub(super) fn end(&self, code: u8) {
         self.finish();
+        self.sum_up();
         let mut state = self.state.borrow_mut();
         let mut end = std::mem::take(&mut state.end);
         let totals = json!({

@@ -40,6 +40,9 @@ pub struct StepReport {
     /// What then entered and left, which the figures above do not see; only of scenes with emitters or drains.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exchange: Option<Exchange>,
+    /// Where `density_error_max` is: the middle of that cell, or that particle, in the scene's coordinates, metres. No ledger keeps it.
+    #[serde(skip)]
+    pub densest_at: Option<[f64; 3]>,
 }
 
 /// Report of one output frame's pressure projections; iterations stand in the frame's report.

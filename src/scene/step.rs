@@ -218,6 +218,22 @@ impl Scene {
         1.0 - kept.powf(length / self.shot.frame_seconds())
     }
 
+    /// The densest of particles with these relative densities, in the scene's coordinates, metres.
+    pub fn densest_particle(&self, state: &Particles, density: &[f64]) -> Option<[f64; 3]> {
+        let both = state.position.iter().zip(density);
+        let densest = both.max_by(|(_, a), (_, b)| a.total_cmp(b))?;
+        let place = DVec3::from(densest.0.map(f64::from));
+        Some((self.origin + place).to_array())
+    }
+
+    /// The middle of the densest cell of FLIP's grid with these relative densities, in the scene's coordinates, metres.
+    pub fn densest_cell(&self, cells: impl Iterator<Item = ([u32; 3], f64)>) -> Option<[f64; 3]> {
+        let (cell, _) = cells.max_by(|(_, a), (_, b)| a.total_cmp(b))?;
+        let middle = DVec3::from(cell.map(|k| f64::from(k) + 0.5));
+        let place = self.domain.min + middle * self.solver.flip().cell_size;
+        Some((self.origin + place).to_array())
+    }
+
     /// Energies of a state, and the errors of relative densities; sums run in order. What the steps did is left at 0.
     pub fn report(&self, state: &Particles, density: impl Iterator<Item = f64>) -> StepReport {
         let mass = self.particle_mass();
@@ -241,6 +257,7 @@ impl Scene {
             volume: None,
             projection: None,
             exchange: None,
+            densest_at: None,
         }
     }
 }

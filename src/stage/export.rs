@@ -125,7 +125,14 @@ pub enum Event {
         warnings: Vec<String>,
     },
     /// What is odd about a frame.
-    Warning(String),
+    Warning {
+        /// The frame.
+        frame: u32,
+        /// Part of the particles' volume that its mesh holds too little or too much.
+        off: f64,
+        /// A sentence about it.
+        text: String,
+    },
     /// The files of a frame are on the disk, or being made by another process.
     Frame {
         /// Its number.
@@ -208,8 +215,14 @@ pub fn export(
             }
         }
         let volume = content.mesh.get().map(|mesh| mesh.volume);
-        if let Some(warning) = volume.and_then(|volume| warning(frame, volume)) {
-            tell(Event::Warning(warning));
+        if let Some(held) = volume
+            && let Some(warning) = warning(held)
+        {
+            tell(Event::Warning {
+                frame,
+                off: (held - 1.0).abs(),
+                text: warning,
+            });
         }
         tell(Event::Frame {
             frame,
@@ -223,11 +236,11 @@ pub fn export(
 }
 
 /// What there is to say of a mesh whose volume could not be brought to the particles'.
-fn warning(frame: u32, volume: f64) -> Option<String> {
+fn warning(volume: f64) -> Option<String> {
     let is_off = (volume - 1.0).abs() > VOLUME;
     is_off.then(|| {
         format!(
-            "frame {frame}: the mesh holds {:.1} % of the particles' volume, and no value of the field near its own has more of it",
+            "the mesh holds {:.1} % of the particles' volume, and no value of the field near its own has more of it",
             100.0 * volume
         )
     })

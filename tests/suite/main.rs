@@ -67,6 +67,7 @@ mod gpu {
     mod sort;
 }
 mod reference {
+    mod densest;
     mod flip;
     mod pbf;
     mod viscous;

@@ -417,11 +417,19 @@ impl Flip {
             self.show(span, cloud, watch)?;
             if span.is_last {
                 report.projection = Some(all);
-                let kinds = self.field.iter().flat_map(|field| &field.kind);
-                let of_cells = density.into_iter().zip(kinds);
+                let Some(field) = &self.field else {
+                    return Ok((report, Vec::new()));
+                };
+                let of_cells = (0u32..).zip(density).zip(&field.kind);
                 let in_water = of_cells.filter(|(_, kind)| **kind == FLUID);
-                let density = in_water.map(|(density, _)| density).collect();
-                return Ok((report, density));
+                let water: Vec<(u32, f64)> = in_water.map(|(cell, _)| cell).collect();
+                let cells = water.iter();
+                let cells = cells.map(|&(element, density)| (field.bricks.cell(element), density));
+                report.densest_at = self.model.scene.densest_cell(cells);
+                return Ok((
+                    report,
+                    water.into_iter().map(|(_, density)| density).collect(),
+                ));
             }
         }
     }
@@ -552,6 +560,7 @@ impl Solver for Flip {
             capped: done.capped,
             boundary_work: done.boundary_work,
             projection: done.projection,
+            densest_at: done.densest_at,
             ..self.model.scene.report(&self.state, density.into_iter())
         };
         Ok((self.state.clone(), report))

@@ -448,6 +448,7 @@ impl Solver for Pbf {
             capped,
             boundary_work,
             projection: self.grid.as_ref().map(|_| all),
+            densest_at: self.scene.densest_particle(&self.state, &density),
             ..self.scene.report(&self.state, density.into_iter())
         };
         Ok((self.state.clone(), report))

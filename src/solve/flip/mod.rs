@@ -490,10 +490,9 @@ impl Solver for Flip {
                 last => breach.in_substep(last),
             }
         })?;
-        let density = if self.state.is_empty() {
-            Vec::new()
-        } else {
-            self.densities()?
+        let (density, densest_at) = match self.state.is_empty() {
+            true => Default::default(),
+            false => self.densities()?,
         };
         let capped = self.field(COUNTERS, 1)?[0].capped;
         self.frame += 1;
@@ -508,9 +507,8 @@ impl Solver for Flip {
             capped: u64::from(capped),
             boundary_work: totals.work,
             projection: Some(totals.projection),
-            ..self
-                .scene
-                .report(&self.state, density.into_iter().map(f64::from))
+            densest_at,
+            ..self.scene.report(&self.state, density.into_iter())
         };
         Ok((self.state.clone(), report))
     }

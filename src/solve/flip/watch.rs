@@ -91,14 +91,23 @@ impl Flip {
             .collect())
     }
 
-    /// Relative densities in cells of water, as the last substep found them.
-    pub(super) fn densities(&self) -> Result<Vec<f32>, SolveError> {
+    /// Relative densities in cells of water, as the last substep found them, and where the densest is.
+    pub(super) fn densities(&self) -> Result<(Vec<f64>, Option<[f64; 3]>), SolveError> {
         let cells = (self.bricks.wet as usize + 1) * CELLS as usize;
         let wanted = (DENSITY.first(cells), CELL_KIND.first(cells));
         let (density, kind) = self.program.download(wanted)?;
-        let of_cells = density.into_iter().zip(kind);
+        let of_cells = (0u32..).zip(density).zip(kind);
         let in_water = of_cells.filter(|&(_, kind)| kind == FLUID);
-        Ok(in_water.map(|(density, _)| density).collect())
+        let water: Vec<(u32, f64)> = in_water
+            .map(|((element, density), _)| (element, f64::from(density)))
+            .collect();
+        let cells = water.iter();
+        let densest = (self.scene)
+            .densest_cell(cells.map(|&(element, density)| (self.bricks.cell(element), density)));
+        Ok((
+            water.into_iter().map(|(_, density)| density).collect(),
+            densest,
+        ))
     }
 
     /// See [`Gauge::taken`].

@@ -463,6 +463,7 @@ impl Solver for Pbf {
             searched: u64::from(counters.searched),
             boundary_work: work + grid.as_ref().map_or(0.0, |grid| grid.1),
             projection: grid.map(|grid| grid.0),
+            densest_at: self.scene.densest_particle(&self.state, &density),
             ..self.scene.report(&self.state, density.into_iter())
         };
         Ok((self.state.clone(), report))

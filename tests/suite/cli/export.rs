@@ -464,9 +464,13 @@ fn a_camera_s_fitted_film_is_exported() {
         job.expect(0, &format!("export cache --usd {out} --look look.toml"));
         let text = fs::read_to_string(job.path(out)).unwrap();
         ["focalLength", "horizontalAperture", "verticalAperture"].map(|key| {
-            let line = text.lines().find(|line| line.contains(key));
-            let line = line.unwrap_or_else(|| panic!("no {key} in {text}"));
-            line.rsplit(" = ").next().unwrap().parse::<f64>().unwrap()
+            let (_, behind) = text.split_once(key).unwrap();
+            // Of frames, the first one's.
+            let from = behind.strip_prefix(".timeSamples = {").unwrap_or(behind);
+            let value = from.trim_start_matches(" = ").trim();
+            let value = value.strip_prefix("1: ").unwrap_or(value);
+            let end = value.find([',', '\n']).unwrap();
+            value[..end].parse::<f64>().unwrap()
         })
     };
     let near = |a: [f64; 3], b: [f64; 3]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-6);

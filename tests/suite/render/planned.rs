@@ -62,11 +62,9 @@ fn what_is_planned_for_a_frame_is_refused_where_drawing_it_is() {
         };
         assert_eq!(refused(largest.bytes), (None, None), "{more}");
         let (planned, drawn) = refused(largest.bytes - 4);
-        assert!(
-            drawn
-                .as_deref()
-                .is_some_and(|said| said.contains(&largest.name))
-        );
+        let said = drawn.as_deref().unwrap_or_default();
+        // Of equals any.
+        assert!(names.iter().any(|name| said.contains(name)), "{drawn:?}");
         assert_eq!(planned, drawn);
         // The control: what the number of particles alone lets expect, a brick for 24 of them, is beyond that binding.
         let bricks = count.next_power_of_two() / 24;

@@ -122,6 +122,7 @@ pub fn report(frame: u32) -> Value {
         volume: None,
         projection: None,
         exchange: None,
+        densest_at: None,
     })
     .unwrap()
 }

@@ -28,8 +28,13 @@ fn middle(image: &Image) -> [f64; 2] {
     first.map(|of| of / sum)
 }
 
+/// It looks up, so that no ground is seen.
+fn eye() -> Eye {
+    Eye::new([5.0, 1.0, 1.0], [5.0, 6.0, 8.0], 1.0)
+}
+
 fn drawn(method: &'static str, film: [f64; 2], fit: &str) -> Image {
-    let eye = Eye::new([5.0, 1.0, 1.0], [5.0, 1.0, 9.0], 1.0);
+    let eye = eye();
     let setup = Setup {
         samples: 16,
         method,
@@ -101,8 +106,8 @@ fn a_point_is_where_the_fit_of_the_film_has_it() {
                 assert!((found - other).abs() > 0.5, "{method} {fit}: {found}");
             }
             // The header's matrix has the ball's centre there too.
-            let eye = DVec3::new(5.0, 1.0, 1.0);
-            let point = eye + DVec3::new(-x, y, z);
+            let [to_right, to_top, forward] = eye().axes();
+            let point = eye().position + x * to_right + y * to_top + z * forward;
             let row = point.extend(1.0).to_array();
             let matrix = image.view.unwrap().world_to_ndc;
             let sum = |column: usize| -> f64 {

@@ -1,0 +1,143 @@
+//! Warnings that frame after frame may have: said once a job, and at its end where it was worst.
+
+use serde_json::{Value, json};
+
+/// A warning about a frame.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Recurring {
+    /// Of what kind, as events call it.
+    pub(crate) what: &'static str,
+    /// The frame.
+    pub(crate) frame: u32,
+    /// How bad it is, beside others of its kind.
+    pub(crate) size: f64,
+    /// A sentence about the frame.
+    pub(crate) text: String,
+    /// Further keys of the event.
+    pub(crate) event: Value,
+}
+
+impl Recurring {
+    /// The line and the event of the frame.
+    fn said(&self) -> (String, Value) {
+        let text = format!("frame {}: {}", self.frame, self.text);
+        let mut event = self.event.clone();
+        event["event"] = json!("warning");
+        event["what"] = json!(self.what);
+        event["frame"] = json!(self.frame);
+        event["text"] = json!(text);
+        (format!("warning: {text}"), event)
+    }
+}
+
+/// Warnings of one kind, in a job.
+struct Kind {
+    worst: Recurring,
+    frames: u64,
+    first: u32,
+    last: u32,
+}
+
+/// Those of a job, by kind, in the order in which the kinds came.
+#[derive(Default)]
+pub(super) struct Recurrences(Vec<Kind>);
+
+impl Recurrences {
+    /// Takes a warning; the line and the event to say now, where it is the first of its kind.
+    pub(super) fn add(&mut self, warning: Recurring) -> Option<(String, Value)> {
+        let known = self.0.iter_mut().find(|it| it.worst.what == warning.what);
+        let Some(kind) = known else {
+            let (line, event) = warning.said();
+            self.0.push(Kind {
+                first: warning.frame,
+                last: warning.frame,
+                frames: 1,
+                worst: warning,
+            });
+            let more = "; of the frames after it the end tells the worst";
+            return Some((format!("{line}{more}"), event));
+        };
+        kind.frames += 1;
+        kind.last = warning.frame;
+        if warning.size > kind.worst.size {
+            kind.worst = warning;
+        }
+        None
+    }
+
+    /// What is left to say at the end of the job, of kinds that more than one frame had; after it nothing is.
+    pub(super) fn end(&mut self) -> Vec<(String, Value)> {
+        let kinds = std::mem::take(&mut self.0).into_iter();
+        let more = kinds.filter(|kind| kind.frames > 1);
+        more.map(|kind| {
+            let Kind {
+                worst,
+                frames,
+                first,
+                last,
+            } = kind;
+            let (_, mut event) = worst.said();
+            event["frames"] = json!(frames);
+            event["first"] = json!(first);
+            event["last"] = json!(last);
+            let line = format!(
+                "warning: in {frames} of frames {first} to {last}, worst in frame {}: {}",
+                worst.frame, worst.text
+            );
+            (line, event)
+        })
+        .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn crowded(frame: u32, size: f64) -> Recurring {
+        Recurring {
+            what: "crowded cell",
+            frame,
+            size,
+            text: format!("a cell holds {size:.1} times"),
+            event: json!({ "density_error_max": size - 1.0 }),
+        }
+    }
+
+    #[test]
+    fn a_kind_is_said_once_and_its_worst_at_the_end() {
+        let mut told = Recurrences::default();
+        let (line, event) = told.add(crowded(5, 2.5)).unwrap();
+        assert!(line.starts_with("warning: frame 5: a cell holds 2.5 times; of the frames"));
+        assert_eq!(
+            event,
+            json!({
+                "event": "warning", "what": "crowded cell", "frame": 5, "density_error_max": 1.5,
+                "text": "frame 5: a cell holds 2.5 times",
+            })
+        );
+        assert_eq!(told.add(crowded(6, 4.0)), None);
+        assert_eq!(told.add(crowded(9, 3.0)), None);
+        // Another kind is said too, and needs no summary where one frame alone has it.
+        let other = Recurring {
+            what: "density",
+            ..crowded(7, 1.0)
+        };
+        assert!(told.add(other).is_some());
+        let end = told.end();
+        assert_eq!(end.len(), 1);
+        assert_eq!(
+            end[0].0,
+            "warning: in 3 of frames 5 to 9, worst in frame 6: a cell holds 4.0 times"
+        );
+        assert_eq!(
+            end[0].1,
+            json!({
+                "event": "warning", "what": "crowded cell", "frame": 6, "density_error_max": 3.0, "frames": 3, "first": 5,
+                "last": 9, "text": "frame 6: a cell holds 4.0 times",
+            })
+        );
+        // The next job begins anew.
+        assert!(told.end().is_empty() && told.add(crowded(1, 2.1)).is_some());
+    }
+}

@@ -1,0 +1,66 @@
+//! Where a report's largest density is, on the device and in f64.
+
+use glam::DVec3;
+use swell::{
+    domain::{boundary::Boundary, particles::Particles, solver::Solver},
+    reference::{flip::Flip, pbf::Pbf},
+};
+
+use crate::support::{D, context, flip, lattice, noise, scene, solver};
+
+/// 60 particles more, within a tenth of a cell of `middle`.
+fn with_clump(mut water: Particles, middle: DVec3, within: f64) -> Particles {
+    for k in 0..60u64 {
+        let offset = DVec3::from_array([0, 1, 2].map(|axis| noise(7 * k + axis)));
+        water
+            .position
+            .push((middle + within * offset).as_vec3().to_array());
+        water.velocity.push([0.0; 3]);
+        water.id.push(water.id.len() as u32);
+    }
+    water
+}
+
+/// A clump in one cell, or in another, which is the control: the report names the middle of that cell, in the coordinates of a scene
+/// whose zero lies elsewhere.
+#[test]
+fn the_densest_cell_is_where_a_clump_is() {
+    let mut scene = flip::scene([8.0; 3]);
+    scene.origin = DVec3::new(1000.0, 0.0, -500.0);
+    scene.water.gravity = DVec3::ZERO;
+    flip::flip(&mut scene).density_correction = false;
+    for cell in [[3.0, 1.0, 5.0], [5.0, 2.0, 2.0]] {
+        let middle = (DVec3::from(cell) + 0.5) * flip::DX;
+        let water = with_clump(flip::block([0; 3], [8, 4, 8]), middle, 0.1 * flip::DX);
+        let mut gpu = flip::solver(&context(), &scene, &water);
+        let mut reference = Flip::new(&scene, &Boundary::default());
+        reference.load(0, &water).unwrap();
+        let reports = [gpu.advance().unwrap().1, reference.advance().unwrap().1];
+        for report in reports {
+            assert!(report.density_error_max > 2.0, "{report:?}");
+            let found = DVec3::from(report.densest_at.unwrap());
+            let off = (found - scene.origin - middle).length();
+            assert!(off < 1e-9, "{found}: {off} from the clump");
+        }
+    }
+}
+
+/// The same by PBF, whose report names a particle, which has been pushed no further than the clump reaches.
+#[test]
+fn the_densest_particle_is_where_a_clump_is() {
+    let mut scene = scene([1.0; 3]);
+    scene.origin = DVec3::new(1000.0, 0.0, -500.0);
+    scene.water.gravity = DVec3::ZERO;
+    let block = lattice([0.0; 3], [10, 5, 10], [D; 3]);
+    for middle in [DVec3::new(0.31, 0.22, 0.64), DVec3::new(0.73, 0.18, 0.27)] {
+        let water = with_clump(block.clone(), middle, 0.3 * D);
+        let mut gpu = solver(&context(), &scene, &water, &Boundary::default());
+        let mut reference = Pbf::new(&scene, &Boundary::default());
+        reference.load(0, &water).unwrap();
+        for report in [gpu.advance().unwrap().1, reference.advance().unwrap().1] {
+            let found = DVec3::from(report.densest_at.unwrap());
+            let off = (found - scene.origin - middle).length();
+            assert!(off < 4.0 * D, "{found}: {off} from the clump");
+        }
+    }
+}
