@@ -16,7 +16,7 @@ pub(super) struct Content<'a> {
     job: &'a Job<'a>,
     pub(super) frame: u32,
     particles: OnceCell<Particles>,
-    mesh: OnceCell<WaterMesh>,
+    pub(super) mesh: OnceCell<WaterMesh>,
 }
 
 impl<'a> Content<'a> {
