@@ -3,9 +3,11 @@
 //! Every reader works on bytes already in memory, and nothing is allocated from a count that a
 //! header merely promises: counts are first held against the bytes that are there.
 
+mod needles;
 mod obj;
 pub mod parts;
 mod ply;
+mod polygons;
 mod stl;
 pub mod vdb;
 
@@ -94,8 +96,32 @@ impl MeshFormat {
     }
 }
 
-/// Unchecked result of a reader: vertices, and triangles as any index.
-type Raw = (Vec<DVec3>, Vec<[u64; 3]>);
+/// Unchecked result of a reader.
+#[derive(Default)]
+struct Raw {
+    vertices: Vec<DVec3>,
+    /// Corners of one face after another, as any index.
+    corners: Vec<u64>,
+    /// Where the corners of each face end.
+    ends: Vec<usize>,
+}
+
+impl Raw {
+    fn add_face(&mut self, corners: impl IntoIterator<Item = u64>) {
+        self.corners.extend(corners);
+        self.ends.push(self.corners.len());
+    }
+
+    /// Of triangles alone.
+    fn of_triangles(vertices: Vec<DVec3>, triangles: impl IntoIterator<Item = [u64; 3]>) -> Self {
+        let corners: Vec<_> = triangles.into_iter().flatten().collect();
+        Self {
+            vertices,
+            ends: (1..=corners.len() / 3).map(|face| 3 * face).collect(),
+            corners,
+        }
+    }
+}
 
 /// The bytes of a mesh file, at most [`MAX_FILE_BYTES`].
 ///
@@ -133,25 +159,73 @@ impl TriangleMesh {
         Self::from_bytes(&read_bytes(path)?, format, path)
     }
 
-    /// Reads a mesh from bytes; `file` only names it in errors. Polygons become fans, vertices at
-    /// the same place become one, vertices that no triangle uses are left out.
+    /// Reads a mesh from bytes; `file` only names it in errors.
     ///
     /// # Errors
-    /// [`MeshError::Malformed`] says what is wrong: no triangles, an index out of range, a vertex
-    /// that is no number, a triangle without area, or broken syntax.
+    /// Those of [`Loaded::from_bytes`].
+    pub fn from_bytes(bytes: &[u8], format: MeshFormat, file: &Path) -> Result<Self, MeshError> {
+        Ok(Loaded::from_bytes(bytes, format, file)?.mesh)
+    }
+}
+
+/// A mesh as a file has it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Loaded {
+    /// In the file's own frame and unit.
+    pub mesh: TriangleMesh,
+    /// Polygons whose outline crosses itself, in a sentence; `None` where there are none.
+    pub crossing: Option<String>,
+}
+
+impl Loaded {
+    /// Reads a mesh from bytes; `file` only names it in errors. Polygons become triangles that use all their corners, vertices at
+    /// the same place become one, vertices that no triangle uses are left out, and so are triangles without area, whose corners
+    /// their neighbours take.
+    ///
+    /// # Errors
+    /// [`MeshError::Malformed`] says what is wrong: no triangles, an index out of range, a vertex that is no number, no triangle
+    /// with an area, or broken syntax.
     pub fn from_bytes(bytes: &[u8], format: MeshFormat, file: &Path) -> Result<Self, MeshError> {
         let welded = welded(bytes, format, file)?;
-        Ok(welded.mesh)
+        Ok(Self {
+            mesh: welded.mesh,
+            crossing: welded.crossing.words(),
+        })
+    }
+}
+
+/// Polygons whose outline crosses itself.
+#[derive(Default)]
+struct Crossing {
+    count: usize,
+    /// Number of the first in the file, and one of its corners.
+    first: Option<(usize, DVec3)>,
+}
+
+impl Crossing {
+    fn words(&self) -> Option<String> {
+        let (face, at) = self.first?;
+        let (count, [x, y, z]) = (self.count, at.to_array());
+        let is = if count == 1 {
+            "1 polygon crosses itself".to_owned()
+        } else {
+            format!("{count} polygons cross themselves")
+        };
+        Some(format!(
+            "{is}, the first is face {face} (counted from 1) with a corner at ({x}, {y}, {z}); each is taken as a fan about one \
+             corner, so part of it may fold back over itself; make it triangles where it was drawn"
+        ))
     }
 }
 
 /// What a reader found, checked and welded.
 struct Welded {
     mesh: TriangleMesh,
-    /// For each triangle of the mesh its number in the file.
-    kept: Vec<u32>,
-    /// Whether the second and the third corner of each changed places.
-    is_turned: bool,
+    /// Corners of each triangle of the mesh, counted over all faces of the file; from `in_file` on, those of `between`.
+    corners: Vec<[u32; 3]>,
+    in_file: usize,
+    between: Vec<needles::Between>,
+    crossing: Crossing,
 }
 
 fn welded(bytes: &[u8], format: MeshFormat, file: &Path) -> Result<Welded, MeshError> {
@@ -161,67 +235,94 @@ fn welded(bytes: &[u8], format: MeshFormat, file: &Path) -> Result<Welded, MeshE
         MeshFormat::Stl => stl::read(bytes),
         MeshFormat::Vdb => vdb::read(bytes),
     };
-    raw.and_then(weld).map_err(|detail| MeshError::Malformed {
-        file: file.to_owned(),
-        detail,
-    })
+    raw.and_then(|raw| weld(&raw))
+        .map_err(|detail| MeshError::Malformed {
+            file: file.to_owned(),
+            detail,
+        })
 }
 
-/// Checks what a reader found and welds vertices at the same place, whatever the format: STL has
+/// Checks what a reader found, cuts polygons into triangles, and welds vertices at the same place, whatever the format: STL has
 /// no shared vertices, and exporters split OBJ and PLY ones along seams.
-fn weld((vertices, triangles): Raw) -> Result<Welded, String> {
-    if triangles.is_empty() {
+fn weld(raw: &Raw) -> Result<Welded, String> {
+    if raw.ends.is_empty() {
         return Err("no triangles".into());
     }
-    let mut mesh = TriangleMesh::default();
-    let mut kept = Vec::with_capacity(triangles.len());
+    let mut welded = Welded {
+        mesh: TriangleMesh::default(),
+        corners: Vec::with_capacity(raw.ends.len()),
+        in_file: raw.corners.len(),
+        between: Vec::new(),
+        crossing: Crossing::default(),
+    };
     let mut by_place = HashMap::new();
-    for (t, triangle) in triangles.iter().enumerate() {
-        let mut welded = [0; 3];
-        for (slot, &index) in welded.iter_mut().zip(triangle) {
-            let vertex = usize::try_from(index).ok().and_then(|i| vertices.get(i));
-            let &v = vertex.ok_or_else(|| {
-                format!(
-                    "triangle {t} refers to vertex {index}, but there are {} (counted from 0)",
-                    vertices.len()
-                )
-            })?;
-            if !(v.is_finite() && v.abs().max_element() <= MAX_COORDINATE) {
-                return Err(format!(
-                    "vertex {index} is ({}, {}, {}); allowed are numbers up to {MAX_COORDINATE:e}",
-                    v.x, v.y, v.z
-                ));
-            }
-            // + 0.0 makes one zero of the two.
-            let place = (v + DVec3::ZERO).to_array().map(f64::to_bits);
-            *slot = *by_place.entry(place).or_insert_with(|| {
-                mesh.vertices.push(v);
-                mesh.vertices.len() as u32 - 1
+    let mut begin = 0;
+    let mut places = Vec::new();
+    for (face, &end) in raw.ends.iter().enumerate() {
+        places.clear();
+        for &index in &raw.corners[begin..end] {
+            places.push(place(raw, face, index)?);
+        }
+        let cut = polygons::triangles(&places).unwrap_or_else(|polygons::Crossing| {
+            welded.crossing.count += 1;
+            welded.crossing.first.get_or_insert((face + 1, places[0]));
+            polygons::fan(&places)
+        });
+        for triangle in cut {
+            let mesh = &mut welded.mesh;
+            let vertices = triangle.map(|k| {
+                let v = places[k];
+                // + 0.0 makes one zero of the two.
+                let key = (v + DVec3::ZERO).to_array().map(f64::to_bits);
+                *by_place.entry(key).or_insert_with(|| {
+                    mesh.vertices.push(v);
+                    mesh.vertices.len() as u32 - 1
+                })
             });
+            let [a, b, c] = vertices;
+            // A triangle that comes down to an edge or a point: it has no edge that another triangle needs.
+            if a != b && b != c && c != a {
+                mesh.triangles.push(vertices);
+                welded.corners.push(triangle.map(|k| (begin + k) as u32));
+            }
         }
-        mesh.triangles.push(welded);
-        // Exporters leave slivers without area, which bound nothing and turn no winding number.
-        if mesh.area_vector(mesh.triangles.len() - 1).length_squared() == 0.0 {
-            mesh.triangles.pop();
-            continue;
-        }
-        kept.push(t as u32);
+        begin = end;
     }
+    needles::dissolve(&mut welded);
+    let Welded { mesh, corners, .. } = &mut welded;
     if mesh.triangles.is_empty() {
         return Err("no triangle has an area".into());
     }
-    let is_turned = mesh.open_edges().is_empty() && mesh.signed_volume() < 0.0;
-    if is_turned {
+    if mesh.open_edges().is_empty() && mesh.signed_volume() < 0.0 {
         // Closed and inside out: the sign of a distance does not mind, normals of samples do.
         for [_, b, c] in &mut mesh.triangles {
             std::mem::swap(b, c);
         }
+        for [_, b, c] in corners {
+            std::mem::swap(b, c);
+        }
     }
-    Ok(Welded {
-        mesh,
-        kept,
-        is_turned,
-    })
+    Ok(welded)
+}
+
+/// Where the vertex with this index is.
+fn place(raw: &Raw, face: usize, index: u64) -> Result<DVec3, String> {
+    let vertex = usize::try_from(index)
+        .ok()
+        .and_then(|i| raw.vertices.get(i));
+    let &v = vertex.ok_or_else(|| {
+        format!(
+            "face {face} refers to vertex {index}, but there are {} (counted from 0)",
+            raw.vertices.len()
+        )
+    })?;
+    if !(v.is_finite() && v.abs().max_element() <= MAX_COORDINATE) {
+        return Err(format!(
+            "vertex {index} is ({}, {}, {}); allowed are numbers up to {MAX_COORDINATE:e}",
+            v.x, v.y, v.z
+        ));
+    }
+    Ok(v)
 }
 
 /// A text file's bytes without the byte order mark that some editors put first.

@@ -21,8 +21,7 @@ use super::{
 use swell_domain::{
     answer::Answers,
     bounds::Bounds,
-    mesh::TriangleMesh,
-    mesh_file::{self, MeshFormat},
+    mesh_file::{self, Loaded, MeshFormat},
     sampling,
 };
 
@@ -386,8 +385,8 @@ fn placed_mesh(
     let file = doc.find(base_dir, &key, &spec.file)?;
     let bytes = MeshFormat::of(&file)
         .and_then(|format| Ok((format, mesh_file::read_bytes(&file)?)))
-        .and_then(|(format, bytes)| Ok((TriangleMesh::from_bytes(&bytes, format, &file)?, bytes)));
-    let (in_file, bytes) = bytes.map_err(|error| fail(chain(&error)))?;
+        .and_then(|(format, bytes)| Ok((Loaded::from_bytes(&bytes, format, &file)?, bytes)));
+    let (loaded, bytes) = bytes.map_err(|error| fail(chain(&error)))?;
     let file_hash = blake3::hash(&bytes).to_hex().to_string();
     if spec.blake3.as_ref().is_some_and(|hash| *hash != file_hash) {
         let problem = format!("{} has BLAKE3 {file_hash}", file.display());
@@ -398,7 +397,7 @@ fn placed_mesh(
         rotate_degrees: DVec3::from_array(spec.rotate_degrees),
         scale: spec.scale.into(),
     };
-    let mesh = in_file.transformed(&placement.world_from_file());
+    let mesh = loaded.mesh.transformed(&placement.world_from_file());
     let holes = mesh
         .check_inside()
         .map_err(|error| fail(format!("{}: {error}", file.display())))?;
@@ -408,5 +407,6 @@ fn placed_mesh(
         placement,
         mesh,
         holes,
+        faults: loaded.crossing.into_iter().collect(),
     })
 }

@@ -223,30 +223,34 @@ pub struct PlacedMesh {
     pub mesh: TriangleMesh,
     /// Holes that it is taken with; world coordinates, metres.
     pub holes: Holes,
+    /// Other faults of the file that it is taken with, a sentence each.
+    pub faults: Vec<String>,
 }
 
 impl PlacedMesh {
-    /// That it is open, with its holes; `None` for a closed mesh.
-    fn warning(&self) -> Option<String> {
-        let name = self.name();
-        (!self.holes.0.is_empty()).then(|| {
+    /// What the mesh is taken with: its holes, and faults of its file.
+    fn warnings(&self) -> Vec<String> {
+        let name = self.file.file_name().unwrap_or_default().to_string_lossy();
+        let open = (!self.holes.0.is_empty()).then(|| {
             format!(
                 "{name} is open and taken as closed: {}; inside is where its winding number is above one half, about \
                  as if a flat cap closed each hole",
                 self.holes
             )
-        })
+        });
+        let faults = self.faults.iter().map(|fault| format!("{name}: {fault}"));
+        open.into_iter().chain(faults).collect()
     }
 }
 
 impl Scene {
-    /// What a user has to know of a scene that is taken all the same, a sentence each: its open meshes, and its lints.
+    /// What a user has to know of a scene that is taken all the same, a sentence each: faults of its meshes, and its lints.
     pub fn warnings(&self) -> Vec<String> {
         let placed = self.water.meshes.iter().chain(&self.solids);
         let moving = self.moving_solids.iter().map(|solid| &solid.placed);
         let placed = placed.chain(moving).chain(self.source_meshes());
-        let open = placed.filter_map(PlacedMesh::warning);
-        open.chain(self.lints()).collect()
+        let faults = placed.flat_map(PlacedMesh::warnings);
+        faults.chain(self.lints()).collect()
     }
 }
 

@@ -91,6 +91,7 @@ mod scene {
     mod faults;
     mod fuzz_inputs;
     mod lint;
+    mod meshes;
     mod untrusted;
 }
 mod solve {

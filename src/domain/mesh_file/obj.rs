@@ -10,7 +10,7 @@ use glam::DVec3;
 
 use super::{Raw, lines_of, quoted, without_mark};
 
-/// Vertices and triangles of all objects and groups.
+/// Vertices and faces of all objects and groups.
 pub(super) fn read(bytes: &[u8]) -> Result<Raw, String> {
     let text = lines_of(without_mark(bytes)?);
     let mut geometry = Geometry::default();
@@ -104,7 +104,7 @@ impl Geometry {
         }
         let options = tobj::LoadOptions {
             single_index: true,
-            triangulate: true,
+            triangulate: false,
             ignore_points: true,
             ignore_lines: true,
         };
@@ -112,15 +112,21 @@ impl Geometry {
             Err(tobj::LoadError::GenericFailure)
         })
         .map_err(|e| e.to_string())?;
-        let mut raw: Raw = Default::default();
-        for model in models {
-            let base = raw.0.len() as u64;
+        let mut raw = Raw::default();
+        for tobj::Model { mesh, .. } in models {
+            let base = raw.vertices.len() as u64;
             let place = |p: &[f32]| DVec3::new(p[0].into(), p[1].into(), p[2].into());
-            raw.0
-                .extend(model.mesh.positions.chunks_exact(3).map(place));
-            let corners = |t: &[u32]| [t[0], t[1], t[2]].map(|i| base + u64::from(i));
-            raw.1
-                .extend(model.mesh.indices.chunks_exact(3).map(corners));
+            raw.vertices
+                .extend(mesh.positions.chunks_exact(3).map(place));
+            // Of a mesh of triangles alone tobj counts no corners.
+            let counts = match mesh.face_arities[..] {
+                [] => vec![3; mesh.indices.len() / 3],
+                _ => mesh.face_arities,
+            };
+            let mut indices = mesh.indices.iter().map(|&i| base + u64::from(i));
+            for count in counts {
+                raw.add_face(indices.by_ref().take(count as usize));
+            }
         }
         Ok(raw)
     }

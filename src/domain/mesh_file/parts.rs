@@ -3,7 +3,9 @@
 
 use std::{collections::HashMap, path::Path};
 
-use super::{MeshError, MeshFormat, lines_of, obj, quoted, welded, without_mark};
+use glam::Vec2;
+
+use super::{MeshError, MeshFormat, Welded, lines_of, obj, quoted, welded, without_mark};
 
 /// Texture coordinates of a triangle's corners: u to the right, v upward.
 pub type Places = [[f32; 2]; 3];
@@ -33,23 +35,16 @@ impl Parts {
         if format != MeshFormat::Obj {
             return Ok(Self {
                 names: vec![Vec::new()],
-                of: vec![0; welded.kept.len()],
+                of: vec![0; welded.corners.len()],
                 places: Vec::new(),
             });
         }
-        let mut parts = Self::of_file(bytes).map_err(fail)?;
-        let picked = |k: &u32| parts.of.get(*k as usize).copied();
-        let of: Option<Vec<u32>> = welded.kept.iter().map(picked).collect();
-        // Both count a polygon of n corners as n − 2 triangles.
-        parts.of = of.ok_or_else(|| fail("its faces are counted in two ways".into()))?;
-        if !parts.places.is_empty() {
-            let kept = welded.kept.iter();
-            parts.places = kept.map(|&k| parts.places[k as usize]).collect();
+        let found = Reader::of_file(bytes).map_err(fail)?;
+        // Both readers count the corners of all faces.
+        if found.corners.len() != welded.in_file {
+            return Err(fail("its faces are counted in two ways".into()));
         }
-        if welded.is_turned {
-            parts.turn();
-        }
-        Ok(parts)
+        Ok(found.into_parts(&welded))
     }
 
     /// Follows triangles whose second and third corners change places, as a mirror's do.
@@ -58,20 +53,14 @@ impl Parts {
             places.swap(1, 2);
         }
     }
-
-    /// Of every triangle of an OBJ file, in the order of its faces.
-    fn of_file(bytes: &[u8]) -> Result<Self, String> {
-        let text = lines_of(without_mark(bytes)?);
-        let mut reader = Reader::default();
-        for (number, line) in obj::statements(&text) {
-            reader.add(number, &line)?;
-        }
-        reader.end()
-    }
 }
 
-/// Texture coordinates' numbers of a triangle's corners, counted from 1, and the line of their face.
-type Corners = Option<([i64; 3], usize)>;
+/// A corner of a face.
+struct Corner {
+    part: u32,
+    /// Number of its texture coordinate, counted from 1, and the line of its face.
+    named: Option<(i64, usize)>,
+}
 
 #[derive(Default)]
 struct Reader {
@@ -83,12 +72,22 @@ struct Reader {
     numbers: HashMap<Vec<String>, u32>,
     /// That of the faces that come next; `None` until there is one.
     current: Option<u32>,
-    of: Vec<u32>,
-    corners: Vec<Corners>,
-    parts: Parts,
+    corners: Vec<Corner>,
+    names: Vec<Vec<String>>,
 }
 
 impl Reader {
+    /// All corners of an OBJ file, in the order of its faces.
+    fn of_file(bytes: &[u8]) -> Result<Self, String> {
+        let text = lines_of(without_mark(bytes)?);
+        let mut reader = Self::default();
+        for (number, line) in obj::statements(&text) {
+            reader.add(number, &line)?;
+        }
+        reader.check()?;
+        Ok(reader)
+    }
+
     fn add(&mut self, number: usize, line: &str) -> Result<(), String> {
         let line = line.trim_start();
         let (word, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
@@ -129,14 +128,12 @@ impl Reader {
         self.current = None;
     }
 
-    /// A face as a fan about its first corner, as tobj makes one.
     fn face(&mut self, number: usize, rest: &str) -> Result<(), String> {
         let part = self.part();
         let count = self.coordinates.len() as i64;
-        let mut corners = Vec::new();
         for word in rest.split_whitespace() {
-            let named = word.split('/').nth(1).filter(|index| !index.is_empty());
-            corners.push(match named {
+            let index = word.split('/').nth(1).filter(|index| !index.is_empty());
+            let named = match index {
                 None => None,
                 Some(index) => Some(obj::index_of(index, count).ok_or_else(|| {
                     format!(
@@ -144,16 +141,9 @@ impl Reader {
                         quoted(word)
                     )
                 })?),
-            });
-        }
-        for pair in corners.windows(2).skip(1) {
-            self.of.push(part);
-            let all = [corners[0], pair[0], pair[1]];
-            let [Some(a), Some(b), Some(c)] = all else {
-                self.corners.push(None);
-                continue;
             };
-            self.corners.push(Some(([a, b, c], number)));
+            let named = named.map(|index| (index, number));
+            self.corners.push(Corner { part, named });
         }
         Ok(())
     }
@@ -166,39 +156,72 @@ impl Reader {
             .chain(&self.groups)
             .chain([&self.object]);
         let names: Vec<String> = own.filter(|name| !name.is_empty()).cloned().collect();
-        let next = self.parts.names.len() as u32;
+        let next = self.names.len() as u32;
         let part = *self.numbers.entry(names.clone()).or_insert(next);
         if part == next {
-            self.parts.names.push(names);
+            self.names.push(names);
         }
         self.current = Some(part);
         part
     }
 
-    /// Coordinates may stand behind the faces that name them.
-    fn end(mut self) -> Result<Parts, String> {
-        self.parts.of = self.of;
-        if self.corners.iter().all(Option::is_none) {
-            return Ok(self.parts);
-        }
+    /// Coordinates may come after the faces that name them.
+    fn check(&self) -> Result<(), String> {
         let count = self.coordinates.len();
-        for corners in &self.corners {
-            let mut places = None;
-            if let Some((indices, number)) = corners {
-                let mut found = [[0.0; 2]; 3];
-                for (place, &index) in found.iter_mut().zip(indices) {
-                    let at = usize::try_from(index - 1).ok();
-                    *place = *at.and_then(|at| self.coordinates.get(at)).ok_or_else(|| {
-                        format!(
-                            "line {number}: the face refers to texture coordinate {index}, but there are {count}"
-                        )
-                    })?;
-                }
-                places = Some(found);
+        let named = self.corners.iter().filter_map(|corner| corner.named);
+        for (index, number) in named {
+            if self.coordinate(index).is_none() {
+                return Err(format!(
+                    "line {number}: the face refers to texture coordinate {index}, but there are {count}"
+                ));
             }
-            self.parts.places.push(places);
         }
-        Ok(self.parts)
+        Ok(())
+    }
+
+    fn coordinate(&self, index: i64) -> Option<Vec2> {
+        let at = usize::try_from(index - 1).ok()?;
+        self.coordinates.get(at).copied().map(Vec2::from_array)
+    }
+
+    fn into_parts(self, welded: &Welded) -> Parts {
+        let file = |corner: u32| self.corners.get(corner as usize);
+        // Of corners that split triangles: those that they lie between come before them.
+        let mut between: Vec<(u32, Option<Vec2>)> = Vec::with_capacity(welded.between.len());
+        let of = |corner: u32, between: &[(u32, Option<Vec2>)]| match file(corner) {
+            Some(Corner { part, named }) => {
+                (*part, named.and_then(|(index, _)| self.coordinate(index)))
+            }
+            None => between[corner as usize - welded.in_file],
+        };
+        for it in &welded.between {
+            let [(part, from), (_, to)] = it.ends.map(|end| of(end, &between));
+            let place = from.zip(to).map(|(from, to)| from.lerp(to, it.part as f32));
+            between.push((part, place));
+        }
+        let triangles = welded.corners.iter();
+        let found = triangles.map(|t| t.map(|corner| of(corner, &between)));
+        let (of, mut places): (Vec<_>, Vec<_>) = found
+            .map(|[a, b, c]| {
+                (
+                    a.0,
+                    match [a.1, b.1, c.1] {
+                        [Some(a), Some(b), Some(c)] => {
+                            Some([a, b, c].map(|place| place.to_array()))
+                        }
+                        _ => None,
+                    },
+                )
+            })
+            .unzip();
+        if places.iter().all(Option::is_none) {
+            places.clear();
+        }
+        Parts {
+            names: self.names,
+            of,
+            places,
+        }
     }
 }
 
@@ -249,6 +272,29 @@ mod tests {
             let corners = mesh.corners(k).map(|p| [p.x as f32, p.y as f32]);
             assert_eq!(places.unwrap(), corners, "triangle {k}");
         }
+    }
+
+    /// Polygons that are not convex, and corners that neighbours of triangles without area take.
+    #[test]
+    fn cut_polygons_and_split_triangles_keep_their_corners_coordinates() {
+        // Coordinates are x and y of their vertex. The last face has no area: its corner 7 goes into the bay's first edge.
+        let text = "v 0 0 0\nv 3 0 0\nv 3 1 0\nv 1 1 0\nv 1 2 0\nv 0 2 0\nv 0.75 0 0\n\
+            vt 0 0\nvt 3 0\nvt 3 1\nvt 1 1\nvt 1 2\nvt 0 2\nvt 9 9\n\
+            g bay\nf 1/1 2/2 3/3 4/4 5/5 6/6\ng needle\nf 2/2 1/1 7/7\n";
+        let found = parts(text).unwrap();
+        let mesh =
+            TriangleMesh::from_bytes(text.as_bytes(), MeshFormat::Obj, Path::new("a.obj")).unwrap();
+        assert_eq!((mesh.triangles.len(), mesh.area()), (5, 4.0));
+        assert_eq!((found.of.len(), found.places.len()), (5, 5));
+        let bay = found.names.iter().position(|names| names == &["bay"]);
+        assert!(found.of.iter().all(|part| Some(*part as usize) == bay));
+        let mut split = 0;
+        for (k, places) in found.places.iter().enumerate() {
+            let corners = mesh.corners(k).map(|p| [p.x as f32, p.y as f32]);
+            assert_eq!(places.unwrap(), corners, "triangle {k}");
+            split += corners.iter().filter(|p| **p == [0.75, 0.0]).count();
+        }
+        assert_eq!(split, 2);
     }
 
     #[test]

@@ -48,7 +48,7 @@ fn number(property: &Property) -> Option<f64> {
     }
 }
 
-/// Vertices and triangles.
+/// Vertices and faces.
 pub(super) fn read(bytes: &[u8]) -> Result<Raw, String> {
     let (text, body) = split(without_mark(bytes)?)?;
     check_names(&text)?;
@@ -86,20 +86,19 @@ fn take(raw: &mut Raw, element: &ElementDef, payload: &[PlyElement]) -> Result<(
                 let [Some(x), Some(y), Some(z)] = vertex.place else {
                     return Err(format!("vertex {index} lacks one of x, y, z"));
                 };
-                raw.0.push(DVec3::new(x, y, z));
+                raw.vertices.push(DVec3::new(x, y, z));
             }
         }
         "face" => {
             for (index, face) in payload.iter().enumerate() {
                 let corners = face.corners.as_deref().unwrap_or_default();
-                let [first, rest @ ..] = corners else {
+                if corners.is_empty() {
                     return Err(format!("face {index} has no list vertex_indices"));
-                };
-                if rest.len() < 2 {
+                }
+                if corners.len() < 3 {
                     return Err(format!("face {index} has fewer than three corners"));
                 }
-                raw.1
-                    .extend(rest.windows(2).map(|pair| [*first, pair[0], pair[1]]));
+                raw.add_face(corners.iter().copied());
             }
         }
         _ => {}

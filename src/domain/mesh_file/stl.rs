@@ -50,16 +50,10 @@ fn read_binary(bytes: &[u8]) -> Result<Raw, String> {
     // stl_io takes every file that starts with "solid " for text; some binary ones do.
     bytes[..80].fill(0);
     let mesh = stl_io::read_stl(&mut Cursor::new(bytes)).map_err(|e| e.to_string())?;
-    Ok((
-        mesh.vertices
-            .iter()
-            .map(|v| DVec3::from_array(v.0.map(f64::from)))
-            .collect(),
-        mesh.faces
-            .iter()
-            .map(|f| f.vertices.map(|i| i as u64))
-            .collect(),
-    ))
+    let vertices = mesh.vertices.iter();
+    let vertices = vertices.map(|v| DVec3::from_array(v.0.map(f64::from)));
+    let triangles = mesh.faces.iter().map(|f| f.vertices.map(|i| i as u64));
+    Ok(Raw::of_triangles(vertices.collect(), triangles))
 }
 
 fn read_text(text: &str) -> Result<Raw, String> {
@@ -72,10 +66,10 @@ fn read_text(text: &str) -> Result<Raw, String> {
             let line = begins.get(index).copied().unwrap_or_default();
             format!("the facet that begins in line {line}: {error}")
         })?;
-        let first = raw.0.len() as u64;
+        let first = raw.vertices.len() as u64;
         let place = |v: &stl_io::Vertex| DVec3::from_array(v.0.map(f64::from));
-        raw.0.extend(facet.vertices.iter().map(place));
-        raw.1.push([first, first + 1, first + 2]);
+        raw.vertices.extend(facet.vertices.iter().map(place));
+        raw.add_face([first, first + 1, first + 2]);
     }
     Ok(raw)
 }

@@ -8,7 +8,7 @@ const SQUARE_PLY: &str = "ply\nformat ascii 1.0\nelement vertex 4\nproperty floa
     property list uchar int vertex_indices\nend_header\n0 0 0 255\n2 0 0 255\n2 2 0 255\n\
     0 2 0 255\n4 0 1 2 3\n";
 
-fn parse(format: MeshFormat, bytes: &[u8]) -> Result<TriangleMesh, String> {
+pub(super) fn parse(format: MeshFormat, bytes: &[u8]) -> Result<TriangleMesh, String> {
     TriangleMesh::from_bytes(bytes, format, Path::new("m")).map_err(|e| e.to_string())
 }
 
@@ -90,6 +90,56 @@ fn a_cube_survives_stl_and_binary_ply_welded_and_closed() {
         assert!((mesh.signed_volume() - 1.0).abs() < 1e-15);
         assert!(mesh.open_edges().is_empty());
     }
+}
+
+/// An L of area 4 whose corners come from any one on, in both formats that have polygons.
+#[test]
+fn polygons_that_are_not_convex_are_cut_alike_in_obj_and_ply() {
+    let ring = [[0, 0], [3, 0], [3, 1], [1, 1], [1, 2], [0, 2]];
+    let vertices = |prefix: &str| {
+        let line = |[x, y]: [i32; 2]| format!("{prefix}{x} {y} 0\n");
+        ring.map(line).concat()
+    };
+    let read = |first: usize| {
+        let order = |base: usize| -> Vec<String> {
+            (0..6)
+                .map(|k| ((first + k) % 6 + base).to_string())
+                .collect()
+        };
+        let obj = format!("{}f {}\n", vertices("v "), order(1).join(" "));
+        let ply = format!(
+            "ply\nformat ascii 1.0\nelement vertex 6\nproperty float x\nproperty float y\nproperty float z\n\
+             element face 1\nproperty list uchar int vertex_indices\nend_header\n{}6 {}\n",
+            vertices(""),
+            order(0).join(" ")
+        );
+        let obj = parse(MeshFormat::Obj, obj.as_bytes()).expect("an OBJ");
+        assert_eq!(parse(MeshFormat::Ply, ply.as_bytes()).as_ref(), Ok(&obj));
+        (0..4).map(|t| obj.corners(t)).collect::<Vec<_>>()
+    };
+    let whole = read(0);
+    let area = |[a, b, c]: &[DVec3; 3]| 0.5 * (*b - *a).cross(*c - *a).z;
+    assert!(whole.iter().all(|t| area(t) > 0.0));
+    assert_eq!(whole.iter().map(area).sum::<f64>(), 4.0);
+    for first in 1..6 {
+        assert_eq!(read(first), whole, "from corner {first}");
+    }
+}
+
+#[test]
+fn polygons_that_cross_themselves_are_told_of() {
+    let read = |face: &str| {
+        let text = format!("v 0 0 0\nv 2 2 0\nv 2 0 0\nv 0 1 0\nf 1 3 2\n{face}");
+        Loaded::from_bytes(text.as_bytes(), MeshFormat::Obj, Path::new("m")).expect("a mesh")
+    };
+    let said = read("f 1 2 3 4\n").crossing.expect("words");
+    assert!(
+        said.starts_with("1 polygon crosses itself, the first is face 2 (counted from 1) with a corner at (0, 0, 0);"),
+        "{said}"
+    );
+    let said = read("f 1 2 3 4\nf 2 3 4 1\n").crossing.expect("words");
+    assert!(said.starts_with("2 polygons cross themselves"), "{said}");
+    assert_eq!(read("f 1 3 2 4\n").crossing, None);
 }
 
 #[test]

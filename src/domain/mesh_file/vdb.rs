@@ -55,7 +55,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Raw, String> {
     let (scale, origin) = (DVec3::from_array(scale), DVec3::from_array(origin));
     let places = mesh.vertices.iter().map(|&v| origin + scale * v);
     let triangles = mesh.triangles.iter().map(|t| t.map(u64::from));
-    Ok((places.collect(), triangles.collect()))
+    Ok(Raw::of_triangles(places.collect(), triangles))
 }
 
 thread_local! {

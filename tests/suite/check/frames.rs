@@ -97,6 +97,7 @@ fn tank(method: Method, speed: f64) -> (Scene, Start) {
         placement: Placement::default(),
         mesh: sphere(SPHERE.0, SPHERE.1),
         holes: Default::default(),
+        faults: Vec::new(),
     };
     match speed {
         0.0 => scene.solids.push(placed),

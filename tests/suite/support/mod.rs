@@ -222,5 +222,6 @@ pub fn placed(mesh: TriangleMesh) -> PlacedMesh {
         placement: Placement::default(),
         mesh,
         holes: Default::default(),
+        faults: Vec::new(),
     }
 }

@@ -1,0 +1,359 @@
+//! Polygons as triangles that use every corner: each edge of a polygon stays the edge of one triangle, so closed meshes stay closed.
+//!
+//! A quad is cut along one of its diagonals, a polygon of more corners by a constrained Delaunay triangulation (spade), whose
+//! predicates are exact. Ear clipping that leaves out corners on a straight edge would open the mesh there.
+
+use std::collections::HashMap;
+
+use glam::{DVec2, DVec3};
+use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation as _};
+
+/// Area of a polygon over the square of its extent below which it has no normal: rounding of corners on one line.
+const FLAT: f64 = 1e-12;
+
+/// Part of a quad's area by which its second diagonal has to be better: rounding does not choose between those of a rectangle.
+const BETTER: f64 = 1e-9;
+
+/// A polygon's outline is not that of a surface: it crosses or overlaps itself.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Crossing;
+
+/// Triangles of a polygon, as positions among its `corners`, in the polygon's direction.
+///
+/// They do not depend on the corner that comes first. Corners on one line make triangles without area.
+///
+/// # Errors
+/// [`Crossing`]; a fan about a corner then has the same outline.
+pub(super) fn triangles(corners: &[DVec3]) -> Result<Vec<[usize; 3]>, Crossing> {
+    if corners.len() == 3 {
+        return Ok(vec![[0, 1, 2]]);
+    }
+    let start = first_corner(corners);
+    let turned = |k: usize| (k + start) % corners.len();
+    let places: Vec<DVec3> = (0..corners.len()).map(|k| corners[turned(k)]).collect();
+    let cut = match normal(&places) {
+        Some(_) if let [a, b, c, d] = places[..] => quad([a, b, c, d])?,
+        Some(normal) => polygon(&places, normal)?,
+        None if are_on_a_line(&places) => about_first(places.len()),
+        None => return Err(Crossing),
+    };
+    Ok(cut.into_iter().map(|t| t.map(turned)).collect())
+}
+
+/// A fan about the first corner that [`triangles`] counts from.
+pub(super) fn fan(corners: &[DVec3]) -> Vec<[usize; 3]> {
+    let start = first_corner(corners);
+    let turned = |k: usize| (k + start) % corners.len();
+    let fan = about_first(corners.len()).into_iter();
+    fan.map(|t| t.map(turned)).collect()
+}
+
+fn about_first(count: usize) -> Vec<[usize; 3]> {
+    (1..count - 1).map(|k| [0, k, k + 1]).collect()
+}
+
+/// The corner from which the sequence of places is the least of all: the same one wherever the file begins.
+fn first_corner(corners: &[DVec3]) -> usize {
+    let count = corners.len();
+    let from = |start: usize| (0..count).flat_map(move |k| corners[(start + k) % count].to_array());
+    let order = |a: &usize, b: &usize| {
+        let mut pairs = from(*a).zip(from(*b));
+        let unlike = pairs.find(|(x, y)| x != y);
+        unlike.map_or(std::cmp::Ordering::Equal, |(x, y)| x.total_cmp(&y))
+    };
+    (0..count).min_by(order).unwrap_or_default()
+}
+
+/// Twice the area vector (Newell's); `None` of a polygon that bounds no area.
+fn normal(places: &[DVec3]) -> Option<DVec3> {
+    let about = |k: usize| places[k] - places[0];
+    let sum: DVec3 = (1..places.len() - 1)
+        .map(|k| about(k).cross(about(k + 1)))
+        .sum();
+    (sum.length() > FLAT * extent_squared(places)).then_some(sum)
+}
+
+fn extent_squared(places: &[DVec3]) -> f64 {
+    let away = places.iter().map(|p| p.distance_squared(places[0]));
+    away.fold(0.0, f64::max)
+}
+
+fn are_on_a_line(places: &[DVec3]) -> bool {
+    let far = |a: &&DVec3, b: &&DVec3| {
+        let [a, b] = [a, b].map(|p| p.distance_squared(places[0]));
+        a.total_cmp(&b)
+    };
+    let along = places
+        .iter()
+        .max_by(far)
+        .map_or(DVec3::ZERO, |p| *p - places[0]);
+    let least = FLAT * along.length_squared();
+    places
+        .iter()
+        .all(|p| along.cross(*p - places[0]).length() <= least)
+}
+
+/// Along the diagonal whose smaller triangle is the larger; both count against the quad's own normal.
+fn quad(p: [DVec3; 4]) -> Result<Vec<[usize; 3]>, Crossing> {
+    let normal = (p[2] - p[0]).cross(p[3] - p[1]);
+    let area = |[a, b, c]: [usize; 3]| normal.dot((p[b] - p[a]).cross(p[c] - p[a]));
+    let least = |cut: &[[usize; 3]; 2]| area(cut[0]).min(area(cut[1]));
+    let cuts = [[[0, 1, 2], [0, 2, 3]], [[0, 1, 3], [1, 2, 3]]];
+    let [first, second] = [least(&cuts[0]), least(&cuts[1])];
+    let room = BETTER * normal.length_squared();
+    if first.max(second) < -room {
+        return Err(Crossing);
+    }
+    Ok(cuts[usize::from(second > first + room)].to_vec())
+}
+
+type Cdt = ConstrainedDelaunayTriangulation<Point2<f64>>;
+
+/// All that the outline winds about once, seen along the axis that is nearest to the normal: exact for corners on a line.
+fn polygon(places: &[DVec3], normal: DVec3) -> Result<Vec<[usize; 3]>, Crossing> {
+    let axis = normal.abs().max_position();
+    let (mut u, mut v) = ((axis + 1) % 3, (axis + 2) % 3);
+    if normal[axis] < 0.0 {
+        std::mem::swap(&mut u, &mut v);
+    }
+    let mut cdt = Cdt::new();
+    let mut corner_of = HashMap::new();
+    let mut handles = Vec::with_capacity(places.len());
+    for (k, p) in places.iter().enumerate() {
+        let at = DVec2::new(p[u], p[v]).to_array().map(settled);
+        let handle = cdt.insert(Point2::from(at)).map_err(|_| Crossing)?;
+        // Corners that only this view sees at one place are two.
+        if places[*corner_of.entry(handle).or_insert(k)] != *p {
+            return Err(Crossing);
+        }
+        handles.push(handle);
+    }
+    // How often the outline goes along an edge of the triangulation.
+    let mut along = HashMap::<_, i32>::new();
+    let mut cut = Vec::new();
+    for (k, &from) in handles.iter().enumerate() {
+        let to = handles[(k + 1) % handles.len()];
+        if from == to {
+            // A corner that the file repeats.
+            continue;
+        }
+        let edges = cdt.try_add_constraint(from, to);
+        if edges.is_empty() {
+            return Err(Crossing);
+        }
+        let ends = edges.iter().map(|edge| cdt.directed_edge(*edge).vertices());
+        let ends: Vec<_> = ends.map(|it| it.map(|end| end.fix())).collect();
+        // Corners on the edge: triangles without area lead from it to its pieces.
+        let between: Vec<_> = ends[1..].iter().map(|[begin, _]| *begin).collect();
+        let mut next = to;
+        for &at in between.iter().rev() {
+            cut.push([from, next, at].map(|handle| corner_of[&handle]));
+            next = at;
+        }
+        for [a, b] in ends {
+            *along.entry([a, b]).or_default() += 1;
+            *along.entry([b, a]).or_default() -= 1;
+        }
+    }
+    let mut winding = vec![None; cdt.num_all_faces()];
+    winding[cdt.outer_face().fix().index()] = Some(0);
+    let mut border: Vec<_> = cdt.convex_hull().map(|edge| edge.fix()).collect();
+    while let Some(edge) = border.pop() {
+        let edge = cdt.directed_edge(edge);
+        let Some(here) = winding[edge.face().fix().index()] else {
+            continue;
+        };
+        let there = edge.rev().face();
+        let ends = edge.vertices().map(|end| end.fix());
+        // To the left of an edge it winds once more than to the right.
+        let expected = here - along.get(&ends).copied().unwrap_or_default();
+        let slot = &mut winding[there.fix().index()];
+        if slot.is_some() || there.is_outer() {
+            continue;
+        }
+        *slot = Some(expected);
+        if let Some(inner) = there.as_inner() {
+            border.extend(inner.adjacent_edges().map(|edge| edge.fix()));
+        }
+    }
+    for face in cdt.inner_faces() {
+        match winding[face.fix().index()] {
+            Some(1) => cut.push(face.vertices().map(|corner| corner_of[&corner.fix()])),
+            Some(0) => {}
+            _ => return Err(Crossing),
+        }
+    }
+    Ok(cut)
+}
+
+/// Zero where a coordinate is smaller than spade takes.
+fn settled(x: f64) -> f64 {
+    if x.abs() < spade::MIN_ALLOWED_VALUE {
+        return 0.0;
+    }
+    x
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn flat(corners: &[[f64; 2]]) -> Vec<DVec3> {
+        corners
+            .iter()
+            .map(|[x, y]| DVec3::new(*x, *y, 0.5))
+            .collect()
+    }
+
+    fn area(corners: &[DVec3], cut: &[[usize; 3]]) -> f64 {
+        let of = |t: &[usize; 3]| {
+            let [a, b, c] = t.map(|k| corners[k]);
+            0.5 * (b - a).cross(c - a).length()
+        };
+        cut.iter().map(of).sum()
+    }
+
+    /// Directed edges that no opposite one cancels.
+    fn outline(cut: &[[usize; 3]]) -> Vec<[usize; 2]> {
+        let edges = cut.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
+        let mut net = HashMap::<[usize; 2], i32>::new();
+        for [a, b] in edges {
+            *net.entry([a, b]).or_default() += 1;
+            *net.entry([b, a]).or_default() -= 1;
+        }
+        let mut left: Vec<_> = net.into_iter().filter(|(_, n)| *n > 0).collect();
+        left.sort_unstable();
+        left.into_iter().map(|(edge, _)| edge).collect()
+    }
+
+    /// Each polygon's own outline and area, from wherever it begins and whichever way it faces.
+    #[test]
+    fn a_polygon_keeps_its_outline_and_area_wherever_it_begins() {
+        let polygons: [(&str, &[[f64; 2]], f64); 6] = [
+            ("rectangle", &[[0., 0.], [2., 0.], [2., 1.], [0., 1.]], 2.0),
+            ("dart", &[[0., 0.], [2., 0.], [0.4, 0.4], [0., 2.]], 0.8),
+            (
+                "triangle with a corner on an edge",
+                &[[0., 0.], [0.3, 0.], [1., 0.], [0., 1.]],
+                0.5,
+            ),
+            (
+                "L",
+                &[[0., 0.], [3., 0.], [3., 1.], [1., 1.], [1., 2.], [0., 2.]],
+                4.0,
+            ),
+            (
+                "U with corners on its edges",
+                &[
+                    [0., 0.],
+                    [0.5, 0.],
+                    [3., 0.],
+                    [3., 2.],
+                    [2., 2.],
+                    [2., 1.],
+                    [1.5, 1.],
+                    [1., 1.],
+                    [1., 2.],
+                    [0., 2.],
+                    [0., 1.3],
+                ],
+                5.0,
+            ),
+            (
+                "frame with a bridge to its hole",
+                &[
+                    [0., 0.],
+                    [3., 0.],
+                    [3., 3.],
+                    [0., 3.],
+                    [0., 0.],
+                    [1., 1.],
+                    [1., 2.],
+                    [2., 2.],
+                    [2., 1.],
+                    [1., 1.],
+                ],
+                8.0,
+            ),
+        ];
+        for (name, polygon, expected) in polygons {
+            let count = polygon.len();
+            let tilt = glam::DQuat::from_rotation_x(0.7) * glam::DQuat::from_rotation_y(2.0);
+            for (turn, is_reversed) in (0..count).flat_map(|turn| [(turn, false), (turn, true)]) {
+                let mut corners = flat(polygon);
+                corners.rotate_left(turn);
+                if is_reversed {
+                    corners.reverse();
+                }
+                for corners in [corners.clone(), corners.iter().map(|p| tilt * *p).collect()] {
+                    let cut = triangles(&corners).expect(name);
+                    assert_eq!(cut.len(), count - 2, "{name}");
+                    let found = area(&corners, &cut);
+                    // 24 roundings of a few square metres each.
+                    assert!((found - expected).abs() < 1e-14, "{name}: {found}");
+                    // Corners at one place are one: compare places.
+                    let at = |k: usize| corners[k].to_array().map(f64::to_bits);
+                    let first = |k: usize| (0..count).find(|&j| at(j) == at(k)).unwrap_or(k);
+                    let merged: Vec<_> = cut.iter().map(|t| t.map(first)).collect();
+                    let ring: Vec<_> = (0..count)
+                        .map(|k| [first(k), first((k + 1) % count)])
+                        .collect();
+                    let mut own: Vec<_> = ring
+                        .iter()
+                        .filter(|[a, b]| !ring.contains(&[*b, *a]))
+                        .copied()
+                        .collect();
+                    own.sort_unstable();
+                    assert_eq!(outline(&merged), own, "{name}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_corner_that_comes_first_changes_no_triangle() {
+        // The saddle's two diagonals bound different solids.
+        let saddle = [[0., 0., 0.], [1., 0., 1.], [1., 1., 0.], [0., 1., 1.]];
+        let saddle: Vec<_> = saddle.into_iter().map(DVec3::from_array).collect();
+        let bay = flat(&[[0., 0.], [3., 0.], [3., 1.], [1., 1.], [1., 2.], [0., 2.]]);
+        for corners in [saddle, bay] {
+            let places = |turn: usize| {
+                let mut corners = corners.clone();
+                corners.rotate_left(turn);
+                let cut = triangles(&corners).expect("no crossing");
+                cut.into_iter()
+                    .map(|t| t.map(|k| corners[k]))
+                    .collect::<Vec<_>>()
+            };
+            for turn in 1..corners.len() {
+                assert_eq!(places(turn), places(0));
+            }
+            // The control: fans about the file's first corner differ.
+            let about = |turn: usize| -> Vec<[DVec3; 3]> {
+                let mut corners = corners.clone();
+                corners.rotate_left(turn);
+                let fan = about_first(corners.len()).into_iter();
+                fan.map(|t| t.map(|k| corners[k])).collect()
+            };
+            assert_ne!(about(1), about(0));
+        }
+    }
+
+    #[test]
+    fn outlines_that_cross_are_refused_and_lines_are_not() {
+        let crossing: [&[[f64; 2]]; 4] = [
+            // A bow tie of no net area, one of some, a star, a ring that goes round twice.
+            &[[0., 0.], [1., 1.], [1., 0.], [0., 1.]],
+            &[[0., 0.], [2., 2.], [2., 0.], [0., 1.]],
+            &[[0., 1.], [1., -1.], [-1., 0.3], [1., 0.3], [-1., -1.]],
+            &[[0., 0.], [3., 0.], [3., 3.], [0., 0.], [3., 0.], [3., 3.]],
+        ];
+        for corners in crossing.map(flat) {
+            assert_eq!(triangles(&corners), Err(Crossing));
+            assert_eq!(fan(&corners).len(), corners.len() - 2);
+        }
+        let line = flat(&[[0., 0.], [1., 0.], [2., 0.], [0.5, 0.]]);
+        let cut = triangles(&line).expect("a line");
+        assert_eq!((cut.len(), area(&line, &cut)), (2, 0.0));
+    }
+}
