@@ -62,7 +62,7 @@ impl fmt::Display for Parts {
             _ => write!(
                 f,
                 " in one of its {count} separate parts, {lone} of which are a single triangle (vertices are joined where \
-                 they are exactly equal, and nowhere else)"
+                 they are equal, in a text to 7 digits of the mesh's size, and nowhere else)"
             ),
         }
     }

@@ -21,7 +21,7 @@ use std::{
 
 use glam::DVec3;
 
-use super::mesh::TriangleMesh;
+use super::{bounds::Bounds, mesh::TriangleMesh};
 
 /// Largest mesh file read, bytes. A scan of ten million triangles is half of it in binary.
 pub const MAX_FILE_BYTES: u64 = 1 << 30;
@@ -96,9 +96,28 @@ impl MeshFormat {
     }
 }
 
+/// How exact a file's coordinates are.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Digits {
+    /// Decimals, read in 64 bits; the program that wrote them may have had fewer.
+    #[default]
+    Text,
+    /// 32-bit floats.
+    Single,
+    /// 64-bit floats.
+    Double,
+}
+
+/// Half the distance of neighbouring 32-bit floats about `x`.
+fn rounding_of_single(x: f64) -> f64 {
+    let x = x.abs() as f32;
+    0.5 * (f64::from(x.next_up()) - f64::from(x))
+}
+
 /// Unchecked result of a reader.
 #[derive(Default)]
 struct Raw {
+    digits: Digits,
     vertices: Vec<DVec3>,
     /// Corners of one face after another, as any index.
     corners: Vec<u64>,
@@ -113,9 +132,14 @@ impl Raw {
     }
 
     /// Of triangles alone.
-    fn of_triangles(vertices: Vec<DVec3>, triangles: impl IntoIterator<Item = [u64; 3]>) -> Self {
+    fn of_triangles(
+        digits: Digits,
+        vertices: Vec<DVec3>,
+        triangles: impl IntoIterator<Item = [u64; 3]>,
+    ) -> Self {
         let corners: Vec<_> = triangles.into_iter().flatten().collect();
         Self {
+            digits,
             vertices,
             ends: (1..=corners.len() / 3).map(|face| 3 * face).collect(),
             corners,
@@ -173,6 +197,8 @@ impl TriangleMesh {
 pub struct Loaded {
     /// In the file's own frame and unit.
     pub mesh: TriangleMesh,
+    /// How exact its coordinates are.
+    pub digits: Digits,
     /// Polygons whose outline crosses itself, in a sentence; `None` where there are none.
     pub crossing: Option<String>,
 }
@@ -189,8 +215,24 @@ impl Loaded {
         let welded = welded(bytes, format, file)?;
         Ok(Self {
             mesh: welded.mesh,
+            digits: welded.digits,
             crossing: welded.crossing.words(),
         })
+    }
+
+    /// The coordinate that is farthest from zero, in the file's unit.
+    pub fn farthest(&self) -> f64 {
+        let all = self.mesh.vertices.iter();
+        all.flat_map(|v| v.to_array())
+            .fold(0.0, |far: f64, x| if x.abs() > far.abs() { x } else { far })
+    }
+
+    /// By how much 32-bit floats round the farthest coordinate along each axis at most, in the file's unit. That is also what the
+    /// decimals of a text may be off, where the program that wrote them had 32 bits.
+    pub fn rounding(&self) -> DVec3 {
+        let all = self.mesh.vertices.iter();
+        let far = all.fold(DVec3::ZERO, |far, v| far.max(v.abs()));
+        far.map(rounding_of_single)
     }
 }
 
@@ -225,6 +267,7 @@ struct Welded {
     corners: Vec<[u32; 3]>,
     in_file: usize,
     between: Vec<needles::Between>,
+    digits: Digits,
     crossing: Crossing,
 }
 
@@ -253,8 +296,10 @@ fn weld(raw: &Raw) -> Result<Welded, String> {
         corners: Vec::with_capacity(raw.ends.len()),
         in_file: raw.corners.len(),
         between: Vec::new(),
+        digits: raw.digits,
         crossing: Crossing::default(),
     };
+    let joined = Joined::of(raw);
     let mut by_place = HashMap::new();
     let mut begin = 0;
     let mut places = Vec::new();
@@ -272,9 +317,7 @@ fn weld(raw: &Raw) -> Result<Welded, String> {
             let mesh = &mut welded.mesh;
             let vertices = triangle.map(|k| {
                 let v = places[k];
-                // + 0.0 makes one zero of the two.
-                let key = (v + DVec3::ZERO).to_array().map(f64::to_bits);
-                *by_place.entry(key).or_insert_with(|| {
+                *by_place.entry(joined.key(v)).or_insert_with(|| {
                     mesh.vertices.push(v);
                     mesh.vertices.len() as u32 - 1
                 })
@@ -303,6 +346,40 @@ fn weld(raw: &Raw) -> Result<Welded, String> {
         }
     }
     Ok(welded)
+}
+
+/// Which vertices are one.
+struct Joined {
+    /// Least coordinates, and the step within which decimals are the same place; `None` of binary files: what is equal.
+    steps: Option<(DVec3, f64)>,
+}
+
+impl Joined {
+    /// Part of a mesh's size: the last of the bits that a 32-bit float has. Programs that compute in 64 bits write the corner that two
+    /// faces share with last digits that differ.
+    const STEP: f64 = 1.0 / 16_777_216.0;
+
+    fn of(raw: &Raw) -> Self {
+        let used = raw.corners.iter();
+        let used = used.filter_map(|&index| raw.vertices.get(usize::try_from(index).ok()?));
+        let around = Bounds::of_points(used.copied()).filter(|_| raw.digits == Digits::Text);
+        // A power of two: no decimal with few digits is midway between two of its multiples.
+        let step = |around: &Bounds| around.size().max_element().log2().ceil().exp2() * Self::STEP;
+        Self {
+            steps: around
+                .map(|around| (around.min, step(&around)))
+                .filter(|(_, step)| *step > 0.0),
+        }
+    }
+
+    fn key(&self, v: DVec3) -> [u64; 3] {
+        let place = match self.steps {
+            Some((least, step)) => ((v - least) / step).round(),
+            None => v,
+        };
+        // + 0.0 makes one zero of the two.
+        (place + DVec3::ZERO).to_array().map(f64::to_bits)
+    }
 }
 
 /// Where the vertex with this index is.

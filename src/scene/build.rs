@@ -21,7 +21,7 @@ use super::{
 use swell_domain::{
     answer::Answers,
     bounds::Bounds,
-    mesh_file::{self, Loaded, MeshFormat},
+    mesh_file::{self, Digits, Loaded, MeshFormat},
     sampling,
 };
 
@@ -29,6 +29,9 @@ pub(super) use solver::{CHEBYSHEV_RELAXATION, RELAXATION};
 
 /// Most particles of a scene: ids are 32 bits, and 2²⁷ particles of 200 bytes fill 25 GiB.
 const MAX_PARTICLES: f64 = 134_217_728.0;
+
+/// Particle spacings between neighbouring coordinates of a mesh's file from which its shape suffers.
+const MOST_STEP: f64 = 0.01;
 
 /// Least edge of the domain, metres: no smaller than the least spacing.
 const LEAST_EDGE: f64 = 1e-8;
@@ -75,7 +78,7 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
         gravity: water.gravity,
         spacing: lattice.spacing,
         solids: &solids,
-        mesh: &|path, spec| placed_mesh(doc, base_dir, path, "file", spec),
+        mesh: &|path, spec| placed_mesh(doc, base_dir, path, "file", (spec, lattice.spacing)),
         block: &|path, spec| bounds(doc, path, spec),
     };
     let emitters = sources::emitters(doc, &spec.emitter, &around)?;
@@ -166,7 +169,7 @@ fn solids(
             let problem = format!("at most {MAX_MOVING_SOLIDS} solids can move");
             return Err(doc.fault_of_plain(&place, problem));
         }
-        let placed = placed_mesh(doc, around.base_dir, &path, "mesh", spec)?;
+        let placed = placed_mesh(doc, around.base_dir, &path, "mesh", (spec, around.spacing))?;
         moving.push(moving_solid::build(doc, &path, placed, spec, around)?);
     }
     Ok((solids, moving))
@@ -222,9 +225,13 @@ fn water(
     }
     for (index, mesh) in spec.mesh.iter().enumerate() {
         let path = format!("water.mesh[{index}]");
-        water
-            .meshes
-            .push(water_mesh(doc, base_dir, &path, mesh, domain)?);
+        water.meshes.push(water_mesh(
+            doc,
+            base_dir,
+            &path,
+            mesh,
+            (domain, lattice.spacing),
+        )?);
     }
     for (index, swarm) in spec.particles.iter().enumerate() {
         let path = format!("water.particles[{index}].at");
@@ -240,9 +247,9 @@ fn water_mesh(
     base_dir: &Path,
     path: &str,
     spec: &MeshSpec,
-    domain: &Bounds,
+    (domain, spacing): (&Bounds, f64),
 ) -> Result<PlacedMesh> {
-    let placed = placed_mesh(doc, base_dir, path, "file", spec)?;
+    let placed = placed_mesh(doc, base_dir, path, "file", (spec, spacing))?;
     if placed.mesh.bounds().is_some_and(|b| fits(&b, domain)) {
         return Ok(placed);
     }
@@ -356,7 +363,7 @@ fn static_solid(
     around: &wave_maker::Surroundings<'_>,
 ) -> Result<PlacedMesh> {
     let domain = around.domain;
-    let placed = placed_mesh(doc, around.base_dir, path, "mesh", spec)?;
+    let placed = placed_mesh(doc, around.base_dir, path, "mesh", (spec, around.spacing))?;
     let overlaps = placed
         .mesh
         .bounds()
@@ -372,13 +379,13 @@ fn static_solid(
     Err(doc.fault_of(&format!("{path}.mesh"), problem))
 }
 
-/// A mesh of the table at `path`, whose file the key `name` names.
+/// A mesh of the table at `path`, whose file the key `name` names, for particles `spacing` metres apart.
 fn placed_mesh(
     doc: &Document<'_>,
     base_dir: &Path,
     path: &str,
     name: &str,
-    spec: &MeshSpec,
+    (spec, spacing): (&MeshSpec, f64),
 ) -> Result<PlacedMesh> {
     let key = format!("{path}.{name}");
     let fail = |problem: String| doc.fault_of(&key, problem);
@@ -397,6 +404,7 @@ fn placed_mesh(
         rotate_degrees: DVec3::from_array(spec.rotate_degrees),
         scale: spec.scale.into(),
     };
+    let coarse = coarse(&loaded, &placement, spacing);
     let mesh = loaded.mesh.transformed(&placement.world_from_file());
     let holes = mesh
         .check_inside()
@@ -407,6 +415,20 @@ fn placed_mesh(
         placement,
         mesh,
         holes,
-        faults: loaded.crossing.into_iter().collect(),
+        faults: [loaded.crossing, coarse].into_iter().flatten().collect(),
+    })
+}
+
+/// Coordinates so far from zero that 32 bits do not tell particles apart, in a sentence.
+fn coarse(loaded: &Loaded, placement: &Placement, spacing: f64) -> Option<String> {
+    let reach = placement.rounding(2.0 * loaded.rounding());
+    let step = reach.max_element();
+    (loaded.digits == Digits::Single && step > MOST_STEP * spacing).then(|| {
+        format!(
+            "32-bit floats about its coordinate {} are {step:.2e} m apart, more than {MOST_STEP} of the particle spacing of {} m; \
+             save it near its own zero and let translate move it, or as text with all digits, such as OBJ",
+            shown(loaded.farthest()),
+            shown(spacing)
+        )
     })
 }

@@ -284,6 +284,11 @@ impl Placement {
             DQuat::from_rotation_z(z) * DQuat::from_rotation_y(y) * DQuat::from_rotation_x(x);
         DAffine3::from_scale_rotation_translation(self.scale, rotation, self.translate)
     }
+
+    /// Most that coordinates may be off in the world, metres, where those of the file may be off by so much.
+    pub(crate) fn rounding(&self, in_file: DVec3) -> DVec3 {
+        self.world_from_file().matrix3.abs() * in_file
+    }
 }
 
 /// One of the six domain walls.

@@ -62,7 +62,7 @@ impl Geometry {
                 let words: Vec<_> = words.collect();
                 // Six or seven words: a colour follows. Four: a weight.
                 let used = if words.len() == 4 { 4 } else { 3 };
-                let is_number = |word: &&str| word.parse::<f32>().is_ok();
+                let is_number = |word: &&str| word.parse::<f64>().is_ok();
                 if words.len() < 3 || !words[..used].iter().all(is_number) {
                     return Err(format!(
                         "line {number}: a vertex needs three numbers: {}",
@@ -115,9 +115,8 @@ impl Geometry {
         let mut raw = Raw::default();
         for tobj::Model { mesh, .. } in models {
             let base = raw.vertices.len() as u64;
-            let place = |p: &[f32]| DVec3::new(p[0].into(), p[1].into(), p[2].into());
-            raw.vertices
-                .extend(mesh.positions.chunks_exact(3).map(place));
+            let places = mesh.positions.chunks_exact(3);
+            raw.vertices.extend(places.map(DVec3::from_slice));
             // Of a mesh of triangles alone tobj counts no corners.
             let counts = match mesh.face_arities[..] {
                 [] => vec![3; mesh.indices.len() / 3],

@@ -5,10 +5,13 @@ use std::{borrow::Cow, collections::HashSet, io::ErrorKind};
 use glam::DVec3;
 use ply_rs_bw::{
     parser::{ParseError, Parser, Reader},
-    ply::{ElementDef, Encoding, Property, PropertyAccess, PropertyAccessResult, PropertyType},
+    ply::{
+        ElementDef, Encoding, KeyMap, Property, PropertyAccess, PropertyAccessResult, PropertyType,
+        ScalarType,
+    },
 };
 
-use super::{Raw, lines_of, quoted, without_mark};
+use super::{Digits, Raw, lines_of, quoted, without_mark};
 
 /// A PLY element: of a vertex its place, of a face its corners, of anything else nothing.
 #[derive(Default)]
@@ -53,7 +56,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Raw, String> {
     let (text, body) = split(without_mark(bytes)?)?;
     check_names(&text)?;
     let parser = Parser::<PlyElement>::new();
-    let header = parser
+    let mut header = parser
         .read_header(&mut Reader::new(text.as_bytes()))
         .map_err(|error| header_fault(&error, &text))?;
     let is_text = header.encoding == Encoding::Ascii;
@@ -64,7 +67,10 @@ pub(super) fn read(bytes: &[u8]) -> Result<Raw, String> {
     };
     let numbers = with_digits(&lines);
     let mut reader = Reader::new(if is_text { numbers.as_bytes() } else { body });
-    let mut raw: Raw = Default::default();
+    let mut raw = Raw {
+        digits: coordinates(&mut header.elements, is_text),
+        ..Raw::default()
+    };
     for element in header.elements.values() {
         check_promise(element, header.encoding, reader.get_ref().len())?;
         let payload = parser
@@ -77,6 +83,31 @@ pub(super) fn read(bytes: &[u8]) -> Result<Raw, String> {
         return Err(format!("no element \"face\" among {}", names.join(", ")));
     }
     Ok(raw)
+}
+
+/// How exact the vertices' coordinates are. Those of a text are read in 64 bits, whatever the header calls them.
+fn coordinates(elements: &mut KeyMap<ElementDef>, is_text: bool) -> Digits {
+    let mut digits = if is_text {
+        Digits::Text
+    } else {
+        Digits::Double
+    };
+    let Some(vertex) = elements.get_mut("vertex") else {
+        return digits;
+    };
+    for name in ["x", "y", "z"] {
+        let Some(property) = vertex.properties.get_mut(name) else {
+            continue;
+        };
+        if let PropertyType::Scalar(kind @ ScalarType::Float) = &mut property.data_type {
+            if is_text {
+                *kind = ScalarType::Double;
+            } else {
+                digits = Digits::Single;
+            }
+        }
+    }
+    digits
 }
 
 fn take(raw: &mut Raw, element: &ElementDef, payload: &[PlyElement]) -> Result<(), String> {
@@ -241,7 +272,7 @@ fn check_promise(
     encoding: Encoding,
     bytes_left: usize,
 ) -> Result<(), String> {
-    use ply_rs_bw::ply::ScalarType as S;
+    use ScalarType as S;
     let size = |scalar: &S| match scalar {
         S::Char | S::UChar => 1,
         S::Short | S::UShort => 2,

@@ -4,7 +4,7 @@ use std::io::Cursor;
 
 use glam::DVec3;
 
-use super::{Raw, lines_of, quoted, without_mark};
+use super::{Digits, Raw, lines_of, quoted, without_mark};
 
 /// Bytes before a binary file's triangles: a free text, and how many there are.
 const HEADER: usize = 84;
@@ -53,25 +53,38 @@ fn read_binary(bytes: &[u8]) -> Result<Raw, String> {
     let vertices = mesh.vertices.iter();
     let vertices = vertices.map(|v| DVec3::from_array(v.0.map(f64::from)));
     let triangles = mesh.faces.iter().map(|f| f.vertices.map(|i| i as u64));
-    Ok(Raw::of_triangles(vertices.collect(), triangles))
+    Ok(Raw::of_triangles(
+        Digits::Single,
+        vertices.collect(),
+        triangles,
+    ))
 }
 
 fn read_text(text: &str) -> Result<Raw, String> {
-    let Joined { solid, begins } = join(text)?;
+    let Joined {
+        solid,
+        begins,
+        places,
+    } = join(text)?;
     let mut solid = Cursor::new(solid);
     let facets = stl_io::create_stl_reader(&mut solid).map_err(|e| e.to_string())?;
-    let mut raw: Raw = Default::default();
+    let mut count = 0;
     for (index, facet) in facets.enumerate() {
-        let facet = facet.map_err(|error| {
+        // It is looked at for its syntax: stl_io reads coordinates in 32 bits.
+        facet.map_err(|error| {
             let line = begins.get(index).copied().unwrap_or_default();
             format!("the facet that begins in line {line}: {error}")
         })?;
-        let first = raw.vertices.len() as u64;
-        let place = |v: &stl_io::Vertex| DVec3::from_array(v.0.map(f64::from));
-        raw.vertices.extend(facet.vertices.iter().map(place));
-        raw.add_face([first, first + 1, first + 2]);
+        count += 1;
     }
-    Ok(raw)
+    if places.len() != 3 * count {
+        return Err(format!(
+            "{} lines \"vertex\" with three numbers in {count} facets",
+            places.len()
+        ));
+    }
+    let triangles = (0..count as u64).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]);
+    Ok(Raw::of_triangles(Digits::Text, places, triangles))
 }
 
 /// All solids of a text as one.
@@ -79,11 +92,13 @@ struct Joined {
     solid: String,
     /// Line in which each facet begins.
     begins: Vec<usize>,
+    /// Corners of all facets.
+    places: Vec<DVec3>,
 }
 
 fn join(text: &str) -> Result<Joined, String> {
     let mut solid = String::from("solid all\n");
-    let mut begins = Vec::new();
+    let (mut begins, mut places) = (Vec::new(), Vec::new());
     let (mut is_within, mut is_between) = (false, true);
     for (index, line) in text.lines().enumerate() {
         let line = line.trim().to_ascii_lowercase();
@@ -111,6 +126,11 @@ fn join(text: &str) -> Result<Joined, String> {
         is_between = line == "endfacet";
         // Normals are not used, and where a triangle has no area they may be no numbers.
         let words: Vec<_> = line.split_whitespace().collect();
+        if let ["vertex", x, y, z] = words[..]
+            && let [Ok(x), Ok(y), Ok(z)] = [x, y, z].map(str::parse)
+        {
+            places.push(DVec3::new(x, y, z));
+        }
         match words[..] {
             ["facet", "normal", _, _, _] => solid += "facet normal 0 0 0",
             _ => solid += &line,
@@ -121,5 +141,9 @@ fn join(text: &str) -> Result<Joined, String> {
         return Err("the last solid has no line \"endsolid\"".into());
     }
     solid += "endsolid all\n";
-    Ok(Joined { solid, begins })
+    Ok(Joined {
+        solid,
+        begins,
+        places,
+    })
 }

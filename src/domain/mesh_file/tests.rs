@@ -92,6 +92,86 @@ fn a_cube_survives_stl_and_binary_ply_welded_and_closed() {
     }
 }
 
+/// Decimals keep their digits far from zero; 32-bit floats do not have them, and the file says so.
+#[test]
+fn texts_are_read_in_64_bits() {
+    let way = DVec3::new(448_214.2, 0.0, -5_411_987.6);
+    let far = cube().transformed(&glam::DAffine3::from_translation(way));
+    let obj = |mesh: &TriangleMesh| {
+        let vertices = mesh.vertices.iter();
+        let vertices: String = vertices
+            .map(|v| format!("v {} {} {}\n", v.x, v.y, v.z))
+            .collect();
+        let faces = mesh.triangles.iter().map(|t| t.map(|v| v + 1));
+        let faces: String = faces.map(|[a, b, c]| format!("f {a} {b} {c}\n")).collect();
+        (vertices + &faces).into_bytes()
+    };
+    let ply = |mesh: &TriangleMesh, kind: &str| {
+        let vertices = mesh.vertices.iter();
+        let vertices: String = vertices
+            .map(|v| format!("{} {} {}\n", v.x, v.y, v.z))
+            .collect();
+        let faces = mesh.triangles.iter();
+        let faces: String = faces.map(|[a, b, c]| format!("3 {a} {b} {c}\n")).collect();
+        let header = format!(
+            "ply\nformat ascii 1.0\nelement vertex 8\nproperty {kind} x\nproperty {kind} y\nproperty {kind} z\n\
+             element face 12\nproperty list uchar int vertex_indices\nend_header\n"
+        );
+        (header + &vertices + &faces).into_bytes()
+    };
+    let read = |format, bytes: Vec<u8>| {
+        Loaded::from_bytes(&bytes, format, Path::new("m")).expect("a mesh")
+    };
+    for (format, bytes) in [
+        (MeshFormat::Obj, obj(&far)),
+        (MeshFormat::Ply, ply(&far, "float")),
+        (MeshFormat::Ply, ply(&far, "double")),
+        (MeshFormat::Stl, stl_of(&far, true)),
+    ] {
+        let found = read(format, bytes);
+        assert_eq!(found.digits, Digits::Text);
+        assert_eq!(found.mesh.bounds(), far.bounds(), "{format:?}");
+        assert_eq!(
+            (found.mesh.vertices.len(), found.mesh.open_edges().len()),
+            (8, 0)
+        );
+        assert_eq!(found.farthest(), -5_411_987.6);
+    }
+    // The control: floats there are half a metre apart.
+    for (format, bytes) in [
+        (MeshFormat::Ply, ply_of(&far, true)),
+        (MeshFormat::Stl, stl_of(&far, false)),
+    ] {
+        let found = read(format, bytes);
+        assert_eq!(found.digits, Digits::Single);
+        assert_ne!(found.mesh.bounds(), far.bounds(), "{format:?}");
+        assert_eq!(found.rounding().z, 0.25);
+    }
+}
+
+/// Corners that two faces share, computed in 64 bits in two ways.
+#[test]
+fn last_digits_of_a_text_part_no_corners() {
+    let cube = String::from_utf8(stl_of(&cube(), true)).expect("text");
+    for (from, to) in [
+        ("vertex 1 0 0", "vertex 0.9999999999999999 0 0"),
+        ("vertex 1 0 0", "vertex 1 -0 6.1e-17"),
+        ("vertex 1 1 1", "vertex 1.00000001 1 1"),
+    ] {
+        assert!(cube.matches(from).count() > 1, "{from}");
+        let mesh = parse(MeshFormat::Stl, cube.replacen(from, to, 1).as_bytes()).expect("a cube");
+        assert_eq!(
+            (mesh.vertices.len(), mesh.open_edges().len()),
+            (8, 0),
+            "{to}"
+        );
+    }
+    // The control: what is seen in 32 bits is another corner.
+    let torn = cube.replacen("vertex 1 1 1", "vertex 1.000001 1 1", 1);
+    let mesh = parse(MeshFormat::Stl, torn.as_bytes()).expect("a mesh");
+    assert!(mesh.vertices.len() == 9 && !mesh.open_edges().is_empty());
+}
+
 /// An L of area 4 whose corners come from any one on, in both formats that have polygons.
 #[test]
 fn polygons_that_are_not_convex_are_cut_alike_in_obj_and_ply() {

@@ -15,7 +15,7 @@ use vdb_rs::{Grid, Map, MetadataValue, VdbLevel, VdbReader};
 
 use half::with_lengths;
 
-use super::Raw;
+use super::{Digits, Raw};
 use crate::isosurface::sparse::{Band, around};
 
 /// The level set that is read where a file has several: Houdini, Blender and swell call it so.
@@ -55,7 +55,11 @@ pub(super) fn read(bytes: &[u8]) -> Result<Raw, String> {
     let (scale, origin) = (DVec3::from_array(scale), DVec3::from_array(origin));
     let places = mesh.vertices.iter().map(|&v| origin + scale * v);
     let triangles = mesh.triangles.iter().map(|t| t.map(u64::from));
-    Ok(Raw::of_triangles(places.collect(), triangles))
+    Ok(Raw::of_triangles(
+        Digits::Double,
+        places.collect(),
+        triangles,
+    ))
 }
 
 thread_local! {
