@@ -250,7 +250,11 @@ fn water_mesh(
     (domain, spacing): (&Bounds, f64),
 ) -> Result<PlacedMesh> {
     let placed = placed_mesh(doc, base_dir, path, "file", (spec, spacing))?;
-    if placed.mesh.bounds().is_some_and(|b| fits(&b, domain)) {
+    if placed
+        .mesh
+        .bounds()
+        .is_some_and(|b| fits(&b, domain, placed.rounding))
+    {
         return Ok(placed);
     }
     let problem = format!(
@@ -286,12 +290,16 @@ fn water_block(
     lattice: &Lattice,
 ) -> Result<Bounds> {
     let block = bounds(doc, path, spec)?;
-    if !fits(&block, domain) {
+    if !fits(&block, domain, DVec3::ZERO) {
         let corner = Bounds {
             min: block.min,
             max: block.min,
         };
-        let name = if fits(&corner, domain) { "max" } else { "min" };
+        let name = if fits(&corner, domain, DVec3::ZERO) {
+            "max"
+        } else {
+            "min"
+        };
         let problem = format!(
             "the water does not fit: the block reaches over {}, the domain over {}",
             extent(Some(block)),
@@ -313,10 +321,19 @@ fn water_block(
     Ok(block)
 }
 
-/// Whether `inner` lies in the domain, up to the rounding of decimal fractions.
-fn fits(inner: &Bounds, domain: &Bounds) -> bool {
-    let room = domain.grown(1e-9 * domain.size().max_element());
+/// Whether `inner` lies in the domain, up to the rounding of decimal fractions and, along each axis, of its file.
+pub(super) fn fits(inner: &Bounds, domain: &Bounds, rounding: DVec3) -> bool {
+    let most = rounding.max(DVec3::splat(1e-9 * domain.size().max_element()));
+    let room = Bounds {
+        min: domain.min - most,
+        max: domain.max + most,
+    };
     room.contains(inner.min) && room.contains(inner.max)
+}
+
+/// Whether more of `it` is in the domain than the rounding of its file.
+pub(super) fn comes_into(it: &Bounds, domain: &Bounds, rounding: DVec3) -> bool {
+    (it.min + rounding).cmplt(domain.max).all() && (it.max - rounding).cmpgt(domain.min).all()
 }
 
 fn check_particle_count(
@@ -367,7 +384,7 @@ fn static_solid(
     let overlaps = placed
         .mesh
         .bounds()
-        .is_some_and(|b| b.min.cmplt(domain.max).all() && b.max.cmpgt(domain.min).all());
+        .is_some_and(|b| comes_into(&b, domain, placed.rounding));
     if overlaps {
         return Ok(placed);
     }
@@ -405,6 +422,7 @@ fn placed_mesh(
         scale: spec.scale.into(),
     };
     let coarse = coarse(&loaded, &placement, spacing);
+    let rounding = placement.rounding(loaded.rounding());
     let mesh = loaded.mesh.transformed(&placement.world_from_file());
     let holes = mesh
         .check_inside()
@@ -415,6 +433,7 @@ fn placed_mesh(
         placement,
         mesh,
         holes,
+        rounding: rounding.min(DVec3::splat(MOST_STEP * spacing)),
         faults: [loaded.crossing, coarse].into_iter().flatten().collect(),
     })
 }

@@ -223,6 +223,9 @@ pub struct PlacedMesh {
     pub mesh: TriangleMesh,
     /// Holes that it is taken with; world coordinates, metres.
     pub holes: Holes,
+    /// Most that its coordinates may be off along each axis, metres, where the program that wrote the file had 32 bits; a hundredth of
+    /// the particle spacing at most.
+    pub rounding: DVec3,
     /// Other faults of the file that it is taken with, a sentence each.
     pub faults: Vec<String>,
 }

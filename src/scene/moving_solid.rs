@@ -4,6 +4,7 @@ use glam::{DQuat, DVec3};
 
 use super::{
     PlacedMesh, Scene, Shot,
+    build::comes_into,
     document::Document,
     error::SceneError,
     motion_spec::{MotionSpec, TurnSpec, check_speed},
@@ -334,7 +335,7 @@ fn check_way(
         (None, None) => solid.placed.mesh.bounds(),
     };
     let swept = swept.map(|b| joined(b, b.moved(way)));
-    if swept.is_some_and(|b| b.min.cmplt(domain.max).all() && b.max.cmpgt(domain.min).all()) {
+    if swept.is_some_and(|b| comes_into(&b, domain, solid.placed.rounding)) {
         return Ok(());
     }
     let problem = format!(

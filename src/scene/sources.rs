@@ -5,6 +5,7 @@ use toml::{Table, Value};
 
 use super::{
     PlacedMesh, Scene, Shot,
+    build::fits,
     document::Document,
     error::SceneError,
     spec::{BoxSpec, DrainSpec, EmitterSpec, MeshSpec},
@@ -35,6 +36,14 @@ impl Region {
         match self {
             Self::Block(block) => *block,
             Self::Mesh(placed) => placed.mesh.bounds().unwrap_or_default(),
+        }
+    }
+
+    /// Most that its file may be off along each axis, metres.
+    fn rounding(&self) -> DVec3 {
+        match self {
+            Self::Block(_) => DVec3::ZERO,
+            Self::Mesh(placed) => placed.rounding,
         }
     }
 
@@ -139,7 +148,8 @@ fn region(
     };
     let (bounds, domain) = (region.bounds(), around.domain);
     let size = bounds.size();
-    if size.min_element() < 0.5 * around.spacing {
+    let most = size + 2.0 * region.rounding();
+    if most.min_element() < 0.5 * around.spacing {
         let problem = format!(
             "its room, {} × {} × {} m, is too thin for one layer of particles {} m apart",
             shown(size.x),
@@ -149,8 +159,7 @@ fn region(
         );
         return Err(doc.fault_of(&key, problem));
     }
-    let room = domain.grown(1e-9 * domain.size().max_element());
-    if room.contains(bounds.min) && room.contains(bounds.max) {
+    if fits(&bounds, domain, region.rounding()) {
         return Ok(region);
     }
     let problem = format!(
@@ -187,7 +196,8 @@ fn check_level(
         return refuse("a level is a height, and gravity does not act along -y".to_owned());
     }
     let Bounds { min, max } = region.bounds();
-    if min.y < level && level <= max.y {
+    let rounding = region.rounding().y;
+    if min.y < level && level <= max.y + rounding {
         return Ok(());
     }
     refuse(format!(

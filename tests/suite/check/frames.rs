@@ -97,6 +97,7 @@ fn tank(method: Method, speed: f64) -> (Scene, Start) {
         placement: Placement::default(),
         mesh: sphere(SPHERE.0, SPHERE.1),
         holes: Default::default(),
+        rounding: DVec3::ZERO,
         faults: Vec::new(),
     };
     match speed {

@@ -222,6 +222,7 @@ pub fn placed(mesh: TriangleMesh) -> PlacedMesh {
         placement: Placement::default(),
         mesh,
         holes: Default::default(),
+        rounding: DVec3::ZERO,
         faults: Vec::new(),
     }
 }
