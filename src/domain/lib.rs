@@ -50,6 +50,7 @@ pub mod sph;
 pub mod statistics;
 pub mod substep;
 pub mod surface;
+pub mod text;
 pub mod thin;
 pub mod tolerance;
 mod voxels;

@@ -21,7 +21,7 @@ use std::{
 
 use glam::DVec3;
 
-use super::{bounds::Bounds, mesh::TriangleMesh};
+use super::{bounds::Bounds, mesh::TriangleMesh, text};
 
 /// Largest mesh file read, bytes. A scan of ten million triangles is half of it in binary.
 pub const MAX_FILE_BYTES: u64 = 1 << 30;
@@ -402,12 +402,9 @@ fn place(raw: &Raw, face: usize, index: u64) -> Result<DVec3, String> {
     Ok(v)
 }
 
-/// A text file's bytes without the byte order mark that some editors put first.
+/// [`text::without_mark`], with its error in words.
 fn without_mark(bytes: &[u8]) -> Result<&[u8], String> {
-    if bytes.starts_with(b"\xff\xfe") || bytes.starts_with(b"\xfe\xff") {
-        return Err("the file is text in UTF-16; save it as UTF-8".into());
-    }
-    Ok(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes))
+    text::without_mark(bytes).map_err(|error| error.to_string())
 }
 
 /// Text with one kind of line end: `\n`, also where the file has `\r\n` or `\r`.

@@ -69,7 +69,12 @@ impl<'a> Document<'a> {
         let span = error.span().unwrap_or_default();
         let name = self.text.get(span.clone()).unwrap_or_default().trim();
         if !error.message().starts_with("duplicate key") || name.is_empty() {
-            return self.fault(error.span(), String::new(), error.message().to_owned());
+            let message = error.message();
+            let hint = match self.is_of_backslash(message, &span) {
+                true => "; \\ begins an escape in double quotes: in paths use / between folders",
+                false => "",
+            };
+            return self.fault(error.span(), String::new(), format!("{message}{hint}"));
         }
         let (path, message) = match self.header_at(span.start) {
             Some(header) => (header, "a second table of this name".to_owned()),
@@ -81,6 +86,18 @@ impl<'a> Document<'a> {
             }
         };
         self.fault(Some(span), path, message)
+    }
+
+    /// Whether what is wrong at a span is how a backslash goes on.
+    fn is_of_backslash(&self, message: &str, span: &Range<usize>) -> bool {
+        let before = self.text.get(..span.end).unwrap_or_default();
+        let line = before.rsplit('\n').next().unwrap_or_default();
+        let of_escapes = [
+            "missing escaped value",
+            "too few unicode value digits",
+            "invalid value",
+        ];
+        line.contains('\\') && of_escapes.iter().any(|of| message.starts_with(of))
     }
 
     /// The dotted name in the header of a table, where `place` is on its line.

@@ -1,6 +1,6 @@
 //! From a file to a [`Scene`].
 
-use std::{fs, path::Path};
+use std::path::Path;
 
 use serde::Deserialize as _;
 
@@ -8,6 +8,7 @@ use super::{
     Reach, Scene, build, difference::younger, document::Document, error::SceneError, keys,
     spec::SceneSpec,
 };
+use swell_domain::text;
 
 impl Scene {
     /// Loads a scene file with overrides (`solver.pbf.iterations=8`: dotted keys, TOML values or
@@ -28,7 +29,7 @@ impl Scene {
         overrides: &[String],
         reach: Reach,
     ) -> Result<Self, SceneError> {
-        let text = fs::read_to_string(path).map_err(|source| SceneError::Read {
+        let text = text::read(path).map_err(|source| SceneError::Read {
             file: path.to_owned(),
             source,
         })?;

@@ -19,6 +19,8 @@ use serde::{Deserialize as _, de::DeserializeOwned};
 
 use super::{Fault, Reach, document::Document, error::SceneError, key::Key};
 
+use swell_domain::text;
+
 use camera_file::CameraFile;
 pub use film::Framing;
 pub(super) use keys::KEYS;
@@ -102,7 +104,7 @@ impl Look {
     /// # Errors
     /// As [`Look::load`].
     pub fn load_with(path: &Path, overrides: &[String], reach: Reach) -> Result<Self, LookError> {
-        let text = std::fs::read_to_string(path).map_err(|source| SceneError::Read {
+        let text = text::read(path).map_err(|source| SceneError::Read {
             file: path.to_owned(),
             source,
         })?;

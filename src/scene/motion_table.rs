@@ -8,7 +8,7 @@ use super::{
     motion_spec::check_speed,
     words::{chain, shown, shown_all},
 };
-use swell_domain::motion::Motion;
+use swell_domain::{motion::Motion, text};
 
 /// Largest motion table read, bytes: ten hours at 60 points a second.
 const MAX_TABLE_BYTES: u64 = 64 << 20;
@@ -114,20 +114,20 @@ fn check_points(
 }
 
 fn text_of(file: &Path) -> Result<String> {
-    let mut text = String::new();
+    let mut bytes = Vec::new();
     File::open(file)
-        .and_then(|file| file.take(MAX_TABLE_BYTES + 1).read_to_string(&mut text))
+        .and_then(|file| file.take(MAX_TABLE_BYTES + 1).read_to_end(&mut bytes))
         .map_err(|e| chain(&e))?;
-    match text.len() as u64 > MAX_TABLE_BYTES {
-        true => Err(format!("larger than {} MiB", MAX_TABLE_BYTES >> 20)),
-        false => Ok(text),
+    if bytes.len() as u64 > MAX_TABLE_BYTES {
+        return Err(format!("larger than {} MiB", MAX_TABLE_BYTES >> 20));
     }
+    let text = text::of(&bytes).map_err(|e| e.to_string())?;
+    Ok(text.to_owned())
 }
 
 /// Two numbers a line, each with the line that it stands on, counted from 1. Between them is a comma, a semicolon, a tab or spaces.
 /// What follows a `#`, empty lines, and titles on the first line that is not, are passed over.
 fn rows(text: &str) -> Result<Vec<(usize, [f64; 2])>> {
-    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let mut found = Vec::new();
     let mut may_be_titles = true;
     for (index, line) in text.lines().enumerate() {

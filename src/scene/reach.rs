@@ -17,9 +17,12 @@ impl Reach {
     /// Where `name` leads from `folder`.
     ///
     /// # Errors
-    /// In words where that is further than it may.
+    /// In words where that is further than it may, or the name is meant for Windows or was changed by TOML, and no such file is there.
     pub(super) fn find(self, folder: &Path, name: &Path) -> Result<PathBuf, String> {
         let path = folder.join(name);
+        if let (Some(problem), false) = (odd(&name.to_string_lossy()), path.exists()) {
+            return Err(problem);
+        }
         let is_below = match (path.canonicalize(), real(folder).canonicalize()) {
             (Ok(path), Ok(folder)) => path.starts_with(folder),
             // What is not there is not read; that it leads out is still the better message.
@@ -34,6 +37,37 @@ impl Reach {
             real(folder).display()
         ))
     }
+}
+
+/// What is odd about a path with backslashes, or with what TOML makes of them in double quotes.
+pub(super) fn odd(name: &str) -> Option<String> {
+    let escaped = |c: char| {
+        Some(match c {
+            '\u{8}' => 'b',
+            '\t' => 't',
+            '\n' => 'n',
+            '\u{c}' => 'f',
+            '\r' => 'r',
+            '\u{1b}' => 'e',
+            _ => return None,
+        })
+    };
+    let written = |between: char| -> String {
+        let letters = name.chars().map(|c| match escaped(c) {
+            Some(letter) => format!("{between}{letter}"),
+            None if c == '\\' => between.to_string(),
+            None => c.to_string(),
+        });
+        letters.collect()
+    };
+    let (as_meant, with_slashes) = (written('\\'), written('/'));
+    if let Some(letter) = name.chars().find_map(escaped) {
+        return Some(format!(
+            "{as_meant}: \\{letter} in double quotes is a control character in TOML; use / between folders: \"{with_slashes}\""
+        ));
+    }
+    name.contains('\\')
+        .then(|| format!("there is no {as_meant}; use / between folders: \"{with_slashes}\""))
 }
 
 fn real(folder: &Path) -> &Path {
@@ -63,6 +97,36 @@ mod tests {
     use std::fs;
 
     use super::*;
+
+    #[test]
+    fn paths_of_windows_and_what_toml_makes_of_them_are_named() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let find = |name: &str| Reach::Folder.find(dir.path(), Path::new(name));
+        for (name, words) in [
+            (
+                "sub\u{8}ox.obj",
+                "sub\\box.obj: \\b in double quotes is a control character in TOML; use / between folders: \"sub/box.obj\"",
+            ),
+            ("sub\ttub.obj", "sub\\ttub.obj: \\t in double quotes"),
+            (
+                "sub\\city.obj",
+                "there is no sub\\city.obj; use / between folders: \"sub/city.obj\"",
+            ),
+            (
+                "C:\\sub\\city.obj",
+                "use / between folders: \"C:/sub/city.obj\"",
+            ),
+        ] {
+            let said = find(name).expect_err(name);
+            assert!(said.contains(words), "{said}");
+        }
+        // A file that is called so is read.
+        #[cfg(unix)]
+        {
+            fs::write(dir.path().join("a\\b.obj"), "v 0 0 0").expect("written");
+            assert!(find("a\\b.obj").is_ok());
+        }
+    }
 
     #[test]
     fn no_path_leads_out_of_the_folder() {

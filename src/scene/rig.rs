@@ -7,6 +7,7 @@ use super::{
     usd_nodes::{chains, elsewhere, is_usd, layer, path_of},
     usda::{Prim, Value},
 };
+use swell_domain::text;
 
 /// What a file has, by the names that `camera.name` and `track.node` take.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -27,6 +28,7 @@ impl Rig {
     /// # Errors
     /// What is wrong, in words.
     pub fn read(bytes: &[u8]) -> Result<Self, String> {
+        let bytes = text::without_mark(bytes).map_err(|error| error.to_string())?;
         if is_usd(bytes) {
             let layer = layer(bytes)?;
             let paths = |is_wanted: &dyn Fn(&Prim) -> bool| {

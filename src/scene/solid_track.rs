@@ -15,7 +15,7 @@ use super::{
     usda::Prim,
     words::shown,
 };
-use swell_domain::{mesh::TriangleMesh, pose::Pose};
+use swell_domain::{mesh::TriangleMesh, pose::Pose, text};
 
 /// By how much lengths may change before a solid counts as one that changes its size.
 const RIGID: f64 = 1e-3;
@@ -251,6 +251,7 @@ impl Moves {
         name: Option<&str>,
         beside: Beside<'_>,
     ) -> std::result::Result<(String, Self), Problem> {
+        let bytes = text::without_mark(bytes).map_err(|error| Problem::File(error.to_string()))?;
         if usd_nodes::is_usd(bytes) {
             let layer = usd_nodes::layer(bytes).map_err(Problem::File)?;
             let all = usd_nodes::chains(&layer, &|_| true);

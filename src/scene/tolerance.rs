@@ -1,6 +1,6 @@
 //! Tolerance files: how far apart two caches or two pictures may be.
 
-use std::{collections::BTreeMap, fs, path::Path};
+use std::{collections::BTreeMap, path::Path};
 
 use serde::Deserialize;
 use toml::Spanned;
@@ -12,6 +12,7 @@ use super::{
 };
 use swell_domain::{
     aggregates::Aggregates,
+    text,
     tolerance::{FieldLimits, Limit, PictureLimits, Tolerance},
 };
 
@@ -111,7 +112,7 @@ struct LimitSpec {
 /// # Errors
 /// [`SceneError`], with file, line and key; a file that limits nothing is one.
 pub fn load(path: &Path) -> Result<Tolerance, SceneError> {
-    let text = fs::read_to_string(path).map_err(|source| SceneError::Read {
+    let text = text::read(path).map_err(|source| SceneError::Read {
         file: path.to_owned(),
         source,
     })?;

@@ -9,6 +9,7 @@ use super::{
     usda::{Layer, Prim, Value},
     words::shown,
 };
+use swell_domain::text;
 
 /// What a binary file begins with, and a package of files.
 const BINARY: &[u8] = b"PXR-USDC";
@@ -182,7 +183,7 @@ pub(super) fn layer(bytes: &[u8]) -> Result<Layer> {
     if bytes.starts_with(PACKAGE) {
         return Err(format!("a USD package; {}", flatten("shot.usdz")));
     }
-    let text = std::str::from_utf8(bytes).map_err(|_| "USD text that is not UTF-8".to_owned())?;
+    let text = text::of(bytes).map_err(|error| error.to_string())?;
     let layer = Layer::read(text)?;
     match layer.metadata.get("subLayers") {
         Some(Value::Words(names)) => Err(format!(

@@ -1,6 +1,6 @@
 //! Whitewater settings: how a stream of spray, foam and bubbles is made from a finished bake. No physics of the bake.
 
-use std::{fmt::Write as _, fs, path::Path};
+use std::{fmt::Write as _, path::Path};
 
 use serde::Deserialize;
 
@@ -11,7 +11,10 @@ use super::{
     error::SceneError,
     key::{Interval, Key},
 };
-use swell_domain::whitewater::{SUPPORT, Settings, Thresholds};
+use swell_domain::{
+    text,
+    whitewater::{SUPPORT, Settings, Thresholds},
+};
 
 /// Of spray, metres, from mist to a bucket.
 const RADIUS: Interval = 1e-6..=10.0;
@@ -162,7 +165,7 @@ impl WhitewaterSettings {
     /// # Errors
     /// That the file cannot be read, or its first fault, with line, key and what is allowed.
     pub fn load(path: &Path) -> Result<Self, SceneError> {
-        let text = fs::read_to_string(path).map_err(|source| SceneError::Read {
+        let text = text::read(path).map_err(|source| SceneError::Read {
             file: path.to_owned(),
             source,
         })?;

@@ -2,7 +2,6 @@
 
 use std::{
     fmt::{self, Write},
-    fs,
     path::Path,
 };
 
@@ -16,7 +15,7 @@ const TABLES: [&str; 4] = ["[camera]", "[image]", "[sun]", "[output]"];
 
 /// Whether a file is a look: it has tables of one. What cannot be read is none.
 pub(super) fn is_look(file: &Path) -> bool {
-    let text = fs::read_to_string(file).unwrap_or_default();
+    let text = swell_domain::text::read(file).unwrap_or_default();
     let mut lines = text
         .lines()
         .map(|line| line.split('#').next().unwrap_or(""));

@@ -2,7 +2,6 @@
 
 use std::{
     fmt::{self, Write},
-    fs,
     path::Path,
 };
 
@@ -15,7 +14,7 @@ use swell_stage::inspect::study::Outline;
 
 /// Whether a file is a study: it says of what `kind`, before its first table. What cannot be read is none.
 pub(super) fn is_study(file: &Path) -> bool {
-    let text = fs::read_to_string(file).unwrap_or_default();
+    let text = swell_domain::text::read(file).unwrap_or_default();
     let lines = text.lines().map(str::trim_start);
     lines
         .take_while(|line| !line.starts_with('['))

@@ -1,6 +1,6 @@
 mod written;
 
-use std::path::PathBuf;
+use std::{fs, path::PathBuf};
 
 use glam::DVec3;
 

@@ -15,6 +15,7 @@ use super::{
     Framing,
     usd_camera::UsdCamera,
 };
+use swell_domain::text::{self, NoText};
 
 /// Metres from the origin, at most: farther out, f32 positions are coarser than a millimetre.
 const FARTHEST: f64 = 1e5;
@@ -28,6 +29,9 @@ pub enum CameraFileError {
     /// It is no glTF file.
     #[error("neither USD as text, which begins with #usda, nor glTF that can be read: {0}")]
     Gltf(#[from] gltf::Error),
+    /// It is text in another encoding.
+    #[error(transparent)]
+    Text(#[from] NoText),
     /// It has none.
     #[error("no node of it has a camera")]
     None,
@@ -123,6 +127,7 @@ impl CameraFile {
     /// # Errors
     /// [`CameraFileError`].
     pub fn read(bytes: &[u8], name: Option<&str>, beside: Beside<'_>) -> Result<Self> {
+        let bytes = text::without_mark(bytes)?;
         if is_usd(bytes) {
             let (name, camera) = UsdCamera::read(bytes, name)?;
             let found = Self {

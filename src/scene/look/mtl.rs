@@ -4,6 +4,8 @@
 
 use std::path::PathBuf;
 
+use swell_domain::text;
+
 /// A material of a library.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Entry {
@@ -40,7 +42,8 @@ const MOST: f64 = 1e6;
 
 /// Reads a library.
 pub(super) fn read(bytes: &[u8]) -> Result<Library, String> {
-    let text = String::from_utf8_lossy(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes));
+    let bytes = text::without_mark(bytes).map_err(|error| error.to_string())?;
+    let text = String::from_utf8_lossy(bytes);
     let mut library = Library::default();
     for (number, line) in (1..).zip(text.lines()) {
         let line = line.trim();

@@ -12,7 +12,6 @@ pub mod tune;
 pub mod validation;
 
 use std::{
-    fs,
     ops::Range,
     path::{Path, PathBuf},
 };
@@ -21,8 +20,10 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::{
-    Fault, Place, Reach, Scene, document::Document, error::SceneError, keys, look::LookError,
+    Fault, Place, Reach, Scene, document::Document, error::SceneError, keys, look::LookError, reach,
 };
+
+use swell_domain::text;
 
 use comparison::SolverComparison;
 use stability::Stability;
@@ -106,7 +107,7 @@ impl Study {
     /// # Errors
     /// Those of [`Self::load`].
     pub fn load_within(path: &Path, reach: Reach) -> Result<Self, StudyFileError> {
-        let text = fs::read_to_string(path).map_err(|source| SceneError::Read {
+        let text = text::read(path).map_err(|source| SceneError::Read {
             file: path.to_owned(),
             source,
         })?;
@@ -194,8 +195,11 @@ fn unreadable(
     file: &Path,
     source: &std::io::Error,
 ) -> SceneError {
-    let problem = format!("cannot read {}: {source}", file.display());
-    doc.fault_at(named.span(), problem)
+    let cannot = || format!("cannot read {}: {source}", file.display());
+    doc.fault_at(
+        named.span(),
+        reach::odd(named.get_ref()).unwrap_or_else(cannot),
+    )
 }
 
 /// A scene file that a study names.
@@ -245,6 +249,8 @@ fn load_with(
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::{super::Method, *};
 
     #[test]

@@ -5,12 +5,9 @@
 
 mod limit;
 
-use std::{
-    fs,
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
-use swell_domain::{bounds::Bounds, sampling::block_dims};
+use swell_domain::{bounds::Bounds, sampling::block_dims, text};
 
 use super::super::{
     Iteration, Method, Reach, Scene, SceneError, Stop, flip::Preconditioner, physics_hash,
@@ -176,7 +173,7 @@ impl Tune {
     /// # Errors
     /// [`TuneError`].
     pub fn load(request: TuneRequest) -> Result<Self, TuneError> {
-        let text = fs::read_to_string(&request.scene).map_err(|source| SceneError::Read {
+        let text = text::read(&request.scene).map_err(|source| SceneError::Read {
             file: request.scene.clone(),
             source,
         })?;

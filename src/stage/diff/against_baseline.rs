@@ -40,7 +40,7 @@ pub struct Written {
 
 /// Reads a baseline.
 pub(super) fn read(file: &Path) -> Result<Baseline, DiffError> {
-    let text = fs::read_to_string(file).map_err(DiffError::at(file))?;
+    let text = swell_domain::text::read(file).map_err(DiffError::at(file))?;
     let found: Result<Baseline, String> =
         serde_json::from_str(&text).map_err(|error| error.to_string());
     let checked = found.and_then(|found| found.check().map(|()| found));

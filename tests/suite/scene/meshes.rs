@@ -247,3 +247,103 @@ fn a_solid_that_touches_the_domain_is_outside_of_it() {
     assert_has(&said, &["outside of the domain"]);
     assert!(read("-0.2999").is_ok());
 }
+
+/// Each text that a scene, a look and a study are read from, in UTF-16 with and without its mark, and in UTF-8 with one.
+#[test]
+fn texts_of_other_encodings_say_what_to_do() {
+    let job = Job::new();
+    let mesh = std::fs::read_to_string(job.path("box.obj")).unwrap();
+    let scene = std::fs::read_to_string(job.path("small.toml")).unwrap();
+    let maker = "motion = { kind = \"sine\", stroke = 0.3, period = 0.5, ramp = 0.1 }";
+    assert!(scene.contains(maker));
+    let scene = scene.replace(maker, "motion = { kind = \"table\", file = \"way.csv\" }");
+    let track = "track = { file = \"door.gltf\", node = \"door\" }";
+    let door = "{\"asset\":{\"version\":\"2.0\"},\"nodes\":[{\"name\":\"door\"}]}";
+    let look = std::fs::read_to_string(job.path("look.toml")).unwrap();
+    job.write("scene.toml", &scene);
+    job.write("way.csv", "0,0\n1,0.1\n");
+    job.write("door.gltf", door);
+    job.write("look.toml", &look);
+    let moved = scene.replace(
+        "mesh = \"box.obj\"",
+        &format!("mesh = \"box.obj\"\n{track}"),
+    );
+    job.write("moved.toml", &moved);
+    let stl = {
+        let format = swell::domain::mesh_file::MeshFormat::Obj;
+        let mesh = TriangleMesh::from_bytes(mesh.as_bytes(), format, "m".as_ref()).unwrap();
+        let mut text = "solid box\n".to_owned();
+        for t in 0..mesh.triangles.len() {
+            text += "facet normal 0 0 0\nouter loop\n";
+            for v in mesh.corners(t) {
+                text += &format!("vertex {} {} {}\n", v.x, v.y, v.z);
+            }
+            text += "endloop\nendfacet\n";
+        }
+        text + "endsolid box\n"
+    };
+    job.write("box.stl", &stl);
+    let ply = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\nelement face 4\n\
+        property list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n";
+    job.write("box.ply", ply);
+    for (file, command, code) in [
+        ("scene.toml", "inspect scene.toml", 2),
+        ("box.obj", "inspect scene.toml", 2),
+        ("way.csv", "inspect scene.toml", 2),
+        ("door.gltf", "inspect moved.toml", 2),
+        ("look.toml", "inspect look.toml", 2),
+        ("study.toml", "inspect study.toml", 2),
+        ("box.stl", "inspect box.stl", 4),
+        ("box.ply", "inspect box.ply", 4),
+        ("door.gltf", "inspect door.gltf", 4),
+    ] {
+        let text = std::fs::read_to_string(job.path(file)).unwrap();
+        let set = |bytes: &[u8]| std::fs::write(job.path(file), bytes).unwrap();
+        for marked in [format!("\u{feff}{text}"), text.clone()] {
+            let wide: Vec<u8> = marked.encode_utf16().flat_map(u16::to_le_bytes).collect();
+            set(&wide);
+            let said = job.expect(code, command);
+            assert_has(&said, &[file, "UTF-16; save it as UTF-8"]);
+            assert_eq!(said.trim_end().lines().count(), 1, "{said}");
+        }
+        // With a mark, and the control as it was.
+        set(format!("\u{feff}{text}").as_bytes());
+        job.expect(0, command);
+        set(text.as_bytes());
+        job.expect(0, command);
+    }
+}
+
+#[test]
+fn backslashes_in_paths_say_what_to_write() {
+    let job = Job::new();
+    std::fs::create_dir(job.path("sub")).unwrap();
+    std::fs::copy(job.path("box.obj"), job.path("sub/box.obj")).unwrap();
+    std::fs::copy(job.path("box.obj"), job.path("sub/city.obj")).unwrap();
+    let scene = std::fs::read_to_string(job.path("small.toml")).unwrap();
+    let named = |mesh: &str| {
+        job.write("named.toml", &scene.replace("\"box.obj\"", mesh));
+        let line = 1 + scene
+            .lines()
+            .position(|line| line.contains("box.obj"))
+            .unwrap();
+        (format!("named.toml:{line}: "), "inspect named.toml")
+    };
+    for mesh in [
+        // A control character, no escape, no escape of as many digits, a backslash of its own.
+        r#""sub\box.obj""#,
+        r#""sub\city.obj""#,
+        r#""C:\Users\box.obj""#,
+        r#"'sub\box.obj'"#,
+    ] {
+        let (place, words) = named(mesh);
+        let said = job.expect(2, words);
+        assert_has(&said, &[&place, "use / between folders"]);
+        assert!(
+            said.chars().all(|c| c == '\n' || !c.is_control()),
+            "{said:?}"
+        );
+    }
+    let (_, words) = named("\"sub/box.obj\"");
+    job.expect(0, words);
+}
