@@ -182,8 +182,14 @@ fn dry_run(request: &Request, progress: &Progress) -> Result<u8, Failure> {
         place: output::path(&request.directory),
     };
     let particles = count(found.particles as u64, "particle");
-    let words = format!(", with {particles} at the start");
-    let more = json!({ "particles": found.particles, "removed": found.removed, "disk_free": found.room.free });
+    let words = format!(
+        ", with {particles} at the start, {}",
+        output::water(found.volume)
+    );
+    let more = json!({
+        "particles": found.particles, "removed": found.removed, "volume": found.volume.made, "volume_asked": found.volume.asked,
+        "disk_free": found.room.free,
+    });
     told.tell(progress, &words, more);
     Ok(0)
 }
@@ -218,6 +224,7 @@ pub(super) fn tell(progress: &Progress, event: Event) {
             device,
             particles,
             removed,
+            volume,
             boundary_samples,
             solver,
             bytes,
@@ -261,7 +268,8 @@ pub(super) fn tell(progress: &Progress, event: Event) {
                 count => format!(", {count} boundary samples"),
             };
             let text = format!(
-                "{solver} on {device}\n{particles} particles ({removed} left out where solids are){samples}{memory}\n{span}"
+                "{solver} on {device}\n{particles} particles ({removed} left out where solids are), {}{samples}{memory}\n{span}",
+                output::water(volume)
             );
             if let Some(parent) = &parent {
                 let notes =
@@ -278,7 +286,7 @@ pub(super) fn tell(progress: &Progress, event: Event) {
                 &text,
                 json!({
                     "event": "ready", "solver": solver, "device": device, "particles": particles, "removed": removed,
-                    "boundary_samples": boundary_samples, "bytes": bytes.map(|(all, _)| all), "list_bytes": bytes.map(|(_, lists)| lists), "first": first, "last": last,
+                    "volume": volume.made, "volume_asked": volume.asked, "boundary_samples": boundary_samples, "bytes": bytes.map(|(all, _)| all), "list_bytes": bytes.map(|(_, lists)| lists), "first": first, "last": last,
                     "frames": frames, "disk_bytes": room.bytes, "disk_free": room.free,
                 }),
             );

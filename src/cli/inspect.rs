@@ -240,9 +240,10 @@ fn show_plan(out: &mut String, scene: &Scene, planned: &ScenePlan) -> fmt::Resul
     };
     writeln!(
         out,
-        "{} particles ({} left out where solids are), {samples}{} × {} × {} cells",
+        "{} particles ({} left out where solids are), {}, {samples}{} × {} × {} cells",
         plan.counts.particles,
         planned.removed,
+        output::water(planned.volume),
         plan.grid_dims[0],
         plan.grid_dims[1],
         plan.grid_dims[2]

@@ -18,8 +18,10 @@ use serde_json::{Value, json};
 
 use super::{log, progress::Progress};
 use swell_domain::solver::PassTime;
+use swell_scene::four_digits;
 use swell_stage::{
     device::{Ceilings, PassTimes, Reached},
+    prepare::Volume,
     time::Share,
 };
 
@@ -33,6 +35,15 @@ const STDERR: &str = "standard error";
 static FAILED: Mutex<Option<(&str, io::Error)>> = Mutex::new(None);
 /// Whether an event could not be written.
 static IS_SHORT: AtomicBool = AtomicBool::new(false);
+
+/// How much water there is at a start, and how much the scene asks for.
+pub(super) fn water(volume: Volume) -> String {
+    let made = format!("{} m³", four_digits(volume.made));
+    match volume.asked {
+        Some(asked) => format!("{made} of water of {} m³ asked for", four_digits(asked)),
+        None => format!("{made} of water"),
+    }
+}
 
 /// Writes an event to standard output, a line. A stream of events is whole or short: behind one that could not be written comes
 /// none, and a closed pipe is a fault as any other, for whoever asked for events has not got them.

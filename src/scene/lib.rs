@@ -72,6 +72,7 @@ pub use difference::{physics_difference, physics_hash};
 pub use effects::Effects;
 pub use error::{Fault, Place, SceneError};
 pub use reach::Reach;
+pub use words::four_digits;
 pub use write::asset_path;
 
 /// A validated scene: SI units, every default settled, every file read.

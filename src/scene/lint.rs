@@ -3,16 +3,13 @@
 mod motions;
 mod solids;
 mod still;
+mod water;
 
 use std::f64::consts::{PI, TAU};
 
 use self::still::Still;
 use super::{Method, Scene, Wall, WaveMaker, seas::STEEPEST, words::shown};
-use swell_domain::{
-    bounds::Bounds,
-    motion::{Motion, Phases, piston_height_ratio, wave_number},
-    sources::Window,
-};
+use swell_domain::motion::{Motion, Phases, piston_height_ratio, wave_number};
 
 /// In particle spacings, half a cell of FLIP. Of a sea 1.2 spacings high FLIP keeps 0.96 of the height (docs/validation.md).
 const LEAST_HEIGHT: f64 = 1.0;
@@ -90,7 +87,7 @@ impl Scene {
             lints.extend(self.lint_sine(k, maker, still));
         }
         self.lint_layers(level, &mut lints);
-        self.lint_sources(&mut lints);
+        self.lint_water(&mut lints);
         self.lint_thin(&mut lints);
         lints.extend(self.effects.lints(self.grain()));
         lints
@@ -190,46 +187,6 @@ impl Scene {
                 shown(meets),
                 shown(duration)
             ));
-        }
-    }
-
-    /// Water that enters or leaves only when the shot is over.
-    fn lint_sources(&self, lints: &mut Vec<String>) {
-        let mut emitters = self.emitters.iter().map(|it| ("emitter", it.window));
-        let mut drains = self.drains.iter().map(|it| ("drain", it.window));
-        let duration = self.shot.duration();
-        let late = |list: &mut dyn Iterator<Item = (&str, Window)>, lints: &mut Vec<String>| {
-            for (index, (name, window)) in list.enumerate() {
-                if window.from >= duration {
-                    lints.push(format!(
-                        "{name}[{index}].from: it begins after {} s, and the shot ends after {} s",
-                        shown(window.from),
-                        shown(duration)
-                    ));
-                }
-            }
-        };
-        late(&mut emitters, lints);
-        late(&mut drains, lints);
-        self.lint_rooms(lints);
-    }
-
-    /// Water that enters where a wall stands.
-    fn lint_rooms(&self, lints: &mut Vec<String>) {
-        for (index, emitter) in self.emitters.iter().enumerate() {
-            let Bounds { min, max } = emitter.shape.bounds();
-            for (k, maker) in self.wave_makers.iter().enumerate() {
-                let axis = maker.wall.axis;
-                let behind = match maker.wall.is_max {
-                    true => max[axis] - (self.domain.max[axis] - maker.room()),
-                    false => self.domain.min[axis] + maker.room() - min[axis],
-                };
-                if behind > 1e-6 {
-                    lints.push(format!(
-                        "emitter[{index}]: {behind:.3} m of its room are behind wave_maker[{k}] at rest, and nothing enters there"
-                    ));
-                }
-            }
         }
     }
 

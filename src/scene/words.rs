@@ -82,6 +82,15 @@ pub(super) fn chain(error: &dyn std::error::Error) -> String {
     text
 }
 
+/// A number that is not negative, with four digits.
+pub fn four_digits(of: f64) -> String {
+    if of == 0.0 {
+        return "0".to_owned();
+    }
+    let digits = (3.0 - of.log10().floor()).clamp(0.0, 30.0) as usize;
+    format!("{of:.digits$}")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

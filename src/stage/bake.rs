@@ -21,7 +21,7 @@ use super::{
     branch::{Branch, BranchError, BranchPoint},
     device::{Device, Identity, Opened, PassTimes, SolverError, needs},
     drive::{Drive, End, Step},
-    prepare::Start,
+    prepare::{Start, Volume},
     probes,
     replay::{self, Failure, ReplayError},
     time::Share,
@@ -59,6 +59,8 @@ pub enum Event {
         particles: usize,
         /// Left out because a solid is there.
         removed: usize,
+        /// Water at the start.
+        volume: Volume,
         /// Samples on solids.
         boundary_samples: usize,
         /// Name of the solver.
@@ -250,6 +252,7 @@ pub fn bake(
         last,
         parent,
         notes,
+        volume: start.volume(scene),
         warnings: scene.warnings(),
     });
     drive.load_watched(&start.particles, clock.frame, &state)?;

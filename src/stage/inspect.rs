@@ -17,7 +17,12 @@ use swell_gpu::{
 use swell_scene::{Scene, SceneError};
 use swell_solve::plan::{DeviceLimits, Plan, device_limits};
 
-use super::{Blame, device::needs, prepare::Start, probes, whitewater};
+use super::{
+    Blame,
+    device::needs,
+    prepare::{Start, Volume},
+    probes, whitewater,
+};
 
 pub use swell_scene::solid_grid::MOST_NODES;
 pub use swell_solve::plan::LIST_BUDGET;
@@ -99,6 +104,8 @@ pub struct ScenePlan {
     pub plan: Plan,
     /// Left out of the water because a solid is there.
     pub removed: usize,
+    /// Water at the start.
+    pub volume: Volume,
     /// Metres between the nodes of the solids' signed distance, where it is coarser than the water so as not to have more than
     /// [`MOST_NODES`].
     pub coarse_solids: Option<f64>,
@@ -167,6 +174,7 @@ pub fn plan(scene: &Scene, adapter: Option<&str>) -> Result<ScenePlan, PlanError
         plan,
         misfit,
         removed: start.removed,
+        volume: start.volume(scene),
         adapter: context.map(|context| context.info.name),
     })
 }

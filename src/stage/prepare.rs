@@ -16,6 +16,15 @@ use swell_solve::{
     plan::{Capacity, Counts, DeviceLimits, Plan},
 };
 
+/// How much water there is at a start, m³.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Volume {
+    /// That particles stand for.
+    pub made: f64,
+    /// That the scene asks for, with what lies in solids and where blocks overlap; `None` where a bake begins from a frame.
+    pub asked: Option<f64>,
+}
+
 /// A scene's start.
 #[derive(Clone, Debug)]
 pub struct Start {
@@ -23,6 +32,8 @@ pub struct Start {
     pub particles: Particles,
     /// Lattice points left out because a solid is there.
     pub removed: usize,
+    /// Volume of the water that the scene asks for, m³; `None` where it begins from a frame.
+    pub asked: Option<f64>,
     /// Solids as the solver meets them.
     pub boundary: Boundary,
     /// What enters and leaves at the frames' ends.
@@ -45,13 +56,8 @@ impl Start {
         };
         let water = scene.water.meshes.iter().map(|placed| &placed.mesh);
         let room = scene.start_domain();
-        let within = |block: &Bounds| Bounds {
-            min: block.min.max(room.min),
-            max: block.max.min(room.max),
-        };
-        let blocks: Vec<Bounds> = scene.water.blocks.iter().map(within).collect();
         let fill = fill_water(
-            &blocks,
+            &scene.start_blocks(),
             water,
             at_start.as_ref().or(boundary.distance.as_ref()),
             &room,
@@ -77,6 +83,7 @@ impl Start {
         Ok(Self {
             particles,
             removed,
+            asked: Some(scene.asked_volume()),
             boundary,
             sources: scene.sources()?,
         })
@@ -90,6 +97,7 @@ impl Start {
         Ok(Self {
             particles,
             removed: 0,
+            asked: None,
             boundary: boundary(scene)?,
             sources: scene.sources()?,
         })
@@ -107,6 +115,14 @@ impl Start {
             None => Self::of(scene)?,
             Some(_) => Self::with(scene, cache.read(cache.first_frame())?)?,
         })
+    }
+
+    /// How much water there is.
+    pub fn volume(&self, scene: &Scene) -> Volume {
+        Volume {
+            made: self.particles.len() as f64 * scene.particle_volume(),
+            asked: self.asked,
+        }
     }
 
     /// What the scene needs on a device with these limits.

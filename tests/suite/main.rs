@@ -39,6 +39,7 @@ mod cli {
     #[cfg(target_os = "linux")]
     mod terminal;
     mod view;
+    mod water;
     mod workers;
 }
 mod compare {

@@ -86,6 +86,8 @@ fn scene_json(scene: &Scene, planned: &ScenePlan) -> Value {
         "solver": scene.solver.method.name(),
         "particles": plan.counts.particles,
         "removed": planned.removed,
+        "volume": planned.volume.made,
+        "volume_asked": planned.volume.asked,
         "boundary_samples": plan.counts.boundary_samples,
         "cells": plan.grid_dims,
         "entering": scene.has_inlets().then(|| scene.most_entering().ceil()),

@@ -5,7 +5,7 @@ use std::io;
 use super::{
     BakeError, Beginning, Request, beginning, check_count, check_first, grid_record, last_frame,
 };
-use crate::prepare::Start;
+use crate::prepare::{Start, Volume};
 use swell_cache::{CacheError, CacheReader, Parent, frame, refuse_occupied, vdb};
 use swell_domain::{keep::Keep, particles::Particles};
 use swell_scene::Scene;
@@ -55,6 +55,8 @@ pub struct Expected {
     pub particles: usize,
     /// Left out because a solid is there.
     pub removed: usize,
+    /// Water at the start.
+    pub volume: Volume,
     /// What the frames would take on the disk, and what it has.
     pub room: Room,
     /// Where a new bake begins from a frame of another cache, that frame.
@@ -104,6 +106,7 @@ pub fn expected(request: &Request) -> Result<Expected, BakeError> {
         removed: start.removed,
         room,
         parent,
+        volume: start.volume(scene),
         warnings: [scene.warnings(), notes].concat(),
     })
 }

@@ -54,6 +54,7 @@ fn drops_at_round_places_are_within_tolerance_and_a_fault_in_drag_is_seen() {
                     ..Particles::default()
                 },
                 removed: 0,
+                asked: None,
                 sources: Default::default(),
                 boundary: Boundary::default(),
             };

@@ -86,6 +86,7 @@ fn landing(floor: &Boundary, height: f64) -> (Scene, Start) {
     let start = Start {
         particles,
         removed: 0,
+        asked: None,
         sources: Default::default(),
         boundary: floor.clone(),
     };

@@ -143,6 +143,7 @@ fn case(method: Method) -> (Scene, Start) {
     let start = Start {
         particles,
         removed: 0,
+        asked: None,
         sources: Default::default(),
         boundary: swell::domain::boundary::Boundary {
             samples: if method == Method::Pbf {

@@ -357,6 +357,7 @@ fn iterations_approach_what_is_converged() {
             let start = Start {
                 particles: particles.clone(),
                 removed: 0,
+                asked: None,
                 boundary: boundary.clone(),
                 sources: Default::default(),
             };

@@ -1,0 +1,172 @@
+//! Lints of the water of the start, and of what enters and leaves.
+
+use crate::{
+    Scene,
+    words::{four_digits, shown},
+};
+use swell_domain::{bounds::Bounds, sampling::block_dims, sources::Window};
+
+/// Part of a block's volume by which whole layers of particles may be off it.
+const ROUNDED: f64 = 0.02;
+
+impl Scene {
+    /// What of the water is hardly meant.
+    pub(super) fn lint_water(&self, lints: &mut Vec<String>) {
+        self.lint_blocks(lints);
+        self.lint_sources(lints);
+    }
+
+    /// Blocks of the start, cut where walls that absorb rest inside of the domain.
+    pub fn start_blocks(&self) -> Vec<Bounds> {
+        let room = self.start_domain();
+        let within = |block: &Bounds| Bounds {
+            min: block.min.max(room.min),
+            max: block.max.min(room.max),
+        };
+        self.water.blocks.iter().map(within).collect()
+    }
+
+    /// Volume of the water that the scene asks for at the start, m³: of its blocks, its meshes and single particles, each for itself and
+    /// with what lies in solids.
+    pub fn asked_volume(&self) -> f64 {
+        let blocks = self.start_blocks();
+        let blocks = blocks
+            .iter()
+            .map(|block| block.size().max(glam::DVec3::ZERO));
+        let blocks: f64 = blocks.map(|size| size.x * size.y * size.z).sum();
+        let meshes = self
+            .water
+            .meshes
+            .iter()
+            .map(|placed| placed.mesh.capped_volume());
+        let particles = self.water.particles.iter().map(|swarm| swarm.at.len());
+        blocks + meshes.sum::<f64>() + particles.sum::<usize>() as f64 * self.particle_volume()
+    }
+
+    /// What a particle stands for, m³.
+    pub fn particle_volume(&self) -> f64 {
+        self.particle_spacing().powi(3)
+    }
+
+    /// Blocks of which whole layers of particles are another volume.
+    fn lint_blocks(&self, lints: &mut Vec<String>) {
+        let (room, spacing) = (self.start_domain(), self.particle_spacing());
+        for (index, block) in self.start_blocks().iter().enumerate() {
+            let dims = block_dims(block, &room, spacing);
+            let [x, y, z] = dims;
+            let (asked, made) = (block.volume(), (x * y * z) as f64 * self.particle_volume());
+            let part = made / asked - 1.0;
+            if block.size().min_element() > 0.0 && part.abs() > ROUNDED {
+                lints.push(format!(
+                    "water.block[{index}]: {} m³ are asked for and {} m³ made, {:.1} % {}: it is filled with whole layers, {x} × {y} × {z} \
+                     particles {} m apart",
+                    four_digits(asked),
+                    four_digits(made),
+                    100.0 * part.abs(),
+                    if part < 0.0 { "less" } else { "more" },
+                    shown(spacing)
+                ));
+            }
+        }
+    }
+
+    /// Water that enters or leaves only when the shot is over.
+    fn lint_sources(&self, lints: &mut Vec<String>) {
+        let mut emitters = self.emitters.iter().map(|it| ("emitter", it.window));
+        let mut drains = self.drains.iter().map(|it| ("drain", it.window));
+        let duration = self.shot.duration();
+        let late = |list: &mut dyn Iterator<Item = (&str, Window)>, lints: &mut Vec<String>| {
+            for (index, (name, window)) in list.enumerate() {
+                if window.from >= duration {
+                    lints.push(format!(
+                        "{name}[{index}].from: it begins after {} s, and the shot ends after {} s",
+                        shown(window.from),
+                        shown(duration)
+                    ));
+                }
+            }
+        };
+        late(&mut emitters, lints);
+        late(&mut drains, lints);
+        self.lint_rooms(lints);
+    }
+
+    /// Water that enters where a wall stands.
+    fn lint_rooms(&self, lints: &mut Vec<String>) {
+        for (index, emitter) in self.emitters.iter().enumerate() {
+            let Bounds { min, max } = emitter.shape.bounds();
+            for (k, maker) in self.wave_makers.iter().enumerate() {
+                let axis = maker.wall.axis;
+                let behind = match maker.wall.is_max {
+                    true => max[axis] - (self.domain.max[axis] - maker.room()),
+                    false => self.domain.min[axis] + maker.room() - min[axis],
+                };
+                if behind > 1e-6 {
+                    lints.push(format!(
+                        "emitter[{index}]: {behind:.3} m of its room are behind wave_maker[{k}] at rest, and nothing enters there"
+                    ));
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+
+    const SCENE: &str = r#"
+[shot]
+name = "a"
+frames = 10
+frames_per_second = 20
+[domain]
+min = [0, 0, 0]
+max = [1, 1, 1]
+[[water.block]]
+min = [0, 0, 0]
+max = [1, 0.074, 1]
+[solver]
+method = "pbf"
+[solver.pbf]
+particle_spacing = 0.05
+"#;
+
+    fn scene(set: &[&str]) -> Scene {
+        let set: Vec<String> = set.iter().map(|&text| text.to_owned()).collect();
+        Scene::parse(SCENE, Path::new("s.toml"), Path::new(""), &set).expect("valid")
+    }
+
+    #[test]
+    fn a_block_of_half_layers_is_told_of_with_its_volumes() {
+        assert_eq!(
+            scene(&[]).lints(),
+            [
+                "water.block[0]: 0.07400 m³ are asked for and 0.05000 m³ made, 32.4 % less: it is filled with whole layers, 20 × 1 × 20 \
+                 particles 0.05 m apart"
+            ]
+        );
+        let more = scene(&["solver.pbf.particle_spacing=0.1"]).lints();
+        assert!(
+            more.len() == 1 && more[0].contains("35.1 % more"),
+            "{more:?}"
+        );
+        // Two per cent are none, and a little more are.
+        let of =
+            |top: f64| scene(&[&format!("water.block=[{{min=[0,0,0],max=[1,{top},1]}}]")]).lints();
+        assert_eq!(of(0.5101), [] as [&str; 0]);
+        assert_eq!(of(0.5103).len(), 1);
+        assert_eq!(of(0.1), [] as [&str; 0]);
+    }
+
+    #[test]
+    fn the_volume_asked_for_is_of_all_water() {
+        let all = scene(&[
+            "water.block=[{min=[0,0,0],max=[1,0.5,1]},{min=[0,0.6,0],max=[0.5,0.8,1]}]",
+            "water.particles=[{at=[[0.5,0.9,0.5],[0.6,0.9,0.5]]}]",
+        ]);
+        assert!((all.asked_volume() - (0.5 + 0.1 + 2.0 * 0.05_f64.powi(3))).abs() < 1e-12);
+    }
+}
