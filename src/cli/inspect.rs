@@ -24,7 +24,7 @@ use swell_stage::{
 };
 
 use super::{
-    Failure, bake, check::Misplaced, is_cache, lint::DenyArgs, named_adapter, output, size,
+    Failure, bake, check::Misplaced, count, is_cache, lint::DenyArgs, named_adapter, output, size,
 };
 
 #[derive(Args, Debug)]
@@ -231,7 +231,7 @@ fn show_plan(out: &mut String, scene: &Scene, planned: &ScenePlan) -> fmt::Resul
         shot.frames_per_second,
         scene.solver.method.name()
     )?;
-    for warning in scene.warnings() {
+    for warning in &planned.warnings {
         writeln!(out, "warning: {warning}")?;
     }
     let samples = match plan.counts.boundary_samples {
@@ -240,8 +240,8 @@ fn show_plan(out: &mut String, scene: &Scene, planned: &ScenePlan) -> fmt::Resul
     };
     writeln!(
         out,
-        "{} particles ({} left out where solids are), {}, {samples}{} × {} × {} cells",
-        plan.counts.particles,
+        "{} ({} left out where solids are), {}, {samples}{} × {} × {} cells",
+        count(planned.particles as u64, "particle"),
         planned.removed,
         output::water(planned.volume),
         plan.grid_dims[0],

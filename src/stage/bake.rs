@@ -1,6 +1,7 @@
 //! `bake`: a scene to a particle cache.
 
 mod expected;
+mod water;
 
 use std::{fs, path::PathBuf, sync::atomic::AtomicBool, time::Instant};
 
@@ -253,12 +254,13 @@ pub fn bake(
         parent,
         notes,
         volume: start.volume(scene),
-        warnings: scene.warnings(),
+        warnings: start.warnings(scene),
     });
     drive.load_watched(&start.particles, clock.frame, &state)?;
     drive.go_on_with(clock.next_id);
     let mut looked = probes::Looked::new(scene);
     let mut held = Held::default();
+    let mut most = start.particles.len();
     let ended = drive.run(last, stop, |step| {
         looked.add(scene, step.frame, &step.looks);
         let begin = Instant::now();
@@ -277,6 +279,7 @@ pub fn bake(
         clock.walls = particles.walls;
         clock.substep = particles.substep;
         held.add(scene, &particles);
+        most = most.max(particles.len());
         clock.frame = frame;
         clock.time = time;
         clock.substeps = report.substeps;
@@ -318,7 +321,12 @@ pub fn bake(
         bytes: summary.bytes,
         waited: summary.waiting.as_secs_f64(),
         interrupted: end == End::Stopped,
-        warnings: [looked.warnings(scene), held.warnings()].concat(),
+        warnings: [
+            looked.warnings(scene),
+            held.warnings(),
+            water::overfull(scene, most),
+        ]
+        .concat(),
         passes: match request.time_passes {
             true => opened.pass_times(passes)?,
             false => PassTimes::default(),
@@ -498,7 +506,7 @@ fn open_cache(
         compression: scene.compression,
         probes: probes::records(scene),
         parent: parent.clone(),
-        warnings: scene.warnings(),
+        warnings: start.warnings(scene),
         start_particles: 0,
         files: Vec::new(),
     };

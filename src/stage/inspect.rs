@@ -102,10 +102,14 @@ pub fn adapters() -> Result<Vec<Adapter>, GpuError> {
 pub struct ScenePlan {
     /// Passes and buffers.
     pub plan: Plan,
+    /// At the start.
+    pub particles: usize,
     /// Left out of the water because a solid is there.
     pub removed: usize,
     /// Water at the start.
     pub volume: Volume,
+    /// What a user has to know of the scene, a sentence each.
+    pub warnings: Vec<String>,
     /// Metres between the nodes of the solids' signed distance, where it is coarser than the water so as not to have more than
     /// [`MOST_NODES`].
     pub coarse_solids: Option<f64>,
@@ -173,8 +177,10 @@ pub fn plan(scene: &Scene, adapter: Option<&str>) -> Result<ScenePlan, PlanError
         coarse_solids: spacing.filter(|&spacing| spacing > scene.particle_spacing()),
         plan,
         misfit,
+        particles: start.particles.len(),
         removed: start.removed,
         volume: start.volume(scene),
+        warnings: start.warnings(scene),
         adapter: context.map(|context| context.info.name),
     })
 }

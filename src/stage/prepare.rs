@@ -125,6 +125,17 @@ impl Start {
         }
     }
 
+    /// What a user has to know of the scene and of how it starts, a sentence each.
+    pub fn warnings(&self, scene: &Scene) -> Vec<String> {
+        let mut warnings = scene.warnings();
+        if self.particles.is_empty() && self.removed > 0 {
+            warnings.push(
+                "water: solids cover all of the scene's water, and no particle is left".to_owned(),
+            );
+        }
+        warnings
+    }
+
     /// What the scene needs on a device with these limits.
     pub fn plan(&self, scene: &Scene, limits: DeviceLimits) -> Plan {
         self.plan_of(scene, &self.particles, limits)

@@ -12,6 +12,7 @@ const ROUNDED: f64 = 0.02;
 impl Scene {
     /// What of the water is hardly meant.
     pub(super) fn lint_water(&self, lints: &mut Vec<String>) {
+        self.lint_dry(lints);
         self.lint_blocks(lints);
         self.lint_sources(lints);
     }
@@ -46,6 +47,15 @@ impl Scene {
     /// What a particle stands for, m³.
     pub fn particle_volume(&self) -> f64 {
         self.particle_spacing().powi(3)
+    }
+
+    /// No water, and nothing that brings any.
+    fn lint_dry(&self, lints: &mut Vec<String>) {
+        let water = &self.water;
+        let is_dry = water.blocks.is_empty() && water.meshes.is_empty();
+        if is_dry && water.particles.iter().all(|it| it.at.is_empty()) && self.emitters.is_empty() {
+            lints.push("water: the scene holds no water, and no [[emitter]] brings any".to_owned());
+        }
     }
 
     /// Blocks of which whole layers of particles are another volume.
@@ -168,5 +178,20 @@ particle_spacing = 0.05
             "water.particles=[{at=[[0.5,0.9,0.5],[0.6,0.9,0.5]]}]",
         ]);
         assert!((all.asked_volume() - (0.5 + 0.1 + 2.0 * 0.05_f64.powi(3))).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_scene_without_water_is_told_of() {
+        let dry = "water.block=[]";
+        let [lint] = &scene(&[dry]).lints()[..] else {
+            panic!("one lint");
+        };
+        assert!(lint.contains("holds no water"), "{lint}");
+        let emitter = "emitter=[{min=[0,0,0],max=[0.5,0.5,0.5],velocity=[1,0,0]}]";
+        assert_eq!(scene(&[dry, emitter]).lints(), [] as [&str; 0]);
+        assert_eq!(
+            scene(&[dry, "water.particles=[{at=[[0.5,0.5,0.5]]}]"]).lints(),
+            [] as [&str; 0]
+        );
     }
 }

@@ -107,7 +107,7 @@ pub fn expected(request: &Request) -> Result<Expected, BakeError> {
         room,
         parent,
         volume: start.volume(scene),
-        warnings: [scene.warnings(), notes].concat(),
+        warnings: [start.warnings(scene), notes].concat(),
     })
 }
 

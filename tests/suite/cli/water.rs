@@ -1,4 +1,4 @@
-//! How much water a scene holds, as `inspect` and a bake say it.
+//! How much water a scene holds, as `inspect` and a bake say it: asked for and made, none, too much, and in open meshes.
 
 use crate::support::job::{Job, assert_has};
 
@@ -73,4 +73,98 @@ fn the_volume_that_is_made_stands_beside_the_one_asked_for() {
         "bake water.toml --device cpu --frames 2 --from off:1 -o branch",
     );
     assert_has(&said, &["0.2560 m³ of water\n"]);
+}
+
+#[test]
+fn a_scene_without_water_is_told_of() {
+    let job = job();
+    let dry = "--set water.block=[]";
+    let none = "water: the scene holds no water, and no [[emitter]] brings any";
+    for words in [
+        format!("inspect water.toml {dry}"),
+        format!("{BAKE} {dry} -o dry"),
+        format!("{BAKE} {dry} -o dried --dry-run"),
+    ] {
+        let said = job.expect(0, &words);
+        assert_has(&said, &[&format!("warning: {none}"), "0 particles"]);
+        assert!(!said.contains("1 particles"), "{said}");
+    }
+    assert_has(
+        &job.expect(2, &format!("{BAKE} {dry} -o denied --deny lint")),
+        &[none],
+    );
+    assert_eq!(
+        job.json(0, &format!("inspect water.toml {dry}"))["particles"],
+        0
+    );
+    // One is one.
+    let one = format!("{dry} --set water.particles=[{{at=[[0.4,0.4,0.4]]}}]");
+    let said = job.expect(0, &format!("inspect water.toml {one}"));
+    assert_has(&said, &["1 particle ("]);
+    assert!(!said.contains("holds no water"), "{said}");
+
+    // A solid over all of it.
+    job.write("box.obj", BOX);
+    job.edit(
+        "water.toml",
+        "[solver]\n",
+        "[[solid]]\nmesh = \"box.obj\"\n[solver]\n",
+    );
+    let covered = "water: solids cover all of the scene's water, and no particle is left";
+    for words in [
+        "inspect water.toml".to_owned(),
+        format!("{BAKE} -o covered"),
+    ] {
+        assert_has(
+            &job.expect(0, &words),
+            &[&format!("warning: {covered}"), "0 particles (256 left out"],
+        );
+    }
+    // Control: half of it.
+    job.edit(
+        "water.toml",
+        "mesh = \"box.obj\"",
+        "mesh = \"box.obj\"\ntranslate = [0.5, 0.0, 0.0]",
+    );
+    let said = job.expect(0, "inspect water.toml");
+    assert!(
+        !said.contains(covered) && said.contains("(128 left out"),
+        "{said}"
+    );
+}
+
+/// From -0.1 to 0.9 m, but for its height: 0.7 m.
+const BOX: &str = "v -0.1 -0.1 -0.1\nv 0.9 -0.1 -0.1\nv 0.9 0.7 -0.1\nv -0.1 0.7 -0.1\n\
+    v -0.1 -0.1 0.9\nv 0.9 -0.1 0.9\nv 0.9 0.7 0.9\nv -0.1 0.7 0.9\n\
+    f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 4 8 7 3\nf 1 5 8 4\nf 2 3 7 6\n";
+
+/// A full box into which a sixteenth more water comes: 32 particles to 512.
+#[test]
+fn an_overfull_box_is_told_of_from_five_per_cent_on() {
+    let job = job();
+    job.edit(
+        "water.toml",
+        "max = [0.8, 0.4, 0.8]",
+        "max = [0.8, 0.8, 0.8]",
+    );
+    job.edit(
+        "water.toml",
+        "[solver]\n",
+        "[[emitter]]\nmin = [0.2, 0.2, 0.2]\nmax = [0.6, 0.6, 0.6]\nvelocity = [0.0, 0.2, 0.0]\n[solver]\n",
+    );
+    let overfull = "warning: the domain is overfull: 544 particles stand for 0.5440 m³ of water, and it has room for 0.5120 m³";
+    for solver in ["flip", "pbf"] {
+        let bake = format!("bake water.toml --device cpu --solver {solver}");
+        let said = job.expect(0, &format!("{bake} -o {solver}"));
+        assert_has(&said, &[overfull]);
+        // FLIP's densities see it as well, in each frame.
+        let dense = "the water is 6 % too dense on average: its volume is not kept";
+        assert_eq!(said.contains(dense), solver == "flip", "{said}");
+        // Control: half as much.
+        let said = job.expect(0, &format!("{bake} --frames 1-8 -o {solver}-less"));
+        assert!(
+            !said.contains("overfull") && !said.contains("too dense"),
+            "{said}"
+        );
+    }
 }

@@ -1,0 +1,20 @@
+//! What a bake has to say at its end of the water that came in.
+
+use swell_scene::{Scene, four_digits};
+
+/// Part of the domain's volume by which water may be more than it.
+const OVERFULL: f64 = 0.05;
+
+/// That a frame had more water than the domain has room for; `most` is the greatest count of particles. Pressed together, particles
+/// beside walls hide it from PBF's densities.
+pub(super) fn overfull(scene: &Scene, most: usize) -> Vec<String> {
+    let (made, room) = (most as f64 * scene.particle_volume(), scene.domain.volume());
+    if made <= (1.0 + OVERFULL) * room {
+        return Vec::new();
+    }
+    vec![format!(
+        "the domain is overfull: {most} particles stand for {} m³ of water, and it has room for {} m³",
+        four_digits(made),
+        four_digits(room)
+    )]
+}
