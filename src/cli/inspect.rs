@@ -248,17 +248,17 @@ fn show_plan(out: &mut String, scene: &Scene, planned: &ScenePlan) -> fmt::Resul
         plan.grid_dims[1],
         plan.grid_dims[2]
     )?;
-    for (index, rate) in scene.flow_rates().enumerate() {
-        match rate {
-            Some(rate) => writeln!(out, "emitter[{index}] brings {rate:.4} m³/s")?,
+    for (index, promise) in planned.promises.iter().enumerate() {
+        match promise {
+            Some(promise) => writeln!(out, "emitter[{index}] brings {:.4} m³/s", promise.rate)?,
             None => writeln!(out, "emitter[{index}] keeps a level")?,
         }
     }
-    if scene.has_inlets() {
-        let most = scene.most_entering().ceil();
+    if let Some(most) = planned.entering {
+        let particles = count(most as u64, "particle");
         writeln!(
             out,
-            "at most {most} particles more by the last frame, but for levels"
+            "at most {particles} more by the last frame, but for levels"
         )?;
     }
     match &planned.adapter {

@@ -7,6 +7,7 @@ mod displace;
 use glam::DVec3;
 
 use self::displace::displace;
+pub(super) use self::displace::{CLEARANCE, moved_out};
 use super::{
     bounds::Bounds,
     mesh::TriangleMesh,

@@ -1,30 +1,33 @@
 //! Water that enters and leaves while a shot runs: emitters and drains, which act at the ends of output frames.
 //!
 //! An emitter's water is a lattice of the particle spacing that moves with the emitter's velocity. A particle is born at the
-//! end of the frame in which its place on the lattice came into the emitter. So `velocity · area` enters a second,
-//! whatever the frame rate, and particles of one frame and the next fit together. An emitter with a level keeps its part
-//! below that level full instead.
+//! end of the frame in which its position on the lattice first is in the emitter and outside of solids: one that a solid covers waits
+//! until it has come out. That time is a function of the scene alone, so `velocity · open area` enters a second, whatever the frame
+//! rate, and particles of one frame and the next fit together. An emitter with a level keeps its part below that level full
+//! instead.
+
+mod flow;
+mod solids;
 
 use std::ops::Range;
 
 use glam::DVec3;
 
+use self::flow::Flow;
+pub use self::solids::Solids;
 use super::{
     bounds::Bounds,
     mesh::TriangleMesh,
     particles::Particles,
-    sampling::uniform,
+    sampling::{CLEARANCE, moved_out, uniform},
     signed_distance::{SignedDistance, SignedDistanceError},
 };
 
-/// Distance from solids that water keeps where it is born, spacings: as at the start.
-const CLEARANCE: f64 = 0.5;
-
-/// Of a spacing: a place as near to a face of a room counts as on it, however far from zero coordinates round.
-const ON_FACE: f64 = 1e-6;
-
 /// Of a float, relative: what a place may be off where it is compared.
 const ROUNDING: f64 = 1e-9;
+
+/// Of a spacing: a position as near to a face of a room counts as on it, however far from zero coordinates round.
+const ON_FACE: f64 = 1e-6;
 
 /// Where water enters; `S` is how its room is told.
 #[derive(Clone, Debug, PartialEq)]
@@ -76,7 +79,8 @@ impl<S> Drain<S> {
     }
 }
 
-/// From when to when something acts: at the frames that end after `from`, and not after `until`.
+/// From when to when something acts. Drains, and emitters with a level, act at the frames that end after `from`, and not after `until`;
+/// the water of other emitters is that which comes in between the two.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Window {
     /// Seconds from the shot's start.
@@ -87,7 +91,11 @@ pub struct Window {
 
 impl Window {
     fn holds(&self, time: f64) -> bool {
-        time > self.from && self.until.is_none_or(|until| time <= until)
+        time > self.from && !self.is_over(time)
+    }
+
+    fn is_over(&self, time: f64) -> bool {
+        self.until.is_some_and(|until| time > until)
     }
 
     /// How much of a shot of so many seconds lies in it, seconds.
@@ -125,8 +133,12 @@ impl Shape {
     }
 
     fn contains(&self, p: DVec3) -> bool {
-        let is_inside = |mesh: &SignedDistance| mesh.sample(p) < 0.0;
-        self.bounds.contains(p) && self.mesh.as_ref().is_none_or(is_inside)
+        self.bounds.contains(p) && self.is_in_mesh(p)
+    }
+
+    /// Whether a point within the bounds is in the mesh, where there is one.
+    fn is_in_mesh(&self, p: DVec3) -> bool {
+        self.mesh.as_ref().is_none_or(|mesh| mesh.sample(p) < 0.0)
     }
 }
 
@@ -137,6 +149,22 @@ pub struct Exchange {
     pub entered: u64,
     /// Particles that left.
     pub left: u64,
+    /// Particles of flows that never enter: a solid covered them from where they came into the emitter to where they went out of it.
+    #[serde(default, skip_serializing_if = "is_none")]
+    pub blocked: u64,
+}
+
+fn is_none(count: &u64) -> bool {
+    *count == 0
+}
+
+/// What an emitter without a level brings, where solids stand as at the start.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Promise {
+    /// m³/s.
+    pub rate: f64,
+    /// Part of its cross-section that solids cover, 0..1.
+    pub covered: f64,
 }
 
 /// All emitters and drains of a scene.
@@ -150,6 +178,8 @@ pub struct Sources {
     pub spacing: f64,
     /// Output frames a second.
     pub frames_per_second: f64,
+    /// Where water may be, metres.
+    pub domain: Bounds,
 }
 
 impl Sources {
@@ -158,29 +188,35 @@ impl Sources {
         self.emitters.is_empty() && self.drains.is_empty()
     }
 
-    /// What the end of a frame takes from `particles` and adds to them, away from `solid`. Those that enter come last; their
+    /// What the end of a frame takes from `particles` and adds to them, away from `solids`. Those that enter come last; their
     /// ids go on from `next_id`, which is then the next free one.
     pub fn exchange(
         &self,
         frame: u32,
-        solid: Option<&SignedDistance>,
+        solids: &Solids<'_>,
         particles: &mut Particles,
         next_id: &mut u32,
     ) -> Exchange {
-        let (begin, end) = (self.time(frame.saturating_sub(1)), self.time(frame));
+        let end = self.time(frame);
         let before = particles.len();
         for drain in self.drains.iter().filter(|drain| drain.window.holds(end)) {
             let keep = self.kept(drain, frame, particles);
             particles.retain(&keep);
         }
         let left = (before - particles.len()) as u64;
-        let mut entered = 0;
-        for emitter in self.emitters.iter().filter(|it| it.window.holds(end)) {
-            let mut born = match emitter.level {
-                None => self.flowed(emitter, begin, end),
-                Some(level) => self.lacking(emitter, level, frame, particles, solid),
+        let (mut entered, mut blocked) = (0, 0);
+        for emitter in &self.emitters {
+            let born = match emitter.level {
+                None => {
+                    let brought = Flow::of(self, emitter, solids).brings(frame);
+                    blocked += brought.blocked;
+                    brought.born
+                }
+                Some(level) if emitter.window.holds(end) => {
+                    self.lacking(emitter, level, frame, particles, solids)
+                }
+                Some(_) => Vec::new(),
             };
-            born.retain(|p| is_open(solid, *p, self.spacing));
             for (place, id) in born.iter().zip(*next_id..) {
                 particles.position.push(place.as_vec3().to_array());
                 particles
@@ -194,64 +230,77 @@ impl Sources {
         for column in particles.attributes.values_mut() {
             column.resize(particles.position.len(), 0.0);
         }
-        Exchange { entered, left }
+        Exchange {
+            entered,
+            left,
+            blocked,
+        }
     }
 
     /// Particles that are there for certain at the end of each of these frames, and more than before it: `start` and what the emitters
     /// without a level bring. Nothing where a drain may take some.
-    pub fn least_counts(
-        &self,
+    pub fn least_counts<'a>(
+        &'a self,
         start: usize,
         frames: Range<u32>,
-        solid: Option<&SignedDistance>,
-    ) -> impl Iterator<Item = (u32, usize)> {
+        solids: &Solids<'a>,
+    ) -> impl Iterator<Item = (u32, usize)> + 'a {
         let flowing: Vec<_> = (self.emitters.iter())
             .filter(|emitter| emitter.level.is_none())
+            .map(|emitter| Flow::of(self, emitter, solids))
             .collect();
         let is_known = self.drains.is_empty() && !flowing.is_empty();
         let frames = if is_known { frames } else { 0..0 };
         let mut count = start;
         frames.map(move |frame| {
-            let (begin, end) = (self.time(frame.saturating_sub(1)), self.time(frame));
-            for emitter in flowing.iter().filter(|it| it.window.holds(end)) {
-                let mut born = self.flowed(emitter, begin, end);
-                born.retain(|p| is_open(solid, *p, self.spacing));
-                count += born.len();
-            }
+            let brought = flowing.iter().map(|flow| flow.brings(frame).born.len());
+            count += brought.sum::<usize>();
             (frame, count)
         })
+    }
+
+    /// What each emitter brings where nothing but `still` is in its way, by emitter; `None` where it keeps a level.
+    pub fn promises(&self, still: Option<&SignedDistance>) -> Vec<Option<Promise>> {
+        let solids = Solids::still(still);
+        let all = self.emitters.iter();
+        all.map(|it| (it.level.is_none()).then(|| Flow::of(self, it, &solids).promise()))
+            .collect()
     }
 
     fn time(&self, frame: u32) -> f64 {
         f64::from(frame) / self.frames_per_second
     }
 
-    /// Places on the moving lattice that came into the emitter from `begin` to `end`, seconds, at `end`.
-    fn flowed(&self, emitter: &Emitter<Shape>, begin: f64, end: f64) -> Vec<DVec3> {
-        let (shape, velocity) = (&emitter.shape, emitter.velocity);
-        let lines: [Line; 3] =
-            std::array::from_fn(|axis| Line::of(&shape.bounds, axis, velocity[axis], self.spacing));
-        let at = |cell: [i64; 3], time: f64| {
-            DVec3::from_array(std::array::from_fn(|axis| lines[axis].at(cell[axis], time)))
-        };
-        let is_inside = |cell: [i64; 3], time: f64| {
-            let along = |axis: usize| lines[axis].is_inside(cell[axis], time);
-            let is_in_mesh = |mesh: &SignedDistance| mesh.sample(at(cell, time)) < 0.0;
-            (0..3).all(along) && shape.mesh.as_ref().is_none_or(is_in_mesh)
-        };
-        let [x, y, z] = [0, 1, 2].map(|axis: usize| lines[axis].cells(end));
-        let mut born = Vec::new();
-        for k in z {
-            for j in y.clone() {
-                for i in x.clone() {
-                    let cell = [i, j, k];
-                    if is_inside(cell, end) && !is_inside(cell, begin) {
-                        born.push(at(cell, end));
-                    }
-                }
-            }
+    /// The frame in which a time lies, which is later than the end of the frame before.
+    fn frame_of(&self, time: f64) -> u32 {
+        let near = (time * self.frames_per_second).ceil().max(0.0) as u32;
+        // However the product rounds.
+        if self.time(near) < time {
+            near.saturating_add(1)
+        } else if near > 0 && self.time(near - 1) >= time {
+            near - 1
+        } else {
+            near
         }
-        born
+    }
+
+    /// Where a particle of `p` enters at the end of a frame: there, or as far from the solid as water at rest keeps, where that leads to
+    /// no other. `None` within a solid and outside of the domain.
+    fn settled(&self, p: DVec3, frame: u32, solids: &Solids<'_>) -> Option<DVec3> {
+        let seconds = self.time(frame);
+        let distance = solids.distance(p, seconds);
+        let ends = self.domain.grown(10.0 * ON_FACE * self.spacing);
+        if distance <= 0.0 || !ends.contains(p) {
+            return None;
+        }
+        let clearance = CLEARANCE * self.spacing;
+        if distance >= clearance {
+            return Some(p);
+        }
+        let room = self.domain.grown(-clearance);
+        let at = |p| solids.distance(p, seconds);
+        let moved = moved_out(p, at, |p| solids.gradient(p, seconds), &room, clearance);
+        Some(if at(moved) > 0.0 { moved } else { p })
     }
 
     /// Places below `level` that the emitter lacks particles at. Its room is a lattice; where eight neighbouring places
@@ -262,7 +311,7 @@ impl Sources {
         level: f64,
         frame: u32,
         particles: &Particles,
-        solid: Option<&SignedDistance>,
+        solids: &Solids<'_>,
     ) -> Vec<DVec3> {
         let (shape, d) = (&emitter.shape, self.spacing);
         let mut room = shape.bounds;
@@ -294,9 +343,10 @@ impl Sources {
         for (n, &held) in held.iter().enumerate() {
             let (cell, at) = place(n);
             let block = block_of(cell);
-            let is_place = shape.contains(at) && is_open(solid, at, d);
-            wanted[block] += i64::from(is_place) - i64::from(held);
-            if is_place && held == 0 {
+            let at = shape.contains(at).then(|| self.settled(at, frame, solids));
+            let at = at.flatten();
+            wanted[block] += i64::from(at.is_some()) - i64::from(held);
+            if let (Some(at), 0) = (at, held) {
                 open.push((block, by_chance(frame, n as u32), at));
             }
         }
@@ -340,71 +390,13 @@ fn by_chance(frame: u32, of: u32) -> f64 {
     uniform(u64::from(frame) << 32 | u64::from(of))
 }
 
-fn is_open(solid: Option<&SignedDistance>, place: DVec3, spacing: f64) -> bool {
-    solid.is_none_or(|solid| solid.sample(place) >= CLEARANCE * spacing)
-}
-
 /// How many particles `length` holds, one at least.
 pub fn places(length: f64, spacing: f64) -> usize {
     ((length / spacing).round() as usize).max(1)
 }
 
-/// An axis of a lattice that moves through a box.
-struct Line {
-    min: f64,
-    max: f64,
-    /// Of the place 0 at the start, metres.
-    first: f64,
-    spacing: f64,
-    /// m/s.
-    speed: f64,
-    /// Where it stands still, how many places it has.
-    places: Option<usize>,
-}
-
-impl Line {
-    fn of(bounds: &Bounds, axis: usize, speed: f64, spacing: f64) -> Self {
-        let (min, max) = (bounds.min[axis], bounds.max[axis]);
-        let places = (speed == 0.0).then(|| places(max - min, spacing));
-        // Across the flow places lie about the middle.
-        let first = match places {
-            Some(n) => 0.5 * (min + max) - 0.5 * spacing * (n as f64 - 1.0),
-            None => min + 0.5 * spacing,
-        };
-        Self {
-            min,
-            max,
-            first,
-            spacing,
-            speed,
-            places,
-        }
-    }
-
-    fn at(&self, cell: i64, time: f64) -> f64 {
-        self.first + self.spacing * cell as f64 + self.speed * time
-    }
-
-    /// A place on a face of the room is one at its least face, however it rounds.
-    fn is_inside(&self, cell: i64, time: f64) -> bool {
-        let at = self.at(cell, time) + ON_FACE * self.spacing;
-        self.places.is_some() || (at >= self.min && at < self.max)
-    }
-
-    /// Those that may be inside.
-    fn cells(&self, time: f64) -> Range<i64> {
-        match self.places {
-            Some(n) => 0..n as i64,
-            None => {
-                let cell = |x: f64| (x - self.first - self.speed * time) / self.spacing;
-                cell(self.min).floor() as i64..cell(self.max).ceil() as i64 + 1
-            }
-        }
-    }
-}
-
-/// Whether water of this velocity stays in a box of this size for a frame of so many seconds: else places of the lattice would
-/// pass it between two looks.
+/// Whether water of this velocity stays in a box of this size for a frame of so many seconds: else what enters would be beyond the box
+/// at the frame's end.
 pub fn is_long_enough(size: DVec3, velocity: DVec3, seconds: f64) -> bool {
     (velocity.abs() * seconds)
         .cmple(size * (1.0 + ROUNDING))

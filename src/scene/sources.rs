@@ -308,7 +308,7 @@ impl Scene {
         let (corner, size) = (self.domain.min, self.solver.flip().cell_size);
         let left = self.seconds_left(start, length);
         let inlet = |it: &Emitter<Region>| {
-            let bounds = it.shape.bounds();
+            let bounds = self.entered(it);
             // A centre on a face lies in it.
             let low = ((bounds.min - corner) / size - 0.5 - 1e-6).ceil();
             let high = ((bounds.max - corner) / size - 0.5 + 1e-6).floor();
@@ -325,13 +325,21 @@ impl Scene {
         self.flows().map(inlet).collect()
     }
 
-    /// What each emitter brings, m³/s: of a flow through its box; `None` where it keeps a level.
-    pub fn flow_rates(&self) -> impl Iterator<Item = Option<f64>> + '_ {
-        let spacing = self.particle_spacing();
-        self.emitters.iter().map(move |it| {
-            let size = it.shape.bounds().size();
-            (it.level.is_none()).then(|| flow(size, it.velocity, spacing))
-        })
+    /// Where a frame's water of a flow is when it enters: in the room, and of an oblique flow beyond its edges as well.
+    fn entered(&self, flow: &Emitter<Region>) -> Bounds {
+        let (bounds, velocity) = (flow.shape.bounds(), flow.velocity);
+        let moving = velocity
+            .to_array()
+            .into_iter()
+            .filter(|speed| *speed != 0.0);
+        if moving.count() == 1 {
+            return bounds;
+        }
+        let way = velocity * self.shot.frame_seconds();
+        Bounds {
+            min: (bounds.min + way.min(DVec3::ZERO)).max(self.domain.min),
+            max: (bounds.max + way.max(DVec3::ZERO)).min(self.domain.max),
+        }
     }
 
     /// Whether water enters or leaves.
@@ -350,6 +358,7 @@ impl Scene {
             drains: Vec::new(),
             spacing,
             frames_per_second: self.shot.frames_per_second,
+            domain: self.domain,
         };
         for it in &self.emitters {
             let shape = it.shape.shape(spacing)?;
@@ -360,11 +369,6 @@ impl Scene {
             sources.drains.push(it.clone().with_shape(shape));
         }
         Ok(sources)
-    }
-
-    /// The most particles that flows bring in until the shot's end. What emitters with a level bring depends on the water.
-    pub fn most_entering(&self) -> f64 {
-        most_entering(&self.emitters, self.particle_spacing(), &self.shot)
     }
 
     /// Carries emitters and drains along.
@@ -399,7 +403,7 @@ impl Scene {
     }
 }
 
-/// See [`Scene::most_entering`].
+/// The most particles that flows bring in until the shot's end. What emitters with a level bring depends on the water.
 pub(super) fn most_entering(emitters: &[Emitter<Region>], spacing: f64, shot: &Shot) -> f64 {
     let flows = emitters.iter().filter(|it| it.level.is_none());
     let volumes = flows.map(|it| {

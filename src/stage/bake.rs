@@ -12,7 +12,7 @@ use swell_cache::{
 };
 use swell_domain::{
     budget::Breach, frame_range::FrameRange, keep::Keep, particles::Particles, posix,
-    signed_distance::SignedDistanceError, solver::StepReport,
+    signed_distance::SignedDistanceError, solver::StepReport, sources::Solids,
 };
 use swell_gpu::adapter::GpuError;
 use swell_scene::{Held, Scene, SceneError, grids::Grids};
@@ -260,6 +260,7 @@ pub fn bake(
     drive.go_on_with(clock.next_id);
     let mut looked = probes::Looked::new(scene);
     let mut held = Held::default();
+    let mut blocked = 0;
     let mut most = start.particles.len();
     let ended = drive.run(last, stop, |step| {
         looked.add(scene, step.frame, &step.looks);
@@ -280,6 +281,7 @@ pub fn bake(
         clock.substep = particles.substep;
         held.add(scene, &particles);
         most = most.max(particles.len());
+        blocked += report.exchange.map_or(0, |exchange| exchange.blocked);
         clock.frame = frame;
         clock.time = time;
         clock.substeps = report.substeps;
@@ -324,6 +326,7 @@ pub fn bake(
         warnings: [
             looked.warnings(scene),
             held.warnings(),
+            water::never_entered(blocked),
             water::overfull(scene, most),
         ]
         .concat(),
@@ -348,10 +351,15 @@ fn check_count(
     };
     let first = parent.map_or(0, |parent| parent.frame);
     let particles = start.particles.len();
-    let solid = start.boundary.distance.as_ref();
+    let boundary = &start.boundary;
+    let solids = Solids {
+        still: boundary.distance.as_ref(),
+        moving: &boundary.moving,
+        pose: &|index, seconds| scene.moving_solids[index].pose(seconds),
+    };
     let later = start
         .sources
-        .least_counts(particles, first + 1..last + 1, solid);
+        .least_counts(particles, first + 1..last + 1, &solids);
     let mut counts = std::iter::once((0, particles)).chain(later);
     match counts.find(|(_, count)| *count as f64 > limit) {
         Some((frame, count)) => Err(BakeError::Particles {

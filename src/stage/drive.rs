@@ -14,7 +14,7 @@ use swell_domain::{
     particles::Particles,
     signed_distance::SignedDistance,
     solver::{PassTime, Solver, StepReport},
-    sources::{Exchange, Sources},
+    sources::{Exchange, Solids, Sources},
 };
 use swell_scene::Scene;
 use swell_solve::plan::{Plan, Share};
@@ -29,8 +29,8 @@ use super::{
 /// A scene's solver, and the frame at which it stands.
 pub struct Drive<'a> {
     scene: &'a Scene,
-    /// What enters and leaves, and solids at rest; nothing where neither happens.
-    sources: Option<(Sources, Option<SignedDistance>)>,
+    /// What enters and leaves; nothing where neither happens.
+    sources: Option<Exchanged>,
     /// The least that a particle may have which enters.
     first_id: u32,
     solver: Box<dyn Solver<Error = SolverError>>,
@@ -48,6 +48,24 @@ pub struct Drive<'a> {
     is_recorded: bool,
     /// Of the last frame that the solver finished, also where that frame then broke a budget.
     report: Option<StepReport>,
+}
+
+/// What enters and leaves at the frames' ends, and the solids that it meets: at rest, and where each that moves stood at the start.
+struct Exchanged {
+    sources: Sources,
+    still: Option<SignedDistance>,
+    moving: Vec<SignedDistance>,
+}
+
+impl Exchanged {
+    /// `None` where nothing enters or leaves.
+    fn of(start: &Start) -> Option<Self> {
+        (!start.sources.is_empty()).then(|| Self {
+            sources: start.sources.clone(),
+            still: start.boundary.distance.clone(),
+            moving: start.boundary.moving.clone(),
+        })
+    }
 }
 
 /// A frame as it was computed.
@@ -105,8 +123,7 @@ impl<'a> Drive<'a> {
         let Built { solver, plan } = opened.build(scene, start, is_timed)?;
         Ok(Self {
             scene,
-            sources: (!start.sources.is_empty())
-                .then(|| (start.sources.clone(), start.boundary.distance.clone())),
+            sources: Exchanged::of(start),
             first_id: next_after(&start.particles),
             solver,
             plan,
@@ -213,16 +230,22 @@ impl<'a> Drive<'a> {
 
     /// Lets water in and out at the frame's end, where the scene does that.
     fn exchange(&mut self, particles: &mut Particles) -> Result<Option<Exchange>, SolverError> {
-        let Some((sources, solid)) = &self.sources else {
+        let Some(it) = &self.sources else {
             return Ok(None);
         };
-        let (solid, next_id) = (solid.as_ref(), &mut self.next_id);
-        let exchange = sources.exchange(self.frame, solid, particles, next_id);
+        let scene = self.scene;
+        let solids = Solids {
+            still: it.still.as_ref(),
+            moving: &it.moving,
+            pose: &|index, seconds| scene.moving_solids[index].pose(seconds),
+        };
+        let next_id = &mut self.next_id;
+        let exchange = it.sources.exchange(self.frame, &solids, particles, next_id);
         if self.watch.is_some() {
             let budget = &self.scene.budget;
             budget.check_count(self.frame, particles.len())?;
         }
-        if exchange != Exchange::default() {
+        if exchange.entered > 0 || exchange.left > 0 {
             self.solver.load(self.frame, particles)?;
             if let Some(watch) = &mut self.watch {
                 watch.take_over(particles);

@@ -9,7 +9,7 @@ use std::{
 };
 
 use swell_cache::{CacheError, CacheReader, stream::Stream};
-use swell_domain::signed_distance::SignedDistanceError;
+use swell_domain::{signed_distance::SignedDistanceError, sources::Promise};
 use swell_gpu::{
     adapter::{Context, GpuError, enumerate},
     program::check_sizes,
@@ -108,6 +108,10 @@ pub struct ScenePlan {
     pub removed: usize,
     /// Water at the start.
     pub volume: Volume,
+    /// What emitters bring with solids as they stand at the start; `None` of those that keep a level.
+    pub promises: Vec<Option<Promise>>,
+    /// Particles that emitters without a level bring until the shot's end, at most; `None` where there are none.
+    pub entering: Option<f64>,
     /// What a user has to know of the scene, a sentence each.
     pub warnings: Vec<String>,
     /// Metres between the nodes of the solids' signed distance, where it is coarser than the water so as not to have more than
@@ -171,6 +175,16 @@ pub fn plan(scene: &Scene, adapter: Option<&str>) -> Result<ScenePlan, PlanError
             parts.find_map(|part| check_sizes(context, &part.buffer_specs()).err())
         })
         .or(lacks);
+    let promises = start.promises();
+    let windows = scene.emitters.iter().map(|emitter| emitter.window);
+    let entering = promises
+        .iter()
+        .zip(windows)
+        .filter_map(|(promise, window)| {
+            let seconds = window.length(scene.shot.duration());
+            Some(promise.as_ref()?.rate * seconds / scene.particle_volume())
+        });
+    let entering: f64 = entering.sum();
     let distance = start.boundary.distance.as_ref();
     let spacing = distance.map(|distance| distance.spacing);
     Ok(ScenePlan {
@@ -181,6 +195,8 @@ pub fn plan(scene: &Scene, adapter: Option<&str>) -> Result<ScenePlan, PlanError
         removed: start.removed,
         volume: start.volume(scene),
         warnings: start.warnings(scene),
+        entering: scene.has_inlets().then(|| entering.ceil()),
+        promises,
         adapter: context.map(|context| context.info.name),
     })
 }

@@ -8,7 +8,7 @@ use swell_domain::{
     particles::Particles,
     sampling::{BoundarySample, boundary_samples, fill_water},
     signed_distance::{SignedDistance, SignedDistanceError},
-    sources::Sources,
+    sources::{Promise, Sources},
 };
 use swell_scene::{Method, Scene};
 use swell_solve::{
@@ -133,7 +133,22 @@ impl Start {
                 "water: solids cover all of the scene's water, and no particle is left".to_owned(),
             );
         }
+        for (index, promise) in self.promises().into_iter().enumerate() {
+            if let Some(promise) = promise.filter(|promise| promise.covered > 0.0) {
+                warnings.push(format!(
+                    "emitter[{index}]: solids cover {:.1} % of its cross-section all along its room, and nothing enters there: it brings \
+                     {:.4} m³/s",
+                    100.0 * promise.covered,
+                    promise.rate
+                ));
+            }
+        }
         warnings
+    }
+
+    /// What each emitter brings with the solids as they stand at the start; `None` of those that keep a level.
+    pub fn promises(&self) -> Vec<Option<Promise>> {
+        self.sources.promises(self.boundary.distance.as_ref())
     }
 
     /// What the scene needs on a device with these limits.

@@ -129,5 +129,6 @@ mod stage {
     mod far_origin;
     mod sources;
     mod substeps;
+    mod waiting;
     mod whitewater;
 }

@@ -90,7 +90,7 @@ fn scene_json(scene: &Scene, planned: &ScenePlan) -> Value {
         "volume_asked": planned.volume.asked,
         "boundary_samples": plan.counts.boundary_samples,
         "cells": plan.grid_dims,
-        "entering": scene.has_inlets().then(|| scene.most_entering().ceil()),
+        "entering": planned.entering,
         "warnings": planned.warnings,
         "adapter": planned.adapter,
         "misfit": planned.misfit.as_ref().map(ToString::to_string),

@@ -12,7 +12,7 @@ use super::{
 
 /// Particles stand at least so far from solids, in spacings: a little farther than PBF holds them (0.25) and FLIP does (0.1), so that
 /// none is pushed in the first step.
-const CLEARANCE: f64 = 0.3;
+pub(in super::super) const CLEARANCE: f64 = 0.3;
 
 /// Small cubes along each edge of a particle's cube.
 const PARTS: usize = 4;
@@ -44,9 +44,11 @@ pub(super) fn displace(
     positions.retain(|_| kept.next() == Some(true));
     let clearance = CLEARANCE * spacing;
     let room = domain.grown(-clearance);
+    let distance = |p| solid.sample(p);
+    let gradient = |p| solid.gradient(p);
     positions
         .par_iter_mut()
-        .for_each(|p| *p = moved_out(*p, solid, &room, clearance));
+        .for_each(|p| *p = moved_out(*p, distance, gradient, &room, clearance));
     // Between a solid and a wall, or between two solids, there may be no place.
     positions.retain(|p| solid.sample(*p) > 0.0);
     before - positions.len()
@@ -117,15 +119,21 @@ fn balanced(positions: &[DVec3], open: &[f64], spacing: f64) -> Vec<bool> {
     kept
 }
 
-/// `p` at least `clearance` from the solid and within `room`.
-fn moved_out(p: DVec3, solid: &SignedDistance, room: &Bounds, clearance: f64) -> DVec3 {
+/// `p` at least `clearance` from the solid of this distance and gradient, and within `room`, as far as that goes.
+pub(in super::super) fn moved_out(
+    p: DVec3,
+    distance: impl Fn(DVec3) -> f64,
+    gradient: impl Fn(DVec3) -> DVec3,
+    room: &Bounds,
+    clearance: f64,
+) -> DVec3 {
     let mut p = p;
     for _ in 0..ROUNDS {
-        let distance = solid.sample(p);
+        let distance = distance(p);
         if distance >= clearance {
             break;
         }
-        let out = solid.gradient(p).normalize_or_zero();
+        let out = gradient(p).normalize_or_zero();
         p = (p + out * (clearance - distance)).clamp(room.min, room.max);
     }
     p

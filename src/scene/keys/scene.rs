@@ -263,12 +263,12 @@ const ROOM_MESH: Key = Key::inline("mesh", WATER_MESH)
 const FROM: Key = Key::number("from", 0.0..=1e9)
     .unit("s")
     .default("0.0")
-    .about("it acts at the ends of frames after this time");
+    .about("it acts from this time on; drains and levels at the ends of frames after it");
 const UNTIL: Key = Key::number("until", 0.0..=1e9)
     .unit("s")
     .absent()
     .also(", after from")
-    .about("and not after this one");
+    .about("and until this one; drains and levels not at the ends of frames after it");
 
 const EMITTER: &[Key] = &[
     ROOM_MIN,

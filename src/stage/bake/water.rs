@@ -5,6 +5,18 @@ use swell_scene::{Scene, four_digits};
 /// Part of the domain's volume by which water may be more than it.
 const OVERFULL: f64 = 0.05;
 
+/// That water of emitters never entered, where some did not.
+pub(super) fn never_entered(blocked: u64) -> Vec<String> {
+    let words = match blocked {
+        0 => return Vec::new(),
+        1 => "1 particle of an emitter".to_owned(),
+        many => format!("{many} particles of emitters"),
+    };
+    vec![format!(
+        "{words} never entered: solids covered the whole way through the emitter's room"
+    )]
+}
+
 /// That a frame had more water than the domain has room for; `most` is the greatest count of particles. Pressed together, particles
 /// beside walls hide it from PBF's densities.
 pub(super) fn overfull(scene: &Scene, most: usize) -> Vec<String> {

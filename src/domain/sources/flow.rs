@@ -1,0 +1,307 @@
+//! The water of an emitter without a level: a lattice that moves through its room.
+
+use std::ops::Range;
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::{
+    super::bounds::Bounds, Emitter, ON_FACE, Promise, Shape, Solids, Sources, flow, places,
+};
+
+/// A position's way through the room is looked at so many times a spacing.
+const LOOKS: f64 = 8.0;
+
+/// Layers of an oblique flow of which the covered part is counted.
+const COUNTED: f64 = 16.0;
+
+/// An emitter's lattice, and what it moves through.
+pub(super) struct Flow<'a> {
+    sources: &'a Sources,
+    emitter: &'a Emitter<Shape>,
+    solids: Solids<'a>,
+    lines: [Line; 3],
+}
+
+/// What a frame's end brings.
+#[derive(Debug, Default, PartialEq)]
+pub(super) struct Brought {
+    /// Where particles enter.
+    pub(super) born: Vec<DVec3>,
+    /// Particles that left the room in the frame, and found no open position in it.
+    pub(super) blocked: u64,
+}
+
+/// When a position of the lattice is in the emitter's box, seconds: later than the first, and before the second.
+type Passage = (f64, f64);
+
+/// What becomes of a position of the lattice in a span of time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Fate {
+    /// It enters at this time.
+    Born(f64),
+    /// It leaves the room without.
+    Blocked,
+}
+
+impl<'a> Flow<'a> {
+    pub(super) fn of(
+        sources: &'a Sources,
+        emitter: &'a Emitter<Shape>,
+        solids: &Solids<'a>,
+    ) -> Self {
+        let (bounds, velocity) = (&emitter.shape.bounds, emitter.velocity);
+        Self {
+            sources,
+            emitter,
+            solids: *solids,
+            lines: [0, 1, 2].map(|axis| Line::of(bounds, axis, velocity[axis], sources.spacing)),
+        }
+    }
+
+    /// What enters at the end of a frame.
+    pub(super) fn brings(&self, frame: u32) -> Brought {
+        let sources = self.sources;
+        let (begin, end) = (sources.time(frame.saturating_sub(1)), sources.time(frame));
+        let window = self.emitter.window;
+        if end <= window.from || window.is_over(begin) {
+            return Brought::default();
+        }
+        let fates: Vec<_> = self
+            .cells(begin, end)
+            .filter_map(|cell| Some((cell, self.fate(cell, begin, end)?)))
+            .map(|(cell, fate)| match fate {
+                Fate::Born(birth) => self.entrance(cell, birth, frame),
+                Fate::Blocked => None,
+            })
+            .collect();
+        let blocked = fates.iter().filter(|place| place.is_none()).count() as u64;
+        Brought {
+            born: fates.into_iter().flatten().collect(),
+            blocked,
+        }
+    }
+
+    /// What the emitter brings where its solids stay where they are.
+    pub(super) fn promise(&self) -> Promise {
+        let Self { emitter, .. } = self;
+        let (size, spacing) = (emitter.shape.bounds.size(), self.sources.spacing);
+        let rate = flow(size, emitter.velocity, spacing);
+        let moves = emitter.velocity.to_array().map(|speed| speed != 0.0);
+        // Along an axis layers are alike.
+        let layers = match moves.into_iter().filter(|moves| *moves).count() {
+            1 => 1.0,
+            _ => COUNTED,
+        };
+        let end = (layers * spacing / self.speed()).min(f64::MAX);
+        let entering: Vec<_> = self
+            .cells(0.0, end)
+            .filter_map(|cell| {
+                let passage = self.passage(cell)?;
+                (0.0 < passage.0 && passage.0 <= end).then(|| self.looked(cell, passage))
+            })
+            .collect();
+        let count = |is: fn(&Looked) -> bool| entering.iter().filter(|it| is(it)).count() as f64;
+        let open = count(|it| it.is_open);
+        // Of a flow so slow that no time is told from the next, nothing is counted.
+        let part = |of: f64| if of > 0.0 { open / of } else { 1.0 };
+        Promise {
+            rate: rate * part(entering.len() as f64),
+            covered: 1.0 - part(count(|it| it.is_inside)),
+        }
+    }
+
+    /// Whether a position is in the room on its way, and open there.
+    fn looked(&self, cell: [i64; 3], passage: Passage) -> Looked {
+        let mut looked = Looked::default();
+        for time in self.looks(passage) {
+            looked.is_inside |= self.is_inside(cell, time);
+            if self.is_open(cell, time) {
+                looked.is_open = true;
+                break;
+            }
+        }
+        looked
+    }
+
+    /// Positions that may be in the room at some time of a span, x fastest.
+    fn cells(&self, begin: f64, end: f64) -> impl ParallelIterator<Item = [i64; 3]> {
+        let [x, y, z] = [0, 1, 2].map(|axis: usize| {
+            let (a, b) = (self.lines[axis].cells(begin), self.lines[axis].cells(end));
+            a.start.min(b.start)..a.end.max(b.end)
+        });
+        let rows: Vec<_> = z.flat_map(|k| y.clone().map(move |j| (j, k))).collect();
+        let row = move |(j, k)| x.clone().map(move |i| [i, j, k]);
+        rows.into_par_iter().flat_map_iter(row)
+    }
+
+    fn at(&self, cell: [i64; 3], time: f64) -> DVec3 {
+        DVec3::from_array([0, 1, 2].map(|axis| self.lines[axis].at(cell[axis], time)))
+    }
+
+    fn passage(&self, cell: [i64; 3]) -> Option<Passage> {
+        let along = [0, 1, 2].map(|axis| self.lines[axis].passage(cell[axis]));
+        let all = along.into_iter().flatten();
+        let (enter, leave) = all.reduce(|a, b| (a.0.max(b.0), a.1.min(b.1)))?;
+        (enter < leave).then_some((enter, leave))
+    }
+
+    /// What becomes of a position later than `begin` and not later than `end`. When it enters is a function of the position and the
+    /// scene alone, so that frames of any length find the same.
+    fn fate(&self, cell: [i64; 3], begin: f64, end: f64) -> Option<Fate> {
+        let window = self.emitter.window;
+        let (enter, leave) = self.passage(cell)?;
+        // What is in the room where the emitter begins does not come into it.
+        if enter <= window.from.max(0.0) || enter > end || window.is_over(enter) {
+            return None;
+        }
+        if self.solids.is_empty() && self.emitter.shape.mesh.is_none() {
+            return (enter > begin).then_some(Fate::Born(enter));
+        }
+        let last = window.until.map_or(leave, |until| until.min(leave));
+        if last <= begin {
+            return None;
+        }
+        // Mostly it entered long ago: the newest look before the span sees it.
+        if self
+            .newest_look(enter, begin)
+            .is_some_and(|time| self.is_open(cell, time))
+        {
+            return None;
+        }
+        let mut was_inside = false;
+        let looks = self.looks((enter, leave));
+        for time in looks.take_while(|time| *time <= end && *time <= last) {
+            if self.is_open(cell, time) {
+                return (time > begin).then_some(Fate::Born(time));
+            }
+            was_inside |= self.is_inside(cell, time);
+        }
+        (last <= end && was_inside).then_some(Fate::Blocked)
+    }
+
+    /// Times at which a position is looked at on its way through the box.
+    fn looks(&self, (enter, leave): Passage) -> impl Iterator<Item = f64> {
+        let step = self.step();
+        (0..)
+            .map(move |k| enter + f64::from(k) * step)
+            .take_while(move |time| *time < leave)
+    }
+
+    /// The newest of them not later than `time`; `None` where all are.
+    fn newest_look(&self, enter: f64, time: f64) -> Option<f64> {
+        let step = self.step();
+        let look = |k: u32| enter + f64::from(k) * step;
+        let near = ((time - enter) / step).ceil().max(0.0) as u32;
+        // However the quotient rounds.
+        let near = [near + 1, near, near.saturating_sub(1)].map(look);
+        near.into_iter().find(|look| *look <= time)
+    }
+
+    /// From a look to the next, seconds.
+    fn step(&self) -> f64 {
+        (self.sources.spacing / (LOOKS * self.speed())).min(f64::MAX)
+    }
+
+    /// m/s; squares of the least velocities are no numbers.
+    fn speed(&self) -> f64 {
+        let velocity = self.emitter.velocity;
+        let most = velocity.abs().max_element();
+        most * (velocity / most).length()
+    }
+
+    /// Whether a position in the box is in the room.
+    fn is_inside(&self, cell: [i64; 3], time: f64) -> bool {
+        self.emitter.shape.is_in_mesh(self.at(cell, time))
+    }
+
+    /// Whether it is in the room, and in no solid as these are at the end of the frame: then they are met.
+    fn is_open(&self, cell: [i64; 3], time: f64) -> bool {
+        let p = self.at(cell, time);
+        let seconds = self.sources.time(self.sources.frame_of(time));
+        self.emitter.shape.is_in_mesh(p) && self.solids.distance(p, seconds) > 0.0
+    }
+
+    /// Where a particle that came in at `birth` is at the end of its frame. Where its way from there meets a solid or an end of the
+    /// domain, the frame's water is spread over the open part of the way.
+    fn entrance(&self, cell: [i64; 3], birth: f64, frame: u32) -> Option<DVec3> {
+        let sources = self.sources;
+        let (begin, end) = (sources.time(frame.saturating_sub(1)), sources.time(frame));
+        let settled = |time: f64| sources.settled(self.at(cell, time), frame, &self.solids);
+        if let Some(place) = settled(end) {
+            return Some(place);
+        }
+        let looks = (0..).map(|k| birth + f64::from(k) * self.step());
+        let is_clear = |time: f64| settled(time).is_some();
+        let open = looks.take_while(|time| *time <= end && is_clear(*time));
+        let last = open.last().unwrap_or(birth);
+        let part = (end - birth) / (end - begin);
+        settled(birth + part * (last - birth)).or_else(|| settled(birth))
+    }
+}
+
+/// What was seen of a position on its way.
+#[derive(Clone, Copy, Debug, Default)]
+struct Looked {
+    is_inside: bool,
+    is_open: bool,
+}
+
+/// An axis of a lattice that moves through a box.
+struct Line {
+    min: f64,
+    max: f64,
+    /// Of the place 0 at the start, metres.
+    first: f64,
+    spacing: f64,
+    /// m/s.
+    speed: f64,
+    /// Where it stands still, how many places it has.
+    places: Option<usize>,
+}
+
+impl Line {
+    fn of(bounds: &Bounds, axis: usize, speed: f64, spacing: f64) -> Self {
+        let (min, max) = (bounds.min[axis], bounds.max[axis]);
+        let places = (speed == 0.0).then(|| places(max - min, spacing));
+        // Across the flow places lie about the middle.
+        let first = match places {
+            Some(n) => 0.5 * (min + max) - 0.5 * spacing * (n as f64 - 1.0),
+            None => min + 0.5 * spacing,
+        };
+        Self {
+            min,
+            max,
+            first,
+            spacing,
+            speed,
+            places,
+        }
+    }
+
+    fn at(&self, cell: i64, time: f64) -> f64 {
+        self.first + self.spacing * cell as f64 + self.speed * time
+    }
+
+    /// When a position is in the box along this axis: where it stands still, always. One on a face of the room is one at its least
+    /// face, however it rounds.
+    fn passage(&self, cell: i64) -> Option<Passage> {
+        if self.places.is_some() {
+            return None;
+        }
+        let from = self.at(cell, 0.0) + ON_FACE * self.spacing;
+        let [a, b] = [self.min, self.max].map(|face| (face - from) / self.speed);
+        Some((a.min(b), a.max(b)))
+    }
+
+    /// Those that may be inside.
+    fn cells(&self, time: f64) -> Range<i64> {
+        match self.places {
+            Some(n) => 0..n as i64,
+            None => {
+                let cell = |x: f64| (x - self.first - self.speed * time) / self.spacing;
+                cell(self.min).floor() as i64..cell(self.max).ceil() as i64 + 1
+            }
+        }
+    }
+}
