@@ -13,7 +13,9 @@ pub enum NoInside {
     #[error("the mesh has no triangles")]
     Empty,
     /// A tube, or a sheet.
-    #[error("the mesh is open and has no inside: {why}; {holes}{parts}; close the mesh")]
+    #[error(
+        "the mesh is open and has no inside: {why}; {holes}{parts}; close the mesh, or give its walls a thickness where water is to be inside of it"
+    )]
     Open {
         /// The fault of the part that they are in.
         why: &'static str,
@@ -260,7 +262,7 @@ mod tests {
         assert_eq!(
             error.to_string(),
             "the mesh is open and has no inside: no place in it is enclosed, as beside a sheet; 1 hole: 4 open \
-             edges about (0.0000, 0.5000, 0.5000), 1.4142 m across; close the mesh"
+             edges about (0.0000, 0.5000, 0.5000), 1.4142 m across; close the mesh, or give its walls a thickness where water is to be inside of it"
         );
 
         let mut two_sided = sheet.clone();

@@ -24,6 +24,7 @@ pub mod tolerance;
 
 mod absorption;
 mod build;
+mod container;
 mod difference;
 mod document;
 mod error;
@@ -229,33 +230,6 @@ pub struct PlacedMesh {
     pub rounding: DVec3,
     /// Other faults of the file that it is taken with, a sentence each.
     pub faults: Vec<String>,
-}
-
-impl PlacedMesh {
-    /// What the mesh is taken with: its holes, and faults of its file.
-    fn warnings(&self) -> Vec<String> {
-        let name = self.file.file_name().unwrap_or_default().to_string_lossy();
-        let open = (!self.holes.0.is_empty()).then(|| {
-            format!(
-                "{name} is open and taken as closed: {}; inside is where its winding number is above one half, about \
-                 as if a flat cap closed each hole",
-                self.holes
-            )
-        });
-        let faults = self.faults.iter().map(|fault| format!("{name}: {fault}"));
-        open.into_iter().chain(faults).collect()
-    }
-}
-
-impl Scene {
-    /// What a user has to know of a scene that is taken all the same, a sentence each: faults of its meshes, and its lints.
-    pub fn warnings(&self) -> Vec<String> {
-        let placed = self.water.meshes.iter().chain(&self.solids);
-        let moving = self.moving_solids.iter().map(|solid| &solid.placed);
-        let placed = placed.chain(moving).chain(self.source_meshes());
-        let faults = placed.flat_map(PlacedMesh::warnings);
-        faults.chain(self.lints()).collect()
-    }
 }
 
 /// Scale first, then rotation, then translation.

@@ -168,3 +168,43 @@ fn an_overfull_box_is_told_of_from_five_per_cent_on() {
         );
     }
 }
+
+#[test]
+fn water_in_an_open_mesh_is_told_of() {
+    let job = job();
+    // A cup: the box without its lid, 0.1 to 0.7 m, and its bottom at 0.1 m.
+    let cup = BOX
+        .replace("-0.1", "0.1")
+        .replace("0.9", "0.7")
+        .replace("f 4 8 7 3\n", "");
+    job.write("cup.obj", &cup);
+    job.edit(
+        "water.toml",
+        "[solver]\n",
+        "[[solid]]\nmesh = \"cup.obj\"\n[solver]\n",
+    );
+    let open = "cup.obj is open and taken as closed: 1 hole: 4 open edges about";
+    let container = "water fills this container, and is left out there, as swell takes an open mesh for a solid that is full up to its caps";
+    for words in ["inspect water.toml", &format!("{BAKE} -o cup")] {
+        let said = job.expect(0, words);
+        let warned = said
+            .lines()
+            .filter(|line| line.starts_with("warning: cup.obj"));
+        let [warning] = warned.collect::<Vec<_>>()[..] else {
+            panic!("one warning: {said}");
+        };
+        assert_has(warning, &[open, container]);
+    }
+    // Control: water beside it.
+    job.edit(
+        "water.toml",
+        "max = [0.8, 0.4, 0.8]",
+        "max = [0.8, 0.1, 0.8]",
+    );
+    let said = job.expect(0, "inspect water.toml");
+    assert!(said.contains(open) && !said.contains("container"), "{said}");
+    // As water it is full.
+    let water = "--set solid=[] --set water.mesh=[{file=\"cup.obj\"}]";
+    let said = job.expect(0, &format!("inspect water.toml {water}"));
+    assert_has(&said, &[open, "water fills this container up to there"]);
+}

@@ -1,0 +1,96 @@
+//! Faults of meshes that are taken all the same: that they are open, and what becomes of water inside of them.
+
+use std::borrow::Cow;
+
+use glam::DVec3;
+
+use super::{PlacedMesh, Scene};
+use swell_domain::{bounds::Bounds, bvh::Bvh};
+
+/// Points along each axis at which water is looked for in a mesh.
+const LOOKS: usize = 8;
+
+impl PlacedMesh {
+    fn file_name(&self) -> Cow<'_, str> {
+        self.file.file_name().unwrap_or_default().to_string_lossy()
+    }
+
+    /// That it is open, with its holes; `None` for a closed mesh.
+    fn warning(&self) -> Option<String> {
+        let name = self.file_name();
+        (!self.holes.0.is_empty()).then(|| {
+            format!(
+                "{name} is open and taken as closed: {}; inside is where its winding number is above one half, about \
+                 as if a flat cap closed each hole",
+                self.holes
+            )
+        })
+    }
+}
+
+impl Scene {
+    /// What a user has to know of a scene that is taken all the same, a sentence each: faults of its meshes, and its lints.
+    pub fn warnings(&self) -> Vec<String> {
+        let of_water = self.water.meshes.iter().filter_map(|placed| {
+            let warning = placed.warning()?;
+            Some(format!("{warning}; water fills this container up to there"))
+        });
+        let moving = self.moving_solids.iter().map(|solid| &solid.placed);
+        let solids = self.solids.iter().chain(moving).filter_map(|placed| {
+            let warning = placed.warning()?;
+            Some(match self.is_container(placed) {
+                true => format!(
+                    "{warning}; water fills this container, and is left out there, as swell takes an open mesh for a solid that is full up \
+                     to its caps: give walls that are to hold water a thickness, so that the mesh is closed"
+                ),
+                false => warning,
+            })
+        });
+        let open = self.source_meshes().filter_map(PlacedMesh::warning);
+        let placed = self.water.meshes.iter().chain(&self.solids);
+        let moving = self.moving_solids.iter().map(|solid| &solid.placed);
+        let placed = placed.chain(moving).chain(self.source_meshes());
+        let faults = placed.flat_map(|placed| {
+            let name = placed.file_name();
+            (placed.faults.iter()).map(move |fault| format!("{name}: {fault}"))
+        });
+        of_water
+            .chain(solids)
+            .chain(open)
+            .chain(faults)
+            .chain(self.lints())
+            .collect()
+    }
+
+    /// Whether water of the start, or the room of an emitter, lies inside of a mesh.
+    fn is_container(&self, placed: &PlacedMesh) -> bool {
+        let Some(bounds) = placed.mesh.bounds() else {
+            return false;
+        };
+        let tree = Bvh::new(&placed.mesh);
+        let meshes = self.water.meshes.iter().filter_map(|it| it.mesh.bounds());
+        let emitters = self.emitters.iter().map(|it| it.shape.bounds());
+        let rooms = self
+            .start_blocks()
+            .into_iter()
+            .chain(meshes)
+            .chain(emitters);
+        let in_both = rooms.map(|room| Bounds {
+            min: room.min.max(bounds.min),
+            max: room.max.min(bounds.max),
+        });
+        let in_both = in_both.filter(|both| both.min.cmplt(both.max).all());
+        let particles = self.water.particles.iter().flat_map(|swarm| &swarm.at);
+        let mut places = in_both.flat_map(looks).chain(particles.copied());
+        places.any(|p| tree.winding_number(p).abs() > 0.5)
+    }
+}
+
+/// Points all over a box.
+fn looks(room: Bounds) -> impl Iterator<Item = DVec3> {
+    (0..LOOKS.pow(3)).map(move |n| {
+        let cell = [n % LOOKS, n / LOOKS % LOOKS, n / LOOKS.pow(2)];
+        let part = DVec3::from_array(cell.map(|i| (i as f64 + 0.5) / LOOKS as f64));
+        room.min + room.size() * part
+    })
+}
