@@ -3,7 +3,6 @@
 use swell_cache::{CacheError, CacheReader};
 use swell_domain::{
     boundary::Boundary,
-    bounds::Bounds,
     mesh::TriangleMesh,
     particles::Particles,
     sampling::{BoundarySample, boundary_samples, fill_water},
