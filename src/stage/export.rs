@@ -214,7 +214,7 @@ pub fn export(
                 made => made?,
             }
         }
-        let volume = content.mesh.get().map(|mesh| mesh.volume);
+        let volume = content.volume();
         if let Some(held) = volume
             && let Some(warning) = warning(held)
         {

@@ -16,7 +16,7 @@ pub(super) struct Content<'a> {
     job: &'a Job<'a>,
     pub(super) frame: u32,
     particles: OnceCell<Particles>,
-    pub(super) mesh: OnceCell<WaterMesh>,
+    mesh: OnceCell<WaterMesh>,
 }
 
 impl<'a> Content<'a> {
@@ -36,6 +36,11 @@ impl<'a> Content<'a> {
             let _ = self.particles.set(particles);
         }
         Ok(self.particles.get_or_init(Particles::default))
+    }
+
+    /// Volume within the mesh over the particles'; `None` where none was made.
+    pub(super) fn volume(&self) -> Option<f64> {
+        self.mesh.get().map(|mesh| mesh.volume)
     }
 
     pub(super) fn mesh(&self) -> Result<&WaterMesh, CacheError> {
