@@ -254,6 +254,7 @@ impl Progress {
                 output::log(text);
             }
         }
+        bar.set_prefix(ahead(self.state.borrow().job.seconds_left()));
         bar.inc(1);
     }
 
@@ -280,9 +281,14 @@ impl Progress {
         if self.mode == Mode::Auto && is_before {
             let bar = state.bar.get_or_insert_with(|| bar(count));
             bar.set_position(done);
+            bar.set_prefix(ahead(left));
             bar.set_message(name.to_owned());
         } else if let Some(bar) = &state.bar {
-            bar.set_message(text.clone());
+            bar.set_prefix(ahead(job_left.or_else(|| state.job.seconds_left())));
+            bar.set_message(format!(
+                "{name}: {done} of {count}{}",
+                seconds(left, "left")
+            ));
         }
         let is_line = told.line || (is_before && done == 0);
         if is_line {
@@ -391,9 +397,16 @@ impl Progress {
 }
 
 fn bar(length: u64) -> ProgressBar {
-    let style = ProgressStyle::with_template("{bar:40} {pos}/{len} [{elapsed} < {eta}] {msg}")
+    // Its own estimate knows whole steps alone, and none before the first.
+    let style = ProgressStyle::with_template("{bar:40} {pos}/{len} [{elapsed} < {prefix}] {msg}")
         .unwrap_or_else(|_| ProgressStyle::default_bar());
-    ProgressBar::new(length).with_style(style)
+    let bar = ProgressBar::new(length).with_style(style);
+    bar.with_prefix(ahead(None))
+}
+
+/// Time left, as a bar shows it.
+fn ahead(seconds: Option<f64>) -> String {
+    seconds.map_or("?".to_owned(), |seconds| format!("{seconds:.0} s"))
 }
 
 /// The event of a fault that ends a command.
