@@ -11,6 +11,7 @@ use super::{
     document::Document,
     effects,
     error::SceneError,
+    fit::{comes_into, fits},
     grids, keep,
     moving_solid::{self, MAX_MOVING_SOLIDS, MovingSolid},
     no_slip, origin, periodic, probe, projection, sources,
@@ -319,21 +320,6 @@ fn water_block(
         return Err(doc.fault_of(&format!("{path}.max"), problem));
     }
     Ok(block)
-}
-
-/// Whether `inner` lies in the domain, up to the rounding of decimal fractions and, along each axis, of its file.
-pub(super) fn fits(inner: &Bounds, domain: &Bounds, rounding: DVec3) -> bool {
-    let most = rounding.max(DVec3::splat(1e-9 * domain.size().max_element()));
-    let room = Bounds {
-        min: domain.min - most,
-        max: domain.max + most,
-    };
-    room.contains(inner.min) && room.contains(inner.max)
-}
-
-/// Whether more of `it` is in the domain than the rounding of its file.
-pub(super) fn comes_into(it: &Bounds, domain: &Bounds, rounding: DVec3) -> bool {
-    (it.min + rounding).cmplt(domain.max).all() && (it.max - rounding).cmpgt(domain.min).all()
 }
 
 fn check_particle_count(

@@ -28,6 +28,7 @@ mod container;
 mod difference;
 mod document;
 mod error;
+mod fit;
 mod keep;
 mod key;
 mod lint;

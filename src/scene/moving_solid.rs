@@ -4,9 +4,9 @@ use glam::{DQuat, DVec3};
 
 use super::{
     PlacedMesh, Scene, Shot,
-    build::comes_into,
     document::Document,
     error::SceneError,
+    fit::comes_into,
     motion_spec::{MotionSpec, TurnSpec, check_speed},
     motion_table::{self, ANGLES},
     solid_track::{self, Track},

@@ -5,9 +5,9 @@ use toml::{Table, Value};
 
 use super::{
     PlacedMesh, Scene, Shot,
-    build::fits,
     document::Document,
     error::SceneError,
+    fit::fits,
     spec::{BoxSpec, DrainSpec, EmitterSpec, MeshSpec},
     words::{extent, shown},
 };

@@ -93,12 +93,14 @@ fn a_bay_in_a_polygon_is_open_whichever_corner_comes_first() {
 
 #[test]
 fn a_polygon_that_crosses_itself_is_a_warning() {
-    let mut crossed = prism(0, None);
-    let top = "f 20 19 18";
-    assert!(crossed.contains(top));
-    crossed = crossed.replace(top, "f 20 18 19");
-    let job = Job::of(&[("scene.toml", POOL), ("solid.obj", &crossed)]);
-    let words = "warning: solid.obj: 1 polygon crosses itself, the first is face 2";
+    // Two neighbouring corners of the plan change places, in both heights.
+    let whole = prism(0, None);
+    let mut lines: Vec<_> = whole.lines().collect();
+    for first in [7, PLAN.len() + 7] {
+        lines.swap(first, first + 1);
+    }
+    let job = Job::of(&[("scene.toml", POOL), ("solid.obj", &lines.join("\n"))]);
+    let words = "warning: solid.obj: 2 polygons cross themselves, the first is face 1";
     assert_has(&job.expect(0, "inspect scene.toml"), &[words]);
     job.write("solid.obj", &prism(0, None));
     assert!(!job.expect(0, "inspect scene.toml").contains("warning"));
