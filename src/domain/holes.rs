@@ -176,6 +176,18 @@ impl fmt::Display for Holes {
     }
 }
 
+impl TriangleMesh {
+    /// Enclosed volume, m³, with a flat cap over each hole, whichever way its triangles face.
+    pub fn capped_volume(&self) -> f64 {
+        let holes = Holes::of(self);
+        let caps = holes
+            .0
+            .iter()
+            .map(|hole| hole.centre.dot(hole.area_vector) / 3.0);
+        (self.signed_volume() + caps.sum::<f64>()).abs()
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::{

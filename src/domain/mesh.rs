@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 
 use glam::{DAffine3, DVec3};
 
-use super::{bounds::Bounds, holes::Holes};
+use super::bounds::Bounds;
 
 /// An indexed triangle mesh, counter-clockwise seen from outside.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -49,16 +49,6 @@ impl TriangleMesh {
                 a.dot(b.cross(c)) / 6.0
             })
             .sum()
-    }
-
-    /// Enclosed volume, m³, with a flat cap over each hole, whichever way its triangles face.
-    pub fn capped_volume(&self) -> f64 {
-        let holes = Holes::of(self);
-        let caps = holes
-            .0
-            .iter()
-            .map(|hole| hole.centre.dot(hole.area_vector) / 3.0);
-        (self.signed_volume() + caps.sum::<f64>()).abs()
     }
 
     /// The mesh moved by `world_from_file`. A mirroring transform also turns the triangles, so

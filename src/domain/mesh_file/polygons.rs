@@ -14,6 +14,9 @@ const FLAT: f64 = 1e-12;
 /// Part of a quad's area by which its second diagonal has to be better: rounding does not choose between those of a rectangle.
 const BETTER: f64 = 1e-9;
 
+/// Part of its extent by which a polygon's corners may be off its plane: more than 32 bits round them.
+const BENT: f64 = 1e-6;
+
 /// A polygon's outline is not that of a surface: it crosses or overlaps itself.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Crossing;
@@ -109,18 +112,33 @@ fn quad(p: [DVec3; 4]) -> Result<Vec<[usize; 3]>, Crossing> {
 
 type Cdt = ConstrainedDelaunayTriangulation<Point2<f64>>;
 
-/// All that the outline winds about once, seen along the axis that is nearest to the normal: exact for corners on a line.
+/// How a polygon is seen: corners as points of a plane.
+///
+/// A flat one along the axis that is nearest to its normal, which is exact for corners on a line; one that bends along its normal, as
+/// the part that is seen on edge along an axis would overlap the rest, or vanish.
+fn view(places: &[DVec3], normal: DVec3) -> impl Fn(DVec3) -> DVec2 {
+    let unit = normal.normalize();
+    let off = places.iter().map(|p| unit.dot(*p - places[0]).abs());
+    let is_flat = off.fold(0.0, f64::max) <= BENT * extent_squared(places).sqrt();
+    let [u, v] = if is_flat {
+        let axis = normal.abs().max_position();
+        let [u, v] = [1, 2].map(|k| DVec3::AXES[(axis + k) % 3]);
+        if normal[axis] < 0.0 { [v, u] } else { [u, v] }
+    } else {
+        let u = unit.any_orthonormal_vector();
+        [u, unit.cross(u)]
+    };
+    move |p| DVec2::new(u.dot(p), v.dot(p))
+}
+
+/// All that the outline winds about once, as [`view`] sees it.
 fn polygon(places: &[DVec3], normal: DVec3) -> Result<Vec<[usize; 3]>, Crossing> {
-    let axis = normal.abs().max_position();
-    let (mut u, mut v) = ((axis + 1) % 3, (axis + 2) % 3);
-    if normal[axis] < 0.0 {
-        std::mem::swap(&mut u, &mut v);
-    }
+    let seen = view(places, normal);
     let mut cdt = Cdt::new();
     let mut corner_of = HashMap::new();
     let mut handles = Vec::with_capacity(places.len());
     for (k, p) in places.iter().enumerate() {
-        let at = DVec2::new(p[u], p[v]).to_array().map(settled);
+        let at = seen(*p).to_array().map(settled);
         let handle = cdt.insert(Point2::from(at)).map_err(|_| Crossing)?;
         // Corners that only this view sees at one place are two.
         if places[*corner_of.entry(handle).or_insert(k)] != *p {
@@ -355,5 +373,34 @@ mod tests {
         let line = flat(&[[0., 0.], [1., 0.], [2., 0.], [0.5, 0.]]);
         let cut = triangles(&line).expect("a line");
         assert_eq!((cut.len(), area(&line, &cut)), (2, 0.0));
+    }
+
+    /// A face over the edge of a box, a top and a side of one area: neither is lost, wherever it begins, also where the top hangs over.
+    #[test]
+    fn a_polygon_over_an_edge_is_both_of_its_parts() {
+        for overhang in [0.0, 0.05, 0.1] {
+            let bent = [
+                [0.0, 1.0, 0.0],
+                [1.0, 1.0, 0.0],
+                [1.0, 1.0, 1.0 + overhang],
+                [1.0, 0.0, 1.0],
+                [0.0, 0.0, 1.0],
+                [0.0, 1.0, 1.0 + overhang],
+            ]
+            .map(DVec3::from_array);
+            let truth = (1.0 + overhang) + 1.0_f64.hypot(overhang);
+            for start in 0..bent.len() {
+                let mut corners = bent.to_vec();
+                corners.rotate_left(start);
+                for _ in 0..2 {
+                    let found = area(&corners, &triangles(&corners).expect("no crossing"));
+                    assert!(
+                        (found / truth - 1.0).abs() < 1e-12,
+                        "{overhang}: {found} for {truth}"
+                    );
+                    corners.reverse();
+                }
+            }
+        }
     }
 }
