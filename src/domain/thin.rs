@@ -11,8 +11,23 @@ const MOST_RAYS: f64 = 131_072.0;
 /// Opposite sides of a plate: normals within 30° of opposite. A blunter edge is thin only at its tip.
 const OPPOSITE: f64 = -0.866;
 
-/// Spacings across which a plate is a barrier: four cells of FLIP. Water goes around a smaller one.
-const BARRIER: f64 = 8.0;
+/// Spacings about a place within which a plate is a barrier, two cells of FLIP. Water goes around a smaller one.
+const AROUND: i32 = 4;
+
+/// Part of the places there that a barrier covers.
+const COVERED: f64 = 0.8;
+
+/// Part of them where it is thin itself.
+const THIN: f64 = 0.4;
+
+/// Spacings along the normal by which a curved barrier may leave its tangent plane there.
+const CURVED: f64 = 3.0;
+
+/// Spacings before and behind a surface at which its sides are looked at.
+const BESIDE: f64 = 0.1;
+
+/// Most parts of a mesh of which it is asked whether they belong to a barrier, the thinnest first.
+const MOST_PARTS: usize = 4096;
 
 /// A part of a solid with open space on both sides.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,8 +41,8 @@ pub struct ThinPart {
 /// The thinnest part of each of `solids`, `None` where all of a solid is as thick as `least` metres.
 ///
 /// Rays go inward along the normals from points spread over the surface, one in `spacing` squared, fewer on large meshes. A part counts
-/// where water could stand on both sides of it, half of `spacing` away, within `domain` and outside of every solid, and where it is eight
-/// spacings wide in all directions across the thickness.
+/// where they come out into open space within `domain` with no layer on the way as thick as `least`, one solid or several, and where solids
+/// cover most of the domain's room across the normal, four spacings around.
 pub fn thin_parts(
     solids: &[&TriangleMesh],
     domain: &Bounds,
@@ -35,43 +50,104 @@ pub fn thin_parts(
     least: f64,
 ) -> Vec<Option<ThinPart>> {
     let trees: Vec<Bvh> = solids.iter().map(|mesh| Bvh::new(mesh)).collect();
-    let is_open = |p: DVec3| {
-        domain.contains(p) && trees.iter().all(|tree| tree.winding_number(p).abs() <= 0.5)
+    let all = Solids {
+        meshes: solids,
+        trees: &trees,
+        domain,
+        spacing,
+        least,
     };
-    let thickness = |mesh: &TriangleMesh, tree: &Bvh, p: DVec3, normal: DVec3| {
-        let skipped = 1e-6 * least;
-        let (further, t) = tree.first_along(p - skipped * normal, -normal, least)?;
-        let thickness = further + skipped;
-        let place = p - 0.5 * thickness * normal;
-        let is_thin = thickness < least
-            && mesh.area_vector(t as usize).normalize().dot(normal) < OPPOSITE
-            && is_plate(tree, place, normal, BARRIER * spacing)
-            && is_open(p + 0.5 * spacing * normal)
-            && is_open(p - (thickness + 0.5 * spacing) * normal);
-        is_thin.then_some(ThinPart { place, thickness })
-    };
-    let thinnest = |(mesh, tree): (&&TriangleMesh, &Bvh)| {
+    let thinnest = |mesh: &&TriangleMesh| {
         let points = spread(mesh, domain, spacing);
-        let parts = (points.par_iter()).filter_map(|&(p, normal)| thickness(mesh, tree, p, normal));
-        parts.min_by(|a, b| {
-            let place = |part: &ThinPart| part.place.to_array();
-            (a.thickness.total_cmp(&b.thickness))
-                .then_with(|| place(a).partial_cmp(&place(b)).expect("finite"))
-        })
+        let mut parts: Vec<(ThinPart, DVec3)> = (points.par_iter())
+            .filter_map(|&(p, normal)| Some((all.part(p, normal)?, normal)))
+            .collect();
+        parts.sort_by(|(a, _), (b, _)| a.thickness.total_cmp(&b.thickness));
+        let first = parts.par_iter().take(MOST_PARTS);
+        let is_of_barrier =
+            |(part, normal): &&(ThinPart, DVec3)| all.is_barrier(part.place, *normal);
+        first.find_first(is_of_barrier).map(|(part, _)| *part)
     };
-    solids.iter().zip(&trees).map(thinnest).collect()
+    solids.iter().map(thinnest).collect()
 }
 
-/// Whether the solid about `place` is `least` metres wide in all directions across `normal`, as a post or a pinnacle is not.
-fn is_plate(tree: &Bvh, place: DVec3, normal: DVec3, least: f64) -> bool {
-    let (u, v) = normal.any_orthonormal_pair();
-    let reach = |direction: DVec3| {
-        let met = tree.first_along(place, direction, least);
-        met.map_or(least, |(distance, _)| distance)
-    };
-    [u, v, (u + v).normalize(), (u - v).normalize()]
-        .iter()
-        .all(|&across| reach(across) + reach(-across) >= least)
+/// All solids of a scene.
+struct Solids<'a> {
+    meshes: &'a [&'a TriangleMesh],
+    trees: &'a [Bvh],
+    domain: &'a Bounds,
+    spacing: f64,
+    least: f64,
+}
+
+impl Solids<'_> {
+    fn is_solid(&self, p: DVec3) -> bool {
+        (self.trees.iter()).any(|tree| tree.winding_number(p).abs() > 0.5)
+    }
+
+    /// The next surface along a ray, within so many lengths of `direction`: how far it is and its normal.
+    fn next(&self, p: DVec3, direction: DVec3, bound: f64) -> Option<(f64, DVec3)> {
+        let met = self
+            .trees
+            .iter()
+            .zip(self.meshes)
+            .filter_map(|(tree, mesh)| {
+                let (distance, t) = tree.first_along(p, direction, bound)?;
+                Some((distance, mesh.area_vector(t as usize).normalize()))
+            });
+        met.min_by(|(a, _), (b, _)| a.total_cmp(b))
+    }
+
+    /// The part behind a point of a surface, where it is thin with open space on both sides.
+    fn part(&self, p: DVec3, normal: DVec3) -> Option<ThinPart> {
+        let is_within = |way: f64| self.domain.contains(p - way * normal);
+        let (beside, apart) = (BESIDE * self.spacing, 0.5 * self.spacing);
+        if !is_within(-apart) || self.is_solid(p + beside * normal) {
+            return None;
+        }
+        let skipped = 1e-6 * self.least;
+        let (mut way, mut thickness) = (0.0, None);
+        loop {
+            let from = p - (way + skipped) * normal;
+            let (further, other) = self.next(from, -normal, self.least)?;
+            way += skipped + further;
+            let thickness = *thickness.get_or_insert(way);
+            if other.dot(normal) < OPPOSITE && !self.is_solid(p - (way + beside) * normal) {
+                let place = p - 0.5 * thickness * normal;
+                return is_within(way + apart).then_some(ThinPart { place, thickness });
+            }
+            if way > 4.0 * self.least {
+                return None;
+            }
+        }
+    }
+
+    /// Whether solids cover the room about `place` across `normal`, and thinly: not so about a post, a pinnacle or an awning, nor
+    /// about a parapet on a house.
+    fn is_barrier(&self, place: DVec3, normal: DVec3) -> bool {
+        let (u, v) = normal.any_orthonormal_pair();
+        let reach = CURVED * self.spacing;
+        let (mut within, mut covered, mut thin) = (0.0, 0.0, 0.0);
+        for (i, j) in (-AROUND..=AROUND).flat_map(|i| (-AROUND..=AROUND).map(move |j| (i, j))) {
+            let p = place + self.spacing * (f64::from(i) * u + f64::from(j) * v);
+            if i * i + j * j > AROUND * AROUND || !self.domain.contains(p) {
+                continue;
+            }
+            within += 1.0;
+            let met = |side: f64| self.next(p - side * reach * normal, side * normal, 2.0 * reach);
+            let both = met(1.0).zip(met(-1.0));
+            let layer = both.map(|((front, _), (back, _))| 2.0 * reach - front - back);
+            covered += f64::from(u8::from(layer.is_some() || self.is_solid(p)));
+            let is_layer = layer.is_some_and(|it| it < 2.0 * self.least);
+            let is_apart = || {
+                ![-reach, reach]
+                    .iter()
+                    .any(|way| self.is_solid(p + *way * normal))
+            };
+            thin += f64::from(u8::from(is_layer && is_apart()));
+        }
+        covered >= COVERED * within && thin >= THIN * within
+    }
 }
 
 /// Points on a surface within `domain` and the normals there, one in an area of `spacing` squared.
@@ -102,7 +178,7 @@ fn spread(mesh: &TriangleMesh, domain: &Bounds, spacing: f64) -> Vec<(DVec3, DVe
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::tests::box_mesh;
+    use crate::mesh::tests::{box_mesh, sphere};
 
     fn boxed(min: [f64; 3], max: [f64; 3]) -> TriangleMesh {
         box_mesh(Bounds {
@@ -132,30 +208,60 @@ mod tests {
         );
     }
 
-    /// A skin over the floor, and two plates that lie on each other, have water on one side alone. Apart they are thin, both.
+    /// A skin over the floor or over a block has water on one side alone. Two thin plates are thin, also where they touch: a
+    /// distance is that of either.
     #[test]
     fn what_lies_on_something_is_not_thin() {
         assert_eq!(
             found(&[&boxed([-1.0, -1.0, -1.0], [3.0, 0.06, 3.0])]),
             [None]
         );
+        let block = boxed([0.0, 0.0, 0.0], [1.0, 1.0, 2.0]);
+        assert_eq!(
+            found(&[&block, &boxed([0.0, 1.0, 0.0], [1.0, 1.06, 2.0])]),
+            [None, None]
+        );
         let (left, right) = ([0.9, -1.0, -1.0], [0.98, 3.0, 3.0]);
         let pair = |gap: f64| {
             let near = boxed(left, right);
             let beside = boxed([0.98 + gap, -1.0, -1.0], [1.06 + gap, 3.0, 3.0]);
-            found(&[&near, &beside])
-                .iter()
-                .filter(|it| it.is_some())
-                .count()
+            let found = found(&[&near, &beside]);
+            found.iter().filter(|it| it.is_some()).count()
         };
-        assert_eq!((pair(0.0), pair(0.3)), (0, 2));
+        assert_eq!([0.0, 0.02, 0.3].map(pair), [2; 3]);
+    }
+
+    /// One that ends where the domain does is as good a barrier as one that goes on; a curved one is one however finely it is cut.
+    #[test]
+    fn barriers_end_at_walls_and_may_be_curved() {
+        let domain = Bounds {
+            min: DVec3::ZERO,
+            max: DVec3::new(2.0, 2.0, 0.3),
+        };
+        let across = boxed([0.9, 0.0, 0.0], [0.98, 2.0, 0.3]);
+        assert!(thin_parts(&[&across], &domain, 0.1, 0.125)[0].is_some());
+        let shell = |thickness: f64| {
+            let outer = sphere(DVec3::ONE, 0.8, 48);
+            let inner = sphere(DVec3::ONE, 0.8 - thickness, 48);
+            let count = outer.vertices.len() as u32;
+            let turned = inner
+                .triangles
+                .iter()
+                .map(|[a, b, c]| [*a, *c, *b].map(|v| v + count));
+            TriangleMesh {
+                triangles: outer.triangles.iter().copied().chain(turned).collect(),
+                vertices: [outer.vertices, inner.vertices].concat(),
+            }
+        };
+        assert!(found(&[&shell(0.08)])[0].is_some());
+        assert_eq!(found(&[&shell(0.2)]), [None]);
     }
 
     /// Water goes around a post and an awning.
     #[test]
     fn small_plates_are_not_thin() {
         let width = |width: f64| found(&[&boxed([0.9, 0.0, 0.9], [0.98, 1.0, 0.9 + width])])[0];
-        assert_eq!((width(0.08), width(0.6)), (None, None));
+        assert_eq!((width(0.08), width(0.4)), (None, None));
         assert!(width(1.0).is_some());
     }
 

@@ -7,8 +7,8 @@ use swell_domain::{mesh::TriangleMesh, thin::thin_parts};
 use crate::{PlacedMesh, Scene};
 
 /// Particle spacings below which water passes through a solid: distances are known at points one spacing apart, so that a thinner one can
-/// stand between two of them. A quarter is for solids that stand aslant, or move.
-const LEAST_THICKNESS: f64 = 1.25;
+/// stand between two of them. A half is for those that stand aslant, or move.
+const LEAST_THICKNESS: f64 = 1.5;
 
 impl Scene {
     /// Solids that are thinner somewhere, with water or air on both sides.
@@ -59,10 +59,10 @@ mod tests {
         assert_eq!(found.len(), 1, "{found:?}");
         for part in [
             "solid[0]: box is 0.0500 m thick at (0.825, ",
-            "0.1250 m, 1.25 times",
+            "0.1500 m, 1.5 times",
         ] {
             assert!(found[0].contains(part), "{part} of {found:?}");
         }
-        assert_eq!(lints(&["solid[0].scale=[0.126,1.6,1.0]"]), [] as [&str; 0]);
+        assert_eq!(lints(&["solid[0].scale=[0.151,1.6,1.0]"]), [] as [&str; 0]);
     }
 }

@@ -339,6 +339,8 @@ fn a_mesh_that_is_a_pipe_is_refused() {
 #[test]
 fn an_open_mesh_is_told_of_everywhere_and_a_tube_is_refused() {
     let job = Job::new();
+    // Waves of half a second would break, which is a warning too.
+    job.edit("small.toml", "period = 0.5", "period = 2.0");
     job.expect(0, "bake small.toml --device cpu --frames 1 -o closed");
     // The cache has its own copy, of a name of its own.
     let told = ".obj is open and taken as closed: 1 hole: 4 open edges about (0.5000, 0.5000, 0.7000), 0.5657 m \
