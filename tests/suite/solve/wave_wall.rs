@@ -68,11 +68,12 @@ fn deviations(job: &Job, name: &str, rate: u32) -> [f64; 2] {
     most
 }
 
-/// At 6 frames a second the wall goes 1.0 cell in a frame, at 96 less than 0.07. Control: water that stays as it was.
+/// At 6 frames a second the wall goes 1.0 cell in a frame, at 24 a quarter. Control: water that stays as it was. A minute: the
+/// crest needs 3.4 s to pass a wall that starts from rest.
 #[test]
 fn water_before_a_wall_that_makes_a_wave_has_the_waves_depth_at_any_frame_rate() {
     let job = Job::of(&[("solitary.toml", SCENE)]);
-    let rates: [(&str, &[u32]); 2] = [("gpu", &[6, 24, 96]), ("cpu", &[12])];
+    let rates: [(&str, &[u32]); 2] = [("gpu", &[6, 24]), ("cpu", &[6])];
     for (device, rates) in rates {
         for &rate in rates {
             for solver in ["flip", "pbf"] {
