@@ -14,10 +14,11 @@ const OPPOSITE: f64 = -0.866;
 /// Spacings about a place within which a plate is a barrier, two cells of FLIP. Water goes around a smaller one.
 const AROUND: i32 = 4;
 
-/// Part of the places there that a barrier covers.
+/// Part of the places there that a barrier covers: all of them but for its rim. A plate that ends at the place covers half.
 const COVERED: f64 = 0.8;
 
-/// Part of them where it is thin itself.
+/// Part of them where it is thin itself: next to all of a plate, and more than half of a window of seven spacings in a thick wall; a tenth
+/// of a parapet's, which stands on a house.
 const THIN: f64 = 0.4;
 
 /// Spacings along the normal by which a curved barrier may leave its tangent plane there.
@@ -26,7 +27,7 @@ const CURVED: f64 = 3.0;
 /// Spacings before and behind a surface at which its sides are looked at.
 const BESIDE: f64 = 0.1;
 
-/// Most parts of a mesh of which it is asked whether they belong to a barrier, the thinnest first.
+/// Most parts of a mesh of which it is asked whether they belong to a barrier, the thinnest first; of more, as many evenly among them.
 const MOST_PARTS: usize = 4096;
 
 /// A part of a solid with open space on both sides.
@@ -63,10 +64,11 @@ pub fn thin_parts(
             .filter_map(|&(p, normal)| Some((all.part(p, normal)?, normal)))
             .collect();
         parts.sort_by(|(a, _), (b, _)| a.thickness.total_cmp(&b.thickness));
-        let first = parts.par_iter().take(MOST_PARTS);
+        let each = parts.len().div_ceil(MOST_PARTS).max(1);
+        let asked = parts.par_iter().step_by(each);
         let is_of_barrier =
             |(part, normal): &&(ThinPart, DVec3)| all.is_barrier(part.place, *normal);
-        first.find_first(is_of_barrier).map(|(part, _)| *part)
+        asked.find_first(is_of_barrier).map(|(part, _)| *part)
     };
     solids.iter().map(thinnest).collect()
 }
@@ -102,7 +104,7 @@ impl Solids<'_> {
     fn part(&self, p: DVec3, normal: DVec3) -> Option<ThinPart> {
         let is_within = |way: f64| self.domain.contains(p - way * normal);
         let (beside, apart) = (BESIDE * self.spacing, 0.5 * self.spacing);
-        if !is_within(-apart) || self.is_solid(p + beside * normal) {
+        if !is_within(-apart) {
             return None;
         }
         let skipped = 1e-6 * self.least;
@@ -114,7 +116,8 @@ impl Solids<'_> {
             let thickness = *thickness.get_or_insert(way);
             if other.dot(normal) < OPPOSITE && !self.is_solid(p - (way + beside) * normal) {
                 let place = p - 0.5 * thickness * normal;
-                return is_within(way + apart).then_some(ThinPart { place, thickness });
+                let is_thin = is_within(way + apart) && !self.is_solid(p + beside * normal);
+                return is_thin.then_some(ThinPart { place, thickness });
             }
             if way > 4.0 * self.least {
                 return None;

@@ -25,9 +25,9 @@ pub use volume::{enclosed_volume, volume};
 /// R of the surface's kernel in particle spacings (Zhu and Bridson 2005).
 pub(crate) const SUPPORT: f64 = 2.0;
 
-/// Kinetic and potential energy of particles of `mass` kg, joule; the latter against `lowest`. Positions at a substep's end are taken
-/// back by half of it, as velocities are those at its middle (leapfrog): in free fall the sum is that of no step to (g Δt)² / 8 a
-/// kilogram. With positions as they stand it is off by g v Δt / 2.
+/// Kinetic and potential energy, joule, of particles of `mass` kg; potential energy is relative to `lowest`. Velocities are at
+/// mid-substep and positions at its end (leapfrog), so potential energy uses x − v Δt / 2: in free fall the error is (g Δt)² / 8 a
+/// kilogram. With positions at the substep's end it would be g v Δt / 2.
 pub fn energies(particles: &Particles, mass: f64, gravity: DVec3, lowest: DVec3) -> (f64, f64) {
     let (mut kinetic, mut potential) = (0.0, 0.0);
     for (x, v) in particles.position.iter().zip(&particles.velocity) {

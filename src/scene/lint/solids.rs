@@ -1,7 +1,5 @@
 //! Solids that do not hold water.
 
-use std::borrow::Cow;
-
 use swell_domain::{mesh::TriangleMesh, thin::thin_parts};
 
 use crate::{PlacedMesh, Scene};
@@ -14,27 +12,28 @@ impl Scene {
     /// Solids that are thinner somewhere, with water or air on both sides.
     pub(super) fn lint_thin(&self, lints: &mut Vec<String>) {
         let spacing = self.particle_spacing();
-        let solids = self.solids.iter().map(|solid| Cow::Borrowed(&solid.mesh));
-        let nodes = self.solid_grid(&solids.collect::<Vec<_>>());
+        let at_rest = self.solids.iter();
+        let images = at_rest.flat_map(|it| self.with_images(&it.mesh, self.solid_margin()));
+        let nodes = self.solid_grid(&images.collect::<Vec<_>>());
         let least = LEAST_THICKNESS * nodes.map_or(spacing, |(_, spacing)| spacing);
-        let at_rest = (self.solids.iter().enumerate()).map(|it| ("solid", it));
         let moving = self.moving_solids.iter().map(|solid| &solid.placed);
-        let moving = moving.enumerate().map(|it| ("moving_solid", it));
-        let all: Vec<(&str, (usize, &PlacedMesh))> = at_rest.chain(moving).collect();
-        let meshes: Vec<&TriangleMesh> = all.iter().map(|(_, (_, it))| &it.mesh).collect();
+        let all: Vec<&PlacedMesh> = self.solids.iter().chain(moving).collect();
+        let meshes: Vec<&TriangleMesh> = all.iter().map(|placed| &placed.mesh).collect();
         let found = thin_parts(&meshes, &self.domain, spacing, least);
-        for ((key, (index, placed)), thin) in all.into_iter().zip(found) {
+        for (placed, thin) in all.into_iter().zip(found) {
             let Some(thin) = thin else {
                 continue;
             };
+            // As the scene's file counts.
+            let place = self.origin + thin.place;
             lints.push(format!(
-                "{key}[{index}]: {} is {:.4} m thick at ({:.3}, {:.3}, {:.3}); water passes through what is thinner than {least:.4} m, \
+                "solid.mesh of {}: it is {:.4} m thick at ({:.3}, {:.3}, {:.3}); water passes through what is thinner than {least:.4} m, \
                  {LEAST_THICKNESS} times what distances to solids are apart",
                 placed.name(),
                 thin.thickness,
-                thin.place.x,
-                thin.place.y,
-                thin.place.z,
+                place.x,
+                place.y,
+                place.z,
             ));
         }
     }
@@ -58,11 +57,30 @@ mod tests {
         let found = lints(&[]);
         assert_eq!(found.len(), 1, "{found:?}");
         for part in [
-            "solid[0]: box is 0.0500 m thick at (0.825, ",
+            "solid.mesh of box: it is 0.0500 m thick at (0.825, ",
             "0.1500 m, 1.5 times",
         ] {
             assert!(found[0].contains(part), "{part} of {found:?}");
         }
         assert_eq!(lints(&["solid[0].scale=[0.151,1.6,1.0]"]), [] as [&str; 0]);
+        // A moving one before it in the file, and all of it a kilometre off.
+        let moving = "motion={kind=\"constant_velocity\",velocity=0.1,until=0.1},direction=[1,0,0]";
+        let wall = "mesh=\"box.obj\",scale=[0.05,1.6,1.0]";
+        let far = lints(&[
+            "domain.min=[1000,0,0]",
+            "domain.max=[1001.6,1.2,0.6]",
+            "water.block=[{min=[1000,0,0],max=[1000.4,1.0,0.6]}]",
+            &format!(
+                "solid=[{{{wall},translate=[1000.825,0.6,0.3],{moving}}},{{{wall},translate=[1001.2,0.6,0.3]}}]"
+            ),
+        ]);
+        let places = [
+            "box: it is 0.0500 m thick at (1001.2",
+            "box: it is 0.0500 m thick at (1000.8",
+        ];
+        assert_eq!(far.len(), 2, "{far:?}");
+        for (found, place) in far.iter().zip(places) {
+            assert!(found.contains(place), "{place} of {far:?}");
+        }
     }
 }
