@@ -60,10 +60,13 @@ struct Exchanged {
 impl Exchanged {
     /// `None` where nothing enters or leaves.
     fn of(start: &Start) -> Option<Self> {
+        // Drains look at no solids.
+        let meets_solids = !start.sources.emitters.is_empty();
+        let boundary = meets_solids.then_some(&start.boundary);
         (!start.sources.is_empty()).then(|| Self {
             sources: start.sources.clone(),
-            still: start.boundary.distance.clone(),
-            moving: start.boundary.moving.clone(),
+            still: boundary.and_then(|it| it.distance.clone()),
+            moving: boundary.map_or_else(Vec::new, |it| it.moving.clone()),
         })
     }
 }

@@ -12,6 +12,10 @@ use super::{
 /// A position's way through the room is looked at so many times a spacing.
 const LOOKS: f64 = 8.0;
 
+/// Of a spacing: as near to a solid a position is in it, however coordinates and distances round up to some hundred metres in 32 bits. A
+/// position that comes into a room in the plane of a solid's face is on that face.
+const TOUCHING: f64 = 1e-3;
+
 /// Layers of an oblique flow of which the covered part is counted.
 const COUNTED: f64 = 16.0;
 
@@ -219,7 +223,8 @@ impl<'a> Flow<'a> {
     fn is_open(&self, cell: [i64; 3], time: f64) -> bool {
         let p = self.at(cell, time);
         let seconds = self.sources.time(self.sources.frame_of(time));
-        self.emitter.shape.is_in_mesh(p) && self.solids.distance(p, seconds) > 0.0
+        let least = TOUCHING * self.sources.spacing;
+        self.emitter.shape.is_in_mesh(p) && self.solids.distance(p, seconds) > least
     }
 
     /// Where a particle that came in at `birth` is at the end of its frame. Where its way from there meets a solid or an end of the

@@ -429,6 +429,24 @@ fn water_that_never_comes_out_is_counted() {
     assert_eq!(blocked, 2 * 56);
 }
 
+/// A beam whose end lies in the plane where water comes into the room covers as much as one that begins before it.
+#[test]
+fn a_solid_flush_with_the_room_covers_it() {
+    let entered = |from: f64| {
+        let beam = solid(&[bounds([from, -0.5, -0.5], [0.6, 0.1, 0.8])]);
+        let sources = with(vec![nozzle(DVec3::new(2.0, 0.0, 0.0))], Vec::new());
+        let (particles, _, exchanges) = meeting(&sources, &Solids::still(Some(&beam)), 75);
+        let [Some(promise)] = sources.promises(Some(&beam))[..] else {
+            panic!("one flow");
+        };
+        let blocked: u64 = exchanges.iter().map(|exchange| exchange.blocked).sum();
+        (particles.len(), blocked, promise.covered)
+    };
+    let flush = entered(0.0);
+    assert_eq!(flush, entered(-0.5));
+    assert!(flush.1 > 0 && flush.2 > 0.3, "{flush:?}");
+}
+
 /// A post within the room: what entered before it does not enter again behind it.
 #[test]
 fn water_enters_once() {

@@ -2,7 +2,7 @@
 
 use swell_scene::{Scene, four_digits};
 
-/// Part of the domain's volume by which water may be more than it.
+/// Fraction of the domain's volume by which water may exceed it: whole layers round a block ten spacings high by as much.
 const OVERFULL: f64 = 0.05;
 
 /// That water of emitters never entered, where some did not.
@@ -13,7 +13,7 @@ pub(super) fn never_entered(blocked: u64) -> Vec<String> {
         many => format!("{many} particles of emitters"),
     };
     vec![format!(
-        "{words} never entered: solids covered the whole way through the emitter's room"
+        "{words} did not enter in the frames computed now: solids covered the whole way through the emitter's room"
     )]
 }
 

@@ -76,22 +76,15 @@ fn what_a_solid_covers_enters_later_at_any_frame_rate() {
                 rate / 2
             );
             let said = job.expect(0, &format!("bake {solved} {shot} --device cpu -o {cache}"));
-            assert!(!said.contains("never entered"), "{said}");
+            assert!(!said.contains("did not enter"), "{said}");
             let [entered, blocked] = brought(&job, &cache);
             assert!((128..=144).contains(&entered), "{cache}: {entered}");
             assert_eq!((entered % 16, blocked), (0, 0), "{cache}");
         }
     }
-    // Negative control: with twice the spacing beyond the box the room is too short for any.
-    job.edit(
-        "waiting.toml",
-        "max = [1.05, 0.75, 0.5]",
-        "max = [0.72, 0.75, 0.5]",
-    );
-    job.edit("waiting.toml", "velocity = [1.0", "velocity = [0.5");
-    job.expect(0, "bake waiting.toml --device cpu -o short");
-    let [entered, _] = brought(&job, "short");
-    assert!(entered < 128, "{entered}");
+    // Negative control: without the solid nothing waits.
+    job.expect(0, "bake waiting.toml --device cpu -o open --set solid=[]");
+    assert_eq!(brought(&job, "open"), [160, 0]);
 }
 
 /// On the GPU too, and gone on with to the byte from where water waits.
@@ -106,7 +99,8 @@ fn a_bake_goes_on_where_water_waits() {
         let waiting = brought(&job, "parts")[0];
         job.expect(0, &format!("{bake} --resume -o parts"));
         assert_eq!(job.hash("parts"), job.hash("whole"), "{solver}");
-        assert!(waiting < brought(&job, "parts")[0]);
+        // Two layers came into the room by then, and one of them is covered still.
+        assert!(waiting < 32, "{waiting}");
         for cache in ["whole", "parts"] {
             std::fs::remove_dir_all(job.path(cache)).unwrap();
         }
@@ -137,7 +131,7 @@ fn what_never_enters_is_told_of() {
         &said,
         &[
             covered,
-            "warning: 16 particles of emitters never entered: solids covered the whole way",
+            "warning: 16 particles of emitters did not enter in the frames computed now: solids covered the whole way",
         ],
     );
     assert_has(&job.expect(0, "inspect cache"), &[covered]);
