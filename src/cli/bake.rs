@@ -115,7 +115,8 @@ fn load_lengthened(args: &BakeArgs) -> Result<Scene, SceneError> {
 pub(super) fn run(args: &BakeArgs, progress: &Progress) -> Result<u8, Failure> {
     let device = args.device.read()?;
     let scene = load_lengthened(args)?;
-    args.deny.check(&args.scene, &scene)?;
+    let is_start = args.from.is_none();
+    args.deny.check(&args.scene, &scene, is_start)?;
     let method = scene.solver.method.name();
     let root = || set_variable("SWELL_CACHE").map_or_else(|| PathBuf::from("cache"), PathBuf::from);
     let default = || root().join(&scene.shot.name).join(method);

@@ -109,7 +109,7 @@ pub(super) fn run(args: &InspectArgs) -> Result<u8, Failure> {
         }
         Some(file) => {
             let scene = bake::load(file, &args.set, args.solver, args.allow_outside)?;
-            args.deny.check(file, &scene)?;
+            args.deny.check(file, &scene, true)?;
             refuse_frames_beyond(args, file, scene.shot.frames)?;
             let adapter = named_adapter(args.adapter.as_ref());
             let planned = plan(&scene, adapter.as_deref())?;

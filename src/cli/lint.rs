@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 
 use swell_scene::Scene;
+use swell_stage::prepare::Start;
 
 use super::Failure;
 
@@ -30,12 +31,15 @@ struct Refused {
 }
 
 impl DenyArgs {
-    /// Refuses `scene` of `file` where it was asked to and there is a reason.
-    pub(super) fn check(&self, file: &Path, scene: &Scene) -> Result<(), Failure> {
-        let lints = match self.deny {
+    /// Refuses `scene` of `file` where it was asked to and there is a reason; `is_start` says whether it begins with its own water.
+    pub(super) fn check(&self, file: &Path, scene: &Scene, is_start: bool) -> Result<(), Failure> {
+        let mut lints = match self.deny {
             Some(Denied::Lint) => scene.lints(),
-            None => Vec::new(),
+            None => return Ok(()),
         };
+        if is_start {
+            lints.extend(Start::of(scene)?.lints());
+        }
         if lints.is_empty() {
             return Ok(());
         }

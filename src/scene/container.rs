@@ -40,8 +40,8 @@ impl Scene {
             let warning = placed.warning()?;
             Some(match self.is_container(placed) {
                 true => format!(
-                    "{warning}; water fills this container, and is left out there, as swell takes an open mesh for a solid that is full up \
-                     to its caps: give walls that are to hold water a thickness, so that the mesh is closed"
+                    "{warning}; the scene puts water inside of it, and that water is left out: an open mesh is solid up to a flat cap over \
+                     each hole; give walls that hold water a thickness, so that the mesh is closed"
                 ),
                 false => warning,
             })

@@ -239,7 +239,9 @@ pub fn bake(
     let opened = opened.counting(request.time_passes);
     let mut drive = Drive::unloaded(&opened, scene, &start, request.time_passes)?.with_probes();
     let device = opened.identity();
-    let (mut writer, mut clock, state) = open_cache(request, &device, &start, clock, &parent)?;
+    let warnings = start.warnings(scene);
+    let (mut writer, mut clock, state) =
+        open_cache(request, &device, &start, &warnings, clock, &parent)?;
     let first = clock.frame + 1;
     tell(Event::Ready {
         device,
@@ -254,7 +256,7 @@ pub fn bake(
         parent,
         notes,
         volume: start.volume(scene),
-        warnings: start.warnings(scene),
+        warnings,
     });
     drive.load_watched(&start.particles, clock.frame, &state)?;
     drive.go_on_with(clock.next_id);
@@ -488,6 +490,7 @@ fn open_cache(
     request: &Request,
     device: &Identity,
     start: &Start,
+    warnings: &[String],
     clock: Clock,
     parent: &Option<Parent>,
 ) -> Result<(CacheWriter, Clock, Particles), BakeError> {
@@ -514,7 +517,7 @@ fn open_cache(
         compression: scene.compression,
         probes: probes::records(scene),
         parent: parent.clone(),
-        warnings: start.warnings(scene),
+        warnings: warnings.to_vec(),
         start_particles: 0,
         files: Vec::new(),
     };

@@ -124,14 +124,24 @@ impl Start {
         }
     }
 
+    /// Lints that need the start itself: that there is no water, though the scene asks for some.
+    pub fn lints(&self) -> Vec<String> {
+        if !self.particles.is_empty() || self.asked == Some(0.0) {
+            return Vec::new();
+        }
+        let lint = match (self.asked, self.removed) {
+            (None, _) => "water: the frame that the bake begins from has no particles",
+            (_, 0) => {
+                "water: no block or mesh is large enough for a particle; lower the particle spacing"
+            }
+            _ => "water: solids or walls cover all of the scene's water, and no particle is left",
+        };
+        vec![lint.to_owned()]
+    }
+
     /// What a user has to know of the scene and of how it starts, a sentence each.
     pub fn warnings(&self, scene: &Scene) -> Vec<String> {
-        let mut warnings = scene.warnings();
-        if self.particles.is_empty() && self.removed > 0 {
-            warnings.push(
-                "water: solids cover all of the scene's water, and no particle is left".to_owned(),
-            );
-        }
+        let mut warnings = [scene.warnings(), self.lints()].concat();
         for (index, promise) in self.promises().into_iter().enumerate() {
             if let Some(promise) = promise.filter(|promise| promise.covered > 0.0) {
                 warnings.push(format!(

@@ -51,7 +51,7 @@ fn adapter(adapter: &Adapter) -> Value {
 
 fn of_scene(args: &InspectArgs, file: &Path) -> Result<(Value, Option<Failure>), Failure> {
     let scene = bake::load(file, &args.set, args.solver, args.allow_outside)?;
-    args.deny.check(file, &scene)?;
+    args.deny.check(file, &scene, true)?;
     refuse_frames_beyond(args, file, scene.shot.frames)?;
     let adapter = named_adapter(args.adapter.as_ref());
     let planned = plan(&scene, adapter.as_deref())?;

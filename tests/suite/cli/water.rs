@@ -110,7 +110,7 @@ fn a_scene_without_water_is_told_of() {
         "[solver]\n",
         "[[solid]]\nmesh = \"box.obj\"\n[solver]\n",
     );
-    let covered = "water: solids cover all of the scene's water, and no particle is left";
+    let covered = "water: solids or walls cover all of the scene's water, and no particle is left";
     for words in [
         "inspect water.toml".to_owned(),
         format!("{BAKE} -o covered"),
@@ -120,6 +120,8 @@ fn a_scene_without_water_is_told_of() {
             &[&format!("warning: {covered}"), "0 particles (256 left out"],
         );
     }
+    let denied = job.expect(2, "inspect water.toml --deny lint");
+    assert_has(&denied, &["denied by --deny lint", covered]);
     // Control: half of it.
     job.edit(
         "water.toml",
@@ -184,7 +186,7 @@ fn water_in_an_open_mesh_is_told_of() {
         "[[solid]]\nmesh = \"cup.obj\"\n[solver]\n",
     );
     let open = "cup.obj is open and taken as closed: 1 hole: 4 open edges about";
-    let container = "water fills this container, and is left out there, as swell takes an open mesh for a solid that is full up to its caps";
+    let container = "the scene puts water inside of it, and that water is left out: an open mesh is solid up to a flat cap over each hole";
     for words in ["inspect water.toml", &format!("{BAKE} -o cup")] {
         let said = job.expect(0, words);
         let warned = said
