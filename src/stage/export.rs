@@ -308,7 +308,7 @@ impl<'a> Job<'a> {
         })
     }
 
-    /// What of the look's camera is hardly meant at the frames of all processes.
+    /// Warnings of the look's camera, at the frames of all processes.
     fn lints(&self) -> Vec<String> {
         let ends = self
             .frames
@@ -335,6 +335,14 @@ impl<'a> Job<'a> {
         beside(shot, &format!("{number:0digits$}"))
     }
 
+    /// How a shot has its water, as the records of its layers and of its root say it.
+    fn water_settings(&self, water: UsdWater) -> String {
+        match water {
+            UsdWater::Points => "points".to_owned(),
+            UsdWater::Mesh => format!("mesh, {} voxels a spacing", self.request.voxels),
+        }
+    }
+
     fn owner(&self, settings: String) -> Result<Owner, CacheError> {
         let source = self.source();
         Ok(Owner {
@@ -358,11 +366,8 @@ impl<'a> Job<'a> {
             Target::Bgeo(files) => (files.file(number), "particles as bgeo".to_owned()),
             Target::Vdb(files) => (files.file(number), "grids as vdb".to_owned()),
             Target::Usd(file, water) => {
+                let water = self.water_settings(*water);
                 let layer = self.layer(file, frame);
-                let water = match water {
-                    UsdWater::Points => "points".to_owned(),
-                    UsdWater::Mesh => format!("mesh, {voxels} voxels a spacing"),
-                };
                 (layer, format!("a frame's layer of usd, {water}"))
             }
         };

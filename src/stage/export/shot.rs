@@ -79,6 +79,11 @@ impl Job<'_> {
                 continue;
             };
             let root = self.root(file, *water)?;
+            let settings = format!(
+                "usd of a shot, {}, frame numbers {:+}",
+                self.water_settings(*water),
+                self.numbering.offset
+            );
             let parts = [
                 (beside(file, MANIFEST), usd::manifest(&root)),
                 (file.clone(), usd::root(&root)),
@@ -86,7 +91,7 @@ impl Job<'_> {
             for (file, bytes) in parts {
                 let wanted = Wanted {
                     file,
-                    owner: self.owner("usd of a shot".to_owned())?,
+                    owner: self.owner(settings.clone())?,
                     source: blake3::hash(&bytes).to_hex().to_string(),
                     follows: true,
                 };

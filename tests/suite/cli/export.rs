@@ -342,6 +342,12 @@ fn files_are_numbered_from_another_frame() {
         "export cache --npy moved/p.%04d.npy --frames 4 --number-from 1001 --overwrite",
     );
     assert_eq!(files(&job.path("moved"))["p.1001.npy"], plain["p.0004.npy"]);
+    // A shot whose layers would have other names keeps its root.
+    let standing = files(&job.path("moved"));
+    let again =
+        "export cache --frames 2-4x2 --usd moved/s.usda --look look.toml --number-from 2001";
+    job.expect_clear(4, again, "exported in another way");
+    assert_eq!(files(&job.path("moved")), standing);
     job.expect_clear(2, &words("moved", "--number-from x"), "--number-from");
 }
 
