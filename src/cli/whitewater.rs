@@ -104,14 +104,20 @@ pub(super) fn run(args: &WhitewaterArgs, progress: &Progress) -> Result<u8, Fail
         true => "ended by a signal after",
         false => "done:",
     };
-    progress.conclude(
-        &format!(
+    let words = match outcome.interrupted && outcome.frames == 0 && !outcome.directory.exists() {
+        true => {
+            "ended by a signal while thresholds were calibrated; nothing was written".to_owned()
+        }
+        false => format!(
             "{end} frame {} in {} ({}, {} written now)",
             outcome.last_frame,
             outcome.directory.display(),
             count(outcome.frames.into(), "frame"),
             size(outcome.bytes),
         ),
+    };
+    progress.conclude(
+        &words,
         json!({
             "last_frame": outcome.last_frame, "frames": outcome.frames,
             "interrupted": outcome.interrupted, "directory": output::path(&outcome.directory),

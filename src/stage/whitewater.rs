@@ -197,7 +197,11 @@ pub fn whitewater(
     engine.set(&settings)?;
     let mut stream = match standing {
         Some(_) => Growing::resume(&directory, &manifest, &cache)?,
-        None => Growing::create(&directory, manifest, &cache, &settings)?,
+        None => {
+            // Only now: what calibration was stopped for stands as it was.
+            remove(&directory)?;
+            Growing::create(&directory, manifest, &cache, &settings)?
+        }
     };
     tell(Event::Ready {
         device: identity,
@@ -209,8 +213,7 @@ pub fn whitewater(
         last,
     });
     let mut interrupted = false;
-    let end = cache.last_frame();
-    let mut forecast = Forecast::new(settings.max_particles, end, stream.white.len());
+    let mut forecast = Forecast::new(settings.max_particles, last, stream.white.len());
     while stream.clock.frame < last {
         interrupted = stop.load(Ordering::Relaxed);
         if interrupted {
@@ -432,7 +435,7 @@ impl Growing {
     }
 }
 
-/// The stream that stands there, made as this one would be; `None` where there is none, or it was removed as asked.
+/// The stream that stands there, made as this one would be; `None` where there is none, or one that is to be overwritten.
 fn standing(
     request: &Request,
     directory: &Path,
@@ -444,18 +447,23 @@ fn standing(
     let stream = CacheReader::open(directory)?;
     match (other(&stream, &manifest.scene_hash), request.overwrite) {
         (None, false) => Ok(Some(stream)),
-        (_, true) => {
-            fs::remove_dir_all(directory).map_err(|source| WhitewaterError::Remove {
-                directory: directory.to_owned(),
-                source,
-            })?;
-            Ok(None)
-        }
+        (_, true) => Ok(None),
         (Some(how), false) => Err(WhitewaterError::Other {
             directory: directory.to_owned(),
             how,
         }),
     }
+}
+
+/// Removes a stream that is to be overwritten.
+fn remove(directory: &Path) -> Result<(), WhitewaterError> {
+    if !swell_cache::exists(directory) {
+        return Ok(());
+    }
+    fs::remove_dir_all(directory).map_err(|source| WhitewaterError::Remove {
+        directory: directory.to_owned(),
+        source,
+    })
 }
 
 /// How a stream was made, where it is not the one of this hash.

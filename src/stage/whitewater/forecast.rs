@@ -10,9 +10,9 @@ pub(super) const OVER: usize = 4;
 pub struct Crowding {
     /// First frame that would have more than `max_particles`.
     pub frame: u32,
-    /// So many there would be at the bake's last frame.
+    /// So many there would be at the last frame asked for.
     pub at_end: u64,
-    /// The bake's last frame.
+    /// The last frame asked for.
     pub end: u32,
     /// Frames that growth was measured over.
     pub over: usize,
