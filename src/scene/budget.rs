@@ -250,14 +250,14 @@ impl Budget {
         check(Watched::Speed, report.max_speed, self.speed)?;
         if let Some(times) = self.speed_jump {
             let reached = scene.reached_speed(frame, speed);
-            let fallen = scene.fallen_speed(speed);
+            let fallen = scene.fallen_speed(speed, energy, particles);
             let limit = times * reached.max(fallen / SPEED_JUMP);
             check(Watched::SpeedJump, report.max_speed, Some(limit)).map_err(|breach| {
                 let detail = format!(
-                    "{} times {reached:.4} m/s, which gravity, effects and walls can bring {speed:.4} m/s of the fastest before to, or {} of \
-                     the {fallen:.4} m/s after a fall through the domain",
+                    "{} times the larger of {reached:.4} m/s, which gravity, effects and walls can bring {speed:.4} m/s of the fastest before \
+                     to, and {:.4} m/s, an eighth of the speed after a fall from the top of the water",
                     shown(times),
-                    shown(times / SPEED_JUMP)
+                    fallen / SPEED_JUMP
                 );
                 Breach {
                     detail: Some(detail),
@@ -308,13 +308,11 @@ impl Scene {
         (speed + push + gained + self.effects.frees(self.grain())).max(least)
     }
 
-    /// What a fall from the domain's highest place to its lowest brings a particle of `speed` to, m/s: the column at the foot of a dam is
-    /// that fast within a frame where the frame is long or the column high.
-    fn fallen_speed(&self, speed: f64) -> f64 {
-        let fall = (self.water.gravity * self.domain.size())
-            .abs()
-            .element_sum();
-        (speed * speed + 2.0 * fall).sqrt()
+    /// What a fall from the top of the water brings one of so many particles of `speed` to, m/s: the foot of a column is that fast within
+    /// a frame where the frame is long or the column high. A column's top is twice as high as its energy, joule, has it on average.
+    fn fallen_speed(&self, speed: f64, energy: f64, particles: usize) -> f64 {
+        let mass = self.particle_mass() * particles.max(1) as f64;
+        (speed * speed + 4.0 * energy.max(0.0) / mass).sqrt()
     }
 
     /// Kinetic and potential energy of a state of so many particles, the latter against the domain's lowest place,
@@ -441,8 +439,9 @@ mod tests {
             breach.to_string().contains("budget.speed_jump allows"),
             "{breach}"
         );
-        // From rest 8 times 0.2 m/s are less than a fall of 3 m, √60 m/s.
-        let fall = |max_speed: f64| {
+        // From rest 8 times 0.2 m/s are less than a fall of 3 m, √60 m/s, which is the top of 10 kg with 150 J. Control: a jet of
+        // as much in shallow water, of a tenth of that energy, though the domain is as high.
+        let fall = |max_speed: f64, energy: f64| {
             let held = Budget {
                 speed_jump: Some(SPEED_JUMP),
                 ..Budget::default()
@@ -451,10 +450,18 @@ mod tests {
                 max_speed,
                 ..report.clone()
             };
-            held.check_frame(&scene("flip"), 3, 0, &report, &Before::default())
+            let before = Before {
+                energy,
+                ..Before::default()
+            };
+            held.check_frame(&scene("flip"), 3, 10, &report, &before)
         };
-        assert_eq!(fall(60.0_f64.sqrt() * (1.0 - 1e-6)), Ok(()));
-        assert!(fall(60.0_f64.sqrt() * (1.0 + 1e-6)).is_err());
+        let jumps = |found: Result<(), Breach>| {
+            found.is_err_and(|breach| breach.watched == Watched::SpeedJump)
+        };
+        assert!(!jumps(fall(60.0_f64.sqrt() * (1.0 - 1e-6), 150.0)));
+        assert!(jumps(fall(60.0_f64.sqrt() * (1.0 + 1e-6), 150.0)));
+        assert!(jumps(fall(60.0_f64.sqrt() * (1.0 - 1e-6), 15.0)));
         measured(|b, limit| b.density_error_mean = Some(limit), &report, 0.02);
         measured(|b, limit| b.density_error_p99 = Some(limit), &report, 0.3);
         measured(|b, limit| b.density_error_max = Some(limit), &report, 0.9);

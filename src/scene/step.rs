@@ -20,7 +20,7 @@ pub struct Substep {
     pub start: f64,
     /// Seconds.
     pub length: f64,
-    /// For how long forces act, seconds: half of the substep before and half of this one, so that
+    /// For how long gravity, pressure, surface tension, vorticity confinement and drag act, seconds: half of the substep before and half of this one, so that
     /// velocities are at mid-substep whatever the lengths (leapfrog).
     pub kick: f64,
     /// Most cells that a particle moves, as its speed, gravity, walls and solids have it.
@@ -30,7 +30,7 @@ pub struct Substep {
 /// Displacement, in cells, that faces around the water are filled for where particles ask for none beyond their own cells.
 const WITHIN_CELLS: f64 = 1.0;
 
-/// For how long forces act between a substep of `before` seconds, 0 where there was none, and one of
+/// For how long gravity, pressure, surface tension, vorticity confinement and drag act between a substep of `before` seconds, 0 where there was none, and one of
 /// `length`: half of each. Velocities are at mid-substep, positions at substep ends (leapfrog; Hairer, Lubich and Wanner 2006,
 /// §I.1.4). With the substep's own length instead, waves whose speed determines the substeps lose ω Δt / 4 of their amplitude in each
 /// swing. The start counts as the end of a substep as long as the first.
@@ -174,7 +174,8 @@ impl Scene {
             1.0
         };
         let length = remaining / wanted;
-        let reached = fastest + (gravity * kick(before, length) + push.gained(length));
+        let kick = kick(before, length);
+        let reached = fastest + (gravity * kick + push.gained(kick));
         if f64::from(done) + wanted > f64::from(flip.max_substeps) {
             let detail = format!(
                 "up to {reached:.3} m/s, particles {speed:.3}, with gravity, effects, wave makers and moving solids, at \
@@ -192,7 +193,7 @@ impl Scene {
         let substep = Substep {
             start,
             length,
-            kick: kick(before, length),
+            kick,
             displacement,
         };
         Ok((wanted, substep))

@@ -114,7 +114,7 @@ mirror!(
         periodic: u32,
         /// Water is pushed off walls that are nearer than half of this.
         apart_from_walls: f32,
-        /// Seconds for which forces act: half of the substep before and half of this one.
+        /// Seconds for which gravity, pressure, surface tension, confinement and drag act: half of the substep before and half of this one.
         kick: f32,
         /// Unused.
         padding: u32,
