@@ -77,14 +77,15 @@ impl Renderer {
     ) -> Result<(), RenderError> {
         let recordings = if aovs { &self.aovs } else { &self.sample };
         let begun = Instant::now();
-        for recording in recordings {
-            recording.run(&self.program, self.timer.as_mut())?;
-            if self.is_slow {
+        if self.is_slow {
+            for recording in recordings {
+                recording.run(&self.program, self.timer.as_mut())?;
                 self.program.context.wait()?;
                 parts.add(1);
             }
-        }
-        if !self.is_slow {
+        } else {
+            let all: Vec<&Recording> = recordings.iter().collect();
+            Recording::run_all(&all, &self.program, self.timer.as_mut())?;
             self.program.context.wait()?;
             parts.add(recordings.len());
         }

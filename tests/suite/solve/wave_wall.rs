@@ -30,7 +30,7 @@ const SPACING: f64 = 0.0125;
 /// When the domain's other end is not reached yet, and the crest has passed the wall; seconds.
 const UNTIL: f64 = 3.8;
 
-/// Of the depth, between frames and theory.
+/// Of the depth, between frames and theory: 0.4 spacings, of which the topmost particle tells the surface to half of one.
 const TOLERANCE: f64 = 0.02;
 
 /// Goring 1978: where the wall is, and the depth before it, at a time.

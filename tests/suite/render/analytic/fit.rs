@@ -97,6 +97,7 @@ fn a_point_is_where_the_fit_of_the_film_has_it() {
             let spread = z / (z * z - RADIUS * RADIUS);
             for (found, off) in found.into_iter().zip([x, y]) {
                 let expected = focal * off * spread;
+                // 16 samples place an edge within a quarter of a pixel, and a mean of some 19 of them within 0.06.
                 assert!(
                     (found - expected).abs() < 0.1,
                     "{method} {film:?} {fit}: {found} {expected}"
@@ -121,6 +122,7 @@ fn a_point_is_where_the_fit_of_the_film_has_it() {
             ];
             for (found, off) in [(right, x), (up, y)] {
                 let expected = focal * off / z;
+                // The matrix has 32 bits: 2⁻²⁴ of a coordinate of some hundred pixels, in a sum of four.
                 assert!((found - expected).abs() < 1e-3, "{found} {expected}");
             }
         }
