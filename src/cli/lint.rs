@@ -38,7 +38,7 @@ impl DenyArgs {
             None => return Ok(()),
         };
         if is_start {
-            lints.extend(Start::of(scene)?.lints());
+            lints.extend(Start::of(scene)?.lints(scene));
         }
         if lints.is_empty() {
             return Ok(());

@@ -44,6 +44,14 @@ impl Bounds {
         p.cmpge(self.min).all() && p.cmple(self.max).all()
     }
 
+    /// What both boxes contain; a size is negative along axes on which they are apart.
+    pub fn intersection(&self, other: &Self) -> Self {
+        Self {
+            min: self.min.max(other.min),
+            max: self.max.min(other.max),
+        }
+    }
+
     /// Cells of edge `edge` that cover it along each axis, as [`cells_over`] counts them.
     pub fn cells(&self, edge: f64) -> [u32; 3] {
         cells_over(self.size(), edge).to_array().map(|n| n as u32)

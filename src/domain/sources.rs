@@ -161,9 +161,13 @@ fn is_none(count: &u64) -> bool {
 /// What an emitter without a level brings, where solids stand as at the start.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Promise {
-    /// m³/s.
+    /// Flow rate, m³/s.
     pub rate: f64,
-    /// Part of its cross-section that solids cover, 0..1.
+    /// Velocity times swept area of its box, m³/s; `None` for a mesh.
+    pub asked: Option<f64>,
+    /// Fraction of the lattice's particles that enter, 0..1: within the mesh and outside of solids.
+    pub open: f64,
+    /// Fraction of its cross-section that solids cover, 0..1.
     pub covered: f64,
 }
 
@@ -265,6 +269,26 @@ impl Sources {
         let all = self.emitters.iter();
         all.map(|it| (it.level.is_none()).then(|| Flow::of(self, it, &solids).promise()))
             .collect()
+    }
+
+    /// The most particles that each emitter brings within `duration` seconds; `None` where it keeps a level. Solids, which may move, only
+    /// take from them.
+    pub fn most_entering(&self, duration: f64) -> Vec<Option<u64>> {
+        let solids = Solids::still(None);
+        let all = self.emitters.iter();
+        all.map(|it| {
+            let end = it
+                .window
+                .until
+                .map_or(duration, |until| until.min(duration));
+            let begin = it.window.from.max(0.0);
+            let counts = it.level.is_none();
+            counts.then(|| match begin < end {
+                true => Flow::of(self, it, &solids).entering(begin, end),
+                false => 0,
+            })
+        })
+        .collect()
     }
 
     fn time(&self, frame: u32) -> f64 {
@@ -403,19 +427,22 @@ pub fn is_long_enough(size: DVec3, velocity: DVec3, seconds: f64) -> bool {
         .all()
 }
 
-/// Of a flow through a box, m³/s: of its swept area, which is that of the faces that look along the velocity.
+/// Flow rate through a box, m³/s: velocity times the area of the faces that look along it.
+fn swept(size: DVec3, velocity: DVec3) -> f64 {
+    let faces = DVec3::new(size.y * size.z, size.z * size.x, size.x * size.y);
+    velocity.abs().dot(faces)
+}
+
+/// The same of a lattice of particles, which has whole rows across a flow along axes.
 pub fn flow(size: DVec3, velocity: DVec3, spacing: f64) -> f64 {
     let across = DVec3::from_array(std::array::from_fn(|axis| match velocity[axis] {
         0.0 => places(size[axis], spacing) as f64 * spacing,
         _ => size[axis],
     }));
-    let faces = DVec3::new(
-        across.y * across.z,
-        across.z * across.x,
-        across.x * across.y,
-    );
-    velocity.abs().dot(faces)
+    swept(across, velocity)
 }
 
+#[cfg(test)]
+mod promise_tests;
 #[cfg(test)]
 mod tests;

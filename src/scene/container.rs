@@ -75,10 +75,7 @@ impl Scene {
             .into_iter()
             .chain(meshes)
             .chain(emitters);
-        let in_both = rooms.map(|room| Bounds {
-            min: room.min.max(bounds.min),
-            max: room.max.min(bounds.max),
-        });
+        let in_both = rooms.map(|room| room.intersection(&bounds));
         let in_both = in_both.filter(|both| both.min.cmplt(both.max).all());
         let particles = self.water.particles.iter().flat_map(|swarm| &swarm.at);
         let mut places = in_both.flat_map(looks).chain(particles.copied());

@@ -59,6 +59,9 @@ impl Scene {
             .map(|(k, maker)| (k, maker, self.still_beside(maker).or(still)))
             .collect();
         let mut made: Vec<(Option<Wall>, Made)> = Vec::new();
+        for (k, maker) in self.wave_makers.iter().enumerate() {
+            lints.extend(self.lint_dry_wall(k, maker, level));
+        }
         for &(k, maker, still) in &makers {
             let Some(waves) = made_by(k, maker, self, still) else {
                 continue;

@@ -40,11 +40,7 @@ impl Scene {
             min: all.min.min(other.min),
             max: all.max.max(other.max),
         })?;
-        let grown = all.grown(margin);
-        let clipped = Bounds {
-            min: grown.min.max(reach.min),
-            max: grown.max.min(reach.max),
-        };
+        let clipped = all.grown(margin).intersection(&reach);
         let spacing = || fitting_spacing(&clipped, self.particle_spacing(), MOST_NODES);
         (clipped.min.cmplt(clipped.max).all()).then(|| (clipped, spacing()))
     }

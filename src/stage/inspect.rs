@@ -176,14 +176,11 @@ pub fn plan(scene: &Scene, adapter: Option<&str>) -> Result<ScenePlan, PlanError
         })
         .or(lacks);
     let promises = start.promises();
-    let windows = scene.emitters.iter().map(|emitter| emitter.window);
-    let entering = promises
-        .iter()
-        .zip(windows)
-        .filter_map(|(promise, window)| {
-            let seconds = window.length(scene.shot.duration());
-            Some(promise.as_ref()?.rate * seconds / scene.particle_volume())
-        });
+    let most = start.sources.most_entering(scene.shot.duration());
+    let entering = promises.iter().zip(most).filter_map(|(promise, most)| {
+        // Where nothing is in the way, to the particle.
+        Some((most? as f64 * promise.as_ref()?.open).ceil())
+    });
     let entering: f64 = entering.sum();
     let distance = start.boundary.distance.as_ref();
     let spacing = distance.map(|distance| distance.spacing);
@@ -195,7 +192,7 @@ pub fn plan(scene: &Scene, adapter: Option<&str>) -> Result<ScenePlan, PlanError
         removed: start.removed,
         volume: start.volume(scene),
         warnings: start.warnings(scene),
-        entering: scene.has_inlets().then(|| entering.ceil()),
+        entering: scene.has_inlets().then_some(entering),
         promises,
         adapter: context.map(|context| context.info.name),
     })

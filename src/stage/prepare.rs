@@ -9,11 +9,14 @@ use swell_domain::{
     signed_distance::{SignedDistance, SignedDistanceError},
     sources::{Promise, Sources},
 };
-use swell_scene::{Method, Scene};
+use swell_scene::{Method, Scene, four_digits};
 use swell_solve::{
     flip,
     plan::{Capacity, Counts, DeviceLimits, Plan},
 };
+
+/// Fraction by which whole rows of particles may change an emitter's flow.
+const ROUNDED: f64 = 0.02;
 
 /// How much water there is at a start, m³.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -124,10 +127,44 @@ impl Start {
         }
     }
 
-    /// Lints that need the start itself: that there is no water, though the scene asks for some.
-    pub fn lints(&self) -> Vec<String> {
+    /// Lints that need the start itself: that there is no water, though the scene asks for some, and emitters that bring another amount
+    /// than their boxes and velocities ask for.
+    pub fn lints(&self, scene: &Scene) -> Vec<String> {
+        let mut lints = Vec::from_iter(self.lint_dry());
+        let most = self.sources.most_entering(scene.shot.duration());
+        for (index, (promise, most)) in self.promises().into_iter().zip(most).enumerate() {
+            let window = scene.emitters[index].window;
+            let seconds = window.length(scene.shot.duration());
+            if most == Some(0) && seconds > 0.0 {
+                lints.push(format!(
+                    "emitter[{index}]: nothing enters: no layer of particles comes in within its {} s",
+                    four_digits(seconds)
+                ));
+            } else if let Some(promise) = promise
+                && let Some(asked) = promise.asked
+                && promise.open > 0.0
+            {
+                let made = promise.rate / promise.open;
+                let part = made / asked - 1.0;
+                if part.abs() > ROUNDED {
+                    lints.push(format!(
+                        "emitter[{index}]: its box and velocity ask for {} m³/s, and {} m³/s enter, {:.1} % {}: across the flow there \
+                         are whole rows of particles {} m apart",
+                        four_digits(asked),
+                        four_digits(made),
+                        100.0 * part.abs(),
+                        if part < 0.0 { "less" } else { "more" },
+                        scene.particle_spacing()
+                    ));
+                }
+            }
+        }
+        lints
+    }
+
+    fn lint_dry(&self) -> Option<String> {
         if !self.particles.is_empty() || self.asked == Some(0.0) {
-            return Vec::new();
+            return None;
         }
         let lint = match (self.asked, self.removed) {
             (None, _) => "water: the frame that the bake begins from has no particles",
@@ -136,12 +173,12 @@ impl Start {
             }
             _ => "water: solids or walls cover all of the scene's water, and no particle is left",
         };
-        vec![lint.to_owned()]
+        Some(lint.to_owned())
     }
 
     /// What a user has to know of the scene and of how it starts, a sentence each.
     pub fn warnings(&self, scene: &Scene) -> Vec<String> {
-        let mut warnings = [scene.warnings(), self.lints()].concat();
+        let mut warnings = [scene.warnings(), self.lints(scene)].concat();
         for (index, promise) in self.promises().into_iter().enumerate() {
             if let Some(promise) = promise.filter(|promise| promise.covered > 0.0) {
                 warnings.push(format!(

@@ -6,7 +6,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::{
-    super::bounds::Bounds, Emitter, ON_FACE, Promise, Shape, Solids, Sources, flow, places,
+    super::bounds::Bounds, Emitter, ON_FACE, Promise, Shape, Solids, Sources, flow, places, swept,
 };
 
 /// A position's way through the room is looked at so many times a spacing.
@@ -16,8 +16,11 @@ const LOOKS: f64 = 8.0;
 /// position that comes into a room in the plane of a solid's face is on that face.
 const TOUCHING: f64 = 1e-3;
 
-/// Layers of an oblique flow of which the covered part is counted.
+/// Layers of an oblique flow whose covered fraction is counted.
 const COUNTED: f64 = 16.0;
+
+/// Layers of an oblique flow whose particles are counted: a layer more or less at either end is below 1 %.
+const LONG: f64 = 256.0;
 
 /// An emitter's lattice, and what it moves through.
 pub(super) struct Flow<'a> {
@@ -86,18 +89,10 @@ impl<'a> Flow<'a> {
         }
     }
 
-    /// What the emitter brings where its solids stay where they are.
+    /// Flow rate where the solids stay where they are.
     pub(super) fn promise(&self) -> Promise {
-        let Self { emitter, .. } = self;
-        let (size, spacing) = (emitter.shape.bounds.size(), self.sources.spacing);
-        let rate = flow(size, emitter.velocity, spacing);
-        let moves = emitter.velocity.to_array().map(|speed| speed != 0.0);
-        // Along an axis layers are alike.
-        let layers = match moves.into_iter().filter(|moves| *moves).count() {
-            1 => 1.0,
-            _ => COUNTED,
-        };
-        let end = (layers * spacing / self.speed()).min(f64::MAX);
+        let layers = if self.is_aligned() { 1.0 } else { COUNTED };
+        let end = self.duration(layers);
         let entering: Vec<_> = self
             .cells(0.0, end)
             .filter_map(|cell| {
@@ -107,12 +102,69 @@ impl<'a> Flow<'a> {
             .collect();
         let count = |is: fn(&Looked) -> bool| entering.iter().filter(|it| is(it)).count() as f64;
         let open = count(|it| it.is_open);
-        // Of a flow so slow that no time is told from the next, nothing is counted.
+        // Of a flow so slow that two times round to one, nothing is counted.
         let part = |of: f64| if of > 0.0 { open / of } else { 1.0 };
+        let bounds = &self.emitter.shape.bounds;
+        let is_box = self.emitter.shape.mesh.is_none();
         Promise {
-            rate: rate * part(entering.len() as f64),
+            rate: self.rate() * part(entering.len() as f64),
+            asked: is_box.then(|| swept(bounds.size(), self.emitter.velocity)),
+            open: part(entering.len() as f64),
             covered: 1.0 - part(count(|it| it.is_inside)),
         }
+    }
+
+    /// Positions that come into the box after `begin` and not after `end`, seconds, whatever the emitter's window.
+    pub(super) fn entering(&self, begin: f64, end: f64) -> u64 {
+        let [x, y, z] = &self.lines;
+        let rows: Vec<_> = (z.cells_within(begin, end))
+            .flat_map(|k| y.cells_within(begin, end).map(move |j| (j, k)))
+            .collect();
+        let in_row = |(j, k): (i64, i64)| {
+            // While the row's other coordinates are within the box.
+            let others = [y.passage(j), z.passage(k)].into_iter().flatten();
+            let (from, to) = others.fold((begin, end), |a, b| (a.0.max(b.0), a.1.min(b.1)));
+            if from > to {
+                return 0;
+            }
+            let cells = x.cells_within(from, to).map(|i| self.passage([i, j, k]));
+            let enters = |&(enter, _): &Passage| begin < enter && enter <= end;
+            cells.flatten().filter(enters).count() as u64
+        };
+        rows.into_par_iter().map(in_row).sum()
+    }
+
+    /// Flow rate of the lattice without solids, m³/s. Across a flow along an axis it has whole rows of particles; the rows of an oblique
+    /// flow, too, are whole where they line up with it.
+    fn rate(&self) -> f64 {
+        let velocity = self.emitter.velocity;
+        let exact = flow(
+            self.emitter.shape.bounds.size(),
+            velocity,
+            self.sources.spacing,
+        );
+        let seconds = self.duration(LONG);
+        if self.is_aligned() || seconds == f64::MAX {
+            return exact;
+        }
+        let counted = self.entering(0.0, seconds) as f64 * self.sources.spacing.powi(3) / seconds;
+        // Within the layers that the two ends cut.
+        if (counted / exact - 1.0).abs() < 2.0 / LONG {
+            exact
+        } else {
+            counted
+        }
+    }
+
+    /// Whether the water moves along an axis.
+    fn is_aligned(&self) -> bool {
+        let speeds = self.emitter.velocity.to_array();
+        speeds.into_iter().filter(|speed| *speed != 0.0).count() == 1
+    }
+
+    /// In which so many layers come in, seconds.
+    fn duration(&self, layers: f64) -> f64 {
+        (layers * self.sources.spacing / self.speed()).min(f64::MAX)
     }
 
     /// Whether a position is in the room on its way, and open there.
@@ -130,10 +182,7 @@ impl<'a> Flow<'a> {
 
     /// Positions that may be in the room at some time of a span, x fastest.
     fn cells(&self, begin: f64, end: f64) -> impl ParallelIterator<Item = [i64; 3]> {
-        let [x, y, z] = [0, 1, 2].map(|axis: usize| {
-            let (a, b) = (self.lines[axis].cells(begin), self.lines[axis].cells(end));
-            a.start.min(b.start)..a.end.max(b.end)
-        });
+        let [x, y, z] = [0, 1, 2].map(|axis: usize| self.lines[axis].cells_within(begin, end));
         let rows: Vec<_> = z.flat_map(|k| y.clone().map(move |j| (j, k))).collect();
         let row = move |(j, k)| x.clone().map(move |i| [i, j, k]);
         rows.into_par_iter().flat_map_iter(row)
@@ -204,7 +253,7 @@ impl<'a> Flow<'a> {
 
     /// From a look to the next, seconds.
     fn step(&self) -> f64 {
-        (self.sources.spacing / (LOOKS * self.speed())).min(f64::MAX)
+        self.duration(1.0 / LOOKS)
     }
 
     /// m/s; squares of the least velocities are no numbers.
@@ -297,6 +346,12 @@ impl Line {
         let from = self.at(cell, 0.0) + ON_FACE * self.spacing;
         let [a, b] = [self.min, self.max].map(|face| (face - from) / self.speed);
         Some((a.min(b), a.max(b)))
+    }
+
+    /// Those that may be inside at some time of a span.
+    fn cells_within(&self, begin: f64, end: f64) -> Range<i64> {
+        let (a, b) = (self.cells(begin), self.cells(end));
+        a.start.min(b.start)..a.end.max(b.end)
     }
 
     /// Those that may be inside.

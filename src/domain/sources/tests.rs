@@ -8,14 +8,14 @@ use super::{
     *,
 };
 
-const D: f64 = 0.1;
+pub(super) const D: f64 = 0.1;
 
-fn block(min: [f64; 3], max: [f64; 3]) -> Shape {
+pub(super) fn block(min: [f64; 3], max: [f64; 3]) -> Shape {
     Shape::from(bounds(min, max))
 }
 
 /// A nozzle 0.4 m long, 0.3 × 0.2 m wide.
-fn nozzle(velocity: DVec3) -> Emitter<Shape> {
+pub(super) fn nozzle(velocity: DVec3) -> Emitter<Shape> {
     Emitter {
         shape: block([0.0; 3], [0.4, 0.3, 0.2]),
         velocity,
@@ -24,7 +24,7 @@ fn nozzle(velocity: DVec3) -> Emitter<Shape> {
     }
 }
 
-fn with(emitters: Vec<Emitter<Shape>>, drains: Vec<Drain<Shape>>) -> Sources {
+pub(super) fn with(emitters: Vec<Emitter<Shape>>, drains: Vec<Drain<Shape>>) -> Sources {
     Sources {
         emitters,
         drains,
@@ -48,7 +48,7 @@ fn solid(boxes: &[Bounds]) -> SignedDistance {
 }
 
 /// All that enters until the end of a frame, where nothing moves it.
-fn run(sources: &Sources, frames: u32) -> (Particles, u32, Vec<Exchange>) {
+pub(super) fn run(sources: &Sources, frames: u32) -> (Particles, u32, Vec<Exchange>) {
     meeting(sources, &Solids::still(None), frames)
 }
 

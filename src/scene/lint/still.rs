@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::super::{Scene, WaveMaker};
+use super::super::{Scene, WaveMaker, words::shown};
 use swell_domain::mesh::TriangleMesh;
 
 /// Columns of water that are looked at along a wall.
@@ -60,6 +60,24 @@ impl Scene {
         let mut found: Vec<Still> = (0..COLUMNS).filter_map(column).collect();
         found.sort_by(|a, b| a.depth.total_cmp(&b.depth));
         found.get(found.len() / 2).copied()
+    }
+
+    /// A wall beside which no water is at rest, in a scene that has water on its floor and no emitter that could bring some.
+    pub(super) fn lint_dry_wall(
+        &self,
+        index: usize,
+        maker: &WaveMaker,
+        level: Option<f64>,
+    ) -> Option<String> {
+        let level = level?;
+        let is_dry = maker.wall.axis != 1 && self.still_beside(maker).is_none();
+        (is_dry && self.emitters.is_empty()).then(|| {
+            format!(
+                "wave_maker[{index}]: no water is beside its wall at rest, though water {} m deep is on the floor: the water does not reach \
+                 the wall, or a solid is in between",
+                shown(level)
+            )
+        })
     }
 
     fn is_down(&self) -> bool {

@@ -344,6 +344,30 @@ fn a_wall_that_goes_through_a_solid_is_said() {
     }
 }
 
+#[test]
+fn a_wall_without_water_is_said() {
+    let motion = "kind = \"table\", points = [[0.0, 0.0], [2.0, 0.1], [4.0, 0.1]]";
+    let scene = |from: f64, more: &str| {
+        let water = format!("[[water.block]]\nmin = [{from:?}, 0, 0]\nmax = [20, 1, 1]\n");
+        let text = SCENE.replace(
+            "[[water.block]]\nmin = [0, 0, 0]\nmax = [20, 1, 1]\n",
+            &water,
+        );
+        format!("{text}{more}[[wave_maker]]\nwall = \"-x\"\nmotion = {{ {motion} }}\n")
+    };
+    let solid = "[[solid]]\nmesh = \"box.obj\"\n";
+    let dry =
+        "wave_maker[0]: no water is beside its wall at rest, though water 1 m deep is on the floor";
+    let block = cuboid([-1.0, -1.0, -1.0], [2.0, 3.0, 2.0]);
+    only(&lints_beside(&block, &scene(0.0, solid)), dry);
+    only(&lints_beside(&block, &scene(2.0, "")), dry);
+    // Controls: a solid as high as half of the water, and water that an emitter may bring.
+    let low = cuboid([-1.0, -1.0, -1.0], [2.0, 0.5, 2.0]);
+    assert_eq!(lints_beside(&low, &scene(0.0, solid)), [] as [&str; 0]);
+    let emitter = "[[emitter]]\nmin = [0, 0, 0]\nmax = [1, 1, 1]\nvelocity = [1, 0, 0]\n";
+    assert_eq!(lints_beside(&low, &scene(2.0, emitter)), [] as [&str; 0]);
+}
+
 /// A told depth is compared with what stands beside the wall: of a mesh as of a box, and above solids that are its floor.
 #[test]
 fn a_depth_is_that_beside_the_wall() {

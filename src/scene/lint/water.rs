@@ -20,11 +20,8 @@ impl Scene {
     /// Blocks of the start, cut where walls that absorb rest inside of the domain.
     pub fn start_blocks(&self) -> Vec<Bounds> {
         let room = self.start_domain();
-        let within = |block: &Bounds| Bounds {
-            min: block.min.max(room.min),
-            max: block.max.min(room.max),
-        };
-        self.water.blocks.iter().map(within).collect()
+        let blocks = self.water.blocks.iter();
+        blocks.map(|block| block.intersection(&room)).collect()
     }
 
     /// Volume of the water that the scene asks for at the start, m³: of its blocks, its meshes and single particles, each for itself and

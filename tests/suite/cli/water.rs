@@ -75,6 +75,41 @@ fn the_volume_that_is_made_stands_beside_the_one_asked_for() {
     assert_has(&said, &["0.2560 m³ of water\n"]);
 }
 
+/// An emitter 1.5 rows wide, and one that is open for less than a layer.
+#[test]
+fn emitters_that_rows_or_windows_round_are_told_of() {
+    let job = job();
+    let emitter =
+        |of: &str| format!("--set emitter=[{{min=[0.2,0.5,0.2],max=[0.5,0.7,0.6],velocity={of}}}]");
+    // Whole rows of 0.1 m.
+    for of in ["[1,0,0]", "[0,0,-1]", "[0,-1,0]"] {
+        let said = job.expect(0, &format!("inspect water.toml {}", emitter(of)));
+        assert!(!said.contains("warning"), "{said}");
+    }
+    let thin = "--set emitter=[{min=[0.2,0.5,0.2],max=[0.5,0.65,0.6],velocity=[1,0,0]}]";
+    let lint = "emitter[0]: its box and velocity ask for 0.06000 m³/s, and 0.08000 m³/s enter, 33.3 % more: across the flow there are \
+                whole rows of particles 0.1 m apart";
+    for words in [
+        format!("inspect water.toml {thin}"),
+        format!("{BAKE} {thin} -o rounded"),
+    ] {
+        assert_has(&job.expect(0, &words), &[&format!("warning: {lint}")]);
+    }
+    let denied = job.expect(2, &format!("inspect water.toml {thin} --deny lint"));
+    assert_has(&denied, &[lint]);
+
+    let pulse = |from: f64, until: f64| {
+        let of = format!("[1,0,0],from={from:?},until={until:?}");
+        format!("inspect water.toml {}", emitter(&of))
+    };
+    let lint = "emitter[0]: nothing enters: no layer of particles comes in within its 0.04000 s";
+    let said = job.expect(0, &pulse(0.06, 0.1));
+    assert_has(&said, &[lint, "at most 0 particles more"]);
+    let said = job.expect(0, &pulse(0.12, 0.16));
+    assert!(!said.contains("nothing enters"), "{said}");
+    assert_has(&said, &["at most 8 particles more"]);
+}
+
 #[test]
 fn a_scene_without_water_is_told_of() {
     let job = job();
