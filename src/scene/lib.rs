@@ -77,52 +77,54 @@ pub use reach::Reach;
 pub use words::four_digits;
 pub use write::asset_path;
 
-/// A validated scene: SI units, every default settled, every file read.
+/// A validated scene in SI units: every default is filled in and every referenced file is read.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scene {
-    /// What the shot is called and how long it runs.
+    /// Name, length and frame rate of the shot.
     pub shot: Shot,
-    /// Where the coordinates of all that follows have their zero in the world, metres: `[0, 0, 0]` but for scenes far
-    /// off, which 32 bits could not resolve otherwise. World position = origin + position.
+    /// World position of the local origin, metres: world position = `origin` + local position.
+    ///
+    /// It is zero unless the domain is so far from the world's origin that `f32` coordinates could
+    /// not resolve particles there. All positions below are local.
     pub origin: DVec3,
-    /// The box whose six walls are solid, metres.
+    /// Box whose six faces are solid walls, metres.
     pub domain: Bounds,
-    /// Walls that hold water back, each once; along the others it slides freely.
+    /// No-slip walls, each listed once. All other walls are free-slip.
     pub no_slip: Vec<Wall>,
-    /// Axes along which it has no walls but joins its own end.
+    /// Axes along which the domain is periodic and has no walls.
     pub periodic: [bool; 3],
-    /// The water at the start.
+    /// Water at the start of the shot.
     pub water: Water,
-    /// Static solids.
+    /// Static solids; moving ones are in `moving_solids`.
     pub solids: Vec<Solid>,
-    /// Solids that move; static ones stand in `solids`.
+    /// Moving solids; static ones are in `solids`.
     pub moving_solids: Vec<moving_solid::MovingSolid>,
-    /// Domain walls that move; at most one a wall.
+    /// Moving domain walls, at most one per wall.
     pub wave_makers: Vec<WaveMaker>,
-    /// Where water enters while the shot runs.
+    /// Regions where water enters during the shot.
     pub emitters: Vec<Emitter<sources::Region>>,
-    /// Where it leaves.
+    /// Regions where water leaves during the shot.
     pub drains: Vec<Drain<sources::Region>>,
-    /// Which solver, and the solvers' settings.
+    /// The chosen method and the settings of each solver.
     pub solver: Solver,
-    /// Grids that each frame gets beside its particles, where the scene asks for any.
+    /// Grids written with each frame beside the particles; `None` writes none.
     pub grids: Option<grids::Grids>,
-    /// Of which frames the particles stay on the disk; all where the scene does not say it.
+    /// Frames whose particles stay on disk; `None` keeps all of them.
     pub keep: Option<Keep>,
-    /// How frames are compressed; `None` leaves them plain PLY.
+    /// Compression of the frames; `None` writes plain PLY.
     pub compression: Option<Compression>,
-    /// What is measured at each frame; most scenes have none.
+    /// Quantities measured at each frame.
     pub probes: Vec<probe::Probe>,
-    /// What the bake is held to.
+    /// Limits at which a bake stops.
     pub budget: Budget,
-    /// Effects that the scene names; what is `None` does not exist.
+    /// Effects that the scene enables; each is `None` unless the scene names it.
     pub effects: Effects,
-    /// What walls that absorb do now, by the state that a solver has taken over; none at the start.
+    /// State of the absorbing walls, taken from the solver's state; all `None` at the start.
     pub answers: Answers,
 }
 
 impl Scene {
-    /// Points of the probes of pressure, in order, metres.
+    /// Returns the positions of the pressure probes in their order in the scene, metres.
     pub fn pressure_points(&self) -> Vec<DVec3> {
         let probes = self.probes.iter();
         probes
@@ -133,7 +135,8 @@ impl Scene {
             .collect()
     }
 
-    /// d of the chosen solver: between neighbours of the lattice at the start, metres.
+    /// Returns the particle spacing d of the chosen solver, metres: the distance between neighbours
+    /// on the initial lattice.
     pub fn particle_spacing(&self) -> f64 {
         match self.solver.method {
             Method::Pbf => self.solver.pbf().particle_spacing,
@@ -141,7 +144,8 @@ impl Scene {
         }
     }
 
-    /// What each particle carries beside position, velocity and id.
+    /// Returns the names of the attributes that each particle carries beside position, velocity and
+    /// id.
     pub fn declared_attributes(&self) -> &'static [&'static str] {
         match self.solver.method {
             Method::Pbf => &[],
@@ -154,94 +158,95 @@ impl Scene {
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Shot {
-    /// File-name safe.
+    /// Safe as part of a file name.
     pub name: String,
-    /// Output frames; frame 1 is the first after the start.
+    /// Number of output frames; frame 1 is the first one after the start.
     pub frames: u32,
-    /// Output frames a second.
+    /// Output frames per second.
     pub frames_per_second: f64,
 }
 
 impl Shot {
-    /// Seconds from one frame to the next.
+    /// Returns the duration of a frame, seconds.
     pub fn frame_seconds(&self) -> f64 {
         1.0 / self.frames_per_second
     }
 
-    /// When a frame ends, seconds from the start.
+    /// Returns the time at the end of a frame, seconds from the start.
     pub fn time(&self, frame: u32) -> f64 {
         f64::from(frame) / self.frames_per_second
     }
 
-    /// Seconds from the start to the last frame.
+    /// Returns the time from the start to the end of the last frame, seconds.
     pub fn duration(&self) -> f64 {
         f64::from(self.frames) / self.frames_per_second
     }
 }
 
-/// Water at the start.
+/// Water at the start of the shot.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Water {
-    /// kg/m³.
+    /// ρ0, kg/m³.
     pub rest_density: f64,
-    /// m/s².
+    /// Gravitational acceleration, m/s².
     pub gravity: DVec3,
     /// Boxes filled with water at rest, metres.
     pub blocks: Vec<Bounds>,
     /// Closed meshes filled with water at rest.
     pub meshes: Vec<PlacedMesh>,
-    /// Particles at places of their own.
+    /// Particles whose positions the scene lists one by one.
     pub particles: Vec<Swarm>,
 }
 
 impl Water {
-    /// How pressure rises in water at rest: ρ g, Pa/m.
+    /// Returns the hydrostatic pressure gradient ρ g, Pa/m.
     pub fn rise(&self) -> DVec3 {
         self.rest_density * self.gravity
     }
 }
 
-/// Particles that the scene places one by one; they are taken as they are, also where others stand.
+/// Particles that the scene lists one by one. They are used as given, even where they overlap other
+/// water.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Swarm {
-    /// World positions, metres.
+    /// Positions, metres.
     pub at: Vec<DVec3>,
-    /// Of all of them, m/s.
+    /// Initial velocity of all of them, m/s.
     pub velocity: DVec3,
 }
 
 /// A static solid.
 pub type Solid = PlacedMesh;
 
-/// A mesh from a file, put into the world.
+/// A mesh read from a file and transformed into the scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlacedMesh {
-    /// The file it came from.
+    /// File that the mesh was read from.
     pub file: PathBuf,
-    /// BLAKE3 of that file's bytes, hex.
+    /// BLAKE3 of the file's bytes, hexadecimal.
     pub file_hash: String,
-    /// As the scene says it.
+    /// Transform from the file to the world, as written in the scene.
     pub placement: Placement,
-    /// Metres, about the scene's origin.
+    /// Vertices relative to the scene's origin, metres.
     pub mesh: TriangleMesh,
-    /// Holes that it is taken with; world coordinates, metres.
+    /// Holes of a mesh that is not watertight; world coordinates, metres.
     pub holes: Holes,
-    /// Most that its coordinates may be off along each axis, metres, where the program that wrote the file had 32 bits; a hundredth of
-    /// the particle spacing at most.
+    /// Largest rounding error of the coordinates along each axis, metres, as if the program that
+    /// wrote the file used 32-bit floats; at most a hundredth of the particle spacing.
     pub rounding: DVec3,
-    /// Other faults of the file that it is taken with, a sentence each.
+    /// Other defects of the file that are tolerated, one sentence each.
     pub faults: Vec<String>,
 }
 
-/// Scale first, then rotation, then translation.
+/// Scale, then rotation, then translation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Placement {
-    /// Metres.
+    /// Translation, metres.
     pub translate: DVec3,
-    /// About the world's x axis first, then y, then z, as "XYZ Euler" means in Blender and
-    /// Houdini.
+    /// Euler angles, degrees: about the world's x axis first, then y, then z ("XYZ Euler" in
+    /// Blender and Houdini).
     pub rotate_degrees: DVec3,
-    /// Metres per unit of the file.
+    /// Metres per unit of the file, along each axis.
     pub scale: DVec3,
 }
 
@@ -256,7 +261,7 @@ impl Default for Placement {
 }
 
 impl Placement {
-    /// The transform from the file's frame to the world.
+    /// Returns the transform from file coordinates to the world.
     pub fn world_from_file(&self) -> DAffine3 {
         let [x, y, z] = self.rotate_degrees.to_array().map(f64::to_radians);
         let rotation =
@@ -264,7 +269,8 @@ impl Placement {
         DAffine3::from_scale_rotation_translation(self.scale, rotation, self.translate)
     }
 
-    /// Most that coordinates may be off in the world, metres, where those of the file may be off by so much.
+    /// Bounds the rounding error in the world, metres, for coordinates that are off by up to
+    /// `in_file` in the file.
     pub(crate) fn rounding(&self, in_file: DVec3) -> DVec3 {
         self.world_from_file().matrix3.abs() * in_file
     }
@@ -273,14 +279,14 @@ impl Placement {
 /// One of the six domain walls.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Wall {
-    /// 0, 1, 2 for x, y, z.
+    /// Index of the axis: 0, 1 or 2 for x, y or z.
     pub axis: usize,
-    /// Whether it is the wall at the domain's greatest coordinate.
+    /// Whether the wall is at the domain's maximum along the axis.
     pub is_max: bool,
 }
 
 impl Wall {
-    /// All six, with the names that scenes use.
+    /// All six walls with the names used in scenes, ordered as [`Wall::name`] expects.
     pub const NAMED: [(&'static str, Self); 6] = [
         ("-x", Self::new(0, false)),
         ("+x", Self::new(0, true)),
@@ -294,12 +300,13 @@ impl Wall {
         Self { axis, is_max }
     }
 
-    /// One of six: of the least faces along x, y and z, then of the greatest.
+    /// Returns the wall's bit in a mask: bits 0 to 2 are the minimum faces along x, y and z, bits 3
+    /// to 5 the maximum ones.
     pub fn bit(&self) -> u32 {
         1 << (self.axis + 3 * usize::from(self.is_max))
     }
 
-    /// As scenes name it.
+    /// Returns the name used in scenes, such as `-x`.
     pub fn name(self) -> &'static str {
         Self::NAMED[2 * self.axis + usize::from(self.is_max)].0
     }
@@ -308,44 +315,45 @@ impl Wall {
 /// A domain wall that moves along its inward normal.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WaveMaker {
-    /// Which wall.
+    /// The wall that moves.
     pub wall: Wall,
-    /// Displacement from where it is at the start, positive inward, metres.
+    /// Displacement from the starting position, positive inward, metres.
     pub motion: Motion,
-    /// How it takes in waves that come to it, where it does.
+    /// Active absorption of incoming waves; `None` for a wall that does not absorb.
     pub absorption: Option<Absorption>,
 }
 
-/// Solvers' settings. The chosen one's are always there; those of the other may be.
+/// Settings of the solvers. Those of the chosen method are always present; those of the other may
+/// be.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Solver {
-    /// Which one.
+    /// The chosen method.
     pub method: Method,
-    /// Position-based fluids.
+    /// Settings of position-based fluids.
     pub pbf: Option<Pbf>,
-    /// PIC/FLIP.
+    /// Settings of PIC/FLIP.
     pub flip: Option<flip::Flip>,
 }
 
 impl Solver {
-    /// PBF's settings.
+    /// Returns the settings of PBF.
     ///
     /// # Panics
-    /// Where there are none: only where PBF is chosen are they sure to be there.
+    /// If there are none. They are always present when PBF is the chosen method.
     pub fn pbf(&self) -> &Pbf {
         self.pbf.as_ref().expect("a scene with [solver.pbf]")
     }
 
-    /// FLIP's settings.
+    /// Returns the settings of FLIP.
     ///
     /// # Panics
-    /// Where there are none: only where FLIP is chosen are they sure to be there.
+    /// If there are none. They are always present when FLIP is the chosen method.
     pub fn flip(&self) -> &flip::Flip {
         self.flip.as_ref().expect("a scene with [solver.flip]")
     }
 }
 
-/// A solver.
+/// A fluid solver.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
     /// Position-based fluids (Macklin and Müller 2013).
@@ -355,15 +363,15 @@ pub enum Method {
 }
 
 impl Method {
-    /// With the names that scenes use.
+    /// All methods with the names used in scenes.
     pub const NAMED: [(&'static str, Self); 2] = [("pbf", Self::Pbf), ("flip", Self::Flip)];
 
-    /// The override that chooses it.
+    /// Returns the `key=value` override that chooses this method.
     pub fn as_override(self) -> String {
         format!("solver.method={}", self.name())
     }
 
-    /// As scenes name it.
+    /// Returns the name used in scenes.
     pub fn name(self) -> &'static str {
         Self::NAMED[self as usize].0
     }
@@ -372,69 +380,73 @@ impl Method {
 /// PBF settings (Macklin and Müller 2013).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pbf {
-    /// d, metres.
+    /// d, the distance between neighbours on the initial lattice, metres.
     pub particle_spacing: f64,
-    /// h / d.
+    /// Support radius h over the particle spacing d.
     pub support_ratio: f64,
-    /// How corrections see each other.
+    /// Scheme that applies the corrections within the density iteration.
     pub iteration: Iteration,
-    /// ρ of the plain iteration, below 1, as the Chebyshev semi-iteration takes it; nearer to 1 reaches deeper.
+    /// Spectral radius ρ < 1 of the plain iteration, as the Chebyshev semi-iteration assumes it. A
+    /// value nearer to 1 reaches deeper.
     pub spectral_radius: f64,
-    /// When an iteration stops.
+    /// When the density iteration stops.
     pub stop: Stop,
-    /// Largest displacement in a substep, in units of d.
+    /// Largest displacement per substep, in particle spacings.
     pub cfl: f64,
-    /// Factor on each correction (ω).
+    /// Relaxation factor ω on each correction.
     pub relaxation: f64,
-    /// k of the artificial pressure s_corr, with λ's natural scale as unit; 0 leaves it out.
+    /// Coefficient k of the artificial pressure s_corr, in units of λ's natural scale; 0 disables
+    /// it.
     pub artificial_pressure: f64,
-    /// Whether velocities are made free of divergence on a grid before particles move (Raveendran et al. 2011).
+    /// Whether velocities are projected to be divergence-free on a grid before particles move
+    /// (Raveendran et al. 2011).
     pub grid_projection: bool,
-    /// Most substeps in a frame; a scene that needs more is stopped, never stepped more coarsely.
+    /// Largest number of substeps per frame. A scene that needs more is stopped; it is never
+    /// stepped more coarsely.
     pub max_substeps: u32,
 }
 
-/// Order in which corrections are applied.
+/// Order in which the density iteration applies its corrections.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Iteration {
-    /// All at once.
+    /// All corrections at once.
     Jacobi,
-    /// One colour, then the other, which sees the corrected first.
+    /// One colour first, then the other, which sees the corrected positions of the first.
     RedBlack,
-    /// All at once, and carried on by a Chebyshev semi-iteration (Wang 2015).
+    /// All corrections at once, accelerated by a Chebyshev semi-iteration (Wang 2015).
     Chebyshev,
 }
 
 impl Iteration {
-    /// With the names that scenes use.
+    /// All iterations with the names used in scenes.
     pub const NAMED: [(&'static str, Self); 3] = [
         ("jacobi", Self::Jacobi),
         ("red_black", Self::RedBlack),
         ("chebyshev", Self::Chebyshev),
     ];
 
-    /// As scenes name it.
+    /// Returns the name used in scenes.
     pub fn name(self) -> &'static str {
         Self::NAMED[self as usize].0
     }
 }
 
-/// When the density iteration stops.
+/// Stopping criterion of the density iteration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Stop {
-    /// After a fixed number.
+    /// A fixed number of iterations.
     Iterations(u32),
-    /// When the mean density error falls below `density_error`, or after `max_iterations`.
+    /// Stops once the mean density error is below `density_error`, or after `max_iterations`.
     DensityError {
-        /// Mean of max(0, ρ/ρ0 − 1).
+        /// Bound on the mean of max(0, ρ/ρ0 − 1).
         density_error: f64,
-        /// Upper bound.
+        /// Largest number of iterations.
         max_iterations: u32,
     },
 }
 
 impl Stop {
-    /// Iterations at most.
+    /// Returns the largest number of iterations.
     pub fn most_iterations(self) -> u32 {
         match self {
             Self::Iterations(count)

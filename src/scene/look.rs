@@ -1,4 +1,4 @@
-//! Looks: camera, light, water and output of a shot, apart from its physics.
+//! Looks: camera, light, water and output of a shot, separate from its physics.
 
 pub mod camera_file;
 pub mod spec;
@@ -34,51 +34,49 @@ pub use spec::{
     WaterSpec, WaveMakersSpec, WhitewaterLook, WindowsSpec,
 };
 
-/// Pixels of a picture, counted from the upper left one of the look's image.
+/// A rectangle of pixels, relative to the upper-left pixel of the look's image.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Window {
-    /// The upper left one.
+    /// Column and row of the upper-left pixel; negative with overscan.
     pub corner: [i32; 2],
-    /// Columns and rows.
+    /// Width and height, pixels.
     pub size: [u32; 2],
 }
 
-/// Why a look cannot be used.
+/// Why a look cannot be loaded or used.
 #[derive(Debug, thiserror::Error)]
 #[error(transparent)]
 pub struct LookError(#[from] pub(super) SceneError);
 
-/// The key of the panorama's file.
 const PANORAMA: &str = "sky.file";
 
-/// The key of how water is drawn.
 const METHOD: &str = "renderer.method";
 
-/// The keys of a camera's file, and of its name there.
 const CAMERA_FILE: &str = "camera.file";
 const CAMERA_NAME: &str = "camera.name";
 
-/// Part by which the shape of a file's camera may be off that of the image where the look does not say how it is fitted.
+/// Relative tolerance between the aspect ratios of a camera file and of the image if the look sets
+/// no `camera.fit`.
 const SHAPE: f64 = 0.005;
 
-/// A validated look: every value in its range, every file that it names read.
+/// A validated look: every value is in range and every referenced file is read.
 #[derive(Clone, Debug)]
 pub struct Look {
     spec: LookSpec,
     panorama: Option<Panorama>,
     camera: Option<Arc<CameraFile>>,
     materials: Option<Arc<Materials>>,
-    /// Where the look says how water is drawn.
+    /// Location of `renderer.method` in the look file.
     method: Fault,
     hash: String,
 }
 
-/// A sky's picture, and where the look names it.
+/// Panorama of a sky.
 #[derive(Clone, Debug)]
 struct Panorama {
     bytes: Arc<[u8]>,
     path: PathBuf,
-    /// Where the look names it.
+    /// Location of its key in the look file.
     place: Fault,
 }
 
@@ -86,23 +84,23 @@ impl Look {
     /// Reads, parses and validates a look file.
     ///
     /// # Errors
-    /// That the file cannot be read, or its first fault, with line, key and what is allowed.
+    /// If the file cannot be read, or for its first fault, with line, key and allowed values.
     pub fn load(path: &Path) -> Result<Self, LookError> {
         Self::load_within(path, Reach::Folder)
     }
 
-    /// [`Look::load`] with a panorama and a camera from as far as `reach` says.
+    /// [`Look::load`] with files resolved within `reach`.
     ///
     /// # Errors
-    /// As [`Look::load`].
+    /// Those of [`Look::load`].
     pub fn load_within(path: &Path, reach: Reach) -> Result<Self, LookError> {
         Self::load_with(path, &[], reach)
     }
 
-    /// [`Look::load_within`] with overrides laid over it, as `key=value`.
+    /// [`Look::load_within`] with `key=value` overrides applied to the file.
     ///
     /// # Errors
-    /// As [`Look::load`].
+    /// Those of [`Look::load`].
     pub fn load_with(path: &Path, overrides: &[String], reach: Reach) -> Result<Self, LookError> {
         let text = text::read(path).map_err(|source| SceneError::Read {
             file: path.to_owned(),
@@ -111,11 +109,11 @@ impl Look {
         Ok(Self::parse_with(&text, path, overrides, reach)?)
     }
 
-    /// Parses and validates the text of a look; `file` names it in errors, and its folder is where a
-    /// relative panorama or camera is looked for, which it must not leave.
+    /// Parses and validates the text of a look. Errors name `file`; relative paths start in its
+    /// folder and must not leave it.
     ///
     /// # Errors
-    /// As [`Look::load`].
+    /// Those of [`Look::load`].
     pub fn parse(text: &str, file: &Path) -> Result<Self, LookError> {
         Ok(Self::parse_with(text, file, &[], Reach::Folder)?)
     }
@@ -158,22 +156,23 @@ impl Look {
         Ok(look)
     }
 
-    /// What the file says, defaults filled in.
+    /// Returns the values of the file with defaults filled in.
     pub fn spec(&self) -> &LookSpec {
         &self.spec
     }
 
-    /// Bytes of the sky panorama's EXR, where the look has one.
+    /// Returns the bytes of the sky panorama's EXR, if the look has one.
     pub fn panorama(&self) -> Option<&[u8]> {
         self.panorama.as_ref().map(|sky| sky.bytes.as_ref())
     }
 
-    /// The camera of the file that the look names; `None` where it names none.
+    /// Returns the camera read from `camera.file`, if the look names one.
     pub fn camera_file(&self) -> Option<&CameraFile> {
         self.camera.as_deref()
     }
 
-    /// That its panorama is no picture that can be used, in the words of who tried; `None` where it has none.
+    /// Returns an error that reports `problem` with the panorama; `None` if the look has no
+    /// panorama.
     pub fn panorama_fault(&self, problem: &str) -> Option<LookError> {
         let sky = self.panorama.as_ref()?;
         let fault = Fault {
@@ -183,7 +182,7 @@ impl Look {
         Some(LookError(SceneError::Fault(Box::new(fault))))
     }
 
-    /// That its method cannot draw what it is asked for, in the words of who tried.
+    /// Returns an error that reports `problem` with the chosen rendering method.
     pub fn method_fault(&self, problem: &str) -> LookError {
         let fault = Fault {
             message: problem.to_owned(),
@@ -192,14 +191,14 @@ impl Look {
         LookError(SceneError::Fault(Box::new(fault)))
     }
 
-    /// BLAKE3, hex, over the content: every value with its default, and the bytes of panorama and camera, whatever
-    /// the files are called and however they are laid out.
+    /// Returns the BLAKE3 hash of the content, hexadecimal: all values including defaults, and the
+    /// bytes of the referenced files. File names and layout do not affect it.
     pub fn hash(&self) -> String {
         self.hash.clone()
     }
 
-    /// The time of the camera's file at a frame number, which may lie between two, seconds: frame 1 is at `camera.start`, or else
-    /// frame 0 at 0.
+    /// Returns the time in the camera file at a (fractional) frame number, seconds. Frame 1 is at
+    /// `camera.start` if set; otherwise frame 0 is at time 0.
     pub fn camera_seconds(&self, frame: f64, frames_per_second: f64) -> f64 {
         let start = self.camera_file().zip(self.spec.camera.start);
         match start {
@@ -213,12 +212,12 @@ impl Look {
         }
     }
 
-    /// Which pixels are rendered.
+    /// Returns the rectangle of pixels to render.
     pub fn window(&self) -> Window {
         let image = &self.spec.image;
         let over = image.overscan;
         match image.crop {
-            // Whole, and within the image.
+            // `check_crop` has checked that these are whole numbers within the image.
             Some([x0, y0, x1, y1]) => Window {
                 corner: [x0 as i32, y0 as i32],
                 size: [(x1 - x0) as u32, (y1 - y0) as u32],
@@ -230,20 +229,20 @@ impl Look {
         }
     }
 
-    /// Whether the EXR asks for this AOV.
+    /// Returns whether the EXR includes this AOV.
     pub fn wants(&self, aov: AovSpec) -> bool {
         self.spec.output.aovs.contains(&aov)
     }
 
-    /// The parts of the light that the EXR has in layers, each once, in the order of [`LightSpec::NAMED`].
+    /// Returns the light layers of the EXR, each once, in the order of [`LightSpec::NAMED`].
     pub fn lights(&self) -> Vec<LightSpec> {
         let all = LightSpec::NAMED.iter().map(|(_, light)| *light);
         all.filter(|light| self.spec.output.lights.contains(light))
             .collect()
     }
 
-    /// The look for pictures of the water's surface alone, its depth and normals at pixels' centres at the frame's instant, by
-    /// `method`: every particle belongs to the surface.
+    /// Returns a look that renders only depth and normals of the water's surface by `method`, at
+    /// pixel centres and at the instant of the frame. Every particle belongs to the surface.
     #[must_use]
     pub fn of_surface(&self, method: MethodSpec) -> Self {
         self.changed(|spec| {
@@ -259,8 +258,8 @@ impl Look {
         })
     }
 
-    /// The look for pictures of the water alone by `method`: spray as the look has it, no whitewater, nothing beside the picture;
-    /// caustics by rays alone.
+    /// Returns a look that renders only the water by `method`: spray is kept, whitewater and
+    /// additional outputs are dropped, and caustics are kept only with ray casting.
     #[must_use]
     pub fn of_water(&self, method: MethodSpec) -> Self {
         self.changed(|spec| {
@@ -274,7 +273,8 @@ impl Look {
         })
     }
 
-    /// Rays that are `samples` times as many a pixel, through voxels `voxels` times as fine; up to what the keys take.
+    /// Returns the look drawn by rays with `samples` times the samples per pixel and voxels
+    /// `voxels` times as fine, clamped to the ranges of the keys.
     #[must_use]
     pub fn finer(&self, samples: u32, voxels: f64) -> Self {
         self.changed(|spec| {
@@ -285,7 +285,7 @@ impl Look {
         })
     }
 
-    /// With a camera that stands still at `position`, metres, and looks at `target`.
+    /// Returns the look with a static camera at `position`, metres, that looks at `target`.
     #[must_use]
     pub fn standing(&self, position: DVec3, target: DVec3, focal_length_mm: f64) -> Self {
         let mut look = self.changed(|spec| {
@@ -322,7 +322,7 @@ impl Look {
         hasher.finalize().to_hex().to_string()
     }
 
-    /// Direction from the ground to the sun, unit length.
+    /// Returns the unit direction from the ground to the sun.
     pub fn sun_direction(&self) -> DVec3 {
         let azimuth = self.spec.sun.azimuth_degrees.to_radians();
         let elevation = self.spec.sun.elevation_degrees.to_radians();
@@ -334,15 +334,15 @@ impl Look {
     }
 }
 
-/// The image alone: neither other windows of it, nor layers of light, nor mattes.
+/// Disables overscan, crop, light layers and mattes.
 fn plain(spec: &mut LookSpec) {
     (spec.image.overscan, spec.image.crop) = (0, None);
     spec.output.lights = Vec::new();
     spec.output.cryptomatte = false;
 }
 
-/// What the text of a look has for each newer key that it does without: left out of its hash, so that the look keeps the hash
-/// that it had before there was such a key.
+/// Text of newer keys at their defaults, which the hash leaves out. A look that does not use such a
+/// key keeps the hash that it had before the key existed.
 const NEWER: [&str; 22] = [
     "whitewater: None, ",
     "renderer: RendererSpec { method: Ssfr }, ",
@@ -365,13 +365,14 @@ const NEWER: [&str; 22] = [
     ", materials: None, material: []",
     ", caustics: None",
     ", laid: None",
-    // Quay walls stood at these sides before others could be chosen.
+    // Quay walls were always at these sides before the key existed.
     ", sides: [Wall { axis: 2, is_max: false }, Wall { axis: 2, is_max: true }], colour: None",
 ];
 
-/// The content of a look as text, without the names of its files.
+/// Returns the content of a look as text, without file names.
 fn canonical(spec: &LookSpec) -> String {
-    // `Debug` of a float is its shortest exact text, so equal values give equal text and only they do.
+    // `Debug` prints the shortest exact text of a float, so equal values, and only those, have
+    // equal text.
     let mut canonical = spec.clone();
     if let SkySpec::Panorama { file, .. } = &mut canonical.sky {
         *file = Path::new("").to_owned();
@@ -396,10 +397,10 @@ fn canonical(spec: &LookSpec) -> String {
         .fold(text, |text, newer| text.replace(newer, ""))
 }
 
-/// The values of a table in which every key has a default.
+/// Returns the values of a table in which every key has a default.
 ///
 /// # Panics
-/// Where a key has none; a test has no such table.
+/// If a key has no default; a test checks the tables used here.
 fn default_of<T: DeserializeOwned>(keys: &'static [Key]) -> T {
     let settled = Document::parse("", Path::new(""), &[], keys).and_then(|(doc, mut root)| {
         doc.settle(&mut root)?;
@@ -408,7 +409,7 @@ fn default_of<T: DeserializeOwned>(keys: &'static [Key]) -> T {
     settled.expect("every key of the table has a default")
 }
 
-/// Reads the picture that the look `file` names.
+/// Reads the panorama named by the look `file`.
 fn panorama(doc: &Document<'_>, file: &Path, name: &Path) -> Result<Panorama, SceneError> {
     let folder = file.parent().unwrap_or(Path::new("."));
     let path = doc.find(folder, PANORAMA, &name.to_string_lossy())?;
@@ -449,7 +450,7 @@ fn check_camera(doc: &Document<'_>, spec: &LookSpec) -> Result<(), SceneError> {
     Ok(())
 }
 
-/// A line of sight that has a direction, other than that of the camera's `up`.
+/// Checks that the line of sight is not zero and not parallel to the camera's `up`.
 fn check_pose(
     doc: &Document<'_>,
     path: &str,
@@ -500,7 +501,7 @@ fn check_shutter(doc: &Document<'_>, image: &ImageSpec) -> Result<(), SceneError
     }
 }
 
-/// Reads the camera that the look `file` names.
+/// Reads the camera named by the look `file`.
 fn file_camera(
     doc: &Document<'_>,
     spec: &LookSpec,

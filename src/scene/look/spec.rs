@@ -1,4 +1,5 @@
-//! The look file as written, its numbers in range and its defaults laid down: serde types, no logic.
+//! Serde types of the look file, without logic. Ranges are checked and defaults filled in before
+//! deserialization.
 
 use std::path::PathBuf;
 
@@ -10,86 +11,86 @@ use crate::Wall;
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LookSpec {
-    /// Where the picture is taken from.
+    /// Pose and optics of the camera.
     pub camera: CameraSpec,
-    /// Size and sampling.
+    /// Resolution, sampling and shutter.
     pub image: ImageSpec,
-    /// How the water is drawn.
+    /// Rendering method of the water.
     pub renderer: RendererSpec,
-    /// How splats become a surface.
+    /// Surface reconstruction from particles.
     pub surface: SurfaceSpec,
-    /// What the water is like inside.
+    /// Optical properties of the water.
     pub water: WaterSpec,
-    /// A stream of spray, foam and bubbles; none is drawn unless named.
+    /// Stream of spray, foam and bubbles; none unless named.
     pub whitewater: Option<WhitewaterLook>,
     /// The sun.
     pub sun: SunSpec,
-    /// What the water mirrors.
+    /// Sky that lights the scene and is reflected by the water.
     pub sky: SkySpec,
-    /// The plane at the domain's floor, which runs to the horizon.
+    /// Plane at the domain's floor that extends to the horizon.
     pub ground: GroundSpec,
-    /// Quay walls just outside the domain's sides; none unless named.
+    /// Quay walls just outside the domain; none unless named.
     pub basin: Option<BasinSpec>,
-    /// The scene's wave makers; not drawn unless named.
+    /// Plates for the scene's wave makers; not drawn unless named.
     pub wave_makers: Option<WaveMakersSpec>,
     /// Water beyond the domain; none unless named.
     pub sea: Option<SeaSpec>,
-    /// The scene's solids.
+    /// Appearance of the scene's solids.
     pub solids: SolidsSpec,
-    /// From scene-linear light to a picture.
+    /// Conversion from scene-linear light to the PNG.
     pub view: ViewSpec,
-    /// What is written.
+    /// Files and channels to write.
     pub output: OutputSpec,
 }
 
-/// A camera in millimetres, still, keyframed or from a file.
+/// A static or keyframed camera, or one from a file.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CameraSpec {
-    /// mm; 0 of a camera from a file, which has its own.
+    /// mm; 0 for a camera from a file, which has its own.
     #[serde(default)]
     pub focal_length_mm: f64,
-    /// Width and height of the exposed film, mm.
+    /// Width and height of the film back, mm.
     pub film_back_mm: [f64; 2],
-    /// How the image lies on the film, where their shapes differ; where left out, on all of the film's width, and a file's camera is of
-    /// the image's shape.
+    /// Fit of the image to the film if their aspect ratios differ. If left out, the image takes the
+    /// full width of the film, and a camera file must have the image's aspect ratio.
     pub fit: Option<FitSpec>,
-    /// World metres; with `target`, instead of keyframes.
+    /// World position, metres; given with `target` in place of keyframes.
     pub position: Option<[f64; 3]>,
-    /// World metres.
+    /// World position that the camera looks at, metres.
     pub target: Option<[f64; 3]>,
-    /// Direction that stands upright in the picture; nothing of a camera from a file.
+    /// Up direction of the picture; unused with a camera from a file.
     #[serde(default)]
     pub up: [f64; 3],
-    /// A thin lens; a pinhole unless named.
+    /// Thin lens; a pinhole unless named.
     pub lens: Option<LensSpec>,
-    /// glTF file with the camera, relative to the look file.
+    /// Camera file (glTF or USD as text), relative to the look file.
     pub file: Option<PathBuf>,
-    /// Of the camera in it.
+    /// Name of the camera in the file.
     pub name: Option<String>,
-    /// Frame of the file that is frame 1 of the shot; frame 0 is the file's time 0 where left out.
+    /// Frame of the file at frame 1 of the shot; if left out, frame 0 is at the file's time 0.
     pub start: Option<f64>,
-    /// Poses at frames, in ascending order.
+    /// Poses in ascending order of frames.
     #[serde(default, rename = "keyframe")]
     pub keyframes: Vec<KeyframeSpec>,
 }
 
-/// How an image lies on a film of another shape.
+/// Fit of an image to a film of another aspect ratio.
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
 #[serde(rename_all = "snake_case")]
 pub enum FitSpec {
-    /// As wide as the film: Maya's Horizontal, USD's `adjustApertureHeight`.
+    /// Full width of the film: Maya's Horizontal, USD's `adjustApertureHeight`.
     Width,
-    /// As high as the film: Maya's Vertical, USD's `adjustApertureWidth`.
+    /// Full height of the film: Maya's Vertical, USD's `adjustApertureWidth`.
     Height,
-    /// As large as fits on the film: Maya's Fill, USD's `cropAperture`.
+    /// Largest image within the film: Maya's Fill, USD's `cropAperture`.
     Fill,
-    /// As small as holds all of the film: Maya's Overscan, USD's `expandAperture`.
+    /// Smallest image that covers the film: Maya's Overscan, USD's `expandAperture`.
     Overscan,
 }
 
 impl FitSpec {
-    /// All of them, by the words of looks.
+    /// All fits with the names used in looks.
     pub const NAMED: [(&'static str, Self); 4] = [
         ("width", Self::Width),
         ("height", Self::Height),
@@ -102,117 +103,118 @@ impl FitSpec {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LensSpec {
-    /// Focal length over the aperture's diameter.
+    /// Focal length over the diameter of the aperture.
     pub f_stop: f64,
-    /// To the plane that is sharp, along the optical axis, metres.
+    /// Distance to the plane in focus along the optical axis, metres.
     pub focus_distance_m: f64,
 }
 
-/// The camera at one frame.
+/// Camera pose at one frame.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct KeyframeSpec {
-    /// Frame number; frame 1 is the first.
+    /// Frame number, possibly fractional; frame 1 is the first.
     pub frame: f64,
-    /// World metres.
+    /// World position, metres.
     pub position: [f64; 3],
-    /// World metres.
+    /// World position that the camera looks at, metres.
     pub target: [f64; 3],
-    /// mm; the camera's own where left out.
+    /// mm; that of the camera if left out.
     pub focal_length_mm: Option<f64>,
-    /// Metres; the lens's own where left out.
+    /// Metres; that of the lens if left out.
     pub focus_distance_m: Option<f64>,
 }
 
-/// Size and sampling of the picture.
+/// Resolution, sampling and shutter of the picture.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ImageSpec {
-    /// Pixels.
+    /// Width in pixels.
     pub width: u32,
-    /// Pixels.
+    /// Height in pixels.
     pub height: u32,
-    /// Pixels on each side beyond the image.
+    /// Additional pixels on each side of the image.
     pub overscan: u32,
-    /// Left, upper, right and lower end of the pixels that are rendered; all of the image where left out.
+    /// Left, upper, right and lower bounds of the rendered pixels; the whole image if left out.
     pub crop: Option<[f64; 4]>,
-    /// Samples a pixel, spread over the pixel and over the shutter.
+    /// Samples per pixel, spread over the pixel and the shutter.
     pub samples: u32,
-    /// Fraction of a frame for which the shutter is open, centred on the frame; 0 = no motion blur.
+    /// Fraction of a frame with the shutter open, centred on the frame; 0 disables motion blur.
     pub shutter: f64,
-    /// How far it is open over that time.
+    /// Opening of the shutter over that time.
     pub shutter_curve: CurveSpec,
-    /// Shares of that time in which a trapezoid's shutter opens and closes.
+    /// Fractions of that time in which a trapezoidal shutter opens and closes.
     pub shutter_ramps: Option<[f64; 2]>,
 }
 
-/// How far a shutter is open while it is.
+/// Opening of a shutter over its open time.
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
 #[serde(rename_all = "snake_case")]
 pub enum CurveSpec {
-    /// Wholly, all the time.
+    /// Fully open throughout.
     Box,
-    /// Steadily more up to the middle, and less after it.
+    /// Opens linearly until the middle, then closes linearly.
     Triangle,
-    /// Steadily more while it opens, then wholly, then steadily less.
+    /// Opens linearly, stays open, then closes linearly.
     Trapezoid,
 }
 
-/// How the water is drawn.
+/// Rendering of the water.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RendererSpec {
-    /// Which way.
+    /// Rendering method.
     pub method: MethodSpec,
 }
 
-/// Ways to draw the water.
+/// Rendering methods for water.
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
 #[serde(rename_all = "snake_case")]
 pub enum MethodSpec {
-    /// Screen-space fluid rendering: splats, smoothed. Fast.
+    /// Screen-space fluid rendering: smoothed splats. Fast.
     Ssfr,
-    /// Rays through a level set of the particles. For final frames.
+    /// Ray casting through a level set of the particles. For final frames.
     Ray,
 }
 
-/// The filter that turns splats into a surface.
+/// Smoothing filter for splat depths.
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
 #[serde(rename_all = "snake_case")]
 pub enum FilterSpec {
-    /// van der Laan 2009 with the world-space width of Bagar 2010.
+    /// Curvature flow (van der Laan et al. 2009) with the world-space width of Bagar et al. (2010).
     CurvatureFlow,
-    /// Truong and Yuksel 2018.
+    /// Narrow-range filter (Truong and Yuksel 2018).
     NarrowRange,
 }
 
-/// What a particle is splatted as.
+/// Shape of a splat.
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
 #[serde(rename_all = "snake_case")]
 pub enum SplatSpec {
-    /// Flattened and stretched as its neighbours lie (Yu and Turk 2013); a lone one is a ball of its own volume.
+    /// Ellipsoid fitted to the neighbours (Yu and Turk 2013); isolated particles are small balls.
     Ellipsoid,
-    /// A ball of the splat radius.
+    /// Ball of the splat radius.
     Sphere,
 }
 
-/// How splats become a surface.
+/// Surface reconstruction.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SurfaceSpec {
-    /// Which filter.
+    /// Smoothing filter of the splats.
     pub filter: FilterSpec,
-    /// What a particle is splatted as.
+    /// Shape of a splat.
     pub splat: SplatSpec,
-    /// Splat radius, metres; 0.87 particle spacings where left out.
+    /// Splat radius, metres; 0.87 particle spacings if left out.
     pub radius_m: Option<f64>,
-    /// Standard deviation of the smoothing, metres in the world; 0.5 particle spacings where left out, 1.6 of balls.
+    /// Standard deviation of the smoothing, world metres; default 0.5 particle spacings,
+    /// 1.6 for spheres.
     pub smoothing_width_m: Option<f64>,
-    /// Voxels a particle spacing of the level set that rays are cast into.
+    /// Voxels per particle spacing in the level set for ray casting.
     pub voxels_per_spacing: f64,
-    /// Root mean square slope of the waves too small to be drawn, which widens the glitter.
+    /// RMS slope of waves too small to be drawn, which widens the glitter.
     pub roughness: f64,
-    /// Fine waves drawn into the normals; none unless named.
+    /// Fine waves added to the normals; none unless named.
     pub ripple: Option<RippleSpec>,
 }
 
@@ -220,57 +222,58 @@ pub struct SurfaceSpec {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RippleSpec {
-    /// Longest wave, metres.
+    /// Longest wavelength, metres.
     pub wavelength_m: f64,
-    /// Root mean square slope.
+    /// RMS slope.
     pub slope: f64,
 }
 
-/// What the water is like inside.
+/// Optical properties of the water.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct WaterSpec {
     /// Refractive index.
     pub index: f64,
-    /// Red, green, blue, 1/m.
+    /// Absorption coefficient, linear red, green, blue, 1/m.
     pub absorption_per_metre: [f64; 3],
-    /// Red, green, blue, 1/m: what makes deep water turquoise, not black.
+    /// Scattering coefficient, red, green, blue, 1/m. It makes deep water turquoise
+    /// instead of black.
     pub scattering_per_metre: [f64; 3],
-    /// White water where particles are thrown clear or fast; none unless named.
+    /// White water where particles are detached or fast; none unless named.
     pub spray: Option<SpraySpec>,
-    /// Sunlight that waves bend onto what lies below; straight on unless named.
+    /// Sunlight refracted by the waves onto what is below; undeflected unless named.
     pub caustics: Option<CausticsSpec>,
 }
 
-/// The map of sunlight that comes through the water.
+/// Map of the sunlight that passes through the water.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CausticsSpec {
-    /// Texels along the longer side of the ground that it covers.
+    /// Texels along the longer side of the covered ground.
     pub resolution: u32,
-    /// Standard deviation with which the surface's normals are smoothed for it, metres; 1.5 particle spacings where left out.
+    /// Standard deviation of the normals' smoothing, metres; 1.5 particle spacings if left out.
     pub smoothing_width_m: Option<f64>,
 }
 
-/// How a stream of whitewater is drawn.
+/// Rendering of a whitewater stream.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct WhitewaterLook {
-    /// Name of the stream, of `CACHE/whitewater`.
+    /// Name of the stream in `CACHE/whitewater`.
     pub stream: String,
-    /// Optical density within a whitewater particle, 1/m.
+    /// Extinction within a whitewater particle, 1/m.
     pub density_per_metre: f64,
-    /// Factor on its radius.
+    /// Factor on the particle radius.
     pub size: f64,
 }
 
-/// Whitening of thrown and fast water.
+/// Whitening of detached and fast water.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SpraySpec {
-    /// Optical density of fully aerated water, 1/m.
+    /// Extinction of fully aerated water, 1/m.
     pub density_per_metre: f64,
-    /// Speed from which the surface begins to whiten, m/s.
+    /// Speed above which the surface starts to whiten, m/s.
     pub speed_m_per_s: f64,
 }
 
@@ -278,34 +281,34 @@ pub struct SpraySpec {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SunSpec {
-    /// 0 = along +x, 90 = along +z.
+    /// Azimuth: 0 along +x, 90 along +z.
     pub azimuth_degrees: f64,
-    /// Above the horizon.
+    /// Elevation above the horizon.
     pub elevation_degrees: f64,
-    /// Factor on the sun that a clear sky of this turbidity lets through; 0 = none.
+    /// Factor on the sunlight that a clear sky of this turbidity transmits; 0 disables the sun.
     pub intensity: f64,
 }
 
-/// What the water mirrors.
+/// Sky model.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(tag = "model", rename_all = "snake_case", deny_unknown_fields)]
 pub enum SkySpec {
-    /// Hosek and Wilkie 2012.
+    /// Analytic sky of Hosek and Wilkie (2012).
     HosekWilkie {
-        /// 1 (clear) to 10 (hazy).
+        /// Turbidity, from 1 (clear) to 10 (hazy).
         turbidity: f64,
-        /// Reflectance of the land around, red, green, blue.
+        /// Reflectance of the surrounding land, linear red, green, blue.
         albedo: [f64; 3],
-        /// Whether the air near the ground is as clear as the turbidity says, whatever the ground's haze is.
+        /// Whether haze near the ground follows the turbidity instead of the ground's `haze_m`.
         haze: bool,
     },
     /// A latitude-longitude panorama, scene-linear.
     Panorama {
-        /// EXR, relative to the look file.
+        /// EXR file, relative to the look file.
         file: PathBuf,
-        /// Turn about the vertical.
+        /// Rotation about the vertical axis.
         rotate_degrees: f64,
-        /// Factor on its radiance.
+        /// Factor on the radiance.
         intensity: f64,
     },
 }
@@ -316,36 +319,36 @@ pub enum SkySpec {
 pub struct GroundSpec {
     /// Reflectance, linear red, green, blue.
     pub colour: [f64; 3],
-    /// How uneven that is, 0 to 1.
+    /// Unevenness of the reflectance, 0 to 1.
     pub variation: f64,
-    /// Distance after which air has taken 63 % of the contrast, metres; without effect where the sky's own haze is drawn.
+    /// Distance at which haze removes 63 % of the contrast, metres; unused with the sky's own haze.
     pub haze_m: f64,
 }
 
-/// Quay walls along sides of the domain.
+/// Quay walls along the sides of the domain.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BasinSpec {
-    /// Above the domain's floor, metres.
+    /// Height above the domain's floor, metres.
     pub height_m: f64,
-    /// Metres.
+    /// Thickness, metres.
     pub thickness_m: f64,
-    /// Where they stand.
+    /// Sides of the domain with a wall.
     pub sides: Vec<Wall>,
-    /// Reflectance, linear red, green, blue; 1.1 times the ground's where left out, white under a texture.
+    /// Linear red, green, blue reflectance; default 1.1 times the ground's, white under a texture.
     pub colour: Option<[f64; 3]>,
-    /// A picture on them, laid on along axes.
+    /// Texture projected along the axes.
     #[serde(rename = "texture")]
     pub laid: Option<TextureSpec>,
 }
 
-/// The scene's wave makers, as plates.
+/// Plates for the scene's wave makers.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct WaveMakersSpec {
-    /// Above the domain's floor, metres.
+    /// Height above the domain's floor, metres.
     pub height_m: f64,
-    /// Metres.
+    /// Thickness, metres.
     pub thickness_m: f64,
     /// Reflectance, linear red, green, blue.
     pub colour: [f64; 3],
@@ -355,99 +358,99 @@ pub struct WaveMakersSpec {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SeaSpec {
-    /// Still water above the domain's floor, metres.
+    /// Still-water level above the domain's floor, metres.
     pub level_m: f64,
-    /// Over which the edge of the simulated water goes over into the sea, metres.
+    /// Width of the band that blends the simulated water into the sea, metres.
     pub band_m: f64,
-    /// Beyond which it lies.
+    /// Sides of the domain beyond which the sea extends.
     pub sides: Vec<Wall>,
-    /// Its own waves; the scene's where left out.
+    /// Waves of the sea; those of the scene if left out.
     pub waves: Option<SeaWavesSpec>,
 }
 
-/// Waves of a sea.
+/// Waves of a sea spectrum.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SeaWavesSpec {
-    /// Four times the root of the elevation's variance, metres.
+    /// Significant wave height: four standard deviations of the elevation, metres.
     pub significant_height_m: f64,
-    /// Seconds.
+    /// Peak period, seconds.
     pub peak_period_s: f64,
-    /// Seconds; 0.35 of the peak's where left out.
+    /// Shortest period, seconds; 0.35 of the peak period if left out.
     pub shortest_period_s: Option<f64>,
-    /// Where they go, from +x towards +z.
+    /// Main direction of propagation, from +x towards +z.
     pub direction_degrees: f64,
-    /// s of (cos ½θ)^2s.
+    /// Exponent s of the directional spreading (cos ½θ)^2s.
     pub spreading: f64,
-    /// Of chance.
+    /// Seed of the random phases.
     pub seed: u32,
 }
 
-/// How the scene's solids look.
+/// Appearance of the scene's solids.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SolidsSpec {
     /// Reflectance, linear red, green, blue.
     pub colour: [f64; 3],
-    /// Rows of windows on upright faces; none unless named.
+    /// Rows of windows on vertical faces; none unless named.
     pub windows: Option<WindowsSpec>,
     /// MTL file, relative to the look file.
     pub materials: Option<PathBuf>,
-    /// Materials of the look's own.
+    /// Materials defined in the look.
     #[serde(default)]
     pub material: Vec<MaterialSpec>,
-    /// A picture on what has no material, laid on along axes.
+    /// Texture of solids without a material, projected along the axes.
     #[serde(rename = "texture")]
     pub laid: Option<TextureSpec>,
 }
 
-/// How a part of a solid looks.
+/// Material of a part of a solid.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MaterialSpec {
-    /// Of the part, or of the mesh file without its ending.
+    /// Name of the part, or of the mesh file without its extension.
     pub name: String,
-    /// Reflectance, linear red, green, blue; white under a texture and that of all solids else where left out.
+    /// Linear red, green, blue reflectance; default white under a texture, else that of all solids.
     pub colour: Option<[f64; 3]>,
-    /// A picture on it; none unless named.
+    /// Texture; none unless named.
     pub texture: Option<TextureSpec>,
-    /// Whether the windows of `[solids]` may be on it.
+    /// Whether the windows of `[solids]` may appear on it.
     pub windows: bool,
 }
 
-/// A picture on a solid.
+/// Texture on a solid.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TextureSpec {
     /// PNG, relative to the look file.
     pub file: PathBuf,
-    /// That it covers, metres; as the mesh's texture coordinates say where left out.
+    /// Side length covered by the picture, metres; by the mesh's texture coordinates if left out.
     pub metres: Option<f64>,
 }
 
-/// Windows on upright faces.
+/// Windows on vertical faces.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct WindowsSpec {
     /// Height of a storey, metres.
     pub storey_m: f64,
-    /// Width from window to window, metres.
+    /// Distance between windows, metres.
     pub bay_m: f64,
-    /// Fraction of the windows that are lit from within.
+    /// Fraction of the windows lit from within.
     pub lit: f64,
 }
 
-/// From scene-linear light to a picture.
+/// Conversion from scene-linear light to the PNG.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ViewSpec {
-    /// Factor of 2 to this power on the light, in the PNG only.
+    /// Exposure in stops: scales the light by 2^stops.
     pub exposure_stops: f64,
     /// Tone curve of the PNG.
     pub transform: TransformSpec,
-    /// Factor on the distance from grey after the tone curve.
+    /// Factor on the distance from grey, after the tone curve.
     pub saturation: f64,
-    /// Power about middle grey after the tone curve.
+    /// Exponent about middle grey, after the tone curve.
     pub contrast: f64,
 }
 
@@ -461,11 +464,11 @@ impl Default for ViewSpec {
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
 #[serde(rename_all = "snake_case")]
 pub enum TransformSpec {
-    /// Sobotka's AgX: a filmic curve in log light that lets colours run to white.
+    /// Sobotka's AgX: a filmic log curve that desaturates bright colours towards white.
     Agx,
-    /// ACES 1.0: reference rendering transform and output transform for sRGB displays of 100 nits in a dim room.
+    /// ACES 1.0: reference rendering and output transform for 100-nit sRGB displays, dim surround.
     Aces,
-    /// None: clipped at 1, sRGB-encoded.
+    /// None: clips at 1 and encodes as sRGB.
     Srgb,
 }
 
@@ -473,77 +476,77 @@ pub enum TransformSpec {
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
 #[serde(rename_all = "snake_case")]
 pub enum FormatSpec {
-    /// 8 bits, through the view transform.
+    /// 8 bits per channel, through the view transform.
     Png,
-    /// Scene-linear, with AOVs.
+    /// Scene-linear OpenEXR, with AOVs.
     Exr,
 }
 
-/// Extra channels of the EXR.
+/// Additional channels of the EXR.
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
 pub enum AovSpec {
     /// Depth along the optical axis, metres.
     Z,
-    /// World normal of the first surface.
+    /// World-space normal of the first surface.
     N,
     /// World position of the first surface, metres.
     P,
-    /// Screen motion to the next frame, pixels: u to the right, v upward.
+    /// Screen-space motion to the next frame, pixels: u to the right, v upward.
     #[serde(rename = "forward")]
     Forward,
-    /// Water along the line of sight, metres.
+    /// Length of the line of sight within water, metres.
     #[serde(rename = "thickness")]
     Thickness,
 }
 
-/// Primaries and white of linear light.
+/// Primaries and white point of the linear light.
 #[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Eq)]
 #[serde(rename_all = "lowercase")]
 pub enum ColourSpaceSpec {
-    /// ITU-R BT.709, white D65.
+    /// ITU-R BT.709 primaries, D65 white.
     #[default]
     Rec709,
-    /// AP1 with the white of ACES.
+    /// AP1 primaries, ACES white.
     AcesCg,
 }
 
-/// What becomes of what is opaque and seen directly.
+/// Output of opaque objects seen directly.
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
 #[serde(rename_all = "lowercase")]
 pub enum SolidsOutput {
-    /// It is in the picture.
+    /// They are drawn.
     Draw,
-    /// It is black and transparent, and cuts what stands behind it.
+    /// They are black and transparent, and occlude what is behind them.
     Holdout,
 }
 
-/// Parts of a picture's light. Each light belongs to one, so that all of them add up to the picture; what spray covers is dimmed in
-/// each of them.
+/// Components of a picture's light. They are disjoint and add up to the picture; spray dims each of
+/// them where it covers the pixel.
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
 #[serde(rename_all = "lowercase")]
 pub enum LightSpec {
-    /// What the first surface of the water mirrors.
+    /// Reflection at the first water surface.
     Reflection,
-    /// What comes through that surface, but for what water scatters.
+    /// Refraction through that surface, without the light scattered in water.
     Refraction,
-    /// What water scatters.
+    /// Light scattered in water.
     Scattering,
     /// Glitter of the sun on that surface, and the sun's disc.
     Sun,
-    /// The sky, and the light of the air before something.
+    /// The sky, and in-scattered light of the air.
     Sky,
     /// White water in the air.
     Spray,
-    /// What is opaque and seen directly.
+    /// Opaque objects seen directly.
     Solids,
-    /// Sunlight that came through water onto something opaque in it, of a look with caustics.
+    /// Sunlight through water onto opaque objects, with caustics enabled.
     Caustics,
-    /// Foam and bubbles of a stream of whitewater.
+    /// Foam and bubbles of a whitewater stream.
     Foam,
 }
 
 impl LightSpec {
-    /// All of them, in the order of the shaders' `light_parts`, with the names of their layers.
+    /// All components in the order of the shaders' `light_parts`, with the names of their layers.
     pub const NAMED: [(&'static str, Self); 9] = [
         ("reflection", Self::Reflection),
         ("refraction", Self::Refraction),
@@ -557,34 +560,34 @@ impl LightSpec {
     ];
 }
 
-/// What of a pixel the channels beside the picture show.
+/// Filter of the AOVs within a pixel.
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
 #[serde(rename_all = "snake_case")]
 pub enum AovFilterSpec {
-    /// Its centre, at the frame's instant, through a pinhole.
+    /// Value at the pixel's centre, at the instant of the frame, through a pinhole.
     Centre,
-    /// The mean over the picture's samples: over the pixel, the shutter and the lens.
+    /// Mean over the samples of the picture: pixel, shutter and lens.
     Beauty,
 }
 
-/// What is written.
+/// Files and channels to write.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct OutputSpec {
-    /// At least one.
+    /// File formats, at least one.
     pub formats: Vec<FormatSpec>,
-    /// In the EXR.
+    /// AOVs of the EXR.
     pub aovs: Vec<AovSpec>,
-    /// What of a pixel they show.
+    /// Filter of the AOVs.
     pub aov_filter: AovFilterSpec,
-    /// Of the EXR's light.
+    /// Colour space of the EXR.
     pub colour_space: ColourSpaceSpec,
-    /// What becomes of ground, solids and walls.
+    /// Output of ground, solids and walls.
     pub solids: SolidsOutput,
-    /// Layers of the EXR.
+    /// Light layers of the EXR.
     pub lights: Vec<LightSpec>,
-    /// Whether the EXR has mattes of objects.
+    /// Whether the EXR includes object mattes (Cryptomatte).
     pub cryptomatte: bool,
-    /// Whether the sky is in the picture, or left transparent.
+    /// Whether the sky is drawn; otherwise it is transparent.
     pub background: bool,
 }
