@@ -1,4 +1,4 @@
-//! `[budget]`: what a bake is held to, and the end of it where it is not kept.
+//! `[budget]`: limits on a bake, which stops where one is exceeded.
 
 use serde::{Deserialize, Deserializer};
 
@@ -8,79 +8,78 @@ use swell_domain::{
     solver::StepReport,
 };
 
-/// Limits of a bake; `None` is one that the scene switched off. None of them is physics.
+/// Limits of a bake; `None` disables a limit. None of them affects the physics.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Budget {
-    /// Largest speed of a particle at a frame's end, m/s.
+    /// Largest speed of a particle at the end of a frame, m/s.
     pub speed: Option<f64>,
-    /// How many times as fast as before the frame, gravity and walls in it counted, its fastest particle may be.
+    /// Largest ratio of the fastest particle's speed after a frame to the speed that gravity,
+    /// effects and moving boundaries explain.
     pub speed_jump: Option<f64>,
-    /// Mean of max(0, ρ/ρ0 − 1) at a frame's end.
+    /// Mean of max(0, ρ/ρ0 − 1) at the end of a frame.
     pub density_error_mean: Option<f64>,
-    /// Its 99th percentile.
+    /// 99th percentile of the same.
     pub density_error_p99: Option<f64>,
-    /// Its largest.
+    /// Maximum of the same.
     pub density_error_max: Option<f64>,
-    /// Times that a particle was slowed to the displacement cap, over particles and substeps.
+    /// Fraction of particle updates, over all substeps, that were clamped to the displacement cap.
     pub capped: Option<f64>,
-    /// Relative true residual of a projection; of FLIP alone, as the next one.
+    /// Relative true residual of a projection; checked for FLIP only, like `divergence`.
     pub residual: Option<f64>,
-    /// Largest |∇·u| Δt in a cell of water after a projection.
+    /// Largest |∇·u| Δt in a water cell after a projection.
     pub divergence: Option<f64>,
-    /// |V/V0 − 1|, V0 the volume of the start.
+    /// |V/V0 − 1|, where V0 is the volume at the start.
     pub volume: Option<f64>,
-    /// Rise of the total energy within a frame beyond the work done by walls and solids, over the total: kinetic, and
-    /// potential against the lowest place of the domain.
+    /// Increase of the total energy within a frame beyond the work of walls and solids, relative to
+    /// the total: kinetic energy plus potential energy above the lowest point of the domain.
     pub energy: Option<f64>,
-    /// Particles at a frame's end.
+    /// Number of particles at the end of a frame.
     pub particles: Option<f64>,
 }
 
-/// Defaults that depend on the scene; the others stand in the table of keys.
+/// Defaults that depend on the scene; the others are in the table of keys.
 const SPEED: f64 = 4.0;
 const RESIDUAL: f64 = 1e-2;
-/// What a wall that overtakes drops does on them without pressure is not in the work: 6 % of a frame in the small box of
-/// tests/hard_cases/24-leaving.toml, 0.1 % in the quickstart.
+/// Boundary work misses what a wall does to the drops that it overtakes without pressure: 6 % of a
+/// frame in the small box of tests/hard_cases/24-leaving.toml, 0.1 % in the quickstart.
 const FLIP_ENERGY: f64 = 0.1;
-/// PBF's corrections make energy of their own where they are few and a frame is long: 4 % a frame in the quickstart, 7 %
-/// with Chebyshev's.
+/// With few corrections and long frames PBF creates energy: 4 % per frame in the quickstart, 7 %
+/// with Chebyshev's iteration.
 const PBF_ENERGY: f64 = 0.25;
 
-/// FLIP's. Splashes of the shipped scenes come to 0.9, water that leaked along a wall to 24.
+/// Default with FLIP. Splashes of the shipped scenes reach 0.9, water that leaked along a wall 24.
 const DENSITY_ERROR_MAX: f64 = 4.0;
 
-/// FLIP's. A dam that breaks, and a wave that meets a wall, come to 2; what a leak throws out of still water to 20 and more.
+/// Default with FLIP. A breaking dam and a wave that hits a wall reach 2, a leak in still
+/// water 20 or more.
 const SPEED_JUMP: f64 = 8.0;
 
-/// Where gravity and walls give no speed to go by: so many spacings a frame.
+/// Least default speed limit, spacings per frame, for scenes without gravity or moving walls.
 const LEAST_SPEED: f64 = 10.0;
 
-/// Water with next to no energy: what moves a tenth of a spacing in a frame counts as the total.
+/// Speed whose kinetic energy is added to the total, spacings per frame, so that water
+/// at rest may stir.
 const LEAST_ENERGY_SPEED: f64 = 0.1;
 
-/// The default of `budget.speed`, in words.
+/// Describes the default of `budget.speed`.
 pub(super) fn speed_words() -> String {
     format!(
         "{SPEED} (√(2 g × the domain's diagonal) + the fastest wall or moving solid), at least {LEAST_SPEED} spacings a frame"
     )
 }
 
-/// The default of `budget.speed_jump`, in words.
 pub(super) fn speed_jump_words() -> String {
     format!("false with pbf, {SPEED_JUMP:?} with flip")
 }
 
-/// The default of `budget.density_error_max`, in words.
 pub(super) fn density_error_max_words() -> String {
     format!("false with pbf, {DENSITY_ERROR_MAX:?} with flip")
 }
 
-/// The default of `budget.residual`, in words.
 pub(super) fn residual_words() -> String {
     format!("{RESIDUAL}, or the tolerance where that is larger")
 }
 
-/// The default of `budget.energy`, in words.
 pub(super) fn energy_words() -> String {
     format!(
         "{PBF_ENERGY} with pbf, {FLIP_ENERGY} with flip, false in a wind or with surface tension"
@@ -103,7 +102,6 @@ pub(super) struct BudgetSpec {
     particles: Limit,
 }
 
-/// A number, or `false` for none.
 #[derive(Clone, Copy)]
 struct Limit(Option<f64>);
 
@@ -122,16 +120,16 @@ impl<'de> Deserialize<'de> for Limit {
     }
 }
 
-/// Largest speed that a scene gives rise to by itself: of a fall through all of its domain, and of what pushes.
+/// Speeds that a scene causes by itself, m/s, and its particle spacing, metres.
 pub(super) struct Scales {
     pub(super) fall: f64,
     pub(super) push: f64,
-    /// Of the wind and of what else does work that nothing counts, m/s.
+    /// Wind and other effects whose work is not counted.
     pub(super) wind: f64,
     pub(super) spacing: f64,
 }
 
-/// Builds the table for the chosen solver.
+/// Builds the limits for the chosen solver.
 pub(super) fn build(
     doc: &Document<'_>,
     spec: &BudgetSpec,
@@ -172,19 +170,19 @@ pub(super) fn build(
     })
 }
 
-/// What a frame began with.
+/// State before a frame.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Before {
-    /// What [`Scene::total_energy`] gives, joule.
+    /// Total energy as returned by [`Scene::total_energy`], J.
     pub energy: f64,
-    /// Largest, m/s.
+    /// Speed of the fastest particle, m/s.
     pub speed: f64,
-    /// Of the bake's start, m³, where it is watched.
+    /// Volume at the start of the bake, m³, if the volume is watched.
     pub start_volume: Option<f64>,
 }
 
 impl Budget {
-    /// Each limit with its name, in the order of the table of keys.
+    /// Returns each limit with its quantity, in the order of the table of keys.
     pub(super) fn rows(&self) -> [(Watched, Option<f64>); 11] {
         [
             (Watched::Speed, self.speed),
@@ -201,18 +199,19 @@ impl Budget {
         ]
     }
 
-    /// Holds the count of particles after frame `frame` to its limit.
+    /// Compares the number of particles after frame `frame` with its limit.
     ///
     /// # Errors
-    /// The breach.
+    /// If it is exceeded.
     pub fn check_count(&self, frame: u32, particles: usize) -> Result<(), Breach> {
         Breach::check(frame, Watched::Count, particles as f64, self.particles)
     }
 
-    /// Holds a projection of `length` seconds to its limits; `divergence` is the largest |∇·u| after it, 1/s.
+    /// Compares a projection over `length` seconds with its limits; `divergence` is the largest
+    /// |∇·u| after it, 1/s.
     ///
     /// # Errors
-    /// The first breach; one that is no number breaches every limit.
+    /// For the first limit exceeded. NaN exceeds every limit.
     pub fn check_projection(
         &self,
         frame: u32,
@@ -229,10 +228,11 @@ impl Budget {
             .map_err(|breach| breach.in_substep(substep))
     }
 
-    /// Holds a frame of so many particles to what its report says, and to what stood before it.
+    /// Compares the report of a frame with `particles` particles with the limits and with the
+    /// state before it.
     ///
     /// # Errors
-    /// The first breach.
+    /// For the first limit exceeded.
     pub fn check_frame(
         &self,
         scene: &Scene,
@@ -297,8 +297,10 @@ impl Budget {
 }
 
 impl Scene {
-    /// What gravity and moving walls or solids bring a particle of `speed` to in frame `frame`, m/s; a tenth of a spacing a
-    /// frame at least.
+    /// Bounds the speed that gravity, effects and moving boundaries give in frame `frame` to a
+    /// particle of `speed`, m/s; at least a tenth of a spacing per frame.
+    ///
+    /// What absorbing walls add to their own motion is not included.
     pub fn reached_speed(&self, frame: u32, speed: f64) -> f64 {
         let length = self.shot.frame_seconds();
         let start = f64::from(frame.saturating_sub(1)) * length;
@@ -308,15 +310,16 @@ impl Scene {
         (speed + push + gained + self.effects.frees(self.grain())).max(least)
     }
 
-    /// What a fall from the top of the water brings one of so many particles of `speed` to, m/s: the foot of a column is that fast within
-    /// a frame where the frame is long or the column high. A column's top is twice as high as its energy, joule, has it on average.
+    /// Bounds the speed of a particle of `speed` after a fall from the top of the water, m/s. In a
+    /// long frame or a high column the foot of a column reaches it within a frame. A column's top
+    /// is twice as high as its mean potential energy, `energy` in joules, implies.
     fn fallen_speed(&self, speed: f64, energy: f64, particles: usize) -> f64 {
         let mass = self.particle_mass() * particles.max(1) as f64;
         (speed * speed + 4.0 * energy.max(0.0) / mass).sqrt()
     }
 
-    /// Kinetic and potential energy of a state of so many particles, the latter against the domain's lowest place,
-    /// joule.
+    /// Returns the kinetic and potential energy of `particles` particles, J; the potential energy
+    /// is relative to the lowest point of the domain.
     pub fn total_energy(&self, particles: usize, report: &StepReport) -> f64 {
         let mass = self.particle_mass() * particles as f64;
         let (gravity, size) = (self.water.gravity, self.domain.size());
@@ -324,20 +327,21 @@ impl Scene {
         report.kinetic_energy + report.potential_energy - mass * lowest
     }
 
-    /// The most that a frame may end with where it began with `energy`, `work` was done in it, and `limit` is the
-    /// budget, joule.
+    /// Returns the largest energy allowed at the end of a frame that begins with `energy` and in
+    /// which `work` is done, J; `limit` is the budget.
     pub fn allowed_energy(&self, particles: usize, energy: f64, work: f64, limit: f64) -> f64 {
         energy + work + limit * self.energy_scale(particles, energy, work)
     }
 
-    /// The total that a rise is a part of. Something is added to it, so that water at rest on the floor may stir.
+    /// Scale of a relative increase of energy, J. A small term is added so that water at rest on
+    /// the floor may stir.
     fn energy_scale(&self, particles: usize, energy: f64, work: f64) -> f64 {
         let speed = LEAST_ENERGY_SPEED * self.particle_spacing() * self.shot.frames_per_second;
         let least = 0.5 * self.particle_mass() * particles as f64 * speed * speed;
         energy + work.abs() + least
     }
 
-    /// kg.
+    /// Returns the mass of a particle, kg.
     pub fn particle_mass(&self) -> f64 {
         self.water.rest_density * self.particle_spacing().powi(3)
     }
@@ -349,7 +353,8 @@ mod tests {
 
     use super::*;
 
-    /// Ten particles of 1 kg, 50 frames a second, d = 0.1 m: what moves 0.5 m/s counts as the least energy, 1.25 J.
+    /// Ten particles of 1 kg, 50 frames per second, d = 0.1 m: the least energy is that of
+    /// 0.5 m/s, 1.25 J.
     fn scene(method: &str) -> Scene {
         let text = r#"
             [shot]
@@ -377,7 +382,7 @@ mod tests {
         Scene::parse(text, Path::new("budget.toml"), Path::new("."), &method).expect("a scene")
     }
 
-    /// What a frame is held to; a limit a millionth lower than what is measured breaks, and one a millionth higher holds.
+    /// A limit a millionth below the measured value fails, one a millionth above passes.
     fn measured(budget: impl Fn(&mut Budget, f64), report: &StepReport, expected: f64) {
         let scene = scene("pbf");
         let look = |limit: f64| {
@@ -412,15 +417,17 @@ mod tests {
         }
     }
 
-    /// By hand: 3 of 10 particles in 4 substeps; 1.9 m³ of 2; 150 J after 100 J and 20 J of work are 30 J too many, of
-    /// 100 + 20 + 1.25; with −20 J of work 70 J, of as many.
+    /// By hand: 3 clamped of 10 particles in 4 substeps; 1.9 m³ of 2. 150 J after 100 J and 20
+    /// J of work are 30 J too many, relative to 100 + 20 + 1.25; with −20 J of work 70 J,
+    /// relative to the same.
     #[test]
     fn frames_are_held_to_what_a_hand_counts() {
         let report = report();
         measured(|b, limit| b.capped = Some(limit), &report, 3.0 / 40.0);
         measured(|b, limit| b.volume = Some(limit), &report, 0.05);
         measured(|b, limit| b.speed = Some(limit), &report, 7.0);
-        // 3 m/s, and 0.2 m/s of gravity in a fiftieth of a second; the wall stands by then. The limit counts in times.
+        // 3 m/s, and 0.2 m/s from gravity in a fiftieth of a second; the wall has stopped by then.
+        // The limit is a factor.
         let jump = |times: f64| {
             let held = Budget {
                 speed_jump: Some(times),
@@ -439,8 +446,9 @@ mod tests {
             breach.to_string().contains("budget.speed_jump allows"),
             "{breach}"
         );
-        // From rest 8 times 0.2 m/s are less than a fall of 3 m, √60 m/s, which is the top of 10 kg with 150 J. Control: a jet of
-        // as much in shallow water, of a tenth of that energy, though the domain is as high.
+        // From rest, 8 times 0.2 m/s is less than a fall of 3 m, √60 m/s: the top of 10 kg
+        // with 150 J. Control: a jet as fast in shallow water with a tenth of that energy, in
+        // a domain as high.
         let fall = |max_speed: f64, energy: f64| {
             let held = Budget {
                 speed_jump: Some(SPEED_JUMP),
@@ -475,7 +483,7 @@ mod tests {
         assert!((allowed - (120.0 + 0.2 * 121.25)).abs() < 1e-12);
     }
 
-    /// A projection's divergence counts as the part of a cell that it makes in its substep.
+    /// The divergence limit applies to the relative change of a cell's volume in a substep.
     #[test]
     fn projections_are_held_to_residual_and_divergence() {
         let budget = Budget {
@@ -491,14 +499,15 @@ mod tests {
         assert!((breach.measured - 0.100_02).abs() < 1e-12);
     }
 
-    /// Four times what a fall through the box's diagonal of 7 m and the wall give: 4 (√140 + 1.5) m/s.
+    /// Four times the speed of a fall through the box's diagonal of 7 m plus that of the wall: 4
+    /// (√140 + 1.5) m/s.
     #[test]
     fn the_speed_is_that_of_a_fall_and_a_push() {
         for (method, energy) in [("pbf", 0.25), ("flip", 0.1)] {
             let budget = scene(method).budget;
             let expected = 4.0 * (140.0f64.sqrt() + 1.5);
             let speed = budget.speed.expect("by default");
-            // Ten spacings a frame are 50 m/s, and less.
+            // Ten spacings per frame are only 50 m/s.
             assert!((speed - expected).abs() < 1e-9 && speed > 50.0, "{speed}");
             assert_eq!(budget.energy, Some(energy));
             assert_eq!(budget.speed_jump, (method == "flip").then_some(8.0));

@@ -1,4 +1,4 @@
-//! `[grids]`: which grids each frame gets beside its particles.
+//! `[grids]`: grids written with each frame beside its particles.
 
 use serde::{Deserialize, Serialize};
 
@@ -9,17 +9,17 @@ use swell_domain::{
     surface::{MAX_BRICKS, Raster},
 };
 
-/// Grids of each frame.
+/// Grids written with each frame.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Grids {
-    /// A level set of the water's surface.
+    /// Whether to write a level set of the water's surface.
     pub surface: bool,
-    /// Its velocity on cell faces.
+    /// Whether to write the water's velocity on cell faces.
     pub velocity: bool,
-    /// Metres. Where the scene does not say it: the cell size of FLIP, or two particle spacings,
-    /// which is the same for eight particles a cell.
+    /// Edge of a voxel, metres. The default is FLIP's cell size, or two particle spacings with PBF,
+    /// which is the same for eight particles per cell.
     pub voxel_size: f64,
-    /// How values are kept.
+    /// Storage precision of the values.
     pub precision: Precision,
 }
 
@@ -32,7 +32,7 @@ pub(super) struct GridsSpec {
     precision: Precision,
 }
 
-/// Builds the table for the chosen solver.
+/// Builds the settings for the chosen solver.
 pub(super) fn build(
     doc: &Document<'_>,
     spec: &GridsSpec,

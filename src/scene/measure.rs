@@ -1,32 +1,33 @@
-//! What a benchmark measures: its numbers, its curves, and what it has to be told.
+//! Benchmark measures: the numbers and curves that they produce and the inputs that they need.
 
-/// What is measured of a benchmark's runs, and what its scene starts from.
+/// Measure that a benchmark applies to its runs, and the setup that its scene must have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Measure {
     /// Waves of a piston, at the scene's elevation probes.
     RegularWaves,
-    /// Waves whose elevation a theory gives, of a wall that moves by it or of a generation zone, at the scene's elevation probes.
+    /// Waves with a theoretical elevation, from a wave maker or a generation zone, at the scene's
+    /// elevation probes.
     WavesByTheory,
     /// One solitary wave, at the scene's elevation probes.
     SolitaryWave,
-    /// A column that collapses along x: front, and height at the wall.
+    /// A column that collapses along x: position of the front, and height at the wall.
     DamBreak,
-    /// A long reservoir that empties over a dry bed along x: the profile about the dam.
+    /// A long reservoir that empties over a dry bed along x: profile about the dam.
     DryBed,
-    /// A dam that breaks onto a block: the scene's probes of elevation and pressure.
+    /// A dam break that hits a block: the scene's elevation and pressure probes.
     BlockImpact,
-    /// A jet along x that a wall turns: the scene's probe of the force on it.
+    /// A jet along x deflected by a wall: the scene's probe of the force on it.
     JetImpact,
-    /// A wave between two walls along x, which starts at rest from its highest.
+    /// A standing wave between two walls along x, released from rest at its maximum.
     StandingWave,
-    /// Water at rest: the scene's probes of pressure.
+    /// Water at rest: the scene's pressure probes.
     Hydrostatic,
-    /// A vortex in a closed box, full of water and without gravity, in the plane of x and y.
+    /// A vortex in the x-y plane of a closed box full of water, without gravity.
     TaylorGreen,
 }
 
 impl Measure {
-    /// As studies name them.
+    /// All measures with the names used in studies.
     pub(super) const NAMED: [(&'static str, Self); 10] = [
         ("regular_waves", Self::RegularWaves),
         ("waves_by_theory", Self::WavesByTheory),
@@ -40,7 +41,7 @@ impl Measure {
         ("taylor_green", Self::TaylorGreen),
     ];
 
-    /// What it has to be told.
+    /// Returns the names of the inputs that it needs.
     pub(super) fn needs(self) -> &'static [&'static str] {
         match self {
             Self::RegularWaves => &["stroke", "period", "after"],
@@ -56,7 +57,7 @@ impl Measure {
         }
     }
 
-    /// Numbers that it gives, as gates name them, each with its title and unit. `{curve}` is one that points stand beside.
+    /// Returns the numbers that it produces, as gates name them, each with its title and unit.
     pub fn numbers(self) -> &'static [(&'static str, &'static str)] {
         match self {
             Self::RegularWaves => &[
@@ -189,7 +190,8 @@ impl Measure {
         }
     }
 
-    /// Curves that it gives, as points name them, each with its title and what its axes say.
+    /// Returns the curves that it produces, as reference points name them, each with its title and
+    /// the labels of its axes.
     pub fn curves(self) -> &'static [(&'static str, [&'static str; 3])] {
         match self {
             Self::RegularWaves => &[(

@@ -1,4 +1,4 @@
-//! Solids that move: a mesh along a direction, about an axis, or both.
+//! Moving solids: a mesh that slides along a direction, turns about an axis, or both.
 
 use glam::{DQuat, DVec3};
 
@@ -22,51 +22,51 @@ use swell_domain::{
     pose::{Passage, Pose},
 };
 
-/// Most of them in a scene: what a pass looks at, one after the other.
+/// Largest number of moving solids in a scene; a shader pass loops over all of them.
 pub const MAX_MOVING_SOLIDS: usize = 7;
 
-/// Least length of a direction, whose length does not count.
+/// Least length of a direction vector; only its direction matters.
 const LEAST_DIRECTION: f64 = 1e-6;
 
 type Result<T> = std::result::Result<T, SceneError>;
 
-/// A solid that is carried along a line, or turns, or both.
+/// A solid that slides along a line, turns about an axis, or follows a track.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MovingSolid {
-    /// Where it stands at the start.
+    /// Mesh at its initial placement.
     pub placed: PlacedMesh,
-    /// Along a line; `None` of one that turns in place.
+    /// Translation along a line; `None` for a solid that does not slide.
     pub slide: Option<Slide>,
-    /// About an axis, which is carried along.
+    /// Rotation about an axis, which slides along with the solid.
     pub turn: Option<Turn>,
-    /// As a file has it, in place of both.
+    /// Poses over time from a file or the scene, in place of both.
     pub track: Option<Track>,
 }
 
-/// A way along a line.
+/// Translation along a line.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Slide {
-    /// As the scene says it; its length does not count.
+    /// Direction as written in the scene; its length is ignored.
     pub direction: DVec3,
-    /// How far along `direction` it has come, metres.
+    /// Displacement along `direction`, metres.
     pub motion: Motion,
 }
 
-/// A turn about an axis.
+/// Rotation about an axis.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Turn {
-    /// A point on the axis at the start, metres about the scene's origin.
+    /// A point on the axis at the start, relative to the scene's origin, metres.
     pub pivot: DVec3,
-    /// As the scene says it; its length does not count.
+    /// Direction of the axis as written in the scene; its length is ignored.
     pub axis: DVec3,
-    /// How far it has turned, counter-clockwise as seen against `axis`, degrees.
+    /// Angle, degrees, counter-clockwise when looking against `axis`.
     pub motion: Motion,
-    /// From the pivot to the solid's farthest point, metres.
+    /// Distance from the pivot to the farthest vertex, metres.
     pub reach: f64,
 }
 
 impl Turn {
-    /// Of a solid that stands as `mesh` at the start.
+    /// Creates the rotation of a solid whose initial placement is `mesh`.
     pub fn new(pivot: DVec3, axis: DVec3, motion: Motion, mesh: &TriangleMesh) -> Self {
         let away = mesh.vertices.iter().map(|x| x.distance(pivot));
         Self {
@@ -79,7 +79,7 @@ impl Turn {
 }
 
 impl MovingSolid {
-    /// The key that says how it moves, the first where there are two.
+    /// Returns the key of its motion, the first one if there are two.
     fn key(&self) -> &'static str {
         match (&self.track, &self.slide) {
             (Some(_), _) => "track",
@@ -88,12 +88,12 @@ impl MovingSolid {
         }
     }
 
-    /// Whether it may turn.
+    /// Whether the solid may rotate.
     pub fn turns(&self) -> bool {
         self.turn.is_some() || self.track.is_some()
     }
 
-    /// Where it stands at time `t`, seconds.
+    /// Returns the pose at time `t`, seconds.
     pub fn pose(&self, t: f64) -> Pose {
         if let Some(track) = &self.track {
             return track.pose(t);
@@ -116,12 +116,13 @@ impl MovingSolid {
         }
     }
 
-    /// From where it stands at `start` to where it stands `length` seconds later.
+    /// Returns the motion from the pose at `start` over `length` seconds.
     pub fn passage(&self, start: f64, length: f64) -> Passage {
         Passage::between(self.pose(start), self.pose(start + length), length)
     }
 
-    /// What took it within `step` seconds to where it stands at `time`; with a step of 0 it rests there.
+    /// Returns the motion over the `step` seconds that end at `time`; with a step of 0 the
+    /// solid rests there.
     pub fn passage_to(&self, time: f64, step: f64) -> Passage {
         match step {
             0.0 => Passage::resting(self.pose(time)),
@@ -129,7 +130,7 @@ impl MovingSolid {
         }
     }
 
-    /// An upper bound on the speed of its points within `[t0, t1]`, m/s.
+    /// Bounds the speed of the solid's points within `[t0, t1]`, m/s.
     pub fn peak_speed(&self, t0: f64, t1: f64) -> f64 {
         if let Some(track) = &self.track {
             return track.peak_speed(t0, t1);
@@ -144,7 +145,8 @@ impl MovingSolid {
 }
 
 impl Scene {
-    /// An upper bound on the speed of walls and solids within `[t0, t1]`, m/s.
+    /// Bounds the speed of wave makers and moving solids within `[t0, t1]`, m/s, without what
+    /// absorbing walls add to their own motion.
     pub fn peak_boundary_speed(&self, t0: f64, t1: f64) -> f64 {
         let makers = self.wave_makers.iter();
         let makers = makers.map(|maker| maker.motion.peak_speed(t0, t1));
@@ -154,20 +156,21 @@ impl Scene {
     }
 }
 
-/// A sample on a solid at one moment.
+/// A sample of a solid's surface at one instant.
 #[derive(Clone, Copy, Debug)]
 pub struct SolidSample {
-    /// From the domain's least corner, metres; within the domain along periodic axes.
+    /// Position relative to the domain's least corner, metres; wrapped into the domain
+    /// along periodic axes.
     pub position: DVec3,
-    /// Area of the surface that it stands for, m².
+    /// Surface area that the sample represents, m².
     pub area: f64,
-    /// m/s.
+    /// Velocity of the surface, m/s.
     pub velocity: DVec3,
 }
 
 impl Scene {
-    /// Samples on the solids of `boundary` as they stand at `time`, those that move with what took them there within
-    /// `step` seconds; with a step of 0 they rest. Those of solids at rest come first.
+    /// Returns the samples of `boundary` at `time`, those of static solids first. Samples of moving
+    /// solids have their mean velocity over the last `step` seconds; with a step of 0 they rest.
     pub fn solid_samples(&self, boundary: &Boundary, time: f64, step: f64) -> Vec<SolidSample> {
         let least = self.domain.min;
         let still = boundary.samples.iter().map(|sample| SolidSample {
@@ -193,7 +196,7 @@ impl Scene {
     }
 }
 
-/// Builds the one at `path` from its mesh and its keys.
+/// Builds the moving solid at `path` from its mesh and its keys.
 pub(super) fn build(
     doc: &Document<'_>,
     path: &str,
@@ -251,7 +254,7 @@ pub(super) fn build(
     Ok(solid)
 }
 
-/// A motion in degrees.
+/// Reads a rotation, in degrees.
 fn turn_motion(
     doc: &Document<'_>,
     place: &str,
@@ -282,8 +285,8 @@ fn turn_motion(
     }
 }
 
-/// It must come into the domain at some time, and stay within reason: a motion that carries it away for
-/// ten domains, or whose points are faster than anything, is a slip of the keyboard.
+/// Checks that the solid enters the domain at some time and that its motion is plausible: a
+/// displacement of more than ten domain lengths or an extreme speed is taken for a typing error.
 fn check_way(
     doc: &Document<'_>,
     solid: &MovingSolid,
@@ -330,7 +333,7 @@ fn check_way(
             let (places, reach) = track.places();
             places.map(|at| ball(at, reach)).reduce(joined)
         }
-        // Wherever it turns to.
+        // The solid may turn to any angle.
         (None, Some(turn)) => Some(ball(turn.pivot, turn.reach)),
         (None, None) => solid.placed.mesh.bounds(),
     };

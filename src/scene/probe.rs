@@ -1,4 +1,4 @@
-//! `[[probe]]`: what is measured at each frame and written beside the particles.
+//! `[[probe]]`: quantities measured at each frame and written beside the particles.
 
 use glam::{DVec2, DVec3};
 use serde::Deserialize;
@@ -9,28 +9,29 @@ use super::{
 };
 use swell_domain::{bounds::Bounds, probe::Rate, sparse_grid::EDGE, surface::MAX_BRICKS};
 
-/// A gauge that has a CSV of its own in the cache.
+/// A gauge with its own CSV file in the cache.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Probe {
-    /// File-name safe; no other probe of the scene has it, upper and lower case taken alike.
+    /// Safe as a file name; unique in the scene, ignoring case.
     pub name: String,
-    /// What it measures.
+    /// Measured quantity.
     pub kind: ProbeKind,
-    /// How often.
+    /// Sampling rate.
     pub rate: Rate,
-    /// Seconds up to each look over which the mean, the least and the greatest value are given too.
+    /// Length of the window before each sample over which mean, minimum and maximum are also
+    /// reported, seconds.
     pub window: Option<f64>,
 }
 
-/// What a probe measures.
+/// Quantity that a probe measures.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ProbeKind {
-    /// Height of the water's surface.
+    /// Height of the water surface.
     Elevation {
         /// x and z, metres.
         at: DVec2,
     },
-    /// Pressure of the water at a point.
+    /// Water pressure at a point.
     Pressure {
         /// Position, metres.
         at: DVec3,
@@ -39,47 +40,48 @@ pub enum ProbeKind {
     Energy,
     /// Volume of all water.
     Volume,
-    /// Place behind which a part of the water lies.
+    /// Position of the front along an axis: the given fraction of the water is behind it.
     Front {
-        /// The wall that it heads for.
+        /// Wall that the front moves towards.
         towards: Wall,
-        /// The part, above 0 and up to 1.
+        /// Fraction of the water behind the front, in (0, 1].
         quantile: f64,
     },
-    /// Height of the highest water that hangs together with the body.
+    /// Highest water that is connected to the main body.
     RunUp {
-        /// Part of the body below it, above 0 and up to 1.
+        /// Fraction of the main body below that height, in (0, 1].
         quantile: f64,
     },
-    /// Volume a second that crosses a plane.
+    /// Volume flow rate through a plane.
     Flux {
-        /// The wall towards which it counts as positive.
+        /// Wall towards which the flow is positive.
         towards: Wall,
-        /// Where the plane crosses the axis, metres.
+        /// Position of the plane along the axis, metres.
         at: f64,
     },
-    /// Force of the pressure on a solid or a wall, and its moment.
+    /// Pressure force on a solid or a wall, and its moment.
     Force {
-        /// Who bears it.
+        /// Body that bears the force.
         on: Bearer,
-        /// Where the moment is taken about, metres.
+        /// Reference point of the moment, metres.
         about: DVec3,
     },
 }
 
-/// What bears a force.
+/// Body on which a force is measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Bearer {
-    /// A solid by its number in [`Scene::solids`].
+    /// Index into [`Scene::solids`].
     Solid(usize),
-    /// A solid by its number in [`Scene::moving_solids`].
+    /// Index into [`Scene::moving_solids`].
     MovingSolid(usize),
-    /// A face of the domain, with its wave maker.
+    /// A face of the domain, including its wave maker.
     Wall(Wall),
 }
 
 impl Bearer {
-    /// As a scene names it whose solids at rest stand before those that move: a number, or a wall's name.
+    /// Returns the name used in scenes: the wall's name, or the index among all solids with the
+    /// static ones first.
     pub fn name(self, scene: &Scene) -> String {
         match self {
             Self::Solid(index) => index.to_string(),
@@ -89,7 +91,6 @@ impl Bearer {
     }
 }
 
-/// A bearer as a scene names it.
 #[derive(Clone, Copy, Deserialize)]
 #[serde(untagged)]
 enum BearerSpec {
@@ -97,18 +98,18 @@ enum BearerSpec {
     Wall(Wall),
 }
 
-/// Of a front where the scene does not say: spray ahead of a breaking wave is less than the rest.
+/// Default for a front: spray ahead of a breaking wave is less than the remainder.
 const FRONT_QUANTILE: f64 = 0.995;
-/// The same of a run-up, which leaves out what has come off the body anyway.
+/// Default for a run-up, which already ignores water detached from the body.
 const RUN_UP_QUANTILE: f64 = 1.0;
 
-/// Both in words.
+/// Describes both defaults.
 pub(super) fn quantile_words() -> String {
     format!("{FRONT_QUANTILE} of a front, {RUN_UP_QUANTILE} of a run_up")
 }
 
 impl ProbeKind {
-    /// Names that scenes use.
+    /// Names used in scenes.
     pub(super) const NAMES: [&str; 8] = [
         "elevation",
         "pressure",
@@ -120,7 +121,7 @@ impl ProbeKind {
         "force",
     ];
 
-    /// As scenes name it.
+    /// Returns the name used in scenes.
     pub fn name(self) -> &'static str {
         Self::NAMES[match self {
             Self::Elevation { .. } => 0,
@@ -134,7 +135,7 @@ impl ProbeKind {
         }]
     }
 
-    /// What it gives a frame, with the units.
+    /// Returns the names of the values per sample, with units.
     pub fn columns(self) -> &'static [&'static str] {
         match self {
             Self::Elevation { .. } => &["elevation_m"],
@@ -155,9 +156,9 @@ impl ProbeKind {
         }
     }
 
-    /// World coordinates of its point, metres: x and z, or x, y and z, or that of a plane, or none; of a force what its
-    /// moment is about. `origin` is the
-    /// scene's.
+    /// Returns the probe's position in world coordinates, metres: x and z, or x, y and z,
+    /// the position of a plane, the reference point of a moment, or nothing. `origin` is
+    /// that of the scene.
     pub fn at(self, origin: DVec3) -> Vec<f64> {
         match self {
             Self::Elevation { at } => (at + DVec2::new(origin.x, origin.z)).to_array().to_vec(),
@@ -169,7 +170,7 @@ impl ProbeKind {
         }
     }
 
-    /// The direction that counts as positive or ahead, where it has one.
+    /// Returns the positive direction of a front or a flux.
     pub fn towards(self) -> Option<Wall> {
         match self {
             Self::Front { towards, .. } | Self::Flux { towards, .. } => Some(towards),
@@ -177,7 +178,7 @@ impl ProbeKind {
         }
     }
 
-    /// The part of the water that it looks at, where it has one.
+    /// Returns the fraction of the water that a front or a run-up uses.
     pub fn quantile(self) -> Option<f64> {
         match self {
             Self::Front { quantile, .. } | Self::RunUp { quantile } => Some(quantile),
@@ -201,20 +202,21 @@ pub(super) struct ProbeSpec {
     about: Option<[f64; 3]>,
 }
 
-/// What of a scene its probes are held against.
+/// Parts of the scene that probes are checked against.
 pub(super) struct Around<'a> {
     pub(super) domain: &'a Bounds,
     pub(super) periodic: [bool; 3],
     pub(super) shot: &'a Shot,
     pub(super) solver: &'a Solver,
     pub(super) solids: &'a [PlacedMesh],
-    /// Those that move, as they are placed at the start.
+    /// Moving solids at their initial placement.
     pub(super) moving: Vec<&'a PlacedMesh>,
-    /// Of the scene's solids in its own order, whether each moves.
+    /// For each solid in the scene's order, whether it moves.
     pub(super) is_moving: &'a [bool],
 }
 
-/// Builds all of them. A probe without a name is called by its kind and its place among those of its kind.
+/// Builds all probes. The default name of a probe is its kind and its number among
+/// those of its kind.
 pub(super) fn build_all(
     doc: &Document<'_>,
     specs: &[ProbeSpec],
@@ -263,7 +265,7 @@ pub(super) fn build_all(
     Ok(probes)
 }
 
-/// Why a probe cannot have a name beside another probe's.
+/// Describes why two probes cannot have these names.
 fn second(known: &str, name: &str) -> String {
     let mut problem = format!("a second probe of the name {name:?}");
     if known != name {
@@ -274,7 +276,7 @@ fn second(known: &str, name: &str) -> String {
     problem
 }
 
-/// What the table at `path` measures, with its point in the domain.
+/// Reads the kind of the probe at `path` and checks that its point is in the domain.
 fn kind(
     doc: &Document<'_>,
     path: &str,
@@ -297,7 +299,7 @@ fn kind(
         );
         fault(problem)
     };
-    // The keys need it where a kind does.
+    // The table of keys requires it for these kinds.
     let towards = || {
         let missing = || doc.fault_of(&format!("{path}.axis"), "missing".to_owned());
         spec.axis.ok_or_else(missing)
@@ -346,7 +348,8 @@ fn kind(
     )))
 }
 
-/// Who bears a force, and what its moment is about: the middle of that at the start where the table does not say.
+/// Reads the body that bears a force, and the reference point of the moment: by default the centre
+/// of the body at the start.
 fn force(
     doc: &Document<'_>,
     path: &str,
@@ -397,7 +400,7 @@ fn force(
     Ok(ProbeKind::Force { on, about })
 }
 
-/// A pressure on particles is none on faces.
+/// PBF's pressure is defined at particles, not on faces.
 fn why_no_force(solver: &Solver) -> Option<String> {
     (solver.method == Method::Pbf).then(|| {
         "solver pbf has no pressure on faces that a force could be summed from; choose solver.method = \"flip\""
@@ -405,7 +408,7 @@ fn why_no_force(solver: &Solver) -> Option<String> {
     })
 }
 
-/// A look is at a substep's end, so there are at most as many as substeps.
+/// Samples are taken at the ends of substeps, so their rate is limited by the number of substeps.
 fn why_not_so_often(rate: Rate, shot: &Shot, solver: &Solver) -> Option<String> {
     let Rate::Hertz(rate) = rate else {
         return None;
@@ -424,10 +427,11 @@ fn why_not_so_often(rate: Rate, shot: &Shot, solver: &Solver) -> Option<String> 
     })
 }
 
-/// Hz: a look in a quarter of an hour.
+/// Hz: one sample in about a quarter of an hour.
 const LEAST_RATE: f64 = 1e-3;
 
-/// PBF's pressure is the sum of its multipliers, which says all only where corrections are λ's and nothing else.
+/// PBF's pressure is the sum of its multipliers λ, which is complete only if all
+/// corrections derive from λ.
 fn why_no_pressure(solver: &Solver) -> Option<String> {
     if solver.method != Method::Pbf {
         return None;
@@ -447,7 +451,8 @@ fn why_no_pressure(solver: &Solver) -> Option<String> {
     Some(why.to_owned())
 }
 
-/// The volume is counted on voxels of one spacing, whose bricks have a table over the water.
+/// The volume is counted on voxels of one spacing; their bricks are addressed by a
+/// table over the water.
 fn why_no_volume(domain: &Bounds, solver: &Solver) -> Option<String> {
     let spacing = match solver.method {
         Method::Pbf => solver.pbf().particle_spacing,

@@ -1,4 +1,4 @@
-//! The grid on which distances to solids are known.
+//! Grid of the signed distance to static solids.
 
 use std::borrow::Cow;
 
@@ -7,17 +7,18 @@ use swell_domain::{
     bounds::Bounds, flip, mesh::TriangleMesh, pbf, signed_distance::fitting_spacing,
 };
 
-/// Spacings that the signed distance reaches beyond the solids: more than the contact distance and the cells
-/// that a substep crosses.
+/// Margin of the signed distance around the solids, particle spacings: more than the contact
+/// distance and the cells that a substep crosses.
 const MARGIN: f64 = 4.0;
 
-/// Nodes of the grid of solids that do not move: as many values as a binding of 128 MiB holds, which every adapter has. Where that
-/// does for less than one a particle spacing, they stand farther apart, whatever the adapter.
+/// Largest number of nodes of the distance grid of static solids: a binding of 128 MiB, which every
+/// adapter supports. If these do not suffice for one node per particle spacing, the nodes are
+/// farther apart on any adapter.
 pub const MOST_NODES: usize = 1 << 25;
 
 impl Scene {
-    /// Metres that a signed distance reaches beyond the solids: where the domain joins its own end, as far as a particle may
-    /// come beyond it in a substep as well.
+    /// Returns the margin of the signed distance around the solids, metres. In a periodic domain it
+    /// includes the largest displacement of a particle beyond the domain in a substep.
     pub fn solid_margin(&self) -> f64 {
         let way = match self.solver.method {
             Method::Pbf => pbf::CAP * self.solver.pbf().cfl * self.particle_spacing(),
@@ -30,8 +31,9 @@ impl Scene {
         MARGIN * self.particle_spacing() + beyond
     }
 
-    /// Where solids at rest are, with room about them, as far as water can come, and metres between the nodes of their distance's grid: a
-    /// particle spacing, or what at most [`MOST_NODES`] allow. `None` where there are none.
+    /// Returns the box around the static solids with a margin, clipped to where water can be, and
+    /// the distance between the nodes of its grid, metres: a particle spacing, or more if
+    /// [`MOST_NODES`] requires it. `None` if there are no solids.
     pub fn solid_grid(&self, meshes: &[Cow<'_, TriangleMesh>]) -> Option<(Bounds, f64)> {
         let margin = self.solid_margin();
         let reach = self.domain.grown(margin);

@@ -1,4 +1,5 @@
-//! Poses of a solid over time: an animation of a glTF's node, a prim of USD as text that moves, or as a scene was written out.
+//! Poses of a solid over time: a glTF node's animation, an animated prim of a USD text layer, or
+//! poses written in a scene.
 
 use std::path::Path;
 
@@ -17,52 +18,54 @@ use super::{
 };
 use swell_domain::{mesh::TriangleMesh, pose::Pose, text};
 
-/// By how much lengths may change before a solid counts as one that changes its size.
+/// Relative change of lengths above which a solid counts as deforming.
 const RIGID: f64 = 1e-3;
 
-/// Names that an error lists.
+/// Largest number of names listed in an error.
 const MOST_NAMES: usize = 12;
 
-/// Seconds by which times that are meant to be one may differ.
+/// Times closer than this are the same, seconds.
 const APART: f64 = 1e-6;
 
-/// Poses at most: hours of them.
+/// Largest number of poses; enough for hours.
 const MOST_POSES: usize = 1_000_000;
 
 type Result<T> = std::result::Result<T, SceneError>;
 
-/// Where a solid stands at some times: between them it goes straight and turns the shorter way, evenly.
+/// Poses of a solid at some times; between them it moves linearly and rotates along the shorter arc
+/// at constant rate.
 #[derive(Clone, Debug)]
 pub struct Track {
-    /// Seconds, ascending from 0 on, with where the point of rest is, metres about the scene's origin, and how the solid is
-    /// turned; the first is not.
+    /// Time in seconds, ascending from 0, position of the reference point relative to the scene's
+    /// origin in metres, and rotation; the first rotation is the identity.
     poses: Vec<(f64, DVec3, DQuat)>,
-    /// From the point of rest to the solid's farthest point, metres.
+    /// Distance from the reference point to the farthest vertex, metres.
     reach: f64,
-    /// Of a file that moves the solid before or after the shot alone.
+    /// Set if the file moves the solid only before or after the shot.
     missed: Option<Missed>,
-    /// That the file counts other frames than the shot does.
+    /// Warning that the file's frame rate differs from the shot's.
     other_rate: Option<String>,
 }
 
-/// By where it goes: what a file was hardly meant to do is no part of that, and not in a scene that is written out.
+/// Compares the poses only: warnings about the file are not part of a scene and are not
+/// written out with it.
 impl PartialEq for Track {
     fn eq(&self, other: &Self) -> bool {
         (&self.poses, self.reach) == (&other.poses, other.reach)
     }
 }
 
-/// When a file moves what stands still over the whole shot, in the file's frames.
+/// Key times of a file whose solid is static over the whole shot, in frames of the file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Missed {
-    /// Its first key and its last.
+    /// First and last key.
     moves: [f64; 2],
-    /// The shot's frame 0 and its last.
+    /// Frame 0 and the last frame of the shot.
     shot: [f64; 2],
 }
 
 impl Track {
-    /// Through poses that stand as [`Self::poses`] has them; words where they are none.
+    /// Validates poses in the order of [`Self::poses`]; the error describes the first fault.
     fn new(
         poses: Vec<(f64, DVec3, DQuat)>,
         mesh: &TriangleMesh,
@@ -103,7 +106,7 @@ impl Track {
         })
     }
 
-    /// Where the solid stands at time `t`, seconds.
+    /// Returns the pose at time `t`, seconds.
     pub fn pose(&self, t: f64) -> Pose {
         let rest = self.poses[0].1;
         let next = self.poses.partition_point(|(time, ..)| *time <= t);
@@ -119,7 +122,7 @@ impl Track {
         Pose { rest, centre, turn }
     }
 
-    /// An upper bound on the speed of its points within `[t0, t1]`, m/s.
+    /// Bounds the speed of the solid's points within `[t0, t1]`, m/s.
     pub fn peak_speed(&self, t0: f64, t1: f64) -> f64 {
         let pairs = self.poses.windows(2);
         let pairs = pairs.filter(|pair| pair[0].0 <= t1 && pair[1].0 >= t0);
@@ -130,19 +133,19 @@ impl Track {
         pairs.map(speed).fold(0.0, f64::max)
     }
 
-    /// Where its point of rest comes, and how far from there the solid reaches.
+    /// Returns the positions of the reference point and the distance to the farthest vertex.
     pub(super) fn places(&self) -> (impl Iterator<Item = DVec3> + '_, f64) {
         (self.poses.iter().map(|(_, centre, _)| *centre), self.reach)
     }
 
-    /// With another origin of all coordinates.
+    /// Moves all poses by `way`, metres.
     pub(super) fn carry(&mut self, way: DVec3) {
         for (_, centre, _) in &mut self.poses {
             *centre += way;
         }
     }
 
-    /// Rows of seconds, place and quaternion, about the world's origin.
+    /// Returns rows of time, position and quaternion (x, y, z, w) in world coordinates.
     pub(super) fn written(&self, origin: DVec3) -> Vec<[f64; 8]> {
         let row = |(t, x, q): &(f64, DVec3, DQuat)| {
             let x = *x + origin;
@@ -152,7 +155,7 @@ impl Track {
     }
 }
 
-/// The track at `path` of a solid that stands as `mesh` at the start.
+/// Builds the track at `path` of a solid whose initial placement is `mesh`.
 pub(super) fn build(
     doc: &Document<'_>,
     path: &str,
@@ -203,7 +206,8 @@ pub(super) fn build(
     })
 }
 
-/// Of keys and a shot in the file's seconds: both in its frames, where no key is within the shot and it does not lie between two.
+/// Returns the first and last key and the range of the shot, in frames of the file, if the shot has
+/// no key and does not lie between two. Arguments are in seconds of the file.
 fn missed(moved: &[f64], shot: [f64; 2], rate: f64) -> Option<Missed> {
     let first = moved.iter().copied().reduce(f64::min)?;
     let last = moved.iter().copied().reduce(f64::max)?;
@@ -216,7 +220,8 @@ fn missed(moved: &[f64], shot: [f64; 2], rate: f64) -> Option<Missed> {
 }
 
 impl Scene {
-    /// Solids that a file moves before or after the shot alone, or by other frames than the shot's.
+    /// Warnings for solids that a file moves only before or after the shot, or at
+    /// another frame rate.
     pub(super) fn lint_tracks(&self) -> Vec<String> {
         let tracks = || self.moving_solids.iter().filter_map(|it| it.track.as_ref());
         let rates = tracks().filter_map(|track| track.other_rate.clone());
@@ -231,13 +236,13 @@ impl Scene {
     }
 }
 
-/// What a file moves.
+/// Animated object of a file.
 enum Moves {
     Gltf(Nodes),
     Usd(UsdNodes),
 }
 
-/// What of a file is at fault.
+/// Fault in a file.
 enum Problem {
     /// The name of a node.
     Node(String),
@@ -245,7 +250,7 @@ enum Problem {
 }
 
 impl Moves {
-    /// The node or prim of this name, or the only one, and what errors call it.
+    /// Reads the node or prim of this name, or the only one. The string is its name for messages.
     fn read(
         bytes: &[u8],
         name: Option<&str>,
@@ -256,7 +261,7 @@ impl Moves {
             let layer = usd_nodes::layer(bytes).map_err(Problem::File)?;
             let all = usd_nodes::chains(&layer, &|_| true);
             let chain = choose_prim(&all, name).map_err(|problem| {
-                // It may stand where the layer takes prims from.
+                // It may be where the layer takes prims from.
                 usd_nodes::elsewhere(&layer).map_or(Problem::Node(problem), Problem::File)
             })?;
             let nodes = UsdNodes::read(&layer, chain).map_err(Problem::File)?;
@@ -273,7 +278,7 @@ impl Moves {
         Ok((format!("node {}", named(&node)), Self::Gltf(nodes)))
     }
 
-    /// From what moves to the world, metres with y up.
+    /// Returns the transform to the world, which is in metres with y up.
     fn at(&self, seconds: f64) -> DMat4 {
         match self {
             Self::Gltf(nodes) => nodes.at(seconds),
@@ -281,7 +286,7 @@ impl Moves {
         }
     }
 
-    /// When something has a key, in no order.
+    /// Returns the times of all keys, seconds, unordered.
     fn times(&self) -> Vec<f64> {
         match self {
             Self::Gltf(nodes) => nodes.times().collect(),
@@ -289,7 +294,7 @@ impl Moves {
         }
     }
 
-    /// The same of what moves.
+    /// Returns the key times of values that change, seconds, unordered.
     fn times_moved(&self) -> Vec<f64> {
         match self {
             Self::Gltf(nodes) => nodes.times_moved().collect(),
@@ -297,7 +302,7 @@ impl Moves {
         }
     }
 
-    /// Time codes a second of the file's own count; `None` where it counts seconds alone.
+    /// Returns the file's time codes per second; `None` for a format in seconds.
     fn rate(&self) -> Option<Rate> {
         match self {
             Self::Gltf(_) => None,
@@ -305,7 +310,7 @@ impl Moves {
         }
     }
 
-    /// Whether something jumps from key to key. USD's numbers are joined by lines.
+    /// Whether a value changes in steps. USD interpolates numbers linearly.
     fn jumps(&self) -> bool {
         match self {
             Self::Gltf(nodes) => nodes.jumps(),
@@ -313,7 +318,8 @@ impl Moves {
         }
     }
 
-    /// Whether it is rigid at its keys alone: matrices that are joined by lines are none of a turn between them.
+    /// Whether poses are rigid only at the keys: linear interpolation of matrices does
+    /// not rotate rigidly.
     fn is_of_keys(&self) -> bool {
         match self {
             Self::Gltf(_) => false,
@@ -322,8 +328,8 @@ impl Moves {
     }
 }
 
-/// The prim of this name or path, or the only one that has a transform. Of prims of one name that hang together the outermost: a mesh stands within
-/// its object, which Blender may call the same.
+/// Finds the prim of this name or path, or the only one with a transform. Of nested prims of one
+/// name it takes the outermost, because Blender may give a mesh the name of its object.
 fn choose_prim<'a, 'b>(
     all: &'b [Vec<&'a Prim>],
     name: Option<&str>,
@@ -376,7 +382,7 @@ fn choose_prim<'a, 'b>(
     }
 }
 
-/// The node of this name, or the only one.
+/// Finds the node of this name, or the only one.
 fn choose<'a>(
     document: &'a gltf::Document,
     name: Option<&str>,
@@ -414,7 +420,8 @@ fn choose<'a>(
     }
 }
 
-/// What moves at the shot's start: between two keys that are rigid alone as a solid goes there, straight and the shorter way.
+/// Returns the transform at the start of the shot. Between two keys that are rigid only at the keys
+/// it interpolates rigidly.
 fn at_start(moves: &Moves, begin: f64) -> DMat4 {
     let times = moves.times();
     let before = times.iter().copied().filter(|time| *time <= begin);
@@ -433,7 +440,8 @@ fn at_start(moves: &Moves, begin: f64) -> DMat4 {
     found
 }
 
-/// Poses at the keys and at each frame, from where it stands at the shot's start, which is at `begin` in the file, seconds.
+/// Returns poses at the keys and at each frame, starting at the shot's start, which is at `begin`
+/// in the file, seconds.
 fn sampled(
     moves: &Moves,
     begin: f64,
@@ -448,7 +456,8 @@ fn sampled(
     let frames = (0..=shot.frames).map(|frame| shot.time(frame));
     let is_of_keys = moves.is_of_keys();
     let keys: Vec<f64> = moves.times().iter().map(|time| time - begin).collect();
-    // With keys alone also the first after the end, to which the last frame is on the way.
+    // With keys only, the first key after the end is included: the last frame
+    // interpolates towards it.
     let last = keys.iter().copied().filter(|time| *time >= end);
     let last = last.fold(f64::INFINITY, f64::min);
     let most = if is_of_keys { last } else { end };
@@ -472,7 +481,7 @@ fn sampled(
         let from_start = DMat3::from_mat4(now) * back;
         let strain = from_start.transpose() * from_start - DMat3::IDENTITY;
         let most = strain.to_cols_array().map(f64::abs);
-        // What is not finite is no less than anything.
+        // Written so that NaN counts as deformed.
         if !most.iter().all(|part| *part < RIGID) || from_start.determinant() < 0.0 {
             return Err(format!(
                 "at {} s it has another size or shape than at the start; a solid keeps them",
@@ -480,7 +489,7 @@ fn sampled(
             ));
         }
         let turn = DQuat::from_mat3(&from_start).normalize();
-        // Of the two quaternions of a turn the one that is nearer to the last.
+        // Of the two quaternions of a rotation, the one closer to the previous one.
         let turn = if turn.dot(before) < 0.0 { -turn } else { turn };
         before = turn;
         poses.push((time, now.w_axis.truncate(), turn));

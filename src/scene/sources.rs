@@ -1,4 +1,4 @@
-//! `[[emitter]]` and `[[drain]]`: where water enters and leaves while the shot runs.
+//! `[[emitter]]` and `[[drain]]`: where water enters and leaves during the shot.
 
 use glam::DVec3;
 use toml::{Table, Value};
@@ -21,7 +21,7 @@ use swell_domain::{
 
 type Result<T> = std::result::Result<T, SceneError>;
 
-/// The room of an emitter or a drain.
+/// Volume of an emitter or a drain.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Region {
     /// A box, metres.
@@ -31,7 +31,7 @@ pub enum Region {
 }
 
 impl Region {
-    /// The box about it, metres.
+    /// Returns the bounding box, metres.
     pub fn bounds(&self) -> Bounds {
         match self {
             Self::Block(block) => *block,
@@ -39,7 +39,7 @@ impl Region {
         }
     }
 
-    /// Most that its file may be off along each axis, metres.
+    /// Returns the largest rounding error of the file's coordinates along each axis, metres.
     fn rounding(&self) -> DVec3 {
         match self {
             Self::Block(_) => DVec3::ZERO,
@@ -55,30 +55,29 @@ impl Region {
     }
 }
 
-/// What they have to fit into.
+/// Parts of the scene that sources are checked against.
 pub(super) struct Around<'a> {
     pub(super) domain: &'a Bounds,
     pub(super) shot: &'a Shot,
-    /// m/s².
+    /// Gravitational acceleration, m/s².
     pub(super) gravity: DVec3,
-    /// Of the particles, metres.
+    /// Particle spacing, metres.
     pub(super) spacing: f64,
-    /// Those at rest.
+    /// Static solids.
     pub(super) solids: &'a [PlacedMesh],
-    /// Reads the mesh of a table: its path, and what stands there.
+    /// Reads the mesh of a table, given the table's path and values.
     pub(super) mesh: &'a dyn Fn(&str, &MeshSpec) -> Result<PlacedMesh>,
     /// Reads a box of a table.
     pub(super) block: &'a dyn Fn(&str, &BoxSpec) -> Result<Bounds>,
 }
 
-/// A room, as written.
+/// Minimum, maximum and mesh of a volume, as written.
 type Room<'a> = (
     &'a Option<[f64; 3]>,
     &'a Option<[f64; 3]>,
     &'a Option<MeshSpec>,
 );
 
-/// Builds the emitters.
 pub(super) fn emitters(
     doc: &Document<'_>,
     specs: &[EmitterSpec],
@@ -107,7 +106,6 @@ pub(super) fn emitters(
     .collect()
 }
 
-/// Builds the drains.
 pub(super) fn drains(
     doc: &Document<'_>,
     specs: &[DrainSpec],
@@ -238,10 +236,10 @@ fn check_velocity(
     ))
 }
 
-/// Places along each axis at which a room is looked at.
+/// Points per axis at which a volume is tested against solids.
 const LOOKS: u32 = 5;
 
-/// Refuses a room that lies within solids.
+/// Rejects an emitter that lies entirely within solids.
 fn check_solids(
     doc: &Document<'_>,
     path: &str,
@@ -271,45 +269,47 @@ fn check_solids(
     Err(doc.fault_of(&key, "the emitter lies within a solid"))
 }
 
-/// A flow's room on FLIP's cells.
+/// Volume of an inflow on FLIP's cells.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Inlet {
-    /// First of the cells whose centres lie in the box about it; none where it is beyond the last.
+    /// First cell whose centre lies in the inflow's bounding box; greater than `high`
+    /// if there is none.
     pub low: [u32; 3],
-    /// The last.
+    /// Last such cell.
     pub high: [u32; 3],
-    /// At which cells lose what they hold beyond their own water, 1/s: until the frame's end, when the next comes.
+    /// Rate at which cells lose excess water, 1/s: by the end of the frame, when the
+    /// next water enters.
     pub rate: f64,
 }
 
 impl Inlet {
-    /// Whether a cell lies in it.
+    /// Whether a cell lies in the volume.
     pub fn contains(&self, cell: [u32; 3]) -> bool {
         (0..3).all(|axis| (self.low[axis]..=self.high[axis]).contains(&cell[axis]))
     }
 }
 
-/// Most emitters that have no level: what a pass looks at, one after the other.
+/// Largest number of emitters without a level; a shader pass loops over all of them.
 pub const MAX_INLETS: usize = 8;
 
 impl Scene {
-    /// Emitters whose water enters as fast as their velocity says.
+    /// Returns the emitters without a level, whose water enters at their velocity.
     fn flows(&self) -> impl Iterator<Item = &Emitter<Region>> {
         self.emitters.iter().filter(|it| it.level.is_none())
     }
 
-    /// Whether there are any.
+    /// Whether there are emitters without a level.
     pub fn has_inlets(&self) -> bool {
         self.flows().next().is_some()
     }
 
-    /// Rooms of flows as FLIP's cells have them, in a substep of `length` seconds from `start` on.
+    /// Returns the inflow volumes on FLIP's cells in a substep of `length` seconds from `start`.
     pub fn inlets(&self, start: f64, length: f64) -> Vec<Inlet> {
         let (corner, size) = (self.domain.min, self.solver.flip().cell_size);
         let left = self.seconds_left(start, length);
         let inlet = |it: &Emitter<Region>| {
             let bounds = self.entered(it);
-            // A centre on a face lies in it.
+            // A cell centre on a face counts as inside.
             let low = ((bounds.min - corner) / size - 0.5 - 1e-6).ceil();
             let high = ((bounds.max - corner) / size - 0.5 + 1e-6).floor();
             let [low, high] = match low.cmple(high).all() {
@@ -325,7 +325,8 @@ impl Scene {
         self.flows().map(inlet).collect()
     }
 
-    /// Where a frame's water of a flow is when it enters: in the room, and of an oblique flow beyond its edges as well.
+    /// Returns the box that a frame's water occupies when it enters. For a velocity oblique to the
+    /// axes it extends beyond the emitter.
     fn entered(&self, flow: &Emitter<Region>) -> Bounds {
         let (bounds, velocity) = (flow.shape.bounds(), flow.velocity);
         let moving = velocity
@@ -342,15 +343,15 @@ impl Scene {
         }
     }
 
-    /// Whether water enters or leaves.
+    /// Whether the scene has emitters or drains.
     pub fn has_sources(&self) -> bool {
         !self.emitters.is_empty() || !self.drains.is_empty()
     }
 
-    /// What enters and leaves at the frames' ends.
+    /// Returns the emitters and drains, which act at the ends of frames.
     ///
     /// # Errors
-    /// A mesh whose distance cannot be told.
+    /// If the signed distance of a mesh cannot be computed.
     pub fn sources(&self) -> std::result::Result<Sources, SignedDistanceError> {
         let spacing = self.particle_spacing();
         let mut sources = Sources {
@@ -371,7 +372,7 @@ impl Scene {
         Ok(sources)
     }
 
-    /// Carries emitters and drains along.
+    /// Moves emitters and drains by `way`, metres.
     pub(super) fn carry_sources(&mut self, way: DVec3, carry: &dyn Fn(&mut PlacedMesh, DVec3)) {
         let emitters = self
             .emitters
@@ -392,7 +393,7 @@ impl Scene {
         }
     }
 
-    /// The meshes that are rooms.
+    /// Returns the meshes of emitters and drains.
     pub(super) fn source_meshes(&self) -> impl Iterator<Item = &PlacedMesh> {
         let emitters = self.emitters.iter().map(|it| &it.shape);
         let shapes = emitters.chain(self.drains.iter().map(|it| &it.shape));
@@ -403,7 +404,8 @@ impl Scene {
     }
 }
 
-/// The most particles that flows bring in until the shot's end. What emitters with a level bring depends on the water.
+/// Estimates the number of particles that emitters without a level add during the shot. The number
+/// from emitters with a level depends on the water.
 pub(super) fn most_entering(emitters: &[Emitter<Region>], spacing: f64, shot: &Shot) -> f64 {
     let flows = emitters.iter().filter(|it| it.level.is_none());
     let volumes = flows.map(|it| {
@@ -413,7 +415,7 @@ pub(super) fn most_entering(emitters: &[Emitter<Region>], spacing: f64, shot: &S
     volumes.sum::<f64>() / spacing.powi(3)
 }
 
-/// How each part of the scene is written.
+/// Writers for the parts of a source's table.
 pub(super) struct Written<'a> {
     pub(super) corners: &'a dyn Fn(&Bounds) -> Table,
     pub(super) mesh: &'a dyn Fn(&PlacedMesh) -> Table,

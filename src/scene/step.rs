@@ -1,4 +1,4 @@
-//! How long a substep is, where the walls then stand, and what is reported of a frame.
+//! Length of a substep, positions of the walls at a time, and the report of a frame.
 
 use glam::DVec3;
 
@@ -13,27 +13,29 @@ use swell_domain::{
     statistics::percentile,
 };
 
-/// A piece of a frame, as FLIP takes it.
+/// One substep of FLIP.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Substep {
-    /// Seconds from the shot's start.
+    /// Start, seconds from the start of the shot.
     pub start: f64,
-    /// Seconds.
+    /// Length, seconds.
     pub length: f64,
-    /// For how long gravity, pressure, surface tension, vorticity confinement and drag act, seconds: half of the substep before and half of this one, so that
-    /// velocities are at mid-substep whatever the lengths (leapfrog).
+    /// Time over which forces and drag act, seconds: half of the previous substep plus half of this
+    /// one, which centres velocities in the substep whatever the lengths (leapfrog).
     pub kick: f64,
-    /// Most cells that a particle moves, as its speed, gravity, walls and solids have it.
+    /// Bound on a particle's displacement, cells: own speed, gravity, effects, walls and solids.
     pub displacement: f64,
 }
 
-/// Displacement, in cells, that faces around the water are filled for where particles ask for none beyond their own cells.
+/// Displacement, cells, up to which velocities are extrapolated when particles stay within a cell.
 const WITHIN_CELLS: f64 = 1.0;
 
-/// For how long gravity, pressure, surface tension, vorticity confinement and drag act between a substep of `before` seconds, 0 where there was none, and one of
-/// `length`: half of each. Velocities are at mid-substep, positions at substep ends (leapfrog; Hairer, Lubich and Wanner 2006,
-/// §I.1.4). With the substep's own length instead, waves whose speed determines the substeps lose ω Δt / 4 of their amplitude in each
-/// swing. The start counts as the end of a substep as long as the first.
+/// Time over which forces act between a substep of `before` seconds (0 if there was none) and one
+/// of `length`: half of each. Velocities are then at mid-substep and positions at the ends of
+/// substeps (leapfrog; Hairer, Lubich and Wanner 2006, §I.1.4).
+///
+/// With the substep's own length, waves whose speed determines the substeps would lose ω Δt / 4 of
+/// their amplitude in each swing. The start counts as the end of a substep as long as the first.
 fn kick(before: f64, length: f64) -> f64 {
     if before > 0.0 {
         0.5 * (before + length)
@@ -42,7 +44,8 @@ fn kick(before: f64, length: f64) -> f64 {
     }
 }
 
-/// The substep of a projection whose velocities alone are asked for, after one of `before` seconds; times in seconds.
+/// Returns the substep of a projection of which only the velocities are used, after a substep of
+/// `before` seconds; times in seconds.
 pub fn projected_substep(start: f64, length: f64, before: f64) -> Substep {
     Substep {
         start,
@@ -53,13 +56,13 @@ pub fn projected_substep(start: f64, length: f64, before: f64) -> Substep {
 }
 
 impl Scene {
-    /// The box's faces at `time`, wave makers included, relative to the domain's least corner, metres; [`FAR`] off where
-    /// the domain joins its own end.
+    /// Returns the faces of the box at `time` including wave makers, relative to the domain's least
+    /// corner, metres; ±[`FAR`] along periodic axes.
     pub fn walls(&self, time: f64) -> Bounds {
         self.walls_by(&self.answers, time)
     }
 
-    /// The same after a state that no solver has taken over.
+    /// Returns [`Self::walls`] with the absorber states of `state` in place of the scene's.
     pub fn walls_after(&self, state: &Particles, time: f64) -> Bounds {
         self.walls_by(&self.answers_in(state), time)
     }
@@ -80,8 +83,8 @@ impl Scene {
         Bounds { min, max }
     }
 
-    /// What takes each face of the box in `step` seconds to where it stands at `time`, along its axis, m/s; 0 where `step`
-    /// is.
+    /// Returns the mean velocity of each face over the `step` seconds before `time`, along its
+    /// axis, m/s; 0 if `step` is 0.
     pub fn wall_velocity(&self, time: f64, step: f64) -> Bounds {
         let (before, after) = (self.walls(time - step), self.walls(time));
         let speed = |after: DVec3, before: DVec3| match step {
@@ -94,21 +97,21 @@ impl Scene {
         }
     }
 
-    /// Whether a wall or a solid moves, and so does work on the water.
+    /// Whether any wall or solid moves and so does work on the water.
     pub fn has_movers(&self) -> bool {
         !self.wave_makers.is_empty() || !self.moving_solids.is_empty()
     }
 
-    /// Whether something does work on the water of FLIP: what moves, and what pushes new water in.
+    /// Whether moving boundaries or emitters without a level do work on FLIP's water.
     pub fn is_worked_on(&self) -> bool {
         self.has_movers() || self.has_inlets()
     }
 
-    /// Equal substeps that PBF's CFL number asks of the frame after `frame`: from the fastest particle, `speed` in
-    /// m/s, what gravity and effects add within the frame, and the fastest wave maker or solid.
+    /// Returns the number of equal substeps that PBF's CFL number requires in the frame after
+    /// `frame`, for a fastest particle of `speed`, m/s, gravity, effects, wave makers and solids.
     ///
     /// # Errors
-    /// Where they are more than `max_substeps`.
+    /// If there are more than `max_substeps`.
     pub fn pbf_substeps(&self, frame: u32, speed: f64) -> Result<u32, Breach> {
         let pbf = self.solver.pbf();
         let length = self.shot.frame_seconds();
@@ -136,20 +139,21 @@ impl Scene {
         Ok(wanted as u32)
     }
 
-    /// From `start`, where a substep of `length` begins, to the end of its frame, seconds; no less than the substep is long.
+    /// Returns the time from `start`, where a substep of `length` begins, to the end of its frame,
+    /// seconds; never less than `length`.
     pub fn seconds_left(&self, start: f64, length: f64) -> f64 {
         let frame = self.shot.frame_seconds();
-        // Starts add up with roundings.
+        // Starts accumulate rounding errors.
         let before = (start / frame + 1e-6).floor();
         ((before + 1.0) * frame - start).max(length)
     }
 
-    /// How many equal substeps FLIP's CFL number asks of the `remaining` seconds from `start` on, where the fastest
-    /// particle has `speed`, m/s, and the first of them; `done` substeps of `frame` are over, and the last one, of whichever frame,
-    /// had `before` seconds.
+    /// Returns how many equal substeps FLIP's CFL number requires in the `remaining` seconds from
+    /// `start`, and the first of them. The fastest particle has `speed`, m/s; `done` substeps of
+    /// `frame` are complete, and the last substep (of any frame) took `before` seconds.
     ///
     /// # Errors
-    /// Where the frame's are more than `max_substeps`.
+    /// If the frame has more than `max_substeps`.
     pub fn flip_substep(
         &self,
         frame: u32,
@@ -161,10 +165,11 @@ impl Scene {
         let flip = self.solver.flip();
         let fastest = speed.max(self.peak_boundary_speed(start, start + remaining));
         let (gravity, push) = (self.water.gravity.length(), self.effects.push());
-        // v t + g t² = cfl Δx.
+        // Solves v t + g t² = cfl Δx.
         let room = flip.cfl * flip.cell_size;
         let longest = |v: f64, g: f64| 2.0 * room / (v + (v * v + 4.0 * g * room).sqrt());
-        // Whichever of what an effect adds is the less.
+        // An effect is limited both in acceleration and in speed; the weaker bound
+        // on the step holds.
         let by_acceleration = longest(fastest, gravity + push.acceleration);
         let longest = by_acceleration.max(longest(fastest + push.speed, gravity));
         let longest = longest.min(self.effects.longest_step(self.grain()).0);
@@ -199,7 +204,7 @@ impl Scene {
         Ok((wanted, substep))
     }
 
-    /// What effects say of a substep's length, as a breach's last words.
+    /// Describes the step limit of effects, as the end of a message.
     fn stable_step(&self) -> String {
         match self.effects.longest_step(self.grain()) {
             (longest, name) if longest.is_finite() => {
@@ -209,9 +214,8 @@ impl Scene {
         }
     }
 
-    /// α of a FLIP substep of `length` seconds, so that a frame takes the same part of the grid's velocity in however
-    /// many substeps: 1 − (1 − α)^(Δt / frame). At a fixed α halving Δt would double the dissipation. Effects take
-    /// their part beside it.
+    /// Returns the PIC blend α of a FLIP substep of `length` seconds, 1 − (1 − α)^(Δt / frame),
+    /// where effects add to the frame's α. A fixed α would double the dissipation when Δt halves.
     pub fn substep_pic_blend(&self, length: f64) -> f64 {
         let blends = self.effects.blends().into_iter();
         let kept: f64 = blends.map(|blend| 1.0 - blend).product();
@@ -219,7 +223,8 @@ impl Scene {
         1.0 - kept.powf(length / self.shot.frame_seconds())
     }
 
-    /// The densest of particles with these relative densities, in the scene's coordinates, metres.
+    /// Returns the position of the densest particle, given all relative densities; world
+    /// coordinates, metres.
     pub fn densest_particle(&self, state: &Particles, density: &[f64]) -> Option<[f64; 3]> {
         let both = state.position.iter().zip(density);
         let densest = both.max_by(|(_, a), (_, b)| a.total_cmp(b))?;
@@ -227,7 +232,8 @@ impl Scene {
         Some((self.origin + place).to_array())
     }
 
-    /// The middle of the densest cell of FLIP's grid with these relative densities, in the scene's coordinates, metres.
+    /// Returns the centre of the densest cell of FLIP's grid, given all relative densities; world
+    /// coordinates, metres.
     pub fn densest_cell(&self, cells: impl Iterator<Item = ([u32; 3], f64)>) -> Option<[f64; 3]> {
         let (cell, _) = cells.max_by(|(_, a), (_, b)| a.total_cmp(b))?;
         let middle = DVec3::from(cell.map(|k| f64::from(k) + 0.5));
@@ -235,12 +241,12 @@ impl Scene {
         Some((self.origin + place).to_array())
     }
 
-    /// Energies of a state, and the errors of relative densities; sums run in order. What the steps did is left at 0.
+    /// Returns the energies and density errors of a state, summed in order; counts of steps are 0.
     pub fn report(&self, state: &Particles, density: impl Iterator<Item = f64>) -> StepReport {
         let mass = self.particle_mass();
         let (kinetic, potential) = energies(state, mass, self.water.gravity, self.domain.min);
         let errors: Vec<f64> = density.map(|rho| (rho - 1.0).max(0.0)).collect();
-        // From 0: an empty sum is -0.
+        // The fold starts at 0 because an empty `sum` is −0.
         let mean = errors.iter().fold(0.0, |sum, error| sum + error) / errors.len().max(1) as f64;
         let max = errors.iter().fold(0.0, |most: f64, error| most.max(*error));
         StepReport {
@@ -269,7 +275,8 @@ mod tests {
 
     use super::*;
 
-    /// Spacing 0.1 m, cells of 0.2 m, g = 10 m/s²; the wall -x moves at 3 m/s for one second, +z not at all.
+    /// Spacing 0.1 m, cells of 0.2 m, g = 10 m/s². With `WALL`, the wall -x moves at 3 m/s for one
+    /// second and +z slowly.
     const SCENE: &str = r#"
 [shot]
 name = "a"
@@ -300,7 +307,7 @@ viscosity = { xsph = 0.2 }
         Scene::parse(SCENE, Path::new("s.toml"), Path::new(""), &set).expect("valid")
     }
 
-    /// An oscillator whose fast half takes half as long a step as its slow one, ω Δt = 0.2: a hundred swings of it keep their height.
+    /// An oscillator with ω Δt = 0.2 (half while it is fast) keeps its amplitude for 100 swings.
     #[test]
     fn a_swing_that_decides_on_its_steps_keeps_its_height() {
         let left = |kick: &dyn Fn(f64, f64) -> f64| {
@@ -317,24 +324,27 @@ viscosity = { xsph = 0.2 }
             }
             highest
         };
-        // A step is decided on at its start, which is off the middle by the third order: (ω Δt)³ / 8 of each swing.
+        // A step is chosen at its start, which is off the middle in third order: (ω
+        // Δt)³ / 8 per swing.
         assert!((left(&kick) - 1.0).abs() < 0.1, "{}", left(&kick));
-        // Control: forces that act for the substep's own length take ω Δt / 4 of each swing, until none is fast any more.
+        // Control: forces over the substep's own length take ω Δt / 4 of each swing until none
+        // is fast any more.
         let found = left(&|_, length| length);
         assert!(found < 0.75, "{found}");
     }
 
     #[test]
     fn pbf_takes_as_many_substeps_as_the_way_has_cfl_lengths() {
-        // In a frame of 0.2 s gravity adds 2 m/s. The way is (v + 2 m/s) 0.2 s, a substep's is cfl × 0.1 m.
+        // In a frame of 0.2 s gravity adds 2 m/s. The displacement is (v + 2 m/s) 0.2 s; a substep
+        // allows cfl × 0.1 m.
         for (cfl, speed, substeps) in [
-            // 0.4 m by 0.02006 m is 19.94, by 0.01994 m 20.06.
+            // 0.4 m over 0.02006 m is 19.94, over 0.01994 m 20.06.
             (0.2006, 0.0, 20),
             (0.1994, 0.0, 21),
-            // 1.4 m by 0.05015 m is 27.92, by 0.04985 m 28.08.
+            // 1.4 m over 0.05015 m is 27.92, over 0.04985 m 28.08.
             (0.5015, 5.0, 28),
             (0.4985, 5.0, 29),
-            // A way of less than a substep's is one substep.
+            // A displacement below that of a substep takes one substep.
             (5.0, 0.1, 1),
         ] {
             let found = scene(&[&format!("solver.pbf.cfl={cfl}")]).pbf_substeps(0, speed);
@@ -344,14 +354,14 @@ viscosity = { xsph = 0.2 }
         assert_eq!(still.pbf_substeps(0, 0.0).ok(), Some(1));
     }
 
-    /// Drops of 0.05 mm are as fast as their wind at once, and no faster: (2 + 9) m/s × 0.2 s / 0.1 m.
+    /// Drops of 0.05 mm fly with the wind at once, never faster: (2 + 9) m/s × 0.2 s / 0.1 m.
     #[test]
     fn no_wind_makes_a_drop_faster_than_itself() {
         let windy = "effects.drag={drop_radius=0.00005,wind=[9,0,0]}";
         let found = scene(&["solver.pbf.cfl=1.0", windy]).pbf_substeps(0, 0.0);
         assert_eq!(found.ok(), Some(22));
         let flip = scene(&["solver.method=flip", windy]);
-        // 9 t + g t² = 0.6 m.
+        // Solution of 9 t + g t² = 0.6 m.
         let longest = (-9.0 + f64::sqrt(81.0 + 24.0)) / 20.0;
         let substep = flip
             .flip_substep(1, 0.0, 0.2, 0.0, (0, 0.0))
@@ -363,8 +373,8 @@ viscosity = { xsph = 0.2 }
         );
     }
 
-    /// Wind of 20 m/s pushes a drop of 1 mm radius, C_D = 0.44, by 3/8 × 1.225/999.1 × 0.44 × 20² / 0.001 = 80.9 m/s², which are 16.2 m/s
-    /// in a frame of 0.2 s.
+    /// Wind of 20 m/s on a drop of 1 mm radius, C_D = 0.44: 3/8 × 1.225/999.1 × 0.44 × 20² / 0.001
+    /// = 80.9 m/s², which is 16.2 m/s in a frame of 0.2 s.
     #[test]
     fn wind_shortens_substeps() {
         let of = |more: &[&str]| scene(&[&["solver.pbf.cfl=1.0"], more].concat());
@@ -379,12 +389,13 @@ viscosity = { xsph = 0.2 }
             let substep = scene.flip_substep(1, 0.0, 0.2, 0.0, (0, 0.0));
             substep.expect("few enough").1.length
         };
-        // g t² = 3 × 0.2 m: 0.245 s with gravity alone, 0.081 s in the wind; of 0.2 s one step, or three.
+        // g t² = 3 × 0.2 m: 0.245 s with gravity only, 0.081 s in the wind; one step
+        // or three in 0.2 s.
         assert!((flip(still) - 0.2).abs() < 1e-12 && (flip(windy) - 0.2 / 3.0).abs() < 1e-12);
     }
 
-    /// √(1000 kg/m³ × (0.2 m)³ / (2π σ)) is 0.0598 s of σ = 356 N/m, and √8 less of cells of 0.1 m: of a frame of 0.2 s four
-    /// substeps, and ten on PBF's cells of twice 0.05 m. A breach says so.
+    /// √(1000 kg/m³ × (0.2 m)³ / (2π σ)) is 0.0598 s for σ = 356 N/m: four substeps in 0.2 s. Cells
+    /// of 0.1 m take √8 less: ten substeps with PBF's cells of twice 0.05 m.
     #[test]
     fn capillary_waves_shorten_substeps() {
         let tension = "effects.surface_tension={coefficient=356.0}";
@@ -409,14 +420,14 @@ viscosity = { xsph = 0.2 }
             said.contains("effects.surface_tension no longer than 5.98"),
             "{said}"
         );
-        // Negative control: without it one is enough.
+        // Control: without surface tension one is enough.
         let scene = scene(&still);
         assert_eq!(scene.pbf_substeps(0, 0.0).ok(), Some(1));
     }
 
     #[test]
     fn pbf_refuses_more_substeps_than_it_may_take_and_takes_as_many() {
-        // (v + 2 m/s) 0.2 s by 0.1 m: 38 m/s are 80 spacings.
+        // (v + 2 m/s) 0.2 s over 0.1 m: 38 m/s give 80 substeps.
         let most = |count: u32| scene(&[&format!("solver.pbf.max_substeps={count}")]);
         assert_eq!(most(81).pbf_substeps(3, 38.01).ok(), Some(81));
         assert_eq!(most(82).pbf_substeps(3, 38.01).ok(), Some(81));
@@ -430,15 +441,15 @@ viscosity = { xsph = 0.2 }
 
     #[test]
     fn a_wall_counts_in_the_frames_in_which_it_moves_and_only_there() {
-        // Without gravity 3 m/s are 6 spacings in a frame of 0.2 s, 1 m/s two; frame 5 begins when the wall stands, and
-        // water beside it is not faster for it.
+        // Without gravity, 3 m/s are 6 spacings in a frame of 0.2 s and 1 m/s two. The wall rests
+        // from frame 5 on.
         let scene = scene(&["water.gravity=[0, 0, 0]", "solver.pbf.cfl=0.999", WALL]);
         let counts: Vec<_> = (0..7)
             .map(|frame| scene.pbf_substeps(frame, 1.0).ok())
             .collect();
         let expected = [7, 7, 7, 7, 7, 3, 3].map(Some);
         assert_eq!(counts, expected);
-        // The faster of the two, not both.
+        // The faster of the two counts, not their sum.
         assert_eq!(scene.pbf_substeps(0, 4.0).ok(), Some(9));
     }
 
@@ -453,7 +464,7 @@ viscosity = { xsph = 0.2 }
                 .flip_substep(1, 0.3, remaining, 4.0, (0, 0.0))
                 .expect("few enough");
             assert_eq!(wanted, count, "{part}");
-            // Equal parts, of which this is the first.
+            // The substeps are equal, and this is the first.
             let length = remaining / count;
             let cells = (4.0 + 10.0 * length) * length / 0.2;
             assert!((substep.length / length - 1.0).abs() < 1e-15);
@@ -465,12 +476,12 @@ viscosity = { xsph = 0.2 }
     #[test]
     fn flip_counts_the_substeps_that_are_over_and_walls() {
         let scene = scene(&["solver.method=flip", "water.gravity=[0, 0, 0]", WALL]);
-        // 3.99 m/s for 0.3 s are 5.985 cells, two substeps of at most 3.
+        // 3.99 m/s for 0.3 s are 5.985 cells: two substeps of at most 3.
         let count = |speed, done| scene.flip_substep(1, 1.0, 0.3, speed, (done, 0.0));
         assert_eq!(count(3.99, 0).ok().map(|found| found.0), Some(2.0));
         assert_eq!(count(3.99, 3).ok().map(|found| found.0), Some(2.0));
         assert!(count(3.99, 4).is_err(), "six, and five may be");
-        // Before a second is over the wall is faster than the water: 3 m/s for 0.41 s are 6.15 cells.
+        // In the first second the wall is faster than the water: 3 m/s for 0.41 s are 6.15 cells.
         let beside = |start| scene.flip_substep(1, start, 0.41, 0.0, (0, 0.0)).ok();
         assert_eq!(beside(0.5).map(|found| found.0), Some(3.0));
         assert_eq!(beside(1.0).map(|found| found.0), Some(1.0));
@@ -485,7 +496,7 @@ viscosity = { xsph = 0.2 }
             assert!((walls.min - min).length() < 1e-14, "{time}: {walls:?}");
             assert!((walls.max - max).length() < 1e-14, "{time}: {walls:?}");
         }
-        // Over a step that the wall stops in half-way: half its speed.
+        // Half the wall's speed over a step half-way through which it stops.
         let velocity = scene.wall_velocity(1.1, 0.2);
         assert!((velocity.min - DVec3::new(1.5, 0.0, 0.0)).length() < 1e-13);
         assert!((velocity.max - DVec3::new(0.0, 0.0, -0.1)).length() < 1e-13);
@@ -494,7 +505,7 @@ viscosity = { xsph = 0.2 }
 
     #[test]
     fn substeps_of_a_frame_take_together_what_the_frame_takes() {
-        // pic_blend 0.05 and XSPH's 0.2 leave 0.95 × 0.8 of what the particles had.
+        // pic_blend 0.05 and XSPH's 0.2 leave 0.95 × 0.8 of the particles' velocity.
         let scene = scene(&["solver.method=flip"]);
         let frame = 0.2;
         for parts in [[0.2, 0.0, 0.0], [0.1, 0.05, 0.05], [0.19, 0.005, 0.005]] {
@@ -514,7 +525,7 @@ viscosity = { xsph = 0.2 }
         assert!((24.0 * shot.frame_seconds() - 1.0).abs() < 1e-15);
     }
 
-    /// Of 1 kg a particle, about a corner that is not the origin, with gravity aslant.
+    /// 1 kg per particle, a corner away from the world's origin, and oblique gravity.
     fn sums() -> Scene {
         let text = r#"
             [shot]
@@ -537,8 +548,9 @@ viscosity = { xsph = 0.2 }
         Scene::parse(text, Path::new("sums.toml"), Path::new("."), &[]).expect("a scene")
     }
 
-    /// By hand: of 1000 densities 900 are no error, and the others 1 + k/1000 for k = 1 to 100. The mean is
-    /// 5.05 / 1000; 990 are not above 0.090, and the largest is 0.1. Each 1 + k/1000 is rounded by 2⁻⁵³.
+    /// By hand: 900 of 1000 densities are no error, the others are 1 + k/1000 for k = 1 to 100. The
+    /// mean is 5.05 / 1000, 990 of them are at most 0.090, and the largest is 0.1. Each 1 + k/1000
+    /// is rounded to 2⁻⁵³.
     #[test]
     fn density_errors_have_their_mean_their_tail_and_their_largest() {
         let of = |k: u32| match k * 7919 % 1000 {
@@ -559,7 +571,8 @@ viscosity = { xsph = 0.2 }
         assert_eq!((none.density_error_p99, none.density_error_max), (0.0, 0.0));
     }
 
-    /// 1 kg at 5 m/s and 1 kg at 1 m/s; 2 m along gravity's x lose 6 J each, 0.5 m up are 5 J.
+    /// 1 kg at 5 m/s and 1 kg at 1 m/s; 2 m along gravity's x lower the energy by 6 J each, 0.5 m
+    /// of height add 5 J.
     #[test]
     fn energies_are_those_of_the_particles() {
         let state = Particles {
@@ -572,7 +585,7 @@ viscosity = { xsph = 0.2 }
         assert!((report.kinetic_energy - 13.0).abs() < 1e-12);
         assert!((report.potential_energy - (5.0 - 6.0)).abs() < 1e-12);
         assert_eq!(report.max_speed, 5.0);
-        // Against the lowest place, 2 m along x: 6 J more a particle.
+        // Relative to the lowest point, 2 m along x: 6 J more per particle.
         let total = sums().total_energy(2, &report);
         assert!((total - 24.0).abs() < 1e-12, "{total}");
     }

@@ -191,7 +191,8 @@ pub enum FilterSpec {
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
 #[serde(rename_all = "snake_case")]
 pub enum SplatSpec {
-    /// Ellipsoid fitted to the neighbours (Yu and Turk 2013); isolated particles are small balls.
+    /// Ellipsoid fitted to neighbours (Yu and Turk 2013); a lone particle is a ball
+    /// of its own volume.
     Ellipsoid,
     /// Ball of the splat radius.
     Sphere,
