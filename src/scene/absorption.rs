@@ -1,4 +1,4 @@
-//! Wave makers that take in the waves which come to them: how they are read, and where they then stand.
+//! Absorbing wave makers: reading their settings, and their positions including the absorber state.
 
 use glam::DVec3;
 
@@ -13,7 +13,7 @@ use swell_domain::{
     particles::Particles,
 };
 
-/// Reads and checks the table at `path`, of a wall along an axis, with frames of so many seconds.
+/// Reads and checks the table at `path` for a wall normal to `axis`, with frames of `seconds`.
 pub(super) fn build(
     doc: &Document<'_>,
     path: &str,
@@ -44,37 +44,38 @@ pub(super) fn build(
 }
 
 impl WaveMaker {
-    /// Metres inward from the domain's face at a time, seconds.
+    /// Returns the inward displacement from the domain's face at time `t`, metres.
     pub(super) fn displacement(&self, answer: Option<&Answer>, t: f64) -> f64 {
         let off = answer.map_or(0.0, |answer| answer.state(t).0);
         self.room() + self.motion.displacement(t) + off
     }
 
-    /// An upper bound on the speed between two times, m/s.
+    /// Bounds the speed between two times, m/s, including the absorber's motion.
     pub(super) fn peak_speed(&self, answer: Option<&Answer>, t0: f64, t1: f64) -> f64 {
         let off = answer.map_or(0.0, |answer| answer.peak_speed(t0, t1));
         self.motion.peak_speed(t0, t1) + off
     }
 
-    /// How far inside of the domain's face it is at the start, metres.
+    /// Returns how far inside the domain's face the wall starts, metres: the largest displacement
+    /// that absorption may add.
     pub fn room(&self) -> f64 {
         self.absorption.as_ref().map_or(0.0, |it| it.asked().room)
     }
 
-    /// The farthest inward that it may come until `t`, metres.
+    /// Returns the largest inward displacement until `t`, metres.
     pub(super) fn farthest(&self, t: f64) -> f64 {
         2.0 * self.room() + self.motion.peak_displacement(t)
     }
 }
 
 impl Scene {
-    /// The wave makers, each with what it answers.
+    /// Returns the wave makers with their absorber states.
     pub(super) fn makers(&self) -> impl Iterator<Item = (&WaveMaker, Option<&Answer>)> {
         let answers = self.answers.iter().map(Option::as_ref);
         self.wave_makers.iter().zip(answers)
     }
 
-    /// The scene as it stands after a state.
+    /// Returns the scene with the absorber states of `state`.
     #[must_use]
     pub fn after(&self, state: &Particles) -> Self {
         let mut scene = self.clone();
@@ -82,8 +83,8 @@ impl Scene {
         scene
     }
 
-    /// Answers of the walls of another scene, as this scene's walls have them: by wall, of those that absorb here too; and why
-    /// one of them has none, a sentence each.
+    /// Maps the absorber states of another scene, wall by wall, to the absorbing walls of this one.
+    /// The strings explain which walls could not take over their state.
     pub fn carried(&self, other: &Self, answers: &Answers) -> (Answers, Vec<String>) {
         let (mut carried, mut notes) = (Answers::default(), Vec::new());
         for ((k, maker), answer) in self.wave_makers.iter().enumerate().zip(&mut carried) {
@@ -104,12 +105,12 @@ impl Scene {
         (carried, notes)
     }
 
-    /// Takes over what walls that absorb do after a state.
+    /// Takes over the absorber states of `state`.
     pub fn take_answers(&mut self, state: &Particles) {
         self.answers = self.answers_in(state);
     }
 
-    /// Those in a state, of walls that absorb in this scene too.
+    /// Returns the absorber states in `state` for the walls that absorb in this scene.
     pub(super) fn answers_in(&self, state: &Particles) -> Answers {
         let mut answers = state.walls;
         for (k, answer) in answers.iter_mut().enumerate() {
@@ -119,7 +120,8 @@ impl Scene {
         answers
     }
 
-    /// Has walls that absorb answer the state at the end of `frame`, and writes into it what they do from then on.
+    /// Updates the absorber states from the water at the end of `frame`, and stores
+    /// them in `state`.
     pub fn answer(&mut self, state: &mut Particles, frame: u32) {
         self.answers = self.answers_to(state, self.shot.time(frame));
         state.walls = self.answers;
@@ -128,7 +130,7 @@ impl Scene {
     fn answers_to(&self, state: &Particles, time: f64) -> Answers {
         let mut answers = Answers::default();
         let walls = self.walls(time);
-        // Along an axis that joins its own end the water ends with the domain.
+        // Along a periodic axis the water ends at the domain.
         let (min, max) = (self.domain.min, self.domain.max);
         let room = Bounds {
             min: (min + walls.min).max(min),
@@ -148,7 +150,7 @@ impl Scene {
         answers
     }
 
-    /// What of the domain lies between the walls at the start, metres.
+    /// Returns the part of the domain between the walls at the start, metres.
     pub fn start_domain(&self) -> Bounds {
         let mut domain = self.domain;
         for maker in &self.wave_makers {
@@ -163,7 +165,7 @@ impl Scene {
     }
 }
 
-/// Refuses a wall that never moves.
+/// Rejects a wall that neither moves nor absorbs.
 pub(super) fn check_still(
     doc: &Document<'_>,
     path: &str,
@@ -180,15 +182,15 @@ pub(super) fn check_still(
     }
 }
 
-/// Frames in which walls that absorb were at the end of their room.
+/// Counts the frames in which absorbing walls are at the end of their allowed displacement.
 #[derive(Default)]
 pub struct Held([u32; MOST]);
 
-/// Part of the room from which on a wall is at its end.
+/// Fraction of the allowed displacement from which a wall counts as at its end.
 const AT_THE_END: f64 = 0.99;
 
 impl Held {
-    /// Counts a frame by the state at its end.
+    /// Counts a frame, given the state at its end.
     pub fn add(&mut self, scene: &Scene, state: &Particles) {
         let answers = scene.answers_in(state);
         let makers = scene.wave_makers.iter().zip(&answers);
@@ -198,7 +200,7 @@ impl Held {
         }
     }
 
-    /// What a user has to know of them, a sentence each.
+    /// Returns a warning for each wall that was at its end in any frame.
     pub fn warnings(&self) -> Vec<String> {
         let held = self.0.iter().enumerate().filter(|(_, count)| **count > 0);
         held.map(|(k, count)| {

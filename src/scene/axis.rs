@@ -1,28 +1,28 @@
-//! Axes by their names.
+//! Axes by name.
 
 use swell_domain::named::read_by_name;
 
 /// An axis of the domain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Axis {
-    /// The first.
+    /// The first horizontal axis.
     X,
-    /// Upward.
+    /// The vertical axis, upward.
     Y,
-    /// The last.
+    /// The second horizontal axis.
     Z,
 }
 
 impl Axis {
-    /// With the names that scenes use.
+    /// All axes with the names used in scenes.
     pub const NAMED: [(&'static str, Self); 3] = [("x", Self::X), ("y", Self::Y), ("z", Self::Z)];
 
-    /// As scenes name it.
+    /// Returns the name used in scenes.
     pub fn name(self) -> &'static str {
         Self::NAMED[self as usize].0
     }
 
-    /// Those that are set.
+    /// Returns the axes whose flag is set.
     pub(super) fn of(periodic: [bool; 3]) -> Vec<Self> {
         let named = Self::NAMED.iter().zip(periodic);
         named

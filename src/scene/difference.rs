@@ -1,4 +1,4 @@
-//! Whether two scenes have the same physics.
+//! Compares the physics of two scenes.
 
 use std::{collections::BTreeMap, iter};
 
@@ -11,17 +11,19 @@ use super::{
     keys,
 };
 
-/// Comes before every other difference: with it most of the others follow.
+/// Compared first, because most other differences follow from it.
 const METHOD: &str = "solver.method";
 
-/// Changes whenever the canonical form does, so that hashes of two versions never meet.
+/// Version of the canonical form; it changes with the form so that hashes of different
+/// versions never match.
 const CANONICAL_FORM: &str = "swell scene physics 2";
 
-/// The first key (the method, then in alphabetical order) whose value differs between two scenes as
-/// [`Scene::to_toml`] wrote them, with both values; `None` where the physics is the same.
+/// Returns the first key whose value differs between two scenes written by [`Scene::to_toml`], with
+/// both values: the method first, then the other keys in alphabetical order. Returns `None` if the
+/// physics is the same.
 ///
-/// Keys that the table of keys calls no physics may differ, and so may the settings of a solver that is not chosen and the
-/// path of a mesh whose hash stands beside it in both.
+/// Ignored are keys that the table of keys declares as not physical, settings of the solver that is
+/// not chosen, and paths of meshes whose hashes are given in both.
 ///
 /// # Errors
 /// [`SceneError::NotToml`].
@@ -51,8 +53,8 @@ pub fn physics_difference(old_toml: &str, new_toml: &str) -> Result<Option<Strin
     }))
 }
 
-/// BLAKE3 in hex over the physics of a scene, the hashes of its mesh files included; the same for
-/// two scenes between which [`physics_difference`] finds none.
+/// Returns the BLAKE3 hash of a scene's physics, hexadecimal, including the hashes of its mesh
+/// files. Scenes for which [`physics_difference`] finds no difference have equal hashes.
 pub fn physics_hash(scene: &Scene) -> String {
     let mut hasher = blake3::Hasher::new();
     hasher.update(CANONICAL_FORM.as_bytes());
@@ -62,7 +64,7 @@ pub fn physics_hash(scene: &Scene) -> String {
     hasher.finalize().to_hex().to_string()
 }
 
-/// For the key of a file whose content counts the key itself, and that of its hash.
+/// For the key of a file compared by content, returns the key itself and the key of its hash.
 fn hash_beside(path: &str) -> Option<(String, String)> {
     let is_by_hash = key::find(keys::SCENE, path)?.physics == Physics::ByHash;
     let (table, _) = path.rsplit_once('.')?;
@@ -75,13 +77,14 @@ fn read(text: &str) -> Result<Table, SceneError> {
     })
 }
 
-/// Keys that caches may be older than, each with the value by which nothing differs from before there was one.
+/// Keys that older caches lack, each with the value that reproduces the behaviour
+/// before it existed.
 const YOUNGER: [(&str, &str); 2] = [
     ("solver.pbf.grid_projection", "false"),
     ("wave_maker.motion.second_order", "false"),
 ];
 
-/// What a key of a scene is in [`YOUNGER`]: there without the places in arrays.
+/// Returns the value in [`YOUNGER`] for a key of a scene; array indices are ignored.
 fn as_before(key: &str) -> Option<&'static str> {
     let parts = key
         .split('.')
@@ -92,7 +95,7 @@ fn as_before(key: &str) -> Option<&'static str> {
     found.map(|(_, value)| *value)
 }
 
-/// What a scene of a cache has to be given that is older than some keys, as overrides.
+/// Returns the overrides that complete a cached scene which lacks newer keys.
 pub(super) fn younger(text: &str) -> Result<Vec<String>, SceneError> {
     let root = read(text)?;
     let is_absent = |key: &str| {
@@ -107,7 +110,8 @@ pub(super) fn younger(text: &str) -> Result<Vec<String>, SceneError> {
         .collect())
 }
 
-/// Dotted keys and values of the physics, numbers written alike whether whole or not.
+/// Returns the dotted keys and values of the physics. Integers and floats of equal value
+/// are written alike.
 fn flatten(table: &Table) -> BTreeMap<String, String> {
     let mut values = BTreeMap::new();
     for (key, value) in table {

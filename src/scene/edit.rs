@@ -1,23 +1,25 @@
-//! Settings written into the text of a scene, which keeps its comments and its order.
+//! Edits settings in the text of a scene while keeping its comments and order.
 
 use toml_edit::{DocumentMut, InlineTable, Item, RawString, Table, TableLike, TomlError, Value};
 
-/// A key and what it is set to.
+/// A key and its new value.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Setting {
-    /// Dotted, as in `solver.pbf.iterations`; none of its parts is an index.
+    /// Dotted key such as `solver.pbf.iterations`, without indices.
     pub key: String,
-    /// As TOML has it.
+    /// The value as TOML.
     pub value: String,
-    /// Stands above it, as a comment; one line.
+    /// Reason for the value, written as a comment above the key; a single line.
     pub reason: String,
 }
 
-/// The text of a scene with settings. A key that stands there keeps its place, and the comment behind it; one that does not
-/// comes last in its table, which is made at the end of the text where there is none.
+/// Returns the text of a scene with `settings` applied. An existing key keeps its position
+/// and trailing comment; a new key is appended to its table, and missing tables are
+/// appended to the text.
 ///
 /// # Errors
-/// In words: a text or a value that is no TOML, or a key that leads through what is no table.
+/// A description if the text or a value is not valid TOML, or if a key leads through a value
+/// that is not a table.
 pub fn with_settings(text: &str, settings: &[Setting]) -> Result<String, String> {
     let unread = |error: TomlError| error.message().to_owned();
     let mut document: DocumentMut = text.parse().map_err(unread)?;
@@ -29,7 +31,7 @@ pub fn with_settings(text: &str, settings: &[Setting]) -> Result<String, String>
     Ok(document.to_string())
 }
 
-/// Sets a key, in tables that are made where they are missing.
+/// Sets a key and creates missing tables.
 fn set(root: &mut Table, key: &str, mut value: Value) -> Result<(), String> {
     let mut parts: Vec<&str> = key.split('.').collect();
     let last = parts.pop().expect("a key has a part");
@@ -53,7 +55,7 @@ fn set(root: &mut Table, key: &str, mut value: Value) -> Result<(), String> {
     Ok(())
 }
 
-/// An empty table; without a header of its own while only further tables are in it.
+/// Creates an empty table. It is implicit: it has no header while it holds only tables.
 fn made(is_inline: bool) -> Item {
     if is_inline {
         return Item::Value(InlineTable::new().into());
@@ -63,7 +65,7 @@ fn made(is_inline: bool) -> Item {
     Item::Table(table)
 }
 
-/// Writes the reason on a line above the key, or above that of the inline table which holds it.
+/// Writes the reason on a line above the key, or above the key of the inline table that holds it.
 fn explain(root: &mut Table, setting: &Setting) {
     let mut table = root;
     for part in setting.key.split('.') {
@@ -76,7 +78,7 @@ fn explain(root: &mut Table, setting: &Setting) {
         let decor = key.leaf_decor_mut();
         let before = decor.prefix().and_then(RawString::as_str);
         let before = before.unwrap_or_default();
-        // What stands before a key ends with its indent.
+        // The prefix of a key ends with its indentation.
         let indent = before.rfind('\n').map_or(before, |end| &before[end + 1..]);
         decor.set_prefix(format!("{before}# {}\n{indent}", setting.reason));
         break;
@@ -166,7 +168,7 @@ pressure = { tolerance = 1e-3 }
 
     #[test]
     fn tables_without_a_header_of_their_own_are_found() {
-        // The names of other tables speak of [solver], and of [solver.flip] nothing does.
+        // Other headers imply `[solver]`; nothing implies `[solver.flip]`.
         let text = "[solver.pbf]\nparticle_spacing = 0.1\n[effects]\nviscosity = {}";
         let settings = [
             set("solver.flip.cell_size", "0.2"),
@@ -176,7 +178,7 @@ pressure = { tolerance = 1e-3 }
         let read: toml::Table = toml::from_str(&written).expect("TOML");
         assert_eq!(read["solver"]["flip"]["cell_size"].as_float(), Some(0.2));
         assert_eq!(read["effects"]["viscosity"]["xsph"].as_float(), Some(0.1));
-        // Controls: what is no TOML, and a way through a number.
+        // Controls: invalid TOML, and a key that leads through a number.
         assert!(with_settings("[", &settings).is_err());
         let through = [set("solver.pbf.particle_spacing.deep", "1")];
         let said = with_settings(text, &through).expect_err("no table");

@@ -1,4 +1,4 @@
-//! What can be wrong with a scene.
+//! Errors of scenes.
 
 use std::{fmt, io, path::PathBuf};
 
@@ -8,51 +8,51 @@ pub enum SceneError {
     /// The file cannot be read.
     #[error("cannot read {file}")]
     Read {
-        /// Which file.
+        /// Path of the file.
         file: PathBuf,
-        /// What the system says.
+        /// Error of the operating system.
         source: io::Error,
     },
-    /// Something in the scene, or in an override of it.
+    /// A fault in the scene or in an override of it.
     #[error("{0}")]
     Fault(Box<Fault>),
-    /// An override that is none.
+    /// A malformed override.
     #[error("--set {text}: {reason}")]
     Override {
-        /// As given.
+        /// The override as given.
         text: String,
         /// What is wrong, and what is allowed.
         reason: String,
     },
-    /// One of two texts to compare is no TOML.
+    /// One of two texts to compare is not valid TOML.
     #[error("cannot compare scenes: {reason}")]
     NotToml {
-        /// The parser's complaint.
+        /// Message of the parser.
         reason: String,
     },
 }
 
-/// One fault of a scene: where, which key, what is wrong and what is allowed.
+/// A fault in a file: its location, the key, what is wrong and what is allowed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Fault {
     /// The scene file.
     pub file: PathBuf,
-    /// Where in it.
+    /// Location in the file.
     pub place: Place,
-    /// Dotted, as in `water.block[0].max`; empty where the text is no TOML.
+    /// Dotted key such as `water.block[0].max`; empty if the text is not valid TOML.
     pub key: String,
     /// What is wrong, and what is allowed.
     pub message: String,
 }
 
-/// Where a fault stands.
+/// Location of a fault.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Place {
-    /// A line of the file, from 1.
+    /// A line of the file, counted from 1.
     Line(usize),
     /// An override, as given.
     Override(String),
-    /// Nowhere: something is missing.
+    /// No location, because something is missing.
     Whole,
 }
 

@@ -1,12 +1,12 @@
-//! PIC/FLIP settings, validated.
+//! Validated PIC/FLIP settings.
 
 use serde::{Deserialize, Serialize};
 
 use swell_domain::flip::{APART, LEAST_APART, apart};
 use swell_domain::named::read_by_name;
 
-/// Attributes that APIC declares: C of v(x) = v + C (x − x_p), 1/s, `affine_xy` = ∂v_x/∂y. A state without them
-/// starts from zeros.
+/// Attributes that APIC adds to particles: the matrix C of v(x) = v + C (x − x_p), 1/s, with
+/// `affine_xy` = ∂v_x/∂y. A state without them starts from zero.
 pub const AFFINE: [&str; 9] = [
     "affine_xx",
     "affine_xy",
@@ -23,35 +23,36 @@ pub const AFFINE: [&str; 9] = [
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Flip {
-    /// Δx, metres.
+    /// Δx, the edge of a grid cell, metres.
     pub cell_size: f64,
-    /// Particles that a full cell holds at rest; they start on a lattice of spacing Δx / ∛n.
+    /// Particles per full cell at rest, n; they start on a lattice of spacing Δx / ∛n.
     pub particles_per_cell: u32,
-    /// What velocities carry from particles to the grid.
+    /// Scheme of the transfer between particles and grid.
     pub transfer: Transfer,
-    /// α: the part of the velocity taken from the grid rather than advanced by its change. Acts as a
-    /// viscosity α Δx² / (6 Δt). Unused by APIC, which has its own.
+    /// α: weight of the grid's velocity (PIC) against its change (FLIP). It acts as a viscosity α
+    /// Δx² / (6 Δt). APIC ignores it and has its own dissipation.
     pub pic_blend: f64,
-    /// Largest displacement in a substep, in cells.
+    /// Largest displacement per substep, in cells.
     pub cfl: f64,
-    /// Most substeps in a frame; a scene that needs more is stopped, never stepped more coarsely.
+    /// Largest number of substeps per frame. A scene that needs more is stopped; it is never
+    /// stepped more coarsely.
     pub max_substeps: u32,
-    /// Where the pressure is zero.
+    /// Location of the zero pressure at the free surface.
     pub surface: Surface,
-    /// Whether particles are moved so that their density stays that of the start (Kugelstadt et
-    /// al. 2019); it keeps the volume.
+    /// Whether particles are moved to keep their initial density (Kugelstadt et al. 2019), which
+    /// conserves the volume.
     pub density_correction: bool,
-    /// The linear solve.
+    /// Settings of the pressure solve.
     pub pressure: Pressure,
 }
 
 impl Flip {
-    /// Distance between neighbours of the lattice at the start, metres.
+    /// Returns the distance between neighbours on the initial lattice, metres.
     pub fn particle_spacing(&self) -> f64 {
         self.cell_size / f64::from(self.particles_per_cell).cbrt()
     }
 
-    /// Particles that are nearer to each other are pushed apart, metres.
+    /// Returns the distance below which particles are pushed apart, metres.
     pub fn apart(&self) -> f64 {
         let part = if self.density_correction {
             APART
@@ -61,12 +62,12 @@ impl Flip {
         self.cell_size * apart(part * self.particle_spacing() / self.cell_size)
     }
 
-    /// Particles that are nearer to a wall than half of it are pushed off, metres.
+    /// Returns twice the distance from a wall below which particles are pushed off it, metres.
     pub fn apart_from_walls(&self) -> f64 {
         self.cell_size * apart(APART * self.particle_spacing() / self.cell_size)
     }
 
-    /// Attributes of a frame beyond positions, velocities and ids.
+    /// Returns the attributes of a particle beside position, velocity and id.
     pub fn attributes(&self) -> &'static [&'static str] {
         match self.transfer {
             Transfer::Flip => &[],
@@ -75,84 +76,86 @@ impl Flip {
     }
 }
 
-/// What velocities carry from particles to the grid and back.
+/// Transfer of velocities between particles and grid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Transfer {
-    /// The change of the grid's velocity, blended with the velocity itself.
+    /// Change of the grid velocity, blended with the grid velocity itself.
     Flip,
-    /// The velocity and its affine part (Jiang et al. 2015).
+    /// Velocity and its affine part (Jiang et al. 2015).
     Apic,
 }
 
 impl Transfer {
-    /// With the names that scenes use.
+    /// All transfers with the names used in scenes.
     pub const NAMED: [(&'static str, Self); 2] = [("flip", Self::Flip), ("apic", Self::Apic)];
 
-    /// As scenes name it.
+    /// Returns the name used in scenes.
     pub fn name(self) -> &'static str {
         Self::NAMED[self as usize].0
     }
 }
 
-/// Where the pressure is zero at the free surface.
+/// Location of the zero pressure at the free surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Surface {
-    /// At the centre of the first cell of air.
+    /// The centre of the first air cell.
     Voxel,
-    /// Where the surface crosses the way there (Enright et al. 2003).
+    /// The point where the surface crosses the line to that centre (Enright et al. 2003).
     GhostFluid,
 }
 
 impl Surface {
-    /// With the names that scenes use.
+    /// All surfaces with the names used in scenes.
     pub const NAMED: [(&'static str, Self); 2] =
         [("voxel", Self::Voxel), ("ghost_fluid", Self::GhostFluid)];
 
-    /// As scenes name it.
+    /// Returns the name used in scenes.
     pub fn name(self) -> &'static str {
         Self::NAMED[self as usize].0
     }
 }
 
-/// The pressure solve.
+/// Settings of the pressure solve.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Pressure {
-    /// What precedes each conjugate-gradient iteration.
+    /// Preconditioner of the conjugate-gradient iteration.
     pub preconditioner: Preconditioner,
-    /// What it is solved in on the GPU; the CPU's reference is f64 whatever stands here.
+    /// Precision on the GPU; the CPU reference always uses `f64`.
     pub precision: Precision,
-    /// True residual over the right-hand side, both in the Euclidean norm, at which it stops.
+    /// Norm of the true residual over that of the right-hand side (Euclidean) at which
+    /// the solve stops.
     pub tolerance: f64,
-    /// Most iterations of a solve; one that ends there is reported as missed.
+    /// Largest number of iterations. A solve that reaches it is reported as missed.
     pub max_iterations: u32,
 }
 
-/// What the projection's system is solved in. Face velocities and pressures are f32 before and after it.
+/// Precision of the pressure solve. Face velocities and pressures are `f32` before and after it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Precision {
-    /// One f32 word: the true residual stalls near ε ‖A‖ ‖x‖ / ‖b‖.
+    /// `f32`; the true residual stalls near ε ‖A‖ ‖x‖ / ‖b‖.
     F32,
-    /// Iterative refinement: f32 iterations for a solution of two words, from residuals that are computed afresh.
+    /// Iterative refinement: `f32` iterations with recomputed residuals; the solution is the
+    /// sum of two words.
     F32Refined,
-    /// f64, where the adapter has it.
+    /// `f64`, on adapters that support it.
     F64,
 }
 
 impl Precision {
-    /// With the names that scenes use.
+    /// All precisions with the names used in scenes.
     pub const NAMED: [(&'static str, Self); 3] = [
         ("f32", Self::F32),
         ("f32_refined", Self::F32Refined),
         ("f64", Self::F64),
     ];
 
-    /// As scenes name it.
+    /// Returns the name used in scenes.
     pub fn name(self) -> &'static str {
         Self::NAMED[self as usize].0
     }
 
-    /// Words of 32 bits of a value of the iterations.
+    /// Returns the number of 32-bit words per value of the iteration.
     pub fn words(self) -> usize {
         match self {
             Self::F32 | Self::F32Refined => 1,
@@ -160,7 +163,7 @@ impl Precision {
         }
     }
 
-    /// Values that the solution at a cell is the sum of.
+    /// Returns the number of values whose sum is the solution in a cell.
     pub fn terms(self) -> usize {
         match self {
             Self::F32 | Self::F64 => 1,
@@ -169,21 +172,21 @@ impl Precision {
     }
 }
 
-/// Preconditioner of the conjugate gradients.
+/// Preconditioner of the conjugate-gradient iteration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Preconditioner {
-    /// The identity.
+    /// No preconditioning.
     None,
-    /// The diagonal.
+    /// Diagonal scaling.
     Jacobi,
     /// Incomplete Poisson (Ament et al. 2010), for a system scaled to a unit diagonal.
     Ipp,
-    /// One symmetric V-cycle (McAdams et al. 2010).
+    /// One symmetric multigrid V-cycle (McAdams et al. 2010).
     Multigrid,
 }
 
 impl Preconditioner {
-    /// With the names that scenes use.
+    /// All preconditioners with the names used in scenes.
     pub const NAMED: [(&'static str, Self); 4] = [
         ("none", Self::None),
         ("jacobi", Self::Jacobi),
@@ -191,7 +194,7 @@ impl Preconditioner {
         ("multigrid", Self::Multigrid),
     ];
 
-    /// As scenes name it.
+    /// Returns the name used in scenes.
     pub fn name(self) -> &'static str {
         Self::NAMED[self as usize].0
     }

@@ -1,6 +1,7 @@
-//! Nodes of a glTF 2.0 file (Khronos 2021): where one stands in the file's hierarchy, and how its animations move it.
+//! Nodes of a glTF 2.0 file (Khronos 2021): transforms in the file's hierarchy and
+//! their animations.
 //!
-//! What is sampled is translation, rotation and scale of the node and of every node above it.
+//! Sampled are translation, rotation and scale of a node and of all its ancestors.
 
 mod track;
 
@@ -14,41 +15,41 @@ use gltf::{
 
 use track::{Track, rotations, track};
 
-/// Keys of an animation, at most: hours of them.
+/// Largest number of keys per animation; enough for hours.
 const MOST_KEYS: usize = 10_000_000;
-/// Nodes from the root to the one that is read, at most.
+/// Largest depth of a node in the hierarchy.
 const MOST_NODES: usize = 1000;
 
-/// Reads a file that a glTF names, or says in words why not.
+/// Reads a file referenced by a glTF file; the error is a description.
 pub(crate) type Beside<'a> = &'a dyn Fn(&str) -> std::result::Result<Vec<u8>, String>;
 
 /// Why a node's motion cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum NodeError {
-    /// Data that its accessors name and its buffers lack, or of another type.
+    /// Animation data are missing from the buffers or have the wrong type.
     #[error("its animation of {node}: {what}")]
     Animation {
-        /// The node that is moved.
+        /// Name of the animated node.
         node: String,
-        /// What is wrong.
+        /// Description of the fault.
         what: String,
     },
-    /// A buffer that cannot be had.
+    /// A buffer cannot be read.
     #[error("buffer {index}: {what}")]
     Buffer {
-        /// Which, from 0.
+        /// Index of the buffer.
         index: usize,
-        /// What is wrong.
+        /// Description of the fault.
         what: String,
     },
-    /// Nodes that are their own parents, or too many.
+    /// Nodes that are their own ancestors, or nested too deeply.
     #[error("node {0} hangs under more than {MOST_NODES} nodes, or under itself")]
     Hierarchy(String),
 }
 
 type Result<T> = std::result::Result<T, NodeError>;
 
-/// A node, with all that moves it.
+/// A node with the transforms and animations of its ancestors.
 #[derive(Clone, Debug)]
 pub(crate) struct Nodes {
     /// From the node up to the root.
@@ -57,7 +58,8 @@ pub(crate) struct Nodes {
 }
 
 impl Nodes {
-    /// Of a node of the file with these bytes, which errors call so.
+    /// Reads the chain of a node from the file with these bytes. `beside` reads files
+    /// that it references.
     pub(crate) fn read(
         bytes: &[u8],
         (document, blob): (&Document, Option<Vec<u8>>),
@@ -78,37 +80,37 @@ impl Nodes {
         })
     }
 
-    /// BLAKE3 over the file, and over the buffers that the node is animated by.
+    /// Returns the BLAKE3 hash of the file and of the buffers that animate the node.
     pub(crate) fn hash(&self) -> blake3::Hash {
         self.hash
     }
 
-    /// From the node to the world.
+    /// Returns the transform from the node to the world at a time, seconds.
     pub(crate) fn at(&self, seconds: f64) -> DMat4 {
         let up = self.nodes.iter();
         up.fold(DMat4::IDENTITY, |below, node| node.at(seconds) * below)
     }
 
-    /// Of all keys, in no order.
+    /// Returns the times of all keys, seconds, unordered.
     pub(crate) fn times(&self) -> impl Iterator<Item = f64> + '_ {
         self.nodes.iter().flat_map(Hung::times)
     }
 
-    /// The same of what moves.
+    /// Returns the key times of values that change, seconds, unordered.
     pub(crate) fn times_moved(&self) -> impl Iterator<Item = f64> + '_ {
         self.nodes.iter().flat_map(Hung::times_moved)
     }
 
-    /// Whether something jumps from key to key.
+    /// Whether a value changes in steps.
     pub(crate) fn jumps(&self) -> bool {
         self.nodes.iter().any(Hung::jumps)
     }
 }
 
-/// A node as it hangs under its parent.
+/// Local transform of a node.
 #[derive(Clone, Debug)]
 enum Hung {
-    /// By a matrix, which nothing moves.
+    /// A static matrix.
     Still(DMat4),
     Moved {
         translation: Track<DVec3>,
@@ -177,13 +179,13 @@ impl Hung {
     }
 }
 
-/// What a node is called.
+/// Returns the name of a node, or one made from its index.
 pub(crate) fn named(node: &Node<'_>) -> String {
     let name = node.name();
     name.map_or_else(|| format!("node {}", node.index()), str::to_owned)
 }
 
-/// A node and those above it, up to the root.
+/// Returns a node and its ancestors up to the root.
 fn chain<'a>(document: &'a Document, node: &Node<'a>) -> Result<Vec<Node<'a>>> {
     let mut parents = vec![None; document.nodes().len()];
     for parent in document.nodes() {
@@ -201,7 +203,7 @@ fn chain<'a>(document: &'a Document, node: &Node<'a>) -> Result<Vec<Node<'a>>> {
     Ok(chain)
 }
 
-/// Buffers that move nodes of `chain`, by index; `None` of others, which are not read.
+/// Reads the buffers that animate nodes of `chain`, by index; others are `None` and not read.
 fn buffers<'a>(
     document: &Document,
     blob: Option<Vec<u8>>,
@@ -251,7 +253,7 @@ fn buffers<'a>(
     read.collect()
 }
 
-/// What a URI holds in itself, or the file that it names.
+/// Returns the data embedded in a URI, or the content of the file that it names.
 fn data(uri: &str, beside: Beside<'_>) -> std::result::Result<Vec<u8>, String> {
     use base64::Engine as _;
     let Some(rest) = uri.strip_prefix("data:") else {
@@ -283,7 +285,7 @@ fn percent_decoded(uri: &str) -> std::result::Result<String, String> {
     String::from_utf8(bytes).map_err(|_| format!("{uri} is no text"))
 }
 
-/// A node with what its animations do to it.
+/// Reads the local transform of a node with its animations.
 fn hung(document: &Document, node: &Node<'_>, buffers: &[Option<Cow<'_, [u8]>>]) -> Result<Hung> {
     let channels: Vec<_> = (document.animations())
         .flat_map(|animation| animation.channels().collect::<Vec<_>>())
@@ -356,7 +358,7 @@ fn turn(q: [f32; 4]) -> DQuat {
     DQuat::from_array(q.map(f64::from)).normalize()
 }
 
-/// What an accessor reads lies in its buffers. The crate takes that for granted where it counts bytes.
+/// Checks that an accessor stays within its buffers; the crate's byte arithmetic assumes that.
 fn check_accessor(
     accessor: &gltf::Accessor<'_>,
     buffers: &[Option<Cow<'_, [u8]>>],

@@ -1,19 +1,19 @@
-//! Walls that hold water back.
+//! No-slip walls.
 
 use super::{Method, Scene, Wall, document::Document, error::SceneError, spec::DomainSpec};
 
-/// The words of `domain.walls`: how water meets all six walls.
+/// Values of `domain.walls`, which applies to all six walls.
 pub(super) const WALLS: [&str; 2] = ["free_slip", "no_slip"];
 
 impl Scene {
-    /// A bit a no-slip wall: of the least faces along x, y and z, then of the greatest.
+    /// Returns the mask of no-slip walls, made of [`Wall::bit`].
     pub fn no_slip_bits(&self) -> u32 {
         self.no_slip.iter().map(Wall::bit).sum()
     }
 }
 
-/// The walls that `domain.walls` or `domain.no_slip` names, in the order of [`Wall::NAMED`]; a periodic axis has none. `has_own` says
-/// whether an effect holds water to them, with either solver.
+/// Returns the walls of `domain.walls` or `domain.no_slip` in the order of [`Wall::NAMED`], without
+/// those of periodic axes. `has_own` says whether an effect enforces no-slip with either solver.
 pub(super) fn build(
     doc: &Document<'_>,
     spec: &DomainSpec,

@@ -1,4 +1,4 @@
-//! Axes along which the domain joins its own end, and what does not go with them.
+//! Periodic axes of the domain, and what cannot be combined with them.
 
 use std::borrow::Cow;
 
@@ -15,19 +15,20 @@ use super::{
 };
 use swell_domain::{bounds::Bounds, bricks::EDGE, mesh::TriangleMesh, period::Period};
 
-/// The key that names the axes.
 const KEY: &str = "domain.periodic";
 
-/// Cells of PBF's neighbour search along a period: with fewer a particle would meet another and its image.
+/// Least number of PBF's neighbour cells along a period: with fewer, a particle would see both
+/// another particle and its image.
 const LEAST_CELLS: f64 = 3.0;
 
-/// Of a spacing or cell, how far a period may be off a whole number of them: the rounding of decimal fractions.
+/// Tolerance for a period to be a whole number of spacings or cells, relative to one: rounding of
+/// decimal fractions.
 const ROUNDING: f64 = 1e-6;
 
 /// Sine of the angle to a periodic axis below which a solid counts as moving across it.
 const ACROSS: f64 = 1e-9;
 
-/// One flag an axis.
+/// Reads `domain.periodic` into one flag per axis.
 pub(super) fn read(doc: &Document<'_>, axes: &[Axis]) -> Result<[bool; 3], SceneError> {
     let mut periodic = [false; 3];
     for axis in axes {
@@ -39,7 +40,7 @@ pub(super) fn read(doc: &Document<'_>, axes: &[Axis]) -> Result<[bool; 3], Scene
     Ok(periodic)
 }
 
-/// Refuses a solver whose cells or lattice the periods do not hold a whole number of.
+/// Rejects periods that are not a whole number of the solver's cells or lattice spacings.
 pub(super) fn check_solver(
     doc: &Document<'_>,
     periodic: [bool; 3],
@@ -95,12 +96,14 @@ pub(super) fn check_solver(
     Ok(())
 }
 
-/// Whether there are so many, one at least, up to the rounding of a part in `parts`.
+/// Whether `count` is a whole number of at least one, up to the rounding tolerance
+/// of one of `parts`.
 fn is_whole(count: f64, parts: f64) -> bool {
     count.round() >= 1.0 && (count - count.round()).abs() * parts < ROUNDING
 }
 
-/// Refuses gravity along a periodic axis: no pressure could hold it, and no energy of place belongs to it.
+/// Rejects gravity along a periodic axis: nothing supports the water, and its potential
+/// energy is undefined.
 pub(super) fn check_gravity(
     doc: &Document<'_>,
     periodic: [bool; 3],
@@ -118,7 +121,7 @@ pub(super) fn check_gravity(
     Err(doc.fault_of_plain(KEY, problem))
 }
 
-/// Refuses walls that move where there are none.
+/// Rejects wave makers on periodic axes, which have no walls.
 pub(super) fn check_makers(
     doc: &Document<'_>,
     periodic: [bool; 3],
@@ -136,8 +139,8 @@ pub(super) fn check_makers(
     Err(doc.fault_of_plain(&format!("wave_maker[{index}].wall"), problem))
 }
 
-/// Refuses solids that move along a periodic axis, for they would have to come in again at the other end, and those that
-/// turn about another one, for their images beyond the ends would not stay where they are.
+/// Rejects solids that move along a periodic axis, because they would have to re-enter at the other
+/// end, and solids that turn about another axis, because their images would not stay in place.
 pub(super) fn check_solids(
     doc: &Document<'_>,
     periodic: [bool; 3],
@@ -167,19 +170,21 @@ pub(super) fn check_solids(
 }
 
 impl Scene {
-    /// Whether the domain joins its own end along any axis.
+    /// Whether the domain is periodic along any axis.
     pub fn is_periodic(&self) -> bool {
         self.periodic.contains(&true)
     }
 
-    /// Its lengths along those axes, as 32 bits have them: the GPU and the reference repeat alike.
+    /// Returns the domain's length along periodic axes, rounded to `f32` so that GPU and
+    /// reference wrap alike.
     pub fn period(&self) -> Period {
         let is = |axis: usize| f64::from(u8::from(self.periodic[axis]));
         let size = self.domain.size() * DVec3::new(is(0), is(1), is(2));
         Period(size.as_vec3().as_dvec3())
     }
 
-    /// A mesh and, along periodic axes, those of its images that come nearer than `margin` metres to the domain.
+    /// Returns the mesh and, along periodic axes, those of its images that come within `margin`
+    /// metres of the domain.
     pub fn with_images<'a>(
         &self,
         mesh: &'a TriangleMesh,
@@ -192,7 +197,7 @@ impl Scene {
         }
         for k in (0..27).filter(|&k| k != 13) {
             let step = DVec3::from_array([k % 3, k / 3 % 3, k / 9].map(|n| f64::from(n) - 1.0));
-            // Along an axis with walls there is none.
+            // There are no images along an axis with walls.
             if (0..3).any(|axis| !self.periodic[axis] && step[axis] != 0.0) {
                 continue;
             }

@@ -1,23 +1,24 @@
-//! Where the files that a scene or a look names may lie.
+//! Restricts where the files that a scene or a look names may be.
 
 use std::path::{Component, Path, PathBuf};
 
-/// How far the paths in a scene or a look lead. A file that came from elsewhere must not read what it likes of the
-/// machine, and a cache that keeps copies of it must not carry that away.
+/// How far the paths in a scene or a look may lead. A file from elsewhere must not read arbitrary
+/// files of the machine, and a cache that keeps copies must not carry them away.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Reach {
-    /// Files below the folder of the file that names them; links are followed before that is decided.
+    /// Files below the folder of the file that names them, after symbolic links are resolved.
     #[default]
     Folder,
-    /// Any file that the user can read: `--allow-outside`.
+    /// Any file that the user can read (`--allow-outside`).
     Anywhere,
 }
 
 impl Reach {
-    /// Where `name` leads from `folder`.
+    /// Resolves `name` relative to `folder`.
     ///
     /// # Errors
-    /// In words where that is further than it may, or the name is meant for Windows or was changed by TOML, and no such file is there.
+    /// A description if the path leads too far, or if no such file exists and the name has
+    /// backslashes or control characters.
     pub(super) fn find(self, folder: &Path, name: &Path) -> Result<PathBuf, String> {
         let path = folder.join(name);
         if let (Some(problem), false) = (odd(&name.to_string_lossy()), path.exists()) {
@@ -25,7 +26,7 @@ impl Reach {
         }
         let is_below = match (path.canonicalize(), real(folder).canonicalize()) {
             (Ok(path), Ok(folder)) => path.starts_with(folder),
-            // What is not there is not read; that it leads out is still the better message.
+            // A missing file is not read, but a path that leads out is the more useful message.
             _ => stays_below(name),
         };
         if self == Self::Anywhere || is_below {
@@ -39,7 +40,8 @@ impl Reach {
     }
 }
 
-/// What is odd about a path with backslashes, or with what TOML makes of them in double quotes.
+/// Describes what is wrong with a path that contains backslashes, or control characters that TOML
+/// made from them in double quotes.
 pub(super) fn odd(name: &str) -> Option<String> {
     let escaped = |c: char| {
         Some(match c {
@@ -78,7 +80,7 @@ fn real(folder: &Path) -> &Path {
     }
 }
 
-/// Whether a path stays below where it starts, by its names alone.
+/// Whether a path stays below its start, judged by its components only.
 fn stays_below(name: &Path) -> bool {
     let mut depth = 0i32;
     name.components().all(|part| {
@@ -120,7 +122,7 @@ mod tests {
             let said = find(name).expect_err(name);
             assert!(said.contains(words), "{said}");
         }
-        // A file that is called so is read.
+        // A file with such a name is read.
         #[cfg(unix)]
         {
             fs::write(dir.path().join("a\\b.obj"), "v 0 0 0").expect("written");
@@ -176,7 +178,7 @@ mod tests {
             symlink(dir.path(), folder.join("up")).expect("linked");
             assert!(find("inner.obj").is_ok());
             assert!(find("link.obj").is_err() && find("up/secret.obj").is_err());
-            // The folder itself may be reached by a link.
+            // The folder itself may be reached through a link.
             let linked = dir.path().join("linked");
             symlink("scenes", &linked).expect("linked");
             assert!(Reach::Folder.find(&linked, Path::new("in.obj")).is_ok());

@@ -1,4 +1,4 @@
-//! What of a file of USD or glTF a look or a scene can take: its cameras, and what is animated.
+//! Cameras and animated objects of a USD or glTF file that a look or a scene can use.
 
 use gltf::{Gltf, animation::Property};
 
@@ -9,24 +9,24 @@ use super::{
 };
 use swell_domain::text;
 
-/// What a file has, by the names that `camera.name` and `track.node` take.
+/// Contents of a file, by the names that `camera.name` and `track.node` accept.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Rig {
     /// `usd` or `gltf`.
     pub format: &'static str,
-    /// In the file's order; of USD those within a prim before it.
+    /// Cameras in the order of the file; in USD, prims come after those nested in them.
     pub cameras: Vec<String>,
-    /// Nodes or prims, cameras among them, of which a transform of their own is animated.
+    /// Nodes or prims (including cameras) with an animated transform of their own.
     pub moving: Vec<String>,
-    /// That a prim takes parts from elsewhere, which are not read; a sentence.
+    /// Warning that a prim takes parts from elsewhere, which are not read.
     pub elsewhere: Option<String>,
 }
 
 impl Rig {
-    /// Of the bytes of a file.
+    /// Reads the bytes of a file.
     ///
     /// # Errors
-    /// What is wrong, in words.
+    /// If the file cannot be parsed; the text describes the fault.
     pub fn read(bytes: &[u8]) -> Result<Self, String> {
         let bytes = text::without_mark(bytes).map_err(|error| error.to_string())?;
         if is_usd(bytes) {
@@ -62,7 +62,7 @@ impl Rig {
     }
 }
 
-/// Whether one of the prim's operations has values at several times.
+/// Whether one of the prim's transform operations has several time samples.
 fn moves(prim: &Prim) -> bool {
     let Some(Value::Words(order)) = prim.attributes.get("xformOpOrder") else {
         return false;

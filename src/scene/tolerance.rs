@@ -1,4 +1,4 @@
-//! Tolerance files: how far apart two caches or two pictures may be.
+//! Tolerance files: limits on the differences between two caches or two pictures.
 
 use std::{collections::BTreeMap, path::Path};
 
@@ -16,7 +16,7 @@ use swell_domain::{
     tolerance::{FieldLimits, Limit, PictureLimits, Tolerance},
 };
 
-/// What a difference may be; sums of them are finite.
+/// Range of a difference; bounded so that sums stay finite.
 const DIFFERENCE: Interval = 0.0..=1e300;
 
 const MAX: Key = Key::number("max", DIFFERENCE)
@@ -43,7 +43,7 @@ const LIMIT: &[Key] = &[
         .about("of the reference's value; both add up"),
 ];
 
-/// One for each aggregate.
+/// One key per aggregate.
 const AGGREGATES: [Key; 8] = {
     let mut keys = [const { Key::inline("", LIMIT).absent().about("A limit") }; 8];
     let mut at = 0;
@@ -54,7 +54,6 @@ const AGGREGATES: [Key; 8] = {
     keys
 };
 
-/// Keys of a tolerance file.
 pub(super) const KEYS: &[Key] = &[
     Key::table("position", FIELD).absent().about("Metres"),
     Key::table("velocity", FIELD).absent().about("m/s"),
@@ -110,7 +109,7 @@ struct LimitSpec {
 /// Loads a tolerance file.
 ///
 /// # Errors
-/// [`SceneError`], with file, line and key; a file that limits nothing is one.
+/// [`SceneError`] with file, line and key; a file without any limit is an error.
 pub fn load(path: &Path) -> Result<Tolerance, SceneError> {
     let text = text::read(path).map_err(|source| SceneError::Read {
         file: path.to_owned(),
@@ -119,7 +118,7 @@ pub fn load(path: &Path) -> Result<Tolerance, SceneError> {
     parse(&text, path)
 }
 
-/// [`load`] on a text; `file` names it in messages.
+/// Parses a tolerance file as [`load`] does; `file` names it in messages.
 ///
 /// # Errors
 /// Those of [`load`].
@@ -140,7 +139,7 @@ pub fn parse(text: &str, file: &Path) -> Result<Tolerance, SceneError> {
     Ok(tolerance)
 }
 
-/// Limits by the name of their field, where there are any.
+/// Returns the non-empty limits by the name of their field.
 fn fields(spec: ToleranceSpec) -> BTreeMap<String, FieldLimits> {
     let own = [("position", spec.position), ("velocity", spec.velocity)];
     let own = own.into_iter();

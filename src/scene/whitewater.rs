@@ -1,4 +1,5 @@
-//! Whitewater settings: how a stream of spray, foam and bubbles is made from a finished bake. No physics of the bake.
+//! Whitewater settings: how a stream of spray, foam and bubbles is derived from a finished bake.
+//! They do not affect the bake's physics.
 
 use std::{fmt::Write as _, path::Path};
 
@@ -16,16 +17,15 @@ use swell_domain::{
     whitewater::{SUPPORT, Settings, Thresholds},
 };
 
-/// Of spray, metres, from mist to a bucket.
+/// Radius of whitewater particles, metres, from mist to a bucket.
 const RADIUS: Interval = 1e-6..=10.0;
 const RATE: Interval = 0.0..=1e7;
 const POTENTIAL: Interval = 0.0..=1e9;
 const SECONDS: Interval = 1e-4..=1e6;
 
-/// Radii of the stream's particles, in particle spacings.
+/// Default range of radii, particle spacings.
 const RADII: [f64; 2] = [0.025, 0.08];
 
-/// Keys of a whitewater settings file.
 pub(super) const KEYS: &[Key] = &[
     Key::whole("seed", 0..=u32::MAX)
         .default("0")
@@ -153,17 +153,17 @@ struct BubblesSpec {
     response: f64,
 }
 
-/// A validated settings file; what the shot decides may be open.
+/// A validated settings file. Values that depend on the shot may be open.
 #[derive(Clone, Debug)]
 pub struct WhitewaterSettings {
     spec: WhitewaterSpec,
 }
 
 impl WhitewaterSettings {
-    /// Reads, parses and validates a file.
+    /// Reads, parses and validates a settings file.
     ///
     /// # Errors
-    /// That the file cannot be read, or its first fault, with line, key and what is allowed.
+    /// If the file cannot be read, or for its first fault, with line, key and allowed values.
     pub fn load(path: &Path) -> Result<Self, SceneError> {
         let text = text::read(path).map_err(|source| SceneError::Read {
             file: path.to_owned(),
@@ -172,10 +172,10 @@ impl WhitewaterSettings {
         Self::parse(&text, path)
     }
 
-    /// [`Self::load`] on a text; `file` names it in messages.
+    /// Parses and validates the text of a settings file; `file` names it in messages.
     ///
     /// # Errors
-    /// As [`Self::load`].
+    /// Those of [`Self::load`].
     pub fn parse(text: &str, file: &Path) -> Result<Self, SceneError> {
         let (doc, mut root) = Document::parse(text, file, &[], KEYS)?;
         doc.settle(&mut root)?;
@@ -199,7 +199,7 @@ impl WhitewaterSettings {
         Ok(Self { spec })
     }
 
-    /// Whether the shot has to say where whitewater begins.
+    /// Whether thresholds of emission must be calibrated from the shot.
     pub fn needs_calibration(&self) -> bool {
         let emission = &self.spec.emission;
         [emission.trapped_air, emission.wave_crest, emission.energy]
@@ -207,7 +207,8 @@ impl WhitewaterSettings {
             .any(Option::is_none)
     }
 
-    /// With what a shot of this particle spacing, metres, and these thresholds lays down where the file is silent.
+    /// Returns complete settings for a shot of this particle spacing, metres. `shot` supplies the
+    /// thresholds that the file leaves open.
     pub fn settled(&self, spacing: f64, shot: &Thresholds) -> Settings {
         let WhitewaterSpec {
             seed,
@@ -238,16 +239,18 @@ impl WhitewaterSettings {
         }
     }
 
-    /// BLAKE3, hex, of all that the file says, its defaults filled in, however it is laid out.
+    /// Returns the BLAKE3 hash of all values including defaults, hexadecimal; the layout of the
+    /// file does not affect it.
     pub fn hash(&self) -> String {
-        // `Debug` of a float is its shortest exact text, so equal values give equal text and only they do.
+        // `Debug` prints the shortest exact text of a float, so equal values, and only those,
+        // have equal text.
         blake3::hash(format!("{:?}", self.spec).as_bytes())
             .to_hex()
             .to_string()
     }
 }
 
-/// A file that says all of it; [`WhitewaterSettings::parse`] reads it back.
+/// Returns a file with all settings, which [`WhitewaterSettings::parse`] reads back.
 pub fn written_out(settings: &Settings) -> String {
     let Settings {
         seed,
@@ -306,8 +309,8 @@ pub fn written_out(settings: &Settings) -> String {
 }
 
 impl Scene {
-    /// The same water, walls and solids as particles of one spacing, with sums of [`SUPPORT`] spacings over them: what whitewater
-    /// sees of it, whichever solver baked it.
+    /// Returns the scene as whitewater generation sees it for either solver: the same water, walls
+    /// and solids as particles of one spacing, with a support radius of [`SUPPORT`] spacings.
     #[must_use]
     pub fn of_whitewater(&self) -> Self {
         let mut scene = self.clone();
@@ -370,7 +373,7 @@ mod tests {
             energy: [0.0, 1.0],
             ..shot()
         };
-        // The file says all of it: neither spacing nor shot decides anything more.
+        // The file is complete: neither spacing nor shot changes the result.
         assert_eq!(again.settled(9.0, &other), settled);
         assert!(!again.needs_calibration());
     }

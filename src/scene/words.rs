@@ -1,8 +1,8 @@
-//! Numbers, types and boxes in messages, as a user would write them.
+//! Numbers, types and boxes in messages, in the user's notation.
 
 use swell_domain::bounds::Bounds;
 
-/// A number in few digits: `1e308` has 309 when it is written out.
+/// Formats a number briefly: `1e308` instead of its 309 digits.
 pub(super) fn shown(value: f64) -> String {
     match value.abs() {
         0.0 => "0".to_owned(),
@@ -11,13 +11,13 @@ pub(super) fn shown(value: f64) -> String {
     }
 }
 
-/// Several of them, as TOML has them.
+/// Formats numbers as a TOML array.
 pub(super) fn shown_all(values: &[f64]) -> String {
     let words: Vec<_> = values.iter().map(|&value| shown(value)).collect();
     format!("[{}]", words.join(", "))
 }
 
-/// Rust's names of types and what a user calls them, longer names before those that they begin with.
+/// Type names of serde with those for users; longer names come before their prefixes.
 const TYPES: [(&str, &str); 11] = [
     ("a boolean", "true or false"),
     ("a sequence", "an array"),
@@ -32,7 +32,8 @@ const TYPES: [(&str, &str); 11] = [
     ("struct ", "a table"),
 ];
 
-/// serde's complaint about a type without Rust's names: "invalid type: string \"fine\", expected a number".
+/// Replaces Rust's type names in serde's message: "invalid type: string \"fine\",
+/// expected a number".
 pub(super) fn plain_types(message: &str) -> String {
     let lines = message.lines().collect::<Vec<_>>().join("; ");
     let Some((before, expected)) = lines.rsplit_once("expected ") else {
@@ -42,7 +43,7 @@ pub(super) fn plain_types(message: &str) -> String {
     let Some((name, word)) = found else {
         return lines;
     };
-    // A table's name is Rust's as well.
+    // The name of a table's type is dropped as well.
     let rest = match name.ends_with(' ') {
         true => "",
         false => &expected[name.len()..],
@@ -51,7 +52,7 @@ pub(super) fn plain_types(message: &str) -> String {
     format!("{before}expected {word}{rest}")
 }
 
-/// Whether a name can be a part of a file's.
+/// Whether a name can be part of a file name.
 pub(super) fn is_file_stem(name: &str) -> bool {
     (1..=100).contains(&name.len())
         && name.starts_with(|c: char| c.is_ascii_alphanumeric())
@@ -60,7 +61,7 @@ pub(super) fn is_file_stem(name: &str) -> bool {
             .all(|c| c.is_ascii_alphanumeric() || matches!(c, '_' | '-' | '.'))
 }
 
-/// A box by its corners.
+/// Formats a box by its corners.
 pub(super) fn extent(bounds: Option<Bounds>) -> String {
     bounds.map_or_else(
         || "nothing".to_owned(),
@@ -71,7 +72,7 @@ pub(super) fn extent(bounds: Option<Bounds>) -> String {
     )
 }
 
-/// An error and its causes in one line.
+/// Formats an error and its sources in one line.
 pub(super) fn chain(error: &dyn std::error::Error) -> String {
     let mut text = error.to_string();
     let mut source = error.source();
@@ -82,7 +83,7 @@ pub(super) fn chain(error: &dyn std::error::Error) -> String {
     text
 }
 
-/// A number that is not negative, with four digits.
+/// Formats a non-negative number with four significant digits.
 pub fn four_digits(of: f64) -> String {
     if of == 0.0 {
         return "0".to_owned();

@@ -1,4 +1,4 @@
-//! A scene as TOML again, every default written out.
+//! Writes a scene as TOML with all defaults.
 
 use std::path::{Path, PathBuf};
 
@@ -21,8 +21,8 @@ use swell_domain::{
     probe::Rate,
 };
 
-/// Where a cache keeps its own copy of a mesh file: `assets/NAME-HASH.EXT`, so that two files of
-/// one name stay apart.
+/// Returns the path of a cache's copy of a mesh file, `assets/NAME-HASH.EXT`. The hash keeps files
+/// of equal name apart.
 pub fn asset_path(file: &Path, file_hash: &str) -> String {
     let part = |s: Option<&std::ffi::OsStr>| -> String {
         s.map(|s| s.to_string_lossy().into_owned())
@@ -45,13 +45,13 @@ pub fn asset_path(file: &Path, file_hash: &str) -> String {
     )
 }
 
-/// What a copy's name has behind the original's.
+/// Returns the suffix that a copy's name has.
 fn mark(file_hash: &str) -> String {
     format!("-{}", file_hash.get(..16).unwrap_or(file_hash))
 }
 
 impl PlacedMesh {
-    /// The name of its file without the ending, the same of the original and of a cache's copy.
+    /// Returns the file name without extension; a cache's copy has the name of the original.
     pub fn name(&self) -> String {
         let stem = self.file.file_stem().unwrap_or_default().to_string_lossy();
         let original = stem.strip_suffix(mark(&self.file_hash).as_str());
@@ -60,7 +60,7 @@ impl PlacedMesh {
 }
 
 impl Scene {
-    /// The mesh files that the scene was built from, with their BLAKE3, each once.
+    /// Returns the mesh files of the scene with their BLAKE3 hashes, each once.
     pub fn mesh_files(&self) -> Vec<(PathBuf, String)> {
         let mut files = Vec::new();
         let moving = self.moving_solids.iter().map(|solid| &solid.placed);
@@ -74,16 +74,16 @@ impl Scene {
         files
     }
 
-    /// The scene as TOML with every default written out and motion tables in place; loading it
-    /// again gives an equal scene. `mesh_path` says where a file (given with its hash) will be
-    /// found, relative to where the text is kept: [`asset_path`] for a cache.
+    /// Returns the scene as TOML with all defaults and with motion tables in place; loading it
+    /// gives an equal scene. `mesh_path` maps a file and its hash to the path to write, relative to
+    /// where the text will be stored: [`asset_path`] for a cache.
     pub fn to_toml(&self, mesh_path: &dyn Fn(&Path, &str) -> String) -> String {
         let mut out = String::new();
         write_tables(&mut out, keys::SCENE, "", &self.written(mesh_path));
         out
     }
 
-    /// Every key of the scene with its value.
+    /// Returns all keys of the scene with their values.
     pub(super) fn written(&self, mesh_path: &dyn Fn(&Path, &str) -> String) -> Table {
         let mut scene = table([
             ("shot", value(&self.shot)),
@@ -201,7 +201,7 @@ impl Scene {
     }
 }
 
-/// The tables below `path` in the order of their keys, each with its plain keys before its tables.
+/// Writes the tables below `path` in the order of their keys, plain keys before tables.
 fn write_tables(out: &mut String, keys: &[Key], path: &str, values: &Table) {
     let is_table = |key: &&Key| matches!(key.kind, Kind::Table(_) | Kind::Tables(_));
     for key in keys.iter().filter(|key| !is_table(key)) {
@@ -229,7 +229,8 @@ fn write_tables(out: &mut String, keys: &[Key], path: &str, values: &Table) {
     }
 }
 
-/// A value in one line. `{:?}` of a number is the shortest decimal that reads back as the same number, and valid TOML.
+/// Formats a value in one line. `{:?}` of a float is the shortest decimal that reads back as the
+/// same number, and valid TOML.
 fn inline(key: &Key, value: &Value) -> String {
     match value {
         Value::Float(number) => format!("{number:?}"),
@@ -248,7 +249,7 @@ fn inline(key: &Key, value: &Value) -> String {
     }
 }
 
-/// A number, a name, or settings that have no other.
+/// Converts a number, a name or plain settings.
 fn value(of: &impl Serialize) -> Value {
     Value::try_from(of).expect("numbers and names are TOML")
 }
@@ -333,7 +334,7 @@ fn motion(motion: &Motion) -> Value {
             ]);
             ("sine", rows)
         }
-        // Its gravity is the water's.
+        // The gravity is that of the water.
         Motion::Solitary { height, depth, .. } => {
             let rows = table([("height", value(height)), ("depth", value(depth))]);
             ("solitary", rows)
@@ -348,7 +349,7 @@ fn motion(motion: &Motion) -> Value {
     Value::Table(all)
 }
 
-/// Their gravity is the water's.
+/// Gravity is omitted because it is that of the water.
 fn regular(waves: &RegularWaves) -> Table {
     table([
         ("height", value(&waves.height)),
@@ -358,7 +359,7 @@ fn regular(waves: &RegularWaves) -> Table {
     ])
 }
 
-/// A motion whose displacement is an angle.
+/// Writes a rotation: a motion with the keys of angles.
 fn turned(turn: &Motion) -> Value {
     let Value::Table(mut all) = motion(turn) else {
         return motion(turn);
@@ -374,7 +375,7 @@ fn turned(turn: &Motion) -> Value {
     Value::Table(all)
 }
 
-/// Its gravity is the water's.
+/// Gravity is omitted because it is that of the water.
 fn waves(asked: &Asked) -> (&'static str, Table) {
     let mut rows = table([
         ("depth", value(&asked.depth)),

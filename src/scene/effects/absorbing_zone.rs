@@ -1,4 +1,5 @@
-//! Zones before walls in which waves die out instead of being turned back: a sponge layer (Israeli and Orszag 1981).
+//! Absorbing zones in front of walls, in which waves are damped instead of reflected: a sponge
+//! layer (Israeli and Orszag 1981).
 
 use serde::{Deserialize, Serialize};
 
@@ -13,28 +14,32 @@ use super::{
     zone::Zone,
 };
 
-/// The rate at the wall over the angular frequency of the waves. In shallow water a zone of one and a half wave lengths
-/// then turns back 0.1 % of a wave's height, one of a wave length 1.8 % and one of three quarters 7.7 %: the velocity there
-/// follows u″ + k² (1 − i r/ω) u = 0, and is 0 at the wall. (1.5 turns back 1.2, 5.8 and 11 %, and so does 5.)
+/// Relaxation rate at the wall over the angular frequency of the waves.
+///
+/// In shallow water the velocity in the zone satisfies u″ + k² (1 − i r/ω) u = 0 and vanishes
+/// at the wall. A zone of 1.5 wavelengths then reflects 0.1 % of a wave's height, one of a
+/// wavelength 1.8 % and one of three quarters 7.7 %. (A rate of 1.5 reflects 1.2, 5.8 and 11
+/// %, and so does 5.)
 const RATE: f64 = 2.5;
 
-/// Of a wave length: in shallow water a zone that is half as long turns back 4 % of a wave's height, one of 0.3 a quarter.
+/// Least length in wavelengths. In shallow water such a zone reflects 4 % of a wave's height, one
+/// of 0.3 wavelengths a quarter.
 const LEAST: f64 = 0.5;
 
 /// `absorbing_zone = { walls = ["+x"], length = 9.4, period = 2.3 }`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Settings {
-    /// Walls before which a zone lies, each once.
+    /// Walls with a zone, each listed once.
     pub walls: Vec<Wall>,
-    /// Of each zone from its wall, metres.
+    /// Length of each zone from its wall, metres.
     pub length: f64,
-    /// Of the longest waves that it has to take, s.
+    /// Period of the longest waves to absorb, s.
     pub period: f64,
 }
 
 impl Settings {
-    /// Where it takes what.
+    /// Returns the zones with their relaxation rate.
     pub fn zone(&self) -> Zone<'_> {
         Zone {
             walls: &self.walls,
@@ -80,9 +85,10 @@ mod tests {
 
     use super::*;
 
-    /// Part of a wave's height that a zone of so many wave lengths turns back in shallow water: u″ + k² (1 − i r/ω) u = 0 from
-    /// the wall, where u = 0, to the zone's beginning, by the classical Runge-Kutta method; there u = a exp(ikx) + b exp(−ikx).
-    /// Lengths are in 1/k, complex numbers pairs.
+    /// Part of a wave's height that a zone of this many wavelengths reflects in shallow water. The
+    /// classical Runge-Kutta method integrates u″ + k² (1 − i r/ω) u = 0 from the wall, where u =
+    /// 0, to the beginning of the zone, where u = a exp(ikx) + b exp(−ikx). Lengths are in 1/k;
+    /// complex numbers are pairs.
     fn turned_back(wave_lengths: f64, rate_over_frequency: f64) -> f64 {
         use std::f64::consts::TAU;
         let zone = Settings {
@@ -93,13 +99,13 @@ mod tests {
             length: TAU * wave_lengths,
             period: TAU,
         };
-        // Of a step so short that what is lost is r Δt.
+        // For a step this short the fraction is r Δt.
         let step = 1e-9;
         let lost = |x: f64| {
             let part = zone.zone().led(DVec3::splat(1e3), DVec3::splat(x), step) / step;
             part * rate_over_frequency / RATE
         };
-        // (u, u′), each real and imaginary.
+        // (u, u′), each as real and imaginary part.
         let slope = |x: f64, [u, v, p, q]: [f64; 4]| {
             let r = lost(x);
             [p, q, -(u + r * v), -(v - r * u)]
@@ -115,7 +121,7 @@ mod tests {
             y = std::array::from_fn(|i| y[i] + h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]));
             x += h;
         }
-        // 2a = u − iu′ and 2b = u + iu′ but for their phases.
+        // 2a = u − iu′ and 2b = u + iu′, up to phases.
         let [u, v, p, q] = y;
         let (a, b) = ((u + q).hypot(v - p), (u - q).hypot(v + p));
         a.min(b) / a.max(b)

@@ -1,4 +1,4 @@
-//! Drag of air on water that flies: drops, and sheets that are thinner than a neighbourhood.
+//! Air drag on detached water: drops, and sheets thinner than a neighbourhood.
 
 use std::f64::consts::PI;
 
@@ -15,14 +15,14 @@ use swell_domain::air;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Settings {
-    /// Of the drops that a particle stands for which flies alone, metres.
+    /// Radius of the drops that an isolated particle represents, metres.
     pub drop_radius: f64,
-    /// Velocity of the air, m/s.
+    /// Air velocity, m/s.
     pub wind: [f64; 3],
 }
 
 impl Settings {
-    /// Velocity of the air, m/s.
+    /// Returns the air velocity, m/s.
     pub fn wind(&self) -> DVec3 {
         DVec3::from_array(self.wind)
     }
@@ -55,7 +55,8 @@ impl Effect for Settings {
         })
     }
 
-    /// What wind does to a drop at rest, and no more than its own speed; one that flies gains less from it.
+    /// Bounds the acceleration by that of a drop at rest, and the gain by the speed of the wind; a
+    /// flying drop gains less.
     fn push(&self) -> Push {
         let wind = self.wind().length();
         Push {

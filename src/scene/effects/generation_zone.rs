@@ -1,4 +1,5 @@
-//! Zones before walls in which water is led towards given waves: they come in, and what runs out dies (a relaxation zone, Jacobsen,
+//! Generation zones in front of walls, in which the water is relaxed towards given waves:
+//! these waves enter the domain, and outgoing ones are damped (relaxation zone, Jacobsen,
 //! Fuhrman and Fredsøe 2012).
 
 use std::f64::consts::TAU;
@@ -25,65 +26,71 @@ use swell_domain::{
     open_waves::{Meeting, OpenSea, OpenWaves},
 };
 
-/// The effect's own key, and that of its waves.
+/// Keys of the effect and of its waves.
 const KEY: &str = "effects.generation_zone";
 const WAVES: &str = "effects.generation_zone.waves";
 
-/// The rate at the wall over the angular frequency of the waves. What differs from the waves that are wanted follows the equation of an
-/// absorbing zone, and at the wall, which stands still, it is all of them. In shallow water a zone of one and a half wave lengths then
-/// lets 1.2 % of them through, in which its waves are wrong, and turns 0.6 % of what runs into it back; one of a wave length 5.9 and 4.1 %.
-/// (2.5 lets 4.6 and 14 % through, 6 turns 2.0 and 7.3 % back.)
+/// Relaxation rate at the wall over the angular frequency of the waves.
+///
+/// The deviation from the target waves satisfies the equation of an absorbing zone; at the
+/// wall, which is at rest, it equals the waves themselves. In shallow water a zone of 1.5
+/// wavelengths then transmits 1.2 % of that error into its waves and reflects 0.6 % of outgoing
+/// ones; one of a wavelength 5.9 and 4.1 %. (A rate of 2.5 transmits 4.6 and 14 %, one of 6
+/// reflects 2.0 and 7.3 %.)
 const RATE: f64 = 4.0;
 
-/// Of a wave length: in shallow water 13 % of the waves' height from such a zone is wrong, and from one of half a wave length 30 %.
+/// Least length in wavelengths. In shallow water 13 % of the height of such a zone's waves is
+/// wrong, and 30 % for half a wavelength.
 const LEAST: f64 = 0.75;
 
 const LENGTH: Interval = 1e-9..=1e6;
 
 const PERIOD: Interval = 1e-4..=1e6;
 
-/// `generation_zone = { walls = ["-x"], length = 9.4, waves = { kind = "stokes", height = 0.1, period = 2.3, depth = 1.0 } }`.
+/// `generation_zone = { walls = ["-x"], length = 9.4, waves = { kind = "stokes", height = 0.1,
+/// period = 2.3, depth = 1.0 } }`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Settings {
-    /// Walls before which a zone lies, each once.
+    /// Walls with a zone, each listed once.
     pub walls: Vec<Wall>,
-    /// Of each zone from its wall, metres.
+    /// Length of each zone from its wall, metres.
     pub length: f64,
-    /// What comes in.
+    /// Incoming waves.
     pub waves: Waves,
 }
 
-/// Waves as a scene asks for them.
+/// Waves as specified in a scene.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum Waves {
-    /// Regular ones to second order.
+    /// Regular waves to second order.
     Stokes(Regular),
-    /// Those of a spectrum.
+    /// Waves of a spectrum with random phases.
     Sea(Sea),
-    /// Those of a spectrum, of which the crests meet at a place and a time.
+    /// Waves of a spectrum whose crests meet at a given position and time.
     Focused(Packet),
 }
 
-/// Regular waves as a scene asks for them.
+/// Regular waves as specified in a scene.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Regular {
-    /// From trough to crest, metres.
+    /// Height from trough to crest, metres.
     pub height: f64,
-    /// Seconds.
+    /// Wave period, seconds.
     pub period: f64,
-    /// Of the water at rest, metres.
+    /// Still-water depth, metres.
     pub depth: f64,
-    /// Seconds until the full height.
+    /// Time until the full height is reached, seconds.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ramp: Option<f64>,
-    /// In which they go, from +x towards +z.
+    /// Direction of propagation, from +x towards +z.
     pub direction_degrees: f64,
 }
 
-/// Waves of a spectrum as a scene asks for them: what is said of `$name`, its own keys, and those of every spectrum.
+/// Defines waves of a spectrum as specified in a scene: the documentation and keys of `$name`, then
+/// the keys common to all spectra.
 macro_rules! of_spectrum {
     ($(#[$about:meta])* $name:ident { $($own:tt)* }) => {
         $(#[$about])*
@@ -91,24 +98,25 @@ macro_rules! of_spectrum {
         #[serde(deny_unknown_fields)]
         pub struct $name {
             $($own)*
-            /// How the energy is spread over frequencies.
+            /// Form of the spectrum.
             pub spectrum: Spectrum,
-            /// γ.
+            /// Peak enhancement factor γ.
             #[serde(skip_serializing_if = "Option::is_none")]
             pub peak_enhancement: Option<f64>,
-            /// Seconds.
+            /// Peak period, seconds.
             pub peak_period: f64,
-            /// Of the shortest waves, seconds.
+            /// Period of the shortest waves, seconds.
             #[serde(skip_serializing_if = "Option::is_none")]
             pub shortest_period: Option<f64>,
-            /// Of the water at rest, metres.
+            /// Still-water depth, metres.
             pub depth: f64,
-            /// Seconds until the full height.
+            /// Time until the full height is reached, seconds.
             #[serde(skip_serializing_if = "Option::is_none")]
             pub ramp: Option<f64>,
-            /// In which most of them go, from +x towards +z.
+            /// Main direction of propagation, from +x towards +z.
             pub direction_degrees: f64,
-            /// s of the spread (cos ½θ)^2s over directions; without it all go one way.
+            /// Exponent s of the directional spreading (cos ½θ)^2s; without it all waves
+            /// have one direction.
             #[serde(skip_serializing_if = "Option::is_none")]
             pub spreading: Option<f64>,
         }
@@ -133,23 +141,23 @@ macro_rules! of_spectrum {
 }
 
 of_spectrum! {
-    /// A sea as a scene asks for it.
+    /// A random sea as specified in a scene.
     Sea {
-        /// Four times the root of the elevation's variance, metres.
+        /// Significant wave height: four standard deviations of the elevation, metres.
         pub significant_height: f64,
-        /// Chooses one sea of many.
+        /// Seed of the random phases.
         pub seed: u32,
     }
 }
 
 of_spectrum! {
-    /// A packet as a scene asks for it.
+    /// A focused wave packet as specified in a scene.
     Packet {
-        /// Of the crest above still water by linear theory, metres.
+        /// Height of the crest above still water by linear theory, metres.
         pub height: f64,
-        /// Where crests meet: along x and z, metres.
+        /// x and z where the crests meet, metres from the domain's least corner.
         pub at: [f64; 2],
-        /// When, seconds.
+        /// Time at which they meet, seconds.
         pub time: f64,
     }
 }
@@ -181,7 +189,7 @@ impl Packet {
 }
 
 impl Waves {
-    /// Of a spectrum, with the γ that the scene has; `None` of regular waves.
+    /// Returns the spectrum and the given γ; `None` for regular waves.
     fn spectral(&self, gravity: f64) -> Option<(OpenSea, Option<f64>)> {
         match self {
             Self::Stokes(_) => None,
@@ -190,7 +198,8 @@ impl Waves {
         }
     }
 
-    /// Period, of a sea the peak's, seconds; the water's depth at rest, metres; direction, degrees.
+    /// Returns the period (the peak's for a spectrum), seconds, the still-water depth, metres, and
+    /// the direction, degrees.
     fn common(&self) -> [f64; 3] {
         match self {
             Self::Stokes(waves) => [waves.period, waves.depth, waves.direction_degrees],
@@ -207,12 +216,12 @@ impl Waves {
         }
     }
 
-    /// Of the waves, of a sea those with the most energy, seconds.
+    /// Returns the period, or the peak period of a spectrum, seconds.
     pub fn period(&self) -> f64 {
         self.common()[0]
     }
 
-    /// By g, m/s².
+    /// Returns the waves for a gravity, m/s².
     fn by(&self, gravity: f64) -> OpenWaves {
         let direction = self.common()[2].to_radians();
         match self {
@@ -224,7 +233,8 @@ impl Waves {
         }
     }
 
-    /// Refuses waves that no theory has, or that particles `spacing` metres apart cannot carry.
+    /// Rejects waves that are outside of theory or that particles `spacing` metres
+    /// apart cannot resolve.
     fn check(&self, doc: &Document<'_>, gravity: f64, spacing: f64) -> Result<(), SceneError> {
         if let Self::Stokes(waves) = self {
             let asked = waves.asked(gravity);
@@ -261,7 +271,7 @@ impl Waves {
 }
 
 impl Settings {
-    /// Where water is led how fast.
+    /// Returns the zones with their relaxation rate.
     pub fn zone(&self) -> Zone<'_> {
         Zone {
             walls: &self.walls,
@@ -270,7 +280,8 @@ impl Settings {
         }
     }
 
-    /// Refuses a packet whose crests meet out of the domain, or before the slowest of its waves came from the nearest zone.
+    /// Rejects a packet whose crests meet outside of the domain, or before its slowest waves can
+    /// arrive from the nearest zone.
     fn check_packet<'a>(
         &self,
         packet: &Packet,
@@ -315,7 +326,7 @@ impl Settings {
         Ok(())
     }
 
-    /// What comes in, in a gravity, m/s².
+    /// Returns the incoming waves for a gravity, m/s².
     pub fn incoming(&self, gravity: DVec3) -> OpenWaves {
         self.waves.by(gravity.length())
     }

@@ -1,7 +1,9 @@
-//! Effects that a scene may name under `[effects]`: one word in a list, and a file in each room.
+//! Effects that a scene may name under `[effects]`: one entry in a list, and one
+//! file in each crate.
 //!
-//! An effect's file here holds its settings and their keys. What it adds to each solver stands in a file of the
-//! same name in `solve::effects`, its f64 twins in `reference`, and what holds the two against each other in `check`.
+//! An effect's file here holds its settings and their keys. Its contribution to each solver is in a
+//! file of the same name in `solve::effects`, the `f64` reference passes are in `reference`, and
+//! the comparison of the two is in `check`.
 
 pub mod zone;
 
@@ -11,32 +13,32 @@ use super::{WaveMaker, document::Document, error::SceneError, key::Key, lint::Ma
 use swell_domain::{bounds::Bounds, open_waves::OpenWaves};
 use zone::Zone;
 
-/// What of a scene an effect has to fit into.
+/// Parts of a scene that an effect is checked against.
 pub(super) struct Surroundings<'a> {
     pub(super) domain: &'a Bounds,
     pub(super) periodic: [bool; 3],
     pub(super) wave_makers: &'a [WaveMaker],
-    /// m/s².
+    /// Gravitational acceleration, m/s².
     pub(super) gravity: DVec3,
-    /// Two particle spacings, metres: shorter than that, nothing lies in a zone.
+    /// Least length of a zone, metres: two particle spacings.
     pub(super) least_length: f64,
-    /// Whether the solver makes velocities free of divergence on a grid.
+    /// Whether the solver projects velocities on a grid.
     pub(super) has_projection: bool,
 }
 
-/// What an effect's settings say of themselves.
+/// Settings of an effect, with its keys and properties.
 pub(super) trait Effect {
-    /// What it is, for the page of keys.
+    /// Description for the page of keys.
     const ABOUT: &'static str;
-    /// Its keys, each with its range.
+    /// The effect's keys.
     const KEYS: &'static [Key];
 
-    /// Refuses settings that do not fit into the scene.
+    /// Rejects settings that do not fit the scene.
     fn check(&self, _: &Document<'_>, _: &Surroundings<'_>) -> Result<(), SceneError> {
         Ok(())
     }
 
-    /// What of it acts on the grid that makes PBF's velocities free of divergence, as it does on FLIP's.
+    /// Returns the part of the effect that acts on PBF's projection grid as it does on FLIP's.
     fn on_projection(&self) -> Option<Self>
     where
         Self: Sized,
@@ -44,96 +46,97 @@ pub(super) trait Effect {
         None
     }
 
-    /// Whether it is solved on the grid between two projections; it then holds water to no-slip walls.
+    /// Whether the effect is solved on the grid between two projections. Such an effect also
+    /// enforces no-slip walls.
     fn acts_between_projections(&self) -> bool {
         false
     }
 
-    /// Whether it looks at PBF's neighbours, at the places that the velocity update leaves.
+    /// Whether the effect uses PBF's neighbours, at the positions after the velocity update.
     fn looks_at_neighbors(&self) -> bool {
         false
     }
 
-    /// Part of the velocity that a frame of FLIP takes from the grid for it.
+    /// Part of the velocity that a frame of FLIP takes from the grid on behalf of this effect.
     fn blend(&self) -> f64 {
         0.0
     }
 
-    /// How it makes particles faster.
+    /// Acceleration of particles by the effect.
     fn push(&self) -> Push {
         Push::default()
     }
 
-    /// Speed that what it sets free may give to water, m/s: a budget allows for it.
+    /// Speed that energy released by the effect may give to water, m/s; the budget allows for it.
     fn frees(&self, _: Grain) -> f64 {
         0.0
     }
 
-    /// The longest substep that it is stable in, s.
+    /// Longest stable substep, s.
     fn longest_step(&self, _: Grain) -> f64 {
         f64::INFINITY
     }
 
-    /// What of it is hardly meant, with its key first.
+    /// Warning for legal but suspicious settings, beginning with the key.
     fn lint(&self, _: Grain) -> Option<String> {
         None
     }
 
-    /// Zones in which waves die.
+    /// Zones in which the effect absorbs waves.
     fn absorbs(&self) -> Option<Absorbs<'_>> {
         None
     }
 
-    /// Waves that it makes.
+    /// Waves that the effect generates.
     fn makes(&self) -> Option<Made> {
         None
     }
 
-    /// What theory says of them in a gravity, m/s².
+    /// Theory of the generated waves for a gravity, m/s².
     fn waves(&self, _gravity: DVec3) -> Option<OpenWaves> {
         None
     }
 }
 
-/// What an effect's numbers are judged by.
+/// Scales by which the numbers of an effect are judged.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Grain {
-    /// Of the water, kg/m³.
+    /// Density of the water, kg/m³.
     pub(super) density: f64,
-    /// Magnitude, m/s².
+    /// Magnitude of gravity, m/s².
     pub(super) gravity: f64,
-    /// Between particles, metres.
+    /// Particle spacing, metres.
     pub(super) spacing: f64,
-    /// Edge of a cell of the grid that the pressure is found on, metres.
+    /// Edge of a cell of the pressure grid, metres.
     pub(super) cell: f64,
 }
 
-/// Makes particles faster.
+/// Bounds on the acceleration of particles by an effect.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Push {
-    /// By no more than this, m/s².
+    /// Largest acceleration, m/s².
     pub(super) acceleration: f64,
-    /// And by no more than this in all, m/s.
+    /// Largest total gain of speed, m/s.
     pub(super) speed: f64,
 }
 
 impl Push {
-    /// The most that a particle gains in so many seconds, m/s.
+    /// Returns the largest gain of speed in `seconds`, m/s.
     pub(super) fn gained(self, seconds: f64) -> f64 {
         (self.acceleration * seconds).min(self.speed)
     }
 }
 
-/// Zones in which waves die.
+/// Wave-absorbing zones of an effect.
 pub(super) struct Absorbs<'a> {
     pub(super) zone: Zone<'a>,
-    /// Of the longest, s.
+    /// Longest period of the waves that they absorb, s.
     pub(super) period: f64,
-    /// What a zone's length is at least, of their length.
+    /// Least length of a zone in wavelengths of that period.
     pub(super) least: f64,
 }
 
-/// Gives the list of effects, in the order in which they act, to a macro.
+/// Passes the list of effects, in the order in which they act, to a macro.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! with_effects {
@@ -147,7 +150,7 @@ macro_rules! effects {
     ($($name:ident),+ $(,)?) => {
         $(pub mod $name;)+
 
-        /// The effects that a scene names; what is `None` does not exist.
+        /// Settings of the effects that a scene names; all others are `None`.
         #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
         #[serde(deny_unknown_fields)]
         pub struct Effects {
@@ -162,37 +165,38 @@ macro_rules! effects {
             /// Keys of all effects.
             pub const NAMES: &[&str] = &[$(stringify!($name)),+];
 
-            /// Each with its own keys.
+            /// Keys of each effect in a table of its own.
             pub(super) const KEYS: &[Key] = &[$(
                 Key::inline(stringify!($name), <$name::Settings as Effect>::KEYS)
                     .absent()
                     .about(<$name::Settings as Effect>::ABOUT)
             ),+];
 
-            /// Refuses settings that do not fit into the scene.
+            /// Rejects settings that do not fit the scene.
             pub(super) fn check(&self, doc: &Document<'_>, around: &Surroundings<'_>) -> Result<(), SceneError> {
                 $(self.$name.iter().try_for_each(|settings| settings.check(doc, around))?;)+
                 Ok(())
             }
 
-            /// Whether one is solved between two projections.
+            /// Returns whether an effect is solved between two projections.
             pub fn act_between_projections(&self) -> bool {
                 false$(|| self.$name.as_ref().is_some_and(Effect::acts_between_projections))+
             }
 
-            /// Whether one looks at PBF's neighbours, at the places that the velocity update leaves.
+            /// Returns whether an effect uses PBF's neighbours, at the positions after the
+            /// velocity update.
             pub fn look_at_neighbors(&self) -> bool {
                 false$(|| self.$name.as_ref().is_some_and(Effect::looks_at_neighbors))+
             }
 
-            /// Part of the velocity that a frame of FLIP takes from the grid, of each of the named effects.
+            /// Returns the PIC blend of each enabled effect per frame of FLIP.
             pub(super) fn blends(&self) -> Vec<f64> {
                 let mut blends = Vec::new();
                 $(blends.extend(self.$name.as_ref().map(Effect::blend));)+
                 blends
             }
 
-            /// How the named effects make particles faster, all at once.
+            /// Returns the sum of the accelerations of all enabled effects.
             pub(super) fn push(&self) -> Push {
                 let mut all = Push::default();
                 $(
@@ -203,15 +207,16 @@ macro_rules! effects {
                 all
             }
 
-            /// Speed that what the named effects set free may give to water, m/s.
+            /// Returns the speed that energy released by the enabled effects may
+            /// give to water, m/s.
             pub(super) fn frees(&self, grain: Grain) -> f64 {
                 let mut all = 0.0;
                 $(all += self.$name.as_ref().map_or(0.0, |settings| settings.frees(grain));)+
                 all
             }
 
-            /// The longest substep that the named effects are stable in, s, with the name of the one that says so; infinite where none
-            /// does.
+            /// Returns the longest substep stable with the enabled effects, s, and the name of the
+            /// effect that limits it; infinite if none does.
             pub(super) fn longest_step(&self, grain: Grain) -> (f64, &'static str) {
                 let mut least = (f64::INFINITY, "");
                 $(
@@ -223,33 +228,34 @@ macro_rules! effects {
                 least
             }
 
-            /// What of them acts on the grid that makes PBF's velocities free of divergence.
+            /// Returns the part of the effects that acts on PBF's projection grid.
             pub(super) fn on_projection(&self) -> Self {
                 Self { $($name: self.$name.as_ref().and_then(Effect::on_projection)),+ }
             }
 
-            /// What of the named effects is hardly meant.
+            /// Returns the warnings of the enabled effects for legal but suspicious settings.
             pub(super) fn lints(&self, grain: Grain) -> Vec<String> {
                 let mut lints = Vec::new();
                 $(lints.extend(self.$name.as_ref().and_then(|settings| settings.lint(grain)));)+
                 lints
             }
 
-            /// Zones of the named effects in which waves die, by the effect's name.
+            /// Returns the wave-absorbing zones with the names of their effects.
             pub(super) fn absorbing(&self) -> Vec<(&'static str, Absorbs<'_>)> {
                 let mut zones = Vec::new();
                 $(zones.extend(self.$name.as_ref().and_then(Effect::absorbs).map(|zone| (stringify!($name), zone)));)+
                 zones
             }
 
-            /// Waves that the named effects make.
+            /// Returns the waves that the enabled effects generate.
             pub(super) fn made(&self) -> Vec<Made> {
                 let mut made = Vec::new();
                 $(made.extend(self.$name.as_ref().and_then(Effect::makes));)+
                 made
             }
 
-            /// What theory says of the waves of the first of the named effects that makes any, in a gravity, m/s².
+            /// Returns the theory of the waves of the first enabled effect that generates any, for
+            /// a gravity, m/s².
             pub fn waves(&self, gravity: DVec3) -> Option<OpenWaves> {
                 None$(.or_else(|| self.$name.as_ref()?.waves(gravity)))+
             }

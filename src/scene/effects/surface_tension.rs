@@ -1,4 +1,5 @@
-//! Surface tension: the pressure in water is σ κ above the air's at a surface of curvature κ.
+//! Surface tension: at a surface of curvature κ the pressure in water exceeds that
+//! of the air by σ κ.
 
 use std::f64::consts::{PI, TAU};
 
@@ -9,8 +10,8 @@ use super::{
     Effect, Grain, Surroundings,
 };
 
-/// Bond number ρ g d² / σ of a particle spacing d above which nothing of surface tension is seen: what it shapes, a capillary length
-/// wide, is smaller than a particle.
+/// Bond number ρ g d² / σ of a particle spacing d above which surface tension has no visible
+/// effect: the features that it shapes, about a capillary length wide, are smaller than a particle.
 const MOST_BOND: f64 = 1.0;
 
 /// `surface_tension = { coefficient = 0.0728 }`.
@@ -54,13 +55,14 @@ impl Effect for Settings {
         })
     }
 
-    /// Of a particle whose own surface, that of a lone drop, all became motion.
+    /// Speed of a particle if the surface energy of an isolated drop all became kinetic energy.
     fn frees(&self, grain: Grain) -> f64 {
         let radius = grain.spacing * (3.0 / (4.0 * PI)).cbrt();
         (6.0 * self.coefficient / (grain.density * radius)).sqrt()
     }
 
-    /// Capillary waves of two cells go by no more than what cells follow (Denner and van Wachem 2015, eq. 20, air without mass).
+    /// Capillary waves of two cells must not outrun the grid (Denner and van Wachem 2015, eq. 20,
+    /// for massless air).
     fn longest_step(&self, grain: Grain) -> f64 {
         (grain.density * grain.cell.powi(3) / (TAU * self.coefficient)).sqrt()
     }

@@ -1,4 +1,4 @@
-//! Viscosity: of so many Pa s, or XSPH's.
+//! Viscosity: Newtonian, in Pa s, or XSPH.
 
 use serde::{Deserialize, Serialize};
 
@@ -8,30 +8,32 @@ use super::{
 };
 use swell_domain::relaxation::Relaxation;
 
-/// Reynolds number √(g Δx) Δx / ν of a cell above which nothing of a viscosity ν is seen: that of the way to the grid and back is of 36 with
-/// PBF's projection, whose viscosity is 0.028 √(g Δx³), and about 50 with FLIP's `pic_blend` of 0.05, cells of 0.1 m and 24 frames a second.
+/// Reynolds number √(g Δx) Δx / ν of a cell above which a viscosity ν has no visible effect. The
+/// transfer to the grid and back has one of 36 with PBF's projection (a viscosity of 0.028 √(g
+/// Δx³)) and about 50 with FLIP's `pic_blend` of 0.05, cells of 0.1 m and 24 frames per second.
 const MOST_REYNOLDS: f64 = 1000.0;
 
-/// Of the error of the velocities.
+/// Default of `tolerance`.
 const TOLERANCE: f64 = 1e-3;
 
 /// `viscosity = { coefficient = 10.0 }`, or `viscosity = { xsph = 0.01 }`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, from = "Given")]
 pub struct Settings {
-    /// μ, Pa s: solved on the grid, between two projections (Batty and Bridson 2008).
+    /// μ, Pa s; solved implicitly on the grid between two projections (Batty and Bridson 2008).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub coefficient: Option<f64>,
-    /// With a coefficient: to which part of what it was a substep's solve brings the error of the velocities.
+    /// Factor by which the solve of a substep reduces the error of the velocities; only
+    /// with a coefficient.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tolerance: Option<f64>,
-    /// c: the part of the neighbours' mean relative velocity that a substep of PBF, or a frame of FLIP, takes
-    /// over, 0 to 1 (Schechter and Bridson 2012; Macklin and Müller 2013, eq. 17).
+    /// c in [0, 1]: the part of the neighbours' mean relative velocity that a substep of PBF, or a
+    /// frame of FLIP, adopts (Schechter and Bridson 2012; Macklin and Müller 2013, eq. 17).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub xsph: Option<f64>,
 }
 
-/// As a scene gives them: a tolerance that is left out is the default's.
+/// Settings as written in a scene, before the default tolerance is filled in.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Given {
@@ -52,7 +54,7 @@ impl From<Given> for Settings {
 }
 
 impl Settings {
-    /// Of so many Pa s.
+    /// Creates a Newtonian viscosity of `coefficient` Pa s with the default tolerance.
     pub fn newtonian(coefficient: f64) -> Self {
         Self {
             coefficient: Some(coefficient),
@@ -61,7 +63,7 @@ impl Settings {
         }
     }
 
-    /// XSPH's c.
+    /// Creates an XSPH viscosity with coefficient `c`.
     pub fn xsph(c: f64) -> Self {
         Self {
             coefficient: None,
@@ -70,8 +72,8 @@ impl Settings {
         }
     }
 
-    /// How its solve goes in a step of so many seconds in cells of edge `cell_size`, metres, of water of `density`, kg/m³; `None`
-    /// without a coefficient.
+    /// Returns the relaxation that solves a step of `time_step` seconds on cells of `cell_size`
+    /// metres for water of `density`, kg/m³; `None` without a coefficient.
     pub fn relaxation(&self, time_step: f64, cell_size: f64, density: f64) -> Option<Relaxation> {
         let (coefficient, tolerance) = self.coefficient.zip(self.tolerance)?;
         Some(Relaxation::new(
@@ -96,7 +98,7 @@ impl Effect for Settings {
             .computed(|| TOLERANCE.to_string())
             .with("coefficient")
             .about("to which part of what it was a substep's solve brings the error of the velocities"),
-        // A millionth is what a frame of 32-bit velocities hardly shows.
+        // Below a millionth, a frame of 32-bit velocities hardly changes.
         Key::number("xsph", 1e-6..=1.0)
             .absent()
             .without(&["coefficient"])
@@ -117,8 +119,8 @@ impl Effect for Settings {
         }
     }
 
-    /// XSPH's mean of the neighbours' velocities is what the grid holds: c is a further part taken from it, without a
-    /// pass of its own.
+    /// The grid already holds XSPH's mean of the neighbours' velocities, so c adds to the PIC blend
+    /// and needs no pass of its own.
     fn blend(&self) -> f64 {
         self.xsph.unwrap_or(0.0)
     }

@@ -8,7 +8,7 @@ use super::{super::key::Key, Effect};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Settings {
-    /// ε: metres per second squared for each 1/s of vorticity and metre of support radius (PBF) or cell (FLIP).
+    /// ε, m/s² per 1/s of vorticity and per metre of support radius (PBF) or cell size (FLIP).
     pub strength: f64,
 }
 
@@ -17,7 +17,7 @@ impl Effect for Settings {
         "Vorticity confinement (Macklin and Müller 2013; on the grid Fedkiw et al. 2001)";
 
     const KEYS: &'static [Key] = &[
-        // A millionth is what a frame of 32-bit velocities hardly shows.
+        // Below a millionth, a frame of 32-bit velocities hardly changes.
         Key::number("strength", 1e-6..=100.0)
             .about("ε, metres per second squared for each 1/s of vorticity and metre of support radius (PBF) or cell (FLIP)"),
     ];

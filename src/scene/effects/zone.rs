@@ -1,4 +1,5 @@
-//! Zones before walls in which water is led towards a velocity: what those that absorb and those that generate share.
+//! Zones in front of walls in which the velocity is relaxed towards a target; shared by absorbing
+//! and generating zones.
 
 use glam::DVec3;
 
@@ -7,20 +8,21 @@ use super::{
     Surroundings,
 };
 
-/// Zones of one length before some of the domain's walls.
+/// Zones of equal length in front of some walls of the domain.
 #[derive(Clone, Copy, Debug)]
 pub struct Zone<'a> {
-    /// Walls before which one lies, each once.
+    /// Walls with a zone, each listed once.
     pub walls: &'a [Wall],
-    /// Of each from its wall, metres.
+    /// Length of each zone from its wall, metres.
     pub length: f64,
-    /// At which velocities are led at the wall, 1/s.
+    /// Relaxation rate at the wall, 1/s.
     pub rate: f64,
 }
 
 impl Zone<'_> {
-    /// How far into the zone a place lies, metres from the domain's least corner: 0 where it begins and before, 1 at the
-    /// wall. The domain has `size`, metres.
+    /// Returns the depth of a position within the zone: 0 at its beginning and outside, 1 at
+    /// the wall. `place` is relative to the domain's least corner and `size` is the
+    /// domain's, both in metres.
     pub fn way(&self, size: DVec3, place: DVec3) -> f64 {
         let off = |wall: &Wall| match wall.is_max {
             false => place[wall.axis],
@@ -30,20 +32,20 @@ impl Zone<'_> {
         ways.fold(0.0, f64::max).min(1.0)
     }
 
-    /// Part of the way from its velocity to the wanted one that water at that place is led in a step of so many seconds: r Δt / (1 + r Δt), with
-    /// r the rate times the square of the way into the zone.
+    /// Returns the fraction by which the velocity at a position approaches the target in `step`
+    /// seconds: r Δt / (1 + r Δt), where r is the rate times the squared depth in the zone.
     pub fn led(&self, size: DVec3, place: DVec3, step: f64) -> f64 {
         let way = self.way(size, place);
         let led = self.rate * step * way * way;
         led / (1.0 + led)
     }
 
-    /// A bit a wall: of the least faces along x, y and z, then of the greatest.
+    /// Returns the mask of the zone's walls, made of [`Wall::bit`].
     pub fn bits(&self) -> u32 {
         self.walls.iter().map(Wall::bit).sum()
     }
 
-    /// Refuses walls and a length that do not fit into the scene; `effect` is the zone's key.
+    /// Rejects walls and lengths that do not fit the scene; `effect` is the zone's key.
     pub(super) fn check(
         &self,
         doc: &Document<'_>,

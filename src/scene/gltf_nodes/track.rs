@@ -1,4 +1,4 @@
-//! Values over time, as the animations of glTF join them (glTF 2.0, appendix C).
+//! Animated values with glTF's interpolation (glTF 2.0, appendix C).
 
 use glam::{DQuat, DVec3, DVec4};
 use gltf::animation::{Interpolation, Sampler, util::Rotations};
@@ -6,18 +6,18 @@ use gltf::animation::{Interpolation, Sampler, util::Rotations};
 /// A value over time.
 #[derive(Clone, Debug)]
 pub(super) struct Track<T> {
-    /// Seconds, ascending; one of a value that stays.
+    /// Key times, seconds, ascending; a single one for a constant.
     pub(super) times: Vec<f64>,
-    /// One a time; three where cubic: slope before, value, slope after.
+    /// One value per time, or three for cubic splines: in-tangent, value, out-tangent.
     values: Vec<T>,
     interpolation: Interpolation,
 }
 
-/// What tracks hold: how values are joined.
+/// Interpolation of values.
 pub(super) trait Blend: Copy {
-    /// On the way from one to the other.
+    /// Interpolates towards `other`; `part` is in [0, 1].
     fn between(self, other: Self, part: f64) -> Self;
-    /// The sum of four with weights, as a value again.
+    /// Returns the weighted sum of four values, normalized where the type requires it.
     fn weighted(values: [Self; 4], weights: [f64; 4]) -> Self;
 }
 
@@ -33,7 +33,7 @@ impl Blend for DVec3 {
 
 impl Blend for DQuat {
     fn between(self, other: Self, part: f64) -> Self {
-        // The shorter way round: glam takes it too.
+        // The shorter arc, which `slerp` takes.
         self.slerp(other, part)
     }
 
@@ -46,7 +46,7 @@ impl Blend for DQuat {
 }
 
 impl<T: Blend + PartialEq> Track<T> {
-    /// When it has a key, seconds; nothing where its values are all one.
+    /// Returns the key times, seconds; empty if all values are equal.
     pub(super) fn times_moved(&self) -> &[f64] {
         match self.values.iter().any(|value| *value != self.values[0]) {
             true => &self.times,
@@ -64,12 +64,13 @@ impl<T: Blend> Track<T> {
         }
     }
 
-    /// Whether it jumps from key to key.
+    /// Whether the value changes in steps.
     pub(super) fn jumps(&self) -> bool {
         self.interpolation == Interpolation::Step && self.times.len() > 1
     }
 
-    /// The first value before the first time, the last one after the last (glTF 2.0, appendix C).
+    /// Returns the value at a time; before the first key and after the last it is constant (glTF
+    /// 2.0, appendix C).
     pub(super) fn at(&self, seconds: f64) -> T {
         let is_cubic = self.interpolation == Interpolation::CubicSpline;
         let value = |k: usize| self.values[if is_cubic { 3 * k + 1 } else { k }];
@@ -107,10 +108,10 @@ impl<T: Blend> Track<T> {
     }
 }
 
-/// Rotations over time.
+/// Builds a track of rotations, normalized.
 ///
 /// # Errors
-/// As [`track`].
+/// Those of [`track`].
 pub(super) fn rotations(
     times: Vec<f64>,
     values: Rotations<'_>,
@@ -120,7 +121,7 @@ pub(super) fn rotations(
         .map(|q| DQuat::from_array(q.map(f64::from)))
         .collect();
     let mut track = track(times, values, sampler)?;
-    // Slopes of a cubic are no rotations.
+    // The tangents of a cubic spline are not rotations.
     let stride = match track.interpolation {
         Interpolation::CubicSpline => 3,
         _ => 1,
@@ -131,10 +132,10 @@ pub(super) fn rotations(
     Ok(track)
 }
 
-/// Values over time.
+/// Builds a track of values.
 ///
 /// # Errors
-/// In words where there are not as many as there are times, or where these do not ascend.
+/// A description if the numbers of times and values do not match or the times do not ascend.
 pub(super) fn track<T: Blend>(
     times: Vec<f64>,
     values: Vec<T>,

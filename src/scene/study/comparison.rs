@@ -1,4 +1,4 @@
-//! `kind = "solver_comparison"`: two solvers on one scene, seen with one look.
+//! `kind = "solver_comparison"`: two solvers on one scene, rendered with one look.
 
 use std::path::Path;
 
@@ -16,16 +16,16 @@ use super::{
 };
 use swell_domain::frame_range::FrameRange;
 
-/// Two solvers on one scene, side by side.
+/// Comparison of two solvers on one scene.
 #[derive(Clone, Debug)]
 pub struct SolverComparison {
     /// The scene with each solver, left and right.
     pub scenes: [Scene; 2],
-    /// Same for both.
+    /// Look of both.
     pub look: Look,
-    /// Frames that are measured.
+    /// Frames to measure.
     pub frames: FrameRange,
-    /// Frames that are rendered.
+    /// Frames to render.
     pub pictures: FrameRange,
 }
 
@@ -43,7 +43,7 @@ struct ComparisonSpec {
     pictures: Spanned<String>,
 }
 
-/// The rest of a document of this kind; files are relative to `base_dir`.
+/// Parses the remaining keys of this kind; paths are relative to `base_dir`.
 pub(super) fn parse(
     doc: &Document<'_>,
     root: Spanned<DeTable<'_>>,
@@ -87,7 +87,7 @@ fn load(
         .map(|set| (set.get_ref().clone(), set.span()));
     let chosen = (solver.as_override(), spec.solvers.span());
     let mut scene = load_with(doc, file, sets.chain([chosen]))?;
-    // Each frame is measured.
+    // Every frame is measured, so all must be kept.
     scene.keep = None;
     Ok(scene)
 }
@@ -104,15 +104,15 @@ fn solvers(doc: &Document<'_>, spec: &Spanned<Vec<String>>) -> Result<[Method; 2
     }
 }
 
-/// Every frame of a shot of `last` frames.
+/// Returns the range of all frames of a shot.
 ///
 /// # Panics
-/// Never: a scene's shot has 1 to 10⁶ frames, and a range takes ten times as many.
+/// Never: a shot has 1 to 10⁶ frames, and a range allows ten times as many.
 fn whole_shot(last: u32) -> FrameRange {
     FrameRange::inclusive(1, last).expect("a validated shot")
 }
 
-/// Frames from 1 to the shot's last.
+/// Parses a range of frames within the shot.
 fn range(doc: &Document<'_>, text: &Spanned<String>, last: u32) -> Result<FrameRange, SceneError> {
     let fault = |problem: String| doc.fault_at(text.span(), problem);
     let frames: FrameRange = text

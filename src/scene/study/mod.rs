@@ -1,8 +1,9 @@
-//! Study files: what is to be compared, on which scene.
+//! Study files: comparisons to run on scenes.
 //!
-//! One file a kind: [`comparison`] sets two solvers side by side, [`sweep`] runs a scene over and over, with one
-//! setting changed at a time, [`stability`] runs scenes that are hard on a solver, [`validation`] those whose answer is known, [`surface`]
-//! draws one scene's frames with one setting of the look changed at a time. [`tune`] is what a command line asks for.
+//! Each kind has a module: [`comparison`] compares two solvers, [`sweep`] runs a scene repeatedly
+//! with one setting changed at a time, [`stability`] runs scenes that are hard on a solver,
+//! [`validation`] runs scenes with known solutions, and [`surface`] renders a scene's frames with
+//! one setting of the look changed at a time. [`tune`] is requested on the command line.
 
 pub mod comparison;
 pub mod stability;
@@ -32,7 +33,7 @@ use sweep::Sweep;
 use tune::Tune;
 use validation::Validation;
 
-/// A validated study: every file that it names read.
+/// A validated study, with every referenced file read.
 #[derive(Clone, Debug)]
 pub enum Study {
     /// `kind = "solver_comparison"`.
@@ -43,23 +44,23 @@ pub enum Study {
     Stability(Box<Stability>),
     /// `kind = "surface"`.
     Surface(Box<SurfaceStudy>),
-    /// Of no file: what `swell tune` runs.
+    /// Study of `swell tune`, which has no file.
     Tune(Box<Tune>),
     /// `kind = "validation"`.
     Validation(Box<Validation>),
 }
 
-/// What a run is on.
+/// Device of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum RunsOn {
-    /// The study's adapter, in f32.
+    /// The study's GPU adapter, in `f32`.
     Gpu,
-    /// The f64 reference.
+    /// The `f64` reference on the CPU.
     Cpu,
 }
 
 impl RunsOn {
-    /// As studies name it.
+    /// Returns the name used in studies.
     pub fn name(self) -> &'static str {
         match self {
             Self::Gpu => "gpu",
@@ -67,7 +68,7 @@ impl RunsOn {
         }
     }
 
-    /// What a word of a study names.
+    /// Returns the device with this name.
     fn named(word: &str) -> Option<Self> {
         [Self::Gpu, Self::Cpu]
             .into_iter()
@@ -78,31 +79,31 @@ impl RunsOn {
 /// Why a study could not be loaded.
 #[derive(Debug, thiserror::Error)]
 pub enum StudyFileError {
-    /// The study file itself, or its scene.
+    /// Fault in the study file or in its scene.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// Its look.
+    /// Fault in its look.
     #[error(transparent)]
     Look(#[from] LookError),
 }
 
-/// What every kind says; the rest is read by the kind.
+/// The key common to all kinds, which selects the parser of the others.
 #[derive(Deserialize)]
 struct KindSpec {
     kind: String,
 }
 
 impl Study {
-    /// Loads a study file and what it names; paths are relative to it. Scene and look may lie anywhere; the files that
-    /// these name in turn stay below their folders.
+    /// Loads a study file and the files that it names, relative to it. Its scene and look may be
+    /// anywhere; files that these name must be below their folders.
     ///
     /// # Errors
-    /// [`StudyFileError`], with file, line and key.
+    /// [`StudyFileError`] with file, line and key.
     pub fn load(path: &Path) -> Result<Self, StudyFileError> {
         Self::load_within(path, Reach::Folder)
     }
 
-    /// [`Self::load`] where the scenes and looks may name files from as far as `reach` says.
+    /// Loads as [`Self::load`] does, with the files of scenes and looks resolved within `reach`.
     ///
     /// # Errors
     /// Those of [`Self::load`].
@@ -115,8 +116,8 @@ impl Study {
         Self::parse_within(&text, path, base_dir, reach)
     }
 
-    /// [`Self::load`] on a text; `file` names it in messages, `base_dir` is where relative paths
-    /// start.
+    /// Parses a study as [`Self::load`] does; `file` names it in messages, and relative paths
+    /// start at `base_dir`.
     ///
     /// # Errors
     /// Those of [`Self::load`].
@@ -149,7 +150,7 @@ impl Study {
                 let surface = surface::parse(&doc, root, base_dir)?;
                 Ok(Self::Surface(Box::new(surface)))
             }
-            // The table of keys has no other.
+            // The table of keys allows no other kind.
             _ => {
                 let validation = validation::parse(&doc, root, base_dir)?;
                 Ok(Self::Validation(Box::new(validation)))
@@ -159,7 +160,7 @@ impl Study {
 }
 
 impl Study {
-    /// What a user has to know of its scenes, each sentence once.
+    /// Returns the warnings of its scenes, without duplicates.
     pub fn warnings(&self) -> Vec<String> {
         let mut warnings: Vec<String> = Vec::new();
         let mut of = |scene: &Scene| {
@@ -188,7 +189,7 @@ impl Study {
     }
 }
 
-/// That the scene which a study names cannot be read, at its place in the study.
+/// Error that the scene named by a study cannot be read, located in the study.
 fn unreadable(
     doc: &Document<'_>,
     named: &Spanned<String>,
@@ -202,7 +203,7 @@ fn unreadable(
     )
 }
 
-/// A scene file that a study names.
+/// A scene file named by a study.
 struct SceneFile<'a> {
     named: &'a Spanned<String>,
     path: PathBuf,
@@ -215,8 +216,8 @@ impl<'a> SceneFile<'a> {
     }
 }
 
-/// The scene with overrides; what is wrong with one of them, or with the name of its file, is said at its place in the
-/// study file.
+/// Loads the scene with overrides. Faults in an override or in the name of the file are located
+/// in the study file.
 fn load_with(
     doc: &Document<'_>,
     file: &SceneFile<'_>,
@@ -272,7 +273,7 @@ mod tests {
                 }
                 Study::Stability(stability) => {
                     assert!(!stability.cases.is_empty());
-                    // As far as a search goes, no range of a key is in its way.
+                    // Over the whole search, values stay within the ranges of the keys.
                     for limit in &stability.limits {
                         for value in [limit.passes, limit.fails] {
                             let loaded = limit.searches.iter().map(|search| search.trial(value));

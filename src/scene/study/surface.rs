@@ -1,17 +1,18 @@
-//! `kind = "surface"`: frames of a scene drawn over and over, with one setting of the look changed at a time.
+//! `kind = "surface"`: frames of a scene rendered repeatedly, with one setting of the look
+//! changed at a time.
 //!
 //! ```toml
 //! kind = "surface"
-//! scene = "../quickstart.toml"            # baked first, as far as the last of the frames
-//! look = "../looks/day.toml"              # camera and light; what the truth is drawn with
+//! scene = "../quickstart.toml"            # baked first, up to the last of the frames
+//! look = "../looks/day.toml"              # camera and light; also renders the reference
 //! frames = "40,68"
-//! repeats = 3                             # times are medians over so many
+//! repeats = 3                             # times are medians over this many runs
 //! errors = ["normal_off", "silhouette"]
 //!
-//! [[line]]                                # of the curves
+//! [[line]]                                # one curve each
 //! name = "curvature flow"
-//! set = ["surface.filter=curvature_flow"] # laid over the look
-//! key = "surface.smoothing_width_m"       # what changes from point to point
+//! set = ["surface.filter=curvature_flow"] # applied to the look
+//! key = "surface.smoothing_width_m"       # changes from point to point
 //! values = [0.0, 0.1, 0.2]
 //! ```
 
@@ -31,7 +32,7 @@ use super::{
 };
 use swell_domain::frame_range::FrameRange;
 
-/// Keys of a look that change how water is drawn, and nothing of what is true of it.
+/// Keys of a look that change the rendering of the water but not its reference.
 const SWEPT: [&str; 7] = [
     "surface.filter",
     "surface.splat",
@@ -42,23 +43,22 @@ const SWEPT: [&str; 7] = [
     "image.samples",
 ];
 
-/// Most points of a study.
 const MOST_POINTS: usize = 1000;
 
-/// A validated study of the drawn surface.
+/// A validated study of the rendered surface.
 #[derive(Clone, Debug)]
 pub struct SurfaceStudy {
-    /// In the reader's words, for the page; paragraphs.
+    /// Introduction for the page, in paragraphs.
     pub about: Vec<String>,
-    /// What is baked.
+    /// Scene to bake.
     pub scene: Scene,
-    /// Camera and light, and what the truth is drawn with.
+    /// Camera and light; also renders the reference.
     pub look: Look,
-    /// Frames that are drawn and measured.
+    /// Frames to render and measure.
     pub frames: FrameRange,
-    /// Times that each point is drawn.
+    /// Number of times that each point is rendered.
     pub repeats: u32,
-    /// What is measured; not empty.
+    /// Measured errors, at least one.
     pub errors: Vec<PictureError>,
     /// Curves.
     pub lines: Vec<Line>,
@@ -67,47 +67,47 @@ pub struct SurfaceStudy {
 /// One curve.
 #[derive(Clone, Debug)]
 pub struct Line {
-    /// For the legend.
+    /// Name for the legend.
     pub name: String,
-    /// What changes from point to point.
+    /// Key that changes from point to point.
     pub key: String,
-    /// In the order of the file.
+    /// Points in the order of the file.
     pub points: Vec<Point>,
 }
 
-/// One setting.
+/// One setting of a curve.
 #[derive(Clone, Debug)]
 pub struct Point {
-    /// The value as the file has it.
+    /// The value as written in the file.
     pub label: String,
-    /// With every override laid over it.
+    /// The look with all overrides.
     pub look: Look,
 }
 
 impl SurfaceStudy {
-    /// Settings of all lines.
+    /// Returns the points of all curves.
     pub fn points(&self) -> impl Iterator<Item = &Point> {
         self.lines.iter().flat_map(|line| &line.points)
     }
 }
 
-/// What a picture is off by, as the curves show it.
+/// Error of a picture, as plotted by the curves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PictureError {
-    /// Depths against rays in f64, median, spacings.
+    /// Median difference of depths from `f64` ray casting, spacings.
     Depth,
-    /// Normals against rays in f64, median, degrees.
+    /// Median angle between normals and those of `f64` ray casting, degrees.
     Normal,
-    /// Roughness of silhouettes against those of rays in f64, spacings.
+    /// Roughness of silhouettes relative to those of `f64` ray casting, spacings.
     Silhouette,
-    /// How far silhouettes stand from those of rays in f64 on average, spacings.
+    /// Mean distance of silhouettes from those of `f64` ray casting, spacings.
     Offset,
-    /// 100 − SSIMULACRA 2 against finer rays.
+    /// 100 − SSIMULACRA 2 score against finer rays.
     Colour,
 }
 
 impl PictureError {
-    /// With the names that studies use.
+    /// All errors with the names used in studies.
     pub const NAMED: [(&'static str, Self); 5] = [
         ("depth_off", Self::Depth),
         ("normal_off", Self::Normal),
@@ -116,12 +116,12 @@ impl PictureError {
         ("colour", Self::Colour),
     ];
 
-    /// As studies name it.
+    /// Returns the name used in studies.
     pub fn name(self) -> &'static str {
         Self::NAMED[self as usize].0
     }
 
-    /// In words with its unit, for an axis.
+    /// Returns the title of an axis, with its unit.
     pub fn title(self) -> &'static str {
         match self {
             Self::Depth => "depth off rays in f64, median, spacings",
@@ -159,7 +159,7 @@ struct LineSpec {
     values: Spanned<Vec<Spanned<Value>>>,
 }
 
-/// The rest of a document of this kind; files are relative to `base_dir`.
+/// Parses the remaining keys of this kind; paths are relative to `base_dir`.
 pub(super) fn parse(
     doc: &Document<'_>,
     root: Spanned<DeTable<'_>>,
@@ -172,7 +172,7 @@ pub(super) fn parse(
         .iter()
         .map(|set| (set.get_ref().clone(), set.span()));
     let mut scene = load_with(doc, &SceneFile::new(&spec.scene, base_dir), sets)?;
-    // Frames that are drawn have to be there.
+    // Frames to render must be kept.
     scene.keep = None;
     let frames = frames(doc, &spec.frames, scene.shot.frames)?;
     let file = base_dir.join(spec.look.get_ref());
@@ -272,7 +272,7 @@ fn read_line(doc: &Document<'_>, line: &LineSpec, file: &Path) -> Result<Line, S
     })
 }
 
-/// The look with overrides; what is wrong with one of them is said at its place in the study file.
+/// Loads the look with overrides. Faults in an override are located in the study file.
 fn load_look(
     doc: &Document<'_>,
     file: &Path,

@@ -1,25 +1,27 @@
-//! `kind = "sweep"`: one scene over and over, with one setting changed at a time, by one or more methods.
+//! `kind = "sweep"`: one scene run repeatedly, with one setting changed at a time, by one
+//! or more methods.
 //!
 //! ```toml
 //! kind = "sweep"
 //! scene = "../dam-break.toml"
-//! set = ["solver.pbf.particle_spacing=0.1"]   # laid over the scene in every run, as --set does
-//! key = "solver.pbf.iterations"               # what changes from run to run
+//! set = ["solver.pbf.particle_spacing=0.1"]   # applied to the scene in every run, like --set
+//! key = "solver.pbf.iterations"               # changes from run to run
 //! values = [2, 4, 8, 16]                      # from coarse to fine
 //! seconds = 2.0                               # of the shot; or steps = 120, output frames
-//! repeats = 3                                 # times are medians over so many
+//! repeats = 3                                 # times are medians over this many runs
 //! errors = ["density_error_mean"]
 //!
-//! [[method]]                                  # a line of the curves each
+//! [[method]]                                  # one curve each
 //! name = "red/black"
-//! set = ["solver.pbf.iteration=red_black"]    # key and values may stand here as well, for this line alone
+//! set = ["solver.pbf.iteration=red_black"]    # key and values may also be set here, for this line
 //! device = "gpu"                              # or "cpu", the f64 reference
-//! against = "jacobi"                          # value by value against that method, not against the own finest run
+//! against = "jacobi"                          # compare with that method, not the own finest run
 //! ```
 //!
-//! `key = "device"` with the values `"cpu"` and `"gpu"` sweeps what it runs on. `coarser = ["solver.flip.cell_size=0.4"]`, for
-//! all or for one method, is laid over the last value's run: what that is off by is the discretisation error, beside which
-//! the knee is told.
+//! `key = "device"` with the values `"cpu"` and `"gpu"` sweeps the device. `coarser =
+//! ["solver.flip.cell_size=0.4"]`, for all methods or for one, is applied to the run of the
+//! last value; the difference estimates the discretisation error, which is reported with the
+//! knee of the curve.
 
 mod fit;
 
@@ -34,53 +36,54 @@ use super::{
 };
 use fit::{check_coarser, check_converged, check_fit, check_weighed};
 
-/// The key that changes the length of a frame.
+/// Key that changes the length of a frame.
 pub const FRAME_RATE: &str = "shot.frames_per_second";
 
-/// The key that changes what a run is on, and nothing in the scene.
+/// Key that changes the device of a run and nothing in the scene.
 const DEVICE: &str = "device";
 
-/// Times, equally spaced, at which a run is compared with the finest.
+/// Number of equally spaced times at which a run is compared with the finest.
 pub const SAMPLES: u32 = 10;
 
-/// Most runs of a study.
 const MOST_POINTS: usize = 1000;
 
-/// A validated sweep: every point's scene is loaded.
+/// A validated sweep, with the scene of every point loaded.
 #[derive(Clone, Debug)]
 pub struct Sweep {
-    /// In the reader's words, for the page; paragraphs.
+    /// Introduction for the page, in paragraphs.
     pub about: Vec<String>,
     /// Curves.
     pub lines: Vec<Line>,
-    /// Times that each point runs.
+    /// Number of times that each point runs.
     pub repeats: u32,
-    /// What is measured; not empty, all of one [`Measure`].
+    /// Measured errors: at least one, all with the same [`Measure`].
     pub errors: Vec<ErrorMeasure>,
-    /// What a projection is measured on, after its frames; only of that measure.
+    /// State on which projections are measured, after its frames; only with
+    /// [`Measure::Projection`].
     pub state: Option<Point>,
-    /// Whether the convergence point of the paper's Table 1 is looked for.
+    /// Whether to determine the convergence point of the paper's Table 1.
     pub has_convergence_point: bool,
 }
 
 /// One method: a curve.
 #[derive(Clone, Debug)]
 pub struct Line {
-    /// For the legend.
+    /// Name for the legend.
     pub name: String,
-    /// The line whose run of the same value each of these is held against; its own finest run where `None`. Only of
-    /// [`Measure::Finest`].
+    /// Index of the line whose runs these are compared with, value by value; `None` compares with
+    /// the own finest run. Only with [`Measure::Finest`].
     pub against: Option<usize>,
-    /// The key that is swept.
+    /// Key that is swept.
     pub key: String,
-    /// From coarse to fine.
+    /// Points from coarse to fine.
     pub points: Vec<Point>,
-    /// The last of them, coarser: what its error is told beside. Of [`Measure::Finest`] and [`Measure::Projection`].
+    /// A coarser run at the last value, which estimates the discretisation error. Only with
+    /// [`Measure::Finest`] and [`Measure::Projection`].
     pub coarser: Option<Point>,
 }
 
 impl Sweep {
-    /// Settings of all methods, without what is coarser.
+    /// Returns the points of all methods, without the coarser ones.
     pub fn points(&self) -> impl Iterator<Item = &Point> {
         self.lines.iter().flat_map(|line| &line.points)
     }
@@ -89,49 +92,51 @@ impl Sweep {
 /// One setting of one method.
 #[derive(Clone, Debug)]
 pub struct Point {
-    /// The value as the file has it.
+    /// The value as written in the file.
     pub label: String,
-    /// With every override laid over it.
+    /// The scene with all overrides.
     pub scene: Scene,
-    /// Output frames to run.
+    /// Number of output frames to run.
     pub frames: u32,
-    /// What it runs on.
+    /// Device of the run.
     pub device: RunsOn,
 }
 
 /// How errors are measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Measure {
-    /// From each frame's report or pressures, averaged over the frames or those of the second half.
+    /// From each frame's report or pressures, averaged over the frames or their second half.
     Report,
-    /// At the same times against the finest run of the same line, the last of its values, or another line's run.
+    /// At the same times, against the finest run of the same line (the last value) or the run
+    /// of another line.
     Finest,
-    /// From the end of the last frame on: how far the particles are from where their constraints hold.
+    /// After the last frame: distance of the particles from the solution of their constraints.
     Converged,
-    /// One projection of one fixed state, against the exact solution of the same system in f64.
+    /// One projection of a fixed state, against the exact solution of the same system in `f64`.
     Projection,
 }
 
-/// An error, as the curves show it.
+/// An error, as plotted by the curves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ErrorMeasure {
     /// Mean of max(0, ρ/ρ0 − 1).
     DensityMean,
-    /// Its 99th percentile.
+    /// 99th percentile of the same.
     DensityP99,
-    /// Its maximum.
+    /// Maximum of the same.
     DensityMax,
-    /// Largest speed of a particle in the run's second half.
+    /// Largest speed of a particle in the second half of the run.
     TopSpeed,
-    /// |p / (ρ g depth) − 1| at the scene's probes of pressure, depth under the level of the start, in the run's second half.
+    /// |p / (ρ g depth) − 1| at the scene's pressure probes in the second half of the run, where
+    /// depth is below the initial level.
     Weight,
-    /// Height of the crest against the finest run.
+    /// Height of the crest, against the finest run.
     Crest,
-    /// Place of the front against the finest run.
+    /// Position of the front, against the finest run.
     Front,
-    /// Energy per mass against the finest run.
+    /// Energy per mass, against the finest run.
     Energy,
-    /// Elevation along the wave's way against the finest run.
+    /// Elevation along the direction of the wave, against the finest run.
     Profile,
     /// ‖p − p64‖ / ‖p64‖.
     Pressure,
@@ -139,12 +144,13 @@ pub enum ErrorMeasure {
     Velocity,
     /// Largest |∇·u| Δt after the projection.
     Divergence,
-    /// RMS over the particles of the way to where Newton's method meets their constraints, in spacings.
+    /// RMS distance of the particles from where Newton's method satisfies their
+    /// constraints, in spacings.
     DistanceToConverged,
 }
 
 impl ErrorMeasure {
-    /// With the names that studies use.
+    /// All errors with the names used in studies.
     pub const NAMED: [(&'static str, Self); 13] = [
         ("density_error_mean", Self::DensityMean),
         ("density_error_p99", Self::DensityP99),
@@ -161,12 +167,12 @@ impl ErrorMeasure {
         ("distance_to_converged", Self::DistanceToConverged),
     ];
 
-    /// As studies name it.
+    /// Returns the name used in studies.
     pub fn name(self) -> &'static str {
         Self::NAMED[self as usize].0
     }
 
-    /// What it takes to measure it.
+    /// Returns how the error is measured.
     pub fn measure(self) -> Measure {
         match self {
             Self::DensityMean
@@ -180,7 +186,7 @@ impl ErrorMeasure {
         }
     }
 
-    /// In words with its unit, for an axis.
+    /// Returns the title of an axis, with its unit.
     pub fn title(self) -> &'static str {
         match self {
             Self::DensityMean => "density error, mean",
@@ -233,7 +239,7 @@ struct MethodSpec {
     against: Option<Spanned<String>>,
 }
 
-/// The rest of a document of this kind; files are relative to `base_dir`.
+/// Parses the remaining keys of this kind; paths are relative to `base_dir`.
 pub(super) fn parse(
     doc: &Document<'_>,
     root: Spanned<DeTable<'_>>,
@@ -315,7 +321,7 @@ fn errors(
     Ok(errors)
 }
 
-/// What projections start from: the scene with what is set for all.
+/// Loads the state that projections start from: the scene with the common settings.
 fn state(doc: &Document<'_>, spec: &SweepSpec, base_dir: &Path) -> Result<Point, SceneError> {
     let fixed: Vec<_> = spec.set.iter().collect();
     let scene = load(doc, spec, base_dir, &fixed, None)?;
@@ -331,7 +337,7 @@ fn state(doc: &Document<'_>, spec: &SweepSpec, base_dir: &Path) -> Result<Point,
     })
 }
 
-/// The line that the line at `place` is held against.
+/// Returns the index of the line that the line at `place` is compared with.
 fn against(
     doc: &Document<'_>,
     name: &Spanned<String>,
@@ -358,7 +364,7 @@ fn against(
     Ok(found)
 }
 
-/// What a word of the study, at `at`, says that is run on.
+/// Returns the device named by `word`, which is at `at` in the study.
 fn device(
     doc: &Document<'_>,
     spec: &SweepSpec,
@@ -392,7 +398,7 @@ fn line(
     let values = method.values.as_ref().or(spec.values.as_ref());
     let values = values.ok_or_else(|| doc.missing(at, "values"))?;
     let fixed: Vec<_> = spec.set.iter().chain(&method.set).collect();
-    // The rate that the scene itself has, to which what is taken a frame is tied.
+    // The scene's own rate, to which quantities per frame are tied.
     let own_rate = load(doc, spec, base_dir, &fixed, None)?
         .shot
         .frames_per_second;
@@ -476,7 +482,7 @@ fn line(
     })
 }
 
-/// The scene with what is set and swept.
+/// Loads the scene with fixed and swept settings.
 fn load(
     doc: &Document<'_>,
     spec: &SweepSpec,
@@ -489,8 +495,9 @@ fn load(
     load_with(doc, &file, fixed.chain(swept))
 }
 
-/// FLIP's `pic_blend` is a part of the velocity a frame: over as many seconds each rate is to take the same part,
-/// α = 1 − (1 − α_ref)^(Δt / Δt_ref), or halving Δt would double the dissipation.
+/// Rescales FLIP's `pic_blend`, a fraction per frame, so that every frame rate takes the
+/// same part per second: α = 1 − (1 − α_ref)^(Δt / Δt_ref). Otherwise halving Δt would
+/// double the dissipation.
 fn tie_pic_blend(scene: &mut Scene, own_rate: f64) {
     let exponent = own_rate / scene.shot.frames_per_second;
     if let Some(flip) = &mut scene.solver.flip {
@@ -498,7 +505,7 @@ fn tie_pic_blend(scene: &mut Scene, own_rate: f64) {
     }
 }
 
-/// Output frames of a run of this scene.
+/// Returns the number of output frames of a run of this scene.
 fn frames(doc: &Document<'_>, spec: &SweepSpec, scene: &Scene) -> Result<u32, SceneError> {
     let rate = scene.shot.frames_per_second;
     let Some(seconds) = &spec.seconds else {

@@ -1,7 +1,8 @@
-//! What `swell tune` runs: twins of a shot, coarser than it is and with other settings, and one finer that they are held against.
+//! Runs of `swell tune`: variants of a shot that are coarser or have other settings, and a
+//! finer reference run.
 //!
-//! No file has this kind of study: a command line says it. The scene's own settings are run at several spacings, and at the
-//! coarsest of them one setting is changed at a time.
+//! This kind of study has no file; the command line specifies it. The scene's own settings are run
+//! at several spacings, and one setting at a time is changed at the coarsest of them.
 
 mod limit;
 
@@ -16,72 +17,75 @@ use super::super::{
 
 pub use limit::{Bound, Limit, Quantity};
 
-/// Spacings of the twins over the reference's, from coarse to fine.
+/// Spacings of the runs over that of the reference, from coarse to fine.
 const LADDER: [f64; 4] = [2.5, 2.0, 1.6, 1.25];
 
-/// How far a twin's spacing may be from its place on the ladder to fit the water better, and steps there.
+/// Largest relative change of a spacing on the ladder to fit the water better, and the number of
+/// steps tried in each direction.
 const NEAR: f64 = 0.08;
 const STEPS: i32 = 16;
 
-/// Spacings that proposals choose from, before those are left out that do not fit the water.
+/// Number of spacings that proposals choose from, before those that do not fit the
+/// water are dropped.
 const CHOICES: i32 = 1000;
 
-/// A misfit that every spacing may have: 0.5 % of the height are as much of the energy, below what is asked for.
+/// Misfit that every spacing may have: 0.5 % of the height changes the energy by as much, which is
+/// below the limits requested.
 const FITS: f64 = 0.005;
 
-/// Parts of gravity by which the shaken twin has more.
+/// Relative increase of gravity in the noise-floor run.
 const SHAKEN: f64 = 1e-6;
 
-/// The greatest CFL number that scenes take.
+/// Largest CFL number that scenes accept.
 const MOST_CFL: f64 = 5.0;
 
-/// What is asked for.
+/// Options of a tuning request.
 #[derive(Clone, Debug)]
 pub struct TuneRequest {
-    /// Scene file.
+    /// Path of the scene file.
     pub scene: PathBuf,
     /// Solver in place of the scene's.
     pub solver: Option<Method>,
-    /// What has to be held; each quantity once.
+    /// Errors to limit; each quantity at most once.
     pub limits: Vec<Limit>,
-    /// The most that a frame may take, seconds.
+    /// Largest time per frame, seconds.
     pub per_frame: Option<f64>,
-    /// The most that the whole shot may take, seconds.
+    /// Largest time of the whole shot, seconds.
     pub seconds: Option<f64>,
-    /// Frames of a twin, from the first on; the whole shot where left out.
+    /// Number of frames to run from the first; the whole shot if left out.
     pub frames: Option<u32>,
     /// Spacing of the reference over the scene's own.
     pub reference: f64,
-    /// Runs of each twin; times are medians.
+    /// Runs per variant; times are medians.
     pub repeats: u32,
-    /// Where to write the scene with its settings.
+    /// File to write the tuned scene to.
     pub target: PathBuf,
-    /// How far the scene's paths lead.
+    /// How far the scene's paths may lead.
     pub reach: Reach,
 }
 
 /// Why a shot cannot be tuned.
 #[derive(Debug, thiserror::Error)]
 pub enum TuneError {
-    /// The scene, or a twin of it that nothing goes without.
+    /// Fault in the scene, or in a variant that tuning needs.
     #[error(transparent)]
     Scene(#[from] SceneError),
     /// An option that does not fit the scene.
     #[error("{option}: {problem}")]
     Option {
-        /// As typed.
+        /// The option as typed.
         option: &'static str,
         /// What is wrong, and what is allowed.
         problem: String,
     },
 }
 
-/// One setting of a twin.
+/// One setting of a run.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Setting {
-    /// Dotted.
+    /// Dotted key.
     pub key: &'static str,
-    /// As TOML has it.
+    /// The value as TOML.
     pub value: String,
 }
 
@@ -101,24 +105,24 @@ impl Setting {
     }
 }
 
-/// A run of the shot.
+/// A run of the shot with some settings changed.
 #[derive(Clone, Debug)]
 pub struct Twin {
-    /// What is laid over the scene.
+    /// Settings applied to the scene.
     pub set: Vec<Setting>,
-    /// With that laid over it.
+    /// The scene with these settings.
     pub scene: Scene,
 }
 
 impl Twin {
-    /// Settings in words, as they would stand in a scene.
+    /// Returns the settings as they would be written in a scene.
     pub fn name(&self) -> String {
         let words = self.set.iter();
         let words: Vec<_> = words.map(|s| format!("{} = {}", s.key, s.value)).collect();
         words.join(", ")
     }
 
-    /// What is changed from run to run beside other settings: PBF's particle spacing or FLIP's cell size, metres.
+    /// Returns PBF's particle spacing or FLIP's cell size, metres.
     pub fn spacing(&self) -> f64 {
         spacing(&self.scene)
     }
@@ -131,44 +135,46 @@ fn spacing(scene: &Scene) -> f64 {
     }
 }
 
-/// A setting beside the spacing, and the twins at the coarsest spacing that have another value of it.
+/// A setting other than the spacing, with runs at the coarsest spacing that change it.
 #[derive(Clone, Debug)]
 pub struct Knob {
-    /// Dotted.
+    /// Dotted key.
     pub key: &'static str,
-    /// The scene's own value, as TOML has it.
+    /// The scene's own value as TOML.
     pub own: String,
-    /// Other values: what is laid over the scene for each, with the twin at the coarsest spacing.
+    /// Other values: the settings for each, and its run at the coarsest spacing.
     pub others: Vec<(Vec<Setting>, Twin)>,
 }
 
-/// A shot and its twins.
+/// A shot and the runs that tune it.
 #[derive(Clone, Debug)]
 pub struct Tune {
-    /// What was asked for.
+    /// The request.
     pub request: TuneRequest,
-    /// As the file has it.
+    /// Text of the scene file.
     pub text: String,
-    /// As the file has it, by the chosen solver.
+    /// The scene of the file with the chosen solver.
     pub scene: Scene,
-    /// Frames of each twin.
+    /// Number of frames of each run.
     pub frames: u32,
-    /// With the scene's own settings at other spacings, from coarse to fine; two at least.
+    /// Runs with the scene's own settings at other spacings, from coarse to fine; at least two.
     pub ladder: Vec<Twin>,
-    /// What the others are held against: finer in each of the settings.
+    /// Run that the others are compared with: finer in every setting.
     pub reference: Twin,
-    /// At the coarsest spacing with the reference's other settings: what the others cost in accuracy is told beside it.
+    /// Run at the coarsest spacing with the reference's other settings; it isolates the error of
+    /// the settings from that of the spacing.
     pub fine: Twin,
-    /// The coarsest with a millionth more gravity: what it differs by is what no settings hold.
+    /// Noise-floor run: the coarsest with a millionth more gravity. Its difference is one that no
+    /// settings can undercut.
     pub shaken: Twin,
-    /// Settings beside the spacing.
+    /// Settings other than the spacing.
     pub knobs: Vec<Knob>,
-    /// What is not tried, in words.
+    /// Descriptions of what is not tried.
     pub untried: Vec<String>,
 }
 
 impl Tune {
-    /// The twins of a shot.
+    /// Loads the scene and builds all runs.
     ///
     /// # Errors
     /// [`TuneError`].
@@ -224,17 +230,18 @@ impl Tune {
         })
     }
 
-    /// The shot at a spacing, metres, with these settings as well.
+    /// Builds the run with this spacing, metres, and the settings `more`.
     ///
     /// # Errors
-    /// A scene that cannot be.
+    /// If the scene is invalid with them.
     pub fn twin(&self, spacing: f64, more: &[Setting]) -> Result<Twin, SceneError> {
         let key = spacing_key(self.scene.solver.method);
         let first = Setting::number(key, spacing);
         twin(&self.request, [&[first], more].concat())
     }
 
-    /// Spacings between two, metres, that fit the water as well as the twins' do: what proposals choose from.
+    /// Returns the spacings in a range, metres, that fit the water as well as those of the ladder;
+    /// proposals choose from them.
     pub fn spacings(&self, [finest, coarsest]: [f64; 2]) -> Vec<f64> {
         let worst = self
             .ladder
@@ -248,12 +255,12 @@ impl Tune {
         fitting
     }
 
-    /// The scene's own spacing, as TOML has it.
+    /// Returns the scene's own spacing as TOML.
     pub fn own_spacing(&self) -> String {
         shown(spacing(&self.scene))
     }
 
-    /// Every run that is known before the first, with the setting that it is there for.
+    /// Returns all runs known in advance, each with the setting that it is for.
     pub fn twins(&self) -> impl Iterator<Item = (&'static str, &Twin)> {
         let ladder = self.ladder.iter().map(|twin| ("spacing", twin));
         let knobs = self.knobs.iter();
@@ -266,7 +273,7 @@ impl Tune {
         ladder.chain(apart).chain(others).chain(last)
     }
 
-    /// The most seconds of a frame that the request leaves.
+    /// Returns the largest time per frame that the request allows, seconds.
     pub fn most_seconds(&self) -> Option<f64> {
         let shot = self.request.seconds;
         let shot = shot.map(|seconds| seconds / f64::from(self.scene.shot.frames));
@@ -274,7 +281,7 @@ impl Tune {
         both.into_iter().flatten().reduce(f64::min)
     }
 
-    /// Whether pressures are read.
+    /// Whether pressures are compared.
     pub fn has_pressure(&self) -> bool {
         let mut limits = self.request.limits.iter();
         limits.any(|limit| limit.quantity == Quantity::Pressure)
@@ -336,7 +343,7 @@ fn spacing_key(method: Method) -> &'static str {
     }
 }
 
-/// The scene with settings and further overrides.
+/// Loads the scene with settings and further overrides.
 fn laid(request: &TuneRequest, set: &[Setting], more: &[String]) -> Result<Scene, SceneError> {
     let solver = request.solver.map(Method::as_override);
     let set = set.iter().map(|s| format!("{}={}", s.key, s.value));
@@ -357,14 +364,14 @@ fn shake(scene: &Scene) -> String {
     )
 }
 
-/// Digits are enough for a spacing at four, and read well.
+/// Four digits are precise enough for a spacing, and readable.
 fn four_digits(value: f64) -> f64 {
     let scale = 10f64.powi(3 - value.log10().floor() as i32);
     (value * scale).round() / scale
 }
 
-/// How far the sides of the water's blocks are, relative, from whole numbers of particles at a spacing: what a lattice adds to an error
-/// before anything moves, and what no law of the spacing speaks of.
+/// Returns the largest relative distance of the sides of the water's blocks from whole numbers of
+/// particles. The lattice adds this error before anything moves, and it follows no convergence law.
 fn misfit(scene: &Scene, spacing: f64) -> f64 {
     let lattice = spacing * scene.particle_spacing() / self::spacing(scene);
     let sides = |block: &Bounds| {
@@ -376,19 +383,19 @@ fn misfit(scene: &Scene, spacing: f64) -> f64 {
     scene.water.blocks.iter().map(sides).fold(0.0, f64::max)
 }
 
-/// The spacing near this one that fits the water best; the scene's own stays.
+/// Returns the spacing near `spacing` that fits the water best; the scene's own is kept.
 fn fitting(scene: &Scene, spacing: f64) -> f64 {
     let own = self::spacing(scene);
     if (spacing / own - 1.0).abs() < 1e-9 {
         return own;
     }
     let step = |k: i32| four_digits(spacing * (1.0 + f64::from(k) * NEAR / f64::from(STEPS)));
-    // Misfits within a thousandth are equal, and the nearest is taken.
+    // Misfits within a thousandth are equal; the nearest spacing wins.
     let badness = |k: &i32| ((1e3 * misfit(scene, step(*k))).round() as i64, k.abs());
     (-STEPS..=STEPS).min_by_key(badness).map_or(spacing, step)
 }
 
-/// A CFL number, with as many more substeps as a smaller one asks for.
+/// Scales the CFL number; a smaller one raises the allowed number of substeps in proportion.
 fn cfl(scene: &Scene, factor: f64) -> Vec<Setting> {
     let ([cfl, most], own, substeps) = match scene.solver.method {
         Method::Pbf => {
@@ -412,7 +419,7 @@ fn cfl(scene: &Scene, factor: f64) -> Vec<Setting> {
     }
 }
 
-/// PBF's iterations or the density error that ends them, `factor` times as many or as large.
+/// Scales PBF's number of iterations, or divides the density error that ends them, by `factor`.
 fn stop(stop: Stop, factor: f64) -> Vec<Setting> {
     match stop {
         Stop::Iterations(count) => {
@@ -439,7 +446,8 @@ fn tolerance(scene: &Scene, factor: f64) -> Vec<Setting> {
     vec![Setting::number("solver.flip.pressure.tolerance", value)]
 }
 
-/// What the reference has beside its spacing: half the step, twice the iterations or a tenth of the tolerance.
+/// Settings of the reference beside its spacing: half the step, and twice the iterations or a tenth
+/// of the tolerance.
 fn finer(scene: &Scene) -> Vec<Setting> {
     let step = cfl(scene, 0.5);
     let solve = match scene.solver.method {
@@ -449,8 +457,8 @@ fn finer(scene: &Scene) -> Vec<Setting> {
     [step, solve].concat()
 }
 
-/// The settings that are changed one at a time. A value with which the scene cannot be, or which changes nothing, is told
-/// under `untried` or left out.
+/// Returns the settings that are changed one at a time. Values that make the scene invalid are
+/// reported in `untried`; values that change nothing are dropped.
 fn knobs(
     request: &TuneRequest,
     scene: &Scene,
@@ -509,7 +517,7 @@ fn knobs(
         let mut others = Vec::new();
         for set in settings {
             match twin(request, [coarsest, &set].concat()) {
-                // As where a CFL number is the greatest already.
+                // For example, a CFL number that is already the largest.
                 Ok(twin)
                     if own
                         .as_ref()
@@ -527,7 +535,7 @@ fn knobs(
     values.into_iter().map(&mut of).collect()
 }
 
-/// What stays as the scene has it.
+/// Returns what tuning keeps as in the scene.
 fn others(method: Method) -> impl Iterator<Item = &'static str> {
     const BOTH: [&str; 2] = [
         "the other solver: --solver tunes it",

@@ -2,9 +2,12 @@ use super::*;
 
 type Complex = DVec2;
 
-/// What of the waves' height a zone of so many wave lengths gets wrong, and what of a wave that runs into it is turned back, in shallow
-/// water, by the classical Runge–Kutta method on u″ + k² (1 + i r/ω) u = 0 from the wall to the zone's beginning. What is wrong is
-/// as large as the waves at the wall and runs out of the zone, u′ = iku; what is turned back is 0 at the wall. Lengths are in 1/k.
+/// Error of the generated waves and reflected part of an outgoing wave, relative to the waves'
+/// height, for a zone of this many wavelengths in shallow water.
+///
+/// The classical Runge–Kutta method integrates u″ + k² (1 + i r/ω) u = 0 from the wall to the
+/// beginning of the zone. The error equals the waves at the wall and leaves the zone, u′ = iku; the
+/// reflected wave vanishes at the wall. Lengths are in 1/k.
 fn wrong_and_turned_back(wave_lengths: f64, rate: f64) -> [f64; 2] {
     let walls = [Wall {
         axis: 0,
@@ -16,7 +19,7 @@ fn wrong_and_turned_back(wave_lengths: f64, rate: f64) -> [f64; 2] {
         rate,
     };
     let slope = |x: f64, [u, v]: [Complex; 2]| {
-        // Of a step so short that what is led is r Δt.
+        // For a step this short the fraction is r Δt.
         let r = zone.led(DVec3::splat(1e3), DVec3::splat(x), 1e-9) / 1e-9;
         [v, -(u + r * u.perp())]
     };
@@ -35,21 +38,21 @@ fn wrong_and_turned_back(wave_lengths: f64, rate: f64) -> [f64; 2] {
         }
         y
     };
-    // 1 and 0, then 0 and 1, for u and u′ at the wall.
+    // (u, u′) = (1, 0), then (0, 1), at the wall.
     let one = run([Complex::X, Complex::ZERO]);
     let other = run([Complex::ZERO, Complex::X]);
-    // (one + c other)′ = i (one + c other).
+    // Solves (one + c other)′ = i (one + c other).
     let off = |y: [Complex; 2]| y[0].perp() - y[1];
     let (top, bottom) = (off(one), -off(other));
     let c = Complex::new(bottom.x, -bottom.y).rotate(top) / bottom.length_squared();
     let wrong = (one[0] + c.rotate(other[0])).length();
-    // 2a = u − iu′ and 2b = u + iu′ but for their phases.
+    // 2a = u − iu′ and 2b = u + iu′, up to phases.
     let [u, v] = other;
     let (a, b) = ((u - v.perp()).length(), (u + v.perp()).length());
     [wrong, a.min(b) / a.max(b)]
 }
 
-/// What runs across a period, or comes from all about, has another phase at either end of it.
+/// Waves oblique to a period, or spread over directions, have different phases at its two ends.
 #[test]
 fn waves_fit_into_a_period_or_are_refused() {
     let load = |waves: &str| {
@@ -76,7 +79,7 @@ fn waves_fit_into_a_period_or_are_refused() {
 
 #[test]
 fn waves_in_shallow_water_are_as_right_as_documented() {
-    // Of waves of a period of 2π s the frequency is 1.
+    // A period of 2π s makes the angular frequency 1.
     let settings = Settings {
         walls: Vec::new(),
         length: 1.0,

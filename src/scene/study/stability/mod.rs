@@ -1,38 +1,39 @@
-//! `kind = "stability"`: small scenes that are hard on a solver, what is measured of each, and the mark that it has to
-//! pass; and how far single settings go before a mark is missed.
+//! `kind = "stability"`: small scenes that are hard on a solver, the quantities measured in
+//! each and the marks that they must pass, and searches for how far single settings can go
+//! before a mark fails.
 //!
 //! ```toml
 //! kind = "stability"
 //!
 //! [[case]]
-//! number = 5                                  # several cases may have one number
+//! number = 5                                  # several cases may share a number
 //! name = "film one particle thick"
 //! scene = "../../tests/hard_cases/05-film.toml"
-//! set = ["shot.frames=30"]                    # laid over the scene, as --set does
-//! solvers = ["pbf", "flip"]                   # both where left out
-//! devices = ["gpu", "cpu"]                    # both where left out
-//! frames = 60                                 # the whole shot where left out
+//! set = ["shot.frames=30"]                    # applied to the scene, like --set
+//! solvers = ["pbf", "flip"]                   # default: both
+//! devices = ["gpu", "cpu"]                    # default: both
+//! frames = 60                                 # default: the whole shot
 //!
 //! [[case.mark]]
 //! of = "least_spacing"
 //! at_least = 0.5                              # or at_most
-//! after = 0.5                                 # seconds that do not count; 0 where left out
-//! since = 1.0                                 # against the state then, not that of the start
-//! known_failure = "why it is missed"          # shown as such; a known failure that passes is told as well
+//! after = 0.5                                 # initial seconds to ignore; default 0
+//! since = 1.0                                 # compare with the state then, not with the start
+//! known_failure = "why it is missed"          # reported as such; also reported if it passes
 //!
-//! [[case.against]]                            # another run beside it, frame by frame
+//! [[case.against]]                            # another run to compare with, frame by frame
 //! set = ["domain.max=[2.0, 1.0, 1.0]"]
-//! device = "cpu"                              # the case's own where left out
-//! scale = 1.0                                 # its lengths over the case's
+//! device = "cpu"                              # default: that of the case
+//! scale = 1.0                                 # its lengths over those of the case
 //! shift = [0.0, 0.0, 0.0]                     # its origin, metres
 //!
 //! [[limit]]
 //! name = "longest step"
 //! scene = "../../tests/hard_cases/21-huge-step.toml"
 //! set = ["shot.frames_per_second={1/}"]       # {} is the value, {2*} twice it, {2/} two over it
-//! passes = 0.01                               # from a value that passes
-//! fails = 1.0                                 # to one that fails,
-//! ratio = 1.1                                 # until they are that near
+//! passes = 0.01                               # a value that passes
+//! fails = 1.0                                 # a value that fails
+//! ratio = 1.1                                 # stop once the two are this close
 //! seconds = 1.0                               # of the shot
 //! unit = "s"
 //! [[limit.mark]]
@@ -54,19 +55,19 @@ use swell_domain::bounds::Bounds;
 pub use quantity::{About, Over, Quantity};
 pub(super) use spec::parse;
 
-/// A validated study of stability.
+/// A validated stability study.
 #[derive(Clone, Debug)]
 pub struct Stability {
-    /// In the reader's words, for the page; paragraphs.
+    /// Introduction for the page, in paragraphs.
     pub about: Vec<String>,
-    /// In the order of the file.
+    /// Cases in the order of the file.
     pub cases: Vec<Case>,
-    /// In the order of the file.
+    /// Limits in the order of the file.
     pub limits: Vec<Limit>,
 }
 
 impl Stability {
-    /// Visits the scenes of its cases, and of its limits where they should pass.
+    /// Visits the scenes of its cases, and those of its limits at the value that should pass.
     pub(super) fn for_each_scene(&self, mut visit: impl FnMut(&Scene)) {
         for case in &self.cases {
             match &case.held {
@@ -84,103 +85,103 @@ impl Stability {
     }
 }
 
-/// Something hard.
+/// A difficult case.
 #[derive(Clone, Debug)]
 pub struct Case {
-    /// Of the list that it is from; several may have one.
+    /// Number in the list of hard cases; several cases may share one.
     pub number: u32,
-    /// In words.
+    /// Name in words.
     pub name: String,
-    /// Further words, for the page.
+    /// Note for the page.
     pub note: Option<String>,
-    /// How it is held.
+    /// How the case is checked.
     pub held: Held,
 }
 
-/// By what a case is held.
+/// Check of a case.
 #[derive(Clone, Debug)]
 pub enum Held {
-    /// By the test that this command runs.
+    /// A command that runs a test.
     Test(String),
-    /// By runs, one a solver and device.
+    /// Runs, one per solver and device.
     Runs(Vec<Trial>),
-    /// By a refusal of each scene; all of these words stand in the message.
+    /// Each scene must be rejected with a message that contains all of these words.
     Refusal {
-        /// By solver.
+        /// Attempts per solver and device.
         attempts: Vec<Attempt>,
         /// Parts of the message.
         words: Vec<String>,
     },
 }
 
-/// A scene that is to be refused.
+/// Attempt to load a scene that must be rejected.
 #[derive(Clone, Debug)]
 pub struct Attempt {
-    /// The solver.
+    /// Solver of the attempt.
     pub method: Method,
-    /// What it runs on where it loads after all.
+    /// Device of the run if the scene loads after all.
     pub device: RunsOn,
-    /// What loading it came to, in words where it failed.
+    /// The loaded scene, or the message of the error.
     pub scene: Result<Box<Scene>, String>,
 }
 
 /// A run with its pass marks.
 #[derive(Clone, Debug)]
 pub struct Trial {
-    /// What it runs on.
+    /// Device of the run.
     pub device: RunsOn,
-    /// With every override laid over it.
+    /// The scene with all overrides.
     pub scene: Scene,
-    /// Output frames to run.
+    /// Number of output frames to run.
     pub frames: u32,
-    /// Runs beside it.
+    /// Runs to compare with.
     pub others: Vec<Other>,
-    /// Those of its solver and device.
+    /// Marks that apply to its solver and device.
     pub marks: Vec<Mark>,
 }
 
-/// A run that another is held against.
+/// A run that another one is compared with.
 #[derive(Clone, Debug)]
 pub struct Other {
-    /// What it runs on.
+    /// Device of the run.
     pub device: RunsOn,
-    /// Its scene.
+    /// Scene of the run.
     pub scene: Scene,
-    /// Its lengths over those of the run.
+    /// Its lengths over those of the compared run.
     pub scale: f64,
     /// Its origin, metres.
     pub shift: DVec3,
 }
 
-/// What is measured, and what it has to be.
+/// A measured quantity and its required bound.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mark {
-    /// What is measured.
+    /// Measured quantity.
     pub of: Quantity,
-    /// What it has to be.
+    /// Bound that it has to satisfy.
     pub bound: Bound,
-    /// Seconds of the shot that do not count.
+    /// Initial seconds of the shot that are ignored.
     pub after: f64,
-    /// Seconds of the shot from which what is held against the start is held against the state then; sooner does not
-    /// count.
+    /// Time in seconds of the state to compare with in place of the start; earlier
+    /// frames are ignored.
     pub since: Option<f64>,
-    /// Only what starts in this box.
+    /// Box in which the measured particles start.
     pub region: Option<Bounds>,
-    /// Why it is missed.
+    /// Reason for a known failure.
     pub known_failure: Option<String>,
 }
 
-/// A side that a number has to be on.
+/// A one-sided bound.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Bound {
-    /// Not more.
+    /// Upper bound, inclusive.
     AtMost(f64),
-    /// Not less.
+    /// Lower bound, inclusive.
     AtLeast(f64),
 }
 
 impl Bound {
-    /// Whether a number is on the right side; what is no number is not.
+    /// Whether a number satisfies the bound; NaN does not.
     pub fn holds(self, value: f64) -> bool {
         match self {
             Self::AtMost(most) => value <= most,
@@ -188,7 +189,7 @@ impl Bound {
         }
     }
 
-    /// The one of two that is farther on the wrong side; what is no number is the farthest.
+    /// Returns the worse of two numbers; NaN is the worst.
     pub fn worse(self, a: f64, b: f64) -> f64 {
         match self {
             _ if a.is_nan() || b.is_nan() => f64::NAN,
@@ -197,7 +198,7 @@ impl Bound {
         }
     }
 
-    /// The number itself.
+    /// Returns the bounding number.
     pub fn value(self) -> f64 {
         match self {
             Self::AtMost(value) | Self::AtLeast(value) => value,
@@ -205,38 +206,38 @@ impl Bound {
     }
 }
 
-/// How far a setting goes.
+/// A search for the range of a setting.
 #[derive(Clone, Debug)]
 pub struct Limit {
-    /// In words.
+    /// Name in words.
     pub name: String,
-    /// Further words, for the page.
+    /// Note for the page.
     pub note: Option<String>,
-    /// Of the setting.
+    /// Unit of the setting.
     pub unit: String,
-    /// One a solver.
+    /// Searches, one per solver.
     pub searches: Vec<Search>,
-    /// A value that should pass.
+    /// A value expected to pass.
     pub passes: f64,
-    /// A value that should fail.
+    /// A value expected to fail.
     pub fails: f64,
-    /// How near the two come, above 1.
+    /// Ratio of the bracket, above 1, at which the search stops.
     pub ratio: f64,
 }
 
-/// A limit of one solver; values make scenes as they are tried.
+/// Search with one solver; scenes are built from the values as they are tried.
 #[derive(Clone, Debug)]
 pub struct Search {
-    /// The solver.
+    /// Solver of the search.
     pub method: Method,
     template: spec::Template,
 }
 
 impl Search {
-    /// The run at a value.
+    /// Builds the run for a value.
     ///
     /// # Errors
-    /// A scene that the value makes impossible.
+    /// If the value makes the scene invalid.
     pub fn trial(&self, value: f64) -> Result<Trial, SceneError> {
         self.template.trial(self.method, value)
     }

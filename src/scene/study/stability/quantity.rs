@@ -1,108 +1,113 @@
-//! What is measured of a run.
+//! Measured quantities of a stability run.
 
-/// How the numbers of a run's frames come to one.
+/// Reduction over the frames of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Over {
-    /// The one farthest from the pass mark.
+    /// The value farthest from the pass mark.
     Worst,
-    /// The last frame's.
+    /// The value of the last frame.
     Last,
 }
 
-/// A number a frame. Where a length is meant without a unit, it is that of the resolution: the particle spacing with
-/// PBF, the cell size with FLIP.
+/// A number per frame. Lengths without a unit are in units of the resolution: the particle spacing
+/// with PBF, the cell size with FLIP.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Quantity {
-    /// Particles outside of the domain.
+    /// Particles outside the domain.
     Escaped,
-    /// Particles fewer, or more, than at the start, and ids that are not those of the start.
+    /// Change of the number of particles, and ids that differ from those of the start.
     Lost,
-    /// Values of position and velocity that are not finite.
+    /// Non-finite components of position and velocity.
     NotFinite,
     /// Largest speed, m/s.
     Speed,
-    /// Largest displacement in a substep of the frame, over the one to which particles are slowed.
+    /// Largest displacement per substep of the frame over the displacement cap.
     SpeedOverCap,
-    /// Least distance of two particles, in particle spacings.
+    /// Least distance between two particles, in particle spacings.
     LeastSpacing,
-    /// How far the highest particle is above the highest of the start, in particle spacings.
+    /// Height of the highest particle above the highest one at the start, in particle spacings.
     Climb,
-    /// What the mean height has lost, over that of the start.
+    /// Loss of the mean height, relative to that at the start.
     Sinking,
-    /// Farthest from the parabola of symplectic Euler's substeps, over the way that the particle has come.
+    /// Largest distance from the parabola of symplectic Euler's substeps, over the
+    /// distance travelled.
     BallisticError,
-    /// Highest that a particle has risen above its lowest place so far, over what it had fallen until there.
+    /// Largest rise of a particle above its lowest position so far, over its fall to that position.
     Rebound,
-    /// |V/V0 − 1| of what the level set about the particles encloses, V0 that of the particles.
+    /// |V/V0 − 1|, where V is enclosed by the level set of the particles and V0 is the volume
+    /// of the particles.
     VolumeDrift,
-    /// |V/V0 − 1| of the water that fills its cells of two spacings: those that water or walls surround, over what their
-    /// particles hold. Unlike the level set it does not see how rough the surface is.
+    /// |V/V0 − 1| of filled cells of two spacings, those surrounded by water or walls, over
+    /// the volume of their particles. Unlike the level set it is independent of the
+    /// roughness of the surface.
     FilledVolume,
-    /// Energy over that of the start, less 1; heights count from the domain's floor.
+    /// Energy over that at the start, minus 1; heights are above the domain's floor.
     EnergyGain,
-    /// Energy above the least so far, over that of the start.
+    /// Energy above its minimum so far, over that at the start.
     EnergyRise,
-    /// Farthest that a probe of pressure is from ρ g depth, over that; depth is below the surface of the start.
+    /// Largest relative error of a pressure probe against ρ g depth, where depth is below the
+    /// initial surface.
     PressureError,
-    /// The same of each probe's mean over time.
+    /// The same for each probe's mean over time.
     MeanPressureError,
     /// Mean of max(0, ρ/ρ0 − 1).
     Compression,
-    /// Its maximum.
+    /// Maximum of max(0, ρ/ρ0 − 1).
     LargestCompression,
     /// Largest relative residual of a projection.
     Residual,
-    /// Pressure solves that ended above their tolerance.
+    /// Number of pressure solves that ended above their tolerance.
     Missed,
-    /// Bodies of water that no air touches.
+    /// Number of bodies of water that touch no air.
     Pockets,
-    /// Largest |mean of ∇·u| over such a body, 1/s.
+    /// Largest |mean ∇·u| over such a body, 1/s.
     Incompatible,
-    /// Cells of water without an open face.
+    /// Number of water cells without an open face.
     Dropped,
-    /// Iterations of the frame.
+    /// Iterations per frame.
     Iterations,
-    /// Substeps of the frame.
+    /// Substeps per frame.
     Substeps,
-    /// Times that a particle was slowed, over particles and substeps.
+    /// Fraction of particle updates that were clamped to the displacement cap.
     Capped,
-    /// Particles behind a wall that moves.
+    /// Number of particles behind a moving wall.
     Behind,
-    /// How deep a particle is in a solid, in units of the resolution.
+    /// Largest depth of a particle within a solid, in units of the resolution.
     InSolid,
-    /// Particles in a box.
+    /// Number of particles in a box.
     InRegion,
-    /// Farthest that a particle is from where the other run has it, in units of the resolution.
+    /// Largest distance between the positions of a particle in the two runs, in units
+    /// of the resolution.
     Difference,
-    /// Root mean square difference from the other run over its own displacement.
+    /// RMS difference from the other run over its own displacement.
     DisplacementError,
     /// Iterations so far over those of the other run.
     IterationsRatio,
-    /// Largest difference of a probe of elevation from the other run's, in units of the resolution.
+    /// Largest difference of an elevation probe between the runs, in units of the resolution.
     GaugeDifference,
-    /// Difference of the probes of elevation between the second and third run over that between first and second, both
-    /// root mean square over the frames so far.
+    /// Difference of the elevation probes between the second and third run over that between the
+    /// first and second, both RMS over the frames so far.
     GaugeConvergence,
 }
 
-/// Name, words and unit for a table, what it needs.
+/// Properties of a quantity.
 pub struct About {
-    /// As studies name it.
+    /// Name used in studies.
     pub name: &'static str,
-    /// In words, with its unit.
+    /// Title with unit, for tables.
     pub title: &'static str,
-    /// Other runs that it needs beside the case's own.
+    /// Number of other runs that it is compared with.
     pub others: usize,
     /// Whether it needs a box.
     pub takes_region: bool,
-    /// Whether it can be held against a later state than the start.
+    /// Whether it can be compared with a later state than the start.
     pub takes_since: bool,
-    /// How frames come to one.
+    /// Reduction over the frames.
     pub over: Over,
 }
 
 impl Quantity {
-    /// All, in order.
+    /// All quantities, in the order of their discriminants.
     pub const ALL: [Self; 34] = [
         Self::Escaped,
         Self::Lost,
@@ -140,15 +145,15 @@ impl Quantity {
         Self::GaugeConvergence,
     ];
 
-    /// What every run is measured for, with 0 as mark.
+    /// Quantities measured for every run, with a pass mark of 0.
     pub const ALWAYS: [Self; 3] = [Self::Escaped, Self::Lost, Self::NotFinite];
 
-    /// As studies name it.
+    /// Returns the name used in studies.
     pub fn name(self) -> &'static str {
         self.about().name
     }
 
-    /// Of each.
+    /// Returns the properties of the quantity.
     pub fn about(self) -> About {
         let plain = |name, title| About {
             name,

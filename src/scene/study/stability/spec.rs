@@ -1,4 +1,4 @@
-//! The study as it is written, and how it becomes runs.
+//! Serde types of a stability study, and their conversion to runs.
 
 use std::path::{Path, PathBuf};
 
@@ -88,7 +88,7 @@ struct LimitSpec {
     mark: Vec<Spanned<MarkSpec>>,
 }
 
-/// What a value of a limit becomes a run by.
+/// Builds the run of a limit from a value.
 #[derive(Clone, Debug)]
 pub(super) struct Template {
     file: PathBuf,
@@ -98,7 +98,7 @@ pub(super) struct Template {
     marks: Vec<Mark>,
 }
 
-/// The rest of a document of this kind; files are relative to `base_dir`.
+/// Parses the remaining keys of this kind; paths are relative to `base_dir`.
 pub(in super::super) fn parse(
     doc: &Document<'_>,
     root: Spanned<DeTable<'_>>,
@@ -168,7 +168,7 @@ fn attempts(doc: &Document<'_>, spec: &CaseSpec, file: &SceneFile<'_>) -> Result
                 device,
                 scene: match Scene::load_within(&file.path, &overrides, doc.reach()) {
                     Ok(scene) => Ok(Box::new(scene)),
-                    // A file that is not there is refused for a reason of its own.
+                    // A missing file is an error of the study, not a refusal of the scene.
                     Err(error @ SceneError::Read { .. }) => return Err(error),
                     Err(error) => Err(error.to_string()),
                 },
@@ -220,7 +220,8 @@ fn other(
     let set: Vec<_> = set.iter().copied().chain(&spec.set).collect();
     let scene = load(doc, file, &set, method)?;
     let scale = spec.scale.as_ref().map_or(1.0, |scale| *scale.get_ref());
-    // Runs go frame by frame; Froude's law has times as the root of lengths.
+    // Runs are compared frame by frame; with Froude scaling, times scale as the square
+    // root of lengths.
     let rate = beside.shot.frames_per_second / scale.sqrt();
     if (scene.shot.frames_per_second / rate - 1.0).abs() > 1e-9 {
         let place = spec.scale.as_ref().map(Spanned::span);
@@ -244,7 +245,7 @@ fn other(
     })
 }
 
-/// Marks of a run, those of every run first.
+/// Returns the marks of a run, those of every run first.
 fn marks(
     doc: &Document<'_>,
     specs: &[Spanned<MarkSpec>],
@@ -324,7 +325,8 @@ fn limit(doc: &Document<'_>, spec: &LimitSpec, base_dir: &Path) -> Result<Limit>
             seconds: spec.seconds,
             marks: marks(doc, &spec.mark, method, RunsOn::Gpu, 0)?,
         };
-        // Where the bracket begins the scene has to be sound; further on it may become impossible.
+        // The scene must be valid at the passing end of the bracket; farther on it
+        // may become invalid.
         template.trial(method, spec.passes)?;
         searches.push(Search { method, template });
     }
@@ -363,8 +365,8 @@ impl Template {
     }
 }
 
-/// An override with the value in its braces: `{}` is the value, `{2*}` twice it, `{2/}` two over it. Other braces are
-/// tables of the override's own.
+/// Substitutes the value in the braces of an override: `{}` is the value, `{2*}` twice the value,
+/// `{2/}` two over the value. Other braces are TOML tables.
 fn filled(set: &str, value: f64) -> std::result::Result<String, String> {
     let mut out = String::new();
     let mut rest = set;
@@ -421,7 +423,7 @@ fn device(doc: &Document<'_>, word: &Spanned<String>) -> Result<RunsOn> {
     RunsOn::named(word.get_ref()).ok_or_else(fault)
 }
 
-/// The scene with overrides and a solver.
+/// Loads the scene with overrides and a solver.
 fn load(
     doc: &Document<'_>,
     file: &SceneFile<'_>,

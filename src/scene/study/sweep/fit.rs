@@ -1,4 +1,4 @@
-//! Whether what a sweep asks for can be measured.
+//! Checks that the errors of a sweep can be measured.
 
 use toml::Spanned;
 
@@ -6,11 +6,12 @@ use super::{ErrorMeasure, Line, Measure, Point, SAMPLES, SweepSpec, errors};
 use crate::{Method, Scene, document::Document, error::SceneError, physics_hash};
 use swell_domain::sampling::fill_water;
 
-/// Most particles whose distance to where their constraints hold is measured. With 8 000 a factor takes about 1 s, and
-/// Newton's method some 20 of them; both grow faster than the particles do.
+/// Most particles for which the distance to convergence is measured. With 8000 particles a
+/// factorisation takes about 1 s and Newton's method needs some 20 of them; both grow faster than
+/// the number of particles.
 const MOST_CONVERGED: usize = 9000;
 
-/// Whether a line's runs can be measured.
+/// Checks that the runs of a line can be measured.
 pub(super) fn check_fit(
     doc: &Document<'_>,
     spec: &SweepSpec,
@@ -54,7 +55,7 @@ pub(super) fn check_fit(
     Ok(())
 }
 
-/// Whether there are pressures that can be held against the water's weight.
+/// Checks that there are pressures to compare with the water's weight.
 pub(super) fn check_weighed(
     doc: &Document<'_>,
     spec: &SweepSpec,
@@ -85,7 +86,7 @@ pub(super) fn check_weighed(
     }
 }
 
-/// Whether the distance to where the constraints hold can be measured, and in minutes.
+/// Checks that the distance to convergence can be measured, and within minutes.
 pub(super) fn check_converged(
     doc: &Document<'_>,
     spec: &SweepSpec,
@@ -116,7 +117,7 @@ pub(super) fn check_converged(
     Ok(())
 }
 
-/// Whether `coarser` can tell what `finest` is off by.
+/// Checks that `coarser` can estimate the error of `finest`.
 pub(super) fn check_coarser(
     doc: &Document<'_>,
     spec: &SweepSpec,

@@ -1,28 +1,28 @@
-//! Errors that have to be held, as a command line says them.
+//! Limits on errors, as written on the command line.
 
 use std::{fmt, str::FromStr};
 
 use super::super::super::words::shown;
 
-/// What an error is of.
+/// Quantity whose error is limited.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
-    /// Height of the crest above the still level, metres.
+    /// Height of the crest above the still-water level, metres.
     Crest,
-    /// How far the wave has come, metres.
+    /// Distance that the wave has travelled, metres.
     Front,
-    /// Height of the highest water that hangs together with the body, metres.
+    /// Height of the highest water connected to the main body, metres.
     RunUp,
-    /// ½ v² + g h a mass over the domain's least corner, m²/s².
+    /// Energy per mass, ½ v² + g h with h above the domain's least corner, m²/s².
     Energy,
-    /// At the scene's probes of pressure, Pa.
+    /// Pressure at the scene's probes, Pa.
     Pressure,
-    /// Mean of max(0, ρ/ρ0 − 1); held against rest, not against a finer run.
+    /// Mean of max(0, ρ/ρ0 − 1), compared with rest and not with a finer run.
     Density,
 }
 
 impl Quantity {
-    /// With the names of the command line.
+    /// All quantities with the names used on the command line.
     pub const NAMED: [(&'static str, Self); 6] = [
         ("crest", Self::Crest),
         ("front", Self::Front),
@@ -32,12 +32,12 @@ impl Quantity {
         ("density", Self::Density),
     ];
 
-    /// As the command line names it.
+    /// Returns the name used on the command line.
     pub fn name(self) -> &'static str {
         Self::NAMED[self as usize].0
     }
 
-    /// Units of a limit beside the per cent.
+    /// Returns the unit that a limit accepts beside the percent sign.
     pub fn unit(self) -> Option<&'static str> {
         match self {
             Self::Crest | Self::Front | Self::RunUp => Some("m"),
@@ -46,7 +46,7 @@ impl Quantity {
         }
     }
 
-    /// In words, for an axis.
+    /// Returns the title of an axis.
     pub fn title(self) -> &'static str {
         match self {
             Self::Crest => "height of the crest",
@@ -59,21 +59,21 @@ impl Quantity {
     }
 }
 
-/// How much of an error is allowed.
+/// Largest error allowed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Bound {
-    /// A part of the greatest value of the reference; of a density error a part of rest density.
+    /// Relative to the largest value of the reference, or to the rest density for a density error.
     Part(f64),
-    /// In the quantity's unit.
+    /// Absolute, in the unit of the quantity.
     Absolute(f64),
 }
 
-/// An error that has to be held: `crest=2%`, `front=0.05m`.
+/// A limit on an error: `crest=2%`, `front=0.05m`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limit {
-    /// Of what.
+    /// Quantity whose error is limited.
     pub quantity: Quantity,
-    /// How much.
+    /// Largest error allowed.
     pub bound: Bound,
 }
 
@@ -82,7 +82,7 @@ impl fmt::Display for Limit {
         let name = self.quantity.name();
         match self.bound {
             Bound::Part(part) => {
-                // 0.07 is no sum of powers of two: 7.000000000000001 % is not what was typed.
+                // 0.07 is not exact in binary: 7.000000000000001 % is not what was typed.
                 let percent = (1e12 * 100.0 * part).round() / 1e12;
                 write!(f, "{name} {} %", shown(percent))
             }

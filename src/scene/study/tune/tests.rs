@@ -1,6 +1,6 @@
 use super::*;
 
-/// Of a shipped scene.
+/// Request for a shipped scene.
 fn request(scene: &str, limits: &[&str]) -> TuneRequest {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
     TuneRequest {
@@ -24,7 +24,7 @@ fn request(scene: &str, limits: &[&str]) -> TuneRequest {
 fn twins_differ_from_the_scene_in_what_they_are_called_for() {
     let tune = Tune::load(request("dam-break.toml", &["crest=2%"])).expect("a shot");
     let spacings: Vec<f64> = tune.ladder.iter().map(Twin::spacing).collect();
-    // 0.064 does not go into 2 m.
+    // 0.064 does not divide 2 m.
     assert_eq!(spacings[..2], [0.1, 0.08]);
     assert!(
         (0.06..0.07).contains(&spacings[2]) && spacings[3] == 0.05,
@@ -66,7 +66,8 @@ fn twins_differ_from_the_scene_in_what_they_are_called_for() {
     assert_eq!(names.len(), 4 + 2 + 6 + 1);
 }
 
-/// Sides of 1.6, 3.2 and 2 m: 0.064 has 25, 50 and 31.25 of them; 0.0645 has 24.8, 49.6 and 31.0.
+/// Sides of 1.6, 3.2 and 2 m hold 25, 50 and 31.25 spacings of 0.064, and 24.8, 49.6
+/// and 31.0 of 0.0645.
 #[test]
 fn spacings_fit_the_water() {
     let tune = Tune::load(request("dam-break.toml", &["crest=2%"])).expect("a shot");
@@ -77,7 +78,7 @@ fn spacings_fit_the_water() {
     assert!(misfit(&tune.scene, near) < off && (near / 0.064 - 1.0).abs() <= NEAR);
     let all = tune.spacings([0.05, 0.1]);
     assert!(all.len() > 20 && all.contains(&0.05) && all.contains(&0.1));
-    // Control: these sides are not whole numbers of everything.
+    // Control: these sides are not whole numbers of every spacing.
     let is_fit = |d: &f64| misfit(&tune.scene, *d) <= FITS.max(misfit(&tune.scene, near));
     assert!(all.iter().all(is_fit) && !is_fit(&0.064) && misfit(&tune.scene, 1.5) > 0.06);
 }

@@ -1,33 +1,35 @@
-//! `kind = "validation"`: benchmarks whose answer is known from theory or from an experiment, and how far from it a solver is.
+//! `kind = "validation"`: benchmarks with a known answer from theory or experiment, and a solver's
+//! error against it.
 //!
 //! ```toml
 //! kind = "validation"
 //!
 //! [[benchmark]]
 //! name = "piston, kh = 1"
-//! measure = "regular_waves"                   # what is measured: a name of Measure
+//! measure = "regular_waves"                   # a name of Measure
 //! scene = "../validation/piston.toml"
-//! set = ["shot.frames=400"]                   # laid over the scene of every run, as --set does
-//! stroke = 0.1                                # what the measure is told: metres, seconds
+//! set = ["shot.frames=400"]                   # applied to the scene of every run, like --set
+//! stroke = 0.1                                # inputs of the measure: metres, seconds
 //! period = 2.3
 //! after = 6.0
 //!
 //! [[benchmark.run]]
 //! solver = "flip"
-//! resolution = 20                             # cells a depth, a width, a wave length: for the order, and to name the run
+//! resolution = 20                             # cells per depth, width or wavelength
 //! set = ["solver.flip.cell_size=0.05"]
-//! device = "gpu"                              # where left out
+//! device = "gpu"                              # the default
 //!
 //! [[benchmark.gate]]
 //! of = "height_ratio"                         # a number of the measure
 //! published = 0.982
 //! source = "linear theory (Dean and Dalrymple 1991)"
-//! within = 0.05                               # or off_by, at_most, at_least, order_at_least, agree_within
-//! solver = "flip"                             # runs that it judges; all where left out
+//! within = 0.05                               # or off_by, at_most, at_least, order_at_least,
+//!                                             # agree_within
+//! solver = "flip"                             # runs to judge; default: all
 //! resolution = 20
 //! known_failure = "why it is missed"
 //!
-//! [[benchmark.points]]                        # data that a curve of the measure is drawn and held against
+//! [[benchmark.points]]                        # data that a curve of the measure is compared with
 //! of = "front"
 //! source = "Martin and Moyce 1952"
 //! at = [[0.84, 1.22], [1.43, 1.67]]
@@ -47,114 +49,115 @@ pub use crate::measure::Measure;
 
 type Result<T> = std::result::Result<T, SceneError>;
 
-/// A validated study against theory and experiments.
+/// A validated study of benchmarks.
 #[derive(Clone, Debug)]
 pub struct Validation {
-    /// In the reader's words, for the page; paragraphs.
+    /// Introduction for the page, in paragraphs.
     pub about: Vec<String>,
-    /// In the order of the file.
+    /// Benchmarks in the order of the file.
     pub benchmarks: Vec<Benchmark>,
 }
 
-/// Something whose answer is known.
+/// A setup with a known answer.
 #[derive(Clone, Debug)]
 pub struct Benchmark {
-    /// In words; no two have one name.
+    /// Name in words, unique in the study.
     pub name: String,
-    /// Further words, for the page.
+    /// Note for the page.
     pub note: Option<String>,
-    /// What is measured.
+    /// Measure applied to the runs.
     pub measure: Measure,
-    /// What the measure is told.
+    /// Inputs of the measure.
     pub scale: Scale,
-    /// In the order of the file.
+    /// Runs in the order of the file.
     pub runs: Vec<Trial>,
-    /// In the order of the file.
+    /// Gates in the order of the file.
     pub gates: Vec<Gate>,
-    /// Data beside curves.
+    /// Reference data for the curves.
     pub points: Vec<Points>,
 }
 
 /// A run of a benchmark.
 #[derive(Clone, Debug)]
 pub struct Trial {
-    /// What it runs on.
+    /// Device of the run.
     pub device: RunsOn,
-    /// Cells a length that the benchmark chooses.
+    /// Cells per length that the benchmark chooses.
     pub resolution: f64,
-    /// With every override laid over it.
+    /// The scene with all overrides.
     pub scene: Scene,
 }
 
 impl Trial {
-    /// Solver and resolution, for a legend or a line.
+    /// Returns solver and resolution, for a legend or a line.
     pub fn name(&self) -> String {
         format!("{}, {}", self.scene.solver.method.name(), self.resolution)
     }
 }
 
-/// What a measure is told; 0 where it is not told.
+/// Inputs of a measure; 0 where not given.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Scale {
-    /// Of still water, metres.
+    /// Depth of still water, metres.
     pub depth: f64,
-    /// Of a column, a wave or a box, or where the dam is, metres.
+    /// Length of a column, a wave or a box, or position of the dam, metres.
     pub length: f64,
-    /// Of a crest above still water, metres.
+    /// Height of a crest above still water, metres.
     pub height: f64,
-    /// Of a piston, from end to end, metres.
+    /// Stroke of a piston from end to end, metres.
     pub stroke: f64,
-    /// Of a piston, seconds.
+    /// Period of a piston, seconds.
     pub period: f64,
-    /// Of a vortex, m/s.
+    /// Speed of a vortex or a jet, m/s.
     pub speed: f64,
-    /// Seconds of the shot that do not count.
+    /// Initial seconds of the shot that are ignored.
     pub after: f64,
 }
 
-/// What a number has to be.
+/// Requirement on a number.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Gate {
-    /// A number of the measure.
+    /// Name of a number of the measure.
     pub of: String,
-    /// What is known of it, and whose word that is.
+    /// Published value.
     pub published: Option<f64>,
-    /// Of the published number, or of the gate.
+    /// Source of the published value or of the gate.
     pub source: String,
-    /// How far from it.
+    /// Bound on the number or its error.
     pub bound: Bound,
-    /// The only solver that it judges.
+    /// Solver that the gate judges; `None` for all.
     pub method: Option<Method>,
-    /// The only resolution that it judges.
+    /// Resolution that the gate judges; `None` for all.
     pub resolution: Option<f64>,
-    /// Why it is missed.
+    /// Reason for a known failure.
     pub known_failure: Option<String>,
 }
 
-/// How a number is judged.
+/// Bound on a number or its error.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Bound {
-    /// |measured / published − 1| is at most this.
+    /// Upper bound on |measured / published − 1|.
     Within(f64),
-    /// |measured − published| is at most this, in the number's unit.
+    /// Upper bound on |measured − published|, in the unit of the number.
     OffBy(f64),
-    /// Not more.
+    /// Upper bound.
     AtMost(f64),
-    /// Not less.
+    /// Lower bound.
     AtLeast(f64),
-    /// Error against the published number falls with the resolution by at least this power, over all resolutions.
+    /// Lower bound on the order of convergence of the error against the published value, over
+    /// all resolutions.
     OrderAtLeast(f64),
-    /// Numbers of all resolutions, largest less least over their mean, differ by at most this.
+    /// Upper bound on the spread over all resolutions: maximum less minimum, over the mean.
     AgreeWithin(f64),
 }
 
 impl Bound {
-    /// Whether it judges several runs at once.
+    /// Whether it judges several runs together.
     pub fn is_of_all(self) -> bool {
         matches!(self, Self::OrderAtLeast(_) | Self::AgreeWithin(_))
     }
 
-    /// The number that it names.
+    /// Returns the bounding number.
     fn limit(self) -> f64 {
         match self {
             Self::Within(limit)
@@ -167,14 +170,14 @@ impl Bound {
     }
 }
 
-/// Data that a curve is held against.
+/// Reference data for a curve.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Points {
-    /// A curve of the measure.
+    /// Name of a curve of the measure.
     pub of: String,
-    /// Whose.
+    /// Source of the data.
     pub source: String,
-    /// In the curve's units.
+    /// Points in the units of the curve.
     pub at: Vec<[f64; 2]>,
 }
 
@@ -246,7 +249,7 @@ struct PointsSpec {
     at: Vec<[f64; 2]>,
 }
 
-/// The rest of a document of this kind; files are relative to `base_dir`.
+/// Parses the remaining keys of this kind; paths are relative to `base_dir`.
 pub(super) fn parse(
     doc: &Document<'_>,
     root: Spanned<DeTable<'_>>,
@@ -479,7 +482,7 @@ fn gate(
 }
 
 impl Gate {
-    /// Whether a run is one of those that it judges.
+    /// Returns whether the gate judges this run.
     pub fn judges(&self, run: &Trial) -> bool {
         self.method
             .is_none_or(|method| method == run.scene.solver.method)
