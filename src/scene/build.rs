@@ -1,4 +1,4 @@
-//! From what is written to what is meant: files, and how the parts fit.
+//! Builds a validated scene from its spec: reads files and checks that the parts fit together.
 
 mod solver;
 
@@ -28,23 +28,25 @@ use swell_domain::{
 
 pub(super) use solver::{CHEBYSHEV_RELAXATION, RELAXATION};
 
-/// Most particles of a scene: ids are 32 bits, and 2²⁷ particles of 200 bytes fill 25 GiB.
+/// Largest number of particles of a scene: ids have 32 bits, and 2²⁷ particles of 200
+/// bytes take 25 GiB.
 const MAX_PARTICLES: f64 = 134_217_728.0;
 
-/// Particle spacings between neighbouring coordinates of a mesh's file from which its shape suffers.
+/// Largest distance between adjacent coordinates of a mesh file, particle spacings; a larger one
+/// degrades the shape.
 const MOST_STEP: f64 = 0.01;
 
-/// Least edge of the domain, metres: no smaller than the least spacing.
+/// Least edge of the domain, metres; equal to the least particle spacing.
 const LEAST_EDGE: f64 = 1e-8;
 
 type Result<T> = std::result::Result<T, SceneError>;
 
-/// The lattice on which the chosen solver's particles start.
+/// Initial particle lattice of the chosen solver.
 struct Lattice {
     spacing: f64,
-    /// The key that says how fine it is.
+    /// Key that determines its spacing.
     key: &'static str,
-    /// Metres that must stay between two walls.
+    /// Least distance between two walls, metres.
     least_gap: f64,
 }
 
@@ -147,7 +149,7 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
     Ok(scene.into_local())
 }
 
-/// Solids at rest, and those that move.
+/// Builds the static solids and the moving ones.
 fn solids(
     doc: &Document<'_>,
     specs: &[MeshSpec],
@@ -176,7 +178,7 @@ fn solids(
     Ok((solids, moving))
 }
 
-/// The box of the whole scene.
+/// Reads the domain.
 fn domain(doc: &Document<'_>, spec: &DomainSpec) -> Result<Bounds> {
     let DomainSpec { min, max, .. } = *spec;
     let domain = bounds(doc, "domain", &BoxSpec { min, max })?;
@@ -188,7 +190,7 @@ fn domain(doc: &Document<'_>, spec: &DomainSpec) -> Result<Bounds> {
     Err(doc.fault_of("domain.max", problem))
 }
 
-/// A box with positive edges.
+/// Reads a box and checks that its edges are positive.
 fn bounds(doc: &Document<'_>, path: &str, spec: &BoxSpec) -> Result<Bounds> {
     let [min, max] = [spec.min, spec.max].map(DVec3::from_array);
     for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
@@ -268,7 +270,7 @@ fn water_mesh(
 
 fn swarm(doc: &Document<'_>, path: &str, spec: &SwarmSpec, domain: &Bounds) -> Result<Swarm> {
     let at: Vec<_> = spec.at.iter().copied().map(DVec3::from_array).collect();
-    // NaN is in no box.
+    // A NaN is in no box.
     if let Some(p) = at.iter().find(|p| !domain.contains(**p)) {
         let problem = format!(
             "{} is not in the domain, {}",
@@ -340,7 +342,7 @@ fn check_particle_count(
                 .product::<f64>()
         })
         .sum::<f64>();
-    // A mesh is filled on a grid over its bounds, which has to fit as well.
+    // A mesh is filled on a grid over its bounds, which must fit as well.
     let in_meshes = water
         .meshes
         .iter()
@@ -382,7 +384,8 @@ fn static_solid(
     Err(doc.fault_of(&format!("{path}.mesh"), problem))
 }
 
-/// A mesh of the table at `path`, whose file the key `name` names, for particles `spacing` metres apart.
+/// Reads the mesh of the table at `path`, whose file is in the key `name`, for particles
+/// `spacing` metres apart.
 fn placed_mesh(
     doc: &Document<'_>,
     base_dir: &Path,
@@ -424,7 +427,7 @@ fn placed_mesh(
     })
 }
 
-/// Coordinates so far from zero that 32 bits do not tell particles apart, in a sentence.
+/// Warns if the coordinates are so far from zero that 32-bit floats do not resolve particles.
 fn coarse(loaded: &Loaded, placement: &Placement, spacing: f64) -> Option<String> {
     let reach = placement.rounding(2.0 * loaded.rounding());
     let step = reach.max_element();

@@ -1,4 +1,4 @@
-//! Faults of meshes that are taken all the same: that they are open, and what becomes of water inside of them.
+//! Warnings for meshes that are accepted with defects: open meshes, and water inside of them.
 
 use std::borrow::Cow;
 
@@ -7,7 +7,7 @@ use glam::DVec3;
 use super::{PlacedMesh, Scene};
 use swell_domain::{bounds::Bounds, bvh::Bvh};
 
-/// Points along each axis at which water is looked for in a mesh.
+/// Points per axis at which water is looked for in a mesh.
 const LOOKS: usize = 8;
 
 impl PlacedMesh {
@@ -15,7 +15,7 @@ impl PlacedMesh {
         self.file.file_name().unwrap_or_default().to_string_lossy()
     }
 
-    /// That it is open, with its holes; `None` for a closed mesh.
+    /// Warning for a mesh that is not watertight, with its holes; `None` for a closed mesh.
     fn warning(&self) -> Option<String> {
         let name = self.file_name();
         (!self.holes.0.is_empty()).then(|| {
@@ -29,7 +29,8 @@ impl PlacedMesh {
 }
 
 impl Scene {
-    /// What a user has to know of a scene that is taken all the same, a sentence each: faults of its meshes, and its lints.
+    /// Returns the warnings of the scene, one sentence each: defects of its meshes and legal but
+    /// suspicious values.
     pub fn warnings(&self) -> Vec<String> {
         let of_water = self.water.meshes.iter().filter_map(|placed| {
             let warning = placed.warning()?;
@@ -62,7 +63,7 @@ impl Scene {
             .collect()
     }
 
-    /// Whether water of the start, or the room of an emitter, lies inside of a mesh.
+    /// Whether initial water or the volume of an emitter is inside a mesh.
     fn is_container(&self, placed: &PlacedMesh) -> bool {
         let Some(bounds) = placed.mesh.bounds() else {
             return false;
@@ -83,7 +84,7 @@ impl Scene {
     }
 }
 
-/// Points all over a box.
+/// Points evenly spread over a box.
 fn looks(room: Bounds) -> impl Iterator<Item = DVec3> {
     (0..LOOKS.pow(3)).map(move |n| {
         let cell = [n % LOOKS, n / LOOKS % LOOKS, n / LOOKS.pow(2)];

@@ -1,4 +1,4 @@
-//! A TOML text with overrides laid over it, and the way back from a span to line and key.
+//! A TOML text with overrides, and the mapping from spans back to lines and keys.
 
 use std::{
     ops::Range,
@@ -18,7 +18,7 @@ use super::{
     words::plain_types,
 };
 
-/// Where every key of a file stands. Overrides have spans beyond the end of the text.
+/// Index of the keys of a file. Overrides have spans beyond the end of the text.
 pub(super) struct Document<'a> {
     file: PathBuf,
     text: &'a str,
@@ -35,10 +35,11 @@ struct Entry {
 }
 
 impl<'a> Document<'a> {
-    /// Parses `text`, a file with these `keys`, lays `overrides` (`key=value`) over it, and indexes the result.
+    /// Parses `text`, a file with these `keys`, applies `overrides` (`key=value`), and
+    /// indexes the result.
     ///
     /// # Errors
-    /// Broken TOML, or an override that names no place.
+    /// If the TOML is malformed or an override cannot be applied.
     pub(super) fn parse(
         text: &'a str,
         file: &Path,
@@ -64,7 +65,7 @@ impl<'a> Document<'a> {
         Ok((document, root))
     }
 
-    /// What is wrong with a text that is no TOML.
+    /// Describes a syntax error.
     fn broken(&self, error: &toml::de::Error) -> SceneError {
         let span = error.span().unwrap_or_default();
         let name = self.text.get(span.clone()).unwrap_or_default().trim();
@@ -88,7 +89,7 @@ impl<'a> Document<'a> {
         self.fault(Some(span), path, message)
     }
 
-    /// Whether what is wrong at a span is how a backslash goes on.
+    /// Whether the error at a span is an invalid escape sequence.
     fn is_of_backslash(&self, message: &str, span: &Range<usize>) -> bool {
         let before = self.text.get(..span.end).unwrap_or_default();
         let line = before.rsplit('\n').next().unwrap_or_default();
@@ -100,7 +101,7 @@ impl<'a> Document<'a> {
         line.contains('\\') && of_escapes.iter().any(|of| message.starts_with(of))
     }
 
-    /// The dotted name in the header of a table, where `place` is on its line.
+    /// Returns the dotted name in the table header on the line of `place`.
     fn header_at(&self, place: usize) -> Option<String> {
         let start = self.text.get(..place)?.rfind('\n').map_or(0, |at| at + 1);
         let line = self.text.get(start..)?.lines().next()?.trim();
@@ -109,8 +110,8 @@ impl<'a> Document<'a> {
         is_name.then(|| name.trim_start_matches('[').trim().to_owned())
     }
 
-    /// The table that a second key at a span stands in: the innermost in braces around it, else that of the last header
-    /// before. What can be read of the text tells.
+    /// Returns the table of a duplicate key at a span: the innermost inline table around it, or
+    /// that of the last header before it, as far as the text can be parsed.
     fn table_around(&self, span: &Range<usize>) -> String {
         let mut entries = Vec::new();
         let (partial, _) = DeTable::parse_recoverable(self.text);
@@ -133,17 +134,17 @@ impl<'a> Document<'a> {
         table.map_or_else(String::new, |entry| entry.path.clone())
     }
 
-    /// The same with paths that lead so far.
+    /// Sets how far the paths of the file may lead.
     pub(super) fn within(self, reach: Reach) -> Self {
         Self { reach, ..self }
     }
 
-    /// How far its paths lead.
+    /// Returns how far the paths of the file may lead.
     pub(super) fn reach(&self) -> Reach {
         self.reach
     }
 
-    /// The file that the key at `path` names, from `base_dir`.
+    /// Resolves the file named by the key at `path`, relative to `base_dir`.
     pub(super) fn find(
         &self,
         base_dir: &Path,
@@ -154,36 +155,37 @@ impl<'a> Document<'a> {
         found.map_err(|problem| self.fault_of(path, problem))
     }
 
-    /// A fault at `span`, of the key that stands there, with what that key allows.
+    /// Creates a fault at `span`, for the key there, and appends what the key allows.
     pub(super) fn fault_at(&self, span: Range<usize>, problem: impl Into<String>) -> SceneError {
         let path = self.path_at(&span).unwrap_or_default();
         let message = self.with_allowed(problem.into(), &path);
         self.fault(Some(span), path, message)
     }
 
-    /// A fault at `span` that says itself what is allowed.
+    /// Creates a fault at `span` whose message already says what is allowed.
     pub(super) fn fault_plain(&self, span: Range<usize>, message: String) -> SceneError {
         let path = self.path_at(&span).unwrap_or_default();
         self.fault(Some(span), path, message)
     }
 
-    /// The text at a span, as the file has it.
+    /// Returns the text at a span.
     pub(super) fn text_at(&self, span: Range<usize>) -> &'a str {
         self.text.get(span).unwrap_or_default()
     }
 
-    /// A fault of the key at `path`, with what it allows; it stands where the key does, or the table that lacks it.
+    /// Creates a fault of the key at `path` and appends what it allows. It is located at the key,
+    /// or else at the innermost table that exists.
     pub(super) fn fault_of(&self, path: &str, problem: impl Into<String>) -> SceneError {
         let message = self.with_allowed(problem.into(), path);
         self.fault(self.span_of(path), path.to_owned(), message)
     }
 
-    /// A fault of the key at `path` that says itself what is allowed.
+    /// Creates a fault of the key at `path` whose message already says what is allowed.
     pub(super) fn fault_of_plain(&self, path: &str, message: impl Into<String>) -> SceneError {
         self.fault(self.span_of(path), path.to_owned(), message.into())
     }
 
-    /// Where the key at `path` stands, for a fault that is found later.
+    /// Returns the location of the key at `path` for a fault found later.
     pub(super) fn place_of(&self, path: &str) -> Fault {
         self.fault_at_place(self.span_of(path), path.to_owned(), String::new())
     }
@@ -198,14 +200,14 @@ impl<'a> Document<'a> {
         }
     }
 
-    /// A fault of the key `name` that is missing in the table at `span`.
+    /// Creates a fault for the missing key `name` of the table at `span`.
     pub(super) fn missing(&self, span: Range<usize>, name: &str) -> SceneError {
         let path = self.path_of_missing(&span, name);
         let message = self.with_allowed("missing".into(), &path);
         self.fault(Some(span), path, message)
     }
 
-    /// A fault of the key of this dotted name at a span, or of the whole file.
+    /// Creates a fault of a dotted key, at a span or for the whole file.
     pub(super) fn fault(
         &self,
         span: Option<Range<usize>>,
@@ -231,7 +233,7 @@ impl<'a> Document<'a> {
         }
     }
 
-    /// Turns serde's complaint into one that names the dotted key and what is allowed.
+    /// Translates an error of serde into one that names the dotted key and what is allowed.
     pub(super) fn translate(&self, error: &toml::de::Error) -> SceneError {
         let message = error.message();
         let span = error.span();
@@ -267,7 +269,7 @@ impl<'a> Document<'a> {
         self.fault(span, path, message)
     }
 
-    /// The key at a span: one that stands exactly there, else the innermost around.
+    /// Returns the key at exactly this span, or else the innermost around it.
     fn path_at(&self, span: &Range<usize>) -> Option<String> {
         let exact = self
             .entries
@@ -283,8 +285,8 @@ impl<'a> Document<'a> {
         exact.or_else(around).map(|e| e.path.clone())
     }
 
-    /// The path of a key that the table at a span lacks. `[a.b]` opens both `a` and `a.b` there:
-    /// the one that knows the key is meant.
+    /// Returns the path of a key that is missing in the table at a span. `[a.b]` opens both `a` and
+    /// `a.b` there; the one that has this key is meant.
     fn path_of_missing(&self, span: &Range<usize>, name: &str) -> String {
         let tables = || self.entries.iter().filter(|e| e.value == *span);
         tables()
@@ -294,12 +296,12 @@ impl<'a> Document<'a> {
             .unwrap_or_else(|| name.to_owned())
     }
 
-    /// The keys that the file may have.
+    /// Returns the keys that the file may have.
     pub(super) fn keys(&self) -> &'static [Key] {
         self.keys
     }
 
-    /// The problem, and what the key at a path allows.
+    /// Appends what the key at a path allows.
     pub(super) fn with_allowed(&self, problem: String, path: &str) -> String {
         match key::find(self.keys, path) {
             Some(Key {
@@ -315,7 +317,7 @@ impl<'a> Document<'a> {
     }
 }
 
-/// "unknown key", its table, the nearest of the allowed ones, and all of them.
+/// Message for an unknown key: its table, the nearest allowed key, and all allowed keys.
 pub(super) fn unknown_key<S: AsRef<str>>(path: &str, allowed: &[S]) -> String {
     let (table, name) = path.rsplit_once('.').unwrap_or(("", path));
     let place = table_name(table).map_or_else(String::new, |table| format!(" in {table}"));
@@ -331,14 +333,14 @@ pub(super) fn unknown_key<S: AsRef<str>>(path: &str, allowed: &[S]) -> String {
     }
 }
 
-/// Words that others use, and ours of the same meaning or the nearest to it.
+/// Words from other programs, and the keys with the same or the nearest meaning.
 const OTHER_WORDS: [(&str, &str); 3] = [
     ("amplitude", "stroke"),
     ("frequency", "period"),
     ("fps", "frames_per_second"),
 ];
 
-/// The word that means the same, else the one that is the least edits away.
+/// Returns the synonym of a word, or else the candidate with the least edit distance.
 pub(super) fn nearest<'w, S: AsRef<str>>(word: &str, among: &'w [S]) -> Option<&'w str> {
     let mut among = among.iter().map(AsRef::as_ref);
     let meant = OTHER_WORDS.iter().find(|(other, _)| *other == word);
@@ -352,7 +354,7 @@ pub(super) fn nearest<'w, S: AsRef<str>>(word: &str, among: &'w [S]) -> Option<&
         .min_by_key(|candidate| strsim::damerau_levenshtein(word, candidate))
 }
 
-/// A table as a message names it; `None` for the file itself.
+/// Returns a table's name for messages; `None` for the file itself.
 fn table_name(table: &str) -> Option<String> {
     match table {
         "" => None,
@@ -361,7 +363,7 @@ fn table_name(table: &str) -> Option<String> {
     }
 }
 
-/// `water.block` of `water.block[3]`.
+/// Returns `water.block` for `water.block[3]`.
 fn without_indices(path: &str) -> String {
     let parts = path
         .split('.')
@@ -369,7 +371,7 @@ fn without_indices(path: &str) -> String {
     parts.collect::<Vec<_>>().join(".")
 }
 
-/// Words between backticks.
+/// Returns the words between backticks.
 fn quoted(text: &str) -> Vec<String> {
     text.split('`')
         .skip(1)

@@ -1,4 +1,4 @@
-//! Surfaces that bear a probe's force.
+//! Surfaces on which force probes integrate the pressure.
 
 use glam::DVec3;
 
@@ -10,8 +10,9 @@ use swell_domain::{
 };
 
 impl Scene {
-    /// Where `bearer` meets the water at `time`, in patches no longer than a cell, metres about the scene's origin. What
-    /// faces a wall of the domain less than half a cell away bears nothing: no water comes between.
+    /// Returns the wetted surface of `bearer` at `time` as patches no longer than a cell, relative
+    /// to the scene's origin, metres. Patches that face a wall of the domain less than half a cell
+    /// away are left out: no water fits between.
     pub fn patches(&self, bearer: Bearer, time: f64) -> Vec<Patch> {
         let edge = self.solver.flip().cell_size;
         let (mesh, pose) = match bearer {
@@ -32,7 +33,7 @@ impl Scene {
         all.filter(meets_water).collect()
     }
 
-    /// A wall of the domain where it stands at `time`, counter-clockwise from within.
+    /// Returns a wall of the domain at `time`, counter-clockwise as seen from inside.
     fn face(&self, wall: Wall, time: f64) -> TriangleMesh {
         let walls = self.walls(time);
         let at = if wall.is_max { walls.max } else { walls.min }[wall.axis];

@@ -1,11 +1,11 @@
-//! `[keep]`: what of a bake stays on the disk, and how.
+//! `[keep]`: which data of a bake stay on disk, and their compression.
 
 use serde::Deserialize;
 
 use super::{document::Document, error::SceneError};
 use swell_domain::keep::{Compression, Keep};
 
-/// Names of `compression`.
+/// Values of `compression`.
 pub(super) const COMPRESSIONS: [&str; 2] = ["none", "zstd"];
 
 #[derive(Deserialize)]
@@ -29,14 +29,13 @@ fn all() -> String {
     Keep::All.to_string()
 }
 
-/// The table, checked.
+/// Validated settings.
 #[derive(Clone, Copy)]
 pub(super) struct Kept {
     pub(super) particles: Keep,
     pub(super) compression: Option<Compression>,
 }
 
-/// Builds the table.
 pub(super) fn build(doc: &Document<'_>, spec: &KeepSpec) -> Result<Kept, SceneError> {
     let text = &spec.particles;
     let particles = text
@@ -52,7 +51,7 @@ pub(super) fn build(doc: &Document<'_>, spec: &KeepSpec) -> Result<Kept, SceneEr
     })
 }
 
-/// What a scene writes for `compression`.
+/// Returns the value of `compression` in a scene.
 pub(super) fn name(compression: Option<Compression>) -> &'static str {
     match compression {
         None => "none",

@@ -1,98 +1,98 @@
-//! A key of a file that a user writes: what it is declared with, and what follows in words.
+//! Declaration of a key in a user's file, and the texts derived from it.
 
 use std::ops::RangeInclusive;
 
 use super::words::shown;
 
-/// From the least number to the largest.
+/// Closed range of a number.
 pub(super) type Interval = RangeInclusive<f64>;
 
-/// Stands in a table for any name that the user chooses.
+/// Name of a key that stands for any name chosen by the user.
 pub(super) const ANY: &str = "NAME";
 
-/// What a value is.
+/// Type and range of a value.
 pub(super) enum Kind {
-    /// A number, whole or not.
+    /// A number, integer or not.
     Number(Interval),
-    /// 0, or a number.
+    /// 0 or a number in the range.
     NumberOrZero(Interval),
     /// A number, or `false`.
     NumberOrFalse(Interval),
-    /// A whole number.
+    /// An integer.
     Whole(RangeInclusive<u32>),
-    /// So many numbers in brackets.
+    /// An array of this many numbers.
     Vector(usize, Interval),
     /// Two corners of a box, of three numbers each.
     Corners(Interval),
-    /// A number of this size, or three of them, of either sign.
+    /// A number whose magnitude is in the range, or three of them; the sign is free.
     Scale(Interval),
     /// `true` or `false`.
     Flag,
     /// One of these words.
     Choice(&'static [&'static str]),
-    /// Some of these words, in brackets.
+    /// An array of these words.
     Choices(&'static [&'static str]),
-    /// A name that can be a part of a file's.
+    /// A name that is safe as part of a file name.
     FileStem,
-    /// A string, of which these words say more.
+    /// A string, described by these words.
     Text(&'static str),
-    /// An array of so many numbers each, of which these words say more.
+    /// An array of points with this many numbers each, described by these words.
     Points(usize, &'static str),
-    /// What these words say; looked at where it is used.
+    /// A value described by these words and checked where it is used.
     Other(&'static str),
-    /// `[table]`, which the written-out scene has in lines of its own.
+    /// `[table]`, which is written out in lines of its own.
     Table(&'static [Key]),
-    /// `{ table }`, which it has in one line.
+    /// `{ table }`, which is written out in one line.
     Inline(&'static [Key]),
-    /// `[[table]]`, any number.
+    /// `[[table]]`, any number of times.
     Tables(&'static [Key]),
 }
 
-/// What holds where a key is left out.
+/// What a missing key means.
 pub(super) enum LeftOut {
-    /// It may not be.
+    /// The key is required.
     Needed,
-    /// The same as if this had been written, in TOML.
+    /// This default, in TOML.
     Value(&'static str),
-    /// What these words say, from constants of the code that computes it.
+    /// A default computed by code; the function describes it.
     Computed(fn() -> String),
-    /// There is none of it.
+    /// The thing that the key describes does not exist.
     Absent,
 }
 
-/// Whether a key decides what happens in the frames.
+/// Whether a key affects the simulated frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Physics {
-    /// It does: a bake continues only with the same value.
+    /// It does; a bake continues only with the same value.
     Yes,
-    /// A file, of which the content does: `blake3` stands beside it.
+    /// It names a file whose content does; the key `blake3` in the same table has its hash.
     ByHash,
-    /// It does not: a budget, what is written beside the frames, how many frames there are.
+    /// It does not: for example a budget, outputs beside the frames, or the number of frames.
     No,
 }
 
-/// A key, or a table of them.
+/// A key or a table of keys.
 pub(super) struct Key {
-    /// The last part of its dotted name.
+    /// Last part of the dotted name.
     pub(super) name: &'static str,
     pub(super) kind: Kind,
-    /// In words; empty where there is none.
+    /// Unit in words; empty for none.
     pub(super) unit: &'static str,
     pub(super) default: LeftOut,
     pub(super) physics: Physics,
-    /// What it is for, on the page.
+    /// Purpose, for the page of keys.
     pub(super) about: &'static str,
-    /// More on what is allowed, with the punctuation before it.
+    /// Further constraints, beginning with their punctuation.
     pub(super) also: &'static str,
-    /// It goes only where a key beside it, earlier in the table, has one of these values.
+    /// The key is allowed only if an earlier key of the table has one of these values.
     pub(super) only: Option<(&'static str, &'static [&'static str])>,
-    /// It goes only together with this key.
+    /// The key is allowed only together with this key.
     pub(super) with: Option<&'static str>,
-    /// It goes with none of these keys.
+    /// The key is not allowed together with any of these keys.
     pub(super) without: &'static [&'static str],
 }
 
-/// What a table is written with.
+/// Constructors and builder methods for the tables of keys.
 impl Key {
     const fn new(name: &'static str, kind: Kind) -> Self {
         Self {
@@ -233,7 +233,7 @@ impl Key {
     }
 }
 
-/// The words of an enum's table of names.
+/// Returns the names in an enum's `NAMED` table.
 pub(super) const fn words<T, const N: usize>(named: &[(&'static str, T); N]) -> [&'static str; N] {
     let mut words = [""; N];
     let mut at = 0;
@@ -244,8 +244,8 @@ pub(super) const fn words<T, const N: usize>(named: &[(&'static str, T); N]) -> 
     words
 }
 
-/// The key at a dotted path, whose indices do not matter, and the tables that lead there, from the outermost on; fewer
-/// than the path has parts where there is no such key.
+/// Returns the tables along a dotted path and its key, from the outermost. Indices are ignored. The
+/// result is shorter than the path if there is no such key.
 pub(super) fn along(keys: &'static [Key], path: &str) -> Vec<&'static Key> {
     let mut found = Vec::new();
     let mut keys = keys;
@@ -260,14 +260,14 @@ pub(super) fn along(keys: &'static [Key], path: &str) -> Vec<&'static Key> {
     found
 }
 
-/// The key at a dotted path.
+/// Returns the key at a dotted path.
 pub(super) fn find(keys: &'static [Key], path: &str) -> Option<&'static Key> {
     let found = along(keys, path);
     (found.len() == path.split('.').count()).then(|| found.last().copied())?
 }
 
 impl Key {
-    /// The keys of a table; none of anything else.
+    /// Returns the keys of a table; empty for other kinds.
     pub(super) fn below(&self) -> &'static [Self] {
         match self.kind {
             Kind::Table(keys) | Kind::Inline(keys) | Kind::Tables(keys) => keys,
@@ -275,7 +275,7 @@ impl Key {
         }
     }
 
-    /// What its value may be, in words, and what holds where it is left out and no other key says it.
+    /// Describes the allowed values and a computed default.
     pub(super) fn allowed(&self) -> String {
         match self.default {
             LeftOut::Computed(default) => {
@@ -285,12 +285,12 @@ impl Key {
         }
     }
 
-    /// What its value may be, in words, and with which values of another key it goes.
+    /// Describes the allowed values, including the values of another key that it requires.
     pub(super) fn values(&self) -> String {
         self.words(self.only)
     }
 
-    /// What its value may be, where the keys that it goes with stand.
+    /// Describes the allowed values where the required keys are present.
     fn values_here(&self) -> String {
         self.words(None)
     }
@@ -351,7 +351,7 @@ impl Kind {
     }
 }
 
-/// A table by what it cannot do without, else by all that it has.
+/// Describes a table by its required keys, or by all keys if none is required.
 fn table_words(keys: &[Key]) -> String {
     let needed = |key: &&Key| matches!(key.default, LeftOut::Needed) && key.only.is_none();
     let names =
@@ -371,7 +371,7 @@ fn from_to(range: &Interval) -> String {
     format!("from {} to {}", brief(*range.start()), brief(*range.end()))
 }
 
-/// A bound in few digits.
+/// Formats a bound briefly.
 fn brief(value: f64) -> String {
     match value.abs() {
         size if size >= 1e6 || (size > 0.0 && size < 1e-3) => format!("{value:e}"),
@@ -391,7 +391,7 @@ fn quoted(words: &[&str]) -> Vec<String> {
     words.iter().map(|word| format!("{word:?}")).collect()
 }
 
-/// "a, b and c".
+/// Formats a list such as "a, b and c".
 pub(super) fn list<S: AsRef<str>>(words: &[S], last: &str) -> String {
     let words: Vec<_> = words.iter().map(AsRef::as_ref).collect();
     match words.split_last() {

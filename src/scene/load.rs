@@ -1,4 +1,4 @@
-//! From a file to a [`Scene`].
+//! Loads a [`Scene`] from a file.
 
 use std::path::Path;
 
@@ -11,16 +11,17 @@ use super::{
 use swell_domain::text;
 
 impl Scene {
-    /// Loads a scene file with overrides (`solver.pbf.iterations=8`: dotted keys, TOML values or
-    /// bare words) laid over it. Mesh and table paths are relative to the file, and stay below its folder.
+    /// Loads a scene file with overrides applied. An override is a dotted key and a TOML value or
+    /// bare word, such as `solver.pbf.iterations=8`. Mesh and table paths are relative to the file
+    /// and must stay below its folder.
     ///
     /// # Errors
-    /// One [`SceneError`] that names file, line, key, and what is allowed.
+    /// [`SceneError`] with file, line, key and allowed values.
     pub fn load(path: &Path, overrides: &[String]) -> Result<Self, SceneError> {
         Self::load_within(path, overrides, Reach::Folder)
     }
 
-    /// [`Self::load`] with files from as far as `reach` says.
+    /// Loads as [`Self::load`] does, with files resolved within `reach`.
     ///
     /// # Errors
     /// Those of [`Self::load`].
@@ -37,8 +38,8 @@ impl Scene {
         Self::parse_within(&text, path, base_dir, overrides, reach)
     }
 
-    /// [`Self::load`] on a text; `file` names it in messages, `base_dir` is where relative paths
-    /// start, and what they may not leave.
+    /// Parses a scene as [`Self::load`] does; `file` names it in messages. Relative paths start at
+    /// `base_dir` and must not leave it.
     ///
     /// # Errors
     /// Those of [`Self::load`].
@@ -51,8 +52,8 @@ impl Scene {
         Self::parse_within(text, file, base_dir, overrides, Reach::Folder)
     }
 
-    /// [`Self::parse`] on what [`Self::to_toml`] once wrote into a cache: a key that there was not yet has the value by which
-    /// nothing differs from then, whatever its default is now.
+    /// Parses a scene that [`Self::to_toml`] wrote into a cache. Keys that did not exist then get
+    /// the value that reproduces the behaviour of that time, whatever their default is now.
     ///
     /// # Errors
     /// Those of [`Self::load`].
@@ -60,7 +61,7 @@ impl Scene {
         Self::parse(text, file, base_dir, &younger(text)?)
     }
 
-    /// [`Self::parse`] where paths may lead as far as `reach` says.
+    /// Parses as [`Self::parse`] does, with files resolved within `reach`.
     ///
     /// # Errors
     /// Those of [`Self::load`].

@@ -1,11 +1,11 @@
-//! Motions of walls and solids as a scene has them.
+//! Serde types of the motions of walls and solids.
 
 use serde::Deserialize;
 
 use super::words::shown;
 use swell_domain::motion::Spectrum;
 
-/// A motion with the keys of its kind.
+/// A translation with the keys of its kind.
 #[derive(Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
 pub(super) enum MotionSpec {
@@ -64,7 +64,7 @@ pub(super) enum MotionSpec {
     },
 }
 
-/// A turn with the keys of its kind.
+/// A rotation with the keys of its kind.
 #[derive(Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
 pub(super) enum TurnSpec {
@@ -83,10 +83,10 @@ pub(super) enum TurnSpec {
     },
 }
 
-/// Fastest that a motion may be, m/s: as fast as a velocity may be.
+/// Largest speed of a motion, m/s; equal to the largest `velocity`.
 const MAX_SPEED: f64 = 1e5;
 
-/// What a motion's keys together come to has the range that a velocity has.
+/// Checks that the speed that results from all keys of a motion is within the range of a velocity.
 pub(super) fn check_speed(speed: f64) -> Result<(), String> {
     if speed <= MAX_SPEED {
         return Ok(());

@@ -1,4 +1,5 @@
-//! Motions through points: tables in a scene, or in files that spreadsheets and other programs write.
+//! Motions through points: tables in a scene, or in files written by spreadsheets
+//! and other programs.
 
 use std::{fs::File, io::Read as _, path::Path};
 
@@ -10,33 +11,33 @@ use super::{
 };
 use swell_domain::{motion::Motion, text};
 
-/// Largest motion table read, bytes: ten hours at 60 points a second.
+/// Largest size of a motion table, bytes: ten hours at 60 points per second.
 const MAX_TABLE_BYTES: u64 = 64 << 20;
 
 type Result<T> = std::result::Result<T, String>;
 
-/// What a table of points may hold.
+/// Constraints on the points of a table.
 #[derive(Clone, Copy)]
 pub(super) struct Allowed {
-    /// Of what is moved by.
+    /// Least displacement or angle.
     least: f64,
-    /// How fast.
+    /// Checks the speed between two points.
     check_speed: fn(f64) -> Result<()>,
 }
 
-/// Displacements, metres, of what does not go back behind its start.
+/// Displacements, metres, that never go behind the start.
 pub(super) const WAYS: Allowed = Allowed {
     least: 0.0,
     check_speed,
 };
 
-/// Angles, degrees; how fast a solid's points are depends on the solid.
+/// Angles, degrees; the resulting speed depends on the solid and is checked there.
 pub(super) const ANGLES: Allowed = Allowed {
     least: -1e9,
     check_speed: |_| Ok(()),
 };
 
-/// The motion through the points of the table at `path`, in place or from a file.
+/// Reads the motion table at `path`, in place or from a file.
 pub(super) fn table(
     doc: &Document<'_>,
     path: &str,
@@ -63,7 +64,7 @@ pub(super) fn table(
     Ok(Motion::Table { points })
 }
 
-/// That points are a motion; `called` says where one of them stands.
+/// Checks that points form a motion; `called` describes the location of a point.
 fn check_points(
     points: &[[f64; 2]],
     called: &dyn Fn(usize) -> String,
@@ -74,7 +75,7 @@ fn check_points(
     }
     let least = points.iter().map(|[_, x]| *x).fold(0.0, f64::min);
     for (i, [t, x]) in points.iter().enumerate() {
-        // 1e9 keeps sums and products of them finite.
+        // 1e9 keeps sums and products finite.
         if !((0.0..=1e9).contains(t) && (-1e9..=1e9).contains(x)) {
             return Err(format!(
                 "{}, {}, is out of range",
@@ -125,8 +126,9 @@ fn text_of(file: &Path) -> Result<String> {
     Ok(text.to_owned())
 }
 
-/// Two numbers a line, each with the line that it stands on, counted from 1. Between them is a comma, a semicolon, a tab or spaces.
-/// What follows a `#`, empty lines, and titles on the first line that is not, are passed over.
+/// Reads two numbers per line, with the line number counted from 1. They are separated by a
+/// comma, a semicolon, a tab or spaces. Text after `#`, empty lines, and titles on the first
+/// other line are skipped.
 fn rows(text: &str) -> Result<Vec<(usize, [f64; 2])>> {
     let mut found = Vec::new();
     let mut may_be_titles = true;
@@ -153,7 +155,8 @@ fn rows(text: &str) -> Result<Vec<(usize, [f64; 2])>> {
     Ok(found)
 }
 
-/// What stands between commas or semicolons, and between blanks; nothing between two commas is a field too.
+/// Splits a line at commas, semicolons and whitespace; nothing between two commas
+/// is an empty field.
 fn fields(line: &str) -> Vec<&str> {
     let mut fields = Vec::new();
     for part in line.split([',', ';']) {
@@ -165,7 +168,7 @@ fn fields(line: &str) -> Vec<&str> {
     fields
 }
 
-/// Whether neither end of a line begins as a number does.
+/// Whether neither the first nor the last field begins like a number.
 fn are_titles(fields: &[&str]) -> bool {
     let is_number = |field: &&str| {
         field.parse::<f64>().is_ok()
@@ -192,7 +195,7 @@ mod tests {
         ] {
             assert_eq!(rows(text).unwrap(), wanted, "{text:?}");
         }
-        // Titles, comments and empty lines; lines are those of the file.
+        // Titles, comments and empty lines; line numbers are those of the file.
         for titles in [
             "time,displacement",
             "time [s]; way of 1 [m]",
@@ -207,7 +210,7 @@ mod tests {
                 "{titles}"
             );
         }
-        // The controls: decimal commas, columns that are too many or too few, titles further down.
+        // Controls: decimal commas, too many or too few columns, titles further down.
         for (text, line) in [
             ("0,0;0,0\n0,5;0,25\n", 1),
             ("t;x\n0;0\n0,5;0,25\n", 3),
@@ -228,7 +231,8 @@ mod tests {
         }
     }
 
-    /// A wall has to be told what to do with a table that goes both ways; a turn takes it.
+    /// Displacements of a wall must not go both ways, and the message says how to change the
+    /// table; angles may.
     #[test]
     fn a_table_that_goes_both_ways_is_told_from_one_out_of_range() {
         let called = |index: usize| format!("line {}", index + 2);

@@ -1,18 +1,20 @@
-//! Scenes far from the world's origin, where 32 bits no longer tell particles apart.
+//! Local origin of scenes far from the world's origin, where 32-bit floats no longer
+//! resolve particles.
 
 use glam::{DAffine3, DVec2, DVec3};
 
 use super::{PlacedMesh, Scene, probe::ProbeKind};
 use swell_domain::bounds::Bounds;
 
-/// A domain that lies within this many of its own edge lengths of the world's origin keeps the world's coordinates.
+/// A domain within this many of its own edge lengths of the world's origin keeps world coordinates.
 const NEAR: f64 = 2.0;
 
-/// Where a scene with this domain has its own zero in the world, metres, along each axis.
+/// Returns the world position of the local origin for a domain, metres, per axis.
 ///
-/// Zero unless the domain is far off. Otherwise the domain begins one to two powers of two past it, q being the largest
-/// power of two within the edge: local coordinates lie in [q, 4 q], so an f32 there is finer than 2⁻²² of the edge and a
-/// multiple of 2⁻²³ q, and the sum with the origin is exact in f64 up to 2²⁹ edges off.
+/// It is zero unless the domain is far away. Otherwise, with q the largest power of two not above
+/// the edge, the domain begins between q and 2 q from the local origin. Local coordinates are then
+/// between q and 4 q, so an `f32` is finer than 2⁻²² of the edge and a multiple of 2⁻²³ q, and its
+/// sum with the origin is exact in `f64` up to 2²⁹ edges away.
 pub(super) fn of(domain: &Bounds) -> DVec3 {
     let [min, max] = [domain.min, domain.max].map(|p| p.to_array());
     DVec3::from_array(std::array::from_fn(|axis| {
@@ -26,7 +28,7 @@ pub(super) fn of(domain: &Bounds) -> DVec3 {
 }
 
 impl Scene {
-    /// From world coordinates to those about `self.origin`.
+    /// Converts world coordinates to coordinates relative to `self.origin`.
     pub(super) fn into_local(mut self) -> Self {
         let way = -self.origin;
         if way == DVec3::ZERO {
@@ -73,7 +75,7 @@ fn carry(placed: &mut PlacedMesh, way: DVec3) {
 mod tests {
     use super::*;
 
-    /// Single particles go with the rest of the scene.
+    /// Individual particles move with the scene.
     #[test]
     fn particles_are_carried_with_their_domain() {
         let text = "[shot]\nname = \"a\"\nframes = 1\nframes_per_second = 30\n[domain]\nmin = [100, 0, 100]\nmax = [102, 2, 102]\n\
@@ -90,11 +92,11 @@ mod tests {
     #[test]
     fn far_domains_begin_near_their_own_zero() {
         for (min, max, origin) in [
-            // Near: as they are.
+            // Near: unchanged.
             (0.0, 25.0, 0.0),
             (-2.0, 2.0, 0.0),
             (2.0, 4.0, 0.0),
-            // Far: 8 within 12.6, 2 within 2, a quarter within 0.3.
+            // Far: multiples of 8 for an edge of 12.6, of 2 for 2, and of a quarter for 0.3.
             (10_000.0, 10_012.6, 9_992.0),
             (-10_002.0, -10_000.0, -10_004.0),
             (6.0, 8.0, 4.0),

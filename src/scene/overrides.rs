@@ -1,4 +1,4 @@
-//! `key=value` laid over a TOML text.
+//! Applies `key=value` overrides to a TOML text.
 
 use std::{borrow::Cow, ops::Range};
 
@@ -7,15 +7,15 @@ use toml::{
     de::{DeArray, DeTable, DeValue},
 };
 
-/// Bytes set aside for the spans of one override, beyond the end of the text.
+/// Number of spans reserved for one override, beyond the end of the text.
 const OVERRIDE_SPAN: usize = 1 << 20;
 
 type Value<'a> = Spanned<DeValue<'a>>;
 
-/// Lays each override over the table, with spans beyond the `end` of the text.
+/// Applies all overrides to the table, with spans beyond the `end` of the text.
 ///
 /// # Errors
-/// The first that names no place, and why.
+/// The first override that cannot be applied, and the reason.
 pub(super) fn lay_all<'a>(
     root: &mut DeTable<'a>,
     overrides: &'a [String],
@@ -31,13 +31,13 @@ pub(super) fn lay_all<'a>(
     Ok(())
 }
 
-/// The override that a place beyond the `end` of the text is of.
+/// Returns the override with a span at `place`, beyond the `end` of the text.
 pub(super) fn at(overrides: &[String], place: usize, end: usize) -> Option<&String> {
     let beyond = place.checked_sub(end + 1)?;
     overrides.get(beyond / OVERRIDE_SPAN)
 }
 
-/// Spans of one override, a new one for each key and value that it lays down.
+/// Allocates a new span for each key and value of one override.
 struct OverrideSpans {
     start: usize,
     taken: usize,
@@ -51,7 +51,7 @@ impl OverrideSpans {
     }
 }
 
-/// Lays `key=value` over the table. `a.b[2].c` and `a.b.2.c` both reach into arrays.
+/// Applies `key=value` to the table. Both `a.b[2].c` and `a.b.2.c` index arrays.
 fn lay_over<'a>(
     root: &mut DeTable<'a>,
     entry: &'a str,
@@ -96,7 +96,7 @@ fn parse_value(text: &str) -> Result<Value<'_>, String> {
     }
 }
 
-/// The same value with the override's spans throughout.
+/// Replaces all spans of a value by those of the override.
 fn respan<'a>(value: Value<'a>, spans: &mut OverrideSpans) -> Value<'a> {
     let at = spans.next();
     let inner = match value.into_inner() {
@@ -121,7 +121,7 @@ fn respan<'a>(value: Value<'a>, spans: &mut OverrideSpans) -> Value<'a> {
     Spanned::new(at, inner)
 }
 
-/// The value that `segment` names; a table is made where there is none.
+/// Returns the value named by `segment`, creating a table if there is none.
 fn enter<'t, 'a>(
     slot: &'t mut Value<'a>,
     segment: &'a str,

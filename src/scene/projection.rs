@@ -1,4 +1,4 @@
-//! The grid on which PBF's velocities are made free of divergence, as the FLIP scene whose projection that is.
+//! PBF's projection grid, represented as the FLIP scene whose projection it is.
 
 use super::{
     Method, Scene, Solver, Water,
@@ -6,15 +6,15 @@ use super::{
     flip::{Flip, Precision, Preconditioner, Pressure, Surface, Transfer},
 };
 
-/// Edge of a cell, in particle spacings: eight particles fill it, as FLIP's do.
+/// Edge of a cell, particle spacings; eight particles fill it, as with FLIP.
 pub(super) const PROJECTION_CELL: f64 = 2.0;
 
-/// Rate r at which particles take on the grid's velocity, over √(g / Δx): a viscosity of r Δx² / 6 (Zhu and Bridson 2005),
-/// the same at any scale and length of a step. Without it what the grid does not see of a splash, particles against each
-/// other, hardly calms down.
+/// Rate r at which particles adopt the grid's velocity, over √(g / Δx): a viscosity of r Δx² / 6
+/// (Zhu and Bridson 2005), at any scale and step length. Without it, the relative motion of
+/// particles that the grid cannot see hardly decays after a splash.
 const PIC_RATE: f64 = 0.17;
 
-/// What the projection stops at, and after.
+/// Settings of the projection's pressure solve.
 const PRESSURE: Pressure = Pressure {
     preconditioner: Preconditioner::Multigrid,
     precision: Precision::F32Refined,
@@ -23,8 +23,8 @@ const PRESSURE: Pressure = Pressure {
 };
 
 impl Scene {
-    /// The same water, walls and solids with FLIP on cells of twice the particle spacing, of which PBF takes the velocities
-    /// alone; `None` where it does not.
+    /// Returns the same water, walls and solids with FLIP on cells of twice the particle spacing,
+    /// of which PBF uses only the velocities; `None` without grid projection.
     pub fn of_projection(&self) -> Option<Self> {
         if self.solver.method != Method::Pbf || !self.solver.pbf().grid_projection {
             return None;
@@ -50,12 +50,12 @@ impl Scene {
         Some(scene)
     }
 
-    /// What its effects are judged by.
+    /// Returns the scales by which effects are judged.
     pub(super) fn grain(&self) -> Grain {
         grain(&self.water, &self.solver)
     }
 
-    /// What gravity adds to a velocity in a second as PBF predicts with it, m/s²: nothing where the projection has done so.
+    /// Returns the gravity in PBF's prediction, m/s²; zero if the projection has applied it.
     pub fn predicted_gravity(&self) -> glam::DVec3 {
         match self.solver.pbf().grid_projection {
             true => glam::DVec3::ZERO,
@@ -63,13 +63,13 @@ impl Scene {
         }
     }
 
-    /// Whether pressures are read from PBF's multipliers, rather than from a projection.
+    /// Whether pressures are read from PBF's multipliers instead of from a projection.
     pub fn reads_multipliers(&self) -> bool {
         !self.solver.pbf().grid_projection && !self.pressure_points().is_empty()
     }
 }
 
-/// What effects in such water are judged by.
+/// Returns the scales by which effects in this water are judged.
 pub(super) fn grain(water: &Water, solver: &Solver) -> Grain {
     let (spacing, cell) = match solver.method {
         Method::Pbf => {

@@ -1,4 +1,4 @@
-//! Regular waves of finite height: whether a theory has them, and whether particles can carry them.
+//! Regular waves of finite height: validity of the theory, and resolution by particles.
 
 use super::{
     document::Document,
@@ -11,12 +11,12 @@ use swell_domain::motion::{
     Cnoidal, LEAST_CNOIDAL_LENGTH, MADSEN_LIMIT, Motion, NoCnoidal, RegularWaves, Stokes,
 };
 
-/// Highest that a wave on shallow water can be, in depths (McCowan 1894).
+/// Largest wave height on shallow water, in depths (McCowan 1894).
 pub(super) const HIGHEST: f64 = 0.78;
 
 type Result<T> = std::result::Result<T, SceneError>;
 
-/// What a table asks for, with what it leaves out.
+/// Returns the waves of a table with defaults filled in.
 pub(super) fn asked([height, period, depth, gravity]: [f64; 4], ramp: Option<f64>) -> RegularWaves {
     RegularWaves {
         height,
@@ -27,13 +27,13 @@ pub(super) fn asked([height, period, depth, gravity]: [f64; 4], ramp: Option<f64
     }
 }
 
-/// The motion of the table at `path`, to second order.
+/// Builds the second-order motion of the table at `path`.
 pub(super) fn stokes(doc: &Document<'_>, path: &str, waves: RegularWaves) -> Result<Motion> {
     check_stokes(doc, path, &waves)?;
     finished(doc, path, Motion::Stokes(Stokes::new(waves)), &waves)
 }
 
-/// That the second order holds for them.
+/// Checks that second-order theory is valid for the waves.
 pub(super) fn check_stokes(doc: &Document<'_>, path: &str, waves: &RegularWaves) -> Result<()> {
     check_height(doc, path, waves)?;
     if waves.ursell() >= MADSEN_LIMIT {
@@ -50,7 +50,7 @@ pub(super) fn check_stokes(doc: &Document<'_>, path: &str, waves: &RegularWaves)
     Ok(())
 }
 
-/// The motion of the table at `path`, by cnoidal theory.
+/// Builds the cnoidal motion of the table at `path`.
 pub(super) fn cnoidal(doc: &Document<'_>, path: &str, waves: RegularWaves) -> Result<Motion> {
     check_height(doc, path, &waves)?;
     let motion = Cnoidal::new(waves).map_err(|reason| {
@@ -70,7 +70,7 @@ pub(super) fn cnoidal(doc: &Document<'_>, path: &str, waves: RegularWaves) -> Re
     finished(doc, path, Motion::Cnoidal(motion), &waves)
 }
 
-/// That waves of this height do not break.
+/// Checks that waves of this height do not break.
 fn check_height(doc: &Document<'_>, path: &str, waves: &RegularWaves) -> Result<()> {
     let refuse = |key: &str, problem: String| Err(doc.fault_of(&format!("{path}.{key}"), problem));
     if waves.gravity == 0.0 {
@@ -88,7 +88,7 @@ fn check_height(doc: &Document<'_>, path: &str, waves: &RegularWaves) -> Result<
         .or_else(|problem| refuse("height", problem))
 }
 
-/// A motion whose wall is not too fast.
+/// Checks the speed of the wall and returns the motion.
 fn finished(
     doc: &Document<'_>,
     path: &str,
@@ -100,7 +100,7 @@ fn finished(
     Ok(motion)
 }
 
-/// That waves of this length can be told from particles, `spacing` metres apart.
+/// Checks that particles `spacing` metres apart resolve the wavelength.
 pub(super) fn check_length(
     doc: &Document<'_>,
     path: &str,

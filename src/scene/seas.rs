@@ -1,4 +1,5 @@
-//! Seas and packets of waves: how their motion is read, and whether the water can carry them.
+//! Random seas and focused wave packets: reading their motion, and checking that the
+//! water can carry them.
 
 use std::f64::consts::TAU;
 
@@ -7,28 +8,29 @@ use swell_domain::motion::{
     Asked, DEEPEST, MADSEN_LIMIT, Motion, Phases, Sea, Spectrum, wave_number,
 };
 
-/// Shortest of the waves over the peak's period, where a scene does not say it. What is left out has 1.5 % of the energy of
-/// Pierson and Moskowitz's spectrum.
+/// Default of the shortest period over the peak period. What is left out has 1.5 % of the energy of
+/// the Pierson-Moskowitz spectrum.
 pub(super) const SHORTEST: f64 = 1.0 / 3.0;
 
-/// What it may be.
+/// Allowed range of that ratio.
 const SHORTEST_RANGE: std::ops::RangeInclusive<f64> = 0.1..=0.9;
 
-/// γ where a scene does not say it: the mean of the waves off Sylt by which it was found (Hasselmann et al. 1973).
+/// Default of γ: the mean of the JONSWAP measurements off Sylt (Hasselmann et al. 1973).
 const PEAK_ENHANCEMENT: f64 = 3.3;
 
-/// Periods, of a sea the peak's, until the full size of a motion that makes waves, where a scene does not say it.
+/// Default duration of the ramp to full size, in (peak) periods.
 pub(super) const RAMP: f64 = 2.0;
 
-/// Least length of a wave, in particle spacings: five cells of FLIP, below which little of one is left after its own length.
+/// Least wavelength, particle spacings: five cells of FLIP. Of shorter waves little is left
+/// after one wavelength.
 const LEAST_WAVE: f64 = 10.0;
 
-/// Steepest that a wave of one height can be, H / (λ tanh kh) (Miche 1944).
+/// Largest steepness of a wave, H / (λ tanh kh) (Miche 1944).
 pub(super) const STEEPEST: f64 = 0.142;
 
 type Result<T> = std::result::Result<T, SceneError>;
 
-/// The motion of the table at `path`, of a sea or a packet.
+/// Builds the motion of the table at `path`, for a sea or a packet.
 pub(super) fn build(doc: &Document<'_>, path: &str, asked: Asked) -> Result<Motion> {
     let refuse = |key: &str, problem: String| Err(doc.fault_of(&format!("{path}.{key}"), problem));
     let periods = [asked.peak_period, asked.shortest_period, asked.ramp];
@@ -56,7 +58,7 @@ pub(super) fn build(doc: &Document<'_>, path: &str, asked: Asked) -> Result<Moti
     Ok(motion)
 }
 
-/// That the second order holds for the waves, and is known for the shortest.
+/// Checks that second-order theory is valid for the waves and known for the shortest of them.
 fn check_second_order(asked: &Asked) -> std::result::Result<(), String> {
     let (depth, gravity) = (asked.depth, asked.gravity);
     let shortest = wave_number(TAU / asked.shortest_period, depth, gravity) * depth;
@@ -67,7 +69,7 @@ fn check_second_order(asked: &Asked) -> std::result::Result<(), String> {
             shown(depth)
         ));
     }
-    // A packet's trough is no lower than its crest is high.
+    // A packet's trough is no deeper than its crest is high.
     let (height, of) = match asked.phases {
         Phases::Random {
             significant_height, ..
@@ -87,7 +89,7 @@ fn check_second_order(asked: &Asked) -> std::result::Result<(), String> {
     Ok(())
 }
 
-/// That a spectrum's peak period, shortest period and ramp, seconds, are those of waves.
+/// Checks the peak period, shortest period and ramp of a spectrum, seconds.
 pub(super) fn check_periods(
     doc: &Document<'_>,
     path: &str,
@@ -98,7 +100,7 @@ pub(super) fn check_periods(
     if gravity == 0.0 {
         return refuse("kind", "waves need gravity".to_owned());
     }
-    // 0.3 s of 3 s are a tenth, but for rounding.
+    // Rounded, because 0.3 s of 3 s is not exactly a tenth.
     let ratio = (shortest / peak * 1e12).round() / 1e12;
     if !SHORTEST_RANGE.contains(&ratio) {
         let problem = format!(
@@ -116,7 +118,8 @@ pub(super) fn check_periods(
     Ok(())
 }
 
-/// That a sea of a significant height and a peak period stands on water of a depth, by gravity.
+/// Checks that a sea with this significant height and peak period does not break on water of a
+/// depth and gravity.
 pub(super) fn check_height(
     height: f64,
     peak_period: f64,
@@ -126,7 +129,7 @@ pub(super) fn check_height(
     check_steepness(height, peak_period, water)
 }
 
-/// That waves are no higher than the water is deep.
+/// Checks that waves are no higher than the water is deep.
 pub(super) fn check_depth(height: f64, depth: f64) -> std::result::Result<(), String> {
     if height <= depth {
         return Ok(());
@@ -135,7 +138,7 @@ pub(super) fn check_depth(height: f64, depth: f64) -> std::result::Result<(), St
     Err(format!("waves of {height} m on {depth} m of water"))
 }
 
-/// That waves of a height and a period stand on water of a depth, by gravity.
+/// Checks that waves of this height and period do not break on water of a depth and gravity.
 pub(super) fn check_steepness(
     height: f64,
     period: f64,
@@ -153,7 +156,7 @@ pub(super) fn check_steepness(
     ))
 }
 
-/// The form of a spectrum and its γ, which Pierson and Moskowitz's has none of.
+/// Checks a spectrum's γ, which the Pierson-Moskowitz form does not have.
 pub(super) fn shape(
     doc: &Document<'_>,
     path: &str,
@@ -169,7 +172,7 @@ pub(super) fn shape(
     }
 }
 
-/// γ, which Pierson and Moskowitz's form has none of.
+/// Returns γ; 1 for the Pierson-Moskowitz form.
 pub(super) fn peak_enhancement(spectrum: Spectrum, given: Option<f64>) -> f64 {
     match spectrum {
         Spectrum::PiersonMoskowitz => 1.0,
@@ -177,7 +180,7 @@ pub(super) fn peak_enhancement(spectrum: Spectrum, given: Option<f64>) -> f64 {
     }
 }
 
-/// What a table asks for, with what it leaves out.
+/// Returns the waves of a table with defaults filled in.
 pub(super) fn asked(
     (spectrum, peak_enhancement): (Spectrum, f64),
     [peak_period, depth, gravity]: [f64; 3],
@@ -197,8 +200,8 @@ pub(super) fn asked(
     }
 }
 
-/// That the shortest waves can be told from particles, so many metres apart, and that a packet meets in the domain, whose far face is
-/// `size` metres off, and has the time to.
+/// Checks that particles `spacing` metres apart resolve the shortest waves, and that a packet meets
+/// within the domain (its far face is `size` metres away) and has enough time to do so.
 pub(super) fn check(
     doc: &Document<'_>,
     path: &str,
@@ -234,7 +237,7 @@ pub(super) fn check(
     Ok(())
 }
 
-/// That waves of a period and a length are long enough for particles `spacing` metres apart; `key` says which waves they are.
+/// Checks that particles `spacing` metres apart resolve waves of a length; `key` names the waves.
 pub(super) fn check_spacings(
     doc: &Document<'_>,
     key: &str,

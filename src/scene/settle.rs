@@ -1,4 +1,4 @@
-//! A document held against its table of keys: what the keys do not allow is refused, and what is left out gets its default.
+//! Checks a document against its table of keys and fills in defaults.
 
 use std::ops::Range;
 
@@ -16,21 +16,21 @@ use super::{
 
 type Result<T> = std::result::Result<T, SceneError>;
 
-/// A table of a document, and what it may hold.
+/// A table of a document and the keys that it may have.
 struct Table<'d, 'a> {
     doc: &'d Document<'a>,
     keys: &'static [Key],
     path: &'d str,
-    /// Where it stands; `None` for the file itself.
+    /// Span of the table; `None` for the file itself.
     span: Option<Range<usize>>,
 }
 
 impl<'a> Document<'a> {
-    /// Refuses keys and values that the table of keys does not allow, and lays down the defaults of keys that are left
-    /// out.
+    /// Rejects keys and values that the table of keys does not allow, and fills in the defaults
+    /// of missing keys.
     ///
     /// # Errors
-    /// The first fault, with line, key and what is allowed.
+    /// The first fault, with line, key and allowed values.
     pub(super) fn settle(&self, root: &mut Spanned<DeTable<'a>>) -> Result<()> {
         let table = Table {
             doc: self,
@@ -46,7 +46,8 @@ impl Table<'_, '_> {
     fn settle<'v>(&self, values: &mut DeTable<'v>) -> Result<()> {
         self.check_deciders(values)?;
         self.check_names(values)?;
-        // Before a key is called missing that stands there under another table's rules.
+        // Checked first, so that a key is not reported as missing while it is present but
+        // not allowed here.
         for key in self.keys.iter().filter(|key| key.name != ANY) {
             self.has_place(values, key)?;
         }
@@ -68,7 +69,8 @@ impl Table<'_, '_> {
         Ok(())
     }
 
-    /// Looks at values that decide which keys go with them, before those keys are called unknown.
+    /// Checks the values that decide which keys are allowed, before those keys are
+    /// reported as unknown.
     fn check_deciders(&self, values: &mut DeTable<'_>) -> Result<()> {
         let decides = |name: &str| {
             self.keys
@@ -99,16 +101,16 @@ impl Table<'_, '_> {
         Err(self.doc.fault(Some(name.span()), path, message))
     }
 
-    /// The keys that go with the values of those that stand there.
+    /// Returns the keys allowed with the present values.
     fn names_beside(&self, values: &DeTable<'_>) -> Vec<&'static str> {
         let goes = |key: &&Key| key.clash(values).is_none();
         self.keys.iter().filter(goes).map(|key| key.name).collect()
     }
 
-    /// Whether a key goes with those beside it.
+    /// Returns whether a key is allowed with the keys beside it.
     ///
     /// # Errors
-    /// That it does not, and stands there.
+    /// If it is present but not allowed.
     fn has_place(&self, values: &DeTable<'_>, key: &Key) -> Result<bool> {
         let together = key
             .without
@@ -137,13 +139,13 @@ impl Table<'_, '_> {
         }
     }
 
-    /// Lays down a key's default where it is left out.
+    /// Inserts the default of a missing key.
     ///
     /// # Errors
-    /// That it has none.
+    /// If the key is required.
     ///
     /// # Panics
-    /// Where a default is no TOML; a test lays down all of them.
+    /// If a default is not valid TOML; a test inserts all of them.
     fn fill(&self, values: &mut DeTable<'_>, key: &Key) -> Result<()> {
         if values.contains_key(key.name) {
             return Ok(());
@@ -212,7 +214,7 @@ impl Table<'_, '_> {
 }
 
 impl Key {
-    /// The key beside it that it does not go with, and its value.
+    /// Returns the key whose value excludes this key, and that value.
     fn clash(&self, values: &DeTable<'_>) -> Option<(&'static str, String)> {
         let (by, among) = self.only?;
         let word = values.get(by)?.get_ref().as_str()?;
@@ -220,15 +222,15 @@ impl Key {
     }
 }
 
-/// An element of an array that is of another type than its neighbours have to be.
+/// An array element of the wrong type.
 struct WrongElement {
-    /// `[1]`, or `[1][2]`.
+    /// Index such as `[1]` or `[1][2]`.
     index: String,
     span: Range<usize>,
     problem: String,
 }
 
-/// The first item that is no number.
+/// Returns the first item that is not a number.
 fn no_number(items: &[Spanned<DeValue<'_>>]) -> Option<WrongElement> {
     let (index, item) = (items.iter().enumerate()).find(|(_, i)| number(i.get_ref()).is_none())?;
     Some(WrongElement::of(index, item, "a number"))
@@ -258,7 +260,7 @@ fn wrong_type(value: &DeValue<'_>, expected: &str) -> String {
 }
 
 impl Kind {
-    /// The first element of a wrong type in an array that is as long as it has to be.
+    /// Returns the first element of the wrong type in an array of the right length.
     fn wrong_element(&self, value: &DeValue<'_>) -> Option<WrongElement> {
         let items = value.as_array()?;
         let first = |is_right: fn(&DeValue<'_>) -> bool, expected: &str| {
@@ -277,7 +279,7 @@ impl Kind {
         }
     }
 
-    /// What is wrong with a value.
+    /// Describes the fault of a value.
     fn problem(&self, name: &str, value: &DeValue<'_>) -> Option<String> {
         let Some(expected) = self.expected(value) else {
             return self.misfit(name, value);
@@ -285,7 +287,7 @@ impl Kind {
         Some(wrong_type(value, &expected))
     }
 
-    /// The type that a value of another one should have.
+    /// Returns the expected type if the value has another one.
     fn expected(&self, value: &DeValue<'_>) -> Option<String> {
         let is_number = number(value).is_some();
         let (is_right, expected) = match self {
@@ -337,7 +339,7 @@ impl Kind {
         (!is_right).then(|| expected.to_owned())
     }
 
-    /// What is wrong with a value of the right type.
+    /// Describes the fault of a value of the right type.
     fn misfit(&self, name: &str, value: &DeValue<'_>) -> Option<String> {
         match self {
             Self::NumberOrFalse(_) if value.is_bool() => {
@@ -393,7 +395,7 @@ impl Kind {
     }
 }
 
-/// The first item that is not so many numbers.
+/// Returns the first item that is not an array of `len` numbers.
 fn wrong_point(items: &[Spanned<DeValue<'_>>], len: usize) -> Option<WrongElement> {
     let is_point = |item: &Spanned<DeValue<'_>>| {
         numbers(item.get_ref()).is_some_and(|given| given.len() == len)

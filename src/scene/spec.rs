@@ -1,4 +1,5 @@
-//! The scene as it is written, its numbers in range and its defaults laid down: types for serde, and no logic.
+//! Serde types of the scene file, without logic. Ranges are checked and defaults filled in before
+//! deserialization.
 
 use glam::DVec3;
 use serde::Deserialize;
@@ -76,7 +77,7 @@ pub(super) struct SwarmSpec {
     pub(super) velocity: [f64; 3],
 }
 
-/// A mesh of water or a solid; water says `file` and does not move.
+/// A mesh of water or of a solid; water uses the key `file` and does not move.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct MeshSpec {
@@ -94,7 +95,7 @@ pub(super) struct MeshSpec {
     pub(super) track: Option<TrackSpec>,
 }
 
-/// Where a solid stands over time.
+/// Poses of a solid over time.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct TrackSpec {
@@ -105,7 +106,7 @@ pub(super) struct TrackSpec {
 }
 
 impl MeshSpec {
-    /// Whether it is a solid that moves.
+    /// Whether it is a moving solid.
     pub(super) fn moves(&self) -> bool {
         self.motion.is_some() || self.turn.is_some() || self.track.is_some()
     }

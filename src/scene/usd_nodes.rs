@@ -1,7 +1,9 @@
-//! Prims of a USD layer as text: where one stands among those above it, and how time samples move it (UsdGeomXformable).
+//! Prims of a USD text layer: transforms in the hierarchy and their time samples
+//! (UsdGeomXformable).
 //!
-//! A transform is a list of operations, of which the last is next to the prim. Numbers at time codes are joined by lines, quaternions
-//! by arcs, as OpenUSD joins them; beyond the first and the last they stay.
+//! A transform is a list of operations, the last of which applies to the prim first. Numbers are
+//! interpolated linearly between time codes and quaternions along arcs, as in OpenUSD; before the
+//! first and after the last sample they are constant.
 
 use glam::{DMat4, DQuat, DVec3, DVec4};
 
@@ -11,11 +13,11 @@ use super::{
 };
 use swell_domain::text;
 
-/// What a binary file begins with, and a package of files.
+/// First bytes of a binary layer and of a package.
 const BINARY: &[u8] = b"PXR-USDC";
 const PACKAGE: &[u8] = b"PK\x03\x04";
 
-/// What a prim's metadata takes its content from, beside what is written in it.
+/// Metadata by which a prim takes content from elsewhere.
 const ARCS: [&str; 5] = [
     "references",
     "payload",
@@ -24,16 +26,17 @@ const ARCS: [&str; 5] = [
     "variantSets",
 ];
 
-/// By which part two rates may differ and be one: 23.976 stands for 24000/1001.
+/// Relative difference up to which two rates are equal: 23.976 stands for 24000/1001.
 const SAME_RATE: f64 = 1e-5;
 
-/// Words for why nothing can be read.
+/// The error is a description.
 type Result<T> = std::result::Result<T, String>;
 
-/// Prims from the root to one of them.
+/// Transforms of a prim and its ancestors.
 #[derive(Clone, Debug)]
 pub(super) struct UsdNodes {
-    /// From the prim up to the root, each with its operations in the order that a point meets them.
+    /// From the prim up to the root, each with its operations in the order in which they
+    /// apply to a point.
     steps: Vec<Vec<Operation>>,
     rate: Rate,
     /// From the layer's units and up axis to metres with y up.
@@ -42,7 +45,7 @@ pub(super) struct UsdNodes {
 }
 
 impl UsdNodes {
-    /// Of the last prim of `chain`, which begins at the root of `layer`.
+    /// Reads the transforms of the last prim of `chain`, which begins at the root of `layer`.
     pub(super) fn read(layer: &Layer, chain: &[&Prim]) -> Result<Self> {
         check_written(chain)?;
         let mut steps = Vec::new();
@@ -53,7 +56,7 @@ impl UsdNodes {
                 break;
             }
         }
-        // Centimetres, where a layer says nothing (UsdGeom).
+        // A layer's default unit is the centimetre (UsdGeom).
         let metres_per_unit = number(layer, "metersPerUnit", 0.01)?;
         Ok(Self {
             steps,
@@ -63,22 +66,22 @@ impl UsdNodes {
         })
     }
 
-    /// The time code at a time, seconds.
+    /// Returns the time code at a time, seconds.
     pub(super) fn code(&self, seconds: f64) -> f64 {
         seconds * self.rate.codes_per_second
     }
 
-    /// Time codes a second.
+    /// Returns the layer's time codes per second.
     pub(super) fn rate(&self) -> Rate {
         self.rate
     }
 
-    /// Metres that the layer's unit of length has.
+    /// Returns the layer's unit of length, metres.
     pub(super) fn metres_per_unit(&self) -> f64 {
         self.metres_per_unit
     }
 
-    /// From the prim to the world, which is in metres with y up.
+    /// Returns the transform from the prim to the world, which is in metres with y up.
     pub(super) fn at(&self, seconds: f64) -> DMat4 {
         let code = self.code(seconds);
         let steps = self.steps.iter().flatten();
@@ -92,13 +95,13 @@ impl UsdNodes {
         self.world * local
     }
 
-    /// Whether a matrix is given at several times.
+    /// Whether a matrix has samples at several times.
     pub(super) fn has_moving_matrix(&self) -> bool {
         let mut operations = self.steps.iter().flatten();
         operations.any(|it| it.kind == Kind::Transform && it.curve.samples.len() > 1)
     }
 
-    /// When a transform or one of `beside` has a sample, seconds.
+    /// Returns the sample times of transforms and of `beside`, seconds.
     pub(super) fn times<'a>(
         &'a self,
         beside: impl Iterator<Item = &'a Curve> + 'a,
@@ -107,7 +110,7 @@ impl UsdNodes {
         codes.map(|code| code / self.rate.codes_per_second)
     }
 
-    /// The same of those that move.
+    /// Returns the sample times of values that change, seconds.
     pub(super) fn times_moved<'a>(
         &'a self,
         beside: impl Iterator<Item = &'a Curve> + 'a,
@@ -126,16 +129,17 @@ impl UsdNodes {
     }
 }
 
-/// How many time codes of a layer a second has.
+/// Time codes per second of a layer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Rate {
     pub(super) codes_per_second: f64,
-    /// The key of the layer's metadata that says so; `None` of a layer that says nothing.
+    /// Metadata key that sets the rate; `None` for the default.
     said: Option<&'static str>,
 }
 
 impl Rate {
-    /// As `SdfLayer::GetTimeCodesPerSecond` finds it: `timeCodesPerSecond`, else `framesPerSecond`, else 24.
+    /// Follows `SdfLayer::GetTimeCodesPerSecond`: `timeCodesPerSecond`, else
+    /// `framesPerSecond`, else 24.
     fn of(layer: &Layer) -> Result<Self> {
         let keys = ["timeCodesPerSecond", "framesPerSecond"];
         let said = (keys.into_iter()).find(|key| layer.metadata.contains_key(*key));
@@ -145,7 +149,7 @@ impl Rate {
         })
     }
 
-    /// That the file at `key` counts other frames than a shot of `frames_per_second` does; `None` where both count the same.
+    /// Warns if the file at `key` has another frame rate than the shot; `None` if they are equal.
     pub(super) fn lint(self, key: &str, frames_per_second: f64) -> Option<String> {
         let rate = self.codes_per_second;
         if (rate / frames_per_second - 1.0).abs() <= SAME_RATE {
@@ -164,14 +168,14 @@ impl Rate {
     }
 }
 
-/// Whether a file is USD, by its first bytes.
+/// Whether a file is USD, judged by its first bytes.
 pub(super) fn is_usd(bytes: &[u8]) -> bool {
     [b"#usda", BINARY, PACKAGE]
         .iter()
         .any(|begin| bytes.starts_with(begin))
 }
 
-/// The layer of a file of text; one that other layers add to is refused with what makes one layer of them.
+/// Reads a text layer. A layer composed of others is rejected with the command that flattens it.
 pub(super) fn layer(bytes: &[u8]) -> Result<Layer> {
     if bytes.starts_with(BINARY) {
         return Err(
@@ -195,7 +199,7 @@ pub(super) fn layer(bytes: &[u8]) -> Result<Layer> {
     }
 }
 
-/// What makes one layer of what a file takes from elsewhere.
+/// Describes how to flatten a file into one layer.
 fn flatten(file: &str) -> String {
     format!(
         "write all as one layer: usdcat --flatten {file} -o flat.usda (of OpenUSD; usd-core of Python has it as \
@@ -203,13 +207,13 @@ fn flatten(file: &str) -> String {
     )
 }
 
-/// What the prim takes from elsewhere: the key of its metadata.
+/// Returns the metadata key by which a prim takes content from elsewhere.
 fn arc(prim: &Prim) -> Option<&'static str> {
     let is_there = |key: &&&str| prim.metadata.contains(**key);
     ARCS.iter().find(is_there).copied()
 }
 
-/// That the prims of a chain have all that they have in the layer's own text.
+/// Checks that the prims of a chain are fully defined in the layer's own text.
 fn check_written(chain: &[&Prim]) -> Result<()> {
     for (depth, prim) in chain.iter().enumerate() {
         if let Some(arc) = arc(prim) {
@@ -227,7 +231,8 @@ fn taken(path: &str, arc: &str) -> String {
     )
 }
 
-/// In a layer in which something was looked for and not found: that it may be where the layer takes prims from; `None` where it takes none.
+/// For a layer in which something was not found, says that it may be where the layer takes prims
+/// from; `None` if it takes none.
 pub(super) fn elsewhere(layer: &Layer) -> Option<String> {
     let mut all = chains(layer, &|prim| arc(prim).is_some()).into_iter();
     let chain = all.next()?;
@@ -235,7 +240,8 @@ pub(super) fn elsewhere(layer: &Layer) -> Option<String> {
     Some(taken(&path_of(&chain), arc))
 }
 
-/// Each prim that is wanted, with the prims above it, from the root on; those that a prim has within itself come first.
+/// Returns all wanted prims, each with its ancestors from the root. Descendants come
+/// before the prim.
 pub(super) fn chains<'a>(
     layer: &'a Layer,
     is_wanted: &dyn Fn(&Prim) -> bool,
@@ -261,14 +267,14 @@ pub(super) fn chains<'a>(
     found
 }
 
-/// Such as `/root/rig/camera`.
+/// Returns a path such as `/root/rig/camera`.
 pub(super) fn path_of(chain: &[&Prim]) -> String {
     chain
         .iter()
         .fold(String::new(), |path, prim| path + "/" + &prim.name)
 }
 
-/// One operation of a transform.
+/// An operation of a transform.
 #[derive(Clone, Debug)]
 struct Operation {
     kind: Kind,
@@ -280,7 +286,7 @@ struct Operation {
 enum Kind {
     Translate,
     Scale,
-    /// About axes in this order.
+    /// Rotation about these axes in order.
     Rotate(&'static [usize]),
     Orient,
     Transform,
@@ -308,7 +314,7 @@ impl Kind {
             Self::Translate => DMat4::from_translation(DVec3::new(of[0], of[1], of[2])),
             Self::Scale => DMat4::from_scale(DVec3::new(of[0], of[1], of[2])),
             Self::Rotate(axes) => axes.iter().fold(DMat4::IDENTITY, |before, &axis| {
-                // One angle alone, or one of each axis.
+                // A single angle, or one per axis.
                 let angle = if axes.len() == 1 { of[0] } else { of[axis] };
                 DMat4::from_axis_angle(DVec3::AXES[axis], angle.to_radians()) * before
             }),
@@ -316,7 +322,7 @@ impl Kind {
                 let turn = DQuat::from_xyzw(of[1], of[2], of[3], of[0]);
                 DMat4::from_quat(turn.normalize())
             }
-            // Rows are what a row vector is multiplied with.
+            // USD's rows multiply row vectors, so they are columns here.
             Self::Transform => DMat4::from_cols_slice(of),
         }
     }
@@ -325,7 +331,7 @@ impl Kind {
 /// Numbers over time.
 #[derive(Clone, Debug)]
 pub(super) struct Curve {
-    /// Ascending time codes; one of what stays.
+    /// Samples in ascending order of time codes; a single one for a constant.
     pub(super) samples: Vec<(f64, Vec<f64>)>,
     is_turn: bool,
 }
@@ -340,7 +346,7 @@ impl Curve {
         self.samples.iter().any(|(_, it)| *it != self.samples[0].1)
     }
 
-    /// At a time code.
+    /// Returns the value at a time code.
     pub(super) fn at(&self, code: f64) -> Vec<f64> {
         let next = self.samples.partition_point(|(time, _)| *time <= code);
         let (before, after) = match (next.checked_sub(1), self.samples.get(next)) {
@@ -360,7 +366,7 @@ impl Curve {
         pairs.map(|(a, b)| a + part * (b - a)).collect()
     }
 
-    /// Of so many numbers, all finite.
+    /// Reads samples of `width` finite numbers each; `None` for anything else.
     pub(super) fn of(value: &Value, width: usize, is_turn: bool) -> Option<Self> {
         let samples = match value {
             Value::Numbers(numbers) => vec![(0.0, numbers.clone())],
@@ -375,13 +381,13 @@ impl Curve {
         is_whole.then_some(Self { samples, is_turn })
     }
 
-    /// Whether each of its numbers is above 0; between such ones others are too.
+    /// Whether all its numbers are positive; then so are interpolated ones.
     pub(super) fn is_above_zero(&self) -> bool {
         let numbers = self.samples.iter().flat_map(|(_, numbers)| numbers);
         numbers.into_iter().all(|number| *number > 0.0)
     }
 
-    /// Of a number that stays.
+    /// Creates a constant.
     pub(super) fn still(number: f64) -> Self {
         Self {
             samples: vec![(0.0, vec![number])],
@@ -390,7 +396,8 @@ impl Curve {
     }
 }
 
-/// A prim's operations as a point meets them, and whether it takes nothing of the prims above it.
+/// Returns a prim's operations in the order in which they apply to a point, and whether it ignores
+/// the transforms of its ancestors.
 fn operations(prim: &Prim) -> Result<(Vec<Operation>, bool)> {
     let Some(Value::Words(order)) = prim.attributes.get("xformOpOrder") else {
         return Ok((Vec::new(), false));
@@ -428,7 +435,7 @@ fn operations(prim: &Prim) -> Result<(Vec<Operation>, bool)> {
     Ok((operations, resets))
 }
 
-/// A positive number of the layer's metadata.
+/// Returns a positive number of the layer's metadata.
 fn number(layer: &Layer, key: &str, left_out: f64) -> Result<f64> {
     match layer.metadata.get(key) {
         None => Ok(left_out),
@@ -440,7 +447,7 @@ fn number(layer: &Layer, key: &str, left_out: f64) -> Result<f64> {
     }
 }
 
-/// From the layer's up axis to y.
+/// Returns the rotation from the layer's up axis to y.
 fn up(layer: &Layer) -> Result<DMat4> {
     let up = match layer.metadata.get("upAxis") {
         None => "Y",

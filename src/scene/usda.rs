@@ -1,37 +1,39 @@
-//! USD's text (usda), as far as what moves needs it: prims, their attributes of numbers and words, the layer's own metadata.
+//! Reader for the parts of USD's text format (usda) that animation needs: prims, their attributes
+//! with numbers and words, and the layer's metadata.
 //!
-//! Values of other kinds, relationships, variants and arrays of points are passed over. Layers that a file names are not read.
+//! Other values, relationships, variants and arrays of points are skipped. Layers that a file
+//! names are not read.
 
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Prims within prims, at most.
+/// Largest depth of nested prims.
 const MOST_DEPTH: usize = 256;
 
-/// A prim with what is written in it.
+/// A prim with its content.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Prim {
-    /// Such as `Camera`; empty of an `over`, and of a `class`, which is drawn nowhere.
+    /// Type such as `Camera`; empty for an `over`, and for a `class`, which is never drawn.
     pub(super) kind: String,
     pub(super) name: String,
-    /// Keys of its metadata, and `variantSets` where it has one.
+    /// Keys of its metadata, and `variantSets` if it has one.
     pub(super) metadata: BTreeSet<String>,
-    /// By their names, without types.
+    /// Attributes by name, without types.
     pub(super) attributes: BTreeMap<String, Value>,
     pub(super) children: Vec<Prim>,
 }
 
-/// What an attribute has.
+/// Value of an attribute.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Value {
-    /// Numbers, tuples one after the other; nothing where there is no number.
+    /// Numbers, tuples flattened; empty without numbers.
     Numbers(Vec<f64>),
-    /// One word, or several.
+    /// One or more words.
     Words(Vec<String>),
     /// Numbers at time codes, in ascending order.
     Samples(Vec<(f64, Vec<f64>)>),
 }
 
-/// A layer: its metadata, and the prims at its root.
+/// A layer: its metadata and its root prims.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Layer {
     pub(super) metadata: BTreeMap<String, Value>,
@@ -39,10 +41,10 @@ pub(super) struct Layer {
 }
 
 impl Layer {
-    /// Reads a layer's text.
+    /// Reads the text of a layer.
     ///
     /// # Errors
-    /// What is wrong, with its line.
+    /// A description with the line.
     pub(super) fn read(text: &str) -> Result<Self, String> {
         if !text.starts_with("#usda") {
             return Err("it does not begin with #usda".to_owned());
@@ -72,12 +74,12 @@ fn is_specifier(word: &str) -> bool {
 
 #[derive(Clone, Debug, PartialEq)]
 enum Token {
-    /// Names, keywords, with the colons and dots within them.
+    /// Names and keywords, including colons and dots within them.
     Word(String),
-    /// In quotes, an asset's or a path's name.
+    /// Quoted text, or the name of an asset or path.
     Text(String),
     Number(f64),
-    /// One of ( ) [ ] { } = , ; :
+    /// One of `( ) [ ] { } = , ; :`.
     Sign(char),
 }
 
@@ -85,7 +87,7 @@ struct Tokens<'a> {
     text: &'a str,
     at: usize,
     line: usize,
-    /// The next one, where it was looked at.
+    /// The next token, if it was peeked at.
     held: Option<Token>,
 }
 
@@ -117,7 +119,7 @@ impl<'a> Tokens<'a> {
         }
     }
 
-    /// The next token, which has to be there.
+    /// Returns the next token, or an error at the end of the file.
     fn need(&mut self) -> Result<Token, String> {
         let found = self.next()?;
         found.ok_or_else(|| self.fault("the file ends too early"))
@@ -127,7 +129,7 @@ impl<'a> Tokens<'a> {
         Ok(self.peek()? == Some(&Token::Sign(sign)))
     }
 
-    /// Takes the sign if it is next.
+    /// Consumes the sign if it is next.
     fn take(&mut self, sign: char) -> Result<bool, String> {
         let is = self.is_next(sign)?;
         if is {
@@ -210,7 +212,8 @@ impl<'a> Tokens<'a> {
         Ok(Token::Text(text))
     }
 
-    /// An asset's name between `@@@`: it may hold `@`, `\@@@` stands for `@@@`, and of more than three at its end the last three end it.
+    /// Reads an asset's name between `@@@`. It may contain `@`; `\@@@` stands for `@@@`; of a
+    /// longer run of `@`, the last three end the name.
     fn long_asset(&mut self) -> Result<Token, String> {
         const MARK: &str = "@@@";
         self.step(MARK.len());
@@ -249,7 +252,7 @@ impl<'a> Tokens<'a> {
         if length == 0 {
             return Err(self.fault(&format!("{first:?} belongs to nothing")));
         }
-        // A colon behind a word belongs to what follows.
+        // A trailing colon belongs to what follows.
         let word = self.rest()[..length].trim_end_matches(':');
         let length = word.len().max(1);
         Ok(Token::Word(self.step(length).to_owned()))
@@ -262,7 +265,7 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    /// A prim from behind its specifier on.
+    /// Reads a prim after its specifier.
     fn prim(&mut self, specifier: &str) -> Result<Prim, String> {
         self.depth += 1;
         if self.depth > MOST_DEPTH {
@@ -314,7 +317,7 @@ impl Reader<'_> {
         Ok(prim)
     }
 
-    /// `type name = value (metadata)`, from behind its first word on.
+    /// Reads `type name = value (metadata)` after its first word.
     fn property(&mut self, first: &str, into: &mut BTreeMap<String, Value>) -> Result<(), String> {
         let mut name = first.to_owned();
         loop {
@@ -324,14 +327,14 @@ impl Reader<'_> {
                         continue;
                     };
                     if is_specifier(&word) {
-                        // A declaration without a value stood before a prim.
+                        // A declaration without a value precedes a prim.
                         self.tokens.held = Some(Token::Word(word));
                         return Ok(());
                     }
                     name = word;
                 }
                 Some(Token::Sign('[')) => {
-                    // Of an array's type.
+                    // Brackets of an array type.
                     self.tokens.need()?;
                     if !self.tokens.take(']')? {
                         return Err(self.tokens.fault("a [ behind a type without ]"));
@@ -346,7 +349,7 @@ impl Reader<'_> {
         if self.tokens.take('=')? {
             let value = self.value()?;
             let name = name.strip_suffix(".timeSamples").unwrap_or(&name);
-            // A value that is told at times goes before one that is not.
+            // Time samples take precedence over a default value.
             let is_told = matches!(into.get(name), Some(Value::Samples(_)));
             if let Some(value) = value
                 && (!is_told || matches!(value, Value::Samples(_)))
@@ -360,7 +363,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// Whether what follows begins another statement: a declaration may stand without a value.
+    /// Whether another statement follows: a declaration may have no value.
     fn begins_line_of_its_own(&self) -> bool {
         if self.tokens.held.is_some() {
             return false;
@@ -370,13 +373,13 @@ impl Reader<'_> {
         blank.contains('\n')
     }
 
-    /// `name = value` up to the closing parenthesis.
+    /// Reads `name = value` up to the closing parenthesis.
     fn metadata(&mut self, into: &mut BTreeMap<String, Value>) -> Result<(), String> {
         loop {
             match self.tokens.need()? {
                 Token::Sign(')') => return Ok(()),
                 Token::Sign(';' | ',') | Token::Text(_) => {}
-                // Of a reference: how its times are shifted.
+                // Layer offset of a reference.
                 Token::Sign(open @ ('(' | '[' | '{')) => {
                     self.list(open)?;
                 }
@@ -398,7 +401,7 @@ impl Reader<'_> {
         }
     }
 
-    /// Up to the end of what a word begins: a value, or a body.
+    /// Skips to the end of a statement: a value or a body.
     fn pass_statement(&mut self) -> Result<(), String> {
         loop {
             match self.tokens.need()? {
@@ -412,13 +415,13 @@ impl Reader<'_> {
         }
     }
 
-    /// A value; `None` of what is neither numbers nor words.
+    /// Reads a value; `None` if it has neither numbers nor words.
     fn value(&mut self) -> Result<Option<Value>, String> {
         match self.tokens.need()? {
             Token::Number(number) => Ok(Some(Value::Numbers(vec![number]))),
             Token::Text(text) => Ok(Some(Value::Words(vec![text]))),
             Token::Word(word) => {
-                // `None`, `true`, `inf`.
+                // Words such as `None`, `true` or `inf`.
                 let number = word.parse::<f64>().ok();
                 Ok(number.map(|number| Value::Numbers(vec![number])))
             }
@@ -428,7 +431,7 @@ impl Reader<'_> {
         }
     }
 
-    /// All numbers or words up to the sign that closes `open`.
+    /// Reads all numbers or words up to the sign that closes `open`.
     fn list(&mut self, open: char) -> Result<Value, String> {
         let (mut numbers, mut words) = (Vec::new(), Vec::new());
         let mut opened = vec![open];
@@ -459,7 +462,7 @@ impl Reader<'_> {
         })
     }
 
-    /// Time samples, or a dictionary or body, which is passed over.
+    /// Reads time samples; skips a dictionary or body.
     fn braces(&mut self) -> Result<Option<Value>, String> {
         if !matches!(self.tokens.peek()?, Some(Token::Number(_))) {
             self.list('{')?;
@@ -471,7 +474,7 @@ impl Reader<'_> {
                 Token::Sign('}') => break,
                 Token::Sign(',') => {}
                 Token::Number(time) if self.tokens.take(':')? => {
-                    // What is blocked, or no number, has none.
+                    // Blocked samples and non-numbers are dropped.
                     if let Some(Value::Numbers(numbers)) = self.value()? {
                         samples.push((time, numbers));
                     }
@@ -489,7 +492,7 @@ impl Reader<'_> {
 mod tests {
     use super::*;
 
-    /// Names of assets as OpenUSD 26.11 reads them.
+    /// Asset names as read by OpenUSD 26.11.
     #[test]
     fn assets_are_named_between_one_mark_or_three() {
         for (text, name) in [
@@ -503,7 +506,7 @@ mod tests {
             let found = layer.unwrap().metadata.remove("subLayers");
             assert_eq!(found, Some(Value::Words(vec![name.to_owned()])), "{text}");
         }
-        // The control: nothing ends it.
+        // Control: nothing ends the name.
         for text in ["@./a", "@@@./a@@", "@@@./a\\@@@"] {
             let read = Layer::read(&format!("#usda 1.0\n(\n    subLayers = [{text}]\n)\n"));
             assert!(read.is_err(), "{text}");

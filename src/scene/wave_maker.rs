@@ -1,4 +1,4 @@
-//! Wave-makers: how a motion is read, and whether the walls stay apart.
+//! Wave makers: reading their motions, and checking that walls do not collide.
 
 use std::{f64::consts::PI, path::Path};
 
@@ -21,19 +21,19 @@ use swell_domain::{
 
 type Result<T> = std::result::Result<T, SceneError>;
 
-/// What a motion has to fit into.
+/// Parts of the scene that a motion is checked against.
 pub(super) struct Surroundings<'a> {
     pub(super) base_dir: &'a Path,
     pub(super) domain: &'a Bounds,
     pub(super) gravity: DVec3,
-    /// Between two walls, or a wall and the opposite face, metres.
+    /// Least distance between two walls, or between a wall and the opposite face, metres.
     pub(super) least_gap: f64,
-    /// Of particles, metres.
+    /// Particle spacing, metres.
     pub(super) spacing: f64,
     pub(super) shot: &'a Shot,
 }
 
-/// Builds and checks all of them.
+/// Builds and checks all wave makers.
 pub(super) fn build_all(
     doc: &Document<'_>,
     specs: &[WaveMakerSpec],
@@ -71,7 +71,7 @@ pub(super) fn build_all(
     Ok(makers)
 }
 
-/// That a wall crosses neither the domain nor the wall opposite.
+/// Checks that a wall crosses neither the domain nor the opposite wall.
 fn check_room(
     doc: &Document<'_>,
     place: &str,
@@ -114,12 +114,13 @@ fn check_room(
     Ok(())
 }
 
-/// When two motions together first use up `room`. Steps through the shot, and from each time no
-/// farther than the walls can get at their peak speed, so that no meeting is stepped over.
+/// Returns a time by which two motions together use up `room`. Steps through the shot and compares
+/// the gap with the distance that the walls can close at their peak speeds within a step, so no
+/// meeting is missed.
 fn meeting_time(a: &WaveMaker, b: &WaveMaker, room: f64, duration: f64) -> Option<f64> {
     const STEPS: u32 = 10_000;
     let step = duration / f64::from(STEPS);
-    // Walls that absorb may come as far off their own way as they have room.
+    // Absorption may displace each wall by up to its allowance in addition.
     let room = room - 2.0 * (a.room() + b.room());
     let (a, b) = (&a.motion, &b.motion);
     (0..STEPS).map(|i| step * f64::from(i)).find(|&t| {
@@ -129,7 +130,7 @@ fn meeting_time(a: &WaveMaker, b: &WaveMaker, room: f64, duration: f64) -> Optio
     })
 }
 
-/// The motion of the table at `path`.
+/// Builds the motion of the table at `path`.
 pub(super) fn motion(
     doc: &Document<'_>,
     path: &str,

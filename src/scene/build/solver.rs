@@ -1,4 +1,4 @@
-//! The solvers' tables. Whether the scene fits is asked of the one that is chosen alone.
+//! Settings of the solvers. Only the chosen solver is checked against the scene.
 
 use super::{
     super::{
@@ -13,21 +13,21 @@ use super::{
 };
 use swell_domain::bounds::{Bounds, cells_over};
 
-/// Most cells of PBF's neighbour grid; their indices are 32 bits.
+/// Largest number of cells of PBF's neighbour grid, whose indices have 32 bits.
 const MAX_CELLS: f64 = 2_147_483_647.0;
 
-/// Most cells of FLIP's box, wet or dry: 2²⁷ bricks of 8³, each with four bytes in a table.
+/// Largest number of cells of FLIP's box, wet or dry: 2²⁷ bricks of 8³, with a table entry of
+/// four bytes each.
 const MAX_FLIP_CELLS: f64 = 68_719_476_736.0;
 
-/// Most cells along one axis.
 const MAX_AXIS_CELLS: f64 = 65_536.0;
 
-/// Room that walls leave each other: spacings with PBF, cells with FLIP, of which one is then
-/// between two that touch a wall.
+/// Least distance between walls, in spacings for PBF and in cells for FLIP; the latter leaves one
+/// cell between two that touch a wall.
 const LEAST_SPACINGS: f64 = 2.0;
 const LEAST_CELLS: f64 = 3.0;
 
-/// Every table that stands there, the method, and the lattice of the chosen one.
+/// Reads the method and all given tables, and returns the lattice of the chosen solver.
 pub(super) fn solver(
     doc: &Document<'_>,
     spec: SolverSpec,
@@ -75,10 +75,10 @@ fn fit_flip(doc: &Document<'_>, flip: &Flip, domain: &Bounds) -> Result<Lattice>
     Ok(lattice)
 }
 
-/// Default ω.
+/// Default of the relaxation ω.
 pub(in super::super) const RELAXATION: f64 = 1.0;
 
-/// Default ω of the Chebyshev semi-iteration: 1 overshoots (table in solve/pbf/iteration.rs).
+/// Default ω of the Chebyshev semi-iteration; 1 overshoots (table in solve/pbf/iteration.rs).
 pub(in super::super) const CHEBYSHEV_RELAXATION: f64 = 0.7;
 
 impl From<PbfSpec> for Pbf {
@@ -91,7 +91,7 @@ impl From<PbfSpec> for Pbf {
             particle_spacing: spec.particle_spacing,
             support_ratio: spec.support_ratio,
             iteration: spec.iteration,
-            // The others have none.
+            // Unused by the other iterations.
             spectral_radius: spec.spectral_radius.unwrap_or(0.0),
             stop: match (spec.density_error, spec.max_iterations) {
                 (Some(density_error), Some(max_iterations)) => Stop::DensityError {
@@ -114,7 +114,7 @@ fn metres(domain: &Bounds) -> String {
     format!("{x} × {y} × {z} m")
 }
 
-/// A cell that touches no wall on either side, along every axis.
+/// Checks that along every axis some cell touches no wall.
 fn check_interior(
     doc: &Document<'_>,
     lattice: &Lattice,
@@ -122,7 +122,7 @@ fn check_interior(
     domain: &Bounds,
 ) -> Result<()> {
     let cells = domain.size() / cell_size;
-    // Decimal fractions: 0.6 m are three cells of 0.2 m.
+    // Tolerates rounding of decimal fractions: 0.6 m are three cells of 0.2 m.
     if cells.min_element() >= LEAST_CELLS * (1.0 - 1e-9) {
         return Ok(());
     }
@@ -137,7 +137,7 @@ fn check_interior(
     Err(doc.fault_of(lattice.key, problem))
 }
 
-/// A grid of at most so many cells, and positions of 32 bits that are fine enough for the lattice.
+/// Checks the number of cells, in total and along each axis.
 fn check_grid(
     doc: &Document<'_>,
     domain: &Bounds,

@@ -27,8 +27,8 @@ pub struct Settings {
     /// with a coefficient.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tolerance: Option<f64>,
-    /// c in [0, 1]: the part of the neighbours' mean relative velocity that a substep of PBF, or a
-    /// frame of FLIP, adopts (Schechter and Bridson 2012; Macklin and Müller 2013, eq. 17).
+    /// c from 0 to 1: the part of the neighbours' mean relative velocity that a substep of PBF, or
+    /// a frame of FLIP, adopts (Schechter and Bridson 2012; Macklin and Müller 2013, eq. 17).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub xsph: Option<f64>,
 }

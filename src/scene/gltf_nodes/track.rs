@@ -15,7 +15,7 @@ pub(super) struct Track<T> {
 
 /// Interpolation of values.
 pub(super) trait Blend: Copy {
-    /// Interpolates towards `other`; `part` is in [0, 1].
+    /// Interpolates towards `other`; `part` is from 0 to 1.
     fn between(self, other: Self, part: f64) -> Self;
     /// Returns the weighted sum of four values, normalized where the type requires it.
     fn weighted(values: [Self; 4], weights: [f64; 4]) -> Self;

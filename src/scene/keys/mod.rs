@@ -1,9 +1,9 @@
-//! The keys of every file that a user writes, each declared once: name, type, range, unit, default, whether it is physics,
-//! what it is for.
+//! The keys of all files that users write, each declared once: name, type, range, unit, default,
+//! whether it affects the physics, and purpose.
 //!
-//! From these tables follow what a file may say and how a fault is worded (`super::document`), the defaults, the scene
-//! as a cache has it (`super::write`), what a resume compares (`super::difference`), and the reference page
-//! ([`page`], which `swell keys` prints).
+//! Derived from these tables are validation and the wording of faults (`super::document`), the
+//! defaults, the scene as written into a cache (`super::write`), the comparison on resume
+//! (`super::difference`), and the reference page ([`page`], printed by `swell keys`).
 
 mod motion;
 mod page;
@@ -19,23 +19,23 @@ pub use page::page;
 pub(super) use scene::KEYS as SCENE;
 pub(super) use study::KEYS as STUDY;
 
-/// A kind of file.
+/// A kind of file with keys.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum File {
-    /// A scene.
+    /// A scene file.
     Scene,
-    /// A look.
+    /// A look file.
     Look,
-    /// A study.
+    /// A study file.
     Study,
     /// A tolerance file.
     Tolerance,
-    /// Settings of whitewater.
+    /// A whitewater settings file.
     Whitewater,
 }
 
 impl File {
-    /// With the names that the command line uses.
+    /// All kinds with the names used on the command line.
     pub const NAMED: [(&'static str, Self); 5] = [
         ("scene", Self::Scene),
         ("look", Self::Look),
@@ -44,7 +44,7 @@ impl File {
         ("whitewater", Self::Whitewater),
     ];
 
-    /// Its keys, in the order of the page.
+    /// Returns its keys in the order of the page.
     pub(super) fn keys(self) -> &'static [Key] {
         match self {
             Self::Scene => SCENE,
@@ -56,7 +56,7 @@ impl File {
     }
 }
 
-/// Dotted names of all keys, tables included.
+/// Returns the dotted names of all keys, including tables.
 #[cfg(test)]
 pub(super) fn paths(keys: &'static [Key]) -> Vec<String> {
     let of = |key: &'static Key| {

@@ -1,15 +1,16 @@
-//! Keys of motions: of walls that make waves, and of solids.
+//! Keys of the motions of wave makers and solids.
 
 use super::super::key::{Interval, Key, words};
 use swell_domain::motion::Spectrum;
 
-/// Metres: a stroke, a wave's height, the water's depth. The domain is the upper bound.
+/// Metres: a stroke, a wave height or the depth of the water. The upper bound is
+/// that of the domain.
 const LENGTH: Interval = 1e-9..=1e6;
 
-/// Seconds: from a tenth of a millisecond, the ripples of ultrasound, to eleven days, a spring tide.
+/// Seconds: from a tenth of a millisecond (ultrasonic ripples) to eleven days (a spring tide).
 const PERIOD: Interval = 1e-4..=1e6;
 
-// Sound has 1 500 m/s in water.
+// The speed of sound in water is 1500 m/s.
 const VELOCITY: Key = Key::number("velocity", 1e-9..=1e5)
     .unit("m/s")
     .only("kind", &["constant_velocity"])
@@ -98,7 +99,7 @@ pub(super) const SOLID_TURN: &[Key] = &[
     .about("angles in place, joined by a monotone cubic"),
 ];
 
-/// Motions by a spectrum.
+/// Motions with a spectrum.
 const SEAS: &[&str] = &["sea", "focused"];
 
 const SPECTRA: [&str; 3] = words(&Spectrum::NAMED);

@@ -1,11 +1,11 @@
-//! The reference page: every key with what it allows, its unit, its default and what it is for.
+//! The reference page: for every key the allowed values, unit, default and purpose.
 
 use super::{
     super::key::{Key, Kind, LeftOut, Physics},
     File,
 };
 
-/// The keys of these files as Markdown, a section a table.
+/// Returns the keys of these files as Markdown, one section per table.
 pub fn page(files: &[File]) -> String {
     let mut out = "# Keys\n\nEvery key of every file that swell reads. This page is written by `swell keys`.\n".to_owned();
     files.iter().for_each(|file| chapter(&mut out, *file));
@@ -40,7 +40,7 @@ fn chapter(out: &mut String, file: File) {
     section(out, file, "", "", file.keys());
 }
 
-/// The keys of one table, then those of the tables in it.
+/// Writes the keys of one table, then the sections of its tables.
 fn section(out: &mut String, file: File, head: &str, about: &str, keys: &'static [Key]) {
     if !head.is_empty() {
         *out += &format!("\n### `{head}`\n");
@@ -84,7 +84,7 @@ fn section(out: &mut String, file: File, head: &str, about: &str, keys: &'static
     }
 }
 
-/// That a table may be left out, where that means that there is none.
+/// Note on a table that may be left out.
 fn optional(table: &Key) -> &'static str {
     match (&table.kind, &table.default) {
         (Kind::Tables(_), _) => " Any number.",
@@ -104,7 +104,7 @@ fn left_out(key: &Key) -> String {
     }
 }
 
-/// A bar would end the cell.
+/// An unescaped bar would end the cell.
 fn cell(text: &str) -> String {
     text.replace('|', "\\|")
 }

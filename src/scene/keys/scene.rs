@@ -1,7 +1,7 @@
 //! Keys of a scene, in the order in which a cache's `scene.toml` has them.
 //!
-//! Each range is wider than any shot needs, and narrow enough that no product or quotient of what a scene may hold leaves
-//! what the solvers compute with.
+//! Each range is wider than any shot needs, yet narrow enough that no product or quotient of
+//! allowed values overflows or underflows in the solvers.
 
 use super::super::{
     Effects, Iteration, Method, Wall,
@@ -50,19 +50,20 @@ pub(in super::super) const KEYS: &[Key] = &[
         .about("Effects; what is not named here does not exist"),
 ];
 
-/// Metres along an axis, from the world's origin.
+/// World coordinates along an axis, metres.
 const COORDINATE: Interval = -1e6..=1e6;
 
-/// Metres. Below 10 nm matter is no fluid; 100 km is a tenth of the largest domain.
+/// Metres. Below 10 nm matter is no continuum; 100 km is a tenth of the largest domain.
 const SPACING: Interval = 1e-8..=1e5;
 
-/// Largest displacement in a substep. With 10 000 substeps a frame, the most there are, 1e-5 is a tenth of one in a frame.
+/// Largest displacement per substep. With 10 000 substeps per frame, the largest number allowed,
+/// 1e-5 amounts to a tenth per frame.
 const CFL: Interval = 1e-5..=5.0;
 
-/// m/s², and m/s of placed particles.
+/// Gravity, m/s², and velocities of individual particles, m/s.
 const VECTOR: Interval = -1e4..=1e4;
 
-/// Iterations, or substeps in a frame.
+/// Iterations, or substeps per frame.
 const MANY: std::ops::RangeInclusive<u32> = 1..=10_000;
 
 const SHOT: &[Key] = &[
@@ -72,7 +73,8 @@ const SHOT: &[Key] = &[
     Key::whole("frames", 1..=1_000_000)
         .not_physics()
         .about("output frames; frame 1 is the first after the start"),
-    // From a frame in 100 s, with which a tide is baked in a thousand frames, to the rate of a high-speed camera.
+    // From one frame in 100 s, with which a tide takes a thousand frames, to the rate of a
+    // high-speed camera.
     Key::number("frames_per_second", 0.01..=1e5)
         .unit("per second")
         .about("output frames a second"),
@@ -108,7 +110,7 @@ const DOMAIN: &[Key] = &[
 const AXES: [&str; 3] = words(&Axis::NAMED);
 
 const WATER: &[Key] = &[
-    // Hydrogen gas has 0.09, osmium 22 590.
+    // Hydrogen gas has a density of 0.09 kg/m³, osmium 22 590 kg/m³.
     Key::number("rest_density", 0.01..=1e5)
         .unit("kg/m³")
         .default("1000.0")
@@ -229,7 +231,7 @@ const WAVE_MAKER: &[Key] = &[
         ),
 ];
 
-/// Of a wall that takes in waves.
+/// Keys of an absorbing wall.
 const ABSORPTION: &[Key] = &[
     Key::number("depth", 1e-3..=1e6)
         .unit("metres")
@@ -334,7 +336,7 @@ const PBF: &[Key] = &[
     Key::choice("iteration", &ITERATIONS)
         .default("\"red_black\"")
         .about("how corrections see each other"),
-    // Above, Chebyshev's factors hardly change any more within 10 000 iterations.
+    // Above this, Chebyshev's factors hardly change within 10 000 iterations.
     Key::number("spectral_radius", 0.01..=0.9999)
         .only("iteration", &["chebyshev"])
         .default("0.98")
@@ -343,7 +345,7 @@ const PBF: &[Key] = &[
         .without(&["density_error", "max_iterations"])
         .default("4")
         .about("of each substep"),
-    // f32 tells densities 6e-8 apart.
+    // `f32` resolves relative differences of 6e-8.
     Key::number("density_error", 1e-7..=0.99)
         .absent()
         .with("max_iterations")
@@ -355,7 +357,7 @@ const PBF: &[Key] = &[
     Key::number("cfl", CFL)
         .default("1.0")
         .about("largest displacement in a substep, in d; as many substeps as that asks"),
-    // A hundredth takes a hundred iterations for one.
+    // A relaxation of a hundredth takes a hundred iterations for one.
     Key::number("relaxation", 0.01..=1.5)
         .computed(|| {
             format!("{RELAXATION:?}, {CHEBYSHEV_RELAXATION:?} with iteration = \"chebyshev\"")
@@ -385,7 +387,7 @@ const FLIP: &[Key] = &[
             ", with at least 3 and at most 65536 cells along each axis, 68719476736 cells and 134217728 particles",
         )
         .about("Δx"),
-    // Fewer than four in a cell do not tell its density.
+    // Fewer than four particles do not define the density of a cell.
     Key::whole("particles_per_cell", 4..=64)
         .default("8")
         .about("in a full cell at rest, n on a lattice of spacing Δx / ∛n"),
@@ -424,7 +426,7 @@ const PRESSURE: &[Key] = &[
         .default("\"f32_refined\"")
         .also(", the last where the adapter has it")
         .about("one word, iterative refinement, or 64-bit shader floats"),
-    // In f64 a residual is rounded at 2e-16 a term, and a row has seven.
+    // In `f64`, a residual has a rounding error of 2e-16 per term, and a row has seven terms.
     Key::number("tolerance", 1e-14..=0.99)
         .unit("of the right-hand side's norm")
         .default("1e-5")
@@ -524,10 +526,12 @@ const PROBE: &[Key] = &[
         .about("time up to each look over which mean, least and greatest value are given as well"),
 ];
 
-/// In its unit: wider than what f32 tells apart from nothing, and than anything that is computed.
+/// Range of a limit in its unit, wider than any value that `f32` resolves or that a
+/// simulation reaches.
 const LIMIT: Interval = 1e-12..=1e12;
 
-/// Defaults: a few times what the shipped scenes come to, of which docs/scene.md has the largest.
+/// Defaults are a few times the values of the shipped scenes; docs/scene.md lists the
+/// largest of these.
 const BUDGET: &[Key] = &[
     Key::number_or_false("speed", LIMIT)
         .unit("m/s")

@@ -1,4 +1,4 @@
-//! Keys of a study, of all its kinds.
+//! Keys of all kinds of studies.
 
 use super::super::{
     key::{Interval, Key, words},
@@ -18,7 +18,7 @@ pub(in super::super) const KEYS: &[Key] = &[
         .absent()
         .only("kind", &["sweep", "surface", "stability", "validation"])
         .about("in the reader's words"),
-    // Of two solvers.
+    // `kind = "solver_comparison"`.
     Key::text("look", "a look file, relative to the study file; of two solvers one that writes PNG")
         .only("kind", &["solver_comparison", "surface"])
         .about("how it is seen"),
@@ -35,7 +35,7 @@ pub(in super::super) const KEYS: &[Key] = &[
     Key::other("pictures", "frames to render, such as \"60-240x60\", within the shot")
         .only("kind", COMPARISON)
         .about("pairs of pictures"),
-    // Of a sweep.
+    // `kind = "sweep"`.
     SET.only("kind", &["solver_comparison", "sweep", "surface"]),
     KEY.only("kind", SWEEP),
     VALUES.only("kind", SWEEP),
@@ -73,18 +73,18 @@ pub(in super::super) const KEYS: &[Key] = &[
     Key::tables("method", METHOD)
         .only("kind", SWEEP)
         .about("A line of the curves each"),
-    // Of a surface.
+    // `kind = "surface"`.
     Key::tables("line", LINE)
         .only("kind", SURFACE)
         .about("A line of the curves each"),
-    // Of stability.
+    // `kind = "stability"`.
     Key::tables("case", CASE)
         .only("kind", STABILITY)
         .about("A small scene that is hard on a solver"),
     Key::tables("limit", LIMIT)
         .only("kind", STABILITY)
         .about("How far a setting goes before a mark is missed"),
-    // Against theory and experiments.
+    // `kind = "validation"`.
     Key::tables("benchmark", BENCHMARK)
         .only("kind", VALIDATION)
         .about("Something whose answer is known"),
@@ -234,13 +234,13 @@ const AGAINST: &[Key] = &[
         .about("its origin"),
 ];
 
-/// Largest coordinate of a region or a shift, metres.
+/// Coordinates of a region or a shift, metres.
 const FAR: Interval = -1e9..=1e9;
 
-/// What a quantity is held to, in its unit.
+/// Bound on a quantity, in its unit.
 const BOUND: Interval = -1e12..=1e12;
 
-/// Seconds of a shot that do not count.
+/// Seconds of a shot that are ignored.
 const SKIPPED: Interval = 0.0..=1e8;
 
 const MARKS: &[Key] = &[
@@ -276,7 +276,7 @@ const MARKS: &[Key] = &[
         .about("why it is missed; a known failure that passes is told as well"),
 ];
 
-/// What a limit is searched between, in its unit.
+/// Bracket of a search, in the unit of the setting.
 const SEARCHED: Interval = 1e-12..=1e12;
 
 const LIMIT: &[Key] = &[
@@ -292,14 +292,14 @@ const LIMIT: &[Key] = &[
     SOLVERS,
     Key::number("passes", SEARCHED).about("from a value that passes"),
     Key::number("fails", SEARCHED).about("to one that fails"),
-    // Each step halves the logarithm of what is left, 24 of them at most for 1e24 to 1.001.
+    // Each step halves the logarithm of the bracket: at most 24 steps from 1e24 to 1.001.
     Key::number("ratio", 1.001..=1e12).about("until the two are that near"),
     // Some shots have 1e6 frames of 100 s.
     Key::number("seconds", 1e-6..=1e8).about("of the shot"),
     Key::tables("mark", MARKS).about(MARK),
 ];
 
-/// What a measure is told, metres, seconds, metres a second.
+/// Inputs of a measure: metres, seconds or m/s.
 const TOLD: Interval = 1e-6..=1e6;
 
 const fn told(name: &'static str, unit: &'static str) -> Key {

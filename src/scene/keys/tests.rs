@@ -1,4 +1,4 @@
-//! The tables against what is read and written, and the page against the tables.
+//! Compares the tables with what is read and written, and the page with the tables.
 
 use std::{collections::BTreeSet, path::Path};
 
@@ -6,7 +6,7 @@ use toml::{Table, Value};
 
 use super::{super::key::*, super::*, *};
 
-/// Every table of a scene, each with as little as it may have.
+/// A scene with every table, each as small as possible.
 const LEAST: &str = r#"
 [shot]
 name = "least"
@@ -54,7 +54,7 @@ fn load(set: &[&str]) -> Scene {
     Scene::parse(LEAST, Path::new("least.toml"), folder.path(), &set).expect("the least is enough")
 }
 
-/// The first value at a dotted path, in the first table of each array.
+/// Returns the first value at a dotted path, taking the first table of each array.
 fn value_at<'v>(table: &'v Table, path: &str) -> Option<&'v Value> {
     let first = |value: &'v Value| match value {
         Value::Array(items) if items.first().is_some_and(Value::is_table) => items.first(),
@@ -66,7 +66,7 @@ fn value_at<'v>(table: &'v Table, path: &str) -> Option<&'v Value> {
     }
 }
 
-/// One number means the same whether it is written with a fraction or not, and a scale is one for all axes.
+/// Normalizes a value: integers become floats, and a uniform scale becomes one per axis.
 fn plain(path: &str, value: &Value) -> Value {
     match value {
         Value::Integer(whole) => Value::Float(*whole as f64),
@@ -91,7 +91,7 @@ fn what_is_left_out_is_the_default_of_the_table() {
             continue;
         };
         let table: Table = toml::from_str(&format!("v = {toml}")).expect(toml);
-        // What stands in the least scene, and tables.
+        // Tables, and the key that the least scene sets.
         if path == "grids.surface" || table["v"].is_table() {
             continue;
         }
@@ -111,7 +111,7 @@ fn what_is_left_out_is_the_default_of_the_table() {
     );
 }
 
-/// What depends on more than its key is said in words, with the numbers that hold.
+/// Defaults that depend on other keys are described in words, with the numbers that apply.
 #[test]
 fn defaults_that_are_computed_are_what_their_words_say() {
     let says = |path: &str, number: &str| {
@@ -205,7 +205,8 @@ fn allowed_words_follow_from_the_declaration() {
     assert!(find(File::Tolerance.keys(), "attributes.any.max").is_some());
 }
 
-/// No two keys of a table have one name, every key says what it is for, and `only` looks at a key that is read before it.
+/// Names within a table are unique, every key has a purpose, and `only` refers to a key that
+/// is read earlier.
 #[test]
 fn the_tables_are_whole() {
     fn look(keys: &'static [Key], path: &str) {
@@ -246,7 +247,7 @@ fn the_tables_are_whole() {
     }
 }
 
-/// Caches say by these hashes which scene they are of, and rendered pictures of which look.
+/// Caches and rendered pictures record these hashes of their scenes and looks.
 #[test]
 fn hashes_of_what_ships_are_those_of_the_caches_that_there_are() {
     let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
@@ -255,8 +256,8 @@ fn hashes_of_what_ships_are_those_of_the_caches_that_there_are() {
         let scene = Scene::load(&scenes.join(name).with_extension("toml"), &set).expect(name);
         assert_eq!(physics_hash(&scene), hash, "{name} {method}");
     }
-    // Of the looks as they were, before their spray was made denser and walls and houses had textures: keys that came since are left out where
-    // they are as if they were not.
+    // The looks before their spray became denser and walls and houses got textures. Keys added
+    // since then do not change the hash while they are left out.
     let bare = |text: &str| {
         let is_new = |line: &&str| {
             line.starts_with("texture = ") || line.starts_with("colour = [0.85, 0.83, 0.80]")
@@ -332,7 +333,7 @@ const SHIPPED: [(&str, &str, &str); 8] = [
     ),
 ];
 
-/// The page is what `swell keys` prints: `target/release/swell keys > docs/keys.md`.
+/// The page is the output of `target/release/swell keys > docs/keys.md`.
 #[test]
 fn the_page_of_keys_is_the_one_that_is_tracked() {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/keys.md");
@@ -344,7 +345,7 @@ fn the_page_of_keys_is_the_one_that_is_tracked() {
         .find(|(old, new)| old != new);
     assert_eq!(differs, None, "swell keys > docs/keys.md");
     assert_eq!(tracked, now, "swell keys > docs/keys.md");
-    // Control: another default would stand there.
+    // Control: another default would be printed here.
     assert!(now.contains(
         "| `tolerance` | a number from 1e-14 to 0.99, of the right-hand side's norm | `1e-5` |"
     ));

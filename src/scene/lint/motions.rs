@@ -1,4 +1,5 @@
-//! Tables that move nothing, or stop short; walls that go through solids; strokes whose waves break.
+//! Warnings for tables that move nothing or stop abruptly, walls that pass through solids, and
+//! strokes whose waves break.
 
 use glam::DVec3;
 
@@ -11,14 +12,14 @@ use swell_domain::{
     motion::{Motion, abrupt_end, piston_height_ratio},
 };
 
-/// Seconds by which times that are meant to be one may differ.
+/// Times closer than this are the same, seconds.
 const APART: f64 = 1e-6;
 
-/// Points of a table from which whole numbers may be frames.
+/// Least number of points of a table whose whole numbers may be frames.
 const LEAST_FRAMES: usize = 4;
 
 impl Scene {
-    /// Tables of walls and of solids.
+    /// Checks the motion tables of walls and solids.
     pub(super) fn lint_motions(&self, lints: &mut Vec<String>) {
         for (k, maker) in self.wave_makers.iter().enumerate() {
             let key = format!("wave_maker[{k}].motion");
@@ -42,7 +43,8 @@ impl Scene {
         }
     }
 
-    /// A wall that goes into solids at rest. Those that reach to where it rests, as a floor does, it slides over.
+    /// Warns about a wall that moves into static solids. Solids that extend behind its rest
+    /// position, such as a floor, are ignored: the wall slides over them.
     pub(super) fn lint_way(&self, index: usize, maker: &WaveMaker, lints: &mut Vec<String>) {
         let wall = maker.wall;
         let spacing = self.particle_spacing();
@@ -88,7 +90,7 @@ impl Scene {
         }
     }
 
-    /// A sine whose waves are higher than waves can be, as `stokes` refuses.
+    /// Warns about a sine whose waves exceed the breaking limit that `stokes` enforces.
     pub(super) fn lint_sine(
         &self,
         index: usize,
@@ -119,7 +121,8 @@ impl Scene {
     }
 }
 
-/// A table of which the shot sees nothing, that has frames for seconds, or that ends in mid-motion.
+/// Warns about a table that has no effect within the shot, seems to be timed in frames, or
+/// ends in mid-motion.
 fn lint_table(key: &str, unit: &str, motion: &Motion, shot: &Shot) -> Option<String> {
     let Motion::Table { points } = motion else {
         return None;
@@ -170,7 +173,7 @@ fn lint_table(key: &str, unit: &str, motion: &Motion, shot: &Shot) -> Option<Str
     })
 }
 
-/// The corners of what of a triangle lies within a box (Sutherland and Hodgman 1974).
+/// Returns the corners of a triangle clipped to a box (Sutherland and Hodgman 1974).
 fn within(corners: [DVec3; 3], bounds: &Bounds) -> Vec<DVec3> {
     let mut polygon = corners.to_vec();
     for axis in 0..3 {

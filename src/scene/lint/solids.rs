@@ -1,15 +1,15 @@
-//! Solids that do not hold water.
+//! Warnings for solids too thin to hold water.
 
 use swell_domain::{mesh::TriangleMesh, thin::thin_parts};
 
 use crate::{PlacedMesh, Scene};
 
-/// Particle spacings below which water passes through a solid: distances are known at points one spacing apart, so that a thinner one can
-/// stand between two of them. A half is for those that stand aslant, or move.
+/// Least thickness of a solid, in spacings of the distance grid. A solid thinner than one spacing
+/// can lie between two nodes; the additional half is for oblique and moving solids.
 const LEAST_THICKNESS: f64 = 1.5;
 
 impl Scene {
-    /// Solids that are thinner somewhere, with water or air on both sides.
+    /// Warns about solids that are too thin somewhere, with water or air on both sides.
     pub(super) fn lint_thin(&self, lints: &mut Vec<String>) {
         let spacing = self.particle_spacing();
         let at_rest = self.solids.iter();
@@ -24,7 +24,7 @@ impl Scene {
             let Some(thin) = thin else {
                 continue;
             };
-            // As the scene's file counts.
+            // World coordinates, as in the scene file.
             let place = self.origin + thin.place;
             lints.push(format!(
                 "solid.mesh of {}: it is {:.4} m thick at ({:.3}, {:.3}, {:.3}); water passes through what is thinner than {least:.4} m, \
@@ -45,7 +45,7 @@ mod tests {
 
     use super::*;
 
-    /// The wall of hard case 16, and the same as thick as it has to be.
+    /// The wall of hard case 16, and the same wall with the required thickness.
     #[test]
     fn a_thin_wall_is_told_with_its_place_and_the_thickness_it_needs() {
         let file =
@@ -63,7 +63,7 @@ mod tests {
             assert!(found[0].contains(part), "{part} of {found:?}");
         }
         assert_eq!(lints(&["solid[0].scale=[0.151,1.6,1.0]"]), [] as [&str; 0]);
-        // A moving one before it in the file, and all of it a kilometre off.
+        // With a moving wall before it in the file, and everything a kilometre away.
         let moving = "motion={kind=\"constant_velocity\",velocity=0.1,until=0.1},direction=[1,0,0]";
         let wall = "mesh=\"box.obj\",scale=[0.05,1.6,1.0]";
         let far = lints(&[

@@ -1,32 +1,32 @@
-//! How deep the water stands at rest: by its boxes and meshes, above the floor and the solids that lie on it.
+//! Depth of the water at rest, from its boxes and meshes above the floor and the solids on it.
 
 use glam::DVec3;
 
 use super::super::{Scene, WaveMaker, words::shown};
 use swell_domain::mesh::TriangleMesh;
 
-/// Columns of water that are looked at along a wall.
+/// Number of water columns sampled along a wall.
 const COLUMNS: usize = 9;
 
-/// Water at rest.
+/// Still water.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Still {
-    /// Metres.
+    /// Depth, metres.
     pub(super) depth: f64,
-    /// How high the solids that it stands on are above the domain's floor, metres.
+    /// Height of the solids below the water above the domain's floor, metres.
     pub(super) floor: f64,
 }
 
 impl Still {
-    /// Water so deep on the domain's own floor, metres.
+    /// Creates still water of this depth on the domain's floor, metres.
     pub(super) fn on_the_floor(depth: f64) -> Self {
         Self { depth, floor: 0.0 }
     }
 }
 
 impl Scene {
-    /// How deep the scene's water stands above the floor at the start, metres, where it is deepest; `None` where none stands there,
-    /// or where gravity does not go along -y.
+    /// Returns the largest depth of the water on the floor at the start, metres; `None` without
+    /// such water, or if gravity is not along -y.
     pub(super) fn still_depth(&self) -> Option<f64> {
         let floor = self.domain.min.y;
         let meshes = self.water.meshes.iter();
@@ -38,15 +38,15 @@ impl Scene {
         (self.is_down() && deepest > 0.0).then_some(deepest)
     }
 
-    /// The water beside a wall at its rest, the middle one of some columns along it; `None` where no water stands there, where
-    /// the wall is a floor or a ceiling, or where gravity does not go along -y.
+    /// Returns the water beside the rest position of a wall, as the median of some columns along
+    /// it; `None` without water there, for a floor or ceiling, or if gravity is not along -y.
     pub(super) fn still_beside(&self, maker: &WaveMaker) -> Option<Still> {
         let wall = maker.wall;
         if wall.axis == 1 || !self.is_down() {
             return None;
         }
         let (min, size) = (self.domain.min, self.domain.size());
-        // Off the planes on which faces and edges of boxes lie.
+        // Offsets that avoid the planes of box faces and edges.
         let away = maker.room() + 0.613 * self.particle_spacing();
         let column = |k: usize| {
             let part = (k as f64 + 0.437) / COLUMNS as f64;
@@ -85,7 +85,8 @@ impl Scene {
         gravity.x == 0.0 && gravity.z == 0.0 && gravity.y < 0.0
     }
 
-    /// The water over a place: what stands on the solids at rest that lie on the floor there.
+    /// Returns the water above a position, on top of the static solids that rest on
+    /// the floor there.
     fn column(&self, at: DVec3) -> Option<Still> {
         let bottom = self.domain.min.y;
         let near = self.particle_spacing();
@@ -108,7 +109,8 @@ impl Scene {
     }
 }
 
-/// How high stretches that stand on one another come, of which the lowest begins at `from` or less than `near` above.
+/// Returns the top of a stack of intervals, of which the lowest begins no higher than
+/// `near` above `from`.
 fn topmost(from: f64, near: f64, mut stretches: Vec<[f64; 2]>) -> f64 {
     stretches.sort_by(|a, b| a[0].total_cmp(&b[0]));
     let onto = |top: f64, [low, high]: [f64; 2]| match low <= top + near {
@@ -118,8 +120,8 @@ fn topmost(from: f64, near: f64, mut stretches: Vec<[f64; 2]>) -> f64 {
     stretches.into_iter().fold(from, onto)
 }
 
-/// Where the vertical through `at` is within a mesh, bottom and top of each stretch, metres. What lies below a surface without a
-/// bottom is within.
+/// Returns bottom and top of each interval of the vertical line through `at` that is inside a mesh,
+/// metres. Below a surface without a bottom counts as inside.
 fn stretches(mesh: &TriangleMesh, at: DVec3) -> Vec<[f64; 2]> {
     let outward = mesh.signed_volume().signum();
     let mut crossings: Vec<(f64, i32)> = (0..mesh.triangles.len())
@@ -127,7 +129,7 @@ fn stretches(mesh: &TriangleMesh, at: DVec3) -> Vec<[f64; 2]> {
         .map(|(y, side)| (y, if side * outward < 0.0 { 1 } else { -1 }))
         .collect();
     crossings.sort_by(|a, b| a.0.total_cmp(&b.0));
-    // How many shells the lowest point is within.
+    // Number of shells around the lowest point.
     let sums = crossings.iter().scan(0, |sum, (_, step)| {
         *sum += step;
         Some(*sum)
@@ -149,7 +151,8 @@ fn stretches(mesh: &TriangleMesh, at: DVec3) -> Vec<[f64; 2]> {
     found
 }
 
-/// Height at which the vertical through `at` meets a triangle, and a number of the sign that the triangle's normal has along y.
+/// Returns the height at which the vertical line through `at` meets a triangle, and a number with
+/// the sign of the normal's y component.
 fn crossing(corners: [DVec3; 3], at: DVec3) -> Option<(f64, f64)> {
     let [a, b, c] = corners;
     let side = |p: DVec3, q: DVec3| (q.z - p.z) * (at.x - p.x) - (q.x - p.x) * (at.z - p.z);

@@ -27,10 +27,10 @@ fn lints(set: &[&str]) -> Vec<String> {
     scene.lints()
 }
 
-/// Each with what mends it.
+/// Each suspicious value, paired with a change that removes the warning.
 #[test]
 fn what_is_hardly_meant_is_said_with_its_key_and_number() {
-    // Waves of 2.2987 s are 6.2832 m long on 1 m of water, and their energy goes at 2.1 m/s.
+    // Waves of 2.2987 s are 6.2832 m long on 1 m of water; their group velocity is 2.1 m/s.
     let sine = "wave_maker=[{wall=\"-x\",motion={kind=\"sine\",stroke=0.2,period=2.2987}}]";
     let stokes = |more: &str| {
         let waves = format!("kind=\"stokes\",period=2.2987,{more}");
@@ -166,7 +166,7 @@ fn what_is_hardly_meant_is_said_with_its_key_and_number() {
             vec!["effects.drag={drop_radius=0.03}".into()],
             "effects.drag.drop_radius: a drop of 0.04 m radius holds 2.1 times the water of a particle",
         ),
-        // √(9.81 × 0.1) × 0.1 × 1000 / μ.
+        // The Reynolds number is √(9.81 × 0.1) × 0.1 × 1000 / μ.
         (
             vec!["effects.viscosity={coefficient=0.001}".into()],
             vec!["effects.viscosity={coefficient=0.1}".into()],
@@ -190,7 +190,7 @@ fn what_is_hardly_meant_is_said_with_its_key_and_number() {
     }
 }
 
-/// Each kind of motion hands in a height of its own.
+/// Each kind of motion provides its own wave height.
 #[test]
 fn each_motion_that_makes_waves_is_looked_at() {
     for motion in [
@@ -210,7 +210,7 @@ fn each_motion_that_makes_waves_is_looked_at() {
     }
 }
 
-/// Those of the studies by theory as well.
+/// Includes the scenes of the validation studies.
 #[test]
 fn what_ships_is_meant() {
     let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
@@ -221,11 +221,11 @@ fn what_ships_is_meant() {
             if file.extension().is_some_and(|end| end == "toml") {
                 let scene = Scene::load(&file, &[]).expect("valid");
                 let mut lints = scene.lints();
-                // The paper's iterations alone are what it is there for.
+                // This scene uses the iterations of the paper without grid projection on purpose.
                 if file.ends_with("basin.toml") {
                     lints.retain(|lint| !lint.starts_with("solver.pbf.grid_projection: 24 "));
                 }
-                // The experiment's own sizes.
+                // The experiment fixes these sizes.
                 if file.ends_with("block.toml") {
                     lints.retain(|lint| !lint.starts_with("water.block[0]: 0.6754 m³ "));
                 }
@@ -237,7 +237,7 @@ fn what_ships_is_meant() {
     assert!(read > 12, "{read}");
 }
 
-/// A box with corners at `min` and `max`, as OBJ.
+/// Returns a box with corners at `min` and `max`, as OBJ.
 fn cuboid(min: [f64; 3], max: [f64; 3]) -> String {
     let corner = |k: usize| [0, 1, 2].map(|axis| if k >> axis & 1 == 0 { min } else { max }[axis]);
     let corners: String = (0..8)
@@ -249,7 +249,7 @@ fn cuboid(min: [f64; 3], max: [f64; 3]) -> String {
     corners + "f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n"
 }
 
-/// Lints of the scene with other text at its end, beside a file `box.obj`.
+/// Returns the lints of a scene beside a file `box.obj`.
 fn lints_beside(mesh: &str, scene: &str) -> Vec<String> {
     let folder = tempfile::tempdir().expect("a folder");
     std::fs::write(folder.path().join("box.obj"), mesh).expect("written");
@@ -302,7 +302,7 @@ fn a_table_that_moves_nothing_or_stops_short_is_said() {
         only(&lints(&[&wall(points)]), expected);
         assert_eq!(lints(&[&wall(good)]), [] as [&str; 0], "{good}");
     }
-    // Of solids as of walls.
+    // Solids are checked like walls.
     let door = cuboid([10.0, 0.5, 0.2], [10.4, 0.9, 0.6]);
     let slide =
         "direction = [1, 0, 0]\nmotion = { kind = \"table\", points = [[9.0, 0.0], [9.5, 1.0]] }\n";
@@ -334,7 +334,7 @@ fn a_wall_that_goes_through_a_solid_is_said() {
         );
         assert_eq!(lints_beside(&pier(x), &scene(wall, 0.9)), [] as [&str; 0]);
     }
-    // The controls: a floor, which begins behind the wall or at its face, and one of less than a spacing.
+    // Controls: a floor that begins behind the wall or at its face, and one thinner than a spacing.
     for floor in [
         cuboid([-1.0, -0.5, -0.5], [3.0, 0.3, 1.5]),
         cuboid([0.0, 0.0, 0.0], [3.0, 0.3, 1.0]),
@@ -368,7 +368,8 @@ fn a_wall_without_water_is_said() {
     assert_eq!(lints_beside(&low, &scene(2.0, emitter)), [] as [&str; 0]);
 }
 
-/// A told depth is compared with what stands beside the wall: of a mesh as of a box, and above solids that are its floor.
+/// An assumed depth is compared with the water beside the wall, for a mesh as for a box, and above
+/// the solids that are its floor.
 #[test]
 fn a_depth_is_that_beside_the_wall() {
     let scene = |water: &str, solid: &str, depth: f64| {
@@ -401,7 +402,7 @@ fn a_depth_is_that_beside_the_wall() {
         let good = scene(&block(bottom), solid, 0.6);
         assert_eq!(lints_beside(&floor, &good), [] as [&str; 0], "{bottom}");
     }
-    // The control: a solid that hangs above, and a floor that begins farther on.
+    // Control: a solid that hangs above, and a floor that begins farther away.
     for other in [
         cuboid([-1.0, 0.5, -1.0], [21.0, 0.8, 2.0]),
         cuboid([5.0, -1.0, -1.0], [21.0, 0.4, 2.0]),

@@ -1,4 +1,4 @@
-//! Lints of the water of the start, and of what enters and leaves.
+//! Warnings for the initial water and for emitters and drains.
 
 use crate::{
     Scene,
@@ -6,26 +6,27 @@ use crate::{
 };
 use swell_domain::{bounds::Bounds, sampling::block_dims, sources::Window};
 
-/// Part of a block's volume by which whole layers of particles may be off it.
+/// Relative difference of a block's volume from that of its whole layers of particles
+/// that is tolerated.
 const ROUNDED: f64 = 0.02;
 
 impl Scene {
-    /// What of the water is hardly meant.
     pub(super) fn lint_water(&self, lints: &mut Vec<String>) {
         self.lint_dry(lints);
         self.lint_blocks(lints);
         self.lint_sources(lints);
     }
 
-    /// Blocks of the start, cut where walls that absorb rest inside of the domain.
+    /// Returns the initial water blocks, clipped to the rest positions of absorbing walls
+    /// inside the domain.
     pub fn start_blocks(&self) -> Vec<Bounds> {
         let room = self.start_domain();
         let blocks = self.water.blocks.iter();
         blocks.map(|block| block.intersection(&room)).collect()
     }
 
-    /// Volume of the water that the scene asks for at the start, m³: of its blocks, its meshes and single particles, each for itself and
-    /// with what lies in solids.
+    /// Returns the volume of water requested at the start, m³: the sum over blocks, meshes and
+    /// individual particles, including overlaps and what is inside solids.
     pub fn asked_volume(&self) -> f64 {
         let blocks = self.start_blocks();
         let blocks = blocks
@@ -41,12 +42,12 @@ impl Scene {
         blocks + meshes.sum::<f64>() + particles.sum::<usize>() as f64 * self.particle_volume()
     }
 
-    /// What a particle stands for, m³.
+    /// Returns the volume that a particle represents, m³.
     pub fn particle_volume(&self) -> f64 {
         self.particle_spacing().powi(3)
     }
 
-    /// No water, and nothing that brings any.
+    /// Warns about a scene without water and emitters.
     fn lint_dry(&self, lints: &mut Vec<String>) {
         let water = &self.water;
         let is_dry = water.blocks.is_empty() && water.meshes.is_empty();
@@ -55,7 +56,7 @@ impl Scene {
         }
     }
 
-    /// Blocks of which whole layers of particles are another volume.
+    /// Warns about blocks whose volume differs from that of their particles.
     fn lint_blocks(&self, lints: &mut Vec<String>) {
         let (room, spacing) = (self.start_domain(), self.particle_spacing());
         for (index, block) in self.start_blocks().iter().enumerate() {
@@ -77,7 +78,7 @@ impl Scene {
         }
     }
 
-    /// Water that enters or leaves only when the shot is over.
+    /// Warns about emitters and drains that only act after the shot.
     fn lint_sources(&self, lints: &mut Vec<String>) {
         let mut emitters = self.emitters.iter().map(|it| ("emitter", it.window));
         let mut drains = self.drains.iter().map(|it| ("drain", it.window));
@@ -98,7 +99,7 @@ impl Scene {
         self.lint_rooms(lints);
     }
 
-    /// Water that enters where a wall stands.
+    /// Warns about emitters that extend behind a wave maker.
     fn lint_rooms(&self, lints: &mut Vec<String>) {
         for (index, emitter) in self.emitters.iter().enumerate() {
             let Bounds { min, max } = emitter.shape.bounds();
@@ -160,7 +161,7 @@ particle_spacing = 0.05
             more.len() == 1 && more[0].contains("35.1 % more"),
             "{more:?}"
         );
-        // Two per cent are none, and a little more are.
+        // Two per cent are tolerated, a little more is not.
         let of =
             |top: f64| scene(&[&format!("water.block=[{{min=[0,0,0],max=[1,{top},1]}}]")]).lints();
         assert_eq!(of(0.5101), [] as [&str; 0]);

@@ -98,7 +98,7 @@ fn everything_that_is_written_is_meant() {
     };
     assert_ne!(copy.file.file_stem(), solid.file.file_stem());
     assert_eq!([copy.name(), solid.name()], ["cube", "cube"]);
-    // The corner (1, 0, 0) scaled, then turned by 30° about y, then moved.
+    // The corner (1, 0, 0) scaled, then rotated by 30° about y, then translated.
     let corner = solid.placement.world_from_file().transform_point3(DVec3::X);
     let expected = DVec3::new(8.0 + 30f64.to_radians().cos(), 0.0, 2.0 - 0.5);
     assert!((corner - expected).length() < 1e-12);
@@ -126,7 +126,7 @@ fn everything_that_is_written_is_meant() {
     assert_eq!(flip.transfer, Transfer::Apic);
     assert_eq!(flip.pressure.preconditioner, Preconditioner::Ipp);
     assert_eq!((flip.cell_size, flip.particle_spacing()), (0.25, 0.125));
-    // What is left out.
+    // Defaults.
     assert_eq!((flip.particles_per_cell, flip.pic_blend), (8, 0.05));
     assert_eq!((flip.cfl, flip.max_substeps), (3.0, 32));
     assert_eq!(flip.surface, Surface::GhostFluid);
@@ -145,7 +145,7 @@ fn everything_that_is_written_is_meant() {
     );
 }
 
-/// Numbers of the README, one by one.
+/// The numbers of the README, one by one.
 #[test]
 fn what_a_scene_leaves_out_is_what_its_page_says() {
     let text = "[shot]\nname = \"a\"\nframes = 10\nframes_per_second = 50\n\
@@ -178,7 +178,7 @@ fn what_a_scene_leaves_out_is_what_its_page_says() {
     assert_eq!(pressure.preconditioner, Preconditioner::Multigrid);
     let voxels = |scene: &Scene| scene.grids.as_ref().map(|grids| grids.voxel_size);
     assert_eq!(voxels(&scene), Some(0.2), "two particle spacings");
-    // One period of ramp.
+    // The default ramp is one period.
     let sine = Motion::Sine {
         stroke: 0.5,
         period: 2.0,
@@ -188,8 +188,8 @@ fn what_a_scene_leaves_out_is_what_its_page_says() {
     let chebyshev = load(&["solver.pbf.iteration=chebyshev"]);
     let pbf = chebyshev.solver.pbf();
     assert_eq!((pbf.relaxation, pbf.spectral_radius), (0.7, 0.98));
-    // The diagonal of 4 × 3 × 12 m is 13 m. The wall: π stroke / period at the most, and the bound of an interval as
-    // long as the shot, 0.2 s of the ramp, lies below.
+    // The diagonal of 4 × 3 × 12 m is 13 m. The wall moves at up to π stroke / period; within the
+    // shot, 0.2 s of the ramp, its bound is lower.
     let speed = scene.budget.speed.expect("a limit");
     let fall = (2.0 * 9.81 * 13.0_f64).sqrt();
     let push = scene.wave_makers[0].motion.peak_speed(0.0, 0.2);
@@ -221,7 +221,7 @@ fn either_solver_of_a_scene_can_be_chosen() {
     assert_eq!(flip.particle_spacing(), 0.125);
     assert_eq!(flip.solver.pbf, scene.solver.pbf);
     assert_ne!(physics_hash(&scene), physics_hash(&flip));
-    // Where the other solver would not fit is not asked.
+    // The other solver is not checked against the scene.
     let coarse = "solver.flip.cell_size=2.0";
     parse(dir.path(), FULL, &[coarse]).expect("valid with PBF");
     parse(dir.path(), FULL, &[coarse, "solver.method=flip"]).expect_err("two cells across");
@@ -295,7 +295,7 @@ fn the_scene_of_a_cache_that_is_older_than_a_key_is_read_as_it_was_baked() {
         difference.as_deref(),
         Some("solver.pbf.grid_projection was false, is now true")
     );
-    // Controls: a cache that has the key, and a scene of today that leaves it out.
+    // Controls: a cache that has the key, and a new scene that leaves it out.
     assert_eq!(
         Scene::recorded(&written, file, dir.path()).expect("valid"),
         now
@@ -327,7 +327,7 @@ fn physics_is_compared_by_key() {
         (scene.to_toml(&|_, _| path.to_owned()), physics_hash(&scene))
     };
     let (base, base_hash) = written(&[], "assets/a.obj");
-    // The last two: settings of the solver that is not chosen, and when to give up.
+    // The last two are a setting of the solver that is not chosen, and the limit on substeps.
     let same: [&[&str]; 5] = [
         &[],
         &["shot.frames=7"],
@@ -425,7 +425,7 @@ fn the_scenes_that_ship_fit_together() {
         let fill = sampling::fill_water(blocks, [], solid.as_ref(), &scene.domain, d);
         let fill = fill.expect("no water meshes");
         assert_eq!(fill.particles.len() + fill.removed, in_blocks, "{name}");
-        // Only the beach stands in water: (4 m × 1 m / 2 + 4 m × 1 m) × 3 m of it.
+        // Only the beach displaces water: (4 m × 1 m / 2 + 4 m × 1 m) × 3 m.
         let displaced = fill.removed as f64 * d.powi(3);
         let expected = if name == "wave-tank" { 18.0 } else { 0.0 };
         assert!(

@@ -1,8 +1,9 @@
-//! A camera from a file: of glTF 2.0 (Khronos 2021), where its node stands in the file's hierarchy, and how its animations move it;
-//! or of USD as text.
+//! A camera from a file: glTF 2.0 (Khronos 2021), with its node's place in the hierarchy and its
+//! animations, or USD as text.
 //!
-//! glTF is in metres, y up, and a camera looks along its own −z, as a look's world is. What is sampled is translation, rotation and
-//! scale of the camera's node and of every node above it; a camera's own scale turns nothing and is left out.
+//! glTF is in metres with y up, and a camera looks along its own −z, as in a look's world. Sampled
+//! are translation, rotation and scale of the camera's node and of all its ancestors; a camera's
+//! own scale does not affect its direction and is ignored.
 
 use glam::{DMat3, DVec3};
 use gltf::{Document, Gltf, Node, camera::Projection};
@@ -17,73 +18,74 @@ use super::{
 };
 use swell_domain::text::{self, NoText};
 
-/// Metres from the origin, at most: farther out, f32 positions are coarser than a millimetre.
+/// Largest distance from the origin, metres: beyond it, `f32` positions are coarser
+/// than a millimetre.
 const FARTHEST: f64 = 1e5;
 
-/// Why a file gives no camera.
+/// Why a file provides no camera.
 #[derive(Debug, thiserror::Error)]
 pub enum CameraFileError {
-    /// USD that gives none.
+    /// A fault in a USD file.
     #[error("{0}")]
     Usd(String),
-    /// It is no glTF file.
+    /// The file is neither USD nor valid glTF.
     #[error("neither USD as text, which begins with #usda, nor glTF that can be read: {0}")]
     Gltf(#[from] gltf::Error),
-    /// It is text in another encoding.
+    /// The text has another encoding.
     #[error(transparent)]
     Text(#[from] NoText),
-    /// It has none.
+    /// The file has no camera.
     #[error("no node of it has a camera")]
     None,
-    /// It has several, and none is named.
+    /// The file has several cameras, and none is named.
     #[error("it has {} cameras: {}; name one in camera.name", .0.len(), .0.join(", "))]
     Several(Vec<String>),
-    /// It has none of that name.
+    /// The file has no camera of this name.
     #[error("no camera is called {name:?}; there are {}", names.join(", "))]
     Unknown {
-        /// As asked for.
+        /// The requested name.
         name: String,
-        /// As they are called.
+        /// Names of its cameras.
         names: Vec<String>,
     },
-    /// It has several of that name.
+    /// The file has several cameras of this name.
     #[error("{count} cameras are called {name:?}; give each a name of its own")]
     Ambiguous {
-        /// As asked for.
+        /// The requested name.
         name: String,
-        /// So many.
+        /// Number of such cameras.
         count: usize,
     },
-    /// It has no perspective.
+    /// The camera is orthographic.
     #[error("camera {0} is orthographic; only perspective cameras are drawn")]
     Orthographic(String),
-    /// A field of view that no lens has.
+    /// The field of view is out of range.
     #[error(
         "camera {name} has a vertical field of view of {yfov} radians; allowed is more than 0 and less than π"
     )]
     FieldOfView {
-        /// Of the camera.
+        /// Name of the camera.
         name: String,
-        /// As the file has it.
+        /// Vertical field of view in the file, radians.
         yfov: f32,
     },
-    /// What moves it.
+    /// A fault in the animation of its node.
     #[error(transparent)]
     Node(#[from] NodeError),
-    /// A pose that is none.
+    /// The camera has no valid pose at some time.
     #[error("at {seconds} s camera {name} has no place or no direction: {what}")]
     Pose {
-        /// Of the camera.
+        /// Name of the camera.
         name: String,
-        /// When.
+        /// Time, seconds.
         seconds: f64,
-        /// What is wrong.
+        /// Description of the fault.
         what: &'static str,
     },
 }
 
 impl CameraFileError {
-    /// Whether another `camera.name` is the remedy.
+    /// Whether another `camera.name` could resolve the error.
     pub(super) fn is_of_name(&self) -> bool {
         matches!(self, Self::Unknown { .. } | Self::Ambiguous { .. })
     }
@@ -91,18 +93,18 @@ impl CameraFileError {
 
 type Result<T> = std::result::Result<T, CameraFileError>;
 
-/// Where a camera stands and looks, in the world.
+/// Pose of a camera in the world.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stand {
-    /// Metres.
+    /// Position, metres.
     pub position: DVec3,
-    /// Unit vector into the picture.
+    /// Unit vector of the viewing direction.
     pub forward: DVec3,
-    /// Unit vector to its top, at right angles to `forward`.
+    /// Unit vector towards the top of the picture, perpendicular to `forward`.
     pub up: DVec3,
 }
 
-/// A perspective camera, with what moves it.
+/// A perspective camera with its animation.
 #[derive(Clone, Debug)]
 pub struct CameraFile {
     name: String,
@@ -113,7 +115,7 @@ pub struct CameraFile {
 #[derive(Clone, Debug)]
 enum Body {
     Gltf {
-        /// Vertical, radians.
+        /// Vertical field of view, radians.
         yfov: f64,
         aspect_ratio: Option<f64>,
         nodes: Nodes,
@@ -122,7 +124,8 @@ enum Body {
 }
 
 impl CameraFile {
-    /// Reads the camera called `name`, or the only one, from the bytes of a file; `beside` reads a file that it names.
+    /// Reads the camera called `name`, or the only one, from the bytes of a file. `beside` reads
+    /// files that it references.
     ///
     /// # Errors
     /// [`CameraFileError`].
@@ -163,12 +166,12 @@ impl CameraFile {
         Ok(found)
     }
 
-    /// BLAKE3 over the file, and over the buffers that its camera is animated by.
+    /// Returns the BLAKE3 hash of the file and of the buffers that animate its camera.
     pub(super) fn hash(&self) -> blake3::Hash {
         self.hash
     }
 
-    /// Width over height, where the file says it.
+    /// Returns width over height, if the file specifies it.
     pub fn aspect_ratio(&self) -> Option<f64> {
         match &self.body {
             Body::Gltf { aspect_ratio, .. } => *aspect_ratio,
@@ -176,15 +179,17 @@ impl CameraFile {
         }
     }
 
-    /// Where the picture is so many millimetres high: that over the picture's height in focal lengths, which `framing` decides.
+    /// Returns the focal length for a picture `picture_height_mm` high, mm. `framing` decides which
+    /// part of the film the picture shows.
     pub fn focal_length_mm(&self, framing: &Framing, picture_height_mm: f64, seconds: f64) -> f64 {
         picture_height_mm / framing.shown(self.film(framing, seconds))[1]
     }
 
-    /// How far the picture's middle stands off the optical axis, to its right and to its top, in heights of the picture.
+    /// Returns the offset of the picture's centre from the optical axis, to the right and upward,
+    /// in heights of the picture.
     pub fn shift(&self, framing: &Framing, seconds: f64) -> [f64; 2] {
         match &self.body {
-            // glTF's perspective cameras have none.
+            // glTF's perspective cameras have no offset.
             Body::Gltf { .. } => [0.0; 2],
             Body::Usd(camera) => {
                 let film = self.film(framing, seconds);
@@ -194,7 +199,8 @@ impl CameraFile {
         }
     }
 
-    /// Width and height of the film, in focal lengths; of the image's shape where the file has no width.
+    /// Returns width and height of the film in focal lengths. Without an aspect ratio in the file,
+    /// the film has that of the image.
     fn film(&self, framing: &Framing, seconds: f64) -> [f64; 2] {
         match &self.body {
             Body::Gltf {
@@ -208,7 +214,8 @@ impl CameraFile {
         }
     }
 
-    /// The f-number and the distance that is sharp, metres; `None` of a pinhole, which all of glTF's are.
+    /// Returns the f-number and the focus distance, metres; `None` for a pinhole, as all
+    /// glTF cameras are.
     pub fn lens(&self, seconds: f64) -> Option<[f64; 2]> {
         match &self.body {
             Body::Gltf { .. } => None,
@@ -216,13 +223,13 @@ impl CameraFile {
         }
     }
 
-    /// The longest of the shot, mm.
+    /// Returns the longest focal length of the shot, mm.
     pub fn longest_focal_length_mm(&self, framing: &Framing, picture_height_mm: f64) -> f64 {
         let at = |seconds| self.focal_length_mm(framing, picture_height_mm, seconds);
         self.times().map(at).fold(at(0.0), f64::max)
     }
 
-    /// Time codes a second of the file's own count; `None` where it counts seconds alone.
+    /// Returns the file's time codes per second; `None` for a format in seconds.
     pub(super) fn rate(&self) -> Option<Rate> {
         match &self.body {
             Body::Gltf { .. } => None,
@@ -230,7 +237,7 @@ impl CameraFile {
         }
     }
 
-    /// When the first and the last key of what moves are, seconds; `None` where nothing does.
+    /// Returns the first and last key of values that change, seconds; `None` if nothing moves.
     pub(super) fn moves(&self) -> Option<[f64; 2]> {
         let times: Box<dyn Iterator<Item = f64> + '_> = match &self.body {
             Body::Gltf { nodes, .. } => Box::new(nodes.times_moved()),
@@ -240,7 +247,7 @@ impl CameraFile {
         ends.reduce(|[a, b], [c, d]| [a.min(c), b.max(d)])
     }
 
-    /// When something has a key, seconds.
+    /// Returns the times of all keys, seconds.
     pub(super) fn times(&self) -> Box<dyn Iterator<Item = f64> + '_> {
         match &self.body {
             Body::Gltf { nodes, .. } => Box::new(nodes.times()),
@@ -248,7 +255,7 @@ impl CameraFile {
         }
     }
 
-    /// Where it stands.
+    /// Returns the camera's pose at a time, seconds.
     pub fn at(&self, seconds: f64) -> Stand {
         let world = match &self.body {
             Body::Gltf { nodes, .. } => nodes.at(seconds),
@@ -264,7 +271,7 @@ impl CameraFile {
         }
     }
 
-    /// At each of its keys, and before and after them.
+    /// Checks the pose at each key and at time 0.
     fn check(&self) -> Result<()> {
         for seconds in self.times().chain([0.0]) {
             let stand = self.at(seconds);
@@ -286,7 +293,7 @@ impl CameraFile {
     }
 }
 
-/// What a node is called, or else its camera.
+/// Returns the name of a node, or else that of its camera.
 fn called(node: &Node<'_>) -> String {
     let camera = node.camera();
     let name = (node.name()).or_else(|| camera.as_ref().and_then(gltf::Camera::name));
@@ -308,7 +315,7 @@ fn choose<'a>(document: &'a Document, name: Option<&str>) -> Result<Node<'a>> {
     if all.is_empty() {
         return Err(CameraFileError::None);
     }
-    // A node's name comes first: two nodes may share a camera.
+    // Node names take precedence: two nodes may share a camera.
     for is_called in [
         |node: &Node<'_>, name: &str| node.name() == Some(name),
         |node: &Node<'_>, name: &str| node.camera().is_some_and(|it| it.name() == Some(name)),

@@ -1,20 +1,20 @@
-//! The part of the film that the image shows: which side of it the image takes, where their shapes differ.
+//! The part of the film that the image shows if their aspect ratios differ.
 //!
-//! The names are those of Maya's film fit; USD's `aspectRatioConformPolicy` has the same four, and Houdini's cameras always take the
-//! width. As there, the image stays about the middle of the film.
+//! The names are those of Maya's film fit. USD's `aspectRatioConformPolicy` has the same four
+//! policies; Houdini's cameras always use the width. As there, the image is centred on the film.
 
 use super::{FitSpec, Look};
 
-/// How an image lies on films of any shape.
+/// Fit of an image to films of any aspect ratio.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Framing {
     fit: FitSpec,
-    /// Columns and rows of the image.
+    /// Width and height of the image, pixels.
     image: [f64; 2],
 }
 
 impl Framing {
-    /// Of an image of so many columns and rows.
+    /// Creates the framing of an image with this width and height in pixels.
     pub fn new(fit: FitSpec, image: [u32; 2]) -> Self {
         Self {
             fit,
@@ -22,12 +22,12 @@ impl Framing {
         }
     }
 
-    /// Width over height of the image.
+    /// Returns width over height of the image.
     pub(super) fn shape(&self) -> f64 {
         self.image[0] / self.image[1]
     }
 
-    /// Width and height of the image on a film of this width and height, in their unit.
+    /// Returns the width and height of the image on a film of the given size, in its unit.
     pub fn shown(&self, [width, height]: [f64; 2]) -> [f64; 2] {
         let [columns, rows] = self.image;
         let is_film_wider = width * rows > height * columns;
@@ -45,19 +45,19 @@ impl Framing {
 }
 
 impl Look {
-    /// Width and height of the image on the film, mm.
+    /// Returns the width and height of the image on the look's film, mm.
     pub fn film_mm(&self) -> [f64; 2] {
         let framing = self.framing(FitSpec::Width);
         framing.shown(self.spec.camera.film_back_mm)
     }
 
-    /// How the image lies on the film of a camera from a file: where the look does not say it, both have the same shape, and the
-    /// file's vertical field of view decides.
+    /// Returns the framing for a camera file. Without `camera.fit`, film and image have the same
+    /// aspect ratio and the file's vertical field of view decides.
     pub fn framing_of_file(&self) -> Framing {
         self.framing(FitSpec::Height)
     }
 
-    /// A focal length in pixels of the image.
+    /// Converts a focal length from mm to pixels of the image.
     pub fn focal_px(&self, focal_length_mm: f64) -> f64 {
         focal_length_mm / self.film_mm()[0] * f64::from(self.spec.image.width)
     }
@@ -73,7 +73,8 @@ impl Look {
 mod tests {
     use super::*;
 
-    /// 36 × 24 mm, and film twice as wide as high, under an image of 16 : 9, against the table of `docs/look.md`.
+    /// Film of 36 × 24 mm, and film twice as wide as high, under a 16:9 image, compared with the
+    /// table in `docs/look.md`.
     #[test]
     fn an_image_lies_on_film_as_the_fit_says() {
         let near = |a: [f64; 2], b: [f64; 2]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-12);
@@ -89,7 +90,8 @@ mod tests {
             for (film, expected) in [(narrow, on_narrow), (wide, on_wide)] {
                 let found = framing.shown(film);
                 assert!(near(found, expected), "{fit:?} {film:?}: {found:?}");
-                // The image is within the film, or holds it: both of film of its own shape alone.
+                // The image is within the film or covers it; both only if the aspect
+                // ratios are equal.
                 let is_within = found[0] <= film[0] + 1e-12 && found[1] <= film[1] + 1e-12;
                 let holds = found[0] >= film[0] - 1e-12 && found[1] >= film[1] - 1e-12;
                 assert!(fit != FitSpec::Fill || (is_within && !holds), "{film:?}");

@@ -47,24 +47,24 @@ pub(in super::super) const KEYS: &[Key] = &[
         .about("What is written"),
 ];
 
-/// Farther than this from the origin, f32 positions are coarser than a millimetre.
+/// Metres. Farther from the origin, `f32` positions are coarser than a millimetre.
 const PLACE: Interval = -1e5..=1e5;
 
-/// A part of something, or a reflectance.
+/// A fraction or a reflectance.
 const PART: Interval = 0.0..=1.0;
 
-/// Samples a pixel, at most.
+/// Largest number of samples per pixel.
 pub(super) const MOST_SAMPLES: u32 = 1024;
 
-/// Voxels a particle spacing, at most.
+/// Largest number of voxels per particle spacing.
 pub(super) const MOST_VOXELS: f64 = 8.0;
 
 const FOCAL_LENGTH: Interval = 1.0..=5000.0;
 
-/// Metres of a wall, a storey.
+/// Size of a wall or a storey, metres.
 const SIZE: Interval = 1e-3..=1e3;
 
-/// What a metre of water takes or gives.
+/// Absorption or scattering coefficient of water, 1/m.
 const PER_METRE: Interval = 0.0..=1e4;
 
 const DEGREES: Interval = -360.0..=360.0;
@@ -121,7 +121,7 @@ const CAMERA: &[Key] = &[
         .about("Poses at frames, in ascending order, instead of position and target"),
 ];
 
-/// Metres from the lens to what is sharp.
+/// Focus distance, metres.
 const FOCUS: Interval = 1e-3..=1e5;
 
 const LENS: &[Key] = &[
@@ -364,7 +364,7 @@ const BASIN: &[Key] = &[
     LAID,
 ];
 
-/// A texture of what has no coordinates for one.
+/// Texture of objects without texture coordinates.
 const LAID: Key = Key::table("texture", LAID_TEXTURE)
     .absent()
     .about("A picture on what of them has no material, multiplied by `colour`");
@@ -480,7 +480,7 @@ const WINDOWS: &[Key] = &[
         .about("fraction of the windows that are lit from within"),
 ];
 
-/// Of the PNG alone.
+/// Keys that affect only the PNG.
 pub(super) const VIEW: &[Key] = &[
     Key::number("exposure_stops", -20.0..=20.0)
         .unit("stops")

@@ -1,10 +1,10 @@
-//! The lens of a look: its own, or that of the camera's file.
+//! The lens of a look: its own, or that of the camera file.
 
 use super::{Look, camera_file::CameraFile};
 
 impl Look {
-    /// The f-number and the distance that is sharp, metres, of the look's own lens as it stands without keyframes, or else of its
-    /// file's camera at a time of the file; `None` of a pinhole.
+    /// Returns the f-number and the focus distance, metres: those of the look's own lens without
+    /// keyframes, or else those of the camera file at a time of the file. `None` for a pinhole.
     pub fn lens(&self, seconds: f64) -> Option<[f64; 2]> {
         match &self.spec.camera.lens {
             Some(own) => Some([own.f_stop, own.focus_distance_m]),
@@ -12,7 +12,7 @@ impl Look {
         }
     }
 
-    /// Longest focal length of the shot, mm.
+    /// Returns the longest focal length of the shot, mm.
     pub fn longest_focal_length_mm(&self) -> f64 {
         let camera = &self.spec.camera;
         let own = (self.camera_file()).map_or(camera.focal_length_mm, |file| {
@@ -23,13 +23,13 @@ impl Look {
             .fold(own, f64::max)
     }
 
-    /// Pixels across the disc that a point at infinity is drawn as, at its widest in the shot; a point at half of the focus
-    /// distance is as wide. `None` of a pinhole.
+    /// Returns the diameter of the blur disc of a point at infinity, pixels, at its largest in the
+    /// shot; a point at half the focus distance has the same. `None` for a pinhole.
     pub fn widest_blur_px(&self) -> Option<f64> {
         let camera = &self.spec.camera;
         let times = self.camera_file().into_iter().flat_map(CameraFile::times);
         let lenses = times.chain([0.0]).map(|seconds| self.lens(seconds));
-        // Of the lens at its widest and its nearest, which need not be at one time.
+        // Uses the widest aperture and the nearest focus, even if they occur at different times.
         let [f_stop, own] = lenses
             .flatten()
             .reduce(|[f, d], [f_stop, focus]| [f.min(f_stop), d.min(focus)])?;

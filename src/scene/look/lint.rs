@@ -1,22 +1,22 @@
-//! What of a look is allowed, and hardly what was meant: each found by a number, and said with it.
+//! Warnings for legal but suspicious values of a look, each with the number that it is based on.
 
 use std::f64::consts::PI;
 
 use super::{super::words::shown, Look};
 
-/// Seconds by which times that are meant to be one may differ.
+/// Times closer than this are the same, seconds.
 const ROUNDING: f64 = 1e-6;
 
 impl Look {
-    /// What of the look is allowed and hardly meant, a sentence each, with its key first and the number that it was judged by.
+    /// Returns the warnings of the look, one sentence each, beginning with the key.
     pub fn lints(&self) -> Vec<String> {
         let lens = self.lint_lens().into_iter();
         lens.chain(self.lint_library()).collect()
     }
 
-    /// What of a camera from a file, which moves, is hardly meant where these frames are drawn, first and last: that it counts
-    /// other frames than the shot does, or stands still over all of them, as its keys lie elsewhere: those of a shot that is
-    /// counted from 1001.
+    /// Returns warnings about an animated camera file if the frames from `frames[0]` to `frames[1]`
+    /// are rendered: the file has another frame rate than the shot, or its keys are all outside of
+    /// these frames, so that the camera is static (a shot numbered from 1001, for example).
     pub fn lint_camera(&self, frames: [u32; 2], frames_per_second: f64) -> Vec<String> {
         let rate = (self.camera_file()).and_then(|file| {
             file.moves()?;
@@ -50,7 +50,8 @@ impl Look {
         ))
     }
 
-    /// N samples show a point as N ghosts, evenly over its disc: of c pixels across, each has π c² / 4 N pixels of it.
+    /// N samples show a point as N ghosts, spread over its disc: each has π c² / 4 N pixels of a
+    /// disc c pixels wide.
     fn lint_lens(&self) -> Option<String> {
         let blur = self.widest_blur_px()?;
         let samples = self.spec.image.samples;

@@ -1,4 +1,4 @@
-//! Materials of solids: those of the look, and those of a library that it names.
+//! Materials of solids, from the look and from a material library.
 
 use std::{
     io::Cursor,
@@ -13,68 +13,71 @@ use super::{
 };
 use crate::{Fault, document::Document, error::SceneError};
 
-/// Key of the library.
 const LIBRARY: &str = "solids.materials";
 
-/// Largest file of a library or a picture, bytes.
+/// Largest size of a library or a picture, bytes.
 const MOST_BYTES: u64 = 256 << 20;
-/// Texels of a picture along a side, and of all pictures of a look, at most: with their smaller versions these are 256 MiB.
+/// Largest side of a picture, and largest total of all pictures of a look, texels: with mipmaps
+/// these are 256 MiB.
 const MOST_SIDE: u32 = 8192;
 const MOST_TEXELS: u64 = 24_000_000;
 
-/// Materials of a look, in the order in which a name is looked for, and the pictures of their textures.
+/// Materials of a look in the order in which names are looked up, and the pictures
+/// of their textures.
 #[derive(Clone, Debug, Default)]
 pub struct Materials {
-    /// Those of `[[solids.material]]`, then those of the library.
+    /// Materials of `[[solids.material]]`, then those of the library.
     pub list: Vec<Material>,
-    /// Number in `list` of what solids without a material have; `None` of one colour.
+    /// Index in `list` of the material of solids that have none; `None` for a plain colour.
     pub solids: Option<usize>,
-    /// The same of the walls of `[basin]`.
+    /// Index in `list` of the material of the `[basin]` walls; `None` for a plain colour.
     pub basin: Option<usize>,
-    /// Each once, whichever materials use it.
+    /// Pictures, each once even if several materials use it.
     pub pictures: Vec<Picture>,
-    /// BLAKE3 of the library, where there is one.
+    /// BLAKE3 hash of the library, if there is one.
     library: Option<blake3::Hash>,
-    /// What of the library is not used.
+    /// Statements of the library that are ignored.
     unused: Vec<String>,
 }
 
-/// How a part of a solid looks.
+/// Material of a part of a solid.
 #[derive(Clone, Debug)]
 pub struct Material {
-    /// Of the parts, or of the mesh file without its ending; `None` of what lies on all that has no other.
+    /// Name of the parts, or of the mesh file without extension; `None` for the material of
+    /// everything that has no other.
     pub name: Option<String>,
-    /// Reflectance, linear red, green, blue; the texture's is multiplied by it.
+    /// Reflectance, linear red, green, blue; multiplies the texture.
     pub colour: [f64; 3],
-    /// `None` of one colour.
+    /// Texture; `None` for a plain colour.
     pub texture: Option<Texture>,
-    /// Whether the look's windows may be on it.
+    /// Whether the look's windows may appear on it.
     pub windows: bool,
-    /// Whether it is the look's own: one of a library may have no part in a scene.
+    /// Whether the look defines it. A material of a library may be unused in a scene.
     pub is_own: bool,
-    /// Where the look names it.
+    /// Location of its name in the look.
     place: Fault,
 }
 
-/// A picture on a solid.
+/// A texture on a solid.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Texture {
-    /// Number of it in [`Materials::pictures`].
+    /// Index into [`Materials::pictures`].
     pub picture: usize,
-    /// Metres that one picture covers, laid on along the axes; `None` where the mesh's texture coordinates say where it lies.
+    /// Side length that the picture covers, metres, projected along the axes; `None` to use the
+    /// mesh's texture coordinates.
     pub metres: Option<f64>,
-    /// Those coordinates are multiplied by it.
+    /// Factor on the texture coordinates.
     pub scale: [f64; 2],
-    /// And then moved by it.
+    /// Offset added to the scaled texture coordinates.
     pub offset: [f64; 2],
 }
 
-/// A picture as its file has it.
+/// A decoded picture.
 #[derive(Clone)]
 pub struct Picture {
-    /// Columns and rows.
+    /// Width and height, texels.
     pub size: [u32; 2],
-    /// sRGB, row by row from the top.
+    /// sRGB texels, row by row from the top.
     pub texels: Vec<[u8; 3]>,
     file: PathBuf,
     hash: blake3::Hash,
@@ -87,12 +90,13 @@ impl std::fmt::Debug for Picture {
 }
 
 impl Look {
-    /// Materials of solids; `None` where the look names none.
+    /// Returns the materials of the look; `None` if it names none.
     pub fn materials(&self) -> Option<&Materials> {
         self.materials.as_deref()
     }
 
-    /// That a material is no good, in the words of who tried it on a scene.
+    /// Returns an error that reports `problem` with a material of a scene; `None` if there is
+    /// no such material.
     pub fn material_fault(&self, index: usize, problem: &str) -> Option<LookError> {
         let material = self.materials()?.list.get(index)?;
         let fault = Fault {
@@ -105,7 +109,7 @@ impl Look {
         Some(LookError(SceneError::Fault(Box::new(fault))))
     }
 
-    /// What of its library is not used.
+    /// Warns about statements of the library that are ignored.
     pub(super) fn lint_library(&self) -> Option<String> {
         let unused = &self.materials()?.unused;
         (!unused.is_empty()).then(|| {
@@ -118,7 +122,7 @@ impl Look {
 }
 
 impl Materials {
-    /// Adds what decides their pictures, apart from the look's text.
+    /// Hashes the library and the pictures.
     pub(super) fn hash(&self, hasher: &mut blake3::Hasher) {
         let pictures = self.pictures.iter().map(|picture| &picture.hash);
         for hash in self.library.iter().chain(pictures) {
@@ -126,7 +130,7 @@ impl Materials {
         }
     }
 
-    /// Those that the look `file` names, read; `None` where it names none.
+    /// Reads the materials that the look `file` names; `None` if it names none.
     pub(super) fn read(
         doc: &Document<'_>,
         spec: &LookSpec,
@@ -175,7 +179,8 @@ struct Reader<'d, 'a> {
 }
 
 impl Reader<'_, '_> {
-    /// A material of the look; its colour is white under a texture and that of all solids else.
+    /// Adds a material of the look. Its default colour is white under a texture, and otherwise
+    /// that of all solids.
     fn own(
         &mut self,
         key: &str,
@@ -207,7 +212,7 @@ impl Reader<'_, '_> {
         })
     }
 
-    /// What lies on all of a table that has no other material.
+    /// Adds the material of everything in a table that has no other, and returns its index.
     fn laid(
         &mut self,
         key: &str,
@@ -227,7 +232,7 @@ impl Reader<'_, '_> {
         Ok(self.all.list.len() - 1)
     }
 
-    /// Those of a library whose names are not yet taken.
+    /// Adds the materials of a library.
     fn library(&mut self, name: &Path) -> Result<(), SceneError> {
         let (path, bytes) = self.bytes(LIBRARY, name, "")?;
         self.all.library = Some(blake3::hash(&bytes));
@@ -268,7 +273,7 @@ impl Reader<'_, '_> {
         Ok(())
     }
 
-    /// The number of a picture; `place` stands before what is wrong with it.
+    /// Returns the index of a picture; `place` precedes the description of faults.
     fn picture(&mut self, key: &str, name: &Path, place: &str) -> Result<usize, SceneError> {
         let (path, bytes) = self.bytes(key, name, place)?;
         let hash = blake3::hash(&bytes);
@@ -315,7 +320,7 @@ impl Reader<'_, '_> {
     }
 }
 
-/// Size and colours of a PNG, without its alpha.
+/// Decodes a PNG to its size and colours, ignoring alpha.
 fn decoded(bytes: &[u8]) -> Result<([u32; 2], Vec<[u8; 3]>), String> {
     let fail = |error: png::DecodingError| format!("it is no PNG that can be read: {error}");
     let mut decoder = png::Decoder::new(Cursor::new(bytes));

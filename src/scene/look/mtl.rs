@@ -1,6 +1,7 @@
-//! Material libraries (MTL) as far as pictures use them: `newmtl`, `Kd` and `map_Kd`.
+//! Reader for the parts of material libraries (MTL) that are used: `newmtl`, `Kd` and `map_Kd`.
 //!
-//! tobj reads MTL too, but says no lines of faults and leaves a picture's options in its name; what is used is little.
+//! tobj also reads MTL, but reports no line numbers and leaves the options of a
+//! picture in its name.
 
 use std::path::PathBuf;
 
@@ -10,37 +11,36 @@ use swell_domain::text;
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Entry {
     pub(super) name: String,
-    /// Reflectance, linear; 1 where the library says nothing.
+    /// Reflectance, linear; 1 if the library does not set it.
     pub(super) colour: [f64; 3],
     pub(super) map: Option<Map>,
-    /// Of its `newmtl`.
+    /// Line of its `newmtl`.
     pub(super) line: usize,
 }
 
-/// A picture that multiplies a colour.
+/// A picture that multiplies the colour.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Map {
-    /// As the library names it: relative to it.
+    /// As named in the library, relative to it.
     pub(super) file: PathBuf,
-    /// Of the statement.
+    /// Line of the statement.
     pub(super) line: usize,
-    /// Texture coordinates are multiplied by it.
+    /// Factor on the texture coordinates.
     pub(super) scale: [f64; 2],
-    /// And then moved by it.
+    /// Offset added to the scaled texture coordinates.
     pub(super) offset: [f64; 2],
 }
 
-/// A library, and which statements and options of it are not used, each once.
+/// A library, and the names of its ignored statements and options, each once.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Library {
     pub(super) entries: Vec<Entry>,
     pub(super) unused: Vec<String>,
 }
 
-/// Farthest that a picture is scaled or moved.
+/// Largest scale or offset of a picture.
 const MOST: f64 = 1e6;
 
-/// Reads a library.
 pub(super) fn read(bytes: &[u8]) -> Result<Library, String> {
     let bytes = text::without_mark(bytes).map_err(|error| error.to_string())?;
     let text = String::from_utf8_lossy(bytes);
@@ -102,7 +102,7 @@ impl Library {
     }
 }
 
-/// One number for all three, or three of them.
+/// Reads one number for all channels, or three numbers.
 fn colour(rest: &str) -> Result<[f64; 3], String> {
     let numbers: Option<Vec<f64>> = rest.split_whitespace().map(|it| it.parse().ok()).collect();
     let colour = match numbers.as_deref() {
@@ -120,7 +120,8 @@ fn colour(rest: &str) -> Result<[f64; 3], String> {
     Ok(colour)
 }
 
-/// Options and a file, which may have blanks in its name; and which of the options are not used.
+/// Reads options and a file name, which may contain spaces. Also returns the options
+/// that are ignored.
 fn map(rest: &str, line: usize) -> Result<(Map, Vec<String>), String> {
     let mut map = Map {
         file: PathBuf::new(),
@@ -159,14 +160,14 @@ fn map(rest: &str, line: usize) -> Result<(Map, Vec<String>), String> {
     Ok((map, unused))
 }
 
-/// The next word, without which the rest begins at its next one.
+/// Splits off the next word.
 fn word<'a>(rest: &mut &'a str) -> &'a str {
     let (first, after) = rest.split_once(char::is_whitespace).unwrap_or((*rest, ""));
     *rest = after.trim_start();
     first
 }
 
-/// One to three numbers: along u, v and w, of which the last is nothing of a picture.
+/// Reads one to three numbers along u, v and w; pictures do not use the last.
 fn pair(option: &str, rest: &mut &str, default: [f64; 2]) -> Result<[f64; 2], String> {
     let mut numbers = Vec::new();
     while numbers.len() < 3 {

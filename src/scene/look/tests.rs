@@ -1,4 +1,4 @@
-//! Faults of look files carry line, key and a way out; no text makes the parser panic.
+//! Faults of look files carry line, key and a remedy; no text makes the parser panic.
 
 #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
@@ -44,7 +44,8 @@ fn a_plain_look_parses_and_layout_does_not_change_its_hash() {
     assert_eq!(look.hash().len(), 64);
 }
 
-/// As version 0.1.0 had it before there were voxels and splats to choose; each choice of another has another.
+/// The hash of version 0.1.0, before voxels and splats could be chosen; any other
+/// choice changes it.
 #[test]
 fn a_look_that_leaves_choices_out_keeps_its_hash() {
     const BEFORE: &str = "023f42bda0627032e91d99f5fb5b472c5f3a4c996b6ea8ba9b58729051c346b6";
@@ -122,7 +123,7 @@ fn a_missing_table_is_named_itself_with_what_it_takes() {
         message.contains("missing; allowed: a table with at least focal_length_mm"),
         "{message}"
     );
-    // Nor does the table that the text begins with take it.
+    // The table at the beginning of the text is not blamed either.
     let (_, key, _) = fault("[image]\nwidth = 64\n[sky]\nmodel = \"hosek_wilkie\"\n");
     assert_eq!(key, "camera");
     for (from, to, expected, words) in [
@@ -189,7 +190,7 @@ fn a_panorama_that_is_not_there_is_a_fault_of_its_key() {
         message.contains("cannot read none.exr: No such file"),
         "{message}"
     );
-    // What is there and is no picture is found by who reads it, and told at the same place.
+    // A file that is not a picture is found by its reader and reported at the same location.
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("none.exr"), b"nonsense").unwrap();
     let look = Look::parse(&text, &folder.path().join("look.toml")).unwrap();
@@ -204,7 +205,7 @@ fn a_panorama_that_is_not_there_is_a_fault_of_its_key() {
     assert!(plain.panorama_fault("no EXR").is_none());
 }
 
-/// Numbers that no key of a look takes; each is refused with its key and the range.
+/// Numbers outside of every range of a look; each is rejected with its key and the range.
 #[test]
 fn every_number_of_a_look_has_a_range() {
     for (table, key, value) in [
@@ -340,7 +341,7 @@ fn the_panorama_counts_in_the_hash_and_its_name_does_not() {
     );
 }
 
-/// Keys that came later, with values that are not their defaults: (table, line).
+/// Keys added later, with values other than their defaults: (table, line).
 const NEWER: [(&str, &str); 6] = [
     ("image", "overscan = 8"),
     ("image", "crop = [1, 2, 60, 30]"),
@@ -350,7 +351,7 @@ const NEWER: [(&str, &str); 6] = [
     ("output", "formats = [\"exr\"]\ncryptomatte = true"),
 ];
 
-/// A look with more lines in a table.
+/// Returns a look with additional lines in a table.
 fn with(table: &str, lines: &str) -> String {
     let head = format!("[{table}]\n");
     match PLAIN.contains(&head) {
@@ -362,7 +363,7 @@ fn with(table: &str, lines: &str) -> String {
 #[test]
 fn a_look_without_newer_keys_keeps_its_hash() {
     let hash = |text: &str| Look::parse(text, Path::new("a.toml")).unwrap().hash();
-    // As it was before there were any of them.
+    // The hash from before these keys existed.
     const BEFORE: &str = "023f42bda0627032e91d99f5fb5b472c5f3a4c996b6ea8ba9b58729051c346b6";
     assert_eq!(hash(PLAIN), BEFORE);
     for (table, line) in NEWER {
@@ -426,7 +427,7 @@ fn what_a_look_does_not_name_is_not_in_its_hash() {
     let keyed = PLAIN.replace(POSE, "")
         + "[[camera.keyframe]]\nframe = 5\nposition = [0, 3, 0]\ntarget = [9, 1, 0]\n";
     assert!(!canonical(look(&keyed).spec()).contains("focus"));
-    // The controls: named, each is.
+    // Controls: setting either changes the hash.
     let lens = "[camera]\nlens = { f_stop = 2.0, focus_distance_m = 6.0 }\n";
     let triangle = "[image]\nshutter_curve = \"triangle\"\n";
     let hash = |text: &str| look(text).hash();
@@ -455,8 +456,8 @@ fn ramps_and_focus_go_with_what_they_are_of() {
     Look::parse(&keyed.replace("[camera]\n", LENS), Path::new("a.toml")).unwrap();
 }
 
-/// A lens of f/2 at 35 mm, focused at 6 m, draws infinity as 35/36 · 64 · 0.0175 / 6 = 0.18 pixels; at 3840 pixels it is 10.9, an area
-/// of 93.2.
+/// A lens of f/2 and 35 mm focused at 6 m blurs infinity to 35/36 · 64 · 0.0175 / 6 = 0.18 pixels;
+/// at 3840 pixels it is 10.9, an area of 93.2.
 #[test]
 fn a_lens_with_too_few_samples_is_said() {
     let text = PLAIN.replace("[camera]\n", LENS);
@@ -486,7 +487,8 @@ fn shot(nodes: serde_json::Value) -> Vec<u8> {
     camera_file::tests::glb(&document, &[])
 }
 
-/// A camera's file is found beside its look and no farther, its bytes count in the hash, and it takes the place of other poses.
+/// A camera file is found beside its look and no farther, its bytes count in the hash, and it
+/// replaces other poses.
 #[test]
 fn a_camera_from_a_file() {
     let folder = tempfile::tempdir().unwrap();
@@ -551,7 +553,7 @@ fn a_camera_from_a_file() {
         assert_eq!(found, key, "{to}: {message}");
         assert!(message.contains(words), "{to}: {message}");
     }
-    // What the look says of the fit decides.
+    // The look's fit decides.
     let square = text.replace("height = 36", "height = 64");
     look(&square.replace("[camera]\n", "[camera]\nfit = \"fill\"\n")).unwrap();
     std::fs::write(&file, &one[..one.len() / 2]).unwrap();

@@ -1,7 +1,8 @@
-//! A camera from a USD layer as text: UsdGeomCamera, where its prims and their transforms put it.
+//! A camera (UsdGeomCamera) of a USD text layer, placed by its prims and their transforms.
 //!
-//! Film, focal length and the film's shift are lengths in the same tenths of a unit, so that their ratios say all of the picture. The
-//! film's middle stands off the optical axis by the offsets, as the window of `GfCamera::GetFrustum` does.
+//! Film size, focal length and film offset are in the same tenths of a unit, so only their ratios
+//! matter. The offset shifts the centre of the film from the optical axis, as in the window of
+//! `GfCamera::GetFrustum`.
 
 use glam::DMat4;
 
@@ -13,19 +14,19 @@ use super::{
     camera_file::CameraFileError,
 };
 
-/// Where a camera leaves them out (UsdGeomCamera): focal length, width and height of the film.
+/// Defaults of UsdGeomCamera: focal length, and width and height of the film.
 const FOCAL_LENGTH: f64 = 50.0;
 const APERTURE: [f64; 2] = [20.955, 15.2908];
 
-/// Prims from the root to the camera.
+/// A camera with the prims from the root to it.
 #[derive(Clone, Debug)]
 pub(super) struct UsdCamera {
     nodes: UsdNodes,
     focal_length: Curve,
     aperture: [Curve; 2],
-    /// How far the film's middle stands off the optical axis to the picture's right and to its top.
+    /// Offset of the film's centre from the optical axis, to the right and upward in the picture.
     offset: [Curve; 2],
-    /// The f-number and the distance that is sharp, in the layer's unit; `None` of a pinhole.
+    /// The f-number and the focus distance in units of the layer; `None` for a pinhole.
     lens: Option<[Curve; 2]>,
 }
 
@@ -36,7 +37,7 @@ fn fault(what: impl Into<String>) -> CameraFileError {
 }
 
 impl UsdCamera {
-    /// The camera called `name`, or the only one, and what it is called.
+    /// Reads the camera called `name`, or the only one, and returns it with its path.
     pub(super) fn read(bytes: &[u8], name: Option<&str>) -> Result<(String, Self)> {
         let layer = layer(bytes).map_err(fault)?;
         let chains = chains(&layer, &|prim| prim.kind == "Camera");
@@ -60,7 +61,7 @@ impl UsdCamera {
                 false => Err(fault(format!("{key} of {called} is no positive number"))),
             }
         };
-        // 0 is a pinhole, and what a camera has that says nothing (UsdGeomCamera).
+        // 0, the default of UsdGeomCamera, is a pinhole.
         let f_stop = number("fStop", 0.0)?;
         let is_pinhole = f_stop.samples.iter().all(|(_, it)| it[0] == 0.0);
         let lens = match is_pinhole {
@@ -83,22 +84,22 @@ impl UsdCamera {
         Ok((called, found))
     }
 
-    /// From the camera to the world, which is in metres with y up.
+    /// Returns the transform from the camera to the world, which is in metres with y up.
     pub(super) fn at(&self, seconds: f64) -> DMat4 {
         self.nodes.at(seconds)
     }
 
-    /// Time codes a second.
+    /// Returns the layer's time codes per second.
     pub(super) fn rate(&self) -> Rate {
         self.nodes.rate()
     }
 
-    /// When something has a sample, seconds.
+    /// Returns the times of all samples, seconds.
     pub(super) fn times(&self) -> impl Iterator<Item = f64> + '_ {
         self.nodes.times(self.optics())
     }
 
-    /// The same of what moves.
+    /// Returns the sample times of values that change, seconds.
     pub(super) fn times_moved(&self) -> impl Iterator<Item = f64> + '_ {
         self.nodes.times_moved(self.optics())
     }
@@ -109,20 +110,22 @@ impl UsdCamera {
         [&self.focal_length].into_iter().chain(film).chain(lens)
     }
 
-    /// Width and height of the film over the focal length: twice the tangents of half the fields of view.
+    /// Returns width and height of the film over the focal length: twice the tangents of half
+    /// the fields of view.
     pub(super) fn film(&self, seconds: f64) -> [f64; 2] {
         let code = self.nodes.code(seconds);
         [0, 1].map(|axis| self.aperture[axis].at(code)[0] / self.focal_length.at(code)[0])
     }
 
-    /// How far the film's middle stands off the optical axis to the picture's right and to its top, in heights of the film.
+    /// Returns the offset of the film's centre from the optical axis, to the right and upward in
+    /// the picture, in heights of the film.
     pub(super) fn shift(&self, seconds: f64) -> [f64; 2] {
         let code = self.nodes.code(seconds);
         let height = self.aperture[1].at(code)[0];
         [0, 1].map(|axis| self.offset[axis].at(code)[0] / height)
     }
 
-    /// The f-number and the distance that is sharp, metres; `None` of a pinhole.
+    /// Returns the f-number and the focus distance, metres; `None` for a pinhole.
     pub(super) fn lens(&self, seconds: f64) -> Option<[f64; 2]> {
         let code = self.nodes.code(seconds);
         let [f_stop, focus] = self.lens.as_ref()?;
@@ -130,14 +133,15 @@ impl UsdCamera {
         Some([f_stop.at(code)[0], metres * focus.at(code)[0]])
     }
 
-    /// Of the film at the start.
+    /// Returns the aspect ratio of the film at time code 0.
     pub(super) fn aspect_ratio(&self) -> f64 {
         let [width, height] = [0, 1].map(|axis| self.aperture[axis].at(0.0)[0]);
         width / height
     }
 }
 
-/// By its path, its own name, or that of the prim above it, which Blender calls as its object.
+/// Finds a camera by its path, its own name, or that of its parent, which Blender names
+/// after the object.
 fn choose<'a, 'b>(
     layer: &Layer,
     chains: &'b [Vec<&'a Prim>],

@@ -31,8 +31,8 @@ method = "flip"
 cell_size = 0.25
 "#;
 
-/// A door at (3, 0, 1) that hangs under a cart; the cart goes 2 m along x within two seconds, and the door makes a quarter turn
-/// about y in the second of them.
+/// A door at (3, 0, 1) below a cart. The cart moves 2 m along x within two seconds; in the second
+/// of them the door makes a quarter turn about y.
 fn file(path: &str, interpolation: &str, last: [f32; 4]) -> Vec<u8> {
     // Times, then translations; times, then rotations.
     let mut numbers = vec![0.0, 2.0, 0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 1.0, 2.0];
@@ -77,7 +77,8 @@ fn file(path: &str, interpolation: &str, last: [f32; 4]) -> Vec<u8> {
     glb(&document, &numbers)
 }
 
-/// As Blender 4.5.15 writes a door under a cart, both animated, with z up; the door's mesh is called as its object.
+/// An animated door below an animated cart, z up, as written by Blender 4.5.15; the door's mesh has
+/// the name of its object.
 const BLENDER: &str = include_str!("door.usda");
 
 fn load(bytes: &[u8], set: &[&str]) -> Result<Scene, String> {
@@ -88,7 +89,7 @@ fn load(bytes: &[u8], set: &[&str]) -> Result<Scene, String> {
     let set: Vec<_> = set.iter().map(|&s| s.to_owned()).collect();
     let scene = Scene::parse(SCENE, Path::new("s.toml"), dir.path(), &set);
     let scene = scene.map_err(|error| error.to_string())?;
-    // Written out it has the poses in place, and is the same scene.
+    // Written out, the scene has the poses in place and is equal.
     let written = scene.to_toml(&|_, _| "cube.obj".to_owned());
     assert!(
         written.contains("poses = ") && !written.contains("file = \"door"),
@@ -114,20 +115,22 @@ fn a_solid_goes_as_its_node_does() {
         (0.0, corner),
         (0.5, corner + 0.5 * DVec3::X),
         (1.0, corner + DVec3::X),
-        // The cart is 2 m on, and what was a metre along x from the hinge is a metre along -z.
+        // The cart is 2 m ahead, and a point a metre along x from the hinge is now
+        // a metre along -z.
         (2.0, DVec3::new(5.0, 0.5, 0.0)),
         (9.0, DVec3::new(5.0, 0.5, 0.0)),
     ] {
         let at = solid.pose(t).place(corner);
-        // f32 of the file.
+        // The file stores `f32`.
         assert!((at - expected).length() < 1e-6, "{t}: {at}");
     }
-    // 1 m/s, and from a second on a quarter turn a second of the corner that is farthest from the hinge.
+    // 1 m/s, and in the second second a quarter turn per second at the corner
+    // farthest from the hinge.
     assert!((solid.peak_speed(0.0, 0.9) - 1.0).abs() < 1e-6);
     let farthest = DVec3::new(1.0, 1.5, 1.0).length();
     let most = 1.0 + FRAC_PI_2 * farthest;
     assert!((solid.peak_speed(1.2, 1.4) / most - 1.0).abs() < 1e-6);
-    // Control: the other way round.
+    // Control: the opposite rotation.
     let [_, sin, _, cos] = quarter();
     let other = load(&file("rotation", "LINEAR", [0.0, -sin, 0.0, cos]), &[]).unwrap();
     let at = other.moving_solids[0].pose(2.0).place(corner);
@@ -178,7 +181,7 @@ fn what_is_no_motion_of_a_solid_is_refused() {
 
 const OF_USD: &str = "solid[0].track={ file = \"door.usda\", node = \"door\" }";
 
-/// Against where Blender has the corner (4, -1, 0.5) of its door, z up.
+/// Compared with the corner (4, -1, 0.5) of the door in Blender, z up.
 #[test]
 fn a_solid_goes_as_a_prim_of_blender_does() {
     let scene = load(BLENDER.as_bytes(), &[OF_USD]).unwrap();
@@ -193,11 +196,11 @@ fn a_solid_goes_as_a_prim_of_blender_does() {
         (40.0, [5.041_246_891, 0.0, 0.471_459_329]),
     ] {
         let at = solid.pose(frame / 24.0).place(DVec3::new(4.0, 0.5, 1.0));
-        // f32 of Blender and of the file.
+        // Blender and the file use `f32`.
         let off = (at - DVec3::new(x, z, -y)).length();
         assert!(off < 2e-6, "{frame}: {at} is {off} m off");
     }
-    // Control: taken with y up it goes elsewhere.
+    // Control: with y up it moves elsewhere.
     let other = BLENDER.replace("upAxis = \"Z\"", "upAxis = \"Y\"");
     let other = load(other.as_bytes(), &[OF_USD]).unwrap();
     let at = |scene: &Scene| {
@@ -208,13 +211,14 @@ fn a_solid_goes_as_a_prim_of_blender_does() {
     assert!((at(&other) - at(&scene)).length() > 0.1);
 }
 
-/// A door whose matrix is given at two codes a quarter turn apart, half a second, in centimetres.
+/// A door whose matrix has two samples a quarter turn and half a second apart, in centimetres.
 const MATRICES: &str = "#usda 1.0\n(\n    metersPerUnit = 0.01\n    timeCodesPerSecond = 10\n    upAxis = \"Y\"\n)\ndef Xform \"door\"\n{\n    \
     matrix4d xformOp:transform.timeSamples = {\n        0: ( (1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (300, 0, 100, 1) ),\n        \
     5: ( (0, 0, -1, 0), (0, 1, 0, 0), (1, 0, 0, 0), (400, 0, 100, 1) ),\n    }\n    \
     uniform token[] xformOpOrder = [\"xformOp:transform\"]\n}\n";
 
-/// A layer's rate as `Usd.Stage.GetTimeCodesPerSecond` of usd-core 26.11 has it, with the lint that names where it comes from.
+/// A layer's rate as in usd-core 26.11 (`Usd.Stage.GetTimeCodesPerSecond`), with the lint that
+/// names its source.
 #[test]
 fn a_layer_without_time_codes_a_second_has_its_frames_a_second() {
     let any = "solid[0].track={ file = \"door.usda\" }";
@@ -283,7 +287,7 @@ fn between_matrices_a_solid_turns_and_keeps_its_shape() {
     }
 }
 
-/// The same door counted from 1001, and one whose time is counted in frames of the shot.
+/// The same door numbered from 1001, and one whose times are frames of the shot.
 #[test]
 fn a_solid_s_file_begins_at_its_own_frame() {
     let later = MATRICES.replace("        0: (", "        1001: (");
@@ -292,7 +296,7 @@ fn a_solid_s_file_begins_at_its_own_frame() {
     let corner = DVec3::new(4.0, 0.5, 1.0);
     let half = 0.5f64.sqrt();
     let at = |scene: &Scene, t: f64| scene.moving_solids[0].pose(t).place(corner);
-    // Time codes are those of the file, whatever the shot's rate: frame 1 is at 1001.
+    // Time codes are those of the file at any rate of the shot: frame 1 is at 1001.
     for (rate, first) in [("10", 0.1), ("20", 0.05)] {
         let rate = format!("shot.frames_per_second={rate}");
         let scene = load(later.as_bytes(), &[&of(", start = 1001"), &rate]).unwrap();
@@ -305,7 +309,7 @@ fn a_solid_s_file_begins_at_its_own_frame() {
             let off = (at(&scene, t) - expected).length();
             assert!(off < 1e-9, "{rate}, {t}: {off}");
         }
-        // Where the shot counts other frames than the file, that is said.
+        // A rate that differs from the file's is reported.
         let lints = scene.lints();
         let is_said = |lint: &String| {
             lint.starts_with("solid.track.file: the file has 10 time codes a second, by its timeCodesPerSecond, and the shot has 20")
@@ -313,7 +317,8 @@ fn a_solid_s_file_begins_at_its_own_frame() {
         assert_eq!(lints.iter().filter(|it| is_said(it)).count(), lints.len());
         assert_eq!(lints.len(), usize::from(rate.ends_with("=20")), "{lints:?}");
     }
-    // A shot that begins between two matrices: half a second on, the door has turned by an eighth of a turn, and stands 45° from its start.
+    // A shot that begins between two matrices: after half a second the door has turned by an eighth
+    // of a turn, and is 45° from its start.
     let scene = load(
         MATRICES.as_bytes(),
         &[&of(", start = 3.5"), "shot.frames_per_second=10"],
@@ -331,18 +336,20 @@ fn a_solid_s_file_begins_at_its_own_frame() {
             pose.centre
         );
     }
-    // Frame 10 is at 1 s of the glTF: the shot begins a tenth before, with the hinge at x = 3.9.
+    // Frame 10 is at 1 s in the glTF file: the shot begins a tenth of a second earlier, with the
+    // hinge at x = 3.9.
     let door = "solid[0].track={ file = \"door.glb\", node = \"door\", start = 10 }";
     let scene = load(&file("rotation", "LINEAR", quarter()), &[door]).unwrap();
     for (t, expected) in [
         (0.1, DVec3::new(4.1, 0.5, 1.0)),
         (1.1, DVec3::new(5.0, 0.5, 0.9)),
     ] {
-        // f32 of the file.
+        // The file stores `f32`.
         let off = (at(&scene, t) - expected).length();
         assert!(off < 1e-6, "{t}: {off}");
     }
-    // The controls: without it the solid stands still, before its first key or, begun too late, after its last; both are said.
+    // Controls: without `start` the solid is static before its first key, or, started too late,
+    // after its last; both are reported.
     let dir = tempfile::tempdir().unwrap();
     std::fs::write(dir.path().join("cube.obj"), CUBE).unwrap();
     std::fs::write(dir.path().join("door.usda"), later).unwrap();

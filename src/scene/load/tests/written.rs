@@ -1,4 +1,4 @@
-//! Scenes as they are written out: each key, and the same scene again.
+//! Scenes written out: all keys are present, and reading gives an equal scene.
 
 use std::collections::BTreeSet;
 
@@ -18,10 +18,10 @@ fn what_is_written_loads_again_equal() {
     assert!(text.contains("artificial_pressure = 0.0"), "{text}");
     assert_eq!(scene.mesh_files().len(), 1);
 
-    // Control: one number apart is not equal.
+    // Control: a scene with one other number is not equal.
     scene.solver.flip.as_mut().expect("a table").cfl = 0.9;
     assert_ne!(scene, again);
-    // A mesh that is not the one that was baked is refused.
+    // A mesh that differs from the baked one is rejected.
     fs::write(
         dir.path().join("cube.obj"),
         CUBE.replace("v 1 1 1", "v 1 1 2"),
@@ -31,7 +31,8 @@ fn what_is_written_loads_again_equal() {
     assert!(message.contains("water.mesh[0].blake3"), "{message}");
 }
 
-/// A key that is not written out is in no hash and in no comparison: a bake would go on with another scene.
+/// A key that is not written out is in no hash and no comparison: a bake would continue
+/// with another scene.
 #[test]
 fn every_key_of_a_scene_is_written_out() {
     let dir = assets();
@@ -100,7 +101,7 @@ about = [1.0, 0.0, 0.0]
             "effects.generation_zone={walls=[\"-z\"],length=1.0,waves={kind=\"stokes\",height=0.1,period=3.0,depth=1.0,direction_degrees=90.0}}",
         ];
         let all: Vec<&str> = flip.iter().chain(overrides).copied().collect();
-        // One of the three has viscosity in Pa s.
+        // One of the three has a Newtonian viscosity.
         let viscous = ["effects.viscosity={coefficient=2.0}"];
         let viscous = &viscous[..usize::from(overrides.is_empty())];
         let all: Vec<&str> = all.iter().chain(viscous).copied().collect();
@@ -109,7 +110,7 @@ about = [1.0, 0.0, 0.0]
         let table: toml::Table = toml::from_str(&toml).expect("TOML");
         collect_keys("", &table, &mut written);
     }
-    // Walls stand in the way of all three axes there.
+    // The full scene has obstacles along all three axes.
     let slab = r#"
 [shot]
 name = "slab"
@@ -160,7 +161,8 @@ generation_zone = { walls = ["+x"], length = 1.0, waves = { kind = "sea", signif
     let scene = parse(dir.path(), slab, &["domain.periodic=[]", packet]).expect("valid");
     let toml = scene.to_toml(&|_, _| "a.obj".to_owned());
     collect_keys("", &toml::from_str(&toml).expect("TOML"), &mut written);
-    // A motion's file is written as the points that were read from it, walls as those that are no-slip.
+    // A motion's file is written as the points read from it; `walls` is written as the list
+    // of no-slip walls.
     let read = [
         "motion.file",
         "turn.file",
@@ -176,7 +178,7 @@ generation_zone = { walls = ["+x"], length = 1.0, waves = { kind = "sea", signif
     assert_eq!(missing, [] as [&str; 0]);
 }
 
-/// With what is left out, and once more with what was written.
+/// Both with the default ramp and from the written scene.
 #[test]
 fn regular_waves_are_written_with_their_ramp() {
     let flume = r#"
@@ -208,7 +210,7 @@ motion = { kind = "KIND", height = 0.1, period = 4.0, depth = 1.0 }
     }
 }
 
-/// Dotted keys of a table and of those below it, without indices.
+/// Collects the dotted keys of a table and of those below it, without indices.
 fn collect_keys(path: &str, table: &toml::Table, keys: &mut BTreeSet<String>) {
     for (name, value) in table {
         let path = format!("{path}{name}");

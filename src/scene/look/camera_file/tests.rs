@@ -1,4 +1,4 @@
-//! Cameras of files that are written here, against matrices that are known.
+//! Cameras from files written here, compared with known matrices.
 
 #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 
 use super::{super::FitSpec, *};
 
-/// A binary glTF file (version 2, section 4.4) with these numbers in its binary chunk.
+/// Returns a binary glTF file (version 2, section 4.4) with these numbers in its binary chunk.
 pub(crate) fn glb(document: &Value, numbers: &[f32]) -> Vec<u8> {
     let mut text = document.to_string().into_bytes();
     text.resize(text.len().next_multiple_of(4), b' ');
@@ -26,10 +26,10 @@ pub(crate) fn glb(document: &Value, numbers: &[f32]) -> Vec<u8> {
     file
 }
 
-/// One sampler a row: node, path, interpolation, times and values of so many numbers each.
+/// A sampler: node, path, interpolation, times and values.
 type Row<'a> = (usize, &'a str, &'a str, &'a [f32], &'a [f32]);
 
-/// A file with these nodes, a camera with this field of view, and an animation.
+/// Returns a file with these nodes, a camera with this vertical field of view, and an animation.
 fn animated(nodes: &Value, yfov: f64, rows: &[Row<'_>]) -> Vec<u8> {
     let (mut numbers, mut views, mut accessors) = (Vec::new(), Vec::new(), Vec::new());
     let (mut samplers, mut channels) = (Vec::new(), Vec::new());
@@ -82,7 +82,7 @@ fn read(bytes: &[u8]) -> Result<CameraFile> {
     CameraFile::read(bytes, None, &nothing)
 }
 
-/// What f32 numbers of up to ten metres and their products leave, metres.
+/// Rounding error of `f32` numbers up to ten metres and their products, metres.
 const ROUNDING: f64 = 1e-5;
 
 fn near(a: DVec3, b: DVec3) -> bool {
@@ -91,7 +91,8 @@ fn near(a: DVec3, b: DVec3) -> bool {
 
 #[test]
 fn a_camera_hangs_in_its_hierarchy() {
-    // A crane that is turned a quarter about y and scaled, with the camera on its arm: rolled by 30°.
+    // A crane rotated by a quarter turn about y and scaled, with the camera on its
+    // arm, rolled by 30°.
     let half = (FRAC_PI_2 / 2.0).sin() as f32;
     let (sin, cos) = (PI / 12.0).sin_cos();
     let nodes = json!([
@@ -102,25 +103,26 @@ fn a_camera_hangs_in_its_hierarchy() {
     ]);
     let camera = read(&animated(&nodes, 0.5, &[])).unwrap();
     let stand = camera.at(7.0);
-    // A quarter about y takes −z to −x.
+    // A quarter turn about y maps −z to −x.
     assert!(
         near(stand.position, DVec3::new(1.0 - 8.0, 2.0 + 2.0, 3.0)),
         "{stand:?}"
     );
     assert!(near(stand.forward, DVec3::NEG_X), "{stand:?}");
-    // Rolled by 30° against the clock about +z, which is +x now: its top goes towards −x of its own, which is +z... of the world.
+    // A roll of 30° counter-clockwise about the camera's +z, which is +x in the world, tilts its
+    // top towards its −x, which is +z in the world.
     let up = DVec3::new(0.0, 0.75f64.sqrt(), 0.5);
     assert!(near(stand.up, up), "{stand:?}");
-    // The control: the other way round.
+    // Control: the opposite direction.
     assert!(!near(stand.up, DVec3::new(0.0, up.y, -up.z)));
-    // Half of a film 20.25 mm high over tan of half of 0.5 radians.
+    // Half of a film 20.25 mm high over the tangent of half of 0.5 radians.
     let framing = Framing::new(FitSpec::Height, [16, 9]);
     let focal = camera.focal_length_mm(&framing, 20.25, 0.0);
     assert!((focal - 10.125 / 0.25f64.tan()).abs() < 1e-4, "{focal}");
     assert!((camera.aspect_ratio().unwrap() - 16.0 / 9.0).abs() < 1e-6);
 }
 
-/// A node that a matrix places, and one that is moved by each way of joining.
+/// A node placed by a matrix, and one animated with each interpolation.
 #[test]
 fn animations_are_joined_as_the_standard_says() {
     let nodes = json!([
@@ -158,9 +160,10 @@ fn animations_are_joined_as_the_standard_says() {
         let expected = t.powi(3) - 2.0 * t * t + 3.0;
         assert!((x - expected).abs() < ROUNDING, "{t}: {x} {expected}");
     }
-    // The control: taken for straight it is another.
+    // Control: linear interpolation differs.
     assert!((at(&rows, 2.0).position.x - 10.0 - 7.0).abs() > 1.0);
-    // A turn of 90° about y: half way 45°, along the great circle, where blending numbers keeps no even speed.
+    // A rotation of 90° about y: 45° half-way along the great circle. Blending the components would
+    // not keep a constant speed.
     let half = (FRAC_PI_2 / 2.0).sin() as f32;
     let turns = [0.0, 0.0, 0.0, 1.0, 0.0, half, 0.0, half];
     let rows: [Row<'_>; 1] = [(1, "rotation", "LINEAR", &times, &turns)];
@@ -170,7 +173,8 @@ fn animations_are_joined_as_the_standard_says() {
     assert!(near(forward, DVec3::new(-sin, 0.0, -cos)), "{forward}");
 }
 
-/// What stands still has no part in when a camera moves: nodes without an animation, and keys of one value.
+/// Static values do not count in the range of a camera's motion: nodes without an animation, and
+/// keys of a single value.
 #[test]
 fn a_camera_moves_where_its_keys_differ() {
     let nodes = json!([{ "camera": 0, "translation": [9.0, 9.0, 9.0] }]);
@@ -183,7 +187,7 @@ fn a_camera_moves_where_its_keys_differ() {
     assert_eq!(moves(&[one, two]), Some([2.0, 3.0]));
 }
 
-/// Each with the words that tell it apart.
+/// Each file with the words that identify its error.
 #[test]
 fn what_is_no_camera_is_told() {
     let plain = json!([{ "name": "shot", "camera": 0 }]);
@@ -197,7 +201,7 @@ fn what_is_no_camera_is_told() {
         let error = CameraFile::read(bytes, name, &nothing).err();
         error.map_or_else(String::new, |error| error.to_string())
     };
-    // Cut anywhere it is refused; there is no end at which it reads as something else.
+    // A file truncated anywhere is rejected; no prefix reads as something else.
     for end in (0..good.len()).step_by(7) {
         assert!(!told(&good[..end], None).is_empty(), "{end}");
     }
@@ -229,7 +233,7 @@ fn what_is_no_camera_is_told() {
     let twice = [twice[0], twice[0]];
     let told_twice = told(&animated(&plain, 0.5, &twice), None);
     assert!(!told_twice.is_empty(), "{told_twice}");
-    // A buffer in a file of its own, which is not there, and in the text itself.
+    // A buffer in a missing file, and one embedded in the text.
     let outside = |uri: &str| {
         text(json!({
             "asset": { "version": "2.0" }, "nodes": [{ "camera": 0 }],

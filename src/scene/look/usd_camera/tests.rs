@@ -1,4 +1,5 @@
-//! Layers of others, against the matrices that usd-core 26.11 has of them (ComputeLocalToWorldTransform).
+//! Layers of other programs, compared with the matrices of usd-core 26.11
+//! (ComputeLocalToWorldTransform).
 
 #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
@@ -9,13 +10,13 @@ use super::super::{
     camera_file::{CameraFile, CameraFileError},
 };
 
-/// As Blender 4.5.15 writes a camera under an empty, less what it says of itself.
+/// A camera under an empty as written by Blender 4.5.15, without its own metadata.
 const BLENDER: &str = include_str!("blender.usda");
 
-/// As Blender 4.5.15 writes a camera with a lens in focus and a shifted film, both animated.
+/// A camera with focus and a shifted film, both animated, as written by Blender 4.5.15.
 const LENS: &str = include_str!("blender_lens.usda");
 
-/// By usd-core 26.11: operations of every kind that others write, centimetres, y up.
+/// By usd-core 26.11: operations of every kind that other programs write, centimetres, y up.
 const OPERATIONS: &str = r#"#usda 1.0
 (
     defaultPrim = "a"
@@ -54,7 +55,7 @@ def Xform "a"
 }
 "#;
 
-/// Of images as high as the film.
+/// Framing of an image as high as the film.
 fn framing() -> Framing {
     Framing::new(FitSpec::Height, [16, 9])
 }
@@ -65,7 +66,7 @@ fn camera(text: &str, name: Option<&str>) -> Result<CameraFile, CameraFileError>
     })
 }
 
-/// Second, third and last row of the matrix at a time code: up, back, place.
+/// Second, third and last row of the matrix at a time code: up, back and position.
 type Row = (f64, [f64; 3], [f64; 3], [f64; 3]);
 
 fn assert_stands(
@@ -77,7 +78,7 @@ fn assert_stands(
     for (code, up, back, place) in rows {
         let [up, back, place] = [up, back, place].map(|row| to_world(DVec3::from(*row)));
         let stand = camera.at(code / per_second);
-        // OpenUSD keeps most numbers in 32 bits.
+        // OpenUSD stores most numbers in 32 bits.
         assert!(
             (stand.position - place).length() < 1e-6,
             "{code}: {}",
@@ -126,9 +127,10 @@ fn a_camera_of_blender_stands_where_usd_says() {
             [5.010462718, -5.509599309, 5.919264969],
         ),
     ];
-    // Blender's z is up.
+    // Blender's z axis is up.
     assert_stands(&camera, 24.0, &rows, |v| DVec3::new(v.x, v.z, -v.y));
-    // A zoom from 36 to 40 mm on a film of 20.25, by the field of view that usd-core has: 31.4173° at first, 30.3640° at 2.5.
+    // A zoom from 36 to 40 mm on a film 20.25 mm high, compared with usd-core's fields of view:
+    // 31.4173° at first, 30.3640° at 2.5.
     for (code, focal, yfov) in [
         (1.0, 36.0, 31.417_274_5),
         (2.5, 37.3125, 30.364_011_8),
@@ -140,7 +142,7 @@ fn a_camera_of_blender_stands_where_usd_says() {
     }
     assert!((camera.longest_focal_length_mm(&framing(), 20.25) - 40.0).abs() < 1e-4);
     assert!((camera.aspect_ratio().unwrap() - 16.0 / 9.0).abs() < 1e-6);
-    // Control: the same with y up stands elsewhere.
+    // Control: with y up the pose differs.
     let other = CameraFile::read(
         BLENDER
             .replace("upAxis = \"Z\"", "upAxis = \"Y\"")
@@ -175,21 +177,22 @@ fn operations_are_those_of_usd() {
         ),
     ];
     assert_stands(&found, 25.0, &rows, |v| 0.01 * v);
-    // Control: without the inverse of the pivot it stands elsewhere.
+    // Control: without the inverse pivot the pose differs.
     let other = camera(&OPERATIONS.replace("!invert!", ""), None).unwrap();
     assert!((other.at(0.0).position - found.at(0.0).position).length() > 1e-2);
 }
 
-/// Against where Blender has three points in its camera's picture (`world_to_camera_view`), and the lens that it was told.
+/// Compared with the positions of three points in the camera's picture in Blender
+/// (`world_to_camera_view`), and with its lens settings.
 #[test]
 fn a_lens_and_a_shift_of_blender_are_read() {
     let camera = camera(LENS, None).unwrap();
     let place = |point: [f64; 3], code: f64| {
         let stand = camera.at(code / 24.0);
-        // Blender's z is up.
+        // Blender's z axis is up.
         let away = DVec3::new(point[0], point[2], -point[1]) - stand.position;
         let right = stand.forward.cross(stand.up);
-        // Heights of the picture.
+        // In heights of the picture.
         let focal = camera.focal_length_mm(&framing(), 1.0, code / 24.0);
         let [x, y] = camera.shift(&framing(), code / 24.0);
         let part = |axis: DVec3| focal * away.dot(axis) / away.dot(stand.forward);
@@ -211,19 +214,19 @@ fn a_lens_and_a_shift_of_blender_are_read() {
         let [f_stop, found] = camera.lens(code / 24.0).unwrap();
         assert!(f_stop == 4.0 && (found - focus).abs() < 1e-6, "{found}");
     }
-    // Focus is a length of the layer, an f-number is none.
+    // The focus distance is a length of the layer; the f-number is not.
     let small = LENS.replace("metersPerUnit = 1", "metersPerUnit = 0.01");
     let small = self::camera(&small, None).unwrap();
     let [f_stop, focus] = small.lens(1.0 / 24.0).unwrap();
     assert!(f_stop == 4.0 && (focus - 0.065).abs() < 1e-9, "{focus}");
     let shift = |camera: &CameraFile| camera.shift(&framing(), 0.0);
     assert_eq!(shift(&small), shift(&camera));
-    // A camera that says nothing of it is a pinhole, in the middle of its film.
+    // A camera without these attributes is a pinhole, centred on its film.
     let plain = self::camera(BLENDER, None).unwrap();
     assert!(plain.lens(0.0).is_none() && shift(&plain) == [0.0; 2]);
 }
 
-/// What other layers may say of a camera is not read, so that such a file gives none.
+/// Content from other layers is not read, so a file that relies on it yields no camera.
 #[test]
 fn a_camera_that_is_written_elsewhere_too_is_refused() {
     let with = |metadata: &str| {
@@ -273,7 +276,7 @@ fn a_camera_that_is_written_elsewhere_too_is_refused() {
         );
         assert_eq!(error.lines().count(), 1, "{error}");
     }
-    // What other prims take from elsewhere moves no camera; nor is a class one.
+    // Arcs of other prims do not affect the camera, and a class is no camera.
     let class = OPERATIONS.replace(
         "def Xform \"a\"",
         "class Camera \"_lens\"\n{\n}\n\ndef Xform \"a\"",
