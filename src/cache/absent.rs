@@ -1,8 +1,8 @@
-//! What is where something was looked for, and is not.
+//! Explains why a path is not a cache.
 
 use std::{fs, path::Path};
 
-/// What stands where a cache was looked for: words that go behind the path.
+/// Describes what `dir` is instead of a cache, as the rest of a sentence that begins with the path.
 pub(super) fn why_none(dir: &Path, is_cache: &dyn Fn(&Path) -> bool) -> String {
     if !dir.exists() {
         return "is not there".to_owned();
@@ -18,7 +18,8 @@ pub(super) fn why_none(dir: &Path, is_cache: &dyn Fn(&Path) -> bool) -> String {
     }
 }
 
-/// Folders of a folder that are what is looked for, by name.
+/// Paths of the entries of `dir` for which `is_one` holds, sorted. An unreadable folder counts as
+/// empty.
 pub fn within(dir: &Path, is_one: &dyn Fn(&Path) -> bool) -> Vec<String> {
     let entries = fs::read_dir(dir).into_iter().flatten().flatten();
     let found = entries

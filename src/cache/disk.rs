@@ -1,4 +1,4 @@
-//! Files that are either whole or not there, and the hash of a whole directory.
+//! Atomic file writes, the writer's lock, and the hash of a whole directory.
 
 use std::fs::{self, File, TryLockError};
 use std::io::{self, Read, Write};
@@ -6,17 +6,18 @@ use std::path::{Path, PathBuf};
 
 use super::error::{AtPath, CacheError};
 
-/// The one writer's lock file.
+/// Name of the lock file, held by the one writer.
 pub(super) const LOCK: &str = "lock";
-/// Seconds, which belong to no hash.
+/// Name of the timings file, which no hash covers.
 pub(super) const TIMINGS: &str = "timings.jsonl";
-/// Tells our lock file from someone else's, so that only a creation of ours that was cut short is
-/// ever begun anew.
+/// Content of our lock file. It distinguishes our lock from anyone else's, so that `create`
+/// restarts only an interrupted creation of our own.
 const LOCK_TEXT: &[u8] = b"swell cache: locked while a bake writes here\n";
-/// Ends the name of a file that is still being written.
+/// Extension of a file that is still being written.
 pub(super) const TEMPORARY: &str = "tmp";
 
-/// `path` with `.tmp` behind it: the same folder, so that the rename stays on one file system.
+/// Appends `.tmp` to `path`. The temporary file is in the same folder, so the rename stays on one
+/// file system.
 pub(super) fn temporary(path: &Path) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
     name.push(".");
@@ -24,7 +25,8 @@ pub(super) fn temporary(path: &Path) -> PathBuf {
     name.into()
 }
 
-/// Bytes that a user may still write where `path` is or will be; `None` where the system does not tell.
+/// Free bytes that the user may still write at `path`, which need not exist yet; `None` where the
+/// system does not report them.
 pub fn free_bytes(path: &Path) -> Option<u64> {
     let whole = std::path::absolute(path).ok()?;
     let there = whole.ancestors().find(|folder| folder.exists())?;
@@ -42,11 +44,11 @@ fn free_at(_: &Path) -> Option<u64> {
     None
 }
 
-/// Writes `path` through a temporary file: flushed to the disk before it takes its name, and the name
-/// flushed too.
+/// Writes `path` through a temporary file: flushes the content to the disk before the rename, and
+/// the directory entry after it.
 ///
 /// # Errors
-/// `Io`; the temporary file is removed, and `path` is as it was.
+/// `Io`. If the content cannot be written, the temporary file is removed and `path` is unchanged.
 pub(super) fn write_whole<T>(
     path: &Path,
     fill: impl FnOnce(&mut File) -> io::Result<T>,
@@ -67,12 +69,12 @@ pub(super) fn write_whole<T>(
     Ok(filled)
 }
 
-/// [`write_whole`] of what is there already.
+/// [`write_whole`] for content that is already in memory.
 pub(super) fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), CacheError> {
     write_whole(path, |file| file.write_all(bytes))
 }
 
-/// Removes a file, where there is one.
+/// Removes a file if it exists.
 pub(super) fn remove(path: &Path) -> Result<(), CacheError> {
     match fs::remove_file(path) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
@@ -80,7 +82,7 @@ pub(super) fn remove(path: &Path) -> Result<(), CacheError> {
     }
 }
 
-/// Flushes the directory that holds `path`, without which a rename may not outlive a power cut.
+/// Flushes the directory that holds `path`; without it a rename may not survive a power cut.
 fn sync_parent(path: &Path) -> Result<(), CacheError> {
     match path.parent() {
         Some(parent) if parent.as_os_str().is_empty() => sync_directory(Path::new(".")),
@@ -89,16 +91,16 @@ fn sync_parent(path: &Path) -> Result<(), CacheError> {
     }
 }
 
-/// Flushes the names in a directory.
+/// Flushes the entries of a directory to the disk.
 pub(super) fn sync_directory(dir: &Path) -> Result<(), CacheError> {
-    // Windows opens no directory as a file; NTFS journals the rename itself.
+    // Windows cannot open a directory as a file; NTFS journals the rename itself.
     if cfg!(unix) {
         File::open(dir).and_then(|d| d.sync_all()).at(dir)?;
     }
     Ok(())
 }
 
-/// Makes a directory that outlives a power cut, with those above it.
+/// Creates a directory and its ancestors, and flushes its entry in the parent.
 pub(super) fn create_directory(dir: &Path) -> Result<(), CacheError> {
     fs::create_dir_all(dir).at(dir)?;
     sync_parent(dir)
@@ -110,17 +112,14 @@ pub(super) struct Lock(File);
 
 impl Drop for Lock {
     fn drop(&mut self) {
-        // Closing the file is not enough: a process that another thread just starts has a copy of it until it runs its
-        // own program, and would hold the lock for that moment.
+        // Closing the file is not enough: a process that another thread is spawning holds a copy of
+        // the handle until it calls exec, and would keep the lock for that moment.
         let _ = self.0.unlock();
     }
 }
 
-/// Takes the writer's lock. The file stays behind when the lock goes: removing it would let two
-/// writers hold locks on two files of one name.
-///
-/// # Errors
-/// [`CacheError::Locked`], `Io`.
+/// Takes the writer's lock. The file stays when the lock is released: removing it would allow two
+/// writers to lock two files of the same name.
 pub(super) fn lock(dir: &Path) -> Result<Lock, CacheError> {
     let path = dir.join(LOCK);
     let mut file = File::options()
@@ -144,18 +143,18 @@ pub(super) fn lock(dir: &Path) -> Result<Lock, CacheError> {
     Ok(Lock(file))
 }
 
-/// Whether `dir` has a lock file of ours. An empty one counts: a kill may fall between its creation
-/// and its text.
+/// Whether `dir` has a lock file of ours. An empty one counts: the process may have been killed
+/// between creating the file and writing its text.
 pub(super) fn has_our_lock(dir: &Path) -> bool {
     fs::read(dir.join(LOCK)).is_ok_and(|text| text.is_empty() || text == LOCK_TEXT)
 }
 
-/// Whether a bake has taken `dir` for its cache, by the lock's text alone.
+/// Whether a bake has claimed `dir` for its cache, judged by the text of the lock file only.
 pub(super) fn is_begun(dir: &Path) -> bool {
     fs::read(dir.join(LOCK)).is_ok_and(|text| text == LOCK_TEXT)
 }
 
-/// Names in `dir`, sorted.
+/// Names of the entries of `dir`, sorted.
 pub(super) fn names(dir: &Path) -> Result<Vec<String>, CacheError> {
     let mut names = Vec::new();
     for entry in fs::read_dir(dir).at(dir)? {
@@ -165,7 +164,7 @@ pub(super) fn names(dir: &Path) -> Result<Vec<String>, CacheError> {
     Ok(names)
 }
 
-/// BLAKE3 of a file's bytes, hex.
+/// BLAKE3 of a file's content, hex.
 pub(super) fn file_hash(path: &Path) -> Result<String, CacheError> {
     let mut hasher = blake3::Hasher::new();
     File::open(path)
@@ -174,11 +173,8 @@ pub(super) fn file_hash(path: &Path) -> Result<String, CacheError> {
     Ok(hasher.finalize().to_hex().to_string())
 }
 
-/// BLAKE3 over the names and bytes of all files below `dir`, hex: equal before and after means
-/// untouched. The top folder's `lock` and `timings.jsonl` are left out; links are not followed.
-///
-/// # Errors
-/// [`CacheError::Io`].
+/// BLAKE3 over the names and contents of all files below `dir`, hex: equal hashes mean that nothing
+/// changed. Skips `lock` and `timings.jsonl` of the top folder and does not follow links.
 pub fn directory_hash(dir: &Path) -> Result<String, CacheError> {
     let mut hasher = blake3::Hasher::new();
     hash_below(dir, "", &mut hasher)?;
@@ -200,7 +196,7 @@ fn hash_below(dir: &Path, prefix: &str, hasher: &mut blake3::Hasher) -> Result<(
         } else {
             b'f'
         };
-        // Lengths before contents, so that no two trees give the same stream.
+        // Lengths come before contents, so that no two trees give the same byte stream.
         hasher.update(&[tag]);
         hasher.update(&(relative.len() as u64).to_le_bytes());
         hasher.update(relative.as_bytes());
@@ -221,7 +217,7 @@ fn hash_below(dir: &Path, prefix: &str, hasher: &mut blake3::Hasher) -> Result<(
     Ok(())
 }
 
-/// Reads a file of exactly `bytes` bytes; the length is compared before anything is allocated.
+/// Reads a file of exactly `bytes` bytes. Compares the length before it allocates anything.
 pub(super) fn read_exactly(path: &Path, bytes: u64) -> Result<Vec<u8>, CacheError> {
     let mut file = match File::open(path) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => {
@@ -237,7 +233,7 @@ pub(super) fn read_exactly(path: &Path, bytes: u64) -> Result<Vec<u8>, CacheErro
     Ok(content)
 }
 
-/// Whether a file is there with the length that was written.
+/// Checks that a file exists and has the recorded length.
 pub(super) fn check_length_on_disk(path: &Path, expected: u64) -> Result<(), CacheError> {
     match path.metadata() {
         Err(error) if error.kind() == io::ErrorKind::NotFound => {
@@ -287,7 +283,7 @@ mod tests {
         assert_ne!(hash(), first);
     }
 
-    /// As a process has it that another thread is starting.
+    /// Simulates the copy of the handle that a process being spawned by another thread holds.
     #[test]
     fn a_copy_of_the_lock_file_does_not_keep_the_lock() {
         let dir = tempfile::tempdir().unwrap();

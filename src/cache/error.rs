@@ -1,23 +1,22 @@
-//! What goes wrong with a cache.
+//! Errors of reading and writing a cache.
 
 use std::io;
 use std::path::{Path, PathBuf};
 
 use swell_domain::keep::Keep;
 
-/// Errors of a cache. All but [`CacheError::Io`] mean that the cache is damaged or not the
-/// one that was meant.
+/// Errors of a cache.
 #[derive(Debug, thiserror::Error)]
 pub enum CacheError {
-    /// The operating system refused.
+    /// The operating system refused an operation.
     #[error("{}", path.display())]
     Io {
         /// The file or folder.
         path: PathBuf,
-        /// The error of the operating system.
+        /// The operating system's error.
         source: io::Error,
     },
-    /// No manifest.
+    /// The directory holds no manifest.
     #[error("{} {why}", dir.display())]
     NotACache {
         /// The directory.
@@ -25,7 +24,7 @@ pub enum CacheError {
         /// What is there instead.
         why: String,
     },
-    /// A new bake was sent to a directory with other files in it.
+    /// A new bake was sent to a directory that holds other files.
     #[error(
         "{} holds files that are no cache of ours ({found}); left untouched, choose another -o",
         dir.display()
@@ -33,10 +32,10 @@ pub enum CacheError {
     Occupied {
         /// The directory.
         dir: PathBuf,
-        /// One of them.
+        /// One of the other files.
         found: String,
     },
-    /// A new bake was sent to a directory that holds a bake.
+    /// A new bake was sent to a directory that already holds a bake.
     #[error(
         "{} already holds a cache; left untouched: --resume goes on, or choose another -o",
         dir.display()
@@ -45,13 +44,13 @@ pub enum CacheError {
         /// The directory.
         dir: PathBuf,
     },
-    /// Another process writes.
+    /// Another process is writing to the cache.
     #[error("{} is being written by another bake", dir.display())]
     Locked {
         /// The directory.
         dir: PathBuf,
     },
-    /// A bake cannot go on because its bytes would not follow from those before.
+    /// A bake cannot be resumed because this run differs in a field that decides its bytes.
     #[error(
         "{} was baked with {field} = {cached}, and this run has {given}; choose another -o",
         dir.display()
@@ -59,14 +58,14 @@ pub enum CacheError {
     OtherScene {
         /// The directory.
         dir: PathBuf,
-        /// Manifest field.
+        /// Name of the manifest field.
         field: String,
         /// Value in the manifest.
         cached: String,
         /// Value in this run.
         given: String,
     },
-    /// A bake in an older format, which is read and not gone on with.
+    /// A bake in an older format, which can be read but not resumed.
     #[error(
         "{} was baked in cache format {found}, and this program writes {newest}: begin from one of its frames with \
          --from {}:FRAME and another -o, or bake it anew",
@@ -75,12 +74,12 @@ pub enum CacheError {
     OldFormat {
         /// The directory.
         dir: PathBuf,
-        /// Its format.
+        /// Format version of the cache.
         found: u32,
-        /// The format that this program writes.
+        /// Format version that this program writes.
         newest: u32,
     },
-    /// Frames that stand there were not looked at by the probes that this run has.
+    /// A bake cannot be resumed with other probes: the existing frames were not observed by them.
     #[error(
         "{} was baked with {cached}, and this run has {given}: what a probe sees while a frame is computed cannot be \
          made up afterwards; go on with the same probes, or choose another -o",
@@ -89,22 +88,23 @@ pub enum CacheError {
     OtherProbes {
         /// The directory.
         dir: PathBuf,
-        /// Value in the manifest.
+        /// The probes in the manifest, in words.
         cached: String,
-        /// Value in this run.
+        /// The probes of this run, in words.
         given: String,
     },
-    /// Frames that stand there follow from another frame than the one that this run is to begin from.
+    /// A bake cannot be resumed because its frames began from another parent frame than this run
+    /// asks for.
     #[error("{} began from {cached}, and this run from {given}; choose another -o", dir.display())]
     OtherParent {
         /// The directory.
         dir: PathBuf,
-        /// Value in the manifest.
+        /// The parent in the manifest, in words.
         cached: String,
-        /// Value in this run.
+        /// The parent that this run asks for, in words.
         given: String,
     },
-    /// Written in a format that this program does not read.
+    /// The cache has a format version that this program does not read.
     #[error(
         "{} has cache format {found}, and this program reads {oldest} to {newest}: bake it anew, or use the program \
          that wrote it",
@@ -113,34 +113,34 @@ pub enum CacheError {
     Format {
         /// The directory.
         dir: PathBuf,
-        /// `format_version` as it stands.
+        /// `format_version` as the manifest has it.
         found: String,
-        /// The first that this program reads.
+        /// Oldest version that this program reads.
         oldest: u32,
-        /// The last one, which it writes.
+        /// Newest version that this program reads, which is also the one it writes.
         newest: u32,
     },
-    /// A file is not what was written.
+    /// The content of a file is not what was written.
     #[error("{} is damaged: {what}", file.display())]
     Damaged {
         /// The file.
         file: PathBuf,
-        /// The fault.
+        /// The fault, in words.
         what: String,
     },
-    /// A frame was asked for that was not baked.
+    /// A frame was requested that was not baked.
     #[error("{} has frames {first} to {last}, not {frame}", dir.display())]
     NoFrame {
         /// The directory.
         dir: PathBuf,
-        /// Asked for.
+        /// The requested frame.
         frame: u32,
-        /// First one there.
+        /// First frame of the cache.
         first: u32,
-        /// Last one there.
+        /// Last frame of the cache.
         last: u32,
     },
-    /// A frame was asked for whose particles the bake did not keep.
+    /// A frame was requested whose particles the bake did not keep.
     #[error(
         "{} has no particles of frame {frame}, as its scene has [keep] particles = \"{keep}\"; the nearest frames that \
          have them are {before} and {after}",
@@ -149,19 +149,19 @@ pub enum CacheError {
     NotKept {
         /// The directory.
         dir: PathBuf,
-        /// Asked for.
+        /// The requested frame.
         frame: u32,
-        /// What the scene says.
+        /// The scene's `keep.particles`.
         keep: Keep,
-        /// The last one before it that has them.
+        /// Last frame before the requested one that has its particles.
         before: u32,
-        /// The first one after it.
+        /// First frame after the requested one that has its particles.
         after: u32,
     },
-    /// A value that cannot be written to a cache: a bug of the caller.
+    /// A value that cannot be written to a cache; a bug in the caller.
     #[error("cannot be cached: {0}")]
     Unfit(String),
-    /// The writer failed before and said so then.
+    /// The writer failed at an earlier frame and reported its error then.
     #[error("the cache writer stopped at an earlier error")]
     Stopped,
 }
@@ -175,7 +175,7 @@ impl CacheError {
     }
 }
 
-/// Names the path that an [`io::Error`] keeps to itself.
+/// Adds the path that an [`io::Error`] lacks.
 pub(super) trait AtPath<T> {
     fn at(self, path: &Path) -> Result<T, CacheError>;
 }

@@ -1,7 +1,8 @@
-//! `failed/` in a cache's folder: what the step that could not be made began with, so that it can be made again.
+//! `failed/` in a cache's folder: the state before the step that could not be computed, so that the
+//! step can be replayed.
 //!
-//! No ledger names it. Its report, written last, has the checksums of the other two files and one of itself; a bake that
-//! gets past the frame removes the folder.
+//! The ledger does not name it. Its report is written last and holds the checksums of the other two
+//! files and its own. A bake that gets past the frame removes the folder.
 
 use std::{fs, path::Path};
 
@@ -17,42 +18,44 @@ use super::{
 };
 use swell_domain::{answer::Answers, particles::Particles};
 
-/// The folder.
+/// Name of the folder in the cache.
 pub const FAILED: &str = "failed";
 const REPORT: &str = "report.json";
 const START: &str = "start.ply";
 /// Key of the report: records of the other files.
 const FILES: &str = "files";
-/// Key of the report: BLAKE3 of all that it says beside this.
+/// Key of the report: BLAKE3 of all its other fields.
 const CHECKSUM: &str = "blake3";
-/// Key of the report: what walls that absorb do after the state; only where there are some.
+/// Key of the report: the absorber state at the start; absent where no wall absorbs.
 const WALLS: &str = "walls";
 
-/// Key of the report: length of the substep that ended in the state, seconds.
+/// Key of the report: length of the substep that ended in the start state, seconds.
 const SUBSTEP: &str = "substep";
 
 /// A frame that could not be computed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Failed {
-    /// The scene of that run, every default written out; its mesh files stand in the cache above.
+    /// The scene of that run with every default written out; its mesh files are in the enclosing
+    /// cache.
     pub scene_toml: String,
-    /// The state that the frame began with: that of the last good one.
+    /// The state that the frame began with: that of the last good frame.
     pub start: Particles,
-    /// The last good frame.
+    /// Number of the last good frame.
     pub last_frame: u32,
-    /// Report of the breach, for a machine: an object. On the disk it has `files` and `blake3` as well.
+    /// Machine-readable report of the failed check, a JSON object. On disk it also has `files` and
+    /// `blake3`.
     pub report: Value,
 }
 
-/// Whether `dir` is such a folder.
+/// Whether `dir` is a folder of this kind.
 pub fn is_failed(dir: &Path) -> bool {
     dir.join(REPORT).is_file() && dir.join(START).is_file()
 }
 
-/// Writes `failed/` in the cache at `cache`, in place of one that stands there.
+/// Writes `failed/` in the cache at `cache` and replaces an existing one.
 ///
 /// # Errors
-/// [`CacheError::Io`]; [`CacheError::Unfit`] where the report is no object.
+/// [`CacheError::Io`]; [`CacheError::Unfit`] if the report is not a JSON object.
 pub fn write(cache: &Path, failed: &Failed, stamp: &Stamp<'_>) -> Result<(), CacheError> {
     remove(cache)?;
     let dir = cache.join(FAILED);
@@ -76,11 +79,11 @@ pub fn write(cache: &Path, failed: &Failed, stamp: &Stamp<'_>) -> Result<(), Cac
     fields.insert(SUBSTEP.to_owned(), json!(failed.start.substep));
     let checksum = checksum(fields);
     fields.insert(CHECKSUM.to_owned(), checksum.into());
-    // Last: it is what makes the folder one to replay.
+    // Last, because the report is what marks the folder as replayable.
     file(REPORT, text(fields).as_bytes())
 }
 
-/// Text of the file, fields in the order of their names.
+/// Content of the report file, fields sorted by name.
 fn text(fields: &Map<String, Value>) -> String {
     format!("{:#}\n", Value::Object(fields.clone()))
 }
@@ -89,15 +92,15 @@ fn checksum(fields: &Map<String, Value>) -> String {
     blake3::hash(text(fields).as_bytes()).to_hex().to_string()
 }
 
-/// Reads what [`write()`] wrote to `dir`, the folder itself.
+/// Reads what [`write()`] wrote; `dir` is the `failed/` folder itself.
 ///
 /// # Errors
-/// [`CacheError::Damaged`] for a file that is missing or whose checksum is off, [`CacheError::Io`].
+/// [`CacheError::Damaged`] for a file that is missing or has a wrong checksum, [`CacheError::Io`].
 pub fn read(dir: &Path) -> Result<Failed, CacheError> {
     let path = dir.join(REPORT);
     let damaged = |what: &str| CacheError::damaged(&path, what);
     let bytes = match fs::read(&path) {
-        // Written last: a bake was stopped while it wrote the folder.
+        // The report is written last: the bake was killed while it wrote the folder.
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
             return Err(damaged("it is missing"));
         }
@@ -105,7 +108,8 @@ pub fn read(dir: &Path) -> Result<Failed, CacheError> {
     };
     let mut fields: Map<String, Value> =
         serde_json::from_slice(&bytes).map_err(|error| damaged(&error.to_string()))?;
-    // Digits may change that no f64 holds: the text is compared as well.
+    // Digits beyond f64 precision may change without changing the value, so the text is compared
+    // too.
     let is_as_written = text(&fields).as_bytes() == bytes;
     let recorded = fields.remove(CHECKSUM);
     if !is_as_written || recorded != Some(checksum(&fields).into()) {
@@ -142,10 +146,7 @@ pub fn read(dir: &Path) -> Result<Failed, CacheError> {
     })
 }
 
-/// Removes `failed/` of the cache at `cache`, where it has one.
-///
-/// # Errors
-/// [`CacheError::Io`].
+/// Removes `failed/` of the cache at `cache` if it exists.
 pub fn remove(cache: &Path) -> Result<(), CacheError> {
     let dir = cache.join(FAILED);
     match fs::remove_dir_all(&dir) {
@@ -192,7 +193,7 @@ mod tests {
         for name in [manifest::SCENE, START, REPORT] {
             let path = dir.join(name);
             let sound = fs::read(&path).unwrap();
-            // Of each byte one or two, and each place in it in turn.
+            // One or two bits of each byte, cycling through all bit positions.
             for bit in (0..8 * sound.len()).step_by(7) {
                 let mut bytes = sound.clone();
                 bytes[bit / 8] ^= 1 << (bit % 8);

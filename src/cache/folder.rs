@@ -1,4 +1,5 @@
-//! The folder of a cache: what one may be made in, the folders that it gets, and what a kill leaves in them.
+//! The folder of a cache: which directories are acceptable for a new one, its subfolders, and the
+//! clean-up after a killed process.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -9,10 +10,11 @@ use super::ledger;
 use super::manifest::{self, Manifest};
 use super::stream::{PARTICLES, STREAMS, Stream};
 
-/// The cache that a path lies in, or would lie in, links followed; also one whose creation has only begun.
+/// The cache that contains `path`, or would contain it, with links resolved. A cache whose creation
+/// has only begun counts too.
 pub fn around(path: &Path) -> Option<PathBuf> {
     let mut real = std::path::absolute(path).ok()?;
-    // What is not there yet lies in the first folder above it that is.
+    // A path that does not exist yet is resolved through its nearest existing ancestor.
     while real.canonicalize().map(|found| real = found).is_err() {
         if !real.pop() {
             return None;
@@ -26,16 +28,13 @@ pub fn around(path: &Path) -> Option<PathBuf> {
         .map(Path::to_owned)
 }
 
-/// Makes a folder for each stream of the manifest.
+/// Creates a folder for each stream of the manifest.
 pub(super) fn make_streams(dir: &Path, manifest: &Manifest) -> Result<(), CacheError> {
     Stream::all(manifest).try_for_each(|stream| disk::create_directory(&dir.join(stream.folder)))
 }
 
-/// Refuses a directory with anything in it but a creation of ours that was cut short: our lock, no
-/// manifest, and one frame at most.
-///
-/// # Errors
-/// [`CacheError::Exists`], [`CacheError::Occupied`], [`CacheError::Io`].
+/// Refuses a directory that holds anything but an interrupted creation of our own: our lock, no
+/// manifest, and at most one frame.
 pub fn refuse_occupied(dir: &Path) -> Result<(), CacheError> {
     if manifest::exists(dir) {
         return Err(CacheError::Exists {
@@ -98,14 +97,14 @@ pub fn refuse_occupied(dir: &Path) -> Result<(), CacheError> {
     Ok(())
 }
 
-/// A name without the ending of a temporary file.
+/// A name without the extension of a temporary file.
 fn plain(name: &str) -> &str {
     name.strip_suffix(disk::TEMPORARY)
         .and_then(|name| name.strip_suffix('.'))
         .unwrap_or(name)
 }
 
-/// Empties what [`refuse_occupied`] let pass, the lock apart.
+/// Removes everything that [`refuse_occupied`] accepts, except the lock.
 pub(super) fn clear_unfinished(dir: &Path) -> Result<(), CacheError> {
     for name in disk::names(dir)? {
         let path = dir.join(&name);
@@ -119,8 +118,9 @@ pub(super) fn clear_unfinished(dir: &Path) -> Result<(), CacheError> {
     Ok(())
 }
 
-/// Removes from the folders of all streams temporary files, files behind frame `last`, which were renamed but have no
-/// line, and particles that do not stay: what a crash leaves.
+/// Removes what a crash leaves in the folders of all streams: temporary files, files after frame
+/// `last` (renamed, but without a line in the ledger), and particles that the manifest does not
+/// keep.
 pub(super) fn clear_leftovers(
     dir: &Path,
     manifest: &Manifest,

@@ -1,11 +1,13 @@
-//! A frame file: binary little-endian PLY that Blender, MeshLab and Houdini open as it is, positions in the world's
-//! coordinates: `float`, and `double` where the scene has an origin of its own, which a comment then tells.
+//! A frame file: binary little-endian PLY, readable by Blender, MeshLab and Houdini.
 //!
-//! The header goes through ply-rs-bw. The rows are packed here: 200 000 particles, hash included, come
-//! at 2.2 GB/s, and at 0.28 GB/s through the library's property-by-property path, while the disk under
-//! them takes 0.7 GB/s with a flush (2 cores; the ignored test `packed_rows_against_per_property`
-//! prints the figures). Another test holds the packed rows against the library's own, byte for byte.
-//! [`planes`] is the same content, compressed.
+//! Positions are world coordinates: `float`, or `double` if the scene has its own origin, which is
+//! then recorded in a comment.
+//!
+//! The header goes through ply-rs-bw; the rows are packed here. 200 000 particles, hash included,
+//! are written at 2.2 GB/s, against 0.28 GB/s through the library's property-by-property path; the
+//! disk takes 0.7 GB/s with a flush (2 cores; the ignored test `packed_rows_against_per_property`
+//! prints these figures). Another test compares the packed rows with the library's own, byte for
+//! byte. [`planes`] holds the same content, compressed.
 
 pub mod planes;
 
@@ -31,48 +33,47 @@ const FIXED: [(&str, ScalarType); 7] = [
     ("vz", ScalarType::Float),
     ("id", ScalarType::UInt),
 ];
-/// Every value is four bytes, but for positions about an origin.
+/// Bytes of a value; only positions relative to an origin are wider.
 const VALUE: usize = 4;
-/// The comment that tells the origin.
+/// Prefix of the comment that records the origin.
 const ORIGIN: &str = "origin ";
-/// Rows packed at a time: about half a megabyte, so that a frame of any size is written in little
-/// memory.
+/// Rows packed at a time: about half a megabyte, so that writing takes little memory at any frame
+/// size.
 const ROWS_AT_ONCE: usize = 16_384;
-/// A header of ours has a few hundred bytes; a file without line ends is not read as one line.
+/// Bytes searched for the header. Our headers have a few hundred bytes; the limit keeps a file
+/// without line ends from being read as one line.
 const HEADER_LIMIT: usize = 1 << 16;
 
 /// Description of a frame file, written into it as comments.
 #[derive(Clone, Copy, Debug)]
 pub struct Stamp<'a> {
-    /// `swell`.
+    /// Program name, `swell`.
     pub program: &'a str,
     /// Version of the program.
     pub program_version: &'a str,
     /// Shot name.
     pub shot: &'a str,
-    /// 0 is the start.
+    /// Frame number; 0 is the start.
     pub frame: u32,
-    /// Simulated, seconds.
+    /// Simulated time, seconds.
     pub time: f64,
-    /// Offset from the particles' positions to the world's, metres. Reading takes it off again, and gives the same
-    /// bits as long as the sum is finer than the positions (see `scene::Scene::origin`).
+    /// Offset from the particles' positions to world coordinates, metres. Reading subtracts it
+    /// again and restores the same bits as long as the sum is finer than the positions (see
+    /// `scene::Scene::origin`).
     pub origin: DVec3,
 }
 
 /// Length and BLAKE3 of what was written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Written {
-    /// Length.
+    /// Length in bytes.
     pub bytes: u64,
     /// BLAKE3 of the bytes.
     pub hash: blake3::Hash,
 }
 
-/// Refuses particles that cannot stand in a frame: arrays of different length, ids out of order,
-/// attribute names that are taken or that PLY cannot hold.
-///
-/// # Errors
-/// [`CacheError::Unfit`].
+/// Refuses particles that cannot be stored as a frame: arrays of different lengths, ids that do not
+/// ascend, attribute names that are taken or that PLY cannot hold.
 pub fn check(particles: &Particles) -> Result<(), CacheError> {
     let n = particles.len();
     let unfit = |what: String| Err(CacheError::Unfit(what));
@@ -108,10 +109,10 @@ fn first_unordered(ids: &[u32]) -> Option<usize> {
     ids.windows(2).position(|w| w[0] >= w[1]).map(|i| i + 1)
 }
 
-/// Writes one frame.
+/// Writes one frame. The particles must pass [`check`].
 ///
 /// # Errors
-/// Those of `out`. The particles must pass [`check`].
+/// Those of `out`.
 pub fn encode(
     out: &mut impl Write,
     stamp: &Stamp<'_>,
@@ -129,7 +130,7 @@ pub fn encode(
     Ok(out.written())
 }
 
-/// A file that is being written, and what has gone into it.
+/// A writer that counts and hashes what passes through it.
 struct Counted<W> {
     out: W,
     hasher: blake3::Hasher,
@@ -195,7 +196,7 @@ fn origin_comment(origin: DVec3) -> String {
     format!("{ORIGIN}{:?} {:?} {:?}", origin.x, origin.y, origin.z)
 }
 
-/// [`FIXED`] as it stands in the frames of a scene with this origin.
+/// [`FIXED`] with the position type that a scene with this origin uses.
 fn fixed<'a>(origin: DVec3) -> impl Iterator<Item = (&'a str, ScalarType)> {
     let is_far = origin != DVec3::ZERO;
     let scalar = move |k: usize, scalar: &ScalarType| match k {
@@ -217,7 +218,7 @@ fn header_bytes(header: &Header) -> io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// Little-endian rows of the particles in `range`.
+/// Packs the particles in `range` as little-endian rows.
 fn pack(particles: &Particles, origin: DVec3, range: std::ops::Range<usize>, rows: &mut Vec<u8>) {
     let columns: Vec<&[f32]> = particles.attributes.values().map(Vec::as_slice).collect();
     let row_size = row_size(origin, columns.len());
@@ -241,15 +242,15 @@ fn pack(particles: &Particles, origin: DVec3, range: std::ops::Range<usize>, row
     }
 }
 
-/// Writes values at the start of a row; what is left of it.
+/// Writes values at the start of a row and returns the rest of it.
 fn put<const N: usize, const SIZE: usize>(row: &mut [u8], values: [[u8; SIZE]; N]) -> &mut [u8] {
     let (place, rest) = row.split_at_mut(N * SIZE);
     place.copy_from_slice(values.as_flattened());
     rest
 }
 
-/// Reads one frame. Strict: what [`encode`] would not have written is refused, and nothing is
-/// allocated on a header's word alone.
+/// Reads one frame. Strict: refuses whatever [`encode`] would not have written, and checks the
+/// length that the header promises before it allocates.
 ///
 /// # Errors
 /// [`CacheError::Damaged`] with `file` as its name.
@@ -257,7 +258,7 @@ pub fn decode(bytes: &[u8], file: &Path) -> Result<Particles, CacheError> {
     parse(bytes).map_err(|what| CacheError::damaged(file, what))
 }
 
-/// The comments of a frame's header, in their order.
+/// The comments in a frame's header, in order.
 pub fn comments(bytes: &[u8]) -> Vec<String> {
     let head = String::from_utf8_lossy(&bytes[..bytes.len().min(HEADER_LIMIT)]);
     let lines = head.lines().take_while(|line| *line != "end_header");
@@ -279,7 +280,7 @@ fn parse(bytes: &[u8]) -> Result<Particles, String> {
     Ok(unpacked.finish(head.names))
 }
 
-/// What a header says.
+/// Contents of a header.
 struct Head {
     /// Length of the header.
     bytes: usize,
@@ -287,9 +288,9 @@ struct Head {
     count: usize,
     /// World position of the particles' [0, 0, 0], metres.
     origin: DVec3,
-    /// Of the attributes, ascending.
+    /// Names of the attributes, ascending.
     names: Vec<String>,
-    /// Where byte planes follow, in place of rows, what they are of.
+    /// How the byte planes that follow are encoded; `None` if rows follow.
     planes: Option<planes::Content>,
 }
 
@@ -304,7 +305,7 @@ impl Head {
     }
 }
 
-/// Reads the header that `head` begins with.
+/// Reads the header at the start of `head`.
 fn read_head(head: &[u8]) -> Result<Head, String> {
     let mut reader = Reader::new(head);
     let header = Parser::<DefaultElement>::new()
@@ -315,8 +316,8 @@ fn read_head(head: &[u8]) -> Result<Head, String> {
             format!("PLY header: {first}")
         })?;
     let head = &head[..head.len() - reader.into_inner().len()];
-    // Names given twice, other spellings and further spaces all vanish in the parsed header, so it is
-    // compared as it would be written.
+    // The parsed header hides duplicate names, alternative spellings and extra spaces, so it is
+    // written again and compared byte for byte.
     if header_bytes(&header).map_err(|e| e.to_string())? != head {
         return Err("its PLY header is not one of ours".to_owned());
     }
@@ -331,7 +332,7 @@ fn read_head(head: &[u8]) -> Result<Head, String> {
     })
 }
 
-/// The origin that the comments tell; zero where they tell none.
+/// The origin in the comments; zero if they have none.
 fn read_origin(comments: &[String]) -> Result<DVec3, String> {
     let Some(comment) = comments.iter().find(|c| c.starts_with(ORIGIN)) else {
         return Ok(DVec3::ZERO);
@@ -378,7 +379,7 @@ fn layout(header: &Header, origin: DVec3) -> Result<(usize, Vec<String>), String
     Ok((vertex.count, names))
 }
 
-/// Particles as they are read, row by row.
+/// Particles read so far, row by row.
 struct Unpacked {
     particles: Particles,
     columns: Vec<Vec<f32>>,
@@ -387,7 +388,7 @@ struct Unpacked {
 }
 
 impl Unpacked {
-    /// Nothing yet, with room for so many.
+    /// Empty, with capacity for `room` particles.
     fn new(head: &Head, room: usize) -> Self {
         Self {
             particles: Particles {
@@ -402,7 +403,7 @@ impl Unpacked {
         }
     }
 
-    /// Takes whole rows.
+    /// Appends whole rows.
     fn add(&mut self, rows: &[u8]) -> Result<(), String> {
         let before = self.particles.len().saturating_sub(1);
         for row in rows.chunks_exact(self.row_size) {
@@ -439,7 +440,7 @@ impl Unpacked {
     }
 }
 
-/// Values from the start of a row, and what is left of it.
+/// Splits values off the start of a row.
 fn take<const N: usize, const SIZE: usize>(row: &[u8]) -> ([[u8; SIZE]; N], &[u8]) {
     let (place, rest) = row.split_at(N * SIZE);
     let mut values = [[0; SIZE]; N];

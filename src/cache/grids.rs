@@ -1,4 +1,4 @@
-//! What a bake keeps of each frame's water beside its particles.
+//! The grids that a bake keeps of each frame's water besides its particles.
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
@@ -6,25 +6,26 @@ use serde::{Deserialize, Serialize};
 use super::vdb::Grids;
 use swell_domain::{particles::Particles, sparse_grid::Precision, surface::Raster};
 
-/// Grids that each frame has, as the manifest records them.
+/// Grids that each frame has, as recorded in the manifest.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct GridRecord {
-    /// Whether there is a level set `surface`.
+    /// Whether there is a level set `surface`, metres.
     pub surface: bool,
-    /// Whether there is a staggered `vel`.
+    /// Whether there is a staggered velocity grid `vel`, m/s.
     pub velocity: bool,
-    /// Metres.
+    /// Edge length of a voxel, metres.
     pub voxel_size: f64,
-    /// Corner of voxel (0, 0, 0), metres, about the manifest's origin: the domain's least corner.
+    /// Least corner of the domain, and of voxel (0, 0, 0), metres, relative to the manifest's
+    /// origin.
     pub origin: [f64; 3],
-    /// How values are kept.
+    /// Floating-point precision of the stored values.
     pub precision: Precision,
 }
 
 impl GridRecord {
-    /// The grids of a frame: a function of its particles, so that a resumed bake gives the same
-    /// bytes. `particle_spacing` in metres.
+    /// Computes the grids of a frame. They depend only on its particles, so that a resumed bake
+    /// gives the same bytes. `particle_spacing` is in metres.
     pub fn grids(&self, particles: &Particles, particle_spacing: f64) -> Grids {
         let raster = Raster {
             origin: DVec3::from_array(self.origin),
@@ -45,7 +46,7 @@ impl GridRecord {
             .filter_map(|(is_kept, name)| is_kept.then_some(name))
     }
 
-    /// Refuses what no scene asks for.
+    /// Refuses a record that no scene could ask for.
     pub(super) fn check(&self) -> Result<(), String> {
         let size = self.voxel_size;
         if !(size > 0.0 && size.is_finite() && self.origin.iter().all(|x| x.is_finite())) {

@@ -1,4 +1,4 @@
-//! `frames.jsonl`: one line a frame, each chained to the one before.
+//! `frames.jsonl`: one line per frame, each chained to the line before.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
@@ -18,7 +18,7 @@ use swell_domain::answer::Answers;
 
 /// File name of the ledger.
 pub(super) const FILE: &str = "frames.jsonl";
-/// Stands between a line's contents and the 64 digits of its chained hash.
+/// Separates the contents of a line from the 64 hex digits of its chained hash.
 const CHAIN_KEY: &[u8] = b",\"chain\":\"";
 const CHAIN_LEN: usize = CHAIN_KEY.len() + 64 + 2;
 
@@ -26,21 +26,21 @@ const CHAIN_LEN: usize = CHAIN_KEY.len() + 64 + 2;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Clock {
-    /// 0 is the start.
+    /// Frame number; 0 is the start.
     pub frame: u32,
-    /// Simulated, seconds.
+    /// Simulated time, seconds.
     pub time: f64,
     /// Substeps in this frame.
     pub substeps: u32,
     /// Substeps since the start.
     pub steps: u64,
-    /// Of the particle that enters next; only where water enters or leaves.
+    /// Id of the next particle to enter; present only if water enters or leaves.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub next_id: Option<u32>,
-    /// What walls that absorb do from then on; only where there are some.
+    /// State of the absorbing walls after this frame; absent if there are none.
     #[serde(default, skip_serializing_if = "is_none")]
     pub walls: Answers,
-    /// Length of the substep that ended in the frame, seconds; 0 where none did.
+    /// Length of the substep that ended in the frame, seconds; 0 if there was none.
     #[serde(default, skip_serializing_if = "is_no_time")]
     pub substep: f64,
 }
@@ -53,41 +53,42 @@ fn is_none(walls: &Answers) -> bool {
     walls.iter().all(Option::is_none)
 }
 
-/// Files of a frame by the names of their streams.
+/// Files of a frame, by the name of their stream.
 pub type Files = BTreeMap<String, FileRecord>;
 
-/// Values of a frame by the names of their streams, then by table and column; `None` where there is nothing to measure.
+/// Values of a frame by the name of their stream, then by table and column; `None` where there is
+/// nothing to measure.
 pub type Rows = BTreeMap<String, ProbeValues>;
 
 /// One line of the ledger.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Entry {
-    /// 0 is the start.
+    /// Frame number; 0 is the start.
     pub frame: u32,
     /// Number of particles in the frame's file.
     pub particles: u64,
-    /// Files of each stream with a file a frame that the manifest announces, and so of the particles at least; also of
-    /// particles that the manifest does not keep.
+    /// Files of every by-frame stream that the manifest announces, hence at least the particles'
+    /// file. It is listed even if the manifest does not keep the frame's particles.
     pub files: Files,
-    /// Rows of each stream with a row a frame that the manifest announces; absent where there is none.
+    /// Rows of every by-row stream that the manifest announces; empty if there is none.
     #[serde(default)]
     pub rows: Rows,
-    /// BLAKE3 of `manifest.json`, hex; the first frame alone has it, so that a changed manifest is told from a
-    /// changed first line.
+    /// BLAKE3 of `manifest.json`, hex. Only the first line has it, so that a changed manifest can
+    /// be told from a changed first line.
     #[serde(default)]
     pub manifest: Option<String>,
-    /// After this frame.
+    /// Clock after this frame.
     pub clock: Clock,
-    /// The solver's report of the frame. Nothing in it may differ between two bakes of one scene, so
-    /// no seconds.
+    /// The solver's report of the frame. Nothing in it may differ between two bakes of the same
+    /// scene, so it holds no timings.
     pub report: Value,
-    /// BLAKE3 of the previous line's chained hash and this line's contents, hex; the manifest's hash
-    /// stands before the first.
+    /// BLAKE3 of the previous line's chained hash followed by this line's contents, hex. The first
+    /// line is chained to the manifest's hash.
     pub chain: String,
 }
 
-/// A line as format 1 has it: the streams of that time, each with a place of its own.
+/// A line in cache format 1, which has a separate field for each stream.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct EntryOfFormat1 {
@@ -143,12 +144,13 @@ impl Entry {
         }
     }
 
-    /// The frame's file of a stream; `None` where the manifest does not announce it.
+    /// The frame's file of a stream; `None` if the manifest does not announce the stream.
     pub fn file(&self, stream: &str) -> Option<&FileRecord> {
         self.files.get(stream)
     }
 
-    /// The frame's files that stand in a cache with this manifest, whose newest frame is `newest`; the particles first.
+    /// The frame's files that should exist in a cache with this manifest whose newest frame is
+    /// `newest`; the particles first.
     pub(super) fn files_there(
         &self,
         manifest: &Manifest,
@@ -161,19 +163,20 @@ impl Entry {
         there.filter_map(|stream| self.file(stream.name))
     }
 
-    /// The frame's files but that of the particles.
+    /// The frame's files except that of the particles.
     pub fn files_beside(&self) -> impl Iterator<Item = &FileRecord> {
         let beside = STREAMS.iter().filter(|s| s.name != stream::PARTICLES);
         beside.filter_map(|stream| self.file(stream.name))
     }
 
-    /// The frame's values of a stream's table, by its index in the manifest; empty where there are none.
+    /// The frame's values in a table of a stream; `table` is its index in the manifest. Empty if
+    /// there are none.
     pub fn row(&self, stream: &str, table: usize) -> &[Option<f64>] {
         let row = self.rows.get(stream).and_then(|rows| rows.get(table));
         row.map_or(&[], Vec::as_slice)
     }
 
-    /// Why it cannot be the line of this frame in a cache with this manifest.
+    /// Why this cannot be the line of `frame` in a cache with this manifest.
     fn misfit(&self, manifest: &Manifest, frame: u32) -> Option<String> {
         if self.frame != frame || self.clock.frame != frame {
             return Some(format!("it is not frame {frame}"));
@@ -192,7 +195,7 @@ impl Entry {
     }
 }
 
-/// Why these rows cannot stand in a line of a cache with this manifest.
+/// Why these rows cannot be part of a line in a cache with this manifest.
 pub(super) fn rows_misfit(manifest: &Manifest, rows: &Rows) -> Option<String> {
     let mut expected = 0;
     for stream in &STREAMS {
@@ -220,7 +223,7 @@ pub(super) fn rows_misfit(manifest: &Manifest, rows: &Rows) -> Option<String> {
     (rows.len() != expected).then(|| "it has rows that the manifest does not announce".to_owned())
 }
 
-/// An [`Entry`] without its chain, as the chain is taken over it.
+/// An [`Entry`] without its chain: what the chained hash covers.
 #[derive(Serialize)]
 pub(super) struct Contents<'a> {
     pub(super) frame: u32,
@@ -235,7 +238,7 @@ pub(super) struct Contents<'a> {
 }
 
 impl Contents<'_> {
-    /// The line with its end, and the chained hash that the next one needs.
+    /// The line with its line end, and the chained hash that the next line needs.
     pub(super) fn to_line(&self, previous: &Hash) -> Result<(Vec<u8>, Hash), CacheError> {
         if !self.clock.time.is_finite() {
             return Err(CacheError::Unfit(format!(
@@ -254,7 +257,7 @@ impl Contents<'_> {
     }
 }
 
-/// What is wrong with a line, without the number that it has as a text of its own.
+/// A parse error without the line number, which is always 1.
 fn in_line(error: &serde_json::Error) -> String {
     let text = error.to_string();
     match text.rsplit_once(" at line 1 column ") {
@@ -270,18 +273,18 @@ fn chained(previous: &Hash, contents: &[u8]) -> Hash {
     hasher.finalize()
 }
 
-/// The ledger as found: whole lines, each checked.
+/// The ledger as found on disk: its whole lines, each checked.
 #[derive(Debug)]
 pub(super) struct Ledger {
     /// Entries in order, the start first; never empty.
     pub(super) entries: Vec<Entry>,
     /// Chained hash of the last whole line.
     pub(super) chain: Hash,
-    /// Length of the whole lines.
+    /// Total length of the whole lines, bytes.
     pub(super) whole_bytes: u64,
-    /// Where each entry's line ends.
+    /// Byte offset of the end of each entry's line.
     pub(super) ends: Vec<u64>,
-    /// Bytes behind the last line end: what a crash left of a line, or a line being written now.
+    /// Bytes after the last line end: a line torn by a crash, or one being written right now.
     pub(super) torn_bytes: u64,
 }
 
@@ -317,8 +320,8 @@ impl Ledger {
         Ok(ledger)
     }
 
-    /// Leaves out the entries behind the newest frame whose particles are there, as far as they do not have to be: a bake
-    /// can go on from there, and gives the same lines again.
+    /// Drops the entries after the newest frame whose particles exist, provided that the manifest
+    /// does not keep theirs: a bake resumed from there gives the same lines again.
     pub(super) fn back_to_particles(&mut self, dir: &Path, manifest: &Manifest) {
         while let [.., before, last] = &self.entries[..] {
             let record = last.file(stream::PARTICLES);
@@ -349,8 +352,8 @@ impl Ledger {
         let contents = [contents, b"}"].concat();
         let mut previous = self.chain;
         if number == 1 {
-            // Chained to the manifest that the line itself records: where that holds, the line is
-            // whole, and a manifest with another hash is the file that changed.
+            // Chained to the manifest hash that the line itself records. If that chain is valid,
+            // the line is intact, and a different manifest hash means that the manifest changed.
             previous = entry
                 .manifest
                 .as_ref()
@@ -380,8 +383,8 @@ impl Ledger {
     }
 }
 
-/// Appends a line and waits until it is on the disk. `length` is the ledger's length so far; it is
-/// looked at each time, so that a ledger that was removed or touched in mid-bake is noticed.
+/// Appends a line and waits until it is on the disk. `length` is the expected length of the ledger
+/// so far; checking it each time detects a ledger that was removed or modified during the bake.
 pub(super) fn append(path: &Path, length: u64, line: &[u8]) -> Result<(), CacheError> {
     let mut file = File::options().append(true).open(path).at(path)?;
     let found = file.metadata().at(path)?.len();
@@ -395,7 +398,7 @@ pub(super) fn append(path: &Path, length: u64, line: &[u8]) -> Result<(), CacheE
         .and_then(|()| file.sync_data())
         .at(path)
         .inspect_err(|_| {
-            // Half a line is cut on resume as well; the first error is the one to report.
+            // Resume cuts half a line as well; the first error is the one to report.
             let _ = file.set_len(length);
         })
 }
@@ -423,8 +426,8 @@ mod tests {
     }
 
     proptest! {
-        /// serde_json reads floats to the last bit with its feature `float_roundtrip` alone; without
-        /// it a resumed bake would start from another clock.
+        /// serde_json parses floats exactly only with its feature `float_roundtrip`; without it a
+        /// resumed bake would start from another clock.
         #[test]
         fn the_clock_comes_back_to_the_last_bit(bits in any::<u64>()) {
             let time = f64::from_bits(bits);

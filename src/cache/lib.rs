@@ -1,4 +1,4 @@
-//! Particle frames on disk: the file that stands between baking and everything after it.
+//! Particle frames on disk: the files that separate baking from everything after it.
 //!
 //! ```text
 //! cache/wave-city/pbf/
@@ -6,25 +6,26 @@
 //!   scene.toml      the scene as baked; the manifest holds its hash
 //!   assets/         copies of the files that the scene names; the manifest holds their hashes
 //!   frames.jsonl    the ledger: one line a frame, chained by BLAKE3 back to the manifest
-//!   frames/wave-city.0000.ply   the start; 0001 is the first frame after it. A bake that began from a frame of another
-//!                   cache starts with that number
+//!   frames/wave-city.0000.ply   the start; 0001 is the first frame after it. A bake that
+//!                   began from a frame of another cache starts with that frame's number
 //!   grids/wave-city.0000.vdb    where the scene asks: level set "surface", staggered "vel"
-//!   probes/elevation-1.csv      where the scene has probes: a row a frame, from the ledger
-//!   timings.jsonl   seconds, which no two bakes share: in no hash, in no comparison
-//!   failed/         of the frame that a bake broke off at: its scene, the state that it began with, what was seen
+//!   probes/elevation-1.csv      where the scene has probes: a row per frame, from the ledger
+//!   timings.jsonl   seconds; not reproducible, so in no hash and in no comparison
+//!   failed/         the frame that a bake failed at: its scene, the state before it, the report
 //!   lock            held by the one writer
 //! ```
 //!
-//! The same scene, binary and adapter give the same bytes in every file but `timings.jsonl`; `failed/` has checksums of its own, and goes when a bake gets past its frame.
+//! The same scene, binary and adapter give the same bytes in every file except `timings.jsonl`.
+//! `failed/` has checksums of its own and is removed when a bake gets past its frame.
 //!
-//! What there is of each frame, and in which folder, is a table: [`stream::STREAMS`]. The files of a frame go to a
-//! temporary file, to the platter, to their name, and only then into the ledger. So
-//! the ledger never names a frame that is not whole, whatever kills the process, and what a crash can
-//! leave (a temporary file, a frame without a line, half a line) is cleared by
-//! [`CacheWriter::resume`].
+//! The table [`stream::STREAMS`] lists what a cache keeps of each frame and in which folder. A
+//! frame's files are written to a temporary file, flushed to the disk, renamed, and only then
+//! entered into the ledger. The ledger therefore never names an incomplete frame, whatever kills
+//! the process, and [`CacheWriter::resume`] clears what a crash can leave: a temporary file, a
+//! frame without a line, half a line.
 //!
-//! The chain finds damage and edits. It is no signature, and a ledger cut at the end of a line reads
-//! as a bake that stopped there.
+//! The hash chain detects damage and edits. It is not a signature, and a ledger cut at the end of a
+//! line reads like a bake that stopped there.
 
 mod absent;
 mod disk;

@@ -1,4 +1,4 @@
-//! What was baked, by what, on what.
+//! `manifest.json`: what was baked, by which program, on which device.
 
 use std::fmt;
 use std::fs;
@@ -17,12 +17,13 @@ use swell_domain::keep::{Compression, Keep};
 
 /// File name of the manifest.
 pub(super) const FILE: &str = "manifest.json";
-/// The scene as baked.
+/// File name of the scene as baked.
 pub(super) const SCENE: &str = "scene.toml";
-/// Folder of the scene's own files.
+/// Folder of the files that the scene names.
 pub(super) const ASSETS: &str = "assets";
 
-/// Whether `dir` holds a cache whose creation was finished, so that a bake must resume it or leave it.
+/// Whether `dir` holds a cache whose creation was completed, which a bake must resume or leave
+/// alone.
 pub fn exists(dir: &Path) -> bool {
     dir.join(FILE).is_file()
 }
@@ -31,79 +32,82 @@ pub fn exists(dir: &Path) -> bool {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Manifest {
-    /// [`Manifest::FORMAT_VERSION`] of the program that wrote it.
+    /// Cache format: [`Manifest::FORMAT_VERSION`] of the program that wrote it.
     pub format_version: u32,
-    /// `swell`.
+    /// Program name, `swell`.
     pub program: String,
     /// Version of the program.
     pub program_version: String,
-    /// BLAKE3 of the shaders that were read from a folder, hex; absent where they were the program's own.
+    /// BLAKE3 of the shaders that were loaded from a folder, hex; absent if the built-in shaders
+    /// ran.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shaders: Option<String>,
-    /// Shot name, which the frame files carry: letters, digits, `.`, `_`, `-`.
+    /// Shot name, part of each frame file's name: letters, digits, `.`, `_`, `-`.
     pub shot: String,
-    /// Hash of all that decides the physics, hex.
+    /// Hash of everything that decides the physics, hex.
     pub scene_hash: String,
-    /// `pbf` or `flip`.
+    /// `pbf`, `flip`, or [`Manifest::WHITEWATER`].
     pub solver: String,
-    /// Adapter name, or that it was the f64 reference.
+    /// Name of the adapter, or of the f64 reference.
     pub device: String,
-    /// Driver and its version; of the reference what it was built for.
+    /// Driver and its version; for the reference, the target it was built for.
     pub driver: String,
-    /// `Vulkan`, `Metal`, `Dx12`; `CPU` of the reference.
+    /// `Vulkan`, `Metal` or `Dx12`; `CPU` for the reference.
     pub backend: String,
-    /// Output frames a second.
+    /// Output frames per second.
     pub frames_per_second: f64,
-    /// d, metres.
+    /// Particle spacing d, metres.
     pub particle_spacing: f64,
-    /// kg/m³.
+    /// Rest density, kg/m³.
     pub rest_density: f64,
-    /// World position of what the solver has as [0, 0, 0], metres; absent where it is the world's own.
+    /// World position of the solver's [0, 0, 0], metres; absent if it is the world's origin.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub origin: [f64; 3],
-    /// Names of what each particle carries beside position, velocity and id; sorted by
-    /// [`CacheWriter::create`](super::CacheWriter::create).
+    /// Names of the per-particle attributes besides position, velocity and id.
+    /// [`CacheWriter::create`](super::CacheWriter::create) sorts them.
     pub attributes: Vec<String>,
-    /// Grids of each frame; absent where the scene asks for no grids.
+    /// Grids of each frame; absent if the scene asks for none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub grids: Option<GridRecord>,
-    /// Of which frames the particles stay; absent where those of all do.
+    /// Which frames keep their particles; absent if all do.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub keep: Option<Keep>,
-    /// How frames are compressed; absent where they are plain PLY.
+    /// How frames are compressed; absent if they are plain PLY.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub compression: Option<Compression>,
-    /// Probes, which measure each frame; absent where the scene has no probe.
+    /// Probes, which measure each frame; absent if the scene has none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub probes: Vec<ProbeRecord>,
-    /// The frame of another cache that this bake began from; absent where it began from its scene's start.
+    /// The frame of another cache that this bake began from; absent if it began from its scene's
+    /// start.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub parent: Option<Parent>,
-    /// Warnings about the scene that were shown before the bake; absent where there were none.
+    /// Warnings about the scene that were shown before the bake; absent if there were none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub warnings: Vec<String>,
-    /// Particles at the start; filled in by `create`.
+    /// Number of particles at the start; filled in by `create`.
     pub start_particles: u64,
-    /// `scene.toml` and the assets; filled in by `create`.
+    /// Records of `scene.toml` and the assets; filled in by `create`.
     pub files: Vec<FileRecord>,
 }
 
-/// A frame of another cache. The bake that began there goes on with its number and its clock, so the frame is the
-/// first of both.
+/// A frame of another cache that a bake began from. The bake continues with its frame number and
+/// clock, so the frame belongs to both caches.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Parent {
-    /// Shot of that cache.
+    /// Shot name of the other cache.
     pub shot: String,
-    /// Solver of that cache.
+    /// Solver of the other cache.
     pub solver: String,
     /// Hash of its physics, hex.
     pub scene_hash: String,
-    /// Number of the frame, in both caches.
+    /// Number of the frame, the same in both caches.
     pub frame: u32,
-    /// BLAKE3 of the frame's file there, hex.
+    /// BLAKE3 of the frame's file in the other cache, hex.
     pub blake3: String,
-    /// BLAKE3 of the shaders that it was baked with, hex; absent where they were the program's own.
+    /// BLAKE3 of the edited shaders that it was baked with, hex; absent if the built-in shaders
+    /// ran.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shaders: Option<String>,
 }
@@ -127,8 +131,8 @@ fn is_zero(origin: &[f64; 3]) -> bool {
     *origin == [0.0; 3]
 }
 
-/// Fields that a resumed bake must have in common with the cache, the most telling first. The scene's hash
-/// comes last: it differs where any of the fields above it that a scene sets does.
+/// Fields that a resumed bake must have in common with the cache, the most informative first. The
+/// scene's hash comes last: it differs whenever a field above it that a scene sets differs.
 const COMPARED: [&str; 16] = [
     "program",
     "program_version",
@@ -149,44 +153,46 @@ const COMPARED: [&str; 16] = [
 ];
 
 impl Manifest {
-    /// The format that this program writes. Since 2 a line of the ledger lists its files and its rows by stream.
+    /// Cache format that this program writes. From format 2 on, a line of the ledger lists its
+    /// files and rows by stream.
     pub const FORMAT_VERSION: u32 = 2;
 
-    /// The oldest format that it reads. A bake in an older one than [`Self::FORMAT_VERSION`] is not gone on with.
+    /// Oldest cache format that this program reads. A bake in a format older than
+    /// [`Self::FORMAT_VERSION`] cannot be resumed.
     pub const OLDEST_FORMAT: u32 = 1;
 
-    /// In the place of a solver: a stream of whitewater.
+    /// Value of `solver` for a whitewater stream.
     pub const WHITEWATER: &str = "whitewater";
 
-    /// Whether it is no bake's, but that of a stream of whitewater that was made from one.
+    /// Whether this is the manifest of a whitewater stream made from a bake.
     pub fn is_whitewater(&self) -> bool {
         self.solver == Self::WHITEWATER
     }
 
-    /// Names of the scene's own files, as [`Asset`](super::Asset) has them.
+    /// Names of the scene's own files, relative to `assets/` as in [`Asset`](super::Asset).
     pub fn asset_names(&self) -> impl Iterator<Item = &str> {
         let files = self.files.iter().map(|record| &*record.file);
         files.filter_map(|file| file.strip_prefix(ASSETS)?.strip_prefix('/'))
     }
 
-    /// Number of the first frame: 0 is a scene's own start.
+    /// Number of the first frame: 0 for a scene's own start, otherwise the parent's.
     pub fn first_frame(&self) -> u32 {
         self.parent.as_ref().map_or(0, |parent| parent.frame)
     }
 
-    /// Hash of the edited shaders that made its frames or those that they began from, hex; `None` where only the program's
-    /// own did.
+    /// Hash of the edited shaders that made these frames or the parent's, hex; `None` if only
+    /// built-in shaders ran.
     pub fn edited_shaders(&self) -> Option<&str> {
         let of_parent = || self.parent.as_ref()?.shaders.as_deref();
         self.shaders.as_deref().or_else(of_parent)
     }
 
-    /// Whether a cache whose newest frame is `newest` has the particles of this one.
+    /// Whether a cache whose newest frame is `newest` has the particles of `frame`.
     pub fn has_particles(&self, frame: u32, newest: u32) -> bool {
         frame == newest || self.keeps(frame)
     }
 
-    /// Whether this frame's particles stay when later frames are there.
+    /// Whether the particles of `frame` are kept once later frames exist.
     pub(super) fn keeps(&self, frame: u32) -> bool {
         frame == self.first_frame() || self.keep.is_none_or(|keep| keep.keeps(frame))
     }
@@ -203,7 +209,7 @@ impl Manifest {
         }
     }
 
-    /// Bytes of `manifest.json`.
+    /// Content of `manifest.json`.
     pub(super) fn to_bytes(&self) -> Result<Vec<u8>, CacheError> {
         let mut text = serde_json::to_vec_pretty(self)
             .map_err(|error| CacheError::Unfit(format!("manifest: {error}")))?;
@@ -211,7 +217,7 @@ impl Manifest {
         Ok(text)
     }
 
-    /// Reads `manifest.json` and its hash.
+    /// Reads and checks `manifest.json` and returns its hash as well.
     pub(super) fn read(dir: &Path) -> Result<(Self, blake3::Hash), CacheError> {
         if !exists(dir) {
             return Err(CacheError::NotACache {
@@ -249,12 +255,12 @@ impl Manifest {
             .ok_or_else(|| CacheError::damaged(dir.join(FILE), "it names no scene.toml"))
     }
 
-    /// Refuses `scene.toml` and the assets where one is missing or not what was written.
+    /// Checks that `scene.toml` and the assets exist and are what was written.
     pub(super) fn check_files(&self, dir: &Path) -> Result<(), CacheError> {
         self.files.iter().try_for_each(|record| record.check(dir))
     }
 
-    /// Refuses what could not be read back, and names that lead out of the cache.
+    /// Refuses values that could not be read back, and names that lead out of the cache.
     pub(super) fn check(&self) -> Result<(), String> {
         if !is_file_stem(&self.shot) {
             return Err(format!("shot name `{}` is no file name", self.shot));
@@ -288,7 +294,7 @@ impl Manifest {
         Ok(())
     }
 
-    /// Refuses to go on with a cache that this run would not have written.
+    /// Refuses to resume a cache that this run would not have written.
     pub(super) fn expect(&self, dir: &Path, given: &Self) -> Result<(), CacheError> {
         if self.format_version != given.format_version {
             return Err(CacheError::OldFormat {
@@ -304,7 +310,7 @@ impl Manifest {
                 .map_err(|error| CacheError::Unfit(format!("manifest: {error}")))
         };
         let (cached, given_fields) = (fields(self)?, fields(given)?);
-        // Without a parent this run asks for none: what stands there is all that it needs.
+        // A run without a parent makes no demand: the existing frames are all it needs.
         if given.parent.is_some() && given.parent != self.parent {
             let name = |parent: &Option<Parent>| match parent {
                 None => "the start of its scene".to_owned(),

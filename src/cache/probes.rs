@@ -1,33 +1,34 @@
-//! What probes measure, as a cache keeps it: named columns, a row of values a frame.
+//! Probe measurements as a cache stores them: named columns, a row of values per frame.
 
 use serde::{Deserialize, Serialize};
 
 use super::record::is_file_stem;
 use swell_domain::probe::Rate;
 
-/// A probe, as the manifest has it.
+/// A probe, as recorded in the manifest.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ProbeRecord {
-    /// Name of its file, without the ending.
+    /// Name of its file, without the extension.
     pub name: String,
-    /// As scenes name it: `elevation`, `pressure`, `energy`, …
+    /// Kind as scenes name it: `elevation`, `pressure`, `energy`, …
     pub kind: String,
-    /// World coordinates that it looks at, metres.
+    /// World coordinates of the measurement, metres.
     pub at: Vec<f64>,
-    /// `-x` to `+z`: which way is ahead, or positive; only of kinds that have one.
+    /// `-x` to `+z`: the direction that counts as ahead or positive; only for kinds that have one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub axis: Option<String>,
-    /// Part of the water that lies behind; only of kinds that have one.
+    /// Fraction of the water that lies behind; only for kinds that have one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub quantile: Option<f64>,
-    /// A solid's number or a wall's name; only of forces.
+    /// Number of the solid or name of the wall; only for forces.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub solid: Option<String>,
-    /// How often it looks, where not at each frame's end.
+    /// How often the probe samples; absent if at the end of each frame.
     #[serde(default, skip_serializing_if = "is_by_frame")]
     pub rate_hz: Rate,
-    /// Seconds up to each look over which its file has the mean, the least and the greatest value as well.
+    /// Length in seconds of the window before each sample whose mean, minimum and maximum its file
+    /// has too.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub window: Option<f64>,
     /// Columns of a row, after frame and time; each name ends with its unit.
@@ -38,22 +39,25 @@ fn is_by_frame(rate: &Rate) -> bool {
     *rate == Rate::Frame
 }
 
-/// One look of a probe.
+/// One sample of a probe.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Look<'a> {
-    /// Seconds from the shot's start.
+    /// Time since the shot's start, seconds.
     pub time: f64,
-    /// By column; `None` where there is nothing to measure.
+    /// Value of each column; `None` where there is nothing to measure.
     pub values: &'a [Option<f64>],
 }
 
-/// One frame's values by probe; `None` where there is nothing to measure. Of a probe that looks at frames' ends a value a
-/// column. Of one with a rate of its own as many looks as there were, one after the other, each its time in seconds and then a
-/// value a column: so all that a frame saw stands in the frame's line, and goes with it where a bake is cut short.
+/// One frame's values by probe; `None` where there is nothing to measure.
+///
+/// A probe that samples at the end of each frame has one value per column. A probe with its own
+/// rate has all its samples one after another, each as its time in seconds followed by one value
+/// per column. All samples of a frame are thus in the frame's ledger line and are dropped with it
+/// when a bake is cut.
 pub type ProbeValues = Vec<Vec<Option<f64>>>;
 
 impl ProbeRecord {
-    /// The looks in one frame's values, where the frame ended at `time`.
+    /// The samples in one frame's values; the frame ended at `time`, seconds.
     pub fn looks<'a>(
         &self,
         values: &'a [Option<f64>],
@@ -86,8 +90,8 @@ impl ProbeRecord {
         }
     }
 
-    /// Columns of its file, after frame and time: of a window `elevation_mean_m`, `elevation_min_m` and
-    /// `elevation_max_m` behind `elevation_m`, and so of each.
+    /// Columns of the probe's file after frame and time. With a window, `elevation_m` is followed
+    /// by `elevation_mean_m`, `elevation_min_m` and `elevation_max_m`, and so on for each column.
     pub(super) fn file_columns(&self) -> Vec<String> {
         let of = |column: &String| {
             let mut all = vec![column.clone()];
@@ -100,7 +104,7 @@ impl ProbeRecord {
         self.columns.iter().flat_map(of).collect()
     }
 
-    /// No name may lead out of the folder, and none may meet another on any file system.
+    /// Refuses names that lead out of the folder or that collide on a case-insensitive file system.
     pub(super) fn check_all(records: &[Self]) -> Result<(), String> {
         for (k, record) in records.iter().enumerate() {
             if !is_file_stem(&record.name) {

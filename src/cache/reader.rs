@@ -1,4 +1,4 @@
-//! Reading a cache. Nothing is handed out whose checksum is off, and nothing is ever written.
+//! Reading a cache. Returns no data whose checksum is wrong, and never writes.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -18,8 +18,9 @@ use super::vdb::{self, Grids};
 use swell_domain::keep::Compression;
 use swell_domain::particles::Particles;
 
-/// An open cache: its manifest, its ledger, its scene and the scene's files, all checked; the frames are checked as they
-/// are read. A bake may go on meanwhile: a line that is just being written is not seen.
+/// An open cache with its manifest, ledger, scene and the scene's files, all checked. Frames are
+/// checked when they are read. A bake may be running meanwhile: a line that is being written is not
+/// seen.
 #[derive(Debug)]
 pub struct CacheReader {
     dir: PathBuf,
@@ -33,30 +34,27 @@ pub struct CacheReader {
 pub struct Problem {
     /// The file.
     pub file: PathBuf,
-    /// The fault.
+    /// The fault, in words.
     pub what: String,
 }
 
 /// Result of checking every checksum.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct VerifyReport {
-    /// Baked frames in the ledger; the start is not counted.
+    /// Number of baked frames in the ledger, not counting the start.
     pub frames: u32,
-    /// Length of the frames' files, the start's too, as the ledger has it.
+    /// Total length of the frames' files including the start's, as recorded in the ledger.
     pub bytes: u64,
-    /// Frames with particles, the start among them; empty where all have them.
+    /// Frames with particles, including the start; empty if all frames have them.
     pub kept: Vec<u32>,
-    /// Whether the cache has `failed/`, and all of it is sound.
+    /// Whether the cache has a `failed/` folder that is intact.
     pub failed: bool,
-    /// Faults in the order of the files; empty for a sound cache.
+    /// Faults in the order of the files; empty for an intact cache.
     pub problems: Vec<Problem>,
 }
 
 impl VerifyReport {
-    /// The report, or its first problem as an error.
-    ///
-    /// # Errors
-    /// [`CacheError::Damaged`].
+    /// Turns the first problem into an error.
     pub fn into_result(self) -> Result<Self, CacheError> {
         match self.problems.first() {
             None => Ok(self),
@@ -65,10 +63,11 @@ impl VerifyReport {
     }
 }
 
-/// Looks at every checksum of the cache in `dir`, also where the cache is too damaged to be opened.
+/// Checks every checksum of the cache in `dir`, even if the cache is too damaged to be opened.
 ///
 /// # Errors
-/// [`CacheError::NotACache`], [`CacheError::Format`], [`CacheError::Io`]; damage stands in the report.
+/// [`CacheError::NotACache`], [`CacheError::Format`], [`CacheError::Io`]; damage goes into the
+/// report.
 pub fn survey(dir: &Path) -> Result<VerifyReport, CacheError> {
     match CacheReader::open_without_assets(dir) {
         Ok(reader) => Ok(reader.survey()),
@@ -81,21 +80,22 @@ pub fn survey(dir: &Path) -> Result<VerifyReport, CacheError> {
 }
 
 impl CacheReader {
-    /// The ledger's file, from the cache's folder.
+    /// Path of the ledger, relative to the cache's folder.
     pub const LEDGER: &str = ledger::FILE;
 
     /// Opens the cache in `dir`.
     ///
     /// # Errors
-    /// [`CacheError::NotACache`], [`CacheError::Format`], [`CacheError::Damaged`] for the manifest, the
-    /// ledger, the scene or one of its files in `assets/`, [`CacheError::Io`].
+    /// [`CacheError::NotACache`], [`CacheError::Format`], [`CacheError::Io`];
+    /// [`CacheError::Damaged`] for the manifest, the ledger, the scene or one of its files in
+    /// `assets/`.
     pub fn open(dir: &Path) -> Result<Self, CacheError> {
         let reader = Self::open_without_assets(dir)?;
         reader.manifest.check_files(dir)?;
         Ok(reader)
     }
 
-    /// [`Self::open`] without looking at the assets.
+    /// [`Self::open`] without checking the assets.
     fn open_without_assets(dir: &Path) -> Result<Self, CacheError> {
         let (manifest, seed) = Manifest::read(dir)?;
         let ledger = Ledger::read(dir, &manifest, &seed)?;
@@ -120,16 +120,16 @@ impl CacheReader {
         &self.manifest
     }
 
-    /// The scene as baked, every default written out.
+    /// The scene as baked, with every default written out.
     pub fn scene_toml(&self) -> &str {
         &self.scene_toml
     }
 
-    /// Bytes of an asset that was given to [`CacheWriter::create`](super::CacheWriter::create) under
+    /// Content of the asset that [`CacheWriter::create`](super::CacheWriter::create) received as
     /// `name`.
     ///
     /// # Errors
-    /// [`CacheError::Damaged`], also where the cache has no such asset; [`CacheError::Io`].
+    /// [`CacheError::Damaged`], also if the cache has no such asset; [`CacheError::Io`].
     pub fn asset(&self, name: &str) -> Result<Vec<u8>, CacheError> {
         let file = format!("{}/{name}", manifest::ASSETS);
         let record = self.manifest.files.iter().find(|r| r.file == file);
@@ -140,26 +140,23 @@ impl CacheReader {
             .read(&self.dir)
     }
 
-    /// The ledger: one entry a frame without gaps, the start first; never empty.
+    /// The ledger: one entry per frame without gaps, the start first; never empty.
     pub fn entries(&self) -> &[Entry] {
         &self.ledger.entries
     }
 
-    /// The start: 0, or the frame of another cache that the bake began from.
+    /// Number of the start: 0, or the frame of another cache that the bake began from.
     pub fn first_frame(&self) -> u32 {
         self.manifest.first_frame()
     }
 
-    /// Last frame in the ledger.
+    /// Number of the last frame in the ledger.
     pub fn last_frame(&self) -> u32 {
         let last = self.ledger.entries.last();
         last.map_or(self.first_frame(), |entry| entry.frame)
     }
 
-    /// A frame's line.
-    ///
-    /// # Errors
-    /// [`CacheError::NoFrame`].
+    /// The ledger entry of a frame.
     pub fn entry(&self, frame: u32) -> Result<&Entry, CacheError> {
         let index = frame.checked_sub(self.first_frame());
         index
@@ -172,15 +169,12 @@ impl CacheReader {
             })
     }
 
-    /// Whether the frame is there, and its particles were kept.
+    /// Whether the ledger has the frame and its particles are kept.
     pub fn has_particles(&self, frame: u32) -> bool {
         self.entry(frame).is_ok() && self.manifest.has_particles(frame, self.last_frame())
     }
 
-    /// The line of a frame whose particles were kept.
-    ///
-    /// # Errors
-    /// [`CacheError::NoFrame`], [`CacheError::NotKept`].
+    /// The ledger entry of a frame whose particles are kept.
     pub fn kept(&self, frame: u32) -> Result<&Entry, CacheError> {
         let entry = self.entry(frame)?;
         let has = |frame: &u32| self.has_particles(*frame);
@@ -196,10 +190,7 @@ impl CacheReader {
         }
     }
 
-    /// A frame's particles, once its length and its checksum are found right.
-    ///
-    /// # Errors
-    /// Those of [`Self::kept`]; [`CacheError::Damaged`] (also for a missing file), [`CacheError::Io`].
+    /// Reads a frame's particles after checking length and checksum.
     pub fn read(&self, frame: u32) -> Result<Particles, CacheError> {
         let found = read_frame(&self.dir, &self.manifest, self.kept(frame)?);
         match found {
@@ -211,18 +202,16 @@ impl CacheReader {
         }
     }
 
-    /// The cache as it stands now, where this frame was its newest and a bake that goes on has let go of its particles.
+    /// Reopens the cache if `frame` was its newest and a running bake has since removed its
+    /// particles.
     fn gone_on(&self, frame: u32) -> Option<Self> {
         let was_newest = frame == self.last_frame() && !self.manifest.keeps(frame);
         let now = was_newest.then(|| Self::open(&self.dir).ok()).flatten()?;
         (now.last_frame() > frame).then_some(now)
     }
 
-    /// The grids in a frame's file, computed anew from its particles; `None` where the frame has none, or where its file
-    /// is not what this program makes of the particles.
-    ///
-    /// # Errors
-    /// [`CacheError::Io`].
+    /// Recomputes the grids in a frame's file from its particles; `None` if the frame has none, or
+    /// if its file is not what this program makes of the particles.
     pub fn grids(&self, entry: &Entry, particles: &Particles) -> Result<Option<Grids>, CacheError> {
         let manifest = &self.manifest;
         let (Some(asked), Some(record)) = (&manifest.grids, entry.file(stream::GRIDS)) else {
@@ -237,20 +226,21 @@ impl CacheReader {
         Ok((hash.to_hex().as_str() == record.blake3).then_some(grids))
     }
 
-    /// BLAKE3 of the file of a frame's particles, hex.
+    /// BLAKE3 of the file with a frame's particles, hex.
     ///
     /// # Errors
-    /// [`CacheError::NoFrame`].
+    /// [`CacheError::NoFrame`]; [`CacheError::Damaged`] if the entry names no particles.
     pub fn frame_hash(&self, frame: u32) -> Result<&str, CacheError> {
         let record = particles_record(&self.dir, self.entry(frame)?)?;
         Ok(&record.blake3)
     }
 
-    /// Looks at what stands beside the particles: at the other files of these frames, and at all files of streams with a
-    /// row a frame, which have to be what the ledger says.
+    /// Checks the files other than the particles: the other files of these frames, and all tables,
+    /// which must match the ledger.
     ///
     /// # Errors
-    /// [`CacheError::NoFrame`]; [`CacheError::Damaged`] for the first file that is off or cannot be read.
+    /// [`CacheError::NoFrame`]; [`CacheError::Damaged`] for the first file that differs or cannot
+    /// be read.
     pub fn check_beside(&self, frames: &[u32]) -> Result<(), CacheError> {
         let entries = frames.iter().map(|&frame| self.entry(frame));
         let entries: Vec<&Entry> = entries.collect::<Result<_, CacheError>>()?;
@@ -262,7 +252,7 @@ impl CacheReader {
         let first = problems.into_iter().next();
         let first = first.or_else(|| {
             let found = self.table_problems(self.entries()).next()?;
-            // A bake that goes on has written rows since this cache was opened.
+            // A running bake may have written rows since this cache was opened.
             match Self::open(&self.dir) {
                 Ok(now) if now.entries().len() > self.entries().len() => {
                     self.table_problems(now.entries()).next()
@@ -275,17 +265,14 @@ impl CacheReader {
         })
     }
 
-    /// Tables that are not what these lines of the ledger say.
+    /// Tables that do not match these lines of the ledger.
     fn table_problems<'a>(&'a self, entries: &'a [Entry]) -> impl Iterator<Item = Problem> + 'a {
         let problems = tables::problems(&self.dir, &self.manifest, entries);
         problems.map(|(file, what)| Problem { file, what })
     }
 
-    /// Seconds that the bake of each frame took, where they are known: `timings.jsonl` is in no
-    /// checksum, and lines that are not whole are passed over.
-    ///
-    /// # Errors
-    /// [`CacheError::Io`].
+    /// Wall-clock seconds that each frame took to bake, where known. No checksum covers
+    /// `timings.jsonl`; incomplete lines are skipped.
     pub fn seconds(&self) -> Result<BTreeMap<u32, f64>, CacheError> {
         let path = self.dir.join(disk::TIMINGS);
         let text = match std::fs::read_to_string(&path) {
@@ -300,9 +287,9 @@ impl CacheReader {
         Ok(text.lines().filter_map(seconds).collect())
     }
 
-    /// Looks at every checksum: scene, assets, each frame's files; at tables, which have to be what the ledger says; and
-    /// at `failed/`, where a bake broke off. The manifest and the ledger's chain were checked when the cache was opened.
-    /// A file that cannot be read stands in the report as well.
+    /// Checks every checksum: scene, assets and each frame's files; the tables, which must match
+    /// the ledger; and `failed/`, if a bake failed. The manifest and the ledger's chain were
+    /// checked on opening. A file that cannot be read is reported as a problem too.
     pub fn survey(&self) -> VerifyReport {
         let entries = self.entries();
         let mut problems: Vec<Problem> = self
@@ -353,10 +340,7 @@ impl CacheReader {
         }
     }
 
-    /// Every checksum: the report of a sound cache, or the first bad file.
-    ///
-    /// # Errors
-    /// [`CacheError::Damaged`].
+    /// Checks every checksum: the report of an intact cache, or the first problem as an error.
     pub fn verify(&self) -> Result<VerifyReport, CacheError> {
         self.survey().into_result()
     }
@@ -368,7 +352,7 @@ impl CacheReader {
 }
 
 impl Problem {
-    /// Builds the fault of a file from an error; `file` where the error names none.
+    /// Builds the problem from an error; `file` is used if the error names no file.
     fn of(error: CacheError, file: &Path) -> Self {
         let (file, what) = match error {
             CacheError::Damaged { file, what } => (file, what),
@@ -379,7 +363,7 @@ impl Problem {
     }
 }
 
-/// The record of a frame's particles, which no line is read without.
+/// The record of a frame's particles, which every entry has: the ledger's reader checks it.
 fn particles_record<'a>(dir: &Path, entry: &'a Entry) -> Result<&'a FileRecord, CacheError> {
     let no_particles = || {
         let what = format!("frame {} has no particles", entry.frame);
@@ -388,7 +372,7 @@ fn particles_record<'a>(dir: &Path, entry: &'a Entry) -> Result<&'a FileRecord, 
     entry.file(stream::PARTICLES).ok_or_else(no_particles)
 }
 
-/// Reads and checks the frame of a ledger line.
+/// Reads and checks the frame of a ledger entry.
 pub(super) fn read_frame(
     dir: &Path,
     manifest: &Manifest,

@@ -1,4 +1,4 @@
-//! The record of a file in a cache: its path, its length, its checksum. No path of a cache leads out of it.
+//! The record of a file in a cache: path, length, checksum. No path may lead out of the cache.
 
 use std::path::{Component, Path};
 
@@ -8,15 +8,15 @@ use super::disk;
 use super::error::CacheError;
 use super::frame::Written;
 
-/// A file that stands in a cache.
+/// A file in a cache.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FileRecord {
-    /// Path from the cache's folder, with `/`.
+    /// Path relative to the cache's folder, with `/`.
     pub file: String,
-    /// Length.
+    /// Length in bytes.
     pub bytes: u64,
-    /// BLAKE3, hex.
+    /// BLAKE3 of the content, hex.
     pub blake3: String,
 }
 
@@ -39,7 +39,7 @@ impl FileRecord {
         }
     }
 
-    /// Refuses the file where it is not the one recorded, without taking it into memory.
+    /// Checks the file's length and hash without loading it into memory.
     pub(super) fn check(&self, dir: &Path) -> Result<(), CacheError> {
         let path = dir.join(&self.file);
         disk::check_length_on_disk(&path, self.bytes)?;
@@ -49,7 +49,7 @@ impl FileRecord {
         Ok(())
     }
 
-    /// Reads the file and refuses it where it is not the one recorded.
+    /// Reads the file and checks its length and hash.
     pub(super) fn read(&self, dir: &Path) -> Result<Vec<u8>, CacheError> {
         let path = dir.join(&self.file);
         let content = disk::read_exactly(&path, self.bytes)?;
@@ -69,7 +69,7 @@ pub(super) fn is_file_stem(name: &str) -> bool {
             .all(|b| b.is_ascii_alphanumeric() || b"._-".contains(&b))
 }
 
-/// A path of plain names, so that it stays below the folder that it is joined to.
+/// Whether a path consists of plain names, so that it stays below the folder that it is joined to.
 pub(super) fn is_relative(path: &str) -> bool {
     !path.contains('\\')
         && path.split('/').all(|part| !part.is_empty())

@@ -1,4 +1,5 @@
-//! The writing end of a cache, on a thread of its own: a frame's files, then its line in the ledger, then its rows.
+//! The writing end of a cache, on its own thread: a frame's files, then its ledger line, then its
+//! rows.
 
 use std::fs::File;
 use std::io::Write;
@@ -28,24 +29,24 @@ pub struct Summary {
     pub frames: u32,
     /// Last frame in the ledger.
     pub last_frame: u32,
-    /// Length of the frames and grids that this writer wrote.
+    /// Bytes of the frames and grids that this writer wrote.
     pub bytes: u64,
-    /// Time that the writer's thread was at work.
+    /// Time that the writer's thread was busy.
     pub writing: Duration,
-    /// Time that the solver stood still because the disk was behind.
+    /// Time that the solver waited because the disk was behind.
     pub waiting: Duration,
 }
 
-/// The writing end, on its thread.
+/// The state of the writer's thread.
 pub(super) struct Sink {
     pub(super) dir: PathBuf,
     pub(super) manifest: Manifest,
-    /// The manifest's hash.
+    /// Hash of the manifest, which the first line is chained to.
     pub(super) seed: Hash,
     /// Chained hash of the last line.
     pub(super) chain: Hash,
     pub(super) ledger_bytes: u64,
-    /// Of the tables' files.
+    /// Sliding windows of the tables, in their order.
     pub(super) windows: Vec<Window>,
 }
 
@@ -80,7 +81,7 @@ impl Sink {
         Ok(summary)
     }
 
-    /// Writes a frame's files, then its line, then its rows; gives the length of the files.
+    /// Writes a frame's files, then its line, then its rows. Returns the total length of the files.
     pub(super) fn write(
         &mut self,
         clock: Clock,
@@ -124,7 +125,8 @@ impl Sink {
         Ok(files.values().map(|record| record.bytes).sum())
     }
 
-    /// Removes the particles of the frame before `newest` where they do not stay: a bake now goes on from `newest`.
+    /// Removes the particles of the frame before `newest` unless they are kept: a bake now resumes
+    /// from `newest`.
     fn let_go_before(&self, newest: u32) -> Result<(), CacheError> {
         let manifest = &self.manifest;
         match newest.checked_sub(1) {
@@ -167,7 +169,7 @@ pub(super) fn check_rows(manifest: &Manifest, rows: &Rows) -> Result<(), CacheEr
     ledger::rows_misfit(manifest, rows).map_or(Ok(()), |what| Err(CacheError::Unfit(what)))
 }
 
-/// Rows of the probes, as the ledger takes them.
+/// Rows of the probes, as the ledger stores them.
 pub(super) fn rows_of(probes: ProbeValues) -> Rows {
     let rows = (stream::PROBES.to_owned(), probes);
     Rows::from_iter((!rows.1.is_empty()).then_some(rows))

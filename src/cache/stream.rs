@@ -1,5 +1,5 @@
-//! The streams of a cache: what it keeps of every frame. Writer, reader, verification, resume and comparison know a
-//! stream by its line in [`STREAMS`].
+//! The streams of a cache: what it keeps of every frame. Writer, reader, verification, resume and
+//! comparison are all driven by the table [`STREAMS`].
 
 use std::io::{self, Write};
 
@@ -11,17 +11,17 @@ use super::vdb;
 use swell_domain::keep::Compression;
 use swell_domain::particles::Particles;
 
-/// Name of the stream that every cache has: a frame's particles, from which a bake goes on.
+/// Name of the stream that every cache has: a frame's particles, from which a bake resumes.
 pub const PARTICLES: &str = "particles";
 /// Name of the stream of level sets and velocity grids.
 pub const GRIDS: &str = "grids";
-/// Name of the stream of what probes measure.
+/// Name of the stream of probe measurements.
 pub const PROBES: &str = "probes";
 
-/// The line of the particles.
+/// The particle stream.
 pub(super) static OF_PARTICLES: &Stream = &STREAMS[0];
 
-/// The particles first: the other files of a frame follow from them.
+/// All streams, the particles first: the other files of a frame follow from them.
 pub static STREAMS: [Stream; 3] = [
     Stream {
         name: PARTICLES,
@@ -57,28 +57,28 @@ pub static STREAMS: [Stream; 3] = [
 pub struct Stream {
     /// Name in the ledger and in reported differences.
     pub name: &'static str,
-    /// Folder of its files, in the cache's.
+    /// Folder of its files, relative to the cache's folder.
     pub folder: &'static str,
-    /// Ending of its files, without the dot.
+    /// Extension of its files, without the dot.
     pub extension: &'static str,
     /// Kind of its content.
     pub content: Content,
     /// How its files grow with the bake.
     pub(super) layout: Layout,
-    /// Word before a part's name in reported differences.
+    /// Noun that precedes a part's name in reported differences.
     pub part: &'static str,
-    /// Names of the parts that a bake with this manifest has of it; nothing where the bake has no such stream.
+    /// Names of its parts in a bake with this manifest; empty if the bake does not have the stream.
     parts: fn(&Manifest) -> Vec<&str>,
 }
 
-/// Kind of a stream's content, which decides how two of them are compared.
+/// Kind of a stream's content, which decides how two streams are compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Content {
-    /// Particles, compared field by field and matched by their ids.
+    /// Particles, compared field by field and matched by id.
     Particles,
     /// Sparse grids, compared voxel by voxel.
     SparseGrids,
-    /// Named columns, a row a frame, compared column by column.
+    /// Named columns, one row per frame, compared column by column.
     Columns,
 }
 
@@ -88,10 +88,10 @@ type Encode = fn(&mut dyn Write, &Manifest, &Stamp<'_>, &Particles) -> io::Resul
 /// How the files of a stream grow with the bake.
 #[derive(Debug)]
 pub(super) enum Layout {
-    /// `FOLDER/SHOT.0001.EXTENSION`: whole on the disk before the ledger names it with its checksum.
+    /// `FOLDER/SHOT.0001.EXTENSION`: complete on disk before the ledger names it with its checksum.
     FileAFrame(Encode),
-    /// `FOLDER/TABLE.EXTENSION`, a file a table for the whole bake. The values stand in the ledger, each frame's in its
-    /// line, so that the files can be written anew from there.
+    /// `FOLDER/TABLE.EXTENSION`, one file per table for the whole bake. The values are in the
+    /// ledger lines of their frames, so that the files can be rewritten from there.
     RowAFrame(fn(&Manifest) -> &[ProbeRecord]),
 }
 
@@ -101,12 +101,12 @@ impl Stream {
         STREAMS.iter().filter(|stream| stream.is_in(manifest))
     }
 
-    /// Whether a bake with this manifest has it.
+    /// Whether a bake with this manifest has the stream.
     pub fn is_in(&self, manifest: &Manifest) -> bool {
         !(self.parts)(manifest).is_empty()
     }
 
-    /// Whether it has a file a frame, which the ledger names.
+    /// Whether the stream has one file per frame, named in the ledger.
     pub fn is_by_frame(&self) -> bool {
         matches!(self.layout, Layout::FileAFrame(_))
     }
@@ -122,8 +122,8 @@ impl Stream {
         lone.map(|name| format!("{} {name}", self.part)).collect()
     }
 
-    /// Path of a frame's file from the cache's folder, with `/`: `frames/wave-city.0001.ply`, `….ply.zst` where this
-    /// manifest has frames compressed.
+    /// Path of a frame's file relative to the cache's folder, with `/`:
+    /// `frames/wave-city.0001.ply`, or `….ply.zst` if the manifest asks for compression.
     pub fn frame_file(&self, manifest: &Manifest, frame: u32) -> String {
         let packed = match (self.content, manifest.compression) {
             (Content::Particles, Some(Compression::Zstd)) => ".zst",
@@ -133,12 +133,12 @@ impl Stream {
         format!("{folder}/{shot}.{frame:04}.{extension}{packed}")
     }
 
-    /// Path of a table's file from the cache's folder, with `/`: `probes/gauge.csv`.
+    /// Path of a table's file relative to the cache's folder, with `/`: `probes/gauge.csv`.
     pub fn table_file(&self, table: &str) -> String {
         format!("{}/{table}.{}", self.folder, self.extension)
     }
 
-    /// Tables of a bake with this manifest; none of a stream with a file a frame.
+    /// Tables of a bake with this manifest; empty for a stream with one file per frame.
     pub fn tables<'a>(&self, manifest: &'a Manifest) -> &'a [ProbeRecord] {
         match self.layout {
             Layout::FileAFrame(_) => &[],
@@ -190,7 +190,8 @@ mod tests {
         assert_eq!((names.len(), folders.len()), (STREAMS.len(), STREAMS.len()));
     }
 
-    /// `diff` compares one stream of particles, with the tolerance's fields and the aggregates; a second one needs a place of its own there.
+    /// `diff` compares one stream of particles, with the tolerance's fields and the aggregates; a
+    /// second one would need its own handling there.
     #[test]
     fn one_stream_is_compared_as_particles() {
         let particles = STREAMS.iter().filter(|s| s.content == Content::Particles);

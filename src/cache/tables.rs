@@ -1,7 +1,8 @@
-//! The files of streams whose values stand in the ledger, `probes/NAME.csv`: a row a look, and all that they hold follows from it.
+//! The files of streams whose values are in the ledger, `probes/NAME.csv`: one row per sample, all
+//! of it derived from the ledger.
 //!
-//! So a row is never on the disk before its frame is, a bake that goes on writes the files anew, and a file that says
-//! something else is damaged.
+//! A row is therefore never on disk before its frame, a resumed bake rewrites the files, and a file
+//! that differs from the ledger is damaged.
 
 use std::fs::File;
 use std::io::Write;
@@ -18,7 +19,7 @@ use super::window::Window;
 /// One file: a table of a stream.
 struct Table<'a> {
     stream: &'static Stream,
-    /// Among the stream's tables.
+    /// Index among the stream's tables.
     index: usize,
     record: &'a ProbeRecord,
 }
@@ -40,7 +41,7 @@ impl Table<'_> {
         dir.join(self.stream.table_file(&self.record.name))
     }
 
-    /// Text of the file after these frames, and what of them later rows look back on.
+    /// Content of the file after these frames, and the window that later rows look back on.
     fn text(&self, entries: &[Entry]) -> (String, Window) {
         let mut window = Window::default();
         let header = format!("frame,time_s,{}\n", self.record.file_columns().join(","));
@@ -50,7 +51,8 @@ impl Table<'_> {
         (header + &rows.collect::<String>(), window)
     }
 
-    /// A frame's rows, one a look. Numbers as the shortest decimals that read back as the same; nothing where there is none.
+    /// A frame's rows, one per sample. Numbers are the shortest decimals that parse back to the
+    /// same value; a missing value is an empty field.
     fn rows(&self, window: &mut Window, clock: Clock, rows: &Rows) -> String {
         let values = rows
             .get(self.stream.name)
@@ -74,7 +76,7 @@ impl Table<'_> {
         text
     }
 
-    /// Fault of the file, against the ledger.
+    /// How the file differs from the ledger.
     fn problem(&self, dir: &Path, entries: &[Entry]) -> Option<String> {
         let found = match std::fs::read(self.path(dir)) {
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
@@ -96,7 +98,7 @@ impl Table<'_> {
     }
 }
 
-/// Writes every file anew from the ledger; gives what rows to come look back on, by table.
+/// Rewrites every file from the ledger. Returns the windows that later rows look back on, by table.
 pub(super) fn write_all(
     dir: &Path,
     manifest: &Manifest,
@@ -110,7 +112,7 @@ pub(super) fn write_all(
     all(manifest).map(write).collect()
 }
 
-/// Adds a frame's rows to every file; `windows` are those of [`write_all`], carried on.
+/// Appends a frame's rows to every file; `windows` are those of [`write_all`], updated.
 pub(super) fn append(
     dir: &Path,
     manifest: &Manifest,
@@ -126,7 +128,7 @@ pub(super) fn append(
     })
 }
 
-/// Files that are not what these lines of the ledger say, and what is off in each.
+/// Files that do not match these lines of the ledger, and what is wrong with each.
 pub(super) fn problems(
     dir: &Path,
     manifest: &Manifest,

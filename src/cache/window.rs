@@ -1,30 +1,34 @@
-//! Mean, least and greatest value of a probe over the time up to each look.
+//! Mean, minimum and maximum of a probe over the time before each sample.
 //!
-//! They follow from the looks alone, which stand in the ledger, so that a bake that goes on writes the same.
+//! They follow from the samples alone, which are in the ledger, so that a resumed bake writes the
+//! same.
 
 use std::collections::VecDeque;
 
 use super::probes::Look;
 
-/// The looks that a window still holds.
+/// The samples that are still in the window.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Window {
-    /// From when, to when, and what was seen at the end of that.
+    /// Start and end of the interval that a sample covers, seconds, and its values by column.
     held: VecDeque<(f64, f64, Vec<Option<f64>>)>,
-    /// Time of the last look.
+    /// Time of the last sample, seconds.
     last: Option<f64>,
 }
 
 impl Window {
-    /// Takes a look; gives mean, least and greatest value by column over the last `length` seconds. A value holds since the
-    /// look before, of which the mean takes what lies in the window; least and greatest are those of looks in it. A column
-    /// without a value at that time counts for nothing, and where there is none there is no mean.
+    /// Adds a sample and returns mean, minimum and maximum by column over the last `length`
+    /// seconds.
+    ///
+    /// A value covers the interval since the sample before; the mean weights it by the part of the
+    /// interval inside the window. Minimum and maximum range over the samples in the window.
+    /// Missing values are ignored; without any value there is no mean.
     pub(super) fn take(&mut self, length: f64, look: Look<'_>) -> Vec<[Option<f64>; 3]> {
         let since = self.last.replace(look.time).unwrap_or(look.time);
         self.held
             .push_back((since, look.time, look.values.to_vec()));
         let begin = look.time - length;
-        // A look on the window's edge is out of it, and round-off must not let it in.
+        // A sample on the window's edge is outside, and round-off must not let it in.
         let edge = begin + 1e-9 * length;
         while self.held.front().is_some_and(|(_, end, _)| *end <= edge) {
             self.held.pop_front();
@@ -43,7 +47,7 @@ impl Window {
         let mean = if total > 0.0 {
             Some(seen().map(|(span, value)| span * value).sum::<f64>() / total)
         } else {
-            // The first look of all.
+            // No interval yet: the first sample.
             seen().map(|(_, value)| value).next_back()
         };
         let values = || seen().map(|(_, value)| value);
@@ -73,7 +77,8 @@ mod tests {
         looks.iter().map(take).collect()
     }
 
-    /// By hand, over 2 s at uneven times: each value holds since the look before.
+    /// Computed by hand, over 2 s at uneven times: each value covers the interval since the sample
+    /// before.
     #[test]
     fn a_value_holds_since_the_look_before() {
         let looks = [(0.0, 10.0), (1.0, 2.0), (1.5, 4.0), (3.0, 8.0), (5.0, 1.0)];
@@ -82,14 +87,15 @@ mod tests {
             [10.0, 10.0, 10.0],
             [2.0, 2.0, 10.0],
             [(2.0 + 0.5 * 4.0) / 1.5, 2.0, 10.0],
-            // From 1 s on, where the look of 1 s ends.
+            // The window begins at 1 s, which excludes the sample of 1 s.
             [(0.5 * 4.0 + 1.5 * 8.0) / 2.0, 4.0, 8.0],
             [1.0, 1.0, 1.0],
         ];
         assert_eq!(found, expected.map(|all| all.map(Some)));
     }
 
-    /// sin² at 1 kHz over its own period of 10 ms: half, from 0 to 1; over half the period it is not.
+    /// sin² at 100 Hz, sampled at 1 kHz over its period of 10 ms: mean 1/2, range 0 to 1. Over half
+    /// a period the mean differs.
     #[test]
     fn a_whole_period_has_its_mean() {
         let looks: Vec<_> = (0..100)

@@ -1,4 +1,4 @@
-//! Writing a cache, on a thread of its own beside the solver.
+//! Writing a cache on a thread beside the solver.
 
 use std::fs::File;
 use std::path::Path;
@@ -20,10 +20,10 @@ use super::sink::{Job, Sink, Summary, check, check_rows, rows_of};
 use super::tables;
 use swell_domain::particles::Particles;
 
-/// Frames that wait for the disk at most; with the one being written, three are in memory.
+/// Most frames that wait for the disk; with the one being written, three are in memory.
 const DEPTH: usize = 2;
 
-/// A file that the scene names, to be kept with the frames.
+/// A file that the scene names, stored in the cache.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Asset {
     /// Path below `assets/`, with `/`.
@@ -32,8 +32,8 @@ pub struct Asset {
     pub bytes: Vec<u8>,
 }
 
-/// Writes frames one after the other, beside its caller. Dropped without [`CacheWriter::finish`], it
-/// still writes what it was given, but no one hears of errors.
+/// Writes frames one after another on its own thread. Dropped without [`CacheWriter::finish`], it
+/// still writes what it was given, but errors are lost.
 #[derive(Debug)]
 pub struct CacheWriter {
     manifest: Manifest,
@@ -46,13 +46,17 @@ pub struct CacheWriter {
 }
 
 impl CacheWriter {
-    /// Starts a cache in `dir`, which must be absent, empty, or a creation of ours that was cut
-    /// short. `start` becomes the first frame: 0, or that of the manifest's parent, with `clock` as it stood there. Of it the
-    /// probes say `probes`: one list a probe of the manifest. `manifest.files` and `manifest.start_particles` are filled in.
+    /// Creates a cache in `dir`, which must be absent, empty, or an interrupted creation of our
+    /// own.
+    ///
+    /// `start` becomes the first frame: 0, or the parent's frame, with the parent's `clock`.
+    /// `probes` holds the start's measurements, one list per probe of the manifest.
+    /// `manifest.files` and `manifest.start_particles` are filled in.
     ///
     /// # Errors
     /// [`CacheError::Exists`] and [`CacheError::Occupied`], with the directory untouched;
-    /// [`CacheError::Locked`]; [`CacheError::Unfit`] before anything is written; [`CacheError::Io`].
+    /// [`CacheError::Locked`]; [`CacheError::Unfit`] before anything is written;
+    /// [`CacheError::Io`].
     pub fn create(
         dir: &Path,
         manifest: Manifest,
@@ -73,7 +77,7 @@ impl CacheWriter {
         folder::refuse_occupied(dir)?;
         disk::create_directory(dir)?;
         let lock = disk::lock(dir)?;
-        // Once more under the lock: another process may have begun in between.
+        // Checked again under the lock: another process may have started in between.
         folder::refuse_occupied(dir)?;
         folder::clear_unfinished(dir)?;
 
@@ -99,22 +103,26 @@ impl CacheWriter {
             windows,
         };
         sink.write(clock, start, &rows, &Value::Null)?;
-        // Last, because it is what makes the directory a cache.
+        // Last, because the manifest is what makes the directory a cache.
         disk::write_bytes(&dir.join(manifest::FILE), &manifest_bytes)?;
         Self::spawn(sink, manifest, clock.frame, lock)
     }
 
-    /// Goes on with the cache in `dir` after its last frame, which is handed back with its line. Where the particles of
-    /// that one do not stay and are gone, it goes on after the newest frame whose particles stay, and the lines behind it
-    /// are cut. What a crash left behind (half a line, temporary files, frames without a line) is cleared, once all
-    /// else is found sound.
+    /// Resumes the cache in `dir` after its last frame, which is returned with its ledger entry.
+    ///
+    /// If the particles of the last frame are gone and need not be kept, the bake resumes after the
+    /// newest frame that has particles, and the later lines are cut. What a crash left (half a
+    /// line, temporary files, frames without a line) is cleared once everything else has been
+    /// checked.
     ///
     /// # Errors
-    /// [`CacheError::NotACache`]; [`CacheError::Format`]; [`CacheError::OtherScene`] for the first
-    /// field of the manifest that differs from `given` (`files` and `start_particles` are not
-    /// compared); [`CacheError::Locked`]; [`CacheError::Damaged`], with the cache untouched, for the
-    /// manifest, scene, assets, ledger, the last frame, or an earlier frame that is missing or of another
-    /// length; [`CacheError::Io`].
+    /// - [`CacheError::NotACache`], [`CacheError::Format`], [`CacheError::OldFormat`],
+    ///   [`CacheError::Locked`], [`CacheError::Io`].
+    /// - [`CacheError::OtherParent`], [`CacheError::OtherProbes`], and [`CacheError::OtherScene`]
+    ///   for the first field of the manifest that differs from `given` (`files` and
+    ///   `start_particles` are not compared).
+    /// - [`CacheError::Damaged`], with the cache untouched, for the manifest, scene, assets,
+    ///   ledger, the last frame, or an earlier frame that is missing or of another length.
     pub fn resume(dir: &Path, given: &Manifest) -> Result<(Self, Entry, Particles), CacheError> {
         let (manifest, seed) = Manifest::read(dir)?;
         manifest.expect(dir, given)?;
@@ -150,7 +158,7 @@ impl CacheWriter {
                 .and_then(|()| file.sync_all())
                 .at(&path)?;
         }
-        // A folder of tables may be missing: all that it holds is written anew.
+        // A folder of tables may be missing: all its content is rewritten.
         folder::make_streams(dir, &manifest)?;
         folder::clear_leftovers(dir, &manifest, last.frame)?;
         entries.push(last.clone());
@@ -189,17 +197,19 @@ impl CacheWriter {
         })
     }
 
-    /// The manifest as it stands on disk.
+    /// The manifest as stored on disk.
     pub fn manifest(&self) -> &Manifest {
         &self.manifest
     }
 
-    /// Hands over the frame that follows the last one. Waits only where the disk is more than two
-    /// frames behind. `probes` has one list a probe of the manifest. `report` goes into the ledger and must be the same in every bake of the scene;
-    /// `timings` goes beside it, or nowhere where it is null.
+    /// Queues the next frame for writing. Blocks only if the disk is more than two frames behind.
+    ///
+    /// `probes` holds one list per probe of the manifest. `report` goes into the ledger and must be
+    /// the same in every bake of the scene; `timings` goes to a separate file, or nowhere if it is
+    /// null.
     ///
     /// # Errors
-    /// [`CacheError::Unfit`] for a frame out of turn; the error of an earlier frame, once;
+    /// [`CacheError::Unfit`] for a frame out of order; the error of an earlier frame, once;
     /// [`CacheError::Stopped`] after that.
     pub fn submit(
         &mut self,
@@ -228,7 +238,7 @@ impl CacheWriter {
         });
         self.waiting += begin.elapsed();
         if sent.is_err() {
-            // The thread hangs up at an error alone.
+            // The thread hangs up only on an error.
             return self.stop().and(Err(CacheError::Stopped));
         }
         self.next_frame += 1;
@@ -238,8 +248,8 @@ impl CacheWriter {
     /// Waits until all frames are on the disk and in the ledger.
     ///
     /// # Errors
-    /// The error of an earlier frame; [`CacheError::Stopped`] where [`CacheWriter::submit`] gave it
-    /// already.
+    /// The error of an earlier frame; [`CacheError::Stopped`] if [`CacheWriter::submit`] has
+    /// already returned it.
     pub fn finish(mut self) -> Result<Summary, CacheError> {
         let waiting = self.waiting;
         self.stop().map(|summary| Summary { waiting, ..summary })
@@ -259,13 +269,13 @@ impl Drop for CacheWriter {
     fn drop(&mut self) {
         self.sender = None;
         if let Some(thread) = self.thread.take() {
-            // A drop cannot report; `finish` does.
+            // A drop cannot report an error; `finish` does.
             let _ = thread.join();
         }
     }
 }
 
-/// The manifest with what only the writer knows, all of it checked.
+/// The manifest with the fields that only the writer knows, fully checked.
 fn completed(
     mut manifest: Manifest,
     scene_toml: &str,

@@ -1,9 +1,12 @@
-//! A compressed frame, `.ply.zst`: one Zstandard stream (RFC 8878) of the PLY header of [`super`], with one comment more,
-//! and then, in place of rows, blocks of byte planes: byte 0 of the rows of a block one after the other, then byte 1, and so on. In place
-//! of positions stand `differences`.
+//! A compressed frame, `.ply.zst`: one Zstandard stream (RFC 8878).
 //!
-//! Nothing is lost. Neighbours by id are neighbours in space for long, so their high bytes repeat, and in planes of their own they are
-//! found: what remains are the low bytes of the mantissas, which nothing shrinks.
+//! It holds the PLY header of [`super`] with one more comment, followed by blocks of byte planes in
+//! place of rows: byte 0 of all rows of a block, then byte 1, and so on. Positions are replaced by
+//! their `differences`.
+//!
+//! The compression is lossless. Particles with neighbouring ids stay neighbours in space for a long
+//! time, so their high bytes repeat, and separate planes let Zstandard find that. What remains are
+//! the low bytes of the mantissas, which nothing compresses.
 
 mod differences;
 
@@ -17,22 +20,23 @@ use super::{
 use crate::error::CacheError;
 use swell_domain::particles::Particles;
 
-/// Rows of a block, the last one's fewer: a plane is then one block of Zstandard, which are of 128 KiB at most.
+/// Rows of a block (the last block may have fewer). A plane then fills exactly one Zstandard block,
+/// whose limit is 128 KiB.
 const ROWS: usize = 1 << 17;
-/// Zstandard's own default.
+/// Zstandard's default compression level.
 const LEVEL: i32 = 3;
 
-/// What planes are of.
+/// Encoding of the rows before they are split into planes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Content {
-    /// The rows as they are, as this program wrote them until 2026-11-25.
+    /// Raw rows, as older versions of swell wrote them.
     Values,
-    /// [`differences::take`] of each block.
+    /// [`differences::take`] applied to each block.
     Differences,
 }
 
 impl Content {
-    /// The comment that tells that planes follow.
+    /// The header comment that announces the planes.
     fn comment(self) -> String {
         match self {
             Self::Values => format!("planes {ROWS}"),
@@ -40,17 +44,17 @@ impl Content {
         }
     }
 
-    /// What these comments tell.
+    /// The encoding that these comments announce.
     pub(super) fn told(comments: &[String]) -> Option<Self> {
         let all = [Self::Values, Self::Differences];
         all.into_iter().find(|it| comments.contains(&it.comment()))
     }
 }
 
-/// Writes one frame.
+/// Writes one frame. The particles must pass [`super::check`].
 ///
 /// # Errors
-/// Those of `out`. The particles must pass [`super::check`].
+/// Those of `out`.
 pub fn encode(
     out: &mut impl Write,
     stamp: &Stamp<'_>,
@@ -85,7 +89,7 @@ fn encode_as(
         turn(&rows, row_size, &mut planes);
         for plane in planes.chunks_exact(end - first) {
             stream.write_all(plane)?;
-            // A block of Zstandard ends here: the next plane has statistics of its own.
+            // Ends a Zstandard block, so that the next plane has its own statistics.
             stream.flush()?;
         }
     }
@@ -93,19 +97,16 @@ fn encode_as(
     Ok(counted.written())
 }
 
-/// Reads one frame. Of a stream that promises more than it has nothing is allocated but what it has.
-///
-/// # Errors
-/// [`CacheError::Damaged`] with `file` as its name.
+/// Reads one frame. Memory grows only with the data found, not with what the header promises.
 pub fn decode(bytes: &[u8], file: &Path) -> Result<Particles, CacheError> {
     parse(bytes).map_err(|what| CacheError::damaged(file, what))
 }
 
-/// The comments of a frame's header, in their order; as far as the stream can be read.
+/// The comments in a frame's header, in order, as far as the stream can be read.
 pub fn comments(bytes: &[u8]) -> Vec<String> {
     let mut head = Vec::new();
     if let Ok(stream) = zstd::Decoder::with_buffer(bytes) {
-        // A torn stream gives what comes before the tear.
+        // A truncated stream gives what comes before the cut.
         let _ = stream.take(HEADER_LIMIT as u64).read_to_end(&mut head);
     }
     super::comments(&head)
@@ -120,10 +121,10 @@ fn parse(mut bytes: &[u8]) -> Result<Particles, String> {
     }
 }
 
-/// Reads the content of a stream, header and planes.
+/// Reads the content of a decompressed stream, header and planes.
 ///
 /// # Errors
-/// In words, where it is not what [`encode`] compresses.
+/// A message if it is not what [`encode`] compresses.
 pub fn read(mut content: impl io::Read) -> Result<Particles, String> {
     let mut begin = Vec::new();
     let limit = HEADER_LIMIT as u64;
@@ -171,7 +172,7 @@ fn read_blocks(
     Ok(unpacked.finish(head.names))
 }
 
-/// Turns a table of bytes, `width` a row, into that of its columns.
+/// Transposes a table of bytes with `width` bytes a row.
 fn turn(table: &[u8], width: usize, turned: &mut Vec<u8>) {
     let height = table.len() / width;
     turned.resize(table.len(), 0);

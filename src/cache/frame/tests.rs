@@ -70,7 +70,7 @@ fn replaced(particles: &Particles, from: &str, to: &str) -> Vec<u8> {
     [&bytes[..at], to.as_bytes(), &bytes[at + from.len()..]].concat()
 }
 
-/// ply-rs-bw's own way to write a row: by name, property by property.
+/// A row as ply-rs-bw itself writes it: by name, property by property.
 struct Row([f32; 6], u32, BTreeMap<String, f32>);
 
 impl PropertyAccess for Row {
@@ -116,7 +116,7 @@ fn packed_rows_are_the_librarys_own_bytes() {
             .unwrap();
         let bytes = encoded(&particles);
         assert!(bytes == expected, "{n} particles");
-        // Negative control: one particle moved by the last bit.
+        // Negative control: flip the last bit of one particle's position.
         if n > 0 {
             let mut moved = particles.clone();
             let x = &mut moved.position[n as usize / 2][1];
@@ -165,7 +165,7 @@ fn far_from_the_origin_positions_are_the_worlds_in_64_bits() {
         origin: DVec3::new(9_992.0, 0.0, -131_072.5),
         ..STAMP
     };
-    // As a scene's own coordinates are: in [q, 4 q], here with q = 8.
+    // Like a scene's own coordinates: in [q, 4 q], here with q = 8.
     let mut particles = water(1000, &["age"]);
     for (k, p) in particles.position.iter_mut().enumerate() {
         let step = (k as u32).wrapping_mul(2_654_435_761);
@@ -183,14 +183,14 @@ fn far_from_the_origin_positions_are_the_worlds_in_64_bits() {
     assert_eq!(row["x"], Property::Double(9_992.0 + x));
     assert_eq!(row["z"], Property::Double(z - 131_072.5));
     assert_eq!(row["age"], Property::Float(particles.attributes["age"][4]));
-    // Negative control: in 32 bits the world's positions would not come back.
+    // Negative control: in 32 bits the world positions would not survive the round trip.
     let narrow = |p: &[f32; 3]| ((9_992.0 + f64::from(p[0])) as f32 - 9_992.0).to_bits();
     let lost = particles
         .position
         .iter()
         .filter(|p| narrow(p) != p[0].to_bits());
     assert!(lost.count() > 900);
-    // A comment that is not ours, or says another width than the rows have.
+    // A comment that is not ours, or that contradicts the width of the rows.
     let text = "comment origin 9992.0 0.0 -131072.5\n";
     let at = bytes
         .windows(text.len())
@@ -349,7 +349,7 @@ fn packed_rows_against_per_property() {
         encode(&mut out, &STAMP, &particles).unwrap();
         out.len()
     });
-    // As much work: rows from the state, bytes, hash.
+    // The same amount of work: build rows from the state, write bytes, hash.
     let library = best(&mut || {
         out.clear();
         ply_rs_bw::writer::Writer::new()

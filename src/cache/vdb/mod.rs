@@ -1,9 +1,8 @@
-//! A grid file: OpenVDB's own format, written sparsely, its buffers zipped and without their
-//! inactive values.
+//! A grid file in OpenVDB's format: sparse, buffers zipped, inactive values omitted.
 //!
-//! OpenVDB has no specification beside its source; what is written here follows `io/Archive.cc`,
-//! `io/GridDescriptor.cc`, `io/Compression.h`, `tree/*.h` of OpenVDB 10, format version 224. The
-//! library writes a random identifier into each file; ours is taken from the content, so that the
+//! OpenVDB has no specification besides its source. This writer follows `io/Archive.cc`,
+//! `io/GridDescriptor.cc`, `io/Compression.h` and `tree/*.h` of OpenVDB 10, format version 224. The
+//! library writes a random identifier into each file; ours is derived from the content, so that the
 //! same frame gives the same bytes.
 
 mod tree;
@@ -19,9 +18,9 @@ use value::Value;
 
 /// "VDB " and four zero bytes.
 const MAGIC: i64 = 0x5644_4220;
-/// The newest format version there is.
+/// The newest version of the file format.
 const FORMAT_VERSION: u32 = 224;
-/// The library whose files these are like.
+/// OpenVDB version that the files claim to be written by.
 const LIBRARY_VERSION: [u32; 2] = [10, 0];
 /// `COMPRESS_ZIP | COMPRESS_ACTIVE_MASK`, which every build of OpenVDB reads; Blosc is optional.
 const COMPRESSION: u32 = 0x1 | 0x2;
@@ -31,12 +30,12 @@ const COMPRESSION: u32 = 0x1 | 0x2;
 pub struct Grids {
     /// Level set `surface`, metres.
     pub surface: Option<SparseGrid<f32>>,
-    /// Staggered `vel`, m/s.
+    /// Staggered velocity grid `vel`, m/s.
     pub velocity: Option<SparseGrid<[f32; 3]>>,
 }
 
 impl Grids {
-    /// The grids moved by `way`, metres.
+    /// The grids translated by `way`, metres.
     #[must_use]
     pub fn moved(mut self, way: DVec3) -> Self {
         if let Some(grid) = &mut self.surface {
@@ -50,9 +49,6 @@ impl Grids {
 }
 
 /// Writes one file.
-///
-/// # Errors
-/// Those of `out`.
 pub fn encode(
     out: &mut impl Write,
     stamp: &Stamp<'_>,
@@ -86,7 +82,7 @@ pub fn encode(
     })
 }
 
-/// A hash of the values as a file of this precision keeps them, whatever wrote it and of which frame.
+/// Hash of the values at this precision, independent of frame, shot and program.
 pub fn content_hash(grids: &Grids, precision: Precision) -> io::Result<blake3::Hash> {
     let stamp = Stamp {
         program: "",
@@ -99,7 +95,7 @@ pub fn content_hash(grids: &Grids, precision: Precision) -> io::Result<blake3::H
     encode(&mut io::sink(), &stamp, grids, precision).map(|written| written.hash)
 }
 
-/// Bytes of [`header`].
+/// Length in bytes of what [`header`] returns.
 const HEADER: usize = 8 + 4 + 2 * 4 + 1 + 36;
 
 /// Bytes before the file's metadata.
@@ -109,14 +105,14 @@ fn header(body: &[u8]) -> Vec<u8> {
     for part in LIBRARY_VERSION {
         put_u32(&mut header, part);
     }
-    // Offsets follow: the file can be read grid by grid.
+    // A file with offsets can be read grid by grid.
     header.push(1);
     header.extend_from_slice(identifier(body).as_bytes());
     debug_assert_eq!(header.len(), HEADER);
     header
 }
 
-/// An RFC 9562 UUID of version 8, which leaves its other bits to us.
+/// A UUID of version 8 (RFC 9562), which leaves all other bits to the application.
 fn identifier(body: &[u8]) -> String {
     let hash = blake3::hash(body).to_hex();
     let hex = hash.as_str();
@@ -141,7 +137,7 @@ fn put_grid<T: Value>(
     put_text(body, name);
     let suffix = if is_half { "_HalfFloat" } else { "" };
     put_text(body, &format!("Tree_{}_5_4_3{suffix}", T::NAME));
-    // No grid that it is an instance of.
+    // Not an instance of another grid.
     put_text(body, "");
     let offsets = body.len();
     body.extend_from_slice(&[0; 24]);
@@ -167,7 +163,7 @@ fn put_grid_metadata<T: Value>(
     grid: &SparseGrid<T>,
     is_half: bool,
 ) {
-    // What OpenVDB writes for a grid without active voxels.
+    // OpenVDB's own value for a grid without active voxels.
     let nothing = ([i32::MAX; 3], [i32::MIN; 3]);
     let (min, max) = grid.active_bounds().unwrap_or(nothing);
     let count = grid.active_count() as i64;
@@ -185,8 +181,8 @@ fn put_grid_metadata<T: Value>(
     put_metadata(body, &entries);
 }
 
-/// Index (i, j, k) stands for the middle of voxel (i, j, k); a staggered component i then lies half
-/// a voxel before it along i, which is where [`SparseGrid`]'s faces are.
+/// Index (i, j, k) maps to the centre of voxel (i, j, k); a staggered component i then lies half a
+/// voxel before it along i, which is where [`SparseGrid`]'s faces are.
 fn put_transform<T>(body: &mut Vec<u8>, grid: &SparseGrid<T>) {
     put_text(body, "UniformScaleTranslateMap");
     let size = grid.voxel_size;
@@ -215,7 +211,7 @@ enum Metadata<'a> {
     Ints([i32; 3]),
 }
 
-/// Entries in the order of their names, as OpenVDB's map has them.
+/// Entries sorted by name, as in OpenVDB's map.
 fn put_metadata(body: &mut Vec<u8>, entries: &[(&str, Metadata<'_>)]) {
     debug_assert!(entries.is_sorted_by_key(|(name, _)| *name));
     put_u32(body, entries.len() as u32);

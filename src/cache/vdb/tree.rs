@@ -1,4 +1,4 @@
-//! OpenVDB's tree of 32³ × 16³ × 8³: its topology, then its buffers.
+//! OpenVDB's tree of 32³ × 16³ × 8³ nodes: its topology, then its buffers.
 
 use std::collections::BTreeMap;
 use std::io::Write;
@@ -11,31 +11,31 @@ use super::put_u32;
 use super::value::{self, Value};
 use swell_domain::sparse_grid::{Leaf, SparseGrid};
 
-/// Bits of a coordinate below a leaf, and below each kind of inner node.
+/// Bits of a coordinate below a leaf, and below each kind of internal node.
 const LEAF_BITS: u32 = 3;
 const LOWER_BITS: u32 = LEAF_BITS + 4;
 const UPPER_BITS: u32 = LOWER_BITS + 5;
 
-/// `io/Compression.h`: what stands for the inactive values of a buffer.
+/// `io/Compression.h`: how the inactive values of a buffer are encoded.
 mod inactive {
     /// All are the background.
     pub(super) const BACKGROUND: u8 = 0;
     /// All are minus the background.
     pub(super) const MINUS_BACKGROUND: u8 = 1;
-    /// A mask follows, set where they are the background, clear where they are minus it.
+    /// A mask follows: set for the background, clear for minus the background.
     pub(super) const EITHER: u8 = 3;
-    /// They are written like active ones.
+    /// They are written like active values.
     pub(super) const WRITTEN: u8 = 6;
 }
 
-/// A grid's leaves by the nodes above them; each map is in the order in which the file has them.
+/// A grid's leaves, grouped by the nodes above them; each map is in file order.
 pub(super) struct Tree<'a, T> {
     background: T,
-    /// Nodes by the first voxel of a 32³ node.
+    /// Nodes keyed by the first voxel of their 32³ node, then by offset in it.
     upper: BTreeMap<[i32; 3], BTreeMap<usize, Lower<'a, T>>>,
 }
 
-/// A 16³ node, by offset.
+/// A 16³ node; leaves and inside tiles by offset.
 struct Lower<'a, T> {
     leaves: BTreeMap<usize, &'a Leaf<T>>,
     inside: Vec<usize>,
@@ -71,10 +71,10 @@ impl<'a, T: Value> Tree<'a, T> {
     }
 
     pub(super) fn put_topology(&self, out: &mut Vec<u8>, is_half: bool) {
-        // Buffers a voxel.
+        // Buffers per voxel.
         put_u32(out, 1);
         value::put_whole(out, self.background, is_half);
-        // Tiles of the root: none.
+        // Number of root tiles.
         put_u32(out, 0);
         put_u32(out, self.upper.len() as u32);
         for (origin, upper) in &self.upper {
@@ -120,7 +120,8 @@ impl<T: Value> Lower<'_, T> {
     }
 }
 
-/// Offset of a voxel in its node of `2^(above - below)` children an edge, x slowest.
+/// Offset of a voxel in its node, which has `2^(above - below)` children along an edge; x is
+/// slowest.
 fn offset(voxel: [i32; 3], below: u32, above: u32) -> usize {
     let edge_bits = above - below;
     voxel.iter().fold(0, |offset, x| {
@@ -129,7 +130,8 @@ fn offset(voxel: [i32; 3], below: u32, above: u32) -> usize {
     })
 }
 
-/// Which places of an inner node of `2^bits` an edge have a child, and which are active: none.
+/// Child mask of an internal node with `2^bits` children along an edge, and its value mask, which
+/// is empty.
 fn put_masks<'a>(out: &mut Vec<u8>, bits: u32, children: impl Iterator<Item = &'a usize>) {
     let words = (1 << (3 * bits)) / 64;
     let mut mask = vec![0u64; words];
@@ -140,8 +142,8 @@ fn put_masks<'a>(out: &mut Vec<u8>, bits: u32, children: impl Iterator<Item = &'
     put_words(out, &vec![0; words]);
 }
 
-/// The values of an inner node, all inactive and all written, which zipping makes next to nothing.
-/// OpenVDB leaves them out where it can, but not even their length stands there in half precision,
+/// The values of an internal node, all inactive and all written; zip compresses them to almost
+/// nothing. OpenVDB omits them where it can, but in half precision it then omits their length too,
 /// and vdb-rs 0.6 expects one.
 fn put_tiles<T: Value>(out: &mut Vec<u8>, tiles: impl Iterator<Item = T>, is_half: bool) {
     out.push(inactive::WRITTEN);
@@ -152,7 +154,7 @@ fn put_tiles<T: Value>(out: &mut Vec<u8>, tiles: impl Iterator<Item = T>, is_hal
     out.extend_from_slice(&zipped(&bytes));
 }
 
-/// A leaf's mask once more, and its active values.
+/// A leaf's mask again, followed by its active values.
 fn buffer<T: Value>(leaf: &Leaf<T>, background: T, is_half: bool) -> Vec<u8> {
     let mut out = Vec::new();
     put_words(&mut out, &leaf.active);
@@ -179,11 +181,11 @@ fn buffer<T: Value>(leaf: &Leaf<T>, background: T, is_half: bool) -> Vec<u8> {
     out
 }
 
-/// The bytes behind their length: zipped, or as they are and the length negative where zipping does
-/// not shorten them.
+/// The bytes preceded by their length: zipped, or raw with a negative length if zipping does not
+/// shorten them.
 fn zipped(bytes: &[u8]) -> Vec<u8> {
     let mut encoder = ZlibEncoder::new(Vec::new(), Compression::default());
-    // Writing to a Vec cannot fail; were it to, the bytes go out as they are.
+    // Writing to a Vec cannot fail; if it did, the bytes would be written raw.
     let zipped = encoder.write_all(bytes).and_then(|()| encoder.finish());
     let (length, content) = match &zipped {
         Ok(zipped) if zipped.len() < bytes.len() => (zipped.len() as i64, zipped.as_slice()),

@@ -1,15 +1,15 @@
-//! Values that a grid can hold.
+//! Types of values that a grid can hold.
 
 use half::f16;
 
 /// A voxel's value.
 pub(super) trait Value: Copy + PartialEq + Send + Sync {
-    /// OpenVDB's name in a tree's type.
+    /// Name of the type in OpenVDB's tree type.
     const NAME: &'static str;
-    /// How transforms act on it: vectors as velocities.
+    /// How transforms act on vectors: like velocities.
     const VECTOR_TYPE: Option<&'static str>;
 
-    /// Minus it.
+    /// The negated value.
     fn negative(self) -> Self;
 
     /// Components of the value.
@@ -42,7 +42,7 @@ impl Value for [f32; 3] {
     }
 }
 
-/// A value of a buffer: two bytes a component, or four.
+/// Appends a buffer value: two or four bytes per component.
 pub(super) fn put<T: Value>(out: &mut Vec<u8>, value: T, is_half: bool) {
     for &x in value.components() {
         if is_half {
@@ -53,7 +53,7 @@ pub(super) fn put<T: Value>(out: &mut Vec<u8>, value: T, is_half: bool) {
     }
 }
 
-/// A value of a tree's own: four bytes a component, rounded where buffers are.
+/// Appends a tree value: four bytes per component, rounded to half precision if the buffers are.
 pub(super) fn put_whole<T: Value>(out: &mut Vec<u8>, value: T, is_half: bool) {
     for &x in value.components() {
         let x = if is_half {

@@ -1,16 +1,20 @@
-//! Differences of neighbours in place of positions, and back.
+//! Replaces positions by the differences between neighbouring rows, and back.
 //!
-//! Of each of the three columns the bits are taken as an integer that is ordered as the numbers are: negative floats turned round, others
-//! above them. Of that the value before it is taken off (nothing of a block's first), both modulo 2 to the number of bits, and the difference
-//! stands as 2 d, or as −2 d − 1 where it is negative, so that small ones have zeros in their high bytes. Bits of any kind come back.
+//! Each of the three columns is mapped to integers that are ordered like the floats: negative
+//! floats are inverted, all others get the top bit set. The value of the row before is subtracted
+//! (nothing from a block's first row), modulo 2 to the number of bits. The difference d is stored
+//! zigzag-coded, as 2 d, or as −2 d − 1 where it is negative, so that small differences have zeros
+//! in their high bytes. Every bit pattern survives the round trip.
 //!
-//! Velocities are left as they are: calm water's repeat, and their differences do not (wave-city's frame 60 by FLIP takes 0.381 of the bytes
-//! with them, 0.372 without). Differences of velocities along a Morton curve through the positions take less where water has mixed (the
-//! quickstart's last frame by PBF 0.642 and 0.648) and more elsewhere (wave-city's 0.390).
+//! Velocities stay as they are: those of calm water repeat and their differences do not. Frame 60
+//! of wave-city by FLIP takes 0.381 of the bytes with velocity differences, 0.372 without.
+//! Differences of velocities along a Morton curve through the positions save bytes where water has
+//! mixed (0.642 against 0.648 for the quickstart's last frame by PBF) and cost bytes elsewhere
+//! (0.390 for wave-city's).
 
 use glam::DVec3;
 
-/// Bytes of the values that are wide, where positions are about an origin.
+/// Bytes of a position component if positions are relative to an origin.
 const WIDE: usize = size_of::<f64>();
 const NARROW: usize = size_of::<f32>();
 
@@ -24,7 +28,7 @@ pub(super) fn take(rows: &mut [u8], origin: DVec3, row_size: usize) {
     }
 }
 
-/// The positions of a block's rows again.
+/// Restores the positions of a block's rows.
 pub(super) fn add_up(rows: &mut [u8], origin: DVec3, row_size: usize) {
     for axis in 0..3 {
         match origin == DVec3::ZERO {
@@ -34,12 +38,12 @@ pub(super) fn add_up(rows: &mut [u8], origin: DVec3, row_size: usize) {
     }
 }
 
-/// All bits of a value of so many bytes.
+/// Mask of all bits of a value of `bytes` bytes.
 const fn all(bytes: usize) -> u64 {
     u64::MAX >> (64 - 8 * bytes)
 }
 
-/// Its sign.
+/// Sign bit of a value of `bytes` bytes.
 const fn top(bytes: usize) -> u64 {
     1 << (8 * bytes - 1)
 }
@@ -76,7 +80,7 @@ fn add_up_column<const BYTES: usize>(rows: &mut [u8], row_size: usize, at: usize
     });
 }
 
-/// Replaces a value of each row by what `next` makes of it.
+/// Replaces one value of each row by the result of `next`.
 fn replace<const BYTES: usize>(
     rows: &mut [u8],
     row_size: usize,
@@ -96,7 +100,7 @@ fn replace<const BYTES: usize>(
 mod tests {
     use super::*;
 
-    /// Rows of one wide column of three and one narrow one.
+    /// Rows of three wide columns and a narrow one.
     const ROW: usize = 3 * WIDE + NARROW;
     const FAR: DVec3 = DVec3::X;
 
@@ -120,11 +124,11 @@ mod tests {
             let begin = ROW * row + WIDE * column;
             u64::from_le_bytes(taken[begin..begin + WIDE].try_into().unwrap())
         };
-        // One step up is 2, one down is 1; from −0 to 0 is a step.
+        // One step up is 2, one step down is 1; from −0 to 0 is one step.
         assert_eq!((at(1, 0), at(2, 0), at(1, 1)), (2, 1, 2));
         add_up(&mut taken, FAR, ROW);
         assert!(taken == rows);
-        // The control: as rows of narrow columns they are not what comes back.
+        // Control: restoring them as narrow columns does not give the rows back.
         take(&mut taken, FAR, ROW);
         add_up(&mut taken, DVec3::ZERO, ROW);
         assert!(taken != rows);

@@ -14,7 +14,7 @@ const NEAR: Stamp<'_> = Stamp {
     origin: DVec3::ZERO,
 };
 
-/// A lattice that a wave has moved, each particle a tenth of the spacing off it.
+/// A lattice that a wave has moved, each particle up to a tenth of the spacing off its site.
 fn water(n: u32) -> Particles {
     let at = |i: u32| [i % 64, i / 64 % 16, i / 1024].map(|k| 0.05 + 0.1 * k as f32);
     let own =
@@ -38,7 +38,7 @@ fn packed(stamp: &Stamp<'_>, particles: &Particles) -> Vec<u8> {
     bytes
 }
 
-/// As programs wrote them before.
+/// Encodes as older versions of swell did.
 fn packed_before(stamp: &Stamp<'_>, particles: &Particles) -> Vec<u8> {
     let mut bytes = Vec::new();
     encode_as(Content::Values, &mut bytes, stamp, particles).unwrap();
@@ -51,7 +51,7 @@ fn plain(stamp: &Stamp<'_>, particles: &Particles) -> Vec<u8> {
     bytes
 }
 
-/// A stream of ours with another content.
+/// Compresses other content as our streams are compressed.
 fn stream_of(content: &[u8]) -> Vec<u8> {
     zstd::encode_all(content, LEVEL).unwrap()
 }
@@ -63,7 +63,8 @@ fn refused(bytes: &[u8]) -> String {
     }
 }
 
-/// None, one, a whole block, and a block with one row more; near the world's origin and far from it.
+/// No particle, one, a whole block, and a block plus one row; near the world's origin and far from
+/// it.
 #[test]
 fn particles_come_back_bit_for_bit() {
     let far = Stamp {
@@ -90,7 +91,7 @@ fn particles_come_back_bit_for_bit() {
     }
 }
 
-/// Of water that waves have moved; the same stream of plain rows does not get there.
+/// For water that waves have moved; compressing plain rows does not reach this ratio.
 #[test]
 fn it_takes_at_most_six_tenths_of_the_bytes() {
     let particles = water(40_000);
