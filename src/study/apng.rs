@@ -1,4 +1,4 @@
-//! Animated PNG, frame after frame: lossless, played by every browser.
+//! Animated PNG written frame by frame: lossless, and played by every browser.
 
 use std::io::Write;
 
@@ -6,16 +6,16 @@ use png::{BitDepth, ColorType, EncodingError};
 
 use super::rgb::Rgb;
 
-/// An animation that grows; it repeats without end.
+/// An animation that is being written; it loops forever.
 pub struct Apng<W: Write> {
     writer: png::Writer<W>,
 }
 
 impl<W: Write> Apng<W> {
-    /// One of `count` frames, at least 1, of `size` pixels, so many a second.
+    /// Starts an animation of `count` frames (at least 1) of `size` pixels (columns, rows).
     ///
     /// # Errors
-    /// The writer, or a side longer than PNG has.
+    /// An error of the writer, or a side longer than PNG allows.
     pub fn begin(
         out: W,
         size: [usize; 2],
@@ -36,25 +36,25 @@ impl<W: Write> Apng<W> {
         })
     }
 
-    /// The next frame.
+    /// Appends the next frame.
     ///
     /// # Errors
-    /// The writer; a frame of another size, or one more than there are.
+    /// An error of the writer; a frame of another size, or more frames than announced.
     pub fn push(&mut self, frame: &Rgb) -> Result<(), EncodingError> {
         self.writer.write_image_data(frame.pixels.as_flattened())
     }
 
-    /// The end.
+    /// Finishes the file.
     ///
     /// # Errors
-    /// The writer.
+    /// An error of the writer.
     pub fn finish(self) -> Result<(), EncodingError> {
         self.writer.finish()
     }
 }
 
-/// Seconds between frames as numerator and denominator of 16 bits: over 1, over 1001 as broadcasting has it, or to the
-/// nearest that there is.
+/// Frame delay in seconds as a fraction of two 16-bit numbers: over 1, over 1001 as in
+/// broadcasting, or the nearest that fits.
 fn delay(frames_per_second: f64) -> (u16, u16) {
     let of = |parts: u16| {
         let many = (frames_per_second * f64::from(parts))
@@ -66,7 +66,7 @@ fn delay(frames_per_second: f64) -> (u16, u16) {
     let mut best = of(1);
     for parts in [1001, 1000, 100, 10] {
         let other = of(parts);
-        // The first one that is near enough has the roundest numbers.
+        // The first fraction that is close enough has the roundest numbers.
         if best.0 > 1e-6 && other.0 < best.0 {
             best = other;
         }

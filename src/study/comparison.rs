@@ -1,5 +1,5 @@
-//! Two solvers on one scene, measured frame by frame, and what follows for the claims that the paper
-//! draws from its Figures 2 (PBF) and 3 (PIC/FLIP).
+//! Compares two solvers on one scene, frame by frame, and evaluates the claims that the paper draws
+//! from its Figures 2 (PBF) and 3 (PIC/FLIP).
 
 use super::{
     chart::{Chart, Mark, Series},
@@ -7,65 +7,67 @@ use super::{
     median,
 };
 
-/// Relative difference below which two values are called alike: twice the few per cent by which a
-/// crest or a splash moves when its waterline shifts by half a cube.
+/// Relative difference up to which two values count as alike: twice the few per cent by which a
+/// crest or a splash changes when its waterline shifts by half a cube.
 const ALIKE: f64 = 0.05;
 
-/// What the paper says (§3.2), of the same wave and city on a GTX 1650.
+/// Claims of the paper (§3.2) for the same wave and city on a GTX 1650.
 pub const CLAIMS: &str = "The paper sees a better defined crest with PBF (its Figure 2a) than with PIC/FLIP (3a), no \
     well-defined splash with PIC/FLIP, which swallows the buildings (3b), and a wave that spreads more with PBF (2b); a \
     frame took it 24.27 ms with PIC/FLIP and 25.22 ms with PBF.";
 
-/// One frame of one solver.
+/// Measurements of one frame of one solver.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row {
-    /// Output frame.
+    /// Number of the output frame.
     pub frame: u32,
-    /// Simulated, seconds.
+    /// Simulated time, seconds.
     pub time: f64,
-    /// Wall clock of its bake; `None` where the cache has lost it.
+    /// Wall-clock seconds of its bake; `None` if the cache has lost them.
     pub seconds: Option<f64>,
-    /// Substeps.
+    /// Number of substeps.
     pub substeps: u32,
-    /// Solver iterations.
+    /// Solver iterations, summed over the substeps.
     pub iterations: u64,
-    /// Projections that missed their tolerance.
+    /// Number of projections that missed their tolerance.
     pub missed: u32,
-    /// What the water measures.
+    /// Measurements of the water.
     pub measures: Measures,
 }
 
 /// One solver's frames.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Course {
-    /// `pbf`, `flip`.
+    /// Name of the solver: `pbf`, `flip`.
     pub solver: String,
-    /// In the order of the frames; the same frames for every solver.
+    /// Rows in frame order; the same frames for every solver.
     pub rows: Vec<Row>,
 }
 
-/// When the water meets what stands in its way.
+/// The moment when the water reaches the first obstacle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Impact {
-    /// First measured frame in which either solver's front is there; `None` where none came so far.
+    /// First measured frame in which either solver's front has reached the obstacle; `None` if
+    /// neither did.
     pub frame: Option<u32>,
 }
 
-/// What was found on one question.
+/// The finding on one question.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Finding {
-    /// What is asked.
+    /// The question.
     pub question: &'static str,
-    /// The solver that the paper sees ahead; `None` where it makes no claim.
+    /// The solver that the paper sees ahead; `None` if it makes no claim.
     pub claimed: Option<&'static str>,
-    /// The solver that is ahead here; `None` where the two are alike or one has no value.
+    /// The solver that is ahead here; `None` if the two are alike or one has no value.
     pub ahead: Option<String>,
     /// The finding in words, with its figures.
     pub text: String,
 }
 
 impl Impact {
-    /// From the fronts of both solvers and the distance at which the first obstacle stands.
+    /// Computed from the fronts of all solvers; `obstacle` is the distance of the first obstacle,
+    /// metres.
     pub fn of(courses: &[Course], obstacle: f64) -> Self {
         let first = |course: &Course| {
             let is_there = |row: &&Row| row.measures.front >= Some(obstacle);
@@ -85,7 +87,7 @@ impl Impact {
     }
 }
 
-/// What a question looks at.
+/// A question and how it is measured.
 struct Question {
     asked: &'static str,
     claimed: Option<&'static str>,
@@ -93,7 +95,7 @@ struct Question {
     unit: &'static str,
     digits: usize,
     value: fn(&Course, Impact) -> Option<f64>,
-    /// Whether the lesser value is the better one.
+    /// Whether the smaller value is the better one.
     less_is_ahead: bool,
 }
 
@@ -237,7 +239,7 @@ fn leader([a, b]: [f64; 2], less_is_ahead: bool) -> Option<usize> {
     Some(usize::from((a > b) == less_is_ahead))
 }
 
-/// All findings in one sentence.
+/// Summarises all findings in one sentence.
 pub fn summary(findings: &[Finding]) -> String {
     let claims = || findings.iter().filter(|f| f.claimed.is_some());
     let borne_out = claims().filter(|f| f.ahead.as_deref() == f.claimed).count();
@@ -250,7 +252,7 @@ pub fn summary(findings: &[Finding]) -> String {
     )
 }
 
-/// Name in the table and value; empty where there is none.
+/// Column name and value; `None` is an empty cell.
 type Column = (&'static str, fn(&Row) -> Option<f64>);
 
 const COLUMNS: [Column; 13] = [
@@ -269,7 +271,7 @@ const COLUMNS: [Column; 13] = [
     ("wet_area_m2", |row| Some(row.measures.wet_area)),
 ];
 
-/// Every measured frame, SI units. The first row are titles.
+/// Every measured frame as a table in SI units. The first row has the titles.
 pub fn table(courses: &[Course]) -> Vec<Vec<String>> {
     let titles = COLUMNS.iter().map(|(name, _)| *name);
     let titles = ["solver"].into_iter().chain(titles);
@@ -284,7 +286,7 @@ pub fn table(courses: &[Course]) -> Vec<Vec<String>> {
     table
 }
 
-/// The curves of a page: each measure against simulated time.
+/// The curves of the page: each measure against simulated time.
 pub fn charts(courses: &[Course], impact: Impact) -> Vec<Chart> {
     type Value = fn(&Row) -> Option<f64>;
     let measured: [(&str, &str, Value); 7] = [
@@ -330,7 +332,7 @@ pub fn charts(courses: &[Course], impact: Impact) -> Vec<Chart> {
 mod tests {
     use super::*;
 
-    /// Ten frames, the front a metre a frame; what is given is the same in each.
+    /// Ten frames with the front advancing a metre per frame; `measures` is the same in each.
     fn course(solver: &str, measures: Measures, seconds: f64) -> Course {
         let row = |frame: u32| Row {
             frame,
@@ -384,7 +386,7 @@ mod tests {
         let mut alike = vec![None; 5];
         alike.push(flip);
         assert_eq!(verdicts(&pair(1.0, 1.04)), alike);
-        // A twentieth of the greater: 1 of 1 / 0.95 = 1.052632.
+        // 5 % of the greater: 1 against 1 / 0.95 = 1.052632.
         assert_eq!(verdicts(&pair(1.0, 1.0526)), alike);
         assert!(
             verdicts(&pair(1.0, 1.0527))[..5]
@@ -407,7 +409,7 @@ mod tests {
     #[test]
     fn before_and_after_the_impact_are_kept_apart() {
         let mut courses = pair(1.0, 1.0);
-        // What comes after the impact is no crest, and what comes before it no splash.
+        // A height after the impact is no crest, and spray before it is no splash.
         for row in &mut courses[1].rows {
             let is_before = row.frame < 5;
             row.measures.crest_height = if is_before { 1.0 } else { 9.0 };

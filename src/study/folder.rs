@@ -1,21 +1,22 @@
-//! What lies in a study's folder, by name: the study writes it, and `swell view` reads it.
+//! Names of the files in a study's folder, which the study writes and `swell view` reads.
 
 use serde::{Deserialize, Serialize};
 
 use swell_domain::chunk::Chunk;
 
-/// The file that holds a [`Claim`].
+/// Name of the file that holds a [`Claim`].
 pub const CLAIM: &str = "study.json";
 
-/// The study's own ledger; [`ledger_of`] has those of shares.
+/// Name of the ledger of a whole study; [`ledger_of`] gives those of shares.
 pub const LEDGER: &str = "results.jsonl";
 
-/// Whose the folder is.
+/// The study that owns a folder.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Claim {
-    /// Of the study, as its file is called.
+    /// Name of the study, like that of its file.
     pub study: String,
-    /// What runs the whole study, but for options of the device and of what may be read; `None` where another version of the program took the folder.
+    /// Command that runs the whole study, without options of the device and of file access; `None`
+    /// if another version of the program claimed the folder.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub command: Option<String>,
 }

@@ -1,31 +1,31 @@
-//! Where more time stops paying, and who is better for the same time.
+//! Where more time stops paying off, and which method is more accurate at equal time.
 
-/// Part of the discretisation error below which a solver's error is of no account.
+/// Fraction of the discretisation error below which a solver's error is negligible.
 pub const OF_NO_ACCOUNT: f64 = 0.1;
 
 /// A method's points, in the order of its settings.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Line {
-    /// Of the method.
+    /// Name of the method.
     pub name: String,
-    /// What was measured.
+    /// The measured points.
     pub points: Vec<Point>,
 }
 
-/// A setting: what it costs and how far off it is.
+/// Cost and error of one setting.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Point {
-    /// The setting.
+    /// Name of the setting.
     pub label: String,
-    /// Least, median and greatest of the repeats, in any one unit.
+    /// Minimum, median and maximum time of the repeats, in any consistent unit.
     pub time: [f64; 3],
-    /// The cost that no machine changes, in any one unit.
+    /// Machine-independent cost, in any consistent unit.
     pub work: f64,
-    /// 0 or more.
+    /// Error, 0 or more.
     pub error: f64,
 }
 
-/// The points of a line that no other beats in both time and error, from the cheapest on.
+/// The Pareto front of a line in time and error, from the cheapest point on.
 fn best(line: &Line) -> Vec<&Point> {
     let mut points: Vec<&Point> = line.points.iter().filter(|p| p.error > 0.0).collect();
     points.sort_by(|a, b| {
@@ -42,25 +42,28 @@ fn best(line: &Line) -> Vec<&Point> {
     points
 }
 
-/// The cheapest setting whose error is below a tenth of the discretisation error; `None` where none is.
+/// The cheapest setting whose error is at most a tenth of the discretisation error; `None` if there
+/// is none.
 fn first_of_no_account(line: &Line, discretisation: f64) -> Option<&Point> {
     let mut points = best(line).into_iter();
     points.find(|point| point.error <= OF_NO_ACCOUNT * discretisation)
 }
 
-/// Where more time stops paying.
+/// Where more time stops paying off.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Knee<'a> {
-    /// The setting.
+    /// The setting at the knee.
     pub point: &'a Point,
-    /// Whether its error is below a tenth of the discretisation error; otherwise it has the least error × time, up to
-    /// which x times the time buys more than x times the accuracy, and beyond it less.
+    /// Whether its error is at most a tenth of the discretisation error. Otherwise the setting has
+    /// the least error × time: up to it x times the time buys more than x times the accuracy,
+    /// beyond it less.
     pub is_enough: bool,
-    /// Whether no setting that was run is better, so that more may still pay.
+    /// Whether no setting that was run is better, so that more time may still pay off.
     pub is_last: bool,
 }
 
-/// The knee of a line, beside the discretisation error where that is known; `None` for a line without points.
+/// The knee of a line, given the discretisation error if it is known; `None` for a line without
+/// points.
 pub fn knee(line: &Line, discretisation: Option<f64>) -> Option<Knee<'_>> {
     let enough = discretisation.and_then(|error| first_of_no_account(line, error));
     let product = |point: &&Point| point.time[1] * point.error;
@@ -90,13 +93,13 @@ fn bargain(from: &Point, to: &Point) -> String {
     )
 }
 
-/// What is said of a knee at the end of what was run.
+/// Text for a knee at the last setting that was run.
 pub const BEST_THAT_WAS_RUN: &str = "the best that was run, so that more may still pay";
 
-/// Settings that two lines have to have in common before either is called better.
+/// Number of settings that two lines must have in common before either is called better.
 const LEAST_IN_COMMON: usize = 2;
 
-/// What the knee of a line is, in words, beside the discretisation error where that is known.
+/// Describes the knee of a line in words, given the discretisation error if it is known.
 pub fn words(line: &Line, discretisation: Option<f64>) -> String {
     let best = best(line);
     let (Some(knee), Some(first), Some(last)) =
@@ -136,7 +139,8 @@ pub fn words(line: &Line, discretisation: Option<f64>) -> String {
     said.join("; ")
 }
 
-/// What a line leaves at a time between its points' times: its best points joined by straight lines in the chart.
+/// Error of a line at a time between those of its points: its best points joined by straight lines
+/// in the logarithmic chart.
 fn at_time(line: &Line, time: f64) -> Option<f64> {
     let best = best(line);
     let pair = best
@@ -147,16 +151,16 @@ fn at_time(line: &Line, time: f64) -> Option<f64> {
     Some(a.error * (b.error / a.error).powf(part))
 }
 
-/// What is said of lines with hardly a time in common.
+/// Text for lines that have too few times in common.
 pub const TOO_FEW: &str = "too few for a verdict";
 
-/// A line against another at equal times.
+/// Comparison of a line with another at equal times.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rivalry {
     /// Name of the other line.
     pub other: String,
-    /// Settings with a time at which both lines have points, and there the other's error over the setting's: above 1 the
-    /// setting is better.
+    /// For each setting whose time lies within the other line's range: the other's error over the
+    /// setting's. Above 1 the setting is better.
     pub ratios: Vec<(String, f64)>,
 }
 
@@ -177,7 +181,7 @@ pub fn rivalry(lines: &[Line], index: usize) -> Vec<Rivalry> {
 }
 
 impl Rivalry {
-    /// Whether the lines have so many times in common that either may be called better.
+    /// Whether the lines have enough times in common for a verdict.
     pub fn has_verdict(&self) -> bool {
         self.ratios.len() >= LEAST_IN_COMMON
     }
@@ -189,7 +193,7 @@ impl Rivalry {
             .collect()
     }
 
-    /// Whether the line beats the other, in words: where it does not, the settings are named.
+    /// Describes whether the line beats the other; if not at all settings, names the exceptions.
     pub fn words(&self) -> String {
         let (name, lost) = (&self.other, self.lost());
         if !self.has_verdict() {
@@ -230,7 +234,8 @@ mod tests {
         }
     }
 
-    /// Twice the time for four times the accuracy, twice; then twice the time for a tenth more.
+    /// Twice four times the accuracy for twice the time; then twice a tenth more for twice the
+    /// time.
     #[test]
     fn a_bend_is_found() {
         let bent = line(
@@ -258,7 +263,8 @@ mod tests {
             said.contains("from s2 to s4 4.00 times the time buys 1.23 times"),
             "{said}"
         );
-        // A setting that is slower and worse is no part of it; no points have no knee.
+        // A setting that is slower and worse does not belong to the front; a line without points
+        // has no knee.
         let worse = line("a", &[(1.0, 1.6), (2.0, 0.4), (3.0, 0.5), (4.0, 0.1)]);
         assert_eq!(best(&worse).len(), 3);
         assert!(words(&worse, None).contains("more may still pay"));
@@ -304,7 +310,7 @@ mod tests {
             "fast",
             &[(0.5, 3.0), (2.5, 0.2), (8.0, 0.0625), (32.0, 0.01)],
         );
-        // Error 1/t: at 2.5 it is 0.4, at 8 0.125.
+        // Error 1/t: 0.4 at 2.5, 0.125 at 8.
         let lines = [slow, fast];
         let [found] = &rivalry(&lines, 1)[..] else {
             panic!("one other line")

@@ -1,10 +1,12 @@
 //! Studies: what baked frames measure, and the page that shows it.
 //!
-//! Pure functions from particles to numbers, and from numbers to text; `experiment` runs what is measured and writes the
-//! files. [`comparison`] sets two solvers side by side; [`stability`] measures what is hard on a solver, [`waves`] what theory and
-//! experiments know the answer to; a sweep finds the [`knee`] and, for the paper's Table 1, the [`convergence_point`]; [`tune`] finds
-//! the cheapest settings that hold an error. [`measure`], [`chart`] and [`page`] serve every kind. What is looked at frame by
-//! frame has a [`player`], a [`sheet`] and an [`apng`]. [`folder`] names what a study leaves.
+//! Pure functions from particles to numbers, and from numbers to text; the crate `experiment` runs
+//! the studies and writes the files. [`comparison`] sets two solvers side by side, [`stability`]
+//! measures hard cases, and [`waves`] measures benchmarks whose answer is known from theory or
+//! experiment. A sweep finds the [`knee`] and, for the paper's Table 1, the [`convergence_point`];
+//! [`tune`] finds the cheapest settings that keep an error below its limit. [`measure`], [`chart`]
+//! and [`page`] serve every kind of study. [`player`], [`sheet`] and [`apng`] show pictures frame
+//! by frame, and [`folder`] names the files that a study leaves.
 
 pub mod apng;
 pub mod chart;

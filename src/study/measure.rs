@@ -1,33 +1,34 @@
-//! A frame's wave and splash in numbers, from the particles alone, so that every solver is measured
+//! Measures a frame's wave and splash from its particles only, so that every solver is measured
 //! alike. Height is along y.
 //!
-//! Space is cut into cubes two particle spacings wide, which hold 8 particles at rest. A cube that is
-//! at least half full is water, and the largest body of such cubes (connected through faces) is the
+//! Space is divided into cubes two particle spacings wide, which hold 8 particles at rest. A cube
+//! that is at least half full is water, and the largest face-connected body of such cubes is the
 //! continuous water. The elevation η of a column is the top of that body, with the fill of its top
-//! cubes as a fraction: the height function of volume-of-fluid methods (Torrey et al. 1985), smoothed
-//! once by the binomial filter ¼ ½ ¼ along both axes, as single particles make steps of half a cube.
+//! cubes as a fraction: the height function of volume-of-fluid methods (Torrey et al. 1985). It is
+//! smoothed once by the binomial filter ¼ ½ ¼ along both axes, because single particles make steps
+//! of half a cube.
 
 use rayon::prelude::*;
 
 use super::{median, percentile};
 use swell_domain::{aggregates::Aggregates, bounds::Bounds, particles::Particles, probe::energies};
 
-/// Most cubes; a larger domain is measured with larger ones.
+/// Most cubes; a larger domain is measured with larger cubes.
 const MAX_CUBES: f64 = (1u64 << 27) as f64;
 
 /// Edge of a cube in particle spacings.
 const EDGE_SPACINGS: f64 = 2.0;
 
-/// Part of a cube's particles at rest from which on it is water.
+/// Fraction of a cube's particles at rest from which on it counts as water.
 const HALF_FULL: f64 = 0.5;
 
-/// Parts of the crest's height between which its front face is measured.
+/// Fractions of the crest's height between which its front face is measured.
 const FACE: [f64; 2] = [0.9, 0.5];
 
-/// Part of the particles that lies within the splash's height and reach.
+/// Fraction of the particles that lies within the splash's height and reach.
 const NEARLY_ALL: f64 = 0.999;
 
-/// Which way the wave runs.
+/// Direction in which the wave travels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Direction {
     /// 0 for x, 2 for z.
@@ -36,31 +37,34 @@ pub struct Direction {
     pub is_forward: bool,
 }
 
-/// What one frame measures. Lengths are metres, heights above the still level, distances along the
-/// wave's way from the domain's face behind it.
+/// Measurements of one frame. Lengths are in metres, heights above the still level, distances along
+/// the wave's direction from the domain's face behind it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Measures {
-    /// Height of the crest: the highest η of each row along the wave's way, median over the rows.
+    /// Height of the crest: the highest η of each row along the wave's direction, median over the
+    /// rows.
     pub crest_height: f64,
-    /// Slope of the crest's front face, degrees: from the foremost place of a row that reaches 0.9 of
-    /// its crest's height to the foremost that reaches half of it, median over the rows. The crest
-    /// front steepness of Kjeldsen and Myrhaug (1979) goes from the crest to the zero crossing
-    /// instead; a bore has a plateau for a crest and may run over a dry bed, which has no crossing.
-    /// `None` where fewer than half of the rows have a crest higher than a cube.
+    /// Slope of the crest's front face, degrees, between the foremost points of a row that reach
+    /// 0.9 and 0.5 of its crest's height; median over the rows.
+    ///
+    /// The crest front steepness of Kjeldsen and Myrhaug (1979) runs from the crest to the zero
+    /// crossing instead; a bore has a plateau for a crest and may run over a dry bed, which has no
+    /// crossing. `None` if fewer than half of the rows have a crest higher than a cube.
     pub crest_slope: Option<f64>,
-    /// How far the wave has come: the foremost place of a row that reaches half of its crest's height,
-    /// median over the rows; the thin tongue that runs ahead over a dry bed is not the wave. `None` as
-    /// for the slope.
+    /// How far the wave has come: the foremost point of a row that reaches half of its crest's
+    /// height, median over the rows. The thin tongue that runs ahead over a dry bed does not count.
+    /// `None` as for the slope.
     pub front: Option<f64>,
     /// Height that 99.9 % of the particles do not exceed.
     pub splash_height: f64,
     /// Distance that 99.9 % of the particles do not exceed.
     pub splash_reach: f64,
-    /// Part of the particles farther than a cube from the continuous water.
+    /// Fraction of the particles farther than a cube from the continuous water.
     pub airborne: f64,
-    /// Ground with any water above it, m².
+    /// Ground area with any water above it, m².
     pub wet_area: f64,
-    /// Of the continuous water, m³: its cubes, the top ones of each column by their fill.
+    /// Volume of the continuous water, m³: its cubes, with the top ones of each column weighted by
+    /// their fill.
     pub volume: f64,
 }
 
@@ -70,14 +74,14 @@ pub struct Gauge {
     domain: Bounds,
     direction: Direction,
     edge: f64,
-    /// Cubes along the wave's way, upward, across.
+    /// Number of cubes along the wave's direction, upwards and across.
     dims: [usize; 3],
     still: f64,
 }
 
 impl Gauge {
-    /// For particles `spacing` metres apart at rest; of several lattices take the coarsest, so that
-    /// all are measured with the same cubes. The still level is the domain's floor.
+    /// A gauge for particles `spacing` metres apart at rest. Of several lattices take the coarsest,
+    /// so that all are measured with the same cubes. The still level is the domain's floor.
     pub fn new(domain: Bounds, direction: Direction, spacing: f64) -> Self {
         let mut edge = EDGE_SPACINGS * spacing;
         let size = domain.size();
@@ -96,20 +100,20 @@ impl Gauge {
         }
     }
 
-    /// The same with a still level so many metres above the domain's floor.
+    /// Sets the still level, metres above the domain's floor.
     pub fn with_still_level(self, still: f64) -> Self {
         Self { still, ..self }
     }
 
-    /// Depth of water at rest, metres: the median over its columns. Particles are `spacing` metres
-    /// apart.
+    /// Depth of water at rest, metres: the median over its columns. `spacing` is the particle
+    /// spacing, metres.
     pub fn depth(&self, position: &[[f32; 3]], spacing: f64) -> f64 {
         let depths = self.water(position, spacing).elevation.into_iter();
         median(depths.flatten().collect()).unwrap_or(0.0)
     }
 
-    /// Elevation above the domain's floor along the wave's way, metres: the mean over each row across it, dry ground
-    /// at 0. Particles are `spacing` metres apart.
+    /// Elevation above the domain's floor along the wave's direction, metres: the mean over each
+    /// row across it, dry ground counting as 0. `spacing` is the particle spacing, metres.
     pub fn profile(&self, position: &[[f32; 3]], spacing: f64) -> Vec<f64> {
         let elevation = self.water(position, spacing).elevation;
         let [nx, _, nz] = self.dims;
@@ -120,8 +124,8 @@ impl Gauge {
         (0..nx).map(mean).collect()
     }
 
-    /// What a frame is compared by. Particles are `spacing` metres apart at `rest_density` kg/m³; gravity in m/s². No
-    /// density error: the solver alone knows it.
+    /// Aggregates by which frames are compared. `spacing` is in metres, `rest_density` in kg/m³,
+    /// `gravity` in m/s². Leaves out the density error, which only the solver knows.
     pub fn aggregates(
         &self,
         particles: &Particles,
@@ -145,12 +149,12 @@ impl Gauge {
         }
     }
 
-    /// Edge of the cubes, metres: what lengths are good to.
+    /// Edge of the cubes, metres: the resolution of lengths.
     pub fn resolution(&self) -> f64 {
         self.edge
     }
 
-    /// Distance along the wave's way of a point, metres.
+    /// Distance of a point along the wave's direction, metres.
     pub fn distance(&self, point: glam::DVec3) -> f64 {
         let axis = self.direction.axis;
         if self.direction.is_forward {
@@ -217,7 +221,7 @@ impl Gauge {
             p.y - self.domain.min.y,
             p[across] - self.domain.min[across],
         ];
-        // What lies outside counts at the rim; `as` takes a negative number to 0.
+        // Points outside are clamped to the boundary cubes; `as` saturates negative numbers to 0.
         std::array::from_fn(|k| ((at[k] / self.edge) as usize).min(self.dims[k] - 1))
     }
 
@@ -232,7 +236,7 @@ impl Gauge {
     /// Whether each cube belongs to the continuous water.
     fn body(&self, counts: &[u32], rest: f64) -> Vec<bool> {
         let is_water = |index: usize| f64::from(counts[index]) >= HALF_FULL * rest;
-        // 0: not visited; else the number of the body.
+        // 0: not visited; otherwise the number of the body.
         let mut label = vec![0u32; counts.len()];
         let (mut bodies, mut largest) = (0, (0, 0));
         for first in 0..counts.len() {
@@ -276,8 +280,8 @@ impl Gauge {
         })
     }
 
-    /// Top cube of the continuous water in each column (way fastest), and the fill of it and of the one
-    /// above it, in cubes.
+    /// Top cube of the continuous water in each column (wave direction fastest), and the fill of it
+    /// plus the one above it, in cubes.
     fn tops(&self, counts: &[u32], body: &[bool], rest: f64) -> Vec<Option<(usize, f64)>> {
         let [nx, ny, nz] = self.dims;
         let fill = |index: usize| (f64::from(counts[index]) / rest).min(1.0);
@@ -292,12 +296,12 @@ impl Gauge {
     fn volume(&self, water: &Water) -> f64 {
         let tops = water.tops.iter().flatten();
         let (columns, fills) = tops.fold((0, 0.0), |(n, sum), (_, fill)| (n + 1, sum + fill));
-        // The cubes below the tops are full.
+        // The cubes below the tops count as full.
         let full = water.body.iter().filter(|&&is_water| is_water).count() - columns;
         (full as f64 + fills) * self.edge.powi(3)
     }
 
-    /// The binomial filter over wet columns; dry ones have no part in it.
+    /// Applies the binomial filter over wet columns; dry ones are ignored.
     fn smoothed(&self, elevation: &[Option<f64>]) -> Vec<Option<f64>> {
         let [nx, _, nz] = self.dims;
         let weight = |step: i64| if step == 0 { 2.0 } else { 1.0 };
@@ -328,7 +332,8 @@ impl Gauge {
         let crest = (0..=last)
             .filter_map(above)
             .fold(f64::NEG_INFINITY, f64::max);
-        // The foremost place that reaches a level, between columns: dry ground is at the bed.
+        // The foremost position that reaches a level, interpolated between columns; dry ground is
+        // at the bed.
         let foremost = |level: f64| {
             let s = (0..=last).rev().find(|&s| above(s) >= Some(level))?;
             let (here, ahead) = (above(s)?, above(s + 1).unwrap_or(-self.still));
@@ -340,7 +345,7 @@ impl Gauge {
             let rise = (FACE[0] - FACE[1]) * crest;
             Some(Face {
                 slope: rise.atan2(run).to_degrees(),
-                // The middle of a column stands for it.
+                // A column is represented by its middle.
                 front: self.edge * (half? + 0.5),
             })
         };
@@ -350,7 +355,7 @@ impl Gauge {
         })
     }
 
-    /// Cubes of the body and the 26 about each.
+    /// Cubes of the body and their 26 neighbours.
     fn dilated(&self, body: &[bool]) -> Vec<bool> {
         let mut near = body.to_vec();
         let [nx, ny, _] = self.dims;
@@ -372,18 +377,19 @@ impl Gauge {
     }
 }
 
-/// Particles in cubes.
+/// Particles binned into cubes.
 struct Water {
     counts: Vec<u32>,
     /// Whether each cube belongs to the continuous water.
     body: Vec<bool>,
-    /// Of that in each column (way fastest) the top cube, and the fill of it and of the one above it, in cubes.
+    /// For each column (wave direction fastest) the top cube of the continuous water, and the fill
+    /// of it plus the one above it, in cubes.
     tops: Vec<Option<(usize, f64)>>,
     /// Depth of the continuous water in each column, metres; `None` where it is dry.
     elevation: Vec<Option<f64>>,
 }
 
-/// One row of columns along the wave's way.
+/// One row of columns along the wave's direction.
 struct Row {
     crest: f64,
     face: Option<Face>,
@@ -419,7 +425,7 @@ mod tests {
         }
     }
 
-    /// A lattice below the surface `depth(x)`, x and depth from the domain's corner.
+    /// A lattice below the surface `depth(x)`; x and depth are relative to the domain's corner.
     fn water(depth: impl Fn(f64) -> f64) -> Vec<[f32; 3]> {
         let mut position = Vec::new();
         for (i, j, k) in
@@ -451,12 +457,12 @@ mod tests {
         assert!((measures.volume - 20.0).abs() < 1e-9);
         let higher = gauge.measure(&water(|_| 1.1), D);
         assert!((higher.volume - 22.0).abs() < 1e-9);
-        // The top layer's centres: half a spacing below the surface.
+        // Centres of the top layer: half a spacing below the surface.
         assert!((measures.splash_height + 0.05).abs() < 1e-6);
         let profile = gauge.profile(&water(|x| if x < 4.0 { 2.0 } else { 0.4 }), D);
         assert_eq!(profile.len(), 50);
         assert!((profile[5] - 2.0).abs() < 1e-9 && (profile[45] - 0.4).abs() < 1e-9);
-        // A surface between two layers of cubes is found by their fill.
+        // A surface between two layers of cubes is found from their fill.
         assert!((gauge.depth(&water(|_| 1.1), D) - 1.1).abs() < 1e-12);
     }
 
@@ -467,18 +473,19 @@ mod tests {
         assert_eq!(gauge.measure(&[], D), Measures::default());
     }
 
-    /// A ramp from 2.5 m down to 1 m: the slope is known. It starts at 3.01 m, so that no particle lies
-    /// on it and is in the water in one of two mirror images only.
+    /// A ramp from 2.5 m down to 1 m with a known slope. It starts at 3.01 m, so that no particle
+    /// lies on it and is in the water in only one of two mirror images.
     #[test]
     fn a_ramp_has_its_slope_height_and_mirror_image() {
         let gauge = gauge(FORWARD);
         for slope in [0.5, 1.0, 2.0] {
             let ramp = |x: f64| (2.5 - slope * (x - 3.01)).clamp(1.0, 2.5);
             let measures = gauge.measure(&water(ramp), D);
-            // The plateau is 15 columns long: smoothing leaves it.
+            // The plateau is 15 columns long, so smoothing leaves its height unchanged.
             assert!((measures.crest_height - 1.5).abs() < 1e-9);
             let found = measures.crest_slope.expect("a crest");
-            // 0.4 of the crest are 0.6 m up; each end is good to about a quarter of a cube.
+            // 0.4 of the crest is 0.6 m of height; each end is accurate to about a quarter of a
+            // cube.
             let run = 0.6 / slope;
             let (most, least) = (0.6 / (run - 0.1), 0.6 / (run + 0.1));
             let bounds = [least.atan().to_degrees(), most.atan().to_degrees()];
@@ -486,7 +493,7 @@ mod tests {
                 bounds[0] < found && found < bounds[1],
                 "{slope}: {found} {bounds:?}"
             );
-            // The same wave the other way.
+            // The same wave in the opposite direction.
             let back = self::gauge(Direction {
                 axis: 0,
                 is_forward: false,
@@ -494,7 +501,7 @@ mod tests {
             let mirrored = back.measure(&water(|x| ramp(10.0 - x)), D);
             assert!((mirrored.crest_slope.expect("a crest") - found).abs() < 1e-3);
         }
-        // Negative control: a step is steeper than any of them.
+        // Negative control: a step is steeper than all of them.
         let step = gauge.measure(&water(|x| if x < 3.0 { 2.5 } else { 1.0 }), D);
         assert!(step.crest_slope.expect("a crest") > 66.0);
     }
@@ -508,7 +515,7 @@ mod tests {
             _ => 0.0,
         };
         let measures = gauge.measure(&water(depth), D);
-        // Smoothing widens a step to two cubes, of 0.2 m.
+        // Smoothing widens a step to two cubes of 0.2 m.
         assert!((measures.front.expect("a wave") - 4.0).abs() < 0.2);
         assert!((measures.wet_area - 12.0).abs() < 1e-9);
         assert!(measures.crest_slope.expect("a crest") > 66.0);
@@ -523,7 +530,7 @@ mod tests {
         for k in 0..100 {
             position.push([3.0 + 0.05 * k as f32, 5.0, 1.0]);
         }
-        // A dense blob in the air is no part of the continuous water either.
+        // Nor does a dense blob in the air belong to the continuous water.
         for k in 0..64 {
             let [x, y, z] = [k % 4, k / 4 % 4, k / 16].map(|c| 0.1 * c as f32 + 0.05);
             position.push([3.0 + x, 4.0 + y, 1.1 + z]);
@@ -534,10 +541,11 @@ mod tests {
         assert!((measures.splash_height - 2.0).abs() < 1e-6);
     }
 
-    /// By hand: on a slope of 1 the lattice's columns are 5.55 − x high, half a spacing's rounding above the ramp. The
-    /// binomial filter keeps that but for the columns beside the bend at 3 m: at 3.1 m it makes (2.5 + 2 · 2.45 + 2.25) / 4,
-    /// and at 3.3 m 2.25. Of the crest of 1.5 m above the still level, 0.9 are met 5/13 of the way between these, and a
-    /// half at 3.8 m.
+    /// By hand: on a slope of 1 the lattice's columns are 5.55 − x high, half a spacing's rounding
+    /// above the ramp. The binomial filter changes only the columns beside the bend at 3 m: at 3.1
+    /// m it gives (2.5 + 2 · 2.45 + 2.25) / 4, and at 3.3 m 2.25. The level 0.9 of the crest, which
+    /// is 1.5 m above the still level, is met 5/13 of the distance between these, and half of the
+    /// crest at 3.8 m.
     #[test]
     fn a_ramp_s_face_is_where_a_hand_finds_it() {
         let ramp = |x: f64| (2.5 - (x - 3.01)).clamp(1.0, 2.5);
@@ -546,7 +554,8 @@ mod tests {
         let slope = f64::atan2(0.4 * 1.5, run).to_degrees();
         assert!((measures.crest_slope.expect("a crest") - slope).abs() < 1e-9);
         assert!((measures.front.expect("a crest") - 3.8).abs() < 1e-9);
-        // Columns of 2.5 m to 3 m, then falling to 1 m at 4.55 m: the lattice's particles, each of its own volume.
+        // Columns of 2.5 m up to 3 m, then falling to 1 m at 4.55 m: the volume of the lattice's
+        // particles.
         let volume = water(ramp).len() as f64 * D.powi(3);
         assert!(
             (measures.volume - volume).abs() < 1e-9,
@@ -555,7 +564,7 @@ mod tests {
         );
     }
 
-    /// Of 2000 particles each with a height and a reach of its own, 1998 keep below the 1998th.
+    /// Of 2000 particles with distinct heights and reaches, 1998 do not exceed the 1998th.
     #[test]
     fn splashes_are_what_nearly_all_keep_below() {
         let gauge = gauge(FORWARD);
@@ -569,7 +578,7 @@ mod tests {
         let measures = gauge.measure(&position, D);
         assert!((measures.splash_height - (heights(1, 2.0) - 1.0)).abs() < 1e-12);
         assert!((measures.splash_reach - heights(0, -1.0)).abs() < 1e-12);
-        // From the domain's far side of 9 m, where the wave runs the other way.
+        // From the domain's far side at 9 m if the wave travels the other way.
         let back = self::gauge(Direction {
             axis: 0,
             is_forward: false,

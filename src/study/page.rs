@@ -1,54 +1,56 @@
-//! One HTML page that stands alone: no script, no other file.
+//! A self-contained HTML page: no script, no other file.
 
 use std::fmt::Write as _;
 
 /// A part of a page.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Part {
-    /// What the page says, in one sentence.
+    /// The main result, in one sentence.
     Answer(String),
     /// A heading.
     Heading(String),
-    /// A smaller one.
+    /// A smaller heading.
     Subheading(String),
     /// A paragraph.
     Text(String),
-    /// The first row are titles, the first column too. What is the same in all rows of a wide one is told once, below.
+    /// A table of numbers with titles in its first row and column. In a wide table, columns that
+    /// are equal in all rows are stated once below it.
     Table(Vec<Vec<String>>),
-    /// The same of words, each column from its left.
+    /// A table of words, with left-aligned columns.
     Words(Vec<Vec<String>>),
-    /// A table whose rows are coloured.
+    /// A table whose rows are coloured by their verdict.
     Verdicts {
-        /// Of the columns.
+        /// Titles of the columns.
         titles: Vec<String>,
-        /// As many cells as titles.
+        /// Tone and cells of each row; as many cells as titles.
         rows: Vec<(Tone, Vec<String>)>,
     },
-    /// Pictures: titles of the columns, then rows of a title and one address a column.
+    /// A grid of pictures: column titles, then rows with a title and one picture address per
+    /// column.
     Pictures {
-        /// One a column.
+        /// Titles of the columns.
         columns: Vec<String>,
-        /// Title and addresses.
+        /// Title of each row and the addresses of its pictures.
         rows: Vec<(String, Vec<String>)>,
     },
-    /// SVG, put in as it is; one alone is as large as the page lets it be.
+    /// SVG documents, inserted as they are; a single one takes the width of the page.
     Curves(Vec<String>),
-    /// As typed in a terminal or a file.
+    /// Code as typed in a terminal or a file.
     Code(String),
-    /// What a reader opens who wants to know more: its title and what stands there.
+    /// A collapsible section: its title and its content.
     Folded(String, Vec<Part>),
 }
 
-/// How a row looks.
+/// Colour of a table row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Tone {
-    /// Like any other.
+    /// No colour.
     Plain,
-    /// As it should be.
+    /// As expected.
     Good,
-    /// Not as it should be.
+    /// Not as expected.
     Bad,
-    /// Not as it should be, and known.
+    /// Not as expected, but a known limitation.
     Known,
 }
 
@@ -63,11 +65,11 @@ impl Tone {
     }
 }
 
-/// Columns from which on a table is wide.
+/// Number of columns from which on a table is wide.
 const WIDE: usize = 9;
 
-/// Nothing is wider than the window: text and code break where they have to, and curves shrink. Cells break within a number
-/// in narrow windows alone.
+/// Nothing is wider than the window: text and code break where necessary, and curves shrink. Cells
+/// break within a number only in narrow windows.
 const STYLE: &str = "body{font:15px/1.5 sans-serif;max-width:1300px;margin:2em auto;padding:0 1em;color:#222;\
 overflow-wrap:anywhere}h1,h2{font-weight:600}h3{margin:1.4em 0 .3em;font-weight:600}\
 .answer{font-size:1.25em;margin:.5em 0 1em}summary{cursor:pointer;font-weight:600;margin:.8em 0}\
@@ -84,7 +86,7 @@ th,td{overflow-wrap:break-word}@media(max-width:1100px){th,td{overflow-wrap:anyw
 .curve{max-width:900px}svg{display:block;width:100%;height:auto}\
 pre{background:#f4f4f4;padding:.8em;white-space:pre-wrap}";
 
-/// The page.
+/// Renders the page.
 pub fn html(title: &str, parts: &[Part]) -> String {
     let title = escaped(title);
     let mut out = format!(
@@ -167,7 +169,7 @@ fn write_table<'a>(
         let cell = |text: &String| format!("<{tag}>{}</{tag}>", escaped(text));
         cells.iter().map(cell).collect::<String>()
     };
-    // Names of columns break where their words do.
+    // Column names may break between their words.
     let head = cells("th", titles).replace('_', "_<wbr>");
     writeln!(out, "<table class=\"{class}\">\n<tr>{head}</tr>")?;
     for (tone, row) in rows {
@@ -177,7 +179,8 @@ fn write_table<'a>(
     writeln!(out, "</table>")
 }
 
-/// A wide table without the columns that are the same in all of its rows, but the first, and what stands in these.
+/// Removes from a wide table the columns, except the first, that are equal in all rows, and states
+/// their values in a sentence.
 fn told_once(rows: &[Vec<String>]) -> (String, Vec<Vec<String>>) {
     let [titles, body @ ..] = rows else {
         return (String::new(), vec![Vec::new()]);
@@ -195,7 +198,7 @@ fn told_once(rows: &[Vec<String>]) -> (String, Vec<Vec<String>>) {
     (told.join(", "), rows.iter().map(kept).collect())
 }
 
-/// Text as HTML and SVG take it, also within quotes.
+/// Escapes text for HTML and SVG, also inside quotes.
 pub fn escaped(text: &str) -> String {
     text.replace('&', "&amp;")
         .replace('<', "&lt;")
@@ -264,7 +267,7 @@ mod tests {
         );
         assert!(page.contains("<td>x</td><td>2</td>"), "{page}");
         assert!(page.contains("In every row: b same, d 3, e 4"), "{page}");
-        // Negative controls: one row alone, and a narrow table, keep all.
+        // Negative controls: a single row and a narrow table keep all columns.
         let narrow: Vec<Vec<String>> = rows.iter().map(|row| row[..3].to_vec()).collect();
         for rows in [rows[..2].to_vec(), narrow] {
             let page = html("t", &[Part::Table(rows)]);

@@ -1,36 +1,33 @@
-//! Pictures that stand in a page: reduced, and as text.
+//! Pictures embedded in a page: reduced in size, and encoded as text.
 
 use base64::{Engine, engine::general_purpose::STANDARD};
 use png::{BitDepth, ColorType};
 
-/// Widest picture in a page, pixels; a wider one is reduced by a whole factor.
+/// Widest picture in a page, pixels; a wider one is reduced by an integer factor.
 const MAX_WIDTH: u32 = 640;
 
-/// Why a picture cannot stand in a page.
+/// Why a picture cannot be embedded in a page.
 #[derive(Debug, thiserror::Error)]
 pub enum PictureError {
-    /// It is no PNG, or a torn one.
+    /// It is not a PNG, or a truncated one.
     #[error(transparent)]
     Decode(#[from] png::DecodingError),
-    /// It cannot be written again.
+    /// The reduced picture cannot be encoded.
     #[error(transparent)]
     Encode(#[from] png::EncodingError),
-    /// It is not as our renderer writes them.
+    /// It does not have the format that our renderer writes.
     #[error("it is no 8-bit RGB or RGBA picture")]
     Kind,
 }
 
-/// A PNG as the address of an `<img>`, reduced to at most 640 pixels of width.
-///
-/// # Errors
-/// [`PictureError`].
+/// Encodes a PNG as a `data:` URI for an `<img>`, reduced to at most 640 pixels of width.
 pub fn data_uri(png_bytes: &[u8]) -> Result<String, PictureError> {
     let reduced = reduced(png_bytes)?;
     let bytes = reduced.as_deref().unwrap_or(png_bytes);
     Ok(format!("data:image/png;base64,{}", STANDARD.encode(bytes)))
 }
 
-/// `None` where it is small enough.
+/// The reduced picture; `None` if it is small enough already.
 fn reduced(png_bytes: &[u8]) -> Result<Option<Vec<u8>>, PictureError> {
     let mut reader = png::Decoder::new(std::io::Cursor::new(png_bytes)).read_info()?;
     let mut pixels = vec![0; reader.output_buffer_size().unwrap_or(0)];
@@ -98,7 +95,7 @@ mod tests {
         let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
         let info = reader.next_frame(&mut pixels).unwrap();
         assert_eq!((info.width, info.height), (427, 2));
-        // Columns 0, 200, 0 and rows 0, 1, 2.
+        // The mean of columns 0, 200, 0 and rows 0, 1, 2.
         assert_eq!(pixels[..3], [67, 7, 1]);
         assert!(data_uri(b"no picture").is_err());
         // The signature of a PNG.

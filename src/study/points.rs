@@ -1,22 +1,23 @@
-//! Particles as balls, drawn on the CPU in milliseconds: what a frame holds, and no render of it.
+//! Draws particles as balls on the CPU within milliseconds: a look at a frame's content, not a
+//! render.
 //!
-//! The projection is parallel, so that lengths compare across the picture, and nearness is by a depth for each pixel. Light comes from
-//! the eye; there is no water between the balls.
+//! The projection is parallel, so that lengths are comparable across the picture, and a depth
+//! buffer resolves visibility. Light comes from the eye; the space between the balls is empty.
 
 use glam::{DVec2, DVec3};
 
 use super::rgb::Rgb;
 use swell_domain::{bounds::Bounds, mesh::TriangleMesh, particles::Particles};
 
-/// From where particles are looked at.
+/// Viewing direction.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Aspect {
-    /// Along -z: x goes right and y up.
+    /// Along -z: x points right and y up.
     #[default]
     Side,
-    /// Along -y: x goes right and -z up.
+    /// Along -y: x points right and -z up.
     Top,
-    /// From above the corner of least x and greatest z.
+    /// From above the corner with least x and greatest z.
     Corner,
 }
 
@@ -25,22 +26,23 @@ pub enum Aspect {
 pub struct Projection {
     right: DVec3,
     up: DVec3,
-    /// Unit vector to the eye.
+    /// Unit vector towards the eye.
     toward: DVec3,
-    /// Place in the world, metres, of the picture's middle.
+    /// World position at the middle of the picture, metres.
     centre: DVec3,
-    /// Pixels a metre.
+    /// Pixels per metre.
     scale: f64,
     /// Columns and rows.
     size: [usize; 2],
 }
 
-/// What is drawn of a frame beside its particles; metres, about the particles' origin.
+/// What is drawn besides the particles; metres, relative to the particles' origin.
 #[derive(Clone, Copy, Debug)]
 pub struct Around<'a> {
     /// Drawn as its edges.
     pub domain: Bounds,
-    /// The box that the walls leave to the water now, drawn as its edges where it is another one.
+    /// The box that the walls currently leave to the water, drawn as its edges if it differs from
+    /// the domain.
     pub walls: Bounds,
     /// Drawn in grey.
     pub solids: &'a [TriangleMesh],
@@ -50,22 +52,22 @@ const GROUND: [f32; 3] = [15.0, 18.0, 23.0];
 const DOMAIN: [f32; 3] = [70.0, 78.0, 88.0];
 const WALLS: [f32; 3] = [214.0, 110.0, 40.0];
 const SOLID: [f32; 3] = [150.0, 146.0, 138.0];
-/// Colours of rising speeds, evenly spread up to the greatest.
+/// Colours of rising speeds, evenly spaced up to the top speed.
 const SPEEDS: [[f32; 3]; 4] = [
     [18.0, 52.0, 120.0],
     [24.0, 130.0, 196.0],
     [118.0, 208.0, 226.0],
     [255.0, 255.0, 255.0],
 ];
-/// Room about the domain, of the picture's width.
+/// Margin around the domain, as a fraction of the picture's width.
 const MARGIN: f64 = 0.03;
-/// Rows of a picture at most and at least, of its columns.
+/// Least and greatest number of rows, as fractions of the number of columns.
 const SHAPE: [f64; 2] = [0.25, 0.75];
-/// Pixels along each axis of which one of the picture is the mean.
+/// Supersampling factor along each axis.
 const FINER: usize = 2;
 
 impl Projection {
-    /// Of a domain, as a picture of so many columns.
+    /// Projects a domain onto a picture of `width` columns.
     pub fn of(from: Aspect, domain: &Bounds, width: usize) -> Self {
         let (right, up) = match from {
             Aspect::Side => (DVec3::X, DVec3::Y),
@@ -100,7 +102,7 @@ impl Projection {
         }
     }
 
-    /// The same for places that count from elsewhere: `way` is what they have more, metres.
+    /// The same view for positions that are larger by `way`, metres.
     #[must_use]
     pub fn moved(self, way: DVec3) -> Self {
         Self {
@@ -114,7 +116,8 @@ impl Projection {
         self.size
     }
 
-    /// Column and row of a place, and how near it is, metres; of a picture that is so many times finer.
+    /// Column and row of a position in a picture that is `finer` times as fine, and its nearness,
+    /// metres.
     fn place(&self, place: DVec3, finer: f64) -> (DVec2, f64) {
         let from = place - self.centre;
         let [columns, rows] = self.size.map(|side| 0.5 * side as f64);
@@ -123,7 +126,8 @@ impl Projection {
         (finer * DVec2::new(x, y), from.dot(self.toward))
     }
 
-    /// A frame: balls as wide as particles are apart, `spacing` metres, coloured by their speed up to `top` m/s.
+    /// Draws a frame: balls with the particle spacing (metres) as diameter, coloured by speed up to
+    /// `top` m/s.
     pub fn draw(&self, water: &Particles, spacing: f64, top: f64, around: &Around<'_>) -> Rgb {
         let size = self.size.map(|side| side * FINER);
         let mut canvas = Canvas {
@@ -156,7 +160,7 @@ impl Projection {
     }
 }
 
-/// The colour of a part of the greatest speed.
+/// Colour of a fraction of the top speed.
 fn ramp(part: f32) -> [f32; 3] {
     let at = part * (SPEEDS.len() - 1) as f32;
     let below = (at as usize).min(SPEEDS.len() - 2);
@@ -164,7 +168,7 @@ fn ramp(part: f32) -> [f32; 3] {
     std::array::from_fn(|k| SPEEDS[below][k] + rest * (SPEEDS[below + 1][k] - SPEEDS[below][k]))
 }
 
-/// The eight of them; two that differ in one bit of their number share an edge.
+/// The eight corners; two whose indices differ in one bit share an edge.
 fn corners(bounds: &Bounds) -> [DVec3; 8] {
     std::array::from_fn(|k| {
         let pick = |axis: usize| match k >> axis & 1 {
@@ -179,7 +183,7 @@ struct Canvas<'a> {
     projection: &'a Projection,
     size: [usize; 2],
     colour: Vec<[f32; 3]>,
-    /// How near the nearest is, metres.
+    /// Nearness of the nearest surface, metres.
     depth: Vec<f64>,
 }
 
@@ -188,7 +192,7 @@ impl Canvas<'_> {
         self.projection.place(place, FINER as f64)
     }
 
-    /// Pixels between two ends along an axis, of what is on the picture.
+    /// Pixels between two ends along an axis, clipped to the picture.
     fn between(&self, axis: usize, low: f64, high: f64) -> std::ops::Range<usize> {
         let most = self.size[axis] as f64;
         let [low, high] = [low.floor(), high.ceil() + 1.0].map(|x| x.clamp(0.0, most) as usize);
@@ -203,7 +207,7 @@ impl Canvas<'_> {
         }
     }
 
-    /// The twelve edges of a box, over all that is there.
+    /// Draws the twelve edges of a box over everything.
     fn edges(&mut self, bounds: &Bounds, colour: [f32; 3]) {
         let corners = corners(bounds).map(|corner| self.place(corner).0);
         for (a, b) in (0..8).flat_map(|a| (0..3).map(move |axis| (a, a | 1 << axis))) {
@@ -223,10 +227,10 @@ impl Canvas<'_> {
         }
     }
 
-    /// A ball, brighter where it faces the eye.
+    /// Draws a ball, brighter where it faces the eye.
     fn ball(&mut self, place: DVec3, radius: f64, colour: [f32; 3]) {
         let (at, depth) = self.place(place);
-        // Less than a pixel would be lost between two.
+        // A ball smaller than a pixel could fall between two pixel centres.
         let reach = (radius * self.projection.scale * FINER as f64).max(0.71);
         for y in self.between(1, at.y - reach, at.y + reach) {
             for x in self.between(0, at.x - reach, at.x + reach) {
@@ -241,7 +245,7 @@ impl Canvas<'_> {
         }
     }
 
-    /// A triangle, brighter where it faces up or the eye, from either side.
+    /// Draws a two-sided triangle, brighter where it faces up or the eye.
     fn triangle(&mut self, corners: [DVec3; 3]) {
         let normal = (corners[1] - corners[0])
             .cross(corners[2] - corners[0])
@@ -303,7 +307,8 @@ mod tests {
 
     #[test]
     fn places_are_where_they_are_and_speeds_have_their_colours() {
-        // 400 columns for 4 m and a margin of 12 on either side: 94 pixels a metre; 2 m and margins are 212 rows.
+        // 400 columns for 4 m and a margin of 12 on either side: 94 pixels per metre; 2 m and
+        // margins are 212 rows.
         let side = Projection::of(Aspect::Side, &TANK, 400);
         assert_eq!((side.size(), side.scale), ([400, 212], 94.0));
         let still = ([1.0, 0.5, 0.5], 0.0);
@@ -312,12 +317,12 @@ mod tests {
         let [blue, white] = [[106, 153], [294, 59]].map(|at| bright(&picture, at));
         assert!(blue[2] > 100 && blue[0] < 25, "{blue:?}");
         assert!(white.iter().all(|&x| x > 240), "{white:?}");
-        // The control: nothing beside them, and the middle of the domain is empty.
+        // Control: there is nothing beside them, and the middle of the domain is empty.
         assert_eq!(bright(&picture, [200, 106]), GROUND.map(|x| x as u8));
         let radius = 0.5 * 0.2 * 94.0;
         let seen = picture.pixels.iter().filter(|p| p[0] > 120).count() as f64;
         let disc = std::f64::consts::PI * radius * radius;
-        // A ring of a pixel's width is partly covered.
+        // A ring one pixel wide is partly covered.
         assert!(
             (seen - disc).abs() < 2.0 * std::f64::consts::PI * radius,
             "{seen} {disc}"
@@ -338,7 +343,7 @@ mod tests {
         }
         let top = Projection::of(Aspect::Top, &TANK, 400);
         let picture = top.draw(&water(&[low, high]), 0.2, 3.0, &around(&[]));
-        // z up to the picture's bottom: 0.4 m from the middle are 37.6 pixels.
+        // z grows towards the picture's bottom: 0.4 m from the middle is 37.6 pixels.
         let middle = top.size()[1] / 2;
         assert!(bright(&picture, [200, middle + 37])[0] < 25);
         assert!(bright(&picture, [200, middle - 38])[0] > 240);

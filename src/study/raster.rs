@@ -1,4 +1,4 @@
-//! A drawn curve as PNG, with a font of its own, so that every machine draws the same.
+//! Renders an SVG chart as PNG with built-in fonts, so that every machine draws the same.
 
 use std::sync::Arc;
 
@@ -6,13 +6,13 @@ use resvg::{tiny_skia, usvg};
 
 use super::rgb::Rgb;
 
-/// Pixels a unit of the drawing.
+/// Pixels per unit of the drawing.
 const SCALE: f32 = 2.0;
 
-/// Why a drawing could not be made a picture.
+/// Why an SVG could not be rendered.
 #[derive(Debug, thiserror::Error)]
 pub enum RasterError {
-    /// It is no SVG.
+    /// It is not valid SVG.
     #[error("the drawing: {0}")]
     Svg(#[from] usvg::Error),
     /// It is too large, or its bytes could not be written.
@@ -20,10 +20,8 @@ pub enum RasterError {
     Png(String),
 }
 
-/// The bytes of a PNG of `svg`, two pixels a unit, text in Ubuntu Light, and in Hack what that lacks.
-///
-/// # Errors
-/// [`RasterError`].
+/// Renders `svg` as PNG with two pixels per unit. Text is in Ubuntu Light, with Hack for missing
+/// glyphs.
 pub fn png(svg: &str) -> Result<Vec<u8>, RasterError> {
     let picture = drawn(svg, SCALE)?;
     picture
@@ -31,10 +29,7 @@ pub fn png(svg: &str) -> Result<Vec<u8>, RasterError> {
         .map_err(|error| RasterError::Png(error.to_string()))
 }
 
-/// The pixels of `svg`, one a unit, in the same fonts; over black where it has no ground.
-///
-/// # Errors
-/// [`RasterError`].
+/// Renders `svg` as pixels, one per unit, in the same fonts; over black where it is transparent.
 pub fn rgb(svg: &str) -> Result<Rgb, RasterError> {
     let picture = drawn(svg, 1.0)?;
     let pixels = picture.pixels().iter();
@@ -77,7 +72,7 @@ fn drawn(svg: &str, scale: f32) -> Result<tiny_skia::Pixmap, RasterError> {
 mod tests {
     use super::*;
 
-    /// Dark pixels of a white drawing with `inside`.
+    /// Number of dark pixels of a white drawing with `inside`.
     fn dark(inside: &str) -> usize {
         let svg = format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 200 40\" font-family=\"sans-serif\" \
@@ -91,7 +86,7 @@ mod tests {
 
     #[test]
     fn text_is_drawn() {
-        // A letter of 40 pixels has strokes of about 3: some hundred dark pixels each.
+        // A letter 40 pixels high has strokes of about 3: some hundred dark pixels each.
         let text = dark("<text x=\"10\" y=\"28\">‖p − p64‖</text>");
         assert!(text > 300, "{text}");
         let more = dark("<text x=\"10\" y=\"28\">‖p − p64‖ mm</text>");

@@ -1,18 +1,18 @@
-//! Pictures of 8 bits a channel, as a screen shows them.
+//! Pictures with 8 bits per channel, as a screen shows them.
 
 use png::{BitDepth, ColorType, EncodingError};
 
-/// A picture without alpha, encoded sRGB; rows from the top.
+/// A picture without alpha, sRGB-encoded; rows from the top.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Rgb {
     /// Columns and rows, each at least 1.
     pub size: [usize; 2],
-    /// Red, green, blue; `size[0] × size[1]`.
+    /// Red, green, blue; `size[0] × size[1]` pixels.
     pub pixels: Vec<[u8; 3]>,
 }
 
 impl Rgb {
-    /// One colour all over.
+    /// A picture filled with one colour.
     pub fn filled(size: [usize; 2], colour: [u8; 3]) -> Self {
         Self {
             size,
@@ -20,7 +20,7 @@ impl Rgb {
         }
     }
 
-    /// The size of a picture of `size` that is at most `width` pixels wide, in the same shape.
+    /// Scales `size` down to at most `width` columns, keeping the aspect ratio.
     pub fn within(size: [usize; 2], width: usize) -> [usize; 2] {
         let [columns, rows] = size;
         if columns <= width {
@@ -30,7 +30,8 @@ impl Rgb {
         [width, scaled.max(1)]
     }
 
-    /// The picture in another size: each pixel is the mean of what it covers, of the encoded values, as browsers take it.
+    /// The picture in another size: each pixel is the area-weighted mean of the encoded values that
+    /// it covers, as browsers do it.
     #[must_use]
     pub fn resized(&self, size: [usize; 2]) -> Self {
         if size == self.size {
@@ -56,7 +57,8 @@ impl Rgb {
         }
     }
 
-    /// Puts another picture in, its upper left corner at `[column, row]`; what would stand outside is cut.
+    /// Copies another picture in with its upper left corner at `[column, row]`, clipped to this
+    /// picture.
     pub fn paste(&mut self, other: &Self, [left, top]: [usize; 2]) {
         let [columns, rows] = self.size;
         let width = other.size[0].min(columns.saturating_sub(left));
@@ -66,7 +68,7 @@ impl Rgb {
         }
     }
 
-    /// The picture, and another one of the same height to its right.
+    /// This picture with another one to its right; black fills the rest if their heights differ.
     #[must_use]
     pub fn beside(&self, other: &Self) -> Self {
         let size = [
@@ -79,10 +81,10 @@ impl Rgb {
         both
     }
 
-    /// The bytes of a PNG, which says that it is sRGB and what program it is from.
+    /// Encodes the picture as PNG, tagged as sRGB and with the name of the program.
     ///
     /// # Errors
-    /// Where a side is longer than PNG has.
+    /// A side longer than PNG allows.
     pub fn to_png(&self, software: &str) -> Result<Vec<u8>, EncodingError> {
         let [width, height] = self.size.map(|side| side as u32);
         let mut bytes = Vec::new();
@@ -98,7 +100,7 @@ impl Rgb {
     }
 }
 
-/// Pixels that one of the new ones covers: the first, and the weight of each, which add up to 1.
+/// Source pixels that one new pixel covers: the index of the first, and weights that add up to 1.
 struct Cover {
     first: usize,
     weights: Vec<f32>,
@@ -117,7 +119,7 @@ impl Cover {
     }
 }
 
-/// Of each of `to` pixels, where `from` stand along one axis.
+/// The source pixels that each of `to` pixels covers, of `from` along one axis.
 fn covers(from: usize, to: usize) -> Vec<Cover> {
     let step = from as f64 / to as f64;
     let cover = |k: usize| {
@@ -151,13 +153,14 @@ mod tests {
         // Halves: columns 0 and 1 have the mean 20, 2 and 3 have 100; rows 0 and 1 have 10.
         let half = ramp([4, 2]).resized([2, 1]);
         assert_eq!(half.pixels, [[20, 10, 7], [100, 10, 7]]);
-        // Thirds of four: the first covers column 0 and a third of column 1: 40 · (1/3) / (4/3) = 10.
+        // Thirds of four: the first covers column 0 and a third of column 1: 40 · (1/3) / (4/3) =
+        // 10.
         let third = ramp([4, 1]).resized([3, 1]);
         assert_eq!(
             third.pixels.iter().map(|p| p[0]).collect::<Vec<_>>(),
             [10, 60, 110]
         );
-        // A larger one repeats, and the same size is the same picture.
+        // Enlarging repeats pixels, and the same size gives the same picture.
         assert_eq!(
             ramp([2, 1]).resized([4, 1]).pixels[..3],
             [[0, 0, 7], [0, 0, 7], [40, 0, 7]]

@@ -1,4 +1,4 @@
-//! A contact sheet: pictures in rows, each with what it is below it.
+//! A contact sheet: pictures in rows, each with its label below.
 
 use std::fmt::Write as _;
 
@@ -11,26 +11,27 @@ use super::{
 /// A picture of a sheet.
 #[derive(Clone, Debug)]
 pub struct Cell {
-    /// Below it.
+    /// Text below the picture.
     pub label: String,
-    /// In the size that it gets.
+    /// The picture, already in its final size.
     pub picture: Rgb,
 }
 
-/// Around everything, and between pictures, pixels.
+/// Margin around everything and between pictures, pixels.
 const MARGIN: usize = 16;
-/// Height of a label, pixels, and of the title with the note below it.
+/// Height of a label, and of the title with the note below it, pixels.
 const LABEL: usize = 22;
 const HEAD: usize = 58;
-/// Narrower sheets would have no room for their title.
+/// Least width of a sheet, pixels; a narrower one has no space for its title.
 const LEAST_WIDTH: usize = 480;
-/// Pixels of a letter, about.
+/// Approximate width of a letter, pixels.
 const LETTER: f64 = 6.6;
 
-/// The sheet: a title, a note, and the pictures in rows of at most `columns`. A smaller picture stands in the middle of its place.
+/// Draws a sheet with a title, a note, and the pictures in rows of at most `columns`. Smaller
+/// pictures are centred in their cells.
 ///
 /// # Errors
-/// [`RasterError`]: a sheet too large to be drawn.
+/// [`RasterError`] for a sheet that is too large.
 pub fn sheet(title: &str, note: &str, cells: &[Cell], columns: usize) -> Result<Rgb, RasterError> {
     let columns = columns.clamp(1, cells.len().max(1));
     let most = |axis: usize| cells.iter().map(|cell| cell.picture.size[axis]).max();
@@ -71,7 +72,7 @@ pub fn sheet(title: &str, note: &str, cells: &[Cell], columns: usize) -> Result<
     Ok(all)
 }
 
-/// A text that has room in so many pixels, with its middle left out where it is too long.
+/// Shortens a text to `width` pixels by replacing its middle with an ellipsis.
 fn shortened(text: &str, width: usize, scale: f64) -> String {
     let room = ((width.saturating_sub(MARGIN)) as f64 / (LETTER * scale)) as usize;
     let letters: Vec<char> = text.chars().collect();
@@ -112,7 +113,7 @@ mod tests {
             let bright = label.filter(|&(x, y)| at(x, y)[1] > 120).count();
             assert!(bright > 20, "{k}: {bright}");
         }
-        // The control: no eighth picture and no eighth label.
+        // Control: there is no eighth picture and no eighth label.
         assert!((364..464).all(|x| (HEAD + 88..HEAD + 160).all(|y| at(x, y)[1] < 40)));
     }
 

@@ -1,4 +1,4 @@
-//! What a stability study measures of particles, apart from any scene.
+//! Scene-independent measurements of particles for stability studies.
 
 use std::collections::HashMap;
 
@@ -6,7 +6,7 @@ use glam::{DVec3, Vec3};
 
 use swell_domain::bounds::Bounds;
 
-/// Spacings within which the nearest particle is looked for.
+/// Distance in spacings within which the nearest particle is searched.
 const REACH: f64 = 2.0;
 
 /// A position in f64.
@@ -14,7 +14,8 @@ pub fn point(p: &[f32; 3]) -> DVec3 {
     Vec3::from_array(*p).as_dvec3()
 }
 
-/// Least distance of two particles in units of `spacing`; 2 where none are nearer, also where there is one alone.
+/// Least distance between two particles, in units of `spacing`; 2 if none are closer or there is
+/// only one.
 pub fn least_spacing(position: &[[f32; 3]], spacing: f64) -> f64 {
     let edge = REACH * spacing;
     let cell = |p: DVec3| (p / edge).floor().as_i64vec3().to_array();
@@ -33,9 +34,12 @@ pub fn least_spacing(position: &[[f32; 3]], spacing: f64) -> f64 {
     least / spacing
 }
 
-/// Volume of the water that fills its cells, over what its particles hold: of cells of two spacings that hold water and
-/// have water or the box's walls all about them, how many there are over the density in them, hats over what a full cell
-/// holds, mirrored at the walls. `None` where there are none. Positions are about the box's own origin.
+/// Volume that the water takes up, relative to the rest volume of its particles; `None` if no cell
+/// is full.
+///
+/// Counts the cells (two spacings wide) that hold water and whose 26 neighbours hold water or lie
+/// outside the box, and divides by their total density: trilinear (hat) weights relative to a full
+/// cell, mirrored at the walls. Positions are relative to the box's own origin.
 pub fn filled_volume(position: &[[f32; 3]], spacing: f64, domain: &Bounds) -> Option<f64> {
     let edge = 2.0 * spacing;
     let dims = (domain.size() / edge).round().as_i64vec3().to_array();
@@ -68,14 +72,14 @@ pub fn filled_volume(position: &[[f32; 3]], spacing: f64, domain: &Bounds) -> Op
     let is_filled = |[x, y, z]: [i64; 3]| {
         (0..27).all(|k| holds_water([x + k % 3 - 1, y + k / 3 % 3 - 1, z + k / 9 - 1]))
     };
-    // In order of cells: sums of f64 depend on it.
+    // Sorted by cell, because sums of f64 depend on the order.
     let mut filled: Vec<_> = cells.iter().filter(|(cell, _)| is_filled(**cell)).collect();
     filled.sort_by_key(|(cell, _)| **cell);
     let sum: f64 = filled.iter().map(|(_, (_, density))| density).sum();
     (!filled.is_empty()).then(|| filled.len() as f64 / sum)
 }
 
-/// Particles outside of a box.
+/// Number of particles outside of a box.
 pub fn outside(position: &[[f32; 3]], bounds: &Bounds) -> usize {
     position
         .iter()
@@ -83,8 +87,9 @@ pub fn outside(position: &[[f32; 3]], bounds: &Bounds) -> usize {
         .count()
 }
 
-/// For each particle of `ours` the one of `theirs` that starts where it does, `of` mapping their places to ours; `None`
-/// where none is within a quarter of `spacing`. Of several on one spot each goes to the next in turn.
+/// Finds for each particle of `ours` the one of `theirs` that starts at the same position, where
+/// `of` maps their positions to ours; `None` if there is none within a quarter of `spacing`. If
+/// several share a position, each is used once, in order.
 pub fn matched(
     ours: &[[f32; 3]],
     theirs: &[[f32; 3]],
@@ -106,7 +111,8 @@ pub fn matched(
         for key in around {
             for (place, (other, _)) in cells.get(&key).into_iter().flatten().enumerate() {
                 let distance = p.distance(*other);
-                // The later of equals: they lie there in reverse.
+                // Among equally close ones take the later, because the cell lists are in reverse
+                // order.
                 if distance <= near && best.is_none_or(|(least, ..)| distance <= least) {
                     best = Some((distance, key, place));
                 }
@@ -118,8 +124,8 @@ pub fn matched(
     ours.iter().map(find).collect()
 }
 
-/// Particles as their own parabolas have them, by symplectic Euler: in n equal substeps of a frame of T seconds
-/// x += v T + g T² (n + 1) / 2n, and v += g T.
+/// Ballistic particle paths by symplectic Euler: in n equal substeps of a frame of T seconds x += v
+/// T + g T² (n + 1) / 2n, and v += g T.
 #[derive(Clone, Debug)]
 pub struct Flight {
     position: Vec<DVec3>,
@@ -128,7 +134,7 @@ pub struct Flight {
 }
 
 impl Flight {
-    /// From a start.
+    /// Starts from these positions (metres) and velocities (m/s).
     pub fn new(position: &[[f32; 3]], velocity: &[[f32; 3]]) -> Self {
         Self {
             position: position.iter().map(point).collect(),
@@ -137,7 +143,7 @@ impl Flight {
         }
     }
 
-    /// One frame.
+    /// Advances by one frame.
     pub fn advance(&mut self, gravity: DVec3, seconds: f64, substeps: u32) {
         let n = f64::from(substeps.max(1));
         let fall = gravity * seconds * seconds * (n + 1.0) / (2.0 * n);
@@ -150,7 +156,7 @@ impl Flight {
         }
     }
 
-    /// Farthest that a particle is from its parabola, over the way along it.
+    /// Largest distance of a particle from its parabola, relative to the length of the path.
     pub fn error(&self, position: &[[f32; 3]]) -> f64 {
         let all = self.position.iter().zip(&self.way).zip(position);
         all.map(|((x, way), p)| x.distance(point(p)) / way)
@@ -188,8 +194,9 @@ mod tests {
             (0..8).flat_map(layer).map(at).collect()
         };
         assert_eq!(filled_volume(&lattice(1.0), 1.0, &domain), Some(1.0));
-        // By hand: its cells below the topmost have 1.1, 1.1125 and 1.1375 of a full one's, halves of the hats at 1, 3 and
-        // 5 of layers at 0.45, 1.35, 2.25 and so on; what the floor mirrors counts to the first.
+        // By hand: the cells below the topmost hold 1.1, 1.1125 and 1.1375 of a full cell's
+        // density: half of the hat weights at 1, 3 and 5 of layers at 0.45, 1.35, 2.25 and so on;
+        // what the floor mirrors counts towards the first.
         let pressed = filled_volume(&lattice(0.9), 1.0, &domain).unwrap();
         assert!((pressed - 3.0 / 3.35).abs() < 1e-6, "{pressed}");
         assert_eq!(filled_volume(&[[0.5; 3]], 1.0, &domain), None);

@@ -1,44 +1,49 @@
-//! The cheapest settings that hold an error: laws fitted to the runs of one shot, what they promise, and which run keeps it.
+//! The cheapest settings that keep an error below its limit: power laws fitted to runs of one shot,
+//! the proposals that follow from them, and the choice among the runs.
 //!
-//! A run at spacing d differs from one at spacing r by C (dᵖ − rᵖ), as Richardson's extrapolation (1911) has it: what both have
-//! wrong is not seen. A time goes as C dᵖ, with p below 0. What another setting changes is taken to add to the error and to
-//! multiply the time. Neither is sure, so that what is proposed here is run before it is believed.
+//! A run at spacing d differs from one at spacing r by C (dᵖ − rᵖ), as in Richardson's
+//! extrapolation (1911); errors that both share are invisible. Time scales as C dᵖ with p below 0.
+//! Every other setting is assumed to add to the error and to multiply the time. Neither assumption
+//! is certain, so a proposal is run before it is accepted.
 
 use std::ops::RangeInclusive;
 
-/// Orders that a fit tries, in hundredths.
+/// Resolution of the fitted orders: hundredths.
 const STEPS: f64 = 100.0;
 
-/// Orders of an error against a finer run: below a quarter nothing converges, and no scheme here is above fourth.
+/// Orders tried for an error against a finer run, in hundredths: below a quarter nothing converges,
+/// and no scheme here is above fourth order.
 const ORDERS: RangeInclusive<i32> = 25..=400;
 
-/// Orders of what has no reference, times and density errors: they may rise or fall with the spacing.
+/// Orders tried for quantities without a reference (times, density errors), in hundredths: they may
+/// rise or fall with the spacing.
 const ANY_ORDERS: RangeInclusive<i32> = -800..=800;
 
-/// Part of a limit that a proposal may use up by the laws; the rest is for what they have wrong.
+/// Fraction of a limit that a proposal may use by the laws; the rest covers their inaccuracy.
 const MARGIN: f64 = 0.9;
 
-/// A power of the spacing.
+/// A power law of the particle spacing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Law {
-    /// p.
+    /// Order p.
     pub order: f64,
-    /// C, in the unit of what is fitted, with metres.
+    /// Factor C, in the unit of the fitted quantity, with the spacing in metres.
     pub factor: f64,
-    /// r, metres; 0 of what has no reference.
+    /// Reference spacing r, metres; 0 without a reference.
     pub reference: f64,
     /// RMS of ln(measured / fitted).
     pub scatter: f64,
 }
 
 impl Law {
-    /// Through pairs of spacing (metres) and error against the run at spacing `reference` (metres), by least squares of
-    /// logarithms. Pairs without an error, or not coarser than the reference, tell nothing; `None` for fewer than two spacings.
+    /// Fits pairs of spacing (metres) and error against the run at spacing `reference` (metres), by
+    /// least squares of the logarithms. Pairs without an error, or not coarser than the reference,
+    /// are ignored; `None` for fewer than two spacings.
     pub fn against(reference: f64, pairs: &[(f64, f64)]) -> Option<Self> {
         Self::fit(reference, pairs, ORDERS)
     }
 
-    /// The same of what has no reference: a time, a density error.
+    /// Fits a quantity without a reference: a time, a density error.
     pub fn plain(pairs: &[(f64, f64)]) -> Option<Self> {
         Self::fit(0.0, pairs, ANY_ORDERS)
     }
@@ -73,7 +78,8 @@ impl Law {
             .min_by(|a, b| a.scatter.total_cmp(&b.scatter))
     }
 
-    /// What a run at spacing `d`, metres, is off from the reference by; 0 where it is as fine.
+    /// Predicted difference from the reference at spacing `d`, metres; 0 if `d` is as fine. Without
+    /// a reference, the predicted quantity itself.
     pub fn at(&self, d: f64) -> f64 {
         if self.reference == 0.0 {
             return self.factor * d.powf(self.order);
@@ -82,7 +88,7 @@ impl Law {
         self.factor * part.max(0.0)
     }
 
-    /// What the reference itself is off by; 0 of what has none.
+    /// Predicted error of the reference itself; 0 without a reference.
     pub fn of_reference(&self) -> f64 {
         match self.reference {
             0.0 => 0.0,
@@ -90,12 +96,14 @@ impl Law {
         }
     }
 
-    /// Whether an order of convergence is to be seen: above the least that is tried, and without runs that are off by half as much again.
+    /// Whether the runs show an order of convergence: it is above the least that is tried, and the
+    /// runs scatter by less than a factor of 1.5.
     pub fn is_seen(&self) -> bool {
         self.order > f64::from(*ORDERS.start()) / STEPS && self.scatter.exp() < 1.5
     }
 
-    /// The law after a run at its proposal came out `ratio` times as far off; one run is believed up to a factor of two.
+    /// Corrects the law after a run at its proposal was `ratio` times as far off as predicted. A
+    /// single run is trusted up to a factor of two.
     pub fn corrected(self, ratio: f64) -> Self {
         Self {
             factor: self.factor * ratio.clamp(0.5, 2.0),
@@ -104,17 +112,17 @@ impl Law {
     }
 }
 
-/// What another value of a setting does, by a run with it and all else as the scene has it.
+/// Effect of another value of a setting, from a run that changes only this value.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Effect {
-    /// Time over that with the scene's own value.
+    /// Time relative to that with the scene's own value.
     pub time: f64,
-    /// What it adds to each error, in the order of the limits; below 0 where it is better.
+    /// What it adds to each error, in the order of the limits; negative if it is better.
     pub errors: Vec<f64>,
 }
 
 impl Effect {
-    /// Of the scene's own value.
+    /// The effect of the scene's own value: none.
     pub fn none(errors: usize) -> Self {
         Self {
             time: 1.0,
@@ -123,43 +131,44 @@ impl Effect {
     }
 }
 
-/// What is known of a shot.
+/// Everything known about a shot.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Model {
-    /// Of each error, in the order of the limits.
+    /// Law of each error, in the order of the limits.
     pub errors: Vec<Law>,
-    /// Of a frame's seconds.
+    /// Law of the seconds per frame.
     pub time: Law,
-    /// Values of each further setting; the scene's own is the first.
+    /// Effects of the values of each further setting; the scene's own value is the first.
     pub settings: Vec<Vec<Effect>>,
-    /// What a proposal chooses from, metres: within the spacings that were run, as beyond them no law was seen to hold.
+    /// Candidate spacings, metres: within the spacings that were run, because the laws are untested
+    /// beyond.
     pub spacings: Vec<f64>,
 }
 
-/// What may not be exceeded.
+/// Limits that must not be exceeded.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Limits {
-    /// Of each error, in its own unit.
+    /// Limit of each error, in its own unit.
     pub errors: Vec<f64>,
-    /// Of a frame.
+    /// Limit of the seconds per frame.
     pub seconds: Option<f64>,
 }
 
-/// Settings that the laws call cheapest.
+/// The settings that are cheapest by the laws.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Proposal {
-    /// Metres.
+    /// Particle spacing, metres.
     pub spacing: f64,
-    /// Which value of each further setting.
+    /// Index of the value of each further setting.
     pub values: Vec<usize>,
-    /// What the laws say of each error.
+    /// Predicted errors, in the order of the limits.
     pub errors: Vec<f64>,
-    /// Of a frame, by the laws.
+    /// Predicted seconds per frame.
     pub seconds: f64,
 }
 
 impl Model {
-    /// What the laws say of a spacing, metres, with these values of the further settings.
+    /// Predicts errors and time for a spacing (metres) and these values of the further settings.
     pub fn predict(&self, spacing: f64, values: &[usize]) -> Proposal {
         let chosen = || self.settings.iter().zip(values).map(|(of, &k)| &of[k]);
         let added = |k: usize| chosen().map(|effect| effect.errors[k]).sum::<f64>();
@@ -174,7 +183,8 @@ impl Model {
         }
     }
 
-    /// The cheapest settings that hold the limits by the laws with a tenth to spare; `None` where none do.
+    /// The cheapest settings that keep the limits by the laws with a tenth to spare; `None` if
+    /// there are none.
     pub fn propose(&self, limits: &Limits) -> Option<Proposal> {
         let holds = |proposal: &Proposal| {
             let mut pairs = proposal.errors.iter().zip(&limits.errors);
@@ -204,17 +214,18 @@ fn combinations(settings: &[Vec<Effect>]) -> Vec<Vec<usize>> {
     })
 }
 
-/// A run that came to its end.
+/// A completed run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Candidate {
-    /// Of a frame.
+    /// Seconds per frame.
     pub seconds: f64,
-    /// Measured, in the order of the limits; `None` where it cannot be told.
+    /// Measured errors, in the order of the limits; `None` if one could not be determined.
     pub errors: Vec<Option<f64>>,
 }
 
 impl Candidate {
-    /// The largest of what was measured over what is allowed: up to 1 all limits hold. Infinite where an error cannot be told.
+    /// The largest ratio of a measured value to its limit: up to 1 all limits hold. Infinite if an
+    /// error could not be determined.
     pub fn excess(&self, limits: &Limits) -> f64 {
         let pairs = self.errors.iter().zip(&limits.errors);
         let errors = pairs.map(|(error, limit)| error.map_or(f64::INFINITY, |e| e / limit));
@@ -223,16 +234,17 @@ impl Candidate {
     }
 }
 
-/// Which run is chosen.
+/// The chosen run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Choice {
-    /// The cheapest that holds all limits.
+    /// The cheapest that keeps all limits.
     Holds(usize),
-    /// No run does; this one comes nearest.
+    /// No run keeps all limits; this one comes nearest.
     Nearest(usize),
 }
 
-/// The cheapest run that holds all limits, else the nearest to that; `None` without runs.
+/// Chooses the cheapest run that keeps all limits, else the one nearest to that; `None` without
+/// runs.
 pub fn choose(runs: &[Candidate], limits: &Limits) -> Option<Choice> {
     let each = || runs.iter().enumerate();
     let holding = each().filter(|(_, run)| run.excess(limits) <= 1.0);
@@ -248,7 +260,8 @@ pub fn choose(runs: &[Candidate], limits: &Limits) -> Option<Choice> {
 mod tests {
     use super::*;
 
-    /// 3 d^1.5 against a run at 0.08: what is fitted is what was put in, the reference's own error among it.
+    /// 3 d^1.5 against a run at 0.08: the fit returns what was put in, the reference's own error
+    /// included.
     fn measured(order: f64) -> Vec<(f64, f64)> {
         let of = |d: f64| (d, 3.0 * (d.powf(order) - 0.08f64.powf(order)));
         [0.2, 0.16, 0.128, 0.1].map(of).to_vec()
@@ -266,7 +279,8 @@ mod tests {
             assert!(law.scatter < 1e-12 && law.at(0.08) == 0.0);
             assert!(close(law.of_reference(), 3.0 * 0.08f64.powf(order)));
         }
-        // Negative controls: who takes the reference for the truth finds too high an order, and a spoiled run shows.
+        // Negative controls: taking the reference for the truth gives too high an order, and a
+        // spoiled run shows.
         let blind = Law::plain(&measured(1.0)).expect("four spacings");
         assert!(blind.order > 1.5 && blind.scatter > 0.05, "{blind:?}");
         let mut spoiled = measured(1.0);
@@ -285,12 +299,13 @@ mod tests {
         assert!(close(law.order, -4.0) && close(law.factor, 2e-4), "{law:?}");
         assert_eq!(Law::plain(&[(0.1, 1.0), (0.1, 2.0)]), None);
         assert_eq!(Law::plain(&[]), None);
-        // An error of 0 and a run as fine as the reference tell nothing.
+        // An error of 0 and a run as fine as the reference carry no information.
         let pairs = [(0.08, 1.0), (0.1, 0.0), (0.2, 1.0)];
         assert_eq!(Law::against(0.08, &pairs), None);
     }
 
-    /// Error d − 0.05, time 1e-4 d⁻⁴; one setting halves the time for 0.02 more error, or doubles it for 0.03 less.
+    /// Error d − 0.05, time 1e-4 d⁻⁴; one setting halves the time for 0.02 more error, or doubles
+    /// it for 0.03 less.
     fn model() -> Model {
         Model {
             errors: vec![Law {
@@ -327,8 +342,8 @@ mod tests {
         }
     }
 
-    /// By hand, with 0.9 of the limit to use: 0.1 leaves d = 0.14 with the own value (0.260), 0.12 with the fast one
-    /// (0.241), 0.17 with the slow one (0.239).
+    /// By hand, with 0.9 of the limit to use: 0.1 leaves d = 0.14 with the own value (0.260), 0.12
+    /// with the fast one (0.241), 0.17 with the slow one (0.239).
     #[test]
     fn the_cheapest_of_the_product_is_proposed() {
         let of = |error: f64| model().propose(&limits(error));
@@ -336,12 +351,12 @@ mod tests {
         assert_eq!(proposal.values, [2]);
         assert_eq!(proposal.spacing, 0.17);
         assert!(proposal.errors[0] <= 0.09 + 1e-12);
-        // Without the slow value the fast one wins; where it has no room, the own.
+        // Without the slow value the fast one wins; where its error is too large, the own value.
         let mut two = model();
         two.settings[0].truncate(2);
         let values = |error: f64| two.propose(&limits(error)).expect("one").values;
         assert_eq!((values(0.1), values(0.02)), (vec![1], vec![0]));
-        // Nothing holds what the finest spacing does not, or more than the time that there is.
+        // Nothing meets a limit that the finest spacing misses, or a time limit that is too short.
         assert_eq!(two.propose(&limits(0.01)), None);
         let hurried = |seconds| {
             let limits = Limits {
@@ -385,7 +400,7 @@ mod tests {
         assert_eq!(of(limits(0.02, 0.01, None)), Some(Choice::Holds(1)));
         assert_eq!(of(limits(0.06, 0.01, None)), Some(Choice::Holds(0)));
         assert_eq!(of(limits(0.02, 0.0015, None)), Some(Choice::Holds(2)));
-        // An error that cannot be told holds nothing, however cheap the run is.
+        // A run whose error could not be determined keeps no limit, however cheap it is.
         assert_eq!(of(limits(0.005, 0.01, None)), Some(Choice::Nearest(2)));
         assert_eq!(of(limits(0.015, 0.01, Some(2.9))), Some(Choice::Nearest(2)));
         assert_eq!(choose(&[], &limits(1.0, 1.0, None)), None);

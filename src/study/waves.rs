@@ -1,4 +1,5 @@
-//! What benchmarks with a known answer measure of a signal, a curve or a profile: pure functions, apart from any scene.
+//! Measurements of signals, curves and profiles for benchmarks with a known answer: pure functions,
+//! independent of any scene.
 
 use std::f64::consts::TAU;
 
@@ -7,17 +8,17 @@ use glam::DVec2;
 /// One harmonic of a signal, a + c cos(ωt) + s sin(ωt) = a + A cos(ωt − φ).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Harmonic {
-    /// a, in the signal's unit.
+    /// Mean a, in the signal's unit.
     pub mean: f64,
-    /// A ≥ 0, in the signal's unit.
+    /// Amplitude A ≥ 0, in the signal's unit.
     pub amplitude: f64,
-    /// φ, radians, from −π to π.
+    /// Phase φ, radians, from −π to π.
     pub phase: f64,
 }
 
-/// The harmonic of angular frequency `omega` (rad/s) that fits samples (seconds, value) best by least squares. No trend is
-/// free, which a slow drift would otherwise share with the wave. `None` where fewer than four samples or too short a time
-/// leave it undetermined.
+/// Fits the harmonic of angular frequency `omega` (rad/s) to samples (seconds, value) by least
+/// squares. There is no trend term, which a slow drift would otherwise share with the wave. `None`
+/// if fewer than four samples or too short a time leave the fit undetermined.
 pub fn harmonic(samples: &[(f64, f64)], omega: f64) -> Option<Harmonic> {
     if samples.len() < 4 {
         return None;
@@ -39,14 +40,15 @@ pub fn harmonic(samples: &[(f64, f64)], omega: f64) -> Option<Harmonic> {
     })
 }
 
-/// Three unknowns of three linear equations, right-hand sides last, by Gauss with pivots; `None` where they are singular.
+/// Solves three linear equations, right-hand sides last, by Gaussian elimination with pivoting;
+/// `None` if they are singular.
 fn solved(mut rows: [[f64; 4]; 3]) -> Option<[f64; 3]> {
     let scale = rows.iter().flatten().fold(0.0f64, |a, v| a.max(v.abs()));
     for k in 0..3 {
         let pivot = (k..3).max_by(|&a, &b| rows[a][k].abs().total_cmp(&rows[b][k].abs()))?;
         rows.swap(k, pivot);
         let row = rows[k];
-        // Also where it is no number.
+        // Also false for NaN.
         if row[k].abs().partial_cmp(&(1e-9 * scale)) != Some(std::cmp::Ordering::Greater) {
             return None;
         }
@@ -66,22 +68,25 @@ pub fn whole_periods(samples: &[(f64, f64)], period: f64, after: f64) -> &[(f64,
         return samples;
     };
     let periods = ((end - after) / period + 1e-9).floor();
-    // The sample at the beginning is that of the end, one period on.
+    // Leaves out the sample at the beginning, which has the same phase as the last one.
     let from = end - periods * period + 1e-9 * period;
     &samples[samples.partition_point(|(t, _)| *t <= from)..]
 }
 
-/// The length of a wave that passes two gauges, metres: `first` and `second` are its phases there (that of [`Harmonic`]),
-/// `apart` their distance, less than a wave length.
+/// Length of a wave that passes two gauges, metres. `first` and `second` are its phases there (that
+/// of [`Harmonic`]), `apart` their distance, which must be less than a wavelength.
 pub fn wave_length(first: f64, second: f64, apart: f64) -> f64 {
     TAU * apart / (second - first).rem_euclid(TAU)
 }
 
-/// How much of a wave of number `k` (1/m) is turned back, K = |reflected| / |incident|: of gauges' places along x (metres) and
-/// the wave's harmonic there, by least squares (Mansard and Funke 1980; of two gauges Goda and Suzuki 1976). `None` where
-/// gauges stand half a wave length apart, which cannot tell the two.
+/// Reflection coefficient K = |reflected| / |incident| of a wave with wavenumber `k` (1/m).
+///
+/// Takes the gauges' positions along x (metres) and the wave's harmonic there, by least squares
+/// (Mansard and Funke 1980; for two gauges Goda and Suzuki 1976). `None` if the gauges are half a
+/// wavelength apart, which cannot separate the two waves.
 pub fn reflection(gauges: &[(f64, Harmonic)], k: f64) -> Option<f64> {
-    // Complex numbers as vectors: a wave that comes has A exp(i(kx + δ)), one that runs back A exp(i(δ − kx)).
+    // Complex numbers as vectors: the incident wave is A exp(i(kx + δ)), the reflected one A
+    // exp(i(δ − kx)).
     let count = gauges.len() as f64;
     let turns = |times: f64| {
         gauges
@@ -106,16 +111,16 @@ pub fn reflection(gauges: &[(f64, Harmonic)], k: f64) -> Option<f64> {
     Some(reflected.length() / incident.length())
 }
 
-/// A crest, from the parabola that fits samples (seconds, elevation) above `part` of the largest best: its time and height.
-/// `None` where they are fewer than three or bend upwards, or where the signal begins or ends as high, so that a part of the
-/// crest is not in it.
+/// Time and height of a crest, from the parabola that best fits the samples (seconds, elevation)
+/// above `part` of the maximum. `None` if there are fewer than three, if they bend upwards, or if
+/// the signal begins or ends that high, so that a part of the crest is missing.
 pub fn crest(samples: &[(f64, f64)], part: f64) -> Option<(f64, f64)> {
     let most = samples
         .iter()
         .map(|s| s.1)
         .fold(f64::NEG_INFINITY, f64::max);
     let middle = samples.iter().position(|s| s.1 == most)?;
-    // One crest alone: as far as the signal stays that high.
+    // A single crest: as far as the signal stays that high.
     let is_high = |s: &&(f64, f64)| s.1 >= part * most;
     let before = samples[..middle].iter().rev().take_while(is_high).count();
     let after = samples[middle..].iter().take_while(is_high).count();
@@ -141,7 +146,8 @@ pub fn crest(samples: &[(f64, f64)], part: f64) -> Option<(f64, f64)> {
     (bend < 0.0 && x.abs() <= 1.0).then_some((from + x * width, level + 0.5 * slope * x))
 }
 
-/// Slope of the straight line that fits points best by least squares; `None` of fewer than two, or of one x.
+/// Slope of the least-squares line through points; `None` for fewer than two, or if all have the
+/// same x.
 pub fn slope(points: &[(f64, f64)]) -> Option<f64> {
     let n = points.len() as f64;
     let mean = |f: fn(&(f64, f64)) -> f64| points.iter().map(f).sum::<f64>() / n;
@@ -151,7 +157,8 @@ pub fn slope(points: &[(f64, f64)]) -> Option<f64> {
     (points.len() > 1 && spread > 0.0).then(|| shared / spread)
 }
 
-/// The order of convergence: with which power of the resolution errors fall, by least squares of the logarithms.
+/// Order of convergence: the power of the resolution with which errors fall, by least squares of
+/// the logarithms. Takes pairs of resolution and error.
 pub fn order(errors: &[(f64, f64)]) -> Option<f64> {
     let logs: Vec<_> = errors.iter().map(|(r, e)| (r.ln(), e.abs().ln())).collect();
     slope(&logs)
@@ -159,9 +166,9 @@ pub fn order(errors: &[(f64, f64)]) -> Option<f64> {
         .filter(|order| order.is_finite())
 }
 
-/// The order of convergence of (resolution, number) without the limit: from how much two steps of one ratio change the
-/// number (Roache 1998). `None` unless there are three, in a row of one ratio, that
-/// change to one side.
+/// Order of convergence of (resolution, value) pairs without a known limit, from the changes over
+/// two steps of the same ratio (Roache 1998). `None` unless there are exactly three, in steps of
+/// one ratio, that change in one direction.
 pub fn order_of_changes(numbers: &[(f64, f64)]) -> Option<f64> {
     let [(r0, a), (r1, b), (r2, c)] = *numbers else {
         return None;
@@ -171,8 +178,8 @@ pub fn order_of_changes(numbers: &[(f64, f64)]) -> Option<f64> {
     ((r2 / r1 - ratio).abs() < 1e-9 * ratio && order.is_finite()).then_some(order)
 }
 
-/// Mean period of a signal from where it goes through 0 between swings of at least `least` to either side, seconds; `None`
-/// where it does so less than twice.
+/// Mean period of a signal, seconds, from its zero crossings between swings of at least `least` to
+/// either side; `None` if there are fewer than two.
 pub fn period(samples: &[(f64, f64)], least: f64) -> Option<f64> {
     let mut crossings: Vec<f64> = Vec::new();
     let (mut side, mut through) = (0.0, 0.0);
@@ -192,7 +199,7 @@ pub fn period(samples: &[(f64, f64)], least: f64) -> Option<f64> {
     (crossings.len() > 1).then(|| 2.0 * (last - first) / (crossings.len() - 1) as f64)
 }
 
-/// A curve of rising x at a place, straight between its points; `None` beyond its ends.
+/// Value of a curve with ascending x, linearly interpolated; `None` beyond its ends.
 pub fn value_at(curve: &[(f64, f64)], x: f64) -> Option<f64> {
     let next = curve.partition_point(|p| p.0 < x);
     let b = *curve.get(next)?;
@@ -203,7 +210,7 @@ pub fn value_at(curve: &[(f64, f64)], x: f64) -> Option<f64> {
     Some(a.1 + (b.1 - a.1) * (x - a.0) / (b.0 - a.0))
 }
 
-/// Where a curve first reaches `level` from below, straight between its points.
+/// The x at which a curve first reaches `level` from below, linearly interpolated.
 pub fn reaches(curve: &[(f64, f64)], level: f64) -> Option<f64> {
     let next = curve.iter().position(|p| p.1 >= level)?;
     let b = curve[next];
@@ -216,8 +223,8 @@ pub fn reaches(curve: &[(f64, f64)], level: f64) -> Option<f64> {
     }
 }
 
-/// Mean of |curve / point − 1| over points (x, y), the curve moved by `shift` towards greater x; `None` where it does not
-/// reach over all of them.
+/// Mean of |curve / point − 1| over points (x, y), with the curve shifted by `shift` towards
+/// greater x; `None` if it does not cover all of them.
 pub fn mean_error(curve: &[(f64, f64)], points: &[[f64; 2]], shift: f64) -> Option<f64> {
     let mut sum = 0.0;
     for [x, y] in points {
@@ -226,10 +233,10 @@ pub fn mean_error(curve: &[(f64, f64)], points: &[[f64; 2]], shift: f64) -> Opti
     (!points.is_empty()).then(|| sum / points.len() as f64)
 }
 
-/// Steps of a shift that are tried; of an x of order 1, finer than a measured point is known.
+/// Step of the tried shifts; for x of order 1, finer than measured points are known.
 const SHIFT_STEP: f64 = 0.005;
 
-/// The shift within `most` either way with the least [`mean_error`], and that error.
+/// The shift of at most `most` in either direction with the least [`mean_error`], and that error.
 pub fn fitted_shift(curve: &[(f64, f64)], points: &[[f64; 2]], most: f64) -> Option<(f64, f64)> {
     let steps = (most / SHIFT_STEP).round() as i32;
     let tried = (-steps..=steps).map(|k| SHIFT_STEP * f64::from(k));
@@ -237,8 +244,8 @@ pub fn fitted_shift(curve: &[(f64, f64)], points: &[[f64; 2]], most: f64) -> Opt
     errors.min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
-/// The largest mean of a signal over `window` seconds that samples reach over whole, each sample standing for the time to
-/// the next.
+/// The largest mean of a signal over a window of `window` seconds that lies within the samples;
+/// each sample holds until the next.
 pub fn largest_mean(samples: &[(f64, f64)], window: f64) -> Option<f64> {
     let mut most: Option<f64> = None;
     for (k, &(from, _)) in samples.iter().enumerate() {
@@ -258,8 +265,11 @@ pub fn largest_mean(samples: &[(f64, f64)], window: f64) -> Option<f64> {
     most
 }
 
-/// Depth at x of water that ran out over a dry bed without friction, over a time t since its dam at 0 was gone (Ritter
-/// 1892): depth before it `depth` up to x = −t √(g h0), (2 √(g h0) − x/t)² / 9g from there to x = 2 t √(g h0).
+/// Depth at x of water released over a dry bed without friction, a time t after the dam at 0 is
+/// removed (Ritter 1892).
+///
+/// `depth` h0 up to x = −t √(g h0), then (2 √(g h0) − x/t)² / 9g up to x = 2 t √(g h0), and 0
+/// beyond.
 pub fn ritter(x: f64, t: f64, depth: f64, gravity: f64) -> f64 {
     let celerity = (gravity * depth).sqrt();
     let u = x / t;
@@ -272,8 +282,8 @@ pub fn ritter(x: f64, t: f64, depth: f64, gravity: f64) -> f64 {
     }
 }
 
-/// Elevation of a solitary wave over its height at a distance from its crest, in depths (Boussinesq 1872):
-/// sech²(√(3H/4d) x/d).
+/// Elevation of a solitary wave relative to its height, at a distance from its crest (Boussinesq
+/// 1872): sech²(√(3H/4d) x/d). `distance` and `height` are in depths.
 pub fn solitary(distance: f64, height: f64) -> f64 {
     ((0.75 * height).sqrt() * distance).cosh().powi(-2)
 }
@@ -296,13 +306,13 @@ mod tests {
         let wave = |t: f64| 1.0 + 0.3 * (omega * t - 0.7).cos() + 0.1 * (2.0 * omega * t).sin();
         let samples = sampled(0.0, 10.0, 0.05, wave);
         let samples = whole_periods(&samples, 2.0, 1.0);
-        // Four periods of 40 samples, the last one of the end.
+        // Four periods of 40 samples, the last one at the end.
         assert_eq!(samples.len(), 160);
         let found = harmonic(samples, omega).unwrap();
         assert!((found.mean - 1.0).abs() < 1e-12, "{found:?}");
         assert!((found.amplitude - 0.3).abs() < 1e-12, "{found:?}");
         assert!((found.phase - 0.7).abs() < 1e-12, "{found:?}");
-        // Negative control: of a frequency 5 % off a part is lost.
+        // Negative control: a frequency 5 % off loses a part of the amplitude.
         let other = harmonic(samples, 1.05 * omega).unwrap();
         assert!((other.amplitude - 0.3).abs() > 0.01, "{other:?}");
         assert_eq!(harmonic(&samples[..3], omega), None);
@@ -318,7 +328,7 @@ mod tests {
         };
         let [a, b] = [2.0, 5.0].map(|x| at(x).unwrap().phase);
         assert!((wave_length(a, b, 3.0) - length).abs() < 1e-9);
-        // Negative control: gauges in turn, which is a wave that runs back.
+        // Negative control: swapped gauges see a wave in the opposite direction.
         assert!((wave_length(b, a, 2.0) - length).abs() > 1.0);
     }
 
@@ -342,9 +352,9 @@ mod tests {
                 assert!((is - part).abs() < 1e-9, "{places:?}: {is}, {part}");
             }
         }
-        // Half a wave length apart both waves look alike.
+        // Half a wavelength apart, both waves look alike.
         assert_eq!(found(&[3.0, 3.0 + TAU / k / 2.0], 0.05), None);
-        // Negative control: more runs back than comes.
+        // Negative control: more is reflected than arrives.
         assert!(found(&[3.0, 4.0], 20.0).unwrap() > 19.9);
     }
 
@@ -353,16 +363,17 @@ mod tests {
         let sech = |t: f64| 0.2 * (1.3 * (t - 2.03)).cosh().powi(-2);
         for step in [0.05, 0.11] {
             let (time, height) = crest(&sampled(0.0, 5.0, step, sech), 0.8).unwrap();
-            // Symmetric to the samples' step; a parabola through its upper fifth is 0.4 % lower.
+            // Symmetric to within a tenth of a step; a parabola through the upper fifth is 0.4 %
+            // lower.
             assert!((time - 2.03).abs() < 0.1 * step, "{time}");
             assert!((height / 0.2 - 1.0).abs() < 0.008, "{height}");
         }
-        // A second, lower crest is none; nor is a rise without end.
+        // A second, lower crest does not count; nor does a rise without end.
         let two = |t: f64| sech(t) + 0.19 * (1.3 * (t - 8.0)).cosh().powi(-2);
         let (time, _) = crest(&sampled(0.0, 10.0, 0.05, two), 0.8).unwrap();
         assert!((time - 2.03).abs() < 0.01, "{time}");
         assert_eq!(crest(&sampled(0.0, 1.0, 0.1, |t| t * t), 0.8), None);
-        // Cut off a little after its highest, or before.
+        // Cut off shortly after its maximum, or before it.
         assert_eq!(crest(&sampled(0.0, 2.1, 0.05, sech), 0.8), None);
         assert_eq!(crest(&sampled(1.95, 5.0, 0.05, sech), 0.8), None);
     }
@@ -375,7 +386,7 @@ mod tests {
         assert!(order(&[(10.0, 0.1), (20.0, 0.1)]).unwrap().abs() < 1e-12);
         assert_eq!(order(&errors[..1]), None);
         assert_eq!(slope(&[(1.0, 1.0), (1.0, 2.0)]), None);
-        // Of numbers whose limit is not told.
+        // Values whose limit is not given.
         let numbers = errors.map(|(r, error)| (r, 5.0 + error));
         assert!((order_of_changes(&numbers).unwrap() - 1.7).abs() < 1e-9);
         let [a, b, _] = numbers;
@@ -389,7 +400,7 @@ mod tests {
         let wave = |t: f64| (-0.1 * t).exp() * (TAU * t / 0.8).cos();
         let found = period(&sampled(0.0, 3.0, 0.01, wave), 0.1).unwrap();
         assert!((found - 0.8).abs() < 1e-3, "{found}");
-        // Ripples through 0 that stay below the least are no swings.
+        // Ripples through 0 that stay below the threshold are not swings.
         let ripple = |t: f64| wave(t) + 0.03 * (TAU * t / 0.03).cos();
         let found = period(&sampled(0.0, 3.0, 0.01, ripple), 0.1).unwrap();
         assert!((found - 0.8).abs() < 0.02, "{found}");
@@ -420,7 +431,7 @@ mod tests {
             (shift - 0.3).abs() < 1e-9 && error < 1e-4,
             "{shift} {error}"
         );
-        // Negative control: no shift makes up for a front that is slower.
+        // Negative control: no shift compensates for a slower front.
         let slow = sampled(0.0, 5.0, 0.01, |t| front(0.8 * t));
         assert!(fitted_shift(&slow, &points, 1.0).unwrap().1 > 0.02);
         assert_eq!(mean_error(&curve[..50], &points, 0.0), None);
@@ -440,11 +451,11 @@ mod tests {
             (found - (2.0 * 1000.0 + 8.0 * 400.0) / 10.0).abs() < 1e-6,
             "{found}"
         );
-        // Samples as far apart as the window are their own means; fewer reach over none.
+        // Samples as far apart as the window are their own means; fewer do not span one.
         let apart = [(0.0, 1.0), (0.01, 7.0), (0.02, 2.0)];
         assert!((largest_mean(&apart, 0.01).unwrap() - 7.0).abs() < 1e-9);
         assert_eq!(largest_mean(&apart[..1], 0.01), None);
-        // A window that a sample ends within takes its part of it.
+        // A window that ends within a sample takes its part of it.
         let half = largest_mean(&[(0.0, 1.0), (0.01, 7.0), (0.02, 3.0), (0.03, 0.0)], 0.015);
         assert!(
             (half.unwrap() - (7.0 * 0.01 + 3.0 * 0.005) / 0.015).abs() < 1e-9,
@@ -452,8 +463,8 @@ mod tests {
         );
     }
 
-    /// Depth and flow at the dam in closed form, mass kept, and momentum of the profile's own: the shallow-water equations
-    /// by central differences, u = 2 (x/t + √(g h0)) / 3.
+    /// Depth and flow at the dam in closed form, and conservation of mass and momentum: the
+    /// shallow-water equations by central differences, u = 2 (x/t + √(g h0)) / 3.
     #[test]
     fn ritters_profile_solves_the_shallow_water_equations() {
         let (depth, gravity) = (1.3, 9.81);

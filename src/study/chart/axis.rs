@@ -1,18 +1,18 @@
-//! An axis of a chart, linear or logarithmic, and where its numbers stand.
+//! A linear or logarithmic chart axis and its tick positions.
 
-/// Intervals that a linear axis is cut into, about.
+/// Approximate number of intervals on a linear axis.
 const INTERVALS: f64 = 5.0;
 
-/// Numbers between two ends, and where they lie on the paper.
+/// The range of an axis and where it lies on the paper.
 pub(super) struct Axis {
     is_log: bool,
-    /// Of a logarithmic axis their exponents.
+    /// First and last value; their decimal exponents on a logarithmic axis.
     ends: [f64; 2],
     pub(super) paper: [f64; 2],
 }
 
 impl Axis {
-    /// About all values, from those that have a place on it.
+    /// An axis that covers all values; a logarithmic one ignores those that are not positive.
     pub(super) fn new(
         is_log: bool,
         has_room: bool,
@@ -35,7 +35,7 @@ impl Axis {
         self.ends
     }
 
-    /// The part of the way from the first end to the second; beyond 0 to 1 a value has no place.
+    /// Position of a value as a fraction of the axis; outside of 0 to 1 it is off the axis.
     pub(super) fn part(&self, value: f64) -> f64 {
         let place = if self.is_log { value.log10() } else { value };
         (place - self.ends[0]) / (self.ends[1] - self.ends[0])
@@ -45,7 +45,7 @@ impl Axis {
         self.paper[0] + self.part(value) * (self.paper[1] - self.paper[0])
     }
 
-    /// Values that get a number, and values that get a line alone.
+    /// Values of the numbered ticks, and of the unnumbered grid lines.
     pub(super) fn ticks(&self) -> (Vec<f64>, Vec<f64>) {
         match self.is_log {
             true => log_ticks(self.ends),
@@ -54,7 +54,7 @@ impl Axis {
     }
 }
 
-/// Least and greatest.
+/// Minimum and maximum of the finite values.
 fn span(values: impl Iterator<Item = f64>) -> [f64; 2] {
     values
         .filter(|v| v.is_finite())
@@ -63,7 +63,7 @@ fn span(values: impl Iterator<Item = f64>) -> [f64; 2] {
         })
 }
 
-/// About all positive values, with a little room beyond them; at least half a decade.
+/// Covers all positive values with a small margin; at least half a decade.
 fn log_ends(values: impl Iterator<Item = f64>) -> [f64; 2] {
     let [low, high] = span(values.filter(|value| *value > 0.0).map(f64::log10));
     if low > high {
@@ -73,7 +73,8 @@ fn log_ends(values: impl Iterator<Item = f64>) -> [f64; 2] {
     [low - room, high + room]
 }
 
-/// Never equal; with `has_room` beyond them for lines not to touch the frame, and 0 among them where that takes little.
+/// Ends that are never equal. `has_room` adds a margin, so that lines do not touch the frame, and
+/// includes 0 if that costs little.
 fn linear_ends(values: impl Iterator<Item = f64>, has_room: bool) -> [f64; 2] {
     let [mut low, mut high] = span(values);
     if low > high {
@@ -131,7 +132,7 @@ fn log_ticks([low, high]: [f64; 2]) -> (Vec<f64>, Vec<f64>) {
     (numbered, plain)
 }
 
-/// As few digits as tell it.
+/// A tick label with as few digits as needed.
 pub(super) fn number(value: f64) -> String {
     if value == 0.0 {
         return "0".to_owned();

@@ -1,8 +1,8 @@
-//! Text on a chart: labels that keep clear of points and of each other, and notes that are wrapped.
+//! Text on a chart: labels that avoid points and each other, and wrapped notes.
 
-/// Width of a letter of a label, about, and height of one.
+/// Approximate width and height of a label's letter.
 pub(super) const LETTER: [f64; 2] = [5.8, 10.0];
-/// Letters of a note that fit in a line, and lines that notes take at most.
+/// Letters per line of a note, and most lines that notes may take.
 const NOTE_LETTERS: usize = 105;
 const NOTE_LINES: usize = 8;
 
@@ -13,15 +13,15 @@ fn overlap(a: &Area, b: &Area) -> bool {
     a[0] < b[2] && b[0] < a[2] && a[1] < b[3] && b[1] < a[3]
 }
 
-/// Space of a chart that labels may still take.
+/// The part of a chart that labels may still use.
 pub(super) struct FreeSpace {
     pub(super) within: Area,
     pub(super) taken: Vec<Area>,
 }
 
 impl FreeSpace {
-    /// The place next to a point, `least` from it or farther, that no point and no earlier label takes: its left end and
-    /// base line.
+    /// Finds and reserves a position beside a point, at least `least` away, that overlaps neither
+    /// points nor earlier labels. Returns the left end and base line of the text.
     pub(super) fn place(&mut self, at: [f64; 2], least: f64, letters: usize) -> Option<[f64; 2]> {
         let (width, height) = (LETTER[0] * letters as f64, LETTER[1]);
         let candidates = [0.0, 8.0, 18.0].into_iter().flat_map(|more| {
@@ -51,7 +51,7 @@ impl FreeSpace {
     }
 }
 
-/// Lines of at most `letters` letters, broken between words; a word that is longer is broken too.
+/// Breaks text into lines of at most `letters` letters, between words if possible.
 fn wrapped(text: &str, letters: usize) -> Vec<String> {
     let mut lines = vec![String::new()];
     for word in text.split_whitespace() {
@@ -71,7 +71,7 @@ fn wrapped(text: &str, letters: usize) -> Vec<String> {
     lines
 }
 
-/// The notes, wrapped; those that do not fit are counted.
+/// The wrapped notes; those that do not fit are only counted.
 pub(super) fn note_lines(notes: &[String]) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for (index, note) in notes.iter().enumerate() {

@@ -13,78 +13,79 @@ use super::page::escaped;
 pub struct Dot {
     /// x.
     pub at: f64,
-    /// y; a gap stands where it is `None`, and on logarithmic axes nothing where it is 0.
+    /// y. `None` leaves a gap; logarithmic axes also skip values that are not positive.
     pub value: Option<f64>,
-    /// Beside it, where there is room.
+    /// Text beside the point, if there is space.
     pub label: String,
-    /// Least and greatest x, drawn as a bar where they differ.
+    /// Least and greatest x, drawn as a bar if they differ.
     pub bar: Option<[f64; 2]>,
-    /// Whether it gets a ring, and its label a place before all others.
+    /// Whether the point gets a ring and its label is placed before all others.
     pub is_knee: bool,
 }
 
 /// A line of a chart.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Series {
-    /// For the legend.
+    /// Name in the legend.
     pub name: String,
-    /// In the order in which they are joined.
+    /// Points in the order in which they are joined.
     pub points: Vec<Dot>,
 }
 
-/// A dashed line across a chart, and what it says.
+/// A dashed line across a chart, with its text.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Mark {
-    /// Upright, at this x.
+    /// Vertical, at this x.
     At(f64, String),
-    /// Level, at this y; left out where the curves are far from it. What it says may be empty.
+    /// Horizontal, at this y; omitted if the curves are far from it. The text may be empty.
     Level(f64, String),
 }
 
 /// Curves over one pair of axes.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Chart {
-    /// Above it.
+    /// Title above the chart.
     pub title: String,
-    /// Below that; may be empty.
+    /// Line below the title; may be empty.
     pub subtitle: String,
-    /// Below the x axis, with its unit.
+    /// Label of the x axis, with its unit.
     pub x_label: String,
-    /// Beside the y axis, with its unit.
+    /// Label of the y axis, with its unit.
     pub y_label: String,
-    /// Whether both axes are logarithmic; their points then are dots with labels.
+    /// Whether both axes are logarithmic. Points are then drawn as labelled dots.
     pub is_log: bool,
-    /// In the order of the colours.
+    /// Curves, in the order of the colours.
     pub series: Vec<Series>,
-    /// Data that the series are held against, each point a ring, in the colours after theirs; on linear axes alone.
+    /// Reference data drawn as rings, in the colours after those of the series; only on linear
+    /// axes.
     pub dots: Vec<Series>,
-    /// Lines across.
+    /// Dashed lines across the chart.
     pub marks: Vec<Mark>,
-    /// What has no place on the axes, each in a line below.
+    /// What cannot be drawn on the axes, one line each below the chart.
     pub notes: Vec<String>,
-    /// What a point with a ring is called; a knee where empty.
+    /// Name of a point with a ring; "knee" if empty.
     pub ring: &'static str,
 }
 
-/// Okabe and Ito (2008): told apart by everyone.
+/// Colour-blind safe palette of Okabe and Ito (2008).
 const COLOURS: [&str; 7] = [
     "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000",
 ];
 const GREY: &str = "#666";
 
-/// Room for numbers and names of the axes: left, right, bottom.
+/// Margins for numbers and axis labels: left, right, bottom.
 const MARGIN: [f64; 3] = [70.0, 24.0, 50.0];
-/// Height of a row of the title, the legend, the notes.
+/// Height of a row of the title, the legend or the notes.
 const ROW: f64 = 16.0;
-/// Half the height of a bar's ends.
+/// Half the height of the end caps of a bar.
 const CAP: f64 = 4.5;
-/// Radius of the ring about a knee.
+/// Radius of the ring around a knee.
 const RING: f64 = 7.5;
-/// Radius of a ring that stands for a point of data.
+/// Radius of the ring that marks a data point.
 const DATA: f64 = 4.5;
 
 impl Series {
-    /// A plain curve.
+    /// A plain curve through (x, y) points.
     pub fn curve(name: &str, points: impl IntoIterator<Item = (f64, Option<f64>)>) -> Self {
         let dot = |(at, value)| Dot {
             at,
@@ -98,7 +99,7 @@ impl Series {
     }
 }
 
-/// A drawing that grows.
+/// A drawing under construction.
 struct Svg(String);
 
 impl Svg {
@@ -131,25 +132,25 @@ impl Chart {
         }
     }
 
-    /// A point's y, where it has a place on the axes.
+    /// A point's y if the axes can show it.
     fn value(&self, dot: &Dot) -> Option<f64> {
         let has_place = |value: &f64| !self.is_log || (*value > 0.0 && dot.at > 0.0);
         dot.value.filter(has_place)
     }
 
-    /// All that has a name and a colour.
+    /// Everything that has a name and a colour.
     fn named(&self) -> impl Iterator<Item = &Series> {
         self.series.iter().chain(&self.dots)
     }
 
-    /// Points that have a place, with the number of their series and y.
+    /// The points that the axes can show, with the index of their series and their y.
     fn dots(&self) -> impl Iterator<Item = (usize, &Dot, f64)> {
         let series = self.named().enumerate();
         let all = series.flat_map(|(k, series)| series.points.iter().map(move |dot| (k, dot)));
         all.filter_map(|(k, dot)| Some((k, dot, self.value(dot)?)))
     }
 
-    /// Where each series stands in the legend: left end and base line.
+    /// Position of each series in the legend: left end and base line.
     fn legend(&self) -> Vec<[f64; 2]> {
         let rows = 1.0 + f64::from(u8::from(!self.subtitle.is_empty()));
         let mut at = [MARGIN[0], 4.0 + ROW * (rows + 1.0)];
@@ -168,7 +169,7 @@ impl Chart {
     fn x_axis(&self) -> Axis {
         let ([width, _], [left, right, _]) = (self.size(), MARGIN);
         let bars = |dot: &Dot| dot.bar.unwrap_or([dot.at; 2]);
-        // A linear axis is as long as its series, gaps as well.
+        // A linear axis spans the whole series including its gaps.
         let gaps = self.named().flat_map(|series| &series.points);
         let gaps = gaps.filter(|_| !self.is_log).map(|dot| dot.at);
         let costs = self.dots().flat_map(|(_, dot, _)| bars(dot));
@@ -176,13 +177,14 @@ impl Chart {
         Axis::new(self.is_log, false, costs.chain(gaps), [left, width - right])
     }
 
-    /// Where its linear x axis begins and ends: the values there, and the places in parts of the drawing's width.
+    /// First and last value of the linear x axis, and their positions as fractions of the drawing's
+    /// width.
     pub fn across(&self) -> [[f64; 2]; 2] {
         let axis = self.x_axis();
         [axis.ends(), axis.paper.map(|at| at / self.size()[0])]
     }
 
-    /// A picture of its own, also within HTML.
+    /// Renders the chart as a complete SVG document, which can also be embedded in HTML.
     pub fn to_svg(&self) -> String {
         let ([width, height], bottom) = (self.size(), MARGIN[2]);
         let legend = self.legend();
@@ -190,7 +192,7 @@ impl Chart {
         let x = self.x_axis();
         let values: Vec<f64> = self.dots().map(|(_, _, value)| value).collect();
         let most = values.iter().fold(0.0f64, |a, v| a.max(v.abs()));
-        // What is far beyond the curves would flatten them.
+        // A level far beyond the curves would flatten them.
         let is_near = |level: &f64| !self.is_log && level.abs() <= 4.0 * most;
         let levels = self.marks.iter().filter_map(|mark| match mark {
             Mark::Level(level, _) => Some(*level).filter(is_near),
@@ -228,7 +230,7 @@ impl Chart {
         svg.0 + "</svg>\n"
     }
 
-    /// Title, legend, grid, numbers and axes' names.
+    /// Draws title, legend, grid, tick labels and axis labels.
     fn write_frame(&self, svg: &mut Svg, legend: &[[f64; 2]], x: &Axis, y: &Axis) {
         let ([left, right], [bottom, top]) = (x.paper, y.paper);
         svg.text([12.0, 18.0], "font-size=\"13\"", &self.title);
@@ -276,7 +278,7 @@ impl Chart {
             let (d, place, is_end, text) = match mark {
                 Mark::At(value, text) => {
                     let (at, is_end) = (x.at(*value), x.part(*value) > 0.5);
-                    // On the side that has more room.
+                    // On the side with more space.
                     let beside = if is_end { at - 4.0 } else { at + 4.0 };
                     let d = format!("M{at:.1} {top}V{bottom}");
                     (d, [beside, top + 12.0], is_end, text)
@@ -301,7 +303,7 @@ impl Chart {
             match self.value(dot) {
                 Some(value) => {
                     path += &format!("{pen}{:.1} {:.1}", x.at(dot.at), y.at(value));
-                    // A point of its own shows as a dot.
+                    // A zero-length segment shows an isolated point as a dot.
                     path += if pen == 'M' { "h0" } else { "" };
                     pen = 'L';
                 }
@@ -353,7 +355,7 @@ impl Chart {
                 true => (format!("{}: {}", self.ring_name(), dot.label), RING + 5.0),
                 false => (dot.label.clone(), 7.0),
             };
-            // A label without a free place is left to the table.
+            // A label that does not fit is left to the table.
             if let Some(place) = room.place(at, least, text.chars().count()) {
                 let fill = COLOURS[index % COLOURS.len()];
                 let more = format!("font-size=\"10\" fill=\"{fill}\"");
@@ -382,7 +384,7 @@ mod tests {
         }
     }
 
-    /// A decade of time a setting, with a bar about each.
+    /// One setting per decade of time, each with a bar.
     fn log_chart(errors: [f64; 3]) -> Chart {
         let dot = |k: usize| {
             let decade = 10f64.powi(k as i32);
@@ -416,7 +418,7 @@ mod tests {
             (3.0, Some(0.5)),
         ];
         let svg = chart(points.to_vec()).to_svg();
-        // x from 70 to 536; y from 250 (0) up to 52 (1.06).
+        // x runs from 70 to 536; y from 250 (0) up to 52 (1.06).
         assert!(
             svg.contains("d=\"M70.0 250.0h0L225.3 63.2M536.0 156.6h0\""),
             "{svg}"
@@ -463,7 +465,7 @@ mod tests {
             .collect();
         let step = |k: usize, axis: usize| places[k + 1][axis] - places[k][axis];
         let [x, y] = [0, 1].map(|axis| step(1, axis) - step(0, axis));
-        // Written to a tenth.
+        // The SVG rounds to tenths.
         assert!(x.abs() <= 0.21 && y.abs() <= 0.21, "{path}");
         assert!(svg.contains(">n=1<") && svg.contains("failed: 32") && svg.contains("a &lt;b&gt;"));
         assert!(svg.contains(">0.01<") && svg.contains(">on c<"), "{svg}");
@@ -479,7 +481,7 @@ mod tests {
         }
     }
 
-    /// One ring, about the dot that is the knee, whose label says so.
+    /// One ring, around the dot that is the knee, with a label that says so.
     #[test]
     fn the_knee_is_marked() {
         let mut chart = log_chart([1e-1, 1e-2, 1e-3]);
@@ -501,7 +503,7 @@ mod tests {
             ..log_chart([1.0; 3])
         };
         let rows: Vec<f64> = long.legend().iter().map(|place| place[1]).collect();
-        // 24 + 31 letters of 5.8: two of 204 beside each other in 610.
+        // 24 + 31 letters of 5.8: two entries of 204 fit side by side into 610.
         assert_eq!(rows, [52.0, 52.0, 68.0, 68.0, 84.0, 84.0]);
         let ends = long
             .legend()
@@ -510,7 +512,7 @@ mod tests {
         assert!(ends.into_iter().all(|end| end <= 680.0));
     }
 
-    /// A bar of a point's own times, and none where they are one time.
+    /// Each point's range of times is a bar; equal times draw none.
     #[test]
     fn repeats_have_bars() {
         let bars = |chart: &Chart| chart.to_svg().matches("stroke-width=\"1.2\"").count();
