@@ -120,6 +120,9 @@ impl Drop for Lock {
 
 /// Takes the writer's lock. The file stays when the lock is released: removing it would allow two
 /// writers to lock two files of the same name.
+///
+/// # Errors
+/// [`CacheError::Locked`], `Io`.
 pub(super) fn lock(dir: &Path) -> Result<Lock, CacheError> {
     let path = dir.join(LOCK);
     let mut file = File::options()
@@ -175,6 +178,9 @@ pub(super) fn file_hash(path: &Path) -> Result<String, CacheError> {
 
 /// BLAKE3 over the names and contents of all files below `dir`, hex: equal hashes mean that nothing
 /// changed. Skips `lock` and `timings.jsonl` of the top folder and does not follow links.
+///
+/// # Errors
+/// [`CacheError::Io`].
 pub fn directory_hash(dir: &Path) -> Result<String, CacheError> {
     let mut hasher = blake3::Hasher::new();
     hash_below(dir, "", &mut hasher)?;

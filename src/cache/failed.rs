@@ -147,6 +147,9 @@ pub fn read(dir: &Path) -> Result<Failed, CacheError> {
 }
 
 /// Removes `failed/` of the cache at `cache` if it exists.
+///
+/// # Errors
+/// [`CacheError::Io`].
 pub fn remove(cache: &Path) -> Result<(), CacheError> {
     let dir = cache.join(FAILED);
     match fs::remove_dir_all(&dir) {

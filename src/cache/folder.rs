@@ -35,6 +35,9 @@ pub(super) fn make_streams(dir: &Path, manifest: &Manifest) -> Result<(), CacheE
 
 /// Refuses a directory that holds anything but an interrupted creation of our own: our lock, no
 /// manifest, and at most one frame.
+///
+/// # Errors
+/// [`CacheError::Exists`], [`CacheError::Occupied`], [`CacheError::Io`].
 pub fn refuse_occupied(dir: &Path) -> Result<(), CacheError> {
     if manifest::exists(dir) {
         return Err(CacheError::Exists {

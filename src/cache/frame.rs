@@ -74,6 +74,9 @@ pub struct Written {
 
 /// Refuses particles that cannot be stored as a frame: arrays of different lengths, ids that do not
 /// ascend, attribute names that are taken or that PLY cannot hold.
+///
+/// # Errors
+/// [`CacheError::Unfit`].
 pub fn check(particles: &Particles) -> Result<(), CacheError> {
     let n = particles.len();
     let unfit = |what: String| Err(CacheError::Unfit(what));

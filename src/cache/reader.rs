@@ -55,6 +55,9 @@ pub struct VerifyReport {
 
 impl VerifyReport {
     /// Turns the first problem into an error.
+    ///
+    /// # Errors
+    /// [`CacheError::Damaged`].
     pub fn into_result(self) -> Result<Self, CacheError> {
         match self.problems.first() {
             None => Ok(self),
@@ -157,6 +160,9 @@ impl CacheReader {
     }
 
     /// The ledger entry of a frame.
+    ///
+    /// # Errors
+    /// [`CacheError::NoFrame`].
     pub fn entry(&self, frame: u32) -> Result<&Entry, CacheError> {
         let index = frame.checked_sub(self.first_frame());
         index
@@ -175,6 +181,9 @@ impl CacheReader {
     }
 
     /// The ledger entry of a frame whose particles are kept.
+    ///
+    /// # Errors
+    /// [`CacheError::NoFrame`], [`CacheError::NotKept`].
     pub fn kept(&self, frame: u32) -> Result<&Entry, CacheError> {
         let entry = self.entry(frame)?;
         let has = |frame: &u32| self.has_particles(*frame);
@@ -191,6 +200,10 @@ impl CacheReader {
     }
 
     /// Reads a frame's particles after checking length and checksum.
+    ///
+    /// # Errors
+    /// Those of [`Self::kept`]; [`CacheError::Damaged`] (also for a missing file),
+    /// [`CacheError::Io`].
     pub fn read(&self, frame: u32) -> Result<Particles, CacheError> {
         let found = read_frame(&self.dir, &self.manifest, self.kept(frame)?);
         match found {
@@ -212,6 +225,9 @@ impl CacheReader {
 
     /// Recomputes the grids in a frame's file from its particles; `None` if the frame has none, or
     /// if its file is not what this program makes of the particles.
+    ///
+    /// # Errors
+    /// [`CacheError::Io`].
     pub fn grids(&self, entry: &Entry, particles: &Particles) -> Result<Option<Grids>, CacheError> {
         let manifest = &self.manifest;
         let (Some(asked), Some(record)) = (&manifest.grids, entry.file(stream::GRIDS)) else {
@@ -273,6 +289,9 @@ impl CacheReader {
 
     /// Wall-clock seconds that each frame took to bake, where known. No checksum covers
     /// `timings.jsonl`; incomplete lines are skipped.
+    ///
+    /// # Errors
+    /// [`CacheError::Io`].
     pub fn seconds(&self) -> Result<BTreeMap<u32, f64>, CacheError> {
         let path = self.dir.join(disk::TIMINGS);
         let text = match std::fs::read_to_string(&path) {
@@ -341,6 +360,9 @@ impl CacheReader {
     }
 
     /// Checks every checksum: the report of an intact cache, or the first problem as an error.
+    ///
+    /// # Errors
+    /// [`CacheError::Damaged`].
     pub fn verify(&self) -> Result<VerifyReport, CacheError> {
         self.survey().into_result()
     }

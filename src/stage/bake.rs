@@ -1,4 +1,4 @@
-//! `bake`: a scene to a particle cache.
+//! `bake`: turns a scene into a particle cache.
 
 mod expected;
 mod water;
@@ -30,111 +30,113 @@ use super::{
 
 pub use self::expected::{Expected, Room, expected, shot_bytes};
 
-/// What to bake, and where to.
+/// What to bake, where, and on which device.
 #[derive(Clone, Debug)]
 pub struct Request {
-    /// Validated scene.
+    /// The validated scene.
     pub scene: Scene,
-    /// Cache directory.
+    /// Directory of the cache.
     pub directory: PathBuf,
-    /// Frames wanted; the whole shot where `None`.
+    /// Frames to bake; the whole shot if `None`.
     pub frames: Option<FrameRange>,
-    /// Whether to go on with a bake that stands there.
+    /// Whether to resume a bake that already exists in the directory.
     pub resume: bool,
-    /// Frame of another cache to begin from; the scene's own start where `None`.
+    /// Frame of another cache to begin from; the scene's own start if `None`.
     pub from: Option<BranchPoint>,
-    /// What to solve on.
+    /// Device to solve on.
     pub device: Device,
-    /// Whether passes are timed on the device, which runs them one by one; on the CPU they do so anyway.
+    /// Whether to time passes on the device, which runs them one by one; on the CPU they always run
+    /// so.
     pub time_passes: bool,
 }
 
-/// What a bake has to tell while it runs.
+/// Progress of a running bake.
 #[derive(Clone, Debug)]
 pub enum Event {
-    /// The device is open and the scene filled.
+    /// The device is open and the scene is filled with water.
     Ready {
         /// Adapter and driver, or the f64 reference.
         device: Identity,
-        /// Particles at the start.
+        /// Number of particles at the start.
         particles: usize,
-        /// Left out because a solid is there.
+        /// Lattice points left out because a solid covers them.
         removed: usize,
-        /// Water at the start.
+        /// Volume of water at the start.
         volume: Volume,
-        /// Samples on solids.
+        /// Number of samples on solids.
         boundary_samples: usize,
         /// Name of the solver.
         solver: &'static str,
-        /// GPU memory in all and for neighbour lists; `None` on the CPU.
+        /// GPU memory in total and for neighbour lists, bytes; `None` on the CPU.
         bytes: Option<(u64, u64)>,
-        /// What the frames will take on the disk, and what it has.
+        /// Disk space that the frames will need, and that is free.
         room: Room,
         /// First frame that will be computed.
         first: u32,
-        /// Last one.
+        /// Last frame that will be computed.
         last: u32,
-        /// Where a new bake begins from a frame of another cache, that frame.
+        /// The frame of another cache that a new bake begins from, if it does.
         parent: Option<Parent>,
-        /// What a user has to know of such a beginning, a sentence each.
+        /// Notes about beginning from that frame, a sentence each.
         notes: Vec<String>,
-        /// What a user has to know of the scene, a sentence each.
+        /// Warnings about the scene, a sentence each.
         warnings: Vec<String>,
     },
     /// A frame was computed.
     Frame {
-        /// Its number.
+        /// Number of the frame.
         frame: u32,
-        /// What its steps did.
+        /// Report of its substeps.
         report: StepReport,
-        /// Wall clock for it.
+        /// Wall-clock time it took, seconds.
         seconds: f64,
     },
-    /// The frames computed now are on the disk; also told where the next one failed.
+    /// The frames computed by this run are on the disk. Also sent before the error if a later frame
+    /// failed.
     Written {
-        /// Bytes of them.
+        /// Bytes written by this run.
         bytes: u64,
     },
 }
 
-/// How a bake ended.
+/// Result of a bake that met no error.
 #[derive(Clone, Debug)]
 pub struct Outcome {
     /// Last frame in the cache.
     pub last_frame: u32,
-    /// Frames computed now.
+    /// Number of frames computed by this run.
     pub frames: u32,
-    /// Bytes of frames written now.
+    /// Bytes of frames written by this run.
     pub bytes: u64,
     /// Seconds that the solver waited for the disk.
     pub waited: f64,
     /// Whether a signal ended it before the last frame.
     pub interrupted: bool,
-    /// What a user has to know of the frames computed now, a sentence each.
+    /// Warnings about the frames computed by this run, a sentence each.
     pub warnings: Vec<String>,
-    /// Seconds and runs by pass, where measured.
+    /// Seconds and runs of each pass, if measured.
     pub passes: PassTimes,
-    /// The same by what they are there for, with bytes.
+    /// The same grouped by purpose, with bytes.
     pub shares: Vec<Share>,
 }
 
 /// Why a bake failed.
 #[derive(Debug, thiserror::Error)]
 pub enum BakeError {
-    /// The scene and its meshes.
+    /// The scene or one of its meshes.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// A solid without inside, or too large a grid.
+    /// A solid that has no inside, or too large a distance grid.
     #[error(transparent)]
     Solid(#[from] SignedDistanceError),
-    /// More particles than the budget has, known before the bake.
+    /// More particles than the budget allows, known before the bake.
     #[error("budget.particles is {limit}: {}", more_than(*.frame, *.count))]
     Particles {
-        /// The budget.
+        /// Limit of the budget.
         limit: f64,
-        /// The frame after which there are more, 0 for the start.
+        /// First frame that exceeds it; 0 for the start.
         frame: u32,
-        /// How many there are then.
+        /// Number of particles after that frame.
         count: usize,
     },
     /// The device.
@@ -146,12 +148,12 @@ pub enum BakeError {
     /// The cache.
     #[error(transparent)]
     Cache(#[from] CacheError),
-    /// The bake in the cache began from other physics.
+    /// The bake in the cache has other physics.
     #[error("{directory} was baked from another scene: {difference}; choose another -o", directory = .directory.display())]
     OtherPhysics {
-        /// Cache directory.
+        /// Directory of the cache.
         directory: PathBuf,
-        /// Key and both values.
+        /// Key that differs, and both values.
         difference: String,
     },
     /// The frame to begin from.
@@ -168,26 +170,26 @@ pub enum BakeError {
         /// The frame to begin from.
         frame: u32,
     },
-    /// A budget was broken; what the frame began with is kept.
+    /// A budget was exceeded; the state that the frame began with is kept.
     #[error(
         "{failure}; the last good frame is kept, and `swell check {}` computes this one again",
         posix::path(failed)
     )]
     Budget {
-        /// What, and where in the frame.
+        /// The exceeded budget, and where in the frame.
         failure: Box<Failure>,
-        /// Folder of its inputs.
+        /// Folder with the inputs of the frame.
         failed: PathBuf,
     },
-    /// What the failed frame began with could not be kept, or the frame not be computed again.
+    /// The inputs of the failed frame could not be kept, or the frame could not be recomputed.
     #[error("{breach}; keeping its inputs failed")]
     NotKept {
-        /// What was broken.
+        /// The exceeded budget.
         breach: Box<Breach>,
-        /// Why they could not be kept.
+        /// Why the inputs could not be kept.
         source: Box<ReplayError>,
     },
-    /// A mesh file changed or went between loading and caching.
+    /// A mesh file changed or disappeared between loading and caching.
     #[error("{file}: {what}", file = .file.display())]
     Asset {
         /// The file.
@@ -217,10 +219,11 @@ impl From<&BakeError> for Blame {
     }
 }
 
-/// Runs a bake; `tell` hears of progress, and `stop` ends it after the current frame.
+/// Runs a bake. `tell` receives progress events, and setting `stop` ends the bake after the current
+/// frame.
 ///
 /// # Errors
-/// [`BakeError`]; frames that were finished before are in the cache.
+/// [`BakeError`]; the frames that were completed before are in the cache.
 pub fn bake(
     request: &Request,
     stop: &AtomicBool,
@@ -291,7 +294,7 @@ pub fn bake(
         let extra = json!({ "seconds": seconds });
         writer.submit(clock, particles, seen, to_json(&report), extra)?;
         if frame == first {
-            // Of an earlier bake, which broke off here.
+            // Left by an earlier bake that failed at this frame.
             failed::remove(&request.directory)?;
         }
         tell(Event::Frame {
@@ -340,8 +343,8 @@ pub fn bake(
     })
 }
 
-/// Refuses a bake that is known to come to more particles than the budget has: with its start, or with what emitters bring to it where no
-/// drain may take some.
+/// Refuses a bake that is known to exceed the particle budget: at its start, or with what emitters
+/// add when no drain can remove any.
 fn check_count(
     scene: &Scene,
     start: &Start,
@@ -373,7 +376,7 @@ fn check_count(
     }
 }
 
-/// What there is when, in words.
+/// The count and when it is reached, in words.
 fn more_than(frame: u32, count: usize) -> String {
     match frame {
         0 => format!("the start has {count} particles"),
@@ -383,7 +386,8 @@ fn more_than(frame: u32, count: usize) -> String {
     }
 }
 
-/// What is said of a frame that could not be computed; of one that broke a budget, once its inputs are kept.
+/// The error of a frame that could not be computed. If a budget was exceeded, keeps the frame's
+/// inputs first.
 fn end(request: &Request, opened: &Opened, start: &Start, error: SolverError) -> BakeError {
     let Some(breach) = error.breach() else {
         return error.into();
@@ -405,7 +409,8 @@ fn to_json(report: &StepReport) -> Value {
     serde_json::to_value(report).unwrap_or(Value::Null)
 }
 
-/// The last frame wanted. A bake computes every frame up to it, and a scene was validated up to its own last.
+/// The last requested frame. A bake computes every frame up to it, and a scene is validated only up
+/// to its own last frame.
 fn last_frame(request: &Request) -> Result<u32, BakeError> {
     let shot = request.scene.shot.frames;
     let Some(frames) = &request.frames else {
@@ -421,7 +426,7 @@ fn last_frame(request: &Request) -> Result<u32, BakeError> {
     Ok(frames.last())
 }
 
-/// What a new bake begins with, and the plan is made for.
+/// What a new bake begins with, and what its plan is made for.
 struct Beginning {
     start: Start,
     clock: Clock,
@@ -429,7 +434,8 @@ struct Beginning {
     notes: Vec<String>,
 }
 
-/// The scene's own start, the frame that the request names, or what a cache that is gone on with began from.
+/// The scene's own start, the frame that the request names, or the beginning of the cache to
+/// resume.
 fn beginning(request: &Request, last: u32) -> Result<Beginning, BakeError> {
     let (scene, directory) = (&request.scene, &request.directory);
     let stands = request.resume && swell_cache::exists(directory);
@@ -474,7 +480,7 @@ fn branched(request: &Request, last: u32, mut branch: Branch) -> Result<Beginnin
     })
 }
 
-/// A bake cannot begin after a frame that is not there.
+/// Refuses a range whose first frame lies beyond the next one to bake.
 fn check_first(request: &Request, next: u32) -> Result<(), BakeError> {
     match &request.frames {
         Some(frames) if frames.first() > next => Err(BakeError::Frames(format!(
@@ -485,7 +491,7 @@ fn check_first(request: &Request, next: u32) -> Result<(), BakeError> {
     }
 }
 
-/// A new cache, or one to go on with: the writer, where its clock stands, and the state there.
+/// Creates a cache or resumes one: returns the writer, its clock and the state at that point.
 fn open_cache(
     request: &Request,
     device: &Identity,
@@ -536,14 +542,14 @@ fn open_cache(
     }
     check_first(request, clock.frame + 1)?;
     let assets = assets(scene)?;
-    // No step has been made, so no pressure is known.
+    // No step has run yet, so pressures are unknown.
     let seen = probes::look(scene, clock.time, &start.particles, &[], None);
     let particles = &start.particles;
     let writer = CacheWriter::create(directory, manifest, &text, &assets, clock, particles, &seen)?;
     Ok((writer, clock, particles.clone()))
 }
 
-/// The scene's grids as the cache keeps them.
+/// The scene's grids as the manifest records them.
 fn grid_record(scene: &Scene, grids: &Grids) -> GridRecord {
     GridRecord {
         surface: grids.surface,
@@ -554,7 +560,7 @@ fn grid_record(scene: &Scene, grids: &Grids) -> GridRecord {
     }
 }
 
-/// The scene's mesh files as the cache keeps them.
+/// Reads the scene's mesh files for the cache and checks that they have not changed.
 fn assets(scene: &Scene) -> Result<Vec<Asset>, BakeError> {
     let read = |(file, hash): (PathBuf, String)| {
         let fault = |what: String| BakeError::Asset {

@@ -17,9 +17,9 @@ use swell_scene::{Scene, SceneError};
 /// A frame of a cache, written `CACHE:120`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct BranchPoint {
-    /// Cache directory.
+    /// Directory of the cache.
     pub directory: PathBuf,
-    /// Its frame to begin from.
+    /// Number of the frame to begin from.
     pub frame: u32,
 }
 
@@ -38,7 +38,7 @@ impl TryFrom<OsString> for BranchPoint {
     }
 }
 
-/// The last one: a path may hold others, and bytes that are no UTF-8.
+/// Splits at the last colon: a path may contain others, and bytes that are not UTF-8.
 #[cfg(unix)]
 fn at_last_colon(text: &OsStr) -> Option<(&OsStr, &OsStr)> {
     use std::os::unix::ffi::OsStrExt as _;
@@ -48,7 +48,7 @@ fn at_last_colon(text: &OsStr) -> Option<(&OsStr, &OsStr)> {
     Some(parts.map(OsStr::from_bytes).into())
 }
 
-/// Elsewhere the bytes of a path are not at hand.
+/// Other systems do not expose the bytes of a path.
 #[cfg(not(unix))]
 fn at_last_colon(text: &OsStr) -> Option<(&OsStr, &OsStr)> {
     let (path, frame) = text.to_str()?.rsplit_once(':')?;
@@ -61,16 +61,17 @@ impl fmt::Display for BranchPoint {
     }
 }
 
-/// What a scene begins with where it begins from a frame.
+/// The state with which a scene begins from a frame of another cache.
 #[derive(Clone, Debug)]
 pub struct Branch {
-    /// For the manifest.
+    /// Record of the frame for the manifest.
     pub parent: Parent,
-    /// As it stood after the frame: number and time go on, so that walls and solids move on as they would have.
+    /// Clock after the frame: number and time continue, so that walls and solids keep moving as
+    /// they would have.
     pub clock: Clock,
     /// The frame's particles with the scene's attributes.
     pub particles: Particles,
-    /// What a user has to know of it, a sentence each.
+    /// Notes about beginning from this frame, a sentence each.
     pub notes: Vec<String>,
 }
 
@@ -85,10 +86,10 @@ pub enum BranchError {
     Scene {
         /// The cache.
         file: PathBuf,
-        /// What is off.
+        /// What is wrong with it.
         source: SceneError,
     },
-    /// What the particles of a frame stand for is decided by this key.
+    /// The scene differs from the cache in a key that decides what particles represent.
     #[error(
         "--from {from}: it was baked with {key} = {cached}, and the scene has {given}; a bake that begins from a frame \
          keeps it"
@@ -98,12 +99,12 @@ pub enum BranchError {
         from: BranchPoint,
         /// Key of the scene.
         key: &'static str,
-        /// In the cache.
+        /// Value in the cache.
         cached: String,
-        /// In the scene.
+        /// Value in the scene.
         given: String,
     },
-    /// Water where the scene has none of its room.
+    /// Particles outside the scene's walls.
     #[error(
         "--from {from}: {count} of {all} particles lie beyond the walls of the scene as they stand at {time} s; the first is \
          particle {id} at {position:?}"
@@ -111,24 +112,25 @@ pub enum BranchError {
     Beyond {
         /// The frame.
         from: BranchPoint,
-        /// How many.
+        /// Number of particles outside.
         count: usize,
-        /// Particles of the frame.
+        /// Number of particles in the frame.
         all: usize,
-        /// Of the frame, seconds.
+        /// Time of the frame, seconds.
         time: f64,
-        /// Of the first one.
+        /// Id of the first particle outside.
         id: u32,
-        /// Its place in the world, metres.
+        /// World position of that particle, metres.
         position: [f64; 3],
     },
 }
 
 impl Branch {
-    /// Reads the frame and looks whether the scene can go on from it.
+    /// Reads the frame and checks that the scene can continue from it.
     ///
-    /// Solver, frame rate and particle spacing have to be the same: they decide what a particle and a frame number
-    /// stand for. Attributes that the scene has and the frame has not are zero, as at a scene's own start.
+    /// Solver, frame rate and particle spacing must be equal, because they decide what a particle
+    /// and a frame number mean. Attributes that the scene has and the frame lacks are zero, as at a
+    /// scene's own start.
     ///
     /// # Errors
     /// [`BranchError`].
@@ -179,7 +181,7 @@ impl Branch {
         })
     }
 
-    /// A note where solids of the scene cover particles.
+    /// Adds a note if solids of the scene cover particles.
     pub fn note_covered(&mut self, scene: &Scene, boundary: &Boundary) {
         let time = self.clock.time;
         let still = boundary.distance.iter().map(|field| (field, Pose::START));
@@ -239,7 +241,8 @@ fn check_keys(from: &BranchPoint, cache: &CacheReader, scene: &Scene) -> Result<
     }
 }
 
-/// Refuses a frame of which more than a skin half a spacing deep lies outside: that much a solver lets walls push.
+/// Refuses a frame with particles more than half a spacing outside: walls of the scene's solver
+/// push back no more than that.
 fn check_walls(
     from: &BranchPoint,
     clock: Clock,
@@ -248,7 +251,7 @@ fn check_walls(
 ) -> Result<(), BranchError> {
     let walls = scene.walls_after(particles, clock.time);
     let corner = scene.domain.min;
-    // Along periodic axes walls are far off, and the domain is what particles have to lie in.
+    // Along periodic axes there are no walls nearby, and particles have to lie in the domain.
     let room = Bounds {
         min: (corner + walls.min).max(scene.domain.min),
         max: (corner + walls.max).min(scene.domain.max),
@@ -273,7 +276,7 @@ fn check_walls(
     }
 }
 
-/// Leaves the attributes that are declared; tells which were not there and which go.
+/// Keeps the declared attributes; notes which ones were missing and which are dropped.
 fn take_attributes(particles: &mut Particles, declared: &[&str]) -> Vec<String> {
     let count = particles.len();
     let mut found = std::mem::take(&mut particles.attributes);

@@ -1,4 +1,5 @@
-//! `check`: opens what a step starts from and the device, and has the room `check` hold the step against the reference.
+//! `check`: opens the starting state of a step and the device, and lets the crate `check` compare
+//! the step with the reference.
 
 use std::{
     path::PathBuf,
@@ -30,18 +31,18 @@ pub use swell_check::{Checked, Row, Table};
 pub enum Source {
     /// A scene's start: frame 0.
     Scene(Box<Scene>),
-    /// Frames of a cache; of its last one where none are asked for.
+    /// Frames of a cache; its last frame if none are given.
     Cache(PathBuf, Option<FrameRange>),
 }
 
 /// What to check.
 #[derive(Clone, Debug)]
 pub struct Request {
-    /// Inputs.
+    /// Source of the inputs.
     pub source: Source,
-    /// Which substep of the frame after each.
+    /// Which substep to check of the frame that follows each input.
     pub substep: Which,
-    /// Index or part of the name of an adapter.
+    /// Adapter and shaders.
     pub gpu: Gpu,
 }
 
@@ -50,15 +51,15 @@ pub struct Request {
 pub struct FirstOver {
     /// Frame that the step started from.
     pub frame: u32,
-    /// Substep of the frame after it.
+    /// Number of the substep in the frame after it.
     pub substep: Option<u32>,
-    /// Of the row.
+    /// Pass of the row.
     pub pass: &'static str,
-    /// Of the row.
+    /// Field of the row.
     pub field: &'static str,
 }
 
-/// What a check has to tell while it runs.
+/// Progress of a running check.
 #[derive(Clone, Debug)]
 pub enum Event<'a> {
     /// The device is open.
@@ -67,36 +68,36 @@ pub enum Event<'a> {
         device: String,
         /// Name of the solver.
         solver: &'static str,
-        /// Particles at the start.
+        /// Number of particles at the start.
         particles: usize,
-        /// Frames that will be checked.
+        /// Number of frames that will be checked.
         frames: usize,
-        /// What a user has to know of the scene, a sentence each.
+        /// Warnings about the scene, a sentence each.
         warnings: Vec<String>,
     },
     /// The step after a frame was checked.
     Frame {
-        /// The frame that it started from.
+        /// Number of the frame that the step started from.
         frame: u32,
-        /// What was found, and in which substep.
+        /// The comparison, and the number of the substep.
         checked: &'a Checked,
-        /// Wall clock for it.
+        /// Wall-clock time it took, seconds.
         seconds: f64,
     },
 }
 
-/// What a check found.
+/// Result of a check.
 #[derive(Clone, Debug, Default)]
 pub struct Outcome {
-    /// All frames in one: of each row the value that is furthest out.
+    /// All frames combined: for each row the value that deviates most.
     pub table: Table,
     /// The first row out of tolerance.
     pub first_over: Option<FirstOver>,
-    /// Frames checked.
+    /// Frames that were checked.
     pub frames: Vec<u32>,
-    /// Of each, the substep of the frame after it that was checked.
+    /// For each of them, the substep of the following frame that was checked.
     pub substeps: Vec<Option<u32>>,
-    /// Hash of the shaders where they are not the shipped ones.
+    /// Hash of the shaders if they are not the built-in ones.
     pub shaders: Option<String>,
     /// Whether a signal ended it.
     pub interrupted: bool,
@@ -108,7 +109,7 @@ pub enum CheckError {
     /// The cache.
     #[error(transparent)]
     Cache(#[from] CacheError),
-    /// Its scene.
+    /// The scene in the cache.
     #[error(transparent)]
     Scene(#[from] SceneError),
     /// The scene's solids.
@@ -120,10 +121,10 @@ pub enum CheckError {
     /// The solver.
     #[error(transparent)]
     Solve(#[from] SolveError),
-    /// A stream of whitewater and the water that it was made from.
+    /// A whitewater stream, or the water that it was made from.
     #[error(transparent)]
     Whitewater(#[from] WhitewaterError),
-    /// A comparison of nothing is none that held.
+    /// Nothing was compared, which must not count as a success.
     #[error("nothing was compared: there is no water in it")]
     NoWater,
 }
@@ -142,10 +143,10 @@ impl From<&CheckError> for Blame {
     }
 }
 
-/// Checks the step after each frame; `stop` ends it after the current one.
+/// Checks the step after each frame; setting `stop` ends the check after the current one.
 ///
 /// # Errors
-/// [`CheckError`]; a row out of tolerance is none, but in the outcome.
+/// [`CheckError`]. A row out of tolerance is not an error; it is reported in the outcome.
 pub fn check(
     request: &Request,
     stop: &AtomicBool,
@@ -206,11 +207,11 @@ pub fn check(
 /// What is checked.
 enum Subject {
     Step(Box<Step>),
-    /// Frames of a stream of whitewater.
+    /// Frames of a whitewater stream.
     Whitewater(Box<Stream>),
 }
 
-/// A solver's step: of a scene's start, or from frames of a cache.
+/// A solver's step, from a scene's start or from frames of a cache.
 struct Step {
     scene: Scene,
     start: Start,
@@ -264,7 +265,7 @@ impl Subject {
             Self::Step(step) => step.check(context, frame, which),
             Self::Whitewater(stream) => Ok(Checked {
                 table: stream.check(context, frame)?,
-                // A frame of whitewater is one step.
+                // A frame of whitewater is a single step.
                 substep: Some(1),
             }),
         }
@@ -307,10 +308,10 @@ fn open(source: &Source) -> Result<(Subject, Vec<u32>), CheckError> {
     }
 }
 
-/// The first substep of [`check_substep`].
+/// Checks the first substep with [`check_substep`].
 ///
 /// # Errors
-/// Likewise.
+/// Those of [`check_substep`].
 pub fn check_frame(
     context: &Context,
     scene: &Scene,
@@ -322,11 +323,12 @@ pub fn check_frame(
     Ok(check_substep(context, scene, start, frame, particles, first)?.table)
 }
 
-/// Checks a substep of the frame after `particles`, the state at the end of `frame`: those before it run at once. With PBF
-/// the measurement at a frame's end too, as if the frame ended there.
+/// Checks a substep of the frame after `particles`, the state at the end of `frame`; the substeps
+/// before it run without checks. With PBF also checks the measurement at the end of a frame, as if
+/// the frame ended there.
 ///
 /// # Errors
-/// The device, the numbers of the solver, and a substep that the frame does not have.
+/// A device error, invalid numbers in the solver, or a substep that the frame does not have.
 pub fn check_substep(
     context: &Context,
     scene: &Scene,

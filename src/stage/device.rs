@@ -1,4 +1,4 @@
-//! What a bake runs on: an adapter, or the CPU with the f64 reference.
+//! The device that a bake runs on: an adapter, or the CPU with the f64 reference.
 
 use std::{
     env::consts::{ARCH, OS},
@@ -32,9 +32,9 @@ pub use swell_gpu::{
 /// An adapter, and the shaders that run on it.
 #[derive(Clone, Debug, Default)]
 pub struct Gpu {
-    /// Index of the adapter, or a part of its name; the best one where `None`.
+    /// Index of the adapter or a part of its name; the best adapter if `None`.
     pub adapter: Option<String>,
-    /// The shipped ones by default.
+    /// Shaders to run; the built-in ones by default.
     pub shaders: Shaders,
 }
 
@@ -59,36 +59,36 @@ impl From<Option<String>> for Gpu {
     }
 }
 
-/// What to run on.
+/// The device to run on.
 #[derive(Clone, Debug)]
 pub enum Device {
-    /// An adapter.
+    /// An adapter to open.
     Gpu(Gpu),
-    /// A device that the caller opened.
+    /// A device that the caller has opened.
     Open(Box<Context>),
-    /// The f64 reference; no driver is touched.
+    /// The f64 reference; no driver is used.
     Cpu,
 }
 
-/// A device that stands ready.
+/// An open device.
 pub enum Opened {
-    /// An adapter's.
+    /// An adapter's context.
     Gpu(Box<Context>),
     /// This machine's processors.
     Cpu,
 }
 
-/// What passes took, and what the device gives.
+/// Times of passes, and the ceilings of the device.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PassTimes {
-    /// By name; empty unless timed.
+    /// Times by pass name; empty unless timed.
     pub passes: Vec<PassTime>,
-    /// Only of an adapter whose passes were timed.
+    /// Ceilings of the adapter; `None` unless passes were timed on one.
     pub ceilings: Option<Ceilings>,
 }
 
 impl PassTimes {
-    /// Of passes that were timed on an adapter: measures what it gives.
+    /// Times of passes on an adapter; measures the adapter's ceilings.
     ///
     /// # Errors
     /// Those of [`Ceilings::measure`].
@@ -100,26 +100,28 @@ impl PassTimes {
     }
 }
 
-/// Which part of a device's ceilings a pass reaches.
+/// Fractions of a device's ceilings that a pass reaches.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reached {
-    /// Of the bandwidth; more than 1 where what is bound stays in a cache.
+    /// Fraction of the bandwidth; above 1 if the bound data stays in a cache.
     pub memory: Option<f64>,
-    /// Of the arithmetic rate.
+    /// Fraction of the arithmetic rate.
     pub arithmetic: Option<f64>,
-    /// What the device waits for: `memory` or `arithmetic` where the pass reaches half of it or more, and the larger part of both; `start`
-    /// where a run takes at most twice what a pass without work takes; else `latency`, of loads that wait for one another, of branches,
-    /// of lanes without work. `None` where bytes or operations are not known.
+    /// What limits the pass; `None` if its bytes or operations are unknown.
+    ///
+    /// `memory` or `arithmetic` if the pass reaches at least half of that ceiling (the larger of
+    /// the two); `start` if a run takes at most twice as long as an empty pass; otherwise
+    /// `latency`: dependent loads, branches, or idle lanes.
     pub waits_for: Option<&'static str>,
 }
 
-/// The part of a ceiling from which on it is what holds a pass.
+/// Fraction of a ceiling from which on it limits a pass.
 const HELD: f64 = 0.5;
-/// The times that a pass without work takes, up to which its start is what holds a pass.
+/// Multiple of an empty pass's time up to which the start limits a pass.
 const STARTING: f64 = 2.0;
 
 impl Reached {
-    /// By all runs of a pass.
+    /// Fractions over all runs of a pass.
     pub fn of(time: &PassTime, ceilings: &Ceilings) -> Self {
         let part = |amount: u64, ceiling: f64| amount as f64 / time.seconds / ceiling;
         let memory = (time.bytes > 0).then(|| part(time.bytes, ceilings.bandwidth));
@@ -143,16 +145,16 @@ impl Reached {
     }
 }
 
-/// A device as the manifest has it.
+/// A device as recorded in the manifest.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Identity {
-    /// Adapter, or that it is the reference.
+    /// Name of the adapter, or of the reference.
     pub name: String,
-    /// Driver and its version; of the reference what its libraries were built for.
+    /// Driver and its version; for the reference, the target that it was built for.
     pub driver: String,
-    /// `Vulkan`, `Metal`, `Dx12`; `CPU` of the reference.
+    /// `Vulkan`, `Metal` or `Dx12`; `CPU` for the reference.
     pub backend: String,
-    /// Hash of the shaders where they are not the shipped ones, as [`Shaders::edited`].
+    /// Hash of the shaders if they are not the built-in ones, as in [`Shaders::edited`].
     pub shaders: Option<String>,
 }
 
@@ -167,29 +169,29 @@ impl fmt::Display for Identity {
     }
 }
 
-/// What is said of shaders behind a device or a program: nothing of the shipped ones.
+/// Note about edited shaders that follows a device or a program; empty for the built-in ones.
 pub fn shaders_note(edited: Option<&str>) -> String {
     edited.map_or(String::new(), |hash| {
         format!(" with shaders {hash}, not the shipped ones")
     })
 }
 
-/// What stops a solver, whichever it is.
+/// An error of either solver.
 #[derive(Debug, thiserror::Error)]
 pub enum SolverError {
-    /// On the GPU.
+    /// The solver on the GPU.
     #[error(transparent)]
     Gpu(#[from] SolveError),
-    /// In f64 on the CPU.
+    /// The f64 reference on the CPU.
     #[error(transparent)]
     Reference(#[from] ReferenceError),
-    /// A budget, at a frame's end.
+    /// A budget exceeded at the end of a frame.
     #[error(transparent)]
     Budget(#[from] Breach),
 }
 
 impl SolverError {
-    /// The budget that was broken, where that is what it is.
+    /// The exceeded budget, if that is the error.
     pub fn breach(&self) -> Option<&Breach> {
         match self {
             Self::Gpu(SolveError::Numbers(breach))
@@ -211,10 +213,10 @@ impl From<&SolverError> for Blame {
 }
 
 impl Device {
-    /// Opens it; an adapter for passes with these needs.
+    /// Opens the device; an adapter for passes with these needs.
     ///
     /// # Errors
-    /// Those of an adapter.
+    /// Those of [`Gpu::open`]; the CPU always opens.
     pub fn open(&self, needs: Needs) -> Result<Opened, GpuError> {
         Ok(match self {
             Self::Gpu(gpu) => Opened::Gpu(Box::new(gpu.open(needs)?)),
@@ -224,7 +226,7 @@ impl Device {
     }
 }
 
-/// What a scene's passes ask of an adapter.
+/// Adapter features that a scene's passes need.
 pub fn needs(scene: &Scene) -> Needs {
     let flip = scene.solver.flip.as_ref();
     let flip = flip.filter(|_| scene.solver.method == Method::Flip);
@@ -233,16 +235,16 @@ pub fn needs(scene: &Scene) -> Needs {
     }
 }
 
-/// A solver of a scene, and what it was planned to take.
+/// A scene's solver, and its plan.
 pub struct Built {
-    /// Not loaded yet.
+    /// The solver, without a state yet.
     pub solver: Box<dyn Solver<Error = SolverError>>,
-    /// Of the GPU; `None` on the CPU.
+    /// Plan of the passes and buffers on the GPU; `None` on the CPU.
     pub plan: Option<Plan>,
 }
 
 impl Opened {
-    /// The same; where `counts`, timers count operations as well.
+    /// Sets whether timers count operations as well.
     pub fn counting(mut self, counts: bool) -> Self {
         if let Self::Gpu(context) = &mut self {
             context.counts_operations = counts;
@@ -250,7 +252,7 @@ impl Opened {
         self
     }
 
-    /// For the manifest.
+    /// The device's identity for the manifest.
     pub fn identity(&self) -> Identity {
         match self {
             Self::Gpu(context) => Identity {
@@ -268,7 +270,7 @@ impl Opened {
         }
     }
 
-    /// What passes took on it.
+    /// Times of passes on this device.
     ///
     /// # Errors
     /// Those of [`PassTimes::on`].
@@ -282,10 +284,10 @@ impl Opened {
         }
     }
 
-    /// The scene's solver on it, with what the scene's plan names and no more.
+    /// Builds the scene's solver on this device, with exactly the passes and buffers of its plan.
     ///
     /// # Errors
-    /// A buffer over the adapter's limits, with the figures; the device at fault.
+    /// A buffer that exceeds the adapter's limits, with the figures; a device error.
     pub fn build(
         &self,
         scene: &Scene,
@@ -318,7 +320,7 @@ impl Opened {
     }
 }
 
-/// A solver whose errors are [`SolverError`]s.
+/// Adapts a solver so that its errors are [`SolverError`]s.
 struct Unified<S>(S);
 
 impl<S: Solver> Solver for Unified<S>
@@ -358,7 +360,7 @@ mod tests {
             arithmetic: 1e10,
             start: 0.001,
         };
-        // Ten runs of 0.1 s move and compute these parts of what the device could.
+        // Ten runs of 0.1 s reach these fractions of the ceilings.
         let of = |memory: f64, arithmetic: f64, seconds: f64| {
             let bytes = (memory * 1e9 * seconds) as u64;
             let half = (0.5 * arithmetic * 1e10 * seconds) as u64;
@@ -373,7 +375,7 @@ mod tests {
         assert_eq!(reached.waits_for, Some("memory"));
         assert_eq!(of(0.5, 0.625, 1.0).waits_for, Some("arithmetic"));
         assert_eq!(of(0.25, 0.25, 1.0).waits_for, Some("latency"));
-        // 2 ms and less are a start, 2.1 ms are not.
+        // Up to 2 ms a run counts as a start, 2.1 ms does not.
         assert_eq!(of(0.25, 0.25, 0.02).waits_for, Some("start"));
         assert_eq!(of(0.25, 0.25, 0.021).waits_for, Some("latency"));
         assert_eq!(of(0.75, 0.25, 0.02).waits_for, Some("memory"));

@@ -1,4 +1,5 @@
-//! `diff`: two caches, a cache and a baseline, or two renders: where they part, and by how much.
+//! `diff`: compares two caches, a cache and a baseline, or two renders: where they differ, and by
+//! how much.
 
 mod against_baseline;
 mod caches;
@@ -42,26 +43,26 @@ pub struct Request {
     pub a: PathBuf,
     /// The reference: the same kind of thing, or a baseline.
     pub b: PathBuf,
-    /// Frames to compare; all where `None`.
+    /// Frames to compare; all if `None`.
     pub frames: Option<FrameRange>,
-    /// Equal in every bit where `None`.
+    /// Tolerances; if `None`, every bit must be equal.
     pub tolerance: Option<Tolerance>,
-    /// Where difference images go.
+    /// Where to write difference images; none if `None`.
     pub images: Option<Images>,
-    /// Whether a baseline is to judge as if it did not know the adapter.
+    /// Whether to ignore a baseline's hashes, as if it did not know the adapter.
     pub ignores_hashes: bool,
 }
 
-/// Difference images.
+/// Difference images to write.
 #[derive(Clone, Debug)]
 pub struct Images {
     /// A PNG for two pictures, a folder for two folders.
     pub path: PathBuf,
-    /// What differences are multiplied by.
+    /// Factor that differences are multiplied by.
     pub gain: f64,
 }
 
-/// What was found.
+/// Result of a comparison.
 #[derive(Clone, Debug, Serialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum Outcome {
@@ -90,12 +91,12 @@ pub enum DiffError {
     /// A cache.
     #[error(transparent)]
     Cache(#[from] CacheError),
-    /// The scene in a cache, or in a baseline.
+    /// The scene in a cache or in a baseline.
     #[error("the scene of {}: {source}", file.display())]
     Scene {
         /// The cache or the baseline.
         file: PathBuf,
-        /// What is off with it.
+        /// What is wrong with it.
         source: SceneError,
     },
     /// A picture.
@@ -104,23 +105,23 @@ pub enum DiffError {
     /// A file or folder that cannot be read or written.
     #[error("{}", file.display())]
     File {
-        /// Which.
+        /// The file or folder.
         file: PathBuf,
-        /// The system's words.
+        /// The system's error.
         source: std::io::Error,
     },
-    /// A baseline that is none.
+    /// A file that is not a valid baseline.
     #[error("{} is no baseline: {what}", file.display())]
     Baseline {
-        /// Which.
+        /// The file.
         file: PathBuf,
-        /// What is off.
+        /// What is wrong with it.
         what: String,
     },
     /// A folder without anything to compare.
     #[error("{} holds no cache (no manifest.json) and no PNG or EXR picture", .0.display())]
     Empty(PathBuf),
-    /// Arguments that do not go together.
+    /// Arguments that cannot be combined.
     #[error("{0}")]
     Usage(String),
 }
@@ -130,7 +131,7 @@ impl DiffError {
         Self::Usage(message.into())
     }
 
-    /// Names the file that an [`std::io::Error`] keeps to itself.
+    /// Adds the file that an [`std::io::Error`] lacks.
     fn at(file: &Path) -> impl Fn(std::io::Error) -> Self {
         move |source| Self::File {
             file: file.to_owned(),
@@ -153,7 +154,7 @@ impl From<&DiffError> for Blame {
     }
 }
 
-/// What a path leads to.
+/// What a path refers to.
 enum Subject {
     Cache(Box<CacheReader>),
     Baseline(Box<Baseline>),
@@ -196,10 +197,10 @@ impl Subject {
     }
 }
 
-/// Compares what is asked for; nothing but difference images is written.
+/// Compares what the request names; writes nothing but difference images.
 ///
 /// # Errors
-/// [`DiffError`]; what differs is none.
+/// [`DiffError`]; a difference is not an error.
 pub fn diff(request: &Request) -> Result<Outcome, DiffError> {
     let (a, b) = (Subject::of(&request.a)?, Subject::of(&request.b)?);
     let is_render = matches!(a, Subject::Folder | Subject::Picture);
@@ -252,7 +253,7 @@ pub fn diff(request: &Request) -> Result<Outcome, DiffError> {
     })
 }
 
-/// The first key by which `new` differs from the scene of `file`.
+/// The first key in which `new` differs from the scene of `file`.
 fn physics(file: &Path, old: &str, new: &str) -> Result<Option<String>, DiffError> {
     physics_difference(old, new).map_err(|source| DiffError::Scene {
         file: file.to_owned(),
@@ -280,7 +281,7 @@ fn bake_of(manifest: &Manifest) -> String {
     )
 }
 
-/// What hashes hold for: another driver may round otherwise.
+/// The adapter and driver for which hashes are valid: another driver may round differently.
 fn adapter_of(manifest: &Manifest) -> String {
     format!(
         "{} ({}, {})",
@@ -288,7 +289,7 @@ fn adapter_of(manifest: &Manifest) -> String {
     )
 }
 
-/// What the particles of a frame sum up to, and what its report says of them.
+/// Aggregates of a frame's particles, with the density error from the frame's report.
 fn aggregates(
     cache: &CacheReader,
     scene: &Scene,

@@ -1,4 +1,5 @@
-//! The loop that takes a scene from frame to frame, on a GPU or on the CPU: bakes, replays and experiments stand on it.
+//! The loop that advances a scene frame by frame, on a GPU or on the CPU. Bakes, replays and
+//! experiments use it.
 
 use std::{
     borrow::Cow,
@@ -26,31 +27,33 @@ use super::{
     watch::Watch,
 };
 
-/// A scene's solver, and the frame at which it stands.
+/// A scene's solver and its current frame.
 pub struct Drive<'a> {
     scene: &'a Scene,
-    /// What enters and leaves; nothing where neither happens.
+    /// Emitters and drains; `None` if no water enters or leaves.
     sources: Option<Exchanged>,
-    /// The least that a particle may have which enters.
+    /// Least id that an entering particle may have.
     first_id: u32,
     solver: Box<dyn Solver<Error = SolverError>>,
-    /// What the GPU was planned to hold and run; `None` on the CPU.
+    /// Plan of the passes and buffers on the GPU; `None` on the CPU.
     plan: Option<Plan>,
     frame: u32,
-    /// What walls that absorb do from there on.
+    /// State of the absorbing walls after that frame.
     walls: Answers,
-    /// Of the particle that enters next.
+    /// Id of the next particle to enter.
     next_id: u32,
     watch: Option<Watch<'a>>,
-    /// Where pressures are read after each frame.
+    /// Positions at which pressures are read after each frame, metres.
     pressure_points: Vec<DVec3>,
-    /// Whether probes look at substeps.
+    /// Whether probes sample at substeps.
     is_recorded: bool,
-    /// Of the last frame that the solver finished, also where that frame then broke a budget.
+    /// Report of the last frame that the solver completed, even if that frame then exceeded a
+    /// budget.
     report: Option<StepReport>,
 }
 
-/// What enters and leaves at the frames' ends, and the solids that it meets: at rest, and where each that moves stood at the start.
+/// What enters and leaves at the end of each frame, and the solids that it meets: those at rest,
+/// and the moving ones in their start position.
 struct Exchanged {
     sources: Sources,
     still: Option<SignedDistance>,
@@ -58,9 +61,9 @@ struct Exchanged {
 }
 
 impl Exchanged {
-    /// `None` where nothing enters or leaves.
+    /// `None` if nothing enters or leaves.
     fn of(start: &Start) -> Option<Self> {
-        // Drains look at no solids.
+        // Drains ignore solids.
         let meets_solids = !start.sources.emitters.is_empty();
         let boundary = meets_solids.then_some(&start.boundary);
         (!start.sources.is_empty()).then(|| Self {
@@ -71,40 +74,41 @@ impl Exchanged {
     }
 }
 
-/// A frame as it was computed.
+/// A computed frame.
 #[derive(Clone, Debug)]
 pub struct Step {
-    /// Its number.
+    /// Number of the frame.
     pub frame: u32,
-    /// State at its end, with what entered and without what left.
+    /// State at its end, after emitters and drains acted.
     pub particles: Particles,
-    /// Of the particle that enters next; only where water enters or leaves.
+    /// Id of the next particle to enter; present only if water enters or leaves.
     pub next_id: Option<u32>,
-    /// What its substeps did.
+    /// Report of its substeps.
     pub report: StepReport,
-    /// Pressures at the scene's [`pressure_points`](Scene::pressure_points), Pa; empty where none are read.
+    /// Pressures at the scene's [`pressure_points`](Scene::pressure_points), Pa; empty if none are
+    /// read.
     pub pressures: Vec<Option<f64>>,
-    /// What probes saw while the frame was computed, by probe: values, of one with a rate of its own each look's time and
-    /// its values.
+    /// Values that probes recorded during the frame, by probe; for a probe with its own rate, each
+    /// sample's time followed by its values.
     pub looks: ProbeValues,
-    /// Wall clock of all that, seconds.
+    /// Wall-clock time of all that, seconds.
     pub seconds: f64,
 }
 
-/// How a run ended that met no fault.
+/// How a run without an error ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum End {
-    /// The last frame is done.
+    /// The last frame was computed.
     Done,
-    /// A signal came before.
+    /// A signal stopped it before.
     Stopped,
 }
 
 impl<'a> Drive<'a> {
-    /// Builds the scene's solver and loads the start, as frame 0.
+    /// Builds the scene's solver and loads the start as frame 0.
     ///
     /// # Errors
-    /// A buffer over the adapter's limits; the device.
+    /// A buffer that exceeds the adapter's limits; a device error.
     pub fn new(
         opened: &Opened,
         scene: &'a Scene,
@@ -116,7 +120,7 @@ impl<'a> Drive<'a> {
         Ok(drive)
     }
 
-    /// Builds the scene's solver; it needs a state before it goes anywhere.
+    /// Builds the scene's solver; a state has to be loaded before it can advance.
     pub(super) fn unloaded(
         opened: &Opened,
         scene: &'a Scene,
@@ -140,11 +144,11 @@ impl<'a> Drive<'a> {
         })
     }
 
-    /// Takes over `state`, the end of frame `frame`. Nothing is held against budgets from there on. Where water enters, ids
-    /// go on after those of the state and of the scene's start.
+    /// Loads `state`, the end of frame `frame`, and stops checking budgets. New ids continue after
+    /// those of the state and of the scene's start.
     ///
     /// # Errors
-    /// The device; a state that is not the scene's.
+    /// A device error; a state that does not belong to the scene.
     pub fn load(&mut self, frame: u32, state: &Particles) -> Result<(), SolverError> {
         self.solver.load(frame, state)?;
         (self.frame, self.watch) = (frame, None);
@@ -153,12 +157,13 @@ impl<'a> Drive<'a> {
         Ok(())
     }
 
-    /// Ids go on with that one, where there is one.
+    /// Continues ids with `next_id`, if given.
     pub(super) fn go_on_with(&mut self, next_id: Option<u32>) {
         self.next_id = next_id.unwrap_or(self.next_id);
     }
 
-    /// Loads a state and holds each frame after it against the scene's budgets; `start` is that of the bake.
+    /// Loads a state and checks the scene's budgets after each further frame; `start` is the start
+    /// of the bake.
     pub(super) fn load_watched(
         &mut self,
         start: &Particles,
@@ -170,13 +175,13 @@ impl<'a> Drive<'a> {
         Ok(())
     }
 
-    /// The same with pressures read after each frame, where the scene has probes of pressure.
+    /// Reads pressures after each frame if the scene has pressure probes.
     pub fn with_pressures(mut self) -> Self {
         self.pressure_points = self.scene.pressure_points();
         self
     }
 
-    /// The same, and with looks while a frame is computed for the probes that ask for them.
+    /// Additionally lets probes that ask for it sample during a frame.
     pub fn with_probes(mut self) -> Self {
         let mut probes = self.scene.probes.iter();
         self.is_recorded = probes.any(is_recorded);
@@ -186,7 +191,7 @@ impl<'a> Drive<'a> {
     /// Computes the next frame.
     ///
     /// # Errors
-    /// The device, the numbers, or a budget where frames are held against those.
+    /// A device error, invalid numbers, or an exceeded budget if budgets are checked.
     pub fn advance(&mut self) -> Result<Step, SolverError> {
         let begin = Instant::now();
         let scene = self.standing();
@@ -219,7 +224,7 @@ impl<'a> Drive<'a> {
         })
     }
 
-    /// The scene with its walls where they stand: probes look at them while a frame is computed.
+    /// The scene with its walls in their current position, which probes need during a frame.
     fn standing(&self) -> Cow<'a, Scene> {
         if self.walls == Answers::default() || !self.is_recorded {
             return Cow::Borrowed(self.scene);
@@ -231,7 +236,7 @@ impl<'a> Drive<'a> {
         }))
     }
 
-    /// Lets water in and out at the frame's end, where the scene does that.
+    /// Runs emitters and drains at the end of the frame, if the scene has any.
     fn exchange(&mut self, particles: &mut Particles) -> Result<Option<Exchange>, SolverError> {
         let Some(it) = &self.sources else {
             return Ok(None);
@@ -257,7 +262,8 @@ impl<'a> Drive<'a> {
         Ok(Some(exchange))
     }
 
-    /// Computes frames up to `last` and hands each to `observe`; `stop` ends it between two frames.
+    /// Computes frames up to `last` and passes each to `observe`; setting `stop` ends it between
+    /// two frames.
     ///
     /// # Errors
     /// Those of [`Drive::advance`] and of `observe`.
@@ -276,29 +282,30 @@ impl<'a> Drive<'a> {
         Ok(End::Done)
     }
 
-    /// What the last frame did that the solver finished, also where it then broke a budget.
+    /// Report of the last frame that the solver completed, even if that frame then exceeded a
+    /// budget.
     pub(super) fn report(&self) -> Option<&StepReport> {
         self.report.as_ref()
     }
 
-    /// GPU memory in all and for neighbour lists, bytes; `None` on the CPU.
+    /// GPU memory in total and for neighbour lists, bytes; `None` on the CPU.
     pub fn bytes(&self) -> Option<(u64, u64)> {
         self.plan.as_ref().map(Plan::bytes)
     }
 
-    /// What the GPU takes, by what it is there for, with the times of passes where they were measured; empty on the CPU.
+    /// GPU memory by purpose, with the times of passes if they were measured; empty on the CPU.
     pub fn shares(&self) -> Vec<Share> {
         let plan = self.plan.as_ref();
         plan.map_or(Vec::new(), |plan| plan.shares(&self.timings()))
     }
 
-    /// What passes took, where measured.
+    /// Times of passes, if measured.
     pub fn timings(&self) -> Vec<PassTime> {
         self.solver.timings()
     }
 }
 
-/// The id behind those of a state.
+/// The id after the last one of a state.
 fn next_after(particles: &Particles) -> u32 {
     particles.id.last().map_or(0, |id| id + 1)
 }

@@ -1,8 +1,8 @@
-//! `export`: a cache to files of other programs: meshes of the water, USD shots, tables of particles, grids. The cache is only read, and no
-//! device is needed.
+//! `export`: converts a cache to files for other programs: meshes of the water, USD shots, particle
+//! tables, grids. The cache is only read, and no device is needed.
 //!
-//! Several processes may export shares of one range into one folder. What stands there whole, from the same cache in the same way, is
-//! not made again.
+//! Several processes may export shares of one range into one folder. Files that are already
+//! complete, from the same cache with the same settings, are skipped.
 
 mod asked;
 mod content;
@@ -54,23 +54,23 @@ pub use self::{
     usdc::UsdcError,
 };
 
-/// Voxels of the mesh's grid a particle spacing, where nothing else is asked for: those of the renderer.
+/// Default number of voxels of the mesh's grid per particle spacing, the same as in the renderer.
 pub const VOXELS: f64 = swell_domain::level_set::VOXELS;
 
-/// How a USD shot has its water.
+/// How a USD shot represents its water.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum UsdWater {
-    /// The particles.
+    /// As particles.
     #[default]
     Points,
-    /// The surface.
+    /// As a surface mesh.
     Mesh,
 }
 
-/// Files of one kind.
+/// Files of one kind to export.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Target {
-    /// The water's surface, as PLY, OBJ or USD by the names' ending.
+    /// The water's surface, as PLY, OBJ or USD depending on the extension.
     Mesh(Pattern),
     /// Particles as NPY.
     Npy(Pattern),
@@ -80,91 +80,91 @@ pub enum Target {
     Bgeo(Pattern),
     /// Level set and velocity grid as OpenVDB.
     Vdb(Pattern),
-    /// A shot: this file, and a layer a frame beside it.
+    /// A USD shot: this root file, and one layer per frame beside it.
     Usd(PathBuf, UsdWater),
 }
 
 /// What to export.
 #[derive(Clone, Debug)]
 pub struct Request {
-    /// Cache directory.
+    /// Directory of the cache.
     pub cache: PathBuf,
-    /// A stream of whitewater in place of the water.
+    /// Name of a whitewater stream to export instead of the water.
     pub stream: Option<String>,
-    /// At least one.
+    /// Files to export; at least one target.
     pub targets: Vec<Target>,
-    /// Frames wanted; all whose particles are cached where `None`.
+    /// Frames to export; all frames with particles if `None`.
     pub frames: Option<FrameRange>,
-    /// This process's share of them; all where `None`.
+    /// This process's share of the frames; all if `None`.
     pub chunk: Option<Chunk>,
-    /// Number that the first of the frames has in names of files and as a time code of USD, the others by their distance; the
-    /// cache's own where `None`.
+    /// Number that the first exported frame gets in file names and as a USD time code; the others
+    /// keep their distance from it. The cache's own numbers if `None`.
     pub number_from: Option<u32>,
-    /// Voxels of the mesh's grid a particle spacing.
+    /// Voxels of the mesh's grid per particle spacing.
     pub voxels: f64,
-    /// Whose camera a USD shot has.
+    /// Look whose camera a USD shot gets.
     pub look: Option<Look>,
-    /// Python that is asked for binary USD.
+    /// Python interpreter used to write binary USD.
     pub python: String,
-    /// Whether files that stand there are made again, whosever they are.
+    /// Whether to replace existing files, whatever made them.
     pub overwrite: bool,
-    /// Whether the other frames are exported where one of the cache is damaged.
+    /// Whether to continue with other frames if one frame of the cache is damaged.
     pub keep_going: bool,
 }
 
-/// What an export has to tell while it runs.
+/// Progress of a running export.
 #[derive(Clone, Debug)]
 pub enum Event {
     /// The cache is open.
     Ready {
-        /// Frames of this process's share.
+        /// Number of frames in this process's share.
         frames: usize,
-        /// Files a frame.
+        /// Number of files per frame.
         files: usize,
-        /// What of the look's camera is hardly meant.
+        /// Warnings for legal but suspicious values of the look's camera.
         warnings: Vec<String>,
     },
-    /// What is odd about a frame.
+    /// Warning about a frame.
     Warning {
         /// The frame.
         frame: u32,
-        /// Part of the particles' volume that its mesh holds too little or too much.
+        /// Fraction of the particles' volume that its mesh has too little or too much.
         off: f64,
-        /// A sentence about it.
+        /// The warning in words.
         text: String,
     },
-    /// The files of a frame are on the disk, or being made by another process.
+    /// The files of a frame are on the disk, or another process is making them.
     Frame {
-        /// Its number.
+        /// Number of the frame.
         frame: u32,
-        /// Files made now.
+        /// Number of files made by this run.
         made: usize,
-        /// Bytes of them.
+        /// Bytes of these files.
         bytes: u64,
-        /// Wall clock.
+        /// Wall-clock time, seconds.
         seconds: f64,
-        /// Volume within its mesh over the particles', where one was made.
+        /// Volume inside the frame's mesh relative to the particles' volume, if a mesh was made.
         volume: Option<f64>,
     },
-    /// A frame could not be exported, and the others are.
+    /// A frame could not be exported; the export continues.
     Failed {
-        /// Its number.
+        /// Number of the frame.
         frame: u32,
-        /// Why.
+        /// The error.
         error: Arc<ExportError>,
     },
 }
 
-/// How an export ended.
+/// Result of an export.
 #[derive(Clone, Debug, Default)]
 pub struct Outcome {
-    /// Files made now.
+    /// Number of files made by this run.
     pub made: usize,
-    /// Bytes of them.
+    /// Bytes of these files.
     pub bytes: u64,
-    /// Files that stood there.
+    /// Number of files that existed already.
     pub standing: usize,
-    /// Files that other processes were making.
+    /// Number of files that other processes were making.
     pub elsewhere: usize,
     /// Frames that could not be exported.
     pub failed: Vec<u32>,
@@ -172,11 +172,12 @@ pub struct Outcome {
     pub interrupted: bool,
 }
 
-/// Exports the frames that are wanted; `tell` hears of progress, and `stop` ends it after the current file.
+/// Exports the requested frames. `tell` receives progress events, and setting `stop` ends the
+/// export after the current frame.
 ///
 /// # Errors
-/// [`ExportError`]. Files that stand there and are of something else are one before anything is written, and so is a frame that
-/// is not in the cache; a damaged frame is one when its turn comes.
+/// [`ExportError`]. Existing files of another origin and frames missing from the cache are reported
+/// before anything is written; a damaged frame only when it is read.
 pub fn export(
     request: &Request,
     stop: &AtomicBool,
@@ -235,7 +236,7 @@ pub fn export(
     Ok(outcome)
 }
 
-/// What there is to say of a mesh whose volume could not be brought to the particles'.
+/// Warning for a mesh whose volume could not be matched to the particles'.
 fn warning(volume: f64) -> Option<String> {
     let is_off = (volume - 1.0).abs() > VOLUME;
     is_off.then(|| {
@@ -246,17 +247,17 @@ fn warning(volume: f64) -> Option<String> {
     })
 }
 
-/// An export under way.
+/// A running export.
 struct Job<'a> {
     request: &'a Request,
     cache: CacheReader,
-    /// In place of the water.
+    /// The whitewater stream to export instead of the water.
     stream: Option<CacheReader>,
     scene: Scene,
-    /// All that are wanted, of every process.
+    /// All requested frames, of every process.
     frames: Vec<u32>,
     numbering: Numbering,
-    /// Where a name needs it.
+    /// Present if a file name asks for binary USD.
     python: Option<Python>,
     software: String,
 }
@@ -308,7 +309,7 @@ impl<'a> Job<'a> {
         })
     }
 
-    /// Warnings of the look's camera, at the frames of all processes.
+    /// Warnings about the look's camera over the frames of all processes.
     fn lints(&self) -> Vec<String> {
         let ends = self
             .frames
@@ -322,12 +323,12 @@ impl<'a> Job<'a> {
         })
     }
 
-    /// What is exported: the water, or the stream in its place.
+    /// The cache that is exported: the water, or the stream that replaces it.
     fn source(&self) -> &CacheReader {
         self.stream.as_ref().unwrap_or(&self.cache)
     }
 
-    /// Digits of frame numbers in the names of a shot's layers.
+    /// Path of a frame's layer beside a shot; all layers use the same number of digits.
     fn layer(&self, shot: &Path, frame: u32) -> PathBuf {
         let last = self.numbering.of(self.cache.last_frame());
         let digits = last.to_string().len().max(4);
@@ -335,7 +336,7 @@ impl<'a> Job<'a> {
         beside(shot, &format!("{number:0digits$}"))
     }
 
-    /// How a shot has its water, as the records of its layers and of its root say it.
+    /// Describes how a shot represents its water, for the records of its layers and root.
     fn water_settings(&self, water: UsdWater) -> String {
         match water {
             UsdWater::Points => "points".to_owned(),
@@ -379,14 +380,14 @@ impl<'a> Job<'a> {
         })
     }
 
-    /// The files of a frame, each with what it is.
+    /// The files of a frame, each with its target.
     fn files(&self, frame: u32) -> Result<Vec<(&'a Target, Wanted)>, CacheError> {
         let targets = self.request.targets.iter();
         let of = |target| Ok((target, self.wanted(target, frame)?));
         targets.map(of).collect()
     }
 
-    /// Refuses what stands there and is of something else.
+    /// Refuses existing files of another origin.
     fn check_all(&self, share: &[u32], shots: &[(Wanted, Vec<u8>)]) -> Result<(), ExportError> {
         for &frame in share {
             for (_, wanted) in self.files(frame)? {
@@ -410,7 +411,7 @@ impl<'a> Job<'a> {
         }
     }
 
-    /// Makes a file that does not stand there, unless another process is at it.
+    /// Makes a file unless it exists already or another process is making it.
     fn make(
         &self,
         wanted: &Wanted,
@@ -439,7 +440,7 @@ impl<'a> Job<'a> {
                 };
                 text.write(&bytes)?;
                 let converted = python.convert(&text.draft(), &wanted.draft());
-                // What stays of it is made anew the next time.
+                // A leftover is overwritten next time.
                 let _ = std::fs::remove_file(text.draft());
                 converted?;
             }
@@ -479,7 +480,7 @@ impl<'a> Job<'a> {
         })
     }
 
-    /// Grids as the bake kept them, or would have with the defaults of a scene.
+    /// Grids as the bake kept them, or with a scene's default settings.
     fn grids(&self, content: &Content<'_>) -> Result<Vec<u8>, ExportError> {
         let manifest = self.cache.manifest();
         let frame = content.frame;
@@ -554,7 +555,7 @@ impl<'a> Job<'a> {
     }
 }
 
-/// `shot.0001.usda` of `shot.usda`.
+/// `shot.0001.usda` for `shot.usda`.
 fn beside(shot: &Path, part: &str) -> PathBuf {
     let ending = shot.extension().unwrap_or_default().to_string_lossy();
     shot.with_extension(format!("{part}.{ending}"))

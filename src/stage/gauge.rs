@@ -1,10 +1,10 @@
-//! How a scene's wave is measured: which way it runs, and where the water stands still.
+//! How a scene's wave is measured: its direction and its still level.
 
 use swell_cache::{CacheError, CacheReader};
 use swell_scene::Scene;
 use swell_study::measure::{Direction, Gauge};
 
-/// The wave runs away from the first wave maker; towards greater x where there is none.
+/// Direction of the wave: away from the first wave maker, or towards greater x if there is none.
 pub fn direction(scene: &Scene) -> Direction {
     let makers = &mut scene.wave_makers.iter();
     let maker = makers.find(|maker| maker.wall.axis != 1);
@@ -14,11 +14,11 @@ pub fn direction(scene: &Scene) -> Direction {
     }
 }
 
-/// The gauge of runs of a scene whose coarsest particles are `coarsest` metres apart, so that all are measured alike.
-/// `start` is a state before anything moved, its particles `spacing` metres apart.
+/// A gauge for runs of a scene whose coarsest particle spacing is `coarsest` metres, so that all
+/// are measured alike. `start` is a state at rest with a particle spacing of `spacing` metres.
 ///
-/// Where a wave maker stands, the still level is that of the start; other water has none at the start, and what it would
-/// settle to is taken.
+/// With a wave maker, the still level is that of the start. Other scenes are not at rest at the
+/// start, so the level to which their water would settle is used.
 pub fn gauge(scene: &Scene, coarsest: f64, start: &[[f32; 3]], spacing: f64) -> Gauge {
     let gauge = Gauge::new(scene.domain, direction(scene), coarsest);
     let still = if scene.wave_makers.is_empty() {
@@ -30,14 +30,15 @@ pub fn gauge(scene: &Scene, coarsest: f64, start: &[[f32; 3]], spacing: f64) -> 
     gauge.with_still_level(still)
 }
 
-/// One gauge for all caches of a scene.
+/// One gauge for several caches of a scene.
 ///
 /// # Errors
 /// A frame that cannot be read.
 pub fn of_caches(scene: &Scene, caches: &[&CacheReader]) -> Result<Gauge, CacheError> {
     let spacings = caches.iter().map(|c| c.manifest().particle_spacing);
     let coarsest = spacings.fold(0.0, f64::max);
-    // A bake that began from a frame of another knows no rest: the earliest start comes nearest.
+    // A bake that began from a frame of another has no state at rest: the earliest start comes
+    // closest.
     let first = caches.iter().min_by_key(|cache| cache.first_frame());
     let first = first.unwrap_or(&caches[0]);
     let start = first.read(first.first_frame())?;

@@ -1,4 +1,4 @@
-//! `inspect`: adapters, a scene's plan, a cache's frames, what a study runs, what a file is.
+//! `inspect`: describes adapters, a scene's plan, a cache's frames, the runs of a study, or a file.
 
 pub mod file;
 pub mod study;
@@ -32,26 +32,26 @@ pub use swell_cache::{
     stream::{PARTICLES, PROBES},
 };
 
-/// One adapter of this machine.
+/// An adapter of this machine.
 #[derive(Clone, Debug)]
 pub struct Adapter {
-    /// As `--adapter` takes it.
+    /// Index that `--adapter` accepts.
     pub index: usize,
-    /// Name.
+    /// Name of the adapter.
     pub name: String,
-    /// Backend and kind.
+    /// Backend and device type.
     pub kind: String,
     /// Driver and its version.
     pub driver: String,
-    /// Limits that bear on scenes and pictures: name, value.
+    /// Names and values of the limits that matter for scenes and pictures.
     pub limits: Vec<(&'static str, u64)>,
-    /// Whether passes can be timed on it.
+    /// Whether it supports timestamps, so that passes can be timed.
     pub has_timestamps: bool,
-    /// Whether passes may compute in f64 on it.
+    /// Whether its shaders support f64.
     pub has_f64: bool,
 }
 
-/// All adapters.
+/// Lists all adapters.
 ///
 /// # Errors
 /// [`GpuError::NoAdapter`].
@@ -97,33 +97,35 @@ pub fn adapters() -> Result<Vec<Adapter>, GpuError> {
     }
 }
 
-/// A scene's plan, and for which limits it was made.
+/// A scene's plan, and the limits that it was made for.
 #[derive(Debug)]
 pub struct ScenePlan {
     /// Passes and buffers.
     pub plan: Plan,
-    /// At the start.
+    /// Number of particles at the start.
     pub particles: usize,
-    /// Left out of the water because a solid is there.
+    /// Lattice points left out because a solid covers them.
     pub removed: usize,
-    /// Water at the start.
+    /// Volume of water at the start.
     pub volume: Volume,
-    /// What emitters bring with solids as they stand at the start; `None` of those that keep a level.
+    /// What each emitter adds with solids in their start position; `None` for emitters that keep a
+    /// level.
     pub promises: Vec<Option<Promise>>,
-    /// Particles that emitters without a level bring until the shot's end, at most; `None` where there are none.
+    /// Greatest number of particles that emitters without a level add until the end of the shot;
+    /// `None` if the scene has no inlets.
     pub entering: Option<f64>,
-    /// What a user has to know of the scene, a sentence each.
+    /// Warnings about the scene, a sentence each.
     pub warnings: Vec<String>,
-    /// Metres between the nodes of the solids' signed distance, where it is coarser than the water so as not to have more than
-    /// [`MOST_NODES`].
+    /// Node spacing of the solids' signed distance, metres, if the limit of [`MOST_NODES`] makes it
+    /// coarser than the particle spacing.
     pub coarse_solids: Option<f64>,
-    /// The adapter whose limits were used; `None` where the machine has none.
+    /// The adapter whose limits were used; `None` if the machine has none.
     pub adapter: Option<String>,
-    /// Why that adapter could not bake it.
+    /// Why that adapter could not bake the scene.
     pub misfit: Option<GpuError>,
 }
 
-/// Limits that every Vulkan adapter of the last years has, for machines without any.
+/// Limits that every recent Vulkan adapter meets, for machines without an adapter.
 const COMMON_LIMITS: DeviceLimits = DeviceLimits {
     binding: 128 << 20,
     buffer: 256 << 20,
@@ -136,7 +138,7 @@ pub enum PlanError {
     /// The scene's solids.
     #[error(transparent)]
     Solid(#[from] SignedDistanceError),
-    /// The adapter asked for.
+    /// The requested adapter.
     #[error(transparent)]
     Gpu(#[from] GpuError),
 }
@@ -153,7 +155,7 @@ impl From<&PlanError> for Blame {
 /// Plans a scene without allocating or compiling anything.
 ///
 /// # Errors
-/// A solid without inside, or too large a grid; an adapter that is not there or does not open.
+/// A solid without an inside, or too large a distance grid; an adapter that does not exist or open.
 pub fn plan(scene: &Scene, adapter: Option<&str>) -> Result<ScenePlan, PlanError> {
     let start = Start::of(scene)?;
     let mut lacks = None;
@@ -198,7 +200,7 @@ pub fn plan(scene: &Scene, adapter: Option<&str>) -> Result<ScenePlan, PlanError
     })
 }
 
-/// A cache's manifest and ledger.
+/// Reads a cache's manifest and ledger.
 ///
 /// # Errors
 /// [`CacheError`].
@@ -207,39 +209,40 @@ pub fn cache(directory: &Path) -> Result<(Manifest, Vec<Entry>), CacheError> {
     Ok((reader.manifest().clone(), reader.entries().to_vec()))
 }
 
-/// What a cache takes.
+/// Sizes of a cache on disk and on a device.
 #[derive(Debug)]
 pub struct CacheSizes {
-    /// Of all its files.
+    /// Bytes of all its files.
     pub bytes: u64,
-    /// Each kind of file that it keeps of frames: name, bytes.
+    /// Name and bytes of each stream of frames.
     pub streams: Vec<(&'static str, u64)>,
-    /// Its streams of whitewater: name, last frame, bytes, which are among the cache's.
+    /// Name, last frame and bytes of each whitewater stream; the bytes are included in the cache's.
     pub whitewater: Vec<(String, u32, u64)>,
-    /// What its solver takes on a device with common limits, as planned for its start; `None` of a stream of whitewater.
+    /// Predicted device memory of its solver at the start, under common limits; `None` for a
+    /// whitewater stream.
     pub device_bytes: Option<u64>,
-    /// Wall clock of its frames as they were baked, where that is known, seconds.
+    /// Wall-clock seconds of its frames as they were baked, where known.
     pub seconds: Vec<f64>,
 }
 
-/// Why a cache's sizes are not known.
+/// Why a cache's sizes could not be determined.
 #[derive(Debug, thiserror::Error)]
 pub enum SizesError {
     /// The cache.
     #[error(transparent)]
     Cache(#[from] CacheError),
-    /// The scene in it.
+    /// The scene in the cache.
     #[error("the cache's scene: {0}")]
     Scene(#[from] SceneError),
-    /// Its solids.
+    /// Solids of that scene.
     #[error(transparent)]
     Solid(#[from] SignedDistanceError),
     /// A folder that cannot be read.
     #[error("cannot read {}", folder.display())]
     Read {
-        /// Which.
+        /// The folder.
         folder: PathBuf,
-        /// What the system says.
+        /// The system's error.
         source: io::Error,
     },
 }
@@ -250,7 +253,7 @@ impl From<&SizesError> for Blame {
     }
 }
 
-/// What a cache takes on the disk and on a device.
+/// Determines the disk and device memory of a cache.
 ///
 /// # Errors
 /// [`SizesError`].
@@ -288,7 +291,7 @@ pub fn sizes(directory: &Path) -> Result<CacheSizes, SizesError> {
     })
 }
 
-/// Folders of a cache's streams of whitewater, by name.
+/// Folders of a cache's whitewater streams, sorted by name.
 fn whitewater_folders(cache: &Path) -> Result<Vec<PathBuf>, SizesError> {
     let folder = cache.join(whitewater::FOLDER);
     if !folder.exists() {
@@ -311,7 +314,7 @@ fn unread(folder: &Path, source: io::Error) -> SizesError {
     }
 }
 
-/// Bytes of all files below a folder; 0 where there is none.
+/// Bytes of all files below a folder; 0 if it does not exist.
 fn folder_bytes(folder: &Path) -> Result<u64, SizesError> {
     let fault = |source| unread(folder, source);
     let entries = match fs::read_dir(folder) {
@@ -331,21 +334,21 @@ fn folder_bytes(folder: &Path) -> Result<u64, SizesError> {
     Ok(bytes)
 }
 
-/// Why a cache's probes could not be drawn.
+/// Why a cache's probes could not be plotted.
 #[derive(Debug, thiserror::Error)]
 pub enum PlotError {
     /// The cache.
     #[error(transparent)]
     Cache(#[from] CacheError),
-    /// It was baked without any.
+    /// The cache was baked without probes.
     #[error("{} has no probes to plot: its scene has no [[probe]]", .0.display())]
     NoProbes(PathBuf),
-    /// A picture.
+    /// A plot that cannot be written.
     #[error("cannot write {}", file.display())]
     Write {
         /// The file or folder.
         file: PathBuf,
-        /// What the system says.
+        /// The system's error.
         source: io::Error,
     },
 }
@@ -359,7 +362,8 @@ impl From<&PlotError> for Blame {
     }
 }
 
-/// Draws what a cache's probes saw over time, an SVG a probe, into `folder`; gives the files.
+/// Plots the values of a cache's probes over time into `folder`, one SVG per probe. Returns the
+/// files.
 ///
 /// # Errors
 /// [`PlotError`].

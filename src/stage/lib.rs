@@ -1,4 +1,5 @@
-//! Jobs: each wires rooms together from a typed request to a typed result. No terminal, no printing.
+//! Jobs of the program: each combines the other crates to turn a typed request into a typed result.
+//! No terminal and no printing.
 
 pub mod bake;
 pub mod branch;
@@ -34,13 +35,13 @@ use swell_scene::{
 };
 use swell_solve::SolveError;
 
-/// The cache's own copy of its scene: what was baked, wherever the cache has been moved to.
+/// The cache's own copy of its scene: what was baked, wherever the cache has been moved.
 fn baked_scene(cache: &CacheReader, directory: &Path) -> Result<Scene, SceneError> {
     let file = directory.join("scene.toml");
     Scene::recorded(cache.scene_toml(), &file, directory)
 }
 
-/// The frames that are asked for of a cache; where none are, all behind its first whose particles it has.
+/// The requested frames of a cache; by default all frames after its first that have particles.
 fn frames_of(cache: &CacheReader, asked: Option<&FrameRange>) -> Vec<u32> {
     match asked {
         Some(frames) => frames.iter().collect(),
@@ -50,16 +51,16 @@ fn frames_of(cache: &CacheReader, asked: Option<&FrameRange>) -> Vec<u32> {
     }
 }
 
-/// Where the fault of an error lies; what a caller does about it depends on this alone.
+/// The origin of an error, which alone decides how a caller handles it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Blame {
     /// Arguments, the scene, the look, or a file that they name.
     Input,
-    /// No usable device, a scene too large for it, or a device lost.
+    /// No usable device, a scene too large for it, or a lost device.
     Device,
-    /// A cache or picture that is damaged, of another scene, or cannot be read or written.
+    /// A cache or picture that is damaged, belongs to another scene, or cannot be read or written.
     Files,
-    /// The numbers of a solve.
+    /// Invalid numbers in a solve.
     Numbers,
 }
 

@@ -1,4 +1,4 @@
-//! Lock files in folders that several processes write into. A lock dies with its process.
+//! Lock files in folders that several processes write to. A lock ends with its process.
 
 use std::{
     fs::{File, TryLockError},
@@ -6,14 +6,14 @@ use std::{
     path::Path,
 };
 
-/// Opens a lock file, which is made where it is missing.
+/// Opens a lock file and creates it if it is missing.
 pub fn open(file: &Path) -> io::Result<File> {
     let mut options = File::options();
     options.read(true).write(true).create(true).truncate(false);
     options.open(file)
 }
 
-/// Whether a lock was had, by what trying gave.
+/// Converts the result of `try_lock`: whether the lock was acquired.
 pub fn is_had(tried: Result<(), TryLockError>) -> io::Result<bool> {
     match tried {
         Ok(()) => Ok(true),
@@ -22,7 +22,7 @@ pub fn is_had(tried: Result<(), TryLockError>) -> io::Result<bool> {
     }
 }
 
-/// Whether an open file is the one of this name: its last holder may have taken it away.
+/// Whether an open file is still the one at this path: its previous holder may have removed it.
 #[cfg(unix)]
 pub fn is_at(file: &File, path: &Path) -> bool {
     use std::os::unix::fs::MetadataExt as _;
@@ -30,7 +30,7 @@ pub fn is_at(file: &File, path: &Path) -> bool {
     identity(file.metadata()) == identity(path.metadata())
 }
 
-/// Elsewhere an open file cannot be taken away.
+/// On other systems an open file cannot be removed.
 #[cfg(not(unix))]
 pub fn is_at(_: &File, _: &Path) -> bool {
     true

@@ -1,14 +1,15 @@
-//! Numbers that frames have in the names of files, where these are other than the cache's.
+//! Frame numbers in file names, if they differ from the cache's.
 
-/// From a frame's number in the cache to that in the names of its files.
+/// Maps a frame's number in the cache to the number in the names of its files.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Numbering {
-    /// What is added.
+    /// Difference that is added.
     pub(super) offset: i64,
 }
 
 impl Numbering {
-    /// The first of `frames` gets the number `from`, and the others keep their distances; the cache's own numbers without it.
+    /// Gives the first of `frames` the number `from`; the others keep their distances. Without
+    /// `from`, the cache's own numbers.
     pub(super) fn new(frames: &[u32], from: Option<u32>) -> Self {
         let first = frames.first().copied();
         let offset = from
@@ -17,12 +18,12 @@ impl Numbering {
         Self { offset }
     }
 
-    /// The number of a frame, which is none before the first.
+    /// The number of a frame; not below 0.
     pub(super) fn of(self, frame: u32) -> u32 {
         (i64::from(frame) + self.offset).clamp(0, u32::MAX.into()) as u32
     }
 
-    /// What was added to a frame's number in the name `SHOT.0001.png` of its picture; `None` of other names.
+    /// The offset in the name `SHOT.0001.png` of a frame's picture; `None` for other names.
     pub(super) fn in_name(name: &str, shot: &str, frame: u32) -> Option<Self> {
         let rest = name.strip_prefix(shot)?.strip_prefix('.')?;
         let (digits, _) = rest.split_once('.')?;

@@ -1,4 +1,4 @@
-//! From a scene to what a solver starts from: particles, boundary, plan.
+//! Prepares a scene for a solver: particles, boundary, plan.
 
 use swell_cache::{CacheError, CacheReader};
 use swell_domain::{
@@ -18,12 +18,13 @@ use swell_solve::{
 /// Fraction by which whole rows of particles may change an emitter's flow.
 const ROUNDED: f64 = 0.02;
 
-/// How much water there is at a start, m³.
+/// Volume of water at a start, m³.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Volume {
-    /// That particles stand for.
+    /// Volume that the particles represent.
     pub made: f64,
-    /// That the scene asks for, with what lies in solids and where blocks overlap; `None` where a bake begins from a frame.
+    /// Volume that the scene asks for, including what lies in solids and where blocks overlap;
+    /// `None` if a bake begins from a frame.
     pub asked: Option<f64>,
 }
 
@@ -32,25 +33,25 @@ pub struct Volume {
 pub struct Start {
     /// State before the first frame.
     pub particles: Particles,
-    /// Lattice points left out because a solid is there.
+    /// Number of lattice points left out because a solid covers them.
     pub removed: usize,
-    /// Volume of the water that the scene asks for, m³; `None` where it begins from a frame.
+    /// Volume of water that the scene asks for, m³; `None` if it begins from a frame.
     pub asked: Option<f64>,
-    /// Solids as the solver meets them.
+    /// Solids in the form that the solver needs.
     pub boundary: Boundary,
-    /// What enters and leaves at the frames' ends.
+    /// Emitters and drains, which act at the end of each frame.
     pub sources: Sources,
 }
 
 impl Start {
-    /// Samples solids and fills water.
+    /// Samples the solids and fills the water.
     ///
     /// # Errors
     /// A mesh without an inside, or too large a distance grid.
     pub fn of(scene: &Scene) -> Result<Self, SignedDistanceError> {
         let spacing = scene.particle_spacing();
         let boundary = boundary(scene)?;
-        // Where solids move, they keep out the water of the start as well.
+        // Moving solids displace the water of the start as well.
         let movers = scene.moving_solids.iter().map(|solid| &solid.placed.mesh);
         let at_start = match scene.moving_solids[..] {
             [] => None,
@@ -69,7 +70,7 @@ impl Start {
         for swarm in &scene.water.particles {
             for at in &swarm.at {
                 if room != scene.domain && !room.contains(*at) {
-                    // Behind a wall that rests inside of the domain.
+                    // Behind a wall that rests inside the domain.
                     removed += 1;
                     continue;
                 }
@@ -91,7 +92,7 @@ impl Start {
         })
     }
 
-    /// Samples solids about `particles`, the state of a frame, which has the scene's attributes.
+    /// Samples the solids around `particles`, the state of a frame that has the scene's attributes.
     ///
     /// # Errors
     /// A mesh without an inside, or too large a distance grid.
@@ -105,10 +106,11 @@ impl Start {
         })
     }
 
-    /// The start of a bake of `scene` that stands in `cache`: the scene's own, or the frame that it began from.
+    /// The start of the bake of `scene` in `cache`: the scene's own, or the frame that it began
+    /// from.
     ///
     /// # Errors
-    /// Those of [`Start::of`]; of that frame.
+    /// Those of [`Start::of`]; those of reading that frame.
     pub fn of_cache<E>(scene: &Scene, cache: &CacheReader) -> Result<Self, E>
     where
         E: From<SignedDistanceError> + From<CacheError>,
@@ -119,7 +121,7 @@ impl Start {
         })
     }
 
-    /// How much water there is.
+    /// The volume of water.
     pub fn volume(&self, scene: &Scene) -> Volume {
         Volume {
             made: self.particles.len() as f64 * scene.particle_volume(),
@@ -127,8 +129,8 @@ impl Start {
         }
     }
 
-    /// Lints that need the start itself: that there is no water, though the scene asks for some, and emitters that bring another amount
-    /// than their boxes and velocities ask for.
+    /// Lints that need the start itself: no water although the scene asks for some, and emitters
+    /// whose flow differs from velocity times area.
     pub fn lints(&self, scene: &Scene) -> Vec<String> {
         let mut lints = Vec::from_iter(self.lint_dry());
         let most = self.sources.most_entering(scene.shot.duration());
@@ -176,7 +178,7 @@ impl Start {
         Some(lint.to_owned())
     }
 
-    /// What a user has to know of the scene and of how it starts, a sentence each.
+    /// Warnings about the scene and its start, a sentence each.
     pub fn warnings(&self, scene: &Scene) -> Vec<String> {
         let mut warnings = [scene.warnings(), self.lints(scene)].concat();
         for (index, promise) in self.promises().into_iter().enumerate() {
@@ -192,17 +194,19 @@ impl Start {
         warnings
     }
 
-    /// What each emitter brings with the solids as they stand at the start; `None` of those that keep a level.
+    /// What each emitter adds with solids in their start position; `None` for emitters that keep a
+    /// level.
     pub fn promises(&self) -> Vec<Option<Promise>> {
         self.sources.promises(self.boundary.distance.as_ref())
     }
 
-    /// What the scene needs on a device with these limits.
+    /// Plans what the scene needs on a device with these limits.
     pub fn plan(&self, scene: &Scene, limits: DeviceLimits) -> Plan {
         self.plan_of(scene, &self.particles, limits)
     }
 
-    /// The same to be shown: of one particle where it starts dry, as passes over particles are none without.
+    /// The plan for display: for one particle if the scene starts dry, because passes over no
+    /// particles would be left out.
     pub fn shown_plan(&self, scene: &Scene, limits: DeviceLimits) -> Plan {
         if !self.particles.is_empty() {
             return self.plan(scene, limits);
@@ -214,7 +218,7 @@ impl Start {
         self.plan_of(scene, &one, limits)
     }
 
-    /// What it needs for the frame after one that ended with `particles`.
+    /// Plans the frame after one that ended with `particles`.
     pub fn plan_of(&self, scene: &Scene, particles: &Particles, limits: DeviceLimits) -> Plan {
         let bricks = match (scene.solver.method, scene.of_projection()) {
             (Method::Pbf, None) => Capacity::default(),
@@ -234,12 +238,12 @@ fn meshes(scene: &Scene) -> impl Iterator<Item = &TriangleMesh> {
     scene.solids.iter().map(|solid| &solid.mesh)
 }
 
-/// Solids as the solver meets them.
+/// Solids in the form that the solver needs.
 fn boundary(scene: &Scene) -> Result<Boundary, SignedDistanceError> {
     let distance = distance(scene, meshes(scene))?;
     let sampled = |mesh| samples(scene, mesh, distance.as_ref());
     let moving = scene.moving_solids.iter().map(|solid| &solid.placed.mesh);
-    // FLIP meets solids by their distance alone.
+    // FLIP uses only the signed distance of solids.
     let (samples, moving_samples) = match scene.solver.method {
         Method::Pbf => (
             meshes(scene).flat_map(sampled).collect(),
@@ -255,8 +259,8 @@ fn boundary(scene: &Scene) -> Result<Boundary, SignedDistanceError> {
     })
 }
 
-/// Samples on a mesh's surface, and on its images' along periodic axes: of two that are one there, the one at the least
-/// end.
+/// Samples on the surfaces of a mesh and of its images along periodic axes. Of two that coincide,
+/// keeps the one at the least end.
 fn samples(
     scene: &Scene,
     mesh: &TriangleMesh,
@@ -272,7 +276,7 @@ fn samples(
     if !scene.is_periodic() {
         return samples;
     }
-    // Where a mesh ends at the domain's end, its image goes on: no surface.
+    // Where a mesh ends at the domain's end, its image continues it: that is not a surface.
     let is_within = |sample: &BoundarySample| {
         let before = sample.position + 0.5 * spacing * sample.normal;
         distance.is_some_and(|distance| distance.sample(before) < 0.0)
@@ -284,7 +288,7 @@ fn samples(
     samples
 }
 
-/// Samples on all of a moving mesh's surface: what is outside of the domain now may come in.
+/// Samples on the whole surface of a moving mesh: parts outside the domain may move in.
 fn all_samples(scene: &Scene, mesh: &TriangleMesh) -> Vec<BoundarySample> {
     let spacing = scene.particle_spacing();
     let around = mesh.bounds().map(|bounds| bounds.grown(spacing));
@@ -293,7 +297,7 @@ fn all_samples(scene: &Scene, mesh: &TriangleMesh) -> Vec<BoundarySample> {
     })
 }
 
-/// Of the union of meshes, as far as water can come to them.
+/// Signed distance to the union of meshes, as far as water can reach them.
 fn distance<'a>(
     scene: &Scene,
     meshes: impl Iterator<Item = &'a TriangleMesh>,
@@ -309,7 +313,7 @@ fn distance<'a>(
     }
 }
 
-/// One a moving solid, all of it: what is outside of the domain now may come in.
+/// The full signed distance of each moving solid: parts outside the domain may move in.
 fn moving_distances(scene: &Scene) -> Result<Vec<SignedDistance>, SignedDistanceError> {
     let spacing = scene.particle_spacing();
     let solids = scene.moving_solids.iter();

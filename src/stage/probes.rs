@@ -1,4 +1,4 @@
-//! What a scene's probes see of a frame.
+//! Evaluates a scene's probes.
 
 use swell_cache::{Entry, ProbeRecord, ProbeValues, stream::PROBES};
 use swell_domain::{
@@ -12,7 +12,7 @@ use swell_scene::{
 };
 use swell_study::chart::{Chart, Series};
 
-/// The scene's probes as the cache keeps them.
+/// The scene's probes as the manifest records them.
 pub(super) fn records(scene: &Scene) -> Vec<ProbeRecord> {
     let probes = scene.probes.iter();
     probes
@@ -33,9 +33,9 @@ pub(super) fn records(scene: &Scene) -> Vec<ProbeRecord> {
         .collect()
 }
 
-/// Values of a frame that ends at `time` seconds, one list a probe. `pressures` are those at the scene's
-/// [`pressure_points`](Scene::pressure_points), Pa; `looks` are a [`Recorder`]'s, or none at the start, which all probes
-/// look at.
+/// Values of a frame that ends at `time` seconds, one list per probe. `pressures` are those at the
+/// scene's [`pressure_points`](Scene::pressure_points), Pa. `looks` are the values of a
+/// [`Recorder`], or `None` at the start, where all probes sample.
 pub(super) fn look(
     scene: &Scene,
     time: f64,
@@ -50,7 +50,7 @@ pub(super) fn look(
             for ((values, looks), probe) in values.iter_mut().zip(looks).zip(&scene.probes) {
                 values.extend(looks);
                 if values.is_empty() && probe.rate == Rate::Frame {
-                    // No substep has run, since there is no water.
+                    // No substep ran, because there is no water.
                     values.resize(probe.kind.columns().len(), None);
                 }
             }
@@ -65,27 +65,29 @@ pub(super) fn look(
     values
 }
 
-/// Whether a probe looks while a frame is computed: it has a rate of its own, or what it looks at is gone afterwards.
+/// Whether a probe samples during a frame: it has its own rate, or what it observes is gone
+/// afterwards.
 pub(super) fn is_recorded(probe: &Probe) -> bool {
     probe.rate != Rate::Frame || matches!(probe.kind, ProbeKind::Force { .. })
 }
 
-/// How often probes with a rate of their own looked, of the times that they were asked to: not more than once a substep.
+/// Counts how often probes with their own rate sampled, and how often they were asked to; they
+/// sample at most once per substep.
 #[derive(Clone, Debug)]
 pub(super) struct Looked {
-    /// By probe.
+    /// By probe: samples taken, samples requested.
     times: Vec<[u64; 2]>,
 }
 
 impl Looked {
-    /// Of no frame yet.
+    /// Before any frame.
     pub(super) fn new(scene: &Scene) -> Self {
         Self {
             times: vec![[0, 0]; scene.probes.len()],
         }
     }
 
-    /// Adds frame `frame`, in which probes took these looks.
+    /// Adds frame `frame`, in which probes took these samples.
     pub(super) fn add(&mut self, scene: &Scene, frame: u32, looks: &ProbeValues) {
         let [start, end] = [frame.saturating_sub(1), frame].map(|frame| scene.shot.time(frame));
         for ((times, values), probe) in self.times.iter_mut().zip(looks).zip(&scene.probes) {
@@ -94,7 +96,7 @@ impl Looked {
         }
     }
 
-    /// A sentence for each probe that looked less often.
+    /// A warning for each probe that sampled less often than requested.
     pub(super) fn warnings(&self, scene: &Scene) -> Vec<String> {
         let probes = self.times.iter().zip(&scene.probes);
         let short = probes.filter(|([looked, asked], _)| *looked > 0 && looked < asked);
@@ -109,18 +111,18 @@ impl Looked {
     }
 }
 
-/// What probes see of a frame while it is computed.
+/// Records the values of probes during a frame.
 pub(super) struct Recorder<'a> {
     scene: &'a Scene,
-    /// When the frame ends, seconds.
+    /// Time at the end of the frame, seconds.
     end: f64,
     values: ProbeValues,
-    /// Of the forces that are due, the probe's number and the surface, as they were asked for.
+    /// For each force that is due, the probe's index and the surface as requested.
     surfaces: Vec<(usize, Vec<Patch>)>,
 }
 
 impl<'a> Recorder<'a> {
-    /// Of the frame that ends at `end` seconds.
+    /// A recorder for the frame that ends at `end` seconds.
     pub(super) fn new(scene: &'a Scene, end: f64) -> Self {
         Self {
             scene,
@@ -130,12 +132,12 @@ impl<'a> Recorder<'a> {
         }
     }
 
-    /// By probe, each look its time and its values; nothing of probes that look at frames.
+    /// By probe, each sample's time and values; empty for probes that sample at frames.
     pub(super) fn into_values(self) -> ProbeValues {
         self.values
     }
 
-    /// Probes that look at this substep's end, with their numbers.
+    /// Probes that sample at the end of this substep, with their indices.
     fn due(&self, substep: Span) -> impl Iterator<Item = (usize, &'a Probe)> + use<'a> {
         let probes = self.scene.probes.iter().enumerate();
         probes.filter(move |(_, probe)| is_due(probe, substep))
@@ -164,7 +166,7 @@ impl Watch for Recorder<'_> {
             match probe.kind {
                 ProbeKind::Pressure { .. } => wanted.pressures = true,
                 ProbeKind::Force { on, .. } => {
-                    // As the cells were cut on which the pressure stands.
+                    // At the substep's start, as the cells were cut for which the pressure holds.
                     let patches = self.scene.patches(on, substep.start);
                     wanted.patches.extend_from_slice(&patches);
                     self.surfaces.push((index, patches));
@@ -179,7 +181,7 @@ impl Watch for Recorder<'_> {
         let is_force = |probe: &Probe| matches!(probe.kind, ProbeKind::Force { .. });
         let is_seen = |probe: &Probe| is_due(probe, substep) && !is_force(probe);
         let found = of_state(self.scene, &seen.particles, &seen.pressures, is_seen);
-        // A frame's own time: substeps add up to it but for round-off.
+        // The frame's own time: the substeps' sum differs by round-off.
         let time = if substep.is_last {
             self.end
         } else {
@@ -207,7 +209,7 @@ impl Watch for Recorder<'_> {
     }
 }
 
-/// Values of a state by probe, of those that look at it; nothing of the others.
+/// Values of a state by probe, for the probes that are due; empty for the others.
 fn of_state(
     scene: &Scene,
     particles: &Particles,
@@ -219,7 +221,7 @@ fn of_state(
     let probes = scene.probes.iter();
     probes
         .map(|probe| match probe.kind {
-            // The points are those of all probes of pressure.
+            // The points cover all pressure probes, due or not.
             ProbeKind::Pressure { .. } => {
                 let pressure = pressures.next().flatten();
                 Vec::from_iter(is_due(probe).then_some(pressure))
@@ -249,20 +251,20 @@ fn of_state(
                 let rate = flux(particles, spacing, towards.axis, at);
                 vec![Some(if towards.is_max { rate } else { -rate })]
             }
-            // No substep has been made, as of pressures.
+            // No substep has run; like pressures at the start.
             ProbeKind::Force { .. } => vec![None; probe.kind.columns().len()],
         })
         .collect()
 }
 
-/// World coordinate of a place up to which water reaches: the half spacing beyond its last particle ends at the domain's
-/// walls.
+/// World coordinate of the end of the water: half a spacing beyond its last particle, clamped to
+/// the domain's walls.
 fn within(scene: &Scene, axis: usize, place: f64) -> f64 {
     let (min, max) = (scene.domain.min[axis], scene.domain.max[axis]);
     scene.origin[axis] + place.clamp(min, max)
 }
 
-/// What the probe of `index` saw over time as a chart, one line a column.
+/// Chart of the values of the probe at `index` over time, one line per column.
 pub(super) fn chart(shot: &str, record: &ProbeRecord, index: usize, entries: &[Entry]) -> Chart {
     let columns = || record.columns.iter().map(|column| column.rsplit_once('_'));
     let looks = |entry: &'_ Entry| {

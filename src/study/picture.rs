@@ -21,6 +21,9 @@ pub enum PictureError {
 }
 
 /// Encodes a PNG as a `data:` URI for an `<img>`, reduced to at most 640 pixels of width.
+///
+/// # Errors
+/// [`PictureError`].
 pub fn data_uri(png_bytes: &[u8]) -> Result<String, PictureError> {
     let reduced = reduced(png_bytes)?;
     let bytes = reduced.as_deref().unwrap_or(png_bytes);

@@ -22,6 +22,9 @@ pub enum RasterError {
 
 /// Renders `svg` as PNG with two pixels per unit. Text is in Ubuntu Light, with Hack for missing
 /// glyphs.
+///
+/// # Errors
+/// [`RasterError`].
 pub fn png(svg: &str) -> Result<Vec<u8>, RasterError> {
     let picture = drawn(svg, SCALE)?;
     picture
@@ -30,6 +33,9 @@ pub fn png(svg: &str) -> Result<Vec<u8>, RasterError> {
 }
 
 /// Renders `svg` as pixels, one per unit, in the same fonts; over black where it is transparent.
+///
+/// # Errors
+/// [`RasterError`].
 pub fn rgb(svg: &str) -> Result<Rgb, RasterError> {
     let picture = drawn(svg, 1.0)?;
     let pixels = picture.pixels().iter();

@@ -98,6 +98,9 @@ fn encode_as(
 }
 
 /// Reads one frame. Memory grows only with the data found, not with what the header promises.
+///
+/// # Errors
+/// [`CacheError::Damaged`] with `file` as its name.
 pub fn decode(bytes: &[u8], file: &Path) -> Result<Particles, CacheError> {
     parse(bytes).map_err(|what| CacheError::damaged(file, what))
 }

@@ -49,6 +49,9 @@ impl Grids {
 }
 
 /// Writes one file.
+///
+/// # Errors
+/// Those of `out`.
 pub fn encode(
     out: &mut impl Write,
     stamp: &Stamp<'_>,

@@ -1,4 +1,4 @@
-//! `bake --dry-run`: what a bake would make, without a device, and with nothing written.
+//! `bake --dry-run`: predicts a bake without a device and without writing anything.
 
 use std::io;
 
@@ -10,19 +10,21 @@ use swell_cache::{CacheError, CacheReader, Parent, frame, refuse_occupied, vdb};
 use swell_domain::{keep::Keep, particles::Particles};
 use swell_scene::Scene;
 
-/// What frames that are not there yet will take on the disk, against what it has.
+/// Disk space that the frames still to be baked will need, and that is free.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Room {
-    /// Of the frames that will be computed and kept, each as large as the start's: more where emitters add water.
+    /// Bytes of the frames that will be computed and kept, each assumed as large as the start's. An
+    /// underestimate if emitters add water.
     pub bytes: u64,
-    /// Whether they are compressed, and `bytes` is what they would take if they were not.
+    /// Whether frames are compressed; `bytes` is then their uncompressed size.
     pub is_compressed: bool,
-    /// That the disk has; `None` where the system does not tell.
+    /// Free bytes on the disk; `None` if the system does not report them.
     pub free: Option<u64>,
 }
 
 impl Room {
-    /// Of frames after a start, in a cache in this folder.
+    /// Space for the frames `first` to `last` of the request's cache, given the particles at its
+    /// start.
     pub(super) fn of(
         request: &Request,
         start: &Particles,
@@ -36,36 +38,37 @@ impl Room {
         })
     }
 
-    /// What is free, where that is less than the frames will take.
+    /// The free bytes, if there are fewer than the frames need.
     pub fn short_of(self) -> Option<u64> {
         self.free.filter(|&free| free < self.bytes)
     }
 }
 
-/// What a bake would make.
+/// Prediction of a bake.
 #[derive(Clone, Debug)]
 pub struct Expected {
     /// First frame that would be computed.
     pub first: u32,
-    /// Last one.
+    /// Last frame that would be computed.
     pub last: u32,
-    /// Frames that stand there from an earlier bake, the start aside.
+    /// Number of frames that exist from an earlier bake, not counting the start.
     pub standing: u32,
-    /// Particles at the start.
+    /// Number of particles at the start.
     pub particles: usize,
-    /// Left out because a solid is there.
+    /// Lattice points left out because a solid covers them.
     pub removed: usize,
-    /// Water at the start.
+    /// Volume of water at the start.
     pub volume: Volume,
-    /// What the frames would take on the disk, and what it has.
+    /// Disk space that the frames would need, and that is free.
     pub room: Room,
-    /// Where a new bake begins from a frame of another cache, that frame.
+    /// The frame of another cache that a new bake would begin from, if it does.
     pub parent: Option<Parent>,
-    /// What a user has to know, a sentence each.
+    /// Warnings about the scene and its beginning, a sentence each.
     pub warnings: Vec<String>,
 }
 
-/// Looks at the scene and at what stands there, as a bake would; which device a cache was baked on is not looked at.
+/// Examines the scene and the existing cache as a bake would; ignores which device the cache was
+/// baked on.
 ///
 /// # Errors
 /// Those of [`bake`](super::bake) that need no device.
@@ -111,10 +114,10 @@ pub fn expected(request: &Request) -> Result<Expected, BakeError> {
     })
 }
 
-/// Bytes of the frames of a whole bake of a scene, the start among them, each as large as the start's.
+/// Bytes of all frames of a full bake including the start, each assumed as large as the start's.
 ///
 /// # Errors
-/// The scene's solids; what cannot stand in a frame.
+/// A fault in the scene's solids, or particles that cannot be stored in a frame.
 pub fn shot_bytes(scene: &Scene) -> Result<u64, BakeError> {
     let start = Start::of(scene)?;
     let [particles, grids] = frame_bytes(scene, &start.particles)?;
@@ -122,7 +125,7 @@ pub fn shot_bytes(scene: &Scene) -> Result<u64, BakeError> {
     Ok(particles + grids + later)
 }
 
-/// Of these frames what stays on the disk, each as large as one of these particles.
+/// Bytes of what stays on disk of these frames, each assumed as large as the start.
 fn bytes_of(scene: &Scene, start: &Particles, first: u32, last: u32) -> Result<u64, CacheError> {
     let [particles, grids] = frame_bytes(scene, start)?;
     let keep = scene.keep.unwrap_or(Keep::All);
@@ -133,7 +136,7 @@ fn bytes_of(scene: &Scene, start: &Particles, first: u32, last: u32) -> Result<u
     Ok(bytes.sum())
 }
 
-/// Bytes of the files of a frame with these particles: its own, and the grids' where the scene asks for them.
+/// Bytes of a frame's particle file, and of its grids if the scene asks for them.
 fn frame_bytes(scene: &Scene, particles: &Particles) -> Result<[u64; 2], CacheError> {
     let stamp = frame::Stamp {
         program: swell_domain::PROGRAM,
@@ -143,7 +146,7 @@ fn frame_bytes(scene: &Scene, particles: &Particles) -> Result<[u64; 2], CacheEr
         time: 0.0,
         origin: scene.origin,
     };
-    // Nothing is written, so nothing but what is to be written can be at fault.
+    // Writing to a sink cannot fail, so an error is a fault of the content.
     let unfit = |error: io::Error| CacheError::Unfit(error.to_string());
     let own = frame::encode(&mut io::sink(), &stamp, particles).map_err(unfit)?;
     let grids = match &scene.grids {

@@ -1,11 +1,12 @@
-//! What a bake has to say at its end of the water that came in.
+//! Warnings at the end of a bake about the water that entered.
 
 use swell_scene::{Scene, four_digits};
 
-/// Fraction of the domain's volume by which water may exceed it: whole layers round a block ten spacings high by as much.
+/// Fraction of the domain's volume by which water may exceed it. Whole layers around a block ten
+/// spacings high amount to as much.
 const OVERFULL: f64 = 0.05;
 
-/// That water of emitters never entered, where some did not.
+/// Warning for emitted particles that never entered.
 pub(super) fn never_entered(blocked: u64) -> Vec<String> {
     let words = match blocked {
         0 => return Vec::new(),
@@ -17,8 +18,8 @@ pub(super) fn never_entered(blocked: u64) -> Vec<String> {
     )]
 }
 
-/// That a frame had more water than the domain has room for; `most` is the greatest count of particles. Pressed together, particles
-/// beside walls hide it from PBF's densities.
+/// Warning for a frame with more water than the domain holds; `most` is the greatest particle
+/// count. When pressed together, particles beside walls hide the excess from PBF's densities.
 pub(super) fn overfull(scene: &Scene, most: usize) -> Vec<String> {
     let (made, room) = (most as f64 * scene.particle_volume(), scene.domain.volume());
     if made <= (1.0 + OVERFULL) * room {

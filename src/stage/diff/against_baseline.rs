@@ -1,4 +1,4 @@
-//! A cache against a stored baseline, and the baseline's writing.
+//! Compares a cache with a stored baseline, and writes baselines.
 
 use std::{
     collections::BTreeMap,
@@ -19,26 +19,28 @@ use swell_compare::{
 };
 use swell_domain::frame_range::{FrameRange, ranges};
 
-/// What became of a baseline that was written.
+/// Result of writing a baseline.
 #[derive(Clone, Debug, Serialize)]
 pub struct Written {
-    /// The adapter whose hashes went in.
+    /// The adapter whose hashes were stored.
     pub adapter: String,
-    /// Frames, the start among them.
+    /// Number of frames, including the start.
     pub frames: usize,
-    /// Whether its hashes were in the file, and the same.
+    /// Whether the file already had the same hashes for this adapter.
     pub is_unchanged: bool,
-    /// Adapters whose hashes stay: taken before this writing.
+    /// Adapters whose earlier hashes remain in the file.
     pub kept: Vec<String>,
-    /// Adapters whose hashes went, as they are of another scene or of other frames.
+    /// Adapters whose hashes were dropped because they belong to another scene or other frames.
     pub dropped: Vec<String>,
-    /// Whether spreads went for the same reason, and with them the limits that they stood for.
+    /// Whether spreads were dropped for the same reason, and with them the limits derived from
+    /// them.
     pub is_spread_dropped: bool,
-    /// What differs in the bakes that the spreads are from; empty where none was measured.
+    /// What distinguishes the bakes that the spreads are measured from; empty if none were
+    /// measured.
     pub spread_from: Vec<String>,
 }
 
-/// Reads a baseline.
+/// Reads and checks a baseline.
 pub(super) fn read(file: &Path) -> Result<Baseline, DiffError> {
     let text = swell_domain::text::read(file).map_err(DiffError::at(file))?;
     let found: Result<Baseline, String> =
@@ -65,7 +67,7 @@ pub(super) fn compare(
                 ranges(&known)
             )));
         }
-        // Asked for by number: missing is an error and no difference.
+        // A frame requested by number: if it is missing, that is an error and not a difference.
         cache.entry(frame)?;
     }
     let (there, only_baseline): (Vec<u32>, Vec<u32>) = asked
@@ -89,13 +91,15 @@ pub(super) fn compare(
     })
 }
 
-/// Writes the baseline of a cache. In a file that stands there, tolerances and spreads stay as they are where scene and
-/// frames are the same, and so do hashes of other adapters; aggregates stay where these are within tolerance of them and
-/// of an adapter that the file did not know. Caches in `spread` differ from this one in roundings alone: they give the
-/// spreads, and the tolerances, anew.
+/// Writes the baseline of a cache.
+///
+/// An existing file keeps its tolerances and spreads if scene and frames are the same, and so the
+/// hashes of other adapters. It keeps its aggregates if the new ones are within tolerance of them
+/// and the file did not know the adapter. The caches in `spread` must differ from this one only in
+/// rounding; they replace the spreads and the tolerances.
 ///
 /// # Errors
-/// [`DiffError`]; a file that is there and no baseline is left alone.
+/// [`DiffError`]; an existing file that is not a baseline is left untouched.
 pub fn write_baseline(
     cache: &Path,
     file: &Path,
@@ -152,7 +156,7 @@ pub fn write_baseline(
     })
 }
 
-/// Measures how far the frames of `cache` and those of bakes that differ in roundings alone come apart.
+/// Measures how far the frames of `cache` and those of bakes that differ only in rounding diverge.
 fn take_spread(
     baseline: &mut Baseline,
     cache: &CacheReader,

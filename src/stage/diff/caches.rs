@@ -1,4 +1,4 @@
-//! Two caches: their frames, the streams beside the particles, and the ledgers' lines.
+//! Compares two caches: their frames, the streams besides the particles, and the ledgers' lines.
 
 use std::collections::BTreeSet;
 
@@ -13,7 +13,7 @@ use swell_compare::{
 };
 use swell_domain::{particles::Particles, tolerance::Tolerance};
 
-/// A tolerance that judges nothing here would pass anything.
+/// Refuses a tolerance that limits nothing here, because everything would pass it.
 fn check_tolerance(tolerance: &Tolerance, caches: [&CacheReader; 2]) -> Result<(), DiffError> {
     if tolerance.fields.is_empty() && tolerance.aggregates.is_empty() {
         return Err(DiffError::usage(
@@ -75,7 +75,8 @@ pub(super) fn compare(
             aggregates(a, &scene_a, &gauge, frame, &of_a)?,
             aggregates(b, &scene_b, &gauge, frame, &of_b)?,
         ];
-        // A bake has no report of the frame that it began with, as a branch of the one that it is compared with.
+        // A bake has no report of the frame that it began with, as is the case for a branch of the
+        // other cache.
         if [a, b].iter().any(|cache| cache.first_frame() == frame) {
             for sum in &mut sums {
                 sum.density_error = None;
@@ -107,7 +108,7 @@ pub(super) fn compare(
     })
 }
 
-/// What differs in a frame beside its particles.
+/// Differences in a frame apart from its particles.
 fn of_streams(
     caches: [&CacheReader; 2],
     frame: u32,

@@ -1,4 +1,4 @@
-//! Two renders: pictures by their names.
+//! Compares two renders: pictures matched by name.
 
 use std::{
     collections::BTreeMap,
@@ -25,7 +25,7 @@ fn encoding(path: &Path) -> Option<Encoding> {
     }
 }
 
-/// By its name.
+/// Judged by the extension.
 pub(super) fn is_picture(path: &Path) -> bool {
     encoding(path).is_some()
 }
@@ -54,7 +54,7 @@ pub(super) fn in_folder(
     Ok(found)
 }
 
-/// [`in_folder`], where each frame that is asked for by number has to be.
+/// [`in_folder`] that requires a picture of every frame requested by number.
 fn wanted(
     folder: &Path,
     frames: Option<&FrameRange>,
@@ -91,7 +91,7 @@ pub(super) fn compare_folders(request: &Request) -> Result<PicturesDiff, DiffErr
         .collect();
     let pair = |&(name, a, b): &(&String, &PathBuf, &PathBuf)| {
         let images = request.images.as_ref().map(|images| Images {
-            // An EXR and a PNG of one frame stand side by side.
+            // The name keeps its extension, because an EXR and a PNG of one frame share a folder.
             path: images.path.join(format!("{name}.difference.png")),
             gain: images.gain,
         });

@@ -1,4 +1,5 @@
-//! What two caches hold beside a frame's particles: the other streams of the table, and the ledger's lines.
+//! Compares what two caches hold besides a frame's particles: the other streams, and the ledger's
+//! lines.
 
 use glam::DVec3;
 use serde_json::{Value as Json, json};
@@ -11,35 +12,35 @@ use swell_cache::{
 use swell_compare::streams::{self, Difference, Row, StreamDiff};
 use swell_domain::{particles::Particles, probe::Rate};
 
-/// A frame of one of the two caches; its particles are as they were read.
+/// A frame in one of the two caches, with its particles as read.
 #[derive(Clone, Copy)]
 pub(super) struct Side<'a> {
     pub(super) cache: &'a CacheReader,
     pub(super) entry: &'a Entry,
-    /// `None` where one of the two caches has not kept them.
+    /// `None` if one of the two caches has not kept them.
     pub(super) particles: Option<&'a Particles>,
 }
 
 impl Side<'_> {
-    /// Whether a bake began with this frame: it has no report of it, and no value of a probe that looks at the solver's
-    /// work.
+    /// Whether a bake began with this frame. It then has no report, and no values of probes that
+    /// observe the solver.
     fn is_start(&self) -> bool {
         self.entry.report.is_null()
     }
 }
 
-/// Parts of streams that `a` has and `b` has not: `grids`, `grid NAME`, `probe NAME`.
+/// Parts of streams that `a` has and `b` does not: `grids`, `grid NAME`, `probe NAME`.
 pub(super) fn lone(a: &CacheReader, b: &CacheReader) -> Vec<String> {
     let lone = |stream: &Stream| stream.lone(a.manifest(), b.manifest());
     STREAMS.iter().flat_map(lone).collect()
 }
 
-/// What differs in one frame, in streams that both have.
+/// Differences in one frame, in streams that both caches have.
 pub(super) fn of_frame(sides: [Side<'_>; 2]) -> Result<Vec<StreamDiff>, CacheError> {
     let mut found = Vec::new();
     for stream in &STREAMS {
         match stream.content {
-            // In the frame's own comparison, where a tolerance judges them.
+            // Compared in the frame's own comparison, where a tolerance applies.
             Content::Particles => {}
             Content::SparseGrids => found.extend(grids(stream, sides)?),
             Content::Columns => found.extend(tables(stream, sides)),
@@ -50,8 +51,9 @@ pub(super) fn of_frame(sides: [Side<'_>; 2]) -> Result<Vec<StreamDiff>, CacheErr
     Ok(found)
 }
 
-/// Two grid files that are sound. Their bytes name program, shot and time as well, so where they differ the values
-/// decide: grids are a function of the particles, and are computed anew where this program would write the same file.
+/// Compares two intact grid files. Their bytes also contain program, shot and time, so where they
+/// differ the values decide: grids depend only on the particles and are recomputed if this program
+/// would write the same file.
 fn grids(stream: &Stream, sides: [Side<'_>; 2]) -> Result<Option<StreamDiff>, CacheError> {
     let files = sides.map(|side| side.entry.file(stream.name));
     let asked = sides.map(|side| side.cache.manifest().grids.as_ref());
@@ -101,13 +103,13 @@ fn grids(stream: &Stream, sides: [Side<'_>; 2]) -> Result<Option<StreamDiff>, Ca
         .collect();
     found.retain(|grid| grid.different > 0);
     if found.is_empty() {
-        // A zero's sign, or what lies inside of a level set.
+        // The sign of a zero, or the values inside a level set.
         return diff(bytes);
     }
     diff(found.into_iter().map(Difference::Grid).collect())
 }
 
-/// What decides where voxels lie and how they are kept.
+/// The settings that decide where voxels lie and how they are stored.
 fn settings(grids: &GridRecord, side: Side<'_>) -> Json {
     let origin = DVec3::from(grids.origin) + DVec3::from(side.cache.manifest().origin);
     json!({
@@ -117,7 +119,7 @@ fn settings(grids: &GridRecord, side: Side<'_>) -> Json {
     })
 }
 
-/// Rows of the tables that both have, by name.
+/// Rows of the tables that both have, matched by name.
 fn tables(stream: &Stream, [a, b]: [Side<'_>; 2]) -> Vec<StreamDiff> {
     let [of_a, of_b] = [a, b].map(|side| stream.tables(side.cache.manifest()));
     let table = |(i, x): (usize, &ProbeRecord)| {
@@ -155,8 +157,9 @@ fn tables(stream: &Stream, [a, b]: [Side<'_>; 2]) -> Vec<StreamDiff> {
     of_a.iter().enumerate().filter_map(table).collect()
 }
 
-/// What the first look that differs differs in. Where a table has more than one a frame, it is named by its number in the
-/// frame, from 1, and its time and how many there are count as well.
+/// Differences of the first sample that differs. If a table has more than one sample per frame, the
+/// sample is named by its number in the frame, from 1, and its time and the number of samples are
+/// compared too.
 fn looks_apart(tables: [&ProbeRecord; 2], looks: &[Vec<Look<'_>>; 2]) -> Vec<Difference> {
     let [a, b] = looks;
     let is_many = tables.iter().any(|table| table.rate_hz != Rate::Frame);
@@ -193,7 +196,8 @@ fn looks_apart(tables: [&ProbeRecord; 2], looks: &[Vec<Look<'_>>; 2]) -> Vec<Dif
     found
 }
 
-/// The clock, what the solver reports, and where the particles themselves are not compared the checksum of their file.
+/// Compares the clocks and the solver's reports, and the checksums of the particle files if the
+/// particles themselves are not compared.
 fn ledger([a, b]: [Side<'_>; 2]) -> StreamDiff {
     let [x, y] = [a, b].map(|side| json!(side.entry.clock));
     let mut differences = streams::keys("clock", &x, &y);
@@ -216,7 +220,8 @@ fn ledger([a, b]: [Side<'_>; 2]) -> StreamDiff {
     }
 }
 
-/// Whether the same particles give the same file in both caches: it names program, shot and origin.
+/// Whether equal particles give equal files in both caches: a file contains program, shot and
+/// origin.
 fn has_same_stamps(a: Side<'_>, b: Side<'_>) -> bool {
     let stamp = |side: Side<'_>| {
         let manifest = side.cache.manifest();

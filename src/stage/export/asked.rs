@@ -1,10 +1,10 @@
-//! What may be asked of an export.
+//! Validates an export request.
 
 use std::collections::BTreeSet;
 
 use super::{ExportError, Request, Target, UsdWater, beside};
 
-/// Refuses what does not go together, and names of one file for two.
+/// Refuses targets that cannot be combined, and file names that two targets share.
 pub(super) fn check(request: &Request) -> Result<(), ExportError> {
     let asked = |what: String| Err(ExportError::Asked(what));
     if request.targets.is_empty() {
@@ -49,7 +49,7 @@ pub(super) fn check(request: &Request) -> Result<(), ExportError> {
             ));
         }
         if let Target::Usd(file, _) = target {
-            // The root names its layers, and USD's text has no place for these.
+            // The root names its layers, and USD's text format cannot represent these characters.
             let name = file.file_name().unwrap_or_default();
             if name.to_str().is_none_or(|it| it.contains(char::is_control)) {
                 return asked(format!(

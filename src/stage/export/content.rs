@@ -1,4 +1,4 @@
-//! What of a frame an export needs.
+//! The parts of a frame that an export needs.
 
 use std::cell::OnceCell;
 
@@ -11,7 +11,7 @@ use swell_domain::{
     water_mesh::{Body, WaterMesh},
 };
 
-/// A frame's content, each part read or made when it is first asked for.
+/// A frame's content; each part is read or computed on first use.
 pub(super) struct Content<'a> {
     job: &'a Job<'a>,
     pub(super) frame: u32,
@@ -32,13 +32,13 @@ impl<'a> Content<'a> {
     pub(super) fn particles(&self) -> Result<&Particles, CacheError> {
         if self.particles.get().is_none() {
             let particles = self.job.source().read(self.frame)?;
-            // The cell is empty, and no other thread sees it.
+            // Cannot fail: the cell is empty, and no other thread has access to it.
             let _ = self.particles.set(particles);
         }
         Ok(self.particles.get_or_init(Particles::default))
     }
 
-    /// Volume within the mesh over the particles'; `None` where none was made.
+    /// Volume inside the mesh relative to the particles' volume; `None` if no mesh was made.
     pub(super) fn volume(&self) -> Option<f64> {
         self.mesh.get().map(|mesh| mesh.volume)
     }

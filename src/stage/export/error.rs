@@ -1,4 +1,4 @@
-//! What goes wrong with an export.
+//! Errors of an export.
 
 use std::{io, path::PathBuf};
 
@@ -12,7 +12,7 @@ use super::{FolderError, UsdcError};
 /// Why an export failed.
 #[derive(Debug, thiserror::Error)]
 pub enum ExportError {
-    /// What was asked for does not go together.
+    /// Options that cannot be combined.
     #[error("{0}")]
     Asked(String),
     /// The cache.
@@ -24,36 +24,36 @@ pub enum ExportError {
     /// The look.
     #[error(transparent)]
     Look(#[from] LookError),
-    /// Where files go.
+    /// The output folder.
     #[error(transparent)]
     Folder(#[from] FolderError),
-    /// Binary USD.
+    /// Conversion to binary USD.
     #[error(transparent)]
     Usdc(#[from] UsdcError),
-    /// A stream that is not there.
+    /// A whitewater stream that does not exist.
     #[error("{} is not there: make it with `swell whitewater {}` (--name {stream})", directory.display(), posix::path(cache))]
     NoStream {
-        /// Its name.
+        /// Name of the stream.
         stream: String,
         /// Where it would be.
         directory: PathBuf,
-        /// Of the bake.
+        /// Directory of the bake's cache.
         cache: PathBuf,
     },
     /// A frame of a stream was made from other water.
     #[error("{}: frame {frame} was made from water that is no longer there: make it again with `swell whitewater`", directory.display())]
     OldStream {
-        /// Of the stream.
+        /// Directory of the stream.
         directory: PathBuf,
         /// The frame.
         frame: u32,
     },
-    /// The output would go into a cache.
+    /// The output would be written into a cache.
     #[error("{} is in the cache {}: choose another name", file.display(), cache.display())]
     IntoCache {
-        /// The file.
+        /// The output file.
         file: PathBuf,
-        /// This cache or another.
+        /// The cache that contains it.
         cache: PathBuf,
     },
     /// A grid file could not be encoded.
@@ -61,13 +61,13 @@ pub enum ExportError {
     Vdb {
         /// The frame.
         frame: u32,
-        /// The fault.
+        /// The cause.
         source: io::Error,
     },
 }
 
 impl ExportError {
-    /// Whether it is a fault of the frame that was read, so that others may do well.
+    /// Whether the fault is specific to the frame, so that other frames may still succeed.
     pub(super) fn is_of_frame(&self) -> bool {
         matches!(self, Self::Cache(_) | Self::Vdb { .. })
     }

@@ -1,24 +1,25 @@
-//! `export --dry-run`: what an export would make, with nothing written.
+//! `export --dry-run`: predicts an export without writing anything.
 
 use std::{collections::BTreeMap, path::Path};
 
 use super::{Content, ExportError, Job, Request, Target, is_binary, share};
 
-/// What an export would make.
+/// Prediction of an export.
 #[derive(Clone, Debug, Default)]
 pub struct Expected {
     /// Frames of this process's share.
     pub frames: Vec<u32>,
-    /// Those of them whose files all stand there.
+    /// Those of them whose files all exist.
     pub standing: Vec<u32>,
-    /// Files to be made.
+    /// Number of files to be made.
     pub files: usize,
-    /// Bytes of them: each as large as that of the first frame to be made, which was made for that and thrown away. `None` where binary
-    /// USD is among them, which another program makes.
+    /// Predicted bytes of these files, each assumed as large as that of the first frame to be made,
+    /// which is computed and discarded for this. `None` if they include binary USD, which another
+    /// program writes.
     pub bytes: Option<u64>,
 }
 
-/// Looks at what stands there, as an export would, and writes nothing.
+/// Examines existing files as an export would; writes nothing.
 ///
 /// # Errors
 /// Those of [`export`](super::export).
@@ -64,7 +65,7 @@ pub fn expected(request: &Request) -> Result<Expected, ExportError> {
     Ok(found)
 }
 
-/// Bytes of a file, which is made for that; `None` of binary USD.
+/// Bytes of a file, found by computing its content; `None` for binary USD.
 fn size_of(
     job: &Job<'_>,
     target: &Target,

@@ -1,15 +1,15 @@
-//! The folders that exported files go to: what stands there, and which process makes a file.
+//! Output folders of exports: which files exist, and which process makes a file.
 //!
 //! Beside the files is a folder `.swell-export/`:
 //!
 //! ```text
-//! m.0001.ply.json  whose file m.0001.ply is, from what it was made, and its checksum; stays
-//! m.0001.ply.lock  locked by the process that makes it
-//! m.0001.ply       a file until it is whole
+//! m.0001.ply.json  record of m.0001.ply: its owner, its source and its checksum; kept
+//! m.0001.ply.lock  locked by the process that makes the file
+//! m.0001.ply       draft of the file until it is complete
 //! ```
 //!
-//! A record is written before its file takes its name, so that a file without one is none of ours. A file is whole where its bytes are
-//! those of its record. A lock dies with its process.
+//! A record is written before its file gets its final name, so a file without a record is not ours.
+//! A file is complete if its bytes match the record. A lock ends with its process.
 
 use std::{
     fs::{self, File},
@@ -24,26 +24,26 @@ use crate::locked::{is_at, is_had, open};
 /// Folder of records and drafts.
 const ROOM: &str = ".swell-export";
 
-/// What files of one export have in common.
+/// What the files of one export have in common.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Owner {
     /// Program and version.
     pub(super) software: String,
-    /// Shot of the cache.
+    /// Shot name of the cache.
     pub(super) shot: String,
     /// Chained hash of the cache's first frame, which covers its manifest.
     pub(super) cache: String,
-    /// What the file is, in words.
+    /// Kind and settings of the file, in words.
     pub(super) settings: String,
 }
 
-/// Of one file.
+/// Record of one file.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Record {
     owner: Owner,
-    /// Hash of what it was made from.
+    /// Hash of what the file was made from.
     source: String,
     bytes: u64,
     blake3: String,
@@ -55,15 +55,15 @@ pub enum FolderError {
     /// A file or folder that cannot be read, written or locked.
     #[error("{}", file.display())]
     File {
-        /// Which.
+        /// The file or folder.
         file: PathBuf,
-        /// The system's words.
+        /// The system's error.
         source: io::Error,
     },
-    /// Something else stands there.
+    /// The name is taken by something else.
     #[error("{} is {what}; choose another name, or export it anew with --overwrite", file.display())]
     Other {
-        /// Which.
+        /// The existing file.
         file: PathBuf,
         /// What it is.
         what: String,
@@ -82,11 +82,11 @@ pub(super) struct Wanted {
     pub(super) owner: Owner,
     /// Hash of what it is made from.
     pub(super) source: String,
-    /// Whether one that was made from something else is made anew without being asked.
+    /// Whether a file made from another source is replaced without asking.
     pub(super) follows: bool,
 }
 
-/// The right to make a file, until it is dropped.
+/// The exclusive right to make a file, held until it is dropped.
 #[derive(Debug)]
 pub(super) struct Claim {
     lock: PathBuf,
@@ -95,7 +95,7 @@ pub(super) struct Claim {
 
 impl Drop for Claim {
     fn drop(&mut self) {
-        // One that stays is of no harm.
+        // A lock file that stays behind does no harm.
         let _ = fs::remove_file(&self.lock);
     }
 }
@@ -114,7 +114,7 @@ impl Wanted {
         self.folder().join(ROOM).join(name)
     }
 
-    /// Where it is written before it is whole; ends as the file does.
+    /// Path of the draft; it has the file's own extension.
     pub(super) fn draft(&self) -> PathBuf {
         self.beside("")
     }
@@ -123,10 +123,10 @@ impl Wanted {
         serde_json::from_slice(&fs::read(self.beside(".json")).ok()?).ok()
     }
 
-    /// Refuses what stands there and is of something else.
+    /// Refuses an existing file of another origin.
     ///
     /// # Errors
-    /// [`FolderError::Other`].
+    /// [`FolderError::Other`]; [`FolderError::File`] if the name is a directory.
     pub(super) fn check(&self) -> Result<(), FolderError> {
         let other = |what: &str| {
             Err(FolderError::Other {
@@ -162,7 +162,7 @@ impl Wanted {
         }
     }
 
-    /// Whether it stands there whole.
+    /// Whether the file exists and is complete.
     pub(super) fn stands(&self) -> bool {
         let is_whole = |record: Record| {
             let is_ours = record.owner == self.owner && record.source == self.source;
@@ -174,7 +174,7 @@ impl Wanted {
         self.record().is_some_and(is_whole)
     }
 
-    /// Takes the file for this process; `None` while another has it.
+    /// Claims the file for this process; `None` while another process has it.
     ///
     /// # Errors
     /// [`FolderError::File`].
@@ -187,7 +187,7 @@ impl Wanted {
             if !is_had(file.try_lock()).map_err(at(&lock))? {
                 return Ok(None);
             }
-            // Its last holder may have taken it away meanwhile.
+            // The previous holder may have removed the lock file in between.
             if is_at(&file, &lock) {
                 return Ok(Some(Claim { lock, _file: file }));
             }
@@ -203,7 +203,7 @@ impl Wanted {
         fs::write(&draft, bytes).map_err(at(&draft))
     }
 
-    /// Gives the draft, which is whole, its name.
+    /// Writes the record of a complete draft and renames the draft. Returns its length in bytes.
     ///
     /// # Errors
     /// [`FolderError::File`].
@@ -236,7 +236,7 @@ impl Wanted {
     }
 }
 
-/// BLAKE3 of a file's bytes, hex.
+/// BLAKE3 of a file's content, hex.
 fn hash(file: &Path) -> io::Result<String> {
     let mut hasher = blake3::Hasher::new();
     hasher.update_reader(File::open(file)?)?;
@@ -274,7 +274,7 @@ mod tests {
         drop(claim);
         assert!(one.stands() && one.check().is_ok());
         assert!(one.claim().unwrap().is_some());
-        // Other bytes: made anew, for the record is ours.
+        // Other bytes: may be replaced, because the record is ours.
         fs::write(&one.file, b"hurt").unwrap();
         assert!(!one.stands() && one.check().is_ok());
         let other = wanted(dir.path(), "frame 2");

@@ -1,11 +1,12 @@
-//! Names of files that have a frame's number in them.
+//! File names that contain the frame number.
 
 use std::{
     path::{Path, PathBuf, is_separator},
     str::FromStr,
 };
 
-/// A file name with a place for the frame's number: `out/m.%04d.ply`, or `out/m.####.ply`. Folders are called as they are written.
+/// A file name with a placeholder for the frame number: `out/m.%04d.ply`, or `out/m.####.ply`.
+/// Folder names are taken literally.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Pattern {
     before: String,
@@ -13,10 +14,10 @@ pub struct Pattern {
     after: String,
 }
 
-/// A text that is no such name.
+/// Why a text is not such a file name.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum PatternError {
-    /// It has no place for the number, or two.
+    /// It has no placeholder, or more than one.
     #[error(
         "the file's name in `{0}` has to hold one place for the frame's number: write %04d or ####"
     )]
@@ -34,7 +35,7 @@ impl Pattern {
         PathBuf::from(format!("{before}{frame:0digits$}{after}"))
     }
 
-    /// What the names end in, behind the last dot; lower case.
+    /// Extension of the names, lower case.
     pub fn ending(&self) -> String {
         let end = Path::new(&self.after)
             .extension()
@@ -50,7 +51,7 @@ impl FromStr for Pattern {
     fn from_str(text: &str) -> Result<Self, PatternError> {
         let fault = || PatternError::Place(text.to_owned());
         let (folder, text) = text.split_at(text.rfind(is_separator).map_or(0, |at| at + 1));
-        // The first sign of a place, how long it is, and its digits.
+        // The placeholder's position, its length, and its number of digits.
         let percent = text.find('%').map(|at| {
             let inner = text[at + 1..]
                 .find('d')
@@ -96,7 +97,7 @@ mod tests {
         assert_eq!(file("m.###.OBJ", 12345), named("m.12345.OBJ", "obj"));
         assert_eq!(file("m%d.npy", 7), named("m7.npy", "npy"));
         assert_eq!(file("m%d.tar.npy", 7).1, "npy");
-        // Folders are called as they are written.
+        // Folder names are taken literally.
         for folder in ["100%", "take #2", "%04d", "####"] {
             let found = file(&format!("{folder}/m.%04d.ply"), 7);
             assert_eq!(found, named(&format!("{folder}/m.0007.ply"), "ply"));

@@ -1,4 +1,4 @@
-//! What of a scene and a look stands in a USD shot beside the water.
+//! The parts of a scene and a look that a USD shot has besides the water.
 
 use std::{
     f64::consts::PI,
@@ -13,21 +13,22 @@ use swell_domain::particles::Particles;
 use swell_export::usd::{self, Root, Solid, View, WaveMaker};
 use swell_scene::{Scene, Wall};
 
-/// What a layer of a shot is called beside its frames'.
+/// Name part of the shot's manifest layer, in the place of a frame number.
 const MANIFEST: &str = "manifest";
 
-/// Diameter of a ball of a particle's volume, metres.
+/// Diameter of a sphere with a particle's volume, metres.
 pub(super) fn width(spacing: f64) -> f64 {
     (6.0 / PI).cbrt() * spacing
 }
 
-/// Such as `wall_minus_x`.
+/// Name of a wave maker, such as `wall_minus_x`.
 fn name(wall: Wall) -> String {
     let side = if wall.is_max { "plus" } else { "minus" };
     format!("wall_{side}_{}", ["x", "y", "z"][wall.axis])
 }
 
-/// How far each wave maker has come from the domain's side at a frame, after the state that it left, metres.
+/// Displacement of each wave maker from the domain's side at a frame, metres, given the frame's
+/// state.
 pub(super) fn ways(scene: &Scene, state: &Particles, frame: u32) -> Vec<(String, DVec3)> {
     let walls = scene.walls_after(state, scene.shot.time(frame));
     let size = scene.domain.size();
@@ -60,7 +61,8 @@ fn maker(scene: &Scene, wall: Wall) -> WaveMaker {
         corner(true, true),
         corner(false, true),
     ];
-    // Seen along the axis the first two sides turn counter-clockwise; from the water at the far wall the other way.
+    // Seen along the axis, the first two sides turn counter-clockwise; seen from the water at the
+    // far wall, clockwise.
     if wall.is_max {
         corners.reverse();
     }
@@ -71,7 +73,8 @@ fn maker(scene: &Scene, wall: Wall) -> WaveMaker {
 }
 
 impl Job<'_> {
-    /// The files of each shot that are no frame's, its manifest and its root, with their bytes.
+    /// The files of each shot that belong to no frame, its manifest and its root, with their
+    /// content.
     pub(super) fn shots(&self) -> Result<Vec<(Wanted, Vec<u8>)>, CacheError> {
         let mut found = Vec::new();
         for target in &self.request.targets {
@@ -155,7 +158,7 @@ impl Job<'_> {
         still.chain(moving).collect()
     }
 
-    /// The look's camera at each frame; nothing without a look.
+    /// The look's camera at each frame; empty without a look.
     fn views(&self) -> Vec<View> {
         let Some(look) = &self.request.look else {
             return Vec::new();

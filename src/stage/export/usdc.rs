@@ -1,47 +1,48 @@
-//! Binary USD, by OpenUSD's own library under Python: an optional tool. swell itself writes USD as text.
+//! Binary USD, written by OpenUSD's own library through an optional Python. swell itself writes USD
+//! as text.
 
 use std::{
     path::Path,
     process::{Command, Stdio},
 };
 
-/// Writes the layer of the first file to the second one.
+/// Exports the layer of the first file to the second one.
 const CONVERT: &str = "import sys\nfrom pxr import Sdf\n\
     layer = Sdf.Layer.FindOrOpen(sys.argv[1])\n\
     sys.exit(0 if layer and layer.Export(sys.argv[2]) else 1)\n";
 
-/// Why there is no binary USD.
+/// Why binary USD cannot be written.
 #[derive(Debug, thiserror::Error)]
 pub enum UsdcError {
-    /// No Python with usd-core.
+    /// There is no Python with usd-core.
     #[error(
         "a name that ends in .usdc needs Python with usd-core (pip install usd-core), and `{python}` has none: {why}; give another \
          one with --python, or write .usda"
     )]
     Missing {
-        /// Program that was tried.
+        /// The program that was tried.
         python: String,
-        /// Its own words, the last line.
+        /// Last line of its error output.
         why: String,
     },
-    /// It did not convert a layer.
+    /// The conversion of a layer failed.
     #[error("{python} could not write {file}: {why}")]
     Failed {
         /// The program.
         python: String,
         /// The file.
         file: String,
-        /// Its own words, the last line.
+        /// Last line of its error output.
         why: String,
     },
 }
 
-/// A Python that has usd-core.
+/// A Python interpreter that has usd-core.
 #[derive(Clone, Debug)]
 pub(super) struct Python(String);
 
 impl Python {
-    /// Looks whether it has.
+    /// Checks that the interpreter can import usd-core.
     ///
     /// # Errors
     /// [`UsdcError::Missing`].
@@ -69,7 +70,7 @@ impl Python {
     }
 }
 
-/// Runs it; the last line of what it says where it fails.
+/// Runs the interpreter; the last line of its error output if it fails.
 fn run(python: &str, arguments: &[&str]) -> Result<(), String> {
     let ran = Command::new(python)
         .args(arguments)

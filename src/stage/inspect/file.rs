@@ -1,4 +1,4 @@
-//! What one file is: a frame of particles, a mesh, a VDB, a picture, a USD or a glTF.
+//! Describes one file: a frame of particles, a mesh, a VDB, a picture, USD or glTF.
 
 use std::{
     fs, io,
@@ -27,10 +27,10 @@ use swell_render::{
 pub use swell_domain::mesh_file::vdb::GridFile;
 pub use swell_scene::rig::Rig;
 
-/// A file that `inspect` knows by its ending.
+/// Content of a file that `inspect` recognises by its extension.
 #[derive(Debug)]
 pub enum FileContents {
-    /// A frame of a cache, or of whitewater.
+    /// A frame of a cache or of whitewater.
     Frame(FrameFile),
     /// A triangle mesh.
     Mesh(MeshFile),
@@ -45,28 +45,29 @@ pub enum FileContents {
 /// Particles of one frame.
 #[derive(Debug)]
 pub struct FrameFile {
-    /// The comments of its header: program, shot, frame, time, and an origin where the scene has one.
+    /// Comments of its header: program, shot, frame, time, and the origin if the scene has one.
     pub comments: Vec<String>,
-    /// How many.
+    /// Number of particles.
     pub particles: usize,
-    /// Further columns beside position, velocity and id, by name.
+    /// Names of the columns besides position, velocity and id.
     pub attributes: Vec<String>,
-    /// Around the particles, metres from the scene's origin; `None` without particles.
+    /// Bounding box of the particles relative to the scene's origin, metres; `None` without
+    /// particles.
     pub bounds: Option<Bounds>,
-    /// Of its fastest particle, m/s.
+    /// Speed of the fastest particle, m/s.
     pub fastest: f64,
 }
 
-/// A mesh as a scene would take it, in the file's own frame and unit.
+/// A mesh as a scene would load it, in the file's own frame and unit.
 #[derive(Debug)]
 pub struct MeshFile {
-    /// Places, each once.
+    /// Number of distinct vertices.
     pub vertices: usize,
-    /// With an area.
+    /// Number of triangles with a nonzero area.
     pub triangles: usize,
-    /// Around it.
+    /// Bounding box.
     pub bounds: Option<Bounds>,
-    /// Edges with a triangle on one side alone; none of a closed mesh.
+    /// Number of edges with a triangle on only one side; 0 for a closed mesh.
     pub open_edges: usize,
 }
 
@@ -75,48 +76,48 @@ pub struct MeshFile {
 pub struct PictureFile {
     /// `png` or `exr`.
     pub format: &'static str,
-    /// Pixels of the image that is shown: width, height.
+    /// Width and height of the displayed image, pixels.
     pub size: [usize; 2],
-    /// Pixels that the file has, and where their upper left corner lies in the image.
+    /// Size of the stored pixels, and the position of their upper left corner in the image.
     pub data: ([usize; 2], [i32; 2]),
-    /// Name and type of each.
+    /// Name and type of each channel.
     pub channels: Vec<(String, &'static str)>,
-    /// Of the pixels.
+    /// Compression of the pixels.
     pub compression: String,
-    /// Where it comes from; empty of a picture that says nothing.
+    /// Metadata about its origin; empty if the picture has none.
     pub attributes: Attributes,
 }
 
 /// Why a file could not be described.
 #[derive(Debug, thiserror::Error)]
 pub enum FileError {
-    /// It cannot be read.
+    /// The file cannot be read.
     #[error("cannot read {}", file.display())]
     Read {
-        /// Which.
+        /// The file.
         file: PathBuf,
-        /// What the system says.
+        /// The system's error.
         source: io::Error,
     },
-    /// Neither a frame of ours nor a mesh.
+    /// A PLY that is neither one of our frames nor a mesh.
     #[error("{}: neither a frame ({frame}) nor a mesh ({mesh})", file.display())]
     Ply {
-        /// Which.
+        /// The file.
         file: PathBuf,
-        /// Why it is no frame.
+        /// Why it is not a frame.
         frame: String,
-        /// Why it is no mesh.
+        /// Why it is not a mesh.
         mesh: String,
     },
     /// A compressed frame.
     #[error(transparent)]
     Frame(#[from] CacheError),
-    /// A VDB, USD or glTF that is none, is damaged, or is not read.
+    /// A VDB, USD or glTF file that is invalid, damaged or unsupported.
     #[error("{}: {detail}", file.display())]
     Other {
-        /// Which.
+        /// The file.
         file: PathBuf,
-        /// What is wrong.
+        /// What is wrong with it.
         detail: String,
     },
     /// A mesh.
@@ -133,23 +134,23 @@ impl From<&FileError> for Blame {
     }
 }
 
-/// Endings that [`describe`] knows, in lower case.
+/// Extensions that [`describe`] knows, in lower case.
 const ENDINGS: [&str; 13] = [
     "ply", "zst", "obj", "stl", "vdb", "png", "exr", "usd", "usda", "usdc", "usdz", "glb", "gltf",
 ];
 
-/// The file's ending where `describe` knows it.
+/// The file's extension if `describe` knows it.
 fn ending(file: &Path) -> Option<&'static str> {
     let found = file.extension()?.to_string_lossy().to_ascii_lowercase();
     ENDINGS.into_iter().find(|known| *known == found)
 }
 
-/// Whether [`describe`] knows files of this name.
+/// Whether [`describe`] recognises files of this name.
 pub fn is_known(file: &Path) -> bool {
     ending(file).is_some() && !file.is_dir()
 }
 
-/// Reads `file`, all of it, so that a torn one is found.
+/// Reads all of `file`, so that a truncated one is detected.
 ///
 /// # Errors
 /// [`FileError`].
@@ -190,7 +191,7 @@ fn read(file: &Path) -> Result<Vec<u8>, FileError> {
     })
 }
 
-/// A frame where its header is one of ours, else a mesh.
+/// A frame if its header is one of ours, otherwise a mesh.
 fn ply(file: &Path) -> Result<FileContents, FileError> {
     let bytes = read(file)?;
     let no_frame = match frame::decode(&bytes, file) {
@@ -211,7 +212,7 @@ fn ply(file: &Path) -> Result<FileContents, FileError> {
     }
 }
 
-/// What is wrong, without the file's name.
+/// The fault without the file's name.
 fn words(error: &CacheError) -> String {
     match error {
         CacheError::Damaged { what, .. } => what.clone(),
@@ -265,7 +266,7 @@ fn png(file: &Path) -> Result<PictureFile, FileError> {
 }
 
 fn exr(file: &Path) -> Result<PictureFile, FileError> {
-    // Decodes all of it.
+    // Decodes the whole file.
     let attributes = read_exr_attributes(file)?;
     let fault = |message: String| RenderError::Format {
         file: file.to_owned(),

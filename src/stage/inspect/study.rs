@@ -1,4 +1,4 @@
-//! What a study will run.
+//! Lists the runs of a study.
 
 use swell_scene::study::{
     RunsOn, Study,
@@ -7,30 +7,30 @@ use swell_scene::study::{
     tune::Tune,
 };
 
-/// A study in the order of its file.
+/// Outline of a study, in the order of its file.
 #[derive(Debug)]
 pub struct Outline {
-    /// As the file's `kind` names it.
+    /// Kind, as in the file's `kind`.
     pub kind: &'static str,
     /// Its curves, cases or benchmarks.
     pub parts: Vec<Part>,
-    /// What a user has to know of its scenes.
+    /// Warnings about its scenes.
     pub warnings: Vec<String>,
 }
 
 /// A curve, a case, a benchmark or a solver.
 #[derive(Debug)]
 pub struct Part {
-    /// As page and legend have it.
+    /// Name as in page and legend.
     pub name: String,
     /// What changes from point to point, or what the part is.
     pub key: String,
-    /// What is run, in order.
+    /// Names of the runs, in order.
     pub points: Vec<String>,
 }
 
 impl Outline {
-    /// Of a study that was read.
+    /// Outline of a study that was read.
     pub fn of(study: &Study) -> Self {
         let (kind, parts) = match study {
             Study::SolverComparison(it) => {
@@ -70,7 +70,7 @@ impl Outline {
         }
     }
 
-    /// Leaves out the points that are not marked, in their order, and parts that have none then.
+    /// Keeps only the marked points, in their order, and drops parts that become empty.
     pub fn keep(&mut self, is_kept: &[bool]) {
         let mut marks = is_kept.iter();
         for part in &mut self.parts {
@@ -79,13 +79,13 @@ impl Outline {
         self.parts.retain(|part| !part.points.is_empty());
     }
 
-    /// Of all parts.
+    /// Number of points of all parts.
     pub fn points(&self) -> usize {
         self.parts.iter().map(|part| part.points.len()).sum()
     }
 }
 
-/// What runs on the reference says so.
+/// Marks a run on the reference.
 fn on(name: &str, device: RunsOn) -> String {
     match device {
         RunsOn::Gpu => name.to_owned(),
@@ -104,7 +104,7 @@ fn swept(sweep: &Sweep) -> Vec<Part> {
     sweep.lines.iter().map(part).collect()
 }
 
-/// Runs in their order, by what each is there for.
+/// Runs in their order, grouped by purpose.
 fn tuned(tune: &Tune) -> Vec<Part> {
     let mut parts: Vec<Part> = Vec::new();
     for (why, twin) in tune.twins() {
