@@ -1,6 +1,7 @@
-//! `render`: a particle cache and a look to an image sequence. The cache is only read.
+//! `render`: turns a particle cache and a look into an image sequence. The cache is only read.
 //!
-//! Several processes may render one look of one cache into one folder: each frame is rendered by one of them.
+//! Several processes may render one look of one cache into one folder; each frame is then rendered
+//! by one of them.
 
 mod expected;
 mod folder;
@@ -59,102 +60,102 @@ pub use self::{
     whitewater::StreamError,
 };
 
-/// Between two looks at frames that other processes render.
+/// Interval between checks for frames that other processes are rendering.
 const POLL: Duration = Duration::from_millis(50);
 
-/// What to render, and where to.
+/// What to render, and where.
 #[derive(Clone, Debug)]
 pub struct Request {
-    /// Cache directory.
+    /// Directory of the cache.
     pub cache: PathBuf,
     /// Camera, light, shading, output.
     pub look: Look,
-    /// Where images go.
+    /// Output folder of the images.
     pub directory: PathBuf,
-    /// Frames wanted; all whose particles are cached where `None`.
+    /// Frames to render; all frames with particles if `None`.
     pub frames: Option<FrameRange>,
-    /// This process's share of them; all where `None`.
+    /// This process's share of the frames; all if `None`.
     pub chunk: Option<Chunk>,
-    /// What to render on.
+    /// Adapter and shaders to render with.
     pub gpu: Gpu,
-    /// Number that the first of the frames has in the names of its pictures, the others by their distance; the cache's own where
-    /// `None`.
+    /// Number that the first rendered frame gets in its file names; the others keep their distance
+    /// from it. The cache's own numbers if `None`.
     pub number_from: Option<u32>,
-    /// Whether frames that stand there already are made again, also those of another look or cache.
+    /// Whether to render frames again that exist already, even those of another look or cache.
     pub overwrite: bool,
-    /// Whether the other frames are rendered where one of the cache is damaged.
+    /// Whether to continue with other frames if one frame of the cache is damaged.
     pub keep_going: bool,
-    /// Whether passes are timed, which runs them one by one.
+    /// Whether to time passes, which runs them one by one.
     pub time_passes: bool,
 }
 
-/// What a render has to tell while it runs.
+/// Progress of a running render.
 #[derive(Clone, Debug)]
 pub enum Event {
     /// The device is open.
     Ready {
-        /// Adapter name.
+        /// Name of the adapter.
         device: String,
-        /// Pixels.
+        /// Width and height of the images, pixels.
         size: [u32; 2],
-        /// Frames wanted.
+        /// Number of frames to render.
         frames: usize,
-        /// Frames of the cache that are left out: their particles were not kept.
+        /// Number of the cache's frames that are left out because their particles were not kept.
         left_out: usize,
-        /// What of the look is allowed and hardly meant.
+        /// Warnings for legal but suspicious values of the look.
         warnings: Vec<String>,
     },
-    /// How far the drawing of a frame has come: before its first part, and behind each.
+    /// Progress of a frame's drawing: sent before the first part and after each part.
     Part {
-        /// The frame's number.
+        /// Number of the frame.
         frame: u32,
-        /// Parts of its picture.
+        /// The parts of its picture, and how many are done.
         part: Part,
     },
     /// A frame is on the disk.
     Frame {
-        /// Its number.
+        /// Number of the frame.
         frame: u32,
-        /// Wall clock; 0 for a frame that stood there with the same hashes.
+        /// Wall-clock time, seconds; 0 for a frame that existed already with the same hashes.
         seconds: f64,
-        /// Whether it stood there, or another process rendered it meanwhile.
+        /// Whether it existed already, or another process rendered it meanwhile.
         skipped: bool,
-        /// Of its pictures written now.
+        /// Bytes of its pictures written by this run.
         bytes: u64,
     },
-    /// A frame could not be rendered, and the others are.
+    /// A frame could not be rendered; the render continues.
     Failed {
-        /// Its number.
+        /// Number of the frame.
         frame: u32,
-        /// Why.
+        /// The error.
         error: Arc<RenderJobError>,
     },
-    /// All other frames are done, and these are being rendered by other processes.
+    /// All other frames are done, and other processes are rendering the remaining ones.
     Waiting {
-        /// How many.
+        /// Number of frames waited for.
         frames: usize,
     },
 }
 
-/// How a render ended.
+/// Result of a render.
 #[derive(Clone, Debug, Default)]
 pub struct Outcome {
-    /// Frames rendered now.
+    /// Number of frames rendered by this run.
     pub rendered: u32,
-    /// Frames that stood there, or that another process rendered meanwhile.
+    /// Number of frames that existed already, or that another process rendered meanwhile.
     pub skipped: u32,
     /// Frames that could not be rendered.
     pub failed: Vec<u32>,
     /// Whether a signal ended it.
     pub interrupted: bool,
-    /// Pass, seconds, runs, by name, of the frames rendered now; nothing unless that was asked for.
+    /// Times by pass name of the frames rendered by this run; empty unless requested.
     pub passes: PassTimes,
 }
 
 /// Why a render failed.
 #[derive(Debug, thiserror::Error)]
 pub enum RenderJobError {
-    /// A comparison of nothing is none that held.
+    /// Nothing was compared, which must not count as a success.
     #[error("nothing was compared: no water is seen in these frames")]
     NoWater,
     /// The cache.
@@ -163,10 +164,10 @@ pub enum RenderJobError {
     /// The scene in the cache.
     #[error("the cache's scene: {0}")]
     Scene(#[from] SceneError),
-    /// The solids of a scene that is planned for.
+    /// The solids of the scene to plan for.
     #[error(transparent)]
     Solid(#[from] SignedDistanceError),
-    /// What the look names.
+    /// The look, or something that it names.
     #[error(transparent)]
     Look(#[from] LookError),
     /// The device.
@@ -181,24 +182,24 @@ pub enum RenderJobError {
     /// The output folder.
     #[error(transparent)]
     Folder(#[from] FolderError),
-    /// A stream of whitewater is no water.
+    /// The given cache is a whitewater stream, not a bake.
     #[error("{} is a stream of whitewater: render the cache that it was made from, with a look that has [whitewater]", .0.display())]
     IsWhitewater(PathBuf),
-    /// The stream that the look draws.
+    /// The whitewater stream that the look draws.
     #[error(transparent)]
     Whitewater(#[from] StreamError),
-    /// The output would go into a cache.
+    /// The output would be written into a cache.
     #[error("{} is in the cache {}: choose another -o", directory.display(), cache.display())]
     IntoCache {
-        /// Where images were to go.
+        /// The output folder.
         directory: PathBuf,
-        /// This cache or another.
+        /// The cache that contains it.
         cache: PathBuf,
     },
 }
 
 impl RenderJobError {
-    /// Whether it is a fault of the frame that was read, so that others may do well.
+    /// Whether the fault is specific to the frame, so that other frames may still succeed.
     fn is_of_frame(&self) -> bool {
         matches!(
             self,
@@ -237,12 +238,15 @@ impl From<&RenderJobError> for Blame {
     }
 }
 
-/// Renders the frames that are wanted; `tell` hears of progress, and `stop` ends it after the current frame. Frames that
-/// another process renders into the same folder are left to it, and waited for at the end; those of one that was killed
-/// are rendered here.
+/// Renders the requested frames. `tell` receives progress events, and setting `stop` ends the
+/// render after the current frame.
+///
+/// Frames that another process is rendering into the same folder are left to it and waited for at
+/// the end; those of a process that was killed are rendered here.
 ///
 /// # Errors
-/// [`RenderJobError`]; a missing cache frame is one before anything is rendered, and so is a folder that cannot be shared.
+/// [`RenderJobError`]. Frames missing from the cache, and a folder that cannot be shared, are
+/// reported before anything is rendered.
 pub fn render(
     request: &Request,
     stop: &AtomicBool,
@@ -296,13 +300,13 @@ pub fn render(
     Ok(outcome)
 }
 
-/// What is asked for, found to be there.
+/// The resources that a request names, checked to exist.
 struct Asked {
     cache: CacheReader,
     whitewater: Option<Whitewater>,
-    /// This process's share.
+    /// Frames of this process's share.
     frames: Vec<u32>,
-    /// The first and the last of all shares' frames.
+    /// The first and the last frame of all shares.
     ends: Option<[u32; 2]>,
     left_out: usize,
     numbering: Numbering,
@@ -350,7 +354,8 @@ impl Asked {
     }
 }
 
-/// A renderer's fault; that of a panorama, of a material or of the method at its place in the look.
+/// Converts an error of the renderer; one caused by a panorama, a material or the method points to
+/// its line in the look.
 fn told(error: RenderError, look: &Look) -> RenderJobError {
     let fault = match &error {
         RenderError::Panorama(problem) => look.panorama_fault(problem),
@@ -361,7 +366,7 @@ fn told(error: RenderError, look: &Look) -> RenderJobError {
     fault.map_or_else(|| error.into(), RenderJobError::Look)
 }
 
-/// Takes this process's place in the output folder.
+/// Enters the output folder, registering this process there.
 fn enter(
     request: &Request,
     cache: &CacheReader,
@@ -373,7 +378,7 @@ fn enter(
     Ok(Folder::enter(&request.directory, &wanted)?)
 }
 
-/// What is to be done in the output folder; `of_frame` gives a frame's hash.
+/// What this process will do in the output folder; `of_frame` gives a frame's hash.
 fn wanted<'a>(
     request: &Request,
     cache: &CacheReader,
@@ -400,32 +405,33 @@ fn wanted<'a>(
     })
 }
 
-/// What became of a frame.
+/// What happened to a frame.
 enum Done {
-    /// Its pictures are to be written.
+    /// It was drawn, and its pictures are to be written.
     Drawn(Box<Drawn>),
     Stands,
-    /// Another process is at it.
+    /// Another process is rendering it.
     Elsewhere,
 }
 
-/// A render under way.
+/// A running render.
 struct Job<'a> {
     request: &'a Request,
     folder: Arc<Folder>,
-    /// The frame that was drawn last, while its pictures are encoded and written: meanwhile the next one is drawn.
+    /// The frame drawn last, whose pictures are being encoded and written while the next one is
+    /// drawn.
     writing: Option<Writing>,
     cache: CacheReader,
-    /// Of the stream that the look draws.
+    /// The whitewater stream that the look draws.
     whitewater: Option<Whitewater>,
     scene: Scene,
     context: Context,
     numbering: Numbering,
-    /// Frames about the last one that was drawn, so that each is read once in a row of them.
+    /// Frames around the one drawn last, so that consecutive frames are read only once.
     near: Near,
-    /// Of the frame before, where it can draw another.
+    /// The renderer of the frame before, if it can draw another frame.
     kept: Option<Renderer>,
-    /// What passes took so far.
+    /// Accumulated times of passes.
     times: BTreeMap<&'static str, PassTime>,
 }
 
@@ -518,7 +524,7 @@ impl Job<'_> {
         let Some(claim) = self.folder.claim(&number)? else {
             return Ok(Done::Elsewhere);
         };
-        // Another process may have come to its end with it between the two.
+        // Another process may have completed it before the claim.
         if stands() {
             return Ok(Done::Stands);
         }
@@ -557,7 +563,8 @@ impl Job<'_> {
         };
         let mut written = Ok(());
         let picture = renderer.render_parts(frame, &around.moment(&white), &mut |part| {
-            // The frame before is told of when it is there, and not when this one is drawn.
+            // Reports the previous frame as soon as it is on disk, not only after this frame is
+            // drawn.
             let is_there = self.writing.as_ref().is_some_and(Writing::is_finished);
             if is_there && written.is_ok() {
                 written = end_writing(&mut self.writing, outcome, tell);
@@ -570,8 +577,8 @@ impl Job<'_> {
             let total = self.times.entry(time.pass);
             total.and_modify(|total| total.add(&time)).or_insert(time);
         }
-        // Solids that move are drawn where they stand at the frame's time, not blurred over its shutter:
-        // a renderer draws its solids once.
+        // Moving solids are drawn in their pose at the frame's time without motion blur: a renderer
+        // draws its solids only once.
         let draws_plates = look.spec().wave_makers.is_some() && !self.scene.wave_makers.is_empty();
         let stands = self.scene.moving_solids.is_empty() && !draws_plates;
         self.kept = stands.then_some(renderer);

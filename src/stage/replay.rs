@@ -1,4 +1,5 @@
-//! A frame that broke a budget, computed again from the state before it: which pass first went wrong.
+//! Recomputes a frame that exceeded a budget from the state before it, to find the pass that first
+//! went wrong.
 
 use std::{fmt, path::Path};
 
@@ -43,21 +44,21 @@ use super::{
 /// Where in a frame something first went wrong.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Place {
-    /// Substep of the frame, from 1.
+    /// Number of the substep in the frame, from 1.
     pub substep: u32,
-    /// Pass.
+    /// Name of the pass.
     pub pass: &'static str,
-    /// Buffer that it wrote.
+    /// Buffer that the pass wrote.
     pub buffer: String,
 }
 
-/// A frame that breaks a budget each time that it is computed.
+/// A frame that exceeds a budget each time it is computed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Failure {
-    /// What was broken.
+    /// The exceeded budget.
     pub breach: Breach,
-    /// Where first; `None` on the CPU, where passes are not traced, and where the state that the frame began with is
-    /// at fault.
+    /// Where it first happened; `None` on the CPU, where passes are not traced, and if the state
+    /// that the frame began with is at fault.
     pub place: Option<Place>,
 }
 
@@ -65,7 +66,7 @@ impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}; ", self.breach)?;
         match &self.place {
-            // No pass lets water in.
+            // No pass adds water.
             None if self.breach.watched == Watched::Count => write!(f, "emitters brought them"),
             Some(Place {
                 substep,
@@ -80,11 +81,11 @@ impl fmt::Display for Failure {
     }
 }
 
-/// Computes the frame after `last`, of which `state` is the end, and finds out what goes wrong in it. `None` where
-/// nothing does.
+/// Recomputes the frame after `last`, which ended with `state`, and finds out what goes wrong in
+/// it. `None` if nothing does.
 ///
 /// # Errors
-/// The device; a state that is not the scene's.
+/// A device error; a state that does not belong to the scene.
 pub fn replay(
     opened: &Opened,
     scene: &Scene,
@@ -109,7 +110,7 @@ pub fn replay(
         }));
     }
     let made = drive.report().cloned();
-    // Two solvers at once may be more than the device holds.
+    // Two solvers at once may exceed the device's memory.
     drop(drive);
     let Opened::Gpu(context) = opened else {
         return Ok(Some(Failure {
@@ -137,16 +138,17 @@ pub fn replay(
     Ok(Some(Failure { breach, place }))
 }
 
-/// Looks at what each dispatch wrote: for what is not finite, and for the watched quantity over its limit.
+/// Examines what each dispatch wrote: for values that are not finite, and for the watched quantity
+/// over its limit.
 struct Finder<'a> {
     scene: &'a Scene,
     state: &'a Particles,
     breach: &'a Breach,
-    /// What the frame reported, where it came to its end.
+    /// Report of the frame, if it was completed.
     made: Option<StepReport>,
     energy: f64,
     start_volume: Option<f64>,
-    /// Whether the substep has come to the density correction: its residual has no budget.
+    /// Whether the substep has reached the density correction, whose residual has no budget.
     is_correcting: bool,
     place: Option<Place>,
 }
@@ -161,12 +163,12 @@ impl Finder<'_> {
         mut solver: impl TraceFrame<Error = SolveError>,
     ) -> Result<(), SolveError> {
         solver.load(last, self.state)?;
-        // PBF counts over a frame, so that the substep may not be known.
+        // PBF counts over a frame, so the substep may be unknown.
         let from = self.breach.substep.unwrap_or(1);
         let span = Span::From(from);
         let traced = solver.trace_frame(span, &mut |begun, traced| self.observe(begun, traced));
         match traced {
-            // Found, or the solver came upon it itself.
+            // The cause was found, or the solver itself reported it.
             Ok(_) | Err(SolveError::Numbers(_)) => Ok(()),
             Err(error) => Err(error),
         }
@@ -193,11 +195,11 @@ impl Finder<'_> {
             pass: traced.pass,
             buffer,
         });
-        // Ends the trace.
+        // The error ends the trace.
         Err(self.breach.clone().into())
     }
 
-    /// The buffer, of those that the dispatch wrote, whose content is over the watched limit.
+    /// The buffer, among those the dispatch wrote, whose content exceeds the watched limit.
     fn first_over(&self, traced: &Traced<'_>) -> Result<Option<String>, SolveError> {
         let limit = self.breach.limit;
         let n = self.state.len();
@@ -222,7 +224,7 @@ impl Finder<'_> {
             {
                 let count = match self.scene.solver.method {
                     Method::Pbf => n,
-                    // Beyond the water of this substep stands that of others.
+                    // The buffer continues beyond the water of this substep with stale values.
                     Method::Flip => (traced.one(PARAMS)?.wet_cells + CELLS) as usize,
                 };
                 let mut density = traced.read(DENSITY, count)?;
@@ -248,7 +250,7 @@ impl Finder<'_> {
             Watched::Divergence if traced.pass == "pressure/measure_divergence" => {
                 let divergence = f64::from(traced.pressure_stats()?.divergence_after);
                 let params = traced.one(PARAMS)?;
-                // The device's step is the rounded one.
+                // The device uses the rounded time step.
                 let change = divergence * f64::from(params.time_step) * (1.0 + U);
                 Ok((change > limit).then(|| pressure::buffers::STATS.name().to_owned()))
             }
@@ -280,7 +282,7 @@ impl Finder<'_> {
         }
     }
 
-    /// Past which the scene's `max_substeps` do not do, m/s.
+    /// Speed above which the scene's `max_substeps` do not suffice, m/s.
     fn most_speed(&self) -> f64 {
         let solver = &self.scene.solver;
         let way = match solver.method {
@@ -303,14 +305,15 @@ impl Finder<'_> {
         Ok(None)
     }
 
-    /// World positions as they stand, metres.
+    /// Current world positions, metres.
     fn positions(&self, traced: &Traced<'_>) -> Result<Vec<[f32; 3]>, SolveError> {
         let local = traced.read(POSITION, self.state.len())?;
         let world = |x: &[f32; 3]| (self.scene.domain.min + vector(x)).as_vec3().to_array();
         Ok(local.iter().map(world).collect())
     }
 
-    /// Kinetic and potential energy of positions and velocities as they stand, joule: their order does not count.
+    /// Kinetic and potential energy of the current positions and velocities, J; their order does
+    /// not matter.
     fn energy_of(&self, traced: &Traced<'_>) -> Result<f64, SolveError> {
         let velocity = traced.read(VELOCITY, self.state.len())?;
         let state = Particles {
@@ -323,7 +326,8 @@ impl Finder<'_> {
     }
 }
 
-/// Whether a pass leaves the densities that a frame's report is of: in an iteration those of PBF are not yet what it leaves.
+/// Whether a pass leaves the densities that a frame's report describes. Those within a PBF
+/// iteration are intermediate.
 fn is_measured(pass: &str) -> bool {
     matches!(pass, "pbf/measure_density" | "flip/find_water")
 }
@@ -332,10 +336,10 @@ fn vector(v: &[f32; 3]) -> DVec3 {
     Vec3::from_array(*v).as_dvec3()
 }
 
-/// Writes `failed/` into the cache that a failed bake left, and says where in the frame it went wrong.
+/// Writes `failed/` into the cache of a failed bake, and says where in the frame it went wrong.
 ///
 /// # Errors
-/// The cache, or the device.
+/// An error of the cache.
 pub(super) fn keep(
     directory: &Path,
     opened: &Opened,
@@ -346,7 +350,7 @@ pub(super) fn keep(
     let cached = CacheReader::open(directory)?;
     let last = cached.last_frame();
     let state = cached.read(last)?;
-    // A device that fails now has its say in the frame's own breach all the same.
+    // If the device fails now, the frame's own breach is still reported.
     let failure = match replay(opened, scene, start, last, &state) {
         Ok(Some(failure)) => failure,
         Ok(None) | Err(_) => Failure {
@@ -386,13 +390,13 @@ pub(super) fn keep(
     Ok(failure)
 }
 
-/// Why a frame could not be computed again.
+/// Why a frame could not be recomputed.
 #[derive(Debug, thiserror::Error)]
 pub enum ReplayError {
-    /// The folder.
+    /// The folder, or its cache.
     #[error(transparent)]
     Cache(#[from] CacheError),
-    /// Its scene.
+    /// The scene in it.
     #[error(transparent)]
     Scene(#[from] SceneError),
     /// The scene's solids.
@@ -418,24 +422,25 @@ impl From<&ReplayError> for Blame {
     }
 }
 
-/// Whether `directory` is what a failed bake left in its cache.
+/// Whether `directory` is the `failed/` folder of a failed bake.
 pub fn is_failed(directory: &Path) -> bool {
     failed::is_failed(directory)
 }
 
-/// A frame computed again from what a failed bake left.
+/// Result of recomputing the frame of a failed bake.
 #[derive(Debug)]
 pub struct Replayed {
-    /// The frame.
+    /// Number of the frame.
     pub frame: u32,
-    /// What went wrong again; `None` where it went well.
+    /// What went wrong again; `None` if nothing did.
     pub failure: Option<Failure>,
 }
 
-/// Computes the frame of `directory`, a cache's `failed/`, again, on the kind of device that it failed on.
+/// Recomputes the frame of `directory`, a cache's `failed/` folder, on the kind of device that it
+/// failed on.
 ///
 /// # Errors
-/// [`ReplayError`]; a breach is none, but in the result.
+/// [`ReplayError`]. A breach is not an error; it is part of the result.
 pub fn replay_failed(directory: &Path, gpu: &Gpu) -> Result<Replayed, ReplayError> {
     let Failed {
         scene_toml,
@@ -443,7 +448,7 @@ pub fn replay_failed(directory: &Path, gpu: &Gpu) -> Result<Replayed, ReplayErro
         last_frame,
         report,
     } = failed::read(directory)?;
-    // Mesh files stand in the cache, whose folder this one is in.
+    // The mesh files are in the cache that contains this folder.
     let cached = CacheReader::open(&directory.join(".."))?;
     let file = directory.join("scene.toml");
     let scene = Scene::recorded(&scene_toml, &file, cached.dir())?;

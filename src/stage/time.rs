@@ -1,4 +1,4 @@
-//! How long frames of a scene take: its first ones, computed and not kept.
+//! Measures how long a scene's frames take, by computing its first ones without keeping them.
 
 use swell_domain::{signed_distance::SignedDistanceError, statistics::median};
 use swell_gpu::adapter::GpuError;
@@ -13,18 +13,19 @@ use super::{
     prepare::Start,
 };
 
-/// What frames took.
+/// Measured times of frames.
 #[derive(Clone, Debug)]
 pub struct Timed {
-    /// What they ran on.
+    /// Device that they ran on.
     pub device: Identity,
-    /// How many; one more ran before them.
+    /// Number of measured frames; one more ran before them as a warm-up.
     pub frames: u32,
-    /// Wall clock of one, seconds: the least, the median, the greatest.
+    /// Wall-clock seconds of a frame: minimum, median, maximum.
     pub seconds: [f64; 3],
-    /// Of each, on the mean.
+    /// Mean number of substeps per frame.
     pub substeps: f64,
-    /// By what passes are there for, of the same frames computed once more with each pass timed: passes then run one by one.
+    /// Shares by purpose, from a second run of the same frames with each pass timed, which runs
+    /// passes one by one.
     pub shares: Vec<Share>,
 }
 
@@ -52,10 +53,11 @@ impl From<&TimeError> for Blame {
     }
 }
 
-/// Computes so many frames of a scene after its first, which warms the device up, and keeps nothing.
+/// Computes `frames` frames of a scene after its first, which warms up the device, and keeps
+/// nothing.
 ///
 /// # Errors
-/// [`TimeError`]; of frames that break a budget that as well.
+/// [`TimeError`], also for frames with invalid numbers.
 pub fn time(scene: &Scene, adapter: Option<&str>, frames: u32) -> Result<Timed, TimeError> {
     let start = Start::of(scene)?;
     let gpu = Gpu::from(adapter.map(str::to_owned));

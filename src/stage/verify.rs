@@ -1,14 +1,14 @@
-//! Every checksum of a cache.
+//! Verifies every checksum of a cache.
 
 use std::path::Path;
 
 pub use swell_cache::{CacheError, Problem, VerifyReport};
 
-/// Looks at every checksum of the cache in `dir`. Damage stands in the report; `into_result` makes an
-/// error of it.
+/// Checks every checksum of the cache in `dir`. Damage is listed in the report; `into_result` turns
+/// it into an error.
 ///
 /// # Errors
-/// [`CacheError`] where `dir` holds no cache that this program reads, or cannot be read at all.
+/// [`CacheError`] if `dir` holds no cache that this program reads, or cannot be read at all.
 pub fn verify(dir: &Path) -> Result<VerifyReport, CacheError> {
     swell_cache::survey(dir)
 }

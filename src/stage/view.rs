@@ -1,4 +1,5 @@
-//! `view`: what is there, to look at: a contact sheet, a movie, a page that plays the frames. Nothing that is looked at is changed.
+//! `view`: shows pictures, a cache or a study as a contact sheet, a movie, or a page that plays the
+//! frames. The subjects are only read.
 
 mod curves;
 mod error;
@@ -31,68 +32,71 @@ pub use self::{
 };
 pub use swell_study::points::Aspect;
 
-/// What to look at, and by what.
+/// What to view, and in which form.
 #[derive(Clone, Debug)]
 pub struct Request {
-    /// A folder of pictures, a cache or the folder of a study; or two of the first two that are held against each other.
+    /// A folder of pictures, a cache, or the folder of a study; or two to compare, each a folder of
+    /// pictures or a cache.
     pub subjects: Vec<PathBuf>,
-    /// Where sheet and page go; `views/NAME` where `None`.
+    /// Output folder of sheet and page; `views/NAME` if `None`.
     pub directory: Option<PathBuf>,
-    /// Frames to look at; all where `None`.
+    /// Frames to view; all if `None`.
     pub frames: Option<FrameRange>,
-    /// A contact sheet of at most so many frames; `None` for none.
+    /// Most frames of a contact sheet; `None` for no sheet.
     pub sheet: Option<usize>,
-    /// A movie: APNG, MP4 or WebM by its ending.
+    /// Movie file to write: APNG, MP4 or WebM depending on its extension.
     pub movie: Option<PathBuf>,
-    /// Whether a page is made.
+    /// Whether to make a page.
     pub player: bool,
-    /// Where the page has its pictures.
+    /// Where the page stores its pictures.
     pub placing: Placing,
-    /// Pixels that pictures of page and movie are at most wide; where `None`, those of a page [`PAGE_WIDTH`], those of a movie as they are.
+    /// Greatest width of the pictures of page and movie, pixels. If `None`, [`PAGE_WIDTH`] for a
+    /// page and the full width for a movie.
     pub width: Option<usize>,
-    /// Frames a second; where `None`, those of the cache or the pictures, else [`RATE`].
+    /// Frames per second; if `None`, those of the cache or the pictures, else [`RATE`].
     pub frames_per_second: Option<f64>,
-    /// The look through whose view EXR files are shown.
+    /// The look whose view transform is applied to EXR files.
     pub look: Option<Look>,
-    /// From where particles of a cache are looked at.
+    /// Viewing direction for the particles of a cache.
     pub aspect: Aspect,
-    /// Cache whose probes and ledger are drawn below the pictures; a cache that is looked at has its own.
+    /// Cache whose probes and ledger are plotted below the pictures; a viewed cache provides its
+    /// own.
     pub curves: Option<PathBuf>,
-    /// The program that encodes MP4 and WebM.
+    /// Program that encodes MP4 and WebM.
     pub ffmpeg: String,
 }
 
-/// Frames of a contact sheet at most, unless more are asked for.
+/// Default for the most frames of a contact sheet.
 pub const SHEET: usize = 60;
-/// Pixels that pictures of a page are at most wide: as wide as a window is.
+/// Default for the greatest width of a page's pictures, pixels: about that of a window.
 pub const PAGE_WIDTH: usize = 1280;
-/// Frames a second of pictures that do not say it.
+/// Frames per second of pictures that do not specify them.
 pub const RATE: f64 = 24.0;
 
-/// What a view has to tell while it goes on.
+/// Progress of a running view.
 #[derive(Clone, Debug)]
 pub enum Event {
-    /// What is looked at is open.
+    /// The subjects are open.
     Ready {
-        /// Frames.
+        /// Number of frames.
         frames: usize,
-        /// Pixels of each.
+        /// Columns and rows of each.
         size: [usize; 2],
     },
-    /// What a user may want to know.
+    /// Information for the user.
     Note(String),
-    /// What a user has to know.
+    /// Warning for the user.
     Warning(String),
-    /// A frame's pictures are read.
+    /// A frame's pictures were read.
     Frame(String),
 }
 
-/// What there is to look at now.
+/// Result of a view.
 #[derive(Clone, Debug, Default)]
 pub struct Outcome {
-    /// What each is, the file, and its bytes.
+    /// Kind, path and bytes of each file made.
     pub files: Vec<(&'static str, PathBuf, u64)>,
-    /// What a browser would show.
+    /// The file to open in a browser.
     pub page: Option<PathBuf>,
     /// Whether a signal ended it; then nothing was made.
     pub interrupted: bool,
@@ -101,7 +105,7 @@ pub struct Outcome {
 /// Makes what a request asks for.
 ///
 /// # Errors
-/// [`ViewError`]; then nothing is left half made.
+/// [`ViewError`]; then no incomplete file is left.
 pub fn view(
     request: &Request,
     stop: &AtomicBool,
@@ -124,7 +128,7 @@ pub fn view(
     reel.run(stop, tell)
 }
 
-/// Caches whose curves are drawn, with their names: the one that is asked for, or those that are looked at.
+/// Caches whose curves are drawn, with their names: the requested one, or those that are viewed.
 fn caches(request: &Request, strips: &[Strip]) -> Vec<(String, PathBuf)> {
     if let Some(cache) = &request.curves {
         return vec![(String::new(), cache.clone())];
@@ -136,7 +140,7 @@ fn caches(request: &Request, strips: &[Strip]) -> Vec<(String, PathBuf)> {
         .collect()
 }
 
-/// What is looked at.
+/// Opens the subjects.
 fn open(request: &Request) -> Result<Vec<Strip>, ViewError> {
     let view = request.look.as_ref().map(|look| &look.spec().view);
     let open = |path: &PathBuf| {
@@ -182,7 +186,7 @@ fn open(request: &Request) -> Result<Vec<Strip>, ViewError> {
     }
     if let [a, b] = &strips[..] {
         let [wide, high] = [a.size[0] * b.size[1], a.size[1] * b.size[0]];
-        // The same shape, but for the rounding of a side to a whole pixel.
+        // The same shape up to the rounding of a side to whole pixels.
         if wide.abs_diff(high) > a.size[0].max(b.size[0]) {
             return Err(ViewError::Asked(format!(
                 "{} is {} × {} and {} is {} × {}: pictures that are held against each other have one shape",
@@ -198,7 +202,7 @@ fn open(request: &Request) -> Result<Vec<Strip>, ViewError> {
     Ok(strips)
 }
 
-/// Frames to look at: those that are asked for, or those that all have.
+/// Frames to view: the requested ones, or those that all subjects have.
 fn chosen(
     strips: &[Strip],
     frames: Option<&FrameRange>,
@@ -235,7 +239,7 @@ fn chosen(
     Ok(labels)
 }
 
-/// Nothing goes into a cache.
+/// Refuses an output inside a cache.
 fn check_place(file: &Path) -> Result<(), ViewError> {
     match swell_cache::around(file) {
         None => Ok(()),
@@ -246,7 +250,7 @@ fn check_place(file: &Path) -> Result<(), ViewError> {
     }
 }
 
-/// A cache that has to be there.
+/// Opens a cache that must exist.
 fn reader(path: &Path) -> Result<CacheReader, ViewError> {
     match path.exists() {
         true => Ok(CacheReader::open(path)?),

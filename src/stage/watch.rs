@@ -1,4 +1,4 @@
-//! What a bake is held to at each frame's end, the same for every solver.
+//! Checks a bake's budgets at the end of each frame, the same for every solver.
 
 use glam::Vec3;
 
@@ -10,22 +10,23 @@ use swell_domain::{
 };
 use swell_scene::{Scene, budget::Before};
 
-/// Roundings of a coordinate by which a particle may lie beyond a face of the domain.
+/// Tolerance for particles beyond a face of the domain, in rounding errors of a coordinate.
 const ROUNDINGS: f64 = 4.0;
 
-/// What frames are held against.
+/// The state that the next frame is checked against.
 pub(super) struct Watch<'a> {
     scene: &'a Scene,
-    /// Of the frame that comes next.
+    /// Number of the next frame.
     frame: u32,
-    /// Of the state before it.
+    /// Energy, speed and volume of the state before it.
     before: Before,
-    /// Of all frames.
+    /// Ids of the particles, ascending.
     id: Vec<u32>,
 }
 
 impl<'a> Watch<'a> {
-    /// Before the frame after `last`, of which `state` is the end; `start` is that of the bake.
+    /// Prepares for the frame after `last`, which ended with `state`; `start` is the start of the
+    /// bake.
     pub(super) fn new(scene: &'a Scene, start: &Particles, last: u32, state: &Particles) -> Self {
         let mut watch = Self {
             scene,
@@ -40,7 +41,8 @@ impl<'a> Watch<'a> {
         watch
     }
 
-    /// Before the next frame, which begins with `state`: what entered and left is in its energy, its volume and its ids.
+    /// Prepares for the next frame, which begins with `state`: particles that entered or left
+    /// change its energy, volume and ids.
     pub(super) fn take_over(&mut self, state: &Particles) {
         let scene = self.scene;
         let report = scene.report(state, [].into_iter());
@@ -53,20 +55,20 @@ impl<'a> Watch<'a> {
         self.id.clone_from(&state.id);
     }
 
-    /// Joule, of the state before the frame that comes next.
+    /// Energy of the state before the next frame, J.
     pub(super) fn energy(&self) -> f64 {
         self.before.energy
     }
 
-    /// m³, where a budget watches it.
+    /// Volume at the start, m³, if a budget watches it.
     pub(super) fn start_volume(&self) -> Option<f64> {
         self.before.start_volume
     }
 
-    /// Looks at the frame that came next, and notes in its report what was measured for this.
+    /// Checks the next frame, and adds to its report what was measured for this.
     ///
     /// # Errors
-    /// The first budget that it breaks.
+    /// The first budget that it exceeds.
     pub(super) fn look(
         &mut self,
         particles: &Particles,
@@ -86,8 +88,8 @@ impl<'a> Watch<'a> {
         Ok(())
     }
 
-    /// Neither solver takes particles out, and both clamp them to the domain: the ledger of particles closes at
-    /// every frame, and no budget loosens that.
+    /// Neither solver removes particles, and both clamp them to the domain. The particle count must
+    /// therefore balance at every frame, and no budget can relax that.
     fn count(&self, particles: &Particles) -> Result<(), Breach> {
         let domain = &self.scene.domain;
         let farthest = domain.min.abs().max(domain.max.abs()).max_element();
@@ -111,7 +113,7 @@ impl<'a> Watch<'a> {
     }
 }
 
-/// As a probe has it.
+/// Volume of the water as a probe measures it, m³.
 pub(super) fn volume_of(scene: &Scene, particles: &Particles) -> f64 {
     volume(particles, scene.particle_spacing(), &scene.domain)
 }

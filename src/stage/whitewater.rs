@@ -1,7 +1,8 @@
-//! `whitewater`: spray, foam and bubbles from a finished bake, as a stream beside it. The bake is only read.
+//! `whitewater`: makes spray, foam and bubbles from a finished bake, as a stream beside it. The
+//! bake is only read.
 //!
-//! A stream is a cache of its own in `CACHE/whitewater/NAME`: its frames are checkpoints, so it is resumable, and the same bake,
-//! settings and adapter give the same bytes.
+//! A stream is a cache of its own in `CACHE/whitewater/NAME`. Its frames are checkpoints, so it can
+//! be resumed, and the same bake, settings and adapter give the same bytes.
 
 mod checked;
 mod engine;
@@ -53,92 +54,96 @@ pub use self::{
 
 /// Folder of the streams in a cache.
 pub(super) const FOLDER: &str = "whitewater";
-/// The settings that a stream was made with, all of them, among its assets.
+/// Name of the asset with the complete settings of a stream.
 const SETTINGS: &str = "whitewater.toml";
 /// What to make.
 #[derive(Clone, Debug)]
 pub struct Request {
-    /// Cache of a bake.
+    /// Directory of the bake's cache.
     pub cache: PathBuf,
     /// Name of the stream.
     pub name: String,
-    /// Settings; what they leave open the shot decides.
+    /// Settings; the shot determines those that are left open.
     pub settings: WhitewaterSettings,
-    /// Last frame wanted; the bake's last where `None`.
+    /// Last frame to make; the bake's last if `None`.
     pub last: Option<u32>,
-    /// Whether a stream of this name that was made otherwise is removed first.
+    /// Whether to remove an existing stream of this name that was made differently.
     pub overwrite: bool,
-    /// What to compute on.
+    /// Device to compute on.
     pub device: Device,
-    /// Whether passes are timed, which runs them one by one.
+    /// Whether to time passes, which runs them one by one.
     pub time_passes: bool,
 }
 
-/// What a job has to tell while it runs.
+/// Progress of a running job.
 #[derive(Clone, Debug)]
 pub enum Event {
-    /// How far the thresholds are calibrated: before the first frame that they are calibrated on, and behind each.
+    /// Progress of the calibration of thresholds: sent before the first frame and after each.
     Calibrated {
-        /// Frames looked at.
+        /// Number of frames evaluated.
         done: usize,
-        /// Of so many.
+        /// Number of frames to evaluate.
         count: usize,
     },
-    /// The device is open, and the thresholds stand.
+    /// The device is open, and the thresholds are known.
     Ready {
         /// Adapter and driver, or the f64 reference.
         device: Identity,
-        /// Water particles.
+        /// Number of water particles.
         water: usize,
-        /// Where the stream goes.
+        /// Directory of the stream.
         directory: PathBuf,
-        /// Thresholds.
+        /// The thresholds in use.
         thresholds: Thresholds,
-        /// How many frames they were calibrated on now; `None` where the settings or an earlier run say them.
+        /// Number of frames they were calibrated on by this run; `None` if the settings or an
+        /// earlier run provide them.
         calibrated_on: Option<usize>,
         /// First frame that will be computed.
         first: u32,
-        /// Last one.
+        /// Last frame that will be computed.
         last: u32,
     },
     /// A frame was computed.
     Frame {
-        /// Its number.
+        /// Number of the frame.
         frame: u32,
-        /// Spray, foam, bubbles.
+        /// Number of spray, foam and bubble particles.
         census: [usize; 3],
-        /// New ones.
+        /// Number of new particles.
         born: usize,
-        /// Wall clock for it.
+        /// Wall-clock time it took, seconds.
         seconds: f64,
     },
-    /// There will be more particles than the settings allow, if they go on growing as they did; told once at most.
+    /// If growth continues, there will be more particles than the settings allow. Sent at most
+    /// once.
     Crowding(Crowding),
-    /// The frames computed now are on the disk; also told where the next one failed.
+    /// The frames computed by this run are on the disk. Also sent before the error if a later frame
+    /// failed.
     Written {
-        /// Bytes of them.
+        /// Bytes written by this run.
         bytes: u64,
     },
 }
 
-/// How a job ended.
+/// Result of a job.
 #[derive(Clone, Debug)]
 pub struct Outcome {
     /// Last frame in the stream.
     pub last_frame: u32,
-    /// Frames computed now.
+    /// Number of frames computed by this run.
     pub frames: u32,
-    /// Bytes of frames written now.
+    /// Bytes of frames written by this run.
     pub bytes: u64,
-    /// Where the stream is.
+    /// Directory of the stream.
     pub directory: PathBuf,
     /// Whether a signal ended it.
     pub interrupted: bool,
-    /// Pass, seconds, runs, by name; nothing unless that was asked for.
+    /// Times by pass name; empty unless requested.
     pub passes: PassTimes,
 }
 
-/// Whether a stream's frame was made from the frame of this number that stands in `cache`; the first is always empty.
+/// Whether a stream's frame was made from the frame of this number in `cache`; the first frame is
+/// always empty.
 pub fn is_of(frame: &Entry, cache: &CacheReader) -> bool {
     let now = cache.entry(frame.frame).map(|entry| &*entry.chain).ok();
     frame.frame == cache.first_frame() || frame.report[WATER].as_str() == now
@@ -149,11 +154,11 @@ pub fn directory(cache: &Path, name: &str) -> PathBuf {
     cache.join(FOLDER).join(name)
 }
 
-/// Makes a stream, or goes on with the one that stands there; `tell` hears of progress, and `stop` ends it after the current
-/// frame.
+/// Makes a stream, or resumes an existing one. `tell` receives progress events, and setting `stop`
+/// ends the job after the current frame.
 ///
 /// # Errors
-/// [`WhitewaterError`]; frames that were finished before are in the stream.
+/// [`WhitewaterError`]; the frames that were completed before are in the stream.
 pub fn whitewater(
     request: &Request,
     stop: &AtomicBool,
@@ -198,7 +203,7 @@ pub fn whitewater(
     let mut stream = match standing {
         Some(_) => Growing::resume(&directory, &manifest, &cache)?,
         None => {
-            // Only now: what calibration was stopped for stands as it was.
+            // Only now: if calibration is stopped, the old stream stays intact.
             remove(&directory)?;
             Growing::create(&directory, manifest, &cache, &settings)?
         }
@@ -239,7 +244,7 @@ pub fn whitewater(
                 }
             }
             Err(error) => {
-                // What was computed before is kept.
+                // What was computed before a failure is kept.
                 let bytes = stream.writer.finish()?.bytes;
                 tell(Event::Written { bytes });
                 return Err(error);
@@ -263,7 +268,7 @@ pub fn whitewater(
     })
 }
 
-/// The bake, and the last frame that is asked for.
+/// Opens the bake, and determines the last frame to make.
 fn asked(request: &Request) -> Result<(CacheReader, u32), WhitewaterError> {
     let cache = CacheReader::open(&request.cache)?;
     if cache.manifest().is_whitewater() {
@@ -280,7 +285,7 @@ fn asked(request: &Request) -> Result<(CacheReader, u32), WhitewaterError> {
     Ok((cache, last))
 }
 
-/// A frame of a stream from the one before.
+/// Computes a frame of a stream from the one before.
 struct Step<'a> {
     settings: &'a Settings,
     scene: &'a Scene,
@@ -288,7 +293,7 @@ struct Step<'a> {
 }
 
 impl Step<'_> {
-    /// How many were born.
+    /// Runs the step and returns the number of new particles.
     fn run(
         &self,
         stream: &mut Growing,
@@ -350,12 +355,12 @@ impl Step<'_> {
     }
 }
 
-/// In a frame's report: the id that the next birth gets.
+/// Key of a frame's report: the id that the next new particle gets.
 const NEXT_ID: &str = "next_id";
-/// In a frame's report: the chained hash of the bake's frame.
+/// Key of a frame's report: the chained hash of the bake's frame.
 const WATER: &str = "water";
 
-/// The stream as it is written.
+/// A stream being written.
 struct Growing {
     writer: CacheWriter,
     clock: Clock,
@@ -374,7 +379,7 @@ impl Growing {
             name: SETTINGS.to_owned(),
             bytes: written_out(settings).into_bytes(),
         }];
-        // The scene names its own, wherever the stream is moved to.
+        // The scene names its own assets, wherever the stream is moved.
         for name in cache.manifest().asset_names() {
             assets.push(Asset {
                 name: name.to_owned(),
@@ -435,7 +440,8 @@ impl Growing {
     }
 }
 
-/// The stream that stands there, made as this one would be; `None` where there is none, or one that is to be overwritten.
+/// The existing stream, if it was made with the same settings; `None` if there is none or it is to
+/// be overwritten.
 fn standing(
     request: &Request,
     directory: &Path,
@@ -466,20 +472,20 @@ fn remove(directory: &Path) -> Result<(), WhitewaterError> {
     })
 }
 
-/// How a stream was made, where it is not the one of this hash.
+/// How a stream was made, if its hash differs from `hash`.
 fn other(stream: &CacheReader, hash: &str) -> Option<&'static str> {
     let is_other = stream.manifest().scene_hash != hash;
     is_other.then_some("with other settings, or from another bake")
 }
 
-/// Of all that a stream's bytes depend on but the device: settings and bake.
+/// Hash of everything except the device that decides a stream's bytes: settings and bake.
 fn hash(cache: &CacheReader, request: &Request) -> Result<String, CacheError> {
     let first = &cache.entry(cache.first_frame())?.chain;
     let hash = blake3::hash(format!("{} {first}", request.settings.hash()).as_bytes());
     Ok(hash.to_hex().to_string())
 }
 
-/// Of the stream: the bake's own, but for what was made and by what.
+/// The manifest of the stream: that of the bake with the fields that differ.
 fn manifest(
     cache: &CacheReader,
     request: &Request,

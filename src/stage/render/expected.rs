@@ -1,4 +1,4 @@
-//! `render --dry-run`: what a render would make, without a device, and with nothing written.
+//! `render --dry-run`: predicts a render without a device and without writing anything.
 
 use std::fs;
 
@@ -9,19 +9,19 @@ use super::{
     wanted,
 };
 
-/// What a render would make.
+/// Prediction of a render.
 #[derive(Clone, Debug, Default)]
 pub struct Expected {
     /// Frames of this process's share.
     pub frames: Vec<u32>,
-    /// Those of them whose pictures stand there.
+    /// Those of them whose pictures exist.
     pub standing: Vec<u32>,
-    /// Bytes that the pictures of one frame take, as those that stand there do on the mean; `None` where none does.
+    /// Bytes of the pictures of one frame: the mean over existing frames; `None` if none exist.
     pub frame_bytes: Option<u64>,
 }
 
 impl Expected {
-    /// Bytes of the pictures that are to be made.
+    /// Predicted bytes of the pictures to be made; `None` if unknown.
     pub fn bytes(&self) -> Option<u64> {
         let made = self.frames.len() - self.standing.len();
         match made {
@@ -31,7 +31,7 @@ impl Expected {
     }
 }
 
-/// Looks at what stands there, as a render would, and renders nothing.
+/// Examines existing pictures as a render would; renders nothing.
 ///
 /// # Errors
 /// Those of [`render`](super::render) that need no device.

@@ -1,16 +1,16 @@
-//! The folder that pictures go to: whose pictures it holds, and which processes are at work in it.
+//! The output folder of pictures: whose pictures it holds, and which processes are working in it.
 //!
-//! `render.json` says whose pictures they are, and stays. It is locked for the moments in which a process comes or goes.
-//! While processes are at work there is a folder `.swell/`:
+//! `render.json` names the owner of the pictures, and stays. It is locked briefly while a process
+//! enters or leaves. While processes are working, there is a folder `.swell/`:
 //!
 //! ```text
-//! work             locked by each process at work: shared, or alone with --overwrite
+//! work             locked by each working process: shared, or exclusively with --overwrite
 //! small.0001.lock  locked by the process that renders that frame
-//! small.0001.png   a picture until it is whole
+//! small.0001.png   draft of a picture until it is complete
 //! ```
 //!
-//! A lock dies with its process, so the frame of a process that was killed is free again. The last process to leave
-//! removes `.swell/`; after a kill the next one to come does.
+//! A lock ends with its process, so the frame of a killed process becomes free again. The last
+//! process to leave removes `.swell/`; after a kill the next one to enter does.
 
 use std::{
     collections::BTreeSet,
@@ -27,11 +27,11 @@ use crate::{
 };
 use swell_render::{Attributes, image::read_header};
 
-/// Whose pictures they are; its lock is held while a process comes or goes.
+/// Record of the pictures' owner; locked while a process enters or leaves.
 const RECORD: &str = "render.json";
-/// Folder of what dies with the processes.
+/// Folder of files that last only as long as the processes.
 const ROOM: &str = ".swell";
-/// Locked while a process is at work.
+/// File that is locked while a process is working.
 const WORK: &str = "work";
 
 /// What all pictures of a folder have in common.
@@ -40,7 +40,7 @@ const WORK: &str = "work";
 pub(super) struct Owner {
     /// Program and version.
     pub(super) software: String,
-    /// Shot of the cache.
+    /// Shot name of the cache.
     pub(super) shot: String,
     /// Hash of its physics.
     pub(super) scene_hash: String,
@@ -48,13 +48,13 @@ pub(super) struct Owner {
     pub(super) cache: String,
     /// Hash of the look.
     pub(super) look_hash: String,
-    /// What is added to the cache's numbers of frames in the pictures' names.
+    /// Offset from the cache's frame numbers to those in the pictures' names.
     #[serde(default)]
     pub(super) numbering: i64,
 }
 
 impl Owner {
-    /// What differs first.
+    /// The first field that differs.
     fn difference(&self, other: &Self) -> Option<&'static str> {
         let rows = [
             ("shot", self.shot == other.shot),
@@ -75,7 +75,7 @@ impl Owner {
     }
 }
 
-/// Program and version, without what is said of shaders behind them.
+/// Program and version without the note about shaders.
 fn version_of(software: &str) -> &str {
     let shaders = software.find(" with shaders ");
     let cache = software.find(", of a cache ");
@@ -88,48 +88,48 @@ pub(super) struct Wanted<'a> {
     pub(super) owner: Owner,
     /// Names of the pictures.
     pub(super) names: BTreeSet<String>,
-    /// Whether pictures that stand there are made again, whosever they are.
+    /// Whether to replace existing pictures, whoever owns them.
     pub(super) overwrite: bool,
-    /// Hash of a frame of the cache; `None` where the cache has no such frame (yet).
+    /// Hash of a frame of the cache; `None` if the cache does not have the frame (yet).
     pub(super) frame_hash: &'a dyn Fn(u32) -> Option<String>,
 }
 
-/// Why pictures cannot go to a folder.
+/// Why pictures cannot be written to a folder.
 #[derive(Debug, thiserror::Error)]
 pub enum FolderError {
     /// A file or folder that cannot be read, written or locked.
     #[error("{}", file.display())]
     File {
-        /// Which.
+        /// The file or folder.
         file: PathBuf,
-        /// The system's words.
+        /// The system's error.
         source: io::Error,
     },
-    /// A picture of something else stands there.
+    /// A picture of another origin exists.
     #[error("{} is {what}; choose another -o, or render it anew with --overwrite", file.display())]
     Other {
-        /// The first one.
+        /// The first such picture.
         file: PathBuf,
         /// What it is.
         what: String,
     },
-    /// A picture of something else would stay beside those that are rendered.
+    /// A picture of another origin would remain beside those to be rendered.
     #[error(
         "{} is {what}, and these frames would leave it: one folder would hold both; choose another -o, or remove it",
         file.display()
     )]
     Left {
-        /// The first one.
+        /// The first such picture.
         file: PathBuf,
         /// What it is.
         what: String,
     },
-    /// Other processes are at work there that cannot share it.
+    /// Other processes are working in the folder and cannot share it.
     #[error("{} is in use: another process renders there {what}; wait for it, or choose another -o", directory.display())]
     InUse {
-        /// Which.
+        /// The folder.
         directory: PathBuf,
-        /// What it does.
+        /// What they are doing.
         what: String,
     },
 }
@@ -139,25 +139,27 @@ fn at(file: &Path) -> impl FnOnce(io::Error) -> FolderError + use<> {
     move |source| FolderError::File { file, source }
 }
 
-/// A process's place in a folder, held while it is at work there.
+/// A process's registration in a folder, held while it works there.
 #[derive(Debug)]
 pub(super) struct Folder {
     path: PathBuf,
-    /// Whether it was not there before.
+    /// Whether this process created the folder.
     is_new: bool,
-    /// `None` while it is given up.
+    /// Lock on the work file; `None` while it is being released.
     work: Option<File>,
 }
 
 impl Folder {
-    /// Enters a folder, which is made where it is missing. Processes that render the same look of the same cache share it.
+    /// Enters a folder and creates it if it is missing. Processes that render the same look of the
+    /// same cache share it.
     ///
     /// # Errors
-    /// [`FolderError`]; pictures that stand there are as they were.
+    /// [`FolderError`]; existing pictures are untouched.
     pub(super) fn enter(path: &Path, wanted: &Wanted<'_>) -> Result<Self, FolderError> {
         let is_new = !path.exists();
         if !is_new && !path.join(RECORD).exists() {
-            // Once more than needed, so that a folder of something else is refused with nothing written to it.
+            // An additional check, so that a foreign folder is refused without writing anything to
+            // it.
             check_standing(path, wanted, wanted.overwrite)?;
         }
         let mut gate = Gate::close(path)?;
@@ -196,7 +198,8 @@ impl Folder {
         })
     }
 
-    /// Refuses what [`Self::enter`] would refuse of what stands in a folder, without touching it; whether it is in use is not looked at.
+    /// Refuses existing pictures that [`Self::enter`] would refuse, without touching the folder.
+    /// Does not check whether it is in use.
     ///
     /// # Errors
     /// [`FolderError`].
@@ -207,7 +210,8 @@ impl Folder {
         check_standing(path, wanted, wanted.overwrite || is_ours)
     }
 
-    /// Takes a frame, `small.0001`, for this process until the file is dropped; `None` while another has it.
+    /// Claims a frame, `small.0001`, for this process until the file is dropped; `None` while
+    /// another process has it.
     ///
     /// # Errors
     /// [`FolderError::File`].
@@ -218,12 +222,12 @@ impl Folder {
         Ok(is_ours.then_some(claim))
     }
 
-    /// Where the picture of a claimed frame is written.
+    /// Path of the draft of a claimed frame's picture.
     pub(super) fn draft(&self, name: &str) -> PathBuf {
         self.path.join(ROOM).join(name)
     }
 
-    /// Gives a whole picture its name in the folder; tells its bytes.
+    /// Moves a complete picture to its final name. Returns its size in bytes.
     ///
     /// # Errors
     /// [`FolderError::File`].
@@ -237,7 +241,7 @@ impl Folder {
 
 impl Drop for Folder {
     fn drop(&mut self) {
-        // What cannot be cleared now is cleared by the next process to come.
+        // The next process to enter clears what cannot be cleared now.
         let Ok(_gate) = Gate::close(&self.path) else {
             return;
         };
@@ -247,7 +251,7 @@ impl Drop for Folder {
             return;
         }
         let _ = fs::remove_dir_all(room);
-        // Where nothing was rendered nothing is left.
+        // If nothing was rendered, nothing is left behind.
         let left = names(&self.path).unwrap_or_default();
         if cfg!(unix) && left.len() == 1 && left.contains(RECORD) {
             let _ = fs::remove_file(self.path.join(RECORD));
@@ -258,7 +262,7 @@ impl Drop for Folder {
     }
 }
 
-/// `render.json`, locked: no other process comes or goes. Whoever holds it waits for no other lock.
+/// A lock on `render.json`: no other process enters or leaves. Its holder waits for no other lock.
 struct Gate {
     path: PathBuf,
     file: File,
@@ -271,14 +275,14 @@ impl Gate {
             fs::create_dir_all(folder).map_err(at(folder))?;
             let file = open(&path).map_err(at(&path))?;
             file.lock().map_err(at(&path))?;
-            // Another process may have taken it away, having rendered nothing.
+            // Another process that rendered nothing may have removed it.
             if is_at(&file, &path) {
                 return Ok(Self { path, file });
             }
         }
     }
 
-    /// `None` where a kill left half of it, or nothing.
+    /// The recorded owner; `None` if the file is empty or was left incomplete by a kill.
     fn owner(&mut self) -> Option<Owner> {
         let mut text = String::new();
         self.file.rewind().ok()?;
@@ -302,7 +306,7 @@ impl Gate {
     }
 }
 
-/// Whether no process is at work; asked with the gate closed.
+/// Whether no process is working; requires a closed gate.
 fn is_deserted(room: &Path) -> Result<bool, FolderError> {
     let file = room.join(WORK);
     match File::options().read(true).write(true).open(&file) {
@@ -312,7 +316,8 @@ fn is_deserted(room: &Path) -> Result<bool, FolderError> {
     }
 }
 
-/// Removes what dead processes left: their room, and half pictures beside the whole ones.
+/// Removes what killed processes left: their work folder, and partial pictures beside the complete
+/// ones.
 fn clear(folder: &Path, shot: &str) -> Result<(), FolderError> {
     let room = folder.join(ROOM);
     match fs::remove_dir_all(&room) {
@@ -330,7 +335,7 @@ fn clear(folder: &Path, shot: &str) -> Result<(), FolderError> {
     Ok(())
 }
 
-/// Of what is in a folder; nothing where there is none.
+/// Names of a folder's entries; empty if it does not exist.
 fn names(folder: &Path) -> Result<BTreeSet<String>, FolderError> {
     let name = |entry: io::Result<fs::DirEntry>| {
         let entry = entry.map_err(at(folder))?;
@@ -342,7 +347,7 @@ fn names(folder: &Path) -> Result<BTreeSet<String>, FolderError> {
     }
 }
 
-/// Refuses pictures that are not those of `wanted`, but for those that it may replace.
+/// Refuses pictures of another owner, except those that `wanted` may replace.
 fn check_standing(
     folder: &Path,
     wanted: &Wanted<'_>,
@@ -352,7 +357,7 @@ fn check_standing(
         let file = folder.join(&name);
         let is_replaced = wanted.names.contains(&name);
         if is_replaced && file.is_dir() {
-            // No picture can take its name, whoever it belongs to.
+            // No picture can take its name, whoever owns it.
             return Err(at(&file)(io::ErrorKind::IsADirectory.into()));
         }
         let Some(what) = stranger(&file, is_replaced, wanted) else {
@@ -368,8 +373,8 @@ fn check_standing(
     Ok(())
 }
 
-/// What a file is where it is a picture of something else. One that tells nothing of itself is of no account, unless
-/// it has the name of one that is wanted.
+/// Describes a file that is a picture of another origin. A picture without metadata is ignored
+/// unless it has the name of a wanted picture.
 fn stranger(file: &Path, is_wanted: bool, wanted: &Wanted<'_>) -> Option<String> {
     let found = match read_header(file) {
         Ok(None) => return None,
@@ -383,7 +388,8 @@ fn stranger(file: &Path, is_wanted: bool, wanted: &Wanted<'_>) -> Option<String>
     let numbering = numbering.map_or(wanted.owner.numbering, |it| it.offset);
     let mut found = owner_of(found, numbering);
     if let Some(frame) = &cache {
-        // Behind its frame's hash stand those of what else it was drawn from: other ones are drawn anew, not refused.
+        // The hash of the frame is followed by those of other inputs. If only those differ, the
+        // picture is drawn again, not refused.
         let rest = found.cache.strip_prefix(frame.as_str());
         if rest.is_some_and(|rest| rest.starts_with(' ')) {
             found.cache.clone_from(frame);
@@ -397,7 +403,7 @@ fn stranger(file: &Path, is_wanted: bool, wanted: &Wanted<'_>) -> Option<String>
     Some(format!("of another {what}"))
 }
 
-/// Of one picture: its frame stands for the cache.
+/// The owner of a single picture: its frame's hash stands for the cache.
 fn owner_of(picture: Attributes, numbering: i64) -> Owner {
     Owner {
         software: picture.software,

@@ -1,4 +1,4 @@
-//! Frames of a cache drawn with one look after another, and held against what is true of them.
+//! Draws frames of a cache with one look after another and compares them with a ground truth.
 
 use std::{path::Path, time::Instant};
 
@@ -30,7 +30,8 @@ use swell_scene::{
 pub use swell_check::render::Summary;
 pub use swell_render::REACH;
 
-/// Frames of a cache, and what rays in f64 and, where pictures are scored, finer rays see with one look.
+/// Frames of a cache with their ground truth for one look: f64 rays, and finer rays if pictures are
+/// scored.
 pub struct Gallery<'a> {
     context: &'a Context,
     frames: Vec<Framed>,
@@ -42,27 +43,28 @@ struct Framed {
     around: Around,
     eye: Eye,
     seen: Vec<Seen>,
-    /// `None` where no picture is scored.
+    /// Picture by finer rays; `None` if pictures are not scored.
     picture: Option<Picture>,
 }
 
-/// How a look draws the frames.
+/// Result of drawing the frames with a look.
 #[derive(Clone, Debug)]
 pub struct Drawn {
-    /// Wall clock of the pictures of all frames, seconds, of each repeat.
+    /// Wall-clock seconds of each repeat for the pictures of all frames.
     pub seconds: Vec<f64>,
-    /// Over all frames; `None` where no water was seen.
+    /// Error of the surface over all frames; `None` if no water was visible.
     pub surface: Option<Summary>,
-    /// SSIMULACRA 2 against finer rays, mean over the frames; `None` where no picture is scored.
+    /// SSIMULACRA 2 score against finer rays, mean over the frames; `None` if pictures are not
+    /// scored.
     pub score: Option<f64>,
 }
 
 impl<'a> Gallery<'a> {
-    /// Opens frames of a cache and finds what is true of them as `look`, whose camera it is, sees them; with `is_scored` also by
-    /// finer rays.
+    /// Opens frames of a cache and computes their ground truth for the camera of `look`; with
+    /// `is_scored` also their pictures by finer rays.
     ///
     /// # Errors
-    /// The cache, its scene, the device.
+    /// Errors of the cache, its scene or the device.
     pub fn open(
         context: &'a Context,
         cache: &Path,
@@ -85,7 +87,7 @@ impl<'a> Gallery<'a> {
         })
     }
 
-    /// Particles of all frames.
+    /// Number of particles of all frames.
     pub fn particles(&self) -> usize {
         self.frames
             .iter()
@@ -93,10 +95,11 @@ impl<'a> Gallery<'a> {
             .sum()
     }
 
-    /// Draws the frames `repeats` times, after one that is not counted: it makes the device's programs ready.
+    /// Draws the frames `repeats` times, after one uncounted run that warms up the device's
+    /// pipelines.
     ///
     /// # Errors
-    /// The device, and a frame that cannot be drawn.
+    /// A device error, or a frame that cannot be drawn.
     pub fn draw(&self, look: &Look, repeats: u32) -> Result<Drawn, RenderJobError> {
         let mut drawn = Drawn {
             seconds: vec![0.0; repeats as usize],

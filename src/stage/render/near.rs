@@ -8,19 +8,20 @@ use swell_domain::particles::Particles;
 use swell_render::{Moment, REACH, Water, frames_around};
 use swell_scene::look::Look;
 
-/// Frames that were read last: in a row of frames each is read once.
+/// Recently read frames, so that consecutive frames are read only once.
 #[derive(Default)]
 pub(super) struct Near(BTreeMap<u32, Arc<Water>>);
 
 /// A frame with those around it.
 pub(super) struct Around {
     pub(super) water: Arc<Water>,
-    /// In the order of [`Moment::around`]; `None` where the cache has none, or the look takes none.
+    /// In the order of [`Moment::around`]; `None` if the cache does not have the frame or the look
+    /// does not use it.
     others: [Option<Arc<Water>>; 2 * REACH as usize],
 }
 
 impl Near {
-    /// A frame with as many around it as pictures with `look` are drawn from.
+    /// Reads a frame and the frames around it that `look` needs.
     pub(super) fn around(
         &mut self,
         cache: &CacheReader,
@@ -53,7 +54,8 @@ impl Near {
 }
 
 impl Around {
-    /// The same with nothing found out yet about the frame's own water: in a row of frames that is done once a frame.
+    /// The same frames without cached results for the frame's own water, as when the frame is first
+    /// drawn.
     pub(super) fn anew(&self) -> Self {
         Self {
             water: Arc::new(Water::new(self.water.particles.clone())),
@@ -61,7 +63,7 @@ impl Around {
         }
     }
 
-    /// What a picture is made from, with the frame's whitewater.
+    /// The input of a picture, with the frame's whitewater.
     pub(super) fn moment<'a>(&'a self, white: &'a Particles) -> Moment<'a> {
         Moment {
             water: &self.water,

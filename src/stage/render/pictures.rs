@@ -1,4 +1,4 @@
-//! The pictures of a frame: their names, what their headers say, whether they stand there.
+//! The pictures of a frame: their names, their metadata, whether they exist.
 
 use std::path::Path;
 
@@ -11,7 +11,7 @@ use swell_render::{
 };
 use swell_scene::look::{FormatSpec, Look};
 
-/// All of it: what stands in the header of a frame's pictures.
+/// The complete metadata of a frame's pictures, including all inputs.
 pub(super) fn whole_attributes(
     cache: &CacheReader,
     request: &Request,
@@ -26,8 +26,8 @@ pub(super) fn whole_attributes(
     Ok(attributes)
 }
 
-/// What a picture's header says of the frames around its own that it is drawn from: a hash of theirs, so that it is drawn again when
-/// the cache has come to have more of them. Nothing where the look takes none.
+/// Metadata about the surrounding frames that a picture is drawn from: a hash of theirs, so that
+/// the picture is drawn again once the cache has more of them. Empty if the look uses none.
 fn around(cache: &CacheReader, look: &Look, frame: u32) -> Result<String, CacheError> {
     let reach = frames_around(look);
     if reach == 0 {
@@ -43,7 +43,7 @@ fn around(cache: &CacheReader, look: &Look, frame: u32) -> Result<String, CacheE
     Ok(format!(" around {}", hasher.finalize().to_hex()))
 }
 
-/// Frames about a frame, in the order of [`Moment::around`]: with their places there.
+/// The frames around a frame with their indices, in the order of [`Moment::around`].
 pub(super) fn others(frame: u32) -> impl Iterator<Item = (usize, u32)> {
     let reach = i64::from(REACH);
     let offsets = (-reach..=reach).filter(|&offset| offset != 0);
@@ -52,7 +52,7 @@ pub(super) fn others(frame: u32) -> impl Iterator<Item = (usize, u32)> {
     placed.filter_map(|(side, frame)| Some((side, frame?)))
 }
 
-/// What stands in the header of a frame's pictures, but for what else it is drawn from.
+/// Metadata of a frame's pictures without the inputs other than the frame itself.
 pub(super) fn attributes(
     cache: &CacheReader,
     request: &Request,
@@ -75,7 +75,7 @@ pub(super) fn attributes(
     })
 }
 
-/// What is said of a cache behind a program: nothing where the program's own shaders baked it.
+/// Note about the shaders of a cache that follows the program's name; empty for built-in shaders.
 pub(super) fn baked_note(manifest: &Manifest) -> String {
     let note = shaders_note(manifest.edited_shaders());
     match note.is_empty() {
@@ -98,7 +98,7 @@ fn ending(format: FormatSpec) -> &'static str {
     }
 }
 
-/// Names of a frame's pictures, and in which format each.
+/// Name and format of each of a frame's pictures.
 pub(super) fn pictures(
     cache: &CacheReader,
     look: &Look,
@@ -112,7 +112,7 @@ pub(super) fn pictures(
         .collect()
 }
 
-/// Name of the PNG of a frame of a cache, by the cache's own numbers.
+/// Name of a frame's PNG, with the cache's own frame number.
 pub fn picture_name(cache: &CacheReader, frame: u32) -> String {
     let shot = &cache.manifest().shot;
     let name = name(shot, frame, cache.last_frame(), Numbering::default());

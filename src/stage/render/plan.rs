@@ -15,39 +15,39 @@ use swell_gpu::{
 use swell_render::{Limits, Moment, Plan, RenderScene, Runs, Water};
 use swell_scene::{Scene, look::Look};
 
-/// What is planned to stand before the camera.
+/// What the camera sees in the plan.
 #[derive(Debug)]
 pub enum Subject {
     /// The look's own walls, and no water.
     Nothing,
     /// A scene at its start.
     Scene(Box<Scene>),
-    /// A cache: its scene, and the most particles of a frame.
+    /// A cache: its scene, and its frame with the most particles.
     Cache(PathBuf),
 }
 
-/// A look's plan, and for which limits it was made.
+/// A look's plan, and the limits that it was made for.
 #[derive(Debug)]
 pub struct LookPlan {
-    /// Passes with how often each runs, by name.
+    /// Name of each pass, and how often it runs.
     pub passes: Vec<(&'static str, Runs)>,
-    /// Textures: name, texels along each side, format, bytes.
+    /// Name, size in texels, format and bytes of each texture.
     pub textures: Vec<(String, [u32; 2], String, u64)>,
-    /// Buffers with their bytes.
+    /// Name and bytes of each buffer.
     pub buffers: Vec<(String, u64)>,
-    /// Of all of them.
+    /// Total bytes.
     pub bytes: u64,
-    /// Particles of the frame with the most; 0 without water.
+    /// Number of particles of the fullest frame; 0 without water.
     pub particles: usize,
     /// The frame whose water decides the sizes; `None` without water.
     pub frame: Option<u32>,
-    /// The adapter whose limits were used; `None` where the machine has none.
+    /// The adapter whose limits were used; `None` if the machine has none.
     pub adapter: Option<String>,
     /// Why that adapter could not render it.
     pub misfit: Option<GpuError>,
 }
 
-/// Limits that every Vulkan adapter of the last years has, for machines without any.
+/// Limits that every recent Vulkan adapter meets, for machines without an adapter.
 const COMMON_LIMITS: Limits = Limits {
     storage: 128 << 20,
     texture: 8192,
@@ -58,7 +58,8 @@ const COMMON_LIMITS: Limits = Limits {
 /// Plans what `look` needs to render `subject`, without allocating or compiling anything.
 ///
 /// # Errors
-/// The subject's scene or cache; the look's panorama; an adapter that is not there or does not open.
+/// Errors of the subject's scene or cache, or of the look's panorama; an adapter that does not
+/// exist or open.
 pub fn plan(
     look: &Look,
     subject: &Subject,
@@ -97,7 +98,7 @@ pub fn plan(
     })
 }
 
-/// A plan, and what it is for.
+/// A plan, and its particles and frame.
 struct Planned {
     plan: Plan,
     particles: usize,
@@ -158,8 +159,8 @@ impl Planned {
     }
 }
 
-/// Of the frames whose particles are kept the one with the most of them, and of equals the fastest, whose surface is mostly the
-/// largest; the last one where none is kept.
+/// The frame with the most particles among those kept; of equal ones the fastest, whose surface is
+/// usually the largest. The last frame if none is kept.
 fn fullest(cache: &CacheReader) -> u32 {
     let speed = |entry: &Entry| entry.report["max_speed"].as_f64().unwrap_or(0.0);
     let kept = cache.entries().iter();
@@ -171,7 +172,7 @@ fn fullest(cache: &CacheReader) -> u32 {
     fullest.map_or(cache.last_frame(), |entry| entry.frame)
 }
 
-/// A scene of nothing. Its size and spacing decide no pass and no size of a buffer.
+/// An empty scene. Its size and spacing affect neither passes nor buffer sizes.
 fn empty() -> RenderScene {
     RenderScene {
         origin: DVec3::ZERO,

@@ -1,4 +1,4 @@
-//! What of a scene stands in a picture of a frame.
+//! Prepares a scene for the picture of a frame.
 
 use super::RenderJobError;
 use swell_domain::{
@@ -10,10 +10,11 @@ use swell_domain::{
 use swell_render::{RenderScene, SolidParts};
 use swell_scene::{PlacedMesh, Scene, Wall, look::Look};
 
-/// A scene as it stands at a frame, with what the look takes of it.
+/// The scene at a frame, with the parts that the look needs.
 ///
 /// # Errors
-/// Where the look names materials: a mesh file that is no longer what the scene was read from, or has texture coordinates that are none.
+/// If the look names materials: a mesh file that has changed since the scene was read, or that has
+/// invalid texture coordinates.
 pub(super) fn render_scene(
     scene: &Scene,
     look: &Look,
@@ -43,7 +44,7 @@ pub(super) fn render_scene(
     })
 }
 
-/// Parts of each solid, read again from its file: a scene keeps the mesh alone.
+/// Parts of each solid, read again from its file because a scene keeps only the mesh.
 fn solid_parts(scene: &Scene, time: f64) -> Result<Vec<SolidParts>, MeshError> {
     let still = scene.solids.iter().map(|solid| (solid, Pose::START));
     let moving = scene.moving_solids.iter();
@@ -70,7 +71,7 @@ fn solid_parts(scene: &Scene, time: f64) -> Result<Vec<SolidParts>, MeshError> {
     parts.collect()
 }
 
-/// The scene's wave makers, and how far inward each stands of the domain's side, metres.
+/// The scene's wave makers, and how far inward of the domain's side each one is, metres.
 fn plates(scene: &Scene, walls: &Bounds) -> Vec<(Wall, f64)> {
     let size = scene.domain.size();
     let makers = scene.wave_makers.iter().map(|maker| maker.wall);
@@ -82,7 +83,8 @@ fn plates(scene: &Scene, walls: &Bounds) -> Vec<(Wall, f64)> {
         .collect()
 }
 
-/// What the scene's solids are called, in the order of [`render_scene`]: as their meshes' files, without the ending.
+/// Names of the scene's solids, in the order of [`render_scene`]: those of their mesh files,
+/// without extension.
 pub(super) fn solid_names(scene: &Scene) -> Vec<String> {
     let moving = scene.moving_solids.iter().map(|solid| &solid.placed);
     let placed = scene.solids.iter().chain(moving);

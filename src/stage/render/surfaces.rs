@@ -1,5 +1,5 @@
-//! `check --render`: how far the surfaces in pictures of a cache are from rays in f64 through the particles' own field; and, where it is
-//! asked for, pictures of the water against pictures by finer rays.
+//! `check --render`: compares the surfaces in pictures of a cache with f64 rays through the
+//! particles' own field and, on request, pictures of the water with pictures by finer rays.
 
 use std::{
     path::PathBuf,
@@ -28,103 +28,108 @@ use super::{RenderJobError, near::Near, render_scene, told};
 use crate::{baked_scene, device::Gpu};
 use swell_scene::Scene;
 
-/// What rays may be off by: the 95th percentile of their depths, spacings. Half a voxel, a quarter of a spacing: a surface between
-/// two corners of a voxel is where trilinear values put it.
+/// Tolerance of the ray method for depth: 95th percentile, in spacings. Half a voxel, a quarter of
+/// a spacing: trilinear interpolation decides where a surface between two voxel corners lies.
 pub const DEPTH: f64 = 0.25;
 
-/// What rays may be off by: the median between normals, degrees. Differences over two voxels of a field that bends over a kernel's
-/// shortest axis, a spacing.
+/// Tolerance of the ray method for normals: median angle, degrees. Finite differences over two
+/// voxels approximate a field that bends over a kernel's shortest axis, which is one spacing.
 pub const NORMAL: f64 = 5.0;
 
-/// Samples of the truth's pictures over the look's own, and its voxels a spacing: rays that are as much finer as a check has time for.
+/// Samples of the reference pictures relative to the look's own, and their voxels per spacing: as
+/// fine as a check has time for.
 pub const FINER: (u32, f64) = (4, 2.0);
 
 /// What to check.
 #[derive(Clone, Debug)]
 pub struct Request {
-    /// Cache directory.
+    /// Directory of the cache.
     pub cache: PathBuf,
     /// Camera and surface; spray and whitewater are left out.
     pub look: Look,
-    /// Frames; the last one whose particles are cached where `None`.
+    /// Frames to check; the last frame with particles if `None`.
     pub frames: Option<FrameRange>,
-    /// Whether pictures are scored against finer rays.
+    /// Whether to score pictures against finer rays.
     pub colour: bool,
-    /// Whether what flickers is measured, of each frame between its neighbours.
+    /// Whether to measure flicker, of each frame between its neighbours.
     pub flicker: bool,
-    /// What to render on.
+    /// Adapter and shaders to render with.
     pub gpu: Gpu,
 }
 
-/// One method's surfaces.
+/// Result for one render method.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Row {
     /// `ssfr` or `ray`.
     pub method: &'static str,
-    /// Over all frames; `None` where no water was seen.
+    /// Error of the surface over all frames; `None` if no water was visible.
     pub surface: Option<Summary>,
-    /// Wall clock a frame of rendering its channels, seconds.
+    /// Wall-clock seconds per frame to render its channels.
     pub seconds: f64,
-    /// SSIMULACRA 2 of its pictures against the truth's, mean over the frames; `None` where not asked for, or a side is shorter than 8
-    /// pixels.
+    /// SSIMULACRA 2 score of its pictures against the reference pictures, mean over the frames;
+    /// `None` if not requested, or if a side is shorter than 8 pixels.
     pub score: Option<f64>,
-    /// What flickers beyond the truth, in parts of white, mean over the frames; `None` where not asked for.
+    /// Flicker beyond that of the reference, as a fraction of white, mean over the frames; `None`
+    /// if not requested.
     pub flicker: Option<f64>,
-    /// What of its pictures is not the mean of their neighbours, likewise: what flickers, and what moves unevenly.
+    /// Difference of its pictures from the mean of their neighbours, in the same unit: flicker and
+    /// uneven motion.
     pub residual: Option<f64>,
 }
 
 impl Row {
-    /// Whether it is as near the truth as its method has to be: rays have a pass mark, splats are measured.
+    /// Whether the method meets its tolerance: rays have one, splats are only measured.
     pub fn is_within(&self) -> bool {
         let of_rays = |it: &Summary| it.depth[1] <= DEPTH && it.normal[0] <= NORMAL;
         self.method != "ray" || self.surface.as_ref().is_some_and(of_rays)
     }
 }
 
-/// What a check has to tell while it runs.
+/// Progress of a running check.
 #[derive(Clone, Debug)]
 pub enum Event {
     /// The device is open.
     Ready {
-        /// Adapter name.
+        /// Name of the adapter.
         device: String,
-        /// Frames wanted.
+        /// Number of frames to check.
         frames: usize,
     },
     /// A frame was checked.
     Frame {
-        /// Its number.
+        /// Number of the frame.
         frame: u32,
-        /// Wall clock for all of it.
+        /// Wall-clock time of the whole frame, seconds.
         seconds: f64,
     },
 }
 
-/// What a check found.
+/// Result of a check.
 #[derive(Clone, Debug, Default)]
 pub struct Outcome {
-    /// One a method.
+    /// One row per method.
     pub rows: Vec<Row>,
-    /// Frames checked.
+    /// Frames that were checked.
     pub frames: Vec<u32>,
-    /// Particles whose centres lie outside of the surface, of all.
+    /// Fraction of the particles whose centres lie outside the surface.
     pub outside: f64,
-    /// Wall clock a frame of the truth, seconds.
+    /// Wall-clock seconds per frame to compute the f64 rays.
     pub truth_seconds: f64,
-    /// What of the truth's pictures is not the mean of its neighbours, in parts of white, mean over the frames.
+    /// Difference of the reference pictures from the mean of their neighbours, as a fraction of
+    /// white, mean over the frames.
     pub truth_residual: Option<f64>,
-    /// Adapter.
+    /// Name of the adapter.
     pub device: String,
     /// Whether a signal ended it.
     pub interrupted: bool,
 }
 
-/// Renders frames by both methods and holds their depths and normals against rays in f64; `tell` hears of progress, and `stop` ends it
-/// after the current frame.
+/// Renders frames by both methods and compares their depths and normals with f64 rays. `tell`
+/// receives progress events, and setting `stop` ends the check after the current frame.
 ///
 /// # Errors
-/// The cache, its scene, the device, a frame that cannot be rendered, and that no frame shows water.
+/// Errors of the cache, its scene or the device; a frame that cannot be rendered; no visible water
+/// in any frame.
 pub fn check_render(
     request: &Request,
     stop: &AtomicBool,
@@ -134,7 +139,7 @@ pub fn check_render(
     let scene = baked_scene(&cache, &request.cache)?;
     let frames: Vec<u32> = match &request.frames {
         Some(frames) => frames.iter().collect(),
-        // With a frame after it, where that is looked at.
+        // Leaves a frame after it if neighbours are needed.
         None => vec![cache.last_frame() - u32::from(request.flicker)],
     };
     for &frame in &frames {
@@ -218,10 +223,10 @@ pub fn check_render(
 
 const METHODS: [(&str, MethodSpec); 2] = [("ssfr", MethodSpec::Ssfr), ("ray", MethodSpec::Ray)];
 
-/// A frame, with its neighbours where these are looked at.
+/// A frame, with its neighbours if they are needed.
 fn around(frame: u32, with_neighbours: bool) -> Vec<u32> {
     match with_neighbours {
-        // Frame 0 has none before it, which the cache says.
+        // Frame 0 has no neighbour before it; the cache reports that.
         true => vec![frame.wrapping_sub(1), frame, frame + 1],
         false => vec![frame],
     }
@@ -231,7 +236,7 @@ fn mean(values: &[f64]) -> Option<f64> {
     (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
 }
 
-/// Where pictures come from.
+/// What pictures are drawn from.
 pub(super) struct Set<'a> {
     pub(super) cache: &'a CacheReader,
     pub(super) scene: &'a Scene,
@@ -239,7 +244,8 @@ pub(super) struct Set<'a> {
 }
 
 impl Set<'_> {
-    /// The picture of a frame with a look, as a screen shows it: drawn from what [`super::render`] draws it from.
+    /// The picture of a frame with a look as a screen shows it, drawn from the same inputs as in
+    /// [`super::render`].
     pub(super) fn draw(&self, look: &Look, frame: u32) -> Result<Picture, RenderJobError> {
         let around = Near::default().around(self.cache, look, frame)?;
         let set = render_scene(self.scene, look, frame, &around.water.particles)?;
@@ -250,7 +256,7 @@ impl Set<'_> {
     }
 }
 
-/// What pictures of one method came to, frame by frame.
+/// Measurements of one method's pictures, one entry per frame.
 #[derive(Default)]
 struct Pictured {
     scores: Vec<f64>,
@@ -258,7 +264,7 @@ struct Pictured {
     residuals: Vec<f64>,
 }
 
-/// Pictures of all methods and of the truth.
+/// Measurements of the pictures of all methods and of the reference.
 struct Pictures<'a> {
     request: &'a Request,
     /// In the order of [`METHODS`].
@@ -275,7 +281,7 @@ impl<'a> Pictures<'a> {
         }
     }
 
-    /// Draws what is asked for of a frame that `eye` sees, and measures it.
+    /// Draws and measures what is requested of a frame seen from `eye`.
     fn take(&mut self, set: &Set<'_>, frame: u32, eye: &Eye) -> Result<(), RenderJobError> {
         let Request {
             look,
@@ -318,7 +324,7 @@ impl<'a> Pictures<'a> {
     }
 }
 
-/// What rays in f64 meet, and how many particles' centres are outside of the surface.
+/// Casts the f64 rays, and counts the particles whose centres are outside the surface.
 pub(super) fn truth(
     look: &Look,
     set: &RenderScene,

@@ -1,4 +1,4 @@
-//! The stream of whitewater that a look draws.
+//! The whitewater stream that a look draws.
 
 use std::path::{Path, PathBuf};
 
@@ -9,41 +9,42 @@ use swell_domain::{particles::Particles, posix};
 /// Why a stream cannot be drawn.
 #[derive(Debug, thiserror::Error)]
 pub enum StreamError {
-    /// There is none of that name.
+    /// There is no stream of that name.
     #[error(
         "the look draws whitewater `{stream}`, and {} is not there: make it with `swell whitewater {}` (--name {stream})",
         directory.display(), posix::path(cache)
     )]
     Missing {
-        /// Its name.
+        /// Name of the stream.
         stream: String,
         /// Where it would be.
         directory: PathBuf,
-        /// Of the bake.
+        /// Directory of the bake's cache.
         cache: PathBuf,
     },
-    /// It lacks a frame, or has that of other water.
+    /// The stream lacks a frame, or has one made from other water.
     #[error("{}: frame {frame} {how}: make it again with `swell whitewater`", directory.display())]
     Frame {
-        /// Of the stream.
+        /// Directory of the stream.
         directory: PathBuf,
         /// The frame.
         frame: u32,
         /// What is wrong with it.
         how: &'static str,
     },
-    /// Its files.
+    /// A file of the stream.
     #[error(transparent)]
     Cache(#[from] CacheError),
 }
 
-/// A stream that stands beside the water.
+/// A whitewater stream beside the water.
 pub(super) struct Whitewater {
     stream: CacheReader,
 }
 
 impl Whitewater {
-    /// Opens it and looks for all the frames that are wanted, each made from the water that stands in `water` now.
+    /// Opens the stream and checks that it has all requested frames, each made from the water that
+    /// is now in `water`.
     pub(super) fn open(
         cache: &Path,
         stream: &str,

@@ -1,4 +1,4 @@
-//! A frame's pictures on their way to the disk, beside the next frame's drawing.
+//! Writes a frame's pictures while the next frame is drawn.
 
 use std::{
     fs::File,
@@ -11,23 +11,23 @@ use super::{Event, Outcome, RenderJobError, Request, folder::Folder, pictures::w
 use swell_render::{Attributes, Image};
 use swell_scene::look::FormatSpec;
 
-/// A frame that is drawn and not yet written.
+/// A frame that is drawn but not yet written.
 pub(super) struct Drawn {
     pub(super) frame: u32,
     /// When work on it began.
     pub(super) begin: Instant,
     pub(super) image: Image,
-    /// Names of its pictures, and in which format each.
+    /// Name and format of each of its pictures.
     pub(super) pictures: Vec<(String, FormatSpec)>,
     pub(super) attributes: Attributes,
-    /// Keeps other processes from it.
+    /// Keeps other processes from rendering the frame.
     pub(super) claim: File,
 }
 
 /// A frame whose pictures are being written.
 pub(super) struct Writing {
     frame: u32,
-    /// Gives seconds since work on the frame began, and bytes.
+    /// Returns the seconds since work on the frame began, and the bytes written.
     thread: JoinHandle<Result<(f64, u64), RenderJobError>>,
 }
 
@@ -48,15 +48,16 @@ impl Writing {
         Self { frame, thread }
     }
 
-    /// Whether they are on the disk, or could not be written.
+    /// Whether the pictures are on disk or have failed.
     pub(super) fn is_finished(&self) -> bool {
         self.thread.is_finished()
     }
 
-    /// Waits until they are on the disk: which frame, seconds that it took in all, and bytes.
+    /// Waits until the pictures are on disk. Returns the frame, the seconds it took in total, and
+    /// the bytes.
     ///
     /// # Errors
-    /// [`RenderJobError::Render`] or [`RenderJobError::Folder`] where a picture cannot be written.
+    /// [`RenderJobError::Render`] or [`RenderJobError::Folder`] if a picture cannot be written.
     fn end(self) -> Result<(u32, f64, u64), RenderJobError> {
         let written = self.thread.join();
         let (seconds, bytes) = written.unwrap_or_else(|panic| std::panic::resume_unwind(panic))?;
@@ -64,7 +65,7 @@ impl Writing {
     }
 }
 
-/// Waits for the pictures that are being written, and tells of them.
+/// Waits for the pictures that are being written, and reports them.
 pub(super) fn end_writing(
     writing: &mut Option<Writing>,
     outcome: &mut Outcome,

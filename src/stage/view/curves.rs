@@ -1,4 +1,5 @@
-//! What a cache knows of its frames: their times, what probes saw, what the ledger says of the solve.
+//! What a cache knows about its frames: times, probe values, and the ledger's reports of the
+//! solver.
 
 use std::path::PathBuf;
 
@@ -11,17 +12,18 @@ use swell_cache::{CacheReader, Entry};
 use swell_domain::solver::StepReport;
 use swell_study::chart::{Chart, Series};
 
-/// Times and curves of a cache; none of either where none is named.
+/// Times and curves of caches; empty if none is given.
 #[derive(Default)]
 pub(super) struct Curves {
     pub(super) charts: Vec<Chart>,
     pub(super) frames_per_second: Option<f64>,
-    /// The first one has the times.
+    /// The first one provides the times.
     caches: Vec<CacheReader>,
 }
 
 impl Curves {
-    /// Of these caches, which have names where there are two: curves of one quantity share a chart.
+    /// Curves of these caches, which have names if there are two; curves of one quantity share a
+    /// chart.
     pub(super) fn of(named: &[(String, PathBuf)]) -> Result<Self, ViewError> {
         let open = |(_, path): &(String, PathBuf)| reader(path);
         let caches: Vec<CacheReader> = named.iter().map(open).collect::<Result<_, _>>()?;
@@ -47,7 +49,7 @@ impl Curves {
         })
     }
 
-    /// When a frame ends, seconds; `None` where the cache has no such frame.
+    /// Time at the end of a frame, seconds; `None` if the cache does not have the frame.
     pub(super) fn time(&self, label: &Label) -> Option<f64> {
         let Label::Frame(frame) = label else {
             return None;
@@ -55,7 +57,8 @@ impl Curves {
         Some(self.caches.first()?.entry(*frame).ok()?.clock.time)
     }
 
-    /// A sentence where pictures say that they are of another cache; those that say nothing are believed.
+    /// A warning if the pictures' metadata names another cache; pictures without metadata are
+    /// trusted.
     pub(super) fn stranger(&self, strip: &Strip, labels: &[Label]) -> Option<String> {
         let cache = self.caches.first()?;
         let Some(label @ Label::Frame(frame)) = labels.first() else {
@@ -74,7 +77,7 @@ impl Curves {
     }
 }
 
-/// Every chart of a cache: its probes', and its ledger's.
+/// All charts of a cache: those of its probes and of its ledger.
 fn of_cache(cache: &CacheReader) -> Vec<Chart> {
     let shot = &cache.manifest().shot;
     let records = cache.manifest().probes.iter().enumerate();
@@ -82,7 +85,7 @@ fn of_cache(cache: &CacheReader) -> Vec<Chart> {
     probes.chain(of_ledger(shot, cache.entries())).collect()
 }
 
-/// A chart that says whose its curves are in their names, and no longer in its title.
+/// A chart with the owner in the names of its curves instead of its title.
 fn of_two(name: &str, mut chart: Chart) -> Chart {
     if let Some((_, title)) = chart.title.split_once(": ") {
         chart.title = title.to_owned();
@@ -93,10 +96,10 @@ fn of_two(name: &str, mut chart: Chart) -> Chart {
     chart
 }
 
-/// Curves of a quantity of the solver's reports, with their name.
+/// Name of a curve, and the quantity of the solver's report that it shows.
 type Line = (&'static str, fn(&StepReport) -> f64);
 
-/// What the ledger says of every frame, whether or not the scene has probes.
+/// Charts of the ledger's reports, independent of probes.
 fn of_ledger(shot: &str, entries: &[Entry]) -> Vec<Chart> {
     const CHARTS: [(&str, &str, &[Line]); 3] = [
         (

@@ -1,4 +1,4 @@
-//! What goes wrong with a view.
+//! Errors of a view.
 
 use std::{io, path::PathBuf};
 
@@ -8,13 +8,13 @@ use swell_render::RenderError;
 use swell_scene::SceneError;
 use swell_study::raster::RasterError;
 
-/// Why there is nothing to look at.
+/// Why a view failed.
 #[derive(Debug, thiserror::Error)]
 pub enum ViewError {
-    /// What was asked for does not go together, or is not there to be seen.
+    /// Options that cannot be combined, or nothing to show.
     #[error("{0}")]
     Asked(String),
-    /// There is nothing of this name.
+    /// A path that does not exist.
     #[error("{} is not there", .0.display())]
     Missing(PathBuf),
     /// A picture.
@@ -26,12 +26,12 @@ pub enum ViewError {
     /// The scene in a cache.
     #[error("the cache's scene: {0}")]
     Scene(#[from] SceneError),
-    /// A study that has no page.
+    /// A study that has no page yet.
     #[error("{} is not there: {what}", page.display())]
     Unfinished {
-        /// Where it would be.
+        /// Path of the missing page.
         page: PathBuf,
-        /// Why it is not, and what makes it.
+        /// Why it is missing, and how to make it.
         what: String,
     },
     /// The contact sheet.
@@ -40,28 +40,28 @@ pub enum ViewError {
     /// A file or folder that cannot be read or written.
     #[error("{}", file.display())]
     File {
-        /// Which.
-        file: PathBuf,
-        /// The system's words.
-        source: io::Error,
-    },
-    /// A picture or movie could not be encoded.
-    #[error("{}", file.display())]
-    Encode {
-        /// Which.
-        file: PathBuf,
-        /// Why.
-        source: png::EncodingError,
-    },
-    /// The output would go into a cache.
-    #[error("{} is in the cache {}: choose another name", file.display(), cache.display())]
-    IntoCache {
         /// The file or folder.
         file: PathBuf,
-        /// The cache.
+        /// The system's error.
+        source: io::Error,
+    },
+    /// A picture or movie that could not be encoded.
+    #[error("{}", file.display())]
+    Encode {
+        /// The file.
+        file: PathBuf,
+        /// The cause.
+        source: png::EncodingError,
+    },
+    /// The output would be written into a cache.
+    #[error("{} is in the cache {}: choose another name", file.display(), cache.display())]
+    IntoCache {
+        /// The output file or folder.
+        file: PathBuf,
+        /// The cache that contains it.
         cache: PathBuf,
     },
-    /// A movie that another program has to encode, which is not there.
+    /// The external encoder that a movie needs cannot be run.
     #[error(
         "{} needs {program}, which cannot be run ({source}): install it, name it with --ffmpeg, or write a movie that ends in .apng",
         movie.display()
@@ -69,19 +69,19 @@ pub enum ViewError {
     NoEncoder {
         /// The movie.
         movie: PathBuf,
-        /// As it was called.
+        /// The program as it was called.
         program: String,
-        /// The system's words.
+        /// The system's error.
         source: io::Error,
     },
-    /// That program gave up.
+    /// The external encoder failed.
     #[error("{program} could not write {}: {said}", movie.display())]
     Encoder {
         /// The movie.
         movie: PathBuf,
-        /// As it was called.
+        /// The program as it was called.
         program: String,
-        /// What it said, on one line.
+        /// Its error output on one line.
         said: String,
     },
 }

@@ -1,4 +1,4 @@
-//! A movie: APNG by ourselves, MP4 and WebM by ffmpeg.
+//! Movies: APNG written here, MP4 and WebM by ffmpeg.
 
 use std::{
     fs::{self, File},
@@ -10,7 +10,7 @@ use std::{
 use super::ViewError;
 use swell_study::{apng::Apng, rgb::Rgb};
 
-/// What names of movies end in.
+/// Format of a movie.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     /// Lossless, large, played by every browser.
@@ -22,7 +22,7 @@ pub(super) enum Kind {
 }
 
 impl Kind {
-    /// By the file's ending.
+    /// Determined by the file's extension.
     pub(super) fn of(movie: &Path) -> Result<Self, ViewError> {
         let ending = movie.extension().unwrap_or_default().to_string_lossy();
         match &*ending.to_ascii_lowercase() {
@@ -36,7 +36,8 @@ impl Kind {
         }
     }
 
-    /// How ffmpeg encodes it: sizes of even numbers, in which 4:2:0 has its colours; colours by Rec. 709, and said so.
+    /// Options for ffmpeg: even sizes, which 4:2:0 chroma needs, and colours converted to and
+    /// tagged as Rec. 709.
     fn options(self) -> Vec<&'static str> {
         let codec: &[&str] = match self {
             Self::Mp4 => &[
@@ -82,7 +83,7 @@ impl Kind {
     }
 }
 
-/// A movie that is being written; what is there of it goes where it is dropped before its end.
+/// A movie being written; if it is dropped before it is finished, the partial file is removed.
 pub(super) struct Movie {
     file: PathBuf,
     part: PathBuf,
@@ -96,7 +97,7 @@ enum Writer {
 }
 
 impl Movie {
-    /// Begins one of `count` frames.
+    /// Starts a movie of `count` frames.
     pub(super) fn begin(
         file: &Path,
         size: [usize; 2],
@@ -124,7 +125,7 @@ impl Movie {
         })
     }
 
-    /// The next frame.
+    /// Appends the next frame.
     pub(super) fn push(&mut self, frame: &Rgb) -> Result<(), ViewError> {
         match &mut self.writer {
             Some(Writer::Apng(movie)) => movie.push(frame).map_err(encode(&self.file)),
@@ -133,7 +134,7 @@ impl Movie {
                     .stdin
                     .as_mut()
                     .map(|pipe| pipe.write_all(frame.pixels.as_flattened()));
-                // What is wrong is told when it ends.
+                // The error is reported when the encoder ends.
                 match put {
                     Some(Err(_)) => self.close(),
                     _ => Ok(()),
@@ -143,7 +144,7 @@ impl Movie {
         }
     }
 
-    /// Ends it and gives it its name; its bytes.
+    /// Finishes the movie and renames it. Returns its size in bytes.
     pub(super) fn finish(mut self) -> Result<u64, ViewError> {
         self.close()?;
         fs::rename(&self.part, &self.file).map_err(ViewError::at(&self.file))?;
@@ -181,7 +182,7 @@ impl Drop for Movie {
             let _ = child.kill();
             let _ = child.wait();
         }
-        // Behind its end nothing is there any more.
+        // After `finish` the partial file no longer exists.
         let _ = fs::remove_file(&self.part);
     }
 }
@@ -214,7 +215,7 @@ fn encoder(
         .args(["-video_size", &format!("{width}x{height}")])
         .args(["-framerate", &frames_per_second.to_string(), "-i", "-"])
         .args(kind.options())
-        // A name that begins with a hyphen would be an option.
+        // An absolute path, because a name that begins with a hyphen would be read as an option.
         .arg(std::path::absolute(part).map_err(ViewError::at(part))?)
         .stdin(Stdio::piped())
         .stdout(Stdio::null())

@@ -1,4 +1,4 @@
-//! Frames of a cache as balls: a quick look that needs no device, and no render.
+//! Draws frames of a cache as balls: a quick look that needs neither a device nor a render.
 
 use std::path::Path;
 
@@ -19,9 +19,10 @@ use swell_study::{
     rgb::Rgb,
 };
 
-/// Pixels that a picture is wide.
+/// Width of a picture, pixels.
 const WIDTH: usize = 960;
-/// Frames whose speeds are looked at for the scale of colours, and the part of the particles that is not faster.
+/// Number of frames that are read for the colour scale, and the percentile of the speeds that sets
+/// it.
 const LOOKED: usize = 5;
 const SLOWER: f64 = 0.995;
 
@@ -30,11 +31,11 @@ pub(super) struct Balls {
     cache: CacheReader,
     scene: Scene,
     projection: Projection,
-    /// m/s of the brightest colour.
+    /// Speed of the brightest colour, m/s.
     pub(super) top: f64,
 }
 
-/// Opens a cache, seen from a side.
+/// Opens a cache, seen from `aspect`.
 pub(super) fn open(
     path: &Path,
     aspect: Aspect,
@@ -83,7 +84,7 @@ fn top_speed(cache: &CacheReader, frames: &[u32]) -> Result<f64, ViewError> {
 }
 
 impl Balls {
-    /// In words, for whoever looks.
+    /// Describes the picture for the viewer.
     pub(super) fn note(&self) -> String {
         format!(
             "Particles as balls, coloured by speed from dark blue (0) to white ({:.1} m/s and more): a quick look, no render.",
@@ -131,7 +132,7 @@ impl Balls {
         fault.map_or_else(other, ViewError::Cache)
     }
 
-    /// Draws in the colours and the place of another one, so that both compare.
+    /// Uses the colour scale and the view of another cache, so that both can be compared.
     pub(super) fn like(&mut self, other: &Self) {
         self.top = other.top;
         let moved: DVec3 = other.scene.origin - self.scene.origin;

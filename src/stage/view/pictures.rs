@@ -1,4 +1,4 @@
-//! Rendered pictures as a screen shows them.
+//! Reads rendered pictures as a screen shows them.
 
 use std::{
     collections::BTreeMap,
@@ -23,7 +23,7 @@ use swell_render::{
 use swell_scene::look::ViewSpec;
 use swell_study::rgb::Rgb;
 
-/// PNG before EXR: of a frame that has both, the PNG is what its look shows.
+/// PNG before EXR: if a frame has both, the PNG shows what its look intends.
 const ENDINGS: [&str; 2] = ["png", "exr"];
 
 fn ending(path: &Path) -> Option<usize> {
@@ -31,7 +31,7 @@ fn ending(path: &Path) -> Option<usize> {
     ENDINGS.iter().position(|known| *known == ending)
 }
 
-/// `("shot", 12)` of `shot.0012.png`.
+/// `("shot", 12)` for `shot.0012.png`.
 fn numbered(path: &Path) -> Option<(String, u32)> {
     let stem = path.file_stem()?.to_str()?;
     let (name, digits) = stem.rsplit_once('.').unwrap_or(("", stem));
@@ -39,7 +39,7 @@ fn numbered(path: &Path) -> Option<(String, u32)> {
     Some((name.to_owned(), digits.parse().ok().filter(|_| is_number)?))
 }
 
-/// Pictures of a folder, by their names.
+/// Pictures of a folder, sorted by name.
 pub(super) fn in_folder(folder: &Path) -> Result<Vec<PathBuf>, ViewError> {
     let entries = fs::read_dir(folder).map_err(ViewError::at(folder))?;
     let mut found = Vec::new();
@@ -53,7 +53,7 @@ pub(super) fn in_folder(folder: &Path) -> Result<Vec<PathBuf>, ViewError> {
     Ok(found)
 }
 
-/// Opens a folder of pictures; `None` where it has none. Sizes are known from then on, and every picture has the same.
+/// Opens a folder of pictures; `None` if it has none. Checks that all pictures have the same size.
 pub(super) fn open(folder: &Path, view: Option<&ViewSpec>) -> Result<Option<Strip>, ViewError> {
     let found = in_folder(folder)?;
     let files = match found.iter().any(|path| numbered(path).is_some()) {
@@ -96,7 +96,7 @@ pub(super) fn open(folder: &Path, view: Option<&ViewSpec>) -> Result<Option<Stri
     }))
 }
 
-/// Pictures with a number; one a frame.
+/// Pictures with a number, one per frame.
 fn by_number(folder: &Path, found: &[PathBuf]) -> Result<BTreeMap<Label, PathBuf>, ViewError> {
     let mut files: BTreeMap<Label, PathBuf> = BTreeMap::new();
     let mut shot: Option<String> = None;
@@ -143,9 +143,9 @@ fn by_name(found: &[PathBuf]) -> BTreeMap<Label, PathBuf> {
     files
 }
 
-/// What a picture's header says.
+/// Contents of a picture's header.
 struct Head {
-    /// Of the image that is shown.
+    /// Size of the displayed image.
     size: [usize; 2],
     frames_per_second: Option<f64>,
 }
@@ -183,7 +183,7 @@ fn exr_header(file: &Path) -> Result<exr::meta::header::Header, ViewError> {
     first.ok_or_else(|| damaged(file, "it has no layer"))
 }
 
-/// Where a picture says that it comes from; `None` where it says nothing, or is none.
+/// The recorded origin of a picture; `None` if it records none or is unreadable.
 pub(super) fn attributes(file: &Path) -> Option<Attributes> {
     read_header(file)
         .ok()
@@ -207,7 +207,7 @@ pub(super) fn read(file: &Path, view: &ViewSpec) -> Result<Rgb, ViewError> {
     })
 }
 
-/// The image that is shown of an EXR: black where it was not rendered.
+/// The displayed image of an EXR: black outside the rendered window.
 fn read_light(file: &Path, view: &ViewSpec) -> Result<Rgb, ViewError> {
     let header = exr_header(file)?;
     let window = header.shared_attributes.display_window.size;
@@ -239,7 +239,8 @@ fn read_light(file: &Path, view: &ViewSpec) -> Result<Rgb, ViewError> {
     Ok(shown)
 }
 
-/// Chromaticities are 32-bit numbers in a file, so that Rec. 709's own differ by a rounding.
+/// Whether the primaries are not Rec. 709. Files store chromaticities as 32-bit floats, so even
+/// those of Rec. 709 differ by rounding.
 fn is_other(space: &Space) -> bool {
     let all = |space: &Space| [space.primaries.as_flattened(), &space.white[..]].concat();
     let both = all(space).into_iter().zip(all(&REC_709));
@@ -247,7 +248,7 @@ fn is_other(space: &Space) -> bool {
         .any(|(a, b)| (a - b).abs() > f64::from(f32::EPSILON))
 }
 
-/// Premultiplied light over black.
+/// Converts premultiplied light, over black.
 fn on_screen(view: &ViewSpec, to_709: Option<&DMat3>, light: [f32; 3]) -> [u8; 3] {
     let light = match to_709 {
         Some(matrix) => (*matrix * DVec3::from(light.map(f64::from)))

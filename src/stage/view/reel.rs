@@ -1,4 +1,4 @@
-//! Frames in turn, and what is made of them.
+//! Reads the frames one after another and builds sheet, movie and page from them.
 
 use std::{
     fs,
@@ -21,7 +21,7 @@ use swell_study::{
     sheet::{Cell, sheet},
 };
 
-/// A view that is ready to go.
+/// A view that is ready to run.
 pub(super) struct Reel<'a> {
     request: &'a Request,
     strips: Vec<Strip>,
@@ -33,22 +33,23 @@ pub(super) struct Reel<'a> {
     rate: f64,
 }
 
-/// One frame, read, and reduced to what is made of it.
+/// One frame, read and reduced to the forms that are needed.
 struct Framed {
     joined: Option<Rgb>,
     cell: Option<Cell>,
-    /// One PNG a strip.
+    /// One PNG per strip.
     page: Vec<Vec<u8>>,
 }
 
-/// In PNG files of ours.
+/// Software name in our PNG files.
 pub(super) const SOFTWARE: &str = "swell view";
-/// Pixels that a picture of a sheet is wide, and pictures in a row; of two side by side half as many.
+/// Width of a picture on a sheet, pixels, and pictures per row; half as many if two are side by
+/// side.
 pub(super) const THUMB: usize = 320;
 pub(super) const COLUMNS: usize = 6;
 
 impl<'a> Reel<'a> {
-    /// Of strips of one shape, whose labels all of them have.
+    /// Takes strips of the same shape that all have the `labels`.
     pub(super) fn of(
         request: &'a Request,
         strips: Vec<Strip>,
@@ -101,7 +102,7 @@ impl<'a> Reel<'a> {
         })
     }
 
-    /// Frames of the sheet: all, or as many evenly spread ones as it has at most.
+    /// Indices of the frames on the sheet: all, or evenly spaced ones if there are too many.
     fn on_sheet(&self) -> Vec<usize> {
         let count = self.labels.len();
         let most = self.request.sheet.unwrap_or(0).min(count);
@@ -109,14 +110,14 @@ impl<'a> Reel<'a> {
         (0..most).map(place).collect()
     }
 
-    /// Pixels of the movie: of one picture, or of two side by side.
+    /// Size of the movie in pixels: of one picture, or of two side by side.
     fn movie_size(&self) -> [usize; 2] {
         let most = self.request.width.unwrap_or(usize::MAX);
         let [width, height] = Rgb::within(self.strips[0].size, most);
         [width * self.strips.len(), height]
     }
 
-    /// Goes through the frames once, and makes all from that.
+    /// Reads every frame once and makes everything from it.
     pub(super) fn run(
         self,
         stop: &AtomicBool,
@@ -183,7 +184,7 @@ impl<'a> Reel<'a> {
         Ok(outcome)
     }
 
-    /// `a.0012.png`
+    /// `a.0012.png`.
     fn file_name(&self, strip: usize, k: usize) -> String {
         let set = ["a", "b"][strip];
         match &self.labels[k] {
@@ -192,7 +193,7 @@ impl<'a> Reel<'a> {
         }
     }
 
-    /// Reads a frame, and makes of it what is wanted.
+    /// Reads a frame and converts it to the forms that are needed.
     fn framed(&self, k: usize, is_on_sheet: bool) -> Result<Framed, ViewError> {
         let request = self.request;
         let label = &self.labels[k];
@@ -305,7 +306,7 @@ impl<'a> Reel<'a> {
     }
 }
 
-/// Short names, or whole paths where these are the same.
+/// Short names, or whole paths if the short names are equal.
 pub(super) fn names(strips: &[Strip]) -> Vec<String> {
     let short: Vec<String> = strips.iter().map(|strip| strip.title.clone()).collect();
     match &short[..] {
@@ -317,7 +318,7 @@ pub(super) fn names(strips: &[Strip]) -> Vec<String> {
     }
 }
 
-/// Refuses a sheet that is none of ours.
+/// Refuses to overwrite a sheet that swell did not make.
 pub(super) fn check_sheet(file: &Path) -> Result<(), ViewError> {
     let Ok(bytes) = fs::read(file) else {
         return Ok(());

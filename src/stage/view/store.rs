@@ -1,4 +1,4 @@
-//! Where a page has its pictures: within it, or beside it.
+//! Stores the pictures of a page: inside it or beside it.
 
 use std::{
     fs,
@@ -10,32 +10,32 @@ use base64::{Engine as _, engine::general_purpose::STANDARD};
 use super::ViewError;
 use swell_study::player::MARK;
 
-/// Where pictures of a page stand.
+/// Where the pictures of a page are stored.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Placing {
-    /// Within the page where they are not more than [`MOST`] bytes, else beside it.
+    /// Inside the page up to [`MOST`] bytes, otherwise beside it.
     #[default]
     Auto,
-    /// Within it, whatever their size.
+    /// Inside the page, whatever their size.
     Within,
-    /// In a folder beside it.
+    /// In a folder beside the page.
     Beside,
 }
 
-/// Bytes of pictures that a page holds where nobody asks for more. A page is read whole before its first picture is seen, and
-/// text of three times as much begins to be slow.
+/// Default for the most bytes of pictures inside a page. A browser reads the whole page before it
+/// shows the first picture, and text three times that long starts to be slow.
 pub const MOST: u64 = 64_000_000;
 
-/// The page's file, and its folder of pictures.
+/// Names of the page's file and its picture folder.
 const PAGE: &str = "index.html";
 const FOLDER: &str = "pictures";
 
-/// Pictures of a page that is being made; what is there of them goes where it is dropped before its end.
+/// Pictures of a page under construction; if it is dropped before it is finished, they are removed.
 pub(super) struct Store {
     directory: PathBuf,
     placing: Placing,
     most: u64,
-    /// Names and bytes of those that are to stand within.
+    /// Names and PNG data of the pictures to embed.
     kept: Vec<(String, Vec<u8>)>,
     bytes: u64,
     is_beside: bool,
@@ -43,7 +43,7 @@ pub(super) struct Store {
 }
 
 impl Store {
-    /// Refuses a page that is none of ours.
+    /// Starts a store; refuses to overwrite a page that swell did not make.
     pub(super) fn begin(directory: &Path, placing: Placing, most: u64) -> Result<Self, ViewError> {
         let page = directory.join(PAGE);
         let is_ours = match fs::read(&page) {
@@ -84,7 +84,7 @@ impl Store {
         }
     }
 
-    /// Takes the next picture, a PNG, of this name.
+    /// Adds the next picture, a PNG, under this name.
     pub(super) fn push(&mut self, name: String, png: Vec<u8>) -> Result<(), ViewError> {
         self.bytes += png.len() as u64;
         self.kept.push((name, png));
@@ -105,12 +105,12 @@ impl Store {
         Ok(())
     }
 
-    /// Bytes of pictures so far, and whether they stand beside the page.
+    /// Bytes of pictures so far, and whether they are stored beside the page.
     pub(super) fn told(&self) -> (u64, bool) {
         (self.bytes, self.is_beside)
     }
 
-    /// The pictures' addresses in the order in which they came.
+    /// The pictures' addresses in the order in which they were added.
     pub(super) fn addresses(&self) -> Vec<String> {
         let beside = self
             .names
@@ -122,7 +122,7 @@ impl Store {
         beside.chain(within).collect()
     }
 
-    /// Writes the page over them, which holds [`Self::addresses`]; gives its file and its bytes.
+    /// Writes the page, which contains [`Self::addresses`]. Returns its path and size in bytes.
     pub(super) fn finish(self, html: &str) -> Result<(PathBuf, u64), ViewError> {
         let folder = self.directory.join(FOLDER);
         if folder.exists() {
@@ -143,7 +143,7 @@ impl Drop for Store {
     }
 }
 
-/// Writes beside the file and renames, so that a file that is there is whole.
+/// Writes a temporary file and renames it, so that an existing file is always complete.
 pub(super) fn write(file: &Path, bytes: &[u8]) -> Result<(), ViewError> {
     let mut name = file.file_name().unwrap_or_default().to_owned();
     name.push(".part");
@@ -152,7 +152,7 @@ pub(super) fn write(file: &Path, bytes: &[u8]) -> Result<(), ViewError> {
     fs::rename(&part, file).map_err(ViewError::at(file))
 }
 
-/// A file's name within an address: what has a meaning there is written as its bytes.
+/// Percent-encodes a file's name for an address.
 fn in_address(name: &str) -> String {
     let byte = |b: u8| match b {
         b'A'..=b'Z' | b'a'..=b'z' | b'0'..=b'9' | b'.' | b'_' | b'-' => char::from(b).to_string(),
@@ -194,7 +194,7 @@ mod tests {
             [3; 10]
         );
 
-        // One that breaks off leaves what was there; one that holds all takes it away.
+        // An aborted store leaves the old pictures; one that embeds them all removes the folder.
         drop(filled(folder.path(), Placing::Beside, 0));
         assert!(
             folder.path().join("pictures/a.0 %.png").exists()

@@ -1,4 +1,4 @@
-//! Frames to look at, wherever their pictures come from.
+//! Sequences of frames to view, whatever their source.
 
 use std::{
     collections::BTreeMap,
@@ -11,12 +11,12 @@ use swell_render::Attributes;
 use swell_scene::look::ViewSpec;
 use swell_study::rgb::Rgb;
 
-/// What a picture is told by.
+/// Identifies a picture of a strip.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Label {
-    /// The frame's number.
+    /// Number of the frame.
     Frame(u32),
-    /// The file's name without its ending, where no picture of the folder has a number.
+    /// File name without its extension, if no picture of the folder has a number.
     Name(String),
 }
 
@@ -30,7 +30,7 @@ impl fmt::Display for Label {
 }
 
 impl Label {
-    /// For a sheet.
+    /// The label in words, for a sheet.
     pub(super) fn words(&self) -> String {
         match self {
             Self::Frame(frame) => format!("frame {frame}"),
@@ -41,31 +41,31 @@ impl Label {
 
 /// Pictures of one render or one cache.
 pub(super) struct Strip {
-    /// As it was named.
+    /// Path as given by the user.
     pub(super) path: PathBuf,
-    /// A short name.
+    /// Short name.
     pub(super) title: String,
-    /// What all of it is, in words that a page can show; may be empty.
+    /// Description for sheet and page; may be empty.
     pub(super) note: String,
-    /// In order; at least one.
+    /// Labels in order; at least one.
     pub(super) labels: Vec<Label>,
-    /// Pixels of each.
+    /// Columns and rows of each picture.
     pub(super) size: [usize; 2],
-    /// Where the pictures or the cache say it.
+    /// Frame rate, if the pictures or the cache specify it.
     pub(super) frames_per_second: Option<f64>,
     pub(super) source: Source,
 }
 
-/// Where pictures come from.
+/// Source of the pictures.
 pub(super) enum Source {
-    /// Files, and how light becomes a picture.
+    /// Files, and the view transform for EXR light.
     Files(BTreeMap<Label, PathBuf>, Box<ViewSpec>),
-    /// A cache's particles.
+    /// Particles of a cache.
     Cache(Box<Balls>),
 }
 
 impl Strip {
-    /// What is to be said of all of it.
+    /// Description of the whole strip; may be empty.
     pub(super) fn said(&self) -> String {
         match &self.source {
             Source::Files(..) => self.note.clone(),
@@ -77,7 +77,7 @@ impl Strip {
         self.labels.binary_search(label).is_ok()
     }
 
-    /// The picture of one of its labels.
+    /// Reads or draws the picture with one of its labels.
     pub(super) fn picture(&self, label: &Label) -> Result<Rgb, ViewError> {
         match &self.source {
             Source::Files(files, view) => {
@@ -98,7 +98,7 @@ impl Strip {
         }
     }
 
-    /// Where the first picture of these says that it comes from.
+    /// Recorded origin of the picture with this label.
     pub(super) fn attributes(&self, label: &Label) -> Option<Attributes> {
         match &self.source {
             Source::Files(files, _) => pictures::attributes(files.get(label)?),
@@ -118,7 +118,7 @@ impl Strip {
     }
 }
 
-/// The last part of a path, also of `.` and `..`.
+/// The last component of a path, also for `.` and `..`.
 pub(super) fn name_of(path: &Path) -> String {
     let last = |path: &Path| Some(path.file_name()?.to_string_lossy().into_owned());
     let real = || path.canonicalize().ok().and_then(|real| last(&real));

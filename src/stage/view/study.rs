@@ -1,4 +1,4 @@
-//! A study that is finished has a page of its own; its pictures get a contact sheet.
+//! Views a study: a finished one has a page of its own, and its pictures get a contact sheet.
 
 use std::{
     fs,
@@ -20,9 +20,9 @@ use swell_study::{
     sheet::{Cell, sheet},
 };
 
-/// What a study leaves, beside its ledgers.
+/// File that a finished study leaves besides its ledgers.
 const RESULTS: &str = "results.csv";
-/// Its page, and the folders of what is seen on it.
+/// Name of its page, and the folders of its pictures.
 const PAGE: &str = "index.html";
 const FOLDERS: [&str; 2] = ["pictures", "curves"];
 
@@ -33,7 +33,7 @@ pub(super) fn is_one(folder: &Path) -> bool {
     names.any(|name| name == RESULTS || is_ledger(&name))
 }
 
-/// Why there is no page yet, and what makes it.
+/// Why there is no page yet, and how to make it.
 fn unfinished(folder: &Path) -> Result<ViewError, ViewError> {
     let entries = fs::read_dir(folder).map_err(ViewError::at(folder))?;
     let names = entries.map(|entry| Ok(entry?.file_name().to_string_lossy().into_owned()));
@@ -61,7 +61,7 @@ fn unfinished(folder: &Path) -> Result<ViewError, ViewError> {
     })
 }
 
-/// Its page, and a sheet of its pictures where one is asked for and there are any.
+/// Returns the study's page, and makes a sheet of its pictures if requested and if there are any.
 pub(super) fn view(
     request: &Request,
     folder: &Path,
@@ -99,7 +99,7 @@ pub(super) fn view(
     Ok(outcome)
 }
 
-/// Bytes of the sheet; `None` where the study has no pictures.
+/// Makes the sheet and returns its size in bytes; `None` if the study has no pictures.
 fn sheet_of(
     folder: &Path,
     directory: &Path,
@@ -145,7 +145,7 @@ fn sheet_of(
     Ok(Some(png.len() as u64))
 }
 
-/// PNG files of a folder and of those in it, by name; nothing where it is not there.
+/// Collects PNG files below a folder, sorted by name; none if it does not exist.
 fn pictures_in(folder: &Path, files: &mut Vec<PathBuf>) -> Result<(), ViewError> {
     if !folder.is_dir() {
         return Ok(());

@@ -1,4 +1,4 @@
-//! A stream of whitewater beside the bake that it was made from, for `check`.
+//! A whitewater stream with the bake that it was made from, for `check`.
 
 use std::path::{Path, PathBuf};
 
@@ -11,7 +11,7 @@ use swell_scene::Scene;
 
 use super::{WhitewaterError, is_of, recorded, water::Water};
 
-/// A stream, and all that its frames are made from.
+/// A stream, and everything that its frames are made from.
 pub struct Stream {
     stream: CacheReader,
     cache: CacheReader,
@@ -22,10 +22,12 @@ pub struct Stream {
 }
 
 impl Stream {
-    /// The stream in `directory`, whose bake stands two folders above, as it stood for each of `frames`.
+    /// Opens the stream in `directory`, whose bake is two folders above, and checks that `frames`
+    /// were made from that bake.
     ///
     /// # Errors
-    /// A bake that is not there or another, its scene, its solids; frames whose whitewater before was not kept.
+    /// A bake that is missing or has changed, its scene, its solids; frames whose preceding
+    /// whitewater was not kept.
     pub fn open(
         directory: &Path,
         stream: CacheReader,
@@ -44,7 +46,7 @@ impl Stream {
                     last,
                 });
             }
-            // From the frame before.
+            // A frame is computed from the frame before.
             stream.kept(frame - 1)?;
             if !is_of(stream.entry(frame)?, &cache) {
                 return Err(WhitewaterError::NoBake {
@@ -69,15 +71,15 @@ impl Stream {
         })
     }
 
-    /// Particles of its water.
+    /// Number of water particles.
     pub fn water(&self) -> usize {
         self.particles
     }
 
-    /// Holds the passes that made a frame against their twins.
+    /// Compares the passes that made a frame with their reference passes (f64).
     ///
     /// # Errors
-    /// The files; the device.
+    /// Errors of the files or the device.
     pub fn check(&self, context: &Context, frame: u32) -> Result<Table, WhitewaterError> {
         let water = Water::of(&self.cache, self.scene.period()).at(frame)?;
         let time = self.cache.entry(frame)?.clock.time;

@@ -1,4 +1,4 @@
-//! Whitewater's passes on what was asked for: an adapter, or the CPU with the f64 reference.
+//! Runs the whitewater passes on an adapter, or on the CPU with the f64 reference.
 
 use crate::device::{Opened, SolverError};
 use swell_domain::{
@@ -15,7 +15,8 @@ pub(super) enum Engine {
 }
 
 impl Engine {
-    /// For so many particles of `scene`, which is [`Scene::of_whitewater`] of what was baked.
+    /// Prepares for `water` particles of `scene`, which is [`Scene::of_whitewater`] of the baked
+    /// scene.
     pub(super) fn new(
         opened: &Opened,
         scene: &Scene,
@@ -33,7 +34,7 @@ impl Engine {
         })
     }
 
-    /// Makes ready to move.
+    /// Sets the settings; required before `advance`.
     pub(super) fn set(&mut self, settings: &Settings) -> Result<(), SolverError> {
         match self {
             Self::Gpu(engine) => engine.set(settings)?,
@@ -42,7 +43,8 @@ impl Engine {
         Ok(())
     }
 
-    /// Takes the water of a frame; what of each particle makes whitewater.
+    /// Evaluates the water of a frame and returns the potentials of each particle to make
+    /// whitewater.
     pub(super) fn survey(
         &mut self,
         water: &Particles,
@@ -64,7 +66,7 @@ impl Engine {
         Ok(())
     }
 
-    /// What passes took; nothing on the CPU, or unless timed.
+    /// Times of passes; empty on the CPU, or unless timed.
     pub(super) fn times(&self) -> Vec<PassTime> {
         match self {
             Self::Gpu(engine) => engine.times(),

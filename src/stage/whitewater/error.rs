@@ -1,4 +1,4 @@
-//! Why a stream of whitewater cannot be made.
+//! Errors of making a whitewater stream.
 
 use std::path::PathBuf;
 
@@ -18,50 +18,50 @@ pub enum WhitewaterError {
     /// The scene in the cache, or the stream's own settings.
     #[error("the cache's scene: {0}")]
     Scene(#[from] SceneError),
-    /// Its solids.
+    /// The scene's solids.
     #[error(transparent)]
     Solid(#[from] SignedDistanceError),
     /// The device.
     #[error(transparent)]
     Gpu(#[from] GpuError),
-    /// The passes.
+    /// The whitewater passes.
     #[error(transparent)]
     Solver(#[from] SolverError),
-    /// A stream of whitewater is no water.
+    /// The given cache is a whitewater stream, not a bake.
     #[error("{} is a stream of whitewater; give the cache that it was made from", .0.display())]
     IsWhitewater(PathBuf),
-    /// A stream without the bake that it was made from.
+    /// The bake that a stream was made from is missing or has changed.
     #[error("{} was made from a bake in {}, which is not there or another now: frame {frame}", stream.display(), cache.display())]
     NoBake {
-        /// Of the stream.
+        /// Directory of the stream.
         stream: PathBuf,
         /// Where the bake should be.
         cache: PathBuf,
-        /// Of the stream.
+        /// Frame of the stream.
         frame: u32,
     },
-    /// The bake does not go so far.
+    /// The bake does not have the requested frame.
     #[error("frame {asked} was asked for, and the bake has frames {first} to {last}")]
     NoFrame {
-        /// The frame.
+        /// The requested frame.
         asked: u32,
-        /// First of the bake.
+        /// First frame of the bake.
         first: u32,
-        /// Last of the bake.
+        /// Last frame of the bake.
         last: u32,
     },
-    /// The stream that stands there was made otherwise.
+    /// The existing stream was made differently.
     #[error(
         "{} was made {how}; choose another --name, or --overwrite it",
         directory.display()
     )]
     Other {
-        /// Of the stream.
+        /// Directory of the stream.
         directory: PathBuf,
         /// What differs, in words.
         how: &'static str,
     },
-    /// More than the settings allow.
+    /// More particles than the settings allow.
     #[error(
         "frame {frame} has {count} whitewater particles, and max_particles is {allowed}: raise it, or lower \
          emission.trapped_air_rate and emission.wave_crest_rate; the frames before it stand"
@@ -69,17 +69,17 @@ pub enum WhitewaterError {
     TooMany {
         /// The frame.
         frame: u32,
-        /// So many.
+        /// Number of whitewater particles it would have.
         count: usize,
-        /// `max_particles`.
+        /// `max_particles` of the settings.
         allowed: u32,
     },
-    /// A stream cannot be removed.
+    /// A stream that cannot be removed.
     #[error("cannot remove {}: {source}", directory.display())]
     Remove {
-        /// Of the stream.
+        /// Directory of the stream.
         directory: PathBuf,
-        /// What the system says.
+        /// The system's error.
         source: std::io::Error,
     },
 }

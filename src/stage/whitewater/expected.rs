@@ -1,26 +1,27 @@
-//! `whitewater --dry-run`: what a job would make, without a device, and with nothing written.
+//! `whitewater --dry-run`: predicts a job without a device and without writing anything.
 
 use std::path::PathBuf;
 
 use super::{Request, WhitewaterError, asked, hash, other};
 use swell_cache::{CacheReader, stream::PARTICLES};
 
-/// What a job would make.
+/// Prediction of a job.
 #[derive(Clone, Debug)]
 pub struct Expected {
-    /// Where the stream goes.
+    /// Directory of the stream.
     pub directory: PathBuf,
     /// First frame that would be computed.
     pub first: u32,
-    /// Last one.
+    /// Last frame that would be computed.
     pub last: u32,
-    /// Frames that stand there, the first aside.
+    /// Number of frames that exist, not counting the first.
     pub standing: u32,
-    /// Bytes of the frames to be computed, each as large as those that stand there on the mean; `None` where none does.
+    /// Predicted bytes of the frames to be computed, from the mean of the existing ones; `None` if
+    /// none exist.
     pub bytes: Option<u64>,
 }
 
-/// Looks at the bake and at the stream that stands there, as a job would.
+/// Examines the bake and the existing stream as a job would.
 ///
 /// # Errors
 /// Those of [`whitewater`](super::whitewater()) that need no device.

@@ -1,36 +1,38 @@
-//! When there will be more whitewater than its settings allow, foretold from how its number grows.
+//! Predicts from the growth of whitewater when it will exceed the limit of its settings.
 
 use std::collections::VecDeque;
 
-/// Frames over which growth is measured: births less deaths, from the first frame with whitewater on.
+/// Number of frames over which growth (births minus deaths) is measured, from the first frame with
+/// whitewater.
 pub(super) const OVER: usize = 4;
 
-/// More whitewater than is allowed, if it goes on growing as it did.
+/// A predicted excess of whitewater, if growth continues as measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Crowding {
     /// First frame that would have more than `max_particles`.
     pub frame: u32,
-    /// So many there would be at the last frame asked for.
+    /// Predicted number of particles at the last requested frame.
     pub at_end: u64,
-    /// The last frame asked for.
+    /// The last requested frame.
     pub end: u32,
-    /// Frames that growth was measured over.
+    /// Number of frames over which growth was measured.
     pub over: usize,
-    /// `max_particles`.
+    /// `max_particles` of the settings.
     pub allowed: u32,
 }
 
-/// Counts of a stream that grows.
+/// Particle counts of a growing stream.
 pub(super) struct Forecast {
     allowed: u32,
     end: u32,
-    /// Of consecutive frames, the newest last; before the first whitewater one frame without.
+    /// Counts of consecutive frames, the newest last; before the first whitewater a single frame
+    /// without any.
     counts: VecDeque<usize>,
     is_told: bool,
 }
 
 impl Forecast {
-    /// Of a stream that has `count` particles, and whose bake ends with frame `end`.
+    /// Starts from a stream with `count` particles, to be extended to frame `end`.
     pub(super) fn new(allowed: u32, end: u32, count: usize) -> Self {
         Self {
             allowed,
@@ -40,8 +42,8 @@ impl Forecast {
         }
     }
 
-    /// Takes the number of particles of the next frame. Once, where a line through it and the one [`OVER`] frames before passes what
-    /// is allowed within the bake: when.
+    /// Takes the number of particles of the next frame. Returns a prediction, once, when the line
+    /// through it and the count [`OVER`] frames before exceeds the limit by the last frame.
     pub(super) fn see(&mut self, frame: u32, count: usize) -> Option<Crowding> {
         if count == 0 || self.counts.len() > OVER {
             self.counts.pop_front();
@@ -70,7 +72,7 @@ impl Forecast {
 mod tests {
     use super::*;
 
-    /// What is said, and after which frame, of counts from frame 1 on.
+    /// The prediction, and the frame after which it is made, for counts from frame 1 on.
     fn said(allowed: u32, end: u32, counts: &[usize]) -> Option<(u32, Crowding)> {
         let mut forecast = Forecast::new(allowed, end, 0);
         let mut all = (1u32..).zip(counts).filter_map(|(frame, &count)| {
@@ -84,7 +86,7 @@ mod tests {
 
     #[test]
     fn steady_growth_is_foretold_to_the_frame() {
-        // From frame 11 on 30 a frame: frame k has 30 (k − 10), which passes 1000 at frame 44.
+        // From frame 11 on 30 per frame: frame k has 30 (k − 10), which exceeds 1000 at frame 44.
         let steady: Vec<usize> = (1usize..=43).map(|k| 30 * k.saturating_sub(10)).collect();
         let (when, found) = said(1000, 60, &steady).unwrap_or_else(|| panic!("nothing said"));
         assert_eq!(when, 14);
@@ -98,7 +100,8 @@ mod tests {
                 allowed: 1000
             }
         );
-        // The controls: room enough, a bake that ends before, growth that ended, none at all.
+        // Controls: a sufficient limit, a bake that ends before, growth that stopped, no whitewater
+        // at all.
         assert_eq!(said(1500, 60, &steady), None);
         assert_eq!(said(1000, 43, &steady), None);
         let level: Vec<usize> = (1..=40).map(|k| 100 * k.min(3)).collect();
@@ -107,7 +110,7 @@ mod tests {
         assert_eq!(said(10, 60, &[0; 40]), None);
     }
 
-    /// Growth that begins late is seen when it does.
+    /// Growth that begins late is detected when it begins.
     #[test]
     fn a_later_burst_is_foretold_too() {
         let burst: Vec<usize> = (1..=40usize)

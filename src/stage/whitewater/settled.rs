@@ -1,4 +1,4 @@
-//! What a stream is made with: its own settings, and thresholds that the shot decides.
+//! The complete settings of a stream: its own, and thresholds that are calibrated on the shot.
 
 use std::{
     path::Path,
@@ -10,7 +10,7 @@ use swell_cache::CacheReader;
 use swell_domain::whitewater::{Settings, Thresholds};
 use swell_scene::{Scene, whitewater::WhitewaterSettings};
 
-/// Frames that a shot's thresholds are calibrated on, at most.
+/// Most frames that a shot's thresholds are calibrated on.
 const CALIBRATED_ON: usize = 16;
 
 /// The settings that a stream was made with.
@@ -23,11 +23,12 @@ pub(super) fn recorded(
     let text = String::from_utf8_lossy(&bytes);
     let file = directory.join("assets").join(SETTINGS);
     let settings = WhitewaterSettings::parse(&text, &file)?;
-    // All of them stand there: the shot decides nothing.
+    // The file has all of them, so the shot decides nothing.
     Ok(settings.settled(scene.particle_spacing(), &Thresholds::calibrate(&[])))
 }
 
-/// Settings of a new stream, and how many frames decided what they leave open; `None` where a signal ended it before.
+/// Settings of a new stream, and how many frames were used to calibrate them; `None` if a signal
+/// stopped the calibration.
 pub(super) fn settle(
     request: &Request,
     scene: &Scene,
@@ -42,7 +43,7 @@ pub(super) fn settle(
         false => Vec::new(),
     };
     let step = frames.len().div_ceil(CALIBRATED_ON).max(1);
-    // The last frame is one of them.
+    // Counted from the end, so that the last frame is included.
     let mut chosen: Vec<u32> = frames.into_iter().rev().step_by(step).collect();
     chosen.reverse();
     let mut all = Vec::new();

@@ -1,11 +1,11 @@
-//! The water of every frame of a bake, also of those whose particles were not kept.
+//! The water of every frame of a bake, including frames whose particles were not kept.
 
 use glam::{DVec3, Vec3};
 
 use swell_cache::{CacheError, CacheReader};
 use swell_domain::{particles::Particles, period::Period};
 
-/// Reads frames in order, and makes those between two that were kept.
+/// Reads frames in ascending order, and interpolates those between two kept frames.
 pub(super) struct Water<'a> {
     cache: &'a CacheReader,
     period: Period,
@@ -22,19 +22,19 @@ impl<'a> Water<'a> {
         }
     }
 
-    /// Where it reads.
+    /// The cache that it reads from.
     pub(super) fn cache(&self) -> &'a CacheReader {
         self.cache
     }
 
-    /// The particles of a frame, which are about the scene's origin; between two kept frames each particle goes along the cubic
-    /// that has both frames' positions and velocities (Hermite).
+    /// The particles of a frame, relative to the scene's origin. Between two kept frames, each
+    /// particle follows the cubic Hermite curve through both frames' positions and velocities.
     pub(super) fn at(&mut self, frame: u32) -> Result<Particles, CacheError> {
         let kept = |frame: &u32| self.cache.has_particles(*frame);
         let before = (self.cache.first_frame()..=frame).rev().find(kept);
         let after = (frame..=self.cache.last_frame()).find(kept);
         let (Some(before), Some(after)) = (before, after) else {
-            // The reader says what is wrong with it.
+            // Returns the reader's error.
             return self.cache.read(frame);
         };
         self.read
@@ -58,7 +58,8 @@ impl<'a> Water<'a> {
     }
 }
 
-/// Particles that stand in both, at `part` of the way from one to the other, which takes `seconds`.
+/// Interpolates particles that exist in both states, at the fraction `part` of the `seconds`
+/// between them.
 fn between(
     start: &Particles,
     end: &Particles,
@@ -70,7 +71,7 @@ fn between(
     let mut made = Particles::default();
     let mut others = end.id.iter().enumerate().peekable();
     for (k, &id) in start.id.iter().enumerate() {
-        // Both are in the order of their ids.
+        // Both are sorted by id.
         while others.next_if(|(_, other)| **other < id).is_some() {}
         let Some((l, _)) = others.next_if(|(_, other)| **other == id) else {
             continue;
@@ -87,7 +88,8 @@ fn between(
     made
 }
 
-/// Way gone and velocity at `part` of `seconds`, of the cubic that goes `way` from velocity `v0` to `v1`.
+/// Displacement and velocity at the fraction `part` of `seconds`, along the cubic with total
+/// displacement `way` and end velocities `v0` and `v1`.
 fn hermite(way: DVec3, v0: DVec3, v1: DVec3, seconds: f64, part: f64) -> (DVec3, DVec3) {
     let (s, s2, s3) = (part, part * part, part * part * part);
     let x = (3.0 * s2 - 2.0 * s3) * way + seconds * ((s - 2.0 * s2 + s3) * v0 + (s3 - s2) * v1);
@@ -110,7 +112,7 @@ mod tests {
         }
     }
 
-    /// A free fall is a parabola, which a cubic has exactly.
+    /// A free fall is a parabola, which a cubic represents exactly.
     #[test]
     fn what_falls_is_where_it_falls_to() {
         let at = |t: f64| (2.0 * t - 4.905 * t * t, 2.0 - 9.81 * t);
@@ -121,7 +123,7 @@ mod tests {
         let (x, v) = at(0.1);
         assert!((f64::from(made.position[0][0]) - x).abs() < 1e-6);
         assert!((f64::from(made.velocity[0][0]) - v).abs() < 1e-5);
-        // The straight line between is elsewhere.
+        // Linear interpolation gives another position.
         assert!((x0 + 0.25 * (x1 - x0) - x).abs() > 0.1);
     }
 

@@ -35,7 +35,7 @@ fn hash(frame: u32) -> Option<String> {
     (frame < 9).then(|| format!("b3 of {frame}"))
 }
 
-/// Frames 1 and 2 as PNG.
+/// Enters for frames 1 and 2 as PNG.
 fn enter_as(owner: Owner, folder: &Path, overwrite: bool) -> Result<Folder, FolderError> {
     let wanted = Wanted {
         owner,
@@ -101,7 +101,7 @@ fn one_look_at_a_time_and_overwriting_alone() {
     assert!(is_in_use(enter("day", d, false)));
     assert!(is_in_use(enter("day", d, true)));
     drop(alone);
-    // Without a picture there is nothing to mix with.
+    // Without pictures, there is nothing to mix with.
     drop(enter("dusk", d, false).unwrap());
     assert!(!d.join(ROOM).exists());
 }
@@ -141,7 +141,7 @@ fn where_nothing_was_rendered_nothing_is_left() {
     assert!(!new.exists());
     drop(enter("day", folder.path(), false).unwrap());
     assert!(folder.path().exists() && names(folder.path()).unwrap().is_empty());
-    // A picture stays, and so does the record of whose it is.
+    // A picture stays, and so does the record of its owner.
     let held = enter("day", &new, false).unwrap();
     picture(&held.draft("small.0001.png"), 1, |_| ());
     held.publish("small.0001.png").unwrap();
@@ -150,7 +150,7 @@ fn where_nothing_was_rendered_nothing_is_left() {
     assert_eq!(names(&new).unwrap(), left.into());
 }
 
-/// A lock on a file that was taken away meanwhile keeps nobody out.
+/// A lock on a file that was removed meanwhile excludes nobody.
 #[cfg(unix)]
 #[test]
 fn a_gate_that_was_taken_away_is_made_anew() {
@@ -169,7 +169,7 @@ fn a_gate_that_was_taken_away_is_made_anew() {
     other.try_lock().unwrap();
 }
 
-/// Said before any frame is rendered, whether or not the folder is ours.
+/// Reported before any frame is rendered, whether or not the folder is ours.
 #[test]
 fn a_folder_in_place_of_a_picture_is_refused_at_once() {
     for overwrite in [false, true] {
@@ -190,7 +190,7 @@ fn a_folder_in_place_of_a_picture_is_refused_at_once() {
     }
 }
 
-/// Each thing that pictures of one folder have in common.
+/// Each property that the pictures of one folder share.
 #[test]
 fn a_picture_of_something_else_is_told_by_what_it_is() {
     type Edit = fn(&mut Attributes);
@@ -216,7 +216,8 @@ fn a_picture_of_something_else_is_told_by_what_it_is() {
             picture(&file, frame, |_| ());
             drop(enter("day", d, false).unwrap());
             picture(&file, frame, edit);
-            // Of a folder that is ours it is remade where it is one of the frames wanted: what a kill left.
+            // In a folder of ours it is replaced if it is one of the wanted frames: a kill may have
+            // left it.
             assert_eq!(enter("day", d, false).is_ok(), frame == 2, "{says}");
             fs::remove_file(d.join(RECORD)).unwrap();
             match enter("day", d, false) {
@@ -235,7 +236,7 @@ fn a_picture_of_something_else_is_told_by_what_it_is() {
             }
         }
     }
-    // A frame that the cache has not (yet): the cache cannot tell.
+    // For a frame that the cache does not have (yet), the cache cannot decide.
     let folder = tempfile::tempdir().unwrap();
     picture(&folder.path().join("small.0012.png"), 12, |_| ());
     drop(enter("day", folder.path(), false).unwrap());
