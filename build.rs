@@ -1,7 +1,7 @@
-//! What `swell --version` says of the build: commit, target, profile, features.
+//! Sets what `swell --version` prints about the build: commit, target, profile, features.
 //!
-//! Runs again where the sources have changed, and not otherwise: a commit of pages alone compiles nothing anew. What is said is what was so
-//! when the program was compiled.
+//! Runs again only when the sources change, so that a commit of documentation alone recompiles
+//! nothing. The output therefore describes the state at compile time.
 
 use std::{
     env,
@@ -9,7 +9,7 @@ use std::{
     process::Command,
 };
 
-/// What the program is made of.
+/// Paths that the program is built from.
 const SOURCES: [&str; 5] = ["build.rs", "Cargo.toml", "Cargo.lock", "src", "shaders"];
 
 fn main() {
@@ -35,7 +35,8 @@ fn main() {
     }
 }
 
-/// The last commit of a tree that changed its sources, and whether they were edited since; in words that there is none to be known.
+/// The last commit that changed the sources of a tree, and whether they were edited since.
+/// Describes in words what cannot be determined.
 pub fn commit(root: &Path) -> String {
     let log = ["log", "-1", "--format=%H", "--"];
     let commit = git(root, &[&log[..], &SOURCES].concat());
@@ -51,14 +52,15 @@ pub fn commit(root: &Path) -> String {
     }
 }
 
-/// Whether the tree is a repository's: an archive may have been unpacked within another one.
+/// Whether the tree is the root of its repository: an archive may have been unpacked inside another
+/// one.
 fn is_own(root: &Path) -> bool {
     let top = git(root, &["rev-parse", "--show-toplevel"]).map(PathBuf::from);
     let same = |top: PathBuf| Some(top.canonicalize().ok()? == root.canonicalize().ok()?);
     top.and_then(same) == Some(true)
 }
 
-/// What git says; `None` where there is no git, or it says that something is wrong.
+/// Output of git; `None` if git is missing or fails.
 fn git(root: &Path, arguments: &[&str]) -> Option<String> {
     let output = Command::new("git")
         .arg("-C")

@@ -1,11 +1,13 @@
 //! swell bakes ocean-wave shots to particle caches and renders them.
 //!
-//! The program `swell` is a thin layer over this library: what a command does, a function here does, without a terminal. Whoever wants a cache in a
-//! pipeline of their own, a solver in a test, or one more stage, begins here.
+//! The program `swell` is a thin layer over this library: every command corresponds to a function
+//! here that needs no terminal. Start here to use caches in your own pipeline, to run a solver in a
+//! test, or to add a stage.
 //!
-//! # A bake, and what is in it
+//! # Example: bake a scene and read the result
 //!
-//! Without a driver this runs on the CPU, by the f64 reference; with `Device::Gpu(Gpu::default())` on the best adapter.
+//! This runs on the CPU with the f64 reference and needs no driver. `Device::Gpu(Gpu::default())`
+//! selects the best adapter instead.
 //!
 //! ```
 //! use std::{path::Path, sync::atomic::AtomicBool};
@@ -18,7 +20,7 @@
 //! };
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! // A metre of water in a box two metres wide. `Scene::load` reads a file.
+//! // A column of water one metre high in a box two metres wide. `Scene::load` reads a file.
 //! let text = r#"
 //!     shot = { name = "drop", frames = 24, frames_per_second = 24 }
 //!     domain = { min = [0.0, 0.0, 0.0], max = [2.0, 2.0, 1.0] }
@@ -31,57 +33,73 @@
 //! let request = Request {
 //!     scene,
 //!     directory: folder.path().join("drop"),
-//!     frames: FrameRange::inclusive(1, 2),      // the whole shot where `None`
+//!     frames: FrameRange::inclusive(1, 2),      // the whole shot if `None`
 //!     resume: false,
 //!     from: None,
 //!     device: Device::Cpu,
 //!     time_passes: false,
 //! };
-//! let stop = AtomicBool::new(false);            // set by another thread, ends it after the current frame
+//! let stop = AtomicBool::new(false);            // set it to end after the current frame
 //! let outcome = bake(&request, &stop, &mut |_event| {})?;
 //! assert_eq!(outcome.last_frame, 2);
 //!
 //! let cache = CacheReader::open(&request.directory)?;
-//! let [start, end] = [cache.read(0)?, cache.read(2)?];    // checksums are checked
+//! let [start, end] = [cache.read(0)?, cache.read(2)?];    // verifies checksums
 //! assert_eq!(start.len(), 4 * 8 * 8);
-//! assert_eq!(start.id, end.id);                 // no particle is lost, and each keeps its number
-//! let height = |of: &[[f32; 3]]| of.iter().map(|at| f64::from(at[1])).sum::<f64>() / of.len() as f64;
+//! assert_eq!(start.id, end.id);                 // no particle is lost, and each keeps its id
+//! let height = |of: &[[f32; 3]]| {
+//!     of.iter().map(|at| f64::from(at[1])).sum::<f64>() / of.len() as f64
+//! };
 //! assert!(height(&end.position) < height(&start.position), "metres, y up: it falls");
 //! # Ok(())
 //! # }
 //! ```
 //!
-//! An error says by [`stage::Blame`] whose fault it is: the input's, the device's, the files', the numbers'. The program's exit codes follow from that.
+//! [`stage::Blame`] tells where the fault of an error lies: in the input, the device, the files, or
+//! the numbers. The program's exit codes follow from it.
 //!
-//! # Rooms
+//! # Crates
 //!
-//! Data flows one way, and stages share nothing but files:
+//! Data flows in one direction, and stages share nothing but files:
 //!
 //! ```text
-//! scene.toml -> scene -> stage::bake -> solve (GPU) -> cache -> stage::render -> render (GPU) -> images
+//! scene.toml -> scene -> stage::bake -> solve (GPU) -> cache
+//! cache -> stage::render -> render (GPU) -> images
 //! ```
 //!
-//! | for | rooms |
-//! | --- | --- |
-//! | files in | [`scene`]: scene and look files, validated, and the plan of passes and buffers |
-//! | a job from end to end | [`stage`]: [bake](stage::bake), [render](stage::render), [export](stage::export), [whitewater](stage::whitewater), [check](stage::check), [diff](stage::diff), [verify](stage::verify); wires the rooms, no terminal |
-//! | files between | [`cache`]: frames, ledger, manifest on disk |
-//! | computing | [`gpu`]: adapter, shader composition, passes recorded as data, scan and sort; [`solve`]: the particle solvers on the GPU; [`render`]: pictures of frames, by splats in screen space and by rays |
-//! | how true it is | [`mod@reference`]: the same solvers on the CPU, in f64; [`check`]: a substep on the GPU against the same one in f64, pass by pass; [`compare`]: by how much two sets of values, two caches or two pictures differ |
-//! | studies | [`experiment`]: runs them: points, resumable results, reports; [`study`]: what frames measure, curves, and the page that shows them |
-//! | files out | [`export`]: files for other programs, from a frame's mesh or particles |
-//! | what all speak | [`domain`]: particles, meshes, signed distance, wave-maker motion |
-//! | the terminal | [`cli`]: arguments in, terminal out |
+//! - Input files: [`scene`] parses and validates scene and look files, and plans passes and
+//!   buffers.
+//! - Complete jobs: [`stage`] combines the other crates without a terminal. Its jobs are
+//!   [bake](stage::bake), [render](stage::render), [export](stage::export),
+//!   [whitewater](stage::whitewater), [check](stage::check), [diff](stage::diff) and
+//!   [verify](stage::verify), among others.
+//! - Intermediate files: [`cache`] stores frames, ledger and manifest on disk.
+//! - Computation: [`gpu`] provides adapters, shader composition, passes recorded as data, scan and
+//!   sort; [`solve`] the particle solvers on the GPU; [`render`] pictures of frames, by
+//!   screen-space splats and by rays.
+//! - Accuracy: [`mod@reference`] implements the same solvers on the CPU in f64; [`check`] compares
+//!   a substep on the GPU with the reference, pass by pass; [`compare`] measures how much two sets
+//!   of values, two caches or two pictures differ.
+//! - Studies: [`experiment`] runs points, resumes results and writes reports; [`study`] measures
+//!   frames, draws curves and builds the page that shows them.
+//! - Output files: [`export`] writes files for other programs from a frame's mesh or particles.
+//! - Shared vocabulary: [`domain`] defines particles, meshes, signed distance and wave-maker
+//!   motion.
+//! - Terminal: [`cli`] parses arguments and prints results.
 //!
-//! # Units, axes, numbers
+//! # Units and axes
 //!
-//! SI units throughout; looks have degrees, millimetres on film, stops. Right-handed axes, y up. Names carry a unit where it is another one. A frame's positions
-//! are `f32` about the scene's origin ([`scene::Scene::origin`]), which is zero but for scenes far from the world's.
+//! All quantities are in SI units; looks also use degrees, millimetres on film, and stops. Axes are
+//! right-handed with y up. Names carry a unit if it is a different one. A frame's positions are
+//! `f32` relative to the scene's origin ([`scene::Scene::origin`]), which is zero except for scenes
+//! far from the world's origin.
 //!
 //! # More
 //!
-//! In the repository: `docs/first-shot.md` for users of the program, `docs/ARCHITECTURE.md` for who may import whom and how to add a pass, an effect,
-//! a format, a stage; `docs/cache.md` for the formats, `docs/keys.md` for every key. Python reads caches by the package in `tools/python`.
+//! In the repository: `docs/first-shot.md` introduces the program, `docs/ARCHITECTURE.md` describes
+//! the dependencies between crates and how to add a pass, an effect, a format or a stage,
+//! `docs/cache.md` the file formats, and `docs/keys.md` every key. The package in `tools/python`
+//! reads caches from Python.
 
 pub use swell_cache as cache;
 pub use swell_check as check;

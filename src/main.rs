@@ -2,7 +2,7 @@
 
 use std::{env, process::ExitCode};
 
-/// Version, and what this program was built from and for.
+/// Version, commit, target, profile and features of this build.
 const BUILD: &str = concat!(
     env!("CARGO_PKG_VERSION"),
     "\ncommit: ",
@@ -16,7 +16,8 @@ const BUILD: &str = concat!(
 );
 
 fn main() -> ExitCode {
-    // Without a desktop session Mesa's device-select layer prints two lines that read like our failure.
+    // Without a desktop session, Mesa's device-select layer prints two lines that look like a
+    // failure of ours.
     if env::var_os("XDG_RUNTIME_DIR").is_none() && env::var_os("NODEVICE_SELECT").is_none() {
         // SAFETY: no other thread runs yet.
         unsafe { env::set_var("NODEVICE_SELECT", "1") };

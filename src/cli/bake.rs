@@ -67,7 +67,7 @@ pub(super) struct BakeArgs {
     pub(super) progress: Mode,
 }
 
-/// A solver by its name.
+/// Parses the name of a solver.
 pub(super) fn method(name: &str) -> Result<Method, String> {
     let mut named = Method::NAMED.into_iter();
     let found = named.find(|(known, _)| *known == name);
@@ -77,7 +77,7 @@ pub(super) fn method(name: &str) -> Result<Method, String> {
         .ok_or_else(|| format!("no solver of that name; allowed: {names}"))
 }
 
-/// How far paths in scenes and looks lead.
+/// Which files scenes and looks may refer to.
 pub(super) fn reach(allow_outside: bool) -> Reach {
     if allow_outside {
         Reach::Anywhere
@@ -86,7 +86,7 @@ pub(super) fn reach(allow_outside: bool) -> Reach {
     }
 }
 
-/// A scene with overrides laid over it, and the solver that was asked for.
+/// Loads a scene with overrides and the requested solver.
 pub(super) fn load(
     file: &Path,
     set: &[String],
@@ -98,8 +98,8 @@ pub(super) fn load(
     Scene::load_within(file, &overrides, reach(allow_outside))
 }
 
-/// The scene; where a bake is to go on past the end of its shot, the scene with a longer one, so that walls and solids
-/// are known to stay where they may as far as that.
+/// Loads the scene. If a bake is to be resumed past the end of its shot, the shot is lengthened, so
+/// that walls and solids are validated up to that frame.
 fn load_lengthened(args: &BakeArgs) -> Result<Scene, SceneError> {
     let scene = load(&args.scene, &args.set, args.solver, args.allow_outside)?;
     match &args.frames {
@@ -195,7 +195,7 @@ fn dry_run(request: &Request, progress: &Progress) -> Result<u8, Failure> {
     Ok(0)
 }
 
-/// What the frames will take on the disk.
+/// Disk space that the frames will need, in words.
 fn taken(room: Room) -> String {
     let compressed = if room.is_compressed {
         " before compression"
@@ -205,7 +205,7 @@ fn taken(room: Room) -> String {
     format!("about {}{compressed}", size(room.bytes))
 }
 
-/// That the disk cannot hold the frames, where it cannot.
+/// Warns if the disk cannot hold the frames.
 fn warn_of_room(progress: &Progress, room: Room) {
     if let Some(free) = room.short_of() {
         progress.say(
@@ -333,13 +333,15 @@ pub(super) fn warned(warning: &str) -> (String, Value) {
     )
 }
 
-/// Mean density error above which the water is plainly wrong; splashes of the shipped scenes stay below 0.021.
+/// Mean density error above which the water is clearly wrong; splashes of the included scenes stay
+/// below 0.021.
 const DENSE: f64 = 0.05;
 
-/// Density error of a cell above which water has leaked or run together there; FLIP's splashes stay below 0.9.
+/// Density error of a cell above which water has leaked or piled up there; FLIP's splashes stay
+/// below 0.9.
 const CROWDED: f64 = 1.0;
 
-/// Mean divergence of a pocket against the largest anywhere, above which it is not rounding.
+/// Mean divergence of a pocket, relative to the largest anywhere, above which it is not rounding.
 const INCOMPATIBLE: f64 = 1e-3;
 
 /// Warnings about a frame.

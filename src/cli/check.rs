@@ -54,7 +54,7 @@ pub(super) struct CheckArgs {
     pub(super) progress: Mode,
 }
 
-/// What an option is for, where it is for the other kind of source.
+/// An option that applies only to another kind of source.
 #[derive(Debug, thiserror::Error)]
 #[error("{option} is for {what}; {} is {is}", .source_file.display())]
 pub(super) struct Misplaced {
@@ -64,7 +64,8 @@ pub(super) struct Misplaced {
     pub(super) source_file: PathBuf,
 }
 
-/// What a failed bake left, computed again: the line that the bake ended with, or that it now goes well.
+/// Recomputes the frame of a failed bake: reports the same failure as the bake, or that it now
+/// succeeds.
 fn run_failed(args: &CheckArgs, progress: &Progress) -> Result<u8, Failure> {
     let has_solver = args.solver.is_some() || !args.set.is_empty();
     if args.frames.is_some() || args.substep.is_some() || has_solver {
@@ -128,7 +129,7 @@ pub(super) fn run(args: &CheckArgs, progress: &Progress) -> Result<u8, Failure> 
     })
 }
 
-/// Of pictures of a cache.
+/// Checks pictures of a cache.
 fn run_render(args: &CheckArgs, look: &PathBuf, progress: &Progress) -> Result<u8, Failure> {
     let has_step = args.substep.is_some() || args.solver.is_some() || !args.set.is_empty();
     let source_file = args.source.clone();
@@ -258,7 +259,7 @@ fn to_json(outcome: &Outcome) -> serde_json::Value {
     })
 }
 
-/// Two figures of a number, short.
+/// A number with two significant digits.
 fn short(value: f64) -> String {
     match value {
         0.0 => "0".into(),
@@ -302,7 +303,7 @@ fn show(table: &Table) -> String {
     text
 }
 
-/// Which substeps the table is of.
+/// The substeps that the table covers.
 fn show_substeps(outcome: &Outcome) -> String {
     let checked = outcome.frames.iter().zip(&outcome.substeps);
     let all: Vec<String> = checked

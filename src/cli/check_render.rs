@@ -34,7 +34,7 @@ pub(super) struct SurfaceArgs {
 }
 
 impl SurfaceArgs {
-    /// The look, where pictures are to be checked.
+    /// The look, if pictures are to be checked.
     pub(super) fn look(&self) -> Option<&PathBuf> {
         self.look.as_ref().filter(|_| self.render)
     }
@@ -160,7 +160,7 @@ fn show(outcome: &Outcome, is_within: bool) -> String {
     text
 }
 
-/// The water's edges: how far out they are drawn, and how rough.
+/// The water's edges: their offset and roughness.
 fn outlines(text: &mut String, outcome: &Outcome) {
     let _ = writeln!(
         text,
@@ -189,7 +189,7 @@ fn outlines(text: &mut String, outcome: &Outcome) {
     }
 }
 
-/// What was asked for of pictures.
+/// Scores and flicker of the pictures, as far as requested.
 fn pictures(text: &mut String, outcome: &Outcome) {
     for row in &outcome.rows {
         if let Some(score) = row.score {

@@ -16,7 +16,7 @@ use swell_stage::diff::{
 
 use super::{Failure, OUT_OF_TOLERANCE, output};
 
-/// Lines of one kind that are printed before the rest is counted.
+/// Lines of one kind that are printed before the rest is only counted.
 const MOST_LINES: usize = 10;
 
 #[derive(Args, Debug)]
@@ -179,7 +179,7 @@ fn show_lone(out: &mut String, what: &str, side: &str, names: &str) -> std::fmt:
     writeln!(out, "{what} in {side} alone: {names}")
 }
 
-/// Of each field the worst of all frames, each measure with its frame.
+/// The largest deviation of each field over all frames, each measure with its frame.
 fn show_fields(out: &mut String, diff: &CacheDiff) -> std::fmt::Result {
     let Some(first) = diff.frames.first() else {
         return Ok(());
@@ -230,7 +230,7 @@ fn show_fields(out: &mut String, diff: &CacheDiff) -> std::fmt::Result {
     Ok(())
 }
 
-/// Of each aggregate the frame in which it is farthest apart.
+/// For each aggregate the frame with the largest difference.
 fn show_aggregates(
     out: &mut String,
     peaks: &[AggregatePeak],
@@ -276,7 +276,7 @@ fn show_first_difference(out: &mut String, diff: &CacheDiff) -> std::fmt::Result
     }
 }
 
-/// A line a fault, the first ones alone.
+/// One line per fault, for the first ones only.
 fn show_faults(out: &mut String, faults: impl Iterator<Item = String>) -> std::fmt::Result {
     let faults: Vec<_> = faults.collect();
     for fault in faults.iter().take(MOST_LINES) {
@@ -452,7 +452,7 @@ fn show_pair(out: &mut String, pair: &PairDiff, width: usize) -> std::fmt::Resul
     )
 }
 
-/// Four digits, plain where that is short.
+/// Four significant digits, without exponent if that is short.
 fn number(value: f64) -> String {
     let size = value.abs();
     if value == 0.0 {

@@ -1,23 +1,23 @@
-//! `--dry-run`: what a command would make.
+//! `--dry-run`: reports what a command would make.
 
 use serde_json::{Value, json};
 
 use super::{count, output, progress::Progress, size};
 
-/// What all commands say of it.
+/// The prediction that all commands report.
 pub(super) struct DryRun {
-    /// Frames to be made, by number.
+    /// Numbers of the frames to be made.
     pub(super) frames: Vec<u32>,
-    /// Frames that stand there.
+    /// Number of frames that exist already.
     pub(super) standing: usize,
-    /// Expected on the disk; `None` where nothing is known of it.
+    /// Predicted bytes on disk; `None` if unknown.
     pub(super) bytes: Option<u64>,
-    /// Where to.
+    /// Output folder.
     pub(super) place: String,
 }
 
 impl DryRun {
-    /// Tells it, with `more` that this command knows: words behind the line, and keys for programs.
+    /// Reports the prediction. `words` extends the line, and `more` the keys for programs.
     pub(super) fn tell(&self, progress: &Progress, words: &str, mut more: Value) {
         let frames = self.frames.len();
         let bytes = match self.bytes {

@@ -96,7 +96,7 @@ enum Water {
     Mesh,
 }
 
-/// As looks take it.
+/// Voxels per spacing, with the same range as in looks.
 fn voxels(text: &str) -> Result<f64, String> {
     let allowed = 1.0..=4.0;
     let found = text.parse().ok().filter(|x| allowed.contains(x));
@@ -189,7 +189,7 @@ fn dry_run(request: &Request, progress: &Progress) -> Result<u8, Failure> {
     Ok(0)
 }
 
-/// Folders that files go to, each once.
+/// The output folders, without duplicates.
 fn places(request: &Request) -> Vec<String> {
     let file = |target: &Target| match target {
         Target::Mesh(files)

@@ -1,4 +1,4 @@
-//! `--keep-going`: frames that failed while others went on.
+//! `--keep-going`: frames that failed while the command continued.
 
 use std::error::Error;
 
@@ -10,7 +10,7 @@ use super::{
 };
 use swell_domain::frame_range::ranges;
 
-/// Tells of a frame that failed.
+/// Reports a frame that failed.
 pub(super) fn frame_failed(progress: &Progress, frame: u32, error: &dyn Error) {
     let message = chain(error);
     progress.frame(
@@ -20,7 +20,7 @@ pub(super) fn frame_failed(progress: &Progress, frame: u32, error: &dyn Error) {
     );
 }
 
-/// Behind what was done, in a command's last line.
+/// Suffix of a command's last line with the number of failed frames.
 pub(super) fn failed_in_all(frames: &[u32]) -> String {
     match frames.len() {
         0 => String::new(),
@@ -28,7 +28,7 @@ pub(super) fn failed_in_all(frames: &[u32]) -> String {
     }
 }
 
-/// The end of a command that went on: a fault of files, where frames failed.
+/// Ends a command that continued: exit code 4 if frames failed.
 pub(super) fn refuse_failed(frames: &[u32]) -> Result<u8, Failure> {
     let mut numbers = frames.to_vec();
     numbers.sort_unstable();

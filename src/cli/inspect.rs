@@ -135,7 +135,7 @@ pub(super) fn run(args: &InspectArgs) -> Result<u8, Failure> {
     misfit.map_or(Ok(0), |misfit| Err(misfit.into()))
 }
 
-/// A frame that failed has no plan and no ledger.
+/// Error for the folder of a failed frame, which has neither plan nor ledger.
 fn broken_off(directory: &Path) -> Failure {
     let what = format!(
         "{} is the frame that a bake broke off at, which no cache lists: `swell check {}` computes it again",
@@ -148,7 +148,8 @@ fn broken_off(directory: &Path) -> Failure {
     }
 }
 
-/// A scene moves as it says until its shot's end; the first frame warms the device up.
+/// Refuses to time frames beyond the end of the shot, where motions are undefined; the first frame
+/// is a warm-up.
 fn refuse_frames_beyond(args: &InspectArgs, file: &Path, frames: u32) -> Result<(), Failure> {
     match args.time {
         Some(asked) if asked >= frames => {
@@ -166,10 +167,10 @@ fn refuse_frames_beyond(args: &InspectArgs, file: &Path, frames: u32) -> Result<
     }
 }
 
-/// What is told of a cache where an option of scenes is given: it says itself what it was baked with, and on what.
+/// Reason to refuse options of scenes for a cache.
 const CACHE: &str = "a cache: it says what it was baked with";
 
-/// Refuses options of scenes for what is none.
+/// Refuses options of scenes for other subjects.
 fn refuse_options(args: &InspectArgs, is: &'static str, file: &Path) -> Result<(), Failure> {
     if args.time.is_some() {
         return Err(misplaced("--time", "scenes", is, file));
@@ -296,7 +297,7 @@ fn show_plan(out: &mut String, scene: &Scene, planned: &ScenePlan) -> fmt::Resul
     Ok(())
 }
 
-/// What bindings, or what lists may take, made of the plan.
+/// Describes how limits on bindings and lists changed the plan.
 fn show_arrangement(out: &mut String, scene: &Scene, planned: &ScenePlan) -> fmt::Result {
     let plan = &planned.plan;
     match (scene.solver.method, plan.has_lists, plan.chunks.len()) {
@@ -413,7 +414,7 @@ fn show_cache(out: &mut String, manifest: &Manifest, entries: &[Entry]) -> fmt::
     Ok(())
 }
 
-/// A line a column of each probe: its least, greatest and last value.
+/// One line per column of each probe: its minimum, maximum and last value.
 fn show_probes(out: &mut String, manifest: &Manifest, entries: &[Entry]) -> fmt::Result {
     if manifest.probes.is_empty() {
         return Ok(());
@@ -444,7 +445,7 @@ fn show_probes(out: &mut String, manifest: &Manifest, entries: &[Entry]) -> fmt:
     Ok(())
 }
 
-/// Iterations and what stands under `projection`; the start has neither.
+/// Iterations and the fields of `projection`; the start has neither.
 fn projection_columns(entry: &Entry) -> String {
     let of = |table: Option<&serde_json::Value>, key: &str| table?.get(key)?.as_f64();
     let projection = entry.report.get("projection");

@@ -1,25 +1,26 @@
-//! SIGINT and SIGTERM: the first ends the job after the current frame, resumably; the second at once.
+//! SIGINT and SIGTERM: the first ends the job after the current frame, resumably; the second ends
+//! it at once.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::output;
 
-/// Exit code of a process that a signal ended, by custom 128 + SIGINT.
+/// Exit code of a process that a signal ended; by convention 128 + SIGINT.
 pub const EXIT_CODE: i32 = 130;
 
-/// Whether the user has asked for an end. Clones share one flag.
+/// Whether the user has requested an end. Clones share one flag.
 #[derive(Clone, Debug, Default)]
 pub struct Interrupt {
     flag: Arc<AtomicBool>,
 }
 
 impl Interrupt {
-    /// Takes over SIGINT, SIGTERM and SIGHUP (on Windows Ctrl-C) for the rest of the process; those that the process was
-    /// started to ignore, as under `nohup`, stay ignored.
+    /// Handles SIGINT, SIGTERM and SIGHUP (on Windows Ctrl-C) for the rest of the process. Signals
+    /// that the process was started to ignore, as under `nohup`, stay ignored.
     ///
     /// # Errors
-    /// Where the system refuses.
+    /// The operating system refuses.
     pub fn install() -> std::io::Result<Self> {
         let interrupt = Self::default();
         let shared = interrupt.clone();
@@ -33,8 +34,8 @@ impl Interrupt {
         Ok(interrupt)
     }
 
-    /// [`Self::install`], or a warning where the system refuses: a signal then ends the process at once; finished frames
-    /// survive.
+    /// [`Self::install`], or a warning if the system refuses: a signal then ends the process at
+    /// once, and only completed frames survive.
     pub fn install_or_warn() -> Self {
         Self::install().unwrap_or_else(|error| {
             output::say(&format!(
@@ -49,18 +50,18 @@ impl Interrupt {
         self.flag.load(Ordering::Relaxed)
     }
 
-    /// The flag itself, for a stage that knows nothing of signals.
+    /// The flag itself, for a stage that does not deal with signals.
     pub fn flag(&self) -> &AtomicBool {
         &self.flag
     }
 
-    /// Raises the flag; tells whether it was up before.
+    /// Raises the flag; returns whether it was raised before.
     fn raise(&self) -> bool {
         self.flag.swap(true, Ordering::Relaxed)
     }
 }
 
-/// Has `handle` called, on a thread of its own, for each signal from here on.
+/// Calls `handle` on a separate thread for each signal from now on.
 #[cfg(unix)]
 fn on_signal(handle: impl Fn() + Send + 'static) -> std::io::Result<()> {
     use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
@@ -73,11 +74,12 @@ fn on_signal(handle: impl Fn() + Send + 'static) -> std::io::Result<()> {
     Ok(())
 }
 
-/// Whether whoever started the process had it ignore a signal.
+/// Whether the process inherited an ignored `signal`.
 #[cfg(unix)]
 fn is_ignored(signal: i32) -> bool {
     let mut now = std::mem::MaybeUninit::<libc::sigaction>::zeroed();
-    // SAFETY: a null action changes nothing; `now` has room for what is told, and all zeros are valid where nothing is.
+    // SAFETY: a null action changes nothing; `now` has space for the result, and all zeros are
+    // valid if nothing is written.
     let now = unsafe {
         libc::sigaction(signal, std::ptr::null(), now.as_mut_ptr());
         now.assume_init()
@@ -104,8 +106,8 @@ mod tests {
         assert!(other.raise());
     }
 
-    /// The child half of the test below: says when it is ready and when it was asked to end, and then
-    /// goes on, as a long frame would.
+    /// The child half of the test below: reports when it is ready and when it was asked to end, and
+    /// then continues, as a long frame would.
     #[test]
     #[ignore = "runs as the child of the test below"]
     fn child() {
@@ -118,7 +120,7 @@ mod tests {
         std::thread::sleep(std::time::Duration::from_secs(60));
     }
 
-    /// As under `nohup`: what is ignored stays so, and the others are heard.
+    /// As under `nohup`: an ignored signal stays ignored, and the others are handled.
     #[cfg(unix)]
     #[test]
     fn an_ignored_signal_stays_ignored() {
@@ -153,10 +155,12 @@ mod tests {
         use std::os::unix::process::CommandExt;
         use std::process::{Command, Stdio};
 
-        // A shell starts what goes to the background with SIGINT ignored, and the child would not hear it.
+        // A shell starts background processes with SIGINT ignored, which the child would not
+        // receive.
         let hear_all = || {
             for signal in [libc::SIGINT, libc::SIGTERM] {
-                // SAFETY: `signal` may be called between fork and exec, and the default action holds no pointer.
+                // SAFETY: `signal` may be called between fork and exec, and the default action
+                // holds no pointer.
                 unsafe { libc::signal(signal, libc::SIG_DFL) };
             }
             Ok(())

@@ -1,4 +1,4 @@
-//! Arguments in, terminal out: one file a command.
+//! The command line: parses arguments and prints results, one module per command.
 
 mod bake;
 mod check;
@@ -39,7 +39,7 @@ use swell_stage::{
     device::{Device, Gpu, Shaders},
 };
 
-/// Exit code where something is out of tolerance.
+/// Exit code if something is out of tolerance.
 const OUT_OF_TOLERANCE: u8 = 1;
 
 const AFTER: &str = "Exit codes: 0 done; 1 a comparison is out of tolerance; 2 usage, scene or look at fault; \
@@ -90,7 +90,7 @@ enum Command {
     Man(shell::ManArgs),
 }
 
-/// An error with the exit code that it ends the program with.
+/// An error with the exit code that the program ends with.
 #[derive(Debug)]
 struct Failure {
     code: u8,
@@ -138,8 +138,8 @@ impl GpuArgs {
     }
 }
 
-/// The adapter of `--adapter`; where that is left out the one that the environment names, which other options know nothing of: it is
-/// of no account on the CPU, and for what has no adapter.
+/// The adapter of `--adapter`, or the one named in the environment. The environment is ignored on
+/// the CPU and by commands without an adapter.
 fn named_adapter(flag: Option<&String>) -> Option<String> {
     flag.cloned().or_else(|| {
         Some(
@@ -150,7 +150,7 @@ fn named_adapter(flag: Option<&String>) -> Option<String> {
     })
 }
 
-/// An environment variable that is set, and to something.
+/// An environment variable, if it is set and not empty.
 fn set_variable(name: &str) -> Option<OsString> {
     std::env::var_os(name).filter(|value| !value.is_empty())
 }
@@ -188,8 +188,8 @@ impl DeviceArgs {
     }
 }
 
-/// Parses the command line, runs the command, prints what went wrong with all its causes. `build` is what `--version` prints
-/// after the program's name: the version, and what the program was built from and for.
+/// Parses the command line, runs the command, and prints errors with all their causes. `build` is
+/// what `--version` prints after the program's name: the version, commit, target and features.
 pub fn main(build: &'static str) -> ExitCode {
     let matches = Cli::command().long_version(build).try_get_matches();
     let code = match matches.and_then(|matches| Cli::from_arg_matches(&matches)) {
@@ -199,7 +199,7 @@ pub fn main(build: &'static str) -> ExitCode {
     output::exit_code(code)
 }
 
-/// Prints what clap has to tell: help, the version, or what is wrong with the arguments.
+/// Prints clap's output: help, the version, or errors in the arguments.
 fn tell(told: &clap::Error) -> u8 {
     let code = told.exit_code() as u8;
     if !told.use_stderr() {
@@ -211,7 +211,7 @@ fn tell(told: &clap::Error) -> u8 {
     let lines = text.lines().map(str::trim).take_while(|it| !it.is_empty());
     let message = lines.collect::<Vec<_>>().join(" ");
     let shown = match told.kind() {
-        // All there is to say of a value is that line: how the command is written was right.
+        // The line says everything about the value: the syntax of the command was right.
         ErrorKind::InvalidValue | ErrorKind::ValueValidation | ErrorKind::ArgumentConflict => {
             writeln!(io::stderr(), "{message}")
         }
@@ -223,13 +223,13 @@ fn tell(told: &clap::Error) -> u8 {
     code
 }
 
-/// As they stand on the command line, without the program.
+/// The command line without the program.
 fn arguments() -> Vec<String> {
     let words = std::env::args_os().skip(1);
     words.map(|it| it.to_string_lossy().into_owned()).collect()
 }
 
-/// Opens the log, runs the command, and tells its end.
+/// Opens the log, runs the command, and reports its end.
 fn start(cli: Cli) -> u8 {
     let progress = Progress::new(cli.command.progress());
     let opened = match &cli.log {
@@ -264,7 +264,7 @@ fn open_log(file: &Path) -> Result<(), Failure> {
 }
 
 impl Command {
-    /// How it tells progress.
+    /// Progress mode of the command.
     fn progress(&self) -> Mode {
         match self {
             Self::Bake(args) => args.progress,
@@ -307,7 +307,8 @@ fn run(command: Command, progress: &Progress) -> Result<u8, Failure> {
     }
 }
 
-/// Whether a path that may be a cache or a scene is a cache: a folder, or missing and not named like a scene.
+/// Whether a path that may be a cache or a scene is a cache: a folder, or missing and not named
+/// like a scene.
 fn is_cache(path: &Path) -> bool {
     path.is_dir() || (!path.exists() && path.extension().is_none_or(|end| end != "toml"))
 }
@@ -318,7 +319,7 @@ fn chain(error: &dyn Error) -> String {
     let mut cause = error.source();
     while let Some(error) = cause {
         let next = error.to_string();
-        // Some errors state their cause themselves.
+        // Some errors include their cause in their own message.
         if !text.contains(&next) {
             text += &format!(": {next}");
         }
@@ -327,7 +328,7 @@ fn chain(error: &dyn Error) -> String {
     text
 }
 
-/// So many of a thing: `1 frame`, `2 frames`.
+/// A count with its noun: `1 frame`, `2 frames`.
 fn count(many: u64, what: &str) -> String {
     match many {
         1 => format!("1 {what}"),

@@ -31,7 +31,8 @@ struct Refused {
 }
 
 impl DenyArgs {
-    /// Refuses `scene` of `file` where it was asked to and there is a reason; `is_start` says whether it begins with its own water.
+    /// Refuses `scene` of `file` if `--deny lint` is given and there are lints. `is_start` says
+    /// whether it begins with its own water.
     pub(super) fn check(&self, file: &Path, scene: &Scene, is_start: bool) -> Result<(), Failure> {
         let mut lints = match self.deny {
             Some(Denied::Lint) => scene.lints(),

@@ -1,4 +1,4 @@
-//! `--log FILE`: what goes to standard error, and progress, also into a file, a line with its time each.
+//! `--log FILE`: copies standard error and progress to a file, each line with its time.
 
 use std::{
     fs::File,
@@ -8,23 +8,24 @@ use std::{
     time::SystemTime,
 };
 
-/// The file, where one was asked for.
+/// The log file, if one was requested.
 static LOG: Mutex<Option<File>> = Mutex::new(None);
 
-/// Has everything from here on written behind what the file holds. Several processes may write into one.
+/// Opens the log; everything from now on is appended to it. Several processes may write to one
+/// file.
 ///
 /// # Errors
-/// The system's.
+/// The system's error.
 pub(super) fn open(file: &Path) -> io::Result<()> {
     let file = File::options().append(true).create(true).open(file)?;
     *LOG.lock().unwrap_or_else(PoisonError::into_inner) = Some(file);
     Ok(())
 }
 
-/// Writes text, each of its lines with the time; nothing without a file.
+/// Appends text with the time on each line; does nothing without a log file.
 ///
 /// # Errors
-/// The system's.
+/// The system's error.
 pub(super) fn write(text: &str) -> io::Result<()> {
     let mut log = LOG.lock().unwrap_or_else(PoisonError::into_inner);
     let Some(file) = &mut *log else {
@@ -32,6 +33,6 @@ pub(super) fn write(text: &str) -> io::Result<()> {
     };
     let time = humantime::format_rfc3339_seconds(SystemTime::now());
     let lines = text.lines().map(|line| format!("{time} {line}\n"));
-    // In one piece, so that lines of several processes do not mix.
+    // In a single write, so that lines of several processes do not mix.
     file.write_all(lines.collect::<String>().as_bytes())
 }

@@ -1,8 +1,10 @@
-//! The one way in which a command writes to the terminal.
+//! All output of a command to the terminal.
 //!
-//! A write that fails never ends the work that is under way. It is remembered, as by `close_stdout` of GNU coreutils, and at
-//! the end the exit code says it: [`exit_code`]. A closed pipe (`swell inspect CACHE | head`) is no failure: its reader has
-//! what it wanted, what is left is dropped, and the exit code is that of the result; but for events, which are promised whole.
+//! A failed write never ends the work in progress. Like `close_stdout` of GNU coreutils, it is
+//! remembered and reflected in the exit code at the end: [`exit_code`]. A closed pipe (`swell
+//! inspect CACHE | head`) is not a failure: its reader has what it wanted, the rest is dropped, and
+//! the exit code is that of the result. Events are the exception, because they are guaranteed to be
+//! complete.
 
 use std::{
     io::{self, ErrorKind, Write},
@@ -25,18 +27,18 @@ use swell_stage::{
     time::Share,
 };
 
-/// The exit code where a file cannot be written; standard output is one.
+/// Exit code if a file cannot be written; standard output counts as one.
 const CANNOT_WRITE: u8 = 4;
 
 const STDOUT: &str = "standard output";
 const STDERR: &str = "standard error";
 
-/// The first write that failed: which stream, and the system's words.
+/// The first write that failed: the stream and the system's error.
 static FAILED: Mutex<Option<(&str, io::Error)>> = Mutex::new(None);
 /// Whether an event could not be written.
 static IS_SHORT: AtomicBool = AtomicBool::new(false);
 
-/// How much water there is at a start, and how much the scene asks for.
+/// Volume of water at a start, and the volume that the scene asks for.
 pub(super) fn water(volume: Volume) -> String {
     let made = format!("{} m³", four_digits(volume.made));
     match volume.asked {
@@ -45,8 +47,9 @@ pub(super) fn water(volume: Volume) -> String {
     }
 }
 
-/// Writes an event to standard output, a line. A stream of events is whole or short: behind one that could not be written comes
-/// none, and a closed pipe is a fault as any other, for whoever asked for events has not got them.
+/// Writes an event to standard output as one line. A stream of events is complete up to a point:
+/// none follows one that could not be written, and a closed pipe is an error, because the reader
+/// missed events.
 pub(super) fn event(event: &Value) {
     if IS_SHORT.load(Ordering::Relaxed) {
         return;
@@ -58,13 +61,14 @@ pub(super) fn event(event: &Value) {
     }
 }
 
-/// Writes to standard output what a command is asked for.
+/// Writes a command's result to standard output.
 pub(super) fn print(text: &str) {
     note(STDOUT, put(&mut io::stdout().lock(), text));
 }
 
-/// Tells what passes took: a line each with milliseconds, runs, seconds in all, bytes that they moved at least and operations that they did a
-/// second, which part of the adapter's that is, and what it waits for; behind them what each part took of so many frames.
+/// Reports times of passes, one line each: milliseconds, runs, total seconds, least bytes moved and
+/// operations per second, their fractions of the adapter's ceilings, and what limits the pass; then
+/// the share of each part per frame, over `frames` frames.
 pub(super) fn pass_times(progress: &Progress, times: &PassTimes, parts: &[Share], frames: u32) {
     let PassTimes { passes, ceilings } = times;
     if passes.is_empty() {
@@ -112,7 +116,7 @@ fn pass_json(time: &PassTime, ceilings: Option<&Ceilings>) -> Value {
     })
 }
 
-/// What passes and buffers are there for, for programs.
+/// Passes and buffers by purpose, for programs.
 pub(super) fn parts_json(parts: &[Share]) -> Vec<Value> {
     let part = |part: &Share| {
         json!({
@@ -153,8 +157,8 @@ fn print_pass_times(passes: &[PassTime], ceilings: Option<&Ceilings>) {
     }
 }
 
-/// A line for each thing that passes and buffers are there for: passes, bytes, and milliseconds of each of so many frames where they
-/// were timed.
+/// One line per purpose: passes, bytes and, if passes were timed, milliseconds per frame over
+/// `frames` frames.
 pub(super) fn shares(shares: &[Share], frames: Option<u32>) -> String {
     let all: f64 = shares.iter().map(|share| share.seconds).sum();
     let mut text = format!("{:24}  passes         bytes", "for");
@@ -175,20 +179,20 @@ pub(super) fn shares(shares: &[Share], frames: Option<u32>) -> String {
     text
 }
 
-/// Writes a line to standard error: progress, and what a user has to know.
+/// Writes a line to standard error: progress and messages to the user.
 pub(super) fn say(line: &str) {
     note(STDERR, put(&mut io::stderr().lock(), &format!("{line}\n")));
     log(line);
 }
 
-/// Writes lines to the file of `--log` alone.
+/// Writes lines only to the file of `--log`.
 pub(super) fn log(text: &str) {
     if let Err(error) = log::write(text) {
         remember("the log", error);
     }
 }
 
-/// Remembers how a write to a stream went that was made elsewhere.
+/// Records the result of a write to a stream that was made elsewhere.
 pub(super) fn note(stream: &'static str, written: io::Result<()>) {
     match written {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => remember(stream, error),
@@ -206,8 +210,8 @@ fn put(out: &mut impl Write, text: &str) -> io::Result<()> {
     out.flush()
 }
 
-/// What the exit code is where work ended with `code`: 4 in place of 0 and 1 where something could not be written. A code of a
-/// graver fault stays.
+/// The exit code of work that ended with `code`: 4 replaces 0 and 1 if something could not be
+/// written. More serious codes stay.
 pub(super) fn code(code: u8) -> u8 {
     let failed = FAILED.lock().unwrap_or_else(PoisonError::into_inner);
     match failed.is_some() && code <= 1 {
@@ -216,19 +220,20 @@ pub(super) fn code(code: u8) -> u8 {
     }
 }
 
-/// Exit code of the process whose work ended with `code`, as [`code`]; says what could not be written.
+/// Exit code of the process whose work ended with `code`, as in [`code`]; reports what could not be
+/// written.
 pub(super) fn exit_code(code: u8) -> ExitCode {
     let failed = FAILED.lock().unwrap_or_else(PoisonError::into_inner).take();
     let Some((stream, error)) = failed else {
         return ExitCode::from(code);
     };
-    // Where standard error itself fails, the exit code has to do.
+    // If standard error itself fails, only the exit code can tell.
     let said = format!("swell: cannot write to {stream}: {error}\n");
     let _ = put(&mut io::stderr().lock(), &said);
     ExitCode::from(if code <= 1 { CANNOT_WRITE } else { code })
 }
 
-/// A path for JSON, which holds UTF-8 alone: bytes that are none become U+FFFD.
+/// A path for JSON, which must be UTF-8: invalid bytes become U+FFFD.
 pub(super) fn path(path: &Path) -> String {
     path.to_string_lossy().into_owned()
 }

@@ -1,6 +1,7 @@
-//! Progress: a bar on a terminal, plain lines otherwise, JSON lines for farms.
+//! Progress: a bar on a terminal, plain lines otherwise, JSON lines for render farms.
 //!
-//! What farms read is described in `docs/commands.md`: the last line of a command is its `end`, also where it failed.
+//! The JSON events are documented in `docs/commands.md`: the last line of a command is its `end`,
+//! even if it failed.
 
 mod recurring;
 mod within;
@@ -37,12 +38,12 @@ pub(super) enum Mode {
     None,
 }
 
-/// What became of a frame, or of a point of a study.
+/// Outcome of a frame, or of a point of a study.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Status {
-    /// It was made now.
+    /// It was made by this run.
     Done,
-    /// It stood there, or another process made it.
+    /// It existed already, or another process made it.
     Skipped,
     /// It could not be made.
     Failed,
@@ -58,16 +59,17 @@ impl Status {
     }
 }
 
-/// Frames that the time left is reckoned from: the last ones, as frames of a shot grow slower with the water in motion.
+/// Number of recent frames that the remaining time is estimated from: frames of a shot get slower
+/// as the water starts to move.
 const RECENT: usize = 8;
 
-/// Frames of one job: how many there are, and how far it has come.
+/// Frames of one job: their number and the progress.
 struct Job {
     frames: u64,
     seen: u64,
-    /// When the last of them ended, or the job began.
+    /// When the last of them ended, or when the job began.
     before: Instant,
-    /// What the last ones took that were made.
+    /// Times of the most recent frames that were made.
     recent: VecDeque<Duration>,
 }
 
@@ -92,14 +94,15 @@ impl Job {
         self.before = now;
     }
 
-    /// What each of the last frames took; `None` where none was made yet.
+    /// Mean seconds of the recent frames; `None` if none was made yet.
     fn frame_seconds(&self) -> Option<f64> {
         let took: Duration = self.recent.iter().sum();
         let many = self.recent.len();
         (many > 0).then(|| took.as_secs_f64() / many as f64)
     }
 
-    /// Seconds that the frames left would take, each as long as the last ones; `None` where none was made yet.
+    /// Estimated seconds for the remaining frames, each as long as the recent ones; `None` if none
+    /// was made yet.
     fn seconds_left(&self) -> Option<f64> {
         match self.frames.saturating_sub(self.seen) {
             0 => Some(0.0),
@@ -107,8 +110,9 @@ impl Job {
         }
     }
 
-    /// The same within a frame that has come as far as `told`: what is left of it, and the frames after it, each as long as the last
-    /// ones, or else as this one. `None` before its first part, and before there are frames.
+    /// The same estimate during a frame with the progress `told`: the rest of it, plus the frames
+    /// after it, each as long as the recent ones, or else as this one. `None` before its first
+    /// part, and before there are frames.
     fn seconds_left_within(&self, told: &Told) -> Option<f64> {
         let left = told.left?.as_secs_f64();
         let after = self.frames.checked_sub(self.seen + 1)?;
@@ -122,26 +126,26 @@ fn tenths(seconds: f64) -> f64 {
     (10.0 * seconds).round() / 10.0
 }
 
-/// What a command has done in all.
+/// State of a whole command.
 struct State {
     bar: Option<ProgressBar>,
     job: Job,
-    /// Whether the job is one of [`Progress::set_frames`].
+    /// Whether the job was started by [`Progress::set_frames`].
     is_set: bool,
     done: u64,
     skipped: u64,
     failed: u64,
-    /// `None` where nothing is known of it.
+    /// Bytes written; `None` if unknown.
     bytes: Option<u64>,
-    /// What is under way within a frame, or before the first one.
+    /// Progress within a frame, or before the first one.
     within: Option<Within>,
-    /// Warnings of the job's frames.
+    /// Warnings about the job's frames.
     recurrences: Recurrences,
-    /// What the command itself says at its end.
+    /// Fields that the command adds to the last event.
     end: Map<String, Value>,
 }
 
-/// A command's progress, over the frames of one job or of several in turn.
+/// A command's progress, over the frames of one job or of several, one after another.
 pub(super) struct Progress {
     mode: Mode,
     begun: Instant,
@@ -172,12 +176,12 @@ impl Progress {
         }
     }
 
-    /// Whether what is told goes to a program.
+    /// Whether the output is for a program.
     pub(super) fn is_json(&self) -> bool {
         self.mode == Mode::Json
     }
 
-    /// A job of so many frames begins.
+    /// Starts a job of `frames` frames.
     pub(super) fn begin(&self, frames: u64) {
         self.sum_up();
         self.finish();
@@ -187,7 +191,8 @@ impl Progress {
         state.bar = (self.mode == Mode::Auto).then(|| bar(frames));
     }
 
-    /// A job has so many frames: it begins where none of these has, else it has come to have more or fewer.
+    /// Sets the number of frames of a job. Starts the job unless the previous call has; otherwise
+    /// only its length changes.
     pub(super) fn set_frames(&self, frames: u64) {
         if !self.state.borrow().is_set {
             self.begin(frames);
@@ -200,7 +205,7 @@ impl Progress {
         }
     }
 
-    /// A line that is no frame; `event` is what farms read.
+    /// Prints a line that is not a frame; `event` is its JSON form.
     pub(super) fn say(&self, text: &str, event: Value) {
         match self.mode {
             Mode::Json => output::event(&event),
@@ -213,7 +218,8 @@ impl Progress {
         output::log(text);
     }
 
-    /// A warning about a frame: said where it is the first of its kind in the job, else at the job's end, of the worst frame.
+    /// Handles a warning about a frame: prints it if it is the first of its kind in the job;
+    /// otherwise the job's end reports the worst frame.
     pub(super) fn recur(&self, warning: Recurring) {
         let said = self.state.borrow_mut().recurrences.add(warning);
         if let Some((text, event)) = said {
@@ -221,7 +227,7 @@ impl Progress {
         }
     }
 
-    /// The end of a job: where the warnings that its frames had were worst.
+    /// Ends a job's warnings: reports the worst frame of each kind.
     fn sum_up(&self) {
         let said = self.state.borrow_mut().recurrences.end();
         for (text, event) in said {
@@ -229,20 +235,21 @@ impl Progress {
         }
     }
 
-    /// What only farms read.
+    /// Sends an event that has no text form.
     pub(super) fn tell(&self, event: Value) {
         if self.is_json() {
             output::event(&event);
         }
     }
 
-    /// A frame is done with. Farms also read which one of how many it was, and how long the others may take.
+    /// Records a completed frame. Its event also has the frame's position in the job and the
+    /// estimated remaining time.
     pub(super) fn frame(&self, text: &str, status: Status, event: Value) {
         let event = self.count(status, event);
         let bar = self.state.borrow().bar.clone();
         let Some(bar) = bar else {
             let left = self.state.borrow().job.seconds_left();
-            // A bar tells it itself.
+            // A bar shows the time itself.
             let left = left.filter(|left| *left >= 1.0);
             let left = left.map_or(String::new(), |left| format!(", {left:.0} s left"));
             return self.say(&format!("{text}{left}"), event);
@@ -258,9 +265,10 @@ impl Progress {
         bar.inc(1);
     }
 
-    /// So many parts are done of what is called `name`: of a frame, or of what comes before the first one, as `of` says to farms. A bar
-    /// always shows it; else people hear of it every ten seconds, and of what comes before the frames when it begins; farms hear when it
-    /// begins and every second.
+    /// Reports that `done` of `count` parts of `name` are done: of a frame, or of the work before
+    /// the first one, as `of` in the event says. A bar always shows it. Plain mode prints a line
+    /// every ten seconds, and one when work before the frames begins; JSON mode sends an event at
+    /// the beginning and every second.
     pub(super) fn part(&self, name: &str, (done, count): (u64, u64), event: Value) {
         let mut state = self.state.borrow_mut();
         let state = &mut *state;
@@ -334,26 +342,26 @@ impl Progress {
         event
     }
 
-    /// So many bytes were written.
+    /// Adds to the bytes written.
     pub(super) fn wrote(&self, bytes: u64) {
         let mut state = self.state.borrow_mut();
         state.bytes = Some(state.bytes.unwrap_or(0) + bytes);
     }
 
-    /// What a command was asked for, to farms: the object that its `--json` prints.
+    /// Sends a command's result as an event: the object that its `--json` prints.
     pub(super) fn result(&self, mut object: Value) {
         object["event"] = json!("result");
         self.tell(object);
     }
 
-    /// What a command has to say of its end to farms, which [`Self::end`] does.
+    /// Adds fields to the last event, which [`Self::end`] sends.
     pub(super) fn tell_end(&self, event: Value) {
         if let Value::Object(event) = event {
             self.state.borrow_mut().end.extend(event);
         }
     }
 
-    /// [`Self::tell_end`], and the line that the command ends with.
+    /// [`Self::tell_end`], and prints the command's last line.
     pub(super) fn conclude(&self, text: &str, event: Value) {
         self.sum_up();
         self.tell_end(event);
@@ -363,14 +371,14 @@ impl Progress {
         }
     }
 
-    /// Takes the bar away.
+    /// Removes the bar.
     pub(super) fn finish(&self) {
         if let Some(bar) = self.state.borrow_mut().bar.take() {
             bar.finish_and_clear();
         }
     }
 
-    /// What went wrong, in whatever mode.
+    /// Reports an error, whatever the mode.
     pub(super) fn fail(&self, message: &str, code: u8) {
         self.finish();
         self.sum_up();
@@ -378,7 +386,7 @@ impl Progress {
         self.tell(failed(message, code));
     }
 
-    /// The last event. Nothing is told behind it.
+    /// Sends the last event; none may follow.
     pub(super) fn end(&self, code: u8) {
         self.finish();
         self.sum_up();
@@ -397,24 +405,24 @@ impl Progress {
 }
 
 fn bar(length: u64) -> ProgressBar {
-    // Its own estimate knows whole steps alone, and none before the first.
+    // indicatif's own estimate counts whole steps only, and has none before the first.
     let style = ProgressStyle::with_template("{bar:40} {pos}/{len} [{elapsed} < {prefix}] {msg}")
         .unwrap_or_else(|_| ProgressStyle::default_bar());
     let bar = ProgressBar::new(length).with_style(style);
     bar.with_prefix(ahead(None))
 }
 
-/// Time left, as a bar shows it.
+/// Remaining time, as shown in a bar.
 fn ahead(seconds: Option<f64>) -> String {
     seconds.map_or("?".to_owned(), |seconds| format!("{seconds:.0} s"))
 }
 
-/// The event of a fault that ends a command.
+/// The event of an error that ends a command.
 fn failed(message: &str, code: u8) -> Value {
     json!({ "event": "error", "message": message, "exit_code": code })
 }
 
-/// Tells farms of a command line that cannot be read, where it asks for JSON.
+/// Sends the error of an unparsable command line as an event if it asks for JSON.
 pub(super) fn unread(arguments: &[String], message: &str, code: u8) {
     let asks = |pair: &[String]| pair[0] == "--progress" && pair[1] == "json";
     if arguments.windows(2).any(asks) || arguments.iter().any(|it| it == "--progress=json") {
@@ -434,7 +442,7 @@ mod tests {
         let mut job = Job::new(24);
         job.before = begin;
         assert_eq!(job.seconds_left(), None);
-        // Frames that stood there tell nothing.
+        // Frames that existed already carry no information.
         job.add(Status::Skipped, begin);
         job.add(Status::Failed, begin);
         assert_eq!(job.seconds_left(), None);
@@ -443,9 +451,9 @@ mod tests {
             now += Duration::from_secs(if k < 4 { 100 } else { 2 });
             job.add(Status::Done, now);
         }
-        // The eight last ones took 2 s each, and ten are left.
+        // The eight most recent took 2 s each, and ten are left.
         assert_eq!(job.seconds_left(), Some(20.0));
-        // Within the next one, of which half is drawn in 3 s, and nine come after it.
+        // During the next frame, half of which is drawn in 3 s, with nine more after it.
         let told = |left| Told {
             line: false,
             event: false,
@@ -455,7 +463,7 @@ mod tests {
         let half = told(Some(Duration::from_secs(3)));
         assert_eq!(job.seconds_left_within(&half), Some(21.0));
         assert_eq!(job.seconds_left_within(&told(None)), None);
-        // The first one is all that is known of the others.
+        // The first frame is all that is known about the others.
         let first = Job::new(10);
         assert_eq!(first.seconds_left_within(&half), Some(57.0));
         assert_eq!(Job::new(0).seconds_left_within(&half), None);

@@ -1,4 +1,4 @@
-//! `swell completions SHELL` and `swell man DIR`: what shells and `man` know of the commands.
+//! `swell completions SHELL` and `swell man DIR`: shell completions and man pages.
 
 use std::{fs, path::PathBuf};
 
@@ -20,7 +20,7 @@ pub(super) struct ManArgs {
     directory: PathBuf,
 }
 
-/// Prints a script for the shell.
+/// Prints a completion script for the shell.
 pub(super) fn completions(args: &CompletionsArgs) -> u8 {
     let mut script = Vec::new();
     generate(args.shell, &mut Cli::command(), "swell", &mut script);

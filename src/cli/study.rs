@@ -61,7 +61,7 @@ pub(super) fn run(args: &StudyArgs, progress: &Progress) -> Result<u8, Failure> 
     conduct(&request, progress)
 }
 
-/// Runs a study of whatever kind, and tells of it.
+/// Runs a study of any kind, and reports its progress.
 pub(super) fn conduct(request: &Request, progress: &Progress) -> Result<u8, Failure> {
     let interrupt = Interrupt::install_or_warn();
     let outcome = study(request, interrupt.flag(), &mut |event| match event {
@@ -119,7 +119,7 @@ pub(super) fn conduct(request: &Request, progress: &Progress) -> Result<u8, Fail
     })
 }
 
-/// What a share came to, and who ends the study.
+/// Reports the result of a share, and how to complete the study.
 fn tell_share(progress: &Progress, request: &Request, chunk: Chunk, share: Share) {
     let Share {
         ran, stood, left, ..
@@ -141,7 +141,7 @@ fn tell_share(progress: &Progress, request: &Request, chunk: Chunk, share: Share
     );
 }
 
-/// A point's line, and the same for farms.
+/// A point as a line and as a JSON event.
 fn point(event: &PointEvent) -> (String, serde_json::Value) {
     let (status, told) = match &event.status {
         PointStatus::Stands => ("stands there", String::new()),

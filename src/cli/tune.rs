@@ -126,7 +126,7 @@ fn request(args: &TuneArgs) -> Result<TuneRequest, Failure> {
     })
 }
 
-/// What makes the same settings again, for the page and the scene.
+/// The command that reproduces the settings, for the page and the scene.
 fn command(args: &TuneArgs) -> String {
     let mut words = vec![format!("swell tune {}", posix::path(&args.scene))];
     words.extend(args.errors.iter().map(|limit| {
@@ -147,7 +147,7 @@ fn command(args: &TuneArgs) -> String {
     words.join(" ")
 }
 
-/// `--dry-run`: the runs that are known before the first, or a share of them.
+/// `--dry-run`: prints the runs that are known in advance, or a share of them.
 fn tell_runs(tune: Tune, args: &TuneArgs, progress: &Progress) -> Result<u8, Failure> {
     let untried = tune.untried.clone();
     let study = Study::Tune(Box::new(tune));

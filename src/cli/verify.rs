@@ -19,7 +19,8 @@ pub struct VerifyArgs {
 /// Prints one line for each file with a problem, or `ok: 72 frames, 1.2 GB`.
 ///
 /// # Errors
-/// The first problem as [`CacheError::Damaged`]; [`CacheError`] where there is no cache to look at.
+/// The first problem as [`CacheError::Damaged`]; other [`CacheError`]s if there is no cache to
+/// check.
 pub fn run(args: &VerifyArgs) -> Result<(), CacheError> {
     let report = verify(&args.cache)?;
     output::print(&show(&report));

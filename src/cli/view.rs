@@ -158,7 +158,7 @@ pub(super) fn run(args: &ViewArgs, progress: &Progress) -> Result<u8, Failure> {
     Ok(0)
 }
 
-/// Hands a page to what shows pages here. What was made is there all the same.
+/// Opens a page in the system's viewer. Failing to do so is only a warning.
 fn open(page: &Path) {
     let (program, before): (&str, &[&str]) = match std::env::consts::OS {
         "macos" => ("open", &[]),

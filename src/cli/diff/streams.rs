@@ -1,4 +1,4 @@
-//! What differs beside the particles, in words.
+//! Describes differences other than those of the particles.
 
 use std::fmt::Write as _;
 
@@ -7,10 +7,10 @@ use swell_stage::diff::{CacheDiff, Difference, GridDiff, StreamDiff};
 
 use super::number;
 
-/// Differences of one frame that are printed before the rest is counted.
+/// Differences of one frame that are printed before the rest is only counted.
 const MOST: usize = 3;
 
-/// A stream a line: in which frames it differs, and how in the first of them.
+/// One line per stream: the frames in which it differs, and how in the first of them.
 pub(super) fn show(out: &mut String, diff: &CacheDiff) -> std::fmt::Result {
     let mark = if diff.streams_judged { "out: " } else { "" };
     let lone = [("A", &diff.streams_only_a), ("B", &diff.streams_only_b)];
@@ -44,7 +44,7 @@ pub(super) fn show(out: &mut String, diff: &CacheDiff) -> std::fmt::Result {
     Ok(())
 }
 
-/// Of each stream the first frame in which it differs.
+/// The first frame in which each stream differs.
 fn firsts(streams: &[StreamDiff]) -> Vec<&StreamDiff> {
     let mut found: Vec<&StreamDiff> = Vec::new();
     for diff in streams {

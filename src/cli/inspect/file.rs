@@ -1,4 +1,4 @@
-//! `swell inspect FILE`: a frame, a mesh, a VDB, a picture, a USD or a glTF.
+//! `swell inspect FILE`: a frame, a mesh, a VDB, a picture, USD or glTF.
 
 use std::{
     fmt::{self, Write},
@@ -14,7 +14,7 @@ use swell_stage::inspect::file::{
     FileContents, FrameFile, GridFile, MeshFile, PictureFile, Rig, describe, is_known,
 };
 
-/// Whether a name is that of a frame, mesh, VDB, picture, USD or glTF.
+/// Whether the name is that of a frame, mesh, VDB, picture, USD or glTF.
 pub(super) fn is_file(file: &Path) -> bool {
     is_known(file)
 }
@@ -24,7 +24,7 @@ fn contents(args: &InspectArgs, file: &Path) -> Result<FileContents, Failure> {
     Ok(describe(file)?)
 }
 
-/// Prints what is in `file`.
+/// Prints a description of `file`.
 pub(super) fn show(out: &mut String, args: &InspectArgs, file: &Path) -> Result<(), Failure> {
     let name = file.file_name().unwrap_or_default().to_string_lossy();
     // Writing to a String cannot fail.
@@ -162,7 +162,7 @@ fn show_picture(out: &mut String, name: &str, picture: &PictureFile) -> fmt::Res
     Ok(())
 }
 
-/// The same for programs.
+/// The description for programs.
 pub(super) fn object(args: &InspectArgs, file: &Path) -> Result<Value, Failure> {
     let bounds = |bounds: &Option<Bounds>| {
         bounds.map(|it| json!({ "min": it.min.to_array(), "max": it.max.to_array() }))

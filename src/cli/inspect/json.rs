@@ -1,4 +1,5 @@
-//! `swell inspect --json`: the same for programs. Its keys are listed in `docs/commands.md`, and stay.
+//! `swell inspect --json`: the same for programs. Its keys are documented in `docs/commands.md` and
+//! stable.
 
 use std::path::Path;
 

@@ -10,10 +10,10 @@ use crate::{Failure, bake, count, is_cache, named_adapter, size};
 use swell_scene::look::{AovSpec, FitSpec, FormatSpec, Look, MethodSpec};
 use swell_stage::render::{LookPlan, Subject, plan};
 
-/// Tables that a look has and a scene has not.
+/// Tables that only looks have.
 const TABLES: [&str; 4] = ["[camera]", "[image]", "[sun]", "[output]"];
 
-/// Whether a file is a look: it has tables of one. What cannot be read is none.
+/// Whether a file is a look, judged by its tables; false for an unreadable file.
 pub(super) fn is_look(file: &Path) -> bool {
     let text = swell_domain::text::read(file).unwrap_or_default();
     let mut lines = text
@@ -22,7 +22,7 @@ pub(super) fn is_look(file: &Path) -> bool {
     lines.any(|line| TABLES.contains(&line.trim()))
 }
 
-/// How water is drawn.
+/// Name of the render method.
 pub(super) fn method(look: &Look) -> &'static str {
     match look.spec().renderer.method {
         MethodSpec::Ssfr => "ssfr",
@@ -30,7 +30,7 @@ pub(super) fn method(look: &Look) -> &'static str {
     }
 }
 
-/// The camera in words.
+/// Describes the camera in words.
 pub(super) fn camera(look: &Look) -> String {
     let camera = &look.spec().camera;
     let lens = match look.lens(0.0) {
@@ -62,7 +62,7 @@ pub(super) fn camera(look: &Look) -> String {
     format!("of {} mm{on}, {lens}, {moves}", camera.focal_length_mm)
 }
 
-/// Files of a picture.
+/// File formats of a picture.
 pub(super) fn formats(look: &Look) -> Vec<&'static str> {
     let formats = look.spec().output.formats.iter();
     let name = |format: &FormatSpec| match format {
@@ -72,7 +72,7 @@ pub(super) fn formats(look: &Look) -> Vec<&'static str> {
     formats.map(name).collect()
 }
 
-/// Channels beside the picture.
+/// Names of the additional channels.
 pub(super) fn aovs(look: &Look) -> Vec<&'static str> {
     let name = |aov: &AovSpec| match aov {
         AovSpec::Z => "Z",
@@ -92,7 +92,7 @@ pub(super) fn show(out: &mut String, args: &InspectArgs, file: &Path) -> Result<
     Ok(planned)
 }
 
-/// The look in `file`, what it is planned for, and its plan.
+/// The look in `file`, its subject, and its plan.
 pub(super) fn planned(
     args: &InspectArgs,
     file: &Path,

@@ -12,7 +12,7 @@ use crate::{Failure, bake, count};
 use swell_scene::study::Study;
 use swell_stage::inspect::study::Outline;
 
-/// Whether a file is a study: it says of what `kind`, before its first table. What cannot be read is none.
+/// Whether a file is a study: it sets `kind` before its first table. False for an unreadable file.
 pub(super) fn is_study(file: &Path) -> bool {
     let text = swell_domain::text::read(file).unwrap_or_default();
     let lines = text.lines().map(str::trim_start);
@@ -30,13 +30,13 @@ fn outline(args: &InspectArgs, file: &Path) -> Result<Outline, Failure> {
     Ok(Outline::of(&study))
 }
 
-/// Prints what the study in `file` runs.
+/// Prints the runs of the study in `file`.
 pub(super) fn show(out: &mut String, args: &InspectArgs, file: &Path) -> Result<(), Failure> {
     *out += &told(&outline(args, file)?, file);
     Ok(())
 }
 
-/// What runs, in words; `file` is the study's, or the scene's that a command line asks for.
+/// Describes the runs in words; `file` is the study, or the scene to be tuned.
 pub(crate) fn told(outline: &Outline, file: &Path) -> String {
     let mut out = String::new();
     // Writing to a String cannot fail.
@@ -65,7 +65,7 @@ fn show_outline(out: &mut String, outline: &Outline, file: &Path) -> fmt::Result
     Ok(())
 }
 
-/// The same for programs.
+/// The description for programs.
 pub(super) fn object(args: &InspectArgs, file: &Path) -> Result<Value, Failure> {
     Ok(outline_object(&outline(args, file)?))
 }

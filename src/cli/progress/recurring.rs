@@ -1,24 +1,25 @@
-//! Warnings that frame after frame may have: said once a job, and at its end where it was worst.
+//! Warnings that may recur in many frames: printed once per job, and summarised at its end for the
+//! worst frame.
 
 use serde_json::{Value, json};
 
 /// A warning about a frame.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Recurring {
-    /// Of what kind, as events call it.
+    /// Kind of the warning, as in events.
     pub(crate) what: &'static str,
     /// The frame.
     pub(crate) frame: u32,
-    /// How bad it is, beside others of its kind.
+    /// Severity relative to other warnings of its kind.
     pub(crate) size: f64,
-    /// A sentence about the frame.
+    /// The warning in words.
     pub(crate) text: String,
     /// Further keys of the event.
     pub(crate) event: Value,
 }
 
 impl Recurring {
-    /// The line and the event of the frame.
+    /// The line and the event for this frame.
     fn said(&self) -> (String, Value) {
         let text = format!("frame {}: {}", self.frame, self.text);
         let mut event = self.event.clone();
@@ -30,7 +31,7 @@ impl Recurring {
     }
 }
 
-/// Warnings of one kind, in a job.
+/// Warnings of one kind in a job.
 struct Kind {
     worst: Recurring,
     frames: u64,
@@ -38,12 +39,12 @@ struct Kind {
     last: u32,
 }
 
-/// Those of a job, by kind, in the order in which the kinds came.
+/// Warnings of a job by kind, in order of first occurrence.
 #[derive(Default)]
 pub(super) struct Recurrences(Vec<Kind>);
 
 impl Recurrences {
-    /// Takes a warning; the line and the event to say now, where it is the first of its kind.
+    /// Adds a warning. Returns the line and the event to print now if it is the first of its kind.
     pub(super) fn add(&mut self, warning: Recurring) -> Option<(String, Value)> {
         let known = self.0.iter_mut().find(|it| it.worst.what == warning.what);
         let Some(kind) = known else {
@@ -65,7 +66,8 @@ impl Recurrences {
         None
     }
 
-    /// What is left to say at the end of the job, of kinds that more than one frame had; after it nothing is.
+    /// Summaries for the end of the job, of kinds that occurred in more than one frame. Clears the
+    /// warnings.
     pub(super) fn end(&mut self) -> Vec<(String, Value)> {
         let kinds = std::mem::take(&mut self.0).into_iter();
         let more = kinds.filter(|kind| kind.frames > 1);
@@ -118,7 +120,7 @@ mod tests {
         );
         assert_eq!(told.add(crowded(6, 4.0)), None);
         assert_eq!(told.add(crowded(9, 3.0)), None);
-        // Another kind is said too, and needs no summary where one frame alone has it.
+        // Another kind is printed too, and needs no summary if only one frame has it.
         let other = Recurring {
             what: "density",
             ..crowded(7, 1.0)
@@ -137,7 +139,7 @@ mod tests {
                 "last": 9, "text": "frame 6: a cell holds 4.0 times",
             })
         );
-        // The next job begins anew.
+        // The next job starts afresh.
         assert!(told.end().is_empty() && told.add(crowded(1, 2.1)).is_some());
     }
 }

@@ -1,13 +1,13 @@
-//! How far something has come that takes long by itself: a frame, or what is done before the first one.
+//! Progress within something long: a frame, or the work before the first one.
 
 use std::time::{Duration, Instant};
 
-/// Between two lines about one thing.
+/// Interval between two lines about one thing.
 const LINES: Duration = Duration::from_secs(10);
-/// Between two events about one thing.
+/// Interval between two events about one thing.
 const EVENTS: Duration = Duration::from_secs(1);
 
-/// What is under way.
+/// The work in progress.
 pub(super) struct Within {
     name: String,
     begun: Instant,
@@ -15,21 +15,23 @@ pub(super) struct Within {
     event: Instant,
 }
 
-/// What is to be told of a part, and what it lets expect.
+/// What is due after a part, and the time estimate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Told {
-    /// Whether people have waited long enough for a line.
+    /// Whether a line is due.
     pub(super) line: bool,
-    /// Whether programs have for an event.
+    /// Whether an event is due.
     pub(super) event: bool,
-    /// Since it began.
+    /// Time since the work began.
     pub(super) elapsed: Duration,
-    /// Until all parts are done, each taking as long as those before; `None` before the first.
+    /// Estimated time for the remaining parts, each as long as those before; `None` before the
+    /// first.
     pub(super) left: Option<Duration>,
 }
 
 impl Within {
-    /// `done` of `count` parts of what is called `name` are done now. Another name, or none that is done, begins anew.
+    /// Records that `done` of `count` parts of `name` are done. Another name, or `done` = 0, starts
+    /// a new measurement.
     pub(super) fn step(
         under_way: &mut Option<Self>,
         name: &str,
@@ -94,7 +96,7 @@ mod tests {
         assert_eq!((told.line, told.event), (true, true));
         let told = step("frame 1", 21, 10_900);
         assert_eq!((told.line, told.event), (false, false));
-        // The next frame counts from its own beginning.
+        // The next frame is measured from its own beginning.
         let told = step("frame 2", 0, 40_000);
         assert_eq!((told.event, told.left), (true, None));
         let told = step("frame 2", 32, 42_000);
