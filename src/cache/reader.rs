@@ -1,4 +1,4 @@
-//! Reading a cache. Returns no data whose checksum is wrong, and never writes.
+//! Reads a cache. Returns no data whose checksum is wrong, and never writes.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -1,6 +1,6 @@
 //! Mean, minimum and maximum of a probe over the time before each sample.
 //!
-//! They follow from the samples alone, which are in the ledger, so that a resumed bake writes the
+//! They follow only from the samples, which are in the ledger, so that a resumed bake writes the
 //! same.
 
 use std::collections::VecDeque;

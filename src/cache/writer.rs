@@ -1,4 +1,4 @@
-//! Writing a cache on a thread beside the solver.
+//! Writes a cache on a separate thread, parallel to the solver.
 
 use std::fs::File;
 use std::path::Path;

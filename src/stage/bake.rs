@@ -59,7 +59,7 @@ pub enum Event {
         device: Identity,
         /// Number of particles at the start.
         particles: usize,
-        /// Lattice points left out because a solid covers them.
+        /// Particles left out because a solid covers them or they lie behind a wall.
         removed: usize,
         /// Volume of water at the start.
         volume: Volume,
@@ -123,10 +123,10 @@ pub struct Outcome {
 /// Why a bake failed.
 #[derive(Debug, thiserror::Error)]
 pub enum BakeError {
-    /// The scene or one of its meshes.
+    /// The scene or one of its meshes is invalid.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// A solid that has no inside, or too large a distance grid.
+    /// A solid without an inside, or too large a distance grid.
     #[error(transparent)]
     Solid(#[from] SignedDistanceError),
     /// More particles than the budget allows, known before the bake.
@@ -139,13 +139,13 @@ pub enum BakeError {
         /// Number of particles after that frame.
         count: usize,
     },
-    /// The device.
+    /// The device cannot be opened or does not suffice.
     #[error(transparent)]
     Gpu(#[from] GpuError),
-    /// The solver.
+    /// The solver failed.
     #[error(transparent)]
     Solve(#[from] SolverError),
-    /// The cache.
+    /// Reading or writing the cache failed.
     #[error(transparent)]
     Cache(#[from] CacheError),
     /// The bake in the cache has other physics.
@@ -156,7 +156,7 @@ pub enum BakeError {
         /// Key that differs, and both values.
         difference: String,
     },
-    /// The frame to begin from.
+    /// The bake cannot begin from the requested frame.
     #[error(transparent)]
     Branch(#[from] BranchError),
     /// Frames that a bake cannot compute.

@@ -78,7 +78,7 @@ pub struct Branch {
 /// Why a scene cannot begin from a frame.
 #[derive(Debug, thiserror::Error)]
 pub enum BranchError {
-    /// The cache or its frame.
+    /// Reading the cache or its frame failed.
     #[error(transparent)]
     Cache(#[from] CacheError),
     /// The cache's own scene.
@@ -241,8 +241,8 @@ fn check_keys(from: &BranchPoint, cache: &CacheReader, scene: &Scene) -> Result<
     }
 }
 
-/// Refuses a frame with particles more than half a spacing outside: walls of the scene's solver
-/// push back no more than that.
+/// Refuses a frame with particles more than half a spacing outside the walls; closer ones are left
+/// to the solver, whose walls push them back.
 fn check_walls(
     from: &BranchPoint,
     clock: Clock,

@@ -106,22 +106,22 @@ pub struct Outcome {
 /// Why a check could not be made.
 #[derive(Debug, thiserror::Error)]
 pub enum CheckError {
-    /// The cache.
+    /// Reading the cache failed.
     #[error(transparent)]
     Cache(#[from] CacheError),
-    /// The scene in the cache.
+    /// The scene in the cache is invalid.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// The scene's solids.
+    /// A solid without an inside, or too large a distance grid.
     #[error(transparent)]
     Solid(#[from] SignedDistanceError),
-    /// The device.
+    /// The device cannot be opened or does not suffice.
     #[error(transparent)]
     Gpu(#[from] GpuError),
-    /// The solver.
+    /// The solver failed.
     #[error(transparent)]
     Solve(#[from] SolveError),
-    /// A whitewater stream, or the water that it was made from.
+    /// A whitewater stream, or the water that it was made from, cannot be used.
     #[error(transparent)]
     Whitewater(#[from] WhitewaterError),
     /// Nothing was compared, which must not count as a success.

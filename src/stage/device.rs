@@ -179,10 +179,10 @@ pub fn shaders_note(edited: Option<&str>) -> String {
 /// An error of either solver.
 #[derive(Debug, thiserror::Error)]
 pub enum SolverError {
-    /// The solver on the GPU.
+    /// The solver on the GPU failed.
     #[error(transparent)]
     Gpu(#[from] SolveError),
-    /// The f64 reference on the CPU.
+    /// The f64 reference on the CPU failed.
     #[error(transparent)]
     Reference(#[from] ReferenceError),
     /// A budget exceeded at the end of a frame.

@@ -88,7 +88,7 @@ impl Outcome {
 /// Why two things could not be compared.
 #[derive(Debug, thiserror::Error)]
 pub enum DiffError {
-    /// A cache.
+    /// Reading a cache failed.
     #[error(transparent)]
     Cache(#[from] CacheError),
     /// The scene in a cache or in a baseline.
@@ -99,7 +99,7 @@ pub enum DiffError {
         /// What is wrong with it.
         source: SceneError,
     },
-    /// A picture.
+    /// Reading or writing a picture failed.
     #[error(transparent)]
     Picture(#[from] RenderError),
     /// A file or folder that cannot be read or written.

@@ -104,7 +104,7 @@ pub struct ScenePlan {
     pub plan: Plan,
     /// Number of particles at the start.
     pub particles: usize,
-    /// Lattice points left out because a solid covers them.
+    /// Particles left out because a solid covers them or they lie behind a wall.
     pub removed: usize,
     /// Volume of water at the start.
     pub volume: Volume,
@@ -135,10 +135,10 @@ const COMMON_LIMITS: DeviceLimits = DeviceLimits {
 /// Why a scene could not be planned.
 #[derive(Debug, thiserror::Error)]
 pub enum PlanError {
-    /// The scene's solids.
+    /// A solid without an inside, or too large a distance grid.
     #[error(transparent)]
     Solid(#[from] SignedDistanceError),
-    /// The requested adapter.
+    /// The requested adapter cannot be opened or does not suffice.
     #[error(transparent)]
     Gpu(#[from] GpuError),
 }
@@ -228,13 +228,13 @@ pub struct CacheSizes {
 /// Why a cache's sizes could not be determined.
 #[derive(Debug, thiserror::Error)]
 pub enum SizesError {
-    /// The cache.
+    /// Reading the cache failed.
     #[error(transparent)]
     Cache(#[from] CacheError),
-    /// The scene in the cache.
+    /// The scene in the cache is invalid.
     #[error("the cache's scene: {0}")]
     Scene(#[from] SceneError),
-    /// Solids of that scene.
+    /// A solid without an inside, or too large a distance grid.
     #[error(transparent)]
     Solid(#[from] SignedDistanceError),
     /// A folder that cannot be read.
@@ -337,7 +337,7 @@ fn folder_bytes(folder: &Path) -> Result<u64, SizesError> {
 /// Why a cache's probes could not be plotted.
 #[derive(Debug, thiserror::Error)]
 pub enum PlotError {
-    /// The cache.
+    /// Reading the cache failed.
     #[error(transparent)]
     Cache(#[from] CacheError),
     /// The cache was baked without probes.

@@ -33,7 +33,7 @@ pub struct Volume {
 pub struct Start {
     /// State before the first frame.
     pub particles: Particles,
-    /// Number of lattice points left out because a solid covers them.
+    /// Number of particles left out because a solid covers them or they lie behind a wall.
     pub removed: usize,
     /// Volume of water that the scene asks for, m³; `None` if it begins from a frame.
     pub asked: Option<f64>,

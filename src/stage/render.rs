@@ -158,34 +158,34 @@ pub enum RenderJobError {
     /// Nothing was compared, which must not count as a success.
     #[error("nothing was compared: no water is seen in these frames")]
     NoWater,
-    /// The cache.
+    /// Reading the cache failed.
     #[error(transparent)]
     Cache(#[from] CacheError),
     /// The scene in the cache.
     #[error("the cache's scene: {0}")]
     Scene(#[from] SceneError),
-    /// The solids of the scene to plan for.
+    /// A solid of the scene to plan for has no inside, or its distance grid is too large.
     #[error(transparent)]
     Solid(#[from] SignedDistanceError),
-    /// The look, or something that it names.
+    /// The look, or something that it names, is invalid.
     #[error(transparent)]
     Look(#[from] LookError),
-    /// The device.
+    /// The device cannot be opened or does not suffice.
     #[error(transparent)]
     Gpu(#[from] GpuError),
-    /// The file of a solid's mesh.
+    /// The file of a solid's mesh cannot be read.
     #[error(transparent)]
     Mesh(#[from] MeshError),
-    /// The renderer.
+    /// The renderer failed.
     #[error(transparent)]
     Render(#[from] RenderError),
-    /// The output folder.
+    /// The output folder cannot be used.
     #[error(transparent)]
     Folder(#[from] FolderError),
     /// The given cache is a whitewater stream, not a bake.
     #[error("{} is a stream of whitewater: render the cache that it was made from, with a look that has [whitewater]", .0.display())]
     IsWhitewater(PathBuf),
-    /// The whitewater stream that the look draws.
+    /// The whitewater stream that the look draws cannot be used.
     #[error(transparent)]
     Whitewater(#[from] StreamError),
     /// The output would be written into a cache.

@@ -393,19 +393,19 @@ pub(super) fn keep(
 /// Why a frame could not be recomputed.
 #[derive(Debug, thiserror::Error)]
 pub enum ReplayError {
-    /// The folder, or its cache.
+    /// Reading the folder or its cache failed.
     #[error(transparent)]
     Cache(#[from] CacheError),
-    /// The scene in it.
+    /// The scene in the folder is invalid.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// The scene's solids.
+    /// A solid without an inside, or too large a distance grid.
     #[error(transparent)]
     Solid(#[from] SignedDistanceError),
-    /// The device.
+    /// The device cannot be opened or does not suffice.
     #[error(transparent)]
     Gpu(#[from] GpuError),
-    /// The solver.
+    /// The solver failed.
     #[error(transparent)]
     Solve(#[from] SolverError),
 }

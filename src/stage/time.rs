@@ -32,13 +32,13 @@ pub struct Timed {
 /// Why frames could not be timed.
 #[derive(Debug, thiserror::Error)]
 pub enum TimeError {
-    /// The scene's solids.
+    /// A solid without an inside, or too large a distance grid.
     #[error(transparent)]
     Solid(#[from] SignedDistanceError),
-    /// The adapter.
+    /// The adapter cannot be opened or does not suffice.
     #[error(transparent)]
     Gpu(#[from] GpuError),
-    /// The frames.
+    /// A frame could not be computed.
     #[error(transparent)]
     Solve(#[from] SolverError),
 }

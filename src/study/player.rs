@@ -161,7 +161,7 @@ impl Player {
             rate: self.frames_per_second,
             sets: &self.sets,
         };
-        // The data has only strings and finite numbers, which JSON can represent.
+        // The data has only strings and numbers, which JSON can always represent.
         let json = serde_json::to_string(&data).unwrap_or_default();
         json.replace('<', "\\u003c")
     }

@@ -55,7 +55,7 @@ pub struct Expected {
     pub standing: u32,
     /// Number of particles at the start.
     pub particles: usize,
-    /// Lattice points left out because a solid covers them.
+    /// Particles left out because a solid covers them or they lie behind a wall.
     pub removed: usize,
     /// Volume of water at the start.
     pub volume: Volume,

@@ -15,19 +15,19 @@ pub enum ExportError {
     /// Options that cannot be combined.
     #[error("{0}")]
     Asked(String),
-    /// The cache.
+    /// Reading the cache failed.
     #[error(transparent)]
     Cache(#[from] CacheError),
     /// The scene in the cache.
     #[error("the cache's scene: {0}")]
     Scene(#[from] SceneError),
-    /// The look.
+    /// The look is invalid.
     #[error(transparent)]
     Look(#[from] LookError),
-    /// The output folder.
+    /// The output folder cannot be used.
     #[error(transparent)]
     Folder(#[from] FolderError),
-    /// Conversion to binary USD.
+    /// Binary USD cannot be written.
     #[error(transparent)]
     Usdc(#[from] UsdcError),
     /// A whitewater stream that does not exist.

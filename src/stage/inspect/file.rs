@@ -109,7 +109,7 @@ pub enum FileError {
         /// Why it is not a mesh.
         mesh: String,
     },
-    /// A compressed frame.
+    /// A compressed frame cannot be read.
     #[error(transparent)]
     Frame(#[from] CacheError),
     /// A VDB, USD or glTF file that is invalid, damaged or unsupported.
@@ -120,10 +120,10 @@ pub enum FileError {
         /// What is wrong with it.
         detail: String,
     },
-    /// A mesh.
+    /// A mesh cannot be read.
     #[error(transparent)]
     Mesh(#[from] MeshError),
-    /// A picture.
+    /// A picture cannot be read.
     #[error(transparent)]
     Picture(#[from] RenderError),
 }

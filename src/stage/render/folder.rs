@@ -403,7 +403,7 @@ fn stranger(file: &Path, is_wanted: bool, wanted: &Wanted<'_>) -> Option<String>
     Some(format!("of another {what}"))
 }
 
-/// The owner of a single picture: its frame's hash stands for the cache.
+/// The owner of a single picture: its frame's hash represents the cache.
 fn owner_of(picture: Attributes, numbering: i64) -> Owner {
     Owner {
         software: picture.software,

@@ -32,7 +32,7 @@ pub enum StreamError {
         /// What is wrong with it.
         how: &'static str,
     },
-    /// A file of the stream.
+    /// Reading the stream failed.
     #[error(transparent)]
     Cache(#[from] CacheError),
 }

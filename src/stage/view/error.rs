@@ -17,10 +17,10 @@ pub enum ViewError {
     /// A path that does not exist.
     #[error("{} is not there", .0.display())]
     Missing(PathBuf),
-    /// A picture.
+    /// Reading a picture failed.
     #[error(transparent)]
     Picture(#[from] RenderError),
-    /// A cache.
+    /// Reading a cache failed.
     #[error(transparent)]
     Cache(#[from] CacheError),
     /// The scene in a cache.
@@ -34,7 +34,7 @@ pub enum ViewError {
         /// Why it is missing, and how to make it.
         what: String,
     },
-    /// The contact sheet.
+    /// The contact sheet could not be drawn.
     #[error(transparent)]
     Sheet(#[from] RasterError),
     /// A file or folder that cannot be read or written.

@@ -12,19 +12,19 @@ use crate::{Blame, device::SolverError};
 /// Why whitewater could not be made.
 #[derive(Debug, thiserror::Error)]
 pub enum WhitewaterError {
-    /// The bake's cache, or the stream's.
+    /// Reading or writing the bake's or the stream's cache failed.
     #[error(transparent)]
     Cache(#[from] CacheError),
     /// The scene in the cache, or the stream's own settings.
     #[error("the cache's scene: {0}")]
     Scene(#[from] SceneError),
-    /// The scene's solids.
+    /// A solid without an inside, or too large a distance grid.
     #[error(transparent)]
     Solid(#[from] SignedDistanceError),
-    /// The device.
+    /// The device cannot be opened or does not suffice.
     #[error(transparent)]
     Gpu(#[from] GpuError),
-    /// The whitewater passes.
+    /// A whitewater pass failed.
     #[error(transparent)]
     Solver(#[from] SolverError),
     /// The given cache is a whitewater stream, not a bake.
