@@ -1,4 +1,5 @@
-//! A wave maker that takes in the waves which come to it: active absorption (Milgram 1970; reviewed by Schäffer and Klopman 2000).
+//! Active absorption: a wave maker that also absorbs the waves that reach it (Milgram 1970;
+//! reviewed by Schäffer and Klopman 2000).
 
 use std::f64::consts::TAU;
 
@@ -12,49 +13,55 @@ use super::{
     probe::{self, SUPPORT},
 };
 
-/// After so many periods a wall forgets: where its water stands on the mean, and how far it has come from its own way. What is
-/// slower is not absorbed; of a wave of the period itself 1/(2π · 8) = 2 % of the answer is lost to each, a quarter of a period off.
+/// Memory of a wall, in periods: the time constant with which it forgets the mean water level
+/// beside it and its displacement from its prescribed path. Slower changes are not absorbed. At the
+/// period itself each of the two costs 1/(2π · 8) = 2 % of the response, a quarter of a period out
+/// of phase.
 const MEMORY: f64 = 8.0;
 
-/// Most of the depth that a level counts as: a splash up the wall is no wave.
+/// Largest level that counts, as a fraction of the depth: a splash up the wall is not a wave.
 const HIGHEST: f64 = 0.5;
 
-/// Columns of water that a level is the mean of, at most.
+/// Largest number of columns of water that a level is averaged over.
 const COLUMNS: f64 = 32.0;
 
-/// The most that `gain` × the seconds between two answers may be. A wall that moves raises the water beside it at about its
-/// speed (the local waves), and the next answer takes that for a wave: at 1 it would go on growing.
+/// Largest allowed product of `gain` and the seconds between two updates. A moving wall raises the
+/// water beside it at about its own speed (the local, evanescent waves), and the next update takes
+/// that for an incoming wave: at a product of 1 the motion grows.
 pub const MOST_GAIN: f64 = 0.5;
 
-/// What a wall is to absorb.
+/// What a wall is asked to absorb.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Asked {
-    /// How far inside of the domain's face the wall is at the start, and how far it may come off its own way, metres.
+    /// Distance of the wall from the domain's face at the start, and the farthest it may leave its
+    /// prescribed path, metres.
     pub room: f64,
-    /// Of the water at rest, metres.
+    /// Depth of the water at rest, metres.
     pub depth: f64,
-    /// Of the waves that it absorbs best, seconds.
+    /// Period of the waves that the wall absorbs best, seconds.
     pub period: f64,
-    /// m/s².
+    /// Acceleration of gravity, m/s².
     pub gravity: f64,
 }
 
-/// How a wall absorbs.
+/// Absorption law of a wall: its velocity is `gain` times the level beside it, `lag` later.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Absorption {
     asked: Asked,
-    /// 1/s.
+    /// Wall velocity per level, 1/s.
     gain: f64,
-    /// Seconds.
+    /// Delay of the response, seconds.
     lag: f64,
 }
 
 impl Absorption {
-    /// By linear theory of a piston at the period.
+    /// Derives gain and lag from the linear theory of a piston at the requested period.
     ///
-    /// A wave of amplitude a that comes to a wall is thrown back, 2a at the wall. A velocity U radiates one of c₀ U/ω, and raises
-    /// the water at the wall by (c₀ − i Σcⱼ) U/ω ([`piston_elevation`]). Nothing comes back where U = −a ω/c₀; the level is then
-    /// η = a (1 + i Σcⱼ/c₀), so that U = −ω/(c₀ + i Σcⱼ) η: so much, and so much later.
+    /// A still wall reflects an incoming wave of amplitude a, so that the level at the wall is 2a.
+    /// A wall velocity U radiates a wave of amplitude c₀ U/ω and raises the water at the wall by
+    /// (c₀ − i Σcⱼ) U/ω ([`piston_elevation`]). Nothing is reflected where U = −a ω/c₀. The level
+    /// is then η = a (1 + i Σcⱼ/c₀), so that U = −ω/(c₀ + i Σcⱼ) η: the modulus is the gain, the
+    /// phase the lag.
     pub fn new(asked: Asked) -> Self {
         let frequency = TAU / asked.period;
         let [progressive, local] = piston_elevation(frequency, asked.depth, asked.gravity);
@@ -65,26 +72,28 @@ impl Absorption {
         }
     }
 
-    /// What was asked for.
+    /// Returns the request that this law was derived from.
     pub fn asked(&self) -> &Asked {
         &self.asked
     }
 
-    /// The wall's velocity over the level that it answers, 1/s.
+    /// Returns the wall's velocity per level that it responds to, 1/s.
     pub fn gain(&self) -> f64 {
         self.gain
     }
 
-    /// The level that the wall's own waves have beside it, metres, by the linear theory of waves of the period: (c₀ − i Σcⱼ) U/ω.
+    /// Level beside the wall due to the waves that the wall itself makes, metres, by linear theory
+    /// at the requested period: (c₀ − i Σcⱼ) U/ω.
     fn own_level(&self, motion: &Motion, t: f64) -> f64 {
         motion.velocity(t - self.lag) / self.gain
     }
 
-    /// What the wall does for `seconds` from the time `now` on, where the water beside it stands `level` metres over the still
-    /// water; `None` where there is none.
+    /// Computes the absorber state for `seconds` from time `now` on. `level` is the water level
+    /// beside the wall, metres above still water; `None` if there is no water.
     ///
-    /// The velocity goes over `seconds` to what the level asks for as it will be then, by the line through the last two; the wall
-    /// keeps to its room.
+    /// The velocity changes linearly over `seconds` to the one that the predicted level asks for;
+    /// the prediction extrapolates the last two levels linearly. The displacement stays within the
+    /// wall's `room`.
     pub fn answer(
         &self,
         motion: &Motion,
@@ -114,13 +123,13 @@ impl Absorption {
                 let rate = (level - last) / seconds;
                 (mean, level - mean + (seconds - self.lag) * rate)
             }
-            // The first water that comes is what later waves are told by.
+            // The first water to arrive is the mean that later waves are measured from.
             (None, Some(level)) => (level, 0.0),
             (_, None) => (before.mean, 0.0),
         };
         let (displacement, velocity) = before.state(now);
         let wanted = -self.gain * foreseen - displacement / memory;
-        // Where it is when it has slowed down again over as many seconds.
+        // Displacement after slowing down again over as many seconds.
         let coming = displacement + 0.5 * velocity * seconds;
         let wanted = wanted.clamp((-room - coming) / seconds, (room - coming) / seconds);
         Answer {
@@ -134,10 +143,11 @@ impl Absorption {
     }
 }
 
-/// Mean level of the water along a wall, half a particle spacing off it, metres above the world's y = 0; `None` where there is none.
+/// Returns the mean water level along a wall, half a particle spacing off it, in metres above the
+/// world's y = 0; `None` if there is no water there.
 ///
-/// `walls` are the box's faces in the frame of the particles, of which the wall is the least or the greatest along an axis other
-/// than y.
+/// `walls` are the box's faces in the frame of the particles. `axis` (x or z) and `is_max` select
+/// the face that is the wall.
 pub fn level_along(
     particles: &Particles,
     spacing: f64,
@@ -190,13 +200,13 @@ mod tests {
         Absorption::new(asked(period))
     }
 
-    /// Seconds of waves with this kh.
+    /// Period, seconds, of waves with this kh.
     fn period(kh: f64) -> f64 {
         TAU / (GRAVITY / DEPTH * kh * kh.tanh()).sqrt()
     }
 
-    /// The velocity inward that answers to a level of cos ωt: parts with the cosine and with the sine, over the last of many
-    /// periods.
+    /// Inward wall velocity in response to a level of cos ωt: its cosine and sine components,
+    /// averaged over the last of many periods.
     fn response(wall: &Absorption, period: f64) -> [f64; 2] {
         let frequency = TAU / period;
         let (settled, measured) = ((40.0 * wall.asked.period / SECONDS) as u32, 20_000);
@@ -204,7 +214,7 @@ mod tests {
         let (mut with_cos, mut with_sin) = (0.0, 0.0);
         for k in 0..settled + measured {
             let now = f64::from(k) * SECONDS;
-            // It begins at rest, as water does.
+            // The wave ramps up from rest, as water does.
             let level = 1e-3 * (frequency * now).cos() * (now / wall.asked.period).min(1.0);
             let answer = wall.answer(&Motion::Still, before.as_ref(), (now, SECONDS), Some(level));
             for part in 0..8 {
@@ -220,8 +230,9 @@ mod tests {
         [with_cos, with_sin].map(|sum| sum * 2.0 / (8.0 * f64::from(measured)) / 1e-3)
     }
 
-    /// Amplitude thrown back of waves with this kh, by linear theory, from what the wall does with a level. As complex amplitudes
-    /// of e^iωt: the wall's velocity is U = −F η, the level η = 2a + Z U with Z = (c₀ − i Σcⱼ)/ω, and a + c₀ U/ω goes back.
+    /// Reflected amplitude of waves with this kh, by linear theory, from the wall's response to a
+    /// level. In complex amplitudes of e^iωt: the wall's velocity is U = −F η, the level η = 2a + Z
+    /// U with Z = (c₀ − i Σcⱼ)/ω, and a + c₀ U/ω is reflected.
     fn reflection(wall: &Absorption, kh: f64) -> f64 {
         let frequency = TAU / period(kh);
         let [progressive, local] = piston_elevation(frequency, DEPTH, GRAVITY);
@@ -251,7 +262,7 @@ mod tests {
             let found = reflection(&wall, kh);
             assert!(found < most, "{kh}: {found}");
         }
-        // Negative control: half of the gain, by a depth that is four times the water's.
+        // Negative control: half of the gain, from a depth four times that of the water.
         let other = Absorption::new(Asked {
             depth: 4.0 * DEPTH,
             ..asked(period(0.5))
@@ -260,7 +271,8 @@ mod tests {
         assert!(found > 0.15, "{found}");
     }
 
-    /// A wall that makes waves has their level beside it, and does nothing about that: by linear theory, (c₀ − i Σcⱼ) of the motion.
+    /// A wall does not respond to the level of the waves that it makes itself: by linear theory,
+    /// (c₀ − i Σcⱼ) times its motion.
     #[test]
     fn its_own_waves_are_none_that_come_to_it() {
         let period = period(1.5);
@@ -275,9 +287,10 @@ mod tests {
         let furthest = |scale: f64| {
             let (mut before, mut furthest) = (None, 0.0f64);
             for k in 0..2000 {
-                // Once the wall is under way.
+                // After the ramp.
                 let now = 10.0 * period + f64::from(k) * SECONDS;
-                // With its velocity, and with its way about the mean.
+                // One part is in phase with the velocity, the other with the displacement from
+                // the mean.
                 let way = motion.displacement(now) - 0.01;
                 let level = progressive * motion.velocity(now) / frequency + local * way;
                 let level = Some(scale * level);
@@ -287,7 +300,7 @@ mod tests {
             }
             furthest
         };
-        // Of a stroke of 20 mm.
+        // The stroke is 20 mm.
         assert!(furthest(1.0) < 1e-12, "{}", furthest(1.0));
         assert!(furthest(1.3) > 1e-3, "{}", furthest(1.3));
     }
@@ -316,11 +329,12 @@ mod tests {
             }
             before = Some(answer);
         }
-        // It gets to the end of its room, where without it it would go 0.4 m.
+        // The wall reaches the limit of its displacement; without the limit it would move 0.4 m.
         assert!((0.049..0.0501).contains(&farthest), "{farthest}");
     }
 
-    /// A wall on dry ground is at rest, and water that comes is no trough of still water that was never there.
+    /// A wall on dry ground is at rest: the first water to arrive is not a trough below a still
+    /// level that never was.
     #[test]
     fn the_first_water_at_a_dry_wall_is_no_wave() {
         let wall = absorption(2.0);
@@ -339,7 +353,7 @@ mod tests {
         assert!(run(-0.4, 0.1) > 0.1);
     }
 
-    /// Still water that stands higher or lower than was said is no wave.
+    /// Still water above or below the nominal level is not a wave.
     #[test]
     fn it_stands_where_the_water_does() {
         let wall = absorption(2.0);
@@ -353,14 +367,16 @@ mod tests {
             before.unwrap().displacement.abs()
         };
         assert!(run(&|_| 0.01) == 0.0);
-        // A step in the level is forgotten: e^-5.2 of 0.01 m × gain × memory after as many memories.
+        // The wall forgets a step in the level: after as many memories, e^-5.2 of 0.01 m × gain ×
+        // memory is left.
         let at_once = 0.01 * wall.gain * MEMORY * wall.asked.period;
         let left = run(&|t| if t < 1.0 { 0.0 } else { 0.01 });
         assert!(left < 0.1 * at_once, "{left} of {at_once}");
         assert!(left > 0.0);
     }
 
-    /// Along a wall that has come in: the block's top, whatever stands elsewhere.
+    /// The level along a wall that has moved inward is the top of the block beside it, whatever the
+    /// water does elsewhere.
     #[test]
     fn a_level_is_that_of_the_water_beside_the_wall() {
         let spacing = 0.1;
@@ -369,7 +385,7 @@ mod tests {
         for (i, j, k) in
             (0..20).flat_map(|i| (0..20).flat_map(move |j| (0..12).map(move |k| (i, j, k))))
         {
-            // Twelve layers to x = 1, sixteen beyond.
+            // Twelve layers up to x = 1, sixteen beyond.
             if i >= 3 && j < if i < 10 { 12 } else { 16 } {
                 let p = DVec3::new(at(i), at(j), at(k));
                 water.position.push(p.as_vec3().to_array());
@@ -402,7 +418,7 @@ mod tests {
             (progressive - 0.982).abs() < 1e-3 && (0.054..0.062).contains(&local),
             "{local}"
         );
-        // On shallow water √(g/h), without a lag.
+        // In shallow water the gain is √(g/h), without lag.
         let Absorption { gain, lag, .. } = absorption(60.0);
         assert!(
             (gain / (GRAVITY / DEPTH).sqrt() - 1.0).abs() < 1e-2,

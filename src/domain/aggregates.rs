@@ -1,27 +1,29 @@
-//! What a frame is compared by where its particles cannot be: after an impact two bakes that differ in a
-//! rounding have other trajectories, and the same energies, volume and wave.
+//! Quantities that compare frames whose particles cannot be compared one by one: after an impact,
+//! two bakes that differ by a rounding error have different trajectories but the same energies,
+//! volume and wave.
 
 use serde::{Deserialize, Serialize};
 
-/// One frame's sums and shapes; `None` where there is nothing to measure.
+/// Sums and shapes of one frame; `None` where there is nothing to measure.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Aggregates {
-    /// Σ ½ m v², joule.
+    /// Kinetic energy, Σ ½ m v², J.
     pub kinetic_energy: f64,
-    /// −Σ m g · (x − the domain's least corner), joule.
+    /// Potential energy, −Σ m g · (x − the domain's least corner), J.
     pub potential_energy: f64,
     /// Volume of the continuous water, m³.
     pub volume: f64,
-    /// Median over the rows along the wave's way, metres above the still level.
+    /// Median crest height over the rows along the wave's direction, metres above the still level.
     pub crest_height: f64,
-    /// How far the wave has come, metres; `None` where there is no wave.
+    /// Distance that the wave's front has travelled, metres; `None` if there is no wave.
     pub front: Option<f64>,
     /// Height that 99.9 % of the particles do not exceed, metres above the still level.
     pub splash_height: f64,
-    /// Part of the particles away from the continuous water.
+    /// Fraction of the particles that are detached from the continuous water.
     pub airborne: f64,
-    /// Mean of max(0, ρ/ρ0 − 1), as the solver reports it; the start has no report.
+    /// Mean of max(0, ρ/ρ0 − 1) as the solver reports it; `None` for the start, which has
+    /// no report.
     pub density_error: Option<f64>,
 }
 
@@ -38,7 +40,7 @@ impl Aggregates {
         ("density_error", ""),
     ];
 
-    /// The values in the order of [`Self::NAMES`].
+    /// Returns the values in the order of [`Self::NAMES`].
     pub fn values(&self) -> [Option<f64>; 8] {
         [
             Some(self.kinetic_energy),
@@ -57,7 +59,7 @@ impl Aggregates {
 mod tests {
     use super::*;
 
-    /// Each value stands under its own name.
+    /// Each value is under its own name.
     #[test]
     fn values_stand_in_the_order_of_their_names() {
         for (k, (name, _)) in Aggregates::NAMES.into_iter().enumerate() {

@@ -1,32 +1,34 @@
-//! What air does to drops of water.
+//! Aerodynamic drag on drops of water.
 
 use glam::DVec3;
 
-/// Density of air over that of water, at 15 °C.
+/// Density of air relative to that of water, at 15 °C.
 pub const DENSITY: f64 = 1.225 / 999.1;
 /// Kinematic viscosity of air at 15 °C, m²/s.
 pub const VISCOSITY: f64 = 1.48e-5;
 
-/// Rate at which air takes from a drop's speed against it, 1/s: 3/8 (ρ_air/ρ) C_D |w| / r, with the drag coefficient of a sphere
-/// by Schiller and Naumann 1933 (Clift, Grace and Weber 1978, table 5.1): 24/Re (1 + 0.15 Re^0.687), at least 0.44. `radius` in
-/// metres, `speed` against the air in m/s.
+/// Returns the rate at which drag reduces a drop's speed relative to the air, 1/s: 3/8 (ρ_air/ρ)
+/// C_D |w| / r. C_D is the drag coefficient of a sphere by Schiller and Naumann 1933 (Clift, Grace
+/// and Weber 1978, table 5.1): 24/Re (1 + 0.15 Re^0.687), at least 0.44. `radius` in metres,
+/// `speed` relative to the air in m/s.
 pub fn resistance(radius: f64, speed: f64) -> f64 {
     let reynolds = 2.0 * radius * speed / VISCOSITY;
-    // C_D over that of Stokes, 24/Re.
+    // C_D relative to Stokes drag, 24/Re.
     let over_stokes = (1.0 + 0.15 * reynolds.powf(0.687)).max(0.44 / 24.0 * reynolds);
     4.5 * VISCOSITY * DENSITY / (radius * radius) * over_stokes
 }
 
-/// A velocity, m/s, after what gravity adds in a step, `fall`, m/s, and drag for `seconds` in air that goes with the `wind`. Implicit in
-/// the velocity, so that no step goes beyond the wind's, and that a drop falls in the end as fast as drag holds its weight, however long
-/// steps are.
+/// Returns a drop's velocity, m/s, after one step of gravity and of drag in air that moves with
+/// `wind`. `fall` is what gravity adds in the step, m/s. The update is implicit in the velocity: no
+/// step overshoots the wind, and a drop reaches its terminal speed however long the steps are.
 pub fn blown([velocity, fall]: [DVec3; 2], wind: DVec3, radius: f64, seconds: f64) -> DVec3 {
     let against = velocity - wind;
     wind + (against + fall) / (1.0 + seconds * resistance(radius, against.length()))
 }
 
-/// Part of a lone drop's drag that water feels which has so large a `share` of water about it, from 0 of a drop alone to 1 deep
-/// in the water: none from the share on that a plane surface has.
+/// Returns the fraction of a lone drop's drag that acts on a particle whose neighbourhood holds
+/// this `share` of water: 1 for a drop in open air, falling to 0 at `of_plane`, the share below a
+/// plane surface, and 0 deeper in the water.
 pub fn exposure(share: f64, of_plane: f64) -> f64 {
     (1.0 - share / of_plane).clamp(0.0, 1.0)
 }
@@ -35,18 +37,20 @@ pub fn exposure(share: f64, of_plane: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// Speed at which a drop falls steadily, by the fixed point of gravity and drag.
+    /// Terminal speed of a drop, m/s, by fixed-point iteration of gravity and drag.
     fn terminal_speed(radius: f64) -> f64 {
         let mut speed = 1.0;
         for _ in 0..200 {
-            // g = resistance(speed) speed; half way, since it grows with the speed.
+            // Solves g = resistance(speed) speed; damped by half, because resistance grows with
+            // the speed.
             speed = 0.5 * (speed + 9.81 / resistance(radius, speed));
         }
         speed
     }
 
-    /// Gunn and Kinzer 1949, table 2 (drops in stagnant air, 20 °C): diameters of 0.2, 0.5, 1 and 2 mm fall at 0.72, 2.06, 4.03 and
-    /// 6.49 m/s. The sphere's drag meets them within 5 %, and the largest, which flattens and falls slower than a sphere, within 7 %.
+    /// Gunn and Kinzer 1949, table 2 (drops in stagnant air, 20 °C): diameters of 0.2, 0.5, 1 and 2
+    /// mm fall at 0.72, 2.06, 4.03 and 6.49 m/s. The sphere's drag agrees within 5 %, and within 7
+    /// % for the largest, which flattens and falls slower than a sphere.
     #[test]
     fn drops_fall_as_gunn_and_kinzer_measured() {
         let cases = [
@@ -62,7 +66,7 @@ mod tests {
                 off.abs() < allowed,
                 "{diameter}: {speed} against {measured}"
             );
-            // Half the radius falls at another speed: the comparison tells.
+            // Negative control: half the radius falls at a different speed.
             assert!((terminal_speed(0.25 * diameter) / measured - 1.0).abs() > 0.2);
         }
     }
@@ -75,7 +79,7 @@ mod tests {
         let stokes = 6.0 * std::f64::consts::PI * VISCOSITY * 1.225 * radius / mass;
         assert!((resistance(radius, 0.0) / stokes - 1.0).abs() < 1e-12);
         assert!((resistance(radius, 1e-4) / stokes - 1.0).abs() < 1e-2);
-        // At 1 m/s Re is 1.35, and the drag 18 % above.
+        // At 1 m/s Re is 1.35, and the drag 18 % higher.
         assert!((resistance(radius, 1.0) / stokes - 1.184).abs() < 2e-3);
     }
 

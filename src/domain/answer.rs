@@ -1,34 +1,36 @@
-//! What walls that absorb do from one frame's end to the next: a part of the state.
+//! State of absorbing walls between the ends of two frames; part of the simulation's state.
 
 use serde::{Deserialize, Serialize};
 
-/// Most walls that absorb: all of the domain's.
+/// Largest number of absorbing walls: all faces of the domain.
 pub const MOST: usize = 6;
 
-/// How far a wall has come off its own way, from one answer to the next.
+/// Displacement of an absorbing wall from its prescribed path, from one update to the next: a
+/// uniformly accelerated motion.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Answer {
-    /// When it begins, seconds from the shot's start.
+    /// Time at which this state begins, seconds from the start of the shot.
     pub start: f64,
-    /// Then, metres inward.
+    /// Displacement at `start`, metres inward.
     pub displacement: f64,
-    /// Then, m/s inward.
+    /// Velocity at `start`, m/s inward.
     pub velocity: f64,
-    /// From then on, m/s² inward.
+    /// Constant acceleration from `start` on, m/s² inward.
     pub acceleration: f64,
-    /// By how much the water beside the wall then stood over what the wall's own waves have there, metres; `None` where there was
-    /// none.
+    /// Water level beside the wall at `start`, less the level of the waves that the wall itself
+    /// makes, metres; `None` if there was no water.
     pub level: Option<f64>,
-    /// What that was on the mean since there was water, metres.
+    /// Running mean of `level` since water first arrived, metres.
     pub mean: f64,
 }
 
-/// Those of the walls of a scene, in the order of its wave makers; `None` of walls that do not absorb, and before the first frame.
+/// States of a scene's walls, in the order of its wave makers; `None` for walls that do not absorb,
+/// and before the first frame.
 pub type Answers = [Option<Answer>; MOST];
 
 impl Answer {
-    /// Metres inward and m/s inward at a time, seconds.
+    /// Returns the displacement, metres inward, and the velocity, m/s inward, at time `t`, seconds.
     pub fn state(&self, t: f64) -> (f64, f64) {
         let s = t - self.start;
         let way = s * (self.velocity + 0.5 * self.acceleration * s);
@@ -38,7 +40,7 @@ impl Answer {
         )
     }
 
-    /// The greatest speed between two times, m/s.
+    /// Returns the largest speed between times `t0` and `t1`, m/s.
     pub fn peak_speed(&self, t0: f64, t1: f64) -> f64 {
         self.state(t0).1.abs().max(self.state(t1).1.abs())
     }

@@ -1,27 +1,29 @@
-//! Solids as a solver meets them: samples with a weight in the density, and a signed distance.
+//! Solids as a solver sees them: surface samples that contribute to the density, and a
+//! signed distance.
 
 use super::{sampling::BoundarySample, signed_distance::SignedDistance};
 
 /// All solids of a scene.
 #[derive(Clone, Debug, Default)]
 pub struct Boundary {
-    /// Samples over all surfaces of static solids, world space.
+    /// Samples of the surfaces of all static solids, world space.
     pub samples: Vec<BoundarySample>,
-    /// Distance to the union of the static solids; `None` where the scene has none.
+    /// Signed distance to the union of the static solids; `None` if the scene has none.
     pub distance: Option<SignedDistance>,
-    /// Distance to each moving solid, where it stood at the start.
+    /// Signed distance to each moving solid, in its pose at the start.
     pub moving: Vec<SignedDistance>,
-    /// Samples over the surface of each moving solid, where it stood at the start; none where the solver takes no samples.
+    /// Surface samples of each moving solid, in its pose at the start; empty where the solver takes
+    /// no samples.
     pub moving_samples: Vec<Vec<BoundarySample>>,
 }
 
 impl Boundary {
-    /// Samples on all solids.
+    /// Returns the number of samples on all solids.
     pub fn sample_count(&self) -> usize {
         self.samples.len() + self.moving_samples.iter().map(Vec::len).sum::<usize>()
     }
 
-    /// Distances to all solids, the static ones first.
+    /// Iterates over the distances to all solids, the static ones first.
     pub fn grids(&self) -> impl Iterator<Item = &SignedDistance> {
         self.distance.iter().chain(&self.moving)
     }

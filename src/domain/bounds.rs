@@ -4,7 +4,8 @@ use glam::DVec3;
 
 use super::flip::ON_FACE;
 
-/// Farther than any domain reaches, metres, and a power of two: where walls stand that are not there.
+/// A distance beyond any domain, metres, and a power of two: the position of walls that a
+/// domain lacks.
 pub const FAR: f64 = (1u64 << 40) as f64;
 
 /// An axis-aligned box, metres.
@@ -17,7 +18,7 @@ pub struct Bounds {
 }
 
 impl Bounds {
-    /// The smallest box around `points`; `None` where there are none.
+    /// Returns the smallest box around `points`; `None` if there are none.
     pub fn of_points(points: impl IntoIterator<Item = DVec3>) -> Option<Self> {
         points.into_iter().fold(None, |bounds, p| match bounds {
             None => Some(Self { min: p, max: p }),
@@ -28,18 +29,18 @@ impl Bounds {
         })
     }
 
-    /// Edge lengths.
+    /// Returns the edge lengths, metres.
     pub fn size(&self) -> DVec3 {
         self.max - self.min
     }
 
-    /// Cubic metres.
+    /// Returns the volume, m³.
     pub fn volume(&self) -> f64 {
         let size = self.size();
         size.x * size.y * size.z
     }
 
-    /// Whether `p` lies inside or on the surface.
+    /// Returns whether `p` lies inside or on the surface.
     pub fn contains(&self, p: DVec3) -> bool {
         p.cmpge(self.min).all() && p.cmple(self.max).all()
     }
@@ -52,12 +53,13 @@ impl Bounds {
         }
     }
 
-    /// Cells of edge `edge` that cover it along each axis, as [`cells_over`] counts them.
+    /// Returns the number of cells of edge length `edge` that cover the box along each axis, as
+    /// [`cells_over`] counts them.
     pub fn cells(&self, edge: f64) -> [u32; 3] {
         cells_over(self.size(), edge).to_array().map(|n| n as u32)
     }
 
-    /// This box moved by `way`, metres.
+    /// Returns this box moved by `way`, metres.
     pub fn moved(&self, way: DVec3) -> Self {
         Self {
             min: self.min + way,
@@ -65,7 +67,7 @@ impl Bounds {
         }
     }
 
-    /// This box with each face moved outward by `margin` metres.
+    /// Returns this box with each face moved outward by `margin` metres.
     pub fn grown(&self, margin: f64) -> Self {
         Self {
             min: self.min - DVec3::splat(margin),
@@ -74,8 +76,9 @@ impl Bounds {
     }
 }
 
-/// Cells of edge `edge` that cover a box of `size` metres along each axis, whole numbers; one at least. A last one of which
-/// the box would take less than [`ON_FACE`] is left out: 3 × 0.05 m are three cells of 0.05 m, though in f64 they are more.
+/// Returns the number of cells of edge length `edge` that cover `size` along each axis, as whole
+/// numbers; at least one. A last cell that the box would fill by less than [`ON_FACE`] is dropped:
+/// 3 × 0.05 m are three cells of 0.05 m, although the quotient exceeds 3 in f64.
 pub fn cells_over(size: DVec3, edge: f64) -> DVec3 {
     (size / edge - ON_FACE).ceil().max(DVec3::ONE)
 }
@@ -97,7 +100,7 @@ mod tests {
         assert!(Bounds::of_points([]).is_none());
     }
 
-    /// Products of decimals, which f64 rounds up or down, along an axis that begins at 0 and along ones that do not.
+    /// Products of decimals, which f64 rounds up or down, on axes that begin at 0 and on others.
     #[test]
     fn rounding_alone_makes_no_cell() {
         let cells = |min: f64, max: f64, edge: f64| {
@@ -116,11 +119,11 @@ mod tests {
                     let found = cells(min, min + length, edge);
                     assert_eq!(found, count, "{count} of {edge} from {min}");
                 }
-                // As f32 has it, as other programs write it.
+                // Lengths rounded to f32, as other programs write them.
                 let narrow = f64::from(length as f32);
                 let found = cells(0.0, narrow, edge);
                 assert!(count > 8000 || found == count, "{count} of {edge} in f32");
-                // Negative control: a cell that is truly cut is one.
+                // Negative control: a cell that is truly cut counts.
                 assert_eq!(cells(0.0, length + 2.0 * ON_FACE * edge, edge), count + 1);
                 assert_eq!(cells(0.0, length - 2.0 * ON_FACE * edge, edge), count);
             }

@@ -1,35 +1,36 @@
-//! Sparse grids: bricks of 8³ cells where the water is (a VDB leaf), and coarser levels above them.
+//! Sparse grids: bricks of 8³ cells where there is water (the size of a VDB leaf), and coarser
+//! levels above them.
 //!
-//! Only the topology stands here; values live in flat arrays of [`CELLS`] per slot, so that cell
-//! `local` of slot `s` is element `512 s + local`, `local` = x + 8 y + 64 z. Slot 0 is nobody's: it
-//! stands for whatever is not there, and its values stay zero. Cost and memory follow the slots;
-//! only `table`, four bytes a brick, follows the box.
+//! This module holds the topology only. Values live in flat arrays of [`CELLS`] per slot: cell
+//! `local` of slot `s` is element `512 s + local`, with `local` = x + 8 y + 64 z. Slot 0 is a
+//! placeholder for every absent brick; its values stay zero. Cost and memory grow with the slots;
+//! only `table`, four bytes per brick, grows with the box.
 
 use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
 
-/// Cells along a brick's edge.
+/// Cells along the edge of a brick.
 pub const EDGE: u32 = 8;
 
-/// Cells of a brick.
+/// Cells in a brick.
 pub const CELLS: u32 = EDGE * EDGE * EDGE;
 
-/// Index of a brick itself among its 27 neighbours: (dx+1) + 3 (dy+1) + 9 (dz+1).
+/// Index of a brick itself among its 27 neighbours, (dx+1) + 3 (dy+1) + 9 (dz+1).
 pub const SELF: usize = 13;
 
-/// A brick and who lies about it; `Brick` of shared/bricks.wgsl, word for word.
+/// A brick and its neighbours. Same layout as `Brick` in shared/bricks.wgsl.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 pub struct Brick {
-    /// Position in bricks of its level, from the domain's least corner.
+    /// Position in bricks of its own level, from the domain's least corner.
     pub coordinate: [u32; 3],
-    /// 0 is the finest; each level doubles the cell size.
+    /// Level: 0 is the finest, and each level doubles the cell size.
     pub level: u32,
-    /// Slots of the 3³ bricks about it on its level, x fastest; 0 where there is none.
+    /// Slots of the 3³ bricks around it on its level, x fastest; 0 where there is none.
     pub neighbors: [u32; 27],
-    /// Slot of the brick above; 0 where there is none.
+    /// Slot of the parent brick on the next coarser level; 0 if there is none.
     pub parent: u32,
-    /// Slots of the 2³ bricks below, x fastest; 0 where there is none.
+    /// Slots of the 2³ child bricks on the next finer level, x fastest; 0 where there is none.
     pub children: [u32; 8],
 }
 
@@ -39,55 +40,60 @@ pub struct Brick {
 pub struct Level {
     /// First slot.
     pub start: u32,
-    /// Slots.
+    /// Number of slots.
     pub count: u32,
 }
 
-/// Bricks about the water of one moment, and their coarser levels.
+/// Bricks around the water at one instant, and their coarser levels.
 ///
-/// Slots 1..=`wet` hold water, up to `active` those within reach of it, and then each coarser level
-/// over the wet ones. Within each of these the order is that of the coordinates, x fastest, so the
-/// same wet bricks always come in the same slots.
+/// Slots 1..=`wet` hold water, those up to `active` are within reach of it, and the coarser levels
+/// over the wet bricks follow. Within each of these groups bricks are ordered by coordinate, x
+/// fastest, so the same wet bricks always get the same slots.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Bricks {
     /// Cells of the finest level along each axis.
     pub cells: [u32; 3],
-    /// Axes along which the last brick's upper neighbour is the first one; their cells are a multiple of [`EDGE`].
+    /// Axes along which the domain wraps: the last brick's upper neighbour is the first. The cell
+    /// count along such an axis is a multiple of [`EDGE`].
     pub periodic: [bool; 3],
     /// Bricks of the finest level along each axis.
     pub table_dims: [u32; 3],
     /// Slot of each brick of the finest level, x fastest; 0 where there is none.
     pub table: Vec<u32>,
-    /// Slots that hold water.
+    /// Number of slots that hold water.
     pub wet: u32,
-    /// Slots of the finest level, wet ones first.
+    /// Number of slots on the finest level, wet ones first.
     pub active: u32,
-    /// `levels[0]` covers the wet bricks alone; the last has one brick.
+    /// Slots of each level. `levels[0]` covers only the wet bricks. The last one has a single
+    /// brick, unless the depth limit came first.
     pub levels: Vec<Level>,
-    /// One record for each slot, slot 0 included.
+    /// One record per slot, slot 0 included.
     pub records: Vec<Brick>,
 }
 
-/// Bricks along each axis that cover so many cells.
+/// Returns the number of bricks along each axis that cover `cells`, at least 1.
 pub fn table_dims(cells: [u32; 3]) -> [u32; 3] {
     cells.map(|n| n.div_ceil(EDGE).max(1))
 }
 
 impl Bricks {
-    /// Lays out the bricks with `is_wet` (one flag a brick of the finest level, x fastest) and all
-    /// within `reach` bricks of one, diagonals included. `depth` bounds the number of levels.
+    /// Lays out the bricks that `is_wet` flags (one flag per brick of the finest level, x
+    /// fastest) and all bricks within `reach` of one, diagonals included. `depth` bounds the
+    /// number of levels.
     ///
     /// # Panics
-    /// Where `is_wet` is not of the length of the table.
+    /// If the length of `is_wet` differs from that of the table.
     pub fn new(cells: [u32; 3], is_wet: &[bool], reach: u32, depth: usize) -> Self {
         Self::periodic(cells, [false; 3], is_wet, reach, depth)
     }
 
-    /// The same where the domain joins its own end along the axes of `periodic`. A coarser level does so only where it
-    /// has half as many bricks as the one below; elsewhere its ends have no neighbour.
+    /// Same as [`Self::new`] for a domain that wraps along the axes of `periodic`. A coarser level
+    /// wraps only where it has exactly half as many bricks as the level below; otherwise the bricks
+    /// at its ends have no neighbour.
     ///
     /// # Panics
-    /// Where `is_wet` is not of the length of the table, or a periodic axis has cells that fill no whole bricks.
+    /// If the length of `is_wet` differs from that of the table, or if the cells along a periodic
+    /// axis do not fill whole bricks.
     pub fn periodic(
         cells: [u32; 3],
         periodic: [bool; 3],
@@ -131,19 +137,20 @@ impl Bricks {
         bricks
     }
 
-    /// Slots in all, slot 0 included: what the arrays must hold.
+    /// Returns the number of slots, slot 0 included: the length that per-slot arrays need.
     pub fn slots(&self) -> usize {
         self.records.len()
     }
 
-    /// Coordinates of an element's cell on its level.
+    /// Returns the coordinates of an element's cell on its level.
     pub fn cell(&self, element: u32) -> [u32; 3] {
         let brick = &self.records[(element / CELLS) as usize];
         let within = place(element);
         std::array::from_fn(|axis| EDGE * brick.coordinate[axis] + within[axis])
     }
 
-    /// Element of a cell of the finest level; in slot 0 where no brick is.
+    /// Returns the element of a cell of the finest level; it lies in slot 0 where there is
+    /// no brick.
     pub fn element(&self, cell: [i64; 3]) -> u32 {
         let edge = i64::from(EDGE);
         let cell = self.wrapped(cell);
@@ -159,7 +166,7 @@ impl Bricks {
         CELLS * slot + x + EDGE * (y + EDGE * z)
     }
 
-    /// The cell of the domain that a cell beyond a periodic end is an image of.
+    /// Maps a cell beyond a periodic end to the cell of the domain that it is an image of.
     pub fn wrapped(&self, cell: [i64; 3]) -> [i64; 3] {
         std::array::from_fn(|axis| {
             if self.periodic[axis] {
@@ -170,7 +177,8 @@ impl Bricks {
         })
     }
 
-    /// Element of the cell `offset` away, at most eight cells along each axis; in slot 0 where there is none.
+    /// Returns the element of the cell `offset` away, at most eight cells along each axis; it lies
+    /// in slot 0 where there is no brick.
     pub fn near(&self, element: u32, offset: [i32; 3]) -> u32 {
         let at = place(element);
         let (mut neighbor, mut local) = (0, 0);
@@ -183,7 +191,8 @@ impl Bricks {
         CELLS * brick.neighbors[neighbor as usize] + local
     }
 
-    /// Coarser levels over the wet bricks, until one brick holds all or `depth` levels stand.
+    /// Adds coarser levels over the wet bricks until one brick covers all or there are
+    /// `depth` levels.
     fn add_levels(&mut self, depth: usize) {
         let (mut dims, mut periodic) = (self.table_dims, self.periodic);
         while self.levels.len() < depth && volume(dims) > 1 {
@@ -253,7 +262,7 @@ fn parent_index(brick: &Brick, dims: [u32; 3]) -> usize {
     (z * dims[1] as usize + y) * dims[0] as usize + x
 }
 
-/// Fills in the neighbours of the slots in `range`, whose level has `table`.
+/// Fills in the neighbours of the slots in `range`, which belong to the level that `table` indexes.
 fn connect(
     records: &mut [Brick],
     range: std::ops::Range<usize>,
@@ -264,7 +273,7 @@ fn connect(
     records[range].par_iter_mut().for_each(|brick| {
         for (k, neighbor) in brick.neighbors.iter_mut().enumerate() {
             let step = [k % 3, k / 3 % 3, k / 9];
-            // One to the left wraps round and is then too large.
+            // Index −1 wraps round to a value beyond any count.
             let at: [usize; 3] = std::array::from_fn(|axis| {
                 let (at, count) = (
                     brick.coordinate[axis] as usize + step[axis],
@@ -283,7 +292,7 @@ fn connect(
     });
 }
 
-/// Flags within `reach` of a flag in the maximum norm: one axis after the other.
+/// Sets all flags within `reach` of a set flag in the maximum norm, one axis after the other.
 fn dilate(flags: &[bool], dims: [u32; 3], periodic: [bool; 3], reach: u32) -> Vec<bool> {
     let [nx, ny, nz] = dims.map(|n| n as usize);
     let (mut flags, reach) = (flags.to_vec(), reach as usize);
@@ -308,7 +317,7 @@ fn dilate(flags: &[bool], dims: [u32; 3], periodic: [bool; 3], reach: u32) -> Ve
 mod tests {
     use super::*;
 
-    /// A hash, so that wet bricks lie about without order.
+    /// Pseudo-random flags, so that wet bricks are scattered.
     fn scattered(count: usize) -> Vec<bool> {
         (0..count as u64)
             .map(|k| (k + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 59 == 0)
@@ -392,7 +401,7 @@ mod tests {
         assert!(found > 100);
     }
 
-    /// Three bricks, two and one; all cells are there, and so is each neighbour.
+    /// Three bricks, two and one; every cell exists, and so does each of its neighbours.
     #[test]
     fn periodic_bricks_join_their_own_ends() {
         let (cells, dims) = ([24, 16, 8], [3, 2, 1]);
@@ -410,14 +419,15 @@ mod tests {
                 assert_eq!(bricks.cell(near), image(there));
             }
         }
-        // Above three bricks are two, of which one is half empty: no joint; above two is one, above one still one.
+        // Above three bricks are two, one of them half empty: that level does not wrap. Above two
+        // is one, and above one is one.
         let faces = |slot: u32| bricks.records[slot as usize].neighbors;
         let above = bricks.levels[1].start;
         assert_eq!(bricks.levels[1].count, 2);
         assert_eq!((faces(above)[12], faces(above)[14]), (0, above + 1));
         assert_eq!((faces(above)[10], faces(above)[16]), (above, above));
         assert_eq!((faces(above)[4], faces(above)[22]), (0, 0));
-        // Within reach across the joint, and not without it.
+        // Bricks are within reach across the periodic boundary, and not without it.
         let only = [true, false, false, false, false, false];
         let reached = |periodic| Bricks::periodic(cells, periodic, &only, 1, 1).active;
         assert_eq!(reached([true, false, false]), 6);

@@ -1,45 +1,48 @@
-//! Limits that a bake is held to, and what is told where one is passed.
+//! Limits that a bake must keep, and the report when it exceeds one.
 
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-/// A quantity that is watched while a bake runs.
+/// A quantity that is monitored while a bake runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Watched {
-    /// A value that is not a finite number.
+    /// Values that are not finite numbers.
     NotFinite,
-    /// Whether every particle that a frame began with is there at its end, once, within the domain.
+    /// Particles that are missing, duplicated or outside of the domain at a frame's end.
     Particles,
-    /// Particles after a frame, with those that entered at its end.
+    /// Particles after a frame, including those that entered at its end.
     Count,
-    /// Substeps that a frame asks for.
+    /// Substeps that a frame requires.
     Substeps,
-    /// Largest speed of a particle at a frame's end, m/s.
+    /// Largest particle speed at a frame's end, m/s.
     Speed,
-    /// Largest speed at a frame's end, m/s, against the state before it and what gravity and walls can add.
+    /// Largest particle speed at a frame's end, m/s, limited by the state before the frame and what
+    /// gravity and walls can add.
     SpeedJump,
     /// Mean of max(0, ρ/ρ0 − 1) at a frame's end.
     DensityErrorMean,
     /// 99th percentile of max(0, ρ/ρ0 − 1) at a frame's end.
     DensityErrorP99,
-    /// Its largest.
+    /// Largest max(0, ρ/ρ0 − 1) at a frame's end.
     DensityErrorMax,
-    /// Times that a particle was slowed to the displacement cap, over particles and substeps.
+    /// Number of times that a particle was slowed to the displacement cap, divided by particles
+    /// and substeps.
     Capped,
     /// Relative true residual of a projection.
     Residual,
-    /// Largest |∇·u| Δt in a cell of water after a projection.
+    /// Largest |∇·u| Δt in a water cell after a projection.
     Divergence,
-    /// |V/V0 − 1| at a frame's end, V0 the volume of the start.
+    /// |V/V0 − 1| at a frame's end, with V0 the volume at the start.
     Volume,
-    /// Rise of the total energy within a frame beyond the work done on the water, over the total.
+    /// Rise of the total energy within a frame beyond the work done on the water, relative to
+    /// the total.
     Energy,
 }
 
 impl Watched {
-    /// Each quantity, its name in reports, and its words in a message.
+    /// Each quantity, its name in reports, and its phrase in messages.
     const NAMED: [(Self, &'static str, &'static str); 14] = [
         (Self::NotFinite, "not_finite", "values that are not finite"),
         (
@@ -94,28 +97,28 @@ impl Watched {
     ];
 
     fn row(self) -> (Self, &'static str, &'static str) {
-        // In the order of the variants; a test holds them against each other.
+        // In the order of the variants; a test checks this.
         Self::NAMED[self as usize]
     }
 
-    /// Name in reports and in `[budget]`.
+    /// Returns the name used in reports and in `[budget]`.
     pub fn name(self) -> &'static str {
         self.row().1
     }
 }
 
-/// A limit that was passed; the state before its frame stands.
+/// A limit that was exceeded. The state before the frame is kept.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub struct Breach {
     /// Output frame that could not be computed.
     pub frame: u32,
-    /// Substep of it, from 1, where it was seen within the frame.
+    /// Substep within the frame, from 1, if the breach was found in one.
     pub substep: Option<u32>,
-    /// The quantity.
+    /// Quantity that exceeded its limit.
     pub watched: Watched,
-    /// Its value.
+    /// Measured value.
     pub measured: f64,
-    /// The largest value allowed.
+    /// Largest value allowed.
     pub limit: f64,
     /// A further sentence for the message.
     pub detail: Option<String>,
@@ -142,7 +145,7 @@ impl Breach {
         }
     }
 
-    /// Adds the substep in which it was seen.
+    /// Adds the substep in which the breach was found.
     pub fn in_substep(self, substep: u32) -> Self {
         Self {
             substep: Some(substep),
@@ -150,10 +153,10 @@ impl Breach {
         }
     }
 
-    /// A value that may not be over `limit` and has to be a number; `None` is no limit.
+    /// Checks that a value is finite and does not exceed `limit`; `None` is no limit.
     ///
     /// # Errors
-    /// The breach, where it is over or not finite.
+    /// The breach, if the value exceeds the limit or is not finite.
     pub fn check(
         frame: u32,
         watched: Watched,
@@ -171,7 +174,7 @@ impl Breach {
     }
 }
 
-/// Four digits: with them two that differ are told apart from a limit.
+/// Formats a value with few digits: four decimals, or three in exponential notation.
 struct Short(f64);
 
 impl fmt::Display for Short {
@@ -199,7 +202,8 @@ impl fmt::Display for Breach {
                 f,
                 ": {words} is {measured}, and budget.{name} allows {limit}"
             )?,
-            // The limit as the scene says it, and the value in full where a few digits would read as the limit.
+            // The limit as the scene states it, and the value in full where both would round to the
+            // same text.
             _ if Short(self.measured).to_string() == Short(self.limit).to_string() => {
                 let [measured, limit] = [self.measured, self.limit];
                 write!(f, ": {words} is {measured}, and budget.{name} is {limit}")?;
@@ -234,13 +238,13 @@ mod tests {
             breach.to_string(),
             "frame 7, substep 2: the relative residual of the projection is 0.0340, and budget.residual is 0.0100"
         );
-        // A value that a few digits round to the limit.
+        // A value that rounds to the same digits as the limit.
         let close = check(0.010_000_4, Some(0.01)).unwrap_err().to_string();
         assert!(
             close.contains("is 0.0100004, and budget.residual is 0.01"),
             "{close}"
         );
-        // What is no number is over every limit, and over none as well.
+        // NaN exceeds every limit, and is a breach even without one.
         for limit in [Some(0.01), None] {
             let breach = check(f64::NAN, limit).unwrap_err();
             assert_eq!(breach.watched, Watched::NotFinite);

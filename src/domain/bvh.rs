@@ -1,4 +1,5 @@
-//! A bounding-volume tree over a mesh: exact nearest triangle and generalised winding number.
+//! Bounding volume hierarchy over a mesh: exact nearest triangle, ray casts and generalised
+//! winding number.
 
 use glam::DVec3;
 
@@ -7,17 +8,17 @@ use super::mesh::TriangleMesh;
 /// Triangles in a leaf.
 const LEAF_SIZE: usize = 4;
 
-/// A cluster farther than this many of its radii counts as one dipole (Barill et al. 2018, who use 2;
-/// the sign only asks on which side of 0.5 the number is).
+/// A cluster farther away than this many of its radii counts as a single dipole. Barill et al. 2018
+/// use 2; here only the side of 0.5 on which the number lies matters.
 const FAR_RADII: f64 = 3.0;
 
-/// The tree. Built once a mesh, read by many threads.
+/// Bounding volume hierarchy of a mesh: built once per mesh, then read by many threads.
 #[derive(Clone, Debug)]
 pub struct Bvh {
     nodes: Vec<Node>,
-    /// Corners in leaf order.
+    /// Triangle corners in leaf order.
     corners: Vec<[DVec3; 3]>,
-    /// Index in the mesh of each entry of `corners`.
+    /// Triangle index in the mesh of each entry of `corners`.
     index: Vec<u32>,
 }
 
@@ -25,14 +26,15 @@ pub struct Bvh {
 struct Node {
     min: DVec3,
     max: DVec3,
-    /// Area-weighted centre of the cluster, and its furthest corner from there.
+    /// Area-weighted centre of the cluster, and the distance from it to its furthest corner.
     centre: DVec3,
     radius: f64,
     /// Σ area × normal.
     area_vector: DVec3,
-    /// First entry of a leaf, or the right child of an inner node (its left child follows it).
+    /// First entry of a leaf, or the right child of an inner node, whose left child follows
+    /// it directly.
     first_or_right: u32,
-    /// Entries of a leaf; 0 marks an inner node.
+    /// Number of entries of a leaf; 0 marks an inner node.
     count: u32,
 }
 
@@ -52,20 +54,21 @@ impl Bvh {
         }
     }
 
-    /// Its boxes for other walks: least and greatest corner, first entry of a leaf or right child of an inner node (whose left one
-    /// follows it), entries of a leaf or 0.
+    /// Iterates over the nodes for other traversals: least and greatest corner of the box; first
+    /// entry of a leaf or right child of an inner node (the left child follows the node directly);
+    /// number of entries of a leaf, or 0.
     pub fn boxes(&self) -> impl Iterator<Item = ([DVec3; 2], u32, u32)> {
         let nodes = self.nodes.iter();
         nodes.map(|node| ([node.min, node.max], node.first_or_right, node.count))
     }
 
-    /// Index in the mesh of each entry of the leaves.
+    /// Returns the triangle index in the mesh of each leaf entry.
     pub fn entries(&self) -> &[u32] {
         &self.index
     }
 
-    /// Distance in metres to the nearest triangle, and its index in the mesh; `None` where none
-    /// is nearer than `bound`.
+    /// Returns the distance in metres to the nearest triangle and its index in the mesh; `None` if
+    /// none is nearer than `bound`.
     pub fn nearest(&self, p: DVec3, bound: f64) -> Option<(f64, u32)> {
         if self.nodes.is_empty() {
             return None;
@@ -93,7 +96,7 @@ impl Bvh {
             let (left, right) = (at + 1, node.first_or_right);
             let left_squared = self.nodes[left as usize].distance_squared(p);
             let right_squared = self.nodes[right as usize].distance_squared(p);
-            // The nearer child is pushed last, and so visited first.
+            // The nearer child is pushed last, so that it is visited first.
             if left_squared < right_squared {
                 stack.push(right, right_squared);
                 stack.push(left, left_squared);
@@ -105,8 +108,8 @@ impl Bvh {
         best.map(|index| (best_squared.sqrt(), index))
     }
 
-    /// Distance along a ray to the first triangle nearer than `bound`, in lengths of `direction`, and its index in the mesh; on
-    /// either side (Möller and Trumbore 1997).
+    /// Returns the first triangle along a ray, on either side, that is nearer than `bound`: the
+    /// distance in lengths of `direction` and its index in the mesh (Möller and Trumbore 1997).
     pub fn first_along(&self, origin: DVec3, direction: DVec3, bound: f64) -> Option<(f64, u32)> {
         let mut nearest = bound;
         let mut found = None;
@@ -135,8 +138,8 @@ impl Bvh {
         found.map(|index| (nearest, index))
     }
 
-    /// Generalised winding number (Jacobson et al. 2013): 1 inside, 0 outside of a closed mesh,
-    /// in between near holes, negative for a mesh turned inside out.
+    /// Returns the generalised winding number (Jacobson et al. 2013): 1 inside and 0 outside of a
+    /// closed mesh, in between near holes, negative for a mesh turned inside out.
     pub fn winding_number(&self, p: DVec3) -> f64 {
         let mut solid_angle = 0.0;
         let mut stack = Stack::new();
@@ -162,7 +165,7 @@ impl Bvh {
     }
 }
 
-/// How far along a ray a triangle is.
+/// Distance along a ray to a triangle, in lengths of `direction`.
 fn along([a, b, c]: [DVec3; 3], origin: DVec3, direction: DVec3) -> Option<f64> {
     let (ab, ac, from_a) = (b - a, c - a, origin - a);
     let p = direction.cross(ac);
@@ -171,18 +174,18 @@ fn along([a, b, c]: [DVec3; 3], origin: DVec3, direction: DVec3) -> Option<f64> 
     let q = from_a.cross(ab);
     let v = direction.dot(q) / volume;
     let t = ac.dot(q) / volume;
-    // A ray within the triangle's plane divides by zero, and no comparison with that holds.
+    // A ray in the triangle's plane divides by zero, and no comparison with the NaN holds.
     (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t > 0.0).then_some(t)
 }
 
 impl Node {
-    /// Whether a ray comes into its box before `nearest`.
+    /// Returns whether a ray enters the node's box before `nearest`.
     fn is_met(&self, origin: DVec3, direction: DVec3, nearest: f64) -> bool {
         let (mut enter, mut leave) = (0.0f64, nearest);
         for axis in 0..3 {
             let a = (self.min[axis] - origin[axis]) / direction[axis];
             let b = (self.max[axis] - origin[axis]) / direction[axis];
-            // On a side's plane and along it is 0 / 0, and min and max pass over what is no number.
+            // A ray in the plane of a side gives 0 / 0; min and max ignore NaN.
             enter = enter.max(a.min(b));
             leave = leave.min(a.max(b));
         }
@@ -199,7 +202,8 @@ impl Node {
     }
 }
 
-/// A fixed stack: median splits keep the depth below 32, and each level leaves one entry behind.
+/// A stack of fixed size: median splits keep the depth below 32, and each level leaves one
+/// entry behind.
 struct Stack {
     entries: [(u32, f64); 64],
     len: usize,
@@ -243,7 +247,7 @@ fn build(corners: &[[DVec3; 3]], order: &mut [u32], first: usize, nodes: &mut Ve
     };
     let key = |t: u32| corners[t as usize].iter().map(|v| v[axis]).sum::<f64>();
     let middle = order.len() / 2;
-    // Ties go by index, so that the tree depends on the mesh alone.
+    // Ties are broken by index, so that the tree depends only on the mesh.
     order.select_nth_unstable_by(middle, |&a, &b| key(a).total_cmp(&key(b)).then(a.cmp(&b)));
     let (left, right) = order.split_at_mut(middle);
     build(corners, left, first, nodes);
@@ -285,7 +289,7 @@ fn cluster(corners: &[[DVec3; 3]], order: &[u32]) -> Node {
     }
 }
 
-/// The point of triangle `abc` nearest to `p` (Ericson 2005, §5.1.5).
+/// Returns the point of triangle `abc` that is nearest to `p` (Ericson 2005, §5.1.5).
 pub fn nearest_point(p: DVec3, a: DVec3, b: DVec3, c: DVec3) -> DVec3 {
     let (ab, ac, ap) = (b - a, c - a, p - a);
     let (d1, d2) = (ab.dot(ap), ac.dot(ap));
@@ -318,8 +322,8 @@ pub fn nearest_point(p: DVec3, a: DVec3, b: DVec3, c: DVec3) -> DVec3 {
     a + ab * (vb * scale) + ac * (vc * scale)
 }
 
-/// Signed solid angle of a triangle seen from `p` (Van Oosterom and Strackee 1983), positive
-/// where its back is seen.
+/// Signed solid angle of a triangle seen from `p` (Van Oosterom and Strackee 1983), positive where
+/// the back faces `p`.
 fn triangle_solid_angle(p: DVec3, corners: [DVec3; 3]) -> f64 {
     let [a, b, c] = corners.map(|v| v - p);
     let (la, lb, lc) = (a.length(), b.length(), c.length());
@@ -361,14 +365,15 @@ mod tests {
                 .map(|t| triangle_solid_angle(p, mesh.corners(t)))
                 .sum::<f64>()
                 / (4.0 * std::f64::consts::PI);
-            // Clusters are seen from beyond 3 radii: the neglected second order is below
-            // (1/3)² of what a cluster adds, and clusters of both signs cancel.
+            // Clusters are approximated beyond 3 radii: the neglected second-order term is below
+            // (1/3)² of a cluster's contribution, and clusters of both signs cancel.
             assert!((bvh.winding_number(p) - exact).abs() < 0.03, "{p} {exact}");
         }
     }
 
-    /// Slanted triangles whose boxes hold the origin are looked at first and come within 1.005 of it. The squares' boxes are
-    /// as near as the squares, 1: a bound that is 2 % too far (1 % in the distance) would leave them out.
+    /// Slanted triangles whose boxes contain the origin are visited first and come within 1.005 of
+    /// it. The squares' boxes are as near as the squares, 1: a bound that is 2 % too large (1 % in
+    /// the distance) would skip them.
     #[test]
     fn a_box_as_near_as_its_triangle_is_looked_into() {
         let mut mesh = TriangleMesh {

@@ -1,46 +1,48 @@
-//! Shares of a range of frames, or of the points of a study, as `--chunk 1/4` asks for them.
+//! Shares of a range of frames or of the points of a study, as in `--chunk 1/4`.
 
 use std::{fmt, str::FromStr};
 
-/// Share `index` of `count` of a range, from 1 on.
+/// Share `index` of `count`; `index` starts at 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Chunk {
     index: u32,
     count: u32,
 }
 
-/// A text that is no share.
+/// Error for a text that is not a share.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ChunkError {
-    /// Not two numbers.
+    /// The text is not two numbers separated by `/`.
     #[error("`{0}` is no share: write 1/4 for the first of four")]
     Form(String),
-    /// No such one.
+    /// The index is not within 1..=count.
     #[error("there is no share {index} of {count}: the shares are 1/{count} to {count}/{count}")]
     Beyond {
-        /// Asked for.
+        /// Index requested.
         index: u32,
-        /// Of so many.
+        /// Number of shares.
         count: u32,
     },
 }
 
-/// The frames of a share; all where none was asked for.
+/// Returns the frames of a share, or all frames if there is none.
 pub fn share(frames: &[u32], chunk: Option<Chunk>) -> &[u32] {
     chunk.map_or(frames, |chunk| chunk.of(frames))
 }
 
 impl Chunk {
-    /// Its frames: as many in a row as in the other shares, or one more.
+    /// Returns the frames of this share: consecutive ones, and at most one more than in any
+    /// other share.
     pub fn of(self, frames: &[u32]) -> &[u32] {
         let end =
             |share: u32| (frames.len() as u64 * u64::from(share) / u64::from(self.count)) as usize;
         &frames[end(self.index - 1)..end(self.index)]
     }
 
-    /// Which of some points are of the share: they are dealt one by one, the cheap ones first, so that each share gets cheap
-    /// and dear ones. `places` has each point's place in its own line, from cheap to dear. Wherever a line would come to the same
-    /// shares again, the dealing goes on from the next share, so that none has one line alone.
+    /// Returns which points belong to this share. Points are dealt one by one in order of cost, so
+    /// that each share gets cheap and expensive ones. `places` holds each point's position in its
+    /// own line, from cheap to expensive. Where a line would fall to the same share again and
+    /// again, the dealing shifts by one share, so that no share holds only one line.
     pub fn deal(self, places: &[usize]) -> Vec<bool> {
         let mut order: Vec<usize> = (0..places.len()).collect();
         order.sort_by_key(|&point| places[point]);
@@ -52,7 +54,7 @@ impl Chunk {
                 is_its[point] = (dealt + shift) % shares == share;
                 dealt += 1;
             }
-            // Each share has got as many so far.
+            // All shares have received equally many so far.
             shift += usize::from(dealt % shares == 0);
         }
         is_its
@@ -102,8 +104,8 @@ mod tests {
         }
     }
 
-    /// Three lines of four values each: every share has one of each value where there are three shares, and nobody has two
-    /// of the dearest where there are four.
+    /// Three lines of four values: with three shares, each has one of each value; with four, none
+    /// has two of the most expensive.
     #[test]
     fn points_are_dealt_so_that_each_share_has_cheap_and_dear_ones() {
         let places: Vec<usize> = (0..3).flat_map(|_| 0..4).collect();
@@ -124,7 +126,8 @@ mod tests {
         }
     }
 
-    /// Lines of two to four methods by six values: of no line has a share more than its part and one, whatever the numbers.
+    /// Lines of two to four methods by six values: no share holds more of a line than its part plus
+    /// one, for any count.
     #[test]
     fn no_share_has_one_line_alone() {
         let values = 6;

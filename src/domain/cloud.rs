@@ -1,8 +1,10 @@
-//! Drops and bubbles of a moment as a sparse grid of optical density for rays: bricks of 8³ voxels where there are any.
+//! Drops and bubbles at one instant as a sparse grid of optical density for ray marching: bricks of
+//! 8³ voxels where there are any.
 //!
-//! A drop's optical cross-section is spread over the nodes about it by a kernel whose weights are normed on these very nodes, so
-//! that the grid holds exactly what the drops hold, wherever they lie between nodes. All follows from the drops alone, in an order
-//! that no number of threads changes.
+//! The optical cross-section of a drop is spread over the nodes around it by a kernel. The weights
+//! are normalised on these same nodes, so that the grid's total equals that of the drops wherever
+//! they lie between nodes. The result depends only on the drops: the order of summation does not
+//! change with the number of threads.
 
 pub mod shade;
 
@@ -12,32 +14,32 @@ use glam::DVec3;
 use half::f16;
 use rayon::prelude::*;
 
-/// Voxels along a brick's edge.
+/// Voxels along the edge of a brick.
 pub const EDGE: u32 = 8;
-/// Nodes along it: those on its far side are the next brick's too.
+/// Nodes along the edge of a brick; those on its far side belong to the next brick as well.
 pub const NODES: u32 = EDGE + 1;
-/// Values of a brick.
+/// Values of a brick: one per node.
 pub const VALUES: usize = (NODES * NODES * NODES) as usize;
-/// In the table, of a brick without drops; those that have some count on from 1.
+/// Table entry of a brick without drops; occupied bricks are numbered from 1.
 pub const EMPTY: u32 = 0;
-/// In the table beside the place of a brick's values, of one that has drops, and of one that has bubbles.
+/// Flags of a table entry: the brick holds drops, the brick holds bubbles.
 pub const HAS: [u32; 2] = [1 << 30, 1 << 31];
 
-/// Least reach of a kernel, voxels: each drop reaches nodes on all sides of it.
+/// Smallest kernel radius, voxels: each drop reaches nodes on all sides.
 const LEAST_REACH: f64 = 1.5;
-/// Reach of a kernel that has the mean square distance of a ball, over the ball's radius: 3/5 against 1/3.
+/// Kernel radius over ball radius at which both have the same mean square distance: √(3/5 / (1/3)).
 const OF_BALL: f64 = 1.341_640_786_499_874;
 
 /// A cloud of drops or of bubbles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Drop {
-    /// Metres.
+    /// Position, metres.
     pub place: DVec3,
-    /// Of the ball that it fills, metres.
+    /// Radius of the ball that the cloud fills, metres.
     pub radius: f64,
     /// Optical cross-section, m²: extinction times volume.
     pub area: f64,
-    /// Whether it is in the water and not before it.
+    /// Whether this is a bubble in the water rather than a drop in the air.
     pub is_bubble: bool,
 }
 
@@ -48,22 +50,23 @@ pub struct Cloud {
     pub corner: DVec3,
     /// Edge length of a voxel, metres.
     pub voxel: f64,
-    /// Bricks along each axis; one that is empty where there are no drops.
+    /// Bricks along each axis; a single empty one if there are no drops.
     pub bricks: [u32; 3],
-    /// [`EMPTY`], or 1 and the place in `values` of each brick and what it [`HAS`], x fastest.
+    /// Entry of each brick, x fastest: [`EMPTY`], or the 1-based index of its block in `values`,
+    /// combined with the flags of [`HAS`].
     pub table: Vec<u32>,
-    /// [`VALUES`] of each brick that has drops, 1/m in half precision: of drops in the lower 16 bits, of bubbles in the upper ones;
-    /// node (i, j, k) is element i + 9 j + 81 k.
+    /// [`VALUES`] for each occupied brick, in 1/m: drops in the lower 16 bits and bubbles in the
+    /// upper ones, both in half precision. Node (i, j, k) is element i + 9 j + 81 k.
     pub values: Vec<u32>,
 }
 
-/// A drop's nodes, counted from the grid's corner, and the factor on its kernel.
+/// The nodes that a drop reaches, counted from the grid's corner, and the factor of its kernel.
 struct Spread {
-    /// In voxels from the grid's corner.
+    /// Centre in voxels from the grid's corner.
     at: DVec3,
-    /// Voxels.
+    /// Kernel radius, voxels.
     reach: f64,
-    /// First nodes, and the first beyond the last.
+    /// First nodes, and one past the last.
     low: [u32; 3],
     end: [u32; 3],
     factor: f64,
@@ -99,14 +102,14 @@ impl Spread {
         [0, 1, 2].map(|axis| self.low[axis]..self.end[axis])
     }
 
-    /// At a node: (1 − q²)², so that density and slope go to zero at its edge.
+    /// Kernel weight at a node: (1 − q²)², so that density and slope vanish at the edge.
     fn weight(&self, node: [u32; 3]) -> f64 {
         let from = (DVec3::from_array(node.map(f64::from)) - self.at) / self.reach;
         let s = (1.0 - from.length_squared()).max(0.0);
         self.factor * s * s
     }
 
-    /// Bricks whose nodes it reaches.
+    /// Bricks that hold nodes within reach.
     fn bricks(&self) -> [Range<u32>; 3] {
         [0, 1, 2].map(|axis| {
             let first = self.low[axis].saturating_sub(EDGE).div_ceil(EDGE);
@@ -116,8 +119,9 @@ impl Spread {
 }
 
 impl Cloud {
-    /// That of drops, metres from the least corner of a domain of `size`, with voxels of `voxel` metres. What has flown farther from
-    /// the domain than it is long is left out.
+    /// Builds the grid of `drops`, whose positions are in metres from the least corner of a domain
+    /// of `size`, with voxels of `voxel` metres. Drops that have flown farther from the domain than
+    /// the domain's own size are left out.
     pub fn new(drops: &[Drop], size: DVec3, voxel: f64) -> Self {
         let is_near = |drop: &&Drop| {
             drop.area > 0.0 && drop.place.cmpgt(-size).all() && drop.place.cmplt(2.0 * size).all()
@@ -219,12 +223,13 @@ impl Cloud {
             .collect()
     }
 
-    /// Extent of the grid, metres.
+    /// Returns the extent of the grid, metres.
     pub fn size(&self) -> DVec3 {
         DVec3::from_array(self.bricks.map(f64::from)) * (self.voxel * f64::from(EDGE))
     }
 
-    /// Densities at `p` of drops and of bubbles, 1/m: trilinear between nodes, nothing beyond the grid.
+    /// Returns the densities of drops and of bubbles at `p`, 1/m: trilinear between nodes, zero
+    /// beyond the grid.
     pub fn densities(&self, p: DVec3) -> [f64; 2] {
         let at = (p - self.corner) / self.voxel;
         let end = DVec3::from_array(self.bricks.map(|n| f64::from(n * EDGE)));
@@ -256,10 +261,10 @@ impl Cloud {
         sums
     }
 
-    /// Cross-sections of all drops and of all bubbles as the grid has them, m².
+    /// Returns the total cross-sections of drops and of bubbles in the grid, m².
     pub fn areas(&self) -> [f64; 2] {
         let mut sums = [0.0; 2];
-        // A node on the side of two bricks is one node.
+        // Nodes that bricks share count once in total.
         let share = |c: u32| if c == 0 || c == EDGE { 0.5 } else { 1.0 };
         for (index, &word) in (0u32..).zip(self.values.iter()) {
             let at = index % VALUES as u32;

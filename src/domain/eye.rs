@@ -1,28 +1,29 @@
-//! A pinhole camera at an instant.
+//! A pinhole camera at one instant.
 
 use glam::DVec3;
 
-/// Where it stands and looks.
+/// Position, orientation and focal length of a pinhole camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Eye {
-    /// Metres.
+    /// Position, metres.
     pub position: DVec3,
-    /// Unit vector to the picture's right.
+    /// Unit vector to the right of the image.
     pub right: DVec3,
-    /// Unit vector to its top.
+    /// Unit vector to the top of the image.
     pub up: DVec3,
-    /// Unit vector into it.
+    /// Unit vector into the scene, along the optical axis.
     pub forward: DVec3,
     /// Focal length in pixels.
     pub focal: f64,
-    /// Where the optical axis meets the picture, pixels to the right of and below its middle.
+    /// Offset of the optical axis from the centre of the image, pixels to the right and down.
     pub axis: [f64; 2],
-    /// Width and height, pixels.
+    /// Width and height of the image, pixels.
     pub size: [u32; 2],
 }
 
 impl Eye {
-    /// Through the centre of a pixel, rows from the top; its part along the optical axis is 1.
+    /// Returns the direction through the centre of a pixel, counted in rows from the top. It is not
+    /// normalised: its component along `forward` is 1.
     pub fn ray(&self, pixel: usize) -> DVec3 {
         let [width, height] = self.size.map(|n| n as usize);
         let [across, down] = self.axis;

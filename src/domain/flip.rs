@@ -1,17 +1,21 @@
-//! Numbers of the FLIP model that the GPU solver and its reference share.
+//! Constants and formulas of the FLIP model that the GPU solver and its reference share.
 
 use glam::DVec3;
 
-/// Particles keep this part of their spacing from walls and solids; at rest the lattice stands at 0.5.
+/// Smallest distance of particles from walls and solids, in particle spacings; in the resting
+/// lattice it is 0.5.
 pub const CONTACT: f64 = 0.1;
 
-/// Nearer than this to a cell's face, in cells, counts as on it: positions of thousands of cells in f32 round below it.
+/// A position nearer than this to a cell's face, in cells, counts as on it: in f32, positions
+/// thousands of cells from the origin round to below the face.
 pub const ON_FACE: f64 = 1e-3;
 
-/// A cell that is open by less has its centre in a wall or a solid; a wall through the centre is beside it.
+/// Open fraction below which a cell's centre lies in a wall or a solid; a cell with a wall through
+/// its centre is still beside it.
 pub const HALF: f64 = 0.5 - ON_FACE;
 
-/// Open part along each axis of the cell whose least corner is `cell`, of what walls at `low` and `high` leave; all in cells.
+/// Returns the open length, along each axis, of the cell whose least corner is `cell`, between
+/// walls at `low` and `high`; all in cells. Lengths within [`ON_FACE`] of 0 or 1 are rounded to it.
 pub fn open_extent(cell: DVec3, [low, high]: [DVec3; 2]) -> DVec3 {
     let length = (cell + 1.0).min(high) - cell.max(low);
     DVec3::from_array(length.to_array().map(|length| {
@@ -25,45 +29,50 @@ pub fn open_extent(cell: DVec3, [low, high]: [DVec3; 2]) -> DVec3 {
     }))
 }
 
-/// Part of a cell that solids leave of what walls do, from its open `volume`.
+/// Returns the fraction of a cell that solids leave open of what walls do, from the cell's
+/// open `volume`.
 pub fn part_of_solids(extent: DVec3, volume: f64) -> f64 {
     volume / extent.element_product().max(1e-6)
 }
 
-/// Particles that are nearer to each other than this part of their spacing are pushed apart beside the density correction, and
-/// off walls that are nearer than half of it.
+/// Particles nearer to each other than this fraction of their spacing are pushed apart, in addition
+/// to the density correction; so are particles nearer than half of it to a wall.
 pub const APART: f64 = 0.9;
 
-/// The same where iterations on their own densities hold particles apart that are pressed together: only what those do not
-/// see is left, particles on one spot at the surface or in the air. At 0.9 a thin sheet that meets a solid throws three times
-/// as many drops up (`scenes/quickstart.toml`, frames 20 to 40). Off walls they are pushed as others: the first layer would come
-/// nearer than in the lattice, and a stirred tank lose 2 % of its volume.
+/// Replaces [`APART`] where the density iterations of the projection separate compressed
+/// particles. Only coincident particles at the surface or in the air remain, which these
+/// iterations do not see. At 0.9, a thin sheet that hits a solid throws up three times as many
+/// drops (`scenes/quickstart.toml`, frames 20 to 40). The push off walls stays at [`APART`]:
+/// otherwise the first layer would come nearer than in the lattice, and a stirred tank would lose
+/// 2 % of its volume.
 pub const LEAST_APART: f64 = 0.5;
 
-/// Water in the open ones of the 27 cells about a particle of a plane surface, over what those hold: the layer of cells below has the
-/// least that there can be.
+/// Water in the open cells among the 27 around a particle at a plane surface, relative to their
+/// capacity: the layer of cells below is the least that there can be.
 pub const PLANE_SHARE: f64 = 1.0 / 3.0;
 
-/// A distance in cells; below half a cell, so that whoever is nearer lies in one of eight.
+/// Limits a separation, in cells, to less than half a cell, so that every closer particle lies in
+/// one of eight cells.
 pub fn apart(wanted: f64) -> f64 {
     wanted.min(0.49)
 }
 
-/// κ of the law of the wall.
+/// Von Kármán constant κ of the law of the wall.
 pub const VON_KARMAN: f64 = 0.41;
 
-/// Displacement cap of a substep over the CFL displacement: what the projection speeds up beyond this is slowed
-/// and counted.
+/// Displacement cap of a substep relative to the CFL displacement. Particles that the projection
+/// accelerates beyond it are slowed and counted.
 pub const CAP: f64 = 2.0;
 
-/// Layers of faces that a velocity is carried outward where particles move by so many cells: √3 times as many
-/// along a diagonal, and what trilinear samples at both stages of the midpoint rule add.
+/// Returns how many layers of faces a velocity is extrapolated outward for particles that move by
+/// `displacement` cells: √3 times as many along a diagonal, plus those that trilinear samples at
+/// both stages of the midpoint rule read.
 pub fn layers(displacement: f64) -> usize {
     (3f64.sqrt() * displacement).ceil() as usize + 3
 }
 
-/// Cells stored along each axis: one beyond the domain's own, for its upper faces; none where these are the lower faces
-/// of the first cells.
+/// Returns the cells stored along each axis: one beyond the domain's own, for its upper faces; none
+/// along periodic axes, where these are the lower faces of the first cells.
 pub fn stored_cells(cells: [u32; 3], periodic: [bool; 3]) -> [u32; 3] {
     std::array::from_fn(|axis| cells[axis] + u32::from(!periodic[axis]))
 }

@@ -1,60 +1,60 @@
-//! Frame ranges as they stand on a command line.
+//! Frame ranges as written on a command line.
 
 use std::fmt;
 use std::str::FromStr;
 
-/// Frames chosen by `7`, `1-240`, `1-240x2`, `1-240:2`, or several of these with commas between.
+/// Frames selected by `7`, `1-240`, `1-240x2`, `1-240:2`, or a comma-separated list of these.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FrameRange {
-    /// Sorted, each once, never empty.
+    /// Sorted, without duplicates, never empty.
     frames: Vec<u32>,
     /// The text as given.
     text: String,
 }
 
-/// A text that is no frame range.
+/// Error for a text that is not a frame range.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "`{part}` is no frame range: {what}; write 7, 1-240, 1-240x2, or several with commas between"
 )]
 pub struct FrameRangeError {
-    /// The part of the list at fault.
+    /// Item of the list that is wrong.
     pub part: String,
     /// The reason.
     pub what: String,
 }
 
-/// 46 hours at 60 frames a second: whoever asks for more has mistyped.
+/// Largest number of frames: 46 hours at 60 frames per second, so more is a typing error.
 const MOST: u64 = 10_000_000;
 
 impl FrameRange {
-    /// The frames from `first` to `last`, both included; `None` where `last` comes before `first` or there are
-    /// more than 10⁷.
+    /// Returns the frames from `first` to `last`, both included; `None` if `last` comes before
+    /// `first` or there are more than 10⁷.
     pub fn inclusive(first: u32, last: u32) -> Option<Self> {
         format!("{first}-{last}").parse().ok()
     }
 
-    /// The frames, ascending, each once.
+    /// Iterates over the frames in ascending order, each once.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = u32> + DoubleEndedIterator + '_ {
         self.frames.iter().copied()
     }
 
-    /// Whether `frame` is one of them.
+    /// Returns whether `frame` is one of them.
     pub fn contains(&self, frame: u32) -> bool {
         self.frames.binary_search(&frame).is_ok()
     }
 
-    /// Least frame.
+    /// Returns the smallest frame.
     pub fn first(&self) -> u32 {
         self.frames[0]
     }
 
-    /// Greatest frame.
+    /// Returns the largest frame.
     pub fn last(&self) -> u32 {
         self.frames[self.frames.len() - 1]
     }
 
-    /// How many; at least one.
+    /// Returns the number of frames, at least one.
     #[expect(
         clippy::len_without_is_empty,
         reason = "a range is never empty, so the question would mislead"
@@ -64,7 +64,7 @@ impl FrameRange {
     }
 }
 
-/// Ascending numbers as a person writes them: `0-4, 7`.
+/// Formats ascending numbers as a person writes them: `0-4, 7`.
 pub fn ranges(numbers: &[u32]) -> String {
     let runs = numbers.chunk_by(|a, b| a.checked_add(1) == Some(*b));
     let run = |run: &[u32]| match run {
@@ -80,7 +80,7 @@ impl fmt::Display for FrameRange {
     }
 }
 
-/// `first`, `last`, `step` of one part of a list.
+/// `first`, `last` and `step` of one item of a list.
 type Span = (u32, u32, u32);
 
 impl FromStr for FrameRange {
@@ -96,7 +96,7 @@ impl FromStr for FrameRange {
             };
             let (first, last, step) = parse_span(part).map_err(error)?;
             total += u64::from((last - first) / step) + 1;
-            // Counted before anything is allocated.
+            // Checked before anything is allocated.
             if total > MOST {
                 return Err(error(format!("more than {MOST} frames")));
             }
@@ -138,7 +138,7 @@ fn parse_span(part: &str) -> Result<Span, String> {
 }
 
 fn number(digits: &str) -> Result<u32, String> {
-    // `parse` alone would take `+1`.
+    // `parse` would accept `+1`.
     if !digits.is_empty() && digits.bytes().all(|b| b.is_ascii_digit()) {
         return digits
             .parse()

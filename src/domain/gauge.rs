@@ -1,4 +1,4 @@
-//! Pressure at a point from the projection's cells.
+//! Interpolation of pressure from the cells of the projection.
 
 use glam::DVec3;
 
@@ -7,26 +7,27 @@ use super::{
     poisson::{AIR, FLUID},
 };
 
-/// The fields of a substep that a pressure is read from.
+/// Fields of a substep from which a pressure is read.
 pub struct Gauge<'a> {
     /// Layout of the elements.
     pub bricks: &'a Bricks,
     /// Cells of the domain along each axis.
     pub cells: [u32; 3],
-    /// Metres.
+    /// Edge length of a cell, metres.
     pub cell_size: f64,
-    /// [`AIR`], [`FLUID`] or [`SOLID`](super::poisson::SOLID), by element.
+    /// [`AIR`], [`FLUID`] or [`SOLID`](super::poisson::SOLID) for each element.
     pub kind: &'a [u32],
     /// Whether an element's centre lies within a wall or a solid.
     pub is_buried: &'a [bool],
     /// Pressure of each element, Pa.
     pub pressure: &'a [f64],
-    /// What the substep took from the particles' velocity at each element's three lower faces, over its length, m/s². With gravity it
-    /// is what a pressure did, or at a closed face the wall.
+    /// Velocity that the substep removed at each element's three lower faces, divided by the
+    /// substep's length, m/s². Together with gravity it is the effect of the pressure, or of the
+    /// wall at a closed face.
     pub taken: &'a [[f32; 3]],
-    /// kg/m³.
+    /// Density of water, kg/m³.
     pub density: f64,
-    /// How pressure rises in water at rest: ρ g, Pa/m.
+    /// Pressure gradient of water at rest, ρ g, Pa/m.
     pub rise: DVec3,
 }
 
@@ -35,26 +36,28 @@ pub struct Gauge<'a> {
 enum Cell {
     /// Its pressure, Pa.
     Water(f64),
-    /// Water whose centre lies within a wall or a solid, and what the projection has there, Pa.
+    /// Water whose centre lies within a wall or a solid, and the projection's pressure there, Pa.
     Buried(f64),
     Air,
     Solid,
 }
 
-/// What a pressure is read for.
+/// Purpose of a reading, which decides how the field is extrapolated.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Reading {
-    /// The water's own, up to walls and solids as in water at rest. What the projection has in a cell whose centre lies within
-    /// them turns the water within a thin part of a cell (a wave that hits a face had 19 kPa in a sliver, 10 kPa half a
-    /// cell off), so that it is taken from the cells before.
+    /// The water's own pressure, extended up to walls and solids as in water at rest. The
+    /// projection's pressure in a cell whose centre lies within them turns the water within a thin
+    /// part of a cell (a wave that hit a face had 19 kPa in a sliver and 10 kPa half a cell off),
+    /// so the neighbouring cells are used instead.
     Field,
-    /// What stops the water at a surface, so that all of its momentum is in the surface's force: from a cell to the next the
-    /// pressure rises by what the face between them takes from the water.
+    /// The pressure that stops the water at a surface, so that all of the water's momentum enters
+    /// the force on it: from one cell to the next, pressure rises by what the face between them
+    /// removes from the water.
     Load,
 }
 
 impl Cell {
-    /// The pressure of water that counts.
+    /// Pressure of water that is not buried.
     fn water(self) -> Option<f64> {
         match self {
             Self::Water(pressure) => Some(pressure),
@@ -63,7 +66,7 @@ impl Cell {
     }
 }
 
-/// What is at a point.
+/// Result of a reading at a point.
 enum Found {
     /// Its pressure, Pa.
     Water(f64),
@@ -71,19 +74,22 @@ enum Found {
     Solid,
 }
 
-/// How far beyond the domain a point may lie by rounding, in cells.
+/// Tolerance for points beyond the domain due to rounding, in cells.
 const ON_FACE: f64 = 1e-6;
 
-/// How far off a surface it is looked at, in cells: first on the water's side of it, then further out of a solid that is coarser than
-/// the cells.
+/// Offsets from a surface at which pressure is read, in cells: first just on its water side, then
+/// farther out of a solid that is coarser than the cells.
 const OFF_FACE: [f64; 4] = [1e-3, 0.5, 1.0, 1.5];
 
 impl Gauge<'_> {
-    /// Trilinear between cell centres; `local` is relative to the domain's least corner, metres. `None` where the
-    /// point's cell holds no water. Air counts as 0 Pa. Beyond a wall or in a solid the field goes on from the cells of
-    /// water beside as in water at rest, ∂p/∂n = ρ g·n, which is what a still wall does to the pressure: so a pressure
-    /// that is linear along a wall and rises by ρ g is met up to it, and what stands half a cell off a wall along which
-    /// gravity points is what stands at it.
+    /// Returns the pressure at a point, Pa, trilinear between cell centres; `None` if the point's
+    /// cell holds no water. `local` is relative to the domain's least corner, metres. Air counts as
+    /// 0 Pa.
+    ///
+    /// Beyond a wall or in a solid the field is extrapolated from the water cells beside it as in
+    /// water at rest, ∂p/∂n = ρ g·n, the condition that a still wall imposes. A pressure that is
+    /// linear along a wall and rises by ρ g is thus exact up to the wall; at a wall parallel to
+    /// gravity, the pressure equals that half a cell off.
     pub fn at(&self, local: DVec3) -> Option<f64> {
         match self.look(local, Reading::Field) {
             Found::Water(pressure) => Some(pressure),
@@ -91,9 +97,11 @@ impl Gauge<'_> {
         }
     }
 
-    /// Pressure on a surface whose unit `normal` points into the water, Pa; 0 where none is. Beyond the surface the field goes on
-    /// by what the face between takes from the water, ∂p/∂n = ρ (g·n + what is taken). At a closed face that is the condition
-    /// which the projection solves with; without it, a wall bears 0.7 of the force of a jet four cells wide.
+    /// Returns the pressure on a surface, Pa, whose unit `normal` points into the water; 0 where
+    /// there is none. Beyond the surface the field is extrapolated by what the face between removes
+    /// from the water, ∂p/∂n = ρ (g·n + removed acceleration). At a closed face this is the
+    /// boundary condition of the projection; without it, a wall bears only 0.7 of the force of a
+    /// jet four cells wide.
     pub fn on_face(&self, local: DVec3, normal: DVec3) -> f64 {
         for off in OFF_FACE {
             let way = off * self.cell_size * normal;
@@ -137,15 +145,17 @@ impl Gauge<'_> {
         let value = |corner: usize| match around[corner] {
             Cell::Water(pressure) => pressure,
             Cell::Air => 0.0,
-            // Where no cell of water has its centre in the open, buried ones are what there is.
+            // Without a water cell whose centre is in the open, the buried cells' own pressures
+            // have to do.
             Cell::Buried(pressure) => beyond(corner).unwrap_or(pressure),
             Cell::Solid => beyond(corner).unwrap_or(own),
         };
         Found::Water((0..8).map(|corner| weight(corner) * value(corner)).sum())
     }
 
-    /// In a solid's cell among eight: from those of water that fewest steps along axes lead to, their mean. `None` where
-    /// there are none. What faces take counts where `last` says which cell the greatest of the eight is.
+    /// Extrapolates into a solid or buried cell among eight: the mean over the water cells that are
+    /// the fewest axis steps away; `None` if there are none. If `last` gives the cell with the
+    /// greatest coordinates of the eight, what the faces remove counts as well.
     fn beyond(&self, around: &[Cell; 8], corner: usize, last: Option<[i64; 3]>) -> Option<f64> {
         let steps = |other: usize| (corner ^ other).count_ones();
         let water = || (0..8).filter_map(|other| Some((other, around[other].water()?)));
@@ -156,7 +166,7 @@ impl Gauge<'_> {
             let way = DVec3::from_array([0, 1, 2].map(|axis| bit(corner, axis) - bit(other, axis)));
             let mut slope = self.rise;
             if let (1, Some(last)) = (nearest, last) {
-                // The face between is the lower one of the greater of both cells.
+                // The face between two cells is the lower face of the greater one.
                 let axis = (corner ^ other).trailing_zeros() as usize;
                 let upper = corner | other;
                 let cell = |axis: usize| last[axis] - 1 + (upper >> axis & 1) as i64;
@@ -168,13 +178,13 @@ impl Gauge<'_> {
         Some(sum / count)
     }
 
-    /// What the lower face of a cell takes, m/s².
+    /// Acceleration that the lower face of a cell removes, m/s².
     fn taken_at(&self, cell: [i64; 3], axis: usize) -> f64 {
         let element = self.element(self.bricks.wrapped(cell));
         element.map_or(0.0, |element| f64::from(self.taken[element][axis]))
     }
 
-    /// Where a cell stands in arrays; `None` beyond the bricks.
+    /// Element of a cell; `None` beyond the bricks.
     fn element(&self, cell: [i64; 3]) -> Option<usize> {
         let dims = self.bricks.table_dims;
         let edge = i64::from(EDGE);
@@ -189,7 +199,7 @@ impl Gauge<'_> {
         Some((CELLS * slot + x + EDGE * (y + EDGE * z)) as usize)
     }
 
-    /// What is outside of the domain is solid.
+    /// Cells outside of the domain are solid.
     fn cell(&self, cell: [i64; 3], reading: Reading) -> Cell {
         let cell = self.bricks.wrapped(cell);
         let is_inside = (0..3).all(|axis| (0..i64::from(self.cells[axis])).contains(&cell[axis]));
@@ -201,7 +211,7 @@ impl Gauge<'_> {
         match self.kind[element] {
             FLUID if is_buried => Cell::Buried(self.pressure[element]),
             FLUID => Cell::Water(self.pressure[element]),
-            // At a surface, what lies behind it is no air.
+            // Behind a surface there is no air.
             AIR if reading == Reading::Field || !is_buried => Cell::Air,
             _ => Cell::Solid,
         }
@@ -213,7 +223,7 @@ mod tests {
     use super::*;
     use crate::poisson::SOLID;
 
-    /// A box of 8 × 8 × 8 cells with water below cell 6 and air above; `look` sees its gauge.
+    /// Passes `look` the gauge of a box of 8 × 8 × 8 cells with water below cell 6 and air above.
     fn with_gauge<T>(
         rise: DVec3,
         field: impl Fn(DVec3) -> f64,
@@ -226,7 +236,8 @@ mod tests {
         DVec3::ZERO
     }
 
-    /// The same where cells are buried as their centres say, and their lower faces stop what these say, m/s².
+    /// Same, with cells buried where `buried` says so of their centres, and lower faces that remove
+    /// `stopped`, m/s².
     fn with_gauge_of<T>(
         buried: impl Fn(DVec3) -> bool,
         stopped: impl Fn(DVec3) -> DVec3,
@@ -262,7 +273,7 @@ mod tests {
         look(&gauge)
     }
 
-    /// A pressure that rises by `slope` as in water at rest.
+    /// Readings of a pressure that rises by `slope` as in water at rest.
     fn at(slope: DVec3, places: &[DVec3]) -> Vec<Option<f64>> {
         let field = |center| 40.0 + slope.dot(center);
         with_gauge(slope, field, |gauge| {
@@ -270,7 +281,7 @@ mod tests {
         })
     }
 
-    /// A linear pressure comes back to rounding between centres and up to walls and corners.
+    /// A linear pressure is reproduced to rounding between centres and up to walls and corners.
     #[test]
     fn a_linear_pressure_is_met_up_to_the_walls() {
         let slope = DVec3::new(3.0, -20.0, 5.0);
@@ -289,9 +300,10 @@ mod tests {
         }
     }
 
-    /// cos(π x / 2 m), flat at the wall at x = 0, under gravity along y. Half a cell off the wall and at it the pressure is
-    /// the same; between centres it is off by what is bent there, (Δx)² p″ / 8, and at the wall by as much. On faces as at
-    /// points, with the way back along the normal.
+    /// cos(π x / 2 m), flat at the wall at x = 0, under gravity along y. The pressure half a cell
+    /// off the wall equals that at the wall. Between centres the error is that of the curvature,
+    /// (Δx)² p″ / 8, and at the wall as much. Surface readings agree with point readings after the
+    /// step back along the normal.
     #[test]
     fn at_a_wall_stands_what_stands_half_a_cell_off() {
         let (k, rise) = (0.5 * std::f64::consts::PI, DVec3::new(0.0, -20.0, 0.0));
@@ -303,23 +315,24 @@ mod tests {
             let found = gauge.at(wall).unwrap();
             assert!((found - gauge.at(off).unwrap()).abs() < 1e-12);
             assert!((found - field(wall)).abs() < 1.01 * bent, "{found}");
-            // A thousandth of a cell off.
+            // Offset by a thousandth of a cell.
             assert!((gauge.on_face(wall, DVec3::X) - found).abs() < 1e-2);
-            // The floor's pressure is what weighs on it.
+            // The pressure on the floor is the weight above it.
             let floor = DVec3::new(0.6, 0.0, 1.0);
             let found = gauge.on_face(floor, DVec3::Y);
             assert!((found - field(floor)).abs() < 1.01 * bent, "{found}");
             // Negative control: without gravity it is less.
             let less = gauge.at(DVec3::new(0.6, 0.125, 1.0)).unwrap();
             assert!((less - field(floor)).abs() > 2.0, "{less}");
-            // Air bears nothing on, and nothing stands beyond the box.
+            // Air exerts no pressure, and there is none beyond the box.
             assert_eq!(gauge.on_face(DVec3::new(0.0, 1.7, 1.0), DVec3::X), 0.0);
             assert_eq!(gauge.on_face(floor, -DVec3::Y), 0.0);
         });
     }
 
-    /// A jet that a wall at x = 0 stops: p = ½ ρ v² − ½ ρ (a x)² beside it, where water goes at a x towards the wall and is stopped at
-    /// its face at a rate s: half a cell off the wall the pressure is that of the cell, and at the wall it is ρ s Δx / 2 more.
+    /// A jet that a wall at x = 0 stops: p = ½ ρ v² − ½ ρ (a x)² beside the wall, where water moves
+    /// at a x towards it and the wall's face stops it at a rate s. Half a cell off the wall the
+    /// pressure is that of the cell; at the wall it is ρ s Δx / 2 higher.
     #[test]
     fn what_a_wall_stops_presses_on_it() {
         let stops = DVec3::new(-3.0, 0.0, 0.0);
@@ -335,20 +348,22 @@ mod tests {
         };
         let [inside, at, on] = with_gauge_of(|_| false, on_wall, DVec3::ZERO, |_| 40.0, look);
         assert!((inside - 40.0).abs() < 1e-9, "{inside}");
-        // The water's own field goes on as at rest.
+        // The field reading continues as in water at rest.
         assert!((at - 40.0).abs() < 1e-9, "{at}");
         let expected = 40.0 + 1000.0 * 3.0 * 0.125;
-        // Looked at a thousandth of a cell off.
+        // Offset by a thousandth of a cell.
         assert!((on - expected).abs() < 1000.0 * 3.0 * 0.25 * 1.1e-3, "{on}");
-        // Negative controls: open faces stop nothing, and a wall that stops nothing bears the cell's pressure.
+        // Negative controls: open faces stop nothing, and a wall that stops nothing bears the
+        // cell's pressure.
         let open = |x: DVec3| if x.x > 0.25 { stops } else { DVec3::ZERO };
         for found in with_gauge_of(|_| false, open, DVec3::ZERO, |_| 40.0, look) {
             assert!((found - 40.0).abs() < 1e-9, "{found}");
         }
     }
 
-    /// A wall at 0.2 m, beyond the centres of the first cells: what the projection has there does not count, on the wall as
-    /// little as in the open part of their cell, and what does goes on to the wall as in water at rest.
+    /// A wall at 0.2 m, beyond the centres of the first cells. The projection's pressure there is
+    /// ignored, both on the wall and in the open part of these cells; the pressure of the next
+    /// cells extends to the wall as in water at rest.
     #[test]
     fn what_is_buried_does_not_count() {
         let slope = DVec3::new(3.0, -20.0, 5.0);
@@ -362,18 +377,19 @@ mod tests {
                 assert!((found - expected).abs() < 1e-12, "{place}: {found}");
             }
         });
-        // In a load what its face takes does, 4 Pa a cell: the surface lies at 0.8 of the first cell, 0.7 of a cell before the next centre.
+        // A load reading does use what the cell's face removes, 4 Pa per cell: the surface lies at
+        // 0.8 of the first cell, 0.7 of a cell before the next centre.
         let takes = |x: DVec3| DVec3::X * if x.x < 0.5 { -0.016 } else { 0.0 };
         with_gauge_of(wall, takes, slope, field, |gauge| {
             let expected = 40.0 + slope.dot(places[0]) + 0.7 * 4.0;
             let found = gauge.on_face(places[0], DVec3::X);
             assert!((found - expected).abs() < 0.01, "{found} {expected}");
         });
-        // Negative control: it would be seen.
+        // Negative control: an unburied cell's pressure would show.
         with_gauge(slope, field, |gauge| {
             assert!(gauge.at(places[0]).unwrap() > 500.0);
         });
-        // Where there is nothing else, it is what there is.
+        // If every cell is buried, their pressures are used.
         with_gauge_of(
             |_| true,
             still,
@@ -386,7 +402,8 @@ mod tests {
         );
     }
 
-    /// By hand: from 12 Pa at the last centre of water, 1.375 m up, to none at the centre of air a cell above.
+    /// By hand: from 12 Pa at the last water centre, 1.375 m up, to zero at the air centre one
+    /// cell above.
     #[test]
     fn air_is_no_pressure_and_no_water_none() {
         let slope = DVec3::new(0.0, -28.0 / 1.375, 0.0);

@@ -1,4 +1,4 @@
-//! Holes of open meshes, and how much of a part they leave open.
+//! Holes of open meshes, and the fraction of a part that they leave open.
 
 use std::{
     collections::{BTreeMap, HashMap},
@@ -9,11 +9,11 @@ use glam::DVec3;
 
 use super::{bounds::Bounds, mesh::TriangleMesh};
 
-/// Holes that a message names; the rest is counted.
+/// Number of holes that a message describes; the rest are counted.
 const NAMED: usize = 3;
 
-/// Holes whose direction is looked along, by the area of their caps. A hole behind them is smaller than 1/64 of what
-/// is open.
+/// Number of directions that are examined, those of the largest caps. A hole beyond them is smaller
+/// than 1/64 of the open area.
 const MOST_DIRECTIONS: usize = 64;
 
 /// A closed loop of open edges.
@@ -21,11 +21,12 @@ const MOST_DIRECTIONS: usize = 64;
 pub struct Hole {
     /// Mean of the loop's vertices, metres.
     pub centre: DVec3,
-    /// Diagonal of the box about the loop, metres.
+    /// Diagonal of the bounding box of the loop, metres.
     pub size: f64,
-    /// Edges of the loop.
+    /// Number of edges of the loop.
     pub edges: usize,
-    /// Area vector of any cap that closes the loop, m², out of the mesh where its triangles look out of it.
+    /// Area vector of any cap that closes the loop, m². It points out of the mesh if the triangles
+    /// face outward.
     pub area_vector: DVec3,
 }
 
@@ -34,11 +35,11 @@ pub struct Hole {
 pub struct Holes(pub Vec<Hole>);
 
 impl Holes {
-    /// Traces the boundary of a mesh whose triangles agree on their side.
+    /// Traces the boundary of a consistently oriented mesh.
     ///
-    /// Each triangle adds its three directed edges, and opposite ones cancel. What is left has as many edges into a
-    /// vertex as out of it, and so falls into closed loops; a loop that meets a vertex again is cut there, so that two
-    /// holes that touch stay two.
+    /// Each triangle adds its three directed edges, and opposite ones cancel. The remaining edges
+    /// enter and leave each vertex equally often, and so form closed loops. A loop that meets a
+    /// vertex again is cut there, so that two touching holes stay two.
     pub(super) fn of(mesh: &TriangleMesh) -> Self {
         let mut next = BTreeMap::<u32, Vec<u32>>::new();
         for ((a, b), uses) in mesh.edges() {
@@ -60,22 +61,22 @@ impl Holes {
                 ));
             });
         }
-        // Stable: equals stay in the order of their vertices.
+        // A stable sort: holes of equal size stay in the order of their vertices.
         holes.sort_by(|a, b| b.size.total_cmp(&a.size));
         Self(holes)
     }
 
-    /// Open edges of all of them.
+    /// Returns the number of open edges of all holes.
     pub fn edges(&self) -> usize {
         self.0.iter().map(|hole| hole.edges).sum()
     }
 
-    /// The greatest part of a cross-section of `part` that its holes take away: of all area seen along a hole's own
-    /// direction, faces and caps alike, what the caps are.
+    /// Returns the largest fraction of a cross-section of `part` that its holes remove: along the
+    /// direction of each hole, the caps' share of the projected area of faces and caps together.
     ///
-    /// Caps are added by size, so that opposite holes do not cancel. Area vectors of a capped part sum to zero; a lone
-    /// hole, however large, thus finds as much area opposite, and this is ½ at most (a box without its floor). Above
-    /// that, holes face one another: 1 is a tube.
+    /// Caps are added by size, so that opposite holes do not cancel. The area vectors of a capped
+    /// part sum to zero: a single hole, however large, has as much area opposite, and the result is
+    /// at most ½ (a box without its floor). Above that, holes face one another: 1 is a tube.
     pub(super) fn missing(&self, part: &TriangleMesh) -> f64 {
         let mut caps: Vec<DVec3> = self.0.iter().map(|hole| hole.area_vector).collect();
         caps.sort_by(|a, b| b.length_squared().total_cmp(&a.length_squared()));
@@ -96,7 +97,8 @@ impl Holes {
     }
 }
 
-/// Follows edges from `first` until none leads on; each loop that closes on the way is handed to `close`.
+/// Follows edges from `first` until none leads on, and passes each loop that closes on the way
+/// to `close`.
 fn trace(first: u32, next: &mut BTreeMap<u32, Vec<u32>>, mut close: impl FnMut(&[u32])) {
     let mut walk = vec![first];
     let mut place = HashMap::from([(first, 0)]);
@@ -116,7 +118,7 @@ fn trace(first: u32, next: &mut BTreeMap<u32, Vec<u32>>, mut close: impl FnMut(&
     }
 }
 
-/// An edge out of `from`, taken away.
+/// Removes and returns an edge out of `from`.
 fn take(next: &mut BTreeMap<u32, Vec<u32>>, from: u32) -> Option<u32> {
     let out = next.get_mut(&from)?;
     let to = out.pop();
@@ -158,7 +160,7 @@ impl fmt::Display for Hole {
     }
 }
 
-/// In one line: how many, and where the largest are.
+/// Formats in one line: how many holes, and where the largest are.
 impl fmt::Display for Holes {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.0.len() {
@@ -177,7 +179,8 @@ impl fmt::Display for Holes {
 }
 
 impl TriangleMesh {
-    /// Enclosed volume, m³, with a flat cap over each hole, whichever way its triangles face.
+    /// Returns the enclosed volume, m³, with a flat cap over each hole, whichever way the
+    /// triangles face.
     pub fn capped_volume(&self) -> f64 {
         let holes = Holes::of(self);
         let caps = holes
@@ -196,7 +199,8 @@ mod tests {
     };
     use super::*;
 
-    /// A prism of `sides` about the z axis, radius 1, from −`half` to `half`, with a cap where asked for.
+    /// A prism of `sides` about the z axis, radius 1, from −`half` to `half`, with the
+    /// requested caps.
     fn prism(sides: u32, half: f64, caps: [bool; 2]) -> TriangleMesh {
         let mut mesh = TriangleMesh::default();
         for z in [-half, half] {
@@ -235,14 +239,14 @@ mod tests {
                 hole.centre.truncate().length() < 1e-12 && hole.centre.z.abs() == 5.0,
                 "{hole}"
             );
-            // 2 √2: the box about a circle of radius 1, which the 48 corners touch.
+            // 2 √2: the box around a circle of radius 1, which the 48 corners touch.
             assert!((hole.size - 8f64.sqrt()).abs() < 1e-12, "{hole}");
-            // A regular polygon's area, 48/2 sin(τ/48), and out of the mesh.
+            // A regular polygon's area, 48/2 sin(τ/48), pointing out of the mesh.
             let area = 24.0 * (std::f64::consts::TAU / 48.0).sin();
             let outward = area * hole.centre.z.signum();
             assert!((hole.area_vector - DVec3::Z * outward).length() < 1e-12);
         }
-        // Nothing of a tube closes its cross-section; of a cup, half of what a closed one has.
+        // A tube's cross-section is fully open; of a cup's, half is closed.
         assert!((holes.missing(&tube) - 1.0).abs() < 1e-12);
         let cup = prism(48, 5.0, [true, false]);
         let taken = cup.check_inside().expect("a cup");
@@ -285,7 +289,7 @@ mod tests {
         assert!((holes.0[0].centre - (a + b + c) / 3.0).length() < 1e-12);
         assert!((holes.0[0].area_vector - whole.area_vector(300)).length() < 1e-15);
 
-        // Two triangles of the fan about the north pole that share the pole alone.
+        // Two triangles of the fan around the north pole that share only the pole.
         let mut open = whole.clone();
         let fan: Vec<usize> = (0..whole.triangles.len())
             .filter(|&t| whole.triangles[t].contains(&0))
@@ -296,7 +300,7 @@ mod tests {
         let holes = open.check_inside().expect("two small holes");
         assert_eq!((holes.0.len(), holes.edges()), (2, 6));
 
-        // Seven that touch nowhere: three are named, the rest counted.
+        // Seven holes that do not touch: three are described, the rest counted.
         let mut open = whole;
         for k in (0..7).rev() {
             open.triangles.remove(200 + 60 * k);
@@ -321,8 +325,8 @@ mod tests {
                 .retain(|t| t.iter().all(|&v| vertices[v as usize].y >= lowest));
             mesh
         };
-        // At the pole of a cap of half-angle a the rim takes 2π (1 − sin(a/2)) of 4π: winding ½ + ½ sin(a/2),
-        // 0.69 at 45° and 0.85 at 90°.
+        // At the pole of a cap of half-angle a the rim takes 2π (1 − sin(a/2)) of 4π: the winding
+        // number is ½ + ½ sin(a/2), 0.69 at 45° and 0.85 at 90°.
         let shallow = dome(5).check_inside();
         let Err(NoInside::Open { holes, why, .. }) = shallow else {
             panic!("{shallow:?}");
@@ -331,13 +335,13 @@ mod tests {
         assert!(why.contains("enclosed"), "{why}");
         assert_eq!(dome(10).check_inside().expect("half a sphere").0.len(), 1);
 
-        // Two windows in opposite walls, a quarter of each: 2 · ¼ of 2.
+        // Two windows in opposite walls, each a quarter of its wall: 2 · ¼ of 2.
         let unit = Bounds {
             min: DVec3::ZERO,
             max: DVec3::ONE,
         };
         let mut windows = box_mesh(unit);
-        // A vertex in the middle of both z walls splits each into four triangles.
+        // A vertex in the middle of each z wall splits it into four triangles.
         windows.triangles.truncate(8);
         for (z, [a, b, c, d]) in [(0.0, [0, 2, 3, 1]), (1.0, [4, 5, 7, 6])] {
             let middle = windows.vertices.len() as u32;

@@ -1,4 +1,4 @@
-//! Whether a mesh has an inside.
+//! Tests whether a mesh has an inside.
 
 use std::{collections::BTreeMap, fmt};
 
@@ -6,31 +6,31 @@ use glam::DVec3;
 
 use super::{bvh::Bvh, holes::Holes, mesh::TriangleMesh};
 
-/// Why a mesh does not bound a volume. Coordinates are metres, in the mesh's own frame.
+/// Reason why a mesh does not bound a volume. Coordinates are metres, in the mesh's own frame.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum NoInside {
-    /// Nothing to enclose anything.
+    /// The mesh has no triangles.
     #[error("the mesh has no triangles")]
     Empty,
-    /// A tube, or a sheet.
+    /// The mesh is open, such as a tube or a sheet.
     #[error(
         "the mesh is open and has no inside: {why}; {holes}{parts}; close the mesh, or give its walls a thickness where water is to be inside of it"
     )]
     Open {
-        /// The fault of the part that they are in.
+        /// What is wrong with the part that the holes belong to.
         why: &'static str,
         /// The holes of that part.
         holes: Holes,
-        /// The parts of the whole mesh.
+        /// The connected parts of the whole mesh.
         parts: Parts,
     },
-    /// Closed, but flat.
+    /// The mesh is closed but flat.
     #[error("the mesh encloses no volume near {place}: a plate needs a thickness")]
     Flat {
         /// A point of the flat part.
         place: String,
     },
-    /// Neighbouring triangles that face opposite ways.
+    /// Neighbouring triangles face opposite ways.
     #[error(
         "triangles {first} and {second} (counted from 0) face opposite ways across the edge \
          {edge}; make the normals consistent"
@@ -40,21 +40,21 @@ pub enum NoInside {
         first: u32,
         /// Index of the other.
         second: u32,
-        /// End points of the edge.
+        /// End points of the edge that they share.
         edge: String,
     },
 }
 
-/// How many connected parts a mesh falls into.
+/// Number of connected parts of a mesh.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Parts {
-    /// All of them.
+    /// All connected parts.
     pub count: usize,
-    /// Those that are one triangle.
+    /// Parts that consist of a single triangle.
     pub lone: usize,
 }
 
-/// Nothing of a mesh in one piece; else which of its pieces the words before speak of.
+/// Empty for a connected mesh; otherwise tells which of the parts a message refers to.
 impl fmt::Display for Parts {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { count, lone } = self;
@@ -70,25 +70,28 @@ impl fmt::Display for Parts {
     }
 }
 
-/// Part of a cross-section that holes may take away (see [`Holes::missing`]): ½ is the most of a lone hole or of several
-/// on one side; above it they face one another and water would run through, as through a tube, which has 1.
+/// Largest fraction of a cross-section that holes may remove (see [`Holes::missing`]). A single
+/// hole, or several on one side, remove ½ at most. Above it, holes face one another and water would
+/// run through; a tube has 1.
 const MOST_MISSING: f64 = 0.6;
 
-/// Winding number that some point just off the surface must reach, the part of all directions that the surface takes
-/// up as seen from there. Beside a plate it is 0.5, under a dome of 60° 0.75, of 90° 0.85, in a cube without a face 0.94.
+/// Winding number that some point just off the surface must reach: the fraction of all directions
+/// that the surface covers as seen from there. Beside a plate it is 0.5, under a dome of 60° 0.75,
+/// of 90° 0.85, in a cube without a face 0.94.
 const INSIDE_WINDING: f64 = 0.75;
 
 impl TriangleMesh {
-    /// Whether the mesh has an inside, part by connected part, so that a good building does not
-    /// hide a sheet.
+    /// Checks that the mesh has an inside, one connected part at a time, so that a good building
+    /// does not hide a sheet.
     ///
-    /// A part passes if its holes do not face one another through it, each measured by itself, and if some point beside
-    /// its surface is enclosed by most of it. Vertices must be shared (loading welds them). Gives the holes of an open
-    /// mesh that passes, of which its user has to be told: where such a mesh's inside is, the generalised winding
-    /// number decides, which closes a hole about as a flat cap would.
+    /// A part passes if its holes do not face one another through it, each measured by itself, and
+    /// if the part encloses most of the directions around some point beside its surface. Vertices
+    /// must be shared (loading welds them). Returns the holes of an open mesh that passes, which
+    /// callers should report: the inside of such a mesh is decided by the generalised winding
+    /// number, which closes a hole about as a flat cap would.
     ///
     /// # Errors
-    /// [`NoInside`] names the holes, the place or the triangles at fault.
+    /// [`NoInside`] names the holes, the position or the triangles at fault.
     pub fn check_inside(&self) -> Result<Holes, NoInside> {
         if self.triangles.is_empty() {
             return Err(NoInside::Empty);
@@ -114,7 +117,7 @@ impl TriangleMesh {
         Ok(Holes::of(self))
     }
 
-    /// Connected parts as meshes of their own, in the order of their first triangle.
+    /// Connected parts as separate meshes, in the order of their first triangle.
     fn parts(&self) -> Vec<TriangleMesh> {
         let mut parent: Vec<u32> = (0..self.vertices.len() as u32).collect();
         for &[a, b, c] in &self.triangles {
@@ -155,14 +158,15 @@ impl TriangleMesh {
     }
 }
 
-/// Whether a connected part has an inside.
+/// Checks that a connected part has an inside.
 fn check_part(part: &TriangleMesh, parts: Parts) -> Result<(), NoInside> {
     let holes = Holes::of(part);
     let open = |why, holes| Err(NoInside::Open { why, holes, parts });
     if holes.missing(part) > MOST_MISSING {
         return open("its holes face one another through it, as in a tube", holes);
     }
-    // 64 places tell a solid from a ring or a folded plate; more would only cost time.
+    // 64 test points distinguish a solid from a ring or a folded plate; more would only
+    // take longer.
     let bvh = Bvh::new(part);
     let stride = part.triangles.len().div_ceil(64);
     let has_inside = (0..part.triangles.len()).step_by(stride).any(|t| {
@@ -211,7 +215,7 @@ mod tests {
         assert!(sphere(DVec3::ZERO, 1.0, 12).check_inside() == Ok(Holes::default()));
     }
 
-    /// A cube whose triangles were written each with corners of its own, off by a rounding.
+    /// A cube whose triangles each have their own corners, which differ by a rounding.
     #[test]
     fn an_unwelded_mesh_is_told_that_it_falls_into_triangles() {
         let whole = cube();
@@ -233,7 +237,7 @@ mod tests {
             ),
             "{all}"
         );
-        // Of a mesh in one piece, nothing about parts.
+        // A connected mesh gets no words about parts.
         let mut sheet = cube();
         sheet.triangles.truncate(2);
         assert!(!said(&sheet).contains("parts"), "{}", said(&sheet));

@@ -1,8 +1,9 @@
-//! A closed mesh around the water of a level set.
+//! Extracts a closed mesh around the water of a level set.
 //!
-//! Marching cubes (Lorensen and Cline 1987) with the asymptotic decider. Beyond the sides of the level set's box is air: where water
-//! stands at a side the mesh has a flat cap that lies in it. Each vertex has a key from its place in the grid, and each triangle names
-//! keys, so that bricks are gone through at the same time and the mesh is the same for any number of threads.
+//! The method is marching cubes (Lorensen and Cline 1987) with the asymptotic decider. Beyond the
+//! sides of the level set's box is air: where water touches a side, the mesh has a flat cap in it.
+//! Each vertex has a key derived from its grid position, and triangles refer to keys. Bricks can
+//! thus be processed in parallel, and the mesh is the same for any number of threads.
 
 mod cell;
 pub mod sparse;
@@ -17,24 +18,26 @@ use super::{
 
 use cell::{EDGES, Loops, fan};
 
-/// How near to a corner of a cell a vertex may come, of the edge's length: triangles between coinciding vertices have no normal.
+/// Smallest distance of a vertex from a corner of its cell, relative to the edge: triangles between
+/// coincident vertices have no normal.
 const NEAREST: f64 = 1.0 / 128.0;
 
-/// What a key's lowest bits say of a vertex, beside the axes of edges.
+/// Code in a key's lowest three bits for a vertex at a node; smaller codes are the axis of an edge.
 const AT_NODE: u64 = 3;
-/// The first of the four loops of a cell that have a vertex in their middle.
+/// First of the four codes for the centre vertex of a loop in a cell.
 const MIDDLE: u64 = 4;
 
 /// A mesh around water, metres from the box's least corner.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Isosurface {
-    /// Counter-clockwise seen from the air.
+    /// Triangles, counter-clockwise seen from the air.
     pub mesh: TriangleMesh,
-    /// Of each vertex: the sum of the outward normals of the sides of the box that it lies in as part of a cap; zero elsewhere.
+    /// For each vertex of a cap, the sum of the outward normals of the box sides that it lies in;
+    /// zero for other vertices.
     pub caps: Vec<DVec3>,
 }
 
-/// The mesh where the field of `level` is `iso`; 0 is its own surface.
+/// Extracts the mesh where the field of `level` equals `iso`; 0 is the surface of the water.
 pub fn extract(level: &LevelSet, iso: f32) -> Isosurface {
     let grid = Grid::over(level, iso);
     let blocks = grid.nodes.map(|n| (n - 1).div_ceil(EDGE));
@@ -64,13 +67,15 @@ pub fn extract(level: &LevelSet, iso: f32) -> Isosurface {
     }
 }
 
-/// Layers of nodes across the box: the level set's own, a last one in the far side, and one of air beyond each side.
+/// The grid of nodes: the level set's own, a last layer in the far side, and one layer of air
+/// beyond each side.
 struct Grid<'a> {
     level: &'a LevelSet,
     iso: f32,
-    /// Along each axis, those of air included.
+    /// Nodes along each axis, those of air included.
     nodes: [u32; 3],
-    /// Of the layer in the far side: node of the level set before it, and the part of a voxel from there on.
+    /// For the layer in the far side: the level set's node before it, and the distance from there
+    /// in voxels.
     last: [(u32, f32); 3],
 }
 
@@ -81,7 +86,8 @@ impl<'a> Grid<'a> {
             let before = (end + 1e-9).floor();
             (before, (end - before).max(0.0))
         });
-        // A layer less than half a voxel before the side is left out: the one in the side takes its place.
+        // A layer less than half a voxel before the side is dropped: the layer in the side
+        // replaces it.
         let layers = ends.map(|(before, part)| match part < 0.5 {
             true => before as u32 + 1,
             false => before as u32 + 2,
@@ -94,7 +100,7 @@ impl<'a> Grid<'a> {
         }
     }
 
-    /// Whether a node lies in a layer of air beyond a side along `axis`.
+    /// Returns whether a node lies in the layer of air beyond a side along `axis`.
     fn is_beyond(&self, at: u32, axis: usize) -> bool {
         at == 0 || at == self.nodes[axis] - 1
     }
@@ -103,7 +109,7 @@ impl<'a> Grid<'a> {
         (0..3).any(|axis| self.is_beyond(at[axis], axis))
     }
 
-    /// Metres along an axis from the box's least corner.
+    /// Coordinate along an axis, metres from the box's least corner.
     fn place(&self, at: u32, axis: usize) -> f64 {
         match at {
             0 => 0.0,
@@ -116,7 +122,7 @@ impl<'a> Grid<'a> {
         DVec3::from_array([0, 1, 2].map(|axis| self.place(at[axis], axis)))
     }
 
-    /// The field at a node, less the value that the surface has.
+    /// Field at a node, minus `iso`.
     fn value(&self, at: [u32; 3]) -> f32 {
         if self.is_outside(at) {
             return -1.0;
@@ -140,7 +146,8 @@ impl<'a> Grid<'a> {
         sum - self.iso
     }
 
-    /// Whether the block of cells from this one on has no surface, by its bricks alone.
+    /// Returns whether the bricks alone show that the block of cells that starts at `first` holds
+    /// no surface.
     fn is_plain(&self, first: [u32; 3]) -> bool {
         let mut is_inner = true;
         let ranges = [0, 1, 2].map(|axis| {
@@ -163,7 +170,7 @@ impl<'a> Grid<'a> {
         all(EMPTY) || is_inner && all(FULL)
     }
 
-    /// Triangles in the cells of the block from this one on, by the keys of their vertices.
+    /// Triangles in the block of cells that starts at `first`, as vertex keys.
     fn triangles(&self, first: [u32; 3]) -> Vec<[u64; 3]> {
         let mut found = Vec::new();
         if self.is_plain(first) {
@@ -202,7 +209,7 @@ impl<'a> Grid<'a> {
         }
         let mut add = |keys: [u64; 3]| {
             let [a, b, c] = keys;
-            // At the sides several edges end in one vertex.
+            // At the sides, several edges end in the same vertex.
             if a != b && b != c && c != a {
                 found.push(keys);
             }
@@ -265,7 +272,7 @@ impl<'a> Grid<'a> {
         }
     }
 
-    /// Outward normals of the sides that a vertex of a cap lies in.
+    /// Sum of the outward normals of the sides that a cap's vertex lies in.
     fn cap(&self, key: u64) -> DVec3 {
         let at = self.node_of(key);
         if key % 8 != AT_NODE {
@@ -279,7 +286,7 @@ impl<'a> Grid<'a> {
     }
 }
 
-/// A corner of a cell, by its number.
+/// Corner of a cell, by its number.
 fn corner(cell: [u32; 3], c: usize) -> [u32; 3] {
     [0, 1, 2].map(|axis| cell[axis] + (c >> axis & 1) as u32)
 }

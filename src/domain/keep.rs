@@ -1,35 +1,36 @@
-//! Of which frames a bake keeps the particles, and how.
+//! Which frames a bake keeps the particles of, and how it compresses them.
 
 use std::{fmt, str::FromStr};
 
 use serde::{Deserialize, Serialize};
 
-/// How frames are compressed, without loss.
+/// Lossless compression of frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Compression {
-    /// Zstandard (RFC 8878), of the bytes of all particles' rows by their place in the row.
+    /// Zstandard (RFC 8878). Bytes are grouped by their position within a particle's row first.
     Zstd,
 }
 
-/// Frames whose particles stay on the disk. A cache also has those of its first frame, and of its newest, with which a bake
-/// goes on; the newest one's go once the next frame is whole on the disk.
+/// Frames whose particles stay on disk. A cache also holds those of its first frame, and those of
+/// its newest, from which a bake resumes; the latter are removed once the next frame is complete
+/// on disk.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub enum Keep {
     /// Every frame.
     All,
-    /// Frames whose number is a multiple of this, from 1.
+    /// Frames whose number is a multiple of this, which is at least 1.
     Every(u32),
-    /// None.
+    /// No frame but the first and the newest.
     Newest,
 }
 
 impl Keep {
-    /// Largest step of [`Keep::Every`]: the longest shot.
+    /// Largest step of [`Keep::Every`]: the length of the longest shot, frames.
     pub const MOST: u32 = 1_000_000;
 
-    /// Whether a frame's particles stay when later frames are there.
+    /// Returns whether a frame's particles stay once later frames exist.
     pub fn keeps(self, frame: u32) -> bool {
         match self {
             Self::All => true,
@@ -39,7 +40,7 @@ impl Keep {
     }
 }
 
-/// As scenes write it: `all`, `every 10`, `none`.
+/// As written in scenes: `all`, `every 10`, `none`.
 impl fmt::Display for Keep {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -50,13 +51,13 @@ impl fmt::Display for Keep {
     }
 }
 
-/// The fault of a text that names no frames.
+/// Error for a text that does not select frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum KeepError {
-    /// A bake could not go on from such frames.
+    /// The step is 0, and a bake could not resume from such frames.
     #[error("every 0th frame is none, and a bake goes on from the frames that it keeps")]
     Zero,
-    /// Anything else.
+    /// The text has any other fault.
     #[error("it names no frames")]
     Unknown,
 }

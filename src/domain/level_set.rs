@@ -1,8 +1,10 @@
-//! The water of a frame as a sparse level set for rays: bricks of 8³ voxels along the surface.
+//! The water of a frame as a sparse level set for ray tracing: bricks of 8³ voxels along
+//! the surface.
 //!
-//! The field is Σ V det(G) P(|G (x − x̄)|) over particles with anisotropic kernels ([`kernels`]; Yu and Turk 2013), sampled at the
-//! voxels' corners, over its value at a calm surface, less 1: positive in water. Bricks that the surface stays out of are one
-//! word. All follows from the frame alone, in an order that no number of threads changes.
+//! The field is Σ V det(G) P(|G (x − x̄)|) over particles with anisotropic kernels ([`kernels`]; Yu
+//! and Turk 2013), sampled at the voxels' corners, divided by its value at a calm surface, minus 1:
+//! positive in water. Bricks away from the surface take one word. The result depends only on the
+//! frame: the order of summation does not change with the number of threads.
 
 pub mod edges;
 pub mod eigen;
@@ -17,43 +19,45 @@ use rayon::prelude::*;
 
 use kernels::{Ellipsoid, Kernels};
 
-/// Voxels along a brick's edge.
+/// Voxels along the edge of a brick.
 pub const EDGE: u32 = 8;
 
-/// Corners of voxels along a brick's edge that are kept with it: its own, and one more on each side, so that a gradient's
-/// differences need no other brick.
+/// Nodes (voxel corners) stored along the edge of a brick: its own, and one more on each side, so
+/// that the central differences of a gradient need no other brick.
 pub const NODES: u32 = EDGE + 3;
 
-/// Values of a brick.
+/// Values of a brick: one per node.
 pub const VALUES: usize = (NODES * NODES * NODES) as usize;
 
-/// In the table, of a brick without water.
+/// Table entry of a brick without water.
 pub const EMPTY: u32 = 0;
-/// In the table, of a brick that is all water.
+/// Table entry of a brick that lies entirely in water.
 pub const FULL: u32 = 1;
-/// In the table, of the first brick that has values; the next ones count on.
+/// Table entry of the first brick that has values; later ones follow.
 pub const FIRST: u32 = 2;
 
-/// Voxels a particle spacing, where nothing else is asked for.
+/// Default number of voxels per particle spacing.
 pub const VOXELS: f64 = 2.0;
 
-/// A sparse level set over a box from the origin on.
+/// A sparse level set over a box whose least corner is the origin.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LevelSet {
-    /// Of the box, metres.
+    /// Size of the box, metres.
     pub size: DVec3,
     /// Edge length of a voxel, metres.
     pub voxel: f64,
     /// Bricks along each axis.
     pub bricks: [u32; 3],
-    /// [`EMPTY`], [`FULL`], or [`FIRST`] and the place in `values` of each brick, x fastest.
+    /// Entry of each brick, x fastest: [`EMPTY`], [`FULL`], or [`FIRST`] plus the index of its
+    /// block in `values`.
     pub table: Vec<u32>,
-    /// [`VALUES`] of each brick that the surface is in or beside; corner (i, j, k), from −1 on, is element
-    /// (i + 1) + 11 (j + 1) + 121 (k + 1).
+    /// [`VALUES`] for each brick that the surface passes through or near. Node (i, j, k), counted
+    /// from −1, is element (i + 1) + 11 (j + 1) + 121 (k + 1).
     pub values: Vec<f32>,
 }
 
-/// Bricks along each axis over a box of `size` metres with voxels of `voxel` metres.
+/// Returns the number of bricks along each axis over a box of `size` metres with voxels of
+/// `voxel` metres.
 pub fn bricks_over(size: DVec3, voxel: f64) -> [u32; 3] {
     let edge = voxel * f64::from(EDGE);
     size.to_array()
@@ -61,20 +65,22 @@ pub fn bricks_over(size: DVec3, voxel: f64) -> [u32; 3] {
 }
 
 impl LevelSet {
-    /// That of particles at `positions`, metres from the box's least corner, of `spacing` metres between neighbours at rest.
-    /// The sides of the box are mirrors: water that stands at one meets it at a right angle.
+    /// Builds the level set of particles at `positions`, metres from the box's least corner, with
+    /// `spacing` metres between neighbours at rest. The sides of the box are mirrors: water meets
+    /// them at a right angle.
     pub fn new(positions: &[DVec3], size: DVec3, spacing: f64) -> Self {
         let kernels = Kernels::fit(positions, size, spacing);
         Self::of_kernels(&kernels, size, spacing / VOXELS)
     }
 
-    /// That of kernels that were fitted in this box, with voxels of `voxel` metres.
+    /// Samples the field of kernels that were fitted in this box, with voxels of `voxel` metres.
     pub fn of_kernels(kernels: &Kernels, size: DVec3, voxel: f64) -> Self {
         Self::with_margin(kernels, size, voxel, 0.0)
     }
 
-    /// The same with values also where the field comes no nearer to the surface's value than `margin` of it, below 1: surfaces of other
-    /// values, down to −`margin` and up to `margin`, then lie in bricks that have values too.
+    /// Same as [`Self::of_kernels`], but keeps the values of all bricks where the field comes
+    /// within `margin` (relative, below 1) of the surface's value: isosurfaces of values from
+    /// −`margin` to `margin` then lie in bricks with values.
     pub fn with_margin(kernels: &Kernels, size: DVec3, voxel: f64, margin: f32) -> Self {
         let bricks = bricks_over(size, voxel);
         let lists = Lists::new(&kernels.ellipsoids, bricks, voxel);
@@ -104,8 +110,8 @@ impl LevelSet {
         set
     }
 
-    /// The field at `p`, metres from the box's least corner: between the voxels' corners it is trilinear. −1 in bricks without
-    /// water, 1 in those that are all water.
+    /// Returns the field at `p`, metres from the box's least corner, trilinear between nodes: −1 in
+    /// bricks without water, 1 in bricks entirely in water.
     pub fn value(&self, p: DVec3) -> f64 {
         let (slot, q) = self.brick_at(p);
         match slot {
@@ -115,7 +121,8 @@ impl LevelSet {
         }
     }
 
-    /// ∇ of the field in 1/m, by differences over two voxels; zero in bricks without values.
+    /// Returns the gradient of the field, 1/m, by central differences over two voxels; zero in
+    /// bricks without values.
     pub fn gradient(&self, p: DVec3) -> DVec3 {
         let (slot, q) = self.brick_at(p);
         if slot < FIRST {
@@ -125,8 +132,8 @@ impl LevelSet {
         DVec3::new(along(DVec3::X), along(DVec3::Y), along(DVec3::Z)) / (2.0 * self.voxel)
     }
 
-    /// The value at corner `at` of voxels, counted from the box's least one, as the brick that begins there keeps it; −1 in bricks
-    /// without water, 1 in those that are all water.
+    /// Returns the value at node `at`, counted from the box's least corner, from the brick that
+    /// begins there: −1 in bricks without water, 1 in bricks entirely in water.
     pub fn node(&self, at: [u32; 3]) -> f32 {
         let brick = [0, 1, 2].map(|axis| (at[axis] / EDGE).min(self.bricks[axis] - 1));
         let [nx, ny] = [self.bricks[0] as usize, self.bricks[1] as usize];
@@ -142,7 +149,8 @@ impl LevelSet {
         }
     }
 
-    /// Height below which all water lies, metres: the upper side of the highest brick with any, within the box.
+    /// Returns the height below which all water lies, metres: the upper side of the highest brick
+    /// that holds any, within the box.
     pub fn top(&self) -> f64 {
         let [nx, ny] = [self.bricks[0] as usize, self.bricks[1] as usize];
         let wet = self
@@ -154,12 +162,12 @@ impl LevelSet {
         (layers as f64 * self.voxel * f64::from(EDGE)).min(self.size.y)
     }
 
-    /// What the table says of the brick at `p`.
+    /// Returns the table entry of the brick at `p`.
     pub fn slot(&self, p: DVec3) -> u32 {
         self.brick_at(p).0
     }
 
-    /// What the table says of the brick at `p`, and where in it that is, in voxels.
+    /// Table entry of the brick at `p`, and the position within the brick, voxels.
     fn brick_at(&self, p: DVec3) -> (u32, DVec3) {
         let last = DVec3::from_array(self.bricks.map(|n| f64::from(n * EDGE) - 1e-9));
         let at = (p / self.voxel).clamp(DVec3::ZERO, last);
@@ -191,14 +199,14 @@ impl LevelSet {
     }
 }
 
-/// A brick's content.
+/// Content of a brick.
 enum Filled {
     Empty,
     Full,
     Values(Box<[f32; VALUES]>),
 }
 
-/// Which ellipsoids reach each brick, by index.
+/// Indices of the ellipsoids that reach each brick.
 struct Lists {
     bricks: [u32; 3],
     starts: Vec<u32>,
@@ -208,7 +216,8 @@ struct Lists {
 impl Lists {
     fn new(ellipsoids: &[Ellipsoid], bricks: [u32; 3], voxel: f64) -> Self {
         let edge = voxel * f64::from(EDGE);
-        // Bricks whose nodes, with the one beyond each side, an ellipsoid's box holds; none where the first is after the last.
+        // Bricks whose nodes, including the extra layer on each side, an ellipsoid's box overlaps;
+        // empty if the first is past the last.
         let range = |ellipsoid: &Ellipsoid| {
             let low = (ellipsoid.centre - ellipsoid.reach - voxel) / edge;
             let high = (ellipsoid.centre + ellipsoid.reach + voxel) / edge;
@@ -267,7 +276,7 @@ impl Lists {
         }
         let [nx, ny] = [self.bricks[0] as usize, self.bricks[1] as usize];
         let place = [brick % nx, brick / nx % ny, brick / nx / ny];
-        // Of node −1, so that nodes count from 0.
+        // Position of node −1, so that nodes count from 0.
         let edge = f64::from(EDGE);
         let corner = DVec3::from_array(place.map(|c| (c as f64 * edge - 1.0) * voxel));
         let mut values = Box::new([0.0f32; VALUES]);

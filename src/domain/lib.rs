@@ -1,8 +1,10 @@
-//! What every stage speaks: particles, meshes, signed distance, sampling, wave-maker motion.
+//! Types and algorithms that every stage shares: particles, meshes, signed distance, sampling,
+//! wave-maker motion, probes.
 
-/// The program's name, as manifests and pictures record it.
+/// Name of the program, as written to manifests and image metadata.
 pub const PROGRAM: &str = "swell";
-/// The program's version, likewise: all crates of the workspace share it.
+/// Version of the program, as written to manifests and image metadata. All crates of the workspace
+/// share it.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 
 pub mod absorption;

@@ -1,6 +1,5 @@
-//! Triangle meshes: their geometry. Whether one has an inside is looked at in [`crate::inside`].
-//!
-//! Files are read by [`crate::mesh_file`].
+//! Triangle meshes and their geometry. [`crate::inside`] checks whether a mesh has an inside, and
+//! [`crate::mesh_file`] reads files.
 
 use std::collections::BTreeMap;
 
@@ -11,37 +10,39 @@ use super::bounds::Bounds;
 /// An indexed triangle mesh, counter-clockwise seen from outside.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TriangleMesh {
-    /// Metres.
+    /// Vertex positions, metres.
     pub vertices: Vec<DVec3>,
-    /// Indices into `vertices`.
+    /// Triangles as indices into `vertices`.
     pub triangles: Vec<[u32; 3]>,
 }
 
 impl TriangleMesh {
-    /// The corners of triangle `index`.
+    /// Returns the corners of triangle `index`, metres.
     pub fn corners(&self, index: usize) -> [DVec3; 3] {
         self.triangles[index].map(|v| self.vertices[v as usize])
     }
 
-    /// The smallest box around the vertices; `None` for an empty mesh.
+    /// Returns the smallest box around the vertices; `None` for an empty mesh.
     pub fn bounds(&self) -> Option<Bounds> {
         Bounds::of_points(self.vertices.iter().copied())
     }
 
-    /// Half the cross product of two edges: the normal times the area, m².
+    /// Returns the area vector of triangle `index`, m²: half the cross product of two edges, which
+    /// is normal times area.
     pub fn area_vector(&self, index: usize) -> DVec3 {
         let [a, b, c] = self.corners(index);
         0.5 * (b - a).cross(c - a)
     }
 
-    /// Surface area, m².
+    /// Returns the surface area, m².
     pub fn area(&self) -> f64 {
         (0..self.triangles.len())
             .map(|t| self.area_vector(t).length())
             .sum()
     }
 
-    /// Enclosed volume, m³; negative where the normals point inward. Only for closed meshes.
+    /// Returns the enclosed volume, m³; negative if the normals point inward. Meaningful only for
+    /// closed meshes.
     pub fn signed_volume(&self) -> f64 {
         (0..self.triangles.len())
             .map(|t| {
@@ -51,8 +52,8 @@ impl TriangleMesh {
             .sum()
     }
 
-    /// The mesh moved by `world_from_file`. A mirroring transform also turns the triangles, so
-    /// that they stay counter-clockwise seen from outside.
+    /// Returns the mesh transformed by `world_from_file`. A mirroring transform also reverses the
+    /// triangles, so that they stay counter-clockwise seen from outside.
     pub fn transformed(&self, world_from_file: &DAffine3) -> Self {
         let mirrored = world_from_file.matrix3.determinant() < 0.0;
         Self {
@@ -69,7 +70,7 @@ impl TriangleMesh {
         }
     }
 
-    /// Edges that no oppositely directed edge cancels, by vertex indices.
+    /// Returns the edges that are not cancelled by an oppositely directed one, by vertex indices.
     pub fn open_edges(&self) -> Vec<(u32, u32)> {
         let is_open = |uses: &[(u32, bool)]| {
             let forward = uses.iter().filter(|(_, forward)| *forward).count();
@@ -82,7 +83,8 @@ impl TriangleMesh {
             .collect()
     }
 
-    /// For each edge (least vertex first) the triangles that use it, and whether in that order.
+    /// For each edge (smaller vertex first), the triangles that use it, and whether they traverse
+    /// it in that order.
     pub(super) fn edges(&self) -> BTreeMap<(u32, u32), Vec<(u32, bool)>> {
         let mut edges = BTreeMap::<_, Vec<_>>::new();
         for (index, &[a, b, c]) in self.triangles.iter().enumerate() {
@@ -147,7 +149,7 @@ pub(crate) mod tests {
         })
     }
 
-    /// A closed sphere from `rings` × 2·`rings` quads.
+    /// A closed sphere of `rings` × 2·`rings` quads.
     pub(crate) fn sphere(centre: DVec3, radius: f64, rings: u32) -> TriangleMesh {
         let sectors = 2 * rings;
         let mut vertices = vec![centre + DVec3::Y * radius];
@@ -181,7 +183,7 @@ pub(crate) mod tests {
     fn a_cube_has_its_area_and_volume_and_keeps_them_when_mirrored() {
         let cube = cube();
         assert_eq!(cube.area(), 6.0);
-        // Twelve terms of 1/6 that round on their own.
+        // Twelve terms of 1/6, each rounded.
         assert!((cube.signed_volume() - 1.0).abs() < 1e-15);
         let mirror = DAffine3::from_scale(DVec3::new(-2.0, 1.0, 1.0));
         let mirrored = cube.transformed(&mirror);

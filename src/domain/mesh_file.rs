@@ -1,7 +1,7 @@
-//! Meshes from OBJ, PLY and STL files, and from OpenVDB level sets.
+//! Reads meshes from OBJ, PLY and STL files, and from OpenVDB level sets.
 //!
-//! Every reader works on bytes already in memory, and nothing is allocated from a count that a
-//! header merely promises: counts are first held against the bytes that are there.
+//! Every reader works on bytes in memory, and allocates nothing from a count in a header before
+//! checking it against the bytes that are there.
 
 mod needles;
 mod obj;
@@ -23,19 +23,19 @@ use glam::DVec3;
 
 use super::{bounds::Bounds, mesh::TriangleMesh, text};
 
-/// Largest mesh file read, bytes. A scan of ten million triangles is half of it in binary.
+/// Largest mesh file that is read, bytes. A binary scan of ten million triangles takes half of it.
 pub const MAX_FILE_BYTES: u64 = 1 << 30;
 
 /// Largest coordinate accepted, metres, so that areas and volumes stay far from overflow.
 const MAX_COORDINATE: f64 = 1e9;
 
-/// Why a mesh could not be loaded.
+/// Reason why a mesh could not be loaded.
 #[derive(Debug, thiserror::Error)]
 pub enum MeshError {
     /// The file cannot be read.
     #[error("cannot read mesh {file}")]
     Read {
-        /// Which file.
+        /// File concerned.
         file: PathBuf,
         /// Error of the operating system.
         source: io::Error,
@@ -43,21 +43,21 @@ pub enum MeshError {
     /// The file has more bytes than [`MAX_FILE_BYTES`].
     #[error("mesh {file} is larger than {} MiB", MAX_FILE_BYTES >> 20)]
     TooLarge {
-        /// Which file.
+        /// File concerned.
         file: PathBuf,
     },
-    /// An extension that names no format.
+    /// The extension names no known format.
     #[error("mesh {file}: unknown extension; allowed are .obj, .ply, .stl and .vdb")]
     UnknownFormat {
-        /// Which file.
+        /// File concerned.
         file: PathBuf,
     },
-    /// The reader's complaint.
+    /// The content is invalid.
     #[error("mesh {file}: {detail}")]
     Malformed {
-        /// Which file.
+        /// File concerned.
         file: PathBuf,
-        /// The fault and its place.
+        /// What is wrong, and where.
         detail: String,
     },
 }
@@ -71,15 +71,15 @@ pub enum MeshFormat {
     Ply,
     /// STL, ASCII or binary.
     Stl,
-    /// A level set of OpenVDB, negative inside: the surface where it is 0.
+    /// OpenVDB level set, negative inside: the surface is where it is 0.
     Vdb,
 }
 
 impl MeshFormat {
-    /// Format by the file name's extension, upper or lower case.
+    /// Returns the format that the file name's extension stands for, in upper or lower case.
     ///
     /// # Errors
-    /// [`MeshError::UnknownFormat`].
+    /// [`MeshError::UnknownFormat`] for any other extension.
     pub fn of(path: &Path) -> Result<Self, MeshError> {
         let extension = path
             .extension()
@@ -96,10 +96,10 @@ impl MeshFormat {
     }
 }
 
-/// How exact a file's coordinates are.
+/// Precision of a file's coordinates.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Digits {
-    /// Decimals, read in 64 bits; the program that wrote them may have had fewer.
+    /// Decimals, read as 64-bit floats; the program that wrote them may have used fewer bits.
     #[default]
     Text,
     /// 32-bit floats.
@@ -108,20 +108,20 @@ pub enum Digits {
     Double,
 }
 
-/// Half the distance of neighbouring 32-bit floats about `x`.
+/// Half the distance between neighbouring 32-bit floats at `x`.
 fn rounding_of_single(x: f64) -> f64 {
     let x = x.abs() as f32;
     0.5 * (f64::from(x.next_up()) - f64::from(x))
 }
 
-/// Unchecked result of a reader.
+/// Unchecked output of a reader.
 #[derive(Default)]
 struct Raw {
     digits: Digits,
     vertices: Vec<DVec3>,
-    /// Corners of one face after another, as any index.
+    /// Corners of all faces, one face after another, as unchecked vertex indices.
     corners: Vec<u64>,
-    /// Where the corners of each face end.
+    /// End of each face in `corners`.
     ends: Vec<usize>,
 }
 
@@ -131,7 +131,7 @@ impl Raw {
         self.ends.push(self.corners.len());
     }
 
-    /// Of triangles alone.
+    /// Builds a mesh of triangles only.
     fn of_triangles(
         digits: Digits,
         vertices: Vec<DVec3>,
@@ -147,10 +147,11 @@ impl Raw {
     }
 }
 
-/// The bytes of a mesh file, at most [`MAX_FILE_BYTES`].
+/// Reads the bytes of a mesh file, at most [`MAX_FILE_BYTES`].
 ///
 /// # Errors
-/// [`MeshError::Read`], also of what is no plain file (a pipe would not end); [`MeshError::TooLarge`].
+/// [`MeshError::Read`], also for anything but a plain file (a pipe might not end);
+/// [`MeshError::TooLarge`].
 pub fn read_bytes(path: &Path) -> Result<Vec<u8>, MeshError> {
     let fail = |source| MeshError::Read {
         file: path.to_owned(),
@@ -177,13 +178,13 @@ impl TriangleMesh {
     /// Loads a mesh in the format that the extension names, in the file's own frame and unit.
     ///
     /// # Errors
-    /// [`MeshError`] names the file and what is wrong in it.
+    /// [`MeshError`] names the file and what is wrong with it.
     pub fn load(path: &Path) -> Result<Self, MeshError> {
         let format = MeshFormat::of(path)?;
         Self::from_bytes(&read_bytes(path)?, format, path)
     }
 
-    /// Reads a mesh from bytes; `file` only names it in errors.
+    /// Reads a mesh from bytes; `file` is only used in error messages.
     ///
     /// # Errors
     /// Those of [`Loaded::from_bytes`].
@@ -192,25 +193,25 @@ impl TriangleMesh {
     }
 }
 
-/// A mesh as a file has it.
+/// A mesh and the properties of the file that it was read from.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Loaded {
-    /// In the file's own frame and unit.
+    /// The mesh, in the file's own frame and unit.
     pub mesh: TriangleMesh,
-    /// How exact its coordinates are.
+    /// Precision of the coordinates.
     pub digits: Digits,
-    /// Polygons whose outline crosses itself, in a sentence; `None` where there are none.
+    /// Warning about polygons whose outline crosses itself, one sentence; `None` if there are none.
     pub crossing: Option<String>,
 }
 
 impl Loaded {
-    /// Reads a mesh from bytes; `file` only names it in errors. Polygons become triangles that use all their corners, vertices at
-    /// the same place become one, vertices that no triangle uses are left out, and so are triangles without area, whose corners
-    /// their neighbours take.
+    /// Reads a mesh from bytes; `file` is only used in error messages. Polygons are triangulated
+    /// over all their corners. Vertices at the same position are merged, and unused vertices are
+    /// dropped. Triangles without area are removed, and their neighbours take over their corners.
     ///
     /// # Errors
-    /// [`MeshError::Malformed`] says what is wrong: no triangles, an index out of range, a vertex that is no number, no triangle
-    /// with an area, or broken syntax.
+    /// [`MeshError::Malformed`] says what is wrong: no triangles, an index out of range, a vertex
+    /// that is not a number, no triangle with an area, or broken syntax.
     pub fn from_bytes(bytes: &[u8], format: MeshFormat, file: &Path) -> Result<Self, MeshError> {
         let welded = welded(bytes, format, file)?;
         Ok(Self {
@@ -220,15 +221,16 @@ impl Loaded {
         })
     }
 
-    /// The coordinate that is farthest from zero, in the file's unit.
+    /// Returns the coordinate that is farthest from zero, in the file's unit.
     pub fn farthest(&self) -> f64 {
         let all = self.mesh.vertices.iter();
         all.flat_map(|v| v.to_array())
             .fold(0.0, |far: f64, x| if x.abs() > far.abs() { x } else { far })
     }
 
-    /// By how much 32-bit floats round the farthest coordinate along each axis at most, in the file's unit. That is also what the
-    /// decimals of a text may be off, where the program that wrote them had 32 bits.
+    /// Returns the largest error, along each axis, of rounding the coordinates to 32-bit floats, in
+    /// the file's unit. The decimals of a text may be off by as much if the program that wrote them
+    /// used 32 bits.
     pub fn rounding(&self) -> DVec3 {
         let all = self.mesh.vertices.iter();
         let far = all.fold(DVec3::ZERO, |far, v| far.max(v.abs()));
@@ -240,7 +242,7 @@ impl Loaded {
 #[derive(Default)]
 struct Crossing {
     count: usize,
-    /// Number of the first in the file, and one of its corners.
+    /// One-based number of the first such face in the file, and one of its corners.
     first: Option<(usize, DVec3)>,
 }
 
@@ -260,10 +262,11 @@ impl Crossing {
     }
 }
 
-/// What a reader found, checked and welded.
+/// A reader's output, checked and welded.
 struct Welded {
     mesh: TriangleMesh,
-    /// Corners of each triangle of the mesh, counted over all faces of the file; from `in_file` on, those of `between`.
+    /// Corners of each triangle of the mesh, numbered over all faces of the file; those from
+    /// `in_file` on are in `between`.
     corners: Vec<[u32; 3]>,
     in_file: usize,
     between: Vec<needles::Between>,
@@ -285,8 +288,9 @@ fn welded(bytes: &[u8], format: MeshFormat, file: &Path) -> Result<Welded, MeshE
         })
 }
 
-/// Checks what a reader found, cuts polygons into triangles, and welds vertices at the same place, whatever the format: STL has
-/// no shared vertices, and exporters split OBJ and PLY ones along seams.
+/// Checks a reader's output, triangulates polygons, and welds vertices at the same position,
+/// whatever the format: STL has no shared vertices, and exporters split those of OBJ and PLY
+/// along seams.
 fn weld(raw: &Raw) -> Result<Welded, String> {
     if raw.ends.is_empty() {
         return Err("no triangles".into());
@@ -323,7 +327,8 @@ fn weld(raw: &Raw) -> Result<Welded, String> {
                 })
             });
             let [a, b, c] = vertices;
-            // A triangle that comes down to an edge or a point: it has no edge that another triangle needs.
+            // A triangle that collapses to an edge or a point has no edge that another
+            // triangle needs.
             if a != b && b != c && c != a {
                 mesh.triangles.push(vertices);
                 welded.corners.push(triangle.map(|k| (begin + k) as u32));
@@ -337,7 +342,8 @@ fn weld(raw: &Raw) -> Result<Welded, String> {
         return Err("no triangle has an area".into());
     }
     if mesh.open_edges().is_empty() && mesh.signed_volume() < 0.0 {
-        // Closed and inside out: the sign of a distance does not mind, normals of samples do.
+        // Closed and inside out: the sign of a distance is unaffected, but normals of samples
+        // are not.
         for [_, b, c] in &mut mesh.triangles {
             std::mem::swap(b, c);
         }
@@ -348,15 +354,16 @@ fn weld(raw: &Raw) -> Result<Welded, String> {
     Ok(welded)
 }
 
-/// Which vertices are one.
+/// Decides which vertices are the same.
 struct Joined {
-    /// Least coordinates, and the step within which decimals are the same place; `None` of binary files: what is equal.
+    /// Least coordinates, and the step within which decimals count as equal; `None` for binary
+    /// files, where only equal values match.
     steps: Option<(DVec3, f64)>,
 }
 
 impl Joined {
-    /// Part of a mesh's size: the last of the bits that a 32-bit float has. Programs that compute in 64 bits write the corner that two
-    /// faces share with last digits that differ.
+    /// Step relative to the mesh's size: the last bit of a 32-bit float. Programs that compute in
+    /// 64 bits write a corner that two faces share with different last digits.
     const STEP: f64 = 1.0 / 16_777_216.0;
 
     fn of(raw: &Raw) -> Self {
@@ -377,12 +384,12 @@ impl Joined {
             Some((least, step)) => ((v - least) / step).round(),
             None => v,
         };
-        // + 0.0 makes one zero of the two.
+        // Adding +0.0 turns −0.0 into +0.0.
         (place + DVec3::ZERO).to_array().map(f64::to_bits)
     }
 }
 
-/// Where the vertex with this index is.
+/// Position of the vertex with this index.
 fn place(raw: &Raw, face: usize, index: u64) -> Result<DVec3, String> {
     let vertex = usize::try_from(index)
         .ok()
@@ -402,12 +409,12 @@ fn place(raw: &Raw, face: usize, index: u64) -> Result<DVec3, String> {
     Ok(v)
 }
 
-/// [`text::without_mark`], with its error in words.
+/// [`text::without_mark`] with its error as text.
 fn without_mark(bytes: &[u8]) -> Result<&[u8], String> {
     text::without_mark(bytes).map_err(|error| error.to_string())
 }
 
-/// Text with one kind of line end: `\n`, also where the file has `\r\n` or `\r`.
+/// Decodes text and normalises line ends `\r\n` and `\r` to `\n`.
 fn lines_of(bytes: &[u8]) -> Cow<'_, str> {
     let text = String::from_utf8_lossy(bytes);
     if text.contains('\r') {
@@ -417,7 +424,7 @@ fn lines_of(bytes: &[u8]) -> Cow<'_, str> {
     }
 }
 
-/// The beginning of a line, for a message: in quotes, what cannot be printed escaped.
+/// Beginning of a line for a message: quoted, with unprintable characters escaped.
 fn quoted(line: &str) -> String {
     const MOST: usize = 60;
     let line = line.trim();

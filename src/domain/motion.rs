@@ -1,7 +1,7 @@
-//! Wave-maker motion.
+//! Motion of wave makers.
 //!
-//! A displacement is measured from the domain's face, positive inward, metres; it is 0 at the
-//! start and never negative, so that no water is ever behind the wall.
+//! A displacement is measured from the domain's face, positive inward, metres; it is 0 at the start
+//! and never negative, so that no water is ever behind the wall.
 
 mod cnoidal;
 mod complex;
@@ -31,57 +31,59 @@ pub use stokes::{MADSEN_LIMIT, Stokes};
 use table::Segment;
 pub use table::abrupt_end;
 
-/// Displacement of a wave-maker over time.
+/// Displacement of a wave maker over time.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Motion {
-    /// None: a wall that only takes in what comes to it.
+    /// No motion: a wall that only absorbs incoming waves.
     Still,
-    /// Moves from the first moment, stops dead.
+    /// Constant velocity from the start, with an abrupt stop.
     ConstantVelocity {
-        /// m/s, not negative.
+        /// Velocity, m/s, not negative.
         velocity: f64,
-        /// Seconds after which it stands; `None`: never.
+        /// Time at which the wall stops, seconds; `None` means never.
         until: Option<f64>,
     },
-    /// x = stroke/2 · (1 − cos 2πt/period), grown from rest by a smooth ramp.
+    /// x = stroke/2 · (1 − cos 2πt/period), multiplied by a smooth ramp from rest.
     Sine {
         /// Distance from the innermost to the outermost position, metres.
         stroke: f64,
-        /// Seconds.
+        /// Period, seconds.
         period: f64,
-        /// Seconds until the full stroke; 0 starts with it (still from rest, as 1 − cos is).
+        /// Time until the full stroke, seconds; 0 begins with the full stroke (still from rest, as
+        /// 1 − cos is).
         ramp: f64,
     },
     /// One solitary wave (Goring 1978).
     Solitary {
-        /// Crest above still water, metres.
+        /// Height of the crest above still water, metres.
         height: f64,
-        /// Still water, metres.
+        /// Depth of still water, metres.
         depth: f64,
-        /// m/s², positive.
+        /// Acceleration of gravity, m/s², positive.
         gravity: f64,
     },
     /// Regular waves to second order (Schäffer 1996).
     Stokes(Stokes),
     /// Regular waves of permanent form in shallow water (Goring 1978).
     Cnoidal(Cnoidal),
-    /// A sea or a packet of waves, by a spectrum.
+    /// An irregular sea or a wave packet, from a spectrum.
     Sea(Sea),
-    /// Through given points by a monotone cubic (Fritsch and Carlson 1980), at rest before the
-    /// first and after the last; it never leaves the range of the two points around it.
+    /// Interpolates given points by a monotone cubic (Fritsch and Carlson 1980), at rest before the
+    /// first and after the last; the path never leaves the range of the two points around it.
     Table {
-        /// (seconds, metres), times rising.
+        /// Points (seconds, metres), with increasing times.
         points: Vec<[f64; 2]>,
     },
 }
 
 impl Motion {
-    /// Metres inward from the domain's face at time `t`, seconds.
+    /// Returns the displacement at time `t` (seconds), metres inward from the domain's face.
     pub fn displacement(&self, t: f64) -> f64 {
         self.state(t).0
     }
 
-    /// Metres per second inward at time `t`: the derivative of [`Self::displacement`].
+    /// Returns the velocity at time `t` (seconds), m/s inward: the derivative of
+    /// [`Self::displacement`].
     pub fn velocity(&self, t: f64) -> f64 {
         self.state(t).1
     }
@@ -123,7 +125,8 @@ impl Motion {
         }
     }
 
-    /// An upper bound on |velocity| within `[t0, t1]`, m/s; tight as the interval shrinks.
+    /// Returns an upper bound on |velocity| within `[t0, t1]`, m/s, which is tight as the
+    /// interval shrinks.
     pub fn peak_speed(&self, t0: f64, t1: f64) -> f64 {
         if t1 <= 0.0 {
             return 0.0;
@@ -144,7 +147,7 @@ impl Motion {
                 let omega = TAU / period;
                 let (amount_low, rate_start) = smooth_ramp(t0, ramp);
                 let (amount_high, rate_end) = smooth_ramp(t1, ramp);
-                // The ramp's rate rises to its middle and falls again.
+                // The ramp's rate rises until its middle, then falls.
                 let (_, rate_high) = smooth_ramp((0.5 * ramp).clamp(t0, t1), ramp);
                 let rate_low = rate_start.min(rate_end);
                 let (cos_low, cos_high) = cos_range(omega * t0, omega * t1);
@@ -176,10 +179,10 @@ impl Motion {
         }
     }
 
-    /// An upper bound on the displacement within `[0, t]`, metres.
+    /// Returns an upper bound on the displacement within `[0, t]`, metres.
     pub fn peak_displacement(&self, t: f64) -> f64 {
         match *self {
-            // These never turn back.
+            // These never move back.
             Self::Still | Self::ConstantVelocity { .. } | Self::Solitary { .. } => {
                 self.displacement(t)
             }
@@ -216,7 +219,7 @@ fn cos_range(a: f64, b: f64) -> (f64, f64) {
     )
 }
 
-/// 6u⁵ − 15u⁴ + 10u³ with u = t/ramp, and its derivative: from rest to one without a jump in
+/// Ramp 6u⁵ − 15u⁴ + 10u³ with u = t/ramp, and its derivative: from zero to one without a jump in
 /// velocity or acceleration.
 pub(super) fn smooth_ramp(t: f64, ramp: f64) -> (f64, f64) {
     if t >= ramp {
@@ -320,8 +323,8 @@ mod tests {
 
     #[test]
     fn velocity_is_the_derivative_of_displacement() {
-        // Central differences are off by step²/6 · x''' ≤ 1e-10/6 · 500 m/s³ (a ramped sine with
-        // ω = 8 rad/s), and by round-off 1e-16 · 3 m / 1e-5 s.
+        // Central differences are off by step²/6 · x''' ≤ 1e-10/6 · 500 m/s³ (a ramped sine with ω
+        // = 8 rad/s), and by round-off 1e-16 · 3 m / 1e-5 s.
         let step = 1e-5;
         for motion in motions() {
             for i in 0..900 {
@@ -378,7 +381,8 @@ mod tests {
         }
     }
 
-    /// A sine between its ends: all of the stroke at half a period, half at a quarter, where the wall is fastest.
+    /// A sine between its ends: the whole stroke at half a period, half of it at a quarter, where
+    /// the wall is fastest.
     #[test]
     fn a_sine_goes_the_whole_stroke_and_its_ramp_is_the_quintic() {
         let sine = |ramp| Motion::Sine {
@@ -397,7 +401,8 @@ mod tests {
             assert!((full.displacement(t) - x).abs() < 1e-14, "{t}");
             assert!((full.velocity(t) - v).abs() < 1e-14, "{t}");
         }
-        // 6u⁵ − 15u⁴ + 10u³ at a quarter is 106/1024, at a half one half, at three quarters 918/1024.
+        // 6u⁵ − 15u⁴ + 10u³ is 106/1024 at a quarter, one half at a half, and 918/1024 at
+        // three quarters.
         let slow = sine(8.0);
         for (t, part) in [(2.0, 106.0 / 1024.0), (4.0, 0.5), (6.0, 918.0 / 1024.0)] {
             assert!(

@@ -1,6 +1,6 @@
-//! Values that files name by a word.
+//! Values that files refer to by name.
 
-/// Reads a value by the name that it has in its `NAMED`, and writes it so.
+/// Implements `Deserialize` and `Serialize` by the names in the type's `NAMED` table.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! read_by_name {

@@ -1,4 +1,5 @@
-//! Waves on open water: where the water goes and how high it stands, by the theory of waves alone.
+//! Waves on open water: water velocity and surface elevation from wave theory, without a
+//! wave maker.
 
 use std::f64::consts::TAU;
 
@@ -9,77 +10,81 @@ use super::{
     sampling::uniform,
 };
 
-/// Waves of a sea. Each has the same energy, so that no two are whole multiples of a common frequency and the sea does not come again.
+/// Number of waves in a sea. They have equal energies, so that their frequencies have no common
+/// divisor and the sea does not repeat.
 pub const LINES: u32 = 64;
 
-/// A spectrum is summed in steps of this part of its peak's frequency.
+/// Integration step over a spectrum, relative to the peak's frequency.
 const STEP: f64 = 1e-3;
 
-/// The longest waves have this part of the peak's frequency; below it a spectrum has 2e-9 of its energy.
+/// Frequency of the longest waves relative to the peak; below it a spectrum has 2e-9 of its energy.
 const LEAST_RATIO: f64 = 0.5;
 
-/// What a sea is asked to be.
+/// Parameters of a sea on open water.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OpenSea {
-    /// How the energy is spread over frequencies.
+    /// Distribution of energy over frequencies.
     pub spectrum: Spectrum,
-    /// How the waves come together.
+    /// Phases of the waves.
     pub meeting: Meeting,
-    /// Of the peak, seconds.
+    /// Peak period, seconds.
     pub peak_period: f64,
-    /// γ of JONSWAP and TMA.
+    /// Peak enhancement factor γ of JONSWAP and TMA.
     pub peak_enhancement: f64,
-    /// Of the shortest waves, seconds.
+    /// Period of the shortest waves, seconds.
     pub shortest_period: f64,
-    /// Still water, metres.
+    /// Depth of still water, metres.
     pub depth: f64,
-    /// m/s², positive.
+    /// Acceleration of gravity, m/s², positive.
     pub gravity: f64,
-    /// Seconds until the full height.
+    /// Time until the full height, seconds.
     pub ramp: f64,
-    /// s of the spread over directions, (cos ½(θ − θ₀))^2s (Longuet-Higgins, Cartwright and Smith 1963); `None` has all waves go one way.
+    /// Exponent s of the directional spreading (cos ½(θ − θ₀))^2s (Longuet-Higgins, Cartwright and
+    /// Smith 1963); `None` for long-crested waves in a single direction.
     pub spreading: Option<f64>,
 }
 
-/// How the waves of a spectrum come together.
+/// How the phases of a spectrum's waves are chosen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Meeting {
-    /// A sea: by chance.
+    /// A sea with random phases.
     Random {
-        /// Four times the root of the elevation's variance, metres.
+        /// Four times the standard deviation of the elevation, metres.
         significant_height: f64,
-        /// Other numbers make other seas of the same spectrum.
+        /// Different seeds give different seas of the same spectrum.
         seed: u32,
     },
-    /// One packet whose crests meet: the most probable form of a sea about a high crest (Lindgren 1970; Tromans et al. 1991), where each
-    /// wave has the part of the crest that it has of the energy.
+    /// One packet whose crests meet: the most probable shape of a sea around a high crest
+    /// (Lindgren 1970; Tromans et al. 1991), in which each wave contributes to the crest in
+    /// proportion to its energy.
     Focused {
-        /// The crest above still water by linear theory, metres.
+        /// Height of the crest above still water by linear theory, metres.
         height: f64,
-        /// Metres along x and z.
+        /// Position of the focus along x and z, metres.
         at: DVec2,
-        /// Seconds.
+        /// Time of the focus, seconds.
         time: f64,
     },
 }
 
-/// One of the waves: elevation a cos θ with θ = k·x − ωt + φ.
+/// One wave of the sum: elevation a cos θ with θ = k·x − ωt + φ.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Line {
-    /// k, rad/m along x and z.
+    /// Wave vector k along x and z, rad/m.
     pub number: DVec2,
-    /// ω, rad/s.
+    /// Angular frequency ω, rad/s.
     pub frequency: f64,
-    /// φ.
+    /// Phase φ, radians.
     pub phase: f64,
-    /// a, metres.
+    /// Amplitude a of the elevation, metres.
     pub elevation: f64,
     /// Amplitude of the horizontal velocity at the still level, m/s.
     pub speed: f64,
 }
 
 impl Line {
-    /// A free wave of linear theory (Dean and Dalrymple 1991, §3): its speed is aω / tanh kh.
+    /// A free wave of linear theory (Dean and Dalrymple 1991, §3): its velocity amplitude is aω /
+    /// tanh kh.
     fn free(elevation: f64, frequency: f64, number: DVec2, phase: f64, depth: f64) -> Self {
         Self {
             number,
@@ -90,27 +95,28 @@ impl Line {
         }
     }
 
-    /// θ at a place and a time.
+    /// θ at a position and a time.
     fn angle(&self, at: DVec2, t: f64) -> f64 {
         self.number.dot(at) - self.frequency * t + self.phase
     }
 }
 
-/// Waves that go over water of one depth. Places are in metres from the domain's least corner, x and z along the level, y up from the
-/// floor.
+/// Waves on water of constant depth. Positions are metres from the domain's least corner, with x
+/// and z horizontal and y upward from the floor.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OpenWaves {
-    /// All of them.
+    /// All waves of the sum.
     pub lines: Vec<Line>,
-    /// Of regular waves, s.
+    /// Period of regular waves, seconds; `None` for a sea.
     pub period: Option<f64>,
     depth: f64,
     ramp: f64,
 }
 
 impl OpenWaves {
-    /// Regular waves to second order (Stokes 1847): a cos θ + a₂ cos 2θ with a₂ = k a² / 4 · (3 − T²) / T³, where T = tanh kh; the second
-    /// has the velocity ¾ a² ω k cosh 2ky / sinh⁴ kh. They go along `direction`, a unit vector of x and z.
+    /// Builds regular waves to second order (Stokes 1847): a cos θ + a₂ cos 2θ with a₂ = k a² / 4 ·
+    /// (3 − T²) / T³, where T = tanh kh. The second harmonic has the velocity ¾ a² ω k cosh 2ky /
+    /// sinh⁴ kh. `direction` is a unit vector along x and z.
     pub fn regular(waves: &RegularWaves, direction: DVec2) -> Self {
         let (k, frequency) = (waves.wave_number(), TAU / waves.period);
         let a = 0.5 * waves.height;
@@ -132,8 +138,9 @@ impl OpenWaves {
         }
     }
 
-    /// A sea or a packet of [`LINES`] waves of the same energy, whose frequencies stand in the middle of as many equal parts of the spectrum's energy;
-    /// each goes its own way (a single summation, Miles and Funke 1989), about `direction`, radians from x towards z.
+    /// Builds a sea or a packet of [`LINES`] waves of equal energy. Their frequencies are the
+    /// medians of as many equal parts of the spectrum's energy; each wave has one direction (single
+    /// summation, Miles and Funke 1989) around `direction`, radians from x towards z.
     pub fn sea(asked: &OpenSea, direction: f64) -> Self {
         let (a, seed) = match asked.meeting {
             Meeting::Random {
@@ -168,12 +175,13 @@ impl OpenWaves {
         }
     }
 
-    /// Part of the full height at a time.
+    /// Returns the ramp's fraction of the full height at time `t`, seconds.
     pub fn grown(&self, t: f64) -> f64 {
         smooth_ramp(t, self.ramp).0
     }
 
-    /// Where water at a place goes, m/s; above the still level as at it.
+    /// Returns the water velocity at a position, m/s. Above the still level it is that at the
+    /// still level.
     pub fn velocity(&self, place: DVec3, t: f64) -> DVec3 {
         let at = DVec2::new(place.x, place.z);
         let y = place.y.clamp(0.0, self.depth);
@@ -190,29 +198,29 @@ impl OpenWaves {
         self.grown(t) * self.lines.iter().map(of).sum::<DVec3>()
     }
 
-    /// How far the level stands above still water at x and z, metres.
+    /// Returns the surface elevation above still water at x and z, metres.
     pub fn elevation(&self, at: DVec2, t: f64) -> f64 {
         let of = |line: &Line| line.elevation * line.angle(at, t).cos();
         self.grown(t) * self.lines.iter().map(of).sum::<f64>()
     }
 
-    /// Seconds until the full height.
+    /// Returns the time until the full height, seconds.
     pub fn ramp(&self) -> f64 {
         self.ramp
     }
 
-    /// Still water, metres.
+    /// Returns the depth of still water, metres.
     pub fn depth(&self) -> f64 {
         self.depth
     }
 
-    /// Length of the shortest free waves, metres.
+    /// Returns the length of the shortest waves, metres.
     pub fn least_wave_length(&self) -> f64 {
         let numbers = self.lines.iter().map(|line| line.number.length());
         TAU / numbers.fold(0.0, f64::max)
     }
 
-    /// Slowest that the energy of a free wave goes, m/s (Dean and Dalrymple 1991, eq. 4.82).
+    /// Returns the smallest group velocity of the waves, m/s (Dean and Dalrymple 1991, eq. 4.82).
     pub fn least_group_speed(&self) -> f64 {
         let of = |line: &Line| {
             let k = line.number.length();
@@ -222,13 +230,13 @@ impl OpenWaves {
         self.lines.iter().map(of).fold(f64::INFINITY, f64::min)
     }
 
-    /// Fastest that the water at the still level can be, m/s.
+    /// Returns an upper bound on the water's speed at the still level, m/s.
     pub fn most_speed(&self) -> f64 {
         self.lines.iter().map(|line| line.speed.abs()).sum()
     }
 }
 
-/// rad/s.
+/// Angular frequencies of the waves, rad/s.
 fn frequencies(asked: &OpenSea) -> Vec<f64> {
     let peak = asked.peak_period.recip();
     let count = ((asked.peak_period / asked.shortest_period - LEAST_RATIO) / STEP).ceil() as usize;
@@ -251,7 +259,8 @@ fn frequencies(asked: &OpenSea) -> Vec<f64> {
         .collect()
 }
 
-/// The angle, radians from −π to π, below which a spread of (cos ½θ)^2s has the part `part`.
+/// Quantile of the spreading (cos ½θ)^2s: the angle, radians from −π to π, below which the fraction
+/// `part` lies.
 fn spread(s: f64, part: f64) -> f64 {
     const PARTS: u32 = 4096;
     let angle = |i: u32| TAU * ((f64::from(i) + 0.5) / f64::from(PARTS) - 0.5);
@@ -301,7 +310,7 @@ mod tests {
         }
     }
 
-    /// Water at the surface stays there: η_t + u η_s = v up to the third order of the steepness.
+    /// The kinematic surface condition η_t + u η_s = v holds up to third order in the steepness.
     #[test]
     fn regular_waves_keep_their_surface_to_second_order() {
         let residual = |height: f64, second: f64| {
@@ -310,7 +319,7 @@ mod tests {
             waves.lines[1].speed *= second;
             let (d, e) = (1e-4, DVec2::from_angle(0.6));
             let at = |s: f64, t: f64| waves.elevation(s * e, t);
-            // Beyond the still level the fields go on as the exponentials do.
+            // Above the still level the fields are extended linearly.
             let velocity = |s: f64, y: f64, t: f64| {
                 let still = waves.velocity(DVec3::new(s * e.x, 0.5, s * e.y), t);
                 let below = waves.velocity(DVec3::new(s * e.x, 0.5 - d, s * e.y), t);
@@ -328,10 +337,11 @@ mod tests {
             }
             worst
         };
-        // Four times as steep is sixteen times as much of what is left out.
+        // A steepness four times as large has sixteen times the error, which is of second order per
+        // unit of height squared.
         let (flat, steep) = (residual(0.01, 1.0), residual(0.04, 1.0));
         assert!((10.0..22.0).contains(&(steep / flat)), "{flat} {steep}");
-        // Negative control: half of the second order is a fault of the first power.
+        // Negative control: half of the second order is an error of first power.
         let (flat, steep) = (residual(0.01, 0.5), residual(0.04, 0.5));
         assert!((3.0..6.0).contains(&(steep / flat)), "{flat} {steep}");
     }
@@ -348,7 +358,7 @@ mod tests {
                 (waves.velocity(place + off, 2.0) - waves.velocity(place - off, 2.0)) / (2.0 * d)
             };
             let [x, y, z] = [slope(0), slope(1), slope(2)];
-            // The third derivative is below 1e3 here: d² of it.
+            // The third derivative is below 1e3 here; the error is d² of it.
             assert!((x.x + y.y + z.z).abs() < 1e-5, "{place}");
             let turn = DVec3::new(y.z - z.y, z.x - x.z, x.y - y.x);
             assert!(turn.length() < 1e-5, "{place} {turn}");
@@ -357,7 +367,7 @@ mod tests {
         }
     }
 
-    /// The level rises as fast as the water there (the first order of the kinematic condition).
+    /// The surface rises as fast as the water there (the kinematic condition to first order).
     #[test]
     fn a_seas_level_rises_as_its_water_does() {
         let waves = OpenWaves::sea(&asked(Some(4.0), 1), 0.0);
@@ -382,7 +392,8 @@ mod tests {
             let deep = 9.81 * k * (k * 0.8).tanh();
             assert!((deep.sqrt() / line.frequency - 1.0).abs() < 1e-9);
         }
-        // JONSWAP's energy lies with 0.43 below 1.02 of the peak's frequency, 0.72 below 1.25, by Simpson's rule on the formula itself.
+        // JONSWAP has 0.43 of its energy below 1.02 of the peak's frequency and 0.72 below 1.25, by
+        // Simpson's rule on the formula itself.
         let jonswap = |x: f64| {
             let width: f64 = if x <= 1.0 { 0.07 } else { 0.09 };
             let raised = 3.3f64.powf((-0.5 * ((x - 1.0) / width).powi(2)).exp());
@@ -407,7 +418,7 @@ mod tests {
             let expected = area(ratio) / area(most);
             let below = |l: &&Line| l.frequency < TAU * ratio / 1.6;
             let found = sea.lines.iter().filter(below).count() as f64 / f64::from(LINES);
-            // A line stands for 1/64 of the energy.
+            // Each wave carries 1/64 of the energy.
             assert!(
                 (found - expected).abs() < 1.0 / 64.0,
                 "{ratio}: {found} {expected}"
@@ -416,8 +427,8 @@ mod tests {
         assert!(OpenWaves::sea(&asked(None, 0), 0.0) != OpenWaves::sea(&asked(None, 1), 0.0));
     }
 
-    /// At the place and the time that are asked for the crest is as high as was asked for and nowhere higher; a quarter of the peak's
-    /// period before it is half as high at most, and the sum of the waves' energies is that of their lines.
+    /// At the requested position and time the crest has the requested height, and it is nowhere
+    /// higher; a quarter of the peak's period before, it is at most half as high.
     #[test]
     fn crests_of_a_packet_meet_where_they_are_asked_to() {
         for spreading in [None, Some(12.0)] {
@@ -437,12 +448,13 @@ mod tests {
                 assert!(waves.elevation(at + way, time) < 0.15, "{way}");
             }
             assert!(waves.elevation(at, time - 0.4) < 0.075);
-            // Long before the waves have not met yet.
+            // Long before, the waves have not met yet.
             assert!(waves.elevation(at, time - 15.0).abs() < 0.075);
         }
     }
 
-    /// Of (cos ½θ)^2s the mean of cos θ is s / (s + 1) (Longuet-Higgins, Cartwright and Smith 1963).
+    /// For (cos ½θ)^2s the mean of cos θ is s / (s + 1) (Longuet-Higgins, Cartwright and
+    /// Smith 1963).
     #[test]
     fn directions_are_spread_as_the_cosine_asks() {
         for s in [1.0, 5.0, 30.0] {

@@ -1,4 +1,4 @@
-//! A particle state: exactly what one cache frame holds.
+//! State of the particles: exactly what one frame of a cache holds.
 
 use std::collections::BTreeMap;
 
@@ -8,36 +8,38 @@ use super::answer::Answers;
 
 /// Particles in the order of their ids.
 ///
-/// The state between two frames is this and nothing else, so every frame is a checkpoint.
+/// Between two frames the simulation has no other state, so every frame is a checkpoint.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Particles {
-    /// Positions, metres, about the scene's origin: the world's, but for scenes far off.
+    /// Positions, metres, relative to the scene's origin, which is the world's except for scenes
+    /// far from it.
     pub position: Vec<[f32; 3]>,
-    /// Velocities, metres per second.
+    /// Velocities, m/s.
     pub velocity: Vec<[f32; 3]>,
-    /// Unique and ascending.
+    /// Ids, unique and ascending.
     pub id: Vec<u32>,
-    /// Further attributes that an effect declares, one value a particle, by name.
+    /// Additional attributes declared by effects, by name, with one value per particle.
     pub attributes: BTreeMap<String, Vec<f32>>,
-    /// What walls that absorb do from then on; a cache has it in its ledger.
+    /// State of absorbing walls from this time on; caches store it in their ledger.
     pub walls: Answers,
-    /// Length of the substep that ended in this state, seconds; 0 where none did. A cache has it in its ledger.
+    /// Length of the substep that ended in this state, seconds; 0 if there was none. Caches store
+    /// it in their ledger.
     pub substep: f64,
 }
 
 impl Particles {
-    /// Number of particles.
+    /// Returns the number of particles.
     pub fn len(&self) -> usize {
         self.position.len()
     }
 
-    /// Whether there is no particle.
+    /// Returns whether there are no particles.
     pub fn is_empty(&self) -> bool {
         self.position.is_empty()
     }
 
-    /// The particles with their positions about another origin; both in the world, metres. What 32 bits do not hold is
-    /// rounded.
+    /// Returns the particles with positions relative to the origin `to` instead of `from`, both in
+    /// world coordinates, metres. Positions are rounded to f32.
     #[must_use]
     pub fn about(mut self, from: DVec3, to: DVec3) -> Self {
         if from != to {
@@ -49,7 +51,7 @@ impl Particles {
         self
     }
 
-    /// Keeps those that are marked, in their order.
+    /// Keeps the particles that are marked in `keep`, in their order.
     pub fn retain(&mut self, keep: &[bool]) {
         fn kept<T>(values: &mut Vec<T>, keep: &[bool]) {
             let mut marks = keep.iter();
@@ -63,7 +65,7 @@ impl Particles {
         }
     }
 
-    /// Largest speed, m/s; 0 without particles.
+    /// Returns the largest speed, m/s; 0 without particles.
     pub fn max_speed(&self) -> f64 {
         self.velocity
             .iter()
@@ -71,8 +73,8 @@ impl Particles {
             .fold(0.0, f64::max)
     }
 
-    /// How many particles are not finite, and the first of them in words; `density` is one relative density a particle,
-    /// where there is any.
+    /// Returns how many particles have values that are not finite, and a description of the first;
+    /// `None` if there are none. `density` is one relative density per particle, if known.
     pub fn first_not_finite(&self, density: Option<&[f64]>) -> Option<(u64, String)> {
         let is_bad = |v: &[f32; 3]| !v.iter().all(|x| x.is_finite());
         let density = |k: usize| density.map_or(1.0, |density| density[k]);

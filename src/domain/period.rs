@@ -1,16 +1,16 @@
-//! Boxes that join their own ends.
+//! Periodic boxes, whose opposite ends are joined.
 
 use glam::DVec3;
 
 use super::bounds::cells_over;
 
-/// Lengths of a box along the axes along which it joins its own end, metres; 0 along those with walls. Positions are
+/// Lengths of a box along its periodic axes, metres; 0 along axes with walls. Positions are
 /// relative to its least corner.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Period(pub DVec3);
 
 impl Period {
-    /// The place in the box, up to its rounding, of which `x` is an image.
+    /// Returns the position in the box, up to its rounding, that `x` is an image of.
     #[inline]
     pub fn wrap(self, x: DVec3) -> DVec3 {
         if self.0 == DVec3::ZERO {
@@ -19,7 +19,7 @@ impl Period {
         x - self.whole((x / self.0).floor())
     }
 
-    /// The shortest of a difference and its images.
+    /// Returns the shortest of a difference and its periodic images.
     #[inline]
     pub fn shortest(self, difference: DVec3) -> DVec3 {
         if self.0 == DVec3::ZERO {
@@ -28,8 +28,8 @@ impl Period {
         difference - self.whole((difference / self.0).round())
     }
 
-    /// Whether what went from `before` to `after` was carried to the other end, or stands so near to an end that
-    /// rounding decides at which.
+    /// Returns whether a point that moved from `before` to `after` was wrapped to the other end, or
+    /// is so close to an end that rounding decides on which side it is.
     #[inline]
     pub fn is_at_joint(self, before: DVec3, after: DVec3) -> bool {
         let is_carried = (after - before).abs().cmpgt(0.5 * self.0);
@@ -37,8 +37,8 @@ impl Period {
         (self.0.cmpgt(DVec3::ZERO) & (is_carried | is_near)).any()
     }
 
-    /// A place that was found, or its image that is nearer to what was expected where rounding alone took the one to the
-    /// other end of the box: what was found has to lie in the box.
+    /// Returns `found`, or its image nearer to `expected` if only rounding put it at the other end
+    /// of the box. `found` must lie in the box to be replaced.
     #[inline]
     pub fn image_by_rounding(self, found: DVec3, expected: DVec3) -> DVec3 {
         let slack = 1e-6 * self.0;
@@ -47,8 +47,9 @@ impl Period {
         DVec3::select(self.0.cmpgt(DVec3::ZERO) & is_within, near, found)
     }
 
-    /// Cells that cover a box of `size` metres along each axis, one at least: of edge `edge` along axes with walls, and
-    /// along the others as many as fit without one's being shorter.
+    /// Returns the number of cells that cover a box of `size` metres along each axis, at least one:
+    /// of edge `edge` along axes with walls; along periodic axes, as many as fit without being
+    /// shorter than that.
     pub fn cells(self, size: DVec3, edge: f64) -> [u32; 3] {
         let (count, covering) = ((size / edge).to_array(), cells_over(size, edge).to_array());
         std::array::from_fn(|axis| match self.0[axis] > 0.0 {
@@ -58,13 +59,13 @@ impl Period {
         })
     }
 
-    /// Edges of so many cells, metres, which are `edge` along axes with walls.
+    /// Returns the edge lengths of `cells`, metres; `edge` along axes with walls.
     pub fn edges(self, cells: [u32; 3], edge: f64) -> DVec3 {
         let fitted = self.0 / DVec3::from_array(cells.map(f64::from));
         DVec3::select(self.0.cmpgt(DVec3::ZERO), fitted, DVec3::splat(edge))
     }
 
-    /// So many periods, metres; nothing along axes with walls.
+    /// Lengths of whole periods, metres; 0 along axes with walls.
     fn whole(self, periods: DVec3) -> DVec3 {
         DVec3::select(self.0.cmpgt(DVec3::ZERO), periods * self.0, DVec3::ZERO)
     }
@@ -82,17 +83,17 @@ mod tests {
         assert_eq!(period.wrap(period.wrap(x)), period.wrap(x));
         let there = DVec3::new(1.75, 3.0, 0.125) - DVec3::new(0.25, 1.0, 0.25);
         assert_eq!(period.shortest(there), DVec3::new(-0.5, 2.0, -0.125));
-        // The other end is near; a place beyond it is where it should not be.
+        // The other end is near; a position beyond it stays.
         let (low, high) = (DVec3::new(1e-9, 1.0, 0.1), DVec3::new(2.0, 1.0, 0.1));
         let off = |found| period.image_by_rounding(found, high).distance(high);
         assert!(off(low) < 1e-8 && off(high) == 0.0);
         assert!(off(high + 2.0 * DVec3::X) == 2.0 && off(low - 2.0 * DVec3::X) > 3.9);
-        // Cells no shorter than what was asked for, and none left over.
+        // Cells are no shorter than requested, and fill the period.
         let cells = period.cells(DVec3::new(2.0, 7.0, 0.5), 0.15);
         assert_eq!(cells, [13, 47, 3]);
         let edges = period.edges(cells, 0.15);
         assert_eq!(edges, DVec3::new(2.0 / 13.0, 0.15, 0.5 / 3.0));
-        // Without a period a place stays where it is.
+        // Without a period, positions do not change.
         assert_eq!(Period::default().wrap(x), x);
         assert_eq!(Period::default().shortest(x), x);
     }

@@ -1,31 +1,35 @@
-//! Twin of shared/place.wgsl: places told by words, and who is near by them. Lists of PBF's neighbours are made of these.
+//! Positions packed into 32-bit words, and the distance test on them from which PBF builds its
+//! neighbour lists. Mirrors shared/place.wgsl.
 
-/// Steps of h along an axis, and how many of them come round.
+/// Steps per h along an axis, and the number of steps after which an axis wraps.
 const STEPS: f32 = 256.0;
 const ROUND: u32 = 1024;
-/// Steps within which a list made from words has everyone, and no one else.
+/// Distance in steps below which two words count as near.
 const REACH: u32 = 258;
 
-/// Cells along an axis up to which words tell places: what their products err by is stated for so many.
+/// Largest number of cells along an axis for which packing is used: the bound on the rounding of
+/// its products holds up to it.
 const MOST_CELLS: usize = 4000;
 
-/// Whether words tell places in a grid of cells of h: where an axis comes round, their steps do not come round with it.
+/// Returns whether packed positions work in a grid of cells of size h. They do not for periodic
+/// axes, whose steps do not wrap with the period.
 pub fn are_told(mut dims: impl Iterator<Item = usize>, is_periodic: bool) -> bool {
     !is_periodic && dims.all(|cells| cells <= MOST_CELLS)
 }
 
-/// How far beyond h, over h, whoever is listed can be: within 258 steps of h/256, and a step of each place along three axes with what
-/// their products err by.
+/// Largest distance of a listed neighbour, as the excess over h relative to h: 258 steps of h/256,
+/// plus one step per position along three axes including the rounding of their products.
 pub const SKIN: f64 = (REACH as f64 + 1.949) / STEPS as f64 - 1.0;
 
-/// The word of a place, metres; `inverse` is 1/h as the device has it. Products are rounded as there, so that words are equal.
+/// Packs a position, metres; `inverse` is 1/h as the GPU has it. Products are rounded as on the
+/// GPU, so that the words are equal.
 #[inline]
 pub fn word(place: [f32; 3], inverse: f32) -> u32 {
     let step = |axis: usize| (place[axis] * inverse * STEPS).floor() as i32 as u32 % ROUND;
     step(0) | step(1) << 10 | step(2) << 20
 }
 
-/// Whether two are listed with each other by their words: along each axis the way that comes round sooner.
+/// Returns whether two words are near; along each axis the shorter way round counts.
 #[inline]
 pub fn are_near(a: u32, b: u32) -> bool {
     let way = |axis: u32| {
@@ -39,7 +43,8 @@ pub fn are_near(a: u32, b: u32) -> bool {
 mod tests {
     use super::*;
 
-    /// Whoever is nearer than h is listed, whoever is farther than [`SKIN`] allows is not, wherever words come round.
+    /// Points nearer than h are listed, and points farther than [`SKIN`] allows are not, including
+    /// where words wrap.
     #[test]
     fn words_list_who_is_near_and_no_one_far() {
         let h = 0.1f32;
@@ -57,13 +62,13 @@ mod tests {
                 let y = [0, 1, 2].map(|axis| x[axis] + (way[axis] * distance) as f32);
                 are_near(words(x), words(y))
             };
-            // Of coordinates at 60 m the last place is 4e-6 m.
+            // At 60 m the last digit of an f32 coordinate is 4e-6 m.
             let (h, rounding) = (f64::from(h), 1e-5);
             assert!(listed(h - rounding), "{x:?} {way:?}");
             assert!(!listed(h * (1.0 + SKIN) + rounding), "{x:?} {way:?}");
             between += usize::from(listed(h * (1.0 + 0.5 * SKIN)));
         }
-        // Neither all nor none of those between.
+        // Some of those in between are listed, but not all.
         assert!((400..3600).contains(&between), "{between}");
     }
 

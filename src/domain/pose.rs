@@ -1,44 +1,44 @@
-//! Where a rigid body stands, and how it goes from there to where it stands next.
+//! Poses of rigid bodies, and the motion from one pose to the next.
 
 use glam::{DAffine3, DQuat, DVec3};
 
 use super::signed_distance::SignedDistance;
 
-/// A place that a rigid body takes, seen from where it stood at the start: x = centre + turn (x₀ − rest).
+/// Pose of a rigid body relative to the start: x = centre + turn (x₀ − rest).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
-    /// A point of the body where it stood at the start, metres.
+    /// A point of the body in its position at the start, metres.
     pub rest: DVec3,
-    /// Where that point is now, metres.
+    /// Current position of that point, metres.
     pub centre: DVec3,
-    /// A unit quaternion: how the body is turned about it.
+    /// Rotation of the body about that point, a unit quaternion.
     pub turn: DQuat,
 }
 
 impl Pose {
-    /// As it stood at the start.
+    /// The pose at the start.
     pub const START: Self = Self {
         rest: DVec3::ZERO,
         centre: DVec3::ZERO,
         turn: DQuat::IDENTITY,
     };
 
-    /// Where the body's point is now that was at `x` at the start.
+    /// Returns the current position of the body's point that was at `x` at the start.
     pub fn place(&self, x: DVec3) -> DVec3 {
         self.centre + self.turn * (x - self.rest)
     }
 
-    /// Where the body's point was at the start that is at `x` now.
+    /// Returns the position at the start of the body's point that is at `x` now.
     pub fn back(&self, x: DVec3) -> DVec3 {
         self.rest + self.turn.conjugate() * (x - self.centre)
     }
 
-    /// [`Self::place`] as a map.
+    /// Returns [`Self::place`] as an affine map.
     pub fn affine(&self) -> DAffine3 {
         DAffine3::from_rotation_translation(self.turn, self.place(DVec3::ZERO))
     }
 
-    /// With another origin of all coordinates: `way` is added to those of every point.
+    /// Returns the pose in coordinates with another origin: `way` is added to those of every point.
     pub fn moved(self, way: DVec3) -> Self {
         Self {
             rest: self.rest + way,
@@ -47,7 +47,7 @@ impl Pose {
         }
     }
 
-    /// In a unit of which `1 / factor` are one of the old.
+    /// Returns the pose with all lengths multiplied by `factor`.
     pub fn scaled(self, factor: f64) -> Self {
         Self {
             rest: factor * self.rest,
@@ -57,23 +57,24 @@ impl Pose {
     }
 }
 
-/// A body's way from one pose to the next: its point of rest goes straight, and it turns the shorter way about that.
+/// Motion of a body from one pose to the next: its rest point moves in a straight line, and it
+/// turns the shorter way.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Passage {
-    /// Where it begins.
+    /// Pose at the beginning.
     pub start: Pose,
-    /// How it is turned at the end; on the same side of the sphere as at the start.
+    /// Rotation at the end, in the same hemisphere of quaternions as at the beginning.
     pub end_turn: DQuat,
-    /// Of the point of rest, m/s.
+    /// Velocity of the rest point, m/s.
     pub velocity: DVec3,
     /// Angular velocity, rad/s.
     pub spin: DVec3,
-    /// Seconds.
+    /// Duration, seconds.
     pub length: f64,
 }
 
 impl Passage {
-    /// Of a body that does not move, in no time.
+    /// Builds the passage of a body at rest, of duration 0.
     pub fn resting(pose: Pose) -> Self {
         Self {
             start: pose,
@@ -84,8 +85,9 @@ impl Passage {
         }
     }
 
-    /// From `start` to `end`, which have one point of rest, within `length` seconds. The velocities are those that take
-    /// the body there, not those of the motion that it follows.
+    /// Builds the passage from `start` to `end`, which must have the same rest point, within
+    /// `length` seconds. The velocities are those that take the body there, not those of the motion
+    /// that it samples.
     pub fn between(start: Pose, end: Pose, length: f64) -> Self {
         let end_turn = match start.turn.dot(end.turn) < 0.0 {
             true => -end.turn,
@@ -101,8 +103,9 @@ impl Passage {
         }
     }
 
-    /// Where it stands when `share` of the time is over. Both turns are known: between them it is the normalised mean,
-    /// which stays on the arc and is less than angle³/240 off the even turn, of angles up to 1.5.
+    /// Returns the pose after the fraction `share` of the duration. Between the ends the rotation
+    /// is the normalised mean of both, which stays on the arc and differs from a uniform rotation
+    /// by less than angle³/240, for angles up to 1.5.
     pub fn at(&self, share: f64) -> Pose {
         let turn = match share {
             0.0 => self.start.turn,
@@ -116,28 +119,28 @@ impl Passage {
         }
     }
 
-    /// Of the body's point that is at `x` while its point of rest is at `centre`, m/s.
+    /// Returns the velocity of the body's point at `x` while its rest point is at `centre`, m/s.
     pub fn velocity_at(&self, x: DVec3, centre: DVec3) -> DVec3 {
         self.velocity + self.spin.cross(x - centre)
     }
 }
 
-/// Signed distances of a body that stands somewhere else than where they were sampled.
+/// Signed distance of a body in a pose other than the one it was sampled in.
 #[derive(Clone, Debug)]
 pub struct Posed {
-    /// As it stood at the start.
+    /// Distances in the pose at the start.
     pub grid: SignedDistance,
-    /// Where it stands.
+    /// Current pose.
     pub pose: Pose,
 }
 
 impl Posed {
-    /// Distance at `x`, metres, as [`SignedDistance::sample`] has it.
+    /// Returns the distance at `x`, metres, as [`SignedDistance::sample`].
     pub fn sample(&self, x: DVec3) -> f64 {
         self.grid.sample(self.pose.back(x))
     }
 
-    /// Its gradient, as [`SignedDistance::gradient`] has it.
+    /// Returns its gradient, as [`SignedDistance::gradient`].
     pub fn gradient(&self, x: DVec3) -> DVec3 {
         self.pose.turn * self.grid.gradient(self.pose.back(x))
     }
@@ -160,15 +163,16 @@ mod tests {
         let (pose, x) = (pose(0.7), DVec3::new(-0.3, 1.7, 4.0));
         assert!((pose.back(pose.place(x)) - x).length() < 1e-14);
         assert!((pose.affine().transform_point3(x) - pose.place(x)).length() < 1e-14);
-        // By another origin: the same body.
+        // The same body relative to another origin.
         let way = DVec3::new(5.0, -3.0, 2.0);
         let moved = pose.moved(way).place(x + way) - way;
         assert!((moved - pose.place(x)).length() < 1e-14);
         assert_eq!(pose.place(pose.rest), pose.centre);
     }
 
-    /// The velocity of a point is what its place changes by: by central differences about the middle, where the normalised
-    /// mean turns at 1 + angle²/48 times the mean speed, here 1.0002.
+    /// The velocity of a point is the rate of change of its position: by central differences
+    /// about the middle, where the normalised mean turns at 1 + angle²/48 times the mean rate,
+    /// here 1.0002.
     #[test]
     fn a_passage_ends_where_it_should_and_its_velocity_is_its_way() {
         let (length, angle) = (0.05, 0.1);
@@ -176,7 +180,7 @@ mod tests {
             centre: DVec3::new(1.3, 2.0, 0.6),
             ..pose(0.7 + angle)
         };
-        // The other sign is the same turn.
+        // The quaternion of opposite sign is the same rotation.
         for end_turn in [end.turn, -end.turn] {
             let end = Pose {
                 turn: end_turn,
@@ -196,7 +200,7 @@ mod tests {
                 (found - told).length() < 1e-3 * told.length(),
                 "{found} {told}"
             );
-            // Control: with the other sense of turning it is not.
+            // Control: with the opposite sense of rotation it differs.
             let wrong = Passage {
                 spin: -passage.spin,
                 ..passage

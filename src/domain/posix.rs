@@ -1,18 +1,18 @@
-//! Words of the commands that messages, pages and logs print, as a POSIX shell takes them.
+//! Quotes words of commands that messages, pages and logs print, for a POSIX shell.
 
 use std::{borrow::Cow, path::Path};
 
-/// A word of a command: in single quotes where a shell would not take it as it stands.
+/// Quotes a word of a command: in single quotes unless a shell takes it literally.
 pub fn word(text: &str) -> Cow<'_, str> {
     let is_plain = |c: char| c.is_alphanumeric() || "_-./:=,@%+".contains(c);
     match !text.is_empty() && text.chars().all(is_plain) {
         true => text.into(),
-        // Within single quotes every character is itself, but for the quote that ends them.
+        // Within single quotes every character is literal, except the closing quote.
         false => format!("'{}'", text.replace('\'', r"'\''")).into(),
     }
 }
 
-/// A path as a word.
+/// Quotes a path.
 pub fn path(path: &Path) -> String {
     word(&path.to_string_lossy()).into_owned()
 }
@@ -66,7 +66,7 @@ mod tests {
         };
         let wanted: String = words.iter().map(|it| format!("{it}\0")).collect();
         assert_eq!(given_back(words.map(word).join(" ")), wanted);
-        // The control: a shell takes bare words apart.
+        // Negative control: a shell splits unquoted words.
         assert_ne!(given_back(words[..2].join(" ")), "plain\0two words\0");
     }
 }

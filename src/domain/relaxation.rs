@@ -1,41 +1,45 @@
-//! Second-order Richardson iteration of a viscous solve, with what is known of its system beforehand.
+//! Second-order Richardson iteration of a viscous solve, with parameters known in advance.
 
-/// How a viscous solve goes.
+/// Parameters of a viscous solve.
 ///
-/// The system is (M + κ K) u = M u*, with κ = ν Δt / Δx², M the part of a face's water and K the stress of the velocities about it
-/// (Batty and Bridson 2008). Over its diagonal D, its greatest eigenvalue is [`GREATEST`] at most, since a strain is a sum of four
-/// velocities and the square of such a sum no more than four times the sum of squares; its least is 1 / (1 + [`MOST_STRESS`] κ) or
-/// more for faces with water on both sides. So the iteration uₙ₊₁ = uₙ + dₙ, dₙ = m dₙ₋₁ + g D⁻¹ (M u* − (M + κ K) uₙ) (Golub and
-/// Varga 1961, whose q² and 2q/δ are m and g) needs no sum over the grid: how many iterations bring the error to a part of what it was
-/// is known before.
+/// The system is (M + κ K) u = M u*, with κ = ν Δt / Δx², M the water fraction of a face and K the
+/// stress of the velocities around it (Batty and Bridson 2008). Relative to its diagonal D, its
+/// greatest eigenvalue is at most [`GREATEST`], since a strain is a sum of four velocities and the
+/// square of such a sum is no more than four times the sum of squares. Its least eigenvalue is at
+/// least 1 / (1 + [`MOST_STRESS`] κ) for faces with water on both sides. The iteration uₙ₊₁ = uₙ +
+/// dₙ, dₙ = m dₙ₋₁ + g D⁻¹ (M u* − (M + κ K) uₙ) (Golub and Varga 1961, whose q² and 2q/δ are m and
+/// g) therefore needs no sum over the grid: the number of iterations that reduces the error by a
+/// given factor is known in advance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Relaxation {
-    /// κ.
+    /// κ = ν Δt / Δx².
     pub reach: f64,
-    /// g of the first iteration, which has no momentum.
+    /// Gain g of the first iteration, which has no momentum.
     pub first_gain: f64,
-    /// g.
+    /// Gain g.
     pub gain: f64,
-    /// m.
+    /// Momentum m.
     pub momentum: f64,
-    /// Even, so that the result stands where the velocities stood.
+    /// Number of iterations; even, so that the result ends up in the buffer that held
+    /// the velocities.
     pub iterations: u32,
-    /// Whether those were not as many as the tolerance asks for.
+    /// Whether the number of iterations was limited to fewer than the tolerance needs.
     pub is_short: bool,
 }
 
-/// Bound of the greatest eigenvalue of the system over its diagonal.
+/// Bound of the greatest eigenvalue of the system relative to its diagonal.
 pub const GREATEST: f64 = 4.0;
 
-/// Bound of K's diagonal: two normal stresses of 2 each, and four edges of up to 3 at corners of solids.
+/// Bound of K's diagonal: two normal stresses of 2 each, and four edges of up to 3 at corners
+/// of solids.
 pub const MOST_STRESS: f64 = 16.0;
 
-/// Iterations of a substep at most.
+/// Largest number of iterations per substep.
 pub const MOST_ITERATIONS: u32 = 4000;
 
 impl Relaxation {
-    /// Of a kinematic ν, m²/s, over `time_step`, seconds, in cells of edge `cell_size`, metres, so that the error falls to a part
-    /// `tolerance` of what it was.
+    /// Computes the parameters for a kinematic viscosity ν, m²/s, over `time_step`, seconds, in
+    /// cells of edge `cell_size`, metres, that reduce the error by the factor `tolerance`.
     pub fn new(nu: f64, time_step: f64, cell_size: f64, tolerance: f64) -> Self {
         let reach = nu * time_step / (cell_size * cell_size);
         let least = 1.0 / (1.0 + MOST_STRESS * reach);
@@ -55,7 +59,7 @@ impl Relaxation {
         }
     }
 
-    /// κ, g and m of an iteration, and 0: as the device has them.
+    /// Returns κ, g and m of an iteration, and 0, in the layout of the GPU's uniform.
     pub fn of_iteration(&self, is_first: bool) -> [f64; 4] {
         match is_first {
             true => [self.reach, self.first_gain, 0.0, 0.0],
@@ -64,7 +68,8 @@ impl Relaxation {
     }
 }
 
-/// Part of the error that is left at most after so many iterations (Golub and Varga 1961): qⁿ (1 + n (1 − q²) / (1 + q²)).
+/// Bound on the remaining fraction of the error after `iterations` (Golub and Varga 1961): qⁿ (1 +
+/// n (1 − q²) / (1 + q²)).
 fn left(rate: f64, iterations: u32) -> f64 {
     let n = f64::from(iterations);
     let square = rate * rate;
@@ -75,7 +80,7 @@ fn left(rate: f64, iterations: u32) -> f64 {
 mod tests {
     use super::*;
 
-    /// Part of the error that is left of a mode with an eigenvalue, as the recurrence has it.
+    /// Remaining fraction of the error of a mode with this eigenvalue, by the recurrence.
     fn of_mode(relaxation: &Relaxation, eigenvalue: f64) -> f64 {
         let (mut error, mut step): (f64, f64) = (1.0, 0.0);
         let mut most_left: f64 = 1.0;
@@ -99,9 +104,10 @@ mod tests {
                     .map(|value| of_mode(&relaxation, value))
                     .fold(0.0, f64::max);
                 assert!(worst <= tolerance, "{reach} {tolerance}: {worst}");
-                // No more iterations than that asks for: two fewer leave more of the worst mode, by the bound.
+                // No more iterations than needed: by the bound, two fewer leave more of the
+                // worst mode.
                 assert!(!relaxation.is_short);
-                // Negative control: beyond the greatest eigenvalue it does not hold.
+                // Negative control: beyond the greatest eigenvalue the bound does not hold.
                 if relaxation.iterations > 20 {
                     let beyond = of_mode(&relaxation, 1.2 * GREATEST);
                     assert!(beyond.is_nan() || beyond > tolerance, "{reach}: {beyond}");
@@ -114,7 +120,7 @@ mod tests {
     fn more_than_the_most_iterations_is_said() {
         let relaxation = Relaxation::new(1e7, 1.0, 1.0, 1e-3);
         assert!(relaxation.is_short && relaxation.iterations == MOST_ITERATIONS);
-        // What is not brought down is not blown up either.
+        // Modes that are not reduced enough do not grow either.
         let least = 1.0 / (1.0 + MOST_STRESS * 1e7);
         for value in [0.01 * least, least, 1.0, GREATEST] {
             assert!(of_mode(&relaxation, value) <= 1.0);

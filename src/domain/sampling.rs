@@ -1,6 +1,6 @@
-//! Particles from blocks, meshes and surfaces.
+//! Samples blocks and meshes with water particles, and surfaces with boundary particles.
 //!
-//! Everything here is a function of its arguments alone: random numbers are hashed from indices.
+//! All results depend only on the arguments: random numbers are hashes of indices.
 
 mod displace;
 
@@ -15,44 +15,45 @@ use super::{
     signed_distance::{SignedDistance, SignedDistanceError},
 };
 
-/// Centres nearer than this many spacings to water that is there already are left out where
-/// regions of water overlap.
+/// Distance to existing water, in spacings, below which centres are left out where regions of
+/// water overlap.
 const OVERLAP_SPACINGS: f64 = 0.75;
 
-/// Least distance of boundary samples in spacings, chosen so that there is one sample a spacing
-/// squared within a few per cent. (0.835 would do if random sequential packing saturated; with
-/// the candidates below it does not, and gave 0.8.)
+/// Least distance of boundary samples, in spacings, chosen to give one sample per squared spacing
+/// within a few per cent. (0.835 would do if random sequential packing saturated; with the
+/// candidates below it does not, and gave 0.8.)
 const BOUNDARY_DISTANCE: f64 = 0.75;
 
-/// Candidates a spacing squared. With 12 no place on a box or sphere is farther than 1.2 spacings
-/// from a sample (tested).
+/// Candidates per squared spacing. With 12, no point on a box or sphere is farther than 1.2
+/// spacings from a sample (tested).
 const BOUNDARY_CANDIDATES: f64 = 12.0;
 
-/// A boundary particle of a solid's surface.
+/// A boundary particle on the surface of a solid.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BoundarySample {
-    /// Metres.
+    /// Position, metres.
     pub position: DVec3,
-    /// Unit length, outward.
+    /// Unit normal, outward.
     pub normal: DVec3,
-    /// Area of the surface that it stands for, m².
+    /// Area of the surface that the sample represents, m².
     pub area: f64,
 }
 
 /// The water at the start.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fill {
-    /// Particles at rest, ids from 0 without gaps, in the order of blocks, then meshes, x fastest in each.
+    /// Particles at rest, with consecutive ids from 0: blocks first, then meshes, x fastest
+    /// in each.
     pub particles: Particles,
-    /// How many were left out because a solid is there.
+    /// Number of particles that were left out because of solids.
     pub removed: usize,
 }
 
-/// Fills blocks and meshes with particles on lattices of `spacing` metres, and makes way for `solid`: as many particles
-/// stay as there is room for, each 0.3 spacings or more from it.
+/// Fills blocks and meshes with particles on lattices of `spacing` metres, then clears `solid`: as
+/// many particles stay as fit into the open volume, each at least 0.3 spacings from the solid.
 ///
 /// # Errors
-/// A water mesh without inside, or too large a grid for it.
+/// If a water mesh has no inside, or needs too large a grid.
 pub fn fill_water<'a>(
     blocks: &[Bounds],
     meshes: impl IntoIterator<Item = &'a TriangleMesh>,
@@ -74,9 +75,9 @@ pub fn fill_water<'a>(
     Ok(Fill { particles, removed })
 }
 
-/// Particles along each axis of a block: its size over the spacing, rounded to the nearest so
-/// that the volume is kept, but never a layer less than half a spacing (less a tenth, for the
-/// rounding) from the domain's far wall.
+/// Returns the number of particles along each axis of a block: its size over the spacing, rounded
+/// to the nearest integer to preserve the volume, but with no layer closer than half a spacing
+/// (less a tenth, for rounding) to the domain's far wall.
 pub fn block_dims(block: &Bounds, domain: &Bounds, spacing: f64) -> [u64; 3] {
     [0, 1, 2].map(|axis| {
         let size = block.max[axis] - block.min[axis];
@@ -87,11 +88,11 @@ pub fn block_dims(block: &Bounds, domain: &Bounds, spacing: f64) -> [u64; 3] {
     })
 }
 
-/// Centres at `min + (i + ½) · spacing` in each block, x fastest. Where blocks overlap, the first
-/// one fills the place.
+/// Returns the centres `min + (i + ½) · spacing` in each block, x fastest. Where blocks overlap,
+/// the first one fills the volume.
 pub fn fill_blocks(blocks: &[Bounds], domain: &Bounds, spacing: f64) -> Vec<DVec3> {
     let mut positions = Vec::new();
-    // What each earlier block really covers, after the rounding.
+    // Extent that each earlier block really covers, after rounding.
     let mut covered = Vec::<Bounds>::new();
     for block in blocks {
         let dims = block_dims(block, domain, spacing);
@@ -119,8 +120,8 @@ pub fn fill_blocks(blocks: &[Bounds], domain: &Bounds, spacing: f64) -> Vec<DVec
     positions
 }
 
-/// Adds the centres of a lattice over the mesh's bounds that lie inside the mesh and the domain,
-/// and not where water is already.
+/// Adds the centres of a lattice over the mesh's bounds that lie inside the mesh and the domain and
+/// away from existing water.
 ///
 /// # Errors
 /// Those of [`SignedDistance::from_mesh`].
@@ -134,7 +135,7 @@ pub fn fill_mesh(
         return Ok(());
     };
     let cells = (bounds.size() / spacing).ceil();
-    // Nodes of the distance are the lattice's own centres: no interpolation.
+    // The nodes of the distance grid are the lattice's centres: no interpolation.
     let first = bounds.min + DVec3::splat(0.5 * spacing);
     let centres = Bounds {
         min: first,
@@ -176,13 +177,13 @@ impl Lattice {
     }
 }
 
-/// Covers a mesh's surface with samples about `spacing` metres apart (one a spacing squared, none
-/// nearer than 0.75 of it to another on the same side), by throwing darts at candidates that lie
-/// evenly over each triangle. Samples outside of `domain`, and those on the domain's own faces
-/// that look out of it, are left out.
+/// Covers a mesh's surface with samples about `spacing` metres apart (one per squared spacing, none
+/// nearer than 0.75 spacings to another on the same side), by dart throwing among candidates spread
+/// evenly over each triangle. Samples outside of `domain` are left out, and so are those on the
+/// domain's own faces whose normal points out of it.
 ///
-/// Areas follow Akinci et al. 2012: a sample's share is 1/ΣW over its neighbours, W a kernel on
-/// the surface; all shares together are then scaled to the area inside the domain.
+/// Areas follow Akinci et al. 2012: a sample's share is 1/ΣW over its neighbours, with W a kernel
+/// on the surface; the shares are then scaled so that their sum is the area inside the domain.
 pub fn boundary_samples(mesh: &TriangleMesh, domain: &Bounds, spacing: f64) -> Vec<BoundarySample> {
     let least = BOUNDARY_DISTANCE * spacing;
     let mut positions = Vec::new();
@@ -205,7 +206,7 @@ pub fn boundary_samples(mesh: &TriangleMesh, domain: &Bounds, spacing: f64) -> V
                 continue;
             }
             inside += 1;
-            // Two sides of a thin wall do not crowd each other out.
+            // The two sides of a thin wall do not exclude each other's samples.
             let is_taken = grid.any_near(&positions, p, |other| {
                 DVec3::dot(normals[other as usize], normal) > -0.5
             });
@@ -247,7 +248,8 @@ fn surface_shares(positions: &[DVec3], normals: &[DVec3], spacing: f64) -> Vec<f
     (0..positions.len()).map(share).collect()
 }
 
-/// Whether `p` lies on a face of the domain and `normal` points out of it: no water comes there.
+/// Returns whether `p` lies on a face of the domain and `normal` points out of it: no water
+/// gets there.
 fn looks_out(domain: &Bounds, p: DVec3, normal: DVec3, tolerance: f64) -> bool {
     (0..3).any(|a| {
         (p[a] - domain.min[a] < tolerance && normal[a] < -0.99)
@@ -255,8 +257,8 @@ fn looks_out(domain: &Bounds, p: DVec3, normal: DVec3, tolerance: f64) -> bool {
     })
 }
 
-/// The `c`-th point of a low-discrepancy sequence (Roberts 2018, R2) over a triangle, shifted by
-/// a hash of the triangle's index.
+/// The `index`-th point of a low-discrepancy sequence (Roberts 2018, R2) over a triangle, shifted
+/// by a hash of the triangle's index.
 pub(crate) fn candidate([a, b, c]: &[DVec3; 3], triangle: u64, index: u64) -> DVec3 {
     const R2: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_3];
     let coordinate = |axis: u64| {
@@ -264,14 +266,14 @@ pub(crate) fn candidate([a, b, c]: &[DVec3; 3], triangle: u64, index: u64) -> DV
         (shift + R2[axis as usize] * (index + 1) as f64).fract()
     };
     let (mut u, mut v) = (coordinate(0), coordinate(1));
-    // The far half of the parallelogram, folded back.
+    // Folds the far half of the parallelogram back.
     if u + v > 1.0 {
         (u, v) = (1.0 - u, 1.0 - v);
     }
     *a + (*b - *a) * u + (*c - *a) * v
 }
 
-/// A number from 0 to 1 by chance, the same for the same `seed`.
+/// A pseudo-random number from 0 to 1, determined by `seed`.
 pub(super) fn uniform(seed: u64) -> f64 {
     hash(seed) as f64 / u64::MAX as f64
 }
@@ -284,17 +286,17 @@ fn hash(seed: u64) -> u64 {
     z ^ (z >> 31)
 }
 
-/// Points in hashed cells, chained; a search looks at the 27 cells around.
+/// Points in hashed cells with chaining; a search visits the 27 cells around a point.
 ///
-/// Two cells may share a bucket, and their points are then met in both: an even bucket count of
-/// at least the points keeps chains short, and every hit is tested by its cell before use, so
+/// Two cells may share a bucket, whose chain then holds the points of both: at least as many
+/// buckets as points (a power of two) keep chains short, and every hit is checked for its cell, so
 /// that none counts twice.
 struct PointGrid {
     cell: f64,
     heads: Vec<u32>,
     /// Cell and next entry of each point.
     entries: Vec<([i64; 3], u32)>,
-    /// The point of each entry.
+    /// Point of each entry.
     points: Vec<u32>,
 }
 
@@ -352,7 +354,7 @@ impl PointGrid {
         }
     }
 
-    /// Visits points within one cell size of `p`, with their distances.
+    /// Visits the points within one cell size of `p`, with their distances.
     fn for_each_near(&self, positions: &[DVec3], p: DVec3, mut visit: impl FnMut(u32, f64)) {
         self.search(positions, p, |point, distance| {
             visit(point, distance);
@@ -368,7 +370,7 @@ impl PointGrid {
         self.search(positions, p, |point, _| counts(point))
     }
 
-    /// Visits near points until `visit` says that it is enough; whether it did.
+    /// Visits near points until `visit` returns `true`; returns whether it did.
     fn search(
         &self,
         positions: &[DVec3],
@@ -376,7 +378,7 @@ impl PointGrid {
         mut visit: impl FnMut(u32, f64) -> bool,
     ) -> bool {
         let [x, y, z] = self.cell_of(p);
-        // The middle first: most searches end there.
+        // The centre cell first: most searches end there.
         for n in [13].into_iter().chain(0..13).chain(14..27) {
             let cell = [x + n % 3 - 1, y + n / 3 % 3 - 1, z + n / 9 - 1];
             let mut entry = self.heads[self.bucket(cell)];

@@ -1,7 +1,7 @@
-//! Bricks of water that hold no particle: walls and solids leave too little of their cells for one, or water is about to close a gap
-//! before a wall.
+//! Water bricks without particles: walls and solids leave too little of their cells for a particle,
+//! or water is about to close a gap before a wall.
 //!
-//! Were such cells air, the water beside them would lose its pressure there.
+//! If such cells were air, the water beside them would lose its pressure there.
 
 use std::collections::BTreeSet;
 
@@ -11,22 +11,23 @@ use super::{
     boundary::Boundary, bounds::Bounds, bricks::EDGE, pose::Pose, signed_distance::SignedDistance,
 };
 
-/// Cells of a gap, at most (flip/close_gaps).
+/// Largest gap that is closed, in cells (flip/close_gaps).
 const MOST_GAP: f64 = 4.0;
 
-/// Nearer than this to a cell's face, in cells, a wall counts as on it.
+/// A wall nearer than this to a cell's face, in cells, counts as on it.
 const ON_FACE: f64 = 1e-3;
 
-/// Where the solids of a scene cut cells. Lengths are in cells, from the domain's least corner.
+/// Positions where the solids of a scene cut cells. Lengths are in cells, from the domain's
+/// least corner.
 #[derive(Clone, Debug, Default)]
 pub struct Shores {
     at_rest: Option<Surface>,
     moving: Vec<Surface>,
-    /// Axes along which the last brick lies beside the first.
+    /// Axes along which the last brick is next to the first.
     periodic: [bool; 3],
 }
 
-/// A box of a brick's edge about each part of a solid's surface.
+/// Boxes of a brick's edge length around each part of a solid's surface.
 #[derive(Clone, Debug)]
 struct Surface {
     origin: DVec3,
@@ -37,7 +38,8 @@ impl Surface {
     fn of(grid: &SignedDistance, least: DVec3, cell_size: f64) -> Self {
         let edge = f64::from(EDGE);
         let mut boxes = BTreeSet::new();
-        // A cell that the surface crosses has a node within a cell's diagonal of it, and one node's spacing.
+        // A cell that the surface crosses has a node within a cell's diagonal plus one node spacing
+        // of it.
         let reach = 3f64.sqrt() * (cell_size + grid.spacing);
         let [nx, ny, _] = grid.dims;
         for (k, &distance) in grid.values.iter().enumerate() {
@@ -54,7 +56,7 @@ impl Surface {
         }
     }
 
-    /// Bricks that it touches where it stands so; `pose` is in cells from the domain's least corner.
+    /// Bricks that the surface touches in `pose`, which is in cells from the domain's least corner.
     fn bricks(&self, pose: Pose, dims: [u32; 3]) -> impl Iterator<Item = usize> {
         let edge = f64::from(EDGE);
         let last = DVec3::from_array(dims.map(|n| f64::from(n) - 1.0));
@@ -76,7 +78,7 @@ impl Surface {
 }
 
 impl Shores {
-    /// Of a scene's solids; `least` is the domain's least corner, metres.
+    /// Collects the surfaces of a scene's solids; `least` is the domain's least corner, metres.
     pub fn new(boundary: &Boundary, least: DVec3, cell_size: f64) -> Self {
         let surface = |grid: &SignedDistance| Surface::of(grid, least, cell_size);
         Self {
@@ -86,14 +88,15 @@ impl Shores {
         }
     }
 
-    /// The same in a domain that joins its own end along these axes.
+    /// Returns the same for a domain that is periodic along these axes.
     pub fn joined(self, periodic: [bool; 3]) -> Self {
         Self { periodic, ..self }
     }
 
-    /// Marks what lies beside bricks that hold particles: bricks that solids cut, which stand at `poses`, in cells from the
-    /// domain's least corner, and those of which the walls at `cut` leave no more than four cells, as many as a gap has (flip/close_gaps). `is_wet` is one
-    /// flag a brick, `dims` bricks along each axis, x fastest; lengths are in cells.
+    /// Marks bricks beside those that hold particles: bricks that solids cut, with moving solids at
+    /// `poses` (in cells from the domain's least corner), and bricks of which the walls at `cut`
+    /// leave no more than four cells, the largest gap that is closed (flip/close_gaps). `is_wet`
+    /// has one flag per brick, `dims` bricks along each axis, x fastest; lengths are in cells.
     pub fn mark(
         &self,
         is_wet: &mut [bool],
@@ -123,7 +126,7 @@ impl Shores {
     }
 }
 
-/// Whether one of the 27 bricks about one is set.
+/// Returns whether one of the 27 bricks around a brick is set.
 fn has_water_about(is_wet: &[bool], dims: [u32; 3], periodic: [bool; 3], brick: usize) -> bool {
     let n = dims.map(|n| n as usize);
     let at = [brick % n[0], brick / n[0] % n[1], brick / (n[0] * n[1])];
@@ -202,14 +205,15 @@ mod tests {
             let found = marked(&none, &[[1, 0, 0]], cut([x, 0.0, 0.0], last), DVec3::ZERO);
             assert_eq!(found, sorted(&expected), "{x}");
         }
-        // Two walls meet: the brick in the corner too.
+        // Two walls meet: the brick in the corner is marked too.
         let walls = cut([0.0; 3], [19.9, 8.3, 16.0]);
         let found = marked(&none, &[[1, 0, 0], [3, 2, 1]], walls, DVec3::ZERO);
         let corner = [[1, 0, 0], [2, 0, 0], [1, 1, 0], [2, 1, 0], [3, 2, 1]];
         assert_eq!(found, sorted(&corner));
     }
 
-    /// A floor at height 8.5 cells of a solid that moves: bricks below the water's and beside it, none farther off.
+    /// The floor of a moving solid at height 8.5 cells: bricks below the water's and beside it are
+    /// marked, none farther away.
     #[test]
     fn bricks_that_a_solid_cuts_are_water_beside_water() {
         let grid = SignedDistance {
@@ -231,13 +235,13 @@ mod tests {
         assert!(found.contains(&index([1, 0, 0])), "{found:?}");
         assert!(!found.contains(&index([3, 0, 0])), "{found:?}");
         assert!(!found.contains(&index([1, 2, 0])), "{found:?}");
-        // Where the ends are joined, the brick beside the last one is the first.
+        // If the ends are joined, the brick beside the last one is the first.
         let across = shores.clone().joined([true, false, false]);
         let found = marked(&across, &[[0, 1, 0]], all, DVec3::ZERO);
         assert!(found.contains(&index([3, 0, 0])), "{found:?}");
         let found = marked(&shores, &[[0, 1, 0]], all, DVec3::ZERO);
         assert!(!found.contains(&index([3, 0, 0])), "{found:?}");
-        // Negative control: where it is gone nothing is marked.
+        // Negative control: with the solid gone nothing is marked.
         let gone = marked(&shores, &wet, all, DVec3::new(0.0, -40.0, 0.0));
         assert_eq!(gone, sorted(&wet));
     }

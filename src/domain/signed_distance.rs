@@ -1,66 +1,66 @@
 //! Signed distance to a mesh on a node-centred grid.
 //!
 //! Distance and sign both come from one tree over the triangles: every node gets the exact
-//! distance, not only a band that a sweep then carries outward. The node before in the row bounds
-//! the search, so that this costs no more than a sweep and runs on every core. Exact distances
-//! also say where the sign cannot change: between two nodes whose distances add up to more than
-//! the way from one to the other there is no surface. Only where they do not, and everywhere
-//! around an open mesh, is the winding number asked.
+//! distance, not only a band from which a sweep extrapolates. The previous node in the row bounds
+//! the search, so that this costs no more than a sweep, and it runs on every core. Exact distances
+//! also show where the sign cannot change: between two nodes whose distances add up to more than
+//! their separation there is no surface. Only elsewhere, and everywhere around an open mesh, is the
+//! winding number evaluated.
 
 use glam::DVec3;
 use rayon::prelude::*;
 
 use super::{bounds::Bounds, bvh::Bvh, inside::NoInside, mesh::TriangleMesh};
 
-/// Most nodes in a grid: 4 GiB of values.
+/// Largest number of nodes in a grid: 4 GiB of values.
 pub const MAX_NODES: usize = 1 << 30;
 
-/// Distances on the nodes of a grid, metres; negative inside.
+/// Distances at the nodes of a grid, metres; negative inside.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SignedDistance {
-    /// The first node.
+    /// Position of the first node, metres.
     pub origin: DVec3,
     /// Distance between nodes, metres.
     pub spacing: f64,
     /// Nodes along x, y, z; at least two each.
     pub dims: [usize; 3],
-    /// One value a node, x fastest.
+    /// One value per node, x fastest.
     pub values: Vec<f32>,
 }
 
-/// Why there is no signed distance.
+/// Reason why there is no signed distance.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SignedDistanceError {
-    /// The mesh bounds nothing.
+    /// The mesh has no inside.
     #[error(transparent)]
     NoInside(#[from] NoInside),
-    /// Too fine a grid, or a box that is none.
+    /// The grid is too fine, or the box is invalid.
     #[error(
         "a grid over {size} m at a spacing of {spacing} m has about {nodes:.3e} nodes; allowed \
          are up to {MAX_NODES}"
     )]
     Grid {
-        /// Edge lengths asked for, metres.
+        /// Edge lengths requested, metres.
         size: DVec3,
-        /// Metres.
+        /// Distance between nodes requested, metres.
         spacing: f64,
-        /// Number of nodes that this would take.
+        /// Number of nodes that this would need.
         nodes: f64,
     },
-    /// Grids that do not lie on each other.
+    /// The grids do not coincide.
     #[error("cannot unite signed distances on different grids")]
     GridsDiffer,
 }
 
 impl SignedDistance {
-    /// Samples the distance to `mesh` at the nodes of a grid that starts at `bounds.min` and
-    /// covers `bounds`, `spacing` metres apart.
+    /// Samples the distance to `mesh` at the nodes of a grid that starts at `bounds.min`, covers
+    /// `bounds`, and has a spacing of `spacing` metres.
     ///
-    /// The sign is that of a generalised winding number beyond ½ in either direction, so that a
-    /// mesh with small holes, and one turned inside out, have their inside where one sees it.
+    /// A node is inside if the absolute generalised winding number exceeds ½, so that a mesh with
+    /// small holes, or one turned inside out, has its inside where one expects it.
     ///
     /// # Errors
-    /// A mesh without inside, or a grid over [`MAX_NODES`].
+    /// If the mesh has no inside, or the grid exceeds [`MAX_NODES`].
     pub fn from_mesh(
         mesh: &TriangleMesh,
         bounds: &Bounds,
@@ -82,7 +82,8 @@ impl SignedDistance {
                 for (i, value) in values.iter_mut().enumerate() {
                     let p = origin + spacing * DVec3::new(i as f64, j as f64, k as f64);
                     let distance = bvh.nearest(p, bound).map_or(bound, |(d, _)| d);
-                    // The next node is one spacing away, and so at most that much farther.
+                    // The next node is one spacing away, and so at most that much farther from
+                    // the surface.
                     bound = (distance + spacing) * (1.0 + 1e-9);
                     let is_inside = match before {
                         Some((d, is_inside))
@@ -104,14 +105,14 @@ impl SignedDistance {
         })
     }
 
-    /// From `x` to the grid's farthest corner, metres.
+    /// Returns the distance from `x` to the farthest corner of the grid, metres.
     pub fn reach(&self, x: DVec3) -> f64 {
         let last = DVec3::from_array(self.dims.map(|n| (n - 1) as f64));
         let (low, high) = (self.origin - x, self.origin + self.spacing * last - x);
         low.abs().max(high.abs()).length()
     }
 
-    /// The union of several solids; `None` for none.
+    /// Samples the distance to the union of several solids; `None` if there are none.
     ///
     /// # Errors
     /// Those of [`Self::from_mesh`].
@@ -131,10 +132,11 @@ impl SignedDistance {
         Ok(all)
     }
 
-    /// The distance to the union of two solids: the lesser of both. Exact outside, a bound within.
+    /// Returns the distance to the union of two solids, the smaller of both: exact outside, a
+    /// bound inside.
     ///
     /// # Errors
-    /// [`SignedDistanceError::GridsDiffer`].
+    /// [`SignedDistanceError::GridsDiffer`] if the grids do not coincide.
     pub fn union(mut self, other: &Self) -> Result<Self, SignedDistanceError> {
         if (self.origin, self.spacing, self.dims) != (other.origin, other.spacing, other.dims) {
             return Err(SignedDistanceError::GridsDiffer);
@@ -145,13 +147,13 @@ impl SignedDistance {
         Ok(self)
     }
 
-    /// The value at node `(i, j, k)`.
+    /// Returns the value at node `(i, j, k)`, metres.
     pub fn node(&self, i: usize, j: usize, k: usize) -> f64 {
         f64::from(self.values[i + self.dims[0] * (j + self.dims[1] * k)])
     }
 
-    /// Trilinear interpolation at `p`, metres. Beyond the grid: the value at the nearest point of
-    /// the grid plus the way there.
+    /// Returns the trilinear interpolation at `p`, metres. Beyond the grid it is the value at the
+    /// nearest point of the grid plus the distance to that point.
     #[inline]
     pub fn sample(&self, p: DVec3) -> f64 {
         let (cell, u, beyond) = self.locate(p);
@@ -164,8 +166,9 @@ impl SignedDistance {
         along_y(0) + u.z * (along_y(1) - along_y(0)) + beyond
     }
 
-    /// Gradient of the trilinear interpolation, pointing away from the solid; its length is one
-    /// up to the grid's error, less at edges of the medial axis. Constant beyond the grid.
+    /// Returns the gradient of the trilinear interpolation, which points away from the solid;
+    /// its length is one up to the grid's error, and less near the medial axis. Constant beyond
+    /// the grid.
     #[inline]
     pub fn gradient(&self, p: DVec3) -> DVec3 {
         let (cell, u, _) = self.locate(p);
@@ -184,8 +187,8 @@ impl SignedDistance {
         DVec3::new(slope(0), slope(1), slope(2))
     }
 
-    /// The cell around `p` (clamped to the grid), the place within it in `[0, 1]³`, and how far
-    /// `p` is from the grid.
+    /// Cell around `p` (clamped to the grid), position within it in `[0, 1]³`, and distance of `p`
+    /// from the grid.
     fn locate(&self, p: DVec3) -> ([usize; 3], DVec3, f64) {
         let local = (p - self.origin) / self.spacing;
         let last = DVec3::from_array(self.dims.map(|n| (n - 1) as f64));
@@ -201,14 +204,15 @@ impl SignedDistance {
     }
 }
 
-/// The least distance between nodes, metres, not below `spacing`, at which so many nodes cover `bounds`.
+/// Returns the smallest distance between nodes, metres, not below `spacing`, at which at most
+/// `most` nodes cover `bounds`.
 pub fn fitting_spacing(bounds: &Bounds, spacing: f64, most: usize) -> f64 {
     let nodes = |spacing: f64| {
         let counts = node_counts(bounds, spacing);
         counts.x * counts.y * counts.z
     };
     let mut fitting = spacing;
-    // Counts are whole numbers, so that the cube root may fall short of it by some.
+    // Counts are whole numbers, so that the cube root may fall slightly short.
     while spacing > 0.0 && nodes(fitting) > most as f64 {
         fitting *= (nodes(fitting) / most as f64).cbrt().max(1.001);
     }
@@ -216,14 +220,14 @@ pub fn fitting_spacing(bounds: &Bounds, spacing: f64, most: usize) -> f64 {
 }
 
 fn node_counts(bounds: &Bounds, spacing: f64) -> DVec3 {
-    // A box that is a whole number of spacings up to round-off gets no further node.
+    // A box that is a whole number of spacings up to round-off gets no additional node.
     (bounds.size() / spacing - DVec3::splat(1e-6))
         .ceil()
         .max(DVec3::ONE)
         + DVec3::ONE
 }
 
-/// Nodes needed to cover `bounds`.
+/// Number of nodes that cover `bounds`.
 fn grid_dims(bounds: &Bounds, spacing: f64) -> Result<[usize; 3], SignedDistanceError> {
     let size = bounds.size();
     let counts = node_counts(bounds, spacing);
@@ -261,7 +265,7 @@ mod tests {
                     .product::<usize>()
             };
             assert!(nodes(spacing) <= most && spacing > 0.01, "{most}");
-            // Control: a node more along each axis would be too many.
+            // Control: one more node along each axis would be too many.
             let along = grid_dims(&bounds, spacing).expect("few");
             let finer: usize = along.iter().map(|n| n + 1).product();
             assert!(finer > most, "{most}");
@@ -331,7 +335,7 @@ mod tests {
             for axis in 0..3 {
                 let d = step * DVec3::AXES[axis];
                 let difference = (field.sample(p + d) - field.sample(p - d)) / (2.0 * step);
-                // The interpolation is linear along an axis within a cell: round-off alone.
+                // The interpolation is linear along an axis within a cell: only round-off remains.
                 assert!((difference - gradient[axis]).abs() < 1e-8, "{p} {axis}");
             }
         }
@@ -343,7 +347,7 @@ mod tests {
             min: DVec3::ZERO,
             max: DVec3::ONE,
         };
-        // One of 1 520 triangles is missing: the rest must be right away from the hole.
+        // One of 1 520 triangles is missing: away from the hole the sign must be right.
         let mut open = sphere(DVec3::splat(0.5), 0.5, 20);
         open.triangles.remove(300);
         let grid = bounds.grown(0.2);
@@ -370,8 +374,9 @@ mod tests {
             max: DVec3::new(2.0, 4.0, 2.0),
         });
         house.triangles.drain(4..6);
-        // Two nodes 5 mm to each side of the hole's middle. A square of half edge a takes up 4 asin(a²/(a² + h²)) as seen
-        // from h above it: there the winding number is 0.5 ± 0.002, and a threshold 1 % off would move the floor.
+        // Two nodes 5 mm to each side of the hole's centre. A square of half edge a subtends 4
+        // asin(a²/(a² + h²)) as seen from h above it: there the winding number is 0.5 ± 0.002, and
+        // a threshold 1 % off would move the floor.
         let middle = Bounds {
             min: DVec3::new(1.0, -0.005, 1.0),
             max: DVec3::new(1.01, 0.005, 1.01),
@@ -402,7 +407,7 @@ mod tests {
             .expect("two solids");
         assert!((field.sample(DVec3::new(0.5, 0.5, 0.5)) - 0.02).abs() < 1e-6);
         assert!(field.sample(DVec3::new(0.3, 0.5, 0.5)) < 0.0);
-        // Control: joined, the middle is inside.
+        // Control: without the gap the middle is inside.
         let joined = SignedDistance::from_mesh(&cube(), &grid, 0.1).expect("closed");
         assert!(joined.sample(DVec3::new(0.5, 0.5, 0.5)) < -0.4);
     }
@@ -460,7 +465,8 @@ mod tests {
         let field = SignedDistance::from_mesh(&city, &domain, 0.2).expect("closed");
         let seconds = start.elapsed().as_secs_f64();
         println!("{} nodes in {seconds:.2} s", field.values.len());
-        // Measured 1.8 s on two cores in use; the bound only tells a lost tree from a busy machine.
+        // Takes 1.8 s on two cores; the bound only distinguishes a missing tree from a
+        // busy machine.
         assert!(seconds < 20.0);
         let inside = field.values.iter().filter(|v| **v < -1e-6).count();
         assert!(inside > 1000, "{inside}");

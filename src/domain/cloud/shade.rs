@@ -1,4 +1,4 @@
-//! How deep in drops and bubbles a place lies as the sun sees it, on a coarse lattice.
+//! Optical depth of drops and bubbles towards the sun, on a coarse lattice.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -6,27 +6,28 @@ use rayon::prelude::*;
 use super::Cloud;
 use crate::level_set::sunlight::between;
 
-/// Voxels between the lattice's nodes, where there are not too many.
+/// Distance between the lattice's nodes, voxels, unless that gives too many nodes.
 const PITCH: f64 = 2.0;
-/// Nodes above which they lie twice as far from each other.
+/// Number of nodes above which the spacing doubles.
 const MOST_NODES: f64 = 4e6;
-/// Voxels between places at which density is looked up on the way from a plane of nodes to the one above.
+/// Distance between density samples on the path from one plane of nodes to the next, voxels.
 const LOOK: f64 = 1.0;
 
 /// Optical depths towards a distant source, at nodes over a cloud's grid.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Shade {
-    /// Nodes along each axis; the first stand on the grid's least corner.
+    /// Nodes along each axis; the first lies at the grid's least corner.
     pub nodes: [u32; 3],
-    /// Metres between nodes.
+    /// Distance between nodes, metres.
     pub pitch: f64,
     /// Optical depths, x fastest.
     pub depths: Vec<f32>,
 }
 
 impl Shade {
-    /// Of a cloud in light straight from `towards`, a unit vector that points upward: plane by plane downward, each from the one above,
-    /// which spreads a shadow's edge over about a pitch for every plane that it falls through.
+    /// Computes the depths for light from `towards`, a unit vector that points upward. Planes are
+    /// swept downward, each one from the plane above, which blurs a shadow's edge by about one
+    /// pitch per plane.
     pub fn new(cloud: &Cloud, towards: DVec3) -> Self {
         let size = cloud.size();
         let mut pitch = PITCH * cloud.voxel;

@@ -5,7 +5,7 @@ use super::{shade::Shade, *};
 const SIZE: DVec3 = DVec3::splat(4.0);
 const VOXEL: f64 = 0.1;
 
-/// Drops about the domain without order, every third a bubble.
+/// Drops scattered over the domain; every third one is a bubble.
 fn drops(count: u32) -> Vec<Drop> {
     let part = |k: u32, by: f64| (f64::from(k) * by).fract();
     (1..=count)
@@ -30,14 +30,14 @@ fn a_grid_holds_what_the_drops_hold() {
     for count in [1, 3, 200] {
         let drops = drops(count);
         let cloud = Cloud::new(&drops, SIZE, VOXEL);
-        // Each value is rounded to 11 bits, and a sum of f32 is far finer.
+        // Each value is rounded to 11 bits; the f32 sums are far more accurate.
         let off = |areas: [f64; 2]| {
             let wanted = sums(&drops);
             (0..2).all(|k| (areas[k] - wanted[k]).abs() <= wanted[k] / 2048.0)
         };
         assert!(off(cloud.areas()), "{count}: {:?}", cloud.areas());
         assert!(!off(cloud.areas().map(|a| 1.001 * a + 1e-9)), "the control");
-        // At midpoints of voxels the trilinear field has the same integral.
+        // At the voxels' midpoints the trilinear field has the same integral.
         let [nx, ny, nz] = cloud.bricks.map(|n| n * EDGE);
         let mut integral = [0.0; 2];
         for k in 0..nx * ny * nz {
@@ -68,7 +68,7 @@ fn a_drop_has_the_spread_of_its_ball() {
         let p = cloud.corner + (cell + 0.5) * VOXEL;
         square += cloud.densities(p)[0] * VOXEL.powi(3) * (p - drop.place).length_squared();
     }
-    // Of a ball 3/5 r²; trilinear filtering adds a quarter of a voxel's square a axis.
+    // A ball has 3/5 r²; trilinear filtering adds a quarter of a squared voxel per axis.
     let expected = 0.6 * radius * radius + 3.0 * 0.25 * VOXEL * VOXEL;
     assert!(
         (square / expected - 1.0).abs() < 0.02,
@@ -76,7 +76,7 @@ fn a_drop_has_the_spread_of_its_ball() {
     );
 }
 
-/// A level layer of drops, as even as the kernels make it.
+/// A horizontal layer of drops, as uniform as the kernels make it.
 fn slab() -> (Vec<Drop>, f64) {
     let (n, pitch) = (40, 0.1);
     let at = |k: usize| (k as f64 + 0.5) * pitch;
@@ -86,7 +86,7 @@ fn slab() -> (Vec<Drop>, f64) {
         area: 2.0 * pitch * pitch * pitch,
         is_bubble: k % 2 == 0,
     });
-    // 2 per metre, half a metre high.
+    // 2 per metre, half a metre thick.
     (drops.collect(), 1.0)
 }
 
@@ -97,10 +97,11 @@ fn a_slab_shades_as_deep_as_it_is() {
     for degrees in [90.0f64, 45.0, 30.0] {
         let (sin, cos) = degrees.to_radians().sin_cos();
         let shade = Shade::new(&cloud, DVec3::new(cos, sin, 0.0));
-        // Below its middle, at the grid's lowest plane.
+        // Below the slab's middle, on the grid's lowest plane.
         let [nx, ny, nz] = shade.nodes.map(|n| n as usize);
         let found = f64::from(shade.depths[(nz / 2 * ny) * nx + nx / 4]);
-        // The lowest plane of the middle is far from the sides: kernels and half precision are what is left.
+        // The middle of the lowest plane is far from the sides: only kernels and half precision
+        // remain as errors.
         assert!(
             (found * sin / depth - 1.0).abs() < 0.01,
             "{degrees}°: {found}"

@@ -1,10 +1,12 @@
-//! Where a surface goes through one cell of a grid: loops over its edges, found face by face.
+//! Intersection of a surface with one grid cell: loops over the cell's edges, traced face by face.
 //!
-//! A face whose corners alternate between water and air is settled by the saddle of its bilinear values (Nielson and Hamann, The
-//! asymptotic decider, 1991). Both cells at a face see the same four values, so their loops meet there whatever the values are: a
-//! surface of such loops has no open edge.
+//! A face whose corners alternate between water and air is resolved by the saddle of its
+//! bilinear values (Nielson and Hamann, The asymptotic decider, 1991). Both cells at a face see
+//! the same four values, so their loops always match there, and a surface made of such loops has
+//! no open edge.
 
-/// Corners of a face, counter-clockwise seen from outside of the cell; corner c lies at (c & 1, c >> 1 & 1, c >> 2).
+/// Corners of each face, counter-clockwise seen from outside of the cell; corner c lies at (c & 1,
+/// c >> 1 & 1, c >> 2).
 const FACES: [[usize; 4]; 6] = [
     [0, 4, 6, 2],
     [1, 3, 7, 5],
@@ -14,7 +16,7 @@ const FACES: [[usize; 4]; 6] = [
     [4, 5, 7, 6],
 ];
 
-/// Edges of a cell: the corner that each begins at, and the axis along which it leads.
+/// Edges of a cell: first corner and axis.
 pub(super) const EDGES: [(usize, usize); 12] = [
     (0, 0),
     (2, 0),
@@ -30,20 +32,21 @@ pub(super) const EDGES: [(usize, usize); 12] = [
     (3, 2),
 ];
 
-/// No edge.
+/// Marks the absence of an edge.
 const NONE: u8 = u8::MAX;
 
 /// Loops of a cell: at most four, over at most twelve edges in all.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Loops {
     edges: [u8; 12],
-    /// Where each loop ends in `edges`.
+    /// End of each loop in `edges`.
     ends: [u8; 4],
     count: usize,
 }
 
 impl Loops {
-    /// Those of a cell with these values at its corners, positive in water. Each runs counter-clockwise seen from the air.
+    /// Traces the loops of a cell from its corner values, which are positive in water. Each loop
+    /// runs counter-clockwise seen from the air.
     pub(super) fn of(values: &[f32; 8]) -> Self {
         let next = segments(values);
         let mut loops = Self {
@@ -69,7 +72,7 @@ impl Loops {
         loops
     }
 
-    /// The edges of each loop.
+    /// Iterates over the loops, each as a slice of edges.
     pub(super) fn iter(&self) -> impl Iterator<Item = &[u8]> {
         (0..self.count).map(|k| {
             let start = k.checked_sub(1).map_or(0, |before| self.ends[before]);
@@ -78,13 +81,14 @@ impl Loops {
     }
 }
 
-/// From the crossing of an edge to the next one, with the water to the right where the face between them is seen from outside.
+/// For each edge with a crossing, the next edge of its loop. The water is on the right if the face
+/// between them is seen from outside.
 fn segments(values: &[f32; 8]) -> [u8; 12] {
     let is_water = |corner: usize| values[corner] > 0.0;
     let mut next = [NONE; 12];
     for face in FACES {
         let from = |k: usize| face[k % 4];
-        // Edges by whether walking along them comes out of the air, or out of the water.
+        // Edges along which the walk round the face enters or leaves the water.
         let enters = |k: usize| !is_water(from(k)) && is_water(from(k + 1));
         let leaves = |k: usize| is_water(from(k)) && !is_water(from(k + 1));
         let edge = |k: usize| edge_between(from(k), from(k + 1));
@@ -95,7 +99,8 @@ fn segments(values: &[f32; 8]) -> [u8; 12] {
             value(water) * value(water + 2) > value(water + 1) * value(water + 3)
         };
         for k in (0..4).filter(|&k| enters(k)) {
-            // Around the water that begins here, or where water is joined across the face, around the air that ends here.
+            // Goes around the water that begins here or, where the water is connected across the
+            // face, around the air that ends here.
             let other = match joins {
                 true => (1..4).map(|step| k + 4 - step).find(|&k| leaves(k)),
                 false => (1..4).map(|step| k + step).find(|&k| leaves(k)),
@@ -108,7 +113,7 @@ fn segments(values: &[f32; 8]) -> [u8; 12] {
     next
 }
 
-/// The edge between two corners that differ along one axis.
+/// Edge between two corners that differ along one axis.
 fn edge_between(a: usize, b: usize) -> u8 {
     let axis = (a ^ b).trailing_zeros() as usize;
     let least = a.min(b);
@@ -116,7 +121,8 @@ fn edge_between(a: usize, b: usize) -> u8 {
     among.map_or(NONE, |edge| edge as u8)
 }
 
-/// Whether two edges lie on one face of the cell: a line between them may then belong to the cell beyond as well.
+/// Returns whether two edges lie on one face of the cell, where a line between them may also belong
+/// to the neighbouring cell.
 fn share_face(a: u8, b: u8) -> bool {
     let [a, b] = [a, b].map(|edge| EDGES[usize::from(edge)]);
     (0..3).any(|normal| {
@@ -126,7 +132,8 @@ fn share_face(a: u8, b: u8) -> bool {
     })
 }
 
-/// The place in a loop from which a fan has no diagonal within a face; `None` where each has one.
+/// Position in a loop from which a triangle fan has no diagonal within a face; `None` if there is
+/// no such position.
 pub(super) fn fan(edges: &[u8]) -> Option<usize> {
     let n = edges.len();
     let is_free = |apex: &usize| {
@@ -142,7 +149,8 @@ pub(super) fn fan(edges: &[u8]) -> Option<usize> {
 mod tests {
     use super::*;
 
-    /// Values of all patterns of water and air, of sizes that make each saddle come out either way.
+    /// Values for all patterns of water and air, with magnitudes that resolve each saddle
+    /// either way.
     fn patterns() -> impl Iterator<Item = [f32; 8]> {
         (0..256usize).flat_map(|pattern| {
             (0..16u32).map(move |round| {
@@ -176,7 +184,8 @@ mod tests {
 
     #[test]
     fn neighbours_agree_about_the_face_between_them() {
-        // Segments on a cell's face x = 1 against those of its mirror image there, whose face it is as well.
+        // Segments on a cell's face x = 1, compared with those of the cell mirrored there, which
+        // shares the face.
         let on = |values: &[f32; 8]| {
             let next = segments(values);
             let is_there = |edge: usize| {
@@ -194,7 +203,7 @@ mod tests {
         for values in patterns() {
             let mirrored: [f32; 8] = std::array::from_fn(|corner| values[corner | 1]);
             let own: [f32; 8] = std::array::from_fn(|corner| values[corner]);
-            // The neighbour's face x = 0 has these values; turned about, its loops run the other way.
+            // The neighbour's face x = 0 has these values; its loops run the opposite way.
             let next = segments(&mirrored);
             let beyond = |edge: usize| {
                 let (corner, axis) = EDGES[edge];
@@ -208,7 +217,7 @@ mod tests {
 
     #[test]
     fn the_saddle_decides_a_torn_face() {
-        // Water at two opposite corners of the face z = 0, much and little of it.
+        // Water at two opposite corners of the face z = 0, once a lot and once a little.
         let of = |water: f32| {
             let values = [water, -1.0, -1.0, water, -1.0, -1.0, -1.0, -1.0];
             Loops::of(&values)

@@ -1,4 +1,4 @@
-//! A mesh around the inside of a sparse level set.
+//! Extracts a mesh around the inside of a sparse level set.
 
 use std::collections::HashMap;
 
@@ -11,11 +11,12 @@ use super::{
 };
 use crate::mesh::TriangleMesh;
 
-/// Values of a narrow band at whole places, negative inside.
+/// Values of a narrow band at integer lattice points, negative inside.
 pub type Band = HashMap<[i32; 3], f32>;
 
-/// The mesh where a band is 0, in steps of its lattice, counter-clockwise seen from outside. Cells of which the band lacks a corner have none:
-/// where a surface goes through them, the mesh is open.
+/// Extracts the mesh where a band is 0, in lattice units, counter-clockwise seen from outside.
+/// Cells with a corner outside of the band yield no triangles: where the surface passes through
+/// them, the mesh is open.
 pub fn around(band: &Band) -> TriangleMesh {
     let mut cells: Vec<[i32; 3]> = band.keys().copied().collect();
     cells.sort_unstable_by_key(|&[x, y, z]| [z, y, x]);
@@ -27,7 +28,7 @@ pub fn around(band: &Band) -> TriangleMesh {
             let [Some(x), Some(y), Some(z)] = at else {
                 return None;
             };
-            // Inside is what the loops call water.
+            // The inside corresponds to water in `Loops`.
             band.get(&[x, y, z]).map(|value| -value)
         });
         let mut known = [0.0; 8];
@@ -38,7 +39,8 @@ pub fn around(band: &Band) -> TriangleMesh {
     mesh.mesh
 }
 
-/// A vertex: least corner of its cell or edge, and its edge's axis, or 3 and the number of a loop that it is in the middle of.
+/// Key of a vertex: the least corner of its cell or edge, and the axis of its edge or 3 plus the
+/// number of the loop that it is the centre of.
 type Key = ([i32; 3], u8);
 
 #[derive(Default)]
@@ -98,7 +100,7 @@ impl Builder {
 mod tests {
     use super::*;
 
-    /// Distances to a sphere about a place, in a band of so many steps.
+    /// Distances to a sphere, in a band that is `wide` lattice units wide on each side.
     fn sphere(radius: f64, wide: f64) -> Band {
         let centre = DVec3::new(0.3, -0.2, 0.1);
         let reach = (radius + wide) as i32 + 2;
@@ -123,10 +125,11 @@ mod tests {
         let mesh = around(&sphere(radius, 3.0));
         assert!(mesh.open_edges().is_empty());
         let volume = 4.0 / 3.0 * std::f64::consts::PI * radius.powi(3);
-        // Chords of steps of 1 lie up to 1/8r inside: 3 · √3² / 8 r² of the volume at most.
+        // Chords of length 1 lie up to 1/8r inside: 3 · √3² / 8 r² of the volume at most.
         let off = mesh.signed_volume() / volume - 1.0;
         assert!(off.abs() < 9.0 / (8.0 * radius * radius), "{off}");
-        // The controls: an inside that is outside turns it about, and a band that lacks a side opens it.
+        // Negative controls: swapping inside and outside flips the mesh, and a band without one
+        // side leaves it open.
         let inverted = sphere(radius, 3.0)
             .into_iter()
             .map(|(at, value)| (at, -value));

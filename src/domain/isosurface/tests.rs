@@ -3,7 +3,7 @@ use crate::level_set::kernels::Kernels;
 
 const D: f64 = 0.1;
 
-/// A lattice's places where `is_water` says so, in a box of `size`.
+/// Lattice points where `is_water` holds, in a box of `size`.
 fn lattice(size: DVec3, is_water: impl Fn(DVec3) -> bool) -> Vec<DVec3> {
     let count = (size / D).floor().to_array().map(|n| n as usize);
     let at = |k: usize| D * (k as f64 + 0.5);
@@ -21,7 +21,7 @@ fn lattice(size: DVec3, is_water: impl Fn(DVec3) -> bool) -> Vec<DVec3> {
     all
 }
 
-/// Edges that two triangles do not share, one each way.
+/// Number of edges that are not shared by exactly two triangles.
 fn torn(mesh: &TriangleMesh) -> usize {
     mesh.edges().values().filter(|uses| uses.len() != 2).count()
 }
@@ -46,7 +46,7 @@ fn a_pool_fills_its_box_up_to_its_level() {
             (bounds.min, bounds.max.x, bounds.max.z),
             (DVec3::ZERO, size.x, size.z)
         );
-        // What lies in a side says so.
+        // Vertices in a side have its normal as their cap.
         let flat = mesh
             .vertices
             .iter()
@@ -58,7 +58,7 @@ fn a_pool_fills_its_box_up_to_its_level() {
 
 #[test]
 fn drops_sheets_and_noise_are_closed() {
-    // A hash for noise: neighbours in all arrangements.
+    // A hash for noise, so that all arrangements of neighbours occur.
     let noise = |p: DVec3| {
         let h = (p.dot(DVec3::new(127.1, 311.7, 74.7)).sin() * 43758.5)
             .fract()
@@ -77,7 +77,7 @@ fn drops_sheets_and_noise_are_closed() {
             "{k}"
         );
         assert!(mesh.signed_volume() > 0.0);
-        // The control: one triangle less.
+        // Negative control: one triangle less.
         let mut holed = mesh.clone();
         holed.triangles.pop();
         assert_eq!(holed.open_edges().len(), 3);
@@ -95,7 +95,8 @@ fn a_ball_has_its_vertices_on_the_field_and_no_needles() {
     let field = kernels.field();
     let off = |p: DVec3| field.value(p).abs() / field.gradient(p).length();
     let worst = mesh.vertices.iter().map(|&p| off(p)).fold(0.0, f64::max);
-    // A voxel is half a spacing; the field bends over a kernel's half axis of about a spacing: h²/8 times 1/d, 0.03 d.
+    // A voxel is half a spacing. The field curves over a kernel's half axis of about a spacing:
+    // h²/8 times 1/d is 0.03 d.
     assert!(worst < 0.05 * D, "{worst}");
     let moved = mesh
         .vertices
@@ -119,7 +120,8 @@ fn another_value_gives_another_volume() {
     };
     let [more, same, less] = [-0.45, 0.0, 0.45].map(volume);
     assert!(more > same && same > less, "{more} {same} {less}");
-    // Without the margin the bricks' values end where the surface of value 0 does; its own surface is the same.
+    // Without the margin, bricks hold values only near the surface of value 0; that surface is
+    // the same.
     let plain = extract(&LevelSet::of_kernels(&kernels, size, 0.5 * D), 0.0);
     assert_eq!(plain, extract(&level, 0.0));
 }

@@ -1,32 +1,35 @@
-//! How high the water stands along the upright sides of its box.
+//! Height of the water along the vertical sides of its box.
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::kernels::{Kernels, REACH};
 
-/// Places a particle spacing at which water is looked for on the way up.
+/// Samples per particle spacing in the upward search for water.
 const LOOKS: f64 = 2.0;
-/// Halvings of the way between a place in the water and one above it.
+/// Bisection steps between a sample in the water and the one above it.
 const HALVINGS: u32 = 12;
 
-/// Heights of the water at nodes along the sides of a box.
+/// Heights of the water at nodes along the vertical sides of a box.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Edges {
-    /// Nodes along x and z; the first and the last stand at corners.
+    /// Nodes along x and z; the first and the last are at corners.
     pub nodes: [u32; 2],
-    /// Metres above the floor: along the side −x, +x, −z, +z; 0 where there is no water.
+    /// Heights above the floor, metres, along the sides −x, +x, −z, +z in this order; 0 where there
+    /// is no water.
     pub heights: Vec<f32>,
 }
 
-/// Nodes along x and z of a box of `size` metres: one a particle spacing of `spacing` metres, and one at each corner.
+/// Returns the number of nodes along x and z for a box of `size` metres: one per particle spacing
+/// of `spacing` metres, and one at each corner.
 pub fn nodes_along(size: DVec3, spacing: f64) -> [u32; 2] {
     [size.x, size.z].map(|length| (length / spacing).ceil().max(1.0) as u32 + 1)
 }
 
 impl Edges {
-    /// Of particles at `positions`, metres from the box's least corner, of `spacing` metres between neighbours at rest. Water is counted
-    /// from the floor up to where a particle spacing of air stands over it: what flies above is none of it.
+    /// Measures the water of particles at `positions`, metres from the box's least corner, with
+    /// `spacing` metres between neighbours at rest. Water counts from the floor up to the first gap
+    /// of one particle spacing of air; spray above it does not count.
     pub fn new(positions: &[DVec3], size: DVec3, spacing: f64) -> Self {
         let near = REACH * spacing;
         let is_near = |p: &&DVec3| {
@@ -70,7 +73,7 @@ impl Edges {
     }
 }
 
-/// Where the nodes stand, in the order of the heights.
+/// Positions of the nodes in plan, in the order of the heights.
 fn places(size: DVec3, [nx, nz]: [u32; 2]) -> impl Iterator<Item = DVec2> {
     let along = |k: u32, n: u32, length: f64| length * f64::from(k) / f64::from(n - 1);
     let across = [0.0, size.x]
@@ -95,7 +98,8 @@ mod tests {
         let mut all = Vec::new();
         for x in 0..30 {
             let level = 1.0 + slope * (place(x) - 0.5 * SIZE.x);
-            // Layers are squeezed or stretched to end half a layer below the level.
+            // Layers are compressed or stretched so that the topmost lies half a layer below
+            // the level.
             let layers = 10;
             for (y, z) in (0..layers).flat_map(|y| (0..20).map(move |z| (y, z))) {
                 let height = (y as f64 + 0.5) * level / f64::from(layers);
@@ -111,7 +115,8 @@ mod tests {
         let edges = Edges::new(&tank(0.0), SIZE, D);
         assert_eq!(edges.nodes, [31, 21]);
         assert_eq!(edges.heights.len(), 2 * (31 + 21));
-        // The field is calibrated so that its mean over a lattice's cell is zero at the level; within a cell it varies.
+        // The field is calibrated so that its mean over a lattice cell is zero at the level; within
+        // a cell it varies.
         assert!(
             edges
                 .heights
@@ -128,14 +133,15 @@ mod tests {
         let of = |x: f64| 1.0 + 0.1 * (x - 0.5 * SIZE.x);
         let worst = |offset: f64| {
             let places = places(SIZE, edges.nodes).zip(&edges.heights);
-            // The sides are mirrors, so that a slope ends level there: within a kernel's reach it is not the tank's.
+            // The sides are mirrors, so that a slope is level there: within a kernel's reach it
+            // differs from the tank's.
             let inner = places.filter(|(p, _)| (0.3..=SIZE.x - 0.3).contains(&p.x));
             inner
                 .map(|(p, &h)| (f64::from(h) - of(p.x) - offset).abs())
                 .fold(0.0, f64::max)
         };
-        // Layers are up to 14 % nearer to each other than the lattice's, or farther, and the surface stands half a layer above the
-        // outermost: 0.07 spacings.
+        // Layers are up to 14 % closer together or farther apart than the lattice's, and the
+        // surface is half a layer above the outermost: 0.07 spacings.
         assert!(worst(0.0) < 0.1 * D, "{}", worst(0.0));
         assert!(worst(0.2 * D) > 0.1 * D, "the control: 0.2 spacings off");
     }

@@ -2,20 +2,21 @@
 
 use glam::{DMat3, DVec3};
 
-/// Sweeps of Jacobi's rotations: they converge quadratically, and five leave less than f64's rounding of any 3 × 3 matrix.
+/// Jacobi sweeps: they converge quadratically, and five reduce the error of any 3 × 3 matrix below
+/// f64 rounding.
 const SWEEPS: usize = 6;
-/// Part of the diagonal below which what stands beside it changes no value by more than a rounding. Vectors of values that are as near to each
-/// other may be any in their plane.
+/// Fraction of the diagonal below which an off-diagonal element changes no eigenvalue by more than
+/// a rounding. Eigenvectors of eigenvalues this close together are arbitrary in their plane.
 const NEGLIGIBLE: f64 = 0.1 * f64::EPSILON;
 
-/// Eigenvalues of a symmetric matrix in no order, and the eigenvectors as columns, by Jacobi's rotations (Golub and Van Loan,
-/// Matrix Computations, section 8.5).
+/// Returns the eigenvalues of a symmetric matrix, in no particular order, and the eigenvectors as
+/// columns, by the cyclic Jacobi method (Golub and Van Loan, Matrix Computations, section 8.5).
 pub fn symmetric(matrix: DMat3) -> (DVec3, DMat3) {
     let mut a = matrix.to_cols_array_2d();
     let mut vectors = DMat3::IDENTITY.to_cols_array_2d();
     for _ in 0..SWEEPS {
         for (p, q) in [(0, 1), (0, 2), (1, 2)] {
-            // What is left of it is less than the values are rounded by.
+            // The element is below the rounding of the eigenvalues.
             if a[p][q].abs() <= NEGLIGIBLE * (a[p][p].abs() + a[q][q].abs()) {
                 continue;
             }
@@ -34,7 +35,7 @@ pub fn symmetric(matrix: DMat3) -> (DVec3, DMat3) {
     (values, DMat3::from_cols_array_2d(&vectors))
 }
 
-/// Turns two rows in their plane.
+/// Applies a Givens rotation to two rows.
 fn turn(rows: &mut [[f64; 3]; 3], [p, q]: [usize; 2], [c, s]: [f64; 2]) {
     let (x, y) = (rows[p], rows[q]);
     rows[p] = std::array::from_fn(|k| c * x[k] - s * y[k]);
@@ -45,7 +46,8 @@ fn turn(rows: &mut [[f64; 3]; 3], [p, q]: [usize; 2], [c, s]: [f64; 2]) {
 mod tests {
     use super::*;
 
-    /// A = Σ λ v vᵀ again, with orthogonal v, of turned diagonals near and far from each other.
+    /// Rotated diagonal matrices, with eigenvalues near and far apart, are rebuilt as A = Σ λ v vᵀ
+    /// with orthogonal v.
     #[test]
     fn a_matrix_is_put_together_again_from_its_eigenvalues() {
         for (values, turn) in [
@@ -57,7 +59,7 @@ mod tests {
             let matrix = r * DMat3::from_diagonal(values) * r.transpose();
             let (found, vectors) = symmetric(matrix);
             let again = vectors * DMat3::from_diagonal(found) * vectors.transpose();
-            // A few roundings of the greatest value.
+            // A few roundings of the greatest eigenvalue.
             let allowed = 64.0 * f64::EPSILON * values.abs().max_element();
             let off = |a: DMat3, b: DMat3| (a - b).to_cols_array().map(f64::abs);
             assert!(off(again, matrix).iter().all(|&x| x <= allowed), "{values}");

@@ -1,19 +1,19 @@
-//! Places sorted by cell.
+//! Points sorted by grid cell.
 
 use std::ops::Range;
 
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// How many cells make up the reach of neighbours. With cells half as long as the reach a search looks at fewer places than with 3³ cells
-/// as long as it.
+/// Cells per search radius. With cells half as long as the radius, a search visits fewer points
+/// than with 3³ cells of the full radius.
 pub(super) const HALVES: usize = 2;
-/// Cells for each place, at most.
+/// Largest number of cells per point.
 const SPARSEST: usize = 16;
 
-/// Places by cell.
+/// Points sorted by cell.
 pub(super) struct Grid {
-    /// As asked, and of the cells themselves, metres.
+    /// Requested edge length, and that of the cells themselves, metres.
     edge: f64,
     cell: f64,
     min: DVec3,
@@ -32,9 +32,10 @@ impl Grid {
             .par_iter()
             .copied()
             .reduce(|| DVec3::NEG_INFINITY, DVec3::max);
-        // Where there is no place, max − min is −∞, and there is one cell.
+        // Without points, max − min is −∞, and there is one cell.
         let counts = |cell: f64| ((max - min) / cell).floor().max(DVec3::ZERO) + 1.0;
-        // Where drops lie far apart most cells would be empty; longer cells find the same neighbours.
+        // If points are far apart, most cells would be empty; larger cells find the
+        // same neighbours.
         let most = (SPARSEST * (places.len() + 1)) as f64;
         let mut cell = edge;
         while counts(cell).element_product() > most {
@@ -67,7 +68,7 @@ impl Grid {
         grid
     }
 
-    /// How far [`Self::for_each_near`] finds neighbours, metres.
+    /// Distance up to which [`Self::for_each_near`] finds neighbours, metres.
     pub(super) fn edge(&self) -> f64 {
         self.edge
     }
@@ -81,21 +82,23 @@ impl Grid {
         (z * self.cells[1] + y) * self.cells[0] + x
     }
 
-    /// Visits those of the 3³ cells about a place, which may lie outside of all, in an order that depends on the places alone.
+    /// Visits the points of the 3³ cells around `p`, which may lie outside of the grid, in an order
+    /// that depends only on the points.
     pub(super) fn for_each_near(&self, p: DVec3, mut visit: impl FnMut(usize)) {
         self.for_each_run(p, 1, |run| {
             self.order[run].iter().for_each(|&k| visit(k as usize));
         });
     }
 
-    /// Places in the grid's order.
+    /// Copies the points in the grid's order.
     pub(super) fn sorted(&self, places: &[DVec3]) -> Vec<DVec3> {
         (self.order.par_iter())
             .map(|&k| places[k as usize])
             .collect()
     }
 
-    /// Visits the rows of those of the cells about a place that are up to `reach` from its own, as ranges of the grid's order.
+    /// Visits the rows of cells up to `reach` cells away from that of `p`, as ranges of the
+    /// grid's order.
     pub(super) fn for_each_run(&self, p: DVec3, reach: usize, mut visit: impl FnMut(Range<usize>)) {
         let [x, y, z] = self.cell(p);
         let range = |c: usize, n: usize| c.saturating_sub(reach)..=(c + reach).min(n - 1);
@@ -115,13 +118,14 @@ impl Grid {
 mod tests {
     use super::*;
 
-    /// Two clumps a million cells apart, and one by itself: all within a cell's edge are met, in no more cells than places warrant.
+    /// Two clusters a million cells apart, and one by itself: all points within an edge length are
+    /// found, with no more cells than the points warrant.
     #[test]
     fn drops_far_apart_take_few_cells() {
         let clump = |k: usize| DVec3::splat(if k < 50 { 0.0 } else { 1e6 });
         let place = |k: usize| clump(k) + 0.3 * DVec3::new((k % 5) as f64, (k / 5 % 5) as f64, 0.0);
         let scattered: Vec<DVec3> = (0..100).map(place).collect();
-        // As far as f32 goes, and nowhere.
+        // Points at the limit of f32, and no points.
         let farther: Vec<DVec3> = scattered.iter().map(|p| 1e31 * *p).collect();
         assert_eq!(Grid::new(&farther, 1.0).order.len(), farther.len());
         assert_eq!(Grid::new(&[], 1.0).cells, [1; 3]);
@@ -136,7 +140,7 @@ mod tests {
                 assert!(near.clone().count() > 20 && near.clone().all(|(_, met)| *met));
             }
         }
-        // The control: those of one clump alone take no longer cells than asked.
+        // Negative control: one cluster by itself keeps the requested cell size.
         assert_eq!(Grid::new(&scattered[..50], 1.0).cell, 1.0);
         assert!(Grid::new(&scattered, 1.0).cell > 1.0);
     }

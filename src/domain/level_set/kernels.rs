@@ -1,13 +1,21 @@
-//! Anisotropic kernels of particles (Yu and Turk, Reconstructing surfaces of particle-based fluids using anisotropic kernels, 2013).
+//! Anisotropic kernels of particles (Yu and Turk, Reconstructing surfaces of particle-based fluids
+//! using anisotropic kernels, 2013).
 //!
-//! A particle's kernel is stretched as its neighbours lie: a ball within the water, a flat disc along a surface or a sheet. So calm
-//! water is flat, and a sheet one particle thick holds together. What is not the paper's: lengths follow from the lattice, so that
-//! half a lattice has its surface half a spacing beyond its outermost particles, and a lone particle is a ball of its own volume;
-//! from lone to joined a kernel changes steadily, where the paper switches, so that no particle flickers; in water that is torn to half of
-//! its density particles are balls again, since stretched kernels would nowhere reach the surface's value; half axes go with the
-//! neighbours' standard deviations, where the paper takes variances; and centres stay where particles are: moved towards their
-//! neighbours' mean (the paper's λ), they left a noisy surface as rough, 0.06 spacings for any λ up to 0.5, and with the paper's 0.9
-//! kernels no longer reach a calm surface.
+//! A particle's kernel is stretched along the distribution of its neighbours: a ball within the
+//! water, a flat disc along a surface or a sheet. Calm water is therefore flat, and a sheet one
+//! particle thick stays connected. This implementation differs from the paper:
+//!
+//! - Lengths follow from the lattice, so that the surface of half a lattice lies half a spacing
+//!   beyond its outermost particles, and a lone particle is a ball of its own volume.
+//! - The transition from isolated to connected particles is gradual, where the paper switches, so
+//!   that no particle flickers.
+//! - In water torn to half of its density, particles are balls again: the field of stretched
+//!   kernels would nowhere reach the surface's value.
+//! - Half axes are proportional to the neighbours' standard deviations, where the paper
+//!   uses variances.
+//! - Centres stay at the particles. The paper moves them towards their neighbours' mean by λ; this
+//!   left a noisy surface equally rough, 0.06 spacings for any λ up to 0.5, and with the paper's
+//!   0.9 kernels no longer reach a calm surface.
 
 use std::f64::consts::PI;
 
@@ -20,44 +28,47 @@ use super::{
     moments::{AT_ONCE, Moments, Near},
 };
 
-/// Reach of a kernel that is not flattened, in particle spacings.
+/// Radius of a kernel that is not flattened, particle spacings.
 const SUPPORT: f64 = 2.5;
-/// Half axis of a lone particle's kernel, in particle spacings; the paper's k_n is a half.
+/// Half axis of a lone particle's kernel, particle spacings; the paper's k_n is one half.
 pub const ALONE: f64 = 0.5 * SUPPORT;
-/// Neighbours that shape a kernel lie within so many particle spacings.
+/// Radius within which neighbours shape a kernel, particle spacings.
 const NEAR: f64 = 3.0;
-/// The longest half axis over the shortest one, at most; the paper's k_r.
+/// Largest ratio of the longest to the shortest half axis; the paper's k_r.
 const FLATTEST: f64 = 4.0;
-/// How far from a place particles may stand that its field depends on, in particle spacings: kernels that reach it, and what shapes them.
+/// Distance within which particles affect the field at a point, particle spacings: kernels that
+/// reach it, and the neighbours that shape them.
 pub(super) const REACH: f64 = SUPPORT + NEAR;
-/// Weights of neighbours between which a kernel goes from a lone particle's to a stretched one.
+/// Total neighbour weights between which a kernel changes from that of a lone particle to a
+/// stretched one.
 const JOINED: [f64; 2] = [1.0, 6.0];
-/// Densities over that of water between which it does too. At 0.55 the field of stretched kernels has a calm surface's value.
+/// Relative densities between which a kernel changes likewise. At 0.55 the field of stretched
+/// kernels has a calm surface's value.
 const TORN: [f64; 2] = [0.4, 0.8];
 
 /// The kernel of a particle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ellipsoid {
-    /// Metres.
+    /// Centre, metres.
     pub centre: DVec3,
-    /// G, 1/m: the kernel's edge is |G (x − centre)| = 1.
+    /// G, 1/m: the boundary of the kernel is |G (x − centre)| = 1.
     pub inverse: DMat3,
-    /// Half of the box that holds it, metres.
+    /// Half extents of the bounding box, metres.
     pub reach: DVec3,
     /// Longest half axis, metres.
     pub(super) longest: f64,
-    /// Its value at the centre.
+    /// Value at the centre.
     pub peak: f64,
 }
 
 impl Ellipsoid {
-    /// V det(G) P(|G (x − centre)|), P(q) = 315/(64π) (1 − q²)³.
+    /// Evaluates V det(G) P(|G (x − centre)|) with P(q) = 315/(64π) (1 − q²)³.
     pub fn value(&self, x: DVec3) -> f64 {
         let q = self.inverse * (x - self.centre);
         self.peak * (1.0 - q.length_squared()).max(0.0).powi(3)
     }
 
-    /// [`Self::value`], and its ∇, 1/m.
+    /// [`Self::value`] and its gradient, 1/m.
     fn value_and_gradient(&self, x: DVec3) -> (f64, DVec3) {
         let q = self.inverse * (x - self.centre);
         let s = (1.0 - q.length_squared()).max(0.0);
@@ -69,11 +80,12 @@ impl Ellipsoid {
         (self.peak * s.powi(3), gradient)
     }
 
-    /// Half axes in metres along the columns of `turn`, of a particle of `volume` m³.
+    /// Builds the kernel of a particle of `volume` m³ with half axes `axes`, metres, along the
+    /// columns of `turn`.
     fn new(centre: DVec3, turn: DMat3, axes: DVec3, volume: f64) -> Self {
         let inverse = turn * DMat3::from_diagonal(axes.recip()) * turn.transpose();
         let stretch = turn * DMat3::from_diagonal(axes) * turn.transpose();
-        // A symmetric matrix has its rows for columns.
+        // The matrix is symmetric, so its columns are its rows.
         let reach = DVec3::new(
             stretch.x_axis.length(),
             stretch.y_axis.length(),
@@ -88,7 +100,7 @@ impl Ellipsoid {
         }
     }
 
-    /// As a mirror at `plane` along `axis` shows it.
+    /// Mirror image of the kernel at `plane` along `axis`.
     fn mirrored(&self, axis: usize, plane: f64) -> Self {
         let mut flip = DVec3::ONE;
         flip[axis] = -1.0;
@@ -104,33 +116,34 @@ impl Ellipsoid {
 /// The kernels of a frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Kernels {
-    /// One a particle, in the order of the particles, and then those that stand in the mirrors of the box's sides.
+    /// One kernel per particle, in the order of the particles, followed by the images in the
+    /// box's sides.
     pub ellipsoids: Vec<Ellipsoid>,
-    /// Value of the field at a calm surface.
+    /// Value of the summed kernels at a calm surface.
     pub level: f64,
 }
 
 /// Lengths and weights that follow from the lattice alone.
 struct Calibration {
     spacing: f64,
-    /// Variance of their places along an axis, m².
+    /// Variance of the neighbours' positions along an axis, m².
     variance: f64,
-    /// Weight of a place with water all around.
+    /// Total weight of a point with water all around.
     bulk: f64,
-    /// Factor on a lone particle's kernel.
+    /// Factor of a lone particle's kernel.
     alone: f64,
     level: f64,
 }
 
 impl Kernels {
-    /// Fits kernels to particles at `positions`, metres from the least corner of a box of `size` whose sides are mirrors;
-    /// `spacing` lies between neighbours at rest, metres.
+    /// Fits kernels to particles at `positions`, metres from the least corner of a box of `size`
+    /// whose sides are mirrors; `spacing` is the distance between neighbours at rest, metres.
     pub fn fit(positions: &[DVec3], size: DVec3, spacing: f64) -> Self {
         let fitted = Self::of_first(positions.len(), positions, size, spacing);
         Self::of_fitted(fitted, size, spacing)
     }
 
-    /// These kernels, which [`Self::of_first`] fitted, and those that stand in the mirrors of the box's sides.
+    /// Adds to the kernels from [`Self::of_first`] their images in the box's sides.
     pub fn of_fitted(fitted: Vec<Ellipsoid>, size: DVec3, spacing: f64) -> Self {
         Self {
             ellipsoids: mirrored(fitted, size, SUPPORT * spacing, &Ellipsoid::mirrored),
@@ -138,7 +151,8 @@ impl Kernels {
         }
     }
 
-    /// The kernels of the first `count` of these positions alone, without those that stand in mirrors; the others shape them.
+    /// Fits only the kernels of the first `count` positions, without images; the other positions
+    /// only shape them.
     pub fn of_first(
         count: usize,
         positions: &[DVec3],
@@ -155,7 +169,7 @@ impl Kernels {
         fit(&all, count, &calibration)
     }
 
-    /// The field itself, for values at any place.
+    /// Returns the field, which evaluates at any point.
     pub fn field(&self) -> Field<'_> {
         let longest = self.ellipsoids.par_iter().map(|it| it.longest);
         let farthest = longest.reduce(|| f64::MIN_POSITIVE, f64::max);
@@ -170,24 +184,24 @@ impl Kernels {
     }
 }
 
-/// The field of kernels: what a level set samples.
+/// The field of a set of kernels, which a level set samples.
 pub struct Field<'a> {
     kernels: &'a Kernels,
     grid: Grid,
-    /// In the grid's order.
+    /// Centres in the grid's order.
     centres: Vec<DVec3>,
-    /// Square of the distance from which on no kernel reaches a place, m².
+    /// Squared distance beyond which no kernel reaches a point, m².
     farthest: f64,
 }
 
 impl Field<'_> {
-    /// Visits the kernels that may reach a place, in the grid's order.
+    /// Visits the kernels that may reach a point, in the grid's order.
     fn for_each(&self, x: DVec3, mut visit: impl FnMut(&Ellipsoid)) {
         let mut near = [0; AT_ONCE];
         self.grid.for_each_run(x, HALVES, |run| {
             let centres = self.centres[run.clone()].chunks(AT_ONCE);
             for (centres, places) in centres.zip(self.grid.order[run].chunks(AT_ONCE)) {
-                // Without a branch that a processor would have to guess.
+                // Branch-free, to avoid mispredictions.
                 let mut count = 0;
                 for (centre, place) in centres.iter().zip(places) {
                     near[count] = *place as usize;
@@ -199,14 +213,14 @@ impl Field<'_> {
         });
     }
 
-    /// At `x`: positive in water, 0 at its surface, −1 where no particle reaches.
+    /// Returns the field at `x`: positive in water, 0 at its surface, −1 where no kernel reaches.
     pub fn value(&self, x: DVec3) -> f64 {
         let mut sum = 0.0;
         self.for_each(x, |kernel| sum += kernel.value(x));
         sum / self.kernels.level - 1.0
     }
 
-    /// [`Self::value`] and [`Self::gradient`] at once.
+    /// Returns [`Self::value`] and [`Self::gradient`] at once.
     pub fn value_and_gradient(&self, x: DVec3) -> (f64, DVec3) {
         let (mut sum, mut slope) = (0.0, DVec3::ZERO);
         self.for_each(x, |kernel| {
@@ -218,7 +232,7 @@ impl Field<'_> {
         (sum / level - 1.0, slope / level)
     }
 
-    /// ∇ at `x`, 1/m.
+    /// Returns the gradient at `x`, 1/m.
     pub fn gradient(&self, x: DVec3) -> DVec3 {
         self.value_and_gradient(x).1
     }
@@ -229,7 +243,7 @@ fn reflected(mut p: DVec3, axis: usize, plane: f64) -> DVec3 {
     p
 }
 
-/// What has a place.
+/// Anything with a position.
 trait Placed: Copy {
     fn place(&self) -> DVec3;
 }
@@ -246,7 +260,7 @@ impl Placed for Ellipsoid {
     }
 }
 
-/// These, and behind them their images at the sides of a box that they are within `near` of.
+/// Appends the images of all items within `near` of a side of the box.
 fn mirrored<T: Placed>(
     mut all: Vec<T>,
     size: DVec3,
@@ -267,10 +281,11 @@ fn mirrored<T: Placed>(
     all
 }
 
-/// Kernels of the first `count` of these places.
+/// Kernels of the first `count` points.
 fn fit(places: &[DVec3], count: usize, calibration: &Calibration) -> Vec<Ellipsoid> {
     let reach = NEAR * calibration.spacing;
-    // 27 % of the places in the cells that are looked at are within reach; were cells as long as that, it would be 16 %.
+    // 27 % of the points in the visited cells are within reach; with cells of the full radius it
+    // would be 16 %.
     let grid = Grid::new(places, reach / HALVES as f64);
     let sorted = grid.sorted(places);
     (0..count)
@@ -282,7 +297,7 @@ fn fit(places: &[DVec3], count: usize, calibration: &Calibration) -> Vec<Ellipso
         .collect()
 }
 
-/// 0 up to the first of these, 1 from the second on, and steadily between.
+/// Smoothstep: 0 up to `from`, 1 from `to` on.
 fn rise([from, to]: [f64; 2], x: f64) -> f64 {
     let t = ((x - from) / (to - from)).clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)
@@ -317,13 +332,13 @@ impl Calibration {
     }
 
     fn kernel(&self, place: DVec3, near: &Moments) -> Ellipsoid {
-        // A particle is a neighbour of its own, with a weight of 1.
+        // A particle is its own neighbour, with weight 1.
         let (values, turn) = eigen::symmetric(near.covariance() * (1.0 / self.variance));
         let longest = values.max_element().max(0.0).sqrt();
         let stretch = DVec3::from_array(values.to_array().map(|x| x.max(0.0).sqrt()))
             .max(DVec3::splat(longest / FLATTEST))
             .clamp(DVec3::splat(1.0 / FLATTEST), DVec3::ONE);
-        // Over that of water: neighbours are where the kernel is.
+        // Density relative to that of water: the neighbours fill the kernel's stretched volume.
         let density = near.weight / (self.bulk * stretch.element_product());
         let joined = rise(JOINED, near.weight - 1.0) * rise(TORN, density);
         let full = SUPPORT * self.spacing;
@@ -333,10 +348,11 @@ impl Calibration {
         Ellipsoid::new(place, turn, axes, factor * self.spacing.powi(3))
     }
 
-    /// The field's mean over a plane half a spacing above the outermost particles of half a lattice of spacing 1.
+    /// Mean of the field over a plane half a spacing above the outermost particles of half a
+    /// lattice of spacing 1.
     fn calm_level(&self) -> f64 {
         const SAMPLES: i32 = 4;
-        // One particle of each layer; the others of a layer have the same kernel beside it.
+        // One particle per layer is fitted; the others in the layer have the same kernel, shifted.
         let layers = (NEAR + SUPPORT).ceil() as i32 + 1;
         let side = NEAR.ceil() as i32;
         let kernels: Vec<Ellipsoid> = (0..layers)
@@ -367,7 +383,8 @@ impl Calibration {
     }
 }
 
-/// Factor on a lone particle's kernel with which the field is `level` where a ball of its volume ends; the spacing is 1.
+/// Factor of a lone particle's kernel for which the field equals `level` at the radius of a ball of
+/// its volume; the spacing is 1.
 fn lone_factor(level: f64) -> f64 {
     let radius = (3.0 / (4.0 * PI)).cbrt();
     let plain = Ellipsoid::new(DVec3::ZERO, DMat3::IDENTITY, DVec3::splat(ALONE), 1.0);

@@ -1,4 +1,4 @@
-//! Weight and moments of a place's neighbours, summed in the processor's lanes.
+//! Weight and moments of a point's neighbours, summed in SIMD lanes.
 
 use glam::{DMat3, DVec3};
 use pulp::{Simd, WithSimd};
@@ -6,12 +6,13 @@ use pulp::{Simd, WithSimd};
 use super::grid::{Grid, HALVES};
 use crate::lanes::{positive, widely};
 
-/// Places that are looked at together.
+/// Points that are processed together.
 pub(super) const AT_ONCE: usize = 64;
-/// Neighbours that are summed at once: ten sums of as many parts stand in a processor's registers.
+/// Neighbours summed at once: ten sums with this many partial sums fit into a
+/// processor's registers.
 const LANES: usize = 4;
 
-/// Weight and moments of neighbours, relative to a place.
+/// Weight and moments of neighbours, relative to a point.
 pub(super) struct Moments {
     pub(super) weight: f64,
     first: DVec3,
@@ -19,7 +20,8 @@ pub(super) struct Moments {
 }
 
 impl Moments {
-    /// Of the places within `reach`, itself included, under the paper's weight 1 − (r / R)³; `sorted` are in the grid's order.
+    /// Sums over the points within `reach`, `place` itself included, with the paper's weight 1 − (r
+    /// / R)³; `sorted` holds the points in the grid's order.
     pub(super) fn about(place: DVec3, (grid, sorted): (&Grid, &[DVec3]), reach: f64) -> Self {
         let mut near = Near::new(reach);
         grid.for_each_run(place, HALVES, |run| {
@@ -30,16 +32,16 @@ impl Moments {
         near.moments()
     }
 
-    /// About their mean.
+    /// Covariance about the weighted mean.
     pub(super) fn covariance(&self) -> DMat3 {
         self.second * (1.0 / self.weight) - outer(self.first / self.weight)
     }
 }
 
-/// Ways to neighbours, gathered before they are summed several at a time.
+/// Offsets of neighbours, collected before they are summed several at a time.
 pub(super) struct Near {
     reach: f64,
-    /// An axis after the other, metres.
+    /// One axis after the other, metres.
     ways: [[f64; 2 * AT_ONCE]; 3],
     count: usize,
     sums: Sums,
@@ -55,12 +57,12 @@ impl Near {
         }
     }
 
-    /// Takes those of at most [`AT_ONCE`] places that are within reach of `from`.
+    /// Collects those of at most [`AT_ONCE`] points that are within reach of `from`.
     pub(super) fn take(&mut self, places: &[DVec3], from: DVec3) {
         if self.count > AT_ONCE {
             self.sum();
         }
-        // Without a branch that a processor would have to guess.
+        // Branch-free, to avoid mispredictions.
         for place in places {
             let way = *place - from;
             for (axis, of) in self.ways.iter_mut().enumerate() {
@@ -70,7 +72,7 @@ impl Near {
         }
     }
 
-    /// Sums what was gathered, filled up to whole lanes with some that weigh nothing.
+    /// Sums the collected offsets, padded to whole lanes with entries of zero weight.
     fn sum(&mut self) {
         let whole = self.count.next_multiple_of(LANES);
         for at in self.count..whole {
@@ -107,7 +109,7 @@ impl Near {
     }
 }
 
-/// Sums of weights, and of ways and their products under them.
+/// Sums of weights, weighted offsets and weighted products of offsets.
 #[derive(Default)]
 struct Sums {
     weight: [f64; LANES],
@@ -116,7 +118,7 @@ struct Sums {
     second: [[f64; LANES]; 6],
 }
 
-/// Adds whole lanes of ways.
+/// Adds whole lanes of offsets.
 struct Add<'a> {
     ways: [&'a [f64]; 3],
     /// 1 / R².
@@ -169,7 +171,8 @@ mod tests {
     use super::*;
     use crate::sampling::uniform;
 
-    /// Of more places than are gathered at once, and of numbers of them that fill no whole lanes, against each by itself.
+    /// Compares with a sum over each neighbour by itself, for more points than fit a batch and for
+    /// counts that do not fill whole lanes.
     #[test]
     fn sums_are_those_of_each_neighbour() {
         let place = |k: u64| DVec3::from([0, 1, 2].map(|axis| uniform(3 * k + axis)));
@@ -179,7 +182,7 @@ mod tests {
         let mut most = 0;
         for &place in &places[..100] {
             let found = Moments::about(place, (&grid, &sorted), 0.4);
-            // How far that is from the sums within `reach`, over their roundings.
+            // Deviation from the sums within `reach`, in roundings.
             let off = |reach: f64| {
                 let (mut weight, mut first, mut second) = (0.0, DVec3::ZERO, DMat3::ZERO);
                 let near = places.iter().map(|it| *it - place);
@@ -199,17 +202,17 @@ mod tests {
                         .sum::<f64>();
                 (near.len(), off / (near.len() as f64 * f64::EPSILON))
             };
-            // 11 sums of terms of at most 1, each of which is rounded up to four times.
+            // 11 sums of terms of at most 1, each rounded up to four times.
             let (count, off_by) = off(0.4);
             assert!(off_by < 44.0, "{off_by}");
             most = most.max(count);
-            // The control: a hundredth less far.
+            // Negative control: a radius that is 1 % smaller.
             assert!(off(0.396).1 > 1e6);
         }
         assert!(most > AT_ONCE, "{most}");
     }
 
-    /// The processor's widest lanes give the bits of plain ones.
+    /// The processor's widest vectors give the same bits as scalar code.
     #[test]
     fn lanes_are_summed_alike() {
         let ways =

@@ -1,28 +1,30 @@
-//! How far sunlight has gone through water, on a coarse lattice.
+//! Length of sunlight's path through water, on a coarse lattice.
 
 use glam::DVec3;
 use rayon::prelude::*;
 
 use super::LevelSet;
 
-/// Voxels between the lattice's nodes.
+/// Distance between the lattice's nodes, voxels.
 const PITCH: f64 = 4.0;
 
-/// Places on the way from a plane of nodes to the one above at which water is looked for.
+/// Samples between a plane of nodes and the one above at which water is looked up.
 const LOOKS: u32 = 4;
 
-/// Metres that light from a distant source has gone through water, at nodes over a level set's box.
+/// Length of the path through water of light from a distant source, at nodes over a level
+/// set's box.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sunlight {
-    /// Nodes along each axis; the first stand on the box's least corner.
+    /// Nodes along each axis; the first lies at the box's least corner.
     pub nodes: [u32; 3],
-    /// Metres between nodes.
+    /// Distance between nodes, metres.
     pub pitch: f64,
-    /// Metres, x fastest.
+    /// Path lengths, metres, x fastest.
     pub paths: Vec<f32>,
 }
 
-/// Nodes along each axis over a box of `size` metres with voxels of `voxel` metres, and metres between them.
+/// Returns the number of nodes along each axis over a box of `size` metres with voxels of `voxel`
+/// metres, and their distance, metres.
 pub fn nodes_over(size: DVec3, voxel: f64) -> ([u32; 3], f64) {
     let pitch = PITCH * voxel;
     let nodes = size
@@ -32,8 +34,9 @@ pub fn nodes_over(size: DVec3, voxel: f64) -> ([u32; 3], f64) {
 }
 
 impl Sunlight {
-    /// Through `water`, straight from `towards`, a unit vector that points upward: plane by plane downward, each from the one
-    /// above, which spreads a shadow's edge over about a pitch for every plane that it falls through.
+    /// Computes the paths through `water` for light from `towards`, a unit vector that points
+    /// upward. Planes are swept downward, each one from the plane above, which blurs a shadow's
+    /// edge by about one pitch per plane.
     pub fn new(water: &LevelSet, towards: DVec3) -> Self {
         let (nodes, pitch) = nodes_over(water.size, water.voxel);
         let [nx, ny, nz] = nodes.map(|n| n as usize);
@@ -68,7 +71,8 @@ impl Sunlight {
         }
     }
 
-    /// At `p` in the box, metres from its least corner, trilinear between nodes.
+    /// Returns the path length at `p` in the box, metres from its least corner, trilinear
+    /// between nodes.
     pub fn path(&self, p: DVec3) -> f64 {
         let nodes = self.nodes.map(|n| n as usize);
         let last = DVec3::from_array(nodes.map(|n| (n - 1) as f64));
@@ -99,7 +103,8 @@ fn is_within(p: DVec3, size: DVec3) -> bool {
     p.cmpge(DVec3::ZERO).all() && p.cmple(size).all()
 }
 
-/// Bilinear in a plane of nodes; light comes in from beyond its sides without a way through anything.
+/// Bilinear interpolation in a plane of nodes; light that enters through the sides has no path
+/// behind it.
 pub(crate) fn between(plane: &[f32], [nx, nz]: [usize; 2], x: f64, z: f64) -> f64 {
     let last = |n: usize| (n - 1) as f64;
     if !(x >= 0.0 && z >= 0.0 && x <= last(nx) && z <= last(nz)) {

@@ -1,4 +1,4 @@
-//! Against lattices whose surface is known.
+//! Tests with lattices whose surface is known.
 
 use std::f64::consts::PI;
 
@@ -12,13 +12,14 @@ use super::{
 
 const D: f64 = 0.1;
 
-/// A number in −0.5..0.5 that follows from its index.
+/// A pseudo-random number in −0.5..0.5 for an index.
 fn noise(index: usize) -> f64 {
     let x = (index as f64 * 12.9898).sin() * 43758.5453;
     x - x.floor() - 0.5
 }
 
-/// A cubic lattice of so many particles along each axis, each moved by up to half of `jitter` spacings along each axis.
+/// A cubic lattice with `counts` particles along each axis, each displaced by up to half of
+/// `jitter` spacings along each axis.
 fn lattice(counts: [usize; 3], corner: DVec3, jitter: f64) -> Vec<DVec3> {
     let [nx, ny, nz] = counts;
     (0..nx * ny * nz)
@@ -30,7 +31,7 @@ fn lattice(counts: [usize; 3], corner: DVec3, jitter: f64) -> Vec<DVec3> {
         .collect()
 }
 
-/// Heights at which the field changes its sign over a grid of places, spacings above `level`.
+/// Heights at which the field changes sign over a grid of positions, in spacings above `level`.
 fn heights(set: &LevelSet, level: f64) -> Vec<f64> {
     let columns = (0..400).map(|k| (f64::from(k % 20), f64::from(k / 20)));
     columns
@@ -57,13 +58,15 @@ fn rms(values: &[f64]) -> f64 {
     (values.iter().map(|x| x * x).sum::<f64>() / values.len() as f64).sqrt()
 }
 
-/// A pool from wall to wall: level and flat up to the walls. Control: without mirrors the surface falls at the walls.
+/// A pool from wall to wall is level up to the walls. Control: without mirrors the surface falls at
+/// the walls.
 #[test]
 fn a_pool_is_flat_up_to_its_walls() {
     let size = DVec3::new(2.0, 2.0, 1.6);
     let pool = lattice([20, 10, 16], DVec3::ZERO, 0.0);
     let set = LevelSet::new(&pool, size, D);
-    // What is interpolated over two voxels a spacing, of a field that is 0 half a spacing above the lattice on average.
+    // Error of interpolating, at two voxels per spacing, a field that averages 0 half a spacing
+    // above the lattice.
     let off = heights(&set, 1.0);
     let most = off.iter().fold(0.0f64, |a, h| a.max(h.abs()));
     assert!(most < 0.06, "{most} spacings off");
@@ -77,8 +80,8 @@ fn a_pool_is_flat_up_to_its_walls() {
     assert!(set.value(corner - DVec3::new(5.0, 0.0, 5.0)) > 0.0);
 }
 
-/// Particles a fifth of a spacing off their places leave a surface that is 0.08 spacings rough at most, the silhouette's gate.
-/// Control: kernels that no neighbour stretches leave more.
+/// Particles a fifth of a spacing off their lattice points leave a surface that is 0.08 spacings
+/// rough at most, the tolerance of the silhouette. Control: unstretched kernels leave more.
 #[test]
 fn noise_of_particles_is_smoothed_out_of_the_surface() {
     let size = DVec3::new(2.0, 2.0, 2.0);
@@ -108,7 +111,8 @@ fn noise_of_particles_is_smoothed_out_of_the_surface() {
     assert!(plain > 1.3 * stretched, "{plain} of balls, {stretched}");
 }
 
-/// A sheet one particle thick has no hole between its particles, nor has one that is stretched by a third.
+/// A sheet one particle thick has no hole between its particles, nor has one that is stretched by
+/// a third.
 #[test]
 fn a_sheet_one_particle_thick_holds_together() {
     let size = DVec3::new(4.0, 2.0, 4.0);
@@ -129,8 +133,8 @@ fn a_sheet_one_particle_thick_holds_together() {
     }
 }
 
-/// Of water that is torn to 1/1.3³ = 0.46 of its density every particle lies inside of the surface. Control: kernels as in water all around
-/// have a field of that density, which is below a calm surface's 0.55.
+/// In water torn to 1/1.3³ = 0.46 of its density every particle lies inside the surface. Control:
+/// kernels as in full water give a field of that density, which is below a calm surface's 0.55.
 #[test]
 fn particles_of_torn_water_are_inside() {
     let size = DVec3::splat(4.0);
@@ -164,7 +168,8 @@ fn a_lone_particle_is_a_ball_of_its_volume() {
         set.value(place + step * DVec3::from_array(c)) > 0.0
     });
     let volume = inside.count() as f64 * step.powi(3) / D.powi(3);
-    // The field is a hat 2.5 voxels wide, and trilinear values lie below a hat's: h²/8 of its curvature take a quarter.
+    // The field is a hat 2.5 voxels wide, and trilinear interpolation lies below a hat: h²/8 of its
+    // curvature removes a quarter.
     assert!((0.6..1.0).contains(&volume), "{volume} of its volume");
     let radius = (3.0 / (4.0 * PI)).cbrt() * D;
     let exact = Kernels::fit(&[place], DVec3::splat(2.0), D);
@@ -172,7 +177,7 @@ fn a_lone_particle_is_a_ball_of_its_volume() {
     assert!(exact.field().value(place + DVec3::X * radius * 0.999) > 0.0);
 }
 
-/// Bricks say what the kernels say: of full and empty ones the sign, of the others the value.
+/// Bricks agree with the kernels: full and empty ones in the sign, the others in the value.
 #[test]
 fn bricks_hold_the_field_of_the_kernels() {
     let size = DVec3::new(2.0, 2.1, 1.7);
@@ -196,26 +201,28 @@ fn bricks_hold_the_field_of_the_kernels() {
             }
             _ => {
                 between += 1;
-                // (Δx²/8) |∇²| of kernels whose shortest half axis is 1.25 voxels, over a peak of about 2.
+                // (Δx²/8) |∇²| of kernels whose shortest half axis is 1.25 voxels, over a peak of
+                // about 2.
                 assert!((held - exact).abs() < 0.35, "{held} is {exact}");
             }
         }
     }
     assert!(full > 100 && empty > 100 && between > 100);
-    // A gradient is what differences say.
+    // The gradient agrees with finite differences.
     let (at, step) = (DVec3::new(1.0, 0.88, 0.8), 1e-6);
     for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
         let change = field.value(at + step * axis) - field.value(at - step * axis);
         let slope = field.gradient(at).dot(axis);
-        // Rounding of values of about 1 over the step, and its square of the third derivative.
+        // Rounding of values of about 1 over the step, and the squared step times the
+        // third derivative.
         assert!((change / (2.0 * step) - slope).abs() < 1e-6 * field.gradient(at).length() + 1e-8);
     }
-    // Near the surface a gradient points downward, into the water.
+    // Near the surface the gradient points downward, into the water.
     let down = set.gradient(DVec3::new(1.0, 0.9, 0.8)).normalize();
     assert!(down.y < -0.95, "{down}");
 }
 
-/// The same frame gives the same set.
+/// The same frame gives the same set for any number of threads.
 #[test]
 fn a_level_set_does_not_depend_on_threads() {
     let size = DVec3::splat(1.5);
@@ -227,7 +234,8 @@ fn a_level_set_does_not_depend_on_threads() {
     assert_eq!(alone, LevelSet::new(&pool, size, D));
 }
 
-/// Beneath a pool light has gone its depth over the cosine, and beside a wall of water less, as a part of its way is dry.
+/// Below a pool, the light's path is the depth over the cosine; beside a wall of water it is
+/// shorter, as part of it is dry.
 #[test]
 fn light_goes_straight_down_through_a_pool() {
     let size = DVec3::new(3.0, 2.0, 3.0);
@@ -237,7 +245,7 @@ fn light_goes_straight_down_through_a_pool() {
     let deep = |y: f64| light.path(DVec3::new(1.0, y, 1.2));
     for y in [0.2, 0.5, 0.8] {
         let wanted = (1.2 - y) / towards.y;
-        // A look every twentieth of the pitch of two spacings, and the surface between two nodes.
+        // There are four samples per pitch of two spacings, and the surface lies between two nodes.
         assert!((deep(y) - wanted).abs() < D, "{} is {wanted}", deep(y));
     }
     assert!(deep(1.5) < 1e-6, "there is no water above");
@@ -245,7 +253,7 @@ fn light_goes_straight_down_through_a_pool() {
     assert!(straight.path(DVec3::new(1.0, 0.2, 1.2)) < deep(0.2) - 0.02);
 }
 
-/// The field's value and slope are those of all kernels, whichever cells they lie in.
+/// The field's value and gradient are those of all kernels, whichever cells they are in.
 #[test]
 fn a_field_is_the_sum_of_all_kernels() {
     let size = DVec3::splat(10.0 * D);
@@ -261,10 +269,11 @@ fn a_field_is_the_sum_of_all_kernels() {
     for k in 600..900 {
         let x = 1.2 * place(k) - 0.1 * size;
         let (value, slope) = field.value_and_gradient(x);
-        // Some hundred terms of a few.
+        // Some hundred terms of order 1.
         assert!((value - all(x)).abs() < 1e-12, "{value} {}", all(x));
         assert_eq!(value, field.value(x));
-        // By central differences, whose remainder is h² times a third derivative, 1e-9, and whose roundings are 1e-16 over h.
+        // By central differences: the remainder is h² times a third derivative, 1e-9, and the
+        // rounding is 1e-16 over h.
         let h = 1e-5 * D;
         let along = |axis: DVec3| (all(x + h * axis) - all(x - h * axis)) / (2.0 * h);
         let differences = DVec3::new(along(DVec3::X), along(DVec3::Y), along(DVec3::Z));
@@ -272,7 +281,7 @@ fn a_field_is_the_sum_of_all_kernels() {
             (slope - differences).length() * D < 1e-7,
             "{slope} {differences}"
         );
-        // The control: a hundredth of a spacing away.
+        // Negative control: a hundredth of a spacing away.
         if slope.length() * D > 0.1 {
             let along = 0.01 * D * slope.normalize();
             assert!((field.value(x + along) - all(x)).abs() > 1e-4);

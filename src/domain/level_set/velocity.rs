@@ -1,17 +1,17 @@
-//! How the water goes at places on its surface.
+//! Velocity of the water at points on its surface.
 
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
 use super::grid::Grid;
 
-/// Particles that a velocity is taken from lie within so many particle spacings: a surface lies within 2.5 of one.
+/// Radius within which particles contribute, particle spacings: a surface lies within 2.5 of one.
 const NEAR: f64 = 3.0;
-/// Part of the neighbours' spread that is added to it in all directions: along one that they have no spread in (a sheet, a pair) the
-/// velocity is then their mean's.
+/// Fraction of the neighbours' spread that is added in all directions: in a direction without
+/// spread (a sheet, a pair) the velocity is then the neighbours' mean.
 const SPREAD: f64 = 1e-2;
 
-/// The velocities of particles, for any place near them.
+/// Velocities of particles, interpolated at points near them.
 pub struct Velocities<'a> {
     places: &'a [DVec3],
     velocities: &'a [[f32; 3]],
@@ -19,7 +19,8 @@ pub struct Velocities<'a> {
 }
 
 impl<'a> Velocities<'a> {
-    /// Those of particles at `places`, metres; `spacing` lies between neighbours at rest.
+    /// Indexes particles at `places`, metres; `spacing` is the distance between neighbours at
+    /// rest, metres.
     pub fn new(places: &'a [DVec3], velocities: &'a [[f32; 3]], spacing: f64) -> Self {
         Self {
             places,
@@ -28,8 +29,9 @@ impl<'a> Velocities<'a> {
         }
     }
 
-    /// At each of these places, m/s: the linear function of place that fits the neighbours' velocities best, weighed by (1 − (r/R)²)³,
-    /// and no farther from all of theirs than half of what they differ by. Zero where no particle is near.
+    /// Returns the velocity at each of `places`, m/s: the linear function of position that fits the
+    /// neighbours' velocities best under the weight (1 − (r/R)²)³, limited to their range extended
+    /// by half on each side. Zero where no particle is near.
     pub fn at(&self, places: &[DVec3]) -> Vec<[f32; 3]> {
         places.par_iter().map(|&place| self.one(place)).collect()
     }
@@ -71,7 +73,7 @@ impl<'a> Velocities<'a> {
     }
 }
 
-/// a bᵀ.
+/// Outer product a bᵀ.
 fn outer(a: DVec3, b: DVec3) -> DMat3 {
     DMat3::from_cols(a * b.x, a * b.y, a * b.z)
 }
@@ -113,15 +115,15 @@ mod tests {
     #[test]
     fn a_turning_block_has_its_velocities_at_its_surface() {
         let turning = |p: DVec3| DVec3::new(2.0, 1.0, -1.0) + DVec3::new(0.3, 0.5, 1.0).cross(p);
-        // The neighbours' mean lies about a spacing below the surface; what is added to their spread takes a part of the slope there:
-        // 3 SPREAD of 1 along it.
+        // The neighbours' mean lies about a spacing below the surface; the spread added to theirs
+        // reduces the slope along that distance by 3 SPREAD.
         let slope = DVec3::new(0.3, 0.5, 1.0).length();
         assert!(
             worst(8, turning) < 4.0 * SPREAD * slope * 1.5 * D,
             "{}",
             worst(8, turning)
         );
-        // The control: the mean alone is off by a good part of a spacing's change.
+        // Negative control: the mean alone is off by a good part of the change over a spacing.
         let places = block(8);
         let below = turning(DVec3::ZERO) - turning(DVec3::Y * D);
         assert!(below.length() > 4.0 * SPREAD * slope * 1.5 * D);

@@ -1,7 +1,8 @@
-//! Triangles without area, whose three corners are on one line: they bound nothing, but to leave one out opens its edges.
+//! Removes triangles without area, whose three corners are collinear: they bound nothing, but
+//! dropping one opens its edges.
 //!
-//! A needle's middle corner is put into the longest edge of the needle's neighbour there, which becomes two triangles. Both outlines
-//! together stay as they were, so a closed mesh stays closed.
+//! A needle's middle corner is inserted into the longest edge of the neighbour there, which becomes
+//! two triangles. The outline of both together is unchanged, so a closed mesh stays closed.
 
 use std::{
     cmp::Ordering,
@@ -10,7 +11,8 @@ use std::{
 
 use super::Welded;
 
-/// Splits that a needle may cause on average before the rest are left out as they are: rounding could go round in circles.
+/// Average number of splits per needle before the remaining needles are simply dropped: rounding
+/// could cause an endless loop.
 const MOST_SPLITS: usize = 64;
 
 /// A corner between two others, of a triangle that was split.
@@ -18,11 +20,12 @@ const MOST_SPLITS: usize = 64;
 pub(super) struct Between {
     /// Corners on either side, each of the file or of this kind.
     pub(super) ends: [u32; 2],
-    /// Part of the way from the first to the second.
+    /// Position between the first and the second, 0 to 1.
     pub(super) part: f64,
 }
 
-/// A needle, the longest first: its neighbour then has no longer one, and the pieces are shorter.
+/// A needle in the queue, longest first: its neighbour then has no longer needle, and the pieces
+/// are shorter.
 struct Needle {
     length: f64,
     triangle: usize,
@@ -49,7 +52,8 @@ impl PartialEq for Needle {
 
 impl Eq for Needle {}
 
-/// Takes all triangles without area out of `welded`, whose corners are three different vertices each.
+/// Removes all triangles without area from `welded`. Each triangle must have three
+/// different vertices.
 pub(super) fn dissolve(welded: &mut Welded) {
     let flat: Vec<usize> = (0..welded.mesh.triangles.len())
         .filter(|&t| is_flat(welded, t))
@@ -118,7 +122,7 @@ impl Work<'_> {
         }
     }
 
-    /// The triangle's vertices and corners, so that the first edge is the one from `first`.
+    /// The triangle's vertices and corners, rotated so that the first edge starts at `first`.
     fn from(&self, t: usize, first: u32) -> ([u32; 3], [u32; 3]) {
         let (mut vertices, mut corners) = (self.welded.mesh.triangles[t], self.welded.corners[t]);
         let turn = vertices
@@ -130,7 +134,7 @@ impl Work<'_> {
         (vertices, corners)
     }
 
-    /// The first vertex of the longest edge, and its length.
+    /// First vertex of the longest edge, and its length.
     fn longest(&self, t: usize) -> (u32, f64) {
         let mesh = &self.welded.mesh;
         let [a, b, c] = mesh.triangles[t];
@@ -148,8 +152,8 @@ impl Work<'_> {
         self.needles.push(Needle { length, triangle });
     }
 
-    /// Takes the needle away and gives its middle corner to the triangle beyond its longest edge; a needle at the border of an open
-    /// mesh is only taken away.
+    /// Removes the needle and inserts its middle corner into the triangle beyond its longest edge;
+    /// a needle at the border of an open mesh is only removed.
     fn split_beside(&mut self, needle: usize) {
         let ([b, a, m], _) = self.from(needle, self.longest(needle).0);
         self.leave(needle);
@@ -160,7 +164,7 @@ impl Work<'_> {
         let ([.., c], [corner_a, corner_b, corner_c]) = self.from(beyond, a);
         self.leave(beyond);
         if c == m {
-            // Its own back: both together bound nothing.
+            // The neighbour is the needle's own back: together they bound nothing.
             return;
         }
         let place = |v: u32| self.welded.mesh.vertices[v as usize];
@@ -194,10 +198,12 @@ mod tests {
         mesh_file::{MeshFormat, tests::parse},
     };
 
-    /// A unit cube whose top has corners in the middle of two edges, fanned about one of them by another program.
+    /// A unit cube whose top has extra corners along one edge, fanned about one of its ends by
+    /// another program.
     fn fanned() -> String {
         let corners = "v 0 0 0\nv 1 0 0\nv 1 0 1\nv 0 0 1\nv 0 1 0\nv 1 1 0\nv 1 1 1\nv 0 1 1\nv 0.25 1 0\nv 0.5 1 0\nv 0.75 1 0\n";
-        // The top as a fan about corner 5, along whose first edge 9, 10 and 11 are; the side below it from the other end.
+        // The top is a fan about corner 5, whose first edge contains 9, 10 and 11; the side below
+        // it is fanned from the other end.
         let top = "f 5 10 9\nf 5 11 10\nf 5 6 11\nf 5 7 6\nf 5 8 7\n";
         let side = "f 1 5 9\nf 1 9 10\nf 1 10 11\nf 1 11 6\nf 1 6 2\n";
         let rest = "f 1 2 3 4\nf 2 6 7 3\nf 3 7 8 4\nf 4 8 5 1\n";
@@ -211,10 +217,10 @@ mod tests {
         assert_eq!(mesh.open_edges(), []);
         assert_eq!(mesh.vertices.len(), 11);
         assert!((0..mesh.triangles.len()).all(|t| mesh.area_vector(t).length() > 0.0));
-        // Of at most 18 terms that round on their own.
+        // Up to 18 terms, each rounded.
         assert!((mesh.signed_volume() - 1.0).abs() < 18.0 * f64::EPSILON);
         assert!((mesh.area() - 6.0).abs() < 18.0 * f64::EPSILON);
-        // The control: without them it is open.
+        // Negative control: without the needles the mesh is open.
         let cut = ["f 5 10 9\n", "f 5 11 10\n", "f 5 6 11\n"];
         let open = cut
             .iter()

@@ -1,8 +1,9 @@
-//! OBJ through tobj, which sees `v` and `f` lines only, and of a corner `v/vt/vn` only `v`.
+//! Reads OBJ through tobj, which is given only `v` and `f` lines, and of a corner `v/vt/vn`
+//! only `v`.
 //!
-//! The rest carries no geometry, and is where tobj can still be driven out of bounds (normal and
-//! texture indices near the largest integer wrap around) or asked to open other files. Objects and
-//! groups are names alone: all of them are one mesh.
+//! The rest carries no geometry, and is where tobj can still index out of bounds (normal and
+//! texture indices near the largest integer wrap around) or be made to open other files. Objects
+//! and groups are only names: all of them form one mesh.
 
 use std::{borrow::Cow, fmt::Write as _, io::Cursor};
 
@@ -10,7 +11,7 @@ use glam::DVec3;
 
 use super::{Raw, lines_of, quoted, without_mark};
 
-/// Vertices and faces of all objects and groups.
+/// Reads the vertices and faces of all objects and groups.
 pub(super) fn read(bytes: &[u8]) -> Result<Raw, String> {
     let text = lines_of(without_mark(bytes)?);
     let mut geometry = Geometry::default();
@@ -20,8 +21,8 @@ pub(super) fn read(bytes: &[u8]) -> Result<Raw, String> {
     geometry.read()
 }
 
-/// The statements of a text without their comments, each with the number of its first line: one that ends in a backslash goes on in
-/// the next.
+/// Iterates over the statements of a text without their comments, each with the number of its first
+/// line. A statement that ends in a backslash continues on the next line.
 pub(super) fn statements(text: &str) -> impl Iterator<Item = (usize, Cow<'_, str>)> {
     fn bare(line: &str) -> &str {
         line.split('#').next().unwrap_or_default().trim_end()
@@ -44,23 +45,23 @@ pub(super) fn statements(text: &str) -> impl Iterator<Item = (usize, Cow<'_, str
     })
 }
 
-/// The lines that are handed on to tobj.
+/// The lines that are passed on to tobj.
 #[derive(Default)]
 struct Geometry {
     text: String,
     vertices: i64,
-    /// Greatest index of a face's corner, and its line.
+    /// Greatest index of a face's corner, and its line number.
     greatest: (i64, usize),
 }
 
 impl Geometry {
-    /// Takes a line without its comment.
+    /// Adds a line without its comment.
     fn add(&mut self, number: usize, line: &str) -> Result<(), String> {
         let mut words = line.split_whitespace();
         match words.next() {
             Some("v") => {
                 let words: Vec<_> = words.collect();
-                // Six or seven words: a colour follows. Four: a weight.
+                // Six or seven numbers: position and colour. Four: position and weight.
                 let used = if words.len() == 4 { 4 } else { 3 };
                 let is_number = |word: &&str| word.parse::<f64>().is_ok();
                 if words.len() < 3 || !words[..used].iter().all(is_number) {
@@ -94,7 +95,7 @@ impl Geometry {
     }
 
     fn read(self) -> Result<Raw, String> {
-        // Faces may stand before their vertices.
+        // Faces may precede their vertices.
         if self.greatest.0 > self.vertices {
             let (index, number) = self.greatest;
             return Err(format!(
@@ -117,7 +118,7 @@ impl Geometry {
             let base = raw.vertices.len() as u64;
             let places = mesh.positions.chunks_exact(3);
             raw.vertices.extend(places.map(DVec3::from_slice));
-            // Of a mesh of triangles alone tobj counts no corners.
+            // For a mesh of triangles only, tobj reports no face sizes.
             let counts = match mesh.face_arities[..] {
                 [] => vec![3; mesh.indices.len() / 3],
                 _ => mesh.face_arities,
@@ -131,12 +132,13 @@ impl Geometry {
     }
 }
 
-/// A face corner's vertex, counted from 1; negative ones count back from the vertices so far.
+/// Vertex of a face's corner, counted from 1; negative indices count back from the vertices read
+/// so far.
 fn vertex_index(word: &str, vertex_count: i64) -> Option<i64> {
     index_of(word.split('/').next()?, vertex_count)
 }
 
-/// An index into what there is so far `vertex_count` of.
+/// Parses an index into the `vertex_count` items read so far.
 pub(super) fn index_of(word: &str, vertex_count: i64) -> Option<i64> {
     let index: i64 = word.parse().ok()?;
     let index = if index < 0 {

@@ -1,5 +1,5 @@
-//! Of which part of its file each triangle of a mesh is, and where pictures lie on it: for pictures alone. The mesh is the same with
-//! and without.
+//! Part names and texture coordinates of each triangle of a mesh. They are for rendering only; the
+//! mesh does not depend on them.
 
 use std::{collections::HashMap, path::Path};
 
@@ -10,22 +10,26 @@ use super::{MeshError, MeshFormat, Welded, lines_of, obj, quoted, welded, withou
 /// Texture coordinates of a triangle's corners: u to the right, v upward.
 pub type Places = [[f32; 2]; 3];
 
-/// Parts of a mesh, triangle by triangle in the mesh's order.
+/// Parts of a mesh, for each triangle in the mesh's order.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Parts {
-    /// Names of each part: of its material (`usemtl`), then of its groups (`g`), then of its object (`o`). Only OBJ has any.
+    /// Names of each part: of its material (`usemtl`), then of its groups (`g`), then of its object
+    /// (`o`). Only OBJ has names.
     pub names: Vec<Vec<String>>,
-    /// Which part each triangle is of.
+    /// Index in `names` of each triangle's part.
     pub of: Vec<u32>,
-    /// Texture coordinates of each triangle, `None` where a corner has none; empty where no triangle has any.
+    /// Texture coordinates of each triangle; `None` if one of its corners has none. Empty if no
+    /// triangle has any.
     pub places: Vec<Option<Places>>,
 }
 
 impl Parts {
-    /// Those of the mesh that [`crate::mesh::TriangleMesh::from_bytes`] reads from the same bytes.
+    /// Reads the parts of the mesh that [`crate::mesh::TriangleMesh::from_bytes`] reads from the
+    /// same bytes.
     ///
     /// # Errors
-    /// As there; and a texture coordinate (`vt`) that is no number, or a corner that names one that is not there.
+    /// The same errors; also a texture coordinate (`vt`) that is not a number, or a corner that
+    /// refers to a missing one.
     pub fn from_bytes(bytes: &[u8], format: MeshFormat, file: &Path) -> Result<Self, MeshError> {
         let fail = |detail| MeshError::Malformed {
             file: file.to_owned(),
@@ -40,14 +44,14 @@ impl Parts {
             });
         }
         let found = Reader::of_file(bytes).map_err(fail)?;
-        // Both readers count the corners of all faces.
+        // Both readers must count the same corners.
         if found.corners.len() != welded.in_file {
             return Err(fail("its faces are counted in two ways".into()));
         }
         Ok(found.into_parts(&welded))
     }
 
-    /// Follows triangles whose second and third corners change places, as a mirror's do.
+    /// Swaps the second and third corner of each triangle, for a mesh that was mirrored.
     pub fn turn(&mut self) {
         for places in self.places.iter_mut().flatten() {
             places.swap(1, 2);
@@ -68,16 +72,16 @@ struct Reader {
     material: String,
     groups: Vec<String>,
     object: String,
-    /// Number of the part with these names.
+    /// Part number of each list of names.
     numbers: HashMap<Vec<String>, u32>,
-    /// That of the faces that come next; `None` until there is one.
+    /// Part of the faces that follow; `None` until there is one.
     current: Option<u32>,
     corners: Vec<Corner>,
     names: Vec<Vec<String>>,
 }
 
 impl Reader {
-    /// All corners of an OBJ file, in the order of its faces.
+    /// Reads all corners of an OBJ file, in the order of its faces.
     fn of_file(bytes: &[u8]) -> Result<Self, String> {
         let text = lines_of(without_mark(bytes)?);
         let mut reader = Self::default();
@@ -96,7 +100,7 @@ impl Reader {
             "vt" => {
                 let mut numbers = rest.split_whitespace().map(str::parse::<f32>);
                 let u = numbers.next();
-                // A picture along a line has u alone.
+                // A one-dimensional texture has only u.
                 let (Some(Ok(u)), Ok(v)) = (u, numbers.next().unwrap_or(Ok(0.0))) else {
                     return Err(format!(
                         "line {number}: a texture coordinate needs numbers: {}",
@@ -165,7 +169,7 @@ impl Reader {
         part
     }
 
-    /// Coordinates may come after the faces that name them.
+    /// Checks the indices at the end, because coordinates may follow the faces that refer to them.
     fn check(&self) -> Result<(), String> {
         let count = self.coordinates.len();
         let named = self.corners.iter().filter_map(|corner| corner.named);
@@ -186,7 +190,7 @@ impl Reader {
 
     fn into_parts(self, welded: &Welded) -> Parts {
         let file = |corner: u32| self.corners.get(corner as usize);
-        // Of corners that split triangles: those that they lie between come before them.
+        // Corners of split triangles: their ends come before them in the list.
         let mut between: Vec<(u32, Option<Vec2>)> = Vec::with_capacity(welded.between.len());
         let of = |corner: u32, between: &[(u32, Option<Vec2>)]| match file(corner) {
             Some(Corner { part, named }) => {
@@ -244,12 +248,12 @@ mod tests {
         let found = parts(FILE).unwrap();
         let mesh =
             TriangleMesh::from_bytes(FILE.as_bytes(), MeshFormat::Obj, Path::new("a.obj")).unwrap();
-        // The sliver is left out of both.
+        // Both drop the sliver.
         assert_eq!(mesh.triangles.len(), 3);
         assert_eq!(found.names[0], ["wall", "hut"]);
         assert_eq!(found.names[1], ["roof", "front", "left", "hut"]);
         assert_eq!(found.of, [0, 0, 1]);
-        // Coordinates were written as x and y of the vertex that they belong to.
+        // The texture coordinates equal x and y of their vertex.
         for (k, places) in found.places.iter().enumerate().take(2) {
             let corners = mesh.corners(k).map(|p| [p.x as f32, p.y as f32]);
             assert_eq!(places.unwrap(), corners, "triangle {k}");
@@ -261,7 +265,7 @@ mod tests {
 
     #[test]
     fn what_is_turned_inside_out_keeps_its_corners_coordinates() {
-        // A tetrahedron whose faces point inward: the reader turns them.
+        // A tetrahedron whose faces point inward: the reader reverses them.
         let text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvt 0 0\nvt 1 0\nvt 0 1\nvt 0 0\n\
             f 1/1 2/2 3/3\nf 1/1 4/4 2/2\nf 1/1 3/3 4/4\nf 2/2 4/4 3/3\n";
         let found = parts(text).unwrap();
@@ -274,10 +278,12 @@ mod tests {
         }
     }
 
-    /// Polygons that are not convex, and corners that neighbours of triangles without area take.
+    /// Polygons that are not convex, and corners inserted into the neighbours of triangles
+    /// without area.
     #[test]
     fn cut_polygons_and_split_triangles_keep_their_corners_coordinates() {
-        // Coordinates are x and y of their vertex. The last face has no area: its corner 7 goes into the bay's first edge.
+        // The texture coordinates equal x and y of their vertex. The last face has no area: its
+        // corner 7 is inserted into the bay's first edge.
         let text = "v 0 0 0\nv 3 0 0\nv 3 1 0\nv 1 1 0\nv 1 2 0\nv 0 2 0\nv 0.75 0 0\n\
             vt 0 0\nvt 3 0\nvt 3 1\nvt 1 1\nvt 1 2\nvt 0 2\nvt 9 9\n\
             g bay\nf 1/1 2/2 3/3 4/4 5/5 6/6\ng needle\nf 2/2 1/1 7/7\n";
@@ -340,7 +346,7 @@ mod tests {
             assert_ne!(text, FILE);
             let error = parts(&text).unwrap_err().to_string();
             assert!(error.contains(words), "{from} -> {to}: {error}");
-            // The mesh is read all the same: no bake is refused for what it does not use.
+            // The mesh still loads: no bake is refused for what it does not use.
             TriangleMesh::from_bytes(text.as_bytes(), MeshFormat::Obj, Path::new("a.obj")).unwrap();
         }
     }

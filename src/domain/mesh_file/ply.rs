@@ -1,4 +1,5 @@
-//! PLY through ply-rs-bw, element by element; its faults in one line, with the file's own line.
+//! Reads PLY through ply-rs-bw, element by element. Errors are one line that quotes the file's
+//! own line.
 
 use std::{borrow::Cow, collections::HashSet, io::ErrorKind};
 
@@ -13,7 +14,7 @@ use ply_rs_bw::{
 
 use super::{Digits, Raw, lines_of, quoted, without_mark};
 
-/// A PLY element: of a vertex its place, of a face its corners, of anything else nothing.
+/// A PLY element: the position of a vertex or the corners of a face; other elements are ignored.
 #[derive(Default)]
 struct PlyElement {
     place: [Option<f64>; 3],
@@ -46,12 +47,12 @@ fn number(property: &Property) -> Option<f64> {
         Property::Double(v) => Some(*v),
         Property::Int(v) => Some(f64::from(*v)),
         Property::UInt(v) => Some(f64::from(*v)),
-        // Exact for the small integers and float.
+        // Exact for small integers and floats.
         other => other.to_f32_lossy().map(f64::from),
     }
 }
 
-/// Vertices and faces.
+/// Reads vertices and faces.
 pub(super) fn read(bytes: &[u8]) -> Result<Raw, String> {
     let (text, body) = split(without_mark(bytes)?)?;
     check_names(&text)?;
@@ -85,7 +86,8 @@ pub(super) fn read(bytes: &[u8]) -> Result<Raw, String> {
     Ok(raw)
 }
 
-/// How exact the vertices' coordinates are. Those of a text are read in 64 bits, whatever the header calls them.
+/// Precision of the vertices' coordinates. Text is read as 64-bit floats, whatever the
+/// header declares.
 fn coordinates(elements: &mut KeyMap<ElementDef>, is_text: bool) -> Digits {
     let mut digits = if is_text {
         Digits::Text
@@ -137,8 +139,8 @@ fn take(raw: &mut Raw, element: &ElementDef, payload: &[PlyElement]) -> Result<(
     Ok(())
 }
 
-/// The header's lines, each ended by `\n`, and what follows them. How the first line ends says how the others do: after
-/// the header, a binary file may go on with any byte.
+/// Splits into the header's lines, each ended by `\n`, and the rest. The end of the first line
+/// decides what ends the others: the body of a binary file may begin with any byte.
 fn split(bytes: &[u8]) -> Result<(String, &[u8]), String> {
     let is_end = |b: &u8| matches!(b, b'\n' | b'\r');
     let first = bytes.iter().position(is_end).unwrap_or(bytes.len());
@@ -168,8 +170,8 @@ fn split(bytes: &[u8]) -> Result<(String, &[u8]), String> {
     Err("the header has no line \"end_header\"".into())
 }
 
-/// ply-rs-bw keeps elements and properties by name: of two with one name it would forget the first, and read on at the
-/// wrong place.
+/// Rejects duplicate names. ply-rs-bw stores elements and properties by name: of two with one name
+/// it would drop the first, and continue at the wrong offset.
 fn check_names(header: &str) -> Result<(), String> {
     let mut elements = HashSet::new();
     let mut properties = HashSet::new();
@@ -194,7 +196,8 @@ fn check_names(header: &str) -> Result<(), String> {
     Ok(())
 }
 
-/// ply-rs-bw takes no number without digits on both sides of its point, as C writes and reads them: `1.`, `.5`.
+/// ply-rs-bw rejects numbers without digits on both sides of the point, as C writes and reads them:
+/// `1.`, `.5`.
 fn with_digits(text: &str) -> Cow<'_, str> {
     let bytes = text.as_bytes();
     let is_digit = |at: Option<usize>| {
@@ -221,7 +224,8 @@ fn with_digits(text: &str) -> Cow<'_, str> {
     out.into()
 }
 
-/// The parser's first line names the fault; the lines after it dump its state.
+/// Converts a header error to one line: the parser's first line names the fault, and the rest dumps
+/// its state.
 fn header_fault(error: &ParseError, header: &str) -> String {
     let told = error.to_string();
     let Some(number) = error.line() else {
@@ -234,7 +238,8 @@ fn header_fault(error: &ParseError, header: &str) -> String {
     format!("line {number}: {}: {what}", quoted(line))
 }
 
-/// `lines` are the body's, of a text; before them stand `header` lines.
+/// Converts a body error to one line. `lines` are those of a text body, which follow
+/// `header` lines.
 fn body_fault(error: &ParseError, element: &ElementDef, lines: &str, header: usize) -> String {
     let ElementDef { name, count, .. } = element;
     if error.kind() == ErrorKind::UnexpectedEof {
@@ -265,8 +270,8 @@ fn body_fault(error: &ParseError, element: &ElementDef, lines: &str, header: usi
     )
 }
 
-/// Holds an element's promised count against the bytes that are left. Without it a header that
-/// promises 2⁶⁰ elements without properties keeps the reader busy for years.
+/// Checks an element's declared count against the bytes that are left. Otherwise a header that
+/// declares 2⁶⁰ elements without properties would keep the reader busy for years.
 fn check_promise(
     element: &ElementDef,
     encoding: Encoding,
@@ -279,7 +284,7 @@ fn check_promise(
         S::Int | S::UInt | S::Float => 4,
         S::Double => 8,
     };
-    // A line holds two characters a property at the least: a digit and what ends it.
+    // A line has at least two characters per property: a digit and a separator.
     let least: u128 = match encoding {
         Encoding::Ascii => element.properties.len() as u128 * 2,
         _ => element
@@ -291,7 +296,7 @@ fn check_promise(
             .sum(),
     };
     let needed = element.count as u128 * least.max(1);
-    // The last line may end with the file.
+    // The last line may lack its line end.
     if needed > bytes_left as u128 + 1 {
         return Err(format!(
             "the header promises {} of element \"{}\", which need {needed} bytes, but {bytes_left} \

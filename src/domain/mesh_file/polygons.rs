@@ -1,29 +1,35 @@
-//! Polygons as triangles that use every corner: each edge of a polygon stays the edge of one triangle, so closed meshes stay closed.
+//! Triangulates polygons over all their corners: each edge of a polygon stays the edge of one
+//! triangle, so closed meshes stay closed.
 //!
-//! A quad is cut along one of its diagonals, a polygon of more corners by a constrained Delaunay triangulation (spade), whose
-//! predicates are exact. Ear clipping that leaves out corners on a straight edge would open the mesh there.
+//! A quad is cut along one of its diagonals, a polygon with more corners by a constrained Delaunay
+//! triangulation (spade), whose predicates are exact. Ear clipping that skips corners on a straight
+//! edge would open the mesh there.
 
 use std::collections::HashMap;
 
 use glam::{DVec2, DVec3};
 use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation as _};
 
-/// Area of a polygon over the square of its extent below which it has no normal: rounding of corners on one line.
+/// Ratio of a polygon's area to its squared extent below which it has no normal: rounding of
+/// collinear corners.
 const FLAT: f64 = 1e-12;
 
-/// Part of a quad's area by which its second diagonal has to be better: rounding does not choose between those of a rectangle.
+/// Fraction of a quad's area by which its second diagonal must be better, so that rounding does not
+/// choose between those of a rectangle.
 const BETTER: f64 = 1e-9;
 
-/// Part of its extent by which a polygon's corners may be off its plane: more than 32 bits round them.
+/// Fraction of its extent by which the corners of a flat polygon may be off its plane: more than
+/// the rounding of 32-bit floats.
 const BENT: f64 = 1e-6;
 
-/// A polygon's outline is not that of a surface: it crosses or overlaps itself.
+/// Error for an outline that does not bound a surface: it crosses or overlaps itself.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Crossing;
 
-/// Triangles of a polygon, as positions among its `corners`, in the polygon's direction.
+/// Triangulates a polygon. Triangles are indices into `corners`, in the polygon's direction.
 ///
-/// They do not depend on the corner that comes first. Corners on one line make triangles without area.
+/// The result does not depend on which corner comes first. Collinear corners give triangles
+/// without area.
 ///
 /// # Errors
 /// [`Crossing`]; a fan about a corner then has the same outline.
@@ -43,7 +49,7 @@ pub(super) fn triangles(corners: &[DVec3]) -> Result<Vec<[usize; 3]>, Crossing> 
     Ok(cut.into_iter().map(|t| t.map(turned)).collect())
 }
 
-/// A fan about the first corner that [`triangles`] counts from.
+/// A fan about the corner that [`triangles`] starts from.
 pub(super) fn fan(corners: &[DVec3]) -> Vec<[usize; 3]> {
     let start = first_corner(corners);
     let turned = |k: usize| (k + start) % corners.len();
@@ -55,12 +61,12 @@ fn about_first(count: usize) -> Vec<[usize; 3]> {
     (1..count - 1).map(|k| [0, k, k + 1]).collect()
 }
 
-/// The corner from which the sequence of places is the least of all, the same one wherever the file begins: the least rotation
-/// (Booth 1980, by two candidates), in a time that grows with the count.
+/// Start of the lexicographically least rotation of the corners, which does not depend on where the
+/// file begins. Takes linear time (Booth 1980, with two candidates).
 fn first_corner(corners: &[DVec3]) -> usize {
     let count = corners.len();
     let order = |i: usize, j: usize| {
-        // Zeros of either sign are one place.
+        // Treats zeros of either sign as equal.
         let [a, b] = [i, j].map(|k| (corners[k % count] + 0.0).to_array());
         let axes = a.iter().zip(&b).map(|(a, b)| a.total_cmp(b));
         axes.fold(std::cmp::Ordering::Equal, std::cmp::Ordering::then)
@@ -82,7 +88,7 @@ fn first_corner(corners: &[DVec3]) -> usize {
     i.min(j)
 }
 
-/// Twice the area vector (Newell's); `None` of a polygon that bounds no area.
+/// Twice the area vector (Newell's method); `None` for a polygon without area.
 fn normal(places: &[DVec3]) -> Option<DVec3> {
     let about = |k: usize| places[k] - places[0];
     let sum: DVec3 = (1..places.len() - 1)
@@ -111,7 +117,8 @@ fn are_on_a_line(places: &[DVec3]) -> bool {
         .all(|p| along.cross(*p - places[0]).length() <= least)
 }
 
-/// Along the diagonal whose smaller triangle is the larger; both count against the quad's own normal.
+/// Cuts along the diagonal whose smaller triangle is larger; areas are signed by the quad's
+/// own normal.
 fn quad(p: [DVec3; 4]) -> Result<Vec<[usize; 3]>, Crossing> {
     let normal = (p[2] - p[0]).cross(p[3] - p[1]);
     let area = |[a, b, c]: [usize; 3]| normal.dot((p[b] - p[a]).cross(p[c] - p[a]));
@@ -127,10 +134,11 @@ fn quad(p: [DVec3; 4]) -> Result<Vec<[usize; 3]>, Crossing> {
 
 type Cdt = ConstrainedDelaunayTriangulation<Point2<f64>>;
 
-/// How a polygon is seen: corners as points of a plane.
+/// Projection of a polygon's corners to a plane.
 ///
-/// A flat one along the axis that is nearest to its normal, which is exact for corners on a line; one that bends along its normal, as
-/// the part that is seen on edge along an axis would overlap the rest, or vanish.
+/// A flat polygon is projected along the axis nearest to its normal, which is exact for collinear
+/// corners. A bent one is projected along its normal: along an axis, the part seen edge-on would
+/// overlap the rest, or vanish.
 fn view(places: &[DVec3], normal: DVec3) -> impl Fn(DVec3) -> DVec2 {
     let unit = normal.normalize();
     let off = places.iter().map(|p| unit.dot(*p - places[0]).abs());
@@ -146,7 +154,7 @@ fn view(places: &[DVec3], normal: DVec3) -> impl Fn(DVec3) -> DVec2 {
     move |p| DVec2::new(u.dot(p), v.dot(p))
 }
 
-/// All that the outline winds about once, as [`view`] sees it.
+/// Triangulates the region that the outline winds around once in the projection of [`view`].
 fn polygon(places: &[DVec3], normal: DVec3) -> Result<Vec<[usize; 3]>, Crossing> {
     let seen = view(places, normal);
     let mut cdt = Cdt::new();
@@ -155,13 +163,13 @@ fn polygon(places: &[DVec3], normal: DVec3) -> Result<Vec<[usize; 3]>, Crossing>
     for (k, p) in places.iter().enumerate() {
         let at = seen(*p).to_array().map(settled);
         let handle = cdt.insert(Point2::from(at)).map_err(|_| Crossing)?;
-        // Corners that only this view sees at one place are two.
+        // Different corners that coincide only in this projection.
         if places[*corner_of.entry(handle).or_insert(k)] != *p {
             return Err(Crossing);
         }
         handles.push(handle);
     }
-    // How often the outline goes along an edge of the triangulation.
+    // Net number of times that the outline follows each directed edge of the triangulation.
     let mut along = HashMap::<_, i32>::new();
     let mut cut = Vec::new();
     for (k, &from) in handles.iter().enumerate() {
@@ -176,7 +184,7 @@ fn polygon(places: &[DVec3], normal: DVec3) -> Result<Vec<[usize; 3]>, Crossing>
         }
         let ends = edges.iter().map(|edge| cdt.directed_edge(*edge).vertices());
         let ends: Vec<_> = ends.map(|it| it.map(|end| end.fix())).collect();
-        // Corners on the edge: triangles without area lead from it to its pieces.
+        // Corners on the edge: triangles without area connect it to its pieces.
         let between: Vec<_> = ends[1..].iter().map(|[begin, _]| *begin).collect();
         let mut next = to;
         for &at in between.iter().rev() {
@@ -198,7 +206,7 @@ fn polygon(places: &[DVec3], normal: DVec3) -> Result<Vec<[usize; 3]>, Crossing>
         };
         let there = edge.rev().face();
         let ends = edge.vertices().map(|end| end.fix());
-        // To the left of an edge it winds once more than to the right.
+        // The winding number to the left of an edge is one more than to the right.
         let expected = here - along.get(&ends).copied().unwrap_or_default();
         let slot = &mut winding[there.fix().index()];
         if slot.is_some() || there.is_outer() {
@@ -219,7 +227,7 @@ fn polygon(places: &[DVec3], normal: DVec3) -> Result<Vec<[usize; 3]>, Crossing>
     Ok(cut)
 }
 
-/// Zero where a coordinate is smaller than spade takes.
+/// Replaces coordinates too small for spade by zero.
 fn settled(x: f64) -> f64 {
     if x.abs() < spade::MIN_ALLOWED_VALUE {
         return 0.0;
@@ -259,7 +267,7 @@ mod tests {
         left.into_iter().map(|(edge, _)| edge).collect()
     }
 
-    /// Each polygon's own outline and area, from wherever it begins and whichever way it faces.
+    /// Each polygon keeps its outline and area, wherever it begins and whichever way it faces.
     #[test]
     fn a_polygon_keeps_its_outline_and_area_wherever_it_begins() {
         let polygons: [(&str, &[[f64; 2]], f64); 6] = [
@@ -324,7 +332,7 @@ mod tests {
                     let found = area(&corners, &cut);
                     // 24 roundings of a few square metres each.
                     assert!((found - expected).abs() < 1e-14, "{name}: {found}");
-                    // Corners at one place are one: compare places.
+                    // Coincident corners count as one: compare positions.
                     let at = |k: usize| corners[k].to_array().map(f64::to_bits);
                     let first = |k: usize| (0..count).find(|&j| at(j) == at(k)).unwrap_or(k);
                     let merged: Vec<_> = cut.iter().map(|t| t.map(first)).collect();
@@ -361,7 +369,7 @@ mod tests {
             for turn in 1..corners.len() {
                 assert_eq!(places(turn), places(0));
             }
-            // The control: fans about the file's first corner differ.
+            // Negative control: fans about the file's first corner differ.
             let about = |turn: usize| -> Vec<[DVec3; 3]> {
                 let mut corners = corners.clone();
                 corners.rotate_left(turn);
@@ -375,7 +383,8 @@ mod tests {
     #[test]
     fn outlines_that_cross_are_refused_and_lines_are_not() {
         let crossing: [&[[f64; 2]]; 4] = [
-            // A bow tie of no net area, one of some, a star, a ring that goes round twice.
+            // A bow tie without net area, one with some, a star, and a ring that is
+            // traversed twice.
             &[[0., 0.], [1., 1.], [1., 0.], [0., 1.]],
             &[[0., 0.], [2., 2.], [2., 0.], [0., 1.]],
             &[[0., 1.], [1., -1.], [-1., 0.3], [1., 0.3], [-1., -1.]],
@@ -390,7 +399,8 @@ mod tests {
         assert_eq!((cut.len(), area(&line, &cut)), (2, 0.0));
     }
 
-    /// A face over the edge of a box, a top and a side of one area: neither is lost, wherever it begins, also where the top hangs over.
+    /// A face over the edge of a box, whose top and side have equal area: neither is lost, wherever
+    /// the face begins, even if the top overhangs.
     #[test]
     fn a_polygon_over_an_edge_is_both_of_its_parts() {
         for overhang in [0.0, 0.05, 0.1] {
@@ -419,7 +429,7 @@ mod tests {
         }
     }
 
-    /// A file that names corners again and again costs no more than others: by the square of the count it would be hours.
+    /// A file that repeats corners costs no more than others: quadratic time would take hours.
     #[test]
     fn repeated_corners_cost_no_more_than_others() {
         let places = [DVec3::X, DVec3::Y];

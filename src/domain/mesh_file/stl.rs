@@ -1,4 +1,5 @@
-//! STL through stl_io, which reads one solid of a text in lower case; the text is brought to that.
+//! Reads STL through stl_io, which reads a single solid in lower-case text; texts are converted to
+//! that first.
 
 use std::io::Cursor;
 
@@ -6,10 +7,10 @@ use glam::DVec3;
 
 use super::{Digits, Raw, lines_of, quoted, without_mark};
 
-/// Bytes before a binary file's triangles: a free text, and how many there are.
+/// Bytes before the triangles of a binary file: 80 bytes of free text and the number of triangles.
 const HEADER: usize = 84;
 
-/// Vertices and triangles of all solids.
+/// Reads the vertices and triangles of all solids.
 pub(super) fn read(bytes: &[u8]) -> Result<Raw, String> {
     let promised = bytes
         .get(80..HEADER)
@@ -18,7 +19,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Raw, String> {
     if promised.is_some_and(|n| bytes.len() as u64 == HEADER as u64 + 50 * n) {
         return read_binary(bytes);
     }
-    // Some exporters end a text as old systems did, with a control character.
+    // Some exporters end a text with a control character, as old systems did.
     let text = without_mark(bytes)?;
     let end = text
         .iter()
@@ -47,7 +48,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Raw, String> {
 
 fn read_binary(bytes: &[u8]) -> Result<Raw, String> {
     let mut bytes = bytes.to_vec();
-    // stl_io takes every file that starts with "solid " for text; some binary ones do.
+    // stl_io takes every file that starts with "solid " for text, but some binary files do too.
     bytes[..80].fill(0);
     let mesh = stl_io::read_stl(&mut Cursor::new(bytes)).map_err(|e| e.to_string())?;
     let vertices = mesh.vertices.iter();
@@ -70,7 +71,7 @@ fn read_text(text: &str) -> Result<Raw, String> {
     let facets = stl_io::create_stl_reader(&mut solid).map_err(|e| e.to_string())?;
     let mut count = 0;
     for (index, facet) in facets.enumerate() {
-        // It is looked at for its syntax: stl_io reads coordinates in 32 bits.
+        // Parsed only to check the syntax: stl_io reads coordinates as 32-bit floats.
         facet.map_err(|error| {
             let line = begins.get(index).copied().unwrap_or_default();
             format!("the facet that begins in line {line}: {error}")
@@ -87,7 +88,7 @@ fn read_text(text: &str) -> Result<Raw, String> {
     Ok(Raw::of_triangles(Digits::Text, places, triangles))
 }
 
-/// All solids of a text as one.
+/// All solids of a text, joined into one.
 struct Joined {
     solid: String,
     /// Line in which each facet begins.
@@ -124,7 +125,7 @@ fn join(text: &str) -> Result<Joined, String> {
             begins.push(index + 1);
         }
         is_between = line == "endfacet";
-        // Normals are not used, and where a triangle has no area they may be no numbers.
+        // Normals are not used, and may be NaN for a triangle without area.
         let words: Vec<_> = line.split_whitespace().collect();
         if let ["vertex", x, y, z] = words[..]
             && let [Ok(x), Ok(y), Ok(z)] = [x, y, z].map(str::parse)

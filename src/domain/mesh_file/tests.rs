@@ -92,7 +92,7 @@ fn a_cube_survives_stl_and_binary_ply_welded_and_closed() {
     }
 }
 
-/// Decimals keep their digits far from zero; 32-bit floats do not have them, and the file says so.
+/// Decimals keep their digits far from zero; 32-bit floats do not, and are reported as such.
 #[test]
 fn texts_are_read_in_64_bits() {
     let way = DVec3::new(448_214.2, 0.0, -5_411_987.6);
@@ -137,7 +137,7 @@ fn texts_are_read_in_64_bits() {
         );
         assert_eq!(found.farthest(), -5_411_987.6);
     }
-    // The control: floats there are half a metre apart.
+    // Negative control: floats there are half a metre apart.
     for (format, bytes) in [
         (MeshFormat::Ply, ply_of(&far, true)),
         (MeshFormat::Stl, stl_of(&far, false)),
@@ -149,7 +149,7 @@ fn texts_are_read_in_64_bits() {
     }
 }
 
-/// Corners that two faces share, computed in 64 bits in two ways.
+/// Corners that two faces share, with coordinates computed in 64 bits in two ways.
 #[test]
 fn last_digits_of_a_text_part_no_corners() {
     let cube = String::from_utf8(stl_of(&cube(), true)).expect("text");
@@ -166,13 +166,13 @@ fn last_digits_of_a_text_part_no_corners() {
             "{to}"
         );
     }
-    // The control: what is seen in 32 bits is another corner.
+    // Negative control: a difference visible in 32 bits makes another corner.
     let torn = cube.replacen("vertex 1 1 1", "vertex 1.000001 1 1", 1);
     let mesh = parse(MeshFormat::Stl, torn.as_bytes()).expect("a mesh");
     assert!(mesh.vertices.len() == 9 && !mesh.open_edges().is_empty());
 }
 
-/// An L of area 4 whose corners come from any one on, in both formats that have polygons.
+/// An L of area 4 that starts at each of its corners, in both formats with polygons.
 #[test]
 fn polygons_that_are_not_convex_are_cut_alike_in_obj_and_ply() {
     let ring = [[0, 0], [3, 0], [3, 1], [1, 1], [1, 2], [0, 2]];
@@ -229,7 +229,8 @@ fn a_nameless_text_stl_is_text() {
     assert!(parse(MeshFormat::Stl, nameless.as_bytes()).is_ok());
 }
 
-/// A sliver is dropped; a closed mesh that was exported inside out is turned; an open one is left as it is.
+/// A sliver is dropped; a closed mesh exported inside out is reversed; an open one is left as
+/// it is.
 #[test]
 fn slivers_go_and_inside_out_is_turned() {
     let corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n";
@@ -328,12 +329,12 @@ fn moved(mesh: &TriangleMesh, by: f64) -> TriangleMesh {
     mesh.transformed(&glam::DAffine3::from_translation(DVec3::X * by))
 }
 
-/// What two cubes have, one of them moved.
+/// Checks for two cubes, one of them displaced.
 #[track_caller]
 fn assert_two_cubes(found: Result<TriangleMesh, String>) {
     let mesh = found.expect("two cubes");
     assert_eq!((mesh.vertices.len(), mesh.triangles.len()), (16, 24));
-    // Twenty-four terms of at most 7/6 that round on their own.
+    // 24 terms of at most 7/6, each rounded.
     assert!((mesh.signed_volume() - 2.0).abs() < 24.0 * 7.0 / 6.0 * f64::EPSILON);
 }
 
@@ -343,8 +344,8 @@ fn every_solid_of_a_text_is_read() {
     text.extend(b"\n");
     text.extend(stl_of(&moved(&cube(), 6.0), true));
     assert_two_cubes(parse(MeshFormat::Stl, &text));
-    // As some exporters write them: capitals, tabs, Windows' and old Macs' line ends, a mark before, a control
-    // character behind, normals that are no numbers.
+    // Variants that some exporters write: capitals, tabs, line ends of Windows and old Macs, a byte
+    // order mark, a trailing control character, NaN normals.
     let text = String::from_utf8(text).expect("text");
     for changed in [
         text.to_uppercase(),
@@ -359,7 +360,7 @@ fn every_solid_of_a_text_is_read() {
     ] {
         assert_two_cubes(parse(MeshFormat::Stl, changed.as_bytes()));
     }
-    // A binary one may begin with the word.
+    // A binary file may begin with the word.
     let mut binary = stl_of(&cube(), false);
     assert!(binary.starts_with(b"solid "));
     assert!(parse(MeshFormat::Stl, &binary).is_ok());
@@ -400,7 +401,7 @@ fn every_group_of_an_obj_is_read_with_comments_marks_and_joined_lines() {
     ] {
         assert_two_cubes(parse(MeshFormat::Obj, changed.as_bytes()));
     }
-    // Line numbers are the file's, also after joined lines.
+    // Line numbers are those of the file, even after joined lines.
     let message = parse(MeshFormat::Obj, b"v 0 \\\n0 0\n# \\\nf 1 2 x").expect_err("no x");
     assert_eq!(message, "mesh m: line 4: \"x\" names no vertex");
     let wide: Vec<u8> = text.encode_utf16().flat_map(u16::to_le_bytes).collect();

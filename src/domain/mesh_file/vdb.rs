@@ -1,4 +1,5 @@
-//! OpenVDB level sets, by vdb-rs: the surface where one is 0, in the grid's own world.
+//! Reads OpenVDB level sets with vdb-rs: the surface is where the level set is 0, in world
+//! coordinates of the grid.
 
 mod half;
 
@@ -18,13 +19,13 @@ use half::with_lengths;
 use super::{Digits, Raw};
 use crate::isosurface::sparse::{Band, around};
 
-/// The level set that is read where a file has several: Houdini, Blender and swell call it so.
+/// Level set that is read if a file has several: Houdini, Blender and swell use this name.
 const USUAL: &str = "surface";
 
-/// How a file begins; vdb-rs does not look.
+/// First bytes of a file; vdb-rs does not check them.
 const MAGIC: [u8; 8] = *b" BDV\0\0\0\0";
 
-/// Vertices in metres, and triangles.
+/// Reads vertices in metres, and triangles.
 pub(super) fn read(bytes: &[u8]) -> Result<Raw, String> {
     if !bytes.starts_with(&MAGIC) {
         return Err("no OpenVDB file".into());
@@ -43,7 +44,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Raw, String> {
     };
     let mut band = Band::new();
     for (at, value, level) in grid.iter() {
-        // Tiles are wholly inside or outside: no surface is in them.
+        // Tiles are entirely inside or outside: no surface passes through them.
         if matches!(level, VdbLevel::Voxel) {
             band.insert(at.to_array().map(|c| c as i32), value);
         }
@@ -63,11 +64,12 @@ pub(super) fn read(bytes: &[u8]) -> Result<Raw, String> {
 }
 
 thread_local! {
-    /// Whether a panic of this thread is an answer, and nothing to tell of.
+    /// Whether this thread is inside [`caught`], whose panics are returned and not printed.
     static IS_ASKING: Cell<bool> = const { Cell::new(false) };
 }
 
-/// What `read` gives, or the words of its panic, of which nothing else tells: vdb-rs asserts what a file should be.
+/// Returns the result of `read`, or the message of its panic, which is not printed: vdb-rs asserts
+/// what it expects of a file.
 fn caught<T>(read: impl FnOnce() -> T) -> Result<T, String> {
     static HOOK: Once = Once::new();
     HOOK.call_once(|| {
@@ -91,27 +93,29 @@ fn words(panic: &(dyn Any + Send)) -> String {
     lines.map(str::trim).collect::<Vec<_>>().join(", ")
 }
 
-/// A grid of an OpenVDB file.
+/// Description of a grid of an OpenVDB file.
 #[derive(Clone, Debug)]
 pub struct GridFile {
-    /// Such as `surface`.
+    /// Name, such as `surface`.
     pub name: String,
-    /// As OpenVDB calls it, such as `Tree_float_5_4_3`.
+    /// OpenVDB's name of the grid type, such as `Tree_float_5_4_3`.
     pub kind: String,
-    /// `level set`, `staggered`, `fog volume`; empty where it has none.
+    /// Grid class: `level set`, `staggered` or `fog volume`; empty if the grid has none.
     pub class: String,
-    /// Active voxels as its metadata says; `None` where they do not.
+    /// Number of active voxels according to the metadata; `None` if it does not tell.
     pub voxels: Option<u64>,
-    /// Least and greatest active voxel as its metadata says.
+    /// Least and greatest active voxel according to the metadata.
     pub extent: Option<[[i32; 3]; 2]>,
-    /// Edges of a voxel, in the grid's own unit; `None` of grids that hold no single floats.
+    /// Edge lengths of a voxel, in the grid's own unit; `None` for grids that do not hold
+    /// 32-bit floats.
     pub voxel_size: Option<[f64; 3]>,
 }
 
-/// What grids a file has, by name; grids of floats are read, so that a torn one is found.
+/// Lists the grids of a file, by name. Grids of floats are read completely, so that a truncated one
+/// is detected.
 ///
 /// # Errors
-/// What is wrong, in words.
+/// A message that says what is wrong.
 pub fn grids(bytes: &[u8]) -> Result<Vec<GridFile>, String> {
     if !bytes.starts_with(&MAGIC) {
         return Err("no OpenVDB file".into());
@@ -170,7 +174,7 @@ fn scale_of(grid: &Grid<f32>) -> [f64; 3] {
     }
 }
 
-/// The file's level set.
+/// Reads the level set of a file.
 fn grid(bytes: &[u8]) -> Result<Grid<f32>, String> {
     let fail = |error: vdb_rs::ParseError| error.to_string();
     let mut reader = VdbReader::new(Cursor::new(bytes)).map_err(fail)?;

@@ -1,62 +1,69 @@
-//! The piston that makes regular waves of permanent form in shallow water: cnoidal waves (Goring 1978; Goring and Raichlen 1980).
+//! Piston motion for regular waves of permanent form in shallow water: cnoidal waves (Goring 1978;
+//! Goring and Raichlen 1980).
 
 use super::{
     elliptic::Elliptic,
     regular::{Cycle, RegularWaves, comes_within},
 };
 
-/// Least length of a cnoidal wave in depths: at 8 the speed of a low one is 2.5 % less than linear theory's.
+/// Least length of a cnoidal wave, in depths: at 8 the speed of a low wave is 2.5 % below
+/// linear theory.
 pub const LEAST_CNOIDAL_LENGTH: f64 = 8.0;
 
-/// Greatest −ln(1 − m). The crests are then 693 √(4h³ / 3H) from one another.
+/// Largest −ln(1 − m). The crests are then 693 √(4h³ / 3H) apart.
 const MOST_LOG: f64 = 690.0;
 
-/// Why there is no cnoidal wave of a height, a period and a depth.
+/// Reason why no cnoidal wave has a given height, period and depth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum NoCnoidal {
-    /// It would be shorter than [`LEAST_CNOIDAL_LENGTH`] depths, or no m between 0 and 1 fits.
+    /// The wave would be shorter than [`LEAST_CNOIDAL_LENGTH`] depths, or no m between 0 and
+    /// 1 fits.
     Short {
-        /// The period from which on there is one, seconds.
+        /// Shortest period for which there is a wave, seconds.
         least_period: f64,
     },
-    /// Its crests are so far apart that 1 − m is no number: each is a solitary wave.
+    /// The crests are so far apart that 1 − m underflows: each is a solitary wave.
     Long {
-        /// The period up to which there is one, seconds.
+        /// Longest period for which there is a wave, seconds.
         most_period: f64,
     },
 }
 
 /// Cnoidal waves, the permanent form of Korteweg and de Vries (1895).
 ///
-/// η = H (cn²(2Kθ | m) − mean of cn²) about the still water, H L² / h³ = 16/3 m K² and
-/// c² = g h (1 + H/h · (2 − m − 3 E/K) / m), which becomes g (h + H) of the solitary wave (Wiegel 1960; Svendsen and Jonsson
-/// 1976). The wall goes with the water beside it: dξ/dt = c η / (h + η) at x = ξ. With θ = (ct − ξ) / L this is
-/// dξ/dθ = L η / h, and so ξ = √(4 H h / 3m) Z(2Kθ | m) about the mean place with Z Jacobi's zeta function: implicit in t
-/// alone, as Goring's solitary wave is.
+/// η = H (cn²(2Kθ | m) − mean of cn²) about the still water, H L² / h³ = 16/3 m K² and c² = g h
+/// (1 + H/h · (2 − m − 3 E/K) / m), which becomes g (h + H) for the solitary wave (Wiegel 1960;
+/// Svendsen and Jonsson 1976). The wall moves with the water beside it: dξ/dt = c η / (h + η) at
+/// x = ξ. With θ = (ct − ξ) / L this is dξ/dθ = L η / h, and so ξ = √(4 H h / 3m) Z(2Kθ | m)
+/// about the mean position, with Jacobi's zeta function Z: implicit only in t, like Goring's
+/// solitary wave.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cnoidal {
     waves: RegularWaves,
     functions: Elliptic,
-    /// L, metres.
+    /// Wave length L, metres.
     length: f64,
-    /// c, m/s.
+    /// Phase speed c, m/s.
     celerity: f64,
-    /// √(4 H h / 3m), metres.
+    /// Amplitude of the wall, √(4 H h / 3m), metres.
     amplitude: f64,
-    /// u = 2Kθ at which η falls through 0 and the wall is farthest in; farthest out it is at −u.
+    /// u = 2Kθ at which η falls through 0 and the wall is farthest in; it is farthest out at −u.
     farthest: f64,
-    /// Metres.
+    /// Mean position of the wall, metres.
     mean: f64,
 }
 
 impl Cnoidal {
-    /// The wall's motion for waves lower than they are deep.
+    /// Computes the wall's motion for waves whose height is less than the depth.
+    ///
+    /// # Errors
+    /// [`NoCnoidal`] if no cnoidal wave has this period.
     pub fn new(waves: RegularWaves) -> Result<Self, NoCnoidal> {
         let functions = fitting(&waves)?;
         let length = length(&waves, &functions);
         let amplitude = (4.0 * waves.height * waves.depth / (3.0 * functions.parameter)).sqrt();
         let level = functions.mean_of_squared_cn();
-        // cn falls from 1 to 0 over a quarter.
+        // cn falls from 1 to 0 over a quarter period.
         let farthest = bisect([0.0, functions.quarter], |u| {
             functions.cn_and_zeta(u).0.powi(2) < level
         });
@@ -71,17 +78,17 @@ impl Cnoidal {
         })
     }
 
-    /// What was asked for.
+    /// Returns the waves that this motion was derived from.
     pub fn waves(&self) -> &RegularWaves {
         &self.waves
     }
 
-    /// Metres.
+    /// Returns the wave length, metres.
     pub fn wave_length(&self) -> f64 {
         self.length
     }
 
-    /// Elevation at a distance from the domain's face once the ramp is over, metres.
+    /// Returns the elevation at `distance` from the domain's face after the ramp, metres.
     pub fn elevation(&self, distance: f64, t: f64) -> f64 {
         let way = self.run(t) - (distance - self.mean);
         let theta = way / self.length;
@@ -89,23 +96,24 @@ impl Cnoidal {
         self.level(self.functions.cn_and_zeta(u).0)
     }
 
-    /// η, metres, by cn.
+    /// η, metres, from cn.
     fn level(&self, cn: f64) -> f64 {
         self.waves.height * (cn * cn - self.functions.mean_of_squared_cn())
     }
 
-    /// c η / (h + η), m/s.
+    /// Wall velocity c η / (h + η), m/s.
     fn velocity(&self, level: f64) -> f64 {
         self.celerity * level / (self.waves.depth + level)
     }
 
-    /// Metres that waves have gone, from where a crest is at the wall's mean place.
+    /// Distance that waves have travelled, metres, measured from a crest at the wall's
+    /// mean position.
     fn run(&self, t: f64) -> f64 {
         let start = self.farthest * self.length / (2.0 * self.functions.quarter) + self.mean;
         self.celerity * t - start
     }
 
-    /// θ = n + u / 2K with u within a quarter of 0: n, u, and cn and Z there.
+    /// Phase as θ = n + u / 2K with |u| up to a quarter period: n, u, and cn and Z at u.
     fn phase(&self, t: f64) -> (f64, f64, (f64, f64)) {
         let run = self.run(t);
         let whole = (run / self.length).round();
@@ -113,7 +121,8 @@ impl Cnoidal {
         let per_u = self.length / (2.0 * self.functions.quarter);
         let (mut low, mut high) = (-self.functions.quarter, self.functions.quarter);
         let mut u = (run / per_u).clamp(low, high);
-        // L θ + ξ rises with θ, by 1 + η/h: Newton converges quadratically, bisection keeps it inside.
+        // L θ + ξ increases with θ at a rate of 1 + η/h: Newton converges quadratically, and
+        // bisection keeps it in the bracket.
         for _ in 0..60 {
             let (cn, zeta) = self.functions.cn_and_zeta(u);
             let residual = per_u * u + self.amplitude * zeta - run;
@@ -186,15 +195,17 @@ fn length(waves: &RegularWaves, functions: &Elliptic) -> f64 {
     waves.depth * (16.0 * functions.parameter / (3.0 * steepness)).sqrt() * functions.quarter
 }
 
-/// L / c, seconds; infinite where c² would be negative.
+/// Period L / c, seconds; infinite where c² would be negative.
 fn period(waves: &RegularWaves, functions: &Elliptic) -> f64 {
     let faster = 1.0 + waves.height / waves.depth * functions.speed_up();
     length(waves, functions) / (waves.gravity * waves.depth * faster.max(0.0)).sqrt()
 }
 
-/// The functions whose m gives the period. From [`LEAST_CNOIDAL_LENGTH`] on the period rises with m.
+/// Elliptic functions whose m gives the period. From [`LEAST_CNOIDAL_LENGTH`] on, the period
+/// increases with m.
 fn fitting(waves: &RegularWaves) -> Result<Elliptic, NoCnoidal> {
-    // By the logarithm of −ln(1 − m), as m is tiny for low waves and all but 1 for long ones.
+    // Searches over the logarithm of −ln(1 − m), as m is tiny for low waves and close to 1 for
+    // long ones.
     let at = |log: f64| Elliptic::new(-(-log.exp()).exp_m1(), (-log.exp()).exp());
     let all = [1e-17f64.ln(), MOST_LOG.ln()];
     let shortest = bisect(all, |log| {
@@ -213,7 +224,7 @@ fn fitting(waves: &RegularWaves) -> Result<Elliptic, NoCnoidal> {
     })))
 }
 
-/// Where a condition begins to hold, to rounding: it holds at the end and not at the start.
+/// Point from which a condition holds, to rounding: it must hold at the end and not at the start.
 fn bisect([mut low, mut high]: [f64; 2], holds: impl Fn(f64) -> bool) -> f64 {
     for _ in 0..100 {
         let middle = 0.5 * (low + high);
@@ -247,7 +258,7 @@ mod tests {
         Cnoidal::new(asked(height, period)).expect("there is one")
     }
 
-    /// The equation of motion itself (Goring 1978), by the elevation where the wall is.
+    /// The equation of motion itself (Goring 1978), with the elevation at the wall.
     #[test]
     fn the_wall_goes_with_the_water_beside_it() {
         let waves = cnoidal(0.3, 6.0);
@@ -263,12 +274,13 @@ mod tests {
             assert!(there < 1e-12, "{t}: {there}");
             spoiled = spoiled.max(off(t, waves.mean));
         }
-        // Negative control: the elevation at the wall's mean place.
+        // Negative control: the elevation at the wall's mean position.
         assert!(spoiled > 0.05, "{spoiled}");
     }
 
-    /// Steady waves of Korteweg and de Vries: h³/3 η'² = (η₁ − η)(η − η₂)(η − η₃) with the crest η₁, the trough η₂, and
-    /// η₁ + η₂ + η₃ = h (c²/gh − 1) (Svendsen and Jonsson 1976), about a mean level of 0.
+    /// Steady waves of Korteweg and de Vries: h³/3 η'² = (η₁ − η)(η − η₂)(η − η₃) with the crest
+    /// η₁, the trough η₂, and η₁ + η₂ + η₃ = h (c²/gh − 1) (Svendsen and Jonsson 1976), about a
+    /// mean level of 0.
     #[test]
     fn the_elevation_is_a_wave_of_korteweg_and_de_vries_about_the_still_water() {
         for (height, period) in [(0.01, 3.2), (0.1, 4.0), (0.3, 6.0), (0.6, 20.0)] {
@@ -280,7 +292,7 @@ mod tests {
             let levels: Vec<f64> = levels.collect();
             let crest = levels.iter().copied().fold(f64::MIN, f64::max);
             let trough = levels.iter().copied().fold(f64::MAX, f64::min);
-            // Half a step off the crest, 1e-6 of the height or less.
+            // Half a step from the crest the error is at most 1e-6 of the height.
             assert!(((crest - trough) / height - 1.0).abs() < 1e-4);
             let mean = levels.iter().sum::<f64>() / f64::from(samples);
             assert!(mean.abs() < 1e-12 * height, "{mean}");
@@ -304,8 +316,8 @@ mod tests {
         }
     }
 
-    /// The farther the crests are apart, the more each is Goring's solitary wave: what is left falls as one over the period, as
-    /// the trough's H/K does.
+    /// The farther apart the crests, the closer each is to Goring's solitary wave: the difference
+    /// falls as one over the period, like the trough's H/K.
     #[test]
     fn crests_far_apart_are_gorings_solitary_waves() {
         let off = |period: f64, height: f64| {
@@ -327,12 +339,13 @@ mod tests {
             let falls = pair[0] / pair[1];
             assert!((falls - 2.0).abs() < 0.1, "{far:?}");
         }
-        // Negative control: a solitary wave of another height stays as far off.
+        // Negative control: for a solitary wave of another height the difference does not fall.
         let other = [150.0, 300.0].map(|period| off(period, 0.33));
         assert!(other[0] < 1.2 * other[1], "{other:?}");
     }
 
-    /// Low waves: a piston's stroke by linear theory. The length of low cnoidal waves is off by (kh)⁴/15.
+    /// Low waves: a piston's stroke agrees with linear theory. The length of low cnoidal waves is
+    /// off by (kh)⁴/15.
     #[test]
     fn low_waves_have_the_stroke_of_linear_theory() {
         let off = |height: f64, period: f64| {
@@ -345,9 +358,9 @@ mod tests {
             let (kh, off) = off(height, period);
             assert!(off < 0.1 * kh.powi(4) + 1e-4, "{period}: {off}");
         }
-        // Negative control: high waves are none of linear theory's.
+        // Negative control: high waves deviate from linear theory.
         assert!(off(0.3, 20.0).1 > 0.1);
-        // A sine of its frequency.
+        // The motion is a sine of the wave's frequency.
         let waves = cnoidal(1e-8, 10.0);
         for i in 0..50 {
             let t = 0.2 * f64::from(i);
@@ -383,7 +396,7 @@ mod tests {
         let waves = cnoidal(0.1, 1.001 * least_period);
         let length = waves.wave_length();
         assert!((LEAST_CNOIDAL_LENGTH..1.01 * LEAST_CNOIDAL_LENGTH).contains(&length));
-        // Above KdV's own bound, T √(g/h) = 2π / √¾ of low waves.
+        // Above the bound of KdV itself, T √(g/h) = 2π / √¾ for low waves.
         assert!(least_period * 9.81f64.sqrt() > TAU / 0.75f64.sqrt());
         let Err(NoCnoidal::Long { most_period }) = Cnoidal::new(asked(0.1, 1e4)) else {
             panic!("1e4 s on a metre of water");

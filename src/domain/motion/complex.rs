@@ -1,8 +1,8 @@
-//! Complex amplitudes: a exp(iωt), of which the real part is what moves.
+//! Complex amplitudes: the real part of a exp(iωt) is the physical quantity.
 
 use std::ops::{Add, AddAssign, Mul, Sub};
 
-/// re + i im.
+/// The complex number re + i im.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Complex {
     pub(super) re: f64,
@@ -14,7 +14,7 @@ impl Complex {
         Self { re, im }
     }
 
-    /// `size` exp(i `angle`).
+    /// Returns `size` exp(i `angle`).
     pub(super) fn polar(size: f64, angle: f64) -> Self {
         let (sin, cos) = angle.sin_cos();
         Self::new(size * cos, size * sin)

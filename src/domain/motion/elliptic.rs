@@ -1,29 +1,31 @@
-//! Elliptic integrals and functions by the arithmetic-geometric mean (Abramowitz and Stegun 1964, §16.4 and §17.6).
+//! Elliptic integrals and functions by the arithmetic-geometric mean (Abramowitz and Stegun 1964,
+//! §16.4 and §17.6).
 
 use std::f64::consts::PI;
 
-/// Those of one parameter m between 0 and 1.
+/// Elliptic integrals and functions for one parameter m between 0 and 1.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Elliptic {
-    /// m.
+    /// Parameter m.
     pub(super) parameter: f64,
-    /// K(m), a quarter of sn's period and half of cn²'s.
+    /// Quarter period K(m): a quarter of sn's period and half of cn²'s.
     pub(super) quarter: f64,
-    /// Σ 2ⁿ⁻¹ cₙ² from n = 1 on: 1 − m/2 − E/K, without the rounding of that difference where m is small.
+    /// Σ 2ⁿ⁻¹ cₙ² from n = 1 on. It equals 1 − m/2 − E/K, without the cancellation of that
+    /// difference for small m.
     rest: f64,
-    /// [aₙ, cₙ] of the mean from n = 1 on.
+    /// [aₙ, cₙ] of the arithmetic-geometric mean from n = 1 on.
     steps: Vec<[f64; 2]>,
 }
 
 impl Elliptic {
-    /// By m and 1 − m, each as exact as it can be.
+    /// Takes m and 1 − m separately, so that each is accurate.
     pub(super) fn new(parameter: f64, complement: f64) -> Self {
         let (mut a, mut b, mut c_squared) = (1.0, complement.sqrt(), parameter);
         let (mut rest, mut weight) = (0.0, 1.0);
         let mut steps = Vec::new();
         loop {
             let next = 0.5 * (a + b);
-            // cₙ = (aₙ₋₁ − bₙ₋₁) / 2, without its rounding.
+            // cₙ = (aₙ₋₁ − bₙ₋₁) / 2, without cancellation.
             let c = c_squared / (4.0 * next);
             b = (a * b).sqrt();
             a = next;
@@ -43,17 +45,19 @@ impl Elliptic {
         }
     }
 
-    /// The mean of cn² over its period, (E/K − (1 − m)) / m.
+    /// Returns the mean of cn² over its period, (E/K − (1 − m)) / m.
     pub(super) fn mean_of_squared_cn(&self) -> f64 {
         0.5 - self.rest / self.parameter
     }
 
-    /// (2 − m − 3 E/K) / m: how much faster a cnoidal wave is than a long one, in H/h (see [`super::Cnoidal`]).
+    /// Returns (2 − m − 3 E/K) / m: the excess of a cnoidal wave's c²/gh over 1, in units of H/h
+    /// (see [`super::Cnoidal`]).
     pub(super) fn speed_up(&self) -> f64 {
         0.5 + (3.0 * self.rest - 1.0) / self.parameter
     }
 
-    /// cn(u | m) and Jacobi's zeta function Z(u | m) = E(u | m) − u E/K, for |u| of some K.
+    /// Returns cn(u | m) and Jacobi's zeta function Z(u | m) = E(u | m) − u E/K, for |u| up to a
+    /// few K.
     pub(super) fn cn_and_zeta(&self, u: f64) -> (f64, f64) {
         let levels = self.steps.len();
         let mut phase = 2f64.powi(levels as i32) * self.steps[levels - 1][0] * u;
@@ -75,7 +79,7 @@ mod tests {
         Elliptic::new(m, 1.0 - m)
     }
 
-    /// E(m), as 1 − m/2 − Σ says it.
+    /// E(m), from 1 − m/2 − Σ.
     fn second_kind(functions: &Elliptic) -> f64 {
         functions.quarter * (1.0 - 0.5 * functions.parameter - functions.rest)
     }
@@ -105,14 +109,14 @@ mod tests {
             assert!((functions.mean_of_squared_cn() - mean).abs() < 1e-7);
             let speed_up = (2.0 - row[0] - 3.0 * row[2] / row[1]) / row[0];
             assert!((functions.speed_up() - speed_up).abs() < 2e-7);
-            // Negative control: of the modulus k for the parameter m = k².
+            // Negative control: the modulus k instead of the parameter m = k².
             let (first, second) = off(row[0].sqrt(), row);
             assert!(first > 1e-3 && second > 1e-3);
         }
     }
 
-    /// cn(0.2 | 0.81) and cn(u | 0.5) as they are tabulated; cn² and Z at half of K in closed form (Abramowitz and Stegun 1964,
-    /// §16.5; Z(K/2) = (1 − k')/2).
+    /// Tabulated values of cn(0.2 | 0.81) and cn(u | 0.5); cn² and Z at half of K in closed form
+    /// (Abramowitz and Stegun 1964, §16.5; Z(K/2) = (1 − k')/2).
     #[test]
     fn cn_and_zeta_have_the_values_that_are_known() {
         for (m, u, cn) in [
@@ -145,7 +149,7 @@ mod tests {
             let u = 0.07 * f64::from(i);
             let (cn, zeta) = low.cn_and_zeta(u);
             assert!((cn - u.cos()).abs() < 1e-9);
-            // m/4 sin 2u to first order in m: of it, so many parts in 1e9.
+            // m/4 sin 2u to first order in m, with m = 1e-9.
             assert!((zeta * 4e9 - (2.0 * u).sin()).abs() < 1e-8, "{u}: {zeta}");
             let (cn, zeta) = high.cn_and_zeta(u);
             assert!((cn - 1.0 / u.cosh()).abs() < 1e-14);
@@ -155,7 +159,7 @@ mod tests {
         // K → ln 4 / k'.
         let quarter = 4f64.ln() + 150.0 * 10f64.ln();
         assert!((high.quarter / quarter - 1.0).abs() < 1e-14);
-        // Negative control: each is not the other.
+        // Negative control: the two limits differ.
         assert!((low.cn_and_zeta(0.7).0 - high.cn_and_zeta(0.7).0).abs() > 0.01);
     }
 }

@@ -1,12 +1,12 @@
-//! Linear wave theory: what a piston makes.
+//! Linear wave theory of a piston.
 
 use std::f64::consts::PI;
 
-/// The wavenumber k in rad/m of a wave of `angular_frequency` (rad/s) on water of `depth` metres:
-/// ω² = g k tanh kh.
+/// Returns the wavenumber k in rad/m of a wave of `angular_frequency` (rad/s) on water of `depth`
+/// metres, from ω² = g k tanh kh. `gravity` in m/s².
 pub fn wave_number(angular_frequency: f64, depth: f64, gravity: f64) -> f64 {
     let deep = angular_frequency.powi(2) / gravity;
-    // Guo 2002, within 0.75 % at any depth; Newton takes it to round-off.
+    // Initial guess of Guo 2002, within 0.75 % at any depth; Newton refines it to round-off.
     let y = deep * depth;
     let mut kh = y * (1.0 - (-y.powf(1.25)).exp()).powf(-0.4);
     for _ in 0..20 {
@@ -21,23 +21,24 @@ pub fn wave_number(angular_frequency: f64, depth: f64, gravity: f64) -> f64 {
     kh / depth
 }
 
-/// Wave height over piston stroke far from the piston, in linear theory:
-/// H/S = 2 (cosh 2kh − 1) / (sinh 2kh + 2kh).
+/// Returns the ratio of wave height to piston stroke far from the piston, by linear theory: H/S = 2
+/// (cosh 2kh − 1) / (sinh 2kh + 2kh).
 pub fn piston_height_ratio(wave_number: f64, depth: f64) -> f64 {
     let twice = 2.0 * wave_number * depth;
-    // Both grow as exp: in deep water the ratio is 2 and cosh overflows.
+    // Both terms grow as exp: in deep water the ratio tends to 2 and cosh overflows.
     if twice > 300.0 {
         return 2.0;
     }
     2.0 * (twice.cosh() - 1.0) / (twice.sinh() + twice)
 }
 
-/// Local waves of a piston whose count is enough: what those behind add to their sum falls as 1/count².
+/// Number of local waves of a piston that are summed: the remainder of their sum falls as 1/count².
 const LOCAL_WAVES: u32 = 400;
 
-/// The waves that stay beside a piston (Biésel 1951; Dean and Dalrymple 1991, 6.2): kⱼh with ω² = −g kⱼ tan kⱼh, and the
-/// amplitude of their elevation at the piston over that of its way, cⱼ = 4 sin² kⱼh / (2kⱼh + sin 2kⱼh). They rise with
-/// the piston's way, as water that is pushed does.
+/// Evanescent (local) waves beside a piston (Biésel 1951; Dean and Dalrymple 1991, 6.2): kⱼh with
+/// ω² = −g kⱼ tan kⱼh, and the amplitude of their elevation at the piston per displacement, cⱼ = 4
+/// sin² kⱼh / (2kⱼh + sin 2kⱼh). The elevation is in phase with the displacement, as for water that
+/// is pushed.
 fn local_waves(
     angular_frequency: f64,
     depth: f64,
@@ -61,8 +62,9 @@ fn local_waves(
     })
 }
 
-/// Elevation at a piston over its way, in linear theory: the part that goes with its velocity, and that which goes with
-/// the way itself (the local waves'). As complex amplitudes η = (i a + b) ξ for a motion as e^iωt.
+/// Returns the elevation at a piston per displacement, by linear theory: the part in phase with the
+/// velocity, and the part in phase with the displacement (that of the local waves). In complex
+/// amplitudes, η = (i a + b) ξ for a motion as e^iωt.
 pub fn piston_elevation(angular_frequency: f64, depth: f64, gravity: f64) -> [f64; 2] {
     let number = wave_number(angular_frequency, depth, gravity);
     let local = local_waves(angular_frequency, depth, gravity);
@@ -93,8 +95,8 @@ mod tests {
         assert_eq!(piston_height_ratio(1e6, 1.0), 2.0);
     }
 
-    /// A piston pushes alike at every depth: modes are complete, and at the surface their profiles add up to one. Those of an
-    /// elevation c have c coth kh and cⱼ cot kⱼh there.
+    /// A piston pushes equally at every depth: the modes are complete, and their profiles add up to
+    /// one at the surface. Those of an elevation c have c coth kh and cⱼ cot kⱼh there.
     #[test]
     fn all_waves_of_a_piston_together_are_its_own_profile() {
         for (frequency, depth) in [(2.0, 0.3), (3.0, 1.0), (5.0, 1.0), (9.0, 0.5)] {
@@ -104,7 +106,7 @@ mod tests {
                 let local = local_waves(frequency, depth, 9.81);
                 progressive + scale * local.map(|(x, c)| c / x.tan()).sum::<f64>()
             };
-            // What is left out falls as 2 y / (π² count).
+            // The truncation error falls as 2 y / (π² count).
             let left = 2.0 * frequency.powi(2) * depth / 9.81 / (PI * PI * f64::from(LOCAL_WAVES));
             assert!((sum(1.0) - 1.0).abs() < 1.2 * left, "{}", sum(1.0) - 1.0);
             assert!((sum(1.1) - 1.0).abs() > 1.5 * left, "{}", sum(1.1) - 1.0);

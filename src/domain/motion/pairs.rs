@@ -1,39 +1,44 @@
-//! The wave maker problem to second order for waves of many frequencies: what a piston has to do at the sum and at the difference
-//! of each two of them so that no free wave of that frequency is made (Schäffer 1996, the full theory), and the waves that are
-//! bound to each two (Sharma and Dean 1981; Dalzell 1999).
+//! The wave maker problem to second order for waves of many frequencies: the motion that a piston
+//! needs at the sum and at the difference of each two frequencies so that it generates no free wave
+//! there (Schäffer 1996, the full theory), and the bound waves of each pair (Sharma and Dean 1981;
+//! Dalzell 1999).
 
 use rayon::prelude::*;
 
 use super::{complex::Complex, second_order::evanescent, wave_number};
 
-/// Evanescent modes that are summed, in shallow water and more per kh of the shorter wave. The sums of an eighth, a quarter and half of
-/// them take off what is left out, which falls as one over their number and its powers: 5e-5 of the whole is left where kh is 9,
-/// 2e-4 where it is 25.
+/// Number of evanescent modes that are summed: a base for shallow water, and more per kh of the
+/// shorter wave. The truncation error falls as one over their number and its powers; extrapolation
+/// from the sums over an eighth, a quarter and half of the modes removes most of it. 5e-5 of the
+/// whole is left at kh = 9, 2e-4 at kh = 25.
 const MODES: f64 = 32.0;
 const MODES_PER_KH: f64 = 10.0;
 
-/// What a mode counts as it is within the first eighth, quarter, half or the rest, by three steps of Richardson's.
+/// Weights of a mode in the first eighth, quarter, half or the rest: three steps of
+/// Richardson extrapolation.
 const WEIGHTS: [f64; 4] = [1.0, 22.0 / 21.0, 8.0 / 21.0, 64.0 / 21.0];
 
-/// Frequencies at which pairs are solved for; what is between them is interpolated by polynomials of the fifth degree. In water four of the
-/// shortest waves deep, the most that is taken, the difference frequencies are off by 1e-3 at most, where one wave has twice the
-/// frequency of the other; where kh of the shortest is 9, all are off by 1e-5.
+/// Number of frequencies at which pairs are solved; in between, polynomials of the fifth degree
+/// interpolate. In water as deep as four of the shortest waves, the deepest allowed, the difference
+/// frequencies are off by 1e-3 at most, where one wave has twice the frequency of the other; for kh
+/// = 9 of the shortest wave, all are off by 1e-5.
 const NODES: usize = 96;
 const POINTS: usize = 6;
 
-/// kh of the shortest waves that it is solved for: four of them are as long as the water is deep. In deeper water the
+/// Largest kh of the shortest waves: the depth is then four of their lengths. In deeper water the
 /// differences need more nodes than `NODES`.
 pub const DEEPEST: f64 = 25.0;
 
-/// Which product of two waves.
+/// Selects one of the two products of a pair of waves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Of {
     Sum,
     Difference,
 }
 
-/// A wave of the first order, before the wall that makes it. The wall's way is Re X exp(iωt), and the potential
-/// −ωX Σ (Dⱼ / kⱼ) cosh kⱼ(z + h) / cosh kⱼh · exp(i(ωt − kⱼx)) with ω² = g kⱼ tanh kⱼh, k₀ real and the others −iκⱼ.
+/// A wave of first order near the wall that makes it. The wall's displacement is Re X exp(iωt), and
+/// the potential is −ωX Σ (Dⱼ / kⱼ) cosh kⱼ(z + h) / cosh kⱼh · exp(i(ωt − kⱼx)) with ω² = g kⱼ
+/// tanh kⱼh, k₀ real and the others −iκⱼ.
 struct Wave {
     /// ω, rad/s.
     frequency: f64,
@@ -68,19 +73,19 @@ fn modes_for(kh: f64) -> usize {
     ((MODES + MODES_PER_KH * kh) / 8.0).ceil() as usize * 8
 }
 
-/// Two waves, of which the second counts with −ω and −k* where it is their difference that is looked at: exp(i(ωt − kx)) is then the
-/// conjugate.
+/// Two waves. For their difference, the second enters with −ω and −k*: exp(i(ωt − kx)) is then
+/// the conjugate.
 struct Pair<'a> {
     first: &'a Wave,
     second: &'a Wave,
-    /// Of the second, rad/s and rad/m, with its sign.
+    /// Signed frequency and wavenumber of the second wave, rad/s and rad/m.
     frequency: f64,
     number: f64,
-    /// Ω, rad/s.
+    /// Combined frequency Ω, rad/s.
     whole: f64,
     /// Ω²/g, 1/m.
     deep: f64,
-    /// K², of the free wave of Ω.
+    /// K², with K the wavenumber of the free wave of Ω.
     squared: f64,
     depth: f64,
     gravity: f64,
@@ -104,12 +109,14 @@ impl<'a> Pair<'a> {
         }
     }
 
-    /// Ω F, rad/(s m), where the wall has to do Re F X₁X₂ exp(iΩt) besides, of the difference Re F X₁X₂* exp(iΩt).
+    /// Returns Ω F, rad/(s m): the wall's correction is Re F X₁X₂ exp(iΩt) for the sum, and Re F
+    /// X₁X₂* exp(iΩt) for the difference.
     ///
-    /// The waves' squares force the surface by Re p φ₁φ₂, and the wall stands at its displacement and not at the mean place. By Green's
-    /// identity the free wave of Ω is not made where i Ω F tanh Kh / K is
-    /// −½ Σₗ ω₂ kₗDₗ Iₗ − ½ Σⱼ ω₁ kⱼDⱼ Iⱼ − Σⱼₗ ω₁ω₂ (DⱼDₗ / kⱼkₗ) s p / g (s² − K²) with s = kⱼ + kₗ, where I is
-    /// (ν − N) / (k² − K²), N = Ω²/g, and p = Ω (kⱼkₗ − ν₁ν₂) + ½ ω₁ (kₗ² − ν₂²) + ½ ω₂ (kⱼ² − ν₁²).
+    /// Products of the waves force the surface by Re p φ₁φ₂, and the wall is at its displacement,
+    /// not at the mean position. By Green's identity the free wave of Ω vanishes if i Ω F tanh Kh /
+    /// K is −½ Σₗ ω₂ kₗDₗ Iₗ − ½ Σⱼ ω₁ kⱼDⱼ Iⱼ − Σⱼₗ ω₁ω₂ (DⱼDₗ / kⱼkₗ) s p / g (s² − K²) with s =
+    /// kⱼ + kₗ, where I is (ν − N) / (k² − K²), N = Ω²/g, and p = Ω (kⱼkₗ − ν₁ν₂) + ½ ω₁ (kₗ² −
+    /// ν₂²) + ½ ω₂ (kⱼ² − ν₁²).
     fn transfer(&self) -> Complex {
         let (first, second) = (self.first, self.second);
         let kh = first.number.max(second.number) * self.depth;
@@ -132,7 +139,7 @@ impl<'a> Pair<'a> {
             sum += with_second * (weight * d) + with_first * (weight * e);
         }
         sum.im += self.evanescent(count);
-        // K² / (iN) of it.
+        // Multiplies by K² / (iN).
         Complex::new(sum.im, -sum.re) * (self.squared / self.deep)
     }
 
@@ -153,12 +160,13 @@ impl<'a> Pair<'a> {
         if off.size() > 1e-7 * self.squared {
             return k * off.inverse() * (deep - self.deep);
         }
-        // The free wave is one of the two: (½ ν/k² + ½ h (1 − ν²/k²)) k.
+        // The free wave coincides with one of the two: (½ ν/k² + ½ h (1 − ν²/k²)) k.
         let k = k.re;
         (0.5 * deep / k + 0.5 * self.depth * (k - deep * deep / k)).into()
     }
 
-    /// The imaginary part of [`Self::product`] over all pairs of two of the first so many evanescent modes; there is no real one.
+    /// Imaginary part of [`Self::product`] summed over all pairs of the first `count` evanescent
+    /// modes; the real part is zero.
     fn evanescent(&self, count: usize) -> f64 {
         let (first, second) = (self.first, self.second);
         let ends = [count / 8, count / 4, count / 2, count];
@@ -176,7 +184,7 @@ impl<'a> Pair<'a> {
                 };
                 modes.iter().map(of).sum()
             };
-            // The larger of the two indices says in which part a pair is.
+            // The larger of the two indices decides the group of a pair.
             let mut from = 0;
             let mut row = 0.0;
             for (part, &end) in ends.iter().enumerate().skip(block(index, count)) {
@@ -188,7 +196,8 @@ impl<'a> Pair<'a> {
         all * first.frequency * self.frequency / self.gravity
     }
 
-    /// What is bound to two progressive waves of a metre each, metres: b of the elevation Re b exp(i(Ωt − (k₁ + k₂)x)).
+    /// Elevation bound to two progressive waves of one metre each, metres: b in Re b exp(i(Ωt − (k₁
+    /// + k₂)x)).
     fn bound(&self) -> f64 {
         let (first, second) = (self.first, self.second);
         let (k, l) = (first.number, self.number);
@@ -204,7 +213,7 @@ impl<'a> Pair<'a> {
     }
 }
 
-/// Which eighth, quarter, half or whole of so many the index first falls into.
+/// Index of the first of an eighth, a quarter, half and all of `count` that contains `index`.
 fn block(index: usize, count: usize) -> usize {
     [8, 4, 2]
         .iter()
@@ -212,25 +221,28 @@ fn block(index: usize, count: usize) -> usize {
         .count()
 }
 
-/// The second order of waves whose frequencies are `first` to `last` times a step.
+/// Second-order solution for waves whose frequencies are `first` to `last` times a step.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Pairs {
     first: usize,
     last: usize,
-    /// rad/s.
+    /// Frequency step, rad/s.
     step: f64,
-    /// Ω F at the nodes, row by row of the first wave's; the second's are half a node's distance lower, so that Ω is nowhere 0.
+    /// Ω F at the nodes, one row per node of the first wave. The nodes of the second wave are half
+    /// a node spacing lower, so that Ω is never 0.
     sums: Vec<Complex>,
     differences: Vec<Complex>,
-    /// What is bound to each two, those of the first line first: of the sum and of the difference, 1/m.
+    /// Bound elevation of each pair, grouped by the first line: of the sum and of the
+    /// difference, 1/m.
     bound: Vec<[f64; 2]>,
 }
 
-/// Nodes of the second wave: one more, as they begin half of a distance lower.
+/// Number of nodes of the second wave: one more, as they begin half a node spacing lower.
 const ACROSS: usize = NODES + 1;
 
 impl Pairs {
-    /// For lines of `first` to `last` times `step` rad/s in `water`, depth and gravity.
+    /// Solves for lines of `first` to `last` times `step` rad/s in `water`, given as depth (m) and
+    /// gravity (m/s²).
     pub(super) fn new([first, last]: [usize; 2], step: f64, water: [f64; 2]) -> Self {
         let greatest = wave_number(step * last as f64, water[0], water[1]);
         let modes = modes_for(greatest * water[0] * 1.1);
@@ -241,7 +253,7 @@ impl Pairs {
         let table = |of: Of| -> Vec<Complex> {
             let cell = |index: usize| {
                 let (row, column) = (index / ACROSS, index % ACROSS);
-                // Only pairs whose first wave is the faster are looked up.
+                // Only pairs whose first wave is the faster one are looked up.
                 if column > row + POINTS {
                     return Complex::default();
                 }
@@ -257,7 +269,7 @@ impl Pairs {
             let of = move |m: usize, of| Pair::new(&lines[n], &lines[m], of, water).bound();
             (0..n)
                 .map(move |m| [of(m, Of::Sum), of(m, Of::Difference)])
-                // With itself once, and its difference is the mean level.
+                // The pair of a line with itself counts once, and its difference is the mean level.
                 .chain([[0.5 * of(n, Of::Sum), 0.0]])
         });
         Self {
@@ -270,8 +282,9 @@ impl Pairs {
         }
     }
 
-    /// The wall's way to second order, where `ways` is that of the first order, metres, line by line: the amplitude at each multiple of the
-    /// step, from 0 on. Differences of less than `slowest` steps, 1 or more, are left out: at 0 a wall would go on for ever.
+    /// Returns the wall's displacement to second order: the amplitude at each multiple of the step,
+    /// from 0 on. `ways` are the first-order amplitudes, metres, line by line. Differences of fewer
+    /// than `slowest` steps (at least 1) are left out: at 0 the wall would drift for ever.
     pub(super) fn corrected(&self, ways: &[Complex], slowest: usize) -> Vec<Complex> {
         let mut all = vec![Complex::default(); 2 * self.last + 1];
         for (n, &way) in ways.iter().enumerate() {
@@ -287,7 +300,7 @@ impl Pairs {
                     })
                 };
                 let (sum, difference) = (2 * self.first + n + m, n - m);
-                // With itself once.
+                // The pair of a line with itself counts once.
                 let share = if n == m { 0.5 } else { 1.0 };
                 let per = |line: usize| share / (self.step * line as f64);
                 all[sum] += at(&sums) * way * other * per(sum);
@@ -299,7 +312,7 @@ impl Pairs {
         all
     }
 
-    /// A table's row for a line as the first wave.
+    /// Row of a table for a line as the first wave.
     fn row(&self, table: &[Complex], line: usize) -> Vec<Complex> {
         let (start, weights) = self.place(line, 0.0, NODES);
         let mut row = vec![Complex::default(); ACROSS];
@@ -312,7 +325,7 @@ impl Pairs {
         row
     }
 
-    /// The first of the nodes beside a line, and what each counts (Lagrange).
+    /// First of the nodes around a line, and the Lagrange weights.
     fn place(&self, line: usize, offset: f64, nodes: usize) -> (usize, [f64; POINTS]) {
         let at = line as f64 * (NODES - 1) as f64 / (self.last - self.first) as f64 + offset;
         let start = (at.floor() as usize).saturating_sub(POINTS / 2 - 1);
@@ -327,7 +340,7 @@ impl Pairs {
         (start, std::array::from_fn(weight))
     }
 
-    /// What is bound to waves of these elevations, metres, about the mean level.
+    /// Returns the elevation bound to waves of these elevations, metres, about the mean level.
     pub(super) fn bound(&self, elevations: &[Complex]) -> f64 {
         let mut pairs = self.bound.iter();
         let mut sum = 0.0;

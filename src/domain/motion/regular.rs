@@ -1,40 +1,41 @@
-//! Regular waves that a wall makes: what a scene says of them, and what all their motions share.
+//! Regular waves that a wall makes: their parameters, and what all such motions share.
 
 use std::f64::consts::TAU;
 
 use super::{smooth_ramp, wave_number};
 
-/// Regular waves as a scene asks for them.
+/// Parameters of regular waves, as in a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RegularWaves {
-    /// From trough to crest, metres.
+    /// Height from trough to crest, metres.
     pub height: f64,
-    /// Seconds.
+    /// Period, seconds.
     pub period: f64,
-    /// Still water, metres.
+    /// Depth of still water, metres.
     pub depth: f64,
-    /// m/s², positive.
+    /// Acceleration of gravity, m/s², positive.
     pub gravity: f64,
-    /// Seconds until the motion's full size; 0 begins with it, from rest as well.
+    /// Time until the motion's full size, seconds; 0 begins with it, also from rest.
     pub ramp: f64,
 }
 
 impl RegularWaves {
-    /// The wavenumber by linear theory, rad/m.
+    /// Returns the wavenumber by linear theory, rad/m.
     pub fn wave_number(&self) -> f64 {
         wave_number(TAU / self.period, self.depth, self.gravity)
     }
 
-    /// H L² / h³ with the length of linear theory (Ursell 1953): how far long waves are from sines.
+    /// Returns the Ursell number H L² / h³ with the length of linear theory (Ursell 1953): how far
+    /// long waves are from sines.
     pub fn ursell(&self) -> f64 {
         let length_in_depths = TAU / (self.wave_number() * self.depth);
         self.height / self.depth * length_in_depths.powi(2)
     }
 }
 
-/// A motion that comes again each period. It begins at rest at its least displacement, 0, and is grown by a ramp.
+/// A periodic motion that begins at rest at its least displacement, 0, and is scaled by a ramp.
 pub(super) trait Cycle {
-    /// Seconds until the full size.
+    /// Time until the full size, seconds.
     fn ramp(&self) -> f64;
 
     /// Displacement, metres, and velocity, m/s, at full size.
@@ -43,7 +44,8 @@ pub(super) trait Cycle {
     /// Least and greatest velocity within `[t0, t1]` at full size, m/s.
     fn velocities(&self, t0: f64, t1: f64) -> [f64; 2];
 
-    /// Seconds until the greatest displacement, which rises until then, and that displacement, metres, at full size.
+    /// Time of the greatest displacement, seconds, until which the displacement increases, and that
+    /// displacement at full size, metres.
     fn greatest(&self) -> (f64, f64);
 
     /// Displacement, metres, and velocity, m/s, at a time from 0 on.
@@ -53,7 +55,7 @@ pub(super) trait Cycle {
         (amount * x, amount * velocity + amount_rate * x)
     }
 
-    /// An upper bound on |velocity| within `[t0, t1]`, m/s, by interval arithmetic on r v + r' x.
+    /// Upper bound on |velocity| within `[t0, t1]`, m/s, by interval arithmetic on r v + r' x.
     fn peak_speed(&self, t0: f64, t1: f64) -> f64 {
         let ramp = self.ramp();
         let [slowest, fastest] = self.velocities(t0, t1);
@@ -62,7 +64,7 @@ pub(super) trait Cycle {
         let x_low = (x + slowest.min(0.0) * (t1 - t0)).max(0.0);
         let (amount_low, rate_start) = smooth_ramp(t0, ramp);
         let (amount_high, rate_end) = smooth_ramp(t1, ramp);
-        // The ramp's rate rises to its middle and falls again.
+        // The ramp's rate rises until its middle, then falls.
         let (_, rate_high) = smooth_ramp((0.5 * ramp).clamp(t0, t1), ramp);
         let rate_low = rate_start.min(rate_end);
         let upper = rate_high * x_high + (amount_high * fastest).max(amount_low * fastest);
@@ -70,7 +72,7 @@ pub(super) trait Cycle {
         upper.max(-lower)
     }
 
-    /// An upper bound on the displacement within `[0, t]`, metres.
+    /// Upper bound on the displacement within `[0, t]`, metres.
     fn peak_displacement(&self, t: f64) -> f64 {
         let (when, most) = self.greatest();
         if t < when {
@@ -81,7 +83,7 @@ pub(super) trait Cycle {
     }
 }
 
-/// Whether a phase that comes again with each whole number lies within `[from, to]`.
+/// Returns whether `phase` plus any whole number lies within `[from, to]`.
 pub(super) fn comes_within(phase: f64, [from, to]: [f64; 2]) -> bool {
     (to - phase).floor() >= (from - phase).ceil()
 }

@@ -1,5 +1,6 @@
-//! Seas and packets of waves that a wall makes: a sum of sines, each as high as linear theory asks of a piston, and where it is asked for
-//! what the second order asks at their sums and differences.
+//! Irregular seas and wave packets that a wall makes: a sum of sines whose amplitudes follow from
+//! linear theory of a piston, optionally with the second-order correction at their sum and
+//! difference frequencies.
 
 use std::{f64::consts::TAU, sync::Arc};
 
@@ -13,88 +14,93 @@ use super::{
 };
 use crate::sampling::uniform;
 
-/// Frequencies within the peak's own: the sea comes again after so many peak periods.
+/// Number of lines below and at the peak's frequency: the sea repeats after this many peak periods.
 const LINES: u32 = 200;
 
-/// The longest waves have this part of the peak's frequency; below it a spectrum has 2e-9 of its energy.
+/// Frequency of the longest waves relative to the peak; below it a spectrum has 2e-9 of its energy.
 const LEAST_RATIO: f64 = 0.5;
 
-/// Peak periods of the slowest groups that the second order moves the wall for. What it has to do for a group grows with the group's
-/// length, and is the same for all of a shot that is shorter: it would only stand farther in.
+/// Longest groups, in peak periods, that the second-order correction moves the wall for. The motion
+/// for a group grows with the group's length, and is constant over any shorter shot: it would only
+/// shift the wall inward.
 const SLOWEST_GROUP: u32 = 40;
 
-/// Waves as a scene asks for them.
+/// Parameters of the waves, as in a scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Asked {
-    /// How the energy is spread.
+    /// Distribution of energy over frequencies.
     pub spectrum: Spectrum,
-    /// Seconds.
+    /// Peak period, seconds.
     pub peak_period: f64,
-    /// γ of JONSWAP and TMA.
+    /// Peak enhancement factor γ of JONSWAP and TMA.
     pub peak_enhancement: f64,
-    /// Of the shortest waves that are made, seconds.
+    /// Period of the shortest waves that are generated, seconds.
     pub shortest_period: f64,
-    /// Still water, metres.
+    /// Depth of still water, metres.
     pub depth: f64,
-    /// m/s², positive.
+    /// Acceleration of gravity, m/s², positive.
     pub gravity: f64,
-    /// Seconds until the motion's full size.
+    /// Time until the motion's full size, seconds.
     pub ramp: f64,
-    /// How waves come together.
+    /// Phases of the waves.
     pub phases: Phases,
-    /// Whether the wall makes no free waves of sum and difference frequencies (Schäffer 1996). Then kh of the shortest waves is at
+    /// Whether the wall is corrected so that it generates no free waves of sum and
+    /// difference frequencies (Schäffer 1996). The kh of the shortest waves is then at
     /// most [`DEEPEST`](super::DEEPEST).
     pub second_order: bool,
 }
 
-/// How the waves of a spectrum come together.
+/// How the phases of a spectrum's waves are chosen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Phases {
-    /// A sea: by chance. Each wave has the energy that the spectrum gives it, whatever the seed.
+    /// A sea with random phases. Each wave has the energy of the spectrum, whatever the seed.
     Random {
-        /// Four times the root of the elevation's variance, metres.
+        /// Four times the standard deviation of the elevation, metres.
         significant_height: f64,
-        /// Other numbers make other seas of the same spectrum.
+        /// Different seeds give different seas of the same spectrum.
         seed: u32,
     },
-    /// One packet whose crests meet: the most probable form of a sea about a high crest (Lindgren 1970; Tromans et al. 1991).
+    /// One packet whose crests meet: the most probable shape of a sea around a high crest (Lindgren
+    /// 1970; Tromans et al. 1991).
     Focused {
-        /// The crest above still water by linear theory, metres.
+        /// Height of the crest above still water by linear theory, metres.
         height: f64,
-        /// From the domain's face, metres.
+        /// Distance of the focus from the domain's face, metres.
         at: f64,
-        /// Seconds.
+        /// Time of the focus, seconds.
         time: f64,
     },
 }
 
-/// One of the waves.
+/// One wave of the sum.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Wave {
-    /// Of the wall's way, metres.
+    /// Amplitude of the wall's displacement, metres.
     amplitude: f64,
-    /// rad/s.
+    /// Angular frequency, rad/s.
     frequency: f64,
-    /// rad/m.
+    /// Wavenumber, rad/m.
     number: f64,
-    /// Of the wall's way at time 0.
+    /// Phase of the wall's displacement at time 0, radians.
     phase: f64,
 }
 
-/// A wall's motion that makes them: r(t) (X + Σ Aᵢ sin(ωᵢ t + φᵢ)) with the ramp r, where X keeps it off the water's outside.
+/// Wall motion for a sea: r(t) (X + Σ Aᵢ sin(ωᵢ t + φᵢ)) with the ramp r; the mean position X keeps
+/// the wall within the domain.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sea {
     asked: Asked,
     waves: Vec<Wave>,
-    /// Where the second order is asked for.
+    /// Second-order solution, if requested.
     pairs: Option<Arc<Pairs>>,
-    /// X is the wall's mean place.
+    /// X is the wall's mean position.
     pub(super) sines: Sines,
 }
 
 impl Sea {
-    /// The wall's motion for these waves. In linear theory a wall whose speed is u cos(ωt) makes waves that are in phase with it
-    /// and H/S of its way high (Dean and Dalrymple 1991, §6).
+    /// Computes the wall's motion for these waves. In linear theory, a wall with speed u cos(ωt)
+    /// makes waves in phase with it whose height is H/S times its stroke (Dean and Dalrymple
+    /// 1991, §6).
     pub fn new(asked: Asked) -> Self {
         let peak = asked.peak_period.recip();
         let step = peak / f64::from(LINES);
@@ -114,7 +120,7 @@ impl Sea {
         let waves = lines.iter().enumerate().map(|(i, &(f, density))| {
             let frequency = TAU * f;
             let number = wave_number(frequency, asked.depth, asked.gravity);
-            // Of the elevation: Σ a²/2 = H²/16, or Σ a = the crest.
+            // Amplitude of the elevation: Σ a²/2 = H²/16, or Σ a = the crest.
             let (elevation, phase) = match asked.phases {
                 Phases::Random {
                     significant_height,
@@ -156,14 +162,14 @@ impl Sea {
         sea
     }
 
-    /// What was asked for.
+    /// Returns the parameters that this motion was derived from.
     pub fn asked(&self) -> &Asked {
         &self.asked
     }
 
-    /// Elevation by linear theory at a distance from the domain's face once the ramp is over, metres; waves that the ramp
-    /// weakened are taken as if it had not. Where the second order is asked for, with the waves that are bound to each two, about the
-    /// mean level.
+    /// Returns the elevation at `distance` from the domain's face after the ramp, metres, by linear
+    /// theory; the ramp's effect on waves that are still under way is ignored. With the second
+    /// order, includes the bound waves of each pair, about the mean level.
     pub fn elevation(&self, distance: f64, t: f64) -> f64 {
         let way = distance - self.sines.mean;
         let of = |wave: &Wave| {
@@ -181,7 +187,7 @@ impl Sea {
         first + pairs.bound(&waves)
     }
 
-    /// Speed at which the energy of the shortest waves goes, m/s: the group velocity of linear theory.
+    /// Returns the speed of the shortest waves' energy, m/s: their group velocity in linear theory.
     pub fn least_group_speed(&self) -> f64 {
         let wave = self.waves[self.waves.len() - 1];
         let kh = wave.number * self.asked.depth;
@@ -189,12 +195,13 @@ impl Sea {
         n * wave.frequency / wave.number
     }
 
-    /// Length of the shortest waves, metres.
+    /// Returns the length of the shortest waves, metres.
     pub fn least_wave_length(&self) -> f64 {
         TAU / self.waves[self.waves.len() - 1].number
     }
 
-    /// A packet meets at a distance from the domain's face, and its waves come from the wall's mean place.
+    /// A packet's focus is at a distance from the domain's face, but its waves start from the
+    /// wall's mean position.
     fn phase(&self, wave: &Wave) -> f64 {
         match self.asked.phases {
             Phases::Random { .. } => wave.phase,
@@ -202,8 +209,8 @@ impl Sea {
         }
     }
 
-    /// The least mean place from which the wall never leaves the domain, or a little more: where it is, a packet's phases
-    /// depend on it.
+    /// Finds the least mean position from which the wall never leaves the domain. For packets,
+    /// whose phases depend on it, the result may be slightly larger.
     fn find_mean(&mut self) {
         loop {
             self.sines.lines = self.lines();
@@ -218,7 +225,7 @@ impl Sea {
         }
     }
 
-    /// The wall's way: wave by wave, to second order frequency by frequency.
+    /// The wall's displacement as sines: one per wave, or with the second order one per frequency.
     fn lines(&self) -> Vec<Sine> {
         let of = |wave: &Wave| Sine {
             amplitude: wave.amplitude,
@@ -273,8 +280,9 @@ mod tests {
         }))
     }
 
-    /// Frequency, Hz, and energy ½ a² of the elevation, m², that linear theory has the wall's way make: a Fourier transform of
-    /// 200 peak periods, each line by H/S = 2 (cosh 2kh − 1) / (sinh 2kh + 2kh) with k bisected from ω² = g k tanh kh.
+    /// Frequency, Hz, and energy ½ a² of the elevation, m², that the wall's displacement generates
+    /// by linear theory: a Fourier transform of 200 peak periods, each line by H/S = 2 (cosh 2kh −
+    /// 1) / (sinh 2kh + 2kh) with k bisected from ω² = g k tanh kh.
     fn made(sea: &Sea) -> Vec<(f64, f64)> {
         let (whole, depth) = (200.0 * 1.6, 0.8);
         let samples = 2048;
@@ -313,8 +321,8 @@ mod tests {
         4.0 * lines.iter().map(|line| line.1).sum::<f64>().sqrt()
     }
 
-    /// The wall's way is a sum of lines with whole numbers of periods, so that its transform is theirs to rounding; the peak is
-    /// the one of the lines.
+    /// The wall's displacement is a sum of lines with whole numbers of periods, so that its
+    /// transform gives them to rounding; the peak is one of the lines.
     #[test]
     fn two_hundred_periods_have_the_height_and_the_peak_that_were_asked_for() {
         for seed in [0, 7] {
@@ -323,7 +331,8 @@ mod tests {
             assert!((height / 0.1 - 1.0).abs() < 1e-9, "{height}");
             let peak = lines.iter().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap().0;
             assert!((peak * 1.6 - 1.0).abs() < 1e-9, "{peak}");
-            // JONSWAP's density over that of its peak: (f/fp)⁻⁵ exp(−5/4 ((f/fp)⁻⁴ − 1)) γ^(exp(−½ ((f/fp − 1)/σ)²) − 1).
+            // JONSWAP's density relative to its peak: (f/fp)⁻⁵ exp(−5/4 ((f/fp)⁻⁴ − 1)) γ^(exp(−½
+            // ((f/fp − 1)/σ)²) − 1).
             let of = |ratio: f64| lines[(200.0 * ratio).round() as usize - 1].1;
             for (ratio, width) in [(0.9f64, 0.07f64), (1.2, 0.09)] {
                 let expected = ratio.powi(-5)
@@ -333,7 +342,7 @@ mod tests {
                 assert!((found / expected - 1.0).abs() < 1e-9, "{found} {expected}");
             }
         }
-        // Negative control: a wall of the same depth's longest waves alone, H/S = kh, would be far off.
+        // Negative control: amplitudes that are 6 % too large.
         let mut spoiled = sea(0);
         for wave in &mut spoiled.waves {
             wave.amplitude *= 1.06;
@@ -343,7 +352,8 @@ mod tests {
         assert!(sea(0).waves != sea(7).waves);
     }
 
-    /// Long waves on shallow water go as they are made, η(x, t) = (h/c) v(t − x/c) with v the wall's speed.
+    /// Long waves on shallow water travel as they are made, η(x, t) = (h/c) v(t − x/c) with the
+    /// wall's speed v.
     #[test]
     fn in_shallow_water_the_elevation_is_the_walls_own_speed_on_its_way() {
         let depth = 0.01;
@@ -361,7 +371,8 @@ mod tests {
         for (x, t) in [(0.0, 100.0), (2.0, 131.0), (5.0, 170.0), (9.0, 263.0)] {
             let way = x - sea.sines.mean;
             let expected = depth / celerity * sea.sines.state(t - way / celerity).1;
-            // (kh)²/6 of the celerity, 7e-6, is what dispersion takes: over 9 m a phase of 1e-4, and as much of the height.
+            // Dispersion changes the celerity by (kh)²/6, 7e-6: over 9 m a phase of 1e-4, and as
+            // much of the height.
             let off = (sea.elevation(x, t) - expected).abs();
             assert!(off < 1e-6, "{x} {t}: {off} of {expected}");
         }
@@ -380,7 +391,7 @@ mod tests {
             let (here, there) = (sea.elevation(6.0, t), sea.elevation(4.5, t));
             assert!(here.abs() <= 0.15 + 1e-12 && there.abs() < 0.15, "{t}");
         }
-        // Four periods before and after there is little of it.
+        // Four periods before and after, little of it is left.
         for t in [7.6, 20.4] {
             assert!(
                 sea.elevation(6.0, t).abs() < 0.03,
@@ -390,7 +401,8 @@ mod tests {
         }
     }
 
-    /// Far less than the amplitudes' sum, as waves by chance hardly come together: a wall farther in would shorten the flume.
+    /// The mean position is far less than the sum of the amplitudes, as random waves hardly ever
+    /// align: a wall farther in would shorten the flume.
     #[test]
     fn a_wall_stands_no_farther_in_than_its_way_asks() {
         let sea = sea(1);
@@ -405,8 +417,9 @@ mod tests {
         assert!(sea.sines.mean < 0.5 * sea.sines.most(0));
     }
 
-    /// The crest of a packet, with what is bound to its waves, is higher, and the troughs beside it are less deep: in regular waves of
-    /// its height and peak by k a² / 4 · (3 − tanh²) / tanh³ = 12 mm, less the set-down, and in a spectrum of this width less.
+    /// With the bound waves, the crest of a packet is higher and the troughs beside it are
+    /// shallower. For regular waves of its height and peak the difference is k a² / 4 · (3 − tanh²)
+    /// / tanh³ = 12 mm, less the set-down; in a spectrum of this width it is smaller.
     #[test]
     fn the_second_order_makes_crests_higher_and_troughs_less_deep() {
         let packet = Phases::Focused {
@@ -432,8 +445,8 @@ mod tests {
         assert!(second_low > low + 0.002, "{second_low} {low}");
     }
 
-    /// A wall's way to second order stays within the domain and hardly farther in, has the waves of the first order, and no group
-    /// slower than forty peak periods.
+    /// To second order the wall stays within the domain and hardly farther in, keeps the waves of
+    /// first order, and makes no group slower than forty peak periods.
     #[test]
     fn the_second_order_keeps_the_wall_in_place() {
         let first = sea(1);
@@ -455,7 +468,7 @@ mod tests {
             let found = lines.find(|line| (line.frequency / step - n).abs() < 1e-6);
             found.map_or(0.0, |line| line.amplitude)
         };
-        // The peak's own, and twice its frequency, of which the first order has little.
+        // The peak's own line, and twice its frequency, of which the first order has little.
         assert!((line(&second, 200.0) / line(&first, 200.0) - 1.0).abs() < 0.05);
         assert!(line(&first, 20.0) == 0.0 && line(&second, 20.0) > 1e-5);
         assert!(line(&first, 700.0) == 0.0 && line(&second, 700.0) > 1e-6);

@@ -1,23 +1,27 @@
-//! The wave maker problem to second order: what a piston has to do at twice its frequency so that regular waves carry no free wave
-//! of that frequency (Schäffer 1996; in shallow water Madsen 1971).
+//! The wave maker problem to second order for regular waves: the motion that a piston needs at
+//! twice its frequency so that it generates no free wave of that frequency (Schäffer 1996; in
+//! shallow water Madsen 1971).
 
 use std::f64::consts::PI;
 
 use super::wave_number;
 
-/// Evanescent modes of the first order that are summed, in shallow water and more per kh. What is left out falls as one over
-/// their number, and half as many are summed besides to take it off: 1e-3 of the sum is left.
+/// Number of evanescent modes of first order that are summed: a base for shallow water, and more
+/// per kh. The truncation error falls as one over their number; extrapolation from half as many
+/// leaves 1e-3 of the sum.
 const MODES: f64 = 100.0;
 const MODES_PER_KH: f64 = 20.0;
 const MOST_MODES: f64 = 1000.0;
 
-/// What the wall does besides A sin φ, as part of A²: the factors of sin 2φ and cos 2φ, 1/m, for a wave of `frequency` (rad/s).
+/// Returns the wall's second-order motion in addition to A sin φ, divided by A²: the factors of sin
+/// 2φ and cos 2φ, 1/m, for a wave of `frequency` (rad/s).
 ///
-/// To first order the wall's potential is i A ω Σ (Dⱼ / kⱼ) cosh kⱼ(z + h) / cosh kⱼh · exp(i(ωt − kⱼx)) with
-/// ω² = g kⱼ tanh kⱼh, k₀ real and the others −iκⱼ, and Dⱼ = 2 sinh 2kⱼh / (2kⱼh + sinh 2kⱼh). Its squares force the surface, and the
-/// wall stands at its displacement and not at the mean place. Projected upon the free wave of 2ω, whose wavenumber is K, that
-/// wave is not made where ξ₂ = (K A)² / 8 · (Re Q sin 2φ + Im Q cos 2φ) with ν = ω²/g and
-/// Q = Σⱼₗ DⱼDₗ (1 + (kⱼ² + kₗ² − 6ν²) / 4kⱼkₗ) (kⱼ + kₗ) / (K² − (kⱼ + kₗ)²) − 3/2 Σⱼ kⱼDⱼ / (K² − kⱼ²).
+/// To first order the wall's potential is i A ω Σ (Dⱼ / kⱼ) cosh kⱼ(z + h) / cosh kⱼh · exp(i(ωt −
+/// kⱼx)) with ω² = g kⱼ tanh kⱼh, k₀ real and the others −iκⱼ, and Dⱼ = 2 sinh 2kⱼh / (2kⱼh + sinh
+/// 2kⱼh). Its squares force the surface, and the wall is at its displacement, not at the mean
+/// position. Projection onto the free wave of 2ω, whose wavenumber is K, shows that this wave
+/// vanishes if ξ₂ = (K A)² / 8 · (Re Q sin 2φ + Im Q cos 2φ) with ν = ω²/g and Q = Σⱼₗ DⱼDₗ (1 +
+/// (kⱼ² + kₗ² − 6ν²) / 4kⱼkₗ) (kⱼ + kₗ) / (K² − (kⱼ + kₗ)²) − 3/2 Σⱼ kⱼDⱼ / (K² − kⱼ²).
 pub(super) fn second_harmonic(frequency: f64, depth: f64, gravity: f64) -> [f64; 2] {
     let k = wave_number(frequency, depth, gravity);
     let twice = wave_number(2.0 * frequency, depth, gravity);
@@ -39,11 +43,11 @@ pub(super) fn second_harmonic(frequency: f64, depth: f64, gravity: f64) -> [f64;
     ]
 }
 
-/// κⱼ, 1/m, and Dⱼ of an evanescent mode: κh tan κh = −νh with κh a little less than jπ.
+/// κⱼ, 1/m, and Dⱼ of an evanescent mode: κh tan κh = −νh with κh slightly below jπ.
 pub(super) fn evanescent(index: u32, deep: f64, depth: f64) -> [f64; 2] {
     let whole = PI * f64::from(index);
     let mut less = 0.0f64;
-    // Each step takes the error to a third or less.
+    // Each iteration reduces the error to a third or less.
     for _ in 0..40 {
         less = (deep * depth / (whole - less)).atan();
     }
@@ -51,7 +55,7 @@ pub(super) fn evanescent(index: u32, deep: f64, depth: f64) -> [f64; 2] {
     [(whole - less) / depth, -2.0 * sin / (twice - sin)]
 }
 
-/// What Q is summed from.
+/// Quantities that Q is summed from.
 struct Sums {
     /// k₀, rad/m.
     k: f64,
@@ -66,7 +70,7 @@ struct Sums {
 }
 
 impl Sums {
-    /// The progressive wave with itself and at the wall's displacement.
+    /// Terms of the progressive wave with itself and at the wall's displacement.
     fn progressive(&self) -> f64 {
         let (k, d) = (self.k, self.d);
         let tanh = self.deep / k;
@@ -74,7 +78,7 @@ impl Sums {
             - 1.5 * k * d / (self.squared - k * k)
     }
 
-    /// All terms with one or two of the first so many evanescent modes: real and imaginary part.
+    /// All terms with one or two of the first `count` evanescent modes: real and imaginary part.
     fn evanescent(&self, count: usize) -> [f64; 2] {
         let modes = &self.modes[..count];
         let mut sum = [0.0, 0.0];
@@ -89,7 +93,7 @@ impl Sums {
         sum
     }
 
-    /// An evanescent mode with the progressive wave, by D₀Dⱼ.
+    /// Term of an evanescent mode with the progressive wave, divided by D₀Dⱼ.
     fn with_progressive(&self, kappa: f64) -> [f64; 2] {
         let k = self.k;
         let (re, im) = (self.squared - k * k + kappa * kappa, 2.0 * k * kappa);
@@ -101,7 +105,7 @@ impl Sums {
         [a + c * b, c * a - b]
     }
 
-    /// Two evanescent modes.
+    /// Term of two evanescent modes.
     fn pair(&self, [kappa, d]: [f64; 2], [other, e]: [f64; 2]) -> f64 {
         let squares = kappa * kappa + other * other + 6.0 * self.deep.powi(2);
         let sum = kappa + other;
@@ -115,18 +119,19 @@ mod tests {
 
     use super::*;
 
-    /// B / A² and C / A² on a metre of water, by kh.
+    /// B / A² and C / A² for a depth of one metre, as a function of kh.
     fn of(kh: f64) -> [f64; 2] {
         second_harmonic((9.81 * kh * kh.tanh()).sqrt(), 1.0, 9.81)
     }
 
-    /// Madsen's B / A² on a metre of water: A = H/2n, B = H²/32 · (3 cosh kh / sinh³ kh − 2/n), with the 2 as asked.
+    /// Madsen's B / A² for a depth of one metre: A = H/2n, B = H²/32 · (3 cosh kh / sinh³ kh −
+    /// 2/n), with the 2 given by `two`.
     fn madsen(kh: f64, two: f64) -> f64 {
         let n = 2.0 * ((2.0 * kh).cosh() - 1.0) / ((2.0 * kh).sinh() + 2.0 * kh);
         (2.0 * n).powi(2) / 32.0 * (3.0 * kh.cosh() / kh.sinh().powi(3) - two / n)
     }
 
-    /// What Madsen leaves out is of fourth order in kh.
+    /// Madsen's formula neglects terms of fourth order in kh.
     #[test]
     fn in_shallow_water_the_second_harmonic_is_madsens() {
         for kh in [0.05, 0.1, 0.2, 0.3] {
@@ -135,13 +140,14 @@ mod tests {
             assert!(off > 0.5 && off < 0.7, "{kh}: {off}");
             assert!(cos.abs() < 2.0 * kh.powi(7), "{kh}: {cos}");
         }
-        // Negative control: his last term one and a half times as large.
+        // Negative control: his last term multiplied by 1.5.
         let off = (of(0.1)[0] / madsen(0.1, 3.0) - 1.0) / 1e-4;
         assert!(off > 20.0, "{off}");
     }
 
-    /// By a program apart: the surface's forcing and the wall's condition term by term in complex numbers, with integrals over the
-    /// depth and not Green's identity, of 200 and 400 modes.
+    /// From a separate program: the surface's forcing and the wall's condition term by term in
+    /// complex numbers, with integrals over the depth instead of Green's identity, and 200 and
+    /// 400 modes.
     #[test]
     fn at_any_depth_the_second_harmonic_is_that_of_the_sum_of_modes() {
         for (kh, sin, cos) in [
@@ -153,19 +159,20 @@ mod tests {
             let size = f64::hypot(sin, cos);
             let off = f64::hypot(found[0] - sin, found[1] - cos) / size;
             assert!(off < 3e-4, "{kh}: {found:?}, off by {off}");
-            // Negative control: Madsen's is not it.
+            // Negative control: Madsen's formula differs.
             let off = f64::hypot(madsen(kh, 2.0) - sin, cos) / size;
             assert!(off > 0.04, "{kh}: {off}");
         }
     }
 
-    /// Water that the wall pushes is what a wave of permanent form carries, c η, where the wave is long: ξ' (h + η) = c η at x = ξ,
-    /// with η of Stokes and ξ of this program, has no part of twice the frequency.
+    /// For a long wave, the water that the wall pushes is what a wave of permanent form carries, c
+    /// η: ξ' (h + η) = c η at x = ξ, with Stokes' η and this module's ξ, has no component of twice
+    /// the frequency.
     #[test]
     fn the_wall_pushes_what_the_wave_carries() {
         let kh: f64 = 0.05;
         let ratio = super::super::piston_height_ratio(kh, 1.0);
-        // a₂ = 3 a² / 4k²h³: small, so that the fourth order is.
+        // a₂ = 3 a² / 4k²h³ is small, so that the fourth order is negligible.
         let amplitude = 1e-6;
         let second =
             0.25 * kh * amplitude * amplitude * (3.0 - kh.tanh().powi(2)) / kh.tanh().powi(3);
@@ -178,7 +185,7 @@ mod tests {
                 let speed = first * phase.cos() + 2.0 * b * (2.0 * phase).cos();
                 let at = phase - kh * way;
                 let level = amplitude * at.cos() + second * (2.0 * at).cos();
-                // Over ω: c = ω/k.
+                // Divided by ω: c = ω/k.
                 let off = speed * (1.0 + level) - level / kh;
                 re += off * (2.0 * phase).cos() / 32.0;
                 im += off * (2.0 * phase).sin() / 32.0;
@@ -187,7 +194,8 @@ mod tests {
         };
         let b = of(kh)[0] * first * first;
         assert!(twice(b) < 1e-5, "{}", twice(b));
-        // Negative control: the water's own second harmonic alone, without the way of the wall through it.
+        // Negative control: the second harmonic of the water only, without the effect of the
+        // wall's displacement.
         let spoiled = twice(second / (2.0 * kh));
         assert!(spoiled > 1e-3, "{spoiled}");
     }

@@ -1,32 +1,33 @@
-//! A sum of sines behind a ramp: the way of a wall whose waves are known one by one.
+//! A sum of sines with a ramp: the displacement of a wall whose waves are known one by one.
 
 use super::smooth_ramp;
 
-/// What a sum may be over its samples, as part of its root mean square: between two of them a function is off the line
-/// through both by no more than an eighth of the step's square times its greatest curvature.
+/// Largest excess of a bound over the samples, relative to the root mean square: between two
+/// samples a function differs from the straight line by at most an eighth of the squared step times
+/// its greatest curvature.
 const MISSED: f64 = 0.01;
 
 /// A sin(ω t + φ).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Sine {
-    /// Metres, of either sign.
+    /// Amplitude, metres, of either sign.
     pub(super) amplitude: f64,
-    /// rad/s.
+    /// Angular frequency, rad/s.
     pub(super) frequency: f64,
-    /// At time 0.
+    /// Phase at time 0, radians.
     pub(super) phase: f64,
 }
 
-/// r(t) (X + Σ Aᵢ sin(ωᵢ t + φᵢ)) with the ramp r, where X keeps it from below 0.
+/// r(t) (X + Σ Aᵢ sin(ωᵢ t + φᵢ)) with the ramp r; X keeps the displacement from falling below 0.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Sines {
-    /// All of them.
+    /// The terms of the sum.
     pub(super) lines: Vec<Sine>,
     /// X, metres.
     pub(super) mean: f64,
-    /// Seconds until its full size, above 0.
+    /// Time until the full size, seconds, above 0.
     pub(super) ramp: f64,
-    /// Seconds after which the sum comes again.
+    /// Period of the sum, seconds.
     pub(super) whole: f64,
 }
 
@@ -36,7 +37,8 @@ impl Sines {
         let curvature = self.most(2);
         let step = (8.0 * MISSED * self.root_mean_square(0) / curvature).sqrt();
         let count = (self.whole / step).ceil() as u64;
-        // Turned from one sample to the next: 2e4 times, which takes 2e4 ε of the amplitude.
+        // Rotated from one sample to the next: some 2e4 rotations, with an error of 2e4 ε of
+        // the amplitude.
         let mut turning: Vec<[f64; 4]> = self
             .lines
             .iter()
@@ -63,13 +65,13 @@ impl Sines {
         least - curvature * step * step / 8.0
     }
 
-    /// Σ |Aᵢ| ωᵢⁿ: no derivative of that order is greater, m/sⁿ.
+    /// Σ |Aᵢ| ωᵢⁿ: an upper bound on the derivative of order n, m/sⁿ.
     pub(super) fn most(&self, order: i32) -> f64 {
         let of = |line: &Sine| line.amplitude.abs() * line.frequency.powi(order);
         self.lines.iter().map(of).sum()
     }
 
-    /// Of the sum's derivative of that order, m/sⁿ.
+    /// Root mean square of the sum's derivative of order n, m/sⁿ.
     fn root_mean_square(&self, order: i32) -> f64 {
         let of = |line: &Sine| (line.amplitude * line.frequency.powi(order)).powi(2);
         (0.5 * self.lines.iter().map(of).sum::<f64>()).sqrt()
@@ -84,7 +86,7 @@ impl Sines {
             way += line.amplitude * sin;
             rate += line.amplitude * line.frequency * cos;
         }
-        // 0 but for what `mean` is off by rounding.
+        // 0 but for the rounding of `mean`.
         ((amount * way).max(0.0), amount * rate + amount_rate * way)
     }
 
@@ -98,10 +100,11 @@ impl Sines {
         self.peak(1, t0, t1)
     }
 
-    /// An upper bound on the size of the way's derivative of that order, 0 or 1. After the ramp the sum comes again.
+    /// An upper bound on the magnitude of the displacement's derivative of order 0 or 1. After the
+    /// ramp the sum is periodic.
     fn peak(&self, order: i32, t0: f64, t1: f64) -> f64 {
         let ramp = self.ramp;
-        // Of the ramp's quintic in t / ramp the greatest derivatives are 1.875, 10 / √3 and 60.
+        // Derivatives of the ramp's quintic in t / ramp are at most 1.875, 10 / √3 and 60.
         let before = [
             1.0,
             1.875 / ramp,
@@ -123,7 +126,8 @@ impl Sines {
         rising.max(full)
     }
 
-    /// The same where the ramp's derivatives are at most `ramp`: by samples, and the greatest curvature between them (Leibniz).
+    /// Same for ramp derivatives of at most `ramp`: from samples, and a bound on the curvature
+    /// between them (Leibniz rule).
     fn peak_of(&self, order: i32, [t0, t1]: [f64; 2], ramp: [f64; 4]) -> f64 {
         let order_of_curvature = order + 2;
         let binomials = [[1.0, 2.0, 1.0, 0.0], [1.0, 3.0, 3.0, 1.0]][order as usize];

@@ -1,29 +1,30 @@
-//! Spectra of wind seas: how the energy of waves is spread over their frequencies.
+//! Spectra of wind seas: the distribution of wave energy over frequencies.
 
 use super::wave_number;
 
-/// Form of a spectrum; its height and peak are given apart.
+/// Shape of a spectrum; its height and peak are given separately.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Spectrum {
-    /// A sea that still grows: Pierson and Moskowitz's with a peak raised γ times (Hasselmann et al. 1973).
+    /// A growing sea: the Pierson–Moskowitz spectrum with a peak enhanced by γ (Hasselmann et
+    /// al. 1973).
     Jonswap,
-    /// A sea that has grown out (Pierson and Moskowitz 1964).
+    /// A fully developed sea (Pierson and Moskowitz 1964).
     PiersonMoskowitz,
-    /// JONSWAP's in water of finite depth (Bouws et al. 1985).
+    /// JONSWAP in water of finite depth (Bouws et al. 1985).
     Tma,
 }
 
 crate::read_by_name!(Spectrum);
 
 impl Spectrum {
-    /// Each by its name.
+    /// All spectra with their names in scenes.
     pub const NAMED: [(&'static str, Self); 3] = [
         ("jonswap", Self::Jonswap),
         ("pierson_moskowitz", Self::PiersonMoskowitz),
         ("tma", Self::Tma),
     ];
 
-    /// Its name in scenes.
+    /// Returns the name used in scenes.
     pub fn name(self) -> &'static str {
         let mut named = Self::NAMED.iter();
         named
@@ -31,8 +32,8 @@ impl Spectrum {
             .map_or("", |named| named.0)
     }
 
-    /// Density at a frequency over that of the peak, up to a factor that is the same for all frequencies. The peak is of
-    /// `peak` Hz, raised `enhancement` times (γ), in water of `depth` metres under `gravity`, m/s².
+    /// Returns the spectral density at a frequency, up to a factor common to all frequencies.
+    /// `frequency` and `peak` in Hz, `enhancement` is γ, depth in metres, gravity in m/s².
     pub(crate) fn density(
         self,
         frequency: f64,
@@ -62,14 +63,15 @@ impl Spectrum {
 mod tests {
     use super::*;
 
-    /// ∫ of a density over its own peak, by 20 000 steps to ten times the peak.
+    /// ∫ of a density for a peak of 1 Hz, in 20 000 steps up to ten times the peak.
     fn area(spectrum: Spectrum, enhancement: f64, depth: f64) -> f64 {
         let at = |f: f64| spectrum.density(f, 1.0, enhancement, (depth, 9.81));
         (1..=20_000).map(|i| 5e-4 * at(5e-4 * f64::from(i))).sum()
     }
 
-    /// ∫ x⁻⁵ exp(−1.25 x⁻⁴) dx = 1/5. JONSWAP's with γ = 3.3 has 1.52 times as much (Goda 2000, 0.06533 for 1/5 · 5/16 by his
-    /// formula 0.0624 / (0.23 + 0.0336 γ − 0.185 / (1.9 + γ)), within 0.5 %).
+    /// ∫ x⁻⁵ exp(−1.25 x⁻⁴) dx = 1/5. For JONSWAP with γ = 3.3 it is 1.52 times as much (Goda 2000,
+    /// 0.06533 for 1/5 · 5/16 by his formula 0.0624 / (0.23 + 0.0336 γ − 0.185 / (1.9 + γ)), within
+    /// 0.5 %).
     #[test]
     fn densities_have_the_areas_that_are_known_in_closed_form() {
         let grown = area(Spectrum::PiersonMoskowitz, 3.3, 1.0);
@@ -85,7 +87,8 @@ mod tests {
         assert!((area(Spectrum::Jonswap, 1.0, 1.0) - grown).abs() < 1e-12);
     }
 
-    /// With x² = ω² h/g, Thompson and Vincent 1983 have φ = x²/2 to x = 1 and 1 − (2 − x)²/2 to x = 2, within 4 % of the exact φ.
+    /// With x² = ω² h/g, Thompson and Vincent 1983 approximate φ by x²/2 up to x = 1 and 1 − (2 −
+    /// x)²/2 up to x = 2, within 4 %.
     #[test]
     fn shallow_water_takes_from_the_long_waves_what_is_published() {
         let (depth, gravity) = (1.0f64, 9.81);

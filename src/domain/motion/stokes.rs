@@ -1,4 +1,4 @@
-//! The piston that makes regular waves to second order, with no free wave of twice the frequency.
+//! Piston motion for regular waves to second order, without a free wave of twice the frequency.
 
 use std::f64::consts::{PI, TAU};
 
@@ -8,38 +8,41 @@ use super::{
     second_order::second_harmonic,
 };
 
-/// The second order holds where H L² / h³ is less (Madsen 1971): from there on the second harmonic of the elevation, in shallow
-/// water, is more than a quarter of the first, and a second crest stands in the trough.
+/// Largest H L² / h³ for which the second order holds (Madsen 1971). Beyond it, in shallow water,
+/// the second harmonic of the elevation is more than a quarter of the first, and a second crest
+/// appears in the trough.
 pub const MADSEN_LIMIT: f64 = 8.0 * PI * PI / 3.0;
 
-/// Parts of a turn in which zeros are looked for. Two harmonics have at most four.
+/// Number of intervals per turn in which zeros are searched for. Two harmonics have at most
+/// four zeros.
 const PARTS: u32 = 64;
 
-/// Regular waves to second order.
+/// Wall motion for regular waves to second order.
 ///
-/// The way about the wall's mean place is A sin φ + B sin 2φ + C cos 2φ with φ = ωt + φ₀: A = H / 2n, where n = H/S is that of
-/// linear theory (Dean and Dalrymple 1991, §6), B and C are those of the whole second order (Schäffer 1996). In shallow water C is
-/// 0 and B is Madsen's (1971) H² / 32h · (3 cosh kh / sinh³ kh − 2 / n), which is 5 % low at kh = 0.5, 20 % at 0.7, and of the wrong
-/// sign above 1.16.
+/// The displacement from the wall's mean position is A sin φ + B sin 2φ + C cos 2φ with φ = ωt +
+/// φ₀. A = H / 2n, where n = H/S is the ratio of linear theory (Dean and Dalrymple 1991, §6); B and
+/// C are those of the full second order (Schäffer 1996). In shallow water C is 0 and B is Madsen's
+/// (1971) H² / 32h · (3 cosh kh / sinh³ kh − 2 / n), which is 5 % low at kh = 0.5, 20 % at 0.7, and
+/// of the wrong sign above 1.16.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stokes {
     waves: RegularWaves,
-    /// rad/m.
+    /// Wavenumber, rad/m.
     number: f64,
-    /// rad/s.
+    /// Angular frequency, rad/s.
     frequency: f64,
     /// A, B and C, metres.
     harmonics: [f64; 3],
-    /// The phases at which the wall is farthest out, which is φ₀, and next farthest in.
+    /// Phases at which the wall is farthest out (φ₀), and next farthest in.
     ends: [f64; 2],
     /// Phases, from 0 to 2π, at which the wall is fastest or slowest.
     turns: Vec<f64>,
-    /// Metres.
+    /// Mean position of the wall, metres.
     mean: f64,
 }
 
 impl Stokes {
-    /// The wall's motion for waves whose H L² / h³ is below [`MADSEN_LIMIT`].
+    /// Computes the wall's motion for waves whose H L² / h³ is below [`MADSEN_LIMIT`].
     pub fn new(waves: RegularWaves) -> Self {
         let number = waves.wave_number();
         let frequency = TAU / waves.period;
@@ -50,7 +53,7 @@ impl Stokes {
         let way = |phase: &f64| harmonic(harmonics, *phase)[0];
         let ends = zeros(|phase| harmonic(harmonics, phase)[1]);
         let by_way = |a: &&f64, b: &&f64| way(a).total_cmp(&way(b));
-        // The derivative changes its sign twice or more.
+        // The derivative changes its sign at least twice.
         let out = ends.iter().min_by(by_way).copied().unwrap_or_default();
         let far = ends.iter().max_by(by_way).copied().unwrap_or_default();
         Self {
@@ -64,18 +67,19 @@ impl Stokes {
         }
     }
 
-    /// What was asked for.
+    /// Returns the waves that this motion was derived from.
     pub fn waves(&self) -> &RegularWaves {
         &self.waves
     }
 
-    /// By linear theory, metres.
+    /// Returns the wave length by linear theory, metres.
     pub fn wave_length(&self) -> f64 {
         TAU / self.number
     }
 
-    /// Elevation to second order at a distance from the domain's face once the ramp is over, metres: a cos φ + a₂ cos 2φ with
-    /// a = H/2 and a₂ = k a² / 4 · (3 − tanh² kh) / tanh³ kh (Stokes 1847).
+    /// Returns the elevation to second order at `distance` from the domain's face after the ramp,
+    /// metres: a cos φ + a₂ cos 2φ with a = H/2 and a₂ = k a² / 4 · (3 − tanh² kh) / tanh³ kh
+    /// (Stokes 1847).
     pub fn elevation(&self, distance: f64, t: f64) -> f64 {
         let amplitude = 0.5 * self.waves.height;
         let tanh = (self.number * self.waves.depth).tanh();
@@ -84,12 +88,12 @@ impl Stokes {
         amplitude * phase.cos() + second * (2.0 * phase).cos()
     }
 
-    /// φ.
+    /// Phase φ.
     fn phase(&self, t: f64) -> f64 {
         self.frequency * t + self.ends[0]
     }
 
-    /// At φ, m/s.
+    /// Velocity at phase φ, m/s.
     fn velocity(&self, phase: f64) -> f64 {
         self.frequency * harmonic(self.harmonics, phase)[1]
     }
@@ -126,7 +130,7 @@ impl Cycle for Stokes {
     }
 }
 
-/// A sin φ + B sin 2φ + C cos 2φ and its first two derivatives by φ.
+/// A sin φ + B sin 2φ + C cos 2φ and its first two derivatives with respect to φ.
 fn harmonic([a, b, c]: [f64; 3], phase: f64) -> [f64; 3] {
     let (sin, cos) = phase.sin_cos();
     let (sin_2, cos_2) = (2.0 * phase).sin_cos();
@@ -137,11 +141,12 @@ fn harmonic([a, b, c]: [f64; 3], phase: f64) -> [f64; 3] {
     ]
 }
 
-/// Where a function of a phase changes its sign within a turn, by bisection.
+/// Zeros of a function of phase within a turn, by bisection.
 fn zeros(of: impl Fn(f64) -> f64) -> Vec<f64> {
     let part = TAU / f64::from(PARTS);
     let below: Vec<bool> = (0..PARTS).map(|i| of(part * f64::from(i)) < 0.0).collect();
-    // The last part ends with the first's start itself: a zero at 0 is within one of both, however it is rounded.
+    // The last interval ends with the first one's own start, so a zero at 0 lies in one of both,
+    // however it is rounded.
     let ends = below.iter().cycle().skip(1);
     let changes = below.iter().zip(ends).zip(0u32..);
     changes
@@ -176,7 +181,8 @@ mod tests {
         }
     }
 
-    /// Amplitudes of a harmonic of the way: of sin nφ and cos nφ where φ is 0 with the first's crossing.
+    /// Amplitudes of a harmonic of the displacement: of sin nφ and cos nφ, with φ = 0 at the zero
+    /// crossing of the first.
     fn part(waves: &Stokes, n: f64) -> [f64; 2] {
         let mut sum = [0.0, 0.0];
         let (samples, period) = (512, waves.waves.period);
@@ -190,7 +196,7 @@ mod tests {
         sum
     }
 
-    /// k bisected from ω² = g k tanh kh; H/S = 4 sinh² kh / (sinh 2kh + 2kh).
+    /// k bisected from ω² = g k tanh kh, and H/S = 4 sinh² kh / (sinh 2kh + 2kh).
     fn linear(period: f64) -> (f64, f64) {
         let (mut low, mut high) = (1e-6, 1e3);
         for _ in 0..100 {
@@ -213,7 +219,7 @@ mod tests {
             let off = |stroke: f64| f64::hypot(first[0] - 0.5 * stroke, first[1]) / stroke;
             assert!(off(height / ratio) < 1e-12, "{period}: {first:?}");
             assert!(off(1.01 * height / ratio) > 1e-3);
-            // Madsen 1971: what he leaves out is of fourth order in kh.
+            // Madsen 1971 neglects terms of fourth order in kh.
             let second = part(&waves, 2.0);
             let madsen =
                 height.powi(2) / (32.0 * 0.8) * (3.0 * kh.cosh() / kh.sinh().powi(3) - 2.0 / ratio);
@@ -226,7 +232,8 @@ mod tests {
             }
             assert!(part(&waves, 3.0).iter().all(|x| x.abs() < 1e-14));
         }
-        // By hand: 0.1 m and 4 s on 0.8 m have kh = 0.46418 and n = 0.46372, so 0.01 / 25.6 · (29.909 − 4.313) = 9.9985 mm by Madsen.
+        // By hand: 0.1 m and 4 s on 0.8 m have kh = 0.46418 and n = 0.46372, so Madsen gives 0.01 /
+        // 25.6 · (29.909 − 4.313) = 9.9985 mm.
         let [sin, _] = part(&Stokes::new(asked(0.1, 4.0)), 2.0);
         assert!((1.03..1.04).contains(&(sin / 9.9985e-3)), "{sin}");
     }
@@ -240,20 +247,22 @@ mod tests {
             let (when, most) = waves.greatest();
             let at = |i: u32| waves.state(period * f64::from(i) / 5000.0).0;
             let seen = (0..5000).map(at).fold(0.0, f64::max);
-            // Half a step off the end takes (2π/10⁴)²/2 of the way.
+            // Half a step from the maximum loses (2π/10⁴)²/2 of it.
             assert!((seen / most - 1.0).abs() < 4e-7 && seen <= most * (1.0 + 1e-14));
             assert!((waves.state(when).0 / most - 1.0).abs() < 1e-14);
             assert!(waves.state(0.9 * when).0 < 0.99 * most);
         }
     }
 
-    /// Crest and trough of the elevation are the height apart, as sin² has no part in it, and the crest goes with the speed ω/k.
+    /// Crest and trough of the elevation differ by the height, as the second harmonic is equal at
+    /// both, and the crest moves at ω/k.
     #[test]
     fn the_elevation_is_stokes_wave_that_leaves_the_walls_mean_place() {
         let waves = Stokes::new(asked(0.1, 2.5));
         let (kh, _) = linear(2.5);
         let length = TAU * 0.8 / kh;
-        // With the way's first harmonic in its middle on its way in, a crest is at the mean place.
+        // When the first harmonic of the displacement crosses zero inward, a crest is at the
+        // mean position.
         let t = -waves.ends[0] / waves.frequency;
         let at = |x: f64| waves.elevation(waves.mean + x, t);
         assert!((at(0.0) - at(0.5 * length) - 0.1).abs() < 1e-12);
@@ -267,7 +276,8 @@ mod tests {
         assert!((waves.elevation(waves.mean + 0.3 * length, t) - at(0.0)).abs() > 0.01);
     }
 
-    /// C is all but 0 on shallow water, so that the wall is fastest where a turn ends and begins.
+    /// On shallow water C is almost 0, so that the wall is fastest at the boundary between
+    /// two turns.
     #[test]
     fn both_turns_of_the_velocity_are_found_on_shallow_water() {
         for height in [1e-9, 1e-7, 1e-3] {
@@ -280,12 +290,13 @@ mod tests {
         }
     }
 
-    /// At Madsen's limit, in shallow water, the second harmonic is a quarter of the first: H L² / h³ = 8π²/3.
+    /// At Madsen's limit, in shallow water, the second harmonic is a quarter of the first: H L² /
+    /// h³ = 8π²/3.
     #[test]
     fn madsens_limit_is_where_a_second_crest_begins() {
         let waves = |height: f64| Stokes::new(asked(height, 12.0));
         let limit = 1e-3 * MADSEN_LIMIT / asked(1e-3, 12.0).ursell();
-        // The curvature in the trough, φ = π: upward without a second crest.
+        // Curvature in the trough, φ = π: positive without a second crest.
         let curvature = |height: f64| {
             let waves = waves(height);
             let of = |turn: f64| {

@@ -1,13 +1,13 @@
-//! A motion through given points: a monotone cubic (Fritsch and Carlson 1980).
+//! Motion through given points: a monotone cubic (Fritsch and Carlson 1980).
 
-/// One cubic between two points of a table.
+/// The cubic between two points of a table.
 pub(super) struct Segment {
     start: [f64; 2],
-    /// Seconds.
+    /// Duration, seconds.
     duration: f64,
-    /// Metres.
+    /// Change of the displacement, metres.
     rise: f64,
-    /// m/s at both ends.
+    /// Velocities at both ends, m/s.
     slopes: [f64; 2],
 }
 
@@ -31,7 +31,7 @@ impl Segment {
         (x, m0 + u * (2.0 * lift + 3.0 * u * bend))
     }
 
-    /// The velocity is a parabola: greatest at an end or at its vertex.
+    /// The velocity is a parabola: its maximum is at an end or at the vertex.
     pub(super) fn peak_speed(&self) -> f64 {
         let [m0, m1] = self.slopes;
         let bend = m0 + m1 - 2.0 * self.rise / self.duration;
@@ -46,8 +46,8 @@ impl Segment {
     }
 }
 
-/// Slope at a point: 0 at the ends and at turns, else the weighted harmonic mean of the
-/// neighbouring chords, which keeps the cubic monotone (Fritsch and Butland 1984).
+/// Slope at a point: 0 at the ends and at turning points, otherwise the weighted harmonic mean of
+/// the neighbouring chords, which keeps the cubic monotone (Fritsch and Butland 1984).
 fn slope(points: &[[f64; 2]], index: usize) -> f64 {
     if index == 0 || index + 1 == points.len() {
         return 0.0;
@@ -62,16 +62,19 @@ fn slope(points: &[[f64; 2]], index: usize) -> f64 {
     (w_before + w_after) / (w_before / chord_before + w_after / chord_after)
 }
 
-/// By how much more than anywhere else within a table its motion slows down to its end before it counts as a stop.
+/// Ratio of the final deceleration to the largest acceleration elsewhere in a table above which the
+/// end counts as abrupt.
 const STOP: f64 = 2.0;
 
-/// How much greater than the bend of the last two chords a velocity has to be to be told from none: points that lie so far apart
-/// do not say it.
+/// Smallest significant ratio of the final velocity to the change of velocity over the last two
+/// chords: points that are too far apart do not determine it.
 const COARSE: f64 = 1.2;
 
-/// How fast a motion through `points` was when its points ended, in their unit a second, where it does not come to rest there: the
-/// velocity that its last three points lead to is over a tenth of its fastest chord, and its last segment slows down more than twice
-/// as hard as any but the first speeds up or slows down. `None` of two points, which are joined from rest to rest.
+/// Returns the velocity with which a motion through `points` ends, in their unit per second, if it
+/// does not come to rest there. That is the case if the velocity extrapolated from the last three
+/// points exceeds a tenth of the fastest chord, and the last segment decelerates more than twice as
+/// hard as any other but the first accelerates or decelerates. `None` for two points, which are
+/// joined from rest to rest.
 pub fn abrupt_end(points: &[[f64; 2]]) -> Option<f64> {
     let [.., before, last] = points else {
         return None;
@@ -85,7 +88,7 @@ pub fn abrupt_end(points: &[[f64; 2]]) -> Option<f64> {
         return None;
     };
     let [time_before, time] = [chords[chords.len() - 2][0], last[0] - before[0]];
-    // From the middle of the last chord on to its end, as from that of the one before to it.
+    // Extrapolates from the middles of the last two chords to the end.
     let bend = (ended - previous) * time / (time_before + time);
     let leads_to = ended + bend;
     let fastest = speeds.iter().map(|speed| speed.abs()).fold(0.0, f64::max);
@@ -119,7 +122,8 @@ mod tests {
 
     use super::{super::Motion, abrupt_end};
 
-    /// Fritsch and Butland 1984: chords of 1 and ½ m/s over 1 and 2 s have the weighted harmonic mean 9/13 m/s.
+    /// Fritsch and Butland 1984: chords of 1 and ½ m/s over 1 and 2 s have the weighted harmonic
+    /// mean 9/13 m/s.
     #[test]
     fn a_table_has_fritsch_and_butlands_slopes() {
         let motion = Motion::Table {
@@ -128,19 +132,20 @@ mod tests {
         assert!((motion.velocity(1.0) - 9.0 / 13.0).abs() < 1e-15);
         assert!((motion.velocity(1.0 - 1e-9) - 9.0 / 13.0).abs() < 1e-8);
         assert_eq!((motion.velocity(0.0), motion.velocity(3.0)), (0.0, 0.0));
-        // Half-way a cubic of slopes 0 and m has come to ½ − m/8.
+        // Half-way, a cubic with slopes 0 and m is at ½ − m/8.
         let half = 0.5 - 9.0 / 13.0 / 8.0;
         assert!((motion.displacement(0.5) - half).abs() < 1e-15);
     }
 
-    /// Samples of motions that are known: one that comes to rest is none, however coarse; one that is cut off is.
+    /// Samples of known motions: one that comes to rest has no abrupt end, however coarse; one that
+    /// is cut off has.
     #[test]
     fn a_motion_that_is_cut_off_is_told_from_one_that_comes_to_rest() {
         let sampled = |count: u32, end: f64, x: &dyn Fn(f64) -> f64| -> Vec<[f64; 2]> {
             let time = |k: u32| end * f64::from(k) / f64::from(count);
             (0..=count).map(|k| [time(k), x(time(k))]).collect()
         };
-        // Half a period takes π s, and the fastest is half a metre a second.
+        // Half a period takes π s, and the largest velocity is 0.5 m/s.
         let cosine = |t: f64| 0.5 * (1.0 - t.cos());
         for halves in 1..4u32 {
             for count in [3, 4, 5, 8, 20, 200] {
@@ -152,13 +157,14 @@ mod tests {
             for end in [0.3 * TAU, 0.7 * TAU, 1.25 * TAU] {
                 let found = abrupt_end(&sampled(count, end, &cosine));
                 let error = (found.unwrap_or(0.0) - 0.5 * end.sin()).abs();
-                // A parabola through three points is off by dt² / 3 of the third derivative at their end, which is at most a half;
-                // a tenth of that for the orders above.
+                // The slope of a parabola through three points is off by dt² / 3 of the third
+                // derivative at their end, which is at most a half; a tenth of that is allowed for
+                // higher orders.
                 let bound = 1.1 * (end / f64::from(count)).powi(2) / 6.0;
                 assert!(error < bound, "{count}, {end}: {found:?}");
             }
         }
-        // A steady motion, and one that rests at last; two points are joined from rest to rest.
+        // A steady motion, and one that ends moving back; two points are joined from rest to rest.
         assert_eq!(abrupt_end(&[[0.0, 0.0], [1.0, 1.0], [2.0, 2.0]]), Some(1.0));
         assert_eq!(abrupt_end(&[[0.0, 0.0], [1.0, 1.0], [2.0, 1.0]]), None);
         assert_eq!(abrupt_end(&[[0.0, 0.0], [1.0, 1.0]]), None);

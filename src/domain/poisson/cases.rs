@@ -1,39 +1,40 @@
-//! Systems whose answers or iteration counts are known.
+//! Test systems whose solutions or iteration counts are known.
 
 use glam::DVec3;
 
 use super::{AIR, Cells, FLUID, SOLID, System};
 use crate::bricks::{Bricks, CELLS, EDGE, table_dims};
 
-/// Place where pressure is taken as zero.
+/// Where pressure is taken to be zero.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Surface {
-    /// The centre of the first cell of air.
+    /// At the centre of the first cell of air.
     Voxel,
-    /// The point where the surface crosses the line to that centre.
+    /// Where the surface crosses the line to that centre.
     GhostFluid,
 }
 
-/// A system's inputs, laid out on bricks.
+/// Input of a system, laid out on bricks.
 #[derive(Clone, Debug)]
 pub struct Case {
     /// Layout of the elements.
     pub bricks: Bricks,
-    /// Metres.
+    /// Edge length of a cell, metres.
     pub cell_size: f64,
-    /// See [`Cells`].
+    /// Cell kinds, as in [`Cells`].
     pub kind: Vec<u32>,
-    /// See [`Cells`].
+    /// Open face fractions, as in [`Cells`].
     pub open: Vec<f32>,
-    /// See [`Cells`]; metres.
+    /// Distances to the surface, as in [`Cells`], metres.
     pub distance: Vec<f32>,
-    /// Whether `distance` counts.
+    /// Whether `distance` is used.
     pub surface: Surface,
 }
 
 impl Case {
-    /// Lays out a box of `dims` cells. `kind` is of a cell; `open` of a lower face (axis, cell), 0 at the box's
-    /// own walls and about solid cells whatever it says; `distance` of a cell's centre, metres.
+    /// Lays out a box of `dims` cells. `kind` is evaluated per cell. `open` is evaluated per lower
+    /// face (axis, cell), and replaced by 0 at the box's own walls and around solid cells.
+    /// `distance` is evaluated at a cell's centre, metres.
     pub fn new(
         dims: [u32; 3],
         cell_size: f64,
@@ -75,17 +76,17 @@ impl Case {
         case
     }
 
-    /// Coordinates of an element's cell.
+    /// Returns the coordinates of an element's cell.
     pub fn cell(&self, element: u32) -> [u32; 3] {
         self.bricks.cell(element)
     }
 
-    /// Centre of an element's cell, metres.
+    /// Returns the centre of an element's cell, metres.
     pub fn center(&self, element: u32) -> DVec3 {
         DVec3::from_array(self.cell(element).map(|c| f64::from(c) + 0.5)) * self.cell_size
     }
 
-    /// Input of the system builder.
+    /// Returns the input of the system builder.
     pub fn cells(&self) -> Cells<'_> {
         Cells {
             bricks: &self.bricks,
@@ -95,7 +96,7 @@ impl Case {
         }
     }
 
-    /// The system.
+    /// Builds the system.
     pub fn system(&self) -> System {
         System::new(self.cells())
     }
@@ -116,8 +117,9 @@ fn wet_bricks(dims: [u32; 3], kind: &impl Fn([u32; 3]) -> u32) -> Vec<bool> {
     is_wet
 }
 
-/// The tank on which iteration counts are compared: n³ cells of a unit cube, 60 % full with a sloshing surface, a
-/// solid sphere in it; `has_cuts` gives the sphere open fractions in place of whole cells.
+/// Builds the tank on which iteration counts are compared: n³ cells of a unit cube, 60 % full with
+/// a sloshing surface, and a solid sphere in it. `has_cuts` represents the sphere by open fractions
+/// instead of whole cells.
 pub fn tank(n: u32, surface: Surface, has_cuts: bool) -> Case {
     let spacing = 1.0 / f64::from(n);
     let pi = std::f64::consts::PI;
@@ -161,8 +163,8 @@ pub fn tank(n: u32, surface: Surface, has_cuts: bool) -> Case {
     }
 }
 
-/// A pressure with its right-hand side: p = cos πx cos πz sin(π(h − y)/2h) in a unit square's basin of n² columns
-/// under a surface at y = `HEIGHT`. Returns, for each row, b and the exact q = p.
+/// Builds a manufactured solution: p = cos πx cos πz sin(π(h − y)/2h) in a unit square basin of n²
+/// columns with the surface at y = `HEIGHT`. Also returns, for each row, b and the exact q = p.
 pub fn manufactured(n: u32) -> (Case, Vec<f64>, Vec<f64>) {
     let spacing = 1.0 / f64::from(n);
     let pi = std::f64::consts::PI;
@@ -184,7 +186,7 @@ pub fn manufactured(n: u32) -> (Case, Vec<f64>, Vec<f64>) {
 /// Height of the surface of [`manufactured`]; on no cell's face or centre for n a power of 2.
 pub const HEIGHT: f64 = 0.63;
 
-/// Right-hand side of the tank: a product of sines, and a tenth as much noise.
+/// Returns the right-hand side of the tank: a product of sines, plus a tenth as much noise.
 pub fn tank_rhs(case: &Case, system: &System) -> Vec<f64> {
     let tau = std::f64::consts::TAU;
     let noise = white_noise(system.cell.len());
@@ -199,7 +201,7 @@ pub fn tank_rhs(case: &Case, system: &System) -> Vec<f64> {
         .collect()
 }
 
-/// Values in −1..1, each a hash of its row.
+/// Returns values in −1..1, each a hash of its row.
 pub fn white_noise(rows: usize) -> Vec<f64> {
     (1..=rows as u64)
         .map(|k| {

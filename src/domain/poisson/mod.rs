@@ -1,8 +1,10 @@
-//! Pressure's linear system on sparse bricks, in double precision: the one that GPU rows are held against.
+//! Linear system of the pressure on sparse bricks, in double precision: the reference for the
+//! GPU's rows.
 //!
-//! For each cell of water Σ f (q − q') over its six faces = b, with f the face's open fraction (Batty et al.
-//! 2007); q' of air is 0 at the air cell's centre, or where the surface crosses the way there (ghost fluid, Enright
-//! et al. 2003). Rows are not scaled: an open face has coefficient 1.
+//! For each cell of water, Σ f (q − q') over its six faces = b, with f the face's open fraction
+//! (Batty et al. 2007). In air, q' is 0 at the air cell's centre, or where the surface crosses the
+//! line to it (ghost fluid, Enright et al. 2003). Rows are not scaled: an open face has
+//! coefficient 1.
 
 pub mod cases;
 
@@ -17,36 +19,38 @@ pub const FLUID: u32 = 1;
 /// Kind of a cell without open volume; its faces have fraction 0.
 pub const SOLID: u32 = 2;
 
-/// Least part of the way to air at which the surface may lie: a smaller one would make the row ever stiffer
-/// for a pressure that is ever nearer 0.
+/// Smallest fraction of the distance to air at which the surface may lie: smaller ones make the row
+/// ever stiffer for a pressure ever closer to 0.
 pub const LEAST_THETA: f64 = 0.01;
 
-/// The same where it lies beyond the cell of air, over a floor that passes above that cell's centre: its pressure there is nearly that
-/// of the water.
+/// Largest such fraction, where the surface lies beyond the air cell, above a floor that is higher
+/// than that cell's centre: the pressure there is nearly that of the water.
 pub const MOST_THETA: f64 = 100.0;
 
-/// No row.
+/// Marks the absence of a row.
 pub const NONE: u32 = u32::MAX;
 
-/// Rows of one task.
+/// Rows per parallel task.
 const GRAIN: usize = 4096;
 
-/// Input of a system, in f32 as the GPU has it or in f64; arrays are by element, `512 slot + local`, slot 0
-/// included.
+/// Input of a system, in f32 as on the GPU or in f64. Arrays are indexed by element,
+/// `512 slot + local`, slot 0 included.
 #[derive(Clone, Copy, Debug)]
 pub struct Cells<'a, T = f32> {
     /// Layout of the elements.
     pub bricks: &'a Bricks,
     /// [`AIR`], [`FLUID`] or [`SOLID`]; only wet bricks hold water.
     pub kind: &'a [u32],
-    /// Open fractions of the lower faces, 0..1, three planes of the length of `kind`.
+    /// Open fractions of the lower faces, 0..1: three planes of the length of `kind`.
     pub open: &'a [T],
-    /// Distance to the surface at cell centres, negative inside, in any one unit; voxel surface where `None`.
+    /// Distance to the surface at cell centres, negative inside, in any unit; `None` for a surface
+    /// at the air cells' centres.
     pub distance: Option<&'a [T]>,
 }
 
 impl<T: Copy + Into<f64>> Cells<'_, T> {
-    /// Element of the neighbour in direction `k`: −x, +x, −y, +y, −z, +z; one of slot 0 where there is none.
+    /// Returns the element of the neighbour in direction `k` (−x, +x, −y, +y, −z, +z); it lies in
+    /// slot 0 if there is none.
     pub fn neighbor(&self, element: u32, k: usize) -> u32 {
         let (slot, local) = (element / CELLS, element % CELLS);
         let (axis, is_up) = (k / 2, k % 2 == 1);
@@ -71,7 +75,7 @@ impl<T: Copy + Into<f64>> Cells<'_, T> {
         CELLS * other + across
     }
 
-    /// Place of the face in direction `k` in a plane array.
+    /// Returns the index into `open` of the face in direction `k`.
     pub fn face(&self, element: u32, k: usize) -> usize {
         let owner = if k % 2 == 1 {
             self.neighbor(element, k)
@@ -81,7 +85,8 @@ impl<T: Copy + Into<f64>> Cells<'_, T> {
         k / 2 * self.kind.len() + owner as usize
     }
 
-    /// θ: the part of the way from the cell `water` to the cell `air` at which the surface lies.
+    /// Returns θ: the fraction of the distance from the cell `water` to the cell `air` at which the
+    /// surface lies.
     pub fn theta(&self, water: u32, air: u32) -> f64 {
         let Some(distance) = self.distance else {
             return 1.0;
@@ -96,18 +101,19 @@ impl<T: Copy + Into<f64>> Cells<'_, T> {
     }
 }
 
-/// The system; one row a cell of water that has an open face.
+/// The linear system, with one row per cell of water that has an open face.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct System {
     /// Element of each row.
     pub cell: Vec<u32>,
-    /// Part of the diagonal due to air: Σ f/θ.
+    /// Part of the diagonal due to air, Σ f/θ.
     pub dirichlet: Vec<f64>,
-    /// The diagonal.
+    /// Diagonal of the matrix.
     pub diagonal: Vec<f64>,
-    /// Rows of the neighbours, −x, +x, −y, +y, −z, +z; [`NONE`] where no water is shared.
+    /// Rows of the neighbours, −x, +x, −y, +y, −z, +z; [`NONE`] without a common open face
+    /// to water.
     pub neighbor: Vec<[u32; 6]>,
-    /// What is shared with them, 0..1; the matrix holds its negative.
+    /// Open fractions of the faces to these neighbours, 0..1; the matrix holds their negatives.
     pub coefficient: Vec<[f64; 6]>,
     /// Elements of water without an open face.
     pub dropped: Vec<u32>,
@@ -158,7 +164,8 @@ impl System {
         system
     }
 
-    /// b = −(Σ ± f u + `solid_flux`) of each row; velocities in planes like `Cells::open`.
+    /// Returns b = −(Σ ± f u + `solid_flux`) of each row; velocities are in planes
+    /// like `Cells::open`.
     pub fn rhs<T: Copy + Into<f64> + Sync>(
         &self,
         cells: Cells<'_, T>,
@@ -180,8 +187,9 @@ impl System {
             .collect()
     }
 
-    /// Faces that a projection changes, as indices into the planes of `Cells::open`, with what the solution `q` takes
-    /// from the velocity there: u −= q − q'. Each face once, in the order of the rows.
+    /// Returns the faces that a projection changes, as indices into the planes of `Cells::open`,
+    /// with the amount q − q' that the solution `q` subtracts from the velocity there. Each face
+    /// appears once, in the order of the rows.
     pub fn gradient<T: Copy + Into<f64>>(
         &self,
         cells: Cells<'_, T>,
@@ -204,8 +212,8 @@ impl System {
         faces
     }
 
-    /// The matrix times `x`, by differences, so that a smooth `x` loses no digits: the f64 twin of
-    /// `shaders/pressure/multiply.wgsl`.
+    /// Multiplies the matrix by `x`, written in differences so that a smooth `x` loses no digits:
+    /// the f64 reference of `shaders/pressure/multiply.wgsl`.
     pub fn apply(&self, x: &[f64]) -> Vec<f64> {
         (0..x.len())
             .into_par_iter()
@@ -222,8 +230,9 @@ impl System {
             .collect()
     }
 
-    /// Rows of each body of water that no air touches, in the order of their first rows. There the matrix is
-    /// singular: b must sum to zero, and the pressure is known up to a constant.
+    /// Returns the rows of each body of water without contact to air, in the order of their first
+    /// rows. There the matrix is singular: b must sum to zero, and the pressure is determined up to
+    /// a constant.
     pub fn pockets(&self) -> Vec<Vec<u32>> {
         let mut is_seen = vec![false; self.cell.len()];
         let mut pockets = Vec::new();
@@ -251,8 +260,8 @@ impl System {
     }
 }
 
-/// Subtracts the mean of `values` over each pocket. Of values that are all alike nothing is left: the rounding of their
-/// mean would be a right-hand side without a solution.
+/// Subtracts the mean of `values` over each pocket. Values that are equal up to rounding become
+/// exactly 0: the rounding of their mean would be a right-hand side without a solution.
 pub fn remove_means(values: &mut [f64], pockets: &[Vec<u32>]) {
     for pocket in pockets {
         let sum: f64 = pocket.iter().map(|&row| values[row as usize]).sum();
@@ -296,7 +305,8 @@ mod tests {
         assert!(system.pockets().is_empty());
     }
 
-    /// What the gradient takes away is what the right-hand side asks: b of the corrected velocities is b − A q.
+    /// The gradient subtracts what the right-hand side asks for: b of the corrected velocities is b
+    /// − A q.
     #[test]
     fn the_gradient_of_a_solution_is_its_image() {
         for surface in [Surface::GhostFluid, Surface::Voxel] {
@@ -313,7 +323,7 @@ mod tests {
             }
             let flux = vec![0.0f32; case.kind.len()];
             let left = system.rhs(case.cells(), &velocity, &flux);
-            // Velocities are rounded at 6e-8 of at most 2 / θ = 200.
+            // Velocities of at most 2 / θ = 200 are rounded at 6e-8.
             for (left, image) in left.iter().zip(system.apply(&q)) {
                 assert!((left + image).abs() < 1e-4, "{left} {image}");
             }
@@ -322,7 +332,7 @@ mod tests {
 
     #[test]
     fn a_lone_cell_and_a_closed_pair() {
-        // Water at (1,1,1) in air, water at (5,5,5) and (6,5,5) in rock, water at (5,1,5) alone in rock.
+        // Water at (1,1,1) in air, at (5,5,5) and (6,5,5) in rock, and isolated in rock at (5,1,5).
         let water = [[1, 1, 1], [5, 5, 5], [6, 5, 5], [5, 1, 5]];
         let kind = |c: [u32; 3]| match (water.contains(&c), c[0] < 4) {
             (true, _) => FLUID,

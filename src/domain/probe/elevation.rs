@@ -1,24 +1,26 @@
-//! Height of the water's surface over a point.
+//! Elevation of the water's surface over a point.
 
 use glam::{DVec2, DVec3, Vec3};
 
 use super::SUPPORT;
 use crate::{bounds::Bounds, particles::Particles, surface::calm_radius};
 
-/// Heights at which a column is looked at, a particle spacing.
+/// Samples along a column per particle spacing.
 const SAMPLES: f64 = 8.0;
 
-/// Gaps that count as water, in particle spacings: the reach of the surface's kernel.
+/// Widest gap that counts as water, in particle spacings: the radius of the surface's kernel.
 const BRIDGED: f64 = SUPPORT;
 
-/// Height of the water's surface over (x, z), metres above the world's y = 0; `None` where there is no water.
+/// Returns the elevation of the water's surface over (x, z), metres above the world's y = 0; `None`
+/// if there is no water.
 ///
-/// The surface is that of Zhu and Bridson 2005 about the particles, φ = |x − x̄| − r, without a grid: r puts it half a
-/// spacing above the topmost layer of water at rest. The domain's faces are mirrors, so that the surface meets them
-/// level. Of a column with several stretches of water (a lip that turns over, spray) it is the top of the thickest, the
-/// upper one of two alike; gaps of less than two spacings count as water, since particles leave such gaps within a body
-/// that is stretched or stirred. Columns are looked at in eighths of a spacing; where φ changes its sign between two, it is
-/// taken as straight.
+/// The surface is that of Zhu and Bridson 2005 around the particles, φ = |x − x̄| − r, without a
+/// grid; r puts it half a spacing above the topmost layer of water at rest. The domain's faces are
+/// mirrors, so that the surface meets them at a right angle. In a column with several stretches of
+/// water (an overturning lip, spray), the result is the top of the thickest, the upper one of two
+/// equal ones. Gaps of less than two spacings count as water, since particles leave such gaps
+/// within a body that is stretched or stirred. Columns are sampled at an eighth of a spacing; where
+/// φ changes its sign between two samples, it is interpolated linearly.
 pub fn elevation(particles: &Particles, spacing: f64, domain: &Bounds, at: DVec2) -> Option<f64> {
     let support = SUPPORT * spacing;
     let near = column(particles, domain, support, at);
@@ -38,7 +40,7 @@ pub fn elevation(particles: &Particles, spacing: f64, domain: &Bounds, at: DVec2
             sum += w * d;
             weights += w;
         }
-        // As in `surface`: below it the quotient is round-off.
+        // As in `surface`: below this the quotient is round-off.
         if weights > 1e-12 {
             sum.length() / weights - radius
         } else {
@@ -46,7 +48,7 @@ pub fn elevation(particles: &Particles, spacing: f64, domain: &Bounds, at: DVec2
         }
     };
     let mut before = level(low);
-    // From the lowest up: where a stretch of water begins, and where it ends.
+    // From bottom to top: beginning and end of each stretch of water.
     let mut stretches = Vec::<(f64, f64)>::new();
     let mut bottom = (before < 0.0).then_some(low);
     for k in 1..=((high - low) / step).ceil() as usize {
@@ -66,7 +68,7 @@ pub fn elevation(particles: &Particles, spacing: f64, domain: &Bounds, at: DVec2
         }
         before = here;
     }
-    // Of equals the last.
+    // `max_by` returns the last of equal elements.
     let thickness = |(bottom, top): &(f64, f64)| top - bottom;
     let thickest = stretches
         .into_iter()
@@ -74,7 +76,7 @@ pub fn elevation(particles: &Particles, spacing: f64, domain: &Bounds, at: DVec2
     thickest.map(|(_, top)| top)
 }
 
-/// Particles and their mirror images about the column over `at`, from below.
+/// Particles and their mirror images around the column over `at`, in ascending order.
 fn column(particles: &Particles, domain: &Bounds, support: f64, at: DVec2) -> Vec<DVec3> {
     let (min, max) = (domain.min, domain.max);
     let images = |x: f64, axis: usize| [x, 2.0 * min[axis] - x, 2.0 * max[axis] - x];
@@ -91,7 +93,7 @@ fn column(particles: &Particles, domain: &Bounds, support: f64, at: DVec2) -> Ve
             }
         }
     }
-    // Stable, so that ties stay in the order of the ids.
+    // A stable sort, so that ties stay in the order of the ids.
     near.sort_by(|a, b| a.y.total_cmp(&b.y));
     near
 }
@@ -105,8 +107,8 @@ mod tests {
         elevation(particles, 0.1, &domain(), at)
     }
 
-    /// On still water the surface is where the block ends, to a twentieth of a spacing, wherever one looks, and at the
-    /// walls.
+    /// On still water the surface is the top of the block, to a twentieth of a spacing, at all
+    /// sampled points and at the walls.
     #[test]
     fn elevation_of_a_block_is_its_top() {
         for lift in [0.0, 0.013, 0.037] {
@@ -123,13 +125,14 @@ mod tests {
         // Negative control: a layer less is a spacing less.
         let lower = height(&block([12, 8, 12], DVec3::ZERO), DVec2::splat(0.6)).unwrap();
         assert!((lower - 0.8).abs() < 0.005, "{lower}");
-        // One layer on the floor is as thick as it is, by its mirror image.
+        // Thanks to its mirror image, a single layer on the floor has its own thickness.
         let film = height(&block([12, 1, 12], DVec3::ZERO), DVec2::splat(0.6)).unwrap();
         assert!((film - 0.1).abs() < 0.02, "{film}");
     }
 
-    /// A column with layers taken out: the gap is the layers that are missing, since the surface lies half a spacing beyond
-    /// a layer. One missing is water still, two are air, and then the thicker part counts.
+    /// A column from which layers are removed: the gap equals the missing layers, since the surface
+    /// lies half a spacing beyond a layer. One missing layer still counts as water; more are air,
+    /// and then the thicker part counts.
     #[test]
     fn narrow_gaps_are_bridged() {
         let without = |missing: &[usize]| {
@@ -142,7 +145,7 @@ mod tests {
             let found = without(missing);
             assert!((found - 1.2).abs() < 0.005, "{missing:?}: {found}");
         }
-        // Negative control: wider, it is the thicker part's top.
+        // Negative control: with a wider gap it is the thicker part's top.
         for (missing, top) in [(&[7, 8, 9][..], 0.7), (&[3, 4, 5], 1.2)] {
             let found = without(missing);
             assert!((found - top).abs() < 0.005, "{missing:?}: {found}");
@@ -160,9 +163,9 @@ mod tests {
         assert_eq!(height(&Particles::default(), at), None);
     }
 
-    /// The mean over a lattice cell of the elevation is the top of the lattice, at two spacings. The column is looked at
-    /// right there; along the surface single places are up to 0.0045 spacings off, and on the step of an eighth to the next
-    /// height the field is taken as straight: 0.0045 · 0.125 / 2 spacings, and as much again for what is bent.
+    /// The mean of the elevation over a lattice cell is the top of the lattice, for two spacings.
+    /// Along the surface single positions are up to 0.0045 spacings off. Linear interpolation over
+    /// the step of an eighth adds 0.0045 · 0.125 / 2 spacings, and the curvature as much again.
     #[test]
     fn elevation_is_the_top_of_the_lattice_on_average() {
         for d in [0.1, 0.037] {

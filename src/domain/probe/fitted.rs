@@ -1,10 +1,11 @@
-//! A field of the particles at a point.
+//! Interpolation of a particle field at a point.
 
 use glam::{DMat3, DVec3};
 
-/// A field of the particles at `at`, by the plane that fits the particles within `support` best under the kernel
-/// (1 − q²)³ (moving least squares): exact for a linear field, also beside walls and surfaces. `None` where no particle
-/// is nearer than half of `support`; the kernel's mean where they are too few for a plane.
+/// Returns a field of the particles at `at`, from the plane that fits the particles within
+/// `support` best under the kernel (1 − q²)³ (moving least squares): exact for a linear field, also
+/// beside walls and surfaces. `None` if no particle is nearer than half of `support`; the kernel's
+/// mean if there are too few for a plane.
 pub fn fitted(points: impl Iterator<Item = (DVec3, f64)>, at: DVec3, support: f64) -> Option<f64> {
     let (mut near, mut nearest) = (Vec::new(), f64::MAX);
     for (x, value) in points {
@@ -26,7 +27,8 @@ pub fn fitted(points: impl Iterator<Item = (DVec3, f64)>, at: DVec3, support: f6
         spread += DMat3::from_cols(*w * d.x * d, *w * d.y * d, *w * d.z * d);
         slope += *w * (value - mean) * d;
     }
-    // The spread of a half space of neighbours is about a twentieth of support² each way; a sheet has next to none.
+    // The spread of a half space of neighbours is about a twentieth of support² along each axis; a
+    // sheet has next to none.
     let least = weights * 1e-3 * support * support;
     if spread.determinant() < least.powi(3) {
         return Some(mean);
@@ -41,8 +43,8 @@ mod tests {
     use super::super::tests::block;
     use super::*;
 
-    /// By hand, too few for a plane: values 2 and 5 at a quarter and at a half of the support, whose weights are
-    /// (15/16)³ and (3/4)³.
+    /// By hand, too few points for a plane: values 2 and 5 at a quarter and a half of the support,
+    /// with weights (15/16)³ and (3/4)³.
     #[test]
     fn two_points_have_their_kernels_mean() {
         let pair = |near: f64| {
@@ -52,12 +54,13 @@ mod tests {
         let weights = [(15.0f64 / 16.0).powi(3), 0.75f64.powi(3)];
         let mean = (2.0 * weights[0] + 5.0 * weights[1]) / (weights[0] + weights[1]);
         assert!((pair(0.25).unwrap() - mean).abs() < 1e-12);
-        // Water is where a particle is within half of the support.
+        // There is water if a particle is within half of the support.
         let alone = |q: f64| fitted([(q * DVec3::X, 2.0)].into_iter(), DVec3::ZERO, 1.0);
         assert_eq!((alone(0.499), alone(0.501)), (Some(2.0), None));
     }
 
-    /// A linear field comes back to rounding, at the block's face and corner as in its middle; the mean alone does not.
+    /// A linear field is reproduced to rounding at the block's face and corner as in its middle;
+    /// the mean does not do that.
     #[test]
     fn a_plane_is_fitted_exactly() {
         let particles = block([8, 8, 8], DVec3::ZERO);
@@ -76,7 +79,7 @@ mod tests {
         }
         let at = DVec3::splat(2.0);
         assert_eq!(fitted(points().map(|x| (x, 1.0)), at, 0.2), None);
-        // One layer is no plane's worth: its mean.
+        // A single layer does not determine a plane: its mean counts.
         let sheet = || points().filter(|x| x.y < 0.1);
         let found = fitted(sheet().map(|x| (x, 7.0)), DVec3::new(0.4, 0.05, 0.4), 0.2);
         assert!((found.unwrap() - 7.0).abs() < 1e-12);

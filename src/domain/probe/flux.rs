@@ -1,14 +1,16 @@
-//! Volume that crosses a plane.
+//! Volume flux through a plane.
 
 use super::SUPPORT;
 use crate::particles::Particles;
 
-/// Volume a second that crosses the plane where the coordinate along `axis` is `at`, towards larger ones, m³/s.
+/// Returns the volume per second that crosses the plane where the coordinate along `axis` is `at`,
+/// positive towards larger coordinates, m³/s.
 ///
-/// Σ V v δ(x − at) over particles of volume V, with a hat δ that reaches two spacings to each side: at each moment exactly
-/// the rate at which Σ V H(x − at) grows, H the step that the hat adds up to, so that its sum over time is the volume that
-/// has crossed. On a lattice with layers one spacing apart hats add up to one, wherever the plane lies. It needs no state
-/// but the one that is looked at.
+/// It is Σ V v δ(x − at) over particles of volume V, with a hat function δ that reaches two
+/// spacings to each side. At each instant this is exactly the growth rate of Σ V H(x − at), with H
+/// the integral of the hat, so that its integral over time is the volume that has crossed. On a
+/// lattice with layers one spacing apart the hats add up to one, wherever the plane lies. Only the
+/// current state is needed.
 pub fn flux(particles: &Particles, spacing: f64, axis: usize, at: f64) -> f64 {
     let width = SUPPORT * spacing;
     let all = particles.position.iter().zip(&particles.velocity);
@@ -28,8 +30,9 @@ mod tests {
     use super::super::tests::block;
     use super::*;
 
-    /// A stream 0.5 high and 0.4 wide at 3 m/s along x carries 0.6 m³/s through any plane that it fills two spacings
-    /// about, and nothing through planes across which it does not move; half of it where it ends.
+    /// A stream 0.5 high and 0.4 wide at 3 m/s along x carries 0.6 m³/s through any plane with
+    /// water for two spacings on both sides, nothing through planes parallel to its motion, and
+    /// half of it at its end.
     #[test]
     fn a_steady_stream_carries_its_section_times_its_speed() {
         let particles = block([12, 5, 4], DVec3::new(0.013, 0.0, 0.0));
@@ -41,20 +44,20 @@ mod tests {
         assert_eq!(flux(&particles, 0.1, 0, 3.0), 0.0);
         let end = flux(&particles, 0.1, 0, 0.013);
         assert!((end - 0.3).abs() < 1e-6, "{end}");
-        // Against the axis it is negative: 0.5 high, 1.2 long, 4 m/s along z, mirrored.
+        // Against the axis the flux is negative.
         let mut back = particles.clone();
         back.velocity.iter_mut().for_each(|v| v[0] = -v[0]);
         assert!((flux(&back, 0.1, 0, 0.6) + 0.6).abs() < 1e-6);
     }
 
-    /// A stream at rest until 0.2 s and then faster and faster, in steps of 2 ms: what has crossed by the sum of the
-    /// fluxes is what lies beyond the plane. Particles cross one after another, so the sum over time is off by the rate at
-    /// which the flux changes, a step's part of it.
+    /// A stream that starts from rest and accelerates, in steps of 2 ms: the integral of the flux
+    /// is the volume that lies beyond the plane. The sum over time is off by the flux's rate of
+    /// change times a fraction of a step.
     #[test]
     fn what_crosses_is_what_lies_beyond() {
         let mut particles = block([12, 5, 4], DVec3::ZERO);
         let (step, at) = (2e-3, 1.0);
-        // H: how much of a hat about the particle lies beyond the plane.
+        // H: the fraction of a particle's hat that lies beyond the plane.
         let beyond = |particles: &Particles| -> f64 {
             let part = |x: &[f32; 3]| {
                 let s = ((f64::from(x[0]) - at) / 0.2).clamp(-1.0, 1.0);
@@ -84,7 +87,7 @@ mod tests {
             found > 0.05 && (crossed / found - 1.0).abs() < 1e-3,
             "{crossed} {found}"
         );
-        // Negative control: a speed 1 % off is seen.
+        // Negative control: a speed 1 % off is detected.
         assert!((1.01 * crossed / found - 1.0).abs() > 5e-3);
     }
 }

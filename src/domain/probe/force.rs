@@ -4,22 +4,22 @@ use glam::DVec3;
 
 use crate::{mesh::TriangleMesh, pose::Pose};
 
-/// A piece of a surface that water may press on.
+/// A piece of a surface on which water may press.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Patch {
-    /// Its centroid, metres.
+    /// Centroid, metres.
     pub at: DVec3,
-    /// Its area along its normal, out of what bears it and into the water, m².
+    /// Area times unit normal, which points into the water, m².
     pub area: DVec3,
 }
 
 impl Patch {
-    /// Its unit normal.
+    /// Returns the unit normal; zero for a patch without area.
     pub fn normal(&self) -> DVec3 {
         self.area.normalize_or_zero()
     }
 
-    /// Of a body that stands so; `self` is where it stood at the start.
+    /// Returns the patch of a body in `pose`; `self` is in the pose at the start.
     pub fn posed(self, pose: &Pose) -> Self {
         Self {
             at: pose.place(self.at),
@@ -28,7 +28,7 @@ impl Patch {
     }
 }
 
-/// A mesh cut into pieces no longer than `edge`: each triangle into n² alike ones.
+/// Cuts a mesh into pieces no longer than `edge`, metres: each triangle into n² congruent ones.
 pub fn patches(mesh: &TriangleMesh, edge: f64) -> Vec<Patch> {
     let mut all = Vec::new();
     for index in 0..mesh.triangles.len() {
@@ -58,8 +58,8 @@ pub fn patches(mesh: &TriangleMesh, edge: f64) -> Vec<Patch> {
     all
 }
 
-/// Force, N, and moment about `about`, N m, that these pressures (Pa, one a patch) put on what bears the patches:
-/// −Σ p A and −Σ (x − about) × p A, exact for closed meshes where the pressure is linear.
+/// Returns the force, N, and the moment about `about`, N m, of these pressures (Pa, one per patch):
+/// −Σ p A and −Σ (x − about) × p A, exact for closed meshes if the pressure is linear.
 pub fn load(patches: &[Patch], pressures: &[f64], about: DVec3) -> [DVec3; 2] {
     let pushes = patches.iter().zip(pressures);
     pushes.fold([DVec3::ZERO; 2], |[force, moment], (patch, pressure)| {
@@ -80,8 +80,9 @@ mod tests {
         }
     }
 
-    /// Archimedes: under p = ρ g (2 − y) a closed body bears ρ g V upward, through the middle of its volume, however it is
-    /// cut. Without the face at the top it is what weighs on that more.
+    /// Archimedes: under p = ρ g (2 − y) a closed body is lifted by ρ g V at the centre of its
+    /// volume, however it is cut. Without the top face, the force is larger by the load on
+    /// that face.
     #[test]
     fn a_submerged_box_bears_what_it_displaces() {
         let (mesh, bounds) = (box_mesh(bounds()), bounds());
@@ -95,7 +96,7 @@ mod tests {
             let lift = 9810.0 * bounds.volume();
             let [force, moment] = load(&patches, &pressures, middle + DVec3::X);
             assert!((force - lift * DVec3::Y).length() < 1e-9 * lift, "{force}");
-            // A metre beside the middle: −x × y is −z.
+            // A metre beside the centre: −x × y is −z.
             assert!(
                 (moment + lift * DVec3::Z).length() < 1e-9 * lift,
                 "{moment}"
@@ -108,8 +109,8 @@ mod tests {
         }
     }
 
-    /// A wall of height 1.5 and width 0.4 under water to its top: ½ ρ g H² B, a third up. The moment's integrand is bent,
-    /// so that it is right to (edge / H)².
+    /// A wall of height 1.5 and width 0.4 under water to its top bears ½ ρ g H² B, at a third of
+    /// its height. The moment's integrand is quadratic, so that it is exact to (edge / H)².
     #[test]
     fn a_wall_bears_half_its_square() {
         let corners = [[0.0, 0.0], [0.0, 1.5], [0.4, 1.5], [0.4, 0.0]];

@@ -1,16 +1,18 @@
-//! How far the water reaches along an axis, and how high it runs up.
+//! Position of the water's front along an axis, and run-up height.
 
 use std::ops::Range;
 
 use super::SUPPORT;
 use crate::particles::Particles;
 
-/// Coordinate along `axis` (0, 1, 2 for x, y, z) behind which the part `quantile` of the water lies, metres: for
-/// `sign` 1 the rest lies at larger coordinates, for −1 at smaller ones. `None` without water.
+/// Returns the coordinate along `axis` (0, 1, 2 for x, y, z) behind which the fraction `quantile`
+/// of the water lies, metres; `None` without water. For `sign` 1 the rest lies at larger
+/// coordinates, for −1 at smaller ones.
 ///
-/// Each particle counts as a slab one `spacing` wide about its centre, so that a block ends where it ends: the front of
-/// a block from 0 to L is `quantile` · L, and its end with a quantile of 1. A quantile below 1 leaves spray out, however
-/// far it flies; it needs no threshold of depth, below which a thin tongue on a dry floor would be lost.
+/// Each particle counts as a slab one `spacing` wide around its centre, so that the front of a
+/// block from 0 to L is `quantile` · L, and its end for a quantile of 1. A quantile below 1
+/// excludes spray, however far it flies, without a threshold of depth, which would miss a thin
+/// tongue on a dry floor.
 pub fn front(
     particles: &Particles,
     spacing: f64,
@@ -25,7 +27,8 @@ pub fn front(
     ends.sort_by(|a, b| b.total_cmp(a));
     let ahead = (1.0 - quantile) * ends.len() as f64;
     let mut at = *ends.first()?;
-    // Slabs that have begun and those that are over, from the foremost back, and what they hold ahead of `at`.
+    // Slabs entered and slabs left, from the foremost back, and the water ahead of `at` that
+    // they hold.
     let (mut begun, mut over, mut passed) = (0, 0, 0.0);
     while over < ends.len() {
         let next = ends[over] - spacing;
@@ -50,12 +53,12 @@ pub fn front(
     Some(sign * at)
 }
 
-/// Height of the highest water that hangs together with the body of the water, metres above the world's y = 0, by
-/// [`front`] upward over the body's particles; `None` without water.
+/// Returns the height of the highest water that is connected to the main body, metres above the
+/// world's y = 0: [`front`] upward over the particles of that body. `None` without water.
 ///
-/// The body is the largest set of particles in which each is nearer than two spacings to another: across such gaps the
-/// water counts as whole, as for [`elevation`](super::elevation). Drops that have come off it do not count, so a quantile of
-/// 1 is of use here.
+/// The body is the largest set of particles in which each is nearer than two spacings to another:
+/// as for [`elevation`](super::elevation), water counts as continuous across such gaps. Detached
+/// drops do not count, so a quantile of 1 is useful here.
 pub fn run_up(particles: &Particles, spacing: f64, quantile: f64) -> Option<f64> {
     let body = Particles {
         position: body(&particles.position, SUPPORT * spacing),
@@ -64,7 +67,8 @@ pub fn run_up(particles: &Particles, spacing: f64, quantile: f64) -> Option<f64>
     front(&body, spacing, 1, 1.0, quantile)
 }
 
-/// Places of the largest set that links shorter than `reach` hold together; of equals the one with the first particle.
+/// Positions of the largest set connected by links shorter than `reach`; of equal sets, the one
+/// with the first particle.
 fn body(places: &[[f32; 3]], reach: f64) -> Vec<[f32; 3]> {
     let cell_of = |x: &[f32; 3]| x.map(|x| (f64::from(x) / reach).floor() as i64);
     let mut order: Vec<([i64; 3], u32)> = (places.iter().map(cell_of)).zip(0..).collect();
@@ -100,12 +104,12 @@ fn body(places: &[[f32; 3]], reach: f64) -> Vec<[f32; 3]> {
     sets.largest().map(|k| places[k as usize]).collect()
 }
 
-/// Half of the 27 cells about a cell, without itself: each pair of neighbours once.
+/// Half of the 26 cells around a cell, so that each pair of neighbours is visited once.
 const AFTER: Range<usize> = 14..27;
 const AROUND: [i64; 3] = [-1, 0, 1];
 const POWERS: [usize; 3] = [9, 3, 1];
 
-/// Sets by the least of their members: union–find with path halving.
+/// Disjoint sets named by their least member: union–find with path halving.
 struct Sets(Vec<u32>);
 
 impl Sets {
@@ -123,12 +127,12 @@ impl Sets {
         self.0[a.max(b) as usize] = a.min(b);
     }
 
-    /// Members of the largest one in order; of equals the one with the least member.
+    /// Members of the largest set in order; of equal sets, the one with the least member.
     fn largest(mut self) -> impl Iterator<Item = u32> {
         let all: Vec<u32> = (0..self.0.len() as u32).map(|a| self.first(a)).collect();
         let mut sizes = vec![0usize; all.len()];
         all.iter().for_each(|&first| sizes[first as usize] += 1);
-        // Of equals the last, so from the end.
+        // `max_by_key` returns the last of equal elements, so iterate backwards.
         let largest = (0..sizes.len()).rev().max_by_key(|&first| sizes[first]);
         let members = (0..).zip(all);
         members.filter_map(move |(a, first)| (Some(first as usize) == largest).then_some(a))
@@ -142,8 +146,8 @@ mod tests {
     use super::super::tests::block;
     use super::*;
 
-    /// Of a block from 0.02 to 1.22 along x the part behind its front is the quantile, to the rounding of f32 positions, from
-    /// either side and within a slab as between two.
+    /// The fraction of a block from 0.02 to 1.22 along x behind its front is the quantile, to the
+    /// rounding of f32 positions, from either side and both within a slab and between two.
     #[test]
     fn the_front_of_a_block_is_where_its_quantile_ends() {
         let particles = block([12, 3, 4], DVec3::new(0.02, 0.0, 0.0));
@@ -164,7 +168,7 @@ mod tests {
         assert_eq!(front(&Particles::default(), 0.1, 0, 1.0, 0.995), None);
     }
 
-    /// A wedge whose particles are as dense as x: the part behind x is (x / L)².
+    /// A wedge whose particle density is proportional to x: the fraction behind x is (x / L)².
     #[test]
     fn the_front_of_a_wedge_is_the_root_of_its_quantile() {
         let mut particles = Particles::default();
@@ -184,8 +188,8 @@ mod tests {
         }
     }
 
-    /// One drop in 1000 far ahead: the foremost place is the drop's, the front of 99.5 % is the block's to half of a
-    /// per cent of its length.
+    /// One drop in 1000 far ahead: with a quantile of 1 the front is the drop's, with 99.5 % it is
+    /// the block's to half of a per cent of its length.
     #[test]
     fn a_drop_ahead_is_no_front() {
         let mut particles = block([10, 10, 10], DVec3::ZERO);
@@ -195,13 +199,13 @@ mod tests {
         assert!((0.995..1.0).contains(&found), "{found}");
     }
 
-    /// A column at a wall that is joined to the block by a film is its run-up; a higher drop is not, until a gap to it is
-    /// narrower than two spacings.
+    /// A column at a wall connected to the block by a film sets the run-up; a higher drop does not,
+    /// unless the gap to it is narrower than two spacings.
     #[test]
     fn the_run_up_hangs_together_with_the_body() {
         let mut particles = block([12, 4, 6], DVec3::ZERO);
         for k in 0..6 {
-            // Each 1.5 spacings over the one below.
+            // Each one 1.5 spacings above the one below.
             particles
                 .position
                 .push([0.05, 0.35 + 0.15 * (k as f32 + 1.0), 0.25]);
@@ -217,13 +221,14 @@ mod tests {
             let found = run_up(&with_drop, 0.1, 1.0).unwrap();
             assert!((found - top).abs() < 1e-6, "{gap}: {found} {top}");
         }
-        // Of the body a quantile counts: half of it lies below the middle of what is 0.4 high.
+        // The quantile applies to the body: half of a block 0.4 high lies below its middle.
         let half = run_up(&block([12, 4, 6], DVec3::ZERO), 0.1, 0.5).unwrap();
         assert!((half - 0.2).abs() < 1e-6, "{half}");
         assert_eq!(run_up(&Particles::default(), 0.1, 1.0), None);
     }
 
-    /// The sets against those that a look at each pair finds, over places scattered at twice the spacing of a lattice.
+    /// Compares with the sets found by testing each pair, for points scattered at twice a
+    /// lattice's spacing.
     #[test]
     fn the_body_is_that_of_all_pairs() {
         let hash =

@@ -1,6 +1,7 @@
-//! What is measured at a point, over a plane or over all of a frame's water, the same for every solver.
+//! Measurements at a point, over a plane or over all water of a frame, the same for every solver.
 //!
-//! Height is along y. Sums run in the order of the particles, so that a frame gives the same numbers every time.
+//! Height is along y. Sums run in the order of the particles, so that a frame always gives the
+//! same numbers.
 
 mod elevation;
 mod fitted;
@@ -22,12 +23,13 @@ pub use front::{front, run_up};
 pub use rate::Rate;
 pub use volume::{enclosed_volume, volume};
 
-/// R of the surface's kernel in particle spacings (Zhu and Bridson 2005).
+/// Radius R of the surface's kernel, particle spacings (Zhu and Bridson 2005).
 pub(crate) const SUPPORT: f64 = 2.0;
 
-/// Kinetic and potential energy, joule, of particles of `mass` kg; potential energy is relative to `lowest`. Velocities are at
-/// mid-substep and positions at its end (leapfrog), so potential energy uses x − v Δt / 2: in free fall the error is (g Δt)² / 8 a
-/// kilogram. With positions at the substep's end it would be g v Δt / 2.
+/// Returns the kinetic and potential energy, J, of particles of `mass` kg; potential energy is
+/// relative to `lowest`. Velocities are at mid-substep and positions at its end (leapfrog), so
+/// potential energy uses x − v Δt / 2: in free fall the error is (g Δt)² / 8 per kilogram. With
+/// positions at the substep's end it would be g v Δt / 2.
 pub fn energies(particles: &Particles, mass: f64, gravity: DVec3, lowest: DVec3) -> (f64, f64) {
     let (mut kinetic, mut potential) = (0.0, 0.0);
     for (x, v) in particles.position.iter().zip(&particles.velocity) {
@@ -43,7 +45,7 @@ mod tests {
     use super::super::bounds::Bounds;
     use super::*;
 
-    /// A block of n³ particles from 0 on, d = 0.1.
+    /// A block of n[0] × n[1] × n[2] particles from 0 on, d = 0.1.
     pub(super) fn block(n: [usize; 3], shift: DVec3) -> Particles {
         let mut particles = Particles::default();
         for k in 0..n[0] * n[1] * n[2] {
@@ -56,7 +58,7 @@ mod tests {
         particles
     }
 
-    /// Wide enough for no wall to matter but those at 0.
+    /// Wide enough that only the walls at 0 matter.
     pub(super) fn domain() -> Bounds {
         Bounds {
             min: DVec3::ZERO,
@@ -74,7 +76,8 @@ mod tests {
         assert!((potential - 1536.0).abs() < 1e-3, "{potential}");
     }
 
-    /// A particle falls in leapfrog steps of several lengths, each after half of the one before and half of its own.
+    /// A particle falls in leapfrog steps of several lengths; its velocity steps by half of the
+    /// previous and half of the current one.
     #[test]
     fn free_fall_keeps_its_energy_to_second_order() {
         let gravity = DVec3::new(0.0, -10.0, 0.0);
@@ -91,7 +94,7 @@ mod tests {
                 substep,
                 ..Particles::default()
             };
-            // Control: positions as they stand.
+            // Control: positions as they are.
             let late = Particles {
                 substep: 0.0,
                 ..state.clone()

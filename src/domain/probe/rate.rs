@@ -1,29 +1,30 @@
-//! How often a probe looks.
+//! Sampling rate of a probe.
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// How often a probe looks at the water.
+/// How often a probe samples the water.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Rate {
-    /// At each frame's end.
+    /// At the end of each frame.
     #[default]
     Frame,
-    /// At each substep's end.
+    /// At the end of each substep.
     Substep,
-    /// So many times a second: at the end of each substep in which one of its times lies.
+    /// A number of times per second: at the end of each substep that contains one of its times.
     Hertz(f64),
 }
 
 impl Rate {
-    /// Stands for [`Rate::Substep`] where else a number is.
+    /// Word for [`Rate::Substep`] in files that otherwise hold a number.
     pub const SUBSTEP: &'static str = "substep";
 
-    /// How near to a substep's end a time may lie and still be in it, in its own spacing: what sums of substeps' lengths
-    /// leave of round-off is 1e-12 of a shot of a million times.
+    /// How far beyond a substep's end a time may lie and still count, in sampling intervals: the
+    /// round-off of summed substep lengths is 1e-12 over a shot of a million intervals.
     const NEAR: f64 = 1e-6;
 
-    /// Whether it looks at the end of the substep from `start` to `end`, seconds from the shot's start. Its times are
-    /// k / rate, k whole; a substep with several of them is one look.
+    /// Returns whether a sample is due at the end of the substep from `start` to `end`, seconds
+    /// from the start of the shot. Sampling times are k / rate for whole k; a substep with several
+    /// of them has one sample.
     pub fn is_due(self, start: f64, end: f64) -> bool {
         match self {
             Self::Frame => false,
@@ -32,7 +33,8 @@ impl Rate {
         }
     }
 
-    /// How many of its own times lie after `start` and up to `end`, seconds; 0 of one that has none.
+    /// Returns how many sampling times lie after `start` and up to `end`, seconds; 0 for
+    /// [`Rate::Frame`] and [`Rate::Substep`].
     pub fn times(self, start: f64, end: f64) -> u64 {
         match self {
             Self::Frame | Self::Substep => 0,
@@ -44,7 +46,7 @@ impl Rate {
     }
 }
 
-/// A number of hertz or `"substep"`; [`Rate::Frame`] is what is left out.
+/// A number of hertz or `"substep"`; [`Rate::Frame`] is written as none.
 impl Serialize for Rate {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         match self {
@@ -75,7 +77,8 @@ impl<'de> Deserialize<'de> for Rate {
 mod tests {
     use super::*;
 
-    /// 10 Hz over a second of substeps: at the first end at or after each tenth, once where several lie in a substep.
+    /// 10 Hz over a second of substeps: a sample at the first end at or after each tenth, and only
+    /// one if several lie in a substep.
     #[test]
     fn a_look_is_at_the_first_end_after_its_time() {
         let due = |substeps: u32, rate: Rate| -> Vec<u32> {
@@ -88,7 +91,7 @@ mod tests {
             due(20, Rate::Hertz(10.0)),
             [2, 4, 6, 8, 10, 12, 14, 16, 18, 20]
         );
-        // Tenths lie at 2.3, 4.6, …, 23 of 23.
+        // Tenths are at 2.3, 4.6, …, 23 of 23.
         assert_eq!(
             due(23, Rate::Hertz(10.0)),
             [3, 5, 7, 10, 12, 14, 17, 19, 21, 23]
@@ -98,7 +101,8 @@ mod tests {
         assert!(due(4, Rate::Frame).is_empty());
     }
 
-    /// Frames of 1/24 s in uneven substeps, added up as solvers do: never one more or one less than the rate.
+    /// Frames of 1/24 s in uneven substeps, summed as solvers do: never a sample more or less than
+    /// the rate.
     #[test]
     fn round_off_neither_adds_nor_loses_a_look() {
         for (rate, substeps) in [(24.0, 7), (240.0, 30), (1000.0, 97), (120.0, 11)] {

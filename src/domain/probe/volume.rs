@@ -1,4 +1,4 @@
-//! Volume of a frame's water.
+//! Volume of the water of a frame.
 
 use rayon::prelude::*;
 
@@ -12,14 +12,16 @@ use crate::{
     voxels::Voxels,
 };
 
-/// Volume of the water in the domain, m³: each particle has that of its spacing where there is room for it.
+/// Returns the volume of the water in the domain, m³: that of one spacing cubed per particle, as
+/// far as there is space for it.
 ///
-/// On voxels of one spacing each particle is spread by hats that reach two spacings, which add up to one on a lattice, and
-/// no voxel holds more than what of it lies in the domain; the domain's faces are mirrors. So a drop, a torn sheet or a
-/// film counts as what it is made of, and water whose particles have come nearer to each other than at rest counts as
-/// less. Where particles stand in disorder a voxel holds by chance more than it has room for: with each particle anywhere
-/// within its own cell of the lattice that is 2.4 % of the volume, half as much 1.3 %. Water that has spread apart does not
-/// count as more: that is [`enclosed_volume`]'s.
+/// Each particle is spread over voxels of one spacing by hat functions that reach two spacings and
+/// add up to one on a lattice; no voxel holds more than its own volume within the domain. The
+/// domain's faces are mirrors. A drop, a torn sheet or a film thus counts as the sum of its
+/// particles, and water whose particles are compressed counts as less. In disordered water some
+/// voxels overflow by chance: with each particle anywhere within its own cell of the lattice that
+/// loses 2.4 % of the volume, with half of that displacement 1.3 %. Water that has spread apart
+/// does not count as more; [`enclosed_volume`] measures that.
 pub fn volume(particles: &Particles, spacing: f64, domain: &Bounds) -> f64 {
     // A voxel that a face cuts has its centre up to half a voxel beyond.
     let reach = SUPPORT + 0.5;
@@ -50,7 +52,8 @@ pub fn volume(particles: &Particles, spacing: f64, domain: &Bounds) -> f64 {
     by_slot.iter().sum::<f64>() * spacing.powi(3)
 }
 
-/// Adds a particle at `place`, in voxels from the corner of a brick of 8³, to the voxels that its hat reaches.
+/// Adds a particle at `place`, in voxels from the corner of a brick of 8³, to the voxels that its
+/// hat reaches.
 fn add_hats(fill: &mut [f32], place: [f32; 3]) {
     const WIDTH: f32 = SUPPORT as f32;
     let part = |axis: usize, k: usize| {
@@ -72,24 +75,25 @@ fn add_hats(fill: &mut [f32], place: [f32; 3]) {
     }
 }
 
-/// Part of a voxel that lies in the domain, at whose least corner the indices begin.
+/// Fraction of a voxel that lies in the domain; voxel indices count from its least corner.
 fn room(domain: &Bounds, spacing: f64, voxel: [i32; 3]) -> f64 {
     (0..3)
         .map(|axis| within(domain, spacing, voxel[axis], axis))
         .product()
 }
 
-/// The same along an axis.
+/// Same along one axis.
 fn within(domain: &Bounds, spacing: f64, voxel: i32, axis: usize) -> f64 {
     let low = f64::from(voxel) * spacing;
     let size = domain.size()[axis];
     ((low + spacing).min(size) - low.max(0.0)).max(0.0) / spacing
 }
 
-/// Volume that the water's surface encloses in the domain, m³: of what lies within the level set of [`Raster::surface`] at
-/// voxels of one spacing, a voxel that the surface crosses by the part that a plane at its distance leaves inside. The
-/// domain's faces are mirrors; edges of the free surface are rounded by two spacings. Air between particles counts where
-/// the surface closes over it, and water where they are too far apart does not.
+/// Returns the volume that the water's surface encloses in the domain, m³: that within the level
+/// set of [`Raster::surface`] at voxels of one spacing. A voxel that the surface crosses counts by
+/// the fraction that a plane at its distance leaves inside. The domain's faces are mirrors; edges
+/// of the free surface are rounded by two spacings. Air between particles counts where the surface
+/// closes over it; water whose particles are too far apart does not.
 pub fn enclosed_volume(particles: &Particles, spacing: f64, domain: &Bounds) -> f64 {
     let raster = Raster {
         origin: domain.min,
@@ -100,7 +104,7 @@ pub fn enclosed_volume(particles: &Particles, spacing: f64, domain: &Bounds) -> 
     volume_within(&raster.surface(&water), domain)
 }
 
-/// Volume within a level set and a domain at whose least corner its indices begin, m³.
+/// Volume within a level set and a domain, m³; indices count from the domain's least corner.
 fn volume_within(grid: &SparseGrid<f32>, domain: &Bounds) -> f64 {
     let spacing = grid.voxel_size;
     let part = |distance: f32| (0.5 - f64::from(distance) / spacing).clamp(0.0, 1.0);
@@ -121,7 +125,7 @@ fn volume_within(grid: &SparseGrid<f32>, domain: &Bounds) -> f64 {
     sum * spacing.powi(3)
 }
 
-/// Positions with their mirror images within `reach` beyond the domain's faces, edges and corners.
+/// Positions and their mirror images within `reach` beyond the domain's faces, edges and corners.
 fn mirrored(particles: &Particles, domain: &Bounds, reach: f64) -> Particles {
     let mut position = particles.position.clone();
     for axis in 0..3 {
@@ -150,14 +154,15 @@ mod tests {
     use super::*;
     use crate::sparse_grid::{Leaf, VOXELS};
 
-    /// A number from 0 to 1 that follows from `k`.
+    /// A pseudo-random number from 0 to 1 for `k`.
     fn chance(k: usize) -> f64 {
         let mut x = (k as u32).wrapping_mul(2_654_435_761) ^ 0x9e37_79b9;
         x = (x ^ (x >> 15)).wrapping_mul(0x85eb_ca6b);
         f64::from((x ^ (x >> 13)) % 65_536) / 65_536.0
     }
 
-    /// Particles at these places, d = 0.1, in a domain of 6 × 6 × 6.
+    /// Relative and expected volume of particles at these positions, d = 0.1, in a domain of 6 × 6
+    /// × 6.
     fn of(places: impl Iterator<Item = DVec3>) -> (f64, f64) {
         let position: Vec<_> = places.map(|x| x.as_vec3().to_array()).collect();
         let expected = position.len() as f64 * 1e-3;
@@ -172,9 +177,10 @@ mod tests {
         (volume(&particles, 0.1, &domain) / expected, expected)
     }
 
-    /// Drops, sheets and blocks of a lattice in any place and direction: hats add up to one voxel's worth a particle, and
-    /// nowhere to more than a voxel where the lattice has the voxels' directions. Turned, a lattice's hats are off one by
-    /// up to 2 % here and there, a quarter of which is too much somewhere and cut.
+    /// Drops, sheets and blocks of a lattice in any position and orientation: hats add up to one
+    /// voxel's worth per particle, and nowhere to more than a voxel if the lattice is aligned with
+    /// the voxels. For a rotated lattice, the sum of hats is off by up to 2 % in places, a quarter
+    /// of which is an excess that is cut.
     #[test]
     fn what_is_thin_counts_as_what_it_is_made_of() {
         let drops = (0..125).map(|k| {
@@ -186,7 +192,7 @@ mod tests {
         assert!((found - 1.0).abs() < 1e-5, "{found}");
         for tilt in [0.0f64, 0.3, 0.7] {
             for layers in [1, 2, 3, 10] {
-                // At 1.6 spacings it is torn.
+                // At 1.6 spacings the sheet is torn.
                 for spread in [1.0, 1.6] {
                     let sheet = (0..400 * layers).map(|k| {
                         let place = [k % 20, k / 400, k / 20 % 20].map(|c| c as f64);
@@ -207,7 +213,7 @@ mod tests {
         }
     }
 
-    /// Particles anywhere within their cells of the lattice, and anywhere within the half of it.
+    /// Particles anywhere within their lattice cells, and anywhere within half of them.
     #[test]
     fn disorder_takes_the_part_that_is_named() {
         for (jitter, most) in [(1.0, 0.026), (0.5, 0.015)] {
@@ -222,8 +228,9 @@ mod tests {
         }
     }
 
-    /// Negative control: a block of 20 × 20 × 20 in a corner whose particles are nearer by a tenth is less by as much as
-    /// its edges are, but for the layer at its three free faces, where a hat finds room outside: a spacing of each at most.
+    /// Negative control: a block of 20 × 20 × 20 in a corner, compressed by a tenth, is smaller by
+    /// as much as its edges, except for the layer at its three free faces, where a hat finds space
+    /// outside: at most a spacing each.
     #[test]
     fn what_is_pressed_together_counts_as_less() {
         let block = (0..8000).map(|k| {
@@ -236,8 +243,8 @@ mod tests {
         assert!((least..most).contains(&found), "{found}");
     }
 
-    /// On the lattice it is what is there to rounding, also where faces of the domain cut voxels: there the lattice begins
-    /// at the least corner, and the last layer's hats are mirrored.
+    /// On the lattice the volume is exact to rounding, even if faces of the domain cut voxels:
+    /// there the lattice begins at the least corner, and the last layer's hats are mirrored.
     #[test]
     fn volume_of_a_lattice_is_exact() {
         for n in [[12, 9, 12], [8, 9, 12], [12, 11, 5], [12, 1, 1]] {
@@ -248,8 +255,8 @@ mod tests {
         assert_eq!(volume(&Particles::default(), 0.1, &domain()), 0.0);
     }
 
-    /// Between walls it is what the lattice fills; where the block has a free edge, that is rounded, which takes up to
-    /// half a square of two spacings from each of its cross sections.
+    /// Between walls it is the volume of the lattice; a free edge of the block is rounded, which
+    /// removes up to half a square of two spacings from each of its cross sections.
     #[test]
     fn enclosed_volume_of_a_block() {
         for (n, edges) in [([12, 9, 12], 0.0), ([8, 9, 12], 12.0), ([12, 11, 5], 12.0)] {
@@ -257,7 +264,7 @@ mod tests {
             let expected = n.iter().product::<usize>() as f64 * 1e-3;
             let found = enclosed_volume(&particles, 0.1, &domain());
             println!("{found} of {expected}");
-            // A free face is off by what the voxels have of a plane, a twentieth of a spacing.
+            // A free face is off by the voxels' error for a plane, a twentieth of a spacing.
             let faces = 0.05 * 0.1 * (1.2 * 1.2 + if edges > 0.0 { 1.2 * 1.1 } else { 0.0 });
             let least = expected - faces - edges * 0.1 * 0.02;
             assert!(
@@ -268,8 +275,9 @@ mod tests {
         assert_eq!(enclosed_volume(&Particles::default(), 0.1, &domain()), 0.0);
     }
 
-    /// By a plane that is exact on every voxel, in a box whose far faces cut voxels: its volume to the rounding of f32,
-    /// 3 voxels' worth at 2⁻²⁴ beside a depth of 17. The leaves below are whole.
+    /// A plane that every voxel represents exactly, in a box whose far faces cut voxels: its
+    /// volume to the rounding of f32, 3 voxels' worth at 2⁻²⁴ beside a depth of 17. The leaves
+    /// below are full.
     #[test]
     fn volume_below_a_plane_is_exact() {
         let h = 0.05;
@@ -305,10 +313,10 @@ mod tests {
         }
     }
 
-    /// Where voxels lie about the particles is chance; over all of that, still water ends half a spacing beyond its
-    /// outermost layer. The thickness of five layers, over 16 shifts of a slab against its voxels: the radius is
-    /// right to first order in what single shifts are off by, 0.036 spacings a face; what is left is of second order, 0.036²
-    /// a face.
+    /// The positions of voxels relative to the particles are arbitrary; on average, still water
+    /// ends half a spacing beyond its outermost layer. Measures the thickness of five layers over
+    /// 16 shifts of a slab against its voxels. Single shifts are off by 0.036 spacings per face;
+    /// the radius cancels the first order, which leaves 0.036² per face.
     #[test]
     fn a_level_set_is_as_thick_as_its_layers() {
         for d in [0.1, 0.04] {

@@ -1,4 +1,4 @@
-//! Water of the start that gives way to solids.
+//! Makes initial water give way to solids.
 
 use std::collections::BTreeMap;
 
@@ -10,24 +10,26 @@ use super::{
     uniform,
 };
 
-/// Particles stand at least so far from solids, in spacings: a little farther than PBF holds them (0.25) and FLIP does (0.1), so that
-/// none is pushed in the first step.
+/// Least distance of particles from solids, in spacings: slightly farther than PBF (0.25) and FLIP
+/// (0.1) keep them, so that none is pushed in the first step.
 pub(in super::super) const CLEARANCE: f64 = 0.3;
 
-/// Small cubes along each edge of a particle's cube.
+/// Subdivisions along each edge of a particle's cube.
 const PARTS: usize = 4;
 
 /// Edge of the blocks within which the count is balanced, in spacings.
 const BLOCK: f64 = 4.0;
 
-/// Random addition to an open part, so that the particles that are left out of equal places lie scattered.
+/// Random addition to an open fraction, so that the particles removed among equal ones
+/// are scattered.
 const SCATTER: f64 = 0.02;
 
-/// Passes over particles that lie between a solid and a wall, or between two solids.
+/// Iterations for particles between a solid and a wall, or between two solids.
 const ROUNDS: usize = 8;
 
-/// Removes particles in `solid` and moves those that are too near to it outward; returns how many it removed. As many stay as the
-/// open volume of the particles' cubes holds, to half a particle, except where there is no place outside of the solid.
+/// Removes particles in `solid` and moves those that are too close to it outward; returns the
+/// number removed. The count that stays matches the open volume of the particles' cubes to half a
+/// particle, unless there is no space outside of the solid.
 pub(super) fn displace(
     positions: &mut Vec<DVec3>,
     solid: &SignedDistance,
@@ -49,15 +51,16 @@ pub(super) fn displace(
     positions
         .par_iter_mut()
         .for_each(|p| *p = moved_out(*p, distance, gradient, &room, clearance));
-    // Between a solid and a wall, or between two solids, there may be no place.
+    // Between a solid and a wall, or between two solids, there may be no space.
     positions.retain(|p| solid.sample(*p) > 0.0);
     before - positions.len()
 }
 
-/// Part of the cube of edge `spacing` about `p` that lies outside of `solid`, 0..1, summed over small cubes.
+/// Fraction of the cube of edge `spacing` around `p` that lies outside of `solid`, 0..1, summed
+/// over small cubes.
 fn open_part(solid: &SignedDistance, p: DVec3, spacing: f64) -> f64 {
     let distance = solid.sample(p);
-    // Half of a cube's diagonal, and interpolation's error at edges.
+    // Half of the cube's diagonal, plus interpolation's error at edges.
     if distance.abs() > spacing {
         return if distance > 0.0 { 1.0 } else { 0.0 };
     }
@@ -68,8 +71,8 @@ fn open_part(solid: &SignedDistance, p: DVec3, spacing: f64) -> f64 {
         let at = DVec3::from_array(cell(k, NODES).map(|i| i as f64 / PARTS as f64 - 0.5));
         solid.sample(p + spacing * at)
     });
-    // Of the eight distances at a small cube's corners the positive ones over all: exact for a face parallel to the cube's,
-    // for one that it fits too.
+    // Positive distances over all distances at a small cube's eight corners: exact for a face
+    // parallel to the cube's, including one that coincides with a face of it.
     let part = |k: usize| {
         let at = cell(k, PARTS);
         let (mut open, mut all) = (0.0, 0.0);
@@ -84,8 +87,9 @@ fn open_part(solid: &SignedDistance, p: DVec3, spacing: f64) -> f64 {
     (0..parts).map(part).sum::<f64>() / parts as f64
 }
 
-/// Which particles stay: those of whose cubes at least half is open, less or more of them block by block until the count is
-/// that of the open parts. What is left of a block is the next one's.
+/// Selects which particles stay: those whose cubes are at least half open, with more or fewer added
+/// block by block until the count matches the sum of the open fractions. The remainder of a block
+/// carries over to the next.
 fn balanced(positions: &[DVec3], open: &[f64], spacing: f64) -> Vec<bool> {
     let mut kept: Vec<bool> = open.iter().map(|part| *part >= 0.5).collect();
     let mut blocks = BTreeMap::<[i64; 3], Vec<usize>>::new();
@@ -101,7 +105,7 @@ fn balanced(positions: &[DVec3], open: &[f64], spacing: f64) -> Vec<bool> {
         let held = |i: &usize| if kept[*i] { 1.0 } else { 0.0 };
         lacking += cut.iter().map(|i| open[*i] - held(i)).sum::<f64>();
         let wanted = lacking.round();
-        // Towards the solid where some are to be added, away from it where some are to go.
+        // Adds those with the largest open fraction, or removes those with the smallest.
         let rank = |i: &usize| {
             let rank = open[*i] + SCATTER * uniform(*i as u64);
             if wanted > 0.0 { -rank } else { rank }
@@ -119,7 +123,8 @@ fn balanced(positions: &[DVec3], open: &[f64], spacing: f64) -> Vec<bool> {
     kept
 }
 
-/// `p` at least `clearance` from the solid of this distance and gradient, and within `room`, as far as that goes.
+/// Moves `p` to at least `clearance` from the solid with this distance and gradient, and into
+/// `room`, as far as possible.
 pub(in super::super) fn moved_out(
     p: DVec3,
     distance: impl Fn(DVec3) -> f64,

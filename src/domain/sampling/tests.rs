@@ -10,7 +10,7 @@ fn cuboid(min: [f64; 3], max: [f64; 3]) -> Bounds {
     }
 }
 
-/// The naive search that the hashed one is held against.
+/// Brute-force search, the reference for the hashed one.
 fn least_distance(positions: &[DVec3]) -> f64 {
     let mut least = f64::INFINITY;
     for (i, a) in positions.iter().enumerate() {
@@ -36,7 +36,7 @@ fn the_city_scene_starts_with_201_000_particles() {
 fn a_block_that_is_no_whole_number_of_spacings_keeps_its_volume() {
     let domain = cuboid([0.0; 3], [10.0; 3]);
     let block = cuboid([0.0; 3], [1.0, 1.0, 10.0]);
-    // 5.88 layers become 6; 58.8 along z would pass the wall, where 58 fit.
+    // 5.88 layers become 6; 58.8 along z would exceed the wall, where 58 fit.
     assert_eq!(block_dims(&block, &domain, 0.17), [6, 6, 58]);
     assert_eq!(
         block_dims(&cuboid([0.0; 3], [0.0; 3]), &domain, 0.17),
@@ -63,7 +63,7 @@ fn overlapping_blocks_leave_no_twins() {
     assert_eq!(whole, fill_blocks(&[first], &domain, 0.1));
 }
 
-/// A pier of a harbour, whose faces the lattice of the water fits: all of it stays, layer by layer alike.
+/// A harbour pier whose faces are aligned with the water's lattice: no particle moves.
 #[test]
 fn water_beside_a_solid_that_fits_is_whole() {
     let domain = cuboid([0.0; 3], [24.0, 6.0, 16.0]);
@@ -72,7 +72,7 @@ fn water_beside_a_solid_that_fits_is_whole() {
     let pier_mesh = box_mesh(pier);
     let solid = SignedDistance::from_mesh(&pier_mesh, &domain, 0.25).expect("closed");
     let fill = fill_water(&[water], [], Some(&solid), &domain, 0.25).expect("no mesh");
-    // 24 by 8 by 6 cells of the lattice are the pier's.
+    // 24 by 8 by 6 cells of the lattice belong to the pier.
     assert_eq!(fill.removed, 24 * 8 * 6);
     let key = |p: &[f32; 3]| p.map(f32::to_bits);
     let lattice = fill_blocks(&[water], &domain, 0.25);
@@ -85,7 +85,7 @@ fn water_beside_a_solid_that_fits_is_whole() {
         places.filter(|p| !lattice.contains(&key(p))).count()
     };
     assert_eq!(moved(&fill), 0);
-    // The control: beside a pier a tenth of a spacing off, some of it is moved.
+    // Negative control: beside a pier shifted by 0.4 spacings, particles are moved.
     let off = TriangleMesh {
         vertices: (pier_mesh.vertices.iter())
             .map(|v| *v + DVec3::splat(0.4 * 0.25))
@@ -103,8 +103,8 @@ fn a_water_mesh_is_filled_and_a_solid_displaces() {
     let drop = sphere(DVec3::ZERO, 0.8, 24);
     let fill = fill_water(&[], [&drop], None, &domain, 0.1).expect("closed");
     let volume = fill.particles.len() as f64 * 1e-3;
-    // Each surface cell is counted whole or not at all: 800 cells of 1e-3 m³, off by half at
-    // random, are √800/2 of 2 130, 0.7 %; four times that is allowed.
+    // Each surface cell counts fully or not at all: 800 cells of 1e-3 m³, off by half at random,
+    // are √800/2 of 2 130, 0.7 %; four times that is allowed.
     let exact = drop.signed_volume();
     assert!((volume / exact - 1.0).abs() < 0.03, "{volume} {exact}");
 
@@ -112,8 +112,8 @@ fn a_water_mesh_is_filled_and_a_solid_displaces() {
     let solid = SignedDistance::from_mesh(&drop, &domain, 0.1).expect("closed");
     let wet = fill_water(&[block], [], Some(&solid), &domain, 0.1).expect("no mesh");
     assert_eq!(wet.particles.len() + wet.removed, 8000);
-    // As many as the solid's room holds: interpolation takes 3/8 · spacing² / R off its radius, three times as much in parts of
-    // its volume, and there is half a particle.
+    // As many are removed as the solid's volume holds: interpolation takes 3/8 · spacing² / R off
+    // its radius, three times that fraction off its volume, and there is half a particle.
     let removed = wet.removed as f64 * 1e-3;
     assert!(
         removed < exact && removed > 0.97 * exact,
@@ -132,7 +132,8 @@ fn a_water_mesh_is_filled_and_a_solid_displaces() {
     );
 }
 
-/// Slopes of 1:1, 1:4 and 1:20, and a box turned about two axes, all in water: the volume is that of the polyhedra.
+/// Slopes of 1:1, 1:4 and 1:20, and a box rotated about two axes, all in water: the volume is that
+/// of the polyhedra.
 #[test]
 fn water_beside_slopes_has_its_volume() {
     let domain = cuboid([0.0; 3], [2.0; 3]);
@@ -156,14 +157,15 @@ fn water_beside_slopes_has_its_volume() {
         let fill = fill_water(&[domain], [], Some(&solid), &domain, spacing).expect("no mesh");
         let error = fill.particles.len() as f64 * spacing.powi(3) / volume - 1.0;
         assert!(error.abs() < 1e-3, "{about_z} {about_x}: {error}");
-        // Control: without what lies nearer than half a spacing, as a lattice beside a face that it fits has it.
+        // Control: without the particles nearer than half a spacing, as for a lattice beside an
+        // aligned face.
         let lattice = fill_blocks(&[domain], &domain, spacing);
         let far = lattice
             .iter()
             .filter(|p| solid.sample(**p) >= 0.499 * spacing);
         let error = far.count() as f64 * spacing.powi(3) / volume - 1.0;
         assert!(error < -5e-3, "{about_z} {about_x}: {error}");
-        // None nearer than a third of what it is moved out to, at edges.
+        // At edges, none is nearer than a third of the target distance.
         let places = fill.particles.position.iter();
         let places: Vec<_> = places
             .map(|p| DVec3::from_array(p.map(f64::from)))
@@ -171,7 +173,8 @@ fn water_beside_slopes_has_its_volume() {
         for p in &places {
             assert!(solid.sample(*p) > 0.1 * spacing, "{p}");
         }
-        // One that was half a spacing deep is now 0.3 out, and the next of its column 0.5.
+        // A particle that was half a spacing deep is now 0.3 outside, and the next in its
+        // column 0.5.
         let near = PointGrid::over(&places, 0.15 * spacing);
         for (i, p) in places.iter().enumerate() {
             let is_shared = near.any_near(&places, *p, |j| j as usize != i);
@@ -205,7 +208,7 @@ fn boundary_samples_are_even_and_share_the_area() {
         let spread = samples.iter().map(|s| s.area / share);
         assert!(spread.clone().fold(0.0, f64::max) < 1.7);
         assert!(spread.fold(f64::INFINITY, f64::min) > 0.5);
-        // No place on the surface is farther from a sample than this.
+        // No point on the surface is farther from a sample than this.
         let grid = PointGrid::over(&positions, 1.2 * spacing);
         for t in 0..mesh.triangles.len() {
             for c in 0..200 {
@@ -222,10 +225,11 @@ fn boundary_samples_are_even_and_share_the_area() {
 
 #[test]
 fn a_share_is_one_over_the_sum_of_the_kernel_on_its_own_side() {
-    // A row one spacing apart on one side, and a sample of the other side at the middle's place.
+    // A row one spacing apart on one side, and a sample of the other side at the position of the
+    // middle one.
     let row = [-0.1, 0.0, 0.1, 0.0].map(|x| DVec3::new(x, 0.0, 0.0));
     let normals = [DVec3::Y, DVec3::Y, DVec3::Y, -DVec3::Y];
-    // 1 − r/R with R two spacings: 1 of itself, ½ of each neighbour; from end to end r = R.
+    // 1 − r/R with R two spacings: 1 for itself, ½ for each neighbour; from end to end r = R.
     let expected = [1.0 / 1.5, 1.0 / 2.0, 1.0 / 1.5, 1.0];
     for (share, exact) in surface_shares(&row, &normals, 0.1).iter().zip(expected) {
         // A handful of operations, each rounded once.
@@ -244,7 +248,7 @@ fn samples_outside_the_domain_and_on_its_floor_are_left_out() {
     assert!(samples.iter().all(|s| domain.contains(s.position)));
     assert!(samples.iter().all(|s| s.normal.y.abs() < 1e-9));
     let sum: f64 = samples.iter().map(|s| s.area).sum();
-    // Four walls of 0.5 by 2.0; the candidates on a wall count its part inside to 1/√n.
+    // Four walls of 0.5 by 2.0; the candidates estimate the part of a wall inside to 1/√n.
     assert!((sum / 4.0 - 1.0).abs() < 0.02, "{sum}");
 }
 

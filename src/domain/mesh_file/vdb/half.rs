@@ -1,20 +1,22 @@
-//! Grids in half precision for vdb-rs 0.6.
+//! Makes grids in half precision readable for vdb-rs 0.6.
 //!
-//! A buffer that is compressed has its length before it, and one without values a length of 0. OpenVDB's writer of half precision
-//! (`io::HalfWriter`, `io/Compression.h`) leaves that 0 out, and vdb-rs expects it: here it is put in. Formats 222 and newer.
+//! A compressed buffer is preceded by its length, and an empty one by a length of 0. OpenVDB's
+//! writer of half precision (`io::HalfWriter`, `io/Compression.h`) omits that 0, but vdb-rs expects
+//! it: this module inserts it. It knows file format 222 and newer.
 
 use std::borrow::Cow;
 
 /// Bytes of a length.
 const LENGTH: usize = 8;
-/// `COMPRESS_ZIP`, `COMPRESS_BLOSC`: buffers with a length.
+/// `COMPRESS_ZIP` and `COMPRESS_BLOSC`: buffers with a length.
 const WITH_LENGTH: u32 = 0x1 | 0x4;
-/// `COMPRESS_ACTIVE_MASK`: inactive values are left out.
+/// `COMPRESS_ACTIVE_MASK`: inactive values are omitted.
 const ACTIVE_MASK: u32 = 0x2;
-/// Sides of nodes, in powers of two, from the root's children on down to the leaves.
+/// Edge lengths of nodes, as powers of two, from the root's children down to the leaves.
 const SIDES: [u32; 3] = [5, 4, 3];
 
-/// The file with each length in its place; as it is where nothing is missing, and where it is not of a kind that is known.
+/// Returns the file with all lengths present; unchanged if nothing is missing, or if its kind
+/// is unknown.
 pub(super) fn with_lengths(bytes: &[u8]) -> Cow<'_, [u8]> {
     match Walk::over(bytes) {
         Some(found) if !found.holes.is_empty() => Cow::Owned(found.filled()),
@@ -22,18 +24,18 @@ pub(super) fn with_lengths(bytes: &[u8]) -> Cow<'_, [u8]> {
     }
 }
 
-/// A way through a file.
+/// A traversal of a file.
 struct Walk<'a> {
     bytes: &'a [u8],
     at: usize,
-    /// Where a length is missing, ascending.
+    /// Positions of missing lengths, ascending.
     holes: Vec<usize>,
-    /// Where the file tells of a place in itself, as a length of 8 bytes.
+    /// Positions of file offsets, each a group of three with 8 bytes each.
     places: Vec<usize>,
 }
 
 impl<'a> Walk<'a> {
-    /// Through all of it; `None` of what it does not know.
+    /// Traverses the whole file; `None` for a kind that it does not know.
     fn over(bytes: &'a [u8]) -> Option<Self> {
         let mut walk = Self {
             bytes,
@@ -44,7 +46,7 @@ impl<'a> Walk<'a> {
         if walk.number()? < 222 {
             return None;
         }
-        // Library, whether grids have places, identifier.
+        // Library version, whether grids have offsets, identifier.
         walk.take(4 + 4 + 1 + 36)?;
         walk.metadata()?;
         for _ in 0..walk.number()? {
@@ -72,7 +74,7 @@ impl<'a> Walk<'a> {
         self.take(length as usize)
     }
 
-    /// Whether it says of half precision.
+    /// Reads metadata; returns whether it declares half precision.
     fn metadata(&mut self) -> Option<bool> {
         let mut is_half = false;
         for _ in 0..self.number()? {
@@ -82,7 +84,7 @@ impl<'a> Walk<'a> {
         Some(is_half)
     }
 
-    /// From its descriptor to its end.
+    /// Traverses a grid, from its descriptor to its end.
     fn grid(&mut self) -> Option<()> {
         let (_name, kind, _parent) = (self.text()?, self.text()?, self.text()?);
         self.places.push(self.at);
@@ -100,7 +102,7 @@ impl<'a> Walk<'a> {
             }
         }
         let end = usize::try_from(end).ok()?;
-        // Else it would be gone over again and again.
+        // Otherwise the same bytes would be traversed again and again.
         if end < self.at {
             return None;
         }
@@ -108,9 +110,9 @@ impl<'a> Walk<'a> {
         Some(())
     }
 
-    /// Past the map and the tree's nodes; how many leaves they have.
+    /// Skips the map and the nodes of the tree; returns the number of leaves.
     fn topology(&mut self, is_sparse: bool) -> Option<usize> {
-        // Five triples of doubles, or six with a translation, as vdb-rs has them.
+        // Five triples of doubles, or six with a translation, as vdb-rs reads them.
         let map = match self.text()? {
             b"UniformScaleMap" => 5 * 24,
             b"UniformScaleTranslateMap" | b"ScaleTranslateMap" => 6 * 24,
@@ -133,18 +135,19 @@ impl<'a> Walk<'a> {
         Some(leaves)
     }
 
-    /// Past a node; how many children it has.
+    /// Skips a node; returns the number of its children.
     fn node(&mut self, side: u32, is_sparse: bool) -> Option<usize> {
         let (children, active) = (self.take(mask_bytes(side))?, self.take(mask_bytes(side))?);
         self.values(side, active, is_sparse)?;
         Some(ones(children))
     }
 
-    /// Past a node's values, of which `active` says which count; of a sparse grid the others are left out.
+    /// Skips the values of a node. `active` is the mask of active values; a sparse grid omits
+    /// the others.
     fn values(&mut self, side: u32, active: &[u8], is_sparse: bool) -> Option<()> {
         let all = 8 * mask_bytes(side);
         let kind = *self.take(1)?.first()?;
-        // `io::NodeMetaData`: inactive values, and a mask of which of two it is.
+        // `io::NodeMetaData`: number of inactive values, and whether a mask selects between two.
         let (inactive, has_mask) = match kind {
             0 | 1 | 6 => (0, false),
             2 => (1, false),
@@ -162,13 +165,13 @@ impl<'a> Walk<'a> {
             self.holes.push(self.at);
             return Some(());
         }
-        // Below 0 it is that of what is not compressed.
+        // A negative length is that of uncompressed data.
         let length = usize::try_from(self.long()?.unsigned_abs()).ok()?;
         self.take(length)?;
         Some(())
     }
 
-    /// The file with a length of 0 in each hole, and its places moved by those before them.
+    /// Copies the file, inserts a length of 0 at each hole, and moves the offsets accordingly.
     fn filled(&self) -> Vec<u8> {
         let mut filled = Vec::with_capacity(self.bytes.len() + LENGTH * self.holes.len());
         let mut from = 0;
@@ -178,7 +181,7 @@ impl<'a> Walk<'a> {
             from = hole;
         }
         filled.extend_from_slice(&self.bytes[from..]);
-        // A grid that was not walked through may tell of any place.
+        // Grids that were not traversed may hold any offset.
         let moved = |place: usize| {
             place.saturating_add(LENGTH * self.holes.partition_point(|&it| it <= place))
         };
@@ -213,7 +216,8 @@ mod tests {
 
     const HALF: &[u8] = include_bytes!("../../../../tests/suite/domain/files/half.vdb");
 
-    /// Each byte spoiled in turn, and the file cut anywhere: it comes to an end, and puts in no more than the file has room for.
+    /// Each byte damaged in turn, and the file cut anywhere: the traversal ends, and inserts no
+    /// more lengths than the file has space for.
     #[test]
     fn no_damage_makes_the_walk_panic() {
         assert_eq!(with_lengths(HALF).len(), HALF.len() + 6 * LENGTH);

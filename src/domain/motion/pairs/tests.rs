@@ -7,7 +7,7 @@ use super::{
 
 const WATER: [f64; 2] = [1.0, 9.81];
 
-/// A wave of a kh on a metre of water.
+/// A wave of a given kh on a depth of one metre.
 fn of_kh(kh: f64) -> Wave {
     Wave::new((9.81 * kh * kh.tanh()).sqrt(), WATER, modes_for(2.0 * kh))
 }
@@ -17,7 +17,7 @@ fn transfer(first: &Wave, second: &Wave, of: Of) -> Complex {
     pair.transfer() * pair.whole.recip()
 }
 
-/// ½ F A² (−1) exp(2iφ) is B sin 2φ + C cos 2φ of regular waves.
+/// ½ F A² (−1) exp(2iφ) is B sin 2φ + C cos 2φ for regular waves.
 #[test]
 fn two_equal_waves_are_a_regular_one() {
     for kh in [0.3, 0.5, 1.0, 2.0, 3.0, 8.0] {
@@ -25,16 +25,18 @@ fn two_equal_waves_are_a_regular_one() {
         let found = transfer(&wave, &wave, Of::Sum) * 0.5;
         let [sin, cos] = second_harmonic(wave.frequency, 1.0, 9.81);
         let off = |found: Complex| f64::hypot(found.im - sin, -found.re - cos) / sin.hypot(cos);
-        // The evanescent modes' sum of regular waves is good to 1e-3 of itself (second_order.rs).
+        // The evanescent modes' sum for regular waves is accurate to 1e-3 of itself
+        // (second_order.rs).
         assert!(off(found) < 1e-3, "{kh}: {}", off(found));
-        // Negative control: a wave of 1 % more frequency.
+        // Negative control: a wave with a 1 % higher frequency.
         let other = Wave::new(1.01 * wave.frequency, WATER, modes_for(2.0 * kh));
         assert!(off(transfer(&other, &wave, Of::Sum) * 0.5) > 3e-3);
     }
 }
 
-/// Longuet-Higgins and Stewart 1962: beneath slow groups the water is lower by Sxx / ρ (gh − c_g²) with Sxx = E (2n − ½), and that
-/// wave, which goes with the group, carries c_g times its elevation. The wall has to move this much water.
+/// Longuet-Higgins and Stewart 1962: beneath slow groups the water is lower by Sxx / ρ (gh − c_g²)
+/// with Sxx = E (2n − ½), and that wave, which travels with the group, carries c_g times its
+/// elevation. The wall has to move this much water.
 #[test]
 fn as_waves_become_alike_the_wall_follows_their_group() {
     for kh in [0.2f64, 0.7, 1.2, 2.5] {
@@ -48,12 +50,13 @@ fn as_waves_become_alike_the_wall_follows_their_group() {
         let off = |stress: f64| f64::hypot(found.re, found.im - of(stress)) / of(stress);
         // Waves 1e-4 apart are off by about as much.
         assert!(off(2.0 * n - 0.5) < 1e-3, "{kh}: {}", off(2.0 * n - 0.5));
-        // Negative control: the radiation stress of waves on deep water everywhere.
+        // Negative control: the radiation stress of deep-water waves everywhere.
         assert!(off(n) > 2e-3, "{kh}");
     }
 }
 
-/// Sharma and Dean's kernel of the difference as Hasselmann 1962 has it, and Stokes' second harmonic.
+/// Sharma and Dean's kernel of the difference in the form of Hasselmann 1962, and Stokes'
+/// second harmonic.
 #[test]
 fn what_is_bound_to_two_waves_is_published() {
     let g = 9.81;
@@ -81,15 +84,16 @@ fn what_is_bound_to_two_waves_is_published() {
     }
 }
 
-/// A flow of the second order by finite volumes, apart from Green's identity: what is forced on the surface and at the wall by two
-/// waves, whose modes are summed in place, and a far end through which the free wave leaves. Gives the free wave's potential there
-/// over the part of the bound one that the wall has to give, with the wall's correction `by` times.
+/// A flow of second order by finite volumes, without Green's identity: forcing by two waves at the
+/// surface and at the wall, with their modes summed pointwise, and a far end through which the free
+/// wave leaves. Returns the potential of the free wave there relative to the part of the bound wave
+/// that the wall has to supply, with the wall's correction scaled by `by`.
 fn free_wave(pair: &Pair<'_>, [columns, rows]: [usize; 2], by: f64) -> Complex {
     let (first, second) = (pair.first, pair.second);
     let length = 3.0;
     let (dx, dz) = (length / columns as f64, 1.0 / rows as f64);
     let correction = pair.transfer() * (by / pair.whole);
-    // Each wave's potential for a wall of 1 m: by mode its k, its part, and what the surface sees.
+    // Potential of each wave for a wall amplitude of 1 m: k and amplitude of each mode.
     let modes = |wave: &Wave, frequency: f64, number: f64| -> Vec<(Complex, Complex)> {
         let progressive = (Complex::from(number), wave.part);
         let others = wave
@@ -129,7 +133,7 @@ fn free_wave(pair: &Pair<'_>, [columns, rows]: [usize; 2], by: f64) -> Complex {
         speeds * i * -pair.whole + rises * -0.5
     };
     let depth_of = |k: Complex, z: f64| {
-        // cosh k(z + h) / cosh kh, of real and imaginary k.
+        // cosh k(z + h) / cosh kh, for real and imaginary k.
         match k.im == 0.0 {
             true => (k.re * (z + 1.0)).cosh() / k.re.cosh(),
             false => (k.im * (z + 1.0)).cos() / k.im.cos(),
@@ -143,7 +147,7 @@ fn free_wave(pair: &Pair<'_>, [columns, rows]: [usize; 2], by: f64) -> Complex {
         };
         correction * Complex::new(0.0, pair.whole) + (of(&one) + of(&two)) * 0.5
     };
-    // The bound wave, alone where the evanescent modes have died.
+    // The bound wave, which is all that is left where the evanescent modes have decayed.
     let s = first.number + pair.number;
     let bound = {
         let (k, l) = (first.number, pair.number);
@@ -156,7 +160,8 @@ fn free_wave(pair: &Pair<'_>, [columns, rows]: [usize; 2], by: f64) -> Complex {
     let bound_at = |x: f64, z: f64| bound * run(s.into(), x) * depth_of(s.into(), z);
     let free = pair.squared.sqrt();
     let size = columns * rows;
-    // Bands of a column each way; Gauss without pivots, as the matrix is nearly symmetric and diagonally strong.
+    // The bandwidth is one column each way; Gaussian elimination without pivoting, as the matrix is
+    // nearly symmetric and diagonally dominant.
     let width = 2 * rows + 1;
     let mut matrix = vec![Complex::default(); size * width];
     let mut right = vec![Complex::default(); size];
@@ -217,7 +222,7 @@ fn free_wave(pair: &Pair<'_>, [columns, rows]: [usize; 2], by: f64) -> Complex {
         }
         right[row] = right[row] * matrix[at(row, row)].inverse();
     }
-    // The free wave's part of the last column.
+    // Projects the last column onto the free wave.
     let (mut sum, mut norm) = (Complex::default(), 0.0);
     for j in 0..rows {
         let (x, z) = (length - 0.5 * dx, (j as f64 + 0.5) * dz - 1.0);
@@ -228,8 +233,8 @@ fn free_wave(pair: &Pair<'_>, [columns, rows]: [usize; 2], by: f64) -> Complex {
     sum * norm.recip()
 }
 
-/// What is left is the cells' own, of the first power, as the forcing has a logarithm where the wall meets the surface; without the
-/// correction it is not.
+/// The remainder is the discretisation error, of first order, as the forcing has a logarithmic
+/// singularity where the wall meets the surface; without the correction it is not.
 #[test]
 fn a_flow_by_finite_volumes_has_no_free_wave() {
     for (kh, other) in [(1.2, 0.9), (2.0, 1.0)] {
@@ -258,8 +263,8 @@ fn a_flow_by_finite_volumes_has_no_free_wave() {
     }
 }
 
-/// Water that the wall pushes is what the waves carry, where all are long: ξ' (h + η) at x = ξ is Σ (ω/k) η over first order and
-/// bound waves, at the sum and the difference too.
+/// For long waves, the water that the wall pushes is what the waves carry: ξ' (h + η) at x = ξ is Σ
+/// (ω/k) η over first-order and bound waves, at the sum and the difference too.
 #[test]
 fn the_wall_pushes_what_long_waves_carry() {
     let [first, second] = [0.06, 0.04].map(of_kh);
@@ -276,7 +281,7 @@ fn the_wall_pushes_what_long_waves_carry() {
             let s = first.number + pair.number;
             let mut sum = Complex::default();
             for i in 0..256 {
-                // Any two phases stand for any time.
+                // Independent phases cover all times.
                 for j in 0..16 {
                     let a = TAU * f64::from(i) / 256.0;
                     let b = TAU * f64::from(j) / 16.0;
@@ -298,13 +303,14 @@ fn the_wall_pushes_what_long_waves_carry() {
             }
             2.0 * sum.size() / 4096.0 / (bound * pair.whole / s).abs()
         };
-        // What the speed varies by over the depth is of the order (kh)², 4e-3.
+        // The speed varies over the depth by the order of (kh)², 4e-3.
         assert!(left(1.0) < 4e-3, "{of:?}: {}", left(1.0));
         assert!(left(0.9) > 0.02, "{of:?}: {}", left(0.9));
     }
 }
 
-/// Between the nodes, and in the deepest water that is taken, where one wave has all but twice the frequency of another.
+/// Accuracy between the nodes, and in the deepest water allowed, where one wave has almost twice
+/// the frequency of another.
 #[test]
 fn the_table_is_the_theory() {
     for (last, water, within) in [
@@ -313,7 +319,7 @@ fn the_table_is_the_theory() {
         (1000, WATER, 1e-3),
         (2000, [0.25, 9.81], 1e-3),
     ] {
-        // 100 to `last` of 200 in the peak's own frequency, of 2 s.
+        // Lines 100 to `last`, where 200 is the peak's own frequency, of 2 s.
         let step = TAU / 400.0;
         let count = last - 99;
         let pairs = Pairs::new([100, last], step, water);
@@ -336,7 +342,7 @@ fn the_table_is_the_theory() {
             for (of, at, phase) in [(Of::Sum, 200 + n + m, 1.4), (Of::Difference, n - m, -0.8)] {
                 let pair = Pair::new(&first, &second, of, water);
                 let expected = pair.transfer() * pair.whole.recip() * Complex::polar(1.0, phase);
-                // The waves themselves stand at their own lines.
+                // The waves themselves are at their own lines.
                 let own = |line: usize| {
                     if line == at {
                         ways[line - 100]
