@@ -1,7 +1,8 @@
-//! A baseline: what a bake was when it was last looked at, small enough to be tracked with the program.
+//! Baselines: the recorded results of a bake, small enough to be tracked with the source.
 //!
-//! On the adapter that a baseline knows, the particles of every frame have to be the same, bit for bit, and what they
-//! sum up to as well. On another one roundings differ and trajectories part, and the aggregates alone decide.
+//! On an adapter that a baseline knows, the particles of every frame must be bit-identical, and so
+//! must their sums. On other adapters roundings differ and trajectories diverge, so that only the
+//! aggregates decide.
 
 use std::collections::BTreeMap;
 
@@ -14,29 +15,29 @@ use super::{
 };
 use swell_domain::{aggregates::Aggregates, particles::Particles, tolerance::Limit};
 
-/// The format that this program writes and reads.
+/// Format version that this program writes and reads.
 pub const FORMAT_VERSION: u32 = 1;
 
-/// A stored baseline: one scene with one solver.
+/// Stored baseline of one scene with one solver.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Baseline {
-    /// [`FORMAT_VERSION`] when it was written.
+    /// Value of [`FORMAT_VERSION`] when it was written.
     pub format_version: u32,
     /// Shot name.
     pub shot: String,
-    /// `pbf`, `flip`.
+    /// Solver name, `pbf` or `flip`.
     pub solver: String,
-    /// The scene as baked, by line.
+    /// The scene as baked, line by line.
     pub scene: Vec<String>,
     /// Limits of the aggregates by name, each with its reason.
     pub tolerances: BTreeMap<String, StatedLimit>,
-    /// Descriptions of the bakes that the frames' spreads are from; empty where none was measured.
+    /// Descriptions of the bakes from which the frames' spreads were measured; empty if none were.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub spread_from: Vec<String>,
-    /// The adapter on which the aggregates were taken.
+    /// Adapter on which the aggregates were measured.
     pub aggregates_from: String,
-    /// Frames in order, from the start, 0.
+    /// Frames in order, from frame 0, the start.
     pub frames: Vec<BaselineFrame>,
     /// [`particles_hash`] of each frame of `frames`, by adapter and driver.
     pub hashes: BTreeMap<String, Vec<String>>,
@@ -46,42 +47,42 @@ pub struct Baseline {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BaselineFrame {
-    /// Output frame.
+    /// Output frame number.
     pub frame: u32,
-    /// How many.
+    /// Number of particles.
     pub particles: usize,
-    /// Sums and shapes over them.
+    /// Sums and shapes over the particles.
     pub aggregates: Aggregates,
-    /// How far bakes that differ in roundings alone had come apart by then; absent where that was not measured.
+    /// How far bakes that differ only in roundings had diverged by then; absent if not measured.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub spread: Option<Spread>,
 }
 
-/// One frame of the cache that is held against a baseline.
+/// One frame of the cache that is compared with a baseline.
 #[derive(Clone, Debug)]
 pub struct Measured {
-    /// Count and aggregates.
+    /// Particle count and aggregates.
     pub frame: BaselineFrame,
-    /// [`particles_hash`].
+    /// [`particles_hash`] of the particles.
     pub hash: String,
 }
 
-/// How a cache was compared with a baseline.
+/// Basis of a comparison of a cache with a baseline.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Basis {
-    /// Every frame's hash, and its aggregates: the baseline knows the adapter.
+    /// Hash and aggregates of every frame: the baseline knows the adapter.
     Hashes,
-    /// Aggregates within their limits: it does not, or hashes were to be ignored.
+    /// Aggregates within their limits: the adapter is unknown, or hashes are ignored.
     Aggregates,
 }
 
-/// A frame that is not as the baseline has it.
+/// A frame that differs from the baseline.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct BaselineFault {
-    /// Output frame.
+    /// Output frame number.
     pub frame: u32,
-    /// The fault.
+    /// What differs.
     pub fault: Fault,
 }
 
@@ -90,17 +91,17 @@ pub struct BaselineFault {
 pub struct BaselineDiff {
     /// Program and device that baked the cache.
     pub bake: String,
-    /// Whether the baseline knows the cache's adapter, so that hashes decide as well.
+    /// Basis of the comparison: whether hashes decide as well.
     pub basis: Basis,
     /// Whether hashes were to be ignored.
     pub ignores_hashes: bool,
     /// Adapters whose hashes the baseline holds.
     pub known_adapters: Vec<String>,
-    /// The adapter that the baseline's aggregates are from.
+    /// Adapter on which the baseline's aggregates were measured.
     pub aggregates_from: String,
-    /// The first key of the scenes that differs, with the baseline's value and then the cache's.
+    /// First key in which the scenes differ, with the baseline's value, then the cache's.
     pub physics: Option<String>,
-    /// Frames that the cache has not, of those that were asked for.
+    /// Requested frames that the cache lacks.
     pub only_baseline: Vec<u32>,
     /// Frames that were compared.
     pub frames: Vec<FramePair>,
@@ -108,10 +109,10 @@ pub struct BaselineDiff {
     pub faults: Vec<BaselineFault>,
 }
 
-/// One frame's aggregates.
+/// Aggregates of one frame.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FramePair {
-    /// Output frame.
+    /// Output frame number.
     pub frame: u32,
     /// Aggregates of the cache and of the baseline.
     pub aggregates: [Aggregates; 2],
@@ -120,14 +121,15 @@ pub struct FramePair {
 }
 
 impl BaselineDiff {
-    /// Whether nothing is out of tolerance, and no frame missing.
+    /// Returns whether everything is within tolerance and no frame is missing.
     pub fn is_within(&self) -> bool {
         self.faults.is_empty() && self.only_baseline.is_empty()
     }
 }
 
-/// BLAKE3, hex, over every bit of the particles: count, then positions, velocities, ids, and the attributes
-/// with their names, little-endian. The frame's file would not do: it names the program's version.
+/// Returns a BLAKE3 hash, in hex, of all bits of the particles: count, then positions, velocities,
+/// ids, and the attributes with their names, little-endian. The frame's file is not suitable,
+/// because it contains the program's version.
 pub fn particles_hash(particles: &Particles) -> String {
     let mut hasher = blake3::Hasher::new();
     hasher.update(&(particles.len() as u64).to_le_bytes());
@@ -151,18 +153,19 @@ fn update(hasher: &mut blake3::Hasher, values: impl Iterator<Item = [u8; 4]>) {
     hasher.update(&bytes);
 }
 
-/// Parts of the former baseline that a new one no longer has.
+/// Parts of the previous baseline that the new one drops.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Lost {
-    /// Adapters whose hashes were of another scene or of other frames.
+    /// Adapters whose hashes belong to another scene or to other frames.
     pub hashes: Vec<String>,
-    /// Whether spreads were, and with them the limits that they stood for.
+    /// Whether measured spreads, and the limits based on them, were dropped.
     pub has_spread: bool,
 }
 
 impl Baseline {
-    /// Takes over what holds on of the baseline that stood in its place. Of the same scene and frames that is all but the
-    /// aggregates, and these as well where they agree and are of an adapter that the old one did not know.
+    /// Takes over what remains valid of the previous baseline. For the same scene and frames that
+    /// is everything but the aggregates; these as well if they agree and were measured on an
+    /// adapter that the old baseline did not know.
     pub fn inherit(&mut self, before: Self, is_same_scene: bool, measured: &[Measured]) -> Lost {
         let adapter = self.aggregates_from.clone();
         let number = |frame: &BaselineFrame| frame.frame;
@@ -196,8 +199,9 @@ impl Baseline {
         Lost::default()
     }
 
-    /// Compares frames with the baseline's, those that both have. On an `adapter` that it knows the hashes have to be the
-    /// same; the aggregates are judged there as well, and tell a rounding from a change. `None` ignores the hashes.
+    /// Compares frames with the baseline's, as far as both have them. On an `adapter` that the
+    /// baseline knows, hashes must be equal; the aggregates are judged there as well, and
+    /// distinguish a rounding from a change. `None` ignores the hashes.
     pub fn compare(
         &self,
         adapter: Option<&str>,
@@ -227,7 +231,8 @@ impl Baseline {
             let limits = self.limits(adapter, found);
             let is_same = self.is_same(adapter, index, found);
             let pair = [found.frame.aggregates, expected.aggregates];
-            // Where one side alone has a front the wave is about a cube high, and the crest is judged.
+            // If only one side has a front, the wave is about one cube high, and the crest
+            // is judged.
             aggregate_faults(&pair, |name| limits.get(name).copied())
                 .into_iter()
                 .filter(|fault| is_same || fault.what != "front" || fault.value.is_finite())
@@ -237,7 +242,7 @@ impl Baseline {
         (basis, faults)
     }
 
-    /// Aggregates of the frames that both have, with what they may differ by.
+    /// Returns the aggregates of the frames that both have, with the limits of their differences.
     pub fn pairs(&self, adapter: Option<&str>, measured: &[Measured]) -> Vec<FramePair> {
         let pair = |found: &Measured| {
             let frame = found.frame.frame;
@@ -251,8 +256,8 @@ impl Baseline {
         measured.iter().filter_map(pair).collect()
     }
 
-    /// Takes the limits anew from bakes that differ from `expected` in roundings alone, each with what differs in it.
-    /// Particles are `spacing` metres apart at rest.
+    /// Derives new limits from bakes that differ from `expected` only in roundings, each given with
+    /// a description of the difference. `spacing` is the distance of particles at rest, metres.
     pub fn take_spread(
         &mut self,
         expected: &[BaselineFrame],
@@ -272,15 +277,17 @@ impl Baseline {
         }
     }
 
-    /// Whether the aggregates of the frame at `index` were taken from these very particles.
+    /// Whether the baseline's aggregates of the frame at `index` were measured from these
+    /// very particles.
     fn is_same(&self, adapter: Option<&str>, index: usize, found: &Measured) -> bool {
         let known = adapter.filter(|adapter| *adapter == self.aggregates_from);
         let hashes = known.and_then(|adapter| self.hashes.get(adapter));
         hashes.and_then(|hashes| hashes.get(index)) == Some(&found.hash)
     }
 
-    /// Limits of a frame's aggregates; empty for a frame that the baseline does not have. Where the particles are the same
-    /// bit for bit, the limit is the rounding of a sum of n terms of one sign, n ε of the sum (Higham 2002, eq. 4.4).
+    /// Returns the limits of a frame's aggregates; empty for a frame that the baseline does not
+    /// have. For bit-identical particles the limit is the rounding of a sum of n terms of one sign,
+    /// n ε of the sum (Higham 2002, eq. 4.4).
     pub fn limits(&self, adapter: Option<&str>, found: &Measured) -> BTreeMap<String, Limit> {
         let mut frames = self.frames.iter().enumerate();
         let Some((index, expected)) = frames.find(|(_, f)| f.frame == found.frame.frame) else {
@@ -308,10 +315,10 @@ impl Baseline {
         self.tolerances.iter().map(limit).collect()
     }
 
-    /// Refuses a baseline, just read, that is not consistent.
+    /// Checks the consistency of a baseline that was just read.
     ///
     /// # Errors
-    /// The first fault, in words.
+    /// A message about the first fault.
     pub fn check(&self) -> Result<(), String> {
         if self.format_version != FORMAT_VERSION {
             return Err(format!(
@@ -417,7 +424,8 @@ mod tests {
         assert!(faults("here", "abc", same).is_empty());
         assert_eq!(faults("here", "abd", same), ["particles hash"]);
         assert!(faults("there", "abd", same).is_empty());
-        // Half a spacing of 0.1 m is allowed; a front on one side alone is not judged, the crest is.
+        // Half a spacing of 0.1 m is allowed; a front on only one side is not judged, but the
+        // crest is.
         assert!(faults("there", "", aggregates(0.249, Some(1.0))).is_empty());
         let high = aggregates(0.26, None);
         assert_eq!(faults("there", "", high), ["crest_height difference"]);
@@ -430,7 +438,8 @@ mod tests {
     fn a_hash_that_matches_does_not_excuse_the_aggregates() {
         let same = aggregates(0.2, None);
         assert!(faults("here", "abc", same).is_empty());
-        // Taken from these particles, they agree to the rounding of a sum: 10 terms, 10 ε.
+        // Measured from these particles, the aggregates agree to the rounding of a sum: 10 terms,
+        // 10 ε.
         let near = aggregates(0.2 * (1.0 + 9.0 * f64::EPSILON), None);
         assert!(faults("here", "abc", near).is_empty());
         for other in [0.2 * (1.0 + 12.0 * f64::EPSILON), 0.201, 0.26] {
@@ -441,7 +450,7 @@ mod tests {
             faults("here", "abc", aggregates(0.2, Some(1.0))),
             ["front difference"]
         );
-        // Taken on another adapter, by the stated limits: half a spacing.
+        // If they were measured on another adapter, the stated limit of half a spacing applies.
         let mut elsewhere = baseline();
         elsewhere.aggregates_from = "there".to_owned();
         let judged = |height| {
@@ -449,7 +458,7 @@ mod tests {
             named(&elsewhere, Some("here"), &found).len()
         };
         assert_eq!((judged(0.201), judged(0.26)), (0, 1));
-        // Hashes that are ignored judge nothing, right or wrong.
+        // Ignored hashes have no effect, whether right or wrong.
         let ignoring = |hash, height| {
             let found = measured(hash, aggregates(height, None));
             named(&baseline(), None, &found).len()
@@ -498,7 +507,7 @@ mod tests {
         let (basis, faults) = baseline.compare(Some("here"), &found);
         assert_eq!(basis, Basis::Hashes);
         assert_eq!(faults.iter().map(|f| f.frame).collect::<Vec<_>>(), [4]);
-        // Another number of particles is a fault on any adapter.
+        // A different number of particles is a fault on any adapter.
         found[0].frame.particles = 11;
         let (basis, faults) = baseline.compare(None, &found);
         assert_eq!(basis, Basis::Aggregates);

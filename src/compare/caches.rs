@@ -1,4 +1,4 @@
-//! What two caches differ by, all in all.
+//! Summary of the differences between two caches.
 
 use serde::Serialize;
 
@@ -7,30 +7,31 @@ use super::{frames::FrameDiff, streams::StreamDiff};
 /// Differences between two caches.
 #[derive(Clone, Debug, Serialize)]
 pub struct CacheDiff {
-    /// Program and device that baked each.
+    /// Program and device that baked each cache.
     pub bakes: [String; 2],
-    /// The first key of the scenes that differs, with b's value and then a's.
+    /// First key in which the scenes differ, with b's value, then a's.
     pub physics: Option<String>,
-    /// Frames that a alone has, of those that were asked for.
+    /// Requested frames that only a has.
     pub only_a: Vec<u32>,
-    /// Frames that b alone has.
+    /// Requested frames that only b has.
     pub only_b: Vec<u32>,
-    /// Frames of both whose particles both have kept.
+    /// Frames whose particles both caches have kept.
     pub frames: Vec<FrameDiff>,
-    /// Frames of both that one of them has kept no particles of: there the streams beside them alone are compared.
+    /// Frames of both whose particles one of them has not kept: only their streams are compared.
     pub without_particles: Vec<u32>,
-    /// Streams that a alone has: `grids`, `grid NAME`, `probe NAME`.
+    /// Streams that only a has: `grids`, `grid NAME`, `probe NAME`.
     pub streams_only_a: Vec<String>,
-    /// Streams that b alone has.
+    /// Streams that only b has.
     pub streams_only_b: Vec<String>,
     /// Differences in streams beside the particles, by frame.
     pub streams: Vec<StreamDiff>,
-    /// Whether those count: without a tolerance they do, and with one nothing in it names them.
+    /// Whether stream differences are judged: only without a tolerance, because a tolerance does
+    /// not name streams.
     pub streams_judged: bool,
 }
 
 impl CacheDiff {
-    /// Whether nothing is out of tolerance, and nothing on one side alone.
+    /// Returns whether everything is within tolerance and nothing exists on only one side.
     pub fn is_within(&self) -> bool {
         let same_streams = self.streams.is_empty()
             && self.streams_only_a.is_empty()

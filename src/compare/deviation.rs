@@ -1,15 +1,15 @@
-//! The error of one set of values against another, the reference.
+//! Error of one set of values relative to a reference.
 
 use serde::Serialize;
 
 use swell_domain::statistics::percentile;
 
-/// A type that can be compared: scalars and 3-vectors, f32 or f64.
+/// A value that can be compared: scalars and 3-vectors, f32 or f64.
 pub trait Value: Copy {
-    /// The Euclidean norm.
+    /// Returns the Euclidean norm.
     fn norm(self) -> f64;
-    /// The norm of the difference, in f64; infinite where either value is not finite, so that a NaN is the
-    /// worst error and never none.
+    /// Returns the norm of the difference, in f64; infinite if either value is not finite, so that
+    /// NaN is the worst error and never none.
     fn error(self, reference: Self) -> f64;
 }
 
@@ -71,21 +71,21 @@ fn finite_or_worst(error: f64) -> f64 {
     }
 }
 
-/// The error |a − b| of values a against their reference b, in the unit of the values; of vectors the norm.
-/// All zero where there is no value. JSON has no infinity: there it is null.
+/// Error |a − b| of values a relative to their reference b, in the unit of the values; the norm for
+/// vectors. All zero if there are no values. Infinity is null in JSON.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Deviation {
-    /// Pairs compared.
+    /// Number of pairs compared.
     pub count: usize,
     /// Largest error.
     pub max: f64,
-    /// Index of the first pair with the largest error; `None` where every error is zero.
+    /// Index of the first pair with the largest error; `None` if all errors are zero.
     pub max_at: Option<usize>,
-    /// Root of the mean square.
+    /// Root mean square error.
     pub rms: f64,
-    /// The error that half of the pairs do not exceed.
+    /// Error that half of the pairs do not exceed.
     pub p50: f64,
-    /// The error that 99 % of the pairs do not exceed.
+    /// Error that 99 % of the pairs do not exceed.
     pub p99: f64,
     /// Root mean square of the reference.
     pub reference_rms: f64,
@@ -121,28 +121,30 @@ impl Deviation {
         this
     }
 
-    /// Measures one array against another.
+    /// Measures an array against a reference.
     ///
     /// # Panics
-    /// The lengths differ.
+    /// If the lengths differ.
     pub fn between<T: Value>(values: &[T], reference: &[T]) -> Self {
         assert_eq!(values.len(), reference.len(), "pairs of values");
         Self::of(values.iter().copied().zip(reference.iter().copied()))
     }
 
-    /// RMS error over the reference's RMS: ‖a − b‖/‖b‖. 0 where there is no error, infinite where there is
-    /// one against a reference of zeros.
+    /// Returns the RMS error relative to the reference's RMS, ‖a − b‖/‖b‖: 0 if there is no error,
+    /// infinite for an error relative to a reference of zeros.
     pub fn relative_rms(&self) -> f64 {
         relative(self.rms, self.reference_rms)
     }
 
-    /// Largest error over the largest norm in the reference, with the same rule for zeros.
+    /// Returns the largest error relative to the largest norm in the reference, with the same rule
+    /// for zeros.
     pub fn relative_max(&self) -> f64 {
         relative(self.max, self.reference_max)
     }
 }
 
-/// Measures above their limits, with both; a measure without a limit is not judged.
+/// Iterates over the measures that exceed their limits, with value and limit; a measure without a
+/// limit is not judged.
 pub fn out_of_limits<const N: usize>(
     measures: [(&'static str, f64, Option<f64>); N],
 ) -> impl Iterator<Item = (&'static str, f64, f64)> {
@@ -152,7 +154,8 @@ pub fn out_of_limits<const N: usize>(
     measures.into_iter().filter_map(over)
 }
 
-/// Error over scale; 0 for no error, whatever the scale, and infinite where the ratio is no number.
+/// Returns error over scale; 0 for no error, whatever the scale, and infinite if the ratio is
+/// not finite.
 pub fn relative(error: f64, scale: f64) -> f64 {
     if error == 0.0 {
         0.0
@@ -161,7 +164,7 @@ pub fn relative(error: f64, scale: f64) -> f64 {
     }
 }
 
-/// Index of the first pair whose error is above `tolerance`.
+/// Returns the index of the first pair whose error exceeds `tolerance`.
 pub fn first_over<T: Value>(
     pairs: impl IntoIterator<Item = (T, T)>,
     tolerance: f64,
@@ -183,7 +186,7 @@ mod tests {
         assert_eq!((found.count, found.reference_max), (3, 3.0));
         assert_eq!(found.relative_rms(), 0.0);
         assert_eq!(Deviation::between::<f64>(&[], &[]), Deviation::default());
-        // No error against a reference of zeros is no error.
+        // Zero error relative to a reference of zeros is zero.
         assert_eq!(Deviation::between(&[0.0], &[0.0]).relative_max(), 0.0);
     }
 
@@ -211,7 +214,7 @@ mod tests {
         let found = Deviation::between(&[[3.0f32, 0.0, 4.0]], &[[0.0, 0.0, 0.0]]);
         assert_eq!((found.max, found.rms), (5.0, 5.0));
         assert_eq!(found.relative_rms(), f64::INFINITY);
-        // Widened before the difference is taken: 1 and its f32 neighbour.
+        // Values are widened before the subtraction: 1 and its f32 neighbour.
         let next = f32::from_bits(1.0f32.to_bits() + 1);
         let found = Deviation::between(&[[next, 0.0, 0.0]], &[[1.0, 0.0, 0.0]]);
         assert_eq!(found.max, f64::from(f32::EPSILON));

@@ -1,4 +1,4 @@
-//! Two frames of particles, matched by id.
+//! Comparison of two frames of particles, matched by id.
 
 use serde::Serialize;
 
@@ -12,18 +12,18 @@ use swell_domain::{
     tolerance::{FieldLimits, Limit, Tolerance},
 };
 
-/// Differences between two frames, and which are out of tolerance.
+/// Differences between two frames, and those that are out of tolerance.
 #[derive(Clone, Debug, Serialize)]
 pub struct FrameDiff {
-    /// Output frame.
+    /// Output frame number.
     pub frame: u32,
-    /// Particles in both.
+    /// Number of particles in both.
     pub matched: usize,
-    /// Particles in a alone.
+    /// Particles that only a has.
     pub only_a: Missing,
-    /// Particles in b alone.
+    /// Particles that only b has.
     pub only_b: Missing,
-    /// Position, velocity, and the attributes that both have.
+    /// Position, velocity, and the attributes that both frames have.
     pub fields: Vec<FieldDiff>,
     /// Aggregates of a and of b.
     pub aggregates: [Aggregates; 2],
@@ -34,22 +34,22 @@ pub struct FrameDiff {
 /// Particles that the other side lacks.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Missing {
-    /// How many.
+    /// Number of particles.
     pub count: usize,
-    /// Least id.
+    /// Smallest id.
     pub first: Option<u32>,
 }
 
-/// One field of all particles that stand in both frames.
+/// One field of all particles that both frames have.
 #[derive(Clone, Debug, Serialize)]
 pub struct FieldDiff {
     /// `position`, `velocity`, or an attribute's name.
     pub field: String,
     /// Error in the field's unit.
     pub deviation: Deviation,
-    /// The first particle, by id, of which not all bits are the same.
+    /// First particle, by id, that is not bit-identical.
     pub first_different: Option<Parting>,
-    /// The particle with the largest error; `None` where there is no error.
+    /// Particle with the largest error; `None` if there is no error.
     pub worst: Option<Parting>,
 }
 
@@ -64,22 +64,23 @@ pub struct Parting {
     pub b: Vec<f32>,
 }
 
-/// One thing that is out of tolerance in a frame.
+/// A quantity that is out of tolerance in a frame.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Fault {
-    /// Field, aggregate, or `particles` where ids stand on one side alone.
+    /// Field or aggregate, or `particles` for ids on only one side.
     pub what: String,
     /// `bits`, `max`, `rms`, `p99`, or `difference` of an aggregate.
     pub measure: &'static str,
-    /// The value found.
+    /// Value found.
     pub value: f64,
-    /// The value allowed.
+    /// Value allowed.
     pub limit: f64,
-    /// The first particle, by id, that is out; the worst one of rms and p99. None of an aggregate.
+    /// First particle, by id, that is out of tolerance, or the worst one for rms and p99; `None`
+    /// for an aggregate.
     pub parting: Option<Parting>,
 }
 
-/// A field of the particles that stand in both.
+/// A field of the particles that both frames have.
 struct Field<const N: usize> {
     name: String,
     ids: Vec<u32>,
@@ -87,8 +88,9 @@ struct Field<const N: usize> {
     b: Vec<[f32; N]>,
 }
 
-/// Compares two frames. Without a tolerance every bit of the particles has to be the same; with one, what
-/// it does not name is not judged, and a field that it names needs every particle on both sides.
+/// Compares two frames. Without a tolerance, all bits of the particles must be equal. With one,
+/// quantities that it does not name are not judged, and a field that it names needs every particle
+/// on both sides.
 pub fn compare(
     frame: u32,
     particles: [&Particles; 2],
@@ -133,7 +135,8 @@ pub fn compare(
     }
 }
 
-/// Aggregates that are farther apart than the limit that `limit_of` knows by their name.
+/// Returns a fault for each aggregate that differs by more than the limit that `limit_of` returns
+/// for its name.
 pub fn aggregate_faults(
     [a, b]: &[Aggregates; 2],
     limit_of: impl Fn(&str) -> Option<Limit>,
@@ -158,7 +161,7 @@ pub fn aggregate_faults(
     faults
 }
 
-/// |a − b|; infinite where one side alone has a value.
+/// Returns |a − b|; infinite if only one side has a value.
 pub fn aggregate_error(a: Option<f64>, b: Option<f64>) -> f64 {
     match (a, b) {
         (Some(a), Some(b)) => Deviation::between(&[a], &[b]).max,
@@ -167,7 +170,7 @@ pub fn aggregate_error(a: Option<f64>, b: Option<f64>) -> f64 {
     }
 }
 
-/// Indices of equal ids, and what has no partner.
+/// Indices of equal ids, and ids without a partner.
 struct Matches {
     pairs: Vec<(usize, usize)>,
     only_a: Missing,
@@ -220,7 +223,7 @@ fn missing_faults(matches: &Matches, tolerance: Option<&Tolerance>) -> Vec<Fault
     (is_judged && count > 0).then(fault).into_iter().collect()
 }
 
-/// Attributes that one side alone has, where they are judged.
+/// Adds faults for attributes that only one side has, if they are judged.
 fn lone_attributes(
     [a, b]: [&Particles; 2],
     tolerance: Option<&Tolerance>,
@@ -266,7 +269,7 @@ impl<const N: usize> Field<N> {
         }
     }
 
-    /// A field of fewer than three components has zeros for the others: the norm is the same.
+    /// Pads fields of fewer than three components with zeros, which does not change the norm.
     fn pairs(&self) -> impl Iterator<Item = ([f32; 3], [f32; 3])> + '_ {
         let widen =
             |value: &[f32; N]| std::array::from_fn(|k| value.get(k).copied().unwrap_or(0.0));
@@ -337,26 +340,26 @@ impl<const N: usize> Field<N> {
     }
 }
 
-/// The farthest that an aggregate came apart over all frames.
+/// Largest difference of an aggregate over all frames.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct AggregatePeak {
     /// One of [`Aggregates::NAMES`].
     pub name: &'static str,
-    /// Unit; empty where it has none.
+    /// Unit; empty if dimensionless.
     pub unit: &'static str,
-    /// |a − b|, the largest of all frames; infinite where one side alone has a value.
+    /// Largest |a − b| of all frames; infinite if only one side has a value.
     pub difference: f64,
-    /// Difference over |b|.
+    /// The difference relative to |b|.
     pub relative: f64,
-    /// Frame of the difference; the first one where all are alike.
+    /// Frame of the difference; the first one if several are equal.
     pub frame: u32,
-    /// Value there in a.
+    /// Value in a at that frame.
     pub a: Option<f64>,
-    /// Value there in b.
+    /// Value in b at that frame.
     pub b: Option<f64>,
 }
 
-/// Largest difference of each aggregate; empty where there is no frame.
+/// Returns the largest difference of each aggregate; empty if there are no frames.
 pub fn aggregate_peaks(frames: &[(u32, [Aggregates; 2])]) -> Vec<AggregatePeak> {
     let names = Aggregates::NAMES.iter().enumerate();
     let peak = |(index, &(name, unit)): (usize, &(&'static str, &'static str))| {
@@ -373,7 +376,7 @@ pub fn aggregate_peaks(frames: &[(u32, [Aggregates; 2])]) -> Vec<AggregatePeak> 
                 b,
             }
         };
-        // The first of equal ones.
+        // Of equal differences, the first one.
         frames.iter().map(at).reduce(|most, next| {
             if next.difference > most.difference {
                 next
@@ -420,7 +423,7 @@ mod tests {
         assert!(same.faults.is_empty(), "{:?}", same.faults);
         assert_eq!((same.matched, same.fields.len()), (100, 3));
 
-        // A sign of zero is no error and not the same bits.
+        // A sign of zero is no error, but differs in bits.
         let mut a = b.clone();
         a.velocity[42][0] = -0.0;
         let found = compared(&a, &b, None);
@@ -440,14 +443,14 @@ mod tests {
         let missing = |count, first| Missing { count, first };
         assert_eq!(found.only_a, missing(2, Some(0)));
         assert_eq!(found.only_b, missing(3, Some(3)));
-        // What is matched is the same; the missing ones alone are out.
+        // The matched particles are equal; only the missing ones are out of tolerance.
         assert!(found.fields.iter().all(|f| f.first_different.is_none()));
         assert_eq!(found.faults.len(), 1);
         assert_eq!(
             (found.faults[0].what.as_str(), found.faults[0].value),
             ("particles", 5.0)
         );
-        // A tolerance that judges no particle does not mind.
+        // A tolerance that judges no particles ignores them.
         let aggregates = Tolerance {
             aggregates: BTreeMap::from([("volume".to_owned(), Limit::default())]),
             ..Tolerance::default()
@@ -483,7 +486,7 @@ mod tests {
                 .faults
                 .is_empty()
         );
-        // Not named, not judged; 3 of 200 are beyond the 99th percentile's 2.
+        // Fields that are not named are not judged; 3 of 200 are beyond the 99th percentile's 2.
         assert!(
             compared(&a, &b, Some(&limits("velocity", max(0.0))))
                 .faults
@@ -537,7 +540,7 @@ mod tests {
         };
         assert_eq!(judged("volume", limit(0.2, 0.03)), 0);
         assert_eq!(judged("volume", limit(0.2, 0.02)), 1);
-        // No front on one side is out of any limit.
+        // A front on only one side exceeds any limit.
         assert_eq!(judged("front", limit(1e9, 0.0)), 1);
         assert_eq!(judged("density_error", Limit::default()), 0);
         let peaks = aggregate_peaks(&[(3, [b, b]), (4, [a, b]), (5, [a, b])]);

@@ -1,7 +1,7 @@
-//! By how much results differ: pure functions from values to figures. `stage` reads the files and says
-//! what is compared with what.
+//! Comparison of results: pure functions from values to figures. `stage` reads the files and
+//! selects what to compare.
 //!
-//! In every comparison of two results b is the reference.
+//! In every comparison of two results, b is the reference.
 
 pub mod baseline;
 pub mod caches;

@@ -6,10 +6,11 @@ use serde::{Deserialize, Serialize};
 
 use swell_domain::aggregates::Aggregates;
 
-/// Limits for a scene whose spread was not measured ([`super::spread`]): name, absolute limit (lengths in particle
-/// spacings, all else in its own unit), relative limit, reason. Wide enough for water after an impact with either solver: the
-/// measurements are the largest over the shipped scenes in the frames that `tools/regress` bakes, with gravity changed
-/// in its last place (-9.81 to -9.810001, `swell diff --json`).
+/// Limits for a scene whose spread was not measured ([`super::spread`]): name, absolute limit
+/// (lengths in particle spacings, everything else in its own unit), relative limit, reason. They
+/// are wide enough for water after an impact with either solver. The measurements are the largest
+/// over the shipped scenes in the frames that `tools/regress` bakes, with gravity changed in its
+/// last place (-9.81 to -9.810001, `swell diff --json`).
 const DEFAULT_TOLERANCES: [(&str, f64, f64, &str); 8] = [
     (
         "kinetic_energy",
@@ -61,18 +62,18 @@ const DEFAULT_TOLERANCES: [(&str, f64, f64, &str); 8] = [
     ),
 ];
 
-/// A limit and why it is what it is.
+/// A limit and its reason.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StatedLimit {
-    /// Absolute part, in the aggregate's unit.
+    /// Absolute term, in the aggregate's unit.
     pub absolute: f64,
-    /// Part relative to the baseline's value.
+    /// Factor relative to the baseline's value.
     pub relative: f64,
-    /// Multiples of the frame's spread. The three parts add up.
+    /// Factor of the frame's spread. The three terms are added.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub spreads: f64,
-    /// The reason, in words.
+    /// Reason for the limit.
     pub reason: String,
 }
 
@@ -80,7 +81,8 @@ fn is_zero(value: &f64) -> bool {
     *value == 0.0
 }
 
-/// Limits that a new baseline sets its aggregates; particles are `spacing` metres apart at rest.
+/// Returns the default limits of a new baseline; `spacing` is the distance of particles at
+/// rest, metres.
 pub fn default_tolerances(spacing: f64) -> BTreeMap<String, StatedLimit> {
     let is_length = |name: &str| Aggregates::NAMES.contains(&(name, "m"));
     let stated = |&(name, absolute, relative, reason): &(&str, f64, f64, &str)| {

@@ -1,4 +1,4 @@
-//! Two pictures of one size.
+//! Comparison of two images of the same size.
 
 use std::path::{Path, PathBuf};
 
@@ -8,91 +8,93 @@ use ssimulacra2::{LinearRgb, compute_frame_ssimulacra2};
 use super::deviation::{Value, out_of_limits};
 use swell_domain::{statistics::percentile, tolerance::PictureLimits};
 
-/// How the values of a picture stand for light.
+/// How the values of an image represent light.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Encoding {
-    /// sRGB of 0 to 1, alpha not premultiplied: a PNG.
+    /// sRGB from 0 to 1, alpha not premultiplied, as in a PNG.
     Srgb,
-    /// Scene-linear, premultiplied: an EXR.
+    /// Scene-linear, premultiplied, as in an EXR.
     Linear,
 }
 
-/// A picture to compare; rows from the top.
+/// An image to compare; rows from the top.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
-    /// Pixels.
+    /// Width, pixels.
     pub width: usize,
-    /// Pixels.
+    /// Height, pixels.
     pub height: usize,
-    /// Where its upper left pixel stands in the image that is shown: not at [0, 0] in an EXR with overscan or of a crop.
+    /// Position of its upper left pixel in the displayed image; other than [0, 0] for an EXR with
+    /// overscan or of a crop.
     pub corner: [i32; 2],
-    /// Red, green, blue, alpha; `width × height`.
+    /// Red, green, blue and alpha of `width × height` pixels.
     pub pixels: Vec<[f32; 4]>,
-    /// Meaning of the values.
+    /// Encoding of the values.
     pub encoding: Encoding,
 }
 
-/// Measures of how far two pictures differ. A pixel's error is the largest |a − b| of its channels, in the
-/// file's own values: of a PNG 1 is 255, of an EXR 1 is scene-linear white.
+/// Measures of the difference between two images. A pixel's error is the largest |a − b| of its
+/// channels, in the file's own values: 1 is 255 in a PNG, and scene-linear white in an EXR.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct PictureDiff {
     /// Mean error over the pixels.
     pub mean: f64,
-    /// The error that 99 % of the pixels do not exceed.
+    /// Error that 99 % of the pixels do not exceed.
     pub p99: f64,
-    /// Error of the worst pixel; infinite (null in JSON) where a value is not finite.
+    /// Largest error of a pixel; infinite (null in JSON) if a value is not finite.
     pub max: f64,
-    /// Column and row of the first such pixel, from the upper left; `None` where there is no error.
+    /// Column and row of the first such pixel, from the upper left; `None` if there is no error.
     pub max_at: Option<[usize; 2]>,
-    /// SSIMULACRA 2 (Sneyers 2022) of the light, clamped to 0 to 1, over black: 100 no difference, 90 none
-    /// to see, 70 small ones, below 30 bad. `None` where a side is shorter than 8 pixels.
+    /// SSIMULACRA 2 score (Sneyers 2022) of the light over black, clamped to 0 to 1: 100 no
+    /// difference, 90 none visible, 70 small ones, below 30 bad. `None` if a side is shorter than
+    /// 8 pixels.
     pub perceptual: Option<f64>,
-    /// Whether every value has the same bits.
+    /// Whether all values are bit-identical.
     pub is_identical: bool,
 }
 
-/// A measure that is out of its limit.
+/// A measure that exceeds its limit.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct PictureFault {
     /// `mean`, `p99`, `max`, `perceptual`, or `bits`.
     pub measure: &'static str,
-    /// The value found.
+    /// Value found.
     pub value: f64,
-    /// The largest value allowed; the least, of a perceptual score.
+    /// Largest value allowed; for a perceptual score, the smallest.
     pub limit: f64,
 }
 
 /// Differences between two renders.
 #[derive(Clone, Debug, Serialize)]
 pub struct PicturesDiff {
-    /// Names that a alone has.
+    /// File names that only a has.
     pub only_a: Vec<String>,
-    /// Names that b alone has.
+    /// File names that only b has.
     pub only_b: Vec<String>,
-    /// Pairs by name.
+    /// Pairs of images, by name.
     pub pairs: Vec<PairDiff>,
 }
 
-/// Two pictures of one name.
+/// Two images with the same name.
 #[derive(Clone, Debug, Serialize)]
 pub struct PairDiff {
     /// File name.
     pub name: String,
     /// Width and height of a and of b, pixels.
     pub sizes: [[usize; 2]; 2],
-    /// Where the upper left pixels of a and of b stand in the images that are shown.
+    /// Positions of the upper left pixels of a and of b in the displayed images.
     pub corners: [[i32; 2]; 2],
-    /// `None` where the sizes or the corners differ.
+    /// Measures; `None` if the sizes or the corners differ.
     pub diff: Option<PictureDiff>,
     /// Measures that are out of tolerance.
     pub faults: Vec<PictureFault>,
-    /// File of the difference image; written out, bytes that are no UTF-8 become U+FFFD.
+    /// File of the difference image; when serialised, bytes that are not UTF-8 become U+FFFD.
     #[serde(serialize_with = "as_text")]
     pub image: Option<PathBuf>,
 }
 
-/// A path of any bytes: serde's own way refuses those that are no UTF-8.
+/// Serialises any path: serde's own implementation rejects paths that are not UTF-8.
 fn as_text<S: Serializer>(path: &Option<PathBuf>, serializer: S) -> Result<S::Ok, S::Error> {
     path.as_deref()
         .map(Path::to_string_lossy)
@@ -100,14 +102,14 @@ fn as_text<S: Serializer>(path: &Option<PathBuf>, serializer: S) -> Result<S::Ok
 }
 
 impl PicturesDiff {
-    /// Whether nothing is out of tolerance, and nothing on one side alone.
+    /// Returns whether everything is within tolerance and nothing exists on only one side.
     pub fn is_within(&self) -> bool {
         let is_within = |pair: &PairDiff| pair.diff.is_some() && pair.faults.is_empty();
         self.only_a.is_empty() && self.only_b.is_empty() && self.pairs.iter().all(is_within)
     }
 }
 
-/// Compares two pictures; b is the reference. `None` where sizes, corners or encodings differ.
+/// Compares two images; b is the reference. `None` if sizes, corners or encodings differ.
 pub fn compare(a: &Picture, b: &Picture) -> Option<PictureDiff> {
     let of = |it: &Picture| (it.width, it.height, it.corner, it.encoding);
     if of(a) != of(b) {
@@ -135,7 +137,7 @@ pub fn compare(a: &Picture, b: &Picture) -> Option<PictureDiff> {
 }
 
 impl PictureDiff {
-    /// Lists the measures that are out of the limits; without limits, every bit has to be the same.
+    /// Returns the measures that exceed the limits; without limits, all bits must be equal.
     pub fn faults(&self, limits: Option<&PictureLimits>) -> Vec<PictureFault> {
         let Some(limits) = limits else {
             let fault = PictureFault {
@@ -160,7 +162,7 @@ impl PictureDiff {
             limit,
         };
         let mut faults: Vec<_> = out_of_limits(errors).map(fault).collect();
-        // A picture too small for a score has the worst one.
+        // An image too small for a score counts as the worst one.
         let score = self.perceptual.unwrap_or(f64::NEG_INFINITY);
         if let Some(limit) = limits.perceptual.filter(|&limit| score < limit) {
             faults.push(PictureFault {
@@ -193,7 +195,7 @@ fn perceptual(a: &Picture, b: &Picture) -> Option<f64> {
     compute_frame_ssimulacra2(light(a)?, light(b)?).ok()
 }
 
-/// Linear light over black, 0 to 1; what is not finite is black.
+/// Linear light over black, clamped to 0 to 1; NaN becomes black.
 fn light([r, g, b, alpha]: [f32; 4], encoding: Encoding) -> [f32; 3] {
     [r, g, b].map(|value| {
         let linear = match encoding {
@@ -208,7 +210,7 @@ fn light([r, g, b, alpha]: [f32; 4], encoding: Encoding) -> [f32; 3] {
     })
 }
 
-/// IEC 61966-2-1.
+/// Transfer function of IEC 61966-2-1.
 fn linear_from_srgb(value: f32) -> f32 {
     if value <= 0.04045 {
         value / 12.92
@@ -217,8 +219,8 @@ fn linear_from_srgb(value: f32) -> f32 {
     }
 }
 
-/// |a − b| of red, green and blue times `gain`, 8 bits a channel, 255 where it is 1 or more or not finite;
-/// where alpha alone differs, its difference in all three.
+/// Returns |a − b| of red, green and blue times `gain` in 8 bits per channel, 255 where it is 1 or
+/// more or not finite. If only alpha differs, its difference goes into all three.
 pub fn difference_image(a: &Picture, b: &Picture, gain: f64) -> Vec<[u8; 3]> {
     let byte = |error: f64| (gain * error * 255.0).clamp(0.0, 255.0).round() as u8;
     let pixel = |(a, b): (&[f32; 4], &[f32; 4])| {
@@ -341,12 +343,13 @@ mod tests {
         assert_eq!(difference_image(&a, &b, 4.0)[5], [128, 0, 0]);
     }
 
-    /// IEC 61966-2-1: half of the code is 0.2140 of the light, and the straight part meets the curve.
+    /// IEC 61966-2-1: half of the code value is 0.2140 of the light, and the linear segment meets
+    /// the curve.
     #[test]
     fn light_is_that_of_srgb() {
         let one = |value: f32, alpha: f32| light([value, 0.0, 0.0, alpha], Encoding::Srgb)[0];
         for (code, linear) in [(0.5, 0.214_041_14), (1.0, 1.0), (0.02, 0.02 / 12.92)] {
-            // Powers err by a few units of f32.
+            // Powers have an error of a few f32 roundings.
             assert!((one(code, 1.0) - linear).abs() < 4.0 * f32::EPSILON * linear);
         }
         let edge: f32 = 0.04045;

@@ -1,11 +1,12 @@
-//! How far f32 may be off: first-order bounds of the rounding errors of sums over neighbours.
+//! First-order bounds of f32 rounding errors in sums over neighbours.
 //!
-//! Inputs are the same on both sides, so that a difference of positions is exact to half a unit in its last place,
-//! however far from the origin. With u = 2⁻²⁴, a sum, difference or product errs by u of its value, a quotient by
-//! 5 u, an inverse square root by 4 u, a root by 9 u (WGSL's accuracy: correctly rounded, 2.5 ulp, 2 ulp, and the root
-//! by way of the inverse root). Of q = r/h:
+//! Inputs are equal on both sides, so that a difference of positions is exact to half a unit in its
+//! last place, however far from the origin. With u = 2⁻²⁴, a sum, difference or product has an
+//! error of u relative to its value, a quotient 5 u, an inverse square root 4 u, a square root 9 u
+//! (WGSL's accuracy: correctly rounded, 2.5 ulp, 2 ulp, and the square root through the inverse
+//! root). With q = r/h:
 //!
-//! - r²: 5 u (each square 3 u, two sums); 1 − q² : 5 + 4 u of q² and u; p³ of it: 30 u p² + 2 u p³;
+//! - r²: 5 u (each square 3 u, two sums); 1 − q²: 5 + 4 u of q² and u; p³ of it: 30 u p² + 2 u p³;
 //! - r = r² / √r²: 9 u; s = 1 − q: 11 u; s²: 22 u s + u s²; d s²/r: 22 u s + 11 u s²;
 //! - a sum of n terms: n u of the sum of their magnitudes (Higham 2002, eq. 4.4).
 
@@ -17,10 +18,11 @@ pub const U: f64 = 1.0 / (1 << 24) as f64;
 /// Unit roundoff of f64.
 pub const U64: f64 = 1.0 / (1u64 << 53) as f64;
 
-/// Magnitudes of the terms that a particle's neighbours add to its sums, each weighted: p = 1 − q² and s = 1 − q.
+/// Magnitudes of the weighted terms in a particle's sums over neighbours, with p = 1 − q² and s = 1
+/// − q.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sums {
-    /// Terms.
+    /// Number of terms.
     pub count: f64,
     /// Σ w p².
     pub p2: f64,
@@ -44,17 +46,17 @@ impl Sums {
         self.s2 += weight * s * s;
     }
 
-    /// [`KERNEL`] of these sums.
+    /// Returns [`KERNEL`] for these sums.
     pub fn kernel(&self) -> f64 {
         KERNEL.of([self.count, self.p2, self.p3])
     }
 
-    /// [`GRADIENT`] of these sums.
+    /// Returns [`GRADIENT`] for these sums.
     pub fn gradient(&self) -> f64 {
         GRADIENT.of([self.count, self.s1, self.s2])
     }
 
-    /// [`SQUARES`] of these sums.
+    /// Returns [`SQUARES`] for these sums.
     pub fn squares(&self) -> f64 {
         SQUARES.of([self.count, self.s2])
     }
@@ -70,25 +72,25 @@ bounds! {
     /// Error of Σ w s⁴ for weights 1.
     pub SQUARES = [n: "neighbours", s2: "Σ w s²"] U * (n + 50.0) * s2,
         "each term 44 u s³ + 2 u s⁴, and s³, s⁴ ≤ s²";
-    /// Error of a place's distance from a wall over h.
+    /// Error of a position's distance from a wall, relative to h.
     pub WALL_PLACE = [place: "by how much f32 misplaces a wall, over h"] place + 8.0 * U,
         "a difference and a quotient";
-    /// Error of what walls, as half-spaces, add to the relative density.
+    /// Error of the walls' contribution, as half-spaces, to the relative density.
     pub WALL_DENSITY = [faces: "walls within h", q: "" WALL_PLACE] faces * (315.0 / 256.0 * q + 16.0 * U),
         "the fraction's slope is at most 315/256, and its polynomial adds 16 u";
-    /// Error of what walls add to its gradient times h.
+    /// Error of the walls' contribution to the density gradient times h.
     pub WALL_GRADIENT = [faces: "walls within h", q: "" WALL_PLACE, density: "" WALL_DENSITY]
         faces * (405.0 / 128.0 * q + 20.0 * U + 1.5 * density),
         "the slope of the fraction's slope is at most 405/128, and its polynomial adds 16 u";
     /// Error of the relative density.
     pub DENSITY = [scale: "the kernel's scale", sums: "" KERNEL, walls: "" WALL_DENSITY, density: "the relative density"]
         scale * (sums + 6.0 * U) + walls + 2.0 * U * density, "";
-    /// Error of |∇C| by the particle itself.
+    /// Error of |∇C| with respect to the particle itself.
     pub OWN_GRADIENT = [scale: "the gradient's scale", sums: "" GRADIENT, walls: "over h " WALL_GRADIENT, own: "|∇C| by itself"]
         scale * sums + walls + 2.0 * U * own, "";
-    /// Error of Σ|∇C|² by the neighbours.
+    /// Error of Σ|∇C|² with respect to the neighbours.
     pub OTHER_GRADIENTS = [scale: "the gradient's scale", squares: "" SQUARES] scale * scale * squares, "";
-    /// Error of Σ|∇C|²: |own|² of a vector, and the neighbours' part.
+    /// Error of Σ|∇C|²: |own|² of a vector, plus the neighbours' part.
     pub GRADIENT_SQUARES = [own: "|∇C| by itself", error: "" OWN_GRADIENT, others: "" OTHER_GRADIENTS]
         2.0 * own * error + error * error + 6.0 * U * own * own + others, "";
     /// Error of λ = −max(C, 0) / (Σ|∇C|² + ε).
@@ -107,15 +109,15 @@ mod tests {
         assert_eq!(U64, (1.0f64.next_up() - 1.0) / 2.0);
     }
 
-    /// Bounds by walls that are misplaced by h.
+    /// Bounds for walls that are displaced by h.
     fn walls(faces: f64) -> [f64; 2] {
         let q = WALL_PLACE.of([1.0]);
         let density = WALL_DENSITY.of([faces, q]);
         [density, WALL_GRADIENT.of([faces, q, density])]
     }
 
-    /// A wall's place that is off by far more than U counts by the steepest slope that there is: by differences over 1e-6
-    /// at 2000 places, to a part in 1e-5.
+    /// A wall's displacement far above U is multiplied by the steepest slope, found by differences
+    /// over 1e-6 at 2000 positions, to a relative 1e-5.
     #[test]
     fn walls_err_by_their_steepest_slope() {
         let e = 1e-6;
@@ -132,15 +134,15 @@ mod tests {
             (density, steepest(&half_space_fraction)),
             (gradient - 1.5 * density, steepest(&spiky)),
         ] {
-            // No less than the slope, but for what the differences err by.
+            // No less than the slope, except for the error of the differences.
             let part = found / steepest;
             assert!((1.0 - 1e-9..1.0 + 1e-5).contains(&part), "{part}");
         }
         assert!((walls(3.0)[0] / density - 3.0).abs() < 1e-12);
     }
 
-    /// λ and Σ|∇C|² with their inputs off to the worst side, by far more than U: the bounds are first-order, and these
-    /// 1e-4 of second order and U beside them.
+    /// λ and Σ|∇C|² with inputs perturbed in the worst direction by far more than U. The bounds are
+    /// first-order: second-order terms and U leave deviations of about 1e-4.
     #[test]
     fn bounds_are_met_by_the_worst_inputs() {
         let (excess, denominator) = (0.05f64, 700.0);
@@ -149,7 +151,7 @@ mod tests {
         let worst = -(excess + density_error) / (denominator - square_error);
         let bound = LAMBDA.of([value.abs(), denominator, density_error, square_error]);
         let part = bound / (worst - value).abs();
-        // 8 u |λ| of 2e-5 |λ| are 2.4e-2 of it.
+        // 8 u |λ| relative to 2e-5 |λ| is 2.4e-2.
         let rounded = 8.0 * U / 2e-5;
         assert!((part - 1.0 - rounded).abs() < 1e-4, "{part}");
         let (own, error) = (3.0, 1e-3);
@@ -158,8 +160,9 @@ mod tests {
         assert!((part - 1.0).abs() < 1e-3, "{part}");
     }
 
-    /// The sums of 200 neighbours computed in f32 as the passes do, against f64: within the bound, and the bound is
-    /// within a factor of 1000 of what is seen (it is a worst case over the signs of 200 × 10 roundings).
+    /// Sums over 200 neighbours in f32, as the passes compute them, compared with f64: they are
+    /// within the bound, and the bound is within a factor of 1000 of the error (it is a worst case
+    /// over the signs of 200 × 10 roundings).
     #[test]
     fn bounds_hold_and_are_no_wider_than_they_need() {
         let h = 0.2f32;

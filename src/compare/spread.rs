@@ -1,34 +1,37 @@
-//! What the aggregates of a baseline may differ by on an adapter that it has no hashes of: a multiple of how far
-//! bakes come apart that differ in roundings alone, frame by frame.
+//! Limits of a baseline's aggregates on adapters without recorded hashes: a multiple of how far
+//! bakes diverge that differ only in roundings, frame by frame.
 //!
-//! Trajectories part exponentially, so a limit for the last frame says little of the first ones, in which a changed
-//! constant shows best. For the shipped scenes the bakes are those of `tools/regress --limits`: gravity one last place
-//! up and down and tilted by 10⁻⁷, the scene in three other places, and the f64 reference in place of the adapter.
-//! FLIP's kinetic energy spreads by 2·10⁻⁷ to 10⁻³ of itself; PBF's by 10⁻⁶ to 3·10⁻⁵ in the first frame, by up to 5 %
-//! to 30 % in later ones. A bake in a fourth place, which no limit was taken from, stays within them in all scenes with both solvers.
-//! What a change of 1 % comes to, in limits: `solver.flip.pic_blend` 2 to 84 in every scene; `solver.pbf.relaxation`
-//! 4 to 280 in every scene; `effects.viscosity` 2 to 8 in three scenes with FLIP, 4 in one with PBF; the strength of
-//! `effects.vorticity_confinement` stays below 1 with both.
+//! Trajectories diverge exponentially, so a limit for the last frame says little about the first
+//! ones, which show a changed constant best. For the shipped scenes the bakes are those of
+//! `tools/regress --limits`: gravity changed by one last place up and down and tilted by 10⁻⁷, the
+//! scene at three other positions, and the f64 reference instead of the adapter. FLIP's kinetic
+//! energy spreads by a relative 2·10⁻⁷ to 10⁻³; PBF's by 10⁻⁶ to 3·10⁻⁵ in the first frame, and by
+//! up to 5 % to 30 % in later ones. A bake at a fourth position, which was not used for the limits,
+//! stays within them in all scenes with both solvers. The effect of a change of 1 %, in multiples
+//! of the limits: `solver.flip.pic_blend` 2 to 84 in every scene; `solver.pbf.relaxation` 4 to 280
+//! in every scene; `effects.viscosity` 2 to 8 in three scenes with FLIP, 4 in one with PBF; the
+//! strength of `effects.vorticity_confinement` stays below 1 with both.
 
 use std::collections::BTreeMap;
 
 use super::{frames::aggregate_error, limits::StatedLimit};
 use swell_domain::aggregates::Aggregates;
 
-/// Multiples of the spread that are allowed. A second adapter is as far from exact arithmetic as the first, so they
-/// may be twice as far from each other as one of them is from f64; the rest is room for chaos, of which the spread is
-/// the largest of a few samples.
+/// Multiple of the spread that is allowed. A second adapter is as far from exact arithmetic as the
+/// first, so the two may be twice as far from each other as one of them is from f64; the rest is a
+/// margin for chaos, since the spread is the largest of only a few samples.
 const SPREADS: f64 = 5.0;
 
-/// Eight roundings of a 32-bit value: what sums of such values are good to where no bake shows a spread.
+/// Eight roundings of a 32-bit value: the accuracy of sums of such values if no bake shows
+/// a spread.
 const ROUNDINGS: f64 = 8.0 * f32::EPSILON as f64;
 
-/// Largest difference of each aggregate, by its name.
+/// Largest difference of each aggregate, by name.
 pub type Spread = BTreeMap<String, f64>;
 
-/// Least difference that can be told in each aggregate, whatever was measured: name, absolute, relative, why. Particles are
-/// `spacing` metres apart at rest; lengths and volumes come from cubes two spacings wide, which hold 8 of them
-/// (see `study::measure`).
+/// Smallest distinguishable difference of each aggregate, whatever was measured: name, absolute,
+/// relative, reason. `spacing` is the distance of particles at rest, metres; lengths and volumes
+/// come from cubes two spacings wide, which hold 8 particles (see `study::measure`).
 fn resolution(spacing: f64, particles: usize) -> [(&'static str, f64, f64, &'static str); 8] {
     let cube = (2.0 * spacing).powi(3);
     let drops = 8.0 / particles.max(1) as f64;
@@ -64,8 +67,9 @@ fn resolution(spacing: f64, particles: usize) -> [(&'static str, f64, f64, &'sta
     ]
 }
 
-/// For each frame of `expected` the largest |a − b| of each aggregate in this frame or an earlier one, over all of `bakes`,
-/// whose frames are those of `expected`. What one side alone has is left out, as it is where a baseline is compared.
+/// Returns, for each frame of `expected`, the largest |a − b| of each aggregate in this frame or an
+/// earlier one over all `bakes`, which have the same frames. Values that only one side has are
+/// ignored, as in the comparison with a baseline.
 pub fn of(expected: &[Aggregates], bakes: &[Vec<Aggregates>]) -> Vec<Spread> {
     let names = Aggregates::NAMES.map(|(name, _)| name);
     let mut most = [0.0; Aggregates::NAMES.len()];
@@ -88,7 +92,7 @@ pub fn of(expected: &[Aggregates], bakes: &[Vec<Aggregates>]) -> Vec<Spread> {
     expected.iter().enumerate().map(&mut spread).collect()
 }
 
-/// Limits for frames with these spreads.
+/// Returns the limits for frames with these spreads.
 pub fn tolerances(
     spreads: &[Spread],
     spacing: f64,
@@ -122,14 +126,14 @@ pub fn tolerances(
         .collect()
 }
 
-/// Rounds up to three digits.
+/// Rounds up to three significant digits.
 fn rounded_up(value: f64) -> f64 {
     if value == 0.0 {
         return 0.0;
     }
     let unit = 10f64.powi(value.log10().floor() as i32 - 2);
     let digits = (value / unit).ceil();
-    // As text: products of powers of ten leave digits behind.
+    // Through text: products of powers of ten leave spurious digits.
     format!("{digits}e{}", unit.log10().round())
         .parse()
         .unwrap_or(value)
@@ -172,7 +176,7 @@ mod tests {
             .map(|spread| spread["kinetic_energy"])
             .collect();
         assert_eq!(energies, [0.0, 0.5, 0.5]);
-        // A front on one side alone counts nowhere.
+        // A front on only one side is ignored.
         let fronts: Vec<f64> = found.iter().map(|spread| spread["front"]).collect();
         assert_eq!(fronts, [0.0, 0.0625, 0.125]);
         let limits = tolerances(&found, 0.1, 10);

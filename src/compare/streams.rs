@@ -1,4 +1,5 @@
-//! What two caches hold beside a frame's particles: grids, rows of probes, lines of the ledger.
+//! Comparison of what caches hold beside a frame's particles: grids, rows of probes, lines of
+//! the ledger.
 
 use std::cmp::Ordering;
 
@@ -11,17 +12,17 @@ use swell_domain::sparse_grid::{Leaf, SparseGrid, VOXELS};
 /// Differences in one stream of one frame.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct StreamDiff {
-    /// Output frame.
+    /// Output frame number.
     pub frame: u32,
     /// `grids`, `probe NAME` or `ledger`.
     pub stream: String,
-    /// Path from the caches' folders, of a and of b.
+    /// Paths of a's and of b's file, relative to the caches' folders.
     pub files: [String; 2],
-    /// Differences; never empty.
+    /// The differences; never empty.
     pub differences: Vec<Difference>,
 }
 
-/// One thing that differs in a stream.
+/// One difference in a stream.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum Difference {
@@ -29,45 +30,46 @@ pub enum Difference {
     Value {
         /// Column or key.
         key: String,
-        /// Value in a; null where it has none.
+        /// Value in a; null if it has none.
         a: Json,
-        /// Value in b.
+        /// Value in b; null if it has none.
         b: Json,
     },
     /// The values of a grid.
     Grid(GridDiff),
-    /// The bytes of the files, where no voxel tells more: another program made one of them from its particles.
+    /// The bytes of the files, if no voxel differs: another program made one of them from
+    /// its particles.
     Bytes {
-        /// Length of a's file.
+        /// Length of a's file, bytes.
         a: u64,
-        /// Length of b's file.
+        /// Length of b's file, bytes.
         b: u64,
     },
 }
 
-/// How far two grids of one name are apart, voxel by voxel.
+/// Difference of two grids of the same name, voxel by voxel.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct GridDiff {
-    /// `surface` (metres) or `vel` (m/s).
+    /// Grid name: `surface` (metres) or `vel` (m/s).
     pub grid: String,
-    /// Active voxels of a and of b.
+    /// Number of active voxels of a and of b.
     pub active: [u64; 2],
-    /// Voxels with other values, or active on one side alone.
+    /// Number of voxels whose values differ, or that are active on only one side.
     pub different: u64,
-    /// The largest |a − b| of a voxel that is active in both, in the grid's unit.
+    /// Largest |a − b| of a voxel that is active in both, in the grid's unit.
     pub largest: f64,
-    /// Index of the first voxel with that error; `None` where there is none.
+    /// Index of the first voxel with that error; `None` if there is none.
     pub largest_at: Option<[i32; 3]>,
 }
 
-/// Compares grids whose voxels lie at the same places.
+/// Compares grids whose voxels have the same positions.
 pub fn grids<T: Value + PartialEq>(name: &str, a: &SparseGrid<T>, b: &SparseGrid<T>) -> GridDiff {
     let mut found = GridDiff {
         grid: name.to_owned(),
         active: [a.active_count(), b.active_count()],
         ..GridDiff::default()
     };
-    // Both are in the order of their leaves' first voxels.
+    // Both are ordered by their leaves' first voxels.
     let (mut i, mut j) = (0, 0);
     loop {
         let order = match (a.leaves.get(i), b.leaves.get(j)) {
@@ -108,16 +110,17 @@ impl GridDiff {
     }
 }
 
-/// One frame's row of a probe.
+/// Row of a probe for one frame.
 #[derive(Clone, Copy, Debug)]
 pub struct Row<'a> {
-    /// Names of the values.
+    /// Names of the columns.
     pub columns: &'a [String],
-    /// `None` where there was nothing to measure.
+    /// Values; `None` where there was nothing to measure.
     pub values: &'a [Option<f64>],
 }
 
-/// Columns in which two rows differ in any bit, or that one side alone has; in a's order, then b's.
+/// Returns the columns in which two rows differ in any bit, or that only one side has; in a's
+/// order, then b's.
 pub fn rows(a: Row<'_>, b: Row<'_>) -> Vec<Difference> {
     let value = |row: Row<'_>, column: &String| {
         let index = row.columns.iter().position(|c| c == column)?;
@@ -141,8 +144,8 @@ pub fn rows(a: Row<'_>, b: Row<'_>) -> Vec<Difference> {
     found
 }
 
-/// Keys below `key`, or of the values themselves where it is empty, at which two JSON values differ, with dots between
-/// their parts.
+/// Returns the keys at which two JSON values differ, with dots between their parts, prefixed by
+/// `key` unless it is empty.
 pub fn keys(key: &str, a: &Json, b: &Json) -> Vec<Difference> {
     let (Json::Object(x), Json::Object(y)) = (a, b) else {
         let different = (a != b).then(|| Difference::Value {
@@ -172,7 +175,7 @@ mod tests {
 
     use super::*;
 
-    /// A leaf whose first voxels are active, with these values.
+    /// A leaf whose first voxels are active and have these values.
     fn leaf(origin: [i32; 3], values: &[f32]) -> Leaf<f32> {
         let mut active = [0; 8];
         active[0] = (1u64 << values.len()) - 1;
@@ -204,7 +207,7 @@ mod tests {
         let same = grids("surface", &b, &b);
         assert_eq!((same.different, same.largest_at), (0, None));
 
-        // One value off by 0.5, a voxel more; a leaf of b alone and one of a alone.
+        // One value off by 0.5 and one more voxel; a leaf that only b has, and one that only a has.
         let a = grid(vec![
             leaf([0, 0, -8], &[7.0]),
             leaf([0, 0, 0], &[1.0, 2.5, 3.0, 3.0]),
@@ -226,7 +229,7 @@ mod tests {
             a,
             b,
         };
-        // Another value, one where there was none, and a zero's sign.
+        // A different value, one that only a has, and the sign of a zero.
         let a = row(&columns, &[Some(1.5), Some(2.0), Some(-0.0)]);
         assert_eq!(
             rows(a, b),
@@ -236,7 +239,7 @@ mod tests {
                 value("speed_m_s", json!(-0.0), json!(0.0)),
             ]
         );
-        // Columns are matched by name; what one side alone has differs.
+        // Columns are matched by name; those on only one side differ.
         let swapped = ["depth_m", "eta_m"].map(str::to_owned);
         let a = row(&swapped, &[None, Some(1.0)]);
         assert_eq!(rows(a, b), [value("speed_m_s", json!(null), json!(0.0))]);

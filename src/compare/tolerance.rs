@@ -1,9 +1,9 @@
-//! A bound on an error as an expression that both computes it and prints itself, so that no printed derivation can
-//! differ from the number.
+//! A bound on an error as an expression that both computes and prints itself, so that the printed
+//! derivation cannot differ from the number.
 //!
-//! `bound!` takes the expression once: the compiler makes the function of it, and its own text is what is shown.
-//! What the expression reads are magnitudes, each named and explained where it is declared; a magnitude may be
-//! another bound, which is then printed too.
+//! `bound!` takes the expression once: it compiles to a function, and its source text is what is
+//! printed. The expression reads magnitudes, each named and explained in its declaration; a
+//! magnitude may be another bound, which is then printed too.
 
 use std::fmt;
 
@@ -11,39 +11,39 @@ use std::fmt;
 pub struct Bound<const N: usize> {
     /// Printed form and explanation.
     pub text: Text,
-    /// The number, from the magnitudes in the order of their declaration.
+    /// Evaluates the bound, from the magnitudes in the order of their declaration.
     pub of: fn([f64; N]) -> f64,
 }
 
 impl<const N: usize> Bound<N> {
-    /// The number, from the magnitudes in the order of their declaration.
+    /// Evaluates the bound, from the magnitudes in the order of their declaration.
     pub fn of(&self, magnitudes: [f64; N]) -> f64 {
         (self.of)(magnitudes)
     }
 }
 
-/// What is shown of a [`Bound`].
+/// Printed form of a [`Bound`].
 pub struct Text {
-    /// The expression's own source text.
+    /// Source text of the expression.
     pub expression: &'static str,
-    /// What it reads.
+    /// Magnitudes that the expression reads.
     pub magnitudes: &'static [Magnitude],
-    /// Why it is so; may be empty.
+    /// Reason for the bound; may be empty.
     pub reason: &'static str,
 }
 
-/// What an expression reads.
+/// A magnitude that an expression reads.
 pub struct Magnitude {
-    /// In the expression.
+    /// Name in the expression.
     pub name: &'static str,
-    /// What it is, with its bound after it where it has one.
+    /// Description, followed by its bound if it has one.
     pub words: &'static str,
-    /// The bound that gives it, or by which it was found.
+    /// Bound that gives the magnitude, or with which it was found.
     pub bound: Option<&'static Text>,
 }
 
 impl Text {
-    /// The expression, as it is read in a table.
+    /// Returns the expression in the form used in tables.
     pub fn expression(&self) -> String {
         match self.expression {
             "0.0" => "equal".into(),
@@ -51,7 +51,8 @@ impl Text {
         }
     }
 
-    /// Why it is so: its own words, else those of the first bound that it is made of; empty where none has any.
+    /// Returns the reason for the bound, or the first one among the bounds that it is made of;
+    /// empty if there is none.
     pub fn why(&self) -> &'static str {
         if !self.reason.is_empty() {
             return self.reason;
@@ -66,7 +67,7 @@ impl Text {
             .unwrap_or("")
     }
 
-    /// What each name in it stands for, one after the other.
+    /// Returns the meaning of each name in the expression, separated by commas.
     pub fn meanings(&self) -> String {
         let mut told = Vec::new();
         tell(self.magnitudes, &mut told);
@@ -74,7 +75,7 @@ impl Text {
     }
 }
 
-/// Expression, then the reason, then what each name stands for.
+/// Formats the expression, then the reason, then the meaning of each name.
 impl fmt::Display for Text {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.expression())?;
@@ -88,7 +89,7 @@ impl fmt::Display for Text {
     }
 }
 
-/// Appends what each name stands for, once.
+/// Appends the meaning of each name, once.
 fn tell(magnitudes: &[Magnitude], told: &mut Vec<String>) {
     for Magnitude { name, words, bound } in magnitudes {
         let mut meaning = format!("{name} = {words}");
@@ -107,7 +108,7 @@ fn tell(magnitudes: &[Magnitude], told: &mut Vec<String>) {
     }
 }
 
-/// Source text as it is read in a table: whole numbers without a point, × for a product.
+/// Converts source text to the form used in tables: whole numbers without a point, × for a product.
 fn plain(expression: &str) -> String {
     let words = expression.split_whitespace().map(|word| match word {
         "*" => "×".to_owned(),
@@ -116,7 +117,7 @@ fn plain(expression: &str) -> String {
     words.collect::<Vec<_>>().join(" ")
 }
 
-/// Takes `.0` from numbers that end with it.
+/// Removes `.0` from numbers that end with it.
 fn whole_numbers(word: &str) -> String {
     let mut out = String::new();
     let mut rest = word;
@@ -131,7 +132,7 @@ fn whole_numbers(word: &str) -> String {
     out + rest
 }
 
-/// A [`Bound`]: `[name: "what it is", other: "what it is" ITS_BOUND] expression, "reason"`.
+/// Builds a [`Bound`]: `[name: "what it is", other: "what it is" ITS_BOUND] expression, "reason"`.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! bound {
@@ -152,7 +153,7 @@ macro_rules! bound {
 }
 pub use crate::bound;
 
-/// `Some` of what is there.
+/// `Some` of the argument, or `None` without one.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! optional {
@@ -165,7 +166,7 @@ macro_rules! optional {
 }
 pub use crate::optional;
 
-/// Declares bounds, one a line: `NAME = [magnitudes] expression, "reason";`.
+/// Declares bounds, one per line: `NAME = [magnitudes] expression, "reason";`.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! bounds {
@@ -177,7 +178,7 @@ macro_rules! bounds {
 }
 pub use crate::bounds;
 
-/// How many magnitudes are declared.
+/// Counts the declared magnitudes.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! count {

@@ -1,122 +1,132 @@
-//! What every solver is to the stages.
+//! Interface between solvers and stages.
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use super::{particles::Particles, probe::Patch, sources::Exchange};
 
-/// Report of one output frame's steps.
+/// Report on the steps of one output frame.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StepReport {
-    /// Substeps of this frame.
+    /// Number of substeps of the frame.
     pub substeps: u32,
     /// Solver iterations, summed over substeps.
     pub iterations: u64,
-    /// Mean of max(0, ρ/ρ0 − 1) at the frame's end; with FLIP over the cells of water that its last substep found.
+    /// Mean of max(0, ρ/ρ0 − 1) at the frame's end; for FLIP, over the water cells of the
+    /// last substep.
     pub density_error_mean: f64,
     /// 99th percentile of max(0, ρ/ρ0 − 1).
     pub density_error_p99: f64,
     /// Maximum of max(0, ρ/ρ0 − 1).
     pub density_error_max: f64,
-    /// Joule.
+    /// Kinetic energy, J.
     pub kinetic_energy: f64,
-    /// Joule, against the domain's least corner.
+    /// Potential energy relative to the domain's least corner, J.
     pub potential_energy: f64,
-    /// m/s.
+    /// Largest speed, m/s.
     pub max_speed: f64,
-    /// Times that a particle was slowed to the displacement cap.
+    /// Number of times that a particle was slowed to the displacement cap.
     pub capped: u64,
-    /// Times that a particle had more neighbours than its list holds and was searched for.
+    /// Number of times that a particle had more neighbours than its list holds, so that they were
+    /// searched for directly.
     pub searched: u64,
-    /// Done on the water by walls and solids that move, joule.
+    /// Work done on the water by moving walls and solids, J.
     #[serde(default)]
     pub boundary_work: f64,
-    /// Volume of the water at the frame's end, m³, as a probe has it; only where a budget watches it.
+    /// Volume of the water at the frame's end, m³, as measured by a volume probe; only if a budget
+    /// limits it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub volume: Option<f64>,
-    /// Report of the pressure projections; only of solvers that have one.
+    /// Report on the pressure projections; only for solvers that have them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub projection: Option<Projection>,
-    /// What then entered and left, which the figures above do not see; only of scenes with emitters or drains.
+    /// Particles that then entered and left, which the figures above do not include; only for
+    /// scenes with emitters or drains.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exchange: Option<Exchange>,
-    /// Where `density_error_max` is: the middle of that cell, or that particle, in the scene's coordinates, metres. No ledger keeps it.
+    /// Position of `density_error_max`, the centre of the cell or the particle, in the scene's
+    /// coordinates, metres. Not stored in ledgers.
     #[serde(skip)]
     pub densest_at: Option<[f64; 3]>,
 }
 
-/// Report of one output frame's pressure projections; iterations stand in the frame's report.
+/// Report on the pressure projections of one output frame. Their iterations are in [`StepReport`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Projection {
     /// Largest ‖b − Ap‖/‖b‖ of a solve, from a freshly computed residual.
     pub residual: f64,
-    /// Largest |∇·u| in a cell of water before a projection, 1/s.
+    /// Largest |∇·u| in a water cell before a projection, 1/s.
     pub divergence_before: f64,
-    /// The same after it.
+    /// Largest |∇·u| in a water cell after a projection, 1/s.
     pub divergence_after: f64,
-    /// Solves, the density correction's among them, that ended above their tolerance.
+    /// Number of solves, including those of the density correction, that ended above
+    /// their tolerance.
     pub missed: u32,
-    /// Most bodies of water at once that no air touched.
+    /// Largest number of simultaneous bodies of water without contact to air.
     pub pockets: u32,
-    /// Largest |mean of ∇·u| over such a body, 1/s: what no pressure undoes, as where a solid crushes it.
+    /// Largest |mean of ∇·u| over such a body, 1/s: no pressure can remove it, as where a solid
+    /// crushes the water.
     #[serde(default)]
     pub incompatible: f64,
-    /// Cells of water without an open face, left out of the system, summed over substeps.
+    /// Water cells without an open face, which the system leaves out, summed over substeps.
     pub dropped: u64,
     /// Iterations of the density correction's solves, summed over substeps.
     pub correction_iterations: u64,
 }
 
-/// What is looked at when a substep ends. A solver reads back what is named here, and nothing else.
+/// Data requested at the end of a substep. A solver reads back only what is requested here.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Wanted {
-    /// Positions and velocities of all particles.
+    /// Whether to return positions and velocities of all particles.
     pub particles: bool,
-    /// Pressures at the scene's points of pressure.
+    /// Whether to return the pressures at the scene's pressure points.
     pub pressures: bool,
-    /// Pressures on these patches of surfaces, world coordinates; only of solvers with a pressure on cells.
+    /// Surface patches, in world coordinates, whose pressures to return; only for solvers with a
+    /// pressure on cells.
     pub patches: Vec<Patch>,
 }
 
-/// A substep of a frame.
+/// Time span of a substep.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Span {
-    /// Seconds from the shot's start.
+    /// Start, seconds from the start of the shot.
     pub start: f64,
-    /// Seconds from the shot's start; the next substep's start to the last bit, but for a frame's last.
+    /// End, seconds from the start of the shot. Bit-identical to the next substep's start, except
+    /// for the last substep of a frame.
     pub end: f64,
-    /// Whether the frame ends with it.
+    /// Whether this is the last substep of the frame.
     pub is_last: bool,
 }
 
-/// The water when a substep ended.
+/// State of the water at the end of a substep, as far as it was requested.
 #[derive(Clone, Debug, Default)]
 pub struct Seen {
-    /// World positions and velocities in the order of the frame's; empty where not wanted.
+    /// World positions and velocities in the order of the frame; empty if not requested.
     pub particles: Particles,
-    /// Pa; `None` where there was no water; empty where not wanted.
+    /// Pressures at the pressure points, Pa; `None` where there was no water. Empty if
+    /// not requested.
     pub pressures: Vec<Option<f64>>,
-    /// On the patches, Pa; 0 where they are dry.
+    /// Pressures on the patches, Pa; 0 where they are dry.
     pub patches: Vec<f64>,
 }
 
-/// Looks on while a frame is computed. It changes nothing.
+/// Observes the substeps of a frame while it is computed, without influence on the result.
 pub trait Watch {
-    /// What it wants to see of a substep; asked once, in order.
+    /// Returns what to observe at the end of a substep; called once per substep, in order.
     fn wants(&mut self, substep: Span) -> Wanted;
 
-    /// Shows it what it wanted of that substep; not called where that is nothing.
+    /// Receives what was requested for that substep; not called if nothing was.
     fn look(&mut self, substep: Span, seen: Seen);
 }
 
 impl Wanted {
-    /// Whether there is anything.
+    /// Returns whether anything is requested.
     pub fn is_any(&self) -> bool {
         *self != Self::default()
     }
 }
 
-/// Who looks at frames alone.
+/// A watch that observes nothing.
 pub struct Nobody;
 
 impl Watch for Nobody {
@@ -127,24 +137,24 @@ impl Watch for Nobody {
     fn look(&mut self, _: Span, _: Seen) {}
 }
 
-/// What a pass took.
+/// Time and traffic of a pass.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PassTime {
-    /// Its name.
+    /// Name of the pass.
     pub pass: &'static str,
-    /// Of all runs, seconds.
+    /// Time of all runs, seconds.
     pub seconds: f64,
-    /// How often it ran.
+    /// Number of runs.
     pub runs: u64,
-    /// Bytes that all runs moved if each of what they bind is read and written once, as far as it is read and written at all; 0 where that
-    /// is not known.
+    /// Bytes moved by all runs if each binding is read and written once, as far as the pass reads
+    /// and writes it at all; 0 if unknown.
     pub bytes: u64,
-    /// Operations on floats and on integers of all runs, where they were counted.
+    /// Floating-point and integer operations of all runs, if counted.
     pub operations: Option<[u64; 2]>,
 }
 
 impl PassTime {
-    /// Of a pass: seconds, runs, bytes and operations of all runs.
+    /// Builds the record of a pass from the totals of all runs.
     pub fn new(
         pass: &'static str,
         seconds: f64,
@@ -171,28 +181,29 @@ impl PassTime {
     }
 }
 
-/// A solver that advances a particle state frame by frame.
+/// A solver that advances a state of particles frame by frame.
 ///
-/// All that it needs for the next frame is in the state that it hands back.
+/// The state that it returns contains all that it needs for the next frame.
 pub trait Solver {
     /// Error that ends a step.
     type Error;
 
-    /// Takes over `particles` as the state at the end of `frame`; 0 is the start.
+    /// Takes `particles` as the state at the end of `frame`; frame 0 is the start.
     ///
     /// # Errors
-    /// The device fails, or the state does not fit what the solver was built for.
+    /// If the device fails, or if the state does not fit what the solver was built for.
     fn load(&mut self, frame: u32, particles: &Particles) -> Result<(), Self::Error>;
 
     /// Computes the next frame.
     ///
     /// # Errors
-    /// The device fails, or the numbers do.
+    /// If the device fails, or if the computation does.
     fn advance(&mut self) -> Result<(Particles, StepReport), Self::Error> {
         self.advance_watched(&mut Nobody)
     }
 
-    /// The same, the same to the last bit, while `watch` looks on at the ends of substeps.
+    /// Same as [`Solver::advance`], with bit-identical results, while `watch` observes the ends
+    /// of substeps.
     ///
     /// # Errors
     /// As [`Solver::advance`].
@@ -201,13 +212,14 @@ pub trait Solver {
         watch: &mut dyn Watch,
     ) -> Result<(Particles, StepReport), Self::Error>;
 
-    /// Pressure at world points, metres, as the last substep had it, Pa against the air's; `None`
-    /// where there was no water. Told only of scenes with a probe of pressure: others keep nothing for it.
+    /// Returns the pressure of the last substep at world points, metres, in Pa relative to the air;
+    /// `None` where there was no water. Valid only for scenes with a pressure probe: others do not
+    /// keep the data.
     ///
     /// # Errors
-    /// The device.
+    /// If the device fails.
     fn pressures(&self, points: &[DVec3]) -> Result<Vec<Option<f64>>, Self::Error>;
 
-    /// What passes took since the solver was built, where it measures them.
+    /// Returns the times of all passes since the solver was built, if it measures them.
     fn timings(&self) -> Vec<PassTime>;
 }

@@ -1,10 +1,11 @@
-//! Water that enters and leaves while a shot runs: emitters and drains, which act at the ends of output frames.
+//! Emitters and drains: water that enters and leaves during a shot, at the ends of output frames.
 //!
-//! An emitter's water is a lattice of the particle spacing that moves with the emitter's velocity. A particle is born at the
-//! end of the frame in which its position on the lattice first is in the emitter and outside of solids: one that a solid covers waits
-//! until it has come out. That time is a function of the scene alone, so `velocity · open area` enters a second, whatever the frame
-//! rate, and particles of one frame and the next fit together. An emitter with a level keeps its part below that level full
-//! instead.
+//! An emitter's water is a lattice with the particle spacing that moves with the emitter's
+//! velocity. A particle is born at the end of the frame in which its lattice position first lies in
+//! the emitter and outside of solids; one covered by a solid waits until it emerges. That time
+//! depends only on the scene, so that `velocity · open area` enters per second, whatever the frame
+//! rate, and the particles of successive frames fit together. An emitter with a level keeps its
+//! volume full up to that level instead.
 
 mod flow;
 mod solids;
@@ -23,40 +24,42 @@ use super::{
     signed_distance::{SignedDistance, SignedDistanceError},
 };
 
-/// Of a float, relative: what a place may be off where it is compared.
+/// Relative tolerance for the rounding of floats in comparisons of positions.
 const ROUNDING: f64 = 1e-9;
 
-/// Of a spacing: a position as near to a face of a room counts as on it, however far from zero coordinates round.
+/// Distance from a face of a volume below which a position counts as on it, in spacings, so that
+/// coordinates far from zero may round.
 const ON_FACE: f64 = 1e-6;
 
-/// Where water enters; `S` is how its room is told.
+/// Volume where water enters; `S` is the representation of its shape.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Emitter<S> {
-    /// Its room.
+    /// Shape of the volume.
     pub shape: S,
-    /// Of the water that enters, m/s.
+    /// Velocity of the water that enters, m/s.
     pub velocity: DVec3,
-    /// Height up to which it keeps its room full, metres; where there is none, water enters as fast as `velocity` says.
+    /// Height up to which the emitter keeps its volume full, metres; `None` lets water enter at the
+    /// rate that `velocity` gives.
     pub level: Option<f64>,
-    /// When it acts.
+    /// Time window in which it acts.
     pub window: Window,
 }
 
-/// Where water leaves; `S` is how its room is told.
+/// Volume where water leaves; `S` is the representation of its shape.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Drain<S> {
-    /// Its room.
+    /// Shape of the volume.
     pub shape: S,
     /// Height below which water stays, metres.
     pub level: Option<f64>,
-    /// The most that leaves, m³/s.
+    /// Largest outflow, m³/s.
     pub rate: Option<f64>,
-    /// When it acts.
+    /// Time window in which it acts.
     pub window: Window,
 }
 
 impl<S> Emitter<S> {
-    /// The same with its room told another way.
+    /// Returns the emitter with another representation of its shape.
     pub fn with_shape<T>(self, shape: T) -> Emitter<T> {
         Emitter {
             shape,
@@ -68,7 +71,7 @@ impl<S> Emitter<S> {
 }
 
 impl<S> Drain<S> {
-    /// The same with its room told another way.
+    /// Returns the drain with another representation of its shape.
     pub fn with_shape<T>(self, shape: T) -> Drain<T> {
         Drain {
             shape,
@@ -79,13 +82,14 @@ impl<S> Drain<S> {
     }
 }
 
-/// From when to when something acts. Drains, and emitters with a level, act at the frames that end after `from`, and not after `until`;
-/// the water of other emitters is that which comes in between the two.
+/// Time window of an emitter or drain. Drains, and emitters with a level, act at frames that end
+/// after `from` and not after `until`; the water of other emitters is that which enters between
+/// the two.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Window {
-    /// Seconds from the shot's start.
+    /// Start of the window, seconds from the start of the shot.
     pub from: f64,
-    /// Seconds from the shot's start; to the shot's end where there is none.
+    /// End of the window, seconds from the start of the shot; `None` is the end of the shot.
     pub until: Option<f64>,
 }
 
@@ -98,14 +102,14 @@ impl Window {
         self.until.is_some_and(|until| time > until)
     }
 
-    /// How much of a shot of so many seconds lies in it, seconds.
+    /// Returns how much of a shot of `duration` seconds lies in the window, seconds.
     pub fn length(&self, duration: f64) -> f64 {
         let end = self.until.map_or(duration, |until| until.min(duration));
         (end - self.from).max(0.0)
     }
 }
 
-/// A box, or a mesh within its bounds.
+/// A box, or a mesh within its bounding box.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Shape {
     bounds: Bounds,
@@ -119,7 +123,7 @@ impl From<Bounds> for Shape {
 }
 
 impl Shape {
-    /// Of a closed mesh; `spacing` is that of the particles, metres.
+    /// Builds the shape of a closed mesh; `spacing` is that of the particles, metres.
     ///
     /// # Errors
     /// Those of [`SignedDistance::from_mesh`].
@@ -136,20 +140,21 @@ impl Shape {
         self.bounds.contains(p) && self.is_in_mesh(p)
     }
 
-    /// Whether a point within the bounds is in the mesh, where there is one.
+    /// Whether a point within the bounds is in the mesh, if there is one.
     fn is_in_mesh(&self, p: DVec3) -> bool {
         self.mesh.as_ref().is_none_or(|mesh| mesh.sample(p) < 0.0)
     }
 }
 
-/// What came and went at a frame's end.
+/// Particles that entered and left at a frame's end.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Exchange {
-    /// Particles that entered.
+    /// Number of particles that entered.
     pub entered: u64,
-    /// Particles that left.
+    /// Number of particles that left.
     pub left: u64,
-    /// Particles of flows that never enter: a solid covered them from where they came into the emitter to where they went out of it.
+    /// Number of a flow's particles that never enter, because a solid covered them all the way
+    /// through the emitter.
     #[serde(default, skip_serializing_if = "is_none")]
     pub blocked: u64,
 }
@@ -158,7 +163,7 @@ fn is_none(count: &u64) -> bool {
     *count == 0
 }
 
-/// What an emitter without a level brings, where solids stand as at the start.
+/// Predicted inflow of an emitter without a level, with solids in their poses at the start.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Promise {
     /// Flow rate, m³/s.
@@ -174,26 +179,27 @@ pub struct Promise {
 /// All emitters and drains of a scene.
 #[derive(Clone, Debug, Default)]
 pub struct Sources {
-    /// In the order in which they act.
+    /// Emitters, in the order in which they act.
     pub emitters: Vec<Emitter<Shape>>,
-    /// They act before the emitters.
+    /// Drains, which act before the emitters.
     pub drains: Vec<Drain<Shape>>,
-    /// Of the particles, metres.
+    /// Particle spacing, metres.
     pub spacing: f64,
-    /// Output frames a second.
+    /// Output frames per second.
     pub frames_per_second: f64,
-    /// Where water may be, metres.
+    /// Box that water may enter, metres.
     pub domain: Bounds,
 }
 
 impl Sources {
-    /// Whether there is nothing that acts.
+    /// Returns whether there are neither emitters nor drains.
     pub fn is_empty(&self) -> bool {
         self.emitters.is_empty() && self.drains.is_empty()
     }
 
-    /// What the end of a frame takes from `particles` and adds to them, away from `solids`. Those that enter come last; their
-    /// ids go on from `next_id`, which is then the next free one.
+    /// Removes from `particles` and adds to them what leaves and enters at the end of a frame, away
+    /// from `solids`. New particles come last; their ids count up from `next_id`, which is advanced
+    /// to the next free id.
     pub fn exchange(
         &self,
         frame: u32,
@@ -241,8 +247,9 @@ impl Sources {
         }
     }
 
-    /// Particles that are there for certain at the end of each of these frames, and more than before it: `start` and what the emitters
-    /// without a level bring. Nothing where a drain may take some.
+    /// Iterates over frames and the number of particles that are certain to exist at their ends,
+    /// including what enters there: `start` plus what emitters without a level bring. Empty if a
+    /// drain may remove some, or without such emitters.
     pub fn least_counts<'a>(
         &'a self,
         start: usize,
@@ -263,7 +270,8 @@ impl Sources {
         })
     }
 
-    /// What each emitter brings where nothing but `still` is in its way, by emitter; `None` where it keeps a level.
+    /// Predicts the inflow of each emitter with only `still` as an obstacle; `None` for emitters
+    /// with a level.
     pub fn promises(&self, still: Option<&SignedDistance>) -> Vec<Option<Promise>> {
         let solids = Solids::still(still);
         let all = self.emitters.iter();
@@ -295,10 +303,11 @@ impl Sources {
         f64::from(frame) / self.frames_per_second
     }
 
-    /// The frame in which a time lies, which is later than the end of the frame before.
+    /// Frame whose time span contains `time`: later than the end of the frame before, and not later
+    /// than its own.
     fn frame_of(&self, time: f64) -> u32 {
         let near = (time * self.frames_per_second).ceil().max(0.0) as u32;
-        // However the product rounds.
+        // Corrects for the rounding of the product.
         if self.time(near) < time {
             near.saturating_add(1)
         } else if near > 0 && self.time(near - 1) >= time {
@@ -308,8 +317,9 @@ impl Sources {
         }
     }
 
-    /// Where a particle of `p` enters at the end of a frame: there, or as far from the solid as water at rest keeps, where that leads to
-    /// no other. `None` within a solid and outside of the domain.
+    /// Position where a particle at `p` enters at the end of a frame: there, or moved to the
+    /// clearance that resting water keeps from solids, as far as it gets. `None` within a solid and
+    /// outside of the domain.
     fn settled(&self, p: DVec3, frame: u32, solids: &Solids<'_>) -> Option<DVec3> {
         let seconds = self.time(frame);
         let distance = solids.distance(p, seconds);
@@ -327,8 +337,9 @@ impl Sources {
         Some(if at(moved) > 0.0 { moved } else { p })
     }
 
-    /// Places below `level` that the emitter lacks particles at. Its room is a lattice; where eight neighbouring places
-    /// hold fewer particles than places, some of those that hold none are filled.
+    /// Positions below `level` where the emitter lacks particles. Its volume is a lattice; where a
+    /// block of eight neighbouring positions holds fewer particles than positions, some of the
+    /// empty ones are filled.
     fn lacking(
         &self,
         emitter: &Emitter<Shape>,
@@ -385,7 +396,7 @@ impl Sources {
         born
     }
 
-    /// Whether each particle stays.
+    /// Returns for each particle whether it stays.
     fn kept(&self, drain: &Drain<Shape>, frame: u32, particles: &Particles) -> Vec<bool> {
         let is_taken = |x: &[f32; 3]| {
             let x = glam::Vec3::from_array(*x).as_dvec3();
@@ -399,7 +410,7 @@ impl Sources {
         let gone = |frame: u32| (rate * self.time(frame) / volume * (1.0 + ROUNDING)).floor();
         let most = (gone(frame) - gone(frame.saturating_sub(1))) as usize;
         let mut taken: Vec<usize> = (0..keep.len()).filter(|&k| !keep[k]).collect();
-        // All over the drain alike.
+        // A random order spreads the removal evenly over the drain.
         let order = |k: &usize| by_chance(frame, particles.id[*k]);
         taken.sort_by(|a, b| order(a).total_cmp(&order(b)).then(a.cmp(b)));
         for k in taken.into_iter().skip(most) {
@@ -409,18 +420,18 @@ impl Sources {
     }
 }
 
-/// From 0 to 1, the same in each bake.
+/// A pseudo-random number from 0 to 1, the same in each bake.
 fn by_chance(frame: u32, of: u32) -> f64 {
     uniform(u64::from(frame) << 32 | u64::from(of))
 }
 
-/// How many particles `length` holds, one at least.
+/// Returns how many particles fit into `length`, at least one.
 pub fn places(length: f64, spacing: f64) -> usize {
     ((length / spacing).round() as usize).max(1)
 }
 
-/// Whether water of this velocity stays in a box of this size for a frame of so many seconds: else what enters would be beyond the box
-/// at the frame's end.
+/// Returns whether water of this velocity stays in a box of this size for a frame of `seconds`:
+/// otherwise the particles that enter would be beyond the box at the frame's end.
 pub fn is_long_enough(size: DVec3, velocity: DVec3, seconds: f64) -> bool {
     (velocity.abs() * seconds)
         .cmple(size * (1.0 + ROUNDING))

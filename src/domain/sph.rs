@@ -1,31 +1,33 @@
 //! SPH kernels, calibrated on the bulk lattice.
 //!
-//! Density is the poly6 sum, its gradient the spiky slope (Müller 2003; Macklin and Müller 2013). Particle
-//! mass follows from the lattice, so that water at rest has exactly its rest density.
+//! Density is the poly6 sum; its gradient uses the spiky kernel (Müller 2003; Macklin and
+//! Müller 2013). The particle mass follows from the lattice, so that water at rest has exactly
+//! its rest density.
 
 use std::f64::consts::PI;
 
 /// Kernel factors for particles of spacing d on a cubic lattice with support radius h.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Calibration {
-    /// h, metres.
+    /// Support radius h, metres.
     pub support_radius: f64,
     /// Relative density per unit of (1 − q²)³, q = r/h.
     pub density_scale: f64,
     /// |∇C| per unit of (1 − q)², 1/m.
     pub gradient_scale: f64,
-    /// Lattice density beyond a face over the continuum's, about 0.9.
+    /// Ratio of lattice density to continuum density beyond a face, about 0.9.
     pub wall_density_scale: f64,
-    /// Fluid particles' worth of one boundary sample that stands for d² of a solid's surface.
+    /// Weight, in fluid particles, of a boundary sample that represents d² of a solid's surface.
     pub sample_weight: f64,
-    /// Part of a linear field's gradient that Σ_j (a_i + a_j) ∇W gives on the bulk lattice; 0.95 at h = 2d.
+    /// Fraction of a linear field's gradient that Σ_j (a_i + a_j) ∇W gives on the bulk lattice;
+    /// 0.95 at h = 2d.
     pub linear_gradient: f64,
     /// Σ_k |∇_k C|² of a bulk particle, 1/m².
     pub bulk_gradient_squares: f64,
 }
 
-/// Fraction of the bulk density that a half-space of continuous fluid gives at distance q h outside it:
-/// 315/256 ∫_q^1 (1 − t²)⁴ dt.
+/// Returns the fraction of the bulk density that a half-space of continuous fluid contributes at
+/// distance q h outside of it: 315/256 ∫_q^1 (1 − t²)⁴ dt.
 #[inline]
 pub fn half_space_fraction(q: f64) -> f64 {
     let q = q.clamp(0.0, 1.0);
@@ -35,7 +37,8 @@ pub fn half_space_fraction(q: f64) -> f64 {
 }
 
 impl Calibration {
-    /// Sums over the infinite cubic lattice; `spacing` in metres, `support_ratio` = h / d.
+    /// Evaluates the sums over the infinite cubic lattice; `spacing` in metres, `support_ratio` = h
+    /// / d.
     pub fn new(spacing: f64, support_ratio: f64) -> Self {
         let h = spacing * support_ratio;
         let reach = support_ratio.ceil() as i32;
@@ -75,10 +78,12 @@ impl Calibration {
         }
     }
 
-    /// p / Σ λ of a substep of Δt seconds whose corrections were relaxed by ω: −ρ0 κ ω / Δt². Σ_j (λ_i + λ_j) ∇C moves
-    /// a particle as the pressure force −Σ_j m (p_i/ρ0² + p_j/ρ0²) ∇W does in Δt², but that on the lattice the sum gives
-    /// κ of a pressure's gradient ([`Self::linear_gradient`]). What a correction's bound cuts off counts as if it were
-    /// not cut. λ in m², ρ0 in kg/m³; the result in Pa/m².
+    /// Returns p / Σ λ of a substep of Δt seconds whose corrections were relaxed by ω, in Pa/m²:
+    /// −ρ0 κ ω / Δt². `rest_density` is ρ0 in kg/m³, λ in m².
+    ///
+    /// Σ_j (λ_i + λ_j) ∇C displaces a particle as the pressure force −Σ_j m (p_i/ρ0² + p_j/ρ0²) ∇W
+    /// does in Δt², except that on the lattice the sum gives only κ times a pressure's gradient
+    /// ([`Self::linear_gradient`]). The limit on corrections is ignored.
     #[inline]
     pub fn pressure_scale(&self, rest_density: f64, relaxation: f64, time_step: f64) -> f64 {
         -rest_density * relaxation * self.linear_gradient / (time_step * time_step)
@@ -91,7 +96,8 @@ mod tests {
 
     use super::*;
 
-    /// Summed over the lattice, h = 2d: face 0.81, edge 0.65, corner 0.52 of bulk; the product of faces meets them.
+    /// Lattice sums for h = 2d: 0.81 of the bulk density at a face, 0.65 at an edge, 0.52 at a
+    /// corner; products of the face value reproduce them.
     #[test]
     fn walls_meet_lattice_deficits() {
         let calibration = Calibration::new(0.1, 2.0);
@@ -101,7 +107,7 @@ mod tests {
         assert!((face.powi(3) - 0.52).abs() < 0.015, "{}", face.powi(3));
     }
 
-    /// The closed form against the midpoint rule, error O(1/n²) < 1e-8.
+    /// Compares the closed form with the midpoint rule, whose error is O(1/n²) < 1e-8.
     #[test]
     fn half_space_closed_form() {
         let n = 20_000;
@@ -114,7 +120,8 @@ mod tests {
         }
     }
 
-    /// Spacings and h/d: below, at and between whole numbers, and 3, where the lattice has points on the rim.
+    /// Spacings and h/d: at and between whole numbers, and 3, where the lattice has points on
+    /// the rim.
     const CASES: [(f64, f64); 4] = [(0.1, 2.0), (0.07, 1.7), (0.25, 2.4), (1.3, 3.0)];
 
     /// Müller 2003, eq. 20, 1/m³.
@@ -127,13 +134,14 @@ mod tests {
         15.0 / (PI * h.powi(6)) * (h - r).max(0.0).powi(3)
     }
 
-    /// Its gradient at the particle, 1/m⁴; `d` = x_i − x_j.
+    /// Gradient of spiky at the particle, 1/m⁴; `d` = x_i − x_j.
     fn spiky_gradient(d: DVec3, h: f64) -> DVec3 {
         let r = d.length();
         -45.0 / (PI * h.powi(6)) * (h - r).max(0.0).powi(2) * d / r
     }
 
-    /// A cubic lattice about one of its points, which comes first; it reaches beyond every h of [`CASES`].
+    /// A cubic lattice around one of its points, which comes first; it reaches beyond every h
+    /// of [`CASES`].
     fn lattice(spacing: f64) -> Vec<DVec3> {
         let line = || (-4..=4).map(f64::from);
         let all = line().flat_map(|x| line().flat_map(move |y| line().map(move |z| (x, y, z))));
@@ -142,7 +150,7 @@ mod tests {
         points
     }
 
-    /// m/ρ0 of a particle, m³, so that the lattice has density ρ0: 1 = V Σ W.
+    /// Volume m/ρ0 of a particle, m³, such that the lattice has density ρ0: 1 = V Σ W.
     fn volume(spacing: f64, h: f64) -> f64 {
         let sum: f64 = lattice(spacing).iter().map(|x| poly6(x.length(), h)).sum();
         1.0 / sum
@@ -152,8 +160,9 @@ mod tests {
         (a - b).abs() <= part * b.abs()
     }
 
-    /// What the other tests state kernels by: both integrate to 1 over space, and the gradient is spiky's. The midpoint
-    /// rule with n steps errs by O(1/n²) < 1e-6, a central difference over e h by O(e²).
+    /// Properties of the kernels that the other tests rely on: both integrate to 1 over space, and
+    /// the gradient is that of spiky. The midpoint rule with n steps errs by O(1/n²) < 1e-6, a
+    /// central difference over e h by O(e²).
     #[test]
     fn kernels_of_the_statements_are_the_textbook_s() {
         let (h, n) = (0.3, 4000);
@@ -174,7 +183,7 @@ mod tests {
         }
     }
 
-    /// Sums of 100 positive terms in f64 err by 1e-14 of themselves; some quotients more: 1e-12.
+    /// Sums of 100 positive f64 terms have a relative error of 1e-14; with some quotients, 1e-12.
     const ROUNDED: f64 = 1e-12;
 
     #[test]
@@ -193,7 +202,8 @@ mod tests {
         }
     }
 
-    /// ∇_j C_i = −V ∇_i W (Macklin and Müller 2013, eq. 8), and Σ_k |∇_k C_i|² over the particle and its neighbours.
+    /// ∇_j C_i = −V ∇_i W (Macklin and Müller 2013, eq. 8), and Σ_k |∇_k C_i|² over the particle
+    /// and its neighbours.
     #[test]
     fn gradients_are_spiky_s_with_the_mass_of_poly6() {
         for (d, ratio) in CASES {
@@ -217,7 +227,8 @@ mod tests {
         }
     }
 
-    /// Σ_j (λ_i + λ_j) V ∇W on the lattice for λ = 3 + g · x is κ g, whatever way g points; κ is 0.947 at h = 2d.
+    /// Σ_j (λ_i + λ_j) V ∇W on the lattice for λ = 3 + g · x is κ g for any direction of g; κ is
+    /// 0.947 at h = 2d.
     #[test]
     fn a_linear_field_s_gradient_is_seen_in_part() {
         let g = DVec3::new(1.0, -2.0, 0.5);
@@ -236,8 +247,8 @@ mod tests {
         }
     }
 
-    /// Water at rest: the λ whose corrections, relaxed, undo what gravity moves in Δt² is a pressure that rises by
-    /// ρ0 g with depth.
+    /// Water at rest: the λ whose relaxed corrections compensate the displacement by gravity in Δt²
+    /// is a pressure that increases by ρ0 g with depth.
     #[test]
     fn pressure_of_still_water_rises_by_its_weight() {
         let (density, relaxation, step, gravity) = (1025.0, 0.7, 0.004, 9.81);
@@ -248,7 +259,7 @@ mod tests {
                 let sum: f64 = lattice(d)[1..].iter().map(pair).sum();
                 relaxation * volume(d, h) * sum
             };
-            // What lifts by g Δt².
+            // The slope that lifts by g Δt².
             let slope = gravity * step * step / rise(1.0);
             let pressure = found.pressure_scale(density, relaxation, step) * slope;
             assert!(
@@ -258,9 +269,10 @@ mod tests {
         }
     }
 
-    /// A particle half a spacing from a wall, the lattice on its side alone, has its rest density with the wall's part:
-    /// the kernel's integral over the half-space beyond, by the midpoint rule with 300² steps, which errs by
-    /// 2/300² = 2e-5 of itself at most (measured 8e-6), and the wall's scale on it.
+    /// A particle half a spacing from a wall, with the lattice only on its own side, has its rest
+    /// density together with the wall's term: the kernel's integral over the half-space beyond, by
+    /// the midpoint rule with 300² steps, which errs by a relative 2/300² = 2e-5 at most (measured
+    /// 8e-6), times the wall's scale.
     #[test]
     fn walls_make_up_for_half_the_lattice() {
         for (d, ratio) in CASES {
@@ -283,8 +295,9 @@ mod tests {
         }
     }
 
-    /// The same beside a solid whose surface is covered with samples (Akinci 2012): a sheet with 16² of them a spacing
-    /// squared, each for its area. The sum over the sheet is the integral to 2e-7 (poly6 is smooth there; measured).
+    /// Same beside a solid whose surface is covered with samples (Akinci 2012): a sheet with 16² of
+    /// them per squared spacing, each weighted by its area. The sum over the sheet approximates the
+    /// integral to 2e-7 (poly6 is smooth there; measured).
     #[test]
     fn samples_make_up_for_half_the_lattice() {
         for (d, ratio) in CASES {
@@ -304,7 +317,7 @@ mod tests {
         }
     }
 
-    /// Everything with a length scales with the spacing, everything without does not.
+    /// Factors with a length unit scale with the spacing, dimensionless ones do not.
     #[test]
     fn scale_free() {
         let (a, b) = (Calibration::new(0.1, 2.0), Calibration::new(1.0, 2.0));

@@ -1,12 +1,13 @@
-//! The middle and the tails of many values.
+//! Median and percentiles.
 
-/// The value in the middle; the upper one of two. `None` where there is none.
+/// Returns the median, the upper one of two middle values; `None` for an empty list.
 pub fn median(mut values: Vec<f64>) -> Option<f64> {
     let middle = values.len() / 2;
     (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
-/// The value that a part `p` (0 to 1) of all does not exceed.
+/// Returns the least value that a fraction `p` (0 to 1) of all values does not exceed; `None` for
+/// an empty list.
 pub fn percentile(mut values: Vec<f64>, p: f64) -> Option<f64> {
     let index = (values.len() as f64 * p).ceil() as usize;
     let index = index.saturating_sub(1);
@@ -25,7 +26,7 @@ mod tests {
         assert_eq!(percentile(thousand.clone(), 0.999), Some(999.0));
         assert_eq!(percentile(thousand, 1.0), Some(1000.0));
         assert_eq!(percentile(Vec::new(), 0.5), None);
-        // By hand: 4 of these 7 are a part of 0.571, and 5 one of 0.714.
+        // By hand: 4 of these 7 are a fraction of 0.571, and 5 one of 0.714.
         let seven = vec![9.0, 2.0, 4.0, 7.0, 3.0, 8.0, 5.0];
         let at = |p| percentile(seven.clone(), p);
         assert_eq!(

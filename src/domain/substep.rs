@@ -1,13 +1,13 @@
-//! Which substep of a frame is meant.
+//! Selection of a substep of a frame.
 
 use std::{fmt, str::FromStr};
 
-/// A substep of a frame.
+/// Selects a substep of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Which {
-    /// Counted from 1.
+    /// The substep with this number, counted from 1.
     Number(u32),
-    /// The frame's last, whichever it is.
+    /// The last substep of the frame, whatever its number.
     Last,
 }
 
@@ -26,7 +26,7 @@ impl fmt::Display for Which {
     }
 }
 
-/// Error: a text that names no substep.
+/// Error for a text that is not a substep.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("`{0}` is no substep: it is a number from 1 on, or last")]
 pub struct NoSubstep(String);
@@ -39,7 +39,7 @@ impl FromStr for Which {
         if text == "last" {
             return Ok(Self::Last);
         }
-        // `parse` alone would take `+1`.
+        // `parse` would accept `+1`.
         if !text.bytes().all(|byte| byte.is_ascii_digit()) {
             return Err(fault());
         }

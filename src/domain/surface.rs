@@ -1,27 +1,27 @@
 //! The water of a frame as grids: a level set of its surface, and its velocity on cell faces.
 //!
-//! The surface is that of Zhu and Bridson 2005, φ = |x − x̄| − r with x̄ the particles' mean position
-//! under the kernel (1 − s²)³, made a distance again in the narrow band: beside the surface by
-//! where φ changes its sign along each axis, farther out by the first-order upwind scheme for
-//! |∇φ| = 1 (Rouy and Tourin 1992). Velocities are means under trilinear weights, as
-//! particle-to-grid takes them. Both follow from the frame alone, in an order that no number of
-//! threads changes, so that the same frame gives the same bytes.
+//! The surface is that of Zhu and Bridson 2005, φ = |x − x̄| − r with x̄ the particles' mean
+//! position under the kernel (1 − s²)³. In the narrow band it is converted to a distance: next to
+//! the surface from the zero crossings along each axis, farther out by the first-order upwind
+//! scheme for |∇φ| = 1 (Rouy and Tourin 1992). Velocities are means under trilinear weights, as in
+//! particle-to-grid transfer. Both depend only on the frame: the order of summation does not change
+//! with the number of threads, so that the same frame gives the same bytes.
 
 use glam::DVec3;
 use rayon::prelude::*;
 
 use super::{bricks::CELLS, particles::Particles, sparse_grid::SparseGrid, voxels::Voxels};
 
-/// Half the width of the narrow band, in voxels; OpenVDB's own default.
+/// Half-width of the narrow band, voxels; the default of OpenVDB.
 pub const BAND: f64 = 3.0;
 
-/// Voxels that velocities are carried beyond the faces which particles reach.
+/// Number of voxels by which velocities are extrapolated beyond the faces that particles reach.
 const EXTRAPOLATED: usize = 3;
 
-/// Bricks along an axis, at most, of a box that a grid can cover: their table fills 1 GiB.
+/// Largest number of bricks in a box that a grid may cover: their table then takes 1 GiB.
 pub const MAX_BRICKS: f64 = (1u64 << 28) as f64;
 
-/// The voxels that a frame is laid on.
+/// Voxel grid onto which a frame is rasterised.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Raster {
     /// World position of the corner where the indices begin, metres.
@@ -33,19 +33,19 @@ pub struct Raster {
 }
 
 impl Raster {
-    /// Voxel sizes allowed, in particle spacings.
+    /// Allowed voxel sizes, particle spacings.
     pub const VOXEL_RATIO: std::ops::RangeInclusive<f64> = 0.25..=8.0;
 
-    /// R of the surface's kernel, metres: two particle spacings (Zhu and Bridson), and at least 1.5
-    /// voxels. φ bends more the smaller R is, and is taken as straight from voxel to voxel: on still
-    /// water that misplaces the surface by up to 0.2 voxels where R is one voxel, 0.1 where it is 1.5
-    /// (measured).
+    /// Radius R of the surface's kernel, metres: two particle spacings (Zhu and Bridson), but at
+    /// least 1.5 voxels. φ is more curved for smaller R, and interpolated linearly between voxels:
+    /// on still water that displaces the surface by up to 0.2 voxels for R of one voxel, and by 0.1
+    /// for 1.5 (measured).
     fn support(&self) -> f64 {
         (2.0 * self.particle_spacing).max(1.5 * self.voxel_size)
     }
 
-    /// Signed distance to the surface of the water at the voxels' centres, metres, negative
-    /// inside; the narrow band is active.
+    /// Computes the signed distance to the surface of the water at the voxels' centres, metres,
+    /// negative inside; the narrow band is active.
     pub fn surface(&self, particles: &Particles) -> SparseGrid<f32> {
         let background = (BAND * self.voxel_size) as f32;
         let mut grid = SparseGrid {
@@ -75,7 +75,7 @@ impl Raster {
                     };
                     (sign * size, is_active)
                 });
-                // Without a band there is no surface, and one voxel speaks for all.
+                // Without a band there is no surface, so all voxels have the sign of the first.
                 (
                     leaf,
                     level[slot * CELLS as usize] < 0.0,
@@ -96,7 +96,7 @@ impl Raster {
     }
 
     /// φ of Zhu and Bridson at the voxels' centres, in voxels; where no particle is within reach,
-    /// the least that it can be there.
+    /// its lower bound there.
     fn averaged_kernel(&self, voxels: &Voxels) -> Vec<f32> {
         let support = self.support() / self.voxel_size;
         let spacing = self.particle_spacing / self.voxel_size;
@@ -104,14 +104,14 @@ impl Raster {
         let support = support as f32;
         let mut level = vec![support - radius; voxels.len()];
         voxels.for_each_brick(&mut level, |slot, level| {
-            // Σ w dx, Σ w dy, Σ w dz, Σ w, each over d = voxel − particle.
+            // Σ w dx, Σ w dy, Σ w dz, Σ w, with d = voxel − particle.
             let mut sums = [[0.0f32; CELLS as usize]; 4];
             voxels.for_each_near(slot, support.ceil() as usize, |p, _| {
                 add_kernel(&mut sums, p, support);
             });
             let [x, y, z, w] = &sums;
             for (at, level) in level.iter_mut().enumerate() {
-                // Below it the quotient is round-off; a particle there is all but out of reach.
+                // Below this the quotient is round-off; such a particle is almost out of reach.
                 if w[at] > 1e-12 {
                     *level =
                         (x[at] * x[at] + y[at] * y[at] + z[at] * z[at]).sqrt() / w[at] - radius;
@@ -121,8 +121,9 @@ impl Raster {
         level
     }
 
-    /// Velocity, m/s: component c of voxel (i, j, k) on the face between it and the voxel before it
-    /// along c. Carried a few voxels beyond the water; active where all three are known.
+    /// Computes the velocity, m/s: component c of voxel (i, j, k) is on the face between it and the
+    /// previous voxel along c. Extrapolated a few voxels beyond the water; a voxel is active if all
+    /// three components are known.
     pub fn velocity(&self, particles: &Particles) -> SparseGrid<[f32; 3]> {
         let mut grid = SparseGrid {
             origin: self.origin,
@@ -154,9 +155,9 @@ impl Raster {
     }
 }
 
-/// r for which water at rest ends half a spacing beyond its outermost particles: |x − x̄| there over
-/// half a lattice, as it is interpolated between voxels above and below, averaged over where those
-/// lie and along the surface. In voxels, as its arguments are.
+/// Radius r for which water at rest ends half a spacing beyond its outermost particles: |x − x̄|
+/// there over half a lattice, interpolated between the voxels above and below, averaged over their
+/// positions and along the surface. In voxels, like the arguments.
 fn rest_radius(spacing: f64, support: f64) -> f64 {
     const SAMPLES: i32 = 4;
     let middle = |k: i32| (f64::from(k) + 0.5) / f64::from(SAMPLES);
@@ -171,8 +172,8 @@ fn rest_radius(spacing: f64, support: f64) -> f64 {
     sum / f64::from(SAMPLES.pow(3))
 }
 
-/// The same without voxels, over a spacing of 1: the mean along the surface of |x − x̄| half a spacing above the
-/// outermost particles.
+/// Same without voxels, for a spacing of 1: the mean along the surface of |x − x̄| half a spacing
+/// above the outermost particles.
 pub(super) fn calm_radius(support: f64) -> f64 {
     const SAMPLES: i32 = 16;
     let middle = |k: i32| (f64::from(k) + 0.5) / f64::from(SAMPLES);
@@ -214,7 +215,7 @@ fn lattice_offset(spacing: f64, support: f64, place: DVec3) -> f64 {
     }
 }
 
-/// Adds a particle at `p` to the sums of the voxels of a brick, in voxels from its corner.
+/// Adds a particle at `p`, in voxels from a brick's corner, to the sums of its voxels.
 fn add_kernel(sums: &mut [[f32; CELLS as usize]; 4], p: [f32; 3], support: f32) {
     let low = p.map(|x| (x - support - 0.5).ceil().max(0.0) as usize);
     let end = p.map(|x| (x + support + 0.5).floor().clamp(0.0, 8.0) as usize);
@@ -237,7 +238,7 @@ fn add_kernel(sums: &mut [[f32; CELLS as usize]; 4], p: [f32; 3], support: f32) 
     }
 }
 
-/// Distance to where `level` changes its sign, in voxels, without sign; infinite beyond the band.
+/// Unsigned distance to the zero crossing of `level`, in voxels; infinite beyond the band.
 fn redistanced(voxels: &Voxels, level: &[f32]) -> Vec<f32> {
     let mut distance = vec![f32::INFINITY; level.len()];
     voxels.for_each_brick(&mut distance, |slot, distance| {
@@ -246,8 +247,8 @@ fn redistanced(voxels: &Voxels, level: &[f32]) -> Vec<f32> {
         }
     });
     let fixed = distance.clone();
-    // Each round settles the voxels whose upwind neighbours are settled, at most √3 steps a voxel
-    // of distance.
+    // Each round settles the voxels whose upwind neighbours are settled; that takes at most √3
+    // steps per voxel of distance.
     let rounds = (BAND * 3f64.sqrt()).ceil() as usize + 1;
     for _ in 0..rounds {
         let before = distance.clone();
@@ -270,15 +271,17 @@ fn redistanced(voxels: &Voxels, level: &[f32]) -> Vec<f32> {
     distance
 }
 
-/// Distance of a voxel's centre to the surface that crosses the way to a neighbour, in voxels;
-/// infinite where there is none. Exact for a plane that crosses every axis it meets within a voxel.
+/// Distance from a voxel's centre to the surface, in voxels, from its crossings on the lines to the
+/// neighbours; infinite without any. Exact for a plane that crosses each axis within a voxel or not
+/// at all.
 fn beside_surface(voxels: &Voxels, level: &[f32], slot: usize, local: usize) -> f32 {
     let here = level[slot * CELLS as usize + local];
     let mut inverse_squares = 0.0;
     for axis in 0..3 {
         let crossing = |step| {
             let at = voxels.neighbor(slot, local, axis, step);
-            // Slot 0 holds no particle, and its neighbours none within reach: both are outside.
+            // Slot 0 holds no particle, and its neighbours have none within reach: both
+            // are outside.
             let there = level[at];
             if (here < 0.0) == (there < 0.0) {
                 f32::INFINITY
@@ -289,11 +292,11 @@ fn beside_surface(voxels: &Voxels, level: &[f32], slot: usize, local: usize) -> 
         let nearest = crossing(-1).min(crossing(1)).max(1e-6);
         inverse_squares += 1.0 / (nearest * nearest);
     }
-    // Of a voxel without a crossing, 1/√0.
+    // 1/√0 for a voxel without a crossing.
     1.0 / inverse_squares.sqrt()
 }
 
-/// The solution of Σ max(d − aᵢ, 0)² = 1 with aᵢ the lesser neighbour along each axis.
+/// Solves Σ max(d − aᵢ, 0)² = 1, with aᵢ the smaller neighbour along each axis.
 fn upwind_distance(mut a: [f32; 3]) -> f32 {
     a.sort_unstable_by(f32::total_cmp);
     let one = a[0] + 1.0;
@@ -320,7 +323,7 @@ fn face_means(voxels: &Voxels, particles: &Particles) -> [Vec<Option<f32>>; 3] {
                 add_weights(&mut sums, p, axis, particles.velocity[index][axis]);
             });
             for (mean, [sum, weight]) in means.iter_mut().zip(sums) {
-                // Below it the quotient is round-off.
+                // Below this the quotient is round-off.
                 *mean = (weight > 1e-6).then(|| sum / weight);
             }
         });
@@ -328,10 +331,10 @@ fn face_means(voxels: &Voxels, particles: &Particles) -> [Vec<Option<f32>>; 3] {
     })
 }
 
-/// Adds a particle at `p` to Σ w v and Σ w of the eight faces of `axis` about it, as far as they are
-/// the brick's, in voxels from its corner.
+/// Adds a particle at `p`, in voxels from a brick's corner, to Σ w v and Σ w of the eight
+/// surrounding faces of `axis` that belong to the brick.
 fn add_weights(sums: &mut [[f32; 2]; CELLS as usize], p: [f32; 3], axis: usize, velocity: f32) {
-    // Faces lie on whole numbers along their axis, halfway between along the others.
+    // Face centres have whole coordinates along their axis, and half ones along the others.
     let from_first: [f32; 3] = std::array::from_fn(|a| if a == axis { p[a] } else { p[a] - 0.5 });
     let first = from_first.map(|x| x.floor() as i32);
     for corner in 0..8 {
@@ -349,7 +352,7 @@ fn add_weights(sums: &mut [[f32; 2]; CELLS as usize], p: [f32; 3], axis: usize, 
     }
 }
 
-/// Carries values outward: layer by layer, the mean of the neighbours that are known.
+/// Extrapolates outward, layer by layer, by the mean of the known neighbours.
 fn extrapolated(voxels: &Voxels, mut values: Vec<Option<f32>>) -> Vec<Option<f32>> {
     for _ in 0..EXTRAPOLATED {
         let before = values.clone();
@@ -386,7 +389,7 @@ mod tests {
         }
     }
 
-    /// Lattice points within `inside`, moving as `velocity` says.
+    /// Lattice points within `inside`, with velocities from `velocity`.
     fn water(
         counts: [i32; 3],
         inside: impl Fn(DVec3) -> bool,
@@ -419,8 +422,8 @@ mod tests {
         })
     }
 
-    /// Volume within a level set: inside leaves whole, each other voxel by how much of it the
-    /// plane through its distance leaves.
+    /// Volume within a level set: inside leaves fully, each other voxel by the fraction that the
+    /// plane at its distance leaves inside.
     fn volume(grid: &SparseGrid<f32>) -> f64 {
         let h = grid.voxel_size;
         let voxels: f64 = grid
@@ -440,19 +443,21 @@ mod tests {
             assert_eq!(surface.background, (3.0 * voxel_size) as f32);
             let mut top = Vec::new();
             for (p, _, phi) in values(&surface) {
-                // Above the middle of the block, where the top at 1.2 m is the nearest part.
+                // Above the middle of the block, where the top at 1.2 m is the nearest face.
                 let side = (p - DVec3::new(1.2, 0.0, 1.2)).abs();
                 if side.x.max(side.z) < 0.4 && (p.y - 1.2).abs() < 2.0 * voxel_size.min(0.2) {
                     top.push((f64::from(phi) - (p.y - 1.2)).abs());
                 }
             }
             let worst = top.iter().copied().fold(0.0, f64::max);
-            // 0.1 voxels (see `support`), and 0.05 spacings between a particle and the gap beside it.
+            // 0.1 voxels (see `support`), and 0.05 spacings between a particle and the gap
+            // beside it.
             assert!(
                 !top.is_empty() && worst < 0.1 * voxel_size + 0.05 * D,
                 "{voxel_size}: {worst}"
             );
-            // The kernel rounds twelve edges and eight corners: of 2.4 × 1.2 × 2.4 m a few percent.
+            // The kernel rounds twelve edges and eight corners: a few per cent of 2.4 × 1.2 ×
+            // 2.4 m.
             let ratio = volume(&surface) / (2.4 * 1.2 * 2.4);
             assert!((0.95..1.01).contains(&ratio), "{voxel_size}: {ratio}");
         }
@@ -474,7 +479,7 @@ mod tests {
         }
         println!("worst {worst:.3}, mean {:.3} voxels", sum / count);
         // A ball of lattice points is itself rough by half a spacing; the first-order scheme adds
-        // its own over three voxels.
+        // its own error over three voxels.
         assert!(worst < 0.5 && sum / count < 0.15, "{worst} {}", sum / count);
         assert!(
             !surface.inside.is_empty(),
@@ -522,7 +527,7 @@ mod tests {
         let velocity = raster.velocity(&block);
         let mut inner = 0;
         for (p, _, v) in values(&velocity) {
-            // Within, weights are symmetric about each face, and a linear field is its own mean.
+            // Inside, weights are symmetric about each face, and a linear field equals its mean.
             if (p - 1.0).abs().max_element() < 0.7 {
                 let exact = [0, 1, 2].map(|axis| field(p - 0.5 * h * DVec3::AXES[axis])[axis]);
                 for axis in 0..3 {
@@ -531,9 +536,9 @@ mod tests {
                 inner += 1;
             }
         }
-        // Centres 0.1, 0.3 and 0.5 m to each side of the middle.
+        // Centres 0.1, 0.3 and 0.5 m on each side of the middle.
         assert_eq!(inner, 6 * 6 * 6);
-        // Particles reach the x-faces 0 to 10 of ten voxels, and three layers beyond.
+        // Particles reach the x-faces 0 to 10 of ten voxels; extrapolation adds three layers.
         assert_eq!(velocity.active_bounds(), Some(([-3; 3], [13; 3])));
     }
 

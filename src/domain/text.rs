@@ -1,25 +1,25 @@
-//! Texts of files that people and other programs write: UTF-8, with or without a byte order mark.
+//! Reads text that people and other programs write: UTF-8, with or without a byte order mark.
 
 use std::{fs, io, path::Path};
 
-/// Why bytes are no text that is read.
+/// Reason why bytes are not readable text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum NoText {
-    /// As `>` of Windows PowerShell and some editors write it.
+    /// UTF-16, as written by `>` in Windows PowerShell and by some editors.
     #[error("it is text in UTF-16; save it as UTF-8")]
     Utf16,
-    /// Letters of another encoding, or no text.
+    /// Another encoding, or not text.
     #[error("line {line} is not UTF-8; save it as UTF-8")]
     Other {
-        /// Counted from 1.
+        /// Line of the first invalid byte, counted from 1.
         line: usize,
     },
 }
 
-/// The bytes of a text without the mark that some editors put first. Whether they are UTF-8 is not looked at.
+/// Strips the byte order mark that some editors write. Does not check for UTF-8.
 ///
 /// # Errors
-/// [`NoText::Utf16`], also without a mark, where the first letters are ASCII.
+/// [`NoText::Utf16`], also without a mark if the first characters are ASCII.
 pub fn without_mark(bytes: &[u8]) -> Result<&[u8], NoText> {
     let is_letter = |b: u8| b.is_ascii_graphic() || b.is_ascii_whitespace();
     let is_wide = match *bytes {
@@ -33,10 +33,10 @@ pub fn without_mark(bytes: &[u8]) -> Result<&[u8], NoText> {
     Ok(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes))
 }
 
-/// The text that bytes are.
+/// Decodes bytes as UTF-8 text, without the byte order mark.
 ///
 /// # Errors
-/// [`NoText`].
+/// [`NoText`] if they are not UTF-8.
 pub fn of(bytes: &[u8]) -> Result<&str, NoText> {
     let bytes = without_mark(bytes)?;
     std::str::from_utf8(bytes).map_err(|error| {
@@ -46,10 +46,10 @@ pub fn of(bytes: &[u8]) -> Result<&str, NoText> {
     })
 }
 
-/// The text of a file.
+/// Reads a text file.
 ///
 /// # Errors
-/// That it cannot be read, or [`NoText`] as [`io::ErrorKind::InvalidData`].
+/// If the file cannot be read, or [`NoText`] as [`io::ErrorKind::InvalidData`].
 pub fn read(file: &Path) -> io::Result<String> {
     let bytes = fs::read(file)?;
     let text = of(&bytes).map_err(|error| io::Error::new(io::ErrorKind::InvalidData, error))?;

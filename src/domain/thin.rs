@@ -1,49 +1,55 @@
-//! Where solids are too thin to hold water.
+//! Detects parts of solids that are too thin to hold water back.
 
 use glam::DVec3;
 use rayon::prelude::*;
 
 use super::{bounds::Bounds, bvh::Bvh, mesh::TriangleMesh, sampling::candidate};
 
-/// Most rays cast through one mesh.
+/// Largest number of rays cast through one mesh.
 const MOST_RAYS: f64 = 131_072.0;
 
-/// Opposite sides of a plate: normals within 30° of opposite. A blunter edge is thin only at its tip.
+/// Cosine limit for opposite sides of a plate: normals within 30° of opposite. An edge with a
+/// larger angle is thin only at its tip.
 const OPPOSITE: f64 = -0.866;
 
-/// Spacings about a place within which a plate is a barrier, two cells of FLIP. Water goes around a smaller one.
+/// Radius, in spacings, within which a plate must extend to be a barrier: two cells of FLIP. Water
+/// flows around a smaller one.
 const AROUND: i32 = 4;
 
-/// Part of the places there that a barrier covers: all of them but for its rim. A plate that ends at the place covers half.
+/// Fraction of the points in that radius that a barrier covers: all except its rim. A plate that
+/// ends at the centre covers half.
 const COVERED: f64 = 0.8;
 
-/// Part of them where it is thin itself: next to all of a plate, and more than half of a window of seven spacings in a thick wall; a tenth
-/// of a parapet's, which stands on a house.
+/// Fraction of the points where a barrier is thin: almost all for a plate, and more than half for a
+/// window of seven spacings in a thick wall, but a tenth for a parapet on a house.
 const THIN: f64 = 0.4;
 
-/// Spacings along the normal by which a curved barrier may leave its tangent plane there.
+/// Distance, in spacings, by which a curved barrier may leave its tangent plane within that radius.
 const CURVED: f64 = 3.0;
 
-/// Spacings before and behind a surface at which its sides are looked at.
+/// Distance before and behind a surface at which its sides are tested, in spacings.
 const BESIDE: f64 = 0.1;
 
-/// Most parts of a mesh of which it is asked whether they belong to a barrier, the thinnest first; of more, as many evenly among them.
+/// Largest number of parts of a mesh that are tested for being a barrier, from the thinnest on; if
+/// there are more, as many are picked at regular intervals.
 const MOST_PARTS: usize = 4096;
 
-/// A part of a solid with open space on both sides.
+/// A thin part of a solid with open space on both sides.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ThinPart {
-    /// Midway through it, metres.
+    /// Midpoint, metres.
     pub place: DVec3,
-    /// Metres.
+    /// Thickness, metres.
     pub thickness: f64,
 }
 
-/// The thinnest part of each of `solids`, `None` where all of a solid is as thick as `least` metres.
+/// Returns the thinnest part of each of `solids`; `None` if a solid is at least `least` metres
+/// thick everywhere.
 ///
-/// Rays go inward along the normals from points spread over the surface, one in `spacing` squared, fewer on large meshes. A part counts
-/// where they come out into open space within `domain` with no layer on the way as thick as `least`, one solid or several, and where solids
-/// cover most of the domain's room across the normal, four spacings around.
+/// Rays go inward along the normals from points spread over the surface, one per squared `spacing`,
+/// fewer on large meshes. A part counts if they come out into open space within `domain` without
+/// passing a layer as thick as `least`, of one solid or several, and if solids cover most of the
+/// domain perpendicular to the normal within four spacings.
 pub fn thin_parts(
     solids: &[&TriangleMesh],
     domain: &Bounds,
@@ -87,7 +93,7 @@ impl Solids<'_> {
         (self.trees.iter()).any(|tree| tree.winding_number(p).abs() > 0.5)
     }
 
-    /// The next surface along a ray, within so many lengths of `direction`: how far it is and its normal.
+    /// Next surface along a ray within `bound`, in lengths of `direction`: its distance and normal.
     fn next(&self, p: DVec3, direction: DVec3, bound: f64) -> Option<(f64, DVec3)> {
         let met = self
             .trees
@@ -100,7 +106,7 @@ impl Solids<'_> {
         met.min_by(|(a, _), (b, _)| a.total_cmp(b))
     }
 
-    /// The part behind a point of a surface, where it is thin with open space on both sides.
+    /// Part behind a point of a surface, if it is thin with open space on both sides.
     fn part(&self, p: DVec3, normal: DVec3) -> Option<ThinPart> {
         let is_within = |way: f64| self.domain.contains(p - way * normal);
         let (beside, apart) = (BESIDE * self.spacing, 0.5 * self.spacing);
@@ -125,8 +131,8 @@ impl Solids<'_> {
         }
     }
 
-    /// Whether solids cover the room about `place` across `normal`, and thinly: not so about a post, a pinnacle or an awning, nor
-    /// about a parapet on a house.
+    /// Whether solids cover the surroundings of `place` perpendicular to `normal`, and are thin
+    /// there: not so for a post, a pinnacle or an awning, nor for a parapet on a house.
     fn is_barrier(&self, place: DVec3, normal: DVec3) -> bool {
         let (u, v) = normal.any_orthonormal_pair();
         let reach = CURVED * self.spacing;
@@ -153,11 +159,11 @@ impl Solids<'_> {
     }
 }
 
-/// Points on a surface within `domain` and the normals there, one in an area of `spacing` squared.
+/// Points on a surface within `domain`, with normals: one per area of `spacing` squared.
 fn spread(mesh: &TriangleMesh, domain: &Bounds, spacing: f64) -> Vec<(DVec3, DVec3)> {
     let each = (spacing * spacing).max(mesh.area() / MOST_RAYS);
     let mut points = Vec::new();
-    // Half of the first point's area: small meshes have one too.
+    // Starts with half of a point's area, so that small meshes get a point too.
     let mut area = 0.5 * each;
     for t in 0..mesh.triangles.len() {
         let vector = mesh.area_vector(t);
@@ -198,7 +204,8 @@ mod tests {
         thin_parts(solids, &domain, 0.1, 0.125)
     }
 
-    /// A plate across the domain, its thickness and place; one as thick as it has to be.
+    /// Thickness and position of a plate across the domain; a plate of sufficient thickness
+    /// is none.
     #[test]
     fn plates_between_water_are_thin_as_far_as_they_are() {
         let plate = boxed([0.9, -1.0, -1.0], [0.98, 3.0, 3.0]);
@@ -211,8 +218,8 @@ mod tests {
         );
     }
 
-    /// A skin over the floor or over a block has water on one side alone. Two thin plates are thin, also where they touch: a
-    /// distance is that of either.
+    /// A skin on the floor or on a block has water on only one side. Two thin plates are thin, even
+    /// if they touch: the distance is that of either.
     #[test]
     fn what_lies_on_something_is_not_thin() {
         assert_eq!(
@@ -234,7 +241,8 @@ mod tests {
         assert_eq!([0.0, 0.02, 0.3].map(pair), [2; 3]);
     }
 
-    /// One that ends where the domain does is as good a barrier as one that goes on; a curved one is one however finely it is cut.
+    /// A plate that ends at the domain's ends is as good a barrier as one that continues; so is a
+    /// curved one, however finely it is tessellated.
     #[test]
     fn barriers_end_at_walls_and_may_be_curved() {
         let domain = Bounds {
@@ -260,7 +268,7 @@ mod tests {
         assert_eq!(found(&[&shell(0.2)]), [None]);
     }
 
-    /// Water goes around a post and an awning.
+    /// Water flows around a post and an awning.
     #[test]
     fn small_plates_are_not_thin() {
         let width = |width: f64| found(&[&boxed([0.9, 0.0, 0.9], [0.98, 1.0, 0.9 + width])])[0];
@@ -268,7 +276,7 @@ mod tests {
         assert!(width(1.0).is_some());
     }
 
-    /// A beach ends thinner than anything, on the floor; in mid-water its end is thin.
+    /// A beach becomes arbitrarily thin where it ends on the floor; in mid-water its end is thin.
     #[test]
     fn a_wedge_is_thin_where_it_ends_in_the_water() {
         let wedge = |height: f64| {

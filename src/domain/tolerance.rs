@@ -1,17 +1,17 @@
-//! How far two results may be apart.
+//! Tolerances of a comparison of two results.
 
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-/// Limits of a comparison; what is not named is shown and not judged.
+/// Limits of a comparison; quantities without a limit are reported but not judged.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Tolerance {
     /// Limits by field: `position` (metres), `velocity` (m/s), and attributes by name.
     pub fields: BTreeMap<String, FieldLimits>,
     /// Limits by the names of [`Aggregates::NAMES`](super::aggregates::Aggregates::NAMES).
     pub aggregates: BTreeMap<String, Limit>,
-    /// Limits of pictures.
+    /// Limits of image comparisons.
     pub pictures: PictureLimits,
 }
 
@@ -19,7 +19,7 @@ pub struct Tolerance {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FieldLimits {
-    /// Error of the worst particle.
+    /// Largest error of a particle.
     pub max: Option<f64>,
     /// Root mean square error.
     pub rms: Option<f64>,
@@ -27,23 +27,23 @@ pub struct FieldLimits {
     pub p99: Option<f64>,
 }
 
-/// |a − b| ≤ absolute + relative · |b|.
+/// A limit of the form |a − b| ≤ absolute + relative · |b|.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Limit {
-    /// Absolute part, in the value's unit.
+    /// Absolute term, in the value's unit.
     pub absolute: f64,
-    /// Part relative to the reference b.
+    /// Factor relative to the reference b.
     pub relative: f64,
 }
 
 impl Limit {
-    /// The largest error that is allowed against `reference`.
+    /// Returns the largest allowed error for `reference`.
     pub fn allowed(&self, reference: f64) -> f64 {
         self.absolute + self.relative * reference.abs()
     }
 }
 
-/// Limits of one picture against another.
+/// Limits of a comparison of two images.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PictureLimits {
@@ -51,8 +51,8 @@ pub struct PictureLimits {
     pub mean: Option<f64>,
     /// Error that 99 % of the pixels do not exceed.
     pub p99: Option<f64>,
-    /// Error of the worst pixel.
+    /// Largest error of a pixel.
     pub max: Option<f64>,
-    /// Least SSIMULACRA 2 score; 100 is no visible difference.
+    /// Least SSIMULACRA 2 score; 100 means no visible difference.
     pub perceptual: Option<f64>,
 }

@@ -1,4 +1,4 @@
-//! Particles on the voxels of a sparse grid: which leaves there are, and who lies in each.
+//! Particles on the voxels of a sparse grid: the bricks, and the particles of each voxel.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -9,26 +9,26 @@ use super::{
     sparse_grid::{Leaf, VOXELS},
 };
 
-/// Bricks about the particles of one frame, and the particles of each voxel.
+/// Bricks around the particles of one frame, and the particles of each voxel.
 ///
-/// Positions and indices are relative to `base`, which lies at the least corner of the first brick.
+/// Positions and indices are relative to `base`, the least corner of the first brick.
 pub(super) struct Voxels {
     pub(super) bricks: Bricks,
-    /// Index of the first voxel of the first brick, in the whole grid.
+    /// Index of the first voxel of the first brick in the whole grid.
     base: [i32; 3],
-    /// Start in `order` of each voxel's particles, for the voxels of the wet slots; and at the end
-    /// their number.
+    /// Start in `order` of each voxel's particles, for the voxels of the wet slots, followed by
+    /// the total.
     starts: Vec<u32>,
-    /// Particles by voxel, and within it as in the frame.
+    /// Particle indices by voxel, and within a voxel in the order of the frame.
     order: Vec<u32>,
     /// Positions in voxels from `base`, in the order of `order`.
     places: Vec<[f32; 3]>,
 }
 
 impl Voxels {
-    /// Sorts `particles` into voxels whose indices begin at `origin`, with all bricks that come
-    /// within `reach` voxels of one with particles. Positions that are no numbers are passed over.
-    /// `None` where nothing is left.
+    /// Sorts `particles` into voxels whose indices begin at `origin`, with all bricks within
+    /// `reach` voxels of one with particles. Positions that are not finite are ignored. `None` if
+    /// no particle is left.
     pub(super) fn new(
         particles: &Particles,
         origin: DVec3,
@@ -89,26 +89,26 @@ impl Voxels {
         })
     }
 
-    /// Elements of an array with one value a voxel, slot 0 included.
+    /// Length of an array with one value per voxel, slot 0 included.
     pub(super) fn len(&self) -> usize {
         self.bricks.slots() * CELLS as usize
     }
 
-    /// Slots, whether they hold particles or not.
+    /// All slots, with or without particles.
     pub(super) fn slots(&self) -> std::ops::RangeInclusive<usize> {
         1..=self.bricks.active as usize
     }
 
-    /// First voxel of a slot, from `base`.
+    /// First voxel of a slot, relative to `base`.
     pub(super) fn corner(&self, slot: usize) -> [i32; 3] {
         self.bricks.records[slot]
             .coordinate
             .map(|c| (c * EDGE) as i32)
     }
 
-    /// Visits the particles of the slot's voxels and of `margin` voxels about them, at most 8, in an
-    /// order that depends on the frame alone: where each lies, in voxels from the slot's corner, and
-    /// its index.
+    /// Visits the particles in the slot's voxels and in `margin` (at most 8) voxels around them, in
+    /// an order that depends only on the frame: passes the position, in voxels from the slot's
+    /// corner, and the index.
     pub(super) fn for_each_near(
         &self,
         slot: usize,
@@ -117,7 +117,7 @@ impl Voxels {
     ) {
         let corner = self.corner(slot).map(|c| c as f32);
         let neighbors = &self.bricks.records[slot].neighbors;
-        // Along an axis: the brick before, the slot's own, the one behind, and which voxels of each.
+        // Bricks before, at and behind the slot along an axis, and the range of voxels in each.
         let parts = [(0, 8 - margin..8), (1, 0..8), (2, 0..margin)];
         for (bz, zs) in &parts {
             for (by, ys) in &parts {
@@ -144,8 +144,8 @@ impl Voxels {
         }
     }
 
-    /// Element of the neighbour of a voxel along `axis`, a step of ±1; an element of slot 0 where
-    /// there is no brick.
+    /// Element of a voxel's neighbour along `axis`, at a step of ±1; an element of slot 0 if there
+    /// is no brick.
     pub(super) fn neighbor(&self, slot: usize, local: usize, axis: usize, step: i32) -> usize {
         let stride = 1 << (3 * axis);
         let at = (local / stride % 8) as i32 + step;
@@ -158,7 +158,7 @@ impl Voxels {
         self.bricks.records[slot].neighbors[brick] as usize * CELLS as usize + wrapped
     }
 
-    /// Fills one value a voxel, brick by brick in parallel; slot 0 is left as it is.
+    /// Fills one value per voxel, brick by brick in parallel; slot 0 is left unchanged.
     pub(super) fn for_each_brick<T: Send>(
         &self,
         values: &mut [T],
@@ -171,8 +171,8 @@ impl Voxels {
             .for_each(|(slot, values)| fill(slot, values));
     }
 
-    /// The slot's leaf, where `value` gives for an element the value and whether it is active;
-    /// `None` where none is.
+    /// Builds the slot's leaf. `value` returns an element's value and whether it is active; `None`
+    /// if no element is.
     pub(super) fn leaf<T>(
         &self,
         slot: usize,

@@ -1,4 +1,4 @@
-//! The water of a frame as a mesh that has the particles' volume, with velocities and normals.
+//! The water of a frame as a mesh with the volume of the particles, with velocities and normals.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -9,48 +9,52 @@ use super::{
     mesh::TriangleMesh,
 };
 
-/// How far the volume may be off the particles', of itself, before the surface is moved.
+/// Relative deviation from the particles' volume above which the surface is moved.
 pub const VOLUME: f64 = 0.01;
-/// How near a surface that was moved comes to it: well within [`VOLUME`], so that a frame's neighbours agree.
+/// Relative deviation that a moved surface aims at: well within [`VOLUME`], so that successive
+/// frames agree.
 const NEAR: f64 = 1e-3;
-/// How far from its own the field's value at a moved surface may be.
+/// Largest isovalue of a moved surface, either side of 0.
 const MARGIN: f32 = 0.5;
-/// Extractions on the way to a volume, at most: each about halves what is left where the secant does no better.
+/// Largest number of extractions in the search for a volume; each halves the remaining interval.
 const TRIES: usize = 8;
 
-/// The water that a mesh is made of.
+/// Particles and grid that a mesh is made from.
 #[derive(Clone, Copy, Debug)]
 pub struct Body<'a> {
-    /// Of the particles, metres from the box's least corner.
+    /// Positions of the particles, metres from the box's least corner.
     pub places: &'a [DVec3],
-    /// Of the particles, m/s.
+    /// Velocities of the particles, m/s.
     pub velocities: &'a [[f32; 3]],
-    /// Of the box, metres; its sides are mirrors, and closed where water stands at them.
+    /// Size of the box, metres; its sides are mirrors, and closed where water touches them.
     pub size: DVec3,
-    /// Between neighbours at rest, metres.
+    /// Distance between neighbours at rest, metres.
     pub spacing: f64,
-    /// Of the grid that the surface is found on, a spacing.
+    /// Voxels per particle spacing of the grid on which the surface is extracted.
     pub voxels: f64,
 }
 
 /// A mesh around the water.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct WaterMesh {
-    /// Metres from the box's least corner; closed, counter-clockwise seen from the air.
+    /// Triangles, with vertices in metres from the box's least corner; closed, counter-clockwise
+    /// seen from the air.
     pub mesh: TriangleMesh,
     /// Unit normals of the vertices, outward.
     pub normals: Vec<[f32; 3]>,
     /// Velocities of the vertices, m/s.
     pub velocities: Vec<[f32; 3]>,
-    /// Enclosed, over the particles'; 1 without particles.
+    /// Enclosed volume relative to the particles'; 1 without particles.
     pub volume: f64,
-    /// Value of the field at the surface: 0, unless its own surface had another volume than the particles.
+    /// Value of the field at the surface: 0, unless that surface had a different volume from
+    /// the particles.
     pub iso: f32,
 }
 
 impl WaterMesh {
-    /// The renderer's own surface of a body. Where the volume within it is off the particles' by more than [`VOLUME`], it is that of
-    /// the value at which it is not, so far as one within half of it has; `volume` then says what was reached.
+    /// Extracts the same surface that the renderer draws. If its volume differs from the particles'
+    /// by more than [`VOLUME`], searches for the isovalue within ±0.5 whose surface has
+    /// their volume; `volume` then holds the ratio that was reached.
     pub fn new(body: &Body<'_>) -> Self {
         let &Body { size, spacing, .. } = body;
         let kernels = Kernels::fit(body.places, size, spacing);
@@ -78,7 +82,8 @@ impl WaterMesh {
     }
 }
 
-/// The surface of the value at which `ratio` is 1, found by halving between [`MARGIN`] and the field's own.
+/// Isosurface at which `ratio` is 1, by bisection between 0 and [`MARGIN`] on the side that
+/// is needed.
 fn at_volume(
     level: &LevelSet,
     own: Isosurface,
@@ -111,7 +116,7 @@ fn at_volume(
     best
 }
 
-/// Outward: against the field's gradient, and in a cap those of the sides.
+/// Outward normals: against the field's gradient, and those of the box sides in a cap.
 fn normals(surface: &Isosurface, level: &LevelSet) -> Vec<[f32; 3]> {
     let mesh = &surface.mesh;
     let mut areas = vec![DVec3::ZERO; mesh.vertices.len()];
@@ -122,7 +127,7 @@ fn normals(surface: &Isosurface, level: &LevelSet) -> Vec<[f32; 3]> {
     let all = mesh.vertices.par_iter().zip(&surface.caps).zip(areas);
     let normal = |((&place, &cap), area): ((&DVec3, &DVec3), DVec3)| {
         let field = -level.gradient(place);
-        // Where the field has no slope the triangles have one.
+        // Where the field has no gradient, the triangles' normals are used.
         let choices = [cap, field, area];
         let found = choices.into_iter().find_map(DVec3::try_normalize);
         found.unwrap_or(DVec3::Y).as_vec3().to_array()
@@ -137,7 +142,7 @@ mod tests {
     const D: f64 = 0.1;
     const SIZE: DVec3 = DVec3::splat(2.0);
 
-    /// A ball of a lattice whose neighbours are `part` of a spacing apart, which goes along x.
+    /// A ball of a lattice with neighbours `part` spacings apart.
     fn ball(part: f64) -> Vec<DVec3> {
         let step = part * D;
         let n = (0.7 / step).ceil() as i32;
@@ -165,7 +170,7 @@ mod tests {
         for (place, normal) in found.mesh.vertices.iter().zip(&found.normals) {
             let normal = DVec3::from(normal.map(f64::from));
             assert!((normal.length() - 1.0).abs() < 1e-6);
-            // A ball of a lattice is rough; its normals lead outward all the same.
+            // A ball of a lattice is rough, but its normals point outward.
             assert!(normal.dot((*place - 1.0).normalize()) > 0.5, "{place}");
         }
         assert!(

@@ -1,8 +1,9 @@
-//! Whitewater: spray, foam and bubbles that a finished bake calls for (Ihmsen, Akinci, Akinci and Teschner 2012, "Unified spray,
-//! foam and air bubbles for particle-based fluids").
+//! Whitewater: spray, foam and bubbles, generated from a finished bake (Ihmsen, Akinci, Akinci and
+//! Teschner 2012, "Unified spray, foam and air bubbles for particle-based fluids").
 //!
-//! What happens to each whitewater particle between two frames is a pass on the GPU, with its f64 twin in
-//! `reference::whitewater`. Who is born and who dies is decided here, in f64 on the host, for both.
+//! The motion of whitewater particles between two frames is a pass on the GPU, with its f64
+//! reference in `reference::whitewater`. Births and deaths are decided here, in f64 on the host,
+//! for both.
 
 mod ages;
 mod seeds;
@@ -14,53 +15,56 @@ pub use ages::grow_older;
 pub use seeds::{Births, Source};
 pub use thresholds::{Potentials, Thresholds};
 
-/// Names of what a whitewater particle carries beside position, velocity and id, sorted as a frame has them.
+/// Names of a whitewater particle's attributes besides position, velocity and id, sorted as in
+/// a frame.
 pub const ATTRIBUTES: [&str; 4] = [AGE, KIND, LIFE, RADIUS];
-/// Seconds since its birth.
+/// Attribute: time since birth, seconds.
 pub const AGE: &str = "age";
-/// [`Kind`] as a number.
+/// Attribute: [`Kind`] as a number.
 pub const KIND: &str = "kind";
-/// Seconds that are left to it as foam.
+/// Attribute: remaining life as foam, seconds.
 pub const LIFE: &str = "life";
-/// Metres.
+/// Attribute: radius, metres.
 pub const RADIUS: &str = "radius";
 
-/// Support radius of all sums over water, in particle spacings.
+/// Support radius of all sums over water, particle spacings.
 pub const SUPPORT: f64 = 2.0;
-/// Share of water about a point below which it is in the air: about 0.6 spacings above a surface at rest.
+/// Share of water around a point below which it is in the air: about 0.6 spacings above a surface
+/// at rest.
 pub const AIR_BELOW: f64 = 0.15;
-/// Share of water above which it is under the surface: about half a spacing below one at rest.
+/// Share of water above which a point is under the surface: about half a spacing below one at rest.
 pub const WATER_ABOVE: f64 = 0.8;
-/// Length of the density's gradient times h from which a particle is at the surface, and that from which it fully is. A plane
-/// half a spacing above it gives 0.95, one and a half 0.02.
+/// Values of the density gradient's length times h at which a particle begins to count as at the
+/// surface, and at which it fully does. A plane half a spacing above it gives 0.95, one and a half
+/// spacings 0.02.
 pub const SURFACE: [f64; 2] = [0.3, 0.6];
-/// Cosine of the angle between velocity and normal from which a crest moves outward, and that from which it fully does; Ihmsen's
-/// 0.6 lies between.
+/// Cosines of the angle between velocity and normal at which a crest begins to count as moving
+/// outward, and at which it fully does; Ihmsen's 0.6 lies in between.
 pub const OUTWARD: [f64; 2] = [0.5, 0.7];
-/// Steps of a flight within a frame.
+/// Steps of a flight per frame.
 pub const FLIGHT_STEPS: u32 = 8;
-/// Halvings of a frame's way in the search of where it meets the surface.
+/// Bisection steps in the search for the point where a frame's path meets the surface.
 pub const HALVINGS: u32 = 5;
 
-/// What a whitewater particle is.
+/// Kind of a whitewater particle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// A drop in the air: it flies.
+    /// A drop in the air, which flies.
     Spray,
-    /// On the surface: water carries it.
+    /// Foam on the surface, which the water carries.
     Foam,
-    /// Air under the surface: it rises.
+    /// Air under the surface, which rises.
     Bubble,
 }
 
 impl Kind {
-    /// All three, in the order of their numbers.
+    /// All kinds, in the order of their numbers.
     pub const ALL: [Self; 3] = [Self::Spray, Self::Foam, Self::Bubble];
 
-    /// Shares at which one becomes another.
+    /// Shares of water at which one kind becomes another.
     pub const THRESHOLDS: [f64; 2] = [AIR_BELOW, WATER_ABOVE];
 
-    /// By the share of water about it.
+    /// Returns the kind for a share of water around a particle.
     pub fn of_share(share: f64) -> Self {
         if share < AIR_BELOW {
             Self::Spray
@@ -71,17 +75,17 @@ impl Kind {
         }
     }
 
-    /// Its number in frames and shaders.
+    /// Returns the kind's number in frames and shaders.
     pub fn number(self) -> f32 {
         self as u8 as f32
     }
 
-    /// That of a number; `None` where it is none of theirs.
+    /// Returns the kind with this number; `None` if there is none.
     pub fn of_number(number: f32) -> Option<Self> {
         Self::ALL.into_iter().find(|kind| kind.number() == number)
     }
 
-    /// In words.
+    /// Returns the kind's name in messages.
     pub fn name(self) -> &'static str {
         match self {
             Self::Spray => "spray",
@@ -91,36 +95,36 @@ impl Kind {
     }
 }
 
-/// What a stream of whitewater is made with: a settings file, its thresholds calibrated.
+/// Settings of a whitewater stream: a settings file with its thresholds calibrated.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
-    /// Of all random numbers.
+    /// Seed of all random numbers.
     pub seed: u32,
-    /// A frame with more ends the job.
+    /// Largest number of particles; a frame with more ends the job.
     pub max_particles: u32,
     /// Least and greatest radius of a whitewater particle, metres.
     pub radius: [f64; 2],
-    /// Born a second of one water particle where it traps all the air that it can.
+    /// Whitewater particles born per second at a water particle that traps air at the full rate.
     pub trapped_air_rate: f64,
-    /// The same at a full crest.
+    /// Whitewater particles born per second at a water particle on a full crest.
     pub wave_crest_rate: f64,
-    /// Of the three potentials.
+    /// Thresholds of the three potentials.
     pub thresholds: Thresholds,
-    /// Radius of the drops that a particle of spray stands for, which the air slows, metres.
+    /// Radius of the drops that a spray particle represents, metres; it determines their drag.
     pub drop_radius: f64,
-    /// Of the air, m/s.
+    /// Velocity of the air, m/s.
     pub wind: [f64; 3],
-    /// Least and greatest life of foam, seconds.
+    /// Least and greatest lifetime of foam, seconds.
     pub lifetime: [f64; 2],
-    /// Foam in a cube of one spacing from which on it dies faster.
+    /// Number of foam particles in a cube of one spacing above which foam dies faster.
     pub crowd: u32,
-    /// Of bubbles through still water, m/s.
+    /// Speed of bubbles through still water, m/s.
     pub rise_speed: f64,
-    /// In which a bubble takes on what water about it does, seconds.
+    /// Relaxation time of a bubble's velocity towards that of the water, seconds.
     pub response: f64,
 }
 
-/// Whitewater without a particle, ready for a frame.
+/// Returns an empty whitewater state, with all attributes.
 pub fn none() -> Particles {
     Particles {
         attributes: ATTRIBUTES.map(|name| (name.to_owned(), Vec::new())).into(),
@@ -128,7 +132,7 @@ pub fn none() -> Particles {
     }
 }
 
-/// So many of each kind.
+/// Counts the particles of each kind, in the order of [`Kind::ALL`].
 pub fn census(particles: &Particles) -> [usize; 3] {
     let kinds = particles
         .attributes
@@ -137,7 +141,8 @@ pub fn census(particles: &Particles) -> [usize; 3] {
     Kind::ALL.map(|kind| kinds.iter().filter(|&&k| k == kind.number()).count())
 }
 
-/// A number in 0..1 that belongs to these, as splitmix64 mixes them (Steele, Lea and Flood 2014).
+/// A pseudo-random number in 0..1 for these keys, mixed as in splitmix64 (Steele, Lea and
+/// Flood 2014).
 fn random(seed: u32, id: u32, frame: u32, channel: u32) -> f64 {
     let mut z = (u64::from(seed) << 32 | u64::from(id)).wrapping_mul(0x9E37_79B9_7F4A_7C15)
         ^ (u64::from(frame) << 32 | u64::from(channel)).wrapping_mul(0xD1B5_4A32_D192_ED03);
@@ -181,7 +186,8 @@ mod tests {
         let all: Vec<f64> = (0..4000).map(|id| random(1, id, 7, 0)).collect();
         let mean = all.iter().sum::<f64>() / 4000.0;
         let squares = all.iter().map(|x| (x - 0.5).powi(2)).sum::<f64>() / 4000.0;
-        // Standard errors of 4000 even numbers: 0.0046 of the mean, 0.0012 of the variance; four of each.
+        // Standard errors of 4000 uniform numbers: 0.0046 of the mean, 0.0012 of the variance; four
+        // of each are allowed.
         assert!((mean - 0.5).abs() < 0.019, "{mean}");
         assert!((squares - 1.0 / 12.0).abs() < 0.005, "{squares}");
         let other = [(2, 0, 7, 0), (1, 1, 7, 0), (1, 0, 8, 0), (1, 0, 7, 1)];

@@ -1,18 +1,19 @@
-//! Writers of files for other programs: bytes from a frame's mesh or particles, and nothing of where they go.
+//! Writers of files for other programs: bytes from a frame's mesh or particles, without
+//! file access.
 //!
-//! Each format stands in a file of its own. What opens what they write is a table in `docs/interchange.md`.
+//! Each format has its own file. `docs/interchange.md` lists the programs that open each format.
 
 pub mod mesh;
 pub mod table;
 pub mod usd;
 
-/// What a file says of where it comes from.
+/// Origin of a file, written into it as metadata.
 #[derive(Clone, Copy, Debug)]
 pub struct Source<'a> {
-    /// Program and version.
+    /// Name and version of the program.
     pub software: &'a str,
     /// Name of the shot.
     pub shot: &'a str,
-    /// Number of the frame.
+    /// Frame number.
     pub frame: u32,
 }

@@ -1,4 +1,4 @@
-//! Meshes as PLY and OBJ.
+//! Writes meshes as PLY and OBJ.
 
 use std::fmt::Write as _;
 
@@ -7,18 +7,20 @@ use glam::DVec3;
 use super::Source;
 use swell_domain::water_mesh::WaterMesh;
 
-/// A mesh and where it stands.
+/// A mesh and its position in the world.
 #[derive(Clone, Copy, Debug)]
 pub struct Placed<'a> {
-    /// With its velocities and normals.
+    /// The mesh with its velocities and normals.
     pub water: &'a WaterMesh,
-    /// World position of its zero, metres.
+    /// World position of the mesh's origin, metres.
     pub corner: DVec3,
-    /// Whether coordinates need 64 bits: the scene has an origin of its own, far off.
+    /// Whether coordinates need 64 bits, because the scene has an origin of its own far from
+    /// the world's.
     pub is_far: bool,
 }
 
-/// Binary little-endian PLY: x y z (`float`; `double` where the scene is far off), nx ny nz, vx vy vz in m/s; triangles.
+/// Writes binary little-endian PLY: x y z (`float`, or `double` for a scene far from the world's
+/// origin), nx ny nz, vx vy vz in m/s; triangles.
 pub fn ply(placed: &Placed<'_>, source: &Source<'_>) -> Vec<u8> {
     let &Placed { water, corner, .. } = placed;
     let kind = if placed.is_far { "double" } else { "float" };
@@ -66,7 +68,7 @@ fn put(out: &mut Vec<u8>, values: &[f32]) {
     }
 }
 
-/// Wavefront OBJ with normals. The format has no place for velocities.
+/// Writes Wavefront OBJ with normals. The format cannot hold velocities.
 pub fn obj(placed: &Placed<'_>, source: &Source<'_>) -> Vec<u8> {
     let &Placed { water, corner, .. } = placed;
     let Source {

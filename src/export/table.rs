@@ -1,4 +1,4 @@
-//! Particles as tables: NumPy's NPY, CSV, and Houdini's classic BGEO.
+//! Writes particles as tables: NumPy's NPY, CSV, and Houdini's classic BGEO.
 
 use std::fmt::Write as _;
 
@@ -11,8 +11,8 @@ fn world(particles: &Particles, index: usize, origin: DVec3) -> DVec3 {
     origin + DVec3::from_array(particles.position[index].map(f64::from))
 }
 
-/// NPY 1.0: an array of records `position` (3 `<f4`; `<f8` where the scene has an origin of its own), `velocity` (3 `<f4`), `id` (`<u4`)
-/// and each attribute (`<f4`).
+/// Writes NPY 1.0: an array of records `position` (3 `<f4`, or `<f8` for a scene with an origin of
+/// its own), `velocity` (3 `<f4`), `id` (`<u4`) and each attribute (`<f4`).
 pub fn npy(particles: &Particles, origin: DVec3) -> Vec<u8> {
     let is_far = origin != DVec3::ZERO;
     let place = if is_far { "<f8" } else { "<f4" };
@@ -25,7 +25,7 @@ pub fn npy(particles: &Particles, origin: DVec3) -> Vec<u8> {
         "{{'descr': [{kinds}], 'fortran_order': False, 'shape': ({},), }}",
         particles.len()
     );
-    // Magic, version, length of the header, and the header with its line end fill a multiple of 64 bytes.
+    // Magic, version, header length, and the header with its line end fill a multiple of 64 bytes.
     const BEFORE: usize = 10;
     let filled = (BEFORE + header.len() + 1).next_multiple_of(64);
     header.extend(std::iter::repeat_n(' ', filled - BEFORE - header.len() - 1));
@@ -56,7 +56,8 @@ fn put(out: &mut Vec<u8>, values: &[f32]) {
     }
 }
 
-/// A row a particle under the names `id,x,y,z,vx,vy,vz` and those of the attributes; numbers have as many digits as give their bits back.
+/// Writes CSV with one row per particle and the columns `id,x,y,z,vx,vy,vz` and the attributes;
+/// numbers have enough digits to restore their bits.
 pub fn csv(particles: &Particles, origin: DVec3) -> Vec<u8> {
     let mut out = "id,x,y,z,vx,vy,vz".to_owned();
     for name in particles.attributes.keys() {
@@ -83,21 +84,22 @@ pub fn csv(particles: &Particles, origin: DVec3) -> Vec<u8> {
     out.into_bytes()
 }
 
-/// Kinds of attributes in a BGEO.
+/// Attribute types of BGEO.
 mod kind {
     pub(super) const FLOAT: u32 = 0;
     pub(super) const INT: u32 = 1;
     pub(super) const VECTOR: u32 = 5;
 }
 
-/// Houdini's classic binary geometry, version 5, all big-endian: points with `v`, `id` and the attributes; no primitives. Coordinates have
-/// 32 bits.
+/// Writes Houdini's classic binary geometry, version 5, big-endian: points with `v`, `id` and the
+/// attributes; no primitives. Coordinates have 32 bits.
 pub fn bgeo(particles: &Particles, origin: DVec3) -> Vec<u8> {
     let mut out = b"BgeoV".to_vec();
     let word = |out: &mut Vec<u8>, x: u32| out.extend_from_slice(&x.to_be_bytes());
     word(&mut out, 5);
     let attributes = 2 + particles.attributes.len() as u32;
-    // Points, primitives, groups of both, attributes of points, vertices, primitives and the whole.
+    // Points, primitives, groups of both; attributes of points, vertices, primitives and
+    // the detail.
     for count in [particles.len() as u32, 0, 0, 0, attributes, 0, 0, 0] {
         word(&mut out, count);
     }
@@ -106,7 +108,7 @@ pub fn bgeo(particles: &Particles, origin: DVec3) -> Vec<u8> {
         out.extend_from_slice(name.as_bytes());
         out.extend_from_slice(&size.to_be_bytes());
         out.extend_from_slice(&kind.to_be_bytes());
-        // Defaults.
+        // Default values.
         out.extend(std::iter::repeat_n(0, 4 * usize::from(size)));
     };
     name(&mut out, "v", 3, kind::VECTOR);
@@ -126,7 +128,7 @@ pub fn bgeo(particles: &Particles, origin: DVec3) -> Vec<u8> {
             out.extend_from_slice(&x.to_be_bytes());
         }
     }
-    // No attributes of the whole, and the end of what follows the primitives.
+    // No detail attributes, and the end of the data after the primitives.
     out.extend_from_slice(&[0x00, 0xff]);
     out
 }

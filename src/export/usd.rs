@@ -1,7 +1,9 @@
-//! USD as text (usda), for shots: a root layer with all that stands or moves by rule, and a layer a frame that it plays as a value clip.
+//! Writes shots as USD text (usda): a root layer with everything static or animated by rule, and
+//! one layer per frame, played as value clips.
 //!
-//! Units are metres, up is y, a time code is a frame. What is in these layers is what OpenUSD's own validators ask for; names and
-//! semantics are those of UsdGeom's schemas and of the value clips' documentation.
+//! Units are metres, up is y, and a time code is a frame. The layers contain what OpenUSD's own
+//! validators ask for; names and semantics follow the schemas of UsdGeom and the documentation of
+//! value clips.
 
 mod text;
 
@@ -15,50 +17,51 @@ use swell_domain::{
 
 use text::{Text, asset, name, quoted};
 
-/// What all layers of a shot have in common.
+/// Properties that all layers of a shot share.
 #[derive(Clone, Copy, Debug)]
 pub struct Shot<'a> {
-    /// Name of the shot, and of what the water is called below it.
+    /// Program, shot name and frame; the shot's name is also that of the root prim.
     pub source: Source<'a>,
-    /// Of the prim that holds the water: `water`, or a stream's name.
+    /// Name of the prim that holds the water: `water`, or a stream's name.
     pub water: &'a str,
-    /// Frames a second.
+    /// Frames per second.
     pub frames_per_second: f64,
     /// First and last frame.
     pub frames: [u32; 2],
-    /// World position of the scene's zero, metres.
+    /// World position of the scene's origin, metres.
     pub origin: DVec3,
 }
 
-/// How a shot's water is told.
+/// Representation of a shot's water.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Kind {
-    /// As points.
+    /// Points.
     Points {
-        /// Diameter of each, metres; where `None` the attribute `radius` has half of it.
+        /// Diameter of each point, metres; if `None`, the attribute `radius` holds half of it.
         width: Option<f64>,
     },
-    /// As a mesh.
+    /// A mesh.
     Mesh,
 }
 
 /// A solid of the scene.
 #[derive(Clone, Debug)]
 pub struct Solid {
-    /// Made a valid and single name where it is none.
+    /// Name, which is made valid and unique if necessary.
     pub name: String,
-    /// Metres, about the scene's zero.
+    /// Mesh in metres, relative to the scene's origin.
     pub mesh: TriangleMesh,
-    /// Where it stands at each frame; empty for one that never moves.
+    /// Pose at each frame; empty for a static solid.
     pub way: Vec<(u32, Pose)>,
 }
 
 /// A wall of the domain that makes waves.
 #[derive(Clone, Debug)]
 pub struct WaveMaker {
-    /// Such as `wall_minus_x`.
+    /// Name, such as `wall_minus_x`.
     pub name: String,
-    /// Its four corners where it stands at the start, counter-clockwise seen from the water; metres about the scene's zero.
+    /// Four corners at the start, counter-clockwise seen from the water; metres, relative to the
+    /// scene's origin.
     pub corners: [DVec3; 4],
 }
 
@@ -67,44 +70,44 @@ pub struct WaveMaker {
 pub struct View {
     /// Frame number.
     pub frame: u32,
-    /// About the scene's zero.
+    /// Camera, relative to the scene's origin.
     pub eye: Eye,
-    /// Width of the picture on the film, mm.
+    /// Width of the image on the film, mm.
     pub film_width_mm: f64,
-    /// The lens's f-number and the distance that is sharp, metres; `None` of a pinhole.
+    /// The lens's f-number and focus distance, metres; `None` for a pinhole.
     pub lens: Option<[f64; 2]>,
 }
 
-/// What the root layer holds.
+/// Content of the root layer.
 #[derive(Clone, Debug)]
 pub struct Root<'a> {
-    /// The shot.
+    /// Properties of the shot.
     pub shot: Shot<'a>,
-    /// How the water is told.
+    /// Representation of the water.
     pub kind: Kind,
-    /// Attributes of the particles, by name; of points alone.
+    /// Names of the particles' attributes; used only for points.
     pub attributes: Vec<String>,
-    /// The layers of the frames, files beside the root; names without line ends.
+    /// File name of each frame's layer, beside the root; names must not contain line ends.
     pub layers: Vec<(u32, String)>,
-    /// The layer that says which attributes the frames' layers have.
+    /// File name of the layer that declares which attributes the frames' layers have.
     pub manifest: String,
-    /// Solids, those that move among them.
+    /// Solids, static and moving.
     pub solids: Vec<Solid>,
-    /// Walls that move; where they have come to stands in the layers of the frames.
+    /// Walls that move; their displacements are in the frames' layers.
     pub wave_makers: Vec<WaveMaker>,
-    /// Of a look; empty without one.
+    /// Camera of a look, per frame; empty without one.
     pub camera: Vec<View>,
 }
 
-/// An attribute of the water that has a value a frame.
+/// An attribute of the water with one value per frame.
 struct Sampled {
     kind: &'static str,
     name: String,
-    /// In parentheses behind the value; empty for none.
+    /// Metadata in parentheses after the value; empty for none.
     metadata: &'static str,
 }
 
-/// The attributes that layers of frames have of the water.
+/// Attributes of the water in the frames' layers.
 fn sampled(kind: Kind, attributes: &[String]) -> Vec<Sampled> {
     let of = |kind, name: &str, metadata| Sampled {
         kind,
@@ -134,7 +137,7 @@ fn sampled(kind: Kind, attributes: &[String]) -> Vec<Sampled> {
     all
 }
 
-/// What of the water is the same in all frames.
+/// Writes the attributes of the water that are the same in all frames.
 fn put_constants(text: &mut Text, kind: Kind) {
     match kind {
         Kind::Points { width: Some(width) } => {
@@ -154,7 +157,7 @@ fn schema(kind: Kind) -> &'static str {
     }
 }
 
-/// The first lines of a layer, up to its one prim's body.
+/// Writes the first lines of a layer, up to the body of its only prim.
 fn begin(text: &mut Text, shot: &Shot<'_>, what: &str, frames: [u32; 2]) {
     text.line("#usda 1.0");
     text.line("(");
@@ -177,7 +180,7 @@ fn begin(text: &mut Text, shot: &Shot<'_>, what: &str, frames: [u32; 2]) {
     text.line("");
 }
 
-/// Where a shot's prim stands.
+/// Writes the position of a shot's prim.
 fn put_origin(text: &mut Text, shot: &Shot<'_>) {
     if shot.origin != DVec3::ZERO {
         let at = text::triple(shot.origin);
@@ -186,7 +189,7 @@ fn put_origin(text: &mut Text, shot: &Shot<'_>) {
     }
 }
 
-/// The manifest of the clips: the attributes that layers of frames have, without values.
+/// Writes the manifest of the clips: the attributes of the frames' layers, without values.
 pub fn manifest(root: &Root<'_>) -> Vec<u8> {
     let mut text = Text::default();
     begin(
@@ -214,7 +217,7 @@ pub fn manifest(root: &Root<'_>) -> Vec<u8> {
     text.into_bytes()
 }
 
-/// The root layer.
+/// Writes the root layer.
 pub fn root(root: &Root<'_>) -> Vec<u8> {
     let shot = &root.shot;
     let mut text = Text::default();
@@ -299,7 +302,8 @@ fn put_solids(text: &mut Text, solids: &[Solid]) {
     text.close();
 }
 
-/// How a solid moves. One that turns does so about its point of rest, so that it stays on its arc between frames.
+/// Writes the motion of a solid. A solid that turns does so about its rest point, so that it stays
+/// on its arc between frames.
 fn put_way(text: &mut Text, way: &[(u32, Pose)]) {
     let Some((_, first)) = way.first() else {
         return;
@@ -342,7 +346,7 @@ fn put_wave_makers(text: &mut Text, makers: &[WaveMaker]) {
     text.close();
 }
 
-/// A mesh that keeps its shape.
+/// Writes a mesh of constant shape.
 fn put_mesh(text: &mut Text, vertices: &[DVec3], triangles: &[[u32; 3]]) {
     let points: Vec<[f32; 3]> = vertices.iter().map(|p| p.as_vec3().to_array()).collect();
     text.line(&format!("float3[] extent = {}", extent(&points, 0.0)));
@@ -365,7 +369,8 @@ fn put_camera(text: &mut Text, views: &[View]) {
         return;
     };
     let [width, height] = first.eye.size.map(f64::from);
-    // Of a camera USD has lengths of the film in tenths of the scene's unit, here of a metre; millimetres are hundredths of these.
+    // USD measures the film in tenths of the scene's unit, here of a metre; a millimetre is a
+    // hundredth of that.
     let film = first.film_width_mm / 100.0;
     text.open("def Camera \"camera\"");
     text.line("float2 clippingRange = (0.01, 100000)");
@@ -385,7 +390,7 @@ fn put_camera(text: &mut Text, views: &[View]) {
     text.samples("float focalLength", &focal);
     if views.iter().any(|view| view.eye.axis != [0.0; 2]) {
         for (axis, name, sign) in [(0, "horizontal", -1.0), (1, "vertical", 1.0)] {
-            // Of the film's middle off the axis, to the right and up.
+            // Offset of the film's centre from the axis, to the right and up.
             let offset = |view: &View| sign * view.eye.axis[axis] / width * film;
             let offsets = samples(&|view| (offset(view) as f32).to_string());
             text.samples(&format!("float {name}ApertureOffset"), &offsets);
@@ -414,7 +419,7 @@ fn put_camera(text: &mut Text, views: &[View]) {
     text.close();
 }
 
-/// The box of these points with a margin, metres; at zero without points.
+/// Bounding box of the points with a margin, metres; at zero without points.
 fn extent(points: &[[f32; 3]], margin: f64) -> String {
     let bounds = Bounds::of_points(points.iter().map(|&p| Vec3::from(p).as_dvec3()));
     let [min, max] = bounds.map_or([DVec3::ZERO; 2], |b| [b.min - margin, b.max + margin]);
@@ -422,16 +427,17 @@ fn extent(points: &[[f32; 3]], margin: f64) -> String {
     format!("[{}, {}]", corner(min), corner(max))
 }
 
-/// A frame's water.
+/// The water of a frame.
 #[derive(Clone, Copy, Debug)]
 pub enum Water<'a> {
-    /// As points, about the scene's zero.
+    /// Points, relative to the scene's origin.
     Points(&'a Particles),
-    /// As a mesh, whose zero lies so many metres from the scene's.
+    /// A mesh, and the position of its origin relative to the scene's, metres.
     Mesh(&'a WaterMesh, DVec3),
 }
 
-/// The layer of a frame: the water, and how far each wave maker has come, metres. It opens by itself as well.
+/// Writes the layer of a frame: the water, and the displacement of each wave maker, metres. The
+/// layer can also be opened without the root.
 pub fn frame(
     shot: &Shot<'_>,
     kind: Kind,

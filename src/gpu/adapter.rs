@@ -1,4 +1,4 @@
-//! Finding an adapter and opening a device on it.
+//! Finds adapters and opens devices on them.
 
 use std::sync::{Arc, Mutex};
 
@@ -6,10 +6,10 @@ use wgpu::{Adapter, AdapterInfo, Backends, Device, Features, Instance, Limits, Q
 
 use super::{compiled::Compiled, shader::Shaders};
 
-/// What goes wrong between the program and the device.
+/// Error between the program and the device.
 #[derive(Debug, thiserror::Error)]
 pub enum GpuError {
-    /// No adapter at all.
+    /// There is no adapter.
     #[error(
         "no GPU adapter found; install a Vulkan driver (software: Debian and Ubuntu `mesa-vulkan-drivers`, \
          Fedora `mesa-vulkan-drivers`, Arch `vulkan-swrast`)"
@@ -21,39 +21,39 @@ pub enum GpuError {
         list(available)
     )]
     NoSuchAdapter {
-        /// What was asked for.
+        /// The request.
         request: String,
-        /// Names of those that there are, in the order of their numbers.
+        /// Names of the available adapters, in the order of their numbers.
         available: Vec<String>,
     },
-    /// The adapter refused to open.
+    /// The adapter refused to open a device.
     #[error("adapter {adapter} refused a device: {message}")]
     Open {
         /// Adapter name.
         adapter: String,
-        /// The driver's words.
+        /// Message of the driver.
         message: String,
     },
-    /// The device was lost or reported an error that no one can answer.
+    /// The device was lost or reported an error without a handler.
     #[error("device lost: {0}")]
     Lost(String),
-    /// A shader of ours does not compose or does not compile.
+    /// A shipped shader does not compose or compile.
     #[error("shader {name}: {message}")]
     Shader {
         /// Shader path.
         name: String,
-        /// Where and what.
+        /// Position and message.
         message: String,
     },
-    /// A shader of the folder that `--shaders` names does not compose or does not compile.
+    /// A shader of the `--shaders` folder does not compose or compile.
     #[error("shader {name} of --shaders: {message}")]
     EditedShader {
         /// Shader path.
         name: String,
-        /// Where and what.
+        /// Position and message.
         message: String,
     },
-    /// 64-bit floats are asked for, and there are none.
+    /// 64-bit floats were requested, but the adapter has none.
     #[error(
         "{adapter} has no 64-bit floats in shaders (SHADER_F64), which precision = \"f64\" asks for; \"f32_refined\" \
          needs none"
@@ -62,33 +62,33 @@ pub enum GpuError {
         /// Adapter name.
         adapter: String,
     },
-    /// A pass binds more buffers than the adapter does.
+    /// A pass binds more storage buffers than the adapter supports.
     #[error(
         "pass {pass} binds {needed} storage buffers, and {adapter} allows {allowed} (max_storage_buffers_per_shader_stage); use \
          another adapter or a newer driver (of llvmpipe Mesa 22.3), or bake with --device cpu"
     )]
     TooManyBuffers {
-        /// Its name.
+        /// Pass name.
         pass: String,
-        /// Buffers of the pass.
+        /// Number of storage buffers of the pass.
         needed: u32,
-        /// Buffers that the adapter binds.
+        /// Number that the adapter supports.
         allowed: u32,
         /// Adapter name.
         adapter: String,
     },
-    /// A buffer is larger than the adapter binds.
+    /// A buffer is larger than the adapter supports.
     #[error(
         "buffer `{buffer}` needs {needed} bytes, and {adapter} allows {allowed} ({limit}); make the scene or the picture smaller or coarser"
     )]
     TooLarge {
         /// Buffer name in the plan.
         buffer: String,
-        /// Bytes wanted.
+        /// Bytes needed.
         needed: u64,
         /// Bytes allowed.
         allowed: u64,
-        /// Name of the limit.
+        /// Name of the wgpu limit.
         limit: &'static str,
         /// Adapter name.
         adapter: String,
@@ -102,61 +102,64 @@ pub struct Context {
     pub device: Device,
     /// Its queue.
     pub queue: Queue,
-    /// Name, driver, backend.
+    /// Name, driver and backend of the adapter.
     pub info: AdapterInfo,
-    /// What the device was opened with: the adapter's own limits, unless they were lowered.
+    /// Limits of the device: those of the adapter, unless they were lowered.
     pub limits: Limits,
-    /// Whether passes can be timed on the device.
+    /// Whether passes can be timed with device timestamps.
     pub has_timestamps: bool,
-    /// Whether passes may compute in f64: only where that was asked for.
+    /// Whether passes may compute in f64; only if that was requested.
     pub has_f64: bool,
-    /// What passes are composed from.
+    /// Shaders that passes are composed from.
     pub shaders: Shaders,
-    /// Whether timers also count operations, by running passes again that do so: for the first run of a dispatch and one in seven after it, which then
-    /// take as long again.
+    /// Whether timers also count operations. That runs an instrumented version of a pass at
+    /// the first run of a dispatch and at one in seven after it, each of which then takes
+    /// twice as long.
     pub counts_operations: bool,
-    /// A fault put into one pass, so that a comparison can be seen to fail; `None` in every command.
+    /// A fault injected into one pass, to show that a comparison detects it; `None` in
+    /// every command.
     pub spoil: Option<Spoil>,
-    /// Passes that were compiled on this device.
+    /// Passes compiled on this device.
     pub(super) compiled: Arc<Compiled>,
     fault: Arc<Mutex<Option<String>>>,
 }
 
-/// A text of one pass, imports pasted, that is replaced before it compiles.
+/// A text replacement in one pass, with imports included, before it is compiled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Spoil {
-    /// Pass name. Where a pass `NAME_dry` does some of the work of pass `NAME`, it gets the same fault.
+    /// Pass name. If a pass `NAME_dry` does part of the work of pass `NAME`, it gets the
+    /// same fault.
     pub pass: &'static str,
-    /// Has to occur in it.
+    /// Text to replace; it must occur in the pass.
     pub from: &'static str,
-    /// Stands there instead.
+    /// Replacement.
     pub to: &'static str,
 }
 
 fn instance() -> Instance {
     let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle_from_env();
     descriptor.backends &= Backends::VULKAN | Backends::METAL | Backends::DX12;
-    // It would put a pass of its own before each indirect dispatch, of which a pressure solve has hundreds; their
-    // sizes are our own and within the limits.
+    // The validation would insert a pass of its own before each indirect dispatch, of which a
+    // pressure solve has hundreds; their sizes are our own and within the limits.
     descriptor
         .flags
         .remove(wgpu::InstanceFlags::VALIDATION_INDIRECT_CALL);
     Instance::new(descriptor)
 }
 
-/// Every adapter of this machine, in the driver's order, which `--adapter` indexes.
+/// Lists all adapters of this machine in the driver's order, which `--adapter` indexes.
 pub fn enumerate() -> Vec<Adapter> {
     pollster::block_on(instance().enumerate_adapters(Backends::all()))
 }
 
-/// What a device is opened for, beyond what every pass needs.
+/// Features that a device is opened for, beyond those of every pass.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Needs {
-    /// Passes that compute in f64.
+    /// Whether passes compute in f64.
     pub f64: bool,
 }
 
-/// Those that are used where they are offered, and those that are needed; `None` where one of the latter is missing.
+/// Optional features that are offered, plus required ones; `None` if a required one is missing.
 fn features(offered: Features, needs: Needs) -> Option<Features> {
     let used = offered & (Features::TIMESTAMP_QUERY | Features::FLOAT32_FILTERABLE);
     match needs.f64 {
@@ -165,17 +168,17 @@ fn features(offered: Features, needs: Needs) -> Option<Features> {
     }
 }
 
-/// Whether shaders may compute in f64 on an adapter.
+/// Returns whether shaders can compute in f64 on an adapter.
 pub fn has_f64(adapter: &Adapter) -> bool {
     adapter.features().contains(Features::SHADER_F64)
 }
 
-/// Whether passes can be timed on an adapter.
+/// Returns whether passes can be timed with device timestamps on an adapter.
 pub fn has_timestamps(adapter: &Adapter) -> bool {
     adapter.features().contains(Features::TIMESTAMP_QUERY)
 }
 
-/// A line each: number and name.
+/// Formats names with their numbers, one per line.
 fn list(names: &[String]) -> String {
     let lines = names.iter().enumerate();
     lines
@@ -183,8 +186,8 @@ fn list(names: &[String]) -> String {
         .collect()
 }
 
-/// Which of `names` a request is for. Digits alone are a number and never a part of a name: names hold versions, as in
-/// "llvmpipe (LLVM 15.0.6, 256 bits)".
+/// Index of the name that a request selects. Digits alone are an index and never part of a name,
+/// because names contain versions, as in "llvmpipe (LLVM 15.0.6, 256 bits)".
 fn position(names: &[String], request: &str) -> Option<usize> {
     let wanted = request.trim().to_lowercase();
     if wanted.is_empty() {
@@ -210,7 +213,7 @@ fn find(names: Vec<String>, request: &str) -> Result<usize, GpuError> {
     })
 }
 
-/// Whether this machine has the adapter that `request` names; nothing is opened.
+/// Checks that this machine has the adapter that `request` names, without opening it.
 ///
 /// # Errors
 /// [`GpuError::NoAdapter`], [`GpuError::NoSuchAdapter`].
@@ -227,7 +230,7 @@ fn choose(mut adapters: Vec<Adapter>, request: Option<&str>) -> Result<Adapter, 
         return Err(GpuError::NoAdapter);
     }
     let Some(request) = request else {
-        // A real GPU before the software adapter; the order within a kind is the driver's.
+        // Hardware before software adapters; within a kind, the driver's order.
         adapters.sort_by_key(|adapter| match adapter.get_info().device_type {
             wgpu::DeviceType::DiscreteGpu => 0,
             wgpu::DeviceType::IntegratedGpu => 1,
@@ -241,8 +244,8 @@ fn choose(mut adapters: Vec<Adapter>, request: Option<&str>) -> Result<Adapter, 
 }
 
 impl Context {
-    /// Opens the adapter that `request` names (digits alone are its number, anything else a part of its name), or the best
-    /// there is.
+    /// Opens the adapter that `request` names (digits alone are its number, anything else a part of
+    /// its name), or the best one.
     ///
     /// # Errors
     /// [`GpuError::NoAdapter`], [`GpuError::NoSuchAdapter`], [`GpuError::Open`].
@@ -250,7 +253,8 @@ impl Context {
         Self::open_for(request, Needs::default())
     }
 
-    /// The same for passes with these needs; no feature is enabled that they do not ask for.
+    /// Same as [`Self::open`] for passes with these needs; enables no feature that they do not
+    /// ask for.
     ///
     /// # Errors
     /// Those of [`Self::open`], and [`GpuError::NoF64`].
@@ -258,11 +262,11 @@ impl Context {
         Self::open_lowered(request, needs, |_| {})
     }
 
-    /// The same on a device with less than the adapter has: `lower` takes its limits down. What then passes them is an
-    /// error of the device, as it would be on an adapter that has no more.
+    /// Same as [`Self::open_for`] on a device with lower limits than the adapter has, as set by
+    /// `lower`. Exceeding them is then an error of the device, as on an adapter with these limits.
     ///
     /// # Errors
-    /// Those of [`Self::open_for`]; [`GpuError::Open`] for a limit above the adapter's own.
+    /// Those of [`Self::open_for`]; [`GpuError::Open`] for a limit above that of the adapter.
     pub fn open_lowered(
         request: Option<&str>,
         needs: Needs,
@@ -313,7 +317,7 @@ impl Context {
         })
     }
 
-    /// Fails when the device was lost or has reported an error since it was opened.
+    /// Fails if the device was lost or has reported an error since it was opened.
     ///
     /// # Errors
     /// [`GpuError::Lost`] with the first message.
@@ -326,10 +330,10 @@ impl Context {
         }
     }
 
-    /// Waits until everything submitted is done.
+    /// Waits until all submitted work is done.
     ///
     /// # Errors
-    /// [`GpuError::Lost`].
+    /// [`GpuError::Lost`] if the device was lost or has reported an error.
     pub fn wait(&self) -> Result<(), GpuError> {
         self.device
             .poll(wgpu::PollType::wait_indefinitely())
@@ -356,7 +360,7 @@ mod tests {
             ("0", Some(0)),
             ("1", Some(1)),
             ("02", Some(2)),
-            // In the first name's version, in the second's and third's model.
+            // Digits within the first name's version, and within the second's and third's model.
             ("5", None),
             ("15", None),
             ("256", None),

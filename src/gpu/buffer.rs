@@ -1,7 +1,7 @@
-//! Buffers by name and by the type of what they hold.
+//! Typed names of buffers.
 //!
-//! A buffer is declared once, as a constant, and read and written through it, so that no place types its name, its
-//! element's size or its element's type a second time:
+//! A buffer is declared once, as a constant, and read and written through it, so that its name,
+//! element type and element size are written in a single place:
 //!
 //! ```text
 //! pub const VELOCITY: Buf<[f32; 3]> = Buf::new("velocity");
@@ -9,14 +9,14 @@
 //! let (velocity, id) = program.download((VELOCITY.first(n), ID.first(n)))?;
 //! ```
 //!
-//! `tests/shaders.rs` holds each element type against the WGSL variable of the buffer's name: its stride, and what
-//! scalars it is of.
+//! `tests/suite/gpu/shaders.rs` checks each element type against the WGSL variable with the
+//! buffer's name: its stride and its scalars.
 
 use std::{borrow::Cow, marker::PhantomData};
 
 use super::{program::BufferSpec, reflect::Layout};
 
-/// Scalars of which a value is made.
+/// Scalar type of the components of a value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scalar {
     /// `f32`.
@@ -25,13 +25,13 @@ pub enum Scalar {
     F64,
     /// `u32`.
     U32,
-    /// Several kinds, as in a struct, whose members [`Mirror::layout`] names.
+    /// Several types, as in a struct, whose members [`Mirror::layout`] lists.
     Mixed,
 }
 
-/// A value of plain bits that is the same on the device.
+/// A plain-old-data value with the same layout on the device.
 pub trait Element: bytemuck::Pod {
-    /// What it is made of.
+    /// Scalar type of its components.
     const SCALAR: Scalar;
 }
 
@@ -54,24 +54,25 @@ where
     const SCALAR: Scalar = T::SCALAR;
 }
 
-/// What a buffer holds, for comparison with the shaders' variable of its name.
+/// Element layout of a buffer, for comparison with the shader variable of its name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Held {
-    /// Of a value.
+    /// Bytes per value.
     pub bytes: u32,
-    /// What a value is made of.
+    /// Scalar type of a value's components.
     pub scalar: Scalar,
     /// Bytes before the first value.
     pub head: u32,
 }
 
-/// A struct that the shaders have too, under the same name.
+/// A struct that also exists in the shaders under the same name.
 pub trait Mirror: Element {
-    /// Name, size and members, for comparison with what naga makes of the shader's.
+    /// Returns name, size and members, for comparison with the reflection of the shader's struct.
     fn layout() -> Layout;
 }
 
-/// Declares `repr(C)` structs that mirror WGSL's of the same name, or of the one given after `as`.
+/// Declares `repr(C)` structs that mirror the WGSL struct of the same name, or the one given
+/// after `as`.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! mirror {
@@ -101,11 +102,11 @@ macro_rules! mirror {
 
 pub use crate::mirror;
 
-/// Workgroups of an indirect dispatch, a `vec4u` of the shaders; zeros make it empty.
+/// Workgroup counts of an indirect dispatch, a `vec4u` in shaders; zeros make it empty.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct Workgroups {
-    /// Along each axis.
+    /// Count along each axis.
     pub count: [u32; 3],
     /// Unused.
     pub padding: u32,
@@ -121,11 +122,11 @@ impl From<[u32; 3]> for Workgroups {
     }
 }
 
-/// A buffer of values of `T`.
+/// Name and element type of a buffer of `T` values.
 #[derive(Debug)]
 pub struct Buf<T> {
     name: Cow<'static, str>,
-    /// Bytes before the first of them.
+    /// Bytes before the first value.
     offset: u64,
     is_uniform: bool,
     of: PhantomData<fn() -> T>,
@@ -141,22 +142,22 @@ impl<T> Clone for Buf<T> {
 }
 
 impl<T> Buf<T> {
-    /// A storage buffer; a shader variable of this name binds it.
+    /// A storage buffer; shader variables of this name bind it.
     pub const fn new(name: &'static str) -> Self {
         Self::of(Cow::Borrowed(name), false)
     }
 
-    /// A uniform.
+    /// A uniform buffer; shader variables of this name bind it.
     pub const fn uniform(name: &'static str) -> Self {
         Self::of(Cow::Borrowed(name), true)
     }
 
-    /// A storage buffer whose name is made while the program runs, as one of several of a kind.
+    /// A storage buffer whose name is built at run time, as one of several of a kind.
     pub const fn named(name: String) -> Self {
         Self::of(Cow::Owned(name), false)
     }
 
-    /// What stands behind one value of `Head` in a storage buffer.
+    /// The values that follow one `Head` value in a storage buffer.
     pub const fn behind<Head>(name: &'static str) -> Self {
         Self {
             name: Cow::Borrowed(name),
@@ -175,12 +176,12 @@ impl<T> Buf<T> {
         }
     }
 
-    /// Its name.
+    /// Returns the name.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// One of another name that holds the same.
+    /// Returns the same buffer description under another name.
     pub fn renamed(&self, name: &str) -> Self {
         Self {
             name: Cow::Owned(name.to_owned()),
@@ -188,7 +189,7 @@ impl<T> Buf<T> {
         }
     }
 
-    /// The same bytes as values of another type.
+    /// Returns the same bytes as values of another type.
     pub fn retyped<U>(&self) -> Buf<U> {
         Buf {
             name: self.name.clone(),
@@ -198,7 +199,7 @@ impl<T> Buf<T> {
         }
     }
 
-    /// The first `count` values, to be read.
+    /// Selects the first `count` values for reading.
     pub fn first(self, count: usize) -> First<T> {
         First {
             buffer: self,
@@ -206,14 +207,14 @@ impl<T> Buf<T> {
         }
     }
 
-    /// Where value `index` begins, bytes.
+    /// Byte offset of value `index`.
     pub(super) fn place(&self, index: usize) -> u64 {
         self.offset + (index * size_of::<T>()) as u64
     }
 }
 
 impl<T: Element> Buf<T> {
-    /// One that holds `count` values.
+    /// Describes an allocation with space for `count` values.
     pub fn sized(&self, count: usize) -> BufferSpec {
         BufferSpec {
             name: self.name.clone().into_owned(),
@@ -229,9 +230,9 @@ impl<T: Element> Buf<T> {
     }
 }
 
-/// A uniform of which each dispatch binds one value of `T`.
+/// A uniform buffer of which each dispatch binds one value of `T`, its window.
 ///
-/// Values stand a stride apart that is the largest offset alignment that WebGPU lets an adapter ask for.
+/// Windows are spaced by the largest offset alignment that WebGPU allows an adapter to require.
 #[derive(Debug)]
 pub struct Windows<T> {
     variable: &'static str,
@@ -239,11 +240,11 @@ pub struct Windows<T> {
     of: PhantomData<fn() -> T>,
 }
 
-/// Bytes between the beginnings of windows.
+/// Bytes from one window to the next.
 const STRIDE: usize = 256;
 
 impl<T> Windows<T> {
-    /// Windows of buffer `name`, which shader variable `variable` binds.
+    /// Windows of buffer `name`, bound by shader variable `variable`.
     pub const fn new(variable: &'static str, name: &'static str) -> Self {
         Self {
             variable,
@@ -252,7 +253,7 @@ impl<T> Windows<T> {
         }
     }
 
-    /// The same of a name that is made while the program runs.
+    /// Same with a name that is built at run time.
     pub const fn named(variable: &'static str, name: String) -> Self {
         Self {
             variable,
@@ -261,12 +262,12 @@ impl<T> Windows<T> {
         }
     }
 
-    /// Name of the buffer.
+    /// Returns the name of the buffer.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// Name of the variable.
+    /// Returns the name of the shader variable.
     pub fn variable(&self) -> &'static str {
         self.variable
     }
@@ -283,7 +284,7 @@ impl<T> Windows<T> {
 }
 
 impl<T: Element> Windows<T> {
-    /// A buffer of `count` windows.
+    /// Describes an allocation of `count` windows.
     pub fn sized(&self, count: usize) -> BufferSpec {
         BufferSpec {
             name: self.name.clone().into_owned(),
@@ -298,7 +299,7 @@ impl<T: Element> Windows<T> {
         }
     }
 
-    /// Bytes of a buffer that holds `values`, one a window.
+    /// Returns the bytes of a buffer that holds `values`, one per window.
     pub fn bytes(values: &[T]) -> Vec<u8> {
         let mut bytes = vec![0; values.len() * STRIDE];
         for (window, value) in bytes.chunks_exact_mut(STRIDE).zip(values) {
@@ -308,22 +309,22 @@ impl<T: Element> Windows<T> {
     }
 }
 
-/// The first values of a buffer.
+/// Selects the first values of a buffer.
 #[derive(Clone, Debug)]
 pub struct First<T> {
     pub(super) buffer: Buf<T>,
     pub(super) count: usize,
 }
 
-/// What is read from the device at once: [`Buf::first`] of one buffer, or a tuple of those of several.
+/// Data read back together: [`Buf::first`] of one buffer, or a tuple of those of several.
 pub trait Wanted {
-    /// Vectors of values, one a buffer.
+    /// One vector of values per buffer.
     type Values;
 
-    /// Name, first byte and bytes of each.
+    /// Returns name, byte offset and length in bytes of each buffer's part.
     fn spans(&self) -> Vec<(&str, u64, usize)>;
 
-    /// The values from the bytes of each, in the same order.
+    /// Converts the bytes of each part to values, in the same order.
     fn values(bytes: &mut dyn Iterator<Item = &[u8]>) -> Self::Values;
 }
 

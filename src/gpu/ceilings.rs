@@ -1,4 +1,4 @@
-//! What a device gives at most, measured: what passes are held against.
+//! Measures the peak performance of a device, with which passes are compared.
 
 use super::{
     adapter::{Context, GpuError},
@@ -12,32 +12,36 @@ use super::{
 const COPYING: &str = "measure/copy";
 const COPIED: Buf<[f32; 4]> = Buf::new("copied");
 const COPY: Buf<[f32; 4]> = Buf::new("copy");
-/// Bytes of each of the two buffers where the adapter binds so many: more than the caches of today's processors and GPUs hold.
+/// Bytes of each of the two buffers, if the adapter supports it: more than the caches of today's
+/// processors and GPUs.
 const BYTES: u64 = 256 << 20;
 
 const COMPUTING: &str = "measure/arithmetic";
 const ESCAPED: Buf<[f32; 4]> = Buf::new("escaped");
-/// Threads of the first try, and of the last.
+/// Threads of the first and of the last attempt.
 const THREADS: [usize; 2] = [1 << 14, 1 << 24];
-/// A run that takes as long is long enough to be told from its start, seconds.
+/// Run time that is long enough to be distinguished from the launch overhead, seconds.
 const LONG: f64 = 0.02;
 
-/// The first run pays for pages that were never touched.
+/// Number of runs; the first one pays for pages that were never touched.
 const RUNS: usize = 6;
 
-/// The ceilings of a device, as in the roofline model (Williams, Waterman and Patterson 2009).
+/// Peak performance of a device, as in the roofline model (Williams, Waterman and Patterson 2009).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ceilings {
-    /// Bytes a second that a pass reaches which reads one buffer and writes another (McCalpin 1995, copy).
+    /// Bytes per second of a pass that reads one buffer and writes another (McCalpin 1995, copy).
     pub bandwidth: f64,
-    /// Operations a second ([`super::operations::Operations`]) of a pass that multiplies and adds f32 and does nothing else.
+    /// Operations per second ([`super::operations::Operations`]) of a pass that only multiplies and
+    /// adds f32.
     pub arithmetic: f64,
-    /// Seconds that a pass of one workgroup takes with next to nothing to do, by the clock that times passes.
+    /// Time of a pass with one workgroup and next to no work, seconds, by the clock that
+    /// times passes.
     pub start: f64,
 }
 
 impl Ceilings {
-    /// The best of some runs of each. Two buffers of up to 256 MiB are made for it, and given back.
+    /// Measures the best of several runs of each. Temporarily allocates two buffers of up to
+    /// 256 MiB.
     ///
     /// # Errors
     /// [`GpuError::Shader`], [`GpuError::Lost`].
@@ -78,7 +82,8 @@ fn arithmetic(context: &Context) -> Result<f64, GpuError> {
     })
 }
 
-/// The greatest of what `told` makes of seconds, bytes and operations of single runs of a pass over so many threads.
+/// Largest value of `told(seconds, bytes, operations)` over single runs of a pass with
+/// `threads` threads.
 fn best(
     program: &Program,
     pass: &'static str,

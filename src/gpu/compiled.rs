@@ -11,8 +11,9 @@ use super::{
     raster::{RasterPass, RasterSpec},
 };
 
-/// Compiled passes of one device. A program reuses every pass that an earlier program on the device compiled. Edited shaders are
-/// not cached, because each program checks them against its own buffers.
+/// Compiled passes of one device. A program reuses every pass that an earlier program on the
+/// device compiled. Edited shaders are not cached, because each program checks them against its
+/// own buffers.
 #[derive(Debug, Default)]
 pub(super) struct Compiled {
     passes: Mutex<BTreeMap<PassKey, Arc<Pass>>>,
@@ -26,8 +27,8 @@ type PassKey = (&'static str, Vec<(&'static str, u64)>, String);
 type RasterKey = (&'static str, String);
 
 impl Compiled {
-    /// Returns the compute pass with this name, text and constants, and compiles it by `make` if there is none. Constants that the
-    /// text does not name are ignored.
+    /// Returns the compute pass with this name, text and constants, and compiles it by `make` if
+    /// there is none. Constants that the text does not name are ignored.
     pub(super) fn pass<'a>(
         &self,
         name: &'static str,

@@ -1,15 +1,16 @@
-//! What an edited shader may not change: the buffers that the program binds to it, and how they are laid out.
+//! Checks what an edited shader must not change: the buffers that the program binds to it, and
+//! their layout.
 
 use super::{
     program::BufferSpec,
     reflect::{Access, Binding, ElementType, Layout, Reflection},
 };
 
-/// Holds the bindings of an edited pass against those of the shipped one. A binding that the shipped pass has not may be
-/// any of the program's `buffers`.
+/// Compares the bindings of an edited pass with those of the shipped one. A binding that the
+/// shipped pass lacks may be any of the program's `buffers`.
 ///
 /// # Errors
-/// The first misfit in words.
+/// A message about the first mismatch.
 pub(super) fn check(
     edited: &Reflection,
     shipped: &Reflection,
@@ -53,7 +54,7 @@ pub(super) fn check(
     Ok(())
 }
 
-/// Whether a binding is of the kind and size that the program has.
+/// Checks that a binding has the kind and size that the program expects.
 fn same_element(binding: &Binding, access: Access, known: &ElementType) -> Result<(), String> {
     let (name, now) = (&binding.name, &binding.element);
     let is_same_kind =
@@ -81,7 +82,7 @@ fn same_element(binding: &Binding, access: Access, known: &ElementType) -> Resul
     ))
 }
 
-/// Whether a struct's members lie where the program has those of the same names.
+/// Checks that a struct's members have the offsets of the program's members of the same names.
 fn same_layout(now: &Layout, before: &Layout) -> Result<(), String> {
     for (member, offset) in &now.members {
         let known = before.members.iter().find(|(name, _)| name == member);
@@ -112,7 +113,7 @@ mod tests {
             let use_all = params.step * velocity[0].x;\n\
         }\n";
 
-    /// A pass with texts of the shipped one replaced.
+    /// Checks the shipped pass after text replacements.
     fn checked(edits: &[(&str, &str)]) -> Result<(), String> {
         let mut text = SHIPPED.to_owned();
         for (from, to) in edits {
@@ -168,7 +169,7 @@ mod tests {
         }
     }
 
-    /// Controls: edits that leave the program its buffers.
+    /// Controls: edits that keep the program's buffers.
     #[test]
     fn another_buffer_of_the_program_and_other_statements_are_fine() {
         for edits in [

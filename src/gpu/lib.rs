@@ -1,4 +1,4 @@
-//! Everything that touches the device and knows nothing of fluids.
+//! GPU layer: devices, shaders, buffers and recorded passes, independent of fluids.
 
 pub mod adapter;
 pub mod buffer;

@@ -1,8 +1,9 @@
-//! How many operations a pass does, counted by the pass itself.
+//! Counts the operations of a pass by instrumenting it.
 //!
-//! A second form of the pass adds up, beside its work, what it computes: each statement adds the operations of the expressions that it
-//! evaluates, as naga parsed them, so that loops count as often as they go round and branches only where they are taken. It runs
-//! on copies of whatever the pass writes: the state stays as it is.
+//! An instrumented version of the pass adds up what it computes beside its work: each statement
+//! adds the operations of the expressions that it evaluates, as parsed by naga, so that loops count
+//! once per iteration and branches only where they are taken. It writes to copies of the buffers
+//! that the pass writes, so the state does not change.
 
 use naga::{
     BinaryOperator, Block, Expression, Function, GlobalVariable, Handle, Literal, MathFunction,
@@ -18,18 +19,20 @@ use super::{
     reflect,
 };
 
-/// Operations on floats and on integers, of each component of a vector. A multiplication, addition, division, comparison, minimum, root,
-/// exponential or sine is one, as are those on bits; `fma` is two, and a function of vectors what its formula has (`dot` of three
-/// components five). Loads, stores, atomics, conversions, choices, swizzles and logic of bools are none. What a compiler then leaves
-/// out or does once for all threads is counted nevertheless.
+/// Operations on floats and on integers, for each component of a vector. Multiplication, addition,
+/// division, comparison, minimum, square root, exponential and sine count as one, as do bit
+/// operations; `fma` counts as two, and a vector function as its formula (`dot` of three
+/// components is five). Loads, stores, atomics, conversions, selections, swizzles and boolean
+/// logic do not count. Operations that a compiler later removes or shares among threads are
+/// counted nevertheless.
 pub type Operations = [u64; 2];
 
-/// Binding of the sums, far behind those of passes.
+/// Binding index of the sums, far beyond those of passes.
 const BINDING: u32 = 99;
 const FLOATS: &str = "counted_floats";
 const INTEGERS: &str = "counted_integers";
 const TELL: &str = "tell_counted";
-/// Sums of all threads are of two words each, the lower first.
+/// Sums over all threads, two words each, the lower first.
 const SUMS: &str = "
 @group(0) @binding(99) var<storage, read_write> counted_operations: array<atomic<u32>, 4>;
 var<private> counted_floats: u32;
@@ -46,7 +49,7 @@ fn tell_counted() {
 }
 ";
 
-/// The form of a pass that counts.
+/// Instrumented version of a pass, which counts operations.
 #[derive(Debug)]
 pub(super) struct Counting {
     pipeline: wgpu::ComputePipeline,
@@ -54,7 +57,8 @@ pub(super) struct Counting {
 }
 
 impl Counting {
-    /// Of `pass`; `None` where the adapter binds no buffer more than the pass has.
+    /// Compiles that of `pass`; `None` if the adapter does not support one buffer more than the
+    /// pass has.
     pub(super) fn new(context: &Context, pass: &Pass) -> Result<Option<Self>, GpuError> {
         let storage = pass.bindings.iter().filter(|at| at.access.is_storage());
         if storage.count() as u32 >= context.limits.max_storage_buffers_per_shader_stage {
@@ -85,8 +89,9 @@ impl Counting {
     }
 }
 
-/// Operations of one run of a pass with these bindings and of this size, from the state that the buffers hold and leave as it is; `None`
-/// where the adapter binds no buffer more, or has no memory for the copies. Waits for the device.
+/// Counts the operations of one run of a pass with these bindings and this size, from the current
+/// contents of the buffers, which do not change. `None` if the adapter does not support one buffer
+/// more, or has no memory for the copies. Waits for the device.
 pub(super) fn count(
     program: &Program,
     pass: &'static str,
@@ -163,7 +168,7 @@ pub(super) fn count(
     Ok(Some([sum(0), sum(2)]))
 }
 
-/// The module of a pass's text, behind which [`SUMS`] stand, that counts.
+/// Instruments the module of a pass's text, which must be followed by [`SUMS`].
 fn counting(name: &str, text: &str) -> Result<Module, GpuError> {
     let (mut module, info) = reflect::validated(name, text, &|line| format!("line {line}"))?;
     let fault = |what: &str| GpuError::Shader {
@@ -179,7 +184,7 @@ fn counting(name: &str, text: &str) -> Result<Module, GpuError> {
     let is_tell = |function: &Function| function.name.as_deref() == Some(TELL);
     let tell = (module.functions.fetch_if(is_tell)).ok_or_else(|| fault(TELL))?;
     let types = &module.types;
-    // Those of SUMS are the last two.
+    // The functions of SUMS are the last two.
     let own = module.functions.len() - 2;
     for (handle, function) in module.functions.iter_mut().take(own) {
         let info = &info[handle];
@@ -192,16 +197,16 @@ fn counting(name: &str, text: &str) -> Result<Module, GpuError> {
     Ok(module)
 }
 
-/// What puts sums into a function.
+/// Instruments functions.
 struct Meter<'a> {
     info: &'a FunctionInfo,
     types: &'a UniqueArena<Type>,
-    /// Of floats and of integers.
+    /// Sums of operations on floats and on integers.
     sums: [Handle<GlobalVariable>; 2],
 }
 
 impl Meter<'_> {
-    /// `tell` is called where an entry point ends.
+    /// Instruments a function; `tell` is called at the end of an entry point.
     fn put_into(&self, function: &mut Function, tell: Option<Handle<Function>>) {
         let body = std::mem::take(&mut function.body);
         function.body = self.block(function, body, tell);
@@ -235,7 +240,7 @@ impl Meter<'_> {
                     inner(continuing);
                 }
                 Statement::Emit(range) => emitted = Some(range.clone()),
-                // naga ends each path through a function by one.
+                // naga ends each path through a function with a return.
                 Statement::Return { .. } => {
                     if let Some(tell) = tell {
                         let call = Statement::Call {
@@ -259,7 +264,7 @@ impl Meter<'_> {
         metered
     }
 
-    /// Of floats and of integers.
+    /// Operations of the emitted expressions, on floats and on integers.
     fn operations(&self, function: &Function, emitted: Range<Expression>) -> [u32; 2] {
         let mut counts = [0; 2];
         for handle in emitted {
@@ -315,7 +320,7 @@ impl Meter<'_> {
     }
 }
 
-/// Of a scalar, a vector or a matrix.
+/// Shape of a scalar, a vector or a matrix.
 #[derive(Clone, Copy)]
 struct Shape {
     columns: u32,
@@ -330,9 +335,9 @@ impl Shape {
 
     fn product(self, right: Self) -> u32 {
         match (self.columns > 1, right.columns > 1) {
-            // Rows of a matrix times columns of a matrix or a vector.
+            // A matrix times a matrix or a vector.
             (true, _) if right.count() > 1 => self.rows * right.columns * (2 * self.columns - 1),
-            // A row times columns of a matrix.
+            // A row vector times a matrix.
             (false, true) if self.rows > 1 => right.columns * (2 * right.rows - 1),
             _ => self.count().max(right.count()),
         }
@@ -347,7 +352,7 @@ fn of_function(function: MathFunction, n: u32) -> u32 {
         MathFunction::Length => 2 * n,
         MathFunction::Distance | MathFunction::Normalize | MathFunction::Mix => 3 * n,
         MathFunction::Fma | MathFunction::Clamp | MathFunction::Saturate => 2 * n,
-        // (x − a) / (b − a), held in 0 to 1, and t² (3 − 2 t).
+        // (x − a) / (b − a), clamped to 0 to 1, and t² (3 − 2 t).
         MathFunction::SmoothStep => 9 * n,
         // e₁ − 2 (e₂ · e₁) e₂.
         MathFunction::Reflect => 4 * n,
@@ -358,7 +363,7 @@ fn of_function(function: MathFunction, n: u32) -> u32 {
     }
 }
 
-/// Statements that add `count` to a sum.
+/// Appends statements that add `count` to a sum.
 fn add(function: &mut Function, block: &mut Block, sum: Handle<GlobalVariable>, count: u32) {
     if count == 0 {
         return;

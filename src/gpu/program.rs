@@ -17,23 +17,23 @@ use super::{
     shader::Composed,
 };
 
-/// A buffer to be.
+/// Description of a buffer to allocate.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct BufferSpec {
-    /// Unique; a shader variable of this name binds it.
+    /// Unique name; shader variables of this name bind it.
     pub name: String,
-    /// Size; rounded up to 16.
+    /// Size in bytes; rounded up to a multiple of 16.
     pub bytes: u64,
     /// Whether passes bind it as a uniform.
     pub is_uniform: bool,
-    /// Whether passes bind a part of it at a time: then it may be larger than a binding.
+    /// Whether passes bind parts of it: it may then be larger than the binding limit.
     pub is_windowed: bool,
-    /// What it holds.
+    /// Element layout.
     pub element: Held,
 }
 
 impl BufferSpec {
-    /// The same, of which passes bind a part at a time.
+    /// Returns the description with [`Self::is_windowed`] set.
     pub fn windowed(self) -> Self {
         Self {
             is_windowed: true,
@@ -42,12 +42,12 @@ impl BufferSpec {
     }
 }
 
-/// A pass to be.
+/// Description of a compute pass to compile.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PassSpec {
     /// Shader file without extension, such as `pbf/predict`.
     pub name: &'static str,
-    /// Conditions that hold in it.
+    /// Names for which `#ifdef` holds.
     pub defines: Vec<&'static str>,
     /// Values of its `override` constants.
     pub constants: Vec<(&'static str, f64)>,
@@ -56,25 +56,26 @@ pub struct PassSpec {
 /// A compiled pass.
 #[derive(Debug)]
 pub struct Pass {
-    /// As in [`PassSpec`].
+    /// Name as in [`PassSpec`].
     pub name: &'static str,
-    /// Compute pipeline.
+    /// Compiled pipeline.
     pub pipeline: ComputePipeline,
     /// Layout of group 0.
     pub layout: BindGroupLayout,
     /// Reflected bindings.
     pub bindings: Vec<Binding>,
-    /// Threads a workgroup along each axis.
+    /// Threads per workgroup along each axis.
     pub workgroup_size: [u32; 3],
-    /// As in [`PassSpec`].
+    /// Names for which `#ifdef` holds, as in [`PassSpec`].
     pub(super) defines: Vec<&'static str>,
-    /// Values of those `override` constants that it declares.
+    /// Values of the `override` constants that the pass declares.
     pub(super) constants: Vec<(&'static str, f64)>,
     counting: OnceLock<Option<Counting>>,
 }
 
 impl Pass {
-    /// Its form that counts operations, compiled when it is first asked for; `None` where the adapter binds no buffer more.
+    /// Returns the instrumented version that counts operations, compiled on first use; `None` if
+    /// the adapter does not support one buffer more.
     ///
     /// # Errors
     /// [`GpuError::Shader`].
@@ -101,12 +102,12 @@ pub struct Program {
 }
 
 impl Program {
-    /// Compiles the passes and allocates the buffers, zeroed. `shared` constants go to every pass that
-    /// declares them.
+    /// Compiles the passes and allocates the buffers, filled with zeros. `shared` constants go to
+    /// every pass that declares them.
     ///
     /// # Errors
-    /// [`GpuError::TooLarge`] and [`GpuError::NoF64`] before anything is allocated, [`GpuError::Shader`],
-    /// [`GpuError::Lost`].
+    /// [`GpuError::TooLarge`] and [`GpuError::NoF64`] before anything is allocated,
+    /// [`GpuError::Shader`], [`GpuError::Lost`].
     pub fn new(
         context: &Context,
         buffers: &[BufferSpec],
@@ -134,11 +135,13 @@ impl Program {
         })
     }
 
-    /// Makes this the program of other buffers and passes: allocates, zeroed, those buffers that are new or whose size is
-    /// no longer as wanted, and compiles what passes are new. Recordings made before hold the old buffers.
+    /// Changes the program to other buffers and passes: allocates buffers, filled with zeros,
+    /// that are new or whose size changed, and compiles new passes. Earlier recordings keep the
+    /// old buffers.
     ///
     /// # Errors
-    /// [`GpuError::TooLarge`] before anything is allocated, [`GpuError::Shader`], [`GpuError::Lost`].
+    /// [`GpuError::TooLarge`] before anything is allocated, [`GpuError::Shader`],
+    /// [`GpuError::Lost`].
     pub fn refit(&mut self, buffers: &[BufferSpec], passes: &[PassSpec]) -> Result<(), GpuError> {
         check_sizes(&self.context, buffers)?;
         for spec in passes {
@@ -157,33 +160,33 @@ impl Program {
         self.context.check()
     }
 
-    /// The pass of that name.
+    /// Returns the pass with this name.
     ///
     /// # Panics
-    /// Where the program holds none: a recording that its plan does not cover is a bug.
+    /// If the program has none: a recording that its plan does not cover is a bug.
     pub fn pass(&self, name: &str) -> &Pass {
         self.passes
             .get(name)
             .unwrap_or_else(|| panic!("pass `{name}` is not in the program"))
     }
 
-    /// The buffer of that name.
+    /// Returns the buffer with this name.
     ///
     /// # Panics
-    /// Where the program holds none: a recording that its plan does not cover is a bug.
+    /// If the program has none: a recording that its plan does not cover is a bug.
     pub fn buffer(&self, name: &str) -> &Buffer {
         self.buffers
             .get(name)
             .unwrap_or_else(|| panic!("buffer `{name}` is not in the program"))
     }
 
-    /// Whether it has a buffer of that name.
+    /// Returns whether there is a buffer with this name.
     pub fn has(&self, name: &str) -> bool {
         self.buffers.contains_key(name)
     }
 
-    /// Copies the first `count` values of another program's buffer on the same device into one of this, before whatever is
-    /// submitted next.
+    /// Copies the first `count` values of a buffer of another program on the same device into one
+    /// of this program, ordered before later submissions.
     pub fn copy<T>(&self, to: &Buf<T>, from: &Self, source: &Buf<T>, count: usize) {
         let bytes = (count * size_of::<T>()) as u64;
         let (source, to) = (from.buffer(source.name()), self.buffer(to.name()));
@@ -192,7 +195,7 @@ impl Program {
         self.context.queue.submit([encoder.finish()]);
     }
 
-    /// Names of the passes and of the buffers, sorted.
+    /// Returns the names of the passes and of the buffers, sorted.
     pub fn names(&self) -> (Vec<&str>, Vec<&str>) {
         (
             self.passes.keys().copied().collect(),
@@ -200,7 +203,7 @@ impl Program {
         )
     }
 
-    /// Writes `data` from value `first` of a buffer on, before whatever is submitted next.
+    /// Writes `data` to a buffer from value `first` on, ordered before later submissions.
     pub fn upload<T: bytemuck::NoUninit>(&self, buffer: Buf<T>, first: usize, data: &[T]) {
         self.write(
             buffer.name(),
@@ -209,7 +212,8 @@ impl Program {
         );
     }
 
-    /// Writes `values` into the first windows of a uniform, before whatever is submitted next.
+    /// Writes `values` into the first windows of a uniform buffer, ordered before
+    /// later submissions.
     pub fn upload_windows<T: Element>(&self, windows: &Windows<T>, values: &[T]) {
         self.write(windows.name(), 0, &Windows::bytes(values));
     }
@@ -221,7 +225,7 @@ impl Program {
         }
     }
 
-    /// The first `count` values of a buffer; waits for the device.
+    /// Reads the first `count` values of a buffer; waits for the device.
     ///
     /// # Errors
     /// [`GpuError::Lost`].
@@ -229,7 +233,7 @@ impl Program {
         self.download(buffer.first(count))
     }
 
-    /// The first values of several buffers, waiting for the device once.
+    /// Reads the first values of several buffers, with a single wait for the device.
     ///
     /// # Errors
     /// [`GpuError::Lost`].
@@ -255,7 +259,7 @@ impl Program {
             .collect();
         context.queue.submit([encoder.finish()]);
         for buffer in staging.iter().flatten() {
-            // A failed map shows when its range is asked for.
+            // A failed mapping is reported when its range is requested.
             buffer.map_async(wgpu::MapMode::Read, .., |_| {});
         }
         context.wait()?;
@@ -274,10 +278,10 @@ impl Program {
     }
 }
 
-/// Whether the adapter can hold and bind these buffers.
+/// Checks that the adapter can allocate and bind these buffers.
 ///
 /// # Errors
-/// [`GpuError::TooLarge`] for the first that it cannot.
+/// [`GpuError::TooLarge`] for the first one that it cannot.
 pub fn check_sizes(context: &Context, buffers: &[BufferSpec]) -> Result<(), GpuError> {
     buffers
         .iter()
@@ -297,7 +301,7 @@ fn check_size(context: &Context, spec: &BufferSpec) -> Result<(), GpuError> {
             "max_storage_buffer_binding_size",
         )
     };
-    // Windows are bound one at a time, so only the whole buffer counts there.
+    // Windows are bound one at a time, so only the size of the whole buffer is limited.
     let is_windowed = spec.is_uniform || spec.is_windowed;
     let binding = if is_windowed { u64::MAX } else { binding };
     let (allowed, limit) = if binding < limits.max_buffer_size {
@@ -335,7 +339,7 @@ fn allocate(context: &Context, spec: &BufferSpec) -> Buffer {
     })
 }
 
-/// WGSL of a pass, with the context's fault where it is one of this pass.
+/// WGSL of a pass, with the context's injected fault if it concerns this pass.
 pub(super) fn source(
     context: &Context,
     name: &str,
@@ -366,7 +370,7 @@ fn spoiled(source: &str, spoil: &Spoil) -> Result<String, GpuError> {
     Ok(source.replace(spoil.from, spoil.to))
 }
 
-/// A shader and the layout of its bindings: what a pipeline is made of.
+/// A shader module and its layouts, from which pipelines are built.
 pub(super) struct Shader {
     pub(super) module: wgpu::ShaderModule,
     pub(super) layout: BindGroupLayout,
@@ -397,7 +401,8 @@ pub(super) fn binding_type(access: Access) -> wgpu::BindingType {
     }
 }
 
-/// Runs what makes objects of pass `name` on the device; its validation errors are that pass's.
+/// Runs `make`, which creates objects of pass `name` on the device, and attributes its validation
+/// errors to that pass.
 pub(super) fn checked<T>(
     context: &Context,
     name: &str,
@@ -416,7 +421,7 @@ pub(super) fn checked<T>(
     }
 }
 
-/// Composes and reflects the shader of pass `name`, of a program with these buffers.
+/// Composes and reflects the shader of pass `name` for a program with these buffers.
 ///
 /// # Errors
 /// [`GpuError::Shader`]; [`GpuError::NoF64`]; [`GpuError::TooManyBuffers`].
@@ -468,7 +473,7 @@ pub(super) fn shader(
     })
 }
 
-/// Group 0 of a pass with these bindings.
+/// Layout entries of group 0 for these bindings.
 pub(super) fn entries(
     bindings: &[Binding],
     visibility: wgpu::ShaderStages,
@@ -482,7 +487,7 @@ pub(super) fn entries(
     bindings.iter().map(entry).collect()
 }
 
-/// The module of pass `name`, the layout of its group 0, and that of its pipeline.
+/// Creates the shader module of pass `name`, the layout of its group 0, and that of its pipeline.
 ///
 /// # Errors
 /// [`GpuError::Shader`].
@@ -506,8 +511,9 @@ pub(super) fn module(
             force_loop_bounding: false,
             ..wgpu::ShaderRuntimeChecks::checked()
         };
-        // SAFETY: every loop of these shaders, which the binary embeds, runs to a bound that is fixed
-        // before it starts. All other checks stay on. Who edits shaders keeps to that, as whoever edits this source.
+        // SAFETY: every loop of these shaders, which the binary embeds, runs to a bound that is
+        // fixed before it starts. All other checks stay on. Users who edit shaders must keep to
+        // that, as must anyone who edits this source.
         let module = unsafe { device.create_shader_module_trusted(descriptor, checks) };
         let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: Some(name),
@@ -518,7 +524,7 @@ pub(super) fn module(
     })
 }
 
-/// The pipeline of a compute pass.
+/// Creates the pipeline of a compute pass.
 pub(super) fn pipeline(
     context: &Context,
     name: &str,

@@ -1,7 +1,7 @@
 //! Raster passes: triangles drawn into textures.
 //!
-//! A raster pass is a WGSL file with a vertex entry point and, where it draws colours, a fragment entry point. It has no
-//! vertex buffers: it reads what it draws from bound buffers, by the vertex's index.
+//! A raster pass is a WGSL file with a vertex entry point and, if it draws colours, a fragment
+//! entry point. It has no vertex buffers: it reads its data from bound buffers by vertex index.
 
 use wgpu::{
     BindGroup, BindGroupLayout, Color, CommandEncoder, CompareFunction, LoadOp, Operations,
@@ -16,58 +16,58 @@ use super::{
     reflect::{Binding, Stage},
 };
 
-/// Format of every depth that is drawn.
+/// Format of all depth textures.
 pub const DEPTH: TextureFormat = TextureFormat::Depth32Float;
 
-/// A raster pass to be.
+/// Description of a raster pass to compile.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RasterSpec {
     /// Shader file without extension, such as `ssfr/solid`.
     pub name: &'static str,
-    /// Formats of the textures that its fragments go to, by location.
+    /// Formats of the textures that its fragments are written to, by location.
     pub colours: &'static [TextureFormat],
-    /// Which depth replaces which.
+    /// Depth comparison function.
     pub compare: CompareFunction,
-    /// Conditions that hold in its shader.
+    /// Names for which `#ifdef` holds in its shader.
     pub defines: &'static [&'static str],
 }
 
-/// A texture that is drawn into.
+/// A texture to draw into.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Target {
     /// Texture name.
     pub texture: String,
-    /// What stands in its first channel, or as depth, before anything is drawn.
+    /// Initial value of the first channel, or of the depth.
     pub clear: f64,
-    /// Whether it is read later.
+    /// Whether the result is stored for later reads.
     pub is_kept: bool,
 }
 
 /// Draws triangles with a raster pass.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Draw {
-    /// With what.
+    /// The raster pass.
     pub raster: RasterSpec,
     /// Renamed or windowed bindings.
     pub binds: Vec<Bind>,
-    /// Three a triangle.
+    /// Number of vertices, three per triangle.
     pub vertices: u32,
-    /// One for each of the pass's colours.
+    /// Targets for the pass's colours, by location.
     pub colours: Vec<Target>,
-    /// Depth.
+    /// Depth target.
     pub depth: Target,
 }
 
-/// Copies a texture into a buffer that holds a larger picture.
+/// Copies a texture into a buffer that holds a larger image.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct CopyTexture {
-    /// From here, all of it; four bytes a texel.
+    /// Source texture, copied completely; four bytes per texel.
     pub texture: String,
-    /// Into this buffer.
+    /// Destination buffer.
     pub buffer: String,
-    /// Where its first row begins there, bytes.
+    /// Byte offset of the first row in the buffer.
     pub offset: u64,
-    /// From one row to the next there, bytes: a multiple of 256.
+    /// Bytes from one row to the next in the buffer, a multiple of 256.
     pub bytes_per_row: u32,
 }
 
@@ -92,10 +92,10 @@ impl Program {
         Ok(self)
     }
 
-    /// The raster pass of that name.
+    /// Returns the raster pass with this name.
     ///
     /// # Panics
-    /// Where the program holds none: a recording that its plan does not cover is a bug.
+    /// If the program has none: a recording that its plan does not cover is a bug.
     fn raster(&self, name: &str) -> &RasterPass {
         self.rasters
             .get(name)
@@ -252,7 +252,7 @@ fn depth_attachment<'a>(
     }
 }
 
-/// Sets every texel of a depth texture.
+/// Sets every texel of a depth texture to the target's clear value.
 pub(super) fn clear_depth(program: &Program, encoder: &mut CommandEncoder, target: &Target) {
     let view = view(program, &target.texture);
     encoder.begin_render_pass(&wgpu::RenderPassDescriptor {

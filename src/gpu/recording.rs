@@ -1,4 +1,4 @@
-//! Passes recorded as data, and the one executor that runs them.
+//! Passes recorded as data, and the executor that runs them.
 
 use std::cell::Cell;
 
@@ -17,19 +17,19 @@ use super::{
 
 pub use super::timer::Timer;
 
-/// Where a shader variable finds its data, when not in the buffer, texture or sampler of its own name.
+/// Binding of a shader variable to a resource of another name.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Bind {
     /// WGSL variable.
     pub variable: &'static str,
     /// Name of the buffer, texture or sampler.
     pub buffer: String,
-    /// Byte offset and length; the whole buffer where `None`.
+    /// Byte offset and length; `None` binds the whole buffer.
     pub window: Option<(u64, u64)>,
 }
 
 impl Bind {
-    /// `variable` in all of `buffer`.
+    /// Binds `variable` to all of `buffer`.
     pub fn whole<T>(variable: &'static str, buffer: &Buf<T>) -> Self {
         Self {
             variable,
@@ -39,29 +39,30 @@ impl Bind {
     }
 }
 
-/// How many workgroups a dispatch has.
+/// Number of workgroups of a dispatch.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Groups {
-    /// Enough for so many threads; past the limit of one dimension they go out in two.
+    /// Enough for this many threads, in two dimensions beyond the limit of one.
     Threads(u64),
-    /// Enough for a thread a pixel of a picture.
+    /// Enough for one thread per pixel of an image of this size.
     Pixels([u32; 2]),
-    /// [`Workgroups`] that stand in a buffer at a byte offset; zeros make the dispatch empty.
+    /// [`Workgroups`] read from a buffer; zeros make the dispatch empty.
     Indirect {
         /// Buffer name.
         buffer: String,
-        /// Bytes.
+        /// Byte offset in the buffer.
         offset: u64,
     },
 }
 
 impl Groups {
-    /// Those that stand in a buffer.
+    /// Workgroup counts at an index of a buffer.
     pub fn at(buffer: &Buf<Workgroups>, index: usize) -> Self {
         Self::within(buffer, index * size_of::<Workgroups>())
     }
 
-    /// Those that are a member of a struct, so many bytes from its beginning, in a buffer.
+    /// Workgroup counts that are a member of a struct in a buffer, `member` bytes from
+    /// its beginning.
     pub fn within<T>(buffer: &Buf<T>, member: usize) -> Self {
         Self::Indirect {
             buffer: buffer.name().to_owned(),
@@ -70,19 +71,19 @@ impl Groups {
     }
 }
 
-/// One thing for the device to do.
+/// A command for the device.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Command {
-    /// Runs a pass.
+    /// Runs a compute pass.
     Dispatch {
         /// Pass name.
         pass: &'static str,
         /// Renamed or windowed bindings.
         binds: Vec<Bind>,
-        /// Size.
+        /// Number of workgroups.
         groups: Groups,
     },
-    /// Zeroes a buffer.
+    /// Fills a buffer with zeros.
     Clear(String),
     /// Runs a raster pass.
     Draw(Draw),
@@ -93,12 +94,12 @@ pub enum Command {
 }
 
 impl Command {
-    /// Zeroes `buffer`.
+    /// Fills `buffer` with zeros.
     pub fn clear<T>(buffer: &Buf<T>) -> Self {
         Self::Clear(buffer.name().to_owned())
     }
 
-    /// Runs `pass` in so many workgroups.
+    /// Runs `pass` in `groups` workgroups.
     pub fn in_groups(pass: &'static str, groups: Groups, binds: Vec<Bind>) -> Self {
         Self::Dispatch {
             pass,
@@ -107,7 +108,7 @@ impl Command {
         }
     }
 
-    /// Name of the pass that it runs.
+    /// Returns the name of the pass that the command runs, if it runs one.
     pub fn pass(&self) -> Option<&'static str> {
         match self {
             Self::Dispatch { pass, .. } => Some(pass),
@@ -116,7 +117,7 @@ impl Command {
         }
     }
 
-    /// Runs `pass` over `threads` threads with every binding in the buffer of its own name.
+    /// Runs `pass` over `threads` threads, with every variable bound to the buffer of its own name.
     pub fn over(pass: &'static str, threads: usize) -> Self {
         Self::Dispatch {
             pass,
@@ -125,7 +126,7 @@ impl Command {
         }
     }
 
-    /// The same with bindings of other names.
+    /// Same as [`Self::over`] with renamed bindings.
     pub fn with(pass: &'static str, threads: usize, binds: Vec<Bind>) -> Self {
         Self::Dispatch {
             pass,
@@ -135,25 +136,26 @@ impl Command {
     }
 }
 
-/// A dispatch's operations are counted at its first run and then at one in so many, and taken to be as many in between: a run that is
-/// counted takes as long again.
+/// Interval at which the operations of a dispatch are counted after its first run; runs in between
+/// are assumed to do the same. A counted run takes twice as long.
 const COUNTED_ONE_IN: u32 = 7;
-/// 2³² over the golden ratio: its multiples, as parts of 2³², lie evenly among every second or seventh run too, so that no rhythm of a
-/// solver falls in with the count (Weyl's equidistribution).
+/// 2³² over the golden ratio. Its multiples modulo 2³² are evenly distributed even over every
+/// second or every seventh run, so that no periodicity of a solver coincides with the counting
+/// (Weyl's equidistribution).
 const GOLDEN: u32 = 0x9E37_79B9;
 
-/// A command with its bindings made on a device.
+/// A command with its bindings created on a device.
 pub(super) enum Recorded {
     Dispatch {
         pass: &'static str,
         binds: Vec<Bind>,
         group: BindGroup,
         size: Size,
-        /// What it moves at least where all of its bindings are used: [`moved`].
+        /// Bytes moved if all of its bindings are used: [`moved`].
         bytes: u64,
-        /// Operations that it did when they were last counted, where they were.
+        /// Operations at the last count; `None` if there was none.
         operations: Cell<Option<Operations>>,
-        /// How often it ran while operations were counted.
+        /// Number of runs while operations were counted.
         runs: Cell<u32>,
     },
     Draw(Drawn),
@@ -167,12 +169,12 @@ pub(super) enum Size {
     Indirect(String, u64),
 }
 
-/// Where a traced recording stands.
+/// Point in time of a traced dispatch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Moment {
-    /// A dispatch is about to run: its inputs stand in the buffers.
+    /// Before a dispatch: the buffers hold its inputs.
     Before,
-    /// It has run: its outputs do.
+    /// After a dispatch: the buffers hold its outputs.
     After,
 }
 
@@ -182,7 +184,7 @@ pub struct Recording {
 }
 
 impl Recording {
-    /// Binds every command to the program's buffers.
+    /// Binds all commands to the program's buffers.
     pub fn new(program: &Program, commands: &[Command]) -> Self {
         Self {
             steps: commands
@@ -192,12 +194,12 @@ impl Recording {
         }
     }
 
-    /// Names of the passes that it runs, in order.
+    /// Iterates over the names of the passes that it runs, in order.
     pub fn passes(&self) -> impl Iterator<Item = &'static str> {
         self.steps.iter().filter_map(Recorded::pass)
     }
 
-    /// Submits all of it; returns without waiting unless `timer` measures.
+    /// Submits all commands; returns without waiting unless `timer` measures them.
     ///
     /// # Errors
     /// [`GpuError::Lost`].
@@ -205,7 +207,8 @@ impl Recording {
         Self::run_all(&[self], program, timer)
     }
 
-    /// Submits one recording after the other at once, like [`Self::run`].
+    /// Submits several recordings, one after the other, in a single submission; otherwise
+    /// like [`Self::run`].
     ///
     /// # Errors
     /// [`GpuError::Lost`].
@@ -230,10 +233,11 @@ impl Recording {
         program.context.check()
     }
 
-    /// Runs dispatch by dispatch; `observe` is called before and after each, and may read any buffer.
+    /// Runs one command at a time; `observe` is called before and after each dispatch, and may read
+    /// any buffer.
     ///
     /// # Errors
-    /// [`GpuError::Lost`], and what `observe` returns.
+    /// [`GpuError::Lost`], and the errors of `observe`.
     pub fn trace<E: From<GpuError>>(
         &self,
         program: &Program,
@@ -280,13 +284,14 @@ pub(super) fn encode(steps: &[Recorded], program: &Program, encoder: &mut Comman
 }
 
 impl Recorded {
-    /// Whether its operations are to be counted before its next run: before the first, and before one in so many after it.
+    /// Whether operations are to be counted before the next run: before the first, and before one
+    /// in seven after it.
     pub(super) fn is_due(&self) -> bool {
         let turn = |runs: &Cell<u32>| runs.get().wrapping_mul(GOLDEN);
         matches!(self, Self::Dispatch { runs, .. } if turn(runs) < u32::MAX / COUNTED_ONE_IN)
     }
 
-    /// Counts what its next run does, where it is a dispatch. Waits for the device.
+    /// Counts the operations of the next run, if this is a dispatch. Waits for the device.
     pub(super) fn count(&self, program: &Program) -> Result<(), GpuError> {
         if let Self::Dispatch {
             pass,
@@ -301,7 +306,8 @@ impl Recorded {
         Ok(())
     }
 
-    /// Operations of a run that was made while operations are counted, as last counted; `None` where that was not possible.
+    /// Operations of a run while operations are counted, from the last count; `None` if counting
+    /// was not possible.
     pub(super) fn ran(&self) -> Option<Operations> {
         let Self::Dispatch {
             operations, runs, ..
@@ -313,7 +319,7 @@ impl Recorded {
         operations.get()
     }
 
-    /// What of the device's memory it moves at least; 0 where that is not known.
+    /// Device memory traffic in bytes; 0 if unknown.
     pub(super) fn bytes(&self) -> u64 {
         match self {
             Self::Dispatch { bytes, .. } => *bytes,
@@ -366,7 +372,8 @@ fn record(program: &Program, command: &Command) -> Option<Recorded> {
     }
 }
 
-/// Workgroups for `threads`, in two dimensions where one cannot hold them; `shared/thread.wgsl` undoes it.
+/// Returns the workgroups for `threads`, in two dimensions if one cannot hold them;
+/// `shared/thread.wgsl` inverts this.
 pub fn spread(context: &Context, workgroup_size: u32, threads: u64) -> [u32; 3] {
     let groups = threads.div_ceil(u64::from(workgroup_size));
     let most = u64::from(context.limits.max_compute_workgroups_per_dimension);
@@ -374,8 +381,8 @@ pub fn spread(context: &Context, workgroup_size: u32, threads: u64) -> [u32; 3] 
     [groups.div_ceil(rows) as u32, rows as u32, 1]
 }
 
-/// Bytes that pass over the device's memory if each buffer that is bound, or its window, is read once where the pass reads it and written
-/// once where it writes it.
+/// Bytes of memory traffic if each bound buffer, or its window, is read once if the pass reads it,
+/// and written once if the pass writes it.
 fn moved(program: &Program, bindings: &[Binding], binds: &[Bind]) -> u64 {
     let bytes = |binding: &Binding| {
         let (_, _, length) = bound(program, binding, binds);
@@ -387,7 +394,7 @@ fn moved(program: &Program, bindings: &[Binding], binds: &[Bind]) -> u64 {
     storage.map(bytes).sum()
 }
 
-/// The buffer that a variable is bound to, and the bytes of it: where they begin, and how many.
+/// Buffer that a variable is bound to, and the byte offset and length of the bound range.
 pub(super) fn bound<'a>(
     program: &'a Program,
     binding: &Binding,
@@ -400,7 +407,8 @@ pub(super) fn bound<'a>(
     (buffer, offset, length)
 }
 
-/// The bind group of pass `name`; of bindings in `apart`, by index, with the buffer there in place of the program's.
+/// Creates the bind group of pass `name`; bindings listed in `apart`, by index, use the buffer
+/// there instead of the program's.
 pub(super) fn bind(
     program: &Program,
     name: &str,
@@ -472,7 +480,7 @@ pub(super) fn dispatch(program: &Program, compute: &mut ComputePass<'_>, step: &
     dispatch_sized(program, compute, size);
 }
 
-/// So many workgroups of the pass that is set.
+/// Dispatches `size` workgroups of the current pipeline.
 pub(super) fn dispatch_sized(program: &Program, compute: &mut ComputePass<'_>, size: &Size) {
     match size {
         Size::Direct([x, y, z]) => compute.dispatch_workgroups(*x, *y, *z),

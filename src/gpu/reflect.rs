@@ -1,6 +1,6 @@
-//! What a composed shader says of itself: bindings, workgroup size, struct layouts.
+//! Reflection of composed shaders: bindings, workgroup size, struct layouts.
 //!
-//! Bind groups are built from this, so no binding list is typed by hand.
+//! Bind groups are built from it, so no binding list is written by hand.
 
 use std::error::Error as _;
 
@@ -20,7 +20,7 @@ pub enum Access {
     Read,
     /// `var<storage, read_write>`.
     ReadWrite,
-    /// `texture_2d<f32>`, of a format that filters.
+    /// `texture_2d<f32>`, of a filterable format.
     Texture,
     /// `texture_depth_2d`.
     DepthTexture,
@@ -31,20 +31,20 @@ pub enum Access {
 }
 
 impl Access {
-    /// Whether it counts against the adapter's limit of storage buffers.
+    /// Returns whether it counts towards the adapter's limit of storage buffers.
     pub fn is_storage(self) -> bool {
         matches!(self, Self::Read | Self::ReadWrite)
     }
 }
 
-/// What a shader is compiled into.
+/// Pipeline stage of a shader.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
     /// One compute entry point.
     Compute,
-    /// A vertex entry point.
+    /// A vertex entry point, for a raster pass.
     Raster {
-        /// Whether a fragment entry point stands beside it; without one, depth alone is drawn.
+        /// Whether there is also a fragment entry point; without one, only depth is drawn.
         has_fragment: bool,
     },
 }
@@ -52,39 +52,40 @@ pub enum Stage {
 /// One binding of group 0.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Binding {
-    /// The WGSL variable, which names the buffer too unless a step says otherwise.
+    /// WGSL variable, which is also the name of the buffer unless a command binds another.
     pub name: String,
     /// `@binding(n)`.
     pub index: u32,
-    /// Uniform or storage.
+    /// Kind of the binding.
     pub access: Access,
     /// Whether the shader reads it.
     pub is_read: bool,
     /// Whether the shader writes it.
     pub is_written: bool,
-    /// What it is an array of, behind its head where it has one; what it is where it is no array.
+    /// Element type of the array, after its head if there is one; the type itself if it is not
+    /// an array.
     pub element: ElementType,
 }
 
-/// A type as WGSL lays it out.
+/// A type in its WGSL layout.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ElementType {
     /// Bytes from one element of the array to the next.
     pub stride: u32,
-    /// What it is made of.
+    /// Scalar type of its components.
     pub scalar: Scalar,
-    /// Its name where it is a struct.
+    /// Name if it is a struct.
     pub name: Option<String>,
     /// Bytes before the array.
     pub head: u32,
 }
 
-/// A `struct` of the shader as WGSL lays it out.
+/// Layout of a `struct` of the shader.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Layout {
     /// Struct name.
     pub name: String,
-    /// Bytes.
+    /// Size in bytes.
     pub size: u32,
     /// Member names with their byte offsets.
     pub members: Vec<(String, u32)>,
@@ -93,30 +94,30 @@ pub struct Layout {
 /// Reflection of one pass.
 #[derive(Clone, Debug)]
 pub struct Reflection {
-    /// Its entry points.
+    /// Stage given by its entry points.
     pub stage: Stage,
-    /// In order of binding index.
+    /// Bindings in the order of their indices.
     pub bindings: Vec<Binding>,
-    /// Threads a workgroup along each axis; zeros of a raster pass.
+    /// Threads per workgroup along each axis; zeros for a raster pass.
     pub workgroup_size: [u32; 3],
-    /// Every named struct.
+    /// Layouts of all named structs.
     pub layouts: Vec<Layout>,
-    /// Names of its `override` constants.
+    /// Names of the `override` constants.
     pub overrides: Vec<String>,
-    /// Its constants of u32.
+    /// Named `u32` constants with their values.
     pub constants: Vec<(String, u32)>,
-    /// Whether it computes in f64.
+    /// Whether the shader computes in f64.
     pub has_f64: bool,
 }
 
-/// What a binding of type `ty` consists of.
+/// Element type of a binding of type `ty`.
 fn element_of(module: &naga::Module, ty: naga::Handle<naga::Type>) -> ElementType {
     match &module.types[ty].inner {
         TypeInner::Array { base, stride, .. } => ElementType {
             stride: *stride,
             ..element(module, *base)
         },
-        // A struct that ends in an array without a length is that array's head.
+        // A struct that ends in a runtime-sized array is the array's head.
         TypeInner::Struct { members, .. } => match members.last() {
             Some(last) if is_unsized(module, last.ty) => ElementType {
                 head: last.offset,
@@ -133,7 +134,7 @@ fn is_unsized(module: &naga::Module, ty: naga::Handle<naga::Type>) -> bool {
     matches!(&module.types[ty].inner, TypeInner::Array { size: of, .. } if *of == size)
 }
 
-/// The struct of shared/vector.wgsl, which stands for three numbers of its first member's kind.
+/// The struct of shared/vector.wgsl, which represents three numbers of its first member's type.
 const VECTOR: &str = "Vector";
 
 fn element(module: &naga::Module, ty: naga::Handle<naga::Type>) -> ElementType {
@@ -175,7 +176,7 @@ fn stage(module: &naga::Module) -> Option<Stage> {
     }
 }
 
-/// How a global variable is bound; `None` where no pass may bind it.
+/// Kind of a global variable's binding; `None` if passes may not bind it.
 fn access(module: &naga::Module, variable: &naga::GlobalVariable) -> Option<Access> {
     match variable.space {
         AddressSpace::Uniform => Some(Access::Uniform),
@@ -204,16 +205,18 @@ fn access(module: &naga::Module, variable: &naga::GlobalVariable) -> Option<Acce
     }
 }
 
-/// Reads the entry points of `wgsl`: one of compute, or one of vertices with or without one of fragments.
+/// Reflects `wgsl`, which must have one compute entry point, or one vertex entry point with or
+/// without a fragment entry point.
 ///
 /// # Errors
-/// [`GpuError::Shader`] where it does not parse or validate, has other entry points, binds outside group 0, or binds
-/// anything but what [`Access`] lists.
+/// [`GpuError::Shader`] if it does not parse or validate, has other entry points, binds outside of
+/// group 0, or binds anything that [`Access`] does not list.
 pub fn reflect(name: &str, wgsl: &str) -> Result<Reflection, GpuError> {
     reflect_at(name, wgsl, &|line| format!("line {line}"))
 }
 
-/// A text as naga has it, and what it says of that. Faults name places, of lines from 1, as `place` says.
+/// Parses and validates a text. Errors name positions through `place`, which maps lines counted
+/// from 1.
 pub(super) fn validated(
     name: &str,
     wgsl: &str,
@@ -259,7 +262,7 @@ pub(super) fn validated(
     Ok((module, info))
 }
 
-/// [`reflect`] of a text whose lines stand where `place` says: faults name places, of lines from 1.
+/// Same as [`reflect`]; errors name positions through `place`, which maps lines counted from 1.
 pub(super) fn reflect_at(
     name: &str,
     wgsl: &str,

@@ -1,5 +1,5 @@
-//! Shader composition: `#import "path"`, `#ifdef NAME`, `#else`, `#endif`, from the files embedded in the binary or from a
-//! folder of edited ones.
+//! Shader composition with `#import "path"`, `#ifdef NAME`, `#else` and `#endif`, from the files
+//! embedded in the binary or from a folder of edited ones.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -14,7 +14,7 @@ use super::adapter::GpuError;
 
 static SHADERS: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/../../shaders");
 
-/// Every WGSL file that is a pass, as `room/name`, sorted; `shared/` holds imports only.
+/// Lists every WGSL file that is a pass, as `folder/name`, sorted; `shared/` holds only imports.
 pub fn pass_files() -> Vec<String> {
     let mut names: Vec<String> = SHADERS
         .dirs()
@@ -32,10 +32,10 @@ pub fn pass_files() -> Vec<String> {
     names
 }
 
-/// WGSL text of the shipped `name`, as [`Shaders::compose`].
+/// Composes the shipped shader `name`, as [`Shaders::compose`].
 ///
 /// # Errors
-/// Likewise.
+/// Those of [`Shaders::compose`].
 pub fn compose(name: &str, defines: &[&str]) -> Result<String, GpuError> {
     Shaders::default().compose(name, defines)
 }
@@ -45,25 +45,26 @@ fn is_wgsl(path: &Path) -> bool {
         .is_some_and(|extension| extension == "wgsl")
 }
 
-/// The WGSL files that passes are composed from: the shipped ones by default, or those of a folder, as it was when read.
+/// WGSL files that passes are composed from: the shipped ones by default, or a snapshot of those in
+/// a folder.
 #[derive(Clone, Debug)]
 pub struct Shaders {
-    /// Text by path from the folder, with `/`; `None` of the shipped ones.
+    /// Text by path relative to the folder, with `/`; `None` for the shipped files.
     files: Option<Arc<BTreeMap<String, String>>>,
     hash: Option<Arc<str>>,
 }
 
-/// WGSL of a pass, and where its lines stand.
+/// WGSL of a pass, with the origin of each line.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Composed {
     pub(super) text: String,
     files: Vec<String>,
-    /// Of each line of the text the index of its file and its line there, from 1.
+    /// For each line of the text, the index of its file and its line number there, from 1.
     places: Vec<(usize, usize)>,
 }
 
 impl Composed {
-    /// Where a line of the text stands, from 1: `shared/walls.wgsl:12`.
+    /// Origin of a line of the text, counted from 1, such as `shared/walls.wgsl:12`.
     pub(super) fn place(&self, line: usize) -> String {
         let place = line.checked_sub(1).and_then(|index| self.places.get(index));
         place.map_or_else(
@@ -73,15 +74,15 @@ impl Composed {
     }
 }
 
-/// What is wrong with a folder of edited shaders.
+/// Error in a folder of edited shaders.
 #[derive(Debug, thiserror::Error)]
 pub enum ShadersError {
     /// A file or folder cannot be read.
     #[error("--shaders: cannot read {}", file.display())]
     Unreadable {
-        /// Which.
+        /// Path concerned.
         file: PathBuf,
-        /// Why.
+        /// Error of the operating system.
         source: io::Error,
     },
     /// A shipped file has no counterpart in the folder.
@@ -92,7 +93,7 @@ pub enum ShadersError {
     Missing {
         /// The folder.
         folder: PathBuf,
-        /// Path of the file in it.
+        /// Path of the missing file in the folder.
         file: String,
     },
 }
@@ -109,10 +110,12 @@ impl Shaders {
         hash: None,
     };
 
-    /// Reads every WGSL file below `folder`. Files that nothing imports are allowed, so that a pass can be split.
+    /// Reads every WGSL file below `folder`. Files that nothing imports are allowed, so that a pass
+    /// can be split.
     ///
     /// # Errors
-    /// [`ShadersError`]; a shipped file that is missing is one: it would be taken for an edited one.
+    /// [`ShadersError`], also if a shipped file is missing: the set would be taken for an
+    /// edited one.
     pub fn read(folder: &Path) -> Result<Self, ShadersError> {
         let mut files = BTreeMap::new();
         collect(folder, folder, &mut files)?;
@@ -130,22 +133,24 @@ impl Shaders {
         })
     }
 
-    /// BLAKE3 of all WGSL files, hex, in the order of their paths: of each the lengths of path and text as 8 bytes each,
-    /// little-endian, then both. `None` of the shipped ones, also where a folder holds exactly these.
+    /// Returns a hash of edited files: BLAKE3 in hex over all WGSL files in the order of their
+    /// paths, for each the lengths of path and text as 8 bytes each, little-endian, then both.
+    /// `None` for the shipped files, even if they were read from a folder.
     pub fn edited(&self) -> Option<&str> {
         self.hash.as_deref()
     }
 
-    /// WGSL text of `name` (such as `pbf/predict`) with imports pasted once and conditions resolved.
+    /// Composes the WGSL text of `name` (such as `pbf/predict`), with each import included once and
+    /// conditions resolved.
     ///
     /// # Errors
-    /// A file that does not exist, or a condition that does not close.
+    /// If a file does not exist, or a condition is not closed.
     pub fn compose(&self, name: &str, defines: &[&str]) -> Result<String, GpuError> {
         self.compose_with_places(name, defines)
             .map(|composed| composed.text)
     }
 
-    /// [`Self::compose`], with the place of each line in its file.
+    /// Same as [`Self::compose`], with the origin of each line.
     pub(super) fn compose_with_places(
         &self,
         name: &str,
@@ -157,7 +162,7 @@ impl Shaders {
         Ok(out)
     }
 
-    /// An error of a shader as one of the edited ones, where they are.
+    /// Marks a shader error as one of edited shaders, if they are edited.
     pub(crate) fn blamed(&self, error: GpuError) -> GpuError {
         match error {
             GpuError::Shader { name, message } if self.hash.is_some() => {
@@ -167,7 +172,7 @@ impl Shaders {
         }
     }
 
-    /// The shipped ones, where these are edited.
+    /// Returns the shipped shaders if these are edited.
     pub(super) fn shipped_beside(&self) -> Option<Self> {
         self.hash.is_some().then_some(Self::SHIPPED)
     }

@@ -1,9 +1,9 @@
-//! Exclusive prefix scan and the stable counting sort.
+//! Exclusive prefix scan and stable counting sort.
 //!
-//! Counting sort by cell (Hoetzlein 2014). Slots within a cell are handed out by integer atomics in
-//! whatever order the device runs, and `sort/stabilize` then ranks each cell's members by id, so the
-//! result depends on keys and ids alone. Its work is Σ k² over cells of k members: about ten reads a
-//! particle at rest, and quadratic only where all particles share a cell.
+//! Counting sort by cell (Hoetzlein 2014). Slots within a cell are assigned by integer atomics in
+//! the order in which the device happens to run; `sort/stabilize` then ranks each cell's members by
+//! id, so that the result depends only on keys and ids. Its work is Σ k² over cells of k members:
+//! about ten reads per particle at rest, and quadratic only if all particles share a cell.
 
 use super::{
     buffer::{Buf, Windows},
@@ -11,25 +11,26 @@ use super::{
     recording::{Bind, Command},
 };
 
-/// Elements of each cell; then, scanned, where those of each cell begin in sorted order, and how many there are in all.
+/// Number of elements of each cell; after the scan, the start of each cell in sorted order,
+/// followed by the total.
 pub const CELL_START: Buf<u32> = Buf::new("cell_start");
 /// Cell of each element, in storage order.
 pub const CELL_OF: Buf<u32> = Buf::new("cell_of");
-/// Place of each element in its cell, in storage order, as the device happened to hand it out.
+/// Index of each element within its cell, in storage order, as assigned by the device.
 pub const SLOT_IN_CELL: Buf<u32> = Buf::new("slot_in_cell");
-/// Elements by cell, and within a cell as the device happened to place them.
+/// Elements by cell, in arbitrary order within a cell.
 pub const PLACED: Buf<u32> = Buf::new("placed");
 /// Elements by cell, and within a cell by id.
 pub const ORDER: Buf<u32> = Buf::new("order");
-/// Name of each element, in storage order.
+/// Id of each element, in storage order.
 pub const ID: Buf<u32> = Buf::new("id");
-/// How many elements there are, in the first component.
+/// Number of elements, in the first component.
 pub const ELEMENT_COUNT: Buf<[u32; 4]> = Buf::uniform("element_count");
 
 /// Elements that one workgroup scans.
 const BLOCK: usize = 1024;
 
-/// Lengths of the scan levels: the data, then block sums until one block holds them.
+/// Lengths of the scan levels: the data, then block sums until a single block holds them.
 fn levels(count: usize) -> Vec<usize> {
     let mut lengths = vec![count];
     while let Some(&last) = lengths.last()
@@ -47,17 +48,18 @@ fn level_buffer(data: &Buf<u32>, level: usize) -> Buf<u32> {
     }
 }
 
-/// Where the sum of the last level goes, which no one reads.
+/// Destination of the last level's sum, which is never read.
 fn total(data: &Buf<u32>) -> Buf<u32> {
     Buf::named(format!("{}.total", data.name()))
 }
 
-/// Elements of each level, in the first component.
+/// Length of each level, in the first component.
 fn lengths(data: &Buf<u32>) -> Windows<[u32; 4]> {
     Windows::named("length", format!("{}.lengths", data.name()))
 }
 
-/// Buffers that a scan of `count` elements in buffer `data` needs beside it, `data`'s own `count`+1 apart.
+/// Describes the buffers that a scan of `count` elements in buffer `data` needs, in addition to
+/// `data` with its `count` + 1 elements.
 pub fn scan_buffers(data: &Buf<u32>, count: usize) -> Vec<BufferSpec> {
     let lengths_of = levels(count + 1);
     let mut specs: Vec<BufferSpec> = (1..lengths_of.len())
@@ -68,7 +70,7 @@ pub fn scan_buffers(data: &Buf<u32>, count: usize) -> Vec<BufferSpec> {
     specs
 }
 
-/// Tells a scan of `count` elements in buffer `data` how long its levels are.
+/// Uploads the lengths of all levels for a scan of `count` elements in buffer `data`.
 pub fn upload_lengths(program: &Program, data: &Buf<u32>, count: usize) {
     let levels = levels(count + 1);
     let values: Vec<[u32; 4]> = levels
@@ -78,13 +80,13 @@ pub fn upload_lengths(program: &Program, data: &Buf<u32>, count: usize) {
     program.upload_windows(&lengths(data), &values);
 }
 
-/// Names of the scan's passes.
+/// Passes of the scan.
 pub const SCAN_PASSES: [&str; 2] = ["sort/scan_blocks", "sort/add_block_sums"];
 
-/// Passes of the counting sort after its keys are counted.
+/// Passes of the counting sort after its keys have been counted.
 pub const SORT_PASSES: [&str; 2] = ["sort/place", "sort/stabilize"];
 
-/// A pass without conditions or constants.
+/// Describes a pass without conditions or constants.
 pub fn plain_pass(name: &'static str) -> PassSpec {
     PassSpec {
         name,
@@ -93,7 +95,8 @@ pub fn plain_pass(name: &'static str) -> PassSpec {
     }
 }
 
-/// In place: element k becomes the sum of those before it; element `count` becomes the total.
+/// Returns the commands of an in-place scan: element k becomes the sum of those before it, and
+/// element `count` the total.
 pub fn scan(data: &Buf<u32>, count: usize) -> Vec<Command> {
     let levels = levels(count + 1);
     let binds = |level: usize| {

@@ -7,43 +7,43 @@ use super::{
     program::Program,
 };
 
-/// A texture to be: two-dimensional, one level, one sample.
+/// Description of a texture to allocate: two-dimensional, one mip level, one sample.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TextureSpec {
-    /// Unique; a shader variable of this name binds it.
+    /// Unique name; shader variables of this name bind it.
     pub name: String,
-    /// Texels.
+    /// Width and height, texels.
     pub size: [u32; 2],
-    /// Of a texel.
+    /// Texel format.
     pub format: TextureFormat,
 }
 
 impl TextureSpec {
     /// Bytes of one texel.
     fn texel_bytes(&self) -> u32 {
-        // Every format that a pass here draws or samples can be copied, and so has a size.
+        // Every format that passes draw or sample can be copied, and so has a size.
         self.format.block_copy_size(None).unwrap_or(0)
     }
 
-    /// Bytes in all.
+    /// Returns the total size in bytes.
     pub fn bytes(&self) -> u64 {
         u64::from(self.texel_bytes()) * u64::from(self.size[0]) * u64::from(self.size[1])
     }
 }
 
-/// A sampler to be; it filters linearly, and clamps to the edge.
+/// Description of a sampler, with linear filtering and clamping to the edge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SamplerSpec {
-    /// Unique; a shader variable of this name binds it.
+    /// Unique name; shader variables of this name bind it.
     pub name: &'static str,
-    /// Whether it repeats along x instead.
+    /// Whether it repeats along x instead of clamping.
     pub repeats_x: bool,
-    /// What a `sampler_comparison` asks of a texel; `None` for a plain one.
+    /// Comparison function of a `sampler_comparison`; `None` for an ordinary sampler.
     pub compare: Option<wgpu::CompareFunction>,
 }
 
 impl Program {
-    /// Adds textures, zeroed, and samplers.
+    /// Adds textures, filled with zeros, and samplers.
     ///
     /// # Errors
     /// [`GpuError::Lost`].
@@ -64,17 +64,17 @@ impl Program {
         Ok(self)
     }
 
-    /// The texture of that name.
+    /// Returns the texture with this name.
     ///
     /// # Panics
-    /// Where the program holds none: a recording that its plan does not cover is a bug.
+    /// If the program has none: a recording that its plan does not cover is a bug.
     pub fn texture(&self, name: &str) -> &Texture {
         self.textures
             .get(name)
             .unwrap_or_else(|| panic!("texture `{name}` is not in the program"))
     }
 
-    /// The sampler of that name.
+    /// Returns the sampler with this name.
     ///
     /// # Panics
     /// As [`Self::texture`].
@@ -84,7 +84,7 @@ impl Program {
             .unwrap_or_else(|| panic!("sampler `{name}` is not in the program"))
     }
 
-    /// Writes every texel of a texture, row by row, before whatever is submitted next.
+    /// Writes all texels of a texture, row by row, ordered before later submissions.
     pub fn upload_texture(&self, name: &str, texels: &[u8]) {
         let texture = self.texture(name);
         let layout = wgpu::TexelCopyBufferLayout {

@@ -19,7 +19,7 @@ pub struct Timer {
     total: BTreeMap<&'static str, Total>,
 }
 
-/// Of all runs of a pass.
+/// Totals over all runs of a pass.
 #[derive(Clone, Copy)]
 struct Total {
     seconds: f64,
@@ -29,9 +29,9 @@ struct Total {
 }
 
 enum Clock {
-    /// The device's own.
+    /// Device timestamps.
     Device(Queries),
-    /// The host's: each step is submitted and waited for by itself.
+    /// Host clock: each command is submitted and waited for separately.
     Host,
 }
 
@@ -42,12 +42,12 @@ struct Queries {
     seconds_per_tick: f64,
 }
 
-/// Steps between two readings; two queries each.
+/// Commands between two readbacks; each takes two queries.
 const TIMED_AT_ONCE: usize = wgpu::QUERY_SET_MAX_QUERIES as usize / 2;
 
 impl Timer {
-    /// By the device's clock; by the host's on adapters without timestamps and on those of software, whose timestamps say
-    /// when a pass was queued.
+    /// Uses device timestamps; the host clock on adapters without them, and on software adapters,
+    /// whose timestamps tell when a pass was queued.
     pub fn new(context: &Context) -> Self {
         let is_software = context.info.device_type == wgpu::DeviceType::Cpu;
         let clock = match context.has_timestamps && !is_software {
@@ -61,10 +61,12 @@ impl Timer {
         }
     }
 
-    /// What `made` makes of each pass, by name: of its seconds and runs; of the bytes that its runs move if each buffer that it binds is read
-    /// and written once, as far as it reads and writes it, 0 of raster passes; and of the operations that its runs do. Each dispatch's are
-    /// counted at its first run and at one in seven after it, and taken to be as many in between; `None` of raster passes, where none
-    /// are counted, and where the adapter binds no buffer more than the pass has.
+    /// Calls `made` for each pass, by name, with its seconds, its runs, the bytes that its runs
+    /// move if each binding is read and written once as far as the pass reads and writes it (0 for
+    /// raster passes), and the operations of its runs. Operations of a dispatch are counted at its
+    /// first run and at one in seven after it, and assumed to be the same in between; `None` for
+    /// raster passes, if counting is off, and if the adapter does not support one buffer more than
+    /// the pass has.
     pub fn times<T>(
         &self,
         made: impl Fn(&'static str, f64, u64, u64, Option<Operations>) -> T,
@@ -186,7 +188,8 @@ impl Queries {
         Ok(())
     }
 
-    /// Encodes a step; a pass writes its begin and end at the queries `first` and the one after. Whether it is one.
+    /// Encodes a command; a pass writes its begin and end to the query `first` and the next one.
+    /// Returns whether it is a pass.
     fn encode(
         &self,
         step: &Recorded,

@@ -1,10 +1,10 @@
-//! Every form in which a pass that ships can be composed, for tests of all of them.
+//! All variants in which the shipped passes can be composed, for tests that cover them all.
 
 use std::collections::BTreeSet;
 
 use super::{adapter::GpuError, shader};
 
-/// Conditions that a plan can set; every pass must compose under each.
+/// Combinations of conditions that a plan can set; every pass must compose under each.
 const VARIANTS: [&[&str]; 65] = [
     &[],
     &["SOLIDS"],
@@ -100,7 +100,8 @@ const VARIANTS: [&[&str]; 65] = [
     &["LISTED", "DRY", "MATERIALS", "PALETTE", "SPRAY", "LIGHTS"],
 ];
 
-/// `neighbor_list` holds lists, so build_neighbors has no form without them; and rays alone go through a volume.
+/// `neighbor_list` holds lists, so build_neighbors has no variant without them; and only ray
+/// tracing passes render a volume.
 fn is_meaningful(pass: &str, defines: &[&str]) -> bool {
     let has_lists = pass != "pbf/build_neighbors" || defines.contains(&"NEIGHBOR_LIST");
     has_lists && (pass.starts_with("rays/") || !defines.contains(&"VOLUME"))
@@ -111,13 +112,13 @@ fn is_meaningful(pass: &str, defines: &[&str]) -> bool {
 pub struct Form {
     /// Pass name.
     pub pass: String,
-    /// Conditions.
+    /// Names for which `#ifdef` holds.
     pub defines: &'static [&'static str],
-    /// WGSL.
+    /// Composed WGSL.
     pub text: String,
 }
 
-/// All forms of all passes, each text once.
+/// Composes all distinct variants of all passes.
 ///
 /// # Errors
 /// [`GpuError::Shader`] for a shader that does not compose.
@@ -160,7 +161,7 @@ mod tests {
         {
             let reflection =
                 reflect(pass, text).unwrap_or_else(|error| panic!("{pass} {defines:?}: {error}"));
-            // Nothing but the projection may ask an adapter for f64, and that only where it is told to.
+            // Only the projection may require f64, and only when told to.
             let is_wide = pass.starts_with("pressure/") && defines.contains(&"F64");
             assert!(is_wide || !reflection.has_f64, "{pass} {defines:?}");
             let size = reflection.workgroup_size;
@@ -187,7 +188,7 @@ mod tests {
                 "{pass}: a binding index twice"
             );
         }
-        // Negative control: a type that is not declared.
+        // Negative control: an undeclared type.
         let text = shader::compose("pbf/predict", &[]).expect("it composes");
         assert!(reflect("pbf/predict", &text).is_ok());
         let spoiled = format!("{text}\nfn spoiled(x: Nothing) {{}}\n");

@@ -1,4 +1,4 @@
-//! The water of an emitter without a level: a lattice that moves through its room.
+//! Inflow of an emitter without a level: a lattice that moves through its volume.
 
 use std::ops::Range;
 
@@ -9,11 +9,12 @@ use super::{
     super::bounds::Bounds, Emitter, ON_FACE, Promise, Shape, Solids, Sources, flow, places, swept,
 };
 
-/// A position's way through the room is looked at so many times a spacing.
+/// Samples per spacing of a position's path through the volume.
 const LOOKS: f64 = 8.0;
 
-/// Of a spacing: as near to a solid a position is in it, however coordinates and distances round up to some hundred metres in 32 bits. A
-/// position that comes into a room in the plane of a solid's face is on that face.
+/// Distance to a solid below which a position counts as inside, in spacings: an allowance for the
+/// 32-bit rounding of coordinates and distances up to some hundred metres. A position that enters a
+/// volume in the plane of a solid's face is on that face.
 const TOUCHING: f64 = 1e-3;
 
 /// Layers of an oblique flow whose covered fraction is counted.
@@ -30,24 +31,25 @@ pub(super) struct Flow<'a> {
     lines: [Line; 3],
 }
 
-/// What a frame's end brings.
+/// Particles that enter at a frame's end.
 #[derive(Debug, Default, PartialEq)]
 pub(super) struct Brought {
-    /// Where particles enter.
+    /// Positions of the new particles.
     pub(super) born: Vec<DVec3>,
-    /// Particles that left the room in the frame, and found no open position in it.
+    /// Number of particles that left the volume during the frame without an open position in it.
     pub(super) blocked: u64,
 }
 
-/// When a position of the lattice is in the emitter's box, seconds: later than the first, and before the second.
+/// Time span in which a lattice position is in the emitter's box, seconds: after the first and
+/// before the second.
 type Passage = (f64, f64);
 
-/// What becomes of a position of the lattice in a span of time.
+/// Fate of a lattice position in a time span.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Fate {
-    /// It enters at this time.
+    /// It enters at this time, seconds.
     Born(f64),
-    /// It leaves the room without.
+    /// It leaves the volume without entering.
     Blocked,
 }
 
@@ -66,7 +68,7 @@ impl<'a> Flow<'a> {
         }
     }
 
-    /// What enters at the end of a frame.
+    /// Particles that enter at the end of a frame.
     pub(super) fn brings(&self, frame: u32) -> Brought {
         let sources = self.sources;
         let (begin, end) = (sources.time(frame.saturating_sub(1)), sources.time(frame));
@@ -180,7 +182,7 @@ impl<'a> Flow<'a> {
         looked
     }
 
-    /// Positions that may be in the room at some time of a span, x fastest.
+    /// Lattice positions that may be in the volume at some time of a span, x fastest.
     fn cells(&self, begin: f64, end: f64) -> impl ParallelIterator<Item = [i64; 3]> {
         let [x, y, z] = [0, 1, 2].map(|axis: usize| self.lines[axis].cells_within(begin, end));
         let rows: Vec<_> = z.flat_map(|k| y.clone().map(move |j| (j, k))).collect();
@@ -199,12 +201,12 @@ impl<'a> Flow<'a> {
         (enter < leave).then_some((enter, leave))
     }
 
-    /// What becomes of a position later than `begin` and not later than `end`. When it enters is a function of the position and the
-    /// scene alone, so that frames of any length find the same.
+    /// Fate of a position later than `begin` and not later than `end`. The time at which it enters
+    /// depends only on the position and the scene, so that frames of any length find the same.
     fn fate(&self, cell: [i64; 3], begin: f64, end: f64) -> Option<Fate> {
         let window = self.emitter.window;
         let (enter, leave) = self.passage(cell)?;
-        // What is in the room where the emitter begins does not come into it.
+        // Water inside the volume when the emitter begins does not enter.
         if enter <= window.from.max(0.0) || enter > end || window.is_over(enter) {
             return None;
         }
@@ -215,7 +217,7 @@ impl<'a> Flow<'a> {
         if last <= begin {
             return None;
         }
-        // Mostly it entered long ago: the newest look before the span sees it.
+        // Most positions entered long ago: the newest sample before the span shows it.
         if self
             .newest_look(enter, begin)
             .is_some_and(|time| self.is_open(cell, time))
@@ -233,7 +235,7 @@ impl<'a> Flow<'a> {
         (last <= end && was_inside).then_some(Fate::Blocked)
     }
 
-    /// Times at which a position is looked at on its way through the box.
+    /// Times at which a position's path through the box is sampled.
     fn looks(&self, (enter, leave): Passage) -> impl Iterator<Item = f64> {
         let step = self.step();
         (0..)
@@ -241,34 +243,35 @@ impl<'a> Flow<'a> {
             .take_while(move |time| *time < leave)
     }
 
-    /// The newest of them not later than `time`; `None` where all are.
+    /// Newest of these times that is not later than `time`; `None` if all are later.
     fn newest_look(&self, enter: f64, time: f64) -> Option<f64> {
         let step = self.step();
         let look = |k: u32| enter + f64::from(k) * step;
         let near = ((time - enter) / step).ceil().max(0.0) as u32;
-        // However the quotient rounds.
+        // Corrects for the rounding of the quotient.
         let near = [near + 1, near, near.saturating_sub(1)].map(look);
         near.into_iter().find(|look| *look <= time)
     }
 
-    /// From a look to the next, seconds.
+    /// Time between samples, seconds.
     fn step(&self) -> f64 {
         self.duration(1.0 / LOOKS)
     }
 
-    /// m/s; squares of the least velocities are no numbers.
+    /// Speed, m/s, scaled so that the squares of tiny velocities do not underflow.
     fn speed(&self) -> f64 {
         let velocity = self.emitter.velocity;
         let most = velocity.abs().max_element();
         most * (velocity / most).length()
     }
 
-    /// Whether a position in the box is in the room.
+    /// Whether a position in the box is in the volume.
     fn is_inside(&self, cell: [i64; 3], time: f64) -> bool {
         self.emitter.shape.is_in_mesh(self.at(cell, time))
     }
 
-    /// Whether it is in the room, and in no solid as these are at the end of the frame: then they are met.
+    /// Whether it is in the volume and outside of the solids in their poses at the end of the
+    /// frame, when the particle would meet them.
     fn is_open(&self, cell: [i64; 3], time: f64) -> bool {
         let p = self.at(cell, time);
         let seconds = self.sources.time(self.sources.frame_of(time));
@@ -276,8 +279,8 @@ impl<'a> Flow<'a> {
         self.emitter.shape.is_in_mesh(p) && self.solids.distance(p, seconds) > least
     }
 
-    /// Where a particle that came in at `birth` is at the end of its frame. Where its way from there meets a solid or an end of the
-    /// domain, the frame's water is spread over the open part of the way.
+    /// Position at the end of its frame of a particle that came in at `birth`. If its path meets a
+    /// solid or an end of the domain, the frame's water is spread over the open part of the path.
     fn entrance(&self, cell: [i64; 3], birth: f64, frame: u32) -> Option<DVec3> {
         let sources = self.sources;
         let (begin, end) = (sources.time(frame.saturating_sub(1)), sources.time(frame));
@@ -294,23 +297,23 @@ impl<'a> Flow<'a> {
     }
 }
 
-/// What was seen of a position on its way.
+/// Result of sampling a position's path.
 #[derive(Clone, Copy, Debug, Default)]
 struct Looked {
     is_inside: bool,
     is_open: bool,
 }
 
-/// An axis of a lattice that moves through a box.
+/// One axis of a lattice that moves through a box.
 struct Line {
     min: f64,
     max: f64,
-    /// Of the place 0 at the start, metres.
+    /// Coordinate of position 0 at the start, metres.
     first: f64,
     spacing: f64,
-    /// m/s.
+    /// Velocity along the axis, m/s.
     speed: f64,
-    /// Where it stands still, how many places it has.
+    /// Number of positions along an axis without motion; `None` along others.
     places: Option<usize>,
 }
 
@@ -318,7 +321,7 @@ impl Line {
     fn of(bounds: &Bounds, axis: usize, speed: f64, spacing: f64) -> Self {
         let (min, max) = (bounds.min[axis], bounds.max[axis]);
         let places = (speed == 0.0).then(|| places(max - min, spacing));
-        // Across the flow places lie about the middle.
+        // Across the flow, positions are centred.
         let first = match places {
             Some(n) => 0.5 * (min + max) - 0.5 * spacing * (n as f64 - 1.0),
             None => min + 0.5 * spacing,
@@ -337,8 +340,9 @@ impl Line {
         self.first + self.spacing * cell as f64 + self.speed * time
     }
 
-    /// When a position is in the box along this axis: where it stands still, always. One on a face of the room is one at its least
-    /// face, however it rounds.
+    /// Time span in which a position is in the box along this axis; `None`, which means always,
+    /// without motion. A position on a face of the volume counts as on its least face, however
+    /// it rounds.
     fn passage(&self, cell: i64) -> Option<Passage> {
         if self.places.is_some() {
             return None;

@@ -1,22 +1,22 @@
-//! Solids as water that enters meets them.
+//! Solids as obstacles for water that enters.
 
 use glam::DVec3;
 
 use super::super::{pose::Pose, signed_distance::SignedDistance};
 
-/// Solids that stand and solids that move.
+/// Static and moving solids.
 #[derive(Clone, Copy)]
 pub struct Solids<'a> {
-    /// The union of those that stand; `None` where none does.
+    /// Distance to the union of the static solids; `None` if there are none.
     pub still: Option<&'a SignedDistance>,
-    /// Each of those that move, where it stood at the start.
+    /// Distance to each moving solid, in its pose at the start.
     pub moving: &'a [SignedDistance],
-    /// Where one of those is, by its index, at a time in seconds.
+    /// Pose of a moving solid, given by its index, at a time in seconds.
     pub pose: &'a (dyn Fn(usize, f64) -> Pose + Sync),
 }
 
 impl<'a> Solids<'a> {
-    /// Those that stand alone.
+    /// Builds the solids of a scene in which none moves.
     pub fn still(still: Option<&'a SignedDistance>) -> Self {
         Self {
             still,
@@ -25,12 +25,12 @@ impl<'a> Solids<'a> {
         }
     }
 
-    /// Whether there are none.
+    /// Returns whether there are no solids.
     pub(super) fn is_empty(&self) -> bool {
         self.still.is_none() && self.moving.is_empty()
     }
 
-    /// To the nearest at a time, metres, negative within; infinite where there is none.
+    /// Distance to the nearest solid at a time, metres, negative inside; infinite without solids.
     pub(super) fn distance(&self, p: DVec3, seconds: f64) -> f64 {
         let all = self.all(seconds);
         all.fold(f64::INFINITY, |least, (field, pose)| {
@@ -38,7 +38,7 @@ impl<'a> Solids<'a> {
         })
     }
 
-    /// Of that distance, pointing away from the nearest solid.
+    /// Gradient of that distance, which points away from the nearest solid.
     pub(super) fn gradient(&self, p: DVec3, seconds: f64) -> DVec3 {
         let all = self.all(seconds);
         let nearest = all.min_by(|(a, at_a), (b, at_b)| {

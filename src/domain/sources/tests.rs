@@ -1,4 +1,4 @@
-//! What enters and leaves, counted by hand.
+//! Tests with inflow and outflow counted by hand.
 
 use super::{
     super::{
@@ -39,7 +39,7 @@ fn bounds(min: [f64; 3], max: [f64; 3]) -> Bounds {
     Bounds { min, max }
 }
 
-/// The distance to boxes, all over the nozzle and beyond.
+/// Distance to boxes, over the nozzle and beyond.
 fn solid(boxes: &[Bounds]) -> SignedDistance {
     let meshes: Vec<_> = boxes.iter().map(|it| box_mesh(*it)).collect();
     let around = bounds([-1.0; 3], [2.0; 3]);
@@ -52,7 +52,7 @@ pub(super) fn run(sources: &Sources, frames: u32) -> (Particles, u32, Vec<Exchan
     meeting(sources, &Solids::still(None), frames)
 }
 
-/// The same before solids.
+/// Same with solids.
 fn meeting(sources: &Sources, solids: &Solids<'_>, frames: u32) -> (Particles, u32, Vec<Exchange>) {
     let (mut particles, mut next_id) = (Particles::default(), 0);
     let exchanges = (1..=frames)
@@ -61,8 +61,8 @@ fn meeting(sources: &Sources, solids: &Solids<'_>, frames: u32) -> (Particles, u
     (particles, next_id, exchanges)
 }
 
-/// 2 m/s through 3 × 2 places: after 3 s 6 m of water, 60 layers of 6, whatever a frame holds; and each on its place of one
-/// lattice that moves, so that none is nearer to another than the spacing.
+/// 2 m/s through 3 × 2 positions: after 3 s 6 m of water, 60 layers of 6, whatever the frame rate.
+/// All are positions of one moving lattice, so that no two are closer than the spacing.
 #[test]
 fn a_flow_brings_velocity_times_cross_section() {
     let sources = with(vec![nozzle(DVec3::new(2.0, 0.0, 0.0))], Vec::new());
@@ -70,10 +70,10 @@ fn a_flow_brings_velocity_times_cross_section() {
     assert_eq!((particles.len(), next_id), (360, 360));
     assert_eq!(particles.id, (0..360).collect::<Vec<_>>());
     let counts: Vec<u64> = exchanges.iter().map(|exchange| exchange.entered).collect();
-    // 0.8 layers a frame: four frames of one, and one of none.
+    // 0.8 layers per frame: four frames with one layer, and one without.
     assert!(counts.iter().all(|&n| n == 0 || n == 6), "{counts:?}");
     assert_eq!(counts[..5].iter().sum::<u64>(), 24, "{counts:?}");
-    // Where the water flows as it came in, all of it is one lattice.
+    // If the water keeps its velocity, all of it forms one lattice.
     let mut places: Vec<[i64; 3]> = Vec::new();
     let (mut particles, mut next_id) = (Particles::default(), 0);
     for frame in 1..=75 {
@@ -94,7 +94,7 @@ fn a_flow_brings_velocity_times_cross_section() {
     assert_eq!(places.len(), 360);
 }
 
-/// Through a corner, water comes in by two faces: 0.3 × 0.2 m at 1 m/s, and 0.4 × 0.2 m at 0.5 m/s.
+/// At an angle, water comes in through two faces: 0.3 × 0.2 m at 1 m/s, and 0.4 × 0.2 m at 0.5 m/s.
 #[test]
 fn an_oblique_flow_brings_what_its_faces_take() {
     let velocity = DVec3::new(1.0, 0.5, 0.0);
@@ -102,7 +102,7 @@ fn an_oblique_flow_brings_what_its_faces_take() {
     let (particles, ..) = run(&sources, 250);
     let expected = 10.0 * (0.3 * 0.2 + 0.5 * 0.4 * 0.2) / D.powi(3);
     let found = particles.len() as f64;
-    // A layer of each face.
+    // One layer of each face.
     assert!((found - expected).abs() < 20.0, "{found} of {expected}");
     let size = DVec3::new(0.4, 0.3, 0.2);
     assert!((10.0 * flow(size, velocity, D) / D.powi(3) - expected).abs() < 1e-9);
@@ -113,7 +113,7 @@ fn what_passes_a_room_within_a_frame_is_too_fast_for_it() {
     let size = DVec3::new(0.4, 0.3, 0.2);
     assert!(is_long_enough(size, DVec3::new(10.0, 0.0, 0.0), 0.04));
     assert!(!is_long_enough(size, DVec3::new(10.1, 0.0, 0.0), 0.04));
-    // And it is so: all of it enters, and some is beyond the room.
+    // Confirmed by the exchange: all of the water enters, and some is beyond the volume.
     let beyond = |speed: f64| {
         let sources = with(vec![nozzle(DVec3::new(speed, 0.0, 0.0))], Vec::new());
         let (particles, ..) = run(&sources, 250);
@@ -139,7 +139,7 @@ fn a_window_is_the_frames_that_end_in_it() {
     assert_eq!(counts, expected);
 }
 
-/// A room half full of water that is packed at random gets what it lacks, block by block, and no more.
+/// A volume half full of randomly packed water gets what it lacks, block by block, and no more.
 #[test]
 fn a_level_is_kept_by_what_is_lacking() {
     let emitter = Emitter {
@@ -160,12 +160,12 @@ fn a_level_is_kept_by_what_is_lacking() {
             .entered,
         0
     );
-    // Half a block leaves, and as much comes back, with ids of its own.
+    // Half of the particles leave, and as many come back, with new ids.
     let keep: Vec<bool> = (0..particles.len()).map(|k| k % 2 == 0).collect();
     particles.retain(&keep);
     let again = sources.exchange(3, &none, &mut particles, &mut next_id);
     assert_eq!((again.entered, next_id), (128, 256 + 128));
-    // Crowded particles are none too few.
+    // Crowded particles are not too few.
     for x in &mut particles.position {
         *x = x.map(|x| (x / 0.2).floor() * 0.2 + 0.03);
     }
@@ -222,7 +222,7 @@ fn a_drain_takes_what_it_may() {
     assert_eq!(left[0], 150);
     let above = |x: &&[f32; 3]| x[0] < 0.5 && x[1] > 0.7;
     assert_eq!(rest.position.iter().filter(above).count(), 0);
-    // 0.2 m³/s are 8 particles a frame, from all over the room.
+    // 0.2 m³/s are 8 particles per frame, from all over the volume.
     let (rest, left) = full(Drain {
         rate: Some(0.2),
         ..drain
@@ -259,7 +259,7 @@ fn water_is_not_born_in_solids_and_its_attributes_begin_at_zero() {
     assert_eq!(particles.attributes["affine"], [0.0; 6]);
 }
 
-/// A ball as a room: what enters is the ball's cross-section times the way.
+/// A ball as the volume: the inflow is the ball's cross-section times the distance.
 #[test]
 fn a_mesh_is_a_room_too() {
     let ball = sphere(DVec3::splat(0.5), 0.4, 24);
@@ -271,7 +271,7 @@ fn a_mesh_is_a_room_too() {
     let (particles, ..) = run(&with(vec![emitter], Vec::new()), 100);
     let expected = 4.0 * std::f64::consts::PI * 0.16 / D.powi(3);
     let found = particles.len() as f64;
-    // Columns of places about the circle: Gauss's circle problem for a radius of four.
+    // Columns of positions in the circle: Gauss's circle problem for a radius of four.
     assert!(
         (found / expected - 1.0).abs() < 0.05,
         "{found} of {expected}"
@@ -280,8 +280,9 @@ fn a_mesh_is_a_room_too() {
     assert!(particles.position.iter().all(|x| far(x) < 0.41));
 }
 
-/// Of an oblique flow some positions pass a corner of the room between two frames. They enter as well: after a second as many as velocity
-/// times faces say, to a layer of one of these, whatever the frame rate.
+/// In an oblique flow some positions pass a corner of the volume between two frames. They enter as
+/// well: after a second there are as many as velocity times area gives, to one layer of a face,
+/// whatever the frame rate.
 #[test]
 fn the_frame_rate_does_not_matter() {
     let velocity = DVec3::new(1.0, -1.0, 0.5);
@@ -295,13 +296,14 @@ fn the_frame_rate_does_not_matter() {
         assert!(exchanges.iter().all(|exchange| exchange.blocked == 0));
         particles.len()
     });
-    // At all of them the same positions came in, to the last digit of a time.
+    // At all rates the same positions came in, to the last digit of a time.
     assert!(counts.iter().all(|count| *count == counts[0]), "{counts:?}");
     let expected = 4.0 * flow(size, velocity, D) / D.powi(3);
     // The largest face holds 4 × 3 positions.
     let off = (counts[0] as f64 - expected).abs();
     assert!(off <= 12.0, "{counts:?} of {expected}");
-    // Each where the lattice is at the frame's end: beyond the room's edges too, and no two in one place.
+    // Each is where the lattice is at the frame's end, even beyond the volume's edges, and no
+    // two coincide.
     let sources = Sources {
         frames_per_second: 12.0,
         ..with(vec![nozzle(velocity)], Vec::new())
@@ -323,7 +325,7 @@ fn the_frame_rate_does_not_matter() {
     }
 }
 
-/// A window that begins and ends within frames brings what comes in between the two.
+/// A window that begins and ends within frames brings what enters between the two times.
 #[test]
 fn a_window_is_as_long_at_any_frame_rate() {
     let mut emitter = nozzle(DVec3::new(2.5, 0.0, 0.0));
@@ -348,7 +350,7 @@ fn is_clear(particles: &Particles, solid: &SignedDistance) -> bool {
     all.all(|x| solid.sample(at(x)) > 0.0)
 }
 
-/// The room begins within a wall: water enters where it comes out of it.
+/// The volume begins within a wall: water enters where it comes out of it.
 #[test]
 fn water_that_a_solid_covers_enters_where_it_comes_out() {
     let wall = solid(&[bounds([-0.5; 3], [0.13, 0.8, 0.8])]);
@@ -360,7 +362,8 @@ fn water_that_a_solid_covers_enters_where_it_comes_out() {
         };
         let frames = 3 * rate as u32;
         let (particles, _, exchanges) = meeting(&sources, &solids, frames);
-        // 60 layers of six come in, and of the last one or two are on their way: 0.13 m are 1.3 spacings, seen by eighths of one.
+        // 60 layers of six come in, and the last one or two are still on their way: 0.13 m are 1.3
+        // spacings, sampled at an eighth of a spacing.
         let layers = particles.len() / 6;
         assert!((58..=59).contains(&layers), "{layers} layers");
         assert!(is_clear(&particles, &wall));
@@ -383,7 +386,7 @@ fn water_that_a_solid_covers_enters_where_it_comes_out() {
     }
 }
 
-/// A pipe as wide as the room: all of it enters, however the walls' distance rounds.
+/// A pipe as wide as the volume: all of the water enters, however the distance to the walls rounds.
 #[test]
 fn a_room_that_fills_a_pipe_brings_all_of_it() {
     let pipe = [
@@ -398,7 +401,8 @@ fn a_room_that_fills_a_pipe_brings_all_of_it() {
     assert_eq!(particles.len(), 360);
     let straight = run(&sources, 75).0;
     assert_eq!(particles, straight, "nothing is nearer than water at rest");
-    // A room that reaches into the wall: of three rows the outer one is in it, and the next, a fifth of a spacing off, is moved away.
+    // A volume that reaches into the wall: of three rows the outer one is in it, and the next, a
+    // fifth of a spacing away, is moved.
     let mut low = nozzle(DVec3::new(2.0, 0.0, 0.0));
     low.shape = block([0.0, -0.13, 0.0], [0.4, 0.17, 0.2]);
     let sources = with(vec![low], Vec::new());
@@ -406,14 +410,15 @@ fn a_room_that_fills_a_pipe_brings_all_of_it() {
     let clearance = |x: &[f32; 3]| walls.sample(glam::Vec3::from_array(*x).as_dvec3());
     let least = particles.position.iter().map(clearance).fold(1.0, f64::min);
     assert_eq!(particles.len(), 240);
-    // To rounding of f32 at a metre.
+    // To f32 rounding at a metre.
     assert!((least / D - 0.3).abs() < 1e-5, "{least}");
 }
 
-/// What a solid covers all along is no part of the promise, and is counted where it leaves the room.
+/// A part that a solid covers all along is excluded from the prediction, and counted where it
+/// leaves the volume.
 #[test]
 fn water_that_never_comes_out_is_counted() {
-    // Over the lower third of the cross-section; behind the room, open again.
+    // A beam over the lower third of the cross-section; behind the volume it is open again.
     let beam = solid(&[bounds([-0.5, -0.5, -0.5], [0.45, 0.1, 0.8])]);
     let sources = with(vec![nozzle(DVec3::new(2.0, 0.0, 0.0))], Vec::new());
     let (particles, _, exchanges) = meeting(&sources, &Solids::still(Some(&beam)), 75);
@@ -424,12 +429,12 @@ fn water_that_never_comes_out_is_counted() {
     };
     assert!((promise.covered - 1.0 / 3.0).abs() < 1e-12, "{promise:?}");
     assert!((promise.rate - 2.0 * 0.04).abs() < 1e-12, "{promise:?}");
-    // Two columns of 60 layers, less those that are still in the room, which four layers fill.
+    // Two columns of 60 layers, less the four layers that are still in the volume.
     let blocked: u64 = exchanges.iter().map(|exchange| exchange.blocked).sum();
     assert_eq!(blocked, 2 * 56);
 }
 
-/// A beam whose end lies in the plane where water comes into the room covers as much as one that begins before it.
+/// A beam that ends in the plane where water enters covers as much as one that begins before it.
 #[test]
 fn a_solid_flush_with_the_room_covers_it() {
     let entered = |from: f64| {
@@ -447,7 +452,7 @@ fn a_solid_flush_with_the_room_covers_it() {
     assert!(flush.1 > 0 && flush.2 > 0.3, "{flush:?}");
 }
 
-/// A post within the room: what entered before it does not enter again behind it.
+/// A post within the volume: what entered before it does not enter again behind it.
 #[test]
 fn water_enters_once() {
     let post = solid(&[bounds([0.15, -0.5, -0.5], [0.25, 0.8, 0.8])]);
@@ -458,7 +463,7 @@ fn water_enters_once() {
     assert!(particles.position.iter().all(|x| x[0] < 0.2));
 }
 
-/// A frame's water that would be within a solid at its end is spread over the open way before it.
+/// A frame's water that would be within a solid at its end is spread over the open path before it.
 #[test]
 fn a_frames_water_before_a_wall_is_spread() {
     let wall = solid(&[bounds([0.1, -0.5, -0.5], [0.6, 0.8, 0.8])]);
@@ -494,7 +499,7 @@ fn water_enters_within_the_domain() {
     let domain = sources.domain.grown(1e-6);
     let at = |x: &[f32; 3]| glam::Vec3::from_array(*x).as_dvec3();
     assert!(particles.position.iter().all(|x| domain.contains(at(x))));
-    // Without ends some of it is beyond them.
+    // Without limits some of it would be beyond them.
     let free = with(sources.emitters, Vec::new());
     let free = Sources {
         frames_per_second: 5.0,
@@ -504,7 +509,8 @@ fn water_enters_within_the_domain() {
     assert!(particles.position.iter().any(|x| !domain.contains(at(x))));
 }
 
-/// A lid that lies over the room goes away after a second: what it covers then enters where it is.
+/// A lid over the volume goes away after a second: the water that it covered then enters where
+/// it is.
 #[test]
 fn water_waits_for_a_solid_that_moves() {
     let lid = [solid(&[bounds([-0.5; 3], [0.8; 3])])];
@@ -521,7 +527,7 @@ fn water_waits_for_a_solid_that_moves() {
     let (.., exchanges) = meeting(&sources, &solids, 75);
     let entered = |of: &[Exchange]| of.iter().map(|it| it.entered).sum::<u64>();
     assert_eq!(entered(&exchanges[..25]), 0);
-    // What is in the room: four layers; the control: all that came until then.
+    // Four layers are in the volume; as a control, all that came until then are blocked.
     let first = exchanges[25].entered;
     assert!((24..=30).contains(&first), "{first}");
     assert_eq!(entered(&exchanges), 240 + 24);
@@ -529,7 +535,8 @@ fn water_waits_for_a_solid_that_moves() {
     assert_eq!(entered(&exchanges) + blocked, 360);
 }
 
-/// What a mesh brings is of its own cross-section; one that a line meets twice brings its water once.
+/// The prediction for a mesh uses its own cross-section; a line that crosses the mesh twice brings
+/// its water once.
 #[test]
 fn a_mesh_is_promised_by_its_own_cross_section() {
     let ball = sphere(DVec3::splat(0.5), 0.4, 24);
@@ -544,7 +551,7 @@ fn a_mesh_is_promised_by_its_own_cross_section() {
     assert_eq!(promise.covered, 0.0);
     let (particles, ..) = run(&sources, 100);
     let promised = 4.0 * promise.rate / D.powi(3);
-    // The rows' ways to the ball's face are a few spacings.
+    // The rows' distances to the ball's face are a few spacings.
     let found = particles.len() as f64;
     assert!(
         found <= promised && found > 0.9 * promised,

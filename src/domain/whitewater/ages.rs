@@ -1,12 +1,13 @@
-//! Deaths: foam lives for its time, and for less where it is crowded.
+//! Deaths: foam has a limited lifetime, which is shorter where it is crowded.
 
 use rayon::prelude::*;
 
 use super::{AGE, KIND, Kind, LIFE, Settings};
 use crate::particles::Particles;
 
-/// Lets `seconds` pass: all grow older, foam loses life, by as many times more as its cube of one spacing holds more foam than
-/// `settings.crowd`; those that have none left are taken out. How many went.
+/// Advances ages by `seconds` and reduces the life of foam, by a factor that rises with the number
+/// of foam particles in its cube of one spacing once there are more than `settings.crowd`. Removes
+/// particles without life left, and returns how many.
 pub fn grow_older(
     settings: &Settings,
     particles: &mut Particles,
@@ -43,7 +44,7 @@ fn is_foam(particles: &Particles, k: usize) -> bool {
     particles.attributes[KIND][k] == Kind::Foam.number()
 }
 
-/// The cubes in which foam is, one entry a particle, sorted.
+/// The cubes that contain foam, sorted, one entry per particle.
 struct Crowds {
     spacing: f64,
     cubes: Vec<[i32; 3]>,
@@ -60,7 +61,7 @@ impl Crowds {
         Self { spacing, cubes }
     }
 
-    /// How much foam is in the cube of a place.
+    /// Number of foam particles in the cube of a position.
     fn about(&self, place: [f32; 3]) -> usize {
         let cube = cube_of(place, self.spacing);
         let end = self.cubes.partition_point(|other| *other <= cube);
@@ -120,7 +121,7 @@ mod tests {
         let mut packed = crowd(3 * settings.crowd, Kind::Foam, 1.0);
         assert_eq!(grow_older(&settings, &mut packed, 0.1, 0.25), 0);
         assert_eq!(packed.attributes[LIFE][0], 0.25);
-        // Bubbles in the same place crowd no one.
+        // Bubbles in the same position do not crowd foam.
         let mut few = crowd(settings.crowd, Kind::Foam, 1.0);
         let mut bubbles = crowd(3 * settings.crowd, Kind::Bubble, 1.0);
         few.position.append(&mut bubbles.position);

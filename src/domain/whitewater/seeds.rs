@@ -1,4 +1,4 @@
-//! Births: how much whitewater each water particle gives, and where it begins.
+//! Births: how many whitewater particles each water particle emits, and where they begin.
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -6,31 +6,31 @@ use rayon::prelude::*;
 use super::{AGE, KIND, Kind, LIFE, Potentials, RADIUS, Settings, random, thresholds::grown};
 use crate::{bounds::Bounds, particles::Particles, period::Period};
 
-/// Random numbers of a birth, from which on those of the next begin.
+/// Random channels reserved per birth.
 const CHANNELS: u32 = 8;
 
 /// Water at a frame's end.
 #[derive(Clone, Copy, Debug)]
 pub struct Source<'a> {
-    /// Its particles.
+    /// The water's particles.
     pub water: &'a Particles,
-    /// Of each of them.
+    /// Potentials of each particle.
     pub potentials: &'a [Potentials],
     /// Frame number.
     pub frame: u32,
-    /// Since the frame before, seconds.
+    /// Time since the previous frame, seconds.
     pub seconds: f64,
-    /// Between particles, metres.
+    /// Particle spacing, metres.
     pub spacing: f64,
-    /// The box now, wave-makers included.
+    /// The domain's box at this time, with wave makers at their positions.
     pub walls: Bounds,
     /// The domain's least corner, metres.
     pub corner: DVec3,
-    /// Where the domain joins its own end.
+    /// Periods of the domain.
     pub period: Period,
 }
 
-/// What was born at a frame.
+/// Particles born at a frame.
 #[derive(Clone, Debug, Default)]
 pub struct Births {
     born: Vec<Born>,
@@ -46,9 +46,10 @@ struct Born {
 }
 
 impl Births {
-    /// n = Φ_ke (k_ta Φ_ta + k_wc Φ_wc) Δt of each particle (Ihmsen 2012, eq. 8), a part of one by chance, in a cylinder about its
-    /// place along its velocity: its radius is half a spacing, and so is its length, as a frame's own way would lead ahead of the
-    /// water.
+    /// Emits n = Φ_ke (k_ta Φ_ta + k_wc Φ_wc) Δt whitewater particles per water particle (Ihmsen
+    /// 2012, eq. 8), with stochastic rounding. They begin in a cylinder around its position along
+    /// its velocity, with a radius and a length of half a spacing; the paper's length, the distance
+    /// moved in a frame, would lead ahead of the water.
     pub fn of(settings: &Settings, source: &Source<'_>) -> Self {
         let n = source.water.len();
         let born = (0..n).into_par_iter().flat_map_iter(|i| {
@@ -63,17 +64,17 @@ impl Births {
         }
     }
 
-    /// How many.
+    /// Returns the number of births.
     pub fn len(&self) -> usize {
         self.born.len()
     }
 
-    /// Whether there is none.
+    /// Returns whether there are no births.
     pub fn is_empty(&self) -> bool {
         self.born.is_empty()
     }
 
-    /// Puts them behind those that are there, with ids from `next` on; the next free one.
+    /// Appends the new particles with ids from `next` on, and returns the next free id.
     pub fn join(&self, particles: &mut Particles, next: u32) -> u32 {
         let born = &self.born;
         particles
@@ -95,7 +96,7 @@ impl Births {
     }
 }
 
-/// How strong the stronger of its two causes is, 0 to 1, and how many a particle gives in `seconds`.
+/// Strength of the stronger of the two causes, 0 to 1, and expected number of births in `seconds`.
 fn strength(settings: &Settings, potentials: &Potentials, seconds: f64) -> (f64, f64) {
     let thresholds = &settings.thresholds;
     let trapped_air = grown(potentials.trapped_air, thresholds.trapped_air);
@@ -117,13 +118,13 @@ fn seed(settings: &Settings, source: &Source<'_>, i: usize, potential: f64, chan
     let along = v.try_normalize().unwrap_or(DVec3::Y);
     let (across, aside) = along.any_orthonormal_pair();
     let (sin, cos) = (std::f64::consts::TAU * random(0)).sin_cos();
-    // Even over the disc.
+    // Uniform over the disc.
     let r = 0.5 * source.spacing * random(1).sqrt();
     let offset =
         r * (cos * across + sin * aside) + 0.5 * source.spacing * (random(2) - 0.5) * along;
     let inside = (x + offset).clamp(source.walls.min, source.walls.max);
     let between = |[least, greatest]: [f64; 2], part: f64| least + (greatest - least) * part;
-    // Stronger causes leave foam that lives longer (Ihmsen 2012, section 3.3).
+    // Stronger causes give foam with a longer life (Ihmsen 2012, section 3.3).
     let life = between(settings.lifetime, potential * random(3));
     let place = source.period.wrap(inside - source.corner) + source.corner;
     Born {
@@ -131,7 +132,7 @@ fn seed(settings: &Settings, source: &Source<'_>, i: usize, potential: f64, chan
         velocity: v.as_vec3(),
         kind: Kind::of_share(source.potentials[i].share),
         life: life as f32,
-        // Small ones are many: the square puts the mean at a third of the way.
+        // Most are small: the square puts the mean at a third of the range.
         radius: between(settings.radius, random(4).powi(2)) as f32,
     }
 }
@@ -178,12 +179,13 @@ mod tests {
         ]
     }
 
-    /// Rate times seconds times particles, within four standard errors of that many chances of a half.
+    /// Rate times seconds times particles, within four standard errors of as many coin flips.
     #[test]
     fn births_follow_the_rate() {
         let water = water(4000);
         let settings = settings();
-        // Half way between the thresholds: 25 a second and particle, 1 in 0.04 s; energy is full.
+        // Half-way between the thresholds the rate is 25 per second and particle, 1 in 0.04 s; the
+        // energy potential is 1.
         let [least, greatest] = settings.thresholds.trapped_air;
         let half = potentials(4000, 0.5 * (least + greatest));
         let count = Births::of(&settings, &source(&water, &half)).len() as f64;
@@ -192,7 +194,7 @@ mod tests {
             (count - expected).abs() < 4.0 * (0.25 * 4000f64).sqrt(),
             "{count} {expected}"
         );
-        // Below the threshold nothing is born, and without energy neither.
+        // Nothing is born below the threshold, nor without energy.
         let none = potentials(4000, least);
         assert!(Births::of(&settings, &source(&water, &none)).is_empty());
         let mut slow = half;
@@ -218,7 +220,7 @@ mod tests {
         );
         for (k, x) in all.position.iter().enumerate() {
             let offset = Vec3::from_array(*x) - Vec3::splat(0.5);
-            // Across the velocity half a spacing, along it a quarter.
+            // Across the velocity up to half a spacing, along it a quarter.
             assert!(
                 offset.x.abs() <= 0.0251 && offset.length() < 0.06,
                 "{offset}"
@@ -228,7 +230,7 @@ mod tests {
                 |value: f32, [least, most]: [f64; 2]| (least as f32..=most as f32).contains(&value);
             assert!(within(life, settings.lifetime) && within(radius, settings.radius));
         }
-        // The same again, and others with another seed.
+        // The result is reproducible, and differs for another seed.
         let again = Births::of(&settings, &source(&water, &full));
         let mut twice = none();
         again.join(&mut twice, 7);

@@ -1,48 +1,50 @@
-//! Thresholds between which a potential grows from nothing to all, and how a shot calibrates them.
+//! Thresholds between which a potential rises from 0 to 1, and their calibration for a shot.
 
 use serde::{Deserialize, Serialize};
 
 use super::SUPPORT;
 
-/// Speed at which water that meets water begins to carry air under, m/s: about 1 m/s for plunging jets and for breakers (Chanson
-/// 1996, "Air bubble entrainment in free-surface turbulent shear flows", section 2.3).
+/// Speed of colliding water above which air is entrained, m/s: about 1 m/s for plunging jets and
+/// for breakers (Chanson 1996, "Air bubble entrainment in free-surface turbulent shear flows",
+/// section 2.3).
 const INCEPTION: f64 = 1.0;
-/// Part of the moving particles below the least threshold where a shot asks for more than the floors.
+/// Quantile of the moving particles at the lower threshold, if it exceeds the floor.
 const LEAST: f64 = 0.9;
-/// Part of them below the greatest one.
+/// Quantile of the moving particles at the upper threshold.
 const GREATEST: f64 = 0.995;
-/// Between the thresholds at least, as a factor.
+/// Smallest ratio of the upper threshold to the floor of the lower one.
 const SPAN: f64 = 4.0;
-/// Σ (1 − n·n') W at the top of the sharpest crest that a wave keeps, which is one of 120° (Stokes 1880): the normals of its flanks
-/// are 30° off its own, a surface has π (h/d)² particles within h, and each weighs 1/3 in the mean.
+/// Σ (1 − n·n') W at the top of the sharpest crest of a steady wave, which has 120° (Stokes 1880):
+/// the normals of its flanks are 30° off its own, a surface has π (h/d)² particles within h, and
+/// the mean weight is 1/3.
 const CREST: f64 = std::f64::consts::PI * SUPPORT * SUPPORT / 3.0 * (1.0 - 0.866_025_403_784_438_6);
 
-/// What at one water particle makes whitewater.
+/// Quantities at one water particle that cause whitewater.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Potentials {
-    /// Σ |v_ij| (1 − v̂_ij · x̂_ij) W, m/s: water that meets water.
+    /// Trapped air, Σ |v_ij| (1 − v̂_ij · x̂_ij) W, m/s: water that collides with water.
     pub trapped_air: f64,
-    /// Σ (1 − n̂_i · n̂_j) W over a surface that bends away, where it moves outward.
+    /// Wave crest, Σ (1 − n̂_i · n̂_j) W over a convex surface where it moves outward.
     pub wave_crest: f64,
-    /// v²/2, J/kg.
+    /// Specific kinetic energy v²/2, J/kg.
     pub energy: f64,
-    /// Of water about it: 1 deep inside.
+    /// Share of water around the particle: 1 deep inside.
     pub share: f64,
 }
 
-/// From where to where each potential grows from 0 to 1.
+/// Lower and upper threshold between which each potential rises from 0 to 1.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Thresholds {
-    /// m/s.
+    /// Thresholds of trapped air, m/s.
     pub trapped_air: [f64; 2],
-    /// Without a unit.
+    /// Thresholds of wave crests, dimensionless.
     pub wave_crest: [f64; 2],
-    /// J/kg.
+    /// Thresholds of energy, J/kg.
     pub energy: [f64; 2],
 }
 
-/// Sum of [`Potentials::trapped_air`] where a front of water meets water at rest at [`INCEPTION`], of a particle half a spacing
-/// behind the front: 2π (h/d)³ ∫ (1 − r) (3 r²/2 − s r − s²/2) dr from s = d/2h to 1.
+/// [`Potentials::trapped_air`] of a particle half a spacing behind a front of water that meets
+/// water at rest at [`INCEPTION`]: 2π (h/d)³ ∫ (1 − r) (3 r²/2 − s r − s²/2) dr from s = d/2h to 1.
 fn trapped_at_inception() -> f64 {
     let s = 0.5 / SUPPORT;
     let up_to = |r: f64| {
@@ -52,8 +54,9 @@ fn trapped_at_inception() -> f64 {
 }
 
 impl Thresholds {
-    /// Those of a shot, from the potentials of its particles: where the moving tenth begins, and no lower than where nature does.
-    /// So a calm shot has no whitewater, and a wild one has it where it is wildest.
+    /// Calibrates the thresholds of a shot from the potentials of its particles: the lower one at
+    /// the top tenth of the moving particles, but not below the physical floor. A calm shot thus
+    /// has no whitewater, and a wild one has it where it is wildest.
     pub fn calibrate(potentials: &[Potentials]) -> Self {
         let floor = 0.5 * INCEPTION * INCEPTION;
         let moving: Vec<&Potentials> = potentials.iter().filter(|p| p.energy >= floor).collect();
@@ -66,7 +69,7 @@ impl Thresholds {
             };
             let least = quantile(LEAST).unwrap_or(0.0).max(floor);
             let greatest = quantile(GREATEST).unwrap_or(0.0).max(SPAN * floor);
-            // Both are written into a file that people read.
+            // Both are written to a file that people read.
             [least, greatest.max(1.5 * least)].map(rounded)
         };
         Self {
@@ -77,8 +80,8 @@ impl Thresholds {
     }
 }
 
-/// Energy from which on there is no want of it: that of the fastest tenth, as lone drops that fall are faster than any water that
-/// traps air.
+/// Upper threshold of energy: that of the fastest tenth of the moving particles. A higher quantile
+/// would be set by lone falling drops, which are faster than any water that traps air.
 fn energy(moving: &[&Potentials], floor: f64) -> f64 {
     let mut energies: Vec<f64> = moving.iter().map(|p| p.energy).collect();
     energies.sort_unstable_by(f64::total_cmp);
@@ -86,13 +89,13 @@ fn energy(moving: &[&Potentials], floor: f64) -> f64 {
     rounded(fast.copied().unwrap_or(0.0).max(SPAN * floor))
 }
 
-/// Three digits.
+/// Rounds to three significant digits.
 fn rounded(value: f64) -> f64 {
     let scale = 10f64.powi(2 - value.log10().floor() as i32);
     (value * scale).round() / scale
 }
 
-/// Φ: 0 up to the least threshold, 1 from the greatest on (Ihmsen 2012, eq. 1).
+/// Φ: 0 up to the lower threshold, 1 from the upper one on (Ihmsen 2012, eq. 1).
 pub(super) fn grown(value: f64, [least, greatest]: [f64; 2]) -> f64 {
     ((value - least) / (greatest - least)).clamp(0.0, 1.0)
 }
@@ -112,7 +115,7 @@ mod tests {
 
     #[test]
     fn calm_shots_keep_the_floors_and_wild_ones_rise_above() {
-        // Half a metre a second: below what carries air under, however much of it there is.
+        // 0.5 m/s is below the inception of air entrainment, whatever the potential.
         let calm = vec![of_speed(0.5, 40.0); 100];
         let floors = Thresholds::calibrate(&calm);
         assert_eq!(floors, Thresholds::calibrate(&[]));
@@ -125,8 +128,9 @@ mod tests {
         assert_eq!(thresholds.energy, [0.5, 8.0]);
     }
 
-    /// The sum that the floor stands for, over a lattice: water below a plane moves up at 1 m/s towards water at rest above it. One
-    /// particle in the last layer, its neighbours at rest on the other side; the lattice's sum is within 5 % of the integral.
+    /// Checks the floor against a lattice sum: water below a plane moves up at 1 m/s towards water
+    /// at rest above it. The sum for a particle in the last layer over its neighbours at rest on
+    /// the other side is within 5 % of the integral.
     #[test]
     fn the_floor_is_two_fronts_that_meet() {
         let mut sum = 0.0;
@@ -135,7 +139,7 @@ mod tests {
             for y in -reach..=reach {
                 for z in 1..=reach {
                     let r = f64::from(x * x + y * y + z * z).sqrt();
-                    // v_ij = +z, x_ij points from the other to this one: −z.
+                    // v_ij = +z; x_ij points from the other particle to this one: −z.
                     let cosine = -f64::from(z) / r;
                     sum += (1.0 - cosine) * (1.0 - r / SUPPORT).max(0.0);
                 }

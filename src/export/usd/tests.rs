@@ -65,7 +65,7 @@ fn a_root_plays_the_frames_that_it_is_given() {
         centre: way,
         ..Pose::START
     };
-    // Half a turn about z, about a point that stays.
+    // Half a turn about z, about a fixed point.
     let turned = Pose {
         rest: DVec3::X,
         centre: DVec3::X,
@@ -101,7 +101,8 @@ fn a_root_plays_the_frames_that_it_is_given() {
         assert!(text.contains(part), "{part}: {text}");
     }
     assert!(!text.contains("Camera") && !text.contains("wave_makers"));
-    // Of USD's grammar: a name with an @ stands between three, and @@@ in it behind a backslash.
+    // USD's grammar: a name with an @ is enclosed in three, and @@@ within it is escaped by
+    // a backslash.
     let told = |file: &str| {
         let named = Root {
             layers: vec![(7, file.to_owned())],

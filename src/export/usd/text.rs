@@ -1,10 +1,10 @@
-//! usda's text: lines, names, arrays.
+//! Text of usda: lines, names, arrays.
 
 use std::fmt::Write as _;
 
 use glam::DVec3;
 
-/// A layer on its way.
+/// A layer under construction.
 #[derive(Default)]
 pub(super) struct Text {
     out: String,
@@ -24,7 +24,7 @@ impl Text {
         self.out.push('\n');
     }
 
-    /// A line, nothing where it is empty, and the body that follows it.
+    /// Writes a line, unless it is empty, and opens the body that follows it.
     pub(super) fn open(&mut self, line: &str) {
         if !line.is_empty() {
             self.line(line);
@@ -38,7 +38,7 @@ impl Text {
         self.line("}");
     }
 
-    /// `before` and an array.
+    /// Writes `before` and an array.
     pub(super) fn array<T>(&mut self, before: &str, values: &[T], each: impl Fn(&T) -> String) {
         self.indent();
         self.out.push_str(before);
@@ -57,7 +57,7 @@ impl Text {
         self.out.push(']');
     }
 
-    /// An attribute with a value at each of these frames.
+    /// Writes an attribute with a value at each of these frames.
     pub(super) fn samples(&mut self, attribute: &str, samples: &[(u32, String)]) {
         self.line(&format!("{attribute}.timeSamples = {{"));
         for (frame, value) in samples {
@@ -66,7 +66,7 @@ impl Text {
         self.line("}");
     }
 
-    /// An array attribute with a value at one frame.
+    /// Writes an array attribute with a value at one frame.
     pub(super) fn sampled_array<T>(
         &mut self,
         attribute: &str,
@@ -84,7 +84,7 @@ impl Text {
     }
 }
 
-/// Three values of 32 bits, with the digits that give their bits back.
+/// Formats three 32-bit values with enough digits to restore their bits.
 pub(super) fn floats(values: &[f32; 3]) -> String {
     let mut out = String::with_capacity(40);
     let [x, y, z] = values;
@@ -93,12 +93,12 @@ pub(super) fn floats(values: &[f32; 3]) -> String {
     out
 }
 
-/// Three values of 64 bits.
+/// Formats three 64-bit values.
 pub(super) fn triple(p: DVec3) -> String {
     format!("({}, {}, {})", p.x, p.y, p.z)
 }
 
-/// A name that USD takes: letters, digits and `_`, no digit first.
+/// Converts a text to a valid USD name: letters, digits and `_`, no digit first.
 pub(super) fn name(text: &str) -> String {
     let plain = |c: char| if c.is_ascii_alphanumeric() { c } else { '_' };
     let name: String = text.chars().map(plain).collect();
@@ -108,7 +108,8 @@ pub(super) fn name(text: &str) -> String {
     }
 }
 
-/// The name of a file beside the layer, as an asset's. It has no line ends: USD has no way to write them.
+/// Formats the name of a file beside the layer as an asset path. It must not contain line ends,
+/// which USD cannot express.
 pub(super) fn asset(file: &str) -> String {
     match file.contains('@') {
         true => format!("@@@./{}@@@", file.replace("@@@", "\\@@@")),
@@ -116,7 +117,7 @@ pub(super) fn asset(file: &str) -> String {
     }
 }
 
-/// In quotes. What is quoted here has no line ends.
+/// Quotes a text, which must not contain line ends.
 pub(super) fn quoted(text: &str) -> String {
     format!("\"{}\"", text.replace('\\', "\\\\").replace('"', "\\\""))
 }
