@@ -18,8 +18,8 @@ pub const U: f64 = 1.0 / (1 << 24) as f64;
 /// Unit roundoff of f64.
 pub const U64: f64 = 1.0 / (1u64 << 53) as f64;
 
-/// Magnitudes of the weighted terms in a particle's sums over neighbours, with p = 1 − q² and s = 1
-/// − q.
+/// Magnitudes of the weighted terms in a particle's sums over neighbours, with p = 1 − q² and
+/// s = 1 − q.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sums {
     /// Number of terms.

@@ -367,8 +367,8 @@ mod tests {
             before.unwrap().displacement.abs()
         };
         assert!(run(&|_| 0.01) == 0.0);
-        // The wall forgets a step in the level: after as many memories, e^-5.2 of 0.01 m × gain ×
-        // memory is left.
+        // The wall forgets a step in the level: after as many memories, e^-5.2 of
+        // 0.01 m × gain × memory is left.
         let at_once = 0.01 * wall.gain * MEMORY * wall.asked.period;
         let left = run(&|t| if t < 1.0 { 0.0 } else { 0.01 });
         assert!(left < 0.1 * at_once, "{left} of {at_once}");

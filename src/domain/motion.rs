@@ -323,8 +323,8 @@ mod tests {
 
     #[test]
     fn velocity_is_the_derivative_of_displacement() {
-        // Central differences are off by step²/6 · x''' ≤ 1e-10/6 · 500 m/s³ (a ramped sine with ω
-        // = 8 rad/s), and by round-off 1e-16 · 3 m / 1e-5 s.
+        // Central differences are off by step²/6 · x''' ≤ 1e-10/6 · 500 m/s³ (a ramped sine with
+        // ω = 8 rad/s), and by round-off 1e-16 · 3 m / 1e-5 s.
         let step = 1e-5;
         for motion in motions() {
             for i in 0..900 {

@@ -83,8 +83,8 @@ pub struct Line {
 }
 
 impl Line {
-    /// A free wave of linear theory (Dean and Dalrymple 1991, §3): its velocity amplitude is aω /
-    /// tanh kh.
+    /// A free wave of linear theory (Dean and Dalrymple 1991, §3): its velocity amplitude is
+    /// aω / tanh kh.
     fn free(elevation: f64, frequency: f64, number: DVec2, phase: f64, depth: f64) -> Self {
         Self {
             number,
@@ -114,9 +114,9 @@ pub struct OpenWaves {
 }
 
 impl OpenWaves {
-    /// Builds regular waves to second order (Stokes 1847): a cos θ + a₂ cos 2θ with a₂ = k a² / 4 ·
-    /// (3 − T²) / T³, where T = tanh kh. The second harmonic has the velocity ¾ a² ω k cosh 2ky /
-    /// sinh⁴ kh. `direction` is a unit vector along x and z.
+    /// Builds regular waves to second order (Stokes 1847): a cos θ + a₂ cos 2θ with
+    /// a₂ = k a² / 4 · (3 − T²) / T³, where T = tanh kh. The second harmonic has the velocity
+    /// ¾ a² ω k cosh 2ky / sinh⁴ kh. `direction` is a unit vector along x and z.
     pub fn regular(waves: &RegularWaves, direction: DVec2) -> Self {
         let (k, frequency) = (waves.wave_number(), TAU / waves.period);
         let a = 0.5 * waves.height;

@@ -4,12 +4,12 @@
 ///
 /// The system is (M + κ K) u = M u*, with κ = ν Δt / Δx², M the water fraction of a face and K the
 /// stress of the velocities around it (Batty and Bridson 2008). Relative to its diagonal D, its
-/// greatest eigenvalue is at most [`GREATEST`], since a strain is a sum of four velocities and the
-/// square of such a sum is no more than four times the sum of squares. Its least eigenvalue is at
-/// least 1 / (1 + [`MOST_STRESS`] κ) for faces with water on both sides. The iteration uₙ₊₁ = uₙ +
-/// dₙ, dₙ = m dₙ₋₁ + g D⁻¹ (M u* − (M + κ K) uₙ) (Golub and Varga 1961, whose q² and 2q/δ are m and
-/// g) therefore needs no sum over the grid: the number of iterations that reduces the error by a
-/// given factor is known in advance.
+/// greatest eigenvalue is at most [`GREATEST`], since a strain is a sum of four velocities and
+/// the square of such a sum is no more than four times the sum of squares. Its least eigenvalue
+/// is at least 1 / (1 + [`MOST_STRESS`] κ) for faces with water on both sides. The iteration
+/// uₙ₊₁ = uₙ + dₙ, dₙ = m dₙ₋₁ + g D⁻¹ (M u* − (M + κ K) uₙ) (Golub and Varga 1961, whose q² and
+/// 2q/δ are m and g) therefore needs no sum over the grid: the number of iterations that reduces
+/// the error by a given factor is known in advance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Relaxation {
     /// κ = ν Δt / Δx².
@@ -68,8 +68,8 @@ impl Relaxation {
     }
 }
 
-/// Bound on the remaining fraction of the error after `iterations` (Golub and Varga 1961): qⁿ (1 +
-/// n (1 − q²) / (1 + q²)).
+/// Bound on the remaining fraction of the error after `iterations` (Golub and Varga 1961): qⁿ
+/// (1 + n (1 − q²) / (1 + q²)).
 fn left(rate: f64, iterations: u32) -> f64 {
     let n = f64::from(iterations);
     let square = rate * rate;

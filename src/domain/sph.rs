@@ -37,8 +37,8 @@ pub fn half_space_fraction(q: f64) -> f64 {
 }
 
 impl Calibration {
-    /// Evaluates the sums over the infinite cubic lattice; `spacing` in metres, `support_ratio` = h
-    /// / d.
+    /// Evaluates the sums over the infinite cubic lattice; `spacing` in metres,
+    /// `support_ratio` = h / d.
     pub fn new(spacing: f64, support_ratio: f64) -> Self {
         let h = spacing * support_ratio;
         let reach = support_ratio.ceil() as i32;

@@ -456,8 +456,8 @@ mod tests {
                 !top.is_empty() && worst < 0.1 * voxel_size + 0.05 * D,
                 "{voxel_size}: {worst}"
             );
-            // The kernel rounds twelve edges and eight corners: a few per cent of 2.4 × 1.2 ×
-            // 2.4 m.
+            // The kernel rounds twelve edges and eight corners: a few per cent of
+            // 2.4 × 1.2 × 2.4 m.
             let ratio = volume(&surface) / (2.4 * 1.2 * 2.4);
             assert!((0.95..1.01).contains(&ratio), "{voxel_size}: {ratio}");
         }

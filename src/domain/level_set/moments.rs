@@ -20,8 +20,8 @@ pub(super) struct Moments {
 }
 
 impl Moments {
-    /// Sums over the points within `reach`, `place` itself included, with the paper's weight 1 − (r
-    /// / R)³; `sorted` holds the points in the grid's order.
+    /// Sums over the points within `reach`, `place` itself included, with the paper's weight
+    /// 1 − (r / R)³; `sorted` holds the points in the grid's order.
     pub(super) fn about(place: DVec3, (grid, sorted): (&Grid, &[DVec3]), reach: f64) -> Self {
         let mut near = Near::new(reach);
         grid.for_each_run(place, HALVES, |run| {

@@ -20,8 +20,8 @@ const WEIGHTS: [f64; 4] = [1.0, 22.0 / 21.0, 8.0 / 21.0, 64.0 / 21.0];
 
 /// Number of frequencies at which pairs are solved; in between, polynomials of the fifth degree
 /// interpolate. In water as deep as four of the shortest waves, the deepest allowed, the difference
-/// frequencies are off by 1e-3 at most, where one wave has twice the frequency of the other; for kh
-/// = 9 of the shortest wave, all are off by 1e-5.
+/// frequencies are off by 1e-3 at most, where one wave has twice the frequency of the other; for
+/// kh = 9 of the shortest wave, all are off by 1e-5.
 const NODES: usize = 96;
 const POINTS: usize = 6;
 
@@ -113,10 +113,11 @@ impl<'a> Pair<'a> {
     /// X₁X₂* exp(iΩt) for the difference.
     ///
     /// Products of the waves force the surface by Re p φ₁φ₂, and the wall is at its displacement,
-    /// not at the mean position. By Green's identity the free wave of Ω vanishes if i Ω F tanh Kh /
-    /// K is −½ Σₗ ω₂ kₗDₗ Iₗ − ½ Σⱼ ω₁ kⱼDⱼ Iⱼ − Σⱼₗ ω₁ω₂ (DⱼDₗ / kⱼkₗ) s p / g (s² − K²) with s =
-    /// kⱼ + kₗ, where I is (ν − N) / (k² − K²), N = Ω²/g, and p = Ω (kⱼkₗ − ν₁ν₂) + ½ ω₁ (kₗ² −
-    /// ν₂²) + ½ ω₂ (kⱼ² − ν₁²).
+    /// not at the mean position. By Green's identity the free wave of Ω vanishes if
+    /// i Ω F tanh Kh / K is
+    /// −½ Σₗ ω₂ kₗDₗ Iₗ − ½ Σⱼ ω₁ kⱼDⱼ Iⱼ − Σⱼₗ ω₁ω₂ (DⱼDₗ / kⱼkₗ) s p / g (s² − K²)
+    /// with s = kⱼ + kₗ, where I is (ν − N) / (k² − K²), N = Ω²/g, and
+    /// p = Ω (kⱼkₗ − ν₁ν₂) + ½ ω₁ (kₗ² − ν₂²) + ½ ω₂ (kⱼ² − ν₁²).
     fn transfer(&self) -> Complex {
         let (first, second) = (self.first, self.second);
         let kh = first.number.max(second.number) * self.depth;
@@ -196,8 +197,8 @@ impl<'a> Pair<'a> {
         all * first.frequency * self.frequency / self.gravity
     }
 
-    /// Elevation bound to two progressive waves of one metre each, metres: b in Re b exp(i(Ωt − (k₁
-    /// + k₂)x)).
+    /// Elevation bound to two progressive waves of one metre each, metres: b in Re b
+    /// exp(i(Ωt − (k₁ + k₂)x)).
     fn bound(&self) -> f64 {
         let (first, second) = (self.first, self.second);
         let (k, l) = (first.number, self.number);

@@ -280,9 +280,9 @@ mod tests {
         }))
     }
 
-    /// Frequency, Hz, and energy ½ a² of the elevation, m², that the wall's displacement generates
-    /// by linear theory: a Fourier transform of 200 peak periods, each line by H/S = 2 (cosh 2kh −
-    /// 1) / (sinh 2kh + 2kh) with k bisected from ω² = g k tanh kh.
+    /// Frequency, Hz, and energy ½ a² of the elevation, m², that the wall's displacement
+    /// generates by linear theory: a Fourier transform of 200 peak periods, each line by
+    /// H/S = 2 (cosh 2kh − 1) / (sinh 2kh + 2kh) with k bisected from ω² = g k tanh kh.
     fn made(sea: &Sea) -> Vec<(f64, f64)> {
         let (whole, depth) = (200.0 * 1.6, 0.8);
         let samples = 2048;
@@ -418,8 +418,9 @@ mod tests {
     }
 
     /// With the bound waves, the crest of a packet is higher and the troughs beside it are
-    /// shallower. For regular waves of its height and peak the difference is k a² / 4 · (3 − tanh²)
-    /// / tanh³ = 12 mm, less the set-down; in a spectrum of this width it is smaller.
+    /// shallower. For regular waves of its height and peak the difference is
+    /// k a² / 4 · (3 − tanh²) / tanh³ = 12 mm, less the set-down; in a spectrum of this width it is
+    /// smaller.
     #[test]
     fn the_second_order_makes_crests_higher_and_troughs_less_deep() {
         let packet = Phases::Focused {

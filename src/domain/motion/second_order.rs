@@ -16,12 +16,14 @@ const MOST_MODES: f64 = 1000.0;
 /// Returns the wall's second-order motion in addition to A sin φ, divided by A²: the factors of sin
 /// 2φ and cos 2φ, 1/m, for a wave of `frequency` (rad/s).
 ///
-/// To first order the wall's potential is i A ω Σ (Dⱼ / kⱼ) cosh kⱼ(z + h) / cosh kⱼh · exp(i(ωt −
-/// kⱼx)) with ω² = g kⱼ tanh kⱼh, k₀ real and the others −iκⱼ, and Dⱼ = 2 sinh 2kⱼh / (2kⱼh + sinh
-/// 2kⱼh). Its squares force the surface, and the wall is at its displacement, not at the mean
-/// position. Projection onto the free wave of 2ω, whose wavenumber is K, shows that this wave
-/// vanishes if ξ₂ = (K A)² / 8 · (Re Q sin 2φ + Im Q cos 2φ) with ν = ω²/g and Q = Σⱼₗ DⱼDₗ (1 +
-/// (kⱼ² + kₗ² − 6ν²) / 4kⱼkₗ) (kⱼ + kₗ) / (K² − (kⱼ + kₗ)²) − 3/2 Σⱼ kⱼDⱼ / (K² − kⱼ²).
+/// To first order the wall's potential is
+/// i A ω Σ (Dⱼ / kⱼ) cosh kⱼ(z + h) / cosh kⱼh · exp(i(ωt − kⱼx)) with ω² = g kⱼ tanh kⱼh, k₀ real
+/// and the others −iκⱼ, and Dⱼ = 2 sinh 2kⱼh / (2kⱼh + sinh 2kⱼh). Its squares force the surface,
+/// and the wall is at its displacement, not at the mean position. Projection onto the free wave of
+/// 2ω, whose wavenumber is K, shows that this wave vanishes if
+/// ξ₂ = (K A)² / 8 · (Re Q sin 2φ + Im Q cos 2φ) with ν = ω²/g and Q =
+/// Σⱼₗ DⱼDₗ (1 + (kⱼ² + kₗ² − 6ν²) / 4kⱼkₗ) (kⱼ + kₗ) / (K² − (kⱼ + kₗ)²)
+/// − 3/2 Σⱼ kⱼDⱼ / (K² − kⱼ²).
 pub(super) fn second_harmonic(frequency: f64, depth: f64, gravity: f64) -> [f64; 2] {
     let k = wave_number(frequency, depth, gravity);
     let twice = wave_number(2.0 * frequency, depth, gravity);
@@ -124,8 +126,8 @@ mod tests {
         second_harmonic((9.81 * kh * kh.tanh()).sqrt(), 1.0, 9.81)
     }
 
-    /// Madsen's B / A² for a depth of one metre: A = H/2n, B = H²/32 · (3 cosh kh / sinh³ kh −
-    /// 2/n), with the 2 given by `two`.
+    /// Madsen's B / A² for a depth of one metre: A = H/2n,
+    /// B = H²/32 · (3 cosh kh / sinh³ kh − 2/n), with the 2 given by `two`.
     fn madsen(kh: f64, two: f64) -> f64 {
         let n = 2.0 * ((2.0 * kh).cosh() - 1.0) / ((2.0 * kh).sinh() + 2.0 * kh);
         (2.0 * n).powi(2) / 32.0 * (3.0 * kh.cosh() / kh.sinh().powi(3) - two / n)

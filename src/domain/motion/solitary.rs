@@ -136,8 +136,8 @@ mod tests {
             }
             low
         };
-        // tanh χ goes from −½ to ½: c Δt = ΔX + 2 artanh(½) d / K, and 2 artanh(½) = ln 3, d / K =
-        // S d / 2H.
+        // tanh χ goes from −½ to ½: c Δt = ΔX + 2 artanh(½) d / K, and 2 artanh(½) = ln 3,
+        // d / K = S d / 2H.
         let took = when(0.75 * stroke) - when(0.25 * stroke);
         let expected = (0.5 * stroke + 3f64.ln() * stroke * depth / (2.0 * height)) / celerity;
         assert!((took / expected - 1.0).abs() < 1e-4, "{took} {expected}");

@@ -87,8 +87,8 @@ mod tests {
         assert!((area(Spectrum::Jonswap, 1.0, 1.0) - grown).abs() < 1e-12);
     }
 
-    /// With x² = ω² h/g, Thompson and Vincent 1983 approximate φ by x²/2 up to x = 1 and 1 − (2 −
-    /// x)²/2 up to x = 2, within 4 %.
+    /// With x² = ω² h/g, Thompson and Vincent 1983 approximate φ by x²/2 up to x = 1 and
+    /// 1 − (2 − x)²/2 up to x = 2, within 4 %.
     #[test]
     fn shallow_water_takes_from_the_long_waves_what_is_published() {
         let (depth, gravity) = (1.0f64, 9.81);

@@ -19,11 +19,11 @@ const PARTS: u32 = 64;
 
 /// Wall motion for regular waves to second order.
 ///
-/// The displacement from the wall's mean position is A sin φ + B sin 2φ + C cos 2φ with φ = ωt +
-/// φ₀. A = H / 2n, where n = H/S is the ratio of linear theory (Dean and Dalrymple 1991, §6); B and
-/// C are those of the full second order (Schäffer 1996). In shallow water C is 0 and B is Madsen's
-/// (1971) H² / 32h · (3 cosh kh / sinh³ kh − 2 / n), which is 5 % low at kh = 0.5, 20 % at 0.7, and
-/// of the wrong sign above 1.16.
+/// The displacement from the wall's mean position is A sin φ + B sin 2φ + C cos 2φ with
+/// φ = ωt + φ₀. A = H / 2n, where n = H/S is the ratio of linear theory (Dean and Dalrymple 1991,
+/// §6); B and C are those of the full second order (Schäffer 1996). In shallow water C is 0 and B
+/// is Madsen's (1971) H² / 32h · (3 cosh kh / sinh³ kh − 2 / n), which is 5 % low at kh = 0.5, 20 %
+/// at 0.7, and of the wrong sign above 1.16.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stokes {
     waves: RegularWaves,
@@ -232,8 +232,8 @@ mod tests {
             }
             assert!(part(&waves, 3.0).iter().all(|x| x.abs() < 1e-14));
         }
-        // By hand: 0.1 m and 4 s on 0.8 m have kh = 0.46418 and n = 0.46372, so Madsen gives 0.01 /
-        // 25.6 · (29.909 − 4.313) = 9.9985 mm.
+        // By hand: 0.1 m and 4 s on 0.8 m have kh = 0.46418 and n = 0.46372, so Madsen gives
+        // 0.01 / 25.6 · (29.909 − 4.313) = 9.9985 mm.
         let [sin, _] = part(&Stokes::new(asked(0.1, 4.0)), 2.0);
         assert!((1.03..1.04).contains(&(sin / 9.9985e-3)), "{sin}");
     }
@@ -290,8 +290,8 @@ mod tests {
         }
     }
 
-    /// At Madsen's limit, in shallow water, the second harmonic is a quarter of the first: H L² /
-    /// h³ = 8π²/3.
+    /// At Madsen's limit, in shallow water, the second harmonic is a quarter of the first:
+    /// H L² / h³ = 8π²/3.
     #[test]
     fn madsens_limit_is_where_a_second_crest_begins() {
         let waves = |height: f64| Stokes::new(asked(height, 12.0));

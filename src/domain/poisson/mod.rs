@@ -305,8 +305,8 @@ mod tests {
         assert!(system.pockets().is_empty());
     }
 
-    /// The gradient subtracts what the right-hand side asks for: b of the corrected velocities is b
-    /// − A q.
+    /// The gradient subtracts what the right-hand side asks for: b of the corrected velocities is
+    /// b − A q.
     #[test]
     fn the_gradient_of_a_solution_is_its_image() {
         for surface in [Surface::GhostFluid, Surface::Voxel] {

@@ -161,8 +161,8 @@ mod tests {
         f64::from((x ^ (x >> 13)) % 65_536) / 65_536.0
     }
 
-    /// Relative and expected volume of particles at these positions, d = 0.1, in a domain of 6 × 6
-    /// × 6.
+    /// Relative and expected volume of particles at these positions, d = 0.1, in a domain of
+    /// 6 × 6 × 6.
     fn of(places: impl Iterator<Item = DVec3>) -> (f64, f64) {
         let position: Vec<_> = places.map(|x| x.as_vec3().to_array()).collect();
         let expected = position.len() as f64 * 1e-3;
