@@ -44,7 +44,8 @@ pub struct Asked {
     pub gravity: f64,
 }
 
-/// Absorption law of a wall: its velocity is `gain` times the level beside it, `lag` later.
+/// Absorption law of a wall: its inward velocity is −`gain` times the level beside it, delayed by
+/// `lag`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Absorption {
     asked: Asked,
@@ -231,8 +232,8 @@ mod tests {
     }
 
     /// Reflected amplitude of waves with this kh, by linear theory, from the wall's response to a
-    /// level. In complex amplitudes of e^iωt: the wall's velocity is U = −F η, the level η = 2a + Z
-    /// U with Z = (c₀ − i Σcⱼ)/ω, and a + c₀ U/ω is reflected.
+    /// level. In complex amplitudes of e^iωt: the wall's velocity is U = −F η, the level
+    /// η = 2a + Z U with Z = (c₀ − i Σcⱼ)/ω, and a + c₀ U/ω is reflected.
     fn reflection(wall: &Absorption, kh: f64) -> f64 {
         let frequency = TAU / period(kh);
         let [progressive, local] = piston_elevation(frequency, DEPTH, GRAVITY);
