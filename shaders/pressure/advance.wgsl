@@ -1,7 +1,8 @@
-// A step along the direction: solution += α direction, residual −= α product, and each brick's share of the
-// residual's square. With TWO_WORDS the solution is a sum of two words, of which the first takes what of the step has
-// no rounding: in one word of f32, or with the step rounded, the true residual stops falling at ε ‖A‖ ‖x‖, 1e-5 to
-// 6e-4 ‖b‖ for smooth right-hand sides.
+// A conjugate-gradient step: solution += α direction, residual −= α product, and each brick's share
+// of the squared residual. With TWO_WORDS the solution is the sum of two words; the first
+// accumulates the part of the step that is free of rounding. With one word of f32, or with a
+// rounded step, the true residual stops falling at ε ‖A‖ ‖x‖, 1e-5 to 6e-4 ‖b‖ for smooth
+// right-hand sides.
 #import "shared/pressure_phase.wgsl"
 #import "shared/pressure_control.wgsl"
 #import "shared/pressure_sum.wgsl"
@@ -16,7 +17,7 @@
 @group(0) @binding(5) var<storage, read_write> pressure_solution: array<real>;
 
 #ifdef TWO_WORDS
-// The 12 leading bits, so that products of two such are exact.
+// The 12 leading bits of the mantissa: the product of two such numbers is exact.
 fn leading(x: f32) -> f32 {
     return bitcast<f32>(bitcast<u32>(x) & 0xfffff000u);
 }

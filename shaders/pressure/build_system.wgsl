@@ -1,4 +1,5 @@
-// Rows of the finest level (Batty et al. 2007, Enright et al. 2003): the twin of `domain::poisson::System`.
+// Rows of the finest level (Batty et al. 2007, Enright et al. 2003); reference:
+// `domain::poisson::System`.
 #import "shared/pressure_site.wgsl"
 #import "shared/pressure_stats.wgsl"
 
@@ -19,21 +20,23 @@ alias note = atomic<u32>;
 
 const AIR = 0u;
 const FLUID = 1u;
-// Least part of the way to air at which the surface may lie.
+// Lower bound for θ, the fraction of the distance to the air cell's centre at which the surface
+// lies.
 const LEAST_THETA = 0.01;
-// The same where it lies beyond the cell of air, over a floor that passes above that cell's centre.
+// Upper bound for θ. It exceeds 1 if the surface lies beyond the air cell's centre, over a floor
+// that passes above that centre.
 const MOST_THETA = 100.0;
 
 struct Row {
     dirichlet: real,
     diagonal: real,
-    // Lower faces.
+    // Coefficients of the lower faces.
     coefficient: vec3f,
-    // Whether the six coefficients are 1.
+    // Whether all six coefficients are 1.
     is_full: bool,
 }
 
-// The six neighbours of cell `c`, in natural order; lower ones first.
+// The six neighbours of cell `c` in natural order, lower ones first.
 fn neighbors_of(s: Site, c: u32) -> array<u32, 6> {
     let own = natural(s.slot, s.block);
     let lower = natural_lower(s);
@@ -49,7 +52,7 @@ fn neighbors_of(s: Site, c: u32) -> array<u32, 6> {
     return out;
 }
 
-// 1 / θ, for a surface between a cell of water and one of air.
+// 1 / θ for a surface between a cell of water and a cell of air.
 fn inverse_theta(water: u32, air: u32) -> real {
 #ifdef GHOST_FLUID
     let inside = max(-real(liquid_distance[water]), 0.0);
@@ -93,7 +96,7 @@ fn main(
     if i / 64u >= range.y {
         return;
     }
-    // Air lies in bricks past the wet ones too.
+    // Cells of air may also lie in active bricks after the wet ones.
     let s = site_at(range.x + i / 64u, i & 63u, range.z);
     var rows = 0u;
     var full = 0u;

@@ -1,4 +1,5 @@
-// Removes the mean over each pocket, where the system is singular; one workgroup a pocket, sums in a fixed order.
+// Removes the mean over each pocket, where the system is singular. One workgroup per pocket; sums
+// in a fixed order.
 #import "shared/pressure_phase.wgsl"
 #import "shared/pressure_real.wgsl"
 #import "shared/pressure_stats.wgsl"
@@ -6,7 +7,7 @@
 alias note = atomic<u32>;
 
 @group(0) @binding(1) var<storage, read> pressure_pocket_cells: array<u32>;
-// First and past the last of each pocket's cells.
+// Half-open range of each pocket's cells.
 @group(0) @binding(2) var<storage, read> pressure_pocket_ranges: array<vec2u>;
 @group(0) @binding(3) var<storage, read_write> values: array<real>;
 @group(0) @binding(4) var<storage, read_write> pressure_stats: PressureStats;
@@ -42,8 +43,9 @@ fn main(
     }
     let mean = terms[0] / max(real(range.y - range.x), 1.0);
 #ifdef PERIODIC
-    // Without any wall all values may be alike, and what is left of them the rounding of their mean, which no solve
-    // could follow: 256 sums, of which each thread adds up its own, and 14 more operations.
+    // Without any wall all values can be equal; then only the rounding error of their mean is left,
+    // which no solve can reduce. The bound counts 256 partial sums, each over one thread's values,
+    // and 14 further operations.
     let slack = abs(mean) * (real(range.y - range.x) / 256.0 + 14.0) * UNIT;
     for (var k = range.x + local; k < range.y; k += 256u) {
         let left = values[pressure_pocket_cells[k]] - mean;

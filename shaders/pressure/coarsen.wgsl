@@ -1,5 +1,6 @@
-// Rows of a coarser level from those below: a coarse face's coefficient is the mean of its four (half of what
-// Galerkin's sum would be at this scale, shared/pressure_cycle.wgsl), and air's is half the sum of the eight cells'.
+// Rows of a coarser level. A coarse face's coefficient is the mean of its four fine faces (half of
+// the Galerkin sum at this scale, see shared/pressure_cycle.wgsl), and the air coefficient is half
+// the sum over the eight cells.
 #import "shared/pressure_site.wgsl"
 #import "shared/bricks.wgsl"
 
@@ -9,8 +10,8 @@
 @group(0) @binding(5) var<storage, read_write> pressure_residual: array<real>;
 @group(0) @binding(6) var<storage, read> bricks: array<Brick>;
 
-// A surface very close to one fine cell must not pin the seven others (measured: 1 costs two iterations, above 4
-// nothing is won).
+// Limit for a fine cell's air coefficient: a surface very close to one fine cell must not pin the
+// seven others (measured: a limit of 1 costs two iterations, above 4 there is no gain).
 const MOST_AIR = real(4.0);
 
 @compute @workgroup_size(64)
@@ -49,7 +50,7 @@ fn main(
                 + (pressure_coefficient[first + t] + pressure_coefficient[first + s + t]);
             var shared_by_both = 0.25 * sum;
 #ifdef PERIODIC
-            // A level whose bricks do not join their own end has none beyond it: its ends are closed.
+            // A level whose bricks do not wrap around is closed at its ends.
             let is_end = at[axis] == 0u && ((c >> axis) & 1u) == 0u && pressure_bricks[slot].faces[axis] == 0u;
             shared_by_both = select(shared_by_both, 0.0, is_end);
 #endif
@@ -63,7 +64,8 @@ fn main(
         pressure_residual[coarse] = 0.0;
     }
 #ifdef PERIODIC
-    // At an end that the finer level goes on beyond, coefficients of 1 may stand below closed faces.
+    // At an end that wraps around only on the finer level, coefficients of 1 may lie under closed
+    // faces.
     for (var side = 0u; side < 6u; side++) {
         is_full = is_full && pressure_bricks[slot].faces[side] != 0u;
     }

@@ -1,4 +1,5 @@
-// Gives each cell its body's label, 0 where air touches it, and counts the bodies that none touches.
+// Replaces each cell's label by the root of its body, 0 if air touches the body, and counts the
+// bodies that no air touches.
 #import "shared/pressure_phase.wgsl"
 #import "shared/pressure_stats.wgsl"
 
@@ -30,7 +31,8 @@ fn main(
             }
             at = next;
         }
-        // Others may walk through this cell meanwhile: its root leads them on as well.
+        // Other threads may follow labels through this cell meanwhile: the root leads them to the
+        // same end.
         atomicStore(&pressure_label[e], at);
         if at == e {
             atomicAdd(&pressure_stats.pockets, 1u);

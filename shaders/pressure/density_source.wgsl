@@ -1,5 +1,5 @@
-// Right-hand side of the density correction: the excess that displacements are to carry out of each cell
-// (Kugelstadt et al. 2019), metres.
+// Right-hand side of the density correction: the excess that displacements have to carry out of
+// each cell (Kugelstadt et al. 2019), metres.
 #import "shared/pressure_site.wgsl"
 #import "shared/pressure_sum.wgsl"
 

@@ -1,4 +1,4 @@
-// The next direction: correction + β direction.
+// The next search direction: correction + β direction.
 #import "shared/pressure_phase.wgsl"
 #import "shared/pressure_control.wgsl"
 

@@ -1,5 +1,5 @@
-// Right-hand side −(Σ ± f u + solid flux) of the rows, the solution and residual that the iterations start from,
-// and the largest |∇·u| in a row's cell.
+// Right-hand side −(Σ ± f u + solid flux) of the rows, the initial solution and residual of the
+// iteration, and the largest |∇·u| in a cell with a row.
 #import "shared/pressure_divergence.wgsl"
 #import "shared/pressure_sum.wgsl"
 

@@ -1,5 +1,6 @@
-// First half of the incomplete Poisson preconditioner Kᵀ D⁻¹ K, K = I − L D⁻¹ (Ament et al. 2010, for a system
-// scaled to a unit diagonal; as published it is worse than the diagonal where that varies): D⁻¹ K residual.
+// First half of the incomplete Poisson preconditioner Kᵀ D⁻¹ K, K = I − L D⁻¹: D⁻¹ K residual.
+// Ament et al. 2010 derive it for a system scaled to a unit diagonal; as published it is worse than
+// the diagonal preconditioner if the diagonal varies.
 #import "shared/pressure_ipp.wgsl"
 
 @group(0) @binding(6) var<storage, read> pressure_residual: array<real>;

@@ -1,5 +1,5 @@
-// Second half of the incomplete Poisson preconditioner (pressure/ipp_lower): Kᵀ times what the first left, and each
-// brick's share of residual · correction.
+// Second half of the incomplete Poisson preconditioner (pressure/ipp_lower): Kᵀ times the result of
+// the first half, and each brick's share of residual · correction.
 #import "shared/pressure_ipp.wgsl"
 #import "shared/pressure_sum.wgsl"
 

@@ -1,5 +1,5 @@
-// Bodies of water, first within each block: a label is the least element of the cells that hang together, and 0
-// where air touches them or no row is.
+// Connected bodies of water, first within each block: a label is the smallest element of the
+// connected cells, and 0 if air touches the cell or it has no row.
 #import "shared/pressure_links.wgsl"
 
 @group(0) @binding(5) var<storage, read_write> pressure_label: array<u32>;
@@ -32,7 +32,8 @@ fn main(
         let air = select(l.dirichlet.lo[c & 3u], l.dirichlet.hi[c & 3u], c >= 4u);
         labels[c] = select(0u, own + 64u * c, ((rows >> c) & 1u) == 1u && air == 0.0);
     }
-    // The longest way through a block has 7 steps; each round goes both ways along two axes at least.
+    // The longest path through a block has 7 steps; each round propagates in both directions along
+    // at least two axes.
     for (var round = 0u; round < 7u; round++) {
         join(&labels, 0u, 1u, l.ix.x);
         join(&labels, 2u, 3u, l.ix.y);

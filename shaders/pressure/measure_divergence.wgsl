@@ -1,4 +1,4 @@
-// Largest |∇·u| that the projection left.
+// Largest |∇·u| that the projection leaves.
 #import "shared/pressure_divergence.wgsl"
 
 @compute @workgroup_size(64)

@@ -1,10 +1,10 @@
-// Bodies of water across blocks: union-find, where the lesser root takes the greater (Playne and Hawick 2018). The
-// roots are the same in whatever order the device runs.
+// Connected bodies of water across blocks: union-find in which the smaller root wins (Playne and
+// Hawick 2018). The roots do not depend on the order in which the device runs threads.
 #import "shared/pressure_links.wgsl"
 
 @group(0) @binding(5) var<storage, read_write> pressure_label: array<atomic<u32>>;
 
-// More steps than a chain of labels can have.
+// Exceeds the length of any chain of labels.
 const MOST = 1u << 26u;
 
 fn root_of(label: u32) -> u32 {
@@ -26,13 +26,15 @@ fn unite(a: u32, b: u32) {
         let least = min(x, y);
         let most = max(x, y);
         let before = atomicMin(&pressure_label[most], least);
-        // Another may have been faster: then its root is still to be united with ours.
+        // Another thread may have changed the root first: then its root has to be united with ours
+        // as well.
         x = root_of(least);
         y = select(root_of(before), x, before == most);
     }
 }
 
-// Four pairs across one side of a block; pairs of the same labels as the last are the same union.
+// Four pairs across one side of a block; a pair with the same labels as the previous one is the
+// same union.
 fn across(mine: vec4u, theirs: vec4u, coefficient: vec4r) {
     var last = vec2u(0u);
     for (var k = 0u; k < 4u; k++) {

@@ -1,4 +1,4 @@
-// The identity or the diagonal, and each brick's share of residual · correction.
+// The identity or the diagonal preconditioner, and each brick's share of residual · correction.
 #import "shared/pressure_phase.wgsl"
 #import "shared/pressure_sum.wgsl"
 

@@ -1,4 +1,4 @@
-// Takes the pressure's gradient from the face velocities, and writes the pressure.
+// Subtracts the pressure gradient from the face velocities, and writes the pressure.
 #import "shared/pressure_gradient.wgsl"
 
 @group(0) @binding(6) var<storage, read_write> face_velocity: array<f32>;
@@ -26,7 +26,7 @@ fn main(
         let q = q_element(s.slot, s.block, c);
         var value = pressure_solution[q];
 #ifdef TWO_WORDS
-        // The large word alone is good to 12 bits.
+        // The large word by itself is accurate to 12 bits only.
         value += pressure_solution[phase.stride + q];
 #endif
         pressure[own] = phase.pressure_scale * f32(value);

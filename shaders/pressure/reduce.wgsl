@@ -1,5 +1,6 @@
-// Adds up the bricks' sums and decides what comes next. What is not to run gets no workgroups; this pass itself
-// always runs, since it may not take its size from a buffer that it writes, and does nothing out of its turn.
+// Adds up the partial sums and decides the next state of the solve. Dispatches of other states get
+// zero workgroups. This pass itself always runs, because it must not take its size from a buffer
+// that it writes; out of turn it does nothing.
 #import "shared/pressure_phase.wgsl"
 #import "shared/pressure_control.wgsl"
 #import "shared/pressure_stats.wgsl"
@@ -8,10 +9,11 @@ alias note = u32;
 
 @group(0) @binding(1) var<storage, read_write> pressure_control: PressureControl;
 @group(0) @binding(2) var<storage, read> pressure_sums: array<real>;
-// Pockets that pressure/count_pockets found.
+// Holds the number of pockets that pressure/count_pockets found.
 @group(0) @binding(3) var<storage, read> pressure_stats: PressureStats;
 @group(0) @binding(4) var<storage, read> pressure_sizes: array<vec4u>;
-// The same sizes three times: of iterations, of the verification, and of what follows; 0 while it is not their turn.
+// Three copies of the sizes: for iterations, the verification, and the steps after it; copies of
+// inactive states are 0.
 @group(0) @binding(5) var<storage, read_write> pressure_groups: array<vec4u>;
 
 const BEGIN = 0u;
@@ -24,10 +26,11 @@ const MOST_RESTARTS = 16u;
 
 var<workgroup> terms: array<real, 256>;
 
-// By its bits: a comparison may be compiled as if there were no NaN.
+// Tests the bits: a compiler may assume that a comparison never sees a NaN.
 fn is_positive(x: real) -> bool {
 #ifdef F64
-    // The root of every positive f64 that a sum comes to has its place in f32; a negative one's is no number.
+    // The root of every positive f64 that a sum reaches is representable in f32; the root of a
+    // negative number is NaN.
     let bits = bitcast<u32>(f32(sqrt(x)));
 #else
     let bits = bitcast<u32>(x);
@@ -52,7 +55,7 @@ fn decide(sum: real) {
             pressure_control.beta = select(sum / pressure_control.product, 0.0, pressure_control.is_first == 1u);
             pressure_control.product = sum;
             pressure_control.is_first = 0u;
-            // Nothing is left, or rounding has made the preconditioner indefinite.
+            // The residual is zero, or rounding has made the preconditioner indefinite.
             if !is_positive(sum) {
                 pressure_control.state = VERIFYING;
             }

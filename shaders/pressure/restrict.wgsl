@@ -1,4 +1,4 @@
-// Residuals of a level, summed into the next coarser one (shared/pressure_cycle.wgsl).
+// Sums the residuals of a level into the next coarser level (shared/pressure_cycle.wgsl).
 #import "shared/pressure_cycle.wgsl"
 
 @compute @workgroup_size(64)

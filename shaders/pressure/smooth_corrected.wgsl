@@ -1,4 +1,5 @@
-// Second colour of a level, once the coarser one is solved, and on the finest its share of residual · correction (shared/pressure_cycle.wgsl).
+// Smooths the second colour of a level after the coarser level's solve, and on the finest level
+// sums its share of residual · correction (shared/pressure_cycle.wgsl).
 #import "shared/pressure_cycle.wgsl"
 #import "shared/pressure_sum.wgsl"
 
@@ -15,7 +16,7 @@ fn main(
     if phase.level == 0u {
         let groups = (range.y + 1u) / 2u;
         let group = workgroup.y * workgroups.x + workgroup.x;
-        // A dispatch in two dimensions may have workgroups past the end: their 0 goes past the sums.
+        // A two-dimensional dispatch may have excess workgroups: their 0 is stored after the sums.
         let place = select(2u * groups, phase.colour * groups + group, group < groups);
         sum_workgroup(product, local, place);
     }

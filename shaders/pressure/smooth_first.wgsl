@@ -1,4 +1,4 @@
-// First colour of a level, from nothing (shared/pressure_cycle.wgsl).
+// Smooths the first colour of a level from a correction of 0 (shared/pressure_cycle.wgsl).
 #import "shared/pressure_cycle.wgsl"
 
 @compute @workgroup_size(64)
@@ -9,7 +9,7 @@ fn main(
 ) {
     let i = thread_index(workgroup, workgroups, local, 64u);
     let range = phase.levels[phase.level];
-    // Past the end it is slot 0, where all is 0 and stays so.
+    // Excess threads work on slot 0, where all values are and stay 0.
     let slot = select(0u, range.x + i / 32u, i / 32u < range.y);
     smooth_first_at(site_at(slot, coloured_block(i & 31u, phase.colour), last_slot(phase.level)));
 }

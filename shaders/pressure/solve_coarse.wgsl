@@ -1,15 +1,17 @@
-// The rest of the V-cycle, from a level that one workgroup can hold down to the last and back.
+// The coarse part of the V-cycle in one workgroup: from the first level that it can process down to
+// the last, and back.
 #import "shared/pressure_cycle.wgsl"
 
-// Symmetric sweeps of the last level, whose one brick has at most 8 cells to an edge. Half as many cost one
-// iteration in nine, twice as many save none (measured, tank of 64³).
+// Symmetric sweeps on the last level, whose one brick has at most 8 cells per edge. Half as many
+// cost one iteration in nine, twice as many save none (measured, tank of 64³).
 const SWEEPS = 8u;
 
 fn site_of(level: u32, i: u32, colour: u32) -> Site {
     return site_at(phase.levels[level].x + i / 32u, coloured_block(i & 31u, colour), last_slot(level));
 }
 
-// 64 threads: a workgroup of 256 takes twice the time on a software device, whose barriers cost by the thread.
+// 64 threads: a workgroup of 256 takes twice the time on a software device, where a barrier's cost
+// grows with the number of threads.
 @compute @workgroup_size(64)
 fn main(@builtin(local_invocation_index) local: u32) {
     for (var level = phase.level; level < phase.last_level; level++) {

@@ -15,7 +15,8 @@ fn values(first: u32, s: u32, t: u32) -> vec4r {
     );
 }
 
-// The system times a word of the solution; where it has two, the differences of each are exact, or nearly so.
+// The system times one word of the solution. With two words, the differences within each are exact,
+// or nearly so.
 fn product(s: Site, l: Links, word: u32) -> Pair {
     let own = word + blocked(s.slot, s.block);
     let lower = word + blocked_lower(s);

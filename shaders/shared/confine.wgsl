@@ -1,11 +1,12 @@
-// Keeps a position inside the box, off the walls and out of the solids.
+// Keeps a position inside the box, away from the walls and outside the solids.
 #ifdef SOLIDS
 struct SolidGrid {
-    // Of the signed-distance grid, relative to the domain's least corner, or to a moving solid's point of rest.
+    // First node of the signed-distance grid, relative to the domain's minimum corner, or to a
+    // moving solid's reference point.
     origin: vec3f,
     spacing: f32,
     dims: vec3u,
-    // Where its nodes begin in `solid_distance`.
+    // Index of the grid's first node in `solid_distance`.
     first: u32,
 }
 #ifdef MOVING_SOLIDS
@@ -32,11 +33,11 @@ fn solid_node(node: vec3u) -> f32 {
 #endif
 }
 
-// What leave_solids last pushed by. A difference of positions has their rounding: far from the origin that turns a
-// small push by as much as it is long.
+// Displacement applied by the last call of leave_solids. A difference of positions would carry
+// their rounding error: far from the origin that can rotate a small push by an angle of order 1.
 var<private> solid_push: vec3f;
 
-// Pushes x out along the gradient of the trilinear signed distance where it is nearer than the contact
+// Pushes x out along the gradient of the trilinear signed distance if it is closer than the contact
 // distance. Outside the grid no solid is near.
 fn leave_solids(x: vec3f) -> vec3f {
     solid_push = vec3f(0.0);
@@ -46,7 +47,8 @@ fn leave_solids(x: vec3f) -> vec3f {
         return x;
     }
     let node = vec3u(p);
-    // Two cells' diagonal: no contact can be interpolated from a node so far off.
+    // Twice the spacing exceeds a cell's diagonal: with a node this far away, no contact can occur
+    // within the cell.
     if solid_node(node) > params.contact_distance + 2.0 * solid_grid.spacing {
         return x;
     }
@@ -81,18 +83,18 @@ fn leave_solids(x: vec3f) -> vec3f {
 #endif
 
 #ifdef WALL_WORK
-// What the walls last added to a position.
+// Displacement by the walls in the last call of confine.
 var<private> wall_push: vec3f;
 
 #endif
 #ifdef MOVING_SOLIDS
-// What the solids last added to a position in all, the velocity of the last of them that did, and the sum of what each
-// added times its velocity.
+// Total displacement by solids in the last call, the velocity of the last solid that pushed, and
+// the sum of each solid's displacement times its velocity.
 var<private> solids_push: vec3f;
 var<private> pushing_velocity: vec3f;
 var<private> solids_work: f32;
 
-// Out of each solid, one after the other, as they stand at the substep's end.
+// Pushes x out of each solid, one after another, in their poses at the substep's end.
 fn leave_all_solids(x: vec3f) -> vec3f {
     var y = x;
     solids_push = vec3f(0.0);

@@ -1,11 +1,11 @@
-// What passes count over a frame; `Counters` of solve/params.rs.
+// Counters that passes add to over a frame; mirrored by `Counters` of solve/params.rs.
 struct Counters {
-    // Times that a particle was slowed to the displacement cap.
+    // Times that a particle's displacement was reduced to the cap.
     capped: atomic<u32>,
-    // Times that a particle had more neighbours than its list holds.
+    // Times that a particle had more neighbours than its list holds. PBF only.
     searched: atomic<u32>,
-    // Iterations until a density error.
+    // Iterations of solves that stop at a density error. PBF only.
     iterations: atomic<u32>,
-    // Values that are not finite.
+    // Number of non-finite values.
     not_finite: atomic<u32>,
 }

@@ -1,11 +1,11 @@
-// How air slows water by the share of water about it.
+// Air drag on water, reduced by the water fraction around it.
 #import "shared/air.wgsl"
 
-// The least share of water about what lies in a plane surface.
+// Smallest water fraction around a particle in a plane surface.
 override PLANE_SHARE: f32;
 
-// A velocity after what gravity adds in a step and drag for `seconds`, implicit in it; `share` is 0 of a drop alone, 1 deep in
-// the water.
+// The velocity after gravity's change `fall` and drag over `seconds`, implicit in the velocity.
+// `share` is the water fraction: 0 for a lone droplet, 1 deep in water.
 fn blown(velocity: vec3f, fall: vec3f, share: f32, seconds: f32) -> vec3f {
     let exposure = clamp(1.0 - share / PLANE_SHARE, 0.0, 1.0);
     let against = velocity - wind();

@@ -1,11 +1,11 @@
-// The six cells beside a cell: of other bricks at most one lies along each axis.
+// The six face neighbours of a cell: along each axis at most one of them lies in another brick.
 #import "shared/bricks.wgsl"
 
 @group(0) @binding(1) var<storage, read> bricks: array<Brick>;
 
 var<private> own_slot: u32;
 var<private> own_local: vec3i;
-// On the side of each axis that the cell is nearer to.
+// For each axis, the neighbouring brick on the side that the cell is closer to.
 var<private> slots_beside: vec3u;
 
 fn open_beside(element: u32) {
@@ -19,10 +19,10 @@ fn open_beside(element: u32) {
     );
 }
 
-// Element of the cell `offset` away, which is one step along one axis; in slot 0 where there is none.
+// Element of the cell at `offset`, one step along one axis; in slot 0 if that brick is absent.
 fn element_beside(offset: vec3i) -> u32 {
     let cell = own_local + offset;
-    // -1 and 8 have bit 3, 0 to 7 do not.
+    // -1 and 8 have bit 3 set, 0 to 7 do not.
     let is_beyond = (cell & vec3i(8)) != vec3i(0);
     let crossed = select(select(slots_beside.x, slots_beside.y, is_beyond.y), slots_beside.z, is_beyond.z);
     return select(own_slot, crossed, any(is_beyond)) * CELLS + local_index(vec3u(cell & vec3i(7)));

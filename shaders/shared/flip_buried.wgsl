@@ -1,4 +1,4 @@
-// Cells whose centre lies within a wall or a solid.
+// Cells whose centre lies inside a wall or solid.
 #import "shared/flip_params.wgsl"
 #import "shared/flip_walls.wgsl"
 
@@ -6,7 +6,8 @@
 @group(0) @binding(9) var<storage, read> open_volume: array<f32>;
 #endif
 
-// A cell that is open by less has its centre in a wall or a solid; a wall through the centre is beside it.
+// A cell with a smaller open extent has its centre inside a wall or solid. A wall through the
+// centre does not count.
 const HALF = 0.5 - ON_FACE;
 
 fn is_buried(element: u32, cell: vec3f) -> bool {

@@ -1,11 +1,12 @@
-// How a plane cuts a unit square and a unit cube, from values at their corners.
+// Fractions of a unit square cut by a plane, from values at its corners.
 
-// Part of the square where c + gx x + gy y > 0, x and y from -1/2 to 1/2; exact. `slopes` are |gx| and |gy|.
+// Fraction of the square where c + gx x + gy y > 0, x and y from -1/2 to 1/2; exact. `slopes` are
+// |gx| and |gy|.
 fn open_area(c: f32, slopes: vec2f) -> f32 {
     let steep = max(slopes.x, slopes.y);
     let flat = min(slopes.x, slopes.y);
     let far = max(0.5 * (steep + flat) - abs(c), 0.0);
-    // Past the flat stretch only a corner is left, a triangle.
+    // Beyond the linear range only a corner is left, a triangle.
     let corner = far * far / max(2.0 * steep * flat, 1e-20);
     let stretch = 0.5 - abs(c) / max(steep, 1e-20);
     let smaller = select(corner, stretch, abs(c) <= 0.5 * (steep - flat));

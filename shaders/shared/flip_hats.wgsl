@@ -1,7 +1,7 @@
-// What solids leave of the hat about a cell's centre.
+// Part of the hat function around a cell's centre that solids leave open.
 #import "shared/flip_solid.wgsl"
 
-// Metres from the nearest of the solids whose bits are set.
+// Distance to the nearest of the solids whose bits are set, metres.
 fn nearest_distance(x: vec3f, solids: u32) -> f32 {
 #ifdef MOVING_SOLIDS
     var least = 1e15;
@@ -15,9 +15,10 @@ fn nearest_distance(x: vec3f, solids: u32) -> f32 {
 #endif
 }
 
-// Part of the hat that solids leave of what walls do, half a cell along each axis at a time, each by a plane. Where water is
-// mirrored at walls, solids are. `rise` is what the distance grows by over a cell along x, y and z in all, metres; `solids` has a
-// bit for each that comes near enough.
+// Integral of the hat function over the volume outside solids, relative to that outside walls only,
+// sampled over 4³ half cells, each cut by a plane. If particles are mirrored at walls, so are
+// solids. `rise` is the growth of the distance over a cell, summed over x, y and z, metres;
+// `solids` has a bit for each solid that comes close enough.
 fn open_part_of_hat(cell: vec3f, rise: f32, solids: u32) -> f32 {
     let width = max(0.5 * rise, 1e-20);
     let skin = 1e-4 * params.cell_size;

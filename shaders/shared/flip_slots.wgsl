@@ -1,4 +1,5 @@
-// Slots about a cell, straight from the table: for places that need not lie in a brick with water.
+// Slots around a cell, looked up in the brick table: for positions that may lie outside bricks with
+// water.
 #import "shared/flip_element.wgsl"
 #import "shared/flip_params.wgsl"
 #ifdef PERIODIC

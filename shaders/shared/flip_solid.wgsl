@@ -1,7 +1,8 @@
-// Trilinear signed distance of the solids, metres, and at the corners of a cell.
+// Trilinear signed distance of the solids, metres, in general and at the corners of a cell.
 #import "shared/confine.wgsl"
 
-// Where the node before x is farther off than this nothing of a cell can be cut: no interpolation is needed.
+// Interpolated distance. Where the nearest node is far from the surface (see may_cut), no
+// interpolation is needed.
 fn solid_distance_at(x: vec3f) -> f32 {
     let p = clamp(from_first_node(x) / solid_grid.spacing, vec3f(0.0), vec3f(solid_grid.dims - 1u) - 1e-3);
     let node = vec3u(p);
@@ -19,7 +20,7 @@ fn solid_distance_at(x: vec3f) -> f32 {
     return mix(low, high, t.z);
 }
 
-// Nearest node's distance, for a first look; far away outside the grid.
+// Distance at the nearest node, as a first test; far away outside the grid.
 fn solid_distance_near(x: vec3f) -> f32 {
     let p = from_first_node(x) / solid_grid.spacing;
     let is_outside = any(p < vec3f(-1.0)) || any(p > vec3f(solid_grid.dims));
@@ -27,7 +28,8 @@ fn solid_distance_near(x: vec3f) -> f32 {
     return select(solid_node(node), 1e15, is_outside);
 }
 
-// For a first look: the nearest node's distance, or from beyond the grid the way there, since the solids lie within it.
+// First test: the distance at the nearest node, or beyond the grid the distance to the grid, since
+// solids lie within it.
 fn solid_distance_bound(x: vec3f) -> f32 {
     let place = from_first_node(x);
     let way = distance(place, clamp(place, vec3f(0.0), solid_grid.spacing * vec3f(solid_grid.dims - 1u)));
@@ -40,7 +42,7 @@ struct Corners {
     far: vec4f,
 }
 
-// Whether a solid comes near enough to a cell to cut it.
+// Whether a solid comes close enough to a cell to cut it.
 fn may_cut(cell: vec3f) -> bool {
     let middle = (cell + 0.5) * params.cell_size;
     return solid_distance_near(middle) < 2.0 * (params.cell_size + solid_grid.spacing);
@@ -51,7 +53,7 @@ fn corner_distances(cell: vec3f) -> Corners {
     let x = vec2f(cell.x, cell.x + 1.0) * size;
     let y = vec2f(cell.y, cell.y + 1.0) * size;
     let z = vec2f(cell.z, cell.z + 1.0) * size;
-    // On a face counts as inside.
+    // A corner on the surface counts as inside.
     let skin = 1e-4 * size;
     let near = vec4f(
         solid_distance_at(vec3f(x.x, y.x, z.x)),
@@ -68,7 +70,7 @@ fn corner_distances(cell: vec3f) -> Corners {
     return Corners(near - skin, far - skin);
 }
 
-// Over the corners of each lower face, and of each upper one.
+// Sums over the corners of each lower face, and of each upper face.
 fn lower_sums(c: Corners) -> vec3f {
     let both = c.near + c.far;
     return vec3f(both.x + both.z, both.x + both.y, dot(c.near, vec4f(1.0)));

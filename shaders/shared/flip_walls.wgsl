@@ -1,5 +1,6 @@
-// The six walls as half-spaces that cut cells, closed form; all in cells. Nearer than this to a cell's face counts
-// as on it: positions of thousands of cells in f32 round below it.
+// The six walls as half-spaces that cut cells, in closed form; lengths in cells. A wall closer to a
+// cell's face than this counts as on the face: f32 positions thousands of cells from the origin
+// round by less.
 const ON_FACE = 1e-3;
 
 // Open part of a cell's extent along each axis.
@@ -9,12 +10,12 @@ fn open_extent(cell: vec3f) -> vec3f {
     return select(inner, vec3f(1.0), length > vec3f(1.0 - ON_FACE));
 }
 
-// Whether the planes of a cell's lower faces lie in the open.
+// Whether the planes of a cell's lower faces lie inside the box.
 fn is_plane_open(cell: vec3f) -> vec3<bool> {
     return (cell > params.cut_min + ON_FACE) & (cell < params.cut_max - ON_FACE);
 }
 
-// Along its own axis, the velocity of what closes the planes of a cell's lower faces, m/s.
+// Velocity of the wall that closes each lower face's plane, along its own axis, m/s.
 fn wall_velocity(cell: vec3f) -> vec3f {
     let high = select(vec3f(0.0), params.wall_velocity_max, cell >= params.cut_max - ON_FACE);
     return select(high, params.wall_velocity_min, cell <= params.cut_min + ON_FACE);

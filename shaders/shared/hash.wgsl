@@ -5,7 +5,7 @@ fn pcg(value: u32) -> u32 {
     return (word >> 22u) ^ word;
 }
 
-// A unit vector for a pair that stands on one spot: opposite for (a, b) and (b, a).
+// A unit vector for a pair of particles at the same position: opposite for (a, b) and (b, a).
 fn pair_direction(a: u32, b: u32) -> vec3f {
     let seed = pcg(min(a, b) ^ pcg(max(a, b)));
     let z = f32(seed & 0xffffu) / 32767.5 - 1.0;

@@ -1,17 +1,17 @@
-// Rooms in which water enters, as boxes of cells.
+// Boxes of cells where water enters; mirrored by `Inlets` of solve/params.rs.
 struct Inlets {
     count: u32,
     unused: u32,
     padding: vec2u,
-    // First and last cells along each axis.
+    // First and last cell of each box; the fourth component is unused.
     low: array<vec4u, 8>,
     high: array<vec4u, 8>,
-    // At which what is too much there flows out, 1/s, in the first component.
+    // Rate at which excess water flows out, 1/s, in the first component.
     rate: array<vec4f, 8>,
 }
 @group(0) @binding(7) var<uniform> inlets: Inlets;
 
-// 0 where no water enters.
+// Outflow rate of the box that contains the cell, 1/s; 0 outside all boxes.
 fn rate_in_inlet(cell: vec3u) -> f32 {
     var rate = 0.0;
     for (var k = 0u; k < inlets.count; k++) {

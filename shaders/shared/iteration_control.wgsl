@@ -1,9 +1,9 @@
-// The iteration until a density error; `IterationControl` of solve/params.rs.
+// State of PBF's iteration to a density error; mirrored by `IterationControl` of solve/params.rs.
 struct IterationControl {
     is_done: u32,
     iterations: u32,
     padding: vec2u,
-    // Workgroups of a dispatch over all particles, and over one colour.
+    // Workgroups of an indirect dispatch over all particles, and over one colour.
     all: vec4u,
     colour: vec4u,
 }

@@ -1,5 +1,5 @@
-// A pass over the faces of cells in a zone. What imports it says by `lead` what is done to a face, whose place is in metres from the
-// grid's corner.
+// A pass over the faces of cells in a zone. The importing pass defines `lead`, which updates a
+// face; its position is in metres from the grid's minimum corner.
 #import "shared/thread.wgsl"
 #import "shared/flip_params.wgsl"
 #import "shared/flip_cell.wgsl"
@@ -7,7 +7,7 @@
 
 @group(0) @binding(3) var<storage, read> face_open: array<f32>;
 @group(0) @binding(4) var<storage, read_write> face_velocity: array<f32>;
-// Here still the velocities before gravity.
+// At this point it still holds the velocities before gravity.
 @group(0) @binding(5) var<storage, read> face_change: array<f32>;
 
 @compute @workgroup_size(64)

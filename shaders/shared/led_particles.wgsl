@@ -1,5 +1,6 @@
-// A pass over the particles in a zone. What imports it says by `lead` what is done to one at a place. Drops, which a projection on a
-// grid tells from water, fall as they do elsewhere.
+// A pass over the particles in a zone. The importing pass defines `lead`, which updates a particle
+// at a position. Isolated droplets, which the grid projection tells from water, fall as outside the
+// zone.
 #import "shared/thread.wgsl"
 #import "shared/vector.wgsl"
 #import "shared/phase.wgsl"

@@ -1,22 +1,23 @@
-// Solids that move, each with the distances that were sampled where it stood at the start; those that do not, if there
-// are any, come first as one. One is looked at, at a time.
+// Moving solids, each with a signed-distance grid sampled in its initial pose. All static solids,
+// if any, form the first grid. The functions below work on one selected solid at a time. Mirrored
+// by `SolidGrids` of solve/params.rs.
 struct SolidGrids {
-    // As they lie at the start, their origins from each solid's point of rest.
+    // Grids in their initial pose, relative to each solid's reference point.
     grids: array<SolidGrid, 8>,
-    // Points of rest at the substep's start, relative to the domain's least corner.
+    // Reference points at the substep's start, relative to the domain's minimum corner.
     centres: array<vec4f, 8>,
-    // Of the points of rest, m/s.
+    // Velocities of the reference points, m/s.
     velocities: array<vec4f, 8>,
-    // Angular velocities about them, rad/s.
+    // Angular velocities about the reference points, rad/s.
     spins: array<vec4f, 8>,
-    // Unit quaternions that turn what is seen from a point of rest back to where it was at the start: at the substep's start,
-    // and at its end.
+    // Unit quaternions (x, y, z, w) that rotate back to the initial pose: from the pose at the
+    // substep's start, and from that at its end.
     backs: array<vec4f, 8>,
     end_backs: array<vec4f, 8>,
     count: u32,
-    // The greatest speed of any point.
+    // Largest speed of any point of a solid, m/s.
     fastest: f32,
-    // Of the substep, s.
+    // Length of the substep, seconds.
     length: f32,
     padding: u32,
 }
@@ -28,7 +29,7 @@ var<private> solid_velocity: vec3f;
 var<private> solid_spin: vec3f;
 var<private> solid_back: vec4f;
 
-// Turns to solid k as it stands when `share` of the substep is over.
+// Selects solid k in its pose after the fraction `share` of the substep.
 fn look_at_solid(k: u32, share: f32) {
     solid_grid = solid_grids.grids[k];
     solid_velocity = solid_grids.velocities[k].xyz;
@@ -38,23 +39,23 @@ fn look_at_solid(k: u32, share: f32) {
     solid_back = back * inverseSqrt(dot(back, back));
 }
 
-// v turned by the unit quaternion q.
+// v rotated by the unit quaternion q.
 fn turned(q: vec4f, v: vec3f) -> vec3f {
     let across = 2.0 * cross(q.xyz, v);
     return v + q.w * across + cross(q.xyz, across);
 }
 
-// Of the solid's point at x, m/s.
+// Velocity of the solid's material point at x, m/s.
 fn solid_velocity_at(x: vec3f) -> vec3f {
     return solid_velocity + cross(solid_spin, x - solid_centre);
 }
 
-// x from the first node of the solid's grid, as the grid lies.
+// x relative to the grid's first node, in the grid's frame.
 fn from_first_node(x: vec3f) -> vec3f {
     return turned(solid_back, x - solid_centre) - solid_grid.origin;
 }
 
-// A way that is seen as the grid lies, in the world.
+// Rotates a vector from the grid's frame to the world.
 fn to_world(way: vec3f) -> vec3f {
     return turned(vec4f(-solid_back.xyz, solid_back.w), way);
 }

@@ -1,6 +1,7 @@
-// Lists are words of four neighbours, filled up with nobody: one load in four. They interleave in blocks
-// of 512 particles, the even ones first, so that neighbouring threads of either colour read neighbouring
-// words. In blocks of 128 λ and Δx take half as long again on llvmpipe, in blocks of 16 twice as long (docs/performance.md).
+// Lists consist of words with four neighbours each, padded with the dummy particle: one load for
+// four neighbours. They are interleaved in blocks of 512 particles, even ones first, so that
+// neighbouring threads of either colour read neighbouring words. On llvmpipe, λ and Δx take 50 %
+// longer with blocks of 128, and twice as long with blocks of 16 (docs/performance.md).
 override LIST_CAPACITY: u32;
 const LIST_STRIDE = 512u;
 

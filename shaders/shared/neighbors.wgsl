@@ -1,5 +1,6 @@
-// Calls the pass's own visit(i, j) for every neighbour j of particle i: from the list that
-// pbf/build_neighbors made where the plan has one and it holds them all, else by searching the cells.
+// Calls the importing pass's visit(i, j) for every neighbour j of particle i: from the list that
+// pbf/build_neighbors made if the plan has lists and this one is complete, else by searching the
+// cells.
 #import "shared/search.wgsl"
 #ifdef NEIGHBOR_LIST
 #import "shared/neighbor_list.wgsl"

@@ -1,14 +1,14 @@
-// Which particles a dispatch handles.
-// Colour = parity of the sorted index: the other colour is always close by, and a dispatch over one
-// colour is dense.
+// The particles that a dispatch handles. A particle's colour is the parity of its sorted index:
+// particles of the other colour are always close by, and a dispatch over one colour is dense.
+// Mirrored by `Phase` of solve/params.rs.
 struct Phase {
-    // Of the chunk; even.
+    // First particle of the chunk; even.
     first: u32,
-    // Threads of this dispatch.
+    // Threads of the dispatch.
     count: u32,
     stride: u32,
     colour: u32,
-    // Of the Chebyshev semi-iteration; 1 is the plain one.
+    // Factor of the Chebyshev semi-iteration; 1 is the plain iteration.
     acceleration: f32,
 }
 @group(0) @binding(6) var<uniform> phase: Phase;
@@ -26,7 +26,8 @@ fn phase_particle(thread: u32) -> u32 {
     return phase.first + thread * phase.stride + phase.colour;
 }
 
-// w of `predicted`: λ ≤ 0 of a particle, or the weight > 0 of a boundary sample in particles' worth.
+// The w of `predicted` is λ ≤ 0 for a particle, or for a boundary sample its weight > 0 in units of
+// a particle's mass. Returns the weight; 1 for a particle.
 fn weight(w: f32) -> f32 {
 #ifdef SOLIDS
     return select(1.0, w, w > 0.0);

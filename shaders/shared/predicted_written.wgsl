@@ -1,4 +1,4 @@
-// For passes that write places.
+// For passes that write entries of `predicted`.
 #import "shared/predicted_at.wgsl"
 
 @group(0) @binding(1) var<storage, read_write> predicted: array<vec4f>;

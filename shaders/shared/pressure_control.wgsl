@@ -1,15 +1,16 @@
-// What the conjugate gradients decide among themselves; `PressureControl` of solve/pressure/params.rs.
+// Scalars and state of the conjugate-gradient iteration; mirrored by `PressureControl` of
+// solve/pressure/params.rs.
 #import "shared/pressure_real.wgsl"
 
 struct PressureControl {
     state: u32,
     iterations: u32,
-    // Whether the next direction starts afresh.
+    // 1 if the next direction restarts from the preconditioned residual.
     is_first: u32,
     restarts: u32,
     rhs_square: real,
     residual_square: real,
-    // residual · correction.
+    // Residual · correction.
     product: real,
     alpha: real,
     beta: real,

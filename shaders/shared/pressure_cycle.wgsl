@@ -1,8 +1,10 @@
 // The parts of a V-cycle on one level, for one block.
 //
-// Two-colour Gauss-Seidel over 2³ blocks that are solved exactly, which smooths better than over cells and loads
-// less. A coarse cell is a block: residuals are summed into it and its value is given to all eight, and its
-// coefficients (pressure/coarsen) are half of what Galerkin's would be, which makes up for that crude transfer.
+// Two-colour Gauss-Seidel over 2³ blocks that are solved exactly, which smooths better than
+// Gauss-Seidel over cells and loads less. A coarse cell corresponds to a block: residuals are
+// summed into it, and its value is added to all eight cells. The coarse coefficients
+// (pressure/coarsen) are half of the Galerkin ones, which compensates for this piecewise-constant
+// transfer.
 #import "shared/pressure_links.wgsl"
 
 @group(0) @binding(5) var<storage, read_write> pressure_residual: array<real>;
@@ -65,7 +67,7 @@ fn store_correction(s: Site, z: Pair) {
     pressure_correction[own + 448u] = z.hi.w;
 }
 
-// What flows in from values about the block.
+// Inflow from the values around the block.
 fn inflow(l: Links, v: Sides) -> Pair {
     return sum_sides(Sides(
         l.out.xl * v.xl,
@@ -77,19 +79,19 @@ fn inflow(l: Links, v: Sides) -> Pair {
     ));
 }
 
-// 1 / pivot; 0 where there is no row, or where rounding is all that is left of a closed pair's.
+// 1 / pivot; 0 if there is no row, or if only rounding is left of the pivot of a closed pair.
 fn inverse(pivot: real, diagonal: real) -> real {
     return select(0.0, 1.0 / pivot, pivot > 1e-5 * diagonal);
 }
 
-// The block's exact solution for fixed values about it: cells 0, 3, 5, 6, which do not touch one another, are
-// eliminated, and the other four are left with an L D Lᵀ.
+// The block's exact solution for fixed values around it: cells 0, 3, 5 and 6, which do not touch
+// one another, are eliminated; the other four are solved by an L D Lᵀ factorisation.
 fn solve_block(l: Links, rhs: Pair) -> Pair {
     let d = diagonal(l);
     let red = vec4r(rhs.lo.x, rhs.lo.w, rhs.hi.y, rhs.hi.z);
     let red_diagonal = vec4r(d.lo.x, d.lo.w, d.hi.y, d.hi.z);
     let w = select(vec4r(0.0), 1.0 / red_diagonal, red_diagonal > vec4r(0.0));
-    // Columns: what cells 1, 2, 4, 7 share with the four.
+    // Columns: couplings of cells 1, 2, 4 and 7 with the eliminated four.
     let c1 = vec4r(l.ix.x, l.iy.y, l.iz.y, 0.0);
     let c2 = vec4r(l.iy.x, l.ix.y, 0.0, l.iz.z);
     let c4 = vec4r(l.iz.x, 0.0, l.ix.z, l.iy.z);
@@ -126,12 +128,13 @@ fn solve_block(l: Links, rhs: Pair) -> Pair {
     return Pair(vec4r(z.x, z1, z2, z.y), vec4r(z4, z.z, z.w, z7));
 }
 
-// The first colour, with all else still 0.
+// Smooths the first colour, with all other values still 0.
 fn smooth_first_at(s: Site) {
     store_correction(s, solve_block(links_at(s), residual_at(s)));
 }
 
-// One colour, from the latest values of the other; the block's share of residual · correction.
+// Smooths one colour from the latest values of the other; returns the block's share of residual ·
+// correction.
 fn smooth_at(s: Site) -> real {
     let l = links_at(s);
     let r = residual_at(s);
@@ -141,7 +144,7 @@ fn smooth_at(s: Site) -> real {
     return dot_pair(r, z);
 }
 
-// Values of the cells above the blocks about this one.
+// Values of the coarse cells above the blocks around this one.
 struct Above {
     lower: vec3r,
     upper: vec3r,
@@ -172,7 +175,8 @@ fn above_about(s: Site) -> Above {
     );
 }
 
-// The second colour after the coarser level: the first colour's values plus those above them.
+// Smooths the second colour after the coarser level's solve: the first colour's values have the
+// coarse values above them added.
 fn smooth_corrected_at(s: Site) -> real {
     let l = links_at(s);
     let r = residual_at(s);
@@ -190,8 +194,9 @@ fn smooth_corrected_at(s: Site) -> real {
     return dot_pair(r, z);
 }
 
-// Residuals of the first colour's block after the second's sweep, summed into the cell above. The block was solved
-// with 0 about it, so what has flowed in since is its residual; the second colour, solved last, has none.
+// Restricts the residual of a first-colour block after the second colour's sweep, summed into the
+// cell above. The block was solved with 0 around it, so its residual is the inflow since then; the
+// second colour, solved last, has a residual of 0.
 fn restrict_at(s: Site) {
     let flow = inflow(links_at(s), corrections_about(s));
     let above = pressure_bricks[s.slot].above;

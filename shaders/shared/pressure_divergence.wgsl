@@ -1,4 +1,4 @@
-// What flows out of the cells of a block.
+// Outflow of the cells of a block.
 #import "shared/pressure_site.wgsl"
 #import "shared/pressure_stats.wgsl"
 
@@ -51,7 +51,7 @@ fn outflow(s: Site) -> Pair {
     );
 }
 
-// Bits of the workgroup's largest |∇·u|, 1/s, for its first thread.
+// Bits of the workgroup's largest |∇·u|, 1/s; valid in its first thread.
 fn largest_divergence(flow: Pair, local: u32) -> u32 {
     let most = max(abs(flow.lo), abs(flow.hi));
     largest[local] = f32(max(max(most.x, most.y), max(most.z, most.w)));

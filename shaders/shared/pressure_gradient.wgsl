@@ -13,13 +13,13 @@ const FLUID = 1u;
 const LEAST_THETA = 0.01;
 const MOST_THETA = 100.0;
 
-// Slots that hold water; further ones have no q.
+// Whether a slot holds water; other slots have no q.
 fn is_wet(slot: u32) -> bool {
     let range = phase.levels[0];
     return slot - range.x < range.y;
 }
 
-// Element of q of cell `c` of a block; slot 0 where the brick is dry.
+// Element of q of cell `c` of a block; in slot 0 if the brick is dry.
 fn q_element(slot: u32, block: u32, c: u32) -> u32 {
     return select(0u, blocked(slot, block) + 64u * c, is_wet(slot));
 }
@@ -29,11 +29,11 @@ struct Face {
     element: u32,
     // Whether water may flow through it.
     is_open: bool,
-    // q of its cell − q of the cell before it, by the part of the way where water ends.
+    // q of its cell − q of the cell before it, divided by θ at the surface.
     difference: real,
 }
 
-// Lower face along `axis` of cell `c`.
+// Lower face of cell `c` along `axis`.
 fn face_at(s: Site, c: u32, axis: u32) -> Face {
     let own = natural(s.slot, s.block) + (c & 1u) + 8u * ((c >> 1u) & 1u) + 64u * (c >> 2u);
     let bit = 1u << axis;
@@ -49,7 +49,7 @@ fn face_at(s: Site, c: u32, axis: u32) -> Face {
     let q_before = q_element(slot, block, d);
     var difference = pressure_solution[q] - pressure_solution[q_before];
 #ifdef TWO_WORDS
-    // The small words only where the large ones leave them room.
+    // The difference of the small words, added after that of the large ones.
     difference += pressure_solution[phase.stride + q] - pressure_solution[phase.stride + q_before];
 #endif
 #ifdef GHOST_FLUID

@@ -1,4 +1,4 @@
-// What both halves of the incomplete Poisson preconditioner share.
+// Code shared by both halves of the incomplete Poisson preconditioner.
 #import "shared/pressure_links.wgsl"
 
 @group(0) @binding(5) var<storage, read> pressure_inverse_diagonal: array<real>;

@@ -1,19 +1,20 @@
-// The system's rows, a block at a time.
+// The system's rows, one block at a time.
 #import "shared/pressure_site.wgsl"
 
-// Coefficients of the lower faces, three planes; what air adds to the diagonal; and of each block its kind, with
-// a bit a row from bit 8.
+// Coefficients of the lower faces, three planes; air's contribution to the diagonal; and for each
+// block its kind, with one bit per row from bit 8 on.
 @group(0) @binding(2) var<storage, read> pressure_coefficient: array<f32>;
 @group(0) @binding(3) var<storage, read> pressure_dirichlet: array<real>;
 @group(0) @binding(4) var<storage, read> pressure_block: array<u32>;
 
-// No row; every coefficient 1 and no air; anything else.
+// EMPTY: no row; FULL: every coefficient is 1 and there is no air; MIXED: anything else.
 const EMPTY = 0u;
 const FULL = 1u;
 const MIXED = 2u;
 
 struct Links {
-    // Within the block: across x (cells 0-1, 2-3, 4-5, 6-7), y (0-2, 1-3, 4-6, 5-7), z (0-4, 1-5, 2-6, 3-7).
+    // Within the block: across x (cells 0-1, 2-3, 4-5, 6-7), y (0-2, 1-3, 4-6, 5-7), z (0-4, 1-5,
+    // 2-6, 3-7).
     ix: vec4r,
     iy: vec4r,
     iz: vec4r,
@@ -35,8 +36,8 @@ fn links_at(s: Site) -> Links {
     let one = vec4r(real(select(0.0, 1.0, kind == FULL)));
     let none = Pair(vec4r(0.0), vec4r(0.0));
     var l = Links(one, one, one, Sides(one, one, one, one, one, one), none);
-    // A loop where a branch would do: software devices run both sides of a branch and leave a loop that no lane
-    // is in, and most blocks are FULL.
+    // A loop instead of a branch: software devices run both sides of a branch but skip a loop that
+    // no lane is in, and most blocks are FULL.
     for (var once = u32(kind == MIXED); once > 0u; once -= 1u) {
         let own = blocked(s.slot, s.block);
         let upper = blocked_upper(s);
@@ -59,7 +60,8 @@ fn links_at(s: Site) -> Links {
     return l;
 }
 
-// Σ a (x − x') + dirichlet x, from differences: for smooth x its rounding is that of the differences, not of x.
+// Σ a (x − x') + dirichlet x, from differences: for smooth x the rounding error is that of the
+// differences, not that of x.
 fn apply(l: Links, own: Pair, out: Sides) -> Pair {
     let at = sides_of(own);
     let x = l.ix * (at.xu - at.xl);

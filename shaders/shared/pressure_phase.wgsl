@@ -1,28 +1,28 @@
-// What a pressure pass works on; `PressurePhase` of solve/pressure/params.rs.
+// Parameters of a pressure pass; mirrored by `PressurePhase` of solve/pressure/params.rs.
 #import "shared/thread.wgsl"
 
 struct PressurePhase {
-    // Which of `levels`, and the last of them.
+    // Index into `levels`, and index of the coarsest level.
     level: u32,
     last_level: u32,
-    // Of 2³ blocks, as on a chess board.
+    // Colour of the 2³ blocks, in a checkerboard pattern.
     colour: u32,
-    // What pressure/reduce decides, and over how many sums.
+    // Decision of pressure/reduce, and the number of partial sums that it adds up.
     step: u32,
     sum_count: u32,
-    // Of a plane of an array: 512 a slot that it holds.
+    // Distance between planes of an array, in elements: 512 times its slots.
     stride: u32,
     max_iterations: u32,
-    // Whether the pockets stand in `pressure_pocket_cells`.
+    // Whether the pockets are listed in `pressure_pocket_cells`.
     has_pockets: u32,
     tolerance_square: f32,
-    // Δx.
+    // Cell size Δx, metres.
     cell_size: f32,
-    // ρ Δx / Δt: from q to pascal.
+    // ρ Δx over the time for which the pressure acts: turns q into pascals.
     pressure_scale: f32,
-    // 0, which no compiler knows.
+    // Always 0, but unknown to the shader compiler.
     opaque_zero: u32,
-    // First slot and bricks of each level, and, of the finest alone, active bricks.
+    // For each level: first slot, bricks, active bricks (finest level only), 0.
     levels: array<vec4u, 8>,
 }
 

@@ -1,4 +1,4 @@
-// What the projection computes in: solver.flip.pressure.precision.
+// Precision of the projection: solver.flip.pressure.precision.
 #ifdef F64
 alias real = f64;
 #else

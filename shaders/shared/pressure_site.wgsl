@@ -1,22 +1,22 @@
-// Blocks of 2³ cells, one a thread, and the blocks about them.
+// Blocks of 2³ cells, one per thread, and the blocks around them.
 //
-// A pass that updates 8 cells loads 8 + 24 values of its neighbourhood where 8 threads would load 56. In the
-// room's own arrays cell c = x + 2 y + 4 z of block b = X + 4 Y + 16 Z of a brick is element 64 c + b, so that
-// neighbouring threads read neighbouring words.
+// A pass that updates 8 cells loads 8 + 24 values of its neighbourhood, where 8 threads would load
+// 56. In the projection's own arrays, cell c = x + 2 y + 4 z of block b = X + 4 Y + 16 Z of a brick
+// is element 64 c + b, so that neighbouring threads read neighbouring words.
 #import "shared/pressure_phase.wgsl"
 #import "shared/pressure_real.wgsl"
 
 struct PressureBrick {
-    // Slots of the bricks at the lower faces x, y, z, then at the upper ones; 0 where there is none.
+    // Slots of the bricks at the lower faces x, y, z, then at the upper ones; 0 if absent.
     faces: array<u32, 6>,
-    // Element of the cell above block 0, on the next coarser level.
+    // Element on the next coarser level that contains block 0.
     above: u32,
     padding: u32,
 }
 
 @group(0) @binding(1) var<storage, read> pressure_bricks: array<PressureBrick>;
 
-// Steps between the cells of a block.
+// Strides between the cells of a block.
 const BLOCKED = vec3u(64u, 128u, 256u);
 const NATURAL = vec3u(1u, 8u, 64u);
 
@@ -29,7 +29,7 @@ struct Site {
     upper_block: vec3u,
 }
 
-// Block `block` of brick `slot`; bricks past `last` count as absent.
+// Block `block` of brick `slot`; bricks after slot `last` count as absent.
 fn site_at(slot: u32, block: u32, last: u32) -> Site {
     let at = vec3u(block & 3u, (block >> 2u) & 3u, block >> 4u);
     // Along each axis at most one neighbour lies in another brick.
@@ -87,7 +87,7 @@ fn coloured_block(k: u32, colour: u32) -> u32 {
     return 2u * (k & 1u) + ((colour + y + z) & 1u) + 4u * y + 16u * z;
 }
 
-// Offset of the cell above a block from `above` of its brick.
+// Offset of the coarse cell above a block, from `above` of its brick.
 fn above_offset(block: u32) -> u32 {
     let at = vec3u(block & 3u, (block >> 2u) & 3u, block >> 4u);
     let half = at >> vec3u(1u);
@@ -101,8 +101,8 @@ struct Pair {
     hi: vec4r,
 }
 
-// Values by side: of the cells with x = 0 (c = 0, 2, 4, 6) and x = 1, those with y = 0 (0, 1, 4, 5) and y = 1,
-// those with z = 0 and z = 1.
+// Values by side: cells with x = 0 (c = 0, 2, 4, 6) and with x = 1, cells with y = 0 (0, 1, 4, 5)
+// and with y = 1, cells with z = 0 and with z = 1.
 struct Sides {
     xl: vec4r,
     xu: vec4r,
@@ -112,7 +112,7 @@ struct Sides {
     zu: vec4r,
 }
 
-// A block's own cells by side.
+// Regroups a block's own cells by side.
 fn sides_of(p: Pair) -> Sides {
     return Sides(
         vec4r(p.lo.xz, p.hi.xz),
@@ -124,7 +124,7 @@ fn sides_of(p: Pair) -> Sides {
     );
 }
 
-// Sums by cell what stands by side.
+// Sums values given by side, per cell.
 fn sum_sides(s: Sides) -> Pair {
     return Pair(
         vec4r(s.xl.x, s.xu.x, s.xl.y, s.xu.y) + vec4r(s.yl.xy, s.yu.xy) + s.zl,

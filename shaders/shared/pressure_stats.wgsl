@@ -1,11 +1,11 @@
-// What a projection notes; `PressureStats` of solve/pressure/params.rs. Whoever imports it says whether a `note` is an
-// atomic word or a plain one.
+// Statistics of a projection; mirrored by `PressureStats` of solve/pressure/params.rs. The importer
+// defines `note` as an atomic or a plain word.
 struct PressureStats {
-    // Bits of the largest |∇·u| in a cell of water before the projection and after it, 1/s: those of floats that are not
-    // negative order as the floats do.
+    // Bits of the largest |∇·u| in a cell of water before and after the projection, 1/s:
+    // non-negative floats sort like their bit patterns.
     divergence_before: note,
     divergence_after: note,
-    // The same of the largest |mean of ∇·u| over a pocket.
+    // Bits of the largest |mean of ∇·u| over a pocket, 1/s.
     incompatible: note,
     // Cells of water without an open face.
     dropped: note,

@@ -1,11 +1,11 @@
-// Sums of a workgroup of 64, in a fixed order.
+// Sums over a workgroup of 64 threads, in a fixed order.
 #import "shared/pressure_real.wgsl"
 
 @group(0) @binding(9) var<storage, read_write> pressure_sums: array<real>;
 
 var<workgroup> terms: array<real, 64>;
 
-// Leaves the sum of `term` over the workgroup in `pressure_sums[place]`.
+// Stores the sum of `term` over the workgroup in `pressure_sums[place]`.
 fn sum_workgroup(term: real, local: u32, place: u32) {
     terms[local] = term;
     workgroupBarrier();

@@ -1,12 +1,12 @@
-// Sums whose rounding error is kept (Knuth's two-sum).
+// Sums that keep their rounding error (Knuth's two-sum).
 //
-// Compilers that take `(a + b) - a` for `b`, as Mesa's does, would drop the error; a 0 that they do not know hides
-// the sum from them.
+// A compiler that simplifies `(a + b) - a` to `b`, as Mesa's does, would drop the error; an XOR
+// with a 0 that it does not know hides the sum from it.
 fn hidden(x: f32) -> f32 {
     return bitcast<f32>(bitcast<u32>(x) ^ phase.opaque_zero);
 }
 
-// The sum and what its rounding lost.
+// The rounded sum and its rounding error.
 fn two_sum(a: f32, b: f32) -> vec2f {
     let sum = hidden(a + b);
     let rounded_b = hidden(sum - a);

@@ -1,5 +1,5 @@
-// Calls the pass's own visit(i, j) for every particle and boundary sample j in the cells about xi,
-// i itself apart. Hoetzlein 2014: nine runs of three cells.
+// Calls the importing pass's visit(i, j) for every particle and boundary sample j in the 27 cells
+// around xi, except for i itself. Hoetzlein 2014: nine runs of three cells.
 @group(0) @binding(2) var<storage, read> cell_start: array<u32>;
 #ifdef SOLIDS
 @group(0) @binding(3) var<storage, read> boundary_cell_start: array<u32>;

@@ -1,5 +1,5 @@
-// Cells about one as surface tension sees them: the water's share of a wall or solid is that of the cell before it, as in a
-// mirror, so that the surface meets walls at 90 degrees.
+// The cells around a cell for surface tension: a wall or solid has the water fraction of the cell
+// in front of it, as in a mirror, so that the surface meets walls at 90 degrees.
 #import "shared/thread.wgsl"
 #import "shared/flip_params.wgsl"
 #import "shared/flip_neighborhood.wgsl"
@@ -35,7 +35,7 @@ fn open_mirrored(element: u32) {
     }
 }
 
-// Element of the cell `offset` away, or of what it mirrors.
+// Element of the cell at `offset`, or of the cell that it mirrors.
 fn mirrored_element(offset: vec3i) -> u32 {
     let is_behind = ((offset < vec3i(0)) & is_closed_before) | ((offset > vec3i(0)) & is_closed_after);
     let found = element_at(select(offset, vec3i(0), is_behind));

@@ -1,4 +1,5 @@
-// One pass of the binomial filter (1 2 1)³ / 64 over the water's share; `share_of` and `store` are the importing pass's.
+// One pass of the binomial filter (1 2 1)³ / 64 over the water fraction; the importing pass defines
+// `share_of` and `store`.
 #import "shared/tension.wgsl"
 
 @compute @workgroup_size(64)

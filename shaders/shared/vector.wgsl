@@ -1,4 +1,5 @@
-// A vector of three words, as arrays hold one a particle: an array of vec3f has sixteen bytes a vector.
+// A packed vector of three words, as particle arrays hold them: an array of vec3f would take 16
+// bytes per vector.
 struct Vector {
     x: f32,
     y: f32,

@@ -1,18 +1,19 @@
-// What a viscous solve knows of a cell, in a word: whether it is water; which of its lower faces move and whether water stands on
-// both sides of them; and of the edges through its least corner, by the axis that they lie along, how many of the four cells about
-// one are water and by what its two pairs of velocities count.
+// Bit field of a cell for the viscous solve: whether it is water; which of its lower faces move,
+// and which have water on both sides; and for each of the three edges through its minimum corner,
+// by the axis of the edge, how many of the four cells around the edge are water, and the weights of
+// its two pairs of velocities.
 const WATER = 1u;
-// From here a bit a face.
+// One bit per face from here.
 const MOVED = 1u;
 const WHOLE = 4u;
-// From here seven bits an edge.
+// Seven bits per edge from here.
 const EDGES = 7u;
 const EDGE_BITS = 7u;
 
 struct Edge {
-    // Part of the edge's water.
+    // Water fraction of the four cells around the edge.
     part: f32,
-    // Weights of the pair that lies along the axis after the edge's own, and of the other.
+    // Weights of the pair along the axis after the edge's own, and of the other pair.
     weight: vec2f,
 }
 

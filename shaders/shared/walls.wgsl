@@ -1,11 +1,12 @@
-// The six walls as half-spaces filled with water at rest (continuum integrals of the kernels):
-// a fraction f(z) = 315/256 ∫_q^1 (1 − t²)⁴ dt of the density, and its spiky slope
-// g(z) = 3/2 (1 − q)⁴ (1 + 4q) / h, q = z/h. Where walls meet, 1 − Π(1 − f) keeps what they share from
-// counting twice: bulk-lattice edges and corners are met within 1 %. No samples, so no memory, nothing
-// to sort when a wave-maker moves, and water slides along a wall without friction.
+// The six walls as half-spaces filled with water at rest (continuum integrals of the kernels): a
+// fraction f(z) = 315/256 ∫_q^1 (1 − t²)⁴ dt of the density, and its spiky slope g(z) = 3/2 (1 −
+// q)⁴ (1 + 4q) / h, q = z/h. Where walls meet, 1 − Π(1 − f) avoids counting their intersection
+// twice; it matches edges and corners of the bulk lattice within 1 %. Without boundary samples
+// there is no memory to allocate, nothing to sort when a wave maker moves, and no friction along a
+// wall.
 struct WallTerm {
     density: f32,
-    // Of the density at the particle, 1/m; points to where the density falls.
+    // Gradient of the density at the particle, 1/m; points towards decreasing density.
     gradient: vec3f,
 }
 
@@ -22,7 +23,7 @@ fn wall_slope(q: f32) -> f32 {
 }
 
 #ifdef WALL_WORK
-// The gradient of what each wall adds to the density times the wall's velocity, 1/s.
+// Sum over the walls of each wall's density gradient times its velocity, 1/s.
 fn wall_rate(x: vec3f) -> f32 {
     let h = params.support_radius;
     let low = clamp((x - params.wall_min) / h, vec3f(0.0), vec3f(1.0));

@@ -1,4 +1,4 @@
-// What sums over water have in common: the share of a place that is water. Copies of uniforms that
+// Code shared by sums over water: the water fraction around a position. Copies of uniforms that
 // inner loops read: llvmpipe does not hoist uniform loads out of a loop.
 var<private> fluid_count: u32;
 var<private> inverse_h: f32;
@@ -8,7 +8,8 @@ fn begin_water() {
     inverse_h = params.inverse_support_radius;
 }
 
-// Of what walls and solids leave free, the part that is water: 1 deep inside, also in a corner; nothing in dry air beside a wall.
+// Water fraction of the volume that walls and solids leave open: 1 deep inside, also in a corner; 0
+// in dry air beside a wall.
 fn share_of(kernel: f32, solid: f32, wall: f32) -> f32 {
     let free = 1.0 - wall - params.density_scale * solid;
     return params.density_scale * kernel / max(free, 0.1);

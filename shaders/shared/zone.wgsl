@@ -1,14 +1,15 @@
-// A bit a wall, of the least faces along x, y and z, then of the greatest.
+// Bit mask of walls: the minimum faces along x, y, z, then the maximum faces.
 override ZONE_WALLS: u32;
-// At the wall, 1/s.
+// Relaxation rate at the wall, 1/s.
 override ZONE_RATE: f32;
 override ZONE_INVERSE_LENGTH: f32;
 override ZONE_SIZE_X: f32;
 override ZONE_SIZE_Y: f32;
 override ZONE_SIZE_Z: f32;
 
-// Part of the way to the wanted velocity that a step leads water at x, metres from the domain's least corner: r Δt / (1 + r Δt),
-// where r grows with the square of the way into the zone (Israeli and Orszag 1981).
+// Fraction by which a step moves the velocity of water at x towards the target velocity; x in
+// metres from the domain's minimum corner. It is r Δt / (1 + r Δt), where r grows with the square
+// of the depth into the zone (Israeli and Orszag 1981).
 fn led(x: vec3f, time_step: f32) -> f32 {
     let beyond = vec3f(ZONE_SIZE_X, ZONE_SIZE_Y, ZONE_SIZE_Z) - x;
     let least = ((vec3u(ZONE_WALLS) >> vec3u(0u, 1u, 2u)) & vec3u(1u)) == vec3u(1u);

@@ -1,8 +1,8 @@
-//! What shaders/shared/air.wgsl is told.
+//! Constants of shaders/shared/air.wgsl.
 
 use swell_domain::air::{DENSITY, VISCOSITY};
 
-/// Of drops of that radius, metres, in such a wind, m/s.
+/// Returns the constants for droplets of `drop_radius` metres in a wind of `wind` m/s.
 pub(super) fn constants(drop_radius: f64, wind: [f64; 3]) -> Vec<(&'static str, f64)> {
     vec![
         ("AIR_DENSITY", DENSITY),

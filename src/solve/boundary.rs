@@ -1,6 +1,7 @@
-//! Solids on their way to the device.
+//! Uploads of solids to the device.
 //!
-//! Samples count in the density and push back (Akinci 2012); the distance stops what would tunnel.
+//! Boundary samples count in the density and push back (Akinci 2012); the signed distance stops
+//! particles that would tunnel.
 
 use glam::{DQuat, DVec3};
 
@@ -22,7 +23,7 @@ use super::{
 };
 
 impl Counts {
-    /// Samples and grid nodes of solids; no particles.
+    /// Counts samples and grid nodes of solids; `particles` and `bricks` stay 0.
     pub fn of_solids(boundary: &Boundary) -> Self {
         Self {
             particles: 0,
@@ -34,7 +35,7 @@ impl Counts {
     }
 }
 
-/// Fills the buffers that the plan has for solids. Those of solids that move are filled anew for each substep.
+/// Fills the plan's buffers for solids. Those of moving solids are uploaded again for each substep.
 pub(super) fn upload(
     boundary: &Boundary,
     program: &Program,
@@ -49,8 +50,9 @@ pub(super) fn upload(
     upload_distance(boundary, program, scene);
 }
 
-/// Fills in the samples as they stand at a time, moving as what took them there within so many seconds: behind the
-/// particles of `predicted`, sorted by cell; their weights are particles' worth of mass.
+/// Uploads the boundary samples in their poses at `time`, with the mean velocities over the `step`
+/// seconds before it: behind the particles in `predicted`, sorted by cell, weighted in units of a
+/// particle's mass.
 pub(super) fn upload_samples(
     boundary: &Boundary,
     program: &Program,
@@ -101,7 +103,7 @@ pub(super) fn upload_samples(
     }
 }
 
-/// Fills the signed distance that the plan has for solids.
+/// Uploads the signed distances of all solids.
 pub(super) fn upload_distance(boundary: &Boundary, program: &Program, scene: &Scene) {
     let mut first = 0;
     for grid in boundary.grids() {
@@ -113,15 +115,15 @@ pub(super) fn upload_distance(boundary: &Boundary, program: &Program, scene: &Sc
     }
 }
 
-/// Where solids stand that move; nothing in a scene without them.
+/// Poses of solids that move; `None` in a scene without them.
 pub(super) struct Movers {
-    /// All but where they stand.
+    /// Grids without their poses.
     resting: SolidGrids,
-    /// First nodes, metres, in the scene's coordinates: where each stood at the start.
+    /// First nodes of the grids in the initial pose, metres, in scene coordinates.
     origins: Vec<DVec3>,
-    /// From a point of a solid that turns to its grid's farthest corner.
+    /// Distance from a solid's reference point to its grid's farthest corner, metres.
     reaches: Vec<f64>,
-    /// Before the first that moves.
+    /// Index of the first moving solid's grid: 1 if there are static solids, else 0.
     statics: usize,
 }
 
@@ -146,8 +148,8 @@ impl Movers {
         })
     }
 
-    /// As they stand at `start`, with the velocities that take them to where they then stand `length` seconds
-    /// later.
+    /// Uploads the poses at `start`, with the velocities that take them to their poses `length`
+    /// seconds later.
     pub(super) fn upload(&self, program: &Program, scene: &Scene, start: f64, length: f64) {
         let mut grids = self.resting;
         grids.length = length as f32;
@@ -165,7 +167,8 @@ impl Movers {
                 spin,
                 ..
             } = solid.passage(start, length);
-            // The point of rest of a solid that does not turn may be any: its first node rounds least.
+            // A solid that does not rotate may have any reference point: its first node gives the
+            // least rounding.
             let rest = match solid.turns() {
                 true => pose.rest,
                 false => self.origins[k],

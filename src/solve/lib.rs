@@ -1,4 +1,4 @@
-//! Particle solvers on the GPU.
+//! GPU solvers: position-based fluids (PBF), FLIP, the pressure projection, effects and whitewater.
 
 mod air;
 pub mod boundary;
@@ -22,7 +22,7 @@ use params::{
 };
 use pressure::{PressureBrick, PressureControl, PressureControl64, PressurePhase, PressureStats};
 
-/// Every struct that the host and the shaders share, by the name that it has in WGSL.
+/// Returns the host-side layouts of all structs shared with the shaders, under their WGSL names.
 pub fn mirrors() -> Vec<Layout> {
     vec![
         Params::layout(),
@@ -43,31 +43,31 @@ pub fn mirrors() -> Vec<Layout> {
     ]
 }
 
-/// What stops a solve.
+/// Error that ends a solve.
 #[derive(Debug, thiserror::Error)]
 pub enum SolveError {
-    /// The device.
+    /// A GPU operation failed.
     #[error(transparent)]
     Gpu(#[from] GpuError),
-    /// The state handed in does not fit what the solver was built for.
+    /// The particle count of the state differs from the count that the solver was built for.
     #[error("the solver holds {planned} particles, and the state has {given}")]
     Count {
-        /// Particles of the plan.
+        /// Particles that the solver was built for.
         planned: usize,
         /// Particles of the state.
         given: usize,
     },
-    /// A substep that a frame does not have.
+    /// The frame has fewer substeps than the requested one.
     #[error("substep {asked} was asked for, and the frame after frame {frame} has {count}")]
     NoSubstep {
-        /// From 1.
+        /// Requested substep, counted from 1.
         asked: u32,
-        /// The frame before.
+        /// Number of the frame before the traced one.
         frame: u32,
         /// Substeps that the frame has.
         count: u32,
     },
-    /// The numbers failed; the state before this frame stands.
+    /// A numerical budget was exceeded; the state from before this frame is kept.
     #[error(transparent)]
     Numbers(#[from] Breach),
 }

@@ -1,5 +1,5 @@
-//! Rust mirrors of the uniforms, which a test holds against naga's layout of the WGSL structs, and of the words that
-//! passes count in.
+//! Host-side mirrors of uniforms and counters. A test compares each layout with naga's layout of
+//! the WGSL struct.
 
 use swell_domain::bricks::Brick;
 use swell_gpu::{
@@ -9,112 +9,114 @@ use swell_gpu::{
 use swell_scene::{moving_solid::MAX_MOVING_SOLIDS, sources::MAX_INLETS};
 
 mirror!(
-    /// `Params` of shared/pbf_params.wgsl; lengths in metres, positions relative to the domain's least corner.
+    /// `Params` of shared/pbf_params.wgsl. Lengths in metres; positions relative to the domain's
+    /// minimum corner.
     Params {
         /// Gravity times time step, m/s.
         velocity_step: [f32; 3],
-        /// Fluid particles.
+        /// Number of fluid particles.
         particle_count: u32,
         /// Cells of edge h along each axis.
         grid_dims: [u32; 3],
-        /// Largest correction of one iteration.
+        /// Largest displacement by one iteration, metres.
         max_correction: f32,
-        /// Least faces of the box, wave-makers included.
+        /// Minimum faces of the box, displaced by wave makers, metres.
         wall_min: [f32; 3],
-        /// Seconds.
+        /// Length of the substep, seconds.
         time_step: f32,
-        /// Greatest faces of the box.
+        /// Maximum faces of the box, displaced by wave makers, metres.
         wall_max: [f32; 3],
-        /// 1/s; 0 with a time step of 0.
+        /// 1/Δt, 1/s; 0 if the time step is 0.
         inverse_time_step: f32,
-        /// h.
+        /// Support radius h of the kernels, metres.
         support_radius: f32,
-        /// 1/h.
+        /// 1/h, 1/m.
         inverse_support_radius: f32,
-        /// Index of a particle that is far from everything.
+        /// Index of a dummy particle far from everything, which pads neighbour lists.
         nobody: u32,
-        /// As in `domain::sph`.
+        /// Relative density per unit of (1 − q²)³, q = r/h; see `domain::sph`.
         density_scale: f32,
-        /// As in `domain::sph`.
+        /// |∇C| per unit of (1 − q)², 1/m; see `domain::sph`.
         gradient_scale: f32,
-        /// As in `domain::sph`.
+        /// Lattice density beyond a wall over the continuum's; see `domain::sph`.
         wall_density_scale: f32,
-        /// ε, 1/m².
+        /// ε in the denominator of λ, 1/m².
         regularization: f32,
-        /// ω.
+        /// Relaxation factor ω of the corrections.
         relaxation: f32,
-        /// Least distance from a wall or solid.
+        /// Least distance of a particle from a wall or solid, metres.
         contact_distance: f32,
-        /// Of a substep.
+        /// Cap on a particle's displacement in a substep, metres.
         max_displacement: f32,
-        /// k times λ's natural scale, m².
+        /// k of s_corr times the natural scale of λ, m².
         artificial_pressure: f32,
-        /// Length of the domain along x where it joins its own end; 0 with walls.
+        /// Period of the domain along x, metres; 0 if the axis is not periodic.
         period_x: f32,
-        /// Of the least faces, each along its axis, m/s.
+        /// Velocities of the minimum faces, each along its own axis, m/s.
         wall_velocity_min: [f32; 3],
-        /// The same along y.
+        /// Period of the domain along y, metres; 0 if the axis is not periodic.
         period_y: f32,
-        /// Of the greatest faces.
+        /// Velocities of the maximum faces, each along its own axis, m/s.
         wall_velocity_max: [f32; 3],
-        /// The same along z.
+        /// Period of the domain along z, metres; 0 if the axis is not periodic.
         period_z: f32,
     }
 );
 
 mirror!(
-    /// `FlipParams` of shared/flip_params.wgsl; lengths in metres, positions relative to the domain's least
-    /// corner.
+    /// `FlipParams` of shared/flip_params.wgsl. Lengths in metres; positions relative to the
+    /// domain's minimum corner.
     FlipParams {
-        /// Least faces of the box at the substep's end, wave-makers included.
+        /// Minimum faces of the box at the substep's end, displaced by wave makers, metres.
         wall_min: [f32; 3],
-        /// Particles.
+        /// Number of particles.
         particle_count: u32,
-        /// Greatest faces of the box then.
+        /// Maximum faces of the box at the substep's end, displaced by wave makers, metres.
         wall_max: [f32; 3],
-        /// Cells of slots with water.
+        /// 512 times the number of slots with water, without slot 0.
         wet_cells: u32,
-        /// Least faces of the box at the substep's start, in cells.
+        /// Minimum faces of the box at the substep's start, in cells: they cut cells.
         cut_min: [f32; 3],
-        /// Cells of slots with water or within reach.
+        /// 512 times the number of slots with water or within reach of it, without slot 0.
         active_cells: u32,
-        /// Greatest faces of the box then, in cells.
+        /// Maximum faces of the box at the substep's start, in cells: they cut cells.
         cut_max: [f32; 3],
-        /// Between planes of face arrays, in elements.
+        /// Distance between planes of face arrays, in elements.
         stride: u32,
-        /// Of the least faces, each along its axis, m/s.
+        /// Velocities of the minimum faces, each along its own axis, m/s.
         wall_velocity_min: [f32; 3],
-        /// Between planes of partial sums, in elements.
+        /// Distance between planes of partial sums, in elements.
         partial_stride: u32,
-        /// Of the greatest faces, m/s.
+        /// Velocities of the maximum faces, each along its own axis, m/s.
         wall_velocity_max: [f32; 3],
-        /// Seconds.
+        /// Length of the substep, seconds.
         time_step: f32,
         /// Gravity times `kick`, m/s.
         velocity_step: [f32; 3],
-        /// Δx.
+        /// Cell size Δx, metres.
         cell_size: f32,
-        /// Cells of the domain.
+        /// Cells of the domain along each axis; storage has one more for the upper faces.
         cells: [u32; 3],
-        /// 1/Δx.
+        /// 1/Δx, 1/m.
         inverse_cell_size: f32,
-        /// Bricks of the table.
+        /// Bricks along each axis of the brick table.
         table_dims: [u32; 3],
-        /// α of a substep.
+        /// PIC fraction α of a substep: the share of the velocity that is taken from the grid.
         pic_blend: f32,
-        /// One over the particles of a full cell.
+        /// Reciprocal of the number of particles in a full cell.
         particle_share: f32,
-        /// Least distance from a wall or solid.
+        /// Least distance of a particle from a wall or solid, metres.
         contact_distance: f32,
-        /// Of a substep.
+        /// Cap on a particle's displacement in a substep, metres.
         max_displacement: f32,
-        /// Particles that are nearer to each other are pushed apart.
+        /// Particles closer to each other than this are pushed apart, metres.
         apart: f32,
-        /// A bit an axis along which the domain joins its own end.
+        /// Bit mask of periodic axes: bit k for axis k.
         periodic: u32,
-        /// Water is pushed off walls that are nearer than half of this.
+        /// Particles closer to a wall than half of this are pushed away from it, metres.
         apart_from_walls: f32,
-        /// Seconds for which gravity, pressure, surface tension, confinement and drag act: half of the substep before and half of this one.
+        /// Seconds for which gravity, pressure, surface tension, confinement and drag act: half of
+        /// the previous substep plus half of this one.
         kick: f32,
         /// Unused.
         padding: u32,
@@ -122,55 +124,60 @@ mirror!(
 );
 
 mirror!(
-    /// `Phase` of shared/phase.wgsl.
+    /// `Phase` of shared/phase.wgsl: the particles that a dispatch handles.
     Phase {
         /// First particle of the chunk; even.
         first: u32,
-        /// Threads.
+        /// Threads of the dispatch.
         count: u32,
-        /// 1 for all, 2 for one colour.
+        /// 1 for all particles, 2 for one colour.
         stride: u32,
-        /// 0 or 1.
+        /// Colour, 0 or 1; 0 for all particles.
         colour: u32,
-        /// Factor of the Chebyshev semi-iteration; 1 is the plain one.
+        /// Factor of the Chebyshev semi-iteration; 1 is the plain iteration.
         acceleration: f32,
     }
 );
 
 mirror!(
-    /// `SolidGrid` of shared/confine.wgsl.
+    /// `SolidGrid` of shared/confine.wgsl: a grid of signed distances.
     SolidGrid {
-        /// Relative to the domain's least corner, or to a moving solid's point of rest.
+        /// First node, metres, relative to the domain's minimum corner, or to a moving solid's
+        /// reference point.
         origin: [f32; 3],
-        /// Metres.
+        /// Distance between nodes, metres.
         spacing: f32,
-        /// Nodes.
+        /// Nodes along each axis.
         dims: [u32; 3],
-        /// Where its nodes begin in `solid_distance`.
+        /// Index of the grid's first node in `solid_distance`.
         first: u32,
     }
 );
 
 mirror!(
-    /// `SolidGrids` of shared/moving_solids.wgsl.
+    /// `SolidGrids` of shared/moving_solids.wgsl: poses of all solids in a substep.
     SolidGrids {
-        /// As they lie at the start, from each solid's point of rest; static solids first, as one.
+        /// Grids in their initial pose, relative to each solid's reference point; all static solids
+        /// form the first grid.
         grids: [SolidGrid; MAX_MOVING_SOLIDS + 1],
-        /// Points of rest at the substep's start, relative to the domain's least corner.
+        /// Reference points at the substep's start, metres, relative to the domain's minimum
+        /// corner.
         centres: [[f32; 4]; MAX_MOVING_SOLIDS + 1],
-        /// Of the points of rest, m/s.
+        /// Velocities of the reference points, m/s.
         velocities: [[f32; 4]; MAX_MOVING_SOLIDS + 1],
-        /// Angular velocities about them, rad/s.
+        /// Angular velocities about the reference points, rad/s.
         spins: [[f32; 4]; MAX_MOVING_SOLIDS + 1],
-        /// Quaternions x, y, z, w that turn back to the start, at the substep's start.
+        /// Unit quaternions (x, y, z, w) that rotate from the pose at the substep's start back to
+        /// the initial pose.
         backs: [[f32; 4]; MAX_MOVING_SOLIDS + 1],
-        /// At its end.
+        /// Unit quaternions (x, y, z, w) that rotate from the pose at the substep's end back to the
+        /// initial pose.
         end_backs: [[f32; 4]; MAX_MOVING_SOLIDS + 1],
-        /// Grids in use.
+        /// Number of grids in use.
         count: u32,
-        /// The greatest speed of any point, m/s.
+        /// Largest speed of any point of a solid, m/s.
         fastest: f32,
-        /// Of the substep, seconds.
+        /// Length of the substep, seconds.
         length: f32,
         /// Unused.
         padding: u32,
@@ -178,19 +185,19 @@ mirror!(
 );
 
 mirror!(
-    /// `Inlets` of shared/inlets.wgsl.
+    /// `Inlets` of shared/inlets.wgsl: boxes of cells where water enters.
     Inlets {
-        /// Boxes in use.
+        /// Number of boxes in use.
         count: u32,
         /// Unused.
         unused: u32,
         /// Unused.
         padding: [u32; 2],
-        /// First cells along each axis.
+        /// First cell of each box; the fourth component is unused.
         low: [[u32; 4]; MAX_INLETS],
-        /// Last cells.
+        /// Last cell of each box; the fourth component is unused.
         high: [[u32; 4]; MAX_INLETS],
-        /// At which what is too much there flows out, 1/s, first of four.
+        /// Rate at which excess water flows out, 1/s, in the first component.
         rate: [[f32; 4]; MAX_INLETS],
     }
 );
@@ -198,30 +205,31 @@ mirror!(
 mirror!(
     /// `Counters` of shared/counters.wgsl, which passes of both solvers add to over a frame.
     Counters {
-        /// Times that a particle was slowed to the displacement cap.
+        /// Times that a particle's displacement was reduced to the cap.
         capped: u32,
-        /// Times that a particle of PBF had more neighbours than its list holds.
+        /// Times that a particle had more neighbours than its list holds. PBF only.
         searched: u32,
-        /// Iterations of PBF until a density error.
+        /// Iterations of solves that stop at a density error. PBF only.
         iterations: u32,
-        /// Values that are not finite.
+        /// Number of non-finite values.
         not_finite: u32,
     }
 );
 
 mirror!(
-    /// `IterationControl` of shared/iteration_control.wgsl: PBF's iteration until a density error, which pbf/decide ends
-    /// by emptying the dispatches to come.
+    /// `IterationControl` of shared/iteration_control.wgsl: state of PBF's iteration to a density
+    /// error. The pass pbf/decide ends it by setting the sizes of the remaining indirect dispatches
+    /// to zero.
     IterationControl {
-        /// 1 once the error is small enough.
+        /// 1 once the density error is small enough.
         is_done: u32,
         /// Iterations so far.
         iterations: u32,
         /// Unused.
         padding: [u32; 2],
-        /// Of a dispatch over all particles.
+        /// Workgroups of an indirect dispatch over all particles.
         all: Workgroups,
-        /// Of one over a colour.
+        /// Workgroups of an indirect dispatch over one colour.
         colour: Workgroups,
     }
 );
@@ -229,16 +237,17 @@ mirror!(
 mirror!(
     /// `SurveyHead` of flip/survey.
     SurveyHead {
-        /// Bits of the largest speed squared, (m/s)²: those of floats that are not negative order as the floats do.
+        /// Largest squared speed, (m/s)². The shader takes an integer maximum of its bits:
+        /// non-negative floats sort like their bit patterns.
         speed_square: f32,
-        /// Particles that are not finite.
+        /// Number of particles with non-finite values.
         not_finite: u32,
         /// Unused.
         padding: [u32; 2],
     }
 );
 
-/// A [`Brick`] in the device's memory.
+/// A [`Brick`] with the device's memory layout.
 #[repr(transparent)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct DeviceBrick(pub Brick);

@@ -1,7 +1,9 @@
-//! The exact passes and buffers that a scene calls for, in bytes, before a device is touched.
+//! Plans the passes and buffers (with their sizes in bytes) that a scene needs, before any GPU
+//! device is opened.
 //!
-//! Passes are those of the commands that a solver records, in the order in which they first run; each room declares its
-//! buffers once, and a test holds those declared against those that the commands bind.
+//! Passes come from the commands that a solver records, in the order of their first run. Each
+//! module declares its buffers once; a test compares the declared buffers with those that the
+//! commands bind.
 
 use swell_domain::{places, solver::PassTime};
 use swell_gpu::{
@@ -15,18 +17,18 @@ use super::{effects::Addition, flip, pbf, pbf::buffers::SAMPLE_VELOCITY};
 
 pub use super::pbf::plan::{LIST_BUDGET, LIST_CAPACITY, shared_constants};
 
-/// What of the device decides the arrangement, bytes.
+/// Device limits that determine the layout of buffers, bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DeviceLimits {
-    /// Largest storage binding.
+    /// Largest storage-buffer binding.
     pub binding: u64,
     /// Largest buffer.
     pub buffer: u64,
-    /// What neighbour lists may take in all; 0 goes without them.
+    /// Budget for all neighbour lists together; 0 disables neighbour lists.
     pub list_budget: u64,
 }
 
-/// The limits of an open device that a plan depends on.
+/// Returns the limits of an open device that a plan depends on.
 pub fn device_limits(context: &Context) -> DeviceLimits {
     DeviceLimits {
         binding: context.limits.max_storage_buffer_binding_size,
@@ -35,33 +37,33 @@ pub fn device_limits(context: &Context) -> DeviceLimits {
     }
 }
 
-/// How much there is of everything.
+/// Sizes that a plan is made for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
     /// Fluid particles.
     pub particles: usize,
-    /// Samples on solids.
+    /// Boundary samples on the surfaces of solids.
     pub boundary_samples: usize,
-    /// Nodes of the solids' signed distance along each axis.
+    /// Nodes of the static solids' signed-distance grid along each axis.
     pub solid_grid: [usize; 3],
-    /// Nodes of the moving solids' signed distances, all together.
+    /// Nodes of the moving solids' signed-distance grids, summed.
     pub moving_nodes: usize,
-    /// Bricks that sparse grids hold; of FLIP, or of PBF's projection.
+    /// Capacity of the sparse grids, of FLIP or of PBF's projection.
     pub bricks: Capacity,
 }
 
-/// How many bricks sparse grids can hold. What is in the frame does not depend on it.
+/// Capacity of the sparse grids, in bricks. Results do not depend on it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Capacity {
-    /// Slots of bricks with water, slot 0 included.
+    /// Slots for bricks with water, including the empty slot 0.
     pub wet: usize,
-    /// Slots in all: those within reach and the coarser levels as well.
+    /// Slots in total: also bricks within reach of water, and bricks of the coarser levels.
     pub slots: usize,
 }
 
 impl Capacity {
-    /// Enough for `needed`, with a quarter to spare, so that water that spreads does not ask for more
-    /// every substep.
+    /// Returns a capacity that holds `needed`. What has to grow gets 25 % headroom, so that
+    /// spreading water does not reallocate in every substep.
     pub fn grown(self, needed: Self) -> Self {
         let grow = |have: usize, need: usize| {
             if need > have { need + need / 4 } else { have }
@@ -73,25 +75,26 @@ impl Capacity {
     }
 }
 
-/// A buffer, and what it is there for.
+/// A buffer of the plan, with the component that owns it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PlannedBuffer {
-    /// Name and bytes.
+    /// Name and size.
     pub spec: BufferSpec,
-    /// `pbf`, `flip`, `pressure`, `sort`, `solids`, `lists`, `probes`, `budget`, `emitters`, or an effect's name.
+    /// One of `pbf`, `flip`, `pressure`, `sort`, `solids`, `lists`, `probes`, `budget`, `emitters`,
+    /// or the name of an effect.
     pub owner: &'static str,
-    /// Whether FLIP looks for what is not finite in it at a substep's end, where it may be hidden from all that follows.
+    /// Whether FLIP scans this buffer for non-finite values at the end of a substep. Such values
+    /// may not show up in any later result.
     pub is_watched: bool,
 }
 
-/// Buffers of a room, each declared once.
+/// Buffers that a module declares, each once.
 #[derive(Clone, Debug, Default)]
 pub struct Table {
     rows: Vec<PlannedBuffer>,
 }
 
 impl Table {
-    /// Declares a buffer.
     pub(super) fn add(&mut self, owner: &'static str, spec: BufferSpec) {
         self.rows.push(PlannedBuffer {
             spec,
@@ -100,7 +103,6 @@ impl Table {
         });
     }
 
-    /// Declares several.
     pub(super) fn extend(
         &mut self,
         owner: &'static str,
@@ -109,7 +111,7 @@ impl Table {
         specs.into_iter().for_each(|spec| self.add(owner, spec));
     }
 
-    /// Declares a buffer of floats that is watched.
+    /// Declares a float buffer that is scanned for non-finite values.
     pub(super) fn watch(&mut self, owner: &'static str, spec: BufferSpec) {
         self.rows.push(PlannedBuffer {
             spec,
@@ -118,73 +120,75 @@ impl Table {
         });
     }
 
-    /// Takes in another room's.
+    /// Appends the buffers of another module.
     pub(super) fn append(&mut self, mut other: Self) {
         self.rows.append(&mut other.rows);
     }
 
-    /// Names and bytes.
+    /// Returns names and sizes of all buffers.
     pub fn specs(&self) -> Vec<BufferSpec> {
         self.rows.iter().map(|row| row.spec.clone()).collect()
     }
 }
 
-/// A pass, and what it is there for.
+/// A pass of the plan, with the component that owns it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlannedPass {
-    /// Shader and conditions.
+    /// Shader, conditional defines and constants.
     pub spec: PassSpec,
-    /// As for buffers.
+    /// Owner, as in [`PlannedBuffer::owner`].
     pub owner: &'static str,
 }
 
-/// What all of a plan takes that is there for one thing.
+/// Resources of one owner, summed over a plan.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Share {
-    /// As for buffers and passes.
+    /// Owner, as in [`PlannedBuffer::owner`].
     pub owner: &'static str,
-    /// Passes.
+    /// Number of passes.
     pub passes: usize,
-    /// Of its buffers.
+    /// Total size of its buffers.
     pub bytes: u64,
-    /// That its passes took, where they were timed.
+    /// Time spent in its passes, seconds; 0 where they were not timed.
     pub seconds: f64,
 }
 
-/// Particles that one binding of the neighbour lists covers.
+/// Range of particles whose neighbour lists share one binding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Chunk {
-    /// First sorted index; even.
+    /// First sorted index; always even.
     pub first: usize,
-    /// Particles.
+    /// Number of particles.
     pub count: usize,
 }
 
-/// What a scene needs on the device.
+/// Passes and buffers that a scene needs on the device.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
-    /// What it was made for.
+    /// Sizes that the plan was made for.
     pub counts: Counts,
-    /// Cells along each axis: of edge h with PBF, of edge Δx with FLIP.
+    /// Cells along each axis: of edge h for PBF, of edge Δx for FLIP.
     pub grid_dims: [u32; 3],
-    /// One where lists fit into a binding or there are none; of PBF alone.
+    /// Ranges of the neighbour lists; a single one if the lists fit into one binding or there are
+    /// none. PBF only.
     pub chunks: Vec<Chunk>,
-    /// Whether neighbours are listed once a substep; of PBF alone.
+    /// Whether neighbours are listed once per substep. PBF only.
     pub has_lists: bool,
-    /// How many of the places of `predicted` one binding holds, where it does not hold them all; of PBF alone.
+    /// Number of entries of `predicted` that one binding holds, if one binding cannot hold them
+    /// all. PBF only.
     pub page: Option<usize>,
-    /// Whether FLIP moves particles; not where PBF takes its velocities alone.
+    /// Whether FLIP moves particles; `false` for PBF's projection, which only corrects velocities.
     pub moves: bool,
-    /// Of the grid on which PBF's velocities are projected, where they are.
+    /// Plan of the grid on which PBF's velocities are projected, if they are.
     pub projection: Option<Box<Plan>>,
-    /// Every buffer.
+    /// All buffers, without those of `projection`.
     pub buffers: Vec<PlannedBuffer>,
-    /// Every pass.
+    /// All passes, without those of `projection`.
     pub passes: Vec<PlannedPass>,
 }
 
 impl Plan {
-    /// Lays out the chosen solver for `scene`.
+    /// Plans the solver that `scene` selects.
     pub fn new(scene: &Scene, counts: Counts, limits: DeviceLimits) -> Self {
         match scene.solver.method {
             Method::Pbf => pbf::plan::plan(scene, counts, limits),
@@ -192,7 +196,7 @@ impl Plan {
         }
     }
 
-    /// Every command that a solver of this plan for `scene` may run.
+    /// Returns every command that a solver with this plan may run for `scene`.
     pub fn commands(&self, scene: &Scene) -> Vec<Command> {
         match scene.solver.method {
             Method::Pbf => pbf::plan::commands(self, scene),
@@ -200,13 +204,13 @@ impl Plan {
         }
     }
 
-    /// Whether words tell places (shared/place.wgsl).
+    /// Returns whether quantized position words are in use (shared/place.wgsl).
     pub fn has_places(&self, scene: &Scene) -> bool {
         let dims = self.grid_dims.iter().map(|&cells| cells as usize);
         places::are_told(dims, scene.is_periodic())
     }
 
-    /// One whose buffers and passes are yet to come.
+    /// Returns a plan without buffers and passes.
     pub(super) fn bare(counts: Counts, grid_dims: [u32; 3]) -> Self {
         Self {
             counts,
@@ -221,7 +225,7 @@ impl Plan {
         }
     }
 
-    /// Bytes in all, and those of the neighbour lists.
+    /// Returns the total size of all buffers, and the size of the neighbour lists, bytes.
     pub fn bytes(&self) -> (u64, u64) {
         let sum = |lists_only: bool| -> u64 {
             self.buffers
@@ -234,7 +238,8 @@ impl Plan {
         (sum(false) + of_projection, sum(true))
     }
 
-    /// What there is for each owner, in the order of its first buffer; `times` of passes are as a solver tells them.
+    /// Sums up resources by owner, in the order of each owner's first buffer. `times` are pass
+    /// times as a solver reports them.
     pub fn shares(&self, times: &[PassTime]) -> Vec<Share> {
         let mut shares: Vec<Share> = Vec::new();
         let mut add = |owner, passes, bytes, seconds| match shares
@@ -259,7 +264,7 @@ impl Plan {
                 add(buffer.owner, 0, buffer.spec.bytes, 0.0);
             }
             for PlannedPass { spec, owner } in &part.passes {
-                // A pass of two parts is timed as one.
+                // A pass that appears in both parts is timed under one name: count its time once.
                 let of_pass = times.iter().filter(|time| time.pass == spec.name);
                 let seconds = match timed.contains(&spec.name) {
                     true => 0.0,
@@ -272,41 +277,40 @@ impl Plan {
         shares
     }
 
-    /// Itself, and the plan of its projection.
+    /// Iterates over this plan and the plan of its projection.
     pub fn parts(&self) -> impl Iterator<Item = &Self> {
         std::iter::once(self).chain(self.projection.as_deref())
     }
 
-    /// Whether solids stand in the scene, moving or not.
+    /// Returns whether the scene has solids, static or moving.
     pub(super) fn has_solids(&self) -> bool {
         self.counts.boundary_samples > 0
             || self.counts.solid_grid != [0; 3]
             || self.counts.moving_nodes > 0
     }
 
-    /// Whether PBF's samples have velocities: where solids move.
+    /// Returns whether PBF's boundary samples have velocities, which is so if solids move.
     pub(super) fn has_sample_velocities(&self) -> bool {
         let is_it = |name: &str| name == SAMPLE_VELOCITY.name();
         self.buffers.iter().any(|buffer| is_it(&buffer.spec.name))
     }
 
-    /// Names and bytes of its buffers.
+    /// Returns names and sizes of the buffers, without those of the projection.
     pub fn buffer_specs(&self) -> Vec<BufferSpec> {
         self.buffers.iter().map(|row| row.spec.clone()).collect()
     }
 
-    /// Its passes as a program compiles them.
+    /// Returns the passes in the form that a program compiles, without those of the projection.
     pub fn pass_specs(&self) -> Vec<PassSpec> {
         self.passes.iter().map(|row| row.spec.clone()).collect()
     }
 
-    /// The same with the buffers of `table`.
     pub(super) fn declare(&mut self, table: Table) {
         self.buffers.extend(table.rows);
     }
 
-    /// Plans passes that are not planned yet: `specs` say each one's conditions and constants, beside which an effect has
-    /// its own.
+    /// Adds the passes of `specs` that the plan does not have yet. A pass of an effect also gets
+    /// the effect's own constants.
     pub(super) fn add_passes(
         &mut self,
         specs: impl IntoIterator<Item = PassSpec>,
@@ -328,7 +332,8 @@ impl Plan {
     }
 }
 
-/// Names of the passes that commands run, each once, in the order in which they first run.
+/// Returns the names of the passes that commands run, without repetition, in the order of their
+/// first run.
 pub(super) fn in_order<'a>(
     commands: impl IntoIterator<Item = &'a Command>,
 ) -> impl Iterator<Item = &'static str> {
@@ -339,7 +344,7 @@ pub(super) fn in_order<'a>(
     names.into_iter()
 }
 
-/// What a pass is there for: the room that its shader stands in, or the budget.
+/// Returns the owner of a pass: the shader's folder, or `budget` or `emitters`.
 fn owner_of(pass: &'static str) -> &'static str {
     match pass {
         "pbf/boundary_work" | "flip/boundary_work" | "flip/find_not_finite" => "budget",

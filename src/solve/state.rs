@@ -1,4 +1,4 @@
-//! A particle state on its way to the device and back, and what is reported of it.
+//! Transfer of a particle state to and from the device, and checks on it.
 
 use glam::Vec3;
 
@@ -14,10 +14,10 @@ use super::{
     buffers::{ID, POSITION, VELOCITY},
 };
 
-/// Whether a state has another count of particles than was planned for.
+/// Returns whether the particle count of `state` differs from the planned one.
 ///
-/// # Errors
-/// That it has, and no water enters or leaves.
+/// # Errors Returns [`SolveError::Count`] if it differs although no water enters or leaves the
+/// scene.
 pub(super) fn is_other_count(
     scene: &Scene,
     planned: usize,
@@ -30,7 +30,7 @@ pub(super) fn is_other_count(
     }
 }
 
-/// Positions go up relative to the domain's least corner.
+/// Uploads positions relative to the domain's minimum corner, velocities and ids.
 pub(super) fn upload(program: &Program, scene: &Scene, state: &Particles) {
     let origin = scene.domain.min;
     let local = |p: &[f32; 3]| {
@@ -43,7 +43,8 @@ pub(super) fn upload(program: &Program, scene: &Scene, state: &Particles) {
     program.upload(ID, 0, &state.id);
 }
 
-/// What came back from the device, in any order, into the order of the ids.
+/// Writes downloaded positions and velocities, which come in any order, into the slots given by
+/// their ids.
 pub(super) fn take_over(
     state: &mut Particles,
     scene: &Scene,
@@ -61,8 +62,8 @@ pub(super) fn take_over(
     }
 }
 
-/// Positions and velocities as they stand on the device now, as a frame would have them; `state` is what the frame began
-/// with, and keeps its attributes to itself.
+/// Downloads current positions and velocities, in the order of `state` and in world coordinates.
+/// `state` is the frame's initial state; its attributes are not copied.
 pub(super) fn look(
     program: &Program,
     scene: &Scene,
@@ -84,7 +85,7 @@ pub(super) fn look(
     Ok(now)
 }
 
-/// Where a particle stands in a state, by id.
+/// Returns a map from id to index in the state.
 pub(super) fn slots_by_id(ids: &[u32]) -> impl Fn(u32) -> usize + use<> {
     let top = ids.iter().max().map_or(0, |&id| id as usize + 1);
     let mut slots = vec![0; top];
@@ -94,7 +95,8 @@ pub(super) fn slots_by_id(ids: &[u32]) -> impl Fn(u32) -> usize + use<> {
     move |id| slots[id as usize]
 }
 
-/// Whether the ids that came back are those that went up, in any order, before they are used as places.
+/// Checks that the downloaded ids are a permutation of the uploaded ones, before they are used as
+/// indices.
 pub(super) fn check_ids(frame: u32, sent: &[u32], found: &[u32]) -> Result<(), Breach> {
     let top = sent.iter().max().map_or(0, |&id| id as usize + 1);
     let mut is_missing = vec![false; top];
@@ -111,7 +113,8 @@ pub(super) fn check_ids(frame: u32, sent: &[u32], found: &[u32]) -> Result<(), B
     }
 }
 
-/// `density` is one relative density a particle, in the state's order, where the solver has it.
+/// Checks that a state is finite. `density` holds one relative density per particle, in the state's
+/// order, if the solver has it.
 pub(super) fn check_finite(
     frame: u32,
     state: &Particles,

@@ -1,4 +1,5 @@
-//! A substep run dispatch by dispatch, for whoever holds each pass against its f64 twin.
+//! Runs a substep dispatch by dispatch, so that each pass can be compared with its f64 reference
+//! pass.
 
 use swell_domain::{solver::Solver, substep::Which};
 use swell_gpu::{
@@ -20,23 +21,22 @@ use super::{
     },
 };
 
-/// A dispatch of a traced substep, just before or after it runs.
+/// A dispatch of a traced substep, observed just before or just after it runs.
 #[derive(Clone, Copy)]
 pub struct Traced<'a> {
-    /// Which of the two.
+    /// Whether the dispatch is about to run or has run.
     pub moment: Moment,
-    /// Pass name.
+    /// Name of the pass.
     pub pass: &'static str,
-    /// Where its variables are bound, when not in the buffer of their own name.
+    /// Explicit bindings; a variable without one is bound to the buffer of its own name.
     pub binds: &'a [Bind],
     program: &'a Program,
 }
 
 impl Traced<'_> {
-    /// A buffer's first `count` values as they stand now.
+    /// Reads the first `count` values of a buffer.
     ///
-    /// # Errors
-    /// The device.
+    /// # Errors Returns an error if the device fails.
     pub fn read<T: bytemuck::Pod>(
         &self,
         buffer: Buf<T>,
@@ -45,18 +45,16 @@ impl Traced<'_> {
         Ok(self.program.read(buffer, count)?)
     }
 
-    /// What stands in a buffer of one struct, or in front of others.
+    /// Reads the first value of a buffer.
     ///
-    /// # Errors
-    /// The device.
+    /// # Errors Returns an error if the device fails.
     pub fn one<T: bytemuck::Pod>(&self, buffer: Buf<T>) -> Result<T, SolveError> {
         Ok(self.program.read(buffer, 1)?.remove(0))
     }
 
-    /// The first `count` values of the buffer that the variable of `variable`'s name is bound to.
+    /// Reads the first `count` values of the buffer that the shader variable is bound to.
     ///
-    /// # Errors
-    /// The device.
+    /// # Errors Returns an error if the device fails.
     pub fn bound<T: bytemuck::Pod>(
         &self,
         variable: Buf<T>,
@@ -66,10 +64,9 @@ impl Traced<'_> {
         Ok(self.program.read(buffer, count)?)
     }
 
-    /// The first `count` values of an array of a projection's own precision.
+    /// Reads the first `count` values of an array in the projection's precision.
     ///
-    /// # Errors
-    /// The device.
+    /// # Errors Returns an error if the device fails.
     pub fn reals(
         &self,
         buffer: &Buf<Real>,
@@ -79,48 +76,43 @@ impl Traced<'_> {
         read_reals(self.program, buffer, precision, count)
     }
 
-    /// What passes have counted.
+    /// Reads the counters of the frame.
     ///
-    /// # Errors
-    /// The device.
+    /// # Errors Returns an error if the device fails.
     pub fn counters(&self) -> Result<Counters, SolveError> {
         self.one(COUNTERS)
     }
 
-    /// PBF's iteration until a density error.
+    /// Reads the state of PBF's iteration to a density error.
     ///
-    /// # Errors
-    /// The device.
+    /// # Errors Returns an error if the device fails.
     pub fn iteration_control(&self) -> Result<IterationControl, SolveError> {
         self.one(pbf::buffers::CONTROL)
     }
 
-    /// The scalars of a projection in `precision`, on which their layout depends.
+    /// Reads the scalars of a projection in `precision`, which determines their layout.
     ///
-    /// # Errors
-    /// The device.
+    /// # Errors Returns an error if the device fails.
     pub fn pressure_control(&self, precision: Precision) -> Result<PressureControl64, SolveError> {
         Ok(read_control(self.program, precision)?.0)
     }
 
-    /// What a projection has noted.
+    /// Reads the statistics of a projection.
     ///
-    /// # Errors
-    /// The device.
+    /// # Errors Returns an error if the device fails.
     pub fn pressure_stats(&self) -> Result<PressureStats, SolveError> {
         self.one(STATS)
     }
 
-    /// Name of the buffer that a variable is bound to.
+    /// Returns the name of the buffer that a shader variable is bound to.
     pub fn buffer<'b>(&'b self, variable: &'b str) -> &'b str {
         let found = self.binds.iter().find(|bind| bind.variable == variable);
         found.map_or(variable, |bind| &bind.buffer)
     }
 
-    /// The window of a uniform that the dispatch is bound to.
+    /// Reads the window of a uniform that the dispatch is bound to.
     ///
-    /// # Errors
-    /// The device.
+    /// # Errors Returns an error if the device fails.
     pub fn uniform<T: bytemuck::Pod>(&self, variable: &str) -> Result<T, SolveError> {
         let found = self.binds.iter().find(|bind| bind.variable == variable);
         let offset = found
@@ -131,42 +123,41 @@ impl Traced<'_> {
         Ok(bytemuck::pod_read_unaligned(&bytes[offset..]))
     }
 
-    /// The window of `windows` that the dispatch is bound to.
+    /// Reads the window of `windows` that the dispatch is bound to.
     ///
-    /// # Errors
-    /// The device.
+    /// # Errors Returns an error if the device fails.
     pub fn window<T: bytemuck::Pod>(&self, windows: &Windows<T>) -> Result<T, SolveError> {
         self.uniform(windows.variable())
     }
 }
 
 impl Traced<'_> {
-    /// What the dispatch writes.
+    /// Iterates over the read-write bindings of the pass.
     fn written(&self) -> impl Iterator<Item = &Binding> {
         let bindings = self.program.pass(self.pass).bindings.iter();
         bindings.filter(|binding| binding.access == Access::ReadWrite)
     }
 
-    /// Whether the dispatch writes a buffer.
+    /// Returns whether the dispatch writes a buffer.
     pub fn writes(&self, buffer: &str) -> bool {
         self.written()
             .any(|binding| self.buffer(&binding.name) == buffer)
     }
 
-    /// Whether the program that runs it has a buffer of that name.
+    /// Returns whether the program has a buffer of this name.
     pub fn has(&self, buffer: &str) -> bool {
         self.program.has(buffer)
     }
 
-    /// How many values of `T` a buffer holds.
+    /// Returns how many values of type `T` a buffer holds.
     pub fn length<T>(&self, buffer: &str) -> usize {
         self.program.buffer(buffer).size() as usize / size_of::<T>()
     }
 
-    /// The first buffer of floats that the dispatch writes and in which something is not finite as it stands now.
+    /// Returns the first float buffer that the dispatch writes and that holds a non-finite value
+    /// now.
     ///
-    /// # Errors
-    /// The device.
+    /// # Errors Returns an error if the device fails.
     pub fn first_not_finite(&self) -> Result<Option<String>, SolveError> {
         for binding in self.written() {
             let scalar = binding.element.scalar;
@@ -184,7 +175,8 @@ impl Traced<'_> {
     }
 }
 
-/// Whether floats are finite, by their exponents: the higher word of an f64 holds it.
+/// Returns whether all floats are finite, judged by their exponents; for an f64 that is in the high
+/// word.
 fn are_finite(words: &[u32], float: Scalar) -> bool {
     let (width, exponent) = match float {
         Scalar::F64 => (2, 0x7ff0_0000),
@@ -194,44 +186,44 @@ fn are_finite(words: &[u32], float: Scalar) -> bool {
     high.all(|word| word & exponent != exponent)
 }
 
-/// Which substeps of a frame are traced.
+/// Substeps of a frame that are traced.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Span {
-    /// From one on, counted from 1, to the frame's end.
+    /// From this substep, counted from 1, to the end of the frame.
     From(u32),
-    /// One.
+    /// One substep.
     Only(Which),
 }
 
-/// A substep that is traced.
+/// A substep that is being traced.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Begun {
-    /// From 1.
+    /// Number of the substep, counted from 1.
     pub number: u32,
-    /// Seconds of the frame that were over when it began.
+    /// Time of the frame that had passed when the substep began, seconds.
     pub elapsed: f64,
-    /// Length of the substep before, seconds; 0 where there was none.
+    /// Length of the previous substep, seconds; 0 if there was none.
     pub before: f64,
 }
 
-/// What a trace tells.
+/// Callback that receives each dispatch of a trace.
 pub type Observe<'a> = dyn FnMut(Begun, Traced<'_>) -> Result<(), SolveError> + 'a;
 
 /// A solver whose frames can be run dispatch by dispatch.
 pub trait TraceFrame: Solver {
-    /// Runs the frame after the loaded state: what comes before `span` at once, and its substeps one dispatch at a time, with
-    /// PBF the measurement of a frame's end after the last of them too. Returns that one's number. The solver then has to
-    /// be loaded anew.
+    /// Runs the frame after the loaded state. Substeps before `span` run normally, those of `span`
+    /// one dispatch at a time. PBF also traces the density measurement that ends a frame, after the
+    /// last traced substep. Returns the number of that substep. Load a state before using the
+    /// solver again.
     ///
-    /// # Errors
-    /// The device, the numbers, fewer substeps than were asked for, and what `observe` returns.
+    /// # Errors Returns an error if the device fails, a numerical budget is exceeded, the frame has
+    /// fewer substeps than requested, or `observe` fails.
     fn trace_frame(&mut self, span: Span, observe: &mut Observe<'_>) -> Result<u32, SolveError>;
 }
 
-/// What runs recordings one after the other: at once, timed, or traced.
+/// Callback that runs recordings in order: directly, timed, or traced.
 pub(super) type Run<'a> = dyn FnMut(&Program, &[&Recording]) -> Result<(), SolveError> + 'a;
 
-/// Runs `recordings` one dispatch at a time.
 pub(super) fn trace(
     recordings: &[&Recording],
     program: &Program,
@@ -256,7 +248,7 @@ mod tests {
     #[test]
     fn floats_are_finite_by_the_word_that_holds_their_exponent() {
         let wide = |value: f64| [value.to_bits() as u32, (value.to_bits() >> 32) as u32];
-        // The lower word of this number is an f32 that is none.
+        // Taken as an f32, the low word of this number is a NaN.
         let odd = f64::from_bits(0x3ff0_0000_7fc0_0000);
         assert!(are_finite(
             &[wide(1.0), wide(odd), wide(-f64::MAX)].concat(),

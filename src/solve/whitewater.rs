@@ -1,4 +1,4 @@
-//! Whitewater on the device: what makes it, and where it goes between two frames.
+//! Whitewater on the GPU: potentials for its emission, and its motion between two frames.
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -33,41 +33,43 @@ use super::{
     state::is_other_count,
 };
 
-/// Share of the place of each water particle that is water, in sorted order.
+/// Water fraction around each water particle, in sorted order.
 pub const SHARE: Buf<f32> = Buf::new("share");
-/// Outward normal of the surface at each water particle, in sorted order, and how surely there is one, 0 to 1.
+/// Outward surface normal at each water particle, in sorted order, and in w the confidence that it
+/// is at the surface, 0 to 1.
 pub const SURFACE_AT: Buf<[f32; 4]> = Buf::new("surface");
-/// Trapped air, m/s, wave crest, energy, J/kg, and share of water, in sorted order.
+/// Trapped air, m/s, wave crest, energy, J/kg, and water fraction, in sorted order.
 pub const POTENTIAL: Buf<[f32; 4]> = Buf::new("potential");
-/// x, y, z of each whitewater particle and its kind.
+/// Position x, y, z of each whitewater particle, and its kind in w.
 pub const WHITE_POSITION: Buf<[f32; 4]> = Buf::new("white_position");
-/// Of each whitewater particle, and after a frame the share of water about it.
+/// Velocity of each whitewater particle, and in w the water fraction around it after a frame.
 pub const WHITE_VELOCITY: Buf<[f32; 4]> = Buf::new("white_velocity");
-/// How many there are, in the first component.
+/// Number of whitewater particles, in the first component.
 pub const WHITE_COUNT: Buf<[u32; 4]> = Buf::uniform("white_count");
 
-/// What is found of each water particle.
+/// Passes that compute the potentials of water particles.
 pub const SURVEY: [&str; 2] = ["whitewater/survey", "whitewater/potentials"];
-/// What moves each whitewater particle.
+/// Pass that moves whitewater particles.
 pub const ADVANCE: &str = "whitewater/advance";
 
-/// Whitewater's passes over the frames of one bake.
+/// Whitewater's passes for the frames of one bake.
 pub struct Whitewater {
     program: Program,
     plan: Plan,
     scene: Scene,
     calibration: Calibration,
     survey: Recording,
-    /// Where water enters or leaves: what is uploaded anew for another count of it.
+    /// Boundary to upload again when the water's particle count changes or solids move. `None` if
+    /// neither can happen.
     boundary: Option<Boundary>,
     movers: Option<Movers>,
     settings: Option<Settings>,
-    /// Whitewater that the buffers hold.
+    /// Number of whitewater particles that the buffers can hold.
     capacity: usize,
     timer: Option<Timer>,
 }
 
-/// What the passes before whitewater's own moves need, with so many whitewater particles.
+/// Plans the passes for the water's potentials, and buffers for `white` whitewater particles.
 fn plan(scene: &Scene, boundary: &Boundary, water: usize, white: usize) -> Plan {
     let pbf = scene.solver.pbf();
     let support = Calibration::new(pbf.particle_spacing, pbf.support_ratio).support_radius;
@@ -153,7 +155,7 @@ fn pass(name: &'static str, plan: &Plan, scene: &Scene, settings: Option<&Settin
     }
 }
 
-/// Uploads what does not change from frame to frame; the recording of a survey.
+/// Uploads data that does not change between frames; returns the recording of a survey.
 fn set_up(
     program: &Program,
     plan: &Plan,
@@ -169,11 +171,11 @@ fn set_up(
 }
 
 impl Whitewater {
-    /// For `water` particles of `scene`, which is [`Scene::of_whitewater`] of what was baked. Nothing moves before
-    /// [`Self::set`].
+    /// Creates the passes for `water` particles of `scene`, which is [`Scene::of_whitewater`] of
+    /// the baked scene. Call [`Self::set`] before [`Self::advance`].
     ///
-    /// # Errors
-    /// A buffer over the adapter's limits, with the figures; a shader or the device at fault.
+    /// # Errors Returns an error if a buffer exceeds the adapter's limits, a shader does not
+    /// compile, or the device fails.
     pub fn new(
         context: &Context,
         scene: &Scene,
@@ -204,10 +206,9 @@ impl Whitewater {
         })
     }
 
-    /// Makes ready to move whitewater by these settings.
+    /// Prepares the motion of whitewater with these settings.
     ///
-    /// # Errors
-    /// A shader or the device at fault.
+    /// # Errors Returns an error if a shader does not compile or the device fails.
     pub fn set(&mut self, settings: &Settings) -> Result<(), SolveError> {
         let pass = pass(ADVANCE, &self.plan, &self.scene, Some(settings));
         self.program.refit(&[], &[pass])?;
@@ -215,7 +216,7 @@ impl Whitewater {
         Ok(())
     }
 
-    /// Makes room for so many particles of water.
+    /// Resizes buffers to another number of water particles.
     fn resize(&mut self, water: usize) -> Result<(), SolveError> {
         let boundary = self.boundary.as_ref();
         let boundary = boundary.expect("a scene in which water enters or leaves");
@@ -226,21 +227,20 @@ impl Whitewater {
         Ok(())
     }
 
-    /// Names of the passes and buffers that exist on the device, sorted.
+    /// Returns the names of the passes and of the buffers that exist on the device, sorted.
     pub fn built(&self) -> (Vec<&str>, Vec<&str>) {
         self.program.names()
     }
 
-    /// What passes took, by name; nothing unless timed.
+    /// Returns the time of each pass; empty unless timed.
     pub fn times(&self) -> Vec<PassTime> {
         let timer = self.timer.as_ref();
         timer.map_or_else(Vec::new, |timer| timer.times(PassTime::new))
     }
 
-    /// A buffer's first `count` values.
+    /// Reads the first `count` values of a buffer.
     ///
-    /// # Errors
-    /// The device.
+    /// # Errors Returns an error if the device fails.
     pub fn field<T: bytemuck::Pod>(
         &self,
         buffer: Buf<T>,
@@ -249,11 +249,11 @@ impl Whitewater {
         Ok(self.program.read(buffer, count)?)
     }
 
-    /// Takes the water of a frame at `time`, `seconds` after the one before, and gives what of each particle makes
-    /// whitewater, in the order of the water.
+    /// Uploads the water of the frame at `time`, `seconds` after the previous one, and returns the
+    /// potentials of its particles, in the water's order.
     ///
-    /// # Errors
-    /// The device; another number of particles than it was made for, where none enters or leaves.
+    /// # Errors Returns an error if the device fails, or if the particle count changed although no
+    /// water enters or leaves the scene.
     pub fn survey(
         &mut self,
         water: &Particles,
@@ -270,7 +270,7 @@ impl Whitewater {
         self.program.upload(VELOCITY, 0, &water.velocity);
         self.program.upload(ID, 0, &water.id);
         let mut params = params(&self.scene, &self.calibration, &self.plan, time, seconds);
-        // Whitewater falls, whatever the water's own solver does with gravity.
+        // Whitewater falls under gravity, however the water's own solver applies it.
         params.velocity_step = (self.scene.water.gravity * seconds).as_vec3().to_array();
         self.program.upload(PARAMS, 0, &[params]);
         if let (Some(movers), Some(boundary)) = (&self.movers, &self.boundary) {
@@ -294,13 +294,12 @@ impl Whitewater {
         Ok(found)
     }
 
-    /// Moves whitewater from the frame before to that of the last [`Self::survey`]: positions, velocities, kinds.
+    /// Moves whitewater from the previous frame to that of the last [`Self::survey`]: positions,
+    /// velocities, kinds.
     ///
-    /// # Errors
-    /// The device; what is not finite.
+    /// # Errors Returns an error if the device fails or a value is not finite.
     ///
-    /// # Panics
-    /// Before [`Self::set`].
+    /// # Panics Panics if [`Self::set`] was not called.
     pub fn advance(&mut self, white: &mut Particles, frame: u32) -> Result<(), SolveError> {
         assert!(self.settings.is_some(), "settings come before moves");
         let n = white.len();
@@ -308,7 +307,7 @@ impl Whitewater {
             return Ok(());
         }
         if n > self.capacity {
-            // A quarter more, so that a stream that grows does not ask every frame.
+            // 25 % headroom, so that a growing stream does not reallocate in every frame.
             self.capacity = n + n / 4;
             let specs = [WHITE_POSITION, WHITE_VELOCITY].map(|b| b.sized(self.capacity));
             self.program.refit(&specs, &[])?;
@@ -349,12 +348,13 @@ impl Whitewater {
 }
 
 impl Whitewater {
-    /// The order of places by the cells of the water about them: neighbouring threads then look at the same water.
+    /// Returns the order of positions by their cells: neighbouring threads then read the same water
+    /// particles.
     fn by_cell(&self, places: &[[f32; 3]]) -> Vec<u32> {
         let h = self.calibration.support_radius as f32;
         let [nx, ny, _] = self.plan.grid_dims.map(u64::from);
         let key = |[x, y, z]: &[f32; 3]| {
-            // A cast saturates: what is below 0 becomes 0.
+            // A float-to-integer cast saturates: negative values become 0.
             let [x, y, z] = [x, y, z].map(|x| (x / h) as u64);
             (z * ny + y) * nx + x
         };
@@ -366,7 +366,7 @@ impl Whitewater {
     }
 }
 
-/// Positions relative to the domain's least corner.
+/// Returns positions relative to the domain's minimum corner.
 fn local(scene: &Scene, positions: &[[f32; 3]]) -> Vec<[f32; 3]> {
     let origin = scene.domain.min;
     let one = |p: &[f32; 3]| {

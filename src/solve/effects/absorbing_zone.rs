@@ -1,4 +1,5 @@
-//! Absorbing zones on the device: PBF's particles lose velocity at a step's end, FLIP's faces before the projection.
+//! Absorbing zones on the GPU: they damp the velocities of PBF's particles at the end of a substep,
+//! and of FLIP's faces before the projection.
 
 use swell_scene::{Scene, effects::absorbing_zone::Settings};
 

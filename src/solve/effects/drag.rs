@@ -1,4 +1,5 @@
-//! Drag of air on the device: on PBF's particles at a step's end, on FLIP's before the grid is given their velocities.
+//! Air drag on the GPU: on PBF's particles at the end of a substep, on FLIP's particles before the
+//! transfer to the grid.
 
 use crate::air;
 use swell_domain::{flip, pbf};

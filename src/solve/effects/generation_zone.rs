@@ -1,4 +1,5 @@
-//! Generation zones on the device: PBF's particles are led at a step's end, FLIP's faces before the projection.
+//! Generation zones on the GPU: they relax velocities towards incoming waves, of PBF's particles at
+//! the end of a substep, and of FLIP's faces before the projection.
 
 use std::f64::consts::TAU;
 
@@ -8,7 +9,7 @@ use swell_scene::{Scene, effects::generation_zone::Settings};
 
 use super::{Addition, OnDevice, pass, zone::constants};
 
-/// Two of each wave, as shared/open_waves.wgsl has them.
+/// Two vectors per wave, laid out as in shared/open_waves.wgsl.
 pub const OPEN_WAVES: Buf<[f32; 4]> = Buf::new("open_waves");
 
 pub(super) fn pbf(settings: &Settings, scene: &Scene, _particles: usize) -> Addition {
@@ -33,7 +34,8 @@ fn generation(name: &'static str, settings: &Settings, scene: &Scene) -> Additio
 }
 
 impl OnDevice for Settings {
-    /// The waves as they are then. Phases are reduced here, where there are the digits for it.
+    /// Uploads the waves at the given time. Phases are reduced modulo one turn here, where f64 has
+    /// the digits for it.
     fn upload(&self, program: &Program, scene: &Scene, (time, _): (f64, f64)) {
         let waves = self.incoming(scene.water.gravity);
         let grown = waves.grown(time);

@@ -1,7 +1,8 @@
-//! What each effect adds to a solver: a file an effect, for both.
+//! Passes and buffers that each effect adds to the solvers, one file per effect.
 //!
-//! Its passes bind buffers by name and run in order: of PBF after the velocity update, of FLIP on the grid before the
-//! projection, or on the particles before the grid.
+//! Passes bind buffers by name and run in order. PBF runs them after the velocity update; FLIP runs
+//! them on the grid before the projection, on the grid between two projections, or on the particles
+//! before the transfer to the grid.
 
 mod zone;
 
@@ -11,41 +12,42 @@ use swell_gpu::{
 };
 use swell_scene::{Scene, effects::with_effects};
 
-/// What an effect adds to a solver.
+/// Passes and buffers that an effect adds to a solver.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Addition {
-    /// In the order in which they run, with their own constants.
+    /// Passes in the order in which they run, with the effect's own constants.
     pub passes: Vec<PassSpec>,
-    /// Of FLIP on the sorted particles, before the grid is given their velocities; over cells of water.
+    /// FLIP only: passes on the sorted particles before the transfer to the grid, dispatched over
+    /// cells with water.
     pub on_particles: Vec<PassSpec>,
-    /// Of FLIP on the grid, between two projections.
+    /// FLIP only: passes on the grid between two projections.
     pub between: Option<Between>,
-    /// Beyond what the solver has anyway.
+    /// Buffers that the solver itself does not have.
     pub buffers: Vec<BufferSpec>,
 }
 
-/// What an effect does between two projections: begins, goes to and fro as often as a substep asks for, and ends after the second.
+/// Work of an effect between two projections: an iterative solve, and a step after the second
+/// projection.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Between {
-    /// Its passes, with their own constants.
+    /// Passes, with the effect's own constants.
     pub passes: Vec<PassSpec>,
-    /// Once, with the first to and fro.
+    /// Commands that start the solve, with the first double iteration.
     pub begin: Vec<Command>,
-    /// Each further time.
+    /// Commands of each further double iteration.
     pub again: Vec<Command>,
-    /// After the second projection.
+    /// Commands after the second projection.
     pub end: Vec<Command>,
 }
 
 impl Addition {
-    /// Every pass.
+    /// Iterates over all passes.
     pub(super) fn all(&self) -> impl Iterator<Item = &PassSpec> {
         let between = self.between.iter().flat_map(|between| &between.passes);
         self.passes.iter().chain(&self.on_particles).chain(between)
     }
 }
 
-/// An effect's pass with its constants.
 fn pass(name: &'static str, constants: &[(&'static str, f64)]) -> PassSpec {
     PassSpec {
         name,
@@ -54,23 +56,25 @@ fn pass(name: &'static str, constants: &[(&'static str, f64)]) -> PassSpec {
     }
 }
 
-/// What an effect's settings do on the device beside its passes.
+/// Host-side work of an effect, besides its passes.
 trait OnDevice {
-    /// Fills what its passes are told anew of each substep: the time at which velocities stand when they run, and its length, s.
+    /// Uploads data that changes with the substep. `_span` is the time at which the effect's passes
+    /// evaluate velocities, and the length of the substep, seconds.
     fn upload(&self, _program: &Program, _scene: &Scene, _span: (f64, f64)) {}
 
-    /// What it does between two projections of a substep of so many seconds.
+    /// Returns the iterations between two projections for a substep of `_length` seconds; `None`
+    /// for an effect without such a solve.
     fn turns(&self, _scene: &Scene, _length: f64) -> Option<Turns> {
         None
     }
 }
 
-/// How an effect goes to and fro between two projections.
+/// Iterations of an implicit solve between two projections.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Turns {
-    /// After the first one.
+    /// Double iterations after the first one.
     pub(super) again: u32,
-    /// Whether more were needed than it may take.
+    /// Whether the solve needs more iterations than the settings allow.
     pub(super) is_short: bool,
 }
 
@@ -78,24 +82,27 @@ macro_rules! additions {
     ($($name:ident),+ $(,)?) => {
         $(pub mod $name;)+
 
-        /// What a scene's effects add to PBF with so many particles, by key.
+        /// Returns what the scene's effects add to PBF with `particles` particles, by the effects'
+        /// keys.
         pub(super) fn of_pbf(scene: &Scene, particles: usize) -> Vec<(&'static str, Addition)> {
             let mut all = Vec::new();
             $(all.extend(scene.effects.$name.iter().map(|settings| (stringify!($name), $name::pbf(settings, scene, particles))));)+
             all
         }
 
-        /// Fills what effects are told anew of each substep: the time at which velocities stand when their passes run, and its length, s.
+        /// Uploads the effects' data that changes with the substep. `span` is the time at which
+        /// their passes evaluate velocities, and the length of the substep, seconds.
         pub(super) fn upload(program: &Program, scene: &Scene, span: (f64, f64)) {
             $(scene.effects.$name.iter().for_each(|settings| settings.upload(program, scene, span));)+
         }
 
-        /// How the effect that acts between two projections goes in a substep of so many seconds, where one does.
+        /// Returns the iterations of the effect that acts between two projections, if there is one,
+        /// for a substep of `length` seconds.
         pub(super) fn turns(scene: &Scene, length: f64) -> Option<Turns> {
             None$(.or_else(|| scene.effects.$name.as_ref()?.turns(scene, length)))+
         }
 
-        /// What they add to FLIP with so many cells in its arrays.
+        /// Returns what the scene's effects add to FLIP, whose arrays hold `cells` cells.
         pub(super) fn of_flip(scene: &Scene, cells: usize) -> Vec<(&'static str, Addition)> {
             let mut all = Vec::new();
             $(all.extend(scene.effects.$name.iter().map(|settings| (stringify!($name), $name::flip(settings, scene, cells))));)+

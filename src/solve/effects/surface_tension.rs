@@ -1,4 +1,5 @@
-//! Surface tension on the device: on the grid before the projection, of FLIP's scene or of PBF's.
+//! Surface tension on the GPU: forces on the grid before the projection, for FLIP or for PBF's
+//! projection.
 
 use swell_gpu::buffer::Buf;
 use swell_scene::{Scene, effects::surface_tension::Settings};
@@ -7,14 +8,15 @@ use super::{Addition, OnDevice, pass};
 
 impl OnDevice for Settings {}
 
-/// Cells: the water's share, smoothed once, and in the end three times.
+/// Cells: water fraction, smoothed once; in the end smoothed three times.
 pub const SHARE: Buf<f32> = Buf::new("tension_share");
-/// Cells: smoothed twice.
+/// Cells: water fraction, smoothed twice.
 pub const BETWEEN: Buf<f32> = Buf::new("tension_between");
-/// Cells: the surface's curvature times Δx, and how steep the share is there, a cell.
+/// Cells: curvature of the surface times Δx, and the gradient of the water fraction there, per
+/// cell.
 pub const CURVATURE: Buf<[f32; 2]> = Buf::new("tension_curvature");
 
-/// Nothing on particles: its projection has it.
+/// Adds nothing on particles: PBF's projection applies surface tension on its grid.
 pub(super) fn pbf(_: &Settings, _: &Scene, _particles: usize) -> Addition {
     Addition::default()
 }

@@ -1,4 +1,5 @@
-//! Viscosity on the device: of so many Pa s on FLIP's grid, or XSPH's on PBF's particles.
+//! Viscosity on the GPU: an implicit solve on FLIP's grid for a viscosity in Pa s, or XSPH on PBF's
+//! particles.
 
 use crate::flip::{buffers::FACE_VELOCITY, over_cells};
 use swell_domain::relaxation::Relaxation;
@@ -11,25 +12,25 @@ use swell_scene::{Method, Scene, effects::viscosity::Settings};
 
 use super::{Addition, Between, OnDevice, Turns, pass};
 
-/// What XSPH changes each particle's velocity by, in sorted order, m/s.
+/// Velocity change of each particle by XSPH, in sorted order, m/s.
 pub const CHANGE: Buf<[f32; 3]> = Buf::new("viscosity_change");
 
-/// Cells: what the solve knows of them, as shared/viscous_word.wgsl has it.
+/// Cells: bit field that the solve reads, laid out as in shared/viscous_word.wgsl.
 pub const WORD: Buf<u32> = Buf::new("viscous_word");
-/// Planes: velocities from which the solve starts, m/s.
+/// Planes: initial velocities of the solve, m/s.
 pub const START: Buf<f32> = Buf::new("viscous_start");
 /// Planes: velocities after every other iteration, m/s.
 pub const OTHER: Buf<f32> = Buf::new("viscous_other");
-/// Planes: what the last iteration changed, m/s.
+/// Planes: velocity change in the last iteration, m/s.
 pub const STEP: Buf<f32> = Buf::new("viscous_change");
 /// Cells: pressure of the projection before the solve, Pa.
 pub const EARLIER: Buf<f32> = Buf::new("viscous_pressure");
-/// Of the first iteration and of the others, [`Relaxation::of_iteration`].
+/// [`Relaxation::of_iteration`] for the first iteration and for the others.
 pub const GAINS: Windows<[f32; 4]> = Windows::new("viscous_gain", "viscous_gains");
 
-/// Variable of the velocities that an iteration starts from, m/s; and of those that it comes to.
+/// Shader variable of the velocities that an iteration reads, m/s.
 pub const FROM: Buf<f32> = Buf::new("viscous_from");
-/// See [`FROM`].
+/// Shader variable of the velocities that an iteration writes, m/s.
 pub const TO: Buf<f32> = Buf::new("viscous_to");
 
 const WEIGH: &str = "effects/viscosity_weigh";
@@ -50,7 +51,8 @@ pub(super) fn pbf(settings: &Settings, _: &Scene, particles: usize) -> Addition 
     }
 }
 
-/// XSPH is nothing of its own: the grid holds the mean of the neighbours' velocities already, and the blend takes more of it.
+/// XSPH adds no passes: the grid already averages velocities of neighbours, and the PIC fraction
+/// takes more of that average.
 pub(super) fn flip(settings: &Settings, scene: &Scene, cells: usize) -> Addition {
     if settings.coefficient.is_none() {
         return Addition::default();
@@ -79,7 +81,7 @@ pub(super) fn flip(settings: &Settings, scene: &Scene, cells: usize) -> Addition
     }
 }
 
-/// An iteration between two arrays of velocities.
+/// Returns an iteration from one array of velocities to another.
 fn relax(from: &Buf<f32>, to: &Buf<f32>, gains: usize) -> Command {
     let binds = vec![
         Bind::whole("viscous_from", from),
@@ -97,9 +99,9 @@ fn back() -> Command {
     relax(&OTHER, &FACE_VELOCITY, 1)
 }
 
-/// On the grid of a scene.
+/// Returns the relaxation of the implicit solve on a FLIP scene's grid.
 fn relaxation(settings: &Settings, scene: &Scene, length: f64) -> Option<Relaxation> {
-    // PBF's own scene has none: its projection's has.
+    // PBF's own scene has no grid; the scene of its projection does.
     if scene.solver.method != Method::Flip {
         return None;
     }

@@ -1,4 +1,4 @@
-//! Vorticity confinement on the device.
+//! Vorticity confinement on the GPU.
 
 use swell_gpu::buffer::Buf;
 use swell_scene::{Scene, effects::vorticity_confinement::Settings};
@@ -7,9 +7,9 @@ use super::{Addition, OnDevice, pass};
 
 impl OnDevice for Settings {}
 
-/// Curl of the velocity: of each particle in sorted order (PBF), or of each cell (FLIP), 1/s.
+/// Curl of the velocity, 1/s: per particle in sorted order (PBF), or per cell (FLIP).
 pub const VORTICITY: Buf<[f32; 3]> = Buf::new("vorticity");
-/// Its length.
+/// Length of [`VORTICITY`], 1/s.
 pub const VORTICITY_LENGTH: Buf<f32> = Buf::new("vorticity_length");
 
 pub(super) fn pbf(settings: &Settings, _: &Scene, particles: usize) -> Addition {

@@ -1,8 +1,8 @@
-//! Zones on the device.
+//! Zones on the GPU.
 
 use swell_scene::{Scene, effects::zone::Zone};
 
-/// What shared/zone.wgsl is told.
+/// Returns the constants of shared/zone.wgsl.
 pub(super) fn constants(zone: Zone<'_>, scene: &Scene) -> Vec<(&'static str, f64)> {
     let size = scene.domain.size();
     vec![

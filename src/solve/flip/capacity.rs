@@ -1,4 +1,4 @@
-//! Which bricks a state takes, and room for other counts.
+//! Brick layouts of particle states, and resizing to other counts.
 
 use crate::{
     SolveError,
@@ -14,7 +14,7 @@ use swell_scene::{Scene, step::Substep};
 
 use super::{Flip, PARAMS, plan, pressure_solver, recordings, step, upload_constants};
 
-/// No flag set, one a brick of the domain.
+/// Returns wetness flags of the domain's bricks, none set.
 pub(super) fn no_water(scene: &Scene, grid_dims: [u32; 3]) -> Vec<bool> {
     let dims = table_dims(stored_cells(grid_dims, scene.periodic));
     vec![false; dims.iter().map(|&n| n as usize).product()]
@@ -33,7 +33,7 @@ pub(super) fn capacity_of(bricks: &Bricks) -> Capacity {
     }
 }
 
-/// Bricks that a state takes in a scene.
+/// Returns the bricks that a particle state needs in a scene.
 pub fn capacity(scene: &Scene, particles: &Particles) -> Capacity {
     let grid_dims = scene.domain.cells(scene.solver.flip().cell_size);
     let mut is_wet = no_water(scene, grid_dims);
@@ -45,11 +45,12 @@ pub fn capacity(scene: &Scene, particles: &Particles) -> Capacity {
             std::array::from_fn(|k| ((x[k] / edge).max(0.0) as usize).min(dims[k] - 1));
         is_wet[(at[2] * dims[1] + at[1]) * dims[0] + at[0]] = true;
     }
-    // As deep as layers of a first step reach that is not yet fast.
+    // As many layers as a first substep at a moderate speed reaches.
     capacity_of(&bricks(scene, grid_dims, &is_wet, layers(1.0)))
 }
 
-/// For the first survey, which reads what does not depend on the substep.
+/// Returns the substep of the first survey, which reads only parameters that do not depend on the
+/// substep.
 pub(super) fn whole_frame(scene: &Scene) -> Substep {
     Substep {
         start: 0.0,
@@ -60,7 +61,7 @@ pub(super) fn whole_frame(scene: &Scene) -> Substep {
 }
 
 impl Flip {
-    /// Makes room for other counts.
+    /// Resizes buffers to other counts.
     pub(super) fn refit(&mut self, counts: Counts) -> Result<(), SolveError> {
         self.plan = plan::plan(&self.scene, counts, self.plan.moves);
         let (buffers, passes) = (self.plan.buffer_specs(), self.plan.pass_specs());
@@ -71,7 +72,7 @@ impl Flip {
         Ok(())
     }
 
-    /// Makes room for so many particles.
+    /// Resizes buffers to another number of particles.
     pub(super) fn resize(&mut self, particles: usize) -> Result<(), SolveError> {
         self.refit(Counts {
             particles,

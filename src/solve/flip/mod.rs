@@ -1,8 +1,9 @@
 //! PIC/FLIP (Zhu and Bridson 2005) and APIC (Jiang et al. 2015) on sparse bricks of a MAC grid.
 //!
-//! A substep measures the particles' largest speed and the bricks that they touch, sorts them by cell, carries
-//! their velocities to the grid, projects, carries the change back and moves them through the projected field.
-//! No grid outlives its substep: the state is positions, velocities, ids, and with APIC the affine rows.
+//! A substep measures the particles' largest speed and the bricks that they touch, sorts them by
+//! cell, transfers their velocities to the grid, projects, transfers the change back and advects
+//! the particles through the projected field. No grid outlives its substep: the state consists of
+//! positions, velocities and ids, and for APIC of the affine matrices' rows.
 
 pub mod buffers;
 mod capacity;
@@ -52,7 +53,7 @@ pub(super) use record::over_cells;
 use record::{Commands, Recordings, groups, numbers};
 pub(super) use totals::FrameTotals;
 
-/// FLIP on a device.
+/// The FLIP solver on a GPU.
 pub struct Flip {
     program: Program,
     plan: Plan,
@@ -64,27 +65,28 @@ pub struct Flip {
     timer: Option<Timer>,
     state: Particles,
     frame: u32,
-    /// Of the last substep.
+    /// Bricks of the last substep.
     bricks: Bricks,
-    /// The walls that cut its cells, in cells.
+    /// Walls that cut the cells of the last substep, in cells.
     cut: Bounds,
-    /// See [`Substep::kick`], s.
+    /// See [`Substep::kick`], seconds.
     kick: f64,
 }
 
-/// What `flip/survey` found.
+/// Result of `flip/survey`.
 struct Survey {
-    /// m/s.
+    /// Largest particle speed, m/s.
     speed: f64,
     not_finite: u32,
     is_wet: Vec<bool>,
 }
 
 impl Flip {
-    /// Builds what `plan` names, and nothing more. It must have been made for `scene` and `boundary`.
+    /// Builds the passes and buffers of `plan`, which must have been made for `scene` and
+    /// `boundary`.
     ///
-    /// # Errors
-    /// A buffer over the adapter's limits, with the figures; a shader or the device at fault.
+    /// # Errors Returns an error if a buffer exceeds the adapter's limits, a shader does not
+    /// compile, or the device fails.
     pub fn new(
         context: &Context,
         scene: &Scene,
@@ -117,17 +119,17 @@ impl Flip {
         })
     }
 
-    /// What stands now: its bricks grow with the water.
+    /// Returns the current plan, whose brick capacity grows with the water.
     pub fn plan(&self) -> &Plan {
         &self.plan
     }
 
-    /// Bricks of the last substep.
+    /// Returns the bricks of the last substep.
     pub fn bricks(&self) -> &Bricks {
         &self.bricks
     }
 
-    /// Names of the transfer passes that a substep runs, in order.
+    /// Returns the names of the passes of a substep in order, without those of the projection.
     pub fn recorded_passes(&self) -> Vec<&'static str> {
         let recordings = &self.recordings;
         let before = recordings
@@ -142,15 +144,14 @@ impl Flip {
         before.chain(after).collect()
     }
 
-    /// Names of the passes and buffers that exist on the device, sorted.
+    /// Returns the names of the passes and of the buffers that exist on the device, sorted.
     pub fn built(&self) -> (Vec<&str>, Vec<&str>) {
         self.program.names()
     }
 
-    /// A buffer's first `count` values, as the last substep left it.
+    /// Reads the first `count` values of a buffer, as the last substep left them.
     ///
-    /// # Errors
-    /// The device.
+    /// # Errors Returns an error if the device fails.
     pub fn field<T: bytemuck::Pod>(
         &self,
         buffer: Buf<T>,
@@ -170,7 +171,8 @@ impl Flip {
         })
     }
 
-    /// The next substep of the `remaining` seconds, and how many these take as things stand.
+    /// Chooses the next substep of the `remaining` seconds, and estimates how many substeps these
+    /// take.
     fn choose(
         &self,
         survey: &Survey,
@@ -180,7 +182,7 @@ impl Flip {
     ) -> Result<(f64, Substep), SolveError> {
         if survey.not_finite > 0 {
             let breach = Breach::not_finite(self.frame + 1, survey.not_finite.into(), None);
-            // What the substep before left, or the loaded state.
+            // The values come from the previous substep, or from the loaded state.
             return Err(breach.in_substep(done.max(1)).into());
         }
         let frame = self.frame + 1;
@@ -194,7 +196,8 @@ impl Flip {
         Ok(chosen)
     }
 
-    /// Which bricks are water, where `is_wet` are those that hold particles.
+    /// Extends `is_wet`, the bricks that hold particles, by bricks near solids that belong to the
+    /// water.
     fn with_shores(&self, is_wet: &[bool], substep: &Substep) -> Vec<bool> {
         let size = self.scene.solver.flip().cell_size;
         let cut = step::cut(&self.scene, substep);
@@ -208,7 +211,7 @@ impl Flip {
         is_wet
     }
 
-    /// Lays out bricks about the water, and makes room for more where they do not fit.
+    /// Lays out bricks around the water and grows the buffers if they do not fit.
     fn lay_out(&mut self, is_wet: &[bool], substep: &Substep) -> Result<(), SolveError> {
         let layers = layers(substep.displacement);
         let is_wet = self.with_shores(is_wet, substep);
@@ -241,10 +244,10 @@ impl Flip {
         Ok(())
     }
 
-    /// Carries the loaded state to the grid, as the next frame's first substep does: what [`Self::project`] starts from.
+    /// Transfers the loaded state to the grid, as the first substep of the next frame does;
+    /// [`Self::project`] continues from there.
     ///
-    /// # Errors
-    /// The device, or a state that is not finite or too fast.
+    /// # Errors Returns an error if the device fails or the state is not finite or too fast.
     pub fn carry_to_grid(&mut self) -> Result<Substep, SolveError> {
         self.timed(|flip, run| {
             let (survey, substep) = flip.first_substep(run)?;
@@ -253,23 +256,22 @@ impl Flip {
         })
     }
 
-    /// Projects the face velocities that stand on the grid; waits for the device.
+    /// Projects the face velocities on the grid and waits for the device.
     ///
-    /// # Errors
-    /// The device.
+    /// # Errors Returns an error if the device fails.
     pub fn project(&mut self, substep: &Substep) -> Result<pressure::Projected, SolveError> {
         self.timed(|flip, run| flip.project_by(substep, run))
     }
 
-    /// The last projection's q = p Δt / (ρ Δx) at elements of cell arrays, as the solve has it, m/s.
+    /// Returns the last projection's q = p Δt / (ρ Δx) at elements of cell arrays, in the solve's
+    /// precision, m/s.
     ///
-    /// # Errors
-    /// The device.
+    /// # Errors Returns an error if the device fails.
     pub fn solution(&self, elements: &[u32]) -> Result<Vec<f64>, SolveError> {
         self.pressure.solution(&self.program, elements)
     }
 
-    /// `work` with what runs recordings at once, or timed where the solver times passes.
+    /// Calls `work` with a callback that runs recordings, timed if the solver times passes.
     fn timed<T>(
         &mut self,
         work: impl FnOnce(&mut Self, &mut Run<'_>) -> Result<T, SolveError>,
@@ -282,7 +284,7 @@ impl Flip {
         result
     }
 
-    /// Of the frame after the loaded state.
+    /// Chooses the first substep of the frame after the loaded state.
     fn first_substep(&mut self, run: &mut Run<'_>) -> Result<(Survey, Substep), SolveError> {
         let length = self.scene.shot.frame_seconds();
         let survey = self.survey(run)?;
@@ -363,7 +365,8 @@ impl Flip {
         Ok(())
     }
 
-    /// Whether all that the substep left is finite; then the work over Δx² Δt that was done in it, W/m².
+    /// Checks that the substep left only finite values; returns the work done in it over Δx² Δt,
+    /// W/m².
     fn watched(&self, substep: u32) -> Result<f64, SolveError> {
         let groups = match self.scene.is_worked_on() {
             true => self.bricks.wet as usize * (CELLS / 64) as usize,
@@ -371,7 +374,7 @@ impl Flip {
         };
         let wanted = (COUNTERS.first(1), BOUNDARY_WORK.first(groups));
         let (counters, sums) = match groups {
-            // Without walls that move there is no such buffer.
+            // Without moving walls the buffer does not exist.
             0 => (self.program.read(COUNTERS, 1)?, Vec::new()),
             _ => self.program.download(wanted)?,
         };
@@ -382,12 +385,13 @@ impl Flip {
         Ok(sums.into_iter().map(f64::from).sum())
     }
 
-    /// Takes over where walls that absorb stand after a state.
+    /// Copies the state of absorbing walls from `state`.
     pub(crate) fn take_answers(&mut self, state: &Particles) {
         self.scene.take_answers(state);
     }
 
-    /// What the next substep is, and whether it is the frame's last.
+    /// Surveys the particles and chooses the next substep; also returns whether it is the frame's
+    /// last.
     fn look(
         &mut self,
         totals: &FrameTotals,
@@ -401,7 +405,7 @@ impl Flip {
         Ok((survey, substep, wanted <= 1.0))
     }
 
-    /// The next substep; true where it was the frame's last.
+    /// Runs the next substep; returns whether it was the frame's last.
     fn go_on(&mut self, totals: &mut FrameTotals, run: &mut Run<'_>) -> Result<bool, SolveError> {
         let (survey, substep, is_last) = self.look(totals, run)?;
         totals.substeps += 1;
@@ -453,7 +457,7 @@ impl Flip {
         Ok(())
     }
 
-    /// Of a cell array up to the last slot that the last substep used on the finest level.
+    /// Length of a cell array up to the last slot of the finest level in the last substep.
     fn elements(&self) -> usize {
         (self.bricks.active as usize + 1) * CELLS as usize
     }
@@ -498,7 +502,8 @@ impl Solver for Flip {
         self.frame += 1;
         self.scene.answer(&mut self.state, self.frame);
         if self.scene.domain.min != DVec3::ZERO {
-            // The frame's world positions are rounded: go on from what was written, as a resumed bake would.
+            // World positions in the frame are rounded: continue from the written values, as a
+            // resumed bake does.
             self.upload_state();
         }
         let report = StepReport {
@@ -538,7 +543,8 @@ impl TraceFrame for Flip {
             let is_traced = match span {
                 Span::From(first) => begun.number >= first,
                 Span::Only(Which::Number(number)) => begun.number == number,
-                // A look ahead: the substep's own finds the same.
+                // This look ahead does not change anything: the substep's own survey finds the
+                // same.
                 Span::Only(Which::Last) => self.look(&totals, plain)?.2,
             };
             let is_last = if is_traced {
@@ -564,7 +570,7 @@ impl TraceFrame for Flip {
     }
 }
 
-/// The commands of a plan, bound to the buffers that the program has now.
+/// Binds the commands of a plan to the current buffers of the program.
 fn recordings(program: &Program, plan: &Plan, scene: &Scene) -> Recordings {
     let effects = effects::of_flip(scene, CELLS as usize * plan.counts.bricks.slots);
     Recordings::new(program, &Commands::new(plan, scene, &effects))
@@ -579,12 +585,12 @@ fn pressure_solver(scene: &Scene, plan: &Plan) -> PressureSolver {
     )
 }
 
-/// What does not change from substep to substep.
+/// Uploads data that does not change between substeps.
 fn upload_constants(program: &Program, plan: &Plan, scene: &Scene) {
     let cells = plan.counts.bricks.wet * CELLS as usize;
     sort::upload_lengths(program, &CELL_START, cells);
     program.upload(ELEMENT_COUNT, 0, &[[plan.counts.particles as u32, 0, 0, 0]]);
     program.upload_windows(&AXES, &numbers(0, 3));
-    // The first that is extrapolated is layer 2.
+    // Layer 2 is the first that is extrapolated.
     program.upload_windows(&LAYERS, &numbers(2, layers(scene.solver.flip().cfl)));
 }

@@ -1,4 +1,4 @@
-//! What FLIP needs on the device.
+//! Plan of FLIP's passes and buffers.
 
 use crate::{
     effects,
@@ -20,10 +20,10 @@ use super::{
     record::{Commands, FIRST_LAYER, WALL_FRICTION},
 };
 
-/// Faces on one side of a cell that its particles reach, of one component.
+/// Faces of one component on one side of a cell that the cell's particles reach.
 const FACES: usize = 9;
 
-/// Lays out FLIP with its projection for `scene`; `moves` says whether it moves particles.
+/// Plans FLIP with its projection for `scene`; `moves` says whether it moves particles.
 pub(crate) fn plan(scene: &Scene, counts: Counts, moves: bool) -> Plan {
     let flip = scene.solver.flip();
     let mut plan = Plan::bare(counts, scene.domain.cells(flip.cell_size));
@@ -63,7 +63,7 @@ pub(crate) fn plan(scene: &Scene, counts: Counts, moves: bool) -> Plan {
     plan
 }
 
-/// Every command of a substep, of projections of any shape among them.
+/// Returns every command of a substep, with those of projections on any brick layout.
 pub(crate) fn commands(plan: &Plan, scene: &Scene) -> Vec<Command> {
     let flip = scene.solver.flip();
     let effects = effects::of_flip(scene, CELLS as usize * plan.counts.bricks.slots);
@@ -79,13 +79,14 @@ pub(crate) fn commands(plan: &Plan, scene: &Scene) -> Vec<Command> {
         .collect()
 }
 
-/// Whether particles that are too near to each other are pushed apart: with the density correction, which knows cells alone,
-/// and for a solver whose own corrections know compression alone.
+/// Returns whether particles that are too close to each other are pushed apart: with the density
+/// correction, which only sees cells, and for a solver whose own corrections only act on
+/// compression.
 pub(super) fn pushes(plan: &Plan, scene: &Scene) -> bool {
     scene.solver.flip().density_correction || !plan.moves
 }
 
-/// Conditions that hold for the whole plan; a pass that does not ask ignores them.
+/// Returns the defines for all passes of the plan; a pass ignores those that it does not use.
 fn conditions(plan: &Plan, scene: &Scene) -> Vec<&'static str> {
     let flip = scene.solver.flip();
     let all = [
@@ -102,7 +103,7 @@ fn conditions(plan: &Plan, scene: &Scene) -> Vec<&'static str> {
     holding.map(|(define, _)| define).collect()
 }
 
-/// Whether particles are pushed apart by [`PLACE`].
+/// Returns whether the pass that pushes particles apart reads [`PLACE`].
 fn has_places(plan: &Plan, scene: &Scene) -> bool {
     pushes(plan, scene) && plan.has_places(scene)
 }
@@ -143,7 +144,7 @@ fn particles(plan: &Plan, scene: &Scene, table: &mut Table) {
     table.add("flip", COUNTERS.sized(1));
 }
 
-/// Whatever follows the bricks: its size changes while a scene runs.
+/// Declares buffers whose size follows the number of bricks, which changes during a run.
 fn bricks(plan: &Plan, scene: &Scene, table: &mut Table) {
     let flip = scene.solver.flip();
     let slots = plan.counts.bricks.slots;

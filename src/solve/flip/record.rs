@@ -1,4 +1,4 @@
-//! A substep's passes, recorded.
+//! Recordings of a substep's passes.
 
 use crate::{
     SolveError,
@@ -18,38 +18,38 @@ use swell_scene::Scene;
 
 use super::{buffers::*, plan::pushes};
 
-/// Where in [`GROUPS`] those over cells of water stand.
+/// Index in [`GROUPS`] of dispatches over cells with water.
 const WET: usize = 0;
 
-/// Those over cells within reach too.
+/// Index in [`GROUPS`] of dispatches over cells with water or within reach.
 const ACTIVE: usize = 1;
 
-/// Those of the first extrapolated layer, one after the other.
+/// Index in [`GROUPS`] of the dispatch over the first extrapolated layer; further layers follow.
 pub(super) const FIRST_LAYER: usize = 2;
 
-/// Particles of a thread of `flip/survey`, its `RUN`.
+/// Particles per thread of `flip/survey`; its `RUN`.
 const SURVEY_RUN: usize = 16;
 
-/// Values of a thread of `flip/find_not_finite`, four times its `RUN`.
+/// Values per thread of `flip/find_not_finite`; four times its `RUN`.
 const WATCH_RUN: u64 = 16;
 
-/// Threads of a workgroup of passes over cells.
+/// Threads per workgroup of passes over cells.
 const WORKGROUP: u32 = 64;
 
 /// The pass that slows water along no-slip walls.
 pub(super) const WALL_FRICTION: &str = "flip/wall_friction";
 
-/// A substep in its parts.
+/// Recordings of the parts of a substep.
 pub(super) struct Recordings {
-    /// Before the bricks are known.
+    /// Runs before the bricks are known.
     pub(super) survey: Recording,
-    /// Up to what the projection reads.
+    /// Transfers to the grid and everything else before the projection.
     pub(super) to_grid: Recording,
-    /// Between two projections: what begins, and what goes on.
+    /// Between two projections: the first iteration, and a further one.
     between: [Recording; 2],
-    /// From what it wrote.
+    /// Transfers from the projected grid to particles.
     pub(super) to_particles: Recording,
-    /// What the host is told of the substep.
+    /// Checks and sums that the host reads after the substep.
     pub(super) watch: Recording,
 }
 
@@ -64,12 +64,12 @@ impl Recordings {
         }
     }
 
-    /// Names of the passes between two projections.
+    /// Returns the names of the passes between two projections.
     pub(super) fn between(&self) -> impl Iterator<Item = &'static str> {
         self.between.iter().flat_map(Recording::passes)
     }
 
-    /// Runs what stands between two projections, with so many turns after the first.
+    /// Runs the passes between two projections, with `again` iterations after the first.
     pub(super) fn run_between(
         &self,
         program: &Program,
@@ -78,7 +78,7 @@ impl Recordings {
     ) -> Result<(), SolveError> {
         let [begin, turn] = &self.between;
         run(program, &[begin])?;
-        // So many at once that the device has work, and that no submission grows without bound.
+        // Batches of 64 keep the device busy and bound the size of a submission.
         let turns = vec![turn; again as usize];
         turns.chunks(64).try_for_each(|turns| run(program, turns))
     }
@@ -95,7 +95,6 @@ pub(super) struct Commands {
 }
 
 impl Commands {
-    /// For the counts and buffers of `plan`.
     pub(super) fn new(plan: &Plan, scene: &Scene, effects: &[(&'static str, Addition)]) -> Self {
         let n = plan.counts.particles;
         let between = || {
@@ -135,7 +134,8 @@ impl Commands {
     }
 }
 
-/// Contents of `groups`: empty from the layer on that the substep does not need, also where the substep before needed it.
+/// Returns the contents of `groups`. Layers beyond those that the substep needs get empty
+/// dispatches.
 pub(super) fn groups(
     program: &Program,
     scene: &Scene,
@@ -144,7 +144,7 @@ pub(super) fn groups(
 ) -> Vec<Workgroups> {
     let of = |cells: u32| spread(&program.context, WORKGROUP, u64::from(cells)).into();
     let mut all = vec![of(params.wet_cells), of(params.active_cells)];
-    // Layer 1 is what the projection found.
+    // The projection itself provides layer 1.
     all.resize(
         FIRST_LAYER + needed.saturating_sub(1),
         of(params.active_cells),
@@ -154,7 +154,7 @@ pub(super) fn groups(
     all
 }
 
-/// Contents of windows that each hold their own number, from `first` on.
+/// Returns `count` windows that contain consecutive numbers from `first` on.
 pub(super) fn numbers(first: u32, count: usize) -> Vec<[u32; 4]> {
     (first..).take(count).map(|k| [k, 0, 0, 0]).collect()
 }
@@ -163,7 +163,7 @@ fn over(pass: &'static str, size: usize) -> Command {
     bound(pass, size, Vec::new())
 }
 
-/// A pass over cells within reach.
+/// Returns a dispatch over cells with water or within reach.
 pub(crate) fn over_cells(pass: &'static str, binds: Vec<Bind>) -> Command {
     bound(pass, ACTIVE, binds)
 }
@@ -180,7 +180,8 @@ fn along(pass: &'static str, size: usize, axis: usize) -> Command {
     bound(pass, size, vec![AXES.bind(axis)])
 }
 
-/// Whether no-slip walls slow the water below what the grid resolves: not where an effect resolves it.
+/// Returns whether the wall-friction model slows water along no-slip walls; not if an effect
+/// resolves the friction on the grid.
 fn slows_along_walls(scene: &Scene) -> bool {
     !scene.no_slip.is_empty() && !scene.effects.act_between_projections()
 }

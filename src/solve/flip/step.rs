@@ -1,4 +1,4 @@
-//! What a substep's passes know.
+//! Parameters of a substep's passes.
 
 use crate::{
     params::{FlipParams, Inlets},
@@ -11,7 +11,7 @@ use swell_domain::{
 };
 use swell_scene::{Scene, step::Substep};
 
-/// The walls that cut a substep's cells, in cells.
+/// Returns the walls that cut a substep's cells, in cells.
 pub(super) fn cut(scene: &Scene, step: &Substep) -> Bounds {
     let (walls, size) = (scene.walls(step.start), scene.solver.flip().cell_size);
     Bounds {
@@ -57,7 +57,7 @@ pub(super) fn params(scene: &Scene, plan: &Plan, bricks: &Bricks, step: &Substep
     }
 }
 
-/// Rooms in which water enters, as the passes know them.
+/// Returns the uniform with the boxes of cells where water enters.
 pub(super) fn inlets(scene: &Scene, step: &Substep) -> Inlets {
     let mut inlets = Inlets::default();
     let all = scene.inlets(step.start, step.length);

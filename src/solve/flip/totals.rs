@@ -1,17 +1,17 @@
-//! What the substeps of a frame add up to.
+//! Sums over the substeps of a frame.
 
 use crate::pressure;
 use swell_domain::solver::Projection;
 
-/// What a frame's substeps did, added up.
+/// Sums and maxima over the substeps of a frame.
 #[derive(Default)]
 pub(crate) struct FrameTotals {
     pub(super) substeps: u32,
     pub(super) iterations: u64,
     pub(crate) projection: Projection,
-    /// Joule.
+    /// Work by moving walls and solids on the water, joules.
     pub(crate) work: f64,
-    /// Of the frame, seconds.
+    /// Time of the frame that has passed, seconds.
     pub(super) elapsed: f64,
 }
 

@@ -1,4 +1,4 @@
-//! FLIP's velocities for a solver that moves the particles itself.
+//! FLIP as the velocity projection of a solver that moves the particles itself.
 
 use super::{
     super::{SolveError, trace::Run},
@@ -11,17 +11,18 @@ use swell_gpu::program::Program;
 use swell_scene::step::projected_substep;
 
 impl Flip {
-    /// Zeroes what is counted over the frame after `frame`.
+    /// Resets the counters for the frame after `frame`.
     pub(crate) fn begin_frame(&mut self, frame: u32) {
         self.frame = frame;
         self.program.upload(COUNTERS, 0, &[Counters::default()]);
     }
 
-    /// Takes positions, velocities and ids, in storage order, from a program; makes the velocities those that the projection
-    /// gives over the `length` seconds from `start` on; and hands them back, sorted.
+    /// Copies positions, velocities and ids, in storage order, from `program`; projects the
+    /// velocities over the `length` seconds from `start` on; and copies particles back in sorted
+    /// order.
     ///
-    /// # Errors
-    /// The device, what is not finite, and a projection over the budget.
+    /// # Errors Returns an error if the device fails, a value is not finite, or a projection
+    /// exceeds its budget.
     pub(crate) fn project_velocities(
         &mut self,
         program: &Program,

@@ -1,4 +1,4 @@
-//! What probes see of a substep.
+//! Data of a substep for probes, and figures of a frame for its report.
 
 use glam::DVec3;
 
@@ -16,7 +16,7 @@ use swell_domain::{
 };
 
 impl Flip {
-    /// Substeps through one frame.
+    /// Runs the substeps of one frame.
     pub(super) fn run_substeps(
         &mut self,
         watch: &mut dyn Watch,
@@ -58,12 +58,14 @@ impl Flip {
         Ok(seen)
     }
 
-    /// The projection's, between cell centres.
+    /// Returns the projection's pressures, interpolated between cell centres, Pa; `None` outside
+    /// water.
     pub(super) fn pressures_at(&self, points: &[DVec3]) -> Result<Vec<Option<f64>>, SolveError> {
         self.gauged(points, |at| *at, |gauge, x, _| gauge.at(x))
     }
 
-    /// What `look` says of the last substep's pressure where each of these is, relative to the domain's least corner.
+    /// Evaluates `look` on the last substep's pressure field for each item, at its position
+    /// `place(item)` relative to the domain's minimum corner.
     fn gauged<T, V>(
         &self,
         all: &[T],
@@ -91,7 +93,8 @@ impl Flip {
             .collect())
     }
 
-    /// Relative densities in cells of water, as the last substep found them, and where the densest is.
+    /// Returns the relative densities in cells of water in the last substep, and the position of
+    /// the densest cell.
     pub(super) fn densities(&self) -> Result<(Vec<f64>, Option<[f64; 3]>), SolveError> {
         let cells = (self.bricks.wet as usize + 1) * CELLS as usize;
         let wanted = (DENSITY.first(cells), CELL_KIND.first(cells));
@@ -119,7 +122,7 @@ impl Flip {
         Ok((0..self.elements()).map(of).collect())
     }
 
-    /// Whether each element's centre lies within a wall or a solid, of the last substep.
+    /// Returns for each element whether its centre was inside a wall or solid in the last substep.
     fn find_buried(&self) -> Result<Vec<bool>, SolveError> {
         let volume: Option<Vec<f32>> = match self.plan.has_solids() {
             true => Some(self.field(OPEN_VOLUME, self.elements())?),

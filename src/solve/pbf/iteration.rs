@@ -1,25 +1,31 @@
-//! The density iteration as commands: Jacobi and red/black, fixed or until an error.
+//! The density iteration as commands: Jacobi, red/black or Chebyshev, with a fixed count or until a
+//! density error.
 //!
-//! Red/black (Ribas and Pedrini) corrects one colour from everyone's latest positions, then the other, which
-//! sees the corrected first. λ of a colour is computed just before it moves, so an iteration does the work of
-//! one Jacobi iteration in four dispatches of half the size, and two that take the corrections over. Measured on a column of 16 × 20 × 16 particles
-//! compressed by 3 % (h = 2d, llvmpipe), mean and max density error in % after 4, 16 and 64 iterations
-//! (test `red_black_leaves_less_error_than_jacobi`; the schedules that lost are not in the tree):
+//! Red/black (Ribas and Pedrini) corrects one colour from the latest positions of all particles,
+//! then the other colour, which sees the first one corrected. λ of a colour is computed just before
+//! the colour moves, so an iteration does the work of one Jacobi iteration in four dispatches of
+//! half the size, plus two that take over the corrections. Mean and maximum density error in %
+//! after 4, 16 and 64 iterations, measured on a column of 16 × 20 × 16 particles compressed by 3 %
+//! (h = 2d, llvmpipe; test `red_black_leaves_less_error_than_jacobi`; the rejected schedules are
+//! not in the code):
 //!
 //! | schedule | 4 | 16 | 64 |
 //! |---|---|---|---|
 //! | Jacobi | 1.51 / 5.7 | 0.93 / 5.4 | 0.40 / 2.8 |
-//! | red/black, λ of all once an iteration (lost) | 1.51 / 5.5 | 0.92 / 5.5 | 0.40 / 3.3 |
-//! | red/black, λ of each colour before it moves (this) | 1.45 / 3.9 | 0.88 / 4.8 | 0.36 / 2.4 |
-//! | red/black, λ of all before each colour, half as dear again (lost) | 1.46 / 3.8 | 0.87 / 4.6 | 0.36 / 1.9 |
+//! | red/black, λ of all once per iteration (rejected) | 1.51 / 5.5 | 0.92 / 5.5 | 0.40 / 3.3 |
+//! | red/black, λ of each colour before it moves (used) | 1.45 / 3.9 | 0.88 / 4.8 | 0.36 / 2.4 |
+//! | red/black, λ of all before each colour, 50 % more work (rejected) | 1.46 / 3.8 | 0.87 / 4.6 |
+//! 0.36 / 1.9 |
 //!
-//! The Chebyshev semi-iteration (Wang 2015) goes on from a Jacobi iteration, under-relaxed by 0.7, in the direction of the
-//! last step: 1.01 / 4.3 after 4 and 0.59 / 2.8 after 16 on the same column, three dispatches an iteration to red/black's six
-//! (test `chebyshev_leaves_less_error_than_red_black`). A particle whose correction opposes its last step starts afresh.
-//! Without that it does still better on the column (0.65 / 3.4 and 0.31 / 1.2), but in moving water it flings particles off
-//! the surface: 60 m/s in wave-city after 10 frames.
+//! The Chebyshev semi-iteration (Wang 2015) extrapolates a Jacobi iteration, under-relaxed by 0.7,
+//! in the direction of the last step: 1.01 / 4.3 after 4 and 0.59 / 2.8 after 16 iterations on the
+//! same column, with three dispatches per iteration instead of six (test
+//! `chebyshev_leaves_less_error_than_red_black`). A particle whose correction opposes its last step
+//! restarts. Without the restart the column converges faster (0.65 / 3.4 and 0.31 / 1.2), but in
+//! moving water particles are ejected from the surface: 60 m/s in wave-city after 10 frames.
 //!
-//! Over-relaxation by 1.3 overshoots in deep columns (max error 36 % at 40 layers after 16 iterations).
+//! Over-relaxation by 1.3 overshoots in deep columns (maximum error 36 % at 40 layers after 16
+//! iterations).
 
 use std::mem::offset_of;
 
@@ -33,10 +39,10 @@ use swell_scene::{Iteration, Pbf, Stop};
 
 use super::buffers::{CONTROL, PHASES, list_of};
 
-/// Takes over what was corrected.
+/// The pass that takes over corrected positions.
 const EXCHANGE: &str = "pbf/exchange";
 
-/// Which particles a dispatch handles.
+/// Particles that a dispatch handles.
 #[derive(Clone, Copy)]
 enum Who {
     All,
@@ -44,11 +50,11 @@ enum Who {
     Black,
 }
 
-/// Builds commands and the phase slots that they refer to.
+/// Builds commands and the phase windows that they refer to.
 pub(super) struct Builder<'a> {
     plan: &'a Plan,
     phases: Vec<Phase>,
-    /// Of the corrections that are added next.
+    /// Chebyshev factor of the corrections that are added next.
     acceleration: f32,
 }
 
@@ -61,7 +67,7 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// The phases that commands refer to, by window.
+    /// Returns the phases that commands refer to, in the order of their windows.
     pub(super) fn into_phases(self) -> Vec<Phase> {
         self.phases
     }
@@ -113,18 +119,18 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// Corrections of particles from the places of all, taken over once all are known.
+    /// Adds passes that compute corrections from the current positions and then take them over.
     fn correct(&mut self, who: Who, out: &mut Vec<Command>, indirect: bool) {
         self.pass("pbf/compute_delta", who, out, indirect);
         self.pass(EXCHANGE, who, out, indirect);
     }
 
-    /// A pass over all particles, such as one of an effect.
+    /// Adds a pass over all particles, for example one of an effect.
     pub(super) fn over_all(&mut self, pass: &'static str, out: &mut Vec<Command>) {
         self.pass(pass, Who::All, out, false);
     }
 
-    /// Density by a full search over all particles, as they were sorted.
+    /// Adds the density measurement by a full search over all particles in sorted order.
     pub(super) fn measure(&mut self, out: &mut Vec<Command>) {
         let count = self.plan.counts.particles;
         let phase = self.phase(Chunk { first: 0, count }, Who::All);
@@ -132,7 +138,7 @@ impl<'a> Builder<'a> {
         out.push(Command::with("pbf/measure_density", count, vec![bind]));
     }
 
-    /// All iterations.
+    /// Adds all iterations.
     pub(super) fn iterations(&mut self, pbf: &Pbf, out: &mut Vec<Command>) {
         let count = pbf.stop.most_iterations();
         let adaptive = matches!(pbf.stop, Stop::DensityError { .. });
@@ -144,7 +150,8 @@ impl<'a> Builder<'a> {
         };
         for k in 0..count {
             let is_first = k == 0;
-            // Black λ of the iteration before still hold for red's correction: only the first needs all.
+            // λ of black particles from the previous iteration is still valid for red's correction:
+            // only the first iteration has to compute all.
             let lambda = match pbf.iteration {
                 Iteration::RedBlack if !is_first => Who::Red,
                 _ => Who::All,

@@ -1,4 +1,4 @@
-//! Position-based fluids (Macklin and Müller 2013) with the red/black iteration.
+//! Position-based fluids (Macklin and Müller 2013) with Jacobi, red/black and Chebyshev iterations.
 
 pub mod buffers;
 mod iteration;
@@ -42,10 +42,10 @@ use plan::{cell_count, places, shared_constants};
 use projection::Grid;
 use record::Commands;
 
-/// Far from everything, and still finite when squared.
+/// Dummy particle: far from everything, and still finite when squared.
 const NOBODY: [f32; 4] = [1e15, 1e15, 1e15, 0.0];
 
-/// PBF on a device.
+/// The PBF solver on a GPU.
 pub struct Pbf {
     program: Program,
     plan: Plan,
@@ -54,18 +54,19 @@ pub struct Pbf {
     substep: Recording,
     measure: Recording,
     grid: Option<Grid>,
-    /// Where water enters or leaves, or solids move: what is uploaded anew for another count of particles, or for each substep.
+    /// Boundary to upload again when the particle count changes or, with moving solids, in each
+    /// substep. `None` if neither can happen.
     boundary: Option<Boundary>,
     movers: Option<Movers>,
     timer: Option<Timer>,
     state: Particles,
     frame: u32,
-    /// Positions relative to the domain's least corner, metres, and pressures, Pa, of the last substep's particles; empty
-    /// where the scene asks for none.
+    /// Positions relative to the domain's minimum corner, metres, and pressures, Pa, of the
+    /// particles in the last substep; empty if the scene does not need them.
     pressed: Vec<(DVec3, f64)>,
 }
 
-/// What the passes of a substep know that ends at `time` and is `step` seconds long.
+/// Returns the parameters of a substep that ends at `time` and is `step` seconds long.
 pub(super) fn params(
     scene: &Scene,
     calibration: &Calibration,
@@ -106,7 +107,7 @@ pub(super) fn params(
     }
 }
 
-/// Fills in places from the `first` on, on either side of a page's end.
+/// Uploads entries of [`PREDICTED`] from index `first` on, split at the end of a page.
 pub(super) fn upload_places(
     program: &Program,
     page: Option<usize>,
@@ -123,7 +124,8 @@ pub(super) fn upload_places(
     }
 }
 
-/// Uploads what does not change from substep to substep; the recordings of a substep and of a frame's end.
+/// Uploads data that does not change between substeps; returns the recordings of a substep and of a
+/// frame's final measurement.
 fn set_up(
     program: &Program,
     plan: &Plan,
@@ -143,10 +145,11 @@ fn set_up(
 }
 
 impl Pbf {
-    /// Builds what `plan` names, and nothing more. It must have been made for `scene` and `boundary`.
+    /// Builds the passes and buffers of `plan`, which must have been made for `scene` and
+    /// `boundary`.
     ///
-    /// # Errors
-    /// A buffer over the adapter's limits, with the figures; a shader or the device at fault.
+    /// # Errors Returns an error if a buffer exceeds the adapter's limits, a shader does not
+    /// compile, or the device fails.
     pub fn new(
         context: &Context,
         scene: &Scene,
@@ -177,12 +180,12 @@ impl Pbf {
         })
     }
 
-    /// What was built.
+    /// Returns the current plan.
     pub fn plan(&self) -> &Plan {
         &self.plan
     }
 
-    /// Names of the passes that a substep and a frame's measurement run, in order.
+    /// Returns the names of the passes of a substep and of a frame's final measurement, in order.
     pub fn recorded_passes(&self) -> Vec<&'static str> {
         let of_grid = self
             .grid
@@ -192,15 +195,14 @@ impl Pbf {
         of_grid.chain(own).collect()
     }
 
-    /// Names of the passes and buffers that exist on the device, sorted.
+    /// Returns the names of the passes and of the buffers that exist on the device, sorted.
     pub fn built(&self) -> (Vec<&str>, Vec<&str>) {
         self.program.names()
     }
 
-    /// A buffer's first `count` values.
+    /// Reads the first `count` values of a buffer.
     ///
-    /// # Errors
-    /// The device.
+    /// # Errors Returns an error if the device fails.
     pub fn field<T: bytemuck::Pod>(
         &self,
         buffer: Buf<T>,
@@ -209,7 +211,7 @@ impl Pbf {
         Ok(self.program.read(buffer, count)?)
     }
 
-    /// Makes room for so many particles.
+    /// Resizes buffers to another number of particles.
     fn resize(&mut self, particles: usize) -> Result<(), SolveError> {
         let counts = Counts {
             particles,
@@ -221,7 +223,7 @@ impl Pbf {
         if (plan.has_lists, plan.page) == (self.plan.has_lists, self.plan.page) {
             self.program.refit(&buffers, &passes)?;
         } else {
-            // Their conditions are others.
+            // The passes have different defines: build the program again.
             let context = self.program.context.clone();
             self.program = Program::new(&context, &buffers, &passes, &shared_constants(&plan))?;
         }
@@ -237,7 +239,7 @@ impl Pbf {
         params(&self.scene, &self.calibration, &self.plan, time, step)
     }
 
-    /// Zeroes what adds up over a frame.
+    /// Resets the counters and sums of a frame.
     fn begin_frame(&mut self) {
         if let Some(grid) = &mut self.grid {
             grid.begin_frame(self.frame);
@@ -249,7 +251,8 @@ impl Pbf {
         }
     }
 
-    /// Done on the water by moving walls in the frame that ran last, joule; substeps were `step` seconds long.
+    /// Returns the work by moving walls on the water in the last frame, joules; its substeps were
+    /// `step` seconds long.
     fn boundary_work(&self, step: f64) -> Result<f64, SolveError> {
         if !self.scene.has_movers() {
             return Ok(0.0);
@@ -260,7 +263,7 @@ impl Pbf {
         Ok(self.scene.particle_mass() / step * sum)
     }
 
-    /// Ready for the recording of the substep that ends at `time`.
+    /// Projects velocities and uploads the uniforms for the substep that ends at `time`.
     fn prepare_substep(
         &mut self,
         time: f64,
@@ -302,20 +305,21 @@ impl Pbf {
         Ok(self.substep.run(&self.program, self.timer.as_mut())?)
     }
 
-    /// Substeps of the next frame.
+    /// Returns the number of substeps in the next frame.
     fn substeps(&self) -> Result<u32, SolveError> {
         let substeps = (self.scene).pbf_substeps(self.frame, self.state.max_speed())?;
         Ok(substeps)
     }
 
-    /// When the k-th of so many ends, and how long it is, seconds.
+    /// Returns the end time and the length of the k-th substep, seconds.
     fn substep_of(&self, substeps: u32, k: u32) -> (f64, f64) {
         let length = self.scene.shot.frame_seconds();
         let step = length / f64::from(substeps);
         (f64::from(self.frame) * length + f64::from(k) * step, step)
     }
 
-    /// A fresh `control`: not done, no iterations, and the groups of the largest chunk over all and over a colour.
+    /// Returns the initial `control`: not done, no iterations, and the workgroups of the largest
+    /// chunk for all particles and for one colour.
     fn control(&self) -> IterationControl {
         let largest = self
             .plan
@@ -332,7 +336,8 @@ impl Pbf {
         }
     }
 
-    /// As [`Calibration::pressure_scale`] has it from Σ λ; in sorted order, before the state is uploaded again.
+    /// Computes the particles' pressures from Σ λ by [`Calibration::pressure_scale`], in sorted
+    /// order. Call it before the state is uploaded again.
     fn particle_pressures(&self, step: f64) -> Result<Vec<(DVec3, f64)>, SolveError> {
         let n = self.plan.counts.particles;
         let wanted = (POSITION.first(n), LAMBDA_SUM.first(n));
@@ -349,7 +354,7 @@ impl Pbf {
             .collect())
     }
 
-    /// What is wanted of a substep of `step` seconds that just ran.
+    /// Reads the requested data of the last substep, which was `step` seconds long.
     fn seen(&mut self, wanted: &Wanted, step: f64) -> Result<Seen, SolveError> {
         let mut seen = Seen::default();
         if wanted.particles {
@@ -365,7 +370,8 @@ impl Pbf {
         Ok(seen)
     }
 
-    /// Sorts at the frame's last positions, measures density there, and reads everything back.
+    /// Sorts particles at the frame's final positions, measures the density there, and downloads
+    /// the state.
     fn read_state(&mut self, time: f64) -> Result<(Vec<f64>, Counters), SolveError> {
         self.program.upload(PARAMS, 0, &[self.params(time, 0.0)]);
         self.measure.run(&self.program, self.timer.as_mut())?;
@@ -447,7 +453,8 @@ impl Solver for Pbf {
             grid.take_answers(&self.state);
         }
         if self.scene.domain.min != DVec3::ZERO {
-            // The frame's world positions are rounded: go on from what was written, as a resumed bake would.
+            // World positions in the frame are rounded: continue from the written values, as a
+            // resumed bake does.
             upload(&self.program, &self.scene, &self.state);
         }
         let iterations = match self.scene.solver.pbf().stop {
@@ -469,7 +476,8 @@ impl Solver for Pbf {
         Ok((self.state.clone(), report))
     }
 
-    /// Of the particles about a point, by the plane that fits them best; with a projection, its own.
+    /// Fits a plane to the pressures of particles around each point; with a projection, returns the
+    /// projection's pressure.
     fn pressures(&self, points: &[DVec3]) -> Result<Vec<Option<f64>>, SolveError> {
         if let Some(grid) = &self.grid {
             return grid.pressures(points);

@@ -1,4 +1,4 @@
-//! What PBF needs on the device.
+//! Plan of PBF's passes and buffers.
 
 use crate::{
     effects, flip,
@@ -15,27 +15,29 @@ use swell_scene::{Iteration, Scene, Stop};
 use super::{buffers::*, record::Commands};
 use crate::flip::buffers::SOLID_GRIDS;
 
-/// Constants for every pass that declares them.
+/// Returns the constants for every pass that declares them.
 pub fn shared_constants(plan: &Plan) -> Vec<(&'static str, f64)> {
     let mut constants = vec![("LIST_CAPACITY", f64::from(LIST_CAPACITY))];
     constants.extend(plan.page.map(|page| ("PAGE", page as f64)));
     constants
 }
 
-/// Neighbours that a list holds; a particle with more is searched for, and the report counts it. At rest
-/// h = 2d has 32; in the dam of `tools/bench pbf` no list of 48 overflowed.
+/// Neighbours that a list holds. If a particle has more, passes search the cells for it, and the
+/// report counts it. At rest, h = 2d gives 32 neighbours; in the dam break of `tools/bench pbf` no
+/// list of 48 overflowed.
 pub const LIST_CAPACITY: u32 = 48;
 
-/// Device memory that neighbour lists may take; a larger scene searches the cells in each pass instead.
+/// Device memory that neighbour lists may take, bytes. In a larger scene each pass searches the
+/// cells.
 pub const LIST_BUDGET: u64 = 4 << 30;
 
-/// Particles of a list block: lists are chunked in these.
+/// Particles per block of lists; a chunk consists of whole blocks.
 const LIST_BLOCK: usize = 512;
 
-/// Fours of neighbours that a list holds.
+/// Groups of four neighbours in a list.
 const LIST_FOURS: usize = LIST_CAPACITY as usize / 4;
 
-/// Lays out PBF for `scene`.
+/// Plans PBF for `scene`.
 pub(crate) fn plan(scene: &Scene, counts: Counts, limits: DeviceLimits) -> Plan {
     let pbf = scene.solver.pbf();
     let calibration = Calibration::new(pbf.particle_spacing, pbf.support_ratio);
@@ -62,26 +64,26 @@ pub(crate) fn plan(scene: &Scene, counts: Counts, limits: DeviceLimits) -> Plan 
     plan
 }
 
-/// Every command of a substep and of a frame's end.
+/// Returns every command of a substep and of a frame's final measurement.
 pub(crate) fn commands(plan: &Plan, scene: &Scene) -> Vec<Command> {
     let effects = effects::of_pbf(scene, plan.counts.particles);
     let commands = Commands::new(plan, scene, &effects);
     [commands.substep, commands.measure].concat()
 }
 
-/// Entries of [`PREDICTED`].
+/// Returns the number of entries of [`PREDICTED`].
 pub(super) fn places(plan: &Plan) -> usize {
     plan.counts.particles + plan.counts.boundary_samples + 1
 }
 
-/// How many of so many places one binding holds, where it does not hold them all.
+/// Returns the number of entries that one binding holds, if one binding cannot hold them all.
 fn page(places: usize, limits: DeviceLimits) -> Option<usize> {
     let page = limits.binding.min(limits.buffer) / PREDICTED.sized(1).bytes;
     let page = usize::try_from(page).unwrap_or(usize::MAX);
     (places > page).then_some(page)
 }
 
-/// [`PREDICTED`] for so many places, and what stands behind a page.
+/// Returns the buffers for [`PREDICTED`], split at the page.
 fn place_buffers(places: usize, page: Option<usize>) -> Vec<BufferSpec> {
     let low = page.unwrap_or(places);
     let mut specs = vec![PREDICTED.sized(low)];
@@ -112,12 +114,12 @@ fn choose_lists(plan: &mut Plan, limits: DeviceLimits) {
         .collect();
 }
 
-/// Whether lists are made from [`PLACE`].
+/// Returns whether lists are built from [`PLACE`].
 fn has_places(plan: &Plan, scene: &Scene) -> bool {
     plan.has_lists && plan.has_places(scene)
 }
 
-/// Conditions that hold for the whole plan; a pass that does not ask ignores them.
+/// Returns the defines for all passes of the plan; a pass ignores those that it does not use.
 fn conditions(plan: &Plan, scene: &Scene) -> Vec<&'static str> {
     let mut conditions = Vec::new();
     if plan.has_solids() {
@@ -144,7 +146,7 @@ fn conditions(plan: &Plan, scene: &Scene) -> Vec<&'static str> {
     conditions
 }
 
-/// Conditions and constants of one pass.
+/// Returns the defines and constants of a single pass.
 fn own(name: &'static str, scene: &Scene) -> PassSpec {
     let pbf = scene.solver.pbf();
     let is_adaptive = matches!(pbf.stop, Stop::DensityError { .. });
@@ -238,7 +240,7 @@ fn buffers(plan: &Plan, scene: &Scene, phases: usize) -> Table {
     table
 }
 
-/// Cells that particles are sorted by.
+/// Returns the number of cells that particles are sorted into.
 pub(crate) fn cell_count(plan: &Plan) -> usize {
     plan.grid_dims.iter().map(|&n| n as usize).product()
 }

@@ -1,4 +1,5 @@
-//! The grid on which velocities are made free of divergence before particles move (Raveendran et al. 2011).
+//! The grid on which velocities are made divergence-free before particles move (Raveendran et al.
+//! 2011).
 
 use glam::DVec3;
 
@@ -16,14 +17,14 @@ use swell_domain::{
 use swell_gpu::{adapter::Context, program::Program};
 use swell_scene::Scene;
 
-/// FLIP up to what it gives to particles.
+/// A FLIP solver that projects velocities but does not move particles.
 pub(super) struct Grid {
     flip: Flip,
     totals: FrameTotals,
 }
 
 impl Grid {
-    /// Where the plan has one.
+    /// Builds the grid if the plan has one.
     pub(super) fn of(
         context: &Context,
         scene: &Scene,
@@ -43,18 +44,19 @@ impl Grid {
         self.flip.load(frame, particles)
     }
 
-    /// Its walls stand where those of the particles do.
+    /// Copies the state of absorbing walls, so that the grid's walls match those of the particles.
     pub(super) fn take_answers(&mut self, state: &Particles) {
         self.flip.take_answers(state);
     }
 
-    /// Zeroes what adds up over a frame.
+    /// Resets the sums of a frame.
     pub(super) fn begin_frame(&mut self, frame: u32) {
         self.totals = FrameTotals::default();
         self.flip.begin_frame(frame);
     }
 
-    /// Changes the velocities of `program`, and the order of its particles, for `length` seconds from `start` on.
+    /// Projects the velocities of `program` over the given (start, length), seconds, and reorders
+    /// its particles.
     pub(super) fn project(
         &mut self,
         program: &Program,
@@ -64,12 +66,12 @@ impl Grid {
         (self.flip).project_velocities(program, span, &mut self.totals, run)
     }
 
-    /// The last projection's, Pa.
+    /// Returns the last projection's pressures, Pa.
     pub(super) fn pressures(&self, points: &[DVec3]) -> Result<Vec<Option<f64>>, SolveError> {
         self.flip.pressures(points)
     }
 
-    /// What the frame's projections did, and what moving walls did in them, joule.
+    /// Returns the report of the frame's projections, and the work by moving walls in them, joules.
     pub(super) fn done(&self) -> (Projection, f64) {
         (self.totals.projection, self.totals.work)
     }

@@ -1,4 +1,4 @@
-//! What a substep runs, and what a frame's end does, as commands.
+//! Commands of a substep, and of a frame's final measurement.
 
 use crate::{effects::Addition, params::Phase, plan::Plan};
 use swell_gpu::{recording::Command, sort};
@@ -8,16 +8,15 @@ use super::{buffers::*, iteration::Builder, plan::cell_count};
 
 /// Commands of PBF, and the phases that they refer to.
 pub(super) struct Commands {
-    /// A substep.
+    /// Commands of a substep.
     pub(super) substep: Vec<Command>,
-    /// The frame's end: sorted at the last positions, density measured there.
+    /// Commands that sort particles at their final positions and measure the density there.
     pub(super) measure: Vec<Command>,
     /// Contents of [`PHASES`].
     pub(super) phases: Vec<Phase>,
 }
 
 impl Commands {
-    /// For the counts, chunks and lists of `plan`.
     pub(super) fn new(plan: &Plan, scene: &Scene, effects: &[(&'static str, Addition)]) -> Self {
         let mut builder = Builder::new(plan);
         Self {
@@ -28,7 +27,7 @@ impl Commands {
     }
 }
 
-/// Particles by cell, and within a cell by id.
+/// Returns commands that sort particles by cell, and by id within a cell.
 pub(crate) fn sorting(plan: &Plan) -> Vec<Command> {
     let n = plan.counts.particles;
     let mut commands = vec![

@@ -1,7 +1,8 @@
-//! Buffers of the projection's own. Inputs, which its caller fills, are FLIP's.
+//! Buffers of the projection. Its inputs, which the caller fills, are buffers of FLIP.
 //!
-//! "Cells" and "planes" as in FLIP's; "blocked" cells stand by block of 2³ ([`super::blocked`]). A [`Real`] is what
-//! `solver.flip.pressure.precision` says that the solve computes in.
+//! "Cells" and "planes" are as for FLIP; "blocked" arrays order cells by block of 2³ cells
+//! ([`super::blocked`]). A [`Real`] has the precision of the solve,
+//! `solver.flip.pressure.precision`.
 
 use swell_gpu::{
     buffer::{Buf, Windows, Workgroups},
@@ -13,61 +14,63 @@ use super::{
     SolveError,
 };
 
-/// An f32 or an f64 of the device, by the precision of the solve.
+/// Placeholder type for an f32 or f64 on the device, depending on the precision of the solve.
 #[derive(Debug)]
 pub enum Real {}
 
-/// Cells: pascal; 0 without water.
+/// Cells: pressure, Pa; 0 without water.
 pub const PRESSURE: Buf<f32> = Buf::new("pressure");
-/// Planes: metres by which the density correction moves water; 0 on faces that touch none or are closed.
+/// Planes: displacement of water by the density correction, metres; 0 on faces that are closed or
+/// touch no water.
 pub const FACE_DISPLACEMENT: Buf<f32> = Buf::new("face_displacement");
-/// Planes, blocked: coefficient of the lower face, 0 where nothing passes.
+/// Planes, blocked: coefficient of the lower face; 0 if nothing flows through it.
 pub const COEFFICIENT: Buf<f32> = Buf::new("pressure_coefficient");
-/// Cells, blocked: sum of the coefficients to air.
+/// Cells, blocked: sum of the coefficients to air cells.
 pub const DIRICHLET: Buf<Real> = Buf::new("pressure_dirichlet");
-/// Blocks: which of its cells are what, a bit each.
+/// Blocks: bit field of the kinds of a block's cells.
 pub const BLOCK: Buf<u32> = Buf::new("pressure_block");
-/// Cells, blocked: b.
+/// Cells, blocked: right-hand side b.
 pub const RHS: Buf<Real> = Buf::new("pressure_rhs");
-/// Cells, blocked: r.
+/// Cells, blocked: residual r.
 pub const RESIDUAL: Buf<Real> = Buf::new("pressure_residual");
-/// Cells, blocked: M⁻¹ r.
+/// Cells, blocked: preconditioned residual M⁻¹ r.
 pub const CORRECTION: Buf<Real> = Buf::new("pressure_correction");
-/// Cells, blocked: p.
+/// Cells, blocked: search direction p.
 pub const DIRECTION: Buf<Real> = Buf::new("pressure_direction");
 /// Cells, blocked: A p.
 pub const PRODUCT: Buf<Real> = Buf::new("pressure_product");
-/// Cells, blocked, as many arrays as the precision has terms: q is their sum, m/s.
+/// Cells, blocked, one array per term of the precision: the sum of the terms is q, m/s.
 pub const SOLUTION: Buf<Real> = Buf::new("pressure_solution");
-/// Cells, blocked: one over the diagonal; with a preconditioner that asks for it.
+/// Cells, blocked: reciprocal of the diagonal. Exists only with a preconditioner that needs it.
 pub const INVERSE_DIAGONAL: Buf<Real> = Buf::new("pressure_inverse_diagonal");
-/// Cells, blocked: least place of the body of water, 0 where air touches it or no row is.
+/// Cells, blocked: smallest index in the connected body of water; 0 if air touches the body or the
+/// cell has no row.
 pub const LABEL: Buf<u32> = Buf::new("pressure_label");
-/// Blocked places of the pockets' cells, one pocket after the other.
+/// Blocked indices of the pockets' cells, pocket by pocket.
 pub const POCKET_CELLS: Buf<u32> = Buf::new("pressure_pocket_cells");
-/// First and past the last of each pocket's.
+/// Half-open range of each pocket in [`POCKET_CELLS`].
 pub const POCKET_RANGES: Buf<[u32; 2]> = Buf::new("pressure_pocket_ranges");
-/// Records of the bricks, one a slot.
+/// Topology of the bricks, one record per slot.
 pub const BRICKS: Buf<PressureBrick> = Buf::new("pressure_bricks");
-/// A sum a workgroup.
+/// One partial sum per workgroup.
 pub const SUMS: Buf<Real> = Buf::new("pressure_sums");
-/// What the iterations decide, in f32.
+/// Scalars of the iteration, in f32.
 pub const CONTROL: Buf<PressureControl> = Buf::new("pressure_control");
-/// The same where the solve is in f64.
+/// Scalars of the iteration, in f64.
 pub const CONTROL_F64: Buf<PressureControl64> = Buf::new("pressure_control");
-/// What a projection notes.
+/// Statistics of a projection.
 pub const STATS: Buf<PressureStats> = Buf::new("pressure_stats");
-/// Of every dispatch when it runs, by `Size`.
+/// Workgroups of every dispatch when it runs, indexed by `Size`.
 pub const SIZES: Buf<Workgroups> = Buf::new("pressure_sizes");
-/// The same three times: of iterations, of the verification, and of what follows; zeros out of turn.
+/// Three copies of [`SIZES`]: for iterations, the verification, and the steps after it. Copies of
+/// inactive states are zero.
 pub const GROUPS: Buf<Workgroups> = Buf::new("pressure_groups");
-/// What a dispatch works on, by `Phase`.
+/// Parameters of each dispatch, indexed by `Phase`.
 pub const PHASES: Windows<PressurePhase> = Windows::new("phase", "pressure_phases");
 
-/// The first `count` values of an array of the solve's own precision.
+/// Reads the first `count` values of an array in the solve's precision.
 ///
-/// # Errors
-/// The device.
+/// # Errors Returns an error if the device fails.
 pub fn read_reals(
     program: &Program,
     buffer: &Buf<Real>,
@@ -83,10 +86,9 @@ pub fn read_reals(
     })
 }
 
-/// The scalars of a solve and what its projection noted.
+/// Reads the scalars of a solve and the statistics of its projection.
 ///
-/// # Errors
-/// The device.
+/// # Errors Returns an error if the device fails.
 pub fn read_control(
     program: &Program,
     precision: Precision,

@@ -1,37 +1,42 @@
 //! Pressure projection of face velocities on sparse bricks.
 //!
-//! The unknown is q = p Δt / (ρ Δx), a velocity, so that nothing is scaled: for each cell of water
-//! Σ f (q − q') over its six faces = −(Σ ± f u + `solid_flux`), with f the face's open fraction (Batty et
-//! al. 2007), and each open face is then corrected by u −= q − q'. Air is q' = 0, at its cell's centre or
-//! where the surface crosses (ghost fluid).
+//! The unknown is q = p Δt / (ρ Δx), a velocity, which makes the coefficients dimensionless: for
+//! each cell of water, Σ f (q − q') over its six faces = −(Σ ± f u + `solid_flux`), with the open
+//! fraction f of the face (Batty et al. 2007). Each open face is then corrected by u −= q − q'. In
+//! air q' = 0, at the centre of the air cell or at the crossing of the surface (ghost fluid).
 //!
-//! # What the caller's program holds
-//! Buffers that the caller fills before [`PressureSolver::project`], `slots` = capacity in slots, slot 0
-//! included; cell arrays are `slots * 512` values, planes three such arrays one after the other, so that
-//! component c of element e is at `c * 512 * slots + e`:
+//! # Inputs
 //!
-//! | name | type | holds |
+//! The caller fills these buffers before [`PressureSolver::project`]. With a capacity of `slots`
+//! slots, including slot 0, cell arrays hold `slots * 512` values. Planes are three such arrays in
+//! sequence: component c of element e is at `c * 512 * slots + e`.
+//!
+//! | name | type | contents |
 //! | --- | --- | --- |
 //! | `bricks` | `Brick` | the records of `domain::bricks` |
-//! | `cell_kind` | `u32` cells | [`AIR`], [`FLUID`] or [`SOLID`] (no open volume); of active slots |
-//! | `face_open` | `f32` planes | open fraction of the lower faces, 0..1; slot 0 stays 0, so the box is closed |
-//! | `face_velocity` | `f32` planes | m/s; a face with fraction 0 holds the solid's velocity and keeps it |
+//! | `cell_kind` | `u32` cells | [`AIR`], [`FLUID`] or [`SOLID`]; in active slots |
+//! | `face_open` | `f32` planes | open fraction of lower faces, 0 to 1; 0 in slot 0: closed box |
+//! | `face_velocity` | `f32` planes | m/s; a closed face keeps the velocity of the solid |
 //! | `solid_flux` | `f32` cells | Σ ± (1 − f) u_solid over the six faces, outward positive, m/s |
-//! | `liquid_distance` | `f32` cells | metres, negative inside; with the ghost-fluid surface alone |
-//! | `density_excess` | `f32` cells | ρ/ρ_target − 1 as it is to be corrected; with the correction alone |
+//! | `liquid_distance` | `f32` cells | metres, negative in water; ghost-fluid surface only |
+//! | `density_excess` | `f32` cells | ρ/ρ_target − 1 to correct; density correction only |
 //!
-//! What the room fills, of [`planned`]: `face_velocity` in place; `pressure`, Pa, natural cell order, 0 where
-//! there is no water; `face_displacement`, planes in metres, 0 on faces that touch no water or are closed.
-//! Only cells of wet slots are FLUID. Cells of a brick that lie past the box are AIR, and their lower faces closed:
-//! one of those is the box's own wall. Only faces between water and water or water and air change.
+//! # Outputs
+//!
+//! Of the buffers in [`planned`], the projection fills `pressure` (Pa, natural cell order, 0
+//! without water) and `face_displacement` (planes, metres, 0 on faces that are closed or touch no
+//! water); it updates `face_velocity` in place. Only cells of wet slots are FLUID. Cells of a brick
+//! beyond the box are AIR with closed lower faces; one of these faces is the box's own wall. Only
+//! faces between two cells of water, or between water and air, change.
 //!
 //! # Use
+//!
 //! ```text
-//! buffers += pressure::planned(..); passes += pressure::passes(..);    plan
-//! let mut pressure = PressureSolver::new(..);                          once, and again when slots grow
-//! pressure.set_topology(&program, &bricks, cell_size)                  each substep, after `bricks` is uploaded
-//! pressure.project(&program, Scale { .. }, timer)                      builds, solves, subtracts; waits once
-//! pressure.correct(&program, timer)                                    same system, density_excess -> face_displacement
+//! buffers += pressure::planned(..); passes += pressure::passes(..);  // plan
+//! let mut pressure = PressureSolver::new(..);    // once, and again when the slots grow
+//! pressure.set_topology(&program, &bricks, cell_size)  // each substep, after uploading `bricks`
+//! pressure.project(&program, Scale { .. }, timer)  // builds, solves, subtracts; waits once
+//! pressure.correct(&program, timer)  // same system: density_excess -> face_displacement
 //! ```
 
 pub mod buffers;
@@ -62,62 +67,64 @@ pub(super) use stages::all_commands;
 use stages::{SINGLE, Shape, Stages};
 pub use swell_domain::poisson::{AIR, FLUID, SOLID};
 
-/// Levels of bricks that the multigrid uses at most: pass it to [`Bricks::new`] as depth.
+/// Most brick levels that the multigrid uses; pass it to [`Bricks::new`] as depth.
 pub const LEVELS: usize = 8;
 
-/// Relative residual of the density correction.
+/// Relative residual that ends the density correction's solve.
 pub const CORRECTION_TOLERANCE: f64 = 1e-2;
 
 /// `state` of a solve that iterates, as in shared/pressure_control.wgsl.
 pub const ITERATING: u32 = 0;
-/// Of one whose residual is computed afresh.
+/// `state` of a solve that recomputes its true residual.
 pub const VERIFYING: u32 = 1;
-/// Of one that has ended.
+/// `state` of a solve that has ended.
 pub const DONE: u32 = 2;
-/// Of one that waits for the host to list the pockets.
+/// `state` of a solve that waits until the host has listed the pockets.
 pub const WANTS_POCKETS: u32 = 3;
 
-/// Iterations submitted at once at most: a device that is done skips the rest, but not for nothing.
+/// Most iterations per submission. Iterations after convergence are skipped on the device, but
+/// still cost time.
 const MOST_AT_ONCE: u32 = 64;
 
-/// What q of a substep stands for: pressure is q ρ Δx over the time for which it acts.
+/// Factors that turn q into a pressure: p = q ρ Δx / `kick`.
 #[derive(Clone, Copy, Debug)]
 pub struct Scale {
-    /// For how long it acts, seconds: Δt where substeps are equal.
+    /// Time for which the pressure acts, seconds; Δt if all substeps have the same length.
     pub kick: f64,
     /// ρ, kg/m³.
     pub rest_density: f64,
 }
 
-/// What a solve did.
+/// Result of a solve.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Solved {
     /// Conjugate-gradient iterations.
     pub iterations: u32,
-    /// ‖b − Ax‖/‖b‖ from a freshly computed residual; 0 where b = 0.
+    /// ‖b − Ax‖/‖b‖ from a freshly computed residual; 0 if b = 0.
     pub residual: f64,
-    /// Whether that is above the tolerance.
+    /// Whether the residual exceeds the tolerance.
     pub is_missed: bool,
 }
 
-/// What a projection did.
+/// Result of a projection.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Projected {
-    /// The solve.
+    /// Result of the solve.
     pub solved: Solved,
-    /// Largest |∇·u| in a cell of water before, 1/s.
+    /// Largest |∇·u| in a cell of water before the projection, 1/s.
     pub divergence_before: f64,
-    /// The same after.
+    /// Largest |∇·u| in a cell of water after the projection, 1/s.
     pub divergence_after: f64,
     /// Bodies of water that no air touches.
     pub pockets: u32,
-    /// Largest |mean of ∇·u| over a pocket, 1/s: what no pressure can undo, as when a solid crushes it.
+    /// Largest |mean of ∇·u| over a pocket, 1/s. No pressure can remove it; it occurs for example
+    /// if a solid squeezes the pocket.
     pub incompatible: f64,
-    /// Cells of water without an open face.
+    /// Cells of water without an open face, which are left out of the system.
     pub dropped: u32,
 }
 
-/// The projection, bound to a program that holds [`planned`] buffers and [`passes`].
+/// The projection, for a program that has the [`planned`] buffers and the [`passes`].
 pub struct PressureSolver {
     settings: Pressure,
     has_correction: bool,
@@ -127,8 +134,8 @@ pub struct PressureSolver {
     phase: PressurePhase,
     sizes: [Workgroups; SIZE_COUNT],
     pockets: u32,
-    /// Iterations that the last projection and the last correction took: how many the next is submitted with.
-    /// It changes when the device is waited for, and nothing else.
+    /// Iterations of the last projection and the last correction: the next solve submits as many at
+    /// first. It only affects when the host waits for the device, not the result.
     expected: [u32; 2],
 }
 
@@ -139,7 +146,8 @@ enum Task {
 }
 
 impl PressureSolver {
-    /// For a program with buffers of `capacity` slots; to be built anew when those were replaced by larger ones.
+    /// Creates a solver for a program whose buffers hold `capacity` slots. Create a new one when
+    /// the buffers are replaced by larger ones.
     pub fn new(settings: &Pressure, has_correction: bool, capacity: usize) -> Self {
         let expected = match settings.preconditioner {
             Preconditioner::Multigrid => 10,
@@ -166,10 +174,9 @@ impl PressureSolver {
         }
     }
 
-    /// Takes over the bricks of a substep, whose records the caller has uploaded to `bricks`.
+    /// Sets the bricks of a substep, whose records the caller has uploaded to `bricks`.
     ///
-    /// # Panics
-    /// Where they are more than the capacity.
+    /// # Panics Panics if the bricks exceed the capacity.
     pub fn set_topology(&mut self, program: &Program, bricks: &Bricks, cell_size: f64) {
         assert!(
             bricks.slots() <= self.capacity,
@@ -214,10 +221,10 @@ impl PressureSolver {
         program.upload(SIZES, 0, &self.sizes);
     }
 
-    /// Builds the system, solves it and makes `face_velocity` free of divergence; waits for the device.
+    /// Builds the system, solves it and makes `face_velocity` divergence-free; waits for the
+    /// device.
     ///
-    /// # Errors
-    /// The device.
+    /// # Errors Returns an error if the device fails.
     pub fn project(
         &mut self,
         program: &Program,
@@ -233,7 +240,7 @@ impl PressureSolver {
         })
     }
 
-    /// The same, by whatever runs recordings.
+    /// Does the same with a callback that runs recordings.
     pub(super) fn project_by(
         &mut self,
         program: &Program,
@@ -242,7 +249,7 @@ impl PressureSolver {
     ) -> Result<Projected, SolveError> {
         let pressure = scale.rest_density * f64::from(self.phase.cell_size) / scale.kick;
         self.phase.pressure_scale = pressure as f32;
-        // Each substep looks for pockets anew.
+        // Each substep searches for pockets again.
         self.phase.has_pockets = 0;
         self.shape.has_pockets = false;
         self.pockets = 0;
@@ -261,11 +268,9 @@ impl PressureSolver {
     /// Solves the last projection's system for displacements whose divergence is `density_excess`
     /// (Kugelstadt et al. 2019), to [`CORRECTION_TOLERANCE`]; waits for the device.
     ///
-    /// # Errors
-    /// The device.
+    /// # Errors Returns an error if the device fails.
     ///
-    /// # Panics
-    /// Where the room was built without the correction.
+    /// # Panics Panics if the solver was created without the density correction.
     pub fn correct(
         &mut self,
         program: &Program,
@@ -280,7 +285,7 @@ impl PressureSolver {
         })
     }
 
-    /// The same, by whatever runs recordings.
+    /// Does the same with a callback that runs recordings.
     pub(super) fn correct_by(
         &mut self,
         program: &Program,
@@ -291,10 +296,10 @@ impl PressureSolver {
         Ok(solved)
     }
 
-    /// q of the last solve in the precision that it was solved in, m/s, of `elements` of the caller's cell arrays.
+    /// Returns q of the last solve in the solve's precision, m/s, at `elements` of the caller's
+    /// cell arrays.
     ///
-    /// # Errors
-    /// The device.
+    /// # Errors Returns an error if the device fails.
     pub fn solution(&self, program: &Program, elements: &[u32]) -> Result<Vec<f64>, SolveError> {
         let precision = self.settings.precision;
         let stride = CELLS as usize * self.capacity;
@@ -308,8 +313,9 @@ impl PressureSolver {
         Ok(elements.iter().map(|&e| at(blocked(e))).collect())
     }
 
-    /// Runs a task to its end: batches of iterations, each followed by a verification and by what is to be done
-    /// with the solution, which stay empty until it is their turn.
+    /// Runs a task to its end, in batches of iterations. Each batch is followed by a verification
+    /// and by the steps that use the solution; their dispatches stay empty until the state calls
+    /// for them.
     fn solve(
         &mut self,
         program: &Program,
@@ -367,7 +373,7 @@ impl PressureSolver {
         program.upload_windows(&PHASES, &phases);
     }
 
-    /// Lists the cells of each pocket, which the device has counted and found to be there.
+    /// Lists the cells of each pocket, after the device has counted pockets.
     fn find_pockets(&mut self, program: &Program) -> Result<(), SolveError> {
         let cells = (CELLS * (self.phase.levels[0][1] + 1)) as usize;
         let labels = program.read(buffers::LABEL, cells)?;
@@ -385,7 +391,7 @@ impl PressureSolver {
     }
 }
 
-/// Where an element stands in the room's own arrays: by block of 2³ cells.
+/// Returns the index of an element in blocked arrays, which are ordered by block of 2³ cells.
 pub fn blocked(element: u32) -> usize {
     let (slot, local) = (element / CELLS, element % CELLS);
     let [x, y, z] = [local % 8, local / 8 % 8, local / 64];
@@ -399,12 +405,13 @@ fn solved(control: &PressureControl64, tolerance: f64) -> Solved {
     Solved {
         iterations: control.iterations,
         residual,
-        // The device compares squares, with the tolerance's in f32.
+        // The device compares squares, with the squared tolerance rounded to f32.
         is_missed: residual.is_nan() || residual > tolerance * (1.0 + 1e-6),
     }
 }
 
-/// The room's own records: face neighbours, and the way up to the next level, of the first `levels` levels.
+/// Returns the projection's brick records for the first `levels` levels: face neighbours, and the
+/// cell on the next coarser level.
 fn brick_records(bricks: &Bricks, levels: usize) -> Vec<PressureBrick> {
     let record = |brick: &swell_domain::bricks::Brick| {
         let octant = brick.coordinate.map(|c| c & 1);

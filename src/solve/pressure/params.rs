@@ -1,35 +1,35 @@
-//! Mirrors of the room's WGSL structs.
+//! Host-side mirrors of the projection's WGSL structs.
 
 use swell_gpu::buffer::mirror;
 
 mirror!(
-    /// `PressurePhase` of shared/pressure_phase.wgsl.
+    /// `PressurePhase` of shared/pressure_phase.wgsl: parameters of a dispatch.
     PressurePhase {
-        /// Which of `levels`.
+        /// Index into `levels`.
         level: u32,
-        /// The coarsest one.
+        /// Index of the coarsest level.
         last_level: u32,
-        /// Of 2³ blocks.
+        /// Colour of the 2³ blocks, in a checkerboard pattern.
         colour: u32,
-        /// What `pressure/reduce` decides; whether `pressure/center` notes the mean.
+        /// Decision of `pressure/reduce`, or whether `pressure/center` records the mean.
         step: u32,
-        /// Sums that `pressure/reduce` adds up.
+        /// Number of partial sums that `pressure/reduce` adds up.
         sum_count: u32,
-        /// Of a plane.
+        /// Distance between planes of an array, in elements: 512 times its slots.
         stride: u32,
-        /// Of a solve.
+        /// Most iterations of a solve.
         max_iterations: u32,
-        /// Whether the pockets are known.
+        /// Whether the pockets have been listed.
         has_pockets: u32,
-        /// Of the relative residual.
+        /// Square of the tolerance for the relative residual.
         tolerance_square: f32,
-        /// Δx.
+        /// Cell size Δx, metres.
         cell_size: f32,
-        /// ρ Δx / Δt.
+        /// ρ Δx over the time for which the pressure acts: turns q into pascals.
         pressure_scale: f32,
-        /// 0.
+        /// Always 0, but unknown to the shader compiler.
         opaque_zero: u32,
-        /// First slot, bricks, active bricks (of the finest level), 0.
+        /// For each level: first slot, bricks, active bricks (finest level only), 0.
         levels: [[u32; 4]; super::LEVELS],
     }
 );
@@ -39,13 +39,13 @@ macro_rules! control {
         mirror!(
             $(#[$meta])*
             $name as "PressureControl" {
-                /// 0 iterating, 1 verifying, 2 done, 3 wants pockets.
+                /// 0 iterating, 1 verifying, 2 done, 3 waiting for the list of pockets.
                 state: u32,
-                /// So far.
+                /// Iterations so far.
                 iterations: u32,
-                /// Whether the next direction starts afresh.
+                /// 1 if the next direction restarts from the preconditioned residual.
                 is_first: u32,
-                /// Verifications.
+                /// Number of verifications.
                 restarts: u32,
                 /// ‖b‖².
                 rhs_square: $real,
@@ -53,9 +53,9 @@ macro_rules! control {
                 residual_square: $real,
                 /// Residual · correction.
                 product: $real,
-                /// Length of the step.
+                /// Step length α.
                 alpha: $real,
-                /// Part of the last direction.
+                /// Factor β of the previous direction.
                 beta: $real,
             }
         );
@@ -63,13 +63,13 @@ macro_rules! control {
 }
 
 control!(
-    /// `PressureControl` of shared/pressure_control.wgsl.
+    /// `PressureControl` of shared/pressure_control.wgsl, in f32.
     PressureControl,
     f32
 );
 
 control!(
-    /// The same where the solve is in f64.
+    /// `PressureControl` of shared/pressure_control.wgsl, in f64.
     PressureControl64,
     f64
 );
@@ -91,7 +91,7 @@ impl From<PressureControl> for PressureControl64 {
 }
 
 impl PressureControl64 {
-    /// ‖r‖ / ‖b‖; 0 where b = 0.
+    /// Returns ‖r‖ / ‖b‖; 0 if b = 0.
     pub fn residual(&self) -> f64 {
         match self.rhs_square {
             0.0 => 0.0,
@@ -101,11 +101,12 @@ impl PressureControl64 {
 }
 
 mirror!(
-    /// `PressureStats` of shared/pressure_stats.wgsl: f32 whatever the solve is in.
+    /// `PressureStats` of shared/pressure_stats.wgsl: statistics of a projection, in f32 for every
+    /// precision of the solve.
     PressureStats {
         /// Largest |∇·u| in a cell of water before the projection, 1/s.
         divergence_before: f32,
-        /// The same after it.
+        /// Largest |∇·u| in a cell of water after the projection, 1/s.
         divergence_after: f32,
         /// Largest |mean of ∇·u| over a pocket, 1/s.
         incompatible: f32,
@@ -119,28 +120,29 @@ mirror!(
 );
 
 mirror!(
-    /// `PressureBrick` of shared/pressure_site.wgsl.
+    /// `PressureBrick` of shared/pressure_site.wgsl: topology of a brick.
     PressureBrick {
-        /// Slots at the lower, then the upper faces.
+        /// Slots of the neighbours at the lower faces x, y, z, then at the upper faces; 0 if
+        /// absent.
         faces: [u32; 6],
-        /// Element of the cell above block 0.
+        /// Element on the next coarser level that contains block 0; 0 if absent.
         above: u32,
         /// Unused.
         padding: u32,
     }
 );
 
-/// What `pressure/reduce` decides, by number.
+/// Decisions of `pressure/reduce`, by number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ReduceStep {
     /// Starts a solve.
     Begin,
-    /// β.
+    /// Computes β.
     Direction,
-    /// α.
+    /// Computes α.
     Length,
-    /// Whether the residual is small enough.
+    /// Tests the updated residual.
     Check,
-    /// Whether the true one is.
+    /// Tests the true residual.
     Verified,
 }

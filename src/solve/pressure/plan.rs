@@ -1,4 +1,4 @@
-//! Buffers, passes and dispatch sizes of the room.
+//! Buffers, passes and dispatch sizes of the projection.
 
 use crate::plan::{Table, in_order};
 use swell_domain::bricks::CELLS;
@@ -16,18 +16,18 @@ use super::{
     stages::all_commands,
 };
 
-/// Places in `pressure_phases`.
+/// Indices into `pressure_phases`.
 #[derive(Clone, Copy)]
 pub(super) enum Phase {
-    /// Of a level's blocks of one colour; other passes over that level take colour 0's.
+    /// Blocks of a (level, colour); passes over a whole level use colour 0.
     Level(usize, usize),
-    /// Of `pressure/reduce`.
+    /// Parameters of `pressure/reduce`.
     Reduce(ReduceStep),
-    /// Of `pressure/center`, noting the means or not.
+    /// Parameters of `pressure/center`; `true` if it records the means.
     Center(bool),
 }
 
-/// Phases in all.
+/// Number of phases.
 pub(super) const PHASE_COUNT: usize = Phase::Center(true).index() + 1;
 
 impl Phase {
@@ -39,7 +39,7 @@ impl Phase {
         }
     }
 
-    /// `base` with what is this phase's own.
+    /// Returns `base` with the fields of this phase.
     pub(super) fn fill(index: usize, base: PressurePhase, half_sums: bool) -> PressurePhase {
         let wet = base.levels[0][1];
         let mut phase = base;
@@ -47,7 +47,7 @@ impl Phase {
             (phase.level, phase.colour) = (index as u32 / 2, index as u32 % 2);
         } else if index < 2 * LEVELS + 5 {
             phase.step = (index - 2 * LEVELS) as u32;
-            // The preconditioner's last two passes run over one colour each.
+            // The preconditioner's last two passes cover one colour each.
             let is_half = half_sums && phase.step == ReduceStep::Direction as u32;
             phase.sum_count = if is_half { 2 * wet.div_ceil(2) } else { wet };
         } else {
@@ -57,22 +57,22 @@ impl Phase {
     }
 }
 
-/// Places in `pressure_sizes`, and in each section of `pressure_groups`.
+/// Indices into `pressure_sizes`, and into each section of `pressure_groups`.
 #[derive(Clone, Copy)]
 pub(super) enum Size {
-    /// A thread a block of a level.
+    /// One thread per block of a level.
     Full(usize),
-    /// A thread a block of one colour.
+    /// One thread per block of one colour of a level.
     Half(usize),
     /// One workgroup.
     Single,
-    /// One a pocket.
+    /// One workgroup per pocket.
     Pockets,
-    /// A thread a block of the active bricks.
+    /// One thread per block of the active bricks.
     Active,
 }
 
-/// Sizes in all.
+/// Number of sizes.
 pub(super) const SIZE_COUNT: usize = Size::Active.index() + 1;
 
 impl Size {
@@ -87,27 +87,27 @@ impl Size {
     }
 }
 
-/// When a dispatch runs.
+/// State of the solve in which a dispatch runs.
 #[derive(Clone, Copy)]
 pub(super) enum When {
-    /// In any case.
+    /// In any state.
     Always,
-    /// As one workgroup that itself knows when it is its turn.
+    /// In any state, as one workgroup that decides itself whether to do anything.
     InTurn,
-    /// While the solve goes on.
+    /// While the solve iterates.
     Iterating,
-    /// Once it believes to be done.
+    /// When the solve has converged by its updated residual.
     Verifying,
-    /// Once it is.
+    /// When the solve has ended.
     Done,
 }
 
-/// A dispatch of the room.
+/// Returns a dispatch of the projection.
 pub(super) fn run(pass: &'static str, phase: Phase, when: When, size: Size) -> Command {
     run_on(pass, phase, when, size, None)
 }
 
-/// The same with variable `values` bound to a buffer.
+/// Returns a dispatch whose variable `values` is bound to a buffer.
 pub(super) fn run_on(
     pass: &'static str,
     phase: Phase,
@@ -139,7 +139,8 @@ fn has_diagonal(settings: &Pressure) -> bool {
     )
 }
 
-/// Buffers that the room adds to its inputs (module docs); `capacity` is in slots.
+/// Returns the buffers that the projection adds to its inputs (see the module documentation);
+/// `capacity` is in slots.
 pub fn planned(settings: &Pressure, has_correction: bool, capacity: usize) -> Table {
     let cells = capacity * CELLS as usize;
     let precision = settings.precision;
@@ -166,7 +167,8 @@ pub fn planned(settings: &Pressure, has_correction: bool, capacity: usize) -> Ta
             POCKET_CELLS.sized(cells),
             POCKET_RANGES.sized(cells / 2),
             BRICKS.sized(capacity),
-            // A sum a workgroup, and room for those that a dispatch in two dimensions adds.
+            // One sum per workgroup, and space for the excess workgroups of a two-dimensional
+            // dispatch.
             reals(SUMS, capacity + 1024),
             match precision {
                 Precision::F32 | Precision::F32Refined => CONTROL.sized(1),
@@ -187,7 +189,7 @@ pub fn planned(settings: &Pressure, has_correction: bool, capacity: usize) -> Ta
     table
 }
 
-/// The passes that any solve runs by these settings, in the order in which they first run.
+/// Returns the passes of any solve with these settings, in the order in which they first run.
 pub fn passes(
     settings: &Pressure,
     surface: Surface,
@@ -201,7 +203,7 @@ pub fn passes(
         .collect()
 }
 
-/// A pass under the conditions that hold for the whole room; one that does not ask ignores them.
+/// Returns a pass with all defines of the projection; a pass ignores those that it does not use.
 fn pass(name: &'static str, settings: &Pressure, surface: Surface, is_periodic: bool) -> PassSpec {
     let conditions = [
         ("GHOST_FLUID", surface == Surface::GhostFluid),

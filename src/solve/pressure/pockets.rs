@@ -1,7 +1,7 @@
 //! Bodies of water that no air touches, as lists of cells.
 
-/// Cells of the pockets one after the other, and the first and past the last of each. `labels` are a body's least
-/// element, 0 where air touches it or no row is.
+/// Returns the cells of all pockets, pocket by pocket, and the half-open range of each pocket. A
+/// label is the smallest element of its body; 0 if air touches the body or the cell has no row.
 pub(super) fn list(labels: &[u32]) -> (Vec<u32>, Vec<[u32; 2]>) {
     let mut cells: Vec<u32> = (0..labels.len() as u32)
         .filter(|&element| labels[element as usize] != 0)

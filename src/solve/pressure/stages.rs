@@ -1,4 +1,5 @@
-//! The room's command lists: starting a solve, one iteration, its verification, and what follows.
+//! Command lists of the projection: the start of a solve, one iteration, its verification, and the
+//! steps after it.
 
 use swell_gpu::{
     buffer::Buf,
@@ -14,30 +15,30 @@ use super::{
     plan::{Phase, Size, When, run, run_on},
 };
 
-/// Bricks of a level that one workgroup can take on together with all coarser ones.
+/// Most bricks of a level that one workgroup can process together with all coarser levels.
 pub(super) const SINGLE: u32 = 4;
 
-/// Symmetric sweeps where there is but one level.
+/// Symmetric sweeps if there is only one level.
 const SWEEPS: usize = 8;
 
-/// What the command lists depend on.
+/// Parameters that determine the command lists.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Shape {
-    /// Levels in all.
+    /// Number of levels.
     pub levels: usize,
-    /// Those with dispatches of their own; one workgroup has the others.
+    /// Number of levels with dispatches of their own; one workgroup processes the others.
     pub dispatched: usize,
-    /// Whether pockets have their means removed.
+    /// Whether means are removed over pockets.
     pub has_pockets: bool,
 }
 
 /// The stages of a solve for one shape: as commands, or bound to a program's buffers.
 pub(super) struct Stages<T> {
-    /// System, bodies of water, right-hand side.
+    /// Builds the system, labels bodies of water, and computes the right-hand side.
     pub project: T,
-    /// The right-hand side alone.
+    /// Computes the right-hand side of the density correction.
     pub correct: Option<T>,
-    /// Means removed from the right-hand side, and the start.
+    /// Removes means from the right-hand side, and starts the iteration.
     pub begin: T,
     pub iterate: T,
     pub verify: T,
@@ -76,7 +77,7 @@ impl Stages<Vec<Command>> {
         }
     }
 
-    /// In the order in which they run.
+    /// Iterates over all commands in the order in which they run.
     fn into_commands(self) -> impl Iterator<Item = Command> {
         let project = [self.project, self.begin, self.iterate, self.verify];
         let correct = [self.correct, self.finish_correct].into_iter().flatten();
@@ -85,7 +86,7 @@ impl Stages<Vec<Command>> {
     }
 }
 
-/// What solves of every shape run.
+/// Returns the commands of solves of every shape.
 pub(crate) fn all_commands(preconditioner: Preconditioner, has_correction: bool) -> Vec<Command> {
     let mut all = Vec::new();
     for levels in (1..=LEVELS).rev() {
@@ -148,7 +149,7 @@ fn begin(shape: Shape) -> Vec<Command> {
     let mut commands = Vec::new();
     if shape.has_pockets {
         commands.push(center(&RHS, true, When::Always));
-        // From 0, the true residual is the right-hand side.
+        // With a solution of 0, the true residual is the right-hand side.
         commands.push(run(
             "pressure/verify",
             Phase::Level(0, 0),
@@ -184,7 +185,8 @@ fn iteration(preconditioner: Preconditioner, shape: Shape) -> Vec<Command> {
     commands
 }
 
-/// One symmetric V-cycle: first colour, second colour, down; up, second colour, first colour.
+/// One symmetric V-cycle: down with the first colour, then the second; up with the second colour,
+/// then the first.
 fn cycle(shape: Shape) -> Vec<Command> {
     let half = |pass, level, colour| {
         run(
