@@ -1,5 +1,5 @@
-// Faces in an absorbing zone lose a part of the velocity that particles gave them. What gravity added stays: less of it in
-// one place than in another would be a force that turns the water.
+// Damps the velocity that particles transferred to faces in an absorbing zone. Gravity's change is
+// kept: a reduction that varies in space would act as a force that spins the water.
 #import "shared/led_faces.wgsl"
 
 fn lead(face: u32, component: u32, place: vec3f) {

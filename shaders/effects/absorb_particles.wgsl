@@ -1,5 +1,5 @@
-// Particles in an absorbing zone lose a part of their velocity. At rest in the water they have none, so that gravity, which
-// the next step adds, and the pressure that holds it are left alone.
+// Damps the velocity of particles in an absorbing zone. Particles at rest have none, so that
+// gravity, which the next step adds, and the pressure that balances it are not affected.
 #import "shared/led_particles.wgsl"
 
 fn lead(i: u32, place: vec3f, is_drop: bool) {

@@ -1,4 +1,5 @@
-// Air slows water that flies: the more, the fewer particles there are in the 27 cells about its own, walls and solids left out. What the grid is then given has the velocity that air left.
+// Air drag on flying water: it grows as the number of particles in the 27 cells around a particle's
+// cell falls, walls and solids excluded. The transfer to the grid uses the resulting velocity.
 #import "shared/thread.wgsl"
 #import "shared/vector.wgsl"
 #import "shared/flip_params.wgsl"
@@ -14,7 +15,8 @@
 
 const SOLID = 2u;
 
-// Water about a particle of a cell, over what the open cells of 27 hold.
+// Water fraction around a particle of a cell: the other particles over what the open ones of the 27
+// cells hold.
 fn share_about(element: u32) -> f32 {
     open_neighborhood(element);
     let cell = vec3i(own_cell(element));
@@ -52,13 +54,13 @@ fn main(
     let first = cell_start[element];
     let end = cell_start[element + 1u];
     var share = 0.0;
-    // Entered only by cells with particles.
+    // Only cells with particles enter the loop.
     for (var once = 0; once < select(0, 1, end > first); once++) {
         share = share_about(element);
     }
     for (var i = first; i < end; i++) {
         let before = three(sorted_velocity[i]);
-        // What gravity adds follows on the grid.
+        // The grid adds gravity later.
         let after = blown(before, params.velocity_step, share, params.kick) - params.velocity_step;
         sorted_velocity[i] = packed(select(before, after, is_exposed(share)));
     }

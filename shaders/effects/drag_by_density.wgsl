@@ -1,4 +1,5 @@
-// Air slows water that flies: the more, the less water there is about it, by the density at its place.
+// Air drag on flying water: it grows as the water fraction around a particle, given by its density,
+// falls.
 #import "shared/thread.wgsl"
 #import "shared/predicted.wgsl"
 #import "shared/vector.wgsl"
@@ -40,10 +41,10 @@ fn main(
     kernel_sum = 0.0;
     begin_phase();
     for_each_neighbor(own_position, i);
-    // Without the particle's own, over what a full neighborhood has without it.
+    // Density without the particle itself, over that of a full neighbourhood without it.
     let others = params.density_scale * kernel_sum + wall_term(own_position).density;
     let share = others / (1.0 - params.density_scale);
-    // What gravity added in this step is in it already.
+    // The velocity already includes gravity's change in this step.
     let fall = params.time_step * vec3f(GRAVITY_X, GRAVITY_Y, GRAVITY_Z);
     let before = three(velocity[i]);
     let after = blown(before - fall, fall, share, params.time_step);

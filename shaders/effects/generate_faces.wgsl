@@ -1,5 +1,6 @@
-// Faces in a generation zone go a part of the way from the velocity that particles gave them to that of the waves at the
-// substep's start. What gravity added stays, and the pressure makes of it what it makes of waves.
+// Moves face velocities in a generation zone from those that particles transferred towards those of
+// the waves at the substep's start. Gravity's change is kept; the projection then produces the
+// pressure of the waves.
 #import "shared/led_faces.wgsl"
 #import "shared/open_waves.wgsl"
 

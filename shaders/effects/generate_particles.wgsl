@@ -1,4 +1,5 @@
-// Particles in a generation zone go a part of the way to the velocity of the waves at the substep's end.
+// Moves velocities of particles in a generation zone towards those of the waves at the substep's
+// end.
 #import "shared/led_particles.wgsl"
 #import "shared/open_waves.wgsl"
 

@@ -1,4 +1,5 @@
-// a = ε Δx (N × ω), N = η/|η|, η = ∇|ω| (Fedkiw et al. 2001), at faces between two cells of water.
+// Vorticity confinement a = ε Δx (N × ω), N = η/|η|, η = ∇|ω| (Fedkiw et al. 2001), at faces
+// between two cells of water.
 #import "shared/thread.wgsl"
 #import "shared/vector.wgsl"
 #import "shared/flip_params.wgsl"
@@ -18,7 +19,8 @@ fn magnitude(offset: vec3i) -> f32 {
     return vorticity_length[element_at(offset)];
 }
 
-// Twice the mean over the face's two cells of |ω|'s central difference along `axis`, which lies in the face.
+// Twice the central difference of |ω| along `axis`, which is tangential to the face, averaged over
+// the face's two cells.
 fn slope_along(normal: vec3i, axis: vec3i) -> f32 {
     return 0.5 * (magnitude(axis) - magnitude(-axis) + magnitude(axis - normal) - magnitude(-axis - normal));
 }
@@ -36,7 +38,7 @@ fn confinement(normal: vec3i) -> vec3f {
     );
     let omega = 0.5 * (three(vorticity[own]) + three(vorticity[before]));
     let steepness = length(slope);
-    // Below the rounding of |ω| the direction is noise.
+    // Below the rounding error of |ω| the direction is noise.
     let is_clear = steepness > 1e-5 * (lengths.x + lengths.y);
     return select(vec3f(0.0), cross(slope / max(steepness, 1e-30), omega), is_clear);
 }

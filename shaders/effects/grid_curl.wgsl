@@ -1,5 +1,5 @@
-// Vorticity at cell centres, ω = ∇ × u by differences of the mean velocities of the cells beside, in cells of water;
-// one-sided where there is none.
+// Vorticity ω = ∇ × u at the centres of cells with water, by differences of the mean velocities of
+// neighbouring cells; one-sided if a neighbour has no water.
 #import "shared/thread.wgsl"
 #import "shared/vector.wgsl"
 #import "shared/flip_params.wgsl"
@@ -12,15 +12,16 @@
 
 const FLUID = 1u;
 
-// Mean velocity of the cell `offset` away along one axis, or of this one where that holds no water; `w` tells.
+// Mean velocity of the cell at `offset`, one step along an axis, or of this cell if that one has no
+// water; `w` is 1 in the former case.
 fn velocity_of(offset: vec3i) -> vec4f {
     let found = element_at(offset);
     let is_water = cell_kind[found] == FLUID;
     let e = select(element_at(vec3i(0)), found, is_water);
     let kept = select(vec3i(0), offset, is_water);
     let low = vec3f(face_velocity[e], face_velocity[params.stride + e], face_velocity[2u * params.stride + e]);
-    // A cell's upper faces are its upper neighbours' lower ones. Two cells off none is at hand, and none is needed:
-    // a curl takes no velocity along the way it goes.
+    // A cell's upper faces are its upper neighbours' lower faces. Faces two cells away are out of
+    // reach, but not needed: a curl takes no velocity component along the axis of its difference.
     let high = vec3f(
         face_velocity[element_at(clamp(kept + vec3i(1, 0, 0), vec3i(-1), vec3i(1)))],
         face_velocity[params.stride + element_at(clamp(kept + vec3i(0, 1, 0), vec3i(-1), vec3i(1)))],
@@ -29,7 +30,7 @@ fn velocity_of(offset: vec3i) -> vec4f {
     return vec4f(0.5 * (low + high), f32(is_water));
 }
 
-// Difference over one axis, 1/s.
+// Difference along one axis, 1/s.
 fn slope(axis: vec3i) -> vec3f {
     let after = velocity_of(axis);
     let before = velocity_of(-axis);

@@ -1,27 +1,30 @@
-// Curvature of the surface near each cell, and how steep the smoothed share of water is there.
+// Curvature of the surface near each cell, and the gradient of the smoothed water fraction there.
 //
-// κ = −∇·n, n = ∇s / |∇s| at the corners of the cell. Level sets off the surface are bent more or less than it: κ is carried along
-// the normal to the surface, by κ' = |∇n|² a cell. Without that water which bulges less than the filter sees stands where κ is
-// less, is pressed less, and bulges more: ripples of a few cells grew twofold in a fifth of a drop's period. The surface itself
-// lies off the level 1/2 of the smoothed share by κ s² / 2, s² the filter's variance along an axis.
+// κ = −∇·n, n = ∇s / |∇s| at the corners of the cell. Level sets away from the surface have a
+// different curvature: κ is extrapolated along the normal to the surface, with κ' = |∇n|² per cell.
+// Without that, water whose bulge is below the filter's resolution gets a smaller κ and less
+// pressure, and bulges more: ripples of a few cells grew twofold in a fifth of a drop's period. The
+// surface itself lies off the level 1/2 of the smoothed fraction by κ s² / 2, where s² is the
+// filter's variance along an axis.
 #import "shared/tension.wgsl"
 
 @group(0) @binding(3) var<storage, read> tension_share: array<f32>;
-// κ Δx, and |∇s| Δx.
+// κ Δx and |∇s| Δx.
 @group(0) @binding(4) var<storage, read_write> tension_curvature: array<vec2f>;
 
-// Slopes below this give no direction.
+// Smaller gradients have no reliable direction.
 const LEAST_SLOPE = 1e-3;
-// Cells that κ is carried at most.
+// Largest distance over which κ is extrapolated, cells.
 const FARTHEST = 2.0;
-// Half of the variance of three binomial filters and of the hats, 3 × 1/2 + 1/6 cells².
+// Half the variance of three binomial filters and of the hat function, 3 × 1/2 + 1/6 cells².
 const SHIFT = 0.8333333;
-// A drop of two cells' radius: of smaller ones cells see too little.
+// Curvature of a drop with a radius of two cells: the grid does not resolve smaller ones.
 const MOST = 1.0;
 
 var<private> shares: array<f32, 27>;
 
-// Of the share at a corner, from the eight cells that meet there, of which the first is number `k` of 27.
+// Gradient of the water fraction at a corner, from the eight cells that meet there; `k` is the
+// first of them, among 27.
 fn slope_at(k: u32) -> vec3f {
     let low = vec4f(shares[k], shares[k + 1u], shares[k + 3u], shares[k + 4u]);
     let high = vec4f(shares[k + 9u], shares[k + 10u], shares[k + 12u], shares[k + 13u]);
@@ -45,7 +48,7 @@ fn main(
     }
     let element = thread + CELLS;
     var found = vec2f(0.0);
-    // Far from the water there is nothing to be bent.
+    // Far from water there is no surface.
     for (var once = 0; once < select(0, 1, tension_share[element] > 0.0); once++) {
         open_mirrored(element);
         for (var k = 0; k < 27; k++) {

@@ -1,6 +1,7 @@
-// The jump of the pressure across a surface, σ κ, as what it does to the faces between water and air in a step: Δt σ κ / (ρ θ Δx)
-// against the air. The projection then finds the pressure with that jump in it: its right-hand side has the ghost-fluid term, and
-// the faces lose the gradient towards σ κ at the surface in place of that towards 0 (Kang, Fedkiw and Liu 2000).
+// The pressure jump σ κ across the surface, as a velocity change of the faces between water and
+// air: Δt σ κ / (ρ θ Δx), directed against the air. The projection then finds the pressure
+// including the jump: its right-hand side gets the ghost-fluid term, and faces lose the gradient
+// towards σ κ at the surface instead of that towards 0 (Kang, Fedkiw and Liu 2000).
 #import "shared/thread.wgsl"
 #import "shared/flip_params.wgsl"
 #import "shared/flip_neighborhood.wgsl"
@@ -21,7 +22,7 @@ const FLUID = 1u;
 // As in the projection.
 const LEAST_THETA = 0.01;
 const MOST_THETA = 100.0;
-// Where the share of water is flatter than this on both sides, nothing is known of κ.
+// If the water fraction is flatter than this on both sides, κ is unknown.
 const LEAST_WEIGHT = 1e-6;
 
 fn theta_of(water: u32, air: u32) -> f32 {
@@ -40,7 +41,8 @@ fn jump(water: u32, air: u32) -> f32 {
     let theta = theta_of(water, air);
     let inside = tension_curvature[water];
     let outside = tension_curvature[air];
-    // By how steep the share is too: in the middle of a thin sheet it is flat, and says nothing of the surface.
+    // Also weighted by the gradient: in the middle of a thin sheet the water fraction is flat, and
+    // its κ says nothing about the surface.
     let part = min(theta, 1.0);
     let weights = vec2f((1.0 - part) * inside.y, part * outside.y);
     let sum = weights.x * inside.x + weights.y * outside.x;

@@ -1,4 +1,4 @@
-// Water's share about cell centres, for surface tension: the density there, smoothed for the first time.
+// Water fraction around cell centres for surface tension: the density, smoothed for the first time.
 #import "shared/tension.wgsl"
 #import "shared/tension_smooth.wgsl"
 

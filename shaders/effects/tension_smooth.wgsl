@@ -1,4 +1,4 @@
-// Smooths the water's share for the second time.
+// Smooths the water fraction for the second time.
 #import "shared/tension.wgsl"
 #import "shared/tension_smooth.wgsl"
 

@@ -1,4 +1,4 @@
-// Smooths the water's share for the last time.
+// Smooths the water fraction for the third and last time.
 #import "shared/tension.wgsl"
 #import "shared/tension_smooth.wgsl"
 

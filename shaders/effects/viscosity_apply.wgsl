@@ -1,4 +1,4 @@
-// Adds what viscosity_gather found, once every particle has read the old velocities.
+// Adds the changes by viscosity_gather, after every particle has read the old velocities.
 #import "shared/thread.wgsl"
 #import "shared/vector.wgsl"
 #import "shared/phase.wgsl"

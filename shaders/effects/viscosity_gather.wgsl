@@ -1,4 +1,5 @@
-// c Σ_j m/ρ (v_j − v_i) W: the mean velocity of the neighbours relative to one's own, by poly6.
+// XSPH: c Σ_j m/ρ (v_j − v_i) W, the neighbours' mean velocity relative to the particle's own, with
+// the poly6 kernel.
 #import "shared/thread.wgsl"
 #import "shared/predicted.wgsl"
 #import "shared/vector.wgsl"

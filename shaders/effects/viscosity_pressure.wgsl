@@ -1,4 +1,4 @@
-// The pressure of a substep is that of both projections, before the viscous solve and after it.
+// Adds up the pressures of the substep's two projections, before and after the viscous solve.
 #import "shared/thread.wgsl"
 #import "shared/flip_params.wgsl"
 #import "shared/bricks.wgsl"

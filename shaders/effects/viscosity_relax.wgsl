@@ -1,5 +1,6 @@
-// An iteration of the viscous solve (M + κ K) u = M u*: second-order Richardson (Golub and Varga 1961) over the diagonal, whose
-// numbers `domain::relaxation` gives. Velocities go from one array to the other and back.
+// One iteration of the viscous solve (M + κ K) u = M u*: second-order Richardson (Golub and Varga
+// 1961) with a diagonal preconditioner and the coefficients of `domain::relaxation`. Velocities
+// alternate between two arrays.
 #import "shared/thread.wgsl"
 #import "shared/flip_params.wgsl"
 #import "shared/flip_neighborhood.wgsl"
@@ -10,7 +11,7 @@
 @group(0) @binding(3) var<storage, read> viscous_start: array<f32>;
 @group(0) @binding(4) var<storage, read> viscous_from: array<f32>;
 @group(0) @binding(5) var<storage, read_write> viscous_to: array<f32>;
-// The change of the iteration before, m/s.
+// Change of the previous iteration, m/s.
 @group(0) @binding(6) var<storage, read_write> viscous_change: array<f32>;
 // κ, gain, momentum.
 @group(0) @binding(7) var<uniform> viscous_gain: vec4f;
@@ -19,8 +20,8 @@ fn velocity(axis: u32, element: u32) -> f32 {
     return viscous_from[axis * params.stride + element];
 }
 
-// What the edge along `along` through the least corner of the cell `offset` away adds to K u and to K's diagonal, at the face on
-// its upper side along `other`.
+// Contribution to K u and to K's diagonal by the edge along `along` through the minimum corner of
+// the cell at `offset`, for the face on its upper side along `other`.
 fn stress(offset: vec3i, axis: u32, other: u32, along: u32) -> vec2f {
     let element = element_at(offset);
     let edge = edge_of(viscous_word[element], along);
@@ -48,7 +49,7 @@ fn main(
         viscous_to[face] = viscous_from[face];
     }
     let moves_any = ((word >> MOVED) & 7u) != 0u;
-    // What an earlier substep left where none moves now.
+    // Clears leftovers of an earlier substep in cells where nothing moves.
     for (var axis = 0u; axis < select(3u, 0u, moves_any); axis++) {
         viscous_change[axis * params.stride + element] = 0.0;
     }

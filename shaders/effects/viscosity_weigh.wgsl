@@ -1,16 +1,18 @@
-// What a viscous solve moves, and by how much water each stress counts (Batty and Bridson 2008): a word a cell. It keeps the
-// velocities from which the solve starts, and the pressure of the projection before it.
+// Sets up a viscous solve: which faces it moves, and the water fraction that weights each stress
+// (Batty and Bridson 2008), in one word per cell. Also stores the initial velocities of the solve,
+// and the pressure of the projection before it.
 //
-// A face moves where it is open and beside water. An edge has no stress where one of its faces is in the air, so that the surface
-// is free of it. A wall or a solid lies half a cell from the face beside it: its pair counts twice in the strain, over half the
-// water. Solids hold the water, walls where they are no-slip walls.
+// A face moves if it is open and beside water. An edge has no stress if one of its faces is in the
+// air: the surface is stress-free. A wall or solid is half a cell away from the face beside it: its
+// velocity pair counts twice in the strain, over half the water. Solids are no-slip; walls are if
+// they are no-slip walls.
 #import "shared/thread.wgsl"
 #import "shared/flip_params.wgsl"
 #import "shared/flip_neighborhood.wgsl"
 #import "shared/unit.wgsl"
 #import "shared/viscous_word.wgsl"
 
-// A bit a no-slip wall: of the least faces along x, y and z, then of the greatest.
+// Bit mask of no-slip walls: the minimum faces along x, y, z, then the maximum faces.
 override NO_SLIP: u32;
 
 @group(0) @binding(2) var<storage, read> cell_kind: array<u32>;
@@ -23,7 +25,7 @@ override NO_SLIP: u32;
 
 const FLUID = 1u;
 
-// A face so far behind a wall is in its plane, cells.
+// A face this far behind a wall still counts as in its plane, cells.
 const BESIDE = 0.01;
 
 const IN_AIR = 0u;
@@ -36,14 +38,14 @@ fn is_water(offset: vec3i) -> bool {
     return cell_kind[element_at(offset)] == FLUID;
 }
 
-// Walls that a place lies behind, a bit each.
+// Bit mask of the walls that a position lies behind.
 fn behind(place: vec3f) -> u32 {
     let low = select(vec3u(0u), vec3u(1u, 2u, 4u), place < params.cut_min - BESIDE);
     let high = select(vec3u(0u), vec3u(8u, 16u, 32u), place > params.cut_max + BESIDE);
     return low.x | low.y | low.z | high.x | high.y | high.z;
 }
 
-// Middle of the lower face along `axis` of the cell `offset` away, in cells.
+// Centre of the lower face along `axis` of the cell at `offset`, in cells.
 fn middle(offset: vec3i, axis: u32) -> vec3f {
     return cell + vec3f(offset) + 0.5 - 0.5 * vec3f(unit(axis));
 }
@@ -52,14 +54,15 @@ fn state_of(offset: vec3i, axis: u32) -> u32 {
     let element = element_at(offset);
     let beside = is_water(offset) || is_water(offset - unit(axis));
     let open = select(IN_AIR, MOVES, beside);
-    // Cells that no brick holds are behind a wall, or far from water.
+    // Cells of absent bricks lie behind a wall or far from water.
     let stored = select(CLOSED, open, face_open[axis * params.stride + element] > 0.0);
     let missing = select(IN_AIR, CLOSED, behind(middle(offset, axis)) != 0u);
     return select(stored, missing, element < CELLS);
 }
 
-// By what the velocities along `axis` on both sides of an edge count, which lie one cell along `across` from each other: not where
-// both are closed. 3 where one is, by a wall that water slips along.
+// Weight of the two velocities along `axis` on both sides of an edge, one cell apart along
+// `across`: 0 if both are closed, 1 if none, 2 if one is, and 3 if one is closed by a free-slip
+// wall.
 fn weight_of(states: vec2u, axis: u32, across: u32) -> u32 {
     let closed = vec2u(states == vec2u(CLOSED));
     let offset = select(vec3i(0), -unit(across), states.y == CLOSED);

@@ -1,4 +1,4 @@
-// ω_i = Σ_j m/ρ (v_j − v_i) × ∇_j W, spiky gradient; and its length.
+// Vorticity ω_i = Σ_j m/ρ (v_j − v_i) × ∇_j W with the spiky gradient, and its length.
 #import "shared/thread.wgsl"
 #import "shared/predicted.wgsl"
 #import "shared/vector.wgsl"

@@ -1,4 +1,5 @@
-// a = ε h (N × ω), N = η/|η|, η = ∇|ω| by differences, so that uniform vorticity has none.
+// Vorticity confinement a = ε h (N × ω), N = η/|η|; η = ∇|ω| by differences, so that uniform
+// vorticity gives 0.
 #import "shared/thread.wgsl"
 #import "shared/predicted.wgsl"
 #import "shared/vector.wgsl"
@@ -44,7 +45,7 @@ fn main(
     begin_phase();
     for_each_neighbor(own_position, i);
     let steepness = length(slope);
-    // Below rounding of |ω| over h the direction is noise.
+    // Below the rounding error of |ω| over h the direction is noise.
     if steepness * params.support_radius < 1e-5 * own_strength || own_strength == 0.0 {
         return;
     }

@@ -1,6 +1,7 @@
-// Particles move with the projected velocity by the midpoint rule (its first stage is what grid_to_particle sampled),
-// and by the density correction's displacement; they are kept out of solids and walls, and lose what velocity they
-// have into them. One that would move farther than the cap is slowed and counted.
+// Advects particles with the projected velocity by the midpoint rule (grid_to_particle has sampled
+// the first stage), and by the density correction's displacement. Particles are kept out of solids
+// and walls, and lose their velocity component into them. A particle that would move farther than
+// the cap is slowed and counted.
 #import "shared/thread.wgsl"
 #import "shared/vector.wgsl"
 #import "shared/counters.wgsl"
@@ -25,7 +26,7 @@
 @group(0) @binding(6) var<storage, read_write> position: array<Vector>;
 @group(0) @binding(9) var<storage, read_write> velocity: array<Vector>;
 @group(0) @binding(10) var<storage, read_write> id: array<u32>;
-// Of particles slowed, and of what is not finite, which clamping would hide.
+// Counts slowed particles, and non-finite values, which clamping would hide.
 @group(0) @binding(11) var<storage, read_write> counters: Counters;
 
 fn component_at(plane: u32, low: vec3i, high: vec3i, t: vec3f) -> f32 {
@@ -43,7 +44,7 @@ fn component_at(plane: u32, low: vec3i, high: vec3i, t: vec3f) -> f32 {
     return sum;
 }
 
-// The grid's velocity at x; `otherwise` where no brick is.
+// The grid's velocity at x; `otherwise` if there is no brick.
 fn velocity_at(x: vec3f, otherwise: vec3f) -> vec3f {
 #ifdef PERIODIC
     let scaled = wrapped_place(x * params.inverse_cell_size, vec3f(params.cells));
@@ -54,7 +55,8 @@ fn velocity_at(x: vec3f, otherwise: vec3f) -> vec3f {
     let cell = vec3i(cell_of_place(p));
     let f = p - vec3f(cell);
     find_slots(cell);
-    // Between centres; beyond the outermost ones the velocity is that of the outermost.
+    // Interpolates between face centres; beyond the outermost ones, the velocity is that of the
+    // outermost.
     let is_before = f < vec3f(0.5);
     let t = select(f - 0.5, f + 0.5, is_before);
     var low = max(select(vec3i(0), vec3i(-1), is_before), -cell);
@@ -72,16 +74,16 @@ fn velocity_at(x: vec3f, otherwise: vec3f) -> vec3f {
 }
 
 #ifdef SOLIDS
-// Each halves, or better, how deep one that lies between a wall and a solid 45° off is in either.
+// Each round at least halves the penetration depth of a particle between a wall and a solid at 45°.
 const CORNER_ROUNDS = 4u;
 
-// The velocity of what was pushed back: without its part against the push.
+// Removes the velocity component against a push.
 fn stopped(v: vec3f, push: vec3f) -> vec3f {
     return v - push * (min(dot(v, push), 0.0) / max(dot(push, push), 1e-30));
 }
 #endif
 
-// Without what of a velocity leads into the walls that x lies at or beyond.
+// Removes the velocity component into the walls that x touches or is beyond.
 fn at_walls(v: vec3f, x: vec3f) -> vec3f {
     let left = select(v, max(v, params.wall_velocity_min), x < params.wall_min + params.contact_distance);
     return select(left, min(left, params.wall_velocity_max), x > params.wall_max - params.contact_distance);
@@ -99,7 +101,8 @@ fn main(
     }
     let start = three(sorted_position[i]);
     let here = three(carried[i]);
-    // A drop goes on as it flies: on its way there are no faces of its own, and those about it may be other water's.
+    // A droplet continues ballistically: along its path the faces do not carry its velocity, and
+    // those around may belong to other water.
     let between = select(velocity_at(start + 0.5 * params.time_step * here, here), here, is_drop[i] > 0u);
     var way = params.time_step * between;
 #ifdef CORRECTION
@@ -117,7 +120,8 @@ fn main(
     let high = params.wall_max - params.contact_distance;
     var v = three(velocity[i]);
 #ifdef MOVING_SOLIDS
-    // In steps of at most half a node spacing as the fastest solid sees them, so that nothing thin is stepped over.
+    // Steps of at most half a node spacing relative to the fastest solid, so that thin solids are
+    // not skipped.
     let most = length(way) + solid_grids.fastest * params.time_step;
     let spacing = solid_grids.grids[0].spacing;
     let steps = u32(ceil(2.0 * most / spacing)) + 1u;
@@ -137,7 +141,7 @@ fn main(
         }
     }
     let free = x;
-    // Where a solid and a wall meet, each would push into the other.
+    // Between a solid and a wall, each of them would push the particle into the other.
     let rounds = select(0u, CORNER_ROUNDS, is_near && any(x != clamp(x, low, high)));
     for (var k = 0u; k < rounds; k++) {
         for (var solid = 0u; solid < solid_grids.count; solid++) {
@@ -148,7 +152,8 @@ fn main(
 #else
     var x = start + way;
 #ifdef SOLIDS
-    // In steps of at most half a node spacing, so that nothing thin is stepped over; none where no solid is near.
+    // Steps of at most half a node spacing, so that thin solids are not skipped; no steps if no
+    // solid is near.
     let reach = length(way) + params.contact_distance + 2.0 * solid_grid.spacing;
     let is_near = solid_distance_bound(start) < reach;
     let steps = u32(ceil(2.0 * length(way) / solid_grid.spacing)) + 1u;
@@ -158,8 +163,9 @@ fn main(
         v = stopped(v, solid_push);
     }
     let free = x;
-    // Where a solid and a wall meet, each would push into the other. How often is decided once: x lies exactly on
-    // the wall after a push along it, and next to it after any other.
+    // Between a solid and a wall, each of them would push the particle into the other. The number
+    // of rounds is decided once: after a push along the wall x lies exactly on it, after any other
+    // push next to it.
     let rounds = select(0u, CORNER_ROUNDS, is_near && any(x != clamp(x, low, high)));
     for (var k = 0u; k < rounds; k++) {
         x = leave_solids(clamp(x, low, high));

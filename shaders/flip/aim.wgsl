@@ -1,6 +1,7 @@
-// Moves each particle to where its own velocity has to start from so as to take it to where the grid's velocity takes it
-// from its own place: whoever predicts with the particle's velocity alone then goes with the flow, and what single
-// particles do beside it parts no neighbours. Drops fly as they are. All are displaced by what pushes them apart.
+// Displaces each particle so that its own velocity takes it to where the grid's velocity would take
+// it from its original position. A solver that predicts positions with particle velocities then
+// follows the grid's flow, and deviations of single particles do not separate neighbours. Isolated
+// droplets keep their own path. The displacement that pushes particles apart is added to all.
 #import "shared/thread.wgsl"
 #import "shared/vector.wgsl"
 #import "shared/flip_params.wgsl"

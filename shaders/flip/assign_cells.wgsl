@@ -1,4 +1,4 @@
-// Each particle's cell element, and a slot in it.
+// Determines each particle's cell element, and a slot in that cell.
 #import "shared/thread.wgsl"
 #import "shared/vector.wgsl"
 #import "shared/bricks.wgsl"

@@ -1,6 +1,6 @@
-// Work that walls and solids which move do on the water in a substep, over Δx² Δt: −p times what they push out through
-// the closed parts of a cell's faces, each workgroup's share of it. It is what the projection's energy gains by them. The flux of gaps
-// that close (flip/close_gaps) is no work.
+// Work by moving walls and solids on the water in a substep, over Δx² Δt, per workgroup: −p times
+// the flux that they push through the closed parts of a cell's faces. It equals their contribution
+// to the energy in the projection. The flux of closing gaps (flip/close_gaps) is not work.
 #import "shared/thread.wgsl"
 #import "shared/flip_cell.wgsl"
 #import "shared/flip_buried.wgsl"

@@ -1,6 +1,8 @@
-// Gaps that close within the substep, as under a slab of water that falls on a floor. Air has no pressure: water would run into what
-// stands beyond the gap and be squeezed there, by as much as it goes in a substep, and the density correction would lift it again. The
-// cells of such a gap count as water whose divergence is what fills them, so that the projection stops the water at the gap's end.
+// Gaps that close within the substep, for example under a slab of water that falls on a floor. Air
+// has no pressure: the water would penetrate what lies beyond the gap by its displacement in a
+// substep and be compressed there, and the density correction would lift it again. The cells of
+// such a gap count as water with the divergence that fills them, so that the projection stops the
+// water at the end of the gap.
 #import "shared/thread.wgsl"
 #import "shared/flip_neighborhood.wgsl"
 #import "shared/flip_buried.wgsl"
@@ -20,16 +22,18 @@
 const AIR = 0u;
 const FLUID = 1u;
 
-// Cells of a gap, at most: elements are known so far off.
+// Most cells of a gap: the reach of the neighbourhood's elements.
 const MOST_GAP = 4;
 
-// A gap closes where its ends meet by more than this part of it.
+// A gap closes if its ends approach by more than this fraction of it.
 const CLOSES = 0.75;
 
-// And by more than this part of a cell: what is less the density correction takes away.
+// They must also approach by more than this fraction of a cell: the density correction handles
+// less.
 const LEAST_CLOSING = 0.25;
 
-// A face that is open by less ends a gap: it would have to let through all that the gap takes.
+// A face with a smaller open fraction ends a gap: all the water that fills the gap would have to
+// pass it.
 const LEAST_WAY = 0.5;
 
 const OPEN = 0u;
@@ -41,14 +45,14 @@ struct End {
     kind: u32,
     // m/s, along the axis.
     velocity: f32,
-    // Cells of air up to the end, and what all up to there lack, in cells.
+    // Number of air cells up to the end, and the volume that all of them lack, in cells.
     cells: i32,
     gap: f32,
-    // Of that, what water beside the cell lacks.
+    // Volume that the water beside the cell lacks, in cells.
     beside: f32,
 }
 
-// What a cell lacks along an axis, in cells.
+// Volume that a cell lacks, per area across the axis, in cells.
 fn lack_of(element: u32, cell: vec3f, axis: u32) -> f32 {
     let extent = open_extent(cell);
     var room = extent[axis];
@@ -58,7 +62,7 @@ fn lack_of(element: u32, cell: vec3f, axis: u32) -> f32 {
     return room * clamp(1.0 - density[element], 0.0, 1.0);
 }
 
-// What walls leave of a cell's faces across an axis.
+// Area of a cell's faces across an axis that walls leave open.
 fn across(cell: vec3f, axis: u32) -> f32 {
     let extent = open_extent(cell);
     return extent[(axis + 1u) % 3u] * extent[(axis + 2u) % 3u];
@@ -78,7 +82,7 @@ fn end_of(cell: vec3f, axis: u32, side: i32) -> End {
         let is_water = density[there] >= 0.5;
         let lack = lack_of(there, cell + vec3f((k + 1) * step), axis);
         end.kind = select(select(select(OPEN, WATER, is_water), UNKNOWN, !is_there), CLOSED, is_closed);
-        // Of a face that is closed in part the velocity is the water's.
+        // On a partly closed face the velocity is that of the water.
 #ifdef MOVING_SOLIDS
         let of_solid = closed_velocity[face];
 #else
@@ -92,7 +96,8 @@ fn end_of(cell: vec3f, axis: u32, side: i32) -> End {
     return end;
 }
 
-// What of a cell is filled in this substep because the ends of a gap meet, in cells, times the area across; negative where none do.
+// Volume of a cell that fills in this substep because the ends of a gap meet, in cells: the missing
+// length times the area across; negative if no gap closes.
 fn filled(element: u32, cell: vec3f) -> f32 {
     var most = -1.0;
     for (var axis = 0u; axis < 3u; axis++) {

@@ -1,5 +1,5 @@
-// What of each cell and of its lower faces is open, and what the solids push through the rest: face fractions of
-// Batty et al. 2007, exact for the walls and for planes in meshes.
+// Open fractions of each cell and of its lower faces, and the flux of solids through the closed
+// parts: face fractions of Batty et al. 2007, exact for walls and for planes in meshes.
 #import "shared/thread.wgsl"
 #import "shared/flip_params.wgsl"
 #import "shared/flip_cell.wgsl"
@@ -17,17 +17,18 @@
 @group(0) @binding(10) var<storage, read_write> open_hats: array<f32>;
 #endif
 #ifdef MOVING_SOLIDS
-// What the lower faces have where they are closed, m/s.
+// Velocities of closed lower faces, m/s.
 @group(0) @binding(9) var<storage, read_write> closed_velocity: array<f32>;
 #endif
 
-// Which of the cells with room are water is found later, by the density at their centres.
+// A later pass finds which open cells are water, from the density at their centres.
 const AIR = 0u;
 const SOLID = 2u;
 
 #ifdef SOLIDS
-// A face with a smaller open fraction is closed: such faces drive jets at edges and corners in water at rest. A larger threshold blocks
-// the flow along a wall: at 0.05 the water in a turning elliptic drum is half as far off again from Lamb's solution.
+// A face with a smaller open fraction is closed: such faces drive jets at edges and corners in
+// water at rest. A larger threshold blocks the flow along a wall: with 0.05, the deviation from
+// Lamb's solution for water in a turning elliptic drum is 50 % larger.
 const LEAST_OPEN = 0.02;
 #endif
 
@@ -50,13 +51,13 @@ fn main(
     var volume = extent.x * across.x;
 #ifdef SOLIDS
     var corners = Corners(vec4f(1e15), vec4f(1e15));
-    // A bit for each solid that may cut it.
+    // One bit for each solid that may cut the cell.
     var solids = 0u;
     var hats = 1.0;
 #ifdef MOVING_SOLIDS
     let lower_of_walls = lower;
     let upper_of_walls = upper;
-    // Of what is nearest to each face, along that face's axis.
+    // Velocity of the solid nearest to each face, along that face's axis.
     var lower_velocity = vec3f(0.0);
     var upper_velocity = vec3f(0.0);
     for (var k = 0u; k < solid_grids.count; k++) {
@@ -65,7 +66,8 @@ fn main(
             let found = corner_distances(cell);
             let is_nearer_low = lower_sums(found) < lower_sums(corners);
             let is_nearer_high = upper_sums(found) < upper_sums(corners);
-            // A component does not change along its own axis: that at the middle is that at both faces.
+            // A velocity component of a rigid body does not change along its own axis: the value at
+            // the centre is that at both faces.
             let pushing = solid_velocity_at((cell + 0.5) * params.cell_size);
             lower_velocity = select(lower_velocity, pushing, is_nearer_low);
             upper_velocity = select(upper_velocity, pushing, is_nearer_high);
@@ -74,7 +76,7 @@ fn main(
         }
     }
 #else
-    // Entered only where a solid may cut the cell.
+    // Only cells that a solid may cut enter the loop.
     for (var once = 0; once < select(0, 1, may_cut(cell)); once++) {
         corners = corner_distances(cell);
         solids = 1u;
@@ -115,7 +117,7 @@ fn main(
     face_open[element] = lower.x;
     face_open[params.stride + element] = lower.y;
     face_open[2u * params.stride + element] = lower.z;
-    // What of a face lies beyond a wall that stands across it is nobody's.
+    // The part of a face beyond a wall perpendicular to it counts for nothing.
 #ifdef MOVING_SOLIDS
     let pushed_high = (across - upper_of_walls) * wall_velocity(cell + 1.0) + (upper_of_walls - upper) * upper_velocity;
     let pushed_low = (across - lower_of_walls) * wall_velocity(cell) + (lower_of_walls - lower) * lower_velocity;

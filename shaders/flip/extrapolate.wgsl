@@ -1,8 +1,10 @@
-// One layer of faces gets the mean of its neighbours of the layers before. Where particles gave a velocity, it is
-// the change that is carried on, so that drops near each other keep their own velocities.
+// Extrapolates velocities by one layer: a face gets the mean of its neighbours in earlier layers.
+// On faces with a velocity from particles only the change is extrapolated, so that droplets near
+// each other keep their own velocities.
 //
-// In place: a neighbour that this very pass fills shows either no layer or this one, and neither is taken. Loops
-// that run once stand where branches would run for lanes that need nothing.
+// Works in place: a neighbour that this pass itself fills has either no layer or the current one,
+// and neither is used. Loops that run at most once replace branches, which would run for lanes that
+// do not need them.
 #import "shared/thread.wgsl"
 #import "shared/flip_params.wgsl"
 #import "shared/flip_beside.wgsl"
@@ -10,7 +12,7 @@
 @group(0) @binding(2) var<storage, read_write> face_velocity: array<f32>;
 @group(0) @binding(3) var<storage, read_write> face_change: array<f32>;
 @group(0) @binding(4) var<storage, read_write> face_layer: array<u32>;
-// The layer that is filled.
+// Index of the layer that is filled.
 @group(0) @binding(5) var<uniform> layer: vec4u;
 
 // Elements of the cells before and after along each axis.
@@ -31,7 +33,7 @@ fn find_beside(element: u32) {
     );
 }
 
-// Where each of the six stands in a plane; element 0, which is 0, where its bit is not set.
+// Indices of the six faces in a plane; element 0, which is 0, if a face's bit is not set.
 fn chosen(plane: u32, sources: u32, elements: vec3u, bits: vec3u) -> vec3u {
     return select(vec3u(0u), elements + plane, (vec3u(sources) & bits) != vec3u(0u));
 }
@@ -39,7 +41,7 @@ fn chosen(plane: u32, sources: u32, elements: vec3u, bits: vec3u) -> vec3u {
 const BEFORE = vec3u(1u, 4u, 16u);
 const AFTER = vec3u(2u, 8u, 32u);
 
-// Sum of a field over those of the six faces whose bit is set.
+// Sum of a field over those of the six faces whose bits are set.
 fn sum_velocity(plane: u32, sources: u32) -> f32 {
     let low = chosen(plane, sources, before, BEFORE);
     let high = chosen(plane, sources, after, AFTER);
@@ -54,13 +56,14 @@ fn sum_change(plane: u32, sources: u32) -> f32 {
         + face_change[low.z] + face_change[high.z];
 }
 
-// A bit for each of the six, by component: of an older layer, and seen by particles.
+// Bit masks of the six faces, by component: faces of an earlier layer, and those with a velocity
+// from particles.
 var<private> sources: vec3u;
 var<private> seen: vec3u;
 
 fn note(tags: u32, bit: u32) {
     let other = vec3u(tags) >> vec3u(0u, 8u, 16u);
-    // 0 wraps round.
+    // Layer 0 wraps around to the largest value.
     let is_older = (other & vec3u(0x7fu)) - 1u < vec3u(layer.x - 1u);
     sources |= select(vec3u(0u), vec3u(bit), is_older);
     seen |= select(vec3u(0u), vec3u(bit), (other & vec3u(0x80u)) != vec3u(0u));
@@ -108,7 +111,7 @@ fn main(
                 let count = countOneBits(seen[component]);
                 let mean = sum_change(plane, seen[component]) / f32(max(count, 1u));
                 let change = select(params.velocity_step[component], mean, count > 0u);
-                // What gravity changed is in both.
+                // Gravity's change is included in both.
                 face_velocity[face] += change - face_change[face];
                 face_change[face] = change;
             }

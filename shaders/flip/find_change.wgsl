@@ -1,4 +1,5 @@
-// After the projection: which faces it gave a velocity (layer 1), and what of that is change.
+// After the projection: marks the faces to which it gave a velocity (layer 1), and stores the
+// change of velocity.
 #import "shared/thread.wgsl"
 #import "shared/flip_params.wgsl"
 #import "shared/flip_beside.wgsl"
@@ -12,7 +13,7 @@
 const FLUID = 1u;
 const SOLID = 2u;
 
-// Beyond the stored layer of the upper walls: never asked for.
+// Tags of cells beyond the stored layer of the upper walls, whose faces are never used.
 const NO_NEED = 0x7f7f7fu;
 
 @compute @workgroup_size(64)
@@ -37,7 +38,8 @@ fn main(
         let other = before[component];
         let kind = cell_kind[other];
         let is_closed = face_open[face] == 0.0;
-        // A closed face between solids has no velocity of its own; slot 0 is what lies beyond the domain.
+        // A closed face between two solid cells has no velocity of its own; slot 0 lies beyond the
+        // domain.
         let is_buried = own == SOLID && (kind == SOLID || other < CELLS);
         let is_found = own == FLUID || kind == FLUID || (is_closed && !is_buried);
         face_change[face] = face_velocity[face] - face_change[face];

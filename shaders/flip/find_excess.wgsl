@@ -1,5 +1,5 @@
-// What of the density is too much, or too little within the water, in parts of a cell: what the density correction takes
-// away (Kugelstadt et al. 2019).
+// Excess of density, or deficit inside the water, as a fraction of a cell: the source of the
+// density correction (Kugelstadt et al. 2019).
 #import "shared/thread.wgsl"
 #import "shared/flip_neighborhood.wgsl"
 #import "shared/flip_buried.wgsl"
@@ -11,7 +11,8 @@
 const AIR = 0u;
 const FLUID = 1u;
 
-// Of a cell's excess a substep corrects at most this much either way: displacements stay well below a cell.
+// Bound on the excess that a substep corrects, in both directions: it keeps displacements well
+// below a cell.
 const MOST_EXCESS = 0.5;
 
 @compute @workgroup_size(64)
@@ -33,7 +34,8 @@ fn main(
         for (var k = 0; k < 27; k++) {
             let offset = vec3i(k % 3, k / 3 % 3, k / 9) - 1;
             let found = element_at(offset);
-            // Beyond the domain there is no cell and no air. Water that fills a gap is air still.
+            // Beyond the domain there is neither a cell nor air. A gap filled by close_gaps still
+            // counts as air.
             let is_air = cell_kind[found] == AIR || (density[found] < 0.5 && !is_buried(found, own + vec3f(offset)));
             touches_air |= is_air && found >= CELLS;
         }

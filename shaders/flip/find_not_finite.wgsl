@@ -1,11 +1,12 @@
-// Counts what is not finite in one of a substep's arrays: what clamps, maxima and comparisons behind it would hide.
+// Counts non-finite values in one of a substep's arrays, which clamps, maxima and comparisons of
+// later passes would hide.
 #import "shared/thread.wgsl"
 #import "shared/counters.wgsl"
 
 @group(0) @binding(0) var<storage, read> values: array<vec4u>;
 @group(0) @binding(1) var<storage, read_write> counters: Counters;
 
-// Values of a thread, in fours.
+// Vectors of four values per thread.
 const RUN = 4u;
 
 @compute @workgroup_size(64)

@@ -1,11 +1,13 @@
-// Which cells are water: those at whose centre the density is at least half of the water's, as at a surface that stands
-// there; and how far the surface is. Whether a cell has particles does not count: a full one may have none for a moment, as
-// beside a wall that comes or goes, and were it air, all of the water's pressure would leak there; and drops in the air
-// have no pressure.
+// Finds the cells of water and the distance to the surface. A cell is water if the density at its
+// centre is at least half that of full water, the value at a surface through the centre. The
+// presence of particles does not decide: a full cell may have none for a moment, for example beside
+// a moving wall, and as air it would drain all of the water's pressure; and isolated droplets have
+// no pressure.
 //
-// A cell whose centre lies within a wall is what the water before it is. One that solids cut goes by what they leave of it, and a
-// film on a floor that passes above the centre is water as well: of water that runs up a slope, and of water at rest on it, the edge
-// lies in cells whose centres are in the slope. Were they air, nothing would hold it up or apart.
+// A cell whose centre lies inside a wall is of the kind of the water in front of it. A cell cut by
+// solids is judged by the volume that they leave open, and a film on a floor that passes above the
+// centre is water too: where water runs up a slope, or rests on it, its edge lies in cells whose
+// centres are inside the slope. As air, they could not support the water or keep it apart.
 #import "shared/thread.wgsl"
 #import "shared/flip_neighborhood.wgsl"
 #import "shared/flip_buried.wgsl"
@@ -26,13 +28,15 @@ const AIR = 0u;
 const FLUID = 1u;
 const SOLID = 2u;
 
-// Least distance of the surface from the centre of a cell of water, in cells. The pressure there is by it alone, and every
-// way to the air from there has to know of the same one: with a least θ of each way in its place, water whose surface passes
-// a centre was pushed sideways by up to half of gravity.
+// Least distance of the surface from the centre of a cell of water, in cells. It determines the
+// pressure in the cell, so all directions towards air have to use the same distance: with a lower
+// bound on θ per direction instead, water whose surface passes a cell centre was pushed sideways by
+// up to half of gravity.
 const LEAST_DEPTH = 0.02;
 
-// Density before the walls and solids that a cell's centre lies in: in the cell inward of the walls, and where that is
-// buried too, the mean over the faces that lead out of it, by how far they are open.
+// Density in front of the walls and solids that contain a cell's centre: in the cell inward of the
+// walls, or if its centre is inside too, the mean over the cell's faces to other cells, weighted by
+// their open fractions.
 fn density_before(element: u32, cell: vec3f) -> f32 {
     let is_thin = open_extent(cell) < vec3f(HALF);
     let inward = select(vec3i(0), select(vec3i(-1), vec3i(1), !is_plane_open(cell)), is_thin);
@@ -56,14 +60,15 @@ fn density_before(element: u32, cell: vec3f) -> f32 {
 }
 
 #ifdef SOLIDS
-// Part of the hats below which a cell counts as having room for that part.
+// Lower bound for a cell's open fraction of the hat function.
 const LEAST_ROOM = 0.02;
 
-// Part of its room that a film fills at least.
+// Least fraction of its open volume that a film fills.
 const LEAST_FILM = 0.1;
 
-// Water at a centre over the room there. Where the centre is in a solid, the little room that is left may hold no particle for a
-// while, or one too many, so that the cells beyond the open faces count as well.
+// Water at a centre relative to the open volume there. If the centre is inside a solid, the small
+// open volume may hold no particle for a while, or one too many, so that cells beyond the open
+// faces count as well.
 fn share_of_room(element: u32) -> f32 {
     let room = open_hats[element];
     var water = density[element] * max(room, params.particle_share);
@@ -82,9 +87,11 @@ fn share_of_room(element: u32) -> f32 {
     return max(own, water / rooms);
 }
 
-// Part of the hat at the centre that lies below a level surface, solids included; `of_room` is that part of the open hat. A solid
-// counts as below the surface where it is a floor, as above it where it is a ceiling, and as the open hat does where it is a wall.
-// If it counted as the open hat does everywhere, water on a slope would have its surface too low near the waterline, and climb.
+// Fraction of the hat function at the centre that lies below a level surface, solids included;
+// `of_room` is that fraction of the open part. A solid counts as below the surface if it is a
+// floor, as above it if it is a ceiling, and like the open part if it is a wall. If it always
+// counted like the open part, water on a slope would have its surface too low near the waterline,
+// and climb.
 fn below_surface(element: u32, of_room: f32) -> f32 {
     let room = open_hats[element];
     var to_open = vec3f(0.0);
@@ -131,13 +138,14 @@ fn main(
         is_film = share > LEAST_FILM && below >= 0.5;
     }
 #endif
-    // Water lies in bricks that hold particles, or a wall beside them.
+    // Water lies in bricks that hold particles, or next to a wall beside them.
     let is_water = (share >= 0.5 || is_film) && thread < params.wet_cells;
     let is_open = cell_kind[element] != SOLID;
     cell_kind[element] = select(SOLID, select(AIR, FLUID, is_water), is_open);
 #ifdef GHOST_FLUID
-    // Across a flat surface the density is 1/2 at it, and falls as s - s²/2 with the distance s in cells. Where a dry floor passes
-    // above the centre of a cell of air, the surface is there: negative, as in water.
+    // Across a flat surface the density is 1/2 at the surface, and falls as s - s²/2 with the
+    // distance s in cells. If a dry floor passes above the centre of an air cell, the surface is
+    // the floor: the distance is negative, as in water.
     let off = below - 0.5;
     let inside = sign(off) * (1.0 - sqrt(max(1.0 - 2.0 * abs(off), 0.0)));
     let depth = select(inside, max(inside, LEAST_DEPTH), is_water);

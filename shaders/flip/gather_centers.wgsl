@@ -1,10 +1,11 @@
-// The water's density at cell centres over what a full cell has there, 1 in still water, 0.5 on its surface, from what the cells
-// about gave: with a density correction mirrored at walls. Solids are left out of it, and walls where nothing is mirrored.
+// Relative density at cell centres, 1 in still water, 0.5 on its surface: sums the contributions of
+// the cells around. With a density correction particles are mirrored at walls. The volume of solids
+// is excluded, and that of walls where nothing is mirrored.
 #import "shared/thread.wgsl"
 #import "shared/flip_params.wgsl"
 #import "shared/flip_neighborhood.wgsl"
 
-// As flip/spread_centers has them.
+// Partial sums, stored as in flip/spread_centers.
 @group(0) @binding(2) var<storage, read> weight_before: array<f32>;
 @group(0) @binding(4) var<storage, read> weight_after: array<f32>;
 @group(0) @binding(5) var<storage, read> momentum_before: array<f32>;
@@ -13,13 +14,13 @@
 @group(0) @binding(9) var<storage, read> open_hats: array<f32>;
 #endif
 
-// Integral of the hat from minus infinity to t.
+// Integral of the hat function from minus infinity to t.
 fn hat_below(t: vec3f) -> vec3f {
     let s = 1.0 - min(abs(t), vec3f(1.0));
     return select(1.0 - 0.5 * s * s, 0.5 * s * s, t < vec3f(0.0));
 }
 
-// Part of the hats below which a cell counts as that part full.
+// Lower bound for a cell's open fraction of the hat function.
 const LEAST_ROOM = 0.02;
 
 @compute @workgroup_size(64)
@@ -39,7 +40,8 @@ fn main(
     let last_wet = params.wet_cells / CELLS;
     let holds_water = (slots_near - 1u < vec4u(last_wet)) | (slots_far - 1u < vec4u(last_wet));
     var sum = 0.0;
-    // Layer by layer: what lies before gave to the layer after its own.
+    // Layer by layer: cells in the layer before contribute by their sums for the layer after
+    // theirs.
     for (var k = 0; k < select(0, 9, any(holds_water)); k++) {
         let found = element_at(vec3i(k % 3, k / 3, 0) - 1);
         sum += momentum_before[u32(8 - k) * stride + select(0u, found, found < wet_end)];
@@ -52,7 +54,8 @@ fn main(
         let found = element_at(vec3i(k % 3, k / 3, 2) - 1);
         sum += weight_before[u32(8 - k) * stride + select(0u, found, found < wet_end)];
     }
-    // What the walls leave of the hats, exactly, and what solids do of that.
+    // The part of the hat function that walls leave open, exactly, times the part of it that solids
+    // leave open.
     let center = vec3f(own_cell(element)) + 0.5;
     let along = hat_below(params.cut_max - center) - hat_below(params.cut_min - center);
 #ifdef CORRECTION
@@ -63,7 +66,7 @@ fn main(
 #endif
     var room = max(parts.x * parts.y * parts.z, LEAST_ROOM);
 #ifdef SOLIDS
-    // What has room for less than a particle counts as having it for one.
+    // A smaller open volume counts as that of one particle.
     room *= max(open_hats[element], params.particle_share);
 #endif
     density[element] = sum * params.particle_share / room;

@@ -1,5 +1,6 @@
-// Particle-to-grid, second half: a face's velocity from what the cells about it gave. The old velocity is kept; the
-// new one has gravity, and is the wall's or solid's where the face is closed.
+// Particle-to-grid transfer, second half: computes a face's velocity from the contributions of the
+// cells around it. The old velocity is stored; the new one includes gravity, and on a closed face
+// it is that of the wall or solid.
 #import "shared/thread.wgsl"
 #import "shared/flip_params.wgsl"
 #import "shared/flip_neighborhood.wgsl"
@@ -14,15 +15,16 @@
 @group(0) @binding(13) var<storage, read> weight_after: array<f32>;
 @group(0) @binding(4) var<storage, read> face_open: array<f32>;
 @group(0) @binding(5) var<storage, read_write> face_velocity: array<f32>;
-// The old velocity here, its change from flip/find_change on.
+// Holds the old velocity here, and its change from flip/find_change on.
 @group(0) @binding(6) var<storage, read_write> face_change: array<f32>;
-// Eight bits a component: bit 7 whether particles gave a velocity, below it the layer, of flip/extrapolate.
+// Eight bits per component: bit 7 is set if particles gave a velocity; the lower bits hold the
+// layer, see flip/extrapolate.
 @group(0) @binding(9) var<storage, read_write> face_layer: array<u32>;
 #ifdef MOVING_SOLIDS
 @group(0) @binding(10) var<storage, read> closed_velocity: array<f32>;
 #endif
 
-// Of what is not finite, which a comparison would hide.
+// Counts non-finite values, which a comparison would hide.
 @group(0) @binding(11) var<storage, read_write> counters: Counters;
 
 @compute @workgroup_size(64)
@@ -46,7 +48,8 @@ fn main(
     let holds_water = (slots_near - 1u < vec4u(last_wet)) | (slots_far - 1u < vec4u(last_wet));
     var momentum = 0.0;
     var weight = 0.0;
-    // A loop that no lane enters costs nothing, where a branch would: dry bricks' cells far from water.
+    // A loop that no lane enters costs nothing, unlike a branch: it skips cells of dry bricks far
+    // from water.
     for (var c = -1; c <= select(-2, 1, any(holds_water)); c++) {
         for (var b = -1; b <= 1; b++) {
             // Partial sums of slot 0 stay zero.

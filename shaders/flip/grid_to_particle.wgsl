@@ -1,11 +1,13 @@
-// Particles take the grid's velocity and its change: v = α u + (1 − α)(v + Δu) (Zhu and Bridson 2005), or u and its
-// slope (APIC, Jiang et al. 2015). At the surface v is clamped to the range of the 18 faces about it, and by what
-// the fastest of them goes in the step over a cell beyond it, at most as fast as that one: the grid does not see how a particle differs
-// from the flow, and there no pressure of neighbours bounds such differences, which grow the more the smaller the step. Without that margin
-// a jet presses on a wall with more than its momentum. A cell's particles share its faces, which are read once. Weights are multiplied
-// by the faces' open fractions and normalized: the projection gives faces that are open by little several times their neighbours'
-// velocities.
-// Faces beyond the domain's along b and c have the values of those before them, so that water slides along walls.
+// Grid-to-particle transfer: v = α u + (1 − α)(v + Δu) (Zhu and Bridson 2005), or u and its
+// gradient (APIC, Jiang et al. 2015). At the surface v is clamped to the range of the 18 faces
+// around it, extended by a margin: the largest speed of these faces times its Courant number, at
+// most that speed. The grid does not see how a particle differs from the flow, and at the surface
+// no pressure of neighbours bounds such differences, which grow as the substep shrinks. Without the
+// margin a jet presses on a wall with more than its momentum. The particles of a cell share its
+// faces, which are read once. Weights are multiplied by the faces' open fractions and normalized,
+// because the projection gives faces with a small open fraction several times their neighbours'
+// velocities. Beyond the domain along b and c, faces have the values of those inside, so that water
+// slides along walls.
 #import "shared/thread.wgsl"
 #import "shared/vector.wgsl"
 #import "shared/flip_params.wgsl"
@@ -17,7 +19,7 @@
 @group(0) @binding(2) var<storage, read> cell_start: array<u32>;
 @group(0) @binding(3) var<storage, read> sorted_position: array<Vector>;
 @group(0) @binding(4) var<storage, read> face_velocity: array<f32>;
-// Three floats a particle, as `sorted_velocity`, `carried` and `pushed` have.
+// Three floats per particle, as in `sorted_velocity`, `carried` and `pushed`.
 @group(0) @binding(5) var<storage, read_write> velocity: array<f32>;
 #ifdef SOLIDS
 @group(0) @binding(15) var<storage, read> face_open: array<f32>;
@@ -30,7 +32,7 @@
 #endif
 @group(0) @binding(12) var<storage, read> cell_kind: array<u32>;
 @group(0) @binding(10) var<storage, read_write> carried: array<f32>;
-// 1 where it is a drop, far from all water that has a pressure.
+// 1 if the particle is an isolated droplet, far from all water with a pressure.
 @group(0) @binding(14) var<storage, read_write> is_drop: array<u32>;
 #ifdef PUSHED
 @group(0) @binding(13) var<storage, read_write> pushed: array<f32>;
@@ -66,7 +68,7 @@ fn displacements(faces: vec3u) -> vec3f {
 #endif
 
 #ifdef SOLIDS
-// What counts of each: closed ones have the velocity of what closes them.
+// Weight of each face; closed faces count fully, with the velocity of the wall or solid.
 fn parts(faces: vec3u) -> vec3f {
     let open = vec3f(face_open[faces.x], face_open[faces.y], face_open[faces.z]);
     return select(open, vec3f(1.0), open <= vec3f(0.0));
@@ -80,7 +82,7 @@ fn sum_of(a: mat3x3f) -> f32 {
     return dot(a[0] + a[1] + a[2], vec3f(1.0));
 }
 
-// Each by its part, and the mean of all by the rest.
+// Each value times its weight, plus the mean of all times the rest.
 fn settled(values: Values, part: Values) -> Values {
     let all = weighed(values, part);
     let mean = (sum_of(all.lower) + sum_of(all.upper)) / max(sum_of(part.lower) + sum_of(part.upper), 1e-6);
@@ -94,7 +96,7 @@ fn weighed(values: Values, part: Values) -> Values {
 
 #endif
 #ifndef APIC
-// Above any velocity, m/s.
+// Exceeds any velocity, m/s.
 const FAR = 1e30;
 
 fn least(values: Values) -> f32 {
@@ -105,16 +107,16 @@ fn least(values: Values) -> f32 {
 }
 
 #endif
-// What the faces of one component hold.
+// Values at the faces of one component.
 struct Component {
     speeds: Values,
 #ifdef SOLIDS
-    // Where solids leave faces open in part, what counts of each; the values are multiplied by it.
+    // Weight of each face where solids leave faces partly open; the values are multiplied by it.
     part: Values,
 #endif
 #ifndef APIC
     change: Values,
-    // Least and greatest velocity of the faces.
+    // Smallest and largest velocity of the faces.
     range: vec2f,
 #endif
 #ifdef CORRECTION
@@ -125,11 +127,11 @@ struct Component {
 const AIR = 0u;
 const FLUID = 1u;
 
-// What the 27 cells about one are, as far as the domain goes.
+// Kinds of the 27 cells around a cell, as far as the domain reaches.
 struct About {
-    // None is water.
+    // None of them is water.
     is_dry: bool,
-    // One is air.
+    // At least one is air.
     is_surface: bool,
 }
 
@@ -145,7 +147,7 @@ fn look_about(to_before: vec3i, to_after: vec3i) -> About {
     return About(water == 0u, air > 0u);
 }
 
-// Steps along b and c to the cells before and after; none where the domain ends.
+// Steps along b and c to the cells before and after; 0 where the domain ends.
 struct Steps {
     a: vec3i,
     b_before: vec3i,
@@ -219,7 +221,8 @@ fn center_hats(f: f32) -> vec3f {
 }
 
 #ifdef APIC
-// Of the interpolation where it is `u`, times what its weights add up to; along the axis whose weights are slopes.
+// Derivative of the normalized interpolation with value `u`, times the sum of its weights, along
+// the axis whose weights are slopes.
 fn slope_of(faces: Component, u: f32, a: vec2f, b: vec3f, c: vec3f) -> f32 {
 #ifdef SOLIDS
     return value_at(faces.speeds, a, b, c) - u * value_at(faces.part, a, b, c);
@@ -229,8 +232,9 @@ fn slope_of(faces: Component, u: f32, a: vec2f, b: vec3f, c: vec3f) -> f32 {
 }
 #endif
 
-// `f` is the place in the cell, along a, b and c. A drop falls freely: about it nothing is projected, and closed faces, which
-// have the wall's velocity, would stop it a cell away from the wall, or hold it under a ceiling.
+// `f` is the position in the cell, along a, b and c. An isolated droplet falls freely: around it
+// nothing is projected, and closed faces, which have the wall's velocity, would stop it a cell away
+// from the wall or hold it under a ceiling.
 fn give(i: u32, axis: u32, f: vec3f, faces: Component, falls: bool, beyond: f32) {
     let a = vec2f(1.0 - f.x, f.x);
     let b = center_hats(f.y);
@@ -246,7 +250,7 @@ fn give(i: u32, axis: u32, f: vec3f, faces: Component, falls: bool, beyond: f32)
     carried[k] = u;
 #ifdef APIC
     velocity[k] = u;
-    // Slopes of the hats, 1 over a cell.
+    // Derivatives of the hat functions, 1 per cell.
     let of_b = select(vec3f(0.0, -1.0, 1.0), vec3f(-1.0, 1.0, 0.0), f.y < 0.5);
     let of_c = select(vec3f(0.0, -1.0, 1.0), vec3f(-1.0, 1.0, 0.0), f.z < 0.5);
     let scale = params.inverse_cell_size * per_whole;
@@ -286,7 +290,7 @@ fn main(
     var of_z: Component;
     var corner = vec3f(0.0);
     var about: About;
-    // Entered only by cells with particles.
+    // Only cells with particles enter the loop.
     for (var once = 0; once < select(0, 1, end > first); once++) {
         open_neighborhood(element);
         let cell = own_cell(element);

@@ -1,5 +1,6 @@
-// What entered where water was already makes room for itself: the projection lets as much flow out of such cells as they hold too
-// much, until the frame's end. So water that enters pushes what stands before it, also where no surface is near.
+// Makes room for water that enters where water already is: the projection lets the excess of such
+// cells flow out by the end of the frame. So entering water pushes the water in front of it, even
+// where no surface is near.
 #import "shared/thread.wgsl"
 #import "shared/flip_params.wgsl"
 #import "shared/flip_cell.wgsl"
@@ -18,7 +19,8 @@
 
 const FLUID = 1u;
 
-// Of a cell's room: twice the water is as much as a flow brings into one that is full.
+// Largest excess, in units of the cell's open volume: a flow into a full cell at most doubles its
+// water.
 const MOST_OVER = 1.0;
 
 @compute @workgroup_size(64)
@@ -46,7 +48,7 @@ fn main(
     let over = clamp(density[element] - 1.0, 0.0, MOST_OVER);
     solid_flux[element] -= over * volume * params.cell_size * rate;
 #ifdef CORRECTION
-    // The density correction would move it at once, and leave it standing.
+    // The density correction would move the excess at once, without giving it a velocity.
     density_excess[element] = min(density_excess[element], 0.0);
 #endif
 }

@@ -1,6 +1,7 @@
-// Particles that have come nearer to each other, or to a wall, than water at rest has them are moved apart: half of what each
-// pair lacks, shared between the two (the weak springs of Ando and Tsuruno 2011, without their velocity). The density
-// correction knows cells alone: within one, particles may gather at the surface, at walls, or on one spot.
+// Moves particles apart that are closer to each other, or to a wall, than in water at rest: by half
+// of what each pair lacks, shared between the two (the weak springs of Ando and Tsuruno 2011,
+// without their velocity). The density correction only sees cells: within one, particles may gather
+// at the surface, at walls, or in one point.
 #import "shared/thread.wgsl"
 #import "shared/vector.wgsl"
 #import "shared/flip_slots.wgsl"
@@ -16,12 +17,12 @@
 @group(0) @binding(7) var<storage, read> place: array<u32>;
 #endif
 
-// Of what a pair lacks, for each of the two.
+// Fraction of the missing distance that each of a pair moves.
 const SHARE = 0.25;
-// Of the distance that is kept, at most so much in a substep.
+// Largest displacement in a substep, as a fraction of the target distance.
 const MOST = 0.25;
 
-// From j to x, or to its image that is nearer.
+// From j to x, or to its nearest periodic image.
 fn way_from(j: u32, x: vec3f) -> vec3f {
     let way = x - three(sorted_position[j]);
 #ifdef PERIODIC
@@ -46,16 +47,17 @@ fn main(
     let p = clamp(x * params.inverse_cell_size, vec3f(0.0), vec3f(params.cells));
     let cell = vec3i(cell_of_place(p));
     find_slots(cell);
-    // The distance is below half a cell: whoever is nearer lies in one of eight.
+    // The target distance is below half a cell: closer particles lie in one of eight cells.
     let side = select(vec3i(1), vec3i(-1), p - vec3f(cell) < vec3f(0.5));
     let own = sorted_id[i];
     let apart = params.apart;
     let of_walls = params.apart_from_walls;
-    // As the walls stand where the particles do, at the substep's start: pushed off where they will be, water beside a wall that comes
-    // left a gap before it.
+    // Uses the walls at the substep's start, when the particles are at these positions. With the
+    // walls at its end, water in front of an approaching wall left a gap.
     var push = max(of_walls - 2.0 * (x - params.cut_min * params.cell_size), vec3f(0.0))
         - max(of_walls - 2.0 * (params.cut_max * params.cell_size - x), vec3f(0.0));
-    // A drop lies at a wall as near as it may: lifted off it, it would fall again in each step.
+    // An isolated droplet may rest as close to a wall as it can: if pushed off, it would fall again
+    // in each step.
     push = select(push, vec3f(0.0), is_drop[i] > 0u);
 #ifdef PERIODIC
     push = select(push, vec3f(0.0), is_periodic());
@@ -69,7 +71,8 @@ fn main(
         let is_wet = element >= CELLS && element < params.wet_cells + CELLS;
         let end = select(0u, cell_start[element + 1u], is_wet);
         for (var base = select(0u, cell_start[element], is_wet); base < end; base += 32u) {
-            // Found first, as bits: llvmpipe runs what a branch holds for every candidate.
+            // First finds candidates as bits: llvmpipe runs the body of a branch for every
+            // candidate.
             let stop = min(base + 32u, end);
             var found = 0u;
             var bit = 1u;

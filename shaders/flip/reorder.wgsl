@@ -1,4 +1,4 @@
-// Re-lays particles in the order of their cells (Hoetzlein 2014).
+// Copies particles into the order of their cells (Hoetzlein 2014).
 #import "shared/thread.wgsl"
 #import "shared/vector.wgsl"
 #import "shared/flip_params.wgsl"

@@ -1,7 +1,9 @@
-// What the particles of each cell give to the density at the 3 x 3 x 3 cell centres about it, in particles. Where a density
-// correction goes by it, the water goes on behind a wall as its mirror image: hats that a wall cuts see less of particles
-// that keep off it, and the correction would thin the water. PBF's projection has none: it only asks which cells are water,
-// and with images a film of one particle on the floor would be, which flies up where it runs into a house.
+// Contributions of each cell's particles to the density at the 3 x 3 x 3 cell centres around it, in
+// particles. For a density correction, water continues behind a wall as its mirror image: a hat
+// function cut by a wall sees fewer of the particles that keep off the wall, and the correction
+// would thin the water. PBF's projection does not mirror: it only needs to know which cells are
+// water, and with images a film of one particle on the floor would count, which splashes up where
+// it runs into an obstacle.
 #import "shared/thread.wgsl"
 #import "shared/vector.wgsl"
 #import "shared/bricks.wgsl"
@@ -11,8 +13,8 @@
 @group(0) @binding(1) var<storage, read> bricks: array<Brick>;
 @group(0) @binding(2) var<storage, read> cell_start: array<u32>;
 @group(0) @binding(3) var<storage, read> sorted_position: array<Vector>;
-// For the nine centres in the layer before the cell, in its own, and in the one after it: the faces have been given what they were
-// to get, and the room for it is free.
+// Sums for the nine centres in the layer before the cell, in its own layer, and in the layer after
+// it. The arrays are free again, since the faces have been gathered.
 @group(0) @binding(4) var<storage, read_write> weight_before: array<f32>;
 @group(0) @binding(5) var<storage, read_write> weight_after: array<f32>;
 @group(0) @binding(6) var<storage, read_write> momentum_before: array<f32>;
@@ -31,7 +33,8 @@ fn hat(t: vec3f) -> vec3f {
     return max(1.0 - abs(t), vec3f(0.0));
 }
 
-// Hats as center_weights has them, with the place's images in the walls at `low` and `high` where a centre lies in the open.
+// Hat functions as in center_weights, plus those of the position's mirror images at the walls `low`
+// and `high` if a centre lies inside the box.
 fn mirrored_weights(f: f32, low: f32, high: f32) -> vec3f {
     let centers = vec3f(-0.5, 0.5, 1.5);
     let images = hat(2.0 * low - f - centers) + hat(2.0 * high - f - centers);

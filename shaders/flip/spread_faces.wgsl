@@ -1,5 +1,6 @@
-// Particle-to-grid, first half: what the particles of each cell give to the 2 x 3 x 3 faces about it. Every particle
-// is read once; flip/gather_faces adds up what a face was given (Zhu and Bridson 2005; APIC: Jiang et al. 2015).
+// Particle-to-grid transfer, first half: contributions of each cell's particles to the 2 x 3 x 3
+// faces around it. Every particle is read once; flip/gather_faces sums up the contributions of a
+// face (Zhu and Bridson 2005; APIC: Jiang et al. 2015).
 #import "shared/thread.wgsl"
 #import "shared/vector.wgsl"
 #import "shared/bricks.wgsl"
@@ -9,9 +10,9 @@
 @group(0) @binding(1) var<storage, read> bricks: array<Brick>;
 @group(0) @binding(2) var<storage, read> cell_start: array<u32>;
 @group(0) @binding(3) var<storage, read> sorted_position: array<Vector>;
-// Three floats a particle.
+// Three floats per particle.
 @group(0) @binding(4) var<storage, read> sorted_velocity: array<f32>;
-// For the nine faces before the cell, and for those after it.
+// Sums for the nine faces before the cell, and for those after it.
 @group(0) @binding(5) var<storage, read_write> momentum_before: array<f32>;
 @group(0) @binding(10) var<storage, read_write> momentum_after: array<f32>;
 @group(0) @binding(6) var<storage, read_write> weight_before: array<f32>;

@@ -1,5 +1,5 @@
-// What the host needs to choose a step and lay out bricks: which bricks hold water, the largest speed, and whether
-// anything is not finite. Bits of floats that are not negative order as the floats do.
+// Data from which the host chooses a step and lays out bricks: which bricks hold water, the largest
+// speed, and whether a value is non-finite. Non-negative floats sort like their bit patterns.
 #import "shared/thread.wgsl"
 #import "shared/vector.wgsl"
 #import "shared/finite.wgsl"
@@ -8,9 +8,9 @@
 @group(0) @binding(1) var<storage, read> position: array<Vector>;
 @group(0) @binding(2) var<storage, read> velocity: array<Vector>;
 
-// `SurveyHead` of solve/params.rs.
+// Mirrored by `SurveyHead` of solve/params.rs.
 struct SurveyHead {
-    // Bits of the largest speed squared.
+    // Bits of the largest squared speed.
     speed_square: atomic<u32>,
     not_finite: atomic<u32>,
     padding: vec2u,
@@ -18,12 +18,13 @@ struct SurveyHead {
 
 struct Survey {
     head: SurveyHead,
-    // A flag a brick.
+    // One flag per brick.
     is_wet: array<atomic<u32>>,
 }
 @group(0) @binding(3) var<storage, read_write> survey: Survey;
 
-// Particles of a thread: one atomic for so many, and in sorted order few bricks.
+// Particles per thread: this reduces the number of atomics, and in sorted order these particles lie
+// in few bricks.
 const RUN = 16u;
 
 @compute @workgroup_size(64)

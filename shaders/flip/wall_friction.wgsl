@@ -1,25 +1,27 @@
-// No-slip walls, below what the grid resolves: water within a cell of one is slowed along it by the shear stress ρ (κ u)²
-// of Prandtl's mixing length κ y with the mean slope u / y between the wall, where water stands still, and a face at y.
-// The speed u is that of the particles, and what is slowed is divided, so that a substep of any length ends between what
-// there was and rest. Walls move along their normals alone: along themselves they rest.
+// No-slip walls below the grid's resolution: slows water within a cell of such a wall along it, by
+// the shear stress ρ (κ u)² of Prandtl's mixing length κ y with the mean gradient u / y between the
+// wall, where water is at rest, and a face at distance y. The speed u is that of the particles. The
+// update divides the velocity, so that a substep of any length ends between the initial velocity
+// and rest. Walls only move along their normals: tangentially they are at rest.
 #import "shared/thread.wgsl"
 #import "shared/flip_params.wgsl"
 #import "shared/flip_neighborhood.wgsl"
 #import "shared/unit.wgsl"
 
-// A bit a no-slip wall: of the least faces along x, y and z, then of the greatest.
+// Bit mask of no-slip walls: the minimum faces along x, y, z, then the maximum faces.
 override NO_SLIP: u32;
 
 @group(0) @binding(2) var<storage, read> face_open: array<f32>;
-// The particles' velocity.
+// Velocity transferred from the particles.
 @group(0) @binding(3) var<storage, read> face_change: array<f32>;
 @group(0) @binding(4) var<storage, read> face_layer: array<u32>;
 @group(0) @binding(5) var<storage, read_write> face_velocity: array<f32>;
 
 const VON_KARMAN = 0.41;
 
-// Part of the layer of one cell beside each no-slip wall that a row of faces stands for, by the rows' height in cells
-// along each axis: all of it where its cell is cut less than to a half, shared where two rows are as near.
+// Part of the layer of one cell beside each no-slip wall that a row of faces represents, from the
+// row's position in cells along each axis: all of it if less than half of its cell is cut off,
+// shared between two rows that are equally near.
 fn parts(place: vec3f) -> vec3f {
     let low = clamp(1.5 - (place - params.cut_min), vec3f(0.0), vec3f(1.0));
     let high = clamp(1.5 - (params.cut_max - place), vec3f(0.0), vec3f(1.0));
@@ -32,8 +34,8 @@ fn is_known(element: u32, component: u32) -> bool {
     return (face_layer[element] & (0x80u << (8u * component))) != 0u;
 }
 
-// The particles' velocity along `other` at the lower face along `own`: the mean of the four faces about it, of those that
-// particles gave one.
+// The particles' velocity along `other` at the lower face along `own`: the mean of those of the
+// four faces around it to which particles gave a velocity.
 fn velocity_across(own: u32, other: u32) -> f32 {
     var sum = 0.0;
     var count = 0.0;

@@ -1,4 +1,4 @@
-// Cell of each predicted position, and a slot in it.
+// Determines the cell of each predicted position, and a slot in that cell.
 #import "shared/thread.wgsl"
 #import "shared/vector.wgsl"
 #import "shared/pbf_params.wgsl"

@@ -1,4 +1,5 @@
-// Each workgroup's share of what moving walls did on the particles in a substep, added to that of the substeps before.
+// Adds each workgroup's share of the work by moving walls in a substep to the sum over earlier
+// substeps.
 #import "shared/thread.wgsl"
 #import "shared/pbf_params.wgsl"
 
@@ -16,7 +17,7 @@ fn main(
     let thread = thread_index(workgroup, workgroups, local, 64u);
     let is_inside = thread < params.particle_count;
     let i = select(0u, thread, is_inside);
-    // By corrections, and before the sort by the prediction.
+    // Work by corrections, in sorted order, plus work by the prediction, in storage order.
     terms[local] = select(0.0, wall_work[i] + wall_work[params.particle_count + i], is_inside);
     workgroupBarrier();
     if local == 0u && is_inside {

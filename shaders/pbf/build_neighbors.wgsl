@@ -1,6 +1,7 @@
-// Lists who is within h at the predicted positions, once a substep, and with words for places some who are a little farther,
-// whose kernels are 0 until they come near. A particle with more than a list holds keeps its true count, and every
-// pass then searches for it instead.
+// Lists the neighbours within h at the predicted positions, once per substep. With quantized
+// positions the list also holds a few slightly farther ones, whose kernels are 0 until they come
+// close. A particle with more neighbours than its list holds keeps the true count, and every pass
+// then searches its neighbours instead.
 #import "shared/thread.wgsl"
 #import "shared/predicted.wgsl"
 #import "shared/pbf_params.wgsl"
@@ -9,7 +10,7 @@
 #import "shared/counters.wgsl"
 #ifdef PLACES
 #import "shared/place.wgsl"
-// h, and what words leave unsure.
+// h in steps, plus the uncertainty of quantized positions.
 const REACH = STEPS + UNSURE;
 @group(0) @binding(11) var<storage, read> place: array<u32>;
 #endif
@@ -26,7 +27,7 @@ var<private> word: u32;
 var<private> four: vec4u;
 var<private> count: u32;
 
-// A word is written when it is full: stores are as dear as loads.
+// Writes a word when it is full: stores cost as much as loads.
 fn append(j: u32) {
     four = vec4u(j, four.xyz);
     count++;
@@ -75,7 +76,8 @@ fn main(
 #endif
             let end = cell_start[last];
 #ifdef PLACES
-            // Found first, as bits, and then listed: llvmpipe runs what a branch holds for every candidate.
+            // First finds candidates as bits and then appends them: llvmpipe runs the body of a
+            // branch for every candidate.
             for (var base = cell_start[first]; base < end; base += 32u) {
                 let stop = min(base + 32u, end);
                 var found = 0u;
@@ -108,7 +110,8 @@ fn main(
         }
     }
     if (count & 3u) != 0u && count < LIST_CAPACITY {
-        // The newest stands first; the rest of the word is nobody or repeats of a full word before.
+        // The newest neighbour comes first; the rest of the word is padding, or repeats neighbours
+        // of a full word before it.
         let held = count & 3u;
         neighbor_list[word] = select(vec4u(params.nobody), four, vec4u(0u, 1u, 2u, 3u) < vec4u(held));
     }

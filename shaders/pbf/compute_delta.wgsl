@@ -1,5 +1,5 @@
-// Δx_i = Σ_j (λ_i + λ_j + s_corr) ∇W / ρ0 (Macklin and Müller 2013, eq. 14), bounded: physical masses
-// with the formula verbatim blow up.
+// Position correction Δx_i = Σ_j (λ_i + λ_j + s_corr) ∇W / ρ0 (Macklin and Müller 2013, eq. 14),
+// bounded in length: the unbounded formula with physical masses is unstable.
 #import "shared/thread.wgsl"
 #import "shared/predicted.wgsl"
 #import "shared/vector.wgsl"
@@ -16,17 +16,17 @@
 #ifdef MOVING_SOLIDS
 @group(0) @binding(14) var<storage, read> sample_velocity: array<Vector>;
 
-// Σ over samples of the slope towards each times its velocity.
+// Sum over boundary samples: density gradient towards each, times its velocity.
 var<private> sample_rate: f32;
 #endif
 #endif
 
-// Read by others from the exchange on that follows.
+// Other particles do not read it before pbf/exchange.
 @group(0) @binding(10) var<storage, read_write> corrected: array<Vector>;
-// Of what is not finite, which clamping would hide.
+// Counts non-finite values, which clamping would hide.
 @group(0) @binding(11) var<storage, read_write> counters: Counters;
 #ifdef PRESSURE
-// Σ λ over the substep's corrections: the pressure that they stand for.
+// Σ λ over the substep's corrections, which is proportional to the pressure.
 @group(0) @binding(12) var<storage, read_write> lambda_sum: array<f32>;
 #endif
 #ifdef ARTIFICIAL_PRESSURE
@@ -37,8 +37,8 @@ const REFERENCE_KERNEL = 0.884736;
 var<private> own_position: vec3f;
 var<private> own_lambda: f32;
 var<private> delta: vec3f;
-// A neighbour on the same spot, or i itself: llvmpipe runs both sides of a branch, so the hash waits until
-// after the loop.
+// A neighbour at the same position, or i itself if there is none. The hash is evaluated after the
+// loop, because llvmpipe runs both sides of a branch.
 var<private> coincident: u32;
 #ifdef ARTIFICIAL_PRESSURE
 var<private> artificial_pressure: f32;
@@ -118,12 +118,12 @@ fn main(
 #endif
     delta = bounded(delta);
 #ifdef CHEBYSHEV
-    // Wang 2015, eq. 9. What is overwritten here is this particle's position of one iteration before.
+    // Wang 2015, eq. 9. `corrected` still holds this particle's position of one iteration before.
     let last = own_position - three(corrected[i]);
     if dot(delta, last) > 0.0 {
         delta = bounded(phase.acceleration * delta + (phase.acceleration - 1.0) * last);
 #ifdef WALL_WORK
-        // As if the walls' part of the last step had been that of this one.
+        // Assumes that the walls' share of the last step was that of this one.
         work *= 2.0 * phase.acceleration - 1.0;
 #endif
     }

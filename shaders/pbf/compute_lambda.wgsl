@@ -1,5 +1,5 @@
 // λ_i = −max(C_i, 0) / (Σ_k |∇_k C_i|² + ε) (Macklin and Müller 2013, eq. 11). Only compression is
-// corrected: pulling a free surface together makes the water clump.
+// corrected: correcting a density deficit at the free surface makes particles clump.
 #import "shared/thread.wgsl"
 #import "shared/predicted_written.wgsl"
 #import "shared/pbf_params.wgsl"
@@ -11,7 +11,8 @@
 @group(0) @binding(11) var<storage, read_write> density: array<f32>;
 #endif
 
-// λ goes into w. Others read this particle's w meanwhile, but only its sign, which λ ≤ 0 does not change.
+// Stores λ in w. Other threads may read this w meanwhile, but only its sign, which λ ≤ 0 does not
+// change.
 fn set_lambda(i: u32, lambda: f32) {
 #ifdef PAGED
     if i < PAGE {
@@ -41,7 +42,7 @@ fn visit(i: u32, j: u32) {
     let slope = mass * s * s;
     gradient_sum += d * (slope * inverse_r);
 #ifdef SOLIDS
-    // A solid's samples do not move: they have no gradient of their own.
+    // Boundary samples are not moved by corrections: they contribute no gradient of their own.
     gradient_squares += select(slope * slope, 0.0, other.w > 0.0);
 #else
     gradient_squares += slope * slope;

@@ -1,4 +1,5 @@
-// Ends the iteration once the mean density error is small enough, by emptying the dispatches to come.
+// Ends the iteration once the mean density error is small enough, by setting the sizes of the
+// remaining dispatches to zero.
 #import "shared/pbf_params.wgsl"
 #import "shared/counters.wgsl"
 #import "shared/iteration_control.wgsl"

@@ -1,5 +1,5 @@
-// Takes over what was corrected: every correction of a dispatch reads the places from before all of them. The Chebyshev
-// semi-iteration asks for the places before as well.
+// Takes over the corrected positions: all corrections of a dispatch read the positions from before
+// it. For the Chebyshev semi-iteration it also keeps the previous positions.
 #import "shared/thread.wgsl"
 #import "shared/predicted_written.wgsl"
 #import "shared/vector.wgsl"

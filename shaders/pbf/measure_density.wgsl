@@ -1,5 +1,5 @@
-// Relative density at the positions as they were just sorted, by a full search: the number that the
-// frame's report states, free of what the lists may have missed.
+// Relative density at the sorted positions by a full search: the figure of the frame's report,
+// which does not depend on neighbour lists.
 #import "shared/thread.wgsl"
 #import "shared/predicted.wgsl"
 #import "shared/pbf_params.wgsl"

@@ -1,6 +1,6 @@
-// Explicit step of the external forces (Macklin and Müller 2013, algorithm 1, lines 1–4), into
-// `corrected`; the sort takes it to `predicted`. What walls and solids take of the way is taken
-// from the velocity.
+// Explicit step of the external forces (Macklin and Müller 2013, algorithm 1, lines 1–4) into
+// `corrected`; the sort copies it to `predicted`. What walls and solids remove from the
+// displacement is also removed from the velocity.
 #import "shared/thread.wgsl"
 #import "shared/vector.wgsl"
 #import "shared/counters.wgsl"
@@ -14,14 +14,14 @@
 @group(0) @binding(1) var<storage, read_write> corrected: array<Vector>;
 @group(0) @binding(10) var<storage, read> position: array<Vector>;
 @group(0) @binding(11) var<storage, read_write> velocity: array<Vector>;
-// Of what is not finite, which clamping would hide.
+// Counts non-finite values, which clamping would hide.
 @group(0) @binding(12) var<storage, read_write> counters: Counters;
 #ifdef PROJECTED
 @group(0) @binding(14) var<storage, read> is_drop: array<u32>;
 #endif
 
 #ifdef PROJECTED
-// After confine(free).
+// Removes the part of v against the pushes of walls and solids; call it after confine(free).
 fn stopped(v: vec3f, free: vec3f) -> vec3f {
     var left = v;
     var y = free;
@@ -69,7 +69,8 @@ fn main(
 #endif
     let taken = (x - free) * params.inverse_time_step;
 #ifdef PROJECTED
-    // The grid's flow took water here, not its own velocity, which loses what it has into walls and solids and no more.
+    // Water was moved here by the grid's flow, not by its own velocity. The velocity therefore only
+    // loses its component into walls and solids.
     velocity[thread] = packed(select(stopped(v, free), v + taken, is_drop[thread] > 0u));
 #else
     velocity[thread] = packed(v + taken);

@@ -1,4 +1,4 @@
-// Re-lays what the iteration reads in sorted order (Hoetzlein 2014).
+// Copies the data that the iteration reads into sorted order (Hoetzlein 2014).
 #import "shared/thread.wgsl"
 #import "shared/predicted_written.wgsl"
 #import "shared/vector.wgsl"

@@ -1,4 +1,4 @@
-// Sums max(0, ρ/ρ0 − 1) of 256 particles a workgroup, in a fixed order.
+// Sums max(0, ρ/ρ0 − 1) over the 256 particles of a workgroup, in a fixed order.
 #import "shared/thread.wgsl"
 #import "shared/pbf_params.wgsl"
 

@@ -1,6 +1,7 @@
-// v += (x* − x*_0) / Δt, x*_0 the prediction before any correction: v = (x* − x) / Δt (Macklin and Müller 2013,
-// algorithm 1, lines 20–23) without its cancellation, which costs a free particle at 90 m 0.4 mm/s a step in
-// f32. A particle faster than the cap is slowed and counted, and its position follows.
+// v += (x* − x*_0) / Δt, where x*_0 is the prediction before any correction. This is v = (x* − x) /
+// Δt (Macklin and Müller 2013, algorithm 1, lines 20–23) without its cancellation, which in f32
+// costs a free particle at 90 m 0.4 mm/s per step. A particle faster than the cap is slowed and
+// counted, and its position follows.
 #import "shared/thread.wgsl"
 #ifdef NEIGHBOR_EFFECTS
 #import "shared/predicted_written.wgsl"
@@ -36,8 +37,9 @@ fn main(
     var x = predicted_at(thread).xyz;
     var v = (x - three(start_position[thread])) * params.inverse_time_step;
 #ifdef PROJECTED
-    // Water goes with the grid's flow and not with its own velocity: what it is corrected by in each step would add up
-    // in a velocity that never moves it. Drops fly with theirs.
+    // Water moves with the grid's flow and not with its own velocity: the corrections of each step
+    // would accumulate in a velocity that never moves it. Isolated droplets move with their own
+    // velocity.
     v *= f32(sorted_is_drop[thread]);
     is_drop[thread] = sorted_is_drop[thread];
 #endif
@@ -54,7 +56,7 @@ fn main(
 #endif
     position[thread] = packed(x);
 #ifdef NEIGHBOR_EFFECTS
-    // What they read neighbours' places from.
+    // Effects read neighbours' positions from here.
     set_predicted(thread, vec4f(x, 0.0));
 #endif
     velocity[thread] = packed(v);
