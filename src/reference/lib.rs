@@ -1,7 +1,8 @@
-//! The solvers once more, in f64 on the CPU: what the GPU's results are measured against.
+//! Reference implementation of the solvers: f64 on the CPU, which GPU results are compared with.
 //!
-//! Plain where the GPU is clever: no lists of fixed capacity, no colours in memory, no f32. Each
-//! function that carries the name of a GPU pass is its twin: the same inputs, the same outputs.
+//! It favours simplicity over speed: no neighbour lists of fixed capacity, no colour ordering in
+//! memory, no f32. A function with the name of a GPU pass is its reference pass: it has the same
+//! inputs and the same outputs.
 
 pub mod flip;
 mod hash;
@@ -15,35 +16,35 @@ use std::{collections::BTreeMap, time::Instant};
 
 use swell_domain::{budget::Breach, solver::PassTime};
 
-/// What stops the reference.
+/// Error that ends a reference solve.
 #[derive(Debug, thiserror::Error)]
 pub enum ReferenceError {
-    /// The numbers failed; the state before this frame stands.
+    /// A numerical budget was exceeded; the state from before this frame is kept.
     #[error(transparent)]
     Numbers(#[from] Breach),
-    /// A sparse factor could not be made.
+    /// The sparse Cholesky factorisation failed.
     #[error("the sparse Cholesky factor: {0}")]
     Factor(String),
-    /// Newton's steps did not come to their end.
+    /// The Newton iteration did not converge.
     #[error(
         "{steps} linear solves leave a compression of {error:.3e}, and {tolerance:.1e} was asked"
     )]
     NotConverged {
-        /// Linear solves.
+        /// Linear solves done.
         steps: usize,
-        /// max(0, C) that is left.
+        /// Remaining compression max(0, C).
         error: f64,
-        /// What was asked.
+        /// Requested bound on the compression.
         tolerance: f64,
     },
 }
 
-/// Wall clock by pass.
+/// Wall-clock time by pass.
 #[derive(Clone, Debug, Default)]
 pub struct Timings(BTreeMap<&'static str, (f64, u64)>);
 
 impl Timings {
-    /// Does a pass's work.
+    /// Runs `work` and adds its time to that of `pass`.
     pub fn time<T>(&mut self, pass: &'static str, work: impl FnOnce() -> T) -> T {
         let begin = Instant::now();
         let result = work();
@@ -53,7 +54,7 @@ impl Timings {
         result
     }
 
-    /// By pass.
+    /// Returns the time and the number of runs of each pass, sorted by name.
     pub fn rows(&self) -> Vec<PassTime> {
         let rows = self.0.iter();
         rows.map(|(&pass, &(seconds, runs))| PassTime::new(pass, seconds, runs, 0, None))

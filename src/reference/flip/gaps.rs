@@ -1,4 +1,4 @@
-//! Twin of the pass that closes gaps (flip/close_gaps).
+//! Reference pass of flip/close_gaps.
 
 use swell_domain::{
     bricks::{Bricks, CELLS},
@@ -11,64 +11,67 @@ use super::{
     water::open_parts,
 };
 
-/// Cells of a gap, at most.
+/// Most cells of a gap.
 const MOST_GAP: i32 = 4;
 
-/// A gap closes where its ends meet by more than this part of it.
+/// A gap closes if its ends approach by more than this fraction of it.
 const CLOSES: f64 = 0.75;
 
-/// And by more than this part of a cell: what is less the density correction takes away.
+/// They must also approach by more than this fraction of a cell: the density correction handles
+/// less.
 const LEAST_CLOSING: f64 = 0.25;
 
-/// A face that is open by less ends a gap: it would have to let through all that the gap takes.
+/// A face with a smaller open fraction ends a gap: all the water that fills the gap would have to
+/// pass it.
 const LEAST_WAY: f64 = 0.5;
 
-/// Where a gap ends.
+/// End of a gap.
 #[derive(Clone, Copy, Debug, Default)]
 struct End {
-    /// Whether it is water, or a face that is closed.
+    /// Whether the end is water, rather than a closed face.
     is_water: bool,
-    /// m/s, along the axis.
+    /// Velocity along the axis, m/s.
     velocity: f64,
-    /// Cells of air up to the end.
+    /// Number of air cells up to the end.
     cells: i32,
-    /// What all cells up to the end lack, in cells.
+    /// Missing water in all cells up to the end, in cells.
     gap: f64,
-    /// Of that, what water beside the cell lacks.
+    /// The part of `gap` that water beside the cell lacks, in cells.
     beside: f64,
 }
 
-/// What is known where gaps are looked for.
+/// Inputs of the search for closing gaps.
 pub struct Gaps<'a> {
-    /// The scheme.
+    /// Scene and grid.
     pub model: &'a Model,
-    /// The substep.
+    /// Parameters of the substep.
     pub step: &'a Step<'a>,
-    /// Where the elements are.
+    /// Layout of the elements.
     pub bricks: &'a Bricks,
-    /// With kinds from [`super::find_water`].
+    /// Open space, with cell kinds from [`super::find_water`].
     pub room: &'a Room,
-    /// From [`super::gather_centers`].
+    /// Relative densities from [`super::gather_centers`].
     pub density: &'a [f64],
-    /// Of the lower faces, with gravity, m/s. Shape (elements, 3 components).
+    /// Velocities at the lower faces, including gravity, m/s. Shape (elements, 3 components).
     pub velocity: &'a [glam::DVec3],
 }
 
 impl Gaps<'_> {
-    /// What a cell lacks along an axis, in cells.
+    /// Returns the length along an axis that a cell lacks, in cells.
     fn lack(&self, element: u32, axis: usize) -> f64 {
         let parts = open_parts(self.step, self.bricks, self.room, element);
         let room = (parts[axis] * parts[3]).min(1.0);
         room * (1.0 - self.density[element as usize]).clamp(0.0, 1.0)
     }
 
-    /// What walls leave of a cell's faces across an axis.
+    /// Returns the area of a cell's faces across an axis that walls leave open.
     fn across(&self, element: u32, axis: usize) -> f64 {
         let extent = self.step.open_extent(corner(self.bricks, element));
         extent[(axis + 1) % 3] * extent[(axis + 2) % 3]
     }
 
-    /// The end of a gap on one side of a cell, none where it is too far; `lean` moves what is decided.
+    /// Returns the end of a gap on one side of a cell, if it is close enough. `lean` shifts the
+    /// threshold for closed faces.
     fn end(&self, element: u32, axis: usize, side: i32, lean: f64) -> Option<End> {
         let mut end = End::default();
         for k in 0..MOST_GAP {
@@ -78,7 +81,7 @@ impl Gaps<'_> {
             let open = self.room.open[face][axis];
             let least = (LEAST_WAY + lean) * self.across(here, axis);
             if (side < 0 || there >= CELLS) && open < least {
-                // Of a face that is closed in part the velocity is the water's.
+                // On a partly closed face the velocity is that of the water.
                 let moves = !self.model.scene.moving_solids.is_empty();
                 end.velocity = match open > 0.0 {
                     true if moves => self.room.closed_velocity[face][axis],
@@ -103,8 +106,9 @@ impl Gaps<'_> {
         None
     }
 
-    /// What of a cell is filled in the substep because the ends of a gap meet, in cells, times the area across; none where none
-    /// do. `lean` moves what is decided, so that what is decided by rounding is known.
+    /// Returns the volume of a cell that fills in the substep because the ends of a gap meet, in
+    /// cells: the missing length times the area across; `None` if no gap closes. `lean` shifts the
+    /// thresholds, to find decisions that rounding may change.
     pub fn filled(&self, element: u32, lean: f64) -> Option<f64> {
         let is_looked_at = self.room.kind[element as usize] == AIR;
         let is_wet = element < CELLS * (self.bricks.wet + 1);
@@ -130,7 +134,8 @@ impl Gaps<'_> {
     }
 }
 
-/// Makes the cells of gaps that close water: kinds and fluxes of the room, and distances of the surface, metres.
+/// Turns the cells of closing gaps into water: returns the updated kinds and fluxes, and updates
+/// the distances to the surface, metres.
 pub fn close_gaps(gaps: &Gaps<'_>, distance: &mut [f64]) -> Room {
     let filled = per_cell(gaps.bricks, |element| gaps.filled(element, 0.0));
     let size = gaps.model.cell_size();

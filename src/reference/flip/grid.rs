@@ -5,7 +5,8 @@ use rayon::prelude::*;
 
 use swell_domain::bricks::{Bricks, CELLS};
 
-/// One value a cell of every active brick, in the order of the elements; zero in slot 0.
+/// Evaluates a function on the cells of all active bricks, in the order of the elements; slot 0 is
+/// zero.
 pub(super) fn per_cell<T: Clone + Default + Send>(
     bricks: &Bricks,
     value: impl Fn(u32) -> T + Sync,
@@ -23,24 +24,25 @@ pub(super) fn per_cell<T: Clone + Default + Send>(
     values
 }
 
-/// Least corner of an element's cell, in cells.
+/// Returns the minimum corner of an element's cell, in cells.
 pub(super) fn corner(bricks: &Bricks, element: u32) -> DVec3 {
     DVec3::from_array(bricks.cell(element).map(f64::from))
 }
 
-/// Values at lower faces, one vector a cell, as three planes one after the other: as the GPU has them.
+/// Converts values at lower faces, one vector per cell, to three planes in sequence, the layout of
+/// the GPU.
 pub fn planes(faces: &[DVec3]) -> Vec<f64> {
     (0..3)
         .flat_map(|axis| faces.iter().map(move |face| face[axis]))
         .collect()
 }
 
-/// The 27 steps to a cell and its neighbours, x fastest.
+/// Iterates over the 27 offsets to a cell and its neighbours, x fastest.
 pub(super) fn neighborhood() -> impl Iterator<Item = [i32; 3]> {
     (0..27).map(|k| [k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1])
 }
 
-/// One cell on along an axis, `step` times.
+/// Returns the offset of `step` cells along an axis.
 pub(super) fn along(axis: usize, step: i32) -> [i32; 3] {
     std::array::from_fn(|k| if k == axis { step } else { 0 })
 }

@@ -1,9 +1,9 @@
 //! PIC/FLIP (Zhu and Bridson 2005) and APIC (Jiang et al. 2015), the same model as on the GPU.
 //!
-//! Positions are relative to the domain's least corner, in metres; grids are laid out on the same bricks as the GPU's,
-//! so that arrays compare element by element, faces as one vector a cell (see [`planes`]). A function under a GPU
-//! pass's name is its twin; where the GPU splits a pass for speed, one twin does both halves. [`Flip`] runs whole
-//! frames.
+//! Positions are relative to the domain's minimum corner, in metres. Grids use the same bricks as
+//! on the GPU, so that arrays compare element by element; faces are stored as one vector per cell
+//! (see [`planes`]). A function with the name of a GPU pass is its reference pass; where the GPU
+//! splits a pass for speed, one function covers both halves. [`Flip`] runs whole frames.
 
 pub mod effects;
 mod gaps;

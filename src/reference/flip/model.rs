@@ -1,4 +1,4 @@
-//! What stays the same over a bake, and what a substep knows.
+//! Data that does not change during a bake, and parameters of a substep.
 
 use glam::{BVec3, DVec3};
 
@@ -21,48 +21,49 @@ use swell_scene::{
     step::Substep,
 };
 
-/// The scene, its grid and its solids; positions are relative to the domain's least corner.
+/// The scene, its grid and its solids; positions are relative to the domain's minimum corner.
 #[derive(Clone, Debug)]
 pub struct Model {
-    /// As given.
+    /// The scene.
     pub scene: Scene,
-    /// Cells that the domain takes along each axis; one more is stored, for its upper faces.
+    /// Cells of the domain along each axis; storage has one more for the upper faces.
     pub cells: [u32; 3],
-    /// Distances to solids at the start: to those at rest, if there are any, as one; then to each that moves.
+    /// Signed distances of solids in their initial pose: all static solids as one grid, if there
+    /// are any, then each moving solid.
     pub(super) solids: Vec<SignedDistance>,
-    /// Where they cut cells.
+    /// Finds bricks near solids that count as water.
     shores: Shores,
-    /// How many of them are at rest.
+    /// Number of grids for static solids, 0 or 1.
     at_rest: usize,
 }
 
-/// One substep.
+/// Parameters of one substep.
 #[derive(Clone, Debug)]
 pub struct Step<'a> {
-    /// When it begins, seconds into the shot.
+    /// Start of the substep, seconds into the shot.
     pub start: f64,
-    /// Δt, seconds.
+    /// Length Δt, seconds.
     pub length: f64,
     /// See [`Substep::kick`], seconds.
     pub kick: f64,
     /// Gravity times `kick`, m/s.
     pub velocity_step: DVec3,
-    /// Faces of the box at the end, metres: where particles are kept.
+    /// Faces of the box at the substep's end, metres: they confine particles.
     pub walls: Bounds,
-    /// Faces of the box at the start, in cells: what cuts cells.
+    /// Faces of the box at the substep's start, in cells: they cut cells.
     pub cut: Bounds,
-    /// Of the least and of the greatest faces, each along its axis, m/s.
+    /// Velocities of the minimum and the maximum faces, each along its own axis, m/s.
     pub wall_velocity: [DVec3; 2],
-    /// α of this substep.
+    /// PIC fraction α of the substep.
     pub pic_blend: f64,
-    /// Layers of faces that get a velocity.
+    /// Number of layers of faces that get a velocity.
     pub layers: usize,
-    /// Solids as they stand at the start.
+    /// Solids in their poses at the substep's start.
     pub solids: Vec<Solid<'a>>,
 }
 
 impl Model {
-    /// Of a scene that FLIP solves, and its solids in world space.
+    /// Creates the model of a scene that uses FLIP, with its solids in world space.
     pub fn new(scene: &Scene, boundary: &Boundary) -> Self {
         let local = |grid: &SignedDistance| SignedDistance {
             origin: grid.origin - scene.domain.min,
@@ -79,58 +80,60 @@ impl Model {
         }
     }
 
-    /// FLIP's settings.
+    /// Returns FLIP's settings.
     pub fn settings(&self) -> &Flip {
         self.scene.solver.flip()
     }
 
-    /// Δx, metres.
+    /// Returns Δx, metres.
     pub fn cell_size(&self) -> f64 {
         self.settings().cell_size
     }
 
-    /// Least distance of a particle from walls and solids, metres.
+    /// Returns the least distance of a particle from walls and solids, metres.
     pub(super) fn contact_distance(&self) -> f64 {
         CONTACT * self.settings().particle_spacing()
     }
 
-    /// Displacement cap of a substep, metres.
+    /// Returns the cap on a particle's displacement in a substep, metres.
     pub(super) fn max_displacement(&self) -> f64 {
         CAP * self.settings().cfl * self.cell_size()
     }
 
-    /// Lengths along the axes along which the domain joins its own end.
+    /// Returns the lengths of the domain along its periodic axes.
     pub fn period(&self) -> Period {
         self.scene.period()
     }
 
-    /// Whether the surface counts in the pressure.
+    /// Returns whether the pressure solve uses the ghost-fluid surface.
     pub(super) fn has_ghost_fluid(&self) -> bool {
         self.settings().surface == Surface::GhostFluid
     }
 
-    /// The cell of a place, metres; places at or beyond the domain's faces count to the outermost cells.
+    /// Returns the cell of a position in metres; positions on or beyond the domain's faces belong
+    /// to the outermost cells.
     pub fn cell_of(&self, x: DVec3) -> [u32; 3] {
         let place = (x / self.cell_size()).floor().to_array();
-        // A cast saturates: what is below 0 becomes 0.
+        // A float-to-integer cast saturates: negative values become 0.
         std::array::from_fn(|axis| (place[axis] as u32).min(self.cells[axis] - 1))
     }
 
-    /// One flag a brick, none set.
+    /// Returns wetness flags of the domain's bricks, none set.
     pub(super) fn no_water(&self) -> Vec<bool> {
         let dims = table_dims(stored_cells(self.cells, self.scene.periodic));
         vec![false; dims.iter().map(|&n| n as usize).product()]
     }
 
-    /// Place of a cell's brick among the flags.
+    /// Returns the index of a cell's brick among the flags.
     pub(super) fn brick_index(&self, cell: [u32; 3]) -> usize {
         let dims = table_dims(stored_cells(self.cells, self.scene.periodic));
         let [x, y, z] = cell.map(|c| c / EDGE);
         ((z * dims[1] + y) * dims[0] + x) as usize
     }
 
-    /// Bricks with particles, which `is_wet` tells, with what else is water beside walls and solids, and those that the
-    /// step's layers of faces beyond it reach; their elements are those of the GPU.
+    /// Lays out the bricks with particles (`is_wet`), those that count as water near walls and
+    /// solids, and those within reach of the step's layers of faces. The elements are those of the
+    /// GPU.
     pub fn bricks(&self, is_wet: &[bool], step: &Step<'_>) -> Bricks {
         let periodic = self.scene.periodic;
         let cells = stored_cells(self.cells, periodic);
@@ -142,7 +145,7 @@ impl Model {
         Bricks::periodic(cells, periodic, &is_wet, reach, 1)
     }
 
-    /// What `substep` knows.
+    /// Returns the parameters of `substep`.
     pub fn step(&self, substep: &Substep) -> Step<'_> {
         let Substep {
             start,
@@ -185,19 +188,20 @@ impl Model {
     }
 }
 
-/// The six walls as half-spaces that cut cells; a cell is named by its least corner, in cells.
+/// The six walls as half-spaces that cut cells. A cell is given by its minimum corner, in cells.
 impl Step<'_> {
-    /// Open part of a cell's extent along each axis.
+    /// Returns the open part of a cell's extent along each axis.
     pub(super) fn open_extent(&self, cell: DVec3) -> DVec3 {
         open_extent(cell, [self.cut.min, self.cut.max])
     }
 
-    /// Whether the planes of a cell's lower faces lie in the open.
+    /// Returns whether the planes of a cell's lower faces lie inside the box.
     pub(super) fn is_plane_open(&self, cell: DVec3) -> BVec3 {
         cell.cmpgt(self.cut.min + ON_FACE) & cell.cmplt(self.cut.max - ON_FACE)
     }
 
-    /// Along its own axis, the velocity of what closes the planes of a cell's lower faces, m/s.
+    /// Returns the velocity of the wall that closes each lower face's plane, along its own axis,
+    /// m/s.
     pub(super) fn closing_velocity(&self, cell: DVec3) -> DVec3 {
         let [low, high] = self.wall_velocity;
         let high = DVec3::select(cell.cmpge(self.cut.max - ON_FACE), high, DVec3::ZERO);

@@ -1,4 +1,5 @@
-//! Twins of the pressure passes about the solve; the system and its right-hand side are `domain::poisson`'s.
+//! Reference passes around the pressure solve; `domain::poisson` builds the system and its
+//! right-hand side.
 
 use glam::DVec3;
 
@@ -11,18 +12,18 @@ use swell_domain::{
     poisson::{AIR, Cells, FLUID, System},
 };
 
-/// What the linear system is built from, and what its solution is taken to the faces by.
+/// Inputs of the linear system, and of the update of the faces from its solution.
 #[derive(Clone, Debug)]
 pub struct Waters<'a> {
     bricks: &'a Bricks,
     room: &'a Room,
-    /// As planes.
+    /// Open fractions of the lower faces, as planes.
     open: Vec<f64>,
     distance: Option<&'a [f64]>,
 }
 
 impl<'a> Waters<'a> {
-    /// Of a substep's room; the surface counts where the scene asks for it.
+    /// Collects the inputs of a substep; the ghost-fluid surface is included if the scene uses it.
     pub fn new(model: &Model, bricks: &'a Bricks, room: &'a Room, centers: &'a Centers) -> Self {
         Self {
             bricks,
@@ -32,7 +33,7 @@ impl<'a> Waters<'a> {
         }
     }
 
-    /// As the builder takes it.
+    /// Returns the inputs in the form that [`System::new`] takes.
     pub fn cells(&self) -> Cells<'_, f64> {
         Cells {
             bricks: self.bricks,
@@ -42,17 +43,17 @@ impl<'a> Waters<'a> {
         }
     }
 
-    /// `pressure/build_system`.
+    /// Reference pass of `pressure/build_system`.
     pub fn system(&self) -> System {
         System::new(self.cells())
     }
 
-    /// `pressure/divergence`: −(Σ ± f u + solid flux) of each row, m/s.
+    /// Reference pass of `pressure/divergence`: −(Σ ± f u + solid flux) for each row, m/s.
     pub fn divergence(&self, system: &System, velocity: &[DVec3]) -> Vec<f64> {
         system.rhs(self.cells(), &planes(velocity), &self.room.solid_flux)
     }
 
-    /// A value a row as one an element; 0 where there is no row.
+    /// Converts values per row to values per element; 0 where there is no row.
     pub fn by_element(&self, system: &System, rows: &[f64]) -> Vec<f64> {
         let mut values = vec![0.0; self.room.kind.len()];
         for (&element, &value) in system.cell.iter().zip(rows) {
@@ -61,7 +62,8 @@ impl<'a> Waters<'a> {
         values
     }
 
-    /// q − q' across the lower faces, by the part of the way where water ends; 0 where no water may flow.
+    /// Returns q − q' across the lower faces, divided by θ at the surface; 0 where no water may
+    /// flow.
     fn differences(&self, q: &[f64]) -> Vec<DVec3> {
         let cells = self.cells();
         let kind = |e: u32| self.room.kind[e as usize];
@@ -82,14 +84,16 @@ impl<'a> Waters<'a> {
         })
     }
 
-    /// `pressure/project`: takes the gradient of q, by element, from the velocities.
+    /// Reference pass of `pressure/project`: subtracts the gradient of q, given by element, from
+    /// the velocities.
     pub fn project(&self, q: &[f64], velocity: &mut [DVec3]) {
         for (velocity, difference) in velocity.iter_mut().zip(self.differences(q)) {
             *velocity -= difference;
         }
     }
 
-    /// `pressure/displace`: displacements at the lower faces, metres, of the density correction's q, by element.
+    /// Reference pass of `pressure/displace`: returns displacements at the lower faces from the
+    /// density correction's q, given by element, metres.
     pub fn displace(&self, q: &[f64]) -> Vec<DVec3> {
         self.differences(q)
             .into_iter()
@@ -98,7 +102,8 @@ impl<'a> Waters<'a> {
     }
 }
 
-/// `pressure/density_source`: the right-hand side of the density correction, metres.
+/// Reference pass of `pressure/density_source`: the right-hand side of the density correction,
+/// metres.
 pub fn density_source(model: &Model, system: &System, centers: &Centers) -> Vec<f64> {
     let excess = |&element: &u32| centers.excess[element as usize];
     (system.cell.iter())

@@ -1,4 +1,4 @@
-//! The projection of a substep: the system, its direct solve, and what that does to the faces.
+//! The projection of a substep: the system, its direct solve, and the update of the faces.
 
 use glam::DVec3;
 
@@ -9,25 +9,25 @@ use crate::{
 };
 use swell_domain::{poisson::System, solver::Projection};
 
-/// What the pressure of a substep did.
+/// Result of a substep's projection.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Projected {
-    /// The rows.
+    /// The linear system.
     pub system: System,
-    /// q of each, m/s; pascal after multiplication by ρ Δx / Δt.
+    /// q for each row, m/s; times ρ Δx / Δt it is a pressure in pascals.
     pub solution: Solution,
-    /// Of the density correction's displacements, where there is one; metres.
+    /// Solution for the density correction's displacements, metres, if the correction is on.
     pub correction: Option<Solution>,
     /// Bodies of water that no air touches.
     pub pockets: u32,
-    /// Largest |mean of ∇·u| over one of them, 1/s.
+    /// Largest |mean of ∇·u| over such a body, 1/s.
     pub incompatible: f64,
-    /// Largest |∇·u| in a row's cell before and after, 1/s.
+    /// Largest |∇·u| in a cell with a row, before and after the projection, 1/s.
     pub divergence: [f64; 2],
 }
 
 impl Projected {
-    /// Adds it to what a frame's projections did.
+    /// Adds this projection to the report of a frame's projections.
     pub(super) fn add_to(&self, all: &mut Projection) {
         all.residual = all.residual.max(self.solution.residual);
         let [before, after] = self.divergence;
@@ -41,8 +41,8 @@ impl Projected {
     }
 }
 
-/// Makes the velocities free of divergence; what the solves did, and the density correction's displacements, where there is one and
-/// `centers` are given.
+/// Makes the velocities divergence-free. Returns the results of the solves, and the density
+/// correction's displacements if it is on and `centers` are given.
 pub(super) fn project(
     model: &Model,
     timings: &mut Timings,

@@ -1,4 +1,4 @@
-//! Twins of shaders/effects/grid_curl.wgsl and grid_confinement.wgsl.
+//! Reference passes of shaders/effects/grid_curl.wgsl and grid_confinement.wgsl.
 
 use glam::DVec3;
 
@@ -12,14 +12,14 @@ fn is_water(room: &Room, element: u32) -> bool {
     room.kind[element as usize] == FLUID
 }
 
-/// Mean velocity of a cell's faces along each axis.
+/// Returns the mean velocity of a cell's faces along each axis.
 fn at_center(bricks: &Bricks, velocity: &[DVec3], element: u32) -> DVec3 {
     let upper = |axis: usize| velocity[bricks.near(element, along(axis, 1)) as usize][axis];
     0.5 * (velocity[element as usize] + DVec3::new(upper(0), upper(1), upper(2)))
 }
 
-/// ω = ∇ × u at the centres of cells of water, 1/s, by differences of the cells beside; one-sided where there is no
-/// water. Shape (elements).
+/// Returns ω = ∇ × u at the centres of cells with water, 1/s, by differences between the
+/// neighbouring cells; one-sided if a neighbour has no water. Shape (elements).
 pub fn grid_curl(model: &Model, bricks: &Bricks, room: &Room, velocity: &[DVec3]) -> Vec<DVec3> {
     per_cell(bricks, |element| {
         if !is_water(room, element) {
@@ -39,8 +39,8 @@ pub fn grid_curl(model: &Model, bricks: &Bricks, room: &Room, velocity: &[DVec3]
     })
 }
 
-/// The velocities after a = ε Δx (N × ω), N = η/|η|, η = ∇|ω| (Fedkiw et al. 2001) has acted at faces between two
-/// cells of water.
+/// Returns the velocities after vorticity confinement a = ε Δx (N × ω), N = η/|η|, η = ∇|ω| (Fedkiw
+/// et al. 2001), at faces between two cells of water.
 pub fn grid_confinement(
     model: &Model,
     step: &Step<'_>,
@@ -71,7 +71,7 @@ pub fn grid_confinement(
         };
         let slope = DVec3::new(slope(0), slope(1), slope(2));
         let steepness = slope.length();
-        // Below the rounding of |ω|, in f32, the direction is noise.
+        // Below the rounding error of |ω| in f32 the direction is noise.
         if steepness <= 1e-5 * (own.length() + before.length()) {
             return 0.0;
         }

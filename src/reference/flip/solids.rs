@@ -1,4 +1,4 @@
-//! Solids by their signed distance: how they cut cells, and how they push particles back.
+//! Solids by their signed distance: how they cut cells and push particles back.
 
 use glam::{BVec3, DVec3};
 
@@ -9,30 +9,30 @@ use swell_domain::{
     signed_distance::SignedDistance,
 };
 
-/// Nearer than this to a solid, in cells, counts as inside.
+/// A distance to a solid below this, in cells, counts as inside.
 const SKIN: f64 = 1e-4;
 
 /// A solid at one moment.
 #[derive(Clone, Copy, Debug)]
 pub struct Solid<'a> {
-    /// Its distances where it stood at the start, metres.
+    /// Signed distances in the initial pose, metres.
     pub grid: &'a SignedDistance,
-    /// How it goes through the substep.
+    /// Motion through the substep.
     pub passage: Passage,
-    /// Where it stands.
+    /// Pose at this moment.
     pub pose: Pose,
 }
 
-/// What of a cell a solid leaves open.
+/// Open fractions of a cell that is cut by solids.
 pub(super) struct Cut {
-    /// Of its lower and of its upper faces, 0..1.
+    /// Open fractions of the lower and of the upper faces, 0 to 1.
     pub(super) faces: [DVec3; 2],
-    /// Of its volume, 0..1; exact for planes along two axes at most.
+    /// Open fraction of the volume, 0 to 1; exact for planes that vary along at most two axes.
     pub(super) volume: f64,
 }
 
 impl<'a> Solid<'a> {
-    /// At the beginning of a passage.
+    /// Creates a solid in its pose at the start of a passage.
     pub(super) fn new(grid: &'a SignedDistance, passage: Passage) -> Self {
         Self {
             grid,
@@ -41,7 +41,7 @@ impl<'a> Solid<'a> {
         }
     }
 
-    /// As it stands when `share` of the substep is over.
+    /// Returns the solid in its pose after the fraction `share` of the substep.
     pub(super) fn after(self, share: f64) -> Self {
         Self {
             pose: self.passage.at(share),
@@ -49,12 +49,12 @@ impl<'a> Solid<'a> {
         }
     }
 
-    /// Of its point at `x`, m/s.
+    /// Returns the velocity of the solid's material point at `x`, m/s.
     pub fn velocity_at(&self, x: DVec3) -> DVec3 {
         self.passage.velocity_at(x, self.pose.centre)
     }
 
-    /// An upper bound on the speed of its points within its grid, m/s.
+    /// Returns an upper bound on the speed of points within the solid's grid, m/s.
     pub fn fastest(&self) -> f64 {
         let spin = self.passage.spin.length();
         let reach = match spin {
@@ -68,19 +68,19 @@ impl<'a> Solid<'a> {
         DVec3::from_array(self.grid.dims.map(|n| (n - 1) as f64))
     }
 
-    /// A place in node spacings, as the grid lies.
+    /// Returns a position in node spacings, in the grid's frame.
     fn place(&self, x: DVec3) -> DVec3 {
         (self.pose.back(x) - self.grid.origin) / self.grid.spacing
     }
 
-    /// Distance at the place of the grid that is nearest to `x`, trilinear.
+    /// Returns the trilinear distance at the point of the grid that is closest to `x`.
     fn distance(&self, x: DVec3) -> f64 {
         let place = self.place(x).clamp(DVec3::ZERO, self.last());
         self.grid
             .sample(self.grid.origin + self.grid.spacing * place)
     }
 
-    /// The nearest node's distance; far away beyond the grid.
+    /// Returns the distance at the nearest node; far away outside the grid.
     fn near(&self, x: DVec3) -> f64 {
         let p = self.place(x);
         if p.cmplt(-DVec3::ONE).any() || p.cmpgt(self.last() + 1.0).any() {
@@ -90,14 +90,16 @@ impl<'a> Solid<'a> {
         self.grid.node(i as usize, j as usize, k as usize)
     }
 
-    /// The nearest node's distance, or from beyond the grid the way there: the solid lies within it.
+    /// Returns the distance at the nearest node, or outside the grid the distance to the grid,
+    /// which contains the solid.
     pub(super) fn bound(&self, x: DVec3) -> f64 {
         let place = self.place(x);
         let way = self.grid.spacing * place.distance(place.clamp(DVec3::ZERO, self.last()));
         if way > 0.0 { way } else { self.near(x) }
     }
 
-    /// Distances at the corners of a cell, x fastest; `None` where the solid is too far off to cut it.
+    /// Returns the distances at the corners of a cell, x fastest; `None` if the solid is too far
+    /// away to cut it.
     pub(super) fn corners(&self, cell: DVec3, cell_size: f64) -> Option<[f64; 8]> {
         let middle = (cell + 0.5) * cell_size;
         if self.near(middle) >= 2.0 * (cell_size + self.grid.spacing) {
@@ -119,12 +121,13 @@ impl<'a> Solid<'a> {
         let own = self.grid.origin + self.grid.spacing * p;
         let distance = self.grid.sample(own);
         let [i, j, k] = p.to_array().map(|c| c as usize);
-        // Two cells' diagonal: no contact can be interpolated from a node so far off.
+        // Twice the spacing exceeds a cell's diagonal: with a node this far away, no contact can
+        // occur within the cell.
         if self.grid.node(i, j, k) > contact + 2.0 * self.grid.spacing || distance >= contact {
             return x;
         }
         let gradient = self.grid.gradient(own);
-        // Per metre; the GPU's is per spacing.
+        // Here the gradient is per metre; on the GPU it is per spacing.
         if gradient.length() < 1e-6 {
             return x;
         }
@@ -132,7 +135,7 @@ impl<'a> Solid<'a> {
     }
 }
 
-/// Sums over the corners of a cell's lower faces, or (`side` = 1) its upper ones.
+/// Returns the sums over the corners of a cell's lower faces, or of its upper ones for `side` = 1.
 pub(super) fn face_sums(corners: &[f64; 8], side: usize) -> DVec3 {
     let sum = |axis: usize| {
         (0..8)
@@ -143,7 +146,7 @@ pub(super) fn face_sums(corners: &[f64; 8], side: usize) -> DVec3 {
     DVec3::new(sum(0), sum(1), sum(2))
 }
 
-/// How planes through a cell's corner distances cut it (Batty et al. 2007).
+/// Computes how planes through a cell's corner distances cut it (Batty et al. 2007).
 pub(super) fn cut(corners: &[f64; 8]) -> Cut {
     let part = |axis: usize, side: usize| {
         let (s, t) = ([1, 0, 0][axis], [2, 2, 1][axis]);
@@ -161,12 +164,14 @@ pub(super) fn cut(corners: &[f64; 8]) -> Cut {
     }
 }
 
-/// Half cells along an axis of the hat about a cell's centre: from where each begins, in cells from the cell's least corner, and the
-/// hat's mean over it.
+/// Half cells along an axis of the hat function around a cell's centre: start of each, in cells
+/// from the cell's minimum corner, and the function's mean over it.
 const HALVES: [(f64, f64); 4] = [(-0.5, 0.25), (0.0, 0.75), (0.5, 0.75), (1.0, 0.25)];
 
-/// Part of the hat about a cell's centre that solids leave of what the walls at `walls` do (in cells), half a cell along each axis
-/// at a time, each by a plane; `corners` are the distances at the cell's. Where water is mirrored at walls, solids are.
+/// Integrates the hat function around a cell's centre over the volume outside solids, relative to
+/// that outside the walls `walls` (in cells) only. It samples 4³ half cells, each cut by a plane.
+/// `corners` are the distances at the cell's corners. If particles are mirrored at walls, so are
+/// solids.
 pub(super) fn open_part_of_hat(
     solids: &[&Solid<'_>],
     walls: &Bounds,
@@ -198,7 +203,8 @@ pub(super) fn open_part_of_hat(
     if all > 0.0 { open / all } else { 1.0 }
 }
 
-/// Open part of a square from the distances at its corners (0,0), (1,0), (0,1), (1,1).
+/// Returns the open fraction of a square from the distances at its corners (0,0), (1,0), (0,1),
+/// (1,1).
 fn open_part(corners: [f64; 4]) -> f64 {
     let [a, b, c, d] = corners;
     let slopes = [(b + d - a - c).abs() / 2.0, (c + d - b - a).abs() / 2.0];
@@ -208,19 +214,20 @@ fn open_part(corners: [f64; 4]) -> f64 {
     let smaller = if center.abs() <= 0.5 * (steep - flat) {
         0.5 - center.abs() / steep.max(1e-20)
     } else {
-        // Past the flat stretch only a corner is left, a triangle.
+        // Beyond the linear range only a corner is left, a triangle.
         let far = (0.5 * (steep + flat) - center.abs()).max(0.0);
         far * far / (2.0 * steep * flat).max(1e-20)
     };
     if center > 0.0 { 1.0 - smaller } else { smaller }
 }
 
-/// The velocity of what was pushed back: without its part against the push.
+/// Removes the velocity component against a push.
 fn stopped(v: DVec3, push: DVec3) -> DVec3 {
     v - push * (v.dot(push).min(0.0) / push.length_squared().max(1e-30))
 }
 
-/// Without what of a velocity leads into the walls that `x` lies at or beyond, which are moved in by the contact distance.
+/// Removes the velocity component into the walls that `x` touches or is beyond. The walls are moved
+/// inward by the contact distance.
 pub(super) fn at_walls(model: &Model, step: &super::Step<'_>, v: DVec3, x: DVec3) -> DVec3 {
     let contact = model.contact_distance();
     let [slowest, fastest] = step.wall_velocity;
@@ -228,10 +235,12 @@ pub(super) fn at_walls(model: &Model, step: &super::Step<'_>, v: DVec3, x: DVec3
     DVec3::select(x.cmpgt(step.walls.max - contact), v.min(fastest), v)
 }
 
-/// Each halves, or better, how deep one that lies between a wall and a solid 45° off is in either.
+/// Each round at least halves the penetration depth of a particle between a wall and a solid at
+/// 45°.
 const CORNER_ROUNDS: usize = 4;
 
-/// Where a particle comes to that goes `way` from `start` among solids, walls apart, and its velocity then.
+/// Moves a particle from `start` by `way` among solids, ignoring walls; returns its position and
+/// velocity.
 pub(super) fn go(
     model: &Model,
     step: &super::Step<'_>,
@@ -247,7 +256,7 @@ pub(super) fn go(
     if !step.solids.iter().any(is_near) {
         return (start + way, velocity);
     }
-    // In steps of at most half a node spacing, so that nothing thin is stepped over.
+    // Steps of at most half a node spacing, so that thin solids are not skipped.
     let steps = (2.0 * most / step.solids[0].grid.spacing).ceil() as usize + 1;
     let (mut x, mut v) = (start, velocity);
     for k in 1..=steps {
@@ -263,7 +272,7 @@ pub(super) fn go(
     let v = at_walls(model, step, v, x);
     let (low, high) = (step.walls.min + contact, step.walls.max - contact);
     if x != x.clamp(low, high) {
-        // Where a solid and a wall meet, each would push into the other.
+        // Between a solid and a wall, each of them would push the particle into the other.
         for _ in 0..CORNER_ROUNDS {
             for solid in &step.solids {
                 x = solid.after(1.0).leave(x.clamp(low, high), contact);

@@ -27,67 +27,69 @@ use swell_scene::{
     step::Substep,
 };
 
-/// FLIP in f64. Frames are rounded to f32 as they are written, and the next one starts from what was written.
+/// FLIP in f64. Frames are rounded to f32, as when written, and the next frame starts from the
+/// rounded state.
 pub struct Flip {
     model: Model,
     factor_budget: u64,
     state: Particles,
     frame: u32,
     timings: Timings,
-    /// Of the last substep; none before the first.
+    /// Pressure field of the last substep; `None` before the first.
     field: Option<Field>,
 }
 
-/// A pressure on cells.
+/// A pressure field on cells.
 struct Field {
     bricks: Bricks,
     kind: Vec<u32>,
-    /// Whether their centre lies within a wall or a solid.
+    /// Whether each cell's centre is inside a wall or solid.
     is_buried: Vec<bool>,
-    /// Pa, by element.
+    /// Pressure by element, Pa.
     pressure: Vec<f64>,
     /// See [`Gauge::taken`].
     taken: Vec<[f32; 3]>,
 }
 
-/// A substep from its beginning to its end, with all that stood between.
+/// A substep with all its intermediate results.
 #[derive(Clone, Debug)]
 pub struct Trace {
-    /// Where the elements lie.
+    /// Layout of the elements.
     pub bricks: Bricks,
-    /// Particles as they were, by cell.
+    /// Particles at the substep's start, sorted by cell.
     pub sorted: Sorted,
-    /// What of the cells is open.
+    /// Open space of the cells.
     pub room: Room,
-    /// Densities.
+    /// Densities at cell centres.
     pub centers: Centers,
-    /// Velocities as the last layer of the extrapolation left them.
+    /// Face velocities after the extrapolation of the last layer.
     pub faces: Faces,
-    /// The solve: the last one.
+    /// The last projection.
     pub projected: Projected,
-    /// The one before, where an effect acts between two.
+    /// The first projection, if an effect acts between two.
     pub earlier: Option<Projected>,
-    /// Whether that effect needed more iterations than it may take.
+    /// Whether that effect needs more iterations than the settings allow.
     pub is_short: bool,
-    /// Pa, by element; 0 where there is no water.
+    /// Pressure by element, Pa; 0 where there is no water.
     pub pressure: Vec<f64>,
-    /// Displacements of the density correction at the lower faces, metres, where there is one.
+    /// Displacements of the density correction at the lower faces, metres, if it is on.
     pub displacement: Option<Vec<DVec3>>,
-    /// What the grid gave the particles, in the order of `sorted`, before they moved.
+    /// Values transferred from the grid to the particles, in the order of `sorted`, before the
+    /// particles moved.
     pub given: Given,
-    /// Particles as they then are, in the order of `sorted`.
+    /// Particles at the substep's end, in the order of `sorted`.
     pub after: Cloud,
-    /// Particles that were slowed to the displacement cap.
+    /// Number of particles whose displacement was reduced to the cap.
     pub capped: u64,
 }
 
 impl Trace {
-    /// Every solve, in order.
+    /// Iterates over the projections in order.
     pub fn projections(&self) -> impl Iterator<Item = &Projected> {
         self.earlier.iter().chain([&self.projected])
     }
 
-    /// Adds what they did to what a frame's did.
+    /// Adds the projections to the report of a frame's projections.
     fn add_to(&self, all: &mut Projection) {
         self.projections()
             .for_each(|projected| projected.add_to(all));
@@ -96,8 +98,8 @@ impl Trace {
 }
 
 impl Flip {
-    /// Of a scene that FLIP solves, and its solids. Pressures are those of conjugate gradients, which come as near to
-    /// the system's solution as a factor does, in a tenth of its time.
+    /// Creates the solver for a scene that uses FLIP, with its solids. It solves for pressures by
+    /// conjugate gradients, which are as accurate as a direct factorisation in a tenth of its time.
     pub fn new(scene: &Scene, boundary: &Boundary) -> Self {
         Self {
             model: Model::new(scene, boundary),
@@ -109,17 +111,17 @@ impl Flip {
         }
     }
 
-    /// Solves by sparse Cholesky factors of up to so many bytes from now on; see [`crate::poisson::BUDGET`].
+    /// Switches to sparse Cholesky factors of up to `bytes` bytes; see [`crate::poisson::BUDGET`].
     pub fn set_factor_budget(&mut self, bytes: u64) {
         self.factor_budget = bytes;
     }
 
-    /// Settings and solids.
+    /// Returns the scene, its grid and its solids.
     pub fn model(&self) -> &Model {
         &self.model
     }
 
-    /// The state as the passes take it.
+    /// Returns the current state in the form that the passes take.
     pub fn cloud(&self) -> Cloud {
         let state = &self.state;
         let origin = self.model.scene.domain.min;
@@ -144,10 +146,9 @@ impl Flip {
         }
     }
 
-    /// One substep of `cloud` on bricks about `is_wet`.
+    /// Runs one substep of `cloud` on bricks around `is_wet`.
     ///
-    /// # Errors
-    /// A pressure system without a factor.
+    /// # Errors Returns an error if the factorisation of a pressure system fails.
     pub fn substep(
         &mut self,
         cloud: &Cloud,
@@ -299,7 +300,8 @@ impl Flip {
         })
     }
 
-    /// A substep whose pressure the gauge then reads; its numbers are the frame and, from 1, its own in it.
+    /// Runs a substep, checks it against the budget, and keeps its pressure field. The first
+    /// argument is the frame and the number of the substep in it, from 1.
     fn judged_substep(
         &mut self,
         (frame, number): (u32, u32),
@@ -330,16 +332,18 @@ impl Flip {
         Ok(trace)
     }
 
-    /// Takes over where walls that absorb stand after a state.
+    /// Copies the state of absorbing walls from `state`.
     pub fn take_answers(&mut self, state: &Particles) {
         self.model.scene.take_answers(state);
     }
 
-    /// Makes the velocities of particles in the order of their ids those of the projection over a substep, m/s, and aims the
-    /// particles with them; returns which of them are drops, and what moving walls did, joule. The substep's numbers are the frame and, from 1, its own.
+    /// Projects the velocities of particles, given in the order of their ids, over a substep, and
+    /// displaces the particles (flip/aim). Returns which of them are isolated droplets, and the
+    /// work by moving walls, joules. The first argument is the frame and the number of the substep
+    /// in it, from 1.
     ///
-    /// # Errors
-    /// What is not finite, a projection over the budget, and a pressure system without a factor.
+    /// # Errors Returns an error if a value is not finite, a projection exceeds its budget, or the
+    /// factorisation of a pressure system fails.
     pub fn project_velocities(
         &mut self,
         (frame, number): (u32, u32),
@@ -368,7 +372,8 @@ impl Flip {
         Ok((is_drop.collect(), work))
     }
 
-    /// Substeps through one frame, from `cloud` on; what they did, and the densities that the last one found.
+    /// Runs the substeps of one frame; returns their report and the densities in cells of water in
+    /// the last one.
     fn run_frame(
         &mut self,
         cloud: &mut Cloud,
@@ -434,7 +439,7 @@ impl Flip {
         }
     }
 
-    /// The last substep's pressure; `None` before the first.
+    /// Returns the last substep's pressure field; `None` before the first.
     fn gauge(&self) -> Option<Gauge<'_>> {
         let field = self.field.as_ref()?;
         Some(Gauge {
@@ -450,7 +455,7 @@ impl Flip {
         })
     }
 
-    /// Shows a substep that just ran.
+    /// Shows a substep that has just run to `watch`.
     fn show(&self, span: Span, cloud: &Cloud, watch: &mut dyn Watch) -> Result<(), ReferenceError> {
         let wanted = watch.wants(span);
         if !wanted.is_any() {
@@ -478,7 +483,7 @@ impl Flip {
         Ok(())
     }
 
-    /// Positions and velocities into a state's order, as a frame has them.
+    /// Rounds positions and velocities into a state, in its order.
     fn round(&self, cloud: &Cloud, order: &[usize], state: &mut Particles) {
         let origin = self.model.scene.domain.min;
         for (slot, &k) in order.iter().enumerate() {
@@ -487,7 +492,7 @@ impl Flip {
         }
     }
 
-    /// Rounds into the state, in its order.
+    /// Rounds the particles into the solver's state, in its order.
     fn write(&mut self, cloud: &Cloud) {
         let order = by_id(cloud);
         let mut state = std::mem::take(&mut self.state);
@@ -504,7 +509,7 @@ impl Flip {
 }
 
 impl Model {
-    /// Done on the water by what moves in a substep, joule (flip/boundary_work).
+    /// Returns the work of walls and solids that move in a substep, joules (flip/boundary_work).
     fn boundary_work(&self, step: &Step<'_>, trace: &Trace) -> f64 {
         let Trace { bricks, room, .. } = trace;
         let terms = (0..room.kind.len()).map(|e| {
@@ -566,9 +571,10 @@ impl Solver for Flip {
         Ok((self.state.clone(), report))
     }
 
-    /// The projection's, between cell centres.
+    /// Returns the projection's pressures, interpolated between cell centres, Pa; `None` outside
+    /// water.
     fn pressures(&self, points: &[DVec3]) -> Result<Vec<Option<f64>>, ReferenceError> {
-        // Without particles there is none.
+        // Without particles there is no pressure field.
         let Some(gauge) = self.gauge() else {
             return Ok(vec![None; points.len()]);
         };
@@ -581,7 +587,7 @@ impl Solver for Flip {
     }
 }
 
-/// Places in the cloud in the order of the ids.
+/// Returns indices into the cloud in the order of the ids.
 fn by_id(cloud: &Cloud) -> Vec<usize> {
     let mut order: Vec<usize> = (0..cloud.id.len()).collect();
     order.sort_unstable_by_key(|&k| cloud.id[k]);

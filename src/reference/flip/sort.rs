@@ -1,4 +1,5 @@
-//! Twins of the passes before the grid: what the particles take, and their order by cell.
+//! Reference passes before the transfer to the grid: the particles' bricks, and their order by
+//! cell.
 
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
@@ -6,42 +7,44 @@ use rayon::prelude::*;
 use super::Model;
 use swell_domain::bricks::{Bricks, CELLS};
 
-/// Particles in any order; positions relative to the domain's least corner.
+/// Particles in any order; positions relative to the domain's minimum corner.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Cloud {
-    /// Metres. Shape (particles).
+    /// Positions, metres. Shape (particles).
     pub position: Vec<DVec3>,
-    /// m/s. Shape (particles).
+    /// Velocities, m/s. Shape (particles).
     pub velocity: Vec<DVec3>,
-    /// C of v(x) = v + C (x − x_p), 1/s, row k of component k. Shape (particles) with APIC, else empty.
+    /// C of v(x) = v + C (x − x_p), 1/s, with row k for component k. Shape (particles) for APIC,
+    /// else empty.
     pub affine: Vec<DMat3>,
-    /// Unique. Shape (particles).
+    /// Unique ids. Shape (particles).
     pub id: Vec<u32>,
 }
 
-/// What decides a substep.
+/// Data from which a substep is chosen.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Survey {
-    /// Of the fastest particle, m/s.
+    /// Largest particle speed, m/s.
     pub speed: f64,
-    /// Particles that are not finite.
+    /// Number of particles with non-finite values.
     pub not_finite: u32,
-    /// One flag a brick of the domain, x fastest.
+    /// Whether each brick of the domain holds particles, x fastest.
     pub is_wet: Vec<bool>,
 }
 
-/// Particles by cell, and within a cell by id.
+/// Particles sorted by cell, and by id within a cell.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sorted {
-    /// Themselves.
+    /// The particles.
     pub cloud: Cloud,
-    /// Element of the cell of each. Shape (particles).
+    /// Element of each particle's cell. Shape (particles).
     pub cell: Vec<u32>,
-    /// First particle of each element up to the last wet one, and one past the last. Shape (512 (wet + 1) + 1).
+    /// First particle of each element up to the last wet one, and the total number. Shape (512 (wet
+    /// + 1) + 1).
     pub start: Vec<u32>,
 }
 
-/// Speeds, and which bricks hold particles.
+/// Measures the largest speed and finds the bricks that hold particles.
 pub fn survey(model: &Model, cloud: &Cloud) -> Survey {
     let mut is_wet = model.no_water();
     let (mut speed, mut not_finite) = (0.0f64, 0);
@@ -57,14 +60,14 @@ pub fn survey(model: &Model, cloud: &Cloud) -> Survey {
     }
 }
 
-/// Element of each particle's cell.
+/// Returns the element of each particle's cell.
 pub fn assign_cells(model: &Model, bricks: &Bricks, position: &[DVec3]) -> Vec<u32> {
     (position.par_iter())
         .map(|&x| bricks.element(model.cell_of(x).map(i64::from)))
         .collect()
 }
 
-/// The particles in the order of their elements, and of their ids within one.
+/// Sorts particles by element, and by id within an element.
 pub fn reorder(bricks: &Bricks, cloud: &Cloud, cell: &[u32]) -> Sorted {
     let mut order: Vec<u32> = (0..cell.len() as u32).collect();
     order.par_sort_unstable_by_key(|&k| (cell[k as usize], cloud.id[k as usize]));
@@ -90,7 +93,7 @@ pub fn reorder(bricks: &Bricks, cloud: &Cloud, cell: &[u32]) -> Sorted {
 }
 
 impl Sorted {
-    /// The particles of an element; none of one that is not wet.
+    /// Returns the particles of an element; empty for one outside wet slots.
     pub fn of(&self, element: u32) -> std::ops::Range<usize> {
         let element = element as usize;
         match self.start.get(element..element + 2) {

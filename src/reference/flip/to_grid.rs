@@ -1,4 +1,4 @@
-//! Twins of the passes that bring solids to the grid, and particles' velocities to its faces.
+//! Reference passes that cut cells by solids, and transfer particle velocities to faces.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -14,50 +14,54 @@ use swell_domain::{
     poisson::{AIR, SOLID},
 };
 
-/// What each hat has beyond itself, so that a face that no particle of its two cells touches takes the velocity of
-/// the particles nearby.
+/// Added to every hat function, so that a face that no particle in its two cells touches gets the
+/// velocity of the particles nearby.
 const LEAST_WEIGHT: f64 = 2.4e-7;
 
-/// A face with a smaller open fraction is closed: such faces drive jets at edges and corners in water at rest.
+/// A face with a smaller open fraction is closed: such faces drive jets at edges and corners in
+/// water at rest.
 const LEAST_OPEN: f64 = 0.02;
 
-/// The room that there is for water.
+/// The space that walls and solids leave open for water.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Room {
-    /// [`AIR`], [`FLUID`](swell_domain::poisson::FLUID) or [`SOLID`]. Shape (elements), as of every array here.
+    /// [`AIR`], [`FLUID`](swell_domain::poisson::FLUID) or [`SOLID`]. Shape (elements), as for
+    /// every array here.
     pub kind: Vec<u32>,
-    /// Open fractions of the lower faces, 0..1.
+    /// Open fractions of the lower faces, 0 to 1.
     pub open: Vec<DVec3>,
-    /// Σ ± (1 − f) u_solid over the six faces, outward, m/s.
+    /// Σ ± (1 − f) u_solid over the six faces, outward positive, m/s.
     pub solid_flux: Vec<f64>,
-    /// Open part of the cell, 0..1.
+    /// Open fraction of the cell's volume, 0 to 1.
     pub volume: Vec<f64>,
-    /// Part of the hat about the cell's centre that solids leave of what walls do, 0..1.
+    /// Integral of the hat function around the cell's centre over the volume outside solids,
+    /// relative to that outside walls only, 0 to 1.
     pub hats: Vec<f64>,
-    /// What the lower faces have where they are closed, m/s.
+    /// Velocities of the lower faces where they are closed, m/s.
     pub closed_velocity: Vec<DVec3>,
 }
 
 /// Velocities at the lower faces.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Faces {
-    /// With gravity, m/s. Shape (elements), as of every array here.
+    /// Velocities including gravity, m/s. Shape (elements), as for every array here.
     pub velocity: Vec<DVec3>,
-    /// The particles' own, m/s; its change from [`super::find_change`] on.
+    /// Velocities transferred from the particles, m/s; from [`super::find_change`] on, the change
+    /// of velocity.
     pub change: Vec<DVec3>,
-    /// Eight bits a component: bit 7 whether particles gave a velocity, below it the layer, of
-    /// [`super::extrapolate`].
+    /// Eight bits per component: bit 7 is set if particles gave a velocity; the lower bits hold the
+    /// layer, see [`super::extrapolate`].
     pub layer: Vec<u32>,
-    /// What the particles' hats add up to: it divides the rounding of their places.
+    /// Sum of the particles' weights; rounding errors of their positions are divided by it.
     pub weight: Vec<DVec3>,
 }
 
-/// Hats of a place at the cells after, at and before its own along each axis: of the cell that sees it one step
-/// down, in itself, one step up. The middle entry of `face` is that of its cell's lower face.
+/// Hat functions of a position, along each axis: for the next cell, its own cell and the previous
+/// one. The middle entry of `face` belongs to the lower face of its own cell.
 pub(super) struct Hats {
     face: [DVec3; 3],
     pub(super) center: [DVec3; 3],
-    /// Place in its cell.
+    /// Position within its cell, 0 to 1.
     place: DVec3,
 }
 
@@ -65,7 +69,7 @@ impl Hats {
     fn of(place: DVec3) -> Self {
         let least = DVec3::splat(LEAST_WEIGHT);
         Self {
-            // Rounding may have taken a place out of its cell.
+            // Rounding may have moved a position out of its cell.
             face: [
                 DVec3::ZERO,
                 (1.0 - place).max(DVec3::ZERO) + least,
@@ -80,7 +84,8 @@ impl Hats {
         }
     }
 
-    /// Weights at the three lower faces of the cell from which this place's cell lies `offset` away.
+    /// Returns the weights at the three lower faces of the cell that has this position's cell at
+    /// `offset`.
     fn at_faces(&self, offset: [i32; 3]) -> DVec3 {
         let [x, y, z] = offset.map(|step| (1 - step) as usize);
         let (face, center) = (&self.face, &self.center);
@@ -91,8 +96,9 @@ impl Hats {
         )
     }
 
-    /// Hats at the centres of the cells before, of its own and after along each axis, with the place's images in the walls at
-    /// `low` and `high` (from its cell's corner, in cells) where a centre lies in the open.
+    /// Returns the hat functions at the centres of the previous, own and next cell along each axis,
+    /// plus those of the position's mirror images at the walls `low` and `high` (from its cell's
+    /// corner, in cells) if a centre lies inside the box.
     pub(super) fn mirrored(&self, low: DVec3, high: DVec3) -> [DVec3; 3] {
         let images = [-0.5, 0.5, 1.5].map(|center| {
             let hat = |x: DVec3| (1.0 - (x - center).abs()).max(DVec3::ZERO);
@@ -111,8 +117,9 @@ pub(super) fn hats(model: &Model, bricks: &Bricks, sorted: &Sorted) -> Vec<Hats>
         .collect()
 }
 
-/// What of each cell and of its lower faces is open, and what solids push through the rest (Batty et al. 2007).
-/// Which cells with room are water is found later, by [`super::find_water`].
+/// Computes the open fractions of each cell and of its lower faces, and the flux of solids through
+/// the closed parts (Batty et al. 2007). [`super::find_water`] later decides which open cells are
+/// water.
 pub fn cut_cells(model: &Model, step: &Step<'_>, bricks: &Bricks) -> Room {
     #[derive(Clone, Default)]
     struct Cell {
@@ -138,7 +145,7 @@ pub fn cut_cells(model: &Model, step: &Step<'_>, bricks: &Bricks) -> Room {
         let (mut open, mut volume) = (of_walls, extent.element_product());
         let (mut nearest, mut hats): (Option<[f64; 8]>, f64) = (None, 1.0);
         let mut near = Vec::new();
-        // Of what is nearest to each face, along that face's axis.
+        // Velocity of the solid nearest to each face, along that face's axis.
         let mut velocity = [DVec3::ZERO; 2];
         for solid in &step.solids {
             let Some(found) = solid.corners(cell, model.cell_size()) else {
@@ -148,7 +155,8 @@ pub fn cut_cells(model: &Model, step: &Step<'_>, bricks: &Bricks) -> Room {
             velocity = [0, 1].map(|side| {
                 let sums = nearest.map_or(DVec3::MAX, |nearest| face_sums(&nearest, side));
                 let is_nearer = face_sums(&found, side).cmplt(sums);
-                // A component does not change along its own axis: that at the middle is that at both faces.
+                // A velocity component of a rigid body does not change along its own axis: the
+                // value at the centre is that at both faces.
                 let pushing = solid.velocity_at((cell + 0.5) * model.cell_size());
                 DVec3::select(is_nearer, pushing, velocity[side])
             });
@@ -204,8 +212,8 @@ pub fn cut_cells(model: &Model, step: &Step<'_>, bricks: &Bricks) -> Room {
     }
 }
 
-/// Particle-to-grid (Zhu and Bridson 2005; APIC: Jiang et al. 2015): what `flip/spread_faces` and
-/// `flip/gather_faces` do between them.
+/// Particle-to-grid transfer (Zhu and Bridson 2005; APIC: Jiang et al. 2015): `flip/spread_faces`
+/// and `flip/gather_faces` together.
 pub fn gather_faces(
     model: &Model,
     step: &Step<'_>,
@@ -251,7 +259,8 @@ pub fn gather_faces(
     }
 }
 
-/// Particle `i`'s velocity at the lower faces of the cell from which its own lies `offset` away, each along its axis.
+/// Returns particle `i`'s velocity at the lower faces of the cell that has the particle's cell at
+/// `offset`, each along its own axis.
 fn velocity_at_faces(
     model: &Model,
     sorted: &Sorted,

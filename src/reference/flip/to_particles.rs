@@ -1,4 +1,4 @@
-//! Twins of the passes that bring the grid's velocity to the particles, and move them.
+//! Reference passes that transfer grid velocities to the particles and advect them.
 
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
@@ -14,36 +14,37 @@ use swell_domain::{
     poisson::{AIR, FLUID, SOLID},
 };
 
-/// Bits of a component's layer, and whether particles gave it a velocity.
+/// Bits of a component's layer, and the bit that is set if particles gave it a velocity.
 const LAYER: u32 = 0x7f;
 const KNOWN: u32 = 0x80;
 
-/// Beyond the stored layer of the upper walls: no face is ever asked for.
+/// Tags of cells beyond the stored layer of the upper walls, whose faces are never used.
 const NO_NEED: u32 = 0x7f_7f7f;
 
-/// What the grid gives each particle, in sorted order.
+/// Values transferred from the grid to each particle, in sorted order.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Given {
-    /// The particle's new velocity, m/s. Shape (particles).
+    /// New velocity of the particle, m/s. Shape (particles).
     pub velocity: Vec<DVec3>,
-    /// Its new affine part, 1/s. Shape (particles) with APIC, else empty.
+    /// New affine matrix, 1/s. Shape (particles) for APIC, else empty.
     pub affine: Vec<DMat3>,
-    /// The grid's velocity where it is, m/s. Shape (particles).
+    /// The grid's velocity at the particle, m/s. Shape (particles).
     pub carried: Vec<DVec3>,
-    /// Whether it is a drop: none of the 27 cells about its own is water. Shape (particles).
+    /// Whether the particle is an isolated droplet: none of the 27 cells around it is water. Shape
+    /// (particles).
     pub is_drop: Vec<bool>,
-    /// The density correction's displacement there, metres. Shape (particles).
+    /// The density correction's displacement at the particle, metres. Shape (particles).
     pub displacement: Vec<DVec3>,
 }
 
-/// A substep's result, in sorted order.
+/// Particles after a substep, in sorted order.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Moved {
-    /// Metres. Shape (particles).
+    /// Positions, metres. Shape (particles).
     pub position: Vec<DVec3>,
-    /// m/s. Shape (particles).
+    /// Velocities, m/s. Shape (particles).
     pub velocity: Vec<DVec3>,
-    /// Particles that were slowed to the displacement cap.
+    /// Number of particles whose displacement was reduced to the cap.
     pub capped: u64,
 }
 
@@ -55,7 +56,8 @@ fn is_known(tags: u32, axis: usize) -> bool {
     tags >> (8 * axis) & KNOWN != 0
 }
 
-/// After the projection: which faces it gave a velocity (layer 1), and what of that is change.
+/// Marks the faces to which the projection gave a velocity (layer 1), and stores the change of
+/// velocity.
 pub fn find_change(model: &Model, bricks: &Bricks, room: &Room, faces: &mut Faces) {
     let tags = per_cell(bricks, |element| {
         let e = element as usize;
@@ -67,7 +69,8 @@ pub fn find_change(model: &Model, bricks: &Bricks, room: &Room, faces: &mut Face
             let before = bricks.near(element, along(axis, -1));
             let kind = room.kind[before as usize];
             let is_closed = room.open[e][axis] == 0.0;
-            // A closed face between solids has no velocity of its own; slot 0 is what lies beyond the domain.
+            // A closed face between two solid cells has no velocity of its own; slot 0 lies beyond
+            // the domain.
             let is_buried = own == SOLID && (kind == SOLID || before < CELLS);
             own == FLUID || kind == FLUID || (is_closed && !is_buried)
         };
@@ -80,8 +83,8 @@ pub fn find_change(model: &Model, bricks: &Bricks, room: &Room, faces: &mut Face
     }
 }
 
-/// One layer of faces takes the mean of its neighbours of the layers before. Where particles gave a velocity, it is
-/// the change that is carried on.
+/// Extrapolates velocities by one layer: a face gets the mean of its neighbours in earlier layers.
+/// On faces with a velocity from particles only the change is extrapolated.
 pub fn extrapolate(step: &Step<'_>, bricks: &Bricks, layer: u32, faces: &mut Faces) {
     let filled = per_cell(bricks, |element| {
         let e = element as usize;
@@ -108,7 +111,7 @@ pub fn extrapolate(step: &Step<'_>, bricks: &Bricks, layer: u32, faces: &mut Fac
                 } else {
                     changes.iter().sum::<f64>() / changes.len() as f64
                 };
-                // What gravity changed is in both.
+                // Gravity's change is included in both.
                 velocity[axis] += mean - change[axis];
                 change[axis] = mean;
             } else {
@@ -126,8 +129,9 @@ pub fn extrapolate(step: &Step<'_>, bricks: &Bricks, layer: u32, faces: &mut Fac
     faces.layer = filled.iter().map(|cell| cell.2).collect();
 }
 
-/// Elements of the 2 × 3 × 3 faces of component `axis` about a cell: a fastest, then b, then c, where (a, b, c) are
-/// the axes turned so that the component's own is first. Beyond the domain the cell's own row or column counts.
+/// Returns the elements of the 2 × 3 × 3 faces of component `axis` around a cell: a fastest, then
+/// b, then c, where (a, b, c) are the axes permuted so that the component's own is first. Beyond
+/// the domain the cell's own row or column is used.
 fn stencil(model: &Model, bricks: &Bricks, element: u32, axis: usize) -> [usize; 18] {
     std::array::from_fn(|k| {
         let mut offset = [0; 3];
@@ -139,7 +143,7 @@ fn stencil(model: &Model, bricks: &Bricks, element: u32, axis: usize) -> [usize;
     })
 }
 
-/// `offset` from a cell, as far as the domain goes.
+/// Clamps an offset from a cell to the domain.
 fn within(model: &Model, bricks: &Bricks, element: u32, offset: [i32; 3]) -> [i32; 3] {
     let cell = bricks.cell(element);
     std::array::from_fn(|axis| {
@@ -150,7 +154,8 @@ fn within(model: &Model, bricks: &Bricks, element: u32, offset: [i32; 3]) -> [i3
     })
 }
 
-/// Hats of a place in a cell at the centres before it, of its own and after it.
+/// Returns the hat functions of a position in a cell at the centres of the previous, own and next
+/// cell.
 fn center_hats(f: f64) -> [f64; 3] {
     [
         (0.5 - f).max(0.0),
@@ -159,7 +164,7 @@ fn center_hats(f: f64) -> [f64; 3] {
     ]
 }
 
-/// Their slopes, 1 over a cell.
+/// Returns the derivatives of [`center_hats`], per cell.
 fn center_slopes(f: f64) -> [f64; 3] {
     if f < 0.5 {
         [-1.0, 1.0, 0.0]
@@ -168,13 +173,14 @@ fn center_slopes(f: f64) -> [f64; 3] {
     }
 }
 
-/// Σ of products of weights along a, b and c and the values at the faces of a stencil.
+/// Returns the sum over a stencil's faces of the products of weights along a, b and c and the
+/// values.
 fn weighted(values: &[f64; 18], a: [f64; 2], b: [f64; 3], c: [f64; 3]) -> f64 {
     let of = |k: usize| a[k % 2] * b[k / 2 % 3] * c[k / 6] * values[k];
     (0..18).map(of).sum()
 }
 
-/// Values at the faces of a stencil by the parts that count of each, and the mean of all by the rest.
+/// Returns each value times its weight, plus the weighted mean of all times the rest.
 fn settled(values: [f64; 18], parts: &[f64; 18]) -> [f64; 18] {
     let sum: f64 = values
         .iter()
@@ -185,7 +191,7 @@ fn settled(values: [f64; 18], parts: &[f64; 18]) -> [f64; 18] {
     std::array::from_fn(|k| values[k] * parts[k] + mean * (1.0 - parts[k]))
 }
 
-/// Least and greatest velocity among faces.
+/// Returns the smallest and the largest velocity.
 fn range_of(values: &[f64; 18]) -> [f64; 2] {
     let low = values.iter().fold(f64::INFINITY, |low, &v| low.min(v));
     let high = values
@@ -194,9 +200,11 @@ fn range_of(values: &[f64; 18]) -> [f64; 2] {
     [low, high]
 }
 
-/// Velocities from the grid: v = α u + (1 − α)(v + Δu) (Zhu and Bridson 2005), or u and its slope (APIC, Jiang et
-/// al. 2015), of drops v + g Δt; and the displacements of the density correction, where there is one. Faces that solids leave open in
-/// part count by that part, as in the projection, and at the surface v is clamped to the range of the faces' velocities and a little beyond it.
+/// Transfers grid velocities to particles: v = α u + (1 − α)(v + Δu) (Zhu and Bridson 2005), or u
+/// and its gradient (APIC, Jiang et al. 2015); isolated droplets get v + g Δt. Also interpolates
+/// the density correction's displacements, if it is on. Partly open faces are weighted by their
+/// open fraction, as in the projection; at the surface v is clamped to the range of the faces'
+/// velocities, extended by a margin.
 pub fn grid_to_particle(
     model: &Model,
     step: &Step<'_>,
@@ -210,7 +218,7 @@ pub fn grid_to_particle(
     let size = model.cell_size();
     let of_cell = |element: u32| {
         let stencils = [0, 1, 2].map(|axis| stencil(model, bricks, element, axis));
-        // What counts of each: closed ones have the velocity of what closes them.
+        // Weight of each face; closed faces count fully, with the velocity of the wall or solid.
         let parts = [0, 1, 2].map(|axis| {
             stencils[axis].map(|e| match room.open[e][axis] {
                 open if open > 0.0 && !step.solids.is_empty() => open,
@@ -250,7 +258,8 @@ pub fn grid_to_particle(
             for axis in 0..3 {
                 let [f, g, h] = [0, 1, 2].map(|turn| place[(axis + turn) % 3]);
                 let (a, b, c) = ([1.0 - f, f], center_hats(g), center_hats(h));
-                // A drop falls freely: about it nothing is projected, and closed faces have the wall's velocity.
+                // An isolated droplet falls freely: around it nothing is projected, and closed
+                // faces have the wall's velocity.
                 let falling = v[axis] + step.velocity_step[axis];
                 let whole = match step.solids.is_empty() {
                     true => 1.0,
@@ -307,8 +316,9 @@ pub fn grid_to_particle(
     }
 }
 
-/// Where each particle has to start from so that its own new velocity takes it to where the grid's takes it from its
-/// place; drops where they are; and each with its displacement (flip/aim). Metres. Shape (particles), in sorted order.
+/// Displaces each particle so that its own new velocity takes it to where the grid's velocity would
+/// take it from its original position; isolated droplets keep theirs. Adds the displacement of each
+/// (flip/aim). Metres. Shape (particles), in sorted order.
 pub fn aim(step: &Step<'_>, position: &[DVec3], given: &Given) -> Vec<DVec3> {
     let one = |(i, &x): (usize, &DVec3)| {
         let beside = match given.is_drop[i] {
@@ -320,7 +330,7 @@ pub fn aim(step: &Step<'_>, position: &[DVec3], given: &Given) -> Vec<DVec3> {
     position.iter().enumerate().map(one).collect()
 }
 
-/// The grid's velocity at `x`, m/s; `otherwise` where no brick is.
+/// Returns the grid's velocity at `x`, m/s; `otherwise` if there is no brick.
 fn velocity_at(
     model: &Model,
     bricks: &Bricks,
@@ -336,8 +346,9 @@ fn velocity_at(
     if bricks.element(at) < CELLS {
         return otherwise;
     }
-    // Two neighbours along each axis and the way from the first to the second: between faces along the component's
-    // own axis, between centres across it, where beyond the outermost ones the velocity is that of the outermost.
+    // Two neighbours along each axis, and the interpolation weight of the second: between faces
+    // along the component's own axis, between centres across it. Beyond the outermost centres the
+    // velocity is that of the outermost.
     let across = |axis: usize| {
         let last = i64::from(model.cells[axis]) - 1;
         let first = if f[axis] < 0.5 {
@@ -377,15 +388,16 @@ fn velocity_at(
     DVec3::new(component(0), component(1), component(2))
 }
 
-/// Of what a pair of particles lacks to the distance that is kept, each is moved by so much.
+/// Fraction of the missing distance that each of a pair moves.
 const SHARE: f64 = 0.25;
 
-/// Of that distance, a particle is moved by at most so much.
+/// Largest displacement, as a fraction of the target distance.
 const MOST: f64 = 0.25;
 
-/// Displacements that move particles apart which have come nearer to each other, or to a wall, than water at rest has
-/// them, metres; half of what each pair lacks, shared between the two (the weak springs of Ando and Tsuruno 2011, without
-/// their velocity); drops lie at walls as near as they may. Shape (particles).
+/// Returns displacements that move particles apart which are closer to each other, or to a wall,
+/// than in water at rest, metres: half of what each pair lacks, shared between the two (the weak
+/// springs of Ando and Tsuruno 2011, without their velocity). Isolated droplets may rest as close
+/// to a wall as they can. Shape (particles).
 pub fn push_apart(
     model: &Model,
     step: &Step<'_>,
@@ -398,10 +410,10 @@ pub fn push_apart(
     let one = |i: usize| {
         let (x, own) = (sorted.cloud.position[i], sorted.cloud.id[i]);
         let place = x / model.cell_size() - super::grid::corner(bricks, sorted.cell[i]);
-        // The distance is below half a cell: whoever is nearer lies in one of eight.
+        // The target distance is below half a cell: closer particles lie in one of eight cells.
         let side = place.to_array().map(|f| if f < 0.5 { -1 } else { 1 });
         let lacks = |way: DVec3| (from_walls - 2.0 * way).max(DVec3::ZERO);
-        // As the walls stand where the particles do, at the substep's start.
+        // Walls at the substep's start, when the particles are at these positions.
         let [low, high] = [step.cut.min, step.cut.max].map(|wall| wall * model.cell_size());
         let of_walls = lacks(x - low) - lacks(high - x);
         let of_walls = if is_drop[i] { DVec3::ZERO } else { of_walls };
@@ -429,8 +441,9 @@ pub fn push_apart(
         .collect()
 }
 
-/// Moves particles by the midpoint rule and by the density correction's displacement, keeps them out of solids and
-/// walls, and takes what velocity they have into them. One that would move farther than the cap is slowed.
+/// Advects particles by the midpoint rule and the density correction's displacement, keeps them out
+/// of solids and walls, and removes their velocity component into these. A particle that would move
+/// farther than the cap is slowed.
 pub fn advect(
     model: &Model,
     step: &Step<'_>,
@@ -444,7 +457,7 @@ pub fn advect(
     let one = |i: usize| {
         let (start, here) = (position[i], given.carried[i]);
         let middle = start + 0.5 * step.length * here;
-        // A drop goes on as it flies: the faces on its way may be other water's.
+        // A droplet continues ballistically: faces along its path may belong to other water.
         let between = match given.is_drop[i] {
             true => here,
             false => velocity_at(model, bricks, velocity, middle, here),

@@ -1,4 +1,4 @@
-//! No-slip walls.
+//! No-slip walls (flip/wall_friction).
 
 use glam::DVec3;
 
@@ -8,11 +8,12 @@ use super::{
 };
 use swell_domain::{bricks::Bricks, flip::VON_KARMAN};
 
-/// Particles gave a component a velocity.
+/// Bit that is set if particles gave a component a velocity.
 const KNOWN: u32 = 0x80;
 
-/// Slows the water within a cell of no-slip walls along them by the shear stress ρ (κ u)² of Prandtl's mixing length κ y,
-/// with the mean slope u / y between the wall, where water stands still, and a face at y.
+/// Slows water within a cell of no-slip walls along them, by the shear stress ρ (κ u)² of Prandtl's
+/// mixing length κ y with the mean gradient u / y between the wall, where water is at rest, and a
+/// face at distance y.
 pub fn wall_friction(
     model: &Model,
     step: &Step<'_>,
@@ -26,7 +27,8 @@ pub fn wall_friction(
     }
 }
 
-/// By which [`wall_friction`] slows each component at the lower faces, 1/s. Shape (elements).
+/// Returns the rates at which [`wall_friction`] slows each component at the lower faces, 1/s. Shape
+/// (elements).
 pub fn friction_rates(
     model: &Model,
     step: &Step<'_>,
@@ -35,7 +37,8 @@ pub fn friction_rates(
     faces: &Faces,
 ) -> Vec<DVec3> {
     let is_known = |e: usize, axis: usize| faces.layer[e] >> (8 * axis) & KNOWN != 0;
-    // Along `other` at the lower face along `own`: the mean of the four about it that particles gave one.
+    // The velocity along `other` at the lower face along `own`: the mean of those of the four faces
+    // around it to which particles gave a velocity.
     let velocity_across = |element: u32, own: usize, other: usize| {
         let about = (0..4).map(|k| {
             let mut offset = [0; 3];
@@ -71,7 +74,8 @@ pub fn friction_rates(
 }
 
 impl Model {
-    /// Part of the layer of one cell beside each no-slip wall that rows of faces at `place` stand for, across each axis.
+    /// Returns the part of the layer of one cell beside each no-slip wall that rows of faces at
+    /// `place` represent, across each axis.
     fn wall_parts(&self, step: &Step<'_>, place: DVec3) -> DVec3 {
         let part = |distance: f64| (1.5 - distance).clamp(0.0, 1.0);
         (self.scene.no_slip.iter()).fold(DVec3::ZERO, |mut parts, wall| {

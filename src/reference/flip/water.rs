@@ -1,4 +1,4 @@
-//! Twins of the passes that find the water: densities at cell centres, and what follows from them.
+//! Reference passes that find the water: densities at cell centres, and what follows from them.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -15,31 +15,32 @@ use swell_domain::{
 };
 use swell_scene::sources::Inlet;
 
-/// Of a cell's excess a substep corrects at most this much either way.
+/// Bound on the excess of a cell that a substep corrects, in both directions.
 const MOST_EXCESS: f64 = 0.5;
 
-/// Part of the hats below which a cell counts as having room for that part.
+/// Lower bound for a cell's open fraction of the hat function.
 const LEAST_ROOM: f64 = 0.02;
 
-/// Part of its room that a film fills at least.
+/// Least fraction of its open volume that a film fills.
 pub const LEAST_FILM: f64 = 0.1;
 
-/// Least distance of the surface from the centre of a cell of water, in cells: every way to the air from there knows of the
-/// same one, as the pressure there does.
+/// Least distance of the surface from the centre of a cell of water, in cells; all directions
+/// towards air use the same distance.
 const LEAST_DEPTH: f64 = 0.02;
 
-/// What cell centres know of the water about them.
+/// State of the water at cell centres.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Centers {
-    /// Over that of a full cell, in cells of every kind. Shape (elements), as of every array here.
+    /// Density relative to a full cell, in cells of every kind. Shape (elements), as for every
+    /// array here.
     pub density: Vec<f64>,
-    /// What the density correction carries out of the cell.
+    /// Excess that the density correction carries out of the cell, as a fraction of a cell.
     pub excess: Vec<f64>,
-    /// Of the surface, metres; negative inside.
+    /// Signed distance to the surface, metres; negative in water.
     pub distance: Vec<f64>,
 }
 
-/// Integral of the hat from minus infinity to `t`.
+/// Returns the integral of the hat function from minus infinity to `t`.
 fn hat_below(t: f64) -> f64 {
     let s = 1.0 - t.abs().min(1.0);
     if t < 0.0 {
@@ -49,14 +50,15 @@ fn hat_below(t: f64) -> f64 {
     }
 }
 
-/// Part of the hats about a cell's centre that walls leave, where nothing is mirrored in them: behind them, or at all.
+/// Returns the part of the hat function around a cell's centre that walls leave open; 1 along an
+/// axis where particles are mirrored.
 fn room_of_hats(is_mirrored: bool, step: &Step<'_>, bricks: &Bricks, element: u32) -> f64 {
     let cell = corner(bricks, element);
     let along_axis = |axis: usize| {
         let center = cell[axis] + 0.5;
         let (low, high) = (step.cut.min[axis], step.cut.max[axis]);
         match is_mirrored && (low..=high).contains(&center) {
-            // Hats see all of the water.
+            // With mirror images, the hat function sees all of the water.
             true => 1.0,
             false => hat_below(high - center) - hat_below(low - center),
         }
@@ -64,14 +66,14 @@ fn room_of_hats(is_mirrored: bool, step: &Step<'_>, bricks: &Bricks, element: u3
     along_axis(0) * along_axis(1) * along_axis(2)
 }
 
-/// Weight at the centre of the cell from which the place's own lies `offset` away.
+/// Returns the weight at the centre of the cell that has the position's own cell at `offset`.
 fn at_center(weights: &[DVec3; 3], offset: [i32; 3]) -> f64 {
     let [x, y, z] = offset.map(|step| (1 - step) as usize);
     weights[x].x * weights[y].y * weights[z].z
 }
 
-/// Densities at cell centres: what `flip/spread_centers` and `flip/gather_centers` do between them. Where a density correction
-/// goes by them, particles count with their mirror images in walls. Shape (elements).
+/// Computes densities at cell centres: `flip/spread_centers` and `flip/gather_centers` together.
+/// With a density correction, particles count with their mirror images at walls. Shape (elements).
 pub fn gather_centers(
     model: &Model,
     step: &Step<'_>,
@@ -98,7 +100,7 @@ pub fn gather_centers(
                 .sum::<f64>()
         });
         let sum: f64 = given.sum();
-        // What has room for less than a particle counts as having it for one.
+        // A smaller open volume counts as that of one particle.
         let of_solids = match step.solids.is_empty() {
             true => 1.0,
             false => room.hats[element as usize].max(particle_share),
@@ -108,7 +110,8 @@ pub fn gather_centers(
     })
 }
 
-/// What walls leave of a cell along each axis, and what solids leave of that.
+/// Returns the open part of a cell's extent along each axis, given walls, and the fraction of it
+/// that solids leave open.
 pub(super) fn open_parts(step: &Step<'_>, bricks: &Bricks, room: &Room, element: u32) -> [f64; 4] {
     let extent = step.open_extent(corner(bricks, element));
     let part = match step.solids.is_empty() {
@@ -118,13 +121,13 @@ pub(super) fn open_parts(step: &Step<'_>, bricks: &Bricks, room: &Room, element:
     [extent.x, extent.y, extent.z, part]
 }
 
-/// Whether a cell's centre lies within a wall or a solid.
+/// Returns whether a cell's centre is inside a wall or solid.
 fn is_buried(step: &Step<'_>, bricks: &Bricks, room: &Room, element: u32) -> bool {
     let parts = open_parts(step, bricks, room, element);
     parts.into_iter().any(|part| part < HALF)
 }
 
-/// Whether a cell, if it is water, lacks most of it: as in gaps that close (flip/close_gaps).
+/// Returns whether a cell, if it is water, is mostly empty, as in closing gaps (flip/close_gaps).
 pub fn is_filling(
     step: &Step<'_>,
     bricks: &Bricks,
@@ -135,13 +138,13 @@ pub fn is_filling(
     density[element as usize] < 0.5 && !is_buried(step, bricks, room, element)
 }
 
-/// Which cells have their centre within a wall or a solid. Shape (elements).
+/// Returns which cells have their centre inside a wall or solid. Shape (elements).
 pub fn find_buried(step: &Step<'_>, bricks: &Bricks, room: &Room) -> Vec<bool> {
     per_cell(bricks, |element| is_buried(step, bricks, room, element))
 }
 
-/// What entered where water was already makes room for itself: the projection lets as much flow out of such cells as they hold too
-/// much, and the density correction leaves it alone.
+/// Makes room for water that enters where water already is: the projection lets the excess of such
+/// cells flow out, and the density correction ignores it.
 pub fn let_in(
     inlets: &[Inlet],
     cell_size: f64,
@@ -165,10 +168,11 @@ pub fn let_in(
     }
 }
 
-/// Of a cell's room that what entered may fill beyond it.
+/// Largest excess by entering water, in units of the cell's open volume.
 const MOST_OVER: f64 = 1.0;
 
-/// Whether rounding of `error` may decide where the centre of a cell, or of one of those about it, lies.
+/// Returns whether a rounding error of `error` may decide if the centre of a cell, or of one around
+/// it, is inside a wall or solid.
 pub fn is_near_half(
     step: &Step<'_>,
     bricks: &Bricks,
@@ -182,8 +186,9 @@ pub fn is_near_half(
     })
 }
 
-/// Density before the walls and solids that a cell's centre lies in: in the cell inward of the walls, and where that is
-/// buried too, the mean over the faces that lead out of it, by how far they are open.
+/// Returns the density in front of the walls and solids that contain a cell's centre: in the cell
+/// inward of the walls, or if its centre is inside too, the mean over the cell's faces to other
+/// cells, weighted by their open fractions.
 fn density_before(
     step: &Step<'_>,
     bricks: &Bricks,
@@ -222,22 +227,23 @@ fn density_before(
     }
 }
 
-/// What a cell's centre says of the water about it.
+/// The water around a cell's centre, as derived from densities.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Depth {
-    /// What of the room there is water.
+    /// Fraction of the open volume there that is water.
     pub share: f64,
     /// Whether it is a film on a floor that passes above the centre.
     pub is_film: bool,
-    /// How deep it is below the surface, up to a cell either way.
+    /// Depth below the surface, in cells, from −1 to 1.
     pub cells: f64,
-    /// By how much rounding of the rooms beside it moves what lies below the surface, over that rounding; infinite where they are all
-    /// alike.
+    /// Factor by which rounding errors of the open volumes around the cell change the fraction
+    /// below the surface; infinite if these volumes are all equal.
     pub lean: f64,
 }
 
-/// Water at a centre over the room there. Where the centre is in a solid, the little room that is left may hold no particle for
-/// a while, or one too many, so that the cells beyond the open faces count as well.
+/// Returns the water at a centre relative to the open volume there. If the centre is inside a
+/// solid, the small open volume may hold no particle for a while, or one too many, so that cells
+/// beyond the open faces count as well.
 fn share_of_room(
     bricks: &Bricks,
     room: &Room,
@@ -263,9 +269,10 @@ fn share_of_room(
     alone.max(sum / rooms)
 }
 
-/// Part of the hat at a centre that lies below a level surface, solids included, and the lean (see [`Depth`]); `of_room` is that
-/// part of the open hat. A solid counts as below the surface where it is a floor, as above it where it is a ceiling, and as the
-/// open hat does where it is a wall.
+/// Returns the fraction of the hat function at a centre that lies below a level surface, solids
+/// included, and the lean (see [`Depth`]); `of_room` is that fraction of the open part. A solid
+/// counts as below the surface if it is a floor, as above it if it is a ceiling, and like the open
+/// part if it is a wall.
 fn below_surface(
     step: &Step<'_>,
     bricks: &Bricks,
@@ -297,7 +304,7 @@ fn below_surface(
     (of_solid + (of_room - of_solid) * own, lean)
 }
 
-/// What the densities say of the water about each cell's centre. Shape (elements).
+/// Derives the water around each cell's centre from the densities. Shape (elements).
 pub fn find_depth(
     model: &Model,
     step: &Step<'_>,
@@ -321,7 +328,8 @@ pub fn find_depth(
             true => below_surface(step, bricks, room, element, of_room),
             false => (of_room, 0.0),
         };
-        // Across a flat surface the density is 1/2 at it, and falls as s − s²/2 with the distance s in cells.
+        // Across a flat surface the density is 1/2 at the surface, and falls as s − s²/2 with the
+        // distance s in cells.
         let off = below - 0.5;
         let way = 1.0 - (1.0 - 2.0 * off.abs()).max(0.0).sqrt();
         Depth {
@@ -333,8 +341,8 @@ pub fn find_depth(
     })
 }
 
-/// Which cells are water, those whose centre is not above the surface, and how far the surface is: kinds and metres. Shapes
-/// (elements). Whether a cell has particles does not count.
+/// Finds the cells of water, whose centres are not above the surface, and the distance to the
+/// surface: kinds and metres. Shapes (elements). The presence of particles does not decide.
 pub fn find_water(
     model: &Model,
     bricks: &Bricks,
@@ -364,15 +372,16 @@ pub fn find_water(
     cells.into_par_iter().unzip()
 }
 
-/// What of the density is too much, or too little within the water, in parts of a cell (Kugelstadt et al. 2019): what the
-/// density correction takes away. Shape (elements).
+/// Returns the excess of density, or deficit inside the water, as a fraction of a cell: the source
+/// of the density correction (Kugelstadt et al. 2019). Shape (elements).
 pub fn find_excess(step: &Step<'_>, bricks: &Bricks, room: &Room, density: &[f64]) -> Vec<f64> {
     per_cell(bricks, |element| {
         let e = element as usize;
         if room.kind[e] != FLUID {
             return 0.0;
         }
-        // Beyond the domain there is no cell and no air. Water that fills a gap is air still.
+        // Beyond the domain there is neither a cell nor air. A gap filled by close_gaps still
+        // counts as air.
         let is_air = |other: u32| {
             let kind = room.kind[other as usize];
             let is_filling = || is_filling(step, bricks, room, density, other);
