@@ -1,4 +1,4 @@
-//! Numbers that look random and follow from ids (shared/hash.wgsl).
+//! Pseudo-random numbers from ids (shared/hash.wgsl).
 
 use glam::DVec3;
 
@@ -9,7 +9,8 @@ fn pcg(value: u32) -> u32 {
     (word >> 22) ^ word
 }
 
-/// A unit vector for a pair that stands on one spot: opposite for (a, b) and (b, a).
+/// Returns a unit vector for a pair of particles at the same position: opposite for (a, b) and (b,
+/// a).
 pub(super) fn pair_direction(a: u32, b: u32) -> DVec3 {
     let seed = pcg(a.min(b) ^ pcg(a.max(b)));
     let z = f64::from(seed & 0xffff) / 32767.5 - 1.0;

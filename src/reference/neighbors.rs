@@ -1,4 +1,4 @@
-//! Cells, the order of particles in them, and who is within reach of whom.
+//! Cells, the order of particles in them, and neighbour search.
 
 use std::ops::Range;
 
@@ -14,21 +14,21 @@ const BLOCK: usize = 512;
 /// Cells over a box at the origin; x is fastest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cells {
-    /// Along x, y, z.
+    /// Number of cells along x, y, z.
     pub dims: [usize; 3],
-    /// Metres.
+    /// Edge lengths of a cell, metres.
     pub edge: DVec3,
-    /// Of the box, where it joins its own end.
+    /// Period of the box.
     pub period: Period,
 }
 
 impl Cells {
-    /// Cells that cover a box of `size` metres.
+    /// Creates cells that cover a box of `size` metres.
     pub fn new(size: DVec3, edge: f64) -> Self {
         Self::periodic(size, edge, Period::default())
     }
 
-    /// The same where the box joins its own end.
+    /// Creates cells that cover a periodic box.
     pub fn periodic(size: DVec3, edge: f64, period: Period) -> Self {
         let dims = period.cells(size, edge);
         Self {
@@ -38,28 +38,29 @@ impl Cells {
         }
     }
 
-    /// The cell of a point; outside the box the nearest, or that of its image.
+    /// Returns the cell of a point; outside the box the nearest cell, or along a periodic axis that
+    /// of the point's image.
     pub fn coordinate(&self, x: DVec3) -> [usize; 3] {
         let cell = (x / self.edge).to_array();
         std::array::from_fn(|axis| match self.joins(axis) {
             true => cell[axis].floor().rem_euclid(self.dims[axis] as f64) as usize,
-            // A cast rounds towards 0, and saturates: what is below 0 becomes 0.
+            // A float-to-integer cast truncates and saturates: negative values become 0.
             false => (cell[axis] as usize).min(self.dims[axis] - 1),
         })
     }
 
-    /// Whether the last cell along an axis lies beside the first.
+    /// Returns whether an axis is periodic.
     fn joins(&self, axis: usize) -> bool {
         self.period.0[axis] > 0.0
     }
 
-    /// The cells about that of a point, it among them, as runs of their places.
+    /// Returns the 27 cells around a point, including its own, as runs of cell indices.
     #[inline]
     pub fn runs(&self, x: DVec3) -> Runs {
         let ([cx, cy, cz], [nx, ny, nz]) = (self.coordinate(x), self.dims);
         let beside = |axis: usize, at: usize, count: usize| match self.joins(axis) {
             true => [at + count - 1, at, at + 1].map(|k| [k % count, k % count + 1]),
-            // One run, and two that are empty.
+            // One run, and two empty ones.
             false => [[at.saturating_sub(1), (at + 2).min(count)], [0; 2], [0; 2]],
         };
         let [along, rows, layers] = [(0, cx, nx), (1, cy, ny), (2, cz, nz)]
@@ -83,7 +84,7 @@ impl Cells {
         runs
     }
 
-    /// Its place in x-fastest order.
+    /// Returns the index of a point's cell, x fastest.
     pub fn index(&self, x: DVec3) -> usize {
         let [i, j, k] = self.coordinate(x);
         (k * self.dims[1] + j) * self.dims[0] + i
@@ -93,12 +94,13 @@ impl Cells {
         self.dims.iter().product()
     }
 
-    /// First point of each cell, and one past the last, for points that are sorted by cell.
+    /// Returns the first point of each cell, and finally the number of points, for points sorted by
+    /// cell.
     pub fn starts(&self, sorted: &[DVec3]) -> Vec<usize> {
         self.starts_of(&self.indices(sorted))
     }
 
-    /// The order that sorts points by cell, and within a cell by `id`.
+    /// Returns the order that sorts points by cell, and by `id` within a cell.
     pub fn order(&self, points: &[DVec3], id: &[u32]) -> Vec<usize> {
         let cells = self.indices(points);
         let mut next = self.starts_of(&cells);
@@ -133,7 +135,7 @@ impl Cells {
     }
 }
 
-/// Up to 27 runs of cells, each by its first and the one past its last.
+/// Up to 27 runs of cells, each with its first cell and its end.
 #[derive(Clone, Copy, Debug)]
 pub struct Runs {
     ends: [[usize; 2]; 27],
@@ -141,7 +143,7 @@ pub struct Runs {
 }
 
 impl Runs {
-    /// In ascending order but for those across a joint.
+    /// Iterates over the runs, in ascending order except across a periodic boundary.
     #[inline(always)]
     pub fn iter(&self) -> impl Iterator<Item = Range<usize>> + use<'_> {
         self.ends[..self.count]
@@ -150,14 +152,14 @@ impl Runs {
     }
 }
 
-/// Points in cells: particles first, then samples on solids, each sorted by cell.
+/// Points in cells: particles first, then boundary samples on solids, each sorted by cell.
 #[derive(Clone, Debug)]
 pub struct Crowd<'a> {
     /// Cells of edge h or more.
     pub cells: Cells,
     /// Positions, metres.
     pub points: &'a [DVec3],
-    /// How many of them are particles.
+    /// Number of particles among the points.
     pub particles: usize,
 }
 
@@ -167,7 +169,7 @@ pub struct Neighbors {
     blocks: Vec<Block>,
 }
 
-/// Lists one after another, with the end of each one's particles and of its samples.
+/// Lists in sequence, with the end of each one's particles and of its samples.
 #[derive(Clone, Debug, PartialEq, Eq)]
 struct Block {
     ends: Vec<[u32; 2]>,
@@ -175,7 +177,8 @@ struct Block {
 }
 
 impl Neighbors {
-    /// Who is nearer than `radius` to each particle, by nine runs of three cells (Hoetzlein 2014).
+    /// Finds the points closer than `radius` to each particle, by nine runs of three cells
+    /// (Hoetzlein 2014).
     pub fn search(crowd: &Crowd<'_>, radius: f64) -> Self {
         let (fluid, solid) = crowd.points.split_at(crowd.particles);
         let groups = [
@@ -201,7 +204,7 @@ impl Neighbors {
                         members.extend(found.map(|(_, j)| j as u32));
                     }
                 }
-                // Runs across a joint come before those that they follow.
+                // Runs across a periodic boundary come before runs with smaller indices.
                 if period != Period::default() {
                     members[begin..].sort_unstable();
                 }
@@ -210,8 +213,9 @@ impl Neighbors {
         })
     }
 
-    /// Whom PBF's lists have (pbf/build_neighbors): particles by words for places, where these tell them, of which some are a little farther
-    /// than `h` and count once they come within it; samples on solids nearer than `h`.
+    /// Lists the neighbours of PBF's lists (pbf/build_neighbors): particles by quantized positions,
+    /// where these are in use, some of which are slightly farther than `h` and count once they come
+    /// within it; boundary samples closer than `h`.
     pub fn listed_within(crowd: &Crowd<'_>, h: f64) -> Self {
         let cells = &crowd.cells;
         if !places::are_told(cells.dims.into_iter(), cells.period != Period::default()) {
@@ -246,7 +250,8 @@ impl Neighbors {
         })
     }
 
-    /// The same by asking every pair: slow, and with nothing in it to go wrong.
+    /// Finds the same as [`Self::search`] by testing every pair: slow, but simple enough to be an
+    /// oracle.
     pub fn naive(crowd: &Crowd<'_>, radius: f64) -> Self {
         let x = crowd.points;
         Self::listed(crowd.particles, |i, members| {
@@ -259,7 +264,8 @@ impl Neighbors {
         })
     }
 
-    /// `list` appends the neighbours of a particle and gives the lengths after its particles and its samples.
+    /// Builds lists from a function `list` that appends the neighbours of a particle and returns
+    /// the lengths after its particles and after its samples.
     pub fn listed(
         particles: usize,
         list: impl Fn(usize, &mut Vec<u32>) -> [u32; 2] + Sync,
@@ -276,13 +282,14 @@ impl Neighbors {
         Self { blocks }
     }
 
-    /// Particles near particle `i`, itself apart.
+    /// Returns the particles near particle `i`, without itself.
     #[inline]
     pub fn fluid(&self, i: usize) -> &[u32] {
         self.of(i).0
     }
 
-    /// Particles near particle `i`, itself apart, and samples; samples count on from the particles.
+    /// Returns the particles near particle `i`, without itself, and the samples; indices of samples
+    /// follow those of particles.
     #[inline]
     pub fn of(&self, i: usize) -> (&[u32], &[u32]) {
         let block = &self.blocks[i / BLOCK];
@@ -296,21 +303,21 @@ impl Neighbors {
         (&block.members[first..middle], &block.members[middle..end])
     }
 
-    /// Both, one after the other.
+    /// Iterates over both, particles first.
     pub fn all(&self, i: usize) -> impl Iterator<Item = u32> + '_ {
         let (fluid, solid) = self.of(i);
         fluid.iter().chain(solid).copied()
     }
 
-    /// Pairs in all, each of two particles counted from either side.
+    /// Returns the total length of all lists; a pair of particles counts twice.
     pub fn pairs(&self) -> usize {
         self.blocks.iter().map(|block| block.members.len()).sum()
     }
 }
 
-/// Appends which of a run of points, the first of them `first`, are near point `own`.
+/// Appends the points of a run that are near point `own`; the run's first point has index `first`.
 ///
-/// Without a branch on that: six of seven candidates are too far, at no time that can be foretold.
+/// Branch-free: six of seven candidates are too far, in an unpredictable order.
 #[inline]
 fn append_near<T>(
     run: &[T],
@@ -329,23 +336,24 @@ fn append_near<T>(
     members.truncate(end);
 }
 
-/// Appends whom words tell to be near a particle.
+/// Appends the particles that are near a particle according to their quantized positions.
 struct NearByWords<'a> {
     runs: &'a Runs,
     /// First particle of each cell.
     starts: &'a [usize],
-    /// Of the particles, and [`AT_ONCE`] more that mean nothing.
+    /// Position words of the particles, and [`AT_ONCE`] padding words.
     words: &'a [u32],
-    /// The particle.
+    /// Index of the particle.
     own: usize,
     members: &'a mut Vec<u32>,
 }
 
-/// How many words are compared at once, and how many neighbours are collected before they are appended to the list.
+/// Number of words that are compared at once, and of neighbours that are collected before they are
+/// appended to the list.
 const AT_ONCE: usize = 8;
 const HELD: usize = 128;
 
-/// The numbers of a byte's bits that are set, in front; what follows means nothing.
+/// Indices of a byte's set bits, packed to the front; the remaining entries are unused.
 const BITS: [[u8; AT_ONCE]; 1 << AT_ONCE] = {
     let mut bits = [[0; AT_ONCE]; 1 << AT_ONCE];
     let mut byte = 0;
@@ -381,11 +389,11 @@ impl WithSimd for NearByWords<'_> {
                 for (k, &other) in self.words[first..first + AT_ONCE].iter().enumerate() {
                     near |= usize::from(places::are_near(word, other)) << k;
                 }
-                // Neither itself, nor words behind the run's end.
+                // Excludes the particle itself, and words after the end of the run.
                 let itself = self.own.wrapping_sub(first);
                 near &= !(usize::from(itself < AT_ONCE) << (itself % AT_ONCE));
                 near &= (1 << (end - first).min(AT_ONCE)) - 1;
-                // Without a branch: six of seven are too far, at no time that can be foretold.
+                // Branch-free: six of seven candidates are too far, in an unpredictable order.
                 let room = held[count..count + AT_ONCE].iter_mut();
                 for (room, &bit) in room.zip(&BITS[near]) {
                     *room = first as u32 + u32::from(bit);
@@ -402,7 +410,7 @@ impl WithSimd for NearByWords<'_> {
 mod tests {
     use super::*;
 
-    /// Halton points: no two on one spot, no lattice.
+    /// Returns Halton points: no two coincide, and they form no lattice.
     fn halton(count: usize, size: DVec3) -> Vec<DVec3> {
         let radical = |mut k: usize, base: usize| {
             let (mut value, mut weight) = (0.0, 1.0);
@@ -418,7 +426,7 @@ mod tests {
             .collect()
     }
 
-    /// In a slab of three cells, and along x and z as well.
+    /// Periodic along z in a slab of three cells, along x and z, and along all axes.
     #[test]
     fn search_goes_on_across_a_joint() {
         let size = DVec3::new(2.3, 0.9, 0.63);
@@ -441,7 +449,7 @@ mod tests {
             for i in 0..points.len() {
                 assert_eq!(fast.of(i), slow.of(i), "particle {i}");
             }
-            // With walls there, some are not found.
+            // With walls instead, some neighbours are not found.
             let walled = Crowd {
                 cells: Cells {
                     period: Period::default(),
@@ -453,7 +461,7 @@ mod tests {
         }
     }
 
-    /// An even cloud, one that is packed into a corner, and one that reaches out of the box.
+    /// A uniform cloud, one packed into a corner, and one that extends beyond the box.
     #[test]
     fn search_finds_whom_the_naive_one_finds() {
         let size = DVec3::new(2.3, 0.9, 1.4);
@@ -470,7 +478,7 @@ mod tests {
         }
     }
 
-    /// Points of either kind in the order of their cells.
+    /// Returns points of both kinds, sorted by their cells.
     fn crowded(cells: Cells, fluid: &[DVec3], solid: &[DVec3]) -> Vec<DVec3> {
         let sorted = |points: &[DVec3]| {
             let id: Vec<u32> = (0..points.len() as u32).collect();
@@ -480,8 +488,9 @@ mod tests {
         [sorted(fluid), sorted(solid)].concat()
     }
 
-    /// By words are found those whom words of every pair tell, of those who are as near as lists can reach; one cloud is so dense
-    /// that runs of cells are longer than what is held at once.
+    /// Search by quantized positions finds exactly the pairs whose words are close, among all pairs
+    /// within the reach of the lists. One cloud is so dense that runs of cells are longer than the
+    /// held batch.
     #[test]
     fn words_find_whom_every_pair_of_them_tells() {
         let (size, h) = (DVec3::new(2.3, 0.9, 1.4), 0.2);
@@ -510,12 +519,12 @@ mod tests {
                 beyond += told.len() - near.fluid(i).len();
             }
             assert!(scale == 1.0 || most > 2 * HELD, "{most}");
-            // Lists are not those of distances: the comparison can fail.
+            // The lists differ from those by distance: the comparison can fail.
             assert!(beyond > 0);
         }
     }
 
-    /// In cells, and in a cell by their numbers, however these lie.
+    /// Sorted by cell, and by id within a cell, whatever the order of the ids.
     #[test]
     fn order_is_that_of_cells_and_numbers() {
         let size = DVec3::new(2.3, 0.9, 1.4);
@@ -528,7 +537,7 @@ mod tests {
         let mut all = order.clone();
         all.sort_unstable();
         assert!(all.into_iter().eq(0..1500));
-        // By places alone numbers do not ascend.
+        // Negative control: without sorting, the ids do not ascend.
         assert!(!(0..1500).collect::<Vec<usize>>().is_sorted_by_key(key));
     }
 

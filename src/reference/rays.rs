@@ -1,7 +1,7 @@
-//! The truth of a picture's surfaces: rays cast in f64 through the kernels' own field.
+//! Ground truth for the surfaces of a picture: rays cast in f64 through the field of the kernels.
 //!
-//! No voxel, no splat and no f32 stands between a particle and what a ray meets here. The level set only says in which bricks no
-//! surface can be.
+//! No voxels, splats or f32 approximations are involved. The level set only tells in which bricks
+//! no surface can be.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -16,22 +16,25 @@ use swell_domain::{
     mesh::TriangleMesh,
 };
 
-/// Steps through a voxel of the level set: the thinnest sheet of particles is one and a half of its voxels.
+/// Steps through a voxel of the level set: the thinnest sheet of particles is one and a half voxels
+/// thick.
 const STEPS: f64 = 2.0;
-/// Halvings of the step in which a ray meets the surface.
+/// Bisections of the step in which a ray meets the surface.
 const HALVINGS: u32 = 40;
 
-/// What a pixel's ray meets.
+/// What a pixel's ray hits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Seen {
-    /// Along the optical axis to what is opaque, metres; infinite in the sky.
+    /// Depth along the optical axis of the first opaque surface, metres; infinite in the sky.
     pub opaque: f64,
-    /// Along the optical axis to water that stands before it, and the unit normal out of it.
+    /// Depth along the optical axis of water in front of that, and the unit normal out of the
+    /// water.
     pub water: Option<(f64, DVec3)>,
 }
 
-/// Casts a ray through each pixel, rows from the top: water of `kernels` in a box whose floor is the ground, of particles of
-/// `spacing` metres, before solids; all relative to the box's least corner.
+/// Casts a ray through each pixel, rows from the top. The water is that of `kernels` in a box whose
+/// floor is the ground, with particles of `spacing` metres; `solids` are opaque. Positions are
+/// relative to the box's minimum corner.
 pub fn cast(
     eye: &Eye,
     kernels: &Kernels,
@@ -69,7 +72,8 @@ struct Water<'a> {
 }
 
 impl Water<'_> {
-    /// Where a ray from the air first meets the water before `bound`, and the normal there; at a side of the box that of the side.
+    /// Returns where a ray from the air first meets the water before `bound`, and the normal there;
+    /// on a side of the box, the normal of the side.
     fn along(&self, origin: DVec3, ray: DVec3, bound: f64) -> Option<(f64, DVec3)> {
         let low = -origin / ray;
         let high = (self.coarse.size - origin) / ray;
@@ -114,7 +118,8 @@ impl Water<'_> {
 mod tests {
     use super::*;
 
-    /// A pool from wall to wall, half of it behind a plate: depths and normals are a plane's, and the plate hides water.
+    /// A pool from wall to wall, half of it behind a plate: depths and normals are a plane's, and
+    /// the plate hides water.
     #[test]
     fn a_pool_is_met_where_its_plane_is() {
         const D: f64 = 0.1;
@@ -151,7 +156,8 @@ mod tests {
             }
             let (depth, normal) = found.water.expect("a pool");
             assert_eq!(found.opaque, 1.8);
-            // The field is calibrated so that its mean over a lattice's cell is zero there; within a cell it varies.
+            // The field is calibrated so that its mean over a lattice cell is zero there; within a
+            // cell it varies.
             assert!((depth - 1.0).abs() < 0.02 * D, "{depth}");
             assert!(normal.y > 0.99, "{normal}");
         }

@@ -1,4 +1,5 @@
-//! Twins of shaders/whitewater in f64, and whitewater on the CPU: one function a pass, under its name.
+//! Reference passes of shaders/whitewater in f64, one function per pass with its name, and
+//! whitewater on the CPU.
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -17,61 +18,62 @@ use swell_scene::Scene;
 
 use super::{ReferenceError, pbf::Model};
 
-/// Water at a frame's end, sorted by cell, and the walls and solids about it. Places relative to the domain's least corner.
+/// Water at a frame's end, sorted by cell, with the walls and solids around it. Positions are
+/// relative to the domain's minimum corner.
 #[derive(Clone, Debug)]
 pub struct Water {
-    /// Kernels, samples on solids, cells.
+    /// Kernels, boundary samples on solids, cells.
     pub model: Model,
-    /// The box now, wave-makers included.
+    /// Faces of the box, displaced by wave makers.
     pub walls: Bounds,
-    /// Places, metres. Shape (particles).
+    /// Positions, metres. Shape (particles).
     pub points: Vec<DVec3>,
-    /// m/s. Shape (particles).
+    /// Velocities, m/s. Shape (particles).
     pub velocity: Vec<DVec3>,
-    /// Of each its place in the water that was handed in. Shape (particles).
+    /// Index of each particle in the original water. Shape (particles).
     pub order: Vec<usize>,
     starts: Vec<usize>,
     sample_starts: Vec<usize>,
 }
 
-/// What whitewater/survey finds of a water particle.
+/// Result of whitewater/survey for a water particle.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Surveyed {
-    /// Share of its place that is water.
+    /// Water fraction around it.
     pub share: f64,
-    /// Outward, of length 1; 0 where the density has no slope.
+    /// Outward unit normal; 0 where the density has no gradient.
     pub normal: DVec3,
     /// Length of the density's gradient times h.
     pub steepness: f64,
-    /// How surely there is a surface, 0 to 1.
+    /// Confidence that the particle is at the surface, 0 to 1.
     pub sure: f64,
 }
 
 /// A whitewater particle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct White {
-    /// Place, metres.
+    /// Position, metres.
     pub position: DVec3,
-    /// m/s.
+    /// Velocity, m/s.
     pub velocity: DVec3,
-    /// What it is.
+    /// Kind.
     pub kind: Kind,
 }
 
-/// Where a frame took one, and how nearly it went elsewhere.
+/// A whitewater particle after a frame, with the margin of the decisions made on its path.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Moved {
-    /// Now.
+    /// The particle after the frame.
     pub white: White,
-    /// Share of water about it.
+    /// Water fraction around it.
     pub share: f64,
-    /// Least distance of a share that decided something from what it was held against.
+    /// Smallest difference between a water fraction that decided something and its threshold.
     pub margin: f64,
-    /// Whether a solid pushed it, or may have by rounding.
+    /// Whether a solid pushed it, or may have within rounding.
     pub is_pushed: bool,
 }
 
-/// Water about a place.
+/// Water around a position.
 #[derive(Clone, Copy, Debug)]
 struct Found {
     share: f64,
@@ -79,13 +81,14 @@ struct Found {
 }
 
 impl Water {
-    /// Of the water of `scene`, which is [`Scene::of_whitewater`] of what was baked, at `time`, seconds.
+    /// Takes the water of `scene`, which is [`Scene::of_whitewater`] of the baked scene, at `time`,
+    /// seconds.
     pub fn new(scene: &Scene, boundary: &Boundary, water: &Particles, time: f64) -> Self {
         let mut model = Model::new(scene, boundary);
         model.stand(scene, time, 0.0);
         let origin = scene.domain.min;
         let wide = |v: &[f32; 3]| Vec3::from_array(*v).as_dvec3();
-        // The device has them in 32 bits about the same corner.
+        // The device holds positions in f32, relative to the same corner.
         let local = |p: &[f32; 3]| (wide(p) - origin).as_vec3().as_dvec3();
         let places: Vec<DVec3> = water.position.iter().map(local).collect();
         let order = model.cells.order(&places, &water.id);
@@ -101,7 +104,8 @@ impl Water {
         }
     }
 
-    /// Calls `visit` with each water particle and each sample on a solid in the cells about `x`, and the way from it to `x`.
+    /// Calls `visit` with each water particle and each boundary sample in the cells around `x`, and
+    /// the vector from it to `x`.
     pub fn about(&self, x: DVec3, mut visit: impl FnMut(Neighbor, DVec3)) {
         let period = self.model.period();
         for cells in self.model.cells.runs(x).iter() {
@@ -120,7 +124,7 @@ impl Water {
         scale * kernel / (1.0 - wall - scale * solid).max(0.1)
     }
 
-    /// [`Surveyed`] of particle `i` (whitewater/survey).
+    /// Reference pass of whitewater/survey: returns [`Surveyed`] of particle `i`.
     pub fn survey(&self, i: usize) -> Surveyed {
         let (x, h) = (self.points[i], self.model.calibration.support_radius);
         let (mut kernel, mut solid, mut gradient) = (0.0, 0.0, DVec3::ZERO);
@@ -151,7 +155,8 @@ impl Water {
         }
     }
 
-    /// [`Potentials`] of particle `i` (whitewater/potentials), from what was surveyed of all. Shape (particles).
+    /// Reference pass of whitewater/potentials: returns [`Potentials`] of particle `i`, from the
+    /// survey of all particles. Shape (particles).
     pub fn potentials(&self, i: usize, surveyed: &[Surveyed]) -> Potentials {
         let h = self.model.calibration.support_radius;
         let (own, v) = (&surveyed[i], self.velocity[i]);
@@ -199,12 +204,12 @@ impl Water {
         }
     }
 
-    /// Off walls, out of solids, in the domain.
+    /// Returns the nearest allowed position: off walls, out of solids, in the domain.
     fn allowed(&self, x: DVec3) -> DVec3 {
         self.model.period().wrap(self.model.confine(x, &self.walls))
     }
 
-    /// Whether a solid pushes at a place, or may by rounding.
+    /// Returns whether a solid pushes at a position, or may within rounding.
     fn is_touched(&self, x: DVec3) -> bool {
         let reach = 1.001 * self.model.contact_distance();
         let movers = self.model.movers.iter().map(|it| it.solid.sample(x));
@@ -212,7 +217,8 @@ impl Water {
         movers.chain(still).any(|distance| distance < reach)
     }
 
-    /// Takes a whitewater particle over `seconds` to this water's frame, under `gravity`, m/s² (whitewater/advance).
+    /// Reference pass of whitewater/advance: moves a whitewater particle over `seconds` to this
+    /// water's frame, under `gravity`, m/s².
     pub fn advance(
         &self,
         settings: &Settings,
@@ -285,16 +291,16 @@ impl Water {
     }
 }
 
-/// Who is about a place.
+/// A neighbour of a position.
 #[derive(Clone, Copy, Debug)]
 pub enum Neighbor {
     /// Index of a water particle.
     Water(usize),
-    /// Weight of a sample on a solid.
+    /// Weight of a boundary sample.
     Sample(f64),
 }
 
-/// Way, metres, and velocity after it, m/s, of a drop in the air.
+/// Returns the displacement, metres, of a drop in the air, and its velocity after it, m/s.
 fn fly(settings: &Settings, gravity: DVec3, seconds: f64, start: DVec3) -> (DVec3, DVec3) {
     let wind = DVec3::from_array(settings.wind);
     let step = seconds / f64::from(FLIGHT_STEPS);
@@ -309,7 +315,7 @@ fn fly(settings: &Settings, gravity: DVec3, seconds: f64, start: DVec3) -> (DVec
     (way, velocity)
 }
 
-/// Whitewater over the frames of one bake, on the CPU.
+/// Whitewater for the frames of one bake, on the CPU.
 #[derive(Debug)]
 pub struct Whitewater {
     scene: Scene,
@@ -319,7 +325,8 @@ pub struct Whitewater {
 }
 
 impl Whitewater {
-    /// For the water of `scene`, which is [`Scene::of_whitewater`] of what was baked.
+    /// Creates whitewater for the water of `scene`, which is [`Scene::of_whitewater`] of the baked
+    /// scene.
     pub fn new(scene: &Scene, boundary: &Boundary) -> Self {
         Self {
             scene: scene.clone(),
@@ -329,13 +336,13 @@ impl Whitewater {
         }
     }
 
-    /// Makes ready to move whitewater by these settings.
+    /// Prepares the motion of whitewater with these settings.
     pub fn set(&mut self, settings: &Settings) {
         self.settings = Some(settings.clone());
     }
 
-    /// Takes the water of a frame at `time`, `seconds` after the one before, and gives what of each particle makes
-    /// whitewater, in the order of the water.
+    /// Takes the water of the frame at `time`, `seconds` after the previous one, and returns the
+    /// potentials of its particles, in the water's order.
     pub fn survey(&mut self, water: &Particles, time: f64, seconds: f64) -> Vec<Potentials> {
         let sorted = Water::new(&self.scene, &self.boundary, water, time);
         let n = water.len();
@@ -352,13 +359,11 @@ impl Whitewater {
         in_order
     }
 
-    /// Moves whitewater from the frame before to that of the last [`Self::survey`].
+    /// Moves whitewater from the previous frame to that of the last [`Self::survey`].
     ///
-    /// # Errors
-    /// What is not finite.
+    /// # Errors Returns an error if a value is not finite.
     ///
-    /// # Panics
-    /// Before [`Self::set`] and [`Self::survey`].
+    /// # Panics Panics if [`Self::set`] or [`Self::survey`] was not called.
     pub fn advance(&self, white: &mut Particles, frame: u32) -> Result<(), ReferenceError> {
         let (Some(settings), Some((water, seconds))) = (&self.settings, &self.water) else {
             panic!("settings and water come before moves");

@@ -1,8 +1,9 @@
-//! The density constraints solved exactly: what PBF's iterations approach.
+//! Exact solution of the density constraints, which PBF's iterations approach.
 //!
-//! With G = ∇C of the compressed particles, their masses equal, an iteration of PBF takes the diagonal of
-//! G Gᵀ + εI for the whole; here the whole is factorised (faer's sparse Cholesky). A row has the particles within 2h,
-//! 250 of them at h = 2d, and the factor fills in between: docs/accuracy.md has what that costs.
+//! With G = ∇C of the compressed particles, whose masses are equal, an iteration of PBF replaces G
+//! Gᵀ + εI by its diagonal; this module factorises the whole matrix (faer's sparse Cholesky). A row
+//! couples the particles within 2h, 250 of them at h = 2d, and the factor fills in between:
+//! docs/accuracy.md states the cost.
 
 use std::{collections::BTreeMap, fmt::Debug};
 
@@ -22,38 +23,38 @@ use crate::{ReferenceError, Timings};
 use swell_domain::{boundary::Boundary, particles::Particles};
 use swell_scene::Scene;
 
-/// Newton steps after which the nonlinear solve gives up.
+/// Newton steps after which the nonlinear solve fails.
 const MAX_STEPS: usize = 100;
 
-/// A correction that meets the linearised constraints.
+/// A correction that satisfies the linearised constraints.
 #[derive(Clone, Debug)]
 pub struct Correction {
-    /// λ of each particle, m²; 0 where it is not compressed. Shape (particles).
+    /// λ of each particle, m²; 0 if it is not compressed. Shape (particles).
     pub lambda: Vec<f64>,
     /// Δx = Gᵀ λ of each particle, metres; neither bounded nor confined. Shape (particles).
     pub delta: Vec<DVec3>,
-    /// Compressed particles.
+    /// Number of compressed particles.
     pub active: usize,
 }
 
-/// Particles where their constraints hold.
+/// Particles that satisfy their constraints.
 #[derive(Clone, Debug)]
 pub struct Converged {
     /// Positions, metres. Shape (particles).
     pub position: Vec<DVec3>,
-    /// Linear solves.
+    /// Number of linear solves.
     pub steps: usize,
-    /// Largest max(0, C) that is left.
+    /// Largest remaining max(0, C).
     pub error: f64,
-    /// Its mean over all particles.
+    /// Mean of max(0, C) over all particles.
     pub mean_error: f64,
 }
 
-/// Solves (G Gᵀ + εI) λ = −C over the particles with C > 0, G as the iteration has it, which is spiky's; ε =
-/// `regularization`, 1/m².
+/// Solves (G Gᵀ + εI) λ = −C over the particles with C > 0, with the iteration's G from the spiky
+/// kernel; ε = `regularization`, 1/m².
 ///
-/// # Errors
-/// [`ReferenceError::Factor`] where the matrix is not positive definite or memory does not hold its factor.
+/// # Errors Returns [`ReferenceError::Factor`] if the matrix is not positive definite or memory
+/// does not hold its factor.
 pub fn linearised(inputs: Inputs<'_>, regularization: f64) -> Result<Correction, ReferenceError> {
     let rows: Vec<Row> = (0..inputs.particles())
         .into_par_iter()
@@ -68,7 +69,7 @@ pub fn linearised(inputs: Inputs<'_>, regularization: f64) -> Result<Correction,
     solve(&gradients, &excess, regularization)
 }
 
-/// The least Δx with G Δx = −C over the particles whose C, `excess`, is above 0.
+/// Returns the smallest Δx with G Δx = −C over the particles whose C, `excess`, is positive.
 fn solve(
     gradients: &Gradients<'_>,
     excess: &[f64],
@@ -102,13 +103,14 @@ fn solve(
     Ok(correction)
 }
 
-/// Newton's method on C = 0 over the particles with C > 0, each step the least one in the sum of squares, bounded as an
-/// iteration's correction is and kept out of walls and solids, until none is compressed by more than `tolerance`. G is
-/// the derivative of C here, by poly6: a block squeezed by 2 % along each axis takes 21 steps to 1e-8, and 47 with spiky's
-/// slope in its place, as the iteration has it. In too little room poly6's flat top lets pairs close up.
+/// Newton's method on C = 0 over the particles with C > 0. Each step is the smallest one in the sum
+/// of squares, bounded like an iteration's correction and kept out of walls and solids; it ends
+/// when no particle is compressed by more than `tolerance`. Here G is the exact derivative of C,
+/// from poly6: a block squeezed by 2 % along each axis takes 21 steps to 1e-8, and 47 with the
+/// iteration's spiky gradient. If there is too little space, poly6's flat top lets pairs collapse.
 ///
-/// # Errors
-/// [`ReferenceError::Factor`], and [`ReferenceError::NotConverged`] after a hundred steps.
+/// # Errors Returns [`ReferenceError::Factor`], or [`ReferenceError::NotConverged`] after a hundred
+/// steps.
 pub fn converged(
     model: &Model,
     substep: &Substep,
@@ -149,13 +151,13 @@ pub fn converged(
     })
 }
 
-/// How far the state at the end of a frame is from where its density constraints hold: the RMS over particles of
-/// |x − x'| / d, with x' what [`converged`] makes of x. It is what further iterations would still have to move, and 0
-/// once they are done; states that different iterations converge to differ among themselves, for C ≤ 0 holds not at
-/// one place alone.
+/// Returns the distance of a frame's final state from one that satisfies its density constraints:
+/// the RMS over particles of the distance between x and x' over d, where [`converged`] turns x into
+/// x'. It measures the displacement that further iterations would add, and is 0 once they have
+/// converged. States that different iterations converge to differ among themselves, because C ≤ 0
+/// has many solutions.
 ///
-/// # Errors
-/// Those of [`converged`].
+/// # Errors Returns the errors of [`converged`].
 pub fn distance_to_converged(
     scene: &Scene,
     boundary: &Boundary,
@@ -175,12 +177,12 @@ pub fn distance_to_converged(
     Ok(mean.sqrt() / model.settings.particle_spacing)
 }
 
-/// Rows of G, and its columns, without ever being stored.
+/// Rows and columns of G, which is never stored.
 struct Gradients<'a> {
     inputs: Inputs<'a>,
     /// ∇_i C_i, 1/m.
     own: Vec<DVec3>,
-    /// Of poly6, as C itself; else of spiky.
+    /// Whether gradients are those of poly6, the exact derivative of C, rather than of spiky.
     is_exact: bool,
 }
 
@@ -206,7 +208,7 @@ impl<'a> Gradients<'a> {
         gradients
     }
 
-    /// The lower half of G Gᵀ + εI over `active`: row, column, value.
+    /// Returns the lower half of G Gᵀ + εI over `active` as (row, column, value).
     fn products(&self, active: &[usize], regularization: f64) -> Vec<Triplet<usize, usize, f64>> {
         let mut place = vec![usize::MAX; self.own.len()];
         for (k, &i) in active.iter().enumerate() {
@@ -215,7 +217,7 @@ impl<'a> Gradients<'a> {
         let row = |(k, &i): (usize, &usize)| {
             let mut entries = BTreeMap::from([(k, regularization)]);
             for (moved, own) in self.of(i) {
-                // Who else feels that particle: itself and its neighbours.
+                // The particles whose density depends on that one: itself and its neighbours.
                 for (other, theirs) in self.felt_by(moved) {
                     if place[other] <= k {
                         *entries.entry(place[other]).or_insert(0.0) += own.dot(theirs);
@@ -228,19 +230,19 @@ impl<'a> Gradients<'a> {
         active.par_iter().enumerate().flat_map_iter(row).collect()
     }
 
-    /// ∇_j C_i for i itself and its fluid neighbours j.
+    /// Iterates over ∇_j C_i for i itself and its fluid neighbours j.
     fn of(&self, i: usize) -> impl Iterator<Item = (usize, DVec3)> + '_ {
         let others = self.inputs.neighbors.fluid(i).iter().map(|&j| j as usize);
         std::iter::once((i, self.own[i])).chain(others.map(move |j| (j, self.pair(i, j))))
     }
 
-    /// ∇_j C_k for all k whose density j takes part in.
+    /// Iterates over ∇_j C_k for all k whose density depends on j.
     fn felt_by(&self, j: usize) -> impl Iterator<Item = (usize, DVec3)> + '_ {
         let others = self.inputs.neighbors.fluid(j).iter().map(|&k| k as usize);
         std::iter::once((j, self.own[j])).chain(others.map(move |k| (k, self.pair(k, j))))
     }
 
-    /// ∇_j C_i of two different points: moving j towards i makes i denser.
+    /// Returns ∇_j C_i of two different points; moving j towards i increases C_i.
     fn pair(&self, i: usize, j: usize) -> DVec3 {
         let calibration = &self.inputs.model.calibration;
         let h = calibration.support_radius;

@@ -1,8 +1,8 @@
 //! Position-based fluids (Macklin and Müller 2013), the same model as on the GPU.
 //!
-//! Positions are relative to the domain's least corner, in metres, in the order of the sort. [`passes`] and
-//! [`effects`] are the GPU passes' twins; [`Pbf`] runs whole frames; [`constraint`] solves exactly what
-//! iterations approach.
+//! Positions are relative to the domain's minimum corner, in metres, in sorted order. [`passes`]
+//! and [`effects`] are the reference passes of the GPU passes; [`Pbf`] runs whole frames;
+//! [`constraint`] solves exactly what iterations approach.
 
 pub mod constraint;
 pub mod effects;

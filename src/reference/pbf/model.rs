@@ -1,4 +1,4 @@
-//! What stays the same over a bake, and what a substep knows.
+//! Data that does not change during a bake, and parameters of a substep.
 
 use glam::DVec3;
 
@@ -14,19 +14,19 @@ use swell_domain::{
 };
 use swell_scene::Scene;
 
-/// Which particles a pass handles: the parity of their sorted index.
+/// Particles that a pass handles, by the parity of their sorted index.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Colour {
     /// Every particle.
     All,
-    /// Even ones.
+    /// Even indices.
     Red,
-    /// Odd ones.
+    /// Odd indices.
     Black,
 }
 
 impl Colour {
-    /// Whether particle `i` of the sorted order has it.
+    /// Returns whether particle `i` of the sorted order has this colour.
     pub fn holds(self, i: usize) -> bool {
         match self {
             Self::All => true,
@@ -36,72 +36,72 @@ impl Colour {
     }
 }
 
-/// The water's constants and its solids.
+/// Constants of the water, and its solids.
 #[derive(Clone, Debug)]
 pub struct Model {
-    /// Kernels.
+    /// Kernel calibration.
     pub calibration: Calibration,
     /// Solver settings.
     pub settings: swell_scene::Pbf,
-    /// m/s².
+    /// Gravity that the prediction applies, m/s²; zero if a projection applies it.
     pub gravity: DVec3,
-    /// Edges of the domain, metres.
+    /// Size of the domain, metres.
     pub size: DVec3,
     /// Cells of edge h over the domain.
     pub cells: Cells,
-    /// Samples on solids as they stand, sorted by cell.
+    /// Positions of boundary samples on solids in their current poses, sorted by cell, metres.
     pub samples: Vec<DVec3>,
-    /// Their weights in particles' worth of mass.
+    /// Weights of the samples, in units of a particle's mass.
     pub sample_weights: Vec<f64>,
-    /// Their velocities, m/s.
+    /// Velocities of the samples, m/s.
     pub sample_velocities: Vec<DVec3>,
-    /// Distance to the solids at rest; `None` without any.
+    /// Signed distance to the static solids; `None` if there are none.
     pub distance: Option<SignedDistance>,
-    /// Solids that move, as they stand.
+    /// Moving solids in their current poses.
     pub movers: Vec<Mover>,
-    /// What they are placed by; `None` where nothing moves.
+    /// Source of the moving solids' samples and grids; `None` if nothing moves.
     boundary: Option<Boundary>,
-    /// Of the scene, m/s², whoever adds it.
+    /// Gravity of the scene, m/s², whichever part of the solver applies it.
     pub scene_gravity: DVec3,
 }
 
-/// A solid that moves.
+/// A moving solid.
 #[derive(Clone, Debug)]
 pub struct Mover {
-    /// Its distances as it stands; places are relative to the domain's least corner.
+    /// Signed distances in the current pose, relative to the domain's minimum corner.
     pub solid: Posed,
-    /// What took it there.
+    /// Motion that led to this pose.
     pub passage: Passage,
 }
 
-/// What keeps a position off walls and out of solids.
+/// Displacements that keep a position out of solids and walls.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Pushes {
-    /// What solids added to it, metres.
+    /// Displacement by solids, metres.
     pub of_solids: DVec3,
-    /// The velocity of the last solid that did, m/s.
+    /// Velocity of the last solid that pushed, m/s.
     pub pushing: DVec3,
-    /// What walls added to it then, metres.
+    /// Displacement by walls after that, metres.
     pub of_walls: DVec3,
-    /// Work of solids that move, over m / Δt².
+    /// Work of moving solids, over m / Δt².
     pub work: f64,
 }
 
-/// A substep's length and walls.
+/// Length and walls of a substep.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Substep {
-    /// When it ends, seconds into the shot.
+    /// End of the substep, seconds into the shot.
     pub time: f64,
-    /// Δt, seconds; 0 measures only.
+    /// Length Δt, seconds; 0 for a measurement only.
     pub time_step: f64,
-    /// The box now, wave-makers included.
+    /// Faces of the box at the substep's end, displaced by wave makers.
     pub walls: Bounds,
-    /// Of its faces, each along its axis, m/s.
+    /// Velocities of the faces, each along its own axis, m/s.
     pub wall_velocity: Bounds,
 }
 
 impl Substep {
-    /// That ends at `time` and is `time_step` long, seconds.
+    /// Creates a substep that ends at `time` and is `time_step` long, seconds.
     pub fn new(scene: &Scene, time: f64, time_step: f64) -> Self {
         Self {
             time,
@@ -111,7 +111,8 @@ impl Substep {
         }
     }
 
-    /// What walls do on a particle by adding `push` to its way, over m / Δt² (shared/wall_work.wgsl).
+    /// Returns the work of walls on a particle that they displace by `push`, over m / Δt²
+    /// (shared/wall_work.wgsl).
     pub fn work_of_push(&self, push: DVec3) -> f64 {
         push.max(DVec3::ZERO).dot(self.wall_velocity.min)
             + push.min(DVec3::ZERO).dot(self.wall_velocity.max)
@@ -119,7 +120,7 @@ impl Substep {
 }
 
 impl Model {
-    /// Of a scene that PBF solves, and its solids in world space.
+    /// Creates the model of a scene that uses PBF, with its solids in world space.
     pub fn new(scene: &Scene, boundary: &Boundary) -> Self {
         let settings = scene.solver.pbf();
         let calibration = Calibration::new(settings.particle_spacing, settings.support_ratio);
@@ -159,7 +160,8 @@ impl Model {
         self.samples = order.into_iter().map(|k| local[k]).collect();
     }
 
-    /// Puts solids that move to where they stand at `time`, moving as what takes them there within `step` seconds.
+    /// Moves solids to their poses at `time`, with the velocities of their motion over the
+    /// preceding `step` seconds.
     pub fn stand(&mut self, scene: &Scene, time: f64, step: f64) {
         let Some(boundary) = self.boundary.take() else {
             return;
@@ -183,33 +185,33 @@ impl Model {
         self.boundary = Some(boundary);
     }
 
-    /// Lengths along the axes along which the domain joins its own end.
+    /// Returns the lengths of the domain along its periodic axes.
     #[inline]
     pub fn period(&self) -> Period {
         self.cells.period
     }
 
-    /// Largest correction of one iteration, metres.
+    /// Returns the largest displacement by one iteration, metres.
     pub fn max_correction(&self) -> f64 {
         MAX_CORRECTION * self.settings.particle_spacing
     }
 
-    /// Displacement cap of a substep, metres.
+    /// Returns the cap on a particle's displacement in a substep, metres.
     pub fn max_displacement(&self) -> f64 {
         CAP * self.settings.cfl * self.settings.particle_spacing
     }
 
-    /// ε of λ's denominator, 1/m².
+    /// Returns ε in the denominator of λ, 1/m².
     pub fn regularization(&self) -> f64 {
         REGULARIZATION * self.calibration.bulk_gradient_squares
     }
 
-    /// Keeps a position off the walls and out of the solids (shared/confine.wgsl); what is not a number stays so.
+    /// Keeps a position out of walls and solids (shared/confine.wgsl); a NaN stays a NaN.
     pub fn confine(&self, x: DVec3, walls: &Bounds) -> DVec3 {
         self.confine_by(x, walls).0
     }
 
-    /// The same, and what pushed the position.
+    /// Does the same and also returns the displacements.
     pub fn confine_by(&self, x: DVec3, walls: &Bounds) -> (DVec3, Pushes) {
         let contact = self.contact_distance();
         let mut pushes = self.solid_pushes(x);
@@ -228,12 +230,12 @@ impl Model {
         (kept, pushes)
     }
 
-    /// Least distance from walls and solids, metres.
+    /// Returns the least distance of a particle from walls and solids, metres.
     pub(crate) fn contact_distance(&self) -> f64 {
         CONTACT * self.settings.particle_spacing
     }
 
-    /// What solids add to a position, one after the other.
+    /// Returns the displacements of a position by solids, one solid after another.
     pub(super) fn solid_pushes(&self, x: DVec3) -> Pushes {
         let contact = self.contact_distance();
         let mut pushes = Pushes::default();
@@ -259,7 +261,7 @@ impl Model {
         pushes
     }
 
-    /// The largest speed of a solid's point, m/s.
+    /// Returns the largest speed of any point of a solid, m/s.
     pub fn fastest_solid(&self) -> f64 {
         let speed = |mover: &Mover| {
             let spin = mover.passage.spin.length();
@@ -269,8 +271,8 @@ impl Model {
         self.movers.iter().map(speed).fold(0.0, f64::max)
     }
 
-    /// The derivative of the relative density that the walls give at `x`, 1/m; the gradient of
-    /// [`wall_term`](Self::wall_term) is spiky's in its place.
+    /// Returns the derivative of the walls' contribution to the relative density at `x`, 1/m;
+    /// [`wall_term`](Self::wall_term) returns the spiky gradient instead.
     pub(super) fn wall_derivative(&self, x: DVec3, walls: &Bounds) -> DVec3 {
         let h = self.calibration.support_radius;
         let scale = self.calibration.wall_density_scale;
@@ -287,7 +289,8 @@ impl Model {
         DVec3::new(dx * fy * fz, dy * fx * fz, dz * fx * fy)
     }
 
-    /// The gradient of what each wall adds to the density times the wall's velocity, 1/s (shared/walls.wgsl).
+    /// Returns the sum over the walls of each wall's density gradient times its velocity, 1/s
+    /// (shared/walls.wgsl).
     pub(super) fn wall_rate(&self, x: DVec3, substep: &Substep) -> f64 {
         let velocity = &substep.wall_velocity;
         if *velocity == Bounds::default() {
@@ -310,7 +313,8 @@ impl Model {
         along.sum()
     }
 
-    /// Relative density that the walls give at `x`, and its gradient, 1/m (shared/walls.wgsl).
+    /// Returns the walls' contribution to the relative density at `x`, and its spiky gradient, 1/m
+    /// (shared/walls.wgsl).
     pub fn wall_term(&self, x: DVec3, walls: &Bounds) -> (f64, DVec3) {
         let h = self.calibration.support_radius;
         let low = ((x - walls.min) / h).clamp(DVec3::ZERO, DVec3::ONE);
@@ -365,8 +369,9 @@ mod tests {
         }
     }
 
-    /// The gradient of spiky's integral over the half-space beyond a wall is its integral over the wall's plane: rings by
-    /// the midpoint rule, whose error with 2000 steps is below 1e-6 of it.
+    /// The gradient of spiky's integral over the half-space beyond a wall is its integral over the
+    /// wall's plane. The test integrates over rings by the midpoint rule, whose relative error with
+    /// 2000 steps is below 1e-6.
     #[test]
     fn walls_push_by_the_kernel_s_integral_over_their_plane() {
         let model = model();
@@ -386,7 +391,8 @@ mod tests {
                 (gradient.x / expected - 1.0).abs() < 1e-6,
                 "{z}: {gradient} {expected}"
             );
-            // The other way from the wall opposite, and what a wall in motion does is that by its speed.
+            // The opposite wall pushes in the opposite direction, and the rate of a moving wall is
+            // the gradient times its velocity.
             let beyond = DVec3::new(1.0, 2.0 - z, 1.0);
             let (_, gradient) = model.wall_term(beyond, &walls());
             assert!(
@@ -409,7 +415,8 @@ mod tests {
         }
     }
 
-    /// Newton's method takes the derivative of what walls give: central differences over 1e-5 m, off by 1e-7 of it.
+    /// Newton's method uses the derivative of the walls' density: compared with central differences
+    /// over 1e-5 m, whose relative error is 1e-7.
     #[test]
     fn the_derivative_of_walls_is_that_of_their_density() {
         let model = model();

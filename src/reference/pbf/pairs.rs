@@ -1,4 +1,4 @@
-//! What passes sum over a particle's neighbours, in lanes.
+//! SIMD sums over a particle's neighbours.
 
 use glam::DVec3;
 use pulp::{Simd, WithSimd};
@@ -9,15 +9,16 @@ use swell_domain::{
     period::Period,
 };
 
-/// Neighbours that are held at once. All are gathered before the first is summed: a vector that is loaded right after its numbers were
-/// stored one by one waits for them.
+/// Neighbours that are held at once. All are gathered before the first is summed: loading a vector
+/// right after storing its elements one by one would stall.
 const HELD: usize = 48;
 
-/// Ways from neighbours to a particle, metres, an axis after the other, and two numbers for each.
+/// Vectors from neighbours to a particle, metres, one array per axis, and two numbers per
+/// neighbour.
 struct Held {
     ways: [[f64; HELD]; 3],
     numbers: [[f64; HELD]; 2],
-    /// Lanes that are filled: a multiple of [`LANES`].
+    /// Number of filled lanes: a multiple of [`LANES`].
     end: usize,
 }
 
@@ -31,8 +32,8 @@ impl Held {
         }
     }
 
-    /// Gathers up to [`HELD`] neighbours of particle `i`. Lanes beyond the last are 2 h away, where kernels are
-    /// 0, whatever numbers were there before.
+    /// Gathers up to [`HELD`] neighbours of particle `i`. Padding lanes get a distance of more than
+    /// 2 h, where kernels are 0 whatever numbers were there before.
     #[inline(always)]
     fn gather(
         &mut self,
@@ -60,7 +61,7 @@ impl Held {
         }
     }
 
-    /// Ways and numbers of as many as there are lanes, from the `first` on.
+    /// Returns vectors and numbers of [`LANES`] neighbours from index `first` on.
     #[inline(always)]
     fn lanes(&self, first: usize) -> ([&[f64]; 3], [&[f64]; 2]) {
         let ([x, y, z], [a, b], part) = (&self.ways, &self.numbers, first..first + LANES);
@@ -78,7 +79,8 @@ pub(super) struct RowSums<'a> {
 }
 
 impl WithSimd for RowSums<'_> {
-    /// Σ m W / W(0), Σ m s² e with e the unit vector from each, and Σ s⁴ of the particles among them; s = 1 − r/h.
+    /// Σ m W / W(0), Σ m s² e with the unit vector e from each neighbour, and Σ s⁴ over the fluid
+    /// neighbours; s = 1 − r/h.
     type Output = (f64, DVec3, f64);
 
     #[inline(always)]
@@ -93,7 +95,8 @@ impl WithSimd for RowSums<'_> {
         for (near, is_fluid) in [(fluid, true), (solid, false)] {
             let numbers = |j: usize| match is_fluid {
                 true => [1.0, 1.0],
-                // A solid's samples do not move: they have no gradient of their own.
+                // Boundary samples are not moved by corrections: they contribute no gradient of
+                // their own.
                 false => [inputs.model.sample_weights[j - particles], 0.0],
             };
             for near in near.chunks(HELD) {
@@ -120,7 +123,7 @@ impl WithSimd for RowSums<'_> {
     }
 }
 
-/// The sum of a correction over neighbours.
+/// Sum of a correction over neighbours.
 pub(super) struct CorrectionSum<'a> {
     pub(super) inputs: Inputs<'a>,
     pub(super) particle: usize,
@@ -133,7 +136,7 @@ pub(super) struct CorrectionSum<'a> {
 const REFERENCE_KERNEL: f64 = 0.884_736;
 
 impl WithSimd for CorrectionSum<'_> {
-    /// Σ m (λ + λ' + s_corr) s² e, m², and how near the nearest is, metres.
+    /// Σ m (λ + λ' + s_corr) s² e, m², and the distance of the nearest neighbour, metres.
     type Output = (DVec3, f64);
 
     #[inline(always)]
@@ -188,10 +191,11 @@ mod tests {
     use swell_domain::{boundary::Boundary, lanes::widely};
     use swell_scene::Scene;
 
-    /// Roundings of a term: of a way and its length, of the kernel's argument, of powers and products.
+    /// Roundings of a term: of a vector and its length, of the kernel's argument, of powers and
+    /// products.
     const OF_A_TERM: f64 = 20.0;
 
-    /// A block of particles that stand unevenly, with samples of a floor in it.
+    /// Returns a block of irregularly placed particles, with boundary samples of a floor in it.
     fn block() -> (Model, Substep, Vec<DVec3>) {
         let text = "[shot]\nname = \"lanes\"\nframes = 1\nframes_per_second = 50\n\
             [domain]\nmin = [0.0, 0.0, 0.0]\nmax = [2.0, 2.0, 2.0]\n\
@@ -208,8 +212,9 @@ mod tests {
         (model, Substep::new(&scene, 0.0, 0.01), points)
     }
 
-    /// Every sum has the same bits with the processor's widest instructions and with its plainest; and is the sum of its terms
-    /// one after the other up to rounding: of n terms n, and less than [`OF_A_TERM`] of each, on either side, over what terms are at most.
+    /// Every sum has the same bits with the processor's widest instructions and with scalar ones.
+    /// It equals the sequential sum of its terms up to rounding: n roundings for n terms, and less
+    /// than [`OF_A_TERM`] for each, on either side, relative to a bound on the terms.
     #[test]
     fn sums_do_not_depend_on_the_processor() {
         let (model, substep, points) = block();
@@ -219,7 +224,8 @@ mod tests {
         let lambda: Vec<f64> = (0..points.len()).map(|k| -1e-4 * (k % 7) as f64).collect();
         let h = model.calibration.support_radius;
         let (mut others, mut of_solids) = (0, 0);
-        // Some have more neighbours than are held at once, and most a last vector that is not full.
+        // Some particles have more neighbours than are held at once, and most have a last vector
+        // that is not full.
         let counts: Vec<usize> = (0..points.len())
             .map(|i| inputs.neighbors.fluid(i).len())
             .collect();
@@ -265,7 +271,7 @@ mod tests {
             assert!(off <= rounding * most_pushed, "{particle}: {off}");
             others += usize::from(wide.0 != terms.0);
         }
-        // Negative control: another order has other bits, so that equal ones say something.
+        // Negative control: another order gives other bits, so that equal bits are significant.
         assert!(others > 100 && of_solids > 100, "{others} {of_solids}");
     }
 }

@@ -1,6 +1,7 @@
-//! Twins of shaders/pbf: one function a pass, under its name.
+//! Reference passes of shaders/pbf: one function per pass, with the pass's name.
 //!
-//! A pass that the GPU runs on one colour takes a [`Colour`] here, and leaves the others' values alone.
+//! A pass that the GPU runs on one colour takes a [`Colour`] here, and does not change values of
+//! the other colour.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -12,45 +13,48 @@ use super::{
 use crate::{hash::pair_direction, neighbors::Neighbors};
 use swell_domain::lanes::widely;
 
-/// Particles of a task; fewer are not worth the handing out.
+/// Particles per task; smaller tasks are not worth their overhead.
 const GRAIN: usize = 256;
 
-/// What the passes of a substep read.
+/// Inputs of a substep's passes.
 #[derive(Clone, Copy, Debug)]
 pub struct Inputs<'a> {
     /// Constants and solids.
     pub model: &'a Model,
     /// Δt and walls.
     pub substep: &'a Substep,
-    /// Metres: particles, then samples on solids.
+    /// Positions, metres: particles, then boundary samples on solids.
     pub points: &'a [DVec3],
-    /// Who was near whom when they were listed.
+    /// Neighbour lists, made at the predicted positions.
     pub neighbors: &'a Neighbors,
-    /// Which particles fly free of the water, where a projection on a grid told them apart; empty without it.
+    /// Which particles are isolated droplets, as found by the grid projection; empty without a
+    /// projection.
     pub is_drop: &'a [bool],
 }
 
 impl Inputs<'_> {
-    /// How many of the points are particles.
+    /// Returns how many of the points are particles.
     pub fn particles(&self) -> usize {
         self.points.len() - self.model.samples.len()
     }
 
-    /// From point `j` to point `i`, or to the image of it that is nearer, metres.
+    /// Returns the vector from point `j` to the nearest periodic image of point `i`, metres.
     #[inline]
     pub(super) fn between(&self, i: usize, j: usize) -> DVec3 {
         let period = self.model.period();
         period.shortest(self.points[i] - self.points[j])
     }
 
-    /// Of a sample as lists have it, in particles' worth of mass.
+    /// Returns the weight of a boundary sample, given its index among the points, in units of a
+    /// particle's mass.
     pub(super) fn sample_weight(&self, j: u32) -> f64 {
         self.model.sample_weights[j as usize - self.particles()]
     }
 }
 
-/// Explicit step of the external forces; what walls and solids take of the way is taken from the
-/// velocity (pbf/predict). Returns the predicted position and the velocity, metres and m/s.
+/// Explicit step of the external forces; what walls and solids remove from the displacement is also
+/// removed from the velocity (pbf/predict). Returns the predicted position and the velocity, metres
+/// and m/s.
 pub fn predict(
     model: &Model,
     substep: &Substep,
@@ -61,7 +65,7 @@ pub fn predict(
     (x, v)
 }
 
-/// The same, and what moving walls did on the particle by it, over m / Δt².
+/// Does the same and also returns the work of moving walls on the particle, over m / Δt².
 pub fn predict_and_work(
     model: &Model,
     substep: &Substep,
@@ -82,8 +86,8 @@ pub fn predict_and_work(
     (model.period().wrap(x), v + taken, work)
 }
 
-/// As [`predict_and_work`], of water that a grid's flow moves: its own velocity did not take it where it is, and loses what
-/// it has into walls and solids and no more (pbf/predict).
+/// Predicts like [`predict_and_work`] for water that a grid's flow moves: its own velocity did not
+/// take it to its position, so it only loses its component into walls and solids (pbf/predict).
 pub fn predict_along(
     model: &Model,
     substep: &Substep,
@@ -105,7 +109,7 @@ pub fn predict_along(
     (x, v, work)
 }
 
-/// Relative density ρ/ρ0 of each particle, shape (particles) (pbf/measure_density).
+/// Returns the relative density ρ/ρ0 of each particle, shape (particles) (pbf/measure_density).
 pub fn measure_density(inputs: Inputs<'_>) -> Vec<f64> {
     (0..inputs.particles())
         .into_par_iter()
@@ -114,8 +118,8 @@ pub fn measure_density(inputs: Inputs<'_>) -> Vec<f64> {
         .collect()
 }
 
-/// λ_i = −max(C_i, 0) / (Σ_k |∇_k C_i|² + ε), m², and ρ_i/ρ0 of one colour (pbf/compute_lambda; Macklin and
-/// Müller 2013, eq. 11). Shapes (particles).
+/// Computes λ_i = −max(C_i, 0) / (Σ_k |∇_k C_i|² + ε), m², and ρ_i/ρ0 for one colour
+/// (pbf/compute_lambda; Macklin and Müller 2013, eq. 11). Shapes (particles).
 pub fn compute_lambda(inputs: Inputs<'_>, colour: Colour, lambda: &mut [f64], density: &mut [f64]) {
     let regularization = inputs.model.regularization();
     let one = |(i, (lambda, density)): (usize, (&mut f64, &mut f64))| {
@@ -131,7 +135,7 @@ pub fn compute_lambda(inputs: Inputs<'_>, colour: Colour, lambda: &mut [f64], de
         .for_each(one);
 }
 
-/// One density constraint at the positions as they are.
+/// A density constraint at the current positions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Row {
     /// ρ/ρ0.
@@ -142,7 +146,7 @@ pub struct Row {
     pub squares: f64,
 }
 
-/// The constraint of particle `i`.
+/// Returns the constraint of particle `i`.
 #[inline]
 pub fn row(inputs: Inputs<'_>, i: usize) -> Row {
     let (kernel, gradient, squares) = widely(RowSums {
@@ -160,28 +164,29 @@ pub fn row(inputs: Inputs<'_>, i: usize) -> Row {
     }
 }
 
-/// How a semi-iteration carries corrections on (Wang 2015, eq. 9).
+/// Extrapolation of corrections in a semi-iteration (Wang 2015, eq. 9).
 #[derive(Clone, Copy, Debug)]
 pub struct Momentum<'a> {
-    /// ω of this iteration.
+    /// Factor ω of this iteration.
     pub factor: f64,
     /// Positions of one iteration before, metres. Shape (particles).
     pub before: &'a [DVec3],
 }
 
-/// Where a correction takes a particle.
+/// A particle after a correction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Corrected {
-    /// Before walls and solids push it, metres.
+    /// Position before walls and solids push it, metres.
     pub free: DVec3,
-    /// After that, metres.
+    /// Position after that, metres.
     pub position: DVec3,
     /// Work of moving walls on it, over m / Δt².
     pub work: f64,
 }
 
-/// Δx_i = Σ_j (λ_i + λ_j + s_corr) ∇W / ρ0, metres, relaxed, bounded, and what walls and solids leave of it
-/// (pbf/compute_delta; Macklin and Müller 2013, eq. 14): the new positions of one colour, the others' as they are.
+/// Computes Δx_i = Σ_j (λ_i + λ_j + s_corr) ∇W / ρ0, metres, relaxed, bounded, and confined by
+/// walls and solids (pbf/compute_delta; Macklin and Müller 2013, eq. 14). Returns new positions for
+/// one colour, and current ones for the other.
 pub fn compute_delta(
     inputs: Inputs<'_>,
     colour: Colour,
@@ -211,7 +216,7 @@ pub fn compute_delta(
             let last = x - before[i];
             if delta.dot(last) > 0.0 {
                 delta = bounded(factor * delta + (factor - 1.0) * last);
-                // As if the walls' part of the last step had been that of this one.
+                // Assumes that the walls' share of the last step was that of this one.
                 work *= 2.0 * factor - 1.0;
             }
         }
@@ -231,7 +236,7 @@ pub fn compute_delta(
         .collect()
 }
 
-/// Σ_j (λ_i + λ_j + s_corr) m_j (1 − q)² over the unit vector from j, m².
+/// Returns Σ_j (λ_i + λ_j + s_corr) m_j (1 − q)² times the unit vector from j, m².
 #[inline]
 fn pair_corrections(inputs: Inputs<'_>, i: usize, lambda: &[f64]) -> DVec3 {
     let Model {
@@ -254,7 +259,7 @@ fn pair_corrections(inputs: Inputs<'_>, i: usize, lambda: &[f64]) -> DVec3 {
     last.map_or(sum, |j| sum + pair_direction(i as u32, j) * 2.0 * lambda[i])
 }
 
-/// The gradient of what each sample on a solid adds to the density times the sample's velocity, 1/s.
+/// Returns the sum over boundary samples of each sample's density gradient times its velocity, 1/s.
 fn sample_rate(inputs: Inputs<'_>, i: usize) -> f64 {
     let model = inputs.model;
     if model.movers.is_empty() {
@@ -272,8 +277,9 @@ fn sample_rate(inputs: Inputs<'_>, i: usize) -> f64 {
     -model.calibration.gradient_scale * solid.iter().map(rate).sum::<f64>()
 }
 
-/// v += (x* − x*_0) / Δt, with x*_0 the prediction before any correction; what is over the displacement cap
-/// is slowed (pbf/update_velocity). Returns position, velocity, and whether it was.
+/// Computes v += (x* − x*_0) / Δt, where x*_0 is the prediction before any correction; a
+/// displacement above the cap is reduced (pbf/update_velocity). Returns position, velocity, and
+/// whether it was reduced.
 pub fn update_velocity(
     model: &Model,
     substep: &Substep,

@@ -22,40 +22,44 @@ use swell_domain::{
 };
 use swell_scene::{Iteration, Scene, Stop, step::projected_substep};
 
-/// PBF in f64. Frames are rounded to f32 as they are written, and the next one starts from what was written.
+/// PBF in f64. Frames are rounded to f32, as when written, and the next frame starts from the
+/// rounded state.
 pub struct Pbf {
     scene: Scene,
     model: Model,
-    /// What projects velocities, where anything does.
+    /// FLIP solver that projects velocities, if the scene uses a projection.
     grid: Option<Flip>,
-    /// Which particles it found to be drops, whose corrections are motion; the others' shift them alone. Empty without it.
+    /// Which particles the projection found to be isolated droplets. Corrections change their
+    /// velocity; other particles are only displaced. Empty without a projection.
     is_drop: Vec<bool>,
     state: Particles,
     frame: u32,
     timings: Timings,
-    /// Positions after the last substep, metres, its Σ λ, m², and its length, seconds.
+    /// Positions after the last substep, metres; its Σ λ, m²; its length, seconds.
     position: Vec<DVec3>,
     pressed: Vec<f64>,
     step: f64,
 }
 
-/// Particles in the order of the sort, and who is near whom there; positions relative to the domain's least corner.
+/// Particles in sorted order, with their neighbours; positions relative to the domain's minimum
+/// corner.
 #[derive(Clone, Debug)]
 pub struct Sorted {
-    /// Positions, metres: particles, then samples on solids.
+    /// Positions, metres: particles, then boundary samples on solids.
     pub points: Vec<DVec3>,
-    /// Where each stood before the sort. Shape (particles).
+    /// Index of each particle before the sort. Shape (particles).
     pub order: Vec<usize>,
-    /// At the positions as they were sorted.
+    /// Neighbours at the positions at the time of the sort.
     pub neighbors: Neighbors,
-    /// Σ λ of the corrections so far, m²: the pressure that they stand for. Shape (particles).
+    /// Σ λ of the corrections so far, m², proportional to pressure. Shape (particles).
     pub lambda_sum: Vec<f64>,
-    /// What moving walls did by the corrections so far, over m / Δt².
+    /// Work of moving walls in the corrections so far, over m / Δt².
     pub wall_work: f64,
 }
 
 impl Sorted {
-    /// Sorts by cell and id (pbf/assign_cells to pbf/reorder), and lists neighbours (pbf/build_neighbors).
+    /// Sorts particles by cell and id (pbf/assign_cells to pbf/reorder), and lists neighbours
+    /// (pbf/build_neighbors).
     pub fn new(model: &Model, position: &[DVec3], id: &[u32], timings: &mut Timings) -> Self {
         let order = timings.time("pbf/reorder", || model.cells.order(position, id));
         let mut points: Vec<DVec3> = order.iter().map(|&k| position[k]).collect();
@@ -77,7 +81,7 @@ impl Sorted {
         }
     }
 
-    /// As passes take it.
+    /// Returns the inputs of the passes.
     pub fn inputs<'a>(&'a self, model: &'a Model, substep: &'a Substep) -> Inputs<'a> {
         Inputs {
             model,
@@ -88,12 +92,12 @@ impl Sorted {
         }
     }
 
-    /// Positions of the particles, metres.
+    /// Returns the positions of the particles, metres.
     pub fn particles(&self) -> &[DVec3] {
         &self.points[..self.order.len()]
     }
 
-    /// One value a particle, from this order into the one before the sort.
+    /// Reorders one value per particle from sorted order to the order before the sort.
     pub fn unsorted<T: Copy + Default>(&self, values: &[T]) -> Vec<T> {
         let mut by_slot = vec![T::default(); values.len()];
         for (&slot, &value) in self.order.iter().zip(values) {
@@ -103,7 +107,7 @@ impl Sorted {
     }
 }
 
-/// What an iteration carries from pass to pass. Shapes (particles).
+/// State of an iteration that passes share. Shapes (particles).
 struct Corrector<'a> {
     model: &'a Model,
     substep: &'a Substep,
@@ -116,7 +120,8 @@ struct Corrector<'a> {
     visit: &'a mut Visit<'a>,
 }
 
-/// Whom a pass visits from these points; `None` for whom the one before did.
+/// Callback that returns the neighbours that a pass visits at these points; `None` for those of the
+/// previous pass.
 pub type Visit<'a> = dyn FnMut(&[DVec3]) -> Option<Neighbors> + 'a;
 
 impl Corrector<'_> {
@@ -134,7 +139,7 @@ impl Corrector<'_> {
         });
     }
 
-    /// `factor` is that of a semi-iteration.
+    /// Corrects particles of one colour; `factor` is that of a semi-iteration.
     fn delta(&mut self, colour: Colour, factor: Option<f64>) {
         self.look_about();
         let inputs = self.sorted.inputs(self.model, self.substep);
@@ -160,8 +165,8 @@ impl Corrector<'_> {
     }
 }
 
-/// Corrects sorted positions until the stop that the settings name, at most `most` iterations; returns how many
-/// there were.
+/// Corrects sorted positions until the stop condition of the settings; returns the number of
+/// iterations.
 pub fn iterate(
     model: &Model,
     substep: &Substep,
@@ -178,8 +183,8 @@ pub fn iterate(
     )
 }
 
-/// The same, where whom a pass visits may change from pass to pass, and where `disturb` may move the particles before each
-/// iteration, which it is told by its number from 0.
+/// Does the same with neighbours that may change from pass to pass (`visit`), and with a callback
+/// `disturb` that may move the particles before each iteration, numbered from 0.
 pub fn iterate_among<'a>(
     model: &'a Model,
     substep: &'a Substep,
@@ -204,7 +209,8 @@ pub fn iterate_among<'a>(
     let most = settings.stop.most_iterations();
     for k in 0..most {
         disturb(k, &mut corrector.sorted.points[..n]);
-        // Black λ of the iteration before still hold for red's correction: only the first needs all.
+        // λ of black particles from the previous iteration is still valid for red's correction:
+        // only the first iteration has to compute all.
         corrector.lambda(match settings.iteration {
             Iteration::RedBlack if k > 0 => Colour::Red,
             _ => Colour::All,
@@ -229,7 +235,7 @@ pub fn iterate_among<'a>(
 }
 
 impl Pbf {
-    /// Of a scene that PBF solves, and its solids.
+    /// Creates the solver for a scene that uses PBF, with its solids.
     pub fn new(scene: &Scene, boundary: &Boundary) -> Self {
         Self {
             model: Model::new(scene, boundary),
@@ -245,8 +251,9 @@ impl Pbf {
         }
     }
 
-    /// Velocities as the projection makes them for the substep from `start` on, the `number`-th of its frame, and particles
-    /// aimed with them, where there is one; what moving walls did in it, joule.
+    /// Projects the velocities for the substep from `start` on, the `number`-th of its frame, and
+    /// displaces particles (flip/aim), if there is a projection. Returns the work by moving walls,
+    /// joules.
     fn project(
         &mut self,
         (number, start): (u32, f64),
@@ -272,8 +279,8 @@ impl Pbf {
         Ok(work)
     }
 
-    /// One substep of particles in the order of their ids; returns iterations, capped particles and what moving walls
-    /// did on them, joule.
+    /// Runs one substep of particles in the order of their ids; returns the number of iterations
+    /// and of capped particles, and the work by moving walls, joules.
     fn step(
         &mut self,
         substep: &Substep,
@@ -294,7 +301,7 @@ impl Pbf {
         });
         let predicted: Vec<DVec3> = by_prediction.iter().map(|p| p.0).collect();
         let pushed: Vec<DVec3> = by_prediction.iter().map(|p| p.1).collect();
-        // One after the other: the sum is the same on any number of threads.
+        // A sequential sum does not depend on the number of threads.
         let mut work: f64 = by_prediction.iter().map(|p| p.2).sum();
         let mut sorted = Sorted::new(model, &predicted, &self.state.id, timings);
         let iterations = iterate(model, substep, &mut sorted, timings);
@@ -330,7 +337,7 @@ impl Pbf {
         (iterations, capped, work)
     }
 
-    /// Shows a substep of `step` seconds that just ran.
+    /// Shows a substep of `step` seconds that has just run to `watch`.
     fn show(
         &mut self,
         span: Span,
@@ -358,7 +365,7 @@ impl Pbf {
         Ok(())
     }
 
-    /// World positions and velocities as a frame has them.
+    /// Returns world positions and velocities rounded as in a frame.
     fn rounded(&self, position: &[DVec3], velocity: &[DVec3]) -> [Vec<[f32; 3]>; 2] {
         let origin = self.scene.domain.min;
         let place = |x: &DVec3| (origin + *x).as_vec3().to_array();
@@ -369,7 +376,7 @@ impl Pbf {
         ]
     }
 
-    /// Relative densities of the state in its order.
+    /// Returns the relative densities of the state, in its order.
     fn density(&mut self, time: f64) -> Vec<f64> {
         let substep = Substep::new(&self.scene, time, 0.0);
         self.model.stand(&self.scene, time, 0.0);
@@ -382,7 +389,7 @@ impl Pbf {
         sorted.unsorted(&density)
     }
 
-    /// Where walls that absorb stand now.
+    /// Passes the state of absorbing walls to the projection.
     fn tell_grid(&mut self) {
         if let Some(grid) = &mut self.grid {
             grid.take_answers(&self.state);
@@ -454,7 +461,8 @@ impl Solver for Pbf {
         Ok((self.state.clone(), report))
     }
 
-    /// As [`pressure_scale`](swell_domain::sph::Calibration::pressure_scale) has it from Σ λ.
+    /// Computes pressures from Σ λ by
+    /// [`pressure_scale`](swell_domain::sph::Calibration::pressure_scale).
     fn pressures(&self, points: &[DVec3]) -> Result<Vec<Option<f64>>, ReferenceError> {
         if let Some(grid) = &self.grid {
             return grid.pressures(points);
@@ -481,7 +489,7 @@ impl Solver for Pbf {
     }
 }
 
-/// Positions of a state relative to the domain's least corner, metres.
+/// Returns the positions of a state relative to the domain's minimum corner, metres.
 pub fn local(scene: &Scene, state: &Particles) -> Vec<DVec3> {
     let position = state.position.iter();
     position.map(|x| widen(x) - scene.domain.min).collect()

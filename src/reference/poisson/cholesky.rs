@@ -1,4 +1,5 @@
-//! faer's sparse Cholesky factor, ordered by approximate minimum degree, of a size known beforehand.
+//! faer's sparse Cholesky factorisation, ordered by approximate minimum degree, with a size known
+//! in advance.
 
 use faer::{
     Conj, MatMut, Side,
@@ -20,7 +21,7 @@ use swell_domain::poisson::{NONE, System};
 pub(super) struct Factor {
     symbolic: SymbolicCholesky<usize>,
     values: Vec<f64>,
-    /// Of the values, and of what their making takes beside them.
+    /// Size of the factor's values plus the scratch memory of the factorisation.
     pub(super) bytes: u64,
 }
 
@@ -29,7 +30,7 @@ fn fault(error: impl std::fmt::Debug) -> ReferenceError {
 }
 
 impl Factor {
-    /// `None` where it would take more than `budget` bytes.
+    /// Factorises the system; returns `None` if that would take more than `budget` bytes.
     pub(super) fn new(
         system: &System,
         pockets: &[Vec<u32>],
@@ -72,7 +73,7 @@ impl Factor {
         }))
     }
 
-    /// L Lᵀ x = b.
+    /// Solves L Lᵀ x = b.
     pub(super) fn solve(&self, b: &[f64]) -> Vec<f64> {
         let par = get_global_parallelism();
         let mut x = b.to_vec();
@@ -88,8 +89,8 @@ impl Factor {
     }
 }
 
-/// The lower triangle. One row of each pocket stands as if air were beside it: where b has no mean over the pocket,
-/// that leaves its pressure at 0 and takes nothing from the others.
+/// Returns the lower triangle. One row of each pocket is treated as if air were beside it: if b has
+/// no mean over the pocket, that sets the pressure there to 0 without affecting the other rows.
 fn matrix(
     system: &System,
     pockets: &[Vec<u32>],
@@ -104,7 +105,7 @@ fn matrix(
             }
         }
     }
-    // Entries on one place add up.
+    // Duplicate entries add up.
     triplets.extend(pockets.iter().map(|pocket| {
         let row = pocket[0] as usize;
         Triplet::new(row, row, 1.0)

@@ -1,19 +1,19 @@
-//! Preconditioned conjugate gradients: the oracle for the GPU's iteration counts, and the solver of systems whose
-//! factor is too large.
+//! Preconditioned conjugate gradients: the oracle for the GPU's iteration counts, and the solver of
+//! systems whose factor is too large.
 
 use rayon::prelude::*;
 
 use swell_domain::poisson::{NONE, System, remove_means};
 
-/// Terms of a sum that one task adds up, so that sums are the same for any number of threads.
+/// Terms of a sum per task; sums do not depend on the number of threads.
 const CHUNK: usize = 8192;
 
-/// MIC(0): the part of the dropped fill that goes to the diagonal, and the part of the diagonal below which a pivot
-/// is not taken (Bridson 2015, section 5.5).
+/// MIC(0): the fraction of the dropped fill that is added to the diagonal, and the fraction of the
+/// diagonal below which a pivot is rejected (Bridson 2015, section 5.5).
 const MODIFIED: f64 = 0.97;
 const LEAST_PIVOT: f64 = 0.25;
 
-/// What precedes an iteration.
+/// Preconditioner of an iteration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Precondition {
     /// The identity.
@@ -22,23 +22,23 @@ pub enum Precondition {
     Jacobi,
     /// Kᵀ D⁻¹ K, K = I − L D⁻¹ (Ament et al. 2010, scaled to a unit diagonal).
     Ipp,
-    /// Modified incomplete Cholesky without fill (Gustafsson 1978).
+    /// Modified incomplete Cholesky without fill-in (Gustafsson 1978).
     IncompleteCholesky,
 }
 
-/// A solution and how it came about.
+/// A solution and its accuracy.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Solution {
-    /// One value a row.
+    /// One value per row.
     pub x: Vec<f64>,
-    /// Conjugate-gradient iterations; 0 where a factor gave it.
+    /// Conjugate-gradient iterations; 0 if a factor gave the solution.
     pub iterations: u32,
-    /// ‖b − Ax‖/‖b‖ from a fresh residual.
+    /// ‖b − Ax‖/‖b‖ from a freshly computed residual.
     pub residual: f64,
 }
 
-/// Solves from 0 until the residual is `tolerance` ‖b‖ or `most` iterations are done; pockets have their means
-/// removed from `b` and from every residual.
+/// Solves from an initial 0 until the residual is `tolerance` ‖b‖ or `most` iterations are done.
+/// Means over pockets are removed from `b` and from every residual.
 pub fn solve(
     system: &System,
     b: &[f64],
@@ -86,14 +86,15 @@ pub fn solve(
     }
 }
 
-/// ‖b − Ax‖/‖b‖; 0 where b = 0.
+/// Returns ‖b − Ax‖/‖b‖; 0 if b = 0.
 pub fn residual(system: &System, b: &[f64], x: &[f64]) -> f64 {
     let image = system.apply(x);
     let fresh: Vec<f64> = b.iter().zip(&image).map(|(b, image)| b - image).collect();
     norm(&fresh) / norm(b).max(f64::MIN_POSITIVE)
 }
 
-/// Σ over the lower (`first` = 0) or the upper (1) neighbours of what row `i` shares with them times a value of theirs.
+/// Returns Σ over the lower (`first` = 0) or the upper (1) neighbours of row `i`: coefficient times
+/// the neighbour's value.
 fn shared(system: &System, i: usize, first: usize, value: impl Fn(usize) -> f64) -> f64 {
     (first..6)
         .step_by(2)
@@ -102,8 +103,8 @@ fn shared(system: &System, i: usize, first: usize, value: impl Fn(usize) -> f64)
         .sum()
 }
 
-/// The same over the neighbours whose rows stand before row `i`, or after it. Without periods they are the lower and the
-/// upper ones.
+/// Returns the same sum over the neighbours with a smaller row index, or with a larger one. Without
+/// periodic axes these are the lower and the upper neighbours.
 fn shared_in_order(system: &System, i: usize, is_after: bool, value: impl Fn(usize) -> f64) -> f64 {
     (system.neighbor[i].iter().zip(&system.coefficient[i]))
         .filter(|&(&j, _)| j != NONE && (j as usize > i) == is_after)
@@ -111,7 +112,7 @@ fn shared_in_order(system: &System, i: usize, is_after: bool, value: impl Fn(usi
         .sum()
 }
 
-/// One over the square roots of MIC(0)'s pivots.
+/// Returns the reciprocal square roots of MIC(0)'s pivots.
 fn pivots(system: &System) -> Vec<f64> {
     let mut pivots = vec![0.0; system.cell.len()];
     for i in 0..pivots.len() {
@@ -169,7 +170,7 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     sums.iter().sum()
 }
 
-/// Euclidean norm.
+/// Returns the Euclidean norm.
 pub fn norm(a: &[f64]) -> f64 {
     dot(a, a).sqrt()
 }
@@ -179,9 +180,10 @@ mod tests {
     use super::*;
     use swell_domain::poisson::cases::{Surface, tank, tank_rhs};
 
-    /// Iterations to 1e-6 with none, Jacobi, scaled IPP and MIC(0), as counted by another program, in f64, on a tank known
-    /// here by its description alone: 60 % full, with a sphere. Hence 10 %. The plain counts with a ghost-fluid surface
-    /// are left out: they follow the least θ of the surface, which the description does not give.
+    /// Iterations to 1e-6 with none, Jacobi, scaled IPP and MIC(0), as counted by another program
+    /// in f64, on a tank known only by its description: 60 % full, with a sphere. Hence the
+    /// tolerance of 10 %. The unpreconditioned counts with a ghost-fluid surface are omitted: they
+    /// depend on the lower bound for θ, which the description does not give.
     #[test]
     fn counts_are_those_on_record() {
         let record = [(16, [83, 86, 45, 22]), (32, [181, 176, 93, 33])];

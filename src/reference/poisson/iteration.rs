@@ -1,26 +1,27 @@
-//! Twins of the passes of an iteration, row by row, and the magnitudes that their rounding is measured by.
+//! Reference passes of an iteration, row by row, and the magnitudes that their rounding errors are
+//! relative to.
 
 use swell_domain::poisson::{NONE, System};
 
 use super::{Solver, gradients::norm};
 
-/// Inverse iterations for the least eigenvalue.
+/// Inverse iterations for the smallest eigenvalue.
 const EIGEN_STEPS: usize = 8;
 
-/// Times that the true residual may be found too large, as in pressure/reduce.
+/// Number of times that the true residual may exceed the tolerance, as in pressure/reduce.
 const MOST_RESTARTS: u32 = 16;
 
 /// A value and the sum of the magnitudes of its terms.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sum {
-    /// Of the terms.
+    /// Sum of the terms.
     pub value: f64,
-    /// Of their magnitudes.
+    /// Sum of their magnitudes.
     pub size: f64,
 }
 
-/// Σ a b, summed with what each addition rounds off kept beside it (Ogita, Rump and Oishi 2005, algorithm 4.4): the device
-/// may sum in f64 as well, and in a tree, which rounds less than one term after the other.
+/// Computes Σ a b by compensated summation (Ogita, Rump and Oishi 2005, algorithm 4.4): the device
+/// may also sum in f64, and in a tree, which rounds less than a sequential sum.
 pub fn products(a: &[f64], b: &[f64]) -> Sum {
     let terms = || a.iter().zip(b).map(|(a, b)| a * b);
     let (value, rounded_off) = terms().fold((0.0, 0.0), |(sum, rounded_off), term| {
@@ -37,7 +38,7 @@ pub fn products(a: &[f64], b: &[f64]) -> Sum {
     }
 }
 
-/// Σ c |x − x'| and what air takes, of each row.
+/// Returns Σ c |x − x'| plus the air term's magnitude for each row.
 pub fn differences(system: &System, x: &[f64]) -> Vec<f64> {
     (0..x.len())
         .map(|i| {
@@ -51,7 +52,8 @@ pub fn differences(system: &System, x: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// Σ over the lower (`first` = 0) or the upper (1) neighbours of what row `i` shares with them times `value`.
+/// Returns Σ over the lower (`first` = 0) or the upper (1) neighbours of row `i`: coefficient times
+/// `value`.
 fn shared(system: &System, i: usize, first: usize, value: impl Fn(usize) -> f64) -> Sum {
     let mut sum = Sum::default();
     for k in (first..6).step_by(2) {
@@ -64,8 +66,8 @@ fn shared(system: &System, i: usize, first: usize, value: impl Fn(usize) -> f64)
     sum
 }
 
-/// `pressure/ipp_lower`: y = d (r + L d r), of the inverse diagonal `d` and the residual `r`; the size is that of the sum
-/// before it is multiplied by d.
+/// Reference pass of `pressure/ipp_lower`: y = d (r + L d r), from the inverse diagonal `d` and the
+/// residual `r`. The size is that of the sum before it is multiplied by d.
 pub fn ipp_lower(system: &System, d: &[f64], r: &[f64]) -> Vec<Sum> {
     let of = |i: usize| {
         let sum = shared(system, i, 0, |j| d[j] * r[j]);
@@ -77,7 +79,7 @@ pub fn ipp_lower(system: &System, d: &[f64], r: &[f64]) -> Vec<Sum> {
     (0..r.len()).map(of).collect()
 }
 
-/// `pressure/ipp_upper`: z = y + d U y.
+/// Reference pass of `pressure/ipp_upper`: z = y + d U y.
 pub fn ipp_upper(system: &System, d: &[f64], y: &[f64]) -> Vec<Sum> {
     let of = |i: usize| {
         let sum = shared(system, i, 1, |j| y[j]);
@@ -89,7 +91,8 @@ pub fn ipp_upper(system: &System, d: &[f64], y: &[f64]) -> Vec<Sum> {
     (0..y.len()).map(of).collect()
 }
 
-/// `pressure/verify`: b − A x, x being the sum of `terms`; the size is that of b and of each image.
+/// Reference pass of `pressure/verify`: b − A x, where x is the sum of `terms`. The size is that of
+/// b and of each image.
 pub fn verify(system: &System, b: &[f64], terms: &[Vec<f64>]) -> Vec<Sum> {
     let images: Vec<_> = terms.iter().map(|term| system.apply(term)).collect();
     let of = |i: usize| Sum {
@@ -99,61 +102,61 @@ pub fn verify(system: &System, b: &[f64], terms: &[Vec<f64>]) -> Vec<Sum> {
     (0..b.len()).map(of).collect()
 }
 
-/// Where a solve stands; numbered as on the device.
+/// State of a solve, numbered as on the device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SolveState {
     /// It iterates.
     Iterating,
-    /// Its residual is computed afresh.
+    /// It recomputes its true residual.
     Verifying,
     /// It has ended.
     Done,
-    /// It waits for the pockets to be listed.
+    /// It waits until the host has listed the pockets.
     WantsPockets,
 }
 
-/// What `pressure/reduce` decides from a sum.
+/// Decision of `pressure/reduce` from a sum.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Decision {
-    /// Starts a solve from ‖b‖²; there may be pockets that are not listed yet.
+    /// Starts a solve, from ‖b‖².
     Begin {
-        /// Whether there are.
+        /// Whether there are pockets that the host has not listed yet.
         wants_pockets: bool,
     },
-    /// β, from residual · correction.
+    /// Computes β, from residual · correction.
     Direction,
-    /// α, from direction · its image.
+    /// Computes α, from direction · its image.
     Length,
-    /// Whether ‖r‖² of the recursion is small enough.
+    /// Tests the updated ‖r‖².
     Check(Limits),
-    /// Whether that of the true residual is.
+    /// Tests ‖r‖² of the true residual.
     Verified(Limits),
 }
 
-/// When an iteration ends.
+/// Stop conditions of an iteration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
-    /// ‖r‖² that is small enough.
+    /// ‖r‖² at which the solve has converged.
     pub target: f64,
-    /// Iterations at most.
+    /// Most iterations.
     pub iterations: u32,
 }
 
-/// What the decisions go on.
+/// State that the decisions depend on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Progress {
-    /// Where the solve stands.
+    /// State of the solve.
     pub state: SolveState,
-    /// So far.
+    /// Iterations so far.
     pub iterations: u32,
-    /// Whether the next direction starts afresh.
+    /// Whether the next direction restarts from the preconditioned residual.
     pub is_first: bool,
-    /// Verifications.
+    /// Number of verifications.
     pub restarts: u32,
 }
 
 impl Progress {
-    /// `pressure/reduce`: what follows from a sum.
+    /// Reference pass of `pressure/reduce`: returns the state after a decision from a sum.
     #[must_use]
     pub fn after(mut self, decision: Decision, sum: f64) -> Self {
         match decision {
@@ -193,8 +196,8 @@ impl Progress {
     }
 }
 
-/// The least eigenvalue of a system of `rows` rows, by inverse iterations from a vector of hashed signs; what a few of
-/// them reach is at most a few percent above it.
+/// Estimates the smallest eigenvalue of a system of `rows` rows, by inverse iterations from a
+/// vector of hashed numbers; the estimate is at most a few percent above it.
 pub fn least_eigenvalue(solver: &Solver<'_>, rows: usize) -> f64 {
     let sign = |k: usize| {
         let hash = (k as u32 + 1).wrapping_mul(0x9e37_79b9) >> 31;
@@ -219,7 +222,7 @@ mod tests {
     use crate::poisson::BUDGET;
     use swell_domain::poisson::cases::{Surface, tank, white_noise};
 
-    /// A large term that comes and goes between small ones, which a plain sum loses.
+    /// A large term that appears and cancels between small ones, which a plain sum loses.
     #[test]
     fn a_sum_of_products_keeps_what_its_additions_round_off() {
         let mut terms = vec![1.0];
@@ -232,7 +235,8 @@ mod tests {
         assert_ne!(terms.iter().sum::<f64>(), 251.0);
     }
 
-    /// The two halves are (I + D U)(D + D L D) r: symmetric and positive, as a preconditioner has to be.
+    /// Together the two halves are (I + D U)(D + D L D) r: symmetric and positive definite, as a
+    /// preconditioner has to be.
     #[test]
     fn the_two_halves_are_a_symmetric_preconditioner() {
         let system = tank(8, Surface::GhostFluid, true).system();
@@ -250,7 +254,7 @@ mod tests {
             "{ab:?} {ba:?}"
         );
         assert!(products(&a, &apply(&a)).value > 0.0);
-        // Negative control: the lower half alone is not symmetric.
+        // Negative control: the lower half by itself is not symmetric.
         let lower = |r: &[f64]| values(ipp_lower(&system, &d, r));
         let [ab, ba] = [products(&a, &lower(&b)), products(&b, &lower(&a))];
         assert!(
@@ -288,7 +292,7 @@ mod tests {
         );
         let small = checked.after(Decision::Check(limits), 0.5);
         assert_eq!(small.state, SolveState::Verifying);
-        // The recursion was too hopeful.
+        // The updated residual was too optimistic.
         let again = small.after(Decision::Verified(limits), 2.0);
         assert_eq!(
             (again.state, again.is_first, again.restarts),
@@ -305,7 +309,8 @@ mod tests {
         );
     }
 
-    /// Against the Rayleigh quotient of what the inverse iterations end with: it is at least the least eigenvalue.
+    /// Compares with the Rayleigh quotient of the final vector, which is at least the smallest
+    /// eigenvalue.
     #[test]
     fn the_least_eigenvalue_is_no_greater_than_any_quotient() {
         let system = tank(8, Surface::GhostFluid, true).system();

@@ -1,5 +1,5 @@
-//! The pressure's linear system solved as exactly as f64 allows: by a sparse Cholesky factor where the memory for it
-//! suffices, by conjugate gradients where not.
+//! Solves the pressure's linear system as accurately as f64 allows: by a sparse Cholesky factor if
+//! memory suffices, else by conjugate gradients.
 
 mod cholesky;
 pub mod gradients;
@@ -12,20 +12,20 @@ use swell_domain::poisson::{System, remove_means};
 use cholesky::Factor;
 use gradients::{Precondition, Solution, residual};
 
-/// Bytes that a factor may take, with what its making needs beside it: some 280 000 rows of a cubic tank, by 30 MiB
-/// for 19 000, 87 for 37 000, 408 for 103 000, 619 for 126 000. What it would take is known from the ordering, before
-/// any of it is allocated.
+/// Bytes that a factor may take, including the scratch memory of its computation. That allows for
+/// some 280 000 rows of a cubic tank; measured are 30 MiB for 19 000 rows, 87 for 37 000, 408 for
+/// 103 000 and 619 for 126 000. The size is known from the ordering, before any of it is allocated.
 pub const BUDGET: u64 = 2 << 30;
 
-/// Relative residual of the recursion at which the conjugate gradients stop; the true one then stands where rounding
-/// leaves it, near ε ‖A‖ ‖x‖ / ‖b‖, 1e-14 to 1e-12.
+/// Relative updated residual at which the conjugate gradients stop; the true residual is then
+/// limited by rounding, near ε ‖A‖ ‖x‖ / ‖b‖, 1e-14 to 1e-12.
 pub const TOLERANCE: f64 = 1e-14;
 
-/// Iterations after which they give up. MIC(0) takes about three a cell of the longest way through the water for each
-/// 1e-6.
+/// Most iterations of the conjugate gradients. MIC(0) takes about three per cell of the longest
+/// path through the water for each factor of 1e-6.
 const MOST_ITERATIONS: u32 = 20_000;
 
-/// A system, ready for right-hand sides.
+/// A system, prepared for right-hand sides.
 pub struct Solver<'a> {
     system: &'a System,
     pockets: Vec<Vec<u32>>,
@@ -33,10 +33,10 @@ pub struct Solver<'a> {
 }
 
 impl<'a> Solver<'a> {
-    /// Factorises `system` where that takes at most `budget` bytes; 0 tries none.
+    /// Factorises `system` if that takes at most `budget` bytes; 0 never factorises.
     ///
-    /// # Errors
-    /// [`ReferenceError::Factor`] where the system is not positive definite or memory does not hold the factor.
+    /// # Errors Returns [`ReferenceError::Factor`] if the system is not positive definite or memory
+    /// does not hold the factor.
     pub fn new(system: &'a System, budget: u64) -> Result<Self, ReferenceError> {
         let pockets = system.pockets();
         let factor = match budget {
@@ -50,18 +50,18 @@ impl<'a> Solver<'a> {
         })
     }
 
-    /// What the factor takes, bytes; `None` where conjugate gradients solve.
+    /// Returns the size of the factor, bytes; `None` if conjugate gradients solve the system.
     pub fn factor_bytes(&self) -> Option<u64> {
         self.factor.as_ref().map(|factor| factor.bytes)
     }
 
-    /// Bodies of water that no air touches, as lists of rows.
+    /// Returns the bodies of water that no air touches, as lists of rows.
     pub fn pockets(&self) -> &[Vec<u32>] {
         &self.pockets
     }
 
-    /// A x = b, one value a row; over each pocket the means of b and of x are removed. The residual is that of the b
-    /// without its means.
+    /// Solves A x = b, one value per row; the means of b and of x over each pocket are removed. The
+    /// residual refers to b without its means.
     pub fn solve(&self, b: &[f64]) -> Solution {
         let mut b = b.to_vec();
         remove_means(&mut b, &self.pockets);
@@ -84,10 +84,10 @@ impl<'a> Solver<'a> {
     }
 }
 
-/// Solves A x = b once, by a factor of up to [`BUDGET`] bytes or by conjugate gradients; see [`Solver::solve`].
+/// Solves A x = b once, by a factor of up to [`BUDGET`] bytes or by conjugate gradients; see
+/// [`Solver::solve`].
 ///
-/// # Errors
-/// Those of [`Solver::new`].
+/// # Errors Returns the errors of [`Solver::new`].
 pub fn solve(system: &System, b: &[f64]) -> Result<Solution, ReferenceError> {
     Ok(Solver::new(system, BUDGET)?.solve(b))
 }
@@ -105,7 +105,7 @@ mod tests {
         norm(&difference) / norm(b)
     }
 
-    /// By the factor, and by the gradients.
+    /// Solves by the factor, and by conjugate gradients.
     fn both(system: &System, b: &[f64]) -> [Solution; 2] {
         [BUDGET, 0].map(|budget| {
             let solver = Solver::new(system, budget).unwrap();
@@ -114,7 +114,7 @@ mod tests {
         })
     }
 
-    /// Two rooms in rock, filled to the brim, over a basin.
+    /// Two cavities in rock, filled completely, above a basin.
     fn pockets() -> Case {
         let is_room = |c: [u32; 3]| {
             (2..=6).contains(&c[1].wrapping_sub(10))
@@ -146,7 +146,7 @@ mod tests {
             let apart = gap(&iterated.x, &direct.x);
             assert!(apart < 1e-10, "{apart:e}");
 
-            // Negative control: one coefficient of the wrong sign is seen.
+            // Negative control: the residual shows one coefficient of the wrong sign.
             let mut spoiled = system.clone();
             let row = spoiled.cell.len() / 2;
             let k = (0..6).find(|&k| spoiled.coefficient[row][k] > 0.0).unwrap();
@@ -155,8 +155,8 @@ mod tests {
         }
     }
 
-    /// Faces that a solid leaves a sliver of, and cells with nothing but slivers about them: rows of 1e-6 beside rows
-    /// of 6. Hard case 12.
+    /// Faces with a tiny open fraction next to a solid, and cells with only such faces: rows of
+    /// 1e-6 beside rows of 6. Hard case 12.
     #[test]
     fn slivers_are_solved_as_by_the_factor() {
         let mut case = tank(24, Surface::GhostFluid, true);
@@ -184,7 +184,8 @@ mod tests {
         println!("{slivers} slivers, least diagonal {least:.1e}, apart by {apart:.1e}");
         assert!(apart < 1e-8, "{apart:e}");
         assert!(gap(&direct.x, &known) < 1e-8);
-        // Negative control: gradients that stop at 1e-6 have not seen the slivers yet.
+        // Negative control: conjugate gradients that stop at 1e-6 have not resolved the tiny faces
+        // yet.
         let kind = Precondition::IncompleteCholesky;
         let early = gradients::solve(&system, &b, kind, 1e-6, MOST_ITERATIONS);
         assert!(gap(&early.x, &direct.x) > 1e-8);
@@ -212,7 +213,7 @@ mod tests {
         assert!(gap(&again[1].x, &direct.x) < 1e-10);
     }
 
-    /// Second order in p, as of the GPU in tests/suite/solve/pressure.rs.
+    /// Second order in p, like the GPU in tests/suite/solve/pressure.rs.
     #[test]
     fn manufactured_pressure_converges_with_second_order() {
         let error = |n: u32, surface: Surface| {
@@ -223,7 +224,7 @@ mod tests {
         let errors = [16, 32].map(|n| error(n, Surface::GhostFluid));
         let order = (errors[0] / errors[1]).log2();
         assert!(order >= 1.8, "{order} {errors:?}");
-        // Negative control: a surface half a cell off at most has an error of first order.
+        // Negative control: a surface displaced by up to half a cell has a first-order error.
         assert!(error(32, Surface::Voxel) > 5.0 * errors[1]);
     }
 

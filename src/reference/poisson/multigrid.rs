@@ -1,27 +1,29 @@
-//! Twins of the multigrid's passes: the exact solution of each block of 2³ cells from the values about it.
+//! Reference passes of the multigrid: the exact solution of each block of 2³ cells from the values
+//! around it.
 //!
-//! Cells are named by their places in the device's arrays: a brick has 8³ cells, 64 blocks; cell `c` of a block stands at
-//! `512 slot + 64 c + block`.
+//! Cells are named by their indices in the device's arrays: a brick has 8³ cells in 64 blocks; cell
+//! `c` of a block is at `512 slot + 64 c + block`.
 
 use std::ops::Range;
 
 use swell_domain::bricks::CELLS;
 
-/// Least pivot of a block, as a part of its diagonal, that is not a closed pair's rounding; twice the shader's.
+/// Smallest pivot of a block, relative to its diagonal, that is more than the rounding error of a
+/// closed pair; twice the shader's bound.
 const LEAST_PIVOT: f64 = 2e-5;
 
-/// Of what air adds to a diagonal, what a coarser level takes over at most, as in pressure/coarsen.
+/// Limit for a cell's air coefficient in the coarser level, as in pressure/coarsen.
 pub const MOST_AIR: f64 = 4.0;
 
-/// Of the last level, as in pressure/solve_coarse.
+/// Symmetric sweeps on the last level, as in pressure/solve_coarse.
 const SWEEPS: usize = 8;
 
-/// Where a brick's neighbours are.
+/// Neighbours of a brick.
 #[derive(Clone, Copy, Debug)]
 pub struct Brick {
-    /// Slots at the lower, then the upper faces.
+    /// Slots at the lower faces, then at the upper ones.
     pub faces: [u32; 6],
-    /// Element of the cell above block 0, on the next level.
+    /// Element on the next level that contains block 0.
     pub above: u32,
 }
 
@@ -30,11 +32,11 @@ pub struct Brick {
 pub struct Levels {
     /// Slots of each level.
     pub levels: Vec<Range<u32>>,
-    /// One a slot.
+    /// One brick per slot.
     pub bricks: Vec<Brick>,
-    /// Of the lower faces.
+    /// Coefficients of the lower faces.
     pub coefficient: [Vec<f32>; 3],
-    /// What air adds to the diagonal.
+    /// Air's contribution to the diagonal.
     pub dirichlet: Vec<f64>,
     /// Right-hand sides.
     pub residual: Vec<f64>,
@@ -42,54 +44,55 @@ pub struct Levels {
     pub correction: Vec<f64>,
 }
 
-/// How the device rounds.
+/// Rounding model of the device.
 #[derive(Clone, Copy)]
 pub struct Rounding {
-    /// Unit roundoff of what the levels are computed in.
+    /// Unit roundoff of the levels' precision.
     pub unit: f64,
-    /// Of a block's right-hand side, from the unit, |A| |z| and the sum of its own magnitudes.
+    /// Error bound of a block's right-hand side, from the unit, |A| |z| and the sum of its own
+    /// magnitudes.
     pub block: fn([f64; 3]) -> f64,
-    /// Of a restricted residual, from the unit and the sum of magnitudes.
+    /// Error bound of a restricted residual, from the unit and the sum of magnitudes.
     pub restricted: fn([f64; 2]) -> f64,
 }
 
-/// What a block sees about it.
+/// Values around a block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum About {
-    /// Nothing.
+    /// Zero.
     Nothing,
     /// The latest corrections.
     Corrections,
-    /// The same with what the coarser level adds to them.
+    /// The latest corrections plus the coarser level's.
     WithAbove,
 }
 
-/// A value that should stand at a place, and by how much it may be off.
+/// Expected value at an index, with an error bound.
 #[derive(Clone, Copy, Debug)]
 pub struct Expected {
-    /// Of the value.
+    /// Index of the value.
     pub place: usize,
-    /// In f64.
+    /// Value in f64.
     pub value: f64,
-    /// By rounding.
+    /// Bound on the device's rounding error.
     pub error: f64,
 }
 
-/// A block's eight rows: its own matrix, what stands on the right, and of that the sum of magnitudes.
+/// A block's eight rows: its matrix, the right-hand side, and the sum of magnitudes of that.
 struct Block {
     matrix: [[f64; 8]; 8],
     rhs: [f64; 8],
     size: [f64; 8],
-    /// What flows in from beyond the block.
+    /// Inflow from outside the block.
     inflow: [f64; 8],
 }
 
-/// Place of cell `c` of a block.
+/// Returns the index of cell `c` of a block.
 pub fn place(slot: u32, block: u32, c: usize) -> usize {
     (CELLS * slot + block) as usize + 64 * c
 }
 
-/// Place of the cell above a block, from that above block 0.
+/// Returns the offset of the cell above a block from the cell above block 0.
 pub fn above_offset(block: u32) -> u32 {
     let at = [block & 3, block >> 2 & 3, block >> 4];
     let half = at.map(|a| a >> 1);
@@ -98,7 +101,7 @@ pub fn above_offset(block: u32) -> u32 {
 }
 
 impl Levels {
-    /// Blocks of a colour of a level, with their slots.
+    /// Returns the blocks of one colour of a level, with their slots.
     pub fn coloured(&self, level: usize, colour: u32) -> Vec<(u32, u32)> {
         let is_of =
             move |block: &u32| ((block & 1) + (block >> 2 & 1) + (block >> 4 & 1)) % 2 == colour;
@@ -107,8 +110,10 @@ impl Levels {
             .collect()
     }
 
-    /// `pressure/smooth_first`, `pressure/smooth`, `pressure/smooth_corrected`: the corrections of a block of a level;
-    /// `None` where rounding decides whether it has a solution. The right-hand side itself is `rhs_error` off.
+    /// Reference pass of `pressure/smooth_first`, `pressure/smooth` and
+    /// `pressure/smooth_corrected`: the corrections of a block of a level; `None` if rounding
+    /// decides whether it has a solution. `rhs_error` bounds the error of the right-hand side
+    /// itself.
     pub fn solved(
         &self,
         level: usize,
@@ -125,8 +130,9 @@ impl Levels {
         }))
     }
 
-    /// `pressure/restrict`: residuals above a block of the first colour and above its neighbour along x: half of what has
-    /// flowed into the former since it was solved; nothing from the latter, which was solved last.
+    /// Reference pass of `pressure/restrict`: residuals above a block of the first colour and above
+    /// its neighbour along x. The former gets half of the inflow since it was solved, the latter,
+    /// which was solved last, 0.
     pub fn restricted(
         &self,
         level: usize,
@@ -137,7 +143,7 @@ impl Levels {
         let above = self.bricks[slot as usize].above;
         let at = |block: u32| (above + above_offset(block)) as usize;
         let sum: f64 = found.inflow.iter().sum();
-        // Residuals apart, that is what its size is made of.
+        // The magnitudes of the inflow only, without those of the residuals.
         let size: f64 = (0..8)
             .map(|c| found.size[c] - self.residual[place(slot, block, c)].abs())
             .sum();
@@ -155,9 +161,10 @@ impl Levels {
         ]
     }
 
-    /// `pressure/solve_coarse`: from the residuals on level `first` down to the last one, symmetric sweeps there, and back
-    /// up. Corrections and residuals of the levels, and by how much the device's may be off; `None` where rounding decides
-    /// whether a block has a solution.
+    /// Reference pass of `pressure/solve_coarse`: from the residuals on level `first` down to the
+    /// last level, symmetric sweeps there, and back up. Returns the corrections and residuals of
+    /// the levels, and their error bounds; `None` if rounding decides whether a block has a
+    /// solution.
     pub fn solve_coarse(&self, first: usize, rounding: Rounding) -> Option<[Self; 2]> {
         let mut values = self.clone();
         let own = (CELLS * self.levels[first].end) as usize;
@@ -174,14 +181,15 @@ impl Levels {
         Some([cycle.values, cycle.errors])
     }
 
-    /// Whether the lower face along `axis` of the cell at a place is one beyond which its level has no brick.
+    /// Returns whether the level has no brick beyond the lower face along `axis` of the cell at an
+    /// index.
     pub fn is_closed_end(&self, at: usize, axis: usize) -> bool {
         let (slot, c, block) = (at / 512, at % 512 / 64, at % 64);
         let is_first = block >> (2 * axis) & 3 == 0 && c >> axis & 1 == 0;
         is_first && self.bricks[slot].faces[axis] == 0
     }
 
-    /// The block beyond the face of a block; in slot 0 where there is none.
+    /// Returns the block beyond the face of a block; in slot 0 if there is none.
     fn beside(&self, level: usize, slot: u32, block: u32, axis: usize, is_up: bool) -> (u32, u32) {
         let step = 4u32.pow(axis as u32);
         let at = block / step % 4;
@@ -251,7 +259,8 @@ impl Levels {
 }
 
 impl Block {
-    /// Solutions of its matrix; `None` where rounding decides whether it has one.
+    /// Solves the block's matrix for several right-hand sides; `None` if rounding decides whether
+    /// it has a solution.
     fn solve<const N: usize>(&self, mut rhs: [[f64; N]; 8]) -> Option<[[f64; N]; 8]> {
         let mut a = self.matrix;
         let is_row = |k: usize| self.matrix[k][k] != 0.0;
@@ -282,9 +291,10 @@ impl Block {
         Some(rhs)
     }
 
-    /// The solution and by how much it may be off: elimination solves a matrix and a right-hand side that are a few
-    /// roundings off (Higham 2002, theorem 9.3; its factors have no greater entries than an M-matrix itself), and the
-    /// inverse has no negative entry. The right-hand side itself is `rhs_error` off.
+    /// Returns the solution and its error bound: elimination solves a matrix and a right-hand side
+    /// perturbed by a few roundings (Higham 2002, theorem 9.3; its factors have no larger entries
+    /// than the M-matrix itself), and the inverse has no negative entry. `rhs_error` bounds the
+    /// error of the right-hand side itself.
     fn solution(&self, rounding: Rounding, rhs_error: [f64; 8]) -> Option<[[f64; 2]; 8]> {
         let exact = self.solve(self.rhs.map(|b| [b]))?;
         let off = std::array::from_fn(|c| {
@@ -297,8 +307,9 @@ impl Block {
     }
 }
 
-/// The levels' values, and by how much the device's may be off: what a block is given by others and its inverse have no
-/// negative entry, so that bounds take the same steps as values, and each step adds its own rounding.
+/// The levels' values and their error bounds. A block's inputs enter with non-negative coefficients
+/// and its inverse has no negative entry, so bounds take the same steps as values, and each step
+/// adds its own rounding.
 struct Cycle {
     values: Levels,
     errors: Levels,

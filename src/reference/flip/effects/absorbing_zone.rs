@@ -1,4 +1,4 @@
-//! Absorbing zones: faces in one lose a part of the velocity that particles gave them.
+//! Absorbing zones: damp the velocity that particles transferred to faces.
 
 use glam::DVec3;
 

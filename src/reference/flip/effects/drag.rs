@@ -1,4 +1,4 @@
-//! Drag of air on particles before the grid is given their velocities.
+//! Air drag on particles before the transfer to the grid.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -16,8 +16,9 @@ use swell_domain::{
 };
 use swell_scene::effects::drag::Settings;
 
-/// Water about a particle of a cell, over what the open cells of 27 hold: 0 of one alone, 1 deep in the water. `kind` says what cells
-/// are; walls and solids are left out.
+/// Returns the water fraction around a particle of a cell: the other particles over what the open
+/// ones of 27 cells hold. It is 0 for a lone particle, 1 deep in water. `kind` gives the kinds of
+/// cells; walls and solids are excluded.
 pub fn share(model: &Model, bricks: &Bricks, kind: &[u32], sorted: &Sorted, element: u32) -> f64 {
     let cell = bricks.cell(element);
     let is_beyond = |offset: [i32; 3]| {
@@ -37,7 +38,8 @@ pub fn share(model: &Model, bricks: &Bricks, kind: &[u32], sorted: &Sorted, elem
     (particles.max(1) - 1) as f64 / held
 }
 
-/// Velocities of the sorted particles after drag in a step, without what gravity adds in it, m/s (effects/drag_by_cells).
+/// Returns the velocities of the sorted particles after drag in a step, without gravity's change in
+/// the step, m/s (effects/drag_by_cells).
 pub fn drag_by_cells(
     settings: &Settings,
     step: &Step<'_>,

@@ -1,4 +1,5 @@
-//! Generation zones: faces in one go a part of the way from the velocity that particles gave them to that of the waves.
+//! Generation zones: move face velocities from those that particles transferred towards those of
+//! the waves.
 
 use glam::DVec3;
 

@@ -1,4 +1,4 @@
-//! What each effect does to velocities at faces: a file an effect.
+//! Reference passes of the effects on FLIP, one file per effect.
 
 use glam::DVec3;
 
@@ -10,25 +10,26 @@ use crate::Timings;
 use swell_domain::bricks::Bricks;
 use swell_scene::effects::{Effects, with_effects, zone::Zone};
 
-/// What an effect knows beside the velocities.
+/// Inputs of an effect on faces, besides the velocities.
 #[derive(Clone, Copy)]
 pub struct Water<'a> {
-    /// Settings.
+    /// Scene and grid.
     pub model: &'a Model,
-    /// The substep.
+    /// Parameters of the substep.
     pub step: &'a Step<'a>,
-    /// Where the elements lie.
+    /// Layout of the elements.
     pub bricks: &'a Bricks,
-    /// What of the cells is water.
+    /// Open space and cell kinds.
     pub room: &'a Room,
-    /// What cell centres know of it.
+    /// Densities and surface distances at cell centres.
     pub centers: &'a Centers,
     /// Velocities at faces before gravity, m/s.
     pub old: &'a [DVec3],
 }
 
-/// Velocities at faces after a zone led them towards `wanted`, which is asked for at places in metres from the domain's least
-/// corner, from those before gravity on; m/s, shapes (elements).
+/// Returns the face velocities after a zone moved them, from those before gravity, towards
+/// `wanted`, which takes positions in metres from the domain's minimum corner; m/s, shapes
+/// (elements).
 pub fn led_faces(
     zone: Zone<'_>,
     water: Water<'_>,
@@ -53,28 +54,29 @@ pub fn led_faces(
     })
 }
 
-/// What an effect on the sorted particles knows beside them.
+/// Inputs of an effect on the sorted particles, besides the particles.
 #[derive(Clone, Copy)]
 pub struct Flying<'a> {
-    /// Settings.
+    /// Scene and grid.
     pub model: &'a Model,
-    /// The substep.
+    /// Parameters of the substep.
     pub step: &'a Step<'a>,
-    /// Where the elements lie.
+    /// Layout of the elements.
     pub bricks: &'a Bricks,
-    /// What solids leave of the cells.
+    /// Kinds of the cells, as far as solids determine them.
     pub kind: &'a [u32],
 }
 
-/// What an effect's settings do, with times by pass.
+/// Reference passes of an effect, timed by pass.
 trait Acts {
-    /// To the sorted particles, before the grid is given their velocities.
+    /// Acts on the sorted particles before the transfer to the grid.
     fn on_particles(&self, _: Flying<'_>, _: &mut Sorted, _: &mut Timings) {}
 
-    /// To the velocities at the faces, m/s, before the projection.
+    /// Acts on the face velocities, m/s, before the projection.
     fn on_faces(&self, _: Water<'_>, _velocity: &mut Vec<DVec3>, _: &mut Timings) {}
 
-    /// To the velocities at the faces, m/s, between two projections; whether it needed more iterations than it may take.
+    /// Acts on the face velocities, m/s, between two projections; returns whether it needs more
+    /// iterations than the settings allow.
     fn between_projections(
         &self,
         _: Water<'_>,
@@ -89,7 +91,7 @@ macro_rules! twins {
     ($($name:ident),+ $(,)?) => {
         $(pub mod $name;)+
 
-        /// Runs the effects that a scene names on the sorted particles.
+        /// Applies the scene's effects to the sorted particles.
         pub(super) fn on_particles(
             named: &Effects,
             flying: Flying<'_>,
@@ -103,8 +105,8 @@ macro_rules! twins {
             )+
         }
 
-        /// Runs the effects that a scene names between two projections on the velocities at the faces, m/s; whether one needed more
-        /// iterations than it may take.
+        /// Applies the scene's effects between two projections to the face velocities, m/s; returns
+        /// whether one needs more iterations than the settings allow.
         pub(super) fn between_projections(
             named: &Effects,
             water: Water<'_>,
@@ -120,7 +122,7 @@ macro_rules! twins {
             is_short
         }
 
-        /// Runs the effects that a scene names on the velocities at the faces, m/s.
+        /// Applies the scene's effects to the face velocities, m/s.
         pub(super) fn on_faces(
             named: &Effects,
             water: Water<'_>,

@@ -1,4 +1,4 @@
-//! Surface tension: the jump of the pressure at the surface, on the faces that cross it.
+//! Surface tension: the pressure jump at the surface, applied to the faces that it crosses.
 
 use glam::{DMat3, DVec2, DVec3};
 
@@ -16,22 +16,24 @@ use swell_domain::{
 };
 use swell_scene::effects::surface_tension::Settings;
 
-/// Slopes of the share, a cell, below which there is no direction.
+/// Gradients of the water fraction, per cell, below which there is no reliable direction.
 pub const LEAST_SLOPE: f64 = 1e-3;
 
-/// Cells that κ is carried at most along the normal.
+/// Largest distance over which κ is extrapolated along the normal, cells.
 pub const FARTHEST: f64 = 2.0;
 
-/// Half of the variance along an axis of three binomial filters, 1/2 each, and of the hats, 1/6; in cells².
+/// Half the variance along an axis of three binomial filters, 1/2 each, and of the hat function,
+/// 1/6; in cells².
 pub const SHIFT: f64 = (3.0 / 2.0 + 1.0 / 6.0) / 2.0;
 
-/// κ Δx of a drop of two cells' radius: of smaller ones cells see too little.
+/// κ Δx of a drop with a radius of two cells: the grid does not resolve smaller ones.
 pub const MOST: f64 = 1.0;
 
-/// Where the share is flatter than this on both sides of a face, nothing is known of κ.
+/// If the water fraction is flatter than this on both sides of a face, κ is unknown.
 pub const LEAST_WEIGHT: f64 = 1e-6;
 
-/// Elements of the 27 cells about one, x fastest, where a wall or a solid mirrors those before it.
+/// Returns the elements of the 27 cells around one, x fastest; walls and solids mirror the cells in
+/// front of them.
 pub fn mirrored(model: &Model, bricks: &Bricks, kind: &[u32], element: u32) -> [u32; 27] {
     let cell = bricks.cell(element);
     let is_solid = |other: u32| other >= CELLS && kind[other as usize] == SOLID;
@@ -39,7 +41,7 @@ pub fn mirrored(model: &Model, bricks: &Bricks, kind: &[u32], element: u32) -> [
         let there = i64::from(cell[axis]) + i64::from(step);
         let is_inside =
             model.scene.periodic[axis] || (0..i64::from(model.cells[axis])).contains(&there);
-        // Beyond the upper faces along other axes nothing is open either.
+        // Beyond the upper faces along the other axes everything is closed as well.
         let is_behind = |k: usize| !model.scene.periodic[k] && cell[k] >= model.cells[k];
         let is_beyond = (0..3).any(|k| k != axis && is_behind(k));
         !is_inside || is_beyond || is_solid(bricks.near(element, along(axis, step)))
@@ -58,7 +60,7 @@ pub fn mirrored(model: &Model, bricks: &Bricks, kind: &[u32], element: u32) -> [
     elements
 }
 
-/// One pass of the binomial filter (1 2 1)³ / 64. Shapes (elements).
+/// Applies the binomial filter (1 2 1)³ / 64 once. Shapes (elements).
 pub fn smooth(model: &Model, bricks: &Bricks, kind: &[u32], share: &[f64]) -> Vec<f64> {
     per_cell(bricks, |element| {
         let weight = |step: i32| if step == 0 { 0.5 } else { 0.25 };
@@ -71,29 +73,30 @@ pub fn smooth(model: &Model, bricks: &Bricks, kind: &[u32], share: &[f64]) -> Ve
     })
 }
 
-/// Water's share about cell centres, smoothed for the first time (effects/tension_share).
+/// Returns the water fraction around cell centres, smoothed for the first time
+/// (effects/tension_share).
 pub fn first_share(model: &Model, bricks: &Bricks, kind: &[u32], density: &[f64]) -> Vec<f64> {
     let share: Vec<f64> = density.iter().map(|rho| rho.clamp(0.0, 1.0)).collect();
     smooth(model, bricks, kind, &share)
 }
 
-/// The smoothed share about a cell as its curvature sees it; lengths in cells.
+/// Derivatives of the smoothed water fraction around a cell; lengths in cells.
 #[derive(Clone, Copy, Debug)]
 pub struct Bent {
-    /// Slopes at the eight corners.
+    /// Gradients at the eight corners.
     pub corners: [DVec3; 8],
-    /// −∇·n of the cell's own level set.
+    /// −∇·n of the level set through the cell's centre.
     pub bend: f64,
     /// |∇n|².
     pub squares: f64,
     /// |∇s| at the centre.
     pub steep: f64,
-    /// How far outside of the level 1/2 the centre lies.
+    /// Signed distance of the centre from the level 1/2, positive outside the water.
     pub off: f64,
 }
 
 impl Bent {
-    /// From the shares of 27 cells, x fastest.
+    /// Computes the derivatives from the water fractions of 27 cells, x fastest.
     pub fn of(shares: &[f64; 27]) -> Self {
         let places = [0, 1, 2, 3, 4, 5, 6, 7].map(|c: usize| [c & 1, c >> 1 & 1, c >> 2]);
         let corners = places.map(|at| {
@@ -121,13 +124,13 @@ impl Bent {
         }
     }
 
-    /// κ Δx of the surface: that of the level set, carried along the normal.
+    /// Returns κ Δx of the surface: that of the level set, extrapolated along the normal.
     pub fn curvature(&self) -> f64 {
         (self.bend + (self.off - SHIFT * self.bend) * self.squares).clamp(-MOST, MOST)
     }
 }
 
-/// Of a cell that knows of water; `None` of others.
+/// Returns the derivatives at a cell; `None` where the water fraction is 0.
 pub fn bent(
     model: &Model,
     bricks: &Bricks,
@@ -139,7 +142,8 @@ pub fn bent(
     (share[element as usize] > 0.0).then(|| Bent::of(&about()))
 }
 
-/// κ Δx of the surface near each cell, and how steep the share is there, a cell (effects/tension_curvature). Shapes (elements).
+/// Returns κ Δx of the surface near each cell, and the gradient of the water fraction there, per
+/// cell (effects/tension_curvature). Shapes (elements).
 pub fn curvature(model: &Model, bricks: &Bricks, kind: &[u32], share: &[f64]) -> Vec<DVec2> {
     per_cell(bricks, |element| {
         let bent = bent(model, bricks, kind, share, element);
@@ -147,7 +151,8 @@ pub fn curvature(model: &Model, bricks: &Bricks, kind: &[u32], share: &[f64]) ->
     })
 }
 
-/// κ Δx at the surface between a cell of water and one of air, and what its two parts weigh in all.
+/// Returns κ Δx at the surface between a cell of water and one of air, and the total weight of its
+/// two parts.
 pub fn between(curvature: &[DVec2], theta: f64, water: u32, air: u32) -> (f64, f64) {
     let (inside, outside) = (curvature[water as usize], curvature[air as usize]);
     let part = theta.min(1.0);
@@ -157,7 +162,8 @@ pub fn between(curvature: &[DVec2], theta: f64, water: u32, air: u32) -> (f64, f
     (sum / weight.max(LEAST_WEIGHT), weight)
 }
 
-/// The cells of water and of air on both sides of a lower face, in this order, where a surface crosses its way.
+/// Returns the cells of water and of air on both sides of a lower face, in this order, if the
+/// surface crosses it.
 pub fn sides(bricks: &Bricks, room: &Room, element: u32, axis: usize) -> Option<[u32; 2]> {
     let before = bricks.near(element, along(axis, -1));
     let is_open = room.open[element as usize][axis] > 0.0;
@@ -168,9 +174,9 @@ pub fn sides(bricks: &Bricks, room: &Room, element: u32, axis: usize) -> Option<
     }
 }
 
-/// Velocities at faces, m/s, after the jump σ κ has pushed for a step of `seconds` against the air (effects/tension_push): Δt σ κ /
-/// (ρ θ Δx), which the projection answers with a pressure that has the jump in it (Kang, Fedkiw and Liu 2000). `tension` is σ / ρ,
-/// m³/s².
+/// Returns the face velocities, m/s, after the pressure jump σ κ has acted against the air for a
+/// step of `seconds` (effects/tension_push): Δt σ κ / (ρ θ Δx). The projection then finds a
+/// pressure that includes the jump (Kang, Fedkiw and Liu 2000). `tension` is σ / ρ, m³/s².
 pub fn push(
     (model, tension, seconds): (&Model, f64, f64),
     bricks: &Bricks,

@@ -1,5 +1,5 @@
-//! Viscosity on the grid (Batty and Bridson 2008). XSPH's is a further part of the velocity that is taken from the grid, which
-//! [`Scene::substep_pic_blend`] counts in: on the grid itself nothing of it is left to do.
+//! Viscosity on the grid (Batty and Bridson 2008). XSPH increases the PIC fraction, which
+//! [`Scene::substep_pic_blend`] takes into account; on the grid itself it does nothing.
 //!
 //! [`Scene::substep_pic_blend`]: swell_scene::Scene::substep_pic_blend
 
@@ -16,10 +16,10 @@ use swell_domain::{
 };
 use swell_scene::effects::viscosity::Settings;
 
-/// A face so far behind a wall is in its plane, cells.
+/// A face this far behind a wall still counts as in its plane, cells.
 const BESIDE: f64 = 0.01;
 
-/// How a face takes part.
+/// Role of a face in the solve.
 #[derive(Clone, Copy, PartialEq)]
 enum Face {
     InAir,
@@ -27,30 +27,31 @@ enum Face {
     Closed,
 }
 
-/// What the solve knows of a cell.
+/// Data of a cell for the solve.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Cell {
-    /// Whether it is water.
+    /// Whether the cell is water.
     pub is_water: bool,
     /// Which of its lower faces move.
     pub moves: [bool; 3],
-    /// Beside which of them both cells are water.
+    /// Which of its lower faces have water in both cells.
     pub is_whole: [bool; 3],
-    /// Of the edges through its least corner, by the axis that they lie along.
+    /// The edges through its minimum corner, by the axis of the edge.
     pub edges: [Edge; 3],
 }
 
-/// What the stress at an edge counts by.
+/// Weights of the stress at an edge.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Edge {
-    /// Of the four cells about it, how many are water; 0 where there is no stress.
+    /// Number of the four cells around the edge that are water; 0 if there is no stress.
     pub water: u32,
-    /// Weights in its strain of the difference of the velocities along the axis after its own, and along the one after that.
+    /// Weights in the strain of two velocity differences: of the component along the axis after the
+    /// edge's own, and of that along the axis after that.
     pub weight: [u32; 2],
 }
 
 impl Cell {
-    /// What such a word says.
+    /// Unpacks the word of shaders/shared/viscous_word.wgsl.
     pub fn of_word(word: u32) -> Self {
         let bit = |place: usize| word >> place & 1 == 1;
         let edge = |axis: usize| {
@@ -68,7 +69,7 @@ impl Cell {
         }
     }
 
-    /// The word of shaders/shared/viscous_word.wgsl.
+    /// Packs the cell into the word of shaders/shared/viscous_word.wgsl.
     pub fn word(&self) -> u32 {
         let bit = |is: bool, place: usize| u32::from(is) << place;
         let faces =
@@ -84,13 +85,13 @@ impl Cell {
     }
 }
 
-/// `offset` and a step along an axis.
+/// Returns `offset` plus a step along an axis.
 fn beside(offset: [i32; 3], axis: usize, step: i32) -> [i32; 3] {
     let step = along(axis, step);
     std::array::from_fn(|k| offset[k] + step[k])
 }
 
-/// What a cell's own solve is made of.
+/// A cell and its surroundings, from which its [`Cell`] is derived.
 struct Around<'a> {
     water: Water<'a>,
     element: u32,
@@ -106,7 +107,8 @@ impl Around<'_> {
         self.water.room.kind[self.near(offset) as usize] == FLUID
     }
 
-    /// Walls that the middle of a lower face lies behind: of the least faces, and of the greatest.
+    /// Returns the walls that the centre of a lower face lies behind: the minimum and the maximum
+    /// walls, by axis.
     fn behind(&self, offset: [i32; 3], axis: usize) -> [glam::BVec3; 2] {
         let offset = DVec3::from_array(offset.map(f64::from));
         let middle = self.corner + offset + 0.5 - 0.5 * DVec3::AXES[axis];
@@ -136,7 +138,8 @@ impl Around<'_> {
         }
     }
 
-    /// Weight of the difference of the velocities along `axis` over a cell along `across`; `None` where water slips along a wall.
+    /// Returns the weight of the difference of velocities along `axis` over a cell along `across`;
+    /// `None` at a free-slip wall.
     fn weight(&self, axis: usize, across: usize) -> Option<u32> {
         let offsets = [[0; 3], beside([0; 3], across, -1)];
         let is_closed = offsets.map(|offset| self.face(offset, axis) == Face::Closed);
@@ -188,7 +191,8 @@ impl Around<'_> {
     }
 }
 
-/// What a viscous solve moves, and by how much water each stress counts (effects/viscosity_weigh). Shape (elements).
+/// Determines which faces a viscous solve moves, and the water fraction that weights each stress
+/// (effects/viscosity_weigh). Shape (elements).
 pub fn viscosity_weigh(water: Water<'_>) -> Vec<Cell> {
     per_cell(water.bricks, |element| {
         let corner = corner(water.bricks, element);
@@ -201,8 +205,8 @@ pub fn viscosity_weigh(water: Water<'_>) -> Vec<Cell> {
     })
 }
 
-/// What an edge adds to K u and to K's diagonal at the face along `axis` on its upper side along `other`; it lies through the least
-/// corner of the cell `offset` away.
+/// Returns an edge's contribution to K u and to K's diagonal at the face along `axis` on its upper
+/// side along `other`; the edge passes through the minimum corner of the cell at `offset`.
 fn stress(
     (bricks, cells): (&Bricks, &[Cell]),
     velocity: &[DVec3],
@@ -226,7 +230,7 @@ fn stress(
     DVec2::new(share * strain, share * own)
 }
 
-/// K u and K's diagonal at the lower face along `axis` of a cell.
+/// Returns K u and K's diagonal at the lower face along `axis` of a cell.
 pub fn stresses(
     (bricks, cells): (&Bricks, &[Cell]),
     velocity: &[DVec3],
@@ -252,8 +256,8 @@ pub fn stresses(
     sum
 }
 
-/// An iteration of (M + κ K) u = M u*, whose κ, gain and momentum `by` are: velocities, m/s, and what changed them
-/// (effects/viscosity_relax). Shapes (elements).
+/// Runs an iteration of (M + κ K) u = M u* with the given κ, gain and momentum: returns the
+/// velocities and their changes, m/s (effects/viscosity_relax). Shapes (elements).
 pub fn viscosity_relax(
     (bricks, cells): (&Bricks, &[Cell]),
     [reach, gain, momentum]: [f64; 3],

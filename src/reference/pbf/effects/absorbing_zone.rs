@@ -1,4 +1,4 @@
-//! Absorbing zones: particles in one lose a part of their velocity.
+//! Absorbing zones: damp the velocities of particles.
 
 use glam::DVec3;
 

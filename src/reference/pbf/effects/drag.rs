@@ -1,4 +1,4 @@
-//! Drag of air on particles, by the density at their places.
+//! Air drag on particles, by the density around them.
 
 use glam::DVec3;
 
@@ -10,7 +10,8 @@ use swell_domain::{
 };
 use swell_scene::effects::drag::Settings;
 
-/// Share of water about each particle: 0 of one alone, 1 deep in the water. Shape (particles).
+/// Returns the water fraction around each particle: 0 for a lone particle, 1 deep in water. Shape
+/// (particles).
 pub fn shares(inputs: Inputs<'_>) -> Vec<f64> {
     let own = inputs.model.calibration.density_scale;
     let density = measure_density(inputs).into_iter();
@@ -19,7 +20,7 @@ pub fn shares(inputs: Inputs<'_>) -> Vec<f64> {
         .collect()
 }
 
-/// Velocities after drag, m/s (effects/drag_by_density).
+/// Returns the velocities after drag, m/s (effects/drag_by_density).
 pub fn drag_by_density(settings: &Settings, inputs: Inputs<'_>, velocity: &[DVec3]) -> Vec<DVec3> {
     let blow = |(share, &v): (f64, &DVec3)| match exposure(share, PLANE_SHARE) {
         0.0 => v,

@@ -1,4 +1,4 @@
-//! Generation zones: particles in one go a part of the way to the velocity of the waves.
+//! Generation zones: move velocities of particles towards those of the waves.
 
 use glam::DVec3;
 

@@ -1,4 +1,5 @@
-//! Twins of shaders/effects: a file an effect, a function a pass, under its name.
+//! Reference passes of shaders/effects on PBF: one file per effect, one function per pass, with the
+//! pass's name.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -11,7 +12,7 @@ macro_rules! twins {
     ($($name:ident),+ $(,)?) => {
         $(pub mod $name;)+
 
-        /// Runs the effects that a scene names on the velocities of a substep, m/s.
+        /// Applies the scene's effects to the velocities of a substep, m/s.
         pub(super) fn apply(
             named: &Effects,
             inputs: Inputs<'_>,
@@ -29,8 +30,9 @@ macro_rules! twins {
 
 with_effects!(twins);
 
-/// The velocities of particles at `places` after a zone led them towards `wanted` in a step of so many seconds, in a domain of `size`;
-/// m/s and metres, shapes (particles). Drops are let be; `is_drop` is empty where nobody tells them.
+/// Returns the velocities of particles at `places` after a zone moved them towards `wanted` in a
+/// step of `step` seconds, in a domain of the given size; m/s and metres, shapes (particles).
+/// Isolated droplets are left unchanged; `is_drop` is empty if no projection finds them.
 pub fn led_particles(
     zone: Zone<'_>,
     (size, step): (DVec3, f64),
@@ -48,7 +50,7 @@ pub fn led_particles(
         .collect()
 }
 
-/// The sum of `term(i, j)` over the fluid neighbours j of every particle i.
+/// Returns the sum of `term(i, j)` over the fluid neighbours j of every particle i.
 fn fluid_sums<'a>(
     inputs: Inputs<'a>,
     term: impl Fn(usize, usize) -> DVec3 + Sync + Send + 'a,
@@ -59,7 +61,7 @@ fn fluid_sums<'a>(
     })
 }
 
-/// ∇_j W as calibrated, 1/m; it points from j to i.
+/// Returns the calibrated ∇_j W, 1/m; it points from j to i.
 fn slope(inputs: Inputs<'_>, i: usize, j: usize) -> DVec3 {
     let calibration = &inputs.model.calibration;
     let d = inputs.between(i, j);

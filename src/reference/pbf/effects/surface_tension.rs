@@ -1,4 +1,4 @@
-//! Surface tension of PBF: its projection has it, as FLIP's.
+//! Surface tension for PBF: nothing on particles, because its projection applies it on the grid.
 
 use glam::DVec3;
 

@@ -7,7 +7,7 @@ use super::{Inputs, fluid_sums};
 use crate::Timings;
 use swell_scene::effects::viscosity::Settings;
 
-/// c Σ_j m/ρ (v_j − v_i) W of each particle, m/s (effects/viscosity_gather).
+/// Returns c Σ_j m/ρ (v_j − v_i) W of each particle, m/s (effects/viscosity_gather).
 pub fn viscosity_gather(inputs: Inputs<'_>, xsph: f64, velocity: &[DVec3]) -> Vec<DVec3> {
     let calibration = &inputs.model.calibration;
     let inverse_h = 1.0 / calibration.support_radius;
@@ -19,7 +19,7 @@ pub fn viscosity_gather(inputs: Inputs<'_>, xsph: f64, velocity: &[DVec3]) -> Ve
     .collect()
 }
 
-/// Adds the change to each velocity, m/s (effects/viscosity_apply).
+/// Adds the changes to the velocities, m/s (effects/viscosity_apply).
 pub fn viscosity_apply(change: &[DVec3], velocity: &[DVec3]) -> Vec<DVec3> {
     velocity.iter().zip(change).map(|(v, dv)| v + dv).collect()
 }
@@ -31,7 +31,7 @@ pub(super) fn apply(
     timings: &mut Timings,
 ) -> Vec<DVec3> {
     let Some(xsph) = settings.xsph else {
-        // A coefficient is solved on the grid of the projection.
+        // The projection's grid handles a viscosity coefficient.
         return velocity.to_vec();
     };
     let change = timings.time("effects/viscosity_gather", || {

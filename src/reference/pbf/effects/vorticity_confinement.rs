@@ -7,7 +7,7 @@ use super::{Inputs, fluid_sums, slope};
 use crate::Timings;
 use swell_scene::effects::vorticity_confinement::Settings;
 
-/// ω_i = Σ_j m/ρ (v_j − v_i) × ∇_j W, 1/s (effects/vorticity_curl).
+/// Returns ω_i = Σ_j m/ρ (v_j − v_i) × ∇_j W, 1/s (effects/vorticity_curl).
 pub fn vorticity_curl(inputs: Inputs<'_>, velocity: &[DVec3]) -> Vec<DVec3> {
     fluid_sums(inputs, |i, j| {
         (velocity[j] - velocity[i]).cross(slope(inputs, i, j))
@@ -15,8 +15,8 @@ pub fn vorticity_curl(inputs: Inputs<'_>, velocity: &[DVec3]) -> Vec<DVec3> {
     .collect()
 }
 
-/// The velocities after a = ε h (N × ω), N = η/|η|, η = ∇|ω| by differences, has acted for the substep
-/// (effects/vorticity_force).
+/// Returns the velocities after a = ε h (N × ω), N = η/|η|, η = ∇|ω| by differences, has acted for
+/// the substep, m/s (effects/vorticity_force).
 pub fn vorticity_force(
     inputs: Inputs<'_>,
     strength: f64,
@@ -31,7 +31,7 @@ pub fn vorticity_force(
     .enumerate()
     .map(|(i, eta)| {
         let steepness = eta.length();
-        // Below rounding of |ω| over h, in f32, the direction is noise.
+        // Below the rounding error of |ω| over h in f32 the direction is noise.
         if steepness * h < 1e-5 * length[i] || length[i] == 0.0 {
             return velocity[i];
         }
