@@ -1,37 +1,42 @@
-//! The water's outline in pictures against the one that rays in f64 have.
+//! Compares the water's outline in pictures with the outline from f64 rays.
 //!
-//! An edge point is the middle between two pixels beside or above each other of which one alone shows water. Where what the dry one
-//! shows stands `BEHIND` spacings or more behind the water it is of a silhouette, where it stands nearer of a waterline; where it
-//! stands before the water, the edge is not the water's and is left out. Each point of a picture has a distance to the truth's nearest
-//! edge point, which counts as positive where the truth has no water. Offset is the mean of these distances over the outline, and
-//! roughness their root mean square about their own mean nearby: a Gaussian of `NEARBY` spacings along the outline. A wave of
-//! the water's own is in both outlines and in neither number; beads of splats one spacing apart are roughness.
+//! An edge point is the midpoint between two adjacent pixels, side by side or one above the other,
+//! of which exactly one shows water. It belongs to a silhouette if what the dry pixel shows is
+//! `BEHIND` spacings or more behind the water, and to a waterline if it is closer. If it is in
+//! front of the water, the edge is not the water's and is left out. Each edge point of a picture
+//! has a distance to the ground truth's nearest edge point, positive where the truth has no water.
+//! Offset is the mean of these distances over the outline. Roughness is their root mean square
+//! about their local mean, a Gaussian average of `NEARBY` spacings along the outline. A wave of the
+//! water itself is in both outlines and in neither figure; beads of splats one spacing apart count
+//! as roughness.
 
 use glam::DVec2;
 use rayon::prelude::*;
 
-/// How far behind the water a background stands, spacings; less, and they meet at a waterline.
+/// Least distance of a background behind the water for a silhouette, spacings; closer ones form a
+/// waterline.
 const BEHIND: f64 = 3.0;
-/// How far before the water, spacings, what is opaque has to stand for the edge to be its own.
+/// An opaque surface at least this far in front of the water, spacings, makes the edge its own.
 const BEFORE: f64 = 0.5;
-/// Edge points have none of the truth's beside them if that is farther away, spacings.
+/// An edge point has no counterpart in the truth if the nearest one is farther away than this,
+/// spacings.
 const REACH: f64 = 2.0;
-/// Standard deviation of the mean about which roughness is measured, spacings: what is as long as a spacing is left out of it
-/// but for exp(−½ (2π · 1.5)²).
+/// Standard deviation of the local mean about which roughness is measured, spacings. It removes
+/// waves of one spacing from the mean, except for a factor of exp(−½ (2π · 1.5)²).
 const NEARBY: f64 = 1.5;
 
-/// A picture of depths along the optical axis, as far as water and what stands behind it go.
+/// Depths along the optical axis of the water and of what is behind it, per pixel.
 #[derive(Clone, Debug)]
 pub struct Outlined {
-    /// Pixels along a row.
+    /// Pixels per row.
     pub width: usize,
-    /// Of the water, metres; infinite where a pixel shows none.
+    /// Depth of the water, metres; infinite where a pixel shows none.
     pub water: Vec<f64>,
-    /// Of what is opaque, metres; infinite in the sky.
+    /// Depth of the first opaque surface, metres; infinite in the sky.
     pub opaque: Vec<f64>,
 }
 
-/// What an edge is of.
+/// Kind of an edge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
     Silhouette,
@@ -40,10 +45,10 @@ enum Kind {
 
 #[derive(Clone, Copy, Debug)]
 struct Point {
-    /// Pixels from the upper left pixel's centre.
+    /// Position, pixels from the upper left pixel's centre.
     at: DVec2,
     kind: Kind,
-    /// Pixels a spacing at the water's depth.
+    /// Pixels per spacing at the water's depth.
     scale: f64,
     /// The two pixels.
     pair: [usize; 2],
@@ -54,7 +59,8 @@ impl Outlined {
         self.water[pixel].is_finite()
     }
 
-    /// Edge points; `unit` is a spacing in pixels at a depth of a metre, `spacing` is in metres.
+    /// Returns the edge points. `unit` is the size of a spacing in pixels at a depth of one metre;
+    /// `spacing` is in metres.
     fn points(&self, unit: f64, spacing: f64) -> Vec<Point> {
         let mut points = Vec::new();
         let height = self.water.len() / self.width.max(1);
@@ -89,12 +95,13 @@ impl Outlined {
         points
     }
 
-    /// Pixels by which a point lies outside of this outline, whose edge points are `edge`; `None` where none is near.
+    /// Returns the distance of a point outside this outline, pixels; `edge` are the outline's edge
+    /// points. `None` if none is near.
     fn distance(&self, edge: &[Point], point: &Point) -> Option<f64> {
         let sign = match point.pair.map(|pixel| self.is_wet(pixel)) {
             [true, true] => -1.0,
             [false, false] => 1.0,
-            // The truth's edge runs here as well.
+            // The truth's edge passes here as well.
             _ => return Some(0.0),
         };
         let squared = |other: &Point| other.at.distance_squared(point.at);
@@ -103,39 +110,41 @@ impl Outlined {
     }
 }
 
-/// An edge point's distances, spacings.
+/// Deviations of an edge point, spacings.
 #[derive(Clone, Copy, Debug)]
 struct Deviation {
     kind: Kind,
-    /// From the truth's edge; `None` where that is not near.
+    /// Distance from the truth's edge; `None` if that is not near.
     off: Option<f64>,
-    /// From the mean of `off` nearby.
+    /// Distance from the local mean of `off`.
     rough: f64,
-    /// A pixel's edge, spacings.
+    /// Size of a pixel, spacings.
     pixel: f64,
 }
 
-/// Outlines of pictures of some frames against the truth's.
+/// Outlines of the pictures of some frames, compared with ground truth.
 #[derive(Clone, Debug, Default)]
 pub struct Outlines(Vec<Deviation>);
 
-/// What is told of edges of one kind.
+/// Statistics of edges of one kind.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Outline {
-    /// Edge points that have one of the truth's near them.
+    /// Number of edge points with an edge point of the truth near them.
     pub points: usize,
-    /// Mean distance outside of the truth's edge, spacings.
+    /// Mean distance outside the truth's edge, spacings.
     pub offset: f64,
-    /// Root mean square of the distance about its mean nearby, spacings. Pixels alone make 0.41 of a pixel's edge.
+    /// Root mean square of the distance about its local mean, spacings. Pixel quantization by
+    /// itself gives 0.41 of a pixel.
     pub roughness: f64,
-    /// Edge points that have none of the truth's near them, over all.
+    /// Fraction of edge points without an edge point of the truth near them.
     pub astray: f64,
-    /// A pixel's edge, spacings, on average.
+    /// Mean size of a pixel, spacings.
     pub pixel: f64,
 }
 
 impl Outlines {
-    /// Takes a picture and its truth, of particles of `spacing` metres, seen with a focal length of `focal` pixels.
+    /// Adds a picture and its ground truth, with particles of `spacing` metres, seen with a focal
+    /// length of `focal` pixels.
     pub fn add(&mut self, drawn: &Outlined, truth: &Outlined, focal: f64, spacing: f64) {
         let unit = focal * spacing;
         let [points, edge] = [drawn, truth].map(|picture| picture.points(unit, spacing));
@@ -169,12 +178,13 @@ impl Outlines {
         self.0.par_extend(deviations);
     }
 
-    /// Of the edges before what stands far behind; `None` where there are none.
+    /// Returns the statistics of edges in front of a far background; `None` if there are none.
     pub fn silhouette(&self) -> Option<Outline> {
         self.of(Kind::Silhouette)
     }
 
-    /// Of the edges at which water meets what is opaque; `None` where there are none.
+    /// Returns the statistics of edges where water meets an opaque surface; `None` if there are
+    /// none.
     pub fn waterline(&self) -> Option<Outline> {
         self.of(Kind::Waterline)
     }
@@ -204,10 +214,11 @@ mod tests {
     /// Metres.
     const DEPTH: f64 = 10.0;
     const SPACING: f64 = 0.1;
-    /// Pixels a spacing.
+    /// Pixels per spacing.
     const UNIT: f64 = 20.0;
 
-    /// Water within `radius(angle)` pixels of the middle, before a background at `opaque` metres.
+    /// Water within `radius(angle)` pixels of the centre, in front of a background at `opaque`
+    /// metres.
     fn disc(radius: impl Fn(f64) -> f64, opaque: f64) -> Outlined {
         let depth = |pixel: usize| {
             let at = DVec2::new((pixel % SIDE) as f64, (pixel / SIDE) as f64) - 199.5;
@@ -229,12 +240,14 @@ mod tests {
         outlines
     }
 
-    /// Edges of pixels are where a curve is to ±½ pixel, evenly: 1/√12 of a pixel each, and twice that variance for two. Points and
-    /// nearest points are on a grid of half pixels, which adds as much again where the curve is slanted.
+    /// Edges between pixels locate a curve to ±½ pixel, uniformly distributed: 1/√12 of a pixel
+    /// each, and twice that variance for two. Points and nearest points are on a grid of half
+    /// pixels, which adds as much again where the curve is slanted.
     const PIXELS: f64 = 0.6 / UNIT;
 
-    /// A disc 6 pixels wider than the truth's is 0.3 spacings off and smooth; beads of a spacing's length are rough by their
-    /// amplitude over √2, and waves twenty times as long are not.
+    /// A disc 6 pixels wider than the truth's has an offset of 0.3 spacings and is smooth. Beads of
+    /// the length of a spacing have a roughness of their amplitude over √2; waves twenty times as
+    /// long are smooth.
     #[test]
     fn beads_are_rough_and_waves_are_not() {
         const RADIUS: f64 = 150.0;
@@ -246,13 +259,13 @@ mod tests {
         let wide = wide.silhouette().expect("edges");
         assert!((wide.offset - 0.3).abs() < PIXELS, "{wide:?}");
         assert!(wide.roughness < PIXELS, "{wide:?}");
-        // 47 beads on 2π 150 pixels are a spacing long each.
+        // 47 beads on 2π 150 pixels are one spacing long each.
         let waved = |count: f64| {
             let waved = disc(|angle| RADIUS + 6.0 * (count * angle).cos(), sky);
             compared(&waved, &truth).silhouette().expect("edges")
         };
         let (beads, waves) = (waved(47.0), waved(2.0));
-        // Of slanted flanks there are more edge points, of which fewer lie far from the mean.
+        // Slanted flanks have more edge points, of which fewer are far from the mean.
         let amplitude = 0.3 / 2f64.sqrt();
         assert!(
             (0.75 * amplitude..1.1 * amplitude).contains(&beads.roughness),
@@ -264,8 +277,8 @@ mod tests {
         );
     }
 
-    /// What stands a spacing behind makes a waterline, what stands before the water no edge of its own, and an outline far from the
-    /// truth's is told as astray.
+    /// A background one spacing behind makes a waterline, a surface in front of the water no edge
+    /// of the water, and an outline far from the truth's is reported as astray.
     #[test]
     fn edges_are_told_apart_by_what_is_behind() {
         let near = disc(|_| 100.0, DEPTH + SPACING);

@@ -1,5 +1,6 @@
-//! Runs a table of twins along a traced substep: a twin says which pass it is of, what it reads, and what it makes of that;
-//! when and where the device's values are read is written here once.
+//! Runs a table of comparisons along a traced substep. Each row names a pass, the buffers to read
+//! and the reference pass; reading the device's buffers at the right time is implemented once,
+//! here.
 
 use std::collections::BTreeMap;
 
@@ -22,22 +23,25 @@ use swell_solve::{
 
 use super::{sort, table::Table};
 
-/// What comes of a comparison: the table holds what it found.
+/// Result of a comparison, whose findings are in the table.
 pub(super) type Outcome = Result<(), SolveError>;
 
-/// What holds a pass against its twin; `S` is what a solver's twins know of the substep.
+/// Comparison of a pass with its reference pass. `S` is the state that a solver's comparisons share
+/// during the substep.
 pub(super) struct Twin<S> {
     /// Name of the pass.
     pub(super) pass: &'static str,
-    /// Names of variables of the pass that are wanted as they stood before it ran although it writes them: they are kept.
+    /// Names of the pass's variables whose values from before the pass are needed although it
+    /// overwrites them: they are saved.
     pub(super) keeps: fn() -> Vec<String>,
-    /// Whether this run of the pass is one that is compared.
+    /// Whether to compare this run of the pass.
     pub(super) is_due: fn(&mut S, &Io<'_>) -> Result<bool, SolveError>,
-    /// Computes what the pass should have written, and adds that to the table beside what it did.
+    /// Computes what the pass should have written, and adds that and what it did write to the
+    /// table.
     pub(super) compare: fn(&mut S, &mut Io<'_>) -> Outcome,
 }
 
-/// A [`Twin`] that compares every run.
+/// Returns a [`Twin`] that compares every run.
 pub(super) const fn twin<S>(
     pass: &'static str,
     keeps: fn() -> Vec<String>,
@@ -51,10 +55,10 @@ pub(super) const fn twin<S>(
     }
 }
 
-/// Nothing is kept.
+/// Saves nothing.
 pub(super) const NONE: fn() -> Vec<String> = Vec::new;
 
-/// Names of buffers that are kept.
+/// Lists the names of buffers to save.
 macro_rules! names {
     ($($buffer:expr),+ $(,)?) => {
         vec![$($buffer.name().to_owned()),+]
@@ -62,47 +66,47 @@ macro_rules! names {
 }
 pub(super) use names;
 
-/// What a solver's twins know of the substep from pass to pass.
+/// State that a solver's comparisons share during the substep.
 pub(super) trait State: Sized + 'static {
-    /// Twins of its passes.
+    /// Returns the comparisons of the solver's passes.
     fn twins() -> Vec<&'static [Twin<Self>]>;
 
-    /// Particles.
+    /// Returns the number of particles.
     fn particles(&self) -> usize;
 
-    /// Passes without a row of their own, and where what they make is compared.
+    /// Passes without a row of their own, and where their results are compared.
     const ELSEWHERE: &'static [(&'static str, &'static str)];
 }
 
-/// A dispatch that has run: what it read and what it left; and the table.
+/// A dispatch that has run, with the buffers before and after it, and the table.
 pub(super) struct Io<'a> {
     /// Name of the pass.
     pub(super) pass: &'static str,
-    /// The pass before.
+    /// Name of the previous pass.
     pub(super) last: &'static str,
-    /// Buffers as they stood before it ran.
+    /// Buffers before the dispatch.
     pub(super) before: View<'a>,
-    /// Buffers as it left them.
+    /// Buffers after the dispatch.
     pub(super) after: View<'a>,
-    /// Where comparisons are added.
+    /// Table that comparisons are added to.
     pub(super) table: &'a mut Table,
 }
 
 /// The device's buffers at one time.
 pub(super) struct View<'a> {
     traced: Traced<'a>,
-    /// Those that the pass writes and that were kept; `None` after it.
+    /// Saved values of buffers that the pass writes; `None` for the view after it.
     kept: Option<&'a BTreeMap<String, Vec<u32>>>,
 }
 
 impl View<'_> {
-    /// Name of the buffer that a variable is bound to.
+    /// Returns the name of the buffer that a variable is bound to.
     pub(super) fn buffer<'b>(&'b self, variable: &'b str) -> &'b str {
         self.traced.buffer(variable)
     }
 
-    /// The first `count` values of a variable. Before the pass that is what was kept, and else what stands there now, which
-    /// must be of what the pass does not write.
+    /// Reads the first `count` values of a variable. The view before the pass returns saved values,
+    /// and otherwise current ones, which is only valid if the pass does not write the variable.
     pub(super) fn get<T: Pod>(&self, variable: Buf<T>, count: usize) -> Result<Vec<T>, SolveError> {
         let name = variable.name();
         if let Some(kept) = self.kept {
@@ -125,7 +129,7 @@ impl View<'_> {
         }
     }
 
-    /// Vectors.
+    /// Reads vectors.
     pub(super) fn vectors(
         &self,
         variable: Buf<[f32; 3]>,
@@ -134,13 +138,13 @@ impl View<'_> {
         Ok(wide(&self.get(variable, count)?))
     }
 
-    /// Numbers in f64.
+    /// Reads floats, as f64.
     pub(super) fn scalars(&self, variable: Buf<f32>, count: usize) -> Result<Vec<f64>, SolveError> {
         let values = self.get(variable, count)?;
         Ok(values.into_iter().map(f64::from).collect())
     }
 
-    /// Values of the projection's own precision.
+    /// Reads values in the projection's precision.
     pub(super) fn reals(
         &self,
         variable: &Buf<Real>,
@@ -153,7 +157,7 @@ impl View<'_> {
         }
     }
 
-    /// The scalars of a projection.
+    /// Reads the scalars of a projection.
     pub(super) fn control(&self, precision: Precision) -> Result<PressureControl64, SolveError> {
         match precision {
             Precision::F64 => self.one(pressure::CONTROL_F64),
@@ -161,24 +165,24 @@ impl View<'_> {
         }
     }
 
-    /// A struct that stands in front of a buffer.
+    /// Reads the first value of a buffer.
     pub(super) fn one<T: Pod>(&self, variable: Buf<T>) -> Result<T, SolveError> {
         Ok(self.get(variable, 1)?.remove(0))
     }
 
-    /// The window of a uniform that the dispatch is bound to.
+    /// Reads the window of a uniform that the dispatch is bound to.
     pub(super) fn window<T: Pod>(&self, windows: &Windows<T>) -> Result<T, SolveError> {
         self.traced.window(windows)
     }
 }
 
-/// Vectors in f64.
+/// Converts vectors to f64.
 pub(super) fn wide(values: &[[f32; 3]]) -> Vec<DVec3> {
     let wide = |value: &[f32; 3]| Vec3::from_array(*value).as_dvec3();
     values.iter().map(wide).collect()
 }
 
-/// A table of twins at work.
+/// Runs the comparisons of a solver.
 pub(super) struct Engine<S: State> {
     pub(super) state: S,
     pub(super) table: Table,
@@ -204,7 +208,7 @@ impl<S: State> Engine<S> {
         }
     }
 
-    /// Takes in a dispatch, before and after it runs.
+    /// Handles a dispatch, before and after it runs.
     pub(super) fn observe(&mut self, traced: Traced<'_>) -> Result<(), SolveError> {
         if traced.moment == Moment::Before {
             (self.last, self.now) = (self.now, traced.pass);
@@ -245,7 +249,7 @@ impl<S: State> Engine<S> {
         }
     }
 
-    /// The table, with the passes that have no row.
+    /// Returns the table, with the passes that have no row.
     pub(super) fn finish(mut self) -> Table {
         for pass in self.ran {
             if !self.table.has(pass) {

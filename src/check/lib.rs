@@ -1,11 +1,13 @@
-//! A substep on the GPU against the f64 reference, from the same inputs, pass by pass and as a whole.
+//! Compares a substep on the GPU with the f64 reference, from the same inputs, pass by pass and as
+//! a whole.
 //!
-//! A pass has a twin: a row in the table of its solver or effect (`TWINS`) that names the pass and the buffers that it
-//! overwrites and the twin wants from before, and a function from what the pass read to what it should have written.
-//! What is compared is declared beside it (`entries!`): pass, field, unit, and the tolerance as an expression of
-//! magnitudes, which each value hands in. The `engine` reads the device, and the `table` keeps what is furthest out.
+//! Each pass has a row in the table (`TWINS`) of its solver or effect. The row names the pass, the
+//! buffers that the pass overwrites and the comparison needs from before it, and a function that
+//! runs the reference pass on the pass's inputs. The compared values are declared in the same
+//! module (`entries!`): pass, field, unit, and a tolerance as an expression of magnitudes that each
+//! value supplies. The `engine` reads the device's buffers, and the `table` keeps the worst values.
 //!
-//! An effect's twins stand in one file of `effects`, for both solvers.
+//! The comparisons of an effect are in one file of `effects`, for both solvers.
 
 pub mod edges;
 mod effects;
@@ -20,11 +22,11 @@ pub mod whitewater;
 
 pub use table::{Row, Table};
 
-/// A substep held against its twins.
+/// Result of comparing a substep with its reference passes.
 #[derive(Clone, Debug, Default)]
 pub struct Checked {
-    /// What was found; empty where there is no water.
+    /// Comparisons; empty if there is no water.
     pub table: Table,
-    /// Which substep of its frame it was, from 1; `None` where there is no water.
+    /// Number of the substep in its frame, from 1; `None` if there is no water.
     pub substep: Option<u32>,
 }

@@ -1,12 +1,12 @@
-//! Pictures of the water by each method against pictures by finer rays: colour, and what flickers.
+//! Compares pictures of the water by each method with pictures by finer rays: colour and flicker.
 //!
-//! All are taken as a screen shows them, through the look's view.
+//! All pictures are compared as a screen shows them, through the look's view transform.
 
 use swell_compare::pictures::{Encoding, Picture, compare};
 use swell_render::{Image, view};
 use swell_scene::look::ViewSpec;
 
-/// A picture as a screen shows it, over black.
+/// Returns a picture as a screen shows it, over black.
 pub fn shown(image: &Image, spec: &ViewSpec) -> Picture {
     let pixel = |&[r, g, b, _]: &[f32; 4]| {
         let [r, g, b] = view::apply(spec, [r, g, b]).map(|x| x as f32);
@@ -21,19 +21,20 @@ pub fn shown(image: &Image, spec: &ViewSpec) -> Picture {
     }
 }
 
-/// SSIMULACRA 2 (Sneyers 2022) of a picture against its truth: 100 is no difference, 90 none to see, 70 small ones, below 30 bad.
-/// `None` where a side is shorter than 8 pixels.
+/// Returns the SSIMULACRA 2 score (Sneyers 2022) of a picture against its ground truth: 100 is
+/// identical, 90 visually lossless, 70 small differences, below 30 bad. `None` if a side is shorter
+/// than 8 pixels.
 pub fn score(picture: &Picture, truth: &Picture) -> Option<f64> {
     compare(picture, truth)?.perceptual
 }
 
-/// What of three frames in a row, seen by a camera that stands still, is not the mean of its neighbours: of each channel of the
-/// middle one, in parts of white.
+/// Deviation of the middle one of three consecutive frames from the mean of its neighbours, per
+/// channel, in fractions of white; for a static camera.
 #[derive(Clone, Debug)]
 pub struct Residual(Vec<f64>);
 
 impl Residual {
-    /// Of frames in order.
+    /// Computes the residual of three frames in order.
     pub fn of([before, middle, after]: [&Picture; 3]) -> Self {
         let frames = before.pixels.iter().zip(&middle.pixels).zip(&after.pixels);
         Self(
@@ -45,12 +46,13 @@ impl Residual {
         )
     }
 
-    /// Its root mean square: what moves unevenly, and what flickers.
+    /// Returns its root mean square, which includes uneven motion and flicker.
     pub fn strength(&self) -> f64 {
         rms(self.0.iter().copied())
     }
 
-    /// Root mean square of what is left where the truth's own is taken away: what flickers, and does not move so.
+    /// Returns the root mean square of the difference to the ground truth's residual, which leaves
+    /// only flicker.
     pub fn beyond(&self, truth: &Self) -> f64 {
         rms(self.0.iter().zip(&truth.0).map(|(a, b)| a - b))
     }
@@ -65,7 +67,7 @@ fn rms(values: impl ExactSizeIterator<Item = f64>) -> f64 {
 mod tests {
     use super::*;
 
-    /// A number in −0.5..0.5 that belongs to a pixel of a frame.
+    /// Returns a pseudo-random number in −0.5..0.5 for a pixel of a frame.
     fn random(pixel: usize, frame: usize) -> f32 {
         let mut h =
             (pixel as u32).wrapping_mul(0x9E37_79B1) ^ (frame as u32).wrapping_mul(0x85EB_CA77);
@@ -74,7 +76,8 @@ mod tests {
         ((h ^ (h >> 15)) >> 8) as f32 / 16_777_216.0 - 0.5
     }
 
-    /// A soft ball that has gone `way` pixels to the right, and noise of this strength that every frame has anew.
+    /// Returns a picture of a soft ball, moved by `way` pixels to the right, with noise of the
+    /// given strength that differs in every frame.
     fn frame(way: f32, noise: f32, seed: usize) -> Picture {
         let (width, height) = (96, 64);
         let pixel = |k: usize| {
@@ -91,8 +94,9 @@ mod tests {
         }
     }
 
-    /// What moves alike in picture and truth does not flicker, however it moves; noise of one channel does by √(3/2 · 1/12 / 3) of its
-    /// strength: three frames, with weights 1, ½ and ½, of an even distribution.
+    /// Motion that picture and truth share does not flicker, whatever it is. Noise in one channel
+    /// contributes √(3/2 · 1/12 / 3) of its strength: three frames with weights 1, ½ and ½, of a
+    /// uniform distribution.
     #[test]
     fn noise_flickers_and_what_moves_does_not() {
         let of = |ways: [f32; 3], noise: f32| {
@@ -106,12 +110,12 @@ mod tests {
         let found = of(ways, 0.2).beyond(&truth);
         let expected = 0.2 * (1.5f64 / 12.0 / 3.0).sqrt();
         assert!((found / expected - 1.0).abs() < 0.05, "{found} {expected}");
-        // Control: a ball that stops where the truth's goes on.
+        // Control: a ball that stops while the truth's moves on.
         let stays = of([0.0, 4.0, 4.0], 0.0).beyond(&truth);
         assert!(stays > 0.3 * truth.strength(), "{stays}");
     }
 
-    /// A picture that is moved by two pixels has a lower score, by four an even lower one.
+    /// A picture shifted by two pixels has a lower score, by four an even lower one.
     #[test]
     fn a_shifted_picture_has_a_lower_score() {
         let truth = frame(0.0, 0.1, 1);

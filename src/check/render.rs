@@ -1,4 +1,4 @@
-//! Surfaces in pictures against rays in f64.
+//! Compares surfaces in pictures with f64 rays.
 
 use glam::DVec3;
 
@@ -7,45 +7,45 @@ use swell_domain::eye::Eye;
 use swell_reference::rays::Seen;
 use swell_render::Image;
 
-/// Water less than so many spacings, and this part of its depth, before what is opaque is left out: which of the two is seen hangs on
-/// rounding there. A depth is a dozen roundings of f32 of lengths up to a hundred times the height that a far ground is met from.
+/// Water closer than this many spacings, plus this fraction of its depth, in front of an opaque
+/// surface is left out: rounding decides which of the two is visible. A depth takes a dozen f32
+/// roundings of lengths up to a hundred times the height above a distant ground.
 const THINNEST: f64 = 0.05;
 const ROUNDING: f64 = 100.0 * 12.0 * f32::EPSILON as f64;
 
-/// What pictures of some frames have of the water's surface, and the truth.
+/// The water's surface in pictures of some frames, and the ground truth.
 #[derive(Clone, Debug, Default)]
 pub struct Surfaces {
-    /// Off along the optical axis, spacings, where both have water.
+    /// Depth differences along the optical axis, spacings, where both have water.
     depths: Vec<f64>,
-    /// Between normals, degrees, there.
+    /// Angles between normals, degrees, where both have water.
     angles: Vec<f64>,
-    /// Pixels with water in either.
+    /// Number of pixels with water in either.
     either: usize,
     outlines: Outlines,
 }
 
-/// What is told of them.
+/// Statistics of the surfaces.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Summary {
-    /// Pixels with water in picture and truth.
+    /// Number of pixels with water in both picture and truth.
     pub pixels: usize,
-    /// Off along the optical axis, spacings: median and 95th percentile.
+    /// Depth difference along the optical axis, spacings: median and 95th percentile.
     pub depth: [f64; 2],
-    /// Between normals, degrees: median and 95th percentile.
+    /// Angle between normals, degrees: median and 95th percentile.
     pub normal: [f64; 2],
-    /// Pixels with water in both over those with water in either.
+    /// Pixels with water in both, divided by those with water in either.
     pub overlap: f64,
-    /// The water's edge before what stands far behind it.
+    /// The water's edge in front of a far background.
     pub silhouette: Option<Outline>,
-    /// The water's edge at what is opaque.
+    /// The water's edge at an opaque surface.
     pub waterline: Option<Outline>,
 }
 
 impl Surfaces {
-    /// Takes a picture with depth and normals that `eye` sees, of particles of `spacing` metres.
+    /// Adds a picture with depth and normals as seen by `eye`, with particles of `spacing` metres.
     ///
-    /// # Panics
-    /// Where the picture lacks these channels.
+    /// # Panics Panics if the picture lacks these channels.
     pub fn add(&mut self, image: &Image, truth: &[Seen], eye: &Eye, spacing: f64) {
         let z = image.aovs.z.as_ref().expect("a depth");
         let n = image.aovs.n.as_ref().expect("normals");
@@ -76,12 +76,12 @@ impl Surfaces {
         self.outlines.add(&drawn, &exact, eye.focal, spacing);
     }
 
-    /// Whether no pixel has water in either.
+    /// Returns whether no pixel has water in either.
     pub fn is_empty(&self) -> bool {
         self.either == 0
     }
 
-    /// `None` where no pixel had water in both.
+    /// Returns the statistics; `None` if no pixel has water in both.
     pub fn summary(mut self) -> Option<Summary> {
         Some(Summary {
             pixels: self.depths.len(),
@@ -94,10 +94,10 @@ impl Surfaces {
     }
 }
 
-/// Beyond this a depth is that of the sky.
+/// Depths beyond this are those of the sky.
 const FAR: f64 = 1e29;
 
-/// The median and the 95th percentile.
+/// Returns the median and the 95th percentile.
 fn percentiles(values: &mut [f64]) -> Option<[f64; 2]> {
     values.sort_unstable_by(f64::total_cmp);
     let at =

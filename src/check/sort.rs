@@ -1,4 +1,4 @@
-//! The scan and the counting sort against plain loops: whole numbers, so that nothing may differ.
+//! Compares the scan and the counting sort with simple loops: integers, which must be equal.
 
 use glam::DVec3;
 
@@ -20,7 +20,7 @@ const LENGTH: Windows<[u32; 4]> = Windows::new("length", "");
 const BLOCK: usize = 1024;
 
 bounds! {
-    /// Where either of two cells is right, in cells.
+    /// Distance from a cell's face within which either cell is correct, in cells.
     pub(super) NEAR_FACE = [place: "a particle's coordinate in cells"] 4.0 * U * place, "a cell's face";
 }
 
@@ -39,7 +39,7 @@ entries! {
     }
 }
 
-/// Twins of the sort, whatever is sorted.
+/// Comparisons of the sort, for any solver.
 pub(super) type Twins<S> = [Twin<S>; 4];
 
 pub(super) fn twins<S: State>() -> Twins<S> {
@@ -86,7 +86,7 @@ fn add(io: &mut Io<'_>) -> Outcome {
 fn place(n: usize, io: &mut Io<'_>) -> Outcome {
     let cell_of = io.before.get(buffers::CELL_OF, n)?;
     let slot = io.before.get(buffers::SLOT_IN_CELL, n)?;
-    // `cell_start` as far as the keys reach.
+    // `cell_start` up to the largest key.
     let cells = cell_of.iter().max().map_or(0, |&cell| cell as usize + 1);
     let start = io.before.get(buffers::CELL_START, cells)?;
     let mut placed = vec![u32::MAX; n];
@@ -111,7 +111,8 @@ fn stabilize(n: usize, io: &mut Io<'_>) -> Outcome {
     Ok(())
 }
 
-/// Holds the cells of places against `exact`; within rounding of a cell's face either is right.
+/// Compares the cells of positions with `exact`; within rounding of a cell's face either cell is
+/// correct.
 pub(super) fn check_cells(
     entry: &'static Entry<0>,
     places: &[DVec3],
@@ -129,7 +130,7 @@ pub(super) fn check_cells(
     });
 }
 
-/// Holds slots in cells, and the counts that handed them out, against the keys themselves.
+/// Compares slots in cells, and the counts that assigned them, with the keys themselves.
 pub(super) fn check_slots(
     [counts_entry, slots_entry]: [&'static Entry<0>; 2],
     cell_of: &[u32],

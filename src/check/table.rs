@@ -1,4 +1,4 @@
-//! What a check finds: each pass's outputs against its twin's, value by value.
+//! Results of a check: each pass's outputs compared with its reference pass, value by value.
 
 use std::{fmt, ops::Range};
 
@@ -10,16 +10,16 @@ use swell_compare::{
     tolerance::{Bound, Text},
 };
 
-/// A line of a check: one field that one pass writes.
+/// A row of a check: one field that one pass writes.
 #[derive(Debug, Serialize)]
 pub struct Field {
-    /// Pass name, or what is compared when several passes made it.
+    /// Name of the pass, or of the comparison if several passes produced the field.
     pub pass: &'static str,
-    /// What it writes.
+    /// Name of the field.
     pub name: &'static str,
-    /// Its unit; empty where it has none.
+    /// Unit; empty if dimensionless.
     pub unit: &'static str,
-    /// Where the tolerance comes from.
+    /// Derivation of the tolerance.
     pub derivation: Derivation,
 }
 
@@ -29,11 +29,12 @@ impl PartialEq for Field {
     }
 }
 
-/// How a field's tolerance is computed, as it prints itself.
+/// Derivation of a field's tolerance, in printable form.
 pub struct Derivation {
-    /// The tolerance.
+    /// Tolerance.
     pub tolerance: &'static Text,
-    /// Where rounding alone decides, so that a value is left out, and why.
+    /// Bound within which rounding decides the outcome, so that a value is left out, with the
+    /// reason.
     pub tie: Option<&'static Text>,
 }
 
@@ -63,16 +64,17 @@ impl Serialize for Derivation {
     }
 }
 
-/// A field and its tolerance: an expression of `N` magnitudes that each value hands in.
+/// A field with its tolerance: an expression of `N` magnitudes that each value supplies.
 pub struct Entry<const N: usize> {
-    /// What is compared.
+    /// Compared field.
     pub field: Field,
-    /// By how much it may differ.
+    /// Largest allowed difference.
     pub tolerance: &'static Bound<N>,
 }
 
-/// Declares entries, those of one pass together: `"pass" { NAME = "field", "unit": [magnitudes] tolerance, "reason"; }`;
-/// before the last `;` may stand `, tie BOUND`.
+/// Declares entries, grouped by pass:
+/// `"pass" { NAME = "field", "unit": [magnitudes] tolerance, "reason"; }`. An optional
+/// `, tie BOUND` precedes the last `;`.
 macro_rules! entries {
     ($($pass:literal {
         $($name:ident = $field:literal, $unit:literal:
@@ -101,25 +103,25 @@ macro_rules! entries {
 }
 pub(super) use entries;
 
-/// A value, what its twin says, and the magnitudes that say by how much they may differ.
+/// A value, its reference, and the magnitudes that determine the tolerance.
 #[derive(Clone, Copy, Debug)]
 pub struct Pair<T, const N: usize> {
-    /// Of what: a particle's sorted index, a cell's element.
+    /// Index of the value: a particle's sorted index, or a cell's element.
     pub index: usize,
-    /// The GPU's.
+    /// Value from the GPU.
     pub value: T,
-    /// The twin's.
+    /// Value from the reference pass.
     pub reference: T,
-    /// Of the tolerance.
+    /// Magnitudes of the tolerance.
     pub magnitudes: [f64; N],
 }
 
-/// What `one` makes of each number of a range, on all cores and in their order.
+/// Maps `one` over a range in parallel, preserving the order.
 pub fn each<T: Send>(range: Range<usize>, one: impl Fn(usize) -> T + Send + Sync) -> Vec<T> {
     range.into_par_iter().map(one).collect()
 }
 
-/// A [`Pair`].
+/// Creates a [`Pair`].
 pub fn pair<T, const N: usize>(
     index: usize,
     value: impl Into<T>,
@@ -134,41 +136,41 @@ pub fn pair<T, const N: usize>(
     }
 }
 
-/// The value that is furthest out, as a part of its own tolerance.
+/// The worst value, relative to its own tolerance.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Worst {
-    /// Error over tolerance; above 1 is a failure. JSON has no infinity: there it is null.
+    /// Error over tolerance; above 1 is a failure. Infinity becomes null in JSON.
     pub ratio: f64,
-    /// In the unit of the field.
+    /// Error, in the unit of the field.
     pub error: f64,
-    /// In the unit of the field.
+    /// Tolerance, in the unit of the field.
     pub tolerance: f64,
-    /// Of what.
+    /// Index of the value.
     pub index: usize,
 }
 
-/// What all runs of a pass in a traced substep came to.
+/// Summary of all compared runs of a pass in a traced substep.
 #[derive(Clone, Debug, Serialize)]
 pub struct Row {
-    /// What was compared.
+    /// Compared field.
     #[serde(flatten)]
     pub field: &'static Field,
-    /// Runs of the pass.
+    /// Number of compared runs of the pass.
     pub runs: usize,
-    /// Values compared in them.
+    /// Number of compared values.
     pub values: usize,
-    /// Values left out: within rounding both outcomes are right.
+    /// Number of values left out because either outcome is correct within rounding.
     pub ties: usize,
-    /// Values out of tolerance.
+    /// Number of values out of tolerance.
     pub over: usize,
-    /// The furthest out.
+    /// Worst value.
     pub worst: Worst,
-    /// Of the run that holds it.
+    /// Statistics of the run that contains it.
     pub deviation: Deviation,
 }
 
 impl Row {
-    /// Whether every value is within its tolerance.
+    /// Returns whether every value is within its tolerance.
     pub fn is_within(&self) -> bool {
         self.over == 0
     }
@@ -177,15 +179,15 @@ impl Row {
 /// The rows of a check, in the order in which their passes first ran.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Table {
-    /// One a field.
+    /// One row per field.
     pub rows: Vec<Row>,
-    /// Passes that ran and have no twin, each with the reason.
+    /// Passes that ran without a comparison, each with the reason.
     pub unchecked: Vec<(&'static str, &'static str)>,
 }
 
 impl Table {
-    /// Adds a run of a pass; `None` is a value left out, as within rounding both outcomes are right. What is not a number
-    /// is out of tolerance.
+    /// Adds a run of a pass. `None` is a value that is left out because either outcome is correct
+    /// within rounding; a NaN is out of tolerance.
     pub fn add<T: Value, const N: usize, P: Into<Option<Pair<T, N>>>>(
         &mut self,
         entry: &'static Entry<N>,
@@ -228,7 +230,7 @@ impl Table {
         self.merge(row);
     }
 
-    /// Adds a run of a pass, value by value of a range on all cores.
+    /// Adds a run of a pass, evaluating the values of a range in parallel.
     pub fn each<T: Value + Send, const N: usize, P: Into<Option<Pair<T, N>>> + Send>(
         &mut self,
         entry: &'static Entry<N>,
@@ -238,7 +240,7 @@ impl Table {
         self.add(entry, each(range, one));
     }
 
-    /// Counts values of a row that were not told apart one by one and are left out.
+    /// Adds to the number of values left out of a row, if they were only counted.
     pub fn add_ties<const N: usize>(&mut self, entry: &'static Entry<N>, ties: usize) {
         let known = self.rows.iter_mut().find(|row| *row.field == entry.field);
         if let Some(row) = known {
@@ -246,12 +248,12 @@ impl Table {
         }
     }
 
-    /// Adds a run of which rounding decides all `count` values.
+    /// Adds a run in which rounding decides all `count` values.
     pub fn leave_out<const N: usize>(&mut self, entry: &'static Entry<N>, count: usize) {
         self.add(entry, vec![None::<Pair<f64, N>>; count]);
     }
 
-    /// Adds a run whose outputs are whole numbers: those of `value` that are not `reference` are out of tolerance.
+    /// Adds a run with integer outputs: every difference is out of tolerance.
     pub fn add_exact(&mut self, entry: &'static Entry<0>, value: &[u32], reference: &[u32]) {
         let same = value.len() == reference.len();
         let one = |(index, (&value, &reference)): (usize, (&u32, &u32))| {
@@ -261,7 +263,7 @@ impl Table {
         self.add(entry, value.iter().zip(reference).enumerate().map(one));
     }
 
-    /// Takes over the rows of another check, such as of another frame.
+    /// Merges the rows of another check, for example of another frame.
     pub fn absorb(&mut self, other: Self) {
         for row in other.rows {
             self.merge(row);
@@ -288,12 +290,12 @@ impl Table {
         }
     }
 
-    /// The first row out of tolerance.
+    /// Returns the first row that is out of tolerance.
     pub fn first_over(&self) -> Option<&Row> {
         self.rows.iter().find(|row| !row.is_within())
     }
 
-    /// Whether a pass has a row.
+    /// Returns whether a pass has a row.
     pub fn has(&self, pass: &str) -> bool {
         self.rows.iter().any(|row| row.field.pass == pass)
     }

@@ -1,4 +1,5 @@
-//! A frame of whitewater: its passes on the GPU against their f64 twins, from the same water and the same whitewater.
+//! Compares the whitewater passes of a frame on the GPU with their f64 reference passes, from the
+//! same water and the same whitewater.
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -67,29 +68,28 @@ entries! {
     }
 }
 
-/// What a frame of whitewater is made from.
+/// Inputs of a frame of whitewater.
 #[derive(Clone, Copy, Debug)]
 pub struct Frame<'a> {
-    /// [`Scene::of_whitewater`] of what was baked.
+    /// [`Scene::of_whitewater`] of the baked scene.
     pub scene: &'a Scene,
-    /// Its solids.
+    /// Solids of the scene.
     pub boundary: &'a Boundary,
-    /// Of the stream.
+    /// Settings of the whitewater stream.
     pub settings: &'a Settings,
     /// Water at the frame's end.
     pub water: &'a Particles,
-    /// Whitewater at the frame before.
+    /// Whitewater at the end of the previous frame.
     pub white: &'a Particles,
-    /// Of the frame's end, seconds.
+    /// Time of the frame's end, seconds.
     pub time: f64,
-    /// Since the frame before.
+    /// Time since the previous frame, seconds.
     pub seconds: f64,
 }
 
-/// Holds the frame's passes against their twins.
+/// Compares the frame's passes with their reference passes.
 ///
-/// # Errors
-/// The device and its numbers.
+/// # Errors Returns an error if the device fails or a value is not finite.
 pub fn check(context: &Context, frame: Frame<'_>) -> Result<Table, SolveError> {
     let Frame {
         scene,
@@ -128,7 +128,7 @@ pub fn check(context: &Context, frame: Frame<'_>) -> Result<Table, SolveError> {
     Ok(table)
 }
 
-/// The water in f64, and what rounding may do to each particle's sums.
+/// The water in f64, with rounding bounds of each particle's sums.
 struct Twin<'a> {
     frame: Frame<'a>,
     water: Water,
@@ -136,15 +136,15 @@ struct Twin<'a> {
     errors: Vec<Errors>,
 }
 
-/// What rounding may do about a place.
+/// Rounding bounds of the sums around a position.
 #[derive(Clone, Copy, Debug, Default)]
 struct Errors {
     share: f64,
-    /// Of |∇| h.
+    /// Bound on the error of |∇| h.
     steepness: f64,
-    /// Of the normal; 0 where there is surely no surface.
+    /// Bound on the error of the normal; 0 if there is surely no surface.
     direction: f64,
-    /// Of the sureness.
+    /// Bound on the error of the surface confidence.
     sure: f64,
 }
 
@@ -185,7 +185,7 @@ impl<'a> Twin<'a> {
         });
     }
 
-    /// `found` is in the order of the water that was handed in.
+    /// Compares the potentials; `found` is in the order of the original water.
     fn potentials(&self, table: &mut Table, found: &[Potentials]) {
         let n = self.surveyed.len();
         let rows: Vec<(Potentials, [f64; 3], [f64; 5])> = (0..n)
@@ -215,7 +215,7 @@ impl<'a> Twin<'a> {
         });
     }
 
-    /// Magnitudes of [`TRAPPED`].
+    /// Returns the magnitudes of [`TRAPPED`].
     fn trapped(&self, i: usize) -> [f64; 3] {
         let h = self.water.model.calibration.support_radius;
         let (mut n, mut speeds, mut weighted) = (0.0, 0.0, 0.0);
@@ -224,7 +224,7 @@ impl<'a> Twin<'a> {
                 let speed = self.water.velocity[i].distance(self.water.velocity[j]);
                 let w = (1.0 - way.length() / h).max(0.0);
                 n += 1.0;
-                // What lies beyond h weighs nothing, but by rounding.
+                // Particles beyond h have no weight, except by rounding.
                 speeds += if way.length() < 1.001 * h { speed } else { 0.0 };
                 weighted += speed * w;
             }
@@ -232,7 +232,7 @@ impl<'a> Twin<'a> {
         [n, speeds, weighted]
     }
 
-    /// Magnitudes of [`CREST`].
+    /// Returns the magnitudes of [`CREST`].
     fn crest(&self, i: usize) -> [f64; 5] {
         let h = self.water.model.calibration.support_radius;
         let (own, own_error) = (&self.surveyed[i], &self.errors[i]);
@@ -288,7 +288,7 @@ impl<'a> Twin<'a> {
             let [place, _] = (*errors)?;
             let position = wide(found.position[k]) - corner;
             let period = self.water.model.period();
-            // By rounding alone a place may stand at the other end.
+            // Rounding by itself may put a position at the other end of a periodic axis.
             let near = period.image_by_rounding(position, moved.white.position);
             Some(pair(k, near, moved.white.position, [place]))
         });
@@ -309,8 +309,8 @@ impl<'a> Twin<'a> {
         });
     }
 
-    /// What rounding may do to the place and the velocity of one; `None` where it decides which way it goes, or where a solid
-    /// pushed it, which the twins of the solvers hold.
+    /// Returns error bounds for the position and the velocity of a particle; `None` if rounding
+    /// decides its path, or if a solid pushed it, which the solvers' own comparisons cover.
     fn moved_errors(&self, before: &White, moved: &Moved, gravity: DVec3) -> Option<[f64; 2]> {
         if moved.is_pushed {
             return None;
@@ -326,7 +326,8 @@ impl<'a> Twin<'a> {
         let flown = FLOWN.of([taken.min((before.velocity - wind).length() + pull), pull]);
         let way = now.position.length() + seconds * pull;
         let flight = PLACE.of([way, seconds * flown]);
-        // A place in the water is found by a way that errs as a flight does; a carried one errs by the velocity there as well.
+        // A position in the water is reached by a path that errs as a flight does; a carried
+        // particle also errs by the velocity there.
         let spread = about.spread / h * flight;
         let carried = CARRIED.of([about.speeds, about.kernel.max(1e-3), about.fastest, spread]);
         let place = PLACE.of([way, seconds * (flown + carried)]);
@@ -335,7 +336,7 @@ impl<'a> Twin<'a> {
         (moved.margin > decided).then_some([place, flown + carried])
     }
 
-    /// What lies about a place.
+    /// Collects magnitudes around a position.
     fn about(&self, x: DVec3) -> About {
         let h = self.water.model.calibration.support_radius;
         let mut about = About::default();
@@ -361,7 +362,8 @@ impl<'a> Twin<'a> {
             }
         });
         about.speeds = weighted.kernel() + about.fastest * about.sums.kernel();
-        // Slopes of weights are at most 4/h of them: a mean moves by no more of the spread.
+        // Gradients of the weights are at most 4/h times them, so a mean moves by at most that part
+        // of the spread.
         about.spread = match most.cmpge(least).all() {
             true => 8.0 * (most - least).length(),
             false => 0.0,
@@ -376,7 +378,7 @@ impl<'a> Twin<'a> {
 #[derive(Clone, Copy, Debug, Default)]
 struct About {
     sums: Sums,
-    /// Σ p³ of the water.
+    /// Σ p³ over the water.
     kernel: f64,
     /// [`KERNEL`] with speeds as weights.
     speeds: f64,

@@ -1,4 +1,4 @@
-//! Absorbing zones, of particles and of faces.
+//! Absorbing zones, on particles and on faces.
 
 use glam::DVec3;
 

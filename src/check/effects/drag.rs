@@ -1,4 +1,4 @@
-//! Drag of air, by density and by cells.
+//! Air drag, by density and by cells.
 
 use glam::DVec3;
 
@@ -21,8 +21,8 @@ use swell_scene::effects::drag::Settings;
 use swell_solve::{flip, pbf};
 
 bounds! {
-    // (w + g Δt) / (1 + x) with x = e Δt r(w): of x the exposure errs, and the power in r, of an exponent below 18, by what WGSL allows
-    // log2 and exp2.
+    // (w + g Δt) / (1 + x) with x = e Δt r(w). Errors of x: the exposure's, and that of the power
+    // in r, with an exponent below 18, by the accuracy that WGSL requires of log2 and exp2.
     BLOWN = [off: "what the exposure errs by", exposure: "its own value", reach: "Δt times the rate of a lone drop",
         slack: "what that answers when |v − wind| rounds", against: "|v − wind| + |g| Δt", wind: "|wind|"]
         (quotient((off + 150.0 * U * exposure) * reach + exposure * slack, exposure * reach) + 8.0 * U) * against + 4.0 * U * wind, "";
@@ -49,12 +49,12 @@ pub(super) const FLIP: &[Twin<FlipState>] = &[twin(
     by_cells,
 )];
 
-/// What 1 / (1 + x) errs by where x errs by so much.
+/// Returns the error of 1 / (1 + x) for an error `off` of x.
 fn quotient(off: f64, x: f64) -> f64 {
     off / ((1.0 + x) * (1.0 + (x - off).max(0.0)))
 }
 
-/// [`BLOWN`] of a velocity before, of water that errs by `off` in its exposure.
+/// Returns [`BLOWN`] of a velocity before drag, for an error `off` of the exposure.
 fn blown(
     settings: &Settings,
     seconds: f64,
@@ -115,7 +115,7 @@ fn by_cells(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let found = io
         .after
         .vectors(flip::buffers::SORTED_VELOCITY, state.particles())?;
-    // Of counts: a product, a sum, two quotients and a difference.
+    // From exact counts: a product, a sum, two quotients and a difference.
     let error = 8.0 * U / OF_CELLS;
     io.table.each(&SORTED, 0..found.len(), |i| {
         let both = [before[i], step.velocity_step];

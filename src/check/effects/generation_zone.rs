@@ -1,4 +1,4 @@
-//! Generation zones, of particles and of faces.
+//! Generation zones, on particles and on faces.
 
 use std::f64::consts::TAU;
 
@@ -17,8 +17,9 @@ use swell_solve::{flip, pbf};
 use super::zone::{self, PART};
 
 bounds! {
-    // A phase is off by the rounding of as many turns as the domain is long, and WGSL's sines by 2⁻¹¹ between −π and π (WGSL §15.7.4);
-    // its exp(−a) by (3 + 2a) ULP and the rounding of a, where a exp(−a) is at most 0.4.
+    // Errors: a phase's by the rounding of as many turns as fit into the domain's length; WGSL's
+    // sines 2⁻¹¹ between −π and π (WGSL §15.7.4); exp(−a) (3 + 2a) ULP plus the rounding of a,
+    // where a exp(−a) is at most 0.4.
     WAVE = [speed: "Σ|u| of the waves", turns: "the most turns of one along the domain", count: "waves"]
         speed * (2f64.powi(-11) * 2.0 + U * (TAU * 6.0 * (turns + 1.0) + 24.0 + count)), "of the waves' velocity";
 }
@@ -46,7 +47,8 @@ pub(super) const FLIP: &[Twin<FlipState>] = &[twin(
     faces,
 )];
 
-/// The greatest part of the way in a step of so many seconds, [`WAVE`], and Σ|u|, m/s.
+/// Returns the largest fraction by which a step moves a velocity towards the target, [`WAVE`], and
+/// Σ|u|, m/s.
 fn sizes(waves: &OpenWaves, rate: f64, size: DVec3, step: f64) -> [f64; 3] {
     let speed = waves.most_speed();
     let turns = |line: &swell_domain::open_waves::Line| line.number.length() / TAU;

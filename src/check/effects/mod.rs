@@ -1,4 +1,4 @@
-//! Effects' passes against their twins: a file an effect, for both solvers.
+//! Compares effects' passes with their reference passes: one file per effect, for both solvers.
 
 use swell_scene::effects::with_effects;
 
@@ -10,12 +10,12 @@ macro_rules! checks {
     ($($name:ident),+ $(,)?) => {
         $(mod $name;)+
 
-        /// Twins of the passes on PBF's particles.
+        /// Returns the comparisons of passes on PBF's particles.
         pub(super) fn pbf() -> Vec<&'static [Twin<PbfState>]> {
             vec![$($name::PBF),+]
         }
 
-        /// Twins of the passes on FLIP's grid.
+        /// Returns the comparisons of passes on FLIP's grid and particles.
         pub(super) fn flip() -> Vec<&'static [Twin<FlipState>]> {
             vec![$($name::FLIP),+]
         }

@@ -20,7 +20,7 @@ use swell_solve::{
 
 bounds! {
     SLOPE = [most: "the largest share about"] 8.0 * U * most, "a quarter of four differences and their sum";
-    // A normal is a slope over its length: a root takes 9 u, a quotient 5 u.
+    // A normal is a gradient over its length: a root takes 9 u, a quotient 5 u.
     NORMALS = [slope: "" SLOPE, inverse: "the mean of 1 / |∇s| at the corners, no less than 0.001 each"]
         4.0 * slope * inverse + 40.0 * U, "of the derivatives of normals, a mean of eight";
     BEND = [normals: "" NORMALS] 1.8 * normals, "three of them";
@@ -28,7 +28,7 @@ bounds! {
         1.8 * normals * (2.0 * squares.sqrt() + 1.8 * normals) + 12.0 * U * squares, "";
     OFF = [slope: "" SLOPE, steep: "|∇s|, no less than 0.001", off: "how far off the surface lies"]
         (U + (2.0 * slope + 12.0 * U * steep) * off) / steep + 8.0 * U * off, "";
-    // θ is a quotient, and 1 − θ errs by as much as θ does.
+    // θ is a quotient, and 1 − θ has the same error as θ.
     BETWEEN_CELLS = [share: "the larger weight over their sum", most: "the larger |κ Δx|"] U * (30.0 * share + 20.0) * most, "";
 }
 

@@ -1,5 +1,5 @@
-//! Viscosity: of so many Pa s on the grid; XSPH's among particles, which with FLIP is a further part of the velocity that is taken
-//! from the grid, and no pass.
+//! Viscosity: in Pa s on the grid; XSPH on particles. For FLIP, XSPH increases the PIC fraction and
+//! has no pass.
 
 use crate::{
     engine::{Io, NONE, Outcome, State, Twin, names, twin},
@@ -29,8 +29,9 @@ use swell_solve::{
 };
 
 bounds! {
-    // Over the diagonal a stress is 6 times the greatest speed at most, and what pulls a face back 2 times: each term is rounded fewer
-    // than 30 times on its way through differences, weights, sums and the quotient.
+    // Divided by the diagonal, a stress is at most 6 times the largest speed, and the pull towards
+    // the initial velocity 2 times: each term is rounded fewer than 30 times in differences,
+    // weights, sums and the quotient.
     ITERATED = [gain: "g", speed: "the largest |v| about", kept: "m times the last change"]
         U * (30.0 * 8.0 * gain * speed + 3.0 * kept), "stresses over the diagonal";
 }
@@ -88,7 +89,7 @@ fn weigh(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
         step: &step,
         bricks: &elements.bricks,
         room: state.room(),
-        // The solve asks for neither.
+        // The solve reads neither.
         centers: &Centers::default(),
         old: &[],
     });
@@ -125,7 +126,7 @@ fn relax(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let changed = elements.planes(&io.after, STEP)?;
     let error = |e: usize| {
         let speed = elements.largest_about(e, |e| velocity[e].length().max(start[e].length()));
-        // Not read by the first iteration.
+        // The first iteration does not read it.
         let last = if momentum == 0.0 {
             0.0
         } else {

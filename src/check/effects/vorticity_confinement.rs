@@ -1,4 +1,4 @@
-//! Vorticity confinement, among particles and on the grid.
+//! Vorticity confinement, on particles and on the grid.
 
 use glam::DVec3;
 
@@ -125,7 +125,7 @@ fn force(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
         let sums = bounds.sums(i, change).gradient();
         let error = SLOPE.of([scale, sums, bounds.sums(i, both).s2]);
         let slope = slope(&bounds, &strength, i);
-        // Below this the direction is noise, and none is taken.
+        // Below this the direction is noise, and the pass uses none.
         let threshold = 1e-5 * strength[i] / h;
         if (slope - threshold).abs() <= NO_SLOPE.of([error]) {
             return None;
@@ -141,7 +141,7 @@ fn force(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     Ok(())
 }
 
-/// |∇|ω|| by differences, as `vorticity_force` takes it.
+/// Returns |∇|ω|| by differences, as in `vorticity_force`.
 fn slope(bounds: &Bounds<'_>, strength: &[f64], i: usize) -> f64 {
     let inputs = bounds.0;
     let calibration = &inputs.model.calibration;
@@ -165,7 +165,7 @@ fn curl_on_grid(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let twin = grid_curl(&state.model, &elements.bricks, state.room(), &velocity);
     let size = state.model.cell_size();
     let error = |e: usize| {
-        // Two cells off as well: twice the reach of one neighbourhood.
+        // The pass also reads velocities two cells away: twice the reach of one neighbourhood.
         let about = |e: usize| elements.largest_about(e, |e| velocity[e].length());
         GRID_CURL.of([elements.largest_about(e, about), size])
     };
@@ -203,7 +203,8 @@ fn confine_on_grid(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
         )
     };
     let exact = twin(&omega);
-    // Magnitudes err by 12 u and the slope's differences pass that on: what the twin answers when they do.
+    // Magnitudes err by 12 u, and differences pass that on: the bound is the reference's response
+    // to such errors.
     let grown = |sign: f64| -> Vec<DVec3> {
         let by = |(e, w): (usize, &DVec3)| {
             let hash = (e as u32 + 1).wrapping_mul(0x9e37_79b9) >> 31;

@@ -1,4 +1,5 @@
-//! Zones that lead water, of particles and of faces: what those that absorb and those that generate share.
+//! Zones that relax velocities, on particles and on faces: code shared by absorbing and generation
+//! zones.
 
 use glam::DVec3;
 
@@ -20,18 +21,19 @@ use swell_scene::effects::zone::Zone;
 use swell_solve::{flip, pbf};
 
 bounds! {
-    // r Δt w² changes by 2 r Δt w of the way w's own change. Of the part x / (1 + x) that is 2 √(r Δt) √x / (1 + x)², whose
-    // greatest value is 0.65 √(r Δt), at x = 1/3; and no more than 2 r Δt.
+    // r Δt w² changes by 2 r Δt w times the change of the relative depth w. For the fraction x / (1
+    // + x) that gives 2 √(r Δt) √x / (1 + x)², whose maximum is 0.65 √(r Δt), at x = 1/3; and no
+    // more than 2 r Δt.
     pub(super) PART = [most: "r Δt at the wall", ratio: "the domain's longest side over the zone's length"]
         U * ((2.0 * most).min(0.65 * most.sqrt()) * (6.0 * ratio + 4.0) + 8.0 * most.min(1.0)), "of the part of the way that water is led, by where a place is";
 }
 
-/// [`PART`] of a step of so many seconds in a domain of `size`.
+/// Returns [`PART`] for a step of `step` seconds in a domain of `size`.
 pub(super) fn part(zone: Zone<'_>, size: DVec3, step: f64) -> f64 {
     PART.of([zone.rate * step, size.max_element() / zone.length])
 }
 
-/// Particles that a zone led towards `wanted`; `magnitudes` are those of a velocity before.
+/// Compares particles that a zone moved towards `wanted`; `magnitudes` takes the speed before.
 pub(super) fn particles<const N: usize>(
     state: &PbfState,
     io: &mut Io<'_>,
@@ -53,7 +55,8 @@ pub(super) fn particles<const N: usize>(
     Ok(())
 }
 
-/// Faces that a zone led towards `wanted`; `magnitudes` are those of the velocities before gravity and after it.
+/// Compares faces that a zone moved towards `wanted`; `magnitudes` takes the speeds before gravity
+/// and before the zone.
 pub(super) fn faces<const N: usize>(
     state: &FlipState,
     io: &mut Io<'_>,
@@ -71,7 +74,7 @@ pub(super) fn faces<const N: usize>(
         step: &step,
         bricks: &elements.bricks,
         room: state.room(),
-        // No zone asks for them.
+        // Zones do not read them.
         centers: &Centers::default(),
         old: &old,
     };

@@ -1,4 +1,4 @@
-//! The multigrid's passes, from the values that the device had about each block.
+//! Compares the multigrid's passes, from the values that the device had around each block.
 
 use std::ops::Range;
 
@@ -17,7 +17,7 @@ use swell_solve::{
 
 use super::{FlipState, rows::*};
 
-/// Twins of the multigrid's passes.
+/// Comparisons of the multigrid's passes.
 pub(super) const TWINS: &[Twin<FlipState>] = &[
     of_level("pressure/coarsen", coarsen),
     of_level("pressure/smooth_first", |state, io| {
@@ -25,7 +25,7 @@ pub(super) const TWINS: &[Twin<FlipState>] = &[
     }),
     Twin {
         is_due: |state, io| {
-            // The last sweep of a cycle leaves the sums; a cycle has any number of them.
+            // The last sweep of a cycle leaves the sums; the number of sweeps varies.
             if state.is_turn(io)? && state.is_early() {
                 state.note_sum(io, solved::RESIDUAL, solved::CORRECTION)?;
             }
@@ -42,7 +42,7 @@ pub(super) const TWINS: &[Twin<FlipState>] = &[
     of_level("pressure/solve_coarse", solve_coarse),
 ];
 
-/// A twin of which the first few runs on each level are compared.
+/// Returns a comparison of the first few runs on each level.
 const fn of_level(
     pass: &'static str,
     compare: fn(&mut FlipState, &mut Io<'_>) -> Outcome,
@@ -59,7 +59,7 @@ fn is_due(state: &mut FlipState, io: &Io<'_>) -> Result<bool, SolveError> {
     Ok(is_turn && state.is_due(io, level))
 }
 
-/// The levels as the pass left them.
+/// The levels after the pass.
 struct Cycle {
     phase: PressurePhase,
     levels: Levels,
@@ -103,7 +103,7 @@ impl Cycle {
         self.phase.level as usize
     }
 
-    /// Blocks of the phase's colour with their slots.
+    /// Returns the blocks of the phase's colour, with their slots.
     fn blocks(&self) -> Vec<(u32, u32)> {
         self.levels.coloured(self.level(), self.phase.colour)
     }
@@ -138,7 +138,7 @@ fn restrict(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     Ok(())
 }
 
-/// All corrections that the pass leaves, and the residuals that it hands down.
+/// Compares all corrections that the pass leaves, and the residuals that it passes down.
 fn solve_coarse(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let cycle = Cycle::of(state, io)?;
     let levels = &cycle.levels;

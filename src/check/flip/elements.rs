@@ -1,4 +1,4 @@
-//! Where the elements of a substep lie in the device's arrays, and how those are read.
+//! Layout of a substep's elements in the device's arrays, and reading of these.
 
 use std::ops::Range;
 
@@ -11,7 +11,7 @@ use swell_reference::flip::Faces;
 use swell_scene::step::Substep;
 use swell_solve::{SolveError, flip::buffers};
 
-/// What [`Elements::faces`] reads.
+/// Buffers that [`Elements::faces`] reads.
 pub(super) fn faces_kept() -> Vec<String> {
     names![
         buffers::FACE_VELOCITY,
@@ -20,39 +20,39 @@ pub(super) fn faces_kept() -> Vec<String> {
     ]
 }
 
-/// Where the elements of a substep lie.
+/// Layout of a substep's elements.
 pub(crate) struct Elements {
     pub(super) substep: Substep,
     pub(crate) bricks: Bricks,
-    /// Elements of the active bricks, slot 0 included.
+    /// Number of elements of the active bricks, including slot 0.
     pub(crate) cells: usize,
-    /// Between planes of the device's arrays.
+    /// Distance between planes of the device's arrays.
     pub(super) stride: usize,
 }
 
-/// The 27 steps to a cell and its neighbours.
+/// Iterates over the 27 offsets to a cell and its neighbours.
 pub(super) fn neighborhood() -> impl Iterator<Item = [i32; 3]> {
     (0..27).map(|k| [k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1])
 }
 
 impl Elements {
-    /// Elements of the active bricks.
+    /// Returns the elements of the active bricks.
     pub(crate) fn active(&self) -> Range<usize> {
         CELLS as usize..self.cells
     }
 
-    /// Elements of the bricks with water.
+    /// Returns the elements of the bricks with water.
     pub(super) fn wet(&self) -> Range<usize> {
         CELLS as usize..(CELLS * (self.bricks.wet + 1)) as usize
     }
 
-    /// The largest over a cell and the 26 about it.
+    /// Returns the largest value over a cell and the 26 cells around it.
     pub(crate) fn largest_about(&self, element: usize, of: impl Fn(usize) -> f64) -> f64 {
         let near = |offset| of(self.bricks.near(element as u32, offset) as usize);
         neighborhood().map(near).fold(0.0, f64::max)
     }
 
-    /// An array of cells.
+    /// Reads an array of cells.
     pub(crate) fn scalars(
         &self,
         view: &View<'_>,
@@ -61,7 +61,7 @@ impl Elements {
         view.scalars(buffer, self.cells)
     }
 
-    /// Three planes as one vector a cell.
+    /// Reads three planes as one vector per cell.
     pub(crate) fn planes(
         &self,
         view: &View<'_>,
@@ -73,7 +73,7 @@ impl Elements {
         Ok((0..self.cells).map(vector).collect())
     }
 
-    /// Velocities, changes and layers at faces.
+    /// Reads velocities, changes and layers at faces.
     pub(super) fn faces(&self, view: &View<'_>) -> Result<Faces, SolveError> {
         Ok(Faces {
             velocity: self.planes(view, buffers::FACE_VELOCITY)?,

@@ -10,7 +10,7 @@ use crate::{
     table::{each, pair},
 };
 
-/// From the kinds, densities, velocities and fluxes that the device has.
+/// Compares the pass, from the kinds, densities, velocities and fluxes on the device.
 pub(super) fn close_gaps(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let (elements, step, room) = (state.elements(), state.step(), state.room());
     let faces = elements.faces(&io.before)?;
@@ -30,7 +30,7 @@ pub(super) fn close_gaps(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let twin = twin_close_gaps(&gaps, &mut distance);
     let error = OF_GAP.of([CUT.of([state.place()])]);
     let active = elements.active();
-    // What rounding decides comes out otherwise where all that is decided is moved by as much.
+    // Rounding decides where the outcome changes when all thresholds are shifted by the error.
     let ties = each(active.clone(), |e| {
         let closes = |lean: f64| gaps.filled(e as u32, lean).is_some();
         let own = closes(0.0);

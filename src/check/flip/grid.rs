@@ -1,4 +1,4 @@
-//! From the solids to velocities at faces: cuts, particle-to-grid, extrapolation.
+//! From solids to velocities at faces: cut cells, particle-to-grid transfer, extrapolation.
 
 use glam::DVec3;
 
@@ -20,7 +20,7 @@ use swell_solve::flip::buffers;
 
 use super::{FlipState, elements::neighborhood, rows::*};
 
-/// Particles of the 27 cells about one, and the least and the greatest of their velocities.
+/// Number of particles in the 27 cells around one, and the range of their velocities.
 struct About {
     count: f64,
     low: DVec3,
@@ -39,7 +39,7 @@ impl FlipState {
             for i in sorted.of(bricks.near(element as u32, offset)) {
                 let v = sorted.cloud.velocity[i];
                 let affine = sorted.cloud.affine.get(i);
-                // Faces are at most 1.5 cells off along each axis.
+                // Faces are at most 1.5 cells away along each axis.
                 let reach = affine.map_or(0.0, |c| {
                     let rows = [0, 1, 2].map(|k| c.row(k).abs().element_sum());
                     2.0 * self.model.cell_size() * rows.into_iter().fold(0.0, f64::max)
@@ -52,7 +52,7 @@ impl FlipState {
         about
     }
 
-    /// What a solid's distance errs by on the device, metres.
+    /// Returns the error of a solid's distance on the device, metres.
     pub(super) fn distance_error(&self) -> f64 {
         let solids = self.boundary.distance.iter().chain(&self.boundary.moving);
         let origin = self.scene.domain.min;
@@ -62,7 +62,7 @@ impl FlipState {
             GRID.of([extent + first, first, grid.spacing])
         };
         let placed = solids.map(of).fold(0.0, f64::max);
-        // Beyond its grid no solid is looked at.
+        // Outside its grid a solid has no effect.
         let solids = self.scene.moving_solids.iter().zip(&self.boundary.moving);
         let turned = solids.filter(|(solid, _)| solid.turns());
         let turned = turned.map(|(solid, grid)| {
@@ -73,7 +73,8 @@ impl FlipState {
         turned.fold(placed, f64::max)
     }
 
-    /// The twin's room among solids whose distances are off by `shift` and whose nodes by `place`, metres.
+    /// Returns the reference's open space with the solids' distances shifted by `shift` and their
+    /// nodes by `place`, metres.
     fn shifted_room(&self, shift: f64, place: DVec3) -> Room {
         let moved = |grid: &SignedDistance| SignedDistance {
             origin: grid.origin + place,
@@ -103,8 +104,8 @@ pub(super) fn cut_cells(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
         .filter(|_| has_solids)
         .map(|shift| state.shifted_room(shift, DVec3::ZERO))
         .collect();
-    // Which of nodes that are as near to a cell's centre is looked at tells whether a solid is near at all, and so whether
-    // its velocity stands at faces that it does not touch.
+    // If several nodes are equally close to a cell's centre, the chosen one decides whether a solid
+    // is near at all, and so whether its velocity appears at faces that it does not touch.
     let side = |k: usize, axis: usize| if k >> axis & 1 == 0 { error } else { -error };
     let rounded: Vec<Room> = (0..8)
         .filter(|_| has_moving)
@@ -177,7 +178,7 @@ pub(super) fn cut_cells(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     Ok(())
 }
 
-/// After the last of the three axes.
+/// Compares the faces after the last of the three axes.
 pub(super) fn gather_faces(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     if io.before.window(&buffers::AXES)?[0] < 2 {
         return Ok(());
@@ -227,7 +228,8 @@ pub(super) fn gather_centers(state: &mut FlipState, io: &mut Io<'_>) -> Outcome 
     let place = state.place();
     let error = |e: usize| {
         let count = state.about(e).count;
-        // Half of what the cells' open volumes leave: walls leave hats another part than cells.
+        // Half of the volume that is open around the cell: walls cut a different part of hat
+        // functions than of cells.
         let part = |step: i32| if step == 0 { 0.75 } else { 0.125 };
         let open: f64 = neighborhood()
             .map(|offset| {
@@ -250,7 +252,7 @@ pub(super) fn gather_centers(state: &mut FlipState, io: &mut Io<'_>) -> Outcome 
     Ok(())
 }
 
-/// From the densities that the device has.
+/// Compares the pass, from the densities on the device.
 pub(super) fn find_water(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let (elements, step, room) = (state.elements(), state.step(), state.room());
     let (bricks, density) = (&elements.bricks, state.density());
@@ -258,7 +260,7 @@ pub(super) fn find_water(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let (twin, distances) = twin_find_water(&state.model, bricks, room, &depth);
     let cut = CUT.of([state.place()]);
     let active = elements.active();
-    // A cell's own density, where nothing is averaged, decides the same on both sides.
+    // Without averaging, a cell's own density leads to the same decision on both sides.
     let looked = each(active.clone(), |e| {
         let about = neighborhood().map(|offset| density[bricks.near(e as u32, offset) as usize]);
         let mean = OF_MEAN.of([about.fold(depth[e].share, f64::max)]);
@@ -309,7 +311,7 @@ pub(super) fn find_excess(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     Ok(())
 }
 
-/// From the densities, the flux and the excess that the device has.
+/// Compares the pass, from the densities, the flux and the excess on the device.
 pub(super) fn let_in(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let (elements, density) = (state.elements(), state.density());
     let corrects = state.model.settings().density_correction;
@@ -353,7 +355,7 @@ pub(super) fn wall_friction(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     twin_wall_friction(&state.model, &step, bricks, room, &mut twin);
     let found = elements.faces(&io.after)?;
     let place = state.place();
-    // Of each of four walls two components, neither faster than the fastest about.
+    // Two components for each of four walls, each bounded by the largest speed around.
     let at_most = |e: usize| {
         let speed = elements.largest_about(e, |e| before.change[e].length());
         4.0 * 2f64.sqrt() * VON_KARMAN * VON_KARMAN * speed / state.model.cell_size()
@@ -418,8 +420,9 @@ pub(super) fn extrapolate(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     Ok(())
 }
 
-/// By how much the distance of the surface, in cells, moves where the density does by `error`: the density as a function
-/// of it is s − s²/2, whose inverse is steep where the water is full.
+/// Returns the change of the surface distance, in cells, if the density changes by `error`: the
+/// density as a function of the distance is s − s²/2, whose inverse is steep where the cell is
+/// full.
 fn surface_moved(distance: f64, error: f64) -> f64 {
     let s = distance.abs().min(1.0);
     let slope = 1.0 - s;
@@ -432,7 +435,7 @@ mod tests {
     use super::{OF_HALF, surface_moved};
     use swell_compare::rounding::U;
 
-    /// `flip/find_water`'s own steps, in f32.
+    /// The steps of `flip/find_water`, in f32.
     fn device(density: f32) -> f64 {
         let off = density - 0.5;
         f64::from(off.signum() * (1.0 - (1.0 - 2.0 * off.abs()).max(0.0).sqrt()))

@@ -1,4 +1,5 @@
-//! The iteration of a solve: preconditioners, direction, step and scalars; bodies of water that no air touches.
+//! The iteration of a solve: preconditioners, direction, step and scalars; bodies of water that no
+//! air touches.
 
 use crate::{
     engine::{Io, NONE, Outcome, Twin, names, twin},
@@ -21,7 +22,7 @@ use swell_solve::{
 
 use super::{FlipState, rows::*};
 
-/// Twins of the passes of an iteration.
+/// Comparisons of the passes of an iteration.
 pub(super) const TWINS: &[Twin<FlipState>] = &[
     early("pressure/precondition", NONE, precondition),
     early("pressure/ipp_lower", NONE, ipp_lower),
@@ -42,10 +43,10 @@ pub(super) const TWINS: &[Twin<FlipState>] = &[
     twin("pressure/count_pockets", NONE, count_pockets),
 ];
 
-/// What `pressure/center` takes the mean of.
+/// Array whose mean `pressure/center` removes.
 const VALUES: Buf<Real> = Buf::new("values");
 
-/// A twin of which the first few runs that are not empty are compared.
+/// Returns a comparison of the first few non-empty runs.
 const fn early(
     pass: &'static str,
     keeps: fn() -> Vec<String>,
@@ -57,10 +58,10 @@ const fn early(
     }
 }
 
-/// Runs of an iteration's pass that are compared: each is as good as any.
+/// Number of compared runs per pass of an iteration; the runs are equivalent.
 pub(super) const PRODUCTS: usize = 3;
 
-/// Steps of `pressure/reduce` by their numbers.
+/// Steps of `pressure/reduce`, by number.
 const STEPS: [ReduceStep; 5] = [
     ReduceStep::Begin,
     ReduceStep::Direction,
@@ -69,7 +70,7 @@ const STEPS: [ReduceStep; 5] = [
     ReduceStep::Verified,
 ];
 
-// The device's states have the twin's numbers.
+// The device's states have the same numbers as the reference's.
 const _: () = assert!(
     SolveState::Iterating as u32 == ITERATING
         && SolveState::Verifying as u32 == VERIFYING
@@ -78,24 +79,24 @@ const _: () = assert!(
 );
 
 impl FlipState {
-    /// Counts a run of a pass on a level; true for the first few.
+    /// Counts a run of a pass on a level; returns whether it is one of the first few.
     pub(crate) fn is_due(&mut self, io: &Io<'_>, level: u32) -> bool {
         let runs = self.runs.entry((io.pass, level)).or_default();
         *runs += 1;
         *runs <= PRODUCTS
     }
 
-    /// Whether the solve is at one of the iterations that are compared.
+    /// Returns whether the solve is at one of the iterations that are compared.
     pub(super) fn is_early(&self) -> bool {
         let done = self.runs.get(&("pressure/direction", 0));
         done.is_none_or(|&done| done < PRODUCTS)
     }
 
-    /// Whether the dispatch was not empty.
+    /// Returns whether the dispatch was not empty.
     pub(super) fn is_turn(&self, io: &Io<'_>) -> Result<bool, SolveError> {
         let state = io.before.control(self.precision())?.state;
         Ok(match io.pass {
-            // A solve among pockets begins with a verification.
+            // A solve with pockets begins with a verification.
             "pressure/verify" => state == VERIFYING || io.last == "pressure/center",
             "pressure/center" => {
                 let values = VALUES;
@@ -108,7 +109,7 @@ impl FlipState {
         })
     }
 
-    /// What the bricks' sums of products of two arrays come to.
+    /// Computes the sum of products of two arrays, which the bricks' partial sums should add up to.
     pub(super) fn note_sum(&mut self, io: &Io<'_>, a: Buf<Real>, b: Buf<Real>) -> Outcome {
         let [a, b] = [self.by_row(&io.after, a)?, self.by_row(&io.after, b)?];
         self.sum = Some(products(&a, &b));
@@ -226,14 +227,14 @@ fn center(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     }
     state.add_rows(io.table, &CENTERED, |i| {
         let [n, size] = means[i];
-        // Outside of pockets nothing is done.
+        // Outside pockets the pass does nothing.
         let value = if size > 0.0 { before[i].abs() } else { 0.0 };
         (found[i], exact[i], [unit, n, size, value])
     });
     Ok(())
 }
 
-/// A pocket's cells have its least element for a label, all else 0.
+/// Checks that the cells of each pocket have its smallest element as label, and all others 0.
 fn count_pockets(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let wet = state.elements().wet();
     let labels = io.after.get(solved::LABEL, wet.end)?;
@@ -256,7 +257,7 @@ fn count_pockets(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     Ok(())
 }
 
-/// The bricks' sums and what follows from them.
+/// Compares the sums of the partial sums and the decisions based on them.
 fn reduce(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let phase = io.before.window(&solved::PHASES)?;
     let before = io.before.control(state.precision())?;

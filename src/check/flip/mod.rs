@@ -1,4 +1,4 @@
-//! FLIP's passes against their f64 twins, each from the inputs that the GPU had.
+//! Compares FLIP's passes with their f64 reference passes, each from the inputs that the GPU had.
 
 mod cycle;
 mod elements;
@@ -40,7 +40,7 @@ use elements::Elements;
 use pressure::Assembled;
 use rows::{PLACE, WORK};
 
-/// Twins of FLIP's own passes.
+/// Comparisons of FLIP's own passes.
 const TWINS: &[Twin<FlipState>] = &[
     twin("flip/survey", NONE, sort::survey),
     twin("flip/assign_cells", NONE, sort::assign_cells),
@@ -82,14 +82,15 @@ const TWINS: &[Twin<FlipState>] = &[
     twin("flip/boundary_work", NONE, boundary_work),
 ];
 
-/// Passes without a row of their own, and where what they make is compared.
+/// Where the results of passes without a row of their own are compared.
 const BOTH_HALVES: &str = "the twin of flip/gather_faces and flip/gather_centers does both halves";
 const LABELLED: &str = "what they make is held against its twin after pressure/count_pockets";
 
-/// Traces a substep of the frame after `particles`, the state at the end of `frame`, and holds it against the reference.
+/// Traces a substep of the frame after `particles`, the state at the end of `frame`, and compares
+/// it with the reference.
 ///
-/// # Errors
-/// The device, the numbers of the solver, or a substep that the frame does not have.
+/// # Errors Returns an error if the device fails, a numerical budget is exceeded, or the frame does
+/// not have the substep.
 pub fn check(
     context: &Context,
     scene: &Scene,
@@ -112,7 +113,7 @@ pub fn check(
     })
 }
 
-/// What the twins know of the substep.
+/// State that the comparisons share during the substep.
 pub(crate) struct FlipState {
     pub(super) scene: Scene,
     boundary: Boundary,
@@ -120,20 +121,20 @@ pub(crate) struct FlipState {
     n: usize,
     frame: u32,
     pub(super) begun: Begun,
-    /// The substep, where it does not follow from the survey: that of a projection alone.
+    /// The substep, if it does not follow from the survey: that of a projection for another solver.
     pub(super) given_substep: Option<Substep>,
     elements: Option<Elements>,
     sorted: Option<Sorted>,
     room: Option<Room>,
-    /// Of cell centres, as the device has them.
+    /// Densities at cell centres, as on the device.
     density: Option<Vec<f64>>,
     assembled: Option<Assembled>,
     given: Option<Given>,
-    /// How often each pass of an iteration was met on each level.
+    /// Number of runs of each pass of an iteration on each level.
     runs: BTreeMap<(&'static str, u32), usize>,
-    /// Runs of pressure/multiply that were compared.
+    /// Number of compared runs of pressure/multiply.
     products: usize,
-    /// What the bricks' sums of the latest pass that made any come to.
+    /// Expected total of the partial sums of the latest pass that wrote any.
     sum: Option<Sum>,
 }
 
@@ -160,7 +161,7 @@ impl State for FlipState {
 }
 
 impl FlipState {
-    /// Of so many particles at the end of a frame.
+    /// Creates the state for `n` particles at the end of a frame.
     pub(super) fn new(scene: &Scene, boundary: &Boundary, (frame, n): (u32, usize)) -> Self {
         Self {
             scene: scene.clone(),
@@ -194,7 +195,7 @@ impl FlipState {
         self.sorted.as_ref().expect("after flip/reorder")
     }
 
-    /// Gives the sorted particles the velocities that the device has now.
+    /// Sets the velocities of the sorted particles to the device's current ones.
     pub(super) fn carry_velocities(&mut self, velocity: Vec<DVec3>) {
         if let Some(sorted) = &mut self.sorted {
             sorted.cloud.velocity = velocity;
@@ -213,14 +214,14 @@ impl FlipState {
         self.model.step(&self.elements().substep)
     }
 
-    /// [`PLACE`]: the rounding of a place in cells.
+    /// Returns [`PLACE`], the rounding error of a position in cells.
     fn place(&self) -> f64 {
         let cells = self.model.cells.into_iter().max().unwrap_or(1);
         PLACE.of([f64::from(cells)])
     }
 }
 
-/// From the pressure and the flux that the device has.
+/// Compares the work, from the pressure and the flux on the device.
 fn boundary_work(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let elements = state.elements();
     let pressure = elements.scalars(&io.after, solved::PRESSURE)?;

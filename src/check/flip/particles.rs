@@ -1,4 +1,4 @@
-//! The grid back to the particles.
+//! Transfer from the grid to the particles, and their motion.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -16,7 +16,7 @@ use swell_solve::{SolveError, flip::buffers, pressure::buffers as solved};
 
 use super::{FlipState, elements::neighborhood, rows::*};
 
-/// [`OF_FACES`] about a cell, its length over the axes.
+/// Returns the length over the axes of [`OF_FACES`] around a cell.
 fn of_faces(bricks: &Bricks, values: &[DVec3], element: u32, place: f64) -> f64 {
     let (mut low, mut high) = (DVec3::splat(f64::INFINITY), DVec3::splat(f64::NEG_INFINITY));
     for offset in neighborhood() {
@@ -100,7 +100,7 @@ pub(super) fn grid_to_particle(state: &mut FlipState, io: &mut Io<'_>) -> Outcom
     Ok(())
 }
 
-/// From what the device gave the particles.
+/// Compares the pass, from the values that the device transferred to the particles.
 pub(super) fn aim(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let given = state.given.as_ref().expect("after flip/grid_to_particle");
     let before = io.before.vectors(buffers::SORTED_POSITION, state.n)?;
@@ -115,7 +115,8 @@ pub(super) fn aim(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     Ok(())
 }
 
-/// What the device gave each particle; which of them are drops follows from its kinds of cells.
+/// Reads the values that the device transferred to each particle; `is_drop` follows from the
+/// device's cell kinds.
 fn given(state: &FlipState, io: &Io<'_>, is_drop: Vec<bool>) -> Result<Given, SolveError> {
     let is_pushed = state.model.settings().density_correction || state.given_substep.is_some();
     let displacement = match is_pushed {
@@ -132,7 +133,7 @@ fn given(state: &FlipState, io: &Io<'_>, is_drop: Vec<bool>) -> Result<Given, So
     })
 }
 
-/// Of the particles as they were sorted; `displacement` is what it adds to.
+/// Compares the displacements of the sorted particles, which the pass adds to `displacement`.
 pub(super) fn push_apart(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let Some(before) = state.given.take() else {
         return Ok(());
@@ -206,7 +207,7 @@ pub(super) fn advect(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     io.table.each(&MOVED, 0..n, |i| {
         let x = twin.position[i];
         let moved = answer(&|moved| apart(moved.position[i], x));
-        // Rounding may take one of the two to the other end of a period.
+        // Rounding may put one of the two at the other end of a periodic axis.
         let found = period.image_by_rounding(position[i], x);
         let carried = f64::from(u8::from(period.is_at_joint(start[i], x)));
         pair(
@@ -216,7 +217,8 @@ pub(super) fn advect(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
             [moved, x.length() + 4.0 * carried * period.0.length()],
         )
     });
-    // What is left of a velocity that a solid stops has the rounding of the two that were subtracted.
+    // The rest of a velocity that a solid stops carries the rounding errors of both subtracted
+    // terms.
     let among = f64::from(u8::from(!step.solids.is_empty()));
     let solids = step.solids.iter().map(Solid::fastest);
     let solids = solids.fold(0.0, f64::max);

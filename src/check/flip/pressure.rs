@@ -1,4 +1,5 @@
-//! The projection: its system, what goes in and what comes out, and the device's own system solved directly.
+//! The projection: its system, its inputs and outputs, and a direct solve of the device's own
+//! system.
 
 use glam::DVec3;
 
@@ -32,7 +33,7 @@ use swell_solve::{
 
 use super::{Elements, FlipState, iteration::PRODUCTS, rows::*};
 
-/// Twins of what an iteration goes from and comes to.
+/// Comparisons of the passes before and after the iteration.
 pub(super) const TWINS: &[Twin<FlipState>] = &[
     twin("pressure/build_system", NONE, build_system),
     twin("pressure/divergence", NONE, divergence),
@@ -60,7 +61,8 @@ pub(super) const TWINS: &[Twin<FlipState>] = &[
 pub(super) struct Assembled {
     pub(super) system: System,
     centers: Centers,
-    /// The same with the surface nowhere beyond a cell of air: where θ is beyond 1, 1/θ has the rounding of 1.
+    /// Centres whose surface never lies beyond an air cell's centre: where θ exceeds 1, 1/θ has the
+    /// rounding error of 1.
     near: Centers,
 }
 
@@ -68,7 +70,7 @@ fn minus(a: &[f64], b: &[f64]) -> Vec<f64> {
     a.iter().zip(b).map(|(a, b)| a - b).collect()
 }
 
-/// The solution that is the sum of `terms`.
+/// Returns the sum of the solution's `terms`.
 fn sum(terms: &[Vec<f64>]) -> Vec<f64> {
     let all = |row: usize| terms.iter().map(|term| term[row]).sum();
     (0..terms[0].len()).map(all).collect()
@@ -94,7 +96,7 @@ impl FlipState {
         self.model.settings().pressure.precision
     }
 
-    /// Unit roundoff of what the projection computes in.
+    /// Returns the unit roundoff of the projection's precision.
     pub(super) fn unit(&self) -> f64 {
         match self.precision() {
             Precision::F32 | Precision::F32Refined => U,
@@ -102,7 +104,7 @@ impl FlipState {
         }
     }
 
-    /// Whether the solve has ended before the pass.
+    /// Returns whether the solve had ended before the pass.
     fn is_done(&mut self, io: &Io<'_>) -> Result<bool, SolveError> {
         Ok(io.before.control(self.precision())?.state == DONE)
     }
@@ -112,7 +114,7 @@ impl FlipState {
         rows.map(|&e| values[blocked(e)]).collect()
     }
 
-    /// An array of the pressure's own, by row.
+    /// Reads an array of the projection, by row.
     pub(super) fn by_row(
         &self,
         view: &View<'_>,
@@ -122,7 +124,7 @@ impl FlipState {
         Ok(self.rows_of(&values))
     }
 
-    /// The terms that the solution is the sum of, by row.
+    /// Reads the terms whose sum is the solution, by row.
     pub(super) fn terms(&self, view: &View<'_>) -> Result<Vec<Vec<f64>>, SolveError> {
         let Elements { cells, stride, .. } = *self.elements();
         let (precision, terms) = (self.precision(), self.precision().terms());
@@ -131,7 +133,7 @@ impl FlipState {
         Ok((0..terms).map(term).collect())
     }
 
-    /// [`OF_DIFFERENCE`] of all terms, by element.
+    /// Returns [`OF_DIFFERENCE`] of all terms, by element.
     fn difference_errors(&self, terms: &[Vec<f64>]) -> Vec<f64> {
         let near = &self.assembled().near;
         let waters = Waters::new(&self.model, &self.elements().bricks, self.room(), near);
@@ -145,7 +147,7 @@ impl FlipState {
         errors
     }
 
-    /// Σ |f u| and the solids' flux of each row.
+    /// Returns Σ |f u| plus the magnitude of the solids' flux for each row.
     fn flow(&self, velocity: &[DVec3]) -> Vec<f64> {
         let (bricks, room) = (&self.elements().bricks, self.room());
         let of_row = |&element: &u32| {
@@ -165,7 +167,7 @@ impl FlipState {
         self.system().cell.iter().map(of_row).collect()
     }
 
-    /// Adds a value a row.
+    /// Adds one value per row to the table.
     pub(super) fn add_rows<const N: usize>(
         &self,
         table: &mut Table,
@@ -179,7 +181,7 @@ impl FlipState {
         });
     }
 
-    /// Adds the largest divergence that the device noted, against `rows`.
+    /// Compares the largest divergence that the device recorded with that of `rows`.
     fn add_noted(
         &self,
         table: &mut Table,
@@ -193,7 +195,7 @@ impl FlipState {
         table.add(entry, [pair(0, found, most, [largest(flow), most])]);
     }
 
-    /// ‖b − A x‖ / ‖b‖, and [`ALLOWED`] where `asked` was asked for.
+    /// Returns ‖b − A x‖ / ‖b‖, and [`ALLOWED`] for a requested tolerance `asked`.
     fn residual(&self, b: &[f64], x: &[f64], asked: f64) -> [f64; 2] {
         let size = norm(b);
         let residual = relative(norm(&minus(b, &self.system().apply(x))), size);
@@ -351,7 +353,7 @@ fn project(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     whole(state, x, &velocity, io)
 }
 
-/// The device's own system solved directly, against what its iterations came to.
+/// Solves the device's own system directly and compares the result with that of the iteration.
 fn whole(state: &FlipState, mut x: Vec<f64>, velocity: &[DVec3], io: &mut Io<'_>) -> Outcome {
     let mut b = state.by_row(&io.after, solved::RHS)?;
     let system = state.system();
@@ -371,7 +373,7 @@ fn whole(state: &FlipState, mut x: Vec<f64>, velocity: &[DVec3], io: &mut Io<'_>
     let [residual, allowed] = state.residual(&b, &x, asked);
     let off = minus(&x, &exact);
     let least = least_eigenvalue(&solver, b.len());
-    // Without a number too, as of no rows at all.
+    // Also covers NaN, the result without any rows.
     if least.partial_cmp(&0.0) != Some(std::cmp::Ordering::Greater) {
         let why = "nothing to solve: drops alone, or water that no air touches in one cell";
         io.table.unchecked.push(("whole projection", why));

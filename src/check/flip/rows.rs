@@ -1,6 +1,7 @@
-//! What a check of FLIP compares, and by how much each value may differ; U = 2⁻²⁴. What the projection computes in f64,
-//! where the scene asks for that, has `unit` = 2⁻⁵³ in place of U: the system, its right-hand side, products, differences of
-//! the solution, the residual. Velocities, displacements and pascals stay f32.
+//! Values that a check of FLIP compares, and their tolerances; U = 2⁻²⁴. If the scene asks for f64,
+//! the parts of the projection that are computed in f64 have `unit` = 2⁻⁵³ instead of U: the
+//! system, its right-hand side, products, differences of the solution, the residual. Velocities,
+//! displacements and pressures in Pa remain f32.
 
 use crate::{pbf::GRID, sort::NEAR_FACE, table::entries};
 use swell_compare::{deviation::relative, rounding::U, tolerance::bounds};

@@ -1,4 +1,4 @@
-//! Which bricks have water, and particles in the order of their cells.
+//! Bricks with water, and particles in the order of their cells.
 
 use glam::{DMat3, DVec3};
 
@@ -16,7 +16,7 @@ use swell_solve::{SolveError, flip::buffers, trace::Begun};
 use super::{Elements, FlipState, rows::*};
 
 impl FlipState {
-    /// Particles of four arrays: position, velocity, id, slopes.
+    /// Reads particles from four arrays: position, velocity, id, velocity gradients.
     fn cloud(
         &self,
         view: &View<'_>,
@@ -37,7 +37,7 @@ impl FlipState {
         })
     }
 
-    /// Particles as the pass left them.
+    /// Reads the particles after the pass.
     pub(super) fn unsorted(&self, view: &View<'_>) -> Result<Cloud, SolveError> {
         let vectors = [buffers::POSITION, buffers::VELOCITY];
         self.cloud(view, vectors, buffers::ID, buffers::AFFINE)
@@ -57,7 +57,7 @@ pub(super) fn survey(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     io.table.add(&SPEED, [pair(0, fastest, exact, [exact])]);
     let is_wet: Vec<u32> = twin.is_wet.iter().map(|&wet| u32::from(wet)).collect();
     io.table.add_exact(&WET, &found, &is_wet);
-    // What the device found is what its substep follows.
+    // The device's substep follows from its own findings.
     let Begun {
         number,
         elapsed,

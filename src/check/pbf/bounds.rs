@@ -1,4 +1,5 @@
-//! Rounding bounds of one particle's values, from its neighbours and the walls as they are.
+//! Rounding bounds of one particle's values, from its neighbours and the walls at their current
+//! positions.
 
 use glam::{DQuat, DVec3};
 
@@ -11,25 +12,25 @@ use swell_reference::pbf::passes::{Inputs, Row};
 
 use super::rows::{DELTA, GRID, OF_SOLIDS, PUSHED, REACH, REPULSION, TURNED};
 
-/// What the bounds of a pass depend on.
+/// Inputs that the bounds of a pass depend on.
 pub(crate) struct Bounds<'a>(pub(crate) Inputs<'a>);
 
-/// Bounds on a position behind walls and solids.
+/// Bounds on a position after walls and solids.
 pub(crate) struct Confined {
     /// Magnitudes of its tolerance.
     pub(crate) magnitudes: [f64; 4],
-    /// [`PUSHED`]: of what the walls alone added to it, metres.
+    /// [`PUSHED`]: bound on the displacement by walls, metres.
     pub(crate) push_error: f64,
-    /// [`OF_SOLIDS`]: of the work of solids that move, over m / Δt².
+    /// [`OF_SOLIDS`]: bound on the work of moving solids, over m / Δt².
     pub(crate) work_error: f64,
-    /// Whether they pushed, or may have by rounding alone.
+    /// Whether walls or solids pushed, or may have within rounding.
     pub(crate) is_touched: bool,
-    /// By how much the place errs where it is looked up in the solids' grid, metres.
+    /// Error of the position for the lookup in the solids' grid, metres.
     pub(crate) reach: f64,
 }
 
 impl Bounds<'_> {
-    /// Sums over the neighbours of particle `i`, each term weighted.
+    /// Sums over the neighbours of particle `i`, with a weight for each term.
     pub(crate) fn sums(&self, i: usize, weight: impl Fn(usize) -> f64) -> Sums {
         let h = self.0.model.calibration.support_radius;
         let mut sums = Sums::default();
@@ -42,13 +43,13 @@ impl Bounds<'_> {
         sums
     }
 
-    /// A neighbour's part in sums: 1, or a sample's weight.
+    /// Returns a neighbour's weight in sums: 1 for a particle, or that of a boundary sample.
     fn mass(&self, j: usize) -> f64 {
         j.checked_sub(self.0.particles())
             .map_or(1.0, |sample| self.0.model.sample_weights[sample])
     }
 
-    /// [`WALL_DENSITY`] and, over h, [`WALL_GRADIENT`] at `x`.
+    /// Returns [`WALL_DENSITY`] and, divided by h, [`WALL_GRADIENT`] at `x`.
     fn walls(&self, x: DVec3) -> [f64; 2] {
         let h = self.0.model.calibration.support_radius;
         let walls = &self.0.substep.walls;
@@ -63,14 +64,14 @@ impl Bounds<'_> {
         [density, WALL_GRADIENT.of([faces, q, density]) / h]
     }
 
-    /// By how much f32 misplaces a wall, metres.
+    /// Returns the rounding error of the walls' positions in f32, metres.
     fn wall_place(&self) -> f64 {
         let walls = &self.0.substep.walls;
         let off = |x: DVec3| (x - x.as_vec3().as_dvec3()).abs().max_element();
         off(walls.min).max(off(walls.max))
     }
 
-    /// [`DENSITY`].
+    /// Returns the bound [`DENSITY`].
     pub(crate) fn density(&self, i: usize, density: f64) -> f64 {
         let sums = self.sums(i, |j| self.mass(j));
         let [walls, _] = self.walls(self.0.points[i]);
@@ -78,7 +79,7 @@ impl Bounds<'_> {
         DENSITY.of([scale, sums.kernel(), walls, density])
     }
 
-    /// [`LAMBDA`].
+    /// Returns the bound [`LAMBDA`].
     pub(super) fn lambda(&self, i: usize, row: &Row, lambda: f64) -> f64 {
         let scale = self.0.model.calibration.gradient_scale;
         let sums = self.sums(i, |j| self.mass(j));
@@ -96,7 +97,7 @@ impl Bounds<'_> {
         ])
     }
 
-    /// [`DELTA`]: of a correction before walls and solids, metres.
+    /// Returns [`DELTA`]: the bound on a correction before walls and solids, metres.
     pub(super) fn delta(&self, i: usize, lambda: &[f64]) -> f64 {
         let model = self.0.model;
         let calibration = &model.calibration;
@@ -117,9 +118,11 @@ impl Bounds<'_> {
         ])
     }
 
-    /// Of what walls and solids make of `x`, the position before they push, which errs by `error`. Solids bend the way: the
-    /// bound is what the twin answers when `x` moves by its error, and by that of its place in the distance grid, along each
-    /// axis. Where the push has taken it the answer is smaller: a curved solid turns a deep push by more.
+    /// Returns bounds for a position after walls and solids; `x` is the position before they push,
+    /// with an error of `error`. Solids deflect the displacement, so the bound is the reference's
+    /// response when `x` moves along each axis by its error, and by that of its position in the
+    /// distance grid. After the push the response would be smaller: a curved solid deflects a deep
+    /// push by more.
     pub(super) fn confine(&self, x: DVec3, error: f64) -> Confined {
         let (model, walls) = (self.0.model, &self.0.substep.walls);
         let contact = CONTACT * model.settings.particle_spacing;
@@ -198,7 +201,7 @@ impl Bounds<'_> {
     }
 }
 
-/// Speed between a particle and its neighbour, of which samples have none.
+/// Returns the relative speed of a particle and its neighbour; 0 for boundary samples.
 pub(crate) fn relative_speed(velocity: &[DVec3], i: usize) -> impl Fn(usize) -> f64 + '_ {
     move |j| velocity.get(j).map_or(0.0, |v| v.distance(velocity[i]))
 }

@@ -1,4 +1,4 @@
-//! Neighbour lists: the GPU's read back, and whom a pass visits.
+//! Neighbour lists: reads back those of the GPU, and derives the neighbours that a pass visits.
 
 use std::sync::Arc;
 
@@ -22,18 +22,18 @@ use super::{
     rows::{NEAR_H, NEIGHBORS},
 };
 
-/// Particles of a list block, as in shared/neighbor_list.wgsl.
+/// Particles per block of lists, as in shared/neighbor_list.wgsl.
 const STRIDE: usize = 512;
 
 /// The lists of a substep, chunk by chunk.
 pub(super) struct Lists {
     members: Vec<Vec<u32>>,
-    /// More neighbours than a list holds: searched for in each pass.
+    /// Particles with more neighbours than a list holds, which each pass searches for.
     is_searched: Vec<bool>,
     all: Option<Arc<Neighbors>>,
-    /// Where the device's cells begin.
+    /// First particle of each cell, as on the device.
     start: Vec<u32>,
-    /// Words for places, as they should be; empty where lists are made without.
+    /// Expected position words; empty if lists are built without them.
     pub(super) words: Vec<u32>,
 }
 
@@ -50,7 +50,7 @@ impl Lists {
     }
 }
 
-/// Appends ascending neighbours, and gives the lengths after the particles and after the samples.
+/// Appends sorted neighbours; returns the lengths after the particles and after the samples.
 fn split(near: &[u32], particles: usize, members: &mut Vec<u32>) -> [u32; 2] {
     let first = members.len();
     members.extend(near);
@@ -59,12 +59,13 @@ fn split(near: &[u32], particles: usize, members: &mut Vec<u32>) -> [u32; 2] {
 }
 
 impl PbfState {
-    /// Who is nearer than h, in f64; `points` may stand in any order.
+    /// Finds the points closer than h, in f64; `points` may be in any order.
     pub(super) fn search(&self, points: &[DVec3]) -> Neighbors {
         self.search_within(points, self.model.calibration.support_radius)
     }
 
-    /// The cells' order in f64 may differ from the device's where a particle stands on a face.
+    /// Finds the points closer than `radius`. Sorts again, because the order by cells in f64 may
+    /// differ from the device's if a particle lies on a face.
     fn search_within(&self, points: &[DVec3], radius: f64) -> Neighbors {
         let n = self.particles();
         let ids: Vec<u32> = (0..points.len() as u32).collect();
@@ -90,12 +91,13 @@ impl PbfState {
         })
     }
 
-    /// Whether lists are made from words for places.
+    /// Returns whether lists are built from position words.
     pub(super) fn has_words(&self) -> bool {
         self.plan.has_lists && self.plan.has_places(&self.scene)
     }
 
-    /// Whom lists should have, in f64 but for the words where they are made from those.
+    /// Returns the expected members of the lists, in f64, or by position words if lists are built
+    /// from these.
     pub(super) fn listed(&self, points: &[DVec3]) -> Neighbors {
         if self.lists.words.is_empty() {
             return self.search(points);
@@ -114,7 +116,8 @@ impl PbfState {
         })
     }
 
-    /// Whom a pass visits from `points`: the list, or the cells about where there is none.
+    /// Returns the neighbours that a pass visits from `points`: those of the list, or of a search
+    /// of the cells around if there is no list.
     pub(crate) fn visited(
         &mut self,
         io: &Io<'_>,
@@ -137,13 +140,14 @@ impl PbfState {
         Ok(Arc::new(self.searched(points)))
     }
 
-    /// Whether there are particles without a list.
+    /// Returns whether there are particles without a list.
     pub(super) fn is_searching(&self) -> bool {
         self.lists.is_searched.contains(&true)
     }
 
-    /// Whom a pass visits from `points` where some have no list: who was sorted into the cells about where a particle
-    /// is now. Two that come near each other from cells farther apart do not see each other.
+    /// Returns the neighbours that a pass visits from `points` if some particles have no list:
+    /// particles that were sorted into the cells around a particle's current position. Two
+    /// particles that approach each other from cells farther apart are missed.
     pub(super) fn searched(&self, points: &[DVec3]) -> Neighbors {
         let n = self.particles();
         let (cells, lists) = (&self.model.cells, &self.lists);
@@ -190,7 +194,7 @@ pub(super) fn build_neighbors(state: &mut PbfState, io: &mut Io<'_>) -> Outcome 
             local / STRIDE * STRIDE * (capacity / 4) + (lane >> 1) + (lane & 1) * (STRIDE / 2);
         list[4 * (base + k / 4 * STRIDE) + k % 4]
     };
-    // Words of four whose last holds its entries first.
+    // Words of four entries; the last word holds its entries first.
     let members = |local: usize| {
         let held = counts[first + local] as usize;
         let mut all: Vec<u32> = (0..held.next_multiple_of(4))
@@ -203,7 +207,7 @@ pub(super) fn build_neighbors(state: &mut PbfState, io: &mut Io<'_>) -> Outcome 
     let h = state.model.calibration.support_radius;
     let shell = NEAR_H.of([]);
     let (inner, outer) = (h * h * (1.0 - shell), h * h * (1.0 + shell));
-    // Words tell particles from particles exactly; samples on solids have none.
+    // Words determine the neighbours among particles exactly; boundary samples have none.
     let words = match state.has_words() {
         true => io.before.get(buffers::PLACE, n)?,
         false => Vec::new(),

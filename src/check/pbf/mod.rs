@@ -1,4 +1,4 @@
-//! PBF's passes against their f64 twins, each from the inputs that the GPU had.
+//! Compares PBF's passes with their f64 reference passes, each from the inputs that the GPU had.
 
 pub(super) mod bounds;
 mod lists;
@@ -38,7 +38,7 @@ use lists::Lists;
 use rows::{SAMPLES, WEIGHTS};
 use whole::Whole;
 
-/// Twins of PBF's own passes.
+/// Comparisons of PBF's own passes.
 const TWINS: &[Twin<PbfState>] = &[
     twin("pbf/predict", || names![buffers::VELOCITY], passes::predict),
     twin("pbf/assign_cells", NONE, passes::assign_cells),
@@ -90,11 +90,12 @@ const TWINS: &[Twin<PbfState>] = &[
     ),
 ];
 
-/// Traces a substep of the frame after `particles`, the state at the end of `frame`, and holds it against the reference.
-/// `boundary` is what the reference knows of the solids, `uploaded` what the device does: they differ in tests alone.
+/// Traces a substep of the frame after `particles`, the state at the end of `frame`, and compares
+/// it with the reference. `boundary` holds the solids for the reference, `uploaded` those for the
+/// device; they differ only in tests.
 ///
-/// # Errors
-/// The device, the numbers of the solver, or a substep that the frame does not have.
+/// # Errors Returns an error if the device fails, a numerical budget is exceeded, or the frame does
+/// not have the substep.
 pub fn check(
     context: &Context,
     scene: &Scene,
@@ -149,7 +150,7 @@ pub fn check(
     })
 }
 
-/// What the twins know of the substep.
+/// State that the comparisons share during the substep.
 pub(super) struct PbfState {
     pub(super) scene: Scene,
     model: Model,
@@ -159,7 +160,7 @@ pub(super) struct PbfState {
     plan: Plan,
     lists: Lists,
     whole: Whole,
-    /// Whether the velocities have been updated: what follows measures the frame's end.
+    /// Whether the velocities have been updated: later passes measure the frame's end.
     is_over: bool,
 }
 
@@ -190,7 +191,8 @@ impl PbfState {
         }
     }
 
-    /// Samples on solids as the device has them are inputs of its passes; here they are outputs of the upload.
+    /// Takes the boundary samples from the device, as inputs of its passes, and compares them as
+    /// outputs of the upload.
     fn take_samples(&mut self, io: &mut Io<'_>) -> Outcome {
         let (n, samples) = (self.particles(), self.plan.counts.boundary_samples);
         if samples == 0 || std::mem::replace(&mut self.has_samples, true) {
@@ -211,7 +213,8 @@ impl PbfState {
         Ok(())
     }
 
-    /// How the iteration until a density error stands before the pass; `None` where their number is given.
+    /// Reads the state of the iteration to a density error before the pass; `None` if the number of
+    /// iterations is fixed.
     fn control(&self, io: &Io<'_>) -> Result<Option<IterationControl>, SolveError> {
         match self.scene.solver.pbf().stop {
             Stop::DensityError { .. } => Ok(Some(io.before.one(buffers::CONTROL)?)),
@@ -219,7 +222,7 @@ impl PbfState {
         }
     }
 
-    /// The positions that a pass reads, then the samples; and the λ beside them.
+    /// Reads the positions that a pass reads, followed by the samples, and λ.
     fn stored(&self, io: &Io<'_>) -> Result<(Vec<DVec3>, Vec<f64>), SolveError> {
         let n = self.particles();
         let (mut points, lambda) = self.places(&io.before, n)?;
@@ -227,7 +230,7 @@ impl PbfState {
         Ok((points, lambda))
     }
 
-    /// The first `count` places, and what stands in their w.
+    /// Reads the first `count` entries of `predicted`: positions, and the values in w.
     fn places(&self, view: &View<'_>, count: usize) -> Result<(Vec<DVec3>, Vec<f64>), SolveError> {
         let low = self.plan.page.unwrap_or(count).min(count);
         let mut all = view.get(buffers::PREDICTED, low)?;
@@ -241,7 +244,7 @@ impl PbfState {
         ))
     }
 
-    /// Which particles the grid took for drops, in storage order.
+    /// Reads which particles the grid found to be isolated droplets, in storage order.
     pub(super) fn drops(&self, view: &View<'_>) -> Result<Vec<bool>, SolveError> {
         let n = self.particles();
         if !self.model.settings.grid_projection {
@@ -251,7 +254,7 @@ impl PbfState {
         Ok(flags.into_iter().map(|flag| flag > 0).collect())
     }
 
-    /// Positions with the samples behind them, as effects see them.
+    /// Reads positions followed by the samples, as effects see them.
     pub(super) fn moved(&self, io: &Io<'_>) -> Result<Vec<DVec3>, SolveError> {
         let mut points = io.before.vectors(buffers::POSITION, self.particles())?;
         points.extend(&self.model.samples);

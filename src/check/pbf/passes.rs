@@ -24,7 +24,7 @@ pub(super) fn predict(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     let n = state.particles();
     state.take_samples(io)?;
     if state.is_over {
-        // A frame's measurement begins with a prediction of no length.
+        // A frame's measurement begins with a prediction over a time step of 0.
         state.substep.time_step = 0.0;
         state.substep.wall_velocity = Default::default();
     }
@@ -62,15 +62,16 @@ pub(super) fn predict(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
             false => passes::predict_and_work,
         };
         let (at, then, work) = predict(model, &state.substep, x, v);
-        // Rounding may take one of the two to the other end of a period.
+        // Rounding may put one of the two at the other end of a periodic axis.
         let found = (model.period()).image_by_rounding(predicted[i], at);
         let [error, moved, place, pushed] = confined.magnitudes;
-        // What is stopped at once where it touches has another velocity a rounding beside it.
+        // A particle that is stopped at once on contact has another velocity when moved by a
+        // rounding error.
         let answer = |(axis, side): (usize, f64)| {
             let (_, other, _) = predict(model, &state.substep, x + side * DVec3::AXES[axis], v);
             (other - then).length()
         };
-        // Each coordinate errs on its own: what they change adds up.
+        // Each coordinate errs independently: the changes add up.
         let moves = [error, confined.reach].into_iter().flat_map(|by| [-by, by]);
         let along = |axis| (moves.clone().map(|by| answer((axis, by)))).fold(0.0, f64::max);
         let jump = match goes_along(i) {
@@ -225,18 +226,20 @@ pub(super) fn compute_delta(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     let bounds = Bounds(inputs);
     let (h, period) = (state.model.calibration.support_radius, state.model.period());
     let one = |i: usize| {
-        // On one spot a hash decides where they part, by sines that WGSL leaves open.
+        // For coincident particles a hash decides their direction, with sines whose accuracy WGSL
+        // does not specify.
         let is_coincident = (neighbors.all(i))
             .map(|j| period.shortest(points[i] - points[j as usize]))
             .any(|way| way.length_squared() < 2e-12 * h * h);
-        // The bound follows the correction from before walls and solids push, as they bend what it errs by.
+        // The bound starts from the correction before walls and solids push, because these deflect
+        // its error.
         let to = twin[i].free;
         let step = STEP.of([bounds.delta(i, &lambda), (to - points[i]).length()]);
         let last = match momentum {
             Some(_) => points[i] - before[i],
             None => DVec3::ZERO,
         };
-        // Whether the semi-iteration goes on is decided before it adds to the step.
+        // Whether the semi-iteration extrapolates is decided before it adds to the step.
         let along = (plain[i].free - points[i]).dot(last).abs();
         let is_across = along <= ACROSS.of([step, last.length()]);
         if is_coincident || (factor != 1.0 && is_across && last != DVec3::ZERO) {
@@ -384,7 +387,8 @@ pub(super) fn measure_density(state: &mut PbfState, io: &mut Io<'_>) -> Outcome 
 }
 
 impl PbfState {
-    /// Four periods where one carried a particle from `before` to `after`, or rounding decides whether, metres.
+    /// Returns four periods, metres, if a periodic axis wrapped a particle between `before` and
+    /// `after`, or rounding decides whether it did; else 0.
     fn carried(&self, before: DVec3, after: DVec3) -> f64 {
         let period = self.model.period();
         match period.is_at_joint(before, after) {
@@ -394,7 +398,7 @@ impl PbfState {
     }
 }
 
-/// Particles that a dispatch handles.
+/// Returns the particles that a dispatch handles.
 fn handled(phase: &Phase) -> Vec<usize> {
     let particle = |thread| phase.first + thread * phase.stride + phase.colour;
     (0..phase.count).map(|k| particle(k) as usize).collect()

@@ -1,4 +1,5 @@
-//! What a check of PBF compares, and by how much each value may differ; U = 2⁻²⁴, sums as in `compare::rounding`.
+//! Values that a check of PBF compares, and their tolerances; U = 2⁻²⁴, sums as in
+//! `compare::rounding`.
 
 use crate::{sort::NEAR_FACE, table::entries};
 use swell_compare::{
@@ -7,7 +8,7 @@ use swell_compare::{
 };
 
 bounds! {
-    /// Of a distance grid as the device has it, metres.
+    /// Error of a distance grid on the device, metres.
     pub(crate) GRID = [offset: "a place's distance to the grid's origin", origin: "|origin|", spacing: "the grid's"]
         U * (7.0 * offset + origin + 48.0 * spacing), "differences and quotients of a place in the grid";
     pub(crate) TURNED = [grid: "" GRID, radius: "how far places within a turning solid's grid are from its point of rest", centre: "|that point|"]

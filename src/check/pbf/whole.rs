@@ -1,5 +1,6 @@
-//! The whole iteration, from the same start: errors pile up here. By how much they may is what the f64 solve itself answers
-//! when its particles are moved by a rounding before each iteration.
+//! Compares the whole iteration from the same start, over which errors accumulate. The tolerance is
+//! the response of the f64 solve itself when its particles are moved by a rounding error before
+//! each iteration.
 
 use glam::DVec3;
 
@@ -17,7 +18,7 @@ use super::{
     rows::{SHIFT, WHOLE_DELTA, WHOLE_DENSITY, WHOLE_LAMBDA},
 };
 
-/// Where the iteration starts, and where the GPU's ends.
+/// Start of the iteration, and the positions at the end of the GPU's.
 #[derive(Default)]
 pub(super) struct Whole {
     start: Option<Sorted>,
@@ -29,7 +30,7 @@ impl Whole {
         self.start.is_some()
     }
 
-    /// Particles as the sort left them, then samples.
+    /// Stores particles in sorted order, then samples.
     pub(super) fn start(&mut self, points: &[DVec3], particles: usize, neighbors: Neighbors) {
         self.start = Some(Sorted {
             points: points.to_vec(),
@@ -45,10 +46,10 @@ impl Whole {
     }
 }
 
-/// How far a solve is off the exact one, in one of its fields.
+/// Deviation of a solve from the exact one, in one of its fields.
 type Measure<'a> = &'a dyn Fn(&Outcome) -> Deviation;
 
-/// What a solve came to: positions, relative densities, λ.
+/// Result of a solve: positions, relative densities, λ.
 struct Outcome {
     position: Vec<[f64; 3]>,
     density: Vec<f64>,
@@ -63,8 +64,8 @@ impl PbfState {
         let n = self.particles();
         let mut model = Model::new(&self.scene, boundary);
         model.stand(&self.scene, self.substep.time, 0.0);
-        // The GPU rounds in each iteration. Moves of the start alone would not do: where the iteration converges it forgets
-        // them, and what is left is what the last iterations rounded.
+        // The GPU rounds in each iteration. Moving only the start would not do: an iteration that
+        // converges forgets it, and the remaining error is that of the last iterations.
         let solved = |moves: &dyn Fn(u32, usize) -> DVec3| {
             let mut moved = start.clone();
             let mut disturb = |iteration: u32, points: &mut [DVec3]| {
@@ -81,8 +82,9 @@ impl PbfState {
         let shift = SHIFT.of([self.scene.domain.size().length()]);
         let layer = |k: usize| (start.points[k] / self.scene.particle_spacing()).floor();
         let exact = solved(&|_, _| DVec3::ZERO);
-        // Each particle on its own; and on a lattice, where all of a layer meet the same numbers, all of it alike, and in
-        // every iteration the same: what neighbours average out of the one adds up in the other.
+        // Moves each particle independently. On a lattice, where all particles of a layer meet the
+        // same numbers, also moves whole layers alike, the same in every iteration: what averages
+        // out between neighbours in the one case accumulates in the other.
         let alone = solved(&|iteration, k| shift * signs([iteration as usize * n + k; 3]));
         let alike = solved(&|_, k| shift * signs(layer(k).to_array().map(|l| l as usize)));
         let mut end = std::mem::take(&mut self.whole.end);
@@ -119,7 +121,7 @@ impl PbfState {
     }
 }
 
-/// ± 1 along each axis, by a hash of a number for each.
+/// Returns ± 1 along each axis, by a hash of one number per axis.
 fn signs(of: [usize; 3]) -> DVec3 {
     let sign = |axis: usize| {
         let hash = (of[axis] as u32 + 1).wrapping_mul(0x9e37_79b9) >> 16;

@@ -1,4 +1,4 @@
-//! What moving walls do on the particles, over m / Δt².
+//! Work of moving walls on the particles, over m / Δt².
 
 use crate::{
     engine::{Io, Outcome},
@@ -9,13 +9,13 @@ use swell_solve::pbf::buffers;
 use super::{PbfState, State, rows::WORK};
 
 impl PbfState {
-    /// Largest speed of a wall, m/s.
+    /// Returns the largest speed of a wall, m/s.
     pub(super) fn wall_speed(&self) -> f64 {
         let velocity = &self.substep.wall_velocity;
         velocity.min.abs().max(velocity.max.abs()).max_element()
     }
 
-    /// The same, or of a solid.
+    /// Returns the largest speed of a wall or solid, m/s.
     pub(super) fn boundary_speed(&self) -> f64 {
         self.wall_speed().max(self.model.fastest_solid())
     }
