@@ -455,7 +455,6 @@ impl Flip {
         })
     }
 
-    /// Shows a substep that has just run to `watch`.
     fn show(&self, span: Span, cloud: &Cloud, watch: &mut dyn Watch) -> Result<(), ReferenceError> {
         let wanted = watch.wants(span);
         if !wanted.is_any() {
@@ -492,7 +491,6 @@ impl Flip {
         }
     }
 
-    /// Rounds the particles into the solver's state, in its order.
     fn write(&mut self, cloud: &Cloud) {
         let order = by_id(cloud);
         let mut state = std::mem::take(&mut self.state);
