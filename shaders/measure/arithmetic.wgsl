@@ -1,4 +1,5 @@
-// Multiplications and additions alone, in three vectors that do not wait for each other: what the device computes at most.
+// Only multiplications and additions, in three independent vectors: measures the device's peak
+// arithmetic rate.
 #import "shared/thread.wgsl"
 
 @group(0) @binding(0) var<storage, read_write> escaped: array<vec4f>;
@@ -7,7 +8,8 @@ const THREADS = 256u;
 const ROUNDS = 512u;
 const FACTOR = vec4f(0.999);
 const TERM = vec4f(0.001);
-/// Each number goes to TERM / (1 - FACTOR) = 1, so that none is ever as large; no compiler knows that.
+/// Each number converges to TERM / (1 - FACTOR) = 1, so none is ever this large; but no compiler
+/// knows that.
 const NEVER = 1e30;
 
 @compute @workgroup_size(256)

@@ -1,4 +1,5 @@
-// One buffer into another, sixteen bytes a thread, as passes read and write particles: what the device's memory gives (McCalpin 1995, copy).
+// Copies one buffer to another, 16 bytes per thread, the access pattern of passes over particles:
+// measures the device's memory bandwidth (McCalpin 1995, copy).
 #import "shared/thread.wgsl"
 
 @group(0) @binding(0) var<storage, read> copied: array<vec4f>;

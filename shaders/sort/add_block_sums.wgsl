@@ -1,4 +1,4 @@
-// Adds the scanned sum of all blocks before it to each value.
+// Adds to each value the scanned sum of all blocks before its own.
 #import "shared/thread.wgsl"
 
 @group(0) @binding(0) var<uniform> length: vec4u;

@@ -1,4 +1,4 @@
-// Exclusive scan of 1024 values a workgroup, in place, and each block's sum (Blelloch 1990).
+// Exclusive scan of 1024 values per workgroup, in place, and each block's sum (Blelloch 1990).
 #import "shared/thread.wgsl"
 
 @group(0) @binding(0) var<uniform> length: vec4u;

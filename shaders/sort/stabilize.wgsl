@@ -1,4 +1,4 @@
-// Orders the members of each cell by id: what the atomics left to chance is settled here.
+// Sorts the members of each cell by id, which makes the order deterministic after the atomics.
 #import "shared/thread.wgsl"
 
 @group(0) @binding(0) var<storage, read> cell_of: array<u32>;

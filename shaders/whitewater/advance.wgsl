@@ -1,5 +1,5 @@
-// Takes each whitewater particle from the frame before to this one, by the water of this one: spray flies and lands, foam is
-// carried, bubbles rise (Ihmsen et al. 2012, section 3.2).
+// Moves each whitewater particle from the previous frame to this one, with the water of this one:
+// spray flies and lands, foam is advected, bubbles rise (Ihmsen et al. 2012, section 3.2).
 #import "shared/thread.wgsl"
 #import "shared/predicted.wgsl"
 #import "shared/vector.wgsl"
@@ -11,27 +11,27 @@
 #import "shared/air.wgsl"
 
 @group(0) @binding(12) var<storage, read> sorted_velocity: array<Vector>;
-// Place and kind.
+// Position and kind.
 @group(0) @binding(13) var<storage, read_write> white_position: array<vec4f>;
-// Velocity; then also the share of water about it.
+// Velocity; after the pass w holds the water fraction around the particle.
 @group(0) @binding(14) var<storage, read_write> white_velocity: array<vec4f>;
-// How many there are, in x.
+// Number of whitewater particles, in x.
 @group(0) @binding(15) var<uniform> white_count: vec4u;
 
 const SPRAY = 0u;
 const FOAM = 1u;
 const BUBBLE = 2u;
 
-// All of domain::whitewater.
+// Constants of domain::whitewater.
 override AIR_BELOW: f32;
 override WATER_ABOVE: f32;
 override FLIGHT_STEPS: u32;
 override HALVINGS: u32;
-// Of the settings.
+// Values from the settings.
 override RISE_SPEED: f32;
 override RESPONSE: f32;
 
-// No particle has this index: none is left out.
+// No particle has this index, so the search excludes none.
 const NO_ONE = 0xffffffffu;
 
 struct Water {
@@ -69,7 +69,7 @@ fn water_at(x: vec3f) -> Water {
     return Water(share, velocity_sum / max(kernel_sum, 1e-20));
 }
 
-// A place that can be: off walls, out of solids, in the domain.
+// Nearest allowed position: off walls, out of solids, in the domain.
 fn allowed(x: vec3f) -> vec3f {
     let y = confine(x);
 #ifdef PERIODIC
@@ -84,7 +84,7 @@ struct Flight {
     velocity: vec3f,
 }
 
-// Drag is taken implicitly, so that a drop of any size falls steadily in the end.
+// Drag is implicit, so that a drop of any size reaches its terminal velocity.
 fn fly(start: vec3f) -> Flight {
     let step = params.time_step / f32(FLIGHT_STEPS);
     var flight = Flight(vec3f(0.0), start);
@@ -128,7 +128,7 @@ fn main(
     var water = water_at(place);
     let is_in_water = water.share >= AIR_BELOW;
     if is_in_water != (kind != SPRAY) && kind != FOAM {
-        // Somewhere on the way the surface was met: a drop stays there, a bubble bursts there.
+        // The path crosses the surface: bisects for it. A drop stays there, a bubble bursts there.
         var near = 0.0;
         var far = 1.0;
         for (var k = 0u; k < HALVINGS; k++) {
@@ -148,10 +148,11 @@ fn main(
         }
         velocity = select(before, water.velocity, water.share >= AIR_BELOW);
     } else if kind == FOAM && !is_in_water {
-        // Thrown off: from here on it flies.
+        // Foam that is thrown off: from here on it flies.
         velocity = before + params.velocity_step;
     } else if kind != SPRAY {
-        // Heun's method along the water, whose velocity at the frame before is the particle's own.
+        // Heun's method with the water's velocity; the velocity at the previous frame is the
+        // particle's own.
         let up = -params.velocity_step / max(length(params.velocity_step), 1e-30);
         let aim = water.velocity + select(0.0, RISE_SPEED, kind == BUBBLE) * up;
         let kept = select(0.0, exp(-step / RESPONSE), kind == BUBBLE);

@@ -1,5 +1,6 @@
-// What at each water particle makes whitewater (Ihmsen et al. 2012, eqs. 2 to 7): air that is trapped where water meets water, the
-// crest of a wave that moves outward, and the energy that both need. W = 1 − r/h.
+// Potentials of whitewater at each water particle (Ihmsen et al. 2012, eqs. 2 to 7): air trapped
+// where water meets water, crests of waves that move outward, and the energy that both need. W = 1
+// − r/h.
 #import "shared/thread.wgsl"
 #import "shared/predicted.wgsl"
 #import "shared/vector.wgsl"
@@ -10,10 +11,11 @@
 @group(0) @binding(10) var<storage, read> share: array<f32>;
 @group(0) @binding(11) var<storage, read> surface: array<vec4f>;
 @group(0) @binding(12) var<storage, read> sorted_velocity: array<Vector>;
-// Trapped air, wave crest, energy, share of water.
+// Trapped air, wave crest, energy, water fraction.
 @group(0) @binding(13) var<storage, read_write> potential: array<vec4f>;
 
-// Cosines between velocity and normal from which a crest moves outward, and fully does: domain::whitewater.
+// Cosines between velocity and normal at which a crest begins to move outward, and fully does:
+// domain::whitewater.
 override OUTWARD_LEAST: f32;
 override OUTWARD_FULL: f32;
 
@@ -35,7 +37,7 @@ fn visit(i: u32, j: u32) {
     let w = max(1.0 - r2 * inverse_r * inverse_h, 0.0);
     let against = own_velocity - three(sorted_velocity[j]);
     trapped_air += (length(against) - dot(against, d) * inverse_r) * w;
-    // Where the surface bends away from its neighbours: they lie behind the normal's plane.
+    // Counts neighbours that lie behind the normal's plane, where the surface is convex.
     let other = surface[j];
     let behind = clamp(4.0 * dot(d, own_surface.xyz) * inverse_r, 0.0, 1.0);
     wave_crest += (1.0 - dot(own_surface.xyz, other.xyz)) * other.w * behind * w;

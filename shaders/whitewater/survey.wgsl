@@ -1,5 +1,5 @@
-// How full of water the place of each water particle is, and which way its surface faces there: away from where the density
-// grows.
+// Water fraction around each water particle, and the surface normal there, opposite to the
+// density's gradient.
 #import "shared/thread.wgsl"
 #import "shared/predicted.wgsl"
 #import "shared/pbf_params.wgsl"
@@ -8,10 +8,11 @@
 #import "shared/whitewater.wgsl"
 
 @group(0) @binding(10) var<storage, read_write> share: array<f32>;
-// The outward normal, and in w how surely there is a surface, 0 to 1.
+// Outward normal, and in w the confidence that there is a surface, 0 to 1.
 @group(0) @binding(11) var<storage, read_write> surface: array<vec4f>;
 
-// Lengths of the gradient times h from which there is a surface, and fully is: domain::whitewater.
+// Lengths of the gradient times h at which a surface begins to be detected, and fully is:
+// domain::whitewater.
 override SURFACE_LEAST: f32;
 override SURFACE_FULL: f32;
 
@@ -59,7 +60,7 @@ fn main(
     search_neighbors(own_position, i);
     let wall = wall_term(own_position);
     share[i] = share_of(kernel_sum, solid_sum, wall.density);
-    // From j to i is where the density falls.
+    // The density falls in the direction from j to i.
     let outward = params.gradient_scale * gradient_sum - wall.gradient;
     let steepness = length(outward);
     let sure = (steepness * params.support_radius - SURFACE_LEAST) / (SURFACE_FULL - SURFACE_LEAST);
