@@ -34,11 +34,11 @@ struct FlipParams {
     particle_share: f32,
     contact_distance: f32,
     max_displacement: f32,
-    // Particles closer to each other than this are pushed apart.
+    // Particles closer to each other than this are pushed apart, metres.
     apart: f32,
     // Bit mask of periodic axes: bit k for axis k.
     periodic: u32,
-    // Particles closer to a wall than half of this are pushed away from it.
+    // Particles closer to a wall than half of this are pushed away from it, metres.
     apart_from_walls: f32,
     // Seconds for which gravity, pressure, surface tension, confinement and drag act: half of the
     // previous substep plus half of this one.
