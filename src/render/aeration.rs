@@ -1,8 +1,10 @@
-//! Which particles are thrown clear of the water, and how much air is in the rest.
+//! Classifies particles as spray or body of water, and estimates the air each of them holds.
 //!
-//! What decides is the weight of a particle's neighbours, which changes steadily as they come and go, over the frames around it:
-//! their mean weight says how much of the particle is spray, without a step, and which side of the threshold it was on in five frames
-//! says whether it belongs to the body, so that none changes there and back from frame to frame to frame.
+//! Both follow from the weight of a particle's neighbours, which changes smoothly as they come and
+//! go, over the five frames around it. The mean weight gives a continuous measure of how much of
+//! the particle is spray. The side of the threshold that the weight is on in each of the five
+//! frames decides whether the particle belongs to the body, so that no particle flips back and
+//! forth between consecutive frames.
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -15,46 +17,51 @@ use super::{
 };
 use swell_scene::look::SpraySpec;
 
-/// Neighbours within two spacings below which a particle is spray (Ihmsen 2012, section 3.3).
+/// Weight of neighbours within two spacings below which a particle is spray (Ihmsen 2012, section
+/// 3.3).
 const SPRAY_BELOW: f32 = 6.0;
-/// Weights between which a particle goes over from all spray to all water.
+/// Weights over which a particle blends from all spray to all water.
 const TORN: [f32; 2] = [4.0, 8.0];
-/// Neighbours of a particle at a calm surface: the lattice's half space has 20, its bulk 32.
+/// Upper weight of a particle at an open surface. At a calm surface, the half space of the lattice
+/// gives 20 neighbours; the bulk has 32.
 const SURFACE_BELOW: f32 = 24.0;
-/// Part of its water's volume that drops of thrown water hold: it is mostly air.
+/// Air fraction of thrown water relative to full white: a drop stands for mostly air.
 const THROWN: f32 = 0.15;
-/// Of water that is white and not thrown.
+/// Air fraction of white water that belongs to the body.
 const WHITE: f32 = 0.5;
-/// Frames before, at and after: of numbers that go to and fro from frame to frame, nothing is left.
+/// Weights of the two frames before, the frame itself and the two after. The binomial filter
+/// removes oscillations from frame to frame entirely.
 const OVER_TIME: [f32; 2 * REACH as usize + 1] = [1.0 / 16.0, 0.25, 0.375, 0.25, 1.0 / 16.0];
 
-/// How far a particle's acceleration is from gravity's, over that, where it flies and where it does not: at rest it is 1.
+/// Distance of a particle's acceleration from gravity, in units of gravity: at the first value the
+/// particle is in flight, at the second it is not. A particle at rest has 1.
 const FLIGHT: [f32; 2] = [0.5, 1.0];
 
-/// A particle over the frames around it.
+/// State of a particle over the frames around it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Standing {
     /// Mean weight of its neighbours.
     pub(super) weight: f32,
-    /// Whether it belongs to the body.
+    /// Whether it belongs to the body of water rather than to spray.
     pub(super) is_body: bool,
-    /// Part of it that flies: that nothing but gravity moves.
+    /// Degree to which it is in free flight, 0 to 1: moved by nothing but gravity.
     pub(super) flight: f32,
 }
 
-/// What water falls by, and how high it would stand at rest.
+/// Gravity and the level of the water at rest.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Fall {
-    /// m/s².
+    /// Gravity, m/s².
     gravity: Vec3,
-    /// Of the water's surface at rest, −g·x from the domain's least corner, m²/s².
+    /// Potential −g·x of the water's surface at rest, x from the domain's least corner, m²/s².
     level: f32,
     seconds: f32,
     spacing: f32,
 }
 
 impl Fall {
-    /// Of `particles` in a scene's domain, as a box that is filled to one height against gravity; solids in it take no room.
+    /// Estimates the level of `particles` particles as that of a box filled to one height against
+    /// gravity; the volume of solids is ignored.
     pub(super) fn of(scene: &RenderScene, particles: usize) -> Self {
         let size = scene.domain.size();
         let down = scene.gravity;
@@ -69,7 +76,8 @@ impl Fall {
         }
     }
 
-    /// Part of a particle that flies, by its velocities at both ends of so many frames.
+    /// Degree to which a particle is in free flight, from its velocities at both ends of `frames`
+    /// frame intervals.
     fn flight(&self, [before, after]: [[f32; 3]; 2], frames: usize) -> f32 {
         let pull = self.gravity.length();
         if frames == 0 || pull == 0.0 {
@@ -84,7 +92,8 @@ impl Fall {
         )
     }
 
-    /// Speed with which water that flies passes the height at which it would be at rest (Torricelli); below it and at rest its own.
+    /// Speed, m/s, with which a flying particle passes the height of the water at rest
+    /// (Torricelli); its own speed below that height and where it does not fly.
     fn speed(&self, particle: &Particle, flight: f32) -> f32 {
         let above = -self.gravity.dot(particle.position.into()) - self.level;
         let own = Vec3::from(particle.velocity).length_squared();
@@ -92,8 +101,8 @@ impl Fall {
     }
 }
 
-/// Of each particle of a frame. Where a frame is missing, or a particle is not in it, the next one towards the frame itself stands for
-/// it.
+/// Computes the state of each particle of a frame. Where a frame is missing or lacks the particle,
+/// the nearest frame towards the current one takes its place.
 pub(super) fn standing(moment: &Moment<'_>, fall: &Fall) -> Vec<Standing> {
     let own = moment.water.weights(fall.spacing);
     let ids = Ids::of(&moment.water.particles);
@@ -129,8 +138,9 @@ pub(super) fn standing(moment: &Moment<'_>, fall: &Fall) -> Vec<Standing> {
         .collect()
 }
 
-/// Opened and closed by two frames each: a particle belongs to the body for two frames or more at a time, and is spray for two or
-/// more, whatever its neighbours do.
+/// Filters the neighbour weights of five frames. Membership of the body is opened and closed with
+/// two frames each: a particle is body, or spray, for at least two frames at a time, whatever its
+/// neighbours do.
 fn over_time(weights: [f32; 5]) -> Standing {
     let inside = weights.map(|weight| weight >= SPRAY_BELOW);
     let pair = |k: usize| inside[k] && inside[k + 1];
@@ -148,9 +158,10 @@ fn over_time(weights: [f32; 5]) -> Standing {
     }
 }
 
-/// Gives particles their air, the radius of what of them belongs to the surface, and tag bit 0: cleared for those that were thrown
-/// clear. Air at the surface grows from the look's speed to twice that. Water that flies counts as fast as it was thrown: it was torn then,
-/// and slows down as it rises without its air.
+/// Sets the air of particles and the radius of their share of the surface, and clears tag bit 0 of
+/// those that were thrown clear. Air at the surface grows between the look's onset speed and twice
+/// that. A particle in flight counts with the speed it was thrown at: it took up its air then, and
+/// slows as it rises without losing that air.
 pub(super) fn classify(
     particles: &mut [Particle],
     standing: &[Standing],
@@ -162,7 +173,8 @@ pub(super) fn classify(
         let weight = standing.weight;
         let speed = fall.speed(particle, standing.flight);
         let open = 1.0 - smoothstep(SPRAY_BELOW, SURFACE_BELOW, weight);
-        // A film at rest has as few neighbours as a shred in flight: without speed, none of them whitens.
+        // A film at rest has as few neighbours as a shred in flight; the speed keeps it from
+        // whitening.
         let shred = 1.0 - smoothstep(SPRAY_BELOW, 2.0 * SPRAY_BELOW, weight);
         let white = smoothstep(onset, 2.0 * onset, speed) * open
             + 0.3 * smoothstep(0.5 * onset, onset, speed) * shred;
@@ -176,18 +188,19 @@ pub(super) fn classify(
     });
 }
 
-/// Of water without air that is all body.
+/// Value of `air` for water without air that belongs wholly to the body.
 pub(super) const CLEAR: u32 = 0xffff_0000;
 
-/// Of a particle's `air`, the bits that tell its radius in the surface.
+/// Mask of the bits of `air` that hold the particle's radius in the surface.
 const RADIUS: u32 = 0xffc0_0000;
 
-/// Of the body, and drawn in its full size.
+/// Whether the particle belongs to the body and is drawn at full size.
 pub(super) fn is_whole(particle: &Particle) -> bool {
     particle.tag & 1 == 1 && particle.air & RADIUS == RADIUS
 }
 
-/// Three parts of 1: 16 bits of air, 6 of company, 10 of the radius.
+/// Packs three fractions of 1: 16 bits of air, 6 of company (0 for a lone particle, 1 from a
+/// neighbour weight of `TORN[0]` on), 10 of the radius.
 fn packed(air: f32, company: f32, radius: f32) -> u32 {
     let bits = |part: f32, most: f32| (part.clamp(0.0, 1.0) * most).round() as u32;
     bits(air, 65535.0) | bits(company, 63.0) << 16 | bits(radius, 1023.0) << 22
@@ -207,7 +220,7 @@ mod tests {
         }
     }
 
-    /// Whether each is body in five frames that begin at each of a run of weights but the last four.
+    /// Whether the particle is body, for each window of five frames in a run of weights.
     fn kinds(run: &[f32], rule: &dyn Fn(&[f32; 5]) -> bool) -> Vec<bool> {
         run.windows(5)
             .map(|w| rule(&[w[0], w[1], w[2], w[3], w[4]]))
@@ -228,17 +241,17 @@ mod tests {
             let now = kinds(&run, &|w| over_time(*w).is_body);
             steady += flips(&now);
             changes += now.windows(2).filter(|w| w[0] != w[1]).count();
-            // The control: the frame's own neighbours alone.
+            // Control: the frame's own neighbours only.
             today += flips(&kinds(&run, &|w| w[2] >= SPRAY_BELOW));
         }
         assert_eq!(steady, 0);
-        // Half of all frames in between, of numbers that are drawn anew each frame.
+        // With independent random weights, about half of all frames flip.
         assert!(today > 2000 * 4, "{today}");
-        // And yet it changes where that lasts.
+        // A change that lasts still comes through.
         assert!(changes > 2000, "{changes}");
     }
 
-    /// Every run of ten frames that are above and below, all 1024 of them.
+    /// Checks all 1024 runs of ten frames that are above or below the threshold.
     #[test]
     fn none_of_all_runs_changes_there_and_back() {
         for bits in 0u32..1024 {
@@ -248,7 +261,7 @@ mod tests {
             let now = kinds(&run, &|w| over_time(*w).is_body);
             assert_eq!(flips(&now), 0, "{bits:010b}");
         }
-        // What stays stays, and a change that lasts is there in its own frame.
+        // A steady state stays, and a lasting change takes effect in its own frame.
         let lasting = [3.0, 3.0, 3.0, 9.0, 9.0, 9.0, 9.0];
         assert_eq!(
             kinds(&lasting, &|w| over_time(*w).is_body),
@@ -256,7 +269,7 @@ mod tests {
         );
     }
 
-    /// A weight that goes to and fro from frame to frame leaves no trace in the mean.
+    /// A weight that alternates from frame to frame leaves no trace in the mean.
     #[test]
     fn the_mean_weight_is_steady() {
         let mean = |shift: f32| {
@@ -283,7 +296,7 @@ mod tests {
         assert_eq!(word >> 16 & 63, 21);
         assert_eq!(word >> 22, 767);
         assert_eq!(packed(0.0, 1.0, 1.0), CLEAR);
-        // One with neighbours that weigh two of the four from which on it is in company has half of it.
+        // A neighbour weight of half the upper bound of `TORN` gives half the company.
         let mut particle = [at([0.0; 3], 0.0)];
         let standing = [Standing {
             weight: 0.5 * TORN[0],
@@ -326,10 +339,10 @@ mod tests {
         assert_eq!((drop.tag, drop.air >> 16), (0, 0));
         assert!((air(&drop) - THROWN).abs() < 1e-4);
         assert!(particles[..1000].iter().all(|p| p.tag == 1));
-        // A corner of the lattice has 3 and 3 and 1 neighbours: it is torn a little.
+        // Particles at the lattice's corners have 7 neighbours and are slightly torn.
         let calm = |p: &&Particle| p.air == CLEAR;
         assert!(particles[..1000].iter().filter(calm).count() >= 992);
-        // The same face at twice the onset is white.
+        // The same face at twice the onset speed is white.
         for particle in &mut particles {
             particle.velocity = [6.0, 0.0, 0.0];
         }
@@ -346,8 +359,8 @@ mod tests {
         }
     }
 
-    /// Air of a shred of water, 3 m high, whose velocity has changed by so much a second over the frames around it, where all of
-    /// them are there and where none is.
+    /// Mean air of a shred of water, 3 m high, under a constant acceleration over the frames around
+    /// it: with all four neighbouring frames, and with none.
     fn air_of_a_shred(velocity: [f32; 3], acceleration: [f32; 3]) -> [f32; 2] {
         let fall = still(0.1);
         let position: Vec<[f32; 3]> = (0..27)
@@ -385,7 +398,8 @@ mod tests {
         })
     }
 
-    /// Thrown water is white at the top of its flight too, where it hardly moves; a film that rests as high is clear.
+    /// Thrown water stays white at the top of its flight, where it hardly moves; a film at rest at
+    /// the same height is clear.
     #[test]
     fn water_keeps_its_air_as_it_flies() {
         let flying = [0.0, -10.0, 0.0];
@@ -393,12 +407,12 @@ mod tests {
         let [resting, _] = air_of_a_shred([0.0; 3], [0.0; 3]);
         assert_eq!(resting, unknown);
         assert!(top > resting + 0.03, "{top} {resting}");
-        // As white as where it was thrown from, 2 m below, at √(2 · 10 · 2) m/s.
+        // Its air is that of water 2 m below, where it was thrown at √(2 · 10 · 2) m/s.
         let speed = still(0.1).speed(&at([0.0, 3.0, 0.0], 0.0), 1.0);
         assert!((speed - 40f32.sqrt()).abs() < 1e-5, "{speed}");
     }
 
-    /// The level is the height of a box that water fills to it, whichever way it falls.
+    /// The level is the height to which water fills the box, for any direction of gravity.
     #[test]
     fn water_rests_where_its_box_is_filled_to() {
         let scene = |gravity: DVec3| RenderScene {
@@ -415,7 +429,7 @@ mod tests {
             wave_makers: Vec::new(),
             waves: None,
         };
-        // 80 of 0.125 m³ fill a quarter of 40 m³: half a metre of 2, 1 m of 4.
+        // 80 particles of 0.125 m³ fill a quarter of 40 m³: half a metre of 2 m, 1 m of 4 m.
         let level = |gravity| Fall::of(&scene(gravity), 80).level;
         assert!((level(DVec3::new(0.0, -10.0, 0.0)) - 5.0).abs() < 1e-5);
         assert!((level(DVec3::new(10.0, 0.0, 0.0)) + 30.0).abs() < 1e-5);

@@ -1,4 +1,4 @@
-//! Buffers of the renderer, and what each holds.
+//! GPU buffers of the renderer.
 
 use super::uniform::{
     Band, Block, Camera, Caustics, Cloud, Fill, Flow, FlowLevel, Material, Narrow, Page, Particle,
@@ -7,102 +7,106 @@ use super::uniform::{
 };
 use swell_gpu::buffer::{Buf, Windows, Workgroups};
 
-/// The camera of the sample that is drawn.
+/// Camera of the current sample.
 pub(super) const CAMERA: Buf<Camera> = Buf::uniform("camera");
-/// That of the frame after.
+/// Camera of the next frame, for motion vectors.
 pub(super) const NEXT_CAMERA: Buf<Camera> = Buf::uniform("next_camera");
-/// Light, water and set.
+/// Lights, water and scene settings of shading.
 pub(super) const SHADING: Buf<Shading> = Buf::uniform("shading");
 /// Colours of materials.
 pub(super) const PALETTE: Buf<[f32; 4]> = Buf::uniform("palette");
 /// Materials of solids.
 pub(super) const MATERIALS: Buf<Material> = Buf::uniform("materials");
-/// The sea beyond the box.
+/// Settings of the sea beyond the simulated box.
 pub(super) const SEA: Buf<Sea> = Buf::uniform("sea");
-/// Its waves, and the heights of its edge.
+/// Wave components of the sea, then the heights along the box's edge.
 pub(super) const SEA_VALUES: Buf<[f32; 4]> = Buf::new("sea_values");
-/// From the world to the shadow map.
+/// Transform from world space to the shadow map.
 pub(super) const SHADOW_FROM_WORLD: Buf<[[f32; 4]; 4]> = Buf::uniform("shadow_from_world");
 
-/// What is opaque.
+/// Triangles of opaque geometry.
 pub(super) const TRIANGLES: Buf<Triangle> = Buf::new("triangles");
-/// Corner and size of each tile in which solids are drawn.
+/// Corner and size of each tile in which solids are rasterised.
 pub(super) const TILES: Windows<Tile> = Windows::new("tile", "tiles");
-/// Depth of the solids, of each pixel of the padded frame.
+/// Depth of solids for each pixel of the padded frame.
 pub(super) const SOLID_DEPTH: Buf<f32> = Buf::new("solid_depth");
-/// Their normals and materials.
+/// Packed normal and material of solids for each pixel of the padded frame.
 pub(super) const SOLID_PACKED: Buf<u32> = Buf::new("solid_packed");
 
-/// Particles of a frame that may be seen.
+/// Particles of the frame that may be visible.
 pub(super) const PARTICLES: Buf<Particle> = Buf::new("particles");
-/// How each of them goes about the frame's instant.
+/// Path of each particle about the frame's instant.
 pub(super) const PATHS: Buf<Path> = Buf::new("paths");
-/// What each of them is splatted as.
+/// Ellipsoid as which each particle is splatted.
 pub(super) const SHAPES: Buf<Shape> = Buf::new("shapes");
-/// Which of them each dispatch sees.
+/// Range of particles that each dispatch covers.
 pub(super) const PAGES: Windows<Page> = Windows::new("page", "pages");
-/// How many particles hold air, and which: those that spray is splatted of.
+/// Number of particles that hold air, then their indices: the particles from which spray is
+/// splatted.
 pub(super) const AIRED: Buf<u32> = Buf::new("aired");
-/// Workgroups of a dispatch over those that hold air.
+/// Workgroup counts of an indirect dispatch over the particles that hold air.
 pub(super) const AIRED_GROUPS: Buf<Workgroups> = Buf::new("aired_groups");
-/// Workgroups of a dispatch over all particles that may be seen.
+/// Workgroup counts of an indirect dispatch over all particles that may be visible.
 pub(super) const PARTICLE_GROUPS: Buf<Workgroups> = Buf::new("particle_groups");
-/// Blocks of water that stand for particles which other water hides.
+/// Blocks of water that replace particles hidden behind other water.
 pub(super) const BLOCKS: Buf<Block> = Buf::new("blocks");
-/// Workgroups of a dispatch over them.
+/// Workgroup counts of an indirect dispatch over the blocks.
 pub(super) const BLOCK_GROUPS: Buf<Workgroups> = Buf::new("block_groups");
-/// What a particle adds to thickness.
+/// Settings of the thickness that a particle adds.
 pub(super) const THICKNESS_PARAMS: Buf<Thickness> = Buf::uniform("thickness_params");
-/// Length of the line of sight in water, at half the resolution on both sides.
+/// Length of the line of sight in water, at half the resolution along both axes.
 pub(super) const THICKNESS: Buf<u32> = Buf::new("thickness");
-/// Aerated water and whitewater before the surface: planes of the frame at half the resolution on both sides.
+/// Aerated water and whitewater in front of the surface: planes of the frame at half the resolution
+/// along both axes.
 pub(super) const SPRAY: Buf<u32> = Buf::new("spray");
-/// What stands in these sums.
+/// Layout of the planes of `SPRAY`.
 pub(super) const SPRAY_PARAMS: Buf<SprayParams> = Buf::uniform("spray_params");
-/// Spray, foam and bubbles of a frame.
+/// Spray, foam and bubbles of the frame.
 pub(super) const WHITEWATER: Buf<Whitewater> = Buf::new("whitewater");
-/// How they are drawn.
+/// Settings with which whitewater is drawn.
 pub(super) const WHITEWATER_PARAMS: Buf<WhitewaterParams> = Buf::uniform("whitewater_params");
-/// Workgroups of a dispatch of a thread for each.
+/// Workgroup counts of an indirect dispatch with one thread per whitewater particle.
 pub(super) const WHITEWATER_GROUPS: Buf<Workgroups> = Buf::new("whitewater_groups");
-/// Whose sphere is the nearest, of each pixel.
+/// Index of the particle with the nearest sphere, for each pixel.
 pub(super) const OWNER: Buf<u32> = Buf::new("owner");
 
-/// Depths of the water, of each pixel of the padded frame: splats go into the first, and smoothing goes to and fro.
+/// Depth of the water for each pixel of the padded frame: splats go to the first buffer, and
+/// smoothing alternates between the two.
 pub(super) const DEPTHS: [Buf<f32>; 2] = [Buf::new("depth"), Buf::new("smoothed_depth")];
 /// Settings of the curvature flow.
 pub(super) const FLOW: Buf<Flow> = Buf::uniform("flow");
-/// Level and number of each of its dispatches.
+/// Level and iteration of each dispatch of the curvature flow.
 pub(super) const FLOW_LEVELS: Windows<FlowLevel> = Windows::new("level", "flow_levels");
-/// Settings of the narrow-range filter, of each axis.
+/// Settings of the narrow-range filter, one entry per axis.
 pub(super) const NARROW_RANGE: Windows<Narrow> = Windows::new("params", "narrow_range");
 
-/// Where the map of bent sunlight lies, and the rays that it is made from.
+/// Layout of the caustics map and of the sun rays it is made from.
 pub(super) const CAUSTICS: Buf<Caustics> = Buf::uniform("caustics");
-/// Where each of them comes into the water: normal, and distance.
+/// Entry of each sun ray into the water: normal and distance.
 pub(super) const SUN_RAYS: Buf<[f32; 4]> = Buf::new("sun_rays");
-/// Where each of them lands in the map, with its light and layer.
+/// Landing point of each sun ray in the map, with its light and layer.
 pub(super) const SUN_HITS: Buf<[f32; 4]> = Buf::new("sun_hits");
-/// Sums of the light in each texel, in fixed point.
+/// Fixed-point sum of the light in each texel of the caustics map.
 pub(super) const LIGHT_SUMS: Buf<u32> = Buf::new("light_sums");
 
-/// Box, bricks and set of the rays.
+/// Box, bricks and scene tree of ray casting.
 pub(super) const RAYS: Buf<Rays> = Buf::uniform("rays");
-/// What the level set says of each brick.
+/// Table of the level set's bricks.
 pub(super) const LEVEL_TABLE: Buf<u32> = Buf::new("level_table");
-/// Its values, brick by brick.
+/// Values of the level set, brick by brick.
 pub(super) const LEVEL_VALUES: Buf<f32> = Buf::new("level_values");
-/// Metres that sunlight has gone through water, on a coarse lattice.
+/// Metres of water that sunlight passes through, on a coarse lattice; the caustics map follows it.
 pub(super) const SUN_PATHS: Buf<f32> = Buf::new("sun_paths");
 /// Grid of drops and bubbles.
 pub(super) const CLOUD: Buf<Cloud> = Buf::uniform("cloud");
-/// Its table, the lattice of optical depths towards the sun, and its values, brick by brick.
+/// Table of that grid, the lattice of optical depths towards the sun, then the values brick by
+/// brick.
 pub(super) const CLOUD_WORDS: Buf<u32> = Buf::new("cloud_words");
-/// Depth of what each ray meets first, before which drops are splatted.
+/// Depth of the first hit of each ray, in front of which drops are splatted.
 pub(super) const FIRST_DEPTH: Buf<f32> = Buf::new("first_depth");
-/// Tree over what is opaque.
+/// Bounding volume hierarchy over opaque geometry.
 pub(super) const SET_NODES: Buf<SetNode> = Buf::new("set_nodes");
-/// Its triangles, leaf by leaf.
+/// Triangles of the hierarchy, leaf by leaf.
 pub(super) const SET_TRIANGLES: Buf<Triangle> = Buf::new("set_triangles");
 
 /// Rows of each band of the picture.
@@ -110,27 +114,29 @@ pub(super) const BANDS: Windows<Band> = Windows::new("band", "bands");
 /// Word and count of each fill.
 pub(super) const FILLS: Windows<Fill> = Windows::new("params", "fills");
 
-/// Tiles of a part of the frame, by whether there is water in them.
+/// Tiles of a part of the frame in three lists: with water, with solids only, and with neither.
 pub(super) fn tiles(part: &str) -> Buf<u32> {
     Buf::named(format!("tiles.{part}"))
 }
 
-/// Workgroups of dispatches over those with water, and over the others.
+/// Workgroup counts of indirect dispatches over these lists.
 pub(super) fn tile_groups(part: &str) -> Buf<Workgroups> {
     Buf::named(format!("tile_groups.{part}"))
 }
 
-/// A band of the picture: linear radiance and coverage, and behind them, for each pixel, the parts of the light that are asked for.
+/// Band of the picture: linear radiance and coverage, followed for each pixel by the requested
+/// light components.
 pub(super) fn picture(band: usize) -> Buf<[f32; 4]> {
     Buf::named(format!("picture.{band}"))
 }
 
-/// A band of what a sample sees first: its code, and the bits of the part of it that spray covers.
+/// Band of what a sample sees first: the code of the object and the bits of the fraction that spray
+/// covers.
 pub(super) fn objects(band: usize) -> Buf<[u32; 2]> {
     Buf::named(format!("objects.{band}"))
 }
 
-/// A band of the channels beside it: Z, N, P, forward, thickness.
+/// Band of the additional channels: Z, N, P, forward motion and thickness.
 pub(super) fn aovs(band: usize) -> Buf<[f32; 10]> {
     Buf::named(format!("aovs.{band}"))
 }

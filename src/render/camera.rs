@@ -6,42 +6,43 @@ use super::{frame::Extent, samples::Sample, uniform};
 use swell_domain::eye::Eye;
 use swell_scene::look::{CameraSpec, Look};
 
-/// A place and a direction in world space, and a focal length in mm.
+/// Position and orientation of the camera in world space, with its focal length and lens.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Pose {
-    /// Metres.
+    /// World position, metres.
     pub(super) position: DVec3,
-    /// Unit vectors to the picture's right, to its top and into it.
+    /// Unit vector to the picture's right; `up` points to its top and `forward` into it.
     pub(super) right: DVec3,
     pub(super) up: DVec3,
     pub(super) forward: DVec3,
     pub(super) focal_length_mm: f64,
-    /// How far the picture's middle stands off the optical axis, to its right and to its top, in heights of the picture.
+    /// Offset of the picture's centre from the optical axis, to the right and to the top, in
+    /// picture heights.
     pub(super) shift: [f64; 2],
-    /// `None` of a pinhole.
+    /// `None` for a pinhole camera.
     pub(super) lens: Option<Lens>,
 }
 
 /// A thin lens.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Lens {
-    /// Of the aperture, metres.
+    /// Radius of the aperture, metres.
     pub(super) radius: f64,
-    /// To the plane that is sharp, along the optical axis, metres.
+    /// Distance to the plane in focus along the optical axis, metres.
     pub(super) focus: f64,
 }
 
-/// What keyframes hold.
+/// Quantities that keyframes set.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Keyed {
     position: DVec3,
     target: DVec3,
     focal_length_mm: f64,
-    /// Metres; 0 of a pinhole.
+    /// Focus distance, metres; 0 for a pinhole camera.
     focus: f64,
 }
 
-/// The camera at a frame number, which may lie between two.
+/// Returns the camera's pose at a frame number, which may be fractional.
 pub(super) fn pose(look: &Look, frame: f64, frames_per_second: f64) -> Pose {
     let camera = &look.spec().camera;
     let seconds = look.camera_seconds(frame, frames_per_second);
@@ -80,22 +81,23 @@ pub(super) fn pose(look: &Look, frame: f64, frames_per_second: f64) -> Pose {
     }
 }
 
-/// Right and up of a picture into which `forward` leads and in which `up` stands upright.
+/// Right and up vectors of a picture that looks along `forward` with `up` upright.
 fn upright(forward: DVec3, up: DVec3) -> [DVec3; 2] {
     let right = forward.cross(up).normalize();
     [right, right.cross(forward)]
 }
 
-/// Metres to what is sharp; 0 of a pinhole.
+/// Focus distance, metres; 0 for a pinhole camera.
 fn focus(camera: &CameraSpec, of_key: Option<f64>) -> f64 {
     let own = camera.lens.as_ref().map(|lens| lens.focus_distance_m);
     own.map_or(0.0, |own| of_key.unwrap_or(own))
 }
 
-/// What keyframes say at a frame number.
+/// Interpolates the keyframes at a frame number.
 ///
-/// Keyframes are joined by cubic Hermite curves whose slopes are those of Catmull and Rom inside and zero at
-/// both ends, so that a move starts and stops softly; before the first and after the last it stands still.
+/// Cubic Hermite curves join the keyframes, with Catmull-Rom slopes at inner keys and zero slope at
+/// both ends, so that moves start and stop softly. Before the first key and after the last one the
+/// camera rests.
 fn keyed(camera: &CameraSpec, frame: f64) -> Keyed {
     let keys: Vec<(f64, Keyed)> = if camera.keyframes.is_empty() {
         let pose = Keyed {
@@ -148,7 +150,7 @@ fn keyed(camera: &CameraSpec, frame: f64) -> Keyed {
     let vector = |pick: fn(&Keyed) -> DVec3| {
         DVec3::from_array([0, 1, 2].map(|axis| blend(&|p| pick(p)[axis])))
     };
-    // A curve that overshoots must not bring the plane that is sharp behind the lens.
+    // Keeps an overshooting curve from moving the focus plane behind the lens.
     let nearest = keys[i].1.focus.min(keys[i + 1].1.focus);
     Keyed {
         position: vector(|p| p.position),
@@ -163,7 +165,7 @@ pub(super) fn longest_focal_px(look: &Look) -> f64 {
     look.focal_px(look.longest_focal_length_mm())
 }
 
-/// What of the camera's uniform does not come from the pose.
+/// Inputs of the camera's uniform that do not come from the pose.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Setting {
     pub(super) origin: DVec3,
@@ -174,12 +176,14 @@ pub(super) struct Setting {
     pub(super) frames_per_second: f64,
 }
 
-/// The camera of a look at a frame number, which may lie between two, in metres from `origin` in the world; without its lens.
+/// Returns the camera of a look at a frame number, which may be fractional, as a pinhole; its
+/// position is in metres from `origin`.
 pub fn eye(look: &Look, origin: DVec3, frame: f64, frames_per_second: f64) -> Eye {
     of_pose(look, &pose(look, frame, frames_per_second), origin)
 }
 
-/// The lens of a look at a frame number: its f-number and the distance that is sharp, metres; `None` of a pinhole.
+/// Returns the f-number and the focus distance in metres of a look at a frame number; `None` for a
+/// pinhole camera.
 pub fn lens(look: &Look, frame: f64, frames_per_second: f64) -> Option<[f64; 2]> {
     let [f_stop, _] = look.lens(look.camera_seconds(frame, frames_per_second))?;
     let lens = pose(look, frame, frames_per_second).lens?;
@@ -195,18 +199,20 @@ fn of_pose(look: &Look, pose: &Pose, origin: DVec3) -> Eye {
         up: pose.up,
         forward: pose.forward,
         focal: look.focal_px(pose.focal_length_mm),
-        // Where the picture's middle is right of the axis, the axis is left of it.
+        // Where the picture's centre is right of the axis, the axis is left of the centre.
         axis: [-right, up],
         size: [image.width, image.height],
     }
 }
 
-/// Moves an eye to a point of its lens, and gives how far, in pixels to the right and down, the middle of the picture goes with it so
-/// that what is in focus stays where it is (Haeberli and Akeley 1990, section 3.3).
+/// Moves an eye to a point of its lens and returns the offset in pixels, to the right and down, by
+/// which the picture's centre must follow so that points in focus keep their position (Haeberli and
+/// Akeley 1990, section 3.3).
 ///
-/// A point at a depth d is then a disc of A f |1/d_f − 1/d| across on the film, A the aperture's diameter. A thin lens has f / (d_f − f)
-/// where this has f / d_f: its film moves back to v = f d_f / (d_f − f) when it is focused, and what it sees gets narrower. Here the
-/// film stays at f, so that a pull of focus changes no framing.
+/// A point at depth d then covers a disc of diameter A f |1/d_f − 1/d| on the film, where A is the
+/// aperture's diameter. A thin lens would have f / (d_f − f) in place of f / d_f: its film moves
+/// back to v = f d_f / (d_f − f) when it is focused, which narrows the field of view. Here the film
+/// stays at f, so that a focus pull leaves the framing unchanged.
 fn through_lens(eye: &mut Eye, lens: Option<Lens>, aperture: [f64; 2]) -> [f64; 2] {
     let Some(lens) = lens else {
         return [0.0; 2];
@@ -216,7 +222,7 @@ fn through_lens(eye: &mut Eye, lens: Option<Lens>, aperture: [f64; 2]) -> [f64; 
     [eye.focal * right / lens.focus, -eye.focal * up / lens.focus]
 }
 
-/// The uniform for one sample of a frame.
+/// Builds the camera's uniform for one sample of a frame.
 pub(super) fn camera(
     look: &Look,
     setting: &Setting,
@@ -272,8 +278,9 @@ mod tests {
         Look::parse(&text, Path::new("look.toml")).unwrap()
     }
 
-    /// A file's film of 36 × 24 mm with a focal length of 35 mm, moved 1.8 mm to the right and 1.2 mm down, under an image of 160 × 90:
-    /// a millimetre on that film is as many pixels as the fit says, along both sides.
+    /// A film of 36 × 24 mm in a camera file with a focal length of 35 mm, shifted 1.8 mm to the
+    /// right and 1.2 mm down, under an image of 160 × 90: a millimetre on that film has as many
+    /// pixels as the fit says, along both axes.
     #[test]
     fn the_film_of_a_file_is_fitted_too() {
         let folder = tempfile::tempdir().unwrap();
@@ -291,7 +298,7 @@ mod tests {
             Look::parse(&text, &folder.path().join("look.toml"))
         };
         let (by_width, by_height) = (160.0 / 36.0, 90.0 / 24.0);
-        // Of the look's own film, which decides no more than a lens's aperture, none changes where anything is.
+        // The look's own film sets only the aperture of a lens; no value of it moves anything.
         for film in ["", "film_back_mm = [36.0, 24.0]\n"] {
             for (fit, pixels) in [
                 ("width", by_width),
@@ -302,7 +309,7 @@ mod tests {
                 let look = look(&format!("fit = \"{fit}\"\n"), film).unwrap();
                 let found = eye(&look, DVec3::ZERO, 1.0, 24.0);
                 let [across, down] = found.axis;
-                // Lengths have 32 bits: 2⁻²⁴ of 155 pixels are 9e-6.
+                // The file holds 32-bit lengths: 2⁻²⁴ of 155 pixels is 9e-6.
                 for (found, mm) in [(found.focal, 35.0), (across, -1.8), (down, -1.2)] {
                     assert!((found - mm * pixels).abs() < 1e-5, "{fit}: {found}");
                 }
@@ -313,8 +320,8 @@ mod tests {
         assert!(refused.contains("camera.fit"), "{refused}");
     }
 
-    /// A shot that is counted from 1001, against what usd-core 26.11 has at time code 1001 + (frame − 1) · 24 / rate: place, direction,
-    /// focal length.
+    /// A shot whose frames are numbered from 1001, compared with the values of usd-core 26.11 at
+    /// time code 1001 + (frame − 1) · 24 / rate: position, direction, focal length.
     #[test]
     fn a_camera_s_file_begins_at_its_own_frame() {
         let folder = tempfile::tempdir().unwrap();
@@ -360,7 +367,7 @@ mod tests {
         ];
         for (rate, frame, place, forward, focal) in rows {
             let pose = pose(&begun, frame, rate);
-            // OpenUSD keeps angles and lengths in 32 bits.
+            // OpenUSD stores angles and lengths as 32-bit floats.
             assert!(
                 (pose.position - DVec3::from(place)).length() < 1e-6,
                 "{frame}"
@@ -381,7 +388,8 @@ mod tests {
                 && rates[0].starts_with("camera.file: the file has 24 time codes a second, by its"),
             "{rates:?}"
         );
-        // The controls: without it the camera stands at its first key, and after its last; both are said.
+        // Controls: without `start` the camera rests at its first key, or after its last one; both
+        // cause a warning.
         let plain = look("");
         assert_eq!(pose(&plain, 20.0, 24.0).position, DVec3::new(0.0, 3.0, 8.0));
         let text = said(&plain, [1, 24], 24.0).concat();
@@ -422,7 +430,8 @@ mod tests {
         let slope = |frame: f64| (x(frame + 1e-5) - x(frame - 1e-5)) / 2e-5;
         assert!((slope(11.0 - 1e-4) - slope(11.0 + 1e-4)).abs() < 1e-3);
         assert!(slope(1.0 + 1e-4).abs() < 1e-3 && slope(31.0 - 1e-4).abs() < 1e-3);
-        // Halfway along a film back of 36 mm at 36 mm, 160 pixels: the focal length is the width.
+        // With a focal length equal to the film's width of 36 mm, the focal length is the picture's
+        // width, 160 pixels.
         assert!((look(&text).focal_px(36.0) - 160.0).abs() < 1e-12);
     }
 
@@ -445,14 +454,15 @@ mod tests {
             ..Sample::STILL
         };
         let found = camera(&look(text), &setting, 48.0, sample, 0);
-        // Frame 48 at 24 a second, a quarter of a frame later.
+        // Frame 48 at 24 frames per second, a quarter of a frame later.
         assert_eq!(found.clock, (48.25f64 / 24.0) as f32);
         assert_eq!(found.seconds, (0.25f64 / 24.0) as f32);
         assert_eq!(found.frame_seconds, (1.0f64 / 24.0) as f32);
         assert_eq!(found.centre, [16.0 + 80.0, 19.0 + 45.0]);
     }
 
-    /// What is sharp stays where it is from any point of the lens, and what is not moves by its disc's radius.
+    /// Points in focus keep their position from any point of the lens; others move by the radius of
+    /// their disc.
     #[test]
     fn the_plane_in_focus_stays() {
         let text = "[camera]\nfocal_length_mm = 36.0\nposition = [0.0, 1.0, 0.0]\ntarget = [1.0, 1.0, 0.0]\n\
@@ -502,7 +512,7 @@ mod tests {
         let look = look(&text);
         let at = |frame: f64| pose(&look, frame, 24.0).lens.unwrap().focus;
         assert_eq!([at(0.0), at(1.0), at(11.0), at(50.0)], [2.0, 2.0, 8.0, 8.0]);
-        // Half way between two keys at which it stands still.
+        // Halfway between two keys with zero slope.
         assert!((at(6.0) - 5.0).abs() < 1e-12);
     }
 }

@@ -1,9 +1,10 @@
-//! Sunlight that water bends and bundles on what lies below it: a lattice of rays from the sun, followed through the level set, and a
-//! map of the light where they land.
+//! Caustics: sunlight that the water refracts onto what is below it. A lattice of rays from the sun
+//! is traced through the level set and accumulated into a map of the light where the rays land.
 //!
-//! The map lies on the plane of the domain's floor. A place belongs to the texel into which the sunlight of flat water would carry it,
-//! so that flat water makes an even map at any depth, and what stands above the floor is as sharp as the floor. Light is relative to
-//! that through flat water: what a look without caustics has under water is 1.
+//! The map lies in the plane of the domain's floor. A point belongs to the texel into which
+//! sunlight through flat water would carry it, so that flat water gives an even map at any depth
+//! and objects above the floor receive light as sharp as the floor does. Light is relative to that
+//! through flat water: 1 is the light under water of a look without caustics.
 
 use glam::DVec2;
 
@@ -21,40 +22,43 @@ use swell_gpu::{
 };
 use swell_scene::look::Look;
 
-/// Texels between rays: light between four rays is spread over the quad where they land.
+/// Texels between rays. Light between four rays is spread over the quad at which they land.
 const TEXELS_A_RAY: f64 = 2.0;
-/// Standard deviation with which normals are smoothed where the look leaves it out, particle spacings. What particles at rest leave in
-/// a surface has lengths of some spacings; waves that they hold are longer.
+/// Default standard deviation with which normals are smoothed, particle spacings. The
+/// irregularities that particles at rest leave in a surface are some spacings long; the waves that
+/// particles carry are longer.
 const WIDTH: f64 = 1.5;
-/// What the outermost rays are within the box's sides, voxels.
+/// Distance of the outermost rays inside the box's sides, voxels.
 const HAIR: f64 = 0.01;
-/// Layers of the map: what the sun in flat water would shine on, and what stands in shadow there.
+/// Layers of the map: surfaces that the sun reaches through flat water, and surfaces in shadow
+/// there.
 const LAYERS: usize = 2;
 
-/// Where rays and map lie.
+/// Layout of the rays and the map.
 #[derive(Clone, Debug)]
 pub(super) struct Caustics {
-    /// Of the box, x and z, metres.
+    /// Size of the box along x and z, metres.
     size: DVec2,
-    /// Beyond the box's sides, metres; 0 where no sea lies there.
+    /// Extent of the map beyond the box's sides, metres; 0 without a sea.
     margin: f64,
-    /// Still level of the sea, metres; 0 without one.
+    /// Still-water level of the sea, metres; 0 without a sea.
     level: f64,
     texel: f64,
-    /// Off the box's sides, metres, by which the outermost rays are within it.
+    /// Distance of the outermost rays inside the box's sides, metres.
     hair: f64,
-    /// Horizontal way of light for a metre of height, in air and in flat water, towards the sun.
+    /// Horizontal displacement of light per metre of height, in air and in flat water, towards the
+    /// sun.
     slopes: [DVec2; 2],
-    /// What does not change.
+    /// Members of the uniform that stay constant.
     fixed: uniform::Caustics,
-    /// Rays and texels that there is room for, along x and z.
+    /// Allocated numbers of rays and of texels, along x and z.
     room: [[u32; 2]; 2],
-    /// Seconds from the frame, and since frame 0, at which the map stands.
+    /// Seconds from the frame and since frame 0 for which the map is current.
     stands: Option<[f32; 2]>,
 }
 
 impl Caustics {
-    /// `None` where the look has none.
+    /// Returns `None` where the look has no caustics.
     pub(super) fn of(look: &Look, scene: &RenderScene) -> Option<Self> {
         let spec = look.spec();
         let asked = spec.water.caustics.as_ref()?;
@@ -96,17 +100,18 @@ impl Caustics {
         Some(caustics)
     }
 
-    /// Values of the map.
+    /// Number of values of the map.
     fn values(&self) -> usize {
         LAYERS * self.room[1].map(|n| n as usize).iter().product::<usize>()
     }
 
-    /// Rays and map under water that ends below `top`.
+    /// Computes the layout of rays and map under water whose highest point is below `top`.
     fn standing(&self, top: f64) -> uniform::Caustics {
         let [air, water] = self.slopes;
         let margin = DVec2::splat(self.margin);
-        // Rays that come in through the box's sides towards the sun; of a low sun those near its top alone. Of the sea, those that come
-        // down to it within the margin.
+        // Rays that enter through the box's top or through its sides towards the sun; when the sun
+        // is low, only those near the top. With a sea, the rays that reach its level within the
+        // margin.
         let (first, last) = if self.margin > 0.0 {
             let shift = air * (top - self.level).max(0.0);
             (shift - margin, self.size + margin + shift)
@@ -136,8 +141,8 @@ impl Caustics {
         }
     }
 
-    /// Has the device know of a sample whose water, of particles or of the sea, ends below `top` metres; whether the map has to be made
-    /// anew.
+    /// Uploads the layout for a sample whose water, of particles or of the sea, ends below `top`
+    /// metres. Returns whether the map must be rebuilt.
     pub(super) fn stand_at(
         &mut self,
         camera: &uniform::Camera,
@@ -159,18 +164,18 @@ impl Caustics {
         true
     }
 
-    /// Says that the water is another.
+    /// Marks the map as outdated because the water has changed.
     pub(super) fn forget(&mut self) {
         self.stands = None;
     }
 }
 
-/// A little above `height`: rays begin in air.
+/// Adds two voxels to `height`, so that rays begin in air.
 pub(super) fn above(height: f64, look: &Look, scene: &RenderScene) -> f64 {
     height + 2.0 * voxel(look, scene)
 }
 
-/// Fresnel's, of unpolarised light from air, over the cosine of incidence.
+/// Fresnel reflectance of unpolarised light from air, by the cosine of incidence.
 fn reflectance(cosine: f64, index: f64) -> f64 {
     let inside = (1.0 - (1.0 - cosine * cosine) / (index * index)).sqrt();
     let s = (cosine - index * inside) / (cosine + index * inside);
@@ -178,12 +183,13 @@ fn reflectance(cosine: f64, index: f64) -> f64 {
     0.5 * (s * s + p * p)
 }
 
-/// Values behind the lattice of the sun's ways through water.
+/// Number of the map's values, which follow the lattice of sun paths through water in one buffer.
 pub(super) fn map_values(look: &Look, scene: &RenderScene) -> usize {
     Caustics::of(look, scene).map_or(0, |caustics| caustics.values())
 }
 
-/// Plans the map, and what makes it anew where the water has changed; nothing where the look has none.
+/// Plans the buffers of the map and returns the commands that rebuild it; none where the look has
+/// no caustics.
 pub(super) fn plan_caustics(plan: &mut Plan, look: &Look, scene: &RenderScene) -> Vec<Command> {
     let Some(caustics) = Caustics::of(look, scene) else {
         return Vec::new();
@@ -211,7 +217,7 @@ mod tests {
 
     #[test]
     fn flat_water_throws_back_what_fresnel_says() {
-        // Straight down ((n − 1) / (n + 1))²; along the surface everything.
+        // ((n − 1) / (n + 1))² at normal incidence; total reflection at grazing incidence.
         let straight = (0.333f64 / 2.333).powi(2);
         assert!((reflectance(1.0, 1.333) - straight).abs() < 1e-15);
         assert!((reflectance(0.0, 1.333) - 1.0).abs() < 1e-15);

@@ -1,4 +1,5 @@
-//! Which triangles belong to closed bodies: of those, the sides that face away from an eye outside are never seen.
+//! Finds the triangles that belong to closed bodies, whose back faces are never visible from
+//! outside.
 
 use std::collections::HashMap;
 
@@ -6,24 +7,26 @@ use glam::{DVec3, Vec3};
 
 use super::uniform::Triangle;
 
-/// How much farther than the nearest depth that is drawn an eye must be from a body's box, so that no corner of the picture cuts it open:
-/// a corner 83° off the axis is 1 / cos 83° of that depth away.
+/// Required distance between an eye and a body's box, in multiples of the near plane's distance, so
+/// that no corner of the picture cuts the body open: a corner 83° off the axis is 1 / cos 83° times
+/// that distance away.
 const ROOM: f32 = 8.0;
 
-/// Boxes about the closed bodies of a set whose triangles stand first.
+/// Boxes of the closed bodies of a scene, whose triangles come first.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Closed {
-    /// Least and greatest corner, metres.
+    /// Least and greatest corners, metres.
     boxes: Vec<[Vec3; 2]>,
-    /// How many of the first triangles belong to them.
+    /// Number of leading triangles that belong to closed bodies.
     triangles: u32,
 }
 
 impl Closed {
-    /// Puts triangles of closed bodies first, the others behind them, each in their order.
+    /// Moves the triangles of closed bodies to the front and keeps the order within both groups.
     ///
-    /// A body is what hangs together by edges in the same place. It is closed where each is gone along once one way and once the other,
-    /// counter-clockwise seen from outside, which its volume tells.
+    /// A body is a set of triangles connected by edges, with corners matched by position. It is
+    /// closed where each edge is traversed exactly once in both directions and its signed volume is
+    /// positive, that is, its faces are counter-clockwise seen from outside.
     pub(super) fn put_first(triangles: &mut [Triangle]) -> Self {
         let corners = places(triangles);
         let edges = edges(&corners);
@@ -51,8 +54,9 @@ impl Closed {
         found
     }
 
-    /// How many of the first triangles show only their faces to an eye, which draws nothing nearer than `near`: none where it is in a
-    /// body's box, or so near to one that the picture may cut it open.
+    /// Returns the number of leading triangles of which only front faces are visible to an eye with
+    /// its near plane at `near` metres; 0 where the eye is inside a body's box or so close that the
+    /// picture may cut it open.
     pub(super) fn seen_from(&self, eye: Vec3, near: f32) -> u32 {
         let room = Vec3::splat(ROOM * near);
         let is_in =
@@ -64,11 +68,11 @@ impl Closed {
     }
 }
 
-/// Numbers of the places of each triangle's corners.
+/// Assigns an index to each distinct corner position.
 fn places(triangles: &[Triangle]) -> Vec<[usize; 3]> {
     let mut numbers = HashMap::new();
     let mut number = |p: [f32; 3]| {
-        // Zeros of both signs are one place.
+        // Zeros of both signs are the same position.
         let key = p.map(|x| (x + 0.0).to_bits());
         let next = numbers.len();
         *numbers.entry(key).or_insert(next)
@@ -78,12 +82,12 @@ fn places(triangles: &[Triangle]) -> Vec<[usize; 3]> {
         .collect()
 }
 
-/// A side of a triangle, from the lesser place to the greater.
+/// Edge with its end points in ascending order.
 fn side(from: usize, to: usize) -> [usize; 2] {
     [from.min(to), from.max(to)]
 }
 
-/// Triangles at each edge, and whether they go along it from its lesser place to the greater.
+/// Triangles at each edge, and whether each traverses the edge in ascending order.
 fn edges(corners: &[[usize; 3]]) -> HashMap<[usize; 2], Vec<(usize, bool)>> {
     let mut edges: HashMap<[usize; 2], Vec<(usize, bool)>> = HashMap::new();
     for (k, &[a, b, c]) in corners.iter().enumerate() {
@@ -95,7 +99,7 @@ fn edges(corners: &[[usize; 3]]) -> HashMap<[usize; 2], Vec<(usize, bool)>> {
     edges
 }
 
-/// Triangles that hang together by edges, in the order of their first.
+/// Sets of triangles connected by edges, in the order of their first triangle.
 fn bodies(count: usize, edges: &HashMap<[usize; 2], Vec<(usize, bool)>>) -> Vec<Vec<usize>> {
     let mut parent: Vec<usize> = (0..count).collect();
     let root = |parent: &mut Vec<usize>, mut at: usize| {
@@ -123,7 +127,8 @@ fn bodies(count: usize, edges: &HashMap<[usize; 2], Vec<(usize, bool)>>) -> Vec<
     bodies
 }
 
-/// Whether two triangles meet at each edge of a body, and go along it in opposite ways.
+/// Whether exactly two triangles meet at each edge of a body and traverse it in opposite
+/// directions.
 fn has_no_rim(
     corners: &[[usize; 3]],
     edges: &HashMap<[usize; 2], Vec<(usize, bool)>>,
@@ -138,7 +143,7 @@ fn has_no_rim(
     })
 }
 
-/// m³, negative where the normals point inward.
+/// Signed volume of a body, m³; negative where normals point inward.
 fn volume(triangles: &[Triangle], body: &[usize]) -> f64 {
     let about = Vec3::from(triangles[body[0]].a).as_dvec3();
     let corner = |p: [f32; 3]| DVec3::from(p.map(f64::from)) - about;
@@ -182,7 +187,7 @@ mod tests {
 
     #[test]
     fn closed_bodies_come_first() {
-        // A lid that is off, then a whole box, and one that is inside out.
+        // A box without a lid, a closed box, and one that is inside out.
         let mut open = cube(2.0);
         open.pop();
         let mut inward = cube(8.0);
@@ -197,14 +202,15 @@ mod tests {
         assert_eq!(materials[..12], [5; 12]);
         assert_eq!(materials[12..23], [2; 11]);
         assert_eq!(materials[23..], [8; 12]);
-        // Of two that touch at a corner each is a body of its own, also beside one that is inside out.
+        // Two boxes that touch at a corner are separate bodies, and so is a box beside one that is
+        // inside out.
         let mut two = [cube(5.0), cube(6.0)].concat();
         let found = Closed::put_first(&mut two);
         assert_eq!((found.triangles, found.boxes.len()), (24, 2));
         let mut two = [cube(9.0), inward].concat();
         let found = Closed::put_first(&mut two);
         assert_eq!((found.triangles, two[0].material), (12, 9));
-        // A face that is turned among others leaves edges that are gone along twice in one way.
+        // A flipped face leaves edges that are traversed twice in the same direction.
         let mut turned = cube(5.0);
         let face = &mut turned[7];
         std::mem::swap(&mut face.b, &mut face.c);
@@ -223,7 +229,7 @@ mod tests {
             [seen(4.0), seen(4.91), seen(5.5), seen(6.09)],
             [12, 12, 0, 12]
         );
-        // So near that a corner of the picture may cut it open.
+        // So close that a corner of the picture may cut the body open.
         assert_eq!([seen(4.93), seen(6.07)], [0, 0]);
         assert_eq!(Closed::default().seen_from(Vec3::ZERO, 0.01), 0);
     }

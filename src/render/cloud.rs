@@ -1,4 +1,5 @@
-//! Drops and bubbles of a frame as rays go through them: their clouds, and the grid of a moment as the device has it.
+//! Drops and bubbles of a frame as participating media for rays, and their grid at an instant in
+//! the device's layout.
 
 use std::f64::consts::PI;
 
@@ -16,13 +17,16 @@ use swell_domain::{
 };
 use swell_scene::look::Look;
 
-/// Radius of a ball with the mean square distance of what is splatted for a particle, in splat radii: 1.6 of its mist and of the middles
-/// of its drops, which have up to a third of a radius of their own.
+/// Radius, in splat radii, of a ball with the mean square distance of what is splatted for a
+/// particle: 1.6 for its mist and for the centres of its drops, which have a radius of up to a
+/// third themselves.
 const THROWN: f64 = 1.63;
-/// How far behind the water's surface a ray still meets what floats on it, particle spacings: what the grid smears across it.
+/// Depth behind the water's surface at which a ray still meets what floats on it, particle
+/// spacings: the width over which the grid smears it.
 pub(super) const SKIN: f64 = 1.0;
 
-/// Drops of particles that the look whitens, and how they go; without `paths` straight on. `radius` is that of a splat, metres.
+/// Drops of the particles that the look whitens, with their paths; without `paths` they move in
+/// straight lines. `radius` is that of a splat, metres.
 pub(super) fn drops_of(
     look: &Look,
     scene: &RenderScene,
@@ -49,7 +53,7 @@ pub(super) fn drops_of(
         .collect()
 }
 
-/// Drops and bubbles of whitewater; `is_bubble` tells them apart by index.
+/// Drops and bubbles of whitewater with their paths; `is_bubble` distinguishes them by index.
 pub(super) fn white_of(
     look: &Look,
     scene: &RenderScene,
@@ -76,7 +80,7 @@ pub(super) fn white_of(
         .collect()
 }
 
-/// The grid of a moment as the device has it: what it is, and its words.
+/// Builds the grid at an instant and returns its uniform and its words.
 pub(super) fn grid(
     drops: &[(Drop, Path)],
     seconds: f32,

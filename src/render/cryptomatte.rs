@@ -1,30 +1,31 @@
-//! Cryptomatte, specification 1.2.0 (Friedman and Jones 2015): which objects each pixel sees, and how much of each.
+//! Cryptomatte, specification 1.2.0 (Friedman and Jones 2015): which objects each pixel sees, and
+//! the fraction that each covers.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use rayon::prelude::*;
 
-/// Name of the layer.
+/// Name of the Cryptomatte layer, and prefix of its channels.
 pub const LAYER: &str = "CryptoObject";
-/// Pairs of object and coverage that are written of a pixel, at most.
+/// Largest number of pairs of object and coverage written per pixel.
 const MOST_RANKS: usize = 6;
-/// Objects that are told apart in a pixel. Where there are more, the one that covers least gives way.
+/// Number of objects tracked per pixel. Beyond that, the object with the least coverage is dropped.
 const SLOTS: usize = 8;
 
-/// Codes of objects, as the materials of `ssfr_solid.wgsl`.
+/// Object codes, as the materials of `ssfr_solid.wgsl`.
 const WATER: u32 = 0;
 const WALLS: u32 = 1;
 const GROUND: u32 = 2;
-/// Of what is no object; here the code of spray, which covers others.
+/// Code of pixels without an object; within this module the code of spray, which covers others.
 const SKY: u32 = 3;
-/// Of the first solid.
+/// Code of the first solid.
 pub(super) const SOLIDS: u32 = 4;
-/// Solids that are told apart.
+/// Number of solids that have codes of their own.
 pub(super) const MOST_SOLIDS: usize = (PALETTE - SOLIDS) as usize;
-/// Of the first wall or wave maker with a colour of its own.
+/// Code of the first wall or wave maker with its own colour.
 pub(super) const PALETTE: u32 = 192;
 
-/// MurmurHash3_x86_32 (Appleby 2011), seed 0.
+/// MurmurHash3_x86_32 (Appleby 2011) with seed 0.
 fn murmur3(bytes: &[u8]) -> u32 {
     let scrambled = |word: u32| {
         let word = word.wrapping_mul(0xcc9e_2d51).rotate_left(15);
@@ -47,29 +48,31 @@ fn murmur3(bytes: &[u8]) -> u32 {
     hash ^ hash >> 16
 }
 
-/// What stands for a name in pixels: its hash as a float, of which neither infinity, NaN nor a denormal is made.
+/// Returns the id that represents a name in pixels: its hash reinterpreted as a float, adjusted so
+/// that it is never infinite, NaN or denormal.
 pub fn id_of(name: &str) -> f32 {
     let hash = murmur3(name.as_bytes());
     let is_special = matches!(hash >> 23 & 255, 0 | 255);
     f32::from_bits(hash ^ u32::from(is_special) << 23)
 }
 
-/// Eight hexadecimal digits of an id's bits.
+/// Bits of a name's id as eight hexadecimal digits.
 fn hex_of(name: &str) -> String {
     format!("{:08x}", id_of(name).to_bits())
 }
 
-/// The mattes of a picture.
+/// Cryptomatte layer of a picture.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Matte {
-    /// Every object that may be in the shot's pictures.
+    /// Names of all objects that may appear in the shot's pictures.
     pub names: Vec<String>,
-    /// For each rank each pixel's id and coverage, from the largest coverage on; zeros where there is no more.
+    /// Id and coverage of each pixel, one list per rank, in order of decreasing coverage; zeros
+    /// where a pixel has fewer objects.
     pub ranks: Vec<Vec<[f32; 2]>>,
 }
 
 impl Matte {
-    /// The header's attributes, by name.
+    /// Returns the names and values of the header's attributes.
     pub fn attributes(&self) -> Vec<(String, String)> {
         let key = hex_of(LAYER);
         let attribute =
@@ -82,7 +85,7 @@ impl Matte {
         ]
     }
 
-    /// JSON in ASCII, for that is what a header's text holds.
+    /// Manifest as ASCII JSON, because a header's text is ASCII.
     fn manifest(&self) -> String {
         let ids: BTreeMap<&str, String> = self
             .names
@@ -100,7 +103,8 @@ impl Matte {
         ascii
     }
 
-    /// Channels of a layer, in pairs of ranks, by suffix: `00.R`, `00.G`, and so on.
+    /// Channels of the layer by name, two ranks per group of RGBA: `CryptoObject00.R`,
+    /// `CryptoObject00.G`, and so on.
     pub(super) fn channels(&self) -> Vec<(String, Vec<f32>)> {
         let mut channels = Vec::new();
         for (rank, pixels) in self.ranks.iter().enumerate() {
@@ -114,7 +118,7 @@ impl Matte {
     }
 }
 
-/// Names that solids have: those given, with a number behind them where one is taken already.
+/// Makes the names of solids unique: appends a number where a name is already in use.
 pub fn unique(given: &[String]) -> Vec<String> {
     let mut taken: BTreeSet<String> = ["water", "ground", "walls", "spray"]
         .map(str::to_owned)
@@ -129,11 +133,11 @@ pub fn unique(given: &[String]) -> Vec<String> {
     given.iter().map(&mut name).collect()
 }
 
-/// How much of each pixel each object covers, sample by sample.
+/// Coverage of each pixel by object, accumulated sample by sample.
 #[derive(Clone, Debug)]
 pub(super) struct Covers(Vec<[(u32, f32); SLOTS]>);
 
-/// No object.
+/// An unused slot.
 const EMPTY: (u32, f32) = (u32::MAX, 0.0);
 
 impl Covers {
@@ -141,8 +145,8 @@ impl Covers {
         Self(vec![[EMPTY; SLOTS]; pixels])
     }
 
-    /// Adds a sample of `weight` in the pixel's mean: for each pixel the code of what is seen first, and the bits of the part of it
-    /// that spray covers.
+    /// Adds a sample with its `weight` in the pixel's mean. `objects` holds for each pixel the code
+    /// of the first visible object and the bits of the fraction that spray covers.
     pub(super) fn add(&mut self, objects: &[[u32; 2]], weight: f32) {
         let pixels = self.0.par_iter_mut().zip(objects);
         pixels.for_each(|(slots, &[code, cover])| {
@@ -157,7 +161,8 @@ impl Covers {
         });
     }
 
-    /// The mattes: walls and spray are objects where the look has any.
+    /// Converts the coverage to a Cryptomatte layer; walls and spray are objects only where the
+    /// look has them.
     pub(super) fn matte(self, solids: &[String], has_walls: bool, has_spray: bool) -> Matte {
         let fixed = [
             (WATER, "water", true),
@@ -188,7 +193,8 @@ impl Covers {
     }
 }
 
-/// Adds to an object's coverage of a pixel.
+/// Adds coverage of an object to a pixel. With all slots in use, replaces the object with the least
+/// coverage if that is less.
 fn put(slots: &mut [(u32, f32); SLOTS], code: u32, coverage: f32) {
     let known = slots.iter().position(|slot| slot.0 == code);
     let found = known.or_else(|| slots.iter().position(|slot| slot.0 == EMPTY.0));
@@ -203,7 +209,7 @@ fn put(slots: &mut [(u32, f32); SLOTS], code: u32, coverage: f32) {
     }
 }
 
-/// Ids and coverages from the largest on; equal ones in the order of their codes.
+/// Ids and coverages in order of decreasing coverage, then of code.
 fn sorted(mut slots: [(u32, f32); SLOTS], ids: &BTreeMap<u32, f32>) -> [[f32; 2]; SLOTS] {
     slots.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
     slots.map(|(code, coverage)| ids.get(&code).map_or([0.0; 2], |&id| [id, coverage]))
@@ -215,7 +221,7 @@ mod tests {
 
     #[test]
     fn hashes_are_murmurs() {
-        // Vectors of the hash's author (SMHasher) and of its users, seed 0.
+        // Test vectors of the hash's author (SMHasher) and of its users, seed 0.
         for (text, hash) in [
             ("", 0),
             ("hello", 0x248b_fa47),
@@ -229,7 +235,7 @@ mod tests {
 
     #[test]
     fn ids_are_those_of_the_reference_plugin() {
-        // Of cryptomatte_utilities_tests.py in the specification's own repository, as it prints them.
+        // Values that `cryptomatte_utilities_tests.py` in the specification's repository prints.
         for (name, id) in [
             ("hello", 6.070_562_710_24e-17),
             ("cube", -4.084_619_125_19e15),
@@ -244,7 +250,7 @@ mod tests {
 
     #[test]
     fn no_id_is_infinite_nan_or_denormal() {
-        // A twentieth of a percent of hashes have such exponents: many of these names.
+        // Two of 256 exponents are special, so many names hit one.
         let names = (0..100_000u32).map(|k| format!("object{k}"));
         let special = |bits: u32| matches!(bits >> 23 & 255, 0 | 255);
         let mut seen = 0;
@@ -267,7 +273,7 @@ mod tests {
         let [water, spray, pier] = ["water", "spray", "pier"].map(id_of);
         let pixel =
             |k: usize| -> Vec<[f32; 2]> { matte.ranks.iter().map(|rank| rank[k]).collect() };
-        // Of equal covers spray comes first.
+        // Of equal coverages, spray comes first.
         assert_eq!(
             pixel(0),
             [[water, 0.5], [spray, 0.25], [pier, 0.25], [0.0; 2]]

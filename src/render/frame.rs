@@ -1,34 +1,38 @@
 //! Full-frame buffers, and the bands and tiles in which a large frame is drawn.
 //!
-//! What a pixel looks up elsewhere in the frame (depth, thickness, solids) lies in buffers of the whole
-//! frame, four bytes a pixel, so no filter ever meets a tile's edge. Textures are drawn into only in
-//! tiles, and the picture itself is gathered in bands of rows: those two are what limits apply to.
+//! Depth, thickness and solids, which filters and shading look up at other pixels, are in buffers
+//! of the whole frame at four bytes per pixel, so that no filter meets a tile's edge. Only textures
+//! are drawn in tiles, and only the picture is gathered in bands of rows, because device limits
+//! apply to these two.
 
 use super::buffers::{aovs, picture};
 use swell_scene::look::{Look, Window};
 
-/// Sizes in pixels.
+/// Layout of the padded frame, in pixels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Extent {
     /// Columns and rows that are shaded.
     pub(super) picture: [u32; 2],
-    /// With a margin on all sides, so that filters have neighbours at the picture's edge. The width is a
-    /// multiple of 64, which makes a row of four-byte texels one that textures can be copied to.
+    /// Size with a margin on all sides, so that filters have neighbours at the picture's edge. The
+    /// width is a multiple of 64, so that rows of four-byte texels satisfy the alignment of texture
+    /// copies.
     pub(super) size: [u32; 2],
-    /// Padding left of and above the pixels that are shaded.
+    /// Padding left of and above the shaded pixels.
     pub(super) margin: [u32; 2],
-    /// Where the padded frame of the image without overscan begins. Places are counted from there, so that those of the image's
-    /// pixels are the same bits with overscan and without.
+    /// Origin of the padded frame of the image without overscan. Positions are counted from it, so
+    /// that pixels of the image get bitwise equal positions with and without overscan.
     pub(super) corner: [u32; 2],
-    /// From there to the image's own upper left pixel, and that one's size.
+    /// Offset from that origin to the image's upper left pixel, and the size of the image.
     pub(super) image: [[u32; 2]; 2],
 }
 
-/// What is put before a frame with overscan is a multiple of this: pairs of pixels and rows of textures stay together.
+/// The padding before a frame with overscan is a multiple of this, which preserves pairs of pixels
+/// and the alignment of texture rows.
 const STEP: u32 = 64;
 
 impl Extent {
-    /// Of a look. A crop is shaded within the frame of the whole image: what its pixels look up beyond it is there.
+    /// Computes the layout for a look. A crop is shaded within the frame of the whole image, so
+    /// that its pixels can look up what lies beyond it.
     pub(super) fn of(look: &Look) -> Self {
         let image = &look.spec().image;
         Self::new([image.width, image.height], image.overscan, look.window())
@@ -51,7 +55,7 @@ impl Extent {
         }
     }
 
-    /// Pixels that are shaded.
+    /// Number of shaded pixels.
     pub(super) fn shaded(&self) -> usize {
         self.picture[0] as usize * self.picture[1] as usize
     }
@@ -61,8 +65,8 @@ impl Extent {
     }
 }
 
-/// Rows of each band of the picture, of `stride` vectors a pixel: as many as a storage buffer of `most` bytes holds, but no more
-/// than `row_limit`.
+/// Number of rows in each band of the picture at `stride` vectors per pixel: as many as fit a
+/// storage buffer of `most` bytes, but no more than `row_limit`.
 pub(super) fn bands(
     extent: &Extent,
     (stride, has_aovs): (usize, bool),
@@ -83,7 +87,7 @@ pub(super) fn bands(
         .collect()
 }
 
-/// `FAR` of `camera.wgsl`.
+/// Depth of the background; `FAR` of `camera.wgsl`.
 pub(super) const FAR: f32 = 1e30;
 
 #[cfg(test)]
@@ -109,7 +113,7 @@ mod tests {
             size: [50, 20],
         };
         let part = Extent::new(size, 0, part);
-        // Padded pixel of an image's pixel, counted from the corner.
+        // Position of an image pixel in the padded frame, counted from the origin.
         let place = |extent: &Extent, window: [i32; 2], pixel: [i32; 2]| {
             [0, 1].map(|axis| {
                 let shaded = pixel[axis] - window[axis];
@@ -122,7 +126,7 @@ mod tests {
             assert_eq!(place(&part, [100, 30], pixel), expected);
         }
         assert_eq!(part.size, plain.size);
-        // The padding about what is shaded is no less than that about the plain image.
+        // The padding around the shaded pixels is no less than that around the plain image.
         assert!([0, 1].iter().all(|&axis| {
             let after = wide.size[axis] - wide.margin[axis] - wide.picture[axis];
             wide.margin[axis] >= plain.margin[axis] && after >= plain.margin[axis]

@@ -1,5 +1,5 @@
-//! Which particles stand behind others wherever the eye is above the water: splats of depth leave these out, and the way through them is that
-//! through the blocks of water which stand for them.
+//! Finds particles that other water hides from any eye above the water. Depth splats skip them, and
+//! blocks of water take their place in the thickness along a line of sight.
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -9,31 +9,33 @@ use super::{
     uniform::{Block, Particle},
 };
 
-/// Edge of a cell, particle spacings: at rest 8 particles are in one.
+/// Edge of a cell, particle spacings: at rest it holds 8 particles.
 const CELL: f64 = 2.0;
-/// Particles of the body in a cell from which on it is full.
+/// Number of particles of the body at which a cell counts as full.
 const FULL: u8 = 5;
-/// Cells along a side of a block, at most: a longer one would cover many pixels that see nothing of it.
+/// Largest number of cells along a side of a block; a longer block would cover many pixels that see
+/// nothing of it.
 const LONGEST: usize = 8;
-/// The block of a cell that is in none.
+/// Block index of a cell that is in no block.
 const NONE: u32 = u32::MAX;
 
-/// Of the body, in its full size, and without air: as spray a particle may be seen where its surface is not.
+/// Whether the particle belongs to the body at full size and holds no air; as spray it may be
+/// visible where the surface is not.
 fn is_clear(particle: &Particle) -> bool {
     is_whole(particle) && particle.air & 0xffff == 0
 }
 
-/// Cells that hold all clear particles of the domain, and how many are in each.
+/// Numbers of clear particles in the cells of the box around all of them.
 struct Cells {
     edge: f64,
-    /// Of the domain, the first of these.
+    /// Position in the domain of the box's first cell.
     first: [i64; 3],
     counts: [usize; 3],
     particles: Vec<u8>,
 }
 
 impl Cells {
-    /// `None` where no particle is clear.
+    /// Returns `None` where no particle is clear.
     fn of(particles: &[Particle], size: DVec3, spacing: f64) -> Option<Self> {
         let edge = CELL * spacing;
         let most = (size / edge).ceil().max(DVec3::ONE).to_array();
@@ -69,12 +71,12 @@ impl Cells {
         is_in.then(|| self.place([x, y, z]))
     }
 
-    /// Index of a cell that is counted from the first one.
+    /// Index of a cell, from its position relative to the first one.
     fn place(&self, [x, y, z]: [usize; 3]) -> usize {
         (z * self.counts[1] + y) * self.counts[0] + x
     }
 
-    /// From the first one, the cell of an index.
+    /// Position relative to the first cell, from a cell's index.
     fn at(&self, index: usize) -> [usize; 3] {
         let [width, height, _] = self.counts;
         [
@@ -84,13 +86,14 @@ impl Cells {
         ]
     }
 
-    /// The ground hides what is below it; beyond the other sides there is air.
+    /// Whether a cell is full. Cells below the domain count as full, because the ground hides what
+    /// is below it; beyond the other sides there is air.
     fn is_full(&self, cell: [i64; 3]) -> bool {
         let count = self.index(cell).map(|at| self.particles[at]);
         count.map_or(cell[1] < 0, |count| count >= FULL)
     }
 
-    /// Of each cell, whether it and the 26 about it are full.
+    /// For each cell, whether it and its 26 neighbours are full.
     fn deep(&self) -> Vec<bool> {
         let is_deep = |index: usize| {
             let cell = self.at(index);
@@ -103,7 +106,8 @@ impl Cells {
         all.into_par_iter().map(is_deep).collect()
     }
 
-    /// Makes each deep cell part of one block: cells from one on and before another, and of each cell its block.
+    /// Divides the deep cells into disjoint blocks. Returns the first and end cells (exclusive) of
+    /// each block, and the block of each cell.
     fn blocks(&self, deep: &[bool]) -> (Vec<[[usize; 3]; 2]>, Vec<u32>) {
         let mut block_of = vec![NONE; deep.len()];
         let mut blocks: Vec<[[usize; 3]; 2]> = Vec::new();
@@ -133,7 +137,7 @@ impl Cells {
         (blocks, block_of)
     }
 
-    /// Metres, of a corner of cells that is counted from the first one.
+    /// Lower corner of a cell, given relative to the first one, in metres.
     fn corner(&self, cell: [usize; 3]) -> [f32; 3] {
         [0, 1, 2].map(|axis| ((cell[axis] as i64 + self.first[axis]) as f64 * self.edge) as f32)
     }
@@ -144,25 +148,27 @@ fn cell(particle: &Particle, edge: f64) -> [i64; 3] {
     place.floor().to_array().map(|c| c as i64)
 }
 
-/// Cells from `low` on and before `high`.
+/// Cells from `low` up to but excluding `high`.
 fn between(low: [usize; 3], high: [usize; 3]) -> impl Iterator<Item = [usize; 3]> {
     let rows = (low[2]..high[2]).flat_map(move |z| (low[1]..high[1]).map(move |y| (y, z)));
     rows.flat_map(move |(y, z)| (low[0]..high[0]).map(move |x| [x, y, z]))
 }
 
-/// What of a frame's water is behind other water.
+/// Water of a frame that is hidden behind other water.
 #[derive(Default)]
 pub(super) struct Hidden {
-    /// Of each particle, whether water hides it: all cells about its own are full of particles.
+    /// For each particle, whether water hides it: its cell and all cells around that are full.
     pub(super) particles: Vec<bool>,
-    /// What stands for these, in no order of depth.
+    /// Blocks that replace the hidden particles, in no order of depth.
     pub(super) blocks: Vec<Block>,
 }
 
 impl Hidden {
-    /// Places are metres from the least corner of a domain of `size`; `spacing` lies between neighbours at rest, metres.
+    /// Finds the hidden particles. Positions are metres from the least corner of a domain of
+    /// `size`; `spacing` is the distance between neighbours at rest, metres.
     ///
-    /// Two spacings of water at least lie between what is hidden and the air, and a splat reaches 1.25 spacings at most.
+    /// At least two spacings of water lie between a hidden particle and the air, and a splat
+    /// reaches 1.25 spacings at most.
     pub(super) fn of(particles: &[Particle], size: DVec3, spacing: f64) -> Self {
         let Some(cells) = Cells::of(particles, size, spacing) else {
             return Self {
@@ -210,8 +216,8 @@ mod tests {
 
     const SIDE: i32 = 24;
 
-    /// A block of so many particles along each side, a spacing of 1 apart and moved by up to a quarter of that, on the ground in the
-    /// middle of a domain; `keep` says which are there.
+    /// Jittered block of `SIDE` particles along each axis with a spacing of 1, on the ground in the
+    /// middle of a domain, filtered by `keep`; the jitter is up to a quarter.
     fn block(keep: impl Fn(DVec3) -> bool) -> (Vec<Particle>, DVec3) {
         let mut seed = 7u32;
         let mut random = || {
@@ -237,7 +243,7 @@ mod tests {
         (particles, DVec3::new(40.0, 40.0, 40.0))
     }
 
-    /// Distance to the air over and beside the block, spacings.
+    /// Distance to the air above and beside the block, spacings.
     fn depth(p: [f32; 3]) -> f64 {
         let p = Vec3::from(p).as_dvec3();
         let sides = (p - 8.0).min(32.0 - p);
@@ -257,7 +263,8 @@ mod tests {
                 .filter_map(of)
                 .collect::<Vec<_>>()
         };
-        // A cell's edge lies between it and the air, and less than two more: at the ground too.
+        // At least a cell's edge, and less than two, lies between a hidden particle and the air, at
+        // the ground too.
         let shallow = particles
             .iter()
             .zip(&found)
@@ -269,7 +276,7 @@ mod tests {
         );
     }
 
-    /// Beyond a side of the domain there is air; cells with half of their particles are not full.
+    /// Air lies beyond the sides of the domain, and half-filled cells are not full.
     #[test]
     fn sides_and_thin_water_hide_nothing() {
         let (mut particles, size) = block(|_| true);
@@ -281,7 +288,7 @@ mod tests {
         let beside = particles.iter().zip(&found).filter(|(p, _)| at_side(p));
         assert!(beside.clone().count() > 1000 && beside.clone().all(|(_, hidden)| !hidden));
         assert!(found.iter().any(|hidden| *hidden));
-        // Of each cell's eight particles four.
+        // Four of the eight particles of each cell.
         let thin = |fewer: bool| {
             let (particles, size) = block(|p| !fewer || (p.x as i32 + p.y as i32) % 2 == 0);
             Hidden::of(&particles, size, 1.0)
@@ -322,7 +329,7 @@ mod tests {
         );
     }
 
-    /// Particles with air may be seen as spray.
+    /// Particles with air may be visible as spray.
     #[test]
     fn what_holds_air_is_not_hidden() {
         let (mut particles, size) = block(|_| true);
@@ -334,7 +341,8 @@ mod tests {
         assert!(found.iter().step_by(5).all(|hidden| !hidden));
     }
 
-    /// Blocks hold each hidden particle once, overlap nowhere, have its volume and go with it.
+    /// Blocks contain each hidden particle exactly once, are disjoint, and have the particles'
+    /// volume and mean velocity.
     #[test]
     fn blocks_stand_for_what_is_hidden() {
         for spacing in [1.0, 0.17] {
@@ -374,7 +382,7 @@ mod tests {
                 assert!((f64::from(block.velocity[0]) - mean).abs() < 1e-5 * mean);
                 assert_eq!(block.velocity[1..], [3.0, 0.0]);
             }
-            // Cells of 8 particles: most are in blocks of many cells.
+            // Cells hold 8 particles, and most cells are in blocks of many.
             let all: u32 = held.iter().map(|(count, _)| count).sum();
             assert!(
                 all > 4000 && held.len() as u32 * 8 * 8 < all,

@@ -1,4 +1,4 @@
-//! Pictures, and the files that hold them.
+//! Pictures and their files.
 
 mod exr_file;
 mod pixels;
@@ -18,45 +18,47 @@ pub use exr_file::{read_exr_attributes, write_exr};
 pub use pixels::{Pixels, read_exr, read_png, write_rgb_png};
 pub use png_file::{png_header, read_png_attributes, write_png, write_png_with_attributes};
 
-/// A picture and the channels beside it; rows from the top.
+/// A picture with its additional channels. Rows begin at the top.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Image {
-    /// Pixels.
+    /// Width in pixels.
     pub width: u32,
-    /// Pixels.
+    /// Height in pixels.
     pub height: u32,
-    /// Where its upper left pixel stands in the image that is shown: before it with overscan, within it with a crop.
+    /// Position of the upper left pixel in the display window, pixels: negative with overscan,
+    /// positive with a crop.
     pub corner: [i32; 2],
-    /// Columns and rows of the image that is shown.
+    /// Columns and rows of the display window.
     pub display: [u32; 2],
-    /// Scene-linear Rec. 709, premultiplied by alpha; `width × height`.
+    /// Scene-linear Rec. 709, premultiplied by alpha; `width × height` pixels.
     pub beauty: Vec<[f32; 4]>,
-    /// What the look asked for.
+    /// Additional channels that the look requests.
     pub aovs: Aovs,
-    /// Parts of the light that the look asked for: as the beauty, without coverage.
+    /// Light components that the look requests, in the units of the beauty and without coverage.
     pub lights: Vec<(LightSpec, Vec<[f32; 3]>)>,
-    /// Which objects each pixel sees, where the look asks for that.
+    /// Cryptomatte layer, where the look requests one.
     pub matte: Option<Matte>,
-    /// From where it was taken; `None` of a picture that no camera took.
+    /// Camera of the picture; `None` for a picture without a camera.
     pub view: Option<View>,
-    /// Of the light in its EXR; in memory it is that of Rec. 709.
+    /// Colour space of the light in the EXR file; in memory the light is always Rec. 709.
     pub exr_space: ColourSpaceSpec,
 }
 
-/// The camera of a picture at the frame's instant, as the standard attributes of OpenEXR have it: matrices row by row, for points
-/// that stand before them as rows (x, y, z, 1).
+/// Camera of a picture at the frame's instant, in the form of OpenEXR's standard attributes:
+/// row-major matrices that row vectors (x, y, z, 1) multiply from the left.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct View {
-    /// To x right, y up, and z towards the viewer; metres.
+    /// From world space to camera space: x right, y up, z towards the viewer; metres.
     pub world_to_camera: [f32; 16],
-    /// To the picture, (0, 0) its upper left corner and (1, 1) the lower right one, once divided by the last coordinate.
+    /// From world space to the picture after division by the last coordinate, with (0, 0) in its
+    /// upper left corner and (1, 1) in the lower right one.
     pub world_to_ndc: [f32; 16],
-    /// Frames a second.
+    /// Frames per second.
     pub frames_per_second: f64,
 }
 
 impl View {
-    /// That of a camera in the world.
+    /// Converts a camera in world space.
     pub fn of(eye: &Eye, frames_per_second: f64) -> Self {
         let [width, height] = eye.size.map(f64::from);
         let (right, up, forward) = (eye.right, eye.up, eye.forward);
@@ -68,7 +70,7 @@ impl View {
         let down = middle[1] * depth - eye.focal / height * camera[1];
         let rows = |columns: [DVec4; 4]| {
             let matrix = DMat4::from_cols_array_2d(&columns.map(|c| c.to_array()));
-            // Columns one after the other, of the transposed matrix, are rows.
+            // The columns of the transposed matrix are the rows.
             matrix.transpose().to_cols_array().map(|x| x as f32)
         };
         Self {
@@ -79,31 +81,32 @@ impl View {
     }
 }
 
-/// Channels beside the picture, at pixel centres and the frame's instant; `None` where not asked for.
+/// Arbitrary output variables, sampled at pixel centres and the frame's instant; `None` where not
+/// requested.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Aovs {
     /// Depth of the first surface along the optical axis, metres; 1e30 in the sky.
     pub z: Option<Vec<f32>>,
-    /// World normal of the first surface; zero in the sky.
+    /// World-space normal of the first surface; zero in the sky.
     pub n: Option<Vec<[f32; 3]>>,
-    /// World position of the first surface, metres; zero in the sky.
+    /// World-space position of the first surface, metres; zero in the sky.
     pub p: Option<Vec<[f32; 3]>>,
-    /// Where the first surface will be in the next frame's picture less where it is, pixels; u points
-    /// right and v up, as compositing programs read it.
+    /// Motion of the first surface to the next frame's picture, pixels; u points right and v up, as
+    /// compositing programs read it.
     pub forward: Option<Vec<[f32; 2]>>,
-    /// Water along the line of sight in front of what is solid, metres.
+    /// Length of water along the line of sight in front of opaque geometry, metres.
     pub thickness: Option<Vec<f32>>,
 }
 
 impl Image {
-    /// A black, transparent picture without AOVs.
+    /// Returns a black, transparent picture without additional channels.
     pub fn new(width: u32, height: u32) -> Self {
         let size = [width, height];
         let corner = [0, 0];
         Self::of(Window { corner, size }, size)
     }
 
-    /// As [`Image::new`], of the pixels of a window of an image of so many columns and rows.
+    /// Like [`Image::new`], for a window of an image with `display` columns and rows.
     pub fn of(window: Window, display: [u32; 2]) -> Self {
         let [width, height] = window.size;
         Self {
@@ -122,7 +125,8 @@ impl Image {
 }
 
 impl Image {
-    /// Beauty of each pixel of the image that is shown: black and transparent where it was not rendered.
+    /// Returns the beauty of every pixel of the display window; pixels that were not rendered are
+    /// black and transparent.
     pub fn shown(&self) -> Cow<'_, [[f32; 4]]> {
         if self.corner == [0; 2] && self.display == [self.width, self.height] {
             return Cow::Borrowed(&self.beauty);
@@ -143,7 +147,7 @@ impl Image {
     }
 }
 
-/// Where a picture comes from; written into its file.
+/// Provenance of a picture, written into its file.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Attributes {
     /// Frame number.
@@ -152,16 +156,16 @@ pub struct Attributes {
     pub shot: String,
     /// Program and version.
     pub software: String,
-    /// Of the scene's physics.
+    /// Hash of the scene's physics.
     pub scene_hash: String,
-    /// Of the cache frame.
+    /// Hash of the cache frame.
     pub cache_hash: String,
-    /// Of the look.
+    /// Hash of the look.
     pub look_hash: String,
 }
 
 impl Attributes {
-    /// Names as they stand in files, with values.
+    /// Names of the attributes in files, with their values.
     fn texts(&self) -> [(&'static str, &str); 5] {
         [
             ("shot", &self.shot),
@@ -184,11 +188,12 @@ impl Attributes {
     }
 }
 
-/// The attributes in the header of a PNG or EXR, by the file's ending; the pixels are not looked at. `None` for a file
-/// of another ending.
+/// Reads the attributes from the header of a PNG or EXR, chosen by the file's extension, without
+/// decoding pixels. Returns `None` for any other extension.
 ///
 /// # Errors
-/// [`RenderError::Write`] or [`RenderError::Format`] where it cannot be opened, or its header is none.
+/// [`RenderError::Write`] or [`RenderError::Format`] if the file cannot be opened or its header is
+/// invalid.
 pub fn read_header(path: &Path) -> Result<Option<Attributes>, RenderError> {
     match path.extension().and_then(|ending| ending.to_str()) {
         Some("png") => png_file::read_png_header(path).map(Some),
@@ -197,7 +202,7 @@ pub fn read_header(path: &Path) -> Result<Option<Attributes>, RenderError> {
     }
 }
 
-/// Writes beside the file and renames, so that a picture that exists is whole.
+/// Writes to a temporary file and renames it, so that a picture that exists is complete.
 fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), RenderError> {
     let fault = |source| RenderError::Write {
         file: path.to_owned(),

@@ -1,4 +1,5 @@
-//! Which particles may be seen in a frame: those beside it cost a splat as much as those in it.
+//! View-frustum culling of particles and blocks: a splat outside the frame costs as much as one
+//! inside.
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -8,24 +9,25 @@ use super::{
     uniform::{Block, Camera, Particle},
 };
 
-/// How far from a particle it may change a pixel, in particle spacings or splat radii, whichever are longer. Puffs and drops of spray
-/// lie less than 5 radii away. A splat reaches 1.3 spacings, and ends where the field of kernels about it does, which reach 2.5 from 1.3
-/// further on; the rest is for neighbours that go another way.
+/// Distance within which a particle may affect a pixel, in particle spacings or splat radii,
+/// whichever is longer. Puffs and drops of spray extend less than 5 radii. A splat reaches 1.3
+/// spacings and ends where the field of kernels around it does: kernels up to 1.3 spacings further
+/// on, with a support of 2.5. The rest is a margin for neighbours that move differently.
 const REACH: f32 = 6.0;
-/// Pixels by which what is small is drawn larger.
+/// Margin in pixels for small splats, which are drawn larger than they are.
 const WIDER: f32 = 8.0;
 
-/// What a camera sees: four planes through the eye, and the one in front of it.
+/// View frustum of a camera: four planes through the eye, and the plane of the eye itself.
 struct View {
     position: Vec3,
-    /// Unit vectors inward.
+    /// Inward unit normals.
     planes: [Vec3; 5],
-    /// From the frame's instant.
+    /// Seconds from the frame's instant.
     seconds: f32,
 }
 
 impl View {
-    /// Of the whole frame, also of what lies about the picture for filters.
+    /// Frustum of the whole padded frame, with the margin that filters need.
     fn of(camera: &Camera) -> Self {
         let [right, up, forward] = [camera.right, camera.up, camera.forward].map(Vec3::from);
         let slope = |axis: usize, pixel: f32| {
@@ -48,15 +50,15 @@ impl View {
         }
     }
 
-    /// What is `reach` about a place at most, metres.
+    /// Whether the camera may see anything within `reach` metres of a point.
     fn sees(&self, place: Vec3, reach: f32) -> bool {
         let from_eye = place - self.position;
         (self.planes.iter()).all(|plane| plane.dot(from_eye) > -reach)
     }
 }
 
-/// Of each particle, whether one of a frame's cameras may see something of it on its path; without `paths` they stand. `spacing` lies
-/// between neighbours at rest, metres.
+/// For each particle, whether one of a frame's cameras may see part of it on its path; without
+/// `paths` particles stay in place. `spacing` is the distance between neighbours at rest, metres.
 pub(super) fn in_frame(
     particles: &[Particle],
     paths: &[Path],
@@ -78,7 +80,7 @@ pub(super) fn in_frame(
         .collect()
 }
 
-/// Those blocks of which one of a frame's cameras may see something.
+/// Keeps the blocks of which one of a frame's cameras may see a part.
 pub(super) fn blocks_in_frame(mut blocks: Vec<Block>, cameras: &[Camera]) -> Vec<Block> {
     let views: Vec<View> = cameras.iter().map(View::of).collect();
     let radius = cameras
@@ -111,10 +113,11 @@ mod tests {
     use swell_scene::look::Look;
 
     const SPACING: f32 = 0.1;
-    /// What a particle needs: a splat's 1.3 spacings, as far to the end of the field about it, and the 2.5 of a kernel there.
+    /// Reach that a particle needs: a splat's 1.3 spacings, another 1.3 to the end of the field
+    /// around it, and the kernel support of 2.5 there.
     const NEEDED: f32 = 5.1 * SPACING;
 
-    /// One that looks along x from a step aside, `instant` frames from the frame itself.
+    /// Camera that looks along x, slightly off axis, `instant` frames from the frame itself.
     fn looks_along_x(instant: f64) -> Camera {
         let text = "[camera]\nfocal_length_mm = 36.0\nposition = [0.0, 1.0, 0.0]\ntarget = [1.0, 0.9, 0.2]\n\
                     [image]\nwidth = 160\nheight = 90\n[sky]\nmodel = \"hosek_wilkie\"\n";
@@ -141,7 +144,7 @@ mod tests {
         }
     }
 
-    /// Whether a place lies in the padded frame, as `project` of camera.wgsl has it.
+    /// Whether a point projects into the padded frame, as `project` of camera.wgsl computes it.
     fn is_drawn(camera: &Camera, place: Vec3) -> bool {
         let d = place - Vec3::from(camera.position);
         let [x, y, z] = [camera.right, camera.up, camera.forward].map(|axis| d.dot(axis.into()));
@@ -153,7 +156,8 @@ mod tests {
         z > 0.0 && is_in(0) && is_in(1)
     }
 
-    /// Nothing that a particle that was left out needs is in the frame; and of the particles about it most are left out.
+    /// Nothing within the required reach of a culled particle is in the frame, and most particles
+    /// are culled.
     #[test]
     fn what_is_left_out_changes_no_pixel() {
         let camera = looks_along_x(0.0);
@@ -166,7 +170,8 @@ mod tests {
             .map(|_| at(6.0 * Vec3::new(random(), random(), random())))
             .collect();
         let found = in_frame(&particles, &[], &[camera], SPACING);
-        // How many of those left out have a place in the frame, within so many times what they need.
+        // Number of culled particles with a point in the frame within `factor` times the required
+        // reach.
         let mut wrong = |factor: f32| {
             let left_out = particles.iter().zip(&found).filter(|(_, is_in)| !**is_in);
             let reaches = left_out.filter(|(particle, _)| {
@@ -179,19 +184,20 @@ mod tests {
             reaches.count()
         };
         assert_eq!(wrong(1.0), 0);
-        // The control: of what needs twice as much, the particles between 0.6 and 1.02 metres off, a fiftieth of all would be missed.
+        // Control: at twice the reach, about a fiftieth of all particles, those between 0.6 and
+        // 1.02 metres off, would be missed.
         let missed = wrong(2.0);
         assert!(missed > particles.len() / 80, "{missed}");
         let left_out = found.iter().filter(|is_in| !**is_in).count();
         assert!((2500..3800).contains(&left_out), "{left_out}");
     }
 
-    /// One that comes into the frame within the shutter's time belongs to it.
+    /// A particle that enters the frame within the shutter's time is kept.
     #[test]
     fn a_path_into_the_frame_counts() {
         let cameras = [looks_along_x(0.0), looks_along_x(0.5)];
         let away = at(Vec3::new(-3.0, 1.0, 0.0));
-        // Ten metres ahead in half a frame.
+        // Ten metres in half a frame.
         let path = Path::straight(Vec3::X * 10.0 * 48.0);
         let found = |paths: &[Path], cameras: &[Camera]| in_frame(&[away], paths, cameras, SPACING);
         assert_eq!(found(&[path], &cameras), [true]);
@@ -199,7 +205,8 @@ mod tests {
         assert_eq!(found(&[], &cameras), [false]);
     }
 
-    /// A block of which any place is in the frame is kept, most others are not; one that comes into it within the shutter's time is.
+    /// Every block with a point in the frame is kept and most others are culled; a block that
+    /// enters the frame within the shutter's time is kept.
     #[test]
     fn blocks_that_are_left_out_are_in_no_pixel() {
         let cameras = [looks_along_x(0.0), looks_along_x(0.5)];
@@ -223,7 +230,7 @@ mod tests {
             kept += usize::from(is_kept);
             drawn += usize::from(is_drawn);
         }
-        // Their diagonal is 2.8 m: about those that are drawn some others are kept.
+        // Blocks have a diagonal of 2.8 m, so some near the frame are kept too.
         assert!(
             drawn > 200 && kept < 2 * drawn && kept < 1400,
             "{drawn} {kept}"

@@ -1,10 +1,12 @@
-//! Screen-space fluid rendering: particles to a picture.
+//! Screen-space fluid rendering: from particles to a picture.
 //!
-//! A frame is drawn from a [`Moment`]: its particles, and those of the frames around it. A sample of the picture: solids are drawn; particles are splatted as spheres into an eye-space depth
-//! and a thickness, to which the water behind them adds, in blocks; the depth is smoothed by curvature flow or the narrow-range filter; normals are
-//! differences of it; every pixel is shaded from what the water mirrors and what it lets through. Samples
-//! differ in their place in the pixel and in their instant within the shutter; linear radiance is
-//! averaged, depths never are.
+//! A frame is drawn from a [`Moment`]: its particles and those of the frames around it. For each
+//! sample of the picture, solids are rasterised; particles are splatted as spheres into eye-space
+//! depth and thickness, and blocks add the thickness of the water behind them; curvature flow or
+//! the narrow-range filter smooths the depth; normals are differences of the depth; and each pixel
+//! is shaded from the light that the water reflects and transmits. Samples differ in their position
+//! within the pixel and in their instant within the shutter. Their linear radiance is averaged;
+//! depths never are.
 
 mod aeration;
 mod buffers;
@@ -56,69 +58,69 @@ pub use plan::{Limits, Plan, Runs};
 pub use renderer::{Part, Renderer};
 pub use uniform::mirrors;
 
-/// What of a scene a picture needs beside the particles.
+/// Scene data that a picture needs besides the particles.
 #[derive(Clone, Debug)]
 pub struct RenderScene {
-    /// Where the coordinates of domain, solids and particles have their zero in the world of the look, metres.
+    /// Origin of the coordinates of domain, solids and particles in the look's world space, metres.
     pub origin: DVec3,
-    /// The box that holds the water, metres; its least y is the ground's height.
+    /// Box that contains the water, metres; its least y is the ground's height.
     pub domain: Bounds,
-    /// World space, metres.
+    /// Meshes of the solids in world space, metres.
     pub solids: Vec<TriangleMesh>,
-    /// Parts of each of `solids`; nothing where the look names no materials.
+    /// Named parts of each mesh of `solids`; empty where the look names no materials.
     pub parts: Vec<SolidParts>,
-    /// d, metres.
+    /// Particle spacing d, metres.
     pub particle_spacing: f64,
-    /// Frames a second, which turns the shutter and velocities into metres.
+    /// Frames per second, which relate the shutter to seconds.
     pub frames_per_second: f64,
-    /// m/s².
+    /// Gravity, m/s².
     pub gravity: DVec3,
-    /// Walls that make waves, and how far inward of the domain's side each stands, metres.
+    /// Wave-making walls, with the distance of each inward from the domain's side, metres.
     pub wave_makers: Vec<(Wall, f64)>,
-    /// Waves that come in from the sea.
+    /// Waves that enter from the open sea.
     pub waves: Option<OpenWaves>,
 }
 
-/// What materials are told by.
+/// Names and parts of a solid, by which the look assigns materials.
 #[derive(Clone, Debug)]
 pub struct SolidParts {
-    /// The name of the mesh's file without the ending.
+    /// Name of the mesh's file without its extension.
     pub name: String,
-    /// Of its triangles.
+    /// Parts to which the mesh's triangles belong.
     pub parts: Parts,
-    /// Where it stands.
+    /// Current pose of the solid.
     pub pose: Pose,
 }
 
 impl RenderScene {
-    /// The domain's longer side on the ground, metres: what lies about the water has its lengths from it.
+    /// Longer horizontal side of the domain, metres; lengths of the surroundings scale with it.
     fn extent(&self) -> f64 {
         let size = self.domain.size();
         size.x.max(size.z)
     }
 }
 
-/// Why there is no picture.
+/// Reason why a picture cannot be rendered, read or written.
 #[derive(Debug, thiserror::Error)]
 pub enum RenderError {
-    /// The device.
+    /// The GPU failed.
     #[error(transparent)]
     Gpu(#[from] GpuError),
-    /// The sky panorama.
+    /// The sky panorama cannot be used.
     #[error("sky panorama: {0}")]
     Panorama(String),
-    /// A material of the look.
+    /// A material of the look cannot be used.
     #[error("material {index}: {problem}")]
     Material {
-        /// Which of the look's.
+        /// Index in the look's materials.
         index: usize,
-        /// What is wrong.
+        /// Description of the problem.
         problem: String,
     },
-    /// A scene that cannot be drawn.
+    /// The scene cannot be drawn.
     #[error("render scene: {0}")]
     Scene(String),
-    /// Screen space has no second side of the surface.
+    /// The camera is under water, and the screen-space method knows the surface only from above.
     #[error(
         "frame {frame}: the camera is under water, which method \"ssfr\" cannot draw: set [renderer] method = \"ray\""
     )]
@@ -126,28 +128,28 @@ pub enum RenderError {
         /// Frame number.
         frame: u32,
     },
-    /// A particle whose position or velocity is not a number.
+    /// A particle's position or velocity is not finite.
     #[error("particle {index} of frame {frame} has a position or velocity that is not finite")]
     NotFinite {
-        /// Place in the frame.
+        /// Index of the particle in the frame.
         index: usize,
         /// Frame number.
         frame: u32,
     },
-    /// A picture file could not be written.
+    /// A picture file could not be opened or written.
     #[error("{}: {source}", file.display())]
     Write {
-        /// Which.
+        /// Path of the file.
         file: PathBuf,
-        /// The system's words.
+        /// Error of the operating system.
         source: std::io::Error,
     },
     /// A picture file could not be encoded or decoded.
     #[error("{}: {message}", file.display())]
     Format {
-        /// Which.
+        /// Path of the file.
         file: PathBuf,
-        /// The library's words.
+        /// Message of the image library.
         message: String,
     },
 }

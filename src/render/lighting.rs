@@ -1,4 +1,4 @@
-//! What the shading pass is given: the look as a uniform, the sky as a texture.
+//! Inputs of the shading pass: the look as a uniform and the sky as a texture.
 
 use super::RenderScene;
 use super::plan::Plan;
@@ -7,8 +7,8 @@ use super::uniform;
 use swell_gpu::texture::{SamplerSpec, TextureSpec};
 use swell_scene::look::{Look, LookSpec, SkySpec};
 
-/// How far off its face a point is whose shadow is looked up, over the domain's longer side on the ground: about three texels of the
-/// shadow map, which holds a little more than the domain.
+/// Offset along the normal of a shadow lookup, relative to the domain's longer horizontal side:
+/// about three texels of the shadow map, which covers little more than the domain.
 const SHADOW_OFFSET: f64 = 0.0016;
 
 pub(super) fn shading(
@@ -21,7 +21,7 @@ pub(super) fn shading(
     let sun = look.sun_direction();
     let colour = |c: [f64; 3]| c.map(|x| x as f32);
     let index = spec.water.index;
-    // Snell: the cosine of the sunlight's way through flat water.
+    // Snell: cosine of the sunlight's direction in flat water.
     let sun_cosine = (1.0 - (1.0 - sun.y * sun.y) / (index * index)).sqrt();
     let ripple = spec.surface.ripple.as_ref();
     let windows = spec.solids.windows.as_ref();
@@ -41,7 +41,7 @@ pub(super) fn shading(
         ripple: ripple.map_or([0.0; 2], |r| [r.wavelength_m as f32, r.slope as f32]),
         windows: windows.map_or([0.0; 2], |w| [w.storey_m as f32, w.bay_m as f32]),
         window_lit: windows.map_or(0.0, |w| w.lit as f32),
-        // A lit room beside a street at dusk: some percent of the reference light.
+        // Radiance of a lit room beside a street at dusk: some percent of the reference light.
         window_radiance: 0.06,
         background: if spec.output.background { 1.0 } else { 0.0 },
         disc: sky.disc,
@@ -54,7 +54,7 @@ pub(super) fn shading(
     }
 }
 
-/// Says to the passes that shade which of ripples and windows the look has.
+/// Defines `RIPPLES` and `WINDOWS` in the shading passes where the look has them.
 pub(super) fn plan_details(plan: &mut Plan, look: &Look, passes: &[&'static str]) {
     let spec = look.spec();
     for pass in passes {
@@ -67,7 +67,7 @@ pub(super) fn plan_details(plan: &mut Plan, look: &Look, passes: &[&'static str]
     }
 }
 
-/// Metres of air after which 63 % of the contrast are gone.
+/// Distance in metres at which air has removed 63 % of the contrast.
 fn haze(spec: &LookSpec) -> f64 {
     match spec.sky {
         SkySpec::HosekWilkie {
@@ -79,7 +79,7 @@ fn haze(spec: &LookSpec) -> f64 {
     }
 }
 
-/// Optical density, 1/m, of what stands in the sums of spray: of the look's own, else of its whitewater.
+/// Optical density of the spray sums, 1/m: that of the look's spray, else that of its whitewater.
 pub(super) fn spray_density(look: &Look) -> f64 {
     let own = look
         .spec()
@@ -91,7 +91,7 @@ pub(super) fn spray_density(look: &Look) -> f64 {
     own.or(white).unwrap_or(0.0)
 }
 
-/// Plans the textures and samplers that light comes from, but for the shadow map itself.
+/// Plans the textures and samplers of light, except the shadow map itself.
 pub(super) fn plan_light(plan: &mut Plan, sky: &Sky) {
     let spec = TextureSpec {
         name: "sky".into(),

@@ -1,4 +1,5 @@
-//! Materials on the scene's solids: which part has which, and how its picture lies on each triangle.
+//! Materials of the scene's solids: which part has which material, and how its texture maps to each
+//! triangle.
 
 use std::collections::HashMap;
 
@@ -17,49 +18,52 @@ use swell_domain::{mesh_file::parts::Places, pose::Pose};
 use swell_gpu::texture::TextureSpec;
 use swell_scene::look::{Look, Material as LookMaterial, Materials, Picture, Texture};
 
-/// Materials that solids of a picture have, at most: a uniform of common size has room for so many.
+/// Largest number of materials on the solids of a picture, bounded by the usual size of a uniform
+/// buffer.
 const MOST_MATERIALS: usize = 256;
 
-/// Texels of a row of the texture that holds all pictures one after the other: a power of two, so that shaders shift and do not divide.
+/// Texels per row of the texture that holds all pictures in sequence; a power of two, so that
+/// shaders shift instead of dividing.
 const ROW: usize = 1 << 12;
 
-/// What the solids of a scene are painted with.
+/// Materials and texture mappings of a scene's solids.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Painted {
-    /// Materials that a part has, in the order in which they were met.
+    /// Materials in use, in the order in which they were first met.
     pub(super) materials: Vec<Material>,
-    /// How pictures lie on triangles: words of a [`Triangle`], as materials.wgsl tells.
+    /// Texture mappings, stored as words of a [`Triangle`] as materials.wgsl describes.
     pub(super) places: Vec<Triangle>,
-    /// For each of `materials` its number among the look's.
+    /// Index of each of `materials` among the look's materials.
     used: Vec<usize>,
 }
 
-/// Paints the triangles of a scene.
+/// Assigns materials to the triangles of a scene.
 pub(super) struct Painter<'a> {
     look: &'a Materials,
     scene: &'a RenderScene,
-    /// For each of the look's materials its number among those used, from 1 on.
+    /// For each of the look's materials, its number among those in use, counted from 1.
     numbers: Vec<Option<u32>>,
-    /// Whether a part has the name of each of the look's materials.
+    /// For each of the look's materials, whether a part has its name.
     is_named: Vec<bool>,
     painted: Painted,
 }
 
-/// A material, an axis along which a face looks, and whether the other way.
+/// A material, the axis that a face's normal follows most closely, and whether the normal points in
+/// its negative direction.
 pub(super) type Side = (usize, usize, bool);
 
-/// Paints the triangles of a solid.
+/// Assigns materials to the triangles of one solid.
 pub(super) struct SolidPainter<'p, 'a> {
     painter: &'p mut Painter<'a>,
     solid: &'a SolidParts,
-    /// For each part of the mesh the look's material.
+    /// Index of the look's material for each part of the mesh.
     of: Vec<Option<usize>>,
-    /// Records of pictures laid on along axes, by material and side.
+    /// Mappings along coordinate axes, by material and side.
     along: HashMap<Side, u32>,
 }
 
 impl<'a> Painter<'a> {
-    /// `None` where the look names no materials.
+    /// Returns `None` where the look names no materials.
     pub(super) fn new(look: &'a Look, scene: &'a RenderScene) -> Result<Option<Self>, RenderError> {
         let Some(look) = look.materials() else {
             return Ok(None);
@@ -80,7 +84,7 @@ impl<'a> Painter<'a> {
         }))
     }
 
-    /// For one of the scene's solids.
+    /// Starts one of the scene's solids.
     pub(super) fn solid(&mut self, index: usize) -> Result<SolidPainter<'_, 'a>, RenderError> {
         let solid = &self.scene.parts[index];
         let triangles = self.scene.solids[index].triangles.len();
@@ -102,7 +106,7 @@ impl<'a> Painter<'a> {
         })
     }
 
-    /// The material of the first of these names that has one.
+    /// Material of the first name that has one, else the default material of solids.
     fn find<'n>(&mut self, names: impl Iterator<Item = &'n String>) -> Option<usize> {
         let mut found = None;
         for name in names {
@@ -139,7 +143,8 @@ impl<'a> Painter<'a> {
         Ok(number)
     }
 
-    /// Material and records of a face of the look's walls that looks along `axis`; `None` of one colour. `along` has the records of before.
+    /// Material and mapping of a face of the look's walls; `None` where walls have a plain colour.
+    /// `along` keeps the mappings of earlier faces.
     pub(super) fn paint_wall(
         &mut self,
         corners: [DVec3; 3],
@@ -153,7 +158,7 @@ impl<'a> Painter<'a> {
         Ok(Some([paint, place]))
     }
 
-    /// The record of a material whose picture is laid on along axes, on a face of something that stands at a pose.
+    /// Mapping along coordinate axes of a material's texture on a face of an object at a pose.
     fn lay_along(
         &mut self,
         index: usize,
@@ -162,7 +167,7 @@ impl<'a> Painter<'a> {
         along: &mut HashMap<Side, u32>,
     ) -> u32 {
         let pose = pose.moved(-self.scene.domain.min);
-        // As it stood at the start.
+        // Normal in the object's initial pose.
         let normal = pose.turn.conjugate() * (b - a).cross(c - a);
         let size = normal.abs();
         let axis = match () {
@@ -180,7 +185,8 @@ impl<'a> Painter<'a> {
         let [width, height] = self.look.pictures[texture.picture].size.map(f64::from);
         let (right, up) = sides(axis, is_low);
         let gradients = [right / metres, -up / (metres * height / width)];
-        // In the world, so that meshes that touch go on in one another; what moves takes its picture along.
+        // The mapping begins at the world's origin, so that it continues across meshes that touch;
+        // moving objects carry it along.
         let corner = self.scene.origin + self.scene.domain.min;
         let starts = gradients.map(|it| it.dot(corner));
         let gradients = gradients.map(|it| pose.turn * it);
@@ -195,8 +201,8 @@ impl<'a> Painter<'a> {
         places.len() as u32 - 1
     }
 
-    /// What was painted. A name of the look's own that no part has is a fault, and so is a library of which none has one; not where
-    /// there are no solids.
+    /// Finishes and returns the result. It is an error if no part has the name of one of the look's
+    /// own materials, or of any material of a library, unless the scene has no solids.
     pub(super) fn end(self) -> Result<Painted, RenderError> {
         if self.scene.solids.is_empty() {
             return Ok(self.painted);
@@ -243,7 +249,8 @@ impl<'a> Painter<'a> {
 }
 
 impl SolidPainter<'_, '_> {
-    /// Material and record of triangle `k`, whose corners are metres from the domain's least corner; zeros where it has the look's colour.
+    /// Material and mapping of triangle `k`, whose corners are in metres from the domain's least
+    /// corner; zeros where it has the look's colour.
     pub(super) fn paint(&mut self, k: usize, corners: [DVec3; 3]) -> Result<[u32; 2], RenderError> {
         let Some(index) = self.of[self.solid.parts.of[k] as usize] else {
             return Ok([0; 2]);
@@ -275,8 +282,8 @@ impl SolidPainter<'_, '_> {
     }
 }
 
-/// Where a picture's right and upper sides are on a face that looks along an axis, seen from before it; on level faces its upper side is
-/// along -z.
+/// Directions of a picture's right and upper sides on a face whose normal follows an axis, seen
+/// from in front; on level faces the upper side points along -z.
 fn sides(axis: usize, is_low: bool) -> (DVec3, DVec3) {
     let sign = if is_low { -1.0 } else { 1.0 };
     match axis {
@@ -286,7 +293,8 @@ fn sides(axis: usize, is_low: bool) -> (DVec3, DVec3) {
     }
 }
 
-/// A record: how fast both coordinates of a picture change, rows from the top, and what they are at a place.
+/// Texture mapping: the gradients of both coordinates, with rows counted from the top, and their
+/// values at a point.
 fn lie([a, b]: [DVec3; 2], starts: [f64; 2], at: DVec3) -> Triangle {
     let [u, v] = starts.map(|start| (start - start.floor()) as f32);
     Triangle {
@@ -299,7 +307,8 @@ fn lie([a, b]: [DVec3; 2], starts: [f64; 2], at: DVec3) -> Triangle {
     }
 }
 
-/// As a mesh's texture coordinates say: they are linear over the triangle, so that their gradients within its plane give them anywhere.
+/// Mapping from a mesh's texture coordinates. They are linear over the triangle, so their gradients
+/// in its plane give them everywhere.
 fn lie_by(places: Places, texture: &Texture, [a, b, c]: [DVec3; 3]) -> Triangle {
     let place = |k: usize| {
         let axis =
@@ -319,7 +328,8 @@ fn lie_by(places: Places, texture: &Texture, [a, b, c]: [DVec3; 3]) -> Triangle 
     lie([gradient(0), gradient(1)], first, a)
 }
 
-/// Plans materials and their pictures in the passes that shade; nothing where the look names none.
+/// Plans materials and their textures in the shading passes; does nothing where the look names no
+/// materials.
 pub(super) fn plan_materials(
     plan: &mut Plan,
     look: &Look,
@@ -370,7 +380,8 @@ pub(super) fn plan_materials(
     Ok(())
 }
 
-/// A picture in linear light, and versions of half its size down to one texel, each the mean of the picture's areas.
+/// Mip levels of a picture in linear light, down to one texel; each level halves the size and holds
+/// area means.
 fn levels_of(picture: &Picture) -> Vec<Vec<[f16; 4]>> {
     let linear: Vec<f32> = (0..=255)
         .map(|code| linear(f64::from(code) / 255.0) as f32)
@@ -391,7 +402,7 @@ fn levels_of(picture: &Picture) -> Vec<Vec<[f16; 4]>> {
     levels
 }
 
-/// IEC 61966-2-1.
+/// Decodes sRGB (IEC 61966-2-1).
 fn linear(code: f64) -> f64 {
     match code <= 0.04045 {
         true => code / 12.92,
@@ -399,7 +410,7 @@ fn linear(code: f64) -> f64 {
     }
 }
 
-/// Means over areas: where a side is odd, texels are shared.
+/// Downsamples by area means; odd sides share texels between means.
 fn shrunk(texels: &[[f32; 3]], from: [usize; 2], to: [usize; 2]) -> Vec<[f32; 3]> {
     let parts = |axis: usize, k: usize| {
         let ratio = from[axis] as f64 / to[axis] as f64;
@@ -459,7 +470,7 @@ mod tests {
                 "{before} {after}"
             );
         }
-        // The control: without shared texels the last columns would be lost.
+        // Control: without shared texels the last columns would be lost.
         let cut: Vec<[f32; 3]> = (0..35).filter(|k| k % 7 < 6).map(|k| texels[k]).collect();
         assert!((mean(&cut, 0) - mean(&texels, 0)).abs() > 0.1);
     }
@@ -487,7 +498,7 @@ mod tests {
             let expected = [2.0 * place[0] + 0.25, 1.0 - 3.0 * place[1]];
             let found = [at(lie.material, lie.a), at(lie.paint, lie.b)];
             for (found, expected) in found.iter().zip(expected) {
-                // Up to whole pictures.
+                // Equal up to whole repetitions of the picture.
                 let off = found - expected;
                 assert!((off - off.round()).abs() < 1e-5, "{found} {expected}");
             }

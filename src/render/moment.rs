@@ -1,4 +1,4 @@
-//! What a picture of a frame is made from: its particles, and those of the frames around it.
+//! Input of a frame's picture: its particles and those of the frames around it.
 
 use std::{borrow::Cow, sync::OnceLock};
 
@@ -6,20 +6,20 @@ use super::neighbors;
 use swell_domain::particles::Particles;
 use swell_scene::look::{AovSpec, Look};
 
-/// Frames on either side that the membership of a particle is made steady over.
+/// Number of frames on either side over which the classification of particles is filtered.
 pub const REACH: u32 = 2;
 
-/// A frame's particles, with what is found out about them once.
+/// Particles of a frame, with lazily computed properties.
 #[derive(Debug, Default)]
 pub struct Water {
-    /// As they stand in the cache.
+    /// Particles as the cache stores them.
     pub particles: Particles,
-    /// Weight of each one's neighbours.
+    /// Weight of each particle's neighbours.
     weights: OnceLock<Vec<f32>>,
 }
 
 impl Water {
-    /// Of these particles.
+    /// Creates the water of a frame from its particles.
     pub fn new(particles: Particles) -> Self {
         Self {
             particles,
@@ -27,27 +27,29 @@ impl Water {
         }
     }
 
-    /// Weight of each one's neighbours; `spacing` is always the bake's.
+    /// Weight of each particle's neighbours. The first call determines `spacing`, which is always
+    /// that of the bake.
     pub(super) fn weights(&self, spacing: f32) -> &[f32] {
         self.weights
             .get_or_init(|| neighbors::weights(&self.particles.position, spacing))
     }
 }
 
-/// What a picture is made from. Frames that are left out change how blur and spray are drawn, as
-/// [`frames_around`] says; they are all the same whatever was drawn before.
+/// Water and whitewater from which a picture is made. Missing neighbouring frames change blur and
+/// spray, as [`frames_around`] says. The result does not depend on what was drawn before.
 #[derive(Clone, Copy, Debug)]
 pub struct Moment<'a> {
-    /// The frame's own water.
+    /// Water of the frame itself.
     pub water: &'a Water,
-    /// That of the frames 2 and 1 before it, and 1 and 2 after it; `None` where there is none.
+    /// Water of the frames 2 and 1 before, and 1 and 2 after; `None` for a frame that does not
+    /// exist.
     pub around: [Option<&'a Water>; 2 * REACH as usize],
     /// Spray, foam and bubbles of the frame.
     pub white: &'a Particles,
 }
 
 impl<'a> Moment<'a> {
-    /// Of a frame of which nothing else is known.
+    /// Creates a moment without neighbouring frames.
     pub fn alone(water: &'a Water, white: &'a Particles) -> Self {
         Self {
             water,
@@ -56,15 +58,15 @@ impl<'a> Moment<'a> {
         }
     }
 
-    /// The frames just before and just after it.
+    /// Particles of the frames just before and just after.
     pub(super) fn beside(&self) -> [Option<&'a Particles>; 2] {
         let [_, before, after, _] = self.around;
         [before, after].map(|it| it.map(|it| &it.particles))
     }
 }
 
-/// On how many sides of a frame, and how far, a look's pictures take the frames around it into account: one for motion blur and
-/// `forward`, two for spray, none otherwise.
+/// Number of frames on each side of a frame that a look's pictures depend on: two for spray, one
+/// for motion blur and `forward`, otherwise none.
 pub fn frames_around(look: &Look) -> u32 {
     let spec = look.spec();
     if spec.water.spray.is_some() {
@@ -74,10 +76,10 @@ pub fn frames_around(look: &Look) -> u32 {
     }
 }
 
-/// Which particle has which id.
+/// Index from ids to positions of particles.
 pub(super) struct Ids<'a> {
     ids: Cow<'a, [u32]>,
-    /// Places in the order of ids; `None` where that is their own.
+    /// Positions in the order of ids; `None` where the ids are sorted already.
     order: Option<Vec<u32>>,
 }
 
@@ -100,11 +102,11 @@ impl<'a> Ids<'a> {
         self.ids[place]
     }
 
-    /// Where the particle of an id is.
+    /// Position of the particle with an id.
     pub(super) fn find(&self, id: u32) -> Option<usize> {
         match &self.order {
             None => {
-                // Ids are numbers in a row where no particle was added or lost.
+                // Ids are consecutive where no particle was added or removed.
                 let first = self.ids.first()?;
                 let place = id.wrapping_sub(*first) as usize;
                 match self.ids.get(place) == Some(&id) {
@@ -124,7 +126,7 @@ impl<'a> Ids<'a> {
 mod tests {
     use super::*;
 
-    /// Ids in a row, with gaps, and in no order.
+    /// Ids that are consecutive, with gaps, and unsorted.
     #[test]
     fn each_id_is_found_and_no_other() {
         for ids in [

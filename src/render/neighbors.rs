@@ -1,4 +1,4 @@
-//! How much of a neighbourhood a particle has.
+//! Weights of particles' neighbourhoods.
 
 use std::ops::Range;
 
@@ -7,18 +7,19 @@ use rayon::prelude::*;
 
 use swell_domain::lanes::{LANES, widely};
 
-/// Distances, in spacings, over which a neighbour stops counting: half of it is left at two.
+/// Distances, in spacings, between which a neighbour's weight falls from 1 to 0; it is one half at
+/// two.
 const NEAR: [f32; 2] = [1.5, 2.5];
-/// Weight beyond which no more neighbours are looked for.
+/// Largest weight; the search for neighbours stops there.
 const ENOUGH: f32 = 32.0;
 
-/// 0 up to `low`, 1 from `high` on, and steadily between.
+/// Smooth Hermite step: 0 up to `low`, 1 from `high` on.
 pub(super) fn smoothstep(low: f32, high: f32, x: f32) -> f32 {
     let t = ((x - low) / (high - low)).clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)
 }
 
-/// What neighbours of each particle weigh in all, at most [`ENOUGH`].
+/// Sum of the weights of each particle's neighbours, at most [`ENOUGH`].
 pub(super) fn weights(positions: &[[f32; 3]], spacing: f32) -> Vec<f32> {
     let span = NEAR.map(|part| part * spacing);
     let reach = span[1];
@@ -34,7 +35,7 @@ pub(super) fn weights(positions: &[[f32; 3]], spacing: f32) -> Vec<f32> {
         let of = |&(_, index): &([i32; 3], u32)| positions[index as usize][axis];
         order.par_iter().map(of).collect::<Vec<f32>>()
     });
-    // A cell's particles have the same others about them.
+    // All particles of a cell share the same candidates.
     let found: Vec<f32> = order
         .par_chunk_by(|a, b| a.0 == b.0)
         .flat_map_iter(|own| {
@@ -57,14 +58,16 @@ pub(super) fn weights(positions: &[[f32; 3]], spacing: f32) -> Vec<f32> {
     weights
 }
 
-/// Lanes after which it is asked whether that is enough: about as many as water at rest has about a cell.
+/// Number of SIMD batches between tests for an early end; about as many as hold the particles
+/// around a cell of water at rest.
 const OFTEN: usize = 64;
 
-/// Places of a cell and about it, an axis each, filled up to whole lanes with some that weigh nothing.
+/// Positions in and around a cell, one list per axis, padded to whole SIMD lanes with positions of
+/// zero weight.
 struct About([Vec<f32>; 3]);
 
 impl About {
-    /// Of a cell and the 26 about it; `sorted` are in the order of cells.
+    /// Gathers the positions of a cell and its 26 neighbours; `sorted` is in the order of cells.
     fn cell(cell: [i32; 3], order: &[([i32; 3], u32)], sorted: &[Vec<f32>; 3]) -> Self {
         let columns = columns(order, cell);
         let count = columns.iter().map(Range::len).sum::<usize>();
@@ -80,7 +83,8 @@ impl About {
     }
 }
 
-/// What those about a place weigh: 1 up to the first distance of the span, and nothing from the second on.
+/// Sums the weights of candidates around a point: 1 up to the first distance of the span, 0 from
+/// the second on.
 struct Weigh<'a> {
     about: &'a About,
     place: [f32; 3],
@@ -96,7 +100,7 @@ impl WithSimd for Weigh<'_> {
         let scale = 1.0 / (reach - near);
         let mut sums = [0.0; LANES];
         let weight = |sums: &[f32; LANES]| {
-            // It is no neighbour of its own.
+            // Subtracts the particle's own weight.
             (sums.iter().sum::<f32>() - 1.0).min(ENOUGH)
         };
         let [xs, ys, zs] = (self.about.0)
@@ -109,7 +113,7 @@ impl WithSimd for Weigh<'_> {
                 let t = ((square.sqrt() - near) * scale).clamp(0.0, 1.0);
                 sums[lane] += 1.0 - t * t * (3.0 - 2.0 * t);
             }
-            // Among a clump of particles each would look at all of them.
+            // In a dense clump, each particle would otherwise visit all others.
             if k % OFTEN == OFTEN - 1 && weight(&sums) >= ENOUGH {
                 return ENOUGH;
             }
@@ -118,7 +122,7 @@ impl WithSimd for Weigh<'_> {
     }
 }
 
-/// Where in `order` the particles of the nine columns of three cells about a cell stand.
+/// Ranges in `order` of the particles of the nine columns, of three cells each, around a cell.
 fn columns(order: &[([i32; 3], u32)], [x, y, z]: [i32; 3]) -> [Range<usize>; 9] {
     std::array::from_fn(|k| {
         let [x, y] = [x - 1 + k as i32 / 3, y - 1 + k as i32 % 3];
@@ -154,7 +158,7 @@ mod tests {
                     1.0 - t * t * (3.0 - 2.0 * t)
                 })
                 .sum();
-            // A dozen terms of f32.
+            // Sums of about a dozen f32 terms.
             assert!(
                 (f64::from(weight) - all.min(32.0)).abs() < 1e-4,
                 "{weight} {all}"
@@ -164,23 +168,24 @@ mod tests {
         assert!(least < 32.0, "none was counted to its end");
     }
 
-    /// Of a clump no particle looks at all the others: with as many in one place as would take hours otherwise.
+    /// In a dense clump no particle visits all the others, which would take hours with this many.
     #[test]
     fn a_clump_is_heavy_and_soon_weighed() {
         let clump = vec![[0.5f32; 3]; 400_000];
         assert!(weights(&clump, 0.1).iter().all(|&weight| weight == ENOUGH));
-        // The control: a few in one place are told apart from enough.
+        // Control: fewer than enough at one position are counted exactly.
         assert_eq!(weights(&clump[..20], 0.1), [19.0; 20]);
     }
 
-    /// A lattice's bulk and half space weigh what their neighbours within two spacings are, 32 and 20, to a tenth.
+    /// In a lattice's bulk and half space, weights are within a tenth of the numbers of neighbours
+    /// within two spacings, 32 and 20.
     #[test]
     fn weights_are_numbers_of_neighbours() {
         let lattice: Vec<[f32; 3]> = (0..1000)
             .map(|i| [i % 10, i / 10 % 10, i / 100].map(|x| x as f32 * 0.1))
             .collect();
         let found = weights(&lattice, 0.1);
-        // In the middle, and in the middle of a face.
+        // Particles in the middle of the bulk and in the middle of a face.
         let (bulk, surface) = (found[555], found[55]);
         assert!((28.8..=32.0).contains(&bulk), "{bulk}");
         assert!((18.0..=22.0).contains(&surface), "{surface}");

@@ -1,4 +1,5 @@
-//! What is opaque: the scene's solids and wave makers, and the look's quay walls, as triangles with materials.
+//! Opaque geometry: the scene's solids and wave makers and the look's quay walls, as triangles with
+//! materials.
 
 use std::collections::HashMap;
 
@@ -13,30 +14,32 @@ use super::{
 use swell_domain::mesh::TriangleMesh;
 use swell_scene::look::{BasinSpec, Look};
 
-/// Materials of a triangle, as in ssfr_solid.wgsl: a solid of the look's colour, a wall of 1.1 times the ground's; from [`SOLIDS`] on
-/// solids that are told apart, from [`PALETTE`] on those of the palette.
+/// Material codes of a triangle, as in ssfr_solid.wgsl: a solid in the look's colour, a wall at 1.1
+/// times the ground's colour; from [`SOLIDS`] on individual solids, from [`PALETTE`] on the
+/// palette's colours.
 const SOLID: u32 = 0;
 const WALL: u32 = 1;
 
-/// Colours of a palette: a material takes eight bits of a pixel.
+/// Largest number of colours in the palette: a material code has eight bits per pixel.
 pub(super) const MOST_COLOURS: usize = 256 - PALETTE as usize;
 
-/// Between a wall and the domain, particle spacings: two faces in one place would flicker.
+/// Gap between a wall and the domain, particle spacings; coincident faces would flicker.
 const GAP: f64 = 0.006;
 
 /// Triangles, and the colours of their materials.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Opaque {
-    /// Metres from the domain's least corner.
+    /// Triangles with corners in metres from the domain's least corner.
     pub(super) triangles: Vec<Triangle>,
-    /// Linear reflectance, and 1 where rows of windows may be, of the materials from [`PALETTE`] on.
+    /// For each material code from [`PALETTE`] on: linear reflectance, and 1 where the material may
+    /// have rows of windows.
     pub(super) palette: Vec<[f32; 4]>,
-    /// What solids are painted with.
+    /// Materials and texture mappings of solids.
     pub(super) painted: Painted,
 }
 
 impl Opaque {
-    /// That of a look and a scene.
+    /// Collects the opaque geometry of a look and a scene.
     pub(super) fn new(look: &Look, scene: &RenderScene) -> Result<Self, RenderError> {
         let mut opaque = Self::default();
         let mut painter = Painter::new(look, scene)?;
@@ -81,7 +84,8 @@ impl Opaque {
         Ok(opaque)
     }
 
-    /// How pictures lie on triangles, as they stand behind them in a buffer; and the triangles, which find them there.
+    /// Takes the texture mappings, which are stored after the triangles in their buffer, and shifts
+    /// the triangles' references to them.
     pub(super) fn placed(&mut self) -> Vec<Triangle> {
         let places = std::mem::take(&mut self.painted.places);
         if !places.is_empty() {
@@ -121,7 +125,7 @@ impl Opaque {
                         ))
                     })?;
                 }
-                // A triangle without area has no normal, and nothing of it would be seen.
+                // A degenerate triangle has no normal and is invisible.
                 let area = (points[1] - points[0]).cross(points[2] - points[0]);
                 if area.length() > 1e-10 * scene.particle_spacing.powi(2) {
                     let points = points.map(|p| p - origin);
@@ -136,7 +140,7 @@ impl Opaque {
         Ok(())
     }
 
-    /// The material of a colour.
+    /// Returns the code of a colour; adds it to the palette if needed.
     fn material(&mut self, colour: [f64; 3], has_windows: bool) -> Result<u32, RenderError> {
         let [r, g, b] = colour.map(|c| c as f32);
         let entry = [r, g, b, f32::from(u8::from(has_windows))];
@@ -172,10 +176,12 @@ impl Opaque {
     }
 }
 
-/// What a look and a scene have that is opaque, beside the ground, as one mesh, metres from the domain's least corner.
+/// Returns all opaque geometry of a look and a scene, except the ground, as one mesh in metres from
+/// the domain's least corner.
 ///
 /// # Errors
-/// A mesh that names vertices it lacks; more colours than a pixel can name.
+/// [`RenderError::Scene`] or [`RenderError::Material`] if a mesh refers to missing vertices, if
+/// there are more colours than a pixel can encode, or if a material of the look cannot be used.
 pub fn opaque(look: &Look, scene: &RenderScene) -> Result<TriangleMesh, RenderError> {
     let all = Opaque::new(look, scene)?.triangles;
     let corner = |p: [f32; 3]| DVec3::from(p.map(f64::from));
@@ -190,7 +196,8 @@ pub fn opaque(look: &Look, scene: &RenderScene) -> Result<TriangleMesh, RenderEr
     })
 }
 
-/// Two corners of each quay wall. A wall reaches past an end where none stands across, so that no end is in the picture.
+/// Least and greatest corner of each quay wall. Without a wall across it, the -x end lies far
+/// beyond the domain, so that it is not in the picture.
 fn quays(basin: &BasinSpec, size: DVec3, gap: f64) -> Vec<[DVec3; 2]> {
     let thick = basin.thickness_m;
     let stands = |axis: usize, is_max: bool| {
@@ -204,7 +211,8 @@ fn quays(basin: &BasinSpec, size: DVec3, gap: f64) -> Vec<[DVec3; 2]> {
         let way = if wall.is_max { 1.0 } else { -1.0 };
         let (near, far) = (face + way * gap, face + way * thick);
         (low[wall.axis], high[wall.axis]) = (near.min(far), near.max(far));
-        // Those along x go on a good way past -x, where a wave comes from; all others end at a corner.
+        // Waves come from -x. Walls along x therefore extend well past that end; all others end at
+        // a corner.
         low[along] = match (along, stands(along, false)) {
             (0, false) => -2.0 * size.x,
             _ => -thick,
@@ -215,7 +223,7 @@ fn quays(basin: &BasinSpec, size: DVec3, gap: f64) -> Vec<[DVec3; 2]> {
     walls.collect()
 }
 
-/// Twelve triangles, counter-clockwise from outside.
+/// Twelve triangles of a box, counter-clockwise seen from outside.
 pub(super) fn box_triangles(low: DVec3, high: DVec3) -> Vec<[DVec3; 3]> {
     let corner = |i: usize| {
         DVec3::new(

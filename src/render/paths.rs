@@ -1,8 +1,9 @@
-//! Where particles are between frames.
+//! Positions of particles between frames.
 //!
-//! With the frames around it a particle's way is a cubic Hermite curve on either side of the frame's instant: through its places, with
-//! its velocities there. The remainder is x'''' t² (t − h)² / 24, at most x'''' h⁴ / 384 between two frames h apart. On a side where
-//! there is no frame, or the particle is not in it, it goes straight on with its velocity.
+//! Given the neighbouring frames, a particle's path is a cubic Hermite curve on either side of the
+//! frame's instant, through its positions with its velocities there. The remainder is x'''' t² (t −
+//! h)² / 24, at most x'''' h⁴ / 384 between two frames h apart. On a side where the frame is
+//! missing or lacks the particle, the path continues straight with the particle's velocity.
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -10,14 +11,15 @@ use rayon::prelude::*;
 use super::{moment::Ids, uniform};
 use swell_domain::particles::Particles;
 
-/// How a particle goes about its frame's instant: x(t) = x + v t + (square + cube t) t², metres and seconds.
+/// Path of a particle about its frame's instant: x(t) = x + v t + (square + cube t) t², in metres
+/// and seconds.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Path {
-    /// At the frame's instant.
+    /// Velocity at the frame's instant, m/s.
     pub(super) velocity: Vec3,
-    /// Before it: square and cube.
+    /// Coefficients `square` and `cube` before the instant.
     pub(super) before: [Vec3; 2],
-    /// After it.
+    /// Coefficients after it.
     pub(super) after: [Vec3; 2],
 }
 
@@ -29,7 +31,7 @@ impl Path {
         }
     }
 
-    /// Metres from where it is at the frame's instant.
+    /// Displacement from the position at the frame's instant, metres.
     pub(super) fn way(&self, seconds: f32) -> DVec3 {
         let [square, cube] = match seconds < 0.0 {
             true => self.before,
@@ -40,7 +42,7 @@ impl Path {
         t * velocity + t * t * (square + t * cube)
     }
 
-    /// For the device.
+    /// Converts the path to the device's layout.
     pub(super) fn packed(&self) -> uniform::Path {
         let [[a, b], [c, d]] = [self.before, self.after].map(|side| side.map(|v| v.to_array()));
         uniform::Path {
@@ -56,8 +58,8 @@ impl Path {
     }
 }
 
-/// Square and cube of the curve that begins with velocity `v0` and is `way` farther with velocity `v1` after `h` seconds, which may be
-/// negative.
+/// Coefficients `square` and `cube` of the curve that begins with velocity `v0` and, after `h`
+/// seconds, has displacement `way` and velocity `v1`; `h` may be negative.
 fn bend(v0: Vec3, way: Vec3, v1: Vec3, h: f32) -> [Vec3; 2] {
     let mean = way / h;
     [
@@ -66,7 +68,8 @@ fn bend(v0: Vec3, way: Vec3, v1: Vec3, h: f32) -> [Vec3; 2] {
     ]
 }
 
-/// Paths of a frame's particles, in their order, by the frames `seconds` before and after it; `size` is that of the domain, metres.
+/// Paths of a frame's particles, in their order, from the frames `seconds` before and after; `size`
+/// is that of the domain, metres.
 pub(super) fn paths(
     water: &Particles,
     around: [Option<&Particles>; 2],
@@ -75,7 +78,7 @@ pub(super) fn paths(
 ) -> Vec<Path> {
     let others = around.map(|other| other.map(|other| (other, Ids::of(other))));
     let ids = Ids::of(water);
-    // What goes farther came in again at the other side of a periodic domain.
+    // A larger displacement means that the particle crossed a periodic boundary.
     let farthest = 0.5 * size.as_vec3();
     let side = |index: usize, side: usize, h: f32| {
         let (other, at) = others[side].as_ref()?;
@@ -95,7 +98,7 @@ pub(super) fn paths(
         .collect()
 }
 
-/// Where particles of the body are and how they go; without `paths` they go straight on.
+/// Positions and paths of the particles of the body; without `paths` they move in straight lines.
 pub(super) fn body_of(particles: &[uniform::Particle], paths: &[Path]) -> Vec<(Vec3, Path)> {
     let body = (particles.iter().enumerate()).filter(|(_, particle)| particle.tag & 1 == 1);
     body.map(|(index, particle)| {
@@ -121,7 +124,7 @@ mod tests {
         }
     }
 
-    /// A twelfth of a circle of a metre a frame.
+    /// Angle per frame: a twelfth of a circle with a radius of one metre.
     const TURN: f64 = TAU / 12.0;
     const SECONDS: f64 = 1.0 / 24.0;
 
@@ -135,7 +138,7 @@ mod tests {
         )
     }
 
-    /// How far a path is off the circle at most within half a frame, metres.
+    /// Largest distance of a path from the circle within half a frame, metres.
     fn off(path: &Path) -> f64 {
         let at = |part: f64| {
             let place = DVec3::X + path.way((part * SECONDS) as f32);
@@ -159,7 +162,7 @@ mod tests {
         let bound = 2f64.sqrt() * TURN.powi(4) / 384.0 + 2e-6;
         let curved = path([Some(&before), Some(&after)]);
         assert!(off(&curved) < bound, "{} {bound}", off(&curved));
-        // A tangent leaves it by 1 − cos and sin of half a turn's difference: ω²/8 and more.
+        // The tangent deviates by at least 1 − cos of half a frame's angle, about ω²/8.
         let straight = path([None, None]);
         assert!(
             off(&straight) > TURN * TURN / 8.0 * 0.9,
@@ -167,13 +170,14 @@ mod tests {
             off(&straight)
         );
         assert_eq!(straight, Path::straight(straight.velocity));
-        // One side alone is followed where there is a frame.
+        // A side with a frame is followed when the other has none.
         let half = path([None, Some(&after)]);
         assert_eq!(
             (half.before, half.after),
             (Default::default(), curved.after)
         );
-        // Another particle is none, nor is the same one across a periodic domain of 1.5 m.
+        // A different particle is ignored, and so is the same one across a periodic domain of 0.8
+        // m.
         let stranger = circling(1.0, 8);
         assert_eq!(path([None, Some(&stranger)]), straight);
         let small = paths(

@@ -1,6 +1,7 @@
-//! What a look's frames take on the device: buffers, textures and the commands that use them, made without a device.
+//! Buffers, textures and commands of a look's frames, planned without a device.
 //!
-//! The renderer builds this and nothing more. Passes are those of the commands: no list of them is kept beside.
+//! The renderer builds exactly this plan. Its passes are those of the commands; there is no
+//! separate list of them.
 
 use std::collections::BTreeMap;
 
@@ -15,21 +16,23 @@ use swell_gpu::{
 };
 use swell_scene::look::Look;
 
-/// What of the device decides how a frame is divided.
+/// Device properties that determine how a frame is divided.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
-    /// Largest storage buffer that can be bound, bytes.
+    /// Largest storage buffer binding, bytes.
     pub storage: u64,
-    /// Texels along a side of the largest texture.
+    /// Largest texture size along a side, texels.
     pub texture: u32,
-    /// Pixels along a side of what is drawn at once: bands of the picture, tiles of the solids.
+    /// Largest extent drawn at once, pixels along a side: of bands of the picture and of tiles of
+    /// solids.
     pub tile: u32,
-    /// Whether it runs no more than eight threads in step, as software adapters do.
+    /// Whether the adapter's subgroups have at most eight threads, as those of software adapters
+    /// do.
     pub is_narrow: bool,
 }
 
 impl Limits {
-    /// An adapter's own.
+    /// Returns the limits of an adapter.
     pub fn of(context: &Context) -> Self {
         let limits = &context.limits;
         Self {
@@ -41,41 +44,42 @@ impl Limits {
     }
 }
 
-/// How often a pass runs.
+/// Number of times that a pass runs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Runs {
-    /// Before the first frame.
+    /// Runs before the first frame.
     pub once: usize,
-    /// For each state of the water that a frame is drawn with: once a frame, or with an open shutter once a sample.
+    /// Runs for each state of the water: once per frame, or with an open shutter once per sample.
     pub water: usize,
-    /// For each sample of a frame.
+    /// Runs for each sample of a frame.
     pub sample: usize,
-    /// For the channels beside a frame's picture.
+    /// Runs for the additional channels of a frame's picture.
     pub aovs: usize,
 }
 
 /// Buffers, textures and commands of a look.
 #[derive(Clone, Debug, Default)]
 pub struct Plan {
-    /// Every buffer.
+    /// All buffers to allocate.
     pub buffers: Vec<BufferSpec>,
-    /// Every texture.
+    /// All textures to allocate.
     pub textures: Vec<TextureSpec>,
     pub(super) samplers: Vec<SamplerSpec>,
-    /// Before the first frame.
+    /// Commands before the first frame.
     pub(super) once: Vec<Command>,
-    /// For each state of the water that a frame is drawn with.
+    /// Commands for each state of the water.
     pub(super) water: Vec<Command>,
-    /// For each sample of a frame.
+    /// Commands for each sample of a frame.
     pub(super) sample: Vec<Command>,
-    /// For the channels beside the picture; nothing where the look asks for none.
+    /// Commands for the additional channels; empty where the look requests none.
     pub(super) aovs: Vec<Command>,
     pub(super) extent: Extent,
     /// Rows of the picture in each of its buffers.
     pub(super) bands: Vec<u32>,
-    /// Vectors of a pixel in the picture's buffers: its own, and one for each part of the light that is asked for.
+    /// Vectors per pixel in the picture's buffers: the beauty and one for each requested light
+    /// component.
     pub(super) stride: usize,
-    /// Of a splat, metres.
+    /// Radius of a splat, metres.
     pub(super) radius: f64,
     pub(super) closed: Closed,
     pub(super) defines: BTreeMap<&'static str, Vec<&'static str>>,
@@ -86,7 +90,7 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// Passes by name, with how often each runs.
+    /// Returns the passes by name, with the number of runs of each.
     pub fn passes(&self) -> BTreeMap<&'static str, Runs> {
         let mut passes: BTreeMap<&'static str, Runs> = BTreeMap::new();
         let mut add = |commands: &[Command], count: fn(&mut Runs) -> &mut usize| {
@@ -101,14 +105,14 @@ impl Plan {
         passes
     }
 
-    /// Bytes of all buffers and textures.
+    /// Returns the total size of all buffers and textures, bytes.
     pub fn bytes(&self) -> u64 {
         let buffers = self.buffers.iter().map(|buffer| buffer.bytes);
         let textures = self.textures.iter().map(TextureSpec::bytes);
         buffers.sum::<u64>() + textures.sum::<u64>()
     }
 
-    /// Builds it on a device, with what does not change from frame to frame.
+    /// Builds the program on a device and uploads the contents that stay constant across frames.
     pub(super) fn program(&self, context: &Context) -> Result<Program, RenderError> {
         let all = [&self.once, &self.water, &self.sample, &self.aovs];
         let commands = || all.into_iter().flatten();
@@ -144,12 +148,12 @@ impl Plan {
         Ok(program)
     }
 
-    /// Whether it has a buffer of that name.
+    /// Whether the plan has a buffer with this name.
     pub(super) fn has(&self, name: &str) -> bool {
         self.buffers.iter().any(|buffer| buffer.name == name)
     }
 
-    /// Makes a buffer, where it has one of that name, as large as this.
+    /// Replaces the buffer with the same name, if there is one, where `to` is larger.
     pub(super) fn grow(&mut self, to: BufferSpec) {
         let found = self.buffers.iter_mut().find(|it| it.name == to.name);
         if let Some(buffer) = found
@@ -159,38 +163,38 @@ impl Plan {
         }
     }
 
-    /// A buffer that holds `count` values, of zeros.
+    /// Adds a buffer of `count` zeros.
     pub(super) fn buffer<T: Element>(&mut self, buffer: &Buf<T>, count: usize) {
         self.buffers.push(buffer.sized(count));
     }
 
-    /// Buffers that hold `count` values for particles, which passes bind a page at a time; all of it where the look has channels
-    /// beside the picture, whose motion is any particle's.
+    /// Adds a buffer of `count` values for particles, which passes bind page by page; as a whole
+    /// where the look has additional channels, whose motion may look up any particle.
     pub(super) fn per_particle<T: Element>(&mut self, buffer: &Buf<T>, count: usize, look: &Look) {
         self.buffers.push(per_particle(buffer, count, look));
     }
 
-    /// A buffer of these values.
+    /// Adds a buffer with these values.
     pub(super) fn values<T: Element>(&mut self, buffer: &Buf<T>, values: &[T]) {
         self.buffer(buffer, values.len());
         let bytes = bytemuck::cast_slice(values).to_vec();
         self.contents.push((buffer.name().to_owned(), bytes));
     }
 
-    /// A uniform of which each dispatch binds one of these values.
+    /// Adds a uniform buffer of which each dispatch binds one of these values.
     pub(super) fn windows<T: Element>(&mut self, windows: &Windows<T>, values: &[T]) {
         self.buffers.push(windows.sized(values.len()));
         let bytes = Windows::bytes(values);
         self.contents.push((windows.name().to_owned(), bytes));
     }
 
-    /// A texture with these texels.
+    /// Adds a texture with these texels.
     pub(super) fn texture(&mut self, spec: TextureSpec, texels: Vec<u8>) {
         self.texels.push((spec.name.clone(), texels));
         self.textures.push(spec);
     }
 
-    /// Sets a condition in a pass.
+    /// Adds a shader define to a pass.
     pub(super) fn define(&mut self, pass: &'static str, condition: &'static str) {
         let conditions = self.defines.entry(pass).or_default();
         if !conditions.contains(&condition) {
@@ -198,7 +202,7 @@ impl Plan {
         }
     }
 
-    /// Sets each of a buffer's first `count` words.
+    /// Returns a command that sets each of a buffer's first `count` words.
     pub(super) fn fill<T>(&mut self, buffer: &Buf<T>, word: u32, count: usize) -> Command {
         let index = self.fills.len();
         self.fills.push(Fill {
@@ -210,7 +214,7 @@ impl Plan {
         Command::with("ssfr/fill", count, binds)
     }
 
-    /// Lays out what [`Self::fill`] was asked for; after the last of them.
+    /// Adds the uniforms of [`Self::fill`]; to be called after the last fill.
     pub(super) fn end_fills(&mut self) {
         let fills = std::mem::take(&mut self.fills);
         if !fills.is_empty() {
@@ -219,7 +223,7 @@ impl Plan {
     }
 }
 
-/// As [`Plan::per_particle`] has it.
+/// Description of the buffer that [`Plan::per_particle`] adds.
 pub(super) fn per_particle<T: Element>(buffer: &Buf<T>, count: usize, look: &Look) -> BufferSpec {
     let spec = buffer.sized(count);
     match look.spec().output.aovs.is_empty() {
@@ -282,7 +286,7 @@ mod tests {
         Plan::new(&look, &scene, &LIMITS).unwrap()
     }
 
-    /// Names of buffers, textures and samplers that commands use.
+    /// Names of the buffers, textures and samplers that commands use.
     fn used(plan: &Plan) -> BTreeSet<String> {
         let mut used = BTreeSet::new();
         let all = [&plan.once, &plan.water, &plan.sample, &plan.aovs];
@@ -345,7 +349,7 @@ mod tests {
         buffers.chain(textures).chain(samplers).collect()
     }
 
-    /// Conditions of the passes that draw ripples and windows, by either method.
+    /// Defines of the passes that draw ripples and windows, for both methods.
     #[test]
     fn ripples_and_windows_are_drawn_where_the_look_has_them() {
         const BOTH: &str = "[surface.ripple]\nwavelength_m = 1.0\nslope = 0.1\n\
@@ -400,7 +404,7 @@ mod tests {
             sizes.insert(plan.bytes());
         }
         assert_eq!(sizes.len(), 17, "each look takes what it needs: {sizes:?}");
-        // Paths are there where the shutter is open, and motion of spray where a channel shows it.
+        // Paths exist where the shutter is open, and motion of spray where a channel shows it.
         let motion_alone = "[output]\nformats = [\"exr\"]\naovs = [\"forward\"]\n";
         let white = "[whitewater]\n";
         for method in ["", RAYS] {
@@ -412,7 +416,7 @@ mod tests {
                 );
                 assert_eq!(used(&plan), planned(&plan), "open: {method} {more}");
                 let has_paths = plan.buffers.iter().any(|buffer| buffer.name == "paths");
-                // Rays move particles on the CPU, but for drops.
+                // With rays, the CPU moves particles, except for splatted drops.
                 assert_eq!(
                     has_paths,
                     method.is_empty() || more == ALL,

@@ -1,4 +1,5 @@
-//! What rays are cast into: the water as a level set, the opaque set as a tree.
+//! Scene representation for ray casting: the water as a level set, opaque geometry as a bounding
+//! volume hierarchy.
 
 use glam::{DVec3, Vec3};
 
@@ -17,15 +18,15 @@ use swell_domain::level_set::{
 use swell_gpu::recording::{Bind, Command, Groups};
 use swell_scene::look::Look;
 
-/// Sides of the box at which the look's quay walls stand: those along z.
+/// Bits of the box sides at which the look's quay walls are: those along z.
 const QUAYS: u32 = 0b11_0000;
 
-/// Width in spacings of what is taken for water between it and something opaque: a particle that rests on a solid stands half a
-/// spacing off it.
+/// Width, in spacings, of the gap between water and opaque geometry that counts as water: a
+/// particle resting on a solid keeps half a spacing from it.
 const GAP: f64 = 0.5;
 
-/// Plans the level set, for which a frame makes the room that it needs, the light in it with room for `behind` values behind it, and the
-/// tree over what is opaque.
+/// Plans the level set, whose buffer grows with the frames; the lattice of sunlight in it, followed
+/// by `behind` further values; and the hierarchy over opaque geometry.
 pub(super) fn plan_rays(
     plan: &mut Plan,
     look: &Look,
@@ -66,8 +67,9 @@ pub(super) fn plan_rays(
     plan.values(&SET_TRIANGLES, &sorted);
 }
 
-/// Depths of the first thing that a ray of each pixel of the padded frame meets: of water into the first of [`DEPTHS`], of what is
-/// opaque into the second, and where the look draws spray of either into `FIRST_DEPTH` of [`super::buffers`].
+/// Computes the depth of the first hit of a ray through each pixel of the padded frame: of water
+/// into the first of [`DEPTHS`], of opaque geometry into the second, and of either into
+/// `FIRST_DEPTH` of [`super::buffers`] where the look draws spray.
 pub(super) fn first(plan: &Plan) -> Command {
     let binds = vec![
         Bind::whole("depth", &DEPTHS[0]),
@@ -81,8 +83,8 @@ pub(super) fn voxel(look: &Look, scene: &RenderScene) -> f64 {
     scene.particle_spacing / look.spec().surface.voxels_per_spacing
 }
 
-/// The level set of particles so many seconds on their paths from where they stand, relative to the box's least corner, with voxels of
-/// `voxel` metres.
+/// Builds the level set of particles moved along their paths by `seconds`, with positions relative
+/// to the box's least corner and voxels of `voxel` metres.
 pub(super) fn level_set(
     scene: &RenderScene,
     voxel: f64,
@@ -98,7 +100,7 @@ pub(super) fn level_set(
     LevelSet::of_kernels(&kernels, size, voxel)
 }
 
-/// Unit vector to the sun as it stands seen from within flat water.
+/// Unit vector towards the sun as seen from within flat water.
 pub(super) fn sun_in_water(look: &Look) -> DVec3 {
     let sun = look.sun_direction();
     let bent = DVec3::new(sun.x, 0.0, sun.z) / look.spec().water.index;

@@ -1,4 +1,4 @@
-//! Scene-linear OpenEXR: half beauty, float AOVs, and where they come from.
+//! Scene-linear OpenEXR: beauty as half, AOVs as float, and provenance attributes.
 
 use std::path::Path;
 
@@ -26,7 +26,7 @@ fn chromaticity([x, y]: [f64; 2]) -> Vec2<f32> {
     Vec2(x as f32, y as f32)
 }
 
-/// From Rec. 709 to the light of a file; `None` where it is the same.
+/// Conversion from Rec. 709 to the light of a file; `None` where both are the same.
 struct Light(Option<DMat3>);
 
 impl Light {
@@ -35,23 +35,29 @@ impl Light {
         Self((!is_same).then(|| REC_709.to(Space::of(space))))
     }
 
-    /// One channel of a pixel.
+    /// Converts one channel of a pixel.
     fn half(&self, pixel: [f32; 3], channel: usize) -> f16 {
         let value = match &self.0 {
             Some(matrix) => matrix.row(channel).dot(DVec3::from(pixel.map(f64::from))) as f32,
             None => pixel[channel],
         };
-        // Half ends at 65 504; a brighter glint would become infinite.
+        // The largest half is 65 504; a brighter glint would become infinite.
         f16::from_f32(value.min(65504.0))
     }
 }
 
-/// Writes one part: `R G B A` half, parts of the light half (`sun.R/.G/.B`), and the AOVs float: `Z`, `N.X/.Y/.Z`, `P.X/.Y/.Z`, `forward.u/.v`,
-/// `thickness.Y`. ZIP, lossless. The display window is the image that is shown, the data window what was rendered. The light is in the picture's `exr_space`, whose chromaticities are stated, as are, of a picture that
-/// a camera took, the standard attributes `worldToCamera`, `worldToNDC`, `framesPerSecond` and `whiteLuminance`.
+/// Writes a single-part OpenEXR file.
+///
+/// `R G B A` and the light components (`sun.R/.G/.B`, …) are half; the AOVs `Z`, `N.X/.Y/.Z`,
+/// `P.X/.Y/.Z`, `forward.u/.v`, `thickness.Y` and the Cryptomatte layer are float. Compression is
+/// lossless ZIP. The display window is the image as shown, the data window the rendered part. The
+/// light is in the picture's `exr_space`, and the file states its chromaticities. A picture with a
+/// camera gets the standard attributes `worldToCamera`, `worldToNDC`, `framesPerSecond` and
+/// `whiteLuminance`.
 ///
 /// # Errors
-/// [`RenderError::Write`], [`RenderError::Format`].
+/// [`RenderError::Write`] if the file cannot be written, [`RenderError::Format`] if the picture
+/// cannot be encoded.
 pub fn write_exr(path: &Path, image: &Image, attributes: &Attributes) -> Result<(), RenderError> {
     let space = Space::of(image.exr_space);
     let light = Light::to(image.exr_space);
@@ -163,7 +169,7 @@ pub fn write_exr(path: &Path, image: &Image, attributes: &Attributes) -> Result<
     write_whole(path, &bytes)
 }
 
-/// A rate as broadcasting writes it: whole, over 1001, or to a thousandth.
+/// Frame rate as a rational number, as broadcasting writes it: whole, over 1001, or in thousandths.
 fn rational(rate: f64) -> (i32, u32) {
     let over = |parts: u32| (rate * f64::from(parts)).round() as i32;
     let near = |parts: u32| (f64::from(over(parts)) / f64::from(parts) / rate - 1.0).abs() < 1e-6;
@@ -172,11 +178,12 @@ fn rational(rate: f64) -> (i32, u32) {
     (over(parts), parts)
 }
 
-/// Puts the header's attributes in the order of their names. The encoder keeps them in a hash map, whose order
-/// changes from run to run; the same picture has to be the same bytes. Offsets in the file stay as they are,
-/// for the header's length does.
+/// Sorts the header's attributes by name. The encoder keeps them in a hash map, whose order changes
+/// from run to run; equal pictures must give equal bytes. Offsets in the file stay valid because
+/// the header keeps its length.
 fn sort_attributes(bytes: &mut [u8]) -> Option<()> {
-    // Magic number and version, then name\0 type\0 length value, ended by an empty name.
+    // Magic number and version, followed by entries of name\0 type\0 length value up to an empty
+    // name.
     const START: usize = 8;
     let mut entries: Vec<Vec<u8>> = Vec::new();
     let mut at = START;
@@ -195,20 +202,21 @@ fn sort_attributes(bytes: &mut [u8]) -> Option<()> {
     Some(())
 }
 
-/// The attributes of an EXR, or what of them is there; all of it is decoded, so that a torn one is known.
+/// Reads the attributes of an EXR as far as it has them. Decodes the whole file, so that a
+/// truncated one is an error.
 ///
 /// # Errors
-/// [`RenderError::Format`] where it cannot be opened or is no whole EXR.
+/// [`RenderError::Format`] if the file cannot be opened or is not a complete EXR.
 pub fn read_exr_attributes(path: &Path) -> Result<Attributes, RenderError> {
     let whole = exr::prelude::read_all_data_from_file(path);
     whole.map_err(|error| undecoded(path, &error))?;
     read_exr_header(path)
 }
 
-/// The attributes in an EXR's header alone.
+/// Reads the attributes from an EXR's header only.
 ///
 /// # Errors
-/// [`RenderError::Format`] where it cannot be opened or its header is none.
+/// [`RenderError::Format`] if the file cannot be opened or its header is invalid.
 pub(super) fn read_exr_header(path: &Path) -> Result<Attributes, RenderError> {
     let meta = exr::meta::MetaData::read_from_file(path, true);
     let meta = meta.map_err(|error| undecoded(path, &error))?;

@@ -1,4 +1,5 @@
-//! Pixels of picture files, of ours and of others, and a picture of plain bytes.
+//! Decoding of picture files, including those of other programs, and a writer for plain 8-bit
+//! pictures.
 
 use std::path::Path;
 
@@ -7,7 +8,7 @@ use png::{BitDepth, ColorType, Transformations};
 
 use super::super::RenderError;
 
-/// Width, height, and red, green, blue, alpha of each pixel, rows from the top.
+/// Width, height, and the red, green, blue and alpha values of each pixel; rows begin at the top.
 pub type Pixels = (usize, usize, Vec<[f32; 4]>);
 
 fn fault(path: &Path, message: impl ToString) -> RenderError {
@@ -17,11 +18,12 @@ fn fault(path: &Path, message: impl ToString) -> RenderError {
     }
 }
 
-/// The pixels of a PNG of any kind, 0 to 1 as they stand in the file; grey in all three channels, alpha 1
-/// where there is none.
+/// Reads the pixels of a PNG of any colour type, from 0 to 1 in the file's own encoding. Grey fills
+/// all three colour channels; alpha is 1 where the file has none.
 ///
 /// # Errors
-/// [`RenderError::Write`] where it cannot be opened, [`RenderError::Format`] where it is no whole PNG.
+/// [`RenderError::Write`] if the file cannot be opened, [`RenderError::Format`] if it is not a
+/// complete PNG.
 pub fn read_png(path: &Path) -> Result<Pixels, RenderError> {
     let file = std::fs::File::open(path).map_err(|source| RenderError::Write {
         file: path.to_owned(),
@@ -64,11 +66,12 @@ pub fn read_png(path: &Path) -> Result<Pixels, RenderError> {
     Ok((info.width as usize, info.height as usize, pixels))
 }
 
-/// The beauty of an EXR, `R G B` and `A` (1 where there is none) of its first layer that has them, in all of its data window, and
-/// where that begins in the display window.
+/// Reads `R G B` and `A` (1 where missing) from the first layer of an EXR that has them, over the
+/// whole data window. Returns the pixels and the position of the data window in the display window.
 ///
 /// # Errors
-/// [`RenderError::Format`] where it cannot be opened, is no whole EXR, or has no such layer.
+/// [`RenderError::Format`] if the file cannot be opened, is not a complete EXR or has no such
+/// layer.
 pub fn read_exr(path: &Path) -> Result<(Pixels, [i32; 2]), RenderError> {
     let image = read_first_rgba_layer_from_file(
         path,
@@ -85,10 +88,11 @@ pub fn read_exr(path: &Path) -> Result<(Pixels, [i32; 2]), RenderError> {
     Ok((pixels, [begins.0 - shown.0, begins.1 - shown.1]))
 }
 
-/// Writes an 8-bit RGB PNG without a colour space, with one line of text.
+/// Writes an 8-bit RGB PNG without a colour space, with `comment` as a text chunk.
 ///
 /// # Errors
-/// [`RenderError::Write`], [`RenderError::Format`].
+/// [`RenderError::Write`] if the file cannot be written, [`RenderError::Format`] if the pixels
+/// cannot be encoded.
 pub fn write_rgb_png(
     path: &Path,
     size: [usize; 2],

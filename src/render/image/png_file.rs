@@ -1,4 +1,4 @@
-//! 8-bit PNG through the view transform.
+//! 8-bit PNG with the view transform applied.
 
 use std::{fs::File, io::BufReader, path::Path};
 
@@ -9,18 +9,20 @@ use super::super::view::Display;
 use super::{Attributes, Image, write_whole};
 use swell_scene::look::ViewSpec;
 
-/// Writes an 8-bit RGBA PNG of the image that is shown, encoded sRGB, alpha not premultiplied.
+/// Writes an 8-bit PNG of the display window, encoded as sRGB; it has an alpha channel, not
+/// premultiplied, unless the picture is opaque.
 ///
 /// # Errors
-/// [`RenderError::Write`], [`RenderError::Format`].
+/// [`RenderError::Write`] if the file cannot be written, [`RenderError::Format`] if the picture
+/// cannot be encoded.
 pub fn write_png(path: &Path, image: &Image, view: &ViewSpec) -> Result<(), RenderError> {
     write(path, image, view, None)
 }
 
-/// As [`write_png`], with the attributes as text chunks.
+/// Like [`write_png`], with the attributes as text chunks.
 ///
 /// # Errors
-/// As [`write_png`].
+/// As for [`write_png`].
 pub fn write_png_with_attributes(
     path: &Path,
     image: &Image,
@@ -30,7 +32,7 @@ pub fn write_png_with_attributes(
     write(path, image, view, Some(attributes))
 }
 
-/// Pixels that a thread encodes in a row.
+/// Pixels per parallel task of encoding.
 const ROW: usize = 1024;
 
 fn write(
@@ -65,7 +67,7 @@ fn write(
         png::ColorType::Rgba
     });
     encoder.set_depth(png::BitDepth::Eight);
-    // Fast mode takes less time than the default, and its files of rendered frames are smaller.
+    // Fast mode takes less time than the default and makes smaller files of rendered frames.
     encoder.set_compression(png::Compression::Fast);
     encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
     if let Some(attributes) = attributes {
@@ -86,10 +88,12 @@ fn write(
     write_whole(path, &bytes)
 }
 
-/// The attributes of a PNG, or what of them is there; all of it is decoded, so that a torn one is known.
+/// Reads the attributes of a PNG as far as it has them. Decodes the whole file, so that a truncated
+/// one is an error.
 ///
 /// # Errors
-/// [`RenderError::Write`] where it cannot be opened, [`RenderError::Format`] where it is no whole PNG.
+/// [`RenderError::Write`] if the file cannot be opened, [`RenderError::Format`] if it is not a
+/// complete PNG.
 pub fn read_png_attributes(path: &Path) -> Result<Attributes, RenderError> {
     let (mut reader, attributes) = open(path)?;
     let mut pixels = vec![0; reader.output_buffer_size().unwrap_or(0)];
@@ -99,18 +103,20 @@ pub fn read_png_attributes(path: &Path) -> Result<Attributes, RenderError> {
     Ok(attributes)
 }
 
-/// The attributes in a PNG's header alone.
+/// Reads the attributes from a PNG's header only.
 ///
 /// # Errors
-/// [`RenderError::Write`] where it cannot be opened, [`RenderError::Format`] where its header is none.
+/// [`RenderError::Write`] if the file cannot be opened, [`RenderError::Format`] if its header is
+/// invalid.
 pub(super) fn read_png_header(path: &Path) -> Result<Attributes, RenderError> {
     open(path).map(|(_, attributes)| attributes)
 }
 
-/// Width and height, channels as an EXR would name them, and bits of each; of the header alone. A palette's pixels are colours.
+/// Reads width and height, the channels by their EXR names, and the bits per channel from a PNG's
+/// header. The pixels of a palette count as RGB.
 ///
 /// # Errors
-/// As `read_png_header`.
+/// As for `read_png_header`.
 pub fn png_header(path: &Path) -> Result<([usize; 2], &'static [&'static str], u8), RenderError> {
     let (reader, _) = open(path)?;
     let info = reader.info();

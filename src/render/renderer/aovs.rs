@@ -1,4 +1,4 @@
-//! Channels beside the picture, back from the device.
+//! Renders additional channels and reads them back from the device.
 
 use super::{Renderer, parts::Parts};
 use crate::{
@@ -12,16 +12,17 @@ use crate::{
 };
 use swell_scene::look::{AovFilterSpec, AovSpec};
 
-/// What a pixel has of each channel: Z, N, P, forward, thickness.
+/// Values per pixel: Z, N, P, forward, thickness.
 const VALUES: usize = 10;
-/// The last of them, which is 0 where nothing is met; the others are then of nothing.
+/// Index of the thickness, which is 0 where a ray meets nothing; the other channels are then
+/// undefined.
 const THICKNESS: usize = 9;
 
-/// Sums over samples.
+/// Weighted sums over samples.
 struct Means {
-    /// Of weights, of all samples.
+    /// Total weight of all samples.
     all: f64,
-    /// Of each pixel, of the weights of the samples that met something.
+    /// For each pixel, total weight of the samples that met a surface.
     met: Vec<f64>,
     sums: Vec<[f64; VALUES]>,
 }
@@ -48,7 +49,8 @@ impl Means {
         }
     }
 
-    /// Means: of the thickness over all samples, of the rest over those that met something. What `still` says stands where none did.
+    /// Weighted means: of the thickness over all samples, of the other channels over those that met
+    /// a surface. Pixels without such a sample take the values of `still`.
     fn over(self, still: &[[f32; VALUES]]) -> Vec<[f32; VALUES]> {
         let pixels = self.sums.iter().zip(&self.met).zip(still);
         pixels
@@ -69,7 +71,8 @@ fn is_seen(v: &[f32; VALUES]) -> bool {
 }
 
 impl Renderer {
-    /// Draws the channels of a frame; `ahead` is the particles with the velocities that lead to the next frame, where these are known.
+    /// Renders the additional channels of a frame. `ahead` holds the particles with the mean
+    /// velocities to the next frame, or nothing where these are unknown.
     pub(super) fn draw_aovs(
         &mut self,
         frame: u32,
@@ -99,7 +102,7 @@ impl Renderer {
         }))
     }
 
-    /// Samples that the channels are drawn with, where the look asks for any.
+    /// Samples with which additional channels are rendered.
     pub(super) fn aov_samples(&self) -> Vec<Sample> {
         match self.look.spec().output.aov_filter {
             AovFilterSpec::Centre => vec![Sample::STILL],
@@ -107,7 +110,7 @@ impl Renderer {
         }
     }
 
-    /// The channels that the look asks for.
+    /// Splits pixel values into the channels that the look requests.
     fn named(&self, values: &[[f32; VALUES]]) -> Aovs {
         let origin = self.scene.origin + self.scene.domain.min;
         let place = |v: &[f32; VALUES]| {

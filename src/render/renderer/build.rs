@@ -1,4 +1,4 @@
-//! A plan from a look and a scene.
+//! Builds a plan from a look and a scene.
 
 use super::{
     shade::{plan_cast, plan_shade, wants_spray_aovs},
@@ -27,10 +27,12 @@ use crate::{
 };
 use swell_scene::look::{AovSpec, FilterSpec, Look, MethodSpec, SplatSpec};
 
-/// Pixels that rays are cast for in one dispatch, so that none runs long enough to lose a device.
+/// Largest number of pixels per ray-casting dispatch, so that none runs long enough to lose the
+/// device.
 const CAST: u32 = 1 << 17;
-/// Smoothing width over particle spacing where the look leaves it out. Balls need as much as hides their beads; ellipsoids are smooth
-/// but for the particles' own noise, and what is wider takes waves with it (`docs/studies.md`, the drawn surface).
+/// Default smoothing width over particle spacing. Spheres need enough to hide their bumps;
+/// ellipsoids are smooth except for the particles' noise, and wider smoothing would remove waves
+/// (`docs/studies.md`, the drawn surface).
 const fn smoothing_of(splat: SplatSpec) -> f64 {
     match splat {
         SplatSpec::Ellipsoid => 0.5,
@@ -39,10 +41,11 @@ const fn smoothing_of(splat: SplatSpec) -> f64 {
 }
 
 impl Plan {
-    /// Plans what the look calls for and nothing more, before it has room for any particles.
+    /// Plans exactly the resources that the look needs, with the initial capacity for particles.
     ///
     /// # Errors
-    /// A damaged panorama, a domain or spacing that is none, a mesh that names vertices it lacks.
+    /// A damaged panorama, an invalid domain or particle spacing, or a mesh that refers to missing
+    /// vertices.
     pub fn new(look: &Look, scene: &RenderScene, limits: &Limits) -> Result<Self, RenderError> {
         check(scene)?;
         let spec = look.spec();
@@ -122,7 +125,7 @@ impl Plan {
     }
 }
 
-/// Plans pictures of splats.
+/// Plans screen-space rendering.
 fn plan_ssfr(plan: &mut Plan, look: &Look, scene: &RenderScene, set: &Set<'_>, limits: &Limits) {
     for depth in &DEPTHS {
         plan.buffer(depth, plan.extent.pixels());
@@ -151,9 +154,10 @@ fn plan_ssfr(plan: &mut Plan, look: &Look, scene: &RenderScene, set: &Set<'_>, l
     plan.sample = [solids, body, commands, spray.sample, shade.picture].concat();
 }
 
-/// Plans pictures by rays.
+/// Plans ray-cast rendering.
 fn plan_ray(plan: &mut Plan, look: &Look, scene: &RenderScene, set: &Set<'_>) {
-    // The map of caustics stands behind the lattice of light: a pass has no room for a buffer more.
+    // The caustics map follows the lattice of sunlight in one buffer, because the pass has no
+    // binding left.
     let behind = map_values(look, scene);
     plan_rays(plan, look, scene, set, behind);
     plan.water = plan_caustics(plan, look, scene);
@@ -200,7 +204,8 @@ fn plan_ray(plan: &mut Plan, look: &Look, scene: &RenderScene, set: &Set<'_>) {
     plan.sample = [sample, shade.picture].concat();
 }
 
-/// How many particles there is room for where so many are asked for: frames differ, and few of them then need more.
+/// Capacity for a number of particles, rounded up to a power of two, so that few frames cause a
+/// reallocation.
 pub(super) fn room(particles: usize) -> usize {
     particles.next_power_of_two()
 }

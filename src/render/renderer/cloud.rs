@@ -1,4 +1,4 @@
-//! Drops and bubbles that rays go through, on their way to the device.
+//! Uploads the drops and bubbles that rays traverse.
 
 use glam::DVec3;
 
@@ -16,22 +16,23 @@ use swell_domain::{cloud::Drop, particles::Particles};
 use swell_gpu::program::Program;
 use swell_scene::look::{Look, MethodSpec};
 
-/// A frame's drops and bubbles, and the grid of them that the device holds.
+/// Drops and bubbles of a frame, and the state of their grid on the device.
 pub(super) struct RayCloud {
-    /// Where they are and how they go.
+    /// Drops and bubbles with their paths.
     drops: Vec<(Drop, Path)>,
-    /// Seconds from the frame at which the grid on the device stands; `None` before there is one of this frame.
+    /// Seconds from the frame for which the device holds the grid; `None` before the first grid of
+    /// this frame.
     seconds: Option<f32>,
-    /// Words that there is room for.
+    /// Allocated words.
     capacity: usize,
     /// Edge length of a voxel, metres.
     voxel: f64,
-    /// To it.
+    /// Unit vector towards the sun.
     sun: DVec3,
 }
 
 impl RayCloud {
-    /// `None` where the look casts no rays, or draws neither spray nor whitewater.
+    /// Returns `None` where the look casts no rays, or draws neither spray nor whitewater.
     pub(super) fn of(look: &Look, scene: &RenderScene) -> Option<Self> {
         let is_drawn = look.spec().renderer.method == MethodSpec::Ray && draws_spray(look);
         is_drawn.then(|| Self {
@@ -43,7 +44,8 @@ impl RayCloud {
         })
     }
 
-    /// Takes a frame's particles, of whose splats `radius` is the radius in metres, and its whitewater; without `paths` they go straight on.
+    /// Takes a frame's particles, whose splats have `radius` metres, and its whitewater; without
+    /// `paths` particles move in straight lines.
     pub(super) fn take(
         &mut self,
         look: &Look,
@@ -58,7 +60,8 @@ impl RayCloud {
         self.seconds = None;
     }
 
-    /// Has the device hold the grid of so many seconds from the frame; whether a buffer is a new one.
+    /// Uploads the grid for an instant, in seconds from the frame. Returns whether a buffer was
+    /// reallocated.
     pub(super) fn stand_at(
         &mut self,
         seconds: f32,
@@ -80,13 +83,13 @@ impl RayCloud {
         Ok(grew)
     }
 
-    /// What the grid is about, and its words, of so many seconds from the frame.
+    /// Builds the uniform and the words of the grid for an instant, in seconds from the frame.
     pub(super) fn grid(&self, seconds: f32, scene: &RenderScene) -> (uniform::Cloud, Vec<u32>) {
         grid(&self.drops, seconds, scene, (self.voxel, self.sun))
     }
 }
 
-/// How many words there is room for where so many are asked for, of which one binding holds `storage` bytes.
+/// Capacity in words for a required number of them, within a binding of `storage` bytes.
 pub(super) fn room_of(words: usize, storage: u64) -> usize {
     let room = room(words);
     match room as u64 > storage / 4 {

@@ -1,4 +1,4 @@
-//! A frame's particles on their way to the device.
+//! Uploads a frame's particles.
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -28,25 +28,26 @@ use swell_domain::level_set::kernels::Kernels;
 use swell_gpu::{buffer::Workgroups, program::BufferSpec, recording::spread};
 use swell_scene::look::{AovSpec, Look, MethodSpec};
 
-/// Particle spacings within which a particle has a part in the field at the eye: a kernel's reach and that of the neighbours that
-/// shape it.
+/// Distance in particle spacings within which a particle affects the field at the eye: the support
+/// of a kernel and of the neighbours that shape it.
 const ABOUT_THE_EYE: f64 = 6.0;
-/// Particles within [`CLOSE`] spacings of the eye below which it is hit by drops and not under water.
+/// Least number of particles within [`CLOSE`] spacings of an eye under water; fewer are drops that
+/// hit the lens.
 const FEW: usize = 6;
 const CLOSE: f64 = 2.5;
 
-/// A frame that stands on the device.
+/// State of a frame on the device.
 #[derive(Default)]
 pub(super) struct Loaded {
-    /// Its particles that may be seen.
+    /// Number of particles that may be visible.
     pub(super) count: u32,
-    /// They again, with the mean velocity of their way to the next frame: for the channels beside the picture, where one asks for
-    /// motion and there is a next frame.
+    /// The same particles with their mean velocity to the next frame, for additional channels;
+    /// empty unless a channel shows motion and there is a next frame.
     pub(super) ahead: Vec<Particle>,
 }
 
 impl Renderer {
-    /// Moves a frame's particles to the device, relative to the domain's least corner.
+    /// Uploads a frame's particles, relative to the domain's least corner.
     pub(super) fn load(&mut self, frame: u32, moment: &Moment<'_>) -> Result<Loaded, RenderError> {
         let Taken {
             mut packed,
@@ -131,7 +132,8 @@ impl Renderer {
         Ok(Loaded { count, ahead })
     }
 
-    /// Tells the device which particles hold air, few of all, and gives their indices, ascending.
+    /// Uploads the indices of the particles that hold air, a small part of all, and returns them in
+    /// ascending order.
     fn load_aired(&self, packed: &[Particle]) -> Vec<u32> {
         if !self.program.has(AIRED.name()) {
             return Vec::new();
@@ -142,7 +144,8 @@ impl Renderer {
         aired
     }
 
-    /// Tells the device which particles each dispatch sees, and gives how many of each page hold air.
+    /// Uploads the range of particles of each dispatch, and returns the number of particles with
+    /// air in each page.
     fn load_pages(&self, pages: Pages, particles: usize, aired: &[u32]) -> Vec<usize> {
         let counts: Vec<usize> = pages.shares(particles).collect();
         let mut windows = Vec::new();
@@ -164,7 +167,8 @@ impl Renderer {
             .collect()
     }
 
-    /// Tells the device which blocks of water stand for what is hidden; what there is room for beyond them is empty.
+    /// Uploads the blocks of water that replace hidden particles; the rest of the buffer gets empty
+    /// blocks.
     fn load_blocks(&mut self, mut blocks: Vec<Block>) -> Result<(), RenderError> {
         if !self.program.has(BLOCKS.name()) {
             return Ok(());
@@ -182,7 +186,7 @@ impl Renderer {
         Ok(())
     }
 
-    /// Makes room for so many particles.
+    /// Grows the buffers to hold this number of particles.
     fn reserve(&mut self, particles: usize) -> Result<(), RenderError> {
         if particles <= self.capacity {
             return Ok(());
@@ -200,8 +204,9 @@ impl Renderer {
         Ok(())
     }
 
-    /// Tells the device what stands in the sums of spray: depths up to the domain's farthest corner and speeds up to the fastest, both
-    /// with some room for what moves within a frame, and as powers of two, so that frames differ little in what is rounded.
+    /// Uploads the range of the spray sums: depths up to the domain's farthest corner and speeds up
+    /// to the largest, both with a margin for motion within a frame and rounded up to powers of
+    /// two, so that rounding differs little between frames.
     fn load_spray(&self, frame: u32, moment: &Moment<'_>) {
         if !draws_spray(&self.look) {
             return;
@@ -224,7 +229,8 @@ impl Renderer {
         self.program.upload(SPRAY_PARAMS, 0, &[params]);
     }
 
-    /// Whether the field of the body's particles, whose level set rays meet, is positive at the eye at the frame's instant.
+    /// Whether the level-set field of the body's particles, as rays meet it, is positive at the eye
+    /// at the frame's instant.
     fn is_under_water(&self, frame: u32, packed: &[Particle]) -> bool {
         let rate = self.scene.frames_per_second;
         let origin = self.scene.origin + self.scene.domain.min;
@@ -245,7 +251,7 @@ impl Renderer {
     }
 }
 
-/// Buffers that hold what is known of each particle, and of each page of them; a look has some of these.
+/// Descriptions of the buffers that hold data per particle and per page; a look uses some of them.
 pub(super) fn of_particles(look: &Look, pages: Pages) -> Vec<BufferSpec> {
     let capacity = pages.capacity;
     let groups = [PARTICLE_GROUPS, AIRED_GROUPS];

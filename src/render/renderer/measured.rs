@@ -1,4 +1,4 @@
-//! The plan of a frame whose particles are known, without a device.
+//! Plan of a frame with known particles, without a device.
 
 use super::{
     build::room,
@@ -19,11 +19,12 @@ use crate::{
 use swell_scene::look::Look;
 
 impl Plan {
-    /// [`Plan::new`] with the room that the renderer makes as it draws this frame. With an open shutter level set and drops are those of
-    /// the frame's instant, where each of its samples has its own.
+    /// Like [`Plan::new`], with the buffer sizes that the renderer allocates when it draws this
+    /// frame. The level set and the drops are those of the frame's instant; with an open shutter
+    /// each sample has its own.
     ///
     /// # Errors
-    /// As [`Plan::new`]; [`RenderError::NotFinite`] for a damaged particle.
+    /// As for [`Plan::new`], and [`RenderError::NotFinite`] for a damaged particle.
     pub fn of_frame(
         look: &Look,
         scene: &RenderScene,

@@ -1,4 +1,5 @@
-//! One frame: samples over pixel and shutter, each a recording over the whole frame.
+//! Renders a frame as samples over pixel and shutter, each one a recording of commands over the
+//! whole frame.
 
 mod aovs;
 mod build;
@@ -40,7 +41,7 @@ use swell_scene::look::Look;
 use water::RayWater;
 use whitewater::Whitewater;
 
-/// Depth before which nothing solid is drawn, particle spacings.
+/// Near plane of opaque geometry, particle spacings.
 const NEAR: f64 = 0.12;
 
 /// Renders frames of one scene with one look.
@@ -49,49 +50,50 @@ pub struct Renderer {
     scene: RenderScene,
     plan: Plan,
     program: Program,
-    /// Until the first frame.
+    /// Commands that run before the first frame; `None` afterwards.
     once: Option<Recording>,
-    /// What follows from the water alone.
+    /// Commands that depend on the water only.
     light: Recording,
-    /// Of a sample, band by band where rays are cast.
+    /// Commands of a sample, split into bands where rays are cast.
     sample: Vec<Recording>,
     aovs: Vec<Recording>,
-    /// Whether the last sample took long; at first none is known.
+    /// Whether the last sample was slow; true before the first one.
     is_slow: bool,
-    /// Particles that there is room for.
+    /// Allocated particles.
     capacity: usize,
-    /// Blocks of water that there is room for.
+    /// Allocated blocks of water.
     blocks: usize,
     /// `None` where the look casts no rays.
     water: Option<RayWater>,
     /// `None` where rays meet neither spray nor whitewater.
     cloud: Option<RayCloud>,
-    /// `None` where the look has none.
+    /// `None` where the look has no caustics.
     caustics: Option<Caustics>,
-    /// `None` where the look has none.
+    /// `None` where the look has no sea.
     sea: Option<Sea>,
-    /// `None` where the look draws none.
+    /// `None` where the look draws no whitewater.
     whitewater: Option<Whitewater>,
     timer: Option<Timer>,
-    /// Names of the scene's solids.
+    /// Names of the scene's solids in Cryptomatte layers.
     solids: Vec<String>,
 }
 
 impl Renderer {
-    /// Builds what the look calls for and nothing more.
+    /// Builds exactly the resources that the look needs.
     ///
     /// # Errors
-    /// A frame larger than the adapter's buffers, a damaged panorama, a mesh that names vertices it lacks.
+    /// A frame that exceeds the adapter's buffers, a damaged panorama, or a mesh that refers to
+    /// missing vertices.
     pub fn new(context: &Context, look: &Look, scene: &RenderScene) -> Result<Self, RenderError> {
         let most = context.limits.max_texture_dimension_2d;
         Self::with_tile_limit(context, look, scene, most)
     }
 
-    /// As [`Renderer::new`], with textures and bands of the picture no larger than `tile_limit` pixels along a
-    /// side. The picture is the same at any limit.
+    /// Like [`Renderer::new`], with textures and bands of the picture of at most `tile_limit`
+    /// pixels along a side. The picture does not depend on the limit.
     ///
     /// # Errors
-    /// As [`Renderer::new`].
+    /// As for [`Renderer::new`].
     pub fn with_tile_limit(
         context: &Context,
         look: &Look,
@@ -130,40 +132,43 @@ impl Renderer {
         Ok(renderer)
     }
 
-    /// Names the scene's solids in mattes, in the order of [`RenderScene::solids`]; each is "solid" else, with a number.
+    /// Sets the names of the solids in Cryptomatte layers, in the order of [`RenderScene::solids`].
+    /// Without names, each is "solid" with a number.
     pub fn name_solids(&mut self, names: &[String]) {
         self.solids = unique(names);
     }
 
-    /// What it was built from.
+    /// Returns the plan from which the renderer was built.
     pub fn plan(&self) -> &Plan {
         &self.plan
     }
 
-    /// Times each pass from here on, and forgets earlier times; passes then run one by one. The pictures are the same.
+    /// Starts to measure the time of each pass and discards earlier times. Passes then run one by
+    /// one; the pictures stay the same.
     pub fn time_passes(&mut self) {
         self.timer = Some(Timer::new(&self.program.context));
     }
 
-    /// What passes took since [`Self::time_passes`], by name.
+    /// Returns the time of each pass since [`Self::time_passes`], by name.
     pub fn times(&self) -> Vec<PassTime> {
         let timer = self.timer.as_ref();
         timer.map_or_else(Vec::new, |timer| timer.times(PassTime::new))
     }
 
-    /// Renders one frame; the same frame, particles, look and adapter give the same bytes.
+    /// Renders one frame. Equal frame numbers, particles, looks and adapters give equal bytes.
     ///
     /// # Errors
-    /// [`RenderError::NotFinite`] for a damaged particle, [`RenderError::Gpu`] when the device is lost or the
-    /// particles are more than it binds.
+    /// [`RenderError::NotFinite`] for a damaged particle, and [`RenderError::Gpu`] if the device is
+    /// lost or cannot bind that many particles.
     pub fn render(&mut self, frame: u32, particles: &Particles) -> Result<Image, RenderError> {
         self.render_with(frame, particles, &Particles::default())
     }
 
-    /// As [`Renderer::render`], with whitewater, which is drawn where the look names a stream of it.
+    /// Like [`Renderer::render`], with whitewater, which is drawn where the look names a stream of
+    /// it.
     ///
     /// # Errors
-    /// As [`Renderer::render`].
+    /// As for [`Renderer::render`].
     pub fn render_with(
         &mut self,
         frame: u32,
@@ -174,19 +179,21 @@ impl Renderer {
         self.render_moment(frame, &Moment::alone(&water, white))
     }
 
-    /// As [`Renderer::render_with`], with what is known of the frames around it: blur and motion then follow the particles' paths, and
-    /// what is spray does not change from frame to frame and back.
+    /// Like [`Renderer::render_with`], with the frames around it: motion blur then follows the
+    /// particles' paths, and the classification of spray is steady over time.
     ///
     /// # Errors
-    /// As [`Renderer::render`]; [`RenderError::UnderWater`] where splats cannot draw what the camera sees.
+    /// As for [`Renderer::render`], and [`RenderError::UnderWater`] where the screen-space method
+    /// cannot draw what the camera sees.
     pub fn render_moment(&mut self, frame: u32, moment: &Moment<'_>) -> Result<Image, RenderError> {
         self.render_parts(frame, moment, &mut |_| {})
     }
 
-    /// As [`Renderer::render_moment`]; `tell` hears before the first part of the picture and behind each one how far it has come.
+    /// Like [`Renderer::render_moment`]. Calls `tell` with the progress before the first part of
+    /// the picture and after each one.
     ///
     /// # Errors
-    /// As [`Renderer::render_moment`].
+    /// As for [`Renderer::render_moment`].
     pub fn render_parts(
         &mut self,
         frame: u32,
@@ -232,12 +239,12 @@ impl Renderer {
         Ok(image)
     }
 
-    /// What cameras are made of, beside the look and the sample, for so many particles on the device.
+    /// Inputs of cameras besides look and sample, with this number of particles on the device.
     fn setting(&self, particle_count: u32) -> Setting {
         setting(&self.plan, &self.scene, particle_count)
     }
 
-    /// Beauty and the parts of its light.
+    /// Reads back the beauty and its light components.
     fn read_picture(&self, image: &mut Image) -> Result<(), RenderError> {
         let stride = self.plan.stride;
         let values = self.read_bands(picture, stride)?;
@@ -253,7 +260,7 @@ impl Renderer {
         Ok(())
     }
 
-    /// What is kept, so many values a pixel, in the buffers that `of` gives for each band.
+    /// Reads back `values` values per pixel from the buffers that `of` returns for each band.
     fn read_bands<T: Pod>(
         &self,
         of: fn(usize) -> Buf<T>,
@@ -271,7 +278,7 @@ impl Renderer {
         Ok(pixels)
     }
 
-    /// Binds every command to the buffers as they are now.
+    /// Records all commands again with the current buffers.
     fn record(&mut self) {
         let pages = self.pages();
         let spread = |commands: &[Command]| pages.spread(commands);
@@ -280,12 +287,12 @@ impl Renderer {
         self.aovs = parts::record(&self.program, &spread(&self.plan.aovs));
     }
 
-    /// How its particles are shared out among dispatches.
+    /// Division of the particles into dispatches.
     fn pages(&self) -> Pages {
         Pages::new(self.capacity, Limits::of(&self.program.context).storage)
     }
 
-    /// Draws what does not change from frame to frame.
+    /// Runs the commands that precede the first frame.
     fn draw_once(&mut self) -> Result<(), RenderError> {
         if let Some(once) = self.once.take() {
             once.run(&self.program, self.timer.as_mut())?;
@@ -293,7 +300,7 @@ impl Renderer {
         Ok(())
     }
 
-    /// Follows the sun's rays through a sample's water, where these are not the last sample's.
+    /// Traces the sun's rays through the water of a sample, unless the last trace is still current.
     fn light(&mut self, camera: &uniform::Camera) -> Result<(), RenderError> {
         let (Some(caustics), Some(water)) = (&mut self.caustics, &self.water) else {
             return Ok(());
@@ -306,7 +313,7 @@ impl Renderer {
         Ok(())
     }
 
-    /// Draws one sample, into the picture's mean or, with `aovs`, into the channels beside it.
+    /// Draws one sample into the picture's mean or, with `aovs`, into the additional channels.
     fn sample(
         &mut self,
         camera: &uniform::Camera,

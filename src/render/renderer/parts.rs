@@ -1,4 +1,5 @@
-//! A frame's drawing in parts, so that one that takes minutes can say how far it has come.
+//! Splits the drawing of a frame into parts, so that a frame that takes minutes can report
+//! progress.
 
 use std::time::{Duration, Instant};
 
@@ -9,23 +10,24 @@ use swell_gpu::{
     recording::{Command, Recording},
 };
 
-/// How far the drawing of a frame has come.
+/// Progress of drawing a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Part {
-    /// Parts that are drawn.
+    /// Number of finished parts.
     pub done: u32,
-    /// Parts of the frame: bands of its samples, those of the channels beside it among them.
+    /// Number of parts of the frame: bands of its samples, including those of the additional
+    /// channels.
     pub count: u32,
 }
 
-/// Counts the parts of a frame, and tells of each.
+/// Counts the finished parts of a frame and reports progress.
 pub(super) struct Parts<'a> {
     pub(super) part: Part,
     tell: &'a mut dyn FnMut(Part),
 }
 
 impl<'a> Parts<'a> {
-    /// Tells that none of `count` is done.
+    /// Starts at none of `count` and reports it.
     pub(super) fn new(count: usize, tell: &'a mut dyn FnMut(Part)) -> Self {
         let part = Part {
             done: 0,
@@ -41,14 +43,14 @@ impl<'a> Parts<'a> {
     }
 }
 
-/// A sample that took longer is waited for band by band. Below that all of it is submitted at once, and the device never waits for the
-/// next band.
+/// Duration of a sample above which the next one is submitted and awaited band by band. Faster
+/// samples are submitted at once, so that the device never idles between bands.
 const SLOW: Duration = Duration::from_secs(1);
 
-/// The passes that end a band by rays, whose bands are small so that none runs long.
+/// Passes that end a band of rays, whose bands are small so that none runs long.
 const ENDS: [&str; 2] = ["rays/cast", "rays/aovs"];
 
-/// Commands of a sample, up to the end of each band; what follows the last one goes with it.
+/// Splits the commands of a sample after each band; commands after the last band belong to it.
 pub(super) fn portions(commands: &[Command]) -> Vec<&[Command]> {
     let is_end = |command: &Command| command.pass().is_some_and(|pass| ENDS.contains(&pass));
     let ends = commands.iter().filter(|it| is_end(it)).count();
@@ -60,7 +62,7 @@ pub(super) fn portions(commands: &[Command]) -> Vec<&[Command]> {
     commands.split_inclusive(&mut is_split).collect()
 }
 
-/// Each of the portions, bound to the program's buffers as they are now.
+/// Records each portion with the program's current buffers.
 pub(super) fn record(program: &Program, commands: &[Command]) -> Vec<Recording> {
     portions(commands)
         .into_iter()
@@ -69,7 +71,7 @@ pub(super) fn record(program: &Program, commands: &[Command]) -> Vec<Recording> 
 }
 
 impl Renderer {
-    /// Runs what draws a sample, or with `aovs` the channels of one.
+    /// Runs the recordings of a sample or, with `aovs`, those of its additional channels.
     pub(super) fn run_portions(
         &mut self,
         aovs: bool,
@@ -117,7 +119,7 @@ mod tests {
                 vec!["rays/cast", "rays/objects"]
             ]
         );
-        // Splats are one.
+        // Splats are a single portion.
         assert_eq!(run(&["ssfr/shade", "ssfr/shade"]).len(), 1);
         assert!(run(&[]).is_empty());
     }

@@ -1,4 +1,4 @@
-//! What shades the picture, and the channels beside it.
+//! Plans the shading of the picture and of the additional channels.
 
 use crate::{
     buffers::{BANDS, OWNER, THICKNESS, TRIANGLES, aovs, objects, picture},
@@ -12,21 +12,22 @@ use swell_gpu::{
 };
 use swell_scene::look::{AovSpec, LightSpec, Look, SolidsOutput};
 
-/// What draws the pixels of tiles without water that have solids.
+/// Pass over tiles with solids but no water.
 const DRY: &str = "ssfr/shade_dry";
-/// What draws those of tiles that have neither.
+/// Pass over tiles with neither.
 const BARE: &str = "ssfr/shade_bare";
-/// What adds the light of spray.
+/// Pass that adds the light of spray.
 const WITH_SPRAY: &str = "ssfr/shade_spray";
 
-/// Shading, band by band.
+/// Shading commands, band by band.
 pub(super) struct Shade {
     pub(super) picture: Vec<Command>,
-    /// Nothing where the look asks for no channel.
+    /// Empty where the look requests no additional channels.
     pub(super) aovs: Vec<Command>,
 }
 
-/// Plans the shading of the plan's bands by two passes; `surface` is where the depth of the water stands.
+/// Plans the shading of all bands: the first pass, with the first bindings, shades the picture, the
+/// second one the additional channels.
 fn plan_bands(
     plan: &mut Plan,
     look: &Look,
@@ -73,8 +74,8 @@ fn plan_bands(
     shade
 }
 
-/// Says to the pass that shades the picture what the look does with what is opaque, and which parts of the light it asks for; with spray
-/// that is `condition`.
+/// Configures a pass that shades the picture for the look's treatment of opaque geometry and the
+/// requested light components; with spray also defines `condition`.
 fn plan_output(plan: &mut Plan, look: &Look, pass: &'static str, condition: &'static str) {
     if draws_spray(look) {
         plan.define(pass, condition);
@@ -85,7 +86,7 @@ fn plan_output(plan: &mut Plan, look: &Look, pass: &'static str, condition: &'st
     plan_lights(plan, look, pass);
 }
 
-/// Says to a pass which parts of the light the look asks for.
+/// Configures a pass for the light components that the look requests.
 fn plan_lights(plan: &mut Plan, look: &Look, pass: &'static str) {
     let lights = look.lights();
     if lights.is_empty() {
@@ -107,7 +108,8 @@ fn plan_lights(plan: &mut Plan, look: &Look, pass: &'static str) {
     plan.constants.insert(pass, constants);
 }
 
-/// Plans what tells the objects of a sample apart; nothing where the look asks for no mattes. After the shading, whose bands it takes.
+/// Plans the pass that identifies the objects of a sample; nothing where the look requests no
+/// Cryptomatte. Must follow the shading, whose bands it uses.
 pub(super) fn plan_objects(
     plan: &mut Plan,
     look: &Look,
@@ -137,7 +139,8 @@ pub(super) fn plan_objects(
     commands
 }
 
-/// Whether foam is told from spray: where there are layers for them, and a stream that has both.
+/// Whether foam is separated from spray: where a light component asks for either and there is a
+/// whitewater stream with both.
 pub(super) fn tells_foam(look: &Look) -> bool {
     let mut lights = look.lights().into_iter();
     let is_layer = lights.any(|light| matches!(light, LightSpec::Spray | LightSpec::Foam));
@@ -148,13 +151,13 @@ pub(super) fn draws_spray(look: &Look) -> bool {
     look.spec().water.spray.is_some() || look.spec().whitewater.is_some()
 }
 
-/// Whether a channel beside the picture is that of spray, where it hides what is behind.
+/// Whether an additional channel shows spray where it hides what is behind.
 pub(super) fn wants_spray_aovs(look: &Look) -> bool {
     let mut shown = [AovSpec::Z, AovSpec::P, AovSpec::Forward].into_iter();
     draws_spray(look) && shown.any(|aov| look.wants(aov))
 }
 
-/// Plans the shading of what was splatted; `surface` is where the smoothed depth stands.
+/// Plans the shading of splats; `surface` holds the smoothed depth.
 pub(super) fn plan_shade(plan: &mut Plan, look: &Look, surface: &Buf<f32>) -> Shade {
     plan_output(plan, look, "ssfr/shade", "SPRAY");
     plan_output(plan, look, DRY, "SPRAY");
@@ -163,7 +166,7 @@ pub(super) fn plan_shade(plan: &mut Plan, look: &Look, surface: &Buf<f32>) -> Sh
     if wants_spray_aovs(look) {
         plan.define("ssfr/shade_aovs", "SPRAY");
     }
-    // Without `forward` no one is asked for, and any buffer of words stands in.
+    // Without `forward` the owner is not read, and any buffer of words satisfies the binding.
     let owner = match look.wants(AovSpec::Forward) {
         true => OWNER,
         false => THICKNESS,
@@ -184,7 +187,7 @@ pub(super) fn plan_shade(plan: &mut Plan, look: &Look, surface: &Buf<f32>) -> Sh
         };
         match look.spec().sea {
             None => (shade.picture).extend(by_tiles(plan, surface, (index, grid), band)),
-            // There may be water anywhere.
+            // The sea may be visible anywhere.
             Some(_) => shade.picture.push(band),
         }
         shade.picture.extend(spray);
@@ -198,7 +201,8 @@ pub(super) fn plan_shade(plan: &mut Plan, look: &Look, surface: &Buf<f32>) -> Sh
     shade
 }
 
-/// Tiles in which a band of the picture lies: they begin at multiples of their size in the frame, whatever of it is drawn.
+/// Grid of the tiles that cover a band of the picture. Tiles begin at multiples of their size in
+/// the frame, regardless of the part that is drawn.
 fn tile_grid(plan: &Plan, band: usize) -> TileGrid {
     let [left, top] = plan.extent.margin;
     let row: u32 = plan.bands[..band].iter().sum();
@@ -214,7 +218,8 @@ fn tile_grid(plan: &Plan, band: usize) -> TileGrid {
     }
 }
 
-/// The shading of a band by a pass over tiles with water, one over others with solids, and one over those with neither.
+/// Shades a band by three passes: over tiles with water, over others with solids, and over those
+/// with neither.
 fn by_tiles(
     plan: &mut Plan,
     surface: &Buf<f32>,
@@ -239,7 +244,7 @@ fn by_tiles(
     commands
 }
 
-/// What adds the light of spray to a band, in tiles with spray.
+/// Adds the light of spray to a band, in tiles with spray.
 fn plan_spray_light(plan: &mut Plan, look: &Look, index: usize, grid: TileGrid) -> Vec<Command> {
     plan_lights(plan, look, WITH_SPRAY);
     let (tiles, mut commands) = Tiles::of_spray(plan, &format!("spray.{index}"), grid);

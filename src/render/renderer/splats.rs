@@ -1,4 +1,4 @@
-//! What splats particles into the frame.
+//! Plans the passes that splat particles into the frame.
 
 use super::{
     build::room,
@@ -20,13 +20,13 @@ use swell_gpu::{
 };
 use swell_scene::look::Look;
 
-/// Particles of which every per-particle array begins at a multiple of 256 bytes.
+/// Number of particles at whose multiples every per-particle array is aligned to 256 bytes.
 const STEP: usize = 8;
 
-/// Particles of a workgroup: `ROWS` of shared/ssfr_lanes.wgsl.
+/// Particles per workgroup: `ROWS` of shared/ssfr_lanes.wgsl.
 pub(super) const ROWS: u32 = 8;
 
-/// Passes that share a particle's pixels among threads.
+/// Passes that divide a particle's pixels among threads.
 const OVER_PARTICLES: [&str; 5] = [
     "ssfr/splat_depth",
     "ssfr/splat_owner",
@@ -35,10 +35,10 @@ const OVER_PARTICLES: [&str; 5] = [
     "ssfr/splat_spray_aovs",
 ];
 
-/// Shares a block's pixels among threads alike.
+/// Pass that divides a block's pixels among threads in the same manner.
 const OVER_BLOCKS: &str = "ssfr/splat_bulk";
 
-/// Tells them how many threads share a particle or block.
+/// Configures these passes for the number of threads per particle or block.
 pub(super) fn plan_threads(plan: &mut Plan, limits: &Limits) {
     if limits.is_narrow {
         for pass in OVER_PARTICLES.into_iter().chain([OVER_BLOCKS]) {
@@ -47,51 +47,51 @@ pub(super) fn plan_threads(plan: &mut Plan, limits: &Limits) {
     }
 }
 
-/// A pass over the first page of particles; [`Pages::spread`] makes it one over all.
+/// Dispatch over the first page of particles; [`Pages::spread`] extends it to all pages.
 fn over_page(pass: &'static str, groups: &Buf<Workgroups>, mut binds: Vec<Bind>) -> Command {
     binds.push(PAGES.bind(0));
     Command::in_groups(pass, Groups::at(groups, 0), binds)
 }
 
-/// A pass over particles.
+/// Dispatch over all particles of a page.
 fn over_particles(pass: &'static str, binds: Vec<Bind>) -> Command {
     over_page(pass, &PARTICLE_GROUPS, binds)
 }
 
-/// A pass over those that hold air.
+/// Dispatch over the particles of a page that hold air.
 fn over_aired(pass: &'static str, binds: Vec<Bind>) -> Command {
     over_page(pass, &AIRED_GROUPS, binds)
 }
 
-/// How particles are shared out among dispatches: as many to each as a binding holds.
+/// Division of particles into dispatches, each with as many as a binding holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Pages {
-    /// Particles of a page.
+    /// Particles per page.
     pub(super) page: usize,
-    /// Particles that buffers hold.
+    /// Particles that the buffers hold.
     pub(super) capacity: usize,
 }
 
 impl Pages {
-    /// For buffers of `capacity` particles, of which one binding holds `storage` bytes.
+    /// Pages of buffers of `capacity` particles, with bindings of at most `storage` bytes.
     pub(super) fn new(capacity: usize, storage: u64) -> Self {
         let most = usize::try_from(storage).unwrap_or(usize::MAX) / size_of::<Path>();
-        // A power of two: windows begin at multiples of what adapters ask for.
+        // A power of two, so that windows meet the adapter's alignment.
         let page = 1 << most.max(STEP).ilog2();
         Self { page, capacity }
     }
 
-    /// How many there are.
+    /// Number of pages.
     pub(super) fn count(self) -> usize {
         self.capacity.div_ceil(self.page).max(1)
     }
 
-    /// How many of the first `particles` are in each.
+    /// Number of the first `particles` particles in each page.
     pub(super) fn shares(self, particles: usize) -> impl Iterator<Item = usize> {
         (0..self.count()).map(move |k| particles.saturating_sub(k * self.page).min(self.page))
     }
 
-    /// The same commands with a dispatch for each page in place of one for the first.
+    /// Replaces each dispatch over the first page by one dispatch per page.
     pub(super) fn spread(self, commands: &[Command]) -> Vec<Command> {
         let of_page = |command: &Command, k: usize| match command {
             Command::Dispatch {
@@ -121,7 +121,7 @@ impl Pages {
             .collect()
     }
 
-    /// What a dispatch over page `k` binds.
+    /// Bindings of a dispatch over page `k`.
     fn windows(self, k: usize) -> [Bind; 4] {
         let first = k * self.page;
         let count = self.page.min(self.capacity - first);
@@ -139,7 +139,8 @@ impl Pages {
     }
 }
 
-/// Plans particles. Where the shutter is open `moving` passes, which draw samples, take them along their paths.
+/// Plans the particle buffers. With an open shutter, the passes in `moving`, which draw samples,
+/// move particles along their paths.
 pub(super) fn plan_particles(plan: &mut Plan, look: &Look, moving: &[&'static str]) {
     let particles = room(0);
     plan.per_particle(&PARTICLES, particles, look);
@@ -156,7 +157,7 @@ pub(super) fn plan_particles(plan: &mut Plan, look: &Look, moving: &[&'static st
     }
 }
 
-/// Plans a shape of its own for each particle.
+/// Plans an ellipsoid for each particle.
 pub(super) fn plan_shapes(plan: &mut Plan, look: &Look) {
     plan.per_particle(&SHAPES, room(0), look);
     for pass in ["ssfr/splat_depth", "ssfr/splat_owner"] {
@@ -164,12 +165,12 @@ pub(super) fn plan_shapes(plan: &mut Plan, look: &Look) {
     }
 }
 
-/// The volume that a particle of a spacing stands for over that of its sphere.
+/// Volume of a particle, spacing³, over that of its sphere.
 pub(super) fn filled(spacing: f64, radius: f64) -> f64 {
     spacing.powi(3) / (4.0 / 3.0 * std::f64::consts::PI * radius.powi(3))
 }
 
-/// Plans depth and thickness of particles of a spacing, metres.
+/// Plans depth and thickness of particles; `spacing` is in metres.
 pub(super) fn plan_body(plan: &mut Plan, spacing: f64) -> Vec<Command> {
     let pixels = plan.extent.pixels();
     let scale = Thickness {
@@ -191,13 +192,14 @@ pub(super) fn plan_body(plan: &mut Plan, spacing: f64) -> Vec<Command> {
     ]
 }
 
-/// Plans whose sphere is the nearest, while the depth is still that of the spheres.
+/// Plans the owner of each pixel, the particle with the nearest sphere, while the depth is still
+/// that of the spheres.
 pub(super) fn plan_owner(plan: &mut Plan) -> Vec<Command> {
     let owner = over_particles("ssfr/splat_owner", Vec::new());
     vec![plan_owners(plan), owner]
 }
 
-/// Plans the nearest spheres before the opaque depths of rays, and whose they are.
+/// Plans the nearest spheres in front of the opaque depths of rays, and the owner of each pixel.
 pub(super) fn plan_owner_before_rays(plan: &mut Plan) -> Vec<Command> {
     plan.buffer(&PARTICLE_GROUPS, 1);
     let opaque = Bind::whole("solid_depth", &DEPTHS[1]);
@@ -209,29 +211,30 @@ pub(super) fn plan_owner_before_rays(plan: &mut Plan) -> Vec<Command> {
     ]
 }
 
-/// Plans the owner of each pixel, and gives what says that there is none.
+/// Plans the buffer of owners and returns the command that clears it to "none".
 fn plan_owners(plan: &mut Plan) -> Command {
     let pixels = plan.extent.pixels();
     plan.buffer(&OWNER, pixels);
     plan.fill(&OWNER, u32::MAX, pixels)
 }
 
-/// Words of a half-resolution cell of spray: length and depth; length of foam, where that is told; and for the channels beside the
-/// picture velocity.
+/// Planes of the spray buffer at half resolution, one word per cell: optical length, and length
+/// times depth; then length of foam where it is separated, or for additional channels length times
+/// the three components of velocity.
 const PLANES: usize = 2;
 const PLANES_WITH_FOAM: usize = 3;
 const PLANES_WITH_MOTION: usize = 5;
 
-/// What splats spray, for a sample and for the channels beside the picture.
+/// Commands that splat spray, for a sample and for the additional channels.
 #[derive(Default)]
 pub(super) struct Spray {
     pub(super) sample: Vec<Command>,
-    /// Nothing where these show none.
+    /// Empty where the channels do not show spray.
     pub(super) aovs: Vec<Command>,
 }
 
-/// Plans aerated water and whitewater before the surface, whose depth stands in `surface`, and before what is opaque; nothing
-/// where the look has none.
+/// Plans aerated water and whitewater in front of the surface, whose depth is in `surface`, and of
+/// opaque geometry; nothing where the look has neither.
 pub(super) fn plan_spray(
     plan: &mut Plan,
     look: &Look,
@@ -293,7 +296,7 @@ mod tests {
     use super::*;
     use swell_gpu::{reflect::reflect, shader::compose};
 
-    /// What is dispatched is what the shaders take a workgroup for.
+    /// The workgroup sizes of the shaders match the dispatches.
     #[test]
     fn workgroups_hold_as_many_as_the_shaders_say() {
         for pass in OVER_PARTICLES.into_iter().chain([OVER_BLOCKS]) {

@@ -1,4 +1,4 @@
-//! A frame's particles before they are on the device: which of them may be seen, and how they go.
+//! Prepares a frame's particles for the device: their visibility, order and paths.
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -16,12 +16,13 @@ use crate::{
 use swell_domain::particles::Particles;
 use swell_scene::look::{AovSpec, Look, MethodSpec};
 
-/// Width of the picture's upright strips, pixels, in which particles are sorted. A software adapter gives each thread of a pass that does
-/// not deal its groups out a run of them: with strips both of two threads have near particles, which take longer, and they wait less for
-/// each other's pixels.
+/// Width in pixels of the vertical strips by which particles are sorted. In passes that do not
+/// interleave their workgroups, each thread of a software adapter gets a contiguous run of them.
+/// With strips, every thread gets some near particles, which take longer, and threads contend less
+/// for the same pixels.
 const STRIP: f32 = 64.0;
 
-/// A word that is in the order of a number, as `f32::total_cmp` has it.
+/// Maps a float to a word with the order of `f32::total_cmp`.
 fn in_order(x: f32) -> u32 {
     let bits = x.to_bits();
     match bits >> 31 {
@@ -30,16 +31,16 @@ fn in_order(x: f32) -> u32 {
     }
 }
 
-/// The values that have these indices.
+/// Gathers values by index.
 fn picked<T: Copy + Send + Sync>(values: &[T], indices: &[u32]) -> Vec<T> {
     let of = |&index: &u32| values[index as usize];
     indices.par_iter().map(of).collect()
 }
 
-/// A frame's particles relative to the domain's least corner, with the air in them.
+/// Particles of a frame relative to the domain's least corner, with their air.
 pub(super) struct Taken {
     pub(super) packed: Vec<Particle>,
-    /// How each of them goes; nothing where the look asks for no motion.
+    /// Path of each particle; empty where the look needs no motion.
     pub(super) ways: Vec<Path>,
 }
 
@@ -75,7 +76,8 @@ pub(super) fn frame_seconds(scene: &RenderScene) -> f32 {
     (1.0 / scene.frames_per_second) as f32
 }
 
-/// What other water hides; rays may begin under water, where what the water hides from above is seen.
+/// Finds particles hidden by other water. Ray casting keeps all, because rays may begin under water
+/// and see what is hidden from above.
 pub(super) fn hidden(look: &Look, scene: &RenderScene, packed: &[Particle]) -> Option<Hidden> {
     match look.spec().renderer.method {
         MethodSpec::Ssfr => Some(Hidden::of(
@@ -87,7 +89,7 @@ pub(super) fn hidden(look: &Look, scene: &RenderScene, packed: &[Particle]) -> O
     }
 }
 
-/// Particles relative to the domain's least corner.
+/// Converts particles to positions relative to the domain's least corner.
 fn pack(
     scene: &RenderScene,
     frame: u32,
@@ -114,7 +116,7 @@ fn pack(
         .collect())
 }
 
-/// Cameras of a frame's instant and of its samples.
+/// Cameras of the frame's instant and of its samples.
 pub(super) fn cameras(look: &Look, setting: &Setting, frame: u32) -> Vec<Camera> {
     let samples = [vec![Sample::STILL], samples_of(look)].concat();
     samples
@@ -123,8 +125,9 @@ pub(super) fn cameras(look: &Look, setting: &Setting, frame: u32) -> Vec<Camera>
         .collect()
 }
 
-/// First those that may be seen, strip by strip, front to back, so that splats find what hides them already there; how many they are.
-/// Then those that others hide and those beside the frame; of these `ways` keeps none.
+/// Sorts visible particles to the front, strip by strip and front to back, so that occluders are
+/// splatted first, and returns their number. Hidden particles and those outside the frame follow;
+/// `ways` keeps visible ones only.
 pub(super) fn sort(
     (look, scene): (&Look, &RenderScene),
     (frame, cameras): (u32, &[Camera]),
@@ -138,7 +141,8 @@ pub(super) fn sort(
     let (right, forward) = (pose.right.as_vec3(), pose.forward.as_vec3());
     let depth = |p: &Particle| (Vec3::from(p.position) - eye).dot(forward);
     let focal = cameras.first().map_or(1.0, |camera| camera.focal);
-    // Which strip does not depend on the others, so that the order of two particles is the same with overscan and without.
+    // The strip does not depend on other particles, so that overscan does not change the order of
+    // two particles.
     let strip = |p: &Particle| {
         let aside = (Vec3::from(p.position) - eye).dot(right);
         (focal * aside / depth(p).max(f32::MIN_POSITIVE) / STRIP).floor() as i32
