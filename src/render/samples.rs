@@ -1,24 +1,24 @@
-//! Where in the pixel, in the shutter and on the lens the samples of a frame lie.
+//! Positions of a frame's samples within the pixel, the shutter and the lens.
 
 use std::f64::consts::PI;
 
 use swell_scene::look::{CurveSpec, ImageSpec, Look};
 
-/// Where in the pixel, in the shutter and on the lens a sample lies.
+/// Position of a sample within the pixel, the shutter and the lens.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Sample {
-    /// Pixels from the pixel's centre.
+    /// Offset from the pixel's centre, pixels.
     pub(super) jitter: [f64; 2],
-    /// Frames from the frame's instant.
+    /// Offset from the frame's instant, frames.
     pub(super) instant: f64,
-    /// From the middle of the aperture, to the right and upward, in radii of it.
+    /// Offset from the centre of the aperture, to the right and upward, in units of its radius.
     pub(super) aperture: [f64; 2],
-    /// Part of the pixel's mean.
+    /// Weight in the pixel's mean.
     pub(super) weight: f64,
 }
 
 impl Sample {
-    /// Through the pixel's centre and the middle of the lens, at the frame's instant.
+    /// Sample through the pixel's centre and the centre of the lens at the frame's instant.
     pub(super) const STILL: Self = Self {
         jitter: [0.0; 2],
         instant: 0.0,
@@ -27,12 +27,12 @@ impl Sample {
     };
 }
 
-/// How far a shutter is open over its time: steadily more for the first share of it, wholly, and steadily less for the last.
+/// Opening of a shutter over its time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Curve {
-    /// Wholly, all the time.
+    /// Fully open all the time.
     Box,
-    /// With shares in which it opens and closes.
+    /// Opens and closes linearly over these fractions of the time.
     Ramps([f64; 2]),
 }
 
@@ -45,12 +45,13 @@ impl Curve {
         }
     }
 
-    /// The instant, from the middle of the open time and in units of it, up to which a share of all light has come in.
+    /// Instant at which a fraction `share` of all light has arrived, relative to the middle of the
+    /// open time and in units of it.
     fn instant(self, share: f64) -> f64 {
         let Self::Ramps([open, close]) = self else {
             return share - 0.5;
         };
-        // How far it is open at most, so that all light is 1.
+        // Largest opening, normalised so that all light is 1.
         let height = 1.0 / (1.0 - 0.5 * (open + close));
         let time = if share < 0.5 * height * open {
             (2.0 * open * share / height).sqrt()
@@ -63,16 +64,16 @@ impl Curve {
     }
 }
 
-/// The samples of a look's frame.
+/// Samples of a frame of a look.
 pub(super) fn samples_of(look: &Look) -> Vec<Sample> {
     let image = &look.spec().image;
-    // A file's camera has a lens at all times or at none.
+    // A camera file has a lens at all times or never.
     let has_lens = look.lens(0.0).is_some();
     samples(image.samples, image.shutter, Curve::of(image), has_lens)
 }
 
-/// The samples of one frame: Halton points over the pixel, instants with equal shares of the shutter's light between them, and where
-/// there is a lens points of a spiral over its aperture.
+/// Generates the samples of a frame: Halton points over the pixel, instants that divide the
+/// shutter's light equally and, where there is a lens, points of a spiral over its aperture.
 fn samples(count: u32, shutter: f64, curve: Curve, has_lens: bool) -> Vec<Sample> {
     let points = pixel_points(count);
     let apertures = match has_lens {
@@ -103,7 +104,7 @@ fn pixel_points(count: u32) -> Vec<[f64; 2]> {
         value
     };
     let points = (1..=count).map(|i| [halton(2, i), halton(3, i)]).collect();
-    // Few points of the sequence lean to one side, which would shift the picture.
+    // The first points of the sequence are not centred, which would shift the picture.
     centred(points)
 }
 
@@ -116,11 +117,12 @@ fn centred(mut points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
     points
 }
 
-/// Orders of the aperture's points that are tried.
+/// Number of orders of the aperture points among which the best is chosen.
 const ORDERS: u32 = 64;
 
-/// Points over the unit disc, each with the same part of its area (Vogel 1979), in an order in which neither their places nor their
-/// distances from the middle go with the samples' places in the pixel or with their instants.
+/// Points over the unit disc, each with the same share of its area (Vogel 1979), in an order in
+/// which neither their positions nor their distances from the centre correlate with the samples'
+/// positions in the pixel or with their instants.
 fn aperture_points(count: u32, pixel: &[[f64; 2]]) -> Vec<[f64; 2]> {
     let golden = PI * (3.0 - 5f64.sqrt());
     let points: Vec<[f64; 2]> = (0..count)
@@ -132,7 +134,8 @@ fn aperture_points(count: u32, pixel: &[[f64; 2]]) -> Vec<[f64; 2]> {
         .collect();
     let points = centred(points);
     let ordered = |m: u32| {
-        // The ranks of multiples of an irrational number, modulo 1, are a permutation without much order.
+        // Ranks of the multiples of an irrational number modulo 1 give a permutation with little
+        // structure.
         let step = (f64::from(m) * 2f64.sqrt()).fract();
         let key = |i: &usize| ((*i + 1) as f64 * step).fract();
         let mut order: Vec<usize> = (0..points.len()).collect();
@@ -151,7 +154,7 @@ fn aperture_points(count: u32, pixel: &[[f64; 2]]) -> Vec<[f64; 2]> {
     best.map(|(_, points)| points).unwrap_or_default()
 }
 
-/// The largest correlation, of either sign, of aperture points with places in the pixel and with instants.
+/// Largest absolute correlation of aperture points with positions in the pixel and with instants.
 fn dependence(aperture: &[[f64; 2]], pixel: &[[f64; 2]]) -> f64 {
     let column = |points: &[[f64; 2]], value: fn(&[f64; 2]) -> f64| -> Vec<f64> {
         points.iter().map(value).collect()
@@ -172,7 +175,7 @@ fn dependence(aperture: &[[f64; 2]], pixel: &[[f64; 2]]) -> f64 {
     pairs.fold(0.0, f64::max)
 }
 
-/// 0 where one of them does not vary.
+/// Pearson correlation; 0 where either list is constant.
 fn correlation(a: &[f64], b: &[f64]) -> f64 {
     let mean = |x: &[f64]| x.iter().sum::<f64>() / x.len() as f64;
     let (mean_a, mean_b) = (mean(a), mean(b));
@@ -212,8 +215,8 @@ mod tests {
         );
     }
 
-    /// Mean and mean square of the time at which light comes in, from the moment of opening, in closed form: over each of the two
-    /// ramps and between them.
+    /// Mean and mean square of the time at which light arrives, from the moment of opening, in
+    /// closed form over both ramps and the time between them.
     fn moments([open, close]: [f64; 2]) -> [f64; 2] {
         let height = 1.0 / (1.0 - 0.5 * (open + close));
         let end = 1.0 - close;
@@ -231,8 +234,8 @@ mod tests {
     #[test]
     fn instants_have_the_mean_and_the_variance_of_the_shutters_curve() {
         const COUNT: u32 = 1000;
-        // The middle of a step of a monotone function is off its mean by half of what it rises there at most: all steps together
-        // by 1 / 2 N, for times and for their squares.
+        // At the midpoint of a step, a monotone function differs from its mean over the step by at
+        // most half of its rise there: by 1 / 2 N over all steps, for times and for their squares.
         let bound = 0.5 / f64::from(COUNT);
         for ramps in [[0.5, 0.5], [0.25, 0.25], [0.1, 0.6], [0.0, 1.0], [0.0, 0.0]] {
             let found = samples(COUNT, 0.5, Curve::Ramps(ramps), false);
@@ -244,11 +247,11 @@ mod tests {
                 (mean - first).abs().max((square - second).abs())
             };
             assert!(off(ramps) < bound, "{ramps:?}: {}", off(ramps));
-            // The control: a tenth more of a ramp.
+            // Control: a ramp that differs by a tenth.
             let other = [ramps[0], (ramps[1] - 0.1f64).abs()];
             assert!(off(other) > 3.0 * bound, "{ramps:?}: {}", off(other));
         }
-        // Of a box and of a triangle the variances that everyone knows.
+        // Well-known variances of a box and of a triangle.
         let variance = |ramps| {
             let [first, second] = moments(ramps);
             second - first * first
@@ -267,12 +270,13 @@ mod tests {
             let n = f64::from(count);
             let apertures: Vec<[f64; 2]> = found.iter().map(|s| s.aperture).collect();
             let jitters: Vec<[f64; 2]> = found.iter().map(|s| s.jitter).collect();
-            // Of a disc of radius 1 the mean square distance from the middle is a half, and so it is of the spiral, less the
-            // square of a mean that is taken off it.
+            // The mean square distance from the centre is one half on a disc of radius 1 and on the
+            // spiral, except for the square of the mean that is subtracted.
             let square = apertures.iter().map(|a| a[0] * a[0] + a[1] * a[1]);
             let square = square.sum::<f64>() / n;
             assert!((square - 0.5).abs() < 1.0 / n, "{count}: {square}");
-            // No two are nearer than half of what n points on a square lattice over the disc are.
+            // The least distance is at least half that of n points on a square lattice over the
+            // disc.
             let nearest = |i: usize| {
                 let others = apertures.iter().enumerate().filter(|other| other.0 != i);
                 others
@@ -283,10 +287,10 @@ mod tests {
                 .map(nearest)
                 .fold(f64::INFINITY, f64::min);
             assert!(least > 0.5 * (PI / n).sqrt(), "{count}: {least}");
-            // The largest of nine correlations of independent draws is 2/√n in the mean.
+            // The expected maximum of nine correlations of independent samples is about 2/√n.
             let found = dependence(&apertures, &jitters);
             assert!(found < 1.5 / n.sqrt(), "{count}: {found}");
-            // The control: as the spiral goes, far points come last.
+            // Control: in the spiral's own order, distant points come last.
             let spiral: Vec<[f64; 2]> = {
                 let mut sorted = apertures.clone();
                 sorted.sort_by(|a, b| a[0].hypot(a[1]).total_cmp(&b[0].hypot(b[1])));

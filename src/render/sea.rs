@@ -1,4 +1,5 @@
-//! The sea beyond the box: its still level, its waves, and the heights at which the simulated water meets it.
+//! The sea beyond the box: its still level, its waves, and the heights at which the simulated water
+//! joins it.
 
 use glam::{DVec2, DVec3, Vec3};
 
@@ -20,16 +21,17 @@ use swell_domain::{
 use swell_gpu::program::Program;
 use swell_scene::look::{Look, SeaSpec, SeaWavesSpec};
 
-/// γ of a sea that still grows (Hasselmann et al. 1973).
+/// Peak enhancement γ of a growing sea (Hasselmann et al. 1973).
 const PEAK_ENHANCEMENT: f64 = 3.3;
-/// Shortest period over the peak's where the look leaves it out; waves that are shorter are for the look's ripples.
+/// Default shortest period over the peak period; the look's ripples represent shorter waves.
 const SHORTEST: f64 = 0.35;
-/// Of waves that the look asks for, m/s²; those of the scene have the scene's.
+/// Gravity for waves that the look specifies, m/s²; waves of the scene use the scene's gravity.
 const GRAVITY: f64 = 9.81;
-/// Heights of the sea lie within so many times the root of their variance: two places in 10⁸ of a Gaussian sea are higher.
+/// Bound of the sea's height in standard deviations; a Gaussian sea exceeds it at two of 10⁸
+/// points.
 const HIGHEST: f64 = 5.5;
 
-/// Waves of a sea, lengths in metres from the domain's least corner; none where it lies still.
+/// Waves of a sea, with lengths in metres from the domain's least corner; `None` for a still sea.
 fn waves(look: &SeaSpec, scene: &RenderScene) -> Option<OpenWaves> {
     let Some(asked) = &look.waves else {
         return scene.waves.clone();
@@ -57,7 +59,7 @@ fn open_sea(asked: &SeaWavesSpec, depth: f64) -> OpenSea {
     }
 }
 
-/// Plans the sea; nothing where the look has none.
+/// Plans the sea; does nothing where the look has none.
 pub(super) fn plan_sea(plan: &mut Plan, look: &Look, scene: &RenderScene, passes: &[&'static str]) {
     if look.spec().sea.is_none() {
         return;
@@ -73,22 +75,22 @@ pub(super) fn plan_sea(plan: &mut Plan, look: &Look, scene: &RenderScene, passes
     );
 }
 
-/// The sea of a look, on its way to the device.
+/// The sea of a look, and its state on the device.
 pub(super) struct Sea {
     look: SeaSpec,
-    /// Those with the longest waves first.
+    /// Wave components in order of decreasing wavelength.
     lines: Vec<Line>,
     waves: Option<OpenWaves>,
-    /// Particles of the body, and how they go.
+    /// Positions and paths of the body's particles.
     places: Vec<(Vec3, Path)>,
-    /// Seconds from the frame, and since frame 0, at which the device holds it.
+    /// Seconds from the frame and since frame 0 for which the device holds the sea.
     stands: Option<[f32; 2]>,
-    /// Its greatest height as it stands there, metres.
+    /// Greatest height of the sea at that instant, metres.
     highest: f64,
 }
 
 impl Sea {
-    /// `None` where the look has no sea.
+    /// Returns `None` where the look has no sea.
     pub(super) fn of(look: &Look, scene: &RenderScene) -> Option<Self> {
         let look = look.spec().sea.clone()?;
         let waves = waves(&look, scene);
@@ -104,13 +106,14 @@ impl Sea {
         })
     }
 
-    /// Takes a frame's particles, those that belong to the body; without `paths` they go straight on.
+    /// Takes the particles of a frame that belong to the body; without `paths` they move in
+    /// straight lines.
     pub(super) fn take(&mut self, particles: &[uniform::Particle], paths: &[Path]) {
         self.places = body_of(particles, paths);
         self.stands = None;
     }
 
-    /// Has the device hold the sea of a sample.
+    /// Uploads the sea at the instant of a sample.
     pub(super) fn stand_at(
         &mut self,
         camera: &uniform::Camera,
@@ -134,7 +137,7 @@ impl Sea {
         program.upload(SEA_VALUES, 0, &self.values(&edges, camera.clock.into()));
     }
 
-    /// Its greatest height as the device holds it, metres.
+    /// Greatest height of the sea on the device, metres.
     pub(super) fn highest(&self) -> f64 {
         self.highest
     }
@@ -142,7 +145,7 @@ impl Sea {
     fn uniform(&self, edges: &Edges, scene: &RenderScene) -> uniform::Sea {
         let level = self.look.level_m;
         let variance: f64 = self.lines.iter().map(|it| 0.5 * it.elevation.powi(2)).sum();
-        // Of a few waves the sum of their heights is less.
+        // With few components, the sum of their amplitudes is less.
         let sum: f64 = self.lines.iter().map(|it| it.elevation.abs()).sum();
         let swing = (HIGHEST * variance.sqrt()).min(sum);
         let heights = edges.heights.iter().map(|&h| f64::from(h));
@@ -164,8 +167,9 @@ impl Sea {
         }
     }
 
-    /// Two quads for each wave: k, phase now and amplitude; ω and amplitude of the horizontal velocity. Then the heights at the
-    /// edges, four a quad.
+    /// Two vectors per wave component: wave vector, current phase and amplitude; then angular
+    /// frequency and amplitude of the horizontal velocity. The heights along the edges follow, four
+    /// per vector.
     fn values(&self, edges: &Edges, clock: f64) -> Vec<[f32; 4]> {
         let grown = self.waves.as_ref().map_or(0.0, |waves| waves.grown(clock));
         let mut quads = vec![[0.0; 4]; 2 * LINES as usize];

@@ -1,4 +1,4 @@
-//! What is opaque, drawn and in the sun's shadow map.
+//! Rasterises opaque geometry into the frame and into the sun's shadow map.
 
 use glam::{DVec3, Mat4, Vec3};
 use wgpu::{CompareFunction, TextureFormat};
@@ -15,15 +15,16 @@ use swell_gpu::{
     texture::TextureSpec,
 };
 
-/// About what throws shadows, and before and behind it, over the domain's longer side on the ground: quay walls reach far, and in
-/// front of the box they must still be seen by it.
+/// Margins of the shadow map around the shadow casters, and along the light's direction, relative
+/// to the domain's longer horizontal side. Quay walls reach far and must be in the depth range even
+/// in front of the box.
 const SHADOW_MARGIN: f32 = 0.02;
 const SHADOW_DEPTH: f32 = 2.4;
 
 /// Texels along a side of the shadow map.
 const SHADOW_SIZE: u32 = 2048;
 
-/// The sun's view of everything opaque, and of the domain: an orthographic box.
+/// Orthographic projection along the sun's direction that covers solids and the domain.
 pub(super) fn shadow_from_world(triangles: &[Triangle], domain: DVec3, sun: DVec3) -> Mat4 {
     let forward = -sun.as_vec3();
     let helper = if forward.y.abs() > 0.99 {
@@ -43,7 +44,7 @@ pub(super) fn shadow_from_world(triangles: &[Triangle], domain: DVec3, sun: DVec
     let size = domain.as_vec3();
     for i in 0..8u32 {
         let pick = |axis: u32, length: f32| if i >> axis & 1 == 1 { length } else { 0.0 };
-        // Shadows fall on the ground; the domain's ceiling throws none.
+        // The ground receives shadows; the domain's ceiling casts none.
         take(Vec3::new(
             pick(0, size.x),
             pick(1, 0.3 * size.y),
@@ -74,7 +75,8 @@ pub(super) fn shadow_from_world(triangles: &[Triangle], domain: DVec3, sun: DVec
     .transpose()
 }
 
-/// Plans the colours of materials in the passes that shade; nothing where all have the look's own.
+/// Plans the palette in the shading passes; does nothing where all materials have the look's own
+/// colours.
 pub(super) fn plan_palette(plan: &mut Plan, palette: &[[f32; 4]], passes: &[&'static str]) {
     if palette.is_empty() {
         return;
@@ -87,22 +89,22 @@ pub(super) fn plan_palette(plan: &mut Plan, palette: &[[f32; 4]], passes: &[&'st
     plan.values(&PALETTE, &all);
 }
 
-/// Depth, normal and material of the solids in a tile.
+/// Writes depth, normal and material of the solids in a tile.
 const SOLID: RasterSpec = RasterSpec {
     name: "ssfr/solid",
     colours: &[TextureFormat::R32Float, TextureFormat::R32Uint],
-    // Near over depth: the nearest is the greatest.
+    // The depth value is near over depth: the nearest fragment has the greatest.
     compare: CompareFunction::Greater,
     defines: &[],
 };
 
-/// Depth and triangle, which tells more.
+/// Writes depth and triangle index, from which the normal and the material follow.
 const PAINTED: RasterSpec = RasterSpec {
     defines: &["MATERIALS"],
     ..SOLID
 };
 
-/// Depth alone, as the sun sees it.
+/// Writes depth only, as seen by the sun.
 const SHADOW: RasterSpec = RasterSpec {
     name: "ssfr/shadow",
     colours: &[],
@@ -110,18 +112,19 @@ const SHADOW: RasterSpec = RasterSpec {
     defines: &[],
 };
 
-/// What is opaque, as its passes take it.
+/// Opaque geometry as its passes receive it.
 #[derive(Clone, Copy)]
 pub(super) struct Set<'a> {
-    /// In the buffer of triangles first.
+    /// Triangles, at the start of the triangle buffer.
     pub(super) triangles: &'a [Triangle],
-    /// Behind them: how pictures lie on them.
+    /// Texture mappings, which follow the triangles.
     pub(super) places: &'a [Triangle],
     /// Whether the look names materials.
     pub(super) is_painted: bool,
 }
 
-/// Plans the shadow map, and gives what draws it: once, since solids do not move. Without solids it is one texel that shades nothing.
+/// Plans the shadow map and returns the command that draws it once, since solids do not move.
+/// Without opaque geometry the map is a single texel at the far plane.
 pub(super) fn plan_shadow(
     plan: &mut Plan,
     set: &Set<'_>,
@@ -157,7 +160,7 @@ pub(super) fn plan_shadow(
     })
 }
 
-/// Plans what draws the solids into the frame's buffers, tile by tile.
+/// Plans the commands that draw the solids into the frame's buffers, tile by tile.
 pub(super) fn plan_solids(plan: &mut Plan, set: &Set<'_>, limits: &Limits) -> Vec<Command> {
     let triangles = set.triangles;
     let pixels = plan.extent.pixels();
@@ -197,7 +200,7 @@ pub(super) fn plan_solids(plan: &mut Plan, set: &Set<'_>, limits: &Limits) -> Ve
         .collect()
 }
 
-/// Draws one tile and copies it to its place in the frame.
+/// Draws one tile and copies it to its position in the frame.
 fn draw_tile(
     plan: &mut Plan,
     index: usize,

@@ -1,8 +1,10 @@
-//! What particles are splatted as: their kernels (Yu and Turk 2013), scaled so that a lone particle is a ball of its own volume.
+//! Ellipsoids as which particles are splatted: their anisotropic kernels (Yu and Turk 2013), scaled
+//! so that a lone particle is a sphere of its own volume.
 //!
-//! Balls leave a silhouette 0.17 spacings rough. A kernel is flat where the water is, so that the beads of its outermost particles
-//! lie within one another. Where the water is uneven the nearest of them would stand out of it, by as much as particles do: each ends
-//! where the kernels' field does, which is the surface that rays meet.
+//! Spheres would give a silhouette with a roughness of 0.17 spacings. Kernels are flat at a flat
+//! surface, so that those of the outermost particles merge. Where the surface is uneven, the
+//! nearest kernels would protrude as far as the particles do; each ellipsoid therefore ends where
+//! the field of all kernels does, at the surface that rays meet.
 
 use std::f64::consts::PI;
 
@@ -18,15 +20,16 @@ use swell_domain::level_set::{
     kernels::{ALONE, Ellipsoid, Field, Kernels},
 };
 
-/// Splat radius over particle spacing where the look leaves it out: 0.5 √3 closes a lattice seen along its
-/// diagonal.
+/// Default splat radius over particle spacing; 0.5 √3 closes a lattice seen along its diagonal.
 pub(super) const RADIUS: f64 = 0.87;
 
-/// Least half axis, spacings: half of what a sheet of one layer of particles is thick in the kernels' field.
+/// Least half axis, spacings: half the thickness of a single layer of particles in the kernels'
+/// field.
 const THINNEST: f64 = 0.35;
 
-/// Shapes of the first `seen` particles of all, relative to the domain's least corner, in their order; those that were thrown clear have
-/// that of a lone one. `radius` is the look's, metres.
+/// Ellipsoids of the first `seen` particles, in their order, fitted to all particles of the body;
+/// `particles` are relative to the domain's least corner. Particles that were thrown clear are
+/// spheres. `radius` is the look's splat radius, metres.
 pub(super) fn shapes(
     particles: &[Particle],
     seen: usize,
@@ -40,7 +43,8 @@ pub(super) fn shapes(
     let shaped = particles[..seen].iter().filter(is_body).count();
     let spacing = scene.particle_spacing;
     let kernels = Kernels::of_first(shaped, &places, scene.domain.size(), spacing);
-    // A ball of d³ over a lone particle's kernel, and the look's radius over that of looks that leave it out.
+    // Radius of a sphere of volume d³ over that of a lone particle's kernel, times the look's
+    // radius over the default one.
     let factor = (3.0 / (4.0 * PI)).cbrt() / ALONE * radius / (RADIUS * spacing);
     let thinnest = THINNEST * radius / RADIUS;
     let all = Kernels::of_fitted(kernels, scene.domain.size(), spacing);
@@ -61,12 +65,13 @@ pub(super) fn shapes(
     particles[..seen].iter().map(of).collect()
 }
 
-/// Kernels less flat than this, shortest over longest half axis, are within the water: half a lattice's outermost are 0.63.
+/// Ratio of shortest to longest half axis above which a kernel is inside the water. At the surface
+/// of a half-space lattice it is 0.63.
 const ROUND: f64 = 0.9;
 
-/// Twice as flat as the kernel: half axes go with its squares, so that the outermost particles of half a lattice, whose kernels are
-/// 0.63 as high as wide, leave a surface 0.47 spacings above them, 0.02 rough; the water's own stands half a spacing above. Kernels as
-/// they are would leave one 0.74 above.
+/// Squares the flattening of a kernel. The outermost particles of a half-space lattice, with
+/// kernels 0.63 as high as wide, then give a surface 0.47 spacings above them with a roughness of
+/// 0.02; the water's own surface is half a spacing above. Unmodified kernels would give 0.74.
 fn shape(kernel: &Ellipsoid, field: &Field<'_>, factor: f64, thinnest: f64) -> Shape {
     let (inverse, turn) = eigen::symmetric(kernel.inverse);
     let longest = 1.0 / inverse.min_element();
@@ -87,8 +92,9 @@ fn shape(kernel: &Ellipsoid, field: &Field<'_>, factor: f64, thinnest: f64) -> S
     }
 }
 
-/// How far the field's water goes from `centre` along `axis`, on the side where it ends sooner, up to `most`, metres: by the line
-/// between the values there, and from that one step of Newton.
+/// Distance from `centre` along `axis` to the end of the field's water, on the side where it ends
+/// sooner and at most `most`, metres: by linear interpolation between the values at both ends and
+/// one Newton step.
 fn reach(centre: DVec3, axis: DVec3, most: f64, field: &Field<'_>) -> f64 {
     let (inner, gradient) = field.value_and_gradient(centre);
     let outward = if gradient.dot(axis) > 0.0 {
@@ -142,7 +148,8 @@ mod tests {
         shapes(&particles, particles.len(), &scene, RADIUS * D)
     }
 
-    /// A lone particle is a ball of its volume, one of a calm surface lies flat in it, one within the water is round.
+    /// A lone particle is a sphere of its volume, one at a calm surface is flat in it, and one
+    /// inside the water is round.
     #[test]
     fn shapes_follow_the_neighbours() {
         let lone = of(&[DVec3::splat(2.0)])[0];
@@ -155,7 +162,8 @@ mod tests {
         let shapes = of(&pool);
         let place = |y: usize| &shapes[10 + 20 * y + 200 * 10];
         let [top, middle] = [place(9), place(5)].map(|it| it.diagonal.map(|x| f64::from(x) / D));
-        // 0.633² of 1.241, and all of that along the surface, by hand from the weights of half a lattice.
+        // 0.633² of 1.241 across the surface and 1.241 along it, calculated by hand from the
+        // weights of a half-space lattice.
         assert!(
             (top[1] - 0.497).abs() < 0.01 && (top[0] - 1.24).abs() < 0.03,
             "{top:?}"
@@ -166,8 +174,8 @@ mod tests {
         );
     }
 
-    /// Of an uneven pool's particles whose shapes are flat, the least values of the field at the ends of their shortest axes, for axes
-    /// that are `factor` times as long.
+    /// For the flat ellipsoids of an uneven pool, the lesser of the field's values at the two ends
+    /// of the shortest axis, stretched by `factor`.
     fn ends(factor: f64) -> Vec<f64> {
         let mut seed = 7u32;
         let mut random = || {
@@ -189,7 +197,7 @@ mod tests {
             let short = axes.min_position();
             let way = factor * axes[short] * turn.col(short);
             let is_flat = axes[short] < 0.6 * axes.max_element();
-            // The least axis is not shortened further.
+            // The clamped least axis is not shortened further.
             let is_free = axes[short] > 1.001 * THINNEST * D;
             (is_flat && is_free).then(|| field.value(place + way).min(field.value(place - way)))
         };
@@ -197,8 +205,8 @@ mod tests {
         found.collect()
     }
 
-    /// Where particles stand out of a surface their splats do not: of two steps' error 0.02 of the field are left, a hundredth of a
-    /// spacing.
+    /// Splats do not protrude where particles do: two steps of iteration leave an error of 0.02 in
+    /// the field, a hundredth of a spacing.
     #[test]
     fn no_splat_stands_out_of_the_field() {
         let out = |factor: f64| {
@@ -208,7 +216,7 @@ mod tests {
             out as f64 / values.len() as f64
         };
         assert!(out(1.0) < 0.01, "{}", out(1.0));
-        // The control: a tenth longer.
+        // Control: axes longer by a tenth.
         assert!(out(1.1) > 0.2, "{}", out(1.1));
     }
 }

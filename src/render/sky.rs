@@ -1,4 +1,4 @@
-//! Sky, sun and the light that they throw on the set.
+//! Sky and sun, and the light they cast on the scene.
 
 use std::f64::consts::PI;
 
@@ -10,34 +10,35 @@ use rayon::prelude::*;
 use super::RenderError;
 use swell_scene::look::{Look, SkySpec};
 
-/// A latitude-longitude image, and integrals over it.
+/// A latitude-longitude image of the sky, with integrals over it.
 pub(super) struct Sky {
     pub(super) size: [u32; 2],
-    /// Row by row from the zenith; alpha 1.
+    /// Rows from the zenith down; alpha is 1.
     pub(super) texels: Vec<[f16; 4]>,
-    /// Coefficients of the irradiance over direction, in the order of `ssfr_light.wgsl`.
+    /// Spherical-harmonics coefficients of the irradiance, in the order of `ssfr_light.wgsl`.
     pub(super) irradiance: [[f32; 4]; 9],
-    /// On a face at right angles to the sun.
+    /// Irradiance of the sun on a face perpendicular to it.
     pub(super) sun_irradiance: Vec3,
-    /// Radiance over irradiance of the sun's disc; 0 where the image holds the disc itself.
+    /// Radiance over irradiance of the sun's disc, 1/sr; 0 where the image contains the disc.
     pub(super) disc: f32,
 }
 
-/// Reflectance of white paint that lies in the open under a sun at 45° and a sky of turbidity 3 gives
-/// radiance 1: that fixes the unit of light, and exposures are counted from there.
+/// Sun elevation and turbidity that define the unit of light: white paint on level ground under
+/// this sun and sky has radiance 1. Exposures are relative to that.
 const REFERENCE_ELEVATION: f64 = PI / 4.0;
 const REFERENCE_TURBIDITY: f64 = 3.0;
-/// Part of that light that comes from the sky, not the sun (clear-sky measurements lie between 0.15 and 0.2).
+/// Fraction of the reference light that comes from the sky rather than the sun; clear-sky
+/// measurements are between 0.15 and 0.2.
 const REFERENCE_DIFFUSE: f64 = 0.18;
 /// Solid angle of the sun, sr.
 const SUN_SOLID_ANGLE: f64 = 6.794e-5;
 
-/// Illuminance of sunlight outside of the air, lux: the solar illuminance constant.
+/// Solar illuminance constant: illuminance of sunlight outside the atmosphere, lux.
 const SOLAR_ILLUMINANCE: f64 = 133e3;
 
-/// Luminance, cd/m², of radiance 1 in all three channels. White under the reference sun and sky has it: the sun's illuminance outside
-/// of the air, times what of it the air lets through, on a level face; with the sky's part; over π, for white paint sends light
-/// everywhere alike.
+/// Luminance, cd/m², of radiance 1 in all three channels, which white has under the reference sun
+/// and sky: the solar illuminance, times the transmittance of the air, on a level face, plus the
+/// sky's share; over π, because white paint is a Lambertian reflector.
 pub(super) fn white_luminance() -> f64 {
     let through = luminance(transmittance(REFERENCE_ELEVATION, REFERENCE_TURBIDITY));
     let sun = SOLAR_ILLUMINANCE * through * REFERENCE_ELEVATION.sin();
@@ -48,16 +49,16 @@ fn luminance(c: DVec3) -> f64 {
     c.dot(DVec3::new(0.2126, 0.7152, 0.0722))
 }
 
-/// Optical depth of the air from the ground to the zenith at a wavelength in micrometres, but for ozone: that of molecules and that of
-/// aerosols (Preetham, Shirley and Smits 1999, appendix A.1).
+/// Optical depths of the air from the ground to the zenith at a wavelength in micrometres, without
+/// ozone: of molecules and of aerosols (Preetham, Shirley and Smits 1999, appendix A.1).
 fn depths(micrometres: f64, turbidity: f64) -> [f64; 2] {
     let beta = 0.04608 * turbidity - 0.04586;
     let rayleigh = 0.008735 * micrometres.powf(-4.08);
     [rayleigh, beta * micrometres.powf(-1.3)]
 }
 
-/// Part of the sunlight that the air lets through at 650, 550 and 450 nm: Rayleigh, aerosol and ozone, as
-/// Preetham, Shirley and Smits 1999 give them (appendix A.1).
+/// Transmittance of the air for sunlight at 650, 550 and 450 nm, by Rayleigh scattering, aerosols
+/// and ozone (Preetham, Shirley and Smits 1999, appendix A.1).
 fn transmittance(elevation: f64, turbidity: f64) -> DVec3 {
     let zenith = PI / 2.0 - elevation;
     let mass = 1.0 / (zenith.cos() + 0.15 * (93.885 - zenith.to_degrees()).powf(-1.253));
@@ -68,11 +69,12 @@ fn transmittance(elevation: f64, turbidity: f64) -> DVec3 {
     DVec3::new(at(0.65, 0.062), at(0.55, 0.085), at(0.45, 0.003))
 }
 
-/// How fast molecules and aerosols become fewer with height, 1/m (Preetham, Shirley and Smits 1999, section 4).
+/// Rates at which the densities of molecules and aerosols decay with height, 1/m (Preetham, Shirley
+/// and Smits 1999, section 4).
 const DECAY: [f64; 2] = [0.1136e-3, 0.8333e-3];
 
-/// Extinction of the air at the ground at 550 nm, 1/m: the same depths as those of the sunlight, of layers that become thinner with
-/// height as [`DECAY`] says.
+/// Extinction of the air at the ground at 550 nm, 1/m: from the same optical depths as those of the
+/// sunlight, in layers that decay with height by [`DECAY`].
 pub(super) fn extinction(turbidity: f64) -> f64 {
     let layers = depths(0.55, turbidity).into_iter().zip(DECAY);
     layers.map(|(depth, decay)| depth * decay).sum()
@@ -97,7 +99,7 @@ fn radiance(state: &SkyState, direction: DVec3, sun: DVec3) -> DVec3 {
     )
 }
 
-/// Direction of a texel's centre and the solid angle that it covers; as `sky_radiance` in the shader.
+/// Direction of a texel's centre and its solid angle; matches `sky_radiance` in the shader.
 fn texel(size: [u32; 2], x: u32, y: u32) -> (DVec3, f64) {
     let azimuth = ((f64::from(x) + 0.5) / f64::from(size[0]) - 0.5) * 2.0 * PI;
     let polar = (f64::from(y) + 0.5) / f64::from(size[1]) * PI;
@@ -115,7 +117,7 @@ fn image(size: [u32; 2], colour: impl Fn(DVec3) -> DVec3 + Sync) -> Vec<DVec3> {
         .collect()
 }
 
-/// Irradiance on a level face from above.
+/// Irradiance on a level face from the upper hemisphere.
 fn from_above(size: [u32; 2], texels: &[DVec3]) -> DVec3 {
     texels
         .iter()
@@ -127,7 +129,7 @@ fn from_above(size: [u32; 2], texels: &[DVec3]) -> DVec3 {
         .sum()
 }
 
-/// Cosine-convolved spherical harmonics up to order 2 (Ramamoorthi and Hanrahan 2001).
+/// Spherical harmonics up to order 2, convolved with the cosine (Ramamoorthi and Hanrahan 2001).
 fn harmonics(size: [u32; 2], texels: &[DVec3]) -> [[f32; 4]; 9] {
     let mut sums = [DVec3::ZERO; 9];
     for (&colour, i) in texels.iter().zip(0u32..) {
@@ -157,7 +159,7 @@ fn harmonics(size: [u32; 2], texels: &[DVec3]) -> [[f32; 4]; 9] {
     })
 }
 
-/// The nine functions, and the constant before each.
+/// Values of the nine basis functions, and the constant factor of each.
 fn basis(d: DVec3) -> [(f64, f64); 9] {
     const C: [f64; 5] = [0.282_095, 0.488_603, 1.092_548, 0.315_392, 0.546_274];
     [
@@ -174,7 +176,7 @@ fn basis(d: DVec3) -> [(f64, f64); 9] {
 }
 
 impl Sky {
-    /// Bakes the look's sky; `limit` is the widest texture.
+    /// Bakes the look's sky; `limit` is the largest texture width.
     pub(super) fn new(look: &Look, limit: u32) -> Result<Self, RenderError> {
         let spec = look.spec();
         let sun = look.sun_direction();
@@ -206,13 +208,13 @@ impl Sky {
                 let mut texels = image(size, |d| {
                     radiance(&state, DVec3::new(d.x, d.y.max(0.0), d.z), sun) * unit
                 });
-                // Below the horizon lies the ground, lit by what is above.
+                // Below the horizon is the ground, lit by the sky and the sun.
                 let light = from_above(size, &texels) + sun_irradiance * sun.y;
                 let ground = light * DVec3::from(spec.ground.colour) / PI;
                 let below = texels.len() / 2;
                 texels[below..].fill(ground);
-                // Just below it far ground is lost in the air: a row of the sky's, so that none of the ground's is mixed into the
-                // horizon.
+                // The row just below the horizon repeats the sky's, because distant ground fades
+                // into the air; without it, interpolation would mix ground into the horizon.
                 let row = size[0] as usize;
                 texels.copy_within(below - row..below, below);
                 (size, texels, 1.0 / SUN_SOLID_ANGLE)
@@ -318,7 +320,7 @@ mod tests {
     fn a_uniform_sky_gives_pi_times_its_radiance_in_every_direction() {
         let size = [64, 32];
         let coefficients = harmonics(size, &vec![DVec3::ONE; 64 * 32]);
-        // The quadrature's own error at 32 rows is (π/64)²/6 ≈ 4e-4 of π.
+        // The quadrature error at 32 rows is (π/64)²/6 ≈ 4e-4 of π.
         assert!((f64::from(coefficients[0][0]) - PI).abs() < 3e-3);
         assert!(coefficients[1..].iter().all(|c| c[0].abs() < 3e-3));
     }
@@ -335,7 +337,7 @@ mod tests {
         assert!(low.sun_irradiance.x < high.sun_irradiance.x);
         let ratio = |c: Vec3| c.z / c.x;
         assert!(ratio(low.sun_irradiance) < 0.3 * ratio(high.sun_irradiance));
-        // The unit of light: white lying in the open under the reference sky has radiance 1.
+        // The unit of light: white on level ground under the reference sky has radiance 1.
         let up = |c: &[[f32; 4]; 9]| {
             DVec3::from_array([0, 1, 2].map(|i| f64::from(c[0][i] + c[1][i] - c[6][i] - c[8][i])))
         };
@@ -346,13 +348,14 @@ mod tests {
 
     #[test]
     fn white_is_as_bright_as_daylight() {
-        // A clear sky of the Illuminating Engineering Society (Handbook, 9th edition, chapter 8): the sun's 127.5 klx times
-        // exp(−0.21 / sin h), and 0.8 + 15.5 √sin h klx from the sky, on a level face. It is for air clearer than turbidity 3.
+        // Clear sky of the Illuminating Engineering Society (Handbook, 9th edition, chapter 8): on
+        // a level face, 127.5 klx exp(−0.21 / sin h) from the sun and 0.8 + 15.5 √sin h klx from
+        // the sky. It describes air clearer than turbidity 3.
         let sin = REFERENCE_ELEVATION.sin();
         let clear = 127.5e3 * (-0.21 / sin).exp() * sin + 800.0 + 15_500.0 * sin.sqrt();
         let part = white_luminance() * PI / clear;
         assert!((0.8..1.0).contains(&part), "{part}");
-        // Control: light on a face towards the sun.
+        // Control: illuminance on a face towards the sun.
         assert!(!(0.8..1.0).contains(&(part / sin)), "{}", part / sin);
     }
 
@@ -367,7 +370,7 @@ mod tests {
         let bytes = std::fs::read(&file).unwrap();
         let (size, texels) = panorama(&bytes, 8, 90.0, 2.0).unwrap();
         assert_eq!(size, [8, 4]);
-        // Columns 0 and 1 of 8 were bright; a quarter turn puts them at 2 and 3.
+        // Columns 0 and 1 of 8 are bright; a quarter turn moves them to 2 and 3.
         let reds: Vec<f64> = texels[..8].iter().map(|c| c.x).collect();
         assert_eq!(reds, [0.0, 0.0, 8.0, 8.0, 0.0, 0.0, 0.0, 0.0]);
         assert!(panorama(b"not an EXR", 8, 0.0, 1.0).is_err());
@@ -375,19 +378,21 @@ mod tests {
 
     #[test]
     fn air_is_as_clear_as_its_turbidity() {
-        // Rayleigh extinction at sea level at 550 nm, 1/m: Bucholtz 1995, table 2. Both models' fits are good to some percent.
+        // Rayleigh extinction at sea level at 550 nm, 1/m, from Bucholtz 1995, table 2. The fits of
+        // both models are accurate to some percent.
         let molecules = 1.149e-5;
         assert!(
             (extinction(1.0) / molecules - 1.0).abs() < 0.05,
             "{}",
             extinction(1.0)
         );
-        // Contrast of 2 % is left after 3.912 lengths (Koschmieder 1924). In the international visibility code a clear day begins at 10 km
-        // and ends at 50, and light haze lies between 4 and 10 (McCartney 1976).
+        // A contrast of 2 % remains after 3.912 extinction lengths (Koschmieder 1924). In the
+        // international visibility code, a clear day has a visibility of 10 to 50 km, and light
+        // haze one of 4 to 10 km (McCartney 1976).
         let seen_km = |turbidity| 3.912e-3 / extinction(turbidity);
         assert!((10.0..50.0).contains(&seen_km(3.0)), "{}", seen_km(3.0));
         assert!((4.0..10.0).contains(&seen_km(10.0)), "{}", seen_km(10.0));
-        // The control: without aerosols a hazy day is as clear as any.
+        // Control: without aerosols a hazy day is as clear as any.
         assert!(3.912e-3 / molecules > 300.0);
     }
 }

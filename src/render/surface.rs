@@ -1,4 +1,4 @@
-//! From splat depth to a smooth surface.
+//! Smooths the depth of splats into a surface.
 
 use super::buffers::{DEPTHS, FLOW, FLOW_LEVELS, NARROW_RANGE};
 use super::frame::FAR;
@@ -10,13 +10,13 @@ use swell_gpu::{
     recording::{Bind, Command, Groups},
 };
 
-/// How wide a surface is smoothed.
+/// Width of the smoothing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Width {
     /// Standard deviation in metres, the same at any distance (Bagar 2010).
     World(f64),
-    /// In pixels: the flow without that correction, which smooths distant waves away. Kept as the control of
-    /// the test that shows the difference.
+    /// Standard deviation in pixels, without that correction: smooths distant waves away. Control
+    /// of the test that shows the difference.
     #[cfg_attr(not(test), expect(dead_code, reason = "the control of a test"))]
     Pixels(f64),
 }
@@ -25,24 +25,24 @@ pub(super) enum Width {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct FlowSettings {
     pub(super) width: Width,
-    /// Of the largest stable step.
+    /// Fraction of the largest stable step.
     pub(super) fraction: f64,
-    /// Depth steps beyond this are edges, metres.
+    /// Depth difference above which neighbours are separated by an edge, metres.
     pub(super) edge: f64,
-    /// Most levels of the pyramid; 1 is the plain explicit flow.
+    /// Largest number of levels of the pyramid; 1 is the plain explicit flow.
     pub(super) levels: u32,
-    /// Steps on each level but the last, which makes as many as are left, up to `last_steps`.
+    /// Steps on each level except the coarsest, which makes up to `last_steps`.
     pub(super) steps: u32,
     pub(super) last_steps: u32,
 }
 
 impl FlowSettings {
-    /// As looks use it: at most `steps` steps a level, and as many levels as reach a standard deviation of
-    /// `width` metres at a distance of four widths.
+    /// Settings for looks: enough levels to reach a standard deviation of `width` metres at a
+    /// distance of four widths.
     pub(super) fn for_width(width: f64, radius: f64, focal_px: f64) -> Self {
         const STEPS: u32 = 6;
         const FRACTION: f64 = 0.95;
-        // σ in pixels at that distance; each level adds steps × fraction / 2 × 4^level to the variance.
+        // Variance in pixels² at that distance. Each level adds steps × fraction / 2 × 4^level.
         let wanted = (focal_px / 4.0).powi(2);
         let mut levels = 1;
         let mut reached = f64::from(STEPS) * FRACTION / 2.0;
@@ -63,17 +63,19 @@ impl FlowSettings {
     }
 }
 
-/// What smooths the first of [`DEPTHS`].
+/// Commands that smooth the first of [`DEPTHS`].
 pub(super) struct Smoothing {
     pub(super) commands: Vec<Command>,
-    /// Which of [`DEPTHS`] then holds the surface.
+    /// The buffer of [`DEPTHS`] that holds the surface afterwards.
     pub(super) surface: Buf<f32>,
 }
 
-/// Levels of which those tiles are listed that have water: a quarter and a sixteenth as many cells are on each further one.
+/// Number of finest levels on which only tiles with water are processed; each coarser level has a
+/// quarter of the cells of the one before.
 const LISTED: usize = 2;
 
-/// Depths of a level of the pyramid: what restriction left, and two buffers to work in; and the tiles in which the flow runs.
+/// Depths of a level of the pyramid: the result of restriction and two working buffers, with the
+/// tiles over which the flow runs.
 struct Level {
     size: [u32; 2],
     original: Buf<f32>,
@@ -81,8 +83,8 @@ struct Level {
     tiles: (Groups, Bind),
 }
 
-/// What lists the tiles with water of the finer levels: before restriction what stands in the others, which no step writes to, and after
-/// it the lists.
+/// Commands that list the tiles with water of the finer levels: before restriction the fills of all
+/// other tiles, to which no step writes, and after it the lists.
 #[derive(Default)]
 struct Lists {
     before: Vec<Command>,
@@ -151,7 +153,7 @@ impl Lists {
     }
 }
 
-/// Curvature flow over a pyramid, of a frame of `size` cells.
+/// Plans the curvature flow over a pyramid for a frame of `size` cells.
 pub(super) fn curvature_flow(
     plan: &mut Plan,
     settings: &FlowSettings,
@@ -175,7 +177,7 @@ pub(super) fn curvature_flow(
     let (levels, lists) = Level::all(plan, settings.levels, size);
     let mut commands = lists.before;
     let mut windows = Vec::new();
-    // A pass that is told of step `index` of level `at`.
+    // Dispatch for step `index` of level `at`.
     let mut command = |pass, groups: Groups, (at, index): (usize, u32), mut binds: Vec<Bind>| {
         binds.push(Bind::whole("params", &FLOW));
         binds.push(FLOW_LEVELS.bind(windows.len()));
@@ -234,11 +236,12 @@ pub(super) fn curvature_flow(
     }
 }
 
-/// The narrow-range filter: along x, then along y by way of the second depth, then over the few pixels about each.
+/// Plans the narrow-range filter: along x, then along y through the second depth buffer, then over
+/// a few pixels around each.
 pub(super) fn narrow_range(plan: &mut Plan, width: f64, radius: f64, size: [u32; 2]) -> Smoothing {
     let params = [0, 1].map(|axis| Narrow {
         width: width as f32,
-        // The paper's choice: δ = 10 r, μ = r.
+        // Choice of the paper: δ = 10 r, μ = r.
         range: 10.0 * radius as f32,
         offset: radius as f32,
         axis,

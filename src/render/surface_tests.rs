@@ -1,4 +1,5 @@
-//! The flow against what it must do to a wall with a groove, and where it must fail.
+//! Tests of the smoothing filters on walls with ridges, noise and edges, with controls that must
+//! fail.
 
 #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
@@ -36,12 +37,12 @@ fn camera() -> Camera {
     }
 }
 
-/// What `plan_smoothing` makes of a frame's depths.
+/// Smooths a frame's depths with the commands that `plan_smoothing` adds.
 fn run(depth: &[f32], plan_smoothing: impl FnOnce(&mut Plan) -> Smoothing) -> Vec<f32> {
     run_before(depth, &vec![FAR; depth.len()], plan_smoothing)
 }
 
-/// As [`run`], with the depths of what is solid.
+/// Like [`run`], with the depths of solids.
 fn run_before(
     depth: &[f32],
     solid: &[f32],
@@ -76,21 +77,22 @@ fn explicit(width: Width, steps: u32) -> FlowSettings {
     }
 }
 
-/// A wall that faces the viewer, with a shallow ridge of Gaussian profile across it; metres.
+/// A wall facing the viewer with a shallow ridge of Gaussian profile across it; metres.
 fn ridge(distance: f64, width_m: f64) -> Vec<f32> {
     let pixel = distance / FOCAL;
     (0..SIZE[0] * SIZE[1])
         .map(|i| {
             let x = (f64::from(i % SIZE[0]) - 96.0) * pixel;
-            // Shallow, at most a slope of 0.05: the flow is linear, and widths add as variances.
+            // Shallow, with a slope of at most 0.05: the flow is then linear, and widths add as
+            // variances.
             let height = 0.3 * pixel * (-0.5 * (x / width_m).powi(2)).exp();
             (distance - height) as f32
         })
         .collect()
 }
 
-/// Standard deviation by which a ridge of this width was widened, metres: a convolution with a Gaussian
-/// lowers the top by w / √(w² + σ²), and the top is where rounding matters least.
+/// Standard deviation by which a ridge of this width is widened, metres. Convolution with a
+/// Gaussian lowers the top by w / √(w² + σ²), and rounding matters least at the top.
 fn widened(settings: &FlowSettings, distance: f64) -> f64 {
     let pixel = distance / FOCAL;
     let width = 4.0 * pixel;
@@ -104,9 +106,9 @@ fn widened(settings: &FlowSettings, distance: f64) -> f64 {
 const DISTANCES: [f64; 3] = [4.0, 8.0, 16.0];
 const SIGMA: f64 = 0.16;
 
-/// A ridge of 0.3 × 4/300 m on 4 m is resolved by f32 to 1e-4 of it, but late in the flow a step moves less than
-/// an ulp and some of it is lost; the explicit step's own error on a ridge 4 pixels wide is about 1 %, as is that of
-/// a bilinear level. Measured: 0.3 % explicit, 1.5 % through the pyramid.
+/// f32 resolves a ridge of 0.3 × 4/300 m at 4 m to 1e-4 of it, but late in the flow a step moves
+/// less than an ulp and is partly lost. The explicit step's own error on a ridge 4 pixels wide is
+/// about 1 %, as is that of a bilinear level. Measured: 0.3 % explicit, 1.5 % through the pyramid.
 const TOLERANCE: f64 = 0.03;
 
 #[test]
@@ -135,7 +137,7 @@ fn without_the_correction_the_width_follows_the_distance() {
     assert!(spread > TOLERANCE, "the control passes the test");
 }
 
-/// A wall with a noise of 1 % of a pixel, and its roughness: the mean square difference of neighbours.
+/// A wall with a noise of 1 % of a pixel.
 fn noise(distance: f64) -> Vec<f32> {
     let mut seed = 1u32;
     (0..SIZE[0] * SIZE[1])
@@ -161,7 +163,7 @@ fn the_step_is_stable_below_its_limit_and_nowhere_else() {
     let at = |fraction: f64| {
         let settings = FlowSettings {
             fraction,
-            // As many steps at every fraction.
+            // The same number of steps for every fraction.
             width: Width::Pixels((0.5 * fraction.abs() * 40.0).sqrt()),
             ..explicit(Width::Pixels(0.0), 40)
         };
@@ -177,7 +179,7 @@ fn the_step_is_stable_below_its_limit_and_nowhere_else() {
 
 #[test]
 fn a_slanted_plane_stays_where_it_is() {
-    // 70° from face-on, through perspective: 1/z is linear over the picture.
+    // 70° from face-on, in perspective: 1/z is linear over the picture.
     let slope = 70f64.to_radians().tan();
     let plane: Vec<f32> = (0..SIZE[0] * SIZE[1])
         .map(|i| {
@@ -187,7 +189,7 @@ fn a_slanted_plane_stays_where_it_is() {
         .collect();
     let settings = FlowSettings::for_width(0.25, 0.15, FOCAL);
     let after = smooth(&settings, &plane);
-    // Away from the frame's edge, a hundredth of the smoothing width.
+    // Away from the frame's edge; the tolerance is relative to the depth.
     for y in 24..168 {
         for x in 24..168 {
             let i = (y * SIZE[0] + x) as usize;
@@ -221,15 +223,17 @@ fn the_narrow_range_filter_smooths_a_wall_and_keeps_an_edge() {
     let after = run(&depth, |plan| narrow_range(plan, 0.1, 0.1, SIZE));
     let row = |depth: &[f32]| roughness(&depth[96 * 192 + 10..96 * 192 + 80]);
     assert!(row(&after) < 0.05 * row(&depth));
-    // A sample beyond the range counts as μ behind the centre, one radius: the edge moves by no more.
+    // A sample beyond the range counts as μ, one radius, behind the centre, which bounds the edge's
+    // displacement.
     for i in 0..SIZE[0] as usize {
         let at = 96 * 192 + i;
         assert!((after[at] - depth[at]).abs() < 0.12, "{i}");
     }
 }
 
-/// A wall with a plate before its right half: the wall beside the plate stays where it is. Control: where nothing is known to stand
-/// there, the wall is taken to end, and what lies beside its end is drawn back.
+/// A wall with a plate in front of its right half: the wall beside the plate stays in place.
+/// Control: without a known occluder the wall seems to end, and the pixels beside its end are drawn
+/// back.
 #[test]
 fn the_narrow_range_filter_takes_what_is_hidden_for_unknown() {
     const DISTANCE: f32 = 6.0;
@@ -251,12 +255,14 @@ fn the_narrow_range_filter_takes_what_is_hidden_for_unknown() {
     assert!(drawn_back(&nothing) > 0.01, "{}", drawn_back(&nothing));
 }
 
-/// Rows and columns of a wall of bumps that step by more than the range: two passes along the axes leave a streak of each step in
-/// the rows and columns beside it, and the last pass takes most of them. Control: without it they stay.
+/// A wall of bumps that step by more than the range: two passes along the axes leave streaks of
+/// each step in the rows and columns beside it, and the last pass removes most of them. Control:
+/// without it they stay.
 #[test]
 fn the_narrow_range_filter_leaves_no_curtains() {
     const DISTANCE: f64 = 6.0;
-    // Discs of five pixels' radius, which stand out by twice the range, strewn over a wall with a little noise.
+    // Discs with a radius of five pixels that protrude by twice the range from a wall with a little
+    // noise.
     let mut depth = noise(DISTANCE);
     for k in 0..40u32 {
         let at = [17 + (k * 61) % 158, 17 + (k * 97) % 158];

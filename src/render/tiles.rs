@@ -1,5 +1,5 @@
-//! Lists of a picture's tiles: those in which there is water or spray, those with solids alone, and the others, so that what only that needs
-//! is done where there is some.
+//! Lists of a picture's tiles by content (water or spray, solids only, neither), so that passes run
+//! only where they are needed.
 
 use super::{
     buffers::{SOLID_DEPTH, SPRAY, tile_groups, tiles},
@@ -11,28 +11,29 @@ use swell_gpu::{
     recording::{Bind, Command, Groups},
 };
 
-/// Threads of a workgroup of the passes over lists; a workgroup has a tile.
+/// Threads of a workgroup of the passes over lists; each workgroup processes one tile.
 const WORKGROUP: [u32; 2] = [16, 4];
-/// Pixels of a tile of the picture: a thread each.
+/// Pixels of a tile of the picture, one per thread.
 pub(super) const TILE: [u32; 2] = WORKGROUP;
-/// Cells of a tile of the curvature flow: a thread for two by two.
+/// Cells of a tile of the curvature flow, two by two per thread.
 pub(super) const FLOW_TILE: [u32; 2] = [2 * WORKGROUP[0], 2 * WORKGROUP[1]];
 
-/// What lists the tiles with spray.
+/// Pass that lists the tiles with spray.
 const LIST_SPRAY: &str = "ssfr/list_spray";
-/// What lists the tiles with water, and those of the others that have solids.
+/// Pass that lists the tiles with water, and those of the others that have solids.
 const LIST_PICTURE: &str = "ssfr/list_picture";
-/// Lists of a part of the frame: `LISTS` of shared/ssfr_tiles.wgsl.
+/// Number of lists for a part of the frame: `LISTS` of shared/ssfr_tiles.wgsl.
 const LISTS: usize = 3;
 
-/// A list, and the workgroups of dispatches over it.
+/// Lists of tiles, and the workgroup counts of indirect dispatches over them.
 pub(super) struct Tiles {
     list: Buf<u32>,
     groups: Buf<Workgroups>,
 }
 
 impl Tiles {
-    /// Plans the list of a part of the frame by water, and gives what makes it from the depths in `source`.
+    /// Plans the lists of a part of the frame by water, and returns the commands that fill them
+    /// from the depths in `source`.
     pub(super) fn of_water(
         plan: &mut Plan,
         name: &str,
@@ -43,7 +44,7 @@ impl Tiles {
         Self::plan(plan, name, grid, ("ssfr/list_tiles", source))
     }
 
-    /// The same, where tiles of the picture with solids have a list of their own.
+    /// Like [`Self::of_water`], with a separate list for tiles that have solids but no water.
     pub(super) fn of_picture(
         plan: &mut Plan,
         name: &str,
@@ -58,7 +59,8 @@ impl Tiles {
         Self::plan(plan, name, grid, (LIST_PICTURE, binds))
     }
 
-    /// Plans the list of a part of the frame by spray, and gives what makes it from the sums of splats.
+    /// Plans the lists of a part of the frame by spray, and returns the commands that fill them
+    /// from the sums of splats.
     pub(super) fn of_spray(plan: &mut Plan, name: &str, grid: TileGrid) -> (Self, Vec<Command>) {
         plan.define(LIST_SPRAY, "SPRAY");
         let source = vec![Bind::whole("source", &SPRAY)];
@@ -90,36 +92,36 @@ impl Tiles {
         (made, commands)
     }
 
-    /// Binds a pass to the list.
+    /// Binds the lists to a pass.
     pub(super) fn bind(&self) -> Bind {
         Bind::whole("tiles", &self.list)
     }
 
-    /// Of a pass over the tiles that have some.
+    /// Workgroups of a pass over the tiles with water or spray.
     pub(super) fn wet(&self) -> Groups {
         Groups::at(&self.groups, 0)
     }
 
-    /// Of a pass over those without, that have solids.
+    /// Workgroups of a pass over the other tiles with solids.
     pub(super) fn dry(&self) -> Groups {
         Groups::at(&self.groups, 1)
     }
 
-    /// Of a pass over those that have neither.
+    /// Workgroups of a pass over the tiles with neither.
     pub(super) fn bare(&self) -> Groups {
         Groups::at(&self.groups, 2)
     }
 }
 
-/// Plans a list of all tiles of the flow over `size` cells, as if there were water in each, and gives the workgroups and the binding of a
-/// pass over it.
+/// Plans a list of all tiles of the flow over `size` cells, as if each had water, and returns the
+/// workgroups and the binding of a pass over it.
 pub(super) fn every_tile(plan: &mut Plan, name: &str, size: [u32; 2]) -> (Groups, Bind) {
     let [across, down] = counts(size, FLOW_TILE);
     let mut words = vec![across * down, 0, 0];
     words.extend((0..down).flat_map(|y| (0..across).map(move |x| x | y << 16)));
     let list = tiles(name);
     plan.values(&list, &words);
-    // A workgroup a tile: as many columns of threads as that takes.
+    // One workgroup per tile, requested as columns of threads.
     let columns = u64::from(WORKGROUP[0]) * u64::from(words[0]);
     (Groups::Threads(columns), Bind::whole("tiles", &list))
 }

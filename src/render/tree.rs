@@ -1,30 +1,32 @@
-//! The tree over what is opaque, packed for rays on the device: both boxes of a node in eight words, on a lattice of sixteen bits an axis.
+//! Bounding volume hierarchy over opaque geometry, packed for rays on the device: both boxes of a
+//! node in eight words, quantised to sixteen bits per axis.
 
 use glam::{DVec3, Vec3};
 
 use super::uniform::{SetNode, Triangle};
 use swell_domain::{bvh::Bvh, mesh::TriangleMesh};
 
-/// Bit from which on a child says how many triangles it is, as in `shared/rays_set.wgsl`.
+/// Lowest bit of a child's triangle count, as in `shared/rays_set.wgsl`.
 const LEAF_SHIFT: u32 = 28;
-/// Steps of the lattice along the longest axis. The rest of 2¹⁶ is room for rounding outwards.
+/// Lattice steps along the longest axis; the rest of 2¹⁶ is a margin for outward rounding.
 const STEPS: f64 = 65528.0;
-/// Steps by which a box is larger than rounding outwards asks for: a ray's place in steps is off by 2⁻²⁴ × 2¹⁶.
+/// Steps by which a box exceeds its outward rounding: a ray's position in steps has an error of
+/// 2⁻²⁴ × 2¹⁶.
 const MARGIN: f64 = 1.0;
 
-/// A tree over triangles.
+/// A packed hierarchy over triangles.
 pub(super) struct Tree {
     /// Least corner of the lattice, metres.
     pub(super) low: [f32; 3],
-    /// Its step, metres.
+    /// Lattice step, metres.
     pub(super) step: f32,
-    /// Never empty.
+    /// Nodes of the hierarchy; never empty.
     pub(super) nodes: Vec<SetNode>,
-    /// The triangles in the order of the tree's leaves; one that nothing meets where there are none.
+    /// Triangles in the order of the leaves; a degenerate one where there are none.
     pub(super) sorted: Vec<Triangle>,
 }
 
-/// Builds the tree over triangles.
+/// Builds the hierarchy over triangles.
 pub(super) fn tree(triangles: &[Triangle]) -> Tree {
     if triangles.is_empty() {
         return Tree {
@@ -54,10 +56,12 @@ pub(super) fn tree(triangles: &[Triangle]) -> Tree {
     }
 }
 
-/// Least and greatest corner; first entry of a leaf or right child of an inner node, whose left one follows it; entries of a leaf, or 0.
+/// Least and greatest corners of the box; first entry of a leaf, or right child of an inner node,
+/// whose left child follows it; number of entries of a leaf, or 0.
 type Node = ([DVec3; 2], u32, u32);
 
-/// A node for each inner one of the tree, in its order; where the tree is a single leaf, one that has it on either side.
+/// One packed node per inner node of the hierarchy, in its order. A hierarchy of a single leaf
+/// becomes a node with that leaf on both sides.
 fn pairs(boxes: &[Node], lattice: &Lattice) -> Vec<SetNode> {
     if boxes[0].2 > 0 {
         let (sides, child) = (lattice.sides(boxes[0].0), leaf(&boxes[0]));
@@ -68,7 +72,7 @@ fn pairs(boxes: &[Node], lattice: &Lattice) -> Vec<SetNode> {
             right_child: child,
         }];
     }
-    // Inner nodes before each node.
+    // Number of inner nodes before each node.
     let numbers: Vec<u32> = (boxes.iter())
         .scan(0, |inner, node| {
             let before = *inner;
@@ -98,7 +102,7 @@ fn leaf(&(_, first, count): &Node) -> u32 {
     first | count << LEAF_SHIFT
 }
 
-/// What boxes are rounded to.
+/// Lattice to which boxes are rounded.
 struct Lattice {
     low: Vec3,
     step: f32,
@@ -106,7 +110,7 @@ struct Lattice {
 
 impl Lattice {
     fn over([min, max]: [DVec3; 2]) -> Self {
-        // No finer than f32 tells places apart there.
+        // No finer than the resolution of f32 at these coordinates.
         let reach = min.abs().max(max.abs()).max_element();
         let finest = 2.0 * f64::from(f32::EPSILON) * reach;
         let step = ((max - min).max_element() / STEPS).max(finest) as f32;
@@ -117,7 +121,7 @@ impl Lattice {
         }
     }
 
-    /// A word an axis: least side below, greatest above.
+    /// One word per axis: the lower bound in the low half, the upper bound in the high half.
     fn sides(&self, [min, max]: [DVec3; 2]) -> [u32; 3] {
         let at = |p: DVec3| (p - self.low.as_dvec3()) / f64::from(self.step);
         let low = (at(min).floor() - MARGIN).clamp(DVec3::ZERO, DVec3::splat(65535.0));
@@ -130,7 +134,7 @@ impl Lattice {
 mod tests {
     use super::*;
 
-    /// A row of small triangles, and one far away.
+    /// A row of small triangles, up to far from the origin.
     fn row(count: usize) -> Vec<Triangle> {
         let corner = |k: usize, x: f32, y: f32| [7.0 * k as f32 + x, y, 0.3 * k as f32];
         (0..count)
@@ -153,7 +157,8 @@ mod tests {
         [place(|word| word & 0xffff), place(|word| word >> 16)]
     }
 
-    /// Every triangle is in one leaf, and in each box on the way there; no box is larger than its triangles by more than the margins.
+    /// Checks that each box on the path to a triangle contains it and that no leaf's box exceeds
+    /// its triangles by more than the margins.
     fn holds(tree: &Tree, at: u32, within: &[[DVec3; 2]], seen: &mut Vec<u32>) {
         let node = &tree.nodes[at as usize];
         for (sides, child) in [(node.left, node.left_child), (node.right, node.right_child)] {

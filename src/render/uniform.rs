@@ -1,4 +1,4 @@
-//! `repr(C)` mirrors of the shaders' uniforms; field meanings stand beside the WGSL.
+//! `repr(C)` mirrors of the shaders' structs; the WGSL sources document the fields.
 
 use swell_gpu::{
     buffer::{Mirror, mirror},
@@ -330,7 +330,8 @@ mirror!(
     }
 );
 
-/// Every struct that the renderer and its shaders share, by the name that it has in WGSL.
+/// Returns the layouts of all structs that the renderer shares with its shaders, by their WGSL
+/// names.
 pub fn mirrors() -> Vec<Layout> {
     vec![
         Camera::layout(),

@@ -1,4 +1,4 @@
-//! From scene-linear light to what a screen shows.
+//! View transforms from scene-linear light to display values.
 
 mod aces;
 
@@ -8,7 +8,7 @@ use glam::{DMat3, DVec3};
 
 use swell_scene::look::{TransformSpec, ViewSpec};
 
-/// sRGB's encoding of one linear channel, 0 to 1.
+/// Encodes a linear channel as sRGB; clamps to the range 0 to 1.
 pub fn srgb_encode(linear: f64) -> f64 {
     let x = linear.clamp(0.0, 1.0);
     if x <= 0.003_130_8 {
@@ -18,29 +18,31 @@ pub fn srgb_encode(linear: f64) -> f64 {
     }
 }
 
-/// Scene-linear Rec. 709 to encoded sRGB, each channel 0 to 1.
+/// Converts scene-linear Rec. 709 to encoded sRGB, each channel 0 to 1.
 ///
-/// Exposure, then the look's tone curve, then contrast about middle grey and saturation, then sRGB's encoding.
+/// Applies exposure, the look's tone curve, contrast about middle grey, saturation, and the sRGB
+/// encoding.
 pub fn apply(view: &ViewSpec, colour: [f32; 3]) -> [f64; 3] {
     Display::of(view).linear(colour).to_array().map(srgb_encode)
 }
 
-/// Steps of linear light from 0 to 1. The encoding's slope is at most 12.92, so that over a step it rises by at most 0.8 of a 255th, and
-/// rounds to at most two bytes.
+/// Steps of linear light from 0 to 1. The encoding's slope is at most 12.92, so that it rises by at
+/// most 0.8 of a 255th over a step, which rounds to at most two bytes.
 const STEPS: usize = 4096;
 
-/// sRGB's encoding in whole 255ths: look-ups instead of a power.
+/// Lookup table of the sRGB encoding in 255ths, in place of a power.
 struct Bytes {
-    /// The least linear value that it rounds to 1, to 2, and so on to 255; at last NaN, which no value reaches.
+    /// Least linear values that round to 1, 2 and so on up to 255, then NaN, which no value
+    /// reaches.
     least: [f64; 256],
-    /// What the beginning of each step rounds to.
+    /// Byte to which the beginning of each step rounds.
     first: [u8; STEPS + 1],
 }
 
 static BYTES: LazyLock<Bytes> = LazyLock::new(|| {
     let rounded = |x: f64| (srgb_encode(x) * 255.0).round();
     let least = |byte: f64| {
-        // Positive numbers are in the order of their bits.
+        // Positive floats have the order of their bits.
         let (mut below, mut from) = (0.0f64.to_bits(), 1.0f64.to_bits());
         while below + 1 < from {
             let middle = below + (from - below) / 2;
@@ -68,15 +70,16 @@ impl Bytes {
     }
 }
 
-/// Middle grey, about which contrast turns.
+/// Middle grey, the fixed point of contrast.
 const GREY: f64 = 0.18;
 
-/// A view, with what follows from it for every pixel.
+/// A view with the values derived from it for all pixels.
 pub(super) struct Display {
     transform: TransformSpec,
     /// 2^exposure.
     gain: f64,
-    /// Contrast: `GREY (x / GREY)^contrast` as `scale x^power`, where the power also takes AgX's values to linear ones.
+    /// Contrast `GREY (x / GREY)^contrast` in the form `scale x^power`, where the power also
+    /// linearises AgX's values.
     power: f64,
     scale: f64,
     saturation: f64,
@@ -97,13 +100,13 @@ impl Display {
         }
     }
 
-    /// As [`apply`], in whole 255ths.
+    /// Like [`apply`], in 255ths.
     pub(super) fn bytes(&self, colour: [f32; 3]) -> [u8; 3] {
         let bytes = &*BYTES;
         self.linear(colour).to_array().map(|x| bytes.of(x))
     }
 
-    /// Display-linear Rec. 709; values beyond 0 and 1 are clipped by the encoding.
+    /// Display-linear Rec. 709; the encoding clips values beyond 0 and 1.
     fn linear(&self, colour: [f32; 3]) -> DVec3 {
         let scene = DVec3::from(colour.map(f64::from)).max(DVec3::ZERO) * self.gain;
         let shown = match self.transform {
@@ -121,12 +124,13 @@ impl Display {
     }
 }
 
-/// What AgX's values are to the power of, so that they are linear.
+/// Exponent that linearises AgX's values.
 const AGX_POWER: f64 = 2.2;
 
-/// Sobotka's AgX base view of Rec. 709, 0 to 1, still to be taken to the power of [`AGX_POWER`], by Wrensch's polynomial for its curve
-/// (2023): the primaries are drawn together, light is taken to log2 over 16.5 stops about middle grey, bent, and the primaries are spread
-/// again.
+/// Sobotka's AgX base view of Rec. 709, 0 to 1 and not yet raised to [`AGX_POWER`], with Wrensch's
+/// polynomial for its curve (2023): the inset matrix compresses the primaries, light is mapped to
+/// log2 over 16.5 stops about middle grey and through the curve, and the outset matrix expands the
+/// primaries.
 fn agx(scene: DVec3) -> DVec3 {
     let inset = DMat3::from_cols_array(&[
         0.842_479_062_253_094,
@@ -153,7 +157,7 @@ fn agx(scene: DVec3) -> DVec3 {
     const LEAST: f64 = -12.473_93;
     const MOST: f64 = 4.026_069;
     let bent = (inset * scene).to_array().map(|x| {
-        // The 24 bits of f32 are enough for 8.
+        // The 24 bits of f32 suffice for 8-bit output.
         let stops = f64::from((x.max(1e-10) as f32).log2());
         let log = (stops.clamp(LEAST, MOST) - LEAST) / (MOST - LEAST);
         curve(log)
@@ -174,7 +178,7 @@ mod tests {
 
     fn grey(view: &ViewSpec, x: f32) -> f64 {
         let [r, g, b] = apply(view, [x; 3]);
-        // The rows of AgX's matrices add up to 1 within 2e-4.
+        // The rows of AgX's matrices sum to 1 within 2e-4.
         assert!((r - g).abs() < 2e-3 && (b - g).abs() < 2e-3);
         g
     }
@@ -182,26 +186,26 @@ mod tests {
     #[test]
     fn known_values_go_through_the_transform() {
         let agx = ViewSpec::default();
-        // The curve's pivot: middle grey goes to 0.489 of a 2.2 power display, which sRGB encodes as 0.493. The
-        // polynomial is within 0.01 of it.
+        // The curve's pivot: middle grey maps to 0.489 on a display with gamma 2.2, which is 0.493
+        // in sRGB. The polynomial is within 0.01 of it.
         assert!(
             (grey(&agx, 0.18) - 0.493).abs() < 0.01,
             "{}",
             grey(&agx, 0.18)
         );
         assert!(grey(&agx, 0.0) < 1e-6);
-        // Sixteen times white is not yet clipped, where a raw encoding would have been since 1.
+        // Ten times white is not clipped yet; a plain sRGB encoding clips from 1 on.
         assert!(grey(&agx, 1.0) < 0.85 && grey(&agx, 10.0) < 1.0);
         let plain = ViewSpec {
             transform: TransformSpec::Srgb,
             ..ViewSpec::default()
         };
-        // IEC 61966-2-1: linear 0.214041 is encoded 0.5; a power of 1/2.2 would give 0.4962.
+        // IEC 61966-2-1: linear 0.214041 encodes to 0.5; a power of 1/2.2 would give 0.4962.
         assert!((grey(&plain, 0.214_041) - 0.5).abs() < 1e-5);
     }
 
-    /// Sobotka's curve itself, of light in log2 from 10 stops below middle grey to 6.5 above: a sigmoid through (10/16.5, 1/2)
-    /// of slope 2 there, whose toe bends by a power of 3 and whose shoulder by one of 3.25.
+    /// Sobotka's own curve over log2 light from 10 stops below middle grey to 6.5 above: a sigmoid
+    /// through (10/16.5, 1/2) with slope 2 there, toe power 3 and shoulder power 3.25.
     fn sigmoid(x: f64) -> f64 {
         const PIVOT: f64 = 10.0 / 16.5;
         let half = |run: f64, power: f64| {
@@ -233,7 +237,7 @@ mod tests {
         };
         // The polynomial is within 0.0056 of the curve; the rows of the matrices add 2e-4.
         assert!(off(1.0) < 0.006, "{}", off(1.0));
-        // The control: an eighth of a stop.
+        // Control: an eighth of a stop.
         assert!(off(0.125f64.exp2()) > 0.012, "{}", off(0.125f64.exp2()));
     }
 
@@ -301,7 +305,7 @@ mod tests {
             }
         }
         assert!(seen.iter().all(|seen| *seen));
-        // Where the encoding goes over from one byte to the next, to the last bit; a number that is none is black.
+        // The thresholds between bytes are exact to the last bit, and NaN is black.
         for (byte, least) in (1u8..=255).zip(BYTES.least) {
             let of = |x: f64| (srgb_encode(x) * 255.0).round() as u8;
             for of in [&of as &dyn Fn(f64) -> u8, &|x| BYTES.of(x)] {

@@ -1,4 +1,4 @@
-//! The water that rays are cast into, on its way to the device.
+//! Uploads the water into which rays are cast.
 
 use glam::{DVec3, Vec3};
 
@@ -13,23 +13,24 @@ use swell_domain::level_set::{LevelSet, sunlight::Sunlight};
 use swell_gpu::program::Program;
 use swell_scene::look::{Look, MethodSpec};
 
-/// A frame's particles, and the level set of them that the device holds.
+/// Particles of a frame's body, and the state of their level set on the device.
 pub(super) struct RayWater {
-    /// Where the body's particles are and how they go.
+    /// Positions of the body's particles with their paths.
     places: Vec<(Vec3, Path)>,
-    /// Seconds from the frame at which the level set on the device stands; `None` before there is one of this frame.
+    /// Seconds from the frame for which the device holds the level set; `None` before the first one
+    /// of this frame.
     seconds: Option<f32>,
-    /// Values that there is room for.
+    /// Allocated values.
     capacity: usize,
     /// Edge length of a voxel, metres.
     voxel: f64,
     sun: DVec3,
-    /// Height below which the water on the device lies, metres.
+    /// Upper bound of the height of the water on the device, metres.
     top: f64,
 }
 
 impl RayWater {
-    /// `None` where the look casts no rays.
+    /// Returns `None` where the look casts no rays.
     pub(super) fn of(look: &Look, scene: &RenderScene) -> Option<Self> {
         (look.spec().renderer.method == MethodSpec::Ray).then(|| Self {
             places: Vec::new(),
@@ -41,13 +42,15 @@ impl RayWater {
         })
     }
 
-    /// Takes a frame's particles, those that belong to the body; without `paths` they go straight on.
+    /// Takes the particles of a frame that belong to the body; without `paths` they move in
+    /// straight lines.
     pub(super) fn take(&mut self, particles: &[Particle], paths: &[Path]) {
         self.places = body_of(particles, paths);
         self.seconds = None;
     }
 
-    /// Has the device hold the level set of so many seconds from the frame; whether a buffer is a new one.
+    /// Uploads the level set for an instant, in seconds from the frame. Returns whether a buffer
+    /// was reallocated.
     pub(super) fn stand_at(
         &mut self,
         seconds: f32,
@@ -72,12 +75,11 @@ impl RayWater {
         Ok(grew)
     }
 
-    /// The level set of so many seconds from the frame.
+    /// Builds the level set for an instant, in seconds from the frame.
     pub(super) fn level(&self, seconds: f32, scene: &RenderScene) -> LevelSet {
         level_set(scene, self.voxel, &self.places, seconds)
     }
 
-    /// Height below which the water on the device lies, metres.
     pub(super) fn top(&self) -> f64 {
         self.top
     }

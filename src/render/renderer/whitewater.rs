@@ -1,4 +1,4 @@
-//! Whitewater of a frame on its way to the device.
+//! Uploads a frame's whitewater.
 
 use crate::{
     RenderError, RenderScene,
@@ -15,20 +15,20 @@ use swell_scene::look::{Look, MethodSpec};
 
 use super::room;
 
-/// Depth, in particle spacings, at which the water over a bubble has taken most of its white.
+/// Depth, in particle spacings, at which the water above a bubble has removed 63 % of its white.
 const FADING: f64 = 2.0;
 
-/// How a look draws whitewater.
+/// Settings with which a look draws whitewater.
 pub(super) struct Whitewater {
     params: uniform::WhitewaterParams,
-    /// Whether bubbles are splatted too; rays go through them.
+    /// Whether bubbles are splatted too; rays traverse them instead.
     has_bubbles: bool,
-    /// Whitewater that there is room for.
+    /// Allocated whitewater particles.
     capacity: usize,
 }
 
 impl Whitewater {
-    /// `None` where the look draws none.
+    /// Returns `None` where the look draws no whitewater.
     pub(super) fn of(look: &Look, scene: &RenderScene) -> Option<Self> {
         let spec = look.spec().whitewater.as_ref()?;
         Some(Self {
@@ -43,7 +43,8 @@ impl Whitewater {
         })
     }
 
-    /// Moves a frame's whitewater to the device, relative to the domain's least corner; whether its buffer is a new one.
+    /// Uploads a frame's whitewater, relative to the domain's least corner. Returns whether its
+    /// buffer was reallocated.
     pub(super) fn load(
         &mut self,
         program: &mut Program,
@@ -65,7 +66,7 @@ impl Whitewater {
         Ok(grew)
     }
 
-    /// What of a frame's whitewater is drawn as splats.
+    /// Converts the part of a frame's whitewater that is drawn as splats.
     pub(super) fn packed(
         &self,
         scene: &RenderScene,
@@ -99,12 +100,13 @@ fn kind(white: &Particles, index: usize) -> Option<Kind> {
     kind.and_then(|&number| Kind::of_number(number))
 }
 
-/// Whether a particle of a stream is foam or a bubble; what has no kind is spray.
+/// Whether a particle is foam or a bubble; particles without a kind are spray.
 fn is_foam(white: &Particles, index: usize) -> bool {
     matches!(kind(white, index), Some(Kind::Foam | Kind::Bubble))
 }
 
-/// Whether a particle of a stream is in the water and not before it; what has no kind is spray.
+/// Whether a particle is a bubble, which is in the water rather than in front of it; particles
+/// without a kind are spray.
 pub(super) fn is_bubble(white: &Particles, index: usize) -> bool {
     kind(white, index) == Some(Kind::Bubble)
 }

@@ -1,5 +1,6 @@
-//! The ACES 1.0 output for sRGB displays: the reference rendering transform (`RRT.ctl`) and the output transform
-//! `ODT.Academy.RGBmonitor_100nits_dim.ctl` of the Academy's aces-dev 1.0.3, not a fit to them.
+//! The ACES 1.0 output for sRGB displays, implemented exactly rather than fitted: the reference
+//! rendering transform (`RRT.ctl`) and the output transform
+//! `ODT.Academy.RGBmonitor_100nits_dim.ctl` of the Academy's aces-dev 1.0.3.
 
 use std::sync::LazyLock;
 
@@ -7,18 +8,18 @@ use glam::{DMat3, DVec3};
 
 use super::super::colour::{ACES_2065, ACES_CG, REC_709};
 
-/// Nits of the darkest and of the brightest that a cinema's screen shows.
+/// Luminance of black and of white on a cinema screen, nits.
 const CINEMA: [f64; 2] = [0.02, 48.0];
-/// What a dim room about a monitor asks of contrast, on luminance, against a cinema's dark.
+/// Exponent of luminance that compensates for a dim surround, compared with a cinema's dark one.
 const DIM_SURROUND: f64 = 0.9811;
-/// Saturation of the rendering, and of the output.
+/// Saturation factors of the rendering and of the output transform.
 const SATURATION: [f64; 2] = [0.96, 0.93];
 
-/// What is made of the numbers above once.
+/// Values derived from the constants above.
 struct Parts {
-    /// Rec. 709 to ACES2065-1, that to ACEScg, and that to Rec. 709.
+    /// Matrices from Rec. 709 to ACES2065-1, from that to ACEScg, and from that to Rec. 709.
     matrices: [DMat3; 3],
-    /// Of AP1.
+    /// Luminance coefficients of AP1.
     luminance: DVec3,
     output_tone: Tone<9>,
 }
@@ -33,7 +34,7 @@ static PARTS: LazyLock<Parts> = LazyLock::new(|| Parts {
     output_tone: output_tone(),
 });
 
-/// Scene-linear Rec. 709 to display-linear Rec. 709, 0 to 1.
+/// Converts scene-linear Rec. 709 to display-linear Rec. 709, 0 to 1.
 pub(super) fn aces(scene: DVec3) -> DVec3 {
     let parts = &*PARTS;
     let [to_2065, to_cg, to_709] = parts.matrices;
@@ -43,7 +44,7 @@ pub(super) fn aces(scene: DVec3) -> DVec3 {
     let shown = map(linear, |x| {
         (parts.output_tone.of(RENDER_TONE.of(x)) - black) / (white - black)
     });
-    // A dim room: luminance is bent, chromaticity stays.
+    // Dim surround: bends luminance and keeps chromaticity.
     let luminance = parts.luminance.dot(shown);
     let bent = match luminance > 0.0 {
         true => shown * luminance.powf(DIM_SURROUND - 1.0),
@@ -54,7 +55,7 @@ pub(super) fn aces(scene: DVec3) -> DVec3 {
 }
 
 impl Parts {
-    /// Towards grey.
+    /// Scales the saturation about grey.
     fn saturated(&self, v: DVec3, saturation: f64) -> DVec3 {
         let grey = DVec3::splat(self.luminance.dot(v));
         grey + saturation * (v - grey)
@@ -70,7 +71,7 @@ fn saturation_of(v: DVec3) -> f64 {
     (most.max(1e-10) - least.max(1e-10)) / most.max(1e-2)
 }
 
-/// Dark saturated colours glow.
+/// Glow module: brightens dark saturated colours.
 fn glowing(v: DVec3) -> DVec3 {
     const GAIN: f64 = 0.05;
     const MIDDLE: f64 = 0.08;
@@ -90,21 +91,21 @@ fn glowing(v: DVec3) -> DVec3 {
     v * (1.0 + added)
 }
 
-/// Strong reds are drawn in.
+/// Red modifier: compresses strong reds.
 fn reddened(v: DVec3) -> DVec3 {
     const SCALE: f64 = 0.82;
     const PIVOT: f64 = 0.03;
-    /// Degrees of hue.
+    /// Width in degrees of hue.
     const WIDTH: f64 = 135.0;
     let [r, g, b] = v.to_array();
-    // atan2 gives red hues about 0, from −180° to 180°; grey has 0 and no saturation.
+    // atan2 gives red a hue of about 0, in −180° to 180°; grey has hue 0 and no saturation.
     let hue = (3f64.sqrt() * (g - b)).atan2(2.0 * r - g - b).to_degrees();
     let weight = 1.5 * cubic_basis(4.0 * hue / WIDTH);
     let red = r + weight * saturation_of(v) * (PIVOT - r) * (1.0 - SCALE);
     DVec3::new(red, g, b)
 }
 
-/// The cubic B-spline about 0, 2 wide on either side.
+/// Cubic B-spline about 0 with a half-width of 2.
 fn cubic_basis(x: f64) -> f64 {
     let x = x.abs();
     if x >= 2.0 {
@@ -116,13 +117,14 @@ fn cubic_basis(x: f64) -> f64 {
     }
 }
 
-/// A curve of log10 over log10: two quadratic B-splines that meet in the middle, and straight lines beyond their ends.
+/// Tone curve in log10 over log10: two quadratic B-splines that meet in the middle, extended by
+/// straight lines.
 struct Tone<const N: usize> {
     low: [f64; N],
     high: [f64; N],
-    /// Least, middle, most: in and out.
+    /// Least, middle and greatest points: input and output.
     points: [[f64; 2]; 3],
-    /// Slope beyond the brightest; below the darkest it is level.
+    /// Slope above the greatest point; the curve is constant below the least one.
     slope: f64,
 }
 
@@ -143,7 +145,7 @@ impl<const N: usize> Tone<N> {
     }
 }
 
-/// A uniform quadratic B-spline at `part` of its way, 0 to 1.
+/// Evaluates a uniform quadratic B-spline at the parameter `part`, 0 to 1.
 fn spline(coefficients: &[f64], part: f64) -> f64 {
     let spans = coefficients.len() - 2;
     let at = part * spans as f64;
@@ -153,7 +155,8 @@ fn spline(coefficients: &[f64], part: f64) -> f64 {
     (0.5 * a - b + 0.5 * c) * t * t + (b - a) * t + 0.5 * (a + b)
 }
 
-/// `segmented_spline_c5_fwd`; the sixth coefficient, which repeats the fifth, is only read at its very end.
+/// `segmented_spline_c5_fwd`; omits the sixth coefficient, which repeats the fifth and is only read
+/// at the very end.
 const RENDER_TONE: Tone<5> = Tone {
     low: [
         -4.0,
@@ -171,7 +174,8 @@ const RENDER_TONE: Tone<5> = Tone {
     slope: 0.0,
 };
 
-/// `segmented_spline_c9_fwd` for 48 nits, whose ends are what the rendering makes of 6.5 stops about grey.
+/// `segmented_spline_c9_fwd` for 48 nits, whose end points are the rendering of 6.5 stops around
+/// grey.
 fn output_tone() -> Tone<9> {
     let stops = 6.5f64.exp2();
     let [black, white] = CINEMA;
@@ -212,8 +216,9 @@ mod tests {
     use super::*;
     use crate::view::srgb_encode;
 
-    /// Linear Rec. 709 and what OpenColorIO 2 shows of it, encoded: built-in configuration cg-config-v1.0.0_aces-v1.3, display
-    /// "sRGB - Display", view "ACES 1.0 - SDR Video", clamped to 0 to 1.
+    /// Linear Rec. 709 and its display value by OpenColorIO 2, encoded: built-in configuration
+    /// cg-config-v1.0.0_aces-v1.3, display "sRGB - Display", view "ACES 1.0 - SDR Video", clamped
+    /// to 0 to 1.
     const SHOWN: [([f64; 3], [f64; 3]); 15] = [
         ([0.0, 0.0, 0.0], [0.0, 0.0, 0.0]),
         ([0.01, 0.01, 0.01], [0.012_837, 0.012_837, 0.012_837]),
@@ -232,7 +237,8 @@ mod tests {
         ([0.2, 2.0, 9.0], [0.806_364, 0.907_315, 0.991_616]),
     ];
 
-    /// Largest difference of an encoded channel from OpenColorIO's, where light is taken times `factor`.
+    /// Largest difference of an encoded channel from OpenColorIO's, with light multiplied by
+    /// `factor`.
     fn off(factor: f64) -> f64 {
         let one = |&(scene, shown): &([f64; 3], [f64; 3])| {
             let found = aces(factor * DVec3::from(scene)).to_array();
@@ -246,7 +252,8 @@ mod tests {
 
     #[test]
     fn colours_are_those_of_opencolorio() {
-        // Both do the same sums; its curves are tables in f32. A tenth of a step of 8 bits.
+        // Both compute the same formulas, but OpenColorIO's curves are f32 tables. A tenth of an
+        // 8-bit step.
         const TABLES: f64 = 0.1 / 255.0;
         assert!(off(1.0) < TABLES, "{}", off(1.0));
         // Control: a hundredth of a stop.
@@ -260,12 +267,13 @@ mod tests {
     #[test]
     fn grey_has_ten_nits_of_a_hundred_and_white_rolls_off() {
         let grey = |x: f64| aces(DVec3::splat(x)).y;
-        // 4.8 nits of a cinema's 48, less its black, in a dim room: ((4.8 − 0.02) / 47.98)^0.9811.
+        // 4.8 nits of a cinema's 48, less its black, in a dim surround: ((4.8 − 0.02) /
+        // 47.98)^0.9811.
         let expected = (4.78f64 / 47.98).powf(DIM_SURROUND);
-        // The curve's middle is its point within the ten places of its coefficients.
+        // The curve passes its middle point within the ten places of its coefficients.
         assert!((grey(0.18) - expected).abs() < 1e-6, "{}", grey(0.18));
         assert!((expected - 0.10).abs() < 0.005);
-        // Six and a half stops above grey is the brightest.
+        // The greatest point is six and a half stops above grey.
         assert!(grey(0.18 * 6.0f64.exp2()) < 1.0 && grey(0.18 * 6.51f64.exp2()) > 0.9999);
         let mut last = -1.0;
         for step in -160..120 {
