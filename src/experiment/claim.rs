@@ -1,4 +1,5 @@
-//! Which study a folder of results belongs to: pages and lines of two studies in one folder would mix.
+//! Records which study a results folder belongs to, because pages and lines of two studies must not
+//! mix.
 
 use std::{
     fs,
@@ -11,11 +12,13 @@ use swell_study::folder::{CLAIM, Claim, is_ledger};
 
 use super::{StudyError, ledger::names};
 
-/// Takes an empty folder, or one with results that name no study, for the study `name`, which `command` runs whole. Any number of
-/// processes may do so at once: the file is locked while it is read and written.
+/// Claims a folder for the study `name`, which `command` runs as a whole. The folder may be empty
+/// or hold results without a claim. Any number of processes may call this at once: the claim file
+/// is locked while it is read and written.
 ///
 /// # Errors
-/// [`StudyError::OtherStudy`]; a file that cannot be read or written.
+/// [`StudyError::OtherStudy`] if another study owns the folder, and [`StudyError::File`] if a file
+/// cannot be read or written.
 pub(super) fn take(directory: &Path, name: &str, command: &str) -> Result<(), StudyError> {
     let file = directory.join(CLAIM);
     let fault = |source| StudyError::File {
@@ -25,10 +28,10 @@ pub(super) fn take(directory: &Path, name: &str, command: &str) -> Result<(), St
     fs::create_dir_all(directory).map_err(fault)?;
     let names = names(directory).map_err(fault)?;
     if !names.is_empty() && !names.iter().any(|name| name == CLAIM || is_ledger(name)) {
-        // Whoever opens the results says what is off.
+        // Opening the results reports what is wrong with the folder.
         return Ok(());
     }
-    // One that is written is only read: it may be another user's.
+    // An existing claim is only read, because the file may belong to another user.
     let written = fs::read(&file).ok();
     let written = written.and_then(|text| serde_json::from_slice(&text).ok());
     let claim: Claim = match written {
@@ -45,7 +48,7 @@ pub(super) fn take(directory: &Path, name: &str, command: &str) -> Result<(), St
     })
 }
 
-/// Writes whose the folder is, or finds that another process just did.
+/// Writes the claim, or reads it if another process has just written it.
 fn write(file: &Path, name: &str, command: &str) -> io::Result<Claim> {
     let mut record = locked::open(file)?;
     record.lock()?;
@@ -89,7 +92,7 @@ mod tests {
             serde_json::from_str(&text).expect("whole")
         };
         assert_eq!(claim(&directory).command.as_deref(), Some("swell study dt"));
-        // One that was cut off names what mends it.
+        // The error about a truncated claim says how to fix it.
         fs::write(directory.join(CLAIM), "{\"study\":\"d").expect("written");
         let error = take(&directory, "dt").expect_err("cut off");
         let said = std::error::Error::source(&error)
@@ -99,12 +102,12 @@ mod tests {
             said.contains("remove it where the folder holds results of dt"),
             "{said}"
         );
-        // Results of a program that named no study are gone on with.
+        // Results without a claim are resumed.
         fs::remove_file(directory.join(CLAIM)).expect("there");
         fs::write(directory.join("results.jsonl"), "").expect("written");
         take(&directory, "dt").expect("older results");
         take(&directory, "resolution").expect_err("taken now");
-        // Others' files are left alone.
+        // A folder with foreign files is left alone.
         let other = folder.path().join("other");
         fs::create_dir(&other).expect("new");
         fs::write(other.join("notes.txt"), "mine").expect("written");

@@ -1,4 +1,5 @@
-//! Two solvers on one scene: bakes and renders both and measures them. What stands in their caches is resumed.
+//! Compares two solvers on one scene: bakes, renders and measures both. Existing caches are
+//! resumed.
 
 use std::{fs, path::PathBuf};
 
@@ -28,7 +29,7 @@ use super::{
 };
 
 impl Kind for SolverComparison {
-    /// Bakes and renders open the adapter themselves.
+    /// Returns `None`: bakes and renders open the adapter themselves.
     fn needs(&self) -> Option<Needs> {
         None
     }
@@ -37,7 +38,7 @@ impl Kind for SolverComparison {
         self.scenes.len()
     }
 
-    /// Two bakes, which are shared out as bakes are.
+    /// Returns `None`: the two bakes cannot be divided among shares.
     fn places(&self) -> Option<Vec<Place>> {
         None
     }
@@ -121,7 +122,8 @@ fn picture_directory(request: &Request, scene: &Scene) -> PathBuf {
     pictures.join(scene.solver.method.name())
 }
 
-/// Distance at which the first thing stands in the wave's way: a solid, or the far wall.
+/// Distance along the wave's path to the first obstacle, a solid or the far wall, less the gauge's
+/// resolution.
 fn obstacle(scene: &Scene, gauge: &Gauge) -> f64 {
     let nearest = |solid: &Solid| {
         let distances = solid.mesh.vertices.iter().map(|&v| gauge.distance(v));
@@ -129,7 +131,7 @@ fn obstacle(scene: &Scene, gauge: &Gauge) -> f64 {
     };
     let length = scene.domain.size()[gauge::direction(scene).axis];
     let places = scene.solids.iter().map(nearest).chain([length]);
-    // A front is known to a cube.
+    // The position of a front is known to the size of a cube.
     places.fold(f64::INFINITY, f64::min) - gauge.resolution()
 }
 
@@ -182,7 +184,7 @@ fn parts(
     let curves = comparison::charts(courses, impact);
     let mut run = vec![Part::Table(run_table(caches, courses))];
     run.extend(what_was_run(request));
-    // Both tables of solvers are in it.
+    // The scene contains the tables of both solvers.
     run.push(Part::Code(caches[0].scene_toml().to_owned()));
     let measured = vec![Part::Text(MEASURED.into())];
     Ok(vec![
@@ -198,7 +200,7 @@ fn parts(
     ])
 }
 
-/// For the reader of the page; the definitions stand at `swell::study::measure`.
+/// Explanation for readers of the page; `swell::study::measure` has the definitions.
 const MEASURED: &str = "Both solvers are measured alike, from the particles. Space is cut into cubes two \
     particle spacings wide; a cube at least half as full as at rest is water, and the largest body of such cubes that \
     touch by faces is the continuous water. A column's elevation is the top of that body, smoothed once over its \
@@ -207,7 +209,7 @@ const MEASURED: &str = "Both solvers are measured alike, from the particles. Spa
     front steepness of Kjeldsen and Myrhaug 1979). In the air is what lies more than a cube from the continuous water. \
     Values that differ by less than 5 % are called alike. Times are wall clock, the whole frame, with writing beside it.";
 
-/// A course's median, with so many digits.
+/// Median of a quantity over the rows of a course, with `digits` decimals.
 fn middle(course: &Course, digits: usize, value: fn(&Row) -> Option<f64>) -> String {
     let middle = median(course.rows.iter().filter_map(value).collect());
     middle.map_or("none".into(), |value| format!("{value:.digits$}"))

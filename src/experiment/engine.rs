@@ -1,5 +1,5 @@
-//! What every kind of study stands on: devices that are opened once, and points whose results are kept, so that a study that
-//! was interrupted goes on where it stopped.
+//! Common machinery of all kinds of studies: devices that are opened once, and points with stored
+//! results, so that an interrupted study resumes.
 
 use std::{
     cell::{Cell, RefCell},
@@ -30,45 +30,47 @@ use super::{
     run::Run,
 };
 
-/// Changes whenever what a line of results holds does.
+/// Version of the format of result lines; changes with their content.
 const FORM: &str = "swell study 3";
 
-/// A kind of study: what it runs and measures, and what it draws of that.
+/// A kind of study: what it runs, measures and draws.
 pub(super) trait Kind {
-    /// What its runs ask of an adapter; `None` where they need none.
+    /// Requirements of its runs on an adapter; `None` where they need none.
     fn needs(&self) -> Option<Needs>;
 
-    /// Points that it tells of.
+    /// Number of points that are reported.
     fn count(&self) -> usize;
 
-    /// What a share may run, in the order of [`Bench::is_next_ours`]. `None` where points stand on one cache, so that there are
-    /// no shares.
+    /// Units of work that are divided among shares, in the order of [`Bench::is_next_ours`]. `None`
+    /// where all points depend on one cache, so that the study cannot be divided.
     fn places(&self) -> Option<Vec<Place>>;
 
-    /// Runs, measures and draws; `None` where only a share was run, or looked for.
+    /// Runs, measures and draws the study; returns `None` where only a share was run or missing
+    /// points were counted.
     ///
     /// # Errors
-    /// [`StudyError`]; [`StudyError::Stopped`] where a signal came.
+    /// [`StudyError`]; [`StudyError::Stopped`] after a stop signal.
     fn run(&self, bench: &mut Bench<'_>) -> Result<Option<Report>, StudyError>;
 }
 
-/// Where a point, or a search that takes several, stands among those that shares are dealt.
+/// A unit of work among those that are divided among shares: a point, or a search that takes
+/// several.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Place {
-    /// In its line, from cheap to dear.
+    /// Rank within its line, from cheap to expensive.
     pub(super) rank: usize,
-    /// Points that it takes at most.
+    /// Largest number of points that it takes.
     pub(super) points: usize,
 }
 
 impl Place {
-    /// Of one point.
+    /// A unit of one point.
     pub(super) fn of(rank: usize) -> Self {
         Self { rank, points: 1 }
     }
 }
 
-/// What scenes ask of an adapter, each with what it runs on.
+/// Combined requirements of scenes on an adapter, ignoring those that do not run on a GPU.
 pub(super) fn needs_of<'a>(runs: impl Iterator<Item = (&'a Scene, RunsOn)>) -> Option<Needs> {
     let on_gpu = runs.filter(|(_, device)| *device == RunsOn::Gpu);
     on_gpu.fold(None, |all, (scene, _)| {
@@ -79,16 +81,16 @@ pub(super) fn needs_of<'a>(runs: impl Iterator<Item = (&'a Scene, RunsOn)>) -> O
     })
 }
 
-/// What points run on.
+/// Devices on which points run.
 pub struct Devices {
-    /// The study's adapter; `None` where nothing runs there.
+    /// The study's adapter; `None` where no point runs on a GPU.
     pub gpu: Option<Opened>,
-    /// The f64 reference.
+    /// The f64 reference solver on the CPU.
     pub cpu: Opened,
 }
 
 impl Devices {
-    /// Where the adapter has no f64 the points that ask for it fail, and the others do not.
+    /// Opens the devices. On an adapter without f64, only the points that need it fail.
     pub(super) fn open(gpu: &Gpu, needs: Option<Needs>) -> Result<Self, GpuError> {
         let open = |needs| match gpu.open(needs) {
             Err(GpuError::NoF64 { .. }) => gpu.open(Needs::default()),
@@ -101,8 +103,10 @@ impl Devices {
         })
     }
 
+    /// Returns the device for a run.
+    ///
     /// # Panics
-    /// Where a point is on the GPU and none was opened.
+    /// If the run is on a GPU and no adapter was opened.
     pub fn of(&self, device: RunsOn) -> &Opened {
         match device {
             RunsOn::Cpu => &self.cpu,
@@ -110,8 +114,9 @@ impl Devices {
         }
     }
 
-    /// What a point is known by. The hash is of all that its results depend on: each run's physics, device and when it gives
-    /// up; frames, how it is measured, and the program.
+    /// Identifies a point. The hash covers everything its results depend on: the physics, device
+    /// and limits of each run, the number of frames, the settings of the measurement, and the
+    /// program.
     pub(super) fn key(&self, runs: &[(&Scene, RunsOn)], frames: u32, measured: &str) -> Key {
         let of = |(scene, device): &(&Scene, RunsOn)| {
             let solver = &scene.solver;
@@ -140,8 +145,8 @@ impl Devices {
     }
 }
 
-/// BLAKE3 of the program that runs, since another build may compute otherwise; where its file cannot be read, what no other
-/// run has.
+/// BLAKE3 hash of the running executable, since another build may compute different results; a
+/// unique value where the file cannot be read.
 fn program() -> &'static str {
     static PROGRAM: OnceLock<String> = OnceLock::new();
     PROGRAM.get_or_init(|| {
@@ -153,17 +158,17 @@ fn program() -> &'static str {
     })
 }
 
-/// What is run of a study.
+/// Part of a study to run.
 pub(super) enum Work {
-    /// All of it.
+    /// The whole study.
     Whole,
-    /// A share, with which points are its.
+    /// A share of it, and which units of work belong to that.
     Share(Chunk, Vec<bool>),
-    /// Nothing: points that no ledger has are counted.
+    /// Nothing: only counts the points that no ledger has.
     Look,
 }
 
-/// What a kind of study has at hand while it runs.
+/// Context in which a kind of study runs.
 pub(super) struct Bench<'a> {
     pub(super) request: &'a Request,
     pub(super) devices: &'a Devices,
@@ -171,19 +176,19 @@ pub(super) struct Bench<'a> {
     tell: RefCell<&'a mut dyn FnMut(Event)>,
     work: Work,
     pub(super) count: usize,
-    /// Points that were told of.
+    /// Number of points reported so far.
     number: usize,
-    /// Points of the study, a share's or not, that were come to.
+    /// Number of units of work reached so far, whether they belong to the share or not.
     dealt: usize,
-    /// Points that were run, those that stood there, and what is left.
+    /// Numbers of points that were run, that were found in a ledger, and that are missing.
     pub(super) ran: Cell<usize>,
     pub(super) stood: Cell<usize>,
     pub(super) left: Cell<usize>,
-    /// Whether what is left may come to less.
+    /// Whether the number of missing points is an upper bound.
     pub(super) is_left_at_most: Cell<bool>,
-    /// Hashes of points whose results are there: two points of one key have one.
+    /// Hashes of the points with results; points with equal keys share one.
     there: RefCell<BTreeSet<String>>,
-    /// Shares that ran points, with how many; known at the end of a whole study.
+    /// Shares that ran points, with the number of points; known at the end of a whole study.
     shares: RefCell<Vec<(String, usize)>>,
 }
 
@@ -217,12 +222,12 @@ impl<'a> Bench<'a> {
         (self.tell.borrow_mut())(event);
     }
 
-    /// Whether there is nothing to draw, since others run what is not of the share.
+    /// Whether there is nothing to draw because other processes run the rest.
     pub(super) fn is_part(&self) -> bool {
         !matches!(self.work, Work::Whole)
     }
 
-    /// Whether the next of [`Kind::places`] is to be run, or looked for.
+    /// Whether the next unit of [`Kind::places`] is to be run or counted here.
     pub(super) fn is_next_ours(&mut self) -> bool {
         self.dealt += 1;
         match &self.work {
@@ -231,7 +236,7 @@ impl<'a> Bench<'a> {
         }
     }
 
-    /// Tells what became of the next point.
+    /// Reports the outcome of the next point.
     pub(super) fn told(&mut self, name: String, status: PointStatus) {
         if matches!(self.work, Work::Look) {
             return;
@@ -253,14 +258,14 @@ impl<'a> Bench<'a> {
         }
     }
 
-    /// Results that stand in the study's folder.
+    /// Opens the results in the study's folder.
     pub(super) fn ledger<M: Serialize + DeserializeOwned>(&self) -> Result<Ledger<M>, StudyError> {
         let warn = &mut |text| self.tell(Event::Warning(text));
         Ledger::open(&self.request.directory, self.reader(), warn)
     }
 
-    /// A point's results and whether they stood in a ledger; they are measured where they did not. `None` of a point that is
-    /// only looked for, and of which there are none.
+    /// Returns a point's results and whether they come from a ledger; measures them otherwise.
+    /// Returns `None` for a missing point that is only counted.
     pub(super) fn point<M: Clone + Default + Serialize>(
         &self,
         ledger: &mut Ledger<M>,
@@ -306,7 +311,7 @@ impl<'a> Bench<'a> {
         Ok(Some((run.clone(), false)))
     }
 
-    /// At the end of all points: which shares ran some of them.
+    /// Reports which shares ran points; to be called after all points.
     pub(super) fn joined<M: Clone + Serialize>(&self, ledger: &Ledger<M>) {
         let (shares, unknown) = ledger.joined();
         for (share, points) in &shares {
@@ -324,7 +329,7 @@ impl<'a> Bench<'a> {
         *self.shares.borrow_mut() = shares;
     }
 
-    /// What a page says of points that shares ran; `None` where none did.
+    /// Sentence for the page about points that shares ran; `None` where none did.
     pub(super) fn told_of_shares(&self) -> Option<String> {
         let shares = self.shares.borrow();
         let theirs: usize = shares.iter().map(|(_, points)| points).sum();
@@ -346,7 +351,7 @@ impl<'a> Bench<'a> {
     }
 }
 
-/// Drives a point's frames up to `last`.
+/// Advances the frames of a point up to `last`.
 pub(super) fn until_done(
     drive: &mut Drive<'_>,
     last: u32,

@@ -1,4 +1,4 @@
-//! Why a study fails.
+//! Errors of studies.
 
 use std::path::PathBuf;
 
@@ -11,81 +11,81 @@ use swell_solve::SolveError;
 use swell_stage::{Blame, bake::BakeError, device::SolverError, render::RenderJobError};
 use swell_study::{picture::PictureError, raster::RasterError};
 
-/// Why a study failed.
+/// Reason why a study failed.
 #[derive(Debug, thiserror::Error)]
 pub enum StudyError {
-    /// A signal ended it; the same command resumes it.
+    /// A signal ended the study; the same command resumes it.
     #[error("ended by a signal")]
     Stopped,
-    /// A bake.
+    /// A bake failed.
     #[error(transparent)]
     Bake(#[from] BakeError),
-    /// A render.
+    /// A render failed.
     #[error(transparent)]
     Render(#[from] RenderJobError),
-    /// A cache.
+    /// A cache cannot be read.
     #[error(transparent)]
     Cache(#[from] CacheError),
-    /// The scene.
+    /// The scene is invalid.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// A file that cannot be read or written.
+    /// A file cannot be read or written.
     #[error("{}", file.display())]
     File {
-        /// Which.
+        /// Path of the file.
         file: PathBuf,
-        /// The system's words.
+        /// Error of the operating system.
         source: std::io::Error,
     },
-    /// A solid without inside, or too large a grid.
+    /// A solid has no interior, or its distance grid would be too large.
     #[error(transparent)]
     Solid(#[from] SignedDistanceError),
-    /// The device.
+    /// The device failed.
     #[error(transparent)]
     Gpu(#[from] GpuError),
-    /// A solver, or the exact solution.
+    /// A solver or the exact solution failed.
     #[error(transparent)]
     Solve(#[from] SolverError),
-    /// A curve that cannot be drawn.
+    /// A chart cannot be rasterised.
     #[error(transparent)]
     Raster(#[from] RasterError),
-    /// A point that its measure does not fit.
+    /// A point cannot be measured as the study asks.
     #[error("{0}")]
     Point(String),
-    /// A line of the results that cannot be read.
+    /// A line of the results is invalid.
     #[error("{}:{line}: {what}; remove the line (all of them where another version wrote the file), and its point is run again", file.display())]
     Ledger {
-        /// Which file.
+        /// Path of the ledger.
         file: PathBuf,
-        /// From 1.
+        /// Line number, from 1.
         line: usize,
-        /// What is off.
+        /// Description of the problem.
         what: String,
     },
-    /// A share of a study that has none.
+    /// The study cannot be divided into shares.
     #[error(
         "a study of kind {0} has no shares: its points stand on one cache; run it without --chunk"
     )]
     NoShares(&'static str),
-    /// Results of another study stand in the folder.
+    /// The folder contains results of another study.
     #[error(
         "{} holds results of the study {found}, not of {name}; left untouched: choose another -o",
         directory.display()
     )]
     OtherStudy {
-        /// The folder.
+        /// Path of the folder.
         directory: PathBuf,
-        /// The study that it belongs to.
+        /// Study to which the folder belongs.
         found: String,
-        /// The study that is run.
+        /// Study that was to be run.
         name: String,
     },
-    /// A picture that cannot stand in the page.
+    /// A picture cannot be embedded in the page.
     #[error("{}", file.display())]
     Picture {
-        /// Which.
+        /// Path of the picture.
         file: PathBuf,
-        /// What is off.
+        /// Description of the problem.
         source: PictureError,
     },
 }
@@ -124,10 +124,11 @@ impl From<&StudyError> for Blame {
 }
 
 impl StudyError {
-    /// Its words, where the point alone is at fault: its scene or its numbers. The study then goes on without it.
+    /// Returns the message where only the point is at fault, through its scene or its numbers, so
+    /// that the study can continue without it.
     ///
     /// # Errors
-    /// The error itself, where it would meet every point.
+    /// The error itself, where it would affect every point.
     pub(super) fn of_the_point(self) -> Result<String, Self> {
         match Blame::from(&self) {
             Blame::Numbers | Blame::Input => Ok(self.to_string()),

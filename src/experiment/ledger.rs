@@ -1,8 +1,9 @@
-//! Results that are kept, a line a finished point: `results.jsonl`, and for each share of a study (`--chunk 1/4`) a file of its
-//! own beside it, `results.1-of-4.jsonl`, so that no two machines write one file.
+//! Stored results, one line per finished point: `results.jsonl`, and for each share of a study
+//! (`--chunk 1/4`) a separate file beside it, `results.1-of-4.jsonl`, so that no two machines write
+//! to the same file.
 //!
-//! A point that stands in any ledger of the folder is not run again. The study without a share copies the others' lines into its own
-//! ledger, with the share that ran each, and says why it leaves one out.
+//! A point in any ledger of the folder is not run again. A whole study copies the lines of shares
+//! into its own ledger, with the share that ran each, and warns about lines it leaves out.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -19,55 +20,55 @@ use swell_study::folder::{CLAIM, LEDGER, is_ledger, ledger_of};
 
 use super::{StudyError, run::Run};
 
-/// What a point is known by.
+/// Identity of a point.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Key {
-    /// Of all that its results depend on.
+    /// Hash of everything the results depend on.
     pub(super) hash: String,
-    /// Hash of the program that ran it.
+    /// Hash of the executable that ran the point.
     #[serde(default)]
     pub(super) program: String,
-    /// What its runs ran on.
+    /// Identities of the devices that ran the point.
     #[serde(default)]
     pub(super) devices: Vec<String>,
 }
 
-/// A finished point as a file holds it.
+/// A finished point as stored in a ledger.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Line<M> {
     #[serde(flatten)]
     pub(super) key: Key,
-    /// Of the point, as it is told.
+    /// Name of the point in reports.
     pub(super) name: String,
-    /// The share of the study that ran it, such as `1/4`; `None` of the whole study.
+    /// Share of the study that ran the point, such as `1/4`; `None` for a whole study.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) share: Option<String>,
     pub(super) run: Run<M>,
 }
 
-/// Who opens the ledgers of a folder.
+/// Purpose for which the ledgers of a folder are opened.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Reader {
-    /// The study itself: no share may be at work, and it says what is wrong with a line.
+    /// To run the whole study: no share may be running, and invalid lines are errors.
     Whole,
-    /// A share: other shares may be at work.
+    /// To run a share: other shares may be running.
     Share(Chunk),
-    /// Who only counts what is there.
+    /// Only to count existing results.
     Look,
 }
 
-/// Results of a folder, and a file of it that is open for more.
+/// Results in a folder, with a ledger open for appending.
 pub(super) struct Ledger<M> {
     path: PathBuf,
-    /// `None` for who only looks.
+    /// `None` for [`Reader::Look`].
     file: Option<File>,
-    /// Its own, by their hashes.
+    /// Lines of its own ledger by hash.
     lines: BTreeMap<String, Line<M>>,
-    /// Of the folder's other ledgers, in the order of their names.
+    /// Other ledgers of the folder in order of their names.
     others: Vec<Other<M>>,
-    /// Names of points that were asked for.
+    /// Names of the points that were looked up.
     asked: BTreeSet<String>,
-    /// Hashes of points that were found, by the shares that ran them.
+    /// Hashes of the points found, by the share that ran them.
     of_shares: BTreeMap<String, BTreeSet<String>>,
 }
 
@@ -77,17 +78,21 @@ struct Other<M> {
     lines: Vec<Line<M>>,
 }
 
-/// A file's lines.
+/// Lines of a file.
 struct Read<M> {
     lines: Vec<Line<M>>,
-    /// Bytes of whole lines.
+    /// Number of bytes in complete lines.
     whole: usize,
     is_torn: bool,
 }
 
 impl<M: Serialize + DeserializeOwned> Ledger<M> {
-    /// Opens a folder's results, or begins them; a torn last line of its own is cut off. A folder that holds anything but a
-    /// study's results is refused, and so is a ledger that another process writes to. `warn` hears of what is torn elsewhere.
+    /// Opens the results of a folder, or creates them. Truncates an incomplete last line of its own
+    /// ledger, and reports incomplete lines of others through `warn`.
+    ///
+    /// # Errors
+    /// [`StudyError::File`] if the folder holds anything but a study's results or if another
+    /// process writes to the ledger; [`StudyError::Ledger`] for an invalid line.
     pub(super) fn open(
         directory: &Path,
         reader: Reader,
@@ -106,7 +111,7 @@ impl<M: Serialize + DeserializeOwned> Ledger<M> {
             let what = "it holds what is no study's: choose another -o";
             return Err(fault(directory)(io::Error::other(what)));
         }
-        // The lock first: what is read is then what stands there until it is written to.
+        // Takes the lock first, so that the ledger cannot change between reading and writing.
         let file = file.then(|| locked(&path)).transpose()?;
         let is_strict = reader == Reader::Whole;
         let standing = read::<M>(&path, reader != Reader::Look)?;
@@ -119,7 +124,8 @@ impl<M: Serialize + DeserializeOwned> Ledger<M> {
             .filter(|name| is_ledger(name) && *name != own)
         {
             let other = directory.join(&name);
-            // The study waits for all shares; a share for the study, which runs what is missing.
+            // The whole study waits for all shares; a share waits for the whole study, which runs
+            // what is missing.
             if is_strict || name == LEDGER && reader != Reader::Look {
                 refuse_busy(&other)?;
             }
@@ -148,7 +154,8 @@ impl<M: Serialize + DeserializeOwned> Ledger<M> {
 }
 
 impl<M: Clone + Serialize> Ledger<M> {
-    /// What a point came to. The study takes over what a share has; `warn` hears why it cannot.
+    /// Looks up the results of a point. The whole study copies lines of shares; `warn` receives the
+    /// reason where it cannot use one.
     pub(super) fn find(
         &mut self,
         name: &str,
@@ -177,7 +184,7 @@ impl<M: Clone + Serialize> Ledger<M> {
         }
     }
 
-    /// Why the lines of this name are not this point's.
+    /// Reports why lines with this name belong to a different point.
     fn others_differ(&self, name: &str, key: &Key, warn: &mut dyn FnMut(String)) {
         for other in &self.others {
             for line in other.lines.iter().filter(|line| line.name == name) {
@@ -194,13 +201,13 @@ impl<M: Clone + Serialize> Ledger<M> {
         }
     }
 
-    /// Adds a line; it is on the disk when this returns.
+    /// Appends a line and synchronises it to disk.
     ///
     /// # Panics
-    /// Of a ledger that was opened to look.
+    /// If the ledger was opened with [`Reader::Look`].
     pub(super) fn append(&mut self, line: Line<M>) -> Result<&Run<M>, StudyError> {
         let mut file = self.file.as_ref().expect("opened to write");
-        // Finite numbers, strings and lists alone: nothing that JSON cannot hold.
+        // Only finite numbers, strings and lists, which JSON can represent.
         let text = serde_json::to_string(&line).map_err(io::Error::other);
         let written = text.and_then(|text| {
             file.write_all(format!("{text}\n").as_bytes())?;
@@ -215,8 +222,8 @@ impl<M: Clone + Serialize> Ledger<M> {
         Ok(&self.lines.entry(hash).or_insert(line).run)
     }
 
-    /// Shares that ran points of the study, whenever these were taken over, with how many, and what is said of lines that nobody
-    /// asked for.
+    /// Returns the shares that ran points of the study, with the number of points, whenever these
+    /// were copied; and warnings about lines that no point of the study asked for.
     pub(super) fn joined(&self) -> (Vec<(String, usize)>, Vec<String>) {
         let shares = self.of_shares.iter();
         let shares = shares.map(|(share, hashes)| (share.clone(), hashes.len()));
@@ -240,7 +247,7 @@ fn fault(file: &Path) -> impl FnOnce(io::Error) -> StudyError + use<> {
     move |source| StudyError::File { file, source }
 }
 
-/// Of the files of a folder, in order.
+/// Names of the entries of a folder, sorted.
 pub(super) fn names(directory: &Path) -> io::Result<Vec<String>> {
     let entries = fs::read_dir(directory)?;
     let name =
@@ -250,7 +257,7 @@ pub(super) fn names(directory: &Path) -> io::Result<Vec<String>> {
     Ok(names)
 }
 
-/// Opens a ledger to write at its end, and keeps others from it.
+/// Opens a ledger for appending and locks it.
 fn locked(path: &Path) -> Result<File, StudyError> {
     let mut options = OpenOptions::new();
     let file = options.create(true).append(true).open(path);
@@ -261,7 +268,7 @@ fn locked(path: &Path) -> Result<File, StudyError> {
     }
 }
 
-/// Of a share's ledger: whether its worker is at work.
+/// Fails if another process writes to this ledger.
 fn refuse_busy(path: &Path) -> Result<(), StudyError> {
     let file = File::open(path).map_err(fault(path))?;
     match is_had(file.try_lock_shared()).map_err(fault(path))? {
@@ -272,7 +279,8 @@ fn refuse_busy(path: &Path) -> Result<(), StudyError> {
     }
 }
 
-/// Lines of a file, none where it is missing. A line that cannot be read is a fault where `is_strict`, and left out else.
+/// Reads the lines of a file, none where it is missing. An invalid line is an error if `is_strict`,
+/// and skipped otherwise.
 fn read<M: DeserializeOwned>(path: &Path, is_strict: bool) -> Result<Read<M>, StudyError> {
     let text = match fs::read(path) {
         Ok(text) => text,
@@ -303,7 +311,7 @@ fn read<M: DeserializeOwned>(path: &Path, is_strict: bool) -> Result<Read<M>, St
     })
 }
 
-/// What is wrong with a line, without the number that it has as a text of its own.
+/// Message of a JSON error without its line number, which counts within the line's own text.
 fn in_line(error: &serde_json::Error) -> String {
     let text = error.to_string();
     match text.rsplit_once(" at line 1 column ") {
@@ -371,7 +379,7 @@ mod tests {
         );
     }
 
-    /// What shares have is taken over once, whoever wrote what does not fit, is torn or is at work is named.
+    /// Lines of shares are copied once, and foreign, truncated and locked ledgers are reported.
     #[test]
     fn ledgers_of_shares_are_joined_and_what_is_off_is_said() {
         let folder = tempfile::tempdir().expect("a folder");
@@ -440,7 +448,8 @@ mod tests {
         let (shares, unknown) = ledger.joined();
         assert!(shares.is_empty(), "none was asked for: {shares:?}");
         assert!(unknown.len() == 2 && unknown[1].contains("`jacobi, k = b` is no point"));
-        // Whoever joins again, as after a signal, is told once more: also where the share's file is gone.
+        // Joining again, for example after a signal, reports the same shares, even where a share's
+        // file is gone.
         drop(ledger);
         fs::remove_file(folder.path().join("results.1-of-2.jsonl")).expect("there");
         let mut ledger = open(Reader::Whole, &mut said).expect("free");
@@ -453,7 +462,7 @@ mod tests {
         let shares = ledger.joined().0;
         let each = ["1/2", "2/2"].map(|share| (share.to_owned(), 1));
         assert_eq!(shares, each);
-        // A point of the whole study is no share's.
+        // A point run by the whole study belongs to no share.
         let own = Line {
             name: "own".to_owned(),
             ..line("d")
@@ -463,7 +472,8 @@ mod tests {
         assert!(found.expect("readable").is_some());
         assert_eq!(ledger.joined().0, each);
 
-        // A spoiled line of a share stops the study that would take it over, and no other share.
+        // An invalid line of a share stops the whole study, which would copy it, but not other
+        // shares.
         drop(ledger);
         fs::write(&path, format!("{{}}\n{text}")).expect("written");
         let error = open(Reader::Whole, &mut said).err().expect("spoiled");

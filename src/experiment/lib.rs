@@ -1,12 +1,14 @@
-//! Experiments: runs what a study asks for, measures it, and writes the page.
+//! Runs the experiments of a study, measures them, and writes the page.
 //!
-//! The `engine` opens devices, runs points and keeps their results; a kind of study is a file or folder beside it: what is
-//! run, what is measured, what is drawn. `sweep` changes one setting at a time, [`stability`] runs scenes that are hard on a
-//! solver against their marks, [`validation`] against theory and experiments, `comparison` bakes and renders a scene with two solvers,
-//! `surface` draws one with one setting of the look changed at a time, `tune` looks for the cheapest settings of a shot.
+//! The `engine` opens devices, runs points and stores their results. Each kind of study is a file
+//! or folder beside it, which defines what is run, measured and drawn: `sweep` changes one setting
+//! at a time, [`stability`] runs demanding scenes and checks them against bounds, [`validation`]
+//! compares with theory and experiments, `comparison` bakes and renders a scene with two solvers,
+//! `surface` draws a scene with one setting of the look changed at a time, and `tune` searches for
+//! the cheapest settings of a shot.
 //!
-//! A further kind is one file here that implements `engine::Kind`, its parser in [`scene::study`](swell_scene::study), and
-//! a line in [`study`].
+//! A further kind needs one file here that implements `engine::Kind`, a parser in
+//! [`scene::study`](swell_scene::study), and a line in [`study`].
 
 mod claim;
 mod comparison;
@@ -34,95 +36,97 @@ pub use engine::Devices;
 pub use error::StudyError;
 pub use run::Run;
 
-/// What to study, and where to.
+/// A study to run, and where its results go.
 #[derive(Clone, Debug)]
 pub struct Request {
-    /// Of the study, as its page is titled.
+    /// Name of the study, the title of its page.
     pub name: String,
-    /// Validated study.
+    /// The validated study.
     pub study: Study,
-    /// Caches, pictures, table and page go in here.
+    /// Folder for caches, pictures, table and page.
     pub directory: PathBuf,
-    /// Share of the points that is run, without table and page; the whole study where there is none, with what shares have
-    /// run already.
+    /// Share of the points to run, without table and page; `None` for the whole study, including
+    /// what shares have run already.
     pub chunk: Option<Chunk>,
-    /// Adapter and shaders of what runs on a GPU.
+    /// Adapter and shaders for runs on a GPU.
     pub gpu: Gpu,
-    /// As typed, for the page.
+    /// The command as typed, for the page.
     pub command: String,
 }
 
-/// What a study has to tell while it runs.
+/// Progress of a running study.
 #[derive(Clone, Debug)]
 pub enum Event {
-    /// A bake begins or goes on.
+    /// The bake of the named solver begins or resumes.
     Solver(&'static str),
-    /// What a user has to know of a scene of the study.
+    /// Warning about the study or one of its scenes.
     Warning(String),
-    /// A bake tells.
+    /// Progress of a bake.
     Bake(Box<bake::Event>),
-    /// A render tells.
+    /// Progress of a render.
     Render(render::Event),
-    /// A point of a sweep.
+    /// Outcome of a point.
     Point(PointEvent),
-    /// A share ran points of the whole study, which were taken over now or before.
+    /// A share ran points that the whole study has copied, now or earlier.
     Joined {
-        /// Such as `1/4`.
+        /// The share, such as `1/4`.
         share: String,
-        /// Its ledger in the study's folder.
+        /// Name of its ledger in the study's folder.
         file: String,
-        /// How many.
+        /// Number of its points.
         points: usize,
     },
 }
 
-/// Where a sweep stands.
+/// Outcome and position of a point within the study.
 #[derive(Clone, Debug)]
 pub struct PointEvent {
-    /// From 1.
+    /// Number of the point, from 1.
     pub number: usize,
-    /// Points of the study.
+    /// Number of points in the study or the share.
     pub count: usize,
-    /// Method and setting.
+    /// Name of the point, with method and setting.
     pub name: String,
-    /// What became of it.
+    /// Outcome of the point.
     pub status: PointStatus,
 }
 
-/// What became of a point of a sweep.
+/// Outcome of a point.
 #[derive(Clone, Debug)]
 pub enum PointStatus {
-    /// It stands there from a run before.
+    /// Found in a ledger from an earlier run.
     Stands,
-    /// It was run: milliseconds a frame or a projection, and each error that is known already, with its name.
+    /// Finished: milliseconds per frame or projection, and the errors that are known already, by
+    /// name.
     Done(f64, Vec<(&'static str, f64)>),
-    /// Its numbers failed.
+    /// Failed, with the reason.
     Failed(String),
 }
 
-/// How a study ended.
+/// Outcome of a study.
 #[derive(Clone, Debug, Default)]
 pub struct Outcome {
-    /// Its page; `None` where a signal ended it before, and of a share.
+    /// Path of the page; `None` for a share, and where a signal ended the study.
     pub page: Option<PathBuf>,
-    /// What a share came to; `None` where a signal ended it before, and of a whole study.
+    /// Outcome of a share; `None` for a whole study, and where a signal ended it.
     pub share: Option<Share>,
-    /// What was found, in words.
+    /// Findings, as sentences.
     pub findings: Vec<String>,
-    /// Marks that are missed and not known to be; only of a study that has marks.
+    /// Missed marks that are not listed as known failures; empty for studies without marks.
     pub missed: Vec<String>,
 }
 
-/// What a share of a study came to.
+/// Outcome of a share of a study.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Share {
-    /// Points that were run.
+    /// Number of points that were run.
     pub ran: usize,
-    /// Points of the share that stood in a ledger.
+    /// Number of points of the share that were found in a ledger.
     pub stood: usize,
-    /// Points of the study that no ledger of the folder has when the share is done.
+    /// Number of points of the study that no ledger of the folder has at the end of the share.
     pub left: usize,
-    /// Whether these may come to less: a search for a limit ends when it has found it.
+    /// Whether `left` is an upper bound, because a search for a limit ends as soon as it has found
+    /// it.
     pub is_left_at_most: bool,
 }
 
@@ -137,10 +141,10 @@ fn kind_of(study: &Study) -> &dyn Kind {
     }
 }
 
-/// Whether each point that shares are dealt, in the study's order, is of this one.
+/// Returns for each unit of work of a study, in its order, whether it belongs to a share.
 ///
 /// # Errors
-/// [`StudyError::NoShares`].
+/// [`StudyError::NoShares`] if the study cannot be divided.
 pub fn dealt(study: &Study, chunk: Chunk) -> Result<Vec<bool>, StudyError> {
     let places = kind_of(study).places();
     let places = places.ok_or(StudyError::NoShares(Outline::of(study).kind))?;
@@ -148,17 +152,18 @@ pub fn dealt(study: &Study, chunk: Chunk) -> Result<Vec<bool>, StudyError> {
     Ok(chunk.deal(&ranks))
 }
 
-/// Runs a study, or a share of it; `tell` hears of progress, and `stop` ends it after the current frame of a bake, a render or a point, which
-/// is then run anew. Results that stand in the directory already are kept.
+/// Runs a study or a share of it, and keeps results that the folder already has. Reports progress
+/// through `tell`. Setting `stop` ends the study after the current frame; an unfinished point is
+/// run again next time.
 ///
 /// # Errors
-/// [`StudyError`].
+/// [`StudyError`] describes all causes; `stop` is not an error but gives an empty outcome.
 pub fn study(
     request: &Request,
     stop: &AtomicBool,
     tell: &mut dyn FnMut(Event),
 ) -> Result<Outcome, StudyError> {
-    // Also where no point needs it: a name that is none is not passed over.
+    // Checked even where no point needs an adapter, so that a misspelled name is not ignored.
     if let Some(adapter) = &request.gpu.adapter {
         adapter::check_request(adapter)?;
     }
@@ -187,7 +192,7 @@ pub fn study(
         return report.write(request, bench.told_of_shares());
     }
     let (ran, stood) = (bench.ran.get(), bench.stood.get());
-    // Once more over all points, which runs none of them: others have worked meanwhile.
+    // Counts the missing points without running any, because other processes have worked meanwhile.
     let mut look = Bench::new(request, &devices, stop, tell, (Work::Look, kind.count()));
     kind.run(&mut look)?;
     let share = Some(Share {

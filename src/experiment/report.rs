@@ -1,4 +1,4 @@
-//! What a study leaves: `results.csv`, its curves, and the page.
+//! Output of a study: `results.csv`, its curves, and the page.
 
 use std::{fs, path::Path};
 
@@ -9,25 +9,26 @@ use swell_study::{
 
 use super::{Outcome, Request, StudyError};
 
-/// What a kind of study draws.
+/// Content that a kind of study draws.
 #[derive(Default)]
 pub(super) struct Report {
-    /// The page's first words: one sentence.
+    /// First sentence of the page.
     pub(super) answer: String,
-    /// Names of files in `curves/`, and SVG; the first stands below the answer, the others are folded.
+    /// File names in `curves/` with their SVG. The first curve is below the answer, the others are
+    /// folded.
     pub(super) curves: Vec<(String, String)>,
-    /// The page from there on.
+    /// The rest of the page.
     pub(super) parts: Vec<Part>,
-    /// For `results.csv`; the first row are titles.
+    /// Rows of `results.csv`, the titles first.
     pub(super) table: Vec<Vec<String>>,
-    /// What was found, in words.
+    /// Findings, as sentences.
     pub(super) findings: Vec<String>,
-    /// Marks that are missed and not known to be.
+    /// Missed marks that are not listed as known failures.
     pub(super) missed: Vec<String>,
 }
 
 impl Report {
-    /// Writes all of it. `shares` is what a reader of times has to know of shares that ran points.
+    /// Writes all files. `shares` is a note for readers about the times of points that shares ran.
     pub(super) fn write(
         self,
         request: &Request,
@@ -67,7 +68,7 @@ impl Report {
     }
 }
 
-/// What was typed, and what was told of the scenes.
+/// Parts of the page with the command as typed and the study's warnings.
 pub(super) fn what_was_run(request: &Request) -> Vec<Part> {
     let warnings = request.study.warnings().into_iter();
     let told = warnings.map(|warning| Part::Text(format!("Warning: {warning}")));
@@ -82,7 +83,7 @@ fn write(file: &Path, text: impl AsRef<[u8]>) -> Result<(), StudyError> {
     })
 }
 
-/// Rows with commas between cells, quoted where they have to be.
+/// Formats rows as CSV, with quotes where needed.
 fn csv(rows: &[Vec<String>]) -> String {
     let quoted = |cell: &String| match cell.contains([',', '"', '\n']) {
         true => format!("\"{}\"", cell.replace('"', "\"\"")),

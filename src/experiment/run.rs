@@ -1,27 +1,27 @@
-//! What a point of a study came to, as its ledger keeps it.
+//! Results of a point, as its ledger stores them.
 
 use serde::{Deserialize, Serialize};
 
 use swell_study::median;
 
-/// What a point came to; `M` is what its kind of study measures.
+/// Results of a point; `M` is what its kind of study measures.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Run<M> {
-    /// At the start.
+    /// Number of particles at the start.
     pub particles: usize,
-    /// Output frames that were done, or 1 projection.
+    /// Number of finished output frames, or 1 for a projection.
     pub frames: u32,
-    /// Wall clock of all frames, of each repeat.
+    /// Wall-clock seconds of all frames, one value per repeat.
     pub seconds: Vec<f64>,
-    /// Why it ended before its last frame, or did not begin.
+    /// Reason why the run ended before its last frame or did not begin.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ended: Option<String>,
-    /// What was measured so far.
+    /// Measurements up to the end of the run.
     pub measured: M,
 }
 
 impl<M> Run<M> {
-    /// Seconds a frame: least, median and greatest of the repeats.
+    /// Seconds per frame: minimum, median and maximum of the repeats.
     pub(super) fn per_frame(&self) -> [f64; 3] {
         let frames = f64::from(self.frames.max(1));
         let least = self.seconds.iter().copied().fold(f64::INFINITY, f64::min);

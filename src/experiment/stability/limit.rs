@@ -1,4 +1,4 @@
-//! How far a setting goes before a mark is missed, by bisection.
+//! Finds by bisection how far a setting can go before a mark is missed.
 
 use swell_scene::study::stability::{Limit, Search, Trial};
 
@@ -7,19 +7,20 @@ use super::{
     Measured, Run, Verdict, point, report,
 };
 
-/// Where a limit was found.
+/// Result of a search for a limit.
 #[derive(Default)]
 pub(super) struct Found {
-    /// Farthest value that passes; `None` where not even the first does.
+    /// Farthest value that passes; `None` if the first one fails.
     pub(super) passes: Option<f64>,
-    /// Nearest value that fails, and what it fails by; `None` where not even the last does.
+    /// Nearest value that fails, with the reason; `None` if the last one passes.
     pub(super) fails: Option<(f64, String)>,
-    /// Runs that it took.
+    /// Number of runs.
     pub(super) tries: usize,
 }
 
-/// Both ends first, and then the middle by ratio of a value that passes and one that fails, until they are near. `None` where
-/// the runs are only looked for, and one is not there.
+/// Searches for a limit: tries both ends, then bisects geometrically between a passing and a
+/// failing value until their ratio is small enough. Returns `None` where runs are only looked up
+/// and one is missing.
 pub(super) fn find(
     bench: &mut Bench<'_>,
     ledger: &mut Ledger<Vec<Measured>>,
@@ -33,11 +34,11 @@ pub(super) fn find(
     while let Some(value) = next {
         let mut name = format!("{title} = {value}");
         let (fault, status) = match search.trial(value) {
-            // Beyond what a scene can say.
+            // The value is outside the range that a scene accepts.
             Err(error) => (Some(error.to_string()), PointStatus::Done(0.0, Vec::new())),
             Ok(trial) => {
                 let Some((run, stood)) = point(bench, ledger, &name, &trial)? else {
-                    // Itself, and what may follow from it.
+                    // This run and those that may follow it.
                     let rest = most.saturating_sub(found.tries + 1);
                     bench.left.set(bench.left.get() + rest);
                     bench.is_left_at_most.set(true);
@@ -65,7 +66,8 @@ pub(super) fn find(
     Ok(Some(found))
 }
 
-/// Runs that a search takes where both ends are as they should be: each halves the ratio that is left, whichever way it comes out.
+/// Number of runs of a search where both ends come out as expected: each run halves the logarithm
+/// of the remaining ratio, whatever its outcome.
 pub(super) fn most_tries(limit: &Limit) -> usize {
     let mut found = Found::default();
     let mut next = Some(limit.passes);
@@ -80,7 +82,7 @@ pub(super) fn most_tries(limit: &Limit) -> usize {
     found.tries
 }
 
-/// The first mark that a run misses, in words.
+/// Describes the first mark that a run misses.
 fn missed(run: &Run, trial: &Trial) -> Option<String> {
     if let Some(message) = &run.ended {
         return Some(message.clone());
@@ -96,7 +98,7 @@ fn missed(run: &Run, trial: &Trial) -> Option<String> {
     ))
 }
 
-/// The next value to try; `None` where the limit is found.
+/// Next value to try; `None` once the limit is found.
 fn following(limit: &Limit, found: &Found) -> Option<f64> {
     match (found.passes, &found.fails) {
         (Some(_), None) if found.tries == 1 => Some(limit.fails),
@@ -109,7 +111,7 @@ fn following(limit: &Limit, found: &Found) -> Option<f64> {
 }
 
 impl Found {
-    /// In words.
+    /// Describes the limit.
     pub(super) fn words(&self, unit: &str) -> String {
         let told = |value: f64| format!("{} {unit}", report::number(value));
         match (self.passes, &self.fails) {

@@ -1,4 +1,5 @@
-//! Scenes that are hard on a solver: each run, measured against its marks, and how far single settings go.
+//! Stability studies: runs demanding scenes and checks them against marks (acceptance bounds), and
+//! finds how far single settings can go.
 
 mod limit;
 mod report;
@@ -57,7 +58,8 @@ impl Kind for Stability {
         cases.chain(limits).sum()
     }
 
-    /// Trials, and then searches for limits, which take many runs each. What is to be refused is tried with the whole.
+    /// Trials, then searches for limits, which take many runs each. Expected refusals are only
+    /// tried by the whole study.
     fn places(&self) -> Option<Vec<Place>> {
         let trials = |held: &Held| match held {
             Held::Runs(trials) => trials.len(),
@@ -100,7 +102,7 @@ impl Kind for Stability {
                 Held::Refusal { attempts, .. } => {
                     for attempt in attempts {
                         let (method, device) = (attempt.method.name(), attempt.device.name());
-                        // Quick, and no line: it is tried every time.
+                        // Refusals are quick and not stored: they are tried every time.
                         of_case.push(Run {
                             ended: refusal(bench.devices, attempt)?,
                             ..Run::default()
@@ -136,7 +138,7 @@ impl Kind for Stability {
     }
 }
 
-/// Scenes of a trial, its own first, each with what it runs on.
+/// Scenes of a trial with their devices, its own scene first.
 fn scenes(trial: &Trial) -> impl Iterator<Item = (&Scene, RunsOn)> {
     let others = trial
         .others
@@ -145,7 +147,8 @@ fn scenes(trial: &Trial) -> impl Iterator<Item = (&Scene, RunsOn)> {
     [(&trial.scene, trial.device)].into_iter().chain(others)
 }
 
-/// A trial's results, and whether they stood in a ledger; `None` where they are only looked for.
+/// Results of a trial and whether they come from a ledger; `None` where a missing one is only
+/// looked up.
 fn point(
     bench: &Bench<'_>,
     ledger: &mut Ledger<Vec<Measured>>,
@@ -157,7 +160,7 @@ fn point(
         measured += &format!("{} {} ", other.scale, other.shift);
     }
     for mark in &trial.marks {
-        // The worst of the frames depends on the side that the mark is on, not on where it is.
+        // The worst of the frames depends on the direction of the bound, not on its value.
         let side = matches!(mark.bound, Bound::AtMost(_));
         let (of, after, since, region) = (mark.of, mark.after, mark.since, &mark.region);
         measured += &format!("{of:?} {side} {after} {since:?} {region:?} ");

@@ -1,4 +1,4 @@
-//! The table and the page of a stability study.
+//! Table and page of a stability study.
 
 use swell_scene::{
     Method,
@@ -21,33 +21,33 @@ use super::{
     limit::Found,
 };
 
-/// What a study has come to.
+/// All results of a study.
 pub(super) struct Results<'a> {
     pub(super) stability: &'a Stability,
     pub(super) devices: &'a Devices,
-    /// Of each case, one a trial or attempt.
+    /// Runs of each case, one per trial or attempt.
     pub(super) runs: Vec<Vec<Run>>,
     pub(super) limits: Vec<(&'a Limit, &'a Search, Found)>,
 }
 
-/// What a solver is held to in a case.
+/// Requirement on a solver in a case.
 #[derive(Clone, Copy, PartialEq)]
 enum To<'a> {
     Mark(&'a Mark),
-    /// A refusal in these words.
+    /// A refusal whose message contains these words.
     Refusal(&'a [String]),
 }
 
-/// How that came out on a device.
+/// Outcome of a requirement on one device.
 struct On<'a> {
     device: RunsOn,
     run: &'a Run,
     verdict: Verdict,
-    /// Place of the mark.
+    /// Index of the mark in the trial.
     place: usize,
 }
 
-/// What a solver is held to in a case, with each device.
+/// Requirement on a solver in a case, with its outcome on each device.
 struct Row<'a> {
     case: &'a Case,
     method: Method,
@@ -62,7 +62,7 @@ impl On<'_> {
 }
 
 impl Row<'_> {
-    /// Of two devices the worse: a failure that one of them has is a failure still.
+    /// The worse verdict of both devices: a failure on one of them remains a failure.
     fn verdict(&self) -> Verdict {
         let order = [
             Verdict::Misses,
@@ -99,7 +99,7 @@ impl Row<'_> {
     }
 }
 
-/// Three digits.
+/// Formats a number with three significant digits.
 pub(in super::super) fn number(value: f64) -> String {
     match value.abs() {
         0.0 => "0".to_owned(),
@@ -116,7 +116,7 @@ pub(in super::super) fn number(value: f64) -> String {
     }
 }
 
-/// With its sign.
+/// Formats a bound with its relation.
 pub(super) fn bound(bound: Bound) -> String {
     match bound {
         Bound::AtMost(most) => format!("≤ {}", number(most)),
@@ -146,7 +146,7 @@ impl Results<'_> {
         }
     }
 
-    /// Case by case what each solver is held to, devices side by side.
+    /// Requirements case by case, with the outcomes of devices side by side.
     fn rows(&self) -> Vec<Row<'_>> {
         let mut rows = Vec::new();
         for (case, runs) in self.stability.cases.iter().zip(&self.runs) {
@@ -230,7 +230,7 @@ impl Results<'_> {
         findings
     }
 
-    /// A line a mark and device.
+    /// Rows of `results.csv`: one per mark and device, then one per limit.
     fn table(&self, rows: &[Row<'_>]) -> Vec<Vec<String>> {
         let titles =
             "number,case,solver,device,quantity,value,mark,verdict,particles,frames,seconds,ended";
@@ -314,7 +314,7 @@ impl Results<'_> {
         parts
     }
 
-    /// Cases that tests hold, with the command that runs each.
+    /// Table of the cases that tests cover, with the command that runs each.
     fn tests(&self) -> Vec<Part> {
         let mut table = vec![strings(["", "case", "held by"])];
         for case in &self.stability.cases {
@@ -372,19 +372,19 @@ fn names(rows: &[Row<'_>], verdict: Verdict) -> Vec<String> {
     rows.map(Row::name).collect()
 }
 
-/// For `results.csv`.
+/// Formats a value for `results.csv`.
 fn exact(value: Option<f64>) -> String {
     value.map_or(String::new(), |value| format!("{value:.6e}"))
 }
 
-/// Case by case: marks and refusals.
+/// Table of all marks and refusals, case by case.
 fn verdicts(rows: &[Row<'_>]) -> Part {
     let mut out: Vec<(Tone, Vec<String>)> = Vec::new();
     let mut before = None;
     for row in rows {
         let verdict = row.verdict();
         let (what, wanted, why) = match row.to {
-            // What holds of every run is told once, below the table.
+            // Marks that apply to every run are mentioned once below the table, unless missed.
             To::Mark(mark) if Quantity::ALWAYS.contains(&mark.of) && verdict == Verdict::Passes => {
                 continue;
             }
@@ -397,7 +397,7 @@ fn verdicts(rows: &[Row<'_>]) -> Part {
                 ("refused".to_owned(), "refused".to_owned(), said)
             }
         };
-        // A case's name stands once, over its rows.
+        // Only the first row of a case shows its name.
         let is_new = before
             .replace(row.case)
             .is_none_or(|before| !std::ptr::eq(before, row.case));
@@ -422,7 +422,7 @@ fn verdicts(rows: &[Row<'_>]) -> Part {
     }
 }
 
-/// A chart a mark whose number changes over time, one line a solver and device.
+/// One chart per mark whose value changes over time, with one curve per solver and device.
 fn curves(case: &Case, rows: &[Row<'_>]) -> Vec<Part> {
     let own = rows.iter().filter(|row| std::ptr::eq(row.case, case));
     let own: Vec<(&Row<'_>, &Mark)> = own
@@ -431,7 +431,7 @@ fn curves(case: &Case, rows: &[Row<'_>]) -> Vec<Part> {
             To::Refusal(_) => None,
         })
         .collect();
-    // One chart each, and one more of what is held against a later state.
+    // One chart per quantity, and another one where a mark refers to a later state.
     let of = |mark: &Mark| (mark.of, mark.since.map(f64::to_bits));
     let mut quantities: Vec<_> = own.iter().map(|(_, mark)| of(mark)).collect();
     quantities.sort_unstable();
@@ -458,7 +458,7 @@ fn tone(verdict: Verdict) -> Tone {
     }
 }
 
-/// The frames that count, where not all do.
+/// The frames that a mark covers, where these are not all.
 fn when(mark: &Mark) -> String {
     match mark.since {
         Some(since) => format!(", against that at {} s", number(since)),
@@ -467,7 +467,7 @@ fn when(mark: &Mark) -> String {
     }
 }
 
-/// `None` where nothing changes.
+/// Returns `None` where the values are constant.
 fn chart(rows: &[(&Row<'_>, &Mark)]) -> Option<String> {
     let (_, mark) = rows.first()?;
     let runs = rows
@@ -503,7 +503,7 @@ fn chart(rows: &[(&Row<'_>, &Mark)]) -> Option<String> {
     Some(chart.to_svg())
 }
 
-/// For the reader of the page.
+/// Explanations for readers of the page.
 const EVERYWHERE: &str = "Every run is also held to no value that is not finite, no particle outside of the domain, and the \
     particles of the start, each once; these have a row only where they are missed. A run that ends early misses all of its \
     marks.";

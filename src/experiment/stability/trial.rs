@@ -1,4 +1,4 @@
-//! Runs a case's trial, with what it is held against beside it.
+//! Runs a trial of a case, together with the runs it is compared with.
 
 use std::{sync::atomic::AtomicBool, time::Instant};
 
@@ -15,10 +15,11 @@ use super::{
     watch::{Beside, Watch},
 };
 
-/// Runs a trial to its last frame, or to where its numbers fail.
+/// Runs a trial to its last frame, or until its numbers fail.
 ///
 /// # Errors
-/// What is no fault of the numbers: the device, a file; [`StudyError::Stopped`] where `stop` came before the end.
+/// Failures that the numbers did not cause: of the device or a file, or [`StudyError::Stopped`] if
+/// `stop` was set before the end.
 pub fn run_trial(devices: &Devices, trial: &Trial, stop: &AtomicBool) -> Result<Run, StudyError> {
     let mut run = Run::default();
     if let Err(error) = go(devices, trial, stop, &mut run) {
@@ -69,19 +70,19 @@ fn go(
     ended
 }
 
-/// A run at its start.
+/// Creates a run at its start.
 fn drive<'a>(devices: &Devices, device: RunsOn, view: &View<'a>) -> Result<Drive<'a>, SolverError> {
     let drive = Drive::new(devices.of(device), view.scene, &view.start, false)?;
     Ok(drive.with_pressures())
 }
 
-/// Frames within which a scene that is to be refused is refused, where it loads.
+/// Number of frames within which a scene that loads must be refused.
 const FIRST_FRAMES: u32 = 2;
 
-/// In whose words a scene is refused; `None` where it is not.
+/// Returns the message with which a scene is refused; `None` where it is accepted.
 ///
 /// # Errors
-/// What is no fault of the scene: the device, a file.
+/// Failures that the scene did not cause: of the device or a file.
 pub fn refusal(devices: &Devices, attempt: &Attempt) -> Result<Option<String>, StudyError> {
     let scene = match &attempt.scene {
         Err(message) => return Ok(Some(message.clone())),

@@ -1,4 +1,4 @@
-//! How a run's marks came out.
+//! Verdicts on the marks of a run.
 
 use serde::{Deserialize, Serialize};
 
@@ -6,36 +6,37 @@ use swell_scene::study::stability::{Mark, Trial};
 
 use super::{super::PointStatus, report};
 
-/// Most points of a curve that a line keeps.
+/// Largest number of points of a stored curve.
 const CURVE: usize = 160;
 
-/// A run with what each of its marks was measured at, in the order of [`Trial::marks`]; or an attempt that was to be refused.
+/// Run with the measurement for each mark, in the order of [`Trial::marks`]; or an attempt that
+/// should be refused.
 pub type Run = super::super::Run<Vec<Measured>>;
 
-/// What a mark was measured at.
+/// Measurement for a mark.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Measured {
-    /// `None` where it is no number.
+    /// Value compared with the bound; `None` where it is not finite.
     pub value: Option<f64>,
-    /// Seconds of the shot and number, the worst of several frames where there are many.
+    /// Time in seconds of the shot and value; the worst of several frames where there are many.
     pub curve: Vec<(f64, Option<f64>)>,
 }
 
-/// How a mark came out.
+/// Verdict on a mark.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
-    /// Held.
+    /// The bound is met.
     Passes,
-    /// Not held.
+    /// The bound is missed.
     Misses,
-    /// Not held, as the study says.
+    /// The bound is missed, and the study lists that as a known failure.
     KnownFailure,
-    /// Held, where the study says that it is not.
+    /// The bound is met, but the study lists it as a known failure.
     PassesUnexpectedly,
 }
 
 impl Verdict {
-    /// For a table.
+    /// Returns the verdict as shown in tables.
     pub fn words(self) -> &'static str {
         match self {
             Self::Passes => "passes",
@@ -69,19 +70,19 @@ impl Measured {
         }
     }
 
-    /// For a reader.
+    /// Formats the value for readers.
     pub(super) fn words(&self) -> String {
         self.value.map_or("no number".to_owned(), report::number)
     }
 
-    /// Against its mark, in a run that did not end early.
+    /// Whether the value meets the bound of its mark; the run must not have ended early.
     fn holds(&self, mark: &Mark) -> bool {
         self.value.is_some_and(|value| mark.bound.holds(value))
     }
 }
 
 impl Run {
-    /// How each mark came out. A run that ended early holds none.
+    /// Returns the verdict on each mark. A run that ended early meets none.
     pub fn verdicts(&self, trial: &Trial) -> Vec<Verdict> {
         let none = Measured::default();
         let marks = trial.marks.iter().enumerate();
@@ -94,13 +95,13 @@ impl Run {
             .collect()
     }
 
-    /// Whether every mark is held.
+    /// Returns whether every mark is met.
     pub fn passes(&self, trial: &Trial) -> bool {
         let is_held = |v: &Verdict| matches!(v, Verdict::Passes | Verdict::PassesUnexpectedly);
         self.verdicts(trial).iter().all(is_held)
     }
 
-    /// What a user is told of it.
+    /// Outcome as reported to the user.
     pub(super) fn status(&self, trial: &Trial, stood: bool) -> PointStatus {
         let marks = trial
             .marks

@@ -1,4 +1,4 @@
-//! A run as its marks see it after each frame.
+//! State of a run after each frame, as marks observe it.
 
 use std::cell::OnceCell;
 
@@ -14,20 +14,20 @@ use swell_domain::{
 use swell_scene::{Method, Scene, probe::ProbeKind};
 use swell_stage::{drive::Step, prepare::Start};
 
-/// A scene and where its run stands.
+/// A scene and the current state of its run.
 pub(super) struct View<'a> {
     pub(super) scene: &'a Scene,
     pub(super) start: Start,
-    /// Frames that are done.
+    /// Number of finished frames.
     frame: u32,
     pub(super) state: Particles,
-    /// Of the last frame; before the first there is none.
+    /// Report of the last frame; `None` before the first one.
     pub(super) report: Option<StepReport>,
-    /// At the probes of pressure, Pa.
+    /// Readings of the pressure probes, Pa.
     pub(super) pressures: Vec<Option<f64>>,
-    /// At the probes of elevation, metres above the domain's floor.
+    /// Readings of the elevation probes, metres above the domain's floor.
     pub(super) elevations: Vec<Option<f64>>,
-    /// What the water's surface encloses now, m³; several marks ask for it.
+    /// Cached volume enclosed by the water's surface, m³; several marks use it.
     volume: OnceCell<f64>,
 }
 
@@ -46,7 +46,7 @@ impl<'a> View<'a> {
         })
     }
 
-    /// Takes a frame over.
+    /// Updates the state with a finished frame.
     pub(super) fn take(&mut self, step: Step) {
         let (domain, spacing) = (&self.scene.domain, self.scene.particle_spacing());
         let probes = self.scene.probes.iter();
@@ -62,18 +62,18 @@ impl<'a> View<'a> {
         self.frame = step.frame;
     }
 
-    /// What the water's surface encloses, m³.
+    /// Volume enclosed by the water's surface, m³.
     pub(super) fn volume(&self) -> f64 {
         let (domain, spacing) = (&self.scene.domain, self.scene.particle_spacing());
         *(self.volume).get_or_init(|| enclosed_volume(&self.state, spacing, domain))
     }
 
-    /// Seconds of the shot that are over.
+    /// Elapsed seconds of the shot.
     pub(super) fn time(&self) -> f64 {
         f64::from(self.frame) * self.scene.shot.frame_seconds()
     }
 
-    /// What lengths are told in: the particle spacing with PBF, the cell size with FLIP, metres.
+    /// Unit of lengths: the particle spacing with PBF, the cell size with FLIP, metres.
     pub(super) fn resolution(&self) -> f64 {
         match self.scene.solver.method {
             Method::Pbf => self.scene.particle_spacing(),
@@ -81,7 +81,7 @@ impl<'a> View<'a> {
         }
     }
 
-    /// To how much a particle's displacement in a substep is held, metres.
+    /// Cap on a particle's displacement in a substep, metres.
     pub(super) fn cap(&self) -> f64 {
         match self.scene.solver.method {
             Method::Pbf => {
@@ -95,7 +95,7 @@ impl<'a> View<'a> {
         }
     }
 
-    /// The box's faces now, wave makers included, in the world.
+    /// Current faces of the box including wave makers, in the coordinates of the particles.
     pub(super) fn walls(&self) -> Bounds {
         let walls = self.scene.walls_after(&self.state, self.time());
         let origin = self.scene.domain.min;
@@ -105,7 +105,7 @@ impl<'a> View<'a> {
         }
     }
 
-    /// How deep a point lies in a solid where that stands now, metres; negative outside.
+    /// Depth of a point inside a solid at its current pose, metres; negative outside.
     pub(super) fn depth_in_solid(&self, at: DVec3) -> f64 {
         let boundary = &self.start.boundary;
         let still = boundary.distance.iter().map(|solid| -solid.sample(at));
