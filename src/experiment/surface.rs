@@ -1,4 +1,5 @@
-//! How good the drawn surface is for its time: frames of a scene, drawn with one setting of the look changed at a time.
+//! Studies of the drawn surface: accuracy against time of frames that are drawn with one setting of
+//! the look changed at a time.
 
 mod report;
 
@@ -26,20 +27,21 @@ use super::{
     report::Report,
 };
 
-/// What a point came to.
+/// Results of a point.
 type Run = super::run::Run<Measured>;
 
-/// What is measured beside the time.
+/// Measurements besides the time.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 struct Measured {
-    /// `None` where no water was seen.
+    /// Errors of the surface; `None` where no water was visible.
     surface: Option<Summary>,
-    /// SSIMULACRA 2 against finer rays; `None` where colour is not asked for.
+    /// SSIMULACRA 2 score against a reference by finer rays; `None` where the study does not ask
+    /// for colour.
     score: Option<f64>,
 }
 
 impl Measured {
-    /// `None` where it cannot be told.
+    /// Returns `None` where the error was not measured.
     fn error(&self, of: PictureError) -> Option<f64> {
         let surface = self.surface.as_ref();
         match of {
@@ -61,7 +63,7 @@ impl Kind for SurfaceStudy {
         self.points().count()
     }
 
-    /// All draw frames of one cache.
+    /// Returns `None`: all points draw frames of the same cache.
     fn places(&self) -> Option<Vec<Place>> {
         None
     }
@@ -108,7 +110,7 @@ fn cache(request: &Request) -> PathBuf {
     request.directory.join("cache")
 }
 
-/// Bakes the scene as far as pictures of its last frame that is drawn look ahead; what stands there is resumed.
+/// Bakes the scene up to the last frame that the pictures depend on, and resumes an existing cache.
 fn baked(study: &SurfaceStudy, bench: &mut Bench<'_>) -> Result<(), StudyError> {
     let last = (study.frames.last() + REACH).min(study.scene.shot.frames);
     let request = bake::Request {
@@ -127,7 +129,7 @@ fn baked(study: &SurfaceStudy, bench: &mut Bench<'_>) -> Result<(), StudyError> 
     }
 }
 
-/// Of the frames that are drawn.
+/// Hashes of the drawn frames.
 fn hashes(study: &SurfaceStudy, request: &Request) -> Result<String, StudyError> {
     let cache = CacheReader::open(&cache(request))?;
     let hashes = study
@@ -137,12 +139,12 @@ fn hashes(study: &SurfaceStudy, request: &Request) -> Result<String, StudyError>
     Ok(hashes.collect::<Result<Vec<_>, StudyError>>()?.join(" "))
 }
 
-/// What the points share.
+/// State shared by all points.
 struct Room<'s, 'b> {
     study: &'s SurfaceStudy,
     /// Opened for the first point that is measured.
     gallery: Option<Gallery<'b>>,
-    /// Hashes of the frames.
+    /// Hashes of the drawn frames.
     frames: String,
 }
 
@@ -194,8 +196,7 @@ impl<'b> Room<'_, 'b> {
     }
 }
 
-/// # Panics
-/// Never: [`Kind::needs`] has the adapter opened.
+/// Adapter of the study, which [`Kind::needs`] requests.
 fn context<'a>(bench: &Bench<'a>) -> &'a Context {
     match bench.devices.of(RunsOn::Gpu) {
         Opened::Gpu(context) => context,

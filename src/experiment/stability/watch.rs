@@ -1,4 +1,4 @@
-//! One mark of a run: a number a frame, and what these come to.
+//! Evaluates one mark of a run: a value per frame, and their aggregate.
 
 use glam::DVec3;
 
@@ -11,17 +11,18 @@ use swell_study::stability::{Flight, filled_volume, least_spacing, matched, outs
 
 use super::view::View;
 
-/// A run beside the one that is measured, and who is who.
+/// A run beside the measured one, with the correspondence of their particles.
 pub(super) struct Beside<'a> {
     pub(super) view: View<'a>,
     pub(super) other: &'a Other,
-    /// For each particle of the run its own; `None` where it has none there.
+    /// Index in this run of each particle of the measured run; `None` where it has no counterpart.
     pub(super) partner: Vec<Option<usize>>,
-    /// Of the run that is measured.
+    /// Origin of the measured run.
     origin: DVec3,
 }
 
-/// A place of the other run, about its own origin, where the run would have it, about its own.
+/// Maps a position of the other run, relative to that run's origin, to the measured run's
+/// coordinates.
 fn to_ours(p: DVec3, origin: DVec3, view: &View<'_>, other: &Other) -> DVec3 {
     (p + view.scene.origin - other.shift) / other.scale - origin
 }
@@ -42,7 +43,8 @@ impl<'a> Beside<'a> {
         }
     }
 
-    /// Where a particle of the run would be if it went as here; its place at the start as well.
+    /// Current and initial position in this run of the counterpart of particle `k`, in the measured
+    /// run's coordinates.
     fn places(&self, k: usize) -> Option<(DVec3, DVec3)> {
         let of = |p: &[f32; 3]| to_ours(point(p), self.origin, &self.view, self.other);
         let partner = self.partner[k]?;
@@ -54,34 +56,34 @@ impl<'a> Beside<'a> {
     }
 }
 
-/// A mark while a run is under way.
+/// State of a mark during a run.
 pub(super) struct Watch<'a> {
     pub(super) mark: &'a Mark,
     flight: Option<Flight>,
-    /// What a quantity remembers of the frames before, as [`remembered`] begins it.
+    /// Values that a quantity carries from frame to frame, initialised by [`remembered`].
     memory: Vec<f64>,
-    /// Seconds and numbers, one a frame that counts.
+    /// Time in seconds and value of each frame that the mark covers.
     pub(super) curve: Vec<[f64; 2]>,
     value: Option<f64>,
 }
 
-/// What a quantity remembers before the first frame.
+/// Initial value of the memory of a quantity.
 fn remembered(mark: &Mark, run: &View<'_>) -> Vec<f64> {
     let (scene, start) = (run.scene, &run.start.particles);
     let of_start = |number: f64| mark.since.is_none().then_some(number);
     match mark.of {
-        // The lowest place so far, a particle.
+        // Lowest height so far of each particle.
         Quantity::Rebound => start.position.iter().map(|p| f64::from(p[1])).collect(),
-        // The start's, and the least so far.
+        // Energy at the start, and the lowest energy so far.
         Quantity::EnergyGain | Quantity::EnergyRise => {
             let mass = scene.water.rest_density * scene.particle_spacing().powi(3);
             let (gravity, corner) = (scene.water.gravity, scene.domain.min);
             let (kinetic, potential) = energies(start, mass, gravity, corner);
             vec![kinetic + potential; 2]
         }
-        // A sum a probe, and how many there are.
+        // Sum for each probe, and the number of terms.
         Quantity::MeanPressureError => vec![0.0; scene.pressure_points().len() + 1],
-        // What is held against the state at `since` is not known before.
+        // Quantities relative to the state at `since` have no reference before that time.
         Quantity::Sinking => {
             let height = mean_height(&start.position) - scene.domain.min.y;
             of_start(height).into_iter().collect()
@@ -106,11 +108,12 @@ impl<'a> Watch<'a> {
         }
     }
 
-    /// After each frame.
+    /// Updates the mark after a frame.
     pub(super) fn look(&mut self, run: &View<'_>, beside: &[Beside<'_>], report: &StepReport) {
         let from = self.mark.after.max(self.mark.since.unwrap_or(0.0));
         let counts = run.time() >= from * (1.0 - 1e-9);
-        // What sums up the way from the start has to see all of it; means begin where the mark does.
+        // Quantities that integrate from the start need every frame; means begin where the mark
+        // does.
         let sees_all = self.flight.is_some() || self.mark.of == Quantity::Rebound;
         if !counts && !sees_all {
             return;
@@ -125,7 +128,7 @@ impl<'a> Watch<'a> {
         }
     }
 
-    /// What the frames come to; `None` where none counted or it is no number.
+    /// Aggregate of all frames; `None` where no frame was covered or the value is not finite.
     pub(super) fn value(&self) -> Option<f64> {
         self.value.filter(|value| value.is_finite())
     }
@@ -240,7 +243,7 @@ impl<'a> Watch<'a> {
         }
     }
 
-    /// A number over that of the reference, which it becomes where none is known yet.
+    /// Ratio of a value to the reference, which the first value becomes where none is known.
     fn drift(&mut self, number: f64) -> f64 {
         if self.memory.is_empty() {
             self.memory.push(number);
@@ -248,7 +251,7 @@ impl<'a> Watch<'a> {
         number / self.memory[0]
     }
 
-    /// The ratio of two sums over the frames so far.
+    /// Ratio of two sums over the frames so far.
     fn ratio(&mut self, numbers: [f64; 2]) -> f64 {
         let sums = self.memory.iter_mut().zip(numbers);
         sums.for_each(|(sum, number)| *sum += number);
@@ -288,7 +291,7 @@ fn displacement_error(run: &View<'_>, beside: &[Beside<'_>]) -> f64 {
     (gaps / ways).sqrt()
 }
 
-/// A box of the world about the scene's origin.
+/// Converts a box from world space to the scene's coordinates.
 fn about(region: &Bounds, scene: &Scene) -> Bounds {
     Bounds {
         min: region.min - scene.origin,
@@ -296,7 +299,8 @@ fn about(region: &Bounds, scene: &Scene) -> Bounds {
     }
 }
 
-/// Ids that one of two ascending lists has and the other has not.
+/// Number of ids that are in only one of two ascending lists; duplicates count where the lengths
+/// are equal.
 fn lost(a: &[u32], b: &[u32]) -> usize {
     if a == b {
         return 0;
@@ -316,7 +320,7 @@ fn mean_height(position: &[[f32; 3]]) -> f64 {
     position.iter().map(|p| f64::from(p[1])).sum::<f64>() / position.len() as f64
 }
 
-/// Largest; what is no number is larger than any.
+/// Largest value; NaN if any value is NaN.
 fn largest(values: impl IntoIterator<Item = f64>) -> f64 {
     let larger = |a: f64, b: f64| {
         if a.is_nan() || b.is_nan() {
@@ -337,7 +341,7 @@ fn pressure_error(run: &View<'_>, pressures: impl Iterator<Item = f64>) -> f64 {
     largest(off.map(|(at, p)| (p / (weight * (surface - at.y)) - 1.0).abs()))
 }
 
-/// Of the probes of elevation, metres of the first run.
+/// Differences between the elevation probes of two runs, in metres of the first run.
 fn gaps(a: &View<'_>, b: &View<'_>, scale: f64) -> Vec<f64> {
     let pairs = a.elevations.iter().zip(&b.elevations);
     let gap = |(a, b): (&Option<f64>, &Option<f64>)| match (a, b) {
@@ -358,7 +362,7 @@ mod tests {
         assert_eq!(lost(&[1, 2, 3], &[1, 3]), 1);
         assert_eq!(lost(&[1, 2, 3], &[1, 2, 3, 7]), 1);
         assert_eq!(lost(&[1, 2, 3], &[1, 2, 9]), 2);
-        // 3 is lost, 2 doubled.
+        // 3 is lost, 2 is duplicated.
         assert_eq!(lost(&[1, 2, 3], &[1, 2, 2]), 2);
     }
 

@@ -21,7 +21,7 @@ use super::{
 
 struct Results<'a> {
     study: &'a SurfaceStudy,
-    /// Of each line, its points in order.
+    /// Runs of each line, in the order of its points.
     runs: &'a [Vec<Run>],
     device: String,
 }
@@ -74,7 +74,7 @@ impl Results<'_> {
             .collect()
     }
 
-    /// The setting with the least of the first error, in a sentence.
+    /// Sentence about the setting with the least value of the first error.
     fn answer(&self) -> String {
         let Some(&error) = self.study.errors.first() else {
             return String::new();

@@ -1,6 +1,7 @@
-//! Digits of a page: few.
+//! Rounding of numbers for pages.
 
-/// The table of a page: titles in words, and what was measured in few digits; `results.csv` has them all.
+/// Table for a page: with words as titles and measurements rounded to few digits; `results.csv`
+/// keeps all digits.
 pub(in super::super) fn shortened(table: &[Vec<String>]) -> Vec<Vec<String>> {
     let Some((titles, rows)) = table.split_first() else {
         return Vec::new();
@@ -18,7 +19,7 @@ pub(in super::super) fn shortened(table: &[Vec<String>]) -> Vec<Vec<String>> {
         .collect()
 }
 
-/// Three digits.
+/// Formats a number with three significant digits.
 pub(in super::super) fn significant(value: f64) -> String {
     let size = value.abs();
     if value == 0.0 {

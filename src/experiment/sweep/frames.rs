@@ -1,4 +1,4 @@
-//! A point that is a run of frames.
+//! Points that run frames.
 
 use glam::{DVec3, Vec3};
 
@@ -27,12 +27,13 @@ use super::{
     measured::{Measured, Run, Sample},
 };
 
-/// Compression at which constraints hold: Newton's next step would move particles by less than f32 tells apart.
+/// Compression at which constraints count as met: the next Newton step would move particles by less
+/// than f32 resolves.
 const CONVERGED: f64 = 1e-6;
 
-/// Runs a point as often as the sweep repeats, each time from the scene's start, after one frame that is not counted: it
-/// makes the device's programs ready. Samples are taken where there is a gauge; the distance to where the constraints hold
-/// is taken of the end alone, and its time is not the run's.
+/// Runs a point as often as the sweep repeats it, each time from the scene's start, after one
+/// warm-up frame that prepares the device's programs. Takes samples where there is a gauge. The
+/// distance to converged constraints is measured at the end only, outside the run's time.
 pub(super) fn measure(
     bench: &Bench<'_>,
     point: &Point,
@@ -60,7 +61,7 @@ pub(super) fn measure(
         let mut seconds = 0.0;
         until_done(&mut drive, point.frames, bench.stop, |step| {
             seconds += step.seconds;
-            // The same steps again: only their time is new.
+            // Later repeats compute the same steps; only their times are new.
             if repeat == 0 {
                 run.measured.look(point, gauge, &step);
                 run.measured.weigh(&weights, &step);
@@ -81,7 +82,8 @@ pub(super) fn measure(
         (Method::Flip, Opened::Gpu(_)) => {
             measured.work *= products(scene.solver.flip().pressure.preconditioner);
         }
-        // The reference's incomplete Cholesky reads in its two halves what one product does, as IPP.
+        // The two halves of the reference's incomplete Cholesky read as much as one product, like
+        // IPP.
         (Method::Flip, Opened::Cpu) => measured.work *= products(Preconditioner::Ipp),
     }
     Ok(run)
@@ -109,7 +111,8 @@ impl Measured {
         }
     }
 
-    /// `weights` are those of the water over each probe of pressure, Pa; empty where they are not asked for.
+    /// Records the pressure errors. `weights` are the hydrostatic pressures at the pressure probes,
+    /// Pa; empty where not requested.
     fn weigh(&mut self, weights: &[f64], step: &Step) {
         let off = |(p, weight): (&Option<f64>, &f64)| Some((p.as_ref()? / weight - 1.0).abs());
         let all: Option<Vec<f64>> = step.pressures.iter().zip(weights).map(off).collect();
@@ -120,7 +123,8 @@ impl Measured {
     }
 }
 
-/// ρ g depth at the scene's probes of pressure, Pa, under the highest particle's upper end of the start.
+/// Hydrostatic pressures ρ g depth at the scene's pressure probes, Pa, below the upper end of the
+/// highest initial particle.
 fn still_pressures(scene: &Scene, start: &Particles) -> Vec<f64> {
     let gravity = scene.water.gravity;
     let up = -gravity.normalize_or_zero();
@@ -148,7 +152,7 @@ fn sample(scene: &Scene, gauge: &Gauge, particles: &Particles) -> Sample {
     }
 }
 
-/// Energy per mass, m²/s²: ½ v² + g h over the domain's least corner, mean over the particles.
+/// Mean energy per mass of the particles, m²/s²: ½ v² + g h above the domain's least corner.
 fn specific_energy(scene: &Scene, particles: &Particles) -> f64 {
     let gravity = scene.water.gravity;
     let of = |(x, v): (&[f32; 3], &[f32; 3])| {
@@ -159,8 +163,9 @@ fn specific_energy(scene: &Scene, particles: &Particles) -> f64 {
     all.map(of).sum::<f64>() / particles.len().max(1) as f64
 }
 
-/// Neighbour visits of a PBF run: particles × mean neighbours × passes over them, which are one of λ and one of
-/// corrections an iteration and the search of each substep. The mean is that of the end.
+/// Neighbour visits of a PBF run: particles × mean neighbours at the run's end × passes over them,
+/// which are one for λ and one for the corrections of each iteration, and the search of each
+/// substep.
 fn neighbor_visits(scene: &Scene, end: &Particles, run: &Measured) -> f64 {
     let pbf = scene.solver.pbf();
     let radius = pbf.support_ratio * pbf.particle_spacing;
@@ -174,14 +179,15 @@ fn neighbor_visits(scene: &Scene, end: &Particles, run: &Measured) -> f64 {
         points: &points,
         particles: points.len(),
     };
-    // Each pair from either side: particles × mean neighbours.
+    // Counts each pair from both sides: particles × mean neighbours.
     let pairs = Neighbors::search(&crowd, radius).pairs() as f64;
     pairs * (2 * run.iterations + run.substeps) as f64
 }
 
-/// Products with the finest matrix that an iteration comes to: one of its own, and what its preconditioner reads of
-/// neighbours. Both halves of IPP make one; a V-cycle takes half a product each for the second colour, the residual, the
-/// corrected colour and the last, and an eighth as much on each coarser level.
+/// Work of an iteration in products with the finest matrix: one of its own, and the neighbour reads
+/// of its preconditioner. The two halves of IPP make one product; a V-cycle takes half a product
+/// each for the second colour, the residual, the corrected colour and the last one, and an eighth
+/// of that on each coarser level.
 pub(super) fn products(preconditioner: Preconditioner) -> f64 {
     match preconditioner {
         Preconditioner::None | Preconditioner::Jacobi => 1.0,
@@ -194,7 +200,8 @@ pub(super) fn products(preconditioner: Preconditioner) -> f64 {
 mod tests {
     use super::*;
 
-    /// By hand, beside the iteration's own product: four half-products on each level, which has an eighth of the cells of the one before.
+    /// Four half-products on each level, which has an eighth of the cells of the previous one,
+    /// besides the iteration's own product.
     #[test]
     fn a_v_cycle_s_products_are_counted_over_its_levels() {
         let cycle: f64 = (0..20).map(|level| 4.0 * 0.5 / 8f64.powi(level)).sum();

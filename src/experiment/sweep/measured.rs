@@ -1,55 +1,56 @@
-//! What a sweep measures of a point, and the errors that follow from it.
+//! Measurements of a sweep's points, and the errors derived from them.
 
 use serde::{Deserialize, Serialize};
 
 use swell_scene::study::sweep::ErrorMeasure;
 
-/// What a point of a sweep came to.
+/// Results of a point of a sweep.
 pub(super) type Run = super::super::Run<Measured>;
 
-/// What is measured beside the time.
+/// Measurements besides the time.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Measured {
-    /// Summed over the frames.
+    /// Number of substeps over all frames.
     pub(super) substeps: u64,
-    /// Summed over the frames.
+    /// Number of iterations over all frames.
     pub(super) iterations: u64,
-    /// The cost that no machine changes, summed over the frames: neighbour visits or matrix-vector products.
+    /// Machine-independent cost over all frames: neighbour visits or matrix-vector products.
     pub(super) work: f64,
-    /// Pressure solves that ended above their tolerance.
+    /// Number of pressure solves that missed their tolerance.
     pub(super) missed: u32,
-    /// Mean, 99th percentile and maximum of max(0, ρ/ρ0 − 1) at each frame's end.
+    /// Mean, 99th percentile and maximum of max(0, ρ/ρ0 − 1) at the end of each frame.
     pub(super) density: Vec<[f64; 3]>,
-    /// Of each frame: the fastest particle, m/s.
+    /// Speed of the fastest particle in each frame, m/s.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(super) speed: Vec<f64>,
-    /// Of each frame, where it is asked for: mean of |p / (ρ g depth) − 1| over the probes that read one.
+    /// Mean of |p / (ρ g depth) − 1| over the probes with a reading, for each frame, where
+    /// requested.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(super) weight: Vec<Option<f64>>,
-    /// At equally spaced times, where the run is compared with the finest.
+    /// Samples at equally spaced times, where runs are compared with the finest one.
     pub(super) samples: Vec<Sample>,
-    /// RMS over the particles of the way from the end to where their constraints hold, in spacings.
+    /// RMS displacement of the particles from the end to converged constraints, in spacings.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) distance: Option<f64>,
-    /// Of a projection.
+    /// Errors of a projection.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) projection: Option<ProjectionErrors>,
 }
 
-/// What a frame is compared by.
+/// Quantities of a frame that are compared between runs.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Sample {
-    /// Metres above the still level.
+    /// Height of the crest above the still level, metres.
     pub(super) crest: f64,
-    /// Metres along the wave's way.
+    /// Position of the front along the wave's path, metres.
     pub(super) front: Option<f64>,
-    /// m²/s².
+    /// Energy per mass, m²/s².
     pub(super) energy: f64,
-    /// Elevation along the wave's way, metres.
+    /// Elevation along the wave's path, metres.
     pub(super) profile: Vec<f64>,
 }
 
-/// One projection against the exact solution of its system.
+/// Errors of a projection compared with the exact solution of its system.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct ProjectionErrors {
     /// ‖p − p64‖ / ‖p64‖.
@@ -60,11 +61,12 @@ pub(super) struct ProjectionErrors {
     pub(super) divergence: f64,
     /// ‖b − Ap‖ / ‖b‖ as the device reports it.
     pub(super) residual: f64,
-    /// Rows of the system.
+    /// Number of rows of the system.
     pub(super) rows: usize,
     /// ‖b − Ap64‖ / ‖b‖ of the exact solution.
     pub(super) exact_residual: f64,
-    /// Whether that is by a sparse Cholesky factor, not by conjugate gradients.
+    /// Whether the exact solution comes from a sparse Cholesky factor rather than conjugate
+    /// gradients.
     pub(super) has_factor: bool,
 }
 
@@ -77,7 +79,8 @@ fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
     (count > 0).then(|| sum / f64::from(count))
 }
 
-/// An error of a run; against `finest` where the measure needs one. `None` where it cannot be told.
+/// Error of a run, compared with `finest` where the measure needs it; `None` where it was not
+/// measured.
 pub(super) fn error(of: ErrorMeasure, run: &Measured, finest: Option<&Measured>) -> Option<f64> {
     let density = |k: usize| mean(run.density.iter().map(move |frame| frame[k]));
     let against = |difference: fn(&Sample, &Sample) -> Option<f64>| {
@@ -90,7 +93,7 @@ pub(super) fn error(of: ErrorMeasure, run: &Measured, finest: Option<&Measured>)
             let speeds = run.speed[late(run.speed.len())..].iter().copied();
             speeds.reduce(f64::max)
         }
-        // A probe that reads nothing in some frame has no mean.
+        // Without a reading in every frame there is no mean.
         ErrorMeasure::Weight => {
             let weights = &run.weight[late(run.weight.len())..];
             let all: Option<Vec<f64>> = weights.iter().copied().collect();
@@ -154,7 +157,7 @@ mod tests {
         assert_eq!(error(ErrorMeasure::Weight, &finest, None), None);
         assert_eq!(error(ErrorMeasure::Crest, &run, None), None);
         assert_eq!(error(ErrorMeasure::Pressure, &run, None), None);
-        // Against itself a run is off by nothing.
+        // Compared with itself, a run has no error.
         assert_eq!(error(ErrorMeasure::Crest, &run, Some(&run)), Some(0.0));
     }
 }

@@ -1,4 +1,4 @@
-//! A scene run over and over with one setting changed at a time: errors against time.
+//! Sweeps: runs a scene repeatedly with one setting changed at a time and relates errors to time.
 
 pub(super) mod digits;
 mod frames;
@@ -85,16 +85,16 @@ fn status(errors: &[ErrorMeasure], run: &Run, stood: bool) -> PointStatus {
     }
 }
 
-/// What the points of a sweep share.
+/// State shared by the points of a sweep.
 struct Lab<'a> {
     sweep: &'a Sweep,
-    /// One for all, so that runs of different resolution are measured alike.
+    /// A single gauge, so that runs of different resolution are measured in the same manner.
     gauge: Option<Gauge>,
     projections: Option<Projections<'a>>,
 }
 
 impl Lab<'_> {
-    /// `finest` is what a coarser point's error is told beside.
+    /// Measures a point. `finest` is the reference of a coarser point.
     fn measure(
         &mut self,
         bench: &Bench<'_>,
@@ -123,7 +123,8 @@ impl Lab<'_> {
     }
 }
 
-/// Where runs are measured against the finest; its cubes are those of the coarsest lattice.
+/// Gauge for runs that are compared with the finest one; its cubes are those of the coarsest
+/// lattice.
 fn gauge_of(sweep: &Sweep) -> Result<Option<Gauge>, StudyError> {
     let Some(finest) = sweep.points().last() else {
         return Ok(None);

@@ -1,4 +1,4 @@
-//! A point that is one projection of a fixed state, against the exact solution of the same system.
+//! Points that project a fixed state once, compared with the exact solution of the same system.
 
 use std::{collections::BTreeMap, time::Instant};
 
@@ -37,9 +37,9 @@ use super::{
 /// Projections of one state.
 pub(super) struct Projections<'a> {
     made_by: &'a Point,
-    /// Made when it is first needed.
+    /// Computed when it is first needed.
     state: Option<Particles>,
-    /// By a hash of the system and its right-hand side.
+    /// Exact solutions by a hash of the system and its right-hand side.
     exact: BTreeMap<[u8; 32], Exact>,
 }
 
@@ -47,25 +47,26 @@ pub(super) struct Projections<'a> {
 struct Exact {
     q: Vec<f64>,
     residual: f64,
-    /// Whether by a factor, not by conjugate gradients.
+    /// Whether the solution comes from a factor rather than conjugate gradients.
     has_factor: bool,
 }
 
-/// In place of an axis, for what stands at a cell's centre.
+/// Stands for an axis in keys of values at cell centres.
 const CENTER: usize = 3;
 
 /// An exact projection on one grid.
 struct Resolved {
-    /// By x, y, z in cells and axis or [`CENTER`]: m/s at the faces that a projection changes, q Δx at centres.
+    /// Values by cell x, y, z and axis or [`CENTER`]: velocity in m/s at faces that a projection
+    /// changes, q Δx at centres.
     values: BTreeMap<[u32; 4], f64>,
-    /// Δt, seconds.
+    /// Substep Δt, seconds.
     step: f64,
     rows: usize,
     residual: f64,
     has_factor: bool,
 }
 
-/// What stands on the grid before a projection.
+/// State of the grid before a projection.
 struct Grid {
     kind: Vec<u32>,
     open: Vec<f32>,
@@ -75,7 +76,7 @@ struct Grid {
 }
 
 impl<'a> Projections<'a> {
-    /// Of the state at the end of this point's frames.
+    /// Prepares projections of the state at the end of this point's frames.
     pub(super) fn new(made_by: &'a Point) -> Self {
         Self {
             made_by,
@@ -103,7 +104,7 @@ impl<'a> Projections<'a> {
         Ok(self.state.insert(state))
     }
 
-    /// A solver that stands where the state does.
+    /// Creates a solver loaded with the state.
     fn loaded(&mut self, bench: &Bench<'_>, point: &Point) -> Result<Flip, StudyError> {
         let frames = self.made_by.frames;
         let state = self.state(bench)?;
@@ -115,8 +116,8 @@ impl<'a> Projections<'a> {
         Ok(solver)
     }
 
-    /// Projects `repeats` times, after one that is not counted. A time is one projection, all in: system, solve,
-    /// gradient, waiting for the device.
+    /// Projects `repeats` times after one warm-up. Each time covers a whole projection: system,
+    /// solve, gradient, and waiting for the device.
     pub(super) fn measure(
         &mut self,
         bench: &Bench<'_>,
@@ -156,8 +157,9 @@ impl<'a> Projections<'a> {
         self.one(bench, seconds, measured)
     }
 
-    /// How far the exact projection of the state on `coarse` cells is from that on `fine` ones, half as large: velocities
-    /// at faces against the mean of the four faces that make up each, q Δx at centres against the mean of eight.
+    /// Discretisation error: compares the exact projection of the state on `coarse` cells with that
+    /// on `fine` cells of half the size, velocities at faces with the mean of the four faces that
+    /// make up each, q Δx at centres with the mean of eight.
     pub(super) fn coarser(
         &mut self,
         bench: &Bench<'_>,
@@ -206,7 +208,7 @@ impl<'a> Projections<'a> {
         self.one(bench, vec![begin.elapsed().as_secs_f64()], measured)
     }
 
-    /// A run of one projection.
+    /// Results of a single projection.
     fn one(
         &mut self,
         bench: &Bench<'_>,
@@ -222,7 +224,7 @@ impl<'a> Projections<'a> {
         })
     }
 
-    /// The exact projection of the state as a point's grid has it.
+    /// Exact projection of the state on the grid of a point.
     fn resolved(&mut self, bench: &Bench<'_>, point: &Point) -> Result<Resolved, StudyError> {
         let mut solver = self.loaded(bench, point)?;
         let substep = solver.carry_to_grid()?;
@@ -260,13 +262,13 @@ impl<'a> Projections<'a> {
         })
     }
 
-    /// What the device's solution is off by.
+    /// Errors of the device's solution.
     fn errors(&mut self, solver: &Flip, grid: &Grid) -> Result<ProjectionErrors, StudyError> {
         let cells = grid.cells(solver);
         let system = System::new(cells);
         let exact = self.exact(&system, &system.rhs(cells, &grid.velocity, &grid.flux))?;
         let stride = grid.kind.len();
-        // p is q times the same factor on both sides.
+        // p is q times a factor that is the same on both sides.
         let found = solver.solution(&system.cell)?;
         let off: Vec<f64> = found.iter().zip(&exact.q).map(|(q, q64)| q - q64).collect();
         let velocity = solver.field(FACE_VELOCITY, 3 * stride)?;
@@ -289,7 +291,7 @@ impl<'a> Projections<'a> {
         })
     }
 
-    /// The solution of a system, solved once: methods that share it share its solution.
+    /// Exact solution of a system, cached so that methods with the same system share it.
     fn exact(&mut self, system: &System, b: &[f64]) -> Result<Exact, ReferenceError> {
         let mut hasher = blake3::Hasher::new();
         for values in [&system.diagonal, &system.dirichlet, b] {

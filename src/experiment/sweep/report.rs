@@ -1,4 +1,4 @@
-//! A sweep's table, curves and page.
+//! Table, curves and page of a sweep.
 
 use std::collections::BTreeMap;
 
@@ -23,20 +23,21 @@ use super::{
     measured::{self, Run},
 };
 
-/// What is drawn.
+/// Results to draw.
 pub(super) struct Results<'a> {
     pub(super) sweep: &'a Sweep,
     devices: &'a Devices,
-    /// Of each line, its points in order; then what is coarser, where it has that.
+    /// Runs of each line in the order of its points, then of its coarser point if it has one.
     runs: &'a [Vec<Run>],
-    /// Whether costs are told a frame, not of the whole run: where all runs have as many frames.
+    /// Whether costs are per frame rather than per run, which requires that all runs have the same
+    /// number of frames.
     is_per_frame: bool,
 }
 
-/// What stands along x.
+/// Quantity of the x axis.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Cost {
-    /// Median times, with a bar from the least to the greatest.
+    /// Median time, with a bar from the minimum to the maximum.
     Time,
     Work,
 }
@@ -73,7 +74,7 @@ pub(super) fn draw(sweep: &Sweep, bench: &Bench<'_>, runs: &[Vec<Run>]) -> Repor
 }
 
 impl Results<'_> {
-    /// Every run with its line and point, what is coarser last in its line.
+    /// Every run with its line and point; the coarser run is the last of its line.
     fn all(&self) -> impl Iterator<Item = (usize, &Line, &Point, &Run)> {
         let lines = self.sweep.lines.iter().zip(self.runs).enumerate();
         lines.flat_map(|(k, (line, runs))| {
@@ -84,7 +85,7 @@ impl Results<'_> {
         })
     }
 
-    /// Those that came to their end.
+    /// Runs that reached their end.
     pub(super) fn done(&self) -> impl Iterator<Item = &Run> {
         self.all()
             .map(|(.., run)| run)
@@ -95,8 +96,8 @@ impl Results<'_> {
         self.runs[line].get(self.sweep.lines[line].points.len())
     }
 
-    /// An error of run `index` of a line, what is coarser among them; `None` where it failed, cannot be told, or is its
-    /// own reference.
+    /// Error of run `index` of a line, including the coarser one; `None` where the run failed, the
+    /// error was not measured, or the run is its own reference.
     fn error(&self, line: usize, index: usize, error: ErrorMeasure) -> Option<f64> {
         let finest = self.sweep.lines[line].points.len() - 1;
         let (run, reference) = match self.sweep.lines[line].against {
@@ -109,17 +110,17 @@ impl Results<'_> {
         }
         let reference = Some(&reference.measured).filter(|_| reference.ended.is_none());
         let value = measured::error(error, &run.measured, reference);
-        // A grid's or a step's own error is none where it is 0: nothing was measured.
+        // A discretisation error of 0 means that nothing was measured.
         value.filter(|value| index <= finest || *value > 0.0)
     }
 
-    /// The error that a line's grid or step itself has, where the study measured one.
+    /// Discretisation error of a line's grid or step, where the study measured it.
     fn discretisation(&self, line: usize, error: ErrorMeasure) -> Option<f64> {
         self.coarser(line)?;
         self.error(line, self.sweep.lines[line].points.len(), error)
     }
 
-    /// Milliseconds: least, median and greatest.
+    /// Minimum, median and maximum time, milliseconds.
     fn time(&self, run: &Run) -> [f64; 3] {
         let frames = if self.is_per_frame {
             1.0
@@ -168,9 +169,9 @@ impl Results<'_> {
         errors.flat_map(of).collect()
     }
 
-    /// Each error of each line against each other line at equal times.
+    /// Each error of each line compared with each other line at equal times.
     fn rivals(&self) -> Vec<(ErrorMeasure, usize, knee::Rivalry)> {
-        // Lines that are measured against references of their own are no rivals.
+        // Lines with references of their own cannot be compared.
         let errors = self.sweep.errors.iter();
         let errors = errors.filter(|error| error.measure() != Measure::Finest);
         let of = |&error: &ErrorMeasure| {
@@ -183,7 +184,8 @@ impl Results<'_> {
         errors.flat_map(of).collect()
     }
 
-    /// The page in one sentence: the setting at which the first error's best knee is; of lines that are no rivals, each.
+    /// The page's first sentence: the setting at the best knee of the first error, or the knee of
+    /// each line where lines cannot be compared.
     fn answer(&self) -> String {
         let error = self.sweep.errors[0];
         let each = self.each();
@@ -246,7 +248,7 @@ impl Results<'_> {
         }
     }
 
-    /// What a cost is of.
+    /// Unit to which costs refer.
     fn cost_of(&self) -> &'static str {
         match (self.sweep.state.is_some(), self.is_per_frame) {
             (true, _) => "of a projection",
@@ -255,7 +257,7 @@ impl Results<'_> {
         }
     }
 
-    /// With the names of their files, as SVG.
+    /// Charts as SVG with their file names.
     fn charts(&self) -> Vec<(String, String)> {
         let costs = [(Cost::Time, "time"), (Cost::Work, "work")];
         let each = self.sweep.errors.iter();
@@ -297,7 +299,7 @@ impl Results<'_> {
             .filter_map(|k| Some(OF_NO_ACCOUNT * self.discretisation(k, error)?))
             .collect();
         levels.sort_by(f64::total_cmp);
-        // Lines of nearly one height are one.
+        // Levels of nearly the same height are merged.
         levels.dedup_by(|a, b| *a < 1.2 * *b);
         let points = || self.sweep.points();
         let shots = unique(points().map(|point| point.scene.shot.name.as_str()));
@@ -312,7 +314,7 @@ impl Results<'_> {
             y_label: error.title().to_owned(),
             is_log: true,
             series: lines.iter().enumerate().map(series).collect(),
-            // One of several says what they are.
+            // Only the topmost level is labelled.
             marks: (levels.iter().enumerate())
                 .map(|(k, level)| {
                     let is_top = k + 1 == levels.len();
@@ -334,7 +336,7 @@ impl Results<'_> {
         }
     }
 
-    /// What it ran on, and what the bars are.
+    /// Devices, and the meaning of the bars.
     fn subtitle(&self, cost: Cost) -> String {
         let devices = self.sweep.points().map(|p| self.devices.of(p.device));
         let names: Vec<_> = devices.map(|device| device.identity().name).collect();
@@ -483,7 +485,7 @@ impl Results<'_> {
         parts
     }
 
-    /// Which methods ran on what.
+    /// Devices with the methods that ran on each.
     fn where_run(&self) -> String {
         let mut methods: BTreeMap<String, Vec<&str>> = BTreeMap::new();
         for (_, line, point, _) in self.all() {
@@ -499,7 +501,7 @@ impl Results<'_> {
         told.collect::<Vec<_>>().join(" ")
     }
 
-    /// Ours and the paper's, a row for each number of iterations.
+    /// Convergence points beside the paper's, one row per number of iterations.
     fn convergence_table(&self) -> Vec<Vec<String>> {
         let mut titles = vec!["method".into(), "setting".into(), "ms".into()];
         titles.extend(Reading::ALL.map(|reading| format!("point: {}", reading.text())));
@@ -522,7 +524,7 @@ impl Results<'_> {
 
 const LEAST_PRODUCT: &str = "the setting with the least error × time";
 
-/// Each once, in the order in which they come.
+/// Distinct names in order of their first occurrence.
 fn unique<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
     let mut known = Vec::new();
     for name in names {
@@ -538,7 +540,7 @@ fn found(run: &Run, reading: Reading) -> Option<String> {
     convergence_point(&errors, reading).map(|step| step.to_string())
 }
 
-/// The paper's milliseconds and convergence point for a scene's iteration.
+/// Milliseconds and convergence point in the paper for a scene's iteration.
 fn paper(scene: &Scene) -> Option<(f64, u32)> {
     let pbf = scene.solver.pbf.as_ref()?;
     let Stop::Iterations(count) = pbf.stop else {

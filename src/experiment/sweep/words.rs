@@ -1,4 +1,4 @@
-//! How a sweep was measured, in words.
+//! Explanations of how a sweep was measured.
 
 use swell_scene::study::sweep::{FRAME_RATE, Measure, SAMPLES};
 
@@ -67,7 +67,7 @@ impl Results<'_> {
         texts
     }
 
-    /// How times were taken.
+    /// Explains how times were measured.
     pub(super) fn policy(&self) -> String {
         let (repeats, warm) = match self.sweep.state {
             Some(_) => ("projections", "one projection"),

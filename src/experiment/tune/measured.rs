@@ -1,4 +1,4 @@
-//! A twin's run, and how far it is from another.
+//! Runs a variant of the scene (twin) and measures its difference from another.
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
@@ -22,42 +22,43 @@ use super::super::{
     engine::{Bench, until_done},
 };
 
-/// Frames that are measured, about.
+/// Approximate number of measured frames.
 const SAMPLES: u32 = 24;
 
-/// Runs of a twin at the coarsest spacing, at least: it takes little, and times of settings are told by it.
+/// Least number of runs of a variant at the coarsest spacing: they are cheap, and the times of
+/// settings depend on them.
 const COARSE_REPEATS: u32 = 3;
 
-/// What a twin came to.
+/// Results of a variant.
 pub(super) type Run = super::super::run::Run<Measured>;
 
-/// What is measured beside the time.
+/// Measurements besides the time.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Measured {
-    /// Summed over the frames.
+    /// Number of substeps over all frames.
     pub(super) substeps: u64,
-    /// Summed over the frames.
+    /// Number of iterations over all frames.
     pub(super) iterations: u64,
-    /// Pressure solves that ended above their tolerance.
+    /// Number of pressure solves that missed their tolerance.
     pub(super) missed: u32,
     /// Mean of max(0, ρ/ρ0 − 1) over particles and frames.
     pub(super) density: f64,
-    /// At equally spaced frames.
+    /// Samples at equally spaced frames.
     pub(super) samples: Vec<Sample>,
 }
 
-/// What a frame is compared by.
+/// Quantities of a frame that are compared between runs.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Sample {
-    /// Metres above the still level.
+    /// Height of the crest above the still level, metres.
     crest: f64,
-    /// Metres along the wave's way.
+    /// Position of the front along the wave's path, metres.
     front: Option<f64>,
-    /// Metres above the world's y = 0.
+    /// Run-up height above the world's y = 0, metres.
     run_up: Option<f64>,
-    /// Of a mass, m²/s².
+    /// Energy per mass, m²/s².
     energy: f64,
-    /// Pa; empty where they are not read.
+    /// Pressures at the probes, Pa; empty where not requested.
     pressures: Vec<Option<f64>>,
 }
 
@@ -79,7 +80,8 @@ impl Measured {
         self.samples.iter().flat_map(move |s| s.values(of))
     }
 
-    /// What 100 % of a quantity are: its greatest value, and rest density for the density.
+    /// Value that 100 % of a quantity stands for: its greatest absolute value, and rest density for
+    /// the density.
     pub(super) fn whole(&self, of: Quantity) -> Option<f64> {
         match of {
             Quantity::Density => Some(1.0),
@@ -87,8 +89,9 @@ impl Measured {
         }
     }
 
-    /// How far off a run is: the mean, over the frames in which both tell it, of what it differs by from another; the density
-    /// error is itself the difference from rest. `None` where it cannot be told in half of those in which the other tells it.
+    /// Error of a run: the mean difference from another run over the values that both have; the
+    /// density error is by itself the difference from rest. Returns `None` where the run lacks more
+    /// than half of the values of the other.
     pub(super) fn off(&self, of: Quantity, from: &Self) -> Option<f64> {
         if of == Quantity::Density {
             return Some(self.density);
@@ -102,7 +105,7 @@ impl Measured {
     }
 }
 
-/// Runs of a twin.
+/// Number of runs of a variant.
 pub(super) fn repeats(tune: &Tune, twin: &Twin) -> u32 {
     match twin.spacing() >= tune.ladder[0].spacing() {
         true => tune.request.repeats.max(COARSE_REPEATS),
@@ -110,13 +113,13 @@ pub(super) fn repeats(tune: &Tune, twin: &Twin) -> u32 {
     }
 }
 
-/// Frames from one that is measured to the next.
+/// Number of frames from one measured frame to the next.
 pub(super) fn stride(frames: u32) -> u32 {
     (frames / SAMPLES).max(1)
 }
 
-/// Runs a twin as often as its time needs, each time from the scene's start, after one frame that is not counted: it makes the
-/// device's programs ready.
+/// Runs a variant as often as its timing needs, each time from the scene's start, after one warm-up
+/// frame that prepares the device's programs.
 pub(super) fn measure(
     bench: &Bench<'_>,
     tune: &Tune,
@@ -140,7 +143,7 @@ pub(super) fn measure(
         let mut seconds = 0.0;
         until_done(&mut drive, tune.frames, bench.stop, |step| {
             seconds += step.seconds;
-            // The same steps again: only their time is new.
+            // Later repeats compute the same steps; only their times are new.
             if repeat == 0 {
                 run.measured.look(scene, gauge, tune.frames, step);
             }
@@ -166,7 +169,7 @@ impl Measured {
 
 fn sample(scene: &Scene, gauge: &Gauge, step: Step) -> Sample {
     let (particles, spacing) = (&step.particles, scene.particle_spacing());
-    // A density of one and masses of the lattice: energies over the volume are those of a mass.
+    // With a density of 1 and the lattice's particle masses, energy over volume is energy per mass.
     let gravity: DVec3 = scene.water.gravity;
     let sums = gauge.aggregates(particles, spacing, 1.0, gravity);
     let volume = particles.len().max(1) as f64 * spacing.powi(3);
@@ -221,7 +224,7 @@ mod tests {
         );
         close(one.off(Quantity::Front, &three), 0.0);
         assert_eq!(one.off(Quantity::Pressure, &three), None, "one of three");
-        // 10, 20 and 6; where one probe reads nothing the others count.
+        // 10, 20 and 6; where one probe has no reading, the others count.
         close(a.off(Quantity::Pressure, &b), 12.0);
         close(a.off(Quantity::Density, &b), 0.01);
         close(b.whole(Quantity::Front), 9.0);

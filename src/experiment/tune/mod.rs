@@ -1,5 +1,6 @@
-//! The cheapest settings of a shot that hold an error: twins are run, laws are fitted, what they propose is run as well, and
-//! the cheapest run that holds is written as a scene.
+//! Finds the cheapest settings of a shot that keep errors within limits: runs variants of the scene
+//! (twins), fits models of error and time, runs what these propose, and writes the cheapest run
+//! within the limits as a scene.
 
 mod measured;
 mod model;
@@ -32,26 +33,27 @@ use super::{
 use measured::{Measured, Run, measure, repeats};
 use model::Fitted;
 
-/// Proposals that are run at most: each corrects the laws by what the one before came to.
+/// Largest number of proposals to run; each one corrects the models by the result of the previous
+/// one.
 const PROPOSALS: usize = 4;
 
-/// Part of the cheapest time so far that a proposal has to stay below to be worth a run.
+/// A proposal is run only if its predicted time is below this fraction of the cheapest time so far.
 const CHEAPER: f64 = 0.95;
 
-/// What a run is there for.
+/// Purpose of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Role {
     /// The scene's own settings at another spacing.
     Spacing,
-    /// What no settings hold.
+    /// Noise-floor run: the same settings with a millionth more gravity.
     Shaken,
-    /// The coarsest with the reference's other settings.
+    /// The coarsest spacing with the reference's other settings.
     Fine,
-    /// Value of a setting.
+    /// Index of a setting, and index of a value among its alternatives.
     Knob(usize, usize),
-    /// What the others are held against.
+    /// The reference with which the others are compared.
     Reference,
-    /// What the laws proposed.
+    /// Settings that the models proposed.
     Proposal,
 }
 
@@ -62,27 +64,27 @@ impl Role {
     }
 }
 
-/// A run and what it was run for.
+/// A run with its purpose.
 struct Trial<'a> {
     role: Role,
     why: &'static str,
     twin: Cow<'a, Twin>,
     run: Run,
-    /// What the laws said of it, where they were asked before.
+    /// Prediction of the models, where it was made before the run.
     predicted: Option<Proposal>,
 }
 
-/// What all runs came to.
+/// Results of all runs.
 struct Results<'a> {
     tune: &'a Tune,
     trials: Vec<Trial<'a>>,
-    /// The shot's runs whose laws are told; `None` where too few came to their end.
+    /// Models fitted to the runs; `None` where too few runs reached their end.
     fitted: Option<Fitted<'a>>,
-    /// In each quantity's own unit.
+    /// Limits in the quantities' own units.
     limits: Limits,
     /// Edge of the cubes in which crests and fronts are measured, metres.
     resolution: f64,
-    /// Which trial is chosen.
+    /// Index of the chosen trial, and whether it meets the limits.
     choice: Option<(usize, bool)>,
 }
 
@@ -95,7 +97,8 @@ impl Kind for Tune {
         self.twins().count()
     }
 
-    /// What is known before the first run, the coarsest first; what is proposed is run with the whole.
+    /// Runs that are known in advance, the coarsest first; proposals are only run by the whole
+    /// study.
     fn places(&self) -> Option<Vec<Place>> {
         Some((0..self.twins().count()).map(Place::of).collect())
     }
@@ -128,7 +131,7 @@ impl Kind for Tune {
     }
 }
 
-/// The reference's measures.
+/// Measurements of the reference run.
 fn reference<'t>(trials: &'t [Trial<'_>]) -> Result<&'t Measured, StudyError> {
     let mut found = trials.iter().filter(|t| t.role == Role::Reference);
     match found.next() {
@@ -150,7 +153,7 @@ fn reference<'t>(trials: &'t [Trial<'_>]) -> Result<&'t Measured, StudyError> {
     }
 }
 
-/// What is allowed, in each quantity's own unit.
+/// Limits in the quantities' own units.
 fn limits(tune: &Tune, reference: &Measured) -> Result<Limits, StudyError> {
     let of = |limit: &Limit| match limit.bound {
         Bound::Absolute(value) => Ok(value),
@@ -177,7 +180,7 @@ fn untold(name: &str) -> StudyError {
     ))
 }
 
-/// One gauge for all runs; its cubes are those of the coarsest lattice.
+/// Gauge for all runs; its cubes are those of the coarsest lattice.
 fn gauge_of(tune: &Tune) -> Result<Gauge, StudyError> {
     let scene = &tune.reference.scene;
     let spacings = tune.twins().map(|(_, twin)| twin.scene.particle_spacing());
@@ -187,7 +190,7 @@ fn gauge_of(tune: &Tune) -> Result<Gauge, StudyError> {
     Ok(gauge::gauge(scene, coarsest, &start, spacing))
 }
 
-/// What the runs share.
+/// State shared by all runs.
 struct Lab<'a> {
     tune: &'a Tune,
     gauge: Gauge,
@@ -195,7 +198,8 @@ struct Lab<'a> {
 }
 
 impl<'a> Lab<'a> {
-    /// Runs all that is known before the first, the coarsest first: what it cannot tell no run will.
+    /// Runs everything that is known in advance. The coarsest run comes first, because a quantity
+    /// that it does not have is missing from all runs.
     fn known(&mut self, bench: &mut Bench<'_>) -> Result<Vec<Trial<'a>>, StudyError> {
         let tune = self.tune;
         let mut roles = vec![Role::Spacing; tune.ladder.len()];
@@ -235,7 +239,7 @@ impl<'a> Lab<'a> {
         Ok(())
     }
 
-    /// `None` of what is only looked for, and is not there.
+    /// Returns `None` for a missing run that is only looked up.
     fn run(
         &mut self,
         bench: &mut Bench<'_>,
@@ -266,7 +270,8 @@ impl<'a> Lab<'a> {
         Ok(Some(run))
     }
 
-    /// Runs what the laws call cheapest for as long as that is cheaper than any run that holds.
+    /// Runs the settings with the least predicted time, as long as that is below the time of any
+    /// run within the limits.
     fn propose(
         &mut self,
         bench: &mut Bench<'_>,
@@ -296,14 +301,14 @@ impl<'a> Lab<'a> {
 }
 
 impl<'a> Results<'a> {
-    /// The reference was there when these were made.
+    /// Measurements of the reference run, which exist for all results.
     fn reference(&self) -> &Measured {
         let mut all = self.trials.iter().filter(|t| t.role == Role::Reference);
         let found = all.next().map(|trial| &trial.run.measured);
         found.expect("a run that the others are held against")
     }
 
-    /// Errors of a run in the order of the limits; `None` where it did not come to its end.
+    /// Errors of a run in the order of the limits; `None` where it did not reach its end.
     fn errors(&self, run: &Run) -> Vec<Option<f64>> {
         let reference = self.reference();
         let limits = self.tune.request.limits.iter();
@@ -318,7 +323,7 @@ impl<'a> Results<'a> {
         }
     }
 
-    /// Trials that may be chosen, by their places.
+    /// Trials that may be chosen, with their indices.
     fn candidates(&self) -> Vec<(usize, Candidate)> {
         let trials = self.trials.iter().enumerate();
         let may = trials.filter(|(_, t)| t.role.is_candidate() && t.run.ended.is_none());
@@ -333,7 +338,7 @@ impl<'a> Results<'a> {
         });
     }
 
-    /// What the laws call cheapest, where that is worth a run.
+    /// Settings with the least predicted time, where these are worth a run.
     fn proposal(&self) -> Option<Proposal> {
         let proposal = self.fitted.as_ref()?.model.propose(&self.limits)?;
         let runs = self.candidates().into_iter().map(|(_, run)| run);
@@ -343,7 +348,7 @@ impl<'a> Results<'a> {
         is_worth.then_some(proposal)
     }
 
-    /// Takes over a proposal's run, and corrects the laws by it.
+    /// Adds the run of a proposal and corrects the models by it.
     fn take(&mut self, twin: Twin, run: Run, predicted: Proposal) {
         let errors = self.errors(&run);
         if let Some(fitted) = &mut self.fitted {
@@ -358,7 +363,7 @@ impl<'a> Results<'a> {
         });
     }
 
-    /// What the laws say of a trial: before it was run where they were asked, else of what they were fitted to.
+    /// Prediction of the models for a trial: as made before the run, or from the initial fit.
     fn predicted(&self, trial: &Trial<'_>) -> Option<Proposal> {
         if let Some(predicted) = &trial.predicted {
             return Some(predicted.clone());

@@ -1,23 +1,23 @@
-//! Laws fitted to the twins of a shot.
+//! Models of error and time fitted to the variants of a shot.
 
 use swell_scene::study::tune::{Knob, Quantity, Setting, Tune};
 use swell_study::tune::{Effect, Law, Model, Proposal};
 
 use super::{Role, Trial, measured::Run};
 
-/// What was fitted, and which settings its values stand for.
+/// Fitted models, and the settings to which their values refer.
 pub(super) struct Fitted<'a> {
-    /// As the twins told it.
+    /// Models as fitted to the variants.
     pub(super) first: Model,
-    /// Corrected by the proposals that were run.
+    /// Models corrected by the proposals that were run.
     pub(super) model: Model,
-    /// Of each setting of the model its values: the scene's own, which sets nothing, then those that came to their end, each
-    /// with its place among the setting's others.
+    /// Values of each setting in the model: the scene's own, which changes nothing, then those
+    /// whose runs reached their end, with their indices among the setting's alternatives.
     choices: Choices<'a>,
 }
 
 impl<'a> Fitted<'a> {
-    /// `None` where fewer than two spacings came to their end.
+    /// Returns `None` where the reference or all but one spacing failed.
     pub(super) fn of(tune: &'a Tune, trials: &[Trial<'_>]) -> Option<Self> {
         let run = |role: Role| {
             let mut found = trials.iter().filter(|t| t.role == role);
@@ -66,14 +66,14 @@ impl<'a> Fitted<'a> {
         })
     }
 
-    /// What the values of a proposal lay over the scene.
+    /// Settings that the values of a proposal change in the scene.
     pub(super) fn settings(&self, values: &[usize]) -> Vec<Setting> {
         let chosen = self.choices.iter().zip(values).map(|(of, &k)| of[k]);
         let set = chosen.flatten().flat_map(|(_, set)| set);
         set.cloned().collect()
     }
 
-    /// The values of a trial; `None` of one that the laws do not speak of.
+    /// Values of a trial; `None` where the models do not cover it.
     pub(super) fn values(&self, role: Role) -> Option<Vec<usize>> {
         let mut values = vec![0; self.choices.len()];
         match role {
@@ -87,11 +87,11 @@ impl<'a> Fitted<'a> {
         Some(values)
     }
 
-    /// Corrects the laws by what a proposal came to.
+    /// Corrects the models by the result of a proposal.
     pub(super) fn correct(&mut self, errors: &[Option<f64>], seconds: f64, before: &Proposal) {
         let pairs = errors.iter().zip(&before.errors);
         for (law, (measured, predicted)) in self.model.errors.iter_mut().zip(pairs) {
-            // What failed is taken as far off.
+            // A failed run counts as infinitely wrong.
             let ratio = measured.map_or(f64::INFINITY, |measured| measured / predicted);
             if ratio.is_finite() || measured.is_none() {
                 *law = law.corrected(ratio);
@@ -103,7 +103,8 @@ impl<'a> Fitted<'a> {
     }
 }
 
-/// Of an error by spacing. Where no law is to be seen, as where it is 0 throughout, the largest that was measured.
+/// Law of an error by spacing. Where none can be fitted, for example because the error is 0
+/// throughout, a constant at the largest measured value.
 fn law(of: Quantity, reference: f64, pairs: &[(f64, f64)]) -> Law {
     let law = match of {
         Quantity::Density => Law::plain(pairs),
@@ -117,13 +118,15 @@ fn law(of: Quantity, reference: f64, pairs: &[(f64, f64)]) -> Law {
     })
 }
 
-/// A value that is not the scene's own: its place among the setting's others, and what it lays over the scene.
+/// A value other than the scene's own: its index among the alternatives, and the settings it
+/// changes.
 type Chosen<'a> = (usize, &'a [Setting]);
 
-/// Of each setting its values; `None` is the scene's own.
+/// Values of each setting; `None` is the scene's own.
 type Choices<'a> = Vec<Vec<Option<Chosen<'a>>>>;
 
-/// What a run differs by from one with a millionth more gravity: no two bakes are nearer to each other.
+/// Noise floor: difference of a run from one with a millionth more gravity, which no two bakes fall
+/// below.
 pub(super) fn floor(of: Quantity, own: &Run, shaken: &Run) -> Option<f64> {
     match of {
         Quantity::Density => Some((own.measured.density - shaken.measured.density).abs()),
@@ -131,8 +134,9 @@ pub(super) fn floor(of: Quantity, own: &Run, shaken: &Run) -> Option<f64> {
     }
 }
 
-/// What each value of each setting does on the coarsest grid: time over that of the scene's own, and how much farther it is
-/// from the run with finer settings on the same grid. What is no more than a millionth of gravity does is no effect.
+/// Effects of each value of each setting at the coarsest spacing: the time relative to the scene's
+/// own value, and the increase of the distance to the run with finer settings at the same spacing.
+/// Differences within the noise floor count as none.
 fn effects<'a, 't>(
     tune: &'a Tune,
     [own, fine, shaken]: [&Run; 3],
@@ -143,7 +147,7 @@ fn effects<'a, 't>(
     let effect = |other: &Run| {
         let errors = limits.iter().map(|limit| {
             let of = limit.quantity;
-            // What cannot be told on this grid is no gain and no loss.
+            // Quantities without a value at this spacing count as unchanged.
             let added = off(other, of)? - off(own, of)?;
             Some(added).filter(|added| added.abs() > floor(of, own, shaken).unwrap_or(0.0))
         });
@@ -167,7 +171,7 @@ fn effects<'a, 't>(
 }
 
 impl Fitted<'_> {
-    /// The values of a setting beside the scene's own, as TOML has them, with what they do.
+    /// Values of a setting other than the scene's own, in TOML notation, with their effects.
     pub(super) fn effects(&self, knob: usize) -> Vec<(&str, &Effect)> {
         let Some((choices, effects)) = self.choices.get(knob).zip(self.first.settings.get(knob))
         else {
@@ -227,8 +231,8 @@ mod tests {
         }
     }
 
-    /// Density errors of d / 10, times of 1e-5 d⁻⁴; a millionth of gravity does 1e-4. CFL 2 adds twice that, CFL ½ takes half
-    /// of it, which is none.
+    /// Density errors of d / 10, times of 1e-5 d⁻⁴, and a noise floor of 1e-4. CFL 2 adds twice
+    /// that; CFL ½ subtracts half of it, which is within the noise.
     fn trials(tune: &Tune) -> Vec<Trial<'_>> {
         let of = |twin: &Twin| (0.1 * twin.spacing(), 1e-5 * twin.spacing().powi(-4));
         let mut trials: Vec<_> = tune
@@ -264,12 +268,13 @@ mod tests {
         assert_eq!((double, half), ("2", "0.5"));
         assert!((fast.errors[0] - 2e-4).abs() < 1e-12 && (fast.time - 0.5).abs() < 1e-12);
         assert_eq!(slow.errors[0], 0.0, "no more than what gravity does");
-        // The other settings had no run that came to its end: they keep the scene's own value.
+        // No run of the other settings reached its end, so they keep the scene's own values.
         assert_eq!(fitted.settings(&[1, 0, 0]), tune.knobs[0].others[0].0);
         assert!(fitted.effects(1).is_empty() && fitted.settings(&[0, 0, 0]).is_empty());
         assert_eq!(fitted.values(Role::Knob(0, 1)), Some(vec![2, 0, 0]));
         assert_eq!(fitted.values(Role::Knob(1, 0)), None);
-        // Controls: a smaller millionth lets the effect be seen; without a reference nothing is fitted.
+        // Controls: a lower noise floor reveals the effect, and without a reference nothing is
+        // fitted.
         trials[4].run.measured.density -= 9e-5;
         let fitted = Fitted::of(&tune, &trials).expect("four spacings");
         assert!((fitted.effects(0)[1].1.errors[0] + 5e-5).abs() < 1e-12);

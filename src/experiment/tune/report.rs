@@ -20,7 +20,7 @@ use super::{
     Results, Role, Trial,
 };
 
-/// `written` is the scene with the chosen settings.
+/// Draws the report; `written` is the path of the scene with the chosen settings.
 pub(super) fn draw(results: &Results<'_>, bench: &Bench<'_>, written: Option<PathBuf>) -> Report {
     let answer = results.answer();
     let mut findings = vec![answer.clone()];
@@ -57,7 +57,8 @@ impl Results<'_> {
         Some(&self.trials[self.choice?.0])
     }
 
-    /// One error against time: the spacings, each setting on the coarsest grid, what was proposed.
+    /// Chart of one error against time: the spacings, each setting at the coarsest spacing, and the
+    /// proposals.
     fn chart(&self, k: usize, limit: &Limit, device: &str) -> Chart {
         let chosen = self.choice.map(|(place, _)| place);
         let dot = |(place, trial): (usize, &Trial<'_>)| {
@@ -126,7 +127,7 @@ impl Results<'_> {
         failed.collect()
     }
 
-    /// Every run: what it took, what it is off by, what the laws say.
+    /// Rows for every run with its cost, its errors, and the predictions of the models.
     fn table(&self) -> Vec<Vec<String>> {
         let fixed = "run,for,particles,frames,ms,shot_seconds,substeps,iterations,missed";
         let mut titles: Vec<String> = fixed.split(',').map(str::to_owned).collect();
@@ -217,7 +218,7 @@ impl Results<'_> {
         }
     }
 
-    /// What the table's errors are in.
+    /// Units of the errors in the table.
     fn units(&self) -> String {
         let limits = self.tune.request.limits.iter().zip(&self.limits.errors);
         let of = |(limit, allowed): (&Limit, &f64)| match limit.bound {
@@ -253,7 +254,7 @@ impl Results<'_> {
     }
 }
 
-/// What tells a run from the others of its curve.
+/// Label that distinguishes a run from the others of its curve.
 fn label(trial: &Trial<'_>) -> String {
     let set = &trial.twin.set;
     match trial.role {

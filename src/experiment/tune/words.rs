@@ -1,4 +1,4 @@
-//! Numbers and settings of a tuned shot, in words.
+//! Formats numbers and settings of a tuned shot as text.
 
 use swell_scene::study::tune::{Bound, Limit, Quantity};
 use swell_study::tune::Law;
@@ -6,7 +6,7 @@ use swell_study::tune::Law;
 use super::{super::sweep::digits::significant, Results, Trial, model::floor};
 
 impl Results<'_> {
-    /// An error in the unit of its limit: `1.7 %` or `0.043 m`.
+    /// Formats an error in the unit of its limit: `1.7 %` or `0.043 m`.
     pub(super) fn told(&self, limit: &Limit, value: f64) -> String {
         match limit.bound {
             Bound::Part(_) => format!("{} %", significant(self.in_unit(limit, value))),
@@ -17,7 +17,8 @@ impl Results<'_> {
         }
     }
 
-    /// The number of that: per cent of the reference's greatest value, or the quantity's own unit.
+    /// Converts an error to the unit of its limit: per cent of the reference's greatest value, or
+    /// the quantity's own unit.
     pub(super) fn in_unit(&self, limit: &Limit, value: f64) -> f64 {
         match limit.bound {
             Bound::Part(_) => {
@@ -28,7 +29,7 @@ impl Results<'_> {
         }
     }
 
-    /// Whole and frame: `0.31 s a frame, 22 s for the shot's 72`.
+    /// Time per frame and of the shot: `0.31 s a frame, 22 s for the shot's 72`.
     pub(super) fn time(&self, trial: &Trial<'_>) -> String {
         let seconds = trial.run.per_frame()[1];
         let frames = self.tune.scene.shot.frames;
@@ -40,7 +41,7 @@ impl Results<'_> {
         )
     }
 
-    /// Each error of a trial beside its limit and what the laws say of it.
+    /// Each error of a trial with its limit and its prediction.
     pub(super) fn off(&self, trial: &Trial<'_>) -> String {
         let predicted = self.predicted(trial);
         let errors = self.errors(&trial.run);
@@ -62,7 +63,7 @@ impl Results<'_> {
         limits.map(of).collect::<Vec<_>>().join("; ")
     }
 
-    /// All limits, the time's too.
+    /// All limits, including those of time.
     pub(super) fn limits_in_words(&self) -> String {
         let request = &self.tune.request;
         let limits = request.limits.iter().map(Limit::to_string);
@@ -92,7 +93,7 @@ impl Results<'_> {
         }
     }
 
-    /// What the chosen settings save against the scene as it stands, where that was run.
+    /// Time of the chosen settings relative to the scene's own, where the latter was run.
     pub(super) fn against_own(&self) -> Option<String> {
         let chosen = &self.trials[self.choice?.0];
         let own = self.tune.own_spacing();
@@ -110,7 +111,8 @@ impl Results<'_> {
         ))
     }
 
-    /// Where the choice is at the sweep's end, that more may be gained.
+    /// Note that a greater `--reference` may find more, where the choice is at the coarsest
+    /// spacing.
     pub(super) fn at_the_end(&self) -> Option<String> {
         let (place, true) = self.choice? else {
             return None;
@@ -122,7 +124,7 @@ impl Results<'_> {
         })
     }
 
-    /// What no run of this can promise.
+    /// Statements that these runs cannot support.
     pub(super) fn not_promised(&self) -> Vec<String> {
         let mut texts: Vec<String> = self.floors();
         let mut limits = self.tune.request.limits.iter();
@@ -146,7 +148,7 @@ impl Results<'_> {
         texts
     }
 
-    /// What a millionth of gravity changes, by limit; the sentence says where that is more than what is allowed.
+    /// Noise floor of each limited quantity, with a note where it exceeds the limit.
     pub(super) fn floors(&self) -> Vec<String> {
         let run = |role| {
             let mut found = self.trials.iter().filter(move |t| t.role == role);
@@ -174,7 +176,7 @@ impl Results<'_> {
         limits.filter_map(of).collect()
     }
 
-    /// What the others are held against, and what it is off by itself.
+    /// Describes the reference and its own estimated errors.
     pub(super) fn reference_in_words(&self) -> String {
         let mut words = format!("Errors are told against {}.", self.tune.reference.name());
         let Some(fitted) = &self.fitted else {
@@ -204,7 +206,7 @@ impl Results<'_> {
         words
     }
 
-    /// A row for each law.
+    /// Table with one row per law.
     pub(super) fn laws(&self) -> Vec<Vec<String>> {
         let titles = [
             "of",
@@ -237,7 +239,7 @@ impl Results<'_> {
         rows
     }
 
-    /// Why a setting of the chosen run is as it is.
+    /// Reason for the value of a setting in the chosen run.
     pub(super) fn reason(&self, trial: &Trial<'_>, key: &str, value: &str, own: &str) -> String {
         let Some(knob) = self.tune.knobs.iter().position(|knob| knob.key == key) else {
             let law = self.fitted.as_ref().map_or(String::new(), |fitted| {
@@ -268,7 +270,7 @@ impl Results<'_> {
         }
     }
 
-    /// What the values of a setting do beside the scene's own, the chosen one first.
+    /// Effects of the values of a setting other than the scene's own, the chosen one first.
     fn effects_in_words(&self, knob: usize, chosen: &str) -> Vec<String> {
         let Some(effects) = self.fitted.as_ref().map(|fitted| fitted.effects(knob)) else {
             return Vec::new();

@@ -1,4 +1,4 @@
-//! The scene with its settings, and the reason beside each.
+//! Writes the scene with the chosen settings and the reason beside each.
 
 use std::{
     fs, io,
@@ -14,7 +14,7 @@ use swell_scene::{
 
 use super::{super::StudyError, Results, Trial};
 
-/// How a scene begins that may be written over.
+/// First words of a scene that may be overwritten.
 const MARK: &str = "# Tuned by swell from ";
 
 fn fault(file: &Path, source: io::Error) -> StudyError {
@@ -24,7 +24,7 @@ fn fault(file: &Path, source: io::Error) -> StudyError {
     }
 }
 
-/// Before anything is run: no file of another is written over.
+/// Checks before the first run that the target file does not exist or is a tuned scene.
 pub(super) fn check_target(tune: &Tune) -> Result<(), StudyError> {
     let file = &tune.request.target;
     match fs::read_to_string(file) {
@@ -38,7 +38,8 @@ pub(super) fn check_target(tune: &Tune) -> Result<(), StudyError> {
     }
 }
 
-/// Writes the chosen run's scene; `None` where no run holds, and nothing is written.
+/// Writes the scene of the chosen run; returns `None` and writes nothing where no run meets the
+/// limits.
 pub(super) fn write(results: &Results<'_>, command: &str) -> Result<Option<PathBuf>, StudyError> {
     let Some((place, true)) = results.choice else {
         return Ok(None);
@@ -48,7 +49,7 @@ pub(super) fn write(results: &Results<'_>, command: &str) -> Result<Option<PathB
     let unfit = |what: String| StudyError::Point(format!("{}: {what}", file.display()));
     let text = with_settings(&tune.text, &settings(results, trial)).map_err(unfit)?;
     let text = header(results, trial, command) + &text;
-    // What was promised is what was run: read again, it is that scene.
+    // Parses the text again to verify that it describes the scene that was run.
     let folder = file.parent().unwrap_or(Path::new(""));
     let read = Scene::parse_within(&text, file, folder, &[], tune.request.reach);
     let is_it = |scene: &Scene| physics_hash(scene) == physics_hash(&trial.twin.scene);
@@ -63,7 +64,7 @@ pub(super) fn write(results: &Results<'_>, command: &str) -> Result<Option<PathB
     Ok(Some(file.clone()))
 }
 
-/// Lines above the scene's own.
+/// Comment lines above the scene.
 fn header(results: &Results<'_>, trial: &Trial<'_>, command: &str) -> String {
     let scene = results.tune.request.scene.file_name().unwrap_or_default();
     let mut lines = vec![

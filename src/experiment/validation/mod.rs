@@ -1,4 +1,5 @@
-//! Benchmarks whose answer is known: each run, measured, and held against theory and experiments.
+//! Validation studies: runs benchmarks with known answers, and compares the results with theory and
+//! experiments.
 
 mod numbers;
 mod record;
@@ -23,15 +24,17 @@ use record::Record;
 
 pub use verdict::{Judged, judge};
 
-/// What a run came to.
+/// Results of a run.
 pub type Run = super::Run<Measured>;
 
-/// What a benchmark's measure gives of a run.
+/// Measurements that a benchmark takes from a run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Measured {
-    /// By the names of [`Measure::numbers`](swell_scene::study::validation::Measure::numbers); one that cannot be had is left out.
+    /// Values by the names in
+    /// [`Measure::numbers`](swell_scene::study::validation::Measure::numbers), without those that
+    /// cannot be determined.
     pub numbers: BTreeMap<String, f64>,
-    /// By the names of [`Measure::curves`](swell_scene::study::validation::Measure::curves).
+    /// Curves by the names in [`Measure::curves`](swell_scene::study::validation::Measure::curves).
     pub curves: BTreeMap<String, Vec<(f64, f64)>>,
 }
 
@@ -106,10 +109,11 @@ fn status(run: &Run, stood: bool) -> PointStatus {
     }
 }
 
-/// Runs one of a benchmark's runs over its whole shot, or to where its numbers fail.
+/// Runs a trial of a benchmark over its whole shot, or until its numbers fail.
 ///
 /// # Errors
-/// What is no fault of the numbers: the device, a file; [`StudyError::Stopped`] where `stop` came before the end.
+/// Failures that the numbers did not cause: of the device or a file, or [`StudyError::Stopped`] if
+/// `stop` was set before the end.
 pub fn run_benchmark(
     devices: &Devices,
     benchmark: &Benchmark,

@@ -1,4 +1,4 @@
-//! From a run's frames to the numbers and curves of its benchmark.
+//! Computes the numbers and curves of a benchmark from the frames of a run.
 
 use std::f64::consts::{PI, TAU};
 
@@ -13,28 +13,28 @@ use super::{
     record::{Record, Row},
 };
 
-/// m/s²: of the published numbers, whatever the scene has.
+/// Gravity of the published numbers, m/s², regardless of the scene.
 const GRAVITY: f64 = 9.81;
 
-/// kg/m³, the same.
+/// Density of the published numbers, kg/m³, regardless of the scene.
 const DENSITY: f64 = 1000.0;
 
-/// Seconds over which the pressures of SPHERIC benchmark 2 are averaged.
+/// Averaging time of the pressures of SPHERIC benchmark 2, seconds.
 const WINDOW: f64 = 0.01;
 
-/// Seconds over which a splash at a gauge of height is averaged: single drops come and go within it.
+/// Averaging time of a splash at a height gauge, seconds; single drops come and go within it.
 const SPLASH: f64 = 0.05;
 
-/// Part of a crest from which on a parabola is laid through it.
+/// Fraction of a crest's height above which a parabola is fitted to it.
 const CREST: f64 = 0.8;
 
-/// Largest shift of T that is tried on a dam break's front.
+/// Largest shift of T that is tried for a dam break's front.
 const SHIFT: f64 = 1.0;
 
-/// T from which to which water that ran out over a dry bed is looked at.
+/// Range of T in which water running out over a dry bed is evaluated.
 const DRY_BED: [f64; 2] = [4.0, 8.0];
 
-/// Points that a curve keeps.
+/// Largest number of points of a stored curve.
 const CURVE: usize = 400;
 
 type Curve = Vec<(f64, f64)>;
@@ -74,14 +74,14 @@ impl Measured {
     }
 }
 
-/// A number of each frame over its time, seconds; frames without it are left out.
+/// Value of each frame over its time in seconds; frames without a value are left out.
 fn over_time(rows: &[Row], of: impl Fn(&Row) -> Option<f64>) -> Curve {
     rows.iter()
         .filter_map(|row| Some((row.time, of(row)?)))
         .collect()
 }
 
-/// A gauge's level over time, metres.
+/// Level of a gauge over time, metres.
 fn level(record: &Record<'_>, gauge: usize) -> Curve {
     over_time(&record.rows, |row| *row.levels.get(gauge)?)
 }
@@ -127,7 +127,7 @@ fn regular_waves(record: &Record<'_>, out: &mut Measured) {
     let up_to_gauge = ratio(&mut rows().flat_map(|row| row.of_water.iter().copied()));
     out.put("speed_ratio", up_to_gauge);
     out.put("speed_anywhere", ratio(&mut rows().map(|row| row.speed)));
-    // From a crest of the fit on, so that crests come at whole periods.
+    // Time relative to a crest of the fit, so that crests are at whole periods.
     if let Some(fit) = fits.first() {
         let at = |t: f64| t / scale.period - fit.phase / TAU;
         let first = level(record, 0).into_iter();
@@ -136,16 +136,17 @@ fn regular_waves(record: &Record<'_>, out: &mut Measured) {
     }
 }
 
-/// What theory says of a scene's waves.
+/// Theoretical elevation of a scene's waves.
 struct Theory<'a> {
-    /// Elevation at x and z, metres from the domain's least corner, and a time, s.
+    /// Elevation, metres, at x and z in metres from the domain's least corner and a time in
+    /// seconds.
     elevation: Box<dyn Fn(DVec2, f64) -> f64 + 'a>,
-    /// Of regular waves, seconds.
+    /// Period of regular waves, seconds.
     period: Option<f64>,
 }
 
 impl<'a> Theory<'a> {
-    /// Of the first wall that moves by a theory, else of a generation zone.
+    /// Theory of the first wall that moves by one, else of a generation zone.
     fn of(scene: &'a Scene) -> Option<Self> {
         let of_wall = |maker: &'a WaveMaker| -> Option<Self> {
             let rest = maker.room();
@@ -175,10 +176,11 @@ impl<'a> Theory<'a> {
     }
 }
 
-/// A gauge's samples that count: seconds, elevation, and theory's, metres.
+/// Evaluated samples of a gauge: seconds, measured elevation and theoretical elevation, metres.
 type Both = Vec<[f64; 3]>;
 
-/// Against theory from `after` on, about the mean level, which is higher than the still water's by what a wall has come in.
+/// Compares with theory from `after` on, relative to the mean level, which is above the still-water
+/// level by the volume that a wall displaces.
 fn waves_by_theory(record: &Record<'_>, out: &mut Measured) {
     let Some(theory) = Theory::of(record.scene) else {
         return;
@@ -222,8 +224,8 @@ fn waves_by_theory(record: &Record<'_>, out: &mut Measured) {
     }
 }
 
-/// What regular waves have at twice their frequency: bound to them it is the same all along the flume, and a free wave, which goes
-/// slower, makes it rise and fall.
+/// Second harmonic of regular waves: bound to them, it is constant along the flume; a free wave,
+/// which travels more slowly, makes it vary.
 fn second_harmonic(period: f64, after: f64, gauges: &[Both], out: &mut Measured) {
     let omega = 2.0 * TAU / period;
     let amplitude = |samples: &Both, k: usize| -> Option<f64> {
@@ -258,7 +260,7 @@ fn solitary_wave(record: &Record<'_>, out: &mut Measured) {
     out.put("crests", Some(whole / gauges.len() as f64));
     let crests: Option<Vec<_>> = found.into_iter().collect();
     let crests = crests.unwrap_or_default();
-    // By a straight line through the arrivals at all gauges.
+    // Celerity from a straight line through the arrivals at all gauges.
     let arrivals = crests.iter().zip(&gauges).map(|((t, _), at)| (*t, at.x));
     out.put("celerity", waves::slope(&arrivals.collect::<Vec<_>>()));
     out.put("height", mean(crests.iter().map(|(_, y)| y / scale.depth)));
@@ -309,7 +311,7 @@ fn dry_bed(record: &Record<'_>, out: &mut Measured) {
     };
     let width = record.scene.domain.size().x / bins as f64;
     let middle = |bin: usize| (bin as f64 + 0.5) * width - scale.length;
-    // The dam stands between two bins, whose mean is the depth there to second order.
+    // The dam is between two bins, whose mean is the depth there to second order.
     let dam = (scale.length / width).round() as usize;
     let depths = rows
         .iter()
@@ -324,7 +326,8 @@ fn dry_bed(record: &Record<'_>, out: &mut Measured) {
         "flow_at_dam",
         flow.map(|flow| flow / (scale.depth * celerity)),
     );
-    // Between the still water and the tip, towards which the solution is that of water without friction alone.
+    // Between the still water and the tip, because near the tip the solution holds only for water
+    // without friction.
     let gaps = |row: &Row| -> Vec<f64> {
         let of_bin = |(bin, depth): (usize, &f64)| {
             let exact = waves::ritter(middle(bin), row.time, scale.depth, GRAVITY);
@@ -338,7 +341,7 @@ fn dry_bed(record: &Record<'_>, out: &mut Measured) {
     out.put("profile_error", mean(mean_gap));
     let largest = |row: &&Row| gaps(row).into_iter().fold(0.0, f64::max);
     let worst: Vec<f64> = rows.iter().map(largest).collect();
-    // Over one unit of T at either end.
+    // Means over one unit of T at either end.
     let part = |from: f64| {
         let within = |row: &Row| (from - 1e-9..=from + 1.0 + 1e-9).contains(&time(row));
         let both = rows.iter().zip(&worst);
@@ -364,7 +367,7 @@ fn dry_bed(record: &Record<'_>, out: &mut Measured) {
 }
 
 fn block_impact(record: &Record<'_>, out: &mut Measured) {
-    // H1 to H4, and P1 to P4, in the order of the scene's probes.
+    // The scene's probes are in the order H1 to H4 and P1 to P4.
     let levels: Vec<Curve> = (0..4).map(|gauge| level(record, gauge)).collect();
     out.put("arrival", levels[1].first().map(|(t, _)| *t));
     out.put("height_2", waves::largest_mean(&levels[1], SPLASH));
@@ -376,7 +379,7 @@ fn block_impact(record: &Record<'_>, out: &mut Measured) {
         out.put(name, waves::value_at(&levels[3], time));
     }
     let pressure = |probe: usize| {
-        // Dry is no pressure.
+        // A dry probe has no pressure.
         over_time(&record.rows, |row| {
             Some(row.pressures.get(probe)?.unwrap_or(0.0))
         })
@@ -385,7 +388,7 @@ fn block_impact(record: &Record<'_>, out: &mut Measured) {
         let name = format!("peak_{}", probe + 1);
         out.put(&name, waves::largest_mean(&pressure(probe), WINDOW));
     }
-    // Half a cell off the face, P1 to P4 once more.
+    // The following probes repeat P1 to P4 half a cell off the face; P1 to P3 are compared.
     for probe in 0..3 {
         let on = waves::largest_mean(&pressure(probe), WINDOW);
         let off = waves::largest_mean(&pressure(probe + 4), WINDOW);
@@ -403,7 +406,7 @@ fn block_impact(record: &Record<'_>, out: &mut Measured) {
     out.draw("pressure_1", pressure(0));
 }
 
-/// A wall that turns a jet of cross-section A takes all of its momentum, ρ A v² a second.
+/// A wall that deflects a jet of cross-section A absorbs all of its momentum, ρ A v² per second.
 fn jet_impact(record: &Record<'_>, out: &mut Measured) {
     let scale = record.benchmark.scale;
     let whole = DENSITY * scale.length.powi(2) * scale.speed.powi(2);
@@ -457,14 +460,14 @@ fn hydrostatic(record: &Record<'_>, out: &mut Measured) {
 fn taylor_green(record: &Record<'_>, out: &mut Measured) {
     let scale = record.benchmark.scale;
     let energy = over_time(&record.rows, |row| row.of_water.first().copied());
-    // A turn is that of the vortex' middle, whose vorticity is 2 k U.
+    // Turnover time at the vortex centre, where the vorticity is 2 k U.
     let k = PI / scale.length;
     let turn = TAU / (k * scale.speed);
     if let (Some((_, first)), Some((end, last))) = (energy.first(), energy.last()) {
         let kept = mean(energy.iter().map(|(_, e)| e / first)).unwrap_or_default();
         let square = scale.speed.powi(2) * kept;
         let diffusion = numerical_diffusion(record.scene, record.substeps, *end, square);
-        // Of a Taylor–Green vortex energy falls as e^(−4 ν k² t).
+        // The energy of a Taylor–Green vortex decays as e^(−4 ν k² t).
         let decay = -(last / first).ln();
         out.put(
             "dissipation_ratio",
@@ -476,10 +479,11 @@ fn taylor_green(record: &Record<'_>, out: &mut Measured) {
     }
 }
 
-/// What a step does to a Taylor–Green vortex of this U², m²/s: α Δx² / (6 Δt) of PIC's part (Zhu and Bridson 2005), and
-/// U² Δt / 8 of the projection. Particles that are carried keep their energy, and the projection takes away what makes
-/// their field diverge, Δt ∇p / ρ: half its square in each step, whose mean is U⁴ k² / 4, of an energy of U² / 4 that a
-/// viscosity ν diminishes by 4 ν k² (the loss that Zehnder, Narain and Thomaszewski 2018 set out from).
+/// Numerical diffusion of a Taylor–Green vortex with this U², m²/s: α Δx² / (6 Δt) from the PIC
+/// fraction (Zhu and Bridson 2005) and U² Δt / 8 from the projection. Advected particles keep their
+/// energy, and the projection removes the divergent part of their field, Δt ∇p / ρ: half its square
+/// in each step, whose mean is U⁴ k² / 4, from an energy of U² / 4 that a viscosity ν reduces at
+/// the rate 4 ν k² (the loss described by Zehnder, Narain and Thomaszewski 2018).
 fn numerical_diffusion(scene: &Scene, substeps: u32, seconds: f64, square: f64) -> f64 {
     match scene.solver.method {
         Method::Pbf => f64::NAN,

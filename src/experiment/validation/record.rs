@@ -1,4 +1,4 @@
-//! What a benchmark keeps of each frame.
+//! Data of each frame that a benchmark needs.
 
 use glam::{DVec2, Vec3};
 
@@ -14,37 +14,37 @@ use swell_scene::{
 };
 use swell_stage::drive::Step;
 
-/// Part of the water that a front leaves behind: single particles that run ahead are none.
+/// Fraction of the water behind the front, so that single particles running ahead do not count.
 const FRONT: f64 = 0.995;
 
-/// Width of the bins that a depth over a dry bed is taken from, over the depth of the reservoir. Where the profile has its
-/// kink, a mean over it is 0.4 % of that depth off at T = 6.
+/// Width of the bins in which depths over a dry bed are measured, over the depth of the reservoir.
+/// At the kink of the profile, the mean over a bin is off by 0.4 % of that depth at T = 6.
 const BIN: f64 = 0.25;
 
-/// A frame.
+/// Data of a frame.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Row {
-    /// Seconds of the shot.
+    /// Time in seconds of the shot.
     pub(super) time: f64,
     /// Largest speed of a particle, m/s.
     pub(super) speed: f64,
-    /// At the probes of elevation, metres above the domain's floor.
+    /// Readings of the elevation probes, metres above the domain's floor.
     pub(super) levels: Vec<Option<f64>>,
-    /// At the probes of pressure, Pa.
+    /// Readings of the pressure probes, Pa.
     pub(super) pressures: Vec<Option<f64>>,
-    /// Along x at the probe of force, N; the start has none.
+    /// Force along x at the force probe, N; `None` at the start.
     pub(super) force: Option<f64>,
-    /// What the measure takes from the particles.
+    /// Values that the measure takes from the particles.
     pub(super) of_water: Vec<f64>,
 }
 
-/// Frames of a run.
+/// Data of all frames of a run.
 pub(super) struct Record<'a> {
     pub(super) benchmark: &'a Benchmark,
     pub(super) scene: &'a Scene,
-    /// The start first.
+    /// Frames, beginning with the initial state.
     pub(super) rows: Vec<Row>,
-    /// Of all frames.
+    /// Number of substeps over all frames.
     pub(super) substeps: u32,
 }
 
@@ -66,7 +66,7 @@ impl<'a> Record<'a> {
         record
     }
 
-    /// After each frame.
+    /// Adds a frame.
     pub(super) fn look(&mut self, step: &Step) {
         self.substeps += step.report.substeps;
         self.rows.push(Row {
@@ -79,7 +79,7 @@ impl<'a> Record<'a> {
         });
     }
 
-    /// Places of the probes of elevation, metres from the domain's least corner.
+    /// Positions of the elevation probes, metres from the domain's least corner.
     pub(super) fn gauges(&self) -> Vec<DVec2> {
         let corner = DVec2::new(self.scene.domain.min.x, self.scene.domain.min.z);
         let probes = self.scene.probes.iter();
@@ -106,7 +106,7 @@ impl<'a> Record<'a> {
         *looks.get(probe)?.first()?
     }
 
-    /// Frames of a tenth of a second.
+    /// Number of frames in a tenth of a second.
     fn every(&self) -> usize {
         ((0.1 * self.scene.shot.frames_per_second).round() as usize).max(1)
     }
@@ -121,7 +121,8 @@ impl<'a> Record<'a> {
         };
         let volume = self.scene.particle_spacing().powi(3);
         match self.benchmark.measure {
-            // The largest speed between the paddle and the last gauge: at the far wall waves double as they turn.
+            // Largest speed between the paddle and the last gauge, because waves double when they
+            // reflect at the far wall.
             Measure::RegularWaves => {
                 let last = self.gauges().iter().map(|at| at.x).fold(0.0, f64::max);
                 let speed = |v: &[f32; 3]| Vec3::from_array(*v).as_dvec3().length();
@@ -129,19 +130,21 @@ impl<'a> Record<'a> {
                 let seen = both.filter(|(x, _)| *x <= last);
                 vec![seen.map(|(_, v)| speed(v)).fold(0.0, f64::max)]
             }
-            // The front.
+            // Position of the front.
             Measure::DamBreak => {
                 let spacing = self.scene.particle_spacing();
                 let front = front(particles, spacing, 0, 1.0, FRONT);
                 front.map(|x| x - domain.min.x).into_iter().collect()
             }
-            // Depths of bins along x, from particles' volumes; narrower bins see the rows of particles.
+            // Depths of bins along x from the particles' volumes; narrower bins would resolve the
+            // rows of particles.
             Measure::DryBed => {
                 let bins = (domain.size().x / (BIN * scale.depth)).round();
                 let area = domain.size().x / bins * domain.size().z;
                 let mut depths = vec![0.0; bins as usize];
                 for x in along() {
-                    // Shared by the two bins about it, so that a row of particles does not go over at once.
+                    // Divided between the two nearest bins, so that a row of particles does not
+                    // cross a boundary at once.
                     let place = (x / domain.size().x * bins - 0.5).clamp(0.0, bins - 1.0);
                     let (bin, part) = (place as usize, place.fract());
                     depths[bin] += (1.0 - part) * volume / area;
@@ -151,11 +154,12 @@ impl<'a> Record<'a> {
                 }
                 depths
             }
-            // The volume, which takes as long as a frame: ten times a second.
+            // The volume, ten times per second because it takes as long as a frame.
             Measure::BlockImpact if self.rows.len().is_multiple_of(self.every()) => {
                 vec![volume_of(particles, self.scene.particle_spacing(), domain)]
             }
-            // 2/L ∫ η cos kx dx: of water that keeps its volume ∫ η cos kx dx is that of cos kx over all of it.
+            // 2/L ∫ η cos kx dx. As water keeps its volume, ∫ η cos kx dx is the integral of cos kx
+            // over all of it.
             Measure::StandingWave => {
                 let k = std::f64::consts::TAU / scale.length;
                 let sum: f64 = along().map(|x| (k * x).cos()).sum();

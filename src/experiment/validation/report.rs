@@ -1,4 +1,4 @@
-//! The table and the page of a validation study.
+//! Table and page of a validation study.
 
 use swell_scene::study::{
     RunsOn,
@@ -19,7 +19,7 @@ use super::{
     Judged, Run,
 };
 
-/// A benchmark with what became of its runs and its gates.
+/// A benchmark with its runs and the verdicts on its gates.
 type Result<'a> = (&'a Benchmark, Vec<Run>, Vec<Judged<'a>>);
 
 pub(super) fn draw(validation: &Validation, bench: &Bench<'_>, results: &[Result<'_>]) -> Report {
@@ -71,7 +71,7 @@ fn strings<'a>(cells: impl IntoIterator<Item = &'a str>) -> Vec<String> {
     cells.into_iter().map(str::to_owned).collect()
 }
 
-/// Solver and resolution, or that all of them are judged.
+/// Solver and resolution, or a note that the gate judges all runs.
 fn of_run(judged: &Judged<'_>) -> String {
     match (judged.run, judged.gate.method) {
         (Some(run), _) => run.name(),
@@ -105,7 +105,7 @@ fn measured(judged: &Judged<'_>, run: Option<&Run>) -> String {
     }
 }
 
-/// What a number of the benchmark is called.
+/// Title of a number of the benchmark.
 fn title(benchmark: &Benchmark, of: &str) -> &'static str {
     let numbers = benchmark.measure.numbers().iter();
     let mut named = numbers.filter(|(name, _)| *name == of);
@@ -136,7 +136,7 @@ fn parts(validation: &Validation, bench: &Bench<'_>, results: &[Result<'_>]) -> 
     parts
 }
 
-/// The answer in one table.
+/// Table of all verdicts.
 fn verdicts(results: &[Result<'_>]) -> Part {
     let mut rows = Vec::new();
     for result in results {
@@ -154,7 +154,7 @@ fn verdicts(results: &[Result<'_>]) -> Part {
                 other => other.words().to_owned(),
             };
             let cells = vec![
-                // A benchmark's name stands once, over its rows.
+                // Only the first row of a benchmark shows its name.
                 if k == 0 {
                     benchmark.name.clone()
                 } else {
@@ -205,7 +205,7 @@ fn tone(verdict: Verdict) -> Tone {
     }
 }
 
-/// Its curves beside published points, and every number of every run.
+/// Curves of a benchmark beside published points, and all numbers of all runs.
 fn of_benchmark(result: &Result<'_>) -> Vec<Part> {
     let (benchmark, runs, _) = result;
     let mut parts = vec![Part::Heading(benchmark.name.clone())];
@@ -245,8 +245,8 @@ fn of_benchmark(result: &Result<'_>) -> Vec<Part> {
     parts
 }
 
-/// With which power of the resolution the error falls, by solver, where two or more resolutions run and the number is
-/// published.
+/// Order of convergence of a number by solver, where it is published and there are at least two
+/// resolutions.
 fn orders(benchmark: &Benchmark, runs: &[Run], name: &str) -> String {
     let published = benchmark
         .gates
@@ -309,7 +309,7 @@ fn chart(
     (!chart.series.is_empty()).then(|| chart.to_svg())
 }
 
-/// What a gate judges: a number, or what its runs together say of it.
+/// Quantity that a gate judges: a number, or an order or spread over several runs.
 fn quantity(gate: &Gate) -> String {
     match gate.bound {
         Bound::OrderAtLeast(_) => format!("order of {}", gate.of),
@@ -318,7 +318,8 @@ fn quantity(gate: &Gate) -> String {
     }
 }
 
-/// A line for each gate of each run, and for each number that no gate judges.
+/// Rows of `results.csv`: one for each gate of each run, and one for each number that no gate
+/// judges.
 fn table(results: &[Result<'_>]) -> Vec<Vec<String>> {
     let titles = "benchmark,solver,resolution,device,quantity,measured,published,error,gate,verdict,source,known_failure,particles,frames,seconds,ended";
     let mut table = vec![strings(titles.split(','))];

@@ -1,4 +1,4 @@
-//! What a benchmark starts from, where that is more than blocks of water at rest.
+//! Initial states of benchmarks that need more than blocks of water at rest.
 
 use std::f64::consts::{PI, TAU};
 
@@ -10,7 +10,7 @@ use swell_scene::{
     study::validation::{Benchmark, Measure},
 };
 
-/// Moves the scene's particles to where the benchmark starts, and gives them its velocities.
+/// Moves the scene's particles to the initial state of the benchmark and sets their velocities.
 pub(super) fn prepare(benchmark: &Benchmark, scene: &Scene, particles: &mut Particles) {
     let (scale, corner) = (benchmark.scale, scene.domain.min);
     let at = |p: &[f32; 3]| Vec3::from_array(*p).as_dvec3() - corner;
@@ -39,8 +39,8 @@ pub(super) fn prepare(benchmark: &Benchmark, scene: &Scene, particles: &mut Part
     }
 }
 
-/// How far water of a standing wave at its highest is from where it is at rest: of linear theory, η = a cos kx, without
-/// divergence and without rotation.
+/// Displacement of the water of a standing wave at its highest from its position at rest: by linear
+/// theory with η = a cos kx, free of divergence and rotation.
 fn standing(x: DVec3, k: f64, depth: f64, amplitude: f64) -> DVec3 {
     let scale = amplitude / (k * depth).sinh();
     DVec3::new(
@@ -54,8 +54,8 @@ fn standing(x: DVec3, k: f64, depth: f64, amplitude: f64) -> DVec3 {
 mod tests {
     use super::*;
 
-    /// At the surface it is η; at the floor and the walls, crests of the wave, nothing goes through; and by central
-    /// differences it has no divergence.
+    /// The displacement is η at the surface, vanishes across the floor and the walls, which are at
+    /// crests of the wave, and is free of divergence by central differences.
     #[test]
     fn a_standing_wave_starts_as_linear_theory_has_it() {
         let (length, depth, amplitude) = (3.0, 1.0, 0.05);
@@ -68,7 +68,7 @@ mod tests {
             for y in [0.2, 0.7] {
                 let dx = (of(x + h, y).x - of(x - h, y).x) / (2.0 * h);
                 let dy = (of(x, y + h).y - of(x, y - h).y) / (2.0 * h);
-                // Differences of second order: k³ a h².
+                // Second-order differences: k³ a h².
                 assert!((dx + dy).abs() < 1e-8, "{dx} {dy}");
                 assert!(x == 0.0 || x == 1.5 || (dx - dy).abs() > 1e-4, "control");
             }

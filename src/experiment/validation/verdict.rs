@@ -1,26 +1,27 @@
-//! How a benchmark's gates come out.
+//! Judges the gates of a benchmark.
 
 use swell_scene::study::validation::{Benchmark, Bound, Gate, Trial};
 use swell_study::waves;
 
 use super::{super::stability::Verdict, Run};
 
-/// A gate with what it judges, and how that came out.
+/// A gate with its verdict on one or several runs.
 #[derive(Clone, Debug)]
 pub struct Judged<'a> {
-    /// What it has to be.
+    /// The gate.
     pub gate: &'a Gate,
-    /// The run; `None` where it judges all of its solver's.
+    /// Run that the gate judges; `None` where it judges all runs of its solver.
     pub run: Option<&'a Trial>,
-    /// What was measured: the number, the order, or by how much runs differ. `None` where it is no number.
+    /// Measured number, order of convergence or spread; `None` where it could not be determined.
     pub measured: Option<f64>,
-    /// measured / published − 1.
+    /// Relative error: measured / published − 1.
     pub error: Option<f64>,
-    /// How it came out.
+    /// Verdict on the gate.
     pub verdict: Verdict,
 }
 
-/// Each gate with each run that it judges, in the order of the file. A run that ended early passes none.
+/// Judges each gate with each of its runs, in the order of the file. A run that ended early passes
+/// no gate.
 pub fn judge<'a>(benchmark: &'a Benchmark, runs: &[Run]) -> Vec<Judged<'a>> {
     let mut judged = Vec::new();
     for gate in &benchmark.gates {
@@ -46,7 +47,7 @@ pub fn judge<'a>(benchmark: &'a Benchmark, runs: &[Run]) -> Vec<Judged<'a>> {
     judged
 }
 
-/// Order of the error, or spread of the numbers, of (resolution, number).
+/// Order of convergence or spread over pairs of resolution and number.
 fn over_all(gate: &Gate, numbers: &[(f64, f64)]) -> Option<f64> {
     match gate.bound {
         Bound::OrderAtLeast(_) => match gate.published {
@@ -78,7 +79,7 @@ impl<'a> Judged<'a> {
             Bound::AtMost(most) | Bound::AgreeWithin(most) => measured <= most,
             Bound::AtLeast(least) | Bound::OrderAtLeast(least) => measured >= least,
         });
-        // What gives no number may have failed in any way, of which nothing is known.
+        // Without a number the failure may have any cause, so it does not count as a known one.
         let is_known = gate.known_failure.is_some() && measured.is_some();
         Self {
             gate,
@@ -139,14 +140,14 @@ mod tests {
         let (verdict, order) = of([0.04, 0.01, 0.0025]);
         assert_eq!(verdict, Verdict::Passes);
         assert!((order - 2.0).abs() < 1e-9, "{order}");
-        // Whatever they come to.
+        // The order does not depend on the limit that the values converge to.
         let (verdict, order) = of([0.06, 0.03, 0.0225]);
         assert_eq!(verdict, Verdict::Passes);
         assert!((order - 2.0).abs() < 1e-9, "{order}");
         let (verdict, order) = of([0.04, 0.02, 0.01]);
         assert_eq!(verdict, Verdict::Misses);
         assert!((order - 1.0).abs() < 1e-9, "{order}");
-        // With a published number, of what they are off it.
+        // With a published number, the order is that of the errors relative to it.
         let mut benchmark = benchmark.clone();
         benchmark.gates[0].published = Some(c);
         let runs = runs(
@@ -161,7 +162,7 @@ mod tests {
     fn a_gate_judges_its_solver_alone_and_a_run_that_ended_early_passes_none() {
         let mut benchmark = benchmark("solitary wave over 20 depths");
         benchmark.gates.retain(|gate| gate.of == "celerity");
-        // FLIP's gate is 2 %, PBF's 3 %: both runs are 2.5 % slow.
+        // FLIP's gate is 2 %, PBF's is 3 %, and both runs are 2.5 % slow.
         let mut runs = runs(&[3.431 * 0.975; 2], "celerity");
         let verdicts = |benchmark: &Benchmark, runs: &[Run]| -> Vec<Verdict> {
             judge(benchmark, runs)
@@ -184,7 +185,7 @@ mod tests {
             .numbers
             .insert("celerity".to_owned(), 3.431);
         assert_eq!(verdicts(&benchmark, &runs)[0], Verdict::PassesUnexpectedly);
-        // What is no number is missed, whatever is known.
+        // A missing number fails the gate even if a failure is known.
         runs[0].measured.numbers.clear();
         assert_eq!(verdicts(&benchmark, &runs)[0], Verdict::Misses);
         benchmark.gates[0].known_failure = None;
