@@ -1,5 +1,5 @@
-// The channels that stand beside the picture, by rays: what the ray through a pixel's centre meets first, and the water on the
-// straight line of sight.
+// Additional channels by ray casting: the first hit of the ray through a pixel's centre, and the
+// water along the straight line of sight.
 #import "shared/camera.wgsl"
 #import "shared/ssfr_band.wgsl"
 #import "shared/ssfr_splat.wgsl"
@@ -32,10 +32,10 @@
 @group(0) @binding(14) var<storage, read> sea_values: array<vec4f>;
 #endif
 
-// Surfaces on a line of sight, at most.
+// Largest number of surfaces along a line of sight.
 const MOST_SURFACES: i32 = 32;
 
-// Metres of water on a straight line up to what is opaque.
+// Metres of water on a straight line up to opaque geometry.
 fn water_along(start: vec3f, direction: vec3f) -> f32 {
     var origin = start;
     var inside = is_wet(origin);

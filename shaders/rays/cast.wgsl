@@ -1,4 +1,5 @@
-// One sample of the picture by rays: sky, ground and solids, the water and what is seen in and through it.
+// One sample of the picture by ray casting: sky, ground and solids, and the water with everything
+// visible in and through it.
 #import "shared/camera.wgsl"
 #import "shared/ssfr_band.wgsl"
 #import "shared/rays_light.wgsl"
@@ -23,7 +24,7 @@
 @group(0) @binding(13) var<storage, read_write> output: array<vec4f>;
 #ifdef VOLUME
 @group(0) @binding(14) var<storage, read> spray: array<u32>;
-// Depth of what each ray meets first.
+// Depth of the first hit of each ray.
 @group(0) @binding(15) var<storage, read> first_depth: array<f32>;
 @group(0) @binding(16) var<storage, read> cloud_words: array<u32>;
 @group(0) @binding(20) var<uniform> spray_params: SprayParams;
@@ -42,8 +43,8 @@
 #endif
 
 #ifdef VOLUME
-// Radiance over their cover of drops that were splatted before what the eye's ray meets at `end`: how much of the sun comes to them
-// is known from the grid. Where the grid has none, they are seen at `mean`.
+// Radiance over coverage of drops splatted in front of the eye ray's hit at `end`. The grid gives
+// the fraction of sunlight that reaches them; where it has no drops, they are lit as at `mean`.
 fn drops_before(direction: vec3f, mean: f32, end: f32, optical_depth: f32) -> vec3f {
     let passed = cloud_along(camera.position, direction, 0.0, min(end, endless()) + cloud.skin, DROPS);
     var far = mean;
@@ -72,7 +73,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let inside = is_wet(camera.position);
     own_place = hash2(vec2i(vec2f(pixel) - camera.corner) + vec2i(7919 * i32(camera.sample_index), 0));
 #ifdef VOLUME
-    // What the ray meets first is known; in air it is taken up a little before.
+    // The first hit is known; in air, tracing starts just before it.
     let known = first_depth[pixel.y * camera.size.x + pixel.x];
     let start = select(max(known * length(ray) - 2.0 * rays.voxel, 0.0), 0.0, inside || known >= FAR);
     let reach = select(known * length(ray) - start + 2.0 * rays.voxel, 0.0, known >= FAR);

@@ -1,4 +1,5 @@
-// Where rays from the sun, a lattice of them over a level plane, first meet the water.
+// First intersections with the water of a lattice of rays from the sun that begins in a horizontal
+// plane.
 #import "shared/camera.wgsl"
 #import "shared/caustics_sides.wgsl"
 #import "shared/caustics.wgsl"
@@ -10,7 +11,7 @@
 @group(0) @binding(4) var<storage, read> level_values: array<f32>;
 @group(0) @binding(5) var<storage, read> set_nodes: array<SetNode>;
 @group(0) @binding(6) var<storage, read> set_triangles: array<Triangle>;
-// Normal, none of it at a side of the box, and the distance just after the surface; FAR where there is none.
+// Normal, zero at a side of the box, and the distance just after the surface; FAR without a hit.
 @group(0) @binding(7) var<storage, read_write> sun_rays: array<vec4f>;
 #ifdef SEA
 @group(0) @binding(8) var<uniform> sea: Sea;
@@ -26,7 +27,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let origin = vec3f(at.x, caustics.top, at.y);
     var entry = vec4f(0.0, 1.0, 0.0, FAR);
     if opaque_along(origin, caustics.towards, FAR).kind != OPAQUE {
-        // Waves of the sea that a ray's width cannot hold are left out.
+        // Leaves out waves of the sea that the spacing of the rays cannot resolve.
         let found = trace(origin, -caustics.towards, false, caustics.spacing * camera.focal, FAR);
         if found.kind == WATER {
             let p = origin - caustics.towards * found.after;

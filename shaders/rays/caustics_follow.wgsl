@@ -1,4 +1,4 @@
-// From where the sun's rays meet the water to what is opaque below it.
+// Traces the sun's rays from where they enter the water to opaque geometry below.
 #import "shared/camera.wgsl"
 #import "shared/ssfr_optics.wgsl"
 #ifdef RIPPLES
@@ -15,16 +15,16 @@
 @group(0) @binding(5) var<storage, read> set_nodes: array<SetNode>;
 @group(0) @binding(6) var<storage, read> set_triangles: array<Triangle>;
 @group(0) @binding(7) var<storage, read> sun_rays: array<vec4f>;
-// Place in the map, part of the light that flat water would bring (0 = lost), layer.
+// Position in the map, light relative to that through flat water (0 = lost), layer.
 @group(0) @binding(8) var<storage, read_write> sun_hits: array<vec4f>;
 #ifdef SEA
 @group(0) @binding(9) var<uniform> sea: Sea;
 @group(0) @binding(10) var<storage, read> sea_values: array<vec4f>;
 #endif
 
-// Surfaces on a ray's way, at most.
+// Largest number of surfaces along a ray.
 const MOST_SURFACES: i32 = 8;
-// Places on either side at which a normal is smoothed, and how many lie within a standard deviation.
+// Number of taps on either side when smoothing a normal, and number of taps per standard deviation.
 const SIDE: i32 = 6;
 const FINENESS: f32 = 2.5;
 
@@ -33,13 +33,13 @@ fn place_of(at: vec2i, t: f32) -> vec3f {
     return vec3f(start.x, caustics.top, start.y) - caustics.towards * t;
 }
 
-// The mean of normals about a ray's, Gaussian in the rays' plane. What lies off the ray's own tangent plane by more than the width, or
-// is turned from it by more than 60°, is another surface.
+// Gaussian mean of the normals around a ray's, in the plane of the rays. Entries off the ray's
+// tangent plane by more than the width, or turned by more than 60°, belong to another surface.
 fn smooth_normal(at: vec2i, own: vec4f) -> vec3f {
     let step = max(i32(round(caustics.width / (FINENESS * caustics.spacing))), 1);
     let scale = caustics.spacing / max(caustics.width, 1e-6);
     let p = place_of(at, own.w);
-    // A width of less than half a ray's spacing smooths nothing.
+    // A width below half the spacing of the rays smooths nothing.
     let side = select(SIDE, 0, scale > 2.0);
     var sum = own.xyz;
     for (var j = -side; j <= side; j++) {
@@ -61,7 +61,7 @@ fn smooth_normal(at: vec2i, own: vec4f) -> vec3f {
     return normalize(sum);
 }
 
-// Ripples ride on what faces up, as in ssfr_facet.
+// Ripples act on surfaces that face up, as in ssfr_facet.
 fn rippled(p: vec3f, n: vec3f) -> vec3f {
 #ifdef RIPPLES
     let ripple = ripple_at(p.xz, camera.clock, caustics.ripple.x, caustics.ripple.y, caustics.spacing);
@@ -74,13 +74,14 @@ fn rippled(p: vec3f, n: vec3f) -> vec3f {
 
 struct Bent {
     direction: vec3f,
-    // 0 where all is thrown back.
+    // Transmitted fraction; 0 for total reflection.
     part: f32,
 }
 
-// Snell and Fresnel; `normal` is on the side where the ray comes from, and `level` that of the surface as it is met again.
+// Refraction by Snell and Fresnel; `normal` is on the side the ray comes from, and `level` is the
+// geometric normal, which the next intersection sees.
 fn bent_at(direction: vec3f, normal: vec3f, level: vec3f, index: f32) -> Bent {
-    // No facet that is met faces away.
+    // Facets never face away from the ray.
     let n = normalize(normal - direction * max(0.03 + dot(normal, direction), 0.0) * 1.5);
     let refracted = refract(direction, n, 1.0 / index);
     if dot(refracted, refracted) < 0.25 {
@@ -91,8 +92,9 @@ fn bent_at(direction: vec3f, normal: vec3f, level: vec3f, index: f32) -> Bent {
     return Bent(normalize(refracted - level * sinks), 1.0 - fresnel(facing, index));
 }
 
-// Where a ray that meets a side of the box at `p` would come through it if the water went on there, level from the height at which it
-// stands at the side: of x and z, those of the sun's ways in air and in water differ. Below the floor where it does not.
+// For a ray that meets a side of the box at `p`: the point at which it would enter through that
+// side if the water continued beyond at its level there, given the different slopes of sunlight in
+// air and in water. Below the floor where there is no such point.
 fn through_side(p: vec3f) -> vec3f {
     let surface = crossing(p, vec3f(0.0, 1.0, 0.0), 0.0, rays.size.y - p.y, true);
     let sides = min(p.xz, rays.size.xz - p.xz);
@@ -140,7 +142,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
             }
             continue;
         }
-        // Light goes on through the box's sides, as it comes in.
+        // Light leaves through the box's sides as it enters.
         if is_cut(found, origin + direction * found.t) {
             is_open = false;
             continue;

@@ -1,4 +1,5 @@
-// The sums of the sun's light become values, behind the lattice of the sun's ways through water.
+// Converts the sums of the sun's light to values, stored after the lattice of sun paths through
+// water.
 #import "shared/caustics_sums.wgsl"
 #import "shared/caustics.wgsl"
 

@@ -1,5 +1,6 @@
-// Spreads the light between four neighbouring rays of the sun over the map: where they land together, over the quad between them; where
-// they part, a quarter of it about each of them. No light is lost or gained on the way.
+// Spreads the light between four neighbouring rays of the sun over the map: over the quad between
+// their landing points or, where the rays separate, a quarter of it around each of them. Light is
+// conserved.
 #import "shared/caustics.wgsl"
 #import "shared/caustics_sums.wgsl"
 
@@ -7,12 +8,12 @@
 @group(0) @binding(1) var<storage, read> sun_hits: array<vec4f>;
 @group(0) @binding(2) var<storage, read_write> light_sums: array<atomic<u32>>;
 
-// Rays that land so many times farther apart than in flat water have parted.
+// Distance of landing points, relative to that in flat water, from which rays count as separated.
 const PARTED: f32 = 6.0;
-// Points of a quad along each side, at most.
+// Largest number of points along each side of a quad.
 const MOST_POINTS: f32 = 32.0;
 
-// Adds light at a place to the four texels about it.
+// Distributes light at a position to the four surrounding texels.
 fn add_light(place: vec2f, light: f32, layer: u32) {
     let q = place - 0.5;
     let low = floor(q);
@@ -33,9 +34,9 @@ fn longest(a: vec2f, b: vec2f) -> f32 {
     return max(most.x, most.y);
 }
 
-// Adds the light of a quad: places of corners (0, 0), (1, 0), (0, 1), (1, 1), and their light.
+// Adds the light of a quad with corners (0, 0), (1, 0), (0, 1), (1, 1) and their light.
 fn add_quad(corners: array<vec2f, 4>, lights: vec4f, layer: u32) {
-    // Two points a texel along each side: evenly lit ground is even up to a thousandth.
+    // Two points per texel along each side, so that evenly lit ground is even to a thousandth.
     let across = longest(corners[1] - corners[0], corners[3] - corners[2]);
     let up = longest(corners[2] - corners[0], corners[3] - corners[1]);
     let points = clamp(ceil(2.0 * vec2f(across, up) - 1e-3), vec2f(1.0), vec2f(MOST_POINTS));
@@ -59,7 +60,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let at = id.y * caustics.rays.x + id.x;
     let hits = array<vec4f, 4>(
         sun_hits[at], sun_hits[at + 1u], sun_hits[at + caustics.rays.x], sun_hits[at + caustics.rays.x + 1u]);
-    // Texels between rays in flat water, and the light of the quad, where a texel's is 1.
+    // Texels between rays in flat water, and the light of the quad in units of a texel's.
     let edge = caustics.step / caustics.texel;
     let lights = vec4f(hits[0].z, hits[1].z, hits[2].z, hits[3].z) * edge.x * edge.y;
     let layers = vec4f(hits[0].w, hits[1].w, hits[2].w, hits[3].w);

@@ -1,4 +1,4 @@
-// Depth of the first thing that each ray of the padded frame meets, for what is drawn before it.
+// Depth of the first hit of the ray through each padded pixel, for splats in front of it.
 #import "shared/camera.wgsl"
 #import "shared/rays_trace.wgsl"
 
@@ -8,11 +8,11 @@
 @group(0) @binding(3) var<storage, read> level_values: array<f32>;
 @group(0) @binding(4) var<storage, read> set_nodes: array<SetNode>;
 @group(0) @binding(5) var<storage, read> set_triangles: array<Triangle>;
-// Of the water, or FAR, and of what is opaque before it, or FAR.
+// Depth of the water, or FAR, and of opaque geometry in front of it, or FAR.
 @group(0) @binding(6) var<storage, read_write> depth: array<f32>;
 @group(0) @binding(7) var<storage, read_write> solid_depth: array<f32>;
 #ifdef SPRAY
-// Of either.
+// Depth of either.
 @group(0) @binding(10) var<storage, read_write> first_depth: array<f32>;
 #endif
 #ifdef SEA

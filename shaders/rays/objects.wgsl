@@ -1,4 +1,4 @@
-// What each ray of a sample meets first, and the part of it that spray covers.
+// Object of the first hit of each ray of a sample, and the fraction that spray covers.
 #import "shared/camera.wgsl"
 #import "shared/ssfr_band.wgsl"
 #import "shared/rays_trace.wgsl"

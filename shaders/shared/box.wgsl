@@ -1,10 +1,11 @@
-// Rays and the box that holds the simulated water, from the origin on.
+// Intersection of rays with an axis-aligned box that begins at the origin.
 
 fn safe_inverse(d: vec3f) -> vec3f {
     return 1.0 / select(d, vec3f(1e-9), abs(d) < vec3f(1e-9));
 }
 
-// Distances at which a ray comes into a box of `size` and leaves it; the second is less where it misses.
+// Distances at which a ray enters and leaves a box of `size`; the second is less than the first
+// where the ray misses.
 fn span_of(size: vec3f, origin: vec3f, direction: vec3f) -> vec2f {
     let inverse = safe_inverse(direction);
     let a = -origin * inverse;

@@ -1,5 +1,5 @@
-// The map of bent sunlight as it is read. Needs the bindings `caustics`, `sun_paths` and those of rays_water and rays_set of whoever
-// imports it.
+// Lookup in the caustics map. The importing shader must bind `caustics`, `sun_paths` and the
+// bindings of rays_water and rays_set.
 #import "shared/caustics_layer.wgsl"
 
 fn caustic_value(layer: u32, texel: vec2i) -> f32 {
@@ -7,10 +7,10 @@ fn caustic_value(layer: u32, texel: vec2i) -> f32 {
     return sun_paths[caustics.start + (layer * caustics.size.y + at.y) * caustics.size.x + at.x];
 }
 
-// Places along each side of a pixel's footprint at which the map is read, at most.
+// Largest number of taps along each side of a pixel's footprint.
 const MOST_TAPS: i32 = 4;
 
-// Bilinear; `place` is in texels.
+// Bilinear lookup; `place` is in texels.
 fn caustic_between(layer: u32, place: vec2f) -> f32 {
     let q = place - 0.5;
     let low = floor(q);
@@ -21,11 +21,12 @@ fn caustic_between(layer: u32, place: vec2f) -> f32 {
     return mix(near, far, part.y);
 }
 
-// Sunlight through water on a level face at `p`, over that through flat water; `n` is the normal of what stands there. The mean over a
-// pixel of `footprint` metres: lines of light are finer than pixels.
+// Sunlight through water on a level face at `p`, relative to that through flat water, as the mean
+// over a pixel of `footprint` metres, because caustics are finer than pixels; `n` is the surface
+// normal.
 fn caustic_at(p: vec3f, n: vec3f, footprint: f32) -> f32 {
     let layer = caustic_layer(p, n);
-    // At the box's sides the map's light ends within a texel: it is read where no part of it is lost.
+    // The map's light fades out within a texel at the box's sides; the lookup stays away from them.
     var inner = p;
     if caustics.fade <= 0.0 {
         let inset = min(vec2f(1.5 * caustics.texel + 0.5 * footprint), 0.5 * rays.size.xz);
@@ -43,7 +44,7 @@ fn caustic_at(p: vec3f, n: vec3f, footprint: f32) -> f32 {
     return sum / f32(taps * taps);
 }
 
-// The part of a place's light that the map has.
+// Fraction of a point's light that comes from the map.
 fn caustic_part(p: vec3f) -> f32 {
     if caustics.fade <= 0.0 {
         return 1.0;

@@ -1,2 +1,3 @@
-// Fixed point of the map's sums: integer atomics add up to the same bits in any order. They hold 16384 times the light of flat water.
+// Fixed-point scale of the map's sums: integer atomics give the same bits in any order. A sum holds
+// up to 16384 times the light of flat water.
 const LIGHT_SCALE: f32 = 262144.0;

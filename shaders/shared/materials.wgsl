@@ -1,34 +1,36 @@
-// Colours and pictures of solids. Needs the bindings `camera`, `set_triangles`, `materials` and `solid_texels` of whoever imports it.
+// Colours and textures of solids. The importing shader must bind `camera`, `set_triangles`,
+// `materials` and `solid_texels`.
 
 struct Material {
     colour: vec3f,
-    // 1 where rows of windows may be.
+    // 1 where the material may have rows of windows.
     windows: f32,
-    // Of its picture: place of the first texel in `solid_texels`, counted row by row, and texels along each side.
+    // Texture: index of the first texel in `solid_texels`, counted row by row, and size in texels.
     first: u32,
     size_x: u32,
     size_y: u32,
-    // The picture itself and its smaller versions; 0 = no picture.
+    // Number of mip levels including the picture itself; 0 without a texture.
     levels: u32,
 }
 
-// Texels that a footprint is cut into along its longer side, at most.
+// Largest number of taps along the longer side of a footprint.
 const MOST_TAPS: f32 = 8.0;
 
-// A texel of the row that all pictures and their smaller versions make up, linear.
-// A row of the texture has a power of two of them: adapters that divide lane by lane take longer over that than over all the rest.
+// Linear texel from the sequence of all pictures and their mip levels. The texture's rows have a
+// power of two of texels, because division takes longer than everything else on adapters that
+// divide lane by lane.
 fn solid_texel(index: u32) -> vec3f {
     let across = textureDimensions(solid_texels).x;
     let place = vec2u(index & (across - 1u), index >> firstTrailingBit(across));
     return textureLoad(solid_texels, place, 0).rgb;
 }
 
-// A level between texels, repeated; `at` in pictures, rows from the top.
+// Bilinear lookup in a repeating mip level; `at` is in pictures, with rows from the top.
 fn level_at(first: u32, size: vec2u, at: vec2f) -> vec3f {
     let p = fract(at) * vec2f(size) - 0.5;
     let low = floor(p);
     let part = p - low;
-    // From -1 on.
+    // `low` may be -1.
     let a = select(vec2u(low), size - 1u, low < vec2f(0.0));
     let b = select(a + 1u, vec2u(0u), a + 1u >= size);
     let above = mix(solid_texel(first + a.y * size.x + a.x), solid_texel(first + a.y * size.x + b.x), part.x);
@@ -36,7 +38,8 @@ fn level_at(first: u32, size: vec2u, at: vec2f) -> vec3f {
     return mix(above, below, part.y);
 }
 
-// A level and the one that is half its size: where they begin and their sizes, and how far a width is towards the second one.
+// Two successive mip levels: their offsets and sizes, and the interpolation weight of the second
+// one.
 struct Levels {
     first: u32,
     size: vec2u,
@@ -45,7 +48,7 @@ struct Levels {
     part: f32,
 }
 
-// Those of texels that are about `width` texels of the picture wide (Williams 1983).
+// Levels for texels about `width` texels of the picture wide (Williams 1983).
 fn levels_for(material: Material, width: f32) -> Levels {
     let level = clamp(log2(max(width, 1.0)), 0.0, f32(material.levels - 1u));
     var first = material.first;
@@ -57,13 +60,14 @@ fn levels_for(material: Material, width: f32) -> Levels {
     return Levels(first, size, first + size.x * size.y, max(size / 2u, vec2u(1u)), fract(level));
 }
 
-// Samples from which on each takes one of the two levels, as many the second one as it counts.
+// Number of samples from which each one reads a single level; the share of samples that read the
+// second one equals its weight.
 const SHARED: u32 = 4u;
 
-// Loops ask at their end too whether they go on, as in ssfr/shade.
+// The loop also tests its condition at the end, as in ssfr/shade.
 fn picture_at(levels: Levels, at: vec2f) -> vec3f {
-    // One level alone needs no second. That this is asked also keeps lavapipe from compiling the pass again for each sample
-    // (docs/performance.md).
+    // A single level suffices where the weight is 0. This test also keeps lavapipe from compiling
+    // the pass again for each sample (docs/performance.md).
     let count = select(2u, 1u, sample_count(camera) >= SHARED || levels.part == 0.0);
     let share = fract((f32(camera.sample_index) + 0.5) * 0.618034);
     var sum = vec3f(0.0);
@@ -83,7 +87,7 @@ fn picture_at(levels: Levels, at: vec2f) -> vec3f {
     return sum;
 }
 
-// What a triangle of the set is painted with, from 1 on; 0 has the look's own colour.
+// Number of a triangle's material, from 1; 0 for the look's own colour.
 fn paint_of(triangle: u32) -> u32 {
     if triangle == NO_TRIANGLE {
         return 0u;
@@ -91,15 +95,16 @@ fn paint_of(triangle: u32) -> u32 {
     return set_triangles[triangle].paint;
 }
 
-// Reflectance of a painted triangle at `p`. A pixel there is `footprint` wide across the line of sight, and longer on a face that is
-// seen at a slant: that way it is the mean of several places.
+// Reflectance of a textured triangle at `p`. A pixel's footprint there is `footprint` wide across
+// the line of sight and elongated along it on slanted faces, where several taps are averaged.
 fn painted(triangle: u32, p: vec3f, n: vec3f, view: vec3f, footprint: f32) -> vec3f {
     let face = set_triangles[triangle];
     let material = materials[face.paint - 1u];
     if material.levels == 0u {
         return material.colour;
     }
-    // How the picture lies: `a` and `b` are how fast its two coordinates change, `c` is where they are the numbers beside them.
+    // Texture mapping: `a` and `b` are the gradients of the two coordinates, whose values at `c`
+    // are the words beside them.
     let lie = set_triangles[face.place];
     let from_c = p - lie.c;
     let at = vec2f(
@@ -125,7 +130,7 @@ fn painted(triangle: u32, p: vec3f, n: vec3f, view: vec3f, footprint: f32) -> ve
     let taps = clamp(ceil(length_of / max(length(short * size), 1.0)), 1.0, MOST_TAPS);
     let width = max(length(short * size), length_of / taps);
     let levels = levels_for(material, width);
-    // Each sample takes its part of them, between those of the others.
+    // The samples divide the taps among themselves, interleaved.
     let samples = f32(sample_count(camera));
     let own = ceil(taps / samples);
     let part = (f32(camera.sample_index) + 0.5) / samples;

@@ -13,7 +13,7 @@ struct Phase {
 }
 @group(0) @binding(6) var<uniform> phase: Phase;
 
-// Copies of uniforms that inner loops read: llvmpipe does not hoist uniform loads out of a loop.
+// Copies of uniforms for inner loops: llvmpipe does not hoist uniform loads out of loops.
 var<private> fluid_count: u32;
 var<private> inverse_h: f32;
 

@@ -1,42 +1,43 @@
-// Drops and bubbles as a sparse grid of optical density (`Cloud` of domain/cloud.rs), and what a ray meets of them. Needs the bindings
-// `cloud`, `cloud_words` and `shading` of whoever imports it.
+// Drops and bubbles as a sparse grid of optical density (`Cloud` of domain/cloud.rs), and their
+// integration along rays. The importing shader must bind `cloud`, `cloud_words` and `shading`.
 #import "shared/box.wgsl"
 
 struct Cloud {
-    // Least corner, metres from the domain's.
+    // Least corner, metres from the domain's least corner.
     corner: vec3f,
     // Edge length of a voxel, metres.
     voxel: f32,
-    // Along each axis.
+    // Number of bricks along each axis.
     bricks: vec3u,
-    // How far behind the water's surface a ray still meets what floats on it, metres.
+    // Depth behind the water's surface at which a ray still meets what floats on it, metres.
     skin: f32,
-    // Of the lattice of optical depths towards the sun, along each axis.
+    // Number of nodes along each axis of the lattice of optical depths towards the sun.
     nodes: vec3u,
-    // Metres between them.
+    // Distance between the nodes, metres.
     pitch: f32,
 }
 
-// Voxels along a brick's edge, its nodes, and values.
+// Voxels and nodes along a brick's edge, and values per brick.
 const CLOUD_EDGE: u32 = 8u;
 const CLOUD_NODES: u32 = 9u;
 const CLOUD_VALUES: u32 = 729u;
-// In the table, of a brick that has drops; twice that of one that has bubbles.
+// Flag in the table of a brick with drops; twice that for bubbles.
 const HAS_DROPS: u32 = 0x40000000u;
-// Bricks on a ray's way, at most: more than three edges of the largest grid.
+// Largest number of bricks along a ray: more than three edges of the largest grid.
 const MOST_BRICKS: i32 = 4096;
-// Optical depth behind which nothing is seen.
+// Optical depth behind which nothing is visible.
 const DEEPEST: f32 = 12.0;
-// What a grid has of each.
+// Index of each kind in the grid's values.
 const DROPS: u32 = 0u;
 const BUBBLES: u32 = 1u;
 
-// What a way through drops meets.
+// Result of integrating drops or bubbles along a ray.
 struct Passed {
-    // Optical depth, and what of it hides: 1 − exp(−depth).
+    // Optical depth, and the coverage 1 − exp(−depth).
     depth: f32,
     cover: f32,
-    // Sums over what is met and seen, of the part of the sunlight that comes to it, and of its distance.
+    // Sums, weighted by visible coverage, of the fraction of sunlight that arrives and of the
+    // distance.
     lit: f32,
     far: f32,
 }
@@ -45,7 +46,8 @@ fn cloud_words_before_values() -> u32 {
     return cloud.bricks.x * cloud.bricks.y * cloud.bricks.z + cloud.nodes.x * cloud.nodes.y * cloud.nodes.z;
 }
 
-// Of half precision: its bits, shifted to where those of f32 stand, are the number times 2⁻¹¹².
+// Decodes a half-precision value: its bits, shifted to their positions in an f32, represent the
+// number times 2⁻¹¹².
 fn cloud_value(at: u32, kind: u32) -> f32 {
     let bits = cloud_words[at] >> (16u * kind) & 0x7fffu;
     return bitcast<f32>(bits << 13u) * 5.192296858534828e33;
@@ -74,8 +76,8 @@ fn shade_node(c: vec3u) -> f32 {
     return bitcast<f32>(cloud_words[table + (c.z * cloud.nodes.y + c.y) * cloud.nodes.x + c.x]);
 }
 
-// Optical depth of drops and bubbles between a place and the sun: trilinear between the lattice's nodes; from beyond the grid, where
-// the way to the sun comes into it.
+// Optical depth of drops and bubbles between a point and the sun, trilinear between the lattice's
+// nodes; a point beyond the grid takes the value at which its path to the sun enters the grid.
 fn cloud_sun_depth(p: vec3f) -> f32 {
     let size = vec3f(cloud.bricks * CLOUD_EDGE) * cloud.voxel;
     let local = p - cloud.corner;
@@ -100,7 +102,8 @@ fn cloud_sun_depth(p: vec3f) -> f32 {
     return depth;
 }
 
-// What of one kind a ray meets between two distances: brick by brick, a voxel or a little less a step in those that hold some.
+// Integrates one kind between two distances along a ray, brick by brick, with steps of at most a
+// voxel in bricks that hold some.
 fn cloud_along(origin: vec3f, direction: vec3f, from_t: f32, to_t: f32, kind: u32) -> Passed {
     let edge = f32(CLOUD_EDGE) * cloud.voxel;
     let start = origin - cloud.corner;
@@ -110,7 +113,7 @@ fn cloud_along(origin: vec3f, direction: vec3f, from_t: f32, to_t: f32, kind: u3
     var t = max(span.x, from_t);
     var passed = Passed(0.0, 0.0, 0.0, 0.0);
     for (var i = 0; i < MOST_BRICKS && t < end && passed.depth < DEEPEST; i++) {
-        // Just behind the side through which it comes in.
+        // A point just inside the side through which the ray enters.
         let inner = start + direction * (t + 1e-3 * cloud.voxel);
         let brick = vec3u(clamp(inner / edge, vec3f(0.0), vec3f(cloud.bricks) - 0.5));
         let corner = vec3f(brick) * edge;

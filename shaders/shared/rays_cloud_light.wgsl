@@ -1,20 +1,22 @@
-// Light that drops and bubbles on a ray's way scatter along it. Needs what rays_light.wgsl needs.
+// Light that drops and bubbles along a ray scatter towards its origin. Needs the bindings of
+// rays_light.wgsl.
 #import "shared/rays_cloud.wgsl"
 #import "shared/ssfr_spray_light.wgsl"
 
-// Radiance over irradiance, deep in the light, of a white body whose light goes as Lommel and Seeliger say, so that a ball of it gives
-// back all that it takes: 3 / (8 π (1 − ln 2)).
+// Radiance over irradiance of a fully lit white body with Lommel–Seeliger scattering, scaled so
+// that a sphere of it reflects all light: 3 / (8 π (1 − ln 2)).
 const WHITE_BODY: f32 = 0.38899;
 
-// Per steradian, of sunlight that comes to drops. As `cloud_phase`, but that the way through them shades a thick cloud, and not the
-// phase of a ball that shades itself.
+// Sunlight scattered by drops, 1/sr. Like `cloud_phase`, but the path through the drops shades a
+// thick cloud instead of the phase function of a self-shadowing sphere.
 fn shaded_phase(cosine: f32, optical_depth: f32) -> f32 {
     let onward = mix(AHEAD, BACK, BACKWARD);
     let often = mix(WHITE_BODY, 0.25 / PI, unmet((1.0 - onward) * optical_depth));
     return mix(often, drop_phase(-cosine), unmet(CLUMPED * optical_depth));
 }
 
-// Radiance over their cover of drops in air; `lit` is the part of the sunlight that other drops let through to them.
+// Radiance over coverage of drops in air; `lit` is the transmittance of other drops for the
+// sunlight that reaches them.
 fn drops_radiance(position: vec3f, view: vec3f, optical_depth: f32, lit: f32) -> vec3f {
     let phase = shaded_phase(dot(view, shading.sun_direction), optical_depth);
     let sun = shading.sun_irradiance * unshaded(position, vec3f(0.0, 1.0, 0.0)) * phase * lit;
@@ -22,7 +24,7 @@ fn drops_radiance(position: vec3f, view: vec3f, optical_depth: f32, lit: f32) ->
     return sun + mix(around, sky_irradiance(view), 1.0 - exp(-optical_depth)) / PI;
 }
 
-// The same of bubbles in water, in what light the water above lets through.
+// The same for bubbles in water, attenuated by the water above.
 fn bubbles_radiance(position: vec3f, view: vec3f, optical_depth: f32, lit: f32) -> vec3f {
     let extinction = shading.absorption + shading.scattering;
     let above = water_above(position);

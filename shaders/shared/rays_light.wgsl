@@ -1,5 +1,5 @@
-// Light along rays: what a path through water and air brings to the eye. Needs the bindings of rays_water, rays_set and ssfr_light,
-// `camera`.
+// Radiance along rays through water and air. Needs the bindings of rays_water, rays_set and
+// ssfr_light, and `camera`.
 #import "shared/rays_trace.wgsl"
 #import "shared/rays_sun.wgsl"
 #import "shared/ssfr_opaque.wgsl"
@@ -13,43 +13,45 @@
 #import "shared/caustics_light.wgsl"
 #endif
 
-// Rays that wait while another is followed, and rays of one picture ray in all.
+// Stack size of pending rays, and the largest number of rays per picture ray.
 const WAITING: i32 = 8;
 const MOST_RAYS: i32 = 24;
-// Surfaces on the way to a ray after which the sky's mean stands for the rest.
+// Number of surfaces along a path after which the sky's mean replaces further tracing.
 const MOST_SURFACES: u32 = 10u;
-// Part of a picture ray that a side branch has at least, at the first surface and at later ones: below it the other branch takes it
-// along. With 0.004 at all of them a splash takes half as long again.
+// Least weight of a side branch, at the first surface and at later ones; below it the other branch
+// takes over its weight. With 0.004 at all surfaces, a splash takes half as long again.
 const LEAST_BRANCH: f32 = 0.004;
 const LEAST_LATER_BRANCH: f32 = 0.1;
-// Parts of a way through water in which it scatters.
+// Segments of a path through water for single scattering.
 const PARTS: i32 = 4;
 
-// Where in a part the sun is looked for, from 0 to 1: a pixel's and a sample's own, so that the edge of a shadow in water is spread over
-// the part and not seen once for each.
+// Position within a segment at which the sun's visibility is tested, 0 to 1. It differs by pixel
+// and sample, so that a shadow edge in water is spread over the segment instead of repeated once
+// per segment.
 var<private> own_place: f32;
 
 struct Ray {
     origin: vec3f,
     inside: bool,
     direction: vec3f,
-    // Of the picture ray that came this far.
+    // Fraction of the picture ray's weight that arrives here.
     weight: vec3f,
-    // Metres from the eye to its origin.
+    // Distance from the eye to the ray's origin, metres.
     travelled: f32,
     surfaces: u32,
     // REFLECTION or REFRACTION behind the first surface.
     part: u32,
 }
 
-// The part of the picture's light that something belongs to which would be `own` on the ray from the eye: what the first surface
-// mirrors is one part, and so is what comes through it, but for what water scatters.
+// Light component of a contribution that would be `own` on the ray from the eye. What the first
+// surface reflects is one component, and what it transmits another, except for light that the water
+// scatters.
 fn part_of(ray: Ray, own: u32) -> u32 {
     let is_own = ray.surfaces == 0u || (ray.part == REFRACTION && (own == WHITE || own == FOAM_LIGHT || own == SCATTERING));
     return select(ray.part, own, is_own);
 }
 
-// Metres that sunlight has gone through water on its way to `p`.
+// Metres of water that sunlight passes through on its path to `p`.
 fn water_above(p: vec3f) -> f32 {
 #ifdef SEA
     if any(p.xz < vec2f(0.0)) || any(p.xz > rays.size.xz) {
@@ -63,8 +65,8 @@ fn strongest(weight: vec3f) -> f32 {
     return max(weight.x, max(weight.y, weight.z));
 }
 
-// ∫ σ exp(−σ (t + s)) dt from `start` to `end` of a way through water, where the light's own way s changes evenly from `before` to
-// `after`: as it does in flat water, where this is exact at any depth.
+// ∫ σ exp(−σ (t + s)) dt from `start` to `end` of a path through water, where the light's own path
+// s varies linearly from `before` to `after`. This is exact in flat water at any depth.
 fn gathered(extinction: vec3f, start: f32, end: f32, before: f32, after: f32) -> vec3f {
     let x = extinction * (end - start + after - before);
     let first = exp(-extinction * (start + before));
@@ -73,8 +75,9 @@ fn gathered(extinction: vec3f, start: f32, end: f32, before: f32, after: f32) ->
     return extinction * (end - start) * mean;
 }
 
-// Light that water on a way of `length` metres scatters towards its beginning: once, from the sun and the sky through what stands
-// above, scaled so that deep flat water seen from straight above has the reflectance of `deep_albedo`.
+// Light that water along a path of `length` metres scatters towards its origin: single scattering
+// of sun and sky, attenuated by the water above, scaled so that deep flat water seen from straight
+// above has the reflectance of `deep_albedo`.
 fn scattered(origin: vec3f, direction: vec3f, length: f32) -> vec3f {
     let extinction = shading.absorption + shading.scattering;
     let up = vec3f(0.0, 1.0, 0.0);
@@ -84,7 +87,7 @@ fn scattered(origin: vec3f, direction: vec3f, length: f32) -> vec3f {
     var start = 0.0;
     var before = water_above(origin);
     for (var k = 1; k <= PARTS; k++) {
-        // Finer near the eye, where most of it comes from.
+        // Segments are finer near the eye, where most of the light originates.
         let part = f32(k) / f32(PARTS);
         let end = length * part * part;
         let after = water_above(origin + direction * end);
@@ -98,7 +101,7 @@ fn scattered(origin: vec3f, direction: vec3f, length: f32) -> vec3f {
 }
 
 struct Split {
-    // Towards where the ray came from.
+    // On the side the ray came from.
     normal: vec3f,
     mirrored: vec3f,
     refracted: vec3f,
@@ -106,7 +109,7 @@ struct Split {
     variance: f32,
 }
 
-// What the water's surface does with a ray.
+// Reflection and refraction of a ray at the water's surface.
 fn split_at(ray: Ray, found: Found) -> Split {
     let view = -ray.direction;
     let side = select(1.0, -1.0, ray.inside);
@@ -114,12 +117,12 @@ fn split_at(ray: Ray, found: Found) -> Split {
     let footprint = (ray.travelled + found.t) / camera.focal / max(abs(dot(found.normal, view)), 0.1);
     let facet = facet_at(p, found.normal, footprint);
     var normal = facet.normal * side;
-    // No facet that is seen faces away.
+    // Visible facets never face away.
     normal = normalize(normal + view * max(0.03 - dot(normal, view), 0.0) * 1.5);
     let index = select(shading.index, 1.0 / shading.index, ray.inside);
     let facing = clamp(dot(normal, view), 0.0, 1.0);
     var mirrored = reflect(-view, normal);
-    // A mirrored ray goes back to where it came from, whatever a ripple says.
+    // A reflected ray stays on its side of the surface, regardless of ripples.
     let grazes = max(0.005 - dot(mirrored, found.normal * side), 0.0);
     mirrored = normalize(mirrored + found.normal * side * grazes);
     var refracted = refract(-view, normal, 1.0 / index);
@@ -132,12 +135,12 @@ fn split_at(ray: Ray, found: Found) -> Split {
 }
 
 #ifdef CAUSTICS
-// What sunlight that came through the water puts on something opaque in it, but for what water takes.
+// Irradiance on opaque geometry from sunlight that came through the water, before absorption.
 fn sun_under_water(p: vec3f, n: vec3f, footprint: f32) -> vec3f {
     let part = caustic_part(p);
     var sun = 0.0;
     if part > 0.0 {
-        // The map has light over level ground.
+        // The map holds irradiance on level ground.
         let level = max(dot(n, caustics.sun), 0.0) / caustics.sun.y;
         sun = part * shading.sun_direction.y * level * caustic_at(p, n, footprint);
 #ifdef VOLUME
@@ -153,11 +156,11 @@ fn sun_under_water(p: vec3f, n: vec3f, footprint: f32) -> vec3f {
 
 struct Opaque {
     light: vec3f,
-    // The part of it that is sunlight which the map of caustics has.
+    // Part of it that is sunlight from the caustics map.
     caustics: vec3f,
 }
 
-// Radiance of something opaque, in the light that the water above it lets through.
+// Radiance of opaque geometry under the light that the water above it transmits.
 fn opaque_radiance(ray: Ray, found: Found) -> Opaque {
     let p = ray.origin + ray.direction * found.t;
     let n = select(found.normal, -found.normal, dot(found.normal, ray.direction) > 0.0);
@@ -179,8 +182,8 @@ fn opaque_radiance(ray: Ray, found: Found) -> Opaque {
 }
 
 #ifdef VOLUME
-// Adds the light that drops, or bubbles, before what a ray meets at `far` send along it; the part of what is behind that they let
-// through. Drops in air before the eye are splatted instead.
+// Adds the light that drops or bubbles in front of a hit at `far` scatter along the ray, and
+// returns their transmittance. Drops in air in front of the eye are splatted instead.
 fn veil(ray: Ray, found: Found, far: f32, light: ptr<function, vec3f>) -> f32 {
     var kept = 1.0;
     if ray.inside {
@@ -213,8 +216,9 @@ fn veil(ray: Ray, found: Found, far: f32, light: ptr<function, vec3f>) -> f32 {
 }
 #endif
 
-// Radiance and coverage along a ray from `origin`, in air or water, that has come `travelled` metres from the eye on its way there
-// and met nothing. It meets something before `known`, or nothing at all where that is 0.
+// Radiance and coverage along a ray from `origin`, in air or water, that has travelled `travelled`
+// metres from the eye without a hit. Its first hit is known to be before `known`, or to be none
+// where that is 0.
 fn radiance_along(origin: vec3f, direction: vec3f, inside: bool, travelled: f32, known: f32) -> vec4f {
     var reach = known;
     var waiting: array<Ray, WAITING>;
@@ -228,7 +232,8 @@ fn radiance_along(origin: vec3f, direction: vec3f, inside: bool, travelled: f32,
         let found = trace(
             ray.origin, ray.direction, ray.inside, ray.travelled, select(FAR, reach, ray.surfaces == 0u));
         if ray.surfaces == 0u && found.kind == SKY && reach > 0.0 && reach < FAR {
-            // A sheet thinner than a step was passed over: the ray is followed as others are.
+            // The known hit is a sheet thinner than a step that was missed: traces the ray again
+            // without a bound.
             reach = FAR;
             held = 1;
             continue;
@@ -236,7 +241,7 @@ fn radiance_along(origin: vec3f, direction: vec3f, inside: bool, travelled: f32,
         if HOLDS_OUT && ray.surfaces == 0u && !ray.inside && found.kind == OPAQUE {
             return vec4f(0.0);
         }
-        // The way that leads from the eye is whole, wherever it was taken up.
+        // The first segment covers the whole path from the eye, wherever tracing began.
         let far = min(found.t + select(0.0, ray.travelled, ray.surfaces == 0u), 100.0 * endless());
         var weight = ray.weight;
 #ifdef VOLUME
@@ -307,7 +312,8 @@ fn radiance_along(origin: vec3f, direction: vec3f, inside: bool, travelled: f32,
         let bent = part_of(ray, REFRACTION);
         let reflected = Ray(before, ray.inside, split.mirrored, weight * mirror, travelled, surfaces, mirrored);
         let through = Ray(after, !ray.inside, split.refracted, weight * (1.0 - mirror), travelled, surfaces, bent);
-        // The stronger one is followed first, and so are those that it splits into; without room for both it stands for both.
+        // The stronger branch and its descendants are traced first. Without stack space for the
+        // weaker one, the stronger one takes over its weight.
         let is_mirror = mirror > 0.5;
         var next = through;
         var later = reflected;
@@ -326,7 +332,7 @@ fn radiance_along(origin: vec3f, direction: vec3f, inside: bool, travelled: f32,
         waiting[held] = next;
         held += 1;
     }
-    // What was left waiting sees the sky's mean.
+    // Pending rays see the sky's mean.
     for (var k = 0; k < held; k++) {
         let rest = waiting[k].weight * sky_irradiance(vec3f(0.0, 1.0, 0.0)) / PI;
         light += rest;

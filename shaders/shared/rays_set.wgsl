@@ -1,13 +1,15 @@
-// Rays and what is opaque: the set's triangles in a tree of boxes, and the ground. Needs the bindings `rays`, `set_nodes` and
-// `set_triangles` of whoever imports it.
+// Rays against opaque geometry: triangles in a bounding volume hierarchy, and the ground. The
+// importing shader must bind `rays`, `set_nodes` and `set_triangles`.
 #import "shared/camera.wgsl"
 #import "shared/ssfr_solid.wgsl"
 
-// Two boxes and what is in them. An axis has a word for each, in steps of `rays.set_step` from `rays.set_low`: the least corner in its
-// lower half, the greatest in its upper one, both rounded outwards.
+// Two boxes and their contents. Each axis has one word in steps of `rays.set_step` from
+// `rays.set_low`: the lower bound in the low half, the upper bound in the high half, both rounded
+// outwards.
 struct SetNode {
     left: vec3u,
-    // A node, or triangles: the number of the first, and above LEAF_SHIFT how many, which is 0 for a node.
+    // Index of a node, or of the first triangle of a leaf; the bits from LEAF_SHIFT on hold the
+    // number of triangles, 0 for a node.
     left_child: u32,
     right: vec3u,
     right_child: u32,
@@ -22,17 +24,17 @@ const OPAQUE: u32 = 2u;
 
 struct Found {
     kind: u32,
-    // Distance, and distances just before and just after it; FAR in the sky.
+    // Distance of the hit, and distances just before and just after it; FAR in the sky.
     t: f32,
     before: f32,
     after: f32,
-    // Out of the water; of what is opaque, on either side.
+    // Points out of the water; of opaque geometry, to either side.
     normal: vec3f,
     // As in ssfr_solid; 2 is the ground.
     material: u32,
-    // Mean square slope of waves that a pixel there cannot hold.
+    // Mean square slope of waves too short to be resolved by a pixel there.
     variance: f32,
-    // Of the set, or NO_TRIANGLE.
+    // Index of the triangle, or NO_TRIANGLE.
     triangle: u32,
 }
 
@@ -40,7 +42,7 @@ fn met(kind: u32, t: f32, normal: vec3f, material: u32) -> Found {
     return Found(kind, t, t, t, normal, material, 0.0, NO_TRIANGLE);
 }
 
-// Distance along a ray to a triangle, FAR where it misses (Möller and Trumbore 1997).
+// Distance along a ray to a triangle; FAR where it misses (Möller and Trumbore 1997).
 fn triangle_distance(triangle: Triangle, origin: vec3f, direction: vec3f) -> f32 {
     let ab = triangle.b - triangle.a;
     let ac = triangle.c - triangle.a;
@@ -54,15 +56,15 @@ fn triangle_distance(triangle: Triangle, origin: vec3f, direction: vec3f) -> f32
     let q = cross(from_a, ab);
     let v = dot(direction, q) / volume;
     let t = dot(ac, q) / volume;
-    // Sides that two triangles share belong to both.
+    // Edges shared by two triangles belong to both.
     if u < -1e-6 || v < -1e-6 || u + v > 1.000001 || t <= 0.0 {
         return FAR;
     }
     return t;
 }
 
-// Where a ray comes into a box, in the steps of the tree; FAR where it does not before `nearest`. Flat boxes, and those that a ray only
-// touches, count.
+// Distance at which a ray enters a box, in steps of the hierarchy; FAR where it does not before
+// `nearest`. Flat boxes and touching rays count as hits.
 fn box_distance(sides: vec3u, origin: vec3f, inverse: vec3f, nearest: f32) -> f32 {
     let a = (vec3f(sides & vec3u(0xffffu)) - origin) * inverse;
     let b = (vec3f(sides >> vec3u(16u)) - origin) * inverse;
@@ -73,7 +75,8 @@ fn box_distance(sides: vec3u, origin: vec3f, inverse: vec3f, nearest: f32) -> f3
     return select(FAR, enter, enter <= leave * 1.00001 + 1e-6 && enter < nearest);
 }
 
-// The last of the children that wait whose box is nearer than `nearest`: child, and distance of its box.
+// Pops pending children until one has a box nearer than `nearest`. Entries are a child and the
+// distance of its box.
 fn next_of(waiting: ptr<function, array<vec2u, 32>>, held: ptr<function, i32>, nearest: f32) -> u32 {
     var at = NO_CHILD;
     while at == NO_CHILD && *held > 0 {
@@ -84,8 +87,8 @@ fn next_of(waiting: ptr<function, array<vec2u, 32>>, held: ptr<function, i32>, n
     return at;
 }
 
-// What a ray meets first before `reach`: the ground, or a triangle. Each lane walks down to triangles before any lane tests them, nearer
-// boxes first (Aila and Laine 2009).
+// First hit of a ray before `reach`: the ground or a triangle. All lanes descend to leaves before
+// any lane tests triangles, nearer boxes first (Aila and Laine 2009).
 fn opaque_along(origin: vec3f, direction: vec3f, reach: f32) -> Found {
     var nearest = reach;
     var triangle = NO_TRIANGLE;
@@ -99,7 +102,7 @@ fn opaque_along(origin: vec3f, direction: vec3f, reach: f32) -> Found {
     }
     let from_low = (origin - rays.set_low) / rays.set_step;
     let inverse = rays.set_step / select(direction, vec3f(1e-9), abs(direction) < vec3f(1e-9));
-    // Median splits keep the tree's depth below 32.
+    // Median splits keep the hierarchy's depth below 32.
     var waiting: array<vec2u, 32>;
     var held = 0;
     var at = 0u;

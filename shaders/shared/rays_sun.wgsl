@@ -1,14 +1,15 @@
-// How far sunlight has gone through water (`Sunlight` of domain/level_set/sunlight.rs). Needs the bindings `rays` and `sun_paths` of
-// whoever imports it.
+// Length of sunlight's path through water (`Sunlight` of domain/level_set/sunlight.rs). The
+// importing shader must bind `rays` and `sun_paths`.
 #import "shared/rays_water.wgsl"
 
-// Metres that light which came from `towards` has gone through water on its way to `p`; beyond the box as where it left the box.
+// Metres of water that light from direction `towards` passes through on its path to `p`; for a
+// point beyond the box, the value where the light left the box.
 fn sun_path_at(p: vec3f, towards: vec3f) -> f32 {
     let off = abs(p - clamp(p, vec3f(0.0), rays.size));
     if max(off.x, max(off.y, off.z)) <= 0.5 * rays.voxel {
         return sun_path_within(p);
     }
-    // A direction without a part along an axis meets that axis's sides nowhere.
+    // Avoids division by zero for directions parallel to a side.
     let along = select(towards, vec3f(1e-6), abs(towards) < vec3f(1e-6));
     let low = -p / along;
     let high = (rays.size - p) / along;

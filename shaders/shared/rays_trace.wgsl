@@ -1,11 +1,11 @@
-// What a ray meets first: the water's surface, something opaque, or the sky.
+// First hit of a ray: the water's surface, opaque geometry, or the sky.
 #import "shared/rays_water.wgsl"
 #import "shared/rays_set.wgsl"
 #ifdef SEA
 #import "shared/sea.wgsl"
 #endif
 
-// Lengths below this are the same place.
+// Lengths below this count as zero, metres.
 fn hair() -> f32 {
     return 1e-3 * rays.voxel;
 }
@@ -14,7 +14,8 @@ fn pane(t: f32, normal: vec3f) -> Found {
     return Found(WATER, t, t - hair(), t + hair(), normal, 0u, 0.0, NO_TRIANGLE);
 }
 
-// A side of the box that water stands at: a pane that is not there, or the wall behind it, or the ground.
+// Hit at a side of the box where water is cut off: an invisible pane, the wall behind it, or the
+// ground.
 fn at_side(p: vec3f, t: f32) -> Found {
     let side = side_of(p);
     let normal = side_normal(side);
@@ -28,7 +29,8 @@ fn at_side(p: vec3f, t: f32) -> Found {
 }
 
 #ifdef SEA
-// Where a ray meets the sea's surface between two distances beyond the box; of the sky where it does not.
+// Hit of a ray with the sea's surface between two distances beyond the box; the sky where it
+// misses.
 fn sea_along(origin: vec3f, direction: vec3f, span: vec2f, inside: bool, travelled: f32) -> Found {
     let surface = sea_crossing(origin, direction, span.x, min(span.y, sea_end()), inside, travelled);
     if surface.after >= FAR {
@@ -41,14 +43,14 @@ fn sea_along(origin: vec3f, direction: vec3f, span: vec2f, inside: bool, travell
         sea_variance(at, footprint), NO_TRIANGLE);
 }
 
-// What a ray meets behind the box, which it leaves at `from_t`.
+// Hit of a ray beyond the box, which it leaves at `from_t`.
 fn beyond(origin: vec3f, direction: vec3f, from_t: f32, inside: bool, travelled: f32, opaque_one: Found) -> Found {
     let at = from_t + hair();
     let p = origin + direction * at;
     if inside && !is_sea(p.xz) {
         return at_side(p, from_t);
     }
-    // Heights within the box and beyond are the same up to a voxel's interpolation.
+    // Heights within the box and beyond agree up to a voxel's interpolation.
     if is_sea_water(p, (travelled + at) / camera.focal) != inside {
         return pane(at, vec3f(0.0, 1.0, 0.0));
     }
@@ -60,8 +62,9 @@ fn beyond(origin: vec3f, direction: vec3f, from_t: f32, inside: bool, travelled:
 }
 #endif
 
-// `inside` says whether the ray begins in the water, and `travelled` how many metres the eye is before its origin. Nothing in the box or
-// opaque is looked for from `reach` on.
+// First hit of a ray. `inside` states whether the ray begins in water, and `travelled` is the
+// distance from the eye to its origin, metres. Hits in the box or with opaque geometry are only
+// searched up to `reach`.
 fn trace(origin: vec3f, direction: vec3f, inside: bool, travelled: f32, reach: f32) -> Found {
     let opaque_one = opaque_along(origin, direction, reach);
     let span = box_span(origin, direction);
@@ -90,7 +93,8 @@ fn trace(origin: vec3f, direction: vec3f, inside: bool, travelled: f32, reach: f
 #endif
     let end = min(min(span.y, opaque_one.t), reach);
     let surface = crossing(origin, direction, start, end, inside);
-    // Particles keep off solids, and so does their surface: water has no second side where it lies against one.
+    // Particles keep away from solids, and so does their surface: where water rests against a solid
+    // it has no second surface.
     let gap = (opaque_one.t - surface.after) * abs(dot(opaque_one.normal, direction));
     if inside && surface.after < FAR && opaque_one.kind == OPAQUE && gap < rays.gap {
         return opaque_one;

@@ -1,28 +1,28 @@
-// The water as a sparse level set (`LevelSet` of domain/level_set.rs), and where a ray comes through its surface. Needs the bindings
-// `rays`, `level_table` and `level_values` of whoever imports it.
+// The water as a sparse level set (`LevelSet` of domain/level_set.rs), and intersection of rays
+// with its surface. The importing shader must bind `rays`, `level_table` and `level_values`.
 #import "shared/camera.wgsl"
 #import "shared/box.wgsl"
 
 struct Rays {
-    // Of the box that holds the water, metres.
+    // Size of the box that contains the water, metres.
     size: vec3f,
     // Edge length of a voxel, metres.
     voxel: f32,
-    // Along each axis.
+    // Number of bricks along each axis.
     bricks: vec3u,
-    // Of the set.
+    // Number of opaque triangles.
     triangles: u32,
-    // Of the lattice of sunlight, along each axis.
+    // Number of nodes along each axis of the lattice of sunlight.
     nodes: vec3u,
-    // Metres between them.
+    // Distance between the nodes, metres.
     pitch: f32,
-    // Sides of the box at which a wall stands: bit 2 × axis, plus 1 for the greater end.
+    // Sides of the box with a wall: bit 2 × axis, plus 1 for the upper end.
     walls: u32,
-    // Width of what is taken for water between it and something opaque, metres.
+    // Width of the gap between water and opaque geometry that counts as water, metres.
     gap: f32,
     pad0: u32,
     pad1: u32,
-    // Of the set's tree: least corner of its lattice, and the lattice's step, metres.
+    // Quantisation lattice of the hierarchy over opaque geometry: least corner and step, metres.
     set_low: vec3f,
     set_step: f32,
 }
@@ -30,19 +30,19 @@ struct Rays {
 const EMPTY: u32 = 0u;
 const FULL: u32 = 1u;
 const FIRST: u32 = 2u;
-// Voxels along a brick's edge, and values.
+// Voxels and nodes along a brick's edge, and values per brick.
 const EDGE: u32 = 8u;
 const NODES: u32 = 11u;
 const VALUES: u32 = 1331u;
-// Steps after which a ray through the box has met nothing.
+// Number of steps after which a ray through the box counts as a miss.
 const MOST_STEPS: i32 = 8192;
-// Halvings of the step in which a ray meets the surface.
+// Number of bisections of the step in which a ray meets the surface.
 const HALVINGS: i32 = 10;
 
 struct Place {
     brick: vec3u,
     slot: u32,
-    // In voxels from the brick's corner.
+    // Position in voxels from the brick's corner.
     q: vec3f,
 }
 
@@ -69,7 +69,7 @@ fn within(slot: u32, q: vec3f) -> f32 {
     return mix(along_y.x, along_y.y, part.z);
 }
 
-// Positive in water.
+// Level-set value, positive in water.
 fn field(p: vec3f) -> f32 {
     let at = place_at(p);
     if at.slot < FIRST {
@@ -119,8 +119,8 @@ fn refine(origin: vec3f, direction: vec3f, from_t: f32, to_t: f32, inside: bool)
     return Crossing(low, high);
 }
 
-// Where a ray that is `inside` of the water, or not, at `from_t` first is otherwise, up to `to_t`: a voxel a step, and a brick a
-// step where the surface is not.
+// First distance up to `to_t` at which a ray crosses the surface; `inside` states whether it is in
+// water at `from_t`. Steps one voxel at a time, or a whole brick where that has no surface.
 fn crossing(origin: vec3f, direction: vec3f, from_t: f32, to_t: f32, inside: bool) -> Crossing {
     let inverse = safe_inverse(direction);
     let edge = f32(EDGE) * rays.voxel;
@@ -149,12 +149,12 @@ fn crossing(origin: vec3f, direction: vec3f, from_t: f32, to_t: f32, inside: boo
     return Crossing(FAR, FAR);
 }
 
-// Distances at which a ray comes into the box and leaves it; the second is less where it misses.
+// Distances at which a ray enters and leaves the box; the second is less where it misses.
 fn box_span(origin: vec3f, direction: vec3f) -> vec2f {
     return span_of(rays.size, origin, direction);
 }
 
-// Which side of the box a point on it is on: axis and whether it is the greater end.
+// Side of the box on which a point is: the axis, and 1 for the upper end.
 fn side_of(p: vec3f) -> vec2u {
     let low = abs(p);
     let high = abs(p - rays.size);

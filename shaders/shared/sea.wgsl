@@ -1,49 +1,52 @@
-// The sea beyond the box (src/render/sea.rs): where its surface stands, and where a ray meets it. Needs the bindings `sea` and
-// `sea_values` of whoever imports it.
+// The sea beyond the box (src/render/sea.rs): height of its surface, and its intersection with
+// rays. The importing shader must bind `sea` and `sea_values`.
 #import "shared/camera.wgsl"
 #import "shared/box.wgsl"
 
 struct Sea {
-    // Of the box that holds the simulated water, metres.
+    // Size of the box that contains the simulated water, metres.
     size: vec3f,
-    // Still water above the floor, metres.
+    // Still-water level above the floor, metres.
     level: f32,
-    // Least and greatest height of the surface.
+    // Least and greatest height of the surface, metres.
     low: f32,
     high: f32,
-    // Over which the box's edge goes over into the sea, metres.
+    // Width over which the box's edge blends into the sea, metres.
     band: f32,
-    // Lengths below this are the same place.
+    // Lengths below this count as zero, metres.
     hair: f32,
-    // Along the box's edges, x and z.
+    // Number of height samples along the box's edges, x and z.
     nodes: vec2u,
-    // Waves; those with the greatest lengths come first.
+    // Number of wave components, in order of decreasing wavelength.
     lines: u32,
-    // Sides beyond which it lies: bit 2 × axis, plus 1 for the greater end.
+    // Sides beyond which the sea extends: bit 2 × axis, plus 1 for the upper end.
     sides: u32,
 }
 
-// Waves that there is room for, and quads of each: k, phase and amplitude; ω and amplitude of the horizontal velocity.
+// Capacity of wave components, each with two vectors: k, phase and amplitude; ω and amplitude of
+// the horizontal velocity.
 const MOST_LINES: u32 = 64u;
-// A wave whose length is less than 2π over this many of a pixel's footprints is slope alone.
+// A component whose wave number times the pixel's footprint exceeds this contributes to the slope
+// variance only.
 const FINEST: f32 = 6.0;
-// Steps after which a ray along the sea has met nothing.
+// Number of steps after which a ray along the sea counts as a miss.
 const MOST_SEA_STEPS: i32 = 320;
 const SEA_HALVINGS: i32 = 12;
-// A ray that comes from the surface may begin so many hairs on its other side, where heights within the box and beyond differ: half a
-// voxel.
+// Distance, in multiples of `hair`, by which a ray that leaves the surface may begin on its other
+// side, because heights within the box and beyond differ: half a voxel.
 const SKIN: f32 = 500.0;
-// Steeper than the waves are, so that no step jumps over one.
+// Upper bound of the waves' slope, so that no step jumps over a wave.
 const STEEP: f32 = 0.6;
-// Least step of a ray over the distance that it came: a pixel of a picture of a thousand is a tenth of it.
+// Least step of a ray relative to its distance: a pixel of a picture with a thousand is a tenth of
+// it.
 const LEAST_STEP: f32 = 0.008;
 
-// Distance after which it is not looked for: ten million particle spacings.
+// Distance at which the sea ends: ten million particle spacings.
 fn sea_end() -> f32 {
     return 2e10 * sea.hair;
 }
 
-// Whether the sea lies at x and z.
+// Whether the sea extends to x and z.
 fn is_sea(at: vec2f) -> bool {
     let below = at < vec2f(sea.hair);
     let above = at > sea.size.xz - sea.hair;
@@ -56,7 +59,7 @@ fn edge_value(k: u32) -> f32 {
     return sea_values[2u * MOST_LINES + k / 4u][k % 4u];
 }
 
-// Height of the simulated water at the place on its edge that is nearest to one beyond it.
+// Height of the simulated water at the edge point nearest to a point beyond.
 fn edge_height(beyond: vec2f) -> f32 {
     let size = sea.size.xz;
     let is_across = beyond.x < sea.hair || beyond.x > size.x - sea.hair;
@@ -69,14 +72,14 @@ fn edge_height(beyond: vec2f) -> f32 {
     return mix(edge_value(first + low), edge_value(first + low + 1u), at - f32(low));
 }
 
-// The part that the box's edge has in the sea's height: 1 at the edge, 0 from a band away on.
+// Weight of the box's edge in the sea's height: 1 at the edge, 0 from a band's width on.
 fn edge_part(at: vec2f) -> f32 {
     let off = length(at - clamp(at, vec2f(0.0), sea.size.xz));
     let t = clamp(off / sea.band, 0.0, 1.0);
     return 1.0 - t * t * (3.0 - 2.0 * t);
 }
 
-// Height of the surface; waves that a pixel of `footprint` metres cannot hold are left out.
+// Height of the surface, without waves that a pixel of `footprint` metres cannot resolve.
 fn sea_height(at: vec2f, footprint: f32) -> f32 {
     let part = edge_part(at);
     var waves = 0.0;
@@ -97,7 +100,7 @@ fn sea_height(at: vec2f, footprint: f32) -> f32 {
     return open;
 }
 
-// Mean square slope of the waves that such a pixel cannot hold.
+// Mean square slope of the waves that such a pixel cannot resolve.
 fn sea_variance(at: vec2f, footprint: f32) -> f32 {
     var sum = 0.0;
     for (var i = 0u; i < sea.lines; i++) {
@@ -123,7 +126,7 @@ fn sea_normal(at: vec2f, footprint: f32) -> vec3f {
     return normalize(vec3f(-slope.x, 1.0, -slope.y));
 }
 
-// How fast the water at the surface goes; what the box's edge has in it stands still.
+// Velocity of the water at the surface; the contribution of the box's edge counts as still.
 fn sea_velocity(at: vec2f) -> vec3f {
     var sum = vec3f(0.0);
     for (var i = 0u; i < sea.lines; i++) {
@@ -146,19 +149,20 @@ struct SeaCrossing {
     after: f32,
 }
 
-// Where a ray that is `inside` of the sea, or not, first is otherwise between two distances beyond the box. The eye is `travelled`
-// metres before its origin.
+// First crossing of the sea's surface by a ray between two distances beyond the box; `inside`
+// states whether the ray begins in the sea, and `travelled` is the distance from the eye to its
+// origin, metres.
 fn sea_crossing(
     origin: vec3f, direction: vec3f, from_t: f32, to_t: f32, inside: bool, travelled: f32,
 ) -> SeaCrossing {
-    // Above the highest wave there is air, and below the lowest trough water.
+    // There is only air above the highest wave and only water below the lowest trough.
     let inverse = safe_inverse(direction).y;
     let a = (sea.low - sea.hair - origin.y) * inverse;
     let b = (sea.high + sea.hair - origin.y) * inverse;
     let start = max(min(a, b), from_t);
     let end = min(max(a, b), to_t);
     let leaves = (direction.y > 0.0) != inside;
-    // Of the step in which it is otherwise.
+    // The step that crosses the surface.
     var crossed = vec2f(FAR);
     var last = start;
     var t = start;
@@ -175,12 +179,12 @@ fn sea_crossing(
         if wet != inside && !(leaves && gap < SKIN * sea.hair) {
             crossed = vec2f(last, t);
         }
-        // After the last place there is none.
+        // Ends the loop after the last point.
         last = select(t, FAR, t >= end);
         let step = max(gap / (abs(direction.y) + STEEP), max(LEAST_STEP * (travelled + t), 100.0 * sea.hair));
         t = min(t + step, end);
     }
-    // Halved until the surface is known.
+    // Bisection of that step.
     let is_met = crossed.x < FAR;
     for (var i = 0; i < SEA_HALVINGS && is_met; i++) {
         let middle = 0.5 * (crossed.x + crossed.y);

@@ -1,9 +1,11 @@
-// The channels that stand beside the picture. Needs the bindings `camera`, `next_camera` and `output` of whoever imports it, ten
-// floats a pixel, Z, N, P, forward and thickness; and with SPRAY, and MOTION, what ssfr_spray_read.wgsl needs.
+// Additional channels. The importing shader must bind `camera`, `next_camera` and `output` (ten
+// floats per pixel: Z, N, P, forward, thickness), and with SPRAY, whose sums must then have MOTION,
+// the bindings of ssfr_spray_read.wgsl.
 #import "shared/camera.wgsl"
 
-// Where `next`, in the eye space of the next frame, stands in its picture less where `pixel` is, in pixels; rightward and
-// upward are positive, as motion vectors are counted in compositing (rows of the picture are counted downward).
+// Position of `next`, in the eye space of the next frame, in its picture minus that of `pixel`, in
+// pixels. Right and up are positive, as in motion vectors for compositing, while picture rows count
+// downward.
 fn motion_to(next: vec3f, pixel: vec2i) -> vec2f {
     let shift = project(next_camera, vec3f(next.xy, max(next.z, 1e-3)))
         - (vec2f(pixel) - next_camera.corner + 0.5);
@@ -24,7 +26,7 @@ fn store(at: u32, depth: f32, normal: vec3f, position: vec3f, motion: vec2f, thr
     output[base + 9u] = through;
 }
 
-// Spray that stands before everything else at a pixel.
+// Spray in front of everything else at a pixel.
 struct Over {
     is_seen: bool,
     depth: f32,
@@ -32,7 +34,7 @@ struct Over {
     motion: vec2f,
 }
 
-// Depth, position and motion are those of spray where it hides more than half of what is behind.
+// Depth, position and motion of spray that hides more than half of what is behind.
 fn spray_over(pixel: vec2i, ray: vec3f) -> Over {
 #ifdef SPRAY
     let mist = spray_at(vec2f(pixel) + 0.5);
@@ -45,15 +47,15 @@ fn spray_over(pixel: vec2i, ray: vec3f) -> Over {
     return Over(false, FAR, vec3f(0.0), vec2f(0.0));
 }
 
-// As `store`, of what is seen behind the spray.
+// Like `store`, for what is behind the spray.
 fn store_under(over: Over, at: u32, depth: f32, normal: vec3f, position: vec3f, motion: vec2f, through: f32) {
     store(
         at, select(depth, over.depth, over.is_seen), normal, select(position, over.position, over.is_seen),
         select(motion, over.motion, over.is_seen), through);
 }
 
-// A direction in the eye space of the next frame: the sky is infinitely far, and only where that camera looks moves it, not where
-// it stands.
+// A direction in the eye space of the next frame: the sky is infinitely distant, so only the
+// rotation of that camera moves it.
 fn sky_in_next(direction: vec3f) -> vec3f {
     return vec3f(
         dot(direction, next_camera.right),

@@ -1,7 +1,7 @@
-// Rows of the picture that are shaded at once.
+// Rows of the picture that are shaded in one dispatch.
 
 struct Band {
-    // First picture row of this band, and how many.
+    // First picture row of this band, and number of rows.
     row: u32,
     rows: u32,
     pad0: u32,

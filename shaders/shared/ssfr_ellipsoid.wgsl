@@ -1,8 +1,8 @@
-// A particle as an ellipsoid on the screen, where ssfr_splat has a ball.
+// Projection of particles as ellipsoids, in place of the spheres of ssfr_splat.
 #import "shared/camera.wgsl"
 #import "shared/ssfr_splat.wgsl"
 
-// The symmetric matrix, metres, that makes the ellipsoid of the unit ball, in the world's axes.
+// Symmetric matrix, metres, that maps the unit sphere to the ellipsoid in world axes.
 struct Shape {
     // xx, yy, zz.
     diagonal: vec3f,
@@ -23,19 +23,21 @@ struct Ellipsoid {
     bounds: vec4i,
     // Least depth.
     nearest: f32,
-    // Where the ellipsoid is a unit ball: its centre from the eye, the ray through the corner of pixel (0, 0), and what a pixel to the
-    // right and one down add to that.
+    // In the space in which the ellipsoid is a unit sphere: its centre from the eye, the ray
+    // through the corner of pixel (0, 0), and the increments of the ray per pixel to the right and
+    // down.
     middle: vec3f,
     corner: vec3f,
     across: vec3f,
     down: vec3f,
 }
 
-// Of a particle whose centre is `from_eye` metres from the eye, world axes; `part` is a factor on its size.
+// Ellipsoid of a particle whose centre is `from_eye` metres from the eye, in world axes; `part`
+// scales its size.
 fn ellipsoid_at(camera: Camera, from_eye: vec3f, shape: Shape, part: f32, size: vec2u) -> Ellipsoid {
     let s = part * stretch(shape);
     let c = vec3f(dot(from_eye, camera.right), dot(from_eye, camera.up), dot(from_eye, camera.forward));
-    // Its half axes as seen along the eye's axes: planes n · x = n · c ± |S n| touch it.
+    // Half-extents along the eye's axes: planes n · x = n · c ± |S n| touch the ellipsoid.
     let right = s * camera.right;
     let up = s * camera.up;
     let forward = s * camera.forward;
@@ -46,8 +48,8 @@ fn ellipsoid_at(camera: Camera, from_eye: vec3f, shape: Shape, part: f32, size: 
     if c.z < 1.5 * sqrt(deep) {
         return out;
     }
-    // Upright planes through the eye, (1, 0, −u) · x = 0, touch it where (c_x − u c_z)² = |S (1, 0, −u)|²; written out, so that
-    // squares of distances do not cancel. Level ones alike.
+    // Vertical planes through the eye, (1, 0, −u) · x = 0, touch it where (c_x − u c_z)² = |S (1,
+    // 0, −u)|²; expanded so that squares of distances do not cancel. Horizontal planes likewise.
     let squared = c.z * c.z - deep;
     let wide = vec2f(dot(right, right), dot(up, up));
     let skew = vec2f(dot(right, forward), dot(up, forward));
@@ -69,7 +71,8 @@ fn ellipsoid_at(camera: Camera, from_eye: vec3f, shape: Shape, part: f32, size: 
     return out;
 }
 
-// Eye-space depth of the near side at a pixel position that is counted from the camera's `corner`; FAR where the ray misses.
+// Eye-space depth of the near side at a pixel position relative to the camera's `corner`; FAR where
+// the ray misses.
 fn hit_ellipsoid(ellipsoid: Ellipsoid, position: vec2f) -> f32 {
     let ray = ellipsoid.corner + position.x * ellipsoid.across + position.y * ellipsoid.down;
     let hit = hit_sphere(ray, ellipsoid.middle, 1.0);

@@ -1,4 +1,4 @@
-// Sums at half the resolution, read between their cells. Needs the binding `camera` of whoever imports it.
+// Interpolated lookup of half-resolution sums. The importing shader must bind `camera`.
 #import "shared/ssfr_splat.wgsl"
 
 fn half_load(words: ptr<function, vec4u>, part: vec2f) -> f32 {
@@ -11,7 +11,7 @@ struct HalfTap {
     part: vec2f,
 }
 
-// The four half-resolution cells about a padded pixel position.
+// The four half-resolution cells around a padded pixel position.
 fn half_tap(position: vec2f) -> HalfTap {
     let size = vec2i(camera.size / 2u);
     let p = position * 0.5 - 0.5;

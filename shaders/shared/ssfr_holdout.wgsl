@@ -1,4 +1,5 @@
-// Whether what is opaque and seen directly is left out of the picture, and cuts what stands behind it.
+// Whether directly visible opaque geometry is a holdout: absent from the picture, but occluding
+// what is behind it.
 #ifdef HOLDOUT
 const HOLDS_OUT: bool = true;
 #else

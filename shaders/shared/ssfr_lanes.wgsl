@@ -1,22 +1,24 @@
-// Which threads share the pixels of which particle, or block of water.
+// Assignment of threads to particles or blocks of water, whose pixels they share.
 
-// Threads of one particle: as many as the adapter runs in step. With more, an adapter of eight would compute the particle's bounds
-// again for each further eight threads.
+// Threads per particle: the adapter's subgroup size. With more, an adapter of eight lanes would
+// compute the particle's bounds again for every further eight threads.
 #ifdef NARROW
 const LANES: u32 = 8u;
 #else
 const LANES: u32 = 32u;
 #endif
-// Particles of a workgroup: one alone costs a software adapter as much to begin as a distant particle's pixels.
+// Particles per workgroup: with only one, starting it costs a software adapter as much as a distant
+// particle's pixels.
 const ROWS: u32 = 8u;
 
-// Which particle of the dispatch a thread works on.
+// Index in the dispatch of the particle that a thread processes.
 fn row_of_group(group: vec3u, groups: vec3u, thread: vec3u) -> u32 {
     return (group.x + group.y * groups.x) * ROWS + thread.y;
 }
 
-// The same where some rows take longer than others. A software adapter gives each of its threads as many groups in a row; of two threads
-// each has every other group instead. Where a pass adds to few pixels at a time, as the thickness does, threads then wait for each other.
+// The same for passes in which some rows take longer. A software adapter gives each of its threads
+// a contiguous run of workgroups; this interleaves them between two threads. Passes that add to few
+// pixels at a time, such as the thickness, would then contend for the same pixels.
 fn row_of_dealt_group(group: vec3u, groups: vec3u, thread: vec3u) -> u32 {
     var place = group.x + group.y * groups.x;
 #ifdef NARROW

@@ -1,50 +1,52 @@
-// Sun, sky, shadow and haze. Needs the bindings `shading`, `sky`,
-// `sky_sampler`, `shadow_map` and `shadow_sampler` of whoever imports it.
+// Sun, sky, shadows and haze. The importing shader must bind `shading`, `sky`, `sky_sampler`,
+// `shadow_map` and `shadow_sampler`.
 #import "shared/ssfr_optics.wgsl"
 #ifdef VOLUME
 #import "shared/rays_cloud.wgsl"
 #endif
 
 struct Shading {
-    // To the sun.
+    // Unit vector towards the sun.
     sun_direction: vec3f,
     roughness: f32,
-    // On a face at right angles to it.
+    // Irradiance of the sun on a face perpendicular to it.
     sun_irradiance: vec3f,
     index: f32,
     absorption: vec3f,
-    // Metres that sunlight goes through water for one metre of depth.
+    // Metres of water that sunlight passes through per metre of depth.
     sun_path: f32,
     scattering: vec3f,
-    // Between particles, metres.
+    // Particle spacing, metres.
     spacing: f32,
     ground_colour: vec3f,
     ground_variation: f32,
     solid_colour: vec3f,
     haze: f32,
-    // Ripples, with RIPPLES: longest wavelength, root mean square slope.
+    // Ripples, with RIPPLES: longest wavelength, m, and root mean square slope.
     ripple: vec2f,
-    // Windows, with WINDOWS: storey and bay.
+    // Windows, with WINDOWS: heights of storeys and widths of bays, metres.
     windows: vec2f,
     // Fraction of the windows that are lit, and their radiance.
     window_lit: f32,
     window_radiance: f32,
-    // 1 where the sky belongs in the picture.
+    // 1 where the sky is part of the picture.
     background: f32,
-    // Radiance of the sun's disc over its irradiance; 0 in a panorama, which has its own.
+    // Radiance of the sun's disc over its irradiance, 1/sr; 0 for a panorama, which contains the
+    // disc.
     disc: f32,
-    // The domain's longer side on the ground, metres: what is seen beside the water has its measure from it.
+    // Longer horizontal side of the domain, metres; lengths of the surroundings scale with it.
     extent: f32,
-    // How far off its face a point is whose shadow is looked up, metres.
+    // Offset along the normal of shadow lookups, metres.
     shadow_offset: f32,
     pad0: f32,
     pad1: f32,
-    // Irradiance of the sky and the ground over direction: nine spherical harmonics (Ramamoorthi 2001).
+    // Irradiance of sky and ground by direction: nine spherical-harmonics coefficients (Ramamoorthi
+    // 2001).
     irradiance: array<vec4f, 9>,
     shadow_from_world: mat4x4f,
 }
 
-// Metres after which a way is as good as endless.
+// Distance that counts as infinite, metres.
 fn endless() -> f32 {
     return 400.0 * shading.extent;
 }
@@ -55,7 +57,7 @@ fn sky_radiance(direction: vec3f) -> vec3f {
     return textureSampleLevel(sky, sky_sampler, uv, 0.0).rgb;
 }
 
-// The sun's disc, where a direction meets it. Half of its angle across is 0.2666°.
+// Radiance of the sun's disc, which has an angular radius of 0.2666°.
 fn disc_radiance(direction: vec3f) -> vec3f {
     if dot(direction, shading.sun_direction) > 0.99998918 {
         return min(shading.sun_irradiance * shading.disc, vec3f(60000.0));
@@ -75,7 +77,7 @@ fn sky_irradiance(n: vec3f) -> vec3f {
     );
 }
 
-// The part of the sunlight that comes to a place. `n` keeps a face out of its own shadow.
+// Fraction of the sunlight that reaches a point. The normal `n` keeps a face out of its own shadow.
 fn sunlit(world: vec3f, n: vec3f) -> f32 {
     var seen = unshaded(world, n);
 #ifdef VOLUME
@@ -102,29 +104,30 @@ fn unshaded(world: vec3f, n: vec3f) -> f32 {
     return 0.25 * sum;
 }
 
-// Air between the viewer and something at a distance takes it towards the sky's colour at the horizon there.
+// Blends a colour at a distance towards the sky's colour at the horizon in that direction.
 fn hazed(colour: vec3f, distance: f32, direction: vec3f) -> vec3f {
     return mix(sky_radiance(at_horizon(direction)), colour, air_between(distance));
 }
 
-// The part of the light that comes so far.
+// Transmittance of air over a distance.
 fn air_between(distance: f32) -> f32 {
     return exp(-distance / shading.haze);
 }
 
-// The direction at the horizon below or above another.
+// Direction at the horizon with the same azimuth.
 fn at_horizon(direction: vec3f) -> vec3f {
     let level = normalize(vec3f(direction.x, 0.0, direction.z) + vec3f(1e-4, 0.0, 0.0));
     return vec3f(level.x, 0.0, level.z);
 }
 
-// Light that enters water or foam through a surface of this normal and is scattered, per unit albedo; `lit` of the sunlight comes to it.
+// Diffusely scattered radiance per unit albedo of light that enters water or foam through a surface
+// with this normal; `lit` is the fraction of sunlight that arrives.
 fn diffuse_light(n: vec3f, lit: f32) -> vec3f {
     let sun = shading.sun_irradiance * max(dot(n, shading.sun_direction), 0.0) * lit;
     return (sun + sky_irradiance(n)) / PI;
 }
 
-// Diffuse reflectance of deep water of that single-scattering albedo (Hapke 1981, equation 38).
+// Diffuse reflectance of deep water with its single-scattering albedo (Hapke 1981, equation 38).
 fn deep_albedo() -> vec3f {
     let extinction = shading.absorption + shading.scattering;
     let g = sqrt(shading.absorption / max(extinction, vec3f(1e-6)));

@@ -1,5 +1,5 @@
-// Parts of a sample's light, each for a channel of its own. Every light that is added to the picture is added to one of them too, so
-// that they add up to it; without LIGHTS there are none.
+// Components of a sample's light, one per output channel. All light added to the picture is also
+// added to one component, so that the components sum to it. Without LIGHTS there are none.
 
 const REFLECTION: u32 = 0u;
 const REFRACTION: u32 = 1u;
@@ -22,7 +22,7 @@ fn light_part(part: u32, light: vec3f) {
 #endif
 }
 
-// What was added up to here is seen through something that lets so much of it through.
+// Attenuates everything added so far by the transmittance of what is in front.
 fn dim_parts(kept: f32) {
 #ifdef LIGHTS
     for (var part = 0u; part < LIGHT_PARTS; part++) {

@@ -1,23 +1,25 @@
-// Rays over the depth image of what is opaque. Needs the bindings `camera`, `shading` and `solid_depth` of whoever imports it.
+// Screen-space ray marching over the depth image of opaque geometry. The importing shader must bind
+// `camera`, `shading` and `solid_depth`.
 
-// The padded pixel that a place in eye space is seen at.
+// Padded pixel of a point in eye space.
 fn pixel_of(eye: vec3f) -> vec2i {
     return vec2i(floor(project(camera, eye))) + vec2i(camera.corner);
 }
 
 struct March {
-    // World distance; FAR where nothing was hit.
+    // World-space distance; FAR without a hit.
     distance: f32,
     at: u32,
     eye: vec3f,
 }
 
-// Walks a ray over the depth image of the solids. A hit lies just behind that surface, a few spacings or 1.5 steps, of which each goes
-// `deep` times as far behind it, at most; things nearer to the viewer than `nearest` stand before the water and are no hit. The hit is
-// refined after the walk and not where it is found: adapters that run both sides of a branch would refine at each step.
+// Marches a ray over the depth image of the solids. A hit is at most a few spacings or 1.5 steps
+// behind that surface, where each step counts `deep` times; geometry nearer to the viewer than
+// `nearest` is in front of the water and no hit. The refinement follows the loop, because adapters
+// that execute both sides of a branch would refine at every step.
 fn march(origin: vec3f, direction: vec3f, reach: f32, steps: i32, growth: f32, deep: f32, nearest: f32) -> March {
     var last = 0.0;
-    // First step of a geometric row of `steps` steps that ends at `reach`.
+    // First step of a geometric series of `steps` steps that ends at `reach`.
     var step = reach / f32(steps);
     if growth > 1.0 {
         step = reach * (growth - 1.0) / (pow(growth, f32(steps)) - 1.0);
@@ -45,7 +47,7 @@ fn march(origin: vec3f, direction: vec3f, reach: f32, steps: i32, growth: f32, d
     return refine(origin, direction, last, next);
 }
 
-// What a ray meets between two distances; nothing where the second is FAR.
+// Refines a hit between two distances by bisection; no hit where the second is FAR.
 fn refine(origin: vec3f, direction: vec3f, from_t: f32, to_t: f32) -> March {
     if to_t >= FAR {
         return March(FAR, 0u, vec3f(0.0));

@@ -1,9 +1,10 @@
-// Where a particle is at the sample's instant. Needs the binding `camera` of whoever imports it, and with PATHS `paths`: then it goes
-// along the curve that the frames around it say (src/render/paths.rs), without it straight on.
+// Position of a particle at the sample's instant. The importing shader must bind `camera` and, with
+// PATHS, `paths`: the particle then follows its curve through the neighbouring frames
+// (src/render/paths.rs), otherwise a straight line.
 #import "shared/ssfr_splat.wgsl"
 
 struct Path {
-    // Metres for the square and the cube of seconds, before the frame's instant and after it.
+    // Coefficients of t² and t³, t in seconds, before and after the frame's instant.
     before_square: vec3f,
     pad0: f32,
     before_cube: vec3f,

@@ -1,4 +1,4 @@
-// Numbers and smooth noise that belong to places on the ground, the same in every frame.
+// Hashes and smooth noise of positions on the ground, constant over frames.
 
 fn hash2(p: vec2i) -> f32 {
     var h = bitcast<u32>(p.x) * 0x9E3779B1u ^ bitcast<u32>(p.y) * 0x85EBCA77u;

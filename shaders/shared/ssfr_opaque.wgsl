@@ -1,4 +1,5 @@
-// What the set looks like under sun and sky. Needs what ssfr_light.wgsl needs, and what ssfr_solid.wgsl has.
+// Shading of opaque geometry under sun and sky. Needs the bindings of ssfr_light.wgsl and the
+// declarations of ssfr_solid.wgsl.
 #import "shared/ssfr_light.wgsl"
 #import "shared/ssfr_noise.wgsl"
 #ifdef MATERIALS
@@ -10,7 +11,7 @@ struct Surface {
     normal: vec3f,
     // As in ssfr_solid; 2 = ground.
     material: u32,
-    // Of the set, or NO_TRIANGLE.
+    // Index of the triangle, or NO_TRIANGLE.
     triangle: u32,
 }
 
@@ -58,18 +59,18 @@ fn facade(at: Surface, footprint: f32) -> Facade {
 }
 #endif
 
-// Radiance that leaves an opaque surface towards the viewer; `view` points to the viewer, `footprint` is
-// the size of a pixel there. `depth` metres of water stand above it.
+// Radiance of an opaque surface towards the viewer; `view` points to the viewer, `footprint` is the
+// size of a pixel there in metres, and `depth` the metres of water above it.
 fn radiance_of(at: Surface, view: vec3f, footprint: f32, depth: f32) -> vec3f {
     let sun = shading.sun_irradiance * max(dot(at.normal, shading.sun_direction), 0.0)
         * sunlit(at.position, at.normal);
     return radiance_under(at, view, footprint, depth, sun);
 }
 
-// The same under sunlight that puts `sun` on the surface, but for what water takes of it.
+// The same with the sun's irradiance `sun` on the surface, before absorption by the water.
 fn radiance_under(at: Surface, view: vec3f, footprint: f32, depth: f32, sun: vec3f) -> vec3f {
     let through = exp(-(shading.absorption + shading.scattering) * depth * shading.sun_path);
-    // Faces low between other things see less of the sky: a stand-in for its occlusion.
+    // Low faces see less of the sky: an approximation of its occlusion.
     let open = select(1.0, mix(0.45, 1.0, smoothstep(0.0, 0.1 * shading.extent, at.position.y)), at.material != 2u);
     let light = (sun + sky_irradiance(at.normal) * open) * through / PI;
     if at.material == 2u {

@@ -1,9 +1,10 @@
-// What happens to light at and in water.
+// Optics of water.
 
 const PI: f32 = 3.14159265;
 
-// Unpolarised reflectance from air onto a medium of refractive index n, c = cosine of incidence.
-// Exact: Schlick's fit is off by 0.06 near grazing, where waves are seen.
+// Unpolarised Fresnel reflectance from air onto a medium of refractive index n, c = cosine of
+// incidence. Exact: Schlick's approximation is off by 0.06 near grazing incidence, at which waves
+// are seen.
 fn fresnel(c: f32, n: f32) -> f32 {
     let ct = sqrt(max(1.0 - (1.0 - c * c) / (n * n), 0.0));
     let s = (c - n * ct) / (c + n * ct);
@@ -11,8 +12,9 @@ fn fresnel(c: f32, n: f32) -> f32 {
     return 0.5 * (s * s + p * p);
 }
 
-// GGX facet density and Smith's masking with α² = 2 × the mean square slope, times the Fresnel reflectance,
-// over 4 (n·v)(n·l), times n·l: reflected radiance over the irradiance of a distant light at right angles.
+// GGX facet density and Smith's masking with α² = 2 × the mean square slope, times the Fresnel
+// reflectance, over 4 (n·v)(n·l), times n·l: reflected radiance over the irradiance of a distant
+// light on a perpendicular face.
 fn glitter(n: vec3f, v: vec3f, l: vec3f, slope_variance: f32, index: f32) -> f32 {
     let nl = dot(n, l);
     let nv = max(dot(n, v), 0.02);
@@ -29,9 +31,10 @@ fn glitter(n: vec3f, v: vec3f, l: vec3f, slope_variance: f32, index: f32) -> f32
     return density * fresnel(clamp(dot(v, h), 0.0, 1.0), index) * nl / (mask_l * mask_v);
 }
 
-// Two lobes of Henyey and Greenstein 1941. Refracted and mirrored light of water drops has a mean cosine of 0.77: large drops have
-// 0.885 in all (van de Hulst 1957), of which half is diffracted straight on and cannot be told from light that met nothing.
-// 0.93 · 0.85 − 0.07 · 0.3 = 0.77, and a part of the mirrored light comes back.
+// Two Henyey-Greenstein lobes (1941). Light refracted and reflected by water drops has a mean
+// cosine of 0.77: large drops have 0.885 in total (van de Hulst 1957), but half of that light is
+// diffracted forward and indistinguishable from unscattered light. 0.93 · 0.85 − 0.07 · 0.3 = 0.77,
+// with a fraction of reflected light going backward.
 const AHEAD: f32 = 0.85;
 const BACK: f32 = -0.3;
 const BACKWARD: f32 = 0.07;
@@ -41,7 +44,8 @@ fn lobe(g: f32, cosine: f32) -> f32 {
     return (1.0 - g * g) / (4.0 * PI * s * sqrt(s));
 }
 
-// Per steradian, over the cosine between ways before and after; its integral over all ways is 1.
+// Phase function, 1/sr, by the cosine between the directions before and after scattering; its
+// integral over the sphere is 1.
 fn drop_phase(cosine: f32) -> f32 {
     return mix(lobe(AHEAD, cosine), lobe(BACK, cosine), BACKWARD);
 }

@@ -1,9 +1,10 @@
-// Which particles a dispatch sees: as many as a binding holds, and of those that hold air some in a row.
+// Range of particles of a dispatch: as many as a binding holds, and the contiguous range of those
+// that hold air.
 struct Page {
-    // Of the frame's, the first that is bound, and how many are.
+    // First of the frame's particles that is bound, and number of bound particles.
     first: u32,
     count: u32,
-    // Of `aired`, the first that is one of these, and how many are.
+    // First entry of `aired` in this range, and number of entries.
     aired_first: u32,
     aired_count: u32,
 }

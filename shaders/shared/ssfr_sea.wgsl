@@ -1,15 +1,16 @@
-// The sea in a picture of splats. Needs the bindings `camera`, `sea` and `sea_values` of whoever imports it.
+// The sea in screen-space rendering. The importing shader must bind `camera`, `sea` and
+// `sea_values`.
 #import "shared/sea.wgsl"
 
 struct SeaSeen {
-    // Distance from the eye; FAR where there is none.
+    // Distance from the eye; FAR without a hit.
     distance: f32,
-    // Upward, and the mean square slope of the waves that a pixel there cannot hold.
+    // Upward normal, and the mean square slope of the waves that a pixel there cannot resolve.
     normal: vec3f,
     variance: f32,
 }
 
-// The sea along a ray from the eye, which stands in air, before something `bound` metres away.
+// Intersection with the sea of a ray from an eye in air, up to `bound` metres.
 fn sea_from_eye(direction: vec3f, bound: f32) -> SeaSeen {
     let origin = camera.position;
     let span = span_of(sea.size, origin, direction);
@@ -30,7 +31,8 @@ fn sea_from_eye(direction: vec3f, bound: f32) -> SeaSeen {
     return seen;
 }
 
-// Metres of the sea's water on a line of sight that comes through the simulated water and out of the box.
+// Metres of the sea's water on a line of sight that passes through the simulated water and leaves
+// the box.
 fn sea_behind(direction: vec3f) -> f32 {
     let span = span_of(sea.size, camera.position, direction);
     let p = camera.position + direction * (span.y + sea.hair);

@@ -1,21 +1,23 @@
-// A triangle of the set, and how its normal and material are packed into a word.
+// An opaque triangle, and the packing of its normal and material into a word.
 
 struct Triangle {
     a: vec3f,
-    // 0 = solid of the scene, 1 = quay wall of the look; from 4 on solids that are told apart, from 192 on colours of the palette.
+    // 0 = solid of the scene, 1 = quay wall of the look; from 4 on individual solids, from 192 on
+    // colours of the palette.
     material: u32,
     b: vec3f,
-    // Number of its material, from 1 on; 0 = the colour of all of that kind.
+    // Number of its material, from 1; 0 = the common colour of its kind.
     paint: u32,
     c: vec3f,
-    // How the material's picture lies on it: behind the last triangle stand such records, whose words materials.wgsl tells.
+    // Index of its texture mapping, which is stored after the last triangle; materials.wgsl
+    // describes the record.
     place: u32,
 }
 
-// What is no triangle: the ground, a side of the box, the sky.
+// Marks hits without a triangle: the ground, a side of the box, the sky.
 const NO_TRIANGLE: u32 = 0xffffffffu;
 
-// First of the materials whose colours the palette has.
+// First material code of the palette.
 const FIRST_OF_PALETTE: u32 = 192u;
 
 // 2 = ground, 3 = sky.
@@ -31,7 +33,7 @@ fn sign_not_zero(v: vec2f) -> vec2f {
     return select(vec2f(-1.0), vec2f(1.0), v >= vec2f(0.0));
 }
 
-// Octahedral, 12 bits an axis; the six axis directions come back exactly.
+// Octahedral encoding with 12 bits per axis; the six axis directions are exact.
 fn pack_normal(n: vec3f, material: u32) -> u32 {
     let p = n.xy / (abs(n.x) + abs(n.y) + abs(n.z));
     let folded = select((1.0 - abs(p.yx)) * sign_not_zero(p), p, n.z >= 0.0);

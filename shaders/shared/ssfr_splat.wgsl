@@ -1,13 +1,15 @@
-// A particle as a sphere on the screen.
+// Projection of particles as spheres.
 
 struct Particle {
-    // World position.
+    // World position, metres.
     position: vec3f,
-    // From the lowest bit on: 16 of the part of its volume that whitens; 6 of how much company it has, 0 for one that flies alone; 10 of
-    // the radius of what of it belongs to the surface, over that of a whole one.
+    // From the lowest bit on: 16 bits of the fraction of its volume that whitens; 6 bits of
+    // company, 0 for a particle on its own; 10 bits of its radius in the surface over the full
+    // radius.
     air: u32,
     velocity: vec3f,
-    // Twice the particle's id, plus 1 where it belongs to the body of water that rays meet, 0 where it was thrown clear of it.
+    // Twice the particle's id, plus 1 where it belongs to the body of water that rays meet, 0 where
+    // it was thrown clear of it.
     tag: u32,
 }
 
@@ -19,20 +21,21 @@ fn company_of(particle: Particle) -> f32 {
     return f32((particle.air >> 16u) & 63u) / 63.0;
 }
 
-// Radius of the sphere that stands for it in the surface, metres.
+// Radius of the particle's sphere in the surface, metres.
 fn body_radius(camera: Camera, particle: Particle) -> f32 {
     let part = particle.air >> 22u;
     return camera.radius * select(f32(part) / 1023.0, 1.0, part == 1023u);
 }
 
-// Row of the i-th pixel of a box `width` wide, exact below 2²² pixels; software adapters divide integers
-// one lane at a time.
+// Row of the i-th pixel of a box `width` wide, exact below 2²² pixels; software adapters divide
+// integers one lane at a time.
 fn row_of(i: u32, width: u32) -> u32 {
     return u32((f32(i) + 0.5) / f32(width));
 }
 
 // Pixels that the sphere may touch: least and greatest, inclusive; x > z where there are none.
-// The exact perspective bounds of a sphere (Mara and McGuire 2013, 2D polyhedral bounds, in one axis each).
+// Exact perspective bounds of a sphere (Mara and McGuire 2013, 2D polyhedral bounds, in one axis
+// each).
 fn sphere_bounds(camera: Camera, c: vec3f, radius: f32, scale: f32, size: vec2u) -> vec4i {
     if c.z < 1.5 * radius {
         return vec4i(0, 0, -1, -1);
@@ -45,7 +48,7 @@ fn sphere_bounds(camera: Camera, c: vec3f, radius: f32, scale: f32, size: vec2u)
     return pixels_between(camera, low, high, scale, size);
 }
 
-// Whole pixels between two places that are counted from `corner`, and moved from there once they are whole.
+// Whole pixels between two positions relative to `corner`; the offset is added after rounding.
 fn pixels_between(camera: Camera, low: vec2f, high: vec2f, scale: f32, size: vec2u) -> vec4i {
     let shift = camera.corner * scale;
     let edge = vec2f(size) - 1.0 - shift;
@@ -63,8 +66,8 @@ struct Hit {
     chord: f32,
 }
 
-// The ray has z = 1, so its parameter is the depth. The discriminant is taken from the cross product:
-// the textbook b² − ac loses every digit at 20 m for a 10 cm sphere.
+// The ray has z = 1, so its parameter is the depth. The discriminant uses the cross product: the
+// textbook b² − ac loses every digit at 20 m for a 10 cm sphere.
 fn hit_sphere(ray: vec3f, c: vec3f, radius: f32) -> Hit {
     let a = dot(ray, ray);
     let off = cross(ray, c);
@@ -76,5 +79,5 @@ fn hit_sphere(ray: vec3f, c: vec3f, radius: f32) -> Hit {
     return Hit((dot(ray, c) - root) / a, 2.0 * root / sqrt(a));
 }
 
-// Fixed point of thickness sums: integer atomics add up to the same bits in any order.
+// Fixed-point scale of thickness sums: integer atomics give the same bits in any order.
 const THICKNESS_SCALE: f32 = 65536.0;

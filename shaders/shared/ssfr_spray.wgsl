@@ -1,16 +1,18 @@
-// What splats sum up of spray and whitewater, at half resolution: planes of one word a cell, optical length first, then that times
-// depth, and with MOTION times each axis of velocity; with FOAM, without MOTION, that of foam and bubbles alone.
+// Sums of spray and whitewater splats at half resolution, in planes of one word per cell: optical
+// length, and optical length times depth; with MOTION also times each component of velocity; with
+// FOAM but without MOTION also the optical length of foam and bubbles only.
 #import "shared/ssfr_splat.wgsl"
 
 struct SprayParams {
-    // Optical density of what stands in the sums, 1/m.
+    // Optical density of the sums, 1/m.
     density: f32,
-    // d³ / (4/3 π r³): the volume that a particle stands for over that of its sphere.
+    // d³ / (4/3 π r³): volume of a particle over that of its sphere.
     scale: f32,
-    // Depth and speed that stand for 1 in the sums, metres and m/s: none is larger.
+    // Depth, metres, and speed, m/s, that 1 represents in the sums; no value is larger.
     range: f32,
     speed: f32,
 }
 
-// Fixed point of the sums: integer atomics add up to the same bits in any order. They hold 1024 m.
+// Fixed-point scale of the sums: integer atomics give the same bits in any order. A sum holds up to
+// 1024 m.
 const SPRAY_SCALE: f32 = 4194304.0;

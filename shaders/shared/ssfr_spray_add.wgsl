@@ -1,12 +1,13 @@
-// Adds to the sums of spray. Needs the bindings `camera`, `spray_params` and `spray` of whoever imports it.
+// Accumulation of spray sums. The importing shader must bind `camera`, `spray_params` and `spray`.
 #import "shared/ssfr_spray.wgsl"
 
-// Part of a ball at depth `z` that is nearer than `edge`: it dips in there instead of ending.
+// Fraction of a sphere at depth `z` in front of `edge`, so that spheres fade where they intersect a
+// surface.
 fn before(edge: f32, z: f32, radius: f32) -> f32 {
     return clamp((edge - z) / (2.0 * radius) + 0.5, 0.0, 1.0);
 }
 
-// `amount` metres of optical length, at a depth and with a velocity in the world.
+// Adds `amount` metres of optical length at a depth, with a world-space velocity.
 fn add_spray(pixel: vec2u, amount: f32, z: f32, velocity: vec3f) {
     let half_size = camera.size / 2u;
     let scaled = amount * SPRAY_SCALE;
@@ -20,7 +21,7 @@ fn add_spray(pixel: vec2u, amount: f32, z: f32, velocity: vec3f) {
     atomicAdd(&spray[at + plane], u32(scaled * clamp(z / spray_params.range, 0.0, 1.0) + 0.5));
 #ifdef MOTION
     let part = clamp(velocity / spray_params.speed, vec3f(-1.0), vec3f(1.0));
-    // Two's complement: sums of either sign wrap to what they are.
+    // Two's complement: wrapped sums of both signs are correct.
     let words = bitcast<vec3u>(vec3i(round(scaled * part)));
     atomicAdd(&spray[at + 2u * plane], words.x);
     atomicAdd(&spray[at + 3u * plane], words.y);
@@ -29,7 +30,7 @@ fn add_spray(pixel: vec2u, amount: f32, z: f32, velocity: vec3f) {
 }
 
 #ifdef FOAM
-// What of `amount` is foam, in a plane of its own.
+// Adds the part of `amount` that is foam to a separate plane.
 fn add_foam(pixel: vec2u, amount: f32) {
     let half_size = camera.size / 2u;
     let plane = half_size.x * half_size.y;

@@ -1,9 +1,10 @@
-// Which way a cloud of spray faces. Needs what ssfr_spray_read.wgsl needs, and `shading`.
+// Orientation of a spray cloud. Needs the bindings of ssfr_spray_read.wgsl, and `shading`.
 #import "shared/ssfr_spray_read.wgsl"
 #import "shared/ssfr_slope.wgsl"
 
-// Depth of the cloud's near side at a position; where it hides little, goes over to that of a cloud at `z`. Its far side lies as far
-// behind the mean as its near side before it, and the way between them is what the densest cloud of this optical depth needs.
+// Depth of the cloud's near side at a position; blends into that of a cloud at `z` where coverage
+// is low. Near and far sides are equally far from the mean, at the least distance for the cloud's
+// optical depth, that of the densest cloud.
 fn spray_front(position: vec2f, z: f32) -> f32 {
     let mist = spray_at(position);
     return mix(z, mist.depth, mist.cover) - 0.5 * mist.optical_depth / spray_params.density;

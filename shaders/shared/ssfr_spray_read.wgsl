@@ -1,5 +1,5 @@
-// Spray at a pixel: how much it hides, and where and how fast it is in the mean of what hides. Needs the bindings `camera`,
-// `spray_params` and `spray` of whoever imports it.
+// Spray at a pixel: its coverage, and the means of depth and velocity weighted by it. The importing
+// shader must bind `camera`, `spray_params` and `spray`.
 #import "shared/ssfr_spray.wgsl"
 #import "shared/ssfr_half.wgsl"
 #import "shared/ssfr_lights.wgsl"
@@ -7,7 +7,7 @@
 struct Spray {
     optical_depth: f32,
     cover: f32,
-    // Along the optical axis, metres.
+    // Depth along the optical axis, metres.
     depth: f32,
 }
 
@@ -22,7 +22,7 @@ fn spray_plane() -> u32 {
     return half_size.x * half_size.y;
 }
 
-// At a padded pixel position.
+// Spray at a padded pixel position.
 fn spray_at(position: vec2f) -> Spray {
     let tap = half_tap(position);
     let length = spray_mean(tap, 0u);
@@ -40,7 +40,7 @@ fn spray_signed(tap: HalfTap, plane: u32) -> f32 {
     return mix(mix(v.x, v.y, tap.part.x), mix(v.z, v.w, tap.part.x), tap.part.y);
 }
 
-// Mean velocity, m/s, where there is spray and it was splatted with MOTION.
+// Mean velocity, m/s, where there is spray; requires splatting with MOTION.
 fn spray_velocity(position: vec2f) -> vec3f {
     let tap = half_tap(position);
     let plane = spray_plane();
@@ -49,7 +49,7 @@ fn spray_velocity(position: vec2f) -> vec3f {
     return sum / spray_mean(tap, 0u) * spray_params.speed;
 }
 
-// Adds the light of what was splatted at a position, which covers so much of it, to its parts.
+// Adds the light of splats at a position, with their coverage, to the light components.
 fn white_parts(position: vec2f, light: vec3f, cover: f32) {
 #ifdef FOAM
     let tap = half_tap(position);

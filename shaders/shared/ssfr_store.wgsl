@@ -1,19 +1,21 @@
-// Adds a sample to the picture. Needs the binding `output` of whoever imports it.
+// Adds samples to the picture. The importing shader must bind `output`.
 #import "shared/ssfr_lights.wgsl"
 
 #ifdef LIGHTS
-// Which of them are written: a bit each.
+// Bit mask of the light components that are written.
 override WRITTEN_LIGHTS: u32;
-// Vectors of a pixel in `output`: the picture, and those that are written.
+// Vectors per pixel in `output`: the picture and the written components.
 override STRIDE: u32;
 #endif
 
 fn put(at: u32, value: vec4f, is_first: bool) {
-    // Not a branch: lavapipe compiles a pass with one that uniforms alone decide again for each sample (docs/performance.md).
+    // Not a branch: lavapipe compiles a pass again for each sample if a branch depends on uniforms
+    // only (docs/performance.md).
     output[at] = select(output[at], vec4f(0.0), is_first) + value;
 }
 
-// Adds a sample's picture, and the parts of its light, to the pixel's mean; the first one replaces what was there.
+// Adds a sample's picture and light components to the pixel's mean; the first sample overwrites the
+// previous content.
 fn store_light(pixel: u32, value: vec4f, weight: f32, is_first: bool) {
 #ifdef LIGHTS
     var at = pixel * STRIDE;

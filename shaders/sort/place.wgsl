@@ -1,4 +1,4 @@
-// Puts each element into its cell's range, in the order in which the device handed out slots.
+// Places each element into its cell's range, in the order in which atomics assigned slots.
 #import "shared/thread.wgsl"
 
 @group(0) @binding(0) var<storage, read> cell_of: array<u32>;

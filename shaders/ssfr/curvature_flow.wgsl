@@ -1,4 +1,5 @@
-// z −= dt H on one level, H the mean curvature of the depth image, in the tiles of a list.
+// Flow step z −= dt H on one level, in the tiles of a list; H is the mean curvature of the depth
+// image.
 #import "shared/camera.wgsl"
 #import "shared/ssfr_flow.wgsl"
 #import "shared/ssfr_tiles.wgsl"
@@ -10,10 +11,11 @@
 @group(0) @binding(4) var<storage, read_write> smoothed: array<f32>;
 @group(0) @binding(5) var<storage, read> tiles: array<u32>;
 
-// Tangent of the steepest slope that counts as one.
+// Tangent of the steepest slope that counts as part of the surface.
 const STEEPEST: f32 = 1.0;
 
-// A thread has two by two cells: of the sixteen depths that they and their neighbours are, one alone would read nine.
+// Each thread processes two by two cells: together with their neighbours these need sixteen depths,
+// a single cell nine.
 
 fn depth_at(cell: vec2i) -> f32 {
     let size = vec2i(level.size);
@@ -22,13 +24,13 @@ fn depth_at(cell: vec2i) -> f32 {
     return select(FAR, z, all(held == cell));
 }
 
-// A row of four depths, from a cell on.
+// Row of four depths, beginning at a cell.
 fn row_at(cell: vec2i) -> vec4f {
     return vec4f(
         depth_at(cell), depth_at(cell + vec2i(1, 0)), depth_at(cell + vec2i(2, 0)), depth_at(cell + vec2i(3, 0)));
 }
 
-// A depth after the step, from the rows above it, its own and below, of which it is the middle.
+// Depth after the step at the middle of three rows: above, own and below.
 fn stepped(above_row: vec3f, row: vec3f, below_row: vec3f) -> f32 {
     let z = row.y;
     if z >= FAR {
@@ -54,9 +56,10 @@ fn stepped(above_row: vec3f, row: vec3f, below_row: vec3f) -> f32 {
     if no_above { above = straight(z, below, no_below); }
     if no_below { below = straight(z, above, no_above); }
 
-    // The equations of the paper, 3 to 7, in w = 1/z. With a = z_x / (C z), b = z_y / (C z):
-    //   H = z ((1 + b²) w_xx − 2 a b w_xy + (1 + a²) w_yy) / (2 C (1 + a² + b²)^(3/2)),
-    // less a remainder of theirs that moves a slanted plane by σ²/z; a plane is straight in w, so here it stays.
+    // Equations 3 to 7 of the paper, in w = 1/z. With a = z_x / (C z), b = z_y / (C z): H = z ((1 +
+    // b²) w_xx − 2 a b w_xy + (1 + a²) w_yy) / (2 C (1 + a² + b²)^(3/2)), without a remainder in
+    // the paper that moves a slanted plane by σ²/z; a plane is straight in w, so here it stays in
+    // place.
     let w = 1.0 / z;
     let wxx = 1.0 / right - 2.0 * w + 1.0 / left;
     let wyy = 1.0 / below - 2.0 * w + 1.0 / above;
@@ -71,15 +74,15 @@ fn stepped(above_row: vec3f, row: vec3f, below_row: vec3f) -> f32 {
         }
     }
     var slope = 0.5 * vec2f(right - left, below - above) / cell;
-    // A step from splat to splat is no slope of the water: taken as one, it would hold up the flow across it
-    // (by 1 / (1 + slope²)) and stay as a scale on the surface.
+    // A step between splats is no slope of the water: counted as one, it would slow the flow across
+    // it (by 1 / (1 + slope²)) and remain as a scale on the surface.
     slope *= min(1.0, STEEPEST / max(length(slope), 1e-6));
     let s2 = slope * slope;
     let bend = (1.0 + s2.y) * wxx - 2.0 * slope.x * slope.y * wxy + (1.0 + s2.x) * wyy;
 
-    // H moves the surface along the line of sight; times √(1 + slope²) it moves along its normal, so that the
-    // width is the same on a surface seen at a slant. The coefficients of w_xx and w_yy stay at or below
-    // their face-on values, and with them the stability limit.
+    // H moves the surface along the line of sight; times √(1 + slope²) it moves along its normal,
+    // so that the width is the same on slanted surfaces. The coefficients of w_xx and w_yy stay at
+    // or below their face-on values, which preserves the stability limit.
     let h_slant = z * bend / (2.0 * c * (1.0 + s2.x + s2.y));
     let dt = params.fraction * 0.5 * z * c * share;
     return max(z - dt * h_slant, 0.25 * z);

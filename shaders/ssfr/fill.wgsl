@@ -1,4 +1,4 @@
-// One word, everywhere.
+// Fills a buffer with one word.
 
 struct FillParams {
     word: u32,

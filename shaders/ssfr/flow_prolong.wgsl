@@ -1,5 +1,6 @@
-// The surface that the flow left on the coarse level, interpolated on the fine one. Beside an edge, where not all
-// four coarse cells lie on the fine one's surface, only what the flow changed there is taken over.
+// Interpolates the surface of the coarse level onto the fine one. Beside an edge, where not all
+// four coarse cells belong to the fine cell's surface, only applies the change that the flow made
+// there.
 #import "shared/camera.wgsl"
 #import "shared/ssfr_flow.wgsl"
 #import "shared/ssfr_tiles.wgsl"
@@ -14,7 +15,8 @@
 @group(0) @binding(6) var<storage, read_write> corrected: array<f32>;
 @group(0) @binding(7) var<storage, read> tiles: array<u32>;
 
-// Three depths of a row of the coarse level, the second one that of `cell`, before the flow and after it; FAR past the frame.
+// Three depths of a row of the coarse level before and after the flow, the second one at `cell`;
+// FAR outside the frame.
 struct Coarse {
     before: vec3f,
     after: vec3f,
@@ -31,8 +33,8 @@ fn coarse_row(cell: vec2i) -> Coarse {
     return Coarse(select(vec3f(FAR), before, is_in), after);
 }
 
-// The depth of a cell that had `z` and lies `part` of the way from the first of four coarse cells to the last: left and right above,
-// left and right below.
+// New depth of a cell with depth `z` at the fraction `part` between four coarse cells: left and
+// right above, left and right below.
 fn prolonged(z: f32, before: vec4f, after: vec4f, part: vec2f) -> f32 {
     if z >= FAR || !level_share(params, z, camera.focal, level.level + 1u).reached {
         return z;
@@ -41,7 +43,7 @@ fn prolonged(z: f32, before: vec4f, after: vec4f, part: vec2f) -> f32 {
     let weights = vec4f(1.0 - part.x, part.x, 1.0 - part.x, part.x)
         * vec4f(1.0 - part.y, 1.0 - part.y, part.y, part.y);
     var change = 0.0;
-    // In 1/z, where a plane is straight.
+    // In 1/z, in which a plane is straight.
     var inverse = 0.0;
     var total = 0.0;
     for (var i = 0; i < 4; i++) {
@@ -73,7 +75,7 @@ fn store(id: vec2u, above: Coarse, below: Coarse, part: vec2f) {
     corrected[at] = prolonged(fine[at], before, after, part);
 }
 
-// A thread has the two by two cells of a coarse one.
+// Each thread processes the two by two fine cells of a coarse one.
 @compute @workgroup_size(16, 4)
 fn main(
     @builtin(workgroup_id) group: vec3u,

@@ -1,4 +1,5 @@
-// The next coarser level: the nearest of four depths, averaged with those on the same surface.
+// Computes the next coarser level: the nearest of four depths, averaged with those on the same
+// surface.
 #import "shared/camera.wgsl"
 #import "shared/ssfr_flow.wgsl"
 
@@ -32,7 +33,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         var count = 0.0;
         for (var i = 0u; i < 4u; i++) {
             if !is_edge(params, nearest, z[i], cell) {
-                // In 1/z, where a plane is straight.
+                // In 1/z, in which a plane is straight.
                 sum += 1.0 / z[i];
                 count += 1.0;
             }

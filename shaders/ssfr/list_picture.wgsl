@@ -1,2 +1,2 @@
-// As list_tiles, with SOLIDS: what of the picture has water, solids, or neither.
+// As list_tiles, with SOLIDS: sorts the picture's tiles into water, solids and neither.
 #import "ssfr/list_tiles.wgsl"

@@ -1,2 +1,2 @@
-// Which tiles of a part of the frame have spray: as for water, with SPRAY.
+// As list_tiles, with SPRAY: lists the tiles of a part of the frame that have spray.
 #import "ssfr/list_tiles.wgsl"

@@ -1,5 +1,5 @@
-// Which tiles of a part of the frame have water, a thread a tile, and with SOLIDS which of the others have what is opaque; with SPRAY, which
-// have spray.
+// Lists the tiles of a part of the frame that have water, one tile per thread; with SOLIDS also
+// those of the others that have opaque geometry; with SPRAY those that have spray instead.
 #import "shared/camera.wgsl"
 #import "shared/thread.wgsl"
 #import "shared/ssfr_tiles.wgsl"
@@ -8,9 +8,9 @@ struct TileGrid {
     // First pixel of the part, and its size in pixels.
     corner: vec2u,
     size: vec2u,
-    // Pixels of a tile.
+    // Size of a tile in pixels.
     tile: vec2u,
-    // What they stand in, pixels.
+    // Size of the frame in pixels.
     frame: vec2u,
 }
 
@@ -25,10 +25,10 @@ struct TileGrid {
 @group(0) @binding(3) var<storage, read> solid_depth: array<f32>;
 #endif
 
-// Whether there is some in the pixels from `first` on and before `after`.
+// Whether there is any in the pixels from `first` up to but excluding `after`.
 #ifdef SPRAY
 fn is_there(first: vec2u, after: vec2u) -> bool {
-    // Pixels are between cells of twice their size, also those around the tile.
+    // Pixels interpolate between cells of twice their size, including those around the tile.
     let low = (max(first, vec2u(2u)) - 2u) / 2u;
     let high = min(after / 2u + 1u, (grid.frame / 2u));
     var all = 0u;
@@ -87,7 +87,7 @@ fn main(
         kind = SET_ALONE;
     }
 #endif
-    // In any order: what a pass over the list does at a pixel has nothing to do with the others.
+    // The order is arbitrary: passes over the list treat pixels independently.
     let place = atomicAdd(&tiles[kind], 1u);
     atomicStore(&tiles[FIRST_TILE + kind * count.x * count.y + place], word);
 }

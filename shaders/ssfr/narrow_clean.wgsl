@@ -1,5 +1,6 @@
-// What two passes along the axes leave of each other's edges, taken out by one in two dimensions over a few pixels (Truong and Yuksel
-// 2018, section 4.3): pairs of samples on either side of the centre, with the range of the passes before.
+// Removes what two passes along the axes leave of each other's edges, with a small two-dimensional
+// window (Truong and Yuksel 2018, section 4.3): pairs of samples on either side of the centre, with
+// the range of the previous passes.
 #import "shared/camera.wgsl"
 #import "shared/ssfr_narrow.wgsl"
 
@@ -31,7 +32,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     var range = NarrowRange(params.range, params.range);
     var sum = 1.0 / z;
     var total = 1.0;
-    // Half of the window; the other half are the mirrors.
+    // Half of the window; the other half are the mirror images.
     for (var y = 0; y <= reach.y; y++) {
         for (var x = select(-reach.x, 1, y == 0); x <= reach.x; x++) {
             let step = y * i32(camera.size.x) + x;

@@ -1,4 +1,5 @@
-// The narrow-range filter (Truong and Yuksel 2018) along one axis. Distances and widths are in pixels, the range in metres.
+// The narrow-range filter (Truong and Yuksel 2018) along one axis. Distances and widths are in
+// pixels, the range in metres.
 #import "shared/camera.wgsl"
 #import "shared/ssfr_narrow.wgsl"
 

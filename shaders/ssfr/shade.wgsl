@@ -1,5 +1,6 @@
-// One sample of the picture: sky, ground and solids, and the water before them, as much of it as spray lets through (shade_spray adds
-// that of the spray). With AOVS, the channels that stand beside the picture instead; with OBJECTS, what is seen first.
+// One sample of the picture: sky, ground and solids, and water in front of them, dimmed by spray
+// (shade_spray adds the light of the spray). With AOVS, the additional channels instead; with
+// OBJECTS, the first visible object.
 #import "shared/camera.wgsl"
 #import "shared/ssfr_band.wgsl"
 #ifdef LISTED
@@ -44,14 +45,14 @@
 @group(0) @binding(9) var shadow_map: texture_depth_2d;
 @group(0) @binding(10) var shadow_sampler: sampler_comparison;
 #ifdef AOVS
-// Ten floats a pixel: Z, N, P, forward, thickness.
+// Ten floats per pixel: Z, N, P, forward, thickness.
 @group(0) @binding(11) var<storage, read_write> output: array<f32>;
 @group(0) @binding(12) var<storage, read> owner: array<u32>;
 @group(0) @binding(13) var<storage, read> particles: array<Particle>;
 @group(0) @binding(14) var<uniform> next_camera: Camera;
 #else
 #ifdef OBJECTS
-// What is seen first, and the bits of the part of it that spray covers.
+// First visible object, and the bits of the fraction that spray covers.
 @group(0) @binding(11) var<storage, read_write> output: array<vec2u>;
 #else
 @group(0) @binding(11) var<storage, read_write> output: array<vec4f>;
@@ -89,8 +90,8 @@ fn eye_at(pixel: vec2i, z: f32) -> vec3f {
     return eye_ray(camera, vec2f(pixel) + 0.5) * z;
 }
 
-// One-sided difference of eye positions, along `step`, on the side where the depth changes less:
-// the other side may be another surface.
+// One-sided difference of eye positions along `step`, on the side where the depth changes less: the
+// other side may be another surface.
 fn difference(pixel: vec2i, z: f32, step: vec2i) -> vec3f {
     let after = surface_at(pixel + step);
     let before = surface_at(pixel - step);
@@ -107,7 +108,7 @@ fn surface_normal(pixel: vec2i, z: f32) -> vec3f {
     let down = difference(pixel, z, vec2i(0, 1));
     let n = cross(across, down);
     let ray = eye_at(pixel, z);
-    // A lone pixel without neighbours has no differences: it faces the viewer.
+    // A lone pixel has no differences: it faces the viewer.
     if max(abs(across.z), abs(down.z)) >= 0.1 * FAR {
         return -normalize(ray);
     }
@@ -120,16 +121,16 @@ fn thickness_at(position: vec2f) -> f32 {
     return half_load(&words, tap.part);
 }
 
-// Distance along a world ray to the ground, FAR where there is none; the floor is at y = 0.
+// Distance along a world ray to the ground at y = 0; FAR where there is none.
 fn ground_distance(origin: vec3f, direction: vec3f) -> f32 {
-    // In one: `||` would be a branch that uniforms alone decide (docs/performance.md).
+    // Bitwise: `||` would be a branch that depends on uniforms only (docs/performance.md).
     if (direction.y > -1e-5) | (origin.y <= 0.0) {
         return FAR;
     }
     return -origin.y / direction.y;
 }
 
-// What the solid of a pixel is, as in ssfr_solid.
+// Material code of a pixel's solid, as in ssfr_solid.
 fn solid_code(at: u32) -> u32 {
 #ifdef MATERIALS
     return set_triangles[solid_packed[at]].material;
@@ -138,7 +139,7 @@ fn solid_code(at: u32) -> u32 {
 #endif
 }
 
-// Of the solid that is seen at a pixel, at a place in the world.
+// Surface of the solid visible at a pixel, at a world position.
 fn solid_surface(at: u32, position: vec3f, view: vec3f) -> Surface {
     let word = solid_packed[at];
 #ifdef MATERIALS
@@ -152,11 +153,11 @@ fn solid_surface(at: u32, position: vec3f, view: vec3f) -> Surface {
     return Surface(position, select(n, -n, dot(n, view) < 0.0), material_of(solid_code(at)), named);
 }
 
-// In place of a pixel's number: no solid is there, but the ground.
+// In place of a pixel's index: the ground rather than a solid.
 const NO_SOLID: u32 = 0xffffffffu;
 
-// What is opaque and may have to be lit: the pixel whose solid it is, or NO_SOLID for the ground; where it is in the world, towards whom it
-// is seen, the size of a pixel there, and the metres of water above it.
+// Opaque point that may need shading: the pixel of its solid, or NO_SOLID for the ground; its world
+// position, the direction to the viewer, a pixel's size there, and the metres of water above it.
 struct Seen {
     at: u32,
     position: vec3f,
@@ -184,12 +185,12 @@ fn light_of(seen: Seen) -> vec3f {
 struct Behind {
     // Along the optical axis; FAR in the sky.
     depth: f32,
-    // Metres to the eye.
+    // Distance to the eye, metres.
     far: f32,
     seen: Seen,
 }
 
-// What stands at this pixel where there is no water.
+// What this pixel shows without water.
 fn behind(pixel: vec2i, ray: vec3f, direction: vec3f) -> Behind {
     let along = length(ray);
     let ground = ground_distance(camera.position, direction) / along;
@@ -210,7 +211,7 @@ fn behind(pixel: vec2i, ray: vec3f, direction: vec3f) -> Behind {
     return Behind(depth, far, Seen(at, camera.position + direction * far, -direction, far / camera.focal, 0.0));
 }
 
-// `light` is what leaves its surface, where it is none of the sky.
+// `light` is the radiance of its surface, unless it is the sky.
 fn behind_radiance(found: Behind, direction: vec3f, light: vec3f) -> vec3f {
     let is_sky = found.depth >= 0.1 * FAR;
     let air = sky_radiance(select(at_horizon(direction), direction, is_sky));
@@ -221,9 +222,10 @@ fn behind_radiance(found: Behind, direction: vec3f, light: vec3f) -> vec3f {
 }
 
 #ifndef DRY
-// The pixel at which the line of sight through a sheet of water meets what stands behind it. A thin prism turns light by n − 1 times its
-// angle (Born and Wolf, Principles of Optics, 4.7.2); that angle is the slope of the thickness. Where what is met there stands before the
-// sheet, it looks straight on.
+// Pixel at which the line of sight through a sheet of water meets what is behind it. A thin prism
+// deflects light by n − 1 times its angle (Born and Wolf, Principles of Optics, 4.7.2), which is
+// the slope of the thickness. Where the result is in front of the sheet, the ray continues
+// straight.
 fn through_sheet(pixel: vec2i, z: f32, straight: Behind) -> vec2i {
     let p = vec2f(pixel) + 0.5;
     let h = spacing_in_pixels(z);
@@ -240,7 +242,7 @@ fn through_sheet(pixel: vec2i, z: f32, straight: Behind) -> vec2i {
 }
 #endif
 
-// What of opaque things a pixel may have to show: what stands behind the water, what lies in it and what it mirrors.
+// Opaque points that a pixel may need: behind the water, in it, and in its reflection.
 const BACKDROP: u32 = 1u;
 const INTO: u32 = 2u;
 const MIRROR: u32 = 4u;
@@ -250,18 +252,18 @@ struct Water {
     eye: vec3f,
     normal: vec3f,
     view: vec3f,
-    // Mean square slope below the pixel.
+    // Mean square slope of waves below the pixel's resolution.
     slope_variance: f32,
-    // Part of the sunlight that comes to it.
+    // Fraction of the sunlight that arrives.
     lit: f32,
 }
 
-// That water scatters which lets `clear` of what is behind it through.
+// Light scattered by water with the transmittance `clear`.
 fn body_light(normal: vec3f, lit: f32, clear: vec3f) -> vec3f {
     return diffuse_light(normal, lit) * deep_albedo() * (1.0 - clear);
 }
 
-// What a mirrored ray meets.
+// Hit of a reflected ray.
 struct Mirrored {
     way: vec3f,
     hit: March,
@@ -270,7 +272,7 @@ struct Mirrored {
 
 fn mirrored(water: Water) -> Mirrored {
     var r = reflect(-water.view, water.normal);
-    // A mirrored ray that dips into the water would hit its next wave; it is bent up to the horizon.
+    // A reflected ray into the water would hit the next wave; it is bent up to the horizon.
     r = normalize(vec3f(r.x, max(r.y, 0.01), r.z));
     let eye_r = vec3f(dot(r, camera.right), dot(r, camera.up), dot(r, camera.forward));
     let start = water.eye + 0.3 * shading.spacing * eye_r;
@@ -278,8 +280,9 @@ fn mirrored(water: Water) -> Mirrored {
     return Mirrored(r, hit, Seen(hit.at, world_from_eye(camera, hit.eye), -r, hit.eye.z / camera.focal, 0.0));
 }
 
-// Light of a mirrored ray; `light` is that of the solid that it meets. Through the water and spray that stand before this from the mirror
-// on, as the picture has them; there spray faces the mirror, and the sun shines as on it.
+// Light of a reflected ray; `light` is the radiance of the solid it hits, seen through the water
+// and spray that the picture has between it and the mirror. That spray faces the mirror and is lit
+// like it.
 fn mirrored_light(met: Mirrored, water: Water, light: vec3f) -> vec3f {
     if met.hit.distance >= FAR {
         return sky_radiance(met.way);
@@ -300,30 +303,31 @@ fn mirrored_light(met: Mirrored, water: Water, light: vec3f) -> vec3f {
     return colour;
 }
 
-// What a ray that is bent into the water meets.
+// Hit of a ray refracted into the water.
 struct Bent {
     found: Seen,
-    // Metres of water on its way.
+    // Metres of water along its path.
     way: f32,
-    // 1 where it meets what is opaque in the water, 0 where the water ends well before: a sheet or a crest, through which one looks on
-    // almost straight.
+    // 1 where it hits opaque geometry in the water, 0 where the water ends well before that: a
+    // sheet or a crest, which hardly deflects the view.
     filled: f32,
 }
 
-// `seen` metres of water lie on the straight line of sight.
+// `seen` metres of water are on the straight line of sight.
 fn bent(water: Water, seen: f32) -> Bent {
     let n = shading.index;
     let ci = clamp(dot(water.normal, water.view), 0.0, 1.0);
     let ct = sqrt(max(1.0 - (1.0 - ci * ci) / (n * n), 0.0));
     let t = normalize(refract(-water.view, water.normal, 1.0 / n));
-    // Splats measure the straight way; through a sheet the bent one is shorter.
+    // Splats measure the straight path; through a sheet the refracted one is shorter.
     let path = seen * max(ci, 0.3) / ct;
 
     var reach = ground_distance(water.position, t);
     var at = NO_SOLID;
     let eye_t = vec3f(dot(t, camera.right), dot(t, camera.up), dot(t, camera.forward));
     let far = min(reach, 1.4 * seen + 1.8 * shading.spacing);
-    // Below a level ground a step that goes down steeply is as much farther from it along a flat line of sight as that is flatter.
+    // A refracted ray descends more steeply than the line of sight, so that a step below level
+    // ground lies this much farther behind it in depth.
     let deep = max(t.y / min(-water.view.y, -0.02), 1.0);
     let hit = march(water.eye, eye_t, far, 8, 1.0, deep, water.eye.z - 0.6 * shading.spacing);
     if hit.distance < reach {
@@ -337,21 +341,21 @@ fn bent(water: Water, seen: f32) -> Bent {
     return Bent(Seen(at, position, -t, water.eye.z / camera.focal, under), mix(path, straight, filled), filled);
 }
 
-// Water `z` metres along the optical axis, whose normal is `smooth_normal` but for ripples; `lost` is the mean square slope of waves that
-// a pixel there cannot hold.
+// Water at depth `z`, with the normal `smooth_normal` before ripples; `lost` is the mean square
+// slope of waves that a pixel there cannot resolve.
 fn water_at(z: f32, ray: vec3f, view: vec3f, smooth_normal: vec3f, lost: f32) -> Water {
     let eye = ray * z;
     let position = world_from_eye(camera, eye);
     var normal = smooth_normal;
     let footprint = z / camera.focal / max(dot(normal, view), 0.1);
     let facet = facet_at(position, normal, footprint);
-    // No facet that is seen faces away.
+    // Visible facets never face away.
     normal = normalize(facet.normal + view * max(0.03 - dot(facet.normal, view), 0.0) * 1.5);
     let lit = sunlit(position, vec3f(0.0, 1.0, 0.0));
     return Water(position, eye, normal, view, facet.variance + lost, lit);
 }
 
-// Light of water that mirrors `mirrored`, and through which comes `behind`, dimmed by the water on its way.
+// Light of water that reflects `mirrored` and transmits `behind`, dimmed along its path.
 fn water_light(water: Water, mirrored: vec3f, behind: vec3f, way: f32) -> vec3f {
     let reflectance = fresnel(clamp(dot(water.normal, water.view), 0.0, 1.0), shading.index);
     let sun = shading.sun_irradiance * water.lit
@@ -368,7 +372,7 @@ fn water_light(water: Water, mirrored: vec3f, behind: vec3f, way: f32) -> vec3f 
     return mirror + (1.0 - reflectance) * (seen + scattered) + sun;
 }
 
-// The parts of `behind_radiance`, which is `colour`.
+// Light components of `behind_radiance`, whose sum is `colour`.
 fn behind_parts(found: Behind, direction: vec3f, colour: vec3f) {
 #ifdef LIGHTS
     if found.depth < 0.1 * FAR {
@@ -383,7 +387,7 @@ fn behind_parts(found: Behind, direction: vec3f, colour: vec3f) {
 }
 
 #ifdef LISTED
-// Which list of tiles is gone through.
+// List of tiles to process.
 #ifdef BARE
 const LIST: u32 = BARE_TILES;
 #else
@@ -515,7 +519,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         lost = open.variance;
     }
 #endif
-    // What of it is to be lit, a bit each.
+    // Bit mask of the points to shade.
     var wanted = select(0u, BACKDROP, met.depth < 0.1 * FAR);
     var water: Water;
     var mirror: Mirrored;
@@ -531,9 +535,10 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         wanted = select(0u, wanted, into.filled < 1.0) | select(0u, INTO, into.filled > 0.0)
             | select(0u, MIRROR, mirror.hit.distance < FAR);
     }
-    // One after the other: adapters that run both sides of a branch leave a loop when none of their pixels has more to do, and most have
-    // one or two of the three. They leave it where that is asked: at the end too, or they run all of it once more for no pixel. At the end
-    // alone, lavapipe (Mesa 22.3) would go on to change what pixels that are done have computed.
+    // A loop, because adapters that execute both sides of a branch leave a loop once none of their
+    // pixels needs more, and most need one or two of the three. The condition is also tested at the
+    // end, or they run the body once more for no pixel; with that test only, lavapipe (Mesa 22.3)
+    // would overwrite the results of finished pixels.
     var light_behind = vec3f(0.0);
     var light_into = vec3f(0.0);
     var light_mirrored = vec3f(0.0);

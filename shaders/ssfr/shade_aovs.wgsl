@@ -1,2 +1,2 @@
-// The channels that stand beside the picture: as the picture is shaded, with AOVS.
+// Additional channels: shade with AOVS.
 #import "ssfr/shade.wgsl"

@@ -1,2 +1,2 @@
-// Pixels of tiles with neither water nor solids: as for the picture, with DRY and BARE.
+// Tiles with neither water nor solids: shade with DRY and BARE.
 #import "ssfr/shade.wgsl"

@@ -1,2 +1,2 @@
-// Pixels of tiles with solids and without water: as for the picture, with DRY.
+// Tiles with solids but no water: shade with DRY.
 #import "ssfr/shade.wgsl"

@@ -1,2 +1,2 @@
-// What a sample sees first: as the picture is shaded, with OBJECTS.
+// First visible objects of a sample: shade with OBJECTS.
 #import "ssfr/shade.wgsl"

@@ -1,4 +1,4 @@
-// Adds the light of spray to a sample that shade dimmed for it, in the tiles in which there is spray.
+// Adds the light of spray to a sample that shade has dimmed for it, in the tiles with spray.
 #import "shared/camera.wgsl"
 #import "shared/ssfr_band.wgsl"
 #import "shared/ssfr_tiles.wgsl"

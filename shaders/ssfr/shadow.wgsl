@@ -1,4 +1,4 @@
-// The solids as the sun sees them.
+// Depth of the solids as seen by the sun.
 #import "shared/ssfr_solid.wgsl"
 
 @group(0) @binding(0) var<uniform> shadow_from_world: mat4x4f;

@@ -1,5 +1,6 @@
-// Depth and normal of the solids, into one tile of the frame. Depth is that of the triangle's plane along the
-// pixel's ray, not an interpolated one, so a frame drawn in tiles holds the bits of one drawn whole.
+// Depth and normal of the solids in one tile of the frame. Depth is that of the triangle's plane
+// along the pixel's ray rather than an interpolated one, so that a frame drawn in tiles is bitwise
+// equal to one drawn whole.
 #import "shared/camera.wgsl"
 #import "shared/ssfr_solid.wgsl"
 
@@ -25,7 +26,7 @@ struct Corner {
     @location(5) @interpolate(flat) packed: u32,
 }
 
-// A box on the screen, pixels of the tile.
+// A box on the screen, in pixels of the tile.
 struct Box {
     low: vec2f,
     high: vec2f,
@@ -36,11 +37,11 @@ fn with_point(box: Box, p: vec3f) -> Box {
     return Box(min(box.low, at), max(box.high, at));
 }
 
-// Nearer than this over `near` a face is not drawn. Between the two it is, at the depth `near`, so that one does not look into a body whose
-// face is close to the eye.
+// Distance relative to `near` below which a face is cut. Between it and `near` faces are drawn at
+// the depth `near`, so that the view does not look into a body whose face is close to the eye.
 const CUT: f32 = 0.001;
 
-// With what is seen of a side, from the cut on.
+// Extends the box by the part of a side beyond the cut.
 fn with_side(box: Box, from_p: vec3f, to_p: vec3f) -> Box {
     let depths = vec2f(from_p.z, to_p.z) - CUT * camera.near;
     if max(depths.x, depths.y) <= 0.0 {
@@ -51,9 +52,9 @@ fn with_side(box: Box, from_p: vec3f, to_p: vec3f) -> Box {
     return with_point(with_point(box, select(at_plane, from_p, depths.x > 0.0)), select(at_plane, to_p, depths.y > 0.0));
 }
 
-// Two triangles over the box that holds the triangle on the screen.
-// Which pixels it covers is decided by its sides in the fragment (homogeneous rasterisation, Olano and Greer
-// 1997): the device's own rules snap corners to a grid that starts at the tile, and edges would move with it.
+// Two triangles over the screen-space box of the triangle. Its sides decide in the fragment shader
+// which pixels it covers (homogeneous rasterisation, Olano and Greer 1997): the device's own rules
+// snap corners to a grid that begins at the tile, so edges would move with it.
 @vertex
 fn vertex(@builtin(vertex_index) index: u32) -> Corner {
     let triangle = triangles[index / 6u];
@@ -69,10 +70,10 @@ fn vertex(@builtin(vertex_index) index: u32) -> Corner {
     var out: Corner;
     out.range = vec2f(min(a.z, min(b.z, c.z)), max(a.z, max(b.z, c.z)));
     let box = with_side(with_side(with_side(Box(vec2f(FAR), vec2f(-FAR)), a, b), b, c), c, a);
-    // A pixel wider, for rounding.
+    // One pixel wider, for rounding.
     let low = clamp(box.low - 1.0, vec2f(0.0), tile.size);
     var high = clamp(box.high + 1.0, vec2f(0.0), tile.size);
-    // Nothing of what is behind the eye. Of a closed body the sides towards the eye hide the others.
+    // Skips geometry behind the eye and, for closed bodies, back faces.
     if out.range.y <= camera.near || (index / 6u < camera.closed && dot(normal, a) > 0.0) {
         high = low;
     }
@@ -87,7 +88,7 @@ fn vertex(@builtin(vertex_index) index: u32) -> Corner {
     out.side_b = orientation * cross(b, c);
     out.side_c = orientation * cross(c, a);
 #ifdef MATERIALS
-    // Which triangle it is tells the rest.
+    // The triangle's index determines everything else.
     out.packed = index / 6u;
 #else
     out.packed = pack_normal(world_normal, triangle.material);
@@ -106,7 +107,7 @@ fn fragment(in: Corner) -> Texel {
     let ray = eye_ray(camera, in.clip.xy + tile.corner);
     let inside = vec3f(dot(in.side_a, ray), dot(in.side_b, ray), dot(in.side_c, ray));
     let raw = in.plane.w / dot(in.plane.xyz, ray);
-    // Sides that two triangles share belong to both; the nearer one is kept.
+    // Edges shared by two triangles belong to both; the nearer fragment is kept.
     if any(inside < vec3f(0.0)) || !(raw > CUT * camera.near) {
         discard;
     }

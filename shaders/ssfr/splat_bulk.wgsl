@@ -1,13 +1,13 @@
-// Adds to the thickness the way that the line of sight goes through blocks of water. A block stands for the particles within it, which
-// are splatted nowhere.
+// Adds to the thickness the path of the line of sight through blocks of water. A block replaces the
+// particles inside it, which are not splatted.
 #import "shared/camera.wgsl"
 #import "shared/ssfr_splat.wgsl"
 #import "shared/ssfr_lanes.wgsl"
 
-// Sides along the world's axes, at the frame's instant.
+// Axis-aligned sides at the frame's instant.
 struct Block {
     low: vec3f,
-    // Volume that its particles stand for, over its own.
+    // Volume of its particles over its own.
     filled: f32,
     high: vec3f,
     pad0: f32,
@@ -21,9 +21,10 @@ struct Block {
 @group(0) @binding(2) var<storage, read> solid_depth: array<f32>;
 @group(0) @binding(3) var<storage, read_write> thickness: array<atomic<u32>>;
 
-// Balls about a block's particles would reach beyond its faces, and balls of the particles beside it reach into it. A block with sharp faces
-// would leave a seam there. So a block counts as the mean of eight copies of it, moved by these four ways and by their opposites, in splat
-// radii: along each axis the eight ways are the medians of eight equal parts of a ball.
+// Spheres of a block's particles would reach beyond its faces, and those of neighbouring particles
+// reach into it; sharp faces would therefore leave a seam. A block counts as the mean of eight
+// copies, displaced by these four vectors, in splat radii, and their opposites: along each axis the
+// displacements are the medians of eight equal parts of a ball.
 const PAIRS = 4u;
 
 fn aside(k: u32) -> vec3f {
@@ -32,7 +33,8 @@ fn aside(k: u32) -> vec3f {
     return select(last, first, k < 2u) * camera.radius;
 }
 
-// Pixels of the half resolution that a block may touch: least and greatest, inclusive; all of them where it goes on behind the eye.
+// Half-resolution pixels that a block may touch: least and greatest, inclusive; all of them where
+// it extends behind the eye.
 fn block_bounds(low: vec3f, high: vec3f, size: vec2u) -> vec4i {
     var first = vec2f(FAR);
     var last = vec2f(-FAR);
@@ -56,7 +58,8 @@ fn block_bounds(low: vec3f, high: vec3f, size: vec2u) -> vec4i {
     return pixels_between(camera, first, last, 0.5, size);
 }
 
-// How far a ray goes between two corners, before the depth `end`; both as depths at which it passes their planes.
+// Length of a ray between two corners, up to the depth `end`; the corners are given as the depths
+// at which the ray crosses their planes.
 fn between(a: vec3f, b: vec3f, end: f32) -> f32 {
     let first = min(a, b);
     let last = max(a, b);
@@ -65,7 +68,7 @@ fn between(a: vec3f, b: vec3f, end: f32) -> f32 {
     return max(leaves - enters, 0.0);
 }
 
-// A block has a row of threads, which share the pixels of each row.
+// A row of threads per block, which share its pixels.
 @compute @workgroup_size(LANES, ROWS)
 fn main(
     @builtin(workgroup_id) group: vec3u,
@@ -85,19 +88,19 @@ fn main(
     let high = block.high + gone;
     let half_size = camera.size / 2u;
     let bounds = block_bounds(low - camera.radius, high + camera.radius, half_size);
-    // Pairs of copies that each sample takes; a picture of one sample takes all four.
+    // Pairs of copies per sample; a picture with one sample uses all four.
     let pairs = max(PAIRS / sample_count(camera), 1u);
     for (var y = bounds.y; y <= bounds.w; y++) {
         for (var x = bounds.x + i32(thread.x); x <= bounds.z; x += i32(LANES)) {
             let pixel = vec2u(vec2i(x, y));
-            // What the line of sight goes for each metre of depth.
+            // Displacement of the line of sight per metre of depth.
             let way = world_direction(camera, eye_ray(camera, 2.0 * vec2f(pixel) + 1.0));
             let inverse = 1.0 / select(way, vec3f(1e-12), abs(way) < vec3f(1e-12));
             let a = (low - camera.position) * inverse;
             let b = (high - camera.position) * inverse;
             let end = solid_depth[2u * (pixel.y * camera.size.x + pixel.x)];
-            // `end` is positive, so this is always `pairs`. If uniforms alone decided it, lavapipe would compile the pass again for each
-            // sample (docs/performance.md).
+            // `end` is positive, so this is always `pairs`. If it depended on uniforms only,
+            // lavapipe would compile the pass again for each sample (docs/performance.md).
             let own = select(0u, pairs, end > 0.0);
             var sum = 0.0;
             for (var k = 0u; k < own; k++) {

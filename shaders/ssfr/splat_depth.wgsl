@@ -1,4 +1,5 @@
-// Nearest sphere surface at each pixel, or with ELLIPSOIDS that of ellipsoids. A row of threads a particle, which share the pixels.
+// Nearest surface of spheres, or with ELLIPSOIDS of ellipsoids, at each pixel. A row of threads per
+// particle shares its pixels.
 #import "shared/camera.wgsl"
 #import "shared/ssfr_splat.wgsl"
 #import "shared/ssfr_lanes.wgsl"
@@ -11,7 +12,7 @@
 @group(0) @binding(0) var<uniform> camera: Camera;
 @group(0) @binding(1) var<storage, read> particles: array<Particle>;
 @group(0) @binding(2) var<storage, read> solid_depth: array<f32>;
-// Depth bits: positive floats sort as their bits do.
+// Bits of the depth: positive floats sort as their bits do.
 @group(0) @binding(3) var<storage, read_write> depth: array<atomic<u32>>;
 #ifdef PATHS
 @group(0) @binding(4) var<storage, read> paths: array<Path>;
@@ -51,7 +52,7 @@ fn main(
         let row = row_of(i, width);
         let pixel = vec2u(bounds.xy) + vec2u(i - row * width, row);
         let at = pixel.y * camera.size.x + pixel.x;
-        // Most spheres are hidden, and are drawn after what hides them: a plain load spares the rest.
+        // Most spheres are hidden and drawn after what hides them: a plain load avoids the rest.
         let known = atomicLoad(&depth[at]);
         if known <= nearest {
             continue;

@@ -1,4 +1,5 @@
-// Which particle's sphere, or with ELLIPSOIDS whose ellipsoid, is the nearest at each pixel: the least index among those at the nearest depth.
+// Particle with the nearest sphere, or with ELLIPSOIDS ellipsoid, at each pixel; the least index
+// among those at the nearest depth.
 #import "shared/camera.wgsl"
 #import "shared/ssfr_splat.wgsl"
 #import "shared/ssfr_lanes.wgsl"
@@ -49,7 +50,8 @@ fn main(
 #else
         let hit = hit_sphere(eye_ray(camera, vec2f(pixel) + 0.5), c, radius).depth;
 #endif
-        // Two shaders may round one formula differently, so equality is asked within a few ulp.
+        // Two shaders may round the same formula differently, so equality is tested within a few
+        // ulp.
         if hit < FAR && hit <= depth[at] * 1.000001 {
             atomicMin(&owner[at], page.first + index);
         }

@@ -1,4 +1,4 @@
-// Aerated water near or before the surface, at half resolution: what whitens it.
+// Splats aerated water near or in front of the surface, at half resolution; this whitens the water.
 #import "shared/camera.wgsl"
 #import "shared/ssfr_splat.wgsl"
 #import "shared/ssfr_lanes.wgsl"
@@ -12,41 +12,47 @@
 @group(0) @binding(3) var<storage, read> solid_depth: array<f32>;
 @group(0) @binding(4) var<storage, read> surface: array<f32>;
 @group(0) @binding(5) var<storage, read_write> spray: array<atomic<u32>>;
-// How many particles hold air, and which.
+// Number of particles that hold air, then their indices.
 @group(0) @binding(7) var<storage, read> aired: array<u32>;
 #ifdef PATHS
 @group(0) @binding(6) var<storage, read> paths: array<Path>;
 #endif
 
-// A particle stands for torn water: puffs of mist strung on a bent thread, and drops about it that are seen one by one. Where two numbers
-// stand, the first is of one that flies alone, the second of one in company. By eye: without mist clouds are speckled, without drops they
-// are smoke, and a lone puff is cotton.
-// Puffs, the radius of each in splat radii, and their part of the volume.
+// A particle stands for torn water: puffs of mist along a curved thread, and individually visible
+// drops around it. Pairs of values are for a lone particle and for one in company. Chosen by eye:
+// without mist, clouds look speckled; without drops they look like smoke, and a lone puff looks
+// like cotton.
+//
+// Number of puffs, the radius of each in splat radii, and their share of the volume.
 const PUFFS: u32 = 4u;
 const PUFF: f32 = 1.1;
 const MIST: vec2f = vec2f(0.0, 0.6);
-// Drops of a particle far away, and how much finer they are than those of so many.
+// Drops of a distant particle, and the factor by which they are finer than that number would imply.
 const DROPS: f32 = 5.0;
 const FINER: vec2f = vec2f(2.0, 1.0);
 const MOST_DROPS: u32 = 4096u;
-// The least of them, and what is added to it for the largest, in splat radii.
+// Size of the smallest drop, and the difference to the largest, in splat radii.
 const LEAST_SIZE: f32 = 0.14;
 const SIZES: f32 = 0.36;
-// Root mean square of their places from the particle along an axis, in splat radii, over that of what is strung anywhere on a thread;
-// and of the puffs' middles: a seventh of a puff's radius squared is its own, and four middles of parts of a thread are 0.94 as wide.
+// Root mean square offset along an axis, in splat radii, that drops get from their positions along
+// the thread; and that of the puffs' centres, which is less because each puff adds a variance of a
+// seventh of its radius squared and the four centres of segments spread 0.94 times as wide as
+// points anywhere on the thread.
 const WIDE: f32 = 0.716;
 const WIDE_PUFFS: f32 = 0.6;
-// Half a thread's length, how far its ends are bent aside, and how far what is strung on it lies off: root mean squares over that of all,
-// √((LENGTH² + 0.8 BEND² + 3 OFF²) / 3) = 1.
+// Half the thread's length, the bend of its ends, and the scatter around it: root mean squares
+// relative to the total, √((LENGTH² + 0.8 BEND² + 3 OFF²) / 3) = 1.
 const LENGTH: vec2f = vec2f(1.5, 1.2);
 const BEND: f32 = 0.6;
 const OFF: vec2f = vec2f(0.392, 0.651);
-// Nearer to the eye than this, in splat radii, nothing is drawn; at twice as far all is.
+// Distance to the eye, in splat radii, below which nothing is drawn; from twice that on everything
+// is.
 const NEAREST: f32 = 2.6;
-// Radius in pixels above which a drop is many smaller ones: 0.7 cells of the half resolution.
+// Radius in pixels above which a drop is replaced by smaller ones: 0.7 cells of the half
+// resolution.
 const LARGEST: f32 = 1.4;
 
-// A number in 0..1 that belongs to a particle and a channel.
+// Deterministic random number in 0..1 by particle and channel.
 fn random(index: u32, channel: u32) -> f32 {
     var h = index * 0x9E3779B1u + channel * 0x85EBCA77u;
     h = (h ^ (h >> 15u)) * 0x2C1B3C6Du;
@@ -54,13 +60,13 @@ fn random(index: u32, channel: u32) -> f32 {
     return f32((h ^ (h >> 15u)) >> 8u) / 16777216.0;
 }
 
-// chord³/(2r)² instead of the chord, times 5/3 for the same volume: the edge fades out instead of ending.
+// chord³/(2r)² in place of the chord, times 5/3 for the same volume, so that the edge fades out.
 fn soft_chord(ray: vec3f, c: vec3f, radius: f32) -> f32 {
     let chord = max(hit_sphere(ray, c, radius).chord, 0.0);
     return chord * chord * chord / (4.0 * radius * radius) * (5.0 / 3.0);
 }
 
-// A direction that belongs to a particle and a channel.
+// Deterministic random direction by particle and channel.
 fn turned(id: u32, channel: u32) -> vec3f {
     let up = 2.0 * random(id, channel) - 1.0;
     let turn = 2.0 * 3.14159265 * random(id, channel + 1u);
@@ -68,7 +74,7 @@ fn turned(id: u32, channel: u32) -> vec3f {
     return vec3f(across * cos(turn), up, across * sin(turn));
 }
 
-// A number with the mean 0 and the variance 1, of a tent.
+// Random number with a triangular distribution, mean 0 and variance 1.
 fn tent(id: u32, channel: u32) -> f32 {
     return 2.449490 * (random(id, channel) + random(id, channel + 1u) - 1.0);
 }
@@ -80,30 +86,33 @@ struct Thread {
     off: f32,
 }
 
-// Of the two numbers, that of a particle in so much company.
+// Interpolates a pair of values by company.
 fn between(pair: vec2f, company: f32) -> f32 {
     return mix(pair.x, pair.y, company);
 }
 
-// What lies at `part` in 0..1 of a thread, from its middle; off the thread as the channels from `channel` on say.
+// Offset from the thread's centre of a point at the fraction `part`, 0 to 1, along it, with scatter
+// from the channels from `channel` on.
 fn strung(thread: Thread, part: f32, id: u32, channel: u32) -> vec3f {
     let s = 1.732051 * (2.0 * part - 1.0);
     let off = vec3f(tent(id, channel), tent(id, channel + 2u), tent(id, channel + 4u));
     return thread.length * s * thread.along + BEND * (s * s - 1.0) * thread.bent + thread.off * off;
 }
 
-// Part of what is `wide` metres and stands at depth `z` that is seen at a pixel of the half resolution.
+// Visible fraction, at a half-resolution pixel, of an object `wide` metres across at depth `z`.
 fn seen_at(pixel: vec2u, z: f32, wide: f32) -> f32 {
     let at = 2u * (pixel.y * camera.size.x + pixel.x);
-    // The water over a drop takes its white away, half of it two radii of a particle down.
+    // Water above a drop removes its white, half of it at a depth of two particle radii.
     let under = 1.0 - smoothstep(camera.radius, 3.0 * camera.radius, z - surface[at]);
     return before(solid_depth[at], z, wide) * under;
 }
 
-// A puff has so many pixels that the particle's threads share them; `volume` is its part of the particle's.
+// Splats a puff, whose many pixels the particle's threads share; `volume` is its share of the
+// particle's.
 fn add_puff(c: vec3f, volume: f32, lane: u32, velocity: vec3f) {
     let own = PUFF * camera.radius;
-    // At least 0.7 pixels of the half resolution, so that a small one is fainter and never missed: its volume stays.
+    // At least 0.7 pixels of the half resolution, so that small puffs become fainter instead of
+    // being missed; the volume is kept.
     let radius = max(own, 1.4 * c.z / camera.focal);
     let shrunk = own / radius;
     let weight = volume * shrunk * shrunk * shrunk * spray_params.scale;
@@ -121,13 +130,14 @@ fn add_puff(c: vec3f, volume: f32, lane: u32, velocity: vec3f) {
     }
 }
 
-// A drop is at most 1.4 cells of two pixels wide: the four cells about it share its volume as bilinear interpolation would.
+// Splats a drop. It is at most 1.4 cells of two pixels wide, so its volume is distributed
+// bilinearly to the four surrounding cells.
 fn add_drop(c: vec3f, own: f32, volume: f32, velocity: vec3f) {
     let cell = 2.0 * c.z / camera.focal;
     if c.z < 1.5 * own {
         return;
     }
-    // Over the cell's area as the drop sees it.
+    // Volume over the cell's area as seen along the ray.
     let aslant = length(c) / c.z;
     let way = 4.188790 * own * own * own * volume * spray_params.scale / (cell * cell) * aslant;
     let place = 0.5 * (camera.centre + camera.focal * vec2f(c.x, -c.y) / c.z) - 0.5;
@@ -146,7 +156,8 @@ fn add_drop(c: vec3f, own: f32, volume: f32, velocity: vec3f) {
     }
 }
 
-// A particle's threads share the pixels of each puff, which has many, and the drops, each of which has few.
+// A particle's threads share the pixels of each puff, which are many, and divide the drops, which
+// have few pixels each.
 @compute @workgroup_size(LANES, ROWS)
 fn main(
     @builtin(workgroup_id) group: vec3u,
@@ -174,11 +185,12 @@ fn main(
         let off = strung(thread_of, (f32(k) + 0.5) / f32(PUFFS), id, 7u * k + 5u);
         add_puff(c + WIDE_PUFFS * camera.radius * off, of_puffs, thread.x, particle.velocity);
     }
-    // Near the eye more and smaller ones, each as opaque: as many more as their areas are less.
+    // Near the eye, more and smaller drops of the same opacity: as many more as their areas are
+    // smaller.
     let finer = between(FINER, company) * max((LEAST_SIZE + SIZES) * camera.radius * camera.focal / (c.z * LARGEST), 1.0);
     let drops = min(u32(DROPS * finer * finer), MOST_DROPS);
-    // Σ of their cubes: sizes are LEAST + SIZES q² at the middles of as many parts of 0..1, but for terms of 1 over their number
-    // squared.
+    // Sum of the cubes of sizes LEAST + SIZES q² at the midpoints of that many parts of 0..1, with
+    // correction terms of second order in 1 over their number.
     let m = LEAST_SIZE;
     let n = SIZES;
     let part = 1.0 / f32(drops);

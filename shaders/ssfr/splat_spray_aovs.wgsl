@@ -1,2 +1,2 @@
-// Spray for the channels that stand beside the picture: as for the picture, with MOTION.
+// Spray for the additional channels: splat_spray with MOTION.
 #import "ssfr/splat_spray.wgsl"

@@ -1,5 +1,6 @@
-// Water along the line of sight, in front of what is solid, at half resolution: chords of spheres but for those in blocks (ssfr/splat_bulk),
-// scaled so that their sum over a bulk lattice is the length of the way.
+// Water along the line of sight in front of solids, at half resolution: chords of spheres, except
+// of particles in blocks (ssfr/splat_bulk), scaled so that their sum over a bulk lattice is the
+// length of the path.
 #import "shared/camera.wgsl"
 #import "shared/ssfr_splat.wgsl"
 #import "shared/ssfr_lanes.wgsl"
@@ -7,7 +8,7 @@
 #import "shared/ssfr_moved.wgsl"
 
 struct ThicknessParams {
-    // d³ / (4/3 π r³): the volume that a particle stands for over that of its sphere.
+    // d³ / (4/3 π r³): volume of a particle over that of its sphere.
     scale: f32,
     pad0: f32,
     pad1: f32,

@@ -1,25 +1,26 @@
-// Spray, foam and bubbles before the surface or just under it, at half resolution: what whitens the water.
+// Splats spray, foam and bubbles in front of the surface or just below it, at half resolution;
+// these whiten the water.
 #import "shared/camera.wgsl"
 #import "shared/ssfr_splat.wgsl"
 #import "shared/ssfr_spray_add.wgsl"
 
 struct Whitewater {
-    // World position, and radius, metres.
+    // World position and radius, metres.
     position: vec3f,
     radius: f32,
     velocity: vec3f,
-    // 1 of foam and bubbles, 0 of spray.
+    // 1 for foam and bubbles, 0 for spray.
     foam: f32,
 }
 
 struct WhitewaterParams {
-    // How many there are.
+    // Number of whitewater particles.
     count: u32,
     // Factor on radii.
     size: f32,
-    // Optical density over that which the sums stand for.
+    // Optical density relative to that of the sums.
     density: f32,
-    // Depth at which the water over a bubble has taken 63 % of its white, metres.
+    // Depth at which the water above a bubble has removed 63 % of its white, metres.
     fading: f32,
 }
 
@@ -45,7 +46,8 @@ fn main(
     let half_size = camera.size / 2u;
     let c = eye_from_world(camera, one.position + one.velocity * camera.seconds);
     let own = whitewater_params.size * one.radius;
-    // At least 0.7 pixels of the half resolution, so that a small one is fainter and never missed: its volume stays.
+    // At least 0.7 pixels of the half resolution, so that small particles become fainter instead of
+    // being missed; the volume is kept.
     let radius = max(own, 1.4 * c.z / camera.focal);
     let shrunk = own / radius;
     let weight = whitewater_params.density * shrunk * shrunk * shrunk;
@@ -60,7 +62,7 @@ fn main(
             }
             let ray = eye_ray(camera, 2.0 * vec2f(pixel) + 1.0);
             let chord = max(hit_sphere(ray, c, radius).chord, 0.0);
-            // Under the surface the water over it takes its white away.
+            // Water above it removes its white.
             let under = max(c.z - surface[at], 0.0);
             let amount = chord * weight * seen * exp(-under / whitewater_params.fading);
             add_spray(pixel, amount, c.z, one.velocity);

@@ -1,2 +1,2 @@
-// Whitewater for the channels that stand beside the picture: as for the picture, with MOTION.
+// Whitewater for the additional channels: splat_whitewater with MOTION.
 #import "ssfr/splat_whitewater.wgsl"

@@ -1,10 +1,10 @@
-// Workgroups of the dispatches over lists of tiles: one for each list.
+// Computes the workgroup counts of indirect dispatches over lists of tiles, one per list.
 #import "shared/ssfr_tiles.wgsl"
 
 @group(0) @binding(0) var<storage, read> tiles: array<u32>;
 @group(0) @binding(1) var<storage, read_write> tile_groups: array<vec4u>;
 
-// Of a dispatch along an axis: what every adapter allows.
+// Largest number of workgroups along an axis that every adapter allows.
 const MOST_GROUPS: u32 = 65535u;
 
 @compute @workgroup_size(64)
