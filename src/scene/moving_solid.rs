@@ -145,11 +145,11 @@ impl MovingSolid {
 }
 
 impl Scene {
-    /// Bounds the speed of wave makers and moving solids within `[t0, t1]`, m/s, without what
-    /// absorbing walls add to their own motion.
+    /// Bounds the speed of wave makers, with what absorbing ones add to their own motion, and of
+    /// moving solids within `[t0, t1]`, m/s.
     pub fn peak_boundary_speed(&self, t0: f64, t1: f64) -> f64 {
-        let makers = self.wave_makers.iter();
-        let makers = makers.map(|maker| maker.motion.peak_speed(t0, t1));
+        let makers = self.makers();
+        let makers = makers.map(|(maker, absorber)| maker.peak_speed(absorber, t0, t1));
         let solids = self.moving_solids.iter();
         let solids = solids.map(|solid| solid.peak_speed(t0, t1));
         makers.chain(solids).fold(0.0, f64::max)

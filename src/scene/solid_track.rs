@@ -406,10 +406,13 @@ fn choose<'a>(
             )),
         };
     };
-    let found: Vec<_> = all
-        .iter()
-        .filter(|node| node.name() == Some(name))
-        .collect();
+    // A node without a name has the one that it is listed by, unless another node is named so.
+    let has_name = |node: &gltf::Node<'_>| node.name() == Some(name);
+    let is_listed_as = |node: &gltf::Node<'_>| named(node) == name;
+    let mut found: Vec<_> = all.iter().filter(|node| has_name(node)).collect();
+    if found.is_empty() {
+        found = all.iter().filter(|node| is_listed_as(node)).collect();
+    }
     match found[..] {
         [only] => Ok(only.clone()),
         [] => Err(format!("no node is called {name:?}; there are {}", names())),

@@ -182,6 +182,11 @@ pub enum RenderJobError {
     /// The output folder cannot be used.
     #[error(transparent)]
     Folder(#[from] FolderError),
+    /// Flicker was asked for of a frame without a neighbour on either side.
+    #[error(
+        "flicker compares a frame with the frames before and after it, and frame {0} lacks one of them"
+    )]
+    NoNeighbours(u32),
     /// The given cache is a whitewater stream, not a bake.
     #[error("{} is a stream of whitewater: render the cache that it was made from, with a look that has [whitewater]", .0.display())]
     IsWhitewater(PathBuf),
@@ -226,6 +231,7 @@ impl From<&RenderJobError> for Blame {
                 | RenderError::UnderWater { .. },
             )
             | RenderJobError::NoWater
+            | RenderJobError::NoNeighbours(_)
             | RenderJobError::IsWhitewater(_)
             | RenderJobError::IntoCache { .. } => Self::Input,
             RenderJobError::Whitewater(_) | RenderJobError::Mesh(_) => Self::Files,

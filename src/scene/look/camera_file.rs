@@ -319,6 +319,8 @@ fn choose<'a>(document: &'a Document, name: Option<&str>) -> Result<Node<'a>> {
     for is_called in [
         |node: &Node<'_>, name: &str| node.name() == Some(name),
         |node: &Node<'_>, name: &str| node.camera().is_some_and(|it| it.name() == Some(name)),
+        // As the list of names has it.
+        |node: &Node<'_>, name: &str| called(node) == name,
     ] {
         let mut found = all.iter().filter(|node| is_called(node, name));
         match (found.next(), found.count()) {

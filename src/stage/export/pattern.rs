@@ -58,7 +58,10 @@ impl FromStr for Pattern {
                 .map(|end| &text[at + 1..at + 1 + end]);
             let digits = inner.and_then(|digits| match digits {
                 "" => Some(1),
-                digits => digits.parse().ok().filter(|n| (1..=9).contains(n)),
+                // A sign would parse too.
+                digits => (digits.starts_with(|c: char| c.is_ascii_digit()))
+                    .then(|| digits.parse().ok().filter(|n| (1..=9).contains(n)))
+                    .flatten(),
             });
             (at, inner.map_or(0, |inner| inner.len() + 2), digits)
         });
@@ -107,6 +110,7 @@ mod tests {
             "m.ply",
             "m.%04d.%d.ply",
             "m.%04x.ply",
+            "m.%+4d.ply",
             "%04d/m.ply",
             "m#.#.ply",
             "m%99d.ply",

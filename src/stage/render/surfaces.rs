@@ -140,9 +140,12 @@ pub fn check_render(
     let frames: Vec<u32> = match &request.frames {
         Some(frames) => frames.iter().collect(),
         // Leaves a frame after it if neighbours are needed.
-        None => vec![cache.last_frame() - u32::from(request.flicker)],
+        None => vec![(cache.last_frame()).saturating_sub(u32::from(request.flicker))],
     };
     for &frame in &frames {
+        if request.flicker && !(1..cache.last_frame()).contains(&frame) {
+            return Err(RenderJobError::NoNeighbours(frame));
+        }
         for frame in around(frame, request.flicker) {
             cache.kept(frame)?;
         }
@@ -226,8 +229,7 @@ const METHODS: [(&str, MethodSpec); 2] = [("ssfr", MethodSpec::Ssfr), ("ray", Me
 /// A frame, with its neighbours if they are needed.
 fn around(frame: u32, with_neighbours: bool) -> Vec<u32> {
     match with_neighbours {
-        // Frame 0 has no neighbour before it; the cache reports that.
-        true => vec![frame.wrapping_sub(1), frame, frame + 1],
+        true => vec![frame - 1, frame, frame + 1],
         false => vec![frame],
     }
 }

@@ -195,6 +195,11 @@ fn outlines_colour_and_flicker_of_pictures_are_told() {
         assert_eq!(plain["rows"][0][key], Value::Null, "not asked for");
     }
     let asked = format!("{check} --colour --flicker");
+    for frame in [0, 3] {
+        let said = job.expect(2, &format!("{asked} --frames {frame}"));
+        let refusal = format!("and frame {frame} lacks one of them");
+        assert!(said.contains(&refusal), "{said}");
+    }
     // The frame before the last one, which has neighbours.
     let found = job.json(0, &asked);
     assert_eq!(found["frames"], serde_json::json!([2]));
