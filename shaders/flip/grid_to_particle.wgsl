@@ -222,7 +222,8 @@ fn center_hats(f: f32) -> vec3f {
 
 #ifdef APIC
 // Derivative of the normalized interpolation with value `u`, times the sum of its weights, along
-// the axis whose weights are slopes.
+// the axis whose weights are slopes. The derivative itself is not bounded where faces are almost
+// closed: with it, water at rest on a beach of 1:20 reaches 10⁴ m/s within 33 frames.
 fn slope_of(faces: Component, u: f32, a: vec2f, b: vec3f, c: vec3f) -> f32 {
 #ifdef SOLIDS
     return value_at(faces.speeds, a, b, c) - u * value_at(faces.part, a, b, c);
@@ -253,7 +254,7 @@ fn give(i: u32, axis: u32, f: vec3f, faces: Component, falls: bool, beyond: f32)
     // Derivatives of the hat functions, 1 per cell.
     let of_b = select(vec3f(0.0, -1.0, 1.0), vec3f(-1.0, 1.0, 0.0), f.y < 0.5);
     let of_c = select(vec3f(0.0, -1.0, 1.0), vec3f(-1.0, 1.0, 0.0), f.z < 0.5);
-    let scale = params.inverse_cell_size * per_whole;
+    let scale = params.inverse_cell_size;
     let row = 9u * i + 3u * axis;
     affine[row + axis] = scale * slope_of(faces, u, vec2f(-1.0, 1.0), b, c);
     affine[row + (axis + 1u) % 3u] = scale * slope_of(faces, u, a, of_b, c);

@@ -98,6 +98,7 @@ mod scene {
 mod solve {
     mod analytic;
     mod analytic_water;
+    mod apic_solids;
     mod drag;
     mod flip;
     mod flip_passes;

@@ -289,8 +289,10 @@ pub fn grid_to_particle(
                             true => 0.0,
                             false => weighted(&parts[axis], a, b, c),
                         };
+                        // Not divided by `whole`: the slope of the quotient is not bounded where
+                        // faces are almost closed.
                         let slope = weighted(&velocity[axis], a, b, c) - u * of_parts;
-                        rows[axis][(axis + turn) % 3] = slope / (whole * size);
+                        rows[axis][(axis + turn) % 3] = slope / size;
                     }
                 }
             }

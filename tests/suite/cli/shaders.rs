@@ -1,6 +1,6 @@
 //! `--shaders DIR`: an edited shader changes what it is said to change and is recorded; the shipped ones are no edit.
 
-use std::{fs, path::Path};
+use std::fs;
 
 use serde_json::Value;
 use swell::render::image::read_png_attributes;
@@ -11,25 +11,9 @@ use crate::support::job::{Job, LOOK, assert_has};
 fn job(folders: &[&str]) -> Job {
     let job = Job::new();
     for folder in folders {
-        copy(
-            &Path::new(env!("CARGO_MANIFEST_DIR")).join("shaders"),
-            &job.path(folder),
-        );
+        job.copy_shaders(folder);
     }
     job
-}
-
-fn copy(from: &Path, to: &Path) {
-    fs::create_dir(to).unwrap();
-    for entry in fs::read_dir(from).unwrap() {
-        let entry = entry.unwrap();
-        let target = to.join(entry.file_name());
-        if entry.path().is_dir() {
-            copy(&entry.path(), &target);
-        } else {
-            fs::copy(entry.path(), target).unwrap();
-        }
-    }
 }
 
 /// A word that changes nothing but the text.

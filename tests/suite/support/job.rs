@@ -1,7 +1,7 @@
 //! The whole program in a folder of its own.
 use std::{
     fs,
-    path::PathBuf,
+    path::{Path, PathBuf},
     process::{Command, Output},
 };
 
@@ -123,6 +123,14 @@ impl Job {
         fs::write(self.path(name), text).unwrap();
     }
 
+    /// Copies the shipped shaders into a folder, for edits.
+    pub fn copy_shaders(&self, folder: &str) {
+        copy(
+            &Path::new(env!("CARGO_MANIFEST_DIR")).join("shaders"),
+            &self.path(folder),
+        );
+    }
+
     pub fn path(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
     }
@@ -176,6 +184,19 @@ impl Job {
 }
 
 /// That all of `words` stand in what was said.
+fn copy(from: &Path, to: &Path) {
+    fs::create_dir(to).unwrap();
+    for entry in fs::read_dir(from).unwrap() {
+        let entry = entry.unwrap();
+        let target = to.join(entry.file_name());
+        if entry.path().is_dir() {
+            copy(&entry.path(), &target);
+        } else {
+            fs::copy(entry.path(), target).unwrap();
+        }
+    }
+}
+
 pub fn assert_has(said: &str, words: &[&str]) {
     for word in words {
         assert!(said.contains(word), "no {word:?} in: {said}");

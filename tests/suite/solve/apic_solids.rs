@@ -1,0 +1,44 @@
+//! APIC beside solids that cut cells: its affine rows stay bounded where faces are almost closed.
+
+use swell::cache::CacheReader;
+
+use crate::support::job::Job;
+
+const SCENE: &str = include_str!("../../hard_cases/36-beach-1in20.toml");
+const BOX: &str = include_str!("../../hard_cases/box.obj");
+
+/// `key` of the ledger's reports, by frame from 1 on.
+fn reported(job: &Job, cache: &str, key: &str) -> Vec<f64> {
+    let reader = CacheReader::open(&job.path(cache)).unwrap();
+    let entries = reader.entries()[1..].iter();
+    entries
+        .map(|entry| entry.report[key].as_f64().unwrap())
+        .collect()
+}
+
+/// Water at rest on a beach of 1:20 calms down. Negative control: rows divided by the sum of the
+/// open weights, as the interpolation is, end the bake by its budget of speed.
+#[test]
+fn apic_on_a_beach_comes_to_rest() {
+    let job = Job::of(&[("beach.toml", SCENE), ("box.obj", BOX)]);
+    let bake = "bake beach.toml --solver flip --set solver.flip.transfer=apic";
+    job.expect(0, &format!("{bake} --frames 40 -o cache"));
+    let energy = reported(&job, "cache", "kinetic_energy");
+    let speed = reported(&job, "cache", "max_speed");
+    let fastest = speed[31..].iter().fold(0.0, |most: f64, v| most.max(*v));
+    println!("{fastest} m/s, {} J and {} J", energy[7], energy[39]);
+    // 0.06 m/s was measured, and 0.8 of the energy eight frames after the start.
+    assert!(fastest < 0.12, "{fastest}");
+    assert!(energy[39] < energy[7], "{energy:?}");
+    job.copy_shaders("divided");
+    job.edit(
+        "divided/flip/grid_to_particle.wgsl",
+        "let scale = params.inverse_cell_size;",
+        "let scale = params.inverse_cell_size * per_whole;",
+    );
+    let said = job.expect(
+        5,
+        &format!("{bake} --frames 40 -o spoiled --shaders divided"),
+    );
+    assert!(said.contains("the largest speed, m/s, is"), "{said}");
+}
