@@ -6,44 +6,27 @@
 //!
 //! # Example: bake a scene and read the result
 //!
-//! This runs on the CPU with the f64 reference and needs no driver. `Device::Gpu(Gpu::default())`
-//! selects the best adapter instead.
+//! This runs on the CPU with the f64 reference and needs no driver. Without `device` the best
+//! adapter is used.
 //!
 //! ```
-//! use std::{path::Path, sync::atomic::AtomicBool};
-//!
-//! use swell::{
-//!     cache::CacheReader,
-//!     domain::frame_range::FrameRange,
-//!     scene::Scene,
-//!     stage::{bake::{Request, bake}, device::Device},
-//! };
+//! use swell::{cache::CacheReader, scene::Scene, stage::device::Device};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! // A column of water one metre high in a box two metres wide. `Scene::load` reads a file.
-//! let text = r#"
-//!     shot = { name = "drop", frames = 24, frames_per_second = 24 }
-//!     domain = { min = [0.0, 0.0, 0.0], max = [2.0, 2.0, 1.0] }
-//!     water.block = [{ min = [0.0, 0.0, 0.0], max = [0.5, 1.0, 1.0] }]
-//!     solver = { method = "pbf", pbf = { particle_spacing = 0.125 } }
-//! "#;
-//! let scene = Scene::parse(text, Path::new("drop.toml"), Path::new("."), &[])?;
+//! let scene = Scene::builder("drop")
+//!     .frames(24, 24.0)
+//!     .domain([0.0; 3], [2.0, 2.0, 1.0])
+//!     .block([0.0; 3], [0.5, 1.0, 1.0])
+//!     .pbf(0.125)
+//!     .build()?;
 //!
 //! let folder = tempfile::tempdir()?;
-//! let request = Request {
-//!     scene,
-//!     directory: folder.path().join("drop"),
-//!     frames: FrameRange::inclusive(1, 2),      // the whole shot if `None`
-//!     resume: false,
-//!     from: None,
-//!     device: Device::Cpu,
-//!     time_passes: false,
-//! };
-//! let stop = AtomicBool::new(false);            // set it to end after the current frame
-//! let outcome = bake(&request, &stop, &mut |_event| {})?;
+//! let directory = folder.path().join("drop");
+//! let outcome = swell::bake(&scene).to(&directory).device(Device::Cpu).frames(1..=2).run()?;
 //! assert_eq!(outcome.last_frame, 2);
 //!
-//! let cache = CacheReader::open(&request.directory)?;
+//! let cache = CacheReader::open(&directory)?;
 //! let [start, end] = [cache.read(0)?, cache.read(2)?];    // verifies checksums
 //! assert_eq!(start.len(), 4 * 8 * 8);
 //! assert_eq!(start.id, end.id);                 // no particle is lost, and each keeps its id
@@ -54,6 +37,10 @@
 //! # Ok(())
 //! # }
 //! ```
+//!
+//! `examples/` has programs that bake and render a drop, make waves with FLIP, read a cache into
+//! arrays, run a GPU pass of their own beside its reference, and observe substeps
+//! (`cargo run --release --example bake_and_render`).
 //!
 //! [`stage::Blame`] tells where the fault of an error lies: in the input, the device, the files, or
 //! the numbers. The program's exit codes follow from it.
@@ -100,6 +87,10 @@
 //! the dependencies between crates and how to add a pass, an effect, a format or a stage,
 //! `docs/cache.md` the file formats, and `docs/keys.md` every key. The package in `tools/python`
 //! reads caches from Python.
+
+mod jobs;
+
+pub use jobs::{Bake, Render, bake, render};
 
 pub use swell_cache as cache;
 pub use swell_check as check;

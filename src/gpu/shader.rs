@@ -133,6 +133,21 @@ impl Shaders {
         })
     }
 
+    /// Adds a file, or replaces one, such as `own/speeds.wgsl` for a pass `own/speeds`; it may
+    /// import the others.
+    #[must_use]
+    pub fn with_file(&self, path: &str, text: &str) -> Self {
+        let mut files = match &self.files {
+            Some(files) => files.as_ref().clone(),
+            None => shipped(),
+        };
+        files.insert(path.to_owned(), text.to_owned());
+        Self {
+            hash: Some(hash(&files).into()),
+            files: Some(Arc::new(files)),
+        }
+    }
+
     /// Returns a hash of edited files: BLAKE3 in hex over all WGSL files in the order of their
     /// paths, for each the lengths of path and text as 8 bytes each, little-endian, then both.
     /// `None` for the shipped files, even if they were read from a folder.

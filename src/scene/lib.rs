@@ -24,6 +24,7 @@ pub mod tolerance;
 
 mod absorption;
 mod build;
+mod builder;
 mod container;
 mod difference;
 mod document;
@@ -70,6 +71,7 @@ use swell_domain::named::read_by_name;
 
 pub use absorption::Held;
 pub use budget::Budget;
+pub use builder::SceneBuilder;
 pub use difference::{physics_difference, physics_hash};
 pub use effects::Effects;
 pub use error::{Fault, Place, SceneError};
@@ -288,13 +290,26 @@ pub struct Wall {
 impl Wall {
     /// All six walls with the names used in scenes, ordered as [`Wall::name`] expects.
     pub const NAMED: [(&'static str, Self); 6] = [
-        ("-x", Self::new(0, false)),
-        ("+x", Self::new(0, true)),
-        ("-y", Self::new(1, false)),
-        ("+y", Self::new(1, true)),
-        ("-z", Self::new(2, false)),
-        ("+z", Self::new(2, true)),
+        ("-x", Self::NEG_X),
+        ("+x", Self::POS_X),
+        ("-y", Self::NEG_Y),
+        ("+y", Self::POS_Y),
+        ("-z", Self::NEG_Z),
+        ("+z", Self::POS_Z),
     ];
+
+    /// The wall at the domain's minimum along x.
+    pub const NEG_X: Self = Self::new(0, false);
+    /// The wall at the domain's maximum along x.
+    pub const POS_X: Self = Self::new(0, true);
+    /// The floor.
+    pub const NEG_Y: Self = Self::new(1, false);
+    /// The ceiling.
+    pub const POS_Y: Self = Self::new(1, true);
+    /// The wall at the domain's minimum along z.
+    pub const NEG_Z: Self = Self::new(2, false);
+    /// The wall at the domain's maximum along z.
+    pub const POS_Z: Self = Self::new(2, true);
 
     const fn new(axis: usize, is_max: bool) -> Self {
         Self { axis, is_max }

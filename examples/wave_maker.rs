@@ -1,0 +1,53 @@
+//! Makes regular waves with a piston, by FLIP on the CPU, and compares their height with linear
+//! wave-maker theory (Dean and Dalrymple 1991, equation 6.26).
+//!
+//! `cargo run --release --example wave_maker [FOLDER]`
+#![expect(clippy::print_stdout, reason = "a program that says what it measured")]
+
+use std::{env, error::Error, f64::consts::TAU, path::PathBuf};
+
+use swell::{
+    cache::CacheReader,
+    domain::motion::{piston_height_ratio, wave_number},
+    scene::{Scene, Wall},
+    stage::device::Device,
+};
+
+const DEPTH: f64 = 0.5;
+const PERIOD: f64 = 1.5;
+const STROKE: f64 = 0.08;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let folder = env::args()
+        .nth(1)
+        .unwrap_or_else(|| "cache/example".to_owned());
+    let cache = PathBuf::from(folder).join("waves");
+    let scene = Scene::builder("waves")
+        .frames(96, 24.0)
+        .domain([0.0; 3], [8.0, 0.9, 0.2])
+        .block([0.0; 3], [8.0, DEPTH, 0.2])
+        .wave_maker(
+            Wall::NEG_X,
+            &format!(r#"kind = "sine", stroke = {STROKE}, period = {PERIOD}, ramp = {PERIOD}"#),
+        )
+        .push("probe", "kind = \"elevation\"\nat = [2.0, 0.1]")
+        .flip(0.1)
+        .build()?;
+    swell::bake(&scene).to(&cache).device(Device::Cpu).run()?;
+
+    let text = std::fs::read_to_string(cache.join("probes/elevation0.csv"))?;
+    let elevations: Vec<f64> = (text.lines().filter(|line| !line.starts_with('#')).skip(1))
+        .filter_map(|line| line.split(',').nth(1)?.parse().ok())
+        .collect();
+    let last = &elevations[elevations.len().saturating_sub(36)..];
+    let highest = last.iter().copied().fold(f64::MIN, f64::max);
+    let lowest = last.iter().copied().fold(f64::MAX, f64::min);
+    let k = wave_number(TAU / PERIOD, DEPTH, 9.81);
+    println!(
+        "{} frames; waves {:.3} m high, by theory {:.3} m",
+        CacheReader::open(&cache)?.last_frame(),
+        highest - lowest,
+        STROKE * piston_height_ratio(k, DEPTH)
+    );
+    Ok(())
+}

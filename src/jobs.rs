@@ -1,0 +1,204 @@
+//! Bakes and renders with defaults, for programs; [`stage`](crate::stage) has the requests behind
+//! them, and the other jobs.
+
+use std::{
+    ops::RangeInclusive,
+    path::{Path, PathBuf},
+    sync::atomic::AtomicBool,
+};
+
+use crate::{
+    domain::frame_range::FrameRange,
+    scene::{Scene, look::Look},
+    stage::{
+        bake::{self, BakeError},
+        branch::BranchPoint,
+        device::{Device, Gpu},
+        render::{self, RenderJobError},
+    },
+};
+
+static NEVER: AtomicBool = AtomicBool::new(false);
+
+/// Begins a bake of `scene`: the whole shot, on the best adapter, into `cache/SHOT/SOLVER`.
+///
+/// ```no_run
+/// # use swell::{scene::Scene, stage::device::Device};
+/// # let scene = Scene::builder("drop").build()?;
+/// let outcome = swell::bake(&scene).to("cache/drop").device(Device::Cpu).run()?;
+/// println!("{} frames", outcome.frames);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn bake(scene: &Scene) -> Bake<'_> {
+    let solver = scene.solver.method.name();
+    Bake {
+        request: bake::Request {
+            scene: scene.clone(),
+            directory: Path::new("cache").join(&scene.shot.name).join(solver),
+            frames: None,
+            resume: false,
+            from: None,
+            device: Device::Gpu(Gpu::default()),
+            time_passes: false,
+        },
+        stop: &NEVER,
+        tell: Box::new(|_| {}),
+    }
+}
+
+/// Begins a render of the cache in `directory`: all frames, on the best adapter, into
+/// `renders/CACHE`.
+///
+/// ```no_run
+/// # use swell::scene::look::Look;
+/// let look = Look::load("scenes/looks/day.toml".as_ref())?;
+/// swell::render("cache/drop", &look).frames(1..=24).to("out").run()?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn render<'a>(directory: impl AsRef<Path>, look: &Look) -> Render<'a> {
+    let cache = directory.as_ref();
+    let name = cache.file_name().unwrap_or(cache.as_os_str());
+    Render {
+        request: render::Request {
+            cache: cache.to_owned(),
+            look: look.clone(),
+            directory: Path::new("renders").join(name),
+            frames: None,
+            chunk: None,
+            gpu: Gpu::default(),
+            number_from: None,
+            overwrite: false,
+            keep_going: false,
+            time_passes: false,
+        },
+        stop: &NEVER,
+        tell: Box::new(|_| {}),
+    }
+}
+
+/// A bake that has not begun; [`bake()`] makes one.
+#[must_use = "nothing is baked until `run`"]
+pub struct Bake<'a> {
+    request: bake::Request,
+    stop: &'a AtomicBool,
+    tell: Box<dyn FnMut(bake::Event) + 'a>,
+}
+
+impl<'a> Bake<'a> {
+    /// Sets the directory of the cache.
+    pub fn to(mut self, directory: impl Into<PathBuf>) -> Self {
+        self.request.directory = directory.into();
+        self
+    }
+
+    /// Sets the device.
+    pub fn device(mut self, device: Device) -> Self {
+        self.request.device = device;
+        self
+    }
+
+    /// Bakes these frames only, which begin at 1 or, with [`resume`](Self::resume), after the last
+    /// one in the cache.
+    ///
+    /// # Panics
+    /// If the range is empty.
+    pub fn frames(mut self, frames: RangeInclusive<u32>) -> Self {
+        self.request.frames = Some(range(frames));
+        self
+    }
+
+    /// Continues a bake that is already in the directory.
+    pub fn resume(mut self) -> Self {
+        self.request.resume = true;
+        self
+    }
+
+    /// Begins from a frame of another cache instead of the scene's own water.
+    pub fn from(mut self, cache: impl Into<PathBuf>, frame: u32) -> Self {
+        let directory = cache.into();
+        self.request.from = Some(BranchPoint { directory, frame });
+        self
+    }
+
+    /// Calls `tell` with the progress.
+    pub fn on_event(mut self, tell: impl FnMut(bake::Event) + 'a) -> Self {
+        self.tell = Box::new(tell);
+        self
+    }
+
+    /// Ends after the current frame once `stop` is set.
+    pub fn stop_at(mut self, stop: &'a AtomicBool) -> Self {
+        self.stop = stop;
+        self
+    }
+
+    /// Bakes.
+    ///
+    /// # Errors
+    /// [`BakeError`]; the frames that were completed before are in the cache.
+    pub fn run(mut self) -> Result<bake::Outcome, BakeError> {
+        bake::bake(&self.request, self.stop, &mut self.tell)
+    }
+}
+
+/// A render that has not begun; [`render()`] makes one.
+#[must_use = "nothing is rendered until `run`"]
+pub struct Render<'a> {
+    request: render::Request,
+    stop: &'a AtomicBool,
+    tell: Box<dyn FnMut(render::Event) + 'a>,
+}
+
+impl<'a> Render<'a> {
+    /// Sets the folder of the pictures.
+    pub fn to(mut self, directory: impl Into<PathBuf>) -> Self {
+        self.request.directory = directory.into();
+        self
+    }
+
+    /// Sets the adapter and the shaders.
+    pub fn gpu(mut self, gpu: Gpu) -> Self {
+        self.request.gpu = gpu;
+        self
+    }
+
+    /// Renders these frames only.
+    ///
+    /// # Panics
+    /// If the range is empty.
+    pub fn frames(mut self, frames: RangeInclusive<u32>) -> Self {
+        self.request.frames = Some(range(frames));
+        self
+    }
+
+    /// Renders frames again that exist already, even those of another look or cache.
+    pub fn overwrite(mut self) -> Self {
+        self.request.overwrite = true;
+        self
+    }
+
+    /// Calls `tell` with the progress.
+    pub fn on_event(mut self, tell: impl FnMut(render::Event) + 'a) -> Self {
+        self.tell = Box::new(tell);
+        self
+    }
+
+    /// Ends after the current frame once `stop` is set.
+    pub fn stop_at(mut self, stop: &'a AtomicBool) -> Self {
+        self.stop = stop;
+        self
+    }
+
+    /// Renders.
+    ///
+    /// # Errors
+    /// [`RenderJobError`]. Frames missing from the cache, and a folder that cannot be shared, are
+    /// reported before anything is rendered.
+    pub fn run(mut self) -> Result<render::Outcome, RenderJobError> {
+        render::render(&self.request, self.stop, &mut self.tell)
+    }
+}
+
+fn range(frames: RangeInclusive<u32>) -> FrameRange {
+    FrameRange::inclusive(*frames.start(), *frames.end()).expect("a range with a frame in it")
+}
