@@ -307,7 +307,8 @@ fn a_flipped_bit_in_any_file_is_named_or_does_not_matter() {
         }
     }
     println!(
-        "refused {refused:?}\nmended or of no account {mended:?}\nleft as they are, and named {passed:?}"
+        "refused {refused:?}\nmended or of no account {mended:?}\n\
+         left as they are, and named {passed:?}"
     );
     let has = |set: &BTreeSet<PathBuf>, name: &str| set.contains(Path::new(name));
     let is_mesh = |file: &&PathBuf| file.starts_with("assets");

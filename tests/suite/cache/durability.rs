@@ -309,8 +309,9 @@ fn killed_on(device: &str, name: &str, solver: &str, more: &str, kills: u32) -> 
     let fell = case.end(kills);
     let [before, within, between] = fell;
     println!(
-        "{name}, {device}: {kills} kills, {before} before the first frame of their process, {within} within a frame's write, \
-         {between} between frames; start-up {:.2} s, frame {:.1} ms, {:.0} s in all",
+        "{name}, {device}: {kills} kills, {before} before the first frame of their process, \
+         {within} within a frame's write, {between} between frames; start-up {:.2} s, \
+         frame {:.1} ms, {:.0} s in all",
         startup.as_secs_f64(),
         1e3 * frame.as_secs_f64(),
         begin.elapsed().as_secs_f64()

@@ -79,7 +79,11 @@ proptest! {
 
     /// Any bit of any file that carries content; the lock and the timings carry none.
     #[test]
-    fn a_flipped_bit_is_found(file in any::<prop::sample::Index>(), at in any::<prop::sample::Index>(), bit in 0u8..8) {
+    fn a_flipped_bit_is_found(
+        file in any::<prop::sample::Index>(),
+        at in any::<prop::sample::Index>(),
+        bit in 0u8..8,
+    ) {
         static COPY: OnceLock<TempDir> = OnceLock::new();
         let d = COPY.get_or_init(copied).path();
         let all: Vec<_> = files(d)
@@ -109,7 +113,10 @@ proptest! {
     }
 
     #[test]
-    fn garbage_in_place_of_a_file_never_panics(file in any::<prop::sample::Index>(), bytes in prop::collection::vec(any::<u8>(), 0..200)) {
+    fn garbage_in_place_of_a_file_never_panics(
+        file in any::<prop::sample::Index>(),
+        bytes in prop::collection::vec(any::<u8>(), 0..200),
+    ) {
         static COPY: OnceLock<TempDir> = OnceLock::new();
         let d = COPY.get_or_init(copied).path();
         let all = files(baked());

@@ -533,7 +533,8 @@ fn a_splash_keeps_its_volume(solver: &str) {
     let scene = "[shot]\nname = \"splash\"\nframes = 40\nframes_per_second = 40\n\
         [domain]\nmin = [0.0, 0.0, 0.0]\nmax = [2.0, 2.0, 0.6]\n\
         [[water.block]]\nmin = [0.0, 0.0, 0.0]\nmax = [0.7, 1.0, 0.6]\n\
-        [solver]\nmethod = \"pbf\"\n[solver.pbf]\nparticle_spacing = 0.05\n[solver.flip]\ncell_size = 0.1\n\
+        [solver]\nmethod = \"pbf\"\n[solver.pbf]\nparticle_spacing = 0.05\n[solver.flip]\n\
+        cell_size = 0.1\n\
         [[probe]]\nkind = \"volume\"\n";
     let job = Job::of(&[("splash.toml", scene)]);
     job.expect(0, &format!("bake splash.toml --solver {solver} -o out"));

@@ -11,7 +11,8 @@ use crate::support::{
 const FOG: &[u8] = include_bytes!("../domain/files/no-level-set.vdb");
 
 /// Points as a program other than swell may have them: no camera, no prim that moves, no mesh.
-const POINTS: &str = "#usda 1.0\n(\n    defaultPrim = \"p\"\n)\n\ndef Points \"p\"\n{\n    point3f[] points = [(0, 0, 0)]\n}\n";
+const POINTS: &str = "#usda 1.0\n(\n    defaultPrim = \"p\"\n)\n\ndef Points \"p\"\n\
+    {\n    point3f[] points = [(0, 0, 0)]\n}\n";
 
 const SCENE: &str = r#"
 [shot]

@@ -231,7 +231,8 @@ fn names_hold_what_file_systems_take() {
     fs::create_dir(job.path("100%#1")).unwrap();
     job.expect(
         0,
-        "export cache --frames 1-2 --mesh 100%#1/m.%04d.usd --npy 100%#1/p.##.npy --usd 100%#1/take@2.usd --look look.toml",
+        "export cache --frames 1-2 --mesh 100%#1/m.%04d.usd --npy 100%#1/p.##.npy \
+         --usd 100%#1/take@2.usd --look look.toml",
     );
     let made = files(&job.path("100%#1"));
     let names: Vec<_> = made.keys().map(String::as_str).collect();
@@ -278,7 +279,8 @@ fn files_are_numbered_from_another_frame() {
     }
     let words = |folder: &str, more: &str| {
         format!(
-            "export cache --frames 2-4x2 --npy {folder}/p.%04d.npy --usd {folder}/s.usda --look look.toml {more}"
+            "export cache --frames 2-4x2 --npy {folder}/p.%04d.npy --usd {folder}/s.usda \
+             --look look.toml {more}"
         )
     };
     job.expect(0, &words("plain", ""));

@@ -137,7 +137,8 @@ fn events_of_a_study_end_with_the_totals_of_its_points() {
     let job = Job::new();
     job.write(
         "refusal.toml",
-        "kind = \"stability\"\n[[case]]\nnumber = 1\nname = \"a name that is none\"\nscene = \"small.toml\"\ndevices = [\"cpu\"]\n\
+        "kind = \"stability\"\n[[case]]\nnumber = 1\nname = \"a name that is none\"\n\
+         scene = \"small.toml\"\ndevices = [\"cpu\"]\n\
          set = [\"shot.name=../up\"]\nrefused = [\"no safe file name\"]\n",
     );
     let told = events(&job, 0, "study refusal.toml -o s");
@@ -178,7 +179,8 @@ fn a_fault_is_an_event_with_its_exit_code() {
     assert_eq!(all.last().unwrap()["bytes"], bytes_of(&job, &[1, 2]));
 
     // The controls: streams that are not whole.
-    let good = "{\"event\":\"error\",\"exit_code\":2,\"message\":\"m\"}\n{\"event\":\"end\",\"exit_code\":2}\n";
+    let good = "{\"event\":\"error\",\"exit_code\":2,\"message\":\"m\"}\n\
+        {\"event\":\"end\",\"exit_code\":2}\n";
     assert_eq!(fault(good, 2), None);
     let end = "{\"event\":\"end\",\"exit_code\":2}\n";
     for bad in [

@@ -66,7 +66,8 @@ fn inspect_says_what_each_part_takes() {
     );
     // Of 8 frames; the last that is possible was not refused above.
     let said = job.expect(2, "inspect small.toml --time 8");
-    let expected = "--time 8: small.toml has 8 frames, and the first is not timed: up to 7 are possible; raise shot.frames";
+    let expected = "--time 8: small.toml has 8 frames, and the first is not timed: \
+        up to 7 are possible; raise shot.frames";
     assert!(said.contains(expected), "{said}");
     shown("inspect small.toml --time 7");
 }
@@ -265,7 +266,8 @@ fn inspect_names_cameras_and_what_moves() {
     write("taken.usda", &format!("{lens}\n{taken}"));
     write(
         "eye.gltf",
-        "{\"asset\":{\"version\":\"2.0\"},\"cameras\":[{\"type\":\"perspective\",\"perspective\":{\"yfov\":0.5,\"znear\":0.1}}],\
+        "{\"asset\":{\"version\":\"2.0\"},\"cameras\":[{\"type\":\"perspective\",\
+         \"perspective\":{\"yfov\":0.5,\"znear\":0.1}}],\
          \"nodes\":[{\"name\":\"shot\",\"camera\":0},{\"name\":\"set\"}]}",
     );
     let object = |file: &str| job.json(0, &format!("inspect {file}"));

@@ -109,7 +109,8 @@ fn completions_know_commands_and_options() {
     let complete = |words: &str| {
         let script = format!(
             "source ./complete; COMP_WORDS=({words}); COMP_CWORD=$((${{#COMP_WORDS[@]}} - 1)); \
-             _swell swell \"${{COMP_WORDS[COMP_CWORD]}}\" \"${{COMP_WORDS[COMP_CWORD - 1]}}\"; echo \"${{COMPREPLY[*]}}\""
+             _swell swell \"${{COMP_WORDS[COMP_CWORD]}}\" \"${{COMP_WORDS[COMP_CWORD - 1]}}\"; \
+             echo \"${{COMPREPLY[*]}}\""
         );
         let mut bash = Command::new("bash");
         let output = bash.current_dir(job.folder.path()).args(["-c", &script]);

@@ -48,8 +48,8 @@ fn the_volume_that_is_made_stands_beside_the_one_asked_for() {
         "max = [0.8, 0.4, 0.8]",
         "max = [0.8, 0.37, 0.8]",
     );
-    let lint = "water.block[0]: 0.2368 m³ are asked for and 0.2560 m³ made, 8.1 % more: it is filled with whole layers, 8 × 4 × 8 \
-                particles 0.1 m apart";
+    let lint = "water.block[0]: 0.2368 m³ are asked for and 0.2560 m³ made, 8.1 % more: \
+                it is filled with whole layers, 8 × 4 × 8 particles 0.1 m apart";
     let told =
         "256 particles (0 left out where solids are), 0.2560 m³ of water of 0.2368 m³ asked for";
     for words in ["inspect water.toml", &format!("{BAKE} -o off")] {
@@ -87,8 +87,8 @@ fn emitters_that_rows_or_windows_round_are_told_of() {
         assert!(!said.contains("warning"), "{said}");
     }
     let thin = "--set emitter=[{min=[0.2,0.5,0.2],max=[0.5,0.65,0.6],velocity=[1,0,0]}]";
-    let lint = "emitter[0]: its box and velocity ask for 0.06000 m³/s, and 0.08000 m³/s enter, 33.3 % more: across the flow there are \
-                whole rows of particles 0.1 m apart";
+    let lint = "emitter[0]: its box and velocity ask for 0.06000 m³/s, and 0.08000 m³/s enter, \
+                33.3 % more: across the flow there are whole rows of particles 0.1 m apart";
     for words in [
         format!("inspect water.toml {thin}"),
         format!("{BAKE} {thin} -o rounded"),
@@ -187,9 +187,11 @@ fn an_overfull_box_is_told_of_from_five_per_cent_on() {
     job.edit(
         "water.toml",
         "[solver]\n",
-        "[[emitter]]\nmin = [0.2, 0.2, 0.2]\nmax = [0.6, 0.6, 0.6]\nvelocity = [0.0, 0.2, 0.0]\n[solver]\n",
+        "[[emitter]]\nmin = [0.2, 0.2, 0.2]\nmax = [0.6, 0.6, 0.6]\nvelocity = [0.0, 0.2, 0.0]\n\
+         [solver]\n",
     );
-    let overfull = "warning: the domain is overfull: 544 particles stand for 0.5440 m³ of water, and it has room for 0.5120 m³";
+    let overfull = "warning: the domain is overfull: 544 particles stand for 0.5440 m³ of water, \
+        and it has room for 0.5120 m³";
     for solver in ["flip", "pbf"] {
         let bake = format!("bake water.toml --device cpu --solver {solver}");
         let said = job.expect(0, &format!("{bake} -o {solver}"));
@@ -221,7 +223,8 @@ fn water_in_an_open_mesh_is_told_of() {
         "[[solid]]\nmesh = \"cup.obj\"\n[solver]\n",
     );
     let open = "cup.obj is open and taken as closed: 1 hole: 4 open edges about";
-    let container = "the scene puts water inside of it, and that water is left out: an open mesh is solid up to a flat cap over each hole";
+    let container = "the scene puts water inside of it, and that water is left out: \
+        an open mesh is solid up to a flat cap over each hole";
     for words in ["inspect water.toml", &format!("{BAKE} -o cup")] {
         let said = job.expect(0, words);
         let warned = said

@@ -92,7 +92,8 @@ fn water_and_solids_are_taken_from_a_level_set() {
     std::fs::write(job.path("sheared.vdb"), SHEARED).unwrap();
     let scene = |lines: &str| {
         format!(
-            "[shot]\nname = \"ball\"\nframes = 2\nframes_per_second = 24\n[domain]\nmin = [0.0, 0.0, 0.0]\nmax = [2.0, 1.0, 1.0]\n\
+            "[shot]\nname = \"ball\"\nframes = 2\nframes_per_second = 24\n[domain]\n\
+             min = [0.0, 0.0, 0.0]\nmax = [2.0, 1.0, 1.0]\n\
              {lines}[solver]\nmethod = \"pbf\"\n[solver.pbf]\nparticle_spacing = 0.05\n"
         )
     };

@@ -172,7 +172,8 @@ fn one_substep_on_the_gpu_and_in_f64() {
             "effects.viscosity.xsph=0.11",
             "effects.vorticity_confinement.strength=0.6",
             "water.gravity=[0,-9.9,0]",
-            "wave_maker=[{wall=\"-x\",motion={kind=\"constant_velocity\",velocity=1.51,until=1.0}}]",
+            "wave_maker=[{wall=\"-x\",motion={kind=\"constant_velocity\",velocity=1.51,\
+             until=1.0}}]",
         ] {
             let (scene, _) = lively(&format!("{kind} {spoil}"));
             let gap = gaps(&reference(&scene, &start).0, &state, step);

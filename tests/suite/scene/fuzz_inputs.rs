@@ -142,7 +142,8 @@ fn each_fault_of_a_study_names_file_line_key_and_what_is_allowed() {
         (
             "solver_comparison",
             "comparison",
-            "s.toml:1: kind: \"comparison\" is no kind; the nearest is \"solver_comparison\"; allowed: \"solver_comparison\"",
+            "s.toml:1: kind: \"comparison\" is no kind; the nearest is \"solver_comparison\"; \
+             allowed: \"solver_comparison\"",
         ),
         (
             "pictures",
@@ -357,7 +358,11 @@ proptest! {
 
     #[test]
     fn no_tokens_make_the_obj_reader_panic(
-        lines in prop::collection::vec("(v|f|vn|vt|o|g|l|p|usemtl|mtllib|s|\\\\)( -?[0-9]{1,20}(/-?[0-9]{0,19}){0,3}){0,6}", 0..30),
+        lines in prop::collection::vec(
+            "(v|f|vn|vt|o|g|l|p|usemtl|mtllib|s|\\\\)\
+             ( -?[0-9]{1,20}(/-?[0-9]{0,19}){0,3}){0,6}",
+            0..30,
+        ),
     ) {
         let text = lines.join("\n");
         let _ = TriangleMesh::from_bytes(text.as_bytes(), MeshFormat::Obj, Path::new("fuzz"));
@@ -407,7 +412,8 @@ proptest! {
     fn no_mutation_makes_the_tolerance_parser_panic(
         edits in prop::collection::vec(any::<(u16, u8, u8)>(), 1..6),
     ) {
-        let text = "[position]\nmax = 1e-3\n[attributes.c]\nrms = 1\n[aggregates]\nvolume = { relative = 0.1 }\n\
+        let text = "[position]\nmax = 1e-3\n[attributes.c]\nrms = 1\n[aggregates]\n\
+            volume = { relative = 0.1 }\n\
             [pictures]\nperceptual = 90\n";
         let bytes = mutate(text.as_bytes().to_vec(), &edits);
         let _ = tolerance::parse(&String::from_utf8_lossy(&bytes), Path::new("t.toml"));

@@ -8,8 +8,10 @@ use swell::{
 
 use crate::support::job::{Job, assert_has};
 
-const POOL: &str = "[shot]\nname = \"pool\"\nframes = 1\nframes_per_second = 24\n[domain]\nmin = [0.0, 0.0, 0.0]\n\
-    max = [2.0, 1.0, 1.0]\n[[water.block]]\nmin = [0.0, 0.0, 0.0]\nmax = [2.0, 0.5, 1.0]\n[[solid]]\nmesh = \"solid.obj\"\n\
+const POOL: &str = "[shot]\nname = \"pool\"\nframes = 1\nframes_per_second = 24\n[domain]\n\
+    min = [0.0, 0.0, 0.0]\n\
+    max = [2.0, 1.0, 1.0]\n[[water.block]]\nmin = [0.0, 0.0, 0.0]\nmax = [2.0, 0.5, 1.0]\n\
+    [[solid]]\nmesh = \"solid.obj\"\n\
     [solver]\nmethod = \"pbf\"\n[solver.pbf]\nparticle_spacing = 0.05\n";
 
 /// A basin's plan: x and z of its corners, two of them on a straight edge.
@@ -201,7 +203,8 @@ fn box_to(size: [f64; 3]) -> String {
 /// 0.075 in 32 bits is 0.07500000298: what a file in them, or decimals of a program that has them, says for it is as wide as the domain.
 #[test]
 fn a_mesh_as_wide_as_the_domain_fits_into_it() {
-    let head = "[shot]\nname = \"a\"\nframes = 1\nframes_per_second = 24\n[domain]\nmin = [0.0, 0.0, 0.0]\n\
+    let head = "[shot]\nname = \"a\"\nframes = 1\nframes_per_second = 24\n[domain]\n\
+        min = [0.0, 0.0, 0.0]\n\
         max = [0.075, 0.9, 0.3]\n[solver]\nmethod = \"flip\"\n[solver.flip]\ncell_size = 0.0125\n";
     let water = "[[water.mesh]]\nfile = \"FILE\"\n";
     let emitter =
@@ -285,8 +288,10 @@ fn texts_of_other_encodings_say_what_to_do() {
         text + "endsolid box\n"
     };
     job.write("box.stl", &stl);
-    let ply = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\nelement face 4\n\
-        property list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n";
+    let ply = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n\
+        property float z\nelement face 4\n\
+        property list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n\
+        3 0 1 3\n3 1 2 3\n3 0 3 2\n";
     job.write("box.ply", ply);
     for (file, command, code) in [
         ("scene.toml", "inspect scene.toml", 2),

@@ -67,8 +67,10 @@ const MODEST: usize = 1 << 20;
 fn a_promise_of_a_trillion_is_refused_without_memory_for_it() {
     let header = |format: &str, vertices: &str, faces: &str| {
         format!(
-            "ply\nformat {format} 1.0\nelement vertex {vertices}\nproperty float x\nproperty float y\n\
-             property float z\nelement face {faces}\nproperty list uchar uint vertex_indices\nend_header\n"
+            "ply\nformat {format} 1.0\nelement vertex {vertices}\nproperty float x\n\
+             property float y\n\
+             property float z\nelement face {faces}\nproperty list uchar uint vertex_indices\n\
+             end_header\n"
         )
     };
     let mut meshes = Vec::new();
@@ -177,7 +179,9 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(400))]
 
     #[test]
-    fn no_mutation_of_a_manifest_makes_a_reader_panic(edits in prop::collection::vec(any::<(u16, u8, u8)>(), 1..6)) {
+    fn no_mutation_of_a_manifest_makes_a_reader_panic(
+        edits in prop::collection::vec(any::<(u16, u8, u8)>(), 1..6),
+    ) {
         let manifest = mutate(fs::read(stand_in::baked().join("manifest.json")).unwrap(), &edits);
         read_all(&manifest, &stand_in::chained(&manifest, &contents(&manifest)));
     }
@@ -196,7 +200,9 @@ proptest! {
     }
 
     #[test]
-    fn no_mutation_of_a_frame_makes_its_reader_panic(edits in prop::collection::vec(any::<(u16, u8, u8)>(), 1..6)) {
+    fn no_mutation_of_a_frame_makes_its_reader_panic(
+        edits in prop::collection::vec(any::<(u16, u8, u8)>(), 1..6),
+    ) {
         let good = fs::read(stand_in::baked().join("frames/tank.0002.ply")).unwrap();
         let _ = frame::decode(&mutate(good, &edits), Path::new("frame"));
     }
@@ -208,8 +214,8 @@ fn a_parent_at_the_last_frame_number_is_read_or_refused() {
     let manifest = fs::read_to_string(stand_in::baked().join("manifest.json")).unwrap();
     let last = u32::MAX;
     let parent = format!(
-        "\"parent\": {{ \"shot\": \"a\", \"solver\": \"pbf\", \"scene_hash\": \"\", \"frame\": {last}, \"blake3\": \"\" }},\n  \
-         \"start_particles\""
+        "\"parent\": {{ \"shot\": \"a\", \"solver\": \"pbf\", \"scene_hash\": \"\", \"frame\": \
+         {last}, \"blake3\": \"\" }},\n  \"start_particles\""
     );
     let manifest = manifest
         .replace("\"start_particles\"", &parent)
@@ -343,8 +349,8 @@ fn an_open_mesh_is_told_of_everywhere_and_a_tube_is_refused() {
     job.edit("small.toml", "period = 0.5", "period = 2.0");
     job.expect(0, "bake small.toml --device cpu --frames 1 -o closed");
     // The cache has its own copy, of a name of its own.
-    let told = ".obj is open and taken as closed: 1 hole: 4 open edges about (0.5000, 0.5000, 0.7000), 0.5657 m \
-                across; inside is where its winding number is above one half";
+    let told = ".obj is open and taken as closed: 1 hole: 4 open edges about (0.5000, 0.5000, \
+                0.7000), 0.5657 m across; inside is where its winding number is above one half";
     let manifest = |cache: &str| fs::read_to_string(job.path(cache).join("manifest.json")).unwrap();
     assert!(!manifest("closed").contains("warnings"));
     assert!(!job.expect(0, "inspect small.toml").contains("warning"));
@@ -377,8 +383,9 @@ fn an_open_mesh_is_told_of_everywhere_and_a_tube_is_refused() {
         let said = job.expect(2, words);
         for part in [
             "small.toml:16: solid[0].mesh",
-            "its holes face one another through it, as in a tube; 2 holes with 8 open edges: 4 open edges about \
-             (0.5000, 0.5000, 0.7000), 0.5657 m across, 4 open edges about (0.5000, 1.0000, 0.7000), 0.5657 m across",
+            "its holes face one another through it, as in a tube; 2 holes with 8 open edges: \
+             4 open edges about (0.5000, 0.5000, 0.7000), 0.5657 m across, \
+             4 open edges about (0.5000, 1.0000, 0.7000), 0.5657 m across",
         ] {
             assert!(said.contains(part), "{words}: {said}");
         }

@@ -145,8 +145,8 @@ fn a_branch_of_the_reference_is_the_unbroken_bake() {
 /// Where a scene has an origin of its own, frames are in 64 bits, and a branch begins with the same bits.
 #[test]
 fn a_branch_far_from_the_origin_is_the_unbroken_bake() {
-    let far = "--set domain.min=[9999.0,0.5,0.25] --set domain.max=[10001.0,2.5,1.25] --set solid=[] --set \
-        water.block=[{min=[9999.0,0.5,0.25],max=[9999.8,1.5,1.25]}] --set \
+    let far = "--set domain.min=[9999.0,0.5,0.25] --set domain.max=[10001.0,2.5,1.25] \
+        --set solid=[] --set water.block=[{min=[9999.0,0.5,0.25],max=[9999.8,1.5,1.25]}] --set \
         probe=[{kind=\"elevation\",at=[9999.5,0.75]}]";
     branches_are_the_unbroken_bake("pbf", far, "solver.pbf.iterations=5");
 }
@@ -332,7 +332,8 @@ fn a_frame_that_does_not_fit_is_refused_and_nothing_is_written() {
         "mesh = \"box.obj\"\ntranslate = [-1.0, 0.0, 0.0]",
     );
     // Being pushed out by iterations alone is a rise of energy that no wall did, and more than the default budget allows.
-    let covered = "bake small.toml -o covered --from whole:3 --frames 4 --set solver.pbf.grid_projection=false";
+    let covered = "bake small.toml -o covered --from whole:3 --frames 4 \
+        --set solver.pbf.grid_projection=false";
     let said = job.expect(5, covered);
     for words in ["particles lie within solids of the scene", "budget.energy"] {
         assert!(said.contains(words), "{said}");

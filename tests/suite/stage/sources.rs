@@ -193,8 +193,8 @@ fn a_bake_with_more_particles_than_its_budget_ends_there() {
         |limit: usize| format!("{bake} -o limited --resume --set budget.particles={limit}");
     let said = job.expect(5, &limited(most - 1));
     let expected = format!(
-        "frame {frame}: the count of particles with what entered is {most}, and budget.particles is {}; emitters brought them; the last \
-         good frame is kept",
+        "frame {frame}: the count of particles with what entered is {most}, \
+         and budget.particles is {}; emitters brought them; the last good frame is kept",
         most - 1
     );
     assert!(said.contains(&expected), "{said}");

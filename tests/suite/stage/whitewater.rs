@@ -14,7 +14,8 @@ use swell::{
 use crate::support::job::{Job, assert_has};
 
 /// Thresholds low enough for the small splash of a job, and lives as short as it.
-const SETTINGS: &str = "[emission]\ntrapped_air = [0.2, 2.0]\nwave_crest = [0.2, 2.0]\nenergy = [0.02, 0.5]\n\
+const SETTINGS: &str = "[emission]\ntrapped_air = [0.2, 2.0]\nwave_crest = [0.2, 2.0]\n\
+    energy = [0.02, 0.5]\n\
     [foam]\nlifetime = [0.02, 0.1]\n";
 const MAKE: &str = "whitewater cache/small/pbf --settings tuned.toml";
 const STREAM: &str = "cache/small/pbf/whitewater/tuned";

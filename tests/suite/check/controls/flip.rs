@@ -330,7 +330,8 @@ pub const FLIP: &[Control] = &[
     control(
         "flip/survey",
         "atomicMax(&survey.head.speed_square, bitcast<u32>(fastest));",
-        "atomicMax(&survey.head.speed_square, bitcast<u32>(fastest)); atomicStore(&survey.is_wet[12u], 1u);",
+        "atomicMax(&survey.head.speed_square, bitcast<u32>(fastest)); \
+         atomicStore(&survey.is_wet[12u], 1u);",
         "flip/survey",
         &["bricks with water"],
     ),

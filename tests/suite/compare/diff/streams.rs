@@ -190,8 +190,10 @@ fn probes_and_reports_that_differ_are_told_and_count() {
         &said,
         &[
             "no other bit in the particles",
-            "out: probe near not the same in frames 2-4; frame 2, probes/near.csv: potential_j: A 7.25, B 2.5",
-            "out: probe far not the same in frames 4; frame 4, probes/far.csv: depth_m: A null, B 4.0",
+            "out: probe near not the same in frames 2-4; frame 2, probes/near.csv: potential_j: \
+             A 7.25, B 2.5",
+            "out: probe far not the same in frames 4; frame 4, probes/far.csv: depth_m: A null, \
+             B 4.0",
             "OUT OF TOLERANCE",
         ],
     );
@@ -217,7 +219,8 @@ fn probes_and_reports_that_differ_are_told_and_count() {
     assert_has(
         &job.expect(1, "diff slower b"),
         &[
-            "out: ledger not the same in frames 1-4; frame 1, frames.jsonl: report.iterations: A 5, B 4",
+            "out: ledger not the same in frames 1-4; frame 1, frames.jsonl: report.iterations: \
+             A 5, B 4",
         ],
     );
 }

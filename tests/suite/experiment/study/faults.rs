@@ -24,7 +24,8 @@ fn devices_and_references_that_do_not_fit_are_refused() {
         (
             "\"density_error_mean\", \"density_error_max\"",
             "\"weight_error\"",
-            "weight_error cannot be measured of \"jacobi\" with 1: its scene has no probe of pressure",
+            "weight_error cannot be measured of \"jacobi\" with 1: its scene has no probe of \
+             pressure",
         ),
         (
             "\"density_error_mean\", \"density_error_max\"",

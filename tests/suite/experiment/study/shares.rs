@@ -132,7 +132,8 @@ fn shares_that_are_joined_are_the_study_that_one_process_ran() {
     assert_eq!(statuses(&told), ["stands there"; 6]);
     let (mut ours, mut theirs) = (pages(&dealt), pages(&whole));
     let page = String::from_utf8(ours.remove("index.html").unwrap()).unwrap();
-    let words = "<p>Of 6 points, share 1/3 ran 2, share 2/3 ran 2, share 3/3 ran 2 (results.jsonl names each point's share). ";
+    let words = "<p>Of 6 points, share 1/3 ran 2, share 2/3 ran 2, share 3/3 ran 2 (results.jsonl \
+        names each point's share). ";
     let begin = page.find(words).unwrap_or_else(|| panic!("{page}"));
     let end = begin + page[begin..].find('\n').unwrap() + 1;
     assert!(

@@ -2,8 +2,10 @@
 
 use super::{Job, stands};
 
-const LOOK: &str = "[camera]\nfocal_length_mm = 35.0\nfilm_back_mm = [36.0, 24.0]\nposition = [-1.0, 1.2, 1.5]\n\
-    target = [0.5, 0.3, 0.3]\n[image]\nwidth = 72\nheight = 48\nsamples = 1\n[sky]\nmodel = \"hosek_wilkie\"\n";
+const LOOK: &str = "[camera]\nfocal_length_mm = 35.0\nfilm_back_mm = [36.0, 24.0]\n\
+    position = [-1.0, 1.2, 1.5]\n\
+    target = [0.5, 0.3, 0.3]\n[image]\nwidth = 72\nheight = 48\nsamples = 1\n[sky]\n\
+    model = \"hosek_wilkie\"\n";
 
 const SURFACE: &str = r#"
 kind = "surface"

@@ -129,7 +129,12 @@ fn a_signal_ends_it_and_a_failure_is_listed() {
 
     let (outcome, points) = job.run(&text, false).unwrap();
     assert!(outcome.page.is_some());
-    let failed = |p: &PointStatus| matches!(p, PointStatus::Failed(said) if said.contains("max_substeps is 32"));
+    let failed = |p: &PointStatus| {
+        matches!(
+            p,
+            PointStatus::Failed(said) if said.contains("max_substeps is 32")
+        )
+    };
     assert_eq!(
         points.iter().map(failed).collect::<Vec<_>>(),
         [true, false, false, true, false, false]

@@ -10,7 +10,8 @@ pub const FLIP_FAULTS: &[Fault] = &[
         "max = [25.0, 12.6, 15.0]\nperiodic = [\"z\"]",
         9,
         &[
-            "domain.periodic: the period along z is 15 m: 75.000 cells of 0.2 m, and FLIP asks for a multiple of 8",
+            "domain.periodic: the period along z is 15 m: 75.000 cells of 0.2 m, \
+             and FLIP asks for a multiple of 8",
         ],
     ),
     (
@@ -20,14 +21,26 @@ pub const FLIP_FAULTS: &[Fault] = &[
         &[],
     ),
     (
-        "max = [25.0, 12.6, 15.0]\n\n[water]\nrest_density = 1000.0\ngravity = [0.0, -9.81, 0.0]\n[[water.block]]\nmin = [0.0, 0.0, 0.0]\nmax = [13.4, 1.0, 15.0]\n\n[[solid]]\nmesh = \"cube.obj\"\ntranslate = [18.0, 0.0, 7.0]\nscale = 2.0",
-        "max = [25.0, 12.6, 16.0]\nperiodic = [\"z\"]\n\n[water]\nrest_density = 1000.0\ngravity = [0.0, -9.81, 0.0]\n[[water.block]]\nmin = [0.0, 0.0, 0.0]\nmax = [13.4, 1.0, 15.0]\n\n[[solid]]\nmesh = \"cube.obj\"\ntranslate = [18.0, 0.0, 7.0]\nscale = 2.0\ndirection = [1.0, 0.0, 0.5]\nmotion = { kind = \"sine\", stroke = 0.5, period = 3.0 }",
+        "max = [25.0, 12.6, 15.0]\n\n[water]\nrest_density = 1000.0\ngravity = [0.0, -9.81, 0.0]\n\
+         [[water.block]]\nmin = [0.0, 0.0, 0.0]\nmax = [13.4, 1.0, 15.0]\n\n[[solid]]\n\
+         mesh = \"cube.obj\"\ntranslate = [18.0, 0.0, 7.0]\nscale = 2.0",
+        "max = [25.0, 12.6, 16.0]\nperiodic = [\"z\"]\n\n[water]\nrest_density = 1000.0\n\
+         gravity = [0.0, -9.81, 0.0]\n[[water.block]]\nmin = [0.0, 0.0, 0.0]\n\
+         max = [13.4, 1.0, 15.0]\n\n[[solid]]\nmesh = \"cube.obj\"\ntranslate = [18.0, 0.0, 7.0]\n\
+         scale = 2.0\ndirection = [1.0, 0.0, 0.5]\nmotion = { kind = \"sine\", stroke = 0.5, \
+         period = 3.0 }",
         22,
         &["solid[0].direction: the solid moves along z, which domain.periodic names"],
     ),
     (
-        "max = [25.0, 12.6, 15.0]\n\n[water]\nrest_density = 1000.0\ngravity = [0.0, -9.81, 0.0]\n[[water.block]]\nmin = [0.0, 0.0, 0.0]\nmax = [13.4, 1.0, 15.0]\n\n[[solid]]\nmesh = \"cube.obj\"\ntranslate = [18.0, 0.0, 7.0]\nscale = 2.0",
-        "max = [25.0, 12.6, 16.0]\nperiodic = [\"z\"]\n\n[water]\nrest_density = 1000.0\ngravity = [0.0, -9.81, 0.0]\n[[water.block]]\nmin = [0.0, 0.0, 0.0]\nmax = [13.4, 1.0, 15.0]\n\n[[solid]]\nmesh = \"cube.obj\"\ntranslate = [18.0, 0.0, 7.0]\nscale = 2.0\ndirection = [1.0, 0.0, 0.0]\nmotion = { kind = \"sine\", stroke = 0.5, period = 3.0 }",
+        "max = [25.0, 12.6, 15.0]\n\n[water]\nrest_density = 1000.0\ngravity = [0.0, -9.81, 0.0]\n\
+         [[water.block]]\nmin = [0.0, 0.0, 0.0]\nmax = [13.4, 1.0, 15.0]\n\n[[solid]]\n\
+         mesh = \"cube.obj\"\ntranslate = [18.0, 0.0, 7.0]\nscale = 2.0",
+        "max = [25.0, 12.6, 16.0]\nperiodic = [\"z\"]\n\n[water]\nrest_density = 1000.0\n\
+         gravity = [0.0, -9.81, 0.0]\n[[water.block]]\nmin = [0.0, 0.0, 0.0]\n\
+         max = [13.4, 1.0, 15.0]\n\n[[solid]]\nmesh = \"cube.obj\"\ntranslate = [18.0, 0.0, 7.0]\n\
+         scale = 2.0\ndirection = [1.0, 0.0, 0.0]\nmotion = { kind = \"sine\", stroke = 0.5, \
+         period = 3.0 }",
         22,
         &[],
     ),

@@ -117,7 +117,8 @@ pub const KEY_FAULTS: &[Fault] = &[
         33,
         &[
             "probe[0].kind: \"elevaton\" is no kind; the nearest is \"elevation\"",
-            "\"elevation\", \"pressure\", \"energy\", \"volume\", \"front\", \"run_up\", \"flux\" or \"force\"",
+            "\"elevation\", \"pressure\", \"energy\", \"volume\", \"front\", \"run_up\", \
+             \"flux\" or \"force\"",
         ],
     ),
     (
@@ -134,16 +135,19 @@ pub const KEY_FAULTS: &[Fault] = &[
     ),
     (
         "[effects]",
-        "[[probe]]\nkind = \"energy\"\nname = \"A\"\n[[probe]]\nkind = \"volume\"\nname = \"a\"\n\n[effects]",
+        "[[probe]]\nkind = \"energy\"\nname = \"A\"\n[[probe]]\nkind = \"volume\"\nname = \"a\"\n\n\
+         [effects]",
         37,
         &[
-            "probe[1].name: a second probe of the name \"a\": \"A\" is the same file where upper and lower case",
+            "probe[1].name: a second probe of the name \"a\": \"A\" is the same file where upper \
+             and lower case",
             "upper and lower case taken alike",
         ],
     ),
     (
         "[effects]",
-        "[[probe]]\nkind = \"energy\"\nname = \"a\"\n[[probe]]\nkind = \"volume\"\nname = \"a\"\n\n[effects]",
+        "[[probe]]\nkind = \"energy\"\nname = \"a\"\n[[probe]]\nkind = \"volume\"\nname = \"a\"\n\n\
+         [effects]",
         37,
         &["probe[1].name: a second probe of the name \"a\""],
     ),
@@ -158,7 +162,8 @@ pub const KEY_FAULTS: &[Fault] = &[
         "strok = 1.5",
         24,
         &[
-            "wave_maker[0].motion.strok: unknown key in wave_maker[0].motion; the nearest is \"stroke\"",
+            "wave_maker[0].motion.strok: unknown key in wave_maker[0].motion; \
+             the nearest is \"stroke\"",
         ],
     ),
     (
@@ -166,7 +171,8 @@ pub const KEY_FAULTS: &[Fault] = &[
         "stroke = 1.5, velocity = 1",
         24,
         &[
-            "motion.velocity: does not go with kind = \"sine\"; allowed with it: kind, stroke, period, ramp",
+            "motion.velocity: does not go with kind = \"sine\"; allowed with it: kind, stroke, \
+             period, ramp",
         ],
     ),
     (
@@ -229,7 +235,8 @@ pub const KEY_FAULTS: &[Fault] = &[
         "coefficient = 0.0",
         33,
         &[
-            "effects.viscosity.coefficient: 0 is out of range; allowed: a number from 1e-6 to 1e9, Pa s",
+            "effects.viscosity.coefficient: 0 is out of range; allowed: a number from 1e-6 to 1e9, \
+             Pa s",
         ],
     ),
     (

@@ -386,13 +386,15 @@ pub const VALUE_FAULTS: &[Fault] = &[
     ),
     (
         "ramp = 1.0 }",
-        "ramp = 1.0 }\n[[wave_maker]]\nwall = \"-x\"\nmotion = { kind = \"constant_velocity\", velocity = 1.0 }",
+        "ramp = 1.0 }\n[[wave_maker]]\nwall = \"-x\"\nmotion = { kind = \"constant_velocity\", \
+         velocity = 1.0 }",
         26,
         &["wave_maker[1].wall: a second wave maker on the wall -x"],
     ),
     (
         "ramp = 1.0 }",
-        "ramp = 1.0 }\n[[wave_maker]]\nwall = \"+x\"\nmotion = { kind = \"constant_velocity\", velocity = 6.0 }",
+        "ramp = 1.0 }\n[[wave_maker]]\nwall = \"+x\"\nmotion = { kind = \"constant_velocity\", \
+         velocity = 6.0 }",
         27,
         &["wave_maker[1].motion: the walls -x and +x collide 3."],
     ),
@@ -416,21 +418,25 @@ pub const VALUE_FAULTS: &[Fault] = &[
         "kind = \"sea\", significant_height = 0.5, peak_period = 1.4, depth = 1.0",
         24,
         &[
-            "motion.significant_height: waves of 1.4 s on 1 m of water break before they are 0.5 m high (Miche 1944)",
+            "motion.significant_height: waves of 1.4 s on 1 m of water break before they are 0.5 m \
+             high (Miche 1944)",
         ],
     ),
     (
         "kind = \"sine\", stroke = 1.5, period = 3.0, ramp = 1.0",
-        "kind = \"sea\", significant_height = 0.1, peak_period = 3.0, depth = 1.0, shortest_period = 2.9",
+        "kind = \"sea\", significant_height = 0.1, peak_period = 3.0, depth = 1.0, \
+         shortest_period = 2.9",
         24,
         &["motion.shortest_period: 2.9 s is 0.966"],
     ),
     (
         "kind = \"sine\", stroke = 1.5, period = 3.0, ramp = 1.0",
-        "kind = \"sea\", significant_height = 0.1, peak_period = 3.0, depth = 1.0, shortest_period = 0.5",
+        "kind = \"sea\", significant_height = 0.1, peak_period = 3.0, depth = 1.0, \
+         shortest_period = 0.5",
         24,
         &[
-            "motion.shortest_period: waves of 0.5 s are 0.390 m long, 3.9 particle spacings of at least 10; allowed: ",
+            "motion.shortest_period: waves of 0.5 s are 0.390 m long, 3.9 particle spacings of at \
+             least 10; allowed: ",
         ],
     ),
     (
@@ -441,31 +447,37 @@ pub const VALUE_FAULTS: &[Fault] = &[
     ),
     (
         "kind = \"sine\", stroke = 1.5, period = 3.0, ramp = 1.0",
-        "kind = \"sea\", significant_height = 0.1, peak_period = 3.0, depth = 1.0, spectrum = \"pierson_moskowitz\", peak_enhancement = 2.0",
+        "kind = \"sea\", significant_height = 0.1, peak_period = 3.0, depth = 1.0, \
+         spectrum = \"pierson_moskowitz\", peak_enhancement = 2.0",
         24,
         &["motion.peak_enhancement: Pierson and Moskowitz's peak is not raised; allowed: "],
     ),
     (
         "kind = \"sine\", stroke = 1.5, period = 3.0, ramp = 1.0",
-        "kind = \"sea\", significant_height = 0.1, peak_period = 3.0, depth = 1.0, spectrum = \"jonswop\"",
+        "kind = \"sea\", significant_height = 0.1, peak_period = 3.0, depth = 1.0, \
+         spectrum = \"jonswop\"",
         24,
         &["motion.spectrum: \"jonswop\" is no spectrum; the nearest is \"jonswap\""],
     ),
     (
         "kind = \"sine\", stroke = 1.5, period = 3.0, ramp = 1.0",
-        "kind = \"sea\", significant_height = 0.1, peak_period = 6.0, depth = 1.0, second_order = true",
+        "kind = \"sea\", significant_height = 0.1, peak_period = 6.0, depth = 1.0, \
+         second_order = true",
         24,
         &[
             "motion.second_order: H L² / h³ is 34.",
-            "with significant_height and the peak's 6 s on 1 m of water, and the second order holds below 26.3 (Madsen 1971); allowed: ",
+            "with significant_height and the peak's 6 s on 1 m of water, \
+             and the second order holds below 26.3 (Madsen 1971); allowed: ",
         ],
     ),
     (
         "kind = \"sine\", stroke = 1.5, period = 3.0, ramp = 1.0",
-        "kind = \"focused\", height = 0.1, at = 3.0, time = 60.0, peak_period = 2.0, shortest_period = 0.35, depth = 1.0, second_order = true",
+        "kind = \"focused\", height = 0.1, at = 3.0, time = 60.0, peak_period = 2.0, \
+         shortest_period = 0.35, depth = 1.0, second_order = true",
         24,
         &[
-            "motion.second_order: waves of 0.35 s on 1 m of water have kh = 32.9, and it is known up to 25",
+            "motion.second_order: waves of 0.35 s on 1 m of water have kh = 32.9, \
+             and it is known up to 25",
         ],
     ),
     (
@@ -497,7 +509,8 @@ pub const VALUE_FAULTS: &[Fault] = &[
         "kind = \"stokes\", height = 0.5, period = 1.4, depth = 1.0",
         24,
         &[
-            "motion.height: waves of 1.4 s on 1 m of water break before they are 0.5 m high (Miche 1944)",
+            "motion.height: waves of 1.4 s on 1 m of water break before they are 0.5 m high (Miche \
+             1944)",
         ],
     ),
     (
@@ -562,7 +575,8 @@ pub const VALUE_FAULTS: &[Fault] = &[
         "spectral_radius = 0.9",
         30,
         &[
-            "spectral_radius: does not go with iteration = \"red_black\"; allowed with it: particle_spacing, ",
+            "spectral_radius: does not go with iteration = \"red_black\"; allowed with it: \
+             particle_spacing, ",
         ],
     ),
     (

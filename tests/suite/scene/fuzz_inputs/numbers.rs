@@ -124,21 +124,35 @@ const OF_ABSORPTION: &[(&str, &str, bool)] = &[
 
 /// The good scene with all that [`NUMBERS`] changes in it.
 fn numbered() -> String {
-    let makers = "[[wave_maker]]\nwall = \"+x\"\nmotion = { kind = \"constant_velocity\", velocity = 0.1, until = 1.0 }\n\
-        [[wave_maker]]\nwall = \"+z\"\nmotion = { kind = \"solitary\", height = 0.1, depth = 1.0 }\n\
-        [[wave_maker]]\nwall = \"+y\"\nmotion = { kind = \"sea\", significant_height = 0.1, peak_period = 3.0, shortest_period = 2.0, depth = 1.0 }\n\
-        [[wave_maker]]\nwall = \"-z\"\nmotion = { kind = \"stokes\", height = 0.0005, period = 2.0, depth = 1.0 }\n";
-    let more = "[[water.particles]]\nat = [[20.0, 3.0, 3.0]]\nvelocity = [1.0, 0.0, 0.0]\n[[solid]]\nmesh = \"cube.obj\"\n\
+    let makers = "[[wave_maker]]\nwall = \"+x\"\nmotion = { kind = \"constant_velocity\", \
+        velocity = 0.1, until = 1.0 }\n\
+        [[wave_maker]]\nwall = \"+z\"\nmotion = { kind = \"solitary\", height = 0.1, \
+        depth = 1.0 }\n\
+        [[wave_maker]]\nwall = \"+y\"\nmotion = { kind = \"sea\", significant_height = 0.1, \
+        peak_period = 3.0, shortest_period = 2.0, depth = 1.0 }\n\
+        [[wave_maker]]\nwall = \"-z\"\nmotion = { kind = \"stokes\", height = 0.0005, \
+        period = 2.0, depth = 1.0 }\n";
+    let more = "[[water.particles]]\nat = [[20.0, 3.0, 3.0]]\nvelocity = [1.0, 0.0, 0.0]\n\
+        [[solid]]\nmesh = \"cube.obj\"\n\
         translate = [15.0, 3.0, 3.0]\ndirection = [1.0, 0.0, 0.0]\n\
         motion = { kind = \"constant_velocity\", velocity = 0.1, until = 1.0 }\n\
-        pivot = [15.0, 3.0, 3.0]\naxis = [0.0, 1.0, 0.0]\nturn = { kind = \"sine\", swing_degrees = 9.0, period = 2.0 }\n\
-        [[emitter]]\nmin = [1.0, 2.0, 1.0]\nmax = [2.0, 3.0, 2.0]\nvelocity = [0.001, 0.0, 0.0]\nfrom = 1.0\nuntil = 2.0\n\
-        [[drain]]\nmin = [1.0, 2.0, 1.0]\nmax = [2.0, 3.0, 2.0]\nrate = 1.0\nfrom = 1.0\nuntil = 2.0\n";
-    let zone = "drag = { drop_radius = 0.001, wind = [1.0, 0, 0] }\nsurface_tension = { coefficient = 0.07 }\nabsorbing_zone = { walls = [\"-y\"], length = 1.0, period = 1.0 }\n";
+        pivot = [15.0, 3.0, 3.0]\naxis = [0.0, 1.0, 0.0]\nturn = { kind = \"sine\", \
+        swing_degrees = 9.0, period = 2.0 }\n\
+        [[emitter]]\nmin = [1.0, 2.0, 1.0]\nmax = [2.0, 3.0, 2.0]\nvelocity = [0.001, 0.0, 0.0]\n\
+        from = 1.0\nuntil = 2.0\n\
+        [[drain]]\nmin = [1.0, 2.0, 1.0]\nmax = [2.0, 3.0, 2.0]\nrate = 1.0\nfrom = 1.0\n\
+        until = 2.0\n";
+    let zone = "drag = { drop_radius = 0.001, wind = [1.0, 0, 0] }\n\
+        surface_tension = { coefficient = 0.07 }\nabsorbing_zone = { walls = [\"-y\"], \
+        length = 1.0, period = 1.0 }\n";
     SCENE
         .replace("[effects]\n", &format!("[effects]\n{zone}"))
         .replace("[solver]\n", &format!("{makers}{more}[solver]\n"))
-        .replace("particle_spacing = 0.1\niterations = 4\n", "particle_spacing = 0.1\niteration = \"chebyshev\"\ndensity_error = 0.01\nmax_iterations = 9\n")
+        .replace(
+            "particle_spacing = 0.1\niterations = 4\n",
+            "particle_spacing = 0.1\niteration = \"chebyshev\"\ndensity_error = 0.01\n\
+             max_iterations = 9\n",
+        )
 }
 
 /// A range that its end points keep and what is just beyond them does not, where it says so itself: "from A to B".
@@ -164,7 +178,8 @@ fn every_number_has_a_range_and_says_it() {
     each_number_of_a_scene_has_a_range(&SCENE.replace("[solver]\n", wall), OF_ABSORPTION);
     let zone = |waves: &str| {
         let zone = format!(
-            "[effects]\ngeneration_zone = {{ walls = [\"-z\"], length = 3.0, waves = {{ {waves}, direction_degrees = 90.0 }} }}\n"
+            "[effects]\ngeneration_zone = {{ walls = [\"-z\"], length = 3.0, waves = {{ {waves}, \
+             direction_degrees = 90.0 }} }}\n"
         );
         SCENE.replace("[effects]\n", &zone)
     };
@@ -173,7 +188,8 @@ fn every_number_has_a_range_and_says_it() {
     let stokes = zone("kind = \"stokes\", height = 0.1, period = 3.0, depth = 1.0");
     each_number_of_a_scene_has_a_range(&stokes, OF_STOKES);
     let packet = zone(
-        "kind = \"focused\", height = 0.1, at = [2.0, 8.0], time = 40.0, peak_period = 3.0, depth = 1.0",
+        "kind = \"focused\", height = 0.1, at = [2.0, 8.0], time = 40.0, peak_period = 3.0, \
+         depth = 1.0",
     );
     each_number_of_a_scene_has_a_range(&packet, OF_PACKET);
 }

@@ -15,7 +15,8 @@ use super::numbers::each_number_has_a_range;
 use crate::support::mutate::mutate;
 
 const SETTINGS: &str = "seed = 5\nmax_particles = 1000\nradius = [0.001, 0.002]\n\
-    [emission]\ntrapped_air_rate = 12.5\nwave_crest_rate = 3\ntrapped_air = [1, 2]\nwave_crest = [3, 4]\nenergy = [0.5, 6]\n\
+    [emission]\ntrapped_air_rate = 12.5\nwave_crest_rate = 3\ntrapped_air = [1, 2]\n\
+    wave_crest = [3, 4]\nenergy = [0.5, 6]\n\
     [spray]\ndrop_radius = 0.001\nwind = [1, -2.5, 0]\n\
     [foam]\nlifetime = [1, 2]\ncrowd = 3\n[bubbles]\nrise_speed = 0.1\nresponse = 0.5\n";
 
