@@ -1,5 +1,5 @@
-//! One bit off in each file of a cache: every command that reads the file names it and ends with exit 4. And what a ledger
-//! says against the frames that it stands beside.
+//! One flipped bit in each file of a cache: every command that reads the file names it and exits
+//! with code 4. Also compares the contents of a ledger with the frames beside it.
 
 use std::{
     fs,
@@ -26,7 +26,7 @@ fn job() -> Job {
     job
 }
 
-/// Flips a bit in the middle; gives what stood there.
+/// Flips a bit in the middle of a file and returns the original bytes.
 fn flip(file: &Path) -> Vec<u8> {
     let sound = fs::read(file).unwrap();
     let mut bytes = sound.clone();
@@ -39,7 +39,7 @@ fn name(file: &Path) -> String {
     file.file_name().unwrap().to_string_lossy().into_owned()
 }
 
-/// The one file of a folder.
+/// Returns the only file of a folder.
 fn only(folder: &Path) -> PathBuf {
     let mut files = fs::read_dir(folder).unwrap();
     let file = files.next().unwrap().unwrap().path();
@@ -82,10 +82,10 @@ fn each_command_refuses_the_files_that_it_reads() {
             "frames/small.0002.ply",
             &[verify, render, check, diff, &branch, &resume],
         ),
-        // A resume goes on from the last frame; of those before it looks at the lengths.
+        // A resume starts from the last frame; of earlier frames it checks only the lengths.
         ("grids/small.0001.vdb", &[verify]),
         ("grids/small.0002.vdb", &[verify, &resume]),
-        // Written anew from the ledger by a resume.
+        // A resume rewrites it from the ledger.
         ("probes/energy-1.csv", &[verify]),
     ];
     for (file, commands) in files {
@@ -105,7 +105,7 @@ fn each_command_refuses_the_files_that_it_reads() {
         assert!(said.contains("cache"), "{file} is missing: {said}");
         fs::write(path, sound).unwrap();
     }
-    // Control: sound, each of them goes well.
+    // Negative control: on an undamaged cache every command succeeds.
     for command in all {
         job.expect(0, command);
     }
@@ -138,13 +138,13 @@ fn what_a_failed_frame_began_with_is_refused_damaged() {
     job.expect(5, "check cache/failed");
     let said = job.expect(0, "verify cache");
     assert!(said.contains("and the frame that failed"), "{said}");
-    // Killed before the report, which is written last.
+    // As after a kill before the report, which is written last.
     fs::remove_file(failed.join("report.json")).unwrap();
     let said = job.expect(4, "verify cache");
     assert!(said.contains("report.json: it is missing"), "{said}");
 }
 
-/// Of a bake from the start and of one that went on.
+/// Covers a bake from the start and one that was resumed.
 #[test]
 fn a_ledger_tells_the_clock_and_the_state_of_its_frames() {
     let job = job();
@@ -169,12 +169,12 @@ fn a_ledger_tells_the_clock_and_the_state_of_its_frames() {
             x * x + y * y + z * z
         });
         let fastest = squares.clone().fold(0.0, f64::max).sqrt();
-        // A sum of positive terms: a rounding a term, and three in each.
+        // A sum of positive terms: one rounding per term, and three within each.
         let rounding = (state.len() + 3) as f64 * f64::EPSILON;
         let kinetic = 0.5 * mass * squares.sum::<f64>();
         assert!(kinetic > 0.0);
         assert!((report.kinetic_energy / kinetic - 1.0).abs() < rounding);
-        // Its squares may have been summed in f32: four roundings, and half of that after the root.
+        // The squares may be summed in f32: four roundings, halved by the square root.
         assert!((report.max_speed / fastest - 1.0).abs() < 4.0 * f64::from(f32::EPSILON));
     }
 }

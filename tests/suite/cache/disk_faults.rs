@@ -1,5 +1,6 @@
-//! The whole program against full disks, disks that only read, flipped bits and second writers. On the CPU, whose
-//! processes start in no time; what is tested does not know what solved.
+//! Runs the whole program against full disks, read-only disks, flipped bits and second
+//! writers. The bakes run on the CPU, whose processes start fast; the code under test does not
+//! depend on the solver.
 
 use std::{
     collections::BTreeSet,
@@ -37,7 +38,7 @@ fn watched() -> Job {
     job
 }
 
-/// All files below, relative.
+/// Lists all files below `dir`, relative to it.
 fn files(dir: &Path) -> Vec<PathBuf> {
     let mut found = Vec::new();
     let mut folders = vec![dir.to_owned()];
@@ -55,7 +56,7 @@ fn files(dir: &Path) -> Vec<PathBuf> {
     found
 }
 
-/// Whole lines of a ledger.
+/// Returns the complete lines of a ledger.
 fn ledger(cache: &Path) -> Vec<u8> {
     let mut bytes = fs::read(cache.join("frames.jsonl")).unwrap();
     let end = bytes
@@ -66,7 +67,8 @@ fn ledger(cache: &Path) -> Vec<u8> {
     bytes
 }
 
-/// All that the ledger names is there, and it is the beginning of another.
+/// Asserts that all files in the ledger exist and that the ledger is a prefix of `whole`'s.
+/// Returns the last frame.
 fn holds(cache: &Path, whole: &Path) -> u32 {
     let reader = CacheReader::open(cache).unwrap();
     for problem in reader.survey().problems {
@@ -77,7 +79,8 @@ fn holds(cache: &Path, whole: &Path) -> u32 {
     reader.last_frame()
 }
 
-/// The disk fills up at every page of a frame and its grids, in the ledger, and while the cache is created.
+/// The disk fills up at every page of a frame and its grids, in the ledger, and while the
+/// cache is created.
 #[test]
 fn a_full_disk_ends_the_bake_and_with_space_it_goes_on_to_the_same_bytes() {
     const PAGE: u64 = 4096;
@@ -94,7 +97,8 @@ fn a_full_disk_ends_the_bake_and_with_space_it_goes_on_to_the_same_bytes() {
         .sum();
     let mut full = BTreeSet::new();
     let mut last_frames = BTreeSet::new();
-    // Of the first pages each falls in another file of the creation; the last ones in one frame.
+    // Each of the first sizes fails in a different file of the creation; the last sizes fail
+    // within one frame.
     let sizes = (3..9).chain(all - frame - 3..all);
     for pages in sizes {
         let name = "a_full_disk_ends_the_bake_and_with_space_it_goes_on_to_the_same_bytes";
@@ -121,7 +125,7 @@ fn a_full_disk_ends_the_bake_and_with_space_it_goes_on_to_the_same_bytes() {
         if cache::exists(&cache) {
             last_frames.insert(holds(&cache, &whole));
         }
-        // Still full: the same words, and nothing goes.
+        // While the disk is still full, the error is the same and nothing is lost.
         let before = cache::exists(&cache).then(|| ledger(&cache));
         job.expect(4, &bake);
         if let Some(before) = before {
@@ -139,14 +143,14 @@ fn a_full_disk_ends_the_bake_and_with_space_it_goes_on_to_the_same_bytes() {
         full.len() >= 3 && last_frames.contains(&7),
         "{full:?} {last_frames:?}"
     );
-    // Negative control: with room for all of it there is no error.
+    // Negative control: with enough space there is no error.
     let disk = Tmpfs::mount((2 * all + 64) * PAGE, "its control").unwrap();
     let cache = disk.path().join("cache");
     job.expect(0, &format!("{BAKE} -o {}", cache.display()));
     assert_eq!(directory_hash(&cache).unwrap(), hash);
 }
 
-/// A limit on the length of a file, which the ledger alone grows past: its line is torn in the middle, without a mount.
+/// A file size limit that only the ledger exceeds tears a line in the middle, without a mount.
 #[test]
 fn a_ledger_that_cannot_grow_is_cut_back_and_goes_on() {
     let job = Job::new();
@@ -169,7 +173,7 @@ fn a_ledger_that_cannot_grow_is_cut_back_and_goes_on() {
         .filter(|file| file != Path::new("frames.jsonl"))
         .map(|file| job.path("whole").join(file).metadata().unwrap().len())
         .max();
-    // `ulimit -f` counts in 512 bytes; a signal for the process would come before the error.
+    // `ulimit -f` counts blocks of 512 bytes; a signal to the process would come before the error.
     let blocks = lines.len() as u64 * 3 / 4 / 512;
     assert!(
         512 * blocks > longest.unwrap(),
@@ -206,7 +210,7 @@ fn a_ledger_that_cannot_grow_is_cut_back_and_goes_on() {
     assert_eq!(job.hash("cache"), job.hash("whole"));
 }
 
-/// Readers take a cache that cannot be written; a bake refuses it, and it stays as it is.
+/// Readers accept a read-only cache; a bake refuses it and leaves it unchanged.
 #[test]
 fn a_cache_that_cannot_be_written_is_read_and_not_resumed() {
     let job = watched();
@@ -245,9 +249,9 @@ fn a_cache_that_cannot_be_written_is_read_and_not_resumed() {
     assert_eq!(directory_hash(&cache).unwrap(), job.hash("whole"));
 }
 
-/// A flipped bit in each file in turn: `verify` names the file, and a resume refuses and names it as well or goes on to
-/// the bytes of the unbroken bake, in which that file alone is off. The lock holds nothing, and the timings are in no
-/// checksum.
+/// Flips a bit in each file, one after another. `verify` names the file. A resume either refuses
+/// and names it as well, or reproduces the unbroken bake's bytes in every other file. The lock has
+/// no content, and no checksum covers the timings.
 #[test]
 fn a_flipped_bit_in_any_file_is_named_or_does_not_matter() {
     let job = watched();
@@ -280,8 +284,8 @@ fn a_flipped_bit_in_any_file_is_named_or_does_not_matter() {
             let output = job.run(&format!("{BAKE} -o flipped --resume --frames 1-4"));
             let said = String::from_utf8_lossy(&output.stderr);
             if output.status.code() == Some(4) {
-                // One digit of its format version, and the manifest is no longer one that can be read: it is named by
-                // its directory and what is off.
+                // A changed digit of the format version makes the manifest unreadable: the message
+                // names its directory and the fault.
                 let is_named = said.contains(&name) || said.contains("cache format");
                 assert!(is_named && !is_exempt, "{said}");
                 assert_eq!(directory_hash(&d).unwrap(), spoiled, "refused untouched");
@@ -360,7 +364,7 @@ fn a_second_writer_is_refused_and_the_lock_of_a_dead_one_is_taken_over() {
     );
     let said = job.expect(4, &bake);
     assert!(said.contains("already holds a cache"), "{said}");
-    // A reader is no writer.
+    // A reader is not a second writer.
     job.expect(0, "inspect cache");
     let then = lines();
     while lines() < then + 2 {
@@ -381,7 +385,7 @@ fn a_second_writer_is_refused_and_the_lock_of_a_dead_one_is_taken_over() {
     assert_eq!(job.hash("cache"), job.hash("alone"));
 }
 
-/// Before the first frame, by a bake as by its dry run.
+/// Both a bake before its first frame and a dry run print the warning.
 #[test]
 fn a_disk_that_cannot_hold_the_frames_is_a_warning() {
     const NAME: &str = "a_disk_that_cannot_hold_the_frames_is_a_warning";
@@ -397,7 +401,8 @@ fn a_disk_that_cannot_hold_the_frames_is_a_warning() {
     let at = |words| said.find(words).unwrap();
     assert!(at(WARNING) < at("on the disk"), "{said}");
     assert!(at("on the disk") < at("No space left"), "{said}");
-    // Negative control: with space there is none, and what was told is what the frames then take.
+    // Negative control: with enough space there is no warning, and the estimate matches the bytes
+    // that the frames then take.
     disk.remount("size=64m");
     let said = job.expect(0, &format!("{bake} --resume --progress json"));
     assert!(!said.contains("\"what\":\"disk\""), "{said}");
@@ -410,6 +415,6 @@ fn a_disk_that_cannot_hold_the_frames_is_a_warning() {
         .map(|frame| format!("cache/frames/small.{frame:04}.ply"))
         .map(|file| disk.path().join(file).metadata().unwrap().len())
         .sum();
-    // A frame's header holds its number and time, a few digits more or less.
+    // A frame's header holds its number and time, whose digits vary by a few.
     assert!(told.abs_diff(taken) < 64 * 8, "{told} {taken}");
 }

@@ -1,8 +1,9 @@
-//! Bakes killed at random moments: whatever stands in the ledger stays, and a resumed bake ends with the bytes of the
-//! unbroken one. `tools/durability COUNT` does it longer; SWELL_KILLS and SWELL_SEED set count and seed.
+//! Bakes killed at random moments: every line of the ledger survives, and a resumed bake ends with
+//! the bytes of the unbroken one. `tools/durability COUNT` runs it for longer; SWELL_KILLS and
+//! SWELL_SEED set count and seed.
 //!
-//! Most kills are of bakes by the f64 reference: such a process starts in no time, and what writes a cache does not know what
-//! solved. A tenth is of bakes on the GPU.
+//! Most kills hit bakes by the f64 reference, whose processes start fast: the code that writes a
+//! cache does not depend on the solver. A tenth hit bakes on the GPU.
 
 use std::{
     fs,
@@ -15,7 +16,7 @@ use std::{
 use crate::support::job::Job;
 use swell::cache::{self, CacheReader};
 
-/// Frames of a shot: several times what a process lives to bake.
+/// Frames of a shot: several times as many as a process bakes before its kill.
 const FRAMES: u32 = 160;
 
 const WATCHED: &str = r#"
@@ -56,18 +57,18 @@ impl Random {
     }
 }
 
-/// Where a kill fell, by what it left.
+/// When a kill hit, judged by what it left.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Fell {
-    /// Before the process had added a frame: start-up, creation, taking up.
+    /// Before the process added a frame: start-up, creation or resume.
     Before,
-    /// Something stands there that no line of the ledger names yet, or a row is missing.
+    /// A file exists that no line of the ledger lists yet, or a row is missing.
     Within,
-    /// Frames were added, and all that stands there is in the ledger.
+    /// Frames were added, and the ledger lists every file.
     Between,
 }
 
-/// A bake under test, and the same unbroken.
+/// A bake under test and the hash of its unbroken run.
 struct Case {
     job: Job,
     bake: String,
@@ -157,8 +158,8 @@ impl Case {
         command.stdout(Stdio::null()).stderr(said).spawn().unwrap()
     }
 
-    /// Waits for a moment: of five kills one falls anywhere in a process's beginning, two anywhere in a frame, and two
-    /// while a file is written.
+    /// Waits for the moment to kill: of five kills, one falls anywhere in a process's start, two
+    /// anywhere in a frame, and two while a file is being written.
     fn wait(&mut self, child: &mut Child, before: u64, kind: u32) {
         if kind == 0 {
             let most = self.startup + 4 * self.frame;
@@ -182,7 +183,7 @@ impl Case {
         }
     }
 
-    /// Bakes until a kill; where it fell, or `None` where the bake came to its end first.
+    /// Bakes until a kill. Returns where it hit, or `None` if the bake finished first.
     fn strike(&mut self, kind: u32) -> Option<Fell> {
         let cache = self.cache();
         let before = whole_lines(&cache);
@@ -200,7 +201,7 @@ impl Case {
             self.finished += 1;
             return None;
         }
-        // Nothing is lost that was in the ledger.
+        // No line of the ledger may be lost.
         let after = whole_lines(&cache);
         assert!(
             after.starts_with(&before) && after.starts_with(&seen),
@@ -214,7 +215,7 @@ impl Case {
             "the ledger is another"
         );
         let is_whole = self.examine(&cache);
-        // What an earlier kill left may stand there still, or be cleared already.
+        // Leftovers of an earlier kill may still exist, or be cleared already.
         let is_untouched = hash_before == Some(self.job.hash("cache"));
         let has_grown = after.len() > before.len();
         Some(match (has_grown, is_whole || is_untouched) {
@@ -224,7 +225,7 @@ impl Case {
         })
     }
 
-    /// Every file that the ledger names is the one that was written; whether nothing else stands there.
+    /// Asserts that every file in the ledger is undamaged. Returns whether no other file exists.
     fn examine(&self, cache: &Path) -> bool {
         let reader = CacheReader::open(cache).unwrap();
         let mut is_whole = true;
@@ -257,13 +258,13 @@ impl Case {
         let cache = self.cache();
         let is_broken = cache.exists();
         if is_broken {
-            // Negative control: the comparison below is not of equals yet.
+            // Negative control: before it is resumed, the cache differs.
             assert_ne!(self.job.hash("cache"), self.whole);
         }
         assert!(self.spawn("cache").wait().unwrap().success());
         assert_eq!(self.job.hash("cache"), self.whole, "{}", self.bake);
         self.job.expect(0, "verify cache");
-        // Negative control: a bit that is off is seen.
+        // Negative control: a flipped bit is detected.
         let frame = cache.join(format!("frames/small.{FRAMES:04}.ply"));
         let mut bytes = fs::read(&frame).unwrap();
         let last = bytes.len() - 1;
@@ -275,7 +276,7 @@ impl Case {
     }
 }
 
-/// A quarter of all kills each, a tenth of these on the GPU.
+/// Runs a quarter of all kills, a tenth of them on the GPU.
 fn killed(name: &str, solver: &str, more: &str) {
     let kills = number("SWELL_KILLS").unwrap_or(100).div_ceil(4) as u32;
     let of_gpu = (kills / 10).max(1);
@@ -339,8 +340,9 @@ fn flip_bakes_with_grids_and_probes_survive_kills() {
     killed("flip, grids and probes", "flip", WATCHED);
 }
 
-/// Drops at a wall after the fastest is past: passes that the substep does not need are empty, also where an earlier, faster
-/// one needed them, of which a resumed bake knows nothing. (They were not, and twelve particles differed at frame 55.)
+/// Drops at a wall after the fastest one has passed: passes that a substep does not need must be
+/// empty, also where an earlier, faster substep needed them, which a resumed bake does not know. If
+/// they are not, twelve particles differ at frame 55.
 #[test]
 fn a_calmer_frame_is_the_same_after_a_resume() {
     const SPLASH: &str = r#"

@@ -13,7 +13,7 @@ use tempfile::TempDir;
 
 use crate::support::cache::*;
 
-/// A kill leaves a prefix of the ledger, and beyond it a frame without a line or a temporary file.
+/// A kill leaves a prefix of the ledger, and possibly a frame without a line or a temporary file.
 #[test]
 fn resumed_from_any_torn_ledger_it_is_the_unbroken_bake() {
     let whole = directory_hash(baked()).unwrap();
@@ -21,13 +21,13 @@ fn resumed_from_any_torn_ledger_it_is_the_unbroken_bake() {
     let first_line = ledger.iter().position(|&b| b == b'\n').unwrap() + 1;
     let dir = copied();
     let d = dir.path();
-    // Every length would take minutes of flushing; the primes fall on all parts of a line.
+    // Every length would take minutes of flushing; multiples of a prime hit all parts of a line.
     let lengths = (0..ledger.len()).filter(|n| n % 37 == 0 || ledger[n.max(&1) - 1] == b'\n');
     for length in lengths.chain([first_line, ledger.len() - 1]) {
         fs::write(d.join(LEDGER), &ledger[..length]).unwrap();
         fs::write(d.join("frames/tank.0003.ply.tmp"), "half a frame").unwrap();
         if length < first_line {
-            // The manifest comes after the first line, so no crash leaves this.
+            // The manifest is written after the first line, so no crash leaves this state.
             let before = directory_hash(d).unwrap();
             assert_eq!(damaged_file(resume(d, 4)), d.join(LEDGER));
             assert_eq!(directory_hash(d).unwrap(), before, "refused untouched");
@@ -37,7 +37,7 @@ fn resumed_from_any_torn_ledger_it_is_the_unbroken_bake() {
         let problems = CacheReader::open(d).unwrap().survey().problems;
         let is_off = |file: &str| problems.iter().any(|problem| problem.file == d.join(file));
         assert_eq!(is_off(LEDGER), is_torn, "{length}");
-        // Rows of frames that are not in the ledger any more.
+        // Rows of frames that are no longer in the ledger.
         assert_eq!(
             is_off("probes/gauge.csv"),
             length < ledger.len(),
@@ -97,7 +97,7 @@ proptest! {
         flipped[at.index(sound.len())] ^= 1 << bit;
         fs::write(&path, &flipped).unwrap();
         let found = cache::survey(d);
-        // A frame is refused by `read`, the rest by `open` or by `survey`.
+        // `read` refuses a frame; `open` or `survey` refuses the rest.
         if path.extension().is_some_and(|e| e == "ply") {
             let number = path.to_str().unwrap().rsplit('.').nth(1).unwrap().parse().unwrap();
             let read = CacheReader::open(d).unwrap().read(number);
@@ -139,7 +139,7 @@ fn a_missing_or_truncated_file_is_named() {
         let path = d.join(&file);
         let bytes = fs::read(&path).unwrap();
         if file != Path::new(LEDGER) {
-            // A ledger cut short is a bake that stopped; its own test is above.
+            // A truncated ledger is a stopped bake, which has its own test above.
             fs::write(&path, &bytes[..bytes.len() - 1]).unwrap();
             if file != Path::new("manifest.json") || cache::survey(d).is_ok() {
                 assert_eq!(first_problem(d), path);
@@ -173,7 +173,7 @@ fn a_damaged_frame_stops_a_resume_untouched() {
         fs::write(&path, &bytes).unwrap();
         assert_eq!(resume(d, 6).unwrap().last_frame, 6, "control");
     }
-    // In the last frame a flipped bit too, because the bake goes on from it.
+    // In the last frame a flipped bit is found too, because the bake resumes from it.
     let dir = copied();
     let path = dir.path().join("frames/tank.0004.ply");
     let mut bytes = fs::read(&path).unwrap();
@@ -183,7 +183,7 @@ fn a_damaged_frame_stops_a_resume_untouched() {
     assert_eq!(damaged_file(resume(dir.path(), 6)), path);
 }
 
-/// A cache whose meshes are not those that were baked is none to read from, nor to go on with.
+/// A cache whose meshes differ from the baked ones can be neither read nor resumed.
 #[test]
 fn a_damaged_asset_stops_readers_and_a_resume_untouched() {
     let dir = copied();
@@ -208,7 +208,7 @@ fn a_damaged_asset_stops_readers_and_a_resume_untouched() {
         }
         fs::remove_file(&path).unwrap();
         refused();
-        // All that is off is told, not the first alone.
+        // All damaged files are reported, not only the first.
         let sound_other = fs::read(&other).unwrap();
         fs::write(&other, "").unwrap();
         let problems = cache::survey(d).unwrap().problems;
@@ -220,7 +220,7 @@ fn a_damaged_asset_stops_readers_and_a_resume_untouched() {
     assert_eq!(resume(d, 6).unwrap().last_frame, 6, "control");
 }
 
-/// For readers that use what stands beside the particles.
+/// Readers that use the files beside the particles can ask for their check.
 #[test]
 fn a_frames_further_files_are_checked_for_who_asks() {
     let dir = tempfile::tempdir().unwrap();
@@ -253,10 +253,10 @@ fn a_frames_further_files_are_checked_for_who_asks() {
         fs::write(&path, sound).unwrap();
         check().unwrap();
     }
-    // Frames that were not asked for are not looked at.
+    // Frames that were not asked for are not checked.
     fs::remove_file(d.join("grids/tank.0002.vdb")).unwrap();
     reader.check_beside(&[0, 1]).unwrap();
-    // A cache without grids has none that could be off.
+    // A cache without grids has none that could be damaged.
     CacheReader::open(baked())
         .unwrap()
         .check_beside(&[1])
@@ -285,7 +285,7 @@ fn a_damaged_middle_of_the_ledger_stops_a_resume() {
     assert!(resume(d, 6).is_ok(), "control");
 }
 
-/// Each line is whole, the manifest is the same, and the frames belong to two histories.
+/// Each line is whole and the manifest is the same, but the frames belong to two histories.
 #[test]
 fn a_ledger_spliced_from_two_bakes_is_refused() {
     let other = tempfile::tempdir().unwrap();
@@ -313,7 +313,8 @@ fn a_ledger_spliced_from_two_bakes_is_refused() {
         let mut spliced = ours.clone();
         spliced[taken] = theirs[taken].clone();
         fs::write(d.join(LEDGER), spliced.concat()).unwrap();
-        // Of the first line after the start either history is the whole one so far; the next line tells.
+        // After only the first line beyond the start either history is valid; the next
+        // line reveals it.
         if taken == 1 {
             spliced.truncate(2);
             fs::write(d.join(LEDGER), spliced.concat()).unwrap();
@@ -370,7 +371,7 @@ fn other_peoples_directories_stay_untouched() {
         CacheReader::open(d),
         Err(CacheError::NotACache { .. })
     ));
-    // `directory_hash` looks past a lock, the listing does not.
+    // `directory_hash` ignores a lock, the listing does not.
     assert_eq!((directory_hash(d).unwrap(), files(d)), (before, listing));
 
     let file = d.join("scene.toml");
@@ -410,7 +411,8 @@ fn a_creation_that_was_cut_short_begins_anew() {
     assert_eq!(directory_hash(d).unwrap(), whole);
 }
 
-/// A bake that began from a frame of another cache: its start has that number, and so has a creation that was cut short.
+/// The start of a bake from a frame of another cache has that frame's number, also where the
+/// creation was interrupted.
 #[test]
 fn a_cache_that_begins_at_a_frame_is_numbered_from_there() {
     let parent = Parent {
@@ -453,7 +455,7 @@ fn a_cache_that_begins_at_a_frame_is_numbered_from_there() {
             "{said}"
         );
     }
-    // Stopped at each frame, it goes on, whether the run names the parent or not.
+    // Stopped at any frame, it can be resumed, whether or not the run names the parent.
     for (stop, parent) in [(120, None), (121, given.parent.clone()), (124, None)] {
         let part = d.join(format!("part{stop}"));
         go_on(attempt(&part, clock).unwrap(), clock, start(), stop).unwrap();
@@ -476,7 +478,7 @@ fn a_cache_that_begins_at_a_frame_is_numbered_from_there() {
         matches!(refused, Err(CacheError::OtherParent { .. })),
         "{refused:?}"
     );
-    // Cut short before the manifest: with one frame it begins anew, with two it holds a bake.
+    // Interrupted before the manifest: with one frame it starts over, with two it holds a bake.
     let cut = d.join("cut");
     attempt(&cut, clock).unwrap().finish().unwrap();
     let begun = directory_hash(&cut).unwrap();
@@ -491,7 +493,8 @@ fn a_cache_that_begins_at_a_frame_is_numbered_from_there() {
     );
 }
 
-/// Submits until the writer speaks up; by the depth of its queue it must within a few frames.
+/// Submits frames until the writer reports an error; the depth of its queue bounds
+/// how many it takes.
 fn submit_until_error(writer: &mut CacheWriter) -> CacheError {
     let (mut clock, mut particles) = (Clock::default(), start());
     for frame in 1..50 {
@@ -564,7 +567,7 @@ fn a_ledger_touched_in_mid_bake_is_an_error() {
     assert_eq!(directory_hash(d).unwrap(), directory_hash(baked()).unwrap());
 }
 
-/// `/dev/full` behind the name of the frame's temporary file: every write ends with ENOSPC.
+/// Links the frame's temporary file to `/dev/full`: every write ends with ENOSPC.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_full_disk_is_an_error_and_the_bake_goes_on_after_it() {

@@ -1,4 +1,5 @@
-//! The cache as a format: what goes in comes out, the same bytes each time, and nothing else fits.
+//! The cache format: contents survive a round trip, the bytes are reproducible, and anything
+//! else is rejected.
 
 use std::fs;
 use std::path::Path;
@@ -188,7 +189,8 @@ fn probes_have_a_file_each_that_the_ledger_vouches_for() {
     let energy = fs::read_to_string(baked().join("probes/energy-1.csv")).unwrap();
     assert!(energy.starts_with("frame,time_s,kinetic_J,potential_J\n0,0.0,0.0,-0.0\n1,"));
 
-    // A row changed, cut, added; the file gone: each is named, and mended by going on.
+    // A changed, cut or additional row and a missing file: each is reported, and a
+    // resume repairs it.
     let spoil: [fn(&Path); 4] = [
         |path| {
             let text = fs::read_to_string(path).unwrap();
@@ -222,7 +224,7 @@ fn probes_have_a_file_each_that_the_ledger_vouches_for() {
     }
 }
 
-/// What a frame showed to a probe is gone with the frame's computation.
+/// A resume with other probes is refused: a frame's probe values cannot be measured afterwards.
 #[test]
 fn a_bake_goes_on_with_its_own_probes_alone() {
     let dir = copied();
@@ -248,7 +250,7 @@ fn a_bake_goes_on_with_its_own_probes_alone() {
     assert_eq!(directory_hash(dir.path()).unwrap(), before);
 }
 
-/// No number that is none gets into the ledger, and each frame has a value for each column.
+/// The ledger accepts only finite numbers, and each frame needs a value for each column.
 #[test]
 fn probes_that_measure_nothing_sensible_stop_the_bake() {
     let spoil: [fn(&mut ProbeValues); 3] = [
@@ -292,7 +294,7 @@ fn another_format_is_named_not_guessed_at() {
     }
 }
 
-/// A line as the program wrote it before a line listed its files by stream.
+/// Formats a line as in format 1, in which a line does not list its files by stream.
 fn line_of_format_1(entry: &Entry, manifest: Option<&str>) -> Vec<u8> {
     let particles = entry.file(PARTICLES).unwrap();
     let grids = entry.file(GRIDS).unwrap();
@@ -349,7 +351,7 @@ fn a_cache_of_the_first_format_is_read_and_not_gone_on_with() {
             now.read(old.frame).unwrap()
         );
     }
-    // What its lines vouch for is still looked at.
+    // The files that its lines vouch for are still checked.
     let grids = d.join("grids/tank.0002.vdb");
     let sound = fs::read(&grids).unwrap();
     fs::write(&grids, &sound[1..]).unwrap();
@@ -366,7 +368,7 @@ fn a_cache_of_the_first_format_is_read_and_not_gone_on_with() {
     );
     assert_eq!(directory_hash(d).unwrap(), before);
 
-    // A line of one format in a cache of the other is none.
+    // A line of one format is invalid in a cache of the other.
     let no_grids = |entry: &Entry, hash: Option<&str>| {
         let line = String::from_utf8(line_of_format_1(entry, hash)).unwrap();
         line.replace("\"grids\":", "\"meshes\":").into_bytes()
@@ -385,7 +387,8 @@ fn a_cache_of_the_first_format_is_read_and_not_gone_on_with() {
     assert_eq!(damaged_file(CacheReader::open(d)), d.join(LEDGER));
 }
 
-/// Whatever stream the table gets, its files are verified, refused on resume, and cleared where a crash left them.
+/// The files of any stream in the table are verified, refused on resume when damaged, and cleared
+/// where a crash left them.
 #[test]
 fn every_stream_of_the_table_is_verified_and_resumed() {
     let whole = tempfile::tempdir().unwrap();
@@ -397,7 +400,7 @@ fn every_stream_of_the_table_is_verified_and_resumed() {
         let d = dir.path();
         bake_all_streams(d, 2);
         let folder = d.join(stream.folder);
-        // The last in the order of the names: of a stream with a file a frame the last frame's.
+        // The last by name: for a stream with one file per frame, the last frame's.
         let path = folder.join(files(&folder).pop().unwrap());
         let sound = fs::read(&path).unwrap();
         let mut flipped = sound.clone();
@@ -491,7 +494,7 @@ fn what_cannot_be_cached_is_refused_before_anything_is_written() {
         &[],
         &start(),
     );
-    // One file on some file systems.
+    // `gauge` and `GAUGE` are one file on some file systems.
     refuse(
         with(|m| m.probes[1].name = "GAUGE".to_owned()),
         &[],

@@ -1,4 +1,5 @@
-//! `[keep]`: which particles stay, that a bake goes on from them with the same bytes, and what is said of the others.
+//! `[keep]`: which frames keep their particles, that a bake resumes from them with the same bytes,
+//! and what commands report about the others.
 
 use std::{
     fs,
@@ -32,7 +33,7 @@ fn bake_kept(dir: &Path, keep: Keep, last: u32) {
     go_on(writer, clock, start(), last).unwrap();
 }
 
-/// Gives the frame that the bake went on from.
+/// Resumes a bake and returns the frame that it resumed from.
 fn resume_kept(dir: &Path, keep: Keep) -> Result<u32, CacheError> {
     let (writer, entry, particles) = CacheWriter::resume(dir, &manifest_of(keep))?;
     let from = entry.frame;
@@ -70,7 +71,8 @@ fn particles_stay_of_the_frames_that_are_kept_and_all_else_of_every_frame() {
         let report = reader.verify().unwrap();
         assert_eq!((report.frames, &report.kept[..]), (LAST, kept));
         assert!(report.bytes < of_all.verify().unwrap().bytes);
-        // The ledger has every frame, particles' checksums among it, and so have grids and probes.
+        // The ledger lists every frame, including the particles' checksums; grids and
+        // probes are complete.
         for (entry, other) in reader.entries().iter().zip(of_all.entries()) {
             assert_eq!((&entry.files, &entry.rows), (&other.files, &other.rows));
             assert_eq!((entry.clock, &entry.report), (other.clock, &other.report));
@@ -93,14 +95,15 @@ fn particles_stay_of_the_frames_that_are_kept_and_all_else_of_every_frame() {
                 other => panic!("{frame}: {other:?}"),
             }
         }
-        // Negative control: what has to be there is missed.
+        // Negative control: a required frame that is missing is found.
         fs::remove_file(d.join(frame_file(LAST))).unwrap();
         assert_eq!(first_problem(d), d.join(frame_file(LAST)));
     }
 }
 
-/// Stopped at any frame, with what a kill between a frame's line and the removal of the one before leaves, and with the
-/// newest particles gone: the resumed cache is the unbroken one, byte for byte.
+/// A bake is stopped at any frame, with the leftovers of a kill between writing a frame's line and
+/// removing the previous frame, and with the newest particles missing: the resumed cache equals the
+/// unbroken one byte for byte.
 #[test]
 fn a_bake_goes_on_from_what_is_kept_with_the_same_bytes() {
     for (keep, kept) in CASES {
@@ -136,7 +139,7 @@ fn resume_to(dir: &Path, keep: Keep, last: u32) -> u32 {
     entry.frame
 }
 
-/// A frame that stays is no checkpoint that a bake may do without.
+/// A frame that is kept for good is not a checkpoint that a resume may do without.
 #[test]
 fn a_kept_frame_that_is_missing_stops_a_resume_untouched() {
     let dir = tempfile::tempdir().unwrap();
@@ -155,7 +158,7 @@ fn a_kept_frame_that_is_missing_stops_a_resume_untouched() {
     assert_eq!(resume_kept(d, Keep::Every(5)).unwrap(), 12, "control");
 }
 
-/// The program with a solver: 8 frames, of which 0, 3, 6 and the newest keep their particles.
+/// Runs the whole program: of 8 frames, 0, 3, 6 and the newest keep their particles.
 #[test]
 fn commands_take_the_frames_that_are_there_and_name_them_for_the_others() {
     let job = Job::new();
@@ -220,7 +223,7 @@ fn commands_take_the_frames_that_are_there_and_name_them_for_the_others() {
             "the same in all that both keep",
         ],
     );
-    // Negative control: other water between kept frames is seen by probes, ledger and checksums.
+    // Negative control: probes, ledger and checksums reveal different water between kept frames.
     job.expect(
         0,
         "bake small.toml --device cpu -o other --set solver.pbf.iterations=5",
@@ -260,7 +263,7 @@ fn a_keep_that_nothing_could_go_on_from_is_named_with_its_line() {
     }
 }
 
-/// The program: compressed frames are the plain ones, to every command, and to a bake that goes on from one.
+/// Every command, and a bake that resumes, treats compressed frames like plain ones.
 #[test]
 fn compressed_frames_are_the_plain_ones() {
     let job = Job::new();

@@ -5,12 +5,12 @@ use std::{fs, path::Path};
 use crate::support::job::Job;
 use swell::scene::Scene;
 
-/// The cube from 0 to 1.
+/// The unit cube from 0 to 1.
 const CUBE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\n\
     f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 4 8 7 3\nf 1 5 8 4\nf 2 3 7 6\n";
 
-/// 1.1 m deep. The first solid hangs in the water and moves by a millionth of a cell, so that it counts as one that moves;
-/// the second stands on the floor.
+/// 1.1 m deep. The first solid hangs in the water and moves by a millionth of a cell, so that it
+/// counts as a moving solid; the second one rests on the floor.
 const SCENE: &str = r#"
 [shot]
 name = "tank"
@@ -62,7 +62,7 @@ solid = "-x"
 about = [0.0, 0.0, 0.0]
 "#;
 
-/// All of it meets water where nothing stands on it.
+/// The whole floor, in the tank without solids.
 const FLOOR: &str = r#"
 [[probe]]
 name = "floor"
@@ -76,12 +76,14 @@ fn bare() -> String {
     format!("{still}{}", &SCENE[SCENE.find("[solver]").unwrap()..])
 }
 
-/// ρ g, N/m³.
+/// Specific weight of water ρ g, N/m³.
 const WEIGHT: f64 = 9810.0;
 
-/// Δx² / H² of a wall. Between the topmost cell's centre and the air's above it the pressure falls straight to none, where
-/// in truth there is none from the surface halfway on: Δx² / 16 too much of H² / 2. It ends there with a step of Δx / 4, which
-/// patches up to a cell high may count half a patch too far: Δx² / 8.
+/// Relative error of a wall's force, in terms of Δx² / H². Between the centre of the topmost
+/// water cell and that of the air cell above, the pressure falls linearly to zero, while the
+/// exact pressure is zero from the surface, halfway, upwards: an excess of Δx² / 16 over H² / 2.
+/// It ends there with a step of Δx / 4, which patches up to a cell high may count half a patch
+/// too far: Δx² / 8.
 const TOLERANCE: f64 = 2.0 * (1.0 / 16.0 + 1.0 / 8.0) * (0.1 / 1.1) * (0.1 / 1.1);
 
 fn water_at_rest_bears(device: &str) {
@@ -105,7 +107,8 @@ fn water_at_rest_bears(device: &str) {
             .collect()
     };
     let depth = 1.1;
-    // What is displaced; what stands above, as no water comes under it; ½ ρ g H² B; all that stands on the floor.
+    // The displaced water; the water above the solid, as none gets under it; ½ ρ g H² B; the whole
+    // weight on the floor.
     let lift = WEIGHT * 0.4f64.powi(3);
     let load = -WEIGHT * (depth - 0.3) * 0.3 * 0.3;
     let push = -0.5 * WEIGHT * depth * depth * 1.2;
@@ -113,7 +116,7 @@ fn water_at_rest_bears(device: &str) {
     let expected = [
         ("hung", [0.0, lift, 0.0], [0.0, 0.0, 0.0]),
         ("standing", [0.0, load, 0.0], [0.0, 0.0, 0.0]),
-        // At the half of the width, a third of the depth up: z × −x is −y, and −(y × −x) is z.
+        // At half the width and a third of the depth: z × −x is −y, and −(y × −x) is z.
         (
             "wall",
             [push, 0.0, 0.0],
@@ -125,7 +128,7 @@ fn water_at_rest_bears(device: &str) {
         let rows = rows(name);
         assert!(rows[0][2..].iter().all(Option::is_none), "{name}: {rows:?}");
         assert!(rows.len() >= 5, "{name}: {rows:?}");
-        // Pressures on all faces of a body add to what is left of them.
+        // The rounding of the pressures on all faces of a body adds up in the net force.
         let scale = match name {
             "hung" => WEIGHT * depth * 0.16,
             "standing" => WEIGHT * depth * 0.09,
@@ -146,14 +149,14 @@ fn water_at_rest_bears(device: &str) {
             "{device} {name}: {:?} of {force:?} {moment:?}",
             rows[rows.len() - 1]
         );
-        // Negative control: gravity 1 % off is seen.
+        // Negative control: gravity that is off by 1 % is detected.
         let found = rows[4][3].unwrap() - 1.01 * force[1];
         assert!(
             name == "wall" || found.abs() > TOLERANCE * scale,
             "{name}: {found}"
         );
     }
-    // The written-out scene has the solids in another order, and goes on all the same.
+    // The written scene lists the solids in another order, and the bake resumes all the same.
     job.expect(0, &format!("{bake} stopped --frames 1-2"));
     job.expect(0, &format!("{bake} stopped --resume"));
     assert_eq!(job.hash("stopped"), job.hash("whole"));
@@ -218,7 +221,7 @@ fn a_force_that_cannot_be_is_told() {
             "{line}: {error}"
         );
     }
-    // PBF has none, and says so.
+    // PBF has no force probe, and the message says so.
     let text = format!("{}\n[[probe]]\nkind = \"force\"\nsolid = \"-x\"\n", bare());
     let parse = |set: &[String]| Scene::parse(&text, Path::new("a.toml"), &job.path(""), set);
     let error = parse(&["solver.method=pbf".to_owned()])

@@ -1,4 +1,4 @@
-//! Probes that look at substeps: how often, at what, and what their files hold of it.
+//! Probes that sample at substeps: their rates, their windows and the contents of their files.
 
 use std::{fs, path::Path};
 
@@ -29,7 +29,7 @@ cell_size = 0.2
 cfl = 0.03
 "#;
 
-/// Each quantity once at frames and once at a rate of its own.
+/// Each quantity once per frame and once at a rate of its own.
 const PROBES: &str = r#"
 [[probe]]
 kind = "front"
@@ -57,7 +57,7 @@ window = 0.05
 
 type Row = Vec<Option<f64>>;
 
-/// Header and rows of a probe's file.
+/// Returns the header and rows of a probe's file.
 fn file(job: &Job, path: &str) -> (String, Vec<Row>) {
     let text = fs::read_to_string(job.path(path)).unwrap();
     let number = |field: &str| (!field.is_empty()).then(|| field.parse().unwrap());
@@ -66,7 +66,7 @@ fn file(job: &Job, path: &str) -> (String, Vec<Row>) {
     (text.lines().next().unwrap().to_owned(), rows.collect())
 }
 
-/// Substeps of each frame from 1 on.
+/// Returns the substeps of each frame from 1 on.
 fn substeps(job: &Job, cache: &str) -> Vec<u64> {
     let ledger = fs::read_to_string(job.path(cache).join("frames.jsonl")).unwrap();
     let of = |line: &str| {
@@ -76,7 +76,8 @@ fn substeps(job: &Job, cache: &str) -> Vec<u64> {
     ledger.lines().skip(1).map(of).collect()
 }
 
-/// Mean, least and greatest of a column over `window` seconds up to each row, as docs/scene.md says it.
+/// Computes the mean, minimum and maximum of a column over the `window` seconds up to each row, as
+/// docs/scene.md defines them.
 fn windowed(rows: &[Row], column: usize, window: f64) -> Vec<[Option<f64>; 3]> {
     let time = |k: usize| rows[k][1].unwrap();
     let of = |k: usize| {
@@ -108,7 +109,7 @@ fn looks_at_substeps(bake: &str) {
     println!("{bake}: substeps {substeps:?}");
     assert!(substeps.iter().all(|&count| count > 1), "{substeps:?}");
 
-    // One row at the start and one a substep, and the frames' rows among them to the last bit.
+    // One row at the start and one per substep; the frames' rows are among them to the last bit.
     for (frames, all) in [("front-1", "front-all"), ("pressure-1", "pressure-all")] {
         let (_, by_frame) = file(&job, &format!("whole/probes/{frames}.csv"));
         let (_, rows) = file(&job, &format!("whole/probes/{all}.csv"));
@@ -123,10 +124,10 @@ fn looks_at_substeps(bake: &str) {
             };
             assert_eq!(rows[at][..3], row[..3], "{all}, frame {frame}");
         }
-        // Negative control: between frames they are others.
+        // Negative control: values between frames differ.
         assert_ne!(rows[at - 1][2], rows[at][2]);
     }
-    // At 60 Hz two looks a frame, each at the first end at or after its time.
+    // At 60 Hz there are two samples per frame, each at the first substep end at or after its time.
     let (header, energy) = file(&job, "whole/probes/energy-60.csv");
     let (_, all) = file(&job, "whole/probes/front-all.csv");
     assert_eq!(energy.len(), 1 + 2 * substeps.len());
@@ -157,7 +158,7 @@ fn looks_at_substeps(bake: &str) {
         }
     }
 
-    // Who looks changes nothing, and a bake that was cut short ends with the same bytes.
+    // Probes leave the simulation unchanged, and an interrupted bake ends with the same bytes.
     job.expect(0, &format!("bake plain.toml {bake} -o plain"));
     for frame in 0..=5 {
         let of =
@@ -233,7 +234,7 @@ fn a_rate_that_cannot_be_is_told() {
             "{line}: {error}"
         );
     }
-    // As many as there may be substeps.
+    // The highest rate allowed is one sample per possible substep.
     for set in [
         &["solver.pbf.max_substeps=10"][..],
         &["solver.method=flip", "solver.flip.max_substeps=10"],

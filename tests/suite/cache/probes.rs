@@ -1,4 +1,4 @@
-//! Probes: what a scene says of them, what they cost, and the files that they leave in a cache.
+//! Probes: their scene keys, their cost and the files that they write into a cache.
 
 use std::{fs, path::Path};
 
@@ -107,7 +107,7 @@ fn scenes_say_what_is_measured() {
     assert_eq!(scene.pressure_points(), [DVec3::new(-0.6, 0.8, 0.75)]);
     let again = Scene::parse(&text(&scene), Path::new("b.toml"), Path::new(""), &[]).unwrap();
     assert_eq!(again, scene);
-    // They look and do not touch.
+    // Probes only observe: they are no part of the physics.
     assert_eq!(physics_hash(&scene), physics_hash(&plain));
     assert_eq!(
         physics_difference(&text(&scene), &text(&plain)).unwrap(),
@@ -273,12 +273,12 @@ fn a_probe_that_cannot_be_is_told() {
             "{table}: {error}"
         );
     }
-    // FLIP has a pressure whatever PBF's settings say.
+    // FLIP has a pressure regardless of PBF's settings.
     let flip = ["solver.pbf.iteration=chebyshev", "solver.method=flip"];
     assert!(parse(&format!("[[probe]]\n{pressure}\n"), &flip).is_ok());
 }
 
-/// Of all probes that of pressure alone costs the device anything, and only with PBF: four bytes a particle.
+/// Only a pressure probe allocates device memory, and only with PBF: four bytes per particle.
 #[test]
 fn only_a_pressure_costs_the_device_anything() {
     let context = context();
@@ -324,7 +324,7 @@ fn only_a_pressure_costs_the_device_anything() {
     }
 }
 
-/// Whoever looks changes nothing: the same particles to the last bit.
+/// Probes leave the simulation unchanged: the particles are the same to the last bit.
 #[test]
 fn probes_leave_the_water_as_it_is() {
     let context = context();
@@ -348,8 +348,8 @@ fn probes_leave_the_water_as_it_is() {
     assert!(state == plain);
 }
 
-/// The f64 reference sees the same pressure: what f32 leaves of positions, 1e-7 m, is a hundredth of what a frame's
-/// corrections come to.
+/// The f64 reference pass measures the same pressure: the f32 rounding of positions, 1e-7 m, is a
+/// hundredth of a frame's corrections.
 #[test]
 fn the_reference_sees_the_same_pressure() {
     let context = context();
@@ -389,12 +389,12 @@ fn the_reference_sees_the_same_pressure() {
             assert!((gpu / cpu - 1.0).abs() < 0.01, "{method}: {gpu} {cpu}");
         }
         assert_eq!([gpu[2], cpu[2]], [None; 2], "no water there");
-        // Negative control: the other point's pressure is another.
+        // Negative control: the pressures at the two points differ.
         assert!((gpu[1].unwrap() / cpu[0].unwrap() - 1.0).abs() > 0.05);
     }
 }
 
-/// Rows of a probe's file, without the header.
+/// Returns the rows of a probe's file, without the header.
 fn rows(job: &Job, file: &str) -> Vec<Vec<Option<f64>>> {
     let text = fs::read_to_string(job.path(file)).unwrap();
     let number = |field: &str| (!field.is_empty()).then(|| field.parse().unwrap());
@@ -413,12 +413,13 @@ fn a_bake_leaves_a_file_a_probe(solver: &str) {
     assert!(said.contains('6'), "{said}");
     let near = rows(&job, "whole/probes/elevation-1.csv");
     assert_eq!(near.len(), 7);
-    // Before it falls, the water stands to y = 1.5 there; the far end is dry.
+    // Before it falls, the water reaches y = 1.5 there; the far end is dry.
     assert!((near[0][2].unwrap() - 1.5).abs() < 0.01, "{near:?}");
     assert!((near[6][1].unwrap() - 0.1).abs() < 1e-12);
     assert_eq!(rows(&job, "whole/probes/far.csv")[0][2], None);
-    // At most the 0.7 m of water above weigh on it, and less while they fall; PBF's water, not compressed at the start,
-    // only comes to press, and scatters. The start has no pressure yet.
+    // The pressure stays below that of 0.7 m of water at rest, and is lower while the column falls.
+    // PBF's water starts uncompressed, builds up its pressure slowly and scatters. The start frame
+    // has no pressure yet.
     let pressure = rows(&job, "whole/probes/pressure-1.csv");
     assert_eq!(pressure[0][2], None);
     let pressures: Vec<f64> = pressure[1..].iter().map(|row| row[2].unwrap()).collect();
@@ -426,7 +427,8 @@ fn a_bake_leaves_a_file_a_probe(solver: &str) {
         pressures.iter().all(|p| (-1.0..9810.0).contains(p)) && pressures[5] > 500.0,
         "{pressures:?}"
     );
-    // 0.8 m³ of water; 0.5 m above the floor on average.
+    // 0.8 m³ of water; its centre of mass is 0.5 m above the floor (see the
+    // potential energy below).
     let volume = rows(&job, "whole/probes/volume-1.csv");
     assert!(
         volume
@@ -434,8 +436,9 @@ fn a_bake_leaves_a_file_a_probe(solver: &str) {
             .all(|row| (row[2].unwrap() / 0.8 - 1.0).abs() < 0.06),
         "{volume:?}"
     );
-    // 0.8 m long from −1 on, of which 0.5 % lie ahead of the front at the start; then it runs, through the plane where it
-    // began, of 1 m² at most, slower than what falls 1 m.
+    // The block is 0.8 m long and begins at x = −1; 0.5 % of it lies ahead of the front at the
+    // start. The front then advances. The flux passes through at most 1 m² and is slower than a
+    // free fall of 1 m.
     let front = rows(&job, "whole/probes/front-1.csv");
     assert!(
         (front[0][2].unwrap() - (0.995 * 0.8 - 1.0)).abs() < 1e-5,
@@ -463,7 +466,7 @@ fn a_bake_leaves_a_file_a_probe(solver: &str) {
         assert_eq!(last["report"][key].as_f64(), energy[6][column], "{key}");
     }
 
-    // Stopped and gone on with, it ends with the same bytes; rows past the ledger are gone.
+    // A stopped and resumed bake ends with the same bytes; rows past the ledger are removed.
     job.expect(0, &format!("{bake} stopped --frames 1-3"));
     let path = job.path("stopped/probes/far.csv");
     fs::write(&path, fs::read_to_string(&path).unwrap() + "4,0.5,1.0\n").unwrap();
@@ -475,7 +478,7 @@ fn a_bake_leaves_a_file_a_probe(solver: &str) {
     job.expect(0, &format!("{bake} stopped --resume"));
     assert_eq!(job.hash("stopped"), job.hash("whole"));
 
-    // With other probes it is another bake.
+    // A bake with other probes cannot resume this one.
     let said = job.expect(
         4,
         &format!("{bake} whole --resume --set probe[0].at=[0.0,1.0]"),
@@ -504,7 +507,7 @@ fn a_bake_leaves_a_file_a_probe(solver: &str) {
     assert_eq!(fs::read_dir(job.path("plots")).unwrap().count(), 9);
     assert_eq!(job.hash("stopped"), job.hash("whole"));
 
-    // Negative control: who asks for nothing gets nothing, and the same water.
+    // Negative control: without probes there are no probe files, and the water is the same.
     job.expect(0, &format!("bake plain.toml --solver {solver} -o plain"));
     assert!(!job.path("plain/probes").exists());
     let frame = |cache: &str| fs::read(job.path(cache).join("frames/tank.0006.ply")).unwrap();
@@ -526,9 +529,10 @@ fn a_flip_bake_leaves_a_file_a_probe() {
     a_bake_leaves_a_file_a_probe("flip");
 }
 
-/// A column falls, runs up the far wall and breaks over. What is spray, film and torn sheet counts: what is missing is 2.4 %
-/// of disorder, and what the solver presses together: with FLIP its density error, up to 3 % at the time of the splash, with PBF
-/// up to 3.5 % in layers at the surface, which it takes for less dense than they are. The level set's volume went down to 0.89.
+/// A column falls, runs up the far wall and breaks. Spray, film and torn sheets count as volume.
+/// The tolerance is 2.4 % for disorder plus the solver's compression: up to 3 % density error
+/// during the splash with FLIP, and up to 3.5 % with PBF, in surface layers whose density it
+/// underestimates. The volume of the level set dropped to 0.89.
 fn a_splash_keeps_its_volume(solver: &str) {
     let scene = "[shot]\nname = \"splash\"\nframes = 40\nframes_per_second = 40\n\
         [domain]\nmin = [0.0, 0.0, 0.0]\nmax = [2.0, 2.0, 0.6]\n\

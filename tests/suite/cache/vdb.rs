@@ -1,4 +1,4 @@
-//! Grid files against readers that are not ours: OpenVDB's own `vdb_print`, and vdb-rs; and how a
+//! Grid files against independent readers, OpenVDB's own `vdb_print` and vdb-rs, and how a
 //! cache keeps them.
 use std::{collections::BTreeMap, fs, io::Cursor, path::Path, process::Command};
 
@@ -25,8 +25,8 @@ const RASTER: Raster = Raster {
     particle_spacing: 0.0625,
 };
 
-/// A ball of 2 m that turns and rises, big enough to hold leaves without a surface, across indices
-/// of either sign.
+/// A ball of 2 m that turns and rises, large enough for leaves without a surface, across
+/// indices of either sign.
 fn ball(time: f64) -> Particles {
     let mut particles = Particles::default();
     let d = RASTER.particle_spacing;
@@ -78,7 +78,7 @@ fn encoded(precision: Precision) -> Vec<u8> {
     bytes
 }
 
-/// What `vdb_print -l` says of each grid, key by key, or its complaint.
+/// Parses what `vdb_print -l` prints about each grid, by key, or returns its error output.
 fn vdb_print(bytes: &[u8]) -> Result<BTreeMap<String, BTreeMap<String, String>>, String> {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("a.vdb");
@@ -103,7 +103,7 @@ fn vdb_print(bytes: &[u8]) -> Result<BTreeMap<String, BTreeMap<String, String>>,
     Ok(grids.collect())
 }
 
-/// What it has to say of a grid of ours.
+/// What `vdb_print` should print about one of our grids.
 fn expected<T>(
     grid: &SparseGrid<T>,
     class: &str,
@@ -160,8 +160,9 @@ fn openvdb_reads_what_was_written() {
         check(&found["surface"], &of_surface).unwrap();
         check(&found["vel"], &of_velocity).unwrap();
 
-        // Extremes over the tree's values, vectors in the order of their first components. Half
-        // precision keeps 2⁻¹¹ of at most three voxels, or of a metre a second; six digits are printed.
+        // Extremes over the tree's values; vectors compare by their first components.
+        // Half precision rounds at most three voxels, or one m/s, by 2⁻¹¹; `vdb_print`
+        // prints six digits.
         let number = |key: &str| found["surface"][key].parse::<f32>().unwrap();
         let tolerance = 3.0 * 0.0625 * 2f32.powi(-11) + 1e-6;
         let distances = || active(&surface).map(|(_, value)| value);
@@ -184,14 +185,15 @@ fn openvdb_reads_what_was_written() {
             }
         }
 
-        // Control: another class of the same length, and one grid's figures against the other's.
+        // Negative control: another class name of the same length, and one grid's values
+        // against the other's.
         let mut spoilt = bytes.clone();
         let at = find(&spoilt, b"level set");
         spoilt[at..at + 9].copy_from_slice(b"level sit");
         let found = vdb_print(&spoilt).unwrap();
         assert!(check(&found["surface"], &of_surface).is_err());
         assert!(check(&found["vel"], &of_surface).is_err());
-        // Control: a byte of the last leaf's zipped values.
+        // Negative control: one byte of the last leaf's zipped values.
         let mut spoilt = bytes.clone();
         let last = spoilt.len() - 40;
         spoilt[last] ^= 0x55;
@@ -234,10 +236,10 @@ fn vdb_rs_reads_the_level_set_voxel_by_voxel() {
     let half = vdb_rs(&encoded(Precision::Half));
     assert!(half.keys().eq(written.keys()));
     for (half, written) in half.values().zip(written.values()) {
-        // Rounded to nearest: half a unit of 2⁻¹⁰.
+        // Rounding to nearest is off by half a unit of 2⁻¹⁰.
         assert!((half - written).abs() <= written.abs() * 2f32.powi(-11) + 1e-7);
     }
-    // Control: half precision is not float, or neither test says anything.
+    // Negative control: half precision differs from float, or neither test would mean anything.
     assert_ne!(half, written);
 }
 
@@ -253,7 +255,7 @@ fn a_frame_gives_the_same_bytes_on_any_number_of_threads() {
     let size = |precision| encoded(precision).len();
     let (half, float) = (size(Precision::Half), size(Precision::Float));
     println!("{leaves} leaves of numbers: {half} and {float} bytes");
-    // Zipped and without inactive values: less than half of what the leaves hold.
+    // Compressed and without inactive values: less than half the size of the leaves' contents.
     assert!(half < float && float < leaves * 512 * 4 / 2);
 }
 
@@ -346,7 +348,7 @@ fn a_cache_keeps_the_grids_of_each_frame_and_a_resumed_one_has_the_same_bytes() 
 
     let broken = tempfile::tempdir().unwrap();
     bake(broken.path(), Some(record()), 1);
-    // What a crash leaves behind: the grids of a frame without a line, and half of the next.
+    // What a crash leaves behind: the grids of a frame without a line, and half of the next file.
     let folder = broken.path().join("grids");
     fs::write(folder.join("ball.0002.vdb"), "torn").unwrap();
     fs::write(folder.join("ball.0003.vdb.tmp"), "torn").unwrap();
@@ -388,7 +390,7 @@ fn damaged_missing_and_unasked_grids_are_found() {
     assert!(matches!(resumed, Err(CacheError::Damaged { file, .. }) if file == path));
 
     fs::write(&path, &good).unwrap();
-    // The last frame is read before a bake goes on, its grids as well.
+    // A resume reads the last frame first, including its grids.
     let last = dir.path().join("grids/ball.0002.vdb");
     let mut content = fs::read(&last).unwrap();
     content[100] ^= 1;
@@ -462,7 +464,7 @@ fn scenes_ask_for_grids() {
     let written = pbf.to_toml(&|_, _| String::new());
     let again = Scene::parse(&written, Path::new("b.toml"), Path::new(""), &[]).unwrap();
     assert_eq!(again, pbf);
-    // They follow from the particles, and so are no physics.
+    // Grids are derived from the particles and are therefore no part of the physics.
     assert_eq!(physics_hash(&pbf), physics_hash(&plain));
 
     for (table, key, words) in [
