@@ -1,4 +1,4 @@
-//! The cases of scenes/studies/hard-cases.toml, by the study's own engine.
+//! The cases of scenes/studies/hard-cases.toml, run by the study's own engine.
 use std::{
     fs,
     path::{Path, PathBuf},
@@ -39,9 +39,10 @@ fn devices(context: &Context) -> Devices {
 /// Trials of more frames than this are cut short on the GPU.
 const LONG: u32 = 240;
 
-/// Cuts a long trial short on the GPU: it ends a quarter later than the last of its marks begins to count. The f64 reference runs
-/// every trial at full length, so the scheme itself is tested over the whole minute. The study runs all of it on both devices,
-/// and so does `tools/test --all`, which sets SWELL_ALL.
+/// Cuts a long trial short on the GPU: it ends a quarter later than the last of its marks begins to
+/// count. The f64 reference runs every trial at full length, so the scheme itself is tested over
+/// the whole minute. The study runs all of it on both devices, and so does `tools/test --all`,
+/// which sets SWELL_ALL.
 fn in_suite(trial: &Trial) -> Trial {
     let mut trial = trial.clone();
     let is_whole = std::env::var_os("SWELL_ALL").is_some();
@@ -58,7 +59,7 @@ fn run(trial: &Trial) -> Run {
     run_trial(&devices(&context()), trial, &AtomicBool::new(false)).unwrap()
 }
 
-/// What does not come out as the study says: marks that are missed, known failures that hold, and what is not refused.
+/// Lists the deviations from the study: missed marks and attempts that were not refused.
 fn wrong(case: &Case) -> Vec<String> {
     let mut wrong = Vec::new();
     match &case.held {
@@ -96,7 +97,7 @@ fn wrong(case: &Case) -> Vec<String> {
                         verdicts[k].words()
                     );
                     println!("{of}");
-                    // A known failure may hold on one of two devices.
+                    // A known failure may pass on one of two devices.
                     if verdicts[k] == Verdict::Misses {
                         wrong.push(format!("{of}{}", run.ended.as_deref().unwrap_or("")));
                     }
@@ -165,8 +166,8 @@ cases! {
     case_39_onto_a_roof: 39,
 }
 
-/// Negative control of the engine: whatever a mark measures, one beyond that is missed, and so is one of a run that ends
-/// early.
+/// Negative control of the engine: a mark just beyond the measured value is missed, and a run that
+/// ends early does not pass.
 #[test]
 fn a_mark_beyond_what_is_measured_is_missed() {
     let mut seen = 0;
@@ -202,11 +203,11 @@ fn a_mark_beyond_what_is_measured_is_missed() {
     assert!(seen > 20);
 }
 
-/// What no scene can be made to miss: particles are clamped to walls that move and pushed out of solids. How these two
-/// count is tested where they are computed.
+/// Quantities that no scene can violate: particles are clamped to moving walls and pushed out of
+/// solids. Both are tested where they are computed.
 const NOT_SPOILED: [Quantity; 2] = [Quantity::Behind, Quantity::InSolid];
 
-/// Negative control of each measure: water that is made to miss its mark misses it, by a number.
+/// Negative control of each quantity: a spoiled simulation misses its mark, with a measured value.
 #[test]
 fn every_measure_is_missed_by_water_that_is_spoiled() {
     let controls = load("tests/hard_cases/controls.toml");
@@ -243,7 +244,8 @@ fn every_measure_is_missed_by_water_that_is_spoiled() {
     }
 }
 
-/// Whether the test that a command of the study names is there: `--test suite MODULES::NAME`, or `--workspace --lib NAME`.
+/// Whether the test in a command of the study exists: `--test suite MODULES::NAME`, or
+/// `--workspace --lib NAME`.
 fn is_there(command: &str) -> bool {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let words: Vec<&str> = command.split(' ').collect();

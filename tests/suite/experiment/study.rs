@@ -89,7 +89,7 @@ impl Job {
         }
     }
 
-    /// What became of each point.
+    /// Runs the study and returns the outcome and the status of each point.
     fn run(&self, text: &str, stop: bool) -> Result<(Outcome, Vec<PointStatus>), StudyError> {
         let study = Study::parse(text, Path::new("s.toml"), self.folder.path()).unwrap();
         let request = Request {
@@ -110,7 +110,7 @@ impl Job {
         Ok((outcome, points))
     }
 
-    /// The values of a column of the table, by its title.
+    /// Returns the values of a table column, by its title.
     fn column(&self, title: &str) -> Vec<String> {
         let csv = self.read("results.csv");
         let mut rows = csv.lines().map(|row| row.split(',').collect::<Vec<_>>());

@@ -1,4 +1,5 @@
-//! `swell tune`: the choice is right, by bakes of what it wrote; and what it refuses.
+//! `swell tune`: the choice is right, as bakes of the written scene show, and bad
+//! requests are refused.
 
 use std::{collections::BTreeMap, fs};
 
@@ -30,12 +31,12 @@ method = "pbf"
 particle_spacing = 0.08   # ten layers
 "#;
 
-/// A row of the table, by its titles.
+/// A row of the table, by column title.
 type Row = BTreeMap<String, String>;
 
-/// Cells of a line, of which some are quoted.
+/// Splits a CSV line, some of whose cells are quoted.
 fn cells(line: &str) -> Vec<String> {
-    // A quote within is two; no cell is empty and quoted.
+    // A quote within quotes is doubled; no cell is empty and quoted.
     let line = line.replace("\"\"", "\r");
     let parts = line.split('"').enumerate();
     let parts = parts.map(|(k, part)| match k % 2 {
@@ -68,7 +69,8 @@ fn is_candidate(row: &&Row) -> bool {
     why != "reference" && why != "a millionth more gravity" && row["failed"].is_empty()
 }
 
-/// A cache's frames by the gauge of the tuning, with energies of a mass: of a density of 1 over the lattice's volume.
+/// Measures a cache's frames with the tuning's gauge. Energies are per mass: for a density of 1 and
+/// the lattice's volume.
 fn aggregates(job: &Job, cache: &str, gauge: &Gauge) -> Vec<Aggregates> {
     let cache = CacheReader::open(&job.path(cache)).unwrap();
     let spacing = cache.manifest().particle_spacing;
@@ -86,7 +88,7 @@ fn aggregates(job: &Job, cache: &str, gauge: &Gauge) -> Vec<Aggregates> {
     (1..=cache.last_frame()).map(of).collect()
 }
 
-/// Mean difference over the frames that tell it, per cent of the greatest of the reference.
+/// Mean difference over the frames that have the quantity, per cent of the reference's maximum.
 fn error(run: &[Aggregates], fine: &[Aggregates], of: fn(&Aggregates) -> Option<f64>) -> f64 {
     let off = run
         .iter()
@@ -108,7 +110,7 @@ fn the_cheapest_settings_that_hold_are_written_and_hold_when_they_are_baked() {
     );
     let rows = rows(&job);
 
-    // By the table: a run that holds is chosen, and no cheaper one does; some do not.
+    // By the table: the chosen run holds, no cheaper one does, and some runs do not hold.
     let is_within =
         |row: &Row, title: &str, limit: f64| row[title].parse::<f64>().is_ok_and(|v| v <= limit);
     let holds =
@@ -122,7 +124,7 @@ fn the_cheapest_settings_that_hold_are_written_and_hold_when_they_are_baked() {
     assert!(all().all(|row| (row["holds"] == "yes") == holds(&row)));
     assert!(said.contains(&format!("{}: ", cheapest["run"])), "{said}");
 
-    // By bakes: what was written, against the reference.
+    // By bakes: the written scene against the reference.
     let reference = rows.iter().find(|row| row["for"] == "reference").unwrap();
     let set = reference["run"]
         .replace(" = ", "=")
@@ -133,7 +135,7 @@ fn the_cheapest_settings_that_hold_are_written_and_hold_when_they_are_baked() {
         let cache = CacheReader::open(&job.path("reference")).unwrap();
         let scene = Scene::load(&job.path("reference/scene.toml"), &[]).unwrap();
         let start = cache.read(0).unwrap().position;
-        // Twice as coarse as the scene: 2.5 times as the reference, which is 0.8 of it.
+        // Twice the scene's spacing: 2.5 times the reference's, which is 0.8 of the scene's.
         gauge::gauge(&scene, 0.16, &start, scene.particle_spacing())
     };
     let [tuned, fine] = ["tuned", "reference"].map(|cache| aggregates(&job, cache, &gauge));
@@ -141,12 +143,12 @@ fn the_cheapest_settings_that_hold_are_written_and_hold_when_they_are_baked() {
         Some(it.kinetic_energy + it.potential_energy)
     });
     let front = error(&tuned, &fine, |it| it.front);
-    // The table has six digits behind the point.
+    // The table has six decimals.
     let is_told = |value: f64, title| (value - number(cheapest, title)).abs() < 1e-5;
     assert!(is_told(energy, "energy_error") && energy <= 4.0, "{energy}");
     assert!(is_told(front, "front_error") && front <= 6.0, "{front}");
 
-    // The scene keeps its comments, and has the reasons.
+    // The tuned scene keeps its comments and states the reasons.
     let text = fs::read_to_string(job.path("tiny.tuned.toml")).unwrap();
     assert_has(
         &text,
@@ -166,7 +168,7 @@ fn the_cheapest_settings_that_hold_are_written_and_hold_when_they_are_baked() {
         assert!(page.contains(part), "{part}");
     }
 
-    // What nothing holds: the nearest is told, and nothing is written. All runs stand.
+    // If no setting holds, the nearest is reported and nothing is written. All results are reused.
     fs::remove_file(job.path("tiny.tuned.toml")).unwrap();
     let said = job.expect(1, &tune.replace("4%", "1e-6%"));
     assert_has(
@@ -178,11 +180,11 @@ fn the_cheapest_settings_that_hold_are_written_and_hold_when_they_are_baked() {
             "stands there",
         ],
     );
-    // But for what the laws propose for another limit.
+    // Except for the proposals of the scaling laws for the other limit.
     let is_new = |line: &&str| line.contains("  done") && !line.contains("proposal: ");
     assert_eq!(said.lines().find(is_new), None, "{said}");
     assert!(!job.path("tiny.tuned.toml").exists());
-    // A bake that takes a microsecond is none that holds.
+    // No bake holds a limit of one microsecond.
     let hurried = job.expect(1, &format!("{tune} --per-frame 1e-6"));
     assert_has(
         &hurried,
@@ -190,14 +192,15 @@ fn the_cheapest_settings_that_hold_are_written_and_hold_when_they_are_baked() {
     );
 }
 
-/// Runs that are known before the first are shared out; laws, proposals and the scene are made by the command that joins.
+/// Shares divide the runs that are known at the start; the joining command makes laws,
+/// proposals and the scene.
 #[test]
 fn shares_of_a_tuning_are_joined() {
     let job = Job::of(&[("tiny.toml", SCENE)]);
     let tune = "tune tiny.toml -o out --frames 1-4 --error energy=50%";
     let mut done = 0;
     for k in 1..=2 {
-        // What would be run is the share's.
+        // A dry run lists what this share would run.
         let told = events(&job, 0, &format!("{tune} --chunk {k}/2 --dry-run"));
         let dry = &named(&told, "dry_run")[0];
         assert_eq!(
@@ -259,7 +262,7 @@ fn what_cannot_be_tuned_is_refused_before_anything_runs() {
             "not tried",
         ],
     );
-    // A scene of another hand is not written over.
+    // A scene that another author wrote is not overwritten.
     job.write("tiny.tuned.toml", "# mine");
     let said = job.expect(4, "tune tiny.toml --error front=2% -o out");
     assert_has(&said, &["it is no scene that swell tune wrote"]);

@@ -1,4 +1,5 @@
-//! Coarse runs of the benchmarks whose answer is known, by the study's own engine, and what a wrong world comes to.
+//! Coarse runs of the benchmarks with known answers, by the study's own engine, and their results
+//! in deliberately wrong physics.
 use std::{
     f64::consts::TAU,
     fs,
@@ -55,12 +56,12 @@ fn runs(context: &Context, benchmark: &Benchmark) -> Vec<Run> {
     runs
 }
 
-/// Gates of a benchmark that its runs miss on `context`.
+/// Lists the gates of a benchmark that its runs miss on `context`.
 fn missed(context: &Context, benchmark: &Benchmark) -> Vec<String> {
     missed_by(benchmark, &runs(context, benchmark))
 }
 
-/// Gates of a benchmark that these runs miss.
+/// Lists the gates of a benchmark that these runs miss.
 fn missed_by(benchmark: &Benchmark, runs: &[Run]) -> Vec<String> {
     let mut missed = Vec::new();
     for judged in judge(benchmark, runs) {
@@ -82,8 +83,9 @@ fn hold(name: &str) {
     assert!(missed.is_empty(), "{name}: {}", missed.join("\n"));
 }
 
-/// Like [`hold`], with a negative control on the same runs: waves lower by the factor `lower` miss the gate. In linear theory, those are the
-/// waves of a wall or flap with a stroke shorter by that factor.
+/// Like [`hold`], with a negative control on the same runs: waves lower by the factor `lower`
+/// miss the gate. In linear theory, those are the waves of a wall or flap with a stroke
+/// shorter by that factor.
 fn hold_height(name: &str, lower: f64) {
     let mut benchmark = benchmark(&COARSE, name);
     let runs = runs(&crate::support::context(), &benchmark);
@@ -140,13 +142,13 @@ benchmarks! {
     a_vortex_turns_on: "Taylor–Green vortex",
 }
 
-/// A benchmark's text with one passage replaced.
+/// Returns a benchmark's text with one passage replaced.
 fn spoiled(from: &str, to: &str) -> String {
     assert!(COARSE.contains(from), "{from}");
     COARSE.replace(from, to)
 }
 
-/// Negative control: a hundredth more gravity, or less, is a hundredth more pressure, or less.
+/// Negative control: 1 % more or less gravity is 1 % more or less pressure.
 #[test]
 fn gravity_that_is_off_by_a_hundredth_fails_a_benchmark() {
     let context = crate::support::context();
@@ -158,7 +160,7 @@ fn gravity_that_is_off_by_a_hundredth_fails_a_benchmark() {
     }
 }
 
-/// Negative control: a wall in place of the zone turns a wave back, most of it.
+/// Negative control: a wall in place of the zone reflects most of a wave.
 #[test]
 #[ignore = "a minute: tools/test --all; reflections are measured in swell-study's own tests"]
 fn a_flume_without_its_zone_fails_a_benchmark() {
@@ -173,7 +175,7 @@ fn a_flume_without_its_zone_fails_a_benchmark() {
     assert!(found > 0.5, "{missed:?}");
 }
 
-/// Negative control: a twentieth less speed is a tenth less force.
+/// Negative control: 5 % less speed is 10 % less force.
 #[test]
 fn a_jet_that_is_slower_by_a_twentieth_fails_a_benchmark() {
     let mut jet = benchmark(&COARSE, "jet on a wall");
@@ -185,7 +187,7 @@ fn a_jet_that_is_slower_by_a_twentieth_fails_a_benchmark() {
     assert!((0.85..0.95).contains(&found), "{missed:?}");
 }
 
-/// Negative control: in a zone of a fifth of a wave length the wall at its end undoes what it does.
+/// Negative control: in a zone of a fifth of a wavelength, the wall at its end spoils the waves.
 #[test]
 #[ignore = "a minute: tools/test --all"]
 fn waves_from_too_short_a_zone_fail_a_benchmark() {
@@ -200,8 +202,8 @@ fn waves_from_too_short_a_zone_fail_a_benchmark() {
     );
 }
 
-/// A reflection is measured once the energy of the whole wave, which goes at the group velocity, would be back at the first gauge
-/// from a wall.
+/// Measurement begins after the full wave's energy, at the group velocity, would be back at the
+/// first gauge from a reflecting wall.
 #[test]
 fn reflections_are_measured_when_they_would_be_there() {
     let text = fs::read_to_string(studies().join("validation.toml")).unwrap();
@@ -233,8 +235,9 @@ fn reflections_are_measured_when_they_would_be_there() {
     assert_eq!(held, 11);
 }
 
-/// Negative control: a surface whose θ is 1 wherever it is, a whole cell from the centre of the last cell of water; the
-/// column's lies at that centre, so that its water weighs a cell more.
+/// Negative control: with θ = 1 everywhere, the surface lies a whole cell above the centre
+/// of the last water cell. The column's true surface lies at that centre, so its water
+/// weighs one cell more.
 #[test]
 fn a_ghost_fluid_with_the_wrong_theta_fails_a_benchmark() {
     let set = "    \"shot.frames=45\",\n    \"solver.flip.surface=voxel\"";
@@ -244,21 +247,21 @@ fn a_ghost_fluid_with_the_wrong_theta_fails_a_benchmark() {
         &benchmark(&text, "column at rest"),
     );
     assert_eq!(missed.len(), 2, "{missed:?}");
-    // A number that is off, not a run that ended.
+    // A wrong value, not a run that ended.
     assert!(
         missed.iter().all(|words| words.contains("Some(1.")),
         "{missed:?}"
     );
 }
 
-/// Wave height over the stroke at the still water's surface of a flap that is hinged at the floor, in linear theory
-/// (Biésel 1951; Dean and Dalrymple 1991, 6.2), from kh.
+/// Ratio of wave height to the stroke at the still water level, of a flap hinged at the floor, in
+/// linear theory (Biésel 1951; Dean and Dalrymple 1991, 6.2), from kh.
 fn flap_height_ratio(kh: f64) -> f64 {
     let (sinh, cosh) = (kh.sinh(), kh.cosh());
     4.0 * sinh / kh * (kh * sinh - cosh + 1.0) / ((2.0 * kh).sinh() + 2.0 * kh)
 }
 
-/// Numbers that theory sets are those of its formulas at 9.81 m/s², in both studies.
+/// Published values that theory gives are those of its formulas at 9.81 m/s², in both studies.
 #[test]
 fn published_numbers_are_those_of_theory() {
     let text = fs::read_to_string(studies().join("validation.toml")).unwrap();
@@ -302,8 +305,8 @@ fn published_numbers_are_those_of_theory() {
     assert!(held > 20, "{held}");
 }
 
-/// The points beside a sea's curve are linear theory's for the wall's way that its scene has, about their mean over the time that is
-/// measured, which is below a millimetre.
+/// The points of a sea's curve are linear theory's for the wall motion of its scene, about their
+/// mean over the measured time, which is below a millimetre.
 #[test]
 fn points_of_seas_are_those_of_linear_theory() {
     let text = fs::read_to_string(studies().join("validation.toml")).unwrap();

@@ -1,6 +1,6 @@
-//! A scene that is edited between a bake and its resume: every key that decides the physics is named, every other is
-//! allowed. The keys are those that the cache's own scene has, with every default written out; a unit test of
-//! `scene` holds that each key which a scene may have is among what is written.
+//! A scene that is edited between a bake and its resume: the refusal names every key that changes
+//! the physics, and every other edit is allowed. The keys are those of the cache's own scene, which
+//! writes out every default; a unit test of `scene` asserts that it writes each possible key.
 
 use std::{collections::BTreeSet, fs, path::Path, sync::atomic::AtomicBool};
 
@@ -16,7 +16,7 @@ use swell::{
 };
 use toml::Value;
 
-/// What both scenes have, so that their caches have every key of a scene: all kinds of motion and probes.
+/// Part of both scenes, so that their caches have every key: all kinds of motion and probes.
 const MORE: &str = r#"
 [[water.mesh]]
 file = "box.obj"
@@ -83,7 +83,7 @@ axis = [0.0, 0.0, 1.0]
 turn = { kind = "sine", swing_degrees = 5.0, period = 4.0, ramp = 1.0 }
 "#;
 
-/// Strings that some key takes.
+/// Strings that some key accepts.
 const WORDS: [&str; 26] = [
     "f32",
     "f64",
@@ -115,7 +115,7 @@ const WORDS: [&str; 26] = [
 
 type Step = Result<String, usize>;
 
-/// Paths to all values that are neither tables nor arrays.
+/// Collects the paths to all values that are neither tables nor arrays.
 fn leaves(value: &Value, path: &mut Vec<Step>, found: &mut Vec<Vec<Step>>) {
     let mut below = |step: Step, value: &Value| {
         path.push(step);
@@ -144,10 +144,10 @@ fn at<'a>(root: &'a mut Value, path: &[Step]) -> &'a mut Value {
     })
 }
 
-/// Other values that a key might take.
+/// Other values that a key might accept.
 fn others(value: &Value) -> Vec<Value> {
     match value {
-        // Some limits are `false` or a number, some of particles.
+        // Some limits are `false` or a number, some of them a number of particles.
         Value::Boolean(is) => vec![Value::Boolean(!is), Value::Float(0.5), Value::Float(1e6)],
         Value::Integer(n) => [n + 1, n - 1, 2 * n].map(Value::Integer).into(),
         Value::Float(x) => [
@@ -186,8 +186,8 @@ fn run(scene: Scene, cache: &Path) -> Result<(), BakeError> {
     bake(&request(scene, cache), &AtomicBool::new(false), &mut |_| {}).map(|_| ())
 }
 
-/// What the refusal of an edited key has to say, `None` where the edit is allowed: all keys that are not listed here are
-/// physics, and named in full.
+/// What the refusal of an edited key must say, or `None` where the edit is allowed. Every key that
+/// is not listed here is physics, and the refusal names it in full.
 fn expected(key: &str, solver: &str) -> Option<String> {
     let is_idle = ["pbf", "flip"]
         .iter()
@@ -197,7 +197,7 @@ fn expected(key: &str, solver: &str) -> Option<String> {
         "solver.pbf.max_substeps",
         "solver.flip.max_substeps",
     ];
-    // The file's hash beside its path is physics, the path is not.
+    // The hash beside a file's path is physics, the path is not.
     let is_budget = key.starts_with("budget.");
     if is_idle
         || is_budget
@@ -220,9 +220,9 @@ fn expected(key: &str, solver: &str) -> Option<String> {
     })
 }
 
-/// Keys that cannot be edited alone: the hash of a file is of that file, each kind of motion or probe has keys of its own,
-/// a table of displacements begins at 0, and a cache's frames are compressed alike: another compression is refused by words
-/// of its own.
+/// Keys that cannot be edited without others: a hash belongs to its file, each kind of motion or
+/// probe has its own keys, a table of displacements begins at 0, and all frames of a cache have the
+/// same compression, whose change is refused with a message of its own.
 fn is_bound(key: &str) -> bool {
     let is_own = |end: &&str| key.ends_with(end);
     [".blake3", ".kind", ".points[0][1]", "keep.compression"]
@@ -230,7 +230,7 @@ fn is_bound(key: &str) -> bool {
         .any(is_own)
 }
 
-/// Keys that were refused, that were allowed, and that took no other value.
+/// Keys whose edit was refused, keys whose edit was allowed, and keys without another valid value.
 type Found = (BTreeSet<String>, BTreeSet<String>, BTreeSet<String>);
 
 fn edits(solver: &str, settings: &[&str], more: &str) -> Found {
@@ -269,7 +269,7 @@ fn edits(solver: &str, settings: &[&str], more: &str) -> Found {
         let key = name(&path);
         let old = at(&mut base.clone(), &path).clone();
         let edited = others(&old).into_iter().find_map(|value| {
-            // As zero is after it was scaled.
+            // Zero stays zero when it is scaled.
             if value == old {
                 return None;
             }
@@ -297,7 +297,7 @@ fn edits(solver: &str, settings: &[&str], more: &str) -> Found {
     (refused, allowed, bound)
 }
 
-/// `held` is the key that another setting of this scene holds fast; another scene here edits it.
+/// `held` is a key that another setting of this scene fixes; a test with another scene edits it.
 fn check(solver: &str, settings: &[&str], more: &str, named: &[&str], held: &str) {
     let (refused, allowed, bound) = edits(solver, settings, more);
     println!(
@@ -325,7 +325,7 @@ fn each_edited_key_of_a_pbf_bake_is_named_or_allowed() {
         "wave_maker[0].motion.stroke",
         "effects.viscosity.xsph",
     ];
-    // A probe of pressure allows no artificial one.
+    // With a pressure probe, artificial pressure is not allowed.
     check("pbf", &[], MORE, &named, "solver.pbf.artificial_pressure");
 }
 
@@ -336,7 +336,7 @@ fn each_edited_key_of_a_chebyshev_bake_is_named_or_allowed() {
         "solver.pbf.relaxation=0.7",
         "solver.pbf.spectral_radius=0.9",
     ];
-    // Which has no pressure to probe.
+    // The Chebyshev iteration has no pressure to probe.
     let more = MORE.replace(
         "kind = \"pressure\"
 at = [-0.6, 0.7, 0.75]",

@@ -1,4 +1,4 @@
-//! Bad input: each fault of a scene has its message, and no bytes make a reader panic.
+//! Bad input: each fault of a scene has its message, and no bytes make a parser panic.
 
 mod numbers;
 mod whitewater;
@@ -17,7 +17,7 @@ use crate::support::mutate::mutate;
 const CUBE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nv 0 0 1\nv 1 0 1\nv 0 1 1\nv 1 1 1\n\
     f 1 5 7 3\nf 2 4 8 6\nf 1 2 6 5\nf 3 7 8 4\nf 1 3 4 2\nf 5 6 8 7\n";
 
-/// As Blender writes it.
+/// A camera as Blender writes it.
 const CAMERA: &[u8] = include_bytes!("../../../src/scene/look/usd_camera/blender_lens.usda");
 
 /// A folder with one good mesh and some bad ones.
@@ -59,7 +59,7 @@ fn each_fault_names_file_line_key_and_what_is_allowed() {
         assert!(SCENE.contains(old), "{old}");
         let result = parse(&SCENE.replacen(old, new, 1), overrides);
         if expected.is_empty() {
-            // A control: the change is allowed.
+            // Negative control: the change is allowed.
             if let Err(error) = result {
                 wrong.push(format!("{new}: {error}"));
             }
@@ -195,8 +195,8 @@ fn each_fault_of_a_study_names_file_line_key_and_what_is_allowed() {
     }
 }
 
-/// Every number with a fraction that a study of stability may have: its key, the text that it stands in, and the number
-/// there.
+/// Every fractional number that a stability study may have: its key, the text around it, and the
+/// number in that text.
 const STUDY_NUMBERS: &[(&str, &str, &str)] = &[
     ("case[0].against[0].scale", "scale = 1.0", "1.0"),
     ("case[0].against[0].shift", "shift = [0.5,", "0.5"),
@@ -382,7 +382,7 @@ proptest! {
         edits in prop::collection::vec(any::<(u16, u8, u8)>(), 1..6),
     ) {
         let bytes = mutate(SCENE.as_bytes().to_vec(), &edits);
-        // Nothing is allocated for the water here, however much a mutation asks for.
+        // Parsing allocates nothing for the water, however much a mutation asks for.
         let _ = parse(Path::new("/nowhere"), &String::from_utf8_lossy(&bytes));
     }
 
@@ -395,7 +395,7 @@ proptest! {
         let _ = Study::parse(&text, Path::new("s.toml"), Path::new("/nowhere"));
     }
 
-    /// One that is read all the same stands somewhere and looks somewhere.
+    /// If a mutated camera still parses, its position is finite and its direction is a unit vector.
     #[test]
     fn no_mutation_makes_the_reader_of_usd_panic(
         edits in prop::collection::vec(any::<(u16, u8, u8)>(), 1..6),

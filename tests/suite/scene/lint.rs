@@ -1,4 +1,5 @@
-//! Lints where a user meets them: said by inspect and by a bake, kept with the cache, and the end of either where they are denied.
+//! Lints as a user meets them: `inspect` and a bake print them, the cache records them, and either
+//! command fails where they are denied.
 use swell::cache::CacheReader;
 
 use crate::support::job::{Job, assert_has};
@@ -24,12 +25,12 @@ fn lints_are_warnings_unless_they_are_denied() {
         &["warning: ", lint],
     );
     assert_has(&job.expect(0, "inspect told"), &["warning: ", lint]);
-    // Nothing to deny: waves of half a second would break.
+    // Nothing to deny. (Waves of half a second would break.)
     let calm = "--set wave_maker[0].motion.period=2.0";
     job.expect(0, &format!("inspect small.toml --deny lint {calm}"));
 }
 
-/// A probe looks no more often than the solver steps, which is known once it has.
+/// A probe samples at most once per substep, so too high a rate shows only during the bake.
 #[test]
 fn a_probe_that_looks_less_often_than_it_should_is_told_of() {
     let job = Job::new();
@@ -46,14 +47,14 @@ fn a_probe_that_looks_less_often_than_it_should_is_told_of() {
                 .sum::<u64>(),
         )
     };
-    // 33 times in two frames of a sixtieth of a second.
+    // 33 samples in two frames of a sixtieth of a second.
     let (said, substeps) = bake("1000", "often");
     assert!(substeps < 33);
     let expected = format!(
         "warning: probe volume-1 looked {substeps} times of the 33 that its rate_hz asks for"
     );
     assert_has(&said, &[&expected]);
-    // Negative control: as often as a step at least.
+    // Negative control: the solver steps at least as often as the probe samples.
     let (said, _) = bake("60", "each");
     assert!(!said.contains("rate_hz"), "{said}");
 }

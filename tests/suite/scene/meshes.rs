@@ -1,4 +1,4 @@
-//! Meshes as other programs write them: what a scene makes of them, and what it says.
+//! Meshes as other programs write them: what a scene makes of them, and what it reports.
 
 use glam::DVec3;
 use swell::{
@@ -28,10 +28,11 @@ const PLAN: [[f64; 2]; 10] = [
     [0.4, 0.5],
 ];
 
-/// Square metres of [`PLAN`].
+/// Area of [`PLAN`], m².
 const PLAN_AREA: f64 = 1.2 * 0.2 + 0.4 * 0.45 + 0.4 * 0.4;
 
-/// The plan between two heights; floor and top are one polygon each, whose corners come from `first` on, or these faces.
+/// Extrudes the plan between two heights. Floor and top are one polygon each that begins at corner
+/// `first`, or the faces given.
 fn prism(first: usize, floor_and_top: Option<&str>) -> String {
     let count = PLAN.len();
     let ring = |y: f64| PLAN.map(|[x, z]| format!("v {x} {y} {z}\n")).concat();
@@ -63,7 +64,8 @@ fn top_area(mesh: &TriangleMesh) -> f64 {
 fn a_bay_in_a_polygon_is_open_whichever_corner_comes_first() {
     let job = Job::of(&[("scene.toml", POOL), ("solid.obj", &prism(0, None))]);
     let mesh = solid(&job);
-    // Corners within two metres may be rounded to 32 bits, by 2⁻²⁴ of them each along edges of 5.3 m in all.
+    // 32-bit rounding moves each corner within two metres by up to 2⁻²⁴ m, along edges
+    // of 5.3 m in total.
     let tolerance = 5.3 * 2.0 * 2.0f64.powi(-24);
     let check = |mesh: &TriangleMesh| {
         assert_eq!(mesh.open_edges(), []);
@@ -74,7 +76,8 @@ fn a_bay_in_a_polygon_is_open_whichever_corner_comes_first() {
         );
     };
     check(&mesh);
-    // Water stands in the bay: the distance to the nearest of its walls, not to a roof over it.
+    // The bay is open to the water: the distance is that to the nearest of its walls, not
+    // to a roof over it.
     let scene = Scene::load(&job.path("scene.toml"), &[]).unwrap();
     let field = SignedDistance::from_mesh(&mesh, &scene.domain, 0.05).unwrap();
     let found = field.sample(DVec3::new(1.0, 0.3, 0.65));
@@ -83,7 +86,8 @@ fn a_bay_in_a_polygon_is_open_whichever_corner_comes_first() {
         job.write("solid.obj", &prism(first, None));
         assert_eq!(solid(&job), mesh, "from corner {first}");
     }
-    // The control: a fan about the first corner has a roof over the bay, and corners on a line open it.
+    // Negative control: a fan around the first corner covers the bay, and collinear
+    // corners open it.
     let fan = |base: usize, [b, c]: [usize; 2]| format!("f {base} {} {}\n", base + b, base + c);
     let fans: String = (1..PLAN.len() - 1)
         .map(|k| fan(1, [k, k + 1]) + &fan(PLAN.len() + 1, [k + 1, k]))
@@ -95,7 +99,7 @@ fn a_bay_in_a_polygon_is_open_whichever_corner_comes_first() {
 
 #[test]
 fn a_polygon_that_crosses_itself_is_a_warning() {
-    // Two neighbouring corners of the plan change places, in both heights.
+    // Two neighbouring corners of the plan are swapped, at both heights.
     let whole = prism(0, None);
     let mut lines: Vec<_> = whole.lines().collect();
     for first in [7, PLAN.len() + 7] {
@@ -108,7 +112,8 @@ fn a_polygon_that_crosses_itself_is_a_warning() {
     assert!(!job.expect(0, "inspect scene.toml").contains("warning"));
 }
 
-/// A box of water, its least corner and size in hundredths of a metre, whose file has its zero `by` metres off.
+/// An OBJ box of water whose smallest corner and size are in hundredths of a metre, and whose file
+/// is shifted by `by` metres.
 fn tub(by: [i64; 2]) -> String {
     let decimal = |hundredths: i64| {
         let sign = if hundredths < 0 { "-" } else { "" };
@@ -125,7 +130,7 @@ fn tub(by: [i64; 2]) -> String {
     corners + "f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n"
 }
 
-/// The mesh of an OBJ as a binary STL.
+/// Converts an OBJ mesh to a binary STL.
 fn binary_stl(obj: &str) -> Vec<u8> {
     let format = swell::domain::mesh_file::MeshFormat::Obj;
     let mesh = TriangleMesh::from_bytes(obj.as_bytes(), format, "tub.obj".as_ref()).unwrap();
@@ -140,7 +145,7 @@ fn binary_stl(obj: &str) -> Vec<u8> {
     out
 }
 
-/// Water as a survey has it, in a zone of UTM, is the water that the same file has near zero.
+/// Water in the UTM coordinates of a survey is the same as that of a file near zero.
 #[test]
 fn a_mesh_far_from_zero_keeps_its_shape() {
     let way = [448_213, -5_411_987];
@@ -180,7 +185,7 @@ fn a_mesh_far_from_zero_keeps_its_shape() {
             .fold(0.0, f64::max)
     };
     assert!(apart(&far) <= 2.0f64.powi(-30), "{}", apart(&far));
-    // The control: in 32 bits the tub is another, and that is told.
+    // Negative control: 32-bit coordinates change the shape, and a warning reports it.
     let (floats, _) = shape("floats.toml");
     assert!((floats.signed_volume() / near.signed_volume() - 1.0).abs() > 0.05);
     let said = job.expect(0, "inspect floats.toml");
@@ -192,7 +197,7 @@ fn a_mesh_far_from_zero_keeps_its_shape() {
     );
 }
 
-/// Corners of a box from zero to this size, and its faces.
+/// Corners and faces of a box that reaches from zero to `size`.
 fn box_to(size: [f64; 3]) -> String {
     let end = |k: usize, axis: usize| if k >> axis & 1 == 0 { 0.0 } else { size[axis] };
     let corner = |k: usize| format!("v {:?} {:?} {:?}\n", end(k, 0), end(k, 1), end(k, 2));
@@ -200,7 +205,8 @@ fn box_to(size: [f64; 3]) -> String {
     corners + "f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n"
 }
 
-/// 0.075 in 32 bits is 0.07500000298: what a file in them, or decimals of a program that has them, says for it is as wide as the domain.
+/// 0.075 in 32 bits is 0.07500000298: a file in 32-bit floats, or decimals printed from them, still
+/// describes a mesh as wide as the domain.
 #[test]
 fn a_mesh_as_wide_as_the_domain_fits_into_it() {
     let head = "[shot]\nname = \"a\"\nframes = 1\nframes_per_second = 24\n[domain]\n\
@@ -210,7 +216,7 @@ fn a_mesh_as_wide_as_the_domain_fits_into_it() {
     let emitter =
         "[[emitter]]\nmesh = { file = \"FILE\" }\nvelocity = [0.0, 0.0, 0.0]\nlevel = 0.7\n";
     let drain = "[[drain]]\nmesh = { file = \"FILE\" }\nlevel = 0.7\n";
-    // 0.7 is less in 32 bits.
+    // 0.7 rounds down in 32 bits.
     let job = Job::of(&[
         (
             "wide.obj",
@@ -229,7 +235,7 @@ fn a_mesh_as_wide_as_the_domain_fits_into_it() {
         for file in ["wide.obj", "wide.stl"] {
             read(file).unwrap_or_else(|error| panic!("{file}: {error}"));
         }
-        // The control: off by more than five times the rounding.
+        // Negative control: off by more than five times the rounding.
         let said = read("wider.obj").expect_err("wider");
         assert_has(&said, &["not fit", "0.07500002", "0.075"]);
         if table != water {
@@ -239,7 +245,7 @@ fn a_mesh_as_wide_as_the_domain_fits_into_it() {
     }
 }
 
-/// What only touches the domain does not come into it, also where rounding would have it in.
+/// A solid that only touches the domain is outside it, even if rounding puts it inside.
 #[test]
 fn a_solid_that_touches_the_domain_is_outside_of_it() {
     let job = Job::of(&[("solid.obj", &box_to([1.0, 1.0, f64::from(0.3f32)]))]);
@@ -253,7 +259,8 @@ fn a_solid_that_touches_the_domain_is_outside_of_it() {
     assert!(read("-0.2999").is_ok());
 }
 
-/// Each text that a scene, a look and a study are read from, in UTF-16 with and without its mark, and in UTF-8 with one.
+/// Every kind of text file that a scene, a look or a study is read from, in UTF-16 with and without
+/// a byte order mark, and in UTF-8 with one.
 #[test]
 fn texts_of_other_encodings_say_what_to_do() {
     let job = Job::new();
@@ -313,7 +320,7 @@ fn texts_of_other_encodings_say_what_to_do() {
             assert_has(&said, &[file, "UTF-16; save it as UTF-8"]);
             assert_eq!(said.trim_end().lines().count(), 1, "{said}");
         }
-        // With a mark, and the control as it was.
+        // UTF-8 with a byte order mark; and the control, unchanged.
         set(format!("\u{feff}{text}").as_bytes());
         job.expect(0, command);
         set(text.as_bytes());
@@ -337,7 +344,8 @@ fn backslashes_in_paths_say_what_to_write() {
         (format!("named.toml:{line}: "), "inspect named.toml")
     };
     for mesh in [
-        // A control character, no escape, no escape of as many digits, a backslash of its own.
+        // A control character, an invalid escape, an escape with too few digits, a
+        // literal backslash.
         r#""sub\box.obj""#,
         r#""sub\city.obj""#,
         r#""C:\Users\box.obj""#,

@@ -1,5 +1,5 @@
-//! Files from elsewhere: no promise of theirs is believed, no damage makes a reader panic, and no path of theirs leads
-//! where it should not.
+//! Untrusted files: readers believe no count or size in a header, survive any damage without a
+//! panic, and follow no path out of the scene's folder.
 
 use crate::support::cache as stand_in;
 use std::{
@@ -18,7 +18,7 @@ use swell::{
     scene::study::Study,
 };
 
-/// Remembers the largest allocation of each thread.
+/// An allocator that records the largest allocation of each thread.
 struct Watching;
 
 thread_local! {
@@ -26,26 +26,26 @@ thread_local! {
 }
 
 fn note(size: usize) {
-    // Gone while a thread ends.
+    // The thread-local is gone while a thread ends.
     let _ = LARGEST.try_with(|largest| largest.set(largest.get().max(size)));
 }
 
-// SAFETY: all of it is the system's allocator; `note` does not allocate.
+// SAFETY: forwards every call to the system's allocator; `note` does not allocate.
 unsafe impl GlobalAlloc for Watching {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         note(layout.size());
-        // SAFETY: the caller's promise.
+        // SAFETY: the caller upholds the contract of `alloc`.
         unsafe { System.alloc(layout) }
     }
 
     unsafe fn dealloc(&self, memory: *mut u8, layout: Layout) {
-        // SAFETY: the caller's promise.
+        // SAFETY: the caller upholds the contract of `dealloc`.
         unsafe { System.dealloc(memory, layout) }
     }
 
     unsafe fn realloc(&self, memory: *mut u8, layout: Layout, size: usize) -> *mut u8 {
         note(size);
-        // SAFETY: the caller's promise.
+        // SAFETY: the caller upholds the contract of `realloc`.
         unsafe { System.realloc(memory, layout, size) }
     }
 }
@@ -53,14 +53,15 @@ unsafe impl GlobalAlloc for Watching {
 #[global_allocator]
 static WATCHING: Watching = Watching;
 
-/// Largest allocation that `work` makes, bytes.
+/// Returns the largest allocation that `work` makes, bytes.
 fn largest(work: impl FnOnce()) -> usize {
     LARGEST.set(0);
     work();
     LARGEST.get()
 }
 
-/// What a file of a kilobyte may cost: more than any line or table of it, less than what any promise below asks for.
+/// Bytes that a kilobyte file may allocate: more than any of its lines or tables needs, less than
+/// any of the false counts below asks for.
 const MODEST: usize = 1 << 20;
 
 #[test]
@@ -85,7 +86,7 @@ fn a_promise_of_a_trillion_is_refused_without_memory_for_it() {
             meshes.push((MeshFormat::Ply, header(format, "0", many).into_bytes()));
         }
     }
-    // A list that says that it is long.
+    // A list property that claims a great length.
     let wide = header("ascii", "3", "1").replace("list uchar uint", "list uint uint");
     meshes.push((
         MeshFormat::Ply,
@@ -103,7 +104,7 @@ fn a_promise_of_a_trillion_is_refused_without_memory_for_it() {
         });
         assert!(cost < MODEST, "{cost} bytes for {words}");
     }
-    // A frame of ours with another number of particles.
+    // One of our frames with a false particle count.
     let good = fs::read(stand_in::baked().join("frames/tank.0001.ply")).unwrap();
     let end = good.windows(11).position(|w| w == b"end_header\n").unwrap();
     let text = String::from_utf8(good[..end].to_vec()).unwrap();
@@ -120,7 +121,7 @@ fn a_promise_of_a_trillion_is_refused_without_memory_for_it() {
         });
         assert!(cost < MODEST, "{cost} bytes for {many} particles");
     }
-    // Negative control: memory that is taken is seen.
+    // Negative control: a large allocation is detected.
     assert!(largest(|| drop(Vec::<u8>::with_capacity(2 * MODEST))) >= 2 * MODEST);
 }
 
@@ -136,7 +137,7 @@ fn contents(manifest: &[u8]) -> Vec<Vec<u8>> {
         .collect()
 }
 
-/// Everything that reads a cache, with these two files in place of its own.
+/// Runs everything that reads a cache on a copy whose manifest and ledger are replaced.
 fn read_all(manifest: &[u8], ledger: &[u8]) {
     let dir = stand_in::copied();
     fs::write(dir.path().join("manifest.json"), manifest).unwrap();
@@ -160,7 +161,7 @@ fn the_seeds_are_a_cache() {
         ledger,
         fs::read(stand_in::baked().join("frames.jsonl")).unwrap()
     );
-    // Another manifest, whose hash the ledger knows: what a forger would write is read as it is.
+    // Another manifest whose hash is in the ledger: readers accept a consistent forgery.
     let text = String::from_utf8(manifest).unwrap();
     let other = text
         .replace("its driver 1.2", "its driver 1.3")
@@ -186,7 +187,7 @@ proptest! {
         read_all(&manifest, &stand_in::chained(&manifest, &contents(&manifest)));
     }
 
-    /// With chains that hold, so that each line gets as far as its own checks.
+    /// The chain hashes are valid, so that each line gets as far as its own checks.
     #[test]
     fn no_mutation_of_a_ledger_makes_a_reader_panic(
         which in any::<prop::sample::Index>(),
@@ -208,7 +209,7 @@ proptest! {
     }
 }
 
-/// A frame number at the end of all numbers leaves no room for the next one.
+/// The largest frame number has no successor.
 #[test]
 fn a_parent_at_the_last_frame_number_is_read_or_refused() {
     let manifest = fs::read_to_string(stand_in::baked().join("manifest.json")).unwrap();
@@ -264,7 +265,7 @@ fn scenes_and_looks_stay_in_their_folders_unless_told() {
     assert!(!job.path("mesh").exists());
     job.expect(0, &format!("{bake} mesh --allow-outside"));
     job.expect(0, "inspect scenes/small.toml --allow-outside");
-    // The cache has its own copy, and needs no leave.
+    // The cache has its own copy of the mesh and needs no permission.
     job.expect(0, "verify mesh");
     job.expect(0, "render mesh --look look.toml -o pictures");
     let absolute = job.path("box.obj");
@@ -286,7 +287,7 @@ fn scenes_and_looks_stay_in_their_folders_unless_told() {
     );
     refused(&format!("{bake} table"), &["wave_maker[0].motion.file"]);
     job.expect(0, &format!("{bake} table --allow-outside"));
-    // An override of the command line is held to the same.
+    // An override on the command line follows the same rule.
     refused(
         &format!("{bake} set --set wave_maker[0].motion.file=/etc/passwd"),
         &["wave_maker[0].motion.file"],
@@ -294,7 +295,7 @@ fn scenes_and_looks_stay_in_their_folders_unless_told() {
     // A look and its sky.
     fs::create_dir(job.path("looks")).unwrap();
     let look = fs::read_to_string(job.path("look.toml")).unwrap();
-    // A sky is twice as wide as high.
+    // A panorama is twice as wide as high.
     let wide = look.replace("height = 36", "height = 32").replace(
         "film_back_mm = [36.0, 20.25]",
         "film_back_mm = [36.0, 18.0]",
@@ -310,7 +311,8 @@ fn scenes_and_looks_stay_in_their_folders_unless_told() {
     let render = "render link --look looks/look.toml -o under";
     refused(render, &["looks/look.toml:", "sky.file"]);
     job.expect(0, &format!("{render} --allow-outside"));
-    // A study names its scene and look where it likes; what these name is held to their folders.
+    // A study may name scenes and looks anywhere; the files that these name must lie
+    // in their folders.
     fs::create_dir(job.path("studies-of")).unwrap();
     let study = fs::read_to_string(job.path("study.toml")).unwrap();
     let study = study
@@ -324,7 +326,7 @@ fn scenes_and_looks_stay_in_their_folders_unless_told() {
     assert!(!job.path("out").exists());
 }
 
-/// A pipe would be read for ever.
+/// Reading a pipe would never end.
 #[cfg(unix)]
 #[test]
 fn a_mesh_that_is_a_pipe_is_refused() {
@@ -341,20 +343,21 @@ fn a_mesh_that_is_a_pipe_is_refused() {
     );
 }
 
-/// One rule: holes that face one another are refused, others are taken and told of by every command, and in the cache.
+/// Meshes whose holes face each other are refused; with other holes a mesh is accepted, and every
+/// command and the cache report them.
 #[test]
 fn an_open_mesh_is_told_of_everywhere_and_a_tube_is_refused() {
     let job = Job::new();
     // Waves of half a second would break, which is a warning too.
     job.edit("small.toml", "period = 0.5", "period = 2.0");
     job.expect(0, "bake small.toml --device cpu --frames 1 -o closed");
-    // The cache has its own copy, of a name of its own.
+    // The cache has its own copy under a name of its own.
     let told = ".obj is open and taken as closed: 1 hole: 4 open edges about (0.5000, 0.5000, \
                 0.7000), 0.5657 m across; inside is where its winding number is above one half";
     let manifest = |cache: &str| fs::read_to_string(job.path(cache).join("manifest.json")).unwrap();
     assert!(!manifest("closed").contains("warnings"));
     assert!(!job.expect(0, "inspect small.toml").contains("warning"));
-    // A house without its floor.
+    // The box without its floor.
     job.edit("box.obj", "f 1 2 6 5\n", "");
     for words in [
         "inspect small.toml",
@@ -373,7 +376,7 @@ fn an_open_mesh_is_told_of_everywhere_and_a_tube_is_refused() {
         panic!("{:?}", study.warnings());
     };
     assert!(warning.contains(told), "{warning}");
-    // And without its roof: what two holes leave open does not cancel.
+    // And without its roof: the contributions of two opposite holes do not cancel.
     job.edit("box.obj", "f 4 8 7 3\n", "");
     for words in [
         "inspect small.toml",

@@ -1,4 +1,4 @@
-//! `swell study` on a terminal and for farms.
+//! `swell study` on a terminal and for render farms.
 
 use std::{fs, process::Command};
 
@@ -22,12 +22,12 @@ fn the_command_tells_each_point() {
         said.contains("point 1 of 4  jacobi, solver.pbf.iterations = 1  done"),
         "{said}"
     );
-    // What the finding is, times decide; that there is one, they do not.
+    // The finding depends on timings, its presence does not.
     assert!(
         said.contains("density_error_mean, jacobi: ") && said.contains("page: out"),
         "{said}"
     );
-    // A failure is told once.
+    // A failure is reported once.
     let failing = ITERATIONS.replace(
         "name = \"red_black\"",
         "name = \"red_black\"\nset = [\"solver.pbf.cfl=1e-4\", \"solver.pbf.max_substeps=1\"]",
@@ -69,7 +69,8 @@ fn the_command_tells_each_point() {
         assert_eq!(first["status"], status, "{name}: {first}");
     }
 
-    // While another writes there, and where anything else lies, a study does not begin.
+    // A study does not begin while another process writes into the folder, or where the folder
+    // holds anything else.
     let results = fs::File::open(job.folder.path().join("out/results.jsonl")).unwrap();
     results.lock().unwrap();
     let output = run("plain");

@@ -1,4 +1,4 @@
-//! What a sweep cannot be, said where the study says it.
+//! Faulty sweeps are refused with the position of the fault in the study.
 
 use std::fs;
 
@@ -37,7 +37,7 @@ fn devices_and_references_that_do_not_fit_are_refused() {
         let said = job.load(&ITERATIONS.replace(from, to)).unwrap_err();
         assert!(said.contains(expected), "{said}");
     }
-    // A key of another kind is at fault, and not one that is missing.
+    // The message names a key of another kind, not a missing one.
     let other = ITERATIONS.replace("kind = \"sweep\"", "kind = \"solver_comparison\"");
     let said = job.load(&other).unwrap_err();
     let words = "does not go with kind = \"solver_comparison\"; allowed with it: kind, scene";
@@ -223,7 +223,7 @@ fn each_fault_names_file_line_key_and_what_is_allowed() {
             "{new}: {said}"
         );
     }
-    // A fault of the scene itself is said at its own place.
+    // A fault of the scene is reported at its position in the scene.
     fs::write(
         job.folder.path().join("tiny.toml"),
         SCENE.replace("frames = 8", "frames = 0"),

@@ -1,8 +1,9 @@
-//! What a sweep takes beyond a key of the scene: a coarser run, devices, solvers, precisions.
+//! Sweeps beyond the keys of a scene: a coarser run, devices, solvers, precisions.
 
 use super::{ITERATIONS, Job, stands};
 
-/// What the last value's run is off by on cells twice as large is a discretisation error, and the knee is told beside it.
+/// The difference of the last value's run on cells twice as large estimates the discretisation
+/// error, and the page states the knee beside it.
 #[test]
 fn the_knee_is_told_beside_the_discretisation_error() {
     let job = Job::new();
@@ -22,13 +23,13 @@ name = "multigrid"
     assert_eq!(points.len(), 4);
     assert_eq!(job.column("key")[3], "coarser");
     let error = job.numbers("velocity_error");
-    // A grid of 6 cells is off by percents, not by nothing and not by all.
+    // A grid of 6 cells is off by some per cent.
     assert!((1e-3..1.0).contains(&error[3]), "{error:?}");
     assert!(error[2] < 1e-4 * error[3], "{error:?}");
     let told = "The discretisation error, in the rows with the key coarser";
     assert!(job.read("index.html").contains(told));
     assert!(!outcome.findings[0].contains("not known"), "{outcome:?}");
-    // A divergence has none.
+    // A divergence has no discretisation error.
     assert_eq!(job.column("divergence")[3], "");
     let (_, points) = job
         .run(&text.replace("coarser =", "# coarser ="), false)
@@ -61,7 +62,7 @@ name = "multigrid"
         "{said}"
     );
 
-    // Against a finest run: one more run.
+    // Against a finest run, `coarser` adds one more run.
     let finest = r#"
 kind = "sweep"
 scene = "tiny.toml"
@@ -82,7 +83,8 @@ name = "red/black"
     );
 }
 
-/// One word stalls, two go further, f64 to what f32 velocities hold.
+/// A single f32 word stalls, two words go further, and f64 reaches the resolution
+/// of f32 velocities.
 #[test]
 fn a_projection_is_held_against_f64_in_each_precision() {
     let job = Job::new();
@@ -105,7 +107,7 @@ name = "multigrid"
         pressure[1] > 1e3 * pressure[2] && pressure[2] < 1e-10,
         "{pressure:?}"
     );
-    // Half a unit in the last place of f32, a few times over.
+    // A few times half a unit in the last place of f32.
     assert!(
         velocity[2] < 1e-7 && velocity[0] > velocity[2],
         "{velocity:?}"
@@ -113,7 +115,7 @@ name = "multigrid"
     assert_eq!(job.column("missed"), ["1", "1", "0"]);
 }
 
-/// What runs are on, and which solver, are settings like others.
+/// Device and solver are settings like others.
 #[test]
 fn devices_and_solvers_are_swept() {
     let job = Job::new();
@@ -194,7 +196,7 @@ fn a_scene_that_is_not_there_is_named_where_the_study_names_it() {
     assert!(said.contains("none.toml"), "{said}");
 }
 
-/// A point that the study no longer names stays in the ledger and out of the report.
+/// A point that the study no longer names stays in the ledger but not in the report.
 #[test]
 fn dropped_values_are_not_reported() {
     let job = Job::new();

@@ -16,7 +16,7 @@ use crate::support::{
     job::{Job, assert_has},
 };
 
-/// Three points a line, one run each.
+/// Three points per line, one run each.
 fn sweep() -> String {
     let text = ITERATIONS.replace("[1, 4]", "[1, 4, 8]");
     text.replace("repeats = 2", "repeats = 1")
@@ -26,7 +26,7 @@ fn job(study: &str) -> Job {
     Job::of(&[("tiny.toml", SCENE), ("s.toml", study)])
 }
 
-/// All that a study leaves, by name.
+/// All files that a study leaves, by name.
 fn pages(job: &Job) -> BTreeMap<String, Vec<u8>> {
     let files = ["out", "out/curves"].map(|folder| fs::read_dir(job.path(folder)).unwrap());
     let files = files
@@ -41,7 +41,7 @@ fn pages(job: &Job) -> BTreeMap<String, Vec<u8>> {
     files.filter_map(read).collect()
 }
 
-/// Lines of the study's own ledger, without wall clocks and shares.
+/// Lines of the study's own ledger, without wall-clock times and shares.
 fn lines(job: &Job) -> Vec<Value> {
     let text = fs::read_to_string(job.path("out/results.jsonl")).unwrap();
     let line = |line: &str| {
@@ -70,7 +70,7 @@ fn shares_that_are_joined_are_the_study_that_one_process_ran() {
     let whole = job(&text);
     whole.expect(0, "study s.toml -o out");
 
-    // All at once into a folder that is not there yet.
+    // All shares start at once, in a folder that does not exist yet.
     let shared = job(&text);
     thread::scope(|scope| {
         for k in 1..=3 {
@@ -88,7 +88,7 @@ fn shares_that_are_joined_are_the_study_that_one_process_ran() {
     let files = "results.1-of-3.jsonl, results.2-of-3.jsonl, results.3-of-3.jsonl";
     let words = format!("are not joined ({files}); `swell study s.toml -o out`, with the shares'");
     shared.expect_clear(4, "view out", &words);
-    // What stands is counted when all are done; it is run by no other cut into shares.
+    // Results are counted when all are done; another division into shares runs none of them again.
     let told = events(&shared, 0, &share(4, 5));
     assert_eq!(
         (statuses(&told), &told.last().unwrap()["left"]),
@@ -107,14 +107,15 @@ fn shares_that_are_joined_are_the_study_that_one_process_ran() {
     let ledgers = [1, 2, 3].map(|k| format!("results.{k}-of-3.jsonl"));
     assert_eq!(joined, ledgers.each_ref().map(|name| (&**name, 2)));
     assert_eq!(lines(&shared), lines(&whole));
-    // Taken over once, and told again, as to who saw nothing of a joining command that was ended.
+    // Results are taken over once, but reported again, in case the joining command was interrupted
+    // before anyone saw its report.
     let ledger = fs::read(shared.path("out/results.jsonl")).unwrap();
     let told = events(&shared, 0, "study s.toml -o out");
     assert_eq!(named(&told, "joined").len(), 3);
     assert_eq!(fs::read(shared.path("out/results.jsonl")).unwrap(), ledger);
 
-    // With the same times, all of it has the same bytes but for what is said of shares: the lines of the one run as shares would
-    // have written them.
+    // With the same times, all files have the same bytes except for the remarks about shares. The
+    // lines of the single run are rewritten as shares would have written them.
     let dealt = job(&text);
     fs::create_dir(dealt.path("out")).unwrap();
     let text = fs::read_to_string(whole.path("out/results.jsonl")).unwrap();
@@ -151,7 +152,7 @@ fn shares_that_are_joined_are_the_study_that_one_process_ran() {
         lines.sort_by_key(|line| line["hash"].to_string());
     }
     assert_eq!(lines_of_both[0], lines_of_both[1]);
-    // The control: times are in it.
+    // Negative control: the table contains times.
     assert_ne!(pages(&shared)["results.csv"], pages(&whole)["results.csv"]);
 }
 
@@ -173,7 +174,7 @@ fn what_no_share_has_is_run_and_what_does_not_fit_is_named() {
     assert!(other.output().unwrap().status.success());
     fs::remove_file(&copy).unwrap();
 
-    // A worker is at work; a second one of its share, and who joins, are told.
+    // While a worker runs, a second worker of its share and a joining command are refused.
     let ledger = fs::OpenOptions::new()
         .append(true)
         .open(shared.path("out/results.2-of-3.jsonl"));
@@ -208,7 +209,7 @@ fn what_no_share_has_is_run_and_what_does_not_fit_is_named() {
         .filter(|text| text.contains("is of another build of the program"));
     assert_eq!((of_builds.count(), warnings.len()), (2, 3), "{warnings:?}");
 
-    // A scene that changed: nothing of it stands, and each line is named.
+    // After a change of the scene no result is reused, and each line is reported.
     shared.edit("tiny.toml", "[0.6, 0.6, 0.6]", "[0.6, 0.5, 0.6]");
     let said = shared.expect(0, "study s.toml -o out");
     assert_eq!(
@@ -219,7 +220,7 @@ fn what_no_share_has_is_run_and_what_does_not_fit_is_named() {
     );
     assert_eq!(said.matches("  done").count(), 6, "{said}");
 
-    // A line that is spoiled.
+    // A damaged line.
     let file = shared.path("out/results.1-of-3.jsonl");
     let text = fs::read_to_string(&file).unwrap();
     fs::write(&file, text.replacen("\"name\"", "\"nome\"", 1)).unwrap();
@@ -247,7 +248,7 @@ fn a_share_that_is_killed_goes_on() {
     let mut text = fs::read_to_string(&path).unwrap();
     let whole = text.matches('\n').count();
     assert!((1..16).contains(&whole), "{whole} of 16 were done");
-    // As a host that went down may leave it.
+    // As a host that crashed may leave it.
     text.push_str("{\"hash\":\"12");
     fs::write(&path, text).unwrap();
     let told = events(&shared, 0, &share(2, 2));
@@ -285,7 +286,8 @@ fn what_joins_shares_is_a_command_that_a_shell_takes() {
 #[test]
 fn other_kinds_have_shares_or_say_that_they_have_none() {
     let shared = job(FALL);
-    // Each has a run of the case; the second also a search, which takes two runs, and is counted so before it is run.
+    // Each share has a run of the case. The second also has a search, which takes two runs and is
+    // counted so before it begins.
     for (k, counts, left) in [(1, vec![1], 3), (2, vec![3, 3, 3], 0)] {
         let told = events(&shared, 0, &share(k, 2));
         let found: Vec<_> = (named(&told, "point").iter())
@@ -306,7 +308,8 @@ fn other_kinds_have_shares_or_say_that_they_have_none() {
     whole.expect(0, "study s.toml -o out");
     assert_eq!(lines(&shared), lines(&whole));
 
-    // A run that ends a search early takes the others off the count: this one misses its mark at once.
+    // A run that ends a search early removes the others from the count: this one misses
+    // its mark at once.
     let early = FALL
         .replace("passes = 1.0", "passes = 1e-4")
         .replace("fails = 1e-4", "fails = 1e-5");

@@ -2,7 +2,7 @@
 
 use super::{Job, stands};
 
-/// Falling water: the marks are its speed, one that holds and one that does not.
+/// Falling water: the marks bound its speed; one holds and one does not.
 pub(super) const FALL: &str = r#"
 kind = "stability"
 about = ["Why <this> is hard."]
@@ -74,10 +74,10 @@ fn cases_and_limits_run_once_and_are_told() {
     assert!(place("6 of 7 hold") < place("Why &lt;this&gt; is hard."));
     assert!(place("<svg") < place("<summary>What was run</summary>"));
     assert!(page.contains("cargo test nothing"));
-    // What no mark could miss on one device alone has no row: each run is held to no particle lost.
+    // A mark that cannot be missed on one device only has no row: each run must lose no particle.
     assert!(!page.contains("particles lost or doubled"));
 
-    // Again: nothing is run; both runs of the limit and both of the case stand.
+    // Again: nothing is run; both runs of the limit and both of the case are reused.
     let lines = job.read("results.jsonl");
     assert_eq!(lines.lines().count(), 4);
     let written = (job.read("results.csv"), page);
@@ -86,12 +86,12 @@ fn cases_and_limits_run_once_and_are_told() {
     assert_eq!(job.read("results.jsonl"), lines);
     assert_eq!((job.read("results.csv"), job.read("index.html")), written);
 
-    // Another mark is another judgement of the same run; negative control: it is missed.
+    // A stricter mark judges the same run again. Negative control: it is missed.
     let strict = FALL.replace("at_most = 0.0", "at_most = -1.0");
     let (outcome, _) = job.run(&strict, false).unwrap();
     assert_eq!(outcome.missed, ["1 a block, pbf, difference"]);
     assert_eq!(job.read("results.jsonl"), lines);
-    // What is measured, and when, is another run.
+    // A change in what is measured, or when, needs another run.
     let later = FALL.replace("at_most = -5.0", "at_most = -5.0\nafter = 0.05");
     job.run(&later, false).unwrap();
     assert_eq!(job.read("results.jsonl").lines().count(), 6);

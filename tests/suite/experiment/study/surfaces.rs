@@ -49,14 +49,15 @@ fn a_surface_is_drawn_once_and_told() {
     );
     assert_eq!(job.column("setting"), ["0.0", "0.1", "1.0", "2.0"]);
     assert_eq!(job.column("repeats"), ["2"; 4]);
-    // Rays are nearer to the truth than splats, and of finer voxels nearer still; the panes of the box hide that from the median of normals.
+    // Rays are closer to the truth than splats, and rays with finer voxels are closer still; the
+    // flat sides of the box hide that from the median of normals.
     let [normal, colour] = ["normal_off", "colour"].map(|column| job.numbers(column));
     assert!(normal[3] < normal[0], "{normal:?}");
     assert!(colour[3] < colour[2] && colour[3] < colour[0], "{colour:?}");
     let page = job.read("index.html");
     assert_eq!(page.matches("<svg").count(), 3);
     assert!(page.contains("Why &lt;this&gt; is drawn.") && page.contains("<h2>Knees</h2>"));
-    // What stands is not drawn again, and another value is.
+    // Existing results are reused; a new value is drawn.
     let (_, again) = job.run(SURFACE, false).unwrap();
     assert_eq!(stands(&again), 4);
     let (_, more) = job

@@ -1,4 +1,4 @@
-//! Sweeps run, resumed and measured.
+//! Sweeps that are run, resumed and measured.
 
 use std::fs;
 
@@ -6,7 +6,8 @@ use swell::experiment::PointStatus;
 
 use super::{ITERATIONS, Job, SCENE, stands};
 
-/// The study's name, one sentence, the curve with its knee; method against method only for who opens it.
+/// The page begins with the study's name, one sentence and the curve with its knee; the comparison
+/// of methods is folded.
 fn reads_from_the_answer_on(page: &str) {
     let place = |text: &str| page.find(text).unwrap_or_else(|| panic!("{text}: {page}"));
     let order = [
@@ -24,7 +25,8 @@ fn reads_from_the_answer_on(page: &str) {
     for pair in order.windows(2) {
         assert!(place(pair[0]) < place(pair[1]), "{pair:?}");
     }
-    // What would be wider than a narrow window: text that does not wrap, boxes that scroll or have a least width.
+    // Causes of overflow in a narrow window: text that does not wrap, boxes that scroll or have
+    // a minimum width.
     for wide in ["nowrap", "overflow-x", "min-width", "white-space:pre}"] {
         assert!(!page.contains(wide), "{wide}");
     }
@@ -35,7 +37,7 @@ fn a_sweep_runs_once_and_tells() {
     let job = Job::new();
     let (outcome, points) = job.run(ITERATIONS, false).unwrap();
     assert_eq!((points.len(), stands(&points)), (4, 0));
-    // Which setting is the knee and who is better, times decide; that both are told, they do not.
+    // The knee and the better method depend on timings; that both are reported does not.
     let tells = |what: &str| outcome.findings.iter().any(|f| f.contains(what));
     assert!(tells("knee") && tells("at equal time"), "{outcome:?}");
     assert_eq!(
@@ -45,15 +47,16 @@ fn a_sweep_runs_once_and_tells() {
     assert_eq!(job.column("setting"), ["1", "4", "1", "4"]);
     assert_eq!(job.column("particles"), ["216"; 4]);
     assert_eq!(job.column("repeats"), ["2"; 4]);
-    // One step a frame of four, each of so many iterations.
+    // Four frames of one step each, with 1 or 4 iterations per step.
     assert_eq!(job.column("iterations"), ["4", "16", "4", "16"]);
-    // Lists and pairs: 9 passes over neighbours a frame to 3. The neighbours themselves differ little.
+    // Lists and pairs: 9 passes over neighbours per frame against 3. Neighbour
+    // counts differ little.
     let work = job.numbers("work");
     assert!((work[1] / work[0] - 3.0).abs() < 0.6, "{work:?}");
-    // A block of 6 layers that begins to fall over: more iterations leave less error.
+    // A block of 6 layers that begins to collapse: more iterations leave less error.
     let error = job.numbers("density_error_mean");
     assert!(error[1] < error[0] && error[3] < error[2], "{error:?}");
-    // 4 steps are no 51.
+    // 4 steps are fewer than 51.
     assert_eq!(job.column("convergence_point_density"), [""; 4]);
 
     let page = job.read("index.html");
@@ -81,7 +84,8 @@ fn a_sweep_runs_once_and_tells() {
         .unwrap();
     let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
     reader.next_frame(&mut pixels).unwrap();
-    // Title, two labels, and numbers: above the plot, where nothing but text is drawn, there are dark pixels.
+    // Title, two labels and numbers: above the plot, where only text is drawn, there
+    // are dark pixels.
     let row = 4 * reader.info().width as usize;
     let dark = pixels[..50 * row]
         .chunks_exact(4)
@@ -89,7 +93,7 @@ fn a_sweep_runs_once_and_tells() {
         .count();
     assert!(dark > 200, "{dark}");
 
-    // Again: nothing is run, and what is written is the same.
+    // Again: nothing is run, and the output is the same.
     let lines = job.read("results.jsonl");
     let written = (job.read("results.csv"), page);
     let (_, points) = job.run(ITERATIONS, false).unwrap();
@@ -97,13 +101,14 @@ fn a_sweep_runs_once_and_tells() {
     assert_eq!(job.read("results.jsonl"), lines);
     assert_eq!((job.read("results.csv"), job.read("index.html")), written);
 
-    // A line that is gone is run again, and it alone.
+    // Only the point of a missing line is run again.
     let (kept, _) = lines.trim_end().rsplit_once('\n').unwrap();
     fs::write(job.out("results.jsonl"), format!("{kept}\n")).unwrap();
     let (_, points) = job.run(ITERATIONS, false).unwrap();
     assert_eq!(stands(&points), 3);
 
-    // Negative control: with another scene nothing stands; with one method's setting changed the other's points do.
+    // Negative control: after a change of one method's setting, only the other's results are
+    // reused; after a change of the scene, none.
     let other = ITERATIONS.replace("iteration=jacobi", "iteration=chebyshev");
     let (_, points) = job.run(&other, false).unwrap();
     assert_eq!(stands(&points), 2);
@@ -119,7 +124,7 @@ fn a_sweep_runs_once_and_tells() {
 #[test]
 fn a_signal_ends_it_and_a_failure_is_listed() {
     let job = Job::new();
-    // 0.16 m/s after a frame: at a CFL number of 1e-4 that asks for hundreds of substeps.
+    // 0.16 m/s after a frame: at a CFL number of 1e-4 that needs hundreds of substeps.
     let text = ITERATIONS
         .replace("solver.pbf.iterations", "solver.pbf.cfl")
         .replace("[1, 4]", "[1e-4, 1.0, 0.5]");
@@ -149,7 +154,7 @@ fn a_signal_ends_it_and_a_failure_is_listed() {
         page.matches("solver.pbf.cfl = 1e-4: frame 1").count() >= 5,
         "{page}"
     );
-    // A failure stands as well as a result.
+    // Failures are reused like results.
     let (_, points) = job.run(&text, false).unwrap();
     assert_eq!(stands(&points), 6);
 }
@@ -176,7 +181,8 @@ set = ["solver.flip.surface=voxel", "solver.flip.pressure.preconditioner=jacobi"
     for error in ["velocity_error", "pressure_error", "divergence"] {
         let found = job.numbers(error);
         for line in [0, 3] {
-            // Two decades of tolerance and more buy at least one of error; 1e-6 is near what f32 velocities can hold.
+            // More than two decades of tolerance reduce the error by at least one; 1e-6 is near the
+            // resolution of f32 velocities.
             assert!(found[line + 1] < 0.1 * found[line], "{error}: {found:?}");
             assert!(
                 found[line + 2] < 0.1 * found[line + 1],
@@ -214,7 +220,7 @@ name = "pbf"
 "#;
     let sweep = job.load(text).unwrap();
     let blend = |k: usize| sweep.lines[0].points[k].scene.solver.flip().pic_blend;
-    // As much a second at each rate: two frames of 100 keep what one of 50 keeps.
+    // The same blend per second at each rate: two frames at 100 Hz keep what one at 50 Hz keeps.
     assert!((blend(0) - 0.05).abs() < 1e-12);
     assert!(((1.0 - blend(1)).powi(2) - 0.95).abs() < 1e-12);
     assert!(((1.0 - blend(2)).powi(4) - 0.95).abs() < 1e-12);
@@ -231,7 +237,7 @@ name = "pbf"
     assert!(job.read("index.html").contains("α_ref"));
 }
 
-/// The same settings in f32 and f64: rounding is what differs, and the step's length is another matter.
+/// The same settings in f32 and f64 differ only by rounding; a different time step does not.
 #[test]
 fn a_method_runs_on_the_cpu_and_another_is_held_against_it() {
     let job = Job::new();
@@ -255,8 +261,9 @@ against = "f64"
     // The finest run is its own reference; runs against another method's have one each.
     assert_eq!(energy[1], "");
     let [coarse, _, first, second] = [0, 1, 2, 3].map(|k| energy[k].parse().unwrap_or(f64::NAN));
-    // 10 or 20 steps of f32, each rounded to 6e-8 and amplified by iterations on a crowded lattice: below 1e-5, and not
-    // 0. Half the steps are off by percents: negative control, for so would be f32 against the wrong run.
+    // 10 or 20 steps of f32, each rounded to 6e-8 and amplified by iterations on a crowded lattice:
+    // below 1e-5, and not 0. Negative control: half the steps differ by per cents, as would f32
+    // against the wrong run.
     assert!(first > 0.0 && first < 1e-5, "{energy:?}");
     assert!(second > 0.0 && second < 1e-5, "{energy:?}");
     assert!(coarse > 1e-3, "{energy:?}");
@@ -264,7 +271,8 @@ against = "f64"
     assert!(page.contains("On CPU f64 reference ("), "{page}");
     assert!(page.contains("f32 is held, value by value, against f64"));
 
-    // The device is in what a point depends on: on the GPU nothing of the CPU's stands.
+    // A point is identified by its settings and device, not by its method's name: with the names
+    // swapped, the same four results are reused.
     let (_, points) = job.run(text, false).unwrap();
     assert_eq!(stands(&points), 4);
     let moved = text
@@ -277,7 +285,7 @@ against = "f64"
     assert_eq!(stands(&points), 4);
 }
 
-/// A tank that stands still under its own weight with a projection, and not without.
+/// A tank at rest under its own weight is still with a projection, and simmers without.
 #[test]
 fn water_at_rest_is_told_from_water_that_simmers() {
     let job = Job::new();
@@ -324,7 +332,8 @@ fn iterations_come_nearer_to_what_is_converged() {
     job.run(&text, false).unwrap();
     let distance = job.numbers("distance_to_converged");
     for line in distance.chunks(3) {
-        // A block in free room: 32 iterations leave a hundredth of a spacing, one much more.
+        // A block in free space: 32 iterations are off by a hundredth of a spacing,
+        // one by much more.
         assert!(line[1] < line[0] && line[2] < line[1], "{distance:?}");
         assert!(line[2] < 0.01 && line[2] > 0.0, "{distance:?}");
     }

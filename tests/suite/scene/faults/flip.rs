@@ -1,8 +1,8 @@
-//! What only the solver FLIP finds wrong.
+//! Faults that only FLIP reports.
 
 use super::Fault;
 
-/// The same with `solver.method=flip` laid over.
+/// Faults in the good scene with the override `solver.method=flip`.
 pub const FLIP_FAULTS: &[Fault] = &[
     // Periodic axes.
     (

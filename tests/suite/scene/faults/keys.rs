@@ -1,8 +1,8 @@
-//! Keys that are none or are missing, names and types.
+//! Unknown and missing keys, names and types.
 
 use super::Fault;
 
-/// Keys, names and types, with the scene as it stands: PBF.
+/// Faulty keys, names and types in the good scene as it is, with PBF.
 pub const KEY_FAULTS: &[Fault] = &[
     // Keys.
     (

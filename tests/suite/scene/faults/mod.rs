@@ -1,4 +1,4 @@
-//! A good scene, and what each change to it is told.
+//! A good scene, and faulty changes to it with their messages.
 mod flip;
 mod keys;
 mod sources;
@@ -52,5 +52,6 @@ surface = "voxel"
 pressure = { preconditioner = "ipp", tolerance = 1e-4 }
 "#;
 
-/// (what to replace in the good scene, by what, line of the fault, what the message says)
+/// Text to replace in the good scene, its replacement, line of the fault, parts of the message. No
+/// parts: the change is valid.
 pub type Fault = (&'static str, &'static str, usize, &'static [&'static str]);

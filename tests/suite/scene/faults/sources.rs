@@ -2,7 +2,7 @@
 
 use super::Fault;
 
-/// What stands there without them.
+/// The text before which the tables are inserted.
 const BEFORE: &str = "[solver]\nmethod";
 
 pub const SOURCE_FAULTS: &[Fault] = &[

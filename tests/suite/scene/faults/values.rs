@@ -1,10 +1,10 @@
-//! Values that are none of what a key allows, and parts that do not fit together.
+//! Values that a key does not allow, and parts of a scene that do not fit together.
 
 use super::Fault;
 
-/// Values, with the scene as it stands: PBF.
+/// Faulty values in the good scene as it is, with PBF.
 pub const VALUE_FAULTS: &[Fault] = &[
-    // No-slip walls are FLIP's.
+    // No-slip walls belong to FLIP.
     (
         "max = [25.0, 12.6, 15.0]",
         "max = [25.0, 12.6, 15.0]\nwalls = \"no_slip\"",
@@ -305,7 +305,7 @@ pub const VALUE_FAULTS: &[Fault] = &[
         "cube.obj",
         "sheet.obj",
         18,
-        // Where the scene puts it: scaled by 2 and moved.
+        // In the scene's coordinates: scaled by 2 and moved.
         &[
             "solid[0].mesh",
             "1 hole: 3 open edges about (18.6667, 0.6667, 7.0000), 2.8284 m across",
@@ -344,7 +344,7 @@ pub const VALUE_FAULTS: &[Fault] = &[
             "of 25 m",
         ],
     ),
-    // Two spacings are left: 24.8 m.
+    // Two particle spacings must remain: at most 24.8 m.
     ("stroke = 1.5", "stroke = 24.79", 24, &[]),
     (
         "stroke = 1.5",
@@ -352,7 +352,7 @@ pub const VALUE_FAULTS: &[Fault] = &[
         24,
         &["the wall -x crosses the whole domain"],
     ),
-    // At 1 and 6 m/s they have used up 24.8 m after 3.543 s.
+    // At 1 and 6 m/s the walls have used up 24.8 m after 3.543 s.
     (
         "kind = \"sine\", stroke = 1.5, period = 3.0, ramp = 1.0 }",
         "kind = \"constant_velocity\", velocity = 1.0 }\n[[wave_maker]]\nwall = \"+x\"\n\

@@ -1,4 +1,4 @@
-//! Zones that do not fit into the scene, and waves that no theory has.
+//! Zones that do not fit into the scene, and waves outside the range of any theory.
 
 use super::Fault;
 

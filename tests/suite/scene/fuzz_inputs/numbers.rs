@@ -1,9 +1,9 @@
-//! Every number of a scene has a range, and says it.
+//! Every number of a scene has a range, and its error message states it.
 
 use super::*;
 
-/// Every key of a scene that is a number with a fraction: an override with `{}` for it, and whether its range alone
-/// decides.
+/// Every fractional number of a scene: key, override with `{}` in place of the number, and whether
+/// the range is the only constraint on it.
 const NUMBERS: &[(&str, &str, bool)] = &[
     ("shot.frames_per_second", "{}", true),
     ("domain.min", "[{}, 0, 0]", false),
@@ -72,7 +72,7 @@ const NUMBERS: &[(&str, &str, bool)] = &[
     ("drain[0].until", "{}", false),
 ];
 
-/// Those of a zone in which waves come in: of a sea, and of regular waves.
+/// The numbers of a wave generation zone with an irregular sea, and of one with regular waves.
 const OF_SEA: &[(&str, &str, bool)] = &[
     ("effects.generation_zone.length", "{}", false),
     (
@@ -103,26 +103,26 @@ const OF_PACKET: &[(&str, &str, bool)] = &[
     ("effects.generation_zone.waves.time", "{}", false),
 ];
 
-/// Those of a viscosity that is solved.
+/// The numbers of an implicit viscosity.
 const OF_VISCOSITY: &[(&str, &str, bool)] = &[
     ("effects.viscosity.coefficient", "{}", true),
     ("effects.viscosity.tolerance", "{}", true),
 ];
 
-/// Those of rooms in which a level is kept, which gravity has to go with.
+/// The numbers of emitters and drains that keep a level, which need gravity.
 const OF_LEVELS: &[(&str, &str, bool)] = &[
     ("emitter[0].level", "{}", false),
     ("drain[0].level", "{}", false),
 ];
 
-/// Of a wall that absorbs.
+/// The numbers of an absorbing wall.
 const OF_ABSORPTION: &[(&str, &str, bool)] = &[
     ("wave_maker[1].absorption.depth", "{}", false),
     ("wave_maker[1].absorption.period", "{}", false),
     ("wave_maker[1].absorption.room", "{}", false),
 ];
 
-/// The good scene with all that [`NUMBERS`] changes in it.
+/// The good scene with every table that [`NUMBERS`] changes.
 fn numbered() -> String {
     let makers = "[[wave_maker]]\nwall = \"+x\"\nmotion = { kind = \"constant_velocity\", \
         velocity = 0.1, until = 1.0 }\n\
@@ -155,7 +155,8 @@ fn numbered() -> String {
         )
 }
 
-/// A range that its end points keep and what is just beyond them does not, where it says so itself: "from A to B".
+/// Parses the range "from A to B" of an error message. Its ends are valid, values just
+/// beyond them are not.
 fn range_of(message: &str) -> Option<[f64; 2]> {
     let mut words = message.rsplit_once(" from ")?.1.split_whitespace();
     let least = words.next()?.parse().ok()?;
@@ -163,8 +164,8 @@ fn range_of(message: &str) -> Option<[f64; 2]> {
     Some([least, most.parse().ok()?])
 }
 
-/// What is no number, and what would overflow or vanish in the first product, is refused with key, value and range, and the
-/// range is the one that holds.
+/// Values that are not finite, or that would overflow or underflow in the first product, are
+/// refused with key, value and range, and the stated range is the effective one.
 #[test]
 fn every_number_has_a_range_and_says_it() {
     each_number_of_a_scene_has_a_range(&numbered(), NUMBERS);
@@ -204,7 +205,7 @@ fn each_number_of_a_scene_has_a_range(text: &str, numbers: &[(&str, &str, bool)]
     each_number_has_a_range(load, numbers);
 }
 
-/// `load` reads what is good with one key set to something else.
+/// `load` parses a valid text with one key overridden.
 pub(super) fn each_number_has_a_range(
     load: impl Fn(&str) -> Result<(), SceneError>,
     numbers: &[(&str, &str, bool)],
@@ -245,7 +246,7 @@ pub(super) fn each_number_has_a_range(
     }
 }
 
-/// Every key of [`NUMBERS`] that takes 0 besides its range.
+/// The ramp is the only key of [`NUMBERS`] that accepts 0 in addition to its range.
 #[test]
 fn a_wall_without_a_ramp_is_one() {
     let dir = assets();

@@ -1,4 +1,5 @@
-//! Settings of whitewater: each number has a range, each fault its place, and no text makes the reader panic.
+//! Whitewater settings: each number has a range, each fault is located, and no text makes
+//! the parser panic.
 
 use std::path::Path;
 
@@ -20,7 +21,8 @@ const SETTINGS: &str = "seed = 5\nmax_particles = 1000\nradius = [0.001, 0.002]\
     [spray]\ndrop_radius = 0.001\nwind = [1, -2.5, 0]\n\
     [foam]\nlifetime = [1, 2]\ncrowd = 3\n[bubbles]\nrise_speed = 0.1\nresponse = 0.5\n";
 
-/// Key, value with the number's place, and whether both ends of its range are allowed beside the rest.
+/// Key, value with `{}` in place of the number, and whether both ends of the range are valid
+/// together with the other settings.
 const NUMBERS: &[(&str, &str, bool)] = &[
     ("radius", "[{}, {}]", true),
     ("radius", "[{}, 0.002]", false),
@@ -37,7 +39,7 @@ const NUMBERS: &[(&str, &str, bool)] = &[
     ("bubbles.response", "{}", true),
 ];
 
-/// Key and ends of the range of whole numbers.
+/// Key and both ends of the range of each integer.
 const WHOLE: &[(&str, u64, u64)] = &[
     ("seed", 0, 4_294_967_295),
     ("max_particles", 1, 200_000_000),
@@ -79,7 +81,7 @@ fn every_number_of_whitewater_has_a_range_and_says_it() {
             assert!(said.contains(&range) && said.len() < 300, "{said}");
         }
     }
-    // Every key of a number is among them.
+    // The lists above cover every numeric key.
     let all = SETTINGS.matches(" = ").count();
     let mut keys: Vec<_> = NUMBERS.iter().map(|number| number.0).collect();
     keys.dedup();
@@ -147,7 +149,7 @@ fn each_fault_of_whitewater_names_file_line_key_and_what_is_allowed() {
             &["response"],
         ),
         ("seed = 5", "seed = ", 1, &[""]),
-        // A control: least and greatest may be one.
+        // Negative control: minimum and maximum may be equal.
         ("lifetime = [1, 2]", "lifetime = [2, 2]", 14, &[]),
     ] {
         assert!(SETTINGS.contains(old), "{old}");
@@ -176,7 +178,7 @@ proptest! {
         let _ = parse(&text);
     }
 
-    /// What is read is the same once it is written out, and what is not is refused with the file's name.
+    /// Settings that parse survive being written and parsed again; errors name the file.
     #[test]
     fn no_mutation_makes_the_whitewater_parser_panic(
         edits in prop::collection::vec(any::<(u16, u8, u8)>(), 1..6),
