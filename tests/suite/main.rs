@@ -1,7 +1,8 @@
-//! Tests of what crosses rooms, a module for each room; tests of one room alone stand in its own files.
+//! Integration tests that span several crates, one module per area. Tests of a single crate
+//! are in that crate.
 //!
-//! One crate, so that all of them are linked once. No test sets what its process shares: whatever needs an environment,
-//! a signal or a limit of its own runs `swell` as a process.
+//! One test crate, so that everything is linked once. No test changes state that its process
+//! shares: a test that needs its own environment, signals or limits runs `swell` as a process.
 #![allow(
     clippy::print_stderr,
     clippy::print_stdout,

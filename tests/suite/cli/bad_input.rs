@@ -1,4 +1,4 @@
-//! What a user hands over wrongly, by command: each is told in one line, with the exit code of its kind, and writes nothing.
+//! Bad input to each command: one line of error, the exit code of its kind, and nothing is written.
 
 use std::fs;
 
@@ -7,10 +7,10 @@ use crate::support::{
     made_cache::{Made, write_cache},
 };
 
-/// OpenVDB with grids of fog and velocity alone.
+/// An OpenVDB file with only fog and velocity grids.
 const FOG: &[u8] = include_bytes!("../domain/files/no-level-set.vdb");
 
-/// Points as a program other than swell may have them: no camera, no prim that moves, no mesh.
+/// Points as another program may write them: no camera, no moving prim, no mesh.
 const POINTS: &str = "#usda 1.0\n(\n    defaultPrim = \"p\"\n)\n\ndef Points \"p\"\n\
     {\n    point3f[] points = [(0, 0, 0)]\n}\n";
 
@@ -41,7 +41,7 @@ particle_spacing = 0.1
 const BOX: &str = "v 0.3 0.1 0.5\nv 0.7 0.1 0.5\nv 0.3 0.5 0.5\nv 0.3 0.1 0.9\n\
     f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
 
-/// A scene, a look and a cache that are right, and by each fault one that is not.
+/// A valid scene, look and cache, and a faulty one for each fault.
 fn given() -> Job {
     let job = Job::of(&[
         ("scene.toml", SCENE),
@@ -81,7 +81,7 @@ fn given() -> Job {
     job
 }
 
-/// Command, exit code, what the line has to say.
+/// Command, exit code, required part of the line.
 const FAULTS: [(&str, i32, &str); 21] = [
     ("verify gone", 4, "gone is not there"),
     (
@@ -189,7 +189,7 @@ fn each_fault_is_one_line() {
         let said = String::from_utf8(output.stderr).unwrap();
         assert_eq!(output.status.code(), Some(code), "swell {words}: {said}");
         assert!(said.contains(part), "swell {words}: {said}");
-        // A word that is none of the command's has its usage below the line.
+        // After an unknown word of the command line, the usage follows the error line.
         let lines = said.lines().take_while(|line| !line.is_empty()).count();
         assert!(
             lines == 1 && (said.lines().count() == 1 || part == "unexpected"),
@@ -197,7 +197,7 @@ fn each_fault_is_one_line() {
         );
     }
     assert_eq!(names(), before, "nothing is written");
-    // The control: what is right of all that.
+    // Negative control: the valid inputs.
     job.expect(0, "verify cache");
     job.expect(0, "inspect scene.toml");
     job.expect(
@@ -206,7 +206,8 @@ fn each_fault_is_one_line() {
     );
 }
 
-/// Over a damaged frame what is whole is written first; the fault is one line among those of the frames.
+/// With --keep-going an export writes the intact frames beside a damaged one. Either way the
+/// fault is one line.
 #[test]
 fn a_damaged_frame_is_one_line_of_an_export() {
     let job = given();

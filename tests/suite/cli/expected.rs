@@ -1,4 +1,4 @@
-//! What is told before anything is done: dry runs, and `swell inspect --json`.
+//! What is reported before anything is done: dry runs, and `swell inspect --json`.
 
 use std::{collections::BTreeMap, fs, path::Path};
 
@@ -9,7 +9,7 @@ use crate::support::{
     job::{Job, assert_has},
 };
 
-/// A folder with its files, but for locks, before and after.
+/// A folder's files with their contents, without locks, to compare before and after.
 fn tree(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     let mut files = BTreeMap::new();
     let mut folders = vec![folder.to_owned()];
@@ -29,7 +29,7 @@ fn tree(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     files
 }
 
-/// What a dry run tells; nothing may change.
+/// Returns what a dry run reports, and asserts that it changes nothing.
 fn dry(job: &Job, words: &str) -> Value {
     let before = tree(job.folder.path());
     let told = events(job, 0, &format!("{words} --dry-run"));
@@ -49,7 +49,8 @@ fn a_dry_run_tells_what_the_command_then_does() {
     let told = dry(&job, bake);
     assert_eq!((&told["frames"], &told["skipped"]), (&3.into(), &0.into()));
     let done = events(&job, 0, bake);
-    // No water enters or leaves: each frame is as large as the start's, but for its numbers in the header.
+    // No water enters or leaves: each frame is as large as the start, except for the
+    // numbers in its header.
     let [expected, written] = [&told, done.last().unwrap()].map(|it| it["bytes"].as_u64().unwrap());
     assert!(expected.abs_diff(written) < 3 * 40, "{expected} {written}");
     let told = dry(
@@ -58,7 +59,7 @@ fn a_dry_run_tells_what_the_command_then_does() {
     );
     assert_eq!(told["numbers"], serde_json::json!([4, 5]));
     assert_eq!(told["skipped"], 3);
-    // What the command refuses, a dry run does.
+    // A dry run refuses what the command refuses.
     for words in [
         bake,
         "bake small.toml -o cache --resume --frames 6-8",
@@ -87,7 +88,7 @@ fn a_dry_run_tells_what_the_command_then_does() {
     assert_eq!(told["numbers"], serde_json::json!([3]));
     assert!(told["bytes"].as_u64().unwrap() > 100);
 
-    // No device is opened: one that is not there is not looked for.
+    // No device is opened, so a device that does not exist is no error.
     let render = "render cache --look look.toml -o day";
     let told = dry(&job, &format!("{render} --adapter 999"));
     assert_eq!((&told["frames"], &told["bytes"]), (&3.into(), &Value::Null));
@@ -117,7 +118,7 @@ fn a_dry_run_tells_what_the_command_then_does() {
     assert_eq!((&told["frames"], &told["files"]), (&3.into(), &11.into()));
     let done = events(&job, 0, export);
     let [expected, written] = [&told, done.last().unwrap()].map(|it| it["bytes"].as_u64().unwrap());
-    // Tables of numbers in decimal digits are not all of one length.
+    // Decimal numbers in tables vary in length.
     assert!(
         expected.abs_diff(written) * 10 < written,
         "{expected} {written}"
@@ -166,7 +167,7 @@ fn inspect_tells_programs_what_it_prints() {
         .sum();
     assert_eq!(cache["disk_bytes"], on_disk);
     assert_eq!(cache["streams"][0]["bytes"], sum(&cache["frames"]));
-    // Before the bake it was known but for the numbers in the frames' headers.
+    // The bake's size was known in advance, except for the numbers in the frames' headers.
     let expected = scene["disk_bytes"].as_u64().unwrap();
     assert!(expected.abs_diff(sum(&cache["frames"])) < 9 * 40);
     assert_eq!(cache["device_bytes"], scene["device_bytes"]);
@@ -196,7 +197,7 @@ fn inspect_tells_programs_what_it_prints() {
     let adapters = job.json(0, "inspect --adapters");
     assert_eq!(adapters["adapters"][0]["index"], 0);
     assert!(adapters["adapters"][0]["limits"]["max_buffer_size"].is_u64());
-    // Faults are those of the same without.
+    // Faults are the same as without --json.
     job.expect(2, "inspect cache --json --time 1");
     job.expect(2, "inspect none.toml --json");
     job.expect(4, "inspect none --json");

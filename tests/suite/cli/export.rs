@@ -1,4 +1,4 @@
-//! `swell export` as a user runs it: what it writes, resumes, shares out and refuses.
+//! `swell export` as a user runs it: what it writes, resumes, shares and refuses.
 
 use std::{collections::BTreeMap, fs, path::Path};
 
@@ -15,7 +15,7 @@ use crate::support::{
     made_cache::{Made, write_cache},
 };
 
-/// Particles of a made cache, and their volume, m³.
+/// Water volume of a made cache, m³: its particles times their volume.
 const VOLUME: f64 = 800.0 * 0.001;
 
 /// A folder with a cache that no solver made.
@@ -29,7 +29,7 @@ fn mesh(file: &Path) -> TriangleMesh {
     TriangleMesh::load(file).unwrap()
 }
 
-/// Names in a folder with their bytes, the folder of records aside.
+/// Names in a folder with their contents, except for the folder of records.
 fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     let entries = fs::read_dir(folder).unwrap().map(Result::unwrap);
     entries
@@ -53,7 +53,7 @@ fn meshes_are_closed_and_hold_the_water() {
         assert!(found.open_edges().is_empty(), "{name}");
         let ratio = found.signed_volume() / VOLUME;
         assert!((ratio - 1.0).abs() <= 0.01, "{name}: {ratio}");
-        // Where the block stands: at the sides of the domain, which are flat there.
+        // The block's position: it touches the sides of the domain, where it is flat.
         let bounds = found.bounds().unwrap();
         let low = DVec3::new(-1.0, 0.5, 0.25);
         assert!(
@@ -64,7 +64,8 @@ fn meshes_are_closed_and_hold_the_water() {
     }
     let [ply, obj] = ["m.0002.ply", "m.0002.obj"].map(|name| mesh(&job.path("out").join(name)));
     assert_eq!(ply.triangles, obj.triangles);
-    // The control: a triangle less is open, and a turned mesh holds less than nothing.
+    // Negative control: a missing triangle opens the mesh, and an inverted mesh has a
+    // negative volume.
     let bytes = fs::read(job.path("out/m.0002.ply")).unwrap();
     let count = format!("element face {}", ply.triangles.len());
     let fewer = format!("element face {}", ply.triangles.len() - 1);
@@ -80,7 +81,7 @@ fn meshes_are_closed_and_hold_the_water() {
     assert!(!open.open_edges().is_empty());
 }
 
-/// The columns behind x y z nx ny nz of a PLY of ours.
+/// The columns after x y z nx ny nz of a PLY that we wrote.
 fn velocities(bytes: &[u8]) -> Vec<[f32; 3]> {
     let end = b"end_header\n";
     let start = bytes.windows(end.len()).position(|w| w == end).unwrap() + end.len();
@@ -101,7 +102,7 @@ fn vertices_go_as_the_particles_do() {
     let job = made();
     job.expect(0, "export cache --mesh m.%04d.ply --frames 1");
     let found = velocities(&fs::read(job.path("m.0001.ply")).unwrap());
-    // All go along x with 1 m/s; along y each with its number's thousandth.
+    // All particles move along x with 1 m/s, and along y with a thousandth of their number.
     assert!(
         found
             .iter()
@@ -158,7 +159,7 @@ fn grids_are_those_that_the_bake_kept() {
         fs::read(job.path("cache/grids/small.0003.vdb")).unwrap() != kept,
         "the control"
     );
-    // A bake that kept none has them by the scene's defaults.
+    // A bake that kept no grids gets them from the scene's defaults.
     let bare = made();
     bare.expect(0, "export cache --vdb g.%04d.vdb --frames 2");
     let parsed = vdb_rs::VdbReader::new(std::io::Cursor::new(
@@ -187,8 +188,8 @@ fn a_shot_names_its_layers_and_its_camera() {
     }
     assert!(job.path("s.0003.usda").is_file() && job.path("s.manifest.usda").is_file());
     assert!(!job.path("s.0002.usda").exists());
-    // More frames: the root follows, the layers stand.
-    // The shot's camera, read by a look, is the look's own.
+    // The shot's camera, read by a look, equals the look's own. The export of more frames below
+    // extends the root and keeps the layers.
     let text = crate::support::job::LOOK.replace("focal_length_mm = 35.0", "file = \"s.usda\"");
     let is_of_camera = |line: &&str| !line.starts_with("position") && !line.starts_with("target");
     let lines: Vec<_> = text.lines().filter(is_of_camera).collect();
@@ -204,7 +205,7 @@ fn a_shot_names_its_layers_and_its_camera() {
         assert!((own.position - again.position).length() < 1e-12);
         assert!((own.forward - again.forward).length() < 1e-12);
         assert!((own.up - again.up).length() < 1e-12);
-        // The layer has lengths in 32 bits.
+        // The layer stores lengths in 32 bits.
         assert!((own.focal / again.focal - 1.0).abs() < 3e-7);
     }
     let said = job.expect(0, "export cache --usd s.usda --look look.toml --frames 1-4");
@@ -224,7 +225,8 @@ fn a_shot_names_its_layers_and_its_camera() {
     assert!(layer.contains("faceVertexIndices.timeSamples") && !layer.contains("ids"));
 }
 
-/// Folders are called as they are written, and a root that anyone can read names its layers whatever they are called.
+/// Folder names are taken literally, and a root in text names its layers whatever
+/// characters they have.
 #[test]
 fn names_hold_what_file_systems_take() {
     let job = made();
@@ -252,14 +254,14 @@ fn names_hold_what_file_systems_take() {
     let root = String::from_utf8(made["take@2.usd"].clone()).unwrap();
     let layers = "[@@@./take@2.0001.usd@@@, @@@./take@2.0002.usd@@@]";
     assert!(root.contains(layers), "{root}");
-    // A reader finds what stands behind the names.
+    // A reader resolves the escaped names.
     let text =
         crate::support::job::LOOK.replace("focal_length_mm = 35.0", "file = \"100%#1/take@2.usd\"");
     let is_of_camera = |line: &&str| !line.starts_with("position") && !line.starts_with("target");
     let lines: Vec<_> = text.lines().filter(is_of_camera).collect();
     job.write("again.toml", &lines.join("\n"));
     job.expect(0, "inspect again.toml");
-    // The controls: a folder's place for a number is none, and what USD cannot name is refused.
+    // Negative controls: a number in a folder's name and names that USD cannot express are refused.
     job.expect_clear(2, "export cache --npy %04d/p.npy", "the file's name in");
     let words = ["export", "cache", "--usd", "two\nlines.usda"];
     let output = job.command("").args(words).output().unwrap();
@@ -270,7 +272,8 @@ fn names_hold_what_file_systems_take() {
     );
 }
 
-/// The first of the frames has the number that is asked for, in names and in USD; what is in the files is what it was.
+/// The first of the frames has the requested number, in names and in USD; the
+/// contents are unchanged.
 #[test]
 fn files_are_numbered_from_another_frame() {
     let job = made();
@@ -316,7 +319,7 @@ fn files_are_numbered_from_another_frame() {
         layer.contains("startTimeCode = 1003") && layer.contains("    1003: ["),
         "{layer}"
     );
-    // What the set does at a frame, the camera here, it does at its number.
+    // What the set does at a frame, here its camera, it does at the new number.
     let at = |text: &str, number: u32| {
         let before = format!("{number}: ( (");
         let line = text.lines().find(|line| line.trim().starts_with(&before));
@@ -331,7 +334,7 @@ fn files_are_numbered_from_another_frame() {
         );
     }
     assert_eq!(files(&job.path("shared")), moved);
-    // It goes on, and what stands there and is another frame is refused and stays.
+    // A repeated export resumes; an existing file of another frame is refused and kept.
     let said = job.expect(0, &words("moved", "--number-from 1001"));
     assert!(said.contains("0 files made"), "{said}");
     job.expect(
@@ -367,14 +370,14 @@ fn what_stands_whole_is_not_made_again() {
         said.contains("0 files made") && said.contains("8 stood"),
         "{said}"
     );
-    // Half a file, and one that is gone, are made again, with the same bytes.
+    // A truncated file and a missing one are made again, with the same bytes.
     let half = &first["m.0002.ply"][..1000];
     fs::write(job.path("out/m.0002.ply"), half).unwrap();
     fs::remove_file(job.path("out/p.0004.npy")).unwrap();
     let said = job.expect(0, words);
     assert!(said.contains("2 files made"), "{said}");
     assert_eq!(files(&job.path("out")), first);
-    // Made otherwise: refused, and nothing is touched.
+    // Other settings are refused, and nothing is touched.
     let said = job.expect(4, &format!("{words} --voxels 1"));
     assert!(
         said.contains("exported in another way") && said.contains("--overwrite"),
@@ -463,7 +466,8 @@ fn faults_are_one_clear_line() {
     clear(2, "export cache --usd s.usda --look look.toml", "gone.glb");
 }
 
-/// Film of 36 × 24 mm under an image of 16 : 9, at 35 mm: the camera of the file has the image's own part of it, in tenths of a metre.
+/// A film back of 36 × 24 mm with an image of 16 : 9, at 35 mm: the exported camera has the part of
+/// it that the image covers, in tenths of a scene unit (1 m).
 #[test]
 fn a_camera_s_fitted_film_is_exported() {
     let job = made();
@@ -473,7 +477,7 @@ fn a_camera_s_fitted_film_is_exported() {
         let text = fs::read_to_string(job.path(out)).unwrap();
         ["focalLength", "horizontalAperture", "verticalAperture"].map(|key| {
             let (_, behind) = text.split_once(key).unwrap();
-            // Of frames, the first one's.
+            // Of several frames, the first one's value.
             let from = behind.strip_prefix(".timeSamples = {").unwrap_or(behind);
             let value = from.trim_start_matches(" = ").trim();
             let value = value.strip_prefix("1: ").unwrap_or(value);
@@ -516,7 +520,7 @@ fn an_export_that_is_killed_leaves_whole_files_and_goes_on() {
     let words = "export cache --mesh out/m.%04d.ply --voxels 4";
     let begun = std::time::Instant::now();
     let mut process = job.command(words).spawn().unwrap();
-    // Some time in the middle, whatever the machine's speed: behind the first file.
+    // Waits for the first file, so that the kill falls in the middle on any machine.
     while !job.path("out/m.0001.ply").exists() && begun.elapsed().as_secs() < 60 {
         std::thread::sleep(std::time::Duration::from_millis(2));
     }

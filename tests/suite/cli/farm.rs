@@ -1,4 +1,4 @@
-//! What a render farm reads and sets: events, exit codes, logs, variables of the environment.
+//! The interface to render farms: events, exit codes, logs, environment variables.
 
 use std::{
     fs,
@@ -83,8 +83,9 @@ fn events_end_with_the_totals_of_each_command() {
     assert_eq!(named(&told, "result")[0]["frames"][0], 3);
 }
 
-/// What takes long by itself says that it has begun, and of how many parts it is: a frame, before it is told of, and whitewater's
-/// thresholds, before the first frame. Thresholds that a stream already has are none, and neither is a frame that stands there.
+/// Slow work reports its start and its number of parts: a frame, before its own event, and
+/// whitewater's thresholds, before the first frame. Thresholds that a stream already has and frames
+/// that already exist report none.
 #[test]
 fn parts_of_a_frame_and_of_a_calibration_are_told() {
     let job = Job::new();
@@ -117,13 +118,13 @@ fn parts_of_a_frame_and_of_a_calibration_are_told() {
         };
         let begun = of_frame("part").unwrap();
         assert!(begun < of_frame("frame").unwrap());
-        // Three samples, and one of the channel beside the picture.
+        // Three samples, and one for the channel beside the picture.
         let begun = &told[begun];
         assert_eq!((&begun["of"], &begun["done"]), (&"frame".into(), &0.into()));
         assert_eq!(begun["count"], 4);
     }
     assert!(named(&events(&job, 0, render), "part").is_empty());
-    // Lines for people say so of what comes before the first frame.
+    // The lines for people report what comes before the first frame as well.
     fs::remove_dir_all(job.path("cache/whitewater")).unwrap();
     let said = job.expect(0, white);
     assert_has(
@@ -165,7 +166,7 @@ fn a_fault_is_an_event_with_its_exit_code() {
     told(2, "study none.toml", "none.toml");
     told(2, "check none.toml", "none.toml");
     told(4, "whitewater none", "none");
-    // Those that are found while the arguments are read.
+    // Faults found while the arguments are parsed.
     told(2, "render cache", "--look");
     told(
         2,
@@ -178,7 +179,7 @@ fn a_fault_is_an_event_with_its_exit_code() {
     assert_eq!(totals(&all), [2, 0, 0], "what was done before");
     assert_eq!(all.last().unwrap()["bytes"], bytes_of(&job, &[1, 2]));
 
-    // The controls: streams that are not whole.
+    // Negative controls: streams that are not complete.
     let good = "{\"event\":\"error\",\"exit_code\":2,\"message\":\"m\"}\n\
         {\"event\":\"end\",\"exit_code\":2}\n";
     assert_eq!(fault(good, 2), None);
@@ -197,7 +198,7 @@ fn a_fault_is_an_event_with_its_exit_code() {
     assert!(fault(good, 0).is_some());
 }
 
-/// Bytes of exported arrays.
+/// Total size of exported arrays, bytes.
 fn bytes_of(job: &Job, frames: &[u32]) -> u64 {
     let length = |frame: &u32| {
         let file = job.path(&format!("p.{frame:04}.npy"));
@@ -206,7 +207,7 @@ fn bytes_of(job: &Job, frames: &[u32]) -> u64 {
     frames.iter().map(length).sum()
 }
 
-/// A reader that goes away in the middle costs no picture, and is told by the exit code.
+/// A reader that closes the pipe costs no picture, and the exit code reports it.
 #[cfg(unix)]
 #[test]
 fn events_that_cannot_be_written_are_exit_code_4() {
@@ -228,7 +229,7 @@ fn events_that_cannot_be_written_are_exit_code_4() {
     assert_eq!(totals(&told), [0, 4, 0], "all were rendered");
 }
 
-/// A log's lines without their times, each of which has to be one.
+/// A log's lines without their times, whose format is checked.
 fn logged(job: &Job, file: &str) -> Vec<String> {
     let text = fs::read_to_string(job.path(file)).unwrap();
     let lines = text.lines().map(|line| {
@@ -257,7 +258,7 @@ fn a_log_has_what_was_said_and_how_it_ended() {
         .collect();
     assert_eq!(first, wanted);
     assert!(said.lines().any(|line| line.starts_with("frame    2")));
-    // Behind what is there, whatever goes to the terminal, and faults as well.
+    // Later runs append to the log, whatever goes to the terminal, including errors.
     for (code, words) in [
         (
             0,
@@ -297,7 +298,7 @@ fn a_log_has_what_was_said_and_how_it_ended() {
     }
 }
 
-/// Runs with variables set; gives what was said.
+/// Runs a command with variables set and returns its output.
 fn with(job: &Job, variables: &[(&str, &str)], code: i32, words: &str) -> String {
     let mut command = job.command(words);
     let output = command.envs(variables.iter().copied()).output().unwrap();
@@ -314,7 +315,7 @@ fn the_environment_names_adapter_and_caches() {
     let bake = "bake small.toml --device cpu --frames 1";
     with(&job, &caches, 0, bake);
     assert!(root.join("small/pbf/manifest.json").exists() && !job.path("cache").exists());
-    // -o wins, and a variable that is empty is none.
+    // -o takes precedence, and an empty variable counts as unset.
     with(&job, &caches, 0, &format!("{bake} -o other"));
     assert!(job.path("other/manifest.json").exists());
     with(&job, &[("SWELL_CACHE", "")], 0, bake);
@@ -330,13 +331,13 @@ fn the_environment_names_adapter_and_caches() {
     ] {
         let said = with(&job, &none, 2, words);
         assert_has(&said, &["no adapter `999`"]);
-        // The flag wins.
+        // The flag takes precedence.
         if !words.contains("new") {
             with(&job, &none, 0, &format!("{words} --adapter 0"));
         }
     }
     assert!(!job.path("new").exists());
-    // Where no adapter is wanted, it is of no account.
+    // Commands that use no adapter ignore it.
     for words in [
         "bake small.toml --device cpu --frames 1 -o third",
         "inspect other",

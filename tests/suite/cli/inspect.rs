@@ -23,8 +23,8 @@ fn inspect_shows_plan_and_frames() {
     assert!(shown("inspect --adapters").contains("max_storage_buffer_binding_size"));
 }
 
-/// What passes and buffers are there for: counts and bytes without a device's work, milliseconds with it; an effect that is not named
-/// has no line.
+/// The purposes of passes and buffers: counts and bytes without running a device, milliseconds with
+/// it; an effect that the scene does not name has no line.
 #[test]
 fn inspect_says_what_each_part_takes() {
     let job = Job::new();
@@ -64,7 +64,7 @@ fn inspect_says_what_each_part_takes() {
         job.expect(2, "inspect small.toml --time 0")
             .contains("--time")
     );
-    // Of 8 frames; the last that is possible was not refused above.
+    // Of 8 frames; 7, the largest valid count, was not refused above.
     let said = job.expect(2, "inspect small.toml --time 8");
     let expected = "--time 8: small.toml has 8 frames, and the first is not timed: \
         up to 7 are possible; raise shot.frames";
@@ -104,7 +104,7 @@ fn inspect_shows_the_passes_that_render_runs() {
     assert_ne!(column(&bare, "pass "), passes, "the control");
     assert!(column(&of_cache, "texture ").contains(&"shadow_map".to_owned()));
 
-    // What is timed is what was planned, and timing changes no picture.
+    // The timed passes are the planned ones, and timing changes no picture.
     let render = "render cache --look look.toml --progress none";
     let timed = job.expect(0, &format!("{render} -o timed --time-passes"));
     assert_eq!(column(&format!("pass \n{timed}"), "pass "), passes);
@@ -128,7 +128,8 @@ fn inspect_shows_the_passes_that_render_runs() {
     job.expect(4, "inspect look.toml --scene missing");
 }
 
-/// What a study runs, and what one file is: as a user reads it and for programs; what is torn says so.
+/// The runs of a study and the contents of a single file, for people and for programs; a torn
+/// file is reported.
 #[test]
 fn inspect_knows_studies_frames_meshes_grids_and_pictures() {
     let job = Job::new();
@@ -253,7 +254,7 @@ fn inspect_knows_studies_frames_meshes_grids_and_pictures() {
     );
 }
 
-/// Names that a look and a scene take of USD and glTF; what is not read is told of.
+/// Names of USD and glTF objects that a look and a scene may use; unread parts are reported.
 #[test]
 fn inspect_names_cameras_and_what_moves() {
     let job = Job::of(&[]);
@@ -292,7 +293,7 @@ fn inspect_names_cameras_and_what_moves() {
             "warning: prim /set takes parts from elsewhere",
         ],
     );
-    // A look says from where in such a file its camera is taken.
+    // A look states where in such a file its camera comes from.
     let plate = include_str!("../../../src/scene/look/usd_camera/plate.usda");
     write("plate.usda", plate);
     for (start, words) in [

@@ -1,4 +1,5 @@
-//! The whole program as a user runs it: bake, resume, verify, render; exit codes; what stays untouched.
+//! The whole program as a user runs it: bake, resume, verify, render; exit codes; which
+//! files stay untouched.
 
 use std::{
     fs,
@@ -119,7 +120,7 @@ fn a_missed_projection_is_told_and_past_its_limit_ends_the_bake() {
     job.expect(0, "verify ended");
 }
 
-/// What a study stands on is gone on with, and its page stands alone.
+/// A study resumes from existing results, and its page needs no other files.
 #[test]
 fn a_study_bakes_renders_measures_and_tells() {
     let job = Job::new();
@@ -138,7 +139,7 @@ fn a_study_bakes_renders_measures_and_tells() {
     for solver in ["pbf", "flip"] {
         job.expect(0, &format!("verify out/cache/{solver}"));
     }
-    // Again: nothing is baked or rendered twice, and what is written is the same.
+    // Again: nothing is baked or rendered twice, and the output is the same.
     let said = job.expect(0, "study study.toml -o out");
     assert!(said.contains("nothing left to bake"), "{said}");
     assert!(
@@ -146,7 +147,7 @@ fn a_study_bakes_renders_measures_and_tells() {
         "{said}"
     );
     assert_eq!((read("results.csv"), read("index.html")), (csv, page));
-    // Damage in its caches ends it by name, and so does another look.
+    // Damage in its caches ends the study with the file's name, and so does another look.
     let assets = job.path("out/cache/pbf/assets");
     let mesh = fs::read_dir(&assets).unwrap().next().unwrap().unwrap();
     for file in [
@@ -166,7 +167,7 @@ fn a_study_bakes_renders_measures_and_tells() {
     let said = job.expect(4, "study study.toml -o out");
     assert!(said.contains("another look"), "{said}");
     job.edit("look.toml", "24.0", "35.0");
-    // A cache of another scene is left alone.
+    // A cache of another scene is left untouched.
     job.edit("small.toml", "cell_size = 0.2", "cell_size = 0.25");
     let said = job.expect(4, "study study.toml -o out");
     assert!(said.contains("solver.flip.cell_size"), "{said}");
@@ -178,7 +179,7 @@ fn a_study_bakes_renders_measures_and_tells() {
     );
 }
 
-/// Long enough to be caught in the act.
+/// Long enough to be interrupted while it runs.
 const LONG: &str = "--set shot.frames=400";
 
 #[cfg(unix)]
@@ -251,7 +252,7 @@ fn a_cache_of_another_scene_is_left_alone() {
     job.expect(4, "bake small.toml -o mine");
     assert_eq!(fs::read_dir(job.path("mine")).unwrap().count(), 1);
     assert_eq!(job.hash("cache"), before);
-    // Not physics: a longer shot, and when to give up.
+    // Not physics: a longer shot, and the limit of substeps.
     job.edit("box.obj", "v 0.3 1.1 0.9", "v 0.3 1.0 0.9");
     job.edit("small.toml", "frames = 8", "frames = 3");
     job.expect(
@@ -320,7 +321,7 @@ fn faults_end_with_their_code_and_write_nothing() {
         "[effects]",
         "[solver.flip]\ncell_size = 0.2\n[effects]",
     );
-    // Too fast for the substeps that the scene allows: the numbers fail, and the start is kept.
+    // Too fast for the substeps that the scene allows: the frame fails, and the start is kept.
     let said = job.expect(
         5,
         "bake small.toml -o fast --set solver.pbf.max_substeps=1 --set water.gravity=[0,-2000,0]",
@@ -340,7 +341,7 @@ fn faults_end_with_their_code_and_write_nothing() {
     assert_eq!(entries(), before);
 }
 
-/// No driver at all: the code and the packages to install.
+/// Without any driver: the exit code, and the packages to install.
 #[cfg(target_os = "linux")]
 #[test]
 fn no_adapter_names_the_package() {
@@ -356,7 +357,8 @@ fn no_adapter_names_the_package() {
     assert!(said.contains("mesa-vulkan-drivers"), "{said}");
 }
 
-/// The table of exit codes in docs/commands.md: what is not there is a cache's fault, a scene's where it is named like one.
+/// The table of exit codes in docs/commands.md: a missing path is a cache's fault, or a scene's if
+/// it is named like one.
 #[test]
 fn what_is_missing_ends_as_the_table_says() {
     let job = Job::new();
@@ -379,7 +381,7 @@ fn what_is_missing_ends_as_the_table_says() {
     }
 }
 
-/// A check that had nothing to compare is not one that passed.
+/// A check that had nothing to compare does not pass.
 #[test]
 fn a_check_without_water_is_refused() {
     let job = Job::new();
@@ -391,7 +393,8 @@ fn a_check_without_water_is_refused() {
     }
 }
 
-/// Which substep is checked is said; one that the frame does not have is refused with how many there are.
+/// The output states which substep is checked; the refusal of a substep beyond the frame's last
+/// states their number.
 #[test]
 fn a_check_takes_any_substep_of_a_frame() {
     let job = Job::new();
@@ -435,8 +438,8 @@ fn a_new_look_leaves_the_cache_as_it_is() {
     assert!(!job.path("wide/small.0003.png").exists());
     assert!(job.path("day/small.0003.exr").exists());
 
-    // What stands there with the same hashes is left; a torn picture is made again; one of another look is
-    // with --overwrite.
+    // Existing pictures with the same hashes are kept; a torn picture is made again; one of another
+    // look is replaced with --overwrite.
     let first = png("day", 1);
     assert!(
         job.expect(0, "render cache --look look.toml -o day")
@@ -452,7 +455,8 @@ fn a_new_look_leaves_the_cache_as_it_is() {
     assert!(said.contains("4 frames rendered"), "{said}");
     assert_ne!(png("day", 1), first);
 
-    // A cache moved elsewhere renders alike; a missing frame, a damaged one and a strange target are errors.
+    // A cache moved elsewhere renders the same; a missing frame, a damaged one and a foreign
+    // target are errors.
     fs::rename(job.path("cache"), job.path("moved")).unwrap();
     job.expect(0, "render moved --look look.toml -o again --frames 1");
     assert_eq!(png("again", 1), first);

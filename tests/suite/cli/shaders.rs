@@ -1,4 +1,5 @@
-//! `--shaders DIR`: an edited shader changes what it is said to change and is recorded; the shipped ones are no edit.
+//! `--shaders DIR`: an edited shader has its effect and is recorded; the shipped shaders
+//! count as unedited.
 
 use std::fs;
 
@@ -25,7 +26,7 @@ fn comment(job: &Job, folder: &str) {
     );
 }
 
-/// A substep that is too long for the particles.
+/// Makes a substep too long for the particles.
 fn overshoot(job: &Job, folder: &str) {
     job.edit(
         &format!("{folder}/pbf/predict.wgsl"),
@@ -60,16 +61,16 @@ fn a_bake_by_edited_shaders_is_recorded_and_not_resumed_by_others() {
             "{shown}"
         );
     }
-    // The shipped text from a folder is the shipped program.
+    // The shipped shaders, read from a folder, are the shipped program.
     assert_eq!(job.hash("plain"), job.hash("by-same"));
     assert_eq!(recorded(&job, "plain"), None);
     let (comment, edit) = (recorded(&job, "by-comment"), recorded(&job, "by-edit"));
     assert!(comment.is_some() && edit.is_some() && comment != edit);
-    // What differs is the record alone, and then the water.
+    // A comment changes only the record, an edit also the water.
     assert_ne!(job.hash("plain"), job.hash("by-comment"));
     assert_eq!(job.hash("plain/frames"), job.hash("by-comment/frames"));
     assert_ne!(job.hash("plain/frames"), job.hash("by-edit/frames"));
-    // Resumed by the same shaders alone.
+    // Only the same shaders can resume a bake.
     for (cache, shaders, words) in [
         ("by-edit", "", 2),
         ("by-edit", "--shaders comment", 1),
@@ -109,7 +110,7 @@ fn a_check_says_whose_shaders_it_ran() {
     assert_has(&said, &["not the shipped ones"]);
 }
 
-/// Rays have a pass mark, splats are measured; depths that are a tenth too great are out.
+/// Rays have a pass mark, splats are measured; depths that are a tenth too large fail.
 #[test]
 fn surfaces_in_pictures_are_held_against_rays_in_f64() {
     let job = job(&["edit"]);
@@ -166,7 +167,7 @@ fn outlines_colour_and_flicker_of_pictures_are_told() {
         "store_light(out, vec4f(colour, alpha)",
         "store_light(out, vec4f(0.2 * colour, alpha)",
     );
-    // Frames stand a sixtieth of a second apart.
+    // Frames are a sixtieth of a second apart.
     job.edit(
         "flashing/ssfr/shade.wgsl",
         "store_light(out, vec4f(colour, alpha)",
@@ -210,7 +211,7 @@ fn outlines_colour_and_flicker_of_pictures_are_told() {
         "{flashing}"
     );
     assert_eq!(of(&flashing, 1, "flicker"), of(&found, 1, "flicker"));
-    // A picture that flashes is off the mean of its neighbours by that, whatever the truth does.
+    // A flashing picture is off the mean of its neighbours by the flash, whatever the truth does.
     assert!(of(&flashing, 0, "residual") > 3.0 * of(&found, 0, "residual"));
     assert_eq!(of(&flashing, 1, "residual"), of(&found, 1, "residual"));
     let said = job.expect(0, &asked);
@@ -225,12 +226,12 @@ fn outlines_colour_and_flicker_of_pictures_are_told() {
         ],
     );
     assert_has(&job.expect(2, "check cache --flicker"), &["--render"]);
-    // The last frame has none after it.
+    // The last frame has no successor.
     assert_has(&job.expect(4, &format!("{asked} --frames 3")), &["4"]);
 }
 
-/// Pictures that are checked are drawn from the frames that rendered ones are drawn from: one more in the cache changes what is spray,
-/// and nothing where there is none.
+/// `check` draws pictures from the same frames as `render`: one more frame in the cache changes
+/// what is spray, and changes nothing where there is no spray.
 #[test]
 fn checked_pictures_are_drawn_from_the_frames_around_them() {
     let job = job(&[]);
@@ -321,7 +322,8 @@ fn a_folder_that_is_not_whole_or_does_not_compile_is_refused_with_its_place() {
     assert_has(&said, &["ssfr/shade of --shaders", "no_such"]);
 }
 
-/// What a pass binds and how it is laid out is the program's: an edit of that is refused before anything is written.
+/// The program fixes bindings and layouts: an edit that changes them is refused before
+/// anything is written.
 #[test]
 fn an_edit_that_the_program_cannot_bind_or_compose_is_refused_with_its_place() {
     let job = job(&["name", "layout", "shared", "import"]);
@@ -377,7 +379,8 @@ fn an_edit_that_the_program_cannot_bind_or_compose_is_refused_with_its_place() {
     }
 }
 
-/// A branch of such a cache by the shipped shaders says whose frames it began from, and so do pictures of both.
+/// A branch of such a cache by the shipped shaders records whose frames it began from, and so do
+/// pictures of both.
 #[test]
 fn what_follows_from_frames_of_edited_shaders_says_so() {
     let job = job(&["edit"]);

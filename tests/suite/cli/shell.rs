@@ -1,4 +1,4 @@
-//! What the program says of itself: version and build, completions, man pages.
+//! What the program says about itself: version and build, completions, man pages.
 
 use std::{
     fs,
@@ -8,7 +8,7 @@ use std::{
 
 use crate::support::job::{Job, assert_has};
 
-/// The build script, whose findings `swell --version` prints.
+/// The build script, whose results `swell --version` prints.
 #[path = "../../../build.rs"]
 #[allow(dead_code, reason = "cargo runs the rest")]
 mod build;
@@ -85,7 +85,7 @@ fn the_build_knows_its_commit_where_there_is_one() {
     git(root, "commit -q -a -m two");
     assert_eq!(build::commit(root), git(root, "rev-parse HEAD"));
     assert_ne!(build::commit(root), commit);
-    // An archive within another repository is none of its commits.
+    // An archive within another repository has none of its commits.
     assert_eq!(build::commit(&job.path("src")), unknown);
 }
 
@@ -98,7 +98,7 @@ fn completions_know_commands_and_options() {
         assert_has(&script, &["keep-going", "chunk"]);
     }
     assert_has(&job.expect(2, "completions tcsh"), &["tcsh", "bash"]);
-    // As bash itself has it, where there is one.
+    // Runs the completions in bash itself, if there is one.
     let mut bash = Command::new("bash");
     let tried = bash.arg("--version").stdout(Stdio::null()).status();
     if !tried.is_ok_and(|status| status.success()) {

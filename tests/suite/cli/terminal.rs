@@ -1,5 +1,5 @@
-//! What the program does with its surroundings: adapters that are not there, streams that cannot be written to, and paths
-//! that are no UTF-8. Each command as a process of its own.
+//! The program's environment: missing adapters, streams that cannot be written, and paths that are
+//! not UTF-8. Each command runs as a process of its own.
 
 use std::{
     ffi::OsStr,
@@ -12,7 +12,7 @@ use std::{
 
 use crate::support::job::{Job, LOOK, assert_has};
 
-/// A study that runs nothing: it holds that a scene is refused.
+/// A study that runs nothing: its only case is a refused scene.
 const REFUSAL: &str = r#"
 kind = "stability"
 [[case]]
@@ -32,7 +32,8 @@ fn baked() -> Job {
     job
 }
 
-/// How many adapters there are, and numbers that none of them has: the next one, and those in their names.
+/// The number of adapters, and indices that none of them has: the next one, and
+/// numbers in their names.
 fn numbers(job: &Job) -> (usize, Vec<String>) {
     let listed = job.expect(0, "inspect --adapters");
     let names: Vec<&str> = listed
@@ -65,10 +66,10 @@ fn an_adapter_that_is_not_there_is_refused_by_every_command() {
             "render cache/small/pbf --look look.toml -o new",
             "inspect small.toml",
             "study study.toml -o new",
-            // On the CPU alone, or on nothing: a name that is none is not passed over.
+            // Uses only the CPU, or no device: an unknown adapter is still an error.
             "study refusal.toml -o new",
         ];
-        // All of them once; of further numbers one.
+        // The first number runs all commands, further numbers one.
         for command in &commands[..if k == 0 { commands.len() } else { 1 }] {
             let said = job.expect(2, &format!("{command} --adapter {number}"));
             assert_has(&said, &[&format!("no adapter `{number}`"), "\n  0: "]);
@@ -78,17 +79,17 @@ fn an_adapter_that_is_not_there_is_refused_by_every_command() {
         }
     }
     assert_eq!(job.hash("cache"), before);
-    // Controls: the number of one that is there, and a device that a study cannot name.
+    // Negative controls: the index of an existing adapter, and a device that a study cannot name.
     job.expect(0, "check small.toml --adapter 0");
     job.write("device.toml", &REFUSAL.replace("\"cpu\"", "\"5\""));
     let said = job.expect(2, "study device.toml");
     assert_has(&said, &["case[0].devices[0]", "\"5\" is no device"]);
-    // What a cache was baked on is in the cache.
+    // The cache records the adapter that it was baked on.
     let said = job.expect(2, "inspect cache/small/pbf --adapter 0");
     assert_has(&said, &["--adapter is for scenes"]);
 }
 
-/// A device that takes no byte.
+/// A device that rejects every byte.
 fn full() -> File {
     OpenOptions::new().write(true).open("/dev/full").unwrap()
 }
@@ -130,7 +131,7 @@ fn standard_output_that_takes_nothing_is_exit_code_4() {
         );
     }
     assert!(job.path("b/small.0001.png").exists() && job.path("s/index.html").exists());
-    // A graver fault than that keeps its code: usage, and a cache that is not there.
+    // A more serious fault keeps its exit code: usage errors, and a missing cache.
     for (code, command) in [
         (2, "bake none.toml --progress json"),
         (4, "verify none"),
@@ -151,7 +152,7 @@ fn standard_error_that_takes_nothing_ends_no_work() {
         ),
         (4, "render cache/small/pbf --look look.toml -o c --frames 1"),
         (4, "study refusal.toml -o s"),
-        // What went wrong cannot be said, and its code says it.
+        // The fault cannot be printed, but its exit code is kept.
         (2, "bake none.toml"),
         (2, "bake small.toml --frames none"),
         (0, "verify cache/small/pbf"),
@@ -184,14 +185,14 @@ fn a_closed_pipe_is_no_fault() {
         (0, "inspect small.toml"),
         (0, "verify cache/small/pbf"),
         (0, "diff cache/small/pbf cache/small/pbf --json"),
-        // The result is the exit code, whoever reads.
+        // The result is the exit code, whether or not anyone reads the output.
         (1, "diff cache/small/pbf other"),
     ] {
         let (found, said) = closed(command);
         assert_eq!(found, Some(code), "{command}: {said}");
         assert!(!said.contains("cannot write"), "{said}");
     }
-    // Events are promised whole.
+    // Events must be complete, so a closed pipe is an error.
     for command in [
         "bake small.toml -o json --device cpu --frames 1-2 --progress json",
         "study refusal.toml -o s --progress json",
@@ -210,7 +211,7 @@ fn latin(job: &Job, name: &[u8]) -> PathBuf {
     folder.join(OsStr::from_bytes(name))
 }
 
-/// Runs a command with paths between its words, where `@` stands.
+/// Runs a command with paths inserted at each `@` of its words.
 fn with_paths(job: &Job, words: &str, paths: &[&PathBuf]) -> String {
     let mut command = Command::new(env!("CARGO_BIN_EXE_swell"));
     command.current_dir(job.folder.path());
@@ -267,7 +268,7 @@ fn paths_need_not_be_utf_8() {
         let end: serde_json::Value = serde_json::from_str(told.lines().last().unwrap()).unwrap();
         assert!(end["directory"].as_str().unwrap().contains(lossy), "{told}");
     }
-    // With difference images, whose paths are told as well.
+    // With difference images, whose paths are printed as well.
     let words = "diff @ @ -o @ --json";
     let same = with_paths(&job, words, &[&pictures, &more, &path("difference")]);
     let same: serde_json::Value = serde_json::from_str(&same).unwrap();

@@ -20,7 +20,7 @@ use crate::support::{
     made_cache::{Made, write_cache},
 };
 
-/// A picture that no other frame or folder has, down to each pixel.
+/// A picture whose every pixel differs from that of any other frame or folder.
 fn picture(size: [usize; 2], frame: u32, folder: u8) -> Rgb {
     let pixel = |k: usize| {
         let (x, y) = (k % size[0], k / size[0]);
@@ -42,7 +42,7 @@ fn write(job: &Job, folder: &str, frames: impl Iterator<Item = u32>, size: [usiz
     }
 }
 
-/// Twelve frames of 64 × 36.
+/// Twelve frames of 64 × 36 pixels.
 fn made() -> Job {
     let job = Job::of(&[]);
     write(&job, "day", 1..=12, [64, 36]);
@@ -62,14 +62,14 @@ fn decoded(bytes: &[u8]) -> Rgb {
     }
 }
 
-/// What the page's script reads.
+/// The data that the page's script reads.
 fn data(page: &Path) -> Value {
     let text = fs::read_to_string(page).unwrap();
     let begin = text.find("id=\"data\">").unwrap() + "id=\"data\">".len();
     serde_json::from_str(text[begin..].split("</script>").next().unwrap()).unwrap()
 }
 
-/// Pictures of a page, one list a folder.
+/// Pictures of a page, one list per folder.
 fn shown(page: &Path) -> Vec<Vec<Rgb>> {
     let bytes = |address: &Value| {
         let address = address.as_str().unwrap();
@@ -106,7 +106,7 @@ fn a_folder_becomes_a_sheet_and_a_page() {
     assert_ne!(frames[0][3], wanted[4], "the control");
     assert_eq!(data(&page)["labels"][11], "12");
     assert_eq!(data(&page)["rate"], 24.0);
-    // Two rows of six, each where its number stands below it.
+    // Two rows of six pictures, each above its number.
     let sheet = decoded(&fs::read(job.path("views/day/sheet.png")).unwrap());
     let at = |k: usize| {
         let [x, y] = [16 + k % 6 * 80, 58 + k / 6 * 74];
@@ -117,7 +117,7 @@ fn a_folder_becomes_a_sheet_and_a_page() {
         assert!(at(k) == picture.pixels, "{k}");
     }
     assert!(at(2) != wanted[3].pixels, "the control");
-    // Again: what is ours is made anew, and nothing else is left.
+    // Again: our own files are rewritten, and nothing else is left.
     job.expect(0, "view day --pictures beside");
     assert_eq!(shown(&page), [wanted]);
     assert!(job.path("views/day/pictures/a.0012.png").is_file());
@@ -199,7 +199,7 @@ fn two_folders_share_their_frames() {
     let movie = decoded(&fs::read(job.path("both.apng")).unwrap());
     let dusk = picture([32, 18], 4, 4).resized([64, 36]);
     assert_eq!(movie, picture([64, 36], 4, 3).beside(&dusk));
-    // Folders of one name are told apart.
+    // Folders with the same name are distinguished.
     write(&job, "a/day", 1..=3, [64, 36]);
     job.expect(0, "view day a/day --player -o out");
     let names = data(&job.path("out/index.html"));
@@ -246,7 +246,7 @@ fn light_is_shown_through_a_view() {
     let look = swell::scene::look::Look::load(&job.path("look.toml")).unwrap();
     let wanted = |view: &ViewSpec| {
         let pixel = |p: &[f32; 4]| {
-            // Half keeps 11 bits.
+            // Half floats keep 11 bits.
             let half = |x: f32| half::f16::from_f32(x).to_f32();
             match p[3] {
                 0.0 => [0; 3],
@@ -265,7 +265,7 @@ fn light_is_shown_through_a_view() {
     let frames = shown(&job.path("looked/index.html"));
     assert_eq!(frames[0][0].pixels, wanted(&look.spec().view));
     assert_ne!(wanted(&plain), wanted(&look.spec().view), "the control");
-    // A PNG of the same frame is what its look shows, and is taken.
+    // A PNG of the same frame already has its look applied, and takes precedence.
     let png = picture([8, 4], 9, 9).to_png("a test").unwrap();
     fs::write(job.path("exr/shot.0001.png"), png).unwrap();
     job.expect(0, "view exr --player -o png");
@@ -283,7 +283,7 @@ fn curves_of_a_cache_stand_below_its_pictures() {
     job.expect(0, "view day --curves cache");
     let page = job.path("views/day/index.html");
     let text = fs::read_to_string(&page).unwrap();
-    // Two probes, and energy, speed and density error of the ledger.
+    // Two probes, and energy, speed and density error from the ledger.
     assert_eq!(text.matches("<figure").count(), 5);
     assert_has(
         &text,
@@ -299,7 +299,7 @@ fn curves_of_a_cache_stand_below_its_pictures() {
     for (k, time) in found["times"].as_array().unwrap().iter().enumerate() {
         assert_eq!(time.as_f64(), Some((k + 1) as f64 / 60.0));
     }
-    // Pictures that say that they are of this cache, and of another.
+    // Pictures that are marked as made from this cache, and from another.
     let cache = CacheReader::open(&job.path("cache")).unwrap();
     let image = light();
     for (folder, hash) in [("own", cache.frame_hash(2).unwrap()), ("other", "0123")] {
@@ -325,7 +325,7 @@ fn curves_of_a_cache_stand_below_its_pictures() {
     );
 }
 
-/// Pixels of a picture that are nearer to white than to the ground.
+/// Counts the pixels of a picture that are closer to white than to the background.
 fn bright(picture: &Rgb) -> usize {
     picture
         .pixels
@@ -359,8 +359,9 @@ fn a_cache_shows_its_particles() {
             .count(),
         5
     );
-    // The block slides along x with 1 m/s, the fastest colour: 16.7 mm a frame. 2 m of the domain and margins of 3 % are as high as
-    // wide; the picture is cut to three quarters, so that 720 − 57.6 rows are 2 m.
+    // The block slides along x with 1 m/s, the fastest colour: 16.7 mm per frame. 2 m of the domain
+    // with margins of 3 % are as high as wide; the picture is cropped to three quarters, so that
+    // 720 − 57.6 rows are 2 m.
     let frames = &shown(&page)[0];
     let middle = |picture: &Rgb| {
         let white = picture
@@ -374,7 +375,7 @@ fn a_cache_shows_its_particles() {
     let moved = middle(&frames[4]) - middle(&frames[0]);
     let hold = 4.0 / 60.0 * (720.0 - 57.6) / 2.0;
     assert!((moved - hold).abs() < 1.0, "{moved} {hold}");
-    // 0.8 m by 1 m of balls without gaps from the side, each darker to its rim.
+    // From the side, 0.8 m by 1 m of balls without gaps, each darker towards its rim.
     let area = bright(&frames[0]) as f64 / (331.2 * 331.2);
     assert!((0.5..0.85).contains(&area), "{area}");
     // From above they are 0.8 m by 1 m too, and the domain is 2 m by 1 m.
@@ -411,7 +412,7 @@ fn two_caches_share_place_colours_and_charts() {
     );
     let page = job.path("both/index.html");
     let frames = shown(&page);
-    // A quarter of the greatest speed is blue; alone it is white.
+    // A quarter of the shared maximum speed is blue; a cache of its own shows the same speed white.
     assert!(bright(&frames[0][0]) == 0 && bright(&frames[1][0]) > 10_000);
     job.expect(0, "view a --player -o alone");
     assert!(
@@ -512,7 +513,7 @@ fn faults_are_one_clear_line() {
     .unwrap();
     clear(2, "view day", "are both frame 1");
     fs::remove_file(job.path("day/shot.00001.png")).unwrap();
-    // Nothing of another's is written over, and nothing into a cache.
+    // Another program's files are not overwritten, and nothing is written into a cache.
     fs::create_dir(job.path("study")).unwrap();
     fs::write(job.path("study/index.html"), "a study").unwrap();
     clear(2, "view day -o study", "choose another -o");

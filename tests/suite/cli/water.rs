@@ -1,4 +1,5 @@
-//! How much water a scene holds, as `inspect` and a bake say it: asked for and made, none, too much, and in open meshes.
+//! How much water a scene holds, as `inspect` and a bake report it: requested and made, none, too
+//! much, and in open meshes.
 
 use crate::support::job::{Job, assert_has};
 
@@ -42,7 +43,7 @@ fn the_volume_that_is_made_stands_beside_the_one_asked_for() {
     assert!(!said.contains("warning"), "{said}");
     assert_has(&job.expect(0, &format!("{BAKE} -o whole")), &[told]);
 
-    // 0.37 m: of 3.7 layers four.
+    // 0.37 m: 3.7 layers are rounded to four.
     job.edit(
         "water.toml",
         "max = [0.8, 0.4, 0.8]",
@@ -67,7 +68,7 @@ fn the_volume_that_is_made_stands_beside_the_one_asked_for() {
         &said,
         &["256 particles at the start, 0.2560 m³ of water of 0.2368 m³ asked for"],
     );
-    // What begins from a frame asks for nothing.
+    // A bake that begins from a frame requests no water.
     let said = job.expect(
         0,
         "bake water.toml --device cpu --frames 2 --from off:1 -o branch",
@@ -132,7 +133,7 @@ fn a_scene_without_water_is_told_of() {
         job.json(0, &format!("inspect water.toml {dry}"))["particles"],
         0
     );
-    // One is one.
+    // One particle gives the singular.
     let one = format!("{dry} --set water.particles=[{{at=[[0.4,0.4,0.4]]}}]");
     let said = job.expect(0, &format!("inspect water.toml {one}"));
     assert_has(&said, &["1 particle ("]);
@@ -157,7 +158,7 @@ fn a_scene_without_water_is_told_of() {
     }
     let denied = job.expect(2, "inspect water.toml --deny lint");
     assert_has(&denied, &["denied by --deny lint", covered]);
-    // Control: half of it.
+    // Negative control: half of it.
     job.edit(
         "water.toml",
         "mesh = \"box.obj\"",
@@ -170,12 +171,12 @@ fn a_scene_without_water_is_told_of() {
     );
 }
 
-/// From -0.1 to 0.9 m, but for its height: 0.7 m.
+/// From -0.1 to 0.9 m, except for its height: 0.7 m.
 const BOX: &str = "v -0.1 -0.1 -0.1\nv 0.9 -0.1 -0.1\nv 0.9 0.7 -0.1\nv -0.1 0.7 -0.1\n\
     v -0.1 -0.1 0.9\nv 0.9 -0.1 0.9\nv 0.9 0.7 0.9\nv -0.1 0.7 0.9\n\
     f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 4 8 7 3\nf 1 5 8 4\nf 2 3 7 6\n";
 
-/// A full box into which a sixteenth more water comes: 32 particles to 512.
+/// A full box into which a sixteenth more water flows: 32 particles to 512.
 #[test]
 fn an_overfull_box_is_told_of_from_five_per_cent_on() {
     let job = job();
@@ -196,10 +197,10 @@ fn an_overfull_box_is_told_of_from_five_per_cent_on() {
         let bake = format!("bake water.toml --device cpu --solver {solver}");
         let said = job.expect(0, &format!("{bake} -o {solver}"));
         assert_has(&said, &[overfull]);
-        // FLIP's densities see it as well, in each frame.
+        // FLIP's densities show it as well, in each frame.
         let dense = "the water is 6 % too dense on average: its volume is not kept";
         assert_eq!(said.contains(dense), solver == "flip", "{said}");
-        // Control: half as much.
+        // Negative control: half as much.
         let said = job.expect(0, &format!("{bake} --frames 1-8 -o {solver}-less"));
         assert!(
             !said.contains("overfull") && !said.contains("too dense"),
@@ -235,7 +236,7 @@ fn water_in_an_open_mesh_is_told_of() {
         };
         assert_has(warning, &[open, container]);
     }
-    // Control: water beside it.
+    // Negative control: water beside it.
     job.edit(
         "water.toml",
         "max = [0.8, 0.4, 0.8]",
@@ -243,7 +244,7 @@ fn water_in_an_open_mesh_is_told_of() {
     );
     let said = job.expect(0, "inspect water.toml");
     assert!(said.contains(open) && !said.contains("container"), "{said}");
-    // As water it is full.
+    // As a water mesh it is full.
     let water = "--set solid=[] --set water.mesh=[{file=\"cup.obj\"}]";
     let said = job.expect(0, &format!("inspect water.toml {water}"));
     assert_has(&said, &[open, "water fills this container up to there"]);

@@ -1,4 +1,4 @@
-//! Shares of a range, frames that are damaged, workers that are killed.
+//! Shares of a range, damaged frames, killed workers.
 
 use std::{collections::BTreeMap, fs, process::Stdio};
 
@@ -33,10 +33,10 @@ fn a_damaged_frame_is_told_and_the_others_are_rendered() {
     let good = whole.clone();
     whole.retain(|name, _| !name.contains("0002"));
     assert!(pictures(&job.path("day")) == whole && good.len() == whole.len() + 2);
-    // The control: without the flag the frames behind it are not.
+    // Negative control: without the flag the frames after it are not rendered.
     let told = events(&job, 4, &format!("{render} stopped"));
     assert_eq!(totals(&told), [1, 0, 0]);
-    // A frame that is gone is the same, and so is one of a stream.
+    // A missing frame is treated the same, and so is one of a stream.
     fs::remove_file(&frame).unwrap();
     let said = job.expect(4, &format!("{render} day --keep-going"));
     assert_has(
@@ -47,7 +47,7 @@ fn a_damaged_frame_is_told_and_the_others_are_rendered() {
     let told = events(&job, 0, &format!("{render} day --keep-going"));
     assert_eq!(totals(&told), [1, 3, 0]);
     assert!(pictures(&job.path("day")) == good);
-    // A frame that was never baked is a wrong range, whatever is asked for.
+    // Frames that were never baked are a wrong range, with any flags.
     let said = job.expect(4, &format!("{render} more --keep-going --frames 3-9"));
     assert_has(&said, &["frames 0 to 4, not 5"]);
     assert!(!job.path("more").exists());
@@ -68,7 +68,7 @@ fn a_damaged_frame_is_told_and_the_others_are_exported() {
     damage(&job, 1);
     let said = job.expect(4, &format!("{export} --keep-going --overwrite"));
     assert_has(&said, &["2 frames failed: 1, 3", "2 failed"]);
-    // Bakes and whitewater need each frame before: nothing can go on without it.
+    // Bakes and whitewater need every earlier frame, so they cannot continue after a damaged one.
     job.expect(2, "whitewater cache --keep-going");
 }
 
@@ -108,7 +108,7 @@ fn shares_of_a_range_are_rendered_into_one_folder() {
     assert!(!job.path("new").exists() && !job.path("new.0001.npy").exists());
 }
 
-/// How often each frame was made, by what several workers told.
+/// Counts how often each frame was made, according to several workers' events.
 fn made_by(workers: &[Vec<Value>]) -> BTreeMap<u64, usize> {
     let mut made = BTreeMap::new();
     for frame in workers.iter().flat_map(|told| frames(told, "done")) {
@@ -117,7 +117,7 @@ fn made_by(workers: &[Vec<Value>]) -> BTreeMap<u64, usize> {
     made
 }
 
-/// The events of a worker that may have been killed while it told one.
+/// The complete events of a worker that may have been killed while it wrote one.
 #[cfg(unix)]
 fn told_by(output: &std::process::Output) -> Vec<Value> {
     let text = String::from_utf8_lossy(&output.stdout);
@@ -129,7 +129,8 @@ fn told_by(output: &std::process::Output) -> Vec<Value> {
         .collect()
 }
 
-/// Three workers on one render; one is killed and one is told to stop, each at a random time. SWELL_ROUNDS sets how often.
+/// Three workers on one render; one is killed and one is told to stop, each at a random time.
+/// SWELL_ROUNDS sets the number of rounds.
 #[cfg(unix)]
 #[test]
 fn workers_that_are_killed_and_stopped_cost_no_frame() {
@@ -159,7 +160,7 @@ fn workers_that_are_killed_and_stopped_cost_no_frame() {
                 command.spawn().unwrap()
             })
             .collect();
-        // Within the time that three take on one processor and more.
+        // Up to the time that one worker needs for all frames.
         let at = |k: u64| {
             alone
                 .mul_f64(0.5 + 0.5 * crate::support::noise(2 * round + k))
@@ -171,7 +172,7 @@ fn workers_that_are_killed_and_stopped_cost_no_frame() {
         for (when, signal, worker) in faults {
             std::thread::sleep(when.saturating_sub(begun.elapsed()));
             let id = workers[worker].id().to_string();
-            // One that is done is no longer there.
+            // A worker that has finished no longer exists.
             if workers[worker].try_wait().unwrap().is_none() {
                 std::process::Command::new("kill")
                     .args([signal, &id])
@@ -192,11 +193,12 @@ fn workers_that_are_killed_and_stopped_cost_no_frame() {
             made.values().all(|&many| many == 1),
             "round {round}: {made:?}"
         );
-        // Its last frame may have got its name, and the worker not come to telling it.
+        // The killed worker may have renamed its last frame without reporting it.
         assert!(made.len() as u32 + 1 >= last, "round {round}: {made:?}");
         let folder = job.path(&format!("round{round}"));
         if folder.join(".swell").exists() {
-            // One that was killed as the last to leave, or while the last left, cannot clear: the next to come does, and makes nothing.
+            // A worker killed while the last one leaves cannot clean up: the next to come does, and
+            // renders nothing.
             assert!(outputs[0].status.code().is_none(), "round {round}");
             let told = events(
                 &job,
@@ -214,7 +216,7 @@ fn workers_that_are_killed_and_stopped_cost_no_frame() {
         rounds < 20 || (killed > 0 && stopped > 0),
         "{killed} {stopped}"
     );
-    // The controls: a frame that two made, and a picture that is another.
+    // Negative controls: a frame that two workers made, and a picture that differs.
     let told = events(&job, 0, "render cache --look look.toml -o again");
     let twice = made_by(&[told.clone(), told]);
     assert!(twice.values().all(|&many| many == 2) && twice.len() as u32 == last);

@@ -1,5 +1,5 @@
-//! `swell diff` of caches and baselines: what differs is named, what does not passes, and every comparison fails
-//! when one side is spoiled.
+//! `swell diff` of caches and baselines: differences are reported, equal inputs pass, and every
+//! comparison fails when one side is spoiled.
 mod spread;
 mod streams;
 
@@ -10,7 +10,7 @@ use crate::support::made_cache::{Made, SCENE, write_cache};
 use serde_json::Value;
 use swell::domain::particles::Particles;
 
-/// The velocity of particle 123 from frame 3 on, the other way.
+/// Reverses the x velocity of particle 123 from frame 3 on.
 fn flipped(frame: u32, particles: &mut Particles) {
     if frame >= 3 {
         particles.velocity[123][0] *= -1.0;
@@ -51,12 +51,12 @@ fn equal_caches_are_equal_and_a_flipped_velocity_is_found() {
         (&"velocity".into(), &"bits".into())
     );
     assert_eq!(fault["parting"]["particle"], 123);
-    // The error of a velocity of 1 m/s turned round is 2 m/s; RMS over 800: 2/√800.
+    // A reversed velocity of 1 m/s has an error of 2 m/s; RMS over 800 particles: 2/√800.
     let deviation = &frames[3]["fields"][1]["deviation"];
     assert_eq!(deviation["max"], 2.0);
     let rms = deviation["rms"].as_f64().unwrap();
     assert!((rms - 2.0 / 800f64.sqrt()).abs() < 1e-12, "{rms}");
-    // Turned round is as fast: the kinetic energy does not see it, which is why particles are compared.
+    // The reversed velocity has the same kinetic energy, which is why particles are compared.
     let energies = &frames[3]["aggregates"];
     assert_eq!(energies[0]["kinetic_energy"], energies[1]["kinetic_energy"]);
     // The frames before are the same.
@@ -91,7 +91,7 @@ fn tolerances_come_from_a_file_and_judge_what_they_name() {
     job.write("other.toml", "[position]\nmax = 0\nrms = 0\np99 = 0\n");
     job.expect(0, "diff a b --tolerance other.toml");
 
-    // An aggregate on its own: a layer lifted raises the potential energy.
+    // An aggregate by itself: raising a layer raises the potential energy.
     let lift = |frame: u32, particles: &mut Particles| {
         if frame == 2 {
             particles.position[700][1] += 1.0;
@@ -182,7 +182,7 @@ fn ids_frames_and_settings_that_differ_are_told() {
         ],
     );
     assert_has(&job.expect(1, "diff b a"), &["frames in A alone: 4"]);
-    // Another setting alone is no fault.
+    // A different setting by itself is no fault.
     let made = Made {
         scene: &other,
         ..Made::default()
@@ -212,7 +212,7 @@ fn a_baseline_knows_its_adapter_by_hashes_and_others_by_aggregates() {
         &["by hashes", "within tolerance"],
     );
 
-    // Another adapter: by aggregates, which a turned velocity does not change.
+    // On another adapter aggregates are compared, which a reversed velocity does not change.
     let elsewhere = Made {
         device: "another device",
         spoil: &flipped,
@@ -227,7 +227,7 @@ fn a_baseline_knows_its_adapter_by_hashes_and_others_by_aggregates() {
             "no hashes of this adapter, but of a device",
         ],
     );
-    // On the adapter that it knows the same particles fail, by their hash.
+    // On the adapter of the baseline the same particles fail by their hash.
     write_cache(
         &job.path("spoiled"),
         &Made {
@@ -245,7 +245,7 @@ fn a_baseline_knows_its_adapter_by_hashes_and_others_by_aggregates() {
     );
     job.expect(0, "diff spoiled base.json --frames 0-2");
 
-    // Aggregates fail as well: the upper half of the water thrown up on another adapter.
+    // Aggregates fail as well: the upper half of the water is thrown up on another adapter.
     let thrown = |_: u32, particles: &mut Particles| {
         for position in &mut particles.position {
             position[1] += if position[1] > 1.0 { 0.5 } else { 0.0 };
@@ -275,7 +275,7 @@ fn a_baseline_knows_its_adapter_by_hashes_and_others_by_aggregates() {
         &["frame 2, the particles' hash"],
     );
 
-    // A second adapter is added beside the first, whose aggregates stay.
+    // A second adapter is added beside the first, whose aggregates are kept.
     let said = job.expect(0, "diff elsewhere --write-baseline base.json");
     assert_has(&said, &["hashes taken before and kept: a device"]);
     assert_has(
@@ -318,7 +318,7 @@ fn a_baseline_knows_its_adapter_by_hashes_and_others_by_aggregates() {
     ] {
         job.write("bad.json", text);
         assert_has(&job.expect(4, "diff b bad.json"), words);
-        // What is no baseline is not written over.
+        // A file that is no baseline is not overwritten.
         job.expect(4, "diff b --write-baseline bad.json");
         assert_eq!(fs::read_to_string(job.path("bad.json")).unwrap(), text);
     }
@@ -338,7 +338,7 @@ fn a_baked_cache_is_its_own_baseline_and_another_setting_is_not() {
     job.expect(0, "diff a b");
     job.expect(0, "diff a --write-baseline base.json");
     job.expect(0, "diff b base.json");
-    // A changed setting is named, and where it begins to show.
+    // The report names a changed setting and the frame where the difference begins.
     job.expect(0, "bake small.toml -o c --set solver.pbf.iterations=5");
     let said = job.expect(1, "diff c b");
     assert_has(

@@ -60,7 +60,7 @@ fn renders_are_compared_by_name_with_a_difference_image() {
     assert_eq!(exr["p99"], 0.0);
     assert!(exr["perceptual"].as_f64().unwrap() < 100.0);
 
-    // The difference image is black but for the spot, which is 0.25 × 2 × 255.
+    // The difference image is black except for the spot, which is 0.25 × 2 × 255.
     let (width, height, pixels) = read_png(&job.path("out/s.0002.exr.difference.png")).unwrap();
     assert_eq!((width, height), (48, 32));
     let lit: Vec<usize> = (0..pixels.len()).filter(|&k| pixels[k][1] > 0.0).collect();

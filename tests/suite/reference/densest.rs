@@ -1,4 +1,4 @@
-//! Where a report's largest density is, on the device and in f64.
+//! The position of the largest density in a report, on the device and in f64.
 
 use glam::{DVec3, Vec3};
 use swell::{
@@ -8,7 +8,7 @@ use swell::{
 
 use crate::support::{D, context, flip, lattice, noise, paper::Paper, scene, solver};
 
-/// 60 particles more, within a tenth of a cell of `middle`.
+/// Adds 60 particles around `middle`, each coordinate off by at most `within`, m.
 fn with_clump(mut water: Particles, middle: DVec3, within: f64) -> Particles {
     for k in 0..60u64 {
         let offset = DVec3::from_array([0, 1, 2].map(|axis| noise(7 * k + axis)));
@@ -21,8 +21,8 @@ fn with_clump(mut water: Particles, middle: DVec3, within: f64) -> Particles {
     water
 }
 
-/// A clump in one cell, or in another, which is the control: the report names the middle of that cell, in the coordinates of a scene
-/// whose zero lies elsewhere.
+/// A clump is placed in one cell, or in another as the control: the report gives the centre of that
+/// cell, in the world coordinates of a scene with an origin of its own.
 #[test]
 fn the_densest_cell_is_where_a_clump_is() {
     let mut scene = flip::scene([8.0; 3]);
@@ -45,8 +45,8 @@ fn the_densest_cell_is_where_a_clump_is() {
     }
 }
 
-/// The same by PBF, whose report names a particle: the one that is densest by sums over all pairs,
-/// which was in the clump or met it.
+/// The same with PBF, whose report gives a particle: the densest one by sums over all pairs, which
+/// was in the clump or met it.
 #[test]
 fn the_densest_particle_is_where_a_clump_is() {
     let mut scene = scene([1.0; 3]);

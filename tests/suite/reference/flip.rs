@@ -94,7 +94,7 @@ fn pair(context: &Context, case: &Case) -> Pair {
 }
 
 impl Pair {
-    /// A field of the GPU by the elements of the reference, so many planes.
+    /// Reads a field of the GPU with `planes` planes, by the reference's elements.
     fn field(&self, buffer: Buf<f32>, planes: usize) -> Vec<f64> {
         let field = Field::new(&self.gpu, buffer, planes);
         let length = CELLS as usize * (self.trace.bricks.active as usize + 1);
@@ -108,16 +108,17 @@ impl Pair {
     }
 }
 
-/// Of a product or sum in f32.
+/// Unit roundoff of a product or sum in f32.
 const U: f64 = f32::EPSILON as f64 / 2.0;
 
-/// What places of up to 18 cells are rounded by, in cells.
+/// Rounding error of positions up to 18 cells, in cells.
 const PLACE: f64 = 18.0 * U;
 
-/// 1/√λ of the systems' least eigenvalues: (2 D + 1)/π where air lies D cells away at most, here 12; less in pockets.
+/// 1/√λ of the systems' smallest eigenvalue: (2 D + 1)/π where air is at most D cells away, here
+/// 12; less in pockets.
 const STIFFNESS: f64 = 8.0;
 
-/// The largest gap of a field and what it may be; gaps and bounds in pairs where each value has its own.
+/// The largest gap of a field and its bound; pairs of gaps and bounds where each value has its own.
 struct Row {
     name: &'static str,
     gap: f64,
@@ -139,7 +140,7 @@ fn norm(a: &[f64], b: &[f64]) -> f64 {
     squares.sum::<f64>().sqrt()
 }
 
-/// What particles and solids bring to the grid.
+/// Compares what particles and solids contribute to the grid.
 fn rows_to_grid(case: &Case, pair: &Pair, trace: &Trace) -> Vec<Row> {
     let settings = case.scene.solver.flip();
     let off = |found: &[u32], known: &[u32]| {
@@ -156,22 +157,23 @@ fn rows_to_grid(case: &Case, pair: &Pair, trace: &Trace) -> Vec<Row> {
             off(&pair.bits(FACE_LAYER), &trace.faces.layer),
             0.0,
         ),
-        // Corners lie some 50 nodes of half a cell from the grid's own: their distances round by 50 u of those, and
-        // an area changes by up to √3 of what its corners do.
+        // Corners lie some 50 nodes of half a cell from the grid's origin: their distances round by
+        // 50 u of those, and an area changes by up to √3 times the change of its corners.
         row(
             "face_open",
             largest(&pair.field(FACE_OPEN, 3), &planes(&trace.room.open)),
             2.0 * 50.0 * U,
         ),
-        // Six of those times up to 2.5 m/s of a wall or solid.
+        // Six such areas times up to 2.5 m/s of a wall or solid.
         row(
             "solid_flux",
             largest(&pair.field(SOLID_FLUX, 1), &trace.room.solid_flux),
             6.0 * 2.5 * 2.0 * 50.0 * U,
         ),
     ];
-    // Some 64 hats over the 8 of a full cell, each off by a place's rounding, on a lattice all the same way; solids
-    // divide that by the room that they leave, 0.02 at least and in these cases 0.2.
+    // Some 64 hat functions over the 8 of a full cell, each off by a position's rounding, on a
+    // lattice all in the same direction; solids divide that by the open fraction, 0.02 at least and
+    // 0.2 in these cases.
     let room = if case.boundary.distance.is_some() || !case.boundary.moving.is_empty() {
         0.2
     } else {
@@ -192,9 +194,9 @@ fn rows_to_grid(case: &Case, pair: &Pair, trace: &Trace) -> Vec<Row> {
         });
         rows.push(row("liquid_distance", over.fold(0.0, f64::max), 1.0));
     }
-    // velocity − change is the particles' own velocity throughout. Its weights are off by a place's rounding each, at
-    // random, so that some 64 of them add up as 8; they weigh velocities that differ by up to 1 m/s, which APIC's
-    // slopes double.
+    // velocity − change is the particles' own velocity. Its weights are each off by a position's
+    // rounding, at random, so that some 64 of them add up as 8; they weight velocities that differ
+    // by up to 1 m/s, which APIC's slopes double.
     let [velocity, change] = [FACE_VELOCITY, FACE_CHANGE].map(|buffer| pair.field(buffer, 3));
     let faces = &trace.faces;
     let own = planes(&faces.velocity)
@@ -216,14 +218,14 @@ fn rows_to_grid(case: &Case, pair: &Pair, trace: &Trace) -> Vec<Row> {
     rows
 }
 
-/// What the projection makes of it, and what particles take from it.
+/// Compares the projection's results, and what particles take from them.
 fn rows_of_motion(case: &Case, pair: &Pair, trace: &Trace) -> Vec<Row> {
     let step = case.scene.shot.frame_seconds();
     let projected = &trace.projected;
     let reported = pair.report.projection.unwrap();
     let n = trace.room.kind.len();
-    // A projection does not enlarge what it is given; and with the residual r the velocities that it leaves are
-    // ‖r‖ / √λ off in the Euclidean norm. Twice that: gradients and their differences round as well.
+    // A projection does not enlarge its input; with the residual r the velocities are off by ‖r‖ /
+    // √λ in the Euclidean norm. Twice that: gradients and their differences round as well.
     let rows = (projected.system.cell.len() as f64).sqrt();
     let residual = reported.residual * reported.divergence_before * DX * rows;
     let [found, change] = [FACE_VELOCITY, FACE_CHANGE].map(|buffer| pair.field(buffer, 3));
@@ -239,11 +241,11 @@ fn rows_of_motion(case: &Case, pair: &Pair, trace: &Trace) -> Vec<Row> {
     let mut out = vec![row(
         "face_velocity",
         norm(&found, &own),
-        // The extrapolated faces, several times as many.
+        // There are several times as many extrapolated faces.
         3.0 * left,
     )];
     let scale = case.scene.water.rest_density * DX / step;
-    // q rounds to one word where it is written.
+    // q is rounded to f32 when it is written.
     let rounding = U * norm(&trace.pressure, &vec![0.0; n]);
     out.push(row(
         "pressure",
@@ -253,7 +255,7 @@ fn rows_of_motion(case: &Case, pair: &Pair, trace: &Trace) -> Vec<Row> {
     let mut displaced = 0.0;
     if let Some(displacement) = &trace.displacement {
         let source = trace.centers.excess.iter().map(|e| e * e).sum::<f64>();
-        // To 1e-2, pressure::CORRECTION_TOLERANCE; and densities round, as above.
+        // The solver stops at 1e-2, pressure::CORRECTION_TOLERANCE; densities round as above.
         let bound = STIFFNESS * DX * (1e-2 * source.sqrt() + 8.0 * PLACE * rows);
         let found = pair.field(FACE_DISPLACEMENT, 3);
         let gap = norm(&found, &planes(displacement));
@@ -261,11 +263,12 @@ fn rows_of_motion(case: &Case, pair: &Pair, trace: &Trace) -> Vec<Row> {
         displaced = largest(&found, &planes(displacement));
     }
     let faces = largest(&found, &own) + largest(&change, &known);
-    // Means of what the faces have, √3 for three components; hats are off by a place's rounding each, over faces that
-    // differ by up to 1 m/s.
+    // Means of face values, √3 for three components; each hat function is off by a position's
+    // rounding, over faces that differ by up to 1 m/s.
     let given = 3f64.sqrt() * faces + 8.0 * PLACE;
-    // Beside solids weights are multiplied by open fractions, which are off by 100 u (as `face_open`), above and below a quotient;
-    // they are a fiftieth at least, and faces differ by up to 1 m/s.
+    // Beside solids weights are multiplied by open fractions, which are off by 100 u (as
+    // `face_open`), in numerator and denominator of a quotient; they are at least 0.02, and faces
+    // differ by up to 1 m/s.
     let is_cut = case.boundary.distance.is_some() || !case.boundary.moving.is_empty();
     let given = given + if is_cut { 2.0 * 100.0 * U / 0.02 } else { 0.0 };
     let (mut x, mut v, mut touching) = (0.0f64, 0.0f64, 0.0f64);
@@ -280,10 +283,10 @@ fn rows_of_motion(case: &Case, pair: &Pair, trace: &Trace) -> Vec<Row> {
         }
     }
     out.push(row("velocity", v, given));
-    // A solid takes the velocity along its push, a difference of places of up to 1.8 m: of a push of 1e-5 m, the
-    // least of some hundreds, the direction rounds by 2e-2.
+    // A solid changes the velocity along its push, a difference of positions of up to 1.8 m: for a
+    // push of 1e-5 m, the smallest of some hundreds, the direction is off by 2e-2.
     out.push(row("velocity at solids", touching, 2e-2));
-    // And positions round to one word.
+    // Positions round to f32 as well.
     out.push(row(
         "position",
         x,
@@ -376,7 +379,7 @@ fn the_gpu_follows_the_reference() {
     assert_eq!(trace(&pocket()).projected.pockets, 1);
 }
 
-/// Negative controls: each row sees a reference that was given something else, by the size beside it.
+/// Negative controls: each row detects a reference with another input, changed by the amount below.
 #[test]
 fn every_row_sees_what_is_off() {
     let context = context();
@@ -411,7 +414,7 @@ fn every_row_sees_what_is_off() {
     spoil("face_displacement", &|c| {
         flip(&mut c.scene).particles_per_cell = 7;
     });
-    // All by half a cell.
+    // All of them by half a cell.
     spoil("cell_kind", &|c| {
         for x in &mut c.particles.position {
             x[1] += 0.05;
@@ -428,7 +431,7 @@ fn every_row_sees_what_is_off() {
     let case = slope();
     let pair_of_slope = pair(&context, &case);
     let mut spoiled = slope();
-    // The solid by a thousandth of a cell.
+    // Moves the solid by a thousandth of a cell.
     spoiled.boundary.distance.as_mut().unwrap().origin.y += 1e-4;
     is_missed(&case, &pair_of_slope, &spoiled, "face_open");
     let mut spoiled = slope();
@@ -454,7 +457,7 @@ fn every_row_sees_what_is_off() {
     assert!(unseen.borrow().is_empty(), "{unseen:?}");
 }
 
-/// Conjugate gradients, whole frames' own way, and a sparse factor come to the same.
+/// Conjugate gradients, which whole frames use, and a sparse factor give the same result.
 #[test]
 fn a_factor_changes_nothing() {
     for case in [dam(), pocket()] {
@@ -489,7 +492,7 @@ fn threads_change_no_bit() {
     assert!(run(1) == run(3));
 }
 
-/// Frames of a dam break: trajectories part as rounding grows, aggregates do not.
+/// Frames of a dam break: trajectories diverge as rounding grows, aggregates agree.
 #[test]
 fn whole_frames_agree_in_aggregates() {
     let (mut scene, _) = tank([16, 12, 8], 6);
@@ -514,7 +517,8 @@ fn whole_frames_agree_in_aggregates() {
         let front = |p: &Particles| p.position.iter().fold(0.0, |most: f32, x| most.max(x[0]));
         let fronts = f64::from((front(&a) - front(&b)).abs());
         println!("{frame}: {energies:?} {fronts}");
-        // The density correction stops at a residual of 1e-2, and moves particles by up to half a cell a second here.
+        // The density correction stops at a residual of 1e-2, and moves particles by up to half a
+        // cell per second here.
         assert!(
             energies[0] < 1e-3 && energies[1] < 1e-4,
             "{frame} {energies:?}"
@@ -523,7 +527,7 @@ fn whole_frames_agree_in_aggregates() {
         assert!(known.projection.unwrap().residual < 1e-11);
     }
     assert!(substeps > 12);
-    // Bytes of a state that was loaded again are those of the bake that went on.
+    // A solver that loads a saved state continues with the same bytes.
     let mut first = Reference::new(&scene, &Boundary::default());
     first.load(0, &particles).unwrap();
     let (middle, _) = first.advance().unwrap();

@@ -1,4 +1,4 @@
-//! The f64 reference of PBF: against the GPU on the same inputs, and its exact solutions.
+//! The f64 reference of PBF: compared with the GPU on the same inputs, and with exact solutions.
 
 use std::{fs, path::Path};
 
@@ -26,8 +26,9 @@ use crate::support::{D, context, jitter, lattice, noise, scene, solver};
 const BOX: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\n\
     f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 4 8 7 3\nf 1 5 8 4\nf 2 3 7 6\n";
 
-/// Moving walls, a solid in the water that its lattice fits (the direction of a push of 1e-6 m would be rounding's), both effects; one substep a frame. Water that is squeezed by 1.5 % and
-/// moves in all directions.
+/// Moving walls, a solid in the water that fits the lattice (the direction of a push of 1e-6 m
+/// would be rounding error), both effects and one substep per frame. The water is compressed by 1.5
+/// % and moves in all directions.
 fn lively(spoil: &str) -> (Scene, Start) {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("box.obj"), BOX).unwrap();
@@ -93,8 +94,8 @@ fn gaps(a: &Particles, b: &Particles, step: f64) -> [f64; 4] {
     [x, x_rms, v, v_rms]
 }
 
-/// How far the reference itself parts when every coordinate of its start is moved by one unit in the last place of
-/// f32, to either side: most of four draws.
+/// Divergence of the reference when every coordinate of its start is moved by one unit in the last
+/// place of f32, up or down: the maximum of four draws.
 fn sensitivity(scene: &Scene, start: &Start) -> [f64; 4] {
     let step = scene.shot.frame_seconds();
     let (plain, _) = reference(scene, start);
@@ -124,10 +125,11 @@ const KINDS: [&str; 6] = [
     "solver.pbf.iteration=chebyshev solver.pbf.density_error=0.004 solver.pbf.max_iterations=40",
 ];
 
-/// The GPU rounds positions once a pass, by half a unit in their last place; its sums of some 33 terms lie below
-/// that, for corrections are a hundredth of positions. Each pass's error then parts the solutions by no more
-/// than the same error at the start does. A velocity is a difference of positions over the substep, which an error at the start
-/// moves both: it has the rounding of the later one besides, of up to 1.6, 1.2 and 1 m.
+/// The GPU rounds positions once per pass, by half a unit in their last place; its sums of some 33
+/// terms round less than that, because corrections are a hundredth of positions. Each pass's error
+/// then separates the solutions by no more than the same error at the start. A velocity is a
+/// difference of positions over the substep, both of which an error at the start moves: it also has
+/// the rounding of the later position, of up to 1.6, 1.2 and 1 m.
 fn tolerance(sensitivity: [f64; 4], passes: usize) -> [f64; 4] {
     let place = DVec3::new(1.6, 1.2, 1.0).length() * 0.5 * f64::from(f32::EPSILON);
     let [x, x_rms, v, v_rms] = sensitivity.map(|gap| gap * passes as f64);
@@ -160,13 +162,13 @@ fn one_substep_on_the_gpu_and_in_f64() {
         );
         let is_adaptive = kind.contains("density_error");
         assert_eq!(iterations != 4, is_adaptive, "{kind}");
-        // Predict, velocity, three of effects; λ and Δx, of two colours with red/black.
+        // Predict, velocity, three of effects; λ and Δx, for two colours with red/black.
         let passes = 5 + 4 * iterations as usize;
         let tolerance = tolerance(sensitivity(&scene, &start), passes);
         let gap = gaps(&exact, &state, step);
         println!("{kind}: gap {}, tolerance {}", show(&gap), show(&tolerance));
         assert!(is_within(gap, tolerance), "{kind}: {gap:?} {tolerance:?}");
-        // Negative controls: each part of a substep, a little off, is seen.
+        // Negative controls: a small change in each part of a substep is detected.
         for spoil in [
             "solver.pbf.relaxation=0.99",
             "effects.viscosity.xsph=0.11",
@@ -199,7 +201,7 @@ fn not_a_number_is_an_error() {
     );
 }
 
-/// Dense and by hand: (G Gᵀ + εI, −C) of the compressed particles.
+/// Builds the dense system by hand: (G Gᵀ + εI, −C) of the compressed particles.
 fn dense(inputs: Inputs<'_>, epsilon: f64) -> (Vec<usize>, Vec<Vec<f64>>, Vec<f64>) {
     let n = inputs.particles();
     let calibration = &inputs.model.calibration;
@@ -236,7 +238,7 @@ fn norm(values: impl Iterator<Item = f64>) -> f64 {
     values.map(|v| v * v).sum::<f64>().sqrt()
 }
 
-/// A block of particles in a box of its own, squeezed by 2 % in each direction and jittered.
+/// A block of particles in a box of its own, compressed by 2 % in each direction and jittered.
 fn squeezed(count: usize) -> (Scene, Particles) {
     let side = 0.98 * count as f64 * D;
     let scene = scene([side, 2.0 * side, side]);
@@ -274,13 +276,14 @@ fn linearised_constraints_are_met() {
     };
     let exact = residual(&matrix, &lambda);
     println!("residual {exact:.2e}");
-    // 2^-53 times the condition number, at most Σ|∇C|² over ε, 1e3 times the longest row's sum of 10.
+    // 2^-53 times the condition number, at most Σ|∇C|² over ε, 1e3 times the longest
+    // row's sum of 10.
     assert!(exact < 1e-10, "{exact:.2e}");
     // Negative control: a matrix with another ε is another system.
     let (_, other, _) = dense(inputs, 1.001 * epsilon);
     assert!(residual(&other, &lambda) > 1e-7);
 
-    // The first Jacobi step from zero is λ of the iteration.
+    // The first Jacobi step from zero is the λ of the iteration.
     let n = inputs.particles();
     let (mut first, mut density) = (vec![0.0; n], vec![0.0; n]);
     passes::compute_lambda(inputs, Colour::All, &mut first, &mut density);
@@ -288,7 +291,7 @@ fn linearised_constraints_are_met() {
         let expected = right[k] / matrix[k][k];
         assert!((first[i] - expected).abs() < 1e-12 * expected.abs());
     }
-    // And many, under-relaxed so that they converge (Gershgorin), come to the exact λ.
+    // Many steps, under-relaxed so that they converge (Gershgorin), approach the exact λ.
     let rows = matrix.iter().enumerate();
     let largest = rows.map(|(k, line)| line.iter().map(|a| a.abs()).sum::<f64>() / line[k]);
     let relaxation = 1.0 / largest.fold(0.0, f64::max);
@@ -315,7 +318,7 @@ fn linearised_constraints_are_met() {
 #[test]
 fn nonlinear_constraints_are_met() {
     let (mut scene, particles) = squeezed(8);
-    // Air above, so that there is room.
+    // Air above, so that the water can expand.
     scene.domain.max.y *= 2.0;
     let (model, substep, _) = sorted(&scene, &particles);
     let position = local(&scene, &particles);
@@ -326,7 +329,7 @@ fn nonlinear_constraints_are_met() {
     );
     assert!(solved.error <= 1e-8 && solved.mean_error <= solved.error);
     assert!(solved.steps > 0);
-    // Half the room: said, with what is left.
+    // Half the volume: the error reports the remaining density error.
     scene.domain.max.y =
         particles.len() as f64 * 0.5 * D.powi(3) / (scene.domain.max.x * scene.domain.max.z);
     let (model, substep, _) = sorted(&scene, &particles);
@@ -338,7 +341,7 @@ fn nonlinear_constraints_are_met() {
     );
 }
 
-/// More iterations leave less to do; and at the end nothing.
+/// More iterations leave a smaller distance to the converged solution.
 #[test]
 fn iterations_approach_what_is_converged() {
     let (mut scene, particles) = squeezed(8);
@@ -366,7 +369,7 @@ fn iterations_approach_what_is_converged() {
             distances.push(distance_to_converged(&scene, &boundary, 1, &state, 1e-8).unwrap());
         }
         println!("{iteration:?}: {}", show(&distances));
-        // A hundredth of a spacing is what frames of a film show nothing of; Chebyshev is far below.
+        // A hundredth of a spacing is invisible in a film frame; Chebyshev is far below.
         assert!(distances[3] < 0.01, "{iteration:?} {distances:?}");
         assert!(
             distances.windows(2).all(|pair| pair[1] < pair[0]),
@@ -375,7 +378,8 @@ fn iterations_approach_what_is_converged() {
     }
 }
 
-/// What the sparse factor costs: `cargo test --release --test suite reference::pbf::factor_costs -- --ignored --nocapture`.
+/// Cost of the sparse factor: `cargo test --release --test suite reference::pbf::factor_costs --
+/// --ignored --nocapture`.
 #[test]
 #[ignore = "minutes and gigabytes"]
 fn factor_costs() {
@@ -385,7 +389,7 @@ fn factor_costs() {
         let begin = std::time::Instant::now();
         let solved = linearised(sorted.inputs(&model, &substep), model.regularization()).unwrap();
         let seconds = begin.elapsed().as_secs_f64();
-        // Linux tells the peak so far.
+        // Linux reports the peak memory so far.
         let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
         let peak = status
             .lines()

@@ -1,4 +1,5 @@
-//! The viscous solve in f64: its error is what was asked for, and between plates that move it comes to a Couette flow.
+//! The viscous solve in f64: its error is within the requested tolerance, and between moving plates
+//! it converges to a Couette flow.
 
 use glam::DVec3;
 use swell::{
@@ -17,7 +18,7 @@ use swell::{
 use super::flip::cases::{Case, FRAME, dam, slope};
 use crate::support::flip::{DX, block, scene};
 
-/// A substep of a case, and what its grid knows.
+/// A substep of a case, and its reference grid.
 struct Grid {
     reference: Reference,
     substep: Substep,
@@ -59,7 +60,7 @@ impl Grid {
         })
     }
 
-    /// So many iterations from `start` on.
+    /// Runs a number of iterations from `start`.
     fn solved(
         &self,
         cells: &[Cell],
@@ -76,7 +77,8 @@ impl Grid {
         state.0
     }
 
-    /// √Σ D (a − b)² over faces that move, with the system's diagonal D: the norm in which the bound holds.
+    /// √Σ D (a − b)² over the faces that move, with the system's diagonal D: the norm of
+    /// the error bound.
     fn apart(&self, cells: &[Cell], reach: f64, a: &[DVec3], b: &[DVec3]) -> f64 {
         let mut sum = 0.0;
         for (element, cell) in cells.iter().enumerate() {
@@ -113,7 +115,7 @@ fn the_error_that_is_left_is_what_was_asked_for() {
                     how.iterations
                 );
                 assert!(left <= tolerance, "{name} {reach}: {left} {tolerance}");
-                // Negative control: a quarter of them does not come so far.
+                // Negative control: a quarter of the iterations is not enough.
                 let few = grid.solved(&cells, start, &how, how.iterations / 4);
                 let left = grid.apart(&cells, reach, &few, &exact) / whole;
                 assert!(left > tolerance, "{name} {reach}: {left} {tolerance}");
@@ -122,7 +124,8 @@ fn the_error_that_is_left_is_what_was_asked_for() {
     }
 }
 
-/// What moves under a stress alone does not go faster, and momentum is kept where no wall holds water.
+/// Viscous stress never increases the kinetic energy, and conserves momentum where no
+/// wall is no-slip.
 #[test]
 fn stress_takes_energy_and_keeps_momentum() {
     let grid = Grid::of(&dam());
@@ -144,13 +147,13 @@ fn stress_takes_energy_and_keeps_momentum() {
     let (before, energy) = sums(start);
     let (after, left) = sums(&grid.solved(&cells, start, &how, how.iterations));
     assert!(left < 0.9 * energy, "{left} {energy}");
-    // Free-slip walls take what goes against them: along z, where both are still, there is none.
+    // Free-slip walls absorb normal momentum; along z, where both are at rest, there is none.
     let size = (energy * cells.len() as f64).sqrt();
     assert!((after.z - before.z).abs() < 1e-8 * size, "{before} {after}");
 }
 
-/// Plates below and above of which the upper one goes at 1 m/s: in one step that is long enough for any start to be forgotten,
-/// velocities become those of Couette's flow, which the differences have exactly.
+/// Between a still lower plate and an upper plate at 1 m/s, one step long enough to forget the
+/// start gives the velocities of Couette flow, which the finite differences represent exactly.
 #[test]
 fn between_moving_plates_it_is_a_couette_flow() {
     let mut scene = scene([8.0, 8.0, 8.0]);
@@ -168,7 +171,7 @@ fn between_moving_plates_it_is_a_couette_flow() {
     let cells = grid.cells();
     let bricks = &grid.trace.bricks;
     let place = |element: usize| bricks.cell(element as u32);
-    // What is closed above the box is the upper plate.
+    // Closed cells above the box are the upper plate.
     let is_above = |element: usize| element >= 512 && place(element)[1] >= 8;
     let start: Vec<DVec3> = (0..cells.len())
         .map(|e| DVec3::X * f64::from(u8::from(is_above(e))))
@@ -180,7 +183,7 @@ fn between_moving_plates_it_is_a_couette_flow() {
     for (element, cell) in cells.iter().enumerate().filter(|(_, cell)| cell.moves[0]) {
         assert!(cell.is_water);
         let y = (f64::from(place(element)[1]) + 0.5) * DX;
-        // What M u* still pulls by is 1 / κ.
+        // The remaining pull of the mass term M u* is 1 / κ.
         assert!(
             (found[element].x - y / (8.0 * DX)).abs() < 2e-3,
             "{y} {}",

@@ -1,4 +1,5 @@
-//! Baselines whose limits were measured: what is seen on an adapter without hashes, and what is seen with them.
+//! Baselines with measured limits: which changes are detected on an adapter without hashes, and
+//! which with them.
 
 use std::fs;
 
@@ -10,7 +11,7 @@ use crate::support::{
     made_cache::{Made, write_cache},
 };
 
-/// A made cache whose velocities are `by` times as large, on another device.
+/// Writes a made cache whose velocities are scaled by `by`, on another device.
 fn faster(job: &Job, name: &str, device: &str, by: f32) {
     let scaled = |_: u32, particles: &mut Particles| {
         for velocity in particles.velocity.iter_mut().flatten() {
@@ -29,11 +30,11 @@ fn faster(job: &Job, name: &str, device: &str, by: f32) {
 fn a_one_percent_change_is_seen_without_hashes_where_the_spread_was_measured() {
     let job = Job::of(&[]);
     write_cache(&job.path("b"), &Made::default());
-    // Two adapters that round otherwise, and a changed constant: 1 % of speed, 2 % of energy.
+    // Two adapters that round differently, and a changed constant: 1 % of speed, 2 % of energy.
     faster(&job, "second", "a second device", 1.0001);
     faster(&job, "third", "a third device", 0.9998);
     faster(&job, "changed", "a third device", 1.01);
-    // As any baseline has it, 3 % of kinetic energy are allowed.
+    // A plain baseline allows 3 % of kinetic energy.
     job.expect(0, "diff b --write-baseline any.json");
     job.expect(0, "diff changed any.json");
     let said = job.expect(0, "diff b --write-baseline base.json --spread second");
@@ -49,7 +50,7 @@ fn a_one_percent_change_is_seen_without_hashes_where_the_spread_was_measured() {
     let said = job.expect(1, "diff changed base.json");
     assert_has(&said, &["out: frame 0, kinetic_energy: difference"]);
 
-    // The known adapter as if it were not known.
+    // The known adapter, treated as unknown.
     faster(&job, "here", "a device", 1.00001);
     assert_has(
         &job.expect(1, "diff here base.json"),
@@ -66,7 +67,8 @@ fn a_one_percent_change_is_seen_without_hashes_where_the_spread_was_measured() {
         &["--ignore-hashes is for a cache and a baseline"],
     );
 
-    // Written again the spreads stay; of other frames they go, and the limits with them.
+    // Rewriting the same frames keeps the spreads; other frames discard them, and the
+    // limits with them.
     let before = fs::read(job.path("base.json")).unwrap();
     job.expect(0, "diff b --write-baseline base.json");
     assert_eq!(fs::read(job.path("base.json")).unwrap(), before);
@@ -104,7 +106,7 @@ fn aggregates_of_a_baseline_are_judged_where_its_hashes_match() {
     job.expect(0, "diff b base.json");
     let text = fs::read_to_string(job.path("base.json")).unwrap();
     let mut base: Value = serde_json::from_str(&text).unwrap();
-    // Far within the stated limits, and no rounding.
+    // Far within the stated limits, but more than rounding.
     for (name, by) in [("kinetic_energy", 1.001), ("potential_energy", 0.9999)] {
         let place = &mut base["frames"][3]["aggregates"][name];
         let value = place.as_f64().unwrap();
@@ -119,8 +121,8 @@ fn aggregates_of_a_baseline_are_judged_where_its_hashes_match() {
     job.expect(0, "diff b off.json");
 }
 
-/// The shipped scene with FLIP against its tracked baseline as on an adapter that it has no hashes of: the program as it
-/// is passes on any adapter, and one per cent of `pic_blend` does not.
+/// Compares the shipped scene with FLIP with its tracked baseline as on an adapter without hashes:
+/// the unchanged program passes on any adapter, and a change of `pic_blend` by 1 % does not.
 #[test]
 fn a_tracked_baseline_sees_one_percent_of_pic_blend_on_any_adapter() {
     let root = env!("CARGO_MANIFEST_DIR");

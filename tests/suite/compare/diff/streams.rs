@@ -1,4 +1,4 @@
-//! Grids, probes and the ledger's lines: verified as they are read, and compared.
+//! Grids, probes and ledger lines are verified as they are read, and compared.
 
 use std::fs;
 
@@ -9,7 +9,7 @@ use crate::support::{
     made_cache::{self, Made, write_cache},
 };
 
-/// Turns one bit of a file.
+/// Flips one bit of a file.
 fn damage(job: &Job, file: &str) {
     let path = job.path(file);
     let mut bytes = fs::read(&path).unwrap();
@@ -18,7 +18,7 @@ fn damage(job: &Job, file: &str) {
     fs::write(&path, bytes).unwrap();
 }
 
-/// A file, and what is done to it.
+/// A file and the function that damages it.
 type Damage<'a> = (&'static str, &'a dyn Fn(&str));
 
 #[test]
@@ -99,14 +99,15 @@ fn grids_that_differ_are_told_and_count() {
         (&grids["frame"], &grids["stream"]),
         (&3.into(), &"grids".into())
     );
-    // A particle lifted by half a spacing moves the surface about it by no more than that, and by some of it.
+    // A particle raised by half a spacing moves the surface around it by at most that,
+    // and not by zero.
     let surface = &grids["differences"][0];
     assert_eq!(surface["grid"], "surface");
     let largest = surface["largest"].as_f64().unwrap();
     assert!(largest > 0.001 && largest < 0.05, "{largest}");
     let different = surface["different"].as_u64().unwrap();
     assert!(different > 0 && different < surface["active"][1].as_u64().unwrap());
-    // Every frame before is the same, and a tolerance does not judge them.
+    // All earlier frames are the same, and a tolerance does not judge them.
     job.expect(0, "diff a b --frames 0-2");
     job.write("loose.toml", "[position]\nmax = 0.1\n");
     assert_has(
@@ -127,7 +128,7 @@ fn grids_that_differ_are_told_and_count() {
     let bytes = |cache: &str| fs::read(job.path(cache).join("grids/small.0002.vdb")).unwrap();
     assert_ne!(bytes("next"), bytes("b"));
     assert_has(&job.expect(0, "diff next b"), &["the same, bit for bit"]);
-    // Finer voxels are another setting of the grids, and they differ.
+    // Finer voxels are a different setting of the grids, and the grids differ.
     let mut made = Made::watched();
     made.grids.as_mut().unwrap().voxel_size = 0.05;
     write_cache(&job.path("finer"), &made);
@@ -138,7 +139,7 @@ fn grids_that_differ_are_told_and_count() {
             "voxel_size: A 0.05, B 0.1",
         ],
     );
-    // A stream on one side alone.
+    // A stream on one side only.
     let mut made = Made::watched();
     made.grids.as_mut().unwrap().velocity = false;
     made.probes.pop();

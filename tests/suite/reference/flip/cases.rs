@@ -1,4 +1,4 @@
-//! One substep each of what FLIP meets: water in motion, walls, solids, pockets, effects.
+//! One substep for each situation that FLIP meets: moving water, walls, solids, pockets, effects.
 use glam::DVec3;
 use swell::{
     domain::{
@@ -19,10 +19,10 @@ use crate::support::{
     jitter, mover, noise, turning,
 };
 
-/// Frames before the substep: walls and solids are under way by then.
+/// Frame before the substep; walls and solids are in motion by then.
 pub const FRAME: u32 = 5;
 
-/// A scene of one substep a frame.
+/// A scene with one substep per frame.
 pub struct Case {
     pub name: &'static str,
     pub scene: Scene,
@@ -41,7 +41,7 @@ fn case(name: &'static str, scene: Scene, particles: Particles) -> Case {
     case
 }
 
-/// Velocities that vary over the water, some 0.5 m/s, and noise.
+/// Adds velocities that vary over the water, about 0.5 m/s, and noise.
 fn stir(particles: &mut Particles) {
     for k in 0..particles.len() {
         let x = 4.0 * position(particles, k);
@@ -61,7 +61,7 @@ pub fn still() -> Case {
     case("still tank", scene, particles)
 }
 
-/// Off the walls, so that there are surfaces on all sides.
+/// Water away from the walls, so that there are surfaces on all sides.
 pub fn dam() -> Case {
     let scene = scene([18.0, 17.0, 12.0]);
     let mut particles = block([1, 2, 1], [8, 9, 9]);
@@ -122,7 +122,7 @@ pub fn slope() -> Case {
 pub fn wall() -> Case {
     let (mut scene, mut particles) = tank([16, 16, 8], 7);
     stir(&mut particles);
-    // Where the wall stands then: in the second cell.
+    // Keeps particles beyond the wall, which is in the second cell by then.
     let particles = kept(&particles, |x| x.x > 0.13);
     let side = Wall::NAMED.iter().find(|(name, _)| *name == "-x");
     scene.wave_makers.push(WaveMaker {
@@ -175,7 +175,8 @@ pub fn pocket() -> Case {
     case("pocket", scene, particles)
 }
 
-/// A solve between two projections, over a slope and between walls of which some hold water.
+/// An implicit viscosity solve between two projections, over a slope and between walls of which
+/// some are no-slip.
 pub fn viscous() -> Case {
     let mut case = slope();
     case.scene.effects.viscosity = Some(effects::viscosity::Settings::newtonian(20.0));
