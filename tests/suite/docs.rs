@@ -1,8 +1,9 @@
-//! What documents promise of the tree: paths that are there, files that can be read in one sitting.
+//! Statements of the documents about the tree: paths exist, and files are short enough to read.
 
 use std::{fs, path::Path, process::Command};
 
-/// Paths between backticks that begin in one of the tree's folders. `NAME` and other words in capitals stand for any.
+/// Paths between backticks that begin in one of the tree's folders. `NAME` and other words in
+/// capitals are placeholders.
 fn paths(text: &str) -> impl Iterator<Item = &str> {
     let quoted = text.split('`').skip(1).step_by(2);
     let roots = ["src/", "shaders/", "scenes/", "tests/", "tools/", "docs/"];
@@ -28,7 +29,7 @@ fn every_path_that_a_document_names_is_there() {
     files.retain(|file| file.extension().is_some_and(|end| end == "md"));
     let (mut seen, mut absent) = (0, Vec::new());
     for file in files.iter().filter(|file| !file.ends_with("mutants.md")) {
-        // A block of code has backticks of its own.
+        // A code block contains backticks of its own.
         let text = fs::read_to_string(file).unwrap().replace("```", "");
         seen += paths(&text).count();
         for path in missing(root, &text) {
@@ -41,7 +42,7 @@ fn every_path_that_a_document_names_is_there() {
     assert_eq!(missing(root, said), ["src/no_such_room"]);
 }
 
-/// Crates of the workspace that a manifest depends on, tests aside.
+/// Crates of the workspace that a manifest depends on, without its tests.
 fn depends_on(manifest: &str) -> Vec<&str> {
     let needed = manifest.split("[dev-dependencies]").next().unwrap();
     let lines = needed.lines();
@@ -81,7 +82,7 @@ fn crates_depend_as_the_map_says() {
     }
 }
 
-/// Lines of a source file at most.
+/// Maximum number of lines of a source file.
 const LONGEST: usize = 600;
 
 fn is_too_long(text: &str) -> bool {
@@ -118,7 +119,7 @@ fn no_source_file_is_too_long() {
     assert!(is_too_long(&"x\n".repeat(LONGEST + 1)));
 }
 
-/// Where a tool writes a table: its mark, and an end behind it.
+/// Whether a page has exactly one marker of the tool for its table, with an end marker after it.
 fn has_place(page: &str, tool: &str) -> bool {
     let mark = format!("<!-- {tool} -->\n");
     let mut parts = page.split(&mark);
@@ -150,7 +151,7 @@ fn an_unknown_peer_is_usage() {
     for name in ["houdini", "splishsplash", "mantaflow"] {
         assert!(told.contains(name), "{told}");
     }
-    // A known one is not what is complained of.
+    // The message about a known peer concerns another argument.
     let output = run(&["--only", "mantaflow", "--rounds", "0"]);
     let told = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(2), "{told}");

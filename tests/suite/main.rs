@@ -1,5 +1,5 @@
-//! Integration tests that span several crates, one module per area. Tests of a single crate
-//! are in that crate.
+//! Integration tests that span several modules of the library, one test module per area. Tests of a
+//! single module are in its own files.
 //!
 //! One test crate, so that everything is linked once. No test changes state that its process
 //! shares: a test that needs its own environment, signals or limits runs `swell` as a process.

@@ -1,4 +1,5 @@
-//! Drops alone in the air, where users put them: at round coordinates, at rest, in still air and in wind.
+//! Isolated drops in the air, where users put them: at round coordinates, at rest, in still
+//! air and in wind.
 
 use swell::{
     domain::{boundary::Boundary, particles::Particles},
@@ -10,7 +11,7 @@ use swell::{
 use super::{lines, over};
 use crate::support::{context, flip as of_flip};
 
-/// Places are on faces and corners of cells of 0.1 m, the last beside a wall.
+/// The positions are on faces and corners of cells of 0.1 m, the last one beside a wall.
 #[test]
 fn drops_at_round_places_are_within_tolerance_and_a_fault_in_drag_is_seen() {
     let context = context();
@@ -51,7 +52,7 @@ fn drops_at_round_places_are_within_tolerance_and_a_fault_in_drag_is_seen() {
                         [0.04, 3.7, 0.1],
                     ],
                     velocity: vec![[0.0; 3], [0.0; 3], [1.0, -0.5, 0.0], [0.0; 3]],
-                    // A quarter as long as this one: FLIP's drag acts for half of both.
+                    // A quarter of this substep's length: FLIP's drag acts for half of both.
                     substep: 0.25 * scene.shot.frame_seconds(),
                     ..Particles::default()
                 },
@@ -68,7 +69,8 @@ fn drops_at_round_places_are_within_tolerance_and_a_fault_in_drag_is_seen() {
                 "{method:?} {drop_radius}: {}",
                 lines(&clean)
             );
-            // Negative controls: a hundredth less of the time that drag has, and with FLIP the own substep alone.
+            // Negative controls: 1 % less of the time that drag acts, and with FLIP only
+            // this substep's time.
             let mut spoils = vec![[from, to]];
             if method == Method::Flip {
                 spoils.push([from, "share, params.time_step)"]);

@@ -1,4 +1,4 @@
-//! Checks beyond a block of water on a floor: solids that curve, far walls, substeps after the first.
+//! Checks beyond a block of water on a floor: curved solids, far walls, substeps after the first.
 
 use std::collections::BTreeMap;
 
@@ -27,7 +27,7 @@ use super::{
 };
 use crate::support::{D, box_mesh, context, lattice, noise};
 
-/// A sphere of 20 · 4² triangles, an icosahedron whose faces are halved twice.
+/// A sphere of 20 · 4² triangles, an icosahedron whose faces are subdivided twice.
 fn sphere(centre: DVec3, radius: f64) -> TriangleMesh {
     let golden = (1.0 + 5f64.sqrt()) / 2.0;
     let mut vertices = Vec::new();
@@ -80,7 +80,8 @@ fn sphere(centre: DVec3, radius: f64) -> TriangleMesh {
     }
 }
 
-/// A tank with water in motion and a sphere in it, which may move: along a line and about an axis beside it.
+/// A tank with moving water and a sphere in it, which may move along a line and rotate about
+/// an axis beside it.
 fn tank(method: Method, speed: f64) -> (Scene, Start) {
     let (mut scene, _) = case(method);
     scene.effects = Effects::default();
@@ -130,13 +131,14 @@ fn tank(method: Method, speed: f64) -> (Scene, Start) {
     (scene, start)
 }
 
-/// Centre and radius.
+/// Centre and radius, m.
 const SPHERE: (DVec3, f64) = (DVec3::new(0.63, 0.31, 0.57), 0.26);
 
-/// Frames that the sphere's tank is followed over; where the sphere moves too, a third of them.
+/// Frames over which the sphere's tank is checked; a third of them if the sphere moves through PBF
+/// without a projection.
 const FRAMES: u32 = 12;
 
-/// Solves so many frames with `solver` and checks the step after each.
+/// Solves `frames` frames with `solver` and checks the step after each.
 fn follow(
     context: &Context,
     scene: &Scene,
@@ -159,8 +161,8 @@ fn follow(
     (faults, state)
 }
 
-/// Corrections that end in a curved solid were bounded from where the solid had pushed them to: two frames in three were
-/// out of tolerance here, by up to 1.58.
+/// The bound of corrections that end in a curved solid must not begin where the solid pushed the
+/// particles to: two of three frames would be out of tolerance here, by up to 1.58.
 #[test]
 fn a_sphere_in_a_tank_of_pbf_is_within_tolerance() {
     let context = context();
@@ -169,7 +171,7 @@ fn a_sphere_in_a_tank_of_pbf_is_within_tolerance() {
     let solver = Pbf::new(&context, &scene, plan, &start.boundary, false).unwrap();
     let (faults, mut state) = follow(&context, &scene, &start, solver, FRAMES);
     assert!(faults.is_empty(), "{faults}");
-    // Particles may not touch it by themselves: one is put into it.
+    // Particles may not touch it by themselves: one is placed inside.
     state.position[0] = (SPHERE.0 + 0.5 * SPHERE.1 * DVec3::Y).as_vec3().to_array();
     push_is_seen(
         &context,
@@ -181,8 +183,9 @@ fn a_sphere_in_a_tank_of_pbf_is_within_tolerance() {
     );
 }
 
-/// The same where the sphere moves and turns: samples and distance go along, and what they do on the water is counted; by the
-/// iterations alone, and with velocities that a grid projects.
+/// The same with a sphere that moves and turns: its samples and its distance field follow,
+/// and their work on the water is counted; with the iterations only, and with velocities that
+/// a grid projects.
 #[test]
 fn a_sphere_that_moves_through_pbf_is_within_tolerance() {
     let context = context();
@@ -195,7 +198,7 @@ fn a_sphere_that_moves_through_pbf_is_within_tolerance() {
         let (faults, mut state) = follow(&context, &scene, &start, solver, frames);
         assert!(faults.is_empty(), "{faults}");
         if grid_projection {
-            // One is put into the sphere, on the side that comes towards it.
+            // One is placed inside the sphere, on the side that moves towards it.
             let time = f64::from(frames) * scene.shot.frame_seconds();
             let within =
                 scene.moving_solids[0].pose(time).place(SPHERE.0) + 0.5 * SPHERE.1 * DVec3::X;
@@ -230,7 +233,7 @@ fn a_sphere_that_moves_through_pbf_is_within_tolerance() {
     }
 }
 
-/// The same with FLIP, whose particles the sphere pushes on their way; at rest and on its own way.
+/// The same with FLIP, in whose advection the sphere pushes particles, at rest and in motion.
 #[test]
 fn a_sphere_in_a_tank_of_flip_is_within_tolerance() {
     let context = context();
@@ -240,7 +243,7 @@ fn a_sphere_in_a_tank_of_flip_is_within_tolerance() {
         let solver = Flip::new(&context, &scene, plan, &start.boundary, false).unwrap();
         let (faults, mut state) = follow(&context, &scene, &start, solver, FRAMES);
         assert!(faults.is_empty(), "{faults}");
-        // Particles hardly touch it by themselves: one is put into it.
+        // Particles rarely touch it by themselves: one is placed inside.
         let time = f64::from(FRAMES) * scene.shot.frame_seconds();
         let pose = scene.moving_solids.first().map(|solid| solid.pose(time));
         let centre = pose.map_or(SPHERE.0, |pose| pose.place(SPHERE.0));
@@ -260,7 +263,7 @@ fn a_sphere_in_a_tank_of_flip_is_within_tolerance() {
     }
 }
 
-/// Control: a pass in which something else stands is out of tolerance.
+/// Negative control: a pass with a replaced expression is out of tolerance.
 fn spoils(
     context: &Context,
     scene: &Scene,
@@ -277,7 +280,7 @@ fn spoils(
     assert!(is_seen, "{to}: {}", lines(&table));
 }
 
-/// Control: a push that is slightly too long is out of tolerance.
+/// Negative control: a push that is slightly too long is out of tolerance.
 fn push_is_seen(
     context: &Context,
     scene: &Scene,
@@ -299,7 +302,7 @@ fn push_is_seen(
     assert!(over(&table).contains(&(pass, field)), "{}", lines(&table));
 }
 
-/// Walls that close in, by their index and with m/s.
+/// Adds walls that close in, by index and speed in m/s.
 fn close_in(scene: &mut Scene, walls: &[(usize, f64)]) {
     for &(index, velocity) in walls {
         scene.wave_makers.push(WaveMaker {
@@ -313,7 +316,7 @@ fn close_in(scene: &mut Scene, walls: &[(usize, f64)]) {
     }
 }
 
-/// Walls that close in on moving water, over several substeps a frame.
+/// Walls that close in on moving water, with several substeps per frame.
 fn pressed(method: Method) -> (Scene, Start) {
     let (mut scene, start) = case(method);
     scene.solver.pbf.as_mut().unwrap().cfl = 0.06;
@@ -322,8 +325,8 @@ fn pressed(method: Method) -> (Scene, Start) {
     (scene, start)
 }
 
-/// Water in the far corner of a box, whose wall at +z closes in on it. Along x the box ends within a cell, one past a brick
-/// of them and too thin for particles.
+/// Water in the far corner of a box whose wall at +z closes in on it. Along x the box ends within a
+/// cell, one past a brick of cells and too thin for particles.
 fn far_corner(method: Method) -> (Scene, Start) {
     let (mut scene, mut start) = case(method);
     scene.effects = Effects::default();
@@ -337,7 +340,7 @@ fn far_corner(method: Method) -> (Scene, Start) {
     (scene, start)
 }
 
-/// What lies at upper walls, and what those do that move.
+/// Checks water at the upper walls, and upper walls that move.
 #[test]
 fn far_walls_are_within_tolerance_and_fail_where_they_should() {
     let context = context();
@@ -385,8 +388,8 @@ fn of_substep(context: &Context, scene: &Scene, start: &Start, which: Which) -> 
     check_substep(context, scene, start, 0, &start.particles, which).unwrap()
 }
 
-/// Each substep of a frame is within tolerance, and what a substep inherits from the one before shows in the last: a fault
-/// that the first does not meet, as there is nothing yet.
+/// Each substep of a frame is within tolerance. Faults in what a substep inherits from the previous
+/// one, which the first substep cannot show, are detected in the last.
 fn substeps_are_checked(method: Method, spoils: &[Control]) {
     let context = context();
     let (scene, start) = pressed(method);
@@ -448,7 +451,7 @@ fn every_substep_of_flip_is_within_tolerance() {
             "flip/boundary_work",
             &["shares of the work"],
         ),
-        // What the substep before has noted.
+        // Values that the previous substep stored.
         control(
             "flip/gather_faces",
             "select(face_layer[element], 0u, component == 0u)",
@@ -460,7 +463,8 @@ fn every_substep_of_flip_is_within_tolerance() {
     substeps_are_checked(Method::Flip, &spoils);
 }
 
-/// Whether a control's row is out of tolerance in the last substep of a frame, where without it none is.
+/// Asserts that a control's row is out of tolerance in the last substep of a frame, and that
+/// without the fault no row is.
 fn last_substep_sees(scene: &Scene, start: &Start, controls: &[Control]) {
     let context = context();
     let sound = of_substep(&context, scene, start, Which::Last).table;
@@ -476,9 +480,9 @@ fn last_substep_sees(scene: &Scene, start: &Start, controls: &[Control]) {
     }
 }
 
-/// A block compressed by 2 % along each axis throws its particles apart, by more than the cap of two CFL lengths in a substep.
-/// With three substeps a frame they begin the next one at the cap, and gravity takes them over it; with one, some come to
-/// within a hundredth of it.
+/// A block compressed by 2 % along each axis throws its particles apart, by more than the cap of
+/// two CFL lengths per substep. With three substeps per frame they begin the next one at the cap,
+/// and gravity takes them over it; with one, some come to within a hundredth of it.
 #[test]
 fn particles_at_the_cap_are_within_tolerance() {
     let (mut scene, mut start) = case(Method::Pbf);
@@ -506,8 +510,9 @@ fn particles_at_the_cap_are_within_tolerance() {
     }
 }
 
-/// A wall that moves by a spacing in the first step, against a lattice at rest: every particle of a layer rounds alike, and that
-/// adds up. A bound from particles that each move on their own was passed by 1.06 (corrections) to 3.5 times (λ).
+/// A wall moves by a spacing in the first step, against a lattice at rest: every particle of a
+/// layer rounds in the same direction, which adds up. A bound for independent particles would be
+/// exceeded by factors of 1.06 (corrections) to 3.5 (λ).
 #[test]
 fn layers_that_round_alike_are_within_tolerance() {
     let context = context();
@@ -546,8 +551,8 @@ fn layers_that_round_alike_are_within_tolerance() {
     }
 }
 
-/// A plate within the water that covers the faces of one plane and leaves the cells on both sides open: nothing speeds
-/// those faces up.
+/// A plate within the water covers the faces of one plane and leaves the cells on both sides open:
+/// nothing accelerates those faces.
 #[test]
 fn faces_that_a_plate_closes_are_within_tolerance() {
     let (mut scene, start) = tank(Method::Flip, 0.0);

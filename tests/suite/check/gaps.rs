@@ -1,4 +1,5 @@
-//! Water that lands within the substep: gaps that close before a floor that fits the cells, and before a solid that cuts them.
+//! Water that lands within the substep: gaps that close above a floor that fits the cells, and
+//! above a solid that cuts them.
 
 use glam::DVec3;
 use swell::{
@@ -45,7 +46,8 @@ const CONTROLS: &[Control] = &[
     ),
 ];
 
-/// Water from wall to wall, a little more than a cell over a floor that it passes in the substep; a wall moves, and a floor of its own.
+/// Water from wall to wall, a little more than a cell above a floor that it reaches in the substep;
+/// one wall moves, and the floor too if it is a moving solid.
 fn landing(floor: &Boundary, height: f64) -> (Scene, Start) {
     let mut scene = rig::scene([16.0, 24.0, 8.0]);
     scene.solver.method = Method::Flip;
@@ -93,7 +95,7 @@ fn landing(floor: &Boundary, height: f64) -> (Scene, Start) {
     (scene, start)
 }
 
-/// The same as a solid that moves.
+/// The same floor as a moving solid.
 fn rising(solid: Boundary) -> Boundary {
     Boundary {
         moving: solid.distance.into_iter().collect(),

@@ -1,4 +1,4 @@
-//! `check` passes on what the device computes, and each of its rows fails where that pass is spoiled.
+//! `check` passes on what the device computes, and each of its rows fails if its pass is spoiled.
 mod controls;
 mod drops;
 mod frames;
@@ -48,7 +48,7 @@ use controls::{
 };
 use glam::DVec3;
 
-/// A floor at 0.23 m as a solid: it cuts cells.
+/// A floor at 0.23 m as a solid, which cuts cells.
 fn floor() -> (Vec<BoundarySample>, SignedDistance) {
     let samples = (0..144).map(|k| BoundarySample {
         position: DVec3::new(
@@ -73,7 +73,8 @@ fn floor() -> (Vec<BoundarySample>, SignedDistance) {
 /// So small that corrections take particles past the displacement cap.
 const CFL: f64 = 0.1;
 
-/// Moving water of 8 × 6 × 7 particles over a floor, pressed together, in a box of more than one block of cells.
+/// Moving water of 8 × 6 × 7 particles over a floor, compressed, in a box of more than
+/// one block of cells.
 fn case(method: Method) -> (Scene, Start) {
     let mut scene = support::scene([1.6, 6.4, 1.6]);
     scene.solver.method = method;
@@ -99,7 +100,7 @@ fn case(method: Method) -> (Scene, Start) {
         drop_radius: 1e-3,
         wind: [5.0, 1.0, -2.0],
     });
-    // From both ends, and longer than the water is.
+    // From both ends, and longer than the water.
     scene.effects.absorbing_zone = Some(absorbing_zone::Settings {
         walls: vec![Wall::NAMED[0].1, Wall::NAMED[5].1],
         length: 1.3,
@@ -178,16 +179,17 @@ fn lines(table: &Table) -> String {
     table.rows.iter().map(line).collect()
 }
 
-/// Rows that other passes' faults may turn too: they follow from everything.
+/// Rows that faults of other passes may affect too: they depend on everything.
 const FOLLOW: [&str; 3] = ["whole solve", "whole projection", "whole correction"];
 
-/// What is checked, on a context whose shaders may be spoiled.
+/// A check, on a context whose shaders may be spoiled.
 type Checked<'a> = dyn Fn(&Context) -> Result<Table, SolveError> + 'a;
 
-/// The clean table, and which of the controls do not show where they should, or elsewhere too.
+/// Returns the clean table, and the controls that are not detected where they should be,
+/// or elsewhere too.
 fn faults(context: &Context, checked: &Checked<'_>, controls: &[Control]) -> (Table, String) {
     let clean = checked(context).unwrap();
-    // Faults put into what is out of tolerance already would say nothing.
+    // Faults in rows that are out of tolerance already would prove nothing.
     assert!(over(&clean).is_empty(), "{}", lines(&clean));
     let mut faults = String::new();
     let unknown = |(_, why): &&(&str, &str)| *why == "no f64 twin";
@@ -212,7 +214,7 @@ fn faults(context: &Context, checked: &Checked<'_>, controls: &[Control]) -> (Ta
         };
         let found = over(&table);
         let is_seen = fields.iter().all(|field| found.contains(&(*pass, *field)));
-        // Each pass is given the inputs that the device had: no fault spreads.
+        // Each pass is given the device's own inputs, so no fault spreads.
         let is_alone = found
             .iter()
             .all(|(other, _)| other == pass || FOLLOW.contains(other) || follow.contains(other));
@@ -223,7 +225,8 @@ fn faults(context: &Context, checked: &Checked<'_>, controls: &[Control]) -> (Ta
     (clean, faults)
 }
 
-/// Passes of `elsewhere` have their controls in another test.
+/// Asserts that every row has a control that is detected. Passes of `elsewhere` have their controls
+/// in another test.
 fn hold(context: &Context, scene: &Scene, start: &Start, controls: &[Control], elsewhere: &[&str]) {
     let checked = |context: &Context| check_frame(context, scene, start, 0, &start.particles);
     let (clean, mut faults) = faults(context, &checked, controls);
@@ -249,7 +252,7 @@ fn pbf_is_within_tolerance_and_each_row_fails_where_it_should() {
     let clean = run(&context, &scene, &start);
     assert!(clean.unchecked.is_empty(), "{:?}", clean.unchecked);
 
-    // A solid that is not where the reference has it.
+    // A solid at another position than the reference's.
     let mut moved = start.boundary.clone();
     moved.samples[3].position.x += 1e-6;
     moved.samples[4].area *= 1.00001;
@@ -375,7 +378,7 @@ fn flip_is_within_tolerance_and_each_row_fails_where_it_should() {
     hold(&context, &scene, &start, FLIP, &sort);
 }
 
-/// What a scene may ask of FLIP beyond the common case, each with faults in what it alone runs.
+/// Settings of FLIP beyond the common case, each with faults in the code that only it runs.
 #[test]
 fn flip_variants_are_within_tolerance_and_fail_where_they_should() {
     let context = context();
@@ -414,7 +417,7 @@ fn pbf_lists_in_chunks_and_none() {
     let mut many = start.clone();
     many.particles = lattice([-0.01, 0.2, -0.01], [16, 5, 14], [0.9 * D; 3]);
     jitter(&mut many.particles, 0.02 * D);
-    // Without lists, and with places in two bindings.
+    // Without lists, and with positions in two bindings.
     let none = DeviceLimits {
         binding: 3_000,
         list_budget: 0,
@@ -434,7 +437,7 @@ fn pbf_lists_in_chunks_and_none() {
     assert!(all.is_empty(), "{all}");
 }
 
-/// The check of PBF on a device with these limits.
+/// Checks PBF on a device with these limits.
 fn pbf_table(
     context: &Context,
     scene: &Scene,
@@ -448,8 +451,8 @@ fn pbf_table(
     Ok(pbf::check(context, scene, plan, boundaries, state, first)?.table)
 }
 
-/// The other precisions of the projection; in f64 with the tolerances of its own roundoff: a product that is off by 1e-9
-/// fails there, which f32 could not tell.
+/// The other precisions of the projection. f64 has the tolerances of its own roundoff: an error of
+/// 1e-9 in a product fails, which f32 could not resolve.
 #[test]
 fn flip_is_within_tolerance_in_each_precision_of_its_projection() {
     let context = Context::open_for(None, Needs { f64: true })
@@ -488,13 +491,13 @@ fn flip_is_within_tolerance_in_each_precision_of_its_projection() {
     precision(&mut scene, Precision::F32);
     let gross = "pressure_product[own + 64u * c] = product.lo[c] * 1.0001";
     hold(&context, &scene, &start, &[off(gross)], &elsewhere);
-    // In f32 the slight fault is none: 1.000000001 rounds to 1.
+    // In f32 the slight fault vanishes: 1.000000001 rounds to 1.
     let mut spoiled = context.clone();
     spoiled.spoil = Some(off(slight).spoil);
     assert!(over(&run(&spoiled, &scene, &start)).is_empty());
 }
 
-/// The same water between walls that close in: what they do on it.
+/// The same water between walls that close in, and the work of these walls.
 #[test]
 fn work_of_moving_walls_is_within_tolerance_and_fails_where_it_should() {
     let context = context();
@@ -530,7 +533,7 @@ fn work_of_moving_walls_is_within_tolerance_and_fails_where_it_should() {
     }
 }
 
-/// A fault that no longer fits its shader is an error, and not a control that passes.
+/// A fault that no longer matches its shader is an error, not a control that passes.
 #[test]
 fn a_fault_has_to_occur() {
     let (scene, start) = case(Method::Pbf);

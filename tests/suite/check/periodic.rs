@@ -1,4 +1,4 @@
-//! Domains that join their own ends: each pass that sees across a joint, with a fault in it.
+//! Periodic domains: each pass that reads across a joint, with a fault in it.
 
 use glam::DVec3;
 use swell::{
@@ -14,7 +14,7 @@ use swell::{
 use super::{Control, case, control, faults, over, pbf_table};
 use crate::support::{D, context, lattice, noise};
 
-/// The common case about an edge of the box where two joints meet, with water on all sides of it.
+/// The common case around an edge of the box where two joints meet, with water on all sides of it.
 fn across(method: Method) -> (Scene, Start) {
     let (mut scene, mut start) = case(method);
     scene.periodic = [true, false, true];
@@ -65,7 +65,7 @@ const FLIP: &[Control] = &[
     ),
 ];
 
-/// Of deep water: of what its coarser levels hold, some is full as well.
+/// Faults in deep water, where some of the coarser levels' blocks are full.
 const DEEP: &[Control] = &[control(
     "pressure/coarsen",
     "is_full && pressure_bricks[slot].faces[side] != 0u",
@@ -81,7 +81,8 @@ const DEEP: &[Control] = &[control(
     "pressure/solve_coarse",
 ])];
 
-/// Water from end to end, two bricks deep. (Of one brick, no coarser block is clear of the floor and of the surface.)
+/// Water from end to end, two bricks deep. (With one brick, every coarser block touches the floor
+/// or the surface.)
 fn deep() -> (Scene, Start) {
     let (scene, mut start) = across(Method::Flip);
     start.boundary = Boundary::default();
@@ -155,7 +156,7 @@ const PBF: &[Control] = &[
     ),
 ];
 
-/// With lists, and where each pass searches for itself.
+/// With lists, and with a search in each pass.
 #[test]
 fn pbf_is_within_tolerance_across_joints_and_fails_where_it_should() {
     let (scene, start) = across(Method::Pbf);

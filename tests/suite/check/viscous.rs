@@ -9,7 +9,7 @@ use crate::support::context;
 fn a_viscous_solve_is_within_tolerance_and_each_row_fails_where_it_should() {
     let (mut scene, start) = case(Method::Flip);
     scene.effects.viscosity = Some(viscosity::Settings::newtonian(50.0));
-    // Some walls hold water, others do not.
+    // Some walls are no-slip, others free-slip.
     scene.no_slip = [0, 2, 5].map(|k| Wall::NAMED[k].1).to_vec();
     let (weigh, relax) = ("effects/viscosity_weigh", "effects/viscosity_relax");
     let edges: &[&str] = &["faces and edges"];

@@ -1,4 +1,5 @@
-//! Whitewater's passes against their twins, and a fault in each that the check finds.
+//! Whitewater's passes against their f64 reference passes, and a fault in each that
+//! the check finds.
 
 use glam::DVec3;
 use swell::{
@@ -19,7 +20,7 @@ use crate::support::{
     whitewater::{settings, white},
 };
 
-/// Water that is thrown about, in a box whose first wall has moved in.
+/// Turbulent water in a box whose first wall has moved in.
 fn splash(periodic: bool) -> (Scene, Particles) {
     let mut scene = support::scene([1.6, 1.6, 0.9]);
     scene.periodic = [false, false, periodic];
@@ -39,7 +40,7 @@ fn splash(periodic: bool) -> (Scene, Particles) {
     (scene.of_whitewater(), water)
 }
 
-/// All kinds everywhere.
+/// Whitewater particles of all kinds, everywhere.
 fn clouds() -> Particles {
     let all: Vec<_> = (0..3000u64)
         .map(|k| {
@@ -93,7 +94,7 @@ fn whitewater_is_within_tolerance() {
                 .iter()
                 .find(|row| row.field.name == field)
                 .unwrap();
-            // Most of them are compared, and the comparison has teeth: errors are of the tolerance's size.
+            // Most values are compared rather than counted as ties.
             assert!(
                 row.ties < row.values,
                 "{field}: {} of {}",
@@ -104,7 +105,7 @@ fn whitewater_is_within_tolerance() {
     }
 }
 
-/// Each is a change of one to a few parts in a thousand, or of a rule.
+/// Changes by one to a few parts in a thousand, or of a rule.
 const SPOILS: [(&str, &str, &str, &str); 14] = [
     (
         "survey",

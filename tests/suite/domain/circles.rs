@@ -1,4 +1,4 @@
-//! Modules of a room import each other one way, at however many removes.
+//! Submodules of a top-level module import each other without cycles, direct or indirect.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -6,7 +6,7 @@ use std::{
     path::Path,
 };
 
-/// Rooms without a circle of imports.
+/// Top-level modules whose submodules are free of import cycles.
 const ROOMS: [&str; 8] = [
     "cache",
     "compare",
@@ -43,7 +43,7 @@ fn paths(tree: &str) -> Vec<String> {
     items.iter().flat_map(whole).collect()
 }
 
-/// Modules that a file imports, which lies so many modules below its room; tests aside.
+/// Submodules that a file `depth` levels below its top-level module imports, without its tests.
 fn imports(room: &str, text: &str, depth: usize, modules: &BTreeSet<String>) -> BTreeSet<String> {
     let code = text.split("\nmod tests {").next().unwrap_or("");
     let is_code = |line: &&str| !line.trim_start().starts_with("//");
@@ -59,7 +59,7 @@ fn imports(room: &str, text: &str, depth: usize, modules: &BTreeSet<String>) -> 
     named.filter(|name| modules.contains(name)).collect()
 }
 
-/// Gathers what each module of a room imports, from the files below `folder`.
+/// Collects the imports of each submodule from the files below `folder`.
 fn gather(
     room: &str,
     folder: &Path,
@@ -88,7 +88,7 @@ fn gather(
     }
 }
 
-/// A module that comes back to itself by what it imports, and the way.
+/// Returns a module that reaches itself through imports, with the path.
 fn circle(of: &BTreeMap<String, BTreeSet<String>>) -> Option<Vec<String>> {
     fn walk(of: &BTreeMap<String, BTreeSet<String>>, way: &mut Vec<String>) -> Option<Vec<String>> {
         let here = way.last()?.clone();
@@ -109,7 +109,7 @@ fn circle(of: &BTreeMap<String, BTreeSet<String>>) -> Option<Vec<String>> {
         .find_map(|module| walk(of, &mut vec![module.clone()]))
 }
 
-/// What each module of a room imports of the others.
+/// For each submodule of a top-level module, the siblings that it imports.
 fn of_room(room: &str) -> BTreeMap<String, BTreeSet<String>> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("src").join(room);
     let names = fs::read_dir(&folder)
@@ -129,7 +129,7 @@ fn modules_of_a_room_import_each_other_one_way() {
     for room in ROOMS {
         assert_eq!(circle(&of_room(room)), None, "{room}");
     }
-    // Controls: the imports are seen, also through braces, and one back makes a circle.
+    // Negative controls: the imports are found, also within braces, and one back makes a cycle.
     let mut found = of_room("scene");
     assert!(found["build"].contains("document") && found["document"].contains("key"));
     assert!(found["keys"].contains("look") && found["look"].contains("key"));

@@ -1,5 +1,6 @@
-//! Level sets of OpenVDB as meshes. The files in `files/` were written by OpenVDB 10.0.1 itself (`createLevelSetSphere` of its Python module: radius 0.4 m
-//! about (1.0, 0.5, 0.5), voxels of 0.05 m, Blosc), the sheared one with another transform.
+//! OpenVDB level sets as meshes. OpenVDB 10.0.1 wrote the files in `files/` (`createLevelSetSphere`
+//! of its Python module: radius 0.4 m about (1.0, 0.5, 0.5), voxels of 0.05 m, Blosc), the sheared
+//! one with another transform.
 
 use std::{f64::consts::PI, path::Path};
 
@@ -13,7 +14,7 @@ use crate::support::job::Job;
 
 const SPHERE: &[u8] = include_bytes!("files/sphere.vdb");
 const SHEARED: &[u8] = include_bytes!("files/sheared.vdb");
-/// The same by OpenVDB 12.0.0, voxels of 0.1 m, in half precision.
+/// The same sphere by OpenVDB 12.0.0, voxels of 0.1 m, in half precision.
 const HALF: &[u8] = include_bytes!("files/half.vdb");
 const NONE: &[u8] = include_bytes!("files/no-level-set.vdb");
 
@@ -25,7 +26,7 @@ fn read(bytes: &[u8]) -> Result<TriangleMesh, MeshError> {
     TriangleMesh::from_bytes(bytes, MeshFormat::Vdb, Path::new("a.vdb"))
 }
 
-/// Farthest vertex from the sphere, metres.
+/// Largest distance of a vertex from the sphere, m.
 fn off(mesh: &TriangleMesh, centre: DVec3) -> f64 {
     let off = mesh
         .vertices
@@ -38,19 +39,22 @@ fn off(mesh: &TriangleMesh, centre: DVec3) -> f64 {
 fn a_level_set_of_openvdb_is_the_mesh_around_its_inside() {
     let mesh = read(SPHERE).unwrap();
     assert!(mesh.open_edges().is_empty());
-    // Distances are linear along an edge but for 1/r: their chord is off by at most an eighth of its square over the radius.
+    // Distances are linear along an edge except for 1/r: a chord is off by at most an eighth of its
+    // square over the radius.
     let chord = VOXEL * VOXEL / (8.0 * RADIUS);
     assert!(off(&mesh, CENTRE) < chord, "{}", off(&mesh, CENTRE));
-    // Triangles between vertices on the sphere lie inside of it by a diagonal's chord at most, 3 · (√3 voxel)² / 8 r² of the volume.
+    // Triangles between vertices on the sphere lie inside it by a diagonal's chord at most, 3 · (√3
+    // voxel)² / 8 r² of the volume.
     let ratio = mesh.signed_volume() / (4.0 / 3.0 * PI * RADIUS.powi(3));
     let bound = 9.0 * VOXEL * VOXEL / (8.0 * RADIUS * RADIUS);
     assert!((ratio - 1.0).abs() < bound, "{ratio}");
-    // The control: half a voxel to the side is seen.
+    // Negative control: a shift by half a voxel is detected.
     let moved = off(&mesh, CENTRE + DVec3::X * 0.5 * VOXEL);
     assert!(moved > 5.0 * chord, "{moved}");
 }
 
-/// Values of half precision have 11 bits: they are off by 2⁻¹² of a voxel, and so is the place between two of them.
+/// Half precision has 11 bits: values are off by 2⁻¹² of a voxel, and so is the zero
+/// between two of them.
 #[test]
 fn a_level_set_of_half_precision_is_read() {
     let mesh = read(HALF).unwrap();
@@ -70,7 +74,7 @@ fn what_is_no_level_set_is_refused() {
         none.contains("no level set") && none.contains("density, v"),
         "{none}"
     );
-    // The panic of vdb-rs is told, once.
+    // The panic of vdb-rs is reported, once.
     assert!(told(SHEARED).contains("vdb-rs does not read: Not supported AffineMap"));
     // The sphere is the first of its grids, and takes nearly all of the file.
     for file in [SPHERE, HALF] {
@@ -122,7 +126,7 @@ fn water_and_solids_are_taken_from_a_level_set() {
     let layer = 4.0 * PI * RADIUS.powi(2) * 0.025;
     let water = particles("water") * spacing;
     assert!((water - volume).abs() < layer, "{water} {volume}");
-    // Half of the ball stands in the water.
+    // Half of the ball is in the water.
     let displaced = (particles("block") - particles("solid")) * spacing;
     assert!((displaced - 0.5 * volume).abs() < layer, "{displaced}");
     assert!(displaced > 0.2 * volume, "the control");
@@ -131,7 +135,7 @@ fn water_and_solids_are_taken_from_a_level_set() {
         said.contains("water.mesh") && said.contains("no level set"),
         "{said}"
     );
-    // One clear line, and no panic's.
+    // One clear line, and not that of a panic.
     let said = job.expect(2, "bake sheared.toml --device cpu -o sheared");
     assert!(
         said.lines().count() == 1 && said.contains("AffineMap"),

@@ -1,5 +1,5 @@
-//! Signed distance of meshes against parry3d (f64), which finds distances through its own tree and
-//! signs by pseudonormals; and the hard cases of meshes.
+//! Signed distance of meshes against parry3d (f64), which finds distances with its own tree and
+//! signs with pseudonormals; and the hard cases of meshes.
 use std::path::Path;
 
 use glam::DVec3;
@@ -28,18 +28,19 @@ fn trusted(mesh: &TriangleMesh) -> TriMesh {
 }
 
 fn field(mesh: &TriangleMesh, spacing: f64) -> SignedDistance {
-    // A margin that is no multiple of the spacing: nodes lie in general places.
+    // A margin that is no multiple of the spacing puts the nodes at general positions.
     let bounds = mesh.bounds().unwrap().grown(3.3 * spacing);
     SignedDistance::from_mesh(mesh, &bounds, spacing).unwrap()
 }
 
-/// How a field differs from the trusted library's distances to `distances` and signs of `signs`.
+/// Difference between a field and the trusted library's distances to `distances` and
+/// signs of `signs`.
 #[derive(Clone, Copy, Debug, Default)]
 struct Difference {
     nodes: usize,
-    /// In spacings, over all nodes.
+    /// Largest difference over all nodes, in spacings.
     distance: f64,
-    /// Nodes with the other sign, those aside that lie on a surface.
+    /// Nodes with the other sign, without those on a surface.
     signs: usize,
 }
 
@@ -70,7 +71,7 @@ fn compare(field: &SignedDistance, distances: &TriMesh, signs: &TriMesh) -> Diff
         .reduce(Difference::default, both)
 }
 
-/// Distances are exact in f64 and kept as f32: 6e-8 of ten metres is 6e-6 of a spacing of 0.1 m.
+/// Distances are exact in f64 and stored as f32: 6e-8 of ten metres is 6e-6 of a spacing of 0.1 m.
 const DISTANCE: f64 = 1e-3;
 
 #[test]
@@ -85,7 +86,7 @@ fn closed_assets_agree_with_parry_everywhere() {
             "{name}: {found:?}"
         );
 
-        // Control: a hundredth of a spacing aside.
+        // Negative control: a shift by a hundredth of a spacing.
         let mut moved = mesh.clone();
         for v in &mut moved.vertices {
             v.x += 0.01 * spacing;
@@ -116,7 +117,7 @@ fn a_slightly_open_city_keeps_its_distances_and_its_inside() {
     println!("{found:?}");
     assert!(found.distance < DISTANCE, "{found:?}");
     assert!(found.signs * 1000 <= found.nodes, "{found:?}");
-    // Control: without a part of it the sign is another.
+    // Negative control: without a part of the mesh the sign differs.
     let mut half = closed.clone();
     half.triangles.truncate(1200);
     let half = compare(&field(&closed, 0.2), &trusted(&closed), &trusted(&half));
@@ -160,14 +161,14 @@ fn joined(a: &TriangleMesh, b: &TriangleMesh) -> TriangleMesh {
 
 #[test]
 fn flipped_and_non_manifold_meshes_have_their_inside_where_one_sees_it() {
-    // All of the city turned inside out.
+    // The whole city is inverted.
     let city = asset("city.obj");
     let mut turned = city.clone();
     turned.triangles.iter_mut().for_each(|t| t.swap(0, 1));
     let found = compare(&field(&turned, 0.25), &trusted(&city), &trusted(&city));
     assert!(found.distance < DISTANCE && found.signs == 0, "{found:?}");
 
-    // Two boxes that share an edge, which four triangles use then, one of them turned.
+    // Two boxes that share an edge, which then has four triangles; one box is inverted.
     let left = box_mesh(DVec3::ZERO, DVec3::ONE);
     let mut right = box_mesh(DVec3::new(1.0, 1.0, 0.0), DVec3::new(2.0, 2.0, 1.0));
     right.triangles.iter_mut().for_each(|t| t.swap(0, 1));
@@ -192,7 +193,7 @@ fn flipped_and_non_manifold_meshes_have_their_inside_where_one_sees_it() {
         assert_eq!(field.node(i, j, k) < 0.0, is_in(0.0) || is_in(1.0), "{p}");
     }
 
-    // One triangle against its neighbours: refused, its edge named.
+    // One triangle inverted against its neighbours: refused, and the message names its edge.
     let mut wrong = city;
     wrong.triangles[7].swap(0, 1);
     let bounds = wrong.bounds().unwrap();
@@ -209,7 +210,7 @@ fn flipped_and_non_manifold_meshes_have_their_inside_where_one_sees_it() {
     assert_named(&wrong, edge);
 }
 
-/// That a message names an edge by two vertices of the mesh.
+/// Asserts that a message names an edge by two vertices of the mesh.
 fn assert_named(mesh: &TriangleMesh, edges: &str) {
     let name = |v: &DVec3| format!("({:.4}, {:.4}, {:.4})", v.x, v.y, v.z);
     let named = mesh.vertices.iter().filter(|v| edges.contains(&name(v)));
@@ -240,11 +241,11 @@ fn plates_without_thickness_are_refused_with_their_place_and_thin_ones_are_not_i
         }
     }
 
-    // A fifth of a spacing thick, between two layers of nodes: nothing of it is inside.
+    // A fifth of a spacing thick, between two layers of nodes: no node is inside.
     let thin = box_mesh(DVec3::new(0.0, 0.54, 0.0), DVec3::new(2.0, 0.56, 1.0));
     let field = SignedDistance::from_mesh(&thin, &bounds, 0.1).unwrap();
     assert!(field.values.iter().all(|value| *value > 0.0));
-    // Control: two layers thick it is.
+    // Negative control: two layers thick, it contains nodes.
     let thick = box_mesh(DVec3::new(0.0, 0.36, 0.0), DVec3::new(2.0, 0.56, 1.0));
     let field = SignedDistance::from_mesh(&thick, &bounds, 0.1).unwrap();
     assert!(field.values.iter().any(|value| *value < 0.0));
@@ -273,8 +274,8 @@ fn halfway_between_surfaces_closer_than_a_cell_the_sign_is_right() {
     );
     let wall = SignedDistance::from_mesh(&wall, &bounds, spacing).unwrap();
     assert!((wall.sample(middle) + half).abs() < 1e-6);
-    // Half a cell aside, where no node lies between the surfaces, a gap counts as closed and
-    // a wall as open, which is what a grid of this spacing can hold.
+    // Shifted by half a cell, where no node lies between the surfaces, a gap counts as closed and a
+    // wall as open, which is all that a grid of this spacing can represent.
     let aside = DVec3::new(0.5 * spacing, 0.0, 0.0);
     assert!(gap.sample(middle + aside) < 0.0 && wall.sample(middle + aside) > 0.0);
 }

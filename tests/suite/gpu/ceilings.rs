@@ -1,4 +1,4 @@
-//! What a pass moves, and what the device's memory gives.
+//! Bytes that a pass moves, and the peak rates of a device.
 
 use swell::gpu::{
     buffer::Buf,
@@ -15,7 +15,7 @@ const COPIED: Buf<[f32; 4]> = Buf::new("copied");
 const COPY: Buf<[f32; 4]> = Buf::new("copy");
 const COUNT: usize = 1 << 12;
 
-/// Bytes and runs that a timer tells of the copying pass, run twice with these bindings.
+/// Bytes and runs that a timer reports for the copying pass, run twice with these bindings.
 fn told(binds: &[Bind], count: usize) -> (u64, u64) {
     let context = crate::support::context();
     let buffers = [COPIED.sized(COUNT), COPY.sized(COUNT)];
@@ -44,7 +44,7 @@ fn told(binds: &[Bind], count: usize) -> (u64, u64) {
 fn a_copy_moves_each_byte_twice() {
     let bytes = (size_of::<[f32; 4]>() * COUNT) as u64;
     assert_eq!(told(&[], COUNT), (2 * 2 * bytes, 2));
-    // A window of a quarter counts as that.
+    // A binding of a quarter of the buffer counts as a quarter.
     let window = |variable, buffer: &Buf<[f32; 4]>| Bind {
         window: Some((0, bytes / 4)),
         ..Bind::whole(variable, buffer)
@@ -53,7 +53,7 @@ fn a_copy_moves_each_byte_twice() {
     assert_eq!(told(&quarter, COUNT / 4), (2 * 2 * bytes / 4, 2));
 }
 
-/// What is declared `read_write` and only written is not counted as read.
+/// A `read_write` variable that is only written does not count as read.
 #[test]
 fn what_a_shader_reads_and_writes_is_seen() {
     let uses = |name: &str, variable: &str| {
@@ -66,11 +66,12 @@ fn what_a_shader_reads_and_writes_is_seen() {
     assert_eq!(uses(PASS, "copy"), Some((false, true)));
     assert_eq!(uses("sort/scan_blocks", "values"), Some((true, true)));
     assert_eq!(uses("sort/scan_blocks", "block_sums"), Some((false, true)));
-    // Counted up by atomics.
+    // Atomics increment it.
     assert_eq!(uses("pbf/assign_cells", "cell_start"), Some((true, true)));
 }
 
-/// Between a slow card's bus or one slow core and ten times what any device of today gives.
+/// Lower bounds: a slow card's bus and one slow core. Upper bounds: ten times the rates of
+/// any current device.
 #[test]
 fn a_device_has_ceilings() {
     let ceilings = Ceilings::measure(&crate::support::context()).unwrap();

@@ -1,4 +1,4 @@
-//! Passes are compiled once a device.
+//! Passes are compiled once per device.
 
 use std::ptr;
 
@@ -26,7 +26,7 @@ fn a_second_program_has_the_first_ones_passes_and_a_fault_its_own() {
     let context = context();
     let [first, second] = [(); 2].map(|()| program(&context));
     assert!(ptr::eq(first.pass(PASS), second.pass(PASS)));
-    // Negative controls: another text, and another device.
+    // Negative controls: another shader text, and another device.
     let mut spoiled = context.clone();
     spoiled.spoil = Some(Spoil {
         pass: PASS,
@@ -37,6 +37,6 @@ fn a_second_program_has_the_first_ones_passes_and_a_fault_its_own() {
     assert!(!ptr::eq(first.pass(PASS), spoiled.pass(PASS)));
     let other = Context::open(None).unwrap();
     assert!(!ptr::eq(first.pass(PASS), program(&other).pass(PASS)));
-    // The fault was not kept for those without it.
+    // The spoiled pass is not cached for contexts without the fault.
     assert!(ptr::eq(first.pass(PASS), program(&context).pass(PASS)));
 }

@@ -1,4 +1,4 @@
-//! Adapters with little room, and a device that is lost in mid-bake.
+//! Adapters with small limits, and a device that is lost during a bake.
 
 use std::{path::Path, sync::atomic::AtomicBool};
 
@@ -15,7 +15,8 @@ use swell::{
     },
 };
 
-/// The small scene with so many more particles that lists and grids fill more than one workgroup of each pass.
+/// The small scene with enough particles that lists and grids fill more than one
+/// workgroup of each pass.
 fn request(job: &Job, solver: &str, cache: &str, context: &Context) -> Request {
     let set = [
         format!("solver.method={solver}"),
@@ -38,7 +39,8 @@ fn run(request: &Request) -> Result<(), BakeError> {
     bake(request, &AtomicBool::new(false), &mut |_| {}).map(|_| ())
 }
 
-/// A fault in a pass ends the bake or changes its frames. One that is not in the shader is none.
+/// Asserts that a fault in a pass ended the bake or changed its frames. An error about the shader
+/// itself, such as text to replace that it does not contain, does not count.
 fn assert_seen(job: &Job, spoiled: Result<(), BakeError>, solver: &str) {
     match spoiled {
         Ok(()) => assert_ne!(job.hash("whole"), job.hash("spoiled"), "{solver}: control"),
@@ -66,10 +68,10 @@ fn too_large(error: BakeError) -> (String, &'static str) {
     }
 }
 
-/// Groups a dimension that the small scene's dispatches pass many times over.
+/// Workgroups per dimension; the small scene's dispatches exceed it many times over.
 const FEW_GROUPS: u32 = 12;
 
-/// Dispatches in two dimensions are those in one.
+/// Dispatches in two dimensions give the same bytes as those in one.
 #[test]
 fn few_workgroups_a_dimension_give_the_same_bytes() {
     let whole = Context::open(None).unwrap();
@@ -91,7 +93,7 @@ fn few_workgroups_a_dimension_give_the_same_bytes() {
             "one dimension would do"
         );
         assert_eq!(job.hash("whole"), job.hash("few"), "{solver}");
-        // Negative control: a pass that knows one dimension alone is seen.
+        // Negative control: a pass that uses only one dimension is detected.
         let mut spoiled = few.clone();
         spoiled.spoil = Some(Spoil {
             pass,
@@ -103,12 +105,12 @@ fn few_workgroups_a_dimension_give_the_same_bytes() {
     }
 }
 
-/// Neighbour lists that no binding holds whole go out in several.
+/// Neighbour lists that exceed one binding are split into several.
 #[test]
 fn small_bindings_split_the_lists_and_give_the_same_bytes() {
     let whole = Context::open(None).unwrap();
     let job = Job::new();
-    // Of PBF's own passes: the projection's grid is no list, and has buffers that are larger.
+    // PBF without its projection, whose grid has larger buffers than the lists.
     let alone = |cache: &str, context: &Context| {
         let mut request = request(&job, "pbf", cache, context);
         request.scene.solver.pbf.as_mut().unwrap().grid_projection = false;
@@ -120,7 +122,8 @@ fn small_bindings_split_the_lists_and_give_the_same_bytes() {
         .read(0)
         .unwrap()
         .len() as u64;
-    // A list has 48 neighbours of four bytes: a third of all lists, and more than any other buffer of the plan.
+    // A list has 48 neighbours of four bytes: a binding for a third of all lists exceeds any other
+    // buffer of the plan.
     let binding = (48 * 4 * particles / 3).next_multiple_of(256);
     let small = Context::open_lowered(None, Needs::default(), |limits| {
         limits.max_storage_buffer_binding_size = binding;
@@ -146,7 +149,8 @@ fn small_bindings_split_the_lists_and_give_the_same_bytes() {
     assert_eq!(job.hash("whole"), job.hash("small"));
 }
 
-/// Places that no binding holds whole stand in two, and vectors of particles, which take three quarters of a place, in one.
+/// Positions that exceed one binding are split into two; per-particle vectors, three quarters of a
+/// position's size, fit into one.
 #[test]
 fn places_in_two_bindings_give_the_same_bytes() {
     let job = Job::new();
@@ -179,7 +183,7 @@ fn places_in_two_bindings_give_the_same_bytes() {
     assert_eq!(page(&small), Some((binding / 16) as usize));
     run(&alone("small", &small)).unwrap();
     assert_eq!(job.hash("whole"), job.hash("small"));
-    // Negative control: places behind the page that are read one beside.
+    // Negative control: an off-by-one in reading positions beyond the first page is detected.
     let mut spoiled = small.clone();
     spoiled.spoil = Some(Spoil {
         pass: "pbf/compute_delta",
@@ -189,7 +193,7 @@ fn places_in_two_bindings_give_the_same_bytes() {
     assert_seen(&job, run(&alone("spoiled", &spoiled)), "pbf");
 }
 
-/// What cannot be split is refused with the figures, and nothing is written.
+/// Buffers that cannot be split are refused with their sizes, and nothing is written.
 #[test]
 fn what_no_buffer_holds_is_refused_before_the_bake() {
     for solver in ["pbf", "flip"] {
@@ -219,7 +223,7 @@ fn what_no_buffer_holds_is_refused_before_the_bake() {
             );
             assert!(!job.path("refused").exists());
         }
-        // Control: with the adapter's own limits it bakes.
+        // Negative control: with the adapter's own limits it bakes.
         run(&request(
             &job,
             solver,
@@ -238,7 +242,8 @@ fn limits_above_the_adapters_own_do_not_open() {
     assert!(matches!(raised, Err(GpuError::Open { .. })));
 }
 
-/// As llvmpipe of Mesa 20.3 has it, whose limit is told before the first frame and not by a validation error of a shader.
+/// Like llvmpipe of Mesa 20.3: the limit is reported before the first frame, not as a validation
+/// error of a shader.
 #[test]
 fn an_adapter_that_binds_few_buffers_is_refused_by_figures() {
     let job = Job::new();
@@ -256,11 +261,11 @@ fn an_adapter_that_binds_few_buffers_is_refused_by_figures() {
     );
     assert!(!said.contains('\n'), "{said}");
     assert_eq!(Blame::from(&error), Blame::Device, "exit code 3");
-    // The control: as many as any pass of ours binds (`gpu::shaders`) are enough.
+    // Negative control: as many as any of our passes binds (`gpu::shaders`) are enough.
     run(&request(&job, "pbf", "enough", &opened(13))).unwrap();
 }
 
-/// Destroys the device once the second frame is computed.
+/// Destroys the device after the second frame is computed.
 fn lose(request: &Request, context: &Context) -> BakeError {
     let stop = AtomicBool::new(false);
     bake(request, &stop, &mut |event| {
@@ -294,10 +299,10 @@ fn a_lost_device_ends_the_bake_and_a_resume_ends_with_the_same_bytes() {
         assert!(lost(&error), "{error:?}");
         assert_eq!(Blame::from(&error), Blame::Device, "exit code 3");
         assert!(error.to_string().starts_with("device lost: "), "{error}");
-        // All that was computed is in the ledger.
+        // All computed frames are in the ledger.
         assert_eq!(frames(&job.path("lost")), 2);
         assert_ne!(job.hash("lost"), job.hash("whole"));
-        // Negative control: the device that is lost stays so, and loses nothing more.
+        // Negative control: the lost device stays lost, and no more frames are lost.
         let before = job.hash("lost");
         assert!(lost(&run(&broken).unwrap_err()));
         assert_eq!(job.hash("lost"), before);
@@ -309,7 +314,8 @@ fn a_lost_device_ends_the_bake_and_a_resume_ends_with_the_same_bytes() {
         ))
         .unwrap();
         assert_eq!(job.hash("lost"), job.hash("whole"));
-        // A device lost before the first frame leaves the start at most, which can be gone on from.
+        // A device lost before the first frame leaves the start at most, from which a
+        // bake can resume.
         let context = Context::open(None).unwrap();
         context.device.destroy();
         let error = run(&request(&job, solver, "never", &context)).unwrap_err();

@@ -1,4 +1,4 @@
-//! What passes count of their own operations.
+//! Operation counts that passes report.
 
 use swell::gpu::{
     adapter::Spoil,
@@ -20,7 +20,7 @@ const COUNT: usize = 256;
 
 /// The index of a thread takes two multiplications and two additions.
 const INDEX: u64 = 4;
-/// And one comparison, whether there is an element of that index.
+/// And one comparison with the number of elements.
 const GUARD: u64 = 1;
 
 fn counting(spoil: Option<Spoil>) -> Lent {
@@ -30,7 +30,7 @@ fn counting(spoil: Option<Spoil>) -> Lent {
     context
 }
 
-/// Operations that so many runs of a pass are told to have done.
+/// Operations that a timer reports for a number of runs of a pass.
 fn counted(program: &Program, pass: &'static str, threads: usize, runs: u64) -> Operations {
     let recording = Recording::new(program, &[Command::over(pass, threads)]);
     let mut timer = Timer::new(&program.context);
@@ -44,15 +44,15 @@ fn counted(program: &Program, pass: &'static str, threads: usize, runs: u64) -> 
     times[0]
 }
 
-/// Of `measure/arithmetic`.
+/// Operations of `measure/arithmetic`.
 fn computed(threads: usize, spoil: Option<Spoil>) -> Operations {
     let context = counting(spoil);
     let program = Program::new(&context, &[ESCAPED.sized(1)], &[plain_pass(COMPUTING)], &[]);
     counted(&program.unwrap(), COMPUTING, threads, 1)
 }
 
-/// Of `measure/copy` with other words in place of its copy, over values whose first components are 0, 1, 2, 3, 0, and so on; and what stands
-/// in `copy` behind it, where zeros stood.
+/// Operations of `measure/copy` with `words` in place of its copy, over values whose first
+/// components are 0, 1, 2, 3, 0, and so on; and the contents of `copy` afterwards, initially zeros.
 fn copied(words: &'static str, runs: u64) -> (Operations, Vec<[f32; 4]>) {
     let context = counting(Some(Spoil {
         pass: COPYING,
@@ -73,12 +73,13 @@ fn copied(words: &'static str, runs: u64) -> (Operations, Vec<[f32; 4]>) {
 fn loops_count_as_often_as_they_go_round() {
     const ROUNDS: u64 = 512;
     const THREADS: u64 = 1024;
-    // Three times four multiplications and additions a round; behind them two sums of vectors, three of numbers, a comparison.
+    // Three times four multiplications and additions per round; then two sums of vectors, three of
+    // numbers, a comparison.
     let floats = ROUNDS * 3 * 8 + 2 * 4 + 3 + 1;
     let integers = INDEX + ROUNDS + (ROUNDS + 1);
     let found = computed(THREADS as usize, None);
     assert_eq!(found, [THREADS * floats, THREADS * integers]);
-    // The control: one addition of four numbers less.
+    // Negative control: one addition of four numbers less.
     let spoil = Spoil {
         pass: COMPUTING,
         from: "a = a * FACTOR + TERM;",
@@ -86,14 +87,15 @@ fn loops_count_as_often_as_they_go_round() {
     };
     let fewer = computed(THREADS as usize, Some(spoil));
     assert_eq!(fewer, [THREADS * (floats - 4 * ROUNDS), THREADS * integers]);
-    // More than a word of 32 bits holds.
+    // More than 32 bits can hold.
     let many = 1u64 << 19;
     assert!(many * floats > u64::from(u32::MAX));
     let found = computed(many as usize, None);
     assert_eq!(found, [many * floats, many * integers]);
 }
 
-/// Branches, returns and loops that end where data says so; and counting leaves the state alone: what a pass adds up is there once a run.
+/// Branches, returns and loops with data-dependent ends are counted as executed, and counting does
+/// not affect the state: a pass adds its values once per run.
 #[test]
 fn what_is_counted_is_what_was_done_and_the_state_stays() {
     let words = "let rounds = u32(copied[i].x);
@@ -104,12 +106,13 @@ fn what_is_counted_is_what_was_done_and_the_state_stays() {
         }";
     let (rounds, threads) = ([0u64, 1, 2], COUNT as u64 / 4);
     let floats: u64 = rounds.iter().map(|rounds| 4 * rounds).sum();
-    // Of a round that is gone through: a comparison with 10, one with `rounds`, an increment; the last has no increment.
+    // A completed round: a comparison with 10, one with `rounds`, an increment; the last
+    // has no increment.
     let of_rounds: u64 = rounds.iter().map(|rounds| 3 * rounds + 2).sum();
     let integers = 4 * (INDEX + GUARD + 1) + of_rounds;
     let once = [threads * floats, threads * integers];
     assert_eq!(copied(words, 1).0, once);
-    // Counted at the first run and at some after it, and as many in between.
+    // Counted in the first run and in some later ones; the runs between count the same.
     let (nine, sums) = copied(words, 9);
     assert_eq!(nine, once.map(|count| 9 * count));
     for (k, sum) in sums.iter().enumerate() {

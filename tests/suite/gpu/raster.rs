@@ -22,7 +22,8 @@ const SHADOW: RasterSpec = RasterSpec {
     defines: &[],
 };
 
-/// Depths of the picture after a triangle over its lower left half was drawn at depth 0.25 before a far 0.5.
+/// Depths of the picture after a triangle over its lower left half was drawn at depth 0.25, in
+/// front of the far depth 0.5.
 fn drawn(raster: RasterSpec) -> Vec<f32> {
     let context = crate::support::context();
     let pixels = (SIZE[0] * SIZE[1]) as usize;
@@ -75,7 +76,7 @@ fn a_triangle_hides_what_is_farther() {
     let at = |x: usize, y: usize| depth[y * SIZE[0] as usize + x];
     assert_eq!([at(0, 7), at(40, 7), at(0, 1)], [0.25; 3]);
     assert_eq!([at(63, 0), at(63, 6), at(40, 1)], [0.5; 3]);
-    // The control: with the comparison turned round nothing is drawn.
+    // Negative control: with the comparison inverted nothing is drawn.
     let far = drawn(RasterSpec {
         compare: wgpu::CompareFunction::Greater,
         ..SHADOW

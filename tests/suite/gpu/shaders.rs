@@ -1,4 +1,4 @@
-//! What can be said of shaders and rooms without a GPU.
+//! Checks of shaders and modules that need no GPU.
 use std::{fs, path::Path};
 
 use swell::{
@@ -43,7 +43,8 @@ fn reflection_refuses_what_no_pass_binds() {
     let fragment = "@fragment fn f() -> @location(0) vec4f { return vec4f(0.0); }";
     let both = reflect("test", &format!("{kinds}\n{fragment}")).unwrap();
     assert_eq!(both.stage, raster(true));
-    // Controls: a cube, a second group, a fragment shader alone, and no entry point at all.
+    // Negative controls: a cube texture, a second group, a fragment shader by
+    // itself, no entry point.
     let cube = kinds.replace("texture_2d<f32>", "texture_cube<f32>");
     let group = kinds.replace("@group(0) @binding(5)", "@group(1) @binding(5)");
     for refused in [cube.as_str(), group.as_str(), fragment, "fn f() {}"] {
@@ -51,7 +52,7 @@ fn reflection_refuses_what_no_pass_binds() {
     }
 }
 
-/// Where a shader's struct is none of the mirrors of its name.
+/// Returns an error if a shader's struct differs from all mirrors of its name.
 fn check(found: &Layout, mirrors: &[Layout]) -> Result<(), String> {
     let mut named = mirrors.iter().filter(|mirror| mirror.name == found.name);
     if named.clone().next().is_none() || named.any(|mirror| mirror == found) {
@@ -61,7 +62,7 @@ fn check(found: &Layout, mirrors: &[Layout]) -> Result<(), String> {
     Err(format!("{found:?} in WGSL, {named:?} in Rust"))
 }
 
-/// Every struct that is bound has a mirror, and every mirror is its struct: by size, names and offsets.
+/// Every bound struct has a mirror, and every mirror equals its struct in size, names and offsets.
 #[test]
 fn mirrors_match_naga() {
     let mirrors = [solve::mirrors(), render::mirrors()].concat();
@@ -87,7 +88,7 @@ fn mirrors_match_naga() {
     let unseen = mirrors.iter().zip(&seen).filter(|(_, seen)| !**seen);
     assert_eq!(unseen.count(), 0, "a mirror without its struct: {seen:?}");
 
-    // Negative controls: a member out of place and a wrong size are seen.
+    // Negative controls: a misplaced member and a wrong size are detected.
     let text = shader::compose("pbf/predict", &[]).unwrap();
     let layouts = reflect("pbf/predict", &text).unwrap().layouts;
     let params = layouts.iter().find(|layout| layout.name == "Params");
@@ -101,7 +102,7 @@ fn mirrors_match_naga() {
     check(&spoiled, &mirrors).unwrap_err();
 }
 
-/// What the host and the shaders number alike.
+/// Constants that the host and the shaders share.
 #[test]
 fn numbers_match_naga() {
     let reduce = reflect(
@@ -157,7 +158,7 @@ fn sources(dir: &Path, out: &mut Vec<std::path::PathBuf>) {
     }
 }
 
-/// Files of an effect's own: its settings, its passes, its f64 twins, and what holds the two against each other.
+/// Files of each effect: its settings, its passes, its check, and its f64 reference passes.
 const EFFECT_FILES: [&str; 5] = [
     "scene/effects",
     "solve/effects",
@@ -166,7 +167,8 @@ const EFFECT_FILES: [&str; 5] = [
     "reference/flip/effects",
 ];
 
-/// Lines that name an effect outside its own files; comments, tests and what a key says in words aside.
+/// Lines that name an effect outside its own files, without comments, tests and
+/// descriptions of keys.
 fn mentions(files: &[(String, String)], effect: &str) -> Vec<String> {
     let own = EFFECT_FILES.map(|folder| format!("{folder}/{effect}.rs"));
     files
@@ -210,7 +212,7 @@ fn an_effect_is_its_files_and_one_line() {
             assert!(root.join(format!("{folder}/{effect}.rs")).exists());
         }
     }
-    // Negative control: a solver that knew an effect by name would be seen.
+    // Negative control: a solver that names an effect is detected.
     files.push((
         "solve/special.rs".into(),
         "if scene.effects.viscosity.is_some() {}".into(),

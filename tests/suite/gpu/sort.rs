@@ -9,7 +9,7 @@ use swell::gpu::{
 
 use crate::support::context;
 
-/// Deterministic and well mixed (splitmix64).
+/// Deterministic and well mixed (SplitMix64).
 fn random(seed: u64) -> impl FnMut() -> u32 {
     let mut state = seed;
     move || {
@@ -81,7 +81,7 @@ fn gpu_sort(context: &Context, keys: &[u32], ids: &[u32], cells: usize) -> Vec<u
     program.read(ORDER, n).unwrap()
 }
 
-/// 4.2 million 64-thread groups' worth of elements and more go out in two dimensions.
+/// Number of elements whose 64-thread workgroups exceed one dimension of a dispatch.
 const TWO_DIMENSIONAL: usize = 65_535 * 64 + 4_097;
 
 #[test]
@@ -103,7 +103,7 @@ fn scan_matches_the_cpu() {
         let values: Vec<u32> = (0..n).map(|_| next() % 500).collect();
         let (gpu, mut cpu) = (gpu_scan(&context, &values), cpu_scan(&values));
         assert!(gpu == cpu, "n = {n}");
-        // Negative control: one spoiled element is seen.
+        // Negative control: one spoiled element is detected.
         cpu[n / 2] ^= 1;
         assert!(gpu != cpu, "n = {n}");
     }
@@ -130,14 +130,14 @@ fn sort_is_stable_and_matches_the_cpu() {
         cpu.sort_by_key(|&k| keys[k as usize]);
         assert!(gpu == cpu, "n = {n}");
         if n >= 64 {
-            // Negative control: an unstable order, as the atomics gave it, is told apart.
+            // Negative control: an unstable order, as the atomics gave it, is detected.
             cpu.sort_by_key(|&k| (keys[k as usize], u32::MAX - k));
             assert!(gpu != cpu, "n = {n}");
         }
     }
 }
 
-/// Ties follow the ids, wherever their elements stand.
+/// Ties follow the ids, wherever their elements are.
 #[test]
 fn ties_follow_ids() {
     let context = context();

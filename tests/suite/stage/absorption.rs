@@ -1,4 +1,4 @@
-//! Wave makers that take in waves: what they leave of a tank's sloshing, and where they stand in a cache.
+//! Absorbing wave makers: how much of a tank's sloshing they leave, and their state in a cache.
 
 use glam::{DVec2, DVec3};
 use swell::{
@@ -12,8 +12,8 @@ use swell::{
 
 use crate::support::job::Job;
 
-/// A step of water that sloshes to and fro between walls 0.9 m apart: kh = π · 0.4 / 0.9 and 1.14 s of the longest wave. 48
-/// frames are 1.75 of them.
+/// A step of water that sloshes between walls 0.9 m apart: for the longest wave kh = π · 0.4 / 0.9
+/// and a period of 1.14 s. 48 frames are 1.75 periods.
 const TANK: &str = r#"
 [shot]
 name = "tank"
@@ -41,17 +41,17 @@ particle_spacing = 0.025
 grid_projection = true
 "#;
 
-/// The same between walls that stand.
+/// The same between fixed walls.
 const WALLED: &str =
     "--set wave_maker=[] --set domain.max=[0.9,0.8,0.15] --set water.block.1.max=[0.9,0.375,0.15]";
 
-/// What the one wall does after each frame, as the ledger has it.
+/// The absorber state of the single wall after each frame, from the ledger.
 fn answers(reader: &CacheReader) -> Vec<Option<Answer>> {
     let entries = reader.entries().iter();
     entries.map(|entry| entry.clock.walls[0]).collect()
 }
 
-/// Root mean square of the difference between the levels at both ends in the last 1.1 s, metres.
+/// Root mean square of the difference between the water levels at both ends over the last 1.1 s, m.
 fn sloshing(reader: &CacheReader) -> f64 {
     let domain = Bounds {
         min: DVec3::ZERO,
@@ -68,7 +68,7 @@ fn sloshing(reader: &CacheReader) -> f64 {
     (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
 }
 
-/// The wave is at the wall once within the first second; a wall that stands throws it back.
+/// The wave reaches the wall once within the first second; a fixed wall reflects it.
 #[test]
 fn sloshing_is_taken_out_by_a_wall_that_absorbs() {
     let job = Job::of(&[("tank.toml", TANK)]);
@@ -81,9 +81,9 @@ fn sloshing_is_taken_out_by_a_wall_that_absorbs() {
             sloshing(&CacheReader::open(&job.path(&format!("{solver}{which}"))).unwrap())
         });
         println!("{solver}: {absorbed} of {walled}");
-        // Negative control: between walls that stand, it goes on.
+        // Negative control: between fixed walls the sloshing continues.
         assert!(walled > 0.01, "{solver}: {walled}");
-        // A step has waves of all periods, of which the wall is tuned to the longest.
+        // A step contains waves of all periods; the wall is tuned to the longest.
         assert!(absorbed < 0.4 * walled, "{solver}: {absorbed} of {walled}");
     }
 }
@@ -99,7 +99,8 @@ fn a_wall_without_room_says_so() {
     );
 }
 
-/// The wall's place is a state of its own: resumed, begun from a frame and checked, it goes on from there.
+/// The wall's displacement is part of the state: a bake that is resumed, begun from a frame or
+/// checked continues from it.
 #[test]
 fn a_bake_goes_on_with_the_wall_where_it_stood() {
     let job = Job::of(&[("tank.toml", TANK)]);
@@ -134,7 +135,7 @@ fn a_bake_goes_on_with_the_wall_where_it_stood() {
             job.expect(0, &format!("check {name} --frames 8-9"));
         }
     }
-    // Both devices have the wall at one place, but for what rounding makes of a level.
+    // Both devices have the wall at the same displacement, up to the rounding of a water level.
     for solver in ["flip", "pbf"] {
         let [gpu, cpu] = ["gpu", "cpu"].map(|device| {
             let reader = CacheReader::open(&job.path(&format!("{solver}-{device}"))).unwrap();
@@ -147,7 +148,8 @@ fn a_bake_goes_on_with_the_wall_where_it_stood() {
     }
 }
 
-/// A wall that cannot be where it was begins where the scene has it, and says so; by wall, in whatever order walls stand.
+/// A wall whose saved displacement is out of range starts at the scene's position, with a warning.
+/// Saved states are matched by wall, not by the order of the wave makers.
 #[test]
 fn a_branch_takes_answers_by_wall() {
     let job = Job::of(&[("tank.toml", TANK)]);
@@ -182,7 +184,7 @@ fn a_branch_takes_answers_by_wall() {
     assert_eq!(first("small"), Answers::default());
 }
 
-/// Water pushed against a wall that gives way as far as it can, to the domain's face.
+/// Water pushed against a wall that gives way up to the domain's face.
 const PUSHED: &str = r#"
 [shot]
 name = "pushed"
@@ -210,7 +212,8 @@ method = "flip"
 cell_size = 0.05
 "#;
 
-/// A force is read on the wall where it stands: here the same as of the domain's own face.
+/// A force probe integrates at the displaced wall: here the force equals that on the
+/// domain's own face.
 #[test]
 fn forces_are_those_on_the_wall_where_it_stands() {
     let job = Job::of(&[("pushed.toml", PUSHED)]);
@@ -226,7 +229,7 @@ fn forces_are_those_on_the_wall_where_it_stands() {
         let reader = CacheReader::open(&job.path(cache)).unwrap();
         reader.entry(39).unwrap().row("probes", 0)[0].expect("wet")
     });
-    // On patches 0.3 m before the wall it was 195 N.
+    // On patches 0.3 m in front of the wall it would be 195 N.
     assert!((found / there - 1.0).abs() < 1e-3, "{found} N of {there}");
     assert!(found > 210.0, "{found} N");
 }

@@ -1,11 +1,12 @@
-//! Bakes that begin from a frame of another cache, and bakes that go on past their last frame.
+//! Bakes that begin from a frame of another cache, and bakes that are extended past
+//! their last frame.
 
 use std::fs;
 
 use crate::support::job::Job;
 use swell::cache::{CacheReader, Entry};
 
-/// Grids and probes for the small scene; the probe of pressure is of what no frame holds.
+/// Grids and probes for the small scene; no frame stores the pressure that its probe measures.
 const WATCHED: &str = r#"
 [grids]
 surface = true
@@ -34,7 +35,7 @@ fn file(job: &Job, cache: &str, name: &str) -> Vec<u8> {
     fs::read(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
-/// A ledger line without its chain, which goes back to another manifest.
+/// A ledger entry without its chain hash, which depends on the manifest.
 fn told(job: &Job, cache: &str, frame: u32) -> Entry {
     let reader = CacheReader::open(&job.path(cache)).unwrap();
     let mut entry = reader.entry(frame).unwrap().clone();
@@ -43,7 +44,7 @@ fn told(job: &Job, cache: &str, frame: u32) -> Entry {
     entry
 }
 
-/// First frame of `range` of which two caches have other bytes: particles, grids, or what the ledger tells.
+/// First frame of `range` in which two caches differ: particles, grids, or the ledger's entry.
 fn parts(job: &Job, [a, b]: [&str; 2], range: std::ops::RangeInclusive<u32>) -> Option<u32> {
     range.into_iter().find(|&frame| {
         let files = [
@@ -55,7 +56,7 @@ fn parts(job: &Job, [a, b]: [&str; 2], range: std::ops::RangeInclusive<u32>) -> 
     })
 }
 
-/// `other` is a setting that changes the physics, `key` and `value` what of the scene a branch has to keep.
+/// `setting` belongs to both bakes; `other` is a setting that changes the physics.
 fn branches_are_the_unbroken_bake(solver: &str, setting: &str, other: &str) {
     let job = watched();
     let bake = format!("bake small.toml --solver {solver} {setting}");
@@ -91,7 +92,7 @@ fn branches_are_the_unbroken_bake(solver: &str, setting: &str, other: &str) {
         assert_eq!(rows(&cache).len() as u32, 9 - k);
     }
     assert_eq!(job.hash("whole"), whole, "the parent is not touched");
-    // Stopped, it goes on: with the same command, or without the cache that it came from.
+    // A stopped branch is resumed by the same command, or without the cache that it came from.
     job.expect(0, &format!("{bake} --from whole:5 -o stopped --frames 6"));
     assert_ne!(job.hash("stopped"), job.hash("from5"));
     job.expect(
@@ -108,10 +109,10 @@ fn branches_are_the_unbroken_bake(solver: &str, setting: &str, other: &str) {
     fs::rename(job.path("whole"), job.path("away")).unwrap();
     job.expect(0, &format!("{bake} -o stopped --resume"));
     assert_eq!(job.hash("stopped"), job.hash("from5"));
-    // A branch of a branch is the same bytes again.
+    // A branch of a branch has the same bytes again.
     job.expect(0, &format!("{bake} --from from1:5 -o twice"));
     assert_eq!(parts(&job, ["twice", "from5"], 6..=8), None);
-    // Negative control: the same beginning, other physics, which is told.
+    // Negative control: the same beginning with other physics, which is reported.
     let said = job.expect(0, &format!("{bake} --from away:5 -o other --set {other}"));
     let key = other.split('=').next().unwrap();
     assert!(
@@ -142,7 +143,7 @@ fn a_branch_of_the_reference_is_the_unbroken_bake() {
     branches_are_the_unbroken_bake("pbf", "--device cpu", "solver.pbf.iterations=5");
 }
 
-/// Where a scene has an origin of its own, frames are in 64 bits, and a branch begins with the same bits.
+/// A scene with an origin of its own has 64-bit frames, and a branch begins with the same bits.
 #[test]
 fn a_branch_far_from_the_origin_is_the_unbroken_bake() {
     let far = "--set domain.min=[9999.0,0.5,0.25] --set domain.max=[10001.0,2.5,1.25] \
@@ -151,7 +152,7 @@ fn a_branch_far_from_the_origin_is_the_unbroken_bake() {
     branches_are_the_unbroken_bake("pbf", far, "solver.pbf.iterations=5");
 }
 
-/// Attributes that only one of the two has are never passed over in silence.
+/// Attributes that only one of the two caches has are always reported.
 #[test]
 fn attributes_made_zero_or_left_out_are_told() {
     let job = watched();
@@ -206,7 +207,7 @@ fn the_other_commands_read_a_branch() {
     let job = watched();
     job.expect(0, "bake small.toml -o whole --frames 1-6");
     job.expect(0, "bake small.toml -o branch --from whole:3 --frames 4-6");
-    // Pictures: those of the frames that it computed, the same as of the whole.
+    // Pictures of the frames that the branch computed are the same as those of the whole bake.
     job.expect(0, "render whole --look look.toml -o of-whole");
     job.expect(0, "render branch --look look.toml -o of-branch");
     let picture = |folder: &str, frame: u32| job.path(folder).join(format!("small.{frame:04}.exr"));
@@ -218,7 +219,7 @@ fn the_other_commands_read_a_branch() {
         4,
         "render branch --look look.toml -o of-branch --frames 2-4",
     );
-    // The header holds the scene's hash and the frame's, which are the same.
+    // The header contains the hashes of the scene and the frame, which are the same.
     assert_eq!(
         fs::read(picture("of-whole", 5)).unwrap(),
         fs::read(picture("of-branch", 5)).unwrap()
@@ -229,7 +230,7 @@ fn the_other_commands_read_a_branch() {
     assert!(said.contains("has frames 3 to 6, not 2"), "{said}");
     let shown = |words: &str| job.expect(0, words);
     assert!(shown("diff whole branch --frames 3-6").contains("the same, bit for bit"));
-    // As of any two caches of other lengths.
+    // As for any two caches of different lengths.
     let text = job.expect(1, "diff whole branch");
     assert!(
         text.contains("frames in A alone: 0-2") && text.contains("compared frames 3-6"),
@@ -250,11 +251,11 @@ fn the_other_commands_read_a_branch() {
     assert!(!shown("inspect whole").contains("begins from"));
     let curve = fs::read_to_string(job.path("plots/energy-1.svg")).unwrap();
     assert!(curve.contains("<svg"));
-    // A baseline of it is one of its own frames.
+    // A baseline of a branch contains its own frames.
     job.expect(0, "diff branch --write-baseline branch.json");
     let text = shown("diff branch branch.json");
     assert!(text.contains("within tolerance"), "{text}");
-    // A study measures frames that a branch has not.
+    // A study that measures frames which a branch lacks is refused.
     fs::create_dir_all(job.path("out/cache")).unwrap();
     fs::rename(job.path("branch"), job.path("out/cache/pbf")).unwrap();
     let said = job.expect(4, "study study.toml -o out");
@@ -316,7 +317,7 @@ fn a_frame_that_does_not_fit_is_refused_and_nothing_is_written() {
     }
     let said = job.expect(4, "bake small.toml -o whole --from whole:2");
     assert!(said.contains("already holds a cache"), "{said}");
-    // A frame whose bytes are off is no beginning.
+    // A damaged frame cannot begin a bake.
     let frame = job.path("whole/frames/small.0002.ply");
     let mut bytes = fs::read(&frame).unwrap();
     let last = bytes.len() - 5;
@@ -325,13 +326,14 @@ fn a_frame_that_does_not_fit_is_refused_and_nothing_is_written() {
     let said = job.expect(4, "bake small.toml -o new --from whole:2");
     assert!(said.contains("small.0002.ply is damaged"), "{said}");
     job.expect(0, "bake small.toml -o new --from whole:3 --frames 4");
-    // A solid put over the water: it is pushed out, and that is told.
+    // A solid placed over the water pushes it out, and a warning reports it.
     job.edit(
         "small.toml",
         "mesh = \"box.obj\"",
         "mesh = \"box.obj\"\ntranslate = [-1.0, 0.0, 0.0]",
     );
-    // Being pushed out by iterations alone is a rise of energy that no wall did, and more than the default budget allows.
+    // Without the grid projection, the push raises the energy by more than the walls' work, and
+    // beyond the default budget.
     let covered = "bake small.toml -o covered --from whole:3 --frames 4 \
         --set solver.pbf.grid_projection=false";
     let said = job.expect(5, covered);
@@ -342,7 +344,8 @@ fn a_frame_that_does_not_fit_is_refused_and_nothing_is_written() {
     job.expect(0, "verify covered");
 }
 
-/// A finished bake goes on past its last frame, with the bytes of a shot that was longer from the start.
+/// A finished bake is extended past its last frame, with the bytes of a shot that was
+/// longer from the start.
 #[test]
 fn a_finished_bake_is_extended() {
     for solver in ["pbf", "flip"] {
@@ -369,14 +372,14 @@ fn a_finished_bake_is_extended() {
                 assert_eq!(told(&job, cache, frame), told(&job, "long", frame));
             }
         }
-        // A new bake is not made longer by a slip of the finger.
+        // A mistyped range does not make a new bake longer.
         let said = job.expect(2, &format!("{bake} -o new --frames 1-12"));
         assert!(
             said.contains("raise shot.frames") && !job.path("new").exists(),
             "{said}"
         );
     }
-    // What the longer shot cannot hold is found before the bake: the wall would meet the other one.
+    // Faults of the longer shot are found before the bake: the wall would meet the other one.
     let job = Job::new();
     let wall = "wave_maker=[{wall=\"-x\",motion={kind=\"constant_velocity\",velocity=4.0}}]";
     job.expect(0, &format!("bake small.toml -o pushed --set {wall}"));

@@ -1,4 +1,5 @@
-//! `[budget]`: what holds, what breaks it, what is kept of a frame that could not be made, and which pass was at fault.
+//! `[budget]`: limits that hold, limits that are exceeded, what is kept of a failed frame, and
+//! which pass was at fault.
 mod not_a_number;
 mod replay;
 
@@ -45,7 +46,7 @@ fn spoiled(context: &Context, spoil: Spoil) -> Device {
     opened(&context)
 }
 
-/// A bake into a folder of its own: what it reported, and how it ended.
+/// A bake into a folder of its own, its reports and its error.
 struct Baked {
     folder: TempDir,
     reports: Vec<StepReport>,
@@ -106,7 +107,8 @@ fn whole(opened: &Device, scene: &Scene) -> Baked {
 
 const SOLVERS: [&str; 2] = ["solver.method=pbf", "solver.method=flip"];
 
-/// What holds by default, and each limit broken where it is set too low, on the GPU and on the CPU.
+/// The default limits hold, and each limit that is set too low is exceeded, on the
+/// GPU and on the CPU.
 #[test]
 fn each_budget_holds_by_default_and_breaks_where_it_is_too_low() {
     let gpu = opened(&crate::support::context());
@@ -135,7 +137,7 @@ fn each_budget_holds_by_default_and_breaks_where_it_is_too_low() {
             let set = format!("budget.{set}");
             let mut sets = vec![method, &set];
             if watched == Watched::Residual {
-                // One iteration, from which no solve comes near.
+                // One iteration, which is never enough.
                 sets.extend([
                     "solver.flip.pressure.max_iterations=1",
                     "solver.flip.pressure.preconditioner=none",
@@ -153,7 +155,7 @@ fn each_budget_holds_by_default_and_breaks_where_it_is_too_low() {
             assert_eq!(breach.substep.is_some(), is_of_flip, "{breach}");
             let on_cpu = bake(&Device::Cpu, &scene, "1-4");
             if is_of_flip {
-                // Its solves come to the rounding of f64.
+                // The reference's solves converge to the rounding of f64.
                 assert!(on_cpu.error.is_none(), "{:?}", on_cpu.error);
                 continue;
             }
@@ -163,7 +165,7 @@ fn each_budget_holds_by_default_and_breaks_where_it_is_too_low() {
     }
 }
 
-/// Particles that are slowed to the cap count, here all of them by a fault in who is.
+/// Particles slowed down to the cap are counted; here a fault in the test for them counts all.
 #[test]
 fn too_many_slowed_particles_end_a_bake() {
     let context = crate::support::context();
@@ -187,8 +189,8 @@ fn too_many_slowed_particles_end_a_bake() {
     }
 }
 
-/// The energy that walls bring in is what the water gains, and no more: with the work left out, or velocities made a
-/// little larger, the budget breaks.
+/// The water gains the energy of the walls' work, and no more: without the work, or with slightly
+/// larger velocities, the budget is exceeded.
 #[test]
 fn energy_rises_by_the_work_of_the_walls_alone() {
     let context = crate::support::context();
@@ -251,7 +253,7 @@ fn energy_rises_by_the_work_of_the_walls_alone() {
     }
 }
 
-/// Both solvers tell the same work to the f64 reference's.
+/// Both solvers report the same work as the f64 reference.
 #[test]
 fn the_work_of_walls_is_that_of_the_reference() {
     let gpu = opened(&crate::support::context());
@@ -263,7 +265,7 @@ fn the_work_of_walls_is_that_of_the_reference() {
         };
         let (single, double) = (work(&gpu), work(&Device::Cpu));
         println!("{method}: {single} J, {double} J in f64");
-        // Four frames of a splash part by more than rounding.
+        // Four frames of a splash diverge by more than rounding.
         assert!(
             double > 10.0 && (single - double).abs() < 0.01 * double,
             "{single} {double}"
@@ -271,8 +273,8 @@ fn the_work_of_walls_is_that_of_the_reference() {
     }
 }
 
-/// Hard case 14: the lid meets the water in frame 20; from frame 15 on it leaves less than half a cell of air, which FLIP cannot
-/// tell from water.
+/// Hard case 14: the lid meets the water in frame 20; from frame 15 on it leaves less than half a
+/// cell of air, which FLIP cannot distinguish from water.
 #[test]
 fn a_lid_on_sealed_water_is_reported_as_incompatible() {
     let gpu = opened(&crate::support::context());
@@ -287,12 +289,12 @@ fn a_lid_on_sealed_water_is_reported_as_incompatible() {
         let most = after.iter().map(squeezed).fold(0.0, f64::max);
         assert!((0.4..1.6).contains(&most), "{most}");
     }
-    // Until then the water keeps its volume to one part in a hundred.
+    // Until then the water keeps its volume within 1 %.
     let open = load("14-sealed", &["budget.volume=0.01"]);
     let open = bake(&gpu, &open, "1-14");
     assert!(open.error.is_none(), "{:?}", open.error);
     assert_eq!(open.reports.len(), 14);
-    // PBF has no pressure to be incompatible: what is squeezed is too dense, and so is told.
+    // PBF has no incompatible pressure: compressed water is reported as too dense.
     let scene = load("14-sealed", &[SOLVERS[0], "budget.density_error_mean=0.1"]);
     let pressed = whole(&gpu, &scene);
     let breach = &pressed.failure().breach;
@@ -309,7 +311,7 @@ fn water_in_a_solid_is_left_out_and_counted() {
         let none = whole(&gpu, &scene);
         assert!(none.error.is_none(), "{:?}", none.error);
         assert_eq!((none.particles, none.removed), (0, 64), "{method}");
-        // Control: with the solid elsewhere the water starts.
+        // Negative control: with the solid elsewhere the water is kept.
         let scene = load(
             "15-solid-over-all",
             &[method, "solid[0].translate=[0.9,0.3,0.9]"],
@@ -342,7 +344,7 @@ fn one_particle_at_extreme_speed_asks_for_substeps_and_is_told() {
             capped as f64 <= 1e-4 * steps as f64 * fallen.particles as f64,
             "{capped}"
         );
-        // The pool is not infected: what the drop brought is what it may have.
+        // The pool stays calm: its speed stays below the drop's.
         let last = reports.last().unwrap();
         assert!(last.max_speed < fastest, "{} {fastest}", last.max_speed);
         // A budget below its speed names it.
@@ -401,7 +403,8 @@ fn nothing_leaves_the_domain_and_a_ledger_that_does_not_close_ends_the_bake() {
     }
 }
 
-/// The whole program: exit code, line, what is kept, one command that computes it again, and going on.
+/// The whole program: exit code, message, the files that are kept, the command that computes the
+/// frame again, and a resume.
 #[test]
 fn a_broken_budget_is_exit_5_a_folder_and_a_line_that_can_be_had_again() {
     let job = Job::new();
@@ -438,7 +441,7 @@ fn a_broken_budget_is_exit_5_a_folder_and_a_line_that_can_be_had_again() {
         let again = again.lines().last().unwrap();
         assert!(line.starts_with(again), "{line}\n{again}");
         job.expect(2, &format!("{command} --frames 1"));
-        // The cache is as it was, and goes on with another budget: none of them is physics.
+        // The cache is unchanged, and can be resumed with another budget: budgets are no physics.
         job.expect(0, &format!("verify {name}"));
         assert_ne!(job.hash(name), sound);
         job.expect(0, &format!("{bake} --resume --set budget.speed=false"));

@@ -1,10 +1,11 @@
-//! `--device cpu`: bakes without a GPU, the same bytes however many threads there are.
+//! `--device cpu`: bakes without a GPU, with the same bytes for any number of threads.
 
 use std::fs;
 
 use crate::support::job::Job;
 
-/// Runs without any Vulkan driver, on so many threads, and expects an exit code; gives all that was said.
+/// Runs without any Vulkan driver on `threads` threads, asserts the exit code and
+/// returns the output.
 fn expect(job: &Job, code: i32, threads: u32, words: &str) -> String {
     let output = job
         .command(words)
@@ -19,7 +20,7 @@ fn expect(job: &Job, code: i32, threads: u32, words: &str) -> String {
     said
 }
 
-/// `other` is a setting that changes the physics; `pass` one of the solver's.
+/// `other` is a setting that changes the physics; `pass` one of the solver's passes.
 fn bakes_without_a_driver(solver: &str, other: &str, pass: &str) {
     let job = Job::new();
     let bake = format!("bake small.toml --solver {solver} -o");

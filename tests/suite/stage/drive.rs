@@ -58,7 +58,8 @@ fn a_drive_stops_between_frames_and_goes_on_from_one() {
     assert_eq!((end, first.len()), (End::Stopped, 2));
     assert_eq!(first[1].particles, whole[1].particles);
 
-    // Another drive that takes the state over goes on as if none had stopped; from another state it does not.
+    // Another drive that loads the state continues as if uninterrupted; from another
+    // state it does not.
     let mut other = new();
     other.load(2, &first[1].particles).unwrap();
     let (_, rest) = run(&mut other, 9);
@@ -82,7 +83,7 @@ fn pressures_are_read_where_they_are_asked_for() {
     assert!(pressure > 0.0);
 }
 
-/// What the observer finds wrong ends the run, and no further frame is computed.
+/// An error of the observer ends the run, and no further frame is computed.
 #[test]
 fn an_observer_s_fault_ends_a_drive() {
     let scene = Scene::parse(SCENE, Path::new("block.toml"), Path::new(""), &[]).unwrap();

@@ -1,4 +1,5 @@
-//! Hard case 25: a scene ten kilometres from the world's origin is the scene at the origin, moved.
+//! Hard case 25: a scene ten kilometres from the world's origin behaves like the same
+//! scene at the origin.
 
 use std::fs;
 
@@ -6,12 +7,13 @@ use crate::support::job::{Job, assert_has};
 use glam::DVec3;
 use swell::{cache::CacheReader, render::image::read_png};
 
-/// Metres; whole steps of 32-bit floats there, so that both scenes are the same decimal numbers moved.
+/// Displacement of the far scene, m; multiples of the spacing of 32-bit floats there, so that both
+/// scenes have the same decimal numbers, moved.
 const WAY: DVec3 = DVec3::new(10_000.0, 300.0, -20_000.0);
 const SPACING: f64 = 0.1;
 const CELL: f64 = 0.2;
 
-/// The shot of `Job`, moved by `way`: scene, look and probes.
+/// Writes the shot of `Job` near the origin and moved by [`WAY`]: scene, look and probes.
 fn job() -> Job {
     let job = Job::new();
     let file = |name: &str| fs::read_to_string(job.path(name)).unwrap();
@@ -51,8 +53,8 @@ fn job() -> Job {
     job
 }
 
-/// Largest distance between the frames of both caches, the one moved back, metres; and what it would be if the far one
-/// had kept its positions in 32 bits.
+/// Largest distance between the frames of both caches, with the far one moved back, in metres; and
+/// the same if the far one had stored its positions in 32 bits.
 fn apart(job: &Job, frame: u32) -> [f64; 2] {
     let open = |name: &str| CacheReader::open(&job.path(name)).unwrap();
     let (near, far) = (open("near"), open("far"));
@@ -95,7 +97,7 @@ fn is_the_scene_moved(solver: &str, unit: f64) {
         );
         // The pass mark of the case.
         assert!(wide < 1e-3 * unit, "frame {frame}: {wide} m");
-        // Negative control: positions of 32 bits miss it before anything is solved.
+        // Negative control: positions in 32 bits miss it before anything is solved.
         assert!(narrow > 2e-3 * unit, "frame {frame}: {narrow} m");
     }
     let (near, far) = (
@@ -107,7 +109,7 @@ fn is_the_scene_moved(solver: &str, unit: f64) {
         assert!((a + WAY.y - b).abs() < 1e-3 * unit, "{a} {b}");
     }
 
-    // A bake that was stopped goes on to the same bytes.
+    // A stopped and resumed bake ends with the same bytes.
     job.expect(
         0,
         &format!("bake far.toml --solver {solver} -o stopped --frames 1-3"),
@@ -117,16 +119,16 @@ fn is_the_scene_moved(solver: &str, unit: f64) {
         &format!("bake far.toml --solver {solver} -o stopped --resume"),
     );
     assert_eq!(job.hash("stopped"), job.hash("far"));
-    // The step after it is the reference's, too.
+    // The reference pass agrees with the step after it as well.
     job.expect(0, "check far --frames 0,4");
-    // Two caches are compared in the world: these are the way apart.
+    // `diff` compares in world coordinates, in which the caches are that displacement apart.
     let found = job.json(1, "diff far near --frames 4");
     let most = found["diff"]["frames"][0]["fields"][0]["deviation"]["max"]
         .as_f64()
         .unwrap();
     assert!((most / WAY.length() - 1.0).abs() < 1e-3, "{found}");
 
-    // It is seen where it is.
+    // Pictures are taken at each place.
     for (cache, look) in [
         ("near", "near-look"),
         ("far", "far-look"),
@@ -150,7 +152,7 @@ fn is_the_scene_moved(solver: &str, unit: f64) {
     let same = difference("near-near-look", "far-far-look");
     let other = difference("near-near-look", "far-near-look");
     println!("{solver}: pictures differ by {same:.1e}, from elsewhere by {other:.1e}");
-    // Half a step of eight bits, and far from a picture of something else.
+    // Half a step of eight bits, and far from a picture of another place.
     assert!(same < 0.5 / 255.0 && other > 20.0 * same, "{same} {other}");
     assert_has(&job.expect(0, "inspect far"), &["origin"]);
 }

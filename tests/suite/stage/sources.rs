@@ -1,12 +1,13 @@
-//! Water that enters and leaves while a bake runs: ledger, ids, resumed and branched bakes, and the step after it.
+//! Water that enters and leaves during a bake: ledger, ids, resumed and branched bakes, and the
+//! step after an exchange.
 
 use std::collections::BTreeSet;
 
 use crate::support::job::Job;
 use swell::cache::CacheReader;
 
-/// A first emitter whose water all goes down the drain below it, so that the newest ids are gone when the second begins, and
-/// one that keeps a level in a mesh.
+/// A first emitter whose water all flows into the drain below it, so that the newest ids are gone
+/// when the second emitter, which keeps a level in a mesh, begins.
 const SOURCES: &str = r#"
 [[emitter]]
 min = [0.3, 1.9, 0.55]
@@ -54,7 +55,8 @@ fn ids(reader: &CacheReader) -> Vec<Vec<u32>> {
     frames.map(|frame| reader.read(frame).unwrap().id).collect()
 }
 
-/// Whether each frame's line says what came and went, and no id is given twice; how many came and went in all.
+/// Checks that each frame's line counts what entered and left, and that no id is reused. Returns
+/// the totals of both.
 fn closes(ids: &[Vec<u32>], exchanges: &[[u64; 2]]) -> Result<[u64; 2], String> {
     let mut gone = BTreeSet::new();
     let mut newest = *ids[0].last().expect("water at the start");
@@ -98,7 +100,7 @@ fn holds(solver: &str, device: &str) {
     let (all, exchanges) = (ids(&reader), exchanges(&reader));
     let [entered, left] = closes(&all, &exchanges).unwrap();
     assert!(entered > 50 && left > 60, "{entered} {left}");
-    // Negative controls: a particle that is in no line, and one that has the id of another that is gone.
+    // Negative controls: a particle that no line counts, and one with the id of a removed particle.
     let mut spoiled = all.clone();
     spoiled[4].pop();
     assert!(closes(&spoiled, &exchanges).is_err());
@@ -115,7 +117,8 @@ fn holds(solver: &str, device: &str) {
     let said = closes(&spoiled, &exchanges).unwrap_err();
     assert!(said.contains("was given before"), "{said}");
 
-    // Stopped where the newest ids are gone and none has come, and gone on with; and begun from there.
+    // Stopped while the newest ids are gone and no new ones exist, then resumed; and
+    // begun from there.
     let whole = job.hash("whole");
     job.expect(0, &format!("{bake} --frames 1-5 -o parts"));
     job.expect(0, &format!("{bake} --resume -o parts"));
@@ -143,7 +146,8 @@ fn so_do_those_of_the_reference() {
     holds("flip", "cpu");
 }
 
-/// The step after water came in is the reference's, of another count of particles than the start had.
+/// The step after water entered agrees with the reference pass, with another particle count
+/// than at the start.
 #[test]
 fn the_step_after_an_exchange_is_the_references() {
     for solver in ["pbf", "flip"] {
@@ -178,8 +182,8 @@ fn counts(job: &Job, cache: &str) -> Vec<usize> {
         .collect()
 }
 
-/// Where drains take water too it is not known before how much there will be: the bake ends after the frame that has more, and is gone on
-/// with where the budget is raised.
+/// With drains the particle count cannot be predicted: the bake ends after the frame that exceeds
+/// its budget, and can be resumed with a higher one.
 #[test]
 fn a_bake_with_more_particles_than_its_budget_ends_there() {
     let job = job();
@@ -212,13 +216,14 @@ fn a_bake_with_more_particles_than_its_budget_ends_there() {
     }
 }
 
-/// Without drains what emitters bring at least is known, and nothing is written.
+/// Without drains the minimum that emitters add is known, so the bake is refused before
+/// anything is written.
 #[test]
 fn a_bake_that_is_known_to_have_more_particles_is_refused_before_it_begins() {
     let job = job();
     let begin = SOURCES.find("[[drain]]").unwrap();
     job.edit("small.toml", &SOURCES[begin..], "");
-    // What a level keeps is not known, and only more.
+    // The amount that a level emitter adds is unknown, and only adds to it.
     let level = SOURCES.find("[[emitter]]\nmesh").unwrap();
     job.edit("small.toml", &SOURCES[level..begin], "");
     let bake = "bake small.toml --solver flip --device cpu";

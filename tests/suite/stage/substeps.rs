@@ -1,10 +1,10 @@
-//! The length of the last substep is a part of the state.
+//! The length of the last substep is part of the state.
 
 use swell::cache::CacheReader;
 
 use crate::support::job::Job;
 
-/// A column that falls: its speed asks for more substeps from frame to frame.
+/// A falling column: its speed requires more substeps from frame to frame.
 const FALL: &str = r#"
 [shot]
 name = "fall"
@@ -25,7 +25,8 @@ cfl = 1.0
 particle_spacing = 0.1
 "#;
 
-/// Resumed, begun from a frame and checked where the next substep is shorter, it goes on as the unbroken bake.
+/// A bake that is resumed, begun from a frame or checked where the next substep is shorter
+/// continues like the unbroken one.
 #[test]
 fn a_bake_goes_on_after_a_substep_of_another_length() {
     let job = Job::of(&[("fall.toml", FALL)]);

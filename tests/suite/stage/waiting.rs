@@ -1,11 +1,13 @@
-//! Emitters before solids: what `inspect` promises is what a bake brings, by both solvers, whatever the frame rate.
+//! Emitters covered by solids: a bake emits what `inspect` predicts, with both solvers and
+//! at any frame rate.
 
 use crate::support::job::{Job, assert_has};
 use swell::cache::CacheReader;
 
 const D: f64 = 0.05;
 
-/// An emitter that begins within a box, 0.05 m deep, and reaches out of it over as wide a face.
+/// An emitter that begins within a box, 0.05 m deep, and extends beyond it over an
+/// equally wide face.
 const SCENE: &str = r#"
 [shot]
 name = "waiting"
@@ -46,7 +48,7 @@ fn job() -> Job {
     Job::of(&[("waiting.toml", SCENE), ("box.obj", BOX)])
 }
 
-/// Particles that came in over a cache's frames, and those that never will.
+/// Particles that entered over a cache's frames, and particles that never will.
 fn brought(job: &Job, cache: &str) -> [u64; 2] {
     let reader = CacheReader::open(&job.path(cache)).unwrap();
     let of = |key: &str| {
@@ -57,8 +59,9 @@ fn brought(job: &Job, cache: &str) -> [u64; 2] {
     ["entered", "blocked"].map(of)
 }
 
-/// A layer is 4 × 4 particles. In half a second 10 come into the room; 0.05 m of its way and at most an eighth of a spacing lie within
-/// the box, so that one or two are still covered at the end.
+/// A layer is 4 × 4 particles. In half a second 10 layers enter the emitter's volume; 0.05 m of
+/// their path, plus at most an eighth of a spacing, is within the box, so that one or two are still
+/// covered at the end.
 #[test]
 fn what_a_solid_covers_enters_later_at_any_frame_rate() {
     let job = job();
@@ -87,7 +90,7 @@ fn what_a_solid_covers_enters_later_at_any_frame_rate() {
     assert_eq!(brought(&job, "open"), [160, 0]);
 }
 
-/// On the GPU too, and gone on with to the byte from where water waits.
+/// The same on the GPU, where a bake resumes bit for bit while water is waiting.
 #[test]
 fn a_bake_goes_on_where_water_waits() {
     let job = job();
@@ -99,7 +102,7 @@ fn a_bake_goes_on_where_water_waits() {
         let waiting = brought(&job, "parts")[0];
         job.expect(0, &format!("{bake} --resume -o parts"));
         assert_eq!(job.hash("parts"), job.hash("whole"), "{solver}");
-        // Two layers came into the room by then, and one of them is covered still.
+        // Two layers have entered the emitter's volume by then, and one of them is still covered.
         assert!(waiting < 32, "{waiting}");
         for cache in ["whole", "parts"] {
             std::fs::remove_dir_all(job.path(cache)).unwrap();
@@ -107,11 +110,12 @@ fn a_bake_goes_on_where_water_waits() {
     }
 }
 
-/// What a solid covers all along is left out of the promise, told of, and counted in the ledger.
+/// Water that a solid covers everywhere is left out of the prediction, reported, and
+/// counted in the ledger.
 #[test]
 fn what_never_enters_is_told_of() {
     let job = job();
-    // The box, drawn out along the room, over the lower half of it.
+    // The box, extended along the emitter's volume over its lower half.
     job.edit("waiting.toml", "mesh = \"box.obj\"", "mesh = \"beam.obj\"");
     job.write(
         "beam.obj",
@@ -122,11 +126,11 @@ fn what_never_enters_is_told_of() {
     let said = job.expect(0, "inspect waiting.toml");
     assert_has(&said, &[covered, "emitter[0] brings 0.0200 m³/s"]);
     assert_eq!(job.json(0, "inspect waiting.toml")["entering"], 80.0);
-    // The room is 0.4 m long: after 0.4 s the first go out of it.
+    // The volume is 0.4 m long: after 0.4 s the first particles leave it.
     let said = job.expect(0, "bake waiting.toml --device cpu -o cache");
     let [entered, blocked] = brought(&job, "cache");
     assert_eq!(entered, 80);
-    // A tenth of a second later two layers of 4 × 2 have gone out.
+    // A tenth of a second later two layers of 4 × 2 have left.
     assert_eq!(blocked, 2 * 8);
     assert_has(
         &said,

@@ -1,4 +1,4 @@
-//! Streams of whitewater: made, stopped, gone on with, tuned, refused.
+//! Whitewater streams: made, stopped, resumed, tuned, refused.
 
 use std::fs;
 
@@ -13,7 +13,7 @@ use swell::{
 
 use crate::support::job::{Job, assert_has};
 
-/// Thresholds low enough for the small splash of a job, and lives as short as it.
+/// Thresholds low enough for the small splash of a job, and lifetimes as short as the shot.
 const SETTINGS: &str = "[emission]\ntrapped_air = [0.2, 2.0]\nwave_crest = [0.2, 2.0]\n\
     energy = [0.02, 0.5]\n\
     [foam]\nlifetime = [0.02, 0.1]\n";
@@ -57,7 +57,7 @@ fn a_stream_is_made_beside_its_bake_and_leaves_it_as_it_was() {
             .iter()
             .all(|k| [0.0, 1.0, 2.0].contains(k))
     );
-    // Ids are for ever: some died, and no number came again.
+    // Ids are permanent: some particles died, and no id was reused.
     let told = |frame: u32, key: &str| reader.entry(frame).unwrap().report[key].as_u64().unwrap();
     let next = told(8, "next_id");
     assert_eq!(next, (1..=8).map(|frame| told(frame, "born")).sum::<u64>());
@@ -66,7 +66,7 @@ fn a_stream_is_made_beside_its_bake_and_leaves_it_as_it_was() {
     job.expect(0, &format!("verify {STREAM}"));
     job.expect(0, &format!("check {STREAM} --frames 3,8"));
     job.expect(0, &format!("diff {STREAM} {STREAM}"));
-    // The bake: checked, and gone on with, as if nothing stood beside it.
+    // The bake can be verified and resumed despite the stream beside it.
     job.expect(0, "verify cache/small/pbf");
     let said = job.expect(0, "bake small.toml --resume --frames 1-9");
     assert_has(&said, &["frame 9 of 9"]);
@@ -88,7 +88,7 @@ fn a_stopped_stream_goes_on_to_the_same_bytes() {
     assert_eq!(job.hash(STREAM), whole);
     // Nothing is left to do.
     assert_has(&job.expect(0, MAKE), &["0 frames"]);
-    // Control: another seed gives other bytes.
+    // Negative control: another seed gives other bytes.
     job.write("tuned.toml", &format!("seed = 2\n{SETTINGS}"));
     job.expect(0, &format!("{MAKE} --overwrite"));
     assert_ne!(job.hash(STREAM), whole);
@@ -107,7 +107,7 @@ fn other_settings_are_another_stream() {
     assert_eq!(job.hash(STREAM), first);
     let longer = census(&job, "cache/small/pbf/whitewater/longer");
     assert!(longer[8] > census(&job, STREAM)[8], "{longer:?}");
-    // What was calibrated and what had a default stands written out, and makes the same stream.
+    // The settings written out, with calibrated and default values, make the same stream.
     job.expect(0, "whitewater cache/small/pbf --name a");
     let written = "cache/small/pbf/whitewater/a/assets/whitewater.toml";
     job.expect(
@@ -123,7 +123,8 @@ fn other_settings_are_another_stream() {
     assert_eq!(frame("a"), frame("b"));
 }
 
-/// From every second frame the water between is made by a cubic, and the stream has frames where the water has.
+/// With every second frame kept, the water between is interpolated by a cubic, and the stream has
+/// the frames that the water has.
 #[test]
 fn frames_that_were_not_kept_are_bridged() {
     let job = baked();
@@ -138,7 +139,7 @@ fn frames_that_were_not_kept_are_bridged() {
     let total = |particles: &Particles| particles.len() as f64;
     let full = CacheReader::open(&job.path(STREAM)).unwrap();
     let (a, b) = (total(&thin.read(8).unwrap()), total(&full.read(8).unwrap()));
-    // Two streams of one splash; births depend on the water between by little.
+    // Two streams of one splash; births depend little on the water between kept frames.
     assert!((a / b - 1.0).abs() < 0.2, "{a} {b}");
 }
 
@@ -151,14 +152,14 @@ fn the_reference_makes_a_stream_without_a_device() {
         census(&job, STREAM),
         census(&job, "cache/small/pbf/whitewater/cpu"),
     );
-    // Births hang on potentials that agree to rounding: a few chances fall the other way.
+    // Births depend on potentials that agree up to rounding: a few random draws differ.
     assert!(
         (gpu[8] as f64 / cpu[8] as f64 - 1.0).abs() < 0.02,
         "{gpu:?} {cpu:?}"
     );
 }
 
-/// A limit that the bake would pass is told of before it is met.
+/// A warning predicts that the limit will be exceeded, before it is.
 #[test]
 fn a_limit_is_foretold_from_the_first_frames() {
     let job = baked();
@@ -175,11 +176,11 @@ fn a_limit_is_foretold_from_the_first_frames() {
         let frames = before.filter(|event| event["event"] == "frame").count();
         (told.collect::<Vec<_>>(), frames as u64)
     };
-    // The control: the default allows as many as there come to be.
+    // Negative control: the default allows every particle.
     assert_eq!(warnings(MAKE, 0).0, [] as [serde_json::Value; 0]);
     let counts = census(&job, STREAM);
     assert!(counts[2] > 0, "{counts:?}");
-    // What frame 7 would have at the growth of the frames up to 6.
+    // The count of frame 7, extrapolated from the growth up to frame 6.
     let allowed = counts[6] + (counts[6] - counts[2]) / 4 - 1;
     let met = counts.iter().position(|&count| count > allowed).unwrap() as u64;
     job.write(
@@ -204,7 +205,7 @@ fn what_cannot_be_is_refused() {
     job.write("few.toml", &format!("max_particles = 50\n{SETTINGS}"));
     let said = job.expect(5, "whitewater cache/small/pbf --settings few.toml");
     assert_has(&said, &["max_particles", "50"]);
-    // Its last good frame stands.
+    // Its last good frame is kept.
     assert!(
         census(&job, "cache/small/pbf/whitewater/few")
             .iter()

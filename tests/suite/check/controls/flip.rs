@@ -2,7 +2,7 @@
 
 use super::{Control, control};
 
-/// Of a scene whose walls move.
+/// Faults in a scene with moving walls.
 pub const FLIP_WALLS: &[Control] = &[control(
     "flip/boundary_work",
     "for (var k = 0u;",
@@ -11,7 +11,7 @@ pub const FLIP_WALLS: &[Control] = &[control(
     &["shares of the work"],
 )];
 
-/// What is handed another system than the twin's.
+/// Passes that are given another system than the reference's.
 pub const SYSTEM: &[&str] = &[
     "pressure/multiply",
     "pressure/divergence",
@@ -522,7 +522,7 @@ pub const FLIP: &[Control] = &[
         "pressure/restrict",
         &["residual of the coarser level"],
     ),
-    // More of it, where there is something to restrict and to sweep, in the variant of a channel.
+    // Further controls, with something to restrict and to sweep, are in the variant of a channel.
     control(
         "pressure/solve_coarse",
         "wr + w * (",
@@ -572,7 +572,7 @@ pub const FLIP: &[Control] = &[
         "pressure/reduce",
         &["sums and what follows"],
     ),
-    // A sum that is not of what the pass wrote.
+    // A sum that does not match the values that the pass wrote.
     control(
         "pressure/multiply",
         "sum_workgroup(dot_pair",

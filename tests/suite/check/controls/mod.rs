@@ -6,12 +6,12 @@ pub(super) mod variants;
 
 use swell::gpu::adapter::Spoil;
 
-/// A fault in one pass, and what must fail first by it.
+/// A fault in one pass, and the rows that must fail first because of it.
 pub struct Control {
     pub spoil: Spoil,
     pub pass: &'static str,
     pub fields: &'static [&'static str],
-    /// Passes that are handed what contradicts itself by it.
+    /// Passes whose inputs the fault makes inconsistent, which may fail too.
     pub follow: &'static [&'static str],
 }
 

@@ -2,7 +2,7 @@
 
 use super::{Control, control};
 
-/// Who looks for neighbours in cells that do not hold them does not find them.
+/// Passes that look for neighbours in cells that do not contain them, and so do not find them.
 const UNSORTED: [&str; 5] = [
     "sort/place",
     "sort/stabilize",
@@ -11,7 +11,7 @@ const UNSORTED: [&str; 5] = [
     "pbf/assign_cells",
 ];
 
-/// Of a scene whose walls move.
+/// Faults in a scene with moving walls.
 pub const PBF_WALLS: &[Control] = &[
     control(
         "pbf/predict",
@@ -216,7 +216,7 @@ pub const PBF: &[Control] = &[
         "pbf/update_velocity",
         &["position for neighbours"],
     )
-    // It reads neighbours' places there, and its own particle's where the cache has it.
+    // It reads neighbours' positions there, and its own particle's from the cache.
     .and(&["effects/viscosity_gather"]),
     control(
         "pbf/update_velocity",
@@ -317,7 +317,7 @@ pub const PBF: &[Control] = &[
     .and(&["pbf/build_neighbors"]),
 ];
 
-/// Faults that show only where a chunk is not the first.
+/// Faults that show only in chunks after the first.
 pub const CHUNKED: &[Control] = &[
     control(
         "pbf/build_neighbors",
@@ -343,7 +343,7 @@ pub const CHUNKED: &[Control] = &[
     ),
 ];
 
-/// Faults of the search that takes the place of lists.
+/// Faults of the search that replaces the lists.
 pub const SEARCHED: &[Control] = &[
     control(
         "pbf/compute_lambda",
@@ -359,7 +359,7 @@ pub const SEARCHED: &[Control] = &[
         "pbf/compute_delta",
         &["corrected position"],
     ),
-    // Of places in two bindings.
+    // With positions in two bindings.
     control(
         "pbf/compute_lambda",
         "predicted_high[j - PAGE]",

@@ -1,4 +1,5 @@
-//! What a scene may ask of FLIP beyond the common case, and faults in what it alone runs.
+//! What a scene may request of FLIP beyond the common case, and faults in the code
+//! that only this runs.
 
 use glam::DVec3;
 use swell::{
@@ -17,7 +18,7 @@ use swell::{
 use super::{Control, control, flip::SYSTEM, tension::TENSION};
 use crate::support::{D, lattice, mover, noise, turning};
 
-/// A change of the common case, and what must fail by which fault.
+/// A change of the common case, and the faults that its check must detect.
 pub struct Variant {
     pub name: &'static str,
     pub change: fn(&mut Scene, &mut Start),
@@ -45,7 +46,7 @@ fn apic(scene: &mut Scene, start: &mut Start) {
     }
 }
 
-/// As strong as gravity is in a cell, on water off the walls: with air on both of its sides.
+/// As strong as gravity within a cell, on water away from the walls, with air on both sides.
 fn tension(scene: &mut Scene, start: &mut Start) {
     for x in &mut start.particles.position {
         x[0] += 0.3;
@@ -57,7 +58,7 @@ fn voxel(scene: &mut Scene, _: &mut Start) {
     flip(scene).surface = Surface::Voxel;
 }
 
-/// A box within the water that moves on and turns, with particles about it.
+/// A box within the water that moves and turns, with particles around it.
 fn moving_solid(scene: &mut Scene, start: &mut Start) {
     let bounds = Bounds {
         min: DVec3::new(0.33, 0.37, 0.21),
@@ -89,7 +90,7 @@ fn moving_solid(scene: &mut Scene, start: &mut Start) {
     };
 }
 
-/// All six walls, of which two cut cells of water.
+/// All six walls, two of which cut cells of water.
 fn no_slip(scene: &mut Scene, start: &mut Start) {
     scene.domain.max = DVec3::new(1.31, 6.4, 1.13);
     scene.no_slip = Wall::NAMED.iter().map(|named| named.1).collect();
@@ -106,7 +107,8 @@ fn pocket(scene: &mut Scene, start: &mut Start) {
     stir(&mut start.particles);
 }
 
-/// Four bricks in a row, so that two levels, of two bricks and of one, are left to the multigrid's last workgroup.
+/// Four bricks in a row, so that the multigrid's last workgroup handles two levels, of two
+/// bricks and of one.
 fn channel(scene: &mut Scene, start: &mut Start) {
     scene.domain.max = DVec3::new(6.2, 1.4, 1.4);
     start.boundary = Boundary::default();
@@ -114,8 +116,8 @@ fn channel(scene: &mut Scene, start: &mut Start) {
     stir(&mut start.particles);
 }
 
-/// Water nearer to the floor than it may end, where a solid of distances half as steep as they should be stands upon it:
-/// each push goes half of the way, and none of it upwards.
+/// Water below its minimum distance from the floor, next to a solid whose distances are half as
+/// steep as they should be: each push goes half of the required length, and none of it upwards.
 fn corner(_: &mut Scene, start: &mut Start) {
     let dims = [16, 10, 16];
     let value = |k: usize| (0.5 * (0.5 - (0.1 * (k % 16) as f64 - 0.15))) as f32;
@@ -300,7 +302,7 @@ pub const VARIANTS: &[Variant] = &[
                 "pressure/solve_coarse",
                 &["residuals of the coarser levels"],
             ),
-            // The way back up left out, the wrong colour restricted, one sweep in place of eight.
+            // The way back up is omitted, the wrong colour restricted, one sweep replaces eight.
             control(
                 "pressure/solve_coarse",
                 "let above = above_about(s);",
@@ -379,7 +381,7 @@ pub const VARIANTS: &[Variant] = &[
         name: "corner of a wall and a solid",
         change: corner,
         controls: &[
-            // How often such a particle is pushed was asked again after each push.
+            // The number of pushes is decided again after each push.
             control(
                 "flip/advect",
                 "k < rounds",

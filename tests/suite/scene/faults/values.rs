@@ -212,7 +212,7 @@ pub const VALUE_FAULTS: &[Fault] = &[
         1,
         &["shot: invalid type: integer `3`, expected a table;"],
     ),
-    // Boxes.
+    // Boxes and sizes.
     (
         "max = [25.0, 12.6, 15.0]",
         "max = [25.0, 1e-9, 15.0]",
@@ -255,7 +255,6 @@ pub const VALUE_FAULTS: &[Fault] = &[
         15,
         &["too thin for one layer"],
     ),
-    // Size.
     (
         "= 0.1\n",
         "= 0.001\n",

@@ -1,4 +1,4 @@
-//! Values that are no numbers, put into one pass: caught within the frame, and the pass named.
+//! NaNs that one pass writes are caught within the frame, and the pass is named.
 
 use std::{fs, path::Path};
 
@@ -17,14 +17,14 @@ use tempfile::TempDir;
 
 use super::{Baked, SOLVERS, bake, load, opened, spoil, spoiled};
 
-/// What is no number, in WGSL: a compiler knows none that is constant.
+/// A NaN in WGSL, computed from a variable because a constant NaN does not compile.
 macro_rules! nan {
     ($seed:literal) => {
         concat!("bitcast<f32>(0x7fc00000u | min(", $seed, ", 1u))")
     };
 }
 
-/// Goes on with a sound cache on a device with a fault in one pass.
+/// Resumes a sound cache on a device with a fault in one pass.
 pub(super) fn is_caught(context: &Context, scene: &Scene, sound: &Path, spoil: Spoil) {
     let opened = spoiled(context, spoil);
     let mut broken = bake_copy(sound);
@@ -45,7 +45,7 @@ pub(super) fn is_caught(context: &Context, scene: &Scene, sound: &Path, spoil: S
         said.contains(&format!("first in {} of substep 1", spoil.pass)),
         "{said}"
     );
-    // The line that a replay gives.
+    // A replay gives the same message.
     let kept = failed::read(&broken.cache().join("failed")).unwrap();
     let start = Start::of(scene).unwrap();
     let again = replay(
@@ -58,7 +58,7 @@ pub(super) fn is_caught(context: &Context, scene: &Scene, sound: &Path, spoil: S
     .unwrap();
     assert_eq!(again.as_ref(), Some(broken.failure()));
     assert!(said.starts_with(&again.unwrap().to_string()), "{said}");
-    // Nothing else of the cache is other than it was.
+    // The rest of the cache is unchanged.
     failed::remove(&broken.cache()).unwrap();
     assert_eq!(
         directory_hash(&broken.cache()).unwrap(),
@@ -146,7 +146,8 @@ fn what_is_no_number_is_caught_within_the_frame_and_its_pass_named_pbf() {
     ] {
         is_caught(&context, &scene, &sound.cache(), spoil);
     }
-    // Control: without a fault the frames are made, and there is nothing to find in them.
+    // Negative control: without a fault the frames are complete, and a replay finds
+    // nothing in them.
     let mut whole = bake_copy(&sound.cache());
     whole.go_on(&opened(&context), &scene, "1-4");
     assert!(whole.error.is_none(), "{:?}", whole.error);

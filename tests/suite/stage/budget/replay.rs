@@ -1,4 +1,4 @@
-//! What a replay names, in each precision of the projection.
+//! The pass that a replay names, in each precision of the projection.
 
 use swell::{
     domain::budget::Watched,
@@ -8,14 +8,15 @@ use swell::{
 
 use super::{SOLVERS, bake, load, not_a_number::is_caught, opened, spoil};
 
-/// A solve's scalars and arrays have another layout in f64. Read as f32, their words are no numbers here and there, and no
-/// residual. And a solve that takes more than one batch of iterations runs the passes behind it more than once, empty.
+/// A solve's scalars and arrays have another layout in f64. Read as f32, some of their words would
+/// be NaNs, and none a residual. And a solve that takes more than one batch of iterations runs the
+/// later passes more than once, with no work.
 #[test]
 fn a_replay_names_the_pass_of_a_residual_in_each_precision() {
     let needs = Needs { f64: true };
     let context = Context::open_for(None, needs).expect("an adapter with f64, as lavapipe is");
-    // One iteration, from which no solve comes near; and more than are submitted at once, to a tolerance that as many plain
-    // iterations do not reach.
+    // One iteration, which is never enough; and more than one batch, to a tolerance that the same
+    // number of plain iterations does not reach.
     let single = (
         "budget.residual=1e-5",
         ["max_iterations=1", "preconditioner=none", "tolerance=1e-5"],
@@ -48,7 +49,7 @@ fn a_replay_names_the_pass_of_a_residual_in_each_precision() {
     }
 }
 
-/// The pass that writes what is no number is named where its words are those of f64.
+/// The pass that writes a NaN is found where its words are those of f64.
 #[test]
 fn a_replay_names_the_pass_of_a_number_that_is_none_in_f64() {
     let needs = Needs { f64: true };
