@@ -67,8 +67,8 @@ pub enum CacheError {
     },
     /// A bake in an older format, which can be read but not resumed.
     #[error(
-        "{} was baked in cache format {found}, and this program writes {newest}: begin from one of its frames with \
-         --from {}:FRAME and another -o, or bake it anew",
+        "{} was baked in cache format {found}, and this program writes {newest}: begin from one of \
+         its frames with --from {}:FRAME and another -o, or bake it anew",
         dir.display(), dir.display()
     )]
     OldFormat {
@@ -81,8 +81,8 @@ pub enum CacheError {
     },
     /// A bake cannot be resumed with other probes: the existing frames were not observed by them.
     #[error(
-        "{} was baked with {cached}, and this run has {given}: what a probe sees while a frame is computed cannot be \
-         made up afterwards; go on with the same probes, or choose another -o",
+        "{} was baked with {cached}, and this run has {given}: what a probe sees while a frame is \
+         computed cannot be made up afterwards; go on with the same probes, or choose another -o",
         dir.display()
     )]
     OtherProbes {
@@ -106,8 +106,8 @@ pub enum CacheError {
     },
     /// The cache has a format version that this program does not read.
     #[error(
-        "{} has cache format {found}, and this program reads {oldest} to {newest}: bake it anew, or use the program \
-         that wrote it",
+        "{} has cache format {found}, and this program reads {oldest} to {newest}: bake it anew, \
+         or use the program that wrote it",
         dir.display()
     )]
     Format {
@@ -142,8 +142,8 @@ pub enum CacheError {
     },
     /// A frame was requested whose particles the bake did not keep.
     #[error(
-        "{} has no particles of frame {frame}, as its scene has [keep] particles = \"{keep}\"; the nearest frames that \
-         have them are {before} and {after}",
+        "{} has no particles of frame {frame}, as its scene has [keep] particles = \"{keep}\"; the \
+         nearest frames that have them are {before} and {after}",
         dir.display()
     )]
     NotKept {

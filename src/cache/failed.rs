@@ -174,7 +174,10 @@ mod tests {
                 ..Particles::default()
             },
             last_frame: 12,
-            report: json!({ "last_frame": 12, "measured": 0.1 + 0.2, "limit": null, "pass": { "name": "flip/advect" } }),
+            report: json!({
+                "last_frame": 12, "measured": 0.1 + 0.2, "limit": null,
+                "pass": { "name": "flip/advect" },
+            }),
         }
     }
 

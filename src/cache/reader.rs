@@ -321,8 +321,8 @@ impl CacheReader {
             problems.push(Problem {
                 file: self.dir.join(ledger::FILE),
                 what: format!(
-                    "its last line is torn after frame {}; --resume cuts it (a bake that runs now may \
-                     be writing it)",
+                    "its last line is torn after frame {}; --resume cuts it (a bake that runs \
+                     now may be writing it)",
                     self.last_frame()
                 ),
             });

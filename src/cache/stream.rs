@@ -229,9 +229,12 @@ mod tests {
 
     fn manifest(shot: &str, compression: Value) -> Manifest {
         serde_json::from_value(json!({
-            "format_version": Manifest::FORMAT_VERSION, "program": "swell", "program_version": "0", "shot": shot,
-            "scene_hash": "", "solver": "pbf", "device": "", "driver": "", "backend": "", "frames_per_second": 24.0,
-            "particle_spacing": 0.1, "rest_density": 1000.0, "attributes": [], "start_particles": 0, "files": [],
+            "format_version": Manifest::FORMAT_VERSION, "program": "swell", "program_version": "0",
+            "shot": shot,
+            "scene_hash": "", "solver": "pbf", "device": "", "driver": "", "backend": "",
+            "frames_per_second": 24.0,
+            "particle_spacing": 0.1, "rest_density": 1000.0, "attributes": [], "start_particles": 0,
+            "files": [],
             "compression": compression,
         }))
         .unwrap()

@@ -93,7 +93,8 @@ impl Table<'_> {
         let same = differs.unwrap_or(found.len().min(expected.len()));
         let line = 1 + expected[..same].iter().filter(|&&b| b == b'\n').count();
         Some(format!(
-            "line {line} is not what the ledger has; --resume writes it anew (a bake that runs now may be writing it)"
+            "line {line} is not what the ledger has; --resume writes it anew (a bake that runs \
+             now may be writing it)"
         ))
     }
 }

@@ -21,7 +21,8 @@ const BLOCK: usize = 1024;
 
 bounds! {
     /// Distance from a cell's face within which either cell is correct, in cells.
-    pub(super) NEAR_FACE = [place: "a particle's coordinate in cells"] 4.0 * U * place, "a cell's face";
+    pub(super) NEAR_FACE = [place: "a particle's coordinate in cells"]
+        4.0 * U * place, "a cell's face";
 }
 
 entries! {

@@ -27,27 +27,38 @@ use super::{
 };
 
 bounds! {
-    SHARE_ERROR = [scale: "the kernel's scale", fluid: "of the water " KERNEL, solid: "of the solids " KERNEL, walls: "" WALL_DENSITY,
-        share: "the share of water", free: "what walls and solids leave free"]
+    SHARE_ERROR = [scale: "the kernel's scale", fluid: "of the water " KERNEL,
+        solid: "of the solids " KERNEL, walls: "" WALL_DENSITY, share: "the share of water",
+        free: "what walls and solids leave free"]
         (scale * fluid + share * (walls + scale * solid)) / free + 12.0 * U * share, "a quotient";
-    STEEPNESS = [scale: "the gradient's scale", sums: "" GRADIENT, walls: "over h " WALL_GRADIENT] scale * sums + walls, "";
-    DIRECTION = [steepness: "|∇|", error: "" STEEPNESS] 2.0 * error / steepness + 12.0 * U, "a vector over its own length";
-    SURENESS = [error: "h times " STEEPNESS, span: "from where a surface begins to where it is full"] error / span + 12.0 * U, "";
+    STEEPNESS = [scale: "the gradient's scale", sums: "" GRADIENT, walls: "over h " WALL_GRADIENT]
+        scale * sums + walls, "";
+    DIRECTION = [steepness: "|∇|", error: "" STEEPNESS]
+        2.0 * error / steepness + 12.0 * U, "a vector over its own length";
+    SURENESS = [error: "h times " STEEPNESS,
+        span: "from where a surface begins to where it is full"]
+        error / span + 12.0 * U, "";
     NO_SURFACE = [error: "h times " STEEPNESS, least: "where a surface begins"] least - error,
         "a gradient so small that there is surely no surface: its direction is noise";
-    TRAPPED = [n: "candidates", speeds: "Σ |v_ij|", weighted: "Σ |v_ij| W"] U * (24.0 * speeds + (n + 60.0) * weighted),
+    TRAPPED = [n: "candidates", speeds: "Σ |v_ij|", weighted: "Σ |v_ij| W"]
+        U * (24.0 * speeds + (n + 60.0) * weighted),
         "W errs by 11 u, the length by 9 u, the cosine by 14 u, each term is at most 2 |v_ij| W";
-    CREST = [sums: "Σ W (what the normals and their sureness err by)", n: "candidates", weight: "Σ W",
-        crest: "the sum itself", own: "by what the particle's own sureness and direction of motion err"]
+    CREST = [sums: "Σ W (what the normals and their sureness err by)", n: "candidates",
+        weight: "Σ W", crest: "the sum itself",
+        own: "by what the particle's own sureness and direction of motion err"]
         sums + U * (22.0 * n + 2.0 * (n + 20.0) * weight) + crest * own, "";
-    PLACE = [place: "|x| + |way|", way: "of a drop: what air takes of it; else by what the water's velocity errs, times Δt"]
+    PLACE = [place: "|x| + |way|",
+        way: "of a drop: what air takes of it; else by what the water's velocity errs, times Δt"]
         8.0 * U * place + way, "";
-    CARRIED = [sums: "with w = |v| " KERNEL, kernel: "Σ p³", speed: "the largest |v| about", spread: "|Δv| about over h, times " PLACE]
+    CARRIED = [sums: "with w = |v| " KERNEL, kernel: "Σ p³", speed: "the largest |v| about",
+        spread: "|Δv| about over h, times " PLACE]
         2.0 * sums / kernel + 8.0 * U * speed + spread, "a weighted mean";
     FLOWN = [taken: "what air takes", pull: "|v| + |g| Δt"] 1e-5 * taken + 60.0 * U * pull,
         "eight steps; a power by way of exp2 and log2 errs by 4e-6";
-    DECIDED = [place: "" PLACE, h: "", scale: "the kernel's scale", sums: "" KERNEL, free: "what walls and solids leave free"]
-        (4.0 * place / h + 4.0 * scale * sums + 64.0 * U) / free, "what a share errs by on the way: both outcomes are right";
+    DECIDED = [place: "" PLACE, h: "", scale: "the kernel's scale", sums: "" KERNEL,
+        free: "what walls and solids leave free"]
+        (4.0 * place / h + 4.0 * scale * sums + 64.0 * U) / free,
+        "what a share errs by on the way: both outcomes are right";
 }
 
 entries! {

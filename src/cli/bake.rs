@@ -29,24 +29,30 @@ use super::{
 pub(super) struct BakeArgs {
     /// Scene file (TOML).
     scene: PathBuf,
-    /// Cache directory; SHOT/SOLVER in the folder that SWELL_CACHE names, or in cache/, where left out.
+    /// Cache directory; SHOT/SOLVER in the folder that SWELL_CACHE names, or in cache/, where left
+    /// out.
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
     /// Which solver, pbf or flip: short for --set solver.method=SOLVER.
     #[arg(long, value_name = "SOLVER", value_parser = method)]
     solver: Option<Method>,
-    /// Begin from a frame of another cache, such as cache/wave-city/pbf:120, of the same solver, spacing and frame
-    /// rate; numbers and time go on from there.
-    #[arg(long, value_name = "CACHE:FRAME", value_parser = OsStringValueParser::new().try_map(BranchPoint::try_from))]
+    /// Begin from a frame of another cache, such as cache/wave-city/pbf:120, of the same solver,
+    /// spacing and frame rate; numbers and time go on from there.
+    #[arg(
+        long,
+        value_name = "CACHE:FRAME",
+        value_parser = OsStringValueParser::new().try_map(BranchPoint::try_from)
+    )]
     from: Option<BranchPoint>,
-    /// Frames to bake, such as 1-30; the whole shot where left out. With --resume past the end of the shot, which is then
-    /// longer.
+    /// Frames to bake, such as 1-30; the whole shot where left out. With --resume past the end of
+    /// the shot, which is then longer.
     #[arg(long, value_name = "A-B")]
     frames: Option<FrameRange>,
     /// Override a scene key, such as solver.pbf.iterations=8.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// Go on after the last frame of the cache's ledger, if there is one. That frame is read whole, the others are looked for.
+    /// Go on after the last frame of the cache's ledger, if there is one. That frame is read whole,
+    /// the others are looked for.
     #[arg(long)]
     resume: bool,
     /// Take meshes and tables that lie outside of the scene's folder.
@@ -188,7 +194,8 @@ fn dry_run(request: &Request, progress: &Progress) -> Result<u8, Failure> {
         output::water(found.volume)
     );
     let more = json!({
-        "particles": found.particles, "removed": found.removed, "volume": found.volume.made, "volume_asked": found.volume.asked,
+        "particles": found.particles, "removed": found.removed, "volume": found.volume.made,
+        "volume_asked": found.volume.asked,
         "disk_free": found.room.free,
     });
     told.tell(progress, &words, more);
@@ -210,7 +217,8 @@ fn warn_of_room(progress: &Progress, room: Room) {
     if let Some(free) = room.short_of() {
         progress.say(
             &format!(
-                "warning: the disk has {} free, and the frames will take {}; a bake ends where it is full, and --resume goes on",
+                "warning: the disk has {} free, and the frames will take {}; a bake ends where it \
+                 is full, and --resume goes on",
                 size(free),
                 taken(room)
             ),
@@ -263,7 +271,8 @@ pub(super) fn tell(progress: &Progress, event: Event) {
                 count => format!(", {count} boundary samples"),
             };
             let text = format!(
-                "{solver} on {device}\n{} ({removed} left out where solids are), {}{samples}{memory}\n{span}",
+                "{solver} on {device}\n{} ({removed} left out where solids are), \
+                 {}{samples}{memory}\n{span}",
                 count(particles as u64, "particle"),
                 output::water(volume)
             );
@@ -281,8 +290,11 @@ pub(super) fn tell(progress: &Progress, event: Event) {
             progress.say(
                 &text,
                 json!({
-                    "event": "ready", "solver": solver, "device": device, "particles": particles, "removed": removed,
-                    "volume": volume.made, "volume_asked": volume.asked, "boundary_samples": boundary_samples, "bytes": bytes.map(|(all, _)| all), "list_bytes": bytes.map(|(_, lists)| lists), "first": first, "last": last,
+                    "event": "ready", "solver": solver, "device": device, "particles": particles,
+                    "removed": removed,
+                    "volume": volume.made, "volume_asked": volume.asked,
+                    "boundary_samples": boundary_samples, "bytes": bytes.map(|(all, _)| all),
+                    "list_bytes": bytes.map(|(_, lists)| lists), "first": first, "last": last,
                     "frames": frames, "disk_bytes": room.bytes, "disk_free": room.free,
                 }),
             );
@@ -313,8 +325,8 @@ fn line(frame: u32, report: &StepReport, seconds: f64) -> String {
         )
     });
     format!(
-        "frame {frame:4}  {seconds:6.2} s  {} substeps, {} iterations{projection}  density error {:.2} % (99 %: {:.2}, \
-         max {:.2})  top speed {:.2} m/s  {} capped",
+        "frame {frame:4}  {seconds:6.2} s  {} substeps, {} iterations{projection}  density error \
+         {:.2} % (99 %: {:.2}, max {:.2})  top speed {:.2} m/s  {} capped",
         report.substeps,
         report.iterations,
         100.0 * report.density_error_mean,
@@ -382,8 +394,9 @@ fn warnings(frame: u32, report: &StepReport) -> Vec<Recurring> {
     }
     if projection.missed > 0 {
         let text = format!(
-            "{} solves missed their tolerance; of pressure the residual is up to {:.1e}, the divergence up to {:.1e} /s, and where \
-             these are small it was an effect's solve that needed more iterations than it may take",
+            "{} solves missed their tolerance; of pressure the residual is up to {:.1e}, the \
+             divergence up to {:.1e} /s, and where these are small it was an effect's solve that \
+             needed more iterations than it may take",
             projection.missed, projection.residual, projection.divergence_after
         );
         let event = json!({ "missed": projection.missed, "residual": projection.residual });
@@ -392,7 +405,8 @@ fn warnings(frame: u32, report: &StepReport) -> Vec<Recurring> {
     let squeezed = projection.incompatible;
     if squeezed > INCOMPATIBLE * projection.divergence_before {
         let text = format!(
-            "water without air was squeezed by {squeezed:.1e} /s, which no pressure undoes: its volume is not kept"
+            "water without air was squeezed by {squeezed:.1e} /s, which no pressure undoes: \
+             its volume is not kept"
         );
         let event = json!({ "incompatible": squeezed });
         warn("incompatible pocket", squeezed, text, event);

@@ -22,15 +22,16 @@ use super::{
 
 #[derive(Args, Debug)]
 pub(super) struct CheckArgs {
-    /// A cache's folder, or a scene file (TOML), of which the start is taken; or the `failed` folder of a cache, whose
-    /// frame is then computed again.
+    /// A cache's folder, or a scene file (TOML), of which the start is taken; or the `failed`
+    /// folder of a cache, whose frame is then computed again.
     #[arg(value_name = "CACHE|SCENE")]
     source: PathBuf,
     /// Frames of the cache from which the step is taken, such as 1,30,72; its last where left out.
     #[arg(long, value_name = "FRAMES")]
     frames: Option<FrameRange>,
-    /// Substep of the frame after each that is checked: a number from 1 on, or last. The ones before it run, and are not
-    /// compared. With 1, the default, a frame of a cache is itself what the passes read.
+    /// Substep of the frame after each that is checked: a number from 1 on, or last. The ones
+    /// before it run, and are not compared. With 1, the default, a frame of a cache is itself what
+    /// the passes read.
     #[arg(long, value_name = "N|last")]
     substep: Option<Which>,
     /// Of a scene: which solver, pbf or flip.
@@ -207,11 +208,12 @@ fn tell(progress: &Progress, event: &Event<'_>) {
                 progress.say(&text, event);
             }
             progress.say(
-                    &format!("{solver} on {device} against f64, {particles} particles at the start"),
-                    json!({
-                        "event": "ready", "solver": solver, "device": device, "particles": particles, "frames": frames,
-                    }),
-                );
+                &format!("{solver} on {device} against f64, {particles} particles at the start"),
+                json!({
+                    "event": "ready", "solver": solver, "device": device,
+                    "particles": particles, "frames": frames,
+                }),
+            );
         }
         Event::Frame {
             frame,
@@ -231,7 +233,8 @@ fn tell(progress: &Progress, event: &Event<'_>) {
                 ),
                 Status::Done,
                 json!({
-                    "event": "frame", "frame": frame, "substep": checked.substep, "seconds": seconds, "rows": rows.len(),
+                    "event": "frame", "frame": frame, "substep": checked.substep,
+                    "seconds": seconds, "rows": rows.len(),
                     "over": over,
                 }),
             );
@@ -240,13 +243,12 @@ fn tell(progress: &Progress, event: &Event<'_>) {
 }
 
 fn to_json(outcome: &Outcome) -> serde_json::Value {
-    let first = outcome
-        .first_over
-        .map(|first| {
-            json!({
-                "frame": first.frame, "substep": first.substep, "pass": first.pass, "field": first.field,
-            })
-        });
+    let first = outcome.first_over.map(|first| {
+        json!({
+            "frame": first.frame, "substep": first.substep, "pass": first.pass,
+            "field": first.field,
+        })
+    });
     json!({
         "frames": outcome.frames,
         "substeps": outcome.substeps,
@@ -341,13 +343,19 @@ fn verdict(outcome: &Outcome) -> String {
                     reason => format!(" ({reason})"),
                 };
                 let unit = row.field.unit;
-                let unit = if unit.is_empty() { "" } else { &format!(" {unit}") };
+                let unit = if unit.is_empty() {
+                    ""
+                } else {
+                    &format!(" {unit}")
+                };
                 format!(
-                    "; off by {error}{unit} where {tolerance}{unit} is allowed{reason}; --json has the derivation"
+                    "; off by {error}{unit} where {tolerance}{unit} is allowed{reason}; \
+                     --json has the derivation"
                 )
             });
             format!(
-                "out of tolerance: {pass} first, its {field}, in substep {} after frame {frame}{why}",
+                "out of tolerance: {pass} first, its {field}, in substep {} \
+                 after frame {frame}{why}",
                 substep.unwrap_or_default()
             )
         }

@@ -18,8 +18,8 @@ use super::{
 
 #[derive(Args, Debug)]
 pub(super) struct SurfaceArgs {
-    /// Check the water's surface in pictures: depth and normals of splats and of rays against rays cast in f64 through the
-    /// particles' own field.
+    /// Check the water's surface in pictures: depth and normals of splats and of rays against rays
+    /// cast in f64 through the particles' own field.
     #[arg(long, requires = "look")]
     render: bool,
     /// With --render: whose camera is taken, and whose surface.
@@ -28,7 +28,8 @@ pub(super) struct SurfaceArgs {
     /// With --render: score each method's picture against one by finer rays.
     #[arg(long, requires = "render")]
     colour: bool,
-    /// With --render: measure what flickers, from each frame and its two neighbours, against finer rays.
+    /// With --render: measure what flickers, from each frame and its two neighbours, against finer
+    /// rays.
     #[arg(long, requires = "render")]
     flicker: bool,
 }
@@ -110,7 +111,8 @@ fn to_json(outcome: &Outcome, is_within: bool) -> serde_json::Value {
 
 fn show(outcome: &Outcome, is_within: bool) -> String {
     let mut text = format!(
-        "{} on {} against rays in f64 ({:.1} s a frame)\n{:6} {:>9} {:>15} {:>15} {:>15} {:>15} {:>8} {:>10}\n",
+        "{} on {} against rays in f64 ({:.1} s a frame)\n\
+         {:6} {:>9} {:>15} {:>15} {:>15} {:>15} {:>8} {:>10}\n",
         count(outcome.frames.len() as u64, "frame"),
         outcome.device,
         outcome.truth_seconds,
@@ -202,7 +204,8 @@ fn pictures(text: &mut String, outcome: &Outcome) {
         if let (Some(flicker), Some(residual)) = (row.flicker, row.residual) {
             let _ = writeln!(
                 text,
-                "{:6} flicker beyond finer rays: {:.3} % of white; off the mean of their neighbours by {:.3} %",
+                "{:6} flicker beyond finer rays: {:.3} % of white; off the mean of \
+                 their neighbours by {:.3} %",
                 row.method,
                 100.0 * flicker,
                 100.0 * residual

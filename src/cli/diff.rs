@@ -45,10 +45,14 @@ pub(super) struct DiffArgs {
     #[arg(long)]
     ignore_hashes: bool,
     /// Write cache A as a baseline, or add its adapter to the one that stands there.
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["b", "tolerance", "output", "ignore_hashes"])]
+    #[arg(
+        long,
+        value_name = "FILE",
+        conflicts_with_all = ["b", "tolerance", "output", "ignore_hashes"]
+    )]
     write_baseline: Option<PathBuf>,
-    /// With --write-baseline: a bake that differs from cache A in roundings alone; the limits are taken from how far these
-    /// come apart.
+    /// With --write-baseline: a bake that differs from cache A in roundings alone; the limits are
+    /// taken from how far these come apart.
     #[arg(long, value_name = "CACHE", requires = "write_baseline")]
     spread: Vec<PathBuf>,
 }
@@ -128,7 +132,8 @@ fn show_caches(out: &mut String, diff: &CacheDiff) -> std::fmt::Result {
     if !diff.without_particles.is_empty() {
         writeln!(
             out,
-            "particles not kept on both sides: frames {}, of which what stands beside them is compared",
+            "particles not kept on both sides: frames {}, of which what stands \
+             beside them is compared",
             ranges(&diff.without_particles)
         )?;
     }
@@ -186,7 +191,8 @@ fn show_fields(out: &mut String, diff: &CacheDiff) -> std::fmt::Result {
     };
     writeln!(
         out,
-        "\nfield      unit        largest  frame  particle         RMS  frame        99 %  frame  RMS / RMS of B"
+        "\nfield      unit        largest  frame  particle         RMS  frame        99 %  frame  \
+         RMS / RMS of B"
     )?;
     for (index, field) in first.fields.iter().enumerate() {
         let peak = |measure: fn(&swell_stage::diff::FieldDiff) -> f64| {
@@ -238,7 +244,8 @@ fn show_aggregates(
 ) -> std::fmt::Result {
     writeln!(
         out,
-        "\naggregate         unit  largest difference  relative  frame           A           B     allowed"
+        "\naggregate         unit  largest difference  relative  frame           A           B     \
+         allowed"
     )?;
     let optional = |value: Option<f64>| value.map_or("-".to_owned(), number);
     for peak in peaks {
@@ -379,7 +386,8 @@ fn show_written(file: &std::path::Path, written: &Written) -> String {
         text += &format!("limits from the spread of bakes with: {from}\n");
     }
     if written.is_spread_dropped {
-        text += "spreads of another scene or other frames dropped: the limits are those of any scene; --spread measures \
+        text += "spreads of another scene or other frames dropped: the limits are those of any \
+                 scene; --spread measures \
                  them anew\n";
     }
     text
@@ -392,7 +400,8 @@ fn show_pictures(out: &mut String, diff: &PicturesDiff, gain: f64) -> std::fmt::
     let width = longest.unwrap_or(0).max("picture".len());
     writeln!(
         out,
-        "\n{:width$}        mean        99 %     largest           at  perceptual (100: no difference)",
+        "\n{:width$}        mean        99 %     largest           at  perceptual (100: no \
+         difference)",
         "picture"
     )?;
     for pair in &diff.pairs {

@@ -36,7 +36,8 @@ impl DryRun {
             self.place,
         );
         let known = json!({
-            "event": "dry_run", "frames": frames, "numbers": self.frames, "skipped": self.standing, "bytes": self.bytes,
+            "event": "dry_run", "frames": frames, "numbers": self.frames, "skipped": self.standing,
+            "bytes": self.bytes,
             "place": self.place,
         });
         if let (Value::Object(more), Value::Object(known)) = (&mut more, known) {

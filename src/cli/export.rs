@@ -23,10 +23,12 @@ use super::{
 pub(super) struct ExportArgs {
     /// Cache directory.
     cache: PathBuf,
-    /// The water's surface, closed, with velocities: a file a frame, such as m.%04d.ply (.obj, .usda, .usd, .usdc).
+    /// The water's surface, closed, with velocities: a file a frame, such as m.%04d.ply (.obj,
+    /// .usda, .usd, .usdc).
     #[arg(long, value_name = "FILES")]
     mesh: Option<Pattern>,
-    /// A shot for USD, such as shot.usda (.usd, which is text too, .usdc): water, solids and wave makers, with a layer a frame beside it.
+    /// A shot for USD, such as shot.usda (.usd, which is text too, .usdc): water, solids and wave
+    /// makers, with a layer a frame beside it.
     #[arg(long, value_name = "FILE")]
     usd: Option<PathBuf>,
     /// How the shot has its water.
@@ -53,11 +55,12 @@ pub(super) struct ExportArgs {
     /// Frames to export, such as 1-240x2; all that are cached where left out.
     #[arg(long, value_name = "RANGE")]
     frames: Option<FrameRange>,
-    /// Share of the frames, such as 1/4 for the first of four: several machines may fill one folder.
+    /// Share of the frames, such as 1/4 for the first of four: several machines may fill one
+    /// folder.
     #[arg(long, value_name = "I/N")]
     chunk: Option<Chunk>,
-    /// Number of the first of the frames in the names of files, such as 1001; the others follow by their distance. The cache's own
-    /// where left out.
+    /// Number of the first of the frames in the names of files, such as 1001; the others follow by
+    /// their distance. The cache's own where left out.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(..=1_000_000_000))]
     number_from: Option<u32>,
     /// A stream of whitewater in place of the water, as particles.
@@ -75,7 +78,8 @@ pub(super) struct ExportArgs {
     /// Python with usd-core, which names that end in .usdc need.
     #[arg(long, value_name = "PROGRAM", default_value = "python3")]
     python: String,
-    /// Export files again that exist, also those of another cache, and files that are none of swell's.
+    /// Export files again that exist, also those of another cache, and files that are none of
+    /// swell's.
     #[arg(long)]
     overwrite: bool,
     /// Where frames of the cache are damaged, export the others; exit code 4 in the end.
@@ -166,7 +170,8 @@ pub(super) fn run(args: &ExportArgs, progress: &Progress) -> Result<u8, Failure>
         ),
         json!({
             "made": outcome.made, "standing": outcome.standing,
-            "elsewhere": outcome.elsewhere, "failed": outcome.failed, "interrupted": outcome.interrupted,
+            "elsewhere": outcome.elsewhere, "failed": outcome.failed,
+            "interrupted": outcome.interrupted,
         }),
     );
     if outcome.interrupted {
@@ -263,7 +268,8 @@ fn tell(progress: &Progress, event: Event) {
                 &format!("frame {frame:4}  {text}"),
                 status,
                 json!({
-                    "event": "frame", "frame": frame, "made": made, "bytes": bytes, "seconds": seconds, "volume": volume,
+                    "event": "frame", "frame": frame, "made": made, "bytes": bytes,
+                    "seconds": seconds, "volume": volume,
                 }),
             );
         }

@@ -29,11 +29,12 @@ use super::{
 
 #[derive(Args, Debug)]
 #[command(
-    override_usage = "swell inspect [OPTIONS] <SCENE|LOOK|STUDY|CACHE|FILE>\n       swell inspect --adapters"
+    override_usage = "swell inspect [OPTIONS] <SCENE|LOOK|STUDY|CACHE|FILE>\n       swell inspect \
+                      --adapters"
 )]
 pub(super) struct InspectArgs {
-    /// A scene, look or study file, a cache directory, or a file: a frame or mesh (.ply, .obj, .stl), a .vdb, a picture (.png, .exr), a
-    /// .usda, .glb or .gltf with cameras or animations.
+    /// A scene, look or study file, a cache directory, or a file: a frame or mesh (.ply, .obj,
+    /// .stl), a .vdb, a picture (.png, .exr), a .usda, .glb or .gltf with cameras or animations.
     #[arg(required_unless_present = "adapters")]
     subject: Option<PathBuf>,
     /// List this machine's adapters with the limits that matter here.
@@ -54,9 +55,14 @@ pub(super) struct InspectArgs {
     /// Take meshes and tables that lie outside of the scene's folder.
     #[arg(long)]
     allow_outside: bool,
-    /// Compute so many frames of the scene after its first, keep nothing, and tell what they took, by what passes are there for. Later
-    /// frames of a shot may take more substeps.
-    #[arg(long, value_name = "FRAMES", requires = "subject", value_parser = clap::value_parser!(u32).range(1..=1000))]
+    /// Compute so many frames of the scene after its first, keep nothing, and tell what they took,
+    /// by what passes are there for. Later frames of a shot may take more substeps.
+    #[arg(
+        long,
+        value_name = "FRAMES",
+        requires = "subject",
+        value_parser = clap::value_parser!(u32).range(1..=1000)
+    )]
     time: Option<u32>,
     /// Plan for the limits of this adapter; SWELL_ADAPTER in the environment where left out.
     #[arg(long, value_name = "NAME", requires = "subject")]
@@ -138,7 +144,8 @@ pub(super) fn run(args: &InspectArgs) -> Result<u8, Failure> {
 /// Error for the folder of a failed frame, which has neither plan nor ledger.
 fn broken_off(directory: &Path) -> Failure {
     let what = format!(
-        "{} is the frame that a bake broke off at, which no cache lists: `swell check {}` computes it again",
+        "{} is the frame that a bake broke off at, which no cache lists: `swell \
+         check {}` computes it again",
         directory.display(),
         posix::path(directory)
     );
@@ -154,7 +161,8 @@ fn refuse_frames_beyond(args: &InspectArgs, file: &Path, frames: u32) -> Result<
     match args.time {
         Some(asked) if asked >= frames => {
             let error = format!(
-                "--time {asked}: {} has {frames} frames, and the first is not timed: up to {} are possible; raise shot.frames",
+                "--time {asked}: {} has {frames} frames, and the first is not timed: up to {} are \
+                 possible; raise shot.frames",
                 file.display(),
                 frames - 1
             );
@@ -318,7 +326,8 @@ fn show_arrangement(out: &mut String, scene: &Scene, planned: &ScenePlan) -> fmt
     if let Some(spacing) = planned.coarse_solids {
         writeln!(
             out,
-            "signed distance of solids every {spacing:.4} m, coarser than the water, with at most {MOST_NODES} nodes"
+            "signed distance of solids every {spacing:.4} m, coarser than the water, with at \
+             most {MOST_NODES} nodes"
         )?;
     }
     Ok(())
@@ -332,7 +341,8 @@ fn show_time(out: &mut String, timed: &Timed) -> fmt::Result {
     };
     writeln!(
         out,
-        "\n{median:.3} s a frame ({least:.3} to {most:.3}), {:.1} substeps, over {frames}, on {}; by pass, one by one:\n",
+        "\n{median:.3} s a frame ({least:.3} to {most:.3}), {:.1} substeps, over {frames}, on {}; \
+         by pass, one by one:\n",
         timed.substeps, timed.device
     )?;
     write!(out, "{}", output::shares(&timed.shares, Some(timed.frames)))

@@ -42,16 +42,18 @@ use swell_stage::{
 /// Exit code if something is out of tolerance.
 const OUT_OF_TOLERANCE: u8 = 1;
 
-const AFTER: &str = "Exit codes: 0 done; 1 a comparison is out of tolerance; 2 usage, scene or look at fault; \
-    3 no usable device, or device lost; 4 a cache or picture is damaged, missing, in use, of another scene or look, or cannot be read or \
-    written, standard output included (a closed pipe, as of `| head`, is no fault); 5 the numbers failed, last good frame kept; \
-    130 ended by a signal, resumable.";
+const AFTER: &str = "Exit codes: 0 done; 1 a comparison is out of tolerance; 2 usage, scene or \
+    look at fault; 3 no usable device, or device lost; 4 a cache or picture is damaged, missing, \
+    in use, of another scene or look, or cannot be read or written, standard output included (a \
+    closed pipe, as of `| head`, is no fault); 5 the numbers failed, last good frame kept; 130 \
+    ended by a signal, resumable.";
 
 /// Offline, film-quality fluid pipeline for ocean-wave shots.
 #[derive(Parser, Debug)]
 #[command(name = "swell", version, after_help = AFTER)]
 struct Cli {
-    /// Add what goes to standard error, and progress, to the end of this file too, each line with its time.
+    /// Add what goes to standard error, and progress, to the end of this file too, each line with
+    /// its time.
     #[arg(long, global = true, value_name = "FILE")]
     log: Option<PathBuf>,
     #[command(subcommand)]
@@ -74,13 +76,17 @@ enum Command {
     Whitewater(whitewater::WhitewaterArgs),
     /// Hold a step on the GPU against the f64 reference, pass by pass.
     Check(check::CheckArgs),
-    /// Show a scene's plan, a look's plan, what a study runs, a cache's frames, what a file is, or this machine's adapters.
+    /// Show a scene's plan, a look's plan, what a study runs, a cache's frames, what a file is, or
+    /// this machine's adapters.
     Inspect(inspect::InspectArgs),
-    /// Compare two caches, a cache and a baseline, or two renders: where they part, and by how much.
+    /// Compare two caches, a cache and a baseline, or two renders: where they part, and by how
+    /// much.
     Diff(diff::DiffArgs),
-    /// Print the keys of scenes, looks, studies, tolerance and whitewater files, with what each allows and its default.
+    /// Print the keys of scenes, looks, studies, tolerance and whitewater files, with what each
+    /// allows and its default.
     Keys(keys::KeysArgs),
-    /// Look at a cache, rendered pictures or a study: a contact sheet, a movie, a page that plays the frames.
+    /// Look at a cache, rendered pictures or a study: a contact sheet, a movie, a page that plays
+    /// the frames.
     View(Box<view::ViewArgs>),
     /// Check every checksum of a cache.
     Verify(verify::VerifyArgs),
@@ -118,12 +124,13 @@ where
 /// Adapter and shaders of a command.
 #[derive(Args, Debug)]
 struct GpuArgs {
-    /// Number of the adapter, or a part of its name that is not digits alone (see `swell inspect --adapters`). SWELL_ADAPTER in the
-    /// environment where left out.
+    /// Number of the adapter, or a part of its name that is not digits alone (see `swell inspect
+    /// --adapters`). SWELL_ADAPTER in the environment where left out.
     #[arg(long, value_name = "NAME")]
     adapter: Option<String>,
-    /// Read all shaders from this folder, an edited copy of the folder shaders/ of swell's source. What is made with them is
-    /// recorded as not by the shipped ones. An endless loop in them can hang the device.
+    /// Read all shaders from this folder, an edited copy of the folder shaders/ of swell's source.
+    /// What is made with them is recorded as not by the shipped ones. An endless loop in them can
+    /// hang the device.
     #[arg(long, value_name = "DIR")]
     shaders: Option<PathBuf>,
 }
@@ -158,7 +165,8 @@ fn set_variable(name: &str) -> Option<OsString> {
 /// Device of a command that needs no adapter.
 #[derive(Args, Debug)]
 struct DeviceArgs {
-    /// Device to compute on: an adapter, or the CPU with the f64 reference, which needs no driver and is slower.
+    /// Device to compute on: an adapter, or the CPU with the f64 reference, which needs no driver
+    /// and is slower.
     #[arg(long, value_enum, default_value_t, value_name = "DEVICE")]
     device: DeviceKind,
     #[command(flatten)]

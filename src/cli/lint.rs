@@ -11,7 +11,8 @@ use super::Failure;
 
 #[derive(Args, Debug)]
 pub(super) struct DenyArgs {
-    /// Refuse a scene, with exit code 2, where it is allowed but hardly what was meant; otherwise such findings are warnings.
+    /// Refuse a scene, with exit code 2, where it is allowed but hardly what was meant; otherwise
+    /// such findings are warnings.
     #[arg(long, value_name = "WHAT")]
     deny: Option<Denied>,
 }

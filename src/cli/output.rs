@@ -78,7 +78,8 @@ pub(super) fn pass_times(progress: &Progress, times: &PassTimes, parts: &[Share]
         let rows = passes.iter().map(|time| pass_json(time, ceilings.as_ref()));
         return progress.tell(json!({
             "event": "passes", "passes": rows.collect::<Vec<_>>(), "parts": parts_json(parts),
-            "bandwidth": ceilings.map(|of| of.bandwidth), "arithmetic": ceilings.map(|of| of.arithmetic),
+            "bandwidth": ceilings.map(|of| of.bandwidth),
+            "arithmetic": ceilings.map(|of| of.arithmetic),
             "start": ceilings.map(|of| of.start),
         }));
     }
@@ -93,8 +94,9 @@ pub(super) fn pass_times(progress: &Progress, times: &PassTimes, parts: &[Share]
     }) = ceilings
     {
         print(&format!(
-            "; per cent are of {:.2} GB/s, at which a pass copies a buffer here, where a pass is taken to move what it binds once, and of {:.1} \
-             Gop/s, which one does that only multiplies and adds; one without work takes {:.3} ms",
+            "; per cent are of {:.2} GB/s, at which a pass copies a buffer here, where a pass is \
+             taken to move what it binds once, and of {:.1} Gop/s, which one does that only \
+             multiplies and adds; one without work takes {:.3} ms",
             1e-9 * bandwidth,
             1e-9 * arithmetic,
             1e3 * start

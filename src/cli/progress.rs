@@ -393,8 +393,10 @@ impl Progress {
         let mut state = self.state.borrow_mut();
         let mut end = std::mem::take(&mut state.end);
         let totals = json!({
-            "event": "end", "exit_code": code, "frames_done": state.done, "frames_skipped": state.skipped,
-            "frames_failed": state.failed, "bytes": state.bytes, "seconds": self.begun.elapsed().as_secs_f64(),
+            "event": "end", "exit_code": code, "frames_done": state.done,
+            "frames_skipped": state.skipped,
+            "frames_failed": state.failed, "bytes": state.bytes,
+            "seconds": self.begun.elapsed().as_secs_f64(),
         });
         if let Value::Object(totals) = totals {
             end.extend(totals);

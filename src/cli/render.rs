@@ -31,11 +31,12 @@ pub(super) struct RenderArgs {
     /// Frames to render, such as 1-240x2; all that are cached where left out.
     #[arg(long, value_name = "RANGE")]
     frames: Option<FrameRange>,
-    /// Share of the frames, such as 1/4 for the first of four: several processes may fill one folder.
+    /// Share of the frames, such as 1/4 for the first of four: several processes may fill one
+    /// folder.
     #[arg(long, value_name = "I/N")]
     chunk: Option<Chunk>,
-    /// Number of the first of the frames in the names of files, such as 1001; the others follow by their distance. The cache's own
-    /// where left out.
+    /// Number of the first of the frames in the names of files, such as 1001; the others follow by
+    /// their distance. The cache's own where left out.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(..=1_000_000_000))]
     number_from: Option<u32>,
     #[command(flatten)]
@@ -145,9 +146,13 @@ pub(super) fn tell(progress: &Progress, event: Event) {
                 more => format!(" ({more} more were baked, and their particles not kept)"),
             };
             progress.say(
-                &format!("on {device}\n{} of {width} × {height}{others}", count(frames as u64, "frame")),
+                &format!(
+                    "on {device}\n{} of {width} × {height}{others}",
+                    count(frames as u64, "frame")
+                ),
                 json!({
-                    "event": "ready", "device": device, "width": width, "height": height, "frames": frames,
+                    "event": "ready", "device": device, "width": width, "height": height,
+                    "frames": frames,
                     "not_kept": left_out,
                 }),
             );
@@ -185,7 +190,8 @@ pub(super) fn tell(progress: &Progress, event: Event) {
                 &format!("frame {frame:4}  {text}"),
                 status,
                 json!({
-                    "event": "frame", "frame": frame, "seconds": seconds, "skipped": skipped, "bytes": bytes,
+                    "event": "frame", "frame": frame, "seconds": seconds, "skipped": skipped,
+                    "bytes": bytes,
                 }),
             );
         }

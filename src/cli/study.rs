@@ -21,11 +21,13 @@ use super::{
 pub(super) struct StudyArgs {
     /// Study file (TOML).
     study: PathBuf,
-    /// Where caches, pictures, table and page go; studies/NAME where left out. Existing results are resumed.
+    /// Where caches, pictures, table and page go; studies/NAME where left out. Existing results are
+    /// resumed.
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
-    /// Run share I of N of the points alone, such as 1/4, into a file of its own in the folder. The command without it takes over what
-    /// shares have run, runs what is missing, and writes table and page.
+    /// Run share I of N of the points alone, such as 1/4, into a file of its own in the folder. The
+    /// command without it takes over what shares have run, runs what is missing, and writes table
+    /// and page.
     #[arg(long, value_name = "I/N")]
     chunk: Option<Chunk>,
     #[command(flatten)]
@@ -111,7 +113,10 @@ pub(super) fn conduct(request: &Request, progress: &Progress) -> Result<u8, Fail
     };
     progress.conclude(
         &format!("{}\npage: {}", outcome.findings.join("\n"), page.display()),
-        json!({ "page": output::path(&page), "findings": outcome.findings, "missed": outcome.missed, "interrupted": false }),
+        json!({
+            "page": output::path(&page), "findings": outcome.findings, "missed": outcome.missed,
+            "interrupted": false,
+        }),
     );
     Ok(match outcome.missed[..] {
         [] => 0,
@@ -131,11 +136,14 @@ fn tell_share(progress: &Progress, request: &Request, chunk: Chunk, share: Share
     };
     progress.conclude(
         &format!(
-            "done: {} of share {chunk} run, {stood} stood there already; left of the whole study: {most}{left}; the same command without --chunk joins the shares and makes table and page",
+            "done: {} of share {chunk} run, {stood} stood there already; left of the \
+             whole study: {most}{left}; the same command without --chunk joins the shares \
+             and makes table and page",
             count(ran as u64, "point")
         ),
         json!({
-            "chunk": chunk.to_string(), "ran": ran, "stood": stood, "left": left, "is_left_at_most": share.is_left_at_most, "directory": output::path(&request.directory),
+            "chunk": chunk.to_string(), "ran": ran, "stood": stood, "left": left,
+            "is_left_at_most": share.is_left_at_most, "directory": output::path(&request.directory),
             "interrupted": false,
         }),
     );
@@ -161,7 +169,8 @@ fn point(event: &PointEvent) -> (String, serde_json::Value) {
         event.number, event.count, event.name
     );
     let mut json = json!({
-        "event": "point", "number": event.number, "count": event.count, "name": event.name, "status": status,
+        "event": "point", "number": event.number, "count": event.count, "name": event.name,
+        "status": status,
     });
     match &event.status {
         PointStatus::Stands => {}

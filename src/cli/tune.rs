@@ -26,8 +26,8 @@ use super::{
 pub(super) struct TuneArgs {
     /// Scene file (TOML).
     scene: PathBuf,
-    /// An error that has to be held: crest, front, run_up, energy, pressure or density, in per cent of the finer run's greatest
-    /// value, or in metres or Pa. Several of them all have to hold.
+    /// An error that has to be held: crest, front, run_up, energy, pressure or density, in per cent
+    /// of the finer run's greatest value, or in metres or Pa. Several of them all have to hold.
     #[arg(long = "error", value_name = "NAME=VALUE%|m|Pa", required = true)]
     errors: Vec<Limit>,
     /// The most that the bake of the whole shot may take on this machine, seconds.
@@ -42,7 +42,8 @@ pub(super) struct TuneArgs {
     /// Frames that are run, from the first on, such as 1-30; the whole shot where left out.
     #[arg(long, value_name = "1-B")]
     frames: Option<FrameRange>,
-    /// Spacing of the run that errors are told against, in the scene's own; the others are 1.25 to 2.5 times as coarse as it.
+    /// Spacing of the run that errors are told against, in the scene's own; the others are 1.25 to
+    /// 2.5 times as coarse as it.
     #[arg(long, value_name = "FACTOR", default_value_t = 0.8)]
     reference: f64,
     /// Runs of each setting; times are medians.
@@ -51,11 +52,13 @@ pub(super) struct TuneArgs {
     /// Scene with the settings, beside SCENE; SCENE's name with .tuned.toml where left out.
     #[arg(long, value_name = "FILE")]
     write: Option<PathBuf>,
-    /// Where table, curves and page go; studies/NAME-tune where left out. Existing results are resumed.
+    /// Where table, curves and page go; studies/NAME-tune where left out. Existing results are
+    /// resumed.
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
-    /// Of the first runs, before anything is proposed, run share I of N alone, such as 1/4, into a file of its own in the folder. The
-    /// same command without this option takes them over, proposes and runs the rest.
+    /// Of the first runs, before anything is proposed, run share I of N alone, such as 1/4, into a
+    /// file of its own in the folder. The same command without this option takes them over,
+    /// proposes and runs the rest.
     #[arg(long, value_name = "I/N")]
     chunk: Option<Chunk>,
     #[command(flatten)]
@@ -159,7 +162,8 @@ fn tell_runs(tune: Tune, args: &TuneArgs, progress: &Progress) -> Result<u8, Fai
     let after = match args.chunk {
         None => "and what the laws of these propose".to_owned(),
         Some(chunk) => format!(
-            "that is share {chunk}; the command without --chunk joins the shares, and runs what the laws of all propose"
+            "that is share {chunk}; the command without --chunk joins the shares, and runs what \
+             the laws of all propose"
         ),
     };
     let text = format!(

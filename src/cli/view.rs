@@ -22,7 +22,8 @@ use super::{
 
 #[derive(Args, Debug)]
 pub(super) struct ViewArgs {
-    /// Cache directory, folder of rendered pictures, or folder of a study; two caches or renders are held against each other.
+    /// Cache directory, folder of rendered pictures, or folder of a study; two caches or renders
+    /// are held against each other.
     #[arg(required = true, num_args = 1..=2, value_name = "CACHE|IMAGES|STUDY")]
     subjects: Vec<PathBuf>,
     /// Where contact sheet and page go; views/NAME where left out.
@@ -31,8 +32,15 @@ pub(super) struct ViewArgs {
     /// Frames to look at, such as 1-240x2; all where left out.
     #[arg(long, value_name = "RANGE")]
     frames: Option<FrameRange>,
-    /// Make a contact sheet, sheet.png, of at most so many frames. Without --sheet, --player and --movie sheet and page are made.
-    #[arg(long, value_name = "N", num_args = 0..=1, require_equals = true, value_parser = clap::value_parser!(u32).range(1..=2000))]
+    /// Make a contact sheet, sheet.png, of at most so many frames. Without --sheet, --player and
+    /// --movie sheet and page are made.
+    #[arg(
+        long,
+        value_name = "N",
+        num_args = 0..=1,
+        require_equals = true,
+        value_parser = clap::value_parser!(u32).range(1..=2000)
+    )]
     sheet: Option<Option<u32>>,
     /// Make a page that plays the frames, index.html.
     #[arg(long)]
@@ -40,7 +48,8 @@ pub(super) struct ViewArgs {
     /// Make a movie: .apng by swell, .mp4 (H.264) or .webm (VP9) by ffmpeg.
     #[arg(long, value_name = "FILE")]
     movie: Option<PathBuf>,
-    /// Reduce pictures of page and movie to at most so many pixels of width; a page's to 1280 where left out.
+    /// Reduce pictures of page and movie to at most so many pixels of width; a page's to 1280 where
+    /// left out.
     #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(16..=16384))]
     width: Option<u32>,
     /// Frames a second; those of the cache or the pictures where left out, else 24.
@@ -52,7 +61,8 @@ pub(super) struct ViewArgs {
     /// From where the particles of a cache are looked at.
     #[arg(long, value_enum, default_value_t, value_name = "WHERE")]
     from: Sight,
-    /// Cache whose times, probes and ledger are drawn below the pictures; a cache that is looked at has its own.
+    /// Cache whose times, probes and ledger are drawn below the pictures; a cache that is looked at
+    /// has its own.
     #[arg(long, value_name = "CACHE")]
     curves: Option<PathBuf>,
     /// Look through whose [view] EXR files are shown.

@@ -25,8 +25,8 @@ pub(super) struct WhitewaterArgs {
     /// Settings file (TOML); what it leaves out has defaults or is calibrated on the shot.
     #[arg(long, value_name = "FILE")]
     settings: Option<PathBuf>,
-    /// Name of the stream, which goes to CACHE/whitewater/NAME; the settings file's own where left out, or `default`. An
-    /// existing stream is resumed.
+    /// Name of the stream, which goes to CACHE/whitewater/NAME; the settings file's own where left
+    /// out, or `default`. An existing stream is resumed.
     #[arg(long, value_name = "NAME")]
     name: Option<String>,
     /// Last frame to make; the bake's last where left out.
@@ -172,14 +172,17 @@ fn tell(progress: &Progress, event: Event) {
             };
             progress.say(
                 &format!(
-                    "on {device}\n{} of water, into {}\nthresholds, {source}: trapped air {air} m/s, wave crest {crest}, energy \
+                    "on {device}\n{} of water, into {}\nthresholds, {source}: trapped air {air} \
+                     m/s, wave crest {crest}, energy \
                      {energy} J/kg",
                     count(water as u64, "particle"),
                     directory.display(),
                 ),
                 json!({
-                    "event": "ready", "device": device.to_string(), "water": water, "directory": output::path(&directory),
-                    "thresholds": thresholds, "calibrated_on": calibrated_on, "first": first, "last": last,
+                    "event": "ready", "device": device.to_string(), "water": water,
+                    "directory": output::path(&directory),
+                    "thresholds": thresholds, "calibrated_on": calibrated_on, "first": first,
+                    "last": last,
                     "frames": frames,
                 }),
             );
@@ -196,10 +199,14 @@ fn tell(progress: &Progress, event: Event) {
                 .collect();
             let [spray, foam, bubbles] = census;
             progress.frame(
-                &format!("frame {frame:4}  {}, {born} new, {seconds:.2} s", words.join(", ")),
+                &format!(
+                    "frame {frame:4}  {}, {born} new, {seconds:.2} s",
+                    words.join(", ")
+                ),
                 Status::Done,
                 json!({
-                    "event": "frame", "frame": frame, "spray": spray, "foam": foam, "bubbles": bubbles, "born": born,
+                    "event": "frame", "frame": frame, "spray": spray, "foam": foam,
+                    "bubbles": bubbles, "born": born,
                     "seconds": seconds,
                 }),
             );
@@ -212,14 +219,16 @@ fn tell(progress: &Progress, event: Event) {
             allowed,
         }) => {
             let text = format!(
-                "frame {frame} will have more whitewater particles than max_particles, {allowed}, and end the job, if they grow as in these \
-                 {over} frames, and frame {end} about {at_end}: raise max_particles, or lower emission.trapped_air_rate and \
+                "frame {frame} will have more whitewater particles than max_particles, {allowed}, \
+                 and end the job, if they grow as in these {over} frames, and frame {end} about \
+                 {at_end}: raise max_particles, or lower emission.trapped_air_rate and \
                  emission.wave_crest_rate"
             );
             progress.say(
                 &format!("warning: {text}"),
                 json!({
-                    "event": "warning", "what": "max_particles", "text": text, "frame": frame, "at_end": at_end,
+                    "event": "warning", "what": "max_particles", "text": text, "frame": frame,
+                    "at_end": at_end,
                 }),
             );
         }

@@ -52,7 +52,8 @@ const DEFAULT_TOLERANCES: [(&str, f64, f64, &str); 8] = [
         "airborne",
         0.002,
         0.0,
-        "few drops, each with a way of its own; gravity off by its last place: 0.0004 (quickstart, PBF)",
+        "few drops, each with a way of its own; gravity off by its last place: \
+         0.0004 (quickstart, PBF)",
     ),
     (
         "density_error",

@@ -76,25 +76,31 @@ bounds! {
     pub WALL_PLACE = [place: "by how much f32 misplaces a wall, over h"] place + 8.0 * U,
         "a difference and a quotient";
     /// Error of the walls' contribution, as half-spaces, to the relative density.
-    pub WALL_DENSITY = [faces: "walls within h", q: "" WALL_PLACE] faces * (315.0 / 256.0 * q + 16.0 * U),
+    pub WALL_DENSITY = [faces: "walls within h", q: "" WALL_PLACE]
+        faces * (315.0 / 256.0 * q + 16.0 * U),
         "the fraction's slope is at most 315/256, and its polynomial adds 16 u";
     /// Error of the walls' contribution to the density gradient times h.
     pub WALL_GRADIENT = [faces: "walls within h", q: "" WALL_PLACE, density: "" WALL_DENSITY]
         faces * (405.0 / 128.0 * q + 20.0 * U + 1.5 * density),
         "the slope of the fraction's slope is at most 405/128, and its polynomial adds 16 u";
     /// Error of the relative density.
-    pub DENSITY = [scale: "the kernel's scale", sums: "" KERNEL, walls: "" WALL_DENSITY, density: "the relative density"]
+    pub DENSITY = [scale: "the kernel's scale", sums: "" KERNEL, walls: "" WALL_DENSITY,
+        density: "the relative density"]
         scale * (sums + 6.0 * U) + walls + 2.0 * U * density, "";
     /// Error of |∇C| with respect to the particle itself.
-    pub OWN_GRADIENT = [scale: "the gradient's scale", sums: "" GRADIENT, walls: "over h " WALL_GRADIENT, own: "|∇C| by itself"]
+    pub OWN_GRADIENT = [scale: "the gradient's scale", sums: "" GRADIENT,
+        walls: "over h " WALL_GRADIENT, own: "|∇C| by itself"]
         scale * sums + walls + 2.0 * U * own, "";
     /// Error of Σ|∇C|² with respect to the neighbours.
-    pub OTHER_GRADIENTS = [scale: "the gradient's scale", squares: "" SQUARES] scale * scale * squares, "";
+    pub OTHER_GRADIENTS = [scale: "the gradient's scale", squares: "" SQUARES]
+        scale * scale * squares, "";
     /// Error of Σ|∇C|²: |own|² of a vector, plus the neighbours' part.
-    pub GRADIENT_SQUARES = [own: "|∇C| by itself", error: "" OWN_GRADIENT, others: "" OTHER_GRADIENTS]
+    pub GRADIENT_SQUARES = [own: "|∇C| by itself", error: "" OWN_GRADIENT,
+        others: "" OTHER_GRADIENTS]
         2.0 * own * error + error * error + 6.0 * U * own * own + others, "";
     /// Error of λ = −max(C, 0) / (Σ|∇C|² + ε).
-    pub LAMBDA = [lambda: "|λ|", denominator: "Σ|∇C|² + ε", density: "" DENSITY, squares: "" GRADIENT_SQUARES]
+    pub LAMBDA = [lambda: "|λ|", denominator: "Σ|∇C|² + ε", density: "" DENSITY,
+        squares: "" GRADIENT_SQUARES]
         (density + lambda * squares) / denominator + 8.0 * U * lambda, "";
 }
 

@@ -109,8 +109,8 @@ pub fn tolerances(
             (most, unit) => format!("{most:e} {unit}"),
         };
         let reason = format!(
-            "{SPREADS} times the frame's spread between bakes that differ in roundings alone (in the last frame \
-             {most}), and what the measure cannot tell: {why}"
+            "{SPREADS} times the frame's spread between bakes that differ in roundings alone (in \
+             the last frame {most}), and what the measure cannot tell: {why}"
         );
         let limit = StatedLimit {
             absolute,

@@ -170,7 +170,8 @@ pub use crate::optional;
 #[doc(hidden)]
 #[macro_export]
 macro_rules! bounds {
-    ($($(#[$meta:meta])* $visible:vis $name:ident = [$($magnitudes:tt)*] $value:expr, $reason:literal;)+) => {
+    ($($(#[$meta:meta])* $visible:vis $name:ident = [$($magnitudes:tt)*]
+        $value:expr, $reason:literal;)+) => {
         $($(#[$meta])* $visible static $name: $crate::tolerance::Bound<
             { $crate::tolerance::count!($($magnitudes)*) }
         > = $crate::tolerance::bound!([$($magnitudes)*] $value, $reason);)+
@@ -195,7 +196,8 @@ mod tests {
 
     bounds! {
         INNER = [n: "terms", size: "Σ|t|"] U * (n + 2.0) * size, "a sum";
-        OUTER = [scale: "a part", sum: "the sum's error " INNER, x: "|x|"] scale * sum + 0.5 * x.max(10.05), "two of them";
+        OUTER = [scale: "a part", sum: "the sum's error " INNER, x: "|x|"]
+            scale * sum + 0.5 * x.max(10.05), "two of them";
         EQUAL = [] 0.0, "a copy";
         SILENT = [x: "|x|", sum: "" INNER] x + sum, "";
     }

@@ -236,7 +236,8 @@ mod tests {
         let breach = check(0.034, Some(0.01)).unwrap_err().in_substep(2);
         assert_eq!(
             breach.to_string(),
-            "frame 7, substep 2: the relative residual of the projection is 0.0340, and budget.residual is 0.0100"
+            "frame 7, substep 2: the relative residual of the projection is 0.0340, and \
+             budget.residual is 0.0100"
         );
         // A value that rounds to the same digits as the limit.
         let close = check(0.010_000_4, Some(0.01)).unwrap_err().to_string();

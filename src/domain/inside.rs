@@ -14,7 +14,8 @@ pub enum NoInside {
     Empty,
     /// The mesh is open, such as a tube or a sheet.
     #[error(
-        "the mesh is open and has no inside: {why}; {holes}{parts}; close the mesh, or give its walls a thickness where water is to be inside of it"
+        "the mesh is open and has no inside: {why}; {holes}{parts}; close the mesh, or give its \
+         walls a thickness where water is to be inside of it"
     )]
     Open {
         /// What is wrong with the part that the holes belong to.
@@ -63,8 +64,9 @@ impl fmt::Display for Parts {
             (_, 0) => write!(f, " in one of its {count} separate parts"),
             _ => write!(
                 f,
-                " in one of its {count} separate parts, {lone} of which are a single triangle (vertices are joined where \
-                 they are equal, in a text to 7 digits of the mesh's size, and nowhere else)"
+                " in one of its {count} separate parts, {lone} of which are a single triangle \
+                 (vertices are joined where they are equal, in a text to 7 digits of the mesh's \
+                 size, and nowhere else)"
             ),
         }
     }
@@ -232,8 +234,8 @@ mod tests {
         let all = said(&loose);
         assert!(
             all.contains(
-                "1 hole: 3 open edges about (0.0000, 0.3333, 0.6667), 1.4142 m across in one of its 12 separate parts, \
-                 12 of which are a single triangle"
+                "1 hole: 3 open edges about (0.0000, 0.3333, 0.6667), 1.4142 m across in one of \
+                 its 12 separate parts, 12 of which are a single triangle"
             ),
             "{all}"
         );
@@ -265,8 +267,9 @@ mod tests {
         let error = sheet.check_inside().expect_err("a square is open");
         assert_eq!(
             error.to_string(),
-            "the mesh is open and has no inside: no place in it is enclosed, as beside a sheet; 1 hole: 4 open \
-             edges about (0.0000, 0.5000, 0.5000), 1.4142 m across; close the mesh, or give its walls a thickness where water is to be inside of it"
+            "the mesh is open and has no inside: no place in it is enclosed, as beside a sheet; 1 \
+             hole: 4 open edges about (0.0000, 0.5000, 0.5000), 1.4142 m across; close the mesh, \
+             or give its walls a thickness where water is to be inside of it"
         );
 
         let mut two_sided = sheet.clone();

@@ -256,8 +256,9 @@ impl Crossing {
             format!("{count} polygons cross themselves")
         };
         Some(format!(
-            "{is}, the first is face {face} (counted from 1) with a corner at ({x}, {y}, {z}); each is taken as a fan about one \
-             corner, so part of it may fold back over itself; make it triangles where it was drawn"
+            "{is}, the first is face {face} (counted from 1) with a corner at ({x}, {y}, {z}); \
+             each is taken as a fan about one corner, so part of it may fold back over itself; \
+             make it triangles where it was drawn"
         ))
     }
 }

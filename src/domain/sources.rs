@@ -279,8 +279,8 @@ impl Sources {
             .collect()
     }
 
-    /// The most particles that each emitter brings within `duration` seconds; `None` where it keeps a level. Solids, which may move, only
-    /// take from them.
+    /// The most particles that each emitter brings within `duration` seconds; `None` where it keeps
+    /// a level. Solids, which may move, only take from them.
     pub fn most_entering(&self, duration: f64) -> Vec<Option<u64>> {
         let solids = Solids::still(None);
         let all = self.emitters.iter();

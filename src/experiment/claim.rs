@@ -57,7 +57,8 @@ fn write(file: &Path, name: &str, command: &str) -> io::Result<Claim> {
     if !text.is_empty() {
         return serde_json::from_str(&text).map_err(|error| {
             io::Error::other(format!(
-                "{error}: it was cut off or changed; remove it where the folder holds results of {name}, or choose another -o"
+                "{error}: it was cut off or changed; remove it where the folder holds results of \
+                 {name}, or choose another -o"
             ))
         });
     }

@@ -201,13 +201,15 @@ fn parts(
 }
 
 /// Explanation for readers of the page; `swell::study::measure` has the definitions.
-const MEASURED: &str = "Both solvers are measured alike, from the particles. Space is cut into cubes two \
-    particle spacings wide; a cube at least half as full as at rest is water, and the largest body of such cubes that \
-    touch by faces is the continuous water. A column's elevation is the top of that body, smoothed once over its \
-    neighbours. Crest: the highest elevation of each row along the wave's way, median over the rows; the slope of its \
-    front face goes from the foremost place at 0.9 of the crest's height to the foremost at half of it (after the crest \
-    front steepness of Kjeldsen and Myrhaug 1979). In the air is what lies more than a cube from the continuous water. \
-    Values that differ by less than 5 % are called alike. Times are wall clock, the whole frame, with writing beside it.";
+const MEASURED: &str = "Both solvers are measured alike, from the particles. Space is cut into \
+    cubes two particle spacings wide; a cube at least half as full as at rest is water, and the \
+    largest body of such cubes that touch by faces is the continuous water. A column's elevation \
+    is the top of that body, smoothed once over its neighbours. Crest: the highest elevation of \
+    each row along the wave's way, median over the rows; the slope of its front face goes from the \
+    foremost place at 0.9 of the crest's height to the foremost at half of it (after the crest \
+    front steepness of Kjeldsen and Myrhaug 1979). In the air is what lies more than a cube from \
+    the continuous water. Values that differ by less than 5 % are called alike. Times are wall \
+    clock, the whole frame, with writing beside it.";
 
 /// Median of a quantity over the rows of a course, with `digits` decimals.
 fn middle(course: &Course, digits: usize, value: fn(&Row) -> Option<f64>) -> String {

@@ -344,8 +344,9 @@ impl<'a> Bench<'a> {
             (all > theirs).then(|| format!("the command that joined them ran {}", all - theirs));
         let told: Vec<String> = each.chain(own).collect();
         Some(format!(
-            "Of {all} points, {} (results.jsonl names each point's share). Shares may have run on several machines: compare \
-             the times of two of them only where these machines are alike and did nothing else meanwhile.",
+            "Of {all} points, {} (results.jsonl names each point's share). Shares may have run on \
+             several machines: compare the times of two of them only where these machines are \
+             alike and did nothing else meanwhile.",
             told.join(", ")
         ))
     }

@@ -53,7 +53,8 @@ pub enum StudyError {
     #[error("{0}")]
     Point(String),
     /// A line of the results is invalid.
-    #[error("{}:{line}: {what}; remove the line (all of them where another version wrote the file), and its point is run again", file.display())]
+    #[error("{}:{line}: {what}; remove the line (all of them where another version wrote the \
+             file), and its point is run again", file.display())]
     Ledger {
         /// Path of the ledger.
         file: PathBuf,

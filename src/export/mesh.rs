@@ -31,7 +31,8 @@ pub fn ply(placed: &Placed<'_>, source: &Source<'_>) -> Vec<u8> {
         frame,
     } = source;
     let header = format!(
-        "ply\nformat binary_little_endian 1.0\ncomment {software}\ncomment shot {shot}\ncomment frame {frame}\n\
+        "ply\nformat binary_little_endian 1.0\ncomment {software}\ncomment shot {shot}\n\
+         comment frame {frame}\n\
          element vertex {}\nproperty {kind} x\nproperty {kind} y\nproperty {kind} z\n\
          property float nx\nproperty float ny\nproperty float nz\n\
          property float vx\nproperty float vy\nproperty float vz\n\

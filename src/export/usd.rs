@@ -326,7 +326,8 @@ fn put_way(text: &mut Text, way: &[(u32, Pose)]) {
     let rest = text::triple(DVec3::ZERO - first.rest);
     text.line(&format!("double3 xformOp:translate:rest = {rest}"));
     text.line(
-        "uniform token[] xformOpOrder = [\"xformOp:translate\", \"xformOp:orient\", \"xformOp:translate:rest\"]",
+        "uniform token[] xformOpOrder = [\"xformOp:translate\", \"xformOp:orient\", \
+         \"xformOp:translate:rest\"]",
     );
 }
 

@@ -11,8 +11,8 @@ use super::{compiled::Compiled, shader::Shaders};
 pub enum GpuError {
     /// There is no adapter.
     #[error(
-        "no GPU adapter found; install a Vulkan driver (software: Debian and Ubuntu `mesa-vulkan-drivers`, \
-         Fedora `mesa-vulkan-drivers`, Arch `vulkan-swrast`)"
+        "no GPU adapter found; install a Vulkan driver (software: Debian and Ubuntu \
+         `mesa-vulkan-drivers`, Fedora `mesa-vulkan-drivers`, Arch `vulkan-swrast`)"
     )]
     NoAdapter,
     /// `--adapter` matches nothing.
@@ -55,8 +55,8 @@ pub enum GpuError {
     },
     /// 64-bit floats were requested, but the adapter has none.
     #[error(
-        "{adapter} has no 64-bit floats in shaders (SHADER_F64), which precision = \"f64\" asks for; \"f32_refined\" \
-         needs none"
+        "{adapter} has no 64-bit floats in shaders (SHADER_F64), which precision = \"f64\" asks \
+         for; \"f32_refined\" needs none"
     )]
     NoF64 {
         /// Adapter name.
@@ -64,8 +64,9 @@ pub enum GpuError {
     },
     /// A pass binds more storage buffers than the adapter supports.
     #[error(
-        "pass {pass} binds {needed} storage buffers, and {adapter} allows {allowed} (max_storage_buffers_per_shader_stage); use \
-         another adapter or a newer driver (of llvmpipe Mesa 22.3), or bake with --device cpu"
+        "pass {pass} binds {needed} storage buffers, and {adapter} allows {allowed} \
+         (max_storage_buffers_per_shader_stage); use another adapter or a newer driver (of \
+         llvmpipe Mesa 22.3), or bake with --device cpu"
     )]
     TooManyBuffers {
         /// Pass name.
@@ -79,7 +80,8 @@ pub enum GpuError {
     },
     /// A buffer is larger than the adapter supports.
     #[error(
-        "buffer `{buffer}` needs {needed} bytes, and {adapter} allows {allowed} ({limit}); make the scene or the picture smaller or coarser"
+        "buffer `{buffer}` needs {needed} bytes, and {adapter} allows {allowed} ({limit}); make \
+         the scene or the picture smaller or coarser"
     )]
     TooLarge {
         /// Buffer name in the plan.

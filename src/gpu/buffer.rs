@@ -78,7 +78,9 @@ pub trait Mirror: Element {
 macro_rules! mirror {
     (@name $name:ident) => { stringify!($name) };
     (@name $name:ident $wgsl:literal) => { $wgsl };
-    ($(#[$meta:meta])* $name:ident $(as $wgsl:literal)? { $($(#[$field_meta:meta])* $field:ident: $ty:ty),+ $(,)? }) => {
+    ($(#[$meta:meta])* $name:ident $(as $wgsl:literal)? {
+        $($(#[$field_meta:meta])* $field:ident: $ty:ty),+ $(,)?
+    }) => {
         $(#[$meta])*
         #[repr(C)]
         #[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
@@ -93,7 +95,10 @@ macro_rules! mirror {
                 $crate::reflect::Layout {
                     name: $crate::buffer::mirror!(@name $name $($wgsl)?).to_owned(),
                     size: size_of::<$name>() as u32,
-                    members: vec![$((stringify!($field).to_owned(), std::mem::offset_of!($name, $field) as u32)),+],
+                    members: vec![$((
+                        stringify!($field).to_owned(),
+                        std::mem::offset_of!($name, $field) as u32,
+                    )),+],
                 }
             }
         }

@@ -88,7 +88,8 @@ fn same_layout(now: &Layout, before: &Layout) -> Result<(), String> {
         let known = before.members.iter().find(|(name, _)| name == member);
         if let Some((_, known)) = known.filter(|(_, known)| known != offset) {
             return Err(format!(
-                "member `{member}` of its struct {} begins at byte {offset}, and the program has it at byte {known}",
+                "member `{member}` of its struct {} begins at byte {offset}, and the program \
+                 has it at byte {known}",
                 now.name
             ));
         }
@@ -161,7 +162,8 @@ mod tests {
             ),
             (
                 &[("count: u32, step: f32,", "step: f32, count: u32,")],
-                "member `step` of its struct Params begins at byte 0, and the program has it at byte 4",
+                "member `step` of its struct Params begins at byte 0, and the \
+                 program has it at byte 4",
             ),
         ] {
             let said = checked(edits).expect_err(words);

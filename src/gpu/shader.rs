@@ -87,7 +87,8 @@ pub enum ShadersError {
     },
     /// A shipped file has no counterpart in the folder.
     #[error(
-        "--shaders {}: it lacks {file}; begin from a copy of the whole folder shaders/ of swell's source",
+        "--shaders {}: it lacks {file}; begin from a copy of the whole folder \
+         shaders/ of swell's source",
         folder.display()
     )]
     Missing {

@@ -288,12 +288,14 @@ mod tests {
             .replace("1025: 50", "1025: 35")
             .replace(
                 "verticalAperture = 20.25",
-                "verticalAperture = 24\n    float horizontalApertureOffset = 1.8\n    float verticalApertureOffset = -1.2",
+                "verticalAperture = 24\n    float horizontalApertureOffset = 1.8\n    float \
+                 verticalApertureOffset = -1.2",
             );
         std::fs::write(folder.path().join("plate.usda"), plate).unwrap();
         let look = |fit: &str, film: &str| {
             let text = format!(
-                "[camera]\nfile = \"plate.usda\"\n{fit}{film}[image]\nwidth = 160\nheight = 90\n[sky]\nmodel = \"hosek_wilkie\"\n"
+                "[camera]\nfile = \"plate.usda\"\n{fit}{film}[image]\nwidth = 160\nheight = 90\n\
+                 [sky]\nmodel = \"hosek_wilkie\"\n"
             );
             Look::parse(&text, &folder.path().join("look.toml"))
         };
@@ -329,7 +331,8 @@ mod tests {
         std::fs::write(folder.path().join("plate.usda"), plate).unwrap();
         let look = |start: &str| {
             let text = format!(
-                "[camera]\nfile = \"plate.usda\"\n{start}\n[image]\nwidth = 160\nheight = 90\n[sky]\nmodel = \"hosek_wilkie\"\n"
+                "[camera]\nfile = \"plate.usda\"\n{start}\n[image]\nwidth = 160\nheight = 90\n\
+                 [sky]\nmodel = \"hosek_wilkie\"\n"
             );
             Look::parse(&text, &folder.path().join("look.toml")).unwrap()
         };
@@ -411,7 +414,8 @@ mod tests {
     fn keyframes_are_met_and_joined_smoothly() {
         let key = |frame: u32, x: f64| {
             format!(
-                "[[camera.keyframe]]\nframe = {frame}\nposition = [{x:.1}, 2.0, 0.0]\ntarget = [99.0, 0.0, 0.0]\n"
+                "[[camera.keyframe]]\nframe = {frame}\nposition = [{x:.1}, 2.0, 0.0]\n\
+                 target = [99.0, 0.0, 0.0]\n"
             )
         };
         let text = format!(
@@ -437,7 +441,8 @@ mod tests {
 
     #[test]
     fn clocks_count_seconds_from_frame_zero() {
-        let text = "[camera]\nfocal_length_mm = 36.0\nposition = [0.0, 1.0, 0.0]\ntarget = [1.0, 1.0, 0.0]\n";
+        let text = "[camera]\nfocal_length_mm = 36.0\nposition = [0.0, 1.0, 0.0]\n\
+                    target = [1.0, 1.0, 0.0]\n";
         let setting = Setting {
             origin: DVec3::ZERO,
             extent: Extent {
@@ -465,7 +470,8 @@ mod tests {
     /// their disc.
     #[test]
     fn the_plane_in_focus_stays() {
-        let text = "[camera]\nfocal_length_mm = 36.0\nposition = [0.0, 1.0, 0.0]\ntarget = [1.0, 1.0, 0.0]\n\
+        let text = "[camera]\nfocal_length_mm = 36.0\nposition = [0.0, 1.0, 0.0]\n\
+                    target = [1.0, 1.0, 0.0]\n\
                     lens = { f_stop = 2.0, focus_distance_m = 6.0 }\n";
         let look = look(text);
         let pose = pose(&look, 1.0, 24.0);
@@ -500,12 +506,14 @@ mod tests {
     fn the_focus_distance_follows_its_keys() {
         let key = |frame: u32, focus: f64| {
             format!(
-                "[[camera.keyframe]]\nframe = {frame}\nposition = [0.0, 2.0, 0.0]\ntarget = [9.0, 0.0, 0.0]\n\
+                "[[camera.keyframe]]\nframe = {frame}\nposition = [0.0, 2.0, 0.0]\n\
+                 target = [9.0, 0.0, 0.0]\n\
                  focus_distance_m = {focus:?}\n"
             )
         };
         let text = format!(
-            "[camera]\nfocal_length_mm = 36.0\nlens = {{ f_stop = 2.8, focus_distance_m = 5.0 }}\n{}{}",
+            "[camera]\nfocal_length_mm = 36.0\nlens = {{ f_stop = 2.8, focus_distance_m = 5.0 }}\n\
+             {}{}",
             key(1, 2.0),
             key(11, 8.0)
         );

@@ -119,7 +119,8 @@ mod tests {
 
     /// Camera that looks along x, slightly off axis, `instant` frames from the frame itself.
     fn looks_along_x(instant: f64) -> Camera {
-        let text = "[camera]\nfocal_length_mm = 36.0\nposition = [0.0, 1.0, 0.0]\ntarget = [1.0, 0.9, 0.2]\n\
+        let text = "[camera]\nfocal_length_mm = 36.0\nposition = [0.0, 1.0, 0.0]\n\
+                    target = [1.0, 0.9, 0.2]\n\
                     [image]\nwidth = 160\nheight = 90\n[sky]\nmodel = \"hosek_wilkie\"\n";
         let look = Look::parse(text, FilePath::new("look.toml")).unwrap();
         let setting = Setting {

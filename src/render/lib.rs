@@ -122,7 +122,8 @@ pub enum RenderError {
     Scene(String),
     /// The camera is under water, and the screen-space method knows the surface only from above.
     #[error(
-        "frame {frame}: the camera is under water, which method \"ssfr\" cannot draw: set [renderer] method = \"ray\""
+        "frame {frame}: the camera is under water, which method \"ssfr\" cannot draw: set \
+         [renderer] method = \"ray\""
     )]
     UnderWater {
         /// Frame number.

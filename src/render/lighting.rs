@@ -124,7 +124,8 @@ mod tests {
     fn air_is_the_grounds_or_the_skys() {
         let of = |line: &str| {
             let text = format!(
-                "[camera]\nfocal_length_mm = 35.0\nposition = [0.0, 1.0, 0.0]\ntarget = [1.0, 1.0, 0.0]\n[image]\nwidth = 64\n\
+                "[camera]\nfocal_length_mm = 35.0\nposition = [0.0, 1.0, 0.0]\n\
+                 target = [1.0, 1.0, 0.0]\n[image]\nwidth = 64\n\
                  height = 36\n[sky]\nmodel = \"hosek_wilkie\"\nturbidity = 5.0\n{line}\n\
                  [ground]\nhaze_m = 700.0\n"
             );

@@ -239,7 +239,8 @@ impl<'a> Painter<'a> {
             return Err(RenderError::Material {
                 index,
                 problem: format!(
-                    "no part of the scene's solids has the name of one of its materials; there are: {}",
+                    "no part of the scene's solids has the name of one of its \
+                     materials; there are: {}",
                     names()
                 ),
             });
@@ -269,8 +270,8 @@ impl SolidPainter<'_, '_> {
                 let places = places.ok_or_else(|| RenderError::Material {
                     index,
                     problem: format!(
-                        "faces of mesh {} that it is for have no texture coordinates (vt); a texture of [[solids.material]] with \
-                         metres needs none",
+                        "faces of mesh {} that it is for have no texture coordinates (vt); a \
+                         texture of [[solids.material]] with metres needs none",
                         self.solid.name
                     ),
                 })?;
@@ -363,7 +364,8 @@ pub(super) fn plan_materials(
     let rows = texels.len().div_ceil(ROW).max(1);
     if rows as u32 > limits.texture || ROW as u32 > limits.texture {
         return Err(RenderError::Scene(format!(
-            "the look's pictures take a texture of {ROW} × {rows} texels, and the adapter takes {} a side",
+            "the look's pictures take a texture of {ROW} × {rows} texels, and the \
+             adapter takes {} a side",
             limits.texture
         )));
     }

@@ -264,9 +264,12 @@ mod tests {
 
     fn plan_of(image: &str, surface: &str, more: &str) -> Plan {
         let text = format!(
-            "[camera]\nfocal_length_mm = 35.0\nfilm_back_mm = [36.0, 18.0]\nposition = [-2.0, 3.0, 2.5]\n\
-             target = [0.0, 1.0, 0.75]\n[image]\nwidth = 96\nheight = 48\n{image}[surface]\nfilter = \"{surface}\"\n\
-             [sky]\nmodel = \"hosek_wilkie\"\n[sun]\nazimuth_degrees = 120.0\nelevation_degrees = 35.0\n{more}"
+            "[camera]\nfocal_length_mm = 35.0\nfilm_back_mm = [36.0, 18.0]\n\
+             position = [-2.0, 3.0, 2.5]\n\
+             target = [0.0, 1.0, 0.75]\n[image]\nwidth = 96\nheight = 48\n{image}[surface]\n\
+             filter = \"{surface}\"\n\
+             [sky]\nmodel = \"hosek_wilkie\"\n[sun]\nazimuth_degrees = 120.0\n\
+             elevation_degrees = 35.0\n{more}"
         );
         let look = Look::parse(&text, Path::new("look.toml")).unwrap();
         let scene = RenderScene {
@@ -353,7 +356,8 @@ mod tests {
     #[test]
     fn ripples_and_windows_are_drawn_where_the_look_has_them() {
         const BOTH: &str = "[surface.ripple]\nwavelength_m = 1.0\nslope = 0.1\n\
-            [solids.windows]\nstorey_m = 1.0\nbay_m = 1.0\n[water]\ncaustics = { resolution = 64 }\n";
+            [solids.windows]\nstorey_m = 1.0\nbay_m = 1.0\n[water]\n\
+            caustics = { resolution = 64 }\n";
         let conditions = |pass: &str, method: &str, more: &str| {
             let more = format!("[renderer]\nmethod = \"{method}\"\n{more}");
             let plan = plan("curvature_flow", &more);
@@ -377,11 +381,14 @@ mod tests {
 
     #[test]
     fn what_is_planned_is_what_commands_use() {
-        const ALL: &str = "[output]\nformats = [\"exr\"]\naovs = [\"Z\", \"forward\"]\n[basin]\nheight_m = 0.5\n\
+        const ALL: &str = "[output]\nformats = [\"exr\"]\naovs = [\"Z\", \"forward\"]\n[basin]\n\
+            height_m = 0.5\n\
             [water]\nspray = { density_per_metre = 9.0, speed_m_per_s = 5.5 }\n";
         let depth_alone = "[output]\nformats = [\"exr\"]\naovs = [\"Z\"]\n";
-        const LIGHTS: &str = "[output]\nformats = [\"exr\"]\ncryptomatte = true\nlights = [\"sun\", \"spray\"]\nsolids = \"holdout\"\n";
-        const SEA: &str = "[output]\nformats = [\"exr\"]\naovs = [\"Z\"]\ncryptomatte = true\n[sea]\nlevel_m = 0.5\n\
+        const LIGHTS: &str = "[output]\nformats = [\"exr\"]\ncryptomatte = true\n\
+                              lights = [\"sun\", \"spray\"]\nsolids = \"holdout\"\n";
+        const SEA: &str = "[output]\nformats = [\"exr\"]\naovs = [\"Z\"]\ncryptomatte = true\n\
+            [sea]\nlevel_m = 0.5\n\
             [basin]\nheight_m = 0.5\ncolour = [0.5, 0.5, 0.5]\n";
         let mut sizes = BTreeSet::new();
         for surface in ["curvature_flow", "narrow_range"] {

@@ -274,7 +274,8 @@ fn panorama(
     let mut height = layer.size.1;
     if height < 2 || width != 2 * height {
         return Err(fault(format!(
-            "is {width} × {height} pixels; a latitude-longitude picture is twice as wide as high, and at least 4 × 2"
+            "is {width} × {height} pixels; a latitude-longitude picture is twice as wide as \
+             high, and at least 4 × 2"
         )));
     }
     if texels.iter().any(|c| !c.is_finite()) {

@@ -21,7 +21,8 @@ pub(super) fn build(
     (gravity, seconds): (DVec3, f64),
 ) -> Result<Absorption, SceneError> {
     if axis == 1 || gravity.x != 0.0 || gravity.z != 0.0 || gravity.y >= 0.0 {
-        let problem = "a wall absorbs by the water's level: it is one along x or z, and gravity is straight down";
+        let problem = "a wall absorbs by the water's level: it is one along x or z, and \
+                       gravity is straight down";
         return Err(doc.fault_of_plain(path, problem));
     }
     let absorption = Absorption::new(Asked {
@@ -33,8 +34,8 @@ pub(super) fn build(
     let gain = absorption.gain();
     if gain * seconds > MOST_GAIN {
         let problem = format!(
-            "the wall answers once a frame, and on {} m of water that has to be {:.1} times a second or more; raise \
-             shot.frames_per_second",
+            "the wall answers once a frame, and on {} m of water that has to be {:.1} times a \
+             second or more; raise shot.frames_per_second",
             shown(spec.depth),
             gain / MOST_GAIN
         );
@@ -205,7 +206,8 @@ impl Held {
         let held = self.0.iter().enumerate().filter(|(_, count)| **count > 0);
         held.map(|(k, count)| {
             format!(
-                "wave_maker[{k}].absorption.room: the wall was at its end in {count} frames and threw waves back; give it more"
+                "wave_maker[{k}].absorption.room: the wall was at its end in {count} frames and \
+                 threw waves back; give it more"
             )
         })
         .collect()

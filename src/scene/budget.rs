@@ -64,7 +64,8 @@ const LEAST_ENERGY_SPEED: f64 = 0.1;
 /// Describes the default of `budget.speed`.
 pub(super) fn speed_words() -> String {
     format!(
-        "{SPEED} (√(2 g × the domain's diagonal) + the fastest wall or moving solid), at least {LEAST_SPEED} spacings a frame"
+        "{SPEED} (√(2 g × the domain's diagonal) + the fastest wall or moving solid), at least \
+         {LEAST_SPEED} spacings a frame"
     )
 }
 
@@ -254,8 +255,9 @@ impl Budget {
             let limit = times * reached.max(fallen / SPEED_JUMP);
             check(Watched::SpeedJump, report.max_speed, Some(limit)).map_err(|breach| {
                 let detail = format!(
-                    "{} times the larger of {reached:.4} m/s, which gravity, effects and walls can bring {speed:.4} m/s of the fastest before \
-                     to, and {:.4} m/s, an eighth of the speed after a fall from the top of the water",
+                    "{} times the larger of {reached:.4} m/s, which gravity, effects and walls can \
+                     bring {speed:.4} m/s of the fastest before to, and {:.4} m/s, an eighth of \
+                     the speed after a fall from the top of the water",
                     shown(times),
                     fallen / SPEED_JUMP
                 );

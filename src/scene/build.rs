@@ -433,8 +433,9 @@ fn coarse(loaded: &Loaded, placement: &Placement, spacing: f64) -> Option<String
     let step = reach.max_element();
     (loaded.digits == Digits::Single && step > MOST_STEP * spacing).then(|| {
         format!(
-            "32-bit floats about its coordinate {} are {step:.2e} m apart, more than {MOST_STEP} of the particle spacing of {} m; \
-             save it near its own zero and let translate move it, or as text with all digits, such as OBJ",
+            "32-bit floats about its coordinate {} are {step:.2e} m apart, more than {MOST_STEP} \
+             of the particle spacing of {} m; save it near its own zero and let translate move it, \
+             or as text with all digits, such as OBJ",
             shown(loaded.farthest()),
             shown(spacing)
         )

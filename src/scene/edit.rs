@@ -152,7 +152,8 @@ pressure = { tolerance = 1e-3 }
         ];
         let written = with_settings(SCENE, &settings).expect("written");
         for piece in [
-            "[solver.pbf]      # of PBF\n  # why 0.25\n  particle_spacing = 0.25            # d\n# why 8\niterations = 8\n# why 0.5\ncfl = 0.5\n",
+            "[solver.pbf]      # of PBF\n  # why 0.25\n  particle_spacing = 0.25            # d\n\
+             # why 8\niterations = 8\n# why 0.5\ncfl = 0.5\n",
             "# why \"ipp\"\npressure = { tolerance = 1e-5, preconditioner = \"ipp\" }\n",
             "\n[effects.viscosity]\n# why 0.1\nxsph = 0.1\n",
         ] {

@@ -110,7 +110,8 @@ impl Scene {
         let spacing = self.particle_spacing();
         if waves.height < LEAST_HEIGHT * spacing {
             lints.push(format!(
-                "{key}: waves {} m high are {:.2} particle spacings high; below {LEAST_HEIGHT} little of them is left",
+                "{key}: waves {} m high are {:.2} particle spacings high; below {LEAST_HEIGHT} \
+                 little of them is left",
                 shown(waves.height),
                 waves.height / spacing
             ));
@@ -119,7 +120,8 @@ impl Scene {
             let frames = period / self.shot.frame_seconds();
             if frames < LEAST_FRAMES {
                 lints.push(format!(
-                    "{key}: a period of {} s is {frames:.1} frames; below {LEAST_FRAMES} waves may be a few steps each",
+                    "{key}: a period of {} s is {frames:.1} frames; below {LEAST_FRAMES} waves \
+                     may be a few steps each",
                     shown(period)
                 ));
             }
@@ -133,7 +135,8 @@ impl Scene {
         let room = self.domain.size().y - still.floor;
         if still.depth + waves.crest > room {
             lints.push(format!(
-                "{key}: crests {:.3} m above water {} m deep reach the ceiling, {} m above the floor",
+                "{key}: crests {:.3} m above water {} m deep reach the \
+                 ceiling, {} m above the floor",
                 waves.crest,
                 shown(still.depth),
                 shown(room)
@@ -164,7 +167,8 @@ impl Scene {
         let duration = self.shot.duration();
         if back < duration {
             lints.push(format!(
-                "{}: waves are back from the wall opposite after {back:.1} s of {} s, and no zone absorbs them",
+                "{}: waves are back from the wall opposite after {back:.1} s of {} s, \
+                 and no zone absorbs them",
                 waves.key,
                 shown(duration)
             ));
@@ -181,7 +185,8 @@ impl Scene {
         let (steep, breaks) = (k * waves.crest, BREAKS * (k * depth).tanh());
         if steep > breaks {
             lints.push(format!(
-                "{}: a crest of {} m has k a = {steep:.2} at the peak's {} s; waves break from {breaks:.2} on (Miche 1944)",
+                "{}: a crest of {} m has k a = {steep:.2} at the peak's {} s; waves break from \
+                 {breaks:.2} on (Miche 1944)",
                 waves.key,
                 shown(waves.crest),
                 shown(period)
@@ -206,8 +211,8 @@ impl Scene {
             let wave = self.wave_length(period, level);
             if length < least * wave {
                 lints.push(format!(
-                    "effects.{name}.length: {} m is {:.2} of a wave length, as waves of {} s are {wave:.3} m long on {} m of water; \
-                     one and a half are good, {least} the least",
+                    "effects.{name}.length: {} m is {:.2} of a wave length, as waves of {} s are \
+                     {wave:.3} m long on {} m of water; one and a half are good, {least} the least",
                     shown(length),
                     length / wave,
                     shown(period),
@@ -222,8 +227,8 @@ impl Scene {
                 let wave = self.wave_length(longer, level);
                 if length < least * wave {
                     lints.push(format!(
-                        "effects.{name}.length: {} m is {:.2} of a wave length of {}'s waves of {} s; {least} is the least, and its \
-                         period is {} s",
+                        "effects.{name}.length: {} m is {:.2} of a wave length of {}'s waves of {} \
+                         s; {least} is the least, and its period is {} s",
                         shown(length),
                         length / wave,
                         waves.key,
@@ -243,7 +248,8 @@ impl Scene {
         let layers = level.map_or(0.0, |level| level / self.particle_spacing());
         if layers > LAYERS {
             lints.push(format!(
-                "solver.pbf.grid_projection: {layers:.0} layers of particles without it; above {LAYERS} water at rest simmers"
+                "solver.pbf.grid_projection: {layers:.0} layers of particles without it; above \
+                 {LAYERS} water at rest simmers"
             ));
         }
     }

@@ -484,8 +484,8 @@ fn check_crop(doc: &Document<'_>, image: &ImageSpec) -> Result<(), SceneError> {
     let (width, height) = (image.width, image.height);
     if x0 >= x1 || y0 >= y1 || x1 > f64::from(width) || y1 > f64::from(height) {
         return fault(format!(
-            "{crop:?} is no part of a {width} × {height} image; allowed is [x0, y0, x1, y1] with 0 ≤ x0 < x1 ≤ {width} and \
-             0 ≤ y0 < y1 ≤ {height}"
+            "{crop:?} is no part of a {width} × {height} image; allowed is [x0, y0, x1, y1] with 0 \
+             ≤ x0 < x1 ≤ {width} and 0 ≤ y0 < y1 ≤ {height}"
         ));
     }
     Ok(())
@@ -534,7 +534,8 @@ fn file_camera(
     let shape = f64::from(spec.image.width) / f64::from(spec.image.height);
     match camera.aspect_ratio() {
         Some(aspect) if (aspect / shape - 1.0).abs() > SHAPE => Err(fault(format!(
-            "its camera has an aspect ratio of {aspect:.4}, a {} × {} image has {shape:.4}; make them the same, or set camera.fit",
+            "its camera has an aspect ratio of {aspect:.4}, a {} × {} image has {shape:.4}; make \
+             them the same, or set camera.fit",
             spec.image.width, spec.image.height
         ))),
         _ => Ok(camera),

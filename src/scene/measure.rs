@@ -73,27 +73,32 @@ impl Measure {
                 ),
                 (
                     "speed_anywhere",
-                    "largest speed in the flume over the paddle's; waves double where the far wall turns them",
+                    "largest speed in the flume over the paddle's; waves double where \
+                     the far wall turns them",
                 ),
             ],
             Self::WavesByTheory => &[
                 (
                     "variance_ratio",
-                    "root of the elevation's variance over theory's of the same waves in the same time",
+                    "root of the elevation's variance over theory's of the same \
+                     waves in the same time",
                 ),
                 (
                     "elevation_error",
-                    "elevation, root mean square of what it is off theory's over that of theory's, worst gauge",
+                    "elevation, root mean square of what it is off theory's over that \
+                     of theory's, worst gauge",
                 ),
                 ("crest", "highest crest at the last gauge over theory's"),
                 ("crest_time", "how far off in time it is, s"),
                 (
                     "second_harmonic",
-                    "of regular waves: amplitude at twice the frequency over theory's, mean of the gauges",
+                    "of regular waves: amplitude at twice the frequency over \
+                     theory's, mean of the gauges",
                 ),
                 (
                     "second_harmonic_spread",
-                    "its largest less its least over theory's: what free waves of that frequency make",
+                    "its largest less its least over theory's: what free waves \
+                     of that frequency make",
                 ),
             ],
             Self::SolitaryWave => &[
@@ -125,7 +130,8 @@ impl Measure {
                 ),
                 (
                     "profile_error",
-                    "profile, mean |h − Ritter's| over h0 from the still water to h = 0.1 h0, mean of T from 4 to 8",
+                    "profile, mean |h − Ritter's| over h0 from the still water to h = 0.1 \
+                     h0, mean of T from 4 to 8",
                 ),
                 (
                     "profile_worst",
@@ -185,7 +191,8 @@ impl Measure {
             ],
             Self::TaylorGreen => &[(
                 "dissipation_ratio",
-                "decay of the energy over that of PIC and of the projection, α Δx² / (6 Δt) + U² Δt / 8",
+                "decay of the energy over that of PIC and of the projection, α \
+                 Δx² / (6 Δt) + U² Δt / 8",
             )],
         }
     }

@@ -85,8 +85,9 @@ fn check_points(
         }
         if *x < allowed.least {
             return Err(format!(
-                "{}, {}, lies outward of the start: displacements are from 0 on, inward (of a solid: along its direction); a table that \
-                 goes both ways has to begin at its end outward: add {} m to each, and lead there from 0",
+                "{}, {}, lies outward of the start: displacements are from 0 on, inward (of a \
+                 solid: along its direction); a table that goes both ways has to begin at its end \
+                 outward: add {} m to each, and lead there from 0",
                 called(i),
                 shown_all(&[*t, *x]),
                 shown(-least)
@@ -144,8 +145,8 @@ fn rows(text: &str) -> Result<Vec<(usize, [f64; 2])>> {
             _ if may_be_titles && are_titles(&fields) => {}
             _ => {
                 return Err(format!(
-                    "line {}: {line:?} is not time and displacement, two numbers with decimal points and a comma, a semicolon, a tab or \
-                     spaces between them",
+                    "line {}: {line:?} is not time and displacement, two numbers with decimal \
+                     points and a comma, a semicolon, a tab or spaces between them",
                     index + 1
                 ));
             }

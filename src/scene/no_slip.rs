@@ -43,7 +43,8 @@ pub(super) fn build(
     }
     let walls: Vec<Wall> = walls.into_iter().filter(|wall| !is_none(wall)).collect();
     if method == Method::Pbf && !has_own && !walls.is_empty() {
-        let problem = "solver pbf has free-slip walls alone, but where an effect resolves them; choose solver.method = \"flip\"";
+        let problem = "solver pbf has free-slip walls alone, but where an effect resolves them; \
+                       choose solver.method = \"flip\"";
         return Err(doc.fault_of_plain(key, problem));
     }
     Ok(walls)

@@ -78,8 +78,10 @@ mod tests {
     /// Individual particles move with the scene.
     #[test]
     fn particles_are_carried_with_their_domain() {
-        let text = "[shot]\nname = \"a\"\nframes = 1\nframes_per_second = 30\n[domain]\nmin = [100, 0, 100]\nmax = [102, 2, 102]\n\
-            [[water.particles]]\nat = [[101.5, 1.0, 101.25]]\n[solver]\nmethod = \"pbf\"\n[solver.pbf]\nparticle_spacing = 0.1\n";
+        let text = "[shot]\nname = \"a\"\nframes = 1\nframes_per_second = 30\n[domain]\n\
+            min = [100, 0, 100]\nmax = [102, 2, 102]\n\
+            [[water.particles]]\nat = [[101.5, 1.0, 101.25]]\n[solver]\nmethod = \"pbf\"\n\
+            [solver.pbf]\nparticle_spacing = 0.1\n";
         let world = Scene::parse(text, "s.toml".as_ref(), "".as_ref(), &[]).expect("valid");
         let way = world.origin;
         assert!(way.x > 90.0 && way.z > 90.0, "{way}");

@@ -84,7 +84,8 @@ pub(super) fn check_solver(
                 let (cell, edge) = (PROJECTION_CELL * spacing, f64::from(EDGE));
                 if solver.pbf().grid_projection && !is_whole(length / cell / edge, edge) {
                     return refuse(format!(
-                        "{:.3} particle spacings of {} m, and PBF with grid_projection asks for a multiple of {} (without, for a whole number)",
+                        "{:.3} particle spacings of {} m, and PBF with grid_projection asks for a \
+                         multiple of {} (without, for a whole number)",
                         length / spacing,
                         shown(spacing),
                         PROJECTION_CELL * edge

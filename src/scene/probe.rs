@@ -270,7 +270,8 @@ fn second(known: &str, name: &str) -> String {
     let mut problem = format!("a second probe of the name {name:?}");
     if known != name {
         problem += &format!(
-            ": {known:?} is the same file where upper and lower case are not told apart, as on Windows and macOS"
+            ": {known:?} is the same file where upper and lower case are not told apart, \
+             as on Windows and macOS"
         );
     }
     problem
@@ -403,7 +404,8 @@ fn force(
 /// PBF's pressure is defined at particles, not on faces.
 fn why_no_force(solver: &Solver) -> Option<String> {
     (solver.method == Method::Pbf).then(|| {
-        "solver pbf has no pressure on faces that a force could be summed from; choose solver.method = \"flip\""
+        "solver pbf has no pressure on faces that a force could be summed from; choose \
+         solver.method = \"flip\""
             .to_owned()
     })
 }
@@ -421,7 +423,8 @@ fn why_not_so_often(rate: Rate, shot: &Shot, solver: &Solver) -> Option<String> 
     let is_possible = LEAST_RATE <= rate && rate <= highest;
     (!is_possible).then(|| {
         format!(
-            "{rate} a second; from {LEAST_RATE} to {highest} are possible: shot.frames_per_second × solver.{}.max_substeps",
+            "{rate} a second; from {LEAST_RATE} to {highest} are possible: shot.frames_per_second \
+             × solver.{}.max_substeps",
             solver.method.name()
         )
     })
@@ -441,10 +444,11 @@ fn why_no_pressure(solver: &Solver) -> Option<String> {
         return None;
     }
     let why = if pbf.iteration == Iteration::Chebyshev {
-        "with solver.pbf.iteration = \"chebyshev\" a part of each correction goes on from the one before, which no \
-         pressure stands for"
+        "with solver.pbf.iteration = \"chebyshev\" a part of each correction goes on from the one \
+         before, which no pressure stands for"
     } else if pbf.artificial_pressure > 0.0 {
-        "with solver.pbf.artificial_pressure above 0 particles are also held apart by a force that no pressure stands for"
+        "with solver.pbf.artificial_pressure above 0 particles are also held apart by a force that \
+         no pressure stands for"
     } else {
         return None;
     };

@@ -65,7 +65,8 @@ pub(super) fn odd(name: &str) -> Option<String> {
     let (as_meant, with_slashes) = (written('\\'), written('/'));
     if let Some(letter) = name.chars().find_map(escaped) {
         return Some(format!(
-            "{as_meant}: \\{letter} in double quotes is a control character in TOML; use / between folders: \"{with_slashes}\""
+            "{as_meant}: \\{letter} in double quotes is a control character in TOML; use / between \
+             folders: \"{with_slashes}\""
         ));
     }
     name.contains('\\')
@@ -107,7 +108,8 @@ mod tests {
         for (name, words) in [
             (
                 "sub\u{8}ox.obj",
-                "sub\\box.obj: \\b in double quotes is a control character in TOML; use / between folders: \"sub/box.obj\"",
+                "sub\\box.obj: \\b in double quotes is a control character in TOML; use / between \
+                 folders: \"sub/box.obj\"",
             ),
             ("sub\ttub.obj", "sub\\ttub.obj: \\t in double quotes"),
             (

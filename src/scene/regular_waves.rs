@@ -38,8 +38,9 @@ pub(super) fn check_stokes(doc: &Document<'_>, path: &str, waves: &RegularWaves)
     check_height(doc, path, waves)?;
     if waves.ursell() >= MADSEN_LIMIT {
         let problem = format!(
-            "waves of {} m and {} s on {} m of water: H L² / h³ is {:.1}, and the second order holds below {MADSEN_LIMIT:.1} \
-             (Madsen 1971); kind = \"cnoidal\" makes waves that are longer than {LEAST_CNOIDAL_LENGTH} depths",
+            "waves of {} m and {} s on {} m of water: H L² / h³ is {:.1}, and the second order \
+             holds below {MADSEN_LIMIT:.1} (Madsen 1971); kind = \"cnoidal\" makes waves that are \
+             longer than {LEAST_CNOIDAL_LENGTH} depths",
             shown(waves.height),
             shown(waves.period),
             shown(waves.depth),
@@ -57,12 +58,13 @@ pub(super) fn cnoidal(doc: &Document<'_>, path: &str, waves: RegularWaves) -> Re
         let (period, depth) = (shown(waves.period), shown(waves.depth));
         let problem = match reason {
             NoCnoidal::Short { least_period } => format!(
-                "waves of {period} s on {depth} m of water are shorter than {LEAST_CNOIDAL_LENGTH} depths, and cnoidal ones have \
-                 {least_period:.3} s or more; kind = \"stokes\" makes shorter ones"
+                "waves of {period} s on {depth} m of water are shorter than \
+                 {LEAST_CNOIDAL_LENGTH} depths, and cnoidal ones have {least_period:.3} s or \
+                 more; kind = \"stokes\" makes shorter ones"
             ),
             NoCnoidal::Long { most_period } => format!(
-                "no elliptic parameter below 1 fits: at {period} s each crest is a solitary wave; cnoidal ones have up to \
-                 {most_period:.3} s"
+                "no elliptic parameter below 1 fits: at {period} s each crest is a solitary wave; \
+                 cnoidal ones have up to {most_period:.3} s"
             ),
         };
         doc.fault_of(&format!("{path}.period"), problem)
@@ -78,7 +80,8 @@ fn check_height(doc: &Document<'_>, path: &str, waves: &RegularWaves) -> Result<
     }
     if waves.height > HIGHEST * waves.depth {
         let problem = format!(
-            "waves of {} m on {} m of water break: the highest are {HIGHEST} depths high (McCowan 1894)",
+            "waves of {} m on {} m of water break: the highest are {HIGHEST} \
+             depths high (McCowan 1894)",
             shown(waves.height),
             shown(waves.depth)
         );

@@ -64,7 +64,8 @@ fn check_second_order(asked: &Asked) -> std::result::Result<(), String> {
     let shortest = wave_number(TAU / asked.shortest_period, depth, gravity) * depth;
     if shortest > DEEPEST {
         return Err(format!(
-            "waves of {} s on {} m of water have kh = {shortest:.1}, and it is known up to {DEEPEST}; a longer shortest_period has less",
+            "waves of {} s on {} m of water have kh = {shortest:.1}, and it is known up to \
+             {DEEPEST}; a longer shortest_period has less",
             shown(asked.shortest_period),
             shown(depth)
         ));
@@ -80,8 +81,8 @@ fn check_second_order(asked: &Asked) -> std::result::Result<(), String> {
     let ursell = height * length.powi(2) / depth.powi(3);
     if ursell >= MADSEN_LIMIT {
         return Err(format!(
-            "H L² / h³ is {ursell:.1} with {of} and the peak's {} s on {} m of water, and the second order holds below \
-             {MADSEN_LIMIT:.1} (Madsen 1971)",
+            "H L² / h³ is {ursell:.1} with {of} and the peak's {} s on {} m of water, and the \
+             second order holds below {MADSEN_LIMIT:.1} (Madsen 1971)",
             shown(asked.peak_period),
             shown(depth)
         ));
@@ -229,7 +230,8 @@ pub(super) fn check(
     let least = sea.asked().ramp + at / sea.least_group_speed();
     if time < least {
         let problem = format!(
-            "its slowest waves, of {:.3} m/s, are there after {least:.3} s if they leave when the ramp is over",
+            "its slowest waves, of {:.3} m/s, are there after {least:.3} s if they \
+             leave when the ramp is over",
             sea.least_group_speed()
         );
         return refuse("time", problem);

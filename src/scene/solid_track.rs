@@ -228,8 +228,9 @@ impl Scene {
         let told = tracks().filter_map(|track| track.missed).map(|Missed { moves, shot }| {
             let ([begin, end], [from, to]) = (moves.map(shown), shot.map(shown));
             format!(
-                "solid.track.start: the file moves a solid over frames {begin} to {end}, and the shot has frames {from} to {to} of it, so that \
-                 the solid stands still; start = {begin} makes the first of its frames frame 1"
+                "solid.track.start: the file moves a solid over frames {begin} to {end}, and the \
+                 shot has frames {from} to {to} of it, so that the solid stands still; start = \
+                 {begin} makes the first of its frames frame 1"
             )
         });
         rates.chain(told).collect()

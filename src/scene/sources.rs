@@ -226,7 +226,8 @@ fn check_velocity(
     }
     let way = velocity.abs() * frame;
     refuse(format!(
-        "in a frame its water goes {} × {} × {} m, and its room is {} × {} × {} m: make the room longer",
+        "in a frame its water goes {} × {} × {} m, and its room is {} × {} × {} \
+         m: make the room longer",
         shown(way.x),
         shown(way.y),
         shown(way.z),

@@ -183,8 +183,8 @@ impl Scene {
         let reached = fastest + (gravity * kick + push.gained(kick));
         if f64::from(done) + wanted > f64::from(flip.max_substeps) {
             let detail = format!(
-                "up to {reached:.3} m/s, particles {speed:.3}, with gravity, effects, wave makers and moving solids, at \
-                 solver.flip.cfl {}{}",
+                "up to {reached:.3} m/s, particles {speed:.3}, with gravity, effects, wave makers \
+                 and moving solids, at solver.flip.cfl {}{}",
                 flip.cfl,
                 self.stable_step()
             );

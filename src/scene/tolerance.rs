@@ -133,7 +133,8 @@ pub fn parse(text: &str, file: &Path) -> Result<Tolerance, SceneError> {
         fields: fields(spec),
     };
     if tolerance == Tolerance::default() {
-        let problem = "it limits nothing; allowed: [position], [velocity], [attributes.NAME], [aggregates], [pictures]";
+        let problem = "it limits nothing; allowed: [position], [velocity], [attributes.NAME], \
+                       [aggregates], [pictures]";
         return Err(doc.fault_plain(0..0, problem.to_owned()));
     }
     Ok(tolerance)
@@ -179,8 +180,10 @@ mod tests {
 
     #[test]
     fn every_key() {
-        let text = "[position]\nmax = 0.1\n[velocity]\nrms = 1\np99 = 2.5\n[attributes.cx_x]\nmax = 3\n\
-            [aggregates]\nvolume = { relative = 0.01 }\nfront = { absolute = 0.2, relative = 0.1 }\n\
+        let text = "[position]\nmax = 0.1\n[velocity]\nrms = 1\np99 = 2.5\n[attributes.cx_x]\n\
+            max = 3\n\
+            [aggregates]\nvolume = { relative = 0.01 }\n\
+            front = { absolute = 0.2, relative = 0.1 }\n\
             [pictures]\nmean = 0.01\nperceptual = 90\n";
         let found = parse(text, Path::new("t.toml")).expect("valid");
         assert_eq!(found.fields["position"].max, Some(0.1));

@@ -160,8 +160,8 @@ impl Rate {
             None => "as every layer that does not say its timeCodesPerSecond".to_owned(),
         };
         Some(format!(
-            "{key}: the file has {} time codes a second, {by}, and the shot has {} frames; a second of the file is one of the shot, \
-             and its time codes are not the shot's frames",
+            "{key}: the file has {} time codes a second, {by}, and the shot has {} frames; a \
+             second of the file is one of the shot, and its time codes are not the shot's frames",
             shown(rate),
             shown(frames_per_second)
         ))
@@ -179,8 +179,8 @@ pub(super) fn is_usd(bytes: &[u8]) -> bool {
 pub(super) fn layer(bytes: &[u8]) -> Result<Layer> {
     if bytes.starts_with(BINARY) {
         return Err(
-            "binary USD; write it as text: usdcat shot.usdc -o shot.usda (of OpenUSD; usd-core of Python has it as \
-             Usd.Stage.Open(\"shot.usdc\").GetRootLayer().Export(\"shot.usda\"))"
+            "binary USD; write it as text: usdcat shot.usdc -o shot.usda (of OpenUSD; usd-core of \
+             Python has it as Usd.Stage.Open(\"shot.usdc\").GetRootLayer().Export(\"shot.usda\"))"
                 .to_owned(),
         );
     }
@@ -202,8 +202,8 @@ pub(super) fn layer(bytes: &[u8]) -> Result<Layer> {
 /// Describes how to flatten a file into one layer.
 fn flatten(file: &str) -> String {
     format!(
-        "write all as one layer: usdcat --flatten {file} -o flat.usda (of OpenUSD; usd-core of Python has it as \
-         Usd.Stage.Open(\"{file}\").Export(\"flat.usda\"))"
+        "write all as one layer: usdcat --flatten {file} -o flat.usda (of OpenUSD; usd-core of \
+         Python has it as Usd.Stage.Open(\"{file}\").Export(\"flat.usda\"))"
     )
 }
 

@@ -90,7 +90,8 @@ fn check_room(
     };
     if reach > room {
         let problem = format!(
-            "the wall {} crosses the whole domain: within the {} s of the shot it moves {} m of {} m",
+            "the wall {} crosses the whole domain: within the {} s of the \
+             shot it moves {} m of {} m",
             wall.name(),
             shown(duration),
             shown(reach),

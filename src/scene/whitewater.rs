@@ -103,7 +103,10 @@ const BUBBLES: &[Key] = &[
     Key::number("rise_speed", 0.0..=10.0)
         .unit("m/s")
         .default("0.25")
-        .about("through still water; bubbles of 1 to 10 mm rise at 0.2 to 0.3 m/s (Clift, Grace and Weber 1978)"),
+        .about(
+            "through still water; bubbles of 1 to 10 mm rise at 0.2 to 0.3 m/s \
+             (Clift, Grace and Weber 1978)",
+        ),
     Key::number("response", SECONDS)
         .unit("seconds")
         .default("0.1")
@@ -364,7 +367,8 @@ mod tests {
 
     #[test]
     fn what_is_written_out_reads_back_as_the_same() {
-        let text = "seed = 5\nradius = [0.001, 0.002]\n[emission]\ntrapped_air_rate = 12.5\n[spray]\nwind = [1, -2.5, 0]\n\
+        let text = "seed = 5\nradius = [0.001, 0.002]\n[emission]\ntrapped_air_rate = 12.5\n\
+            [spray]\nwind = [1, -2.5, 0]\n\
             [foam]\nlifetime = [1, 2]\ncrowd = 3\n[bubbles]\nrise_speed = 0.1\nresponse = 0.5\n";
         let settled = parse(text).expect("valid").settled(0.1, &shot());
         let written = written_out(&settled);

@@ -149,7 +149,10 @@ pub enum BakeError {
     #[error(transparent)]
     Cache(#[from] CacheError),
     /// The bake in the cache has other physics.
-    #[error("{directory} was baked from another scene: {difference}; choose another -o", directory = .directory.display())]
+    #[error(
+        "{directory} was baked from another scene: {difference}; choose another -o",
+        directory = .directory.display()
+    )]
     OtherPhysics {
         /// Directory of the cache.
         directory: PathBuf,
@@ -484,7 +487,8 @@ fn branched(request: &Request, last: u32, mut branch: Branch) -> Result<Beginnin
 fn check_first(request: &Request, next: u32) -> Result<(), BakeError> {
     match &request.frames {
         Some(frames) if frames.first() > next => Err(BakeError::Frames(format!(
-            "{frames}: frame {next} has not been baked, and each frame needs the one before: --frames {next}-{}",
+            "{frames}: frame {next} has not been baked, and each frame needs the one \
+             before: --frames {next}-{}",
             frames.last()
         ))),
         _ => Ok(()),

@@ -91,8 +91,8 @@ pub enum BranchError {
     },
     /// The scene differs from the cache in a key that decides what particles represent.
     #[error(
-        "--from {from}: it was baked with {key} = {cached}, and the scene has {given}; a bake that begins from a frame \
-         keeps it"
+        "--from {from}: it was baked with {key} = {cached}, and the scene has {given}; a bake that \
+         begins from a frame keeps it"
     )]
     Unfit {
         /// The frame.
@@ -106,8 +106,8 @@ pub enum BranchError {
     },
     /// Particles outside the scene's walls.
     #[error(
-        "--from {from}: {count} of {all} particles lie beyond the walls of the scene as they stand at {time} s; the first is \
-         particle {id} at {position:?}"
+        "--from {from}: {count} of {all} particles lie beyond the walls of the scene as they stand \
+         at {time} s; the first is particle {id} at {position:?}"
     )]
     Beyond {
         /// The frame.

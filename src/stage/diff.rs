@@ -242,8 +242,8 @@ pub fn diff(request: &Request) -> Result<Outcome, DiffError> {
         }
         (a, b) => {
             return Err(DiffError::usage(format!(
-                "{} is {}, and {} is {}; two caches, a cache and then a baseline, two folders of pictures or two \
-                 pictures can be compared",
+                "{} is {}, and {} is {}; two caches, a cache and then a baseline, two folders of \
+                 pictures or two pictures can be compared",
                 request.a.display(),
                 a.kind(),
                 request.b.display(),

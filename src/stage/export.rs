@@ -241,7 +241,8 @@ fn warning(volume: f64) -> Option<String> {
     let is_off = (volume - 1.0).abs() > VOLUME;
     is_off.then(|| {
         format!(
-            "the mesh holds {:.1} % of the particles' volume, and no value of the field near its own has more of it",
+            "the mesh holds {:.1} % of the particles' volume, and no value of the field near \
+             its own has more of it",
             100.0 * volume
         )
     })
@@ -268,7 +269,8 @@ impl<'a> Job<'a> {
         let cache = CacheReader::open(&request.cache)?;
         if cache.manifest().is_whitewater() {
             return Err(ExportError::Asked(format!(
-                "{} is a stream of whitewater: export the cache that it was made from, with --stream",
+                "{} is a stream of whitewater: export the cache that it was \
+                 made from, with --stream",
                 request.cache.display()
             )));
         }

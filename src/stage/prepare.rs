@@ -139,7 +139,8 @@ impl Start {
             let seconds = window.length(scene.shot.duration());
             if most == Some(0) && seconds > 0.0 {
                 lints.push(format!(
-                    "emitter[{index}]: nothing enters: no layer of particles comes in within its {} s",
+                    "emitter[{index}]: nothing enters: no layer of particles \
+                     comes in within its {} s",
                     four_digits(seconds)
                 ));
             } else if let Some(promise) = promise
@@ -150,8 +151,9 @@ impl Start {
                 let part = made / asked - 1.0;
                 if part.abs() > ROUNDED {
                     lints.push(format!(
-                        "emitter[{index}]: its box and velocity ask for {} m³/s, and {} m³/s enter, {:.1} % {}: across the flow there \
-                         are whole rows of particles {} m apart",
+                        "emitter[{index}]: its box and velocity ask for {} m³/s, and {} \
+                         m³/s enter, {:.1} % {}: across the flow there are whole rows \
+                         of particles {} m apart",
                         four_digits(asked),
                         four_digits(made),
                         100.0 * part.abs(),
@@ -184,8 +186,8 @@ impl Start {
         for (index, promise) in self.promises().into_iter().enumerate() {
             if let Some(promise) = promise.filter(|promise| promise.covered > 0.0) {
                 warnings.push(format!(
-                    "emitter[{index}]: solids cover {:.1} % of its cross-section all along its room, and nothing enters there: it brings \
-                     {:.4} m³/s",
+                    "emitter[{index}]: solids cover {:.1} % of its cross-section all along its \
+                     room, and nothing enters there: it brings {:.4} m³/s",
                     100.0 * promise.covered,
                     promise.rate
                 ));

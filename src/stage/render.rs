@@ -188,7 +188,8 @@ pub enum RenderJobError {
     )]
     NoNeighbours(u32),
     /// The given cache is a whitewater stream, not a bake.
-    #[error("{} is a stream of whitewater: render the cache that it was made from, with a look that has [whitewater]", .0.display())]
+    #[error("{} is a stream of whitewater: render the cache that it was made from, with a \
+             look that has [whitewater]", .0.display())]
     IsWhitewater(PathBuf),
     /// The whitewater stream that the look draws cannot be used.
     #[error(transparent)]

@@ -376,8 +376,10 @@ pub(super) fn keep(
     } = &failure.breach;
     let place = failure.place.as_ref();
     let report = json!({
-        "last_frame": last, "frame": frame, "substep": substep, "budget": watched.name(), "measured": measured,
-        "limit": limit, "message": failure.to_string(), "device": match opened { Opened::Gpu(_) => "gpu", Opened::Cpu => "cpu" },
+        "last_frame": last, "frame": frame, "substep": substep, "budget": watched.name(),
+        "measured": measured,
+        "limit": limit, "message": failure.to_string(),
+        "device": match opened { Opened::Gpu(_) => "gpu", Opened::Cpu => "cpu" },
         "pass": place.map(|p| json!({ "name": p.pass, "substep": p.substep, "buffer": p.buffer })),
     });
     let failed = Failed {

@@ -166,7 +166,8 @@ fn open(request: &Request) -> Result<Vec<Strip>, ViewError> {
                 found => format!("; within it there are {}", found.join(", ")),
             };
             ViewError::Asked(format!(
-                "nothing to see in {}: it is no cache and no study, and has no pictures (PNG, EXR){within}",
+                "nothing to see in {}: it is no cache and no study, and has no \
+                 pictures (PNG, EXR){within}",
                 path.display()
             ))
         };
@@ -189,7 +190,8 @@ fn open(request: &Request) -> Result<Vec<Strip>, ViewError> {
         // The same shape up to the rounding of a side to whole pixels.
         if wide.abs_diff(high) > a.size[0].max(b.size[0]) {
             return Err(ViewError::Asked(format!(
-                "{} is {} × {} and {} is {} × {}: pictures that are held against each other have one shape",
+                "{} is {} × {} and {} is {} × {}: pictures that are held against \
+                 each other have one shape",
                 a.path.display(),
                 a.size[0],
                 a.size[1],

@@ -12,9 +12,10 @@ use super::{
 const ALIKE: f64 = 0.05;
 
 /// Claims of the paper (§3.2) for the same wave and city on a GTX 1650.
-pub const CLAIMS: &str = "The paper sees a better defined crest with PBF (its Figure 2a) than with PIC/FLIP (3a), no \
-    well-defined splash with PIC/FLIP, which swallows the buildings (3b), and a wave that spreads more with PBF (2b); a \
-    frame took it 24.27 ms with PIC/FLIP and 25.22 ms with PBF.";
+pub const CLAIMS: &str = "The paper sees a better defined crest with PBF (its Figure 2a) than \
+    with PIC/FLIP (3a), no well-defined splash with PIC/FLIP, which swallows the buildings \
+    (3b), and a wave that spreads more with PBF (2b); a frame took it 24.27 ms with PIC/FLIP \
+    and 25.22 ms with PBF.";
 
 /// Measurements of one frame of one solver.
 #[derive(Clone, Debug, PartialEq)]
@@ -140,7 +141,8 @@ const QUESTIONS: [Question; 6] = [
     Question {
         asked: "Whose splash goes higher?",
         claimed: Some("pbf"),
-        measured: "Greatest height above the still level that 99.9 % of the water keeps below, from the impact on",
+        measured: "Greatest height above the still level that 99.9 % of the water keeps \
+                   below, from the impact on",
         unit: " m",
         digits: 2,
         value: |course, impact| {
@@ -246,8 +248,8 @@ pub fn summary(findings: &[Finding]) -> String {
     let undecided = claims().filter(|f| f.ahead.is_none()).count();
     let all = claims().count();
     format!(
-        "{all} claims follow from the paper's Figures 2 and 3 and its times. Borne out here: {borne_out}; not borne \
-         out: {}; not decided: {undecided}.",
+        "{all} claims follow from the paper's Figures 2 and 3 and its times. Borne out here: \
+         {borne_out}; not borne out: {}; not decided: {undecided}.",
         all - borne_out - undecided
     )
 }

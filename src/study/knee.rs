@@ -121,11 +121,13 @@ pub fn words(line: &Line, discretisation: Option<f64>) -> String {
             "the discretisation error is not known here; by error × time the knee is {label}"
         ),
         Some(error) if is_enough => format!(
-            "the knee is {label}, the cheapest whose error ({:.2e}) is below a tenth of the discretisation error ({error:.2e})",
+            "the knee is {label}, the cheapest whose error ({:.2e}) is below a tenth of the \
+             discretisation error ({error:.2e})",
             point.error
         ),
         Some(error) => format!(
-            "no setting comes below a tenth of the discretisation error ({error:.2e}); by error × time the knee is {label}"
+            "no setting comes below a tenth of the discretisation error ({error:.2e}); by error × \
+             time the knee is {label}"
         ),
     }];
     if *label != first.label {
@@ -206,7 +208,8 @@ impl Rivalry {
                 format!("less error than {name} at all {all} settings that can be compared")
             }
             (all, _) => format!(
-                "less error than {name} at {} of {all} settings, not at {} (its error over this line's)",
+                "less error than {name} at {} of {all} settings, not at {} (its \
+                 error over this line's)",
                 all - lost.len(),
                 lost.join(", ")
             ),

@@ -41,8 +41,7 @@ pub struct Direction {
 /// the wave's direction from the domain's face behind it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Measures {
-    /// Height of the crest: the highest η of each row along the wave's direction, median over the
-    /// rows.
+    /// Height of the crest: highest η of each row along the wave's direction, median over the rows.
     pub crest_height: f64,
     /// Slope of the crest's front face, degrees, between the foremost points of a row that reach
     /// 0.9 and 0.5 of its crest's height; median over the rows.
@@ -332,8 +331,7 @@ impl Gauge {
         let crest = (0..=last)
             .filter_map(above)
             .fold(f64::NEG_INFINITY, f64::max);
-        // The foremost position that reaches a level, interpolated between columns; dry ground is
-        // at the bed.
+        // Foremost position that reaches a level, interpolated between columns; dry ground is bed.
         let foremost = |level: f64| {
             let s = (0..=last).rev().find(|&s| above(s) >= Some(level))?;
             let (here, ahead) = (above(s)?, above(s + 1).unwrap_or(-self.still));

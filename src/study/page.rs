@@ -70,8 +70,9 @@ const WIDE: usize = 9;
 
 /// Nothing is wider than the window: text and code break where necessary, and curves shrink. Cells
 /// break within a number only in narrow windows.
-const STYLE: &str = "body{font:15px/1.5 sans-serif;max-width:1300px;margin:2em auto;padding:0 1em;color:#222;\
-overflow-wrap:anywhere}h1,h2{font-weight:600}h3{margin:1.4em 0 .3em;font-weight:600}\
+const STYLE: &str = "body{font:15px/1.5 sans-serif;max-width:1300px;margin:2em auto;\
+padding:0 1em;color:#222;overflow-wrap:anywhere}\
+h1,h2{font-weight:600}h3{margin:1.4em 0 .3em;font-weight:600}\
 .answer{font-size:1.25em;margin:.5em 0 1em}summary{cursor:pointer;font-weight:600;margin:.8em 0}\
 table{border-collapse:collapse;max-width:100%;font-variant-numeric:tabular-nums}\
 th,td{padding:.25em .8em;border-bottom:1px solid #ddd;text-align:right;vertical-align:top}\
@@ -79,7 +80,8 @@ th:first-child,td:first-child,.words td,.words th{text-align:left}\
 th,td{overflow-wrap:break-word}@media(max-width:1100px){th,td{overflow-wrap:anywhere}}\
 .wide{font-size:12px}.wide th,.wide td{padding:.2em .35em}\
 .good td:last-child,.bad td:last-child,.known td:last-child{border-left:6px solid}\
-.good td:last-child{border-left-color:#009e73}.bad td:last-child{border-left-color:#d55e00;font-weight:600}\
+.good td:last-child{border-left-color:#009e73}\
+.bad td:last-child{border-left-color:#d55e00;font-weight:600}\
 .known td:last-child{border-left-color:#e69f00}\
 .pictures{display:grid;gap:.4em;align-items:center}.pictures img{width:100%;display:block}\
 .curves{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(420px,100%),1fr));gap:1em}\
@@ -142,7 +144,8 @@ fn write_part(out: &mut String, part: &Part) -> std::fmt::Result {
         Part::Pictures { columns, rows } => {
             writeln!(
                 out,
-                "<div class=\"pictures\" style=\"grid-template-columns:5em repeat({},minmax(0,1fr))\">",
+                "<div class=\"pictures\" style=\"grid-template-columns:5em \
+                 repeat({},minmax(0,1fr))\">",
                 columns.len()
             )?;
             let titles = columns.iter().map(|c| format!("<b>{}</b>", escaped(c)));

@@ -51,7 +51,8 @@ const SCRIPT: &str = include_str!("player/player.js");
 const STYLE: &str = include_str!("player/player.css");
 
 /// Content Security Policy: the page may load only its own pictures, whatever it contains.
-const POLICY: &str = "default-src 'none'; img-src data: file: 'self'; script-src 'unsafe-inline'; style-src 'unsafe-inline'";
+const POLICY: &str = "default-src 'none'; img-src data: file: 'self'; script-src 'unsafe-inline'; \
+                      style-src 'unsafe-inline'";
 
 const KEYS: [(&str, &str); 6] = [
     ("Space", "play, pause"),
@@ -86,9 +87,13 @@ impl Player {
         format!(
             "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n{MARK}\n\
              <meta http-equiv=\"Content-Security-Policy\" content=\"{POLICY}\">\n\
-             <meta name=\"viewport\" content=\"width=device-width\">\n<title>{title}</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n\
-             <h1>{title}</h1>\n{}<div id=\"names\"></div>\n<div id=\"stage\"><canvas id=\"picture\" role=\"img\" aria-label=\"the frame\"></canvas></div>\n{}{}{}\
-             <script type=\"application/json\" id=\"data\">{}</script>\n<script>\n{SCRIPT}</script>\n</body>\n</html>\n",
+             <meta name=\"viewport\" content=\"width=device-width\">\n<title>{title}</title>\n\
+             <style>\n{STYLE}</style>\n</head>\n<body>\n\
+             <h1>{title}</h1>\n{}<div id=\"names\"></div>\n\
+             <div id=\"stage\"><canvas id=\"picture\" role=\"img\" aria-label=\"the \
+             frame\"></canvas></div>\n{}{}{}\
+             <script type=\"application/json\" id=\"data\">{}</script>\n<script>\n\
+             {SCRIPT}</script>\n</body>\n</html>\n",
             notes.collect::<String>(),
             self.bar(),
             self.curves(),
@@ -111,14 +116,17 @@ impl Player {
             _ => MODES.iter().map(mode).collect(),
         };
         format!(
-            "<div class=\"bar\">\n<input type=\"range\" id=\"scrub\" min=\"0\" value=\"0\" step=\"1\" aria-label=\"frame\">\n\
+            "<div class=\"bar\">\n<input type=\"range\" id=\"scrub\" min=\"0\" value=\"0\" \
+             step=\"1\" aria-label=\"frame\">\n\
              <button type=\"button\" id=\"back\" aria-label=\"a frame back\">−1</button>\n\
              <button type=\"button\" id=\"play\">Play</button>\n\
              <button type=\"button\" id=\"on\" aria-label=\"a frame on\">+1</button>\n\
-             <label><input type=\"number\" id=\"rate\" min=\"0.1\" max=\"240\" step=\"any\" value=\"{}\"> frames/s</label>\n\
+             <label><input type=\"number\" id=\"rate\" min=\"0.1\" max=\"240\" step=\"any\" \
+             value=\"{}\"> frames/s</label>\n\
              <label><input type=\"checkbox\" id=\"loop\" checked> repeat</label>\n\
              <button type=\"button\" id=\"fit\" aria-pressed=\"false\">1:1</button>\n{modes}\
-             <label id=\"gains\" hidden>times <select id=\"gain\"><option>1<option>4<option>16<option>64</select></label>\n\
+             <label id=\"gains\" hidden>times <select \
+             id=\"gain\"><option>1<option>4<option>16<option>64</select></label>\n\
              <output id=\"told\"></output>\n</div>\n<p id=\"fault\" role=\"alert\"></p>\n",
             self.frames_per_second
         )

@@ -81,8 +81,9 @@ mod tests {
     /// Number of dark pixels of a white drawing with `inside`.
     fn dark(inside: &str) -> usize {
         let svg = format!(
-            "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 200 40\" font-family=\"sans-serif\" \
-             font-size=\"20\"><rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>{inside}</svg>"
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 200 40\" \
+             font-family=\"sans-serif\" font-size=\"20\"><rect width=\"100%\" height=\"100%\" \
+             fill=\"#fff\"/>{inside}</svg>"
         );
         let bytes = png(&svg).expect("a picture");
         let picture = tiny_skia::Pixmap::decode_png(&bytes).expect("a PNG");
@@ -103,7 +104,8 @@ mod tests {
 
     #[test]
     fn the_same_drawing_gives_the_same_bytes() {
-        let svg = "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 9 9\"><text y=\"8\">a</text></svg>";
+        let svg = "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 9 9\"><text \
+                   y=\"8\">a</text></svg>";
         assert_eq!(png(svg).expect("a picture"), png(svg).expect("a picture"));
         assert!(matches!(png("<svg"), Err(RasterError::Svg(_))));
     }

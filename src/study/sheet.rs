@@ -46,10 +46,10 @@ pub fn sheet(title: &str, note: &str, cells: &[Cell], columns: usize) -> Result<
         ]
     };
     let mut svg = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" font-family=\"sans-serif\" \
-         font-size=\"14\" fill=\"#d8dbe0\"><rect width=\"100%\" height=\"100%\" fill=\"#17191c\"/>\
-         <text x=\"{MARGIN}\" y=\"26\" font-size=\"18\">{}</text>\
-         <text x=\"{MARGIN}\" y=\"46\" fill=\"#9aa0a8\">{}</text>",
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" \
+         font-family=\"sans-serif\" font-size=\"14\" fill=\"#d8dbe0\"><rect width=\"100%\" \
+         height=\"100%\" fill=\"#17191c\"/><text x=\"{MARGIN}\" y=\"26\" \
+         font-size=\"18\">{}</text><text x=\"{MARGIN}\" y=\"46\" fill=\"#9aa0a8\">{}</text>",
         shortened(title, width, 1.3),
         shortened(note, width, 1.0),
     );

@@ -303,7 +303,10 @@ proptest! {
             position: rows.iter().map(|r| float(r.0)).collect(),
             velocity: rows.iter().map(|r| float(r.1)).collect(),
             id: gaps[..rows.len()].iter().map(|gap| { id += gap; id }).collect(),
-            attributes: [("age".to_owned(), rows.iter().map(|r| f32::from_bits(r.2)).collect())].into(),
+            attributes: [(
+                "age".to_owned(),
+                rows.iter().map(|r| f32::from_bits(r.2)).collect(),
+            )].into(),
             ..Particles::default()
         };
         let back = decode(&encoded(&particles), Path::new("")).unwrap();
@@ -367,6 +370,7 @@ fn packed_rows_against_per_property() {
         out.len()
     });
     println!(
-        "MB/s: packed {packed:.0}, per property {library:.0}, packed to disk {disk:.0}, read {read:.0}"
+        "MB/s: packed {packed:.0}, per property {library:.0}, packed to disk \
+         {disk:.0}, read {read:.0}"
     );
 }

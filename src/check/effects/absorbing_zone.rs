@@ -15,7 +15,8 @@ use super::zone::{self, PART};
 
 entries! {
     "effects/absorb_particles" {
-        VELOCITY = "velocity", "m/s": [part: "" PART, v: "|v| before"] (part + 4.0 * U) * v, "a product";
+        VELOCITY = "velocity", "m/s": [part: "" PART, v: "|v| before"]
+            (part + 4.0 * U) * v, "a product";
     }
     "effects/absorb_faces" {
         FACES = "velocity at faces", "m/s": [part: "" PART, old: "|v| before gravity", v: "|v|"]

@@ -23,9 +23,12 @@ use swell_solve::{flip, pbf};
 bounds! {
     // (w + g Δt) / (1 + x) with x = e Δt r(w). Errors of x: the exposure's, and that of the power
     // in r, with an exponent below 18, by the accuracy that WGSL requires of log2 and exp2.
-    BLOWN = [off: "what the exposure errs by", exposure: "its own value", reach: "Δt times the rate of a lone drop",
-        slack: "what that answers when |v − wind| rounds", against: "|v − wind| + |g| Δt", wind: "|wind|"]
-        (quotient((off + 150.0 * U * exposure) * reach + exposure * slack, exposure * reach) + 8.0 * U) * against + 4.0 * U * wind, "";
+    BLOWN = [off: "what the exposure errs by", exposure: "its own value",
+        reach: "Δt times the rate of a lone drop",
+        slack: "what that answers when |v − wind| rounds", against: "|v − wind| + |g| Δt",
+        wind: "|wind|"]
+        (quotient((off + 150.0 * U * exposure) * reach + exposure * slack, exposure * reach)
+            + 8.0 * U) * against + 4.0 * U * wind, "";
 }
 
 entries! {

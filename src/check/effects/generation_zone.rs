@@ -20,18 +20,23 @@ bounds! {
     // Errors: a phase's by the rounding of as many turns as fit into the domain's length; WGSL's
     // sines 2⁻¹¹ between −π and π (WGSL §15.7.4); exp(−a) (3 + 2a) ULP plus the rounding of a,
     // where a exp(−a) is at most 0.4.
-    WAVE = [speed: "Σ|u| of the waves", turns: "the most turns of one along the domain", count: "waves"]
-        speed * (2f64.powi(-11) * 2.0 + U * (TAU * 6.0 * (turns + 1.0) + 24.0 + count)), "of the waves' velocity";
+    WAVE = [speed: "Σ|u| of the waves", turns: "the most turns of one along the domain",
+        count: "waves"]
+        speed * (2f64.powi(-11) * 2.0 + U * (TAU * 6.0 * (turns + 1.0) + 24.0 + count)),
+        "of the waves' velocity";
 }
 
 entries! {
     "effects/generate_particles" {
-        VELOCITY = "velocity", "m/s": [part: "" PART, most: "r Δt / (1 + r Δt) at the wall", wave: "" WAVE, speed: "Σ|u| of the waves", v: "|v| before"]
+        VELOCITY = "velocity", "m/s": [part: "" PART, most: "r Δt / (1 + r Δt) at the wall",
+            wave: "" WAVE, speed: "Σ|u| of the waves", v: "|v| before"]
             part * (v + speed) + most * wave + 6.0 * U * (v + most * speed), "a product, and a sum";
     }
     "effects/generate_faces" {
-        FACES = "velocity at faces", "m/s": [part: "" PART, most: "r Δt / (1 + r Δt) at the wall", wave: "" WAVE, speed: "Σ|u| of the waves", old: "|v| before gravity", v: "|v|"]
-            part * (old + speed) + most * wave + 6.0 * U * (most * (old + speed) + v), "a product, and a sum";
+        FACES = "velocity at faces", "m/s": [part: "" PART, most: "r Δt / (1 + r Δt) at the wall",
+            wave: "" WAVE, speed: "Σ|u| of the waves", old: "|v| before gravity", v: "|v|"]
+            part * (old + speed) + most * wave + 6.0 * U * (most * (old + speed) + v),
+            "a product, and a sum";
     }
 }
 

@@ -19,9 +19,11 @@ use swell_solve::{
 };
 
 bounds! {
-    SLOPE = [most: "the largest share about"] 8.0 * U * most, "a quarter of four differences and their sum";
+    SLOPE = [most: "the largest share about"]
+        8.0 * U * most, "a quarter of four differences and their sum";
     // A normal is a gradient over its length: a root takes 9 u, a quotient 5 u.
-    NORMALS = [slope: "" SLOPE, inverse: "the mean of 1 / |∇s| at the corners, no less than 0.001 each"]
+    NORMALS = [slope: "" SLOPE,
+        inverse: "the mean of 1 / |∇s| at the corners, no less than 0.001 each"]
         4.0 * slope * inverse + 40.0 * U, "of the derivatives of normals, a mean of eight";
     BEND = [normals: "" NORMALS] 1.8 * normals, "three of them";
     SQUARES = [normals: "" NORMALS, squares: "|∇n|²"]
@@ -29,26 +31,34 @@ bounds! {
     OFF = [slope: "" SLOPE, steep: "|∇s|, no less than 0.001", off: "how far off the surface lies"]
         (U + (2.0 * slope + 12.0 * U * steep) * off) / steep + 8.0 * U * off, "";
     // θ is a quotient, and 1 − θ has the same error as θ.
-    BETWEEN_CELLS = [share: "the larger weight over their sum", most: "the larger |κ Δx|"] U * (30.0 * share + 20.0) * most, "";
+    BETWEEN_CELLS = [share: "the larger weight over their sum", most: "the larger |κ Δx|"]
+        U * (30.0 * share + 20.0) * most, "";
 }
 
 entries! {
     "effects/tension_share" {
-        FIRST = "share", "": [share: "its own value"] 30.0 * U * share, "27 sums of what is not negative";
+        FIRST = "share", "": [share: "its own value"]
+            30.0 * U * share, "27 sums of what is not negative";
     }
     "effects/tension_smooth" {
-        SECOND = "share", "": [share: "its own value"] 30.0 * U * share, "27 sums of what is not negative";
+        SECOND = "share", "": [share: "its own value"]
+            30.0 * U * share, "27 sums of what is not negative";
     }
     "effects/tension_smooth_again" {
-        THIRD = "share", "": [share: "its own value"] 30.0 * U * share, "27 sums of what is not negative";
+        THIRD = "share", "": [share: "its own value"]
+            30.0 * U * share, "27 sums of what is not negative";
     }
     "effects/tension_curvature" {
-        BENT = "curvature", "1/Δx": [bend: "" BEND, squares: "" SQUARES, off: "" OFF, way: "cells that it is carried", turned: "|∇n|²", size: "|−∇·n| and the way times |∇n|²"]
+        BENT = "curvature", "1/Δx": [bend: "" BEND, squares: "" SQUARES, off: "" OFF,
+            way: "cells that it is carried", turned: "|∇n|²",
+            size: "|−∇·n| and the way times |∇n|²"]
             bend * (1.0 + turned) + squares * (way + bend) + off * turned + 8.0 * U * size, "";
-        STEEP = "slope", "1/Δx": [slope: "" SLOPE, steep: "its own value"] 2.0 * slope + 12.0 * U * steep, "";
+        STEEP = "slope", "1/Δx": [slope: "" SLOPE, steep: "its own value"]
+            2.0 * slope + 12.0 * U * steep, "";
     }
     "effects/tension_push" {
-        PUSHED = "velocity at faces", "m/s": [kappa: "" BETWEEN_CELLS, scale: "Δt σ / (ρ θ Δx²)", push: "|the push|", v: "|v|"]
+        PUSHED = "velocity at faces", "m/s": [kappa: "" BETWEEN_CELLS, scale: "Δt σ / (ρ θ Δx²)",
+            push: "|the push|", v: "|v|"]
             scale * kappa + 40.0 * U * push + 2.0 * U * v, "of three faces";
     }
 }

@@ -38,7 +38,8 @@ bounds! {
 
 entries! {
     "effects/viscosity_gather" {
-        CHANGE = "change of velocity", "m/s": [scale: "c times the kernel's scale", sums: "with w = |Δv| " KERNEL]
+        CHANGE = "change of velocity", "m/s": [scale: "c times the kernel's scale",
+            sums: "with w = |Δv| " KERNEL]
             scale * sums, "";
     }
     "effects/viscosity_apply" {

@@ -27,10 +27,12 @@ use swell_solve::{
 bounds! {
     ROTATION = [scale: "twice the gradient's scale, for the two products of a cross product",
         sums: "with w = |Δv| " GRADIENT] scale * sums, "";
-    SLOPE = [scale: "the gradient's scale", sums: "with w = |Δ|ω|| " GRADIENT, both: "Σ (|ω| + |ω'|) s²"]
+    SLOPE = [scale: "the gradient's scale", sums: "with w = |Δ|ω|| " GRADIENT,
+        both: "Σ (|ω| + |ω'|) s²"]
         scale * (sums + 12.0 * U * both), "";
     NO_SLOPE = [error: "" SLOPE] 1.01 * error, "the least slope that gives a direction";
-    GRID_CURL = [speed: "the largest about", size: "Δx"] 30.0 * U * speed / size, "differences of means of two faces over two cells";
+    GRID_CURL = [speed: "the largest about", size: "Δx"]
+        30.0 * U * speed / size, "differences of means of two faces over two cells";
     GROWN = [] 20.0 * U, "";
     TURNED = [force: "Δt ε Δx of the largest |ω| about"] 0.05 * force,
         "a direction that is noise, as the answers are farther apart than that";
@@ -39,20 +41,24 @@ bounds! {
 entries! {
     "effects/vorticity_curl" {
         CURL = "vorticity", "1/s": [error: "" ROTATION] error, "";
-        LENGTH = "its length", "1/s": [error: "" ROTATION, w: "|ω|"] error + 12.0 * U * w, "a root takes 9 u";
+        LENGTH = "its length", "1/s": [error: "" ROTATION, w: "|ω|"]
+            error + 12.0 * U * w, "a root takes 9 u";
     }
     "effects/vorticity_force" {
-        VELOCITY = "velocity", "m/s": [force: "Δt ε h |ω|", error: "" SLOPE, slope: "|∇|ω||, or ∞ where it gives no direction",
+        VELOCITY = "velocity", "m/s": [force: "Δt ε h |ω|", error: "" SLOPE,
+            slope: "|∇|ω||, or ∞ where it gives no direction",
             rounding: "1 where it gives one, else 0", v: "|v|"]
-            force * (2.0 * error / slope + 30.0 * U * rounding) + 2.0 * U * (v + force), "", tie NO_SLOPE;
+            force * (2.0 * error / slope + 30.0 * U * rounding) + 2.0 * U * (v + force),
+            "", tie NO_SLOPE;
     }
     "effects/grid_curl" {
         GRID_VORTICITY = "vorticity", "1/s": [error: "" GRID_CURL] error, "";
         GRID_LENGTH = "its length", "1/s": [error: "" GRID_CURL, w: "|ω|"] error + 12.0 * U * w, "";
     }
     "effects/grid_confinement" {
-        GRID_VELOCITY = "velocity at faces", "m/s": [moved: "what the twin answers when each |ω| grows or shrinks by the factor "
-            GROWN, push: "|the push| + Δt ε Δx of the largest |ω| about", v: "|v|"]
+        GRID_VELOCITY = "velocity at faces", "m/s":
+            [moved: "what the twin answers when each |ω| grows or shrinks by the factor " GROWN,
+            push: "|the push| + Δt ε Δx of the largest |ω| about", v: "|v|"]
             8.0 * moved + 60.0 * U * push + 2.0 * U * v, "", tie TURNED;
     }
 }

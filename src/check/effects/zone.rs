@@ -24,8 +24,10 @@ bounds! {
     // r Δt w² changes by 2 r Δt w times the change of the relative depth w. For the fraction x / (1
     // + x) that gives 2 √(r Δt) √x / (1 + x)², whose maximum is 0.65 √(r Δt), at x = 1/3; and no
     // more than 2 r Δt.
-    pub(super) PART = [most: "r Δt at the wall", ratio: "the domain's longest side over the zone's length"]
-        U * ((2.0 * most).min(0.65 * most.sqrt()) * (6.0 * ratio + 4.0) + 8.0 * most.min(1.0)), "of the part of the way that water is led, by where a place is";
+    pub(super) PART = [most: "r Δt at the wall",
+        ratio: "the domain's longest side over the zone's length"]
+        U * ((2.0 * most).min(0.65 * most.sqrt()) * (6.0 * ratio + 4.0) + 8.0 * most.min(1.0)),
+        "of the part of the way that water is led, by where a place is";
 }
 
 /// Returns [`PART`] for a step of `step` seconds in a domain of `size`.

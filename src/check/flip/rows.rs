@@ -9,55 +9,82 @@ use swell_compare::{deviation::relative, rounding::U, tolerance::bounds};
 bounds! {
     pub(super) PLACE = [cells: "cells along the domain's longest side"] U * cells, "";
     pub(super) CUT = [place: "" PLACE] 8.0 * place, "";
-    TURN = [grid: "" GRID] grid, "the solids' distance at which it turns, and where nodes are as near";
-    pub(super) OF_FACE = [place: "" PLACE, count: "particles about", weight: "what their hats add up to",
-        range: "of their velocities", most: "their largest |v|"]
-        (12.0 * place * count / weight).min(1.0) * range + U * (count + 20.0) * most, "along each axis";
-    pub(super) OF_CENTER = [share: "1 / particles of a full cell", place: "" PLACE, count: "particles about",
-        least: "half of the open volume about or of the hat, at least 0.02", part: "share × count / least, or the density where it is less"]
+    TURN = [grid: "" GRID]
+        grid, "the solids' distance at which it turns, and where nodes are as near";
+    pub(super) OF_FACE = [place: "" PLACE, count: "particles about",
+        weight: "what their hats add up to", range: "of their velocities",
+        most: "their largest |v|"]
+        (12.0 * place * count / weight).min(1.0) * range + U * (count + 20.0) * most,
+        "along each axis";
+    pub(super) OF_CENTER = [share: "1 / particles of a full cell", place: "" PLACE,
+        count: "particles about",
+        least: "half of the open volume about or of the hat, at least 0.02",
+        part: "share × count / least, or the density where it is less"]
         share * place * 48.0 * count / least + part * (U * (count + 40.0) + 16.0 * place),
-        "along three axes a place and twice a wall's, times two weights of 2 at most, as images double them";
-    pub(super) OF_MEAN = [density: "the largest about"] 20.0 * U * density, "a mean over six faces, and the cell's own with a part";
-    pub(super) OF_HALF = [mean: "" OF_MEAN] mean + 0.25 * U, "a density's difference from a half, which is half of 1 at most";
-    pub(super) OF_SOLID = [lean: "1 − the open part of the hat, over the length of its differences beside the cell"]
+        "along three axes a place and twice a wall's, times two weights of 2 at \
+         most, as images double them";
+    pub(super) OF_MEAN = [density: "the largest about"]
+        20.0 * U * density, "a mean over six faces, and the cell's own with a part";
+    pub(super) OF_HALF = [mean: "" OF_MEAN]
+        mean + 0.25 * U, "a density's difference from a half, which is half of 1 at most";
+    pub(super) OF_SOLID =
+        [lean: "1 − the open part of the hat, over the length of its differences beside the cell"]
         (16.0 * U * lean).min(1.0), "differences and lengths of three components";
     pub(super) OF_SHARE = [half: "" OF_HALF, solid: "" OF_SOLID] half + solid, "";
     pub(super) NEAR_HALF = [cut: "" CUT, mean: "" OF_MEAN] cut + mean,
         "a half, of the density or of what is open of a cell about";
-    pub(super) OF_GAP = [cut: "" CUT] 9.0 * (cut + 8.0 * U) + 64.0 * U,
-        "what at most 9 cells lack, and a difference of velocities by which ends come at most 8 cells nearer";
-    pub(super) OF_FACES = [place: "" PLACE, range: "of the faces' values about the cell", most: "the largest of them"]
-        9.0 * place * range + 96.0 * U * most, "along each axis; three sums over 18 faces, and their quotient";
+    pub(super) OF_GAP = [cut: "" CUT]
+        9.0 * (cut + 8.0 * U) + 64.0 * U,
+        "what at most 9 cells lack, and a difference of velocities by which ends come \
+         at most 8 cells nearer";
+    pub(super) OF_FACES = [place: "" PLACE, range: "of the faces' values about the cell",
+        most: "the largest of them"]
+        9.0 * place * range + 96.0 * U * most,
+        "along each axis; three sums over 18 faces, and their quotient";
     pub(super) START = [x: "|x|", step: "Δt", fastest: "|v| at any face", grid: "with solids " GRID]
         U * (8.0 * x + 30.0 * step * fastest) + grid, "";
 
-    pub(super) OF_DIFFERENCE = [unit: "U, or 2⁻⁵³ with f64", difference: "|Δq| / min(θ, 1) of a word of the solution"]
+    pub(super) OF_DIFFERENCE = [unit: "U, or 2⁻⁵³ with f64",
+        difference: "|Δq| / min(θ, 1) of a word of the solution"]
         24.0 * unit * difference, "";
-    pub(super) OF_BLOCK = [unit: "U, or 2⁻⁵³ with f64", row: "|A| |z|", size: "the sum of magnitudes of b"]
-        40.0 * unit * (row + size), "Higham 2002, theorem 9.3; the inverse has no negative entry, so that bounds take the same steps";
-    pub(super) OF_RESTRICTION = [unit: "U, or 2⁻⁵³ with f64", size: "Σ|c z|"] 4.0 * unit * size, "products and 6 sums, halved";
+    pub(super) OF_BLOCK = [unit: "U, or 2⁻⁵³ with f64", row: "|A| |z|",
+        size: "the sum of magnitudes of b"]
+        40.0 * unit * (row + size),
+        "Higham 2002, theorem 9.3; the inverse has no negative entry, so that \
+         bounds take the same steps";
+    pub(super) OF_RESTRICTION = [unit: "U, or 2⁻⁵³ with f64", size: "Σ|c z|"]
+        4.0 * unit * size, "products and 6 sums, halved";
     PIVOT = [] 2e-5, "a pivot of 0, as a part of the block's diagonal";
     pub(super) OF_SUM = [unit: "U, or 2⁻⁵³ with f64", count: "sums of bricks", size: "Σ|terms|"]
         unit * (count / 256.0 + 60.0) * size, "8 cells a thread, 64 threads, and the bricks";
-    pub(super) QUOTIENT = [sum: "" OF_SUM, value: "the sum", unit: "U, or 2⁻⁵³ with f64"] (sum / value).abs() + 4.0 * unit, "";
+    pub(super) QUOTIENT = [sum: "" OF_SUM, value: "the sum", unit: "U, or 2⁻⁵³ with f64"]
+        (sum / value).abs() + 4.0 * unit, "";
     pub(super) OF_ALPHA = [alpha: "|α|", part: "" QUOTIENT] alpha * part / (1.0 - part), "";
-    pub(super) OF_BETA = [sum: "" OF_SUM, unit: "U, or 2⁻⁵³ with f64", value: "|the sum|", before: "that before it"]
+    pub(super) OF_BETA = [sum: "" OF_SUM, unit: "U, or 2⁻⁵³ with f64", value: "|the sum|",
+        before: "that before it"]
         ((sum + 4.0 * unit * value) / before).abs(), "";
-    pub(super) NEAR_TARGET = [sum: "" OF_SUM, unit: "U, or 2⁻⁵³ with f64", target: "‖b‖² tolerance², or 0"]
+    pub(super) NEAR_TARGET = [sum: "" OF_SUM, unit: "U, or 2⁻⁵³ with f64",
+        target: "‖b‖² tolerance², or 0"]
         sum + 2.0 * unit * target, "the target";
-    pub(super) ONE_WORD = [unit: "U, or 2⁻⁵³ with f64", way: "|α p|", x: "|x|"] unit * (2.0 * way + x), "";
-    pub(super) LOST = [unit: "U", large: "|the greater word|", way: "|α p|"] unit * large + way / 512.0,
+    pub(super) ONE_WORD = [unit: "U, or 2⁻⁵³ with f64", way: "|α p|", x: "|x|"]
+        unit * (2.0 * way + x), "";
+    pub(super) LOST = [unit: "U", large: "|the greater word|", way: "|α p|"]
+        unit * large + way / 512.0,
         "what that word rounds off, and of α p what is beyond its factors' leading 12 bits";
-    pub(super) TWO_WORDS = [unit: "U", small: "|the lesser word|", lost: "" LOST] unit * (small + 4.0 * lost), "";
+    pub(super) TWO_WORDS = [unit: "U", small: "|the lesser word|", lost: "" LOST]
+        unit * (small + 4.0 * lost), "";
 
-    pub(super) ALLOWED = [asked: "tolerance of the solve", unit: "U, or 2⁻⁵³ with f64", spread: "‖Σ c |x − x'|‖", b: "‖b‖"]
-        asked * (1.0 + 1e-6) + relative(12.0 * unit * spread, b), "what it is measured by rounds too";
+    pub(super) ALLOWED = [asked: "tolerance of the solve", unit: "U, or 2⁻⁵³ with f64",
+        spread: "‖Σ c |x − x'|‖", b: "‖b‖"]
+        asked * (1.0 + 1e-6) + relative(12.0 * unit * spread, b),
+        "what it is measured by rounds too";
     pub(super) FAR = [residual: "" ALLOWED, b: "‖b‖"] 1.5 * residual * b, "";
 }
 
 entries! {
     "flip/survey" {
-        SPEED = "largest speed squared", "m²/s²": [square: "|v|²"] 5.0 * U * square, "products and sums";
+        SPEED = "largest speed squared", "m²/s²": [square: "|v|²"]
+            5.0 * U * square, "products and sums";
         WET = "bricks with water", "": [] 0.0, "flags";
     }
     "flip/assign_cells" {
@@ -73,15 +100,20 @@ entries! {
     }
     "flip/cut_cells" {
         KIND = "kind of cell", "": [] 0.0, "a whole number", tie TURN;
-        OPEN = "open fraction", "": [cut: "" CUT, moved: "what it changes by as solids' distances move by " GRID]
+        OPEN = "open fraction", "": [cut: "" CUT,
+            moved: "what it changes by as solids' distances move by " GRID]
             cut + 3.0 * moved, "";
         FLUX = "flux of solids", "m/s": [cut: "" CUT, speed: "the fastest wall's or solid's",
-            moved: "what it changes by as solids' distances move by " GRID] 6.0 * cut * speed + (cut + 3.0 * moved), "6 faces";
-        VOLUME = "open volume", "": [cut: "" CUT, moved: "what it changes by as solids' distances move by " GRID]
+            moved: "what it changes by as solids' distances move by " GRID]
+            6.0 * cut * speed + (cut + 3.0 * moved), "6 faces";
+        VOLUME = "open volume", "": [cut: "" CUT,
+            moved: "what it changes by as solids' distances move by " GRID]
             cut + 3.0 * moved, "";
-        HATS = "open part of the hat", "": [cut: "" CUT, moved: "what it changes by as solids' distances move by " GRID]
+        HATS = "open part of the hat", "": [cut: "" CUT,
+            moved: "what it changes by as solids' distances move by " GRID]
             8.0 * cut + 3.0 * moved, "64 parts";
-        CLOSED = "velocity of closed faces", "m/s": [v: "|v|", far: "the largest of solids' |spin| (|x| + |its point of rest|)"]
+        CLOSED = "velocity of closed faces", "m/s": [v: "|v|",
+            far: "the largest of solids' |spin| (|x| + |its point of rest|)"]
             2.0 * U * v + 6.0 * U * far, "a solid's, unless another is nearest", tie TURN;
     }
     "flip/gather_faces" {
@@ -95,39 +127,51 @@ entries! {
     }
     "flip/find_water" {
         WATER = "kind of cell", "": [] 0.0, "a whole number", tie NEAR_HALF;
-        DISTANCE = "distance of the surface", "m": [moved: "in cells, what it answers when s − s²/2 moves by " OF_SHARE,
-            size: "Δx"] (moved + 24.0 * U) * size, "", tie NEAR_HALF;
+        DISTANCE = "distance of the surface", "m":
+            [moved: "in cells, what it answers when s − s²/2 moves by " OF_SHARE, size: "Δx"]
+            (moved + 24.0 * U) * size, "", tie NEAR_HALF;
     }
     "flip/close_gaps" {
         FILLING = "kind of cell", "": [] 0.0, "a whole number", tie OF_GAP;
-        FILLED = "flux with what fills gaps", "m/s": [gap: "" OF_GAP, rate: "Δx / Δt", flux: "its own value"]
-            16.0 * gap * rate + 2.0 * U * flux, "what 3 cells lack, times a part whose gap is a quarter of a cell at least", tie OF_GAP;
-        FULL = "distance of the surface", "m": [size: "its own value"] U * size, "a cell, or a copy", tie OF_GAP;
+        FILLED = "flux with what fills gaps", "m/s": [gap: "" OF_GAP, rate: "Δx / Δt",
+            flux: "its own value"]
+            16.0 * gap * rate + 2.0 * U * flux,
+            "what 3 cells lack, times a part whose gap is a quarter of a cell at least", tie OF_GAP;
+        FULL = "distance of the surface", "m": [size: "its own value"]
+            U * size, "a cell, or a copy", tie OF_GAP;
     }
     "flip/find_excess" {
-        EXCESS = "density excess", "": [excess: "|ρ − 1| with ρ", cut: "" CUT] 4.0 * U * excess + cut * excess,
-            "a difference, and the product with the open volume";
+        EXCESS = "density excess", "": [excess: "|ρ − 1| with ρ", cut: "" CUT]
+            4.0 * U * excess + cut * excess, "a difference, and the product with the open volume";
     }
     "flip/let_in" {
-        LET_IN = "flux with what enters", "m/s": [rate: "(1 + ρ) Δx times the rate", cut: "" CUT, flux: "its own value"]
-            (6.0 * U + cut) * rate + U * flux, "4 products, a difference, the open volume, and a sum";
+        LET_IN = "flux with what enters", "m/s": [rate: "(1 + ρ) Δx times the rate", cut: "" CUT,
+            flux: "its own value"]
+            (6.0 * U + cut) * rate + U * flux,
+            "4 products, a difference, the open volume, and a sum";
         LEFT_EXCESS = "density excess", "": [] 0.0, "a choice";
     }
     "flip/wall_friction" {
-        FRICTION = "velocity slowed by walls", "m/s": [place: "" PLACE, moved: "what it is slowed by in Δt where a row is a whole cell nearer to each wall",
-            slowed: "Δt times the rate", v: "|v|"] (2.0 * place * moved + U * (16.0 * slowed + 4.0)) * v, "";
+        FRICTION = "velocity slowed by walls", "m/s": [place: "" PLACE,
+            moved: "what it is slowed by in Δt where a row is a whole cell nearer to each wall",
+            slowed: "Δt times the rate", v: "|v|"]
+            (2.0 * place * moved + U * (16.0 * slowed + 4.0)) * v, "";
     }
     "pressure/build_system" {
-        DIRICHLET = "what air adds to the diagonal", "": [unit: "U, or 2⁻⁵³ with f64", air: "Σ f / min(θ, 1)"] 24.0 * unit * air,
-            "16 u of each quotient, 6 sums";
+        DIRICHLET = "what air adds to the diagonal", "": [unit: "U, or 2⁻⁵³ with f64",
+            air: "Σ f / min(θ, 1)"]
+            24.0 * unit * air, "16 u of each quotient, 6 sums";
         COEFFICIENT = "coefficients", "": [] 0.0, "copies";
         ROWS = "rows", "": [] 0.0, "flags";
-        INVERSE = "inverse diagonal", "": [unit: "U, or 2⁻⁵³ with f64", inverse: "its own value, and its square times Σ f (1 / min(θ, 1) − 1 / θ)"] 36.0 * unit * inverse,
-            "what air adds, 6 sums, a quotient";
+        INVERSE = "inverse diagonal", "": [unit: "U, or 2⁻⁵³ with f64",
+            inverse: "its own value, and its square times Σ f (1 / min(θ, 1) − 1 / θ)"]
+            36.0 * unit * inverse, "what air adds, 6 sums, a quotient";
     }
     "pressure/coarsen" {
-        COARSE_COEFFICIENT = "coefficients", "": [sum: "its own value"] 3.0 * U * sum, "a sum of four";
-        COARSE_AIR = "what air adds to the diagonal", "": [unit: "U, or 2⁻⁵³ with f64", sum: "its own value"]
+        COARSE_COEFFICIENT = "coefficients", "": [sum: "its own value"]
+            3.0 * U * sum, "a sum of four";
+        COARSE_AIR = "what air adds to the diagonal", "": [unit: "U, or 2⁻⁵³ with f64",
+            sum: "its own value"]
             8.0 * unit * sum, "a sum of eight";
         COARSE_KIND = "kind of block", "": [] 0.0, "a whole number";
     }
@@ -136,102 +180,135 @@ entries! {
         POCKETS = "pockets", "": [] 0.0, "a count";
     }
     "pressure/center" {
-        CENTERED = "values less their mean", "": [unit: "U, or 2⁻⁵³ with f64", n: "cells of the pocket", size: "Σ|x| over it",
-            value: "|x|"] unit * ((n / 256.0 + 14.0) * size / n + value), "the mean's error, and one difference";
+        CENTERED = "values less their mean", "": [unit: "U, or 2⁻⁵³ with f64",
+            n: "cells of the pocket", size: "Σ|x| over it", value: "|x|"]
+            unit * ((n / 256.0 + 14.0) * size / n + value), "the mean's error, and one difference";
     }
     "pressure/reduce" {
-        SCALARS = "sums and what follows", "": [sum: "of a sum " OF_SUM, alpha: "of α " OF_ALPHA, beta: "of β " OF_BETA]
+        SCALARS = "sums and what follows", "": [sum: "of a sum " OF_SUM, alpha: "of α " OF_ALPHA,
+            beta: "of β " OF_BETA]
             sum + alpha + beta, "";
         DECIDED = "state, iterations, restarts", "": [] 0.0, "whole numbers", tie NEAR_TARGET;
     }
     "pressure/precondition" {
-        PRECONDITIONED = "correction", "": [unit: "U, or 2⁻⁵³ with f64", product: "|r / a|; 0 where it is a copy"]
+        PRECONDITIONED = "correction", "": [unit: "U, or 2⁻⁵³ with f64",
+            product: "|r / a|; 0 where it is a copy"]
             unit * product, "a product";
     }
     "pressure/ipp_lower" {
-        IPP_LOWER = "first half", "": [unit: "U, or 2⁻⁵³ with f64", d: "the inverse diagonal", size: "|r| + Σ|c d r|"]
+        IPP_LOWER = "first half", "": [unit: "U, or 2⁻⁵³ with f64", d: "the inverse diagonal",
+            size: "|r| + Σ|c d r|"]
             9.0 * unit * d * size, "3 products, 4 sums";
     }
     "pressure/ipp_upper" {
-        IPP_UPPER = "correction", "": [unit: "U, or 2⁻⁵³ with f64", size: "|y| + d Σ|c y|"] 9.0 * unit * size, "3 products, 4 sums";
+        IPP_UPPER = "correction", "": [unit: "U, or 2⁻⁵³ with f64", size: "|y| + d Σ|c y|"]
+            9.0 * unit * size, "3 products, 4 sums";
     }
     "pressure/smooth_first" {
-        SMOOTHED_FIRST = "correction", "": [off: "what the block's solution answers to a right-hand side off by " OF_BLOCK]
+        SMOOTHED_FIRST = "correction", "":
+            [off: "what the block's solution answers to a right-hand side off by " OF_BLOCK]
             off, "", tie PIVOT;
     }
     "pressure/smooth" {
-        SMOOTHED = "correction", "": [off: "what the block's solution answers to a right-hand side off by " OF_BLOCK]
+        SMOOTHED = "correction", "":
+            [off: "what the block's solution answers to a right-hand side off by " OF_BLOCK]
             off, "", tie PIVOT;
     }
     "pressure/smooth_corrected" {
-        SMOOTHED_CORRECTED = "correction", "": [off: "what the block's solution answers to a right-hand side off by " OF_BLOCK]
+        SMOOTHED_CORRECTED = "correction", "":
+            [off: "what the block's solution answers to a right-hand side off by " OF_BLOCK]
             off, "", tie PIVOT;
     }
     "pressure/restrict" {
         RESTRICTED = "residual of the coarser level", "": [error: "" OF_RESTRICTION] error, "";
     }
     "pressure/solve_coarse" {
-        COARSE_SOLVED = "correction", "": [off: "carried on through the blocks after it, the error of each restriction and, of each block, " OF_BLOCK]
+        COARSE_SOLVED = "correction", "":
+            [off: "carried on through the blocks after it, the error of each \
+                   restriction and, of each block, " OF_BLOCK]
             off, "", tie PIVOT;
-        COARSE_RESIDUAL = "residuals of the coarser levels", "": [off: "carried on as with the corrections, of each block and of each restriction " OF_RESTRICTION] off, "", tie PIVOT;
+        COARSE_RESIDUAL = "residuals of the coarser levels", "":
+            [off: "carried on as with the corrections, of each block \
+                   and of each restriction " OF_RESTRICTION]
+            off, "", tie PIVOT;
     }
     "pressure/direction" {
-        DIRECTED = "direction", "": [unit: "U, or 2⁻⁵³ with f64", size: "|z| + |β p|"] 2.0 * unit * size, "";
+        DIRECTED = "direction", "": [unit: "U, or 2⁻⁵³ with f64", size: "|z| + |β p|"]
+            2.0 * unit * size, "";
     }
     "pressure/advance" {
-        ADVANCED_SOLUTION = "solution, both words", "": [one: "with one word " ONE_WORD, two: "with two " TWO_WORDS] one + two, "";
-        ADVANCED_RESIDUAL = "residual", "": [unit: "U, or 2⁻⁵³ with f64", size: "|r| + |α A p|"] 2.0 * unit * size, "";
+        ADVANCED_SOLUTION = "solution, both words", "": [one: "with one word " ONE_WORD,
+            two: "with two " TWO_WORDS]
+            one + two, "";
+        ADVANCED_RESIDUAL = "residual", "": [unit: "U, or 2⁻⁵³ with f64", size: "|r| + |α A p|"]
+            2.0 * unit * size, "";
     }
     "pressure/verify" {
-        VERIFIED_RESIDUAL = "residual", "": [unit: "U, or 2⁻⁵³ with f64", differences: "Σ c |x − x'| of both words",
-            size: "|b| + |A x| of both"] unit * (12.0 * differences + 2.0 * size), "";
+        VERIFIED_RESIDUAL = "residual", "": [unit: "U, or 2⁻⁵³ with f64",
+            differences: "Σ c |x − x'| of both words", size: "|b| + |A x| of both"]
+            unit * (12.0 * differences + 2.0 * size), "";
     }
     "pressure/divergence" {
-        RHS = "right-hand side", "m/s": [unit: "U, or 2⁻⁵³ with f64", flow: "Σ|f u|"] 10.0 * unit * flow, "7 products and sums";
-        BEFORE = "largest divergence", "1/s": [flow: "the largest Σ|f u| / Δx", most: "its own value"]
+        RHS = "right-hand side", "m/s": [unit: "U, or 2⁻⁵³ with f64", flow: "Σ|f u|"]
+            10.0 * unit * flow, "7 products and sums";
+        BEFORE = "largest divergence", "1/s": [flow: "the largest Σ|f u| / Δx",
+            most: "its own value"]
             10.0 * U * flow + 4.0 * U * most, "7 products and sums";
     }
     "pressure/multiply" {
-        PRODUCT = "system times direction", "m/s": [unit: "U, or 2⁻⁵³ with f64", differences: "Σ c |x − x'|"]
+        PRODUCT = "system times direction", "m/s": [unit: "U, or 2⁻⁵³ with f64",
+            differences: "Σ c |x − x'|"]
             12.0 * unit * differences, "by differences";
     }
     "pressure/project" {
-        PROJECTED = "velocity at faces", "m/s": [words: "of each word of the solution, which may cancel, " OF_DIFFERENCE,
-            v: "|v|"] words + 2.0 * U * v, "";
+        PROJECTED = "velocity at faces", "m/s":
+            [words: "of each word of the solution, which may cancel, " OF_DIFFERENCE, v: "|v|"]
+            words + 2.0 * U * v, "";
         PRESSURE = "pressure", "Pa": [p: "|p|"] 4.0 * U * p, "";
     }
     "pressure/measure_divergence" {
-        AFTER = "largest divergence", "1/s": [flow: "the largest Σ|f u| / Δx", most: "its own value"]
+        AFTER = "largest divergence", "1/s": [flow: "the largest Σ|f u| / Δx",
+            most: "its own value"]
             10.0 * U * flow + 4.0 * U * most, "7 products and sums";
     }
     "pressure/density_source" {
         SOURCE = "right-hand side", "m": [b: "|b|"] 2.0 * U * b, "";
     }
     "pressure/displace" {
-        DISPLACEMENT = "displacement at faces", "m": [words: "of each word of the solution, which may cancel, " OF_DIFFERENCE,
-            d: "|the displacement|"] words + U * d, "";
+        DISPLACEMENT = "displacement at faces", "m":
+            [words: "of each word of the solution, which may cancel, " OF_DIFFERENCE,
+            d: "|the displacement|"]
+            words + U * d, "";
     }
     "flip/boundary_work" {
-        WORK = "shares of the work", "W/m²": [sizes: "Σ|p f|"] 66.0 * U * sizes, "64 products and sums";
+        WORK = "shares of the work", "W/m²": [sizes: "Σ|p f|"]
+            66.0 * U * sizes, "64 products and sums";
     }
     "flip/find_change" {
         CHANGE = "change at faces", "m/s": [size: "|v| + |v before|"] U * size, "one difference";
         LAYER = "layers", "": [] 0.0, "whole numbers";
     }
     "flip/extrapolate" {
-        SPREAD_VELOCITY = "velocity at faces", "m/s": [most: "the largest about"] 12.0 * U * most, "a mean of six and two sums";
-        SPREAD_CHANGE = "change at faces", "m/s": [most: "the largest about"] 12.0 * U * most, "a mean of six and two sums";
+        SPREAD_VELOCITY = "velocity at faces", "m/s": [most: "the largest about"]
+            12.0 * U * most, "a mean of six and two sums";
+        SPREAD_CHANGE = "change at faces", "m/s": [most: "the largest about"]
+            12.0 * U * most, "a mean of six and two sums";
         SPREAD_LAYER = "layers", "": [] 0.0, "whole numbers";
     }
     "flip/grid_to_particle" {
-        GIVEN = "velocity", "m/s": [velocity: "" OF_FACES, change: "the same of the changes", came: "|v| that came in and |g| Δt"]
+        GIVEN = "velocity", "m/s": [velocity: "" OF_FACES, change: "the same of the changes",
+            came: "|v| that came in and |g| Δt"]
             velocity + change + 4.0 * U * came, "a drop's is their sum";
-        CARRIED = "velocity of the grid", "m/s": [velocity: "" OF_FACES, came: "|v| that came in and |g| Δt"] velocity + 4.0 * U * came, "the same";
+        CARRIED = "velocity of the grid", "m/s": [velocity: "" OF_FACES,
+            came: "|v| that came in and |g| Δt"]
+            velocity + 4.0 * U * came, "the same";
         SHIFT = "displacement", "m": [displacement: "" OF_FACES] displacement, "";
-        GIVEN_AFFINE = "affine rows", "1/s": [velocity: "" OF_FACES, size: "Δx"] 2.0 * velocity / size, "";
+        GIVEN_AFFINE = "affine rows", "1/s": [velocity: "" OF_FACES, size: "Δx"]
+            2.0 * velocity / size, "";
     }
     "flip/push_apart" {
-        PUSHED = "displacement", "m": [count: "particles about", apart: "the distance that is kept", period: "the longest of a domain that joins its own end",
+        PUSHED = "displacement", "m": [count: "particles about", apart: "the distance that is kept",
+            period: "the longest of a domain that joins its own end",
             extent: "the domain's longest side", displacement: "its own value"]
             U * (count * (8.0 * apart + 2.0 * period) + 2.0 * extent + 2.0 * displacement),
             "a difference, a root, a quotient and a product for each; the walls' places; a sum";
@@ -241,20 +318,28 @@ entries! {
             U * (2.0 * x + 4.0 * way + pushed), "a difference, a product and two sums";
     }
     "flip/advect" {
-        MOVED = "position", "m": [answer: "what the twin answers when its start moves along each axis by " START, x: "|x|, and where a period carried it that four times"]
+        MOVED = "position", "m":
+            [answer: "what the twin answers when its start moves along each axis by " START,
+            x: "|x|, and where a period carried it that four times"]
             answer + U * x, "";
-        ADVECTED = "velocity", "m/s": [answer: "what the twin answers when its start moves along each axis by " START,
-            size: "|v|, with solids |v| that came in and theirs too"] answer + 8.0 * U * size, "";
-        SLOWED = "particles slowed", "": [answer: "how many more or fewer as starts move by " START] answer, "a count";
+        ADVECTED = "velocity", "m/s":
+            [answer: "what the twin answers when its start moves along each axis by " START,
+            size: "|v|, with solids |v| that came in and theirs too"]
+            answer + 8.0 * U * size, "";
+        SLOWED = "particles slowed", "": [answer: "how many more or fewer as starts move by " START]
+            answer, "a count";
         MOVED_ID = "id", "": [] 0.0, "a copy";
     }
     "whole projection" {
         RESIDUAL = "‖b − A x‖ / ‖b‖", "": [residual: "" ALLOWED] residual, "";
-        SOLUTION = "‖p − p64‖ / ‖p64‖", "": [far: "" FAR, least: "the least eigenvalue, by inverse iterations on the direct factor",
-            p: "‖p64‖"] relative(far / least, p), "";
-        ENERGY = "‖u − u64‖", "m/s": [far: "" FAR, least: "the least eigenvalue"] far / least.sqrt(),
+        SOLUTION = "‖p − p64‖ / ‖p64‖", "": [far: "" FAR,
+            least: "the least eigenvalue, by inverse iterations on the direct factor", p: "‖p64‖"]
+            relative(far / least, p), "";
+        ENERGY = "‖u − u64‖", "m/s": [far: "" FAR, least: "the least eigenvalue"]
+            far / least.sqrt(),
             "each face weighted by √(f θ), which is the norm of the pressure's error by the system";
-        DIVERGENCE = "‖∇·u‖ after / before", "": [residual: "" ALLOWED, flow: "‖Σ|f u|‖", spread: "‖Σ c |x − x'|‖", b: "‖b‖"]
+        DIVERGENCE = "‖∇·u‖ after / before", "": [residual: "" ALLOWED, flow: "‖Σ|f u|‖",
+            spread: "‖Σ c |x − x'|‖", b: "‖b‖"]
             residual + relative(30.0 * U * (flow + spread), b), "the velocities round too";
     }
     "whole correction" {

@@ -169,17 +169,20 @@ pub(super) fn object(args: &InspectArgs, file: &Path) -> Result<Value, Failure> 
     };
     Ok(match contents(args, file)? {
         FileContents::Frame(it) => json!({
-            "kind": "frame", "particles": it.particles, "attributes": it.attributes, "bounds": bounds(&it.bounds),
+            "kind": "frame", "particles": it.particles, "attributes": it.attributes,
+            "bounds": bounds(&it.bounds),
             "fastest": it.fastest, "comments": it.comments,
         }),
         FileContents::Mesh(it) => json!({
-            "kind": "mesh", "vertices": it.vertices, "triangles": it.triangles, "bounds": bounds(&it.bounds),
+            "kind": "mesh", "vertices": it.vertices, "triangles": it.triangles,
+            "bounds": bounds(&it.bounds),
             "open_edges": it.open_edges,
         }),
         FileContents::Grids(grids) => {
             let grids = grids.iter().map(|it| {
                 json!({
-                    "grid": it.name, "type": it.kind, "class": it.class, "voxels": it.voxels, "extent": it.extent,
+                    "grid": it.name, "type": it.kind, "class": it.class, "voxels": it.voxels,
+                    "extent": it.extent,
                     "voxel_size": it.voxel_size,
                 })
             });

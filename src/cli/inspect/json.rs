@@ -45,7 +45,8 @@ fn adapter(adapter: &Adapter) -> Value {
         .map(|(name, value)| ((*name).to_owned(), json!(value)))
         .collect();
     json!({
-        "index": adapter.index, "name": adapter.name, "kind": adapter.kind, "driver": adapter.driver, "limits": limits,
+        "index": adapter.index, "name": adapter.name, "kind": adapter.kind,
+        "driver": adapter.driver, "limits": limits,
         "pass_times": adapter.has_timestamps, "f64": adapter.has_f64,
     })
 }
@@ -120,7 +121,8 @@ fn of_look(args: &InspectArgs, file: &Path) -> Result<(Value, Option<Failure>), 
     let image = &look.spec().image;
     let passes = planned.passes.iter().map(|(pass, runs)| {
         json!({
-            "pass": pass, "once": runs.once, "each_water": runs.water, "each_sample": runs.sample, "for_aovs": runs.aovs,
+            "pass": pass, "once": runs.once, "each_water": runs.water, "each_sample": runs.sample,
+            "for_aovs": runs.aovs,
         })
     });
     let textures = planned.textures.iter().map(|(name, size, format, bytes)| {
@@ -165,7 +167,8 @@ fn of_cache(directory: &Path) -> Result<Value, Failure> {
     let probes = probes.map(|it| json!({ "probe": it.name, "columns": it.columns }));
     let total: f64 = sizes.seconds.iter().sum();
     let baked = json!({
-        "frames": sizes.seconds.len(), "total": total, "mean": total / sizes.seconds.len().max(1) as f64,
+        "frames": sizes.seconds.len(), "total": total,
+        "mean": total / sizes.seconds.len().max(1) as f64,
     });
     Ok(json!({
         "kind": if manifest.is_whitewater() { "whitewater" } else { "cache" },

@@ -135,7 +135,8 @@ mod tests {
         assert_eq!(
             end[0].1,
             json!({
-                "event": "warning", "what": "crowded cell", "frame": 6, "density_error_max": 3.0, "frames": 3, "first": 5,
+                "event": "warning", "what": "crowded cell", "frame": 6, "density_error_max": 3.0,
+                "frames": 3, "first": 5,
                 "last": 9, "text": "frame 6: a cell holds 4.0 times",
             })
         );

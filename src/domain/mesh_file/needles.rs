@@ -201,7 +201,8 @@ mod tests {
     /// A unit cube whose top has extra corners along one edge, fanned about one of its ends by
     /// another program.
     fn fanned() -> String {
-        let corners = "v 0 0 0\nv 1 0 0\nv 1 0 1\nv 0 0 1\nv 0 1 0\nv 1 1 0\nv 1 1 1\nv 0 1 1\nv 0.25 1 0\nv 0.5 1 0\nv 0.75 1 0\n";
+        let corners = "v 0 0 0\nv 1 0 0\nv 1 0 1\nv 0 0 1\nv 0 1 0\nv 1 1 0\nv 1 1 1\nv 0 1 1\n\
+                       v 0.25 1 0\nv 0.5 1 0\nv 0.75 1 0\n";
         // The top is a fan about corner 5, whose first edge contains 9, 10 and 11; the side below
         // it is fanned from the other end.
         let top = "f 5 10 9\nf 5 11 10\nf 5 6 11\nf 5 7 6\nf 5 8 7\n";

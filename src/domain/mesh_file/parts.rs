@@ -176,7 +176,8 @@ impl Reader {
         for (index, number) in named {
             if self.coordinate(index).is_none() {
                 return Err(format!(
-                    "line {number}: the face refers to texture coordinate {index}, but there are {count}"
+                    "line {number}: the face refers to texture coordinate \
+                     {index}, but there are {count}"
                 ));
             }
         }
@@ -237,7 +238,8 @@ mod tests {
     use crate::mesh::TriangleMesh;
 
     const FILE: &str = "mtllib a.mtl\no hut\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\n\
-        vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nusemtl wall\nf 1/1 2/2 3/3 4/4\nf 1 1 2\ng front left\nusemtl roof\nf 1//1 2//1 5/\n";
+        vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nusemtl wall\nf 1/1 2/2 3/3 4/4\nf 1 1 2\ng front left\n\
+        usemtl roof\nf 1//1 2//1 5/\n";
 
     fn parts(text: &str) -> Result<Parts, MeshError> {
         Parts::from_bytes(text.as_bytes(), MeshFormat::Obj, Path::new("a.obj"))
@@ -353,8 +355,10 @@ mod tests {
 
     #[test]
     fn other_formats_are_one_part_without_a_name() {
-        let ply = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
-            element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+        let ply = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n\
+            property float z\n\
+            element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n\
+            0 1 0\n3 0 1 2\n";
         let found = Parts::from_bytes(ply.as_bytes(), MeshFormat::Ply, Path::new("a.ply")).unwrap();
         assert_eq!(found.names, [Vec::<String>::new()]);
         assert_eq!((found.of, found.places), (vec![0], Vec::new()));

@@ -114,7 +114,8 @@ fn texts_are_read_in_64_bits() {
         let faces = mesh.triangles.iter();
         let faces: String = faces.map(|[a, b, c]| format!("3 {a} {b} {c}\n")).collect();
         let header = format!(
-            "ply\nformat ascii 1.0\nelement vertex 8\nproperty {kind} x\nproperty {kind} y\nproperty {kind} z\n\
+            "ply\nformat ascii 1.0\nelement vertex 8\nproperty {kind} x\nproperty {kind} y\n\
+             property {kind} z\n\
              element face 12\nproperty list uchar int vertex_indices\nend_header\n"
         );
         (header + &vertices + &faces).into_bytes()
@@ -188,7 +189,8 @@ fn polygons_that_are_not_convex_are_cut_alike_in_obj_and_ply() {
         };
         let obj = format!("{}f {}\n", vertices("v "), order(1).join(" "));
         let ply = format!(
-            "ply\nformat ascii 1.0\nelement vertex 6\nproperty float x\nproperty float y\nproperty float z\n\
+            "ply\nformat ascii 1.0\nelement vertex 6\nproperty float x\nproperty float y\n\
+             property float z\n\
              element face 1\nproperty list uchar int vertex_indices\nend_header\n{}6 {}\n",
             vertices(""),
             order(0).join(" ")
@@ -214,7 +216,10 @@ fn polygons_that_cross_themselves_are_told_of() {
     };
     let said = read("f 1 2 3 4\n").crossing.expect("words");
     assert!(
-        said.starts_with("1 polygon crosses itself, the first is face 2 (counted from 1) with a corner at (0, 0, 0);"),
+        said.starts_with(
+            "1 polygon crosses itself, the first is face 2 (counted from 1) with \
+             a corner at (0, 0, 0);"
+        ),
         "{said}"
     );
     let said = read("f 1 2 3 4\nf 2 3 4 1\n").crossing.expect("words");

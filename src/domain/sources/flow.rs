@@ -20,7 +20,8 @@ const TOUCHING: f64 = 1e-3;
 /// Layers of an oblique flow whose covered fraction is counted.
 const COUNTED: f64 = 16.0;
 
-/// Layers of an oblique flow whose particles are counted: a layer more or less at either end is below 1 %.
+/// Layers of an oblique flow whose particles are counted: a layer more or less at either end is
+/// below 1 %.
 const LONG: f64 = 256.0;
 
 /// An emitter's lattice, and what it moves through.
@@ -116,7 +117,8 @@ impl<'a> Flow<'a> {
         }
     }
 
-    /// Positions that come into the box after `begin` and not after `end`, seconds, whatever the emitter's window.
+    /// Positions that come into the box after `begin` and not after `end`, seconds, whatever the
+    /// emitter's window.
     pub(super) fn entering(&self, begin: f64, end: f64) -> u64 {
         let [x, y, z] = &self.lines;
         let rows: Vec<_> = (z.cells_within(begin, end))
@@ -136,8 +138,8 @@ impl<'a> Flow<'a> {
         rows.into_par_iter().map(in_row).sum()
     }
 
-    /// Flow rate of the lattice without solids, m³/s. Across a flow along an axis it has whole rows of particles; the rows of an oblique
-    /// flow, too, are whole where they line up with it.
+    /// Flow rate of the lattice without solids, m³/s. Across a flow along an axis it has whole rows
+    /// of particles; the rows of an oblique flow, too, are whole where they line up with it.
     fn rate(&self) -> f64 {
         let velocity = self.emitter.velocity;
         let exact = flow(

@@ -5,8 +5,9 @@ use super::{
     *,
 };
 
-/// Small boxes and velocities whose rows line up: what enters in 400 layers, to a layer of each face at either end, and never more
-/// than is promised for the shot. Negative control: area times velocity is off by up to a half.
+/// Small boxes and velocities whose rows line up: what enters in 400 layers, to a layer of each
+/// face at either end, and never more than is promised for the shot. Negative control: area times
+/// velocity is off by up to a half.
 #[test]
 fn a_promise_holds_for_oblique_flows() {
     let mut worst = 0.0f64;

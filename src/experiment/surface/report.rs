@@ -151,7 +151,8 @@ impl Results<'_> {
     }
 
     fn table(&self) -> Vec<Vec<String>> {
-        let fixed = "line,key,setting,particles,frames,repeats,ms,ms_least,ms_most,depth_p95,normal_p95,overlap";
+        let fixed = "line,key,setting,particles,frames,repeats,ms,ms_least,ms_most,\
+                     depth_p95,normal_p95,overlap";
         let errors = PictureError::NAMED.map(|(name, _)| name.to_owned());
         let titles = fixed.split(',').map(str::to_owned).chain(errors);
         let mut table = vec![titles.chain(["failed".to_owned()]).collect::<Vec<_>>()];
@@ -213,9 +214,11 @@ impl Results<'_> {
     }
 }
 
-const MEASURED: &str = "The scene is baked; each setting of the look then draws the same frames. A time is the wall clock of a frame's \
-    picture with all its samples, median of the repeats, after one picture that is not counted; spray is drawn as the look has it, \
-    whitewater is not. Depths, normals and silhouettes are taken at the centres of pixels and held against rays that the CPU casts in \
-    f64 through the particles' own field (swell check --render). Colour is SSIMULACRA 2 of the picture as a screen shows it, against one \
-    by rays with four times the look's samples and voxels half as wide: light, sky, spray and set are shared with what is tested, and of \
-    rays all but samples and voxels.";
+const MEASURED: &str = "The scene is baked; each setting of the look then draws the same frames. A \
+    time is the wall clock of a frame's picture with all its samples, median of the repeats, after \
+    one picture that is not counted; spray is drawn as the look has it, whitewater is not. Depths, \
+    normals and silhouettes are taken at the centres of pixels and held against rays that the CPU \
+    casts in f64 through the particles' own field (swell check --render). Colour is SSIMULACRA 2 \
+    of the picture as a screen shows it, against one by rays with four times the look's samples \
+    and voxels half as wide: light, sky, spray and set are shared with what is tested, and of rays \
+    all but samples and voxels.";

@@ -350,7 +350,8 @@ impl Results<'_> {
     }
 
     fn titles(&self) -> Vec<String> {
-        let fixed = "method,device,key,setting,particles,frames,repeats,ms,ms_least,ms_most,work,substeps,iterations,missed";
+        let fixed = "method,device,key,setting,particles,frames,repeats,ms,ms_least,ms_most,work,\
+                     substeps,iterations,missed";
         let fixed = fixed.split(',').map(str::to_owned);
         let errors = self
             .sweep
@@ -556,10 +557,12 @@ fn paper(scene: &Scene) -> Option<(f64, u32)> {
 
 const DISCRETISATION: &str = "a tenth of the discretisation error";
 
-const CONVERGENCE: &str = "The paper calls a run converged from the step on at which \"the relative error of the current \
-    iteration and the 50 before is less than 0.5 %\", for good. It does not say what the error is, nor whether the 50 are what \
-    the current step is compared with. The first column reads it so: the mean density, 1 + the mean of max(0, ρ/ρ0 − 1), \
-    differs from each of the 50 steps before by less than 0.5 %. The others show what the point would be if the density error \
-    itself had to stay below 0.5 %, and if it had to differ from each of the 50 by less than 0.5 % of itself. The paper's scene is \
-    not known beyond its 500 000 particles and 16 ms, so that its points can be compared in their order and trend alone; its \
-    times are of a GTX 1650.";
+const CONVERGENCE: &str = "The paper calls a run converged from the step on at which \"the \
+    relative error of the current iteration and the 50 before is less than 0.5 %\", for good. It \
+    does not say what the error is, nor whether the 50 are what the current step is compared \
+    with. The first column reads it so: the mean density, 1 + the mean of max(0, ρ/ρ0 − 1), \
+    differs from each of the 50 steps before by less than 0.5 %. The others show what the point \
+    would be if the density error itself had to stay below 0.5 %, and if it had to differ from \
+    each of the 50 by less than 0.5 % of itself. The paper's scene is not known beyond its 500 \
+    000 particles and 16 ms, so that its points can be compared in their order and trend alone; \
+    its times are of a GTX 1650.";

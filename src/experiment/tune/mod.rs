@@ -145,7 +145,8 @@ fn reference<'t>(trials: &'t [Trial<'_>]) -> Result<&'t Measured, StudyError> {
             ..
         }) => Ok(measured),
         Some(Trial { twin, run, .. }) => Err(StudyError::Point(format!(
-            "the run that the others are held against ({}) fails: {}; a greater --reference is a coarser one",
+            "the run that the others are held against ({}) fails: {}; a greater \
+             --reference is a coarser one",
             twin.name(),
             run.ended.as_deref().unwrap_or_default()
         ))),

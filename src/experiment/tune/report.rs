@@ -190,8 +190,9 @@ impl Results<'_> {
         parts.push(Part::Text(self.units()));
         let mut run = what_was_run(bench.request);
         run.push(Part::Text(format!(
-            "On {device}, by {} {}. Times are wall clock, in the program, without files: the median of {} of each twin, of \
-             three at least at the coarsest spacing, after one frame that does not count.",
+            "On {device}, by {} {}. Times are wall clock, in the program, without files: the \
+             median of {} of each twin, of three at least at the coarsest spacing, after one \
+             frame that does not count.",
             swell_domain::PROGRAM,
             swell_domain::VERSION,
             self.tune.request.repeats
@@ -267,7 +268,8 @@ fn label(trial: &Trial<'_>) -> String {
     }
 }
 
-const LAWS: &str = "A run at spacing d is taken to be C (dᵖ − rᵖ) off from the reference at r, and to take C dᵖ seconds a frame; the \
-    scatter is how far the runs are from that, as a factor. What another setting adds to the error and what it does to the time \
-    are taken from a run with it at the coarsest spacing, against one with finer settings there. That errors add up and times multiply is an \
-    assumption: each proposal is run, and corrects the laws before the next.";
+const LAWS: &str = "A run at spacing d is taken to be C (dᵖ − rᵖ) off from the reference at r, and \
+    to take C dᵖ seconds a frame; the scatter is how far the runs are from that, as a factor. What \
+    another setting adds to the error and what it does to the time are taken from a run with it at \
+    the coarsest spacing, against one with finer settings there. That errors add up and times \
+    multiply is an assumption: each proposal is run, and corrects the laws before the next.";

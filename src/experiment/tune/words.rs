@@ -130,7 +130,8 @@ impl Results<'_> {
         let mut limits = self.tune.request.limits.iter();
         if limits.any(|it| matches!(it.quantity, Quantity::Crest | Quantity::Front)) {
             texts.push(format!(
-                "Crest and front are measured in cubes of {} m: lower waves ask for run_up or energy.",
+                "Crest and front are measured in cubes of {} m: lower waves \
+                 ask for run_up or energy.",
                 significant(self.resolution)
             ));
         }
@@ -142,7 +143,8 @@ impl Results<'_> {
         let (frames, all) = (self.tune.frames, self.tune.scene.shot.frames);
         if frames < all {
             texts.push(format!(
-                "Frames 1 to {frames} of {all} were run: of the others nothing is known, and their time is taken to be the same."
+                "Frames 1 to {frames} of {all} were run: of the others nothing is known, and their \
+                 time is taken to be the same."
             ));
         }
         texts
@@ -300,5 +302,6 @@ impl Results<'_> {
     }
 }
 
-const PROMISED: &str = "After the water has met a wall, a solid or itself particles are chaotic: what is held are such sums \
-    and medians, as a mean over the frames that were measured. The shape of a splash, a drop, one frame's crest are not.";
+const PROMISED: &str = "After the water has met a wall, a solid or itself particles are chaotic: \
+    what is held are such sums and medians, as a mean over the frames that were measured. The \
+    shape of a splash, a drop, one frame's crest are not.";

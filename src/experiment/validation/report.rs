@@ -57,7 +57,8 @@ pub(super) fn draw(validation: &Validation, bench: &Bench<'_>, results: &[Result
     let [missed, known] = [Verdict::Misses, Verdict::KnownFailure].map(|v| names(v).len());
     Report {
         answer: format!(
-            "Of the gates that theory and experiments set {gates}; {known} are known failures and {missed} are missed."
+            "Of the gates that theory and experiments set {gates}; {known} are known failures \
+             and {missed} are missed."
         ),
         parts: parts(validation, bench, results),
         table: table(results),
@@ -321,7 +322,8 @@ fn quantity(gate: &Gate) -> String {
 /// Rows of `results.csv`: one for each gate of each run, and one for each number that no gate
 /// judges.
 fn table(results: &[Result<'_>]) -> Vec<Vec<String>> {
-    let titles = "benchmark,solver,resolution,device,quantity,measured,published,error,gate,verdict,source,known_failure,particles,frames,seconds,ended";
+    let titles = "benchmark,solver,resolution,device,quantity,measured,published,error,gate,\
+                  verdict,source,known_failure,particles,frames,seconds,ended";
     let mut table = vec![strings(titles.split(','))];
     let exact = |value: Option<f64>| value.map_or(String::new(), |value| format!("{value:.6e}"));
     for result in results {
@@ -393,14 +395,17 @@ fn where_run(bench: &Bench<'_>) -> String {
     let cpu = bench.devices.of(RunsOn::Cpu).identity();
     let (name, version) = (swell_domain::PROGRAM, swell_domain::VERSION);
     format!(
-        "{gpu}CPU: {cpu}. By {name} {version}. Particles, frames and seconds of each run stand in results.csv."
+        "{gpu}CPU: {cpu}. By {name} {version}. Particles, frames and seconds of each \
+         run stand in results.csv."
     )
 }
 
-const MEASURED: &str = "Published numbers are those at 9.81 m/s² and 1000 kg/m³ and of the lengths that the study names, whatever \
-    the scene has: a scene with other gravity or another stroke misses them. Heights are those of elevation probes, pressures \
-    those of pressure probes at the end of each frame. A wave's height and phase are those of one harmonic by least squares \
-    over whole periods, without a trend. A crest is the parabola through what is above 0.8 of it, a celerity the straight line \
-    through arrivals at all gauges. A front is where 99.5 % of the water is behind. Depths over a dry bed are the volumes of \
-    particles in bins of a quarter of h0. The resolution is cells with FLIP and particle spacings with PBF of the length that a \
+const MEASURED: &str = "Published numbers are those at 9.81 m/s² and 1000 kg/m³ and of the lengths \
+    that the study names, whatever the scene has: a scene with other gravity or another stroke \
+    misses them. Heights are those of elevation probes, pressures those of pressure probes at the \
+    end of each frame. A wave's height and phase are those of one harmonic by least squares over \
+    whole periods, without a trend. A crest is the parabola through what is above 0.8 of it, a \
+    celerity the straight line through arrivals at all gauges. A front is where 99.5 % of the \
+    water is behind. Depths over a dry bed are the volumes of particles in bins of a quarter of \
+    h0. The resolution is cells with FLIP and particle spacings with PBF of the length that a \
     benchmark names. The order is the slope of log error over log resolution by least squares.";

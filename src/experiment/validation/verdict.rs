@@ -126,8 +126,7 @@ mod tests {
     }
 
     #[test]
-    fn an_error_that_falls_with_the_square_of_the_cells_passes_and_one_that_falls_with_them_does_not()
-     {
+    fn an_error_of_second_order_passes_and_one_of_first_order_misses() {
         let mut benchmark = benchmark("solitary wave, order");
         benchmark.gates[0].published = None;
         let c = 3.431;

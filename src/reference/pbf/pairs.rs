@@ -200,7 +200,8 @@ mod tests {
         let text = "[shot]\nname = \"lanes\"\nframes = 1\nframes_per_second = 50\n\
             [domain]\nmin = [0.0, 0.0, 0.0]\nmax = [2.0, 2.0, 2.0]\n\
             [[water.block]]\nmin = [0.0, 0.0, 0.0]\nmax = [0.5, 0.5, 0.5]\n\
-            [solver]\nmethod = \"pbf\"\n[solver.pbf]\nparticle_spacing = 0.1\nartificial_pressure = 0.1\n";
+            [solver]\nmethod = \"pbf\"\n[solver.pbf]\nparticle_spacing = 0.1\n\
+            artificial_pressure = 0.1\n";
         let scene = Scene::parse(text, Path::new("lanes.toml"), Path::new("."), &[]).unwrap();
         let mut model = Model::new(&scene, &Boundary::default());
         let uneven = |k: usize| DVec3::new(0.31, 0.17, 0.23) * (k * k % 97) as f64 * 1e-3;

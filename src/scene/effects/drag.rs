@@ -34,7 +34,8 @@ impl Effect for Settings {
     const KEYS: &'static [Key] = &[
         Key::number("drop_radius", 1e-6..=10.0)
             .unit("metres")
-            .about("of the drops that a particle stands for which flies alone; the air slows small ones more"),
+            .about("of the drops that a particle stands for which flies alone; the \
+                    air slows small ones more"),
         Key::vector("wind", 3, -1e3..=1e3)
             .unit("m/s")
             .default("[0.0, 0.0, 0.0]")
@@ -49,7 +50,8 @@ impl Effect for Settings {
         let worth = 4.0 / 3.0 * PI * (self.drop_radius / spacing).powi(3);
         (worth > 1.0).then(|| {
             format!(
-                "effects.drag.drop_radius: a drop of {} m radius holds {worth:.1} times the water of a particle, of which it is to be a part",
+                "effects.drag.drop_radius: a drop of {} m radius holds {worth:.1} times the water \
+                 of a particle, of which it is to be a part",
                 shown(self.drop_radius)
             )
         })

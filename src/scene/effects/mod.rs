@@ -141,7 +141,9 @@ pub(super) struct Absorbs<'a> {
 #[macro_export]
 macro_rules! with_effects {
     ($callback:ident) => {
-        $callback! { viscosity, vorticity_confinement, drag, absorbing_zone, generation_zone, surface_tension }
+        $callback! {
+            viscosity, vorticity_confinement, drag, absorbing_zone, generation_zone, surface_tension
+        }
     };
 }
 pub use crate::with_effects;
@@ -173,7 +175,11 @@ macro_rules! effects {
             ),+];
 
             /// Rejects settings that do not fit the scene.
-            pub(super) fn check(&self, doc: &Document<'_>, around: &Surroundings<'_>) -> Result<(), SceneError> {
+            pub(super) fn check(
+                &self,
+                doc: &Document<'_>,
+                around: &Surroundings<'_>,
+            ) -> Result<(), SceneError> {
                 $(self.$name.iter().try_for_each(|settings| settings.check(doc, around))?;)+
                 Ok(())
             }
@@ -220,7 +226,10 @@ macro_rules! effects {
             pub(super) fn longest_step(&self, grain: Grain) -> (f64, &'static str) {
                 let mut least = (f64::INFINITY, "");
                 $(
-                    let longest = self.$name.as_ref().map_or(f64::INFINITY, |settings| settings.longest_step(grain));
+                    let longest = self
+                        .$name
+                        .as_ref()
+                        .map_or(f64::INFINITY, |settings| settings.longest_step(grain));
                     if longest < least.0 {
                         least = (longest, stringify!($name));
                     }
@@ -243,7 +252,12 @@ macro_rules! effects {
             /// Returns the wave-absorbing zones with the names of their effects.
             pub(super) fn absorbing(&self) -> Vec<(&'static str, Absorbs<'_>)> {
                 let mut zones = Vec::new();
-                $(zones.extend(self.$name.as_ref().and_then(Effect::absorbs).map(|zone| (stringify!($name), zone)));)+
+                $(zones.extend(
+                    self.$name
+                        .as_ref()
+                        .and_then(Effect::absorbs)
+                        .map(|zone| (stringify!($name), zone)),
+                );)+
                 zones
             }
 

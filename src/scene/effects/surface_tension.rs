@@ -39,7 +39,8 @@ impl Effect for Settings {
             true => Ok(()),
             false => Err(doc.fault_of_plain(
                 "effects.surface_tension",
-                "is a part of the projection, which solver.pbf.grid_projection = false goes without: only true is allowed",
+                "is a part of the projection, which solver.pbf.grid_projection = false goes \
+                 without: only true is allowed",
             )),
         }
     }
@@ -48,8 +49,8 @@ impl Effect for Settings {
         let bond = grain.density * grain.gravity * grain.spacing.powi(2) / self.coefficient;
         (bond > MOST_BOND).then(|| {
             format!(
-                "effects.surface_tension.coefficient: the Bond number ρ g d² / σ of a particle spacing of {} m is {bond:.1}; above \
-                 {MOST_BOND} it changes nothing that is seen",
+                "effects.surface_tension.coefficient: the Bond number ρ g d² / σ of a particle \
+                 spacing of {} m is {bond:.1}; above {MOST_BOND} it changes nothing that is seen",
                 shown(grain.spacing)
             )
         })

@@ -5,6 +5,7 @@
 //! defaults, the scene as written into a cache (`super::write`), the comparison on resume
 //! (`super::difference`), and the reference page ([`page`], printed by `swell keys`).
 
+mod budget;
 mod motion;
 mod page;
 mod scene;

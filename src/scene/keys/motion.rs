@@ -24,8 +24,9 @@ const STROKE: Key = Key::number("stroke", LENGTH)
     .unit("metres")
     .only("kind", &["sine"])
     .about(
-        "the whole distance from one end of the way to the other, twice the amplitude: x(t) = stroke/2 (1 − cos(2π t / period)), \
-         times the ramp; the S of H/S in wave maker theory (Dean and Dalrymple 1991)",
+        "the whole distance from one end of the way to the other, twice the amplitude: x(t) = \
+         stroke/2 (1 − cos(2π t / period)), times the ramp; the S of H/S in wave maker theory \
+         (Dean and Dalrymple 1991)",
     );
 const CYCLE: Key = Key::number("period", PERIOD)
     .unit("seconds")
@@ -38,16 +39,20 @@ const RAMP: Key = Key::number_or_zero("ramp", PERIOD)
     .about("how long the motion takes to reach its full stroke; 0: it begins with it");
 const FILE: Key = Key::text(
     "file",
-    "a table of time and displacement (seconds, metres), two numbers a line, relative to the scene file",
+    "a table of time and displacement (seconds, metres), two numbers a line, \
+     relative to the scene file",
 )
 .absent()
 .only("kind", &["table"])
-.about("displacements from a file, a comma, a semicolon, a tab or spaces between the two; the written-out scene has them as points");
+.about(
+    "displacements from a file, a comma, a semicolon, a tab or spaces between the two; the \
+     written-out scene has them as points",
+);
 const POINTS: Key = Key::points(
     "points",
     2,
-    "at least two [seconds, metres], times rising from 0 on, displacements from 0 on, inward or along direction, the first 0, all up to 1e9, no faster \
-     than 100000 m/s",
+    "at least two [seconds, metres], times rising from 0 on, displacements from 0 on, inward or \
+     along direction, the first 0, all up to 1e9, no faster than 100000 m/s",
 )
 .only("kind", &["table"])
 .without(&["file"])
@@ -77,18 +82,22 @@ pub(super) const SOLID_TURN: &[Key] = &[
         .unit("degrees")
         .only("kind", &["sine"])
         .about(
-            "the whole angle from one end of the way to the other: swing/2 (1 − cos(2π t / period)), times the ramp; the solid stands \
-             at one end at the start",
+            "the whole angle from one end of the way to the other: swing/2 (1 − cos(2π t / \
+             period)), times the ramp; the solid stands at one end at the start",
         ),
     CYCLE,
     RAMP,
     Key::text(
         "file",
-        "a table of time and angle (seconds, degrees), two numbers a line, relative to the scene file",
+        "a table of time and angle (seconds, degrees), two numbers a line, \
+         relative to the scene file",
     )
     .absent()
     .only("kind", &["table"])
-    .about("angles from a file, a comma, a semicolon, a tab or spaces between the two; the written-out scene has them as points"),
+    .about(
+        "angles from a file, a comma, a semicolon, a tab or spaces between the two; the \
+         written-out scene has them as points",
+    ),
     Key::points(
         "points",
         2,
@@ -120,8 +129,10 @@ pub(super) const WALL_MOTION: &[Key] = &[
         ],
     )
     .about(
-        "kind of motion; `still`, with absorption alone, makes no waves; `solitary` is Goring 1978; `stokes` (second order, Schäffer 1996 and Madsen 1971) and `cnoidal` (shallow \
-         water, Goring 1978) make regular waves without free ones; `sea` and `focused` follow a spectrum, by linear theory or to second order",
+        "kind of motion; `still`, with absorption alone, makes no waves; `solitary` is Goring \
+         1978; `stokes` (second order, Schäffer 1996 and Madsen 1971) and `cnoidal` (shallow \
+         water, Goring 1978) make regular waves without free ones; `sea` and `focused` follow a \
+         spectrum, by linear theory or to second order",
     ),
     VELOCITY,
     UNTIL,
@@ -136,13 +147,18 @@ pub(super) const WALL_MOTION: &[Key] = &[
         .computed(|| "one period of a sine, two (of the peak) of other waves,".to_owned())
         .only("kind", &["sine", "stokes", "cnoidal", "sea", "focused"])
         .about(
-            "how long the motion takes to reach its full size; 0, of a sine and of regular waves alone: it begins with it",
+            "how long the motion takes to reach its full size; 0, of a sine and of regular waves \
+             alone: it begins with it",
         ),
     Key::number("height", LENGTH)
         .unit("metres")
         .only("kind", &["solitary", "stokes", "cnoidal", "focused"])
         .also(", at most the depth; regular waves are up to 0.78 depths high and do not break")
-        .about("of a solitary wave, whose crest leaves the wall (6 d/K + H/K)/c after the start, K = √(3H/4d), c = √(g (d + H)); of regular waves, trough to crest; of a packet's crest by linear theory"),
+        .about(
+            "of a solitary wave, whose crest leaves the wall (6 d/K + H/K)/c after the start, K \
+             = √(3H/4d), c = √(g (d + H)); of regular waves, trough to crest; of a packet's \
+             crest by linear theory",
+        ),
     Key::number("depth", LENGTH)
         .unit("metres")
         .only("kind", &["solitary", "stokes", "cnoidal", "sea", "focused"])
@@ -151,7 +167,8 @@ pub(super) const WALL_MOTION: &[Key] = &[
         .default("\"jonswap\"")
         .only("kind", SEAS)
         .about(
-            "how the energy is spread: JONSWAP (Hasselmann et al. 1973), Pierson and Moskowitz 1964, TMA (Bouws et al. 1985)",
+            "how the energy is spread: JONSWAP (Hasselmann et al. 1973), Pierson and Moskowitz \
+             1964, TMA (Bouws et al. 1985)",
         ),
     Key::number("peak_enhancement", 1.0..=20.0)
         .computed(|| "3.3".to_owned())
@@ -166,7 +183,10 @@ pub(super) const WALL_MOTION: &[Key] = &[
         .unit("seconds")
         .computed(|| "a third of the peak's".to_owned())
         .only("kind", SEAS)
-        .also(", a tenth to nine tenths of the peak's, of waves that are at least 10 particle spacings long")
+        .also(
+            ", a tenth to nine tenths of the peak's, of waves that are at least 10 \
+             particle spacings long",
+        )
         .about("of the shortest waves that are made; what is left out is given to the others"),
     Key::number("significant_height", LENGTH)
         .unit("metres")
@@ -190,8 +210,14 @@ pub(super) const WALL_MOTION: &[Key] = &[
     Key::flag("second_order")
         .default("false")
         .only("kind", SEAS)
-        .also(", for waves that the second order holds for, the shortest at least a quarter of the depth long")
-        .about("whether the wall moves at sums and differences of frequencies too, so that it makes no free waves of them (Schäffer 1996)"),
+        .also(
+            ", for waves that the second order holds for, the shortest at least a \
+             quarter of the depth long",
+        )
+        .about(
+            "whether the wall moves at sums and differences of frequencies too, so that it makes \
+             no free waves of them (Schäffer 1996)",
+        ),
     FILE,
     POINTS,
 ];
@@ -203,20 +229,32 @@ pub(super) const SOLID_TRACK: &[Key] = &[
     )
     .absent()
     .about("its node's animation carries the solid; the written-out scene has it as poses"),
-    Key::text("node", "the name of a node in the file; of USD its path will do too")
-        .absent()
-        .with("file")
-        .about("whose motion it is, with that of the nodes above it; left out: the file's only node, or USD's only prim with a transform"),
+    Key::text(
+        "node",
+        "the name of a node in the file; of USD its path will do too",
+    )
+    .absent()
+    .with("file")
+    .about(
+        "whose motion it is, with that of the nodes above it; left out: the file's only node, or \
+         USD's only prim with a transform",
+    ),
     Key::number("start", -1e6..=1e6)
         .absent()
         .with("file")
-        .about("the file's frame that is frame 1 of the shot, such as 1001: of USD a time code, of glTF a frame of the shot's rate"),
+        .about(
+            "the file's frame that is frame 1 of the shot, such as 1001: of USD a time code, of \
+             glTF a frame of the shot's rate",
+        ),
     Key::points(
         "poses",
         8,
-        "rows of [seconds, x, y, z, qx, qy, qz, qw], times rising from 0 on, places in metres, unit quaternions, the first [0, 0, 0, 1]",
+        "rows of [seconds, x, y, z, qx, qy, qz, qw], times rising from 0 on, places in metres, \
+         unit quaternions, the first [0, 0, 0, 1]",
     )
     .absent()
     .without(&["file"])
-    .about("the motion in place: where a point of the solid is, and how the solid is turned about it"),
+    .about(
+        "the motion in place: where a point of the solid is, and how the solid is turned about it",
+    ),
 ];

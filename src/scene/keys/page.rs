@@ -7,7 +7,9 @@ use super::{
 
 /// Returns the keys of these files as Markdown, one section per table.
 pub fn page(files: &[File]) -> String {
-    let mut out = "# Keys\n\nEvery key of every file that swell reads. This page is written by `swell keys`.\n".to_owned();
+    let mut out = "# Keys\n\nEvery key of every file that swell reads. This page is written by \
+                   `swell keys`.\n"
+        .to_owned();
     files.iter().for_each(|file| chapter(&mut out, *file));
     out
 }
@@ -16,8 +18,8 @@ fn chapter(out: &mut String, file: File) {
     let (title, intro) = match file {
         File::Scene => (
             "Scene keys",
-            "A bake continues (`--resume`) only with the values that it began with, except of keys with a star: those are no \
-             physics.",
+            "A bake continues (`--resume`) only with the values that it began with, except of keys \
+             with a star: those are no physics.",
         ),
         File::Look => (
             "Look keys",
@@ -29,11 +31,13 @@ fn chapter(out: &mut String, file: File) {
         ),
         File::Tolerance => (
             "Tolerance keys",
-            "What a file does not name is shown and not judged. `NAME` is a name of an attribute or an aggregate.",
+            "What a file does not name is shown and not judged. `NAME` is a name of an \
+             attribute or an aggregate.",
         ),
         File::Whitewater => (
             "Whitewater keys",
-            "Of the file that `swell whitewater CACHE --settings FILE` takes. None of them is physics of the bake.",
+            "Of the file that `swell whitewater CACHE --settings FILE` takes. None of them \
+             is physics of the bake.",
         ),
     };
     *out += &format!("\n## {title}\n\n{intro}\n");

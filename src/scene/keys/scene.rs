@@ -6,7 +6,6 @@
 use super::super::{
     Effects, Iteration, Method, Wall,
     axis::Axis,
-    budget,
     build::{CHEBYSHEV_RELAXATION, RELAXATION},
     flip::{self, Preconditioner, Surface, Transfer},
     keep,
@@ -14,7 +13,10 @@ use super::super::{
     no_slip,
     probe::{self, ProbeKind},
 };
-use super::motion::{SOLID_MOTION, SOLID_TRACK, SOLID_TURN, WALL_MOTION};
+use super::{
+    budget::BUDGET,
+    motion::{SOLID_MOTION, SOLID_TRACK, SOLID_TURN, WALL_MOTION},
+};
 use swell_domain::sparse_grid;
 
 pub(in super::super) const KEYS: &[Key] = &[
@@ -92,7 +94,10 @@ const DOMAIN: &[Key] = &[
     Key::choice("walls", &no_slip::WALLS)
         .computed(|| "free_slip, but for those of no_slip".to_owned())
         .also(", the last of the solver flip, or where an effect resolves them")
-        .about("how water meets all six walls: free-slip ones it slides along, no-slip ones slow what is within a cell"),
+        .about(
+            "how water meets all six walls: free-slip ones it slides along, no-slip ones \
+             slow what is within a cell",
+        ),
     Key::choices("no_slip", &WALLS)
         .absent()
         .without(&["walls"])
@@ -101,10 +106,14 @@ const DOMAIN: &[Key] = &[
     Key::choices("periodic", &AXES)
         .absent()
         .also(
-            ", each once, none along which gravity acts, a wave maker stands or a solid moves; along each the domain is a \
-             multiple of eight cells (FLIP), of 16 particle spacings (PBF), or without grid_projection of one and at least three support radii",
+            ", each once, none along which gravity acts, a wave maker stands or a solid moves; \
+             along each the domain is a multiple of eight cells (FLIP), of 16 particle spacings \
+             (PBF), or without grid_projection of one and at least three support radii",
         )
-        .about("axes along which the domain has no walls: water that leaves at one end comes in at the other"),
+        .about(
+            "axes along which the domain has no walls: water that leaves at one \
+             end comes in at the other",
+        ),
 ];
 
 const AXES: [&str; 3] = words(&Axis::NAMED);
@@ -153,7 +162,8 @@ const SCALE: Key = Key::scale("scale", 1e-6..=1e6)
 const WATER_MESH: &[Key] = &[
     Key::text(
         "file",
-        "a closed .obj, .ply or .stl, or a level set in a .vdb, within the domain, relative to the scene file",
+        "a closed .obj, .ply or .stl, or a level set in a .vdb, within the domain, \
+         relative to the scene file",
     )
     .by_hash()
     .about("the mesh; open ones are taken with a warning where an inside can be told"),
@@ -175,7 +185,8 @@ const PARTICLES: &[Key] = &[
 const SOLID: &[Key] = &[
     Key::text(
         "mesh",
-        "a closed .obj, .ply or .stl, or a level set in a .vdb, that reaches into the domain, relative to the scene file",
+        "a closed .obj, .ply or .stl, or a level set in a .vdb, that reaches into the domain, \
+         relative to the scene file",
     )
     .by_hash()
     .about("the mesh; open ones are taken with a warning where an inside can be told"),
@@ -211,7 +222,10 @@ const SOLID: &[Key] = &[
     Key::inline("track", SOLID_TRACK)
         .absent()
         .without(&["motion", "turn"])
-        .also(", that brings the solid into the domain, no point of it faster than 100000 m/s; not with domain.periodic")
+        .also(
+            ", that brings the solid into the domain, no point of it faster than 100000 m/s; \
+             not with domain.periodic",
+        )
         .about("Where the solid stands over time, from where it stands at the start on"),
 ];
 
@@ -220,14 +234,20 @@ const WAVE_MAKER: &[Key] = &[
         .also(", each once")
         .about("which wall of the domain"),
     Key::inline("motion", WALL_MOTION)
-        .also(", that leaves at least two particle spacings (PBF) or three cells (FLIP) between the walls")
+        .also(
+            ", that leaves at least two particle spacings (PBF) or three cells \
+             (FLIP) between the walls",
+        )
         .about("How far inward the wall has come"),
     Key::inline("absorption", ABSORPTION)
         .absent()
-        .also(", of a wall along x or z under gravity straight down, with frames short enough for it")
+        .also(
+            ", of a wall along x or z under gravity straight down, with frames short enough for it",
+        )
         .about(
-            "Whether the wall also takes in waves that come to it (active absorption, Schäffer and Klopman 2000): once a frame it \
-             answers by how much the water beside it stands over the wall's own waves",
+            "Whether the wall also takes in waves that come to it (active absorption, Schäffer \
+             and Klopman 2000): once a frame it answers by how much the water beside it stands \
+             over the wall's own waves",
         ),
 ];
 
@@ -243,8 +263,8 @@ const ABSORPTION: &[Key] = &[
         .unit("metres")
         .also(", twice of it inside of the domain")
         .about(
-            "how far the wall may come off its own way; it rests as far inside of the domain's face, and all distances of its \
-             motion are from there",
+            "how far the wall may come off its own way; it rests as far inside of the domain's \
+             face, and all distances of its motion are from there",
         ),
 ];
 
@@ -279,8 +299,14 @@ const EMITTER: &[Key] = &[
     Key::vector("velocity", 3, VECTOR)
         .unit("m/s")
         .default("[0.0, 0.0, 0.0]")
-        .also(", by which water goes no farther in a frame than the room is long; not 0 without a level")
-        .about("of the water that enters, and without a level how much does: velocity × the room's cross-section"),
+        .also(
+            ", by which water goes no farther in a frame than the room is \
+             long; not 0 without a level",
+        )
+        .about(
+            "of the water that enters, and without a level how much does: velocity × \
+             the room's cross-section",
+        ),
     Key::number("level", COORDINATE)
         .unit("metres")
         .absent()
@@ -313,7 +339,10 @@ const METHODS: [&str; 2] = words(&Method::NAMED);
 
 const SOLVER: &[Key] = &[
     Key::choice("method", &METHODS)
-        .also(", with a table [solver.pbf] of at least particle_spacing or [solver.flip] of at least cell_size")
+        .also(
+            ", with a table [solver.pbf] of at least particle_spacing or \
+             [solver.flip] of at least cell_size",
+        )
         .about("the solver; `--solver` picks as well"),
     Key::table("pbf", PBF)
         .absent()
@@ -366,11 +395,11 @@ const PBF: &[Key] = &[
     Key::number("artificial_pressure", 0.0..=10.0)
         .default("0.0")
         .about("k of s_corr, with λ's natural scale as unit"),
-    Key::flag("grid_projection")
-        .default("true")
-        .about("velocities are made free of divergence on a grid of cells of 2 d before particles move (Raveendran 2011), \
-            so that iterations correct what is left; a period is then a multiple of 16 d. `false`: the iterations alone, as \
-            in the paper by Macklin and Müller (2013)"),
+    Key::flag("grid_projection").default("true").about(
+        "velocities are made free of divergence on a grid of cells of 2 d before particles move \
+         (Raveendran 2011), so that iterations correct what is left; a period is then a multiple \
+         of 16 d. `false`: the iterations alone, as in the paper by Macklin and Müller (2013)",
+    ),
     Key::whole("max_substeps", MANY)
         .not_physics()
         .default("32")
@@ -384,7 +413,8 @@ const FLIP: &[Key] = &[
     Key::number("cell_size", SPACING)
         .unit("metres")
         .also(
-            ", with at least 3 and at most 65536 cells along each axis, 68719476736 cells and 134217728 particles",
+            ", with at least 3 and at most 65536 cells along each axis, 68719476736 cells \
+             and 134217728 particles",
         )
         .about("Δx"),
     // Fewer than four particles do not define the density of a cell.
@@ -394,9 +424,10 @@ const FLIP: &[Key] = &[
     Key::choice("transfer", &TRANSFERS)
         .default("\"flip\"")
         .about("`apic` (Jiang 2015) has affine rows as attributes of the frames"),
-    Key::number("pic_blend", 0.0..=1.0)
-        .default("0.05")
-        .about("α, the part of the velocity taken from the grid; a viscosity of α Δx² / (6 Δt); unused by apic"),
+    Key::number("pic_blend", 0.0..=1.0).default("0.05").about(
+        "α, the part of the velocity taken from the grid; a viscosity of α Δx² / \
+         (6 Δt); unused by apic",
+    ),
     Key::number("cfl", CFL)
         .default("3.0")
         .about("largest displacement in a substep, in cells; as many substeps as that asks"),
@@ -406,7 +437,10 @@ const FLIP: &[Key] = &[
         .about("more in a frame are an error (exit 5), never silently fewer"),
     Key::choice("surface", &SURFACES)
         .default("\"ghost_fluid\"")
-        .about("where the pressure is zero: at the surface (Enright 2003), or in the middle of the first cell of air"),
+        .about(
+            "where the pressure is zero: at the surface (Enright 2003), or in the middle \
+             of the first cell of air",
+        ),
     Key::flag("density_correction")
         .default("true")
         .about("moves particles so that the volume stays (Kugelstadt 2019)"),
@@ -448,8 +482,8 @@ const GRIDS: &[Key] = &[
         .about("staggered \"vel\", m/s, carried three voxels beyond the water"),
     Key::other(
         "voxel_size",
-        "a number from a quarter of the particle spacing to 8 of them, metres, with at most 268435456 leaves of 8³ voxels \
-         in the domain",
+        "a number from a quarter of the particle spacing to 8 of them, metres, with at most \
+         268435456 leaves of 8³ voxels in the domain",
     )
     .computed(|| "flip's cell_size, or two particle spacings of pbf".to_owned())
     .about("edge of a voxel"),
@@ -465,12 +499,14 @@ const KEEP: &[Key] = &[
     )
     .default("\"all\"")
     .about(
-        "frames whose particles stay; the first and the newest are always there, so that a bake can go on",
+        "frames whose particles stay; the first and the newest are always there, \
+         so that a bake can go on",
     ),
     Key::choice("compression", &keep::COMPRESSIONS)
         .default("\"none\"")
         .about(
-            "of frames, without loss: zstd makes .ply.zst, which swell and its Python package read, and nothing else",
+            "of frames, without loss: zstd makes .ply.zst, which swell and its Python package \
+             read, and nothing else",
         ),
 ];
 
@@ -483,16 +519,19 @@ const PROBE: &[Key] = &[
         .about("of its CSV in the cache"),
     Key::choice("kind", &PROBES)
         .also(
-            "; with the solver pbf a pressure asks for grid_projection, or for iteration = \"red_black\" or \"jacobi\" and artificial_pressure = 0",
+            "; with the solver pbf a pressure asks for grid_projection, or for iteration = \
+             \"red_black\" or \"jacobi\" and artificial_pressure = 0",
         )
         .about(
-            "elevation of the surface, m; pressure, Pa; energy of all water, J; its volume, m³; front along an axis, m; \
-             run_up, the highest water that hangs together with the body, m; flux through a plane, m³/s; force of the \
-             pressure on a solid or a wall, N, and its moment, N m, with the solver flip",
+            "elevation of the surface, m; pressure, Pa; energy of all water, J; its volume, m³; \
+             front along an axis, m; run_up, the highest water that hangs together with the body, \
+             m; flux through a plane, m³/s; force of the pressure on a solid or a wall, N, and its \
+             moment, N m, with the solver flip",
         ),
     Key::other(
         "at",
-        "[x, z] of an elevation, [x, y, z] of a pressure or [c] of a flux's plane along its axis, metres, in the domain",
+        "[x, z] of an elevation, [x, y, z] of a pressure or [c] of a flux's plane along its \
+         axis, metres, in the domain",
     )
     .only("kind", &["elevation", "pressure", "flux"])
     .about("where"),
@@ -505,7 +544,8 @@ const PROBE: &[Key] = &[
         .about("part of the water, with run_up of the body of water, that lies behind or below"),
     Key::other(
         "solid",
-        "the number of a [[solid]], from 0, or a wall of the domain: \"-x\", \"+x\", \"-y\", \"+y\", \"-z\" or \"+z\"",
+        "the number of a [[solid]], from 0, or a wall of the domain: \"-x\", \"+x\", \"-y\", \
+         \"+y\", \"-z\" or \"+z\"",
     )
     .only("kind", &["force"])
     .about("who bears the force"),
@@ -516,65 +556,16 @@ const PROBE: &[Key] = &[
         .about("where the moment is taken about"),
     Key::other(
         "rate_hz",
-        "\"substep\" or a number from 0.001 to shot.frames_per_second × the solver's max_substeps, Hz",
+        "\"substep\" or a number from 0.001 to shot.frames_per_second × the \
+         solver's max_substeps, Hz",
     )
     .computed(|| "each frame".to_owned())
-    .about("how often it looks: at the end of each substep, or of each in which a time k / rate_hz lies"),
+    .about(
+        "how often it looks: at the end of each substep, or of each in which \
+         a time k / rate_hz lies",
+    ),
     Key::number("window", 1e-9..=1e6)
         .unit("s")
         .absent()
         .about("time up to each look over which mean, least and greatest value are given as well"),
-];
-
-/// Range of a limit in its unit, wider than any value that `f32` resolves or that a
-/// simulation reaches.
-const LIMIT: Interval = 1e-12..=1e12;
-
-/// Defaults are a few times the values of the shipped scenes; docs/scene.md lists the
-/// largest of these.
-const BUDGET: &[Key] = &[
-    Key::number_or_false("speed", LIMIT)
-        .unit("m/s")
-        .computed(budget::speed_words)
-        .about("of a particle at a frame's end"),
-    Key::number_or_false("speed_jump", LIMIT)
-        .unit("times")
-        .computed(budget::speed_jump_words)
-        .about("of a frame's fastest particle over the fastest before it with what gravity, walls and moving solids add"),
-    Key::number_or_false("density_error_mean", LIMIT)
-        .unit("of the rest density")
-        .default("0.5")
-        .about("mean of max(0, ρ/ρ0 − 1) at a frame's end"),
-    Key::number_or_false("density_error_p99", LIMIT)
-        .unit("of the rest density")
-        .default("5.0")
-        .about("its 99th percentile"),
-    Key::number_or_false("density_error_max", LIMIT)
-        .unit("of the rest density")
-        .computed(budget::density_error_max_words)
-        .about("its largest"),
-    Key::number_or_false("capped", LIMIT)
-        .unit("of all particles in all substeps")
-        .default("0.01")
-        .about("times that a particle was slowed to the displacement cap"),
-    Key::number_or_false("residual", LIMIT)
-        .unit("of the right-hand side's norm")
-        .also(", at least solver.flip.pressure.tolerance")
-        .computed(budget::residual_words)
-        .about("true residual of a projection"),
-    Key::number_or_false("divergence", LIMIT)
-        .unit("of a cell's volume in a substep")
-        .default("0.1")
-        .about("largest |∇·u| Δt after a projection"),
-    Key::number_or_false("volume", LIMIT)
-        .unit("of the volume at the start")
-        .default("false")
-        .about("how far the volume may be off; measured only where it is set"),
-    Key::number_or_false("energy", LIMIT)
-        .unit("of the total energy in a frame")
-        .computed(budget::energy_words)
-        .about("rise of kinetic and potential energy beyond the work of walls and solids"),
-    Key::number_or_false("particles", 1.0..=134_217_728.0)
-        .default("false")
-        .about("how many there may be, with what emitters bring; a bake that is known to have more is refused before it begins"),
 ];

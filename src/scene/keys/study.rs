@@ -8,7 +8,13 @@ use super::super::{
 pub(in super::super) const KEYS: &[Key] = &[
     Key::choice(
         "kind",
-        &["solver_comparison", "sweep", "surface", "stability", "validation"],
+        &[
+            "solver_comparison",
+            "sweep",
+            "surface",
+            "stability",
+            "validation",
+        ],
     )
     .about("what is compared"),
     Key::text("scene", "a scene file, relative to the study file")
@@ -19,22 +25,29 @@ pub(in super::super) const KEYS: &[Key] = &[
         .only("kind", &["sweep", "surface", "stability", "validation"])
         .about("in the reader's words"),
     // `kind = "solver_comparison"`.
-    Key::text("look", "a look file, relative to the study file; of two solvers one that writes PNG")
-        .only("kind", &["solver_comparison", "surface"])
-        .about("how it is seen"),
+    Key::text(
+        "look",
+        "a look file, relative to the study file; of two solvers one that writes PNG",
+    )
+    .only("kind", &["solver_comparison", "surface"])
+    .about("how it is seen"),
     Key::other("solvers", "two of \"pbf\" and \"flip\", each once")
         .only("kind", COMPARISON)
         .about("left and right"),
     Key::other(
         "frames",
-        "frames to measure, such as \"1-240\" or \"1-240x2\", within the shot; of two solvers all of it if left out",
+        "frames to measure, such as \"1-240\" or \"1-240x2\", within the shot; of two \
+         solvers all of it if left out",
     )
     .absent()
     .only("kind", &["solver_comparison", "surface"])
     .about("what the curves are drawn from"),
-    Key::other("pictures", "frames to render, such as \"60-240x60\", within the shot")
-        .only("kind", COMPARISON)
-        .about("pairs of pictures"),
+    Key::other(
+        "pictures",
+        "frames to render, such as \"60-240x60\", within the shot",
+    )
+    .only("kind", COMPARISON)
+    .about("pairs of pictures"),
     // `kind = "sweep"`.
     SET.only("kind", &["solver_comparison", "sweep", "surface"]),
     KEY.only("kind", SWEEP),
@@ -59,9 +72,10 @@ pub(in super::super) const KEYS: &[Key] = &[
         .about("times are medians over so many runs"),
     Key::other(
         "errors",
-        "of \"density_error_mean\", \"density_error_p99\", \"density_error_max\", \"top_speed\", \"weight_error\", or of \"crest_error\", \
-         \"front_error\", \"energy_error\", \"profile_error\", or of \"pressure_error\", \"velocity_error\", \
-         \"divergence\", or \"distance_to_converged\"; of a surface of \"depth_off\", \"normal_off\", \"silhouette\", \
+        "of \"density_error_mean\", \"density_error_p99\", \"density_error_max\", \"top_speed\", \
+         \"weight_error\", or of \"crest_error\", \"front_error\", \"energy_error\", \
+         \"profile_error\", or of \"pressure_error\", \"velocity_error\", \"divergence\", or \
+         \"distance_to_converged\"; of a surface of \"depth_off\", \"normal_off\", \"silhouette\", \
          \"silhouette_offset\", \"colour\"",
     )
     .only("kind", &["sweep", "surface"])
@@ -119,8 +133,8 @@ const VALUES: Key = Key::other(
 
 const COARSER: Key = Key::other(
     "coarser",
-    "an array of overrides of the scene that make the last value's run coarser, with errors against a finest run or of a \
-     projection",
+    "an array of overrides of the scene that make the last value's run coarser, with errors \
+     against a finest run or of a projection",
 )
 .absent()
 .about("what that run is off by is the discretisation error");
@@ -133,13 +147,15 @@ const METHOD: &[Key] = &[
     COARSER,
     Key::other(
         "device",
-        "\"gpu\", or \"cpu\" for the f64 reference, which runs whole frames and no single projections",
+        "\"gpu\", or \"cpu\" for the f64 reference, which runs whole frames \
+         and no single projections",
     )
     .absent()
     .about("what it runs on; the GPU if left out"),
     Key::other(
         "against",
-        "another method of the same key and values, with errors that are else against the finest run",
+        "another method of the same key and values, with errors that are else \
+         against the finest run",
     )
     .absent()
     .about("value by value against that method"),
@@ -155,8 +171,9 @@ const LINE: &[Key] = &[
     .about("laid over the look"),
     Key::other(
         "key",
-        "\"surface.filter\", \"surface.splat\", \"surface.radius_m\", \"surface.smoothing_width_m\", \
-         \"surface.voxels_per_spacing\", \"renderer.method\" or \"image.samples\"",
+        "\"surface.filter\", \"surface.splat\", \"surface.radius_m\", \
+         \"surface.smoothing_width_m\", \"surface.voxels_per_spacing\", \
+         \"renderer.method\" or \"image.samples\"",
     )
     .about("what changes from point to point"),
     Key::other("values", "one or more values of the key").about("of the key"),
@@ -372,7 +389,10 @@ const GATE: &[Key] = &[
     Key::number("order_at_least", BOUND)
         .absent()
         .also(ONE_OF)
-        .about("the power of the resolution with which the error falls; without published, of three runs in a row of one ratio, with which their changes do"),
+        .about(
+            "the power of the resolution with which the error falls; without published, of three \
+             runs in a row of one ratio, with which their changes do",
+        ),
     Key::number("agree_within", BOUND)
         .absent()
         .also(ONE_OF)

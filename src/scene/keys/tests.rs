@@ -39,7 +39,8 @@ cell_size = 0.2
 surface = true
 "#;
 
-const SEA: &str = "wave_maker.0.motion={ kind = \"sea\", significant_height = 0.1, peak_period = 3.0, shortest_period = 2.0, depth = 1.0 }";
+const SEA: &str = "wave_maker.0.motion={ kind = \"sea\", significant_height = 0.1, peak_period = \
+                   3.0, shortest_period = 2.0, depth = 1.0 }";
 
 const CUBE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nv 0 0 1\nv 1 0 1\nv 0 1 1\nv 1 1 1\n\
     f 1 5 7 3\nf 2 4 8 6\nf 1 2 6 5\nf 3 7 8 4\nf 1 3 4 2\nf 5 6 8 7\n";
@@ -81,7 +82,8 @@ fn plain(path: &str, value: &Value) -> Value {
 fn what_is_left_out_is_the_default_of_the_table() {
     let chebyshev = load(&["solver.pbf.iteration=chebyshev"]).written(&|_, _| "a.obj".to_owned());
     let written = load(&["keep={}"]).written(&|_, _| "a.obj".to_owned());
-    let zone = "effects.generation_zone={walls=[\"-x\"],length=1.0,waves={kind=\"sea\",significant_height=0.1,peak_period=3.0,depth=1.0}}";
+    let zone = "effects.generation_zone={walls=[\"-x\"],length=1.0,waves={kind=\"sea\",\
+                significant_height=0.1,peak_period=3.0,depth=1.0}}";
     let drag = "effects.drag={drop_radius=0.001}";
     let sea = load(&[SEA, "wave_maker.0.wall=+x", zone, drag]).written(&|_, _| "a.obj".to_owned());
     let mut compared = BTreeSet::new();
@@ -181,7 +183,8 @@ fn allowed_words_follow_from_the_declaration() {
         ("solver.flip.transfer", "\"flip\" or \"apic\""),
         (
             "wave_maker[0].motion.ramp",
-            "0 or a number from 1e-4 to 1e6, seconds; one period of a sine, two (of the peak) of other waves, if left out",
+            "0 or a number from 1e-4 to 1e6, seconds; one period of a sine, two (of the peak) of \
+             other waves, if left out",
         ),
         (
             "budget.speed",

@@ -82,7 +82,8 @@ impl Scene {
                 false => met.min[wall.axis] - self.domain.min[wall.axis],
             };
             lints.push(format!(
-                "wave_maker[{index}].motion: the wall goes {} m in, and from {} m on through the solid {}, which stands still",
+                "wave_maker[{index}].motion: the wall goes {} m in, and from {} m on through the \
+                 solid {}, which stands still",
                 shown(farthest),
                 shown((first * 1e3).round() / 1e3),
                 solid.name()
@@ -111,8 +112,9 @@ impl Scene {
         };
         (height > most).then(|| {
             format!(
-                "wave_maker[{index}].motion: by linear theory a stroke of {} m makes waves {height:.3} m high; waves of {} s on {} m of \
-                 water break from {most:.3} m on ({whose})",
+                "wave_maker[{index}].motion: by linear theory a stroke of {} m makes \
+                 waves {height:.3} m high; waves of {} s on {} m of water break from \
+                 {most:.3} m on ({whose})",
                 shown(stroke),
                 shown(period),
                 shown(depth)
@@ -157,7 +159,8 @@ fn lint_table(key: &str, unit: &str, motion: &Motion, shot: &Shot) -> Option<Str
     let fits = ends <= f64::from(shot.frames) + 1.0;
     if are_whole && fits && points.len() >= LEAST_FRAMES && 2 * late > points.len() {
         return Some(format!(
-            "{key}: {late} of {} points of its table, all at whole numbers, lie after the shot's {} s; {in_frames}",
+            "{key}: {late} of {} points of its table, all at whole numbers, lie after the \
+             shot's {} s; {in_frames}",
             points.len(),
             shown(duration)
         ));
@@ -165,7 +168,8 @@ fn lint_table(key: &str, unit: &str, motion: &Motion, shot: &Shot) -> Option<Str
     let speed = abrupt_end(points)?;
     (ends < duration - shot.frame_seconds()).then(|| {
         format!(
-            "{key}: its table ends in mid-motion: up to its last point, at {} s, it goes {} {unit}, and stops there within {} s",
+            "{key}: its table ends in mid-motion: up to its last point, at {} s, it goes {} \
+             {unit}, and stops there within {} s",
             shown(ends),
             shown((speed * 1e3).round() / 1e3),
             shown(ends - points[points.len() - 2][0])

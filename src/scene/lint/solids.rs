@@ -27,8 +27,9 @@ impl Scene {
             // World coordinates, as in the scene file.
             let place = self.origin + thin.place;
             lints.push(format!(
-                "solid.mesh of {}: it is {:.4} m thick at ({:.3}, {:.3}, {:.3}); water passes through what is thinner than {least:.4} m, \
-                 {LEAST_THICKNESS} times what distances to solids are apart",
+                "solid.mesh of {}: it is {:.4} m thick at ({:.3}, {:.3}, {:.3}); water passes \
+                 through what is thinner than {least:.4} m, {LEAST_THICKNESS} times what \
+                 distances to solids are apart",
                 placed.name(),
                 thin.thickness,
                 place.x,
@@ -71,7 +72,8 @@ mod tests {
             "domain.max=[1001.6,1.2,0.6]",
             "water.block=[{min=[1000,0,0],max=[1000.4,1.0,0.6]}]",
             &format!(
-                "solid=[{{{wall},translate=[1000.825,0.6,0.3],{moving}}},{{{wall},translate=[1001.2,0.6,0.3]}}]"
+                "solid=[{{{wall},translate=[1000.825,0.6,0.3],{moving}}},{{{wall},\
+                 translate=[1001.2,0.6,0.3]}}]"
             ),
         ]);
         let places = [

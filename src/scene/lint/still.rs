@@ -62,7 +62,8 @@ impl Scene {
         found.get(found.len() / 2).copied()
     }
 
-    /// A wall beside which no water is at rest, in a scene that has water on its floor and no emitter that could bring some.
+    /// A wall beside which no water is at rest, in a scene that has water on its floor and no
+    /// emitter that could bring some.
     pub(super) fn lint_dry_wall(
         &self,
         index: usize,
@@ -73,8 +74,8 @@ impl Scene {
         let is_dry = maker.wall.axis != 1 && self.still_beside(maker).is_none();
         (is_dry && self.emitters.is_empty()).then(|| {
             format!(
-                "wave_maker[{index}]: no water is beside its wall at rest, though water {} m deep is on the floor: the water does not reach \
-                 the wall, or a solid is in between",
+                "wave_maker[{index}]: no water is beside its wall at rest, though water {} m deep \
+                 is on the floor: the water does not reach the wall, or a solid is in between",
                 shown(level)
             )
         })

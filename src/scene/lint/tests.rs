@@ -38,7 +38,8 @@ fn what_is_hardly_meant_is_said_with_its_key_and_number() {
     };
     let packet = |more: &str| {
         let waves = format!(
-            "kind=\"focused\",at=[2.0,0.5],peak_period=2.2987,ramp=0.1,shortest_period=2.0,depth=1.0,{more}"
+            "kind=\"focused\",at=[2.0,0.5],peak_period=2.2987,ramp=0.1,\
+             shortest_period=2.0,depth=1.0,{more}"
         );
         format!("effects.generation_zone={{walls=[\"-x\"],length=9.0,waves={{{waves}}}}}")
     };
@@ -58,7 +59,8 @@ fn what_is_hardly_meant_is_said_with_its_key_and_number() {
         (
             vec![stokes("height=0.11,depth=1.2")],
             vec![stokes("height=0.11,depth=1.05")],
-            "effects.generation_zone.waves: depth is 1.2 m, and the scene's water stands 1 m deep, 0.83 times as much",
+            "effects.generation_zone.waves: depth is 1.2 m, and the scene's water stands 1 m \
+             deep, 0.83 times as much",
         ),
         (
             vec![
@@ -69,12 +71,14 @@ fn what_is_hardly_meant_is_said_with_its_key_and_number() {
                 stokes("height=0.3,depth=1.0"),
                 "domain.max=[20, 1.2, 1]".into(),
             ],
-            "effects.generation_zone.waves: crests 0.300 m above water 1 m deep reach the ceiling, 1.2 m above the floor",
+            "effects.generation_zone.waves: crests 0.300 m above water 1 m deep reach the \
+             ceiling, 1.2 m above the floor",
         ),
         (
             vec![stokes("height=0.11,depth=1.0").replace("9.0", "4.0")],
             vec![stokes("height=0.11,depth=1.0").replace("9.0", "5.0")],
-            "effects.generation_zone.length: 4 m is 0.64 of a wave length, as waves of 2.2987 s are 6.283 m long on 1 m of water",
+            "effects.generation_zone.length: 4 m is 0.64 of a wave length, as waves of 2.2987 s \
+             are 6.283 m long on 1 m of water",
         ),
         (
             vec!["effects.absorbing_zone={walls=[\"+x\"],length=3.0,period=2.2987}".into()],
@@ -117,12 +121,14 @@ fn what_is_hardly_meant_is_said_with_its_key_and_number() {
         (
             vec![packet("height=0.35,time=4.9")],
             vec![packet("height=0.33,time=4.9")],
-            "effects.generation_zone.waves: a crest of 0.35 m has k a = 0.35 at the peak's 2.2987 s; waves break from 0.34 on",
+            "effects.generation_zone.waves: a crest of 0.35 m has k a = 0.35 at the peak's 2.2987 \
+             s; waves break from 0.34 on",
         ),
         (
             vec![packet("height=0.2,time=5.1")],
             vec![packet("height=0.2,time=5.0")],
-            "effects.generation_zone.waves: its crests meet after 5.1 s, and the shot ends after 5 s",
+            "effects.generation_zone.waves: its crests meet after 5.1 s, and \
+             the shot ends after 5 s",
         ),
         (
             vec![emitter("from=5.0")],
@@ -132,7 +138,8 @@ fn what_is_hardly_meant_is_said_with_its_key_and_number() {
         (
             vec![absorbing("depth=1.2,period=2.3,room=0.2")],
             vec![absorbing("depth=1.05,period=2.3,room=0.2")],
-            "wave_maker[0].absorption: depth is 1.2 m, and the scene's water stands 1 m deep, 0.83 times as much",
+            "wave_maker[0].absorption: depth is 1.2 m, and the scene's water stands 1 m \
+             deep, 0.83 times as much",
         ),
         (
             vec![
@@ -159,24 +166,28 @@ fn what_is_hardly_meant_is_said_with_its_key_and_number() {
                 sine.into(),
                 "effects.absorbing_zone={walls=[\"+x\"],length=3.2,period=1.5}".into(),
             ],
-            "effects.absorbing_zone.length: 3 m is 0.48 of a wave length of wave_maker[0].motion's waves of 2.2987 s",
+            "effects.absorbing_zone.length: 3 m is 0.48 of a wave length of \
+             wave_maker[0].motion's waves of 2.2987 s",
         ),
         (
             vec!["effects.drag={drop_radius=0.04}".into()],
             vec!["effects.drag={drop_radius=0.03}".into()],
-            "effects.drag.drop_radius: a drop of 0.04 m radius holds 2.1 times the water of a particle",
+            "effects.drag.drop_radius: a drop of 0.04 m radius holds 2.1 times \
+             the water of a particle",
         ),
         // The Reynolds number is √(9.81 × 0.1) × 0.1 × 1000 / μ.
         (
             vec!["effects.viscosity={coefficient=0.001}".into()],
             vec!["effects.viscosity={coefficient=0.1}".into()],
-            "effects.viscosity.coefficient: the Reynolds number √(g Δx) Δx / ν of a cell of 0.1 m is 990",
+            "effects.viscosity.coefficient: the Reynolds number √(g Δx) Δx / ν of \
+             a cell of 0.1 m is 990",
         ),
         // Bond numbers of a spacing of 0.05 m: 1000 × 9.81 × 0.05² / σ.
         (
             vec!["effects.surface_tension={coefficient=0.0728}".into()],
             vec!["effects.surface_tension={coefficient=24.6}".into()],
-            "effects.surface_tension.coefficient: the Bond number ρ g d² / σ of a particle spacing of 0.05 m is 33",
+            "effects.surface_tension.coefficient: the Bond number ρ g d² / σ of a particle \
+             spacing of 0.05 m is 33",
         ),
     ] {
         let set: Vec<&str> = set.iter().map(String::as_str).collect();
@@ -278,20 +289,20 @@ fn a_table_that_moves_nothing_or_stops_short_is_said() {
         (
             "[[1001.0,0.0],[1021.0,0.2],[1041.0,0.4],[1061.0,0.4]]",
             "[[0.0,0.0],[1.0,0.2],[2.0,0.4],[3.0,0.4]]",
-            "wave_maker[0].motion: its table moves nothing before 1001 s, and the shot ends after 5 s; its times are seconds, and \
-             frame 1061 is at 53.05 s",
+            "wave_maker[0].motion: its table moves nothing before 1001 s, and the shot ends after \
+             5 s; its times are seconds, and frame 1061 is at 53.05 s",
         ),
         (
             "[[0.0,0.0],[20.0,0.2],[40.0,0.4],[60.0,0.6],[80.0,0.8],[100.0,0.8]]",
             "[[0.0,0.0],[1.0,0.2],[2.0,0.4],[3.0,0.6],[4.0,0.8],[5.0,0.8]]",
-            "wave_maker[0].motion: 5 of 6 points of its table, all at whole numbers, lie after the shot's 5 s; its times are \
-             seconds, and frame 100 is at 5 s",
+            "wave_maker[0].motion: 5 of 6 points of its table, all at whole numbers, lie after the \
+             shot's 5 s; its times are seconds, and frame 100 is at 5 s",
         ),
         (
             "[[0.0,0.0],[1.0,0.2],[2.0,0.4],[3.0,0.6]]",
             "[[0.0,0.0],[1.0,0.2],[2.0,0.4],[5.0,0.6]]",
-            "wave_maker[0].motion: its table ends in mid-motion: up to its last point, at 3 s, it goes 0.2 m/s, and stops there \
-             within 1 s",
+            "wave_maker[0].motion: its table ends in mid-motion: up to its last point, at 3 s, it \
+             goes 0.2 m/s, and stops there within 1 s",
         ),
         (
             "[[0.0,0.0],[5.0,0.0]]",
@@ -306,7 +317,8 @@ fn a_table_that_moves_nothing_or_stops_short_is_said() {
     let door = cuboid([10.0, 0.5, 0.2], [10.4, 0.9, 0.6]);
     let slide =
         "direction = [1, 0, 0]\nmotion = { kind = \"table\", points = [[9.0, 0.0], [9.5, 1.0]] }\n";
-    let turn = "pivot = [10, 0, 0]\naxis = [0, 1, 0]\nturn = { kind = \"table\", points = [[9.0, 0.0], [9.5, 90.0]] }\n";
+    let turn = "pivot = [10, 0, 0]\naxis = [0, 1, 0]\n\
+                turn = { kind = \"table\", points = [[9.0, 0.0], [9.5, 90.0]] }\n";
     for (moves, key) in [(slide, "solid.motion of box"), (turn, "solid.turn of box")] {
         let scene = format!("{SCENE}[[solid]]\nmesh = \"box.obj\"\n{moves}");
         only(
@@ -323,14 +335,16 @@ fn a_wall_that_goes_through_a_solid_is_said() {
     let scene = |wall: &str, way: f64| {
         let motion = format!("kind = \"table\", points = [[0.0, 0.0], [2.0, {way}], [4.0, {way}]]");
         format!(
-            "{SCENE}[[solid]]\nmesh = \"box.obj\"\n[[wave_maker]]\nwall = \"{wall}\"\nmotion = {{ {motion} }}\n"
+            "{SCENE}[[solid]]\nmesh = \"box.obj\"\n[[wave_maker]]\nwall = \"{wall}\"\n\
+             motion = {{ {motion} }}\n"
         )
     };
     let pier = |x: f64| cuboid([x, 0.0, 0.3], [x + 0.4, 0.8, 0.7]);
     for (wall, x) in [("-x", 1.0), ("+x", 18.6)] {
         only(
             &lints_beside(&pier(x), &scene(wall, 1.2)),
-            "wave_maker[0].motion: the wall goes 1.2 m in, and from 1 m on through the solid box, which stands still",
+            "wave_maker[0].motion: the wall goes 1.2 m in, and from 1 m on through the solid \
+             box, which stands still",
         );
         assert_eq!(lints_beside(&pier(x), &scene(wall, 0.9)), [] as [&str; 0]);
     }
@@ -384,7 +398,8 @@ fn a_depth_is_that_beside_the_wall() {
     let pool = cuboid([0.0; 3], [20.0, 1.0, 1.0]);
     only(
         &lints_beside(&pool, &scene(of_mesh, "", 1.2)),
-        "wave_maker[0].motion: depth is 1.2 m, and the scene's water stands 1 m deep, 0.83 times as much",
+        "wave_maker[0].motion: depth is 1.2 m, and the scene's water stands 1 m \
+         deep, 0.83 times as much",
     );
     assert_eq!(
         lints_beside(&pool, &scene(of_mesh, "", 1.05)),
@@ -396,8 +411,8 @@ fn a_depth_is_that_beside_the_wall() {
     for bottom in [0.0, 0.4] {
         only(
             &lints_beside(&floor, &scene(&block(bottom), solid, 1.0)),
-            "wave_maker[0].motion: depth is 1 m, and the scene's water stands 0.6 m deep, 0.60 times as much, on solids 0.4 m high \
-             beside the wall",
+            "wave_maker[0].motion: depth is 1 m, and the scene's water stands 0.6 m deep, 0.60 \
+             times as much, on solids 0.4 m high beside the wall",
         );
         let good = scene(&block(bottom), solid, 0.6);
         assert_eq!(lints_beside(&floor, &good), [] as [&str; 0], "{bottom}");
@@ -418,13 +433,14 @@ fn a_depth_is_that_beside_the_wall() {
 fn a_stroke_whose_waves_break_is_said() {
     let sine = |stroke: f64, period: f64| {
         format!(
-            "wave_maker=[{{wall=\"-x\",motion={{kind=\"sine\",stroke={stroke:?},period={period:?}}}}}]"
+            "wave_maker=[{{wall=\"-x\",motion={{kind=\"sine\",stroke={stroke:?},\
+             period={period:?}}}}}]"
         )
     };
     only(
         &lints(&[&sine(0.7, 2.2987)]),
-        "wave_maker[0].motion: by linear theory a stroke of 0.7 m makes waves 0.687 m high; waves of 2.2987 s on 1 m of water break \
-         from 0.680 m on (Miche 1944)",
+        "wave_maker[0].motion: by linear theory a stroke of 0.7 m makes waves 0.687 m high; waves \
+         of 2.2987 s on 1 m of water break from 0.680 m on (Miche 1944)",
     );
     let long = lints(&[&sine(3.2, 8.0)]);
     assert!(

@@ -61,7 +61,8 @@ pub enum CameraFileError {
     Orthographic(String),
     /// The field of view is out of range.
     #[error(
-        "camera {name} has a vertical field of view of {yfov} radians; allowed is more than 0 and less than π"
+        "camera {name} has a vertical field of view of {yfov} radians; allowed is more \
+         than 0 and less than π"
     )]
     FieldOfView {
         /// Name of the camera.

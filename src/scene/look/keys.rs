@@ -83,7 +83,8 @@ const CAMERA: &[Key] = &[
     Key::choice("fit", FITS)
         .computed(|| "the film's width; a `file`'s camera must be of the image's shape".to_owned())
         .about(
-            "how the image lies on a film of another shape: as wide or as high as the film, as large as fits on it, or as small as holds all of it",
+            "how the image lies on a film of another shape: as wide or as high as the film, as \
+             large as fits on it, or as small as holds all of it",
         ),
     Key::vector("position", 3, PLACE)
         .unit("metres")
@@ -103,19 +104,29 @@ const CAMERA: &[Key] = &[
     Key::table("lens", LENS)
         .absent()
         .about("A thin lens in place of the pinhole: depth of field"),
-    Key::text("file", "a glTF file (.glb, .gltf) or USD as text (.usda), relative to the look file")
-        .absent()
-        .about(
-            "camera from a file, animated, instead of `position`, `target` and `focal_length_mm`; frame k is at k / fps seconds",
-        ),
-    Key::text("name", "the name of a camera's node, or of a camera, in `file`; of USD its path will do too")
-        .absent()
-        .with("file")
-        .about("which of its cameras; may be left out where there is one"),
+    Key::text(
+        "file",
+        "a glTF file (.glb, .gltf) or USD as text (.usda), relative to the look file",
+    )
+    .absent()
+    .about(
+        "camera from a file, animated, instead of `position`, `target` and `focal_length_mm`; \
+         frame k is at k / fps seconds",
+    ),
+    Key::text(
+        "name",
+        "the name of a camera's node, or of a camera, in `file`; of USD its path will do too",
+    )
+    .absent()
+    .with("file")
+    .about("which of its cameras; may be left out where there is one"),
     Key::number("start", -1e6..=1e6)
         .absent()
         .with("file")
-        .about("the file's frame that is frame 1 of the shot, such as 1001: of USD a time code, of glTF a frame of the shot's rate"),
+        .about(
+            "the file's frame that is frame 1 of the shot, such as 1001: of USD a time code, of \
+             glTF a frame of the shot's rate",
+        ),
     Key::tables("keyframe", KEYFRAME)
         .without(&["file"])
         .about("Poses at frames, in ascending order, instead of position and target"),
@@ -171,7 +182,8 @@ const IMAGE: &[Key] = &[
         .absent()
         .also(", whole, x0 < x1 and y0 < y1 within the image")
         .about(
-            "[x0, y0, x1, y1] from the upper left corner: only these pixels are rendered, x1 and y1 are the first beyond them",
+            "[x0, y0, x1, y1] from the upper left corner: only these pixels are rendered, x1 and \
+             y1 are the first beyond them",
         ),
     Key::whole("samples", 1..=MOST_SAMPLES)
         .default("3")
@@ -194,7 +206,8 @@ const IMAGE: &[Key] = &[
 const RENDERER: &[Key] = &[Key::choice("method", &["ssfr", "ray"])
     .default("\"ssfr\"")
     .about(
-        "splats in screen space, fast, or rays through a level set of the particles, for final frames",
+        "splats in screen space, fast, or rays through a level set of the \
+         particles, for final frames",
     )];
 
 const SURFACE: &[Key] = &[
@@ -206,12 +219,16 @@ const SURFACE: &[Key] = &[
     Key::choice("splat", &["ellipsoid", "sphere"])
         .default("\"ellipsoid\"")
         .about(
-            "what a particle is splatted as, with `method = \"ssfr\"`: flattened as its neighbours lie (Yu and Turk 2013), or a ball",
+            "what a particle is splatted as, with `method = \"ssfr\"`: flattened as its neighbours \
+             lie (Yu and Turk 2013), or a ball",
         ),
     Key::number("radius_m", 1e-4..=100.0)
         .unit("metres")
         .computed(|| "0.87 particle spacings".to_owned())
-        .about("splat radius; ellipsoids are as much larger or smaller as it is than what it is if left out"),
+        .about(
+            "splat radius; ellipsoids are as much larger or smaller as it is than \
+             what it is if left out",
+        ),
     Key::number("smoothing_width_m", 0.0..=100.0)
         .unit("metres")
         .computed(|| "0.5 particle spacings, 1.6 of balls".to_owned())
@@ -252,18 +269,27 @@ const WATER: &[Key] = &[
     Key::table("caustics", CAUSTICS)
         .absent()
         .also(", with `method = \"ray\"`")
-        .about("Sunlight that the water's waves bend and bundle on what lies below; straight on where left out"),
+        .about(
+            "Sunlight that the water's waves bend and bundle on what lies below; \
+             straight on where left out",
+        ),
 ];
 
 const CAUSTICS: &[Key] = &[
     Key::whole("resolution", 16..=8192)
         .unit("texels")
         .default("1024")
-        .about("along the longer side of the ground that the map of light covers: the domain's, with the sea's band"),
+        .about(
+            "along the longer side of the ground that the map of light covers: the \
+             domain's, with the sea's band",
+        ),
     Key::number("smoothing_width_m", 0.0..=100.0)
         .unit("metres")
         .computed(|| "1.5 particle spacings".to_owned())
-        .about("standard deviation with which the surface's normals are smoothed for it: particles leave bumps, which would bundle light too"),
+        .about(
+            "standard deviation with which the surface's normals are smoothed for it: particles \
+             leave bumps, which would bundle light too",
+        ),
 ];
 
 const SPRAY: &[Key] = &[
@@ -321,7 +347,10 @@ const SKY: &[Key] = &[
     Key::flag("haze")
         .only("model", CLEAR)
         .default("false")
-        .about("whether air takes the contrast as this turbidity says, in place of ground.haze_m: 63 % within 5.6 km at 3"),
+        .about(
+            "whether air takes the contrast as this turbidity says, in place of ground.haze_m: \
+             63 % within 5.6 km at 3",
+        ),
     Key::text("file", "an EXR file, relative to the look file")
         .only("model", PANORAMA)
         .about("scene-linear picture"),
@@ -439,7 +468,10 @@ const SOLIDS: &[Key] = &[
         .about("Rows of windows on upright faces"),
     Key::text("materials", "an MTL file, relative to the look file")
         .absent()
-        .about("colours (Kd) and textures (map_Kd) of the meshes' parts, by the names of their materials (usemtl), groups or objects"),
+        .about(
+            "colours (Kd) and textures (map_Kd) of the meshes' parts, by the names of their \
+             materials (usemtl), groups or objects",
+        ),
     Key::tables("material", MATERIAL)
         .about("Materials of parts of the scene's meshes, before those of `materials`"),
     LAID,
@@ -448,7 +480,8 @@ const SOLIDS: &[Key] = &[
 const MATERIAL: &[Key] = &[
     Key::text(
         "name",
-        "the name of a material (usemtl), group (g) or object (o) of a mesh, or of its file without the ending",
+        "the name of a material (usemtl), group (g) or object (o) of a mesh, or of its \
+         file without the ending",
     )
     .about("what it is for"),
     COLOUR.computed(|| "white under a texture, else that of all solids".to_owned()),
@@ -489,7 +522,8 @@ pub(super) const VIEW: &[Key] = &[
     Key::choice("transform", &["agx", "aces", "srgb"])
         .default("\"agx\"")
         .about(
-            "tone curve of the PNG: Sobotka's, which lets colours run to white, the ACES 1.0 output for sRGB displays, or none",
+            "tone curve of the PNG: Sobotka's, which lets colours run to white, the ACES 1.0 \
+             output for sRGB displays, or none",
         ),
     Key::number("saturation", 0.0..=3.0)
         .default("1.0")
@@ -520,36 +554,40 @@ const OUTPUT: &[Key] = &[
         .default("[]")
         .also(", with formats = [\"exr\"]")
         .about(
-            "depth along the axis, m; normal; position, m; motion to the next frame, pixels, u to the right, v upward; water \
-             along the line of sight, m",
+            "depth along the axis, m; normal; position, m; motion to the next frame, pixels, u to \
+             the right, v upward; water along the line of sight, m",
         ),
     Key::choice("aov_filter", &["centre", "beauty"])
         .default("\"centre\"")
         .about(
-            "what of a pixel the channels show: its centre at the frame's instant, or the mean of the picture's samples; Z, N, P and \
-             forward over those that meet something",
+            "what of a pixel the channels show: its centre at the frame's instant, or the mean of \
+             the picture's samples; Z, N, P and forward over those that meet something",
         ),
     Key::choice("colour_space", &["rec709", "acescg"])
         .default("\"rec709\"")
         .about(
-            "primaries and white of the EXR's linear light: Rec. 709 with D65, or ACEScg (AP1) with the white of ACES, adapted \
-             by Bradford",
+            "primaries and white of the EXR's linear light: Rec. 709 with D65, or ACEScg (AP1) \
+             with the white of ACES, adapted by Bradford",
         ),
     Key::choice("solids", &["draw", "holdout"])
         .default("\"draw\"")
         .about(
-            "whether ground, solids and walls are in the picture, or black and transparent where they are seen directly, so that \
-             they cut the water",
+            "whether ground, solids and walls are in the picture, or black and transparent where \
+             they are seen directly, so that they cut the water",
         ),
     Key::choices("lights", LIGHTS)
         .default("[]")
         .also(", with formats = [\"exr\"]")
-        .about("parts of the light in layers of their own, premultiplied; all of them add up to R, G, B"),
+        .about(
+            "parts of the light in layers of their own, premultiplied; all of \
+             them add up to R, G, B",
+        ),
     Key::flag("cryptomatte")
         .default("false")
         .also(", with formats = [\"exr\"]")
         .about(
-            "mattes of water, spray, ground, walls and each solid, by the name of its mesh's file, as Cryptomatte's layer CryptoObject",
+            "mattes of water, spray, ground, walls and each solid, by the name of its mesh's file, \
+             as Cryptomatte's layer CryptoObject",
         ),
     Key::flag("background")
         .default("true")

@@ -45,8 +45,8 @@ impl Look {
             false => format!("; camera.start = {begin} makes the first of its frames frame 1"),
         };
         Some(format!(
-            "camera.start: the camera moves over frames {begin} to {end} of its file, and stands still over frames {from} to {to}, \
-             which are drawn{remedy}"
+            "camera.start: the camera moves over frames {begin} to {end} of its file, and stands \
+             still over frames {from} to {to}, which are drawn{remedy}"
         ))
     }
 
@@ -58,8 +58,9 @@ impl Look {
         let wanted = (PI / 4.0 * blur * blur).ceil();
         (f64::from(samples) < wanted).then(|| {
             format!(
-                "image.samples: the lens draws a point at infinity, or at half of the focus distance, as a disc {blur:.1} pixels \
-                 wide, and {samples} samples are as many ghosts of it; they are closer than a pixel from {wanted} on"
+                "image.samples: the lens draws a point at infinity, or at half of the focus \
+                 distance, as a disc {blur:.1} pixels wide, and {samples} samples are as many \
+                 ghosts of it; they are closer than a pixel from {wanted} on"
             )
         })
     }

@@ -197,7 +197,8 @@ mod tests {
 
     #[test]
     fn colours_and_pictures_are_read_and_the_rest_is_told() {
-        let text = "\u{feff}# by hand\r\nnewmtl wet wall\r\nKd 0.5 0.25 0.125\r\nNs 10\r\nmap_Kd -s 2 3 1 -o 0.5 -clamp on a b.png\r\n\
+        let text = "\u{feff}# by hand\r\nnewmtl wet wall\r\nKd 0.5 0.25 0.125\r\nNs 10\r\n\
+            map_Kd -s 2 3 1 -o 0.5 -clamp on a b.png\r\n\
             newmtl plain\nKd 0.5\nNs 3\n";
         let library = read(text.as_bytes()).unwrap();
         let [wall, plain] = &library.entries[..] else {

@@ -449,7 +449,8 @@ fn ramps_and_focus_go_with_what_they_are_of() {
     let (_, key, _) = fault(&PLAIN.replace("[image]\n", "[image]\nshutter_ramps = [0.1, 0.1]\n"));
     assert_eq!(key, "image.shutter_ramps");
     let keyed = PLAIN.replace(POSE, "")
-        + "[[camera.keyframe]]\nframe = 5\nposition = [0, 3, 0]\ntarget = [9, 1, 0]\nfocus_distance_m = 3.0\n";
+        + "[[camera.keyframe]]\nframe = 5\nposition = [0, 3, 0]\ntarget = [9, 1, 0]\n\
+           focus_distance_m = 3.0\n";
     let (_, key, message) = fault(&keyed);
     assert_eq!(key, "camera.keyframe[0].focus_distance_m");
     assert!(message.contains("[camera.lens]"), "{message}");
@@ -580,7 +581,9 @@ proptest! {
     }
 
     #[test]
-    fn no_damage_to_a_good_look_panics(at in 0usize..200, cut in 0usize..40, put in "[\\[\\]a-z0-9=.\"\n{},é-]{0,12}") {
+    fn no_damage_to_a_good_look_panics(
+        at in 0usize..200, cut in 0usize..40, put in "[\\[\\]a-z0-9=.\"\n{},é-]{0,12}"
+    ) {
         let start = at.min(PLAIN.len());
         let end = (start + cut).min(PLAIN.len());
         let text = format!("{}{put}{}", &PLAIN[..start], &PLAIN[end..]);

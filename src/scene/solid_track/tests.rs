@@ -42,7 +42,11 @@ fn file(path: &str, interpolation: &str, last: [f32; 4]) -> Vec<u8> {
     };
     numbers.extend(&values);
     let kind = if path == "rotation" { "VEC4" } else { "VEC3" };
-    let view = |at: usize, count: usize| json!({ "buffer": 0, "byteOffset": 4 * at, "byteLength": 4 * count });
+    let view = |at: usize, count: usize| {
+        json!({
+            "buffer": 0, "byteOffset": 4 * at, "byteLength": 4 * count
+        })
+    };
     let of = |view: usize, count: usize, kind: &str| -> Value {
         let mut accessor =
             json!({ "bufferView": view, "componentType": 5126, "count": count, "type": kind });
@@ -212,8 +216,10 @@ fn a_solid_goes_as_a_prim_of_blender_does() {
 }
 
 /// A door whose matrix has two samples a quarter turn and half a second apart, in centimetres.
-const MATRICES: &str = "#usda 1.0\n(\n    metersPerUnit = 0.01\n    timeCodesPerSecond = 10\n    upAxis = \"Y\"\n)\ndef Xform \"door\"\n{\n    \
-    matrix4d xformOp:transform.timeSamples = {\n        0: ( (1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (300, 0, 100, 1) ),\n        \
+const MATRICES: &str = "#usda 1.0\n(\n    metersPerUnit = 0.01\n    timeCodesPerSecond = 10\n    \
+    upAxis = \"Y\"\n)\ndef Xform \"door\"\n{\n    \
+    matrix4d xformOp:transform.timeSamples = {\n        \
+    0: ( (1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (300, 0, 100, 1) ),\n        \
     5: ( (0, 0, -1, 0), (0, 1, 0, 0), (1, 0, 0, 0), (400, 0, 100, 1) ),\n    }\n    \
     uniform token[] xformOpOrder = [\"xformOp:transform\"]\n}\n";
 
@@ -243,7 +249,8 @@ fn a_layer_without_time_codes_a_second_has_its_frames_a_second() {
         (
             "startTimeCode = 0",
             24.0,
-            "the file has 24 time codes a second, as every layer that does not say its timeCodesPerSecond, and the shot has 10",
+            "the file has 24 time codes a second, as every layer that does not say its \
+             timeCodesPerSecond, and the shot has 10",
         ),
     ] {
         let text = MATRICES.replace("timeCodesPerSecond = 10", said);
@@ -312,7 +319,10 @@ fn a_solid_s_file_begins_at_its_own_frame() {
         // A rate that differs from the file's is reported.
         let lints = scene.lints();
         let is_said = |lint: &String| {
-            lint.starts_with("solid.track.file: the file has 10 time codes a second, by its timeCodesPerSecond, and the shot has 20")
+            lint.starts_with(
+                "solid.track.file: the file has 10 time codes a second, by its \
+                 timeCodesPerSecond, and the shot has 20",
+            )
         };
         assert_eq!(lints.iter().filter(|it| is_said(it)).count(), lints.len());
         assert_eq!(lints.len(), usize::from(rate.ends_with("=20")), "{lints:?}");

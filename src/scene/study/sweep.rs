@@ -436,8 +436,8 @@ fn line(
         let is_new = seen.insert((physics_hash(&scene), device));
         if !is_new {
             let problem = format!(
-                "the scene is the same as with a value before it: {} changes nothing with solver.method {:?}, or the value \
-                 stands there twice",
+                "the scene is the same as with a value before it: {} changes nothing with \
+                 solver.method {:?}, or the value stands there twice",
                 key.get_ref(),
                 scene.solver.method.name()
             );

@@ -539,15 +539,19 @@ fn knobs(
 fn others(method: Method) -> impl Iterator<Item = &'static str> {
     const BOTH: [&str; 2] = [
         "the other solver: --solver tunes it",
-        "two settings at once other than those that were proposed; steps by another length of a frame; effects, walls and what else the scene says of the water",
+        "two settings at once other than those that were proposed; steps by another length of a \
+         frame; effects, walls and what else the scene says of the water",
     ];
     const PBF: [&str; 2] = [
-        "solver.pbf.support_ratio, relaxation, artificial_pressure, spectral_radius and grid_projection stay as they are",
+        "solver.pbf.support_ratio, relaxation, artificial_pressure, spectral_radius and \
+         grid_projection stay as they are",
         "density_error in place of iterations, and the other way round",
     ];
     const FLIP: [&str; 2] = [
-        "solver.flip.particles_per_cell, transfer, pic_blend, surface and density_correction stay as they are",
-        "solver.flip.pressure.precision; preconditioner = \"none\"; max_iterations, which ends no solve that meets its tolerance",
+        "solver.flip.particles_per_cell, transfer, pic_blend, surface and \
+         density_correction stay as they are",
+        "solver.flip.pressure.precision; preconditioner = \"none\"; max_iterations, which ends no \
+         solve that meets its tolerance",
     ];
     let own = match method {
         Method::Pbf => PBF,

@@ -86,14 +86,20 @@ macro_rules! additions {
         /// keys.
         pub(super) fn of_pbf(scene: &Scene, particles: usize) -> Vec<(&'static str, Addition)> {
             let mut all = Vec::new();
-            $(all.extend(scene.effects.$name.iter().map(|settings| (stringify!($name), $name::pbf(settings, scene, particles))));)+
+            $(all.extend(
+                scene.effects.$name.iter()
+                    .map(|settings| (stringify!($name), $name::pbf(settings, scene, particles))),
+            );)+
             all
         }
 
         /// Uploads the effects' data that changes with the substep. `span` is the time at which
         /// their passes evaluate velocities, and the length of the substep, seconds.
         pub(super) fn upload(program: &Program, scene: &Scene, span: (f64, f64)) {
-            $(scene.effects.$name.iter().for_each(|settings| settings.upload(program, scene, span));)+
+            $(
+                scene.effects.$name.iter()
+                    .for_each(|settings| settings.upload(program, scene, span));
+            )+
         }
 
         /// Returns the iterations of the effect that acts between two projections, if there is one,
@@ -105,7 +111,10 @@ macro_rules! additions {
         /// Returns what the scene's effects add to FLIP, whose arrays hold `cells` cells.
         pub(super) fn of_flip(scene: &Scene, cells: usize) -> Vec<(&'static str, Addition)> {
             let mut all = Vec::new();
-            $(all.extend(scene.effects.$name.iter().map(|settings| (stringify!($name), $name::flip(settings, scene, cells))));)+
+            $(all.extend(
+                scene.effects.$name.iter()
+                    .map(|settings| (stringify!($name), $name::flip(settings, scene, cells))),
+            );)+
             all
         }
     };

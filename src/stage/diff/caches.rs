@@ -17,8 +17,8 @@ use swell_domain::{particles::Particles, tolerance::Tolerance};
 fn check_tolerance(tolerance: &Tolerance, caches: [&CacheReader; 2]) -> Result<(), DiffError> {
     if tolerance.fields.is_empty() && tolerance.aggregates.is_empty() {
         return Err(DiffError::usage(
-            "the tolerance file has [pictures] alone; two caches need [position], [velocity], [attributes.NAME] or \
-             [aggregates]",
+            "the tolerance file has [pictures] alone; two caches need [position], [velocity], \
+             [attributes.NAME] or [aggregates]",
         ));
     }
     let attributes = caches.iter().flat_map(|c| &c.manifest().attributes);

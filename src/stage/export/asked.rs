@@ -53,8 +53,8 @@ pub(super) fn check(request: &Request) -> Result<(), ExportError> {
             let name = file.file_name().unwrap_or_default();
             if name.to_str().is_none_or(|it| it.contains(char::is_control)) {
                 return asked(format!(
-                    "{flag}: {name:?} has a line end, another control character or bytes that are no UTF-8, and USD's text cannot \
-                     name layers so"
+                    "{flag}: {name:?} has a line end, another control character or bytes that are \
+                     no UTF-8, and USD's text cannot name layers so"
                 ));
             }
         }

@@ -61,7 +61,8 @@ pub enum FolderError {
         source: io::Error,
     },
     /// The name is taken by something else.
-    #[error("{} is {what}; choose another name, or export it anew with --overwrite", file.display())]
+    #[error("{} is {what}; choose another name, or export \
+             it anew with --overwrite", file.display())]
     Other {
         /// The existing file.
         file: PathBuf,

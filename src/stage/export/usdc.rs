@@ -16,8 +16,8 @@ const CONVERT: &str = "import sys\nfrom pxr import Sdf\n\
 pub enum UsdcError {
     /// There is no Python with usd-core.
     #[error(
-        "a name that ends in .usdc needs Python with usd-core (pip install usd-core), and `{python}` has none: {why}; give another \
-         one with --python, or write .usda"
+        "a name that ends in .usdc needs Python with usd-core (pip install usd-core), and \
+         `{python}` has none: {why}; give another one with --python, or write .usda"
     )]
     Missing {
         /// The program that was tried.

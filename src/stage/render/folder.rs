@@ -115,7 +115,8 @@ pub enum FolderError {
     },
     /// A picture of another origin would remain beside those to be rendered.
     #[error(
-        "{} is {what}, and these frames would leave it: one folder would hold both; choose another -o, or remove it",
+        "{} is {what}, and these frames would leave it: one folder would hold both; choose \
+         another -o, or remove it",
         file.display()
     )]
     Left {
@@ -125,7 +126,10 @@ pub enum FolderError {
         what: String,
     },
     /// Other processes are working in the folder and cannot share it.
-    #[error("{} is in use: another process renders there {what}; wait for it, or choose another -o", directory.display())]
+    #[error(
+        "{} is in use: another process renders there {what}; wait for it, or choose another -o",
+        directory.display()
+    )]
     InUse {
         /// The folder.
         directory: PathBuf,

@@ -11,7 +11,8 @@ use swell_domain::{particles::Particles, posix};
 pub enum StreamError {
     /// There is no stream of that name.
     #[error(
-        "the look draws whitewater `{stream}`, and {} is not there: make it with `swell whitewater {}` (--name {stream})",
+        "the look draws whitewater `{stream}`, and {} is not there: make it with `swell \
+         whitewater {}` (--name {stream})",
         directory.display(), posix::path(cache)
     )]
     Missing {

@@ -70,7 +70,8 @@ impl Curves {
             return None;
         }
         Some(format!(
-            "frame {frame} of {} was not drawn from {}: times and curves may not be those of the pictures",
+            "frame {frame} of {} was not drawn from {}: times and curves may not \
+             be those of the pictures",
             strip.path.display(),
             cache.dir().display()
         ))

@@ -63,7 +63,8 @@ pub enum ViewError {
     },
     /// The external encoder that a movie needs cannot be run.
     #[error(
-        "{} needs {program}, which cannot be run ({source}): install it, name it with --ffmpeg, or write a movie that ends in .apng",
+        "{} needs {program}, which cannot be run ({source}): install it, name it with --ffmpeg, or \
+         write a movie that ends in .apng",
         movie.display()
     )]
     NoEncoder {

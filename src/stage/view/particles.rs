@@ -87,7 +87,8 @@ impl Balls {
     /// Describes the picture for the viewer.
     pub(super) fn note(&self) -> String {
         format!(
-            "Particles as balls, coloured by speed from dark blue (0) to white ({:.1} m/s and more): a quick look, no render.",
+            "Particles as balls, coloured by speed from dark blue (0) to white ({:.1} m/s and \
+             more): a quick look, no render.",
             self.top
         )
     }

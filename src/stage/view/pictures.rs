@@ -107,7 +107,8 @@ fn by_number(folder: &Path, found: &[PathBuf]) -> Result<BTreeMap<Label, PathBuf
         let shot = shot.get_or_insert_with(|| name.clone());
         if *shot != name {
             return Err(ViewError::Asked(format!(
-                "{} has pictures of two sequences, {shot}.* and {name}.*: put each into a folder of its own",
+                "{} has pictures of two sequences, {shot}.* and {name}.*: put each \
+                 into a folder of its own",
                 folder.display()
             )));
         }

@@ -51,7 +51,8 @@ fn unfinished(folder: &Path) -> Result<ViewError, ViewError> {
     let what = match &names[..] {
         [] => format!("the study is not finished; {command} goes on with it"),
         shares => format!(
-            "shares of the study are not joined ({}); {command}, with the shares' other options and without --chunk, joins them",
+            "shares of the study are not joined ({}); {command}, with the shares' other options \
+             and without --chunk, joins them",
             shares.join(", ")
         ),
     };

@@ -31,7 +31,11 @@ pub enum WhitewaterError {
     #[error("{} is a stream of whitewater; give the cache that it was made from", .0.display())]
     IsWhitewater(PathBuf),
     /// The bake that a stream was made from is missing or has changed.
-    #[error("{} was made from a bake in {}, which is not there or another now: frame {frame}", stream.display(), cache.display())]
+    #[error(
+        "{} was made from a bake in {}, which is not there or another now: frame {frame}",
+        stream.display(),
+        cache.display()
+    )]
     NoBake {
         /// Directory of the stream.
         stream: PathBuf,
@@ -63,8 +67,9 @@ pub enum WhitewaterError {
     },
     /// More particles than the settings allow.
     #[error(
-        "frame {frame} has {count} whitewater particles, and max_particles is {allowed}: raise it, or lower \
-         emission.trapped_air_rate and emission.wave_crest_rate; the frames before it stand"
+        "frame {frame} has {count} whitewater particles, and max_particles is {allowed}: \
+         raise it, or lower emission.trapped_air_rate and emission.wave_crest_rate; the \
+         frames before it stand"
     )]
     TooMany {
         /// The frame.

@@ -325,7 +325,8 @@ impl Chart {
                 let ([least, most], [low, high]) =
                     ([x.at(least), x.at(most)], [at[1] - CAP, at[1] + CAP]);
                 let d = format!(
-                    "M{least:.1} {low:.1}V{high:.1}M{least:.1} {:.1}H{most:.1}M{most:.1} {low:.1}V{high:.1}",
+                    "M{least:.1} {low:.1}V{high:.1}M{least:.1} \
+                     {:.1}H{most:.1}M{most:.1} {low:.1}V{high:.1}",
                     at[1]
                 );
                 svg.path(&d, colour, " stroke-width=\"1.2\"");

@@ -98,7 +98,8 @@ about = [1.0, 0.0, 0.0]
             "solver.method=flip",
             "effects.viscosity.xsph=0.02",
             "domain.no_slip=[\"-y\"]",
-            "effects.generation_zone={walls=[\"-z\"],length=1.0,waves={kind=\"stokes\",height=0.1,period=3.0,depth=1.0,direction_degrees=90.0}}",
+            "effects.generation_zone={walls=[\"-z\"],length=1.0,waves={kind=\"stokes\",height=0.1,\
+             period=3.0,depth=1.0,direction_degrees=90.0}}",
         ];
         let all: Vec<&str> = flip.iter().chain(overrides).copied().collect();
         // One of the three has a Newtonian viscosity.
@@ -157,7 +158,9 @@ generation_zone = { walls = ["+x"], length = 1.0, waves = { kind = "sea", signif
     let scene = parse(dir.path(), slab, &[]).expect("valid");
     let toml = scene.to_toml(&|_, _| "a.obj".to_owned());
     collect_keys("", &toml::from_str(&toml).expect("TOML"), &mut written);
-    let packet = "effects.generation_zone={walls=[\"+x\"],length=1.0,waves={kind=\"focused\",height=0.1,at=[1.0,1.0],time=40.0,peak_period=3.0,depth=1.0,spreading=4.0,direction_degrees=180.0}}";
+    let packet = "effects.generation_zone={walls=[\"+x\"],length=1.0,waves={kind=\"focused\",\
+                  height=0.1,at=[1.0,1.0],time=40.0,peak_period=3.0,depth=1.0,spreading=4.0,\
+                  direction_degrees=180.0}}";
     let scene = parse(dir.path(), slab, &["domain.periodic=[]", packet]).expect("valid");
     let toml = scene.to_toml(&|_, _| "a.obj".to_owned());
     collect_keys("", &toml::from_str(&toml).expect("TOML"), &mut written);

@@ -39,7 +39,8 @@ fn animated(nodes: &Value, yfov: f64, rows: &[Row<'_>]) -> Vec<u8> {
         }));
         let kind = ["SCALAR", "", "VEC3", "VEC4"][width - 1];
         let mut accessor = json!({
-            "bufferView": views.len() - 1, "componentType": 5126, "count": values.len() / width, "type": kind
+            "bufferView": views.len() - 1, "componentType": 5126, "count": values.len() / width,
+            "type": kind
         });
         if width == 1 {
             accessor["min"] = json!([values[0]]);
@@ -96,8 +97,8 @@ fn a_camera_hangs_in_its_hierarchy() {
     let half = (FRAC_PI_2 / 2.0).sin() as f32;
     let (sin, cos) = (PI / 12.0).sin_cos();
     let nodes = json!([
-        { "name": "crane", "translation": [1.0, 2.0, 3.0], "rotation": [0.0, half, 0.0, half], "scale": [2.0, 2.0, 2.0],
-          "children": [1] },
+        { "name": "crane", "translation": [1.0, 2.0, 3.0], "rotation": [0.0, half, 0.0, half],
+          "scale": [2.0, 2.0, 2.0], "children": [1] },
         { "name": "arm", "translation": [0.0, 1.0, -4.0], "children": [2] },
         { "name": "shot", "camera": 0, "rotation": [0.0, 0.0, sin, cos] },
     ]);
@@ -239,13 +240,19 @@ fn what_is_no_camera_is_told() {
             "asset": { "version": "2.0" }, "nodes": [{ "camera": 0 }],
             "cameras": [{ "type": "perspective", "perspective": { "yfov": 0.5, "znear": 0.1 } }],
             "buffers": [{ "byteLength": 16, "uri": uri }],
-            "bufferViews": [{ "buffer": 0, "byteLength": 4 }, { "buffer": 0, "byteOffset": 4, "byteLength": 12 }],
+            "bufferViews": [
+                { "buffer": 0, "byteLength": 4 },
+                { "buffer": 0, "byteOffset": 4, "byteLength": 12 }
+            ],
             "accessors": [
-                { "bufferView": 0, "componentType": 5126, "count": 1, "type": "SCALAR", "min": [0.0], "max": [0.0] },
+                { "bufferView": 0, "componentType": 5126, "count": 1, "type": "SCALAR",
+                  "min": [0.0], "max": [0.0] },
                 { "bufferView": 1, "componentType": 5126, "count": 1, "type": "VEC3" }
             ],
-            "animations": [{ "samplers": [{ "input": 0, "output": 1 }],
-                             "channels": [{ "sampler": 0, "target": { "node": 0, "path": "translation" } }] }]
+            "animations": [{
+                "samplers": [{ "input": 0, "output": 1 }],
+                "channels": [{ "sampler": 0, "target": { "node": 0, "path": "translation" } }]
+            }]
         }))
     };
     assert!(told(&outside("a%20b.bin"), None).contains("a b.bin is not there"));

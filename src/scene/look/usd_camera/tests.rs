@@ -243,9 +243,14 @@ fn a_camera_that_is_written_elsewhere_too_is_refused() {
     );
     let within = OPERATIONS.replace(
         "def Camera \"cam\"\n        {",
-        "variantSet \"lens\" = {\n \"wide\" {\n float focalLength = 20\n }\n }\n def Camera \"cam\"\n        {",
+        "variantSet \"lens\" = {\n \"wide\" {\n float focalLength = 20\n }\n }\n \
+         def Camera \"cam\"\n        {",
     );
-    let other = OPERATIONS.replace("def Xform \"a\"", "def Xform \"set\" (\n    prepend references = @set.usda@</set>\n)\n{\n}\n\ndef Xform \"a\"");
+    let other = OPERATIONS.replace(
+        "def Xform \"a\"",
+        "def Xform \"set\" (\n    prepend references = @set.usda@</set>\n)\n{\n}\n\n\
+         def Xform \"a\"",
+    );
     for (text, name, words) in [
         (&sub, None, "subLayers: anim.usda, set.usda"),
         (

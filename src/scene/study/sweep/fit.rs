@@ -33,7 +33,8 @@ pub(super) fn check_fit(
     {
         if error.measure() == Measure::Finest && frames % SAMPLES != 0 {
             return fault(format!(
-                "{} is taken at {SAMPLES} times, and {:?} with {label} has {frames} frames, no multiple of that",
+                "{} is taken at {SAMPLES} times, and {:?} with {label} has {frames} \
+                 frames, no multiple of that",
                 error.name(),
                 line.name
             ));
@@ -46,7 +47,8 @@ pub(super) fn check_fit(
         };
         if !state.is_none_or(is_same) {
             return fault(format!(
-                "{} is measured on one state, and {:?} with {label} has another solver, domain or resolution",
+                "{} is measured on one state, and {:?} with {label} has another \
+                 solver, domain or resolution",
                 error.name(),
                 line.name
             ));
@@ -97,7 +99,8 @@ pub(super) fn check_converged(
         let name = &line.name;
         if scene.solver.method != Method::Pbf {
             return fault(format!(
-                "distance_to_converged is measured with solver.method pbf, and {name:?} with {label} has another"
+                "distance_to_converged is measured with solver.method pbf, and {name:?} \
+                 with {label} has another"
             ));
         }
         let water = scene.water.meshes.iter().map(|placed| &placed.mesh);
@@ -108,9 +111,9 @@ pub(super) fn check_converged(
         };
         if filled > MOST_CONVERGED {
             return fault(format!(
-                "distance_to_converged takes some 20 sparse factors of the constraints a run, a second each with 8000 \
-                 particles and soon gigabytes with more; {name:?} with {label} has {filled} particles, and up to \
-                 {MOST_CONVERGED} are measured"
+                "distance_to_converged takes some 20 sparse factors of the constraints a run, a \
+                 second each with 8000 particles and soon gigabytes with more; {name:?} with \
+                 {label} has {filled} particles, and up to {MOST_CONVERGED} are measured"
             ));
         }
     }
@@ -138,8 +141,8 @@ pub(super) fn check_coarser(
             match is_twice {
                 true => Ok(()),
                 false => fault(
-                    "a projection is held against one of the same particles on cells twice as large, with eight times as many \
-                     in each",
+                    "a projection is held against one of the same particles on cells twice as \
+                     large, with eight times as many in each",
                 ),
             }
         }

@@ -100,7 +100,10 @@ impl FromStr for Limit {
     fn from_str(text: &str) -> Result<Self, String> {
         let names = Quantity::NAMED.map(|(name, _)| name).join(", ");
         let (name, value) = text.split_once('=').ok_or_else(|| {
-            format!("no \"=\" and no value; allowed is NAME=VALUE% or, in its unit, NAME=VALUE, as in crest=2% or front=0.05m; names: {names}")
+            format!(
+                "no \"=\" and no value; allowed is NAME=VALUE% or, in its unit, NAME=VALUE, as in \
+                 crest=2% or front=0.05m; names: {names}"
+            )
         })?;
         let named = Quantity::NAMED
             .into_iter()
