@@ -22,7 +22,8 @@ fn magnitude(offset: vec3i) -> f32 {
 // Twice the central difference of |ω| along `axis`, which is tangential to the face, averaged over
 // the face's two cells.
 fn slope_along(normal: vec3i, axis: vec3i) -> f32 {
-    return 0.5 * (magnitude(axis) - magnitude(-axis) + magnitude(axis - normal) - magnitude(-axis - normal));
+    return 0.5 * (magnitude(axis) - magnitude(-axis) + magnitude(axis - normal)
+        - magnitude(-axis - normal));
 }
 
 // N × ω at the lower face along `normal`, 1/s.
@@ -61,7 +62,8 @@ fn main(
             confinement(vec3i(0, 1, 0)).y,
             confinement(vec3i(0, 0, 1)).z,
         );
-        let before = vec3u(element_at(vec3i(-1, 0, 0)), element_at(vec3i(0, -1, 0)), element_at(vec3i(0, 0, -1)));
+        let before = vec3u(
+            element_at(vec3i(-1, 0, 0)), element_at(vec3i(0, -1, 0)), element_at(vec3i(0, 0, -1)));
         for (var component = 0u; component < 3u; component++) {
             let face = component * params.stride + element;
             let is_between = cell_kind[before[component]] == FLUID && face_open[face] > 0.0;

@@ -19,13 +19,16 @@ fn velocity_of(offset: vec3i) -> vec4f {
     let is_water = cell_kind[found] == FLUID;
     let e = select(element_at(vec3i(0)), found, is_water);
     let kept = select(vec3i(0), offset, is_water);
-    let low = vec3f(face_velocity[e], face_velocity[params.stride + e], face_velocity[2u * params.stride + e]);
+    let low = vec3f(
+        face_velocity[e], face_velocity[params.stride + e], face_velocity[2u * params.stride + e]);
     // A cell's upper faces are its upper neighbours' lower faces. Faces two cells away are out of
     // reach, but not needed: a curl takes no velocity component along the axis of its difference.
     let high = vec3f(
         face_velocity[element_at(clamp(kept + vec3i(1, 0, 0), vec3i(-1), vec3i(1)))],
-        face_velocity[params.stride + element_at(clamp(kept + vec3i(0, 1, 0), vec3i(-1), vec3i(1)))],
-        face_velocity[2u * params.stride + element_at(clamp(kept + vec3i(0, 0, 1), vec3i(-1), vec3i(1)))],
+        face_velocity[params.stride
+            + element_at(clamp(kept + vec3i(0, 1, 0), vec3i(-1), vec3i(1)))],
+        face_velocity[2u * params.stride
+            + element_at(clamp(kept + vec3i(0, 0, 1), vec3i(-1), vec3i(1)))],
     );
     return vec4f(0.5 * (low + high), f32(is_water));
 }

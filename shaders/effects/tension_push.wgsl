@@ -71,7 +71,8 @@ fn main(
         let is_surface = face_open[face] > 0.0 && kind + cell_kind[before] == AIR + FLUID;
         for (var once = 0; once < select(0, 1, is_surface); once++) {
             let is_water = kind == FLUID;
-            let pushed = scale * jump(select(before, element, is_water), select(element, before, is_water));
+            let pushed = scale
+                * jump(select(before, element, is_water), select(element, before, is_water));
             face_velocity[face] += select(-pushed, pushed, is_water);
         }
     }

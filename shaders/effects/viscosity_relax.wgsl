@@ -60,7 +60,8 @@ fn main(
             let own = viscous_from[face];
             let before = element_at(-unit(axis));
             let water = 2.0 * vec2f(f32(viscous_word[before] & WATER), f32(word & WATER));
-            let stretch = vec2f(own - velocity(axis, before), own - velocity(axis, element_at(unit(axis))));
+            let stretch = vec2f(
+                own - velocity(axis, before), own - velocity(axis, element_at(unit(axis))));
             var sum = vec2f(dot(water, stretch), water.x + water.y);
             for (var turn = 1u; turn < 3u; turn++) {
                 let other = (axis + turn) % 3u;

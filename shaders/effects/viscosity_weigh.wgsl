@@ -80,10 +80,12 @@ fn edge_bits(axis: u32) -> u32 {
     let to_b = -unit(b);
     let of_a = vec2u(state_of(vec3i(0), a), state_of(to_b, a));
     let of_b = vec2u(state_of(vec3i(0), b), state_of(to_a, b));
-    let water = u32(is_water(vec3i(0))) + u32(is_water(to_a)) + u32(is_water(to_b)) + u32(is_water(to_a + to_b));
+    let water = u32(is_water(vec3i(0))) + u32(is_water(to_a)) + u32(is_water(to_b))
+        + u32(is_water(to_a + to_b));
     let weight_a = weight_of(of_a, a, b);
     let weight_b = weight_of(of_b, b, a);
-    let is_free = any(of_a == vec2u(IN_AIR)) || any(of_b == vec2u(IN_AIR)) || weight_a == 3u || weight_b == 3u;
+    let is_free = any(of_a == vec2u(IN_AIR)) || any(of_b == vec2u(IN_AIR)) || weight_a == 3u
+        || weight_b == 3u;
     return select(water | (weight_a << 3u) | (weight_b << 5u), 0u, is_free);
 }
 

@@ -25,7 +25,8 @@ fn visit(i: u32, j: u32) {
     let d = between(own_position, predicted_at(j).xyz);
     let r = length(d);
     let s = max(1.0 - r * inverse_h, 0.0);
-    slope -= d * ((vorticity_length[j] - own_strength) * params.gradient_scale * s * s / max(r, 1e-15));
+    slope -= d
+        * ((vorticity_length[j] - own_strength) * params.gradient_scale * s * s / max(r, 1e-15));
 }
 
 @compute @workgroup_size(64)
@@ -50,5 +51,6 @@ fn main(
         return;
     }
     let force = cross(slope / steepness, three(vorticity[i]));
-    velocity[i] = packed(three(velocity[i]) + params.time_step * STRENGTH * params.support_radius * force);
+    velocity[i] = packed(
+        three(velocity[i]) + params.time_step * STRENGTH * params.support_radius * force);
 }

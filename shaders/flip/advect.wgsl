@@ -67,7 +67,8 @@ fn velocity_at(x: vec3f, otherwise: vec3f) -> vec3f {
 #endif
     let sampled = vec3f(
         component_at(0u, vec3i(0, low.yz), vec3i(1, high.yz), vec3f(f.x, t.yz)),
-        component_at(params.stride, vec3i(low.x, 0, low.z), vec3i(high.x, 1, high.z), vec3f(t.x, f.y, t.z)),
+        component_at(
+            params.stride, vec3i(low.x, 0, low.z), vec3i(high.x, 1, high.z), vec3f(t.x, f.y, t.z)),
         component_at(2u * params.stride, vec3i(low.xy, 0), vec3i(high.xy, 1), vec3f(t.xy, f.z)),
     );
     return select(sampled, otherwise, slots_near.x == 0u);
@@ -85,8 +86,10 @@ fn stopped(v: vec3f, push: vec3f) -> vec3f {
 
 // Removes the velocity component into the walls that x touches or is beyond.
 fn at_walls(v: vec3f, x: vec3f) -> vec3f {
-    let left = select(v, max(v, params.wall_velocity_min), x < params.wall_min + params.contact_distance);
-    return select(left, min(left, params.wall_velocity_max), x > params.wall_max - params.contact_distance);
+    let left = select(
+        v, max(v, params.wall_velocity_min), x < params.wall_min + params.contact_distance);
+    return select(
+        left, min(left, params.wall_velocity_max), x > params.wall_max - params.contact_distance);
 }
 
 @compute @workgroup_size(64)
@@ -103,7 +106,8 @@ fn main(
     let here = three(carried[i]);
     // A droplet continues ballistically: along its path the faces do not carry its velocity, and
     // those around may belong to other water.
-    let between = select(velocity_at(start + 0.5 * params.time_step * here, here), here, is_drop[i] > 0u);
+    let between = select(
+        velocity_at(start + 0.5 * params.time_step * here, here), here, is_drop[i] > 0u);
     var way = params.time_step * between;
 #ifdef CORRECTION
     way += three(pushed[i]);

@@ -23,5 +23,6 @@ fn main(
         return;
     }
     let beside = select(three(carried[i]) - three(velocity[i]), vec3f(0.0), is_drop[i] > 0u);
-    sorted_position[i] = packed(three(sorted_position[i]) + params.time_step * beside + three(pushed[i]));
+    sorted_position[i] = packed(
+        three(sorted_position[i]) + params.time_step * beside + three(pushed[i]));
 }

@@ -78,10 +78,12 @@ fn end_of(cell: vec3f, axis: u32, side: i32) -> End {
         let is_there = there >= CELLS;
         let face = axis * params.stride + select(here, there, side > 0);
         let open = face_open[face];
-        let is_closed = (side < 0 || is_there) && open < LEAST_WAY * across(cell + vec3f(k * step), axis);
+        let is_closed = (side < 0 || is_there)
+            && open < LEAST_WAY * across(cell + vec3f(k * step), axis);
         let is_water = density[there] >= 0.5;
         let lack = lack_of(there, cell + vec3f((k + 1) * step), axis);
-        end.kind = select(select(select(OPEN, WATER, is_water), UNKNOWN, !is_there), CLOSED, is_closed);
+        end.kind = select(
+            select(select(OPEN, WATER, is_water), UNKNOWN, !is_there), CLOSED, is_closed);
         // On a partly closed face the velocity is that of the water.
 #ifdef MOVING_SOLIDS
         let of_solid = closed_velocity[face];
@@ -106,7 +108,8 @@ fn filled(element: u32, cell: vec3f) -> f32 {
         for (var once = 0; once < select(0, 1, low.kind == WATER || low.kind == CLOSED); once++) {
             let high = end_of(cell, axis, 1);
             let gap = own + low.gap + high.gap;
-            let closing = (low.velocity - high.velocity) * params.time_step * params.inverse_cell_size;
+            let closing = (low.velocity - high.velocity) * params.time_step
+                * params.inverse_cell_size;
             let is_held = high.kind == WATER || (high.kind == CLOSED && low.kind == WATER);
             let is_near = low.cells + high.cells < MOST_GAP;
             let closes = is_held && is_near && closing > max(CLOSES * gap, LEAST_CLOSING);

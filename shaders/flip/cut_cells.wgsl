@@ -119,15 +119,18 @@ fn main(
     face_open[2u * params.stride + element] = lower.z;
     // The part of a face beyond a wall perpendicular to it counts for nothing.
 #ifdef MOVING_SOLIDS
-    let pushed_high = (across - upper_of_walls) * wall_velocity(cell + 1.0) + (upper_of_walls - upper) * upper_velocity;
-    let pushed_low = (across - lower_of_walls) * wall_velocity(cell) + (lower_of_walls - lower) * lower_velocity;
+    let pushed_high = (across - upper_of_walls) * wall_velocity(cell + 1.0)
+        + (upper_of_walls - upper) * upper_velocity;
+    let pushed_low = (across - lower_of_walls) * wall_velocity(cell)
+        + (lower_of_walls - lower) * lower_velocity;
     let pushed = pushed_high - pushed_low;
     let closing = select(wall_velocity(cell), lower_velocity, is_plane_open(cell));
     closed_velocity[element] = closing.x;
     closed_velocity[params.stride + element] = closing.y;
     closed_velocity[2u * params.stride + element] = closing.z;
 #else
-    let pushed = (across - upper) * wall_velocity(cell + 1.0) - (across - lower) * wall_velocity(cell);
+    let pushed = (across - upper) * wall_velocity(cell + 1.0)
+        - (across - lower) * wall_velocity(cell);
 #endif
     solid_flux[element] = pushed.x + pushed.y + pushed.z;
 }

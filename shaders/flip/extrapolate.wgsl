@@ -45,7 +45,8 @@ const AFTER = vec3u(2u, 8u, 32u);
 fn sum_velocity(plane: u32, sources: u32) -> f32 {
     let low = chosen(plane, sources, before, BEFORE);
     let high = chosen(plane, sources, after, AFTER);
-    return face_velocity[low.x] + face_velocity[high.x] + face_velocity[low.y] + face_velocity[high.y]
+    return face_velocity[low.x] + face_velocity[high.x] + face_velocity[low.y]
+        + face_velocity[high.y]
         + face_velocity[low.z] + face_velocity[high.z];
 }
 

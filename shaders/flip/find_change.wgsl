@@ -28,9 +28,11 @@ fn main(
     }
     let element = thread + CELLS;
     open_beside(element);
-    let before = vec3u(element_beside(vec3i(-1, 0, 0)), element_beside(vec3i(0, -1, 0)), element_beside(vec3i(0, 0, -1)));
+    let before = vec3u(element_beside(vec3i(-1, 0, 0)), element_beside(vec3i(0, -1, 0)),
+        element_beside(vec3i(0, 0, -1)));
     let own = cell_kind[element];
-    let brick = vec3u(bricks[own_slot].coordinate[0], bricks[own_slot].coordinate[1], bricks[own_slot].coordinate[2]);
+    let brick = vec3u(bricks[own_slot].coordinate[0], bricks[own_slot].coordinate[1],
+        bricks[own_slot].coordinate[2]);
     let own_cell = 8u * brick + vec3u(own_local);
     var tags = face_layer[element];
     for (var component = 0u; component < 3u; component++) {

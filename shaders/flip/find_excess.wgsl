@@ -36,7 +36,8 @@ fn main(
             let found = element_at(offset);
             // Beyond the domain there is neither a cell nor air. A gap filled by close_gaps still
             // counts as air.
-            let is_air = cell_kind[found] == AIR || (density[found] < 0.5 && !is_buried(found, own + vec3f(offset)));
+            let is_air = cell_kind[found] == AIR
+                || (density[found] < 0.5 && !is_buried(found, own + vec3f(offset)));
             touches_air |= is_air && found >= CELLS;
         }
     }

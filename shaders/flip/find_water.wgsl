@@ -100,7 +100,8 @@ fn below_surface(element: u32, of_room: f32) -> f32 {
         step[axis] = 1;
         let after = element_at(step);
         let before = element_at(-step);
-        to_open[axis] = select(open_hats[after], room, after < CELLS) - select(open_hats[before], room, before < CELLS);
+        to_open[axis] = select(open_hats[after], room, after < CELLS)
+            - select(open_hats[before], room, before < CELLS);
     }
     let up = -params.velocity_step;
     let lengths = sqrt(dot(to_open, to_open) * dot(up, up));

@@ -63,7 +63,8 @@ fn changes(faces: vec3u) -> vec3f {
 
 #ifdef CORRECTION
 fn displacements(faces: vec3u) -> vec3f {
-    return vec3f(face_displacement[faces.x], face_displacement[faces.y], face_displacement[faces.z]);
+    return vec3f(
+        face_displacement[faces.x], face_displacement[faces.y], face_displacement[faces.z]);
 }
 #endif
 
@@ -85,7 +86,8 @@ fn sum_of(a: mat3x3f) -> f32 {
 // Each value times its weight, plus the mean of all times the rest.
 fn settled(values: Values, part: Values) -> Values {
     let all = weighed(values, part);
-    let mean = (sum_of(all.lower) + sum_of(all.upper)) / max(sum_of(part.lower) + sum_of(part.upper), 1e-6);
+    let mean = (sum_of(all.lower) + sum_of(all.upper))
+        / max(sum_of(part.lower) + sum_of(part.upper), 1e-6);
     let ones = mat3x3f(vec3f(1.0), vec3f(1.0), vec3f(1.0));
     return Values(all.lower + mean * (ones - part.lower), all.upper + mean * (ones - part.upper));
 }
@@ -261,7 +263,8 @@ fn give(i: u32, axis: u32, f: vec3f, faces: Component, falls: bool, beyond: f32)
     affine[row + (axis + 2u) % 3u] = scale * slope_of(faces, u, a, b, of_c);
 #else
     let advanced = sorted_velocity[k] + per_whole * value_at(faces.change, a, b, c);
-    let kept = clamp(advanced + params.pic_blend * (u - advanced), faces.range.x - beyond, faces.range.y + beyond);
+    let kept = clamp(advanced + params.pic_blend * (u - advanced), faces.range.x - beyond,
+        faces.range.y + beyond);
     velocity[k] = select(kept, falling, falls);
 #endif
 #ifdef CORRECTION
@@ -313,9 +316,12 @@ fn main(
         let x = vec3i(1, 0, 0);
         let y = vec3i(0, 1, 0);
         let z = vec3i(0, 0, 1);
-        of_x = read_component(0u, Steps(x, y * to_before, y * to_after, z * to_before, z * to_after));
-        of_y = read_component(1u, Steps(y, z * to_before, z * to_after, x * to_before, x * to_after));
-        of_z = read_component(2u, Steps(z, x * to_before, x * to_after, y * to_before, y * to_after));
+        of_x = read_component(
+            0u, Steps(x, y * to_before, y * to_after, z * to_before, z * to_after));
+        of_y = read_component(
+            1u, Steps(y, z * to_before, z * to_after, x * to_before, x * to_after));
+        of_z = read_component(
+            2u, Steps(z, x * to_before, x * to_after, y * to_before, y * to_after));
     }
 #ifdef APIC
     let beyond = 0.0;

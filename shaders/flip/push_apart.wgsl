@@ -91,7 +91,8 @@ fn main(
                 let way = way_from(j, x);
                 let square = dot(way, way);
                 let distance = sqrt(square);
-                let direction = select(way / max(distance, 1e-20), pair_direction(own, sorted_id[j]), square == 0.0);
+                let direction = select(
+                    way / max(distance, 1e-20), pair_direction(own, sorted_id[j]), square == 0.0);
                 push += max(apart - distance, 0.0) * direction;
             }
         }

@@ -59,7 +59,8 @@ fn main(
     }
     let element = thread + CELLS;
     let slot = element / CELLS;
-    let brick = vec3u(bricks[slot].coordinate[0], bricks[slot].coordinate[1], bricks[slot].coordinate[2]);
+    let brick = vec3u(
+        bricks[slot].coordinate[0], bricks[slot].coordinate[1], bricks[slot].coordinate[2]);
     let corner = vec3f(8u * brick + local_cell(element % CELLS));
     let scale = params.inverse_cell_size;
     let low = params.cut_min - corner;
@@ -71,7 +72,8 @@ fn main(
     var after = mat3x3f();
     for (var i = first; i < end; i++) {
         let f = three(sorted_position[i]) * scale - corner;
-        let layer = outer(mirrored_weights(f.x, low.x, high.x), mirrored_weights(f.y, low.y, high.y));
+        let layer = outer(
+            mirrored_weights(f.x, low.x, high.x), mirrored_weights(f.y, low.y, high.y));
         let z = mirrored_weights(f.z, low.z, high.z);
         before += layer * z.x;
         own += layer * z.y;

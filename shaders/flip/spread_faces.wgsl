@@ -49,7 +49,8 @@ fn main(
     }
     let element = thread + CELLS;
     let slot = element / CELLS;
-    let brick = vec3u(bricks[slot].coordinate[0], bricks[slot].coordinate[1], bricks[slot].coordinate[2]);
+    let brick = vec3u(
+        bricks[slot].coordinate[0], bricks[slot].coordinate[1], bricks[slot].coordinate[2]);
     let corner = vec3f(8u * brick + local_cell(element % CELLS));
     let scale = params.inverse_cell_size;
     let component = axis.x;
@@ -70,9 +71,12 @@ fn main(
         upper_weight += both * a.y;
 #ifdef APIC
         let row = 9u * i + 3u * component;
-        let slope = turned(vec3f(sorted_affine[row], sorted_affine[row + 1u], sorted_affine[row + 2u])) * params.cell_size;
+        let slope = turned(
+            vec3f(sorted_affine[row], sorted_affine[row + 1u], sorted_affine[row + 2u]))
+            * params.cell_size;
         let to_centers = vec3f(-0.5, 0.5, 1.5);
-        let sloped = outer(b * (to_centers - f.y), c) * slope.y + outer(b, c * (to_centers - f.z)) * slope.z;
+        let sloped = outer(b * (to_centers - f.y), c) * slope.y
+            + outer(b, c * (to_centers - f.z)) * slope.z;
         lower_momentum += (both * (v - slope.x * f.x) + sloped) * a.x;
         upper_momentum += (both * (v + slope.x * (1.0 - f.x)) + sloped) * a.y;
 #else

@@ -83,7 +83,8 @@ fn main(
                 var found = 0u;
                 var bit = 1u;
                 for (var j = base; j < stop; j++) {
-                    found |= select(0u, bit, square_between(own, place[j]) < REACH * REACH && j != i);
+                    found |= select(
+                        0u, bit, square_between(own, place[j]) < REACH * REACH && j != i);
                     bit <<= 1u;
                 }
                 for (; found != 0u; found &= found - 1u) {
@@ -113,7 +114,8 @@ fn main(
         // The newest neighbour comes first; the rest of the word is padding, or repeats neighbours
         // of a full word before it.
         let held = count & 3u;
-        neighbor_list[word] = select(vec4u(params.nobody), four, vec4u(0u, 1u, 2u, 3u) < vec4u(held));
+        neighbor_list[word] = select(
+            vec4u(params.nobody), four, vec4u(0u, 1u, 2u, 3u) < vec4u(held));
     }
     neighbor_count[i] = count;
     if count > LIST_CAPACITY {

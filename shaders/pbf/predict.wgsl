@@ -36,8 +36,10 @@ fn stopped(v: vec3f, free: vec3f) -> vec3f {
     left -= push * (min(dot(against, push), 0.0) / max(dot(push, push), 1e-30));
     y += push;
 #endif
-    left = select(left, max(left, params.wall_velocity_min), y < params.wall_min + params.contact_distance);
-    return select(left, min(left, params.wall_velocity_max), y > params.wall_max - params.contact_distance);
+    left = select(
+        left, max(left, params.wall_velocity_min), y < params.wall_min + params.contact_distance);
+    return select(
+        left, min(left, params.wall_velocity_max), y > params.wall_max - params.contact_distance);
 }
 
 #endif

@@ -46,7 +46,8 @@ fn main(
             let p_large = leading(p);
             let sum = two_sum(pressure_solution[e], alpha_large * p_large);
             pressure_solution[e] = sum.x;
-            pressure_solution[phase.stride + e] += sum.y + (alpha_large * (p - p_large) + alpha_small * p);
+            pressure_solution[phase.stride + e] += sum.y
+                + (alpha_large * (p - p_large) + alpha_small * p);
 #else
             pressure_solution[e] += alpha * p;
 #endif

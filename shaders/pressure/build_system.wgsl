@@ -44,7 +44,8 @@ fn neighbors_of(s: Site, c: u32) -> array<u32, 6> {
     var out: array<u32, 6>;
     let bit = vec3u(c & 1u, (c >> 1u) & 1u, c >> 2u);
     for (var axis = 0u; axis < 3u; axis++) {
-        let across = dot(select(NATURAL * bit, vec3u(0u), vec3u(0u, 1u, 2u) == vec3u(axis)), vec3u(1u));
+        let across = dot(
+            select(NATURAL * bit, vec3u(0u), vec3u(0u, 1u, 2u) == vec3u(axis)), vec3u(1u));
         let step = NATURAL[axis];
         out[axis] = select(lower[axis] + step, own, bit[axis] == 1u) + across;
         out[axis + 3u] = select(own + step, upper[axis], bit[axis] == 1u) + across;
@@ -72,7 +73,8 @@ fn row_of(s: Site, c: u32) -> Row {
     for (var k = 0u; k < 6u; k++) {
         let axis = k % 3u;
         let other = cell_kind[neighbor[k]];
-        let open = select(0.0, face_open[axis * phase.stride + select(neighbor[k], own, k < 3u)], is_fluid);
+        let open = select(
+            0.0, face_open[axis * phase.stride + select(neighbor[k], own, k < 3u)], is_fluid);
         let coefficient = select(0.0, open, other == FLUID);
         let air = real(select(0.0, open, other == AIR)) * inverse_theta(own, neighbor[k]);
         row.dirichlet += air;

@@ -51,7 +51,8 @@ fn main(
             var shared_by_both = 0.25 * sum;
 #ifdef PERIODIC
             // A level whose bricks do not wrap around is closed at its ends.
-            let is_end = at[axis] == 0u && ((c >> axis) & 1u) == 0u && pressure_bricks[slot].faces[axis] == 0u;
+            let is_end = at[axis] == 0u && ((c >> axis) & 1u) == 0u
+                && pressure_bricks[slot].faces[axis] == 0u;
             shared_by_both = select(shared_by_both, 0.0, is_end);
 #endif
             pressure_coefficient[axis * phase.stride + coarse] = shared_by_both;

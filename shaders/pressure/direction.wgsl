@@ -21,6 +21,7 @@ fn main(
     let first = 512u * (range.x + i / 64u) + (i & 63u);
     for (var c = 0u; c < 512u; c += 64u) {
         let z = pressure_correction[first + c];
-        pressure_direction[first + c] = select(z + beta * pressure_direction[first + c], z, beta == 0.0);
+        pressure_direction[first + c] = select(
+            z + beta * pressure_direction[first + c], z, beta == 0.0);
     }
 }

@@ -36,5 +36,6 @@ fn main(
 #endif
     }
     let squares = b.lo * b.lo + b.hi * b.hi;
-    sum_workgroup((squares.x + squares.y) + (squares.z + squares.w), local, thread_index(workgroup, workgroups, 0u, 1u));
+    sum_workgroup((squares.x + squares.y) + (squares.z + squares.w), local,
+        thread_index(workgroup, workgroups, 0u, 1u));
 }

@@ -52,7 +52,8 @@ fn decide(sum: real) {
     let target_square = real(phase.tolerance_square) * pressure_control.rhs_square;
     switch phase.step {
         case DIRECTION: {
-            pressure_control.beta = select(sum / pressure_control.product, 0.0, pressure_control.is_first == 1u);
+            pressure_control.beta = select(
+                sum / pressure_control.product, 0.0, pressure_control.is_first == 1u);
             pressure_control.product = sum;
             pressure_control.is_first = 0u;
             // The residual is zero, or rounding has made the preconditioner indefinite.

@@ -12,7 +12,8 @@ fn main(
     let i = thread_index(workgroup, workgroups, local, 64u);
     let range = phase.levels[phase.level];
     let slot = select(0u, range.x + i / 32u, i / 32u < range.y);
-    let product = smooth_corrected_at(site_at(slot, coloured_block(i & 31u, phase.colour), last_slot(phase.level)));
+    let product = smooth_corrected_at(
+        site_at(slot, coloured_block(i & 31u, phase.colour), last_slot(phase.level)));
     if phase.level == 0u {
         let groups = (range.y + 1u) / 2u;
         let group = workgroup.y * workgroups.x + workgroup.x;

@@ -7,7 +7,8 @@
 const SWEEPS = 8u;
 
 fn site_of(level: u32, i: u32, colour: u32) -> Site {
-    return site_at(phase.levels[level].x + i / 32u, coloured_block(i & 31u, colour), last_slot(level));
+    return site_at(
+        phase.levels[level].x + i / 32u, coloured_block(i & 31u, colour), last_slot(level));
 }
 
 // 64 threads: a workgroup of 256 takes twice the time on a software device, where a barrier's cost

@@ -46,7 +46,8 @@
 // Radiance over coverage of drops splatted in front of the eye ray's hit at `end`. The grid gives
 // the fraction of sunlight that reaches them; where it has no drops, they are lit as at `mean`.
 fn drops_before(direction: vec3f, mean: f32, end: f32, optical_depth: f32) -> vec3f {
-    let passed = cloud_along(camera.position, direction, 0.0, min(end, endless()) + cloud.skin, DROPS);
+    let passed = cloud_along(
+        camera.position, direction, 0.0, min(end, endless()) + cloud.skin, DROPS);
     var far = mean;
     var lit = exp(-cloud_sun_depth(camera.position + direction * mean));
     if passed.cover > 0.0 {
@@ -71,16 +72,20 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let ray = eye_ray(camera, vec2f(pixel) + 0.5);
     let direction = normalize(world_direction(camera, ray));
     let inside = is_wet(camera.position);
-    own_place = hash2(vec2i(vec2f(pixel) - camera.corner) + vec2i(7919 * i32(camera.sample_index), 0));
+    own_place = hash2(
+        vec2i(vec2f(pixel) - camera.corner) + vec2i(7919 * i32(camera.sample_index), 0));
 #ifdef VOLUME
     // The first hit is known; in air, tracing starts just before it.
     let known = first_depth[pixel.y * camera.size.x + pixel.x];
-    let start = select(max(known * length(ray) - 2.0 * rays.voxel, 0.0), 0.0, inside || known >= FAR);
+    let start = select(
+        max(known * length(ray) - 2.0 * rays.voxel, 0.0), 0.0, inside || known >= FAR);
     let reach = select(known * length(ray) - start + 2.0 * rays.voxel, 0.0, known >= FAR);
-    var value = radiance_along(camera.position + direction * start, direction, inside, start, reach);
+    var value = radiance_along(
+        camera.position + direction * start, direction, inside, start, reach);
     let mist = spray_at(vec2f(pixel) + 0.5);
     if mist.cover > 0.0 && !inside {
-        let white = drops_before(direction, min(known, mist.depth) * length(ray), known * length(ray), mist.optical_depth);
+        let white = drops_before(direction, min(known, mist.depth) * length(ray),
+            known * length(ray), mist.optical_depth);
         value = mix(value, vec4f(white, 1.0), mist.cover);
         dim_parts(1.0 - mist.cover);
         white_parts(vec2f(pixel) + 0.5, white, mist.cover);

@@ -64,7 +64,8 @@ fn smooth_normal(at: vec2i, own: vec4f) -> vec3f {
 // Ripples act on surfaces that face up, as in ssfr_facet.
 fn rippled(p: vec3f, n: vec3f) -> vec3f {
 #ifdef RIPPLES
-    let ripple = ripple_at(p.xz, camera.clock, caustics.ripple.x, caustics.ripple.y, caustics.spacing);
+    let ripple = ripple_at(
+        p.xz, camera.clock, caustics.ripple.x, caustics.ripple.y, caustics.spacing);
     let rides = smoothstep(0.2, 0.8, n.y);
     return normalize(n - vec3f(ripple.slope.x, 0.0, ripple.slope.y) * rides);
 #else
@@ -103,7 +104,8 @@ fn through_side(p: vec3f) -> vec3f {
     let ways = select(vec2f(in_air.y, in_water.y), vec2f(in_air.x, in_water.x), sides.x < sides.y);
     let under = min(surface.before, rays.size.y) * ways.x / ways.y;
     let out = p.xz + in_air * surface.before - in_water * under;
-    return select(vec3f(0.0, -1.0, 0.0), vec3f(out.x, p.y + surface.before - under, out.y), surface.after < FAR);
+    return select(vec3f(0.0, -1.0, 0.0), vec3f(out.x, p.y + surface.before - under, out.y),
+        surface.after < FAR);
 }
 
 @compute @workgroup_size(16, 4)

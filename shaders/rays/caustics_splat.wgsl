@@ -59,7 +59,8 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     }
     let at = id.y * caustics.rays.x + id.x;
     let hits = array<vec4f, 4>(
-        sun_hits[at], sun_hits[at + 1u], sun_hits[at + caustics.rays.x], sun_hits[at + caustics.rays.x + 1u]);
+        sun_hits[at], sun_hits[at + 1u], sun_hits[at + caustics.rays.x],
+        sun_hits[at + caustics.rays.x + 1u]);
     // Texels between rays in flat water, and the light of the quad in units of a texel's.
     let edge = caustics.step / caustics.texel;
     let lights = vec4f(hits[0].z, hits[1].z, hits[2].z, hits[3].z) * edge.x * edge.y;
@@ -68,7 +69,8 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         max(longest(hits[1].xy - hits[0].xy, hits[3].xy - hits[2].xy),
             longest(hits[2].xy - hits[0].xy, hits[3].xy - hits[1].xy)),
         longest(hits[3].xy - hits[0].xy, hits[2].xy - hits[1].xy) * 0.5);
-    let is_whole = all(lights > vec4f(0.0)) && all(layers == vec4f(layers.x)) && apart < PARTED * max(edge.x, edge.y);
+    let is_whole = all(lights > vec4f(0.0)) && all(layers == vec4f(layers.x))
+        && apart < PARTED * max(edge.x, edge.y);
     let count = select(4u, 1u, is_whole);
     for (var k = 0u; k < count; k++) {
         var corners = array<vec2f, 4>(hits[0].xy, hits[1].xy, hits[2].xy, hits[3].xy);

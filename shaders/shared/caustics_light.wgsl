@@ -17,7 +17,8 @@ fn caustic_between(layer: u32, place: vec2f) -> f32 {
     let part = q - low;
     let c = vec2i(low);
     let near = mix(caustic_value(layer, c), caustic_value(layer, c + vec2i(1, 0)), part.x);
-    let far = mix(caustic_value(layer, c + vec2i(0, 1)), caustic_value(layer, c + vec2i(1, 1)), part.x);
+    let far = mix(
+        caustic_value(layer, c + vec2i(0, 1)), caustic_value(layer, c + vec2i(1, 1)), part.x);
     return mix(near, far, part.y);
 }
 

@@ -54,8 +54,10 @@ fn leave_solids(x: vec3f) -> vec3f {
     }
     let t = p - vec3f(node);
     let a = mix(
-        vec4f(solid_node(node), solid_node(node + vec3u(0, 1, 0)), solid_node(node + vec3u(0, 0, 1)), solid_node(node + vec3u(0, 1, 1))),
-        vec4f(solid_node(node + vec3u(1, 0, 0)), solid_node(node + vec3u(1, 1, 0)), solid_node(node + vec3u(1, 0, 1)), solid_node(node + vec3u(1, 1, 1))),
+        vec4f(solid_node(node), solid_node(node + vec3u(0, 1, 0)),
+            solid_node(node + vec3u(0, 0, 1)), solid_node(node + vec3u(0, 1, 1))),
+        vec4f(solid_node(node + vec3u(1, 0, 0)), solid_node(node + vec3u(1, 1, 0)),
+            solid_node(node + vec3u(1, 0, 1)), solid_node(node + vec3u(1, 1, 1))),
         t.x,
     );
     let distance = mix(mix(a.x, a.y, t.y), mix(a.z, a.w, t.y), t.z);
@@ -121,7 +123,8 @@ fn confine(x: vec3f) -> vec3f {
     y = leave_solids(y);
 #endif
 #endif
-    let kept = clamp(y, params.wall_min + params.contact_distance, params.wall_max - params.contact_distance);
+    let kept = clamp(
+        y, params.wall_min + params.contact_distance, params.wall_max - params.contact_distance);
 #ifdef WALL_WORK
     wall_push = kept - y;
 #endif

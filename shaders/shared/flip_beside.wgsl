@@ -24,6 +24,7 @@ fn element_beside(offset: vec3i) -> u32 {
     let cell = own_local + offset;
     // -1 and 8 have bit 3 set, 0 to 7 do not.
     let is_beyond = (cell & vec3i(8)) != vec3i(0);
-    let crossed = select(select(slots_beside.x, slots_beside.y, is_beyond.y), slots_beside.z, is_beyond.z);
+    let crossed = select(
+        select(slots_beside.x, slots_beside.y, is_beyond.y), slots_beside.z, is_beyond.z);
     return select(own_slot, crossed, any(is_beyond)) * CELLS + local_index(vec3u(cell & vec3i(7)));
 }

@@ -6,6 +6,7 @@
 // Cell coordinates from the domain's minimum corner.
 fn own_cell(element: u32) -> vec3u {
     let slot = element / CELLS;
-    let brick = vec3u(bricks[slot].coordinate[0], bricks[slot].coordinate[1], bricks[slot].coordinate[2]);
+    let brick = vec3u(
+        bricks[slot].coordinate[0], bricks[slot].coordinate[1], bricks[slot].coordinate[2]);
     return 8u * brick + local_cell(element % CELLS);
 }

@@ -29,7 +29,8 @@ fn open_part_of_hat(cell: vec3f, rise: f32, solids: u32) -> f32 {
     var all = 0.0;
     for (var k = 0u; k < 64u; k++) {
         let way = 0.5 * vec3f(vec3u(k & 3u, (k >> 2u) & 3u, k >> 4u));
-        var size = max(min(cell + way, params.cut_max) - max(cell - 0.5 + way, params.cut_min), vec3f(0.0));
+        var size = max(
+            min(cell + way, params.cut_max) - max(cell - 0.5 + way, params.cut_min), vec3f(0.0));
         var place = cell - 0.25 + way;
 #ifdef CORRECTION
         size = select(size, vec3f(0.5), is_mirrored);

@@ -4,7 +4,8 @@
 // Interpolated distance. Where the nearest node is far from the surface (see may_cut), no
 // interpolation is needed.
 fn solid_distance_at(x: vec3f) -> f32 {
-    let p = clamp(from_first_node(x) / solid_grid.spacing, vec3f(0.0), vec3f(solid_grid.dims - 1u) - 1e-3);
+    let p = clamp(
+        from_first_node(x) / solid_grid.spacing, vec3f(0.0), vec3f(solid_grid.dims - 1u) - 1e-3);
     let node = vec3u(p);
     let t = p - vec3f(node);
     let low = mix(
@@ -32,7 +33,8 @@ fn solid_distance_near(x: vec3f) -> f32 {
 // solids lie within it.
 fn solid_distance_bound(x: vec3f) -> f32 {
     let place = from_first_node(x);
-    let way = distance(place, clamp(place, vec3f(0.0), solid_grid.spacing * vec3f(solid_grid.dims - 1u)));
+    let way = distance(
+        place, clamp(place, vec3f(0.0), solid_grid.spacing * vec3f(solid_grid.dims - 1u)));
     return select(solid_distance_near(x), way, way > 0.0);
 }
 

@@ -33,8 +33,10 @@ fn level_at(first: u32, size: vec2u, at: vec2f) -> vec3f {
     // `low` may be -1.
     let a = select(vec2u(low), size - 1u, low < vec2f(0.0));
     let b = select(a + 1u, vec2u(0u), a + 1u >= size);
-    let above = mix(solid_texel(first + a.y * size.x + a.x), solid_texel(first + a.y * size.x + b.x), part.x);
-    let below = mix(solid_texel(first + b.y * size.x + a.x), solid_texel(first + b.y * size.x + b.x), part.x);
+    let above = mix(
+        solid_texel(first + a.y * size.x + a.x), solid_texel(first + a.y * size.x + b.x), part.x);
+    let below = mix(
+        solid_texel(first + b.y * size.x + a.x), solid_texel(first + b.y * size.x + b.x), part.x);
     return mix(above, below, part.y);
 }
 
@@ -79,7 +81,8 @@ fn picture_at(levels: Levels, at: vec2f) -> vec3f {
             part = 1.0;
         }
         sum += part * level_at(
-            select(levels.first, levels.next, is_next), select(levels.size, levels.next_size, is_next), at);
+            select(levels.first, levels.next, is_next),
+            select(levels.size, levels.next_size, is_next), at);
         if k + 1u == count {
             break;
         }
@@ -108,7 +111,8 @@ fn painted(triangle: u32, p: vec3f, n: vec3f, view: vec3f, footprint: f32) -> ve
     let lie = set_triangles[face.place];
     let from_c = p - lie.c;
     let at = vec2f(
-        bitcast<f32>(lie.material) + dot(lie.a, from_c), bitcast<f32>(lie.paint) + dot(lie.b, from_c));
+        bitcast<f32>(lie.material) + dot(lie.a, from_c),
+        bitcast<f32>(lie.paint) + dot(lie.b, from_c));
     let size = vec2f(vec2u(material.size_x, material.size_y));
     let facing = dot(view, n);
     let slant = view - n * facing;

@@ -9,5 +9,6 @@ fn list_base(i: u32) -> u32 {
     let local = i - phase.first;
     let block = local / LIST_STRIDE;
     let lane = local % LIST_STRIDE;
-    return block * LIST_STRIDE * (LIST_CAPACITY / 4u) + (lane >> 1u) + (lane & 1u) * (LIST_STRIDE / 2u);
+    return block * LIST_STRIDE * (LIST_CAPACITY / 4u) + (lane >> 1u)
+        + (lane & 1u) * (LIST_STRIDE / 2u);
 }

@@ -66,7 +66,8 @@ fn between(a: vec3f, b: vec3f) -> vec3f {
 #ifdef PERIODIC
     // Shifts the point near the upper end to below the lower end, which does not round.
     let p = period();
-    return (a - select(vec3f(0.0), p, a - b > 0.5 * p)) - (b - select(vec3f(0.0), p, b - a > 0.5 * p));
+    return (a - select(vec3f(0.0), p, a - b > 0.5 * p))
+        - (b - select(vec3f(0.0), p, b - a > 0.5 * p));
 #else
     return a - b;
 #endif

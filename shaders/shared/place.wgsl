@@ -16,6 +16,8 @@ fn place_word(x: vec3f) -> u32 {
 // Squared distance, in steps.
 fn square_between(a: u32, b: u32) -> f32 {
     // Shifting up and down drops the other axes and restores the sign.
-    let apart = vec3f(vec3i(vec3u(a - b, (a >> 10u) - (b >> 10u), (a >> 20u) - (b >> 20u)) << vec3u(22u)) >> vec3u(22u));
+    let apart = vec3f(vec3i(
+        vec3u(a - b, (a >> 10u) - (b >> 10u), (a >> 20u) - (b >> 20u))
+            << vec3u(22u)) >> vec3u(22u));
     return dot(apart, apart);
 }

@@ -13,7 +13,8 @@ alias note = atomic<u32>;
 var<workgroup> largest: array<f32, 64>;
 
 fn through(first: u32, s: u32, t: u32) -> vec4r {
-    let open = vec4f(face_open[first], face_open[first + s], face_open[first + t], face_open[first + s + t]);
+    let open = vec4f(
+        face_open[first], face_open[first + s], face_open[first + t], face_open[first + s + t]);
     let velocity = vec4f(
         face_velocity[first],
         face_velocity[first + s],
@@ -40,8 +41,10 @@ fn outflow(s: Site) -> Pair {
         iz - through(z + own, 1u, 8u),
         through(z + upper.z, 1u, 8u) - iz,
     ));
-    let lo = vec4r(vec4f(solid_flux[own], solid_flux[own + 1u], solid_flux[own + 8u], solid_flux[own + 9u]));
-    let hi = vec4r(vec4f(solid_flux[own + 64u], solid_flux[own + 65u], solid_flux[own + 72u], solid_flux[own + 73u]));
+    let lo = vec4r(
+        vec4f(solid_flux[own], solid_flux[own + 1u], solid_flux[own + 8u], solid_flux[own + 9u]));
+    let hi = vec4r(vec4f(solid_flux[own + 64u], solid_flux[own + 65u], solid_flux[own + 72u],
+        solid_flux[own + 73u]));
     let rows = pressure_block[64u * s.slot + s.block] >> 8u;
     let is_row_lo = (vec4u(rows) & vec4u(1u, 2u, 4u, 8u)) != vec4u(0u);
     let is_row_hi = (vec4u(rows) & vec4u(16u, 32u, 64u, 128u)) != vec4u(0u);

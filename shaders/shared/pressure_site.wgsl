@@ -72,12 +72,14 @@ fn blocked_upper(s: Site) -> vec3u {
 
 fn natural_lower(s: Site) -> vec3u {
     let b = s.lower_block;
-    return 512u * s.lower_slot + 2u * (b & vec3u(3u)) + 16u * ((b >> vec3u(2u)) & vec3u(3u)) + 128u * (b >> vec3u(4u));
+    return 512u * s.lower_slot + 2u * (b & vec3u(3u)) + 16u * ((b >> vec3u(2u)) & vec3u(3u))
+        + 128u * (b >> vec3u(4u));
 }
 
 fn natural_upper(s: Site) -> vec3u {
     let b = s.upper_block;
-    return 512u * s.upper_slot + 2u * (b & vec3u(3u)) + 16u * ((b >> vec3u(2u)) & vec3u(3u)) + 128u * (b >> vec3u(4u));
+    return 512u * s.upper_slot + 2u * (b & vec3u(3u)) + 16u * ((b >> vec3u(2u)) & vec3u(3u))
+        + 128u * (b >> vec3u(4u));
 }
 
 // The `k`-th of the 32 blocks of one colour.

@@ -43,7 +43,8 @@ struct Passed {
 }
 
 fn cloud_words_before_values() -> u32 {
-    return cloud.bricks.x * cloud.bricks.y * cloud.bricks.z + cloud.nodes.x * cloud.nodes.y * cloud.nodes.z;
+    return cloud.bricks.x * cloud.bricks.y * cloud.bricks.z
+        + cloud.nodes.x * cloud.nodes.y * cloud.nodes.z;
 }
 
 // Decodes a half-precision value: its bits, shifted to their positions in an f32, represent the
@@ -62,10 +63,12 @@ fn cloud_density(slot: u32, q: vec3f, kind: u32) -> f32 {
     let z = CLOUD_NODES * CLOUD_NODES;
     let i = cloud_words_before_values() + (slot - 1u) * CLOUD_VALUES + c.x + y * c.y + z * c.z;
     let before = vec4f(
-        cloud_value(i, kind), cloud_value(i + y, kind), cloud_value(i + z, kind), cloud_value(i + y + z, kind));
+        cloud_value(i, kind), cloud_value(i + y, kind), cloud_value(i + z, kind),
+        cloud_value(i + y + z, kind));
     let j = i + 1u;
     let after = vec4f(
-        cloud_value(j, kind), cloud_value(j + y, kind), cloud_value(j + z, kind), cloud_value(j + y + z, kind));
+        cloud_value(j, kind), cloud_value(j + y, kind), cloud_value(j + z, kind),
+        cloud_value(j + y + z, kind));
     let along_x = mix(before, after, part.x);
     let along_y = mix(along_x.xz, along_x.yw, part.y);
     return mix(along_y.x, along_y.y, part.z);
@@ -92,9 +95,11 @@ fn cloud_sun_depth(p: vec3f) -> f32 {
         let c = vec3u(low);
         let d = min(c + 1u, cloud.nodes - 1u);
         let before = vec4f(
-            shade_node(c), shade_node(vec3u(c.x, d.y, c.z)), shade_node(vec3u(c.xy, d.z)), shade_node(vec3u(c.x, d.yz)));
+            shade_node(c), shade_node(vec3u(c.x, d.y, c.z)), shade_node(vec3u(c.xy, d.z)),
+            shade_node(vec3u(c.x, d.yz)));
         let after = vec4f(
-            shade_node(vec3u(d.x, c.yz)), shade_node(vec3u(d.xy, c.z)), shade_node(vec3u(d.x, c.y, d.z)), shade_node(d));
+            shade_node(vec3u(d.x, c.yz)), shade_node(vec3u(d.xy, c.z)),
+            shade_node(vec3u(d.x, c.y, d.z)), shade_node(d));
         let along_x = mix(before, after, part.x);
         let along_y = mix(along_x.xz, along_x.yw, part.y);
         depth = mix(along_y.x, along_y.y, part.z);
@@ -117,7 +122,8 @@ fn cloud_along(origin: vec3f, direction: vec3f, from_t: f32, to_t: f32, kind: u3
         let inner = start + direction * (t + 1e-3 * cloud.voxel);
         let brick = vec3u(clamp(inner / edge, vec3f(0.0), vec3f(cloud.bricks) - 0.5));
         let corner = vec3f(brick) * edge;
-        let out = (corner + select(vec3f(0.0), vec3f(edge), direction > vec3f(0.0)) - start) * inverse;
+        let out = (corner + select(vec3f(0.0), vec3f(edge), direction > vec3f(0.0)) - start)
+            * inverse;
         let leave = min(max(min(out.x, min(out.y, out.z)), t + 1e-3 * cloud.voxel), end);
         let word = cloud_words[(brick.z * cloud.bricks.y + brick.y) * cloud.bricks.x + brick.x];
         if (word & (HAS_DROPS << kind)) != 0u {

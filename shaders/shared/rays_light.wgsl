@@ -47,7 +47,8 @@ struct Ray {
 // surface reflects is one component, and what it transmits another, except for light that the water
 // scatters.
 fn part_of(ray: Ray, own: u32) -> u32 {
-    let is_own = ray.surfaces == 0u || (ray.part == REFRACTION && (own == WHITE || own == FOAM_LIGHT || own == SCATTERING));
+    let is_own = ray.surfaces == 0u
+        || (ray.part == REFRACTION && (own == WHITE || own == FOAM_LIGHT || own == SCATTERING));
     return select(ray.part, own, is_own);
 }
 
@@ -93,7 +94,8 @@ fn scattered(origin: vec3f, direction: vec3f, length: f32) -> vec3f {
         let after = water_above(origin + direction * end);
         let seen = sunlit(origin + direction * mix(start, end, own_place), up);
         light += sun * seen * gathered(extinction, start, end, before, after);
-        light += sky * gathered(extinction, start, end, before / shading.sun_path, after / shading.sun_path);
+        light += sky
+            * gathered(extinction, start, end, before / shading.sun_path, after / shading.sun_path);
         start = end;
         before = after;
     }
@@ -114,7 +116,8 @@ fn split_at(ray: Ray, found: Found) -> Split {
     let view = -ray.direction;
     let side = select(1.0, -1.0, ray.inside);
     let p = ray.origin + ray.direction * found.t;
-    let footprint = (ray.travelled + found.t) / camera.focal / max(abs(dot(found.normal, view)), 0.1);
+    let footprint = (ray.travelled + found.t) / camera.focal
+        / max(abs(dot(found.normal, view)), 0.1);
     let facet = facet_at(p, found.normal, footprint);
     var normal = facet.normal * side;
     // Visible facets never face away.
@@ -192,7 +195,8 @@ fn veil(ray: Ray, found: Found, far: f32, light: ptr<function, vec3f>) -> f32 {
             let mean = passed.far / passed.cover;
             let p = ray.origin + ray.direction * mean;
             let seen = bubbles_radiance(p, -ray.direction, passed.depth, passed.lit / passed.cover);
-            let white = ray.weight * passed.cover * seen * exp(-(shading.absorption + shading.scattering) * mean);
+            let white = ray.weight * passed.cover * seen
+                * exp(-(shading.absorption + shading.scattering) * mean);
             let before = ray.weight * passed.cover * scattered(ray.origin, ray.direction, mean);
             *light += white + before;
             light_part(part_of(ray, FOAM_LIGHT), white);
@@ -219,7 +223,9 @@ fn veil(ray: Ray, found: Found, far: f32, light: ptr<function, vec3f>) -> f32 {
 // Radiance and coverage along a ray from `origin`, in air or water, that has travelled `travelled`
 // metres from the eye without a hit. Its first hit is known to be before `known`, or to be none
 // where that is 0.
-fn radiance_along(origin: vec3f, direction: vec3f, inside: bool, travelled: f32, known: f32) -> vec4f {
+fn radiance_along(
+    origin: vec3f, direction: vec3f, inside: bool, travelled: f32, known: f32,
+) -> vec4f {
     var reach = known;
     var waiting: array<Ray, WAITING>;
     var held = 1;
@@ -230,7 +236,8 @@ fn radiance_along(origin: vec3f, direction: vec3f, inside: bool, travelled: f32,
         held -= 1;
         let ray = waiting[held];
         let found = trace(
-            ray.origin, ray.direction, ray.inside, ray.travelled, select(FAR, reach, ray.surfaces == 0u));
+            ray.origin, ray.direction, ray.inside, ray.travelled,
+            select(FAR, reach, ray.surfaces == 0u));
         if ray.surfaces == 0u && found.kind == SKY && reach > 0.0 && reach < FAR {
             // The known hit is a sheet thinner than a step that was missed: traces the ray again
             // without a bound.
@@ -287,7 +294,8 @@ fn radiance_along(origin: vec3f, direction: vec3f, inside: bool, travelled: f32,
         let p = ray.origin + ray.direction * found.t;
         if !ray.inside {
             let sun = weight * shading.sun_irradiance * sunlit(p, vec3f(0.0, 1.0, 0.0))
-                * glitter(split.normal, -ray.direction, shading.sun_direction, split.variance, shading.index);
+                * glitter(split.normal, -ray.direction, shading.sun_direction, split.variance,
+                    shading.index);
             light += sun;
             light_part(part_of(ray, SUN), sun);
         }
@@ -310,8 +318,10 @@ fn radiance_along(origin: vec3f, direction: vec3f, inside: bool, travelled: f32,
         let surfaces = ray.surfaces + 1u;
         let mirrored = part_of(ray, REFLECTION);
         let bent = part_of(ray, REFRACTION);
-        let reflected = Ray(before, ray.inside, split.mirrored, weight * mirror, travelled, surfaces, mirrored);
-        let through = Ray(after, !ray.inside, split.refracted, weight * (1.0 - mirror), travelled, surfaces, bent);
+        let reflected = Ray(
+            before, ray.inside, split.mirrored, weight * mirror, travelled, surfaces, mirrored);
+        let through = Ray(after, !ray.inside, split.refracted, weight * (1.0 - mirror), travelled,
+            surfaces, bent);
         // The stronger branch and its descendants are traced first. Without stack space for the
         // weaker one, the stronger one takes over its weight.
         let is_mirror = mirror > 0.5;

@@ -77,7 +77,9 @@ fn box_distance(sides: vec3u, origin: vec3f, inverse: vec3f, nearest: f32) -> f3
 
 // Pops pending children until one has a box nearer than `nearest`. Entries are a child and the
 // distance of its box.
-fn next_of(waiting: ptr<function, array<vec2u, 32>>, held: ptr<function, i32>, nearest: f32) -> u32 {
+fn next_of(
+    waiting: ptr<function, array<vec2u, 32>>, held: ptr<function, i32>, nearest: f32,
+) -> u32 {
     var at = NO_CHILD;
     while at == NO_CHILD && *held > 0 {
         *held -= 1;
@@ -114,7 +116,8 @@ fn opaque_along(origin: vec3f, direction: vec3f, reach: f32) -> Found {
             let goes_left = left <= right;
             let far = max(left, right);
             if far < FAR {
-                waiting[held] = vec2u(select(node.left_child, node.right_child, goes_left), bitcast<u32>(far));
+                waiting[held] = vec2u(
+                    select(node.left_child, node.right_child, goes_left), bitcast<u32>(far));
                 held += 1;
             }
             at = select(node.right_child, node.left_child, goes_left);

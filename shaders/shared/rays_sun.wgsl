@@ -35,9 +35,11 @@ fn sun_path_within(p: vec3f) -> f32 {
     let row01 = (d.z * rays.nodes.y + c.y) * rays.nodes.x;
     let row11 = (d.z * rays.nodes.y + d.y) * rays.nodes.x;
     let before = vec4f(
-        sun_paths[row00 + c.x], sun_paths[row10 + c.x], sun_paths[row01 + c.x], sun_paths[row11 + c.x]);
+        sun_paths[row00 + c.x], sun_paths[row10 + c.x], sun_paths[row01 + c.x],
+        sun_paths[row11 + c.x]);
     let after = vec4f(
-        sun_paths[row00 + d.x], sun_paths[row10 + d.x], sun_paths[row01 + d.x], sun_paths[row11 + d.x]);
+        sun_paths[row00 + d.x], sun_paths[row10 + d.x], sun_paths[row01 + d.x],
+        sun_paths[row11 + d.x]);
     let along_x = mix(before, after, part.x);
     let along_y = mix(along_x.xz, along_x.yw, part.y);
     return mix(along_y.x, along_y.y, part.z);

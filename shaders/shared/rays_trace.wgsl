@@ -32,7 +32,8 @@ fn at_side(p: vec3f, t: f32) -> Found {
 // Hit of a ray with the sea's surface between two distances beyond the box; the sky where it
 // misses.
 fn sea_along(origin: vec3f, direction: vec3f, span: vec2f, inside: bool, travelled: f32) -> Found {
-    let surface = sea_crossing(origin, direction, span.x, min(span.y, sea_end()), inside, travelled);
+    let surface = sea_crossing(
+        origin, direction, span.x, min(span.y, sea_end()), inside, travelled);
     if surface.after >= FAR {
         return met(SKY, FAR, vec3f(0.0), 3u);
     }
@@ -44,7 +45,9 @@ fn sea_along(origin: vec3f, direction: vec3f, span: vec2f, inside: bool, travell
 }
 
 // Hit of a ray beyond the box, which it leaves at `from_t`.
-fn beyond(origin: vec3f, direction: vec3f, from_t: f32, inside: bool, travelled: f32, opaque_one: Found) -> Found {
+fn beyond(
+    origin: vec3f, direction: vec3f, from_t: f32, inside: bool, travelled: f32, opaque_one: Found,
+) -> Found {
     let at = from_t + hair();
     let p = origin + direction * at;
     if inside && !is_sea(p.xz) {
@@ -73,7 +76,8 @@ fn trace(origin: vec3f, direction: vec3f, inside: bool, travelled: f32, reach: f
 #ifdef SEA
     let before = select(start - hair(), FAR, misses);
     if before > 0.0 {
-        let found = sea_along(origin, direction, vec2f(0.0, min(before, opaque_one.t)), inside, travelled);
+        let found = sea_along(
+            origin, direction, vec2f(0.0, min(before, opaque_one.t)), inside, travelled);
         if found.kind == WATER {
             return found;
         }
@@ -103,7 +107,8 @@ fn trace(origin: vec3f, direction: vec3f, inside: bool, travelled: f32, reach: f
         let p = origin + direction * surface.after;
         let towards = select(-direction, direction, inside);
         return Found(
-            WATER, surface.after, surface.before, surface.after, field_normal(p, towards), 0u, 0.0, NO_TRIANGLE);
+            WATER, surface.after, surface.before, surface.after, field_normal(p, towards), 0u, 0.0,
+            NO_TRIANGLE);
     }
 #ifdef SEA
     if span.y < min(opaque_one.t, reach) {

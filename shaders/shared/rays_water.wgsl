@@ -61,9 +61,11 @@ fn within(slot: u32, q: vec3f) -> f32 {
     let y = NODES;
     let z = NODES * NODES;
     let i = (slot - FIRST) * VALUES + c.x + y * c.y + z * c.z;
-    let before = vec4f(level_values[i], level_values[i + y], level_values[i + z], level_values[i + y + z]);
+    let before = vec4f(
+        level_values[i], level_values[i + y], level_values[i + z], level_values[i + y + z]);
     let j = i + 1u;
-    let after = vec4f(level_values[j], level_values[j + y], level_values[j + z], level_values[j + y + z]);
+    let after = vec4f(
+        level_values[j], level_values[j + y], level_values[j + z], level_values[j + y + z]);
     let along_x = mix(before, after, part.x);
     let along_y = mix(along_x.xz, along_x.yw, part.y);
     return mix(along_y.x, along_y.y, part.z);

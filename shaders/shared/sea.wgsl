@@ -181,14 +181,16 @@ fn sea_crossing(
         }
         // Ends the loop after the last point.
         last = select(t, FAR, t >= end);
-        let step = max(gap / (abs(direction.y) + STEEP), max(LEAST_STEP * (travelled + t), 100.0 * sea.hair));
+        let step = max(
+            gap / (abs(direction.y) + STEEP), max(LEAST_STEP * (travelled + t), 100.0 * sea.hair));
         t = min(t + step, end);
     }
     // Bisection of that step.
     let is_met = crossed.x < FAR;
     for (var i = 0; i < SEA_HALVINGS && is_met; i++) {
         let middle = 0.5 * (crossed.x + crossed.y);
-        let same = is_sea_water(origin + direction * middle, (travelled + middle) / camera.focal) == inside;
+        let same = is_sea_water(origin + direction * middle, (travelled + middle) / camera.focal)
+            == inside;
         crossed = select(vec2f(crossed.x, middle), vec2f(middle, crossed.y), same);
     }
     return SeaCrossing(crossed.x, crossed.y);

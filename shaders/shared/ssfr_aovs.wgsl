@@ -41,16 +41,20 @@ fn spray_over(pixel: vec2i, ray: vec3f) -> Over {
     if mist.cover > 0.5 {
         let position = world_from_eye(camera, ray * mist.depth);
         let next = position + spray_velocity(vec2f(pixel) + 0.5) * camera.frame_seconds;
-        return Over(true, mist.depth, position, motion_to(eye_from_world(next_camera, next), pixel));
+        return Over(
+            true, mist.depth, position, motion_to(eye_from_world(next_camera, next), pixel));
     }
 #endif
     return Over(false, FAR, vec3f(0.0), vec2f(0.0));
 }
 
 // Like `store`, for what is behind the spray.
-fn store_under(over: Over, at: u32, depth: f32, normal: vec3f, position: vec3f, motion: vec2f, through: f32) {
+fn store_under(
+    over: Over, at: u32, depth: f32, normal: vec3f, position: vec3f, motion: vec2f, through: f32,
+) {
     store(
-        at, select(depth, over.depth, over.is_seen), normal, select(position, over.position, over.is_seen),
+        at, select(depth, over.depth, over.is_seen), normal,
+        select(position, over.position, over.is_seen),
         select(motion, over.motion, over.is_seen), through);
 }
 

@@ -34,9 +34,12 @@ struct Ellipsoid {
 
 // Ellipsoid of a particle whose centre is `from_eye` metres from the eye, in world axes; `part`
 // scales its size.
-fn ellipsoid_at(camera: Camera, from_eye: vec3f, shape: Shape, part: f32, size: vec2u) -> Ellipsoid {
+fn ellipsoid_at(
+    camera: Camera, from_eye: vec3f, shape: Shape, part: f32, size: vec2u,
+) -> Ellipsoid {
     let s = part * stretch(shape);
-    let c = vec3f(dot(from_eye, camera.right), dot(from_eye, camera.up), dot(from_eye, camera.forward));
+    let c = vec3f(
+        dot(from_eye, camera.right), dot(from_eye, camera.up), dot(from_eye, camera.forward));
     // Half-extents along the eye's axes: planes n · x = n · c ± |S n| touch the ellipsoid.
     let right = s * camera.right;
     let up = s * camera.up;
@@ -60,7 +63,8 @@ fn ellipsoid_at(camera: Camera, from_eye: vec3f, shape: Shape, part: f32, size: 
     let least = vec2f(p.x - root.x, -p.y - root.y) / squared;
     let most = vec2f(p.x + root.x, -p.y + root.y) / squared;
     out.bounds = pixels_between(
-        camera, camera.centre + camera.focal * least - 0.5, camera.centre + camera.focal * most - 0.5, 1.0, size);
+        camera, camera.centre + camera.focal * least - 0.5,
+        camera.centre + camera.focal * most - 0.5, 1.0, size);
     let by = cross(s[1], s[2]);
     let inverse = mat3x3f(by, cross(s[2], s[0]), cross(s[0], s[1])) * (1.0 / dot(s[0], by));
     out.middle = inverse * from_eye;

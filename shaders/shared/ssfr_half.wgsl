@@ -18,6 +18,7 @@ fn half_tap(position: vec2f) -> HalfTap {
     let base = vec2i(floor(p));
     let a = clamp(base, vec2i(0), size - 1);
     let b = clamp(base + 1, vec2i(0), size - 1);
-    let at = vec4u(vec4i(a.y * size.x + a.x, a.y * size.x + b.x, b.y * size.x + a.x, b.y * size.x + b.x));
+    let at = vec4u(
+        vec4i(a.y * size.x + a.x, a.y * size.x + b.x, b.y * size.x + a.x, b.y * size.x + b.x));
     return HalfTap(at, p - floor(p));
 }

@@ -17,7 +17,9 @@ struct March {
 // behind that surface, where each step counts `deep` times; geometry nearer to the viewer than
 // `nearest` is in front of the water and no hit. The refinement follows the loop, because adapters
 // that execute both sides of a branch would refine at every step.
-fn march(origin: vec3f, direction: vec3f, reach: f32, steps: i32, growth: f32, deep: f32, nearest: f32) -> March {
+fn march(
+    origin: vec3f, direction: vec3f, reach: f32, steps: i32, growth: f32, deep: f32, nearest: f32,
+) -> March {
     var last = 0.0;
     // First step of a geometric series of `steps` steps that ends at `reach`.
     var step = reach / f32(steps);
@@ -37,7 +39,9 @@ fn march(origin: vec3f, direction: vec3f, reach: f32, steps: i32, growth: f32, d
         }
         let z = solid_depth[u32(pixel.y) * camera.size.x + u32(pixel.x)];
         let slack = 1.5 * step;
-        if z < q.z && z > nearest - (deep - 1.0) * slack && q.z - z < 3.5 * shading.spacing + deep * slack {
+        if z < q.z && z > nearest - (deep - 1.0) * slack
+            && q.z - z < 3.5 * shading.spacing + deep * slack
+        {
             next = t;
             break;
         }

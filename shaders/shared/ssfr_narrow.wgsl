@@ -54,7 +54,9 @@ fn narrow_pair(range: ptr<function, NarrowRange>, at_a: i32, at_b: i32, z: f32) 
     var a = source[at_a];
     var b = source[at_b];
     // Another object is in front: drops the sample and its mirror image.
-    if min(a, b) < z - (*range).near || is_hidden(at_a, z, (*range).far) || is_hidden(at_b, z, (*range).far) {
+    if min(a, b) < z - (*range).near || is_hidden(at_a, z, (*range).far)
+        || is_hidden(at_b, z, (*range).far)
+    {
         return NarrowPair(0.0, 0.0);
     }
     let in_a = a <= z + (*range).far;

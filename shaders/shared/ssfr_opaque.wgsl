@@ -71,11 +71,13 @@ fn radiance_of(at: Surface, view: vec3f, footprint: f32, depth: f32) -> vec3f {
 fn radiance_under(at: Surface, view: vec3f, footprint: f32, depth: f32, sun: vec3f) -> vec3f {
     let through = exp(-(shading.absorption + shading.scattering) * depth * shading.sun_path);
     // Low faces see less of the sky: an approximation of its occlusion.
-    let open = select(1.0, mix(0.45, 1.0, smoothstep(0.0, 0.1 * shading.extent, at.position.y)), at.material != 2u);
+    let open = select(1.0, mix(0.45, 1.0, smoothstep(0.0, 0.1 * shading.extent, at.position.y)),
+        at.material != 2u);
     let light = (sun + sky_irradiance(at.normal) * open) * through / PI;
     if at.material == 2u {
         let p = at.position.xz / shading.extent;
-        let n = 0.5 * value_noise(p * 8.75) + 0.3 * value_noise(p * 32.5) + 0.2 * value_noise(p * 127.5);
+        let n = 0.5 * value_noise(p * 8.75) + 0.3 * value_noise(p * 32.5)
+            + 0.2 * value_noise(p * 127.5);
         return light * shading.ground_colour * (1.0 + shading.ground_variation * (2.0 * n - 1.0));
     }
     var wall = select(shading.solid_colour, shading.ground_colour * 1.1, at.material == 1u);

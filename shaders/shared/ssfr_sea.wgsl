@@ -17,7 +17,8 @@ fn sea_from_eye(direction: vec3f, bound: f32) -> SeaSeen {
     let start = max(span.x, 0.0);
     let misses = span.y <= start;
     let limit = min(bound, sea_end());
-    var distance = sea_crossing(origin, direction, 0.0, min(select(start, limit, misses), limit), false, 0.0).after;
+    var distance = sea_crossing(origin, direction, 0.0, min(select(start, limit, misses), limit),
+        false, 0.0).after;
     if distance >= FAR && !misses {
         distance = sea_crossing(origin, direction, span.y + sea.hair, limit, false, 0.0).after;
     }

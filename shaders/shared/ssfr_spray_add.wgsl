@@ -34,6 +34,7 @@ fn add_spray(pixel: vec2u, amount: f32, z: f32, velocity: vec3f) {
 fn add_foam(pixel: vec2u, amount: f32) {
     let half_size = camera.size / 2u;
     let plane = half_size.x * half_size.y;
-    atomicAdd(&spray[pixel.y * half_size.x + pixel.x + 2u * plane], u32(amount * SPRAY_SCALE + 0.5));
+    atomicAdd(
+        &spray[pixel.y * half_size.x + pixel.x + 2u * plane], u32(amount * SPRAY_SCALE + 0.5));
 }
 #endif

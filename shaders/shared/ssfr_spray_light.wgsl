@@ -31,7 +31,8 @@ fn cloud_phase(cosine: f32, lit: f32, optical_depth: f32) -> f32 {
 // Radiance of spray over its coverage towards `view`; its near side faces `facing`, and `lit` is
 // the fraction of sunlight that arrives. Under a uniform sky it equals the sky's radiance.
 fn spray_radiance(view: vec3f, facing: vec3f, optical_depth: f32, lit: f32) -> vec3f {
-    let phase = cloud_phase(dot(view, shading.sun_direction), dot(facing, shading.sun_direction), optical_depth);
+    let phase = cloud_phase(
+        dot(view, shading.sun_direction), dot(facing, shading.sun_direction), optical_depth);
     let sun = shading.sun_irradiance * lit * phase;
     // A thin cloud sees the whole sky and what is below it; a thick one the hemisphere of its near
     // side.

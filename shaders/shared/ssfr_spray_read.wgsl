@@ -12,7 +12,8 @@ struct Spray {
 }
 
 fn spray_mean(tap: HalfTap, plane: u32) -> f32 {
-    let words = vec4u(spray[tap.at.x + plane], spray[tap.at.y + plane], spray[tap.at.z + plane], spray[tap.at.w + plane]);
+    let words = vec4u(spray[tap.at.x + plane], spray[tap.at.y + plane], spray[tap.at.z + plane],
+        spray[tap.at.w + plane]);
     let v = vec4f(words) / SPRAY_SCALE;
     return mix(mix(v.x, v.y, tap.part.x), mix(v.z, v.w, tap.part.x), tap.part.y);
 }
@@ -35,7 +36,8 @@ fn spray_at(position: vec2f) -> Spray {
 }
 
 fn spray_signed(tap: HalfTap, plane: u32) -> f32 {
-    let words = vec4u(spray[tap.at.x + plane], spray[tap.at.y + plane], spray[tap.at.z + plane], spray[tap.at.w + plane]);
+    let words = vec4u(spray[tap.at.x + plane], spray[tap.at.y + plane], spray[tap.at.z + plane],
+        spray[tap.at.w + plane]);
     let v = vec4f(bitcast<vec4i>(words)) / SPRAY_SCALE;
     return mix(mix(v.x, v.y, tap.part.x), mix(v.z, v.w, tap.part.x), tap.part.y);
 }
@@ -45,7 +47,8 @@ fn spray_velocity(position: vec2f) -> vec3f {
     let tap = half_tap(position);
     let plane = spray_plane();
     let sum = vec3f(
-        spray_signed(tap, 2u * plane), spray_signed(tap, 3u * plane), spray_signed(tap, 4u * plane));
+        spray_signed(tap, 2u * plane), spray_signed(tap, 3u * plane),
+        spray_signed(tap, 4u * plane));
     return sum / spray_mean(tap, 0u) * spray_params.speed;
 }
 
@@ -53,7 +56,8 @@ fn spray_velocity(position: vec2f) -> vec3f {
 fn white_parts(position: vec2f, light: vec3f, cover: f32) {
 #ifdef FOAM
     let tap = half_tap(position);
-    let foam = clamp(spray_mean(tap, 2u * spray_plane()) / max(spray_mean(tap, 0u), 1.0 / SPRAY_SCALE), 0.0, 1.0);
+    let foam = clamp(spray_mean(tap, 2u * spray_plane())
+        / max(spray_mean(tap, 0u), 1.0 / SPRAY_SCALE), 0.0, 1.0);
     light_part(FOAM_LIGHT, light * (cover * foam));
     light_part(WHITE, light * (cover * (1.0 - foam)));
 #else

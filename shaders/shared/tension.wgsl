@@ -37,7 +37,8 @@ fn open_mirrored(element: u32) {
 
 // Element of the cell at `offset`, or of the cell that it mirrors.
 fn mirrored_element(offset: vec3i) -> u32 {
-    let is_behind = ((offset < vec3i(0)) & is_closed_before) | ((offset > vec3i(0)) & is_closed_after);
+    let is_behind = ((offset < vec3i(0)) & is_closed_before)
+        | ((offset > vec3i(0)) & is_closed_after);
     let found = element_at(select(offset, vec3i(0), is_behind));
     let is_solid = found >= CELLS && cell_kind[found] == SOLID;
     return select(found, element_at(vec3i(0)), is_solid);

@@ -4,7 +4,8 @@
 @group(0) @binding(13) var<storage, read_write> wall_work: array<f32>;
 
 fn work_of_push(push: vec3f) -> f32 {
-    return dot(max(push, vec3f(0.0)), params.wall_velocity_min) + dot(min(push, vec3f(0.0)), params.wall_velocity_max);
+    return dot(max(push, vec3f(0.0)), params.wall_velocity_min)
+        + dot(min(push, vec3f(0.0)), params.wall_velocity_max);
 }
 
 // Call it after confine.

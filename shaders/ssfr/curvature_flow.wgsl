@@ -27,7 +27,8 @@ fn depth_at(cell: vec2i) -> f32 {
 // Row of four depths, beginning at a cell.
 fn row_at(cell: vec2i) -> vec4f {
     return vec4f(
-        depth_at(cell), depth_at(cell + vec2i(1, 0)), depth_at(cell + vec2i(2, 0)), depth_at(cell + vec2i(3, 0)));
+        depth_at(cell), depth_at(cell + vec2i(1, 0)), depth_at(cell + vec2i(2, 0)),
+        depth_at(cell + vec2i(3, 0)));
 }
 
 // Depth after the step at the middle of three rows: above, own and below.
@@ -36,7 +37,8 @@ fn stepped(above_row: vec3f, row: vec3f, below_row: vec3f) -> f32 {
     if z >= FAR {
         return z;
     }
-    let share = clamp(level_share(params, z, camera.focal, level.level).steps - f32(level.index), 0.0, 1.0);
+    let share = clamp(
+        level_share(params, z, camera.focal, level.level).steps - f32(level.index), 0.0, 1.0);
     if share <= 0.0 {
         return z;
     }

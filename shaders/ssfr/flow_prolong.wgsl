@@ -69,9 +69,11 @@ fn store(id: vec2u, above: Coarse, below: Coarse, part: vec2f) {
     let at = id.y * level.size.x + id.x;
     let is_left = (id.x & 1u) == 0u;
     let before = vec4f(
-        select(above.before.yz, above.before.xy, is_left), select(below.before.yz, below.before.xy, is_left));
+        select(above.before.yz, above.before.xy, is_left),
+        select(below.before.yz, below.before.xy, is_left));
     let after = vec4f(
-        select(above.after.yz, above.after.xy, is_left), select(below.after.yz, below.after.xy, is_left));
+        select(above.after.yz, above.after.xy, is_left),
+        select(below.after.yz, below.after.xy, is_left));
     corrected[at] = prolonged(fine[at], before, after, part);
 }
 

@@ -117,7 +117,8 @@ fn surface_normal(pixel: vec2i, z: f32) -> vec3f {
 
 fn thickness_at(position: vec2f) -> f32 {
     let tap = half_tap(position);
-    var words = vec4u(thickness[tap.at.x], thickness[tap.at.y], thickness[tap.at.z], thickness[tap.at.w]);
+    var words = vec4u(
+        thickness[tap.at.x], thickness[tap.at.y], thickness[tap.at.z], thickness[tap.at.w]);
     return half_load(&words, tap.part);
 }
 
@@ -208,7 +209,8 @@ fn behind(pixel: vec2i, ray: vec3f, direction: vec3f) -> Behind {
         return Behind(FAR, FAR, Seen(NO_SOLID, vec3f(0.0), -direction, 0.0, 0.0));
     }
     let far = depth * along;
-    return Behind(depth, far, Seen(at, camera.position + direction * far, -direction, far / camera.focal, 0.0));
+    return Behind(depth, far,
+        Seen(at, camera.position + direction * far, -direction, far / camera.focal, 0.0));
 }
 
 // `light` is the radiance of its surface, unless it is the sky.
@@ -277,7 +279,8 @@ fn mirrored(water: Water) -> Mirrored {
     let eye_r = vec3f(dot(r, camera.right), dot(r, camera.up), dot(r, camera.forward));
     let start = water.eye + 0.3 * shading.spacing * eye_r;
     let hit = march(start, eye_r, 0.56 * shading.extent, 14, 1.25, 1.0, 0.0);
-    return Mirrored(r, hit, Seen(hit.at, world_from_eye(camera, hit.eye), -r, hit.eye.z / camera.focal, 0.0));
+    return Mirrored(
+        r, hit, Seen(hit.at, world_from_eye(camera, hit.eye), -r, hit.eye.z / camera.focal, 0.0));
 }
 
 // Light of a reflected ray; `light` is the radiance of the solid it hits, seen through the water
@@ -297,7 +300,8 @@ fn mirrored_light(met: Mirrored, water: Water, light: vec3f) -> vec3f {
 #ifdef SPRAY
     let mist = spray_at(place);
     if mist.depth > nearest && mist.depth < met.hit.eye.z {
-        colour = mix(colour, spray_radiance(-met.way, -met.way, mist.optical_depth, water.lit), mist.cover);
+        colour = mix(
+            colour, spray_radiance(-met.way, -met.way, mist.optical_depth, water.lit), mist.cover);
     }
 #endif
     return colour;
@@ -338,7 +342,8 @@ fn bent(water: Water, seen: f32) -> Bent {
     let straight = min(reach, endless());
     let position = water.position + t * straight;
     let under = max(water.position.y - position.y, 0.0);
-    return Bent(Seen(at, position, -t, water.eye.z / camera.focal, under), mix(path, straight, filled), filled);
+    return Bent(Seen(at, position, -t, water.eye.z / camera.focal, under),
+        mix(path, straight, filled), filled);
 }
 
 // Water at depth `z`, with the normal `smooth_normal` before ripples; `lost` is the mean square
@@ -359,7 +364,8 @@ fn water_at(z: f32, ray: vec3f, view: vec3f, smooth_normal: vec3f, lost: f32) ->
 fn water_light(water: Water, mirrored: vec3f, behind: vec3f, way: f32) -> vec3f {
     let reflectance = fresnel(clamp(dot(water.normal, water.view), 0.0, 1.0), shading.index);
     let sun = shading.sun_irradiance * water.lit
-        * glitter(water.normal, water.view, shading.sun_direction, water.slope_variance, shading.index);
+        * glitter(
+            water.normal, water.view, shading.sun_direction, water.slope_variance, shading.index);
     let extinction = shading.absorption + shading.scattering;
     let clear = exp(-extinction * way);
     let seen = behind * clear;
@@ -411,7 +417,8 @@ fn main(
         return;
     }
     let all = tiles[WET] + tiles[SET_ALONE] + tiles[BARE_TILES];
-    let id = pixel_of_tile(tiles[FIRST_TILE + LIST * all + place], thread, camera.margin + vec2u(0u, band.row));
+    let id = pixel_of_tile(
+        tiles[FIRST_TILE + LIST * all + place], thread, camera.margin + vec2u(0u, band.row));
 #else
 fn main(@builtin(global_invocation_id) id: vec3u) {
 #endif

@@ -46,5 +46,6 @@ fn main(
     let light = spray_radiance(-direction, facing, mist.optical_depth, lit);
     let white = hazed(light, far, direction);
     white_parts(pixel, white, mist.cover);
-    store_light(id.y * camera.picture.x + id.x, vec4f(white, 1.0) * mist.cover, camera.weight, false);
+    store_light(
+        id.y * camera.picture.x + id.x, vec4f(white, 1.0) * mist.cover, camera.weight, false);
 }

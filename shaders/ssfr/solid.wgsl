@@ -49,7 +49,8 @@ fn with_side(box: Box, from_p: vec3f, to_p: vec3f) -> Box {
     }
     let cut = mix(from_p, to_p, depths.x / (depths.x - depths.y));
     let at_plane = vec3f(cut.xy, CUT * camera.near);
-    return with_point(with_point(box, select(at_plane, from_p, depths.x > 0.0)), select(at_plane, to_p, depths.y > 0.0));
+    return with_point(with_point(box, select(at_plane, from_p, depths.x > 0.0)),
+        select(at_plane, to_p, depths.y > 0.0));
 }
 
 // Two triangles over the screen-space box of the triangle. Its sides decide in the fragment shader

@@ -38,7 +38,8 @@ fn main(
     }
     let place = moved(particle, index);
 #ifdef ELLIPSOIDS
-    let ellipsoid = ellipsoid_at(camera, place - camera.position, shapes[index], radius / camera.radius, camera.size);
+    let ellipsoid = ellipsoid_at(
+        camera, place - camera.position, shapes[index], radius / camera.radius, camera.size);
     let nearest = bitcast<u32>(ellipsoid.nearest);
     let bounds = ellipsoid.bounds;
 #else

@@ -33,7 +33,8 @@ fn main(
     }
     let place = particle.position;
 #ifdef ELLIPSOIDS
-    let ellipsoid = ellipsoid_at(camera, place - camera.position, shapes[index], radius / camera.radius, camera.size);
+    let ellipsoid = ellipsoid_at(
+        camera, place - camera.position, shapes[index], radius / camera.radius, camera.size);
     let bounds = ellipsoid.bounds;
 #else
     let c = eye_from_world(camera, place);

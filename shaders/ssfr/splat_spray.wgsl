@@ -178,7 +178,8 @@ fn main(
     }
     let air = near * air_of(particle);
     let company = company_of(particle);
-    let thread_of = Thread(turned(id, 0u), turned(id, 2u), between(LENGTH, company), between(OFF, company));
+    let thread_of = Thread(
+        turned(id, 0u), turned(id, 2u), between(LENGTH, company), between(OFF, company));
     let mist = between(MIST, company);
     let of_puffs = air * mist / (PUFF * PUFF * PUFF * f32(PUFFS));
     for (var k = 0u; k < select(0u, PUFFS, mist > 0.0); k++) {
@@ -187,7 +188,8 @@ fn main(
     }
     // Near the eye, more and smaller drops of the same opacity: as many more as their areas are
     // smaller.
-    let finer = between(FINER, company) * max((LEAST_SIZE + SIZES) * camera.radius * camera.focal / (c.z * LARGEST), 1.0);
+    let finer = between(FINER, company)
+        * max((LEAST_SIZE + SIZES) * camera.radius * camera.focal / (c.z * LARGEST), 1.0);
     let drops = min(u32(DROPS * finer * finer), MOST_DROPS);
     // Sum of the cubes of sizes LEAST + SIZES q² at the midpoints of that many parts of 0..1, with
     // correction terms of second order in 1 over their number.
