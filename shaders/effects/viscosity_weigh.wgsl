@@ -84,8 +84,8 @@ fn edge_bits(axis: u32) -> u32 {
         + u32(is_water(to_a + to_b));
     let weight_a = weight_of(of_a, a, b);
     let weight_b = weight_of(of_b, b, a);
-    let is_free = any(of_a == vec2u(IN_AIR)) || any(of_b == vec2u(IN_AIR)) || weight_a == 3u
-        || weight_b == 3u;
+    let is_free = any(of_a == vec2u(IN_AIR)) || any(of_b == vec2u(IN_AIR))
+        || weight_a == 3u || weight_b == 3u;
     return select(water | (weight_a << 3u) | (weight_b << 5u), 0u, is_free);
 }
 
