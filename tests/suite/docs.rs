@@ -119,6 +119,74 @@ fn no_source_file_is_too_long() {
     assert!(is_too_long(&"x\n".repeat(LONGEST + 1)));
 }
 
+/// Columns of a source line at most.
+const WIDEST: usize = 100;
+
+/// The end that closes the first raw string of a text, and the text behind its opening quote. Only
+/// raw strings with a `#` count, as none without one spans lines.
+fn raw_string(text: &str) -> Option<(String, &str)> {
+    text.match_indices("r#").find_map(|(at, _)| {
+        let behind = text[at + 1..].trim_start_matches('#');
+        let hashes = text.len() - (at + 1) - behind.len();
+        let body = behind.strip_prefix('"')?;
+        Some((format!("\"{}", "#".repeat(hashes)), body))
+    })
+}
+
+/// Numbers, from 1, of the lines wider than [`WIDEST`]. A line with a URL or with a part of a raw
+/// string, which cannot be continued, may be wider.
+fn wide_lines(text: &str) -> Vec<usize> {
+    let mut wide = Vec::new();
+    // What closes the raw string that is open.
+    let mut end: Option<String> = None;
+    for (index, line) in text.lines().enumerate() {
+        let mut may_be_wider = end.is_some() || line.contains("://");
+        let mut rest = line;
+        loop {
+            if let Some(close) = end.take() {
+                let Some((_, behind)) = rest.split_once(close.as_str()) else {
+                    end = Some(close);
+                    break;
+                };
+                rest = behind;
+            } else if let Some((close, body)) = raw_string(rest) {
+                may_be_wider = true;
+                end = Some(close);
+                rest = body;
+            } else {
+                break;
+            }
+        }
+        if !may_be_wider && line.chars().count() > WIDEST {
+            wide.push(index + 1);
+        }
+    }
+    assert_eq!(end, None, "a raw string without an end");
+    wide
+}
+
+#[test]
+fn no_source_line_is_too_wide() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let (mut seen, mut wide) = (0, Vec::new());
+    for folder in ["src", "shaders"] {
+        sources(&root.join(folder), &["rs", "wgsl"], &mut |file| {
+            seen += 1;
+            for line in wide_lines(&fs::read_to_string(file).unwrap()) {
+                wide.push(format!("{}:{line}", file.display()));
+            }
+        });
+    }
+    assert!(seen > 300, "{seen}");
+    assert!(wide.is_empty(), "over {WIDEST} columns: {wide:#?}");
+    // Negative control: one column more. Columns are characters, not bytes.
+    let full = "π".repeat(WIDEST);
+    assert_eq!(wide_lines(&format!("{full}\n{full}x\n{full}")), [2]);
+    // Raw strings and URLs may be wider, the line behind them may not.
+    let text = format!("r##\"{full}\n{full}x\"#\n{full}\"##\n{full}x\n// https://{full}\n");
+    assert_eq!(wide_lines(&text), [4]);
+}
+
 /// Whether a page has exactly one marker of the tool for its table, with an end marker after it.
 fn has_place(page: &str, tool: &str) -> bool {
     let mark = format!("<!-- {tool} -->\n");
