@@ -102,8 +102,8 @@ impl SceneBuilder {
             .set("solver.flip.cell_size", cell_size)
     }
 
-    /// Sets any key by its dotted path, such as `solver.pbf.iterations`; a value that was set before
-    /// is replaced.
+    /// Sets any key by its dotted path, such as `solver.pbf.iterations`; replaces a value that was
+    /// set before.
     pub fn set(mut self, key: &str, value: impl Into<Value>) -> Self {
         let value = value.into();
         match self.entry(key) {
@@ -121,8 +121,8 @@ impl SceneBuilder {
         }
     }
 
-    /// Sets the folder at which paths of meshes and tables start, and which they must not leave; the
-    /// current folder if it is not called.
+    /// Sets the folder at which paths of meshes and tables start, and which they must not leave;
+    /// the current folder by default.
     pub fn folder(mut self, folder: impl Into<PathBuf>) -> Self {
         self.folder = folder.into();
         self
