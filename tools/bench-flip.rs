@@ -158,8 +158,8 @@ fn print_box(solver: &Flip, told: &Frames) {
         .fold((f64::MAX, 0.0f64), |(a, b), &t| (a.min(t), b.max(t)));
     let frames = told.seconds.len() as f64;
     println!(
-        "{:.3} s a frame ({least:.3} to {most:.3} over {frames} frames), {:.2} substeps, {:.1} iterations and \
-         {:.1} of the correction",
+        "{:.3} s a frame ({least:.3} to {most:.3} over {frames} frames), {:.2} substeps, \
+         {:.1} iterations and {:.1} of the correction",
         median(told.seconds.clone()),
         f64::from(told.substeps) / frames,
         told.iterations as f64 / frames,
@@ -207,7 +207,10 @@ where
         }
     }
     let line = serde_json::json!({
-        "device": device, "particles": start.particles.len(), "seconds": seconds, "substeps": substeps,
+        "device": device,
+        "particles": start.particles.len(),
+        "seconds": seconds,
+        "substeps": substeps,
     });
     println!("{line}");
     Ok(())
@@ -231,7 +234,8 @@ fn measure_reference(options: &Options) -> Result<(), Box<dyn std::error::Error>
     let seconds = begin.elapsed().as_secs_f64();
     let n = start.particles.len();
     println!(
-        "{n} particles, f64: {:.3} µs a particle and substep over {substeps} substeps, {:.1} iterations each",
+        "{n} particles, f64: {:.3} µs a particle and substep over {substeps} substeps, \
+         {:.1} iterations each",
         1e6 * seconds / (n as f64 * f64::from(substeps)),
         iterations as f64 / f64::from(substeps)
     );

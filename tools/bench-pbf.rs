@@ -88,8 +88,8 @@ fn dam(count: usize, options: &Options) -> Result<(Scene, Start), Box<dyn std::e
          [domain]\nmin = [0.0, 0.0, 0.0]\nmax = [{}, {}, {edge}]\n\
          [[water.block]]\nmin = [0.0, 0.0, 0.0]\nmax = [{}, {edge}, {edge}]\n\
          [solver]\nmethod = \"pbf\"\n\
-         [solver.pbf]\nparticle_spacing = 0.1\niterations = 4\ncfl = {cfl:?}\nmax_substeps = {substeps}\n\
-         grid_projection = {has_projection}\n",
+         [solver.pbf]\nparticle_spacing = 0.1\niterations = 4\ncfl = {cfl:?}\n\
+         max_substeps = {substeps}\ngrid_projection = {has_projection}\n",
         4.0 * edge,
         2.0 * edge,
         2.0 * edge
@@ -148,7 +148,10 @@ fn measure(
     let timed = time_frames(&mut built, &start, options.frames)?;
     if options.is_json {
         let line = serde_json::json!({
-            "device": opened.identity().to_string(), "particles": n, "seconds": timed.seconds, "substeps": timed.substeps,
+            "device": opened.identity().to_string(),
+            "particles": n,
+            "seconds": timed.seconds,
+            "substeps": timed.substeps,
         });
         println!("{line}");
         return Ok(());

@@ -37,7 +37,8 @@ pub fn first_line_of_format_1(manifest: &[u8]) -> Vec<u8> {
 fn line_of(manifest: &[u8], files: &str) -> Vec<u8> {
     format!(
         "{{\"frame\":0,\"particles\":1,{files},\
-         \"manifest\":\"{}\",\"clock\":{{\"frame\":0,\"time\":0.0,\"substeps\":0,\"steps\":0}},\"report\":null}}",
+         \"manifest\":\"{}\",\
+         \"clock\":{{\"frame\":0,\"time\":0.0,\"substeps\":0,\"steps\":0}},\"report\":null}}",
         blake3::hash(manifest).to_hex()
     )
     .into_bytes()

@@ -138,7 +138,8 @@ fn processes_share_a_range_and_make_up_for_a_killed_one() {
         );
     }
     println!(
-        "{rounds} rounds of 3 processes: {shared} in which several rendered, {killed} with one killed"
+        "{rounds} rounds of 3 processes: {shared} in which several rendered, {killed} \
+         with one killed"
     );
     assert!(
         rounds < 2 || (shared > 0 && killed > 0),

@@ -20,8 +20,9 @@ use super::{
 /// A crest against the sky, from low before it.
 fn look(surface: &str) -> Look {
     let text = format!(
-        "[camera]\nfocal_length_mm = 27.0\nfilm_back_mm = [36.0, 20.25]\nposition = [17.5, 1.7, 7.3]\n\
-         target = [10.0, 2.0, 7.3]\n[image]\nwidth = 480\nheight = 270\n[surface]\n{surface}\
+        "[camera]\nfocal_length_mm = 27.0\nfilm_back_mm = [36.0, 20.25]\n\
+         position = [17.5, 1.7, 7.3]\ntarget = [10.0, 2.0, 7.3]\n\
+         [image]\nwidth = 480\nheight = 270\n[surface]\n{surface}\
          [sky]\nmodel = \"hosek_wilkie\"\n"
     );
     Look::parse(&text, Path::new("low.toml")).unwrap()

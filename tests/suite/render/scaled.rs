@@ -20,12 +20,14 @@ fn look(method: &str, filter: &str, scale: f64) -> Look {
     let place = |p: [f64; 3]| p.map(|x| scale * x);
     let per = |p: [f64; 3]| p.map(|x| x / scale);
     let text = format!(
-        "[camera]\nfocal_length_mm = 27.0\nfilm_back_mm = [36.0, 20.25]\nposition = {:?}\ntarget = {:?}\n\
+        "[camera]\nfocal_length_mm = 27.0\nfilm_back_mm = [36.0, 20.25]\n\
+         position = {:?}\ntarget = {:?}\n\
          [image]\nwidth = 192\nheight = 108\nsamples = 1\n[renderer]\nmethod = \"{method}\"\n\
          [surface]\nfilter = \"{filter}\"\nripple = {{ wavelength_m = {:?}, slope = 0.05 }}\n\
          [water]\nabsorption_per_metre = {:?}\nscattering_per_metre = {:?}\n\
          spray = {{ density_per_metre = {:?}, speed_m_per_s = {:?} }}\n\
-         [sun]\nazimuth_degrees = 112.0\nelevation_degrees = 34.0\n[sky]\nmodel = \"hosek_wilkie\"\n\
+         [sun]\nazimuth_degrees = 112.0\nelevation_degrees = 34.0\n\
+         [sky]\nmodel = \"hosek_wilkie\"\n\
          [ground]\nvariation = 1.0\nhaze_m = {:?}\n[basin]\nheight_m = {:?}\nthickness_m = {:?}\n\
          [solids.windows]\nstorey_m = {:?}\nbay_m = {:?}\n",
         place([7.2, 5.6, -1.7]),

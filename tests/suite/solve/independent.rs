@@ -531,7 +531,8 @@ fn ledgers_say_what_their_frames_come_to() {
     ] {
         let cache = format!("{solver}-{device}");
         let bake = format!(
-            "bake dam.toml -o {cache} --set solver.method={solver} --device {device} --set solver.pbf.grid_projection=false"
+            "bake dam.toml -o {cache} --set solver.method={solver} --device {device} \
+             --set solver.pbf.grid_projection=false"
         );
         job.expect(0, &bake);
         let reader = CacheReader::open(&job.path(&cache)).unwrap();

@@ -150,7 +150,8 @@ fn a_drop_at_rest_has_laplaces_pressure_and_keeps_still() {
         let (inside, [most, mean], report) = run(&scene, frames);
         let expected = 2.0 * SIGMA / r;
         println!(
-            "{method:?}: {:.4} of 2 σ / R, and of the capillary velocity {:.4} at most, {:.4} in the mean; {} substeps",
+            "{method:?}: {:.4} of 2 σ / R, and of the capillary velocity {:.4} at most, \
+             {:.4} in the mean; {} substeps",
             inside / expected,
             most / capillary,
             mean / capillary,

@@ -10,8 +10,10 @@ fn leaked(job: &Job, solver: &str, thickness: f64, x: f64, degrees: f64) -> usiz
     job.expect(
         0,
         &format!(
-            "bake 16-thin-wall.toml --solver {solver} -o {name} --frames 1-30 --set water.block[0].max=[0.6,1.0,0.6] \
-             --set solid[0].scale=[{thickness},2.6,2.0] --set solid[0].translate=[{x},0.6,0.3] --set solid[0].rotate_degrees=[0,{degrees},0]"
+            "bake 16-thin-wall.toml --solver {solver} -o {name} --frames 1-30 \
+             --set water.block[0].max=[0.6,1.0,0.6] \
+             --set solid[0].scale=[{thickness},2.6,2.0] --set solid[0].translate=[{x},0.6,0.3] \
+             --set solid[0].rotate_degrees=[0,{degrees},0]"
         ),
     );
     let state = CacheReader::open(&job.path(&name))

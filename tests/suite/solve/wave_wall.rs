@@ -84,7 +84,8 @@ fn water_before_a_wall_that_makes_a_wave_has_the_waves_depth_at_any_frame_rate()
                 job.expect(
                     0,
                     &format!(
-                        "bake solitary.toml --solver {solver} --device {device} -o {name} --set shot.frames_per_second={rate} --set shot.frames={frames}"
+                        "bake solitary.toml --solver {solver} --device {device} -o {name} \
+                         --set shot.frames_per_second={rate} --set shot.frames={frames}"
                     ),
                 );
                 let [off, still] = deviations(&job, &name, rate);

@@ -388,7 +388,8 @@ fn shadow(context: &Context, eye: Eye) -> Vec<f64> {
         method: "ray",
         ground: [1.0; 3],
         water: format!(
-            "index = {INDEX:?}\nabsorption_per_metre = [0.0, 0.0, 0.0]\ncaustics = {{ resolution = 512 }}\n"
+            "index = {INDEX:?}\nabsorption_per_metre = [0.0, 0.0, 0.0]\n\
+             caustics = {{ resolution = 512 }}\n"
         ),
         sun: [0.0, 45.0, 1.0],
         ..Setup::new(eye)
@@ -477,8 +478,10 @@ fn bumps_of_particles_at_rest_hardly_bundle_light() {
 
 fn look(water: &str, method: &str) -> Result<Look, String> {
     let text = format!(
-        "[camera]\nfocal_length_mm = 35.0\nfilm_back_mm = [36.0, 36.0]\nposition = [0.0, 3.0, 0.0]\ntarget = [1.0, 0.0, 1.0]\n\
-         [image]\nwidth = 64\nheight = 64\n[renderer]\nmethod = \"{method}\"\n[water]\n{water}\n[sky]\nmodel = \"hosek_wilkie\"\n"
+        "[camera]\nfocal_length_mm = 35.0\nfilm_back_mm = [36.0, 36.0]\n\
+         position = [0.0, 3.0, 0.0]\ntarget = [1.0, 0.0, 1.0]\n\
+         [image]\nwidth = 64\nheight = 64\n[renderer]\nmethod = \"{method}\"\n[water]\n{water}\n\
+         [sky]\nmodel = \"hosek_wilkie\"\n"
     );
     Look::parse(&text, std::path::Path::new("look.toml")).map_err(|error| error.to_string())
 }

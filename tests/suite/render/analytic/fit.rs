@@ -51,7 +51,8 @@ fn drawn(method: &'static str, film: [f64; 2], fit: &str) -> Image {
         .split_once("[image]\nwidth = 64\nheight = 64\n")
         .unwrap();
     let text = format!(
-        "[camera]\nfocal_length_mm = {FOCAL_MM:?}\nfilm_back_mm = {film:?}\n{fit}position = {:?}\ntarget = {:?}\n\
+        "[camera]\nfocal_length_mm = {FOCAL_MM:?}\nfilm_back_mm = {film:?}\n\
+         {fit}position = {:?}\ntarget = {:?}\n\
          [image]\nwidth = {}\nheight = {}\n{rest}",
         eye.position.to_array(),
         eye.target.to_array(),

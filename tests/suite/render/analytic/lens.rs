@@ -104,10 +104,13 @@ fn as_usd(eye: &Eye, [f_stop, focus]: [f64; 2], shift: [f64; 2]) -> String {
     let film = FILM / 100.0;
     let pixel = film / f64::from(eye.size);
     format!(
-        "#usda 1.0\n(\n    metersPerUnit = 1\n    upAxis = \"Y\"\n)\ndef Camera \"eye\"\n{{\n    float focalLength = {:?}\n    \
-         float horizontalAperture = {film:?}\n    float verticalAperture = {film:?}\n    float fStop = {f_stop:?}\n    \
-         float focusDistance = {focus:?}\n    float horizontalApertureOffset = {:?}\n    float verticalApertureOffset = {:?}\n    \
-         matrix4d xformOp:transform = ( {}0), {}0), {}0), {}1) )\n    uniform token[] xformOpOrder = [\"xformOp:transform\"]\n}}\n",
+        "#usda 1.0\n(\n    metersPerUnit = 1\n    upAxis = \"Y\"\n)\ndef Camera \"eye\"\n\
+         {{\n    float focalLength = {:?}\n    float horizontalAperture = {film:?}\n    \
+         float verticalAperture = {film:?}\n    float fStop = {f_stop:?}\n    \
+         float focusDistance = {focus:?}\n    float horizontalApertureOffset = {:?}\n    \
+         float verticalApertureOffset = {:?}\n    \
+         matrix4d xformOp:transform = ( {}0), {}0), {}0), {}1) )\n    \
+         uniform token[] xformOpOrder = [\"xformOp:transform\"]\n}}\n",
         eye.focal * pixel,
         shift[0] * pixel,
         shift[1] * pixel,

@@ -281,7 +281,8 @@ fn the_narrowest_name_counts_and_the_looks_own_comes_first() {
     let shown = Shown {
         eye: face.eye(),
         method: "ray",
-        solids: "materials = \"a.mtl\"\n[[solids.material]]\nname = \"face\"\ncolour = [0.25, 0.25, 0.25]\n\
+        solids: "materials = \"a.mtl\"\n\
+            [[solids.material]]\nname = \"face\"\ncolour = [0.25, 0.25, 0.25]\n\
             [[solids.material]]\nname = \"right\"\ncolour = [0.75, 0.75, 0.75]",
         files: &files,
         scene: &scene,
@@ -390,7 +391,8 @@ fn a_far_checker_is_its_mean() {
             let shown = Shown {
                 eye,
                 method,
-                solids: "[[solids.material]]\nname = \"face\"\ntexture = { file = \"a.png\", metres = 0.5 }",
+                solids: "[[solids.material]]\nname = \"face\"\n\
+                         texture = { file = \"a.png\", metres = 0.5 }",
                 files: &files,
                 scene: &scene,
                 samples: 1,

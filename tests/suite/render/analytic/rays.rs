@@ -77,7 +77,8 @@ fn pool_error(context: &Context, theta: f64, scattering: [f64; 3]) -> f64 {
     };
     let setup = Setup {
         water: format!(
-            "index = {INDEX:?}\nabsorption_per_metre = {ABSORPTION:?}\nscattering_per_metre = {scattering:?}\n"
+            "index = {INDEX:?}\nabsorption_per_metre = {ABSORPTION:?}\n\
+             scattering_per_metre = {scattering:?}\n"
         ),
         sun: [0.0, 90.0, 0.0],
         ..by_rays(eye)
@@ -113,7 +114,8 @@ fn the_pools_shadow_ends_where_light_comes_over_it() {
         let eye = Eye::new([x + 3.0, 3.0, 5.0], [x, 0.0, 5.0], 3000.0);
         let setup = Setup {
             water: format!(
-                "index = {INDEX:?}\nabsorption_per_metre = {ABSORPTION:?}\nscattering_per_metre = {CLEAR:?}\n"
+                "index = {INDEX:?}\nabsorption_per_metre = {ABSORPTION:?}\n\
+                 scattering_per_metre = {CLEAR:?}\n"
             ),
             sun: [180.0, 45.0, 0.0],
             ..by_rays(eye)
@@ -198,7 +200,8 @@ fn parts_error(context: &Context) -> f64 {
     };
     let setup = Setup {
         water: format!(
-            "index = {INDEX:?}\nabsorption_per_metre = {ABSORPTION:?}\nscattering_per_metre = {milky:?}\n"
+            "index = {INDEX:?}\nabsorption_per_metre = {ABSORPTION:?}\n\
+             scattering_per_metre = {milky:?}\n"
         ),
         sun: [0.0, 90.0, 0.0],
         output: "lights = [\"scattering\", \"reflection\", \"refraction\"]\n".to_owned(),
@@ -423,7 +426,8 @@ fn a_shadow_in_water_has_no_edge_but_its_own() {
     let eye = Eye::new([1.0, 1.0, 4.0], [9.0, 1.0, 6.0], 120.0);
     let setup = Setup {
         water: format!(
-            "index = {INDEX:?}\nabsorption_per_metre = [0.02, 0.02, 0.02]\nscattering_per_metre = [0.1, 0.1, 0.1]\n"
+            "index = {INDEX:?}\nabsorption_per_metre = [0.02, 0.02, 0.02]\n\
+             scattering_per_metre = [0.1, 0.1, 0.1]\n"
         ),
         sun: [0.0, 90.0, 1.0],
         samples: 4,

@@ -16,7 +16,8 @@ const WAVES: usize = 7;
 
 /// Slopes and lost variance at places (x, z), seconds and footprints, of ripples with a slope of 0.1.
 fn ripples(context: &Context, input: &[[f32; 4]]) -> Vec<[f32; 4]> {
-    let body = "let r = ripple_at(value.xy, value.z, 1.0, 0.1, value.w); return vec4f(r.slope, r.lost, 0.0);";
+    let body = "let r = ripple_at(value.xy, value.z, 1.0, 0.1, value.w); \
+                return vec4f(r.slope, r.lost, 0.0);";
     kernel(context, "shared/ssfr_ripple", body, input)
 }
 

@@ -137,7 +137,8 @@ fn the_sea_meets_the_edge_of_the_simulated_water_in_height() {
     assert!(found > 0.3, "a sea that does not know the edge: {found}");
 }
 
-const WAVES: &str = "[sea]\nlevel_m = 2.0\n[sea.waves]\nsignificant_height_m = 0.5\npeak_period_s = 4.0\n\
+const WAVES: &str = "[sea]\nlevel_m = 2.0\n\
+    [sea.waves]\nsignificant_height_m = 0.5\npeak_period_s = 4.0\n\
     shortest_period_s = 2.0\ndirection_degrees = 30.0\nspreading = 12.0\nseed = 5\n";
 
 fn waves() -> OpenWaves {

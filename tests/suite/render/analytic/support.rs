@@ -44,8 +44,8 @@ impl Eye {
     /// The look's table of this camera, standing still.
     fn table(&self, lines: &str) -> String {
         format!(
-            "[camera]\n{lines}focal_length_mm = {:?}\nfilm_back_mm = [{FILM:?}, {FILM:?}]\nup = {:?}\n\
-             position = {:?}\ntarget = {:?}\n",
+            "[camera]\n{lines}focal_length_mm = {:?}\nfilm_back_mm = [{FILM:?}, {FILM:?}]\n\
+             up = {:?}\nposition = {:?}\ntarget = {:?}\n",
             self.focal_length_mm(),
             self.up.to_array(),
             self.position.to_array(),
@@ -163,8 +163,9 @@ impl Setup {
         let [azimuth, elevation, intensity] = self.sun;
         format!(
             "{camera}[image]\nwidth = {side}\nheight = {side}\nsamples = {}\nshutter = {:?}\n\
-             {}[renderer]\nmethod = \"{}\"\n[surface]\n{}[water]\n{}[sun]\nazimuth_degrees = {azimuth:?}\n\
-             elevation_degrees = {elevation:?}\nintensity = {intensity:?}\n[sky]\n{}\
+             {}[renderer]\nmethod = \"{}\"\n[surface]\n{}[water]\n{}\
+             [sun]\nazimuth_degrees = {azimuth:?}\nelevation_degrees = {elevation:?}\n\
+             intensity = {intensity:?}\n[sky]\n{}\
              [ground]\ncolour = {:?}\nvariation = 0.0\nhaze_m = {:?}\n[solids]\ncolour = {:?}\n\
              [output]\nformats = [\"exr\"]\nbackground = {}\n\
              aovs = [\"Z\", \"N\", \"P\", \"forward\", \"thickness\"]\n{}{}",

@@ -76,7 +76,8 @@ impl Shot<'_> {
         let setup = Setup {
             method: "ray",
             water: format!(
-                "index = {INDEX:?}\nabsorption_per_metre = [0.0, 0.0, 0.0]\n[whitewater]\ndensity_per_metre = {:?}\n",
+                "index = {INDEX:?}\nabsorption_per_metre = [0.0, 0.0, 0.0]\n[whitewater]\n\
+                 density_per_metre = {:?}\n",
                 self.density
             ),
             sun: self.sun,

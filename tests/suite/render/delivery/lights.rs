@@ -14,7 +14,9 @@ use swell::{
 use super::super::analytic::support::{context, spoiled};
 use super::{METHODS, Setup, harbour, white};
 
-const ALL: &str = "lights = [\"solids\", \"reflection\", \"refraction\", \"scattering\", \"sun\", \"sky\", \"spray\", \"caustics\", \"foam\"]\n[whitewater]\ndensity_per_metre = 6.0\n";
+const ALL: &str = "lights = [\"solids\", \"reflection\", \"refraction\", \"scattering\", \
+                   \"sun\", \"sky\", \"spray\", \"caustics\", \"foam\"]\n\
+                   [whitewater]\ndensity_per_metre = 6.0\n";
 
 /// What stands behind the layers there.
 const WHITE: &str = "[whitewater]\ndensity_per_metre = 6.0\n";
