@@ -1,10 +1,13 @@
 //! Time per output frame and per pass of FLIP in a collapsing dam.
 //!
-//! `tools/bench flip [--adapter NAME | --device cpu] [--frames N] [--box XxYxZ] [--set "KEY = VALUE"] [--twice] [--json]`; the
-//! CPU has the f64 reference, of which the passes' times are wall clock. The box has
-//! 128×77×64 cells of 0.1 m where left out, and 36×49×64 of them hold 903 168 particles, already under way. Frames
-//! are a sixtieth of a second. The first two warm up; medians of the rest. `--set` adds to `[solver.flip]`, and
-//! `--twice` doubles the height of the box twice, and compares. `--json` prints one line, for programs, and leaves the passes out.
+//! `tools/bench flip [--adapter NAME | --device cpu] [--frames N] [--box XxYxZ]
+//! [--set "KEY = VALUE"] [--twice] [--json]`
+//!
+//! `--device cpu` runs the f64 reference; its times per pass are wall-clock times. The default box
+//! has 128×77×64 cells of 0.1 m, of which 36×49×64 hold 903 168 particles, already moving at 2 m/s.
+//! A frame lasts 1/60 s. The first two frames warm up; the medians of the others are printed.
+//! `--set` adds a line to `[solver.flip]`. `--twice` also measures a box four times as high and
+//! prints the ratio. `--json` prints one line for programs, without times per pass.
 #![allow(
     clippy::print_stderr,
     clippy::print_stdout,
@@ -64,7 +67,7 @@ fn options() -> Result<Options, String> {
             "--set" => options.settings += &format!("{}\n", value()?),
             "--json" => options.is_json = true,
             "--twice" => options.is_twice = true,
-            // Cargo's own.
+            // Passed by Cargo.
             "--bench" => {}
             _ => return Err(format!("`{word}` is no option")),
         }
@@ -105,7 +108,7 @@ fn median(mut values: Vec<f64>) -> f64 {
     values[values.len() / 2]
 }
 
-/// What a box's frames took.
+/// Measurements of one box after the warm-up.
 #[derive(Default)]
 struct Frames {
     seconds: Vec<f64>,
@@ -114,7 +117,8 @@ struct Frames {
     correction: u64,
 }
 
-/// Times a dam in boxes of these heights, frame by frame in turn, so that what else the machine does meets all.
+/// Times dams in boxes of these relative heights. The boxes are interleaved frame by frame, so that
+/// other load on the machine affects all of them alike.
 fn measure(
     context: &Context,
     options: &Options,
@@ -186,7 +190,7 @@ fn measure_passes(context: &Context, options: &Options) -> Result<(), Box<dyn st
     Ok(())
 }
 
-/// Times each frame, and prints one line of JSON.
+/// Times each frame and prints one line of JSON.
 fn print_line<S: Solver>(
     mut solver: S,
     device: &str,
@@ -216,7 +220,7 @@ where
     Ok(())
 }
 
-/// Of the f64 reference: µs a particle and substep, and where they go.
+/// Measures the f64 reference: µs per particle and substep, and the time of each pass.
 fn measure_reference(options: &Options) -> Result<(), Box<dyn std::error::Error>> {
     let (scene, start) = dam(options, 1.0)?;
     let mut solver = Reference::new(&scene, &start.boundary);

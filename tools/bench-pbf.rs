@@ -1,10 +1,14 @@
 //! Time per pass and per particle-step, and bytes per particle, of PBF in a collapsing dam.
 //!
-//! `tools/bench pbf [--device cpu] [--adapter NAME] [--frames N] [--rate HZ] [--alone] [--json] [COUNT ...]`; `cpu` is the f64
-//! reference; counts are 60 000, 250 000 and 1 000 000 where left out. With `--rate` a frame is one step of 1/HZ s. `--json` prints
-//! a line for each count, for programs, and leaves the passes out. A step is all in: projection on the grid (`--alone`: without), sort, neighbour lists,
-//! 4 red/black iterations, and the frame's share of measuring density and reading the state back. h = 2d, no effects, no solids. The first two frames warm up; medians of
-//! the rest.
+//! `tools/bench pbf [--device cpu] [--adapter NAME] [--frames N] [--rate HZ] [--alone] [--json]
+//! [COUNT ...]`
+//!
+//! `--device cpu` runs the f64 reference. COUNT is a number of particles; the default is 60 000,
+//! 250 000 and 1 000 000. With `--rate` a frame is one step of 1/HZ s. `--json` prints one line per
+//! count for programs, without times per pass. The time of a step includes the grid projection
+//! (unless `--alone` is given), the sort, neighbour lists, 4 red/black iterations, and a share of
+//! the frame's density measurement and readback. h = 2d, without effects and solids. The first two
+//! frames warm up; the medians of the others are printed.
 #![allow(
     clippy::print_stderr,
     clippy::print_stdout,
@@ -30,7 +34,8 @@ const WARM_UP: usize = 2;
 struct Options {
     device: Device,
     frames: usize,
-    /// Steps a second, a frame each; as many substeps of a thirtieth as the flow asks for where left out.
+    /// Steps a second, one per frame. Without it, a frame of 1/30 s takes as many substeps as the
+    /// CFL condition requires.
     rate: Option<f64>,
     has_projection: bool,
     is_json: bool,
@@ -62,7 +67,7 @@ fn options() -> Result<Options, String> {
             "--rate" => options.rate = Some(value()?.parse().map_err(|_| "--rate wants a number")?),
             "--json" => options.is_json = true,
             "--alone" => options.has_projection = false,
-            // Cargo's own.
+            // Passed by Cargo.
             "--bench" => {}
             _ => options.counts.push(
                 word.parse()
@@ -76,12 +81,13 @@ fn options() -> Result<Options, String> {
     Ok(options)
 }
 
-/// A dam of about `count` particles, twice as long as wide and high, with as much room before it, already under
-/// way, so that a frame takes the substeps of a shot.
+/// A dam of about `count` particles, twice as long as wide and high, with as much empty space in
+/// front of it. It already moves, so that a frame takes as many substeps as one of a shot.
 fn dam(count: usize, options: &Options) -> Result<(Scene, Start), Box<dyn std::error::Error>> {
     let edge = (count as f64 / 2.0).cbrt().round() * 0.1;
     let has_projection = options.has_projection;
-    // One substep: no displacement is then too long for a step of the rate, and a second one would be an error.
+    // One substep: with this `cfl` no displacement is too long for a step, and a second substep
+    // would be an error.
     let (rate, cfl, substeps) = options.rate.map_or((30.0, 0.5, 64), |rate| (rate, 5.0, 1));
     let text = format!(
         "[shot]\nname = \"bench\"\nframes = 1\nframes_per_second = {rate:?}\n\
@@ -105,9 +111,9 @@ fn median(mut values: Vec<f64>) -> f64 {
     values[values.len() / 2]
 }
 
-/// What frames took after the warm-up.
+/// Measurements after the warm-up.
 struct Timed {
-    /// Of a step, a frame each.
+    /// Wall-clock time of a step, seconds; one value per frame.
     seconds: Vec<f64>,
     substeps: u32,
     searched: u64,

@@ -1,10 +1,14 @@
-//! Iterations and times of the pressure solve on the tank of n³ cells, by preconditioner and surface.
+//! Iterations and times of the pressure solve on the tank of n³ cells, by preconditioner and
+//! surface.
 //!
-//! `tools/bench pressure [--adapter NAME] [--tolerance T] [--repeats R] [--passes] [--only P] [N ...]`;
-//! N are 16, 32, 64, 96 where left out, and P one of none, jacobi, ipp, multigrid, or reference: that is the f64
-//! solve on the CPU, by a factor where `reference::poisson::BUDGET` holds it and by conjugate gradients, alone. A time is one `project`, all in:
-//! system, solve, gradient, waiting for the device; the median of the repeats after one that warms up. `--passes`
-//! adds each pass's time by the device's clock.
+//! `tools/bench pressure [--adapter NAME] [--tolerance T] [--repeats R] [--passes] [--only P]
+//! [N ...]`
+//!
+//! N defaults to 16, 32, 64, 96. P is one of none, jacobi, ipp, multigrid, or reference, the f64
+//! solve on the CPU: by a sparse factorization where `reference::poisson::BUDGET` bytes suffice,
+//! and by conjugate gradients. A time is that of one `project`, which includes system, solve,
+//! gradient and waiting for the device; it is the median of the repeats after one that warms up.
+//! `--passes` adds the time of each pass by the device's clock.
 #![allow(
     clippy::print_stderr,
     clippy::print_stdout,
@@ -98,7 +102,8 @@ fn main() {
     }
 }
 
-/// One line for the f64 solve with so many bytes for a factor, and what a further right-hand side takes.
+/// Prints one line for the f64 solve with at most `budget` bytes for a factor, and how long its
+/// preparation takes.
 fn print_reference(n: u32, surface: Surface, budget: u64) {
     let case = tank(n, surface, false);
     let system = case.system();

@@ -1,4 +1,4 @@
-//! A stored baseline of `swell diff`.
+//! Fuzzes the stored baseline of `swell diff`.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

@@ -1,18 +1,18 @@
-//! A folder with a manifest and a ledger, for two targets.
+//! A cache folder with a manifest and a ledger, shared by two fuzz targets.
 #![allow(dead_code, reason = "each target uses its part")]
 
 use std::{fs, path::Path, sync::OnceLock};
 
 use swell::cache::{CacheReader, survey};
 
-/// As a bake writes it, in fewer lines.
+/// A manifest as a bake writes it, in fewer lines.
 pub const MANIFEST: &str = r#"{"format_version":2,"program":"swell","program_version":"0.1.0","shot":"a","scene_hash":"5c",
 "solver":"pbf","device":"d","driver":"d","backend":"Vulkan","frames_per_second":60.0,"particle_spacing":0.1,
 "rest_density":1000.0,"attributes":[],"start_particles":1,"probes":[{"name":"e","kind":"energy","at":[],
 "columns":["kinetic_J"]}],"files":[{"file":"scene.toml","bytes":0,
 "blake3":"af1349b9f5f9a1a6a0404dea36dcc9499bcb25c9adc112b7cc9a93cae41f3262"}]}"#;
 
-/// Contents of frame 0's line.
+/// Contents of the ledger's line for frame 0.
 pub fn first_line(manifest: &[u8]) -> Vec<u8> {
     line_of(
         manifest,
@@ -21,12 +21,12 @@ pub fn first_line(manifest: &[u8]) -> Vec<u8> {
     )
 }
 
-/// [`MANIFEST`] as format 1 has it.
+/// [`MANIFEST`] in format version 1.
 pub fn manifest_of_format_1() -> String {
     MANIFEST.replacen("\"format_version\":2", "\"format_version\":1", 1)
 }
 
-/// Contents of frame 0's line, as format 1 has it.
+/// Contents of the ledger's line for frame 0, in format version 1.
 pub fn first_line_of_format_1(manifest: &[u8]) -> Vec<u8> {
     line_of(
         manifest,
@@ -44,11 +44,12 @@ fn line_of(manifest: &[u8], files: &str) -> Vec<u8> {
     .into_bytes()
 }
 
-/// Opens and surveys a cache of these two; lines are chained as ours are.
+/// Opens and surveys a cache with this manifest and these ledger lines, chained as a bake chains
+/// them.
 pub fn read(manifest: &[u8], lines: &[Vec<u8>]) {
     static FOLDER: OnceLock<tempfile::TempDir> = OnceLock::new();
     let folder = FOLDER.get_or_init(|| {
-        // In memory where the machine has such a place.
+        // In memory where the machine has a memory file system.
         let memory = Path::new("/dev/shm");
         let folder = if memory.is_dir() {
             tempfile::tempdir_in(memory)

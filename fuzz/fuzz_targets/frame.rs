@@ -1,4 +1,4 @@
-//! A frame of a cache, plain or compressed: what is read could be written.
+//! Fuzzes a frame of a cache, plain or compressed: whatever can be read could have been written.
 #![no_main]
 
 use std::path::Path;

@@ -1,4 +1,5 @@
-//! A ledger whose chain holds, so that each line gets as far as its own checks: the input's lines are the contents.
+//! Fuzzes a ledger. The input's lines become the contents of ledger lines with a valid chain, so
+//! that each line reaches its own checks.
 #![no_main]
 
 mod cache;

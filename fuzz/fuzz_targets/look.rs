@@ -1,4 +1,4 @@
-//! A look file.
+//! Fuzzes the parser of look files.
 #![no_main]
 
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! A manifest of a cache, with a ledger that knows it: see `ledger`.
+//! Fuzzes a cache's manifest, with a ledger chained to it; see `ledger`.
 #![no_main]
 
 mod cache;

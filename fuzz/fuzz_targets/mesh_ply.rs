@@ -1,4 +1,4 @@
-//! A mesh file: any bytes are a mesh of finite vertices that its triangles name, or a refusal.
+//! Fuzzes PLY files: any bytes give an error or a mesh of finite vertices with valid indices.
 #![no_main]
 
 use std::path::Path;

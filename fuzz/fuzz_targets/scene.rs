@@ -1,4 +1,4 @@
-//! A scene file: any text is a scene or a refusal.
+//! Fuzzes the parser of scene files: any text gives a scene or an error.
 #![no_main]
 
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! A study file.
+//! Fuzzes the parser of study files.
 #![no_main]
 
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! A tolerance file of `swell diff`.
+//! Fuzzes the parser of `swell diff`'s tolerance files.
 #![no_main]
 
 use std::path::Path;

@@ -1,4 +1,5 @@
-//! A file of whitewater settings: a refusal that names the file, or settings that are the same once written out and read again.
+//! Fuzzes whitewater settings: any text gives an error that names the file, or settings that
+//! survive being written and read again.
 #![no_main]
 
 use std::path::Path;

@@ -1,4 +1,5 @@
-//! Both solvers against what is known without any solver: ballistics, conservation, decay of vortices.
+//! Both solvers compared with results that need no solver: ballistics, conservation, decay of
+//! vortices.
 
 use std::f64::consts::PI;
 
@@ -12,12 +13,12 @@ use swell::{
     solve::flip::capacity,
 };
 
-/// `f` of every particle, mean.
+/// Mean of `f` over all particles.
 fn mean(state: &Particles, f: impl Fn(usize) -> DVec3) -> DVec3 {
     (0..state.len()).map(f).sum::<DVec3>() / state.len() as f64
 }
 
-/// The state after `frames` frames of the scene's solver.
+/// State after `frames` frames of the scene's solver.
 fn advanced(context: &Context, scene: &Scene, particles: &Particles, frames: u32) -> Particles {
     match scene.solver.method {
         Method::Pbf => support::run(context, scene, particles, frames).0,
@@ -25,7 +26,7 @@ fn advanced(context: &Context, scene: &Scene, particles: &Particles, frames: u32
     }
 }
 
-/// A box of water in free flight, of each solver and transfer.
+/// A box of water in free flight, for each solver and transfer.
 fn throws() -> Vec<(&'static str, Scene)> {
     let mut pbf = support::scene([4.0, 6.0, 4.0]);
     pbf.solver.pbf.as_mut().unwrap().cfl = 2.0;
@@ -35,8 +36,9 @@ fn throws() -> Vec<(&'static str, Scene)> {
     vec![("pbf", pbf), ("flip", of_flip), ("apic", apic)]
 }
 
-/// Of a particle, as symplectic Euler takes it through n steps: v += g Δt, then x += v Δt, so that
-/// x_n = x_0 + n Δt v_0 + g Δt² n (n + 1) / 2, the parabola and a first-order part of half a step.
+/// Position and velocity of a particle after n steps of symplectic Euler, v += g Δt and then x += v
+/// Δt: x_n = x_0 + n Δt v_0 + g Δt² n (n + 1) / 2, the parabola plus a first-order term of half a
+/// step.
 fn flown(x: DVec3, v: DVec3, steps: f64, dt: f64) -> (DVec3, DVec3) {
     let g = DVec3::new(0.0, -9.81, 0.0);
     (
@@ -51,7 +53,8 @@ fn drops_fall_from_a_ceiling_as_from_anywhere() {
     let steps = 20;
     let mut projected = support::scene([4.0, 6.0, 4.0]);
     projected.solver.pbf.as_mut().unwrap().grid_projection = true;
-    // Above the water that the others have; far from each other; nearer to the ceiling walls push.
+    // Above the water of the other tests and far from each other. Particles closer to the ceiling
+    // would be pushed by it.
     let places: [[f32; 3]; 4] = [
         [1.55, 5.97, 1.62],
         [0.04, 5.93, 0.05],
@@ -77,11 +80,12 @@ fn drops_fall_from_a_ceiling_as_from_anywhere() {
         .into_iter()
         .chain([("projected", projected.clone())]);
     for (name, scene) in scenes {
-        // A rounding of 6 m a step.
+        // A position of 6 m is rounded in each step.
         let off = fallen(&context, &scene);
         assert!(off < 6.0 * 6e-8 * 2.0 * f64::from(steps), "{name}: {off} m");
     }
-    // Negative control: what the faces about a drop say, of which the ceiling's stands still.
+    // Negative control: the change on the faces around a drop, one of which belongs to the fixed
+    // ceiling.
     let mut spoiled = context;
     spoiled.spoil = Some(Spoil {
         pass: "flip/grid_to_particle",
@@ -94,7 +98,8 @@ fn drops_fall_from_a_ceiling_as_from_anywhere() {
     }
 }
 
-/// Where a solid is near as well: what leads into the floor is taken from the velocity, or gravity would add to it for ever.
+/// The same beside a solid: the velocity loses its component into the floor; otherwise gravity
+/// would add to it forever.
 #[test]
 fn a_drop_beside_a_solid_lies_still_on_the_floor() {
     let mut scene = scene([16.0; 3]);
@@ -108,10 +113,10 @@ fn a_drop_beside_a_solid_lies_still_on_the_floor() {
         velocity(&states.last().unwrap(), 0).length()
     };
     let context = context();
-    // A step's fall.
+    // What gravity adds in one step.
     let speed = falls(&context);
     assert!(speed < 9.81 / 50.0, "{speed} m/s");
-    // Negative control: after the rounds that keep it out of both, no wall knows of it.
+    // Negative control: the walls are ignored after the rounds that keep a particle out of both.
     let mut spoiled = context;
     spoiled.spoil = Some(Spoil {
         pass: "flip/advect",
@@ -122,7 +127,7 @@ fn a_drop_beside_a_solid_lies_still_on_the_floor() {
     assert!(speed > 4.0, "{speed} m/s");
 }
 
-/// Water that nothing touches falls as one, every particle along its own parabola.
+/// Water that nothing touches falls as a whole, every particle along its own parabola.
 #[test]
 fn free_flight_is_a_parabola() {
     let context = context();
@@ -140,26 +145,27 @@ fn free_flight_is_a_parabola() {
             let (x, v) = flown(position(&particles, k), start, f64::from(steps), dt);
             off = off.max((position(&state, k) - x).length());
             off_speed = off_speed.max((velocity(&state, k) - v).length());
-            // Explicit Euler moves before it speeds up: n (n − 1) / 2.
+            // Explicit Euler moves before it accelerates: n (n − 1) / 2.
             let other = x + DVec3::new(0.0, 9.81 * dt * dt * f64::from(steps), 0.0);
             half_a_step = half_a_step.min((position(&state, k) - other).length());
         }
         println!("{name}: {off:.2e} m, {off_speed:.2e} m/s off");
-        // Speeds near 4 m/s: each step sums and, on grids, takes a mean of eight twice, each rounding by at most
-        // ε/2 of 4 m/s; errors of 40 steps add up, and those of positions are sums of those of speeds and of their
-        // own rounding near 6 m.
+        // At speeds near 4 m/s each step sums and, on grids, averages eight values twice; each
+        // operation rounds by at most ε/2 of 4 m/s. The errors of 40 steps add up. Errors of
+        // positions are sums of those of speeds and of their own rounding near 6 m.
         let epsilon = f64::from(f32::EPSILON) / 2.0;
         let speed_bound = 40.0 * 20.0 * epsilon * 4.0;
         let bound = 40.0 * (epsilon * 6.0 + dt * speed_bound);
         assert!(off_speed < speed_bound, "{name}: {off_speed} {speed_bound}");
         assert!(off < bound, "{name}: {off} {bound}");
-        // Negative control: the other Euler's parabola is 3.9 cm away.
+        // Negative control: explicit Euler's parabola is 3.9 cm away.
         assert!(half_a_step > 100.0 * bound, "{name}: {half_a_step}");
     }
 }
 
-/// A blob of water, too dense and jittered, that flies without gravity: how far its mean velocity parts from the
-/// start's, m/s, and whether every particle is still there once.
+/// Runs a blob of water, too dense and jittered, without gravity. Returns how far its mean velocity
+/// departs from the initial one and the rms velocity about the mean, both in m/s. Asserts that no
+/// particle is lost or duplicated.
 fn drift(context: &Context, scene: &Scene, particles: &Particles, frames: u32) -> (f64, f64) {
     let momentum = |state: &Particles| mean(state, |k| velocity(state, k));
     let state = advanced(context, scene, particles, frames);
@@ -176,9 +182,10 @@ fn drift(context: &Context, scene: &Scene, particles: &Particles, frames: u32) -
     )
 }
 
-/// PBF's corrections are pairwise and opposite where all move at once: m Σ v stays. Red/black's second colour sees the
-/// first where it has gone to, and a semi-iteration that starts afresh does so for one particle of a pair: there the
-/// sum moves by a part of what the corrections do.
+/// PBF's corrections are pairwise and opposite where all particles move at once: m Σ v is
+/// conserved. The second colour of red/black sees the first at its new positions, and a Chebyshev
+/// semi-iteration that restarts does so for one particle of a pair; there the sum changes by a part
+/// of the corrections.
 #[test]
 fn pbf_keeps_mass_and_momentum() {
     let context = context();
@@ -192,22 +199,23 @@ fn pbf_keeps_mass_and_momentum() {
         let pbf = scene.solver.pbf.as_mut().unwrap();
         pbf.iteration = iteration;
         pbf.stop = Stop::Iterations(4);
-        // Jacobi at ω = 1 overshoots, and what is bounded is no longer a pair's.
+        // Jacobi at ω = 1 overshoots, and corrections that are clamped are no longer pairwise.
         pbf.relaxation = 0.5;
         let (drift, rms) = drift(&context, &scene, &particles, 20);
         println!("{iteration:?}: {drift:.2e} m/s of {rms:.2e} m/s that the blob expands with");
         drifts.push(drift);
     }
-    // Each of 80 corrections rounds a position near 2 m by at most ε/2, which over 10 ms is a speed; roundings are
-    // independent, over 1000 particles and 80 corrections.
+    // Each of 80 corrections rounds a position near 2 m by at most ε/2, which over 10 ms is a
+    // speed; roundings are independent, over 1000 particles and 80 corrections.
     let rounding = f64::from(f32::EPSILON) / 2.0 * 2.0 / 0.01;
     let bound = 3.0 * rounding * (80.0f64).sqrt() / (1000.0f64).sqrt();
     assert!(drifts[0] < bound, "{drifts:?} {bound}");
-    // Negative control: one colour after the other is no pair any more.
+    // Negative control: with one colour after the other, corrections are not pairwise.
     assert!(drifts[1] > 10.0 * bound, "{drifts:?} {bound}");
 }
 
-/// A block that turns and falls in free space: what its momenta are off after 0.4 s.
+/// A block that rotates and falls in free space: the error of its mean velocity after 0.4 s, m/s,
+/// and its angular momentum relative to the initial one.
 fn free_block(transfer: Transfer, pic_blend: f64) -> (DVec3, f64) {
     let mut scene = scene([24.0, 32.0, 24.0]);
     scene.shot.frames_per_second = 50.0;
@@ -229,7 +237,7 @@ fn free_block(transfer: Transfer, pic_blend: f64) -> (DVec3, f64) {
     (linear(&state) - expected, spin_of(&state) / angular)
 }
 
-/// Gives particles the rows of a flow in the plane, ∂(u, v)/∂(x, y).
+/// Sets the affine attributes of particles to the gradient of a planar flow, ∂(u, v)/∂(x, y).
 fn affine(particles: &mut Particles, rows: impl Fn(DVec3) -> [[f64; 2]; 2]) {
     for k in 0..particles.len() {
         let [[xx, xy], [yx, yy]] = rows(position(particles, k));
@@ -241,7 +249,7 @@ fn affine(particles: &mut Particles, rows: impl Fn(DVec3) -> [[f64; 2]; 2]) {
     }
 }
 
-/// Angular momentum about the upright axis through the middle, a particle's, m²/s.
+/// Mean angular momentum per unit mass about the vertical axis through the centre of mass, m²/s.
 fn spin_of(state: &Particles) -> f64 {
     let center = mean(state, |k| position(state, k));
     mean(state, |k| {
@@ -255,18 +263,18 @@ fn flip_keeps_mass_and_momentum() {
     for transfer in [Transfer::Flip, Transfer::Apic] {
         let (linear, angular) = free_block(transfer, 0.05);
         println!("{transfer:?}: {linear} m/s off, {angular} of the spin");
-        // The pressure of water that turns is not zero, and pushes on faces that hold unequal mass: a hundredth of
-        // the 3.9 m/s is allowed.
+        // The pressure of rotating water is not zero, and it acts on faces of unequal mass: an
+        // error of one hundredth of 3.9 m/s is allowed.
         assert!(linear.length() < 0.04, "{linear}");
         assert!((0.9..1.05).contains(&angular), "{angular}");
     }
-    // Negative control: PIC alone grinds the spin down.
+    // Negative control: pure PIC dissipates the rotation.
     let (_, angular) = free_block(Transfer::Flip, 1.0);
     println!("PIC: {angular} of the spin");
     assert!(angular < 0.9, "{angular}");
 }
 
-/// How velocities go to the grid and back.
+/// Transfer schemes: name, transfer and PIC blend.
 const TRANSFERS: [(&str, Transfer, f64); 4] = [
     ("PIC", Transfer::Flip, 1.0),
     ("FLIP", Transfer::Flip, 0.0),
@@ -274,10 +282,12 @@ const TRANSFERS: [(&str, Transfer, f64); 4] = [
     ("APIC", Transfer::Apic, 0.0),
 ];
 
-/// Steps of the vortices.
+/// Number of steps of the vortex tests.
 const STEPS: u32 = 20;
 
-/// A full box of `cells` × `cells` × 4 cells without gravity and a flow in its plane: u, v and their gradient at x, y.
+/// Runs a full box of `cells` × `cells` × 4 cells without gravity, with a flow in its plane: `flow`
+/// gives u, v and their gradient at x, y. Returns the first state and the one [`STEPS`] steps
+/// later.
 fn planar(
     context: &Context,
     cells: usize,
@@ -309,7 +319,7 @@ fn energy(state: &Particles) -> f64 {
     mean(state, |k| velocity(state, k) * velocity(state, k)).element_sum() / 2.0
 }
 
-/// −ln of what is left of a Taylor–Green vortex's energy after [`STEPS`] steps.
+/// −ln of the fraction of a Taylor–Green vortex's energy that is left after [`STEPS`] steps.
 fn taylor_green(context: &Context, cells: usize, how: (Transfer, f64)) -> f64 {
     let k = PI / (cells as f64 * DX);
     let flow = |x: DVec3| {
@@ -329,9 +339,10 @@ fn taylor_green(context: &Context, cells: usize, how: (Transfer, f64)) -> f64 {
     -(energy(&last) / energy(&first)).ln()
 }
 
-/// sin(kx) cos(ky) is a steady flow of an ideal fluid, and what decays is numerical. To the grid and back a hat each
-/// way takes sinc²(k Δx / 2) an axis: PIC's amplitude falls by sinc⁸ a step, which is the decay 2 ν k² Δt at
-/// ν = Δx² / (6 Δt), METHODS' and Zhu and Bridson's numerical viscosity.
+/// sin(kx) cos(ky) is a steady flow of an ideal fluid, so any decay is numerical. Hat functions to
+/// the grid and back take sinc²(k Δx / 2) per axis each time: PIC's amplitude falls by sinc⁸ per
+/// step, which is the decay 2 ν k² Δt at ν = Δx² / (6 Δt), the numerical viscosity of METHODS and
+/// of Zhu and Bridson.
 #[test]
 fn taylor_green_decays_as_the_transfer_has_it() {
     let context = context();
@@ -346,24 +357,25 @@ fn taylor_green_decays_as_the_transfer_has_it() {
             loss
         });
         println!("expected of PIC {expected:.5}");
-        // The row of cells at a wall takes its mean from one side, off by as much as the smoothing itself: two rows of
-        // `cells` for each axis.
+        // The row of cells at a wall averages over one side, with an error as large as the
+        // smoothing itself: two rows of `cells` for each axis.
         let walls = 2.0 / cells as f64;
         assert!((pic / expected - 1.0).abs() < walls, "{pic} {expected}");
-        // α of the velocity is PIC's. What the grid does not see of the rest, α takes as well: the same again is allowed.
+        // A fraction α of the velocity is PIC's. α also damps the part of the rest that the grid
+        // does not resolve: the same amount again is allowed.
         let part =
             -2.0 * f64::from(STEPS) * (1.0 - 0.05 * (1.0 - (half.sin() / half).powi(8))).ln();
         assert!((0.9..2.0).contains(&(blended / part)), "{blended} {part}");
-        // Affine rows carry what PIC's mean loses to second order in θ = k Δx, and FLIP carries the velocity itself:
-        // what is left is of the next order, θ² of PIC's.
+        // Affine rows carry what PIC's mean loses to second order in θ = k Δx, and FLIP carries the
+        // velocity itself: the remaining loss is of the next order, θ² of PIC's.
         let next = (2.0 * half).powi(2) * pic;
         assert!(flip < next && apic < next, "{flip} {apic} {next}");
-        // Negative control: PIC's bound is none that FLIP or APIC could meet.
+        // Negative control: FLIP and APIC do not meet PIC's bound.
         assert!((apic / expected - 1.0).abs() > walls);
     }
 }
 
-/// A Rankine vortex: core of 6 cells that turns as one, and a free vortex about it.
+/// A Rankine vortex: a core of 6 cells that rotates rigidly, inside a free vortex.
 #[test]
 fn a_rankine_vortex_keeps_its_spin_but_with_pic() {
     let context = context();
@@ -391,16 +403,17 @@ fn a_rankine_vortex_keeps_its_spin_but_with_pic() {
         println!("{name}: {spin:.5} of the spin, {energy:.5} of the energy");
         (spin, spin_of(&first))
     });
-    // d/dt ∫ r² ω dA = 4 ν Γ takes 2 ν Γ from the spin, −½ ∫ r² ω dA + const, a second: free vortex and core are both
-    // without viscous force, and the kink between them spreads (Lamb and Oseen). ν = Δx² / (6 Δt).
+    // d/dt ∫ r² ω dA = 4 ν Γ takes 2 ν Γ per second from the angular momentum, −½ ∫ r² ω dA +
+    // const. Free vortex and core are both without viscous force, and the kink between them spreads
+    // (Lamb and Oseen). ν = Δx² / (6 Δt).
     let area = (cells as f64 * DX).powi(2);
     let lost = f64::from(STEPS) * circulation * DX * DX / 3.0 / area / kept[0].1;
     println!("PIC should lose {lost:.5} of the spin");
     let [pic, flip, blended, apic] = kept.map(|(spin, _)| 1.0 - spin);
-    // Two rows of 32 at walls on two axes, as above.
+    // Two of 32 rows at the walls on two axes, as above.
     assert!((pic / lost - 1.0).abs() < 0.125, "{pic} {lost}");
-    // FLIP's own noise takes less than a twenty-fifth of what PIC takes; blended, α of PIC's comes on top, and half of
-    // that again for what of the noise the grid does not see.
+    // FLIP's noise takes less than 1/25 of what PIC takes. With blending, α of PIC's loss is added,
+    // and half of that again for the noise that the grid does not resolve.
     assert!(blended < (0.05 + 0.025) * lost + flip, "{blended} {lost}");
     assert!(
         flip.abs() < 0.04 * lost && apic.abs() < 0.01 * lost,

@@ -1,4 +1,4 @@
-//! Both solvers against water at rest and against linear waves, seen through probes.
+//! Both solvers compared with water at rest and with linear waves, observed through probes.
 
 use std::f64::consts::PI;
 
@@ -20,7 +20,7 @@ use swell::{
     solve::SolveError,
 };
 
-/// The scene's solver, loaded.
+/// Builds the scene's solver and loads `particles`.
 fn built(
     context: &Context,
     scene: &Scene,
@@ -46,7 +46,8 @@ fn ask_for_pressure(scene: &mut Scene) {
     });
 }
 
-/// p = ρ g depth from the floor to the topmost cell's centre, also between cells, and nothing moves.
+/// p = ρ g depth from the floor to the centre of the topmost cell, also between cell centres, and
+/// nothing moves.
 #[test]
 fn flip_still_water_stays_and_weighs_what_it_weighs() {
     let (mut scene, particles) = tank([16, 20, 12], 11);
@@ -70,15 +71,16 @@ fn flip_still_water_stays_and_weighs_what_it_weighs() {
             most.0.max(off(&pressures, 1.1)),
             most.1.max(report.max_speed),
         );
-        // The solve's tolerance leaves 1e-5 of what gravity adds in 10 ms, 0.1 m/s, each frame; and the lattice's
-        // surface lies on a face to rounding.
+        // The solve's tolerance leaves 1e-5 of what gravity adds in 10 ms, 0.1 m/s, in each frame.
+        // The surface of the lattice lies on a face, up to rounding.
         assert!(report.max_speed < 2e-5, "frame {frame}: {report:?}");
         assert!(off(&pressures, 1.1) < 1e-3, "frame {frame}: {pressures:?}");
-        // Negative control: a surface a twentieth of a cell off is 5 % of the top cell's pressure.
+        // Negative control: a surface a twentieth of a cell off changes the top cell's pressure by
+        // 5 %.
         assert!(off(&pressures, 1.105) > 1e-2);
         assert_eq!(state.id, particles.id);
         let top = elevation(&state, DX / 2.0, &scene.domain, DVec2::splat(0.6)).unwrap();
-        // A twentieth of a spacing, what the level set has on a lattice.
+        // A twentieth of a spacing, the error of the level set on a lattice.
         assert!((top - 1.1).abs() < 0.05 * DX / 2.0, "frame {frame}: {top}");
     }
     println!(
@@ -89,10 +91,11 @@ fn flip_still_water_stays_and_weighs_what_it_weighs() {
     assert_eq!(solver.pressures(&[air]).unwrap(), [None]);
 }
 
-/// PBF holds a column up by multipliers that a few iterations leave off, over particles that lie closer at the surface
-/// than in the bulk. It does not come within 1 % of ρ g depth, and this says what it comes to: away from floor and surface
-/// the pressure rises with depth by ρ g to 5 %, and lies between that of the water under the surface that is seen and
-/// that of all the mass which rest density below leaves above.
+/// PBF supports a column by multipliers that a few iterations leave inexact, over particles that
+/// are closer to each other at the surface than in the bulk. It does not come within 1 % of ρ g
+/// depth. This test states its accuracy: away from floor and surface the pressure rises with depth
+/// by ρ g to 5 %, and it lies between the pressures of the water below the observed surface and of
+/// all the mass that rest density places above.
 #[test]
 fn pbf_still_water_weighs_about_what_it_weighs() {
     let mut scene = support::scene([0.8, 1.6, 0.8]);
@@ -120,7 +123,8 @@ fn pbf_still_water_weighs_about_what_it_weighs() {
         let ratio = p / (9810.0 * (top - at.y));
         println!("PBF at {:.1} m: {p:.0} Pa, {ratio:.3} of ρ g depth", at.y);
     }
-    // κ is that of the lattice, 5 % off 1; water that has settled is none, and may be off by as much.
+    // κ is that of the lattice, 5 % off 1. Settled water is not a lattice and may be off by as
+    // much.
     let slope = (mean[3] - mean[8]) / (5.0 * D) / 9810.0;
     println!("PBF rises by {slope:.4} ρ g between 0.3 and 0.8 m");
     assert!((slope - 1.0).abs() < 0.05, "{slope}");
@@ -131,12 +135,12 @@ fn pbf_still_water_weighs_about_what_it_weighs() {
         })
     };
     assert!(is_between(1.0), "{mean:?}");
-    // Negative control: neither half of it nor twice, as a wrong factor on λ would have it.
+    // Negative control: half or twice the pressure, as a wrong factor on λ would give.
     assert!(!is_between(0.5) && !is_between(2.0));
 }
 
-/// One wave of length `length` along x with a crest in amplitude `a`, its velocities at the moment when it is flat: still
-/// water of depth `h` between walls, k = 2π / L, ω² = g k tanh kh.
+/// A standing wave in water of depth `depth` between walls `length` apart, at the moment when the
+/// surface is flat: k = 2π / L, ω² = g k tanh kh. Lengths in metres.
 struct Wave {
     length: f64,
     depth: f64,
@@ -153,7 +157,8 @@ impl Wave {
         (9.81 * k * (k * self.depth).tanh()).sqrt()
     }
 
-    /// η = a sin ωt cos kx, u = −aω cosh ky / sinh kh cos ωt sin kx, v = aω sinh ky / sinh kh cos ωt cos kx.
+    /// η = a sin ωt cos kx, u = −aω cosh ky / sinh kh cos ωt sin kx, v = aω sinh ky / sinh kh cos
+    /// ωt cos kx.
     fn add_to(&self, particles: &mut Particles) {
         let (k, speed) = (self.number(), self.amplitude * self.frequency());
         for (x, v) in particles.position.iter().zip(&mut particles.velocity) {
@@ -166,7 +171,7 @@ impl Wave {
         }
     }
 
-    /// What an array of gauges sees of the wave: 2/n Σ η cos kx.
+    /// Amplitude of the wave as seen by an array of n gauges: 2/n Σ η cos kx, metres.
     fn seen(&self, scene: &Scene, state: &Particles, z: f64) -> f64 {
         let gauges = 16;
         let sum: f64 = (0..gauges)
@@ -186,7 +191,8 @@ impl Wave {
     }
 }
 
-/// Mean period of a signal from where it goes through 0 between swings of at least `least` to either side.
+/// Mean period of a signal, from its zero crossings between swings of at least `least` to either
+/// side.
 fn period(signal: &[f64], dt: f64, least: f64) -> f64 {
     let mut crossings: Vec<f64> = Vec::new();
     let (mut side, mut through) = (0.0, 0.0);
@@ -204,7 +210,7 @@ fn period(signal: &[f64], dt: f64, least: f64) -> f64 {
     2.0 * (crossings[crossings.len() - 1] - crossings[0]) / (crossings.len() - 1) as f64
 }
 
-/// Measured period over 2π/ω, and the part of the amplitude that the last swing has.
+/// Measured period over 2π/ω, and the amplitude of the last swing as a fraction of the initial one.
 fn swing(context: &Context, scene: &Scene, settled: &Particles, wave: &Wave, z: f64) -> (f64, f64) {
     let expected = 2.0 * PI / wave.frequency();
     let dt = scene.shot.frame_seconds();
@@ -225,8 +231,8 @@ fn swing(context: &Context, scene: &Scene, settled: &Particles, wave: &Wave, z: 
     )
 }
 
-/// The period, over that of linear theory, is within `bound`, and that of the long wave's ω² = g h k², as at kh = 2 it is
-/// not, is far from it.
+/// Asserts that the period relative to linear theory is within `bound`, and that the period of long
+/// waves, ω² = g h k², which does not hold at kh = 2, is far off.
 fn check_period(name: &str, wave: &Wave, ratio: f64, bound: f64) {
     assert!((ratio - 1.0).abs() < bound, "{name}: {ratio} {bound}");
     let depth = wave.number() * wave.depth;
@@ -234,10 +240,11 @@ fn check_period(name: &str, wave: &Wave, ratio: f64, bound: f64) {
     assert!((long - 1.0).abs() > 2.0 * bound, "{name}: {long} {bound}");
 }
 
-/// A grid places the surface to a part of a cell: a cell with any water has it above its centre, one without below. An
-/// eighth of a cell either way, on average over a swing of amplitude a, changes what drives the wave by Δx / (8 a) of
-/// itself, and the period by half of that. Measured, with crests of 1/32 of the length: −6.4 % at 16 cells a length,
-/// 3.2 % at 32, 0.4 % at 48, 1.2 % at 64.
+/// A grid locates the surface only to a part of a cell: in a cell with any water it is above the
+/// centre, in one without water below. An eighth of a cell either way, on average over a swing of
+/// amplitude a, changes the restoring force by Δx / (8 a) of itself, and the period by half of
+/// that. Measured, with crests of 1/32 of the length: −6.4 % at 16 cells per length, 3.2 % at 32,
+/// 0.4 % at 48, 1.2 % at 64.
 #[test]
 fn flip_standing_waves_have_their_period() {
     let context = context();
@@ -250,7 +257,7 @@ fn flip_standing_waves_have_their_period() {
     let periods = cells.map(|cells| {
         let deep = cells * 5 / 16;
         let (mut scene, particles) = tank([cells, 2 * deep, 4], deep);
-        // As many steps a period at either size.
+        // The same number of steps per period for both sizes.
         scene.shot.frames_per_second = 282.8 / (cells as f64).sqrt();
         let (ratio, left) = swing(&context, &scene, &particles, &wave(cells), 0.2);
         println!(
@@ -267,10 +274,11 @@ fn flip_standing_waves_have_their_period() {
     assert!(fine < 0.5 * coarse, "{periods:?}");
 }
 
-/// Density and its gradient are means over the support h, so that waves are off by second order in k h: half of (k h)² is
-/// allowed, 7.7 % at 32 spacings a length. Measured there 3.5 % short with 16 iterations, 1.2 % with 4; at 64 spacings
-/// 0.4 % at 100 steps a second and 2.4 % at 71. Water that has settled is a twelfth less deep than its lattice, and the
-/// wave's depth is what is seen. Three quarters of the amplitude are gone after three periods.
+/// Density and its gradient are means over the support h, so that waves have an error of second
+/// order in k h: half of (k h)² is allowed, 7.7 % at 32 spacings per length. Measured there: 3.5 %
+/// short with 16 iterations, 1.2 % with 4; at 64 spacings 0.4 % at 100 steps a second and 2.4 % at
+/// 71. Settled water is a twelfth less deep than its lattice, so the wave uses the observed depth.
+/// Three quarters of the amplitude are lost after three periods.
 #[test]
 fn pbf_standing_waves_have_about_their_period() {
     let context = context();

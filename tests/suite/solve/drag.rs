@@ -1,4 +1,4 @@
-//! Drag of air: drops fall as drops were measured to, wind takes them along, and what is no drop is let be.
+//! Air drag: drops fall at measured speeds, wind carries them along, and bulk water is unaffected.
 
 use glam::DVec3;
 use swell::{
@@ -15,7 +15,7 @@ const METHODS: [Method; 2] = [Method::Flip, Method::Pbf];
 
 const FRAMES_PER_SECOND: f64 = 100.0;
 
-/// Joined along x, so that wind has no end there.
+/// A box that is periodic along x, so that wind is unbounded there.
 fn scene(method: Method, cells: [f64; 3]) -> Scene {
     let mut scene = of_flip::scene(cells);
     let pbf = scene.solver.pbf.as_mut().unwrap();
@@ -31,7 +31,7 @@ fn drag(drop_radius: f64, wind: [f64; 3]) -> Option<Settings> {
     Some(Settings { drop_radius, wind })
 }
 
-/// Two drops that know nothing of each other.
+/// Two drops too far apart to interact.
 fn drops() -> Particles {
     Particles {
         id: vec![0, 1],
@@ -41,9 +41,10 @@ fn drops() -> Particles {
     }
 }
 
-/// Drops of 0.2 and 0.5 mm fall at 0.72 and 2.06 m/s in air at rest (Gunn and Kinzer 1949, table 2), which the drag of a sphere meets
-/// within 5 %; wind takes them along until they fall in it as they do in air at rest. At the faster one's end 0.5 % of the start is
-/// left, exp(−g t / v).
+/// Drops of 0.2 and 0.5 mm diameter fall at 0.72 and 2.06 m/s in air at rest (Gunn and Kinzer 1949,
+/// table 2), which the drag of a sphere reproduces within 5 %. Wind carries them along until they
+/// fall relative to it as in air at rest. At the end 0.5 % of the faster drop's initial deviation,
+/// exp(−g t / v), is left.
 #[test]
 fn drops_fall_as_measured_and_go_with_the_wind() {
     let context = context();
@@ -67,13 +68,13 @@ fn drops_fall_as_measured_and_go_with_the_wind() {
                 for v in &state.velocity {
                     let v = DVec3::from_array(v.map(f64::from));
                     println!("{method:?} {diameter}: {v}, by hand {by_hand}");
-                    // As many sums in f32 as there are frames, of 16 m/s² at most.
+                    // One f32 sum per frame, of 16 m/s² at most.
                     assert!((v - by_hand).length() < 1e-4, "{v} {by_hand}");
                     assert!((-v.y / measured - 1.0).abs() < 0.05, "{v}");
                     assert!((v.x / wind[0] - 1.0).abs() < 0.01, "{v}");
                 }
             }
-            // Negative control: without drag they are on the floor, and no wind has taken them.
+            // Negative control: without drag they fall freely and the wind does not move them.
             scene.effects.drag = None;
             let state = on_gpu(&context, &scene, &drops(), 20);
             for v in &state.velocity {
@@ -83,8 +84,9 @@ fn drops_fall_as_measured_and_go_with_the_wind() {
     }
 }
 
-/// Wind that would take a lone drop along at 80 m/s² leaves a plane surface where it was: its particles have more water about
-/// them than the least that is exposed. A sheet one particle thick is taken along.
+/// Wind that would accelerate a single drop at 80 m/s² leaves a plane surface at rest: its
+/// particles have more neighbours than the threshold for exposure. A sheet one particle thick is
+/// carried along.
 #[test]
 fn wind_takes_sheets_along_and_leaves_plane_water_at_rest() {
     let context = context();
@@ -100,7 +102,7 @@ fn wind_takes_sheets_along_and_leaves_plane_water_at_rest() {
         scene.effects.drag = drag(1e-3, wind);
         let taken = mean(&scene, &water, 50);
         println!("{method:?}: {taken:.2e} m/s of a plane water's mean after 0.5 s");
-        // Of 40 m/s that a lone drop is pushed by, or of the wind's 20.
+        // Compared with the wind's speed of 20 m/s; a single drop would gain 40 m/s.
         assert!(taken.abs() < 2e-4 * wind[0], "{taken}");
         // Negative control: a sheet half a cell thick.
         let spacing = of_flip::DX / 2.0;
@@ -112,7 +114,7 @@ fn wind_takes_sheets_along_and_leaves_plane_water_at_rest() {
     }
 }
 
-/// One pass where a scene names it, and no buffer and no byte.
+/// Drag adds one pass to scenes that name it, no buffer and no byte.
 #[test]
 fn a_scene_that_names_no_drag_pays_for_none() {
     let context = context();

@@ -1,4 +1,4 @@
-//! FLIP on the GPU: what water does, and what must hold in any run.
+//! FLIP on the GPU: behaviour of water, and invariants of every run.
 
 use crate::support::flip::{self, *};
 use crate::support::{context, jitter, lattice};
@@ -20,11 +20,11 @@ use swell::{
     },
 };
 
-/// How far the water's volume is from that of its particles: mean over cells with water or walls all about them of
-/// the density, hats over what a full cell holds.
+/// Volume of the water relative to that of its particles: the mean density of cells that are
+/// surrounded by water or walls, as hat-function weights over those of a full cell.
 fn relative_volume(solver: &Flip) -> f64 {
     let (kind, density) = (
-        // Read as the bits that they are.
+        // Read as `f32`, compared as bits.
         Field::new(solver, CELL_KIND.retyped(), 1),
         Field::new(solver, DENSITY, 1),
     );
@@ -50,8 +50,8 @@ fn relative_volume(solver: &Flip) -> f64 {
     count / sum
 }
 
-/// A dam that collapses and sloshes in steps of a tenth of a second: the largest drift of its volume past the first
-/// three seconds.
+/// Runs a dam that collapses and sloshes, in frames of a tenth of a second. Returns the largest
+/// drift of its volume after the first three seconds.
 fn slosh(has_correction: bool, frames: u32) -> f64 {
     let mut scene = scene([16.0, 16.0, 8.0]);
     scene.shot.frames_per_second = 10.0;
@@ -74,13 +74,13 @@ fn sloshing_keeps_its_volume_for_a_minute() {
     let drift = slosh(true, 600);
     println!("volume drifts by {:.2} %", 100.0 * drift);
     assert!(drift < 0.01, "{drift}");
-    // Negative control: without the correction half of it is gone after three seconds.
+    // Negative control: without the correction the volume is far off after three seconds.
     let lost = slosh(false, 30);
     println!("without the correction by {:.0} %", 100.0 * lost);
     assert!(lost > 0.1, "{lost}");
 }
 
-/// Water that starts 5 % too dense expands to its volume, and without an explosion.
+/// Water that starts 5 % too dense expands to its volume without exploding.
 #[test]
 fn a_compressed_start_recovers() {
     let (scene, mut particles) = tank([16, 20, 8], 12);
@@ -114,7 +114,7 @@ fn wall(name: &str) -> Wall {
         .1
 }
 
-/// A wall that moves into a tank at half a metre a second for a second.
+/// A wall that moves into a tank at 0.5 m/s for a second.
 fn pushed(side: &str) -> (Scene, Particles) {
     let (mut scene, particles) = tank([32, 16, 8], 6);
     let motion = Motion::ConstantVelocity {
@@ -143,7 +143,7 @@ fn a_moving_wall_leaves_nothing_behind() {
             let moved = scene.wave_makers[0]
                 .motion
                 .displacement(f64::from(frame) / 50.0);
-            // From the wall, into the water.
+            // Distance from the wall's initial position, into the water.
             let x = |p: &[f32; 3]| {
                 if side == "-x" {
                     f64::from(p[0])
@@ -181,7 +181,8 @@ fn a_moving_wall_leaves_nothing_behind() {
     for height in &heights {
         assert!((height - 0.732).abs() < 0.04, "{heights:?}");
     }
-    // The box is its own mirror image, to the rounding of a second's motion of water that only slowly parts.
+    // The two runs are mirror images, up to rounding over a second of flow that diverges only
+    // slowly.
     assert!((heights[0] - heights[1]).abs() < 0.005, "{heights:?}");
 }
 
@@ -196,19 +197,20 @@ fn a_dam_break_runs_as_fast_as_water_does() {
         let (state, _) = solver.advance().unwrap();
         let mut x: Vec<f32> = state.position.iter().map(|p| p[0]).collect();
         x.sort_unstable_by(f32::total_cmp);
-        // But for a few drops.
+        // Ignores the foremost 0.5 %, a few drops.
         fronts.push(f64::from(x[x.len() * 995 / 1000]));
     }
     let speed = (fronts[29] - fronts[14]) / 0.3 / (9.81f64).sqrt();
     println!("front at {:.2} m after 0.6 s, {speed:.2} √(gh)", fronts[29]);
-    // Ritter's ideal front has 2 √(gh); measured ones, past the start, 1.4 to 1.8 (Martin and Moyce 1952).
+    // Ritter's ideal front has 2 √(gh); measured fronts, past the start, have 1.4 to 1.8 (Martin
+    // and Moyce 1952).
     assert!((1.3..2.0).contains(&speed), "{speed}");
 }
 
 /// A dam whose states are compared bit by bit.
 fn dam(transfer: Transfer) -> (Scene, Particles) {
     let mut scene = scene([24.0, 16.0, 12.0]);
-    // Not at 0: positions of the frame are rounded.
+    // Away from the origin, where positions in world space are rounded.
     scene.domain.min += DVec3::new(10.0, -3.0, 5.0);
     scene.domain.max += DVec3::new(10.0, -3.0, 5.0);
     scene.shot.frames_per_second = 30.0;
@@ -249,7 +251,7 @@ fn same_bytes_twice_and_from_any_frame() {
                 "from frame {frame}"
             );
         }
-        // Negative control: one bit of one velocity is enough to part.
+        // Negative control: one bit of one velocity suffices for a different result.
         let mut spoiled = states[5].clone();
         spoiled.velocity[500][0] = f32::from_bits(spoiled.velocity[500][0].to_bits() ^ 1 << 12);
         assert!(go_on(6, &spoiled) != states[7]);
@@ -295,8 +297,8 @@ fn no_water_is_a_frame_too() {
     );
 }
 
-/// A box full to its ceiling, by itself and beside an open tank: its pocket is found in every substep, not only in
-/// the first, and nothing moves; a frame computed from what the one before left has the same bytes.
+/// A box full to its ceiling: its pocket is found in every substep, not only in the first, and
+/// nothing moves. A frame computed from the previous frame's state has the same bytes.
 #[test]
 fn a_full_box_stays_as_it_is() {
     let context = context();
@@ -321,7 +323,8 @@ fn a_full_box_stays_as_it_is() {
     }
 }
 
-/// Mean density error and mean height after half a second of rest in a tank whose last cells along z are `part` wide.
+/// Mean density error and mean height, m, after half a second of rest in a tank whose last cells
+/// along z are `part` of a cell wide.
 fn rest_in_thin_cells(part: f64) -> (f64, f64) {
     let mut scene = scene([12.0, 12.0, 8.0 + part]);
     scene.shot.frames_per_second = 24.0;
@@ -331,13 +334,13 @@ fn rest_in_thin_cells(part: f64) -> (f64, f64) {
     (report.density_error_mean, height)
 }
 
-/// A domain that is no multiple of the cell size holds still water, however thin its last cells; they hold no
-/// particle at the start, and were they air, they would leak the pressure: 72 % of density error at a tenth of a cell
-/// before. The lattice ends at the last whole cell, so that the water sinks by what it has to fill: `part` of 8 cells,
-/// of a mean height of 0.4 m.
+/// A domain that is not a multiple of the cell size holds still water, however thin its last cells.
+/// They hold no particle at the start; treated as air, they would leak pressure, with a density
+/// error of 72 % at a tenth of a cell. The lattice ends at the last whole cell, so the water sinks
+/// by the volume that it has to fill: `part` of 8 cells, at a mean height of 0.4 m.
 #[test]
 fn still_water_in_a_domain_of_any_size() {
-    // A wider gap is a gap: the lattice's edge is a column that collapses into it.
+    // A wider gap is a real gap: the edge of the lattice is a column that collapses into it.
     for part in [0.05, 0.1, 0.2, 0.3] {
         let (error, height) = rest_in_thin_cells(part);
         println!("{part}: density error {error:.4}, height {height:.4}");
@@ -351,8 +354,8 @@ fn still_water_in_a_domain_of_any_size() {
     }
 }
 
-/// Largest acceleration over g s of water at rest whose surface rises by s = 0.02 along the tank, and passes the centres of
-/// cells somewhere on its way: over ten such levels.
+/// Largest acceleration, over g s, of water at rest whose surface has the slope s = 0.02 along the
+/// tank and so crosses cell centres somewhere: the maximum over ten water levels.
 fn push_of_a_gentle_slope(context: &Context) -> f64 {
     const SLOPE: f64 = 0.02;
     let mut scene = scene([32.0, 12.0, 3.0]);
@@ -361,7 +364,7 @@ fn push_of_a_gentle_slope(context: &Context) -> f64 {
         .map(|level| {
             let mut particles = block([0, 0, 0], [32, 8, 3]);
             for x in &mut particles.position {
-                // Of 8 cells, half a cell more in the middle.
+                // Half a cell more than 8 cells at the middle.
                 let height = 8.5 + 0.002 * f64::from(level) + SLOPE * (f64::from(x[0]) / DX - 16.0);
                 x[1] *= (height / 8.0) as f32;
             }
@@ -371,15 +374,15 @@ fn push_of_a_gentle_slope(context: &Context) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// Water is pushed along its surface by g s, and by less the deeper it is.
+/// Water is accelerated along its surface by g s, and by less with increasing depth.
 #[test]
 fn a_surface_that_passes_centres_of_cells_pushes_by_its_slope() {
     let context = context();
     let push = push_of_a_gentle_slope(&context);
     println!("{push}");
-    // Densities of particles know a slope of a fiftieth to within itself.
+    // Densities of particles resolve a slope of 1/50 up to a factor of two.
     assert!(push < 2.0, "{push}");
-    // Negative control: where each way to the air has a least part of its own.
+    // Negative control: without a least distance to the surface.
     let mut spoiled = context;
     spoiled.spoil = Some(Spoil {
         pass: "flip/find_water",
@@ -398,7 +401,8 @@ fn a_drop_lands_and_stays() {
         let particles = lattice([0.71, height, 0.83], [1; 3], [DX; 3]);
         let (state, _) = run(&context(), &scene, &particles, 60);
         let (x, v) = (position(&state, 0), velocity(&state, 0));
-        // It lies on the floor from however high: water does not bounce. Along the floor nothing stops it.
+        // The drop lies on the floor from whatever height: water does not bounce. Nothing stops it
+        // along the floor.
         assert!(x.y < DX && x.y > 0.0 && v.y.abs() < 0.2, "{x} {v}");
         let fall = (2.0 * 9.81 * height).sqrt();
         assert!(v.length() < fall, "{v}");
@@ -411,7 +415,7 @@ fn fast_water_takes_substeps_or_is_refused() {
     let (scene, mut particles) = tank([16, 20, 8], 8);
     particles.velocity[77] = [40.0, 0.0, 0.0];
     let (state, report) = run(&context, &scene, &particles, 1);
-    // 40 m/s for 10 ms are four cells, at cfl 2.
+    // 40 m/s for 10 ms are four cells; cfl is 2.
     assert!(report.substeps >= 2, "{report:?}");
     assert!(state.velocity.iter().flatten().all(|v| v.is_finite()));
     particles.velocity[77] = [4000.0, 0.0, 0.0];
@@ -421,7 +425,7 @@ fn fast_water_takes_substeps_or_is_refused() {
         error.contains("frame 1") && error.contains("max_substeps"),
         "{error}"
     );
-    // Not a number is caught within the frame.
+    // A value that is not finite is detected within the frame.
     particles.velocity[77] = [f32::NAN, 0.0, 0.0];
     solver.load(0, &particles).unwrap();
     let error = solver.advance().unwrap_err().to_string();
@@ -435,7 +439,7 @@ fn water_stays_out_of_solids() {
     scene.shot.frames_per_second = 50.0;
     let n = DVec3::new(0.4, 0.9, 0.1).normalize();
     let d = n.dot(DVec3::splat(0.6));
-    // Its lower part starts inside.
+    // The lower part of the water starts inside the solid.
     let particles = block([4, 4, 4], [8, 8, 8]);
     let depth = |state: &Particles| {
         (0..state.len())
@@ -454,14 +458,16 @@ fn water_stays_out_of_solids() {
     let mut before = f64::INFINITY;
     for frame in 0..40 {
         let (state, report) = solver.advance().unwrap();
-        // The trilinear distance of a plane is the plane's; positions round.
+        // The trilinear interpolant of a plane's distance is exact, up to rounding.
         assert!(depth(&state) > 0.0, "frame {frame}: {}", depth(&state));
-        // The water slides into the corner of two walls, at 4.5 m/s at the most, and shoots up from there: particles at the
-        // walls' edge reach 12 m/s, as jets of waves at walls do (flip-through, Cooker and Peregrine 1990). Nothing is
-        // faster than three times the fall from the ceiling.
+        // The water slides into the corner of two walls at up to 4.5 m/s and shoots up from there:
+        // particles at the walls' edge reach 12 m/s, as in jets of waves at walls (flip-through,
+        // Cooker and Peregrine 1990). Nothing is faster than three times the speed of a fall from
+        // the ceiling.
         let fall = (2.0 * 9.81 * 16.0 * DX).sqrt();
         assert!(report.max_speed < 3.0 * fall, "frame {frame}: {report:?}");
-        // What starts inside is lifted out by the density correction, within ten frames. No jet is for nothing from then on.
+        // The density correction lifts out what starts inside within ten frames. From then on
+        // energy only falls: no jet gains any.
         let energy = report.kinetic_energy + report.potential_energy;
         if frame >= 10 {
             assert!(energy < before, "frame {frame}: {before} {report:?}");
@@ -474,7 +480,7 @@ fn water_stays_out_of_solids() {
 fn effects_add_what_they_need_and_act() {
     let context = context();
     let (mut scene, mut particles) = tank([16, 16, 16], 10);
-    // A vortex about the upright, with a shear that viscosity takes on.
+    // A vortex about the vertical axis, with shear that viscosity damps.
     for k in 0..particles.len() {
         let r = position(&particles, k) - DVec3::new(0.8, 0.0, 0.8);
         let radius = (r.x * r.x + r.z * r.z).sqrt();
@@ -505,7 +511,8 @@ fn effects_add_what_they_need_and_act() {
     );
 }
 
-/// What is left of a shear flow's energy after a tenth of a second.
+/// Fraction of a shear flow's energy left after a tenth of a second, and the substeps of the last
+/// frame.
 fn shear_left(max_cells: f64, pic_blend: f64) -> (f64, u32) {
     let (mut scene, mut particles) = tank([16, 16, 16], 10);
     scene.shot.frames_per_second = 50.0;
@@ -516,7 +523,7 @@ fn shear_left(max_cells: f64, pic_blend: f64) -> (f64, u32) {
             .map(|k| velocity(state, k).length_squared())
             .sum()
     };
-    // One swirl of a few cells beside the other, no flow through a wall.
+    // Alternating swirls of a few cells, without flow through a wall.
     for k in 0..particles.len() {
         let [x, y, _] = (position(&particles, k) * std::f64::consts::PI / 0.4).to_array();
         let v = 0.4 * DVec3::new(x.sin() * y.cos(), -x.cos() * y.sin(), 0.0);
@@ -532,7 +539,7 @@ fn substeps_do_not_change_what_blending_takes() {
     let (one, substeps) = shear_left(2.0, 0.2);
     let (many, more) = shear_left(0.025, 0.2);
     assert!(substeps == 1 && more >= 4, "{substeps} {more}");
-    // α as each substep's own would be that of 1 − 0.8^4 a frame.
+    // If α applied to each substep, a frame would have 1 − 0.8^4.
     let (untied, _) = shear_left(0.025, 1.0 - 0.8f64.powi(4));
     println!("{one} of the energy in one substep a frame, {many} in {more}, untied {untied}");
     assert!(
@@ -551,7 +558,7 @@ fn a_missed_projection_is_told_and_past_its_limit_stops() {
     scene.budget.residual = Some(1e3);
     let (_, report) = run(&context, &scene, &particles, 1);
     let projection = report.projection.unwrap();
-    // The projection and the density correction.
+    // One in the projection and one in the density correction.
     assert!(
         projection.missed == 2 && projection.residual > 1e-5,
         "{projection:?}"
@@ -565,7 +572,7 @@ fn a_missed_projection_is_told_and_past_its_limit_stops() {
         error.contains("frame 1") && error.contains("budget.residual is 0.0010"),
         "{error}"
     );
-    // Negative control: with iterations enough it goes on.
+    // Negative control: with enough iterations the run succeeds.
     flip(&mut scene).pressure.max_iterations = 400;
     assert_eq!(
         run(&context, &scene, &particles, 1)

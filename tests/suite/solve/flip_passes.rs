@@ -1,4 +1,4 @@
-//! FLIP's passes against naive f64 twins and against analysis.
+//! FLIP's passes compared with naive f64 implementations and with analysis.
 mod exact;
 mod gaps;
 
@@ -15,7 +15,7 @@ use swell::{
     },
 };
 
-/// Water somewhere in a box, with velocities at random.
+/// Water in part of a box, with random velocities.
 fn scattered() -> (Scene, Particles) {
     let mut scene = scene([18.0, 17.0, 12.0]);
     scene.shot.frames_per_second = 1e4;
@@ -24,7 +24,7 @@ fn scattered() -> (Scene, Particles) {
     for (k, v) in particles.velocity.iter_mut().enumerate() {
         *v = std::array::from_fn(|c| noise(7_000_000 + 3 * k as u64 + c as u64) as f32);
     }
-    // Beyond a wall no particle is, and none has a cell of its own.
+    // No particle is beyond a wall; cells exist only inside.
     for position in &mut particles.position {
         for (x, cells) in position.iter_mut().zip([18.0, 17.0, 12.0]) {
             *x = x.clamp(0.01, cells * DX as f32 - 0.01);
@@ -33,7 +33,8 @@ fn scattered() -> (Scene, Particles) {
     (scene, particles)
 }
 
-/// Hats of all particles at the face of `component` of a cell: Σ w v, Σ w, and how many are in reach.
+/// Hat-function sums over all particles at the face of `component` of a cell: Σ w v, Σ w, and the
+/// number of particles in reach.
 fn naive_face(
     particles: &Particles,
     component: usize,
@@ -55,7 +56,7 @@ fn naive_face(
     (momentum, sum, count)
 }
 
-/// Largest difference over its own bound, and how many faces were looked at.
+/// Largest difference relative to its bound, and the number of faces compared.
 fn particle_to_grid_gap(spoil: f64) -> (f64, u32) {
     let (scene, particles) = scattered();
     let mut solver = solver(&context(), &scene, &particles);
@@ -66,7 +67,7 @@ fn particle_to_grid_gap(spoil: f64) -> (f64, u32) {
     for component in 0..3 {
         for z in 1..12 {
             for y in 1..12 {
-                // One plane of cells in three: the twin is O(n²).
+                // One cell in three: the naive sum is O(n²).
                 for x in (1..14).filter(|x| (x + y + z) % 3 == 0) {
                     let cell = [x, y, z];
                     let (momentum, sum, count) = naive_face(&particles, component, cell, spoil);
@@ -74,9 +75,9 @@ fn particle_to_grid_gap(spoil: f64) -> (f64, u32) {
                         continue;
                     }
                     let old = after.at(component, cell) - change.at(component, cell);
-                    // Places of up to 18 cells round by 18 ε / 2, of which each of the three factors of a weight
-                    // has one; speeds differ by up to 2 m/s. The sums of at most 64 terms and the difference of
-                    // two velocities round by less.
+                    // Positions of up to 18 cells round by 18 ε / 2, once in each of the three
+                    // factors of a weight; speeds differ by up to 2 m/s. The sums of at most 64
+                    // terms and the difference of two velocities round by less.
                     let epsilon = f64::from(f32::EPSILON);
                     let bound = count * 2.0 * 3.0 * 9.0 * epsilon / sum + 70.0 * epsilon;
                     worst = worst.max((old - momentum / sum).abs() / bound);
@@ -93,12 +94,13 @@ fn particle_to_grid_matches_the_naive_twin() {
     let (worst, faces) = particle_to_grid_gap(1.0);
     println!("{faces} faces, {worst} of the bound");
     assert!(faces > 500 && worst < 1.0, "{worst}");
-    // Negative control: hats wider by 1 % are seen.
+    // Negative control: hats 1 % wider.
     let (worst, _) = particle_to_grid_gap(1.01);
     assert!(worst > 1.0, "{worst}");
 }
 
-/// What a wall at 0.2 m/s pushes into a box so many cells wide, over its open area, m/s.
+/// Mean speed with which a wall at 0.2 m/s pushes into a box `width` cells wide, m/s: the flux over
+/// the wall's area.
 fn pushed_by(width: f64) -> f64 {
     let mut scene = scene([8.0, 8.0, width]);
     scene.wave_makers.push(WaveMaker {
@@ -118,7 +120,8 @@ fn pushed_by(width: f64) -> f64 {
     -sum / (8.0 * width)
 }
 
-/// A side wall that stands across the cells closes a part of their faces, which the wave maker does not push through.
+/// A side wall that cuts cells closes a part of their faces, through which the wave maker does not
+/// push.
 #[test]
 fn a_wave_maker_pushes_the_open_part_of_cells_that_a_side_wall_cuts() {
     for width in [3.0, 3.25, 3.5, 3.9] {
@@ -128,8 +131,9 @@ fn a_wave_maker_pushes_the_open_part_of_cells_that_a_side_wall_cuts() {
     }
 }
 
-/// A of u = A x about the block's middle, without divergence. FLIP's means at the block's faces are off along
-/// their normals, so there no velocity may depend on its own axis, or the projection would have something to do.
+/// The matrix A of a divergence-free flow u = A x about the middle of the block. FLIP's means at
+/// the block's boundary faces are off along their normals, so no velocity component may depend on
+/// its own axis there, or the projection would have something to remove.
 fn slopes(transfer: Transfer) -> [[f64; 3]; 3] {
     let diagonal = if transfer == Transfer::Apic { 0.1 } else { 0.0 };
     [
@@ -144,12 +148,12 @@ fn linear(slopes: &[[f64; 3]; 3], x: DVec3) -> DVec3 {
     DVec3::new(row(0), row(1), row(2))
 }
 
-/// A block of water in free space that moves in a linear field, and how well the grid gives it back: the largest
-/// gap in velocity, and in slope, m/s and 1/s.
+/// Runs a block of water in free space in a linear velocity field. Returns the largest error in
+/// velocity, m/s, and in slope, 1/s, after a transfer to the grid and back.
 fn linear_gap(transfer: Transfer, spoil: f32) -> (f64, f64) {
     let mut scene = scene([16.0; 3]);
     scene.water.gravity = DVec3::ZERO;
-    // So short a frame that nothing moves by more than positions round.
+    // The frame is so short that motion is below the rounding of positions.
     scene.shot.frames_per_second = 1e6;
     flip(&mut scene).transfer = transfer;
     flip(&mut scene).pic_blend = 1.0;
@@ -201,19 +205,19 @@ fn a_linear_field_survives_both_transfers() {
     for transfer in [Transfer::Flip, Transfer::Apic] {
         let (gap, slope_gap) = linear_gap(transfer, 0.0);
         println!("{transfer:?} {gap} {slope_gap}");
-        // Speeds of 1 m/s in sums of up to 64 weights that each round by 3 × 16 ε / 2, of either sign: about 8 × 24 ε.
-        // A slope is the difference of two of them over Δx.
+        // Speeds of 1 m/s in sums of up to 64 weights that each round by 3 × 16 ε / 2, of either
+        // sign: about 8 × 24 ε. A slope is the difference of two of them over Δx.
         let tolerance = 200.0 * f64::from(f32::EPSILON);
         assert!(
             gap < tolerance && slope_gap < 2.0 * tolerance / DX,
             "{gap} {slope_gap}"
         );
     }
-    // Negative control: one particle in 4096 off by 1 cm/s is seen.
+    // Negative control: one particle of 4096 off by 1 cm/s.
     assert!(linear_gap(Transfer::Apic, 0.01).0 > 1e-4);
 }
 
-/// Area of the unit square of a face on the positive side of n·x = d, by clipping, in the face's plane.
+/// Area of the part of a unit square with n·x > d, by clipping in the face's plane.
 fn clipped_area(corners: [DVec3; 4], n: DVec3, d: f64) -> f64 {
     let mut kept: Vec<DVec3> = Vec::new();
     for k in 0..4 {
@@ -265,7 +269,7 @@ fn face_fractions_of_a_plane_are_exact() {
                 let found = open.at(component, cell);
                 let expected = clipped_area(corners, n, d / DX + 1e-4);
                 cut += u32::from(expected > 0.0 && expected < 1.0);
-                // A face that is open by less than a fiftieth is closed.
+                // A face that is open by less than a fiftieth counts as closed.
                 if expected < 0.0199 {
                     assert!(found == 0.0, "{found} of {expected}");
                 } else if expected > 0.0201 {
@@ -275,10 +279,10 @@ fn face_fractions_of_a_plane_are_exact() {
             }
         }
         println!("{n}: {cut} cut, {worst} {control}");
-        // Distances of up to 2 m in f32 over Δx: 2 × 1.2e-7 / 0.1 in cells, eight of them; a line across a face is
-        // at most √2 long. The skin's 1e-4 is in both.
+        // Distances of up to 2 m in f32 over Δx: 2 × 1.2e-7 / 0.1 in cells, eight of them; a line
+        // across a face is at most √2 long. Both sides include the skin of 1e-4.
         assert!(worst < 8.0 * 2.4e-6 * 1.5, "{worst}");
-        // Negative control: a plane aside by a hundredth of a cell.
+        // Negative control: a plane shifted by a hundredth of a cell.
         assert!(control > 5e-3, "{control}");
     }
 }

@@ -1,5 +1,6 @@
-//! Both solvers, on the GPU and in f64, against sums that are written out here from the papers' formulas: what GPU and
-//! reference share, such as the calibration of the kernels, no comparison of the two can see.
+//! Both solvers, on the GPU and in f64, compared with sums written out here from the papers'
+//! formulas. A comparison between GPU and reference cannot detect errors that they share, such as
+//! in the calibration of the kernels.
 
 use crate::support::flip::{self as rig, DX, block, flip, position, velocity};
 use crate::support::job::Job;
@@ -59,10 +60,11 @@ fn close(found: f64, expected: f64, part: f64, what: &str) {
     );
 }
 
-/// Spacings and h/d.
+/// Spacing d, m, and h/d.
 const CASES: [(f64, f64); 3] = [(0.1, 2.0), (0.08, 1.7), (0.05, 2.6)];
 
-/// What is uploaded for the passes, rounded to f32; the wall's scale errs as the midpoint rule does, 1e-6 of itself.
+/// The constants uploaded for the passes, rounded to f32. The wall scale has the error of the
+/// midpoint rule, 1e-6 of itself.
 #[test]
 fn passes_are_given_the_papers_constants() {
     let context = context();
@@ -101,7 +103,8 @@ fn passes_are_given_the_papers_constants() {
             let what = format!("{name} at d = {d}, h = {ratio} d");
             close(f64::from(found), expected, 1.1e-6, &what);
         }
-        // Of a solid's samples: weights for the area of their faces, so that a sheet of them makes up for the lattice.
+        // Weights of a solid's samples: proportional to the area of their faces, so that a sheet of
+        // samples replaces the lattice beyond it.
         let n = boundary.samples.len();
         let values = solver
             .field(pbf::buffers::PREDICTED, particles.len() + n)
@@ -130,9 +133,10 @@ fn boundary_of(mesh: &swell::domain::mesh::TriangleMesh, domain: &Bounds, d: f64
     }
 }
 
-/// A blob far from walls, squeezed to `part` of its spacing, after one iteration: on both devices what the papers' sums
-/// over all pairs make of it. f64 rounds places near 1 m to f32 alone, 2⁻²⁵ m an axis; the GPU errs as tests/pbf.rs derives,
-/// by 2e-5 d where corrections are up to 0.1 d, in proportion to them.
+/// A blob far from walls, squeezed to `part` of its spacing, after one iteration: both devices give
+/// the papers' sums over all pairs. The f64 reference only rounds positions near 1 m to f32, 2⁻²⁵ m
+/// per axis. The GPU's error is as tests/pbf.rs derives, 2e-5 d where corrections are up to 0.1 d,
+/// and proportional to them.
 #[test]
 fn one_iteration_is_the_papers() {
     let paper = Paper::new(D, 2.0);
@@ -155,7 +159,7 @@ fn one_iteration_is_the_papers() {
         let moves = paper.corrections(&start, relaxation, repulsion);
         let largest = moves.iter().map(|m| m.length()).fold(0.0, f64::max);
         println!("{part}: moved by up to {:.4} d", largest / D);
-        // The bound of a correction is met where it should be.
+        // The bound on corrections is active exactly where it should be.
         assert!(largest > 0.02 * D && largest < 0.5 * D + 1e-9);
         assert_eq!(largest > 0.4999 * D, is_bounded);
         let tolerances = [2e-4 * largest, 1e-7];
@@ -170,7 +174,8 @@ fn one_iteration_is_the_papers() {
     }
 }
 
-/// Two particles alone, no pressure between them: XSPH brings each towards the other by c V W(r) of what they differ.
+/// Two isolated particles without pressure between them: XSPH changes the velocity of each by c V
+/// W(r) of their difference.
 #[test]
 fn two_particles_are_slowed_by_xsph() {
     let paper = Paper::new(D, 2.0);
@@ -191,14 +196,15 @@ fn two_particles_are_slowed_by_xsph() {
         assert!(change.length() > 0.02, "{change}");
         for (k, sign) in [(0, 1.0), (1, -1.0)] {
             let off = velocity(&state, k) - before[k] - sign * change;
-            // Places near 1 m are off by 2⁻²⁴ m of 0.1 m and the GPU's velocity of 0.5 m/s is their difference over
-            // 10 ms: 2⁻²⁴ / 0.01.
+            // Positions near 1 m are off by 2⁻²⁴ m of 0.1 m, and the GPU's velocity of 0.5 m/s is
+            // their difference over 10 ms: 2⁻²⁴ / 0.01.
             assert!(off.length() < 1.5e-5, "{off} of {change}");
         }
     }
 }
 
-/// The middle of a lattice of 9³ particles far from walls, in sorted order, and the inputs of passes there.
+/// Calls `test` with the passes' inputs, index and position of the middle particle of a lattice of
+/// 9³ particles far from walls.
 fn bulk(test: impl Fn(passes::Inputs<'_>, usize, DVec3)) {
     let scene = scene([2.0; 3]);
     let particles = lattice([0.5; 3], [9; 3], [D; 3]);
@@ -218,8 +224,8 @@ fn bulk(test: impl Fn(passes::Inputs<'_>, usize, DVec3)) {
     );
 }
 
-/// Water that turns as one has the curl 2 κ Ω by sums over the lattice, and confinement pushes by ε h (N × ω) where |ω|
-/// rises along x. Places are rounded to f32, 1e-6 of a spacing.
+/// Rigidly rotating water has the curl 2 κ Ω by sums over the lattice, and confinement pushes by ε
+/// h (N × ω) where |ω| increases along x. Positions are rounded to f32, 1e-6 of a spacing.
 #[test]
 fn vorticity_and_its_confinement_are_the_papers() {
     let paper = Paper::new(D, 2.0);
@@ -245,13 +251,15 @@ fn vorticity_and_its_confinement_are_the_papers() {
             (push - expected).length() < 1e-5 * expected.length(),
             "{push}"
         );
-        // In the bulk water has its rest density; 32 terms that a place's rounding changes by up to 1e-6 each.
+        // In the bulk, water has its rest density; the sum has 32 terms that a position's rounding
+        // changes by up to 1e-6 each.
         let density = passes::measure_density(inputs)[middle];
         close(density, 1.0, 3e-5, "density");
     });
 }
 
-/// On FLIP's grid the same are second-order differences, exact for these fields.
+/// On FLIP's grid, curl and confinement (Fedkiw et al. 2001) are second-order differences, exact
+/// for these fields.
 #[test]
 fn grid_vorticity_and_its_confinement_are_fedkiws() {
     let (scene, particles) = rig::tank([12; 3], 12);
@@ -263,7 +271,7 @@ fn grid_vorticity_and_its_confinement_are_fedkiws() {
     let center = DVec3::splat(0.6);
     let elements = trace.faces.velocity.len() as u32;
     let cell = |e: u32| DVec3::from_array(trace.bricks.cell(e).map(f64::from));
-    // A component at the middle of its own lower face.
+    // A component at the middle of the lower face along its own axis.
     let face = |e: u32, axis: usize| {
         let place = DX * (cell(e) + 0.5 - 0.5 * DVec3::AXES[axis]);
         spin.cross(place - center)[axis]
@@ -280,7 +288,8 @@ fn grid_vorticity_and_its_confinement_are_fedkiws() {
             curl[place]
         );
     }
-    // |ω| = 3 + 4 x along z: faces across y are pushed by −Δt ε Δx |ω|, those across x and z not at all.
+    // |ω| = 3 + 4 x along z: faces across y are pushed by −Δt ε Δx |ω|, those across x and z not at
+    // all.
     let rising: Vec<DVec3> = (0..elements)
         .map(|e| DVec3::new(0.0, 0.0, 3.0 + 4.0 * DX * (cell(e).x + 0.5)))
         .collect();
@@ -308,7 +317,7 @@ fn step_of(length: f64, displacement: f64) -> step::Substep {
     }
 }
 
-/// One substep in f64.
+/// Runs one substep of the f64 reference.
 fn traced(scene: &Scene, particles: &Particles, length: f64) -> swell::reference::flip::Trace {
     let mut reference = FlipReference::new(scene, &Boundary::default());
     reference.load(0, particles).unwrap();
@@ -320,16 +329,18 @@ fn traced(scene: &Scene, particles: &Particles, length: f64) -> swell::reference
         .unwrap()
 }
 
-/// By hand: full cells have density 1, also beside walls; the surface is half a cell above the topmost centres and half a
-/// cell below the centres of air. Water of twice as many particles is corrected by half a cell's worth at most.
+/// By hand: full cells have density 1, also beside walls. The surface is half a cell above the
+/// topmost centres of water and half a cell below the lowest centres of air. Water with twice as
+/// many particles is corrected by half a cell's worth at most.
 #[test]
 fn a_tank_s_cells_are_full_up_to_its_surface() {
     let (scene, particles) = rig::tank([8, 10, 8], 6);
     let trace = traced(&scene, &particles, 0.01);
-    // Beside the upper wall along z, and for y = 0 the lower one along y.
+    // Beside the upper wall along z; y = 0 is beside the lower wall along y.
     let at = |y: i64| trace.bricks.element([3, y, 7]) as usize;
     let centers = &trace.centers;
-    // The least weight of a hat, 2.4e-7, in each of 8 particles' 27 hats; places are rounded to f32.
+    // The least weight of a hat, 2.4e-7, in each of 8 particles' 27 hats; positions are rounded to
+    // f32.
     for y in 0..5 {
         close(centers.density[at(y)], 1.0, 1e-5, "density");
     }
@@ -339,7 +350,7 @@ fn a_tank_s_cells_are_full_up_to_its_surface() {
         1e-5,
         "density of the topmost cell",
     );
-    // Where the hats' sum is 7/8 or 1/8 the distance has the slope 2: twice the error of the density.
+    // Where the hats' sum is 7/8 or 1/8, the distance has slope 2: twice the error of the density.
     close(
         centers.distance[at(5)],
         -0.5 * DX,
@@ -357,7 +368,8 @@ fn a_tank_s_cells_are_full_up_to_its_surface() {
     close(trace.centers.excess[at(2)], 0.5, 1e-12, "excess");
 }
 
-/// A substep moves by no more than twice the CFL's displacement, and what goes beyond is taken from the velocity.
+/// A substep moves particles by at most twice the CFL displacement; the excess is also removed from
+/// the velocity.
 #[test]
 fn substeps_move_by_at_most_twice_the_cfl() {
     for cfl in [0.5, 1.0] {
@@ -382,7 +394,8 @@ fn substeps_move_by_at_most_twice_the_cfl() {
         particles.velocity.fill([30.0, 0.0, 0.0]);
         let trace = traced(&scene, &particles, 0.01);
         assert_eq!(trace.capped, particles.len() as u64);
-        // On the GPU the same is the uniform's; PBF's is in `passes_are_given_the_papers_constants`.
+        // The GPU gets the same limit as a uniform; `passes_are_given_the_papers_constants` checks
+        // PBF's.
         let gpu = rig::solver(&context(), &scene, &particles);
         let params = gpu.field(flip::buffers::PARAMS, 1).unwrap()[0];
         close(
@@ -398,7 +411,8 @@ fn substeps_move_by_at_most_twice_the_cfl() {
     }
 }
 
-/// A drop on the floor lies a quarter of a spacing above it with PBF, and a tenth with FLIP.
+/// A drop on the floor comes to rest a quarter of a spacing above it with PBF, and a tenth with
+/// FLIP.
 #[test]
 fn a_drop_comes_to_rest_at_the_contact_distance() {
     for (mut scene, contact) in [
@@ -406,7 +420,7 @@ fn a_drop_comes_to_rest_at_the_contact_distance() {
         (rig::scene([8.0; 3]), 0.1 * 0.5 * DX),
     ] {
         let mut particles = lattice([0.4, contact / 2.0, 0.4], [1; 3], [contact; 3]);
-        // Nor is it pushed off the wall, which the density correction does.
+        // Without the density correction, which would push the drop off the wall.
         if let Some(flip) = &mut scene.solver.flip {
             flip.density_correction = false;
         }
@@ -418,8 +432,10 @@ fn a_drop_comes_to_rest_at_the_contact_distance() {
     }
 }
 
-/// A wall at u that meets a particle of 1 kg at rest gives it m u, and works on it m u · u, half of which stays; then it
-/// goes along, and no more is done. The wall's place of some 0.03 m and its way of 5 mm are rounded to f32: 4e-7.
+/// A wall at u that hits a particle of 1 kg at rest transfers m u and does the work m u · u, half
+/// of which remains as kinetic energy. Afterwards the particle moves with the wall, and no more
+/// work is done. The wall's position of some 0.03 m and its displacement of 5 mm are rounded to
+/// f32: 4e-7.
 #[test]
 fn a_wall_works_on_a_particle_by_its_momentum() {
     let mut scene = scene([1.0; 3]);
@@ -454,9 +470,10 @@ fn wall(velocity: f64) -> WaveMaker {
     }
 }
 
-/// A column of 8 × 4 × 4 cells that a wall sets in motion at once: p falls from ρ u (L − Δx/2) / Δt at the first centres to
-/// 0 at the free end, so that the wall works ρ A u² (L − Δx/2), and ρ A L u² / 2 is the water's. The tolerance of 1e-6 on the
-/// residual is one of 29 times as much on the pressure, for 8 cells.
+/// A column of 8 × 4 × 4 cells that a wall sets in motion within a step: p falls from ρ u (L −
+/// Δx/2) / Δt at the first centres to 0 at the free end, so the wall does the work ρ A u² (L −
+/// Δx/2), and the water has ρ A L u² / 2. A tolerance of 1e-6 on the residual allows 29 times as
+/// much on the pressure, for 8 cells.
 #[test]
 fn a_wall_works_on_a_column_by_its_pressure() {
     let mut scene = rig::scene([16.0, 4.0, 4.0]);
@@ -506,15 +523,15 @@ cell_size = 0.2
 fn errors(densities: &[f64]) -> [f64; 3] {
     let mut errors: Vec<f64> = densities.iter().map(|rho| (rho - 1.0).max(0.0)).collect();
     errors.sort_by(f64::total_cmp);
-    // So many of them are no larger.
+    // Nearest-rank percentile: that many values are no larger.
     let rank = (99 * errors.len()).div_ceil(100);
     let mean = errors.iter().sum::<f64>() / errors.len() as f64;
     [mean, errors[rank - 1], errors[errors.len() - 1]]
 }
 
-/// What a cache's ledger says of a frame is what its particles come to, by sums of this file's own, on either device. f32
-/// sums of 34 terms err by 42 ε (tests/pbf.rs), walls by 5e-7. FLIP's hats have 2.4e-7 more each, of 72 that count in a sum
-/// of 8: 2.2e-6, and f32 some 10 ε.
+/// The ledger's report of each frame matches sums over its particles, computed in this file, for
+/// either device. f32 sums of 34 terms err by 42 ε (tests/pbf.rs), walls by 5e-7. FLIP's hats add
+/// 2.4e-7 each, of 72 that count in a sum of 8: 2.2e-6, and f32 some 10 ε.
 #[test]
 fn ledgers_say_what_their_frames_come_to() {
     let job = Job::of(&[("dam.toml", DAM)]);
@@ -547,7 +564,8 @@ fn ledgers_say_what_their_frames_come_to() {
             let (mut kinetic, mut potential, mut fastest) = (0.0, 0.0, 0.0f64);
             for k in 0..state.len() {
                 let (x, v) = (position(&state, k), velocity(&state, k));
-                // 1 kg each, in the middle of the last of the frame's equal substeps, as velocities are.
+                // 1 kg each. Potential energy is taken at the middle of the frame's last substep,
+                // as velocities are.
                 let substep = 1.0 / (30.0 * f64::from(report.substeps));
                 kinetic += (v.x * v.x + v.y * v.y + v.z * v.z) / 2.0;
                 potential += 9.81 * (x.y - substep * v.y / 2.0);
@@ -582,7 +600,7 @@ fn ledgers_say_what_their_frames_come_to() {
             let tolerance = if solver == "pbf" { 6e-6 } else { 1e-5 };
             for (found, expected) in found.into_iter().zip(expected) {
                 assert!((found - expected).abs() < tolerance, "{found} {expected}");
-                // A hundredth more of any would be seen.
+                // An error of 1 % in any of them would be detected.
                 assert!(frame < 4 || expected > 100.0 * tolerance, "{expected}");
             }
         }

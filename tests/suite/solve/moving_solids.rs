@@ -1,4 +1,5 @@
-//! Solids that move through FLIP's water: what cells they cut, that nothing ends within them, what they displace.
+//! Solids that move through FLIP's water: the cells that they cut, particles that stay outside, and
+//! the volume that they displace.
 
 use std::{collections::BTreeMap, path::Path};
 
@@ -25,7 +26,7 @@ use swell::{
     },
 };
 
-/// Δx.
+/// Cell size, metres.
 const DX: f64 = 0.1;
 
 fn scene(cells: [f64; 3]) -> Scene {
@@ -72,7 +73,8 @@ fn solver(context: &Context, scene: &Scene, particles: &Particles) -> Flip {
     Flip::new(context, scene, plan, &boundary, false).unwrap()
 }
 
-/// Water in cells `from` to `to`, less what is within `solid` or nearer to it than half a spacing.
+/// Water in cells `from` to `to`, without what is inside `solid` or closer to it than half a
+/// particle spacing.
 fn water(from: [usize; 3], to: [usize; 3], solid: Bounds) -> Particles {
     let counts: [usize; 3] = std::array::from_fn(|axis| 2 * (to[axis] - from[axis]));
     let all = lattice(from.map(|c| c as f64 * DX), counts, [DX / 2.0; 3]);
@@ -121,7 +123,7 @@ fn a_moving_box_cuts_cells_where_it_stands_and_pushes_through_its_faces() {
         until: None,
     };
     scene.moving_solids = vec![mover(BOX, DVec3::X * 3.0, motion)];
-    // A quarter of a second in, 17.5 cm on.
+    // After a quarter of a second the box has moved by 17.5 cm.
     let now = moved(BOX, DVec3::X * 0.175);
     let particles = water([0; 3], [16; 3], now);
     let mut solver = solver(&context, &scene, &particles);
@@ -141,8 +143,9 @@ fn a_moving_box_cuts_cells_where_it_stands_and_pushes_through_its_faces() {
     };
     let cells = || (0..16 * 16 * 16).map(|n| [n % 16, n / 16 % 16, n / 256]);
 
-    // The closed part of each plane of x-faces is the box's section there, 0.43 m by 0.65 m. A plane is fitted to
-    // each face's corners: a corner of the box within a face is cut off, by a quarter of the face at most.
+    // The closed part of each plane of x-faces is the box's cross-section there, 0.43 m by 0.65 m.
+    // A plane is fitted to each face's corners: a corner of the box within a face is cut off, by a
+    // quarter of the face at most.
     let section = |x: usize| -> f64 {
         let all = cells().filter(|c| c[0] == x);
         all.map(|[x, y, z]| 1.0 - f64::from(open[element(x, y, z)]))
@@ -165,7 +168,7 @@ fn a_moving_box_cuts_cells_where_it_stands_and_pushes_through_its_faces() {
             assert_eq!(section(x), 0.0, "{x}");
         }
     }
-    // What is pushed out in front comes in behind: the section times the speed.
+    // The volume pushed out in front flows in behind: the section times the speed.
     let pushed = |from: usize, to: usize| -> f64 {
         let half = cells().filter(|c| (from..to).contains(&c[0]));
         half.map(|[x, y, z]| f64::from(flux[element(x, y, z)]))
@@ -194,7 +197,7 @@ fn a_moving_box_cuts_cells_where_it_stands_and_pushes_through_its_faces() {
             }
         }
     }
-    // Control: a box that stood still would have pushed nothing.
+    // Control: a box at rest pushes nothing.
     scene.moving_solids[0].slide.as_mut().unwrap().motion = Motion::ConstantVelocity {
         velocity: 0.7,
         until: Some(0.25),
@@ -206,7 +209,7 @@ fn a_moving_box_cuts_cells_where_it_stands_and_pushes_through_its_faces() {
     assert!(flux.iter().all(|&f| f == 0.0));
 }
 
-/// Least distance of a particle to the box as it stands at the end of a frame.
+/// Least distance of a particle to the box, m; negative inside.
 fn nearest(state: &Particles, bounds: Bounds) -> f64 {
     let all = state
         .position
@@ -224,7 +227,7 @@ fn nothing_ends_within_a_box_faster_than_the_cfl_limit() {
         min: DVec3::splat(0.31),
         max: DVec3::splat(0.72),
     };
-    // 12 m/s at 100 frames a second: 1.2 cells a frame with cfl 0.5.
+    // 12 m/s at 100 frames a second: 1.2 cells a frame, with cfl 0.5.
     scene.solver.flip.as_mut().unwrap().cfl = 0.5;
     let motion = Motion::ConstantVelocity {
         velocity: 12.0,
@@ -240,17 +243,19 @@ fn nothing_ends_within_a_box_faster_than_the_cfl_limit() {
         state = next;
         assert!(report.substeps >= 3, "{}", report.substeps);
         let by = scene.moving_solids[0].pose(f64::from(frame) / 100.0).centre;
-        // Particles keep a tenth of their spacing; the trilinear distance is short by less than that at an edge.
+        // Particles keep a tenth of their spacing; the trilinear distance is short by less than
+        // that at an edge.
         let least = nearest(&state, moved(start, by));
         assert!(least > -0.1 * DX, "frame {frame}: {least}");
     }
-    // Control: where it stood at the start there is water by now, and where it stands now there was.
+    // Control: at the start there is water at the final position of the box.
     assert!(nearest(&particles, moved(start, DVec3::new(1.19, 0.119, 0.0))) < -0.1);
     assert_eq!(state.len(), particles.len());
 }
 
-/// A moving box pushes a drop before it. At the end of each substep the drop is before the box's face as the face stands by then, at the
-/// distance that particles keep. Sampled distances are exact before a flat face.
+/// A moving box pushes a drop ahead of it. At the end of each substep the drop is in front of the
+/// box's current face, at the contact distance. Sampled distances are exact in front of a flat
+/// face.
 #[test]
 fn a_box_takes_a_drop_along_as_far_as_it_goes() {
     let context = context();
@@ -274,13 +279,14 @@ fn a_box_takes_a_drop_along_as_far_as_it_goes() {
         assert_eq!(report.substeps, 1);
         let by = DVec3::X * 0.05 * f64::from(frame);
         let apart = box_distance(place(&state.position[0]), moved(BOX, by));
-        // A tenth of the particles' spacing; places of up to 2 m are rounded some ten times.
+        // A tenth of the particles' spacing; positions of up to 2 m are rounded some ten times.
         let kept = 0.1 * 0.5 * DX;
         assert!((apart - kept).abs() < 10.0 * 1.2e-7, "{frame}: {apart}");
     }
 }
 
-/// Mean height of the water's surface over columns at least a cell away from the box, seen from above.
+/// Mean height of the water's surface over columns at least a cell away from the box in plan view,
+/// m.
 fn level(state: &Particles, bounds: Bounds, cells: [i32; 3]) -> f64 {
     let raster = Raster {
         origin: DVec3::ZERO,
@@ -317,7 +323,7 @@ fn a_box_that_dips_into_a_tank_lifts_its_water_by_what_it_displaces() {
     let context = context();
     let mut scene = scene([16.0, 16.0, 16.0]);
     scene.shot.frames_per_second = 50.0;
-    // From just above the water, 0.8 m deep, 0.35 m down within 0.7 s.
+    // From just above the water, which is 0.8 m deep, 0.35 m down within 0.7 s.
     let start = Bounds {
         min: DVec3::new(0.5, 0.82, 0.5),
         max: DVec3::new(1.1, 1.42, 1.1),
@@ -343,7 +349,8 @@ fn a_box_that_dips_into_a_tank_lifts_its_water_by_what_it_displaces() {
     };
     let states = run(&scene);
     let (twentieth, next, state) = (&states[19], &states[20], &states[39]);
-    // Where the solid stands follows from the frame's number: from the twentieth on it is the same.
+    // The solid's position follows from the frame number: a run resumed at frame 20 gives the same
+    // result.
     let mut resumed = solver(&context, &scene, &particles);
     resumed.load(20, twentieth).unwrap();
     assert_eq!(&resumed.advance().unwrap().0, next);
@@ -354,7 +361,8 @@ fn a_box_that_dips_into_a_tank_lifts_its_water_by_what_it_displaces() {
     let expected = (2.56 * 0.8 - 0.36 * 0.47) / (2.56 - 0.36);
     let (before, after) = (level(&particles, end, [16; 3]), level(state, end, [16; 3]));
     println!("{before} {after}, expected {expected}");
-    // A tenth of a cell: what the surface of jittered particles is off from that of a lattice.
+    // A tenth of a cell: the error of the surface of jittered particles relative to that of a
+    // lattice.
     assert!((before - 0.8).abs() < 0.1 * DX && (after - expected).abs() < 0.1 * DX);
     // Control: without the box the level stays.
     scene.moving_solids.clear();
@@ -451,7 +459,7 @@ fn scenes_say_where_solids_go() {
     assert_eq!(scene.mesh_files().len(), 1);
     let written = scene.to_toml(&|_, _| "box.obj".into());
     assert_eq!(parse(&written, &[]).unwrap(), scene);
-    // The motion is physics.
+    // The motion is part of the physics hash.
     let other = parse(SCENE, &["solid[0].motion.stroke=0.4"]).unwrap();
     assert_ne!(
         swell::scene::physics_hash(&scene),
@@ -496,7 +504,7 @@ fn scenes_say_where_solids_go() {
             "{set:?}: {error}"
         );
     }
-    // It turns as well, about an axis that goes along, or alone.
+    // The solid also rotates, about an axis that moves with it, or without translating.
     const TURN: &[&str] = &[
         "solid[0].pivot=[1.5, 1, 1.5]",
         "solid[0].axis=[0, 0, -1]",
@@ -504,8 +512,8 @@ fn scenes_say_where_solids_go() {
     ];
     let both = parse(SCENE, TURN).unwrap();
     let solid = &both.moving_solids[0];
-    // After a second, half-way of the ramp, it is half of its stroke's depth down, and what was to the right of the pivot has
-    // come below it.
+    // After a second, halfway through the sine's period, the solid is at half of its stroke, 0.5 m
+    // down, and a point to the right of the pivot has moved below it.
     let at = solid.pose(1.0).place(DVec3::new(2.0, 1.0, 1.5));
     assert!((at - DVec3::new(1.5, 0.25, 1.5)).length() < 1e-12, "{at}");
     assert!(

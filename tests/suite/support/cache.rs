@@ -1,4 +1,4 @@
-//! A cache with a stand-in for a solver.
+//! A cache written by a stand-in for a solver.
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
@@ -28,7 +28,7 @@ pub fn manifest() -> Manifest {
         driver: "its driver 1.2".to_owned(),
         backend: "Vulkan".to_owned(),
         frames_per_second: 60.0,
-        // No short decimal: must come back to the last bit.
+        // Not a short decimal: it must survive the round trip to the last bit.
         particle_spacing: 0.1 + 0.2,
         rest_density: 1000.0,
         origin: [0.0; 3],
@@ -58,14 +58,14 @@ pub fn probes() -> Vec<ProbeRecord> {
     ]
 }
 
-/// What they see at a time; the first is dry at each third frame.
+/// Probe values at a time. The elevation gauge is dry in every third frame.
 pub fn seen(clock: Clock) -> ProbeValues {
     let wet = !clock.frame.is_multiple_of(3);
     let at = |scale: f64| Some(scale * (1.0 + clock.time).ln());
     vec![vec![at(0.1).filter(|_| wet)], vec![at(1e20), at(-1e-7)]]
 }
 
-/// With every stream of the table.
+/// A manifest that declares every stream of the cache format.
 pub fn manifest_of_all_streams() -> Manifest {
     let grids = GridRecord {
         surface: true,
@@ -106,7 +106,7 @@ pub fn assets() -> Vec<Asset> {
     ]
 }
 
-/// A stand-in for a solver: frame k follows from frame k - 1 and the clock alone.
+/// A stand-in for a solver: frame k depends only on frame k - 1 and the clock.
 pub fn step(before: &Particles, clock: Clock, frame: u32) -> (Clock, Particles, Value) {
     let mut after = before.clone();
     for (i, x) in after.position.iter_mut().enumerate() {
@@ -120,7 +120,7 @@ pub fn step(before: &Particles, clock: Clock, frame: u32) -> (Clock, Particles, 
     }
     let clock = Clock {
         frame,
-        // Accumulates rounding, so that a clock which lost its last bit in the ledger shows.
+        // Accumulates rounding, so that a clock that loses its last bit in the ledger is noticed.
         time: clock.time + 1.0 / 60.0,
         substeps: 1 + frame % 3,
         steps: clock.steps + u64::from(1 + frame % 3),
@@ -157,7 +157,7 @@ pub fn create(dir: &Path) -> CacheWriter {
     .unwrap()
 }
 
-/// Frames `clock.frame + 1 ..= last`, from a state.
+/// Writes frames `clock.frame + 1 ..= last`, starting from the given state.
 pub fn go_on(
     mut writer: CacheWriter,
     mut clock: Clock,
@@ -182,7 +182,7 @@ pub fn resume(dir: &Path, last: u32) -> Result<Summary, CacheError> {
     go_on(writer, entry.clock, particles, last)
 }
 
-/// A baked cache of four frames that the tests copy.
+/// A baked cache of frames 0 to 4 that tests copy.
 pub fn baked() -> &'static Path {
     static BAKED: OnceLock<TempDir> = OnceLock::new();
     BAKED
@@ -204,7 +204,7 @@ pub fn copied() -> TempDir {
     dir
 }
 
-/// All files below, relative.
+/// Paths of all files below `dir`, relative to it, sorted.
 pub fn files(dir: &Path) -> Vec<PathBuf> {
     let mut found = Vec::new();
     let mut folders = vec![dir.to_owned()];
@@ -233,7 +233,7 @@ pub fn first_problem(dir: &Path) -> PathBuf {
     damaged_file(cache::survey(dir).unwrap().into_result())
 }
 
-/// Every line of the ledger names a file that is there and is the one that was written.
+/// Reads every frame that the ledger lists, which checks its checksum; returns the last frame.
 pub fn ledger_holds(dir: &Path) -> u32 {
     let reader = CacheReader::open(dir).unwrap();
     for entry in reader.entries() {
@@ -242,7 +242,7 @@ pub fn ledger_holds(dir: &Path) -> u32 {
     reader.last_frame()
 }
 
-/// A ledger of lines with these contents, chained as ours are to a manifest with these bytes.
+/// A ledger whose lines have these contents, chained by BLAKE3 to a manifest with these bytes.
 pub fn chained(manifest: &[u8], lines: &[Vec<u8>]) -> Vec<u8> {
     let mut chain = blake3::hash(manifest);
     let mut ledger = Vec::new();

@@ -1,4 +1,4 @@
-//! Events of `--progress json`, as a farm reads them.
+//! Events of `--progress json`, as a render farm reads them.
 
 use std::{collections::BTreeMap, fs, path::Path};
 
@@ -9,14 +9,15 @@ use super::{
     made_cache::{Made, write_cache},
 };
 
-/// A folder with a cache of frames 0 to 4 that no solver made, and a look.
+/// A folder with a look and a cache of frames 0 to 4 that no solver produced.
 pub fn made() -> Job {
     let job = Job::of(&[("look.toml", LOOK)]);
     write_cache(&job.path("cache"), &Made::default());
     job
 }
 
-/// What is wrong with a stream of events that a command of this exit code told; `None` of a good one.
+/// Returns what is wrong with the event stream of a command that ended with exit code `code`, or
+/// `None` if nothing is.
 pub fn fault(stdout: &str, code: i32) -> Option<String> {
     let mut seen = Vec::new();
     for line in stdout.lines() {
@@ -48,7 +49,7 @@ pub fn fault(stdout: &str, code: i32) -> Option<String> {
     (!told).then(|| format!("{} errors for exit code {code}: {stdout}", faults.len()))
 }
 
-/// Events of a command that ends with `code`.
+/// Runs a command, expects exit code `code` and a valid stream, and returns its events.
 pub fn events(job: &Job, code: i32, words: &str) -> Vec<Value> {
     let output = job.run(&format!("{words} --progress json"));
     let stdout = String::from_utf8(output.stdout).unwrap();
@@ -70,13 +71,13 @@ pub fn named<'a>(events: &'a [Value], name: &str) -> Vec<&'a Value> {
     named.collect()
 }
 
-/// Frames done, skipped and failed, as the end has them.
+/// Numbers of frames done, skipped and failed, from the final event.
 pub fn totals(events: &[Value]) -> [u64; 3] {
     let end = events.last().unwrap();
     ["frames_done", "frames_skipped", "frames_failed"].map(|key| end[key].as_u64().unwrap())
 }
 
-/// Bytes of all files of a folder.
+/// Total size of the files directly in a folder, bytes.
 pub fn bytes(folder: &Path) -> u64 {
     let files = fs::read_dir(folder).unwrap();
     let files = files.map(|entry| entry.unwrap().metadata().unwrap());
@@ -86,7 +87,7 @@ pub fn bytes(folder: &Path) -> u64 {
         .sum()
 }
 
-/// That each frame says which of how many it is, and how long the others may take.
+/// Asserts that each frame event has its number and the total count, and estimates the time left.
 pub fn assert_counted(events: &[Value], count: u64) {
     let frames = named(events, "frame");
     assert_eq!(frames.len() as u64, count);
@@ -106,7 +107,7 @@ pub fn assert_counted(events: &[Value], count: u64) {
     assert_eq!(named(events, "ready")[0]["frames"], count);
 }
 
-/// Changes a byte of a frame of the cache.
+/// Flips a bit in the last byte of a frame of the cache.
 pub fn damage(job: &Job, frame: u32) {
     let file = job.path(&format!("cache/frames/small.{frame:04}.ply"));
     let mut bytes = fs::read(&file).unwrap();
@@ -115,7 +116,7 @@ pub fn damage(job: &Job, frame: u32) {
     fs::write(file, bytes).unwrap();
 }
 
-/// Files of a folder with their bytes, but for the record of whose they are.
+/// Files of a folder and their bytes, without `render.json`, which records their origin.
 pub fn pictures(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     let mut files = BTreeMap::new();
     for entry in fs::read_dir(folder).unwrap() {
@@ -129,7 +130,7 @@ pub fn pictures(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     files
 }
 
-/// Frames with a status, as events tell it.
+/// Numbers of the frames whose event has this status.
 pub fn frames(events: &[Value], status: &str) -> Vec<u64> {
     let frames = named(events, "frame").into_iter();
     let of = frames.filter(|event| event["status"] == status);

@@ -1,4 +1,4 @@
-//! What FLIP's tests share.
+//! Helpers shared by the tests of FLIP.
 use glam::{DVec3, Vec3};
 use swell::{
     domain::{
@@ -21,7 +21,7 @@ use swell::{
 
 use crate::support::{lattice, scene as box_scene};
 
-/// Δx.
+/// Cell size, metres.
 pub const DX: f64 = 0.1;
 
 pub fn settings() -> Settings {
@@ -43,7 +43,7 @@ pub fn settings() -> Settings {
     }
 }
 
-/// A box of so many cells.
+/// A box of `cells` cells.
 pub fn scene(cells: [f64; 3]) -> Scene {
     let mut scene = box_scene(cells.map(|n| n * DX));
     scene.solver.method = Method::Flip;
@@ -97,7 +97,7 @@ pub fn run(
     last.unwrap()
 }
 
-/// A block of water of whole cells, eight particles each.
+/// A block of whole cells of water, eight particles each.
 pub fn block(corner: [usize; 3], cells: [usize; 3]) -> Particles {
     lattice(
         corner.map(|c| c as f64 * DX),
@@ -114,7 +114,7 @@ pub fn velocity(particles: &Particles, k: usize) -> DVec3 {
     Vec3::from_array(particles.velocity[k]).as_dvec3()
 }
 
-/// Values of one plane of a field, by cell.
+/// A field of the grid, read back from the GPU and indexed by cell.
 pub struct Field {
     pub bricks: Bricks,
     pub values: Vec<f32>,
@@ -131,7 +131,7 @@ impl Field {
         }
     }
 
-    /// Of a field of u32.
+    /// Bits of a value, for a field of `u32` read as `f32`.
     pub fn at_bits(&self, cell: [usize; 3]) -> u32 {
         (self.at(0, cell) as f32).to_bits()
     }
@@ -145,7 +145,7 @@ impl Field {
     }
 }
 
-/// A half space as a solid.
+/// The half-space n·x < d as a solid, sampled every 5 cm.
 pub fn half_space(n: DVec3, d: f64) -> Boundary {
     let (spacing, dims) = (0.05, [50, 50, 50]);
     let origin = DVec3::splat(-0.3);
@@ -166,7 +166,7 @@ pub fn half_space(n: DVec3, d: f64) -> Boundary {
     }
 }
 
-/// A tank, half full, its lattice as it starts.
+/// A tank filled with a lattice of particles to a depth of `depth` cells.
 pub fn tank(cells: [usize; 3], depth: usize) -> (Scene, Particles) {
     let scene = scene(cells.map(|n| n as f64));
     (scene, block([0; 3], [cells[0], depth, cells[2]]))

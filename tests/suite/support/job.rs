@@ -1,4 +1,4 @@
-//! The whole program in a folder of its own.
+//! Runs the `swell` binary in a temporary folder.
 use std::{
     fs,
     path::{Path, PathBuf},
@@ -79,7 +79,7 @@ frames = "1-6"
 pictures = "3-6x3"
 "#;
 
-/// A folder with a scene, its mesh, two looks and a study, in which the program runs.
+/// A temporary folder in which the program runs: a scene, its mesh, two looks and a study.
 pub struct Job {
     pub folder: TempDir,
 }
@@ -95,7 +95,8 @@ impl Job {
         ])
     }
 
-    /// The same on the disk of the build, where writing takes time: temporary folders may be in memory.
+    /// Like [`Self::new`], but on the disk of the build directory, where writing takes time:
+    /// temporary folders may be in memory.
     pub fn on_disk() -> Self {
         let disk = Self {
             folder: TempDir::new_in(env!("CARGO_TARGET_TMPDIR")).unwrap(),
@@ -108,7 +109,7 @@ impl Job {
         disk
     }
 
-    /// A folder with these files, each a name and a text.
+    /// A folder with these files, given as name and text.
     pub fn of(files: &[(&str, &str)]) -> Self {
         let job = Self {
             folder: TempDir::new().unwrap(),
@@ -153,7 +154,8 @@ impl Job {
         self.command(words).output().unwrap()
     }
 
-    /// Runs and expects an exit code; gives what was said, standard output first.
+    /// Runs the program, expects an exit code, and returns standard output followed by standard
+    /// error.
     pub fn expect(&self, code: i32, words: &str) -> String {
         let output = self.run(words);
         let said = [output.stdout, output.stderr].concat();
@@ -162,7 +164,8 @@ impl Job {
         said
     }
 
-    /// As [`Self::expect`], of a fault that is told in one line, which has this part.
+    /// Like [`Self::expect`], for an error that is reported in exactly one line; the output
+    /// contains `part`.
     pub fn expect_clear(&self, code: i32, words: &str, part: &str) {
         let said = self.expect(code, words);
         assert!(said.contains(part), "{words}: {said}");
@@ -170,7 +173,7 @@ impl Job {
         assert_eq!(said.lines().filter(is_fault).count(), 1, "{said}");
     }
 
-    /// The same with `--json`; what standard output holds, and nothing but that, is the object.
+    /// Runs the program with `--json`; standard output must be one JSON object and nothing else.
     pub fn json(&self, code: i32, words: &str) -> serde_json::Value {
         let output = self.run(&format!("{words} --json"));
         let said = String::from_utf8_lossy(&output.stderr);
@@ -183,7 +186,6 @@ impl Job {
     }
 }
 
-/// That all of `words` stand in what was said.
 fn copy(from: &Path, to: &Path) {
     fs::create_dir(to).unwrap();
     for entry in fs::read_dir(from).unwrap() {
@@ -197,6 +199,7 @@ fn copy(from: &Path, to: &Path) {
     }
 }
 
+/// Asserts that `said` contains every string of `words`.
 pub fn assert_has(said: &str, words: &[&str]) {
     for word in words {
         assert!(said.contains(word), "no {word:?} in: {said}");

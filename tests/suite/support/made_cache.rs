@@ -1,4 +1,4 @@
-//! Caches without a solver, for what reads them.
+//! Caches without a solver, for tests of code that reads them.
 use std::path::Path;
 
 use serde_json::Value;
@@ -29,7 +29,7 @@ method = "pbf"
 particle_spacing = 0.1
 "#;
 
-/// What a made cache is, and what is spoiled of it.
+/// Contents of a generated cache, with hooks that spoil parts of it.
 pub struct Made<'a> {
     pub scene: &'a str,
     pub device: &'a str,
@@ -38,7 +38,7 @@ pub struct Made<'a> {
     pub version: &'a str,
     pub grids: Option<GridRecord>,
     pub probes: Vec<ProbeRecord>,
-    /// Of frame, probe and column.
+    /// Probe value as a function of frame, probe and column.
     pub seen: &'a dyn Fn(u32, usize, usize) -> Option<f64>,
     pub report: &'a dyn Fn(u32) -> Value,
 }
@@ -60,7 +60,7 @@ impl Default for Made<'_> {
 }
 
 impl Made<'_> {
-    /// With both grids, and two probes.
+    /// A cache with both grids and two probes.
     pub fn watched() -> Self {
         let probe = |name: &str, columns: &[&str]| ProbeRecord {
             name: name.to_owned(),
@@ -86,12 +86,12 @@ impl Made<'_> {
     }
 }
 
-/// What the probes of a made cache see: nothing at the far one before frame 2.
+/// Default probe values; the second probe is empty before frame 2.
 pub fn seen(frame: u32, probe: usize, column: usize) -> Option<f64> {
     (probe == 0 || frame >= 2).then(|| f64::from(frame) + 0.5 * column as f64)
 }
 
-/// A stand-in for a solver: a block of 8 × 10 × 10 particles that slides along x and sinks a little.
+/// A stand-in for a solver: a block of 8 × 10 × 10 particles that slides along x and sinks slowly.
 pub fn particles(frame: u32) -> Particles {
     let time = frame as f32 / 60.0;
     let place = |k: u32| {

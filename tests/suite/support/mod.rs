@@ -1,4 +1,4 @@
-//! Scenes, waters, caches and folders that tests of several rooms begin from.
+//! Scenes, particles, caches and folders that several test modules start from.
 
 pub mod cache;
 pub mod device;
@@ -33,7 +33,7 @@ use swell::{
 
 pub const D: f64 = 0.1;
 
-/// A box with water settings that tests change where they need.
+/// A box with default water settings, which tests change as needed.
 pub fn scene(size: [f64; 3]) -> Scene {
     Scene {
         shot: Shot {
@@ -104,7 +104,7 @@ pub fn lattice(corner: [f64; 3], counts: [usize; 3], spacing: [f64; 3]) -> Parti
     particles
 }
 
-/// A hash of `k` in −1..1.
+/// A hash of `k`, in −1..1.
 pub fn noise(k: u64) -> f64 {
     let mut z = (k + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -141,7 +141,7 @@ pub fn solver(
     solver
 }
 
-/// State and report after `frames` frames.
+/// State and report after `frames` frames of PBF.
 pub fn run(
     context: &Context,
     scene: &Scene,
@@ -156,7 +156,7 @@ pub fn run(
     last.unwrap()
 }
 
-/// Largest distance between positions of the same id.
+/// Largest distance between positions of the same id, metres.
 pub fn max_distance(a: &Particles, b: &Particles) -> f64 {
     assert_eq!(a.id, b.id);
     a.position
@@ -166,7 +166,7 @@ pub fn max_distance(a: &Particles, b: &Particles) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// A box's surface.
+/// The surface of a box, eight vertices and twelve triangles.
 pub fn box_mesh(bounds: Bounds) -> TriangleMesh {
     let corner = |i: usize| {
         let pick = |axis: usize| {
@@ -193,7 +193,7 @@ pub fn box_mesh(bounds: Bounds) -> TriangleMesh {
     }
 }
 
-/// A box that moves.
+/// A box that translates along `direction`.
 pub fn mover(bounds: Bounds, direction: DVec3, motion: Motion) -> MovingSolid {
     MovingSolid {
         placed: placed(box_mesh(bounds)),
@@ -203,7 +203,7 @@ pub fn mover(bounds: Bounds, direction: DVec3, motion: Motion) -> MovingSolid {
     }
 }
 
-/// The same, about an axis through its middle as well, at a steady speed in degrees a second.
+/// Makes `solid` also rotate about an axis through its centre, at `speed` degrees a second.
 pub fn turning(mut solid: MovingSolid, axis: DVec3, speed: f64) -> MovingSolid {
     let bounds = solid.placed.mesh.bounds().unwrap();
     let motion = Motion::ConstantVelocity {

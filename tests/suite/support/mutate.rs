@@ -1,5 +1,5 @@
-//! Damage for good input.
-/// Bytes cut out, overwritten and doubled at random.
+//! Corrupts valid input.
+/// Truncates, overwrites, inserts and duplicates bytes as `edits` say.
 pub fn mutate(mut bytes: Vec<u8>, edits: &[(u16, u8, u8)]) -> Vec<u8> {
     for &(at, kind, value) in edits {
         if bytes.is_empty() {
@@ -16,7 +16,7 @@ pub fn mutate(mut bytes: Vec<u8>, edits: &[(u16, u8, u8)]) -> Vec<u8> {
                 bytes.extend(part);
             }
             _ => {
-                // Text formats break most deeply in their numbers.
+                // Text formats fail most easily in their numbers.
                 let digits = [b"-1 ".as_slice(), b"nan", b"1e39", b"99999999999999999999"];
                 let digit = digits[value as usize % digits.len()];
                 bytes.splice(at..at + 1, digit.iter().copied());

@@ -1,21 +1,22 @@
-//! PBF's sums as the papers have them, over all pairs and lattices in f64, and none of the program's.
+//! PBF's sums as the papers define them, over all pairs and over lattices in f64, independent of
+//! the program's code.
 use std::f64::consts::PI;
 
 use glam::{DVec3, IVec3};
 use swell::domain::bounds::Bounds;
 
-/// The kernels of Müller 2003 for particles whose lattice has its rest density.
+/// The kernels of Müller et al. 2003, scaled so that a lattice of particles has rest density.
 pub struct Paper {
-    /// h, metres.
+    /// Support radius h, metres.
     pub h: f64,
     pub d: f64,
-    /// m/ρ0, m³.
+    /// Volume of a particle, m/ρ0, m³.
     pub volume: f64,
     /// Σ_k |∇_k C|² in the bulk, 1/m².
     pub squares: f64,
-    /// Σ_j (λ_i + λ_j) ∇C over ∇λ in the bulk.
+    /// Σ_j (λ_i + λ_j) ∇C divided by ∇λ in the bulk.
     pub linear: f64,
-    /// What the lattice beyond a face adds to the density.
+    /// Relative density that the lattice beyond a face of the domain contributes.
     pub deficit: f64,
 }
 
@@ -64,8 +65,8 @@ impl Paper {
         self.volume * slope * x / r
     }
 
-    /// Poly6 over the half-space beyond a plane `z` away: discs of 315/256 (1 − t²)⁴ / h by the midpoint rule, whose
-    /// error is below 2 / n² = 5e-7.
+    /// Poly6 integrated over the half-space beyond a plane `z` away: discs of 315/256 (1 − t²)⁴ /
+    /// h, by the midpoint rule, whose error is below 2 / n² = 5e-7.
     pub fn beyond(&self, z: f64) -> f64 {
         let (n, q) = (2000, (z / self.h).min(1.0));
         let step = (1.0 - q) / f64::from(n);
@@ -73,12 +74,14 @@ impl Paper {
         315.0 / 256.0 * (0..n).map(disc).sum::<f64>()
     }
 
-    /// What makes the half-space beyond a wall, half a spacing away, the lattice that it stands for.
+    /// Factor by which the half-space beyond a wall half a spacing away equals the lattice that it
+    /// represents.
     pub fn wall_scale(&self) -> f64 {
         self.deficit / self.beyond(0.5 * self.d)
     }
 
-    /// Density at `x` of a box, the product of what each wall leaves free.
+    /// Relative density at `x` due to the walls of a box: one minus the product of the fractions
+    /// that each wall leaves free.
     pub fn of_walls(&self, x: DVec3, walls: &Bounds) -> f64 {
         let free = |z: f64| 1.0 - self.wall_scale() * self.beyond(z);
         let axis = |k: usize| free(x[k] - walls.min[k]) * free(walls.max[k] - x[k]);
@@ -91,8 +94,9 @@ impl Paper {
         points.iter().map(of).collect()
     }
 
-    /// A Jacobi iteration far from walls (Macklin and Müller 2013, eqs. 8 to 14): λ = −max(C, 0) / (Σ |∇C|² + ε), then
-    /// Δx = ω Σ (λ_i + λ_j − k (W / W(0.2 h))⁴ / Σ |∇C|²_bulk) ∇W, of at most half a spacing.
+    /// Corrections of a Jacobi iteration far from walls (Macklin and Müller 2013, eqs. 8 to 14): λ
+    /// = −max(C, 0) / (Σ |∇C|² + ε), then Δx = ω Σ (λ_i + λ_j − k (W / W(0.2 h))⁴ / Σ |∇C|²_bulk)
+    /// ∇W, limited to half a spacing.
     pub fn corrections(&self, points: &[DVec3], relaxation: f64, repulsion: f64) -> Vec<DVec3> {
         let gradient = |i: usize, j: usize| self.gradient(points[i] - points[j]);
         let n = points.len();
@@ -119,8 +123,9 @@ impl Paper {
     }
 }
 
-/// Densities of cells of water by hats, at the end of the frame before. The water's image behind a wall gives back what of a
-/// hat lies there: between the wall and the centre beside it the hat stays at one.
+/// Densities of the cells of water by hat functions. Mirror images behind a wall return the part of
+/// a hat that lies there: between the wall and the centre of the cell beside it, the hat stays at
+/// one.
 pub fn of_cells(places: &[DVec3], size: DVec3, dx: f64) -> Vec<f64> {
     let cells = (size / dx).round().as_ivec3();
     let mut densities = Vec::new();
@@ -137,7 +142,7 @@ pub fn of_cells(places: &[DVec3], size: DVec3, dx: f64) -> Vec<f64> {
         };
         let hats = |x: &DVec3| along(x, 0) * along(x, 1) * along(x, 2);
         let density = places.iter().map(hats).sum::<f64>() / 8.0;
-        // Less than half full at its centre it is air.
+        // A cell that is less than half full is air.
         if density >= 0.5 {
             densities.push(density);
         }

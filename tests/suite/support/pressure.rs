@@ -1,4 +1,4 @@
-//! A pressure room on a case, as the FLIP solver drives it.
+//! The pressure solver on a prepared case, driven as FLIP drives it.
 use swell::{
     domain::{
         bricks::CELLS,
@@ -79,13 +79,13 @@ impl Rig {
             .set_topology(&self.program, &case.bricks, case.cell_size);
     }
 
-    /// Solves by other settings of the same preconditioner and precision from now on.
+    /// From now on solves with other settings of the same preconditioner and precision.
     pub fn set(&mut self, settings: &Pressure) {
         self.solver = PressureSolver::new(settings, true, self.capacity);
         self.upload_case();
     }
 
-    /// Planes of the case's stride into those of the capacity's.
+    /// Uploads three planes with the case's stride into a buffer with the capacity's stride.
     pub fn upload_planes(&self, buffer: Buf<f32>, values: &[f32]) {
         let stride = self.capacity * CELLS as usize;
         for (axis, plane) in values.chunks_exact(self.case.kind.len()).enumerate() {
@@ -101,7 +101,7 @@ impl Rig {
             .collect()
     }
 
-    /// Gives each row its right-hand side, by way of the solid flux.
+    /// Sets the right-hand side of each row, by means of the solid flux.
     pub fn set_rhs(&self, b: &[f64]) {
         let mut flux = vec![0.0f32; self.case.kind.len()];
         for (&element, &b) in self.system.cell.iter().zip(b) {
@@ -124,7 +124,7 @@ impl Rig {
         self.project(None).solved
     }
 
-    /// `planes` arrays of the room's own precision, added up, by row.
+    /// Sums `planes` arrays in the solver's own precision; one value per row.
     fn sum(&self, buffer: Buf<Real>, planes: usize) -> Vec<f64> {
         let cells = self.capacity * CELLS as usize;
         let read = read_reals(&self.program, &buffer, self.precision, planes * cells);
@@ -133,12 +133,12 @@ impl Rig {
         self.system.cell.iter().map(|&e| at(blocked(e))).collect()
     }
 
-    /// An array of the room, by row.
+    /// An array of the solver, one value per row.
     pub fn by_row(&self, buffer: Buf<Real>) -> Vec<f64> {
         self.sum(buffer, 1)
     }
 
-    /// All terms of the solution, by row.
+    /// The solution, one value per row, with all terms of its extended precision summed.
     pub fn solution(&self) -> Vec<f64> {
         self.sum(SOLUTION, self.precision.terms())
     }

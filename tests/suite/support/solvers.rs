@@ -1,4 +1,4 @@
-//! A scene by its own solver, on the GPU and in f64.
+//! Runs a scene with the solver that it names, on the GPU or with the f64 reference.
 
 use swell::{
     domain::{boundary::Boundary, particles::Particles, solver::Solver},
@@ -7,7 +7,7 @@ use swell::{
     scene::{Method, Scene},
 };
 
-/// The state of particles after so many frames.
+/// State of the particles after `frames` frames on the GPU.
 pub fn on_gpu(context: &Context, scene: &Scene, particles: &Particles, frames: u32) -> Particles {
     match scene.solver.method {
         Method::Flip => super::flip::run(context, scene, particles, frames).0,
@@ -15,7 +15,7 @@ pub fn on_gpu(context: &Context, scene: &Scene, particles: &Particles, frames: u
     }
 }
 
-/// The same by the reference.
+/// State of the particles after `frames` frames of the f64 reference.
 pub fn on_cpu(scene: &Scene, particles: &Particles, frames: u32) -> Particles {
     let none = Boundary::default();
     let advance = |solver: &mut dyn Solver<Error = reference::ReferenceError>| {

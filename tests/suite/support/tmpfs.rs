@@ -7,14 +7,15 @@ use std::{
 
 use tempfile::TempDir;
 
-/// Mounted until it is dropped.
+/// A tmpfs, unmounted when dropped.
 pub struct Tmpfs {
     folder: TempDir,
 }
 
 impl Tmpfs {
-    /// `bytes` are taken up to whole pages. Where mounts are forbidden the reason goes past the test's captured output to
-    /// the terminal, with the name of the test that is not run.
+    /// Mounts a tmpfs of `bytes` bytes, rounded up to whole pages. Where mounting is not permitted,
+    /// returns `None` and writes the reason and the name of the skipped test to the terminal,
+    /// bypassing the captured output.
     pub fn mount(bytes: u64, test: &str) -> Option<Self> {
         let folder = TempDir::new().unwrap();
         match mount(&format!("size={bytes}"), folder.path()) {
@@ -33,7 +34,7 @@ impl Tmpfs {
         self.folder.path()
     }
 
-    /// Such as `size=4194304` or `ro`.
+    /// Remounts with other options, such as `size=4194304` or `ro`.
     pub fn remount(&self, options: &str) {
         mount(&format!("remount,{options}"), self.path()).unwrap();
     }

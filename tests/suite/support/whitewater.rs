@@ -1,4 +1,4 @@
-//! Whitewater over water that tests lay out.
+//! Whitewater over water that the test lays out.
 use glam::{DVec3, Vec3};
 use swell::{
     domain::{
@@ -33,7 +33,7 @@ pub fn settings() -> Settings {
     }
 }
 
-/// Whitewater of these places, velocities and kinds.
+/// Whitewater particles with these positions, velocities and kinds.
 pub fn white(all: &[(DVec3, DVec3, Kind)]) -> Particles {
     let mut made = none();
     for (id, (x, v, kind)) in (0..).zip(all) {
@@ -68,8 +68,8 @@ pub fn kind(white: &Particles, k: usize) -> Kind {
     Kind::of_number(white.attributes[KIND][k]).unwrap()
 }
 
-/// What the GPU, or without a context the reference, finds of the water, and makes of whitewater over `frames` frames of
-/// `seconds` each, in which the water stays.
+/// Runs whitewater over water at rest for `frames` frames of `seconds` each, on the GPU or, without
+/// a context, with the reference. Returns the potentials found in the water and the whitewater.
 pub fn run(
     context: Option<&Context>,
     (scene, water): (&Scene, &Particles),

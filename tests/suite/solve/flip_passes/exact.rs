@@ -1,5 +1,5 @@
-//! FLIP where the answer is known to rounding, on the GPU and by the reference: affine fields under APIC, modes that the
-//! grid does not see, and a corner between a wall and a solid.
+//! FLIP where the result is known up to rounding, on the GPU and with the reference: affine fields
+//! under APIC, modes that the grid does not resolve, and a corner between a wall and a solid.
 
 use glam::DVec3;
 use swell::{
@@ -25,7 +25,7 @@ use crate::support::{context, device::spoiled, flip::*, lattice, mover, noise};
 
 const EPSILON: f64 = f32::EPSILON as f64;
 
-/// State and report after so many frames, of the GPU and of the reference.
+/// State and report after `frames` frames, on the GPU and with the reference.
 pub(super) fn both(
     context: &Context,
     scene: &Scene,
@@ -54,7 +54,7 @@ pub(super) fn both(
     .map(|(name, (state, report))| (name, state, report))
 }
 
-/// ∂u_i/∂x_j of a flow without divergence, 1/s.
+/// ∂u_i/∂x_j of a divergence-free flow, 1/s.
 const SLOPES: [[f64; 3]; 3] = [[0.4, -0.7, 0.2], [0.9, -0.3, 0.5], [-0.6, 0.1, -0.1]];
 
 fn affine_field(x: DVec3) -> DVec3 {
@@ -62,8 +62,9 @@ fn affine_field(x: DVec3) -> DVec3 {
     DVec3::new(row(0), row(1), row(2))
 }
 
-/// Eight particles a cell, all of them in the same eighth of it and none in its middle: means over them say something of a
-/// face only by way of the affine part. The field is `part` of the affine one.
+/// Eight particles per cell, all in the same eighth of it and none at its centre: their means
+/// represent the velocity at a face only by way of the affine part. The field is `part` of
+/// [`affine_field`].
 fn affine_block(part: f64, frames_per_second: f64) -> (Scene, Particles) {
     let mut scene = scene([16.0; 3]);
     scene.water.gravity = DVec3::ZERO;
@@ -86,8 +87,8 @@ fn affine_block(part: f64, frames_per_second: f64) -> (Scene, Particles) {
     (scene, particles)
 }
 
-/// The largest gaps of velocities and of slopes after a step so short that nothing moves by more than positions round, m/s
-/// and 1/s.
+/// Largest errors of velocities, m/s, and of slopes, 1/s, after a step so short that motion is
+/// below the rounding of positions.
 fn affine_gaps(context: &Context) -> [(&'static str, f64, f64); 2] {
     let (scene, particles) = affine_block(1.0, 1e6);
     both(context, &scene, &particles, &Boundary::default(), 1).map(|(name, state, _)| {
@@ -104,9 +105,9 @@ fn affine_gaps(context: &Context) -> [(&'static str, f64, f64); 2] {
     })
 }
 
-/// Speeds of 1 m/s: sums of some 64 weights each of which rounds by 3 × 16 ε / 2, of either sign, come to 8 × 24 ε; a slope
-/// is a difference of two over Δx. The reference is given velocities, slopes and places that are rounded to f32, and rounds
-/// what it answers: 4 ε.
+/// Speeds of 1 m/s: sums of some 64 weights, each of which rounds by 3 × 16 ε / 2, of either sign,
+/// give 8 × 24 ε; a slope is a difference of two over Δx. The reference gets velocities, slopes and
+/// positions that are rounded to f32, and rounds its output: 4 ε.
 #[test]
 fn an_affine_field_is_given_back_from_off_centre() {
     let tolerance = 200.0 * EPSILON;
@@ -120,7 +121,8 @@ fn an_affine_field_is_given_back_from_off_centre() {
         assert!(gap < tolerance, "{name} {gap:e}");
         assert!(slope_gap < 2.0 * tolerance / DX, "{name} {slope_gap:e}");
     }
-    // Negative controls: the way from a particle to a face off by 1 %, along the component's axis and across.
+    // Negative controls: the distance from a particle to a face off by 1 %, along the component's
+    // axis and across it.
     for (from, to) in [
         ("(v - slope.x * f.x)", "(v - 1.01 * slope.x * f.x)"),
         (
@@ -136,8 +138,8 @@ fn an_affine_field_is_given_back_from_off_centre() {
     }
 }
 
-/// In u = A x a step of the midpoint rule goes A (x + Δt/2 A x) Δt, and the pressure has nothing to do. Velocities of up to 2 m/s
-/// round as above, places of 2 m by a few ε.
+/// In u = A x a step of the midpoint rule moves a particle by A (x + Δt/2 A x) Δt, and the pressure
+/// is zero. Velocities of up to 2 m/s round as above, positions of 2 m by a few ε.
 #[test]
 fn particles_go_by_the_midpoint_rule() {
     const PART: f64 = 6.0;
@@ -150,7 +152,7 @@ fn particles_go_by_the_midpoint_rule() {
                 let x = position(&particles, k);
                 let middle = x + 0.5 * step * PART * affine_field(x);
                 let end = x + step * PART * affine_field(middle);
-                // Where the grid is affine all about the way.
+                // Where the grid is affine all along the path.
                 let is_inner = (x - DVec3::splat(0.8)).abs().max_element() < 0.2;
                 f64::from(u8::from(is_inner)) * position(&state, k).distance(end)
             };
@@ -162,15 +164,15 @@ fn particles_go_by_the_midpoint_rule() {
         println!("{name}: {gap:.1e} m of {tolerance:.1e}");
         assert!(gap < tolerance, "{name} {gap:e}");
     }
-    // Negative control: a middle that is 1 % farther.
+    // Negative control: a midpoint that is 1 % farther.
     let control = spoiled("flip/advect", "start + 0.5 *", "start + 0.505 *");
     let [(_, gap), _] = gaps(&control);
     assert!(gap > 2.0 * tolerance, "{gap:e} {tolerance:e}");
 }
 
-/// Pairs of particles on one spot that move against each other: to the grid they are water at rest, which stays. Those in cells
-/// beside air are at rest, unless noise is to be `everywhere`. The largest gap to what is left by `kept` a frame, m/s, and the substeps
-/// of the last frame.
+/// Pairs of particles at the same position with opposite velocities: to the grid they are water at
+/// rest, which stays. Pairs in cells beside air are at rest unless `everywhere` is set. Returns the
+/// largest deviation from a decay by `kept` per frame, m/s, and the substeps of the last frame.
 fn unseen_gaps(
     context: &Context,
     change: &dyn Fn(&mut Scene),
@@ -208,9 +210,9 @@ fn unseen_gaps(
     })
 }
 
-/// v = α u + (1 − α)(v + Δu) with u = Δu = 0 leaves 1 − α a frame, in however many substeps, and 1 − c of that where
-/// viscosity takes c as well. A substep rounds v by 2 ε and α by ε; sums at faces are of up to 128 speeds that cancel, which
-/// leaves 8 × 3 ε of them and α or so of that in v.
+/// v = α u + (1 − α)(v + Δu) with u = Δu = 0 leaves 1 − α per frame, in however many substeps, and
+/// 1 − c of that with viscosity c. A substep rounds v by 2 ε and α by ε; sums at faces are of up to
+/// 128 speeds that cancel, which leaves 8 × 3 ε of them and about α of that in v.
 #[test]
 fn what_the_grid_does_not_see_decays_by_the_blend_alone() {
     const FRAMES: u32 = 5;
@@ -231,7 +233,7 @@ fn what_the_grid_does_not_see_decays_by_the_blend_alone() {
     ] {
         let kept = (1.0 - alpha) * (1.0 - xsph.unwrap_or(0.0));
         let change = blend(alpha, cfl, xsph);
-        // Control: beside air velocities are clamped to the grid's, at once.
+        // Control: beside air, velocities are clamped to the grid's at once.
         for (name, gap, _) in unseen_gaps(&context, &change, kept, 1, true) {
             assert!(gap > 0.5, "{name} {gap:e}");
         }
@@ -248,9 +250,10 @@ fn what_the_grid_does_not_see_decays_by_the_blend_alone() {
     }
 }
 
-/// A particle where floor and a slope over it at 45° meet, on the slope's contact distance and `deep` below the floor's. The
-/// floor lifts it, the slope pushes it back along its normal, half as far down again: a push each of n rounds takes it along
-/// to x0 + deep (1 − 2^−n), where the floor keeps it.
+/// A particle in the corner between the floor and an overhanging slope at 45°, at the contact
+/// distance of the slope and `deep` below that of the floor. The floor lifts it; the slope pushes
+/// it back along its normal, which is half as far down again. After n rounds it is at x0 + deep (1
+/// − 2^−n), at the floor's contact distance.
 #[test]
 fn four_rounds_take_a_particle_out_of_a_corner() {
     const ROUNDS: i32 = 4;
@@ -275,7 +278,7 @@ fn four_rounds_take_a_particle_out_of_a_corner() {
         scene.shot.frames_per_second = 100.0;
         flip(&mut scene).density_correction = false;
         if !boundary.moving.is_empty() {
-            // Along the slope, so that it stays where it is.
+            // Along the slope, so that it does not move closer.
             let motion = Motion::ConstantVelocity {
                 velocity: 0.5,
                 until: None,
@@ -292,7 +295,7 @@ fn four_rounds_take_a_particle_out_of_a_corner() {
             (name, x.x - exact, x.y - contact)
         })
     };
-    // Places and distances of 2 m round at ε a few times in each round.
+    // Positions and distances of 2 m round by ε a few times in each round.
     let tolerance = 16.0 * EPSILON;
     let cases = [slope.clone(), moving(None), moving(Some(far))];
     for (k, boundary) in cases.iter().enumerate() {
@@ -308,7 +311,8 @@ fn four_rounds_take_a_particle_out_of_a_corner() {
     }
 }
 
-/// A plate across x = 1.05 so thin that no face of the grid is closed by it, and that a quarter of a frame's way leads over it.
+/// A plate across x = 1.05 m so thin that it closes no face of the grid, and that a quarter of a
+/// frame's displacement crosses it.
 fn plate() -> SignedDistance {
     let (spacing, dims) = (0.05, [50, 50, 50]);
     let value = |k: usize| ((-0.3 + spacing * (k % 50) as f64 - 1.05).abs() - 0.02) as f32;
@@ -320,8 +324,9 @@ fn plate() -> SignedDistance {
     }
 }
 
-/// Drops that fly at a plate in a frame's single step end on its near side, at the contact distance, wherever on their way the
-/// pieces of it end: pieces are no longer than from there to the plate's middle.
+/// Drops that fly at a plate within a single substep end on its near side, at the contact distance,
+/// wherever the pieces of their path end: pieces are no longer than the distance from there to the
+/// middle of the plate.
 #[test]
 fn nothing_thin_is_stepped_over() {
     let mut scene = scene([16.0; 3]);
@@ -366,7 +371,8 @@ fn nothing_thin_is_stepped_over() {
     ] {
         for (name, gap) in gaps(&context(), scene, boundary) {
             println!("{name}: {gap:.1e} m");
-            // Places and distances of 2 m round by ε a few times in each of 17 pieces, and the last one counts.
+            // Positions and distances of 2 m round by ε a few times in each of 17 pieces, and the
+            // last one counts.
             assert!(gap < 16.0 * EPSILON, "{name} {gap:e}");
         }
         // Negative control: pieces twice as long.
@@ -380,9 +386,9 @@ fn nothing_thin_is_stepped_over() {
     }
 }
 
-/// The scene's tolerance and its most iterations reach the device: a tolerance just above the residual of the k-th iteration
-/// ends there, one just below does not, and with k iterations allowed k there are. A residual of 1e-4 is known to 1e-3 of it
-/// (`pressure_stops`).
+/// The scene's tolerance and iteration limit reach the device: a tolerance just above the residual
+/// of the k-th iteration stops there, one just below does not, and a limit of k gives k iterations.
+/// A residual of 1e-4 is known to 1e-3 of itself (`pressure_stops`).
 #[test]
 fn a_scenes_projection_stops_where_the_scene_says() {
     let context = context();

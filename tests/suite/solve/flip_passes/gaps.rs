@@ -1,4 +1,4 @@
-//! Water that falls on what stands in its way.
+//! Water that falls on an obstacle.
 
 use glam::DVec3;
 use swell::{
@@ -9,7 +9,8 @@ use swell::{
 use super::exact::both;
 use crate::support::{context, device::spoiled, flip::*};
 
-/// A slab from wall to wall a cell above a floor that it passes in the substep, and how fast it is, cells a substep.
+/// A slab of water from wall to wall, one cell above a floor that it would pass within the substep,
+/// at `speed` cells per substep.
 fn slab(speed: f64) -> (Scene, Particles) {
     let mut scene = scene([8.0, 16.0, 8.0]);
     scene.water.gravity = DVec3::ZERO;
@@ -22,8 +23,9 @@ fn slab(speed: f64) -> (Scene, Particles) {
     (scene, particles)
 }
 
-/// Within the substep it fills the gap and goes no farther: it is left with a cell a substep, by the projection's tolerance of 1e-5 of a
-/// source that is a cell at most, and √N of it in a norm over N = 8² columns.
+/// Within the substep the slab fills the gap and goes no farther: it is left with one cell per
+/// substep, up to the projection's tolerance of 1e-5 of a source of at most one cell, times √N in a
+/// norm over N = 8² columns.
 #[test]
 fn a_slab_that_lands_within_a_substep_goes_as_far_as_the_floor() {
     const TOLERANCE: f64 = 8.0 * 1e-5;
@@ -52,7 +54,7 @@ fn a_slab_that_lands_within_a_substep_goes_as_far_as_the_floor() {
             "{name}: {least} {most}"
         );
     }
-    // Control: with gaps of air it flies on into the floor.
+    // Control: if gaps count as air, it flies on into the floor.
     let control = spoiled("flip/close_gaps", "CLOSES = 0.75", "CLOSES = 7.5");
     let [(_, least, _), _] = speeds(&control, 1.4);
     assert!((least + 1.4).abs() < 1e-6, "{least}");
