@@ -1,4 +1,5 @@
-//! No-slip walls: their shear stress in closed form, what they cost where no scene names them, and a dam break over a floor.
+//! No-slip walls: their shear stress in closed form, that other scenes do not pay for them, and a
+//! dam break over a no-slip floor.
 
 use glam::DVec3;
 use swell::{
@@ -38,7 +39,7 @@ where
     solver.advance().unwrap()
 }
 
-/// After one frame, by the GPU and by the reference.
+/// State and report after one frame, on the GPU and with the reference.
 fn both(context: &Context, scene: &Scene, particles: &Particles) -> [(Particles, StepReport); 2] {
     let cpu = reference::flip::Flip::new(scene, &Boundary::default());
     [
@@ -51,11 +52,12 @@ fn spoiled(from: &'static str, to: &'static str) -> Lent {
     device::spoiled("flip/wall_friction", from, to)
 }
 
-/// Speed of the water along x and along z, m/s: 1 together.
+/// Velocity of the water along x and along z, m/s: 1 m/s in magnitude.
 const ALONG: [f64; 2] = [0.8, 0.6];
 
-/// A block three cells deep that slides over a floor aslant, without gravity and away from all other walls: nothing but
-/// the floor acts on it, and no pressure arises, as what the floor slows it slows everywhere alike.
+/// A block three cells deep that slides diagonally over a floor, without gravity and away from all
+/// other walls. Only the floor acts on it, and no pressure arises, because the floor's stress is
+/// the same everywhere.
 fn sliding(no_slip: &[&str]) -> (Scene, Particles) {
     let mut scene = scene([20.0, 8.0, 20.0]);
     scene.water.gravity = DVec3::ZERO;
@@ -65,13 +67,13 @@ fn sliding(no_slip: &[&str]) -> (Scene, Particles) {
     (scene, particles)
 }
 
-/// What a substep of 0.01 s leaves of the speed of 1 m/s of the faces nearest to the wall.
+/// Fraction of 1 m/s that is left at the faces nearest to the wall after a substep of 0.01 s.
 fn left() -> f64 {
     1.0 / (1.0 + VON_KARMAN * VON_KARMAN * 0.01 / DX)
 }
 
-/// The largest gap to the closed form of any particle's velocity, m/s. The faces of the first row are at half a cell, and
-/// particles see them up to one and a half.
+/// Largest difference of a particle's velocity from the closed form, m/s. The faces of the first
+/// row are at half a cell and affect particles up to one and a half.
 fn sliding_gaps(context: &Context, no_slip: &[&str]) -> [f64; 2] {
     let (scene, particles) = sliding(no_slip);
     both(context, &scene, &particles).map(|(state, report)| {
@@ -86,8 +88,8 @@ fn sliding_gaps(context: &Context, no_slip: &[&str]) -> [f64; 2] {
     })
 }
 
-/// Velocities of 1 m/s are sums of some 20 weights that each round by 20 ε, and the solve leaves 1e-5 of a divergence that
-/// itself is rounding.
+/// Velocities of 1 m/s are sums of some 20 weights that each round by 20 ε, and the solve leaves
+/// 1e-5 of a divergence that is itself rounding.
 #[test]
 fn a_floor_slows_water_by_its_shear_stress() {
     let tolerance = 1e-5;
@@ -97,7 +99,8 @@ fn a_floor_slows_water_by_its_shear_stress() {
     // Walls that the water does not touch add nothing.
     let found = sliding_gaps(&context(), &["-x", "-y", "+y", "+z"]);
     assert!(found.iter().all(|gap| *gap < tolerance), "{found:?}");
-    // Negative controls: free slip, another wall, and a stress off by a part in 40 or taken of one component of the speed.
+    // Negative controls: free slip, another wall, a von Kármán constant 1 % off, and the stress of
+    // a single velocity component.
     for no_slip in [&[][..], &["+y"]] {
         let found = sliding_gaps(&context(), no_slip);
         assert!(found.iter().all(|gap| *gap > 0.01), "{found:?}");
@@ -112,8 +115,9 @@ fn a_floor_slows_water_by_its_shear_stress() {
     }
 }
 
-/// Part by which a substep slows a block along x that fills the lowest four cells below a ceiling, of which the topmost is
-/// open to `open` of its height; over what a stress ρ κ² u² takes from its mass.
+/// Momentum that a substep takes from a block moving along x below a no-slip ceiling, relative to
+/// that of the stress ρ κ² u². The block fills the four lowest cells, the topmost of which is open
+/// to `open` of its height.
 fn ceiling_stress(context: &Context, open: f64) -> [f64; 2] {
     const LAYERS: usize = 40;
     let mut scene = scene([20.0, 3.0 + open, 4.0]);
@@ -133,8 +137,9 @@ fn ceiling_stress(context: &Context, open: f64) -> [f64; 2] {
     })
 }
 
-/// A layer of a cell shares the stress wherever the wall stands in its cell: exactly where the cut is half or less of the
-/// cell, and 1 % more where it is all but gone, with which hats over 40 layers add up to 1 %.
+/// A layer one cell thick shares the stress wherever the wall cuts a cell: exactly where the cut is
+/// half of the cell or less, and 1 % more where little of the cell is left; hats over 40 layers add
+/// up to 1 %.
 #[test]
 fn a_walls_stress_does_not_depend_on_where_it_cuts_a_cell() {
     let context = context();
@@ -146,7 +151,7 @@ fn a_walls_stress_does_not_depend_on_where_it_cuts_a_cell() {
             "{open}: {found:?}"
         );
     }
-    // Negative control: the whole of the layer in both of the rows that share it.
+    // Negative control: the whole layer in each of the two rows that share it.
     let whole = spoiled(
         "clamp(1.5 - (params.cut_max - place), vec3f(0.0), vec3f(1.0))",
         "ceil(clamp(1.5 - (params.cut_max - place), vec3f(0.0), vec3f(1.0)))",
@@ -155,7 +160,8 @@ fn a_walls_stress_does_not_depend_on_where_it_cuts_a_cell() {
     assert!(found > 1.2, "{found}");
 }
 
-/// In a box of no-slip walls, water that is stirred: each of them takes energy and none gives any, and water at rest stays.
+/// Stirred water in a box of no-slip walls: each wall takes energy and none adds any, and water at
+/// rest stays.
 #[test]
 fn walls_take_energy_and_give_none() {
     let stirred = |part: f64, no_slip: Vec<Wall>| {
@@ -208,7 +214,7 @@ fn a_bake_with_no_slip_walls_resumes_exactly() {
             .unwrap()
     };
     assert!(go_on(2, &states[1]) == states[5]);
-    // Negative control: without the walls it goes elsewhere.
+    // Negative control: without the walls the result differs.
     scene.no_slip.clear();
     let mut free = solver(&context, &scene, &particles);
     free.load(2, &states[1]).unwrap();
@@ -242,7 +248,8 @@ fn what_no_scene_names_is_not_planned() {
     assert_eq!(constants.collect::<Vec<_>>(), [&[("NO_SLIP", 34.0)]]);
 }
 
-/// Front in column widths against t √(2g/a): Martin and Moyce 1952, a column twice as high as wide.
+/// Time t √(2g/a) and front position in column widths, for a column twice as high as wide (Martin
+/// and Moyce 1952).
 const FRONT: [(f64, f64); 6] = [
     (0.84, 1.22),
     (1.43, 1.67),
@@ -252,7 +259,8 @@ const FRONT: [(f64, f64); 6] = [
     (3.33, 4.11),
 ];
 
-/// Mean error of the front, the 99.5th percentile of the particles' x, in a slab of three cells with twelve to the width.
+/// Mean relative error of the front, taken as the 99.5th percentile of the particles' x, in a slab
+/// of three cells, with twelve cells per column width.
 fn front_error(no_slip: &[&str]) -> f64 {
     const WIDTH: f64 = 12.0;
     let mut scene = scene([6.0 * WIDTH, 2.5 * WIDTH, 3.0]);
@@ -281,12 +289,12 @@ fn front_error(no_slip: &[&str]) -> f64 {
     errors.iter().sum::<f64>() / errors.len() as f64
 }
 
-/// The walls of the slab slide, as they stand for none.
+/// The side walls of the slab are free-slip: they stand for a symmetry plane.
 #[test]
 fn a_no_slip_floor_holds_a_dam_breaks_front_back() {
     let held = front_error(&["-y"]);
     assert!(held < 0.05, "{held}");
-    // Negative controls: a floor that water slides over, and another wall.
+    // Negative controls: a free-slip floor, and another wall.
     for other in [&[][..], &["-x"]] {
         let free = front_error(other);
         assert!(free > 0.06, "{free}");

@@ -1,4 +1,5 @@
-//! PBF on the GPU: against a naive f64 twin, against analysis, and what must hold in any run.
+//! PBF on the GPU: compared with a naive f64 implementation and with analysis, and invariants of
+//! every run.
 mod naive;
 mod pairs;
 mod solids;
@@ -23,9 +24,9 @@ fn compressed() -> (Scene, Particles) {
     (scene, particles)
 }
 
-/// f32 sums of about 40 terms of either sign: 40 ε relative to the sum of their sizes. Corrections are up to
-/// 0.1 d and their terms ten times that, and λ carries the density's own 40 ε over a 4 % excess: 25 · 40 ε.
-/// Positions near 1 m round at ε. Together below 2e-5 d; the assert allows that.
+/// f32 sums of about 40 terms of either sign: 40 ε relative to the sum of their magnitudes.
+/// Corrections are up to 0.1 d and their terms ten times that, and λ carries the density's own 40 ε
+/// over a 4 % excess: 25 · 40 ε. Positions near 1 m round at ε. The total is below 2e-5 d.
 const ONE_ITERATION_TOLERANCE: f64 = 2e-5 * D;
 
 fn one_iteration_gap(spoil: f64) -> (f64, f64) {
@@ -52,12 +53,12 @@ fn one_jacobi_iteration_matches_the_naive_twin() {
     let (gap, moved) = one_iteration_gap(1.0);
     assert!(moved > 0.01 * D, "nothing was corrected: {moved}");
     assert!(gap < ONE_ITERATION_TOLERANCE, "{gap} m, {} d", gap / D);
-    // Negative control: the slope of the kernel off by 2 % is seen.
+    // Negative control: the kernel's gradient off by 2 %.
     let (gap, _) = one_iteration_gap(1.02);
     assert!(gap > ONE_ITERATION_TOLERANCE, "{gap}");
 }
 
-/// Sums of 34 positive f32 terms: 34 ε, and the kernel's own rounding, 8 ε.
+/// Sums of 34 positive f32 terms: 34 ε, and 8 ε for the rounding of the kernel.
 const DENSITY_TOLERANCE: f64 = 42.0 * f32::EPSILON as f64;
 
 #[test]
@@ -96,14 +97,15 @@ fn colours_and_stops_converge() {
                 report.iterations,
                 u64::from(count) * u64::from(report.substeps)
             );
-            // Fourfold work: even an error that falls with the square root of the count would halve.
+            // Four times the work: even an error that falls with the square root of the count would
+            // halve.
             assert!(
                 report.density_error_mean < 0.8 * last,
                 "{iteration:?} {count}: {report:?}"
             );
             last = report.density_error_mean;
         }
-        // Until an error: fewer iterations for a looser one, and the error is met.
+        // Stopping at a density error: a looser bound takes fewer iterations, and the bound is met.
         let mut counts = Vec::new();
         for density_error in [0.01, 0.002] {
             scene.solver.pbf.as_mut().unwrap().stop = Stop::DensityError {
@@ -111,7 +113,8 @@ fn colours_and_stops_converge() {
                 max_iterations: 200,
             };
             let (_, report) = run(&context, &scene, &particles, 1);
-            // The loop stops on λ's density, and the black half is older than the last correction: 2 %.
+            // The loop stops on the density that λ uses, and the black half is older than the last
+            // correction: 2 %.
             assert!(
                 report.density_error_mean < 1.02 * density_error,
                 "{iteration:?}: {report:?}"
@@ -125,8 +128,9 @@ fn colours_and_stops_converge() {
     }
 }
 
-/// What a colour buys: mean density error of a column compressed by 3 %, red/black against Jacobi, for as many
-/// iterations and the same work. `--nocapture` prints the table that docs/reliability.md and solve::iteration refer to.
+/// Benefit of colouring: mean density error of a column compressed by 3 %, red/black versus Jacobi,
+/// for the same number of iterations and the same work. `--nocapture` prints the table that
+/// docs/reliability.md and solve::iteration refer to.
 #[test]
 fn red_black_leaves_less_error_than_jacobi() {
     let context = context();
@@ -150,9 +154,9 @@ fn red_black_leaves_less_error_than_jacobi() {
     }
 }
 
-/// The same column: Chebyshev's semi-iteration reaches in 4 iterations what red/black has not in 8, and in 16
-/// what it has not in 32, at a Jacobi iteration's cost. Spoiled: with a spectral radius of next to nothing
-/// it is Jacobi, under-relaxed, and loses.
+/// In the same column, the Chebyshev semi-iteration reaches in 4 iterations what red/black does not
+/// reach in 8, and in 16 what it does not in 32, at the cost of a Jacobi iteration. Negative
+/// control: with a spectral radius near zero it is under-relaxed Jacobi, which is worse.
 #[test]
 fn chebyshev_leaves_less_error_than_red_black() {
     let context = context();
@@ -183,9 +187,9 @@ fn chebyshev_leaves_less_error_than_red_black() {
     assert!(error(chebyshev, 0.001, 16) > error(red_black, 0.98, 16));
 }
 
-/// With a little viscosity, as the shipped scenes have it, a tank settles on its compressed height and its
-/// jitter dies down. Without it 4 iterations at 10 ms leave 0.3 m/s for good: what one step does not correct,
-/// the next turns into velocity.
+/// With a little viscosity, as in the shipped scenes, a tank settles at its compressed height and
+/// its jitter decays. Without it, 4 iterations at 10 ms leave 0.3 m/s permanently: what one step
+/// does not correct, the next turns into velocity.
 #[test]
 fn still_water_settles() {
     let context = context();
@@ -205,7 +209,7 @@ fn still_water_settles() {
         speed(restless.kinetic_energy),
         speed(report.kinetic_energy)
     );
-    // Half the speed at most: measured 0.11 of 0.30 m/s, and equal speeds would mean no effect.
+    // At most half the speed: measured 0.11 of 0.30 m/s; equal speeds would mean no effect.
     assert!(
         report.kinetic_energy < 0.25 * restless.kinetic_energy,
         "{report:?} {restless:?}"
@@ -241,7 +245,7 @@ fn same_bytes_twice_and_from_any_frame() {
         let last = advance(&mut resumed, 12 - frame);
         assert!(last == states[11], "from frame {frame}");
     }
-    // Negative control: one bit of one velocity is enough to part.
+    // Negative control: one bit of one velocity suffices for a different result.
     let mut spoiled = states[4].clone();
     spoiled.velocity[500][0] = f32::from_bits(spoiled.velocity[500][0].to_bits() ^ 1 << 12);
     let mut resumed = solver(&context, &scene, &particles, &Boundary::default());
@@ -250,8 +254,9 @@ fn same_bytes_twice_and_from_any_frame() {
     assert!(last != states[11]);
 }
 
-/// Lists and places in several bindings give the same bytes; no lists at all the same water but for what a list, made
-/// once a substep, cannot see: neighbours that come within h during the iteration, of weight (δ/h)².
+/// Lists and positions in several bindings give the same bytes. Without lists the water is the same
+/// except for what a list, built once per substep, cannot contain: neighbours that come within h
+/// during the iteration, of weight (δ/h)².
 #[test]
 fn chunked_lists_and_no_lists() {
     let context = context();
@@ -281,7 +286,7 @@ fn chunked_lists_and_no_lists() {
         true,
     );
     assert!(chunked == whole);
-    // Places in two bindings as well, of which the first ends in the midst of the water.
+    // Positions in two bindings as well; the first ends in the middle of the water.
     let paged = DeviceLimits {
         binding: 100_000,
         ..limits
@@ -301,13 +306,15 @@ fn chunked_lists_and_no_lists() {
         false,
     );
     assert!(searched != whole, "the search finds what the lists cannot");
-    // A neighbour 0.05 d inside h has (1 − 0.975²)³ = 1e-4 of W(0): one correction differs by that part of d.
-    // Three substeps of contacts have no derived bound; 2 % of d is far below a correction's own limit, 0.5 d.
+    // A neighbour 0.05 d inside h has (1 − 0.975²)³ = 1e-4 of W(0): one correction differs by that
+    // fraction of d. Three substeps of contacts have no derived bound; 2 % of d is far below a
+    // correction's own limit, 0.5 d.
     let gap = max_distance(&searched, &whole);
     assert!(gap < 0.02 * D, "{gap}");
 }
 
-/// What the ledger has of a frame beside its state: lists that overflowed, and particles slowed to the cap.
+/// Counters that the ledger reports for a frame: lists that overflowed, and particles slowed to the
+/// displacement cap.
 #[test]
 fn lists_that_overflow_and_particles_that_are_slowed_are_counted() {
     let context = context();
@@ -316,7 +323,8 @@ fn lists_that_overflow_and_particles_that_are_slowed_are_counted() {
     const CAP: f64 = 0.2;
     scene.solver.pbf.as_mut().unwrap().cfl = CAP;
     let (frame, mut counted) = (scene.shot.frame_seconds(), Vec::new());
-    // Particles far apart, and a knot in which each has all others as neighbours: more than a list holds, or fewer.
+    // Particles far apart, and a cluster in which each particle has all others as neighbours: more
+    // than a list holds, or fewer.
     for knot in [[5, 4, 3], [4, 5, 2]] {
         let mut particles = lattice([0.0; 3], [4, 4, 2], [0.4; 3]);
         for at in lattice([1.0, 1.0, 1.4], knot, [0.01; 3]).position {
@@ -334,7 +342,7 @@ fn lists_that_overflow_and_particles_that_are_slowed_are_counted() {
             0
         };
         assert_eq!(report.searched, expected as u64);
-        // In one substep from rest the way is the velocity's; ten roundings.
+        // In one substep from rest the displacement is velocity times time; ten roundings.
         let is_slowed = |v: &&[f32; 3]| {
             let way = glam::Vec3::from_array(**v).as_dvec3().length() * frame;
             way > CAP * D * (1.0 - 10.0 * f64::from(f32::EPSILON))
@@ -366,7 +374,8 @@ fn coincident_particles_part() {
             least = least.min(f64::from(a.distance(b)));
         }
     }
-    // Twenty on one spot have to part at all: the artificial pressure that would space them is off.
+    // Twenty particles at one position must only separate: the artificial pressure that would space
+    // them is off.
     assert!(least > 0.2 * D, "{least}");
     assert!(state == run(&context, &scene, &particles, 30).0);
 }
@@ -405,7 +414,7 @@ fn no_particles_make_an_empty_frame() {
     assert_eq!(report.density_error_max, 0.0);
 }
 
-/// State after so many more frames.
+/// State after `frames` more frames.
 fn advance(solver: &mut Pbf, frames: u32) -> Particles {
     let mut last = None;
     for _ in 0..frames {
@@ -426,7 +435,8 @@ fn names(plan: &Plan) -> (Vec<&str>, Vec<&str>) {
     (passes, buffers)
 }
 
-/// What the scene does not name costs no pass, no buffer, no byte; what is planned is what runs.
+/// What the scene does not name costs no pass, no buffer and no byte, and exactly the planned
+/// passes run.
 #[test]
 fn only_what_the_scene_calls_for() {
     let context = context();
@@ -478,7 +488,8 @@ fn only_what_the_scene_calls_for() {
     }
 }
 
-/// Memory without lists and effects: at most 200 bytes a particle at the density of cells that a shot has.
+/// Memory without lists and effects: at most 200 bytes per particle at the cell density of a
+/// typical shot.
 #[test]
 fn bytes_per_particle() {
     let mut scene = scene([25.0, 12.6, 15.0]);
@@ -505,7 +516,7 @@ fn viscosity_damps_and_confinement_feeds() {
     scene.water.gravity = DVec3::ZERO;
     let mut particles = lattice([0.0; 3], [12, 12, 12], [D; 3]);
     for (position, velocity) in particles.position.iter().zip(&mut particles.velocity) {
-        // A vortex in the middle that falls off toward the walls.
+        // A vortex in the middle that decays toward the walls.
         let (x, y) = (position[0] - 0.6, position[1] - 0.6);
         let strength = 2.0 * (-(x * x + y * y) / 0.08).exp();
         *velocity = [-y * strength, x * strength, 0.0];

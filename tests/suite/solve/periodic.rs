@@ -1,4 +1,4 @@
-//! Domains that join their own ends: what must hold wherever the joint is, and what water does across it.
+//! Periodic domains: results do not depend on where the boundary is, and water flows across it.
 
 use std::f64::consts::{PI, TAU};
 
@@ -13,12 +13,12 @@ use swell::{
 
 const METHODS: [Method; 2] = [Method::Flip, Method::Pbf];
 
-/// 16 × 16 × 8 cells of FLIP, twice as many spacings of PBF, without walls along `periodic`.
+/// 16 × 16 × 8 cells of FLIP, or twice as many spacings of PBF, without walls along `periodic`.
 fn open_box(method: Method, periodic: [bool; 3]) -> Scene {
     let mut scene = of_flip::scene([16.0, 16.0, 8.0]);
     of_flip::flip(&mut scene).pressure.tolerance = 1e-6;
     scene.solver.pbf.as_mut().unwrap().particle_spacing = of_flip::DX / 2.0;
-    // Which particle is red depends on the order of the cells, and so on where the joint is.
+    // Which particles are red depends on the order of the cells, and so on where the boundary is.
     scene.solver.pbf.as_mut().unwrap().iteration = Iteration::Jacobi;
     scene.solver.method = method;
     scene.periodic = periodic;
@@ -26,12 +26,12 @@ fn open_box(method: Method, periodic: [bool; 3]) -> Scene {
     scene
 }
 
-/// Cells of a block, eight particles each.
+/// A block of cells, eight particles each.
 fn block(cells: [usize; 3]) -> Particles {
     of_flip::block([0; 3], cells)
 }
 
-/// State after so many frames, by the GPU.
+/// State after `frames` frames on the GPU.
 fn run(context: &Context, scene: &Scene, particles: &Particles, frames: u32) -> Particles {
     match scene.solver.method {
         Method::Flip => of_flip::run(context, scene, particles, frames).0,
@@ -55,7 +55,7 @@ fn twin(scene: &Scene, particles: &Particles, frames: u32) -> Particles {
     state
 }
 
-/// Moved by `way` and back into the box.
+/// Particles moved by `way` and wrapped into the box.
 fn shifted(scene: &Scene, particles: &Particles, way: DVec3) -> Particles {
     let mut moved = particles.clone();
     for x in &mut moved.position {
@@ -65,7 +65,8 @@ fn shifted(scene: &Scene, particles: &Particles, way: DVec3) -> Particles {
     moved
 }
 
-/// Largest distance of particles of the same id or their images, after one state is moved by `way`.
+/// Largest distance between particles of the same id or their periodic images, after `a` is moved
+/// by `way`, metres.
 fn apart(period: Period, a: &Particles, b: &Particles, way: DVec3) -> f64 {
     assert_eq!(a.id, b.id);
     let at = |x: &[f32; 3]| DVec3::from_array(x.map(f64::from));
@@ -80,7 +81,7 @@ fn is_inside(scene: &Scene, particles: &Particles) -> bool {
     places.all(|x| scene.domain.grown(1e-6).contains(x))
 }
 
-/// A dam that leans across the slab, so that nothing is the same at both ends.
+/// A dam whose velocity varies along z, so that the two ends differ.
 fn leaning() -> Particles {
     let mut particles = block([6, 8, 8]);
     jitter(&mut particles, 0.05 * of_flip::DX);
@@ -95,14 +96,15 @@ fn leaning() -> Particles {
     particles
 }
 
-/// The same dam half a period on is the same shot half a period on. How far roundings may take the two apart is what
-/// the same dam answers to a rounding of its start; ten of these, since the two sum in another order at each step.
+/// The same dam shifted by half a period gives the same shot, shifted. The allowed difference is
+/// ten times the response of the dam to a rounding of its initial state, because the two runs sum
+/// in different orders in each step.
 #[test]
 fn where_the_joint_is_does_not_matter() {
     let context = context();
     for method in METHODS {
         let mut scene = open_box(method, [false, false, true]);
-        // Its solve stops at a hundredth, by another way.
+        // Its solve stops at a residual of 1e-2, after different iterations.
         of_flip::flip(&mut scene).density_correction = false;
         let (start, way, frames) = (leaning(), DVec3::new(0.0, 0.0, 0.4), 6);
         let there = run(&context, &scene, &start, frames);
@@ -115,11 +117,11 @@ fn where_the_joint_is_does_not_matter() {
         assert!(off <= 10.0 * answer, "{method:?}: {off} {answer}");
         assert!(10.0 * answer < 0.02 * of_flip::DX, "{answer}");
         assert!(is_inside(&scene, &there) && is_inside(&scene, &moved));
-        // Many went across, by more than a tenth of the period.
+        // Many crossed the boundary, by more than a tenth of the period.
         let ways = start.position.iter().zip(&there.position);
         assert!(ways.filter(|(a, b)| b[2] < a[2] - 0.4).count() > 200);
 
-        // Negative controls: one pass that does not see across the joint, and walls there.
+        // Negative controls: one pass that does not see across the boundary, and walls there.
         let mut blind = context.clone();
         blind.spoil = Some(match method {
             Method::Flip => Spoil {
@@ -144,7 +146,7 @@ fn where_the_joint_is_does_not_matter() {
     }
 }
 
-/// The f64 solvers see the joint as little.
+/// The same for the f64 solvers.
 #[test]
 fn where_the_joint_is_does_not_matter_to_the_reference() {
     for method in METHODS {
@@ -171,10 +173,12 @@ fn where_the_joint_is_does_not_matter_to_the_reference() {
     }
 }
 
-/// A box full of water that streams along all three axes: no pressure, and each particle where its speed takes it; with
-/// FLIP 1.7 times round the box along x. Each substep may turn a velocity by the rounding of its sums, 40 of 6e-8, and the
-/// projection's tolerance times what it met, which is that rounding over again. A lattice is no stable rest of PBF, which
-/// takes roundings of its density for pressure: a tenth of a second of it, and a thousandth of the speed.
+/// A box full of water that streams along all three axes: no pressure, and each particle moves at
+/// constant velocity; with FLIP 1.7 times around the box along x. Each substep may change a
+/// velocity by the rounding of its sums, 40 of 6e-8, and by the projection's tolerance times its
+/// input, which is the same rounding again. A lattice is not a stable equilibrium of PBF, which
+/// turns roundings of its density into pressure: a tenth of a second, and a thousandth of the
+/// speed.
 #[test]
 fn a_stream_keeps_its_speed_and_its_particles() {
     let context = context();
@@ -208,7 +212,7 @@ fn a_stream_keeps_its_speed_and_its_particles() {
         let mut ids = after.id.clone();
         ids.sort_unstable();
         assert!(ids.into_iter().eq(0..particles.len() as u32));
-        // Negative control: with walls the stream stops there.
+        // Negative control: walls stop the stream.
         scene.periodic = [false; 3];
         let walled = run(&context, &scene, &particles, 4);
         let off = apart(
@@ -221,9 +225,9 @@ fn a_stream_keeps_its_speed_and_its_particles() {
     }
 }
 
-/// Taylor and Green's vortices, which are at rest as a pattern where nothing damps them: u = U sin kx cos ky,
-/// v = −U cos kx sin ky. Linear interpolation between centres is off by at most (k Δx)²/8 of U, 2 % at 16 cells a wave: once
-/// on the way to the grid and once back, along each of two axes.
+/// Taylor–Green vortices, a steady flow without damping: u = U sin kx cos ky, v = −U cos kx sin ky.
+/// Linear interpolation between centres has an error of at most (k Δx)²/8 of U, 2 % at 16 cells per
+/// wavelength: once to the grid and once back, along each of two axes.
 #[test]
 fn vortices_stand_still_in_a_periodic_box() {
     let (context, k) = (context(), TAU / 1.6);
@@ -246,7 +250,8 @@ fn vortices_stand_still_in_a_periodic_box() {
         let mut particles = block([16, 16, 8]);
         let at = particles.position.iter();
         particles.velocity = at.map(|x| field(x).as_vec3().to_array()).collect();
-        // So that the joint is no line of symmetry, where walls would do as well.
+        // Shifted so that the boundary is not a line of symmetry, where walls would give the same
+        // flow.
         let way = DVec3::new(0.3, 0.5, 0.0);
         let mut start = particles.clone();
         for x in &mut start.position {
@@ -266,12 +271,12 @@ fn vortices_stand_still_in_a_periodic_box() {
     let (periodic, walled) = (after([true; 3], 0.1), after([false; 3], 0.1));
     println!("{periodic:.4} of 1 m/s, with walls {walled:.4}; interpolation {interpolation:.4}");
     assert!(periodic < 4.0 * interpolation, "{periodic}");
-    // Negative control: walls turn the flow.
+    // Negative control: walls deflect the flow.
     assert!(walled > 2.0 * 4.0 * interpolation, "{walled}");
     assert!((interpolation - (PI / 8.0).powi(2) / 8.0).abs() < 1e-12);
 }
 
-/// Still water in a slab: the pressure of its depth, and no motion; as with side walls.
+/// Still water in a periodic slab: the pressure of its depth and no motion, as with side walls.
 #[test]
 fn still_water_in_a_slab_has_its_depth_s_pressure() {
     let context = context();
@@ -289,14 +294,15 @@ fn still_water_in_a_slab_has_its_depth_s_pressure() {
         for (x, found) in points.iter().zip(found) {
             let expected = 1000.0 * 9.81 * (1.0 - x.y);
             let off = (found.unwrap() / expected - 1.0).abs();
-            // The projection's tolerance, and where the surface is found between centres: 5e-4 of the depth above.
+            // The projection's tolerance, and the error of the surface between centres: 5e-4 of the
+            // depth above.
             assert!(off < 2e-3, "{x}: {found:?} {expected}");
         }
         assert!(report.max_speed < 1e-3, "{}", report.max_speed);
     }
 }
 
-/// Water at rest without any walls has no excess to carry anywhere.
+/// Water at rest without any walls: there is no excess density to move.
 #[test]
 fn a_full_box_at_rest_stays() {
     let context = context();

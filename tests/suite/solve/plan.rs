@@ -1,4 +1,4 @@
-//! What is planned against what is recorded and what the shaders say, without a GPU.
+//! Compares plans with recorded commands and with shaders, without a GPU.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -29,7 +29,7 @@ use swell::{
 
 use crate::support::{self, flip, mover};
 
-/// A scene, how much there is in it, and for which device.
+/// A scene, the counts of its contents, and the limits of a device.
 struct Case {
     scene: Scene,
     counts: Counts,
@@ -122,7 +122,7 @@ fn grid(change: impl FnOnce(&mut swell::scene::flip::Flip)) -> Scene {
     scene
 }
 
-/// Every setting that a plan depends on, at each of its values at least once.
+/// Cases that use every value of every setting on which a plan depends.
 fn cases() -> Vec<Case> {
     let adaptive = Stop::DensityError {
         density_error: 0.01,
@@ -204,7 +204,7 @@ fn reflections(plan: &Plan) -> BTreeMap<&'static str, Reflection> {
         .collect()
 }
 
-/// Places are written anew after the velocity update where an effect reads neighbours there, and nowhere else.
+/// `update_velocity` writes positions back exactly when an effect reads neighbours there.
 #[test]
 fn places_are_kept_for_effects_that_read_them_alone() {
     let all = with_effects(pbf(|_| {})).effects;
@@ -241,8 +241,8 @@ fn places_are_kept_for_effects_that_read_them_alone() {
     assert!(seen[0] >= 3 && seen[1] == 3, "{seen:?}");
 }
 
-/// Where plan, commands and shaders part: in passes and buffers, which have to be those that commands name and bind, no
-/// more and no less, in what buffers hold, and in how large they are.
+/// Inconsistencies between plan, commands and shaders: passes and buffers must be exactly those
+/// that commands name and bind, with the right contents and sizes.
 fn faults(plan: &Plan, commands: &[Command]) -> BTreeSet<String> {
     let shaders = reflections(plan);
     let mut faults = BTreeSet::new();
@@ -270,11 +270,11 @@ fn faults(plan: &Plan, commands: &[Command]) -> BTreeSet<String> {
                 continue;
             };
             let (held, found) = (row.spec.element, &binding.element);
-            // A shader may go through vectors a scalar at a time.
+            // A shader may read a vector one scalar at a time.
             let is_part = held.scalar != Scalar::Mixed && held.bytes.is_multiple_of(found.stride);
             let is_same = (held.scalar, held.head) == (found.scalar, found.head)
                 && (held.bytes == found.stride || is_part);
-            // It looks at the bits of whatever buffer, sixteen bytes at a time.
+            // This pass reads the bits of any buffer, sixteen bytes at a time.
             if !is_same && *pass != "flip/find_not_finite" {
                 faults.insert(format!("{pass}: {name} holds {held:?}, not {found:?}"));
             }
@@ -321,7 +321,7 @@ fn what_is_planned_is_what_is_recorded() {
     }
 }
 
-/// Each fault that the comparison is for is seen in a plan, or in commands, that have it.
+/// Each kind of fault is detected in a plan, or in commands, that have it.
 #[test]
 fn a_plan_that_parts_from_its_commands_is_seen() {
     let case = Case::new(with_wave_maker(grid(|_| {})));
@@ -386,13 +386,14 @@ fn a_plan_that_parts_from_its_commands_is_seen() {
     assert!(faults(&good, shorter).contains("flip/boundary_work is planned and never runs"));
 }
 
-/// Watched are arrays of f32 that some pass writes, none of which a particle's own survey sees.
+/// Watched buffers are f32 arrays that some pass writes and that the survey of particles does not
+/// cover.
 #[test]
 fn what_is_watched_is_written() {
     let is_watchable = |plan: &Plan, row: &PlannedBuffer| {
         let mut bindings = reflections(plan).into_values().flat_map(|r| r.bindings);
         let is_written = bindings.any(|b| b.name == row.spec.name && b.access == Access::ReadWrite);
-        // Numbers, or vectors of three.
+        // Scalars, or vectors of three.
         let element = &row.spec.element;
         is_written && element.scalar == Scalar::F32 && [4, 12].contains(&element.bytes)
     };
@@ -405,7 +406,7 @@ fn what_is_watched_is_written() {
         }
     }
     assert_eq!(watched.len(), 15, "{watched:?}");
-    // Negative controls: a buffer of numbers, and one that no pass writes.
+    // Negative controls: a buffer of integers, and one that no pass writes.
     let case = Case::new(grid(|_| {})).with_solids();
     let plan = case.plan();
     let row = |name: &str| plan.buffers.iter().find(|b| b.spec.name == name).unwrap();

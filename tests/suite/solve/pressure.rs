@@ -1,4 +1,5 @@
-//! Pressure room: rows against the f64 builder, iteration counts, honest residuals, pockets.
+//! The pressure solver: rows compared with the f64 builder, iteration counts, true residuals,
+//! pockets.
 mod bodies;
 mod precision;
 mod stops;
@@ -38,13 +39,13 @@ fn difference(a: &[f64], b: &[f64]) -> Vec<f64> {
     a.iter().zip(b).map(|(a, b)| a - b).collect()
 }
 
-/// Rows of the device that part from the f64 system's by more than rounding: θ and its inverse are rounded a few
-/// times at ε = 6e-8, and so is their sum.
+/// Number of rows on the device that differ from those of the f64 system by more than rounding: θ
+/// and its inverse are rounded a few times at ε = 6e-8, and so is their sum.
 fn wrong_rows(rig: &Rig, system: &System) -> usize {
     let cells = 512 * (rig.case.bricks.slots() + 3);
     let wanted = COEFFICIENT.first(3 * cells);
     let coefficient = rig.program.download(wanted).unwrap();
-    // The rig's precision is one of f32.
+    // The rig's precision is one of the f32 ones.
     let wanted = DIRICHLET.retyped::<f32>().first(cells);
     let dirichlet = rig.program.download(wanted).unwrap();
     let is_off = |found: f32, expected: f64| (f64::from(found) - expected).abs() > 1e-6 * expected;
@@ -75,13 +76,13 @@ fn rows_are_those_of_the_f64_builder() {
     let context = context();
     for surface in SURFACES {
         for has_cuts in [false, true] {
-            // 20: bricks that the box cuts.
+            // 20 is not a multiple of the brick size: the box cuts bricks.
             let case = tank(20, surface, has_cuts);
             let mut rig = rig(&context, case, Preconditioner::Multigrid, 1e-3);
             rig.solve(&tank_rhs(&rig.case, &rig.system));
             assert_eq!(wrong_rows(&rig, &rig.system), 0, "{surface:?} {has_cuts}");
 
-            // Negative control: one face's fraction off by 1e-4 shows in its two rows.
+            // Negative control: one face's fraction off by 1e-4 changes its two rows.
             let mut spoiled = rig.case.clone();
             let row = (rig.system.cell.len() / 2..)
                 .find(|&row| rig.system.coefficient[row][2] > 0.0)
@@ -116,7 +117,8 @@ fn right_hand_sides_are_those_of_the_f64_builder() {
         .fold(0.0, |worst: f64, b| worst.max(b.abs()));
     assert!((projected.divergence_before * rig.case.cell_size / worst - 1.0).abs() < 1e-6);
 
-    // The projection takes the gradient off: what is left is the residual, by the f64 builder's own account.
+    // The projection subtracts the gradient: what is left is the residual, as the f64 builder
+    // computes it.
     let after = rig
         .system
         .rhs(rig.case.cells(), &rig.planes(FACE_VELOCITY), flux);
@@ -130,10 +132,11 @@ fn right_hand_sides_are_those_of_the_f64_builder() {
     assert!((projected.divergence_after * rig.case.cell_size - worst).abs() < 1e-5);
 }
 
-/// Iterations to 1e-6 on the tank, voxel and ghost-fluid surface: the README's table, measured with lavapipe. One more or
-/// less is allowed: the residual falls by a few percent an iteration at least, and on a device that rounds otherwise (fused
-/// products, sums of other widths) it may pass the target one iteration sooner or later, but what is computed wrongly costs
-/// more: a multigrid whose last level is swept once and not eight times takes 13 in place of 9.
+/// Iterations to 1e-6 on the tank, for voxel and ghost-fluid surface: the README's table, measured
+/// with lavapipe. A difference of one is allowed: the residual falls by at least a few percent per
+/// iteration, and a device that rounds differently (fused products, sums of other widths) may pass
+/// the target one iteration sooner or later. Errors in the computation cost more: a multigrid whose
+/// last level is swept once instead of eight times takes 13 instead of 9.
 const COUNTS: [(Preconditioner, u32, [u32; 2]); 10] = [
     (Preconditioner::None, 16, [88, 168]),
     (Preconditioner::None, 32, [177, 477]),
@@ -165,7 +168,7 @@ fn iteration_counts_are_those_on_record() {
         }
     }
     assert!(off.is_empty(), "{off:?}");
-    // Negative control: the multigrid's last level is swept once and not eight times.
+    // Negative control: the multigrid's last level is swept once instead of eight times.
     let mut spoiled = context.clone();
     spoiled.spoil = Some(Spoil {
         pass: "pressure/solve_coarse",
@@ -178,7 +181,8 @@ fn iteration_counts_are_those_on_record() {
     assert!(solved.iterations > 11, "{solved:?}");
 }
 
-/// Negative control of the counts: without its coarse levels the same solver takes several times as many.
+/// Negative control of the counts: without its coarse levels the same solver takes several times as
+/// many iterations.
 #[test]
 fn the_coarse_levels_do_the_work() {
     let context = context();
@@ -188,7 +192,7 @@ fn the_coarse_levels_do_the_work() {
     let excess = vec![0.1f32; rig.case.kind.len()];
     rig.program.upload(DENSITY_EXCESS, 0, &excess);
     let whole = rig.solver.correct(&rig.program, None).unwrap();
-    // A block without a row has no say.
+    // A block without rows is ignored.
     let coarse = rig.case.bricks.levels[1].start as usize;
     let nothing = vec![0u32; 64 * (rig.case.bricks.slots() - coarse)];
     rig.program.upload(BLOCK, 64 * coarse, &nothing);
@@ -199,7 +203,7 @@ fn the_coarse_levels_do_the_work() {
     );
 }
 
-/// The device's counts are the f64 solver's: rounding costs at most a few iterations in a hundred.
+/// The device takes as many iterations as the f64 solver; rounding costs at most a few percent.
 #[test]
 fn counts_follow_the_f64_solver() {
     let context = context();
@@ -226,7 +230,7 @@ fn counts_follow_the_f64_solver() {
     }
 }
 
-/// θ → 0 (hard case 11): at most 1.2 times the voxel surface's iterations.
+/// θ → 0 (hard case 11): at most 1.2 times the iterations of the voxel surface.
 #[test]
 fn surfaces_close_to_cell_centres_cost_nothing() {
     let context = context();
@@ -261,7 +265,7 @@ fn manufactured_pressure_converges_with_second_order() {
     let errors = [16, 32, 64].map(error);
     let order = (errors[0] / errors[2]).log2() / 2.0;
     assert!(order >= 1.8, "{order} {errors:?}");
-    // Negative control: a surface that is half a cell off at most has an error of first order.
+    // Negative control: a surface that is off by up to half a cell has an error of first order.
     let (case, b, q) = manufactured(64);
     let case = Case {
         surface: Surface::Voxel,
@@ -273,8 +277,8 @@ fn manufactured_pressure_converges_with_second_order() {
     assert!(voxel > 5.0 * errors[2], "{voxel} {errors:?}");
 }
 
-/// The reported residual is that of the downloaded solution in the f64 system, down to where one word for the
-/// solution would not go.
+/// The reported residual is that of the downloaded solution in the f64 system, even at tolerances
+/// that a solution in a single f32 word cannot reach.
 #[test]
 fn the_reported_residual_is_true() {
     let context = context();
@@ -296,13 +300,15 @@ fn the_reported_residual_is_true() {
             "{truth:e} {solved:?}"
         );
         assert!(!solved.is_missed);
-        // Negative control: the solution rounded to one word has a residual of about ε ‖A‖ ‖x‖ / ‖b‖.
+        // Negative control: the solution rounded to one word has a residual of about ε ‖A‖ ‖x‖ /
+        // ‖b‖.
         let rounded: Vec<f64> = x.iter().map(|&x| f64::from(x as f32)).collect();
         assert!(residual(&rounded) > 1e-5, "{:e}", residual(&rounded));
     }
 }
 
-/// Water in rock: `rooms` boxes (least, greatest cell) filled to the brim in a box of n³, and a tank below.
+/// Enclosed water in solid: `rooms` are boxes (least and greatest cell) filled completely, in a box
+/// of n³ cells, above an open tank of height `tank_height`.
 fn pockets(n: u32, rooms: &[[[u32; 3]; 2]], tank_height: u32) -> Case {
     let rooms = rooms.to_vec();
     let is_in = |c: [u32; 3], [a, b]: [[u32; 3]; 2]| (0..3).all(|k| (a[k]..=b[k]).contains(&c[k]));
@@ -344,7 +350,7 @@ fn pockets_converge_and_stay() {
             let projected = rig.project(None);
             assert!(!projected.solved.is_missed, "{projected:?}");
             assert_eq!(projected.pockets, count as u32);
-            // What rounding b to f32 leaves of its mean.
+            // The mean that is left after rounding b to f32.
             assert!(
                 projected.incompatible < 1e-6 / case.cell_size,
                 "{projected:?}"
@@ -354,8 +360,9 @@ fn pockets_converge_and_stay() {
                 "{projected:?}"
             );
 
-            // It stays there: 40 further iterations asked for in vain climb nowhere. The recursion drifts from
-            // the true residual by the rounding of each step, 6e-8 √iterations ‖b‖ some times over.
+            // The solution is stable: 40 further iterations do not increase the residual. The
+            // recursion drifts from the true residual by the rounding of each step, 6e-8
+            // √iterations ‖b‖ times a small factor.
             let mut further = settings(preconditioner, 1e-12);
             further.max_iterations = projected.solved.iterations + 40;
             let solved = Rig::new(&context, case.clone(), &further).solve(&b);
@@ -364,7 +371,8 @@ fn pockets_converge_and_stay() {
     }
 }
 
-/// A solid that crushes the first pocket: what cannot be undone is reported, and the rest is solved.
+/// A solid that crushes the first pocket: the part that cannot be removed is reported, and the rest
+/// is solved.
 #[test]
 fn incompatible_pockets_are_reported() {
     let context = context();
@@ -386,7 +394,7 @@ fn incompatible_pockets_are_reported() {
     assert_eq!(projected.pockets, 2);
     let mean = projected.incompatible * rig.case.cell_size;
     assert!((mean - 0.25).abs() < 1e-5, "{mean}");
-    // And the divergence after shows it.
+    // The divergence after the projection shows it.
     assert!(
         (projected.divergence_after * rig.case.cell_size - 0.25).abs() < 1e-3,
         "{projected:?}"
@@ -403,7 +411,7 @@ fn no_divergence_takes_no_iteration() {
             preconditioner,
             1e-6,
         );
-        // A solve before it, so that nothing is zero by chance.
+        // Solves once before, so that nothing is zero by chance.
         let b = tank_rhs(&rig.case, &rig.system);
         assert!(rig.solve(&b).iterations > 0);
         let solved = rig.solve(&vec![0.0; b.len()]);
@@ -415,7 +423,7 @@ fn no_divergence_takes_no_iteration() {
     }
 }
 
-/// Drops of one cell, a cell without an open face, an empty box, the same arrays all along.
+/// Drops of one cell, a cell without an open face, an empty box, all in the same arrays.
 #[test]
 fn odd_cells_and_changing_bricks() {
     let context = context();
@@ -456,7 +464,7 @@ fn odd_cells_and_changing_bricks() {
         let solved = rig.solve(&b);
         assert!(!solved.is_missed && (solved.iterations > 0) != b.is_empty());
     }
-    // What other bricks left behind changes nothing: the same bytes.
+    // Data left behind by other bricks changes nothing: the same bytes.
     assert!(rig.solution() == x);
 }
 
@@ -469,7 +477,7 @@ fn the_same_bytes_twice() {
         let b = tank_rhs(&rig.case, &rig.system);
         let first = rig.solve(&b);
         let solution = rig.solution();
-        // Submitted with another number of iterations at once.
+        // The first batch of iterations that is submitted has another size in the second solve.
         assert_eq!(rig.solve(&b), first);
         assert!(rig.solution() == solution);
         (first, solution, rig.planes(FACE_VELOCITY))
@@ -479,7 +487,7 @@ fn the_same_bytes_twice() {
     }
 }
 
-/// (Mx, y) = (x, My), (Mx, x) > 0; M x is what the first iteration makes of the residual x.
+/// (Mx, y) = (x, My), (Mx, x) > 0; M x is the first search direction for the residual x.
 #[test]
 fn preconditioners_are_symmetric_and_positive() {
     let context = context();
@@ -501,12 +509,12 @@ fn preconditioners_are_symmetric_and_positive() {
         };
         let (mx, my) = (image(x), image(y));
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-        // Rounding: some 100 operations at 6e-8 on terms of the size of ‖Mx‖ ‖y‖, of random sign.
+        // Rounding: some 100 operations at 6e-8 on terms of size ‖Mx‖ ‖y‖, of random sign.
         let scale = norm(&mx) * norm(y);
         let gap = (dot(&mx, y) - dot(x, &my)).abs() / scale;
         assert!(gap < 2e-6, "{preconditioner:?} {gap:e}");
         assert!(dot(&mx, x) > 0.0 && dot(&my, y) > 0.0);
-        // Negative control: one cell's value 1 % of ‖Mx‖ off.
+        // Negative control: the value of one cell off by 1 % of ‖Mx‖.
         let mut spoiled = mx.clone();
         spoiled[rows / 2] += 0.01 * norm(&mx);
         let gap = (dot(&spoiled, y) - dot(x, &my)).abs() / scale;
@@ -514,7 +522,8 @@ fn preconditioners_are_symmetric_and_positive() {
     }
 }
 
-/// Displacements whose divergence is the excess, on the system of the projection; velocities stay as they are.
+/// Displacements whose divergence is the excess density, on the projection's system; velocities do
+/// not change.
 #[test]
 fn the_correction_carries_the_excess_out() {
     let context = context();
@@ -558,7 +567,7 @@ fn the_correction_carries_the_excess_out() {
     }
 }
 
-/// A face between two cells of air, and a closed one, keep what they have.
+/// Faces between two cells of air, and closed faces, keep their velocity.
 #[test]
 fn other_faces_keep_their_velocity() {
     let context = context();

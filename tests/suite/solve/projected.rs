@@ -1,5 +1,5 @@
-//! PBF whose velocities a grid makes free of divergence: what water at rest, waves and walls do with it, on the GPU and in
-//! f64, and that without it they do not.
+//! PBF with a grid projection that makes velocities divergence-free: water at rest, waves and
+//! walls, on the GPU and in f64, compared with PBF without it.
 
 use std::f64::consts::{PI, TAU};
 
@@ -45,13 +45,14 @@ fn in_f64(scene: &Scene, particles: &Particles) -> reference::pbf::Pbf {
     solver
 }
 
-/// A tank 8 × 8 particles wide at 60 frames a second, so many layers deep.
+/// A tank 8 × 8 particles wide and `layers` layers deep, at 60 frames a second.
 fn tank(layers: usize) -> (Scene, Particles) {
     let scene = projected([0.8, layers as f64 * D + 1.0, 0.8], 60.0);
     (scene, lattice([0.0; 3], [8, layers, 8], [D; 3]))
 }
 
-/// Fastest particle of the frames behind `settled`, m/s, largest mean compression, and pressures over ρ g depth.
+/// Returns the largest particle speed in the frames after `settled`, m/s, the largest mean
+/// compression, and pressures over ρ g depth.
 fn at_rest<S: Solver>(
     mut solver: S,
     layers: usize,
@@ -81,10 +82,12 @@ where
     (speed, compression, ratios)
 }
 
-/// Largest speed of water at rest after a second, m/s; the first frames even out what the lattice lacks at walls.
+/// Largest speed of water at rest after a second, m/s. In the first frames the lattice fills its
+/// gaps at walls.
 const STILL: f64 = 0.02;
 
-/// Of ρ g depth; the surface's least depth of 0.02 cells alone is 0.4 % of the uppermost probe's of 10 layers.
+/// Relative to ρ g depth. The least depth of the surface, 0.02 cells, is 0.4 % for the uppermost
+/// probe of 10 layers.
 const PRESSURE: f64 = 0.02;
 
 fn assert_still((speed, compression, ratios): (f64, f64, Vec<f64>), name: &str) {
@@ -105,14 +108,15 @@ fn tanks_of_any_depth_stand_still_and_weigh_what_water_weighs() {
     }
     let (scene, particles) = tank(20);
     assert_still(at_rest(in_f64(&scene, &particles), 20, 66, 60), "f64");
-    // Negative control: iterations alone reach a layer each.
+    // Negative control: iterations without the projection carry pressure by one layer each.
     let mut alone = on_gpu(&without(&scene), &particles);
     let speeds = (1..=66).map(|_| alone.advance().unwrap().1.max_speed);
     let late = speeds.skip(60).fold(0.0, f64::max);
     assert!(late > 10.0 * STILL, "{late} m/s");
 }
 
-/// Pressure is what the projection takes over the time for which it acts, which is half of the substep before as well.
+/// The projection's impulse divided by the time over which it acts, which includes half of the
+/// previous substep, gives the pressure.
 #[test]
 fn pressures_are_those_of_the_weight_after_a_substep_of_any_length() {
     let (scene, mut particles) = tank(10);
@@ -130,7 +134,8 @@ fn pressures_are_those_of_the_weight_after_a_substep_of_any_length() {
     }
 }
 
-/// Water 20 layers deep with the velocities of a standing wave of half a length in the box, ω² = g k tanh kh.
+/// Water 20 layers deep with the velocities of a standing wave, half a wavelength per box, ω² = g k
+/// tanh kh; and the wave's period, s.
 fn wave() -> (Scene, Particles, f64) {
     let (length, depth) = (4.0, 2.0);
     let scene = projected([length, 3.0, 0.4], 60.0);
@@ -149,7 +154,8 @@ fn wave() -> (Scene, Particles, f64) {
     (scene, particles, period)
 }
 
-/// The period over theory's, and the third period's swing over the first's: of the first mode of where the water is.
+/// Period over theory's, and amplitude of the third period over that of the first, both of the
+/// first mode of the particles' positions.
 fn swing(scene: &Scene, particles: &Particles, period: f64) -> (Option<f64>, f64) {
     let mut solver = on_gpu(scene, particles);
     let k = PI / scene.domain.max.x;
@@ -180,12 +186,13 @@ fn a_standing_wave_keeps_its_height_and_its_period() {
     let found = found.expect("a wave that swings");
     assert!((found - 1.0).abs() < 0.02, "{found} of the period");
     assert!(left > 0.6, "{left} left after three periods");
-    // Negative control.
+    // Negative control: without the projection.
     let (_, left) = swing(&without(&scene), &particles, period);
     assert!(left < 0.5, "{left}");
 }
 
-/// In some frames the swing asks for two substeps and in others for one; it keeps its height as in equal ones.
+/// In some frames the swing requires two substeps and in others one; its height is as with equal
+/// substeps.
 #[test]
 fn a_standing_wave_that_decides_on_its_substeps_keeps_its_height() {
     let (mut scene, particles, period) = wave();
@@ -200,7 +207,7 @@ fn a_standing_wave_that_decides_on_its_substeps_keeps_its_height() {
     assert!((changing / equal - 1.0).abs() < 0.05, "{changing} {equal}");
 }
 
-/// Water that a wall pushes into a heap, with drops.
+/// Water that a wall pushes into a heap, and drops.
 fn pushed() -> (Scene, Particles) {
     let mut scene = projected([2.4, 2.0, 0.6], 60.0);
     scene.wave_makers.push(WaveMaker {
@@ -230,7 +237,7 @@ fn frames_are_the_same_bytes_from_any_frame() {
         let last = (frame..24).map(|_| resumed.advance().unwrap().0).last();
         assert!(last.as_ref() == Some(&states[23]), "from frame {frame}");
     }
-    // Negative control: one bit of one velocity is enough to part.
+    // Negative control: one bit of one velocity suffices for a different result.
     let mut spoiled = states[10].clone();
     spoiled.velocity[100][0] = f32::from_bits(spoiled.velocity[100][0].to_bits() ^ 1 << 12);
     let mut resumed = on_gpu(&scene, &particles);
@@ -239,7 +246,7 @@ fn frames_are_the_same_bytes_from_any_frame() {
     assert!(last.as_ref() != Some(&states[23]));
 }
 
-/// What moving walls give and what the water has: of a frame's report, joule.
+/// Kinetic plus potential energy of the water, J.
 fn energy(report: &StepReport) -> f64 {
     report.kinetic_energy + report.potential_energy
 }
@@ -266,7 +273,8 @@ fn gpu_and_f64_push_alike_and_the_wall_pays_for_it() {
         assert!(projection.residual <= 1e-5, "{projection:?}");
         assert_eq!(projection.pockets, of_reference.pockets);
     }
-    // Four frames of f32, whose projection stops at 1e-5: the wall's 1.5 m/s and gravity leave some 1e-5 d a frame.
+    // Four frames of f32 with a projection that stops at 1e-5: the wall's 1.5 m/s and gravity leave
+    // some 1e-5 d per frame.
     assert!(gap < 1e-3 * D, "{gap} m");
     let gained = end - start.unwrap();
     assert!(work > 0.0 && gained > 0.0);
@@ -283,7 +291,8 @@ fn a_scene_that_does_not_name_it_has_none_of_it() {
     let (with, bare) = (plan(&scene), plan(&without(&scene)));
     assert!(bare.projection.is_none());
     assert!(with.projection.is_some());
-    // Beside the projection's own: which particles it took for drops, before and after a sort.
+    // Besides the projection's own buffers: flags of particles that count as drops, before and
+    // after a sort.
     let flags = |plan: &Plan| -> u64 {
         let names = ["is_drop", "sorted_is_drop"];
         let found = plan
@@ -312,7 +321,7 @@ fn a_scene_that_does_not_name_it_has_none_of_it() {
     );
 }
 
-/// Bricks of eight cells of two spacings join a period's ends.
+/// A period must be a multiple of a brick of the projection: eight cells of two spacings each.
 #[test]
 fn a_period_is_whole_bricks_of_the_projection() {
     let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/dam-break.toml");
@@ -334,7 +343,8 @@ fn a_period_is_whole_bricks_of_the_projection() {
     assert!(said.contains("asks for a multiple of 16"), "{said}");
 }
 
-/// A column that falls, all lengths times `factor` and all times times its root; each frame's state over `factor`.
+/// A falling column with all lengths scaled by `factor` and all times by its square root; returns
+/// each frame's state, with positions divided by `factor`.
 fn falling_column(factor: f64, iteration: Iteration, gravity: f64) -> Vec<Particles> {
     let mut scene = projected(
         [2.4 * factor, 2.0 * factor, 0.8 * factor],
@@ -354,7 +364,8 @@ fn falling_column(factor: f64, iteration: Iteration, gravity: f64) -> Vec<Partic
     (0..10).map(one).collect()
 }
 
-/// By Froude's law; what f32 rounds differently must not grow. Without a projection it does, a hundred times faster.
+/// By Froude scaling. Differences in f32 rounding must not grow; without a projection they do, a
+/// hundred times faster.
 #[test]
 fn similar_scenes_stay_similar_at_any_scale() {
     for iteration in [Iteration::Jacobi, Iteration::RedBlack] {
@@ -367,14 +378,15 @@ fn similar_scenes_stay_similar_at_any_scale() {
             let gap = gap(falling_column(factor, iteration, GRAVITY));
             assert!(gap < 1e-3 * D, "{iteration:?} at {factor}: {gap} m");
         }
-        // Negative control.
+        // Negative control: gravity 1 % off.
         let gap = gap(falling_column(100.0, iteration, 1.01 * GRAVITY));
         assert!(gap > 1e-3 * D, "{gap} m");
     }
 }
 
-/// Velocities of single particles that the grid does not see, neighbours against each other, fall with the rate at which
-/// particles take on the grid's: 0.17 √(g / Δx). Those in cells beside air are clamped to the grid's at once.
+/// Velocities that the grid does not resolve, of neighbours against each other, decay at the rate
+/// at which particles take on the grid's velocity: 0.17 √(g / Δx). Those in cells beside air are
+/// clamped to the grid's at once.
 #[test]
 fn what_the_grid_does_not_see_calms_down_at_the_rate_that_is_documented() {
     let noise = 0.05;
@@ -400,15 +412,15 @@ fn what_the_grid_does_not_see_calms_down_at_the_rate_that_is_documented() {
     let expected = |gravity: f64| (-0.17 * (gravity / (2.0 * D)).sqrt() * 0.5).exp();
     for gravity in [GRAVITY, 4.0 * GRAVITY] {
         let ((left, above), expected) = (left(gravity), expected(gravity));
-        // A particle at a wall has fewer against it.
+        // A particle at a wall has fewer neighbours against it.
         assert!((left / expected - 1.0).abs() < 0.03, "{left} of {expected}");
         assert!(above.abs() < 0.03, "{above}");
     }
-    // Negative control: the two rates are told apart.
+    // Negative control: the two rates are distinguishable.
     assert!(expected(4.0 * GRAVITY) < 0.6 * expected(GRAVITY));
 }
 
-/// Two particles on one spot of the surface, where nothing is compressed.
+/// Two coincident particles at the surface, where nothing is compressed.
 #[test]
 fn particles_on_one_spot_part_also_at_the_surface() {
     let (scene, mut particles) = tank(6);

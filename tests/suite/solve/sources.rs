@@ -1,11 +1,12 @@
-//! Water from emitters against what a hand computes: a jet's parabola, a full pipe, a tank that fills.
+//! Water from emitters compared with hand calculations: a jet's parabola, a full pipe, a tank that
+//! fills.
 
 use std::collections::BTreeMap;
 
 use crate::support::job::Job;
 use swell::{cache::CacheReader, domain::particles::Particles};
 
-/// A nozzle 0.3 m wide, with spacings of 0.05 m, in the air.
+/// A nozzle 0.3 m wide, with particle spacings of 0.05 m, in air.
 const JET: &str = r#"
 [shot]
 name = "jet"
@@ -35,8 +36,8 @@ fn frames(job: &Job, cache: &str) -> Vec<Particles> {
     all.map(|frame| reader.read(frame).unwrap()).collect()
 }
 
-/// Means of what is left of the places at the end, of water that is 0.2 s old and older, over that of the free fall from where it entered, in
-/// spacings; the last number is how many particles there were.
+/// Mean deviation from free fall at the end of the run, in spacings along x, y and z, over water
+/// that is at least 0.2 s old; the last value is the number of those particles.
 fn off_parabola(frames: &[Particles], rate: f64) -> [f64; 4] {
     let mut born: BTreeMap<u32, (usize, [f32; 3])> = BTreeMap::new();
     for (frame, particles) in frames.iter().enumerate() {
@@ -62,7 +63,8 @@ fn off_parabola(frames: &[Particles], rate: f64) -> [f64; 4] {
     [x, y, z, count]
 }
 
-/// Velocities are those of a step's end, so that water falls ½ g t Δt too far in t; 0.35 s in the mean, half a second at most.
+/// Velocities are those of a step's end, so water falls ½ g t Δt too far in t; 0.35 s on average,
+/// half a second at most.
 #[test]
 fn a_jet_falls_along_its_parabola() {
     let job = Job::of(&[("jet.toml", JET)]);
@@ -76,7 +78,7 @@ fn a_jet_falls_along_its_parabola() {
         assert!(x.abs() < 0.1 && z.abs() < 0.1, "{solver}: {found:?}");
         assert!(y.abs() < first_order + 0.1, "{solver}: {found:?}");
     }
-    // Negative control: a tenth more gravity is more than half a spacing.
+    // Negative control: 10 % more gravity is more than half a spacing.
     job.edit(
         "jet.toml",
         "[water]",
@@ -87,7 +89,7 @@ fn a_jet_falls_along_its_parabola() {
     assert!(y.abs() > first_order + 0.1, "{y}");
 }
 
-/// The domain is the pipe: full over its cross-section up to x = 1.2, closed behind the emitter, open before it.
+/// The domain is a pipe: full up to x = 1.2, closed behind the emitter, open in front of it.
 const PIPE: &str = r#"
 [shot]
 name = "pipe"
@@ -111,8 +113,8 @@ method = "flip"
 cell_size = 0.1
 "#;
 
-/// How fast the foremost water went over the last quarter of a second, in which five layers enter, and the mean velocity of the water
-/// behind the emitter in that time, m/s.
+/// Speed of the foremost water over the last quarter of a second, in which five layers enter, and
+/// the mean velocity of the water behind the emitter in that time, m/s.
 fn flow(frames: &[Particles]) -> [f64; 2] {
     let last = &frames[frames.len() - 13..];
     let front = |frame: &Particles| frame.position.iter().map(|x| x[0]).fold(0.0, f32::max);
@@ -128,7 +130,7 @@ fn flow(frames: &[Particles]) -> [f64; 2] {
     ]
 }
 
-/// Water that cannot go back pushes what stands before it out with its own velocity.
+/// Water that cannot flow back pushes the water in front of it out with its own velocity.
 #[test]
 fn what_enters_a_full_pipe_pushes_the_water_out() {
     let job = Job::of(&[("pipe.toml", PIPE)]);
@@ -137,7 +139,7 @@ fn what_enters_a_full_pipe_pushes_the_water_out() {
     println!("{before} {behind}");
     assert!((before - 1.0).abs() < 0.1, "{before} m/s");
     assert!(behind.abs() < 0.1, "{behind} m/s");
-    // Negative control: with half the velocity it is seen, though two or three layers enter in that time.
+    // Negative control: half the velocity is detected although only two or three layers enter.
     job.edit("pipe.toml", "velocity = [1.0", "velocity = [0.5");
     job.expect(0, "bake pipe.toml -o slow");
     let [before, _] = flow(&frames(&job, "slow"));
@@ -169,8 +171,8 @@ particle_spacing = 0.05
 kind = "volume"
 "#;
 
-/// 0.08 m³ in a second from below: the level of 1 m² rises by 0.08 m, less what has yet to make room for itself: at most
-/// as much as the emitter's room holds, 0.024 m³.
+/// 0.08 m³ enter from below in a second: the level of 1 m² rises by 0.08 m, minus water that has
+/// not yet displaced any: at most as much as the emitter's volume holds, 0.024 m³.
 #[test]
 fn a_tank_fills_from_below() {
     let job = Job::of(&[("tank.toml", TANK)]);

@@ -1,5 +1,5 @@
-//! Surface tension: a drop at rest has Laplace's pressure and keeps still, and one that is pulled out of shape oscillates with
-//! Lamb's period.
+//! Surface tension: a drop at rest has the Laplace pressure and stays at rest, and a deformed drop
+//! oscillates with Lamb's period.
 
 use std::f64::consts::{PI, TAU};
 
@@ -27,12 +27,12 @@ use of_flip::DX;
 
 const METHODS: [Method; 2] = [Method::Flip, Method::Pbf];
 
-/// N/m.
+/// Surface tension, N/m.
 const SIGMA: f64 = 100.0;
-/// kg/m³.
+/// Density, kg/m³.
 const RHO: f64 = 1000.0;
 
-/// Nothing but a drop in the middle of a box of so many cells; frames of four of the longest substeps.
+/// A drop in the middle of a box of `cells` cells, with frames of four of the longest substeps.
 fn scene(method: Method, cells: f64) -> Scene {
     let mut scene = of_flip::scene([cells; 3]);
     let pbf = scene.solver.pbf.as_mut().unwrap();
@@ -51,12 +51,12 @@ fn scene(method: Method, cells: f64) -> Scene {
     scene
 }
 
-/// The capillary limit of a substep, s.
+/// Capillary limit of a substep, s.
 fn longest(sigma: f64) -> f64 {
     (RHO * DX.powi(3) / (TAU * sigma)).sqrt()
 }
 
-/// Off every symmetry of the cells, metres.
+/// Centre of the drop, away from every symmetry of the cells, m.
 fn middle(cells: f64) -> DVec3 {
     DX * (DVec3::splat(0.5 * cells) + DVec3::new(0.13, -0.21, 0.34))
 }
@@ -81,7 +81,7 @@ fn drop(cells: f64, radius: f64, amplitude: f64) -> Particles {
     }
 }
 
-/// Of the sphere that holds as much water, metres.
+/// Radius of the sphere of the same volume, m.
 fn radius(particles: &Particles) -> f64 {
     let volume = particles.len() as f64 * (DX / 2.0).powi(3);
     (3.0 * volume / (4.0 * PI)).cbrt()
@@ -101,7 +101,7 @@ fn solver(
     }
 }
 
-/// The fastest particle's speed and the root of the mean square, m/s.
+/// Largest and rms speed of the particles, m/s.
 fn speeds(particles: &Particles) -> [f64; 2] {
     let squares =
         (particles.velocity.iter()).map(|v| Vec3::from_array(*v).as_dvec3().length_squared());
@@ -109,9 +109,10 @@ fn speeds(particles: &Particles) -> [f64; 2] {
     [most.sqrt(), (sum / particles.len() as f64).sqrt()]
 }
 
-/// 2 σ / R inside a drop of six cells' radius within 5 %, on the device as in f64; and where the water is as viscous as in the
-/// usual test (Popinet 2009: a Laplace number σ D ρ / μ² of 120) nothing moves faster than a hundredth of √(σ / (ρ R)) with FLIP.
-/// PBF's viscosity is the effect of that name; FLIP's is α Δx² / (6 Δt) (Zhu and Bridson 2005).
+/// 2 σ / R inside a drop with a radius of six cells, within 5 %. Where the water is as viscous as
+/// in the usual test (Popinet 2009: a Laplace number σ D ρ / μ² of 120), no particle is faster than
+/// a hundredth of √(σ / (ρ R)) with FLIP. PBF's viscosity is the effect of that name; FLIP's is α
+/// Δx² / (6 Δt) (Zhu and Bridson 2005).
 #[test]
 fn a_drop_at_rest_has_laplaces_pressure_and_keeps_still() {
     let context = context();
@@ -163,12 +164,13 @@ fn a_drop_at_rest_has_laplaces_pressure_and_keeps_still() {
         );
         let least = match method {
             Method::Flip => 0.01,
-            // Misses the gate by two: particles of its lattice go on pushing each other, as fast after 90 frames as after 30.
+            // Misses FLIP's bound by a factor of two to three: particles of the lattice keep
+            // pushing each other, as fast after 90 frames as after 30.
             Method::Pbf => 0.03,
         };
         assert!(most / capillary < least, "{}", most / capillary);
         assert_eq!(report.substeps, 4);
-        // Negative control: half of the tension is half of the pressure, and none is none.
+        // Negative control: half of the tension gives half of the pressure, and none gives none.
         scene.effects.surface_tension = Some(Settings {
             coefficient: 0.5 * SIGMA,
         });
@@ -183,7 +185,7 @@ fn a_drop_at_rest_has_laplaces_pressure_and_keeps_still() {
     }
 }
 
-/// The f64 twins, whole frames of both solvers.
+/// The f64 reference, whole frames of both solvers.
 #[test]
 fn the_reference_has_laplaces_pressure() {
     let (cells, size) = (18.0, 5.0);
@@ -210,8 +212,9 @@ fn the_reference_has_laplaces_pressure() {
     }
 }
 
-/// ω² = 8 σ / (ρ R³) of the second mode (Lamb 1932, §275), within 5 %: the time between the first and the third passage of the second
-/// moment through that of a sphere, for a drop of ten cells' radius, a tenth longer than round.
+/// ω² = 8 σ / (ρ R³) of the second mode (Lamb 1932, §275), within 5 %. Measured as the time between
+/// the first and the third passage of the second moment through that of a sphere, for a drop with a
+/// radius of ten cells, elongated by a tenth.
 #[test]
 fn an_ellipsoid_oscillates_with_lambs_period() {
     let context = context();
@@ -262,7 +265,7 @@ fn moment(particles: &Particles) -> f64 {
     terms.sum::<f64>() / n
 }
 
-/// Passes and buffers of its own where a scene names it, and nothing where none does.
+/// Surface tension adds passes to scenes that name it, and none to others.
 #[test]
 fn a_scene_that_names_no_tension_pays_for_none() {
     let context = context();

@@ -1,10 +1,11 @@
-//! Walls between water and an empty room.
+//! Thin walls between water and an empty region.
 
 use swell::cache::CacheReader;
 
 use crate::support::job::Job;
 
-/// Particles that are behind a wall of `thickness` whose middle is at `x`, which turns by `degrees` about the vertical, after half a second.
+/// Number of particles behind a wall after half a second. The wall has `thickness` (m), its middle
+/// at `x`, and is rotated by `degrees` about the vertical.
 fn leaked(job: &Job, solver: &str, thickness: f64, x: f64, degrees: f64) -> usize {
     let name = format!("{solver}-{thickness}-{x}-{degrees}");
     job.expect(
@@ -20,13 +21,14 @@ fn leaked(job: &Job, solver: &str, thickness: f64, x: f64, degrees: f64) -> usiz
         .unwrap()
         .read(30)
         .unwrap();
-    // The wall's normal; its box is turned about the middle.
+    // The wall's normal; the box is rotated about its middle.
     let (sin, cos) = degrees.to_radians().sin_cos();
     let beyond = |p: &&[f32; 3]| cos * (f64::from(p[0]) - x) - sin * (f64::from(p[2]) - 0.3) > 0.0;
     state.position.iter().filter(beyond).count()
 }
 
-/// As thick as the lint asks for, 1.5 spacings, they hold wherever they stand; half of that leaks at some place.
+/// Walls of 1.5 spacings, the least thickness that the lint accepts, hold water at any position;
+/// half of that leaks at some position.
 #[test]
 fn walls_as_thick_as_the_lint_asks_for_hold_water_wherever_they_stand() {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/hard_cases/");
@@ -43,7 +45,7 @@ fn walls_as_thick_as_the_lint_asks_for_hold_water_wherever_they_stand() {
             0,
             "{solver}, turned"
         );
-        // Negative control.
+        // Negative control: half as thick.
         let through = leaked(&job, solver, 0.08, 0.88, 0.0);
         assert!(through > 20, "{solver}: {through} of 360");
     }

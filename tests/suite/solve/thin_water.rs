@@ -1,4 +1,4 @@
-//! Thin water on solids that cut cells: what lies in cells whose centre is within the solid.
+//! Thin water on solids that cut cells, in cells whose centre is inside the solid.
 
 use crate::support::{
     context,
@@ -13,7 +13,7 @@ use swell::{
     solve::plan::Capacity,
 };
 
-/// The cells that a solid cuts are air whatever they hold.
+/// Treats all cells that a solid cuts as air.
 const SPOIL: Spoil = Spoil {
     pass: "flip/find_water",
     from: "select(share_of_room(element), share, is_in_wall)",
@@ -26,17 +26,17 @@ fn spoiled(context: &Context) -> Context {
     spoiled
 }
 
-/// Every brick: water may come anywhere.
+/// A capacity for every brick: water may be anywhere.
 fn everywhere(scene: &Scene) -> Capacity {
     let full = (scene.domain.size() / DX).round().as_uvec3();
     swell::solve::flip::capacity(scene, &block([0; 3], full.to_array().map(|n| n as usize)))
 }
 
-/// Open part of the lowest cells, beneath which a floor stands.
+/// Open part of the lowest cells above the floor.
 const OPEN: f64 = 0.3;
 
-/// A box whose floor is a solid that cuts the third layer of cells, and a cell of water there in a sheet that is pressed to a
-/// tenth of a cell.
+/// A box whose floor is a solid that cuts the third layer of cells, with one cell's worth of water
+/// there, squeezed into a sheet a tenth of a cell thick.
 fn pressed() -> (Scene, Boundary, Particles) {
     let scene = scene([8.0, 8.0, 8.0]);
     let floor = (3.0 - OPEN) * DX;
@@ -57,7 +57,8 @@ fn pressed() -> (Scene, Boundary, Particles) {
     (scene, half_space(DVec3::Y, floor), particles)
 }
 
-/// Mean height of the particles over the floor of [`pressed`] after a quarter of a second, in cells.
+/// Mean height of the particles over the floor of [`pressed`] after a quarter of a second, in
+/// cells.
 fn height<S: Solver>(mut solver: S) -> f64
 where
     S::Error: std::fmt::Debug,
@@ -68,7 +69,7 @@ where
     sum / state.len() as f64 / DX - (3.0 - OPEN)
 }
 
-/// Nothing of it reaches the centre of a cell in the open.
+/// At the start no particle reaches the centre of a cell in the open.
 #[test]
 fn water_that_is_pressed_against_a_solid_comes_back_to_its_depth() {
     let context = context();
@@ -81,7 +82,7 @@ fn water_that_is_pressed_against_a_solid_comes_back_to_its_depth() {
     reference.load(0, &particles).unwrap();
     let found = [on(&context), height(reference)];
     println!("{found:?}");
-    // A cell of water has its middle at 0.5; the cut cells take a little more than their part.
+    // A cell of water has its middle at 0.5; the cut cells take slightly more than their part.
     for height in found {
         assert!((0.4..0.55).contains(&height), "{height}");
     }
@@ -91,7 +92,7 @@ fn water_that_is_pressed_against_a_solid_comes_back_to_its_depth() {
     assert!(height < 0.25, "{height}");
 }
 
-/// A pool over a slope of 1 : 8, which rises out of it: its particles, and where the slope is.
+/// A pool over a slope of 1 : 8 that rises out of the water: scene, slope and particles.
 fn shore() -> (Scene, Boundary, Particles) {
     let mut scene = scene([20.0, 8.0, 8.0]);
     scene.shot.frames_per_second = 25.0;
@@ -107,14 +108,15 @@ fn shore() -> (Scene, Boundary, Particles) {
     (scene, half_space(n, d), particles)
 }
 
-/// Open part of a cell of [`shore`], by 16 × 16 places.
+/// Open part of a cell of [`shore`], sampled at 16 × 16 points.
 fn open_part(x: usize, y: usize) -> f64 {
     let at = |k: usize, sub: usize| (k as f64 + (sub as f64 + 0.5) / 16.0) * DX;
     let is_open = |k: &usize| at(y, k / 16) > 0.4 + (at(x, k % 16) - 1.65) / 8.0;
     (0..256).filter(is_open).count() as f64 / 256.0
 }
 
-/// The fullest cell over what it has room for, mean over the last two seconds of five, and the largest speed then.
+/// Content of the fullest cell relative to its open part, averaged over the last two seconds of
+/// five, and the largest speed in that time, m/s.
 fn crowding(context: &Context) -> (f64, f64) {
     let (scene, boundary, particles) = shore();
     let bricks = everywhere(&scene);
@@ -140,7 +142,8 @@ fn crowding(context: &Context) -> (f64, f64) {
     (sum, fastest)
 }
 
-/// Its edge lies in cells that the slope cuts, most of them with their centre within it.
+/// The water's edge lies in cells that the slope cuts, most of which have their centre inside the
+/// slope.
 #[test]
 fn water_at_a_shore_does_not_gather_there() {
     let context = context();
@@ -148,7 +151,7 @@ fn water_at_a_shore_does_not_gather_there() {
     println!("{fullest} {fastest}");
     assert!((1.0..3.0).contains(&fullest), "{fullest}");
     assert!(fastest < 0.3, "{fastest}");
-    // Negative control: nothing holds it.
+    // Negative control: water in cut cells is not incompressible.
     let (fullest, fastest) = crowding(&spoiled(&context));
     println!("{fullest} {fastest}");
     assert!(fullest < 0.7, "{fullest}");

@@ -1,4 +1,4 @@
-//! Solids that turn, held against flows that are known: ideal water in an elliptic drum.
+//! Rotating solids compared with known flows: ideal water in an elliptic drum.
 
 use glam::{DMat2, DVec2, DVec3};
 use swell::{
@@ -25,13 +25,14 @@ use crate::support::{
     lattice, placed,
 };
 
-/// Semi-axes of the drum, metres, and its axis.
+/// Semi-axes of the drum, m.
 const AXES: DVec2 = DVec2::new(1.0, 0.6);
 const MIDDLE: DVec2 = DVec2::new(1.2, 1.2);
-/// Cells along its axis.
+/// Cells along the drum's axis.
 const DEEP: usize = 4;
 
-/// Its inner wall as a solid's distance, positive within, by the first-order one of an ellipse's equation: exact at the wall.
+/// Signed distance of the drum's inner wall, positive inside, by the first-order distance of the
+/// ellipse's equation, which is exact at the wall.
 fn drum() -> SignedDistance {
     let spacing = 0.5 * DX;
     let (dims, origin) = ([53, 53, 2 * DEEP + 5], DVec3::splat(-2.0 * spacing));
@@ -50,7 +51,8 @@ fn drum() -> SignedDistance {
     }
 }
 
-/// A domain of one drum about z that turns at `spin` rad/s, full of water at rest in its frame at `angle`.
+/// A domain with a drum about z that rotates at `spin` rad/s, filled with water at rest for the
+/// pose of the drum at `angle`, rad.
 fn case(spin: f64, angle: f64) -> (Scene, Boundary, Particles) {
     let mut scene = scene([24.0, 24.0, DEEP as f64]);
     scene.water.gravity = DVec3::ZERO;
@@ -70,7 +72,7 @@ fn case(spin: f64, angle: f64) -> (Scene, Boundary, Particles) {
     let all = lattice([0.0; 3], [48, 48, 2 * DEEP], [DX / 2.0; 3]);
     let is_within = |p: &&[f32; 3]| {
         let p = DVec2::new(p[0].into(), p[1].into()) - MIDDLE;
-        // A quarter of a spacing off the wall.
+        // A quarter of a spacing away from the wall.
         ((back * p) / (AXES - 0.125 * DX)).length() < 1.0
     };
     let place: Vec<_> = all.position.iter().filter(is_within).copied().collect();
@@ -87,8 +89,8 @@ fn case(spin: f64, angle: f64) -> (Scene, Boundary, Particles) {
     (scene, boundary, particles)
 }
 
-/// Ideal water that an elliptic drum sets in motion has the potential ω (a² − b²)/(a² + b²) x y along the drum's axes (Lamb 1932,
-/// article 72).
+/// Velocity of ideal water in a rotating elliptic drum, with the potential ω (a² − b²)/(a² + b²) x
+/// y along the drum's axes (Lamb 1932, article 72), m/s.
 fn ideal(at: DVec2, spin: f64, angle: f64) -> DVec2 {
     let turn = DMat2::from_angle(angle);
     let p = turn.transpose() * (at - MIDDLE);
@@ -107,7 +109,7 @@ fn gpu(context: &Context, scene: &Scene, boundary: &Boundary, particles: &Partic
     Flip::new(context, scene, plan, boundary, false).unwrap()
 }
 
-/// Root mean square of how far particles' velocities are from the ideal ones, over these.
+/// Rms error of the particles' velocities relative to the rms of the ideal ones.
 fn off(before: &Particles, after: &Particles, spin: f64, angle: f64) -> f64 {
     let (mut error, mut size) = (0.0, 0.0);
     for k in 0..before.len() {
@@ -118,11 +120,11 @@ fn off(before: &Particles, after: &Particles, spin: f64, angle: f64) -> f64 {
     (error / size).sqrt()
 }
 
-/// The frame at whose start the drum is turned by this, of a drum that makes 1 rad/s and 100 frames a second.
+/// The frame at whose start the drum has turned by 0.4 rad, at 1 rad/s and 100 frames a second.
 const FRAME: u32 = 40;
 
-/// Cells are cut by the wall as it stands, and it pushes with the velocity of its points: of a drum whose axes lie across
-/// the grid's, at 0.4 rad, after its first hundredth of a second.
+/// The wall cuts cells at its current position and pushes with the velocity of its points. The axes
+/// of the drum are at 0.4 rad to the grid's; compared after one step of a hundredth of a second.
 #[test]
 fn an_elliptic_drum_moves_ideal_water_as_lamb_says() {
     let context = context();
@@ -132,13 +134,14 @@ fn an_elliptic_drum_moves_ideal_water_as_lamb_says() {
     solver.load(FRAME, &particles).unwrap();
     let (state, report) = solver.advance().unwrap();
     assert_eq!(report.substeps, 1);
-    // Where the drum stands in the middle of the substep.
+    // Pose of the drum in the middle of the substep.
     let middle = angle + 0.005;
     let found = off(&particles, &state, 1.0, middle);
     println!("off by {found}");
-    // A cell is a sixth of the lesser semi-axis: planes in cells, and velocities between faces, are off by a few percent.
+    // The smaller semi-axis has six cells: planes in cells, and velocities between faces, have
+    // errors of a few percent.
     assert!(found < 0.08, "{found}");
-    // Control: with faces closed that are open by less than 0.3, which holds water at rest as well.
+    // Control: closes faces that are open by less than 0.3, which also holds water at rest.
     let mut spoiled = context.clone();
     spoiled.spoil = Some(Spoil {
         pass: "flip/cut_cells",
@@ -151,7 +154,7 @@ fn an_elliptic_drum_moves_ideal_water_as_lamb_says() {
     let blocked = off(&particles, &blocked, 1.0, middle);
     println!("off by {blocked} with faces closed below 0.3");
     assert!(blocked > 0.15, "{blocked}");
-    // Controls: the other way round, and as if it had not turned yet.
+    // Controls: the opposite rotation, and the drum before it turned.
     assert!(off(&particles, &state, -1.0, middle) > 1.9);
     assert!(off(&particles, &state, 1.0, 0.0) > 0.5);
 
@@ -164,7 +167,8 @@ fn an_elliptic_drum_moves_ideal_water_as_lamb_says() {
     assert!(apart < 2e-4, "{apart}");
 }
 
-/// Part of the ideal velocity field that particles have: 1 of ideal water, by least squares.
+/// Component of the particles' velocities along the ideal field, by least squares; 1 for ideal
+/// water.
 fn part(state: &Particles, spin: f64, angle: f64) -> f64 {
     let (mut along, mut size) = (0.0, 0.0);
     for k in 0..state.len() {
@@ -175,7 +179,8 @@ fn part(state: &Particles, spin: f64, angle: f64) -> f64 {
     along / size
 }
 
-/// PBF's drum sets the water in motion too, by its samples and its distance; and the f64 twin's does the same.
+/// PBF's drum sets the water in motion too, through its samples and its distance field, and so does
+/// that of the f64 reference.
 #[test]
 fn a_drum_of_pbf_takes_its_water_along() {
     let context = context();
@@ -213,9 +218,9 @@ fn a_drum_of_pbf_takes_its_water_along() {
     let found = part(&state, 1.0, 0.2);
     println!("{found} of the ideal flow");
     assert!(found > 0.5 && found < 1.5, "{found}");
-    // Control: of the flow of the drum as it stood at the start, or that turned the other way, it has less.
+    // Control: the flow of the opposite rotation has a negative component.
     assert!(part(&state, -1.0, 0.2) < -0.5);
-    // Nothing is left behind the wall.
+    // No particle is left outside the wall.
     let back = DMat2::from_angle(-0.2);
     let outermost = (0..state.len())
         .map(|k| (back * (position(&state, k).truncate() - MIDDLE) / AXES).length());

@@ -1,5 +1,5 @@
-//! Viscosity of so many Pa s: flows between plates and vortices decay as theory has it, at any coefficient nothing is blown up, and
-//! water at rest keeps its pressure.
+//! Newtonian viscosity in Pa s: flows between plates and vortices decay as in theory, no
+//! coefficient is unstable, and water at rest keeps its pressure.
 
 use std::f64::consts::{PI, TAU};
 
@@ -21,7 +21,7 @@ const METHODS: [Method; 2] = [Method::Flip, Method::Pbf];
 /// Cells between the plates.
 const GAP: usize = 16;
 
-/// A box full of water between plates below and above, joined along x and z.
+/// A box full of water between no-slip plates below and above, periodic along x and z.
 fn plates(method: Method, coefficient: f64, frames_per_second: f64) -> Scene {
     let mut scene = of_flip::scene([8.0, GAP as f64, 8.0]);
     scene.solver.method = method;
@@ -44,7 +44,7 @@ fn solver(context: &Context, scene: &Scene, start: &Particles) -> Box<dyn Advanc
     }
 }
 
-/// A solver on a device.
+/// A solver whose error type is erased.
 trait Advance {
     fn frame(&mut self) -> (Particles, StepReport);
 }
@@ -64,7 +64,7 @@ fn run(context: &Context, scene: &Scene, start: &Particles, frames: u32) -> Part
     states.last().unwrap()
 }
 
-/// Particles of the box with velocities along x by their height.
+/// Particles that fill the box, with velocities along x as a function of height.
 fn sheared(speed: impl Fn(f64) -> f64) -> Particles {
     let mut particles = of_flip::block([0; 3], [8, GAP, 8]);
     for k in 0..particles.len() {
@@ -74,8 +74,8 @@ fn sheared(speed: impl Fn(f64) -> f64) -> Particles {
     particles
 }
 
-/// Part of the velocities along x that goes as `shape` of the height, by least squares; and the largest that is left in the mean
-/// of a row of cells, m/s.
+/// Amplitude of `shape` in the velocities along x, by least squares, and the largest residual of
+/// the mean of a row of cells, m/s.
 fn fitted(state: &Particles, shape: impl Fn(f64) -> f64) -> (f64, f64) {
     let all = (0..state.len()).map(|k| {
         let y = of_flip::position(state, k).y;
@@ -93,9 +93,9 @@ fn fitted(state: &Particles, shape: impl Fn(f64) -> f64) -> (f64, f64) {
     (part, left.fold(0.0, f64::max))
 }
 
-/// Between plates H apart water that is pushed along them by g comes from rest to g y (H − y) / 2ν (Poiseuille), term by term of its
-/// Fourier series. The gate is 5 %. A difference of a parabola over 16 cells is off by 1/256 of it, a backward step of the slowest term by
-/// half of ν π² Δt / H², 2 %.
+/// Between plates H apart, water driven along them by g develops from rest to g y (H − y) / 2ν
+/// (Poiseuille), as a Fourier series. The tolerance is 5 %. A difference of a parabola over 16
+/// cells is off by 1/256 of it, a backward step of the slowest term by half of ν π² Δt / H², 2 %.
 #[test]
 fn water_between_plates_flows_as_poiseuille_has_it() {
     let context = context();
@@ -122,7 +122,7 @@ fn water_between_plates_flows_as_poiseuille_has_it() {
         );
         assert!((part - 1.0).abs() < 0.05, "{method:?} {part}");
         assert!(left < 0.05 * most, "{method:?} {left}");
-        // Negative control: plates that water slips along do not hold it, and it falls freely.
+        // Negative control: free-slip plates do not hold the water, and it accelerates freely.
         scene.no_slip.clear();
         let (part, _) = fitted(&run(&context, &scene, &sheared(|_| 0.0), frames), |_| 1.0);
         assert!(
@@ -132,7 +132,8 @@ fn water_between_plates_flows_as_poiseuille_has_it() {
     }
 }
 
-/// Between plates at rest sin(πy/H) dies as exp(−ν (π/H)² t): the start-up of a Couette flow, term by term.
+/// Between plates at rest, sin(πy/H) decays as exp(−ν (π/H)² t), a term of the start-up of a
+/// Couette flow.
 #[test]
 fn shear_between_plates_dies_as_couettes_flow_starts() {
     let context = context();
@@ -151,16 +152,17 @@ fn shear_between_plates_dies_as_couettes_flow_starts() {
             (found / rate - 1.0).abs() < 0.05,
             "{method:?} {found} {rate}"
         );
-        // Negative control: half of the coefficient is another decay.
+        // Negative control: half of the coefficient gives another decay.
         scene.effects.viscosity = Some(Settings::newtonian(0.5 * viscosity * 1000.0));
         let half = decay(&scene);
         assert!((half / rate - 1.0).abs() > 0.3, "{method:?} {half}");
     }
 }
 
-/// u = cos kx sin ky, v = −sin kx cos ky dies as exp(−2νk² t) without any wall (Taylor and Green 1937). A backward step takes
-/// 1 / (1 + s) for exp(−s), 0.7 % of the rate; differences over a cell take (kΔx)²/12 of it, and what particles are given of a change goes
-/// to the grid and back by hats, (kΔx)²/12 an axis and a way: five times that in all, 2.9 % of 24 cells a wave.
+/// u = cos kx sin ky, v = −sin kx cos ky decays as exp(−2νk² t) without any wall (Taylor and Green
+/// 1937). A backward step takes 1 / (1 + s) for exp(−s), 0.7 % of the rate; differences over a cell
+/// take (kΔx)²/12 of it, and the change that particles receive goes to the grid and back by hats,
+/// (kΔx)²/12 per axis and direction: five times that in all, 2.9 % at 24 cells per wavelength.
 #[test]
 fn a_taylor_green_vortex_dies_at_the_viscosity_asked_for() {
     let context = context();
@@ -194,7 +196,8 @@ fn a_taylor_green_vortex_dies_at_the_viscosity_asked_for() {
             let (products, squares) = sums.fold((0.0, 0.0), |a, b| (a.0 + b.0, a.1 + b.1));
             products / squares
         };
-        // From the first frame on, since what the grid does not carry of the start goes at once.
+        // From the first frame on: the part of the initial velocity that the grid does not resolve
+        // vanishes at once.
         let first = part(&solver.frame().0);
         let last = (0..15).map(|_| part(&solver.frame().0)).last().unwrap();
         (first / last).ln() / 0.15
@@ -208,14 +211,14 @@ fn a_taylor_green_vortex_dies_at_the_viscosity_asked_for() {
             (found / rate - 1.0).abs() < 0.05,
             "{method:?} {found} {rate}"
         );
-        // Negative control.
+        // Negative control: half of the coefficient.
         let half = decay(method, 0.5 * viscosity);
         assert!((half / rate - 1.0).abs() > 0.3, "{method:?} {half}");
     }
 }
 
-/// A block that falls onto a floor: energy only goes, whatever the coefficient; and where a solve would take more iterations than it
-/// may have, the frame says that it was missed.
+/// A block that falls onto a floor: energy only decreases, whatever the coefficient. If a solve
+/// would take more iterations than allowed, the frame reports it as missed.
 #[test]
 fn no_coefficient_blows_up() {
     let context = context();
@@ -232,7 +235,7 @@ fn no_coefficient_blows_up() {
             let mut missed = 0;
             for _ in 0..if is_short { 1 } else { 12 } {
                 let report = solver.frame().1;
-                // Water that falls together gains by a few thousandths where particles are pushed apart.
+                // Colliding water gains a few thousandths where particles are pushed apart.
                 assert!(energy(&report) < 1.01 * last, "{method:?} {coefficient}");
                 last = energy(&report);
                 missed += report.projection.unwrap().missed;
@@ -243,7 +246,8 @@ fn no_coefficient_blows_up() {
     }
 }
 
-/// A viscous tank at rest stays so, with the pressure of its depth: that of both projections.
+/// A viscous tank at rest stays at rest and keeps the hydrostatic pressure, the sum of both
+/// projections.
 #[test]
 fn viscous_water_at_rest_keeps_its_pressure() {
     let context = context();
@@ -267,7 +271,7 @@ fn viscous_water_at_rest_keeps_its_pressure() {
     }
 }
 
-/// Three passes and their buffers where a scene names a coefficient; none where it does not, nor where it names XSPH alone.
+/// A coefficient adds three passes; scenes without one, or with XSPH only, have none of them.
 #[test]
 fn a_scene_that_names_no_coefficient_pays_for_none() {
     let context = context();

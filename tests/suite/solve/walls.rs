@@ -1,4 +1,4 @@
-//! What walls do to the density on FLIP's grid.
+//! Effect of walls on the density of FLIP's grid.
 
 use crate::support::{
     context,
@@ -19,7 +19,7 @@ use swell::{
     scene::{Scene, Wall, WaveMaker, step},
 };
 
-/// One substep in f64 that begins at `start`, seconds.
+/// One substep of the f64 reference that begins at `start`, seconds.
 fn traced(scene: &Scene, particles: &Particles, start: f64) -> Trace {
     let mut reference = Flip::new(scene, &Boundary::default());
     reference.load(0, particles).unwrap();
@@ -38,7 +38,7 @@ fn one_substep(reference: &mut Flip, start: f64) -> Trace {
     reference.substep(&cloud, &found.is_wet, &step).unwrap()
 }
 
-/// Density of all cells that a box has, in cells.
+/// Sum of the density over all cells of a box.
 fn held(trace: &Trace, cells: [i64; 3]) -> f64 {
     let along = |axis: usize| 0..cells[axis];
     let all = along(0).flat_map(|x| along(1).flat_map(move |y| along(2).map(move |z| [x, y, z])));
@@ -47,15 +47,16 @@ fn held(trace: &Trace, cells: [i64; 3]) -> f64 {
         .sum()
 }
 
-/// Hats add up to one wherever a particle is, with what falls behind a wall given back by its image: cells hold as much as
-/// there are particles, however those stand. (Each of 27 hats has 2.4e-7 of a weight beyond its own.) Else a density
-/// correction thins all water by what walls hide.
+/// Hats sum to one wherever a particle is, because the part that falls behind a wall is returned by
+/// its mirror image: cells hold as much as there are particles, for any arrangement. (Each of 27
+/// hats has 2.4e-7 of a weight beyond its own.) Otherwise a density correction would thin all water
+/// by what walls hide.
 #[test]
 fn cells_hold_what_their_particles_are_also_at_walls() {
     let cells = [8, 10, 8];
     let (scene, mut particles) = rig::tank([8, 10, 8], 6);
     jitter(&mut particles, 0.02);
-    // And none nearer to a wall than 0.225 cells, which is where water is pushed to.
+    // Keeps particles 0.225 cells away from walls, the distance to which water is pushed.
     let size = scene.domain.size();
     for x in &mut particles.position {
         let kept =
@@ -66,7 +67,7 @@ fn cells_hold_what_their_particles_are_also_at_walls() {
     let error = |trace: &Trace| (held(trace, cells) / count - 1.0).abs();
     let found = traced(&scene, &particles, 0.0);
     assert!(error(&found) < 27.0 * 2.4e-7 * 1.5, "{}", error(&found));
-    // Negative control: a particle more.
+    // Negative control: one more particle.
     let mut more = particles.clone();
     more.position.push([0.4, 0.3, 0.4]);
     more.velocity.push([0.0; 3]);
@@ -74,7 +75,7 @@ fn cells_hold_what_their_particles_are_also_at_walls() {
     assert!(error(&traced(&scene, &more, 0.0)) > 1e-4);
 }
 
-/// A tank whose first wall has moved in by `part` of a cell after a second, and its water with it.
+/// A tank whose first wall has moved in by `part` of a cell after a second, with its water.
 fn cut(part: f64) -> (Scene, Particles) {
     let (mut scene, mut particles) = rig::tank([8, 8, 8], 6);
     scene.wave_makers = vec![WaveMaker {
@@ -91,13 +92,15 @@ fn cut(part: f64) -> (Scene, Particles) {
     (scene, particles)
 }
 
-/// How far densities may be off: places up to 0.8 m in f32 are off by 3e-7 cells and weights by 2.4e-7 of a hat, some 27 of them in a
-/// row over a particle's eighth, at worst all the same way.
+/// Tolerance of densities: positions up to 0.8 m in f32 are off by 3e-7 cells and weights by 2.4e-7
+/// of a hat, for some 27 of them in a row over a particle's eighth, at worst all with the same
+/// sign.
 const DENSITY: f64 = 2e-5;
 
-/// A lattice that goes up to a wall is water of density 1 before it, whatever part of a cell the wall cuts off, in cells
-/// whose centres lie before the wall. Particles stand a quarter of a cell apart from it and half a cell from each other; the
-/// lattice's hats add up to one at any place (they are linear between whole cells, of which the lattice is a half).
+/// A lattice that extends up to a wall is water of density 1, whatever part of a cell the wall cuts
+/// off, in cells whose centres are in front of the wall. Particles are a quarter of a cell from the
+/// wall and half a cell from each other; the lattice's hats sum to one anywhere (they are linear
+/// between whole cells, of which the lattice spacing is a half).
 #[test]
 fn water_before_a_wall_that_cuts_cells_has_its_density() {
     for part in [0.1, 0.25, 0.4, 0.5] {
@@ -118,9 +121,10 @@ fn water_before_a_wall_that_cuts_cells_has_its_density() {
     }
 }
 
-/// Without a density correction nothing is mirrored, and a cell is as full as what walls leave of its hats: of a lattice 7/8 in the cell
-/// before a wall that cuts none, 1/2 in one whose centre is in the wall. Its hats there are 3/4, 3/4 and 1/4 of a particle of two, or 3/4
-/// and 1/4; integrals come to the same.
+/// Without a density correction there are no mirror images, and a cell is full relative to what
+/// walls leave of its hats: of a lattice, 7/8 in the cell in front of a wall that cuts none, 1/2 in
+/// one whose centre is in the wall. The hats there are 3/4, 3/4 and 1/4 of a particle of two, or
+/// 3/4 and 1/4; the integrals are the same.
 #[test]
 fn cells_at_walls_are_full_without_images_too() {
     for part in [0.0, 0.5] {
@@ -134,8 +138,8 @@ fn cells_at_walls_are_full_without_images_too() {
     }
 }
 
-/// How far the water stands off a wall that comes by 0.7 cells in a substep, mean over a second half of its way, in cells: from the wall
-/// to the nearest particle.
+/// Distance between the water and a wall that advances by 0.7 cells per substep, averaged over the
+/// second half of its path, in cells: from the wall to the nearest particle.
 fn gap<S: Solver>(mut solver: S) -> f64
 where
     S::Error: std::fmt::Debug,
@@ -153,8 +157,8 @@ where
     sum / f64::from(frames / 2)
 }
 
-/// Particles are pushed off walls as far as half of the lattice's spacing, a quarter of a cell, from where the walls are and not from
-/// where they will be.
+/// Particles are pushed off walls by half of the lattice spacing, a quarter of a cell, from the
+/// current position of the walls and not from their next one.
 #[test]
 fn water_before_a_wall_that_comes_leaves_no_gap() {
     let context = context();
@@ -173,7 +177,7 @@ fn water_before_a_wall_that_comes_leaves_no_gap() {
     let found = [gap(rig::solver(&context, &scene, &particles)), gap(twin)];
     println!("{found:?}");
     assert!(found.iter().all(|gap| *gap < 0.15), "{found:?}");
-    // Negative control.
+    // Negative control: measured from the walls' next position.
     let mut spoiled = context.clone();
     spoiled.spoil = Some(Spoil {
         pass: "flip/push_apart",
@@ -185,8 +189,9 @@ fn water_before_a_wall_that_comes_leaves_no_gap() {
     assert!(gap > 0.3, "{gap}");
 }
 
-/// A cell whose centre lies in a wall is what the water before it is, beside a solid as well: at the wall of [`cut`] that takes 0.7 of
-/// a cell, with a floor of mesh that fits the grid under the water. Before that wall the sliver holds no particle.
+/// A cell whose centre is inside a wall gets the kind of the water in front of it, beside a solid
+/// as well: at the wall of [`cut`] that takes 0.7 of a cell, with a solid floor aligned with the
+/// grid under the water. The sliver in front of that wall holds no particle.
 #[test]
 fn the_sliver_at_a_wall_is_water_beside_a_solid_too() {
     let (mut scene, mut particles) = cut(0.7);

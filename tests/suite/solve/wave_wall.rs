@@ -1,4 +1,5 @@
-//! Water before a wall that makes a wave has the wave's depth, whatever part of a cell the wall goes in a step.
+//! Water in front of a wave-making wall has the wave's depth, whatever fraction of a cell the wall
+//! moves in a step.
 
 use swell::cache::CacheReader;
 
@@ -27,13 +28,14 @@ particle_spacing = 0.0125
 const HEIGHT: f64 = 0.025;
 const DEPTH: f64 = 0.25;
 const SPACING: f64 = 0.0125;
-/// When the domain's other end is not reached yet, and the crest has passed the wall; seconds.
+/// By then the crest has passed the wall and not yet reached the other end of the domain; seconds.
 const UNTIL: f64 = 3.8;
 
-/// Of the depth, between frames and theory: 0.4 spacings, of which the topmost particle tells the surface to half of one.
+/// Relative tolerance of the depth between frames and theory: 0.4 spacings. The topmost particle
+/// locates the surface to half a spacing.
 const TOLERANCE: f64 = 0.02;
 
-/// Goring 1978: where the wall is, and the depth before it, at a time.
+/// Position of the wall and depth in front of it at time `t` (Goring 1978), m.
 fn goring(t: f64) -> (f64, f64) {
     let k = (0.75 * HEIGHT / DEPTH).sqrt();
     let celerity = (9.81 * (DEPTH + HEIGHT)).sqrt();
@@ -51,7 +53,8 @@ fn goring(t: f64) -> (f64, f64) {
     (low, DEPTH + HEIGHT / phase(low).cosh().powi(2))
 }
 
-/// Largest deviation of the depth in two cells before the wall from theory's, and from still water's, parts of these.
+/// Largest relative deviation of the depth in the two cells in front of the wall from theory, and
+/// from still water.
 fn deviations(job: &Job, name: &str, rate: u32) -> [f64; 2] {
     let reader = CacheReader::open(&job.path(name)).unwrap();
     let mut most = [0.0f64; 2];
@@ -68,8 +71,9 @@ fn deviations(job: &Job, name: &str, rate: u32) -> [f64; 2] {
     most
 }
 
-/// At 6 frames a second the wall goes 1.0 cell in a frame, at 24 a quarter. Control: water that stays as it was. A minute: the
-/// crest needs 3.4 s to pass a wall that starts from rest.
+/// At 6 frames a second the wall moves by 1.0 cell per frame, at 24 by a quarter. Control: the
+/// depth of still water does not fit. Takes a minute: the crest needs 3.4 s to pass a wall that
+/// starts from rest.
 #[test]
 fn water_before_a_wall_that_makes_a_wave_has_the_waves_depth_at_any_frame_rate() {
     let job = Job::of(&[("solitary.toml", SCENE)]);

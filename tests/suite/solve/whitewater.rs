@@ -1,4 +1,4 @@
-//! Whitewater against what is known of drops, foam and bubbles, on the GPU and in f64.
+//! Whitewater compared with known behaviour of drops, foam and bubbles, on the GPU and in f64.
 
 use glam::DVec3;
 use swell::{
@@ -15,10 +15,10 @@ use crate::support::{
     whitewater::{kind, place, run, settings, velocity, white},
 };
 
-/// Depth of the pool, metres.
+/// Depth of the pool, m.
 const DEPTH: f64 = 0.8;
 
-/// A box of 2 m × `height` × 2 m with a pool in it that moves at `speed` along x, and joins its own ends there.
+/// A box of 2 m × `height` × 2 m, periodic along x, with a pool that moves at `speed` m/s along x.
 fn pool(height: f64, speed: f64) -> (Scene, Particles) {
     let mut scene = support::scene([2.0, height, 2.0]);
     scene.periodic = [true, false, false];
@@ -27,7 +27,7 @@ fn pool(height: f64, speed: f64) -> (Scene, Particles) {
     (scene, water)
 }
 
-/// On the GPU and in f64.
+/// Runs `check` on the GPU and, without a context, in f64.
 fn both(check: impl Fn(Option<&Context>)) {
     let context = context();
     check(Some(&context));
@@ -51,7 +51,8 @@ fn one(
     .1
 }
 
-/// Half-way sums of a constant pull are exact; the air takes 1e-4 of the speed of a ball of 10 m.
+/// The trapezoidal rule is exact for constant acceleration; air drag takes 1e-4 of the speed of a
+/// ball with a radius of 10 m.
 #[test]
 fn a_heavy_drop_flies_along_a_parabola() {
     let settings = Settings {
@@ -71,7 +72,7 @@ fn a_heavy_drop_flies_along_a_parabola() {
         let off = place(&moved, 0).distance(expected);
         assert!(off < 2e-4, "{off}");
         assert_eq!(kind(&moved, 0), Kind::Spray);
-        // Control: a drop of a millimetre is somewhere else.
+        // Control: a drop of one millimetre deviates.
         let light = Settings {
             drop_radius: 5e-4,
             ..settings.clone()
@@ -87,7 +88,8 @@ fn a_heavy_drop_flies_along_a_parabola() {
     });
 }
 
-/// Gunn and Kinzer 1949: a drop of 1 mm falls at 4.03 m/s, within 6 % (spheres do not flatten); wind takes it along.
+/// Gunn and Kinzer 1949: a drop of 1 mm falls at 4.03 m/s, within 6 % (spheres do not flatten);
+/// wind carries it along.
 #[test]
 fn a_drop_falls_as_fast_as_drops_do() {
     let settings = Settings {
@@ -121,7 +123,8 @@ fn foam_goes_with_its_water() {
         let off = place(&moved, 0).distance(x + 0.15 * DVec3::X);
         assert!(off < 1e-5, "{off}");
         assert_eq!(kind(&moved, 0), Kind::Foam);
-        // Foam that stood takes on the speed of the water within a frame, in which it goes half of the water's way.
+        // Foam at rest takes on the speed of the water within a frame, in which it moves by half of
+        // the water's displacement.
         let moved = one(
             device,
             &pool(2.0, 0.5),
@@ -145,7 +148,8 @@ fn bubbles_rise_at_their_speed_and_float_up_as_foam() {
         let v = velocity(&moved, 0);
         assert_eq!(kind(&moved, 0), Kind::Bubble);
         assert!((v.y / settings.rise_speed - 1.0).abs() < 1e-3, "{v}");
-        // From rest: by rise speed times (t − response), which trapezoids of a frame of half of it make 2 % longer.
+        // From rest: rise speed times (t − response); trapezoids over frames of half the response
+        // make it 2 % longer.
         let way = place(&moved, 0).y - x.y;
         let expected = settings.rise_speed * (1.0 - settings.response);
         assert!((way / expected - 1.0).abs() < 0.02, "{way} {expected}");
@@ -156,8 +160,8 @@ fn bubbles_rise_at_their_speed_and_float_up_as_foam() {
     });
 }
 
-/// A drop at 6 m/s would be 0.2 m deep at the frame's end. It stays where the surface is: at the share of 0.15, 0.6 spacings above
-/// the last layer's upper side, to a 32nd of its way.
+/// A drop at 6 m/s would be 0.2 m deep at the frame's end. It stays at the surface, where the share
+/// is 0.15, 0.6 spacings above the upper side of the last layer, to a 32nd of its path.
 #[test]
 fn drops_land_on_the_surface() {
     let drop = (
@@ -189,16 +193,17 @@ fn potentials(device: Option<&Context>, scene: &Scene, water: &Particles) -> Vec
     run(device, (scene, water), &settings(), &white(&[]), (1, 0.05)).0
 }
 
-/// The particle nearest to a place.
+/// Index of the particle nearest to a position.
 fn nearest(water: &Particles, x: [f64; 3]) -> usize {
     let far = |k: &usize| place(water, *k).distance(DVec3::from_array(x));
     let all = 0..water.len();
     all.min_by(|a, b| far(a).total_cmp(&far(b))).unwrap()
 }
 
-/// A particle half a spacing behind a front that meets water at V sums 2π (h/d)³ V ∫ (1 − r)(3r²/2 − s r − s²/2) dr = 3.755 V, s = d/2h;
-/// one that parts from it has r²/2 − s r + s²/2 in the bracket: 0.663 V. Sums over the lattice are within 5 % of the one and, being
-/// the difference of large terms, within 40 % of the other.
+/// A particle half a spacing behind a front that meets water at relative speed V sums 2π (h/d)³ V ∫
+/// (1 − r)(3r²/2 − s r − s²/2) dr = 3.755 V, s = d/2h; one whose front separates from it has r²/2 −
+/// s r + s²/2 in the bracket: 0.663 V. Sums over the lattice are within 5 % of the first and, being
+/// the difference of large terms, within 40 % of the second.
 #[test]
 fn fronts_that_meet_trap_air() {
     let scene = support::scene([2.0, 2.0, 2.0]);
@@ -223,7 +228,7 @@ fn fronts_that_meet_trap_air() {
     });
 }
 
-/// Water under a roof of this slope on both sides, its ridge along z.
+/// Water under a roof of this slope on both sides, with the ridge along z.
 fn ridge(slope: f32) -> Particles {
     let mut water = lattice([0.0; 3], [20, 12, 20], [D; 3]);
     let under = |x: &[f32; 3]| x[1] < 1.2 - slope * (x[0] - 1.0).abs();
@@ -236,7 +241,8 @@ fn ridge(slope: f32) -> Particles {
     water
 }
 
-/// A crest of 90° is sharper than the 120° at which waves break (Stokes 1880), where the sum is 0.561; one of 150° is not.
+/// A crest of 90° is sharper than the 120° at which waves break (Stokes 1880), where the sum is
+/// 0.561; one of 150° is not.
 #[test]
 fn crests_that_move_outward_break() {
     let scene = support::scene([2.0, 2.0, 2.0]);
@@ -252,7 +258,8 @@ fn crests_that_move_outward_break() {
         assert!(sharp > least, "{sharp}");
         let blunt = at(device, ridge(0.268), [0.0, 2.0, 0.0], top);
         assert!(blunt < least, "{blunt}");
-        // Controls: a crest that sinks, one that slides along its own ridge, and a flat surface that rises.
+        // Controls: a crest that sinks, one that slides along its own ridge, and a flat surface
+        // that rises.
         assert_eq!(at(device, ridge(1.0), [0.0, -2.0, 0.0], top), 0.0);
         assert_eq!(at(device, ridge(1.0), [0.0, 0.0, 2.0], top), 0.0);
         let flat = lattice([0.0; 3], [20, 8, 20], [D; 3]);
@@ -261,8 +268,9 @@ fn crests_that_move_outward_break() {
     });
 }
 
-/// In the middle, beside a wall and in a corner the share is that of full water; in the last layer what a half space leaves. Walls
-/// that meet are a product of faces, within 1.5 % of the lattice's sums in a corner (domain::sph).
+/// In the bulk, beside a wall and in a corner the share is that of full water; in the last layer it
+/// is that of a half-space. Walls that meet multiply, within 1.5 % of the lattice's sums in a
+/// corner (domain::sph).
 #[test]
 fn shares_do_not_depend_on_walls() {
     let (mut scene, water) = pool(2.0, 0.0);

@@ -1,4 +1,4 @@
-//! Absorbing and generation zones: where they lead water, and what they leave alone.
+//! Absorbing and generation zones: how they drive water, and what they leave unaffected.
 
 use glam::DVec3;
 use swell::{
@@ -17,7 +17,7 @@ use crate::support::{
 
 const METHODS: [Method; 2] = [Method::Flip, Method::Pbf];
 
-/// Below, along y.
+/// The lower wall along y.
 const FLOOR: Wall = Wall {
     axis: 1,
     is_max: false,
@@ -36,7 +36,7 @@ fn zone(walls: &[Wall], length: f64, period: f64) -> Option<Settings> {
     })
 }
 
-/// Waves on the water of [`half_full`].
+/// Waves that travel on the water of [`half_full`].
 fn waves(walls: &[Wall], length: f64) -> Option<generation_zone::Settings> {
     Some(generation_zone::Settings {
         walls: walls.to_vec(),
@@ -51,7 +51,7 @@ fn waves(walls: &[Wall], length: f64) -> Option<generation_zone::Settings> {
     })
 }
 
-/// 16 × 8 × 8 cells of FLIP, twice as many spacings of PBF, and the water of its lower half.
+/// 16 × 8 × 8 cells of FLIP, or twice as many spacings of PBF, with water in the lower half.
 fn half_full(method: Method) -> (Scene, Particles) {
     let mut scene = of_flip::scene([16.0, 8.0, 8.0]);
     let pbf = scene.solver.pbf.as_mut().unwrap();
@@ -62,7 +62,7 @@ fn half_full(method: Method) -> (Scene, Particles) {
     (scene, of_flip::block([0; 3], [16, 4, 8]))
 }
 
-/// Mean of a velocity's component over each layer of cells.
+/// Mean of a velocity component in each layer of cells.
 fn layers(state: &Particles, axis: usize) -> [f64; 4] {
     let mut sums = [(0.0, 0.0); 4];
     for (x, v) in state.position.iter().zip(&state.velocity) {
@@ -73,10 +73,11 @@ fn layers(state: &Particles, axis: usize) -> [f64; 4] {
     sums.map(|(sum, count)| sum / count)
 }
 
-/// Of a flow along x in a box without ends there, nothing but the zone takes anything: a layer of particles at y is left with
-/// the part Π 1 / (1 + r(y) Δt) of its velocity. With FLIP a layer of cells is the mean over two of them, and α is 0, which
-/// would carry a layer's velocity to the next at α Δx² / (6 Δt); what a particle loses is its faces', in a field whose second
-/// difference is up to 0.01 m/s. With PBF each particle has its own place's.
+/// In a flow along x in a periodic box only the zone takes velocity: a layer of particles at y
+/// keeps the fraction Π 1 / (1 + r(y) Δt). With FLIP a layer of cells is the mean over two of them,
+/// and α is 0, because α would carry a layer's velocity to the next at α Δx² / (6 Δt); a particle
+/// loses what its faces lose, in a field whose second difference is up to 0.01 m/s. With PBF each
+/// particle has the rate at its own position.
 #[test]
 fn a_flow_dies_out_as_the_zone_says() {
     let context = context();
@@ -106,19 +107,19 @@ fn a_flow_dies_out_as_the_zone_says() {
                 assert!((found - expected).abs() < 0.01, "{found} {expected}");
             }
         }
-        // Negative control: of half the period, at twice the rate.
+        // Negative control: half the period, twice the rate.
         scene.effects.absorbing_zone = zone(&[FLOOR], 0.4, 4.0);
         let other = layers(&on_gpu(&context, &scene, &particles, frames as u32), 0);
         assert!((other[0] - expected[0]).abs() > 0.05, "{other:?}");
-        // And without the zone all of it stays.
+        // Without the zone the velocity stays.
         scene.effects.absorbing_zone = None;
         let plain = layers(&on_gpu(&context, &scene, &particles, frames as u32), 0);
         assert!(plain.iter().all(|v| (v - 0.5).abs() < 1e-5), "{plain:?}");
     }
 }
 
-/// A zone takes of what moves. Had it taken of what gravity adds in a step as well, more before the wall than elsewhere, the
-/// water would begin to turn.
+/// A zone damps existing motion. If it also damped what gravity adds in a step, more near the wall
+/// than elsewhere, the water would begin to circulate.
 #[test]
 fn water_at_rest_in_a_zone_stays_at_rest() {
     let context = context();
@@ -141,8 +142,8 @@ fn water_at_rest_in_a_zone_stays_at_rest() {
     }
 }
 
-/// A drop that flies over a zone falls as it does elsewhere: after n steps of g Δt, in f32. Where no grid tells PBF's drops from
-/// water they lose what water loses, which is the control.
+/// A drop that flies over a zone falls freely: after n steps of g Δt, in f32. Where no grid
+/// distinguishes PBF's drops from water, they are damped like water, which is the control.
 #[test]
 fn drops_over_a_zone_fall_freely() {
     let context = context();
@@ -188,8 +189,9 @@ fn drops_over_a_zone_fall_freely() {
     }
 }
 
-/// A place in the zone has the velocity of the waves there, from which it is off by what walls and the pressure do within a step:
-/// on the mean over the zone's half at the wall, where there is water all the time, by a third of the waves', which are seven cells long.
+/// Water in the zone has the velocity of the waves, up to what walls and the pressure do within a
+/// step. On average over the half of the zone at the wall, where there is always water, the error
+/// is a third of the waves' velocity; the waves are seven cells long.
 #[test]
 fn water_in_a_generation_zone_goes_as_the_waves_do() {
     let context = context();
@@ -221,13 +223,13 @@ fn water_in_a_generation_zone_goes_as_the_waves_do() {
             println!("{method:?}: {found}");
             assert!(found < 0.4, "{found}");
         }
-        // Negative control: the waves of a quarter of a period later.
+        // Negative control: the waves a quarter of a period later.
         let other = apart(&states[0], time + 0.225);
         assert!(other > 0.75, "{other}");
     }
 }
 
-/// One pass where a scene names it, and no buffer and no byte.
+/// The absorbing zone adds one pass and no byte; the generation zone adds one pass and its waves.
 #[test]
 fn a_scene_that_names_no_zone_pays_for_none() {
     let context = context();
@@ -256,7 +258,7 @@ fn a_scene_that_names_no_zone_pays_for_none() {
         scene.effects = Effects::default();
         scene.effects.generation_zone = waves(&[RIGHT], 0.3);
         let with = plan(&scene);
-        // A wave and its second harmonic, of 32 bytes each.
+        // A wave and its second harmonic, 32 bytes each.
         assert_eq!(with.bytes().0, bare.bytes().0 + 64);
         let expected = match method {
             Method::Flip => "effects/generate_faces",

@@ -1,4 +1,4 @@
-//! One Jacobi iteration of PBF, naive.
+//! A naive Jacobi iteration of PBF.
 
 use glam::DVec3;
 use swell::{
@@ -11,8 +11,8 @@ use swell::{
 
 use crate::support::D;
 
-/// One Jacobi iteration from rest without gravity, by O(n²) search in f64: the model's formulas once more,
-/// written from the paper and not from the shaders.
+/// One Jacobi iteration from rest without gravity, by an O(n²) search in f64. Written from the
+/// paper's formulas and not from the shaders.
 pub(super) struct Naive {
     pub(super) positions: Vec<DVec3>,
     pub(super) size: DVec3,
@@ -33,7 +33,7 @@ impl Naive {
         }
     }
 
-    /// Density that the walls add, and its gradient.
+    /// Relative density that the walls add at `x`, and its gradient, 1/m.
     pub(super) fn walls(&self, x: DVec3) -> (f64, DVec3) {
         let (h, scale) = (
             self.calibration.support_radius,

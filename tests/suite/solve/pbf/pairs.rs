@@ -1,4 +1,5 @@
-//! PBF where the answer is known: how many lists overflow, where particles on one spot go, and what Σ λ stands for.
+//! PBF where the result is known: how many lists overflow, how coincident particles separate, and
+//! which pressure Σ λ represents.
 
 use glam::{DVec3, Vec3};
 use swell::{
@@ -29,7 +30,7 @@ use crate::support::{
     D, context, device::spoiled, jitter, lattice, noise, run, scene as box_scene, solver,
 };
 
-/// One or more Jacobi iterations, without gravity.
+/// A scene without gravity that runs `iterations` Jacobi iterations.
 fn scene(size: [f64; 3], iterations: u32) -> Scene {
     let mut scene = box_scene(size);
     scene.water.gravity = DVec3::ZERO;
@@ -43,14 +44,15 @@ fn place(particles: &Particles, k: usize) -> DVec3 {
     Vec3::from_array(particles.position[k]).as_dvec3()
 }
 
-/// A cloud far too dense, counted pair by pair: particles that have more neighbours than a list holds, who are less than 258
-/// steps of h/256 away, each place rounded down to a step (shared/place.wgsl).
+/// Counts overflowing lists pair by pair, for a cloud that is far too dense. Neighbours are
+/// particles less than 258 steps of h/256 apart, each position rounded down to a step
+/// (shared/place.wgsl).
 #[test]
 fn lists_that_overflow_are_counted() {
     let scene = scene([1.4; 3], 1);
     let mut particles = Particles::default();
     for k in 0..500u64 {
-        // Denser towards one side, so that some have too many and some have not.
+        // Denser towards one side, so that only some lists overflow.
         let part = |c: u64| 0.5 + 0.5 * noise(300 + 3 * k + c);
         let x = DVec3::new(part(0).powi(2), part(1), part(2)) * 0.7 + 0.3;
         particles.position.push(x.as_vec3().to_array());
@@ -80,10 +82,10 @@ fn lists_that_overflow_are_counted() {
     println!("{} of {} have no list", report.searched, particles.len());
     assert_eq!((report.substeps, report.searched), (1, over(LIST_CAPACITY)));
     assert!((50..450).contains(&report.searched), "{}", report.searched);
-    // Negative control: one neighbour more or less is another count.
+    // Negative control: a capacity one larger or smaller gives another count.
     assert!(over(LIST_CAPACITY - 1) > report.searched && over(LIST_CAPACITY + 1) < report.searched);
 
-    // A lattice at rest has none, and a frame counts its own alone.
+    // A lattice at rest has no overflow, and a frame counts only its own.
     let calm = lattice([0.3; 3], [6; 3], [D; 3]);
     assert_eq!(run(&context, &scene, &calm, 1).1.searched, 0);
     let mut again = solver(&context, &scene, &particles, &Boundary::default());
@@ -95,8 +97,8 @@ fn lists_that_overflow_are_counted() {
     );
 }
 
-/// Blobs of lattice, and on the middle of each a second particle: by the lattice's symmetry nothing but the other one moves
-/// either of them.
+/// Blobs of lattice with a second particle on the middle of each: by symmetry of the lattice, only
+/// the two coincident particles push each other.
 fn doubled(blobs: usize) -> Particles {
     let mut particles = Particles::default();
     for k in 0..blobs {
@@ -110,8 +112,9 @@ fn doubled(blobs: usize) -> Particles {
     particles
 }
 
-/// How far each is pushed: 2 λ ∇W as r → 0, that is 2 |λ| times the slope there, λ = −C / (Σ|∇C|² + ε) of two in the middle
-/// of a lattice, where the gradient along the particle's own way is 0.
+/// Displacement of each of the two: 2 λ ∇W as r → 0, that is 2 |λ| times the slope there, with λ =
+/// −C / (Σ|∇C|² + ε) of two particles in the middle of a lattice, where the gradient along the
+/// particle's own displacement is 0. Metres.
 fn push_length() -> f64 {
     let calibration = Calibration::new(D, 2.0);
     let (mut kernel, mut squares) = (2.0, 1.0);
@@ -129,7 +132,8 @@ fn push_length() -> f64 {
     2.0 * slope * excess / (slope * slope * squares + epsilon)
 }
 
-/// What one iteration moves both particles of each blob by, on the GPU and by the reference.
+/// Displacement of the two coincident particles of each blob in one iteration, on the GPU and with
+/// the reference.
 fn pushes(context: &Context, particles: &Particles, blobs: usize) -> [Vec<[DVec3; 2]>; 2] {
     let scene = scene([4.0, 3.0, 3.0], 1);
     let mut cpu = reference::pbf::Pbf::new(&scene, &Boundary::default());
@@ -146,9 +150,10 @@ fn pushes(context: &Context, particles: &Particles, blobs: usize) -> [Vec<[DVec3
     })
 }
 
-/// Two on one spot part along a direction of their own, one against the other, as far as λ says. λ has the density's 40 ε over
-/// an excess of a seventh, places of 3 m round by 1e-7 beside pushes of 0.03: 280 ε and 1.4e-5, together below 1e-4. Where the
-/// device parts from the reference, and two particles from each other, one iteration's tolerance holds.
+/// Two coincident particles separate along a direction of their own, opposite to each other, as far
+/// as λ says. λ has the density's 40 ε over an excess of a seventh, and positions of 3 m round by
+/// 1e-7 beside pushes of 0.03: 280 ε and 1.4e-5, together below 1e-4. The tolerance of one
+/// iteration applies to differences between device and reference, and to the sum of the two pushes.
 #[test]
 fn two_on_one_spot_part_as_far_as_lambda_says() {
     const BLOBS: usize = 12;
@@ -167,7 +172,7 @@ fn two_on_one_spot_part_as_far_as_lambda_says() {
     }
     println!("{length} m within {worst:.1e}");
     assert!(worst < 1e-4, "{worst:e}");
-    // The same on both sides, and every time.
+    // The same on the device and with the reference, and in every run.
     let parted = |a: &[[DVec3; 2]], b: &[[DVec3; 2]]| {
         let gaps = a.iter().zip(b).map(|(a, b)| a[0].distance(b[0]));
         gaps.fold(0.0, f64::max)
@@ -176,14 +181,16 @@ fn two_on_one_spot_part_as_far_as_lambda_says() {
     assert!(gap < ONE_ITERATION_TOLERANCE, "{gap:e}");
     assert_eq!(pushes(&context, &particles, BLOBS)[0], found[0]);
     let ways: Vec<DVec3> = found[1].iter().map(|push| push[0].normalize()).collect();
-    // Each pair its own way: twelve at random lie this close together once in a thousand times.
+    // Each pair has its own direction: of twelve random ones, two are this close once in a thousand
+    // cases.
     for (k, a) in ways.iter().enumerate() {
         assert!(ways[..k].iter().all(|b| a.distance(*b) > 0.01), "{ways:?}");
     }
     let middle = ways.iter().sum::<DVec3>() / BLOBS as f64;
     assert!(middle.length() < 0.7, "{middle}");
 
-    // Negative controls: none, one that is 1 % too long, one that is the same for both, and another direction.
+    // Negative controls: no push, one that is 1 % too long, one that is the same for both, and
+    // another direction.
     for (from, to) in [
         (
             "delta += pair_direction(i, coincident) * 2.0",
@@ -209,7 +216,8 @@ fn two_on_one_spot_part_as_far_as_lambda_says() {
     }
 }
 
-/// A block in free space that is too dense by a tenth. Its neighbours stay who they are: the next ones are 0.12 d beyond h.
+/// A block in free space that is too dense by a tenth. The set of neighbours does not change: the
+/// next ones are 0.12 d beyond h.
 fn pressed(iterations: u32) -> (Scene, Particles) {
     let mut scene = scene([2.0; 3], iterations);
     scene.probes.push(Probe {
@@ -223,8 +231,8 @@ fn pressed(iterations: u32) -> (Scene, Particles) {
     (scene, particles)
 }
 
-/// Σ λ of two iterations, pair by pair in f64, against both solvers'. λ carries 25 · 40 ε (see `ONE_ITERATION_TOLERANCE`) an
-/// iteration; the sums, of one sign, no more.
+/// Compares Σ λ of two iterations, computed pair by pair in f64, with both solvers'. λ has an error
+/// of 25 · 40 ε (see `ONE_ITERATION_TOLERANCE`) per iteration; the sums, of one sign, add none.
 #[test]
 fn lambda_is_summed_over_the_corrections() {
     const ITERATIONS: u32 = 2;
@@ -273,12 +281,13 @@ fn lambda_is_summed_over_the_corrections() {
         gap(&of_reference, 1.0)
     );
     assert!(gap(&of_gpu, 1.0) < tolerance);
-    // Positions begin as f32 on either side: only sums in another order.
+    // Positions begin as f32 on either side; only the order of the sums differs.
     assert!(gap(&of_reference, 1.0) < 1e-10);
     // Negative control: sums 1 % off.
     assert!(gap(&of_gpu, 1.01) > 2.0 * tolerance);
 
-    // And pressures follow by ρ κ / Δt², κ by its definition (`a_linear_pressure_pushes_by_its_gradient`).
+    // Pressures follow by ρ κ / Δt², with κ by its definition
+    // (`a_linear_pressure_pushes_by_its_gradient`).
     let scale = -1000.0 * naive.calibration.linear_gradient / (0.01 * 0.01);
     let h = naive.calibration.support_radius;
     let mut cpu = reference::pbf::Pbf::new(&scene, &Boundary::default());
@@ -298,8 +307,8 @@ fn lambda_is_summed_over_the_corrections() {
     }
 }
 
-/// p of Σ λ by its scale: where Σ λ rises linearly along an axis of the bulk lattice, the corrections are what the gradient of p
-/// makes of water in Δt², −∇p Δt² / ρ.
+/// The scale from Σ λ to p: where Σ λ rises linearly along an axis of the bulk lattice, the
+/// corrections equal the displacement by the gradient of p over Δt², −∇p Δt² / ρ.
 #[test]
 fn a_linear_pressure_pushes_by_its_gradient() {
     let naive = Naive::new(&scene([1.0; 3], 1), &lattice([0.0; 3], [9; 3], [D; 3]));
@@ -313,9 +322,10 @@ fn a_linear_pressure_pushes_by_its_gradient() {
     let gradient = DVec3::Y * scale * -1e-4;
     let pushed = -gradient * step * step / density;
     let gap = correction.distance(pushed) / pushed.length();
-    // Positions are f32, 3e-8 of 0.1, and λ at the middle is eight times what it rises by in a spacing.
+    // Positions are f32, 3e-8 of 0.1, and λ at the middle is eight times its increase over a
+    // spacing.
     assert!(gap < 1e-5, "{correction} {pushed}");
-    // A correction that is relaxed stands for as much less.
+    // A relaxed correction represents a pressure that is smaller by the relaxation factor.
     let relaxed = naive.calibration.pressure_scale(density, 0.7, step);
     assert!((relaxed / scale - 0.7).abs() < 1e-12);
 }

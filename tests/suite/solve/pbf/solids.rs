@@ -1,4 +1,4 @@
-//! PBF's water against solids that stand and walls that move.
+//! PBF with solids at rest and moving walls.
 
 use glam::DVec3;
 use swell::{
@@ -51,8 +51,8 @@ fn solids_hold_water_off() {
         worst = worst.max(depth(&with.advance().unwrap().0));
         control = control.max(depth(&without.advance().unwrap().0));
     }
-    // Trilinear distances cut edges and corners by at most (1 − 1/√3) of a node spacing less the contact
-    // distance: 0.42 d − 0.25 d.
+    // Trilinear distances cut edges and corners by at most (1 − 1/√3) of a node spacing, minus the
+    // contact distance: 0.42 d − 0.25 d.
     assert!(worst < 0.17 * D, "{worst}");
     assert!(control > D, "water came nowhere near: {control}");
 }

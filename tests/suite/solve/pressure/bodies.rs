@@ -1,5 +1,5 @@
-//! Bodies of water that no air touches, against a flood fill over the open faces: what label_cells finds within blocks,
-//! merge_labels across them, and count_pockets at the end.
+//! Bodies of water that touch no air, compared with a flood fill over the open faces: label_cells
+//! finds them within blocks, merge_labels joins them across blocks, and count_pockets counts them.
 
 use swell::{
     domain::poisson::{
@@ -14,11 +14,11 @@ use swell::{
 use crate::support::context;
 use crate::support::pressure::{Rig, settings};
 
-/// Cells of a box by their coordinates, x fastest.
+/// Cells of a box, indexed with x fastest.
 struct Grid {
     dims: [u32; 3],
     is_air: Vec<bool>,
-    /// Of the lower faces: whether water gets through.
+    /// Whether water passes through the lower faces.
     is_open: Vec<[bool; 3]>,
 }
 
@@ -71,7 +71,7 @@ impl Grid {
         found
     }
 
-    /// Bodies of water that no air touches and that have a face at all, by flood fill.
+    /// Bodies of water without contact to air and with at least one open face, by flood fill.
     fn bodies(&self) -> Vec<Vec<usize>> {
         let mut is_seen = self.is_air.clone();
         let mut bodies = Vec::new();
@@ -114,8 +114,9 @@ impl Grid {
         }
     }
 
-    /// Cells whose label is not that of the flood fill, bodies that the device counted, and those that there are. A
-    /// label is the least place of its body in the device's order, and 0 where air touches it or no face is open.
+    /// Returns the number of cells whose label differs from the flood fill's, the number of bodies
+    /// that the device counted, and the true number. A label is the least index of its body in the
+    /// device's order, and 0 where the body touches air or no face is open.
     fn compare(&self, context: &Context) -> (usize, u32, usize) {
         let mut rig = Rig::new(
             context,
@@ -139,15 +140,15 @@ impl Grid {
                 expected[index] = least as u32;
             }
         }
-        // Cells of air have no row, nor a label of their own.
+        // Cells of air have no row and no label.
         let is_wrong = |&index: &usize| labels[place(index)] != expected[index];
         let wrong = (0..expected.len()).filter(is_wrong).count();
         (wrong, counted, bodies.len())
     }
 }
 
-/// All ways in which the twelve faces within a block of 2³ cells may be open, a block each with no way out; and all again
-/// with air in the last cell.
+/// Every combination of open faces among the twelve faces within a block of 2³ cells, one isolated
+/// block each; and all of them again with air in the last cell.
 fn every_block() -> Grid {
     let mut grid = Grid::new([64, 32, 32]);
     let inner: Vec<[[u32; 3]; 2]> = (0..3)
@@ -173,8 +174,8 @@ fn every_block() -> Grid {
     grid
 }
 
-/// One way through all cells of a box, to and fro along x, y and z, cut after `piece(n)` cells for the n-th time; air in the
-/// very last cell.
+/// A path through all cells of a box, back and forth along x, y and z, cut into pieces of
+/// `piece(n)` cells, with air in the very last cell.
 fn snake(dims: [u32; 3], piece: impl Fn(usize) -> usize) -> Grid {
     let mut grid = Grid::new(dims);
     let mut way = Vec::new();
@@ -205,10 +206,11 @@ fn snake(dims: [u32; 3], piece: impl Fn(usize) -> usize) -> Grid {
 
 fn snakes() -> [Grid; 3] {
     [
-        // One body to the last piece, of 4 cells, which has air at its end; and one with air at the end of all.
+        // One body up to the last piece of 4 cells, which ends in air; and a single piece that ends
+        // in air.
         snake([24, 24, 24], |n| if n == 0 { 24 * 24 * 24 - 4 } else { 4 }),
         snake([24, 24, 24], |_| 24 * 24 * 24),
-        // Pieces of 2 to 400 cells, in a box that is no multiple of a brick.
+        // Pieces of 2 to 400 cells, in a box that is not a multiple of a brick.
         snake([21, 18, 26], |n| 2 + 37 * n * n % 399),
     ]
 }
@@ -219,7 +221,7 @@ fn bodies_within_blocks_are_those_of_a_flood_fill() {
     println!("{counted} bodies of {bodies}");
     assert!(bodies > 4096, "{bodies}");
     assert_eq!((wrong, counted), (0, bodies as u32));
-    // Negative control: one round in place of seven leaves bodies in parts.
+    // Negative control: one round instead of seven leaves bodies in parts.
     let mut spoiled = context();
     spoiled.spoil = Some(Spoil {
         pass: "pressure/label_cells",
@@ -238,7 +240,7 @@ fn bodies_that_wind_through_blocks_are_those_of_a_flood_fill() {
         assert!(bodies >= least, "{bodies}");
         assert_eq!((wrong, counted), (0, bodies as u32));
     }
-    // Negative control: unions across a block's faces along z are left out.
+    // Negative control: without unions across a block's faces along z.
     let mut spoiled = context.clone();
     spoiled.spoil = Some(Spoil {
         pass: "pressure/merge_labels",

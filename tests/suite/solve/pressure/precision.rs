@@ -1,4 +1,4 @@
-//! The projection in one word of f32, in two, and in f64.
+//! The projection with one f32 word, with two, and in f64.
 
 use swell::{
     domain::poisson::{
@@ -32,8 +32,8 @@ fn in_precision(precision: Precision, tolerance: f64) -> Pressure {
     }
 }
 
-/// One word stalls, two words go past that, f64 goes to where a direct solution is: at each of the three the reported
-/// residual is that of the downloaded solution in the f64 system.
+/// One word stalls, two words get further, and f64 reaches the accuracy of a direct solution. In
+/// all three the reported residual is that of the downloaded solution in the f64 system.
 #[test]
 fn each_precision_stalls_where_it_has_to() {
     let context = Context::open_for(None, Needs { f64: true })
@@ -51,7 +51,8 @@ fn each_precision_stalls_where_it_has_to() {
     let (known, _, exact, rig) = solve_in(Precision::F64, 1e-12);
     assert!(!known.is_missed, "{known:?}");
     let stall = 12.0 * norm(&exact) / norm(&b) / f64::from(1 << 24);
-    // The device's rows are those of the f64 builder to the f64 rounding of θ and of sums of six.
+    // The device's rows equal those of the f64 builder up to the f64 rounding of θ and of sums of
+    // six.
     let (found, truth, _, _) = solve_in(Precision::F64, 1e-10);
     assert!(!found.is_missed && truth <= 1.1e-10, "{truth:e} {found:?}");
     let direct = solve(&rig.system, &b, Precondition::Ipp, 1e-12, 2000);
@@ -70,14 +71,15 @@ fn each_precision_stalls_where_it_has_to() {
         "{plain:?} {plain_truth:e}"
     );
     let (refined, refined_truth, _, _) = solve_in(Precision::F32Refined, 1e-9);
-    // Two words hold x to ε², but the residual is a sum of f32 fluxes, rounded at ε of ‖b‖ a few times over.
+    // Two words hold x to ε², but the residual is a sum of f32 fluxes, rounded at ε of ‖b‖ a few
+    // times.
     assert!(
         refined.is_missed && refined_truth < 0.1 * plain_truth && refined_truth > 1e-9,
         "{refined:?} {refined_truth:e} {plain_truth:e}"
     );
 }
 
-/// Pockets, and the correction on the same system, in f64.
+/// Pockets, and the density correction on the same system, in f64.
 #[test]
 fn f64_takes_pockets_and_corrections() {
     let context = Context::open_for(None, Needs { f64: true })
@@ -114,7 +116,8 @@ fn f64_takes_pockets_and_corrections() {
     }
 }
 
-/// What a precision does not use has no bytes, and no device is asked for f64 but by `f64`.
+/// Buffers that a precision does not use take no bytes, and only `f64` requires 64-bit floats of
+/// the device.
 #[test]
 fn a_precision_takes_its_own_bytes_and_features() {
     let slots = 10;
@@ -132,7 +135,7 @@ fn a_precision_takes_its_own_bytes_and_features() {
     assert_eq!((refined.0, refined.1), (2 * cells, cells));
     assert_eq!((double.0, double.1), (2 * cells, 2 * cells));
     assert_eq!(refined.2 - plain.2, cells);
-    // Six vectors and the rows' share of air, the sums, and five scalars.
+    // Six vectors and the Dirichlet part of the rows, the sums, and five scalars.
     assert_eq!(
         double.2 - plain.2,
         7 * cells + 4 * (slots as u64 + 1024) + 20
@@ -153,6 +156,6 @@ fn a_precision_takes_its_own_bytes_and_features() {
     );
     let error = error.unwrap_err();
     assert!(matches!(error, GpuError::NoF64 { .. }), "{error:?}");
-    // What the commands end with 2 for.
+    // The commands' exit code 2.
     assert_eq!(Blame::from(&error), Blame::Input);
 }

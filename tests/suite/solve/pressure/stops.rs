@@ -1,4 +1,5 @@
-//! When a solve stops: at the first iteration whose true residual is within the tolerance, and at the last that is allowed.
+//! When a solve stops: at the first iteration whose true residual is within the tolerance, or at
+//! the iteration limit.
 
 use swell::{
     domain::poisson::cases::{Surface, tank, tank_rhs},
@@ -9,20 +10,23 @@ use swell::{
 use crate::support::context;
 use crate::support::pressure::{Rig, settings};
 
-/// Parts by which the tolerance is put above and below a residual. On the device that leaves the recursion's residual
-/// 3e-7 ‖b‖ to part from the true one where that is 1e-4, some rounding errors of 6e-8 an iteration.
+/// Relative distance of the tolerances above and below a residual. On the device, the residual of
+/// the recursion may differ from the true one by 3e-7 ‖b‖ where that is 1e-4: some rounding errors
+/// of 6e-8 per iteration.
 const DEVICE: f64 = 0.003;
 const REFERENCE: f64 = 1e-9;
 
-/// What asks for a solve: tolerance and most iterations; answers iterations, whether it missed, and the true residual.
+/// Runs a solve with a tolerance and an iteration limit; returns its iterations, whether it missed
+/// the tolerance, and the true residual.
 type Ask<'a> = dyn FnMut(f64, u32) -> (u32, Option<bool>, f64) + 'a;
 
-/// Holds every iteration whose residual is the least so far, and not below 1e-4, to the rule; returns how many.
+/// Checks the rule at every iteration whose residual is the least so far and not below 1e-4;
+/// returns how many were checked.
 fn hold(ask: &mut Ask<'_>, most: u32, part: f64) -> u32 {
     let mut least = 1.0;
     let mut held = 0;
     for count in 1..=most {
-        // No tolerance: it ends where it has to.
+        // An unreachable tolerance: the solve stops at its limit.
         let (iterations, is_missed, here) = ask(1e-12, count);
         assert_eq!(iterations, count);
         assert!(is_missed != Some(false), "{count}");
@@ -36,7 +40,7 @@ fn hold(ask: &mut Ask<'_>, most: u32, part: f64) -> u32 {
         let (stopped, is_missed, left) = ask((1.0 + part) * here, most);
         assert_eq!(stopped, count, "{here:e}");
         assert!(is_missed != Some(true) && left <= (1.0 + part) * here);
-        // As near as that below it the end is a miss, where it has to come.
+        // With a tolerance just below that, a solve that has to end here misses it.
         let (_, is_missed, _) = ask((1.0 - part) * here, count);
         assert!(is_missed != Some(false), "{here:e}");
         let (stopped, is_missed, left) = ask((1.0 - part) * here, 4 * most);
@@ -77,7 +81,7 @@ fn a_solve_stops_at_its_tolerance_and_at_its_last_iteration() {
     }
 }
 
-/// The reference's gradients likewise; they say no more than what is left.
+/// The same for the reference's conjugate gradients, which report only the residual.
 #[test]
 fn the_references_gradients_stop_likewise() {
     let system = tank(16, Surface::GhostFluid, true).system();
