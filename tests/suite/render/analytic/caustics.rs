@@ -1,4 +1,5 @@
-//! Sunlight that waves bend onto the floor: a flat pool, a corrugated one against Snell's law in f64, one at rest, shadows.
+//! Sunlight that waves focus on the floor: a flat pool, a corrugated pool compared with Snell's law
+//! in f64, a pool at rest, and shadows.
 
 use glam::{DVec2, DVec3};
 use swell::domain::bounds::Bounds;
@@ -12,13 +13,13 @@ use super::geometry::box_mesh;
 use super::rays::{INDEX, LEVEL, pool_scene, reflectance, refracted, water};
 use super::support::{Eye, Setup, context, draw, scene, spoiled};
 
-/// Of particles, metres.
+/// Spacing of particles, m.
 const SPACING: f64 = 0.125;
-/// Of the tank, metres: long, deep and narrow.
+/// Size of the tank, m: long, deep and narrow.
 const TANK: DVec3 = DVec3::new(8.0, 5.0, 0.75);
-/// Still water, metres.
+/// Depth of still water, m.
 const DEPTH: f64 = 4.0;
-/// Of the waves in it, metres: eight particles, which a level set of them holds.
+/// Wavelength in the tank, m: eight particles, which the level set resolves.
 const WAVELENGTH: f64 = 1.0;
 const NUMBER: f64 = std::f64::consts::TAU / WAVELENGTH;
 
@@ -33,7 +34,7 @@ fn tank() -> RenderScene {
     }
 }
 
-/// Water up to [`DEPTH`] in a box of this size, whose columns are longer by `wave` metres at their x.
+/// Water up to `depth` in a box of this size, with particles displaced by `wave`, in m.
 fn filled(size: DVec3, depth: f64, spacing: f64, wave: &dyn Fn(DVec3) -> DVec3) -> Particles {
     let [nx, ny, nz] = [size.x, depth, size.z].map(|length| (length / spacing).round() as usize);
     let mut particles = Particles::default();
@@ -48,7 +49,7 @@ fn filled(size: DVec3, depth: f64, spacing: f64, wave: &dyn Fn(DVec3) -> DVec3) 
     particles
 }
 
-/// A tank whose surface stands at `DEPTH + amplitude * cos(NUMBER * x)`.
+/// A tank whose surface is at `DEPTH + amplitude * cos(NUMBER * x)`.
 fn corrugated(amplitude: f64) -> Particles {
     filled(TANK, DEPTH, SPACING, &|at| {
         DVec3::Y * (amplitude * (NUMBER * at.x).cos() * at.y / DEPTH)
@@ -59,7 +60,7 @@ fn black_sky(_: DVec3, _: DVec2) -> [f64; 3] {
     [0.0; 3]
 }
 
-/// An eye under water that looks straight down onto the floor below it.
+/// An eye under water that looks straight down at the floor.
 fn diver(at: DVec3, focal: f64) -> Eye {
     Eye {
         up: DVec3::Z,
@@ -67,7 +68,8 @@ fn diver(at: DVec3, focal: f64) -> Eye {
     }
 }
 
-/// Light on the floor under each pixel over that without caustics; `sun` is its azimuth and elevation, degrees.
+/// Light on the floor under each pixel relative to that without caustics; `sun` is its azimuth and
+/// elevation, degrees.
 fn light(
     context: &Context,
     eye: Eye,
@@ -79,7 +81,7 @@ fn light(
     light_beside(context, eye, sun, [caustics, ""], scene, water)
 }
 
-/// The same with tables beside those of the water.
+/// Like [`light`], with further tables of the look.
 fn light_beside(
     context: &Context,
     eye: Eye,
@@ -102,7 +104,7 @@ fn light_beside(
     };
     let (with, without) = (
         picture(context, &format!("caustics = {{ {caustics} }}\n")),
-        // What a fault is put into is seen beside a picture without it.
+        // A fault is compared with a picture without it.
         picture(&super::context(), ""),
     );
     let pairs = with.iter().zip(&without);
@@ -125,7 +127,7 @@ fn mean_root(squares: &[f64]) -> f64 {
     mean(squares).sqrt()
 }
 
-/// Mean light of columns of pixels `from..to`, of the middle rows, from bin to bin of `width` columns.
+/// Mean light of the `rows` middle rows of pixels, in bins of `width` columns.
 fn bins(light: &[f64], side: usize, rows: usize, width: usize) -> Vec<f64> {
     let first = (side - rows) / 2;
     (0..side / width)
@@ -140,8 +142,9 @@ fn bins(light: &[f64], side: usize, rows: usize, width: usize) -> Vec<f64> {
         .collect()
 }
 
-/// The same from Snell's and Fresnel's laws: light that lands between places x on the floor, of rays through a surface
-/// `DEPTH + amplitude * cos(NUMBER * x)` whose normals are those of `slope` times as high waves.
+/// The same from Snell's and Fresnel's laws: light that lands between the positions `edges` on the
+/// floor, of rays through a surface `DEPTH + amplitude * cos(NUMBER * x)` whose normals are those
+/// of waves `slope` times as high.
 fn bins_by_snell(edges: &[f64], elevation: f64, amplitude: f64, slope: f64) -> Vec<f64> {
     const RAYS: usize = 400_000;
     let (sin, cos) = elevation.to_radians().sin_cos();
@@ -157,7 +160,7 @@ fn bins_by_snell(edges: &[f64], elevation: f64, amplitude: f64, slope: f64) -> V
         let inside = (1.0 - (1.0 - cosine * cosine) / (INDEX * INDEX)).sqrt();
         let bent = -sun / INDEX + normal * (cosine / INDEX - inside);
         let lands = x + bent.x / -bent.y * height;
-        // A ray's part of the beam is that of the surface which stands there.
+        // A ray's share of the beam follows from the actual slope of the surface.
         let real = -amplitude * NUMBER * (NUMBER * x).sin();
         let part = (sun.y - sun.x * real) * (1.0 - reflectance(cosine, INDEX));
         let bin = edges.partition_point(|edge| *edge <= lands);
@@ -169,12 +172,14 @@ fn bins_by_snell(edges: &[f64], elevation: f64, amplitude: f64, slope: f64) -> V
     sums.iter().map(|sum| sum / flat).collect()
 }
 
-/// Waves of a strength: where it is 1 crests focus an overhead sun on the floor, 1 / ((1 − 1/n) a k²) below them.
+/// Amplitude of waves of a given strength, m. At strength 1, 1 / ((1 − 1/n) a k²) equals the depth:
+/// crests focus an overhead sun on the floor below them.
 fn amplitude(strength: f64) -> f64 {
     strength / ((1.0 - 1.0 / INDEX) * NUMBER * NUMBER * DEPTH)
 }
 
-/// Amplitudes of the surface as it is drawn, metres: by the heights at which rays from above meet it, and by its normals.
+/// Amplitudes of the surface as it is rendered, m: from the heights at which rays from above meet
+/// it, and from its normals.
 fn drawn_amplitudes(water: &Particles) -> [f64; 2] {
     let eye = Eye {
         size: 96,
@@ -202,7 +207,7 @@ fn drawn_amplitudes(water: &Particles) -> [f64; 2] {
     ]
 }
 
-/// The factor on `waves` by which they are nearest to `values`, but for a constant.
+/// Factor by which `waves` fit `values` best, up to a constant.
 fn fitted(values: impl Iterator<Item = f64>, waves: impl Iterator<Item = f64>) -> f64 {
     let (values, waves): (Vec<f64>, Vec<f64>) = values.zip(waves).unzip();
     let (value, wave) = (mean(&values), mean(&waves));
@@ -216,18 +221,20 @@ fn fitted(values: impl Iterator<Item = f64>, waves: impl Iterator<Item = f64>) -
     across / along
 }
 
-/// Pixels along the side of a picture of the floor, and columns of a bin.
+/// Pixels along the side of a picture of the floor, and columns in a bin.
 const SIDE: u32 = 96;
 const BIN: usize = 4;
-/// Texels along the tank: one for each pixel, so that what a pixel misses between texels is no part of a comparison.
+/// Texels along the tank: one for each pixel, so that texels between pixels do not affect a
+/// comparison.
 const RESOLUTION: u32 = 256;
-/// Width with which normals are smoothed, metres: half a particle spacing.
+/// Width of the smoothing of normals, m: half a particle spacing.
 const WIDTH: f64 = 0.0625;
 
-/// Light on the floor in bins of columns under waves of a strength, and what the laws say of it.
+/// Light on the floor in bins of columns under waves of a strength, as rendered and by Snell's law.
 fn under_waves(context: &Context, elevation: f64, strength: f64) -> [Vec<f64>; 2] {
     let water = corrugated(amplitude(strength));
-    // Light of a sun at 45° comes 2.5 m from the side: floor that it reaches from the tank's own surface.
+    // Light of a sun at 45° arrives from 2.5 m to the side: looks at floor that it reaches through
+    // the tank's own surface.
     let middle = if elevation < 90.0 { 3.0 } else { 4.0 };
     let eye = Eye {
         size: SIDE,
@@ -241,7 +248,7 @@ fn under_waves(context: &Context, elevation: f64, strength: f64) -> [Vec<f64>; 2
     let edges: Vec<f64> = (0..=count)
         .map(|k| middle + 3.0 * (k as f64 / count as f64 - 0.5))
         .collect();
-    // A Gaussian leaves so much of a wave.
+    // Factor by which the Gaussian reduces a wave.
     let kept = (-0.5 * (NUMBER * WIDTH).powi(2)).exp();
     let [height, slope] = drawn_amplitudes(&water);
     let mut wanted = bins_by_snell(&edges, elevation, height, kept * slope / height);
@@ -249,7 +256,8 @@ fn under_waves(context: &Context, elevation: f64, strength: f64) -> [Vec<f64>; 2
     [found, wanted]
 }
 
-/// Of the light under a still pool, seen from the air: how far it is from that without caustics, over what it may be.
+/// Error of the light under a still pool, seen from the air, relative to that without caustics; in
+/// units of its tolerance.
 fn flat_error(context: &Context, elevation: f64, more: &str) -> f64 {
     let target = DVec3::new(4.0, LEVEL, 5.0);
     let eye = Eye::new(
@@ -269,12 +277,13 @@ fn flat_error(context: &Context, elevation: f64, more: &str) -> f64 {
     ((mean(&light) - 1.0).abs() / MEAN).max(grain / GRAIN)
 }
 
-/// What the mean of light under still water may be off, and what of it may be grain: a lattice of particles is level to a thousandth
-/// of a spacing, and over eight of them and a flat view its bumps bundle a part of a hundred.
+/// Tolerances of the mean light under still water and of its grain. A lattice of particles is level
+/// to a thousandth of a spacing; over eight of them and at a grazing view its bumps focus about one
+/// percent of the light.
 const MEAN: f64 = 0.01;
 const GRAIN: f64 = 0.015;
 
-/// Whichever way the light comes, and where a sea without waves goes on beyond the box.
+/// For several elevations of the sun, and with a still sea around the box.
 #[test]
 fn still_water_has_the_light_that_it_has_without_caustics() {
     const SEA: &str = "[sea]\nlevel_m = 2.0\nband_m = 3.0\n";
@@ -304,7 +313,7 @@ fn still_water_has_the_light_that_it_has_without_caustics() {
     }
 }
 
-/// Of light in bins: the worst difference from that of Snell's law, over what is allowed there.
+/// Largest difference of the binned light from Snell's law, in units of its tolerance.
 fn worst(elevation: f64, strength: f64, context: &Context) -> f64 {
     let [found, wanted] = under_waves(context, elevation, strength);
     let last = found.len() - 1;
@@ -316,13 +325,16 @@ fn worst(elevation: f64, strength: f64, context: &Context) -> f64 {
     (1..last).map(off).fold(0.0, f64::max)
 }
 
-/// The surface of a lattice of particles is no pure wave: what its other harmonics do to the light.
+/// The surface of a lattice of particles is not a pure wave: effect of its other harmonics on the
+/// light.
 const BASE: f64 = 0.04;
-/// The map spreads light over two tents of texels, and the eye reads it over another: their variance is 1/6 + 1/6 + 1/12, and a step
-/// between bins of four texels leaks σ / √2π of its height over four into the next.
+/// The map spreads light over two tents of texels, and the eye reads it over another: their
+/// variance is 1/6 + 1/6 + 1/12, and a step between bins of four texels leaks σ / √2π of its height
+/// over four into the next.
 const LEAK: f64 = 0.065;
 
-/// Bins of the floor under waves that bundle light above it, on it and below it, and under a sun at 45°.
+/// Bins of the floor under waves that focus light above it, on it and below it, and under a sun at
+/// 45°.
 #[test]
 fn waves_bundle_light_as_snells_law_says() {
     for (elevation, strength) in [(90.0, 0.5), (90.0, 1.0), (90.0, 2.0), (45.0, 0.3)] {
@@ -347,7 +359,8 @@ fn waves_bundle_light_as_snells_law_says() {
     }
 }
 
-/// Mean light on the floor over what came in, under steep waves and in a map so coarse that rays land far apart.
+/// Error of the mean light on the floor relative to the incoming light, under steep waves and with
+/// a map so coarse that rays land far apart.
 fn energy_error(context: &Context) -> f64 {
     const STRENGTH: f64 = 4.0;
     let eye = Eye {
@@ -357,14 +370,15 @@ fn energy_error(context: &Context) -> f64 {
     let water = corrugated(amplitude(STRENGTH));
     let caustics = "resolution = 64, smoothing_width_m = 0.0625";
     let found = light(context, eye, [0.0, 90.0], caustics, &tank(), &water);
-    // Three waves, and the tank's width, but for its sides, where a map of 0.125 m reads what lies beyond them.
+    // Three waves, and the tank's width without its sides, where a map with texels of 0.125 m reads
+    // values from beyond them.
     let found = mean(&bins(&found, SIDE as usize, 12, BIN));
     let [height, slope] = drawn_amplitudes(&water);
     let wanted = bins_by_snell(&[2.5, 5.5], 90.0, height, slope / height)[0];
     (found / wanted - 1.0).abs()
 }
 
-/// Within 1 %.
+/// Energy is conserved within 1 %.
 #[test]
 fn what_comes_in_lands() {
     let error = energy_error(&context());
@@ -374,7 +388,8 @@ fn what_comes_in_lands() {
     assert!(control > 0.01, "{control}");
 }
 
-/// Brightness of the floor from a plate's shadow into the light, over that in the light, along the middle of the picture.
+/// Brightness of the floor from a plate's shadow into the light, relative to the light, along the
+/// middle row of the picture.
 fn shadow(context: &Context, eye: Eye) -> Vec<f64> {
     let plate = box_mesh(Bounds {
         min: DVec3::new(EDGE, 1.4, -10.0),
@@ -397,17 +412,18 @@ fn shadow(context: &Context, eye: Eye) -> Vec<f64> {
     let image = draw(context, &setup, &black_sky, &scene, &corrugated(0.0), 1);
     let side = eye.size as usize;
     let row = &image.beauty[side / 2 * side..][..side];
-    // White in the light of the whole sun.
+    // White in full sunlight.
     let lit = row.iter().fold(1e-6f32, |most, p| p[1].max(most));
     row.iter().map(|p| f64::from(p[1] / lit)).collect()
 }
 
-/// Of the brightest pixel: bumps of the still surface bundle light by a part of a hundred here.
+/// Relative to the brightest pixel: bumps of the still surface change the light by about one
+/// percent.
 const LIT: f64 = 0.97;
-/// Of the plate, metres along x.
+/// Edge of the plate, m along x.
 const EDGE: f64 = 4.0;
 
-/// Where the floor's shadow begins, metres from where Snell puts it.
+/// Distance between the edge of the floor's shadow and where Snell's law puts it, m.
 fn shadow_error(context: &Context) -> f64 {
     let eye = Eye {
         size: SIDE,
@@ -415,13 +431,14 @@ fn shadow_error(context: &Context) -> f64 {
     };
     let seen = shadow(context, eye);
     let width = 1.3 / f64::from(SIDE);
-    // x runs from right to left, and is in the light where it is small.
+    // x runs from right to left, and small x is in the light.
     let edge = 3.0 - 0.65 + seen.iter().sum::<f64>() * width;
     let sun = -refracted(DVec3::new(-1.0, -1.0, 0.0).normalize(), INDEX);
     (edge - (EDGE - sun.x / sun.y * 1.5)).abs()
 }
 
-/// Within a texel, 16 mm; and the plate that throws it is itself in the light, which no shadow of its own dims.
+/// Within a texel, 16 mm. The plate that casts the shadow is itself fully lit and does not shadow
+/// itself.
 #[test]
 fn what_stands_under_water_throws_its_shadow_as_snell_says() {
     let error = shadow_error(&context());
@@ -435,7 +452,8 @@ fn what_stands_under_water_throws_its_shadow_as_snell_says() {
         seen.iter().fold(1.0, |least, x| x.min(least))
     };
     assert!(least(&context()) > LIT, "{}", least(&context()));
-    // Controls: light that falls on the plate is read on the floor below it, and a plate in its own shadow.
+    // Controls: light that falls on the plate appears on the floor below it, and a plate shadows
+    // itself.
     let control = shadow_error(&spoiled(
         "rays/cast",
         "select(0u, 1u, opaque_along",
@@ -446,8 +464,8 @@ fn what_stands_under_water_throws_its_shadow_as_snell_says() {
     assert!(control < LIT, "{control}");
 }
 
-/// Standard deviation of the light under a pool at rest whose particles lie by chance, over its mean: false light that their bumps
-/// bundle, ten spacings below them. `width` is that of the smoothing in spacings.
+/// Standard deviation over mean of the light under a pool at rest with randomly displaced
+/// particles: false caustics of their bumps, ten spacings below. `width` sets the smoothing.
 fn grain(width: &str) -> f64 {
     let size = DVec3::new(4.0, 2.0, 4.0);
     let rest = RenderScene {
@@ -511,7 +529,7 @@ fn what_cannot_be_is_refused_by_name() {
         let error = look(water, method).unwrap_err();
         assert!(error.contains(words), "{water}: {error}");
     }
-    // A map that no adapter binds.
+    // A map that exceeds the adapter's binding limit.
     let large = look("caustics = { resolution = 8192 }", "ray").unwrap();
     let mut context = context();
     context.limits.max_storage_buffer_binding_size = 128 << 20;

@@ -1,4 +1,4 @@
-//! Channels beside the picture over a whole pixel, as the picture itself is.
+//! AOVs filtered over the whole pixel, like the picture itself.
 
 use glam::DVec3;
 use swell::{
@@ -17,7 +17,7 @@ const BLOCK: Bounds = Bounds {
     max: DVec3::new(6.0, 5.0, 6.0),
 };
 
-/// Upward, so that there is nothing behind the block.
+/// Looks up, so that only the sky is behind the block.
 fn eye() -> Eye {
     Eye::new([0.0, 1.0, 1.0], [5.0, 4.2, 5.0], 90.0)
 }
@@ -40,12 +40,13 @@ fn block() -> RenderScene {
     }
 }
 
-/// Part of a pixel that is covered.
+/// Fraction of a pixel that is covered.
 fn cover(image: &Image, i: usize) -> f64 {
     f64::from(image.beauty[i][3])
 }
 
-/// Pixels that are covered in part and have a depth, those without, and those that show two faces by a tenth or more.
+/// Numbers of partly covered pixels with a depth, of those without, and of pixels that show two
+/// faces by a tenth or more.
 fn counts(image: &Image) -> [usize; 3] {
     let z = image.aovs.z.as_ref().unwrap();
     let n = image.aovs.n.as_ref().unwrap();
@@ -74,7 +75,7 @@ fn channels_are_means_over_what_the_samples_meet() {
         let mut whole = 0;
         for i in 0..z.len() {
             let part = cover(&image, i);
-            // A sample weighs 1/16: what none of them meets has no depth, and what one meets has one.
+            // A sample weighs 1/16: a pixel has a depth exactly if a sample hits something.
             assert_eq!(
                 z[i] < 1e6,
                 part > 0.5 / f64::from(SAMPLES),
@@ -84,11 +85,12 @@ fn channels_are_means_over_what_the_samples_meet() {
                 continue;
             }
             whole += usize::from(part > 0.99);
-            // The block's three faces look along axes: whatever parts of a pixel they have, these add up to one. A normal of a splatted
-            // solid has 12 bits an axis, and f32 the rest.
+            // The block's three faces are axis-aligned, so their shares of a pixel add up to one. A
+            // normal of a splatted solid has 12 bits per axis; f32 rounding is smaller.
             let sum: f64 = n[i].iter().map(|side| f64::from(-side)).sum();
             assert!((sum - 1.0).abs() < 1e-5, "{method}: {:?}", n[i]);
-            // Depth is linear in place, so that the means agree as the values do: f32 at 8 m, and its square root in rays' distances.
+            // Depth is linear in position, so the means agree as the values do: f32 at 8 m, and its
+            // square root in the distances of rays.
             let place = DVec3::from(p[i].map(f64::from));
             let along = (place - eye().position).dot(forward);
             assert!(
@@ -101,7 +103,7 @@ fn channels_are_means_over_what_the_samples_meet() {
         let [with, without, shared] = counts(&image);
         assert!(with > 50 && without == 0, "{method}: {with} {without}");
         assert!(shared > 30, "{method}: {shared}");
-        // The control: a pixel's centre is on one face or on none, whatever the picture has there.
+        // Control: a pixel's centre is on one face or on none, whatever the picture shows there.
         let centre = picture(method, "centre", (&set, &nothing));
         assert!(centre.beauty == image.beauty, "{method}: another picture");
         let [_, without, shared] = counts(&centre);
@@ -118,8 +120,8 @@ fn thickness_is_a_mean_over_the_whole_pixel() {
     let thickness = |image: &Image| image.aovs.thickness.clone().unwrap();
     let (mean, still) = (thickness(&image), thickness(&centre));
     let sum = |all: &[f32]| all.iter().map(|&v| f64::from(v)).sum::<f64>();
-    // Both are the ball's volume over the pixels' solid angle, each pixel by one point or by sixteen: N points in the outline's
-    // pixels are off by a few of these.
+    // Both are the ball's volume over the pixels' solid angle, with one point or sixteen per pixel;
+    // N points in the outline's pixels have an error of a few of them.
     let ratio = sum(&mean) / sum(&still);
     assert!((ratio - 1.0).abs() < 0.02, "{ratio}");
     let edge = (0..mean.len()).filter(|&i| mean[i] > 0.0 && still[i] == 0.0);

@@ -1,4 +1,5 @@
-//! Film of another shape than the image: where a known point is in the picture, by either method and in an exported camera.
+//! Film whose aspect ratio differs from the image's: position of a known point in the picture, with
+//! either method and in an exported camera.
 
 use glam::DVec3;
 use swell::{
@@ -12,10 +13,10 @@ const IMAGE: [f64; 2] = [96.0, 54.0];
 const FOCAL_MM: f64 = 30.0;
 const DEPTH: f64 = 4.0;
 const RADIUS: f64 = 0.15;
-/// Of a ball, to the right of the axis, above it and along it, metres.
+/// Position of the ball: right of the axis, above it and along it, m.
 const PLACE: [f64; 3] = [0.9, 0.4, DEPTH];
 
-/// Mean place of a picture's alpha, pixels right of and above the picture's middle.
+/// Centroid of a picture's alpha, pixels right of and above the picture's middle.
 fn middle(image: &Image) -> [f64; 2] {
     let (mut sum, mut first) = (0.0, [0.0; 2]);
     for (i, value) in image.beauty.iter().enumerate() {
@@ -28,7 +29,7 @@ fn middle(image: &Image) -> [f64; 2] {
     first.map(|of| of / sum)
 }
 
-/// It looks up, so that no ground is seen.
+/// Looks up, so that no ground is visible.
 fn eye() -> Eye {
     Eye::new([5.0, 1.0, 1.0], [5.0, 6.0, 8.0], 1.0)
 }
@@ -68,9 +69,10 @@ fn drawn(method: &'static str, film: [f64; 2], fit: &str) -> Image {
     renderer.render_moment(1, &moment).unwrap()
 }
 
-/// A millimetre of film is 96 / 36 pixels where the image takes the film's width and 54 / 24 where it takes its height. A ball
-/// of radius r at a depth of d is an ellipse whose middle is x d / (d² − r²) off the axis, where its centre is x off it: seen
-/// from the eye the cone about it is cut by the film.
+/// A millimetre of film is 96 / 36 pixels where the image uses the film's width and 54 / 24 where
+/// it uses its height. A ball of radius r at a depth d is an ellipse whose middle is x d / (d² −
+/// r²) off the axis if its centre is x off it: the film cuts the cone around it that starts at the
+/// eye.
 #[test]
 fn a_point_is_where_the_fit_of_the_film_has_it() {
     let narrow = [36.0, 24.0];
@@ -98,16 +100,17 @@ fn a_point_is_where_the_fit_of_the_film_has_it() {
             let spread = z / (z * z - RADIUS * RADIUS);
             for (found, off) in found.into_iter().zip([x, y]) {
                 let expected = focal * off * spread;
-                // 16 samples place an edge within a quarter of a pixel, and a mean of some 19 of them within 0.06.
+                // 16 samples locate an edge within a quarter of a pixel, and a mean of some 19 of
+                // them within 0.06.
                 assert!(
                     (found - expected).abs() < 0.1,
                     "{method} {film:?} {fit}: {found} {expected}"
                 );
-                // The control: the next fit is far from it.
+                // Control: the other fit is far from it.
                 let other = expected * by_height / by_width;
                 assert!((found - other).abs() > 0.5, "{method} {fit}: {found}");
             }
-            // The header's matrix has the ball's centre there too.
+            // The header's matrix puts the ball's centre at the same position.
             let [to_right, to_top, forward] = eye().axes();
             let point = eye().position + x * to_right + y * to_top + z * forward;
             let row = point.extend(1.0).to_array();
@@ -123,7 +126,8 @@ fn a_point_is_where_the_fit_of_the_film_has_it() {
             ];
             for (found, off) in [(right, x), (up, y)] {
                 let expected = focal * off / z;
-                // The matrix has 32 bits: 2⁻²⁴ of a coordinate of some hundred pixels, in a sum of four.
+                // The matrix has 32 bits: 2⁻²⁴ of a coordinate of some hundred pixels, in a sum of
+                // four.
                 assert!((found - expected).abs() < 1e-3, "{found} {expected}");
             }
         }

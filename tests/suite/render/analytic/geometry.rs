@@ -1,4 +1,4 @@
-//! Where things are in the picture, and where they go: the channels beside it.
+//! Positions and motion of things in the picture: the AOVs.
 
 use std::collections::BTreeMap;
 
@@ -11,7 +11,7 @@ use swell::render::{Attributes, Image, RenderScene};
 
 use super::support::{Eye, Setup, ball, context, draw, scene, spoiled, uniform_sky, wide};
 
-/// Twelve triangles, counter-clockwise from outside.
+/// A box of twelve triangles, counter-clockwise from outside.
 pub(crate) fn box_mesh(bounds: Bounds) -> TriangleMesh {
     let corner = |i: usize| {
         let pick = |axis: usize| match i >> axis & 1 {
@@ -35,7 +35,7 @@ pub(crate) fn box_mesh(bounds: Bounds) -> TriangleMesh {
     }
 }
 
-/// Distance along a ray to a box, and the face that it enters by.
+/// Distance along a ray to a box, and the normal of the face through which it enters.
 pub(crate) fn enter(from: DVec3, along: DVec3, bounds: Bounds) -> Option<(f64, DVec3)> {
     let (mut near, mut far, mut face) = (f64::NEG_INFINITY, f64::INFINITY, DVec3::ZERO);
     for axis in 0..3 {
@@ -78,7 +78,7 @@ const BLOCK: Bounds = Bounds {
     max: DVec3::new(11.0, 1.5, 11.0),
 };
 
-/// What stands at this ray, about the scene's origin: kind, distance, normal.
+/// What the ray hits first, relative to the scene's origin: kind, distance, normal.
 fn first(from: DVec3, along: DVec3) -> (Kind, f64, DVec3) {
     let mut found = (Kind::Sky, f64::INFINITY, DVec3::ZERO);
     if along.y < 0.0 {
@@ -94,8 +94,8 @@ fn first(from: DVec3, along: DVec3) -> (Kind, f64, DVec3) {
     found
 }
 
-/// A ball of water that flies, a block and the ground under a sky, far from the world's origin, seen by a camera that
-/// moves, turns and zooms.
+/// A moving ball of water, a block and the ground under a sky, far from the world's origin, seen by
+/// a camera that moves, turns and zooms.
 fn picture(context: &Context) -> (Image, [Eye; 2]) {
     let eyes = [
         Eye {
@@ -125,7 +125,8 @@ fn picture(context: &Context) -> (Image, [Eye; 2]) {
     (draw(context, &setup, &uniform_sky, &scene, &water, 1), eyes)
 }
 
-/// The worst error of each channel over each kind, in units of what rounding explains, and how many pixels there were.
+/// The largest error of each AOV for each kind of thing, in units of what rounding explains, and
+/// the number of pixels.
 fn errors(context: &Context) -> BTreeMap<(Kind, &'static str), (f64, usize)> {
     let (image, [eye, next]) = picture(context);
     let aovs = &image.aovs;
@@ -142,8 +143,8 @@ fn errors(context: &Context) -> BTreeMap<(Kind, &'static str), (f64, usize)> {
         }
         let along = eye.direction(i);
         let (kind, far, normal) = at(i);
-        // A pixel whose neighbours see something else may round to either; on a ball's rim a rounding of the ray is
-        // a long way in depth.
+        // A pixel whose neighbours see something else may round to either. On a ball's rim a
+        // rounding of the ray is a large difference in depth.
         let near = [i - 1, i + 1, i - side, i + side];
         let flat = near.iter().all(|&j| {
             let other = at(j);
@@ -172,7 +173,8 @@ fn errors(context: &Context) -> BTreeMap<(Kind, &'static str), (f64, usize)> {
         };
         let shift = next_place - eye.place(along);
         let [u, v] = motion[i].map(f64::from);
-        // 2e-5 of the distance is 2e-5 of the focal length, some 40 pixels, in the picture; times a secant.
+        // 2e-5 of the distance is 2e-5 of the focal length, some 40 pixels, in the picture; times a
+        // secant.
         add("u", (u - shift.x).abs() / 3e-3);
         add("v", (v - shift.y).abs() / 3e-3);
         assert!(
@@ -191,7 +193,7 @@ fn errors(context: &Context) -> BTreeMap<(Kind, &'static str), (f64, usize)> {
         );
         add("p", (wide(p[i]) - ORIGIN - place).length() / rounding);
         if kind != Kind::Water {
-            // The six axes are packed exactly.
+            // The six axis directions are packed exactly.
             add("n", (wide(n[i]) - normal).length() / 1e-6);
         }
     }
@@ -211,7 +213,7 @@ fn every_channel_is_where_the_camera_and_the_motion_say() {
             assert!(error < 1.0, "{kind:?} {channel}: {error}");
         }
     }
-    // The controls: a sign, and the middle of a pixel off by a hundredth of its half.
+    // Controls: a sign, and the pixel's centre off by a hundredth of half a pixel.
     let shade = "ssfr/shade_aovs";
     for (pass, from, to, kind, channel) in [
         (
@@ -255,7 +257,7 @@ fn every_channel_is_where_the_camera_and_the_motion_say() {
     }
 }
 
-/// A ball of 20 m, 30 m away, seen through a long lens.
+/// A ball with a radius of 20 m, 30 m away, seen through a long lens.
 fn close(context: &Context, filled: f64) -> (Image, Eye, DVec3) {
     let centre = DVec3::new(5.0, -16.0, 5.0);
     let eye = Eye::new([-10.0, 30.0, 5.0], [5.0, 4.0, 5.0], 3200.0);
@@ -282,16 +284,16 @@ fn a_ball_of_water_has_its_normals_and_its_chords() {
         let along = eye.direction(i);
         let far = meet(eye.position, along, centre, 20.0).unwrap();
         let normal = (eye.position + along * far - centre) / 20.0;
-        // A difference over a pixel of 30/3200 m, seen at 30° from the surface at worst, turns by half of that over the
-        // radius; depths of 30 m are f32, which over the pixel is 4e-4.
+        // A difference over a pixel of 30/3200 m, seen at 30° to the surface at worst, turns by
+        // half of that over the radius; depths of 30 m are f32, which over the pixel is 4e-4.
         let n = wide(image.aovs.n.as_ref().unwrap()[i]);
         assert!((n - normal).length() < 1.5e-3, "{n} for {normal}");
-        // Sums are in 65 536ths of a metre.
+        // Sums are in units of 1/65536 m.
         let chord = -2.0 * (eye.position - centre).dot(along) - 2.0 * far;
         let thickness = f64::from(image.aovs.thickness.as_ref().unwrap()[i]);
         let error = |filled: f64| (thickness / (filled * chord) - 1.0).abs();
         assert!(error(0.25) < 1e-4, "{thickness} for {}", 0.25 * chord);
-        // The control: a hundredth more water.
+        // Control: one percent more water.
         assert!(error(0.2525) > 5e-3);
     }
 }
@@ -348,7 +350,7 @@ fn a_file_holds_each_channel_under_its_own_name() {
     assert_eq!(found, expected.map(|(name, x)| (name.to_owned(), x)).into());
 }
 
-/// The header's matrices put each pixel's position where that pixel is, and as deep as its Z.
+/// The header's matrices map each pixel's position to that pixel and to its Z.
 #[test]
 fn an_exr_says_where_its_camera_stood() {
     let eye = Eye::new([2.0, 3.0, 1.0], [5.0, 1.0, 6.0], 60.0);
@@ -394,6 +396,7 @@ fn an_exr_says_where_its_camera_stood() {
         let [.., deep, _] = through(camera, p);
         assert!((-deep / f64::from(z) - 1.0).abs() < 1e-4, "{deep} {z}");
     }
-    // Positions and the matrix's shift are rounded to f32 at 300 m, under a focal length of 60 pixels and metres away.
+    // Positions and the matrix's translation are rounded to f32 at 300 m, with a focal length of 60
+    // pixels and at a distance of some metres.
     assert!(worst < 0.01, "{worst} pixels");
 }

@@ -1,4 +1,4 @@
-//! Water that other water hides: it is in no pixel, and its part of the way through is kept.
+//! Water hidden by other water: it is not splatted, but counts towards the thickness.
 
 use glam::DVec3;
 use swell::{
@@ -10,14 +10,14 @@ use crate::support::box_mesh;
 
 use super::support::{Eye, Setup, context, draw, scene, spoiled, uniform_sky};
 
-/// Between particles, metres.
+/// Spacing of particles, m.
 const D: f64 = 0.25;
-/// Particles along each side of the block, and where its least corner is.
+/// Particles along each side of the block, and its lower corner.
 const COUNTS: [i32; 3] = [24, 14, 24];
 const CORNER: DVec3 = DVec3::new(2.0, 1.0, 2.0);
 
-/// A block of water of 24 × 14 × 24 particles a quarter of a metre apart, without those that are more than `shell` layers in; each
-/// is up to half of `off` spacings off its place.
+/// A block of 24 × 14 × 24 particles without those more than `shell` layers inside; each is
+/// displaced by up to half of `off` spacings per axis.
 fn hollow(shell: i32, off: f64) -> Particles {
     let [nx, ny, nz] = COUNTS;
     let mut seed = 11u32;
@@ -40,8 +40,8 @@ fn hollow(shell: i32, off: f64) -> Particles {
     water
 }
 
-/// Particles that others hide are not splatted, and no pixel tells: a block and one whose middle is empty, where a
-/// particle's shape depends on neighbours within three layers.
+/// Leaving out hidden particles changes no pixel: a full block and one whose middle is empty give
+/// the same picture, where a particle's shape depends on neighbours within three layers.
 #[test]
 fn particles_that_others_hide_are_in_no_pixel() {
     let eye = Eye::new([9.5, 8.0, 9.0], [5.0, 3.5, 5.0], 60.0);
@@ -63,7 +63,8 @@ fn particles_that_others_hide_are_in_no_pixel() {
         image.aovs.z.unwrap().to_vec()
     };
     let whole = depths(12);
-    // The block's upper face is 4.5 m up; the ray through the middle meets it 3.5 of 4.5 m down.
+    // The block's upper face is at 4.5 m; the ray through the middle meets it after 3.5 of 4.5 m of
+    // descent.
     let middle = f64::from(whole[32 * 64 + 32]);
     let along = (eye.target - eye.position).length() * 3.5 / 4.5;
     assert!(
@@ -71,12 +72,12 @@ fn particles_that_others_hide_are_in_no_pixel() {
         "{middle}, {along}"
     );
     assert_eq!(whole, depths(6));
-    // The control: with a shell of one layer the shapes of its particles are others.
+    // Control: with a shell of one layer the particles have other shapes.
     assert_ne!(whole, depths(1));
 }
 
-/// Metres from `eye` along `way` between which a ray is within the block, which has gone by `gone`, and at least `inside` metres from its
-/// faces.
+/// Distances from `eye` along `way`, m, between which a ray is within the block moved by `gone`,
+/// and at least `inside` metres from its faces.
 fn span(eye: DVec3, way: DVec3, gone: DVec3, inside: f64) -> [f64; 2] {
     let low = CORNER + gone + inside;
     let high = CORNER + gone + D * DVec3::from(COUNTS.map(f64::from)) - inside;
@@ -84,17 +85,17 @@ fn span(eye: DVec3, way: DVec3, gone: DVec3, inside: f64) -> [f64; 2] {
     [a.min(b).max_element().max(0.0), a.max(b).min_element()]
 }
 
-/// What is seen of the block.
+/// A view of the block.
 #[derive(Clone, Copy)]
 struct View {
     eye: Eye,
-    /// All before this x is solid.
+    /// Everything below this x is solid.
     wall: Option<f64>,
-    /// Metres along z that the block goes while the shutter is open.
+    /// Distance along z that the block moves while the shutter is open, m.
     goes: f64,
-    /// Spacings.
+    /// Disorder of the lattice, spacings.
     off: f64,
-    /// Of rays those alone that stay in the outermost 0.87 spacings of hidden water along x.
+    /// Uses only rays that stay in the outermost 0.87 spacings of hidden water along x.
     at_face: bool,
 }
 
@@ -113,8 +114,9 @@ impl View {
         Self::new([9.5, 8.0, 9.0], [5.0, 3.5, 5.0])
     }
 
-    /// Thickness over the way through the block, as far as it goes before the wall: the means' ratio over the pixels whose rays go 2 m
-    /// through it two spacings and more from its faces, and the largest difference. Nearer to its edges balls reach beyond the block.
+    /// Thickness relative to the length of the ray within the block, up to the wall: the ratio of
+    /// the means over pixels whose rays have 2 m in it at least two spacings from its faces, and
+    /// the largest difference, m. Closer to the edges, balls extend beyond the block.
     fn through(&self, context: &Context) -> [f64; 2] {
         let mut scene = scene(D, 1.0);
         scene.particle_spacing = D;
@@ -156,7 +158,8 @@ impl View {
             .all(|x| (first..first + 0.87 * D).contains(&x))
     }
 
-    /// Of pixel `i`'s ray within the block, and `inside` metres from its faces: the mean over the shutter's time.
+    /// Length of pixel `i`'s ray within the block and `inside` metres from its faces, averaged over
+    /// the shutter time, m.
     fn way(&self, i: usize, inside: f64) -> f64 {
         let direction = self.eye.direction(i);
         let stops = (self.wall).map_or(f64::INFINITY, |x| (x - self.eye.position.x) / direction.x);
@@ -173,11 +176,12 @@ impl View {
 /// Samples of a pixel where the block moves.
 const INSTANTS: u32 = 8;
 
-/// What balls in the place of blocks would differ by: along a ray their sum is off by 0.22 m, root mean square, as a script of its own summed
-/// these balls (it is not kept). Balls are 0.43 m wide, so that of a thousand rays 0.1 m apart some sixty are independent. Twice that, over
-/// ways of 4 m.
+/// Tolerance of the mean: the sum of balls along a ray, which blocks replace, is off by 0.22 m rms
+/// (measured once with a separate script). Balls are 0.43 m wide, so of a thousand rays 0.1 m apart
+/// some sixty are independent. Twice that, over lengths of 4 m.
 const MEAN: f64 = 0.015;
-/// Balls at either end reach 0.87 spacings beyond the block or leave as much of it out, and stand up to 0.2 off their lattice.
+/// Balls at either end extend up to 0.87 spacings beyond the block or leave as much of it out, and
+/// are up to 0.2 off their lattice.
 const MOST: f64 = 2.0 * (0.87 + 0.2) * D;
 
 #[test]
@@ -185,7 +189,7 @@ fn blocks_and_particles_make_up_the_way_through_water() {
     let view = View::aslant();
     let [mean, most] = view.through(&context());
     assert!((mean - 1.0).abs() < MEAN && most < MOST, "{mean} {most}");
-    // The control: blocks that count a twentieth more.
+    // Control: blocks that count 5 % more.
     let full = spoiled("ssfr/splat_bulk", "* block.filled", "* 1.05 * block.filled");
     let [mean, _] = view.through(&full);
     assert!(mean > 1.0 + MEAN, "{mean}");
@@ -199,7 +203,7 @@ fn blocks_end_at_what_is_solid() {
     };
     let [mean, _] = view.through(&context());
     assert!((mean - 1.0).abs() < MEAN, "{mean}");
-    // The control: a tenth of the depth farther.
+    // Control: 10 % farther.
     let far = spoiled(
         "ssfr/splat_bulk",
         "min(last.z, end)",
@@ -209,8 +213,8 @@ fn blocks_end_at_what_is_solid() {
     assert!(mean > 1.0 + MEAN, "{mean}");
 }
 
-/// Along a face of blocks what balls would reach beyond it is there. Rays there are some 12 that are independent, of 3.5 m and each off by
-/// 0.22 m: three times that.
+/// Along a face of the blocks, the parts of balls that extend beyond it are included. Some 12 rays
+/// there are independent, of 3.5 m each and off by 0.22 m: three times that.
 #[test]
 fn blocks_leave_no_seam_along_the_line_of_sight() {
     const MEAN: f64 = 0.055;
@@ -223,19 +227,20 @@ fn blocks_leave_no_seam_along_the_line_of_sight() {
     view.eye.focal = 240.0;
     let [mean, _] = view.through(&context());
     assert!((mean - 1.0).abs() < MEAN, "{mean}");
-    // The control: faces that are sharp. Balls beside one fill 3/16 of what lies within their radius behind it, here of 2.5 of 3.5 m.
+    // Control: sharp faces. Balls beside a face fill 3/16 of the volume within their radius behind
+    // it, here along 2.5 of 3.5 m.
     let sharp = spoiled("ssfr/splat_bulk", "* camera.radius;", "* 0.0;");
     let [mean, _] = view.through(&sharp);
     assert!(mean > 1.0 + MEAN, "{mean}");
 }
 
-/// From over the water, with blocks beside the eye and behind it.
+/// From above the water, with blocks beside the eye and behind it.
 #[test]
 fn blocks_about_the_eye_are_where_they_are() {
     let view = View::new([6.0, 5.2, 6.0], [3.5, 3.0, 3.5]);
     let [mean, most] = view.through(&context());
     assert!((mean - 1.0).abs() < MEAN && most < MOST, "{mean} {most}");
-    // The control: what goes on behind the eye is nowhere.
+    // Control: blocks that extend behind the eye are dropped.
     let cut = spoiled("ssfr/splat_bulk", "behind == 8u", "behind > 0u");
     let [mean, _] = view.through(&cut);
     assert!(mean < 1.0 - MEAN, "{mean}");
@@ -249,7 +254,7 @@ fn blocks_go_with_their_water_while_the_shutter_is_open() {
     };
     let [mean, most] = view.through(&context());
     assert!((mean - 1.0).abs() < MEAN && most < MOST, "{mean} {most}");
-    // The control: they stay.
+    // Control: blocks that do not move.
     let still = spoiled(
         "ssfr/splat_bulk",
         "block.velocity * camera.seconds",

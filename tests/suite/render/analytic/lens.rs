@@ -1,4 +1,4 @@
-//! Depth of field: the disc that a small thing off the focus is drawn as, and cameras from files.
+//! Depth of field: the blur disc of a small thing out of focus, and cameras from files.
 
 use glam::DVec3;
 use swell::{
@@ -8,12 +8,13 @@ use swell::{
 
 use super::support::{Eye, FILM, Setup, ball, context, draw, scene, uniform_sky, write_sky};
 
-/// Focal length, pixels, and the aperture's diameter, metres.
+/// Focal length, pixels, and diameter of the aperture, m.
 const FOCAL: f64 = 600.0;
 const APERTURE: f64 = 0.1;
 const SAMPLES: u32 = 64;
 
-/// Mean place of a picture's alpha, pixels right and down, and the mean of its variances along both axes.
+/// Centroid of a picture's alpha, pixels right and down, and the mean of its variances along both
+/// axes.
 fn spread(image: &Image) -> ([f64; 2], f64) {
     let side = image.width as usize;
     let (mut sum, mut first, mut second) = (0.0, [0.0; 2], [0.0; 2]);
@@ -31,8 +32,9 @@ fn spread(image: &Image) -> ([f64; 2], f64) {
     (mean, 0.5 * (variance(0) + variance(1)))
 }
 
-/// Pixels across the disc that a small ball of water at `depth` metres is drawn as, by how much wider its picture is than by a
-/// pinhole: points spread evenly over a disc c across have a variance of c²/16 along an axis.
+/// Diameter in pixels of the blur disc of a small ball of water at `depth` metres, from the
+/// increase in variance relative to a pinhole: points spread evenly over a disc of diameter c have
+/// a variance of c²/16 along an axis.
 fn circle(method: &'static str, depth: f64, focus: f64) -> f64 {
     let eye = Eye {
         size: 64,
@@ -65,8 +67,8 @@ fn circle(method: &'static str, depth: f64, focus: f64) -> f64 {
     4.0 * (blurred.1 - sharp.1).max(0.0).sqrt()
 }
 
-/// c = A f |1/d_f − 1/d|: of the film at f behind a lens that is A across. A thin lens has d_f − f for d_f in the first term, since
-/// its film moves back to focus.
+/// c = A f |1/d_f − 1/d| for film at distance f behind a lens of diameter A. A thin lens has d_f −
+/// f for d_f in the first term, because its film moves back to focus.
 fn expected(depth: f64, focus: f64) -> f64 {
     FOCAL * APERTURE * (1.0 / focus - 1.0 / depth).abs()
 }
@@ -77,12 +79,13 @@ fn a_thing_off_the_focus_is_a_disc_of_the_lens() {
         for (depth, focus) in [(6.0, 3.0), (3.0, 6.0)] {
             let found = circle(method, depth, focus);
             let error = |focus: f64| found / expected(depth, focus) - 1.0;
-            // 64 points are 0.5 / 64 off the variance of a disc; a ball of three pixels' radius is counted to a hundredth.
+            // 64 points have a variance within 0.5 / 64 of a disc's; the area of a ball with a
+            // radius of three pixels is known to one percent.
             assert!(
                 error(focus).abs() < 0.02,
                 "{method} {depth} {focus}: {found}"
             );
-            // The controls: focused a twentieth nearer or farther.
+            // Controls: focused 5 % nearer or farther.
             for other in [0.95 * focus, 1.05 * focus] {
                 assert!(
                     error(other).abs() > 0.03,
@@ -90,17 +93,19 @@ fn a_thing_off_the_focus_is_a_disc_of_the_lens() {
                 );
             }
         }
-        // On the plane: less than a tenth of a pixel squared more than a pinhole's, which is a disc of 1.2 pixels.
+        // In focus: the variance is that of a pinhole to less than a tenth of a pixel squared,
+        // which is a disc of 1.2 pixels.
         let found = circle(method, 4.0, 4.0);
         assert!(found < 1.2, "{method}: {found}");
     }
 }
 
-/// The camera of a setup as USD, with a lens, and with the picture's middle so many pixels right of and above the optical axis.
+/// The camera as USD, with a lens, and with the picture's middle shifted by so many pixels right of
+/// and above the optical axis.
 fn as_usd(eye: &Eye, [f_stop, focus]: [f64; 2], shift: [f64; 2]) -> String {
     let [right, up, forward] = eye.axes();
     let row = |v: DVec3| format!("({:?}, {:?}, {:?}, ", v.x, v.y, v.z);
-    // Lengths of the film are in tenths of a metre.
+    // Film sizes are in tenths of the scene's unit, here of a metre.
     let film = FILM / 100.0;
     let pixel = film / f64::from(eye.size);
     format!(
@@ -121,7 +126,8 @@ fn as_usd(eye: &Eye, [f_stop, focus]: [f64; 2], shift: [f64; 2]) -> String {
     )
 }
 
-/// A USD camera draws what the look's own camera draws with the same lens, moved on the film by the offsets of its aperture.
+/// A USD camera renders like the look's own camera with the same lens, shifted on the film by the
+/// offsets of its aperture.
 #[test]
 fn a_lens_and_a_shift_of_the_film_come_from_usd() {
     let eye = Eye {
@@ -136,7 +142,7 @@ fn a_lens_and_a_shift_of_the_film_come_from_usd() {
     for method in ["ssfr", "ray"] {
         let setup = Setup {
             camera: format!("lens = {{ f_stop = {f_stop:?}, focus_distance_m = {focus:?} }}\n"),
-            // The same ones in both, so that few will do.
+            // The same samples in both, so few suffice.
             samples: 16,
             method,
             background: false,
@@ -158,7 +164,8 @@ fn a_lens_and_a_shift_of_the_film_come_from_usd() {
             let moment = Moment::alone(&water, &white);
             renderer.render_moment(1, &moment).unwrap()
         };
-        // Where the window goes to the right and up, things go to the left and down; a shift by whole pixels moves samples with them.
+        // If the window moves right and up, things move left and down; a shift by whole pixels
+        // moves samples with them.
         let image = by_file(&as_usd(&eye, [f_stop, focus], [11.0, -7.0]));
         let (moved, same) = spread(&image);
         for (axis, way) in [-11.0, -7.0].into_iter().enumerate() {
@@ -169,7 +176,7 @@ fn a_lens_and_a_shift_of_the_film_come_from_usd() {
             (same / width - 1.0).abs() < 0.01,
             "{method}: {same} {width}"
         );
-        // The header's matrix has the ball there too: a point as a row.
+        // The header's matrix puts the ball at the same position; points are row vectors.
         let point = (eye.position + depth * eye.forward())
             .extend(1.0)
             .to_array();
@@ -182,7 +189,7 @@ fn a_lens_and_a_shift_of_the_film_come_from_usd() {
             let told = sum(axis) / sum(3) * 96.0 - 0.5;
             assert!((told - place).abs() < 0.1, "{method}: {told} {place}");
         }
-        // Control: without its lens the file's camera draws the ball alone, much narrower.
+        // Control: without its lens the file's camera renders the ball itself, much narrower.
         let (_, sharp) = spread(&by_file(&as_usd(&eye, [0.0, focus], [11.0, -7.0])));
         assert!(sharp < 0.5 * width, "{method}: {sharp} {width}");
     }

@@ -1,4 +1,4 @@
-//! What lights the set: sky, sun, shadow and air.
+//! Illumination of the set: sky, sun, shadows and haze.
 
 use std::f64::consts::{PI, TAU};
 
@@ -51,7 +51,8 @@ fn the_sky_is_where_its_panorama_says() {
     }
 }
 
-/// A sky of 64 × 31 pixels or of 64 × 64 is no latitude-longitude picture; one of 64 × 32, the control, is.
+/// A sky of 64 × 31 or of 64 × 64 pixels is not a latitude-longitude picture; one of 64 × 32, the
+/// control, is.
 #[test]
 fn a_panorama_that_is_not_twice_as_wide_as_high_is_refused() {
     let setup = Setup::new(Eye::new([5.0, 2.0, 5.0], [7.0, 4.5, 8.0], 60.0));
@@ -76,7 +77,7 @@ fn a_panorama_that_is_not_twice_as_wide_as_high_is_refused() {
 
 const CENTRE: DVec3 = DVec3::new(5.0, 5.0, 5.0);
 
-/// A ball of flat faces, at which nothing but its normal tells where the light comes from: it hangs too high to be
+/// A ball of flat faces on which only the normal determines the illumination: it is too high to be
 /// darkened by its surroundings.
 fn faceted() -> TriangleMesh {
     let (columns, rows) = (24u32, 12u32);
@@ -114,7 +115,7 @@ fn lit_ball(context: &Context, setup: &Setup, sky: &dyn Fn(DVec3, DVec2) -> [f64
     draw(context, setup, sky, &scene, &dry(), 1)
 }
 
-/// Pixels of the ball, with its normal there.
+/// Pixels of the ball, with the normal there.
 fn faces(image: &Image) -> impl Iterator<Item = (usize, DVec3)> + '_ {
     let (p, n) = (
         image.aovs.p.as_ref().unwrap(),
@@ -125,7 +126,7 @@ fn faces(image: &Image) -> impl Iterator<Item = (usize, DVec3)> + '_ {
         .map(|i| (i, wide(n[i])))
 }
 
-/// Of radiance 1 + b·d + d·Q d, one set a channel; nowhere negative.
+/// Coefficients of the radiance 1 + b·d + d·Q d, one set per channel; nowhere negative.
 const LINEAR: [DVec3; 3] = [
     DVec3::new(0.8, 0.1, -0.1),
     DVec3::new(0.0, 0.5, 0.1),
@@ -141,8 +142,8 @@ fn lobed_sky(d: DVec3, _: DVec2) -> [f64; 3] {
     [0, 1, 2].map(|c: usize| 1.0 + LINEAR[c].dot(d) + d.dot(SQUARE[c] * d))
 }
 
-/// Worst error of the irradiance over π on a ball's faces. The integral of (n·d)⁺ times 1, d and d dᵀ − 1/3 over all
-/// directions is π, 2π/3 n and π/4 (n nᵀ − 1/3).
+/// Largest error of the irradiance over π on a ball's faces. The integral of (n·d)⁺ times 1, d and
+/// d dᵀ − 1/3 over all directions is π, 2π/3 n and π/4 (n nᵀ − 1/3).
 fn irradiance_error(context: &Context) -> f64 {
     let mut worst = 0.0f64;
     // From above and from below, so that every side is seen.
@@ -170,11 +171,11 @@ fn irradiance_error(context: &Context) -> f64 {
 
 #[test]
 fn a_face_is_lit_by_the_side_of_the_sky_that_it_looks_at() {
-    // The midpoint rule over 128 rows is off by (π/128)²/24 of what it sums, and the constants of the harmonics have six
-    // digits: 1e-4 holds both.
+    // The midpoint rule over 128 rows is off by (π/128)²/24 of the sum, and the constants of the
+    // harmonics have six digits: 1e-4 covers both.
     let error = irradiance_error(&context());
     assert!(error < 1e-4, "{error}");
-    // The controls: an axis for another, and a hundredth of one term.
+    // Controls: swapped axes, and 1 % of one term.
     for (from, to) in [
         (
             "(*c)[1].rgb * n.y + (*c)[2].rgb * n.z",
@@ -189,7 +190,7 @@ fn a_face_is_lit_by_the_side_of_the_sky_that_it_looks_at() {
     }
 }
 
-/// Sun by azimuth and elevation, degrees: 0° is +x, 90° is +z.
+/// Direction to the sun by azimuth and elevation, degrees: azimuth 0° is +x, 90° is +z.
 fn to_sun([azimuth, elevation]: [f64; 2]) -> DVec3 {
     let [azimuth, elevation] = [azimuth, elevation].map(f64::to_radians);
     DVec3::new(
@@ -199,16 +200,18 @@ fn to_sun([azimuth, elevation]: [f64; 2]) -> DVec3 {
     )
 }
 
-/// White paint that faces a sun at 45° through the reference air: 0.82 of the unit of light is the sun's on a level face.
+/// White paint that faces a sun at 45° through the reference air: 0.82 of the unit of light is the
+/// sun's on a horizontal face.
 const FACING_SUN: f64 = 0.82 * std::f64::consts::SQRT_2;
 
-/// Worst relative error of sunlight on a ball's faces, for a sun that stands at `law`.
+/// Largest relative error of sunlight on a ball's faces, for a sun at the azimuth and elevation
+/// `law`.
 fn sun_error(image: &Image, law: [f64; 2]) -> f64 {
     let mut worst = 0.0f64;
     let mut lit = 0;
     for (i, n) in faces(image) {
         let cosine = n.dot(to_sun(law));
-        // Faces near the terminator may lie in the shadow of their neighbours.
+        // Faces near the terminator may be in the shadow of their neighbours.
         if cosine > 0.3 {
             lit += 1;
             let expected = FACING_SUN * cosine;
@@ -229,7 +232,7 @@ fn sunlight_falls_from_its_azimuth_and_elevation_with_the_unit_of_light() {
         ..Setup::new(eye)
     };
     let image = lit_ball(&context(), &setup, &black_sky);
-    // A handful of roundings of f32.
+    // A few roundings of f32.
     let error = sun_error(&image, [130.0, 45.0]);
     assert!(error < 2e-5, "{error}");
     for other in [[-130.0, 45.0], [130.0, 45.45], [131.3, 45.0]] {
@@ -238,8 +241,8 @@ fn sunlight_falls_from_its_azimuth_and_elevation_with_the_unit_of_light() {
     }
 }
 
-/// How many pixels of the ground are lit where a block's shadow must lie, or dark where none may; and how many of both
-/// kinds were looked at.
+/// Number of ground pixels that are lit where a block's shadow must be, or dark where none may be,
+/// and the numbers of pixels that must be in shadow and in the light.
 fn shadow_faults(context: &Context) -> (usize, [usize; 2]) {
     let sun = [30.0, 45.0];
     let block = Bounds {
@@ -261,7 +264,7 @@ fn shadow_faults(context: &Context) -> (usize, [usize; 2]) {
     };
     let image = draw(context, &setup, &black_sky, &scene, &dry(), 1);
     let towards = to_sun(sun);
-    // The shadow is looked up 4 cm above the ground, in texels of less than a centimetre, over four of them.
+    // The shadow is looked up 4 cm above the ground, over four texels of less than a centimetre.
     let margin = DVec3::splat(0.06);
     let grown = Bounds {
         min: block.min - margin,
@@ -331,10 +334,10 @@ fn disc(context: &Context) -> (f64, f64) {
 #[test]
 fn the_suns_disc_holds_its_irradiance() {
     let (radiance, covered) = disc(&context());
-    // The sun is 0.5331° across as seen from the mean distance.
+    // The sun has an angular diameter of 0.5331° at mean distance.
     let angle = PI * (0.5 * 0.5331f64).to_radians().powi(2);
-    // A circle of 71 pixels' radius holds its area's count of pixels to 0.3 %; 1 − cos of so small an angle is known to
-    // 6e-8/1.08e-5 in f32.
+    // A circle with a radius of 71 pixels has its area's number of pixels to 0.3 %; 1 − cos of so
+    // small an angle is known to 6e-8/1.08e-5 in f32.
     assert!(
         (covered / angle - 1.0).abs() < 9e-3,
         "{covered} for {angle}"
@@ -360,24 +363,26 @@ fn haze_grows_exponentially_with_the_distance() {
         &dry(),
         1,
     );
-    // Worst error of a black ground under a sky of radiance 1.
+    // Largest error of a black ground under a sky of radiance 1.
     let worst = |haze: f64| {
         (0..64 * 64)
             .filter(|&i| eye.direction(i).y < -0.05)
             .map(|i| {
                 let far = -4.0 / eye.direction(i).y;
-                // Air of optical depth far/haze glows with the rest of the sky's radiance.
+                // Haze of optical depth far/haze adds that fraction of the sky's radiance.
                 let expected = 1.0 - (-far / haze).exp();
                 (f64::from(image.beauty[i][1]) - expected).abs()
             })
             .fold(0.0, f64::max)
     };
-    // The distance along a ray that meets the ground at 3° is rounded twentyfold: 20 × 6e-8, times a few roundings.
+    // The distance along a ray that meets the ground at 3° amplifies rounding twentyfold: 20 ×
+    // 6e-8, times a few roundings.
     assert!(worst(8.0) < 1e-5, "{}", worst(8.0));
     assert!(worst(8.08) > 1e-3, "{}", worst(8.08));
 }
 
-/// The largest change from a row to the next, a twentieth of a degree on, from ground that is lost in haze to the sky above it.
+/// The largest relative change between adjacent rows, a twentieth of a degree apart, from ground
+/// lost in haze to the sky above it.
 fn horizon_step(context: &Context) -> f64 {
     let eye = Eye::new([5.0, 5.0, 5.0], [6.0, 5.0, 5.0], 1146.0);
     let setup = Setup {
@@ -398,11 +403,12 @@ fn horizon_step(context: &Context) -> f64 {
     changes.fold(0.0, f64::max)
 }
 
-/// No line and no band where ground and sky meet: haze leads to the sky's own colour there.
+/// No line and no band where ground and sky meet: haze converges to the sky's colour there.
 #[test]
 fn the_horizon_has_no_line() {
     let step = horizon_step(&context());
-    // The haze's own slope: five metres' height at 1.6° are 180 m away, and a row less by 3 % of that.
+    // Slope of the haze itself: from a height of five metres the ground at 1.6° is 180 m away, and
+    // one row changes that by 3 %.
     assert!(step < 0.02, "{step}");
     let (from, to) = (
         "vec3f(level.x, 0.0, level.z)",
@@ -412,8 +418,8 @@ fn the_horizon_has_no_line() {
     assert!(control > 0.02, "{control}");
 }
 
-/// Pixels of a wall that are dark where no glass should be, or bright where some should; and how many should be glass. Pixels about an edge
-/// are left out.
+/// Numbers of pixels of a wall that are dark where no glass should be or bright where some should,
+/// and of pixels that should be glass. Pixels near an edge are left out.
 fn window_faults(context: &Context, windows: &str) -> [usize; 2] {
     const WALL: Bounds = Bounds {
         min: DVec3::new(0.0, 0.0, 8.0),
@@ -437,18 +443,19 @@ fn window_faults(context: &Context, windows: &str) -> [usize; 2] {
             continue;
         };
         let p = eye.position + far * along;
-        // How far within the middle 0.55 of a bay and 0.6 of a storey.
+        // Distance to the edge of the middle 0.55 of a bay and 0.6 of a storey, positive inside.
         let inside = |x: f64, part: f64| 0.5 * part - (x.rem_euclid(1.0) - 0.5).abs();
         let inside = [inside(p.x / bay, 0.55), inside(p.y / storey, 0.6)];
-        // An edge is smoothed over half a pixel to each side; a pixel is 1 / focal of the distance wide, and on a face seen at a slant
-        // of up to 40° more than that by half.
+        // An edge is smoothed over half a pixel to each side; a pixel is 1 / focal of the distance
+        // wide, and on a face seen at an angle of up to 40° half as much again.
         let blur = 0.5 * 1.5 * far / eye.focal / bay;
-        // Below a tenth of the domain walls see less of the sky.
+        // Below a tenth of the domain's height walls see less of the sky.
         if p.y < 1.0 || inside.iter().any(|edge| edge.abs() < blur) {
             continue;
         }
         let is_glass = inside.iter().all(|edge| *edge > 0.0);
-        // The wall is white. Glass gives back 0.06 of the light and mirrors 0.04 to 0.1 of the sky.
+        // The wall is white. Glass reflects 0.06 of the light diffusely and mirrors 0.04 to 0.1 of
+        // the sky.
         counts[0] += usize::from((luminance(image.beauty[i]) < 0.5) != is_glass);
         counts[1] += usize::from(is_glass);
     }
@@ -461,7 +468,7 @@ fn windows_stand_in_their_bays_and_storeys() {
     let [faults, glass] = window_faults(&context(), windows);
     assert!(glass > 400, "{glass}");
     assert_eq!(faults, 0);
-    // The controls: wider bays, and no windows.
+    // Controls: wider bays, and no windows.
     let wider = windows.replace("1.6", "1.7");
     for other in [&wider[..], ""] {
         let [faults, _] = window_faults(&context(), other);

@@ -1,4 +1,4 @@
-//! Colours and pictures on solids: texel by texel, by both methods.
+//! Colours and textures on solids: texel by texel, with both methods.
 
 use std::path::Path;
 
@@ -15,16 +15,16 @@ use super::support::{Eye, Setup, context, scene, spoiled, uniform_sky, write_sky
 
 const METHODS: [(&str, &str); 2] = [("ssfr", "ssfr/shade"), ("ray", "rays/cast")];
 
-/// Where the faces' middles are, their width, and how far before them the eye stands, metres.
+/// Centre of the faces, their width, and the distance of the eye from them, m.
 const MIDDLE: DVec3 = DVec3::splat(5.0);
 const WIDTH: f64 = 4.0;
 
-/// What a texel's half-precision float is off by, as a part of it; and positions and weights in single precision, in texels of 1 m
-/// whose values differ by up to 1.
+/// Relative error of a texel's half-precision float; and error of positions and weights in single
+/// precision, for texels of 1 m whose values differ by up to 1.
 const HALF: f64 = 1.0 / 2048.0;
 const PLACES: f64 = 1e-4;
 
-/// A face that fills the picture of an eye before it: right, up and towards the eye.
+/// A face that fills the picture: its right and up directions as seen from the eye.
 struct Face {
     right: DVec3,
     up: DVec3,
@@ -58,7 +58,7 @@ impl Face {
         }
     }
 
-    /// OBJ of two halves, left and right of the middle, with their texture coordinates.
+    /// OBJ text of two halves, left and right of the middle, with texture coordinates.
     fn text(&self) -> String {
         let half = 0.5 * WIDTH;
         let mut text = String::from("o face\n");
@@ -72,7 +72,7 @@ impl Face {
         text + "g left\nusemtl one\nf 1/1 2/2 5/5 4/4\ng right\nusemtl two\nf 2/2 3/3 6/6 5/5\n"
     }
 
-    /// Where on it each pixel's centre looks, metres.
+    /// Points on the face at the centres of the pixels, m.
     fn places(&self) -> impl Iterator<Item = DVec3> {
         let eye = self.eye();
         (0..64 * 64).map(move |i| {
@@ -95,7 +95,7 @@ fn of_text(text: &str) -> RenderScene {
     }
 }
 
-/// A PNG of these texels, rows from the top.
+/// A PNG with these texels, rows from the top.
 fn png(side: u32, texel: impl Fn(u32, u32) -> [u8; 3]) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, side, side);
@@ -110,13 +110,13 @@ fn png(side: u32, texel: impl Fn(u32, u32) -> [u8; 3]) -> Vec<u8> {
     bytes
 }
 
-/// Four by four texels of which no two are alike, so that nothing can be mirrored or turned.
+/// Four by four texels, all different, so that mirroring or rotation is detected.
 fn code(x: u32, y: u32) -> [u8; 3] {
     let k = 4 * y + x;
     [(17 * k) as u8, (255 - 13 * k) as u8, (97 * k % 256) as u8]
 }
 
-/// IEC 61966-2-1.
+/// Linear value of an sRGB code (IEC 61966-2-1).
 fn linear(code: u8) -> f64 {
     let code = f64::from(code) / 255.0;
     match code <= 0.04045 {
@@ -125,7 +125,7 @@ fn linear(code: u8) -> f64 {
     }
 }
 
-/// The picture of [`code`] at a place in pictures, rows from the bottom, bilinear and repeated.
+/// The texture of [`code`] at texture coordinates, rows from the bottom, bilinear and repeated.
 fn expected(place: DVec2) -> [f64; 3] {
     let p = DVec2::new(place.x, 1.0 - place.y) * 4.0 - 0.5;
     let (low, part) = (p.floor(), p - p.floor());
@@ -179,7 +179,7 @@ impl Shown<'_> {
             .unwrap())
     }
 
-    /// Reflectance of each pixel: the picture over one of the same faces in white.
+    /// Reflectance of each pixel: the picture divided by one of the same faces in white.
     fn reflectance(&self, context: &Context) -> Vec<[f64; 3]> {
         let white = Shown {
             solids: "",
@@ -302,7 +302,7 @@ fn a_picture_is_laid_on_along_axes() {
         let place = |p: DVec3| DVec2::new(p.dot(face.right), p.dot(face.up)) / WIDTH;
         let named =
             "[[solids.material]]\nname = \"face\"\ntexture = { file = \"a.png\", metres = 4.0 }";
-        // On all that has no material.
+        // Applied to everything without a material.
         let on_all = "texture = { file = \"a.png\", metres = 4.0 }";
         for ((method, pass), solids) in METHODS
             .into_iter()
@@ -328,13 +328,13 @@ fn a_picture_is_laid_on_along_axes() {
     }
 }
 
-/// A wall of the basin has its picture as a solid has, times its colour.
+/// A wall of the basin has a texture as a solid has, multiplied by its colour.
 #[test]
 fn a_picture_is_laid_on_walls() {
     let files = [("a.png", png(4, code))];
     let scene = scene(1.0, 1.0);
     let eye = Eye::new([5.0, 5.0, 4.0], [5.0, 5.0, 0.0], 64.0);
-    // The wall stands a little outside of the domain's side.
+    // The wall is slightly outside the domain's side.
     let far = 4.0 + 0.006 * scene.particle_spacing;
     let all = |half: f64| {
         let places = (0..64 * 64).map(|i| {
@@ -376,7 +376,8 @@ fn a_picture_is_laid_on_walls() {
     }
 }
 
-/// Texels of 1/128 m, black and white in turn, of which a pixel sees eight along each side; and under a slant many more.
+/// Texels of 1/128 m, alternating between black and white: a pixel covers eight along each side,
+/// and many more at a slant.
 #[test]
 fn a_far_checker_is_its_mean() {
     let files = [(
@@ -399,7 +400,7 @@ fn a_far_checker_is_its_mean() {
             };
             let error = |context: &Context| {
                 let found = shown.reflectance(context);
-                // What is beside the face is the same in both pictures.
+                // Outside the face both pictures are the same.
                 let on_face = found.into_iter().filter(|it| it[0] < 0.9999);
                 let off: Vec<f64> = on_face.map(|it| (it[0] - 0.5).abs()).collect();
                 assert!(off.len() > 100, "{}", off.len());
@@ -414,7 +415,8 @@ fn a_far_checker_is_its_mean() {
     }
 }
 
-/// Of four samples and more each takes one of the two levels and its part of the taps: their mean is what each would see alone.
+/// With four samples or more, each sample reads one of the two mip levels and a part of the taps;
+/// their mean equals what each would compute by itself.
 #[test]
 fn samples_share_what_one_would_look_up() {
     const SAMPLES: u32 = 16;
@@ -436,7 +438,7 @@ fn samples_share_what_one_would_look_up() {
             let found = shown.reflectance(context).into_iter();
             found.map(|it| it[0]).collect::<Vec<f64>>()
         };
-        // The picture's own level is black, and the next one white.
+        // The base level is black, and the next one white.
         let (from, to) = ("mix(above, below, part.y)", "vec3f(f32(size.x == 32u))");
         let levels = spoiled(pass, from, to);
         for part in [0.25, 0.5, 0.8f64] {
@@ -450,7 +452,7 @@ fn samples_share_what_one_would_look_up() {
                 "{method}: {found}, not {part}"
             );
         }
-        // Along a slant the mean of a ramp is its middle.
+        // Along a slant the mean of a ramp is its middle value.
         let ramp = |context: &Context| picture(slanted, 4.0, SAMPLES, context);
         let each = ramp(&spoiled(pass, "ceil(taps / samples)", "taps"));
         let off = |found: &[f64]| {
@@ -508,7 +510,7 @@ fn materials_that_nothing_has_are_refused_with_their_key() {
         error.contains("b.mtl line 1") && error.contains("(vt)"),
         "{error}"
     );
-    // The control.
+    // Control.
     assert_eq!(fault("materials = \"b.mtl\"", &scene), None);
     assert_eq!(fault(&named("one"), &scene), None);
 }
@@ -591,7 +593,7 @@ fn files_that_cannot_be_used_are_refused_with_their_key() {
             assert!(error.contains(word), "{solids}: {error}");
         }
     }
-    // The control; and what is in the files decides the hash, not what they are called.
+    // Control. The hash depends on the files' contents, not on their names.
     let good = look("materials = \"good.mtl\"").unwrap().hash();
     std::fs::copy(inside("good.mtl"), inside("other.mtl")).unwrap();
     assert_eq!(good, look("materials = \"other.mtl\"").unwrap().hash());

@@ -1,8 +1,9 @@
 //! Pictures of scenes whose light, motion and shape are known in closed form.
 //!
-//! The expected numbers are computed here in f64 from the laws themselves (Snell, Fresnel, Beer and Lambert, the
-//! dispersion of deep water), never by a helper of the renderer. Most waters are a single ball, so large or so near to
-//! the lens that its surface, its normal and its thickness are those of a sphere.
+//! The expected numbers are computed here in f64 from the laws themselves (Snell, Fresnel,
+//! Beer–Lambert, the dispersion of deep water), never by a helper of the renderer. In most scenes
+//! the water is a single ball, so large or so near to the camera that its surface, its normal and
+//! its thickness are those of a sphere.
 
 mod caustics;
 mod filtered;

@@ -1,4 +1,4 @@
-//! Between frames: the way that blur follows, and where things go to.
+//! Motion between frames: the path of motion blur, and motion vectors.
 
 use glam::DVec3;
 use swell::domain::particles::Particles;
@@ -6,7 +6,8 @@ use swell::render::{Image, Moment, Water};
 
 use super::support::{Eye, Setup, ball, context, draw_moment, scene, uniform_sky};
 
-/// Metres a second squared along z: 4.8 m away a frame before and after, at 24 frames a second.
+/// Acceleration along z, m/s²: 4.8 m of displacement a frame before and after, at 24 frames a
+/// second.
 const PUSH: f64 = 5530.0;
 const SECONDS: f64 = 1.0 / 24.0;
 
@@ -17,14 +18,14 @@ fn eye() -> Eye {
     }
 }
 
-/// Where the ball is a number of frames later: it is thrown towards −z, stands still at the frame, and comes back.
+/// The ball a number of frames later: thrown towards −z, at rest at the frame, then returning.
 fn thrown(frames: f64) -> Particles {
     let t = frames * SECONDS;
     let away = DVec3::Z * (0.5 * PUSH * t * t);
     ball(eye().target + away, DVec3::Z * (PUSH * t))
 }
 
-/// Mean place of a picture's alpha, pixels to the right.
+/// Centroid of a picture's alpha, pixels to the right.
 fn middle(image: &Image) -> f64 {
     let side = image.width as usize;
     let sums = (image.beauty.iter().enumerate()).fold([0.0; 2], |[sum, first], (i, value)| {
@@ -34,7 +35,8 @@ fn middle(image: &Image) -> f64 {
     sums[1] / sums[0]
 }
 
-/// Pixels to the right of where it stands at which the ball is seen in the mean of instants a quarter of a frame before and after.
+/// Shift of the ball to the right, pixels, in the mean of instants a quarter of a frame before and
+/// after.
 fn shift(method: &'static str, around: [Option<&Water>; 4]) -> f64 {
     let shot = |shutter: f64| {
         let setup = Setup {
@@ -71,13 +73,15 @@ fn blur_follows_the_curve_through_the_frames_around() {
     let expected = away * 240.0 / 50f64.sqrt();
     for method in ["ssfr", "ray"] {
         let found = shift(method, [None, Some(&before), Some(&after), None]);
-        // A disc of 14 pixels' radius is counted to a few hundredths of a pixel. Its surface by rays is known to a hundredth of a voxel
-        // or two, which are 0.32 m and 11 pixels.
+        // The centroid of a disc with a radius of 14 pixels is known to a few hundredths of a
+        // pixel. Its surface by rays is known to one or two hundredths of a voxel, which is 0.32 m
+        // and 11 pixels.
         assert!(
             (found - expected).abs() < 0.4,
             "{method}: {found} {expected}"
         );
-        // The controls: with its velocity alone it stands still, and with one side it goes half of that in the mean.
+        // Controls: with its velocity only it does not move, and with one neighbouring frame it
+        // moves by half on average.
         let straight = shift(method, [None; 4]);
         assert!(straight.abs() < 0.4, "{method}: {straight}");
         let half = shift(method, [None, None, Some(&after), None]);
@@ -85,7 +89,7 @@ fn blur_follows_the_curve_through_the_frames_around() {
     }
 }
 
-/// Motion of the middle of the ball to the next frame, pixels to the right, and what it should be by where it goes.
+/// Motion of the middle of the ball to the next frame, pixels to the right.
 fn motion(method: &'static str, after: Option<&Water>) -> f64 {
     let setup = Setup {
         method,
@@ -113,12 +117,12 @@ fn motion(method: &'static str, after: Option<&Water>) -> f64 {
 #[test]
 fn motion_vectors_lead_to_the_next_frame() {
     let after = Water::new(ball(eye().target + DVec3::Z * 0.3, DVec3::Z * 8.0));
-    // The middle of the ball is 0.4 m nearer than its centre.
+    // The front of the ball is 0.4 m nearer than its centre.
     let scale = 240.0 / (50f64.sqrt() - 0.4);
     for method in ["ssfr", "ray"] {
         let found = motion(method, Some(&after));
         assert!((found - 0.3 * scale).abs() < 0.3, "{method}: {found}");
-        // The control: by its velocity it would go 0.125 m.
+        // Control: by its velocity it would move 0.125 m.
         let found = motion(method, None);
         assert!(
             (found - 3.0 * SECONDS * scale).abs() < 0.3,

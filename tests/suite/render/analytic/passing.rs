@@ -1,4 +1,4 @@
-//! Solids that go on past the eye: what of them is before it is all there.
+//! Solids that extend past the eye: the part in front of it is complete.
 
 use glam::DVec3;
 use swell::domain::{bounds::Bounds, particles::Particles};
@@ -23,7 +23,7 @@ fn walls() -> [Bounds; 3] {
     ]
 }
 
-/// What a ray meets first, its face and how far off, where it meets anything.
+/// What a ray meets first, if anything: its index, the normal of the face, and the distance.
 fn first(along: DVec3) -> Option<(usize, DVec3, f64)> {
     let walls = walls().into_iter().enumerate();
     let met = walls.filter_map(|(index, wall)| {
@@ -34,12 +34,12 @@ fn first(along: DVec3) -> Option<(usize, DVec3, f64)> {
     met.chain(ground).min_by(|a, b| a.2.total_cmp(&b.2))
 }
 
-/// Of the pixels whose neighbours see the same face, how many are not as deep as it is, and how many there are.
-/// What is nearer than `near` metres is drawn there.
+/// Number of pixels with a wrong depth, and number of pixels, among those whose neighbours see the
+/// same face. Things nearer than `near` metres are rendered at that depth.
 fn lost(context: &Context, near: f64, tile: u32) -> [usize; 2] {
     let scene = RenderScene {
         solids: walls().into_iter().map(box_mesh).collect(),
-        // `near` is 0.12 of it.
+        // The near distance is 0.12 of the spacing.
         particle_spacing: near / 0.12,
         ..scene(0.1, 1.0)
     };
@@ -73,7 +73,8 @@ fn lost(context: &Context, near: f64, tile: u32) -> [usize; 2] {
                 Some((.., far)) => near.max(far * eye.direction(i).dot(eye.forward())),
                 None => 1e30,
             };
-            // A face is 0.3 m off, and its corners 40 m away are in f32: 40 ε over 0.3 m, in some 16 roundings.
+            // A face is 0.3 m away, and its corners 40 m away are in f32: 40 ε over 0.3 m, in some
+            // 16 roundings.
             let rounding = 16.0 * 40.0 / 0.3 * f64::from(f32::EPSILON);
             let off = (f64::from(depths[i]) / expected - 1.0).abs();
             counts[0] += usize::from(off > rounding || off.is_nan());
@@ -85,14 +86,14 @@ fn lost(context: &Context, near: f64, tile: u32) -> [usize; 2] {
 
 #[test]
 fn what_is_before_the_eye_of_a_solid_that_passes_it_is_drawn() {
-    // The second one: the walls are nearer than what is drawn at its own depth.
+    // With the larger `near` the walls are nearer than the least depth.
     for (near, tile) in [(0.02, 4096), (0.6, 4096), (0.02, 32), (0.6, 32)] {
         let [off, all] = lost(&context(), near, tile);
         // Of 15 views of 62 × 62 pixels; the others are beside an edge.
         assert!(all > 40_000, "{all}");
         assert_eq!(off, 0, "of {all}, {near} m in tiles of {tile}");
     }
-    // The controls: a side is cut at its end behind the eye, or only at the depth from which on it is drawn at its own.
+    // Controls: an edge is clipped at its end behind the eye, or only at the near distance.
     for (from, to, near) in [
         (
             "depths.x / (depths.x - depths.y)",

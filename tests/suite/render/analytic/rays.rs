@@ -1,4 +1,4 @@
-//! Rays through water: a flat pool, a furnace, Snell's window.
+//! Rays through water: a flat pool, a white furnace, Snell's window.
 
 use glam::{DVec2, DVec3};
 use swell::domain::bounds::Bounds;
@@ -13,9 +13,9 @@ use super::support::{Eye, Setup, context, draw, scene, spoiled, uniform_sky};
 pub(super) const INDEX: f64 = 1.333;
 pub(super) const ABSORPTION: [f64; 3] = [0.02, 0.15, 0.4];
 const CLEAR: [f64; 3] = [0.0; 3];
-/// Of particles, metres.
+/// Spacing of particles, m.
 pub(super) const SPACING: f64 = 0.25;
-/// Of the pool, metres.
+/// Level of the pool, m.
 pub(crate) const LEVEL: f64 = 2.0;
 pub(super) const SIDE: f64 = 10.0;
 
@@ -49,7 +49,8 @@ fn by_rays(eye: Eye) -> Setup {
     }
 }
 
-/// Snell: the part of a unit direction along a level surface shrinks by the index.
+/// Refracts a direction at a level surface: the horizontal part of a unit direction shrinks by the
+/// index (Snell).
 pub(super) fn refracted(along: DVec3, index: f64) -> DVec3 {
     let level = DVec3::new(along.x, 0.0, along.z) / index;
     level - DVec3::Y * (1.0 - level.length_squared()).sqrt()
@@ -62,8 +63,9 @@ pub(super) fn reflectance(cosine: f64, index: f64) -> f64 {
     0.5 * (s * s + p * p)
 }
 
-/// Of what a picture of a flat pool over a white floor, under a sky of radiance 1, shows: the worst relative error against Snell,
-/// Fresnel, Beer and Lambert, and light that is scattered once on its way straight down, as the body of deep water throws it back.
+/// Largest relative error of a picture of a flat pool over a white floor, under a sky of radiance
+/// 1, compared with Snell, Fresnel, Beer–Lambert and light that is scattered once on its way
+/// straight down, as the body of deep water returns it.
 fn pool_error(context: &Context, theta: f64, scattering: [f64; 3]) -> f64 {
     let (sin, cos) = f64::to_radians(theta).sin_cos();
     let target = DVec3::new(5.0, LEVEL, 5.0);
@@ -91,14 +93,16 @@ fn pool_error(context: &Context, theta: f64, scattering: [f64; 3]) -> f64 {
         let cosine = -refracted(along, INDEX).y;
         let way = LEVEL / cosine;
         for c in 0..3 {
-            // Daylight comes straight down: the sun, which is too dim to be seen, stands at the zenith.
+            // Daylight comes straight down: the sun, which is too dim to be seen, is at the zenith.
             let extinction = ABSORPTION[c] + scattering[c];
             let floor = (-extinction * (way + LEVEL)).exp();
-            // Hapke 1981, equation 38, times ∫ 2 σ exp(−σ (t + t cos θ)) dt, which is 1 for deep water seen from straight above.
+            // Hapke 1981, equation 38, times ∫ 2 σ exp(−σ (t + t cos θ)) dt, which is 1 for deep
+            // water seen from straight above.
             let gamma = (ABSORPTION[c] / extinction).sqrt();
             let whole = 1.0 - (-extinction * way * (1.0 + cosine)).exp();
             let body = (1.0 - gamma) / (1.0 + gamma) * 2.0 / (1.0 + cosine) * whole;
-            // What the floor sends up comes to the eye and, thrown back below the surface, is the floor's once more: not counted.
+            // Light from the floor reaches the eye; what is reflected below the surface returns to
+            // the floor and is not counted.
             let expected = mirrored + (1.0 - mirrored) * (floor + body);
             worst = worst.max((f64::from(pixel[c]) / expected - 1.0).abs());
         }
@@ -106,8 +110,8 @@ fn pool_error(context: &Context, theta: f64, scattering: [f64; 3]) -> f64 {
     worst
 }
 
-/// White ground behind a pool, away from the sun: a long way off all of its light comes over the water, and a metre off it left the pool
-/// a metre below its surface.
+/// White ground behind a pool, on the side away from the sun: far away all of its light comes over
+/// the water, and one metre from the pool it has left the pool a metre below its surface.
 #[test]
 fn the_pools_shadow_ends_where_light_comes_over_it() {
     let depth_at = |context: &Context, x: f64| {
@@ -121,16 +125,18 @@ fn the_pools_shadow_ends_where_light_comes_over_it() {
             ..by_rays(eye)
         };
         let image = draw(context, &setup, &uniform_sky, &pool_scene(), &water(), 1);
-        // Beer: of the sky's light, from straight above, `depth` metres of water leave exp(−σ depth).
+        // Beer: of the sky's light, from straight above, `depth` metres of water leave exp(−σ
+        // depth).
         -f64::from(image.beauty[32 * 64 + 32][2]).ln() / ABSORPTION[2]
     };
-    // 1 % of the light, and the spacing within which the lattice of sunlight knows a way (`light_goes_straight_down_through_a_pool`).
+    // 1 % of the light, and the spacing to which the lattice of sunlight resolves a path
+    // (`light_goes_straight_down_through_a_pool`).
     let (far, near) = (depth_at(&context(), 34.0), depth_at(&context(), SIDE + 1.0));
     assert!(
         far.abs() < 0.01 / ABSORPTION[2] && (near - 1.0).abs() < SPACING,
         "{far}, {near}"
     );
-    // As it was: every place beyond the box as the box's nearest one, at the pool's floor.
+    // Control: every point outside the box uses the nearest point of the box, at the pool's floor.
     let clamped = spoiled("rays/cast", "<= 0.5 * rays.voxel", "<= 1e9 * rays.voxel");
     for x in [34.0, SIDE + 1.0] {
         let control = depth_at(&clamped, x);
@@ -164,8 +170,9 @@ fn a_pool_over_a_white_floor_is_as_snell_fresnel_and_beer_say() {
     }
 }
 
-/// Within 1 % from thin to so deep that only the body is left: optical depths of 0.6 to 20. The surface's place is known to 0.002
-/// spacings, half a millimetre here, and 10/m makes 0.5 % of that; with 120/m it was 7 %.
+/// Within 1 % from thin water to water so deep that only its body is visible: optical depths of 0.6
+/// to 20. The surface is located to 0.002 spacings, half a millimetre here, which at 10/m changes
+/// the light by 0.5 %; at 120/m the error is 7 %.
 #[test]
 fn a_milky_pool_has_the_light_that_its_body_scatters() {
     let milky = [0.3, 3.0, 10.0];
@@ -184,7 +191,8 @@ fn a_milky_pool_has_the_light_that_its_body_scatters() {
     }
 }
 
-/// Of the parts of a milky pool's light: the worst error against the same optics, part by part, of the whole.
+/// Largest error of the parts of a milky pool's light, compared with the same optics part by part,
+/// relative to the total.
 fn parts_error(context: &Context) -> f64 {
     const THETA: f64 = 40.0;
     let milky = [0.3, 3.0, 10.0];
@@ -237,7 +245,7 @@ fn parts_error(context: &Context) -> f64 {
     worst
 }
 
-/// Within 1 % of the whole, as the whole is.
+/// Within 1 % of the total.
 #[test]
 fn parts_of_a_pools_light_are_what_it_mirrors_lets_through_and_scatters() {
     let error = parts_error(&context());
@@ -251,14 +259,15 @@ fn parts_of_a_pools_light_are_what_it_mirrors_lets_through_and_scatters() {
     }
 }
 
-/// A splash of clear water before white things under a white sky is not seen.
+/// Largest error of a white furnace: a splash of clear water in front of white things under a white
+/// sky is invisible.
 fn furnace_error(context: &Context) -> f64 {
     let mut splash = water();
     for p in &mut splash.position {
         let [x, y, z] = p.map(f64::from);
         let wave = 0.6 * (1.7 * x).sin() * (1.3 * z).cos() * y / LEVEL;
         p[1] = (y + wave) as f32;
-        // And drops above it.
+        // Drops above it.
         if (37.0 * x + 11.0 * z).sin() > 0.97 && y > LEVEL - SPACING {
             p[1] += 1.5;
         }
@@ -285,7 +294,8 @@ fn clear_water_in_a_white_furnace_is_not_seen() {
     assert!(control > 0.01, "{control}");
 }
 
-/// Half of the angle across the part of the surface through which an eye half a metre below sees the sky, degrees.
+/// Half the angle of the part of the surface through which an eye half a metre below it sees the
+/// sky, degrees.
 fn window(context: &Context) -> f64 {
     let eye = Eye {
         up: DVec3::Z,
@@ -297,7 +307,7 @@ fn window(context: &Context) -> f64 {
         ..by_rays(eye)
     };
     let image = draw(context, &setup, &uniform_sky, &pool_scene(), &water(), 1);
-    // Solid angle of what is brighter than half: a cone's is 2π (1 − cos θ).
+    // Solid angle of everything brighter than half: a cone's is 2π (1 − cos θ).
     let mut seen = 0.0;
     for (i, pixel) in image.beauty.iter().enumerate() {
         if pixel[0] > 0.5 {
@@ -320,7 +330,7 @@ fn an_eye_under_water_sees_snells_window() {
     assert!((control - 48.6).abs() > 1.0, "{control}°");
 }
 
-/// How far the foot of a black step under water is from where Snell puts it, pixels.
+/// Distance of the foot of a black step under water from where Snell's law puts it, pixels.
 fn edge_error(context: &Context) -> f64 {
     const FOOT: f64 = 5.0;
     let eye = Eye::new([1.0, 6.0, 5.0], [4.0, LEVEL, 5.0], 120.0);
@@ -340,7 +350,8 @@ fn edge_error(context: &Context) -> f64 {
     };
     let image = draw(context, &setup, &uniform_sky, &scene, &water(), 1);
     let side = eye.size as usize;
-    // The floor is as bright as the sky, so that a pixel of it is 1 however much the surface throws back; the step sends nothing.
+    // The floor is as bright as the sky, so a pixel of it is 1 whatever the surface reflects; the
+    // step is black.
     let lit: f64 = (0..side)
         .map(|row| {
             let i = row * side + side / 2;
@@ -348,7 +359,7 @@ fn edge_error(context: &Context) -> f64 {
             (f64::from(image.beauty[i][1]) - mirrored) / (1.0 - mirrored)
         })
         .sum();
-    // Where on the surface the ray to the foot goes in, by halving.
+    // Point where the ray to the foot enters the surface, by bisection.
     let (mut low, mut high) = (eye.position.x, FOOT);
     for _ in 0..60 {
         let x = 0.5 * (low + high);
@@ -378,8 +389,8 @@ fn an_edge_under_water_is_seen_where_snell_puts_it() {
     assert!(control > 0.5, "{control} pixels");
 }
 
-/// Particles end 0.4 spacings before a wall that stands in the pool, as they do at solids: an eye under water sees the wall, and no
-/// sheet of air that mirrors.
+/// Particles end 0.4 spacings in front of a wall in the pool, as they do at solids: an eye under
+/// water sees the wall and not a reflecting layer of air.
 #[test]
 fn water_lies_against_a_wall_that_its_particles_keep_off() {
     let wall = 6.1;
@@ -396,7 +407,7 @@ fn water_lies_against_a_wall_that_its_particles_keep_off() {
         position: kept,
         ..Particles::default()
     };
-    // 60° from the wall's normal: beyond 48.6° water under air mirrors.
+    // 60° from the wall's normal: beyond 48.6° the surface between water and air reflects totally.
     let eye = Eye::new(
         [4.0, 1.0, 3.0],
         [wall, 1.0, 3.0 + 2.1 * 3.0f64.sqrt()],
@@ -409,13 +420,14 @@ fn water_lies_against_a_wall_that_its_particles_keep_off() {
     };
     // The plane of the wall in f32, ten metres from the origin.
     assert!(off(&context()) < 1e-5, "{}", off(&context()));
-    // The surface is half a spacing, of which the gap has 0.4, beyond the last particles' centres; halved for the level set's own rounding.
+    // The surface is half a spacing beyond the last particles' centres, and the gap is 0.4 spacings
+    // wide; halved for the rounding of the level set.
     let control = off(&spoiled("rays/aovs", "gap < rays.gap", "gap < 0.0"));
     assert!(control > 0.5 * 0.4 * SPACING, "{control}");
 }
 
-/// A slab over milky water, in the sun alone: seen along its shadow the water darkens from column to column, without a step at each place
-/// where the way through it is looked at.
+/// A slab over milky water, lit only by the sun: seen along its shadow, the water darkens gradually
+/// from column to column, without steps at the points where the ray samples the light.
 #[test]
 fn a_shadow_in_water_has_no_edge_but_its_own() {
     let (min, max) = (DVec3::new(4.0, 4.0, 5.0), DVec3::new(8.0, 4.2, 10.0));
@@ -437,7 +449,8 @@ fn a_shadow_in_water_has_no_edge_but_its_own() {
     };
     let steepest = |context: &Context| {
         let image = draw(context, &setup, &|_, _| [0.0; 3], &scene, &water(), 1);
-        // Of the middle rows, whose rays meet neither the floor nor the surface before the pool's side.
+        // The middle rows, whose rays meet neither the floor nor the surface before the pool's
+        // side.
         let columns: Vec<f64> = (0..64)
             .map(|x| {
                 (24..40)
@@ -456,13 +469,14 @@ fn a_shadow_in_water_has_no_edge_but_its_own() {
         "mix(start, end, own_place)",
         "0.5 * (start + end)",
     ));
-    // The longest of the four parts is 7/16 of the way, and one step where it is looked at in one place; 64 looks a column in each part
-    // leave 1/8 of that, and the shadow's own edge is as steep.
+    // The longest of the four segments is 7/16 of the ray, and one step where it is sampled at a
+    // single point; 64 samples per column in each segment leave 1/8 of that, and the shadow's own
+    // edge is as steep.
     assert!(found < 0.3 && control > 7.0 / 16.0, "{found}, {control}");
 }
 
-/// Channels of a pool that flows at 3 m/s: depth, normal, place and motion of its level surface, and the water on the straight line
-/// down to the floor, in shares of what they have to be.
+/// Largest relative error of the AOVs of a pool that flows at 3 m/s: depth, normal, position and
+/// motion of its level surface, and thickness of the water straight down to the floor.
 fn channel_error(context: &Context) -> f64 {
     let velocity = DVec3::new(1.0, 0.0, 3.0);
     let mut flowing = water();
@@ -503,7 +517,7 @@ fn channel_error(context: &Context) -> f64 {
 
 #[test]
 fn channels_of_rays_are_those_of_a_flowing_pool() {
-    // The surface is level to a thousandth of a spacing, and seen from 5 m at a slope of a half.
+    // The surface is level to a thousandth of a spacing, seen from 5 m at a slope of one half.
     let error = channel_error(&context());
     assert!(error < 2e-3, "{error}");
     for (from, to) in [

@@ -1,4 +1,4 @@
-//! Ripples: waves of deep water, and how they turn what is mirrored.
+//! Ripples: waves of deep water, and how they deflect reflections.
 
 use std::f64::consts::TAU;
 
@@ -9,19 +9,20 @@ use swell::render::Image;
 use super::support::{RAMP_ERROR, Setup, context, kernel, ramp_sky, scene, sky_place};
 use super::water::{BLACK, INDEX, Meeting, RADIUS, meetings, pool, setup_at};
 
-/// Longest wave, metres, and how much shorter each of the seven is than the one before.
+/// Longest wave, m, and the ratio of each of the seven wavelengths to the previous one.
 const LONGEST: f64 = 1.0;
 const RATIO: f64 = 0.74;
 const WAVES: usize = 7;
 
-/// Slopes and lost variance at places (x, z), seconds and footprints, of ripples with a slope of 0.1.
+/// Slopes and lost variance at (x, z), time in seconds and footprint, of ripples with a slope of
+/// 0.1.
 fn ripples(context: &Context, input: &[[f32; 4]]) -> Vec<[f32; 4]> {
     let body = "let r = ripple_at(value.xy, value.z, 1.0, 0.1, value.w); \
                 return vec4f(r.slope, r.lost, 0.0);";
     kernel(context, "shared/ssfr_ripple", body, input)
 }
 
-/// Solves a small dense system by elimination with pivots.
+/// Solves a small dense system by Gaussian elimination with pivoting.
 fn solve(mut a: Vec<Vec<f64>>, mut b: Vec<f64>) -> Vec<f64> {
     let n = b.len();
     for k in 0..n {
@@ -49,11 +50,11 @@ fn solve(mut a: Vec<Vec<f64>>, mut b: Vec<f64>) -> Vec<f64> {
 struct Fit {
     /// Amplitude and phase of each wave at time 0: a cos(φ − ω t).
     waves: Vec<[f64; 2]>,
-    /// Root mean square of what is left over that of the series.
+    /// Rms of the residual relative to that of the series.
     rest: f64,
 }
 
-/// Least squares with the seven frequencies.
+/// Least-squares fit with the given frequencies.
 fn fit(times: &[f64], series: &[f64], frequencies: &[f64]) -> Fit {
     let row = |t: f64| -> Vec<f64> {
         frequencies
@@ -89,7 +90,7 @@ fn fit(times: &[f64], series: &[f64], frequencies: &[f64]) -> Fit {
     }
 }
 
-/// Fits of both slopes at a place over 25 s, and the lost variance there.
+/// Fits both slopes at a position over 25 s, and returns the lost variance there.
 fn watch(context: &Context, place: DVec2, footprint: f64, gravity: f64) -> ([Fit; 2], f64) {
     let times: Vec<f64> = (0..512)
         .map(|i| f64::from(i) * 0.05)
@@ -115,12 +116,12 @@ const GRAVITY: f64 = 9.81;
 #[test]
 fn ripples_obey_the_dispersion_of_deep_water() {
     let context = context();
-    // Near the origin the noise that bends the crests stands still: its slope is zero there.
+    // Near the origin the noise that bends the crests does not change: its slope is zero there.
     let step = 3e-4;
     let at = |x: f64, z: f64| watch(&context, DVec2::new(x, z) * step, 0.0, GRAVITY).0;
     let [east, west] = [at(1.0, 0.0), at(-1.0, 0.0)];
     let [north, south] = [at(0.0, 1.0), at(0.0, -1.0)];
-    // Phases of up to 500 are f32, good to 3e-5.
+    // Phases of up to 500 are f32, accurate to 3e-5.
     assert!(
         east[0].rest < 2e-4 && east[1].rest < 2e-4,
         "{}",
@@ -131,7 +132,8 @@ fn ripples_obey_the_dispersion_of_deep_water() {
         (angle + TAU / 2.0).rem_euclid(TAU) - TAU / 2.0
     };
     for i in 0..WAVES {
-        // The wave number as crests lie, by the phase from place to place; the fit has told how they move.
+        // The wave vector from the difference of phases between positions; the fit has given the
+        // frequency.
         let k = DVec2::new(
             turned(&east[0], &west[0], i),
             turned(&north[0], &south[0], i),
@@ -140,12 +142,12 @@ fn ripples_obey_the_dispersion_of_deep_water() {
         // 11 × 3 × (1.4 step)² of bending, on a phase of 2 step k.
         let error = (k.length() / length - 1.0).abs();
         assert!(error < 3e-3, "{i}: {} for {length}", k.length());
-        // Slopes along a wave's own way: they are large where it goes.
+        // The slope is along the wave's direction of travel.
         let slope = DVec2::new(east[0].waves[i][0], east[1].waves[i][0]);
         assert!((slope.normalize().dot(k.normalize().abs()) - 1.0).abs() < 1e-3);
         assert!(k.x > 0.0, "{i} comes from ahead");
     }
-    // The control: a hundredth of gravity is half a hundredth of the frequency, and 0.5 to 2 radians after 25 s.
+    // Control: 1 % of gravity is 0.5 % of the frequency, and 0.5 to 2 radians after 25 s.
     let ([along, _], _) = watch(&context, DVec2::ZERO, 0.0, 1.01 * GRAVITY);
     assert!(along.rest > 0.05, "{}", along.rest);
 }
@@ -167,13 +169,14 @@ fn slopes_that_a_pixel_cannot_show_are_in_its_roughness() {
     for footprint in [0.05, 0.2] {
         let (sum, lost) = total(footprint);
         assert!((sum / all - 1.0).abs() < 1e-4, "{footprint}: {sum} {all}");
-        // The control: what is lost is no small part.
+        // Control: the lost part is not negligible.
         assert!(lost > 0.02 * all, "{lost} {all}");
     }
 }
 
-/// Worst error of what black water with ripples mirrors of [`ramp_sky`] 10 s after frame 0; the law's clock runs
-/// `clock` times as fast, and its slopes are `sign` times the ripples'.
+/// Largest error of the reflection of [`ramp_sky`] in black water with ripples, 10 s after frame 0.
+/// The expected reflection uses a clock that is `clock` times as fast, and slopes that are `sign`
+/// times the ripples'.
 fn ripple_error(context: &Context, image: &Image, setup: &Setup, clock: f64, sign: f64) -> f64 {
     let found = meetings(image, &setup.eye);
     let input: Vec<[f32; 4]> = found
@@ -203,8 +206,8 @@ fn ripple_error(context: &Context, image: &Image, setup: &Setup, clock: f64, sig
 
 #[test]
 fn ripples_turn_the_mirror_at_the_frames_instant() {
-    // As the mirror of `water_mirrors_the_sky_by_the_law_of_reflection`; a position rounded by 1e-6 m turns a crest of 17 cm
-    // by 4e-5 of a radian.
+    // The tolerance of `water_mirrors_the_sky_by_the_law_of_reflection`; a position rounded by 1e-6
+    // m turns a crest of 17 cm by 4e-5 rad.
     let context = context();
     let mut setup = setup_at(20.0, 2.0, BLACK.to_owned());
     setup.surface += "ripple = { wavelength_m = 1.0, slope = 0.1 }\n";

@@ -1,4 +1,5 @@
-//! The sea beyond the box: optics of still water, a level that goes on without a seam, waves where theory has them.
+//! The sea outside the box: optics of still water, a level that continues without a seam, waves as
+//! in theory.
 
 use glam::{DVec2, DVec3};
 use swell::domain::motion::Spectrum;
@@ -26,7 +27,8 @@ fn setup(method: &'static str, eye: Eye, sea: &str) -> Setup {
     }
 }
 
-/// An eye that looks at a place of the level from `theta` degrees off the vertical, along +x and down.
+/// An eye that looks at a point of the surface from `theta` degrees off the vertical, along +x and
+/// down.
 fn above(target: DVec3, theta: f64, distance: f64, focal: f64) -> Eye {
     let (sin, cos) = theta.to_radians().sin_cos();
     let from = target + distance * DVec3::new(-sin, cos, 0.0);
@@ -36,8 +38,8 @@ fn above(target: DVec3, theta: f64, distance: f64, focal: f64) -> Eye {
     }
 }
 
-/// Worst relative error of a picture of flat water over a white floor under a sky of radiance 1 against Snell, Fresnel, Beer and
-/// Lambert.
+/// Largest relative error of a picture of flat water over a white floor under a sky of radiance 1,
+/// compared with Snell, Fresnel and Beer–Lambert.
 fn flat_error(image: &Image, eye: &Eye) -> f64 {
     let mut worst = 0.0f64;
     for (i, pixel) in image.beauty.iter().enumerate() {
@@ -52,12 +54,12 @@ fn flat_error(image: &Image, eye: &Eye) -> f64 {
     worst
 }
 
-/// A picture of the pool and the sea about it.
+/// A picture of the pool and the sea around it.
 fn picture(context: &Context, setup: &Setup) -> Image {
     draw(context, setup, &uniform_sky, &pool_scene(), &water(), 1)
 }
 
-/// Within 1 %, as the pool itself, well away from the box.
+/// Within 1 %, like the pool itself, well away from the box.
 #[test]
 fn a_still_sea_is_as_snell_fresnel_and_beer_say() {
     let error = |context: &Context, method, theta, sea| {
@@ -74,7 +76,8 @@ fn a_still_sea_is_as_snell_fresnel_and_beer_say() {
     }
 }
 
-/// By rays no pixel across the box's side is off by more than 1 %, as in the pool; a seam of a pixel's width would be.
+/// With rays no pixel across the box's side is off by more than 1 %, as in the pool; a seam one
+/// pixel wide would be.
 #[test]
 fn the_sea_goes_on_from_the_box_without_a_seam() {
     let error = |context: &Context, theta| {
@@ -95,7 +98,7 @@ fn the_sea_goes_on_from_the_box_without_a_seam() {
     assert!(found > 0.01, "an edge 0.1 m too low: {found}");
 }
 
-/// A pool whose level rises by a tenth of its way along x.
+/// A pool whose level rises by a tenth of the distance along x.
 fn sloping() -> Particles {
     let mut water = water();
     for p in &mut water.position {
@@ -106,8 +109,8 @@ fn sloping() -> Particles {
     water
 }
 
-/// Beside the edge the sea stands as high as the water in the box, a tenth of a particle spacing at most off: half a voxel of the level
-/// set is a quarter, and the field there is nearly straight.
+/// At the edge the sea is as high as the water in the box, within a tenth of a particle spacing:
+/// half a voxel of the level set is a quarter, and the field there is nearly linear.
 #[test]
 fn the_sea_meets_the_edge_of_the_simulated_water_in_height() {
     let off = |context: &Context| {
@@ -120,7 +123,7 @@ fn the_sea_meets_the_edge_of_the_simulated_water_in_height() {
         let places: Vec<DVec3> = image.aovs.p.unwrap().into_iter().map(wide).collect();
         let side = eye.size as usize;
         let mut worst = 0.0f64;
-        // Rows of the picture go along x; the box begins where z changes its sign.
+        // Rows of the picture run along x; the box begins where z changes its sign.
         for (i, p) in places.iter().enumerate().take(side * (side - 1)) {
             let q = places[i + side];
             if (p.z < 0.0) != (q.z < 0.0) && (1.5..8.5).contains(&p.x) {
@@ -159,7 +162,8 @@ fn waves() -> OpenWaves {
     OpenWaves::sea(&asked, 30f64.to_radians())
 }
 
-/// Worst distance of the surface from linear theory at `time`, metres, and the root mean square of what theory has.
+/// Largest distance of the surface from linear theory at `time`, m, and the rms elevation of
+/// theory, m.
 fn wave_error(image: &Image, time: f64) -> [f64; 2] {
     let waves = waves();
     let (mut worst, mut sum, mut count) = (0.0f64, 0.0, 0.0);
@@ -173,8 +177,9 @@ fn wave_error(image: &Image, time: f64) -> [f64; 2] {
     [worst, f64::sqrt(sum / count)]
 }
 
-/// Positions are f32 of numbers up to 60 m, 4e-6 m, and phases f32 of numbers up to 60 m × 1.1 rad/m; a pixel of 0.2 m takes
-/// 1 − exp(−(0.2 × 1.1)² / 8) = 0.6 % of the finest wave's height. A centimetre of heights of 0.5 m is 2 %.
+/// Positions are f32 of numbers up to 60 m, 4e-6 m, and phases f32 of numbers up to 60 m × 1.1
+/// rad/m; a pixel of 0.2 m takes 1 − exp(−(0.2 × 1.1)² / 8) = 0.6 % of the finest wave's height. A
+/// centimetre of heights of 0.5 m is 2 %.
 #[test]
 fn waves_stand_where_linear_theory_has_them_and_go_as_its_water() {
     let scene = RenderScene {
@@ -210,7 +215,8 @@ fn waves_stand_where_linear_theory_has_them_and_go_as_its_water() {
             let shift = moved - eye.place(p - eye.position);
             off = off.max((shift - DVec2::new(found[0].into(), found[1].into())).length());
         }
-        // A pixel's place is f32 of numbers up to 100: 1e-5; the water's way in a frame is 0.1 pixels and more.
+        // A pixel's position is f32 of numbers up to 100: 1e-5; the water's displacement in a frame
+        // is 0.1 pixels or more.
         assert!(off < 0.002, "{method}: {off} pixels");
     }
 }

@@ -1,4 +1,4 @@
-//! What is seen through sheets of water that splats have no far side of.
+//! Refraction through thin sheets of water, of which splats know no far side.
 
 use glam::DVec2;
 use swell::domain::particles::Particles;
@@ -8,7 +8,8 @@ use swell::render::Image;
 use super::support::{Eye, RAMP_ERROR, Setup, context, draw, ramp_sky, scene, sky_place, spoiled};
 use super::water::INDEX;
 
-/// Balls in one place, each of which stands for a thousandth of its volume: a lens of 0.08 of a ball's thickness, 30 m away.
+/// Balls at one position, each of which represents a thousandth of its volume: a lens of 0.08 of a
+/// ball's thickness, 30 m away.
 const BALLS: u32 = 80;
 const PART: f64 = 1e-3;
 const AWAY: f64 = 30.0;
@@ -38,13 +39,14 @@ fn picture(context: &Context) -> Image {
     draw(context, &setup, &ramp_sky, &scene(1.0, PART), &water, 1)
 }
 
-/// Angle by which a prism of `angle`, both in radians, turns light that passes it in the middle way, by Snell's law at both faces.
+/// Angle by which a prism of angle `angle` deflects light that passes it symmetrically, by Snell's
+/// law at both faces; both in radians.
 fn turned(angle: f64) -> f64 {
     2.0 * (INDEX * (0.5 * angle).sin()).asin() - angle
 }
 
-/// Off the middle of the lens, how far away from where Snell's law has it each pixel shows the sky, and how far light is turned there;
-/// both in pixels.
+/// For each pixel away from the middle of the lens: the distance of the sky that it shows from
+/// where Snell's law puts it, and the deflection of light there, both in pixels.
 fn errors(image: &Image) -> Vec<[f64; 2]> {
     let eye = eye();
     let (_, seen) = &image.lights[0];
@@ -54,7 +56,7 @@ fn errors(image: &Image) -> Vec<[f64; 2]> {
         let place = eye.place(along);
         let far = place.length();
         let distance = (AWAY * eye.forward()).cross(along).length();
-        // Towards the rim a sheet of balls is no thin prism; in the middle it does not turn.
+        // Towards the rim a sheet of balls is not a thin prism; in the middle it does not deflect.
         if !(0.15..0.65).contains(&distance) {
             continue;
         }
@@ -64,7 +66,8 @@ fn errors(image: &Image) -> Vec<[f64; 2]> {
         let angle = (far / eye.focal).atan() - turn;
         let expected = place / far * eye.focal * angle.tan();
         let [u, v] = [0, 1].map(|c| f64::from(light[c] / light[2]));
-        // Where in the picture the sky has that colour: by Newton's steps from what is expected.
+        // Position in the picture where the sky has that colour: Newton's method from the expected
+        // position.
         let mut found = expected;
         for _ in 0..4 {
             let at = |p: DVec2| {
@@ -82,13 +85,13 @@ fn errors(image: &Image) -> Vec<[f64; 2]> {
     errors
 }
 
-/// Of the way that light is turned: 1/30 for metres are measured at the near side of the balls, 1/29 for the prism is not thin, and for the
-/// mean over two spacings of a slope that bends.
+/// Relative to the deflection: 1/30 because metres are measured at the near side of the balls, 1/29
+/// because the prism is not thin, and the mean over two spacings of a slope that varies.
 const OFF: f64 = 0.1;
 
 #[test]
 fn a_sheet_turns_light_as_a_prism() {
-    // A turn of the sky is so many pixels, and a pixel is looked up as a whole.
+    // A turn of the sky is so many pixels, and a lookup is per whole pixel.
     let ramp = eye().focal * std::f64::consts::TAU * RAMP_ERROR + 1.0;
     let share = |context: &Context| {
         let errors = errors(&picture(context));
@@ -99,7 +102,7 @@ fn a_sheet_turns_light_as_a_prism() {
         wrong.count() as f64 / errors.len() as f64
     };
     assert_eq!(share(&context()), 0.0);
-    // The controls: straight on, the other way, a quarter more.
+    // Controls: straight on, the opposite direction, 25 % more.
     for to in ["0.5 + 0.0 * slope", "0.5 - slope", "0.5 + 1.25 * slope"] {
         let wrong = share(&spoiled("ssfr/shade", "0.5 + slope", to));
         assert!(wrong > 0.5, "{to}: {wrong}");

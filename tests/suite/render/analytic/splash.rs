@@ -1,4 +1,4 @@
-//! What water mirrors of solids that spray stands before.
+//! Reflections in water of solids behind spray.
 
 use glam::DVec3;
 use swell::domain::bounds::Bounds;
@@ -11,13 +11,13 @@ use super::support::{ball, context, draw_moment, scene, spoiled, uniform_sky};
 use super::water::{BLACK, INDEX, RADIUS, eye_at, meetings, setup_at};
 
 const LEVEL: f64 = 2.0;
-/// The near side of a black wall, metres, and a cloud that touches it.
+/// The near side of a black wall, m, and a cloud that touches it.
 const WALL: f64 = 7.0;
 const CLOUD: DVec3 = DVec3::new(WALL - 0.4, LEVEL + 0.8, 5.0);
 const CLOUD_RADIUS: f64 = 0.4;
 
-/// What black water mirrors of a cloud before a black wall under a white sky, in the mean over where it is to be seen; and of the wall
-/// beside it.
+/// Mean reflection in black water of a cloud in front of a black wall under a white sky, where the
+/// cloud is visible, and of the wall beside it.
 fn mirrored(context: &Context) -> [f64; 2] {
     let mut setup = setup_at(70.0, LEVEL, BLACK.to_owned());
     setup.eye = eye_at(70.0, LEVEL, 256.0);
@@ -29,7 +29,7 @@ fn mirrored(context: &Context) -> [f64; 2] {
     };
     let scene = RenderScene {
         solids: vec![box_mesh(wall)],
-        // The walk after what is mirrored goes in steps of spacings.
+        // The ray march after the reflection has steps of one spacing.
         particle_spacing: 0.1,
         ..scene(RADIUS, 1.0)
     };
@@ -49,7 +49,8 @@ fn mirrored(context: &Context) -> [f64; 2] {
         let off = (CLOUD - at.position).cross(way).length();
         let on_wall = at.position + way * ((WALL - at.position.x) / way.x);
         let found = f64::from(image.beauty[i][1]) / at.reflectance(INDEX);
-        // Half of the cloud: the picture has it a little aside of where the mirrored ray passes it.
+        // The inner half of the cloud: the picture shows it slightly offset from where the
+        // reflected ray passes it.
         if off < 0.5 * CLOUD_RADIUS {
             cloud.push(found);
         } else if off > 2.0 * CLOUD_RADIUS && on_wall.y < 8.0 {
@@ -62,12 +63,13 @@ fn mirrored(context: &Context) -> [f64; 2] {
     })
 }
 
-/// Spray that absorbs nothing gives back up to 1 under a white sky, the wall 0: what is mirrored is nearer to the one that stands first.
+/// Spray without absorption returns up to 1 under a white sky and the wall 0: the reflection shows
+/// whichever is in front.
 #[test]
 fn what_spray_hides_is_not_mirrored() {
     let [cloud, bare] = mirrored(&context());
     assert!(cloud > 0.5 && bare < 0.5, "{cloud} {bare}");
-    // A mirror of water shows no spray that is brighter than the sky about it.
+    // The reflection shows no spray brighter than the sky around it.
     assert!(cloud < 1.01, "{cloud}");
     let bright = spoiled(
         "ssfr/shade",

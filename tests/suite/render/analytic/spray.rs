@@ -1,4 +1,4 @@
-//! Spray as a volume: its light, its depth and its motion; and eyes in the water.
+//! Spray as a volume: its light, depth and motion; and eyes in the water.
 
 use std::f64::consts::PI;
 
@@ -19,21 +19,22 @@ fn black_sky(_: DVec3, _: DVec2) -> [f64; 3] {
     [0.0; 3]
 }
 
-/// Metres from the eye to the cloud, and its radius.
+/// Distance from the eye to the cloud, m, and its radius, m.
 const AWAY: f64 = 5.0;
 const SIZE: f64 = 0.5;
 const SPEED: DVec3 = DVec3::new(-6.0, 3.0, 4.0);
 
-/// Upward, where there is nothing behind the cloud.
+/// Looks up, where nothing is behind the cloud.
 fn eye() -> Eye {
     Eye::new([5.0, 2.0, 1.0], [5.0, 6.0, 8.0], 300.0)
 }
 
-/// One ball of whitewater before nothing, or before what stands in the scene.
+/// One ball of whitewater, alone or in front of solids.
 struct Cloud {
     eye: Eye,
     method: &'static str,
-    /// Between particles, metres: rays' grid of drops has two voxels in it, and their lattice of shade one node.
+    /// Particle spacing, m: the rays' grid of drops has two voxels in it, and their lattice of
+    /// shade one node.
     spacing: f64,
     density: f64,
     sun: [f64; 3],
@@ -82,7 +83,7 @@ fn cloud(method: &'static str, density: f64) -> Cloud {
 /// The pixel right of and below the middle of the picture.
 const MIDDLE: usize = 32 * 64 + 32;
 
-/// Worst error of what a cloud in a white furnace shows, from thin to thick.
+/// Largest error of a cloud in a white furnace, from thin to thick.
 fn furnace_error(context: &Context, method: &'static str) -> f64 {
     let mut worst = 0.0f64;
     for density in [0.2, 2.0, 50.0] {
@@ -119,7 +120,8 @@ fn lobe(g: f64, cosine: f64) -> f64 {
     (1.0 - g * g) / (4.0 * PI * (1.0 + g * g - 2.0 * g * cosine).powf(1.5))
 }
 
-/// Way through the cloud, metres, as the sums at half resolution have it at a place, in pixels from the upper left corner.
+/// Length of the ray through the cloud, m, as the sums at half resolution have it at a position in
+/// pixels from the upper left corner.
 fn way_through(place: DVec2) -> f64 {
     let eye = eye();
     let [right, up, forward] = eye.axes();
@@ -139,8 +141,9 @@ fn way_through(place: DVec2) -> f64 {
     row(0.0) + part.y * (row(1.0) - row(0.0))
 }
 
-/// Normal of the cloud's near side at pixel `i`, towards the viewer: half the way through it is before its middle. In the mean over two
-/// pixels to each side, which are more than two spacings of [`FINE`].
+/// Normal of the cloud's near side at pixel `i`, towards the viewer: half the length through it is
+/// in front of its middle. Averaged over two pixels to each side, which are more than two spacings
+/// of [`FINE`].
 fn near_side(i: usize) -> DVec3 {
     let eye = eye();
     let [right, up, forward] = eye.axes();
@@ -157,12 +160,13 @@ fn near_side(i: usize) -> DVec3 {
     (right * slope.x - up * slope.y - forward).normalize()
 }
 
-/// A ball of a body of this radiance over irradiance, dimmed as Lommel and Seeliger say, gives back all light:
-/// 4π · 2/3 (1 − ln 2) times it is 1.
+/// Radiance over irradiance of the body of a ball that, shaded by Lommel–Seeliger, reflects all
+/// light: 4π · 2/3 (1 − ln 2) times it is 1.
 const WHITE_BODY: f64 = 3.0 / (8.0 * PI * (1.0 - std::f64::consts::LN_2));
 
-/// Of the sunlight the part that comes to drops through others, in the mean over those that the eye sees in a direction: of the ball
-/// of the mean square distance of the cloud's, whose density goes as (1 − q²)², in steps of a fiftieth of its radius.
+/// Fraction of sunlight that reaches drops through others, averaged over the drops that the eye
+/// sees in a direction. The cloud is a ball with the same mean square distance, whose density is (1
+/// − q²)², integrated in steps of a fiftieth of its radius.
 fn lit(along: DVec3, sun: DVec3, density: f64) -> f64 {
     let reach = 1.8f64.sqrt() * SIZE;
     // ∫ (1 − q²)² over the unit ball is 4π (1/3 − 2/5 + 1/7).
@@ -187,14 +191,16 @@ fn lit(along: DVec3, sun: DVec3, density: f64) -> f64 {
     if all > 0.0 { seen / all } else { 1.0 }
 }
 
-/// Drops in the light of the sun: over its cover a cloud has the sun's irradiance times a mean of phase functions, of light that is
-/// scattered once, of light that goes anywhere and of a white wall that its near side is; by rays of a white body that the way through it
-/// shades. `density` is that of the cloud by rays. Over the brightest light.
+/// Error of drops in sunlight, relative to the brightest light: radiance over cover is the sun's
+/// irradiance times a mix of phase functions, of light scattered once, of light scattered in all
+/// directions, and of a white wall at its near side; with rays, of a white body shaded by the
+/// length through it. `density` is that of the cloud with rays.
 fn sun_error(image: &Image, azimuth: f64, density: Option<f64>) -> f64 {
     let (sin, cos) = azimuth.to_radians().sin_cos();
     let half = 0.5f64.sqrt();
     let sun = DVec3::new(half * cos, half, half * sin);
-    // 0.82 of the unit of light falls on a level face from a sun at 45°, as radiance of white paint.
+    // 0.82 of the unit of light falls on a horizontal face from a sun at 45°, as radiance of white
+    // paint.
     let irradiance = 0.82 * PI * 2f64.sqrt();
     let [mut worst, mut most] = [0.0f64; 2];
     for (i, pixel) in image.beauty.iter().enumerate() {
@@ -216,16 +222,17 @@ fn sun_error(image: &Image, azimuth: f64, density: Option<f64>) -> f64 {
         let expected = irradiance * lit * (once * drops + (1.0 - once) * often);
         let [r, g, b, _] = pixel.map(f64::from);
         let found = (0.2126 * r + 0.7152 * g + 0.0722 * b) / cover;
-        // Shade by rays is exp of minus a depth that a lattice blurs, and a slope is a difference of rounded depths: what is dark has their
-        // error over what is bright.
+        // Shade by rays is exp of minus a depth that a lattice blurs, and a slope is a difference
+        // of rounded depths: dark parts have their error relative to bright ones.
         most = most.max(expected);
         worst = worst.max((found - expected).abs());
     }
     worst / most
 }
 
-/// Particle spacing, metres, with which the lattice of shade has 43 nodes across a cloud. Between nodes it is off by pitch² / 8 of the
-/// depth's second derivative, which over the middle of such a cloud is 5 depths / reach²: for an optical depth of ten 0.014 along each of two axes.
+/// Particle spacing, m, with which the lattice of shade has 43 nodes across a cloud. Between nodes
+/// its error is pitch² / 8 of the depth's second derivative, which over the middle of such a cloud
+/// is 5 depths / reach²: for an optical depth of ten, 0.014 along each of two axes.
 const FINE: f64 = 0.03125;
 
 #[test]
@@ -238,16 +245,17 @@ fn the_sun_shines_through_thin_spray_and_upon_thick() {
                 ..cloud(method, density)
             };
             let image = shot.draw(&context(), &black_sky);
-            // What an adapter's exp is off by, 1e-4 here, is a thousandth or two of a cover of 0.05.
+            // The error of an adapter's exp, 1e-4 here, is a thousandth or two of a cover of 0.05.
             let by_rays = (method == "ray").then_some(density);
             let error = sun_error(&image, azimuth, by_rays);
             assert!(error < 0.01, "{method} {azimuth} {density}: {error}");
-            // The control: the sun 60° farther on; where it stands behind the viewer 20° change the light by 0.7 % alone.
+            // Control: the sun 60° farther. With the sun behind the viewer, 20° change the light by
+            // only 0.7 %.
             let control = sun_error(&image, azimuth + 60.0, by_rays);
             assert!(control > 0.01, "{method} {azimuth} {density}: {control}");
         }
     }
-    // A cloud that is flat for the sun, all of it turned to the viewer.
+    // A cloud that is flat to the sun and faces the viewer.
     let shot = Cloud {
         spacing: FINE,
         sun: [270.0, 45.0, 1.0],
@@ -262,7 +270,8 @@ fn the_sun_shines_through_thin_spray_and_upon_thick() {
     assert!(control > 0.1, "{control}");
 }
 
-/// Integrals over all directions, by the midpoints of 4000 parts of the cosine: of a phase function and of its cosine.
+/// Integrals over all directions of a phase function and of its cosine, by the midpoint rule over
+/// 4000 parts of the cosine.
 fn integrals(body: &str) -> [f64; 2] {
     const PARTS: usize = 4000;
     let step = 2.0 / PARTS as f64;
@@ -282,23 +291,23 @@ fn integrals(body: &str) -> [f64; 2] {
 
 #[test]
 fn phase_functions_give_back_all_light() {
-    // Midpoints are off by step² / 24 times the slope's rise, 500 at the lobe's peak: 5e-6; f32 adds 1e-5.
+    // The midpoint rule is off by step² / 24 times the rise of the slope, 500 at the lobe's peak:
+    // 5e-6; f32 adds 1e-5.
     let [all, mean] = integrals("return vec4f(drop_phase(value.x));");
     assert!((all - 1.0).abs() < 1e-4, "{all}");
-    // Of water drops without what is diffracted, 2 · 0.885 − 1 (van de Hulst 1957).
+    // Water drops without diffraction: 2 · 0.885 − 1 (van de Hulst 1957).
     assert!((mean - 0.77).abs() < 1e-3, "{mean}");
-    // The control: a hundredth less of one.
+    // Control: 1 % less than one.
     let [all, _] = integrals("return vec4f(0.99 * drop_phase(value.x));");
     assert!((all - 1.0).abs() > 5e-3, "{all}");
 }
 
-/// Median of numbers.
 fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     values[values.len() / 2]
 }
 
-/// Medians over the cloud of what Z, P and forward are off by: metres, metres, pixels.
+/// Medians over the cloud of the errors of Z, m, P, m, and forward, pixels.
 fn channel_errors(context: &Context, method: &'static str) -> [f64; 3] {
     let image = cloud(method, 20.0).draw(context, &uniform_sky);
     let aovs = &image.aovs;
@@ -310,7 +319,7 @@ fn channel_errors(context: &Context, method: &'static str) -> [f64; 3] {
             continue;
         }
         let along = eye().direction(i);
-        // In the mean of a ball its middle is seen: the plane through its centre.
+        // The mean position seen of a ball is the plane through its centre.
         let place = eye().position + along * (AWAY / along.dot(eye().forward()));
         let goes = eye().place(place + SPEED / 24.0 - eye().position) - eye().place(along);
         let found = DVec3::from(p[i].map(f64::from));
@@ -329,10 +338,10 @@ fn channels_are_of_spray_where_it_hides_the_rest() {
         let [z, p, motion] = channel_errors(&context(), method);
         assert!(z < 0.01 && p < 0.02, "{method}: {z} {p}");
         assert!(motion < 0.3, "{method}: {motion}");
-        // Where it does not, they are of what is behind: nothing.
+        // Where the cloud is thin, the AOVs are those of what is behind it: nothing.
         let thin = cloud(method, 0.5).draw(&context(), &uniform_sky);
         assert!(thin.aovs.z.unwrap()[MIDDLE] > 1e29, "{method}");
-        // The controls: another speed, and a depth that is not divided.
+        // Controls: another speed, and a depth that is not normalized.
         let spoil = spoiled(pass, "* spray_params.speed", "* 0.9 * spray_params.speed");
         let [_, _, motion] = channel_errors(&spoil, method);
         assert!(motion > 0.3, "{method}: {motion}");
@@ -345,8 +354,8 @@ fn channels_are_of_spray_where_it_hides_the_rest() {
     }
 }
 
-/// Optical depth in the middle of a cloud with a black ceiling through its centre, over that of the whole cloud; seen straight from
-/// below.
+/// Optical depth in the middle of a cloud with a black ceiling through its centre, relative to that
+/// of the whole cloud, seen from straight below.
 fn half(context: &Context) -> f64 {
     let from_below = || Cloud {
         eye: Eye {
@@ -363,7 +372,7 @@ fn half(context: &Context) -> f64 {
         }],
         ..from_below()
     };
-    // Before black, radiance is cover.
+    // In front of black, radiance is cover.
     let front = shot.draw(context, &uniform_sky).beauty[MIDDLE][1];
     let depth = |cover: f32| -(1.0 - f64::from(cover)).ln();
     depth(front) / depth(whole)
@@ -399,19 +408,20 @@ fn is_refused(method: &'static str, height: f64) -> bool {
 
 #[test]
 fn splats_refuse_an_eye_under_water() {
-    // The surface stands half a voxel from where the lattice says, at most.
+    // The surface is at most half a voxel from where the lattice says.
     assert!(is_refused("ssfr", rays::LEVEL - 0.5) && is_refused("ssfr", rays::LEVEL - 0.07));
     assert!(!is_refused("ssfr", rays::LEVEL + 0.07));
     assert!(!is_refused("ray", rays::LEVEL - 0.5));
 }
 
-/// Radius of a particle's splat, metres, and the spacing: a particle is half a splat's volume.
+/// Radius of a particle's splat, m, and the spacing: a particle has half of a splat's volume.
 const SPLAT: f64 = 0.2;
 const SPACING: f64 = 0.25;
 
-/// Of so many particles that fly at one place, in the mean over twelve times other ids: mean square distance of their spray from it along an
-/// axis of the picture, m²; the integral of a particle's optical depth over the area, m²; and mean square difference of a pixel's depth from
-/// those two pixels away, over the mean square depth.
+/// For `count` fast particles at one position, averaged over twelve sets of ids: mean square
+/// distance of their spray along an axis of the picture, m²; the integral of a particle's optical
+/// depth over the area divided by the density, m³; and the mean square difference of a pixel's
+/// depth from that two pixels away, relative to the mean square depth.
 fn drops(context: &Context, count: u32) -> [f64; 3] {
     const DENSITY: f64 = 0.05;
     let eye = eye();
@@ -460,24 +470,26 @@ fn drops(context: &Context, count: u32) -> [f64; 3] {
 #[test]
 fn spray_of_a_particle_is_as_wide_as_its_ball_by_rays_and_holds_its_air() {
     let pass = "ssfr/splat_spray";
-    // One that flies alone has drops and no mist; of five, each of which has four neighbours, three fifths are mist.
+    // An isolated particle has drops and no mist; of five, each of which has four neighbours, three
+    // fifths are mist.
     for (count, of_drops, length) in [(1, 1.0, 1.5f64), (5, 0.4, 1.2)] {
         let [square, volume, _] = drops(&context(), count);
-        // R² / 5 of a ball of 1.6 radii, of which rays know; the tent over cells of two pixels by which a drop is shared out adds a sixth of
-        // their square for its part of the volume, and as much for all of it that they are read linearly.
+        // R² / 5 of a ball of 1.6 radii, as for rays. The tent over cells of two pixels by which a
+        // drop is distributed adds a sixth of their square for its part of the volume, and linear
+        // reads add as much for all of it.
         let pixel = AWAY / 300.0;
         let own = (of_drops + 1.0) * 2.0 * 2.0 / 6.0 * pixel * pixel;
         let wanted = (1.6 * SPLAT).powi(2) / 5.0 + own;
-        // What a thread adds to the mean over both axes of the picture goes with 1 − z², where z is evenly in −1..1: its standard
-        // deviation is 0.149 of its length's square. Its bend and four puffs off it add a tenth to that. Three of them, of the mean of
-        // so many threads.
+        // A thread adds to the mean over both axes of the picture in proportion to 1 − z², with z
+        // uniform in −1..1: the standard deviation is 0.149 of its length's square. Its bend and
+        // four puffs off it add a tenth. Three standard deviations of the mean of so many threads.
         let bound = 3.0 * 1.1 * length.powi(2) * 0.149 / (12.0 * f64::from(count)).sqrt();
         let off = square / wanted - 1.0;
         assert!(off.abs() < bound, "{count}: {square} {wanted}");
-        // Three twentieths of a thrown particle are spray; puffs are sampled by few cells.
+        // Three twentieths of a fast particle are spray; puffs are sampled by few cells.
         let air = 0.15 * SPACING.powi(3);
         assert!((volume / air - 1.0).abs() < 0.02, "{count}: {volume} {air}");
-        // The controls: threads more than twice as long, and smaller drops that are no more opaque for it.
+        // Controls: threads more than twice as long, and smaller drops without more opacity.
         let (from, to) = ("* s * thread.along", "* 2.2 * s * thread.along");
         let control = drops(&spoiled(pass, from, to), count)[0] / wanted - 1.0;
         assert!(control > 3.0 * bound, "{count}: {control}");
@@ -487,8 +499,8 @@ fn spray_of_a_particle_is_as_wide_as_its_ball_by_rays_and_holds_its_air() {
     }
 }
 
-/// Drops are rough, mist is smooth. The control of each is a particle with mist where it flies alone, and without in company: what
-/// company a particle has then tells the other thing.
+/// Drops are rough, mist is smooth. The control swaps them: mist for isolated particles and none in
+/// company.
 #[test]
 fn spray_that_flies_alone_is_drops_and_spray_in_company_mist() {
     let (from, to) = (
@@ -500,15 +512,16 @@ fn spray_that_flies_alone_is_drops_and_spray_in_company_mist() {
         let [_, _, other] = drops(&spoiled("ssfr/splat_spray", from, to), count);
         found / other
     };
-    // With three fifths of it smooth, what is rough is two fifths, and its square less than a quarter of what it was.
+    // With three fifths smooth, two fifths are rough, and their square is less than a quarter.
     let (alone, together) = (rough(1), rough(5));
     assert!(alone > 2.0, "{alone}");
     assert!(together < 0.5, "{together}");
 }
 
-/// Columns and rows over which a particle that flies alone, so many of its radii away, puts spray.
+/// Extent of the spray of an isolated particle at a distance of `radii` of its radii, columns and
+/// rows.
 fn reach(context: &Context, radii: f64, id: u32) -> [usize; 2] {
-    // Straight up, so that no ground is in the picture.
+    // Looks up, so that no ground is in the picture.
     let eye = Eye {
         size: 512,
         ..Eye::new([5.0, 1.0, 5.0], [5.3, 4.0, 5.2], 300.0)
@@ -538,10 +551,11 @@ fn reach(context: &Context, radii: f64, id: u32) -> [usize; 2] {
     })
 }
 
-/// A drop lies in four cells of two pixels, which are read linearly: over six pixels, whatever it stands from the eye.
+/// A drop covers four cells of two pixels, which are read linearly: six pixels at most, at any
+/// distance from the eye.
 #[test]
 fn no_drop_is_wider_than_six_pixels() {
-    // The largest drop alone.
+    // Only the largest drop.
     let alone = spoiled(
         "ssfr/splat_spray",
         "for (var j = thread.x; j < drops; j += LANES)",
@@ -555,7 +569,7 @@ fn no_drop_is_wider_than_six_pixels() {
                 "{radii}: {found:?}"
             );
         }
-        // The control: all of its drops, over a ball of 1.6 radii.
+        // Control: all of its drops, over a ball of 1.6 radii.
         let ball = 2.0 * eye().focal / radii;
         let found = reach(&context(), radii, 1);
         assert!(
