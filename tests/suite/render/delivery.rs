@@ -1,4 +1,4 @@
-//! Pictures as they are handed on: windows, spaces of light, layers and mattes.
+//! Pictures as they are delivered: windows, colour spaces, layers and mattes.
 
 mod colour;
 mod holdout;
@@ -20,10 +20,11 @@ use swell::{
 
 use super::pictures::{OBLIQUE, harbour};
 
-/// Both ways to draw water.
+/// Both methods of rendering water.
 const METHODS: [&str; 2] = ["ssfr", "ray"];
 
-/// A look at the harbour, sun, spray, walls and all: lines of `[image]`, `[surface]` and `[output]`.
+/// A look at the harbour with sun, spray, walls and solids; lines of `[image]`, `[surface]` and
+/// `[output]`.
 struct Setup<'a> {
     method: &'a str,
     image: &'a str,
@@ -68,7 +69,8 @@ fn draw(context: &Context, look: &Look, scene: &RenderScene, water: &Particles) 
     renderer.render_with(3, water, &white()).unwrap()
 }
 
-/// Whitewater of each kind, drops over the water, foam on it and bubbles under it; a look without whitewater does not draw it.
+/// Whitewater of each kind: drops over the water, foam on it and bubbles under it. A look without
+/// whitewater does not render it.
 fn white() -> Particles {
     let mut white = Particles::default();
     let mut kinds = Vec::new();

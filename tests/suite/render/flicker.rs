@@ -1,4 +1,5 @@
-//! What flickers: a frame against the mean of its neighbours. And pictures that are the same whatever was rendered before them.
+//! Flicker: a frame compared with the mean of its neighbours. Also, pictures do not depend on what
+//! was rendered before.
 
 use std::{fs, path::Path};
 
@@ -8,10 +9,12 @@ use swell::render::image::{Pixels, read_png};
 use crate::support::job::{Job, LOOK};
 use crate::support::made_cache::{Made, write_cache};
 
-/// A part of a picture: rows from the top and columns from the left, from and to, in parts of its height and width.
+/// A part of a picture: rows from the top and columns from the left, from and to, as fractions of
+/// its height and width.
 type Part = [[f64; 2]; 2];
 
-/// Root mean square over a part of the picture of a frame less the mean of the frames before and after it, in 255ths.
+/// Rms difference, over a part of the picture, between a frame and the mean of the frames before
+/// and after it, in 1/255.
 fn residual(frames: [&Pixels; 3], part: Part) -> f64 {
     let [before, at, after] = frames;
     let (width, height) = (at.0, at.1);
@@ -41,8 +44,9 @@ fn what_changes_evenly_does_not_flicker() {
     assert!((residual([&a, &d, &c], WHOLE) - 255.0 * 0.2).abs() < 1e-3);
 }
 
-/// Not a test: prints the residual of three pictures. SWELL_FLICKER names them, with commas between; SWELL_PART is four numbers, the
-/// part of the picture: from and to, of its height and of its width.
+/// Not a test: prints the residual of three pictures. `SWELL_FLICKER` is their comma-separated
+/// names; `SWELL_PART` is four numbers, the part of the picture: from and to, of its height and of
+/// its width.
 #[test]
 #[ignore = "measures pictures that $SWELL_FLICKER names"]
 fn flicker() {
@@ -58,7 +62,7 @@ fn flicker() {
     println!("{:.2} / 255", residual([a, b, c], part));
 }
 
-/// Shreds: every third particle, which goes to and fro about its place from frame to frame.
+/// Shreds: every third particle, moving up and down about its position from frame to frame.
 fn shredded(frame: u32, water: &mut Particles) {
     let keep: Vec<bool> = (0..water.len()).map(|k| k % 3 == 0).collect();
     water.retain(&keep);
@@ -68,7 +72,7 @@ fn shredded(frame: u32, water: &mut Particles) {
     }
 }
 
-/// A look with everything that looks at the frames around.
+/// A look with all features that use neighbouring frames.
 fn look() -> String {
     LOOK.replace("samples = 1", "samples = 2\nshutter = 0.5")
         + "[water]\nspray = { density_per_metre = 9.0, speed_m_per_s = 0.5 }\n"
@@ -97,9 +101,9 @@ fn pictures_do_not_depend_on_what_was_rendered_before() {
     }
     assert!(picture("one", 3) == picture("all", 3));
     assert!(picture("back", 5) == picture("all", 5) && picture("back", 1) == picture("all", 1));
-    // What stands there is known by the frames around it too.
+    // Existing pictures are also identified by their neighbouring frames.
     assert!(render("cache -o all").contains("6 stood there already"));
-    // The control: a bake that ended at frame 3 has nothing after it.
+    // Control: a bake that ended at frame 3 has nothing after it.
     cache(&job, "short", 3);
     render("short -o short-pictures");
     assert!(picture("short-pictures", 3) != picture("all", 3));

@@ -1,5 +1,6 @@
-//! Several processes and one folder of pictures: each frame is rendered once, looks do not mix, and what is killed is made up
-//! for. SWELL_ROUNDS sets how often three processes share a range; in every second round one of them is killed.
+//! Several processes and one folder of pictures: each frame is rendered once, looks do not mix, and
+//! frames of a killed process are rendered by others. `SWELL_ROUNDS` sets how often three processes
+//! share a range; in every second round one of them is killed.
 
 use std::{
     fs,
@@ -13,7 +14,7 @@ use crate::support::events::pictures;
 use crate::support::job::{Job, LOOK, assert_has};
 use crate::support::made_cache::{Made, SCENE, write_cache};
 
-/// Frames of the caches.
+/// Last frame of the caches.
 const LAST: u32 = 12;
 
 fn job(last: u32) -> Job {
@@ -35,7 +36,7 @@ fn spawn(job: &Job, words: &str) -> Child {
     command.spawn().unwrap()
 }
 
-/// Frames that a process rendered, and those that others did; it must have gone well.
+/// Numbers of frames that a process rendered and skipped; it must have succeeded.
 fn counts(child: Child) -> [u64; 2] {
     let output = child.wait_with_output().unwrap();
     let said = String::from_utf8(output.stdout).unwrap();
@@ -45,7 +46,7 @@ fn counts(child: Child) -> [u64; 2] {
     ["rendered", "skipped"].map(|key| end[key].as_u64().unwrap())
 }
 
-/// Waits until a process has come so far.
+/// Waits until `done`; the process must still be running.
 fn until(child: &mut Child, done: &dyn Fn() -> bool) {
     while !done() {
         assert!(child.try_wait().unwrap().is_none(), "it ended before");
@@ -53,7 +54,8 @@ fn until(child: &mut Child, done: &dyn Fn() -> bool) {
     }
 }
 
-/// One folder has one numbering, by which pictures are skipped, and made again, as by the cache's own.
+/// A folder has one numbering, which applies to skipping pictures and rendering them again, as the
+/// cache's own numbering does.
 #[test]
 fn pictures_are_numbered_from_another_frame() {
     let job = job(4);
@@ -75,20 +77,21 @@ fn pictures_are_numbered_from_another_frame() {
         picture("moved", "small.1001.png"),
         picture("moved", "small.1003.png")
     );
-    // The whole range decides, as of shares; what stands there is skipped.
+    // `--chunk` divides the whole range; existing pictures are skipped.
     let share = format!("{render} moved --number-from 1001 --chunk 2/2");
     assert_has(&job.expect(0, &share), &["0 frames rendered, 1 stood"]);
     let rest = "render cache --look look.toml --frames 3 --number-from 1002 -o moved";
     assert_has(&job.expect(0, rest), &["1 frame rendered"]);
     let before = pictures(&job.path("moved"));
     assert_eq!(before.len(), 6);
-    // Another numbering: refused with nothing written, with a dry run too, and where it would leave others beside.
+    // Another numbering is refused with nothing written, also in a dry run, and if it would leave
+    // other pictures behind.
     let other = "render cache --look look.toml --frames 2-4 -o moved";
     for more in ["", " --dry-run", " --number-from 1002", " --overwrite"] {
         job.expect_clear(4, &format!("{other}{more}"), "numbering");
     }
     assert_eq!(pictures(&job.path("moved")), before);
-    // All of them anew is what was asked for.
+    // Rendering all of them again is allowed.
     job.expect(
         0,
         "render cache --look look.toml --frames 2-4 --number-from 1001 -o moved --overwrite",
@@ -111,7 +114,7 @@ fn processes_share_a_range_and_make_up_for_a_killed_one() {
         let mut children: Vec<Child> = (0..3).map(|_| spawn(&job, &words)).collect();
         let mut all = u64::from(LAST);
         if round % 2 == 1 {
-            // In mid-work: that frame is being rendered by one of them.
+            // Kills it while one of the processes renders that frame.
             let number = format!("small.{:04}", 2 + round % 9);
             let lock = folder.join(format!(".swell/{number}.lock"));
             let mut victim = children.remove(round % 3);
@@ -126,7 +129,7 @@ fn processes_share_a_range_and_make_up_for_a_killed_one() {
             assert_eq!(rendered + stood, u64::from(LAST), "{counted:?}");
         }
         let rendered: u64 = counted.iter().map(|count| count[0]).sum();
-        // Without a kill each frame is rendered by one process alone.
+        // Without a kill each frame is rendered by exactly one process.
         assert!(
             rendered <= u64::from(LAST) && rendered >= all,
             "{counted:?}"
@@ -169,7 +172,7 @@ fn pictures_of_something_else_are_refused_and_left() {
         "cache --look wide.toml --frames 5-6",
         &["small.0001.exr", "another look"],
     );
-    // Frame 4 would stay behind.
+    // Frame 4 would be left behind.
     is_left(
         4,
         "cache --look wide.toml --frames 1-3 --overwrite",
@@ -199,13 +202,14 @@ fn pictures_of_something_else_are_refused_and_left() {
         write_cache(&job.path(name), &made);
         is_left(4, &format!("{name} --look look.toml"), &[what]);
     }
-    // The record is a help, and what stands there decides.
+    // The record only helps; the existing pictures decide.
     fs::remove_file(day.join("render.json")).unwrap();
     is_left(4, "cache --look wide.toml", &["small.0001.exr"]);
     fs::write(day.join("render.json"), "{ half").unwrap();
     is_left(4, "cache --look wide.toml", &["small.0001.exr"]);
 
-    // The same look goes on, whatever frames; what is not ours, and what a dead process left, hinders nobody.
+    // The same look continues with any frames; files that are not ours, and leftovers of a dead
+    // process, do not interfere.
     fs::write(day.join("notes.png"), "mine").unwrap();
     fs::write(day.join("small.0005.png.part"), "half").unwrap();
     let said = job.expect(0, "render cache --look look.toml -o day --frames 3-6");
@@ -214,7 +218,7 @@ fn pictures_of_something_else_are_refused_and_left() {
     assert_eq!(fs::read_to_string(day.join("notes.png")).unwrap(), "mine");
     let both = pictures(&day);
     assert!(first.iter().all(|(name, bytes)| both[name] == *bytes));
-    // Someone's own picture under one of our names.
+    // A user's own picture under one of our names.
     fs::write(day.join("small.0002.png"), "mine").unwrap();
     fs::remove_file(day.join("render.json")).unwrap();
     is_left(
@@ -228,7 +232,7 @@ fn pictures_of_something_else_are_refused_and_left() {
     assert!(pictures(&day) == pictures(&job.path("wide")));
 }
 
-/// Whether some process has a frame of a folder in hand.
+/// Whether some process holds the lock of a frame of the folder.
 #[cfg(unix)]
 fn is_claimed(folder: &Path) -> bool {
     let locks = fs::read_dir(folder.join(".swell")).unwrap();
@@ -237,8 +241,8 @@ fn is_claimed(folder: &Path) -> bool {
     locks.any(|path| is_lock(&path) && fs::File::open(path).unwrap().try_lock().is_err())
 }
 
-/// A process in the middle of its work on the folder `busy`, standing still with a frame in hand: between two frames it has
-/// none, and whoever comes then waits for nothing.
+/// A process that works on the folder `busy`, stopped while it holds a frame: between two frames it
+/// holds none, and other processes would not have to wait.
 #[cfg(unix)]
 fn stopped(job: &Job, words: &str) -> Child {
     let mut child = spawn(job, words);
@@ -249,7 +253,7 @@ fn stopped(job: &Job, words: &str) -> Child {
         let words = [name.to_owned(), child.id().to_string()];
         let status = std::process::Command::new("kill").args(words).status();
         assert!(status.unwrap().success());
-        // A call into the kernel that has begun is ended before a process stands.
+        // A system call in progress ends before the process stops.
         std::thread::sleep(Duration::from_millis(20));
     };
     signal("-STOP");
@@ -283,7 +287,7 @@ fn a_folder_in_use_is_shared_by_one_look_alone() {
     }
     assert!(job.expect(0, &last).contains("1 frame rendered"));
     assert!(exists(".swell/work"), "the first is still at work");
-    // The frame that it has is waited for, and rendered here once its process is dead.
+    // The second process waits for that frame, and renders it once the first is dead.
     let second = spawn(&job, render);
     while !exists(&format!("small.{:04}.png", LAST - 1)) {
         std::thread::sleep(Duration::from_millis(5));
@@ -295,7 +299,7 @@ fn a_folder_in_use_is_shared_by_one_look_alone() {
     let all = pictures(&job.path("busy"));
     assert_eq!(all.len(), 2 * LAST as usize);
 
-    // What a dead process left goes with the next one.
+    // The next process removes what a dead process left.
     let child = stopped(&job, &format!("{render} --overwrite"));
     let said = job.expect(4, &last);
     assert_has(&said, &["busy is in use", "--overwrite"]);
@@ -306,7 +310,7 @@ fn a_folder_in_use_is_shared_by_one_look_alone() {
     assert!(pictures(&job.path("busy")) == all);
 }
 
-/// Whatever cache it is, and by whatever way.
+/// Into any cache, by any path.
 #[test]
 fn pictures_do_not_go_into_any_cache() {
     let job = job(2);
@@ -334,7 +338,7 @@ fn pictures_do_not_go_into_any_cache() {
         assert!(said.contains("is in the cache"), "{said}");
     }
     assert_eq!(hashes(), before);
-    // Beside them is well, also where a page's manifest stands above.
+    // Beside caches is allowed, also below the manifest of a web page.
     fs::create_dir(job.path("site")).unwrap();
     fs::write(job.path("site/manifest.json"), "{}").unwrap();
     job.expect(0, "render cache --look look.toml -o site/day --frames 1");

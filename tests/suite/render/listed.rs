@@ -1,5 +1,5 @@
-//! Tiles with water and those without are drawn by passes of their own, and the light of spray is added where there is some: it is not to
-//! be seen.
+//! Tiles with water and those without are rendered by separate passes, and the light of spray is
+//! added only where there is some; this does not change the picture.
 
 use std::path::Path;
 
@@ -30,7 +30,7 @@ elevation_degrees = 34.0
 model = \"hosek_wilkie\"
 ";
 
-/// Pictures of several waters by one renderer, the last one.
+/// Renders several waters with one renderer and returns the last picture.
 fn last(context: &Context, waters: &[&Particles]) -> Vec<[f32; 4]> {
     let look = Look::parse(LOOK, Path::new("listed.toml")).unwrap();
     let mut renderer = Renderer::new(context, &look, &city_scene()).unwrap();
@@ -40,8 +40,9 @@ fn last(context: &Context, waters: &[&Particles]) -> Vec<[f32; 4]> {
     pictures.last().unwrap().beauty
 }
 
-/// The part of the pixels of which a channel differs by more than rounding: both passes have one formula, and compilers may order the
-/// steps of two programs differently. A few hundred of them, each half of 2⁻²⁴ off.
+/// Fraction of pixels of which a channel differs by more than rounding: both passes have one
+/// formula, but compilers may order the steps of two programs differently. A few hundred steps,
+/// each off by half of 2⁻²⁴.
 fn apart(a: &[[f32; 4]], b: &[[f32; 4]]) -> f64 {
     const ROUNDING: f32 = 200.0 * 6e-8;
     let differs = |(a, b): &(&[f32; 4], &[f32; 4])| {
@@ -51,7 +52,7 @@ fn apart(a: &[[f32; 4]], b: &[[f32; 4]]) -> f64 {
     a.iter().zip(b).filter(differs).count() as f64 / a.len() as f64
 }
 
-/// What lists tiles, and how it says that there is some.
+/// Passes that list tiles, and the statement that says that a tile has something.
 const LISTS: [(&str, &str); 4] = [
     ("ssfr/list_tiles", "return nearest < FAR;"),
     ("ssfr/list_picture", "return nearest < FAR;"),
@@ -67,15 +68,15 @@ fn lists_of_tiles_do_not_change_the_picture() {
         let everywhere = spoiled(pass, says, "return true;");
         let found = apart(&picture, &last(&everywhere, &[&water]));
         assert_eq!(found, 0.0, "{pass}");
-        // The control: without lists there is nothing, where a quarter of the picture shows some.
+        // Control: without lists nothing is drawn where a quarter of the picture has something.
         let nowhere = spoiled(pass, says, "return false;");
         let found = apart(&picture, &last(&nowhere, &[&water]));
         assert!(found > 0.1, "{pass}: {found}");
     }
 }
 
-/// Sides of closed bodies that face away from the eye are hidden by the others. At an edge both have one depth, and either may be kept: those
-/// pixels are fewer than a thousandth.
+/// Faces of closed meshes that face away from the eye are hidden by the others. At an edge both
+/// have the same depth, and either may be kept: fewer than a thousandth of the pixels.
 #[test]
 fn far_sides_of_closed_bodies_are_in_no_pixel() {
     let water = city_water();
@@ -84,7 +85,7 @@ fn far_sides_of_closed_bodies_are_in_no_pixel() {
     let all = last(&spoiled("ssfr/solid", asks, "index / 6u < 0u"), &[&water]);
     let found = apart(&picture, &all);
     assert!(found < 1e-3, "{found}");
-    // The control: without the near sides one looks into the houses.
+    // Control: without the front faces the houses' insides are visible.
     let opened = last(
         &spoiled("ssfr/solid", cull, "dot(normal, a) < 0.0"),
         &[&water],
@@ -92,7 +93,7 @@ fn far_sides_of_closed_bodies_are_in_no_pixel() {
     assert!(apart(&opened, &all) > 0.05);
 }
 
-/// What stood in a tile that has no water any more is gone.
+/// A tile that has no water any more shows nothing of an earlier frame.
 #[test]
 fn a_frame_leaves_nothing_to_the_next() {
     let water = city_water();
@@ -108,7 +109,7 @@ fn a_frame_leaves_nothing_to_the_next() {
     less.id = (0..less.position.len() as u32).collect();
     let alone = last(&context(), &[&less]);
     assert_eq!(last(&context(), &[&water, &less]), alone);
-    // The controls: the first frame is another picture, and a tile that is not cleared is seen.
+    // Controls: the first frame is a different picture, and a tile that is not cleared is visible.
     assert!(apart(&last(&context(), &[&water]), &alone) > 0.05);
     let uncleared = spoiled(
         "ssfr/fill",

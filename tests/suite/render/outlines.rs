@@ -1,4 +1,4 @@
-//! How rough splats leave the water's outline, against rays in f64.
+//! Roughness of the water's silhouette with splats, compared with rays in f64.
 
 use std::path::Path;
 
@@ -17,7 +17,7 @@ use super::{
     scenes::city_scene,
 };
 
-/// A crest against the sky, from low before it.
+/// A crest against the sky, from a low viewpoint in front of it.
 fn look(surface: &str) -> Look {
     let text = format!(
         "[camera]\nfocal_length_mm = 27.0\nfilm_back_mm = [36.0, 20.25]\n\
@@ -28,8 +28,8 @@ fn look(surface: &str) -> Look {
     Look::parse(&text, Path::new("low.toml")).unwrap()
 }
 
-/// A crest 2.4 m high across the domain, in layers along its surface whose particles are up to a tenth of a spacing off their places
-/// along each axis, as a solver leaves them.
+/// A crest 2.4 m high across the domain, in layers along its surface whose particles are displaced
+/// by up to a tenth of a spacing along each axis, as a solver leaves them.
 fn crest(scene: &RenderScene) -> Particles {
     let spacing = scene.particle_spacing;
     let mut seed = 1u32;
@@ -53,7 +53,7 @@ fn crest(scene: &RenderScene) -> Particles {
     water
 }
 
-/// Of that crest against the sky, with no city before it.
+/// Summary of that crest against the sky, without the city.
 fn summary(context: &Context, surface: &str) -> Summary {
     let mut scene = city_scene();
     scene.solids.clear();
@@ -74,10 +74,11 @@ fn summary(context: &Context, surface: &str) -> Summary {
     surfaces.summary().unwrap()
 }
 
-/// Spacings, from low before the water: what the prototype of rays had, and a little over.
+/// In spacings, from a low viewpoint: slightly more than the prototype with rays had.
 const ROUGH: f64 = 0.08;
 
-/// Ellipsoids are smooth, and stand nearer to where the water does than balls. Control: particles up to 0.6 spacings off their places.
+/// Ellipsoids are smooth, and nearer to the water's true surface than balls. Control: particles
+/// displaced by up to 0.6 spacings.
 #[test]
 fn ellipsoids_leave_a_smooth_silhouette() {
     let of = |context: &Context, surface: &str| {

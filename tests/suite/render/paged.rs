@@ -1,4 +1,5 @@
-//! Particles that no binding holds whole are drawn in several dispatches, which is not to be seen.
+//! Particles that exceed a single binding are drawn in several dispatches, which does not change
+//! the picture.
 
 use swell::{
     gpu::adapter::{Context, Needs},
@@ -8,7 +9,8 @@ use swell::{
 
 use super::pictures::{OBLIQUE, harbour};
 
-/// Bytes of the largest binding: 1536 particles, whose ways take 64 bytes each, and the picture's depths.
+/// Bytes of the largest binding: 1536 particles, whose paths take 64 bytes each, and the picture's
+/// depths.
 const BINDING: u64 = 98_304;
 
 fn picture(context: &Context) -> Image {

@@ -1,4 +1,4 @@
-//! A frame that is drawn in parts says how far it has come, and is the same picture.
+//! A frame that is rendered in parts reports its progress, and is the same picture.
 
 use swell::{
     render::{Moment, Part, Renderer, Water},
@@ -8,7 +8,8 @@ use swell::{
 use super::pictures::{ALL_AOVS, OBLIQUE, harbour};
 use crate::support::context;
 
-/// Rays in bands of 16 rows, and splats whole: each part of each sample and of the channels beside the picture, once, in order.
+/// Rays in bands of 16 rows, and splats whole: each part of each sample and of the AOVs is reported
+/// once, in order.
 #[test]
 fn each_part_of_a_frame_is_told_once() {
     let (scene, water) = harbour();
@@ -29,7 +30,7 @@ fn each_part_of_a_frame_is_told_once() {
         let mut told = Vec::new();
         let drawn = renderer.render_parts(3, &moment, &mut |part| told.push(part));
         let drawn = drawn.unwrap();
-        // A sample that is quick, as those behind the first are here, is told of as one.
+        // A quick sample, such as those after the first here, is reported as one.
         let done: Vec<u32> = told.iter().map(|part| part.done).collect();
         assert!(done.is_sorted() && done[0] == 0, "{method}: {done:?}");
         assert_eq!(done[..=bands as usize], (0..=bands).collect::<Vec<_>>());

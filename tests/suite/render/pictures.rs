@@ -1,4 +1,4 @@
-//! Pictures of small synthetic waters, against what optics and geometry say.
+//! Pictures of small synthetic waters, compared with optics and geometry.
 
 use std::path::Path;
 
@@ -43,7 +43,7 @@ azimuth_degrees = 0.0
 pub(super) const ALL_AOVS: &str =
     "[output]\nformats = [\"exr\"]\naovs = [\"Z\", \"N\", \"P\", \"forward\", \"thickness\"]\n";
 
-/// A tank of 8 × 4 × 6 m; the slab reaches past what the camera sees on all sides.
+/// A tank of 8 × 4 × 6 m that extends beyond the camera's view on all sides.
 pub(super) fn tank(spacing: f64) -> RenderScene {
     RenderScene {
         origin: DVec3::ZERO,
@@ -90,11 +90,13 @@ fn flat_water_has_flat_normals_and_its_own_thickness() {
         let image = render(&look, &tank(SPACING), &tank_water());
         let normals = image.aovs.n.as_ref().unwrap();
         let least = centre(96, 72).map(|i| normals[i][1]).fold(1.0, f32::min);
-        // Spheres of 0.87 d stand 0.43 d proud of the valleys between them; a width of 1.6 d takes a wave of length
-        // d down by exp(−½ (2π 1.6)²), so only rounding and cell shape are left: 1° from upright.
+        // Spheres of 0.87 d are 0.43 d higher than the valleys between them; a width of 1.6 d
+        // reduces a wave of length d by exp(−½ (2π 1.6)²), so only rounding and cell shape are
+        // left: 1° from upright.
         assert!(least > 1f32.to_radians().cos(), "{filter}: {least}");
-        // Splats are scaled so that whatever a column holds adds up to its depth; sight through the middle third
-        // leans by up to 9°, which makes it 1 % longer, and a pixel sees the lattice unevenly by d/2.
+        // Splats are scaled so that the contents of a column add up to its depth. Lines of sight
+        // through the middle third lean by up to 9°, which makes them 1 % longer, and a pixel
+        // samples the lattice unevenly by d/2.
         let thickness = image.aovs.thickness.as_ref().unwrap();
         let count = centre(96, 72).count() as f32;
         let mean = centre(96, 72).map(|i| thickness[i]).sum::<f32>() / count;
@@ -123,7 +125,7 @@ fn rough_water_without_smoothing_is_not_flat() {
 
 #[test]
 fn water_absorbs_as_beer_and_lambert_say() {
-    // Three waters: clear, black (which leaves only what the surface mirrors), and the one in question.
+    // Three waters: clear, black (which leaves only the reflection), and the one in question.
     let beauty = |absorption: f64| {
         let water = format!(
             "[water]\nabsorption_per_metre = [{absorption:.1}, {absorption:.1}, {absorption:.1}]\n"
@@ -144,14 +146,14 @@ fn water_absorbs_as_beer_and_lambert_say() {
         let [x, y, z] = position[i].map(f64::from);
         let view = (DVec3::new(2.0, 6.0, 1.5) - DVec3::new(x, y, z)).normalize();
         let bent = 1.0 / (1.0 - (1.0 - view.y * view.y) / (index * index)).sqrt();
-        // Down along the sun's refracted way, up along the viewer's.
+        // Down along the sun's refracted direction, up along the viewer's.
         let expected = (-0.5 * y * (sun + bent)).exp();
-        // Normals up to 1° off upright lengthen the way by 0.2 % and shift it; f32 adds 1e-6.
+        // Normals up to 1° off upright lengthen the path by 0.2 % and shift it; f32 adds 1e-6.
         assert!(
             (found / expected - 1.0).abs() < 0.01,
             "{found} for {expected}"
         );
-        // The control: half of the absorption is told apart.
+        // Control: half of the absorption is distinguishable.
         assert!((found / expected.sqrt() - 1.0).abs() > 0.05);
     }
 }
@@ -337,7 +339,7 @@ fn forward_is_the_motion_on_the_screen() {
 #[test]
 fn solids_stand_before_behind_and_in_the_water() {
     let mut scene = tank(SPACING);
-    // One pillar through the surface, and one that ends 0.3 m below it.
+    // One pillar through the surface, and one that ends 0.3 m above the floor, below the surface.
     scene.solids = vec![
         box_mesh(DVec3::new(0.6, 0.0, 1.0), DVec3::new(1.4, 1.5, 2.0)),
         box_mesh(DVec3::new(2.6, 0.0, 1.0), DVec3::new(3.4, 0.3, 2.0)),
@@ -348,15 +350,15 @@ fn solids_stand_before_behind_and_in_the_water() {
         &tank_water(),
     );
     let height = |x: usize| image.aovs.p.as_ref().unwrap()[36 * 96 + x][1];
-    // 16 pixels a metre at 6 m: the pillars' middles at x = 1 and x = 3 lie 16 pixels either side of the centre,
-    // a little farther for their height.
+    // 16 pixels per metre at 6 m: the pillars' middles at x = 1 and x = 3 are 16 pixels to either
+    // side of the centre, slightly farther for their height.
     assert!((height(28) - 1.5).abs() < 1e-3, "{}", height(28));
     assert!(
         height(65) > 0.6,
         "the sunken pillar is under water: {}",
         height(65)
     );
-    // It is seen through the water: brighter or darker than the floor beside it.
+    // It is visible through the water: brighter or darker than the floor beside it.
     let green = |x: usize| image.beauty[36 * 96 + x][1];
     assert!(
         (green(65) / green(50) - 1.0).abs() > 0.1,
@@ -460,7 +462,7 @@ fn a_png_went_through_the_view_transform() {
     decoder.next_frame(&mut bytes).unwrap();
     let through = |x: f32| (view::apply(&look.spec().view, [x; 3])[1] * 255.0).round() as u8;
     assert_eq!([bytes[1], bytes[4]], [through(0.18), through(4.0)]);
-    // Raw gamma would show the second as pure white.
+    // Plain gamma would show the second as pure white.
     assert!(bytes[4] < 250, "{}", bytes[4]);
     write_png(&file, &image, &look.spec().view).unwrap();
     assert_eq!(read_png_attributes(&file).unwrap(), Attributes::default());
@@ -544,12 +546,14 @@ fn a_scene_far_from_the_origin_looks_the_same() {
         .map(|(a, b)| (a[1] - b[1]).abs())
         .collect();
     errors.sort_by(f32::total_cmp);
-    // Positions are coarser by 1 mm there; away from silhouettes that is a slope of a few tenths of a percent.
+    // Positions are coarser by 1 mm there; away from silhouettes that is a slope of a few tenths of
+    // a percent.
     let percentile = errors[errors.len() * 9 / 10];
     assert!(percentile < 0.02, "{percentile}");
 }
 
-/// Not a test: pictures to look at, and times. `cargo test --release --test suite render::pictures::pictures -- --ignored --nocapture`
+/// Not a test: writes pictures for inspection and prints times.
+/// `cargo test --release --test suite render::pictures::pictures -- --ignored --nocapture`
 #[test]
 #[ignore = "writes pictures to look at into $SWELL_PICTURES"]
 fn pictures() {

@@ -1,4 +1,4 @@
-//! What is refused before a frame is drawn, and what while it is: the same, for the same reason.
+//! Frames are refused before rendering and while rendering for the same reason.
 
 use glam::DVec3;
 use swell::{
@@ -22,8 +22,9 @@ fn lowered(storage: u64) -> Context {
     .unwrap()
 }
 
-/// Deep water, whose surface is in few bricks: a binding that just holds the level set of its frame is enough to plan and to draw it,
-/// and with four bytes less both are refused in the same words. So it is with particles that channels beside the picture bind whole.
+/// Deep water, whose surface is in few bricks: a binding that just holds the level set of its frame
+/// suffices to plan and to render it, and with four bytes less both are refused with the same
+/// message. The same holds for particles, which AOVs bind as a whole.
 #[test]
 fn what_is_planned_for_a_frame_is_refused_where_drawing_it_is() {
     let scene = tank(SPACING);
@@ -62,10 +63,10 @@ fn what_is_planned_for_a_frame_is_refused_where_drawing_it_is() {
         assert_eq!(refused(largest.bytes), (None, None), "{more}");
         let (planned, drawn) = refused(largest.bytes - 4);
         let said = drawn.as_deref().unwrap_or_default();
-        // Of equals any.
+        // Any of several equally large buffers.
         assert!(names.iter().any(|name| said.contains(name)), "{drawn:?}");
         assert_eq!(planned, drawn);
-        // The control: the plan of a look without a frame does not know what this one takes.
+        // Control: the plan of a look without a frame does not know how much this frame takes.
         let empty = Plan::new(&look, &scene, &Limits::of(&crate::support::context())).unwrap();
         let mut all = empty.buffers.iter();
         let before = all.find(|it| it.name == largest.name).unwrap().bytes;

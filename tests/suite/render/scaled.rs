@@ -1,4 +1,5 @@
-//! A shot and its look a hundred times as large are the same picture: no length stands in a shader.
+//! A shot and its look, both scaled by a hundred, give the same picture: no shader has a fixed
+//! length.
 
 use std::path::Path;
 
@@ -15,7 +16,7 @@ use super::{
     scenes::{city_scene, city_water},
 };
 
-/// A look whose lengths are `scale` times as long; gravity is what it is, so that times are √scale times as long.
+/// A look whose lengths are scaled by `scale`; gravity is unchanged, so times are scaled by √scale.
 fn look(method: &str, filter: &str, scale: f64) -> Look {
     let place = |p: [f64; 3]| p.map(|x| scale * x);
     let per = |p: [f64; 3]| p.map(|x| x / scale);
@@ -74,7 +75,7 @@ fn picture(context: &Context, method: &str, filter: &str, scale: f64) -> Vec<[f3
     renderer.render(9, &water).unwrap().beauty
 }
 
-/// The part of the pixels of which a channel differs by more than 1 % and a thousandth of white.
+/// Fraction of pixels of which a channel differs by more than 1 % and a thousandth of white.
 fn apart(context: &Context, method: &str, filter: &str) -> f64 {
     let near = picture(context, method, filter, 1.0);
     let far = picture(context, method, filter, 100.0);
@@ -86,7 +87,8 @@ fn apart(context: &Context, method: &str, filter: &str) -> f64 {
     near.iter().zip(&far).filter(differs).count() as f64 / pixels
 }
 
-/// Rounding turns which side of an edge a pixel is on, of the sun's shadow, a window or a splat: one in a hundred at most.
+/// Rounding decides on which side of an edge a pixel is, of the sun's shadow, a window or a splat:
+/// one in a hundred at most.
 const EDGES: f64 = 0.01;
 
 #[test]
@@ -101,7 +103,7 @@ fn a_shot_a_hundred_times_as_large_is_the_same_picture() {
     }
 }
 
-/// Control: one length in metres, as shaders had them.
+/// Control: a length in metres in a shader.
 #[test]
 fn a_length_in_metres_is_seen() {
     for (from, to) in [

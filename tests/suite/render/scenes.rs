@@ -1,4 +1,4 @@
-//! Synthetic waters and sets, so that pictures need no solver.
+//! Synthetic water and sets, so that pictures need no solver.
 
 use glam::DVec3;
 use swell::domain::bounds::Bounds;
@@ -6,7 +6,7 @@ use swell::domain::mesh::TriangleMesh;
 use swell::domain::particles::Particles;
 use swell::render::RenderScene;
 
-/// Twelve triangles, counter-clockwise from outside.
+/// A box of twelve triangles, counter-clockwise from outside.
 pub(crate) fn box_mesh(low: DVec3, high: DVec3) -> TriangleMesh {
     let vertices = (0..8)
         .map(|i| {
@@ -70,7 +70,7 @@ impl Random {
     }
 }
 
-/// Box buildings in streets, x 16 to 24.5, z 0.5 to 14.5.
+/// Box buildings in streets, x 16 to 24.5 m, z 0.5 to 14.5 m.
 pub(crate) fn city_scene() -> RenderScene {
     let mut random = Random(3);
     let mut solids = Vec::new();
@@ -102,7 +102,7 @@ pub(crate) fn city_scene() -> RenderScene {
     }
 }
 
-/// A metre of water with a crest of 1.4 m at x = 11.5, jittered, and drops flung from the crest.
+/// A metre of water with a crest of 1.4 m at x = 11.5 m, jittered, and drops flung from the crest.
 pub(crate) fn city_water() -> Particles {
     let spacing = 0.17;
     let mut random = Random(11);

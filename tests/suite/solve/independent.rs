@@ -135,7 +135,7 @@ fn boundary_of(mesh: &swell::domain::mesh::TriangleMesh, domain: &Bounds, d: f64
 
 /// A blob far from walls, squeezed to `part` of its spacing, after one iteration: both devices give
 /// the papers' sums over all pairs. The f64 reference only rounds positions near 1 m to f32, 2⁻²⁵ m
-/// per axis. The GPU's error is as tests/pbf.rs derives, 2e-5 d where corrections are up to 0.1 d,
+/// per axis. The GPU's error is as pbf.rs derives, 2e-5 d where corrections are up to 0.1 d,
 /// and proportional to them.
 #[test]
 fn one_iteration_is_the_papers() {
@@ -530,7 +530,7 @@ fn errors(densities: &[f64]) -> [f64; 3] {
 }
 
 /// The ledger's report of each frame matches sums over its particles, computed in this file, for
-/// either device. f32 sums of 34 terms err by 42 ε (tests/pbf.rs), walls by 5e-7. FLIP's hats add
+/// either device. f32 sums of 34 terms err by 42 ε (pbf.rs), walls by 5e-7. FLIP's hats add
 /// 2.4e-7 each, of 72 that count in a sum of 8: 2.2e-6, and f32 some 10 ε.
 #[test]
 fn ledgers_say_what_their_frames_come_to() {

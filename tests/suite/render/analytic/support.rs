@@ -1,4 +1,4 @@
-//! Cameras, skies and waters that are known, and the renderer's pictures of them.
+//! Cameras, skies and water with known properties, and the renderer's pictures of them.
 
 use std::path::Path;
 
@@ -15,7 +15,7 @@ pub(crate) use crate::support::device::{context, spoiled};
 /// Width of the film, mm.
 pub(crate) const FILM: f64 = 9.0;
 
-/// A pinhole camera; its picture is square.
+/// A pinhole camera with a square picture.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Eye {
     pub(crate) position: DVec3,
@@ -41,7 +41,7 @@ impl Eye {
         self.focal * FILM / f64::from(self.size)
     }
 
-    /// The look's table of this camera, standing still.
+    /// The look's `[camera]` table of this camera, at rest.
     fn table(&self, lines: &str) -> String {
         format!(
             "[camera]\n{lines}focal_length_mm = {:?}\nfilm_back_mm = [{FILM:?}, {FILM:?}]\n\
@@ -53,7 +53,8 @@ impl Eye {
         )
     }
 
-    /// The look's table of a camera that stands as `self` at frame 1 and as `next` at frame 2.
+    /// The look's `[camera]` table of a camera that is at `self` in frame 1 and at `next` in frame
+    /// 2.
     fn moving_table(&self, next: &Self) -> String {
         let key = |frame: u32, eye: &Self| {
             format!(
@@ -92,30 +93,30 @@ impl Eye {
         (forward * self.focal + right * x + up * y).normalize()
     }
 
-    /// Where something in this direction from the eye stands, pixels right and up from the middle.
+    /// Position in the picture of something in this direction, pixels right and up from the middle.
     pub(crate) fn place(&self, direction: DVec3) -> DVec2 {
         let [right, up, forward] = self.axes();
         DVec2::new(direction.dot(right), direction.dot(up)) * self.focal / direction.dot(forward)
     }
 }
 
-/// A look in parts; what is left as it is throws no light and hides nothing.
+/// A look in parts. The defaults emit no light and hide nothing.
 #[derive(Clone, Debug)]
 pub(crate) struct Setup {
     pub(crate) eye: Eye,
-    /// The camera a frame later.
+    /// The camera one frame later.
     pub(crate) next: Option<Eye>,
     pub(crate) samples: u32,
     pub(crate) shutter: f64,
     /// Further lines of `[camera]` and `[image]`.
     pub(crate) camera: String,
     pub(crate) image: String,
-    /// Of the renderer.
+    /// Method of the renderer.
     pub(crate) method: &'static str,
     /// Lines of `[surface]` and `[water]`.
     pub(crate) surface: String,
     pub(crate) water: String,
-    /// Degrees, degrees, factor.
+    /// Azimuth and elevation, degrees, and intensity.
     pub(crate) sun: [f64; 3],
     /// Lines of `[sky]`.
     pub(crate) sky: String,
@@ -123,9 +124,9 @@ pub(crate) struct Setup {
     pub(crate) haze: f64,
     pub(crate) solids: [f64; 3],
     pub(crate) background: bool,
-    /// Tables beside these.
+    /// Further tables.
     pub(crate) more: String,
-    /// More lines of `[output]`.
+    /// Further lines of `[output]`.
     pub(crate) output: String,
 }
 
@@ -186,8 +187,8 @@ impl Setup {
     }
 }
 
-/// Draws one frame. `sky` is the panorama's radiance over direction and over (u, v) in 0..1; where the look has
-/// another sky it is not used.
+/// Renders one frame. `sky` is the panorama's radiance as a function of direction and of (u, v) in
+/// 0..1; it is ignored if the look has another sky.
 pub(crate) fn draw(
     context: &Context,
     setup: &Setup,
@@ -202,7 +203,7 @@ pub(crate) fn draw(
     draw_moment(context, setup, sky, scene, &moment, frame).unwrap()
 }
 
-/// As [`draw`], of a frame with what is around it.
+/// Like [`draw`], for a moment with its neighbouring frames.
 pub(crate) fn draw_moment(
     context: &Context,
     setup: &Setup,
@@ -214,7 +215,7 @@ pub(crate) fn draw_moment(
     renderer(context, setup, sky, scene, u32::MAX).render_moment(frame, moment)
 }
 
-/// Draws frames in tiles of at most so many pixels.
+/// A renderer that draws frames in tiles of at most `tile` pixels.
 pub(super) fn renderer(
     context: &Context,
     setup: &Setup,
@@ -228,11 +229,12 @@ pub(super) fn renderer(
     Renderer::with_tile_limit(context, &look, scene, tile).unwrap()
 }
 
-/// Texels around the horizon; half as many from zenith to nadir. Their (u, v) are exact in half precision.
+/// Texels around the horizon; half as many from zenith to nadir. Their (u, v) are exact in half
+/// precision.
 pub(crate) const SKY_WIDTH: usize = 256;
 
-/// A latitude-longitude panorama: the first row is the zenith, the middle of a row looks along +x, and three quarters
-/// of it along +z.
+/// Writes a latitude-longitude panorama: the first row is the zenith, the middle of a row is +x,
+/// and three quarters along it is +z.
 pub(super) fn write_sky(file: &Path, sky: &dyn Fn(DVec3, DVec2) -> [f64; 3]) {
     let (width, height) = (SKY_WIDTH, SKY_WIDTH / 2);
     let texels: Vec<[f32; 3]> = (0..width * height)
@@ -256,7 +258,7 @@ pub(super) fn write_sky(file: &Path, sky: &dyn Fn(DVec3, DVec2) -> [f64; 3]) {
     .unwrap();
 }
 
-/// Where a direction lies in such a panorama.
+/// Position (u, v) of a direction in such a panorama.
 pub(crate) fn sky_place(direction: DVec3) -> DVec2 {
     DVec2::new(
         direction.z.atan2(direction.x) / std::f64::consts::TAU + 0.5,
@@ -264,23 +266,23 @@ pub(crate) fn sky_place(direction: DVec3) -> DVec2 {
     )
 }
 
-/// Radiance 1 everywhere, which lights every face with π.
+/// Radiance 1 everywhere, which gives every face the irradiance π.
 pub(crate) fn uniform_sky(_: DVec3, _: DVec2) -> [f64; 3] {
     [1.0; 3]
 }
 
-/// Red is u and green is v, so that a colour tells where it comes from. The renderer's own filtering reads such a ramp
-/// exactly, up to the eight bits of a texture unit's weights.
+/// Red is u and green is v, so that a colour tells its direction. The renderer's own filtering
+/// reads such a ramp exactly, up to the eight bits of a texture unit's weights.
 pub(crate) fn ramp_sky(_: DVec3, place: DVec2) -> [f64; 3] {
     [place.x, place.y, 1.0]
 }
 
-/// What reads [`ramp_sky`] may be off by: a texel's step in 256 parts and half of that again for rounding, and 4096 ulp of a
-/// number up to 1, which Vulkan allows to arc functions.
+/// Tolerance of readings of [`ramp_sky`]: a texel's step in 256 parts, half of that again for
+/// rounding, and 4096 ulp of a number up to 1, which Vulkan allows for arc functions.
 pub(crate) const RAMP_ERROR: f64 = 1.5 / 256.0 / (SKY_WIDTH / 2) as f64 + 4096.0 / 16_777_216.0;
 
-/// An open box of 10 m without solids, whose particles are balls of `radius` metres and stand for `filled` times their
-/// balls' volume.
+/// An open box of 10 m without solids, whose particles are balls of `radius` metres and represent
+/// `filled` times their balls' volume.
 pub(crate) fn scene(radius: f64, filled: f64) -> RenderScene {
     RenderScene {
         origin: DVec3::ZERO,
@@ -315,7 +317,8 @@ pub(crate) fn wide(v: [f32; 3]) -> DVec3 {
     DVec3::from(v.map(f64::from))
 }
 
-/// Runs `body`, the text of a function of `vec4f` to `vec4f`, on each input, with a shared shader file pasted before.
+/// Runs `body`, the text of a function from `vec4f` to `vec4f`, on each input, after including a
+/// shared shader file.
 pub(crate) fn kernel(
     context: &Context,
     import: &str,

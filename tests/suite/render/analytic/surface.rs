@@ -1,4 +1,4 @@
-//! From splats to a surface: radius, smoothing, spray, and what moves while the shutter is open.
+//! From splats to a surface: radius, smoothing, spray and motion blur.
 
 use glam::{DVec2, DVec3};
 use swell::domain::particles::Particles;
@@ -7,7 +7,7 @@ use swell::render::Image;
 
 use super::support::{Eye, Setup, ball, context, draw, scene, spoiled, uniform_sky};
 
-/// Looks straight down at (5, 1, 5), `distance` metres away.
+/// Looks straight down at (5, 1, 5) from `distance` metres.
 fn above(distance: f64, focal: f64) -> Eye {
     Eye {
         up: DVec3::Z,
@@ -15,14 +15,15 @@ fn above(distance: f64, focal: f64) -> Eye {
     }
 }
 
-/// Depth of the picture's middle, metres.
+/// Depth of the picture's middle, m.
 fn middle(image: &Image) -> f64 {
     let z = image.aovs.z.as_ref().unwrap();
     let at = |i: usize| f64::from(z[i]);
     0.25 * (at(31 * 64 + 31) + at(31 * 64 + 32) + at(32 * 64 + 31) + at(32 * 64 + 32))
 }
 
-/// How far smoothing by `surface` lowers the top of a ball of 10 m, metres. It stands 1 m above the floor.
+/// Amount by which smoothing with `surface` lowers the top of a ball with a radius of 10 m, m. The
+/// top is 1 m above the floor.
 fn lowered(context: &Context, surface: &str, distance: f64) -> f64 {
     let setup = Setup {
         surface: format!("radius_m = 10.0\nsplat = \"sphere\"\n{surface}"),
@@ -32,22 +33,24 @@ fn lowered(context: &Context, surface: &str, distance: f64) -> f64 {
     let mut scene = scene(10.0, 1.0);
     scene.particle_spacing = 0.3125;
     let depth = middle(&draw(context, &setup, &uniform_sky, &scene, &water, 1));
-    // Half a pixel from the axis both ways, a ball is a little deeper than at its top.
+    // Half a pixel from the axis in both directions, a ball is slightly deeper than at its top.
     let off = 0.5 * (distance / 256.0).powi(2);
     depth - distance - off / 20.0
 }
 
-/// Standard deviation of the smoothing, metres.
+/// Standard deviation of the smoothing, m.
 const SIGMA: f64 = 0.5;
 
-/// A flow by mean curvature takes a ball's radius from R to √(R² − 2σ²): with ∇²z = 2/R a Gaussian of variance σ² lowers
-/// its top by σ²/R, and the ball bends more as it shrinks.
+/// Error relative to flow by mean curvature, which takes a ball's radius from R to √(R² − 2σ²):
+/// with ∇²z = 2/R a Gaussian of variance σ² lowers its top by σ²/R, and curvature grows as the ball
+/// shrinks.
 fn flow_error(lowered: f64, sigma: f64) -> f64 {
     lowered / (10.0 - (100.0 - 2.0 * sigma * sigma).sqrt()) - 1.0
 }
 
-/// The width is 16 to 5 pixels, and three of it lie between the middle and the padded picture's edge. What is left is the
-/// ball's fourth order, (σ/R)² = 0.25 %, and the explicit step's; a hundredth of the width is 2 %.
+/// The width is 16 to 5 pixels, and three widths fit between the middle and the padded picture's
+/// edge. The remaining error is the ball's fourth order, (σ/R)² = 0.25 %, and that of the explicit
+/// step; 1 % of the width is 2 %.
 const FLOW: f64 = 0.006;
 const WIDTH: &str = "smoothing_width_m = 0.5\n";
 
@@ -62,7 +65,7 @@ fn the_flow_smooths_by_the_looks_width_at_any_distance() {
             assert!(control.abs() > FLOW, "{distance} m: {control}");
         }
     }
-    // Left out, the width is 1.6 spacings: 1.6 × 0.3125 m.
+    // The default width is 1.6 spacings: 1.6 × 0.3125 m.
     let error = flow_error(lowered(&context(), "", 12.0), SIGMA);
     assert!(error.abs() < FLOW, "{error}");
     let spoiled = spoiled(
@@ -74,13 +77,13 @@ fn the_flow_smooths_by_the_looks_width_at_any_distance() {
     assert!(control.abs() > FLOW, "{control}");
 }
 
-/// Relative error of what the narrow-range filter takes off the ball, against a Gaussian that is cut at 2.5 σ, along x and
-/// along y.
+/// Relative error of the amount by which the narrow-range filter lowers the ball, compared with a
+/// Gaussian that is cut at 2.5 σ, along x and along y.
 fn narrow_error(lowered: f64, distance: f64, sigma: f64) -> f64 {
     let pixel = distance / 256.0;
     let cells = sigma / pixel;
-    // The last pass has weights of 1.5 pixels that end 3 from the centre, whose variance is 0.881 of a whole Gaussian's; those along
-    // the axes have the rest.
+    // The last pass has weights of 1.5 pixels that end 3 from the centre, whose variance is 0.881
+    // of a whole Gaussian's; those along the axes have the rest.
     let last = (0.5 * cells).min(1.5);
     let axis = (cells * cells - 0.881 * last * last).sqrt();
     let variance = |sigma: f64, reach: i32| {
@@ -115,7 +118,7 @@ fn the_narrow_range_filter_smooths_by_the_looks_width_at_any_distance() {
 
 #[test]
 fn a_splat_has_the_radius_that_its_kind_has_where_the_look_leaves_it_out() {
-    // Balls have 0.87 spacings; a lone ellipsoid is a ball of d³.
+    // The default radius of balls is 0.87 spacings; an isolated ellipsoid is a ball of volume d³.
     let own = (3.0 / (4.0 * std::f64::consts::PI)).cbrt();
     for (splat, radius) in [("sphere", 0.87), ("ellipsoid", own)] {
         splat_radius(splat, 2.0 * radius);
@@ -131,7 +134,8 @@ fn splat_radius(splat: &str, radius: f64) {
     scene.particle_spacing = 2.0;
     let water = ball(DVec3::new(5.0, 1.0, 5.0), DVec3::ZERO);
     let image = draw(&context(), &setup, &uniform_sky, &scene, &water, 1);
-    // Half a pixel from the axis, 8.26/256 m apart, a ball of 1.74 m is 3e-4 m deeper than at its top.
+    // Half a pixel from the axis, 8.26/256 m apart, a ball of 1.74 m is 3e-4 m deeper than at its
+    // top.
     let found = middle(&image);
     let off = 2.0 * (0.5 * (10.0 - radius) / 256.0).powi(2);
     let expected = 10.0 - radius + off / (2.0 * radius);
@@ -141,12 +145,12 @@ fn splat_radius(splat: &str, radius: f64) {
     );
 }
 
-/// Metres between the eye and the drop.
+/// Distance between the eye and the drop, m.
 const AWAY: f64 = 50.0;
 
-/// Particles of spray at one place before an empty sky, with an optical density per metre.
+/// Particles of spray at one position in front of an empty sky, with an optical density per metre.
 fn spray(context: &Context, density: f64, id: &[u32]) -> (Image, Eye) {
-    // 75 cm of the drop's surroundings: few threads are longer than 50.
+    // 75 cm around the drop: few threads are longer than 50.
     let eye = Eye {
         size: 320,
         ..Eye::new(
@@ -173,14 +177,14 @@ fn spray(context: &Context, density: f64, id: &[u32]) -> (Image, Eye) {
     (draw(context, &setup, &uniform_sky, &scene, &water, 1), eye)
 }
 
-/// Of one that flies alone, per metre; of several at one place together.
+/// Density of an isolated particle, 1/m; several at one position share it.
 const DENSITY: f64 = 6.0;
 
-/// Particles of spray that are drawn.
+/// Number of spray particles that are rendered.
 const CLOUDS: u32 = 10;
 
-/// Of particles that fly alone, or so many at one place: optical depth times area of their spray, m², and the worst relative error of the
-/// radiance that it has where it is.
+/// Optical depth times area of the spray of `CLOUDS` particles, in groups of `together` at one
+/// position, m², and the largest relative error of its radiance.
 fn spray_sums(context: &Context, together: u32) -> (f64, f64) {
     let (mut area, mut grey) = (0.0, 0.0f64);
     for first in (0..CLOUDS).step_by(together as usize) {
@@ -191,7 +195,7 @@ fn spray_sums(context: &Context, together: u32) -> (f64, f64) {
             // Cover is 1 − exp(−τ).
             area -= (1.0 - cover).ln() * (AWAY / eye.focal).powi(2);
             if cover > 0.01 {
-                // A furnace: drops that take nothing up, under a sky of radiance 1.
+                // A white furnace: drops without absorption under a sky of radiance 1.
                 grey = grey.max((f64::from(r) / cover - 1.0).abs());
             }
         }
@@ -201,10 +205,11 @@ fn spray_sums(context: &Context, together: u32) -> (f64, f64) {
 
 #[test]
 fn spray_hides_one_less_exp_of_its_optical_depth() {
-    // A particle of spray stands for 15 % of a particle's water.
+    // A particle of spray represents 15 % of a particle's water.
     let volume = f64::from(CLOUDS) * 0.15 * 0.115f64.powi(3);
-    // One that flies alone is 4096 drops here, one of five four puffs and some 1200 drops: 6 cm nearer or farther than 50 m, which is twice
-    // that of an area, and of either sign: 4e-4 for all puffs. Drops are shared out whole.
+    // An isolated particle is 4096 drops here, one of five is four puffs and some 1200 drops: up to
+    // 6 cm nearer or farther than 50 m, which counts twice in an area and has either sign: 4e-4 for
+    // all puffs. Drops are distributed completely.
     for together in [1, 5] {
         let (area, grey) = spray_sums(&context(), together);
         let error = |density: f64| area / (density * volume / f64::from(together)) - 1.0;
@@ -236,7 +241,7 @@ fn spray_hides_one_less_exp_of_its_optical_depth() {
     assert!(control > 1e-3, "{control}");
 }
 
-/// Sum, mean place and variance of a picture's alpha, pixels, right and up.
+/// Sum, centroid and variance of a picture's alpha, pixels, right and up.
 fn moments(image: &Image) -> (f64, DVec2, DVec2) {
     let side = image.width as usize;
     let (mut sum, mut first, mut second) = (0.0, DVec2::ZERO, DVec2::ZERO);
@@ -251,8 +256,9 @@ fn moments(image: &Image) -> (f64, DVec2, DVec2) {
     (sum, mean, second / sum - mean * mean)
 }
 
-/// Pixels that a ball goes while the shutter is open, by how much its picture is wider than that of a ball at rest: a
-/// stroke of length L at n evenly spaced instants has the variance L²/12 (1 − 1/n²).
+/// Pixels that a ball moves while the shutter is open, from the increase in width of its picture
+/// relative to a ball at rest: a stroke of length L at n evenly spaced instants has the variance
+/// L²/12 (1 − 1/n²).
 fn stroke(shutter: f64) -> f64 {
     let eye = Eye {
         size: 96,
@@ -267,7 +273,7 @@ fn stroke(shutter: f64) -> f64 {
             background: false,
             ..Setup::new(eye)
         };
-        // Across the picture, which looks along (1, 1, 0): to the right is +z.
+        // Across the picture, which looks along (1, 1, 0): right is +z.
         let water = ball(eye.target, DVec3::new(0.0, 0.0, 80.0));
         moments(&draw(
             &context(),
@@ -301,7 +307,8 @@ fn motion_is_blurred_over_the_shutters_part_of_a_frame() {
     let expected = |shutter: f64| 80.0 / 24.0 * shutter * 240.0 / 200f64.sqrt();
     let length = stroke(0.5);
     let error = |shutter: f64| length / expected(shutter) - 1.0;
-    // A disc of 7 pixels' radius, at 24 instants between which it moves 1.2 pixels, is counted to a few tenths of a percent.
+    // A disc with a radius of 7 pixels, at 24 instants between which it moves by 1.2 pixels, is
+    // measured to a few tenths of a percent.
     assert!(error(0.5).abs() < 4e-3, "{length} for {}", expected(0.5));
     for shutter in [0.495, 0.505] {
         assert!(error(shutter).abs() > 6e-3, "{length}");

@@ -1,4 +1,4 @@
-//! Drops and bubbles that rays go through: seen in mirrors and through the water, and their shadows.
+//! Drops and bubbles as volumes for rays: in reflections and through the water, and their shadows.
 
 use std::f64::consts::PI;
 
@@ -13,11 +13,12 @@ use crate::support::device::Lent;
 use super::rays::{INDEX, LEVEL, SPACING, pool_scene, reflectance, refracted, water};
 use super::support::{Eye, Setup, ball, context, draw_moment, spoiled, uniform_sky};
 
-/// Between drops of a slab, and radius of each: so wide that the field between them is even to a thousandth.
+/// Spacing of drops in a slab, and radius of each, m: so wide that the density between them is
+/// uniform to a thousandth.
 const PITCH: f64 = 0.25;
 const WIDE: f64 = 0.4;
 
-/// What a slab from `low` to `high` metres holds, so that its optical depth straight through is `depth` with a density of 1.
+/// A slab of whitewater from `low` to `high`, m.
 struct Slab {
     low: f64,
     high: f64,
@@ -30,7 +31,7 @@ fn extinction() -> f64 {
 }
 
 impl Slab {
-    /// Over 14 m, so that none of its sides is seen.
+    /// Particles over 14 m, so that none of the slab's sides is visible.
     fn particles(&self) -> Particles {
         let n = (14.0 / PITCH) as usize;
         let layers = ((self.high - self.low) / PITCH).round() as usize;
@@ -56,7 +57,7 @@ impl Slab {
         white
     }
 
-    /// Metres through it.
+    /// Thickness of the slab, m.
     fn height(&self) -> f64 {
         self.high - self.low
     }
@@ -99,7 +100,7 @@ impl Shot<'_> {
     }
 }
 
-/// Towards a spot on the pool, `theta` degrees from straight down.
+/// Looks at a point on the pool, `theta` degrees from straight down.
 fn eye_on_pool(theta: f64) -> Eye {
     let (sin, cos) = theta.to_radians().sin_cos();
     let target = DVec3::new(5.0, LEVEL, 5.0);
@@ -128,7 +129,7 @@ const UNDER: Slab = Slab {
     kind: Kind::Bubble,
 };
 
-/// Optical depth 1 straight through.
+/// Density that gives the slab an optical depth of 1 straight through.
 fn unit(slab: &Slab) -> f64 {
     1.0 / (extinction() * slab.height())
 }
@@ -142,7 +143,8 @@ fn worst(image: &Image, expected: impl Fn(usize) -> f64) -> f64 {
     off.fold(0.0, f64::max)
 }
 
-/// Worst error of what an even sky shows of a slab, with all else white: seen from above and from within the water.
+/// Largest error of a slab under a uniform sky with everything else white, seen from above and from
+/// within the water.
 fn furnace_error(context: &Context, slab: &Slab) -> f64 {
     let white = slab.particles();
     let below = Eye::new([5.0, 1.6, 5.0], [6.0, 0.2, 5.3], 60.0);
@@ -163,7 +165,7 @@ fn furnace_error(context: &Context, slab: &Slab) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// Seen in the pool's mirror, through its surface, and from within it.
+/// Seen in the pool's reflection, through its surface, and from within it.
 #[test]
 fn clouds_in_a_white_furnace_are_not_seen() {
     for (slab, from, to) in [
@@ -179,14 +181,14 @@ fn clouds_in_a_white_furnace_are_not_seen() {
         ),
     ] {
         let error = furnace_error(&context(), &slab);
-        // As clear water in a furnace: rays that are not followed.
+        // As for clear water in a furnace: rays that are not followed.
         assert!(error < 0.01, "{from}: {error}");
         let control = furnace_error(&spoiled("rays/cast", from, to), &slab);
         assert!(control > 0.01, "{to}: {control}");
     }
 }
 
-/// Drops that send no light.
+/// Drops that emit no light.
 fn black_drops() -> Lent {
     spoiled(
         "rays/cast",
@@ -195,7 +197,8 @@ fn black_drops() -> Lent {
     )
 }
 
-/// Of the sky that a pool over a black floor mirrors, an absorbing slab above the eye takes as Beer says; `density` over the slab's.
+/// Largest error of the sky's reflection in a pool over a black floor, dimmed by an absorbing slab
+/// above the eye (Beer); `density` is relative to the slab's.
 fn mirrored_error(theta: f64, density: f64) -> f64 {
     let white = OVER.particles();
     let shot = Shot {
@@ -216,7 +219,8 @@ fn mirrored_error(theta: f64, density: f64) -> f64 {
 #[test]
 fn a_mirrored_ray_is_dimmed_by_a_slab_as_beer_says() {
     for theta in [0.0, 40.0] {
-        // The pool's slope is some thousandths, and the field's evenness a thousandth of its depth.
+        // The pool's slope is a few thousandths, and the density is uniform to a thousandth of its
+        // depth.
         let error = mirrored_error(theta, 1.0);
         assert!(error < 0.02, "{theta}°: {error}");
         let control = mirrored_error(theta, 1.05);
@@ -224,7 +228,8 @@ fn a_mirrored_ray_is_dimmed_by_a_slab_as_beer_says() {
     }
 }
 
-/// Bubbles in a clear pool over a black floor, under an even sky: what hides the floor is as bright as the sky.
+/// Largest error of bubbles in a clear pool over a black floor, under a uniform sky: whatever hides
+/// the floor is as bright as the sky.
 fn bubbles_error(context: &Context, theta: f64) -> f64 {
     let white = UNDER.particles();
     let shot = Shot {
@@ -255,7 +260,8 @@ fn bubbles_brighten_a_pool_by_what_they_hide() {
     }
 }
 
-/// The sun on a white floor below a slab of drops, over that without one, against Beer along the way to it.
+/// Largest error of sunlight on a white floor below a slab of drops, relative to that without one,
+/// compared with Beer's law along the path of the light.
 fn shadow_error(context: &Context, elevation: f64) -> f64 {
     let (white, none) = (OVER.particles(), Particles::default());
     let draw = |white| {
@@ -288,7 +294,8 @@ fn a_slab_shades_the_floor_as_beer_says() {
     }
 }
 
-/// What a ball of bubbles that moves along x through the picture hides, in all, and how wide that is spread along x, in pixels squared.
+/// Total of the picture's brightness from a ball of bubbles that moves along x, and its variance
+/// along x, pixels².
 fn spread(context: &Context, speed: f64, shutter: f64) -> [f64; 2] {
     const SAMPLES: u32 = 8;
     let mut white = ball(DVec3::new(5.0, 0.7, 5.0), DVec3::new(speed, 0.0, 0.0));
@@ -305,7 +312,8 @@ fn spread(context: &Context, speed: f64, shutter: f64) -> [f64; 2] {
         shutter,
         water: "absorption_per_metre = [0.0, 0.0, 0.0]\n[whitewater]\ndensity_per_metre = 1.0\n"
             .to_owned(),
-        // Four voxels and more in a radius: a ball on the grid is as wide wherever it lies between nodes.
+        // Four voxels and more per radius: a ball on the grid has the same width wherever it lies
+        // between nodes.
         surface: "voxels_per_spacing = 4.0\n".to_owned(),
         sun: [0.0, 90.0, 0.0],
         ..Setup::new(eye)
@@ -328,22 +336,26 @@ fn moving_bubbles_are_drawn_along_their_way() {
     let (speed, shutter) = (12.0, 1.0);
     let still = spread(&context(), 0.0, shutter);
     let moving = spread(&context(), speed, shutter);
-    // A thin ball hides as much wherever it is, but for its distance from the eye and the slope of the view.
+    // A thin ball hides the same amount wherever it is, except for its distance from the eye and
+    // the slope of the view.
     assert!(
         (moving[0] / still[0] - 1.0).abs() < 0.03,
         "{still:?} {moving:?}"
     );
-    // Eight instants, evenly over a shutter of a frame: (1 − 1/64) / 12 of the way's square, 1.2 m below the eye.
+    // Eight instants, evenly over a shutter of a frame: (1 − 1/64) / 12 of the squared
+    // displacement, 1.2 m below the eye.
     let way = 50.0 / 1.2 * speed * shutter / 24.0;
     let wider = |found: [f64; 2]| (found[1] - still[1]) / (way * way * (1.0 - 1.0 / 64.0) / 12.0);
-    // A nearer part goes farther through the picture, by 1 / z, and fills more of it, by 1 / z²: the mean of 1 / z⁴ over that of 1 / z² is
-    // to second order 1 + 7 times the variance of z over z². A ball is as deep as it is wide: that variance is the still picture's over
-    // the square of the focal length.
+    // A nearer part moves farther through the picture, by 1 / z, and fills more of it, by 1 / z²:
+    // the mean of 1 / z⁴ over that of 1 / z² is, to second order, 1 + 7 times the variance of z
+    // over z². A ball is as deep as it is wide: that variance is the still picture's over the
+    // square of the focal length.
     let expected = 1.0 + 7.0 * still[1] / 50f64.powi(2);
-    // What is left is the longer way through a ball beside the middle, two parts of a hundred by quadrature, and as much for the grid.
+    // The rest is the longer path through a ball beside the middle, 2 % by quadrature, and as much
+    // for the grid.
     let off = |found| (wider(found) / expected - 1.0).abs();
     assert!(off(moving) < 0.04, "{}", off(moving));
-    // The control: a twentieth faster, a tenth in the square.
+    // Control: 5 % faster, 10 % in the square.
     let faster = spread(&context(), 1.05 * speed, shutter);
     assert!(off(faster) > 0.04, "{}", off(faster));
 }

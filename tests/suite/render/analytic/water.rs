@@ -1,4 +1,4 @@
-//! Light at and in water: Fresnel, Snell, Beer and Lambert, microfacets.
+//! Light at and in water: Fresnel, Snell, Beer–Lambert, microfacets.
 
 use std::f64::consts::PI;
 
@@ -14,17 +14,17 @@ use super::support::{
     spoiled, uniform_sky, wide,
 };
 
-/// Radius of the ball of water, metres; its top is the pool.
+/// Radius of the ball of water, m; its top is the pool.
 pub(crate) const RADIUS: f64 = 20.0;
 pub(crate) const INDEX: f64 = 1.333;
-/// Absorbs whatever enters it.
+/// Absorbs all light that enters the water.
 pub(crate) const BLACK: &str = "absorption_per_metre = [1e4, 1e4, 1e4]\n";
 
 fn black_sky(_: DVec3, _: DVec2) -> [f64; 3] {
     [0.0; 3]
 }
 
-/// A camera 30 m from the pool's middle, which it sees `theta` degrees from the vertical, looking along +x.
+/// A camera 30 m from the pool's middle, `theta` degrees from the vertical, looking along +x.
 pub(crate) fn eye_at(theta: f64, depth: f64, focal: f64) -> Eye {
     let (sin, cos) = theta.to_radians().sin_cos();
     let target = DVec3::new(5.0, depth, 5.0);
@@ -61,9 +61,9 @@ pub(crate) fn pool(
 /// A ray that meets the water's surface.
 pub(crate) struct Meeting {
     pub(crate) position: DVec3,
-    /// Towards the eye.
+    /// Surface normal, towards the eye.
     pub(crate) normal: DVec3,
-    /// Away from the eye.
+    /// Direction of the ray, away from the eye.
     pub(crate) along: DVec3,
 }
 
@@ -76,13 +76,13 @@ impl Meeting {
         self.along + 2.0 * self.cosine() * self.normal
     }
 
-    /// Snell: what lies along the surface shrinks by the index.
+    /// Refracted direction (Snell): the component along the surface shrinks by the index.
     fn refracted(&self, index: f64) -> DVec3 {
         let tangent = (self.along + self.cosine() * self.normal) / index;
         tangent - self.normal * (1.0 - tangent.length_squared()).sqrt()
     }
 
-    /// Fresnel, by the angles of both rays.
+    /// Fresnel reflectance, by the angles of both rays.
     pub(crate) fn reflectance(&self, index: f64) -> f64 {
         fresnel(self.cosine(), index)
     }
@@ -99,7 +99,7 @@ fn fresnel(cosine: f64, index: f64) -> f64 {
     0.5 * (s * s + p * p)
 }
 
-/// Position and normal are the picture's own channels, which tests/render_analytic/geometry.rs holds.
+/// Intersections from the picture's own position and normal AOVs, which `geometry.rs` tests.
 pub(crate) fn meetings(image: &Image, eye: &Eye) -> Vec<Meeting> {
     let (p, n) = (
         image.aovs.p.as_ref().unwrap(),
@@ -124,7 +124,8 @@ struct Pool {
     image: Image,
 }
 
-/// Of the sun, degrees: it is too dim to be seen, but the daylight comes down along its refracted way.
+/// Elevation of the sun, degrees: it is too dim to be seen, but daylight comes down along its
+/// refracted direction.
 const ELEVATION: f64 = 35.0;
 
 fn drawn_pool(context: &Context, theta: f64, depth: f64, scattering: DVec3) -> Pool {
@@ -151,7 +152,7 @@ fn drawn_pool(context: &Context, theta: f64, depth: f64, scattering: DVec3) -> P
     }
 }
 
-/// Worst relative error against optics with this index.
+/// Largest relative error compared with optics of this index.
 fn pool_error(pool: &Pool, index: f64) -> f64 {
     let sun_sine = ELEVATION.to_radians().cos() / index;
     let sun_path = 1.0 / (1.0 - sun_sine * sun_sine).sqrt();
@@ -176,8 +177,8 @@ fn pool_error(pool: &Pool, index: f64) -> f64 {
     worst
 }
 
-/// The light of the sky is its harmonics' to 3e-5; exponentials of up to 5 and a depth of 2 m that is rounded at 30 m add
-/// as much.
+/// The light of the sky is that of its harmonics to 3e-5; exponentials of up to 5, and a depth of 2
+/// m rounded at 30 m, add as much.
 const POOL: f64 = 1.5e-4;
 
 #[test]
@@ -228,7 +229,7 @@ fn a_pool_shows_sky_floor_and_body_as_optics_say() {
 
 #[test]
 fn a_sheet_absorbs_along_the_bent_way_through_it() {
-    // Thin, and high over a white floor; its thickness along the line of sight is a channel of its own.
+    // Thin, and high over a white floor; the thickness along the line of sight is an AOV.
     let setup = Setup {
         ground: [1.0; 3],
         ..setup_at(
@@ -243,7 +244,7 @@ fn a_sheet_absorbs_along_the_bent_way_through_it() {
     let worst = |bent: &dyn Fn(&Meeting) -> f64| {
         let mut worst = 0.0f64;
         for (i, at) in meetings(&image, &setup.eye).iter().enumerate() {
-            // Sides that are parallel: the bent way crosses the same height.
+            // The sides are parallel: the refracted ray crosses the same height.
             let way = f64::from(thickness[i]) * at.cosine() / bent(at);
             let reflectance = at.reflectance(INDEX);
             for c in 0..3 {
@@ -253,18 +254,18 @@ fn a_sheet_absorbs_along_the_bent_way_through_it() {
         }
         worst
     };
-    // Of a floor 200 m away the haze takes 200/1e7; the rest as in a pool.
+    // For a floor 200 m away the haze takes 200/1e7; the rest as in a pool.
     let cosine = |at: &Meeting| -at.refracted(INDEX).dot(at.normal);
     let error = worst(&cosine);
     assert!(error < POOL, "{error}");
-    // The controls: a hundredth longer, and straight through.
+    // Controls: 1 % longer, and not refracted.
     let control = worst(&|at| cosine(at) / 1.01);
     assert!(control > 5.0 * POOL, "{control}");
     let control = worst(&|at| at.cosine());
     assert!(control > 5.0 * POOL, "{control}");
 }
 
-/// Black water under a sky and a sun of this intensity, seen at some angles.
+/// Black water under a sky and a sun of this intensity, seen at several angles.
 fn black_pools(
     context: &Context,
     angles: &[f64],
@@ -281,7 +282,7 @@ fn black_pools(
     angles.iter().map(shot).collect()
 }
 
-/// Worst error of what black water mirrors of a sky whose colour tells its place.
+/// Largest error of reflections in black water of a sky whose colour tells its direction.
 fn mirror_error(pools: &[(Image, Eye)], index: f64) -> f64 {
     let mut worst = 0.0f64;
     for (image, eye) in pools {
@@ -312,8 +313,9 @@ fn water_mirrors_the_sky_by_the_law_of_reflection() {
     assert!(control > 10.0 * RAMP_ERROR, "{control}");
 }
 
-/// Worst relative error of the sun's glitter on black water under a black sky, against a microfacet surface of that root
-/// mean square slope (Walter 2007: GGX of width α² = 2 σ², Smith's masking, Fresnel at the facet).
+/// Largest relative error of the sun's glitter on black water under a black sky, compared with a
+/// microfacet surface of that rms slope (Walter et al. 2007: GGX of width α² = 2 σ², Smith masking,
+/// Fresnel at the facet).
 fn glitter_error(pools: &[(Image, Eye)], roughness: f64) -> f64 {
     let square = 2.0 * roughness * roughness;
     let sun = DVec3::new(0.5f64.sqrt(), 0.5f64.sqrt(), 0.0);
@@ -328,7 +330,8 @@ fn glitter_error(pools: &[(Image, Eye)], roughness: f64) -> f64 {
             let (to_eye, to_sun) = (at.cosine(), at.normal.dot(sun));
             let brdf = facets * mask(sun) * mask(-at.along) * fresnel(sun.dot(half), INDEX)
                 / (4.0 * to_eye * to_sun);
-            // 0.82 of the unit of light falls on a level face from a sun at 45°, as radiance of white paint.
+            // 0.82 of the unit of light falls on a horizontal face from a sun at 45°, as radiance
+            // of white paint.
             let irradiance = 0.82 * PI * 2f64.sqrt();
             let expected = brdf * to_sun * irradiance;
             worst = worst.max((luminance(image.beauty[i]) / expected - 1.0).abs());
@@ -339,10 +342,12 @@ fn glitter_error(pools: &[(Image, Eye)], roughness: f64) -> f64 {
 
 #[test]
 fn glitter_is_that_of_facets_with_the_looks_slope() {
-    // The mirror's direction, and 7° to either side of it, where the density falls by slopes of 0.07 to 0.12.
+    // The mirror direction, and 7° to either side of it, where the density falls by slopes of 0.07
+    // to 0.12.
     let lines = ("roughness = 0.1\n", 1.0);
     let pools = black_pools(&context(), &[30.0, 45.0, 58.0], lines, &black_sky);
-    // Near the mirror's direction the density is one over 0.02 plus the square of a difference of numbers near 1.
+    // Near the mirror direction the density is one over 0.02 plus the square of a difference of
+    // numbers near 1.
     let error = glitter_error(&pools, 0.1);
     assert!(error < 1e-4, "{error}");
     let control = glitter_error(&pools, 0.101);
@@ -380,14 +385,15 @@ fn a_plate_under_water_is_seen_where_snell_puts_it() {
         ..scene(RADIUS, 1.0)
     };
     let image = pool(&context(), &setup, &uniform_sky, &scene, depth, 1);
-    // How many pixels show the floor where the plate must be seen or the other way round, and how many of each were
-    // looked at.
+    // Numbers of pixels that show the floor where the plate must be seen, or the plate where the
+    // floor must be, and of pixels of each kind.
     let faults = |index: f64| {
         let (mut faults, mut seen) = (0, [0; 2]);
         for (i, at) in meetings(&image, &setup.eye).iter().enumerate() {
             let bent = at.refracted(index);
             let foot = at.position.x - bent.x * at.position.y / bent.y;
-            // A pixel and a half, 30/256 m across and seen at 45°: the renderer walks over the picture of the plate.
+            // A pixel and a half, 30/256 m across and seen at 45°: the renderer marches over the
+            // picture of the plate.
             if (foot - start).abs() < 0.25 {
                 continue;
             }
@@ -402,14 +408,15 @@ fn a_plate_under_water_is_seen_where_snell_puts_it() {
     let (wrong, seen) = faults(INDEX);
     assert!(seen[0] > 500 && seen[1] > 500, "{seen:?}");
     assert_eq!(wrong, 0, "{seen:?}");
-    // Straight through, or bent by a quarter too much.
+    // Straight through, or bent 25 % too much.
     for index in [1.0, 1.25 * INDEX] {
         assert!(faults(index).0 > 60, "{index}: {}", faults(index).0);
     }
 }
 
-/// Pixels of a pool half a metre deep over a white shelf that show what is below the shelf, and pixels of the pool; seen from this many
-/// degrees above its surface, and of the picture's upper half: lower ones show what the picture does not reach down to.
+/// Number of pixels of a pool half a metre deep over a white shelf that show what is below the
+/// shelf, and number of pixels of the pool, seen from `elevation` degrees above its surface. Counts
+/// the picture's upper half: lower pixels show parts that lie outside the picture.
 fn dark_pixels(context: &Context, elevation: f64) -> [usize; 2] {
     let (sin, cos) = elevation.to_radians().sin_cos();
     let target = DVec3::new(5.0, rays::LEVEL, 5.0);
@@ -437,12 +444,13 @@ fn dark_pixels(context: &Context, elevation: f64) -> [usize; 2] {
     );
     let is_wet = |i: &usize| f64::from(place[*i][0]) < rays::SIDE && thickness[*i] > 0.5;
     let wet = || (0..32 * 64).filter(is_wet);
-    // Before a white shelf and a white sky all is white; the ground is black.
+    // In front of a white shelf and a white sky everything is white; the ground is black.
     let dark = wet().filter(|&i| image.beauty[i][1] < 0.8);
     [dark.count(), wet().count()]
 }
 
-/// Along a flat line of sight a step down goes far behind the shelf: that is no gap between it and what stands before it.
+/// Along a flat line of sight a downward step reaches far behind the shelf; it is not a gap between
+/// the shelf and things in front of it.
 #[test]
 fn shallow_water_seen_flat_shows_its_floor() {
     for elevation in [6.0, 9.0, 14.0] {
@@ -469,7 +477,7 @@ fn the_shader_reflects_as_fresnel_says() {
     let mut schlick_off = 0.0f64;
     for (&cosine, found) in cosines.iter().zip(&found) {
         let exact = fresnel(cosine, INDEX);
-        // A dozen roundings of values up to 1, and the index's own.
+        // A dozen roundings of values up to 1, and that of the index.
         assert!(
             (f64::from(found[0]) - exact).abs() < 2e-6,
             "{cosine}: {found:?} {exact}"

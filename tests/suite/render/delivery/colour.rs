@@ -1,4 +1,4 @@
-//! The space of an EXR's light.
+//! The colour space of an EXR.
 
 use std::path::Path;
 
@@ -14,7 +14,8 @@ use swell::{
 
 use super::super::pictures::attributes;
 
-/// From Rec. 709 by Bradford, row by row, as published (OpenColorIO's built-in ACES configurations).
+/// From Rec. 709 to ACEScg with Bradford adaptation, row by row, as published (OpenColorIO's
+/// built-in ACES configurations).
 const TO_ACES_CG: [[f64; 3]; 3] = [
     [0.613_097, 0.339_523, 0.047_379],
     [0.070_194, 0.916_354, 0.013_452],
@@ -47,7 +48,7 @@ fn written(file: &Path, space: ColourSpaceSpec) -> Vec<[f32; 4]> {
     read_exr(file).unwrap().0.2
 }
 
-/// Largest error, in halves' rounding of the largest channel.
+/// Largest error, in units of half-float rounding of the largest channel.
 fn off(found: &[[f32; 4]], matrix: DMat3) -> f64 {
     let mut worst = 0.0f64;
     for (found, [r, g, b, a]) in found.iter().zip(COLOURS) {
@@ -67,7 +68,7 @@ fn an_exr_in_acescg_has_the_light_of_acescg_and_says_so() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("frame.exr");
     let matrix = DMat3::from_cols_array_2d(&TO_ACES_CG).transpose();
-    // The published matrix has six places, a thousandth of that rounding.
+    // The published matrix has six digits, a thousandth of that rounding.
     let found = written(&file, ColourSpaceSpec::AcesCg);
     assert!(off(&found, matrix) < 1.01, "{}", off(&found, matrix));
     assert!(off(&found, DMat3::IDENTITY) > 100.0, "the control");
@@ -75,7 +76,7 @@ fn an_exr_in_acescg_has_the_light_of_acescg_and_says_so() {
         .unwrap()
         .headers
         .remove(0);
-    // AP1 with the white of ACES, of Academy S-2014-004.
+    // AP1 with the ACES white point, of Academy S-2014-004.
     let named = header.shared_attributes.chromaticities.unwrap();
     assert_eq!(
         (named.red, named.green),
@@ -89,7 +90,7 @@ fn an_exr_in_acescg_has_the_light_of_acescg_and_says_so() {
     let nits = header.own_attributes.white_luminance.unwrap();
     assert!((20e3..27e3).contains(&nits), "{nits} cd/m²");
 
-    // A layer of light goes the same way: its reds are those of the picture.
+    // A light layer is converted in the same way: its red equals the picture's.
     let read = exr::prelude::read_all_data_from_file(&file).unwrap();
     let list = &read.layer_data[0].channel_data.list;
     let samples = |name: &str| -> Vec<f32> {

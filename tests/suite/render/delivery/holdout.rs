@@ -1,4 +1,4 @@
-//! Held-out solids, in closed form: black and transparent but for the spray before them.
+//! Held-out solids, in closed form: black and transparent except for spray in front of them.
 
 use std::path::Path;
 
@@ -12,7 +12,8 @@ use swell::{
 use super::super::analytic::support::{context, spoiled};
 use super::{OBLIQUE, draw, harbour};
 
-/// Under a sky of radiance 1 without a sun, of water that takes no light, one sample at each pixel's centre.
+/// A sky of radiance 1 without a sun, water without absorption, and one sample at each pixel's
+/// centre.
 fn look(folder: &Path, method: &str, output: &str) -> Look {
     let text = OBLIQUE
         .replace("samples = 2\nshutter = 0.5", "samples = 1")
@@ -28,11 +29,12 @@ fn look(folder: &Path, method: &str, output: &str) -> Look {
     Look::parse(&text, &folder.join("look.toml")).unwrap()
 }
 
-/// White water under a sky of radiance 1: drops take nothing up.
+/// Radiance of spray under a sky of radiance 1: drops do not absorb.
 const WHITE: f32 = 1.0;
-/// Rows of the sky's picture.
+/// Rows of the sky's panorama.
 const ROWS: usize = 64;
-/// What the sky's irradiance may be off by, of a quadrature of second order: the square of half a row's angle.
+/// Relative error of the sky's irradiance by a quadrature of second order: the square of half a
+/// row's angle.
 const QUADRATURE: f32 = {
     let half = std::f32::consts::PI / (2 * ROWS) as f32;
     half * half
@@ -40,15 +42,15 @@ const QUADRATURE: f32 = {
 /// Some roundings of numbers up to 1.
 const ROUNDING: f32 = 1e-6;
 
-/// Part of a pixel that an object covers.
+/// Fraction of a pixel that an object covers.
 fn cover(image: &Image, i: usize, name: &str) -> f32 {
     let ranks = &image.matte.as_ref().unwrap().ranks;
     let own = ranks.iter().filter(|rank| rank[i][0] == id_of(name));
     own.map(|rank| rank[i][1]).sum()
 }
 
-/// Pixels that are not as they have to be, with the first one in words; and how many there were of three kinds: held out alone, behind
-/// spray, and not held out.
+/// Descriptions of pixels that are wrong, and numbers of pixels of three kinds: held out only,
+/// behind spray, and not held out.
 fn wrong(context: &Context, method: &str) -> (Vec<String>, [usize; 3]) {
     let folder = tempfile::tempdir().unwrap();
     exr::prelude::write_rgb_file(folder.path().join("sky.exr"), 2 * ROWS, ROWS, |_, _| {

@@ -1,4 +1,4 @@
-//! Parts of the light add up to the picture.
+//! The light layers sum to the picture.
 
 use half::f16;
 use swell::{
@@ -18,7 +18,7 @@ const ALL: &str = "lights = [\"solids\", \"reflection\", \"refraction\", \"scatt
                    \"sun\", \"sky\", \"spray\", \"caustics\", \"foam\"]\n\
                    [whitewater]\ndensity_per_metre = 6.0\n";
 
-/// What stands behind the layers there.
+/// The part of [`ALL`] without the layers.
 const WHITE: &str = "[whitewater]\ndensity_per_metre = 6.0\n";
 
 fn setup<'a>(method: &'a str, output: &'a str) -> Setup<'a> {
@@ -30,16 +30,17 @@ fn setup<'a>(method: &'a str, output: &'a str) -> Setup<'a> {
     }
 }
 
-/// What a file has of a value.
+/// Value after rounding to a half float, as a file stores it.
 fn halved(value: f32) -> f64 {
     f16::from_f32(value.min(65504.0)).to_f64()
 }
 
-/// Largest difference between a file's beauty and the sum of its layers, over what rounding to half allows of each of them.
+/// Largest difference between a file's beauty and the sum of its layers, relative to the half-float
+/// rounding of all of them.
 fn off(image: &Image) -> f64 {
     // Half a step of eleven bits, and half of the smallest number.
     let rounding = |value: f64| value.abs() / 2048.0 + 2f64.powi(-25);
-    // Sums in f32, of two samples with some ten lights each, are far finer than that.
+    // Sums in f32, of two samples with some ten lights each, are much more accurate than that.
     let mut worst = 0.0f64;
     for (i, pixel) in image.beauty.iter().enumerate() {
         for (c, value) in pixel[..3].iter().enumerate() {
@@ -56,7 +57,7 @@ fn off(image: &Image) -> f64 {
     worst
 }
 
-/// Largest difference of two pictures' light, in half steps of half floats.
+/// Largest difference between two pictures, in half steps of half floats.
 fn apart(a: &Image, b: &Image) -> f64 {
     let pixels = a.beauty.iter().flatten().zip(b.beauty.iter().flatten());
     pixels
@@ -75,9 +76,9 @@ fn all_lights_add_up_to_the_picture() {
         let names: Vec<LightSpec> = image.lights.iter().map(|(light, _)| *light).collect();
         assert_eq!(names, LightSpec::NAMED.map(|(_, light)| light));
         assert!(off(&image) <= 1.0, "{method}: {}", off(&image));
-        // There is some of each in this picture.
+        // This picture has some light of each kind.
         for (light, part) in &image.lights {
-            // Splats know of no caustics.
+            // Splats have no caustics.
             if (method, *light) == ("ssfr", LightSpec::Caustics) {
                 assert!(part.iter().flatten().all(|&x| x == 0.0));
                 continue;
@@ -87,8 +88,8 @@ fn all_lights_add_up_to_the_picture() {
             let least = part.iter().flatten().fold(0.0f32, |least, &x| least.min(x));
             assert!(least > -1e-6, "{method}: {light:?} takes {least}");
         }
-        // Nothing of the picture depends on them, but for f32 roundings that a compiler orders otherwise where it computes more: less
-        // than what the file's half floats round.
+        // Layers do not affect the picture, except for f32 roundings that a compiler orders
+        // differently when it computes more: less than the rounding of the file's half floats.
         let plain = setup(method, WHITE).draw(&context());
         let changed = apart(&plain, &image);
         assert!(
@@ -98,7 +99,7 @@ fn all_lights_add_up_to_the_picture() {
         let bare = setup(method, "").draw(&context());
         let control = apart(&bare, &image);
         assert!(control > 100.0, "{method}, the control: {control}");
-        // Controls: each light that is left out, or dimmed alone, is missed.
+        // Controls: each light that is left out, or dimmed only in the picture, is detected.
         let foam = "light_part(FOAM_LIGHT, light * (cover * foam));";
         let edits = match method {
             "ssfr" => [
@@ -160,7 +161,8 @@ fn layers_of_a_frame_in_bands_are_those_of_one_drawn_whole() {
     assert!(whole.lights[0].1 != whole.lights[1].1, "the control");
 }
 
-/// Of a stream of one kind alone, that kind's layer has what the picture gained; the other has the look's own spray.
+/// For a stream of a single kind, that kind's layer has what the picture gained; the other has the
+/// look's own spray.
 #[test]
 fn foam_and_bubbles_have_a_layer_of_their_own() {
     for method in METHODS {

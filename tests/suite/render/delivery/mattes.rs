@@ -1,4 +1,4 @@
-//! Cryptomatte: which object each pixel sees.
+//! Cryptomatte: the object that each pixel sees.
 
 use std::collections::BTreeMap;
 
@@ -30,7 +30,7 @@ fn objects(image: &Image, i: usize) -> Vec<[f32; 2]> {
         .collect()
 }
 
-/// Of a place in the harbour, whose boxes these are.
+/// Object at a position in the harbour, by its boxes.
 fn name_at(p: [f32; 3]) -> &'static str {
     let within = |low: [f32; 3], high: [f32; 3]| {
         (0..3).all(|a| p[a] > low[a] - 1e-3 && p[a] < high[a] + 1e-3)
@@ -46,7 +46,8 @@ fn name_at(p: [f32; 3]) -> &'static str {
     }
 }
 
-/// Pixels whose matte is not of what stands at their place, and of all those that were asked.
+/// Number of pixels whose matte is not that of the object at their position, and numbers of pixels
+/// by object.
 fn wrong(context: &Context, method: &str) -> (usize, BTreeMap<&'static str, usize>) {
     let image = picture(context, method, "");
     let (p, z) = (
@@ -59,7 +60,8 @@ fn wrong(context: &Context, method: &str) -> (usize, BTreeMap<&'static str, usiz
         let Some(first) = objects(&image, i).into_iter().find(|pair| pair[0] != spray) else {
             continue;
         };
-        // The ground beyond the domain lies under walls' outer faces too: only what stands above it is told by its place.
+        // The ground outside the domain is also below the outer faces of the walls: position
+        // identifies only things above it.
         if z[i] > 1e29 || p[i][1] < 1e-3 {
             continue;
         }
@@ -82,7 +84,8 @@ fn mattes_are_of_what_stands_there() {
             seen.len() == 4 && seen.values().all(|&count| count > 50),
             "{method}: {seen:?}"
         );
-        // Two samples of a pixel and its centre may see different things at edges: a line of pixels about each of few outlines.
+        // Two samples of a pixel and its centre may see different things at edges: a line of pixels
+        // around each of few outlines.
         let all: usize = seen.values().sum();
         assert!(20 * off < all, "{method}: {off} of {all}");
         let control = match method {
@@ -125,7 +128,7 @@ fn coverages_add_up_to_one_where_no_sky_is() {
             }
         }
         assert!(asked > 5000, "{method}: {asked}");
-        // Spray covers a part of some.
+        // Spray covers a part of some pixels.
         let parts = (0..z.len())
             .filter(|&i| objects(&image, i).len() > 1)
             .count();

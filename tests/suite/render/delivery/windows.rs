@@ -1,4 +1,4 @@
-//! Overscan and crop: the pixels inside are those of the plain picture.
+//! Overscan and crop: pixels inside are those of the plain picture.
 
 use exr::prelude::{IntegerBounds, MetaData, Vec2};
 use swell::render::{
@@ -23,7 +23,7 @@ fn picture(method: &str, image: &str, surface: &str) -> Image {
     setup.draw(&context())
 }
 
-/// Everything that a pixel holds, as bits.
+/// All channels of a pixel, as bits.
 fn pixel(image: &Image, i: usize) -> Vec<u32> {
     let aovs = &image.aovs;
     let values = image.beauty[i].into_iter();
@@ -37,7 +37,8 @@ fn pixel(image: &Image, i: usize) -> Vec<u32> {
     values.map(f32::to_bits).collect()
 }
 
-/// Pixels of both that differ, where `a` is taken to begin `shift` pixels to the right of where it does.
+/// Number of pixels common to both, and of those that differ, with `a` shifted by `shift` pixels to
+/// the right.
 fn differing(a: &Image, b: &Image, shift: i32) -> (usize, usize) {
     let (mut common, mut off) = (0, 0);
     for i in 0..a.beauty.len() {
@@ -60,15 +61,16 @@ fn pixels_of_a_crop_are_those_of_the_whole_picture() {
         let part = picture(method, "crop = [31, 17, 122, 80]", "");
         assert_eq!((part.width, part.height, part.corner), (91, 63, [31, 17]));
         assert_eq!(differing(&part, &whole, 0), (91 * 63, 0), "{method}");
-        // Where the camera looks is the same.
+        // The camera is the same.
         assert_eq!(part.view, whole.view);
         let (common, off) = differing(&part, &whole, 1);
         assert!(2 * off > common, "{method}, the control: {off} of {common}");
     }
 }
 
-/// With rays every bit; with splats, wherever neither smoothing, a mirrored ray nor what is seen through a sheet reaches past the frame's
-/// margin: here nothing is smoothed, nothing that is opaque is mirrored, and no sheet bends as far.
+/// With rays every bit is the same; with splats, wherever neither smoothing, a reflected ray nor a
+/// view through a sheet reaches past the frame's margin: here nothing is smoothed, nothing opaque
+/// is reflected, and no sheet refracts that far.
 #[test]
 fn pixels_within_overscan_are_those_of_the_plain_picture() {
     for method in METHODS {
@@ -95,7 +97,7 @@ fn pixels_within_overscan_are_those_of_the_plain_picture() {
             super::draw(&context(), &text, &scene, &water)
         };
         let plain = draw("");
-        // No multiple of what the frame is padded by.
+        // Not a multiple of the frame's padding.
         let wide = draw("overscan = 13");
         assert_eq!(
             (wide.width, wide.height, wide.corner),
@@ -105,7 +107,7 @@ fn pixels_within_overscan_are_those_of_the_plain_picture() {
         assert_eq!(wide.view, plain.view);
         let (common, off) = differing(&wide, &plain, 1);
         assert!(2 * off > common, "{method}, the control: {off} of {common}");
-        // What lies beyond is a picture too.
+        // The pixels outside are rendered too.
         let beyond = wide.beauty[..186].iter();
         assert!(beyond.clone().any(|p| p[0] > 0.0) && beyond.clone().all(|p| p[3] > 0.0));
     }
@@ -147,7 +149,7 @@ fn files_have_both_windows_and_a_png_the_image_alone() {
     for (i, pixel) in pixels.iter().enumerate() {
         let (x, y) = (i % 160, i / 160);
         let is_inside = (31..122).contains(&x) && (17..80).contains(&y);
-        // What was not rendered is black and transparent.
+        // Pixels that were not rendered are black and transparent.
         let expected = if is_inside { whole[i] } else { [0.0; 4] };
         assert_eq!(*pixel, expected, "{x}, {y}");
     }

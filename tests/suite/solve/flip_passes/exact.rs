@@ -388,7 +388,7 @@ fn nothing_thin_is_stepped_over() {
 
 /// The scene's tolerance and iteration limit reach the device: a tolerance just above the residual
 /// of the k-th iteration stops there, one just below does not, and a limit of k gives k iterations.
-/// A residual of 1e-4 is known to 1e-3 of itself (`pressure_stops`).
+/// A residual of 1e-4 is known to 1e-3 of itself (pressure/stops.rs).
 #[test]
 fn a_scenes_projection_stops_where_the_scene_says() {
     let context = context();
