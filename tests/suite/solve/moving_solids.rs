@@ -512,8 +512,8 @@ fn scenes_say_where_solids_go() {
     ];
     let both = parse(SCENE, TURN).unwrap();
     let solid = &both.moving_solids[0];
-    // After a second, halfway through the sine's period, the solid is at half of its stroke, 0.5 m
-    // down, and a point to the right of the pivot has moved below it.
+    // After a second, halfway through the ramp, the solid is at half of its stroke, 0.25 m down,
+    // and a point to the right of the pivot has moved below it.
     let at = solid.pose(1.0).place(DVec3::new(2.0, 1.0, 1.5));
     assert!((at - DVec3::new(1.5, 0.25, 1.5)).length() < 1e-12, "{at}");
     assert!(

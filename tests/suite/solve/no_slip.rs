@@ -1,5 +1,5 @@
-//! No-slip walls: their shear stress in closed form, that other scenes do not pay for them, and a
-//! dam break over a no-slip floor.
+//! No-slip walls: their shear stress in closed form, no passes for them in other scenes, and a dam
+//! break over a no-slip floor.
 
 use glam::DVec3;
 use swell::{

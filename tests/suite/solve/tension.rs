@@ -164,8 +164,8 @@ fn a_drop_at_rest_has_laplaces_pressure_and_keeps_still() {
         );
         let least = match method {
             Method::Flip => 0.01,
-            // Misses FLIP's bound by a factor of two to three: particles of the lattice keep
-            // pushing each other, as fast after 90 frames as after 30.
+            // Misses FLIP's bound by a factor of two: particles of the lattice keep pushing each
+            // other, as fast after 90 frames as after 30.
             Method::Pbf => 0.03,
         };
         assert!(most / capillary < least, "{}", most / capillary);

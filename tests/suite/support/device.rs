@@ -8,8 +8,8 @@ use std::{
 
 use swell::gpu::adapter::{Context, Spoil};
 
-/// Idle devices. A device keeps its compiled passes, so a test reuses those that an earlier test compiled. No two tests use a
-/// device at once, so they never wait for each other's work.
+/// Idle devices. A device keeps its compiled passes, so a test reuses those that an earlier test
+/// compiled. No two tests use a device at once, so they never wait for each other's work.
 static FREE: Mutex<Vec<Context>> = Mutex::new(Vec::new());
 
 /// A device taken from the pool. Dropping it returns the device.
