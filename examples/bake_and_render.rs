@@ -3,24 +3,24 @@
 //! `cargo run --release --example bake_and_render [FOLDER]`
 #![expect(clippy::print_stdout, reason = "a program that says what it made")]
 
-use std::{env, error::Error, path::PathBuf};
+use std::{
+    env,
+    error::Error,
+    path::{Path, PathBuf},
+};
 
 use swell::{
-    scene::{Scene, look::Look},
+    scene::{Reach, Scene, look::Look},
     stage::{bake, render},
 };
 
-const LOOK: &str = r#"
-[image]
-width = 320
-height = 180
-[[camera.keyframe]]
-frame = 1
-position = [4.5, 1.8, 3.5]
-target = [1.0, 0.4, 0.5]
-[water]
-absorption_per_metre = [1.5, 0.62, 0.55]
-"#;
+/// The shipped look by day, with another camera and a smaller picture.
+const CHANGES: [&str; 4] = [
+    "image.width=320",
+    "image.height=180",
+    "basin.height_m=0.1",
+    "camera.keyframe=[{frame=1,position=[3.2,1.6,2.9],target=[1.2,0.35,0.5]}]",
+];
 
 fn main() -> Result<(), Box<dyn Error>> {
     let folder = PathBuf::from(
@@ -31,7 +31,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let scene = Scene::builder("drop")
         .frames(24, 24.0)
         .domain([0.0; 3], [2.0, 2.0, 1.0])
-        .block([0.0; 3], [0.5, 1.0, 1.0])
+        .block([0.0; 3], [0.8, 0.6, 1.0])
         .pbf(0.05)
         .build()?;
     let cache = folder.join("drop");
@@ -50,7 +50,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         })
         .run()?;
 
-    let look = Look::parse(LOOK, "look.toml".as_ref())?;
+    let day = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/looks/day.toml");
+    let look = Look::load_with(&day, &CHANGES.map(str::to_owned), Reach::Folder)?;
     swell::render(&cache, &look)
         .frames(22..=24)
         .to(folder.join("pictures"))

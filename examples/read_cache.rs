@@ -11,7 +11,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let path = env::args().nth(1).ok_or("usage: read_cache CACHE")?;
     let cache = CacheReader::open(&PathBuf::from(path))?;
     let manifest = cache.manifest();
-    println!("{}, by {}", manifest.shot.name, manifest.solver);
+    println!("{}, by {}", manifest.shot, manifest.solver);
     for frame in 0..=cache.last_frame() {
         // Frames whose particles were not kept have a report, but no particles.
         if cache.kept(frame).is_err() {

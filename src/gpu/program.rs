@@ -435,7 +435,7 @@ pub(super) fn shader(
     let blamed = |error| context.shaders.blamed(error);
     let place = |line| source.place(line);
     let reflection = reflect_at(name, &source.text, &place).map_err(blamed)?;
-    if let Some(shipped) = context.shaders.shipped_beside() {
+    if let Some(shipped) = context.shaders.shipped_beside(name) {
         let known = reflect(name, &shipped.compose(name, defines)?)?;
         edited::check(&reflection, &known, buffers).map_err(|message| {
             let name = name.to_owned();

@@ -188,9 +188,10 @@ impl Shaders {
         }
     }
 
-    /// Returns the shipped shaders if these are edited.
-    pub(super) fn shipped_beside(&self) -> Option<Self> {
-        self.hash.is_some().then_some(Self::SHIPPED)
+    /// Returns the shipped shaders if these are edited and a pass of this name is shipped.
+    pub(super) fn shipped_beside(&self, name: &str) -> Option<Self> {
+        let is_shipped = Self::SHIPPED.source(&format!("{name}.wgsl")).is_some();
+        (self.hash.is_some() && is_shipped).then_some(Self::SHIPPED)
     }
 
     fn source(&self, path: &str) -> Option<&str> {
