@@ -184,7 +184,8 @@ pub enum RenderJobError {
     Folder(#[from] FolderError),
     /// Flicker was asked for of a frame without a neighbour on either side.
     #[error(
-        "flicker compares a frame with the frames before and after it, and frame {0} lacks one of them"
+        "flicker compares a frame with the frames before and after it, and frame {0} lacks one of \
+         them"
     )]
     NoNeighbours(u32),
     /// The given cache is a whitewater stream, not a bake.

@@ -104,6 +104,7 @@ mod solve {
     mod flip;
     mod flip_passes;
     mod independent;
+    mod ledgers;
     mod moving_solids;
     mod no_slip;
     mod pbf;

@@ -180,7 +180,8 @@ fn mentions(files: &[(String, String)], effect: &str) -> Vec<String> {
             let code = text.split("#[cfg(test)]").next().unwrap_or("");
             code.lines()
                 .map(str::trim_start)
-                .filter(|line| !line.starts_with("//") && !line.starts_with(".about("))
+                .filter(|line| !line.starts_with("//") && !line.contains(".about("))
+                .filter(|line| !line.starts_with('"'))
                 .filter(|line| line.contains(effect))
                 .map(move |line| format!("{file}: {line}"))
         })

@@ -134,10 +134,8 @@ fn right_hand_sides_are_those_of_the_f64_builder() {
 
 /// Iterations to 1e-6 on the tank, for voxel and ghost-fluid surface: the table in
 /// docs/performance.md, measured with lavapipe. A difference of one is allowed: the residual falls
-/// by at least a few percent per iteration, and a device that rounds differently (fused products,
-/// sums of other widths) may pass the target one iteration sooner or later. Errors in the
-/// computation cost more: a multigrid whose last level is swept once instead of eight times takes
-/// 13 instead of 9.
+/// by a few percent per iteration, and a device that rounds differently may pass the target one
+/// iteration off. A multigrid whose last level is swept once, not eight times, takes 13 for 9.
 const COUNTS: [(Preconditioner, u32, [u32; 2]); 10] = [
     (Preconditioner::None, 16, [88, 168]),
     (Preconditioner::None, 32, [177, 477]),

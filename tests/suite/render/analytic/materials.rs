@@ -31,21 +31,16 @@ struct Face {
 }
 
 const FACES: [Face; 3] = [
-    Face {
-        right: DVec3::X,
-        up: DVec3::Y,
-    },
-    Face {
-        right: DVec3::NEG_Z,
-        up: DVec3::Y,
-    },
-    Face {
-        right: DVec3::X,
-        up: DVec3::NEG_Z,
-    },
+    Face::new(DVec3::X, DVec3::Y),
+    Face::new(DVec3::NEG_Z, DVec3::Y),
+    Face::new(DVec3::X, DVec3::NEG_Z),
 ];
 
 impl Face {
+    const fn new(right: DVec3, up: DVec3) -> Self {
+        Self { right, up }
+    }
+
     fn normal(&self) -> DVec3 {
         self.right.cross(self.up)
     }
