@@ -66,11 +66,20 @@ const LEAST_ROOM = 0.02;
 // Least fraction of its open volume that a film fills.
 const LEAST_FILM = 0.1;
 
+// Least open fraction, over all faces together, through which a gap fills from beside it.
+const LEAST_OPEN = 0.02;
+
 // Water at a centre relative to the open volume there. If the centre is inside a solid, the small
 // open volume may hold no particle for a while, or one too many, so that cells beyond the open
-// faces count as well.
+// faces count as well. A gap closed above is as full as the cells beside it, the mean over its open
+// faces: particles, at their distance from solids, may not fit into it, and as air, without
+// pressure, it would draw in the water around it without end.
 fn share_of_room(element: u32) -> f32 {
     let room = open_hats[element];
+    let up = -params.velocity_step;
+    var is_roofed = room < 0.5 && dot(up, up) > 0.0;
+    // Sums over the open faces beside: open fraction times density, and open fraction.
+    var beside = vec2f(0.0);
     var water = density[element] * max(room, params.particle_share);
     var rooms = max(room, LEAST_ROOM);
     let own = water / rooms;
@@ -81,10 +90,16 @@ fn share_of_room(element: u32) -> f32 {
         let other = element_at(step);
         let face = axis * params.stride + select(element, other, (k & 1u) == 1u);
         let open = select(0.0, face_open[face], other >= CELLS);
+        // Faces up to 60° off the direction are above, others beside or below. No brick is air.
+        let upward = dot(vec3f(step), up);
+        let is_beside = abs(upward) <= 0.5 * length(up);
+        is_roofed &= upward <= 0.5 * length(up) || (other >= CELLS && open == 0.0);
+        beside += select(0.0, open, is_beside) * vec2f(density[other], 1.0);
         water += open * density[other] * max(open_hats[other], params.particle_share);
         rooms += open * open_hats[other];
     }
-    return max(own, water / rooms);
+    let is_fed = is_roofed && beside.y >= LEAST_OPEN;
+    return max(max(own, water / rooms), select(0.0, beside.x / max(beside.y, 1e-6), is_fed));
 }
 
 // Fraction of the hat function at the centre that lies below a level surface, solids included;

@@ -8,10 +8,17 @@
 // because the projection gives faces with a small open fraction several times their neighbours'
 // velocities. Beyond the domain along b and c, faces have the values of those inside, so that water
 // slides along walls.
+// In a film on a solid the grid knows the depth only to half a particle of a full cell. Surface
+// slopes below that, and speeds below that of a fall by that height, cannot be told from rest, and
+// nothing else stops them. There particles get Coulomb friction with the solid, with that slope as
+// coefficient: water rests on gentler slopes, runs down steeper ones, and falls along walls.
 #import "shared/thread.wgsl"
 #import "shared/vector.wgsl"
 #import "shared/flip_params.wgsl"
 #import "shared/flip_neighborhood.wgsl"
+#ifdef SOLIDS
+#import "shared/flip_solid.wgsl"
+#endif
 #ifdef PERIODIC
 #import "shared/flip_periodic.wgsl"
 #endif
@@ -235,6 +242,85 @@ fn slope_of(faces: Component, u: f32, a: vec2f, b: vec3f, c: vec3f) -> f32 {
 }
 #endif
 
+#ifdef SOLIDS
+// Slope that cannot be told from level, as a multiple of a particle's share of a full cell.
+const LEAST_SLOPE = 0.5;
+
+// Distance from a solid, in cells: friction is full below it, and none from twice that on. Half the
+// spacing of eight particles per cell.
+const TOUCHES = 0.25;
+
+// Friction with the solid that is looked at.
+struct Friction {
+    normal: vec3f,
+    // The solid's velocity, m/s.
+    solid: vec3f,
+    // Largest change of a velocity along the solid in this substep, m/s.
+    most: f32,
+}
+
+fn friction_at(x: vec3f) -> Friction {
+    let step = 0.5 * TOUCHES * params.cell_size;
+    let slope = vec3f(
+        solid_distance_at(x + vec3f(step, 0.0, 0.0)) - solid_distance_at(x - vec3f(step, 0.0, 0.0)),
+        solid_distance_at(x + vec3f(0.0, step, 0.0)) - solid_distance_at(x - vec3f(0.0, step, 0.0)),
+        solid_distance_at(x + vec3f(0.0, 0.0, step)) - solid_distance_at(x - vec3f(0.0, 0.0, step)),
+    );
+    let normal = slope / max(length(slope), 1e-20);
+    let part = clamp(2.0 - solid_distance_at(x) * params.inverse_cell_size / TOUCHES, 0.0, 1.0);
+    let pressing = max(-dot(params.velocity_step, normal), 0.0);
+#ifdef MOVING_SOLIDS
+    let solid = solid_velocity_at(x);
+#else
+    let solid = vec3f(0.0);
+#endif
+    return Friction(normal, solid, part * LEAST_SLOPE * params.particle_share * pressing);
+}
+
+// In a film friction fades between the speed of a fall by the least height and 1.41 times that. An
+// isolated droplet has static friction only: at rest it stays, once it slides it goes on.
+fn slowed(v: vec3f, friction: Friction, falls: bool) -> vec3f {
+    let beside = v - friction.solid;
+    let along = beside - friction.normal * dot(beside, friction.normal);
+    let speed = length(along);
+    let gravity = length(params.velocity_step) / params.kick;
+    let square = 2.0 * gravity * LEAST_SLOPE * params.particle_share * params.cell_size;
+    let over = select(speed * speed / max(square, 1e-20), speed / max(friction.most, 1e-20), falls);
+    return v - along * min(clamp(2.0 - over, 0.0, 1.0) * friction.most / max(speed, 1e-20), 1.0);
+}
+
+// The grid's velocity, which moves the water, stays as it is, so that no water piles up: it creeps
+// to where it finds room. An isolated droplet moves with its own velocity.
+fn rub(i: u32, x: vec3f, falls: bool) {
+    let k = 3u * i;
+    let v = slowed(vec3f(velocity[k], velocity[k + 1u], velocity[k + 2u]), friction_at(x), falls);
+    for (var axis = 0u; axis < 3u; axis++) {
+        velocity[k + axis] = v[axis];
+        carried[k + axis] = select(carried[k + axis], v[axis], falls);
+    }
+}
+
+fn is_near_solid(x: vec3f) -> bool {
+    return solid_distance_near(x) < 2.0 * (TOUCHES * params.cell_size + solid_grid.spacing);
+}
+
+// Each solid as it stands at the start of the substep; only particles near one enter the loop.
+fn rub_all(i: u32, x: vec3f, falls: bool) {
+#ifdef MOVING_SOLIDS
+    for (var solid = 0u; solid < solid_grids.count; solid++) {
+        look_at_solid(solid, 0.0);
+        for (var once = 0; once < select(0, 1, is_near_solid(x)); once++) {
+            rub(i, x, falls);
+        }
+    }
+#else
+    for (var once = 0; once < select(0, 1, is_near_solid(x)); once++) {
+        rub(i, x, falls);
+    }
+#endif
+}
+
+#endif
 // `f` is the position in the cell, along a, b and c. An isolated droplet falls freely: around it
 // nothing is projected, and closed faces, which have the wall's velocity, would stop it a cell away
 // from the wall or hold it under a ceiling.
@@ -306,7 +392,11 @@ fn main(
         to_after = select(to_after, vec3i(1), is_periodic());
 #endif
 #ifdef APIC
+#ifdef SOLIDS
+        let is_looked_about = true;
+#else
         let is_looked_about = cell_kind[element] != FLUID;
+#endif
 #else
         let is_looked_about = true;
 #endif
@@ -336,6 +426,11 @@ fn main(
         give(i, 0u, f, of_x, about.is_dry, beyond);
         give(i, 1u, f.yzx, of_y, about.is_dry, beyond);
         give(i, 2u, f.zxy, of_z, about.is_dry, beyond);
+#ifdef SOLIDS
+        for (var once = 0; once < select(0, 1, about.is_surface); once++) {
+            rub_all(i, three(sorted_position[i]), about.is_dry);
+        }
+#endif
         is_drop[i] = u32(about.is_dry);
     }
 }

@@ -12,6 +12,30 @@ use swell_domain::{
 /// A distance to a solid below this, in cells, counts as inside.
 const SKIN: f64 = 1e-4;
 
+/// Slope that cannot be told from level, as a multiple of a particle's share of a full cell.
+const LEAST_SLOPE: f64 = 0.5;
+
+/// Distance from a solid, in cells: friction is full below it, and none from twice that on. Half
+/// the spacing of eight particles per cell.
+const TOUCHES: f64 = 0.25;
+
+/// A film on solids, in which particles have Coulomb friction with them: the grid knows its depth
+/// only to half a particle of a full cell, so that surface slopes below that, and speeds below that
+/// of a fall by that height, cannot be told from rest. That slope is the coefficient, and friction
+/// fades between that speed and 1.41 times it.
+pub(super) struct Film {
+    /// Gravity times the substep's kick, m/s.
+    pub(super) velocity_step: DVec3,
+    /// See [`Substep::kick`](swell_scene::step::Substep::kick), seconds.
+    pub(super) kick: f64,
+    /// Edge length of a cell, metres.
+    pub(super) cell_size: f64,
+    /// Fraction of a full cell that a particle fills.
+    pub(super) particle_share: f64,
+    /// Whether the particle is an isolated droplet: it has static friction only.
+    pub(super) is_drop: bool,
+}
+
 /// A solid at one moment.
 #[derive(Clone, Copy, Debug)]
 pub struct Solid<'a> {
@@ -52,6 +76,33 @@ impl<'a> Solid<'a> {
     /// Returns the velocity of the solid's material point at `x`, m/s.
     pub fn velocity_at(&self, x: DVec3) -> DVec3 {
         self.passage.velocity_at(x, self.pose.centre)
+    }
+
+    /// Slows the velocity `v` of a particle at `x` along the solid by the friction of a film (see
+    /// [`Film`]), m/s.
+    pub(super) fn slowed(&self, x: DVec3, v: DVec3, film: &Film) -> DVec3 {
+        let touch = TOUCHES * film.cell_size;
+        if self.near(x) >= 2.0 * (touch + self.grid.spacing) {
+            return v;
+        }
+        let way = 0.5 * touch;
+        let difference =
+            |axis: DVec3| self.distance(x + way * axis) - self.distance(x - way * axis);
+        let slope = DVec3::from_array(DVec3::AXES.map(difference));
+        let normal = slope / slope.length().max(1e-20);
+        let part = (2.0 - self.distance(x) / touch).clamp(0.0, 1.0);
+        let pressing = (-film.velocity_step.dot(normal)).max(0.0);
+        let most = part * LEAST_SLOPE * film.particle_share * pressing;
+        let beside = v - self.velocity_at(x);
+        let along = beside - normal * beside.dot(normal);
+        let speed = along.length();
+        let gravity = film.velocity_step.length() / film.kick;
+        let square = 2.0 * gravity * LEAST_SLOPE * film.particle_share * film.cell_size;
+        let over = match film.is_drop {
+            true => speed / most.max(1e-20),
+            false => speed * speed / square.max(1e-20),
+        };
+        v - along * ((2.0 - over).clamp(0.0, 1.0) * most / speed.max(1e-20)).min(1.0)
     }
 
     /// Returns an upper bound on the speed of points within the solid's grid, m/s.

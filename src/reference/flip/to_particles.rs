@@ -296,6 +296,21 @@ pub fn grid_to_particle(
                     }
                 }
             }
+            if is_surface {
+                let film = solids::Film {
+                    velocity_step: step.velocity_step,
+                    kick: step.kick,
+                    cell_size: size,
+                    particle_share: 1.0 / f64::from(model.settings().particles_per_cell),
+                    is_drop,
+                };
+                for solid in &step.solids {
+                    given.0 = solid.slowed(sorted.cloud.position[i], given.0, &film);
+                    if is_drop {
+                        given.2 = given.0;
+                    }
+                }
+            }
             given.1 = DMat3::from_cols(rows[0], rows[1], rows[2]).transpose();
             given
         };

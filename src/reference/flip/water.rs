@@ -241,10 +241,16 @@ pub struct Depth {
     pub lean: f64,
 }
 
+/// Least open fraction, over all faces together, through which a gap fills from beside it.
+const LEAST_OPEN: f64 = 0.02;
+
 /// Returns the water at a centre relative to the open volume there. If the centre is inside a
 /// solid, the small open volume may hold no particle for a while, or one too many, so that cells
-/// beyond the open faces count as well.
+/// beyond the open faces count as well. A gap closed above is as full as the cells beside it, the
+/// mean over its open faces: particles, at their distance from solids, may not fit into it, and as
+/// air, without pressure, it would draw in the water around it without end.
 fn share_of_room(
+    step: &Step<'_>,
     bricks: &Bricks,
     room: &Room,
     density: &[f64],
@@ -255,18 +261,38 @@ fn share_of_room(
     let own = room.hats[element as usize];
     let (mut sum, mut rooms) = (water(element), own.max(LEAST_ROOM));
     let alone = sum / rooms;
+    let up = -step.velocity_step;
+    let mut is_roofed = own < 0.5 && up != DVec3::ZERO;
+    // Sums over the open faces beside: open fraction times density, and open fraction.
+    let mut beside = (0.0, 0.0);
     if own < 0.5 {
         for (axis, side) in (0..3).flat_map(|axis| [(axis, -1), (axis, 1)]) {
             let other = bricks.near(element, along(axis, side));
+            let face = if side < 0 { element } else { other };
+            let open = match other >= CELLS {
+                true => room.open[face as usize][axis],
+                false => 0.0,
+            };
+            // Faces up to 60° off the direction are above, others beside or below. Positions
+            // without a brick are air.
+            let upward = f64::from(side) * up[axis];
+            if upward > 0.5 * up.length() {
+                is_roofed &= other >= CELLS && open == 0.0;
+            } else if upward >= -0.5 * up.length() {
+                beside.0 += open * density[other as usize];
+                beside.1 += open;
+            }
             if other >= CELLS {
-                let face = if side < 0 { element } else { other };
-                let open = room.open[face as usize][axis];
                 sum += open * water(other);
                 rooms += open * room.hats[other as usize];
             }
         }
     }
-    alone.max(sum / rooms)
+    let fed = match is_roofed && beside.1 >= LEAST_OPEN {
+        true => beside.0 / beside.1,
+        false => 0.0,
+    };
+    alone.max(sum / rooms).max(fed)
 }
 
 /// Returns the fraction of the hat function at a centre that lies below a level surface, solids
@@ -319,7 +345,7 @@ pub fn find_depth(
         let share = if extent.cmplt(DVec3::splat(HALF)).any() {
             density_before(step, bricks, room, density, element)
         } else if is_cut {
-            share_of_room(bricks, room, density, particle_share, element)
+            share_of_room(step, bricks, room, density, particle_share, element)
         } else {
             density[element as usize]
         };

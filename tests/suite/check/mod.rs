@@ -1,6 +1,7 @@
 //! `check` passes on what the device computes, and each of its rows fails if its pass is spoiled.
 mod controls;
 mod drops;
+mod films;
 mod frames;
 mod gaps;
 mod periodic;

@@ -16,8 +16,8 @@ fn reported(job: &Job, cache: &str, key: &str) -> Vec<f64> {
         .collect()
 }
 
-/// Water at rest on a beach of 1:20 calms down. Negative control: rows divided by the sum of the
-/// open weights, as the interpolation is, end the bake by its budget of speed.
+/// Water at rest on a beach of 1:20 calms down. Negative control: with rows divided by the sum of
+/// the open weights, as the interpolation is, it is faster and faster.
 #[test]
 fn apic_on_a_beach_comes_to_rest() {
     let job = Job::of(&[("beach.toml", SCENE), ("box.obj", BOX)]);
@@ -36,9 +36,10 @@ fn apic_on_a_beach_comes_to_rest() {
         "let scale = params.inverse_cell_size;",
         "let scale = params.inverse_cell_size * per_whole;",
     );
-    let said = job.expect(
-        5,
+    job.expect(
+        0,
         &format!("{bake} --frames 1-40 -o spoiled --shaders divided"),
     );
-    assert!(said.contains("the largest speed, m/s, is"), "{said}");
+    let spoiled = reported(&job, "spoiled", "max_speed");
+    assert!(spoiled[39] > 1.0, "{spoiled:?}");
 }
