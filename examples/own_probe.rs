@@ -8,7 +8,7 @@
 use std::error::Error;
 
 use swell::{
-    domain::solver::{Seen, Solver as _, Span, Wanted, Watch},
+    domain::solver::{Observed, Requested, Solver as _, Span, Watch},
     reference::flip::Flip,
     scene::Scene,
     stage::prepare::Start,
@@ -19,14 +19,14 @@ use swell::{
 struct Front(Vec<(f64, f64)>);
 
 impl Watch for Front {
-    fn wants(&mut self, _: Span) -> Wanted {
-        Wanted {
+    fn wants(&mut self, _: Span) -> Requested {
+        Requested {
             particles: true,
-            ..Wanted::default()
+            ..Requested::default()
         }
     }
 
-    fn look(&mut self, substep: Span, seen: Seen) {
+    fn look(&mut self, substep: Span, seen: Observed) {
         let x = seen.particles.position.iter().map(|at| at[0]);
         self.0.push((substep.end, f64::from(x.fold(0.0, f32::max))));
     }

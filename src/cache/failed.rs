@@ -16,7 +16,7 @@ use super::{
     manifest,
     record::FileRecord,
 };
-use swell_domain::{answer::Answers, particles::Particles};
+use swell_domain::{absorber::AbsorberStates, particles::Particles};
 
 /// Name of the folder in the cache.
 pub const FAILED: &str = "failed";
@@ -73,7 +73,7 @@ pub fn write(cache: &Path, failed: &Failed, stamp: &Stamp<'_>) -> Result<(), Cac
         .ok_or_else(|| CacheError::Unfit("a report that is no object".to_owned()))?;
     let files = [FileRecord::new(manifest::SCENE, scene), start];
     fields.insert(FILES.to_owned(), json!(files));
-    if failed.start.walls != Answers::default() {
+    if failed.start.walls != AbsorberStates::default() {
         fields.insert(WALLS.to_owned(), json!(failed.start.walls));
     }
     fields.insert(SUBSTEP.to_owned(), json!(failed.start.substep));
@@ -125,8 +125,10 @@ pub fn read(dir: &Path) -> Result<Failed, CacheError> {
         .and_then(|frame| u32::try_from(frame).ok())
         .ok_or_else(|| damaged("it names no last_frame"))?;
     let walls = match fields.remove(WALLS) {
-        Some(walls) => Answers::deserialize(walls).map_err(|error| damaged(&error.to_string()))?,
-        None => Answers::default(),
+        Some(walls) => {
+            AbsorberStates::deserialize(walls).map_err(|error| damaged(&error.to_string()))?
+        }
+        None => AbsorberStates::default(),
     };
     let substep = match fields.remove(SUBSTEP) {
         Some(seconds) => f64::deserialize(seconds).map_err(|error| damaged(&error.to_string()))?,

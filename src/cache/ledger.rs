@@ -14,7 +14,7 @@ use super::manifest::{self, Manifest};
 use super::probes::{ProbeRecord, ProbeValues};
 use super::record::FileRecord;
 use super::stream::{self, STREAMS, Stream};
-use swell_domain::answer::Answers;
+use swell_domain::absorber::AbsorberStates;
 
 /// File name of the ledger.
 pub(super) const FILE: &str = "frames.jsonl";
@@ -39,7 +39,7 @@ pub struct Clock {
     pub next_id: Option<u32>,
     /// State of the absorbing walls after this frame; absent if there are none.
     #[serde(default, skip_serializing_if = "is_none")]
-    pub walls: Answers,
+    pub walls: AbsorberStates,
     /// Length of the substep that ended in the frame, seconds; 0 if there was none.
     #[serde(default, skip_serializing_if = "is_no_time")]
     pub substep: f64,
@@ -49,7 +49,7 @@ fn is_no_time(seconds: &f64) -> bool {
     *seconds == 0.0
 }
 
-fn is_none(walls: &Answers) -> bool {
+fn is_none(walls: &AbsorberStates) -> bool {
     walls.iter().all(Option::is_none)
 }
 

@@ -207,7 +207,7 @@ impl CacheReader {
     pub fn read(&self, frame: u32) -> Result<Particles, CacheError> {
         let found = read_frame(&self.dir, &self.manifest, self.kept(frame)?);
         match found {
-            Err(error) => match self.gone_on(frame) {
+            Err(error) => match self.reopen_if_advanced(frame) {
                 Some(now) => now.kept(frame).and(Err(error)),
                 None => Err(error),
             },
@@ -217,7 +217,7 @@ impl CacheReader {
 
     /// Reopens the cache if `frame` was its newest and a running bake has since removed its
     /// particles.
-    fn gone_on(&self, frame: u32) -> Option<Self> {
+    fn reopen_if_advanced(&self, frame: u32) -> Option<Self> {
         let was_newest = frame == self.last_frame() && !self.manifest.keeps(frame);
         let now = was_newest.then(|| Self::open(&self.dir).ok()).flatten()?;
         (now.last_frame() > frame).then_some(now)
@@ -334,7 +334,7 @@ impl CacheReader {
             .flat_map_iter(there)
             .filter_map(|record| self.problem(record))
             .collect();
-        if !frames.is_empty() && self.gone_on(newest).is_some() {
+        if !frames.is_empty() && self.reopen_if_advanced(newest).is_some() {
             let file = OF_PARTICLES.frame_file(&self.manifest, newest);
             frames.retain(|problem| problem.file != self.dir.join(&file));
         }

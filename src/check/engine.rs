@@ -28,7 +28,7 @@ pub(super) type Outcome = Result<(), SolveError>;
 
 /// Comparison of a pass with its reference pass. `S` is the state that a solver's comparisons share
 /// during the substep.
-pub(super) struct Twin<S> {
+pub(super) struct Comparison<S> {
     /// Name of the pass.
     pub(super) pass: &'static str,
     /// Names of the pass's variables whose values from before the pass are needed although it
@@ -41,13 +41,13 @@ pub(super) struct Twin<S> {
     pub(super) compare: fn(&mut S, &mut Io<'_>) -> Outcome,
 }
 
-/// Returns a [`Twin`] that compares every run.
-pub(super) const fn twin<S>(
+/// Returns a [`Comparison`] that compares every run.
+pub(super) const fn comparison<S>(
     pass: &'static str,
     keeps: fn() -> Vec<String>,
     compare: fn(&mut S, &mut Io<'_>) -> Outcome,
-) -> Twin<S> {
-    Twin {
+) -> Comparison<S> {
+    Comparison {
         pass,
         keeps,
         is_due: |_, _| Ok(true),
@@ -69,7 +69,7 @@ pub(super) use names;
 /// State that a solver's comparisons share during the substep.
 pub(super) trait State: Sized + 'static {
     /// Returns the comparisons of the solver's passes.
-    fn twins() -> Vec<&'static [Twin<Self>]>;
+    fn comparisons() -> Vec<&'static [Comparison<Self>]>;
 
     /// Returns the number of particles.
     fn particles(&self) -> usize;
@@ -119,7 +119,7 @@ impl View<'_> {
             let is_written = self.traced.writes(self.buffer(name));
             assert!(
                 !is_written,
-                "{} writes {name}: its twin has to keep it",
+                "{} writes {name}: its reference has to keep it",
                 self.traced.pass
             );
         }
@@ -186,8 +186,8 @@ pub(super) fn wide(values: &[[f32; 3]]) -> Vec<DVec3> {
 pub(super) struct Engine<S: State> {
     pub(super) state: S,
     pub(super) table: Table,
-    twins: Vec<&'static [Twin<S>]>,
-    sort: sort::Twins<S>,
+    reference_passes: Vec<&'static [Comparison<S>]>,
+    sort: sort::Comparisons<S>,
     ran: Vec<&'static str>,
     kept: BTreeMap<String, Vec<u32>>,
     last: &'static str,
@@ -199,8 +199,8 @@ impl<S: State> Engine<S> {
         Self {
             state,
             table: Table::default(),
-            twins: S::twins(),
-            sort: sort::twins(),
+            reference_passes: S::comparisons(),
+            sort: sort::comparisons(),
             ran: Vec::new(),
             kept: BTreeMap::new(),
             last: "",
@@ -216,14 +216,15 @@ impl<S: State> Engine<S> {
                 self.ran.push(traced.pass);
             }
         }
-        let of_solver = self.twins.iter().copied().flatten();
-        let twin = (self.sort.iter().chain(of_solver)).find(|twin| twin.pass == traced.pass);
-        let Some(twin) = twin else {
+        let of_solver = self.reference_passes.iter().copied().flatten();
+        let reference =
+            (self.sort.iter().chain(of_solver)).find(|reference| reference.pass == traced.pass);
+        let Some(reference) = reference else {
             return Ok(());
         };
         if traced.moment == Moment::Before {
             self.kept.clear();
-            for variable in (twin.keeps)() {
+            for variable in (reference.keeps)() {
                 let buffer = traced.buffer(&variable).to_owned();
                 if traced.writes(&buffer) {
                     let words = traced.length::<u32>(&buffer);
@@ -243,8 +244,8 @@ impl<S: State> Engine<S> {
             after: View { traced, kept: None },
             table: &mut self.table,
         };
-        match (twin.is_due)(&mut self.state, io)? {
-            true => (twin.compare)(&mut self.state, io),
+        match (reference.is_due)(&mut self.state, io)? {
+            true => (reference.compare)(&mut self.state, io),
             false => Ok(()),
         }
     }
@@ -254,7 +255,7 @@ impl<S: State> Engine<S> {
         for pass in self.ran {
             if !self.table.has(pass) {
                 let known = S::ELSEWHERE.iter().find(|(name, _)| *name == pass);
-                let why = known.map_or("no f64 twin", |(_, why)| why);
+                let why = known.map_or("no reference pass", |(_, why)| why);
                 self.table.unchecked.push((pass, why));
             }
         }

@@ -7,7 +7,7 @@ use swell_gpu::buffer::{Buf, Windows};
 use swell_solve::buffers;
 
 use super::{
-    engine::{Io, NONE, Outcome, State, Twin, names, twin},
+    engine::{Comparison, Io, NONE, Outcome, State, comparison, names},
     table::{Entry, Table, entries, pair},
 };
 
@@ -41,14 +41,14 @@ entries! {
 }
 
 /// Comparisons of the sort, for any solver.
-pub(super) type Twins<S> = [Twin<S>; 4];
+pub(super) type Comparisons<S> = [Comparison<S>; 4];
 
-pub(super) fn twins<S: State>() -> Twins<S> {
+pub(super) fn comparisons<S: State>() -> Comparisons<S> {
     [
-        twin("sort/scan_blocks", || names![VALUES], |_, io| scan(io)),
-        twin("sort/add_block_sums", || names![VALUES], |_, io| add(io)),
-        twin("sort/place", NONE, |state, io| place(state.particles(), io)),
-        twin("sort/stabilize", NONE, |state, io| {
+        comparison("sort/scan_blocks", || names![VALUES], |_, io| scan(io)),
+        comparison("sort/add_block_sums", || names![VALUES], |_, io| add(io)),
+        comparison("sort/place", NONE, |state, io| place(state.particles(), io)),
+        comparison("sort/stabilize", NONE, |state, io| {
             stabilize(state.particles(), io)
         }),
     ]

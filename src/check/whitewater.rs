@@ -113,17 +113,17 @@ pub fn check(context: &Context, frame: Frame<'_>) -> Result<Table, SolveError> {
     device.set(frame.settings)?;
     let potentials = device.survey(water, frame.time, frame.seconds)?;
     let mut table = Table::default();
-    let twin = Twin::of(frame);
-    twin.survey(
+    let reference = Comparison::of(frame);
+    reference.survey(
         &mut table,
         &device.field(SHARE, n)?,
         &device.field(SURFACE_AT, n)?,
     );
-    twin.potentials(&mut table, &potentials);
+    reference.potentials(&mut table, &potentials);
     if !frame.white.is_empty() {
         let mut moved = frame.white.clone();
         device.advance(&mut moved, 0)?;
-        twin.advance(&mut table, &moved);
+        reference.advance(&mut table, &moved);
     }
     let sorting = "its order is what the survey is read in";
     for pass in [
@@ -140,7 +140,7 @@ pub fn check(context: &Context, frame: Frame<'_>) -> Result<Table, SolveError> {
 }
 
 /// The water in f64, with rounding bounds of each particle's sums.
-struct Twin<'a> {
+struct Comparison<'a> {
     frame: Frame<'a>,
     water: Water,
     surveyed: Vec<Surveyed>,
@@ -159,7 +159,7 @@ struct Errors {
     sure: f64,
 }
 
-impl<'a> Twin<'a> {
+impl<'a> Comparison<'a> {
     fn of(frame: Frame<'a>) -> Self {
         let water = Water::new(frame.scene, frame.boundary, frame.water, frame.time);
         let n = water.points.len();

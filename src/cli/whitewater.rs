@@ -7,7 +7,7 @@ use serde_json::json;
 
 use swell_domain::whitewater::Kind;
 use swell_scene::whitewater::WhitewaterSettings;
-use swell_stage::whitewater::{Crowding, Event, Request, expected, whitewater};
+use swell_stage::whitewater::{Event, LimitForecast, Request, expected, whitewater};
 
 use super::{
     DeviceArgs, Failure, count,
@@ -211,7 +211,7 @@ fn tell(progress: &Progress, event: Event) {
                 }),
             );
         }
-        Event::Crowding(Crowding {
+        Event::LimitForecast(LimitForecast {
             frame,
             at_end,
             end,

@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 use glam::{DVec2, DVec3};
 
 use super::{
-    answer::Answer,
+    absorber::AbsorberState,
     bounds::Bounds,
     motion::{Motion, piston_elevation},
     particles::Particles,
@@ -95,19 +95,19 @@ impl Absorption {
     /// The velocity changes linearly over `seconds` to the one that the predicted level asks for;
     /// the prediction extrapolates the last two levels linearly. The displacement stays within the
     /// wall's `room`.
-    pub fn answer(
+    pub fn next_state(
         &self,
         motion: &Motion,
-        before: Option<&Answer>,
+        before: Option<&AbsorberState>,
         (now, seconds): (f64, f64),
         level: Option<f64>,
-    ) -> Answer {
+    ) -> AbsorberState {
         let over = level.map(|level| {
             let most = HIGHEST * self.asked.depth;
             (level - self.own_level(motion, now)).clamp(-most, most)
         });
         let Some(before) = before else {
-            return Answer {
+            return AbsorberState {
                 start: now,
                 displacement: 0.0,
                 velocity: 0.0,
@@ -133,7 +133,7 @@ impl Absorption {
         // Displacement after slowing down again over as many seconds.
         let coming = displacement + 0.5 * velocity * seconds;
         let wanted = wanted.clamp((-room - coming) / seconds, (room - coming) / seconds);
-        Answer {
+        AbsorberState {
             start: now,
             displacement,
             velocity,
@@ -217,7 +217,8 @@ mod tests {
             let now = f64::from(k) * SECONDS;
             // The wave ramps up from rest, as water does.
             let level = 1e-3 * (frequency * now).cos() * (now / wall.asked.period).min(1.0);
-            let answer = wall.answer(&Motion::Still, before.as_ref(), (now, SECONDS), Some(level));
+            let answer =
+                wall.next_state(&Motion::Still, before.as_ref(), (now, SECONDS), Some(level));
             for part in 0..8 {
                 let t = now + SECONDS * (f64::from(part) + 0.5) / 8.0;
                 if k >= settled {
@@ -295,7 +296,7 @@ mod tests {
                 let way = motion.displacement(now) - 0.01;
                 let level = progressive * motion.velocity(now) / frequency + local * way;
                 let level = Some(scale * level);
-                let answer = wall.answer(&motion, before.as_ref(), (now, SECONDS), level);
+                let answer = wall.next_state(&motion, before.as_ref(), (now, SECONDS), level);
                 furthest = furthest.max(answer.displacement.abs());
                 before = Some(answer);
             }
@@ -312,12 +313,12 @@ mod tests {
             room: 0.05,
             ..asked(2.0)
         });
-        let mut before: Option<Answer> = None;
+        let mut before: Option<AbsorberState> = None;
         let mut farthest = 0.0f64;
         for k in 0..3000 {
             let now = f64::from(k) * SECONDS;
             let level = (k > 10).then(|| 0.3 * (TAU * now / 2.0).sin());
-            let answer = wall.answer(&Motion::Still, before.as_ref(), (now, SECONDS), level);
+            let answer = wall.next_state(&Motion::Still, before.as_ref(), (now, SECONDS), level);
             if let Some(before) = before {
                 let (x, v) = before.state(now);
                 assert!((x - answer.displacement).abs() < 1e-15);
@@ -344,7 +345,8 @@ mod tests {
             for k in 0..200 {
                 let now = f64::from(k) * SECONDS;
                 let level = (k >= 100).then_some(wet + if k >= 150 { wave } else { 0.0 });
-                let answer = wall.answer(&Motion::Still, before.as_ref(), (now, SECONDS), level);
+                let answer =
+                    wall.next_state(&Motion::Still, before.as_ref(), (now, SECONDS), level);
                 fastest = fastest.max(answer.state(now + SECONDS).1.abs());
                 before = Some(answer);
             }
@@ -359,11 +361,12 @@ mod tests {
     fn it_stands_where_the_water_does() {
         let wall = absorption(2.0);
         let run = |level: &dyn Fn(f64) -> f64| {
-            let mut before: Option<Answer> = None;
+            let mut before: Option<AbsorberState> = None;
             for k in 0..4000 {
                 let now = f64::from(k) * SECONDS;
                 let level = Some(level(now));
-                before = Some(wall.answer(&Motion::Still, before.as_ref(), (now, SECONDS), level));
+                before =
+                    Some(wall.next_state(&Motion::Still, before.as_ref(), (now, SECONDS), level));
             }
             before.unwrap().displacement.abs()
         };

@@ -7,10 +7,10 @@ pub const PROGRAM: &str = "swell";
 /// share it.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 
+pub mod absorber;
 pub mod absorption;
 pub mod aggregates;
 pub mod air;
-pub mod answer;
 pub mod boundary;
 pub mod bounds;
 pub mod bricks;

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use glam::{DVec3, Vec3};
 
-use super::answer::Answers;
+use super::absorber::AbsorberStates;
 
 /// Particles in the order of their ids.
 ///
@@ -21,7 +21,7 @@ pub struct Particles {
     /// Additional attributes declared by effects, by name, with one value per particle.
     pub attributes: BTreeMap<String, Vec<f32>>,
     /// State of absorbing walls from this time on; caches store it in their ledger.
-    pub walls: Answers,
+    pub walls: AbsorberStates,
     /// Length of the substep that ended in this state, seconds; 0 if there was none. Caches store
     /// it in their ledger.
     pub substep: f64,

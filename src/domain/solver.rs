@@ -76,7 +76,7 @@ pub struct Projection {
 
 /// Data requested at the end of a substep. A solver reads back only what is requested here.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Wanted {
+pub struct Requested {
     /// Whether to return positions and velocities of all particles.
     pub particles: bool,
     /// Whether to return the pressures at the scene's pressure points.
@@ -100,7 +100,7 @@ pub struct Span {
 
 /// State of the water at the end of a substep, as far as it was requested.
 #[derive(Clone, Debug, Default)]
-pub struct Seen {
+pub struct Observed {
     /// World positions and velocities in the order of the frame; empty if not requested.
     pub particles: Particles,
     /// Pressures at the pressure points, Pa; `None` where there was no water. Empty if
@@ -113,13 +113,13 @@ pub struct Seen {
 /// Observes the substeps of a frame while it is computed, without influence on the result.
 pub trait Watch {
     /// Returns what to observe at the end of a substep; called once per substep, in order.
-    fn wants(&mut self, substep: Span) -> Wanted;
+    fn wants(&mut self, substep: Span) -> Requested;
 
     /// Receives what was requested for that substep; not called if nothing was.
-    fn look(&mut self, substep: Span, seen: Seen);
+    fn look(&mut self, substep: Span, seen: Observed);
 }
 
-impl Wanted {
+impl Requested {
     /// Returns whether anything is requested.
     pub fn is_any(&self) -> bool {
         *self != Self::default()
@@ -127,14 +127,14 @@ impl Wanted {
 }
 
 /// A watch that observes nothing.
-pub struct Nobody;
+pub struct NoWatch;
 
-impl Watch for Nobody {
-    fn wants(&mut self, _: Span) -> Wanted {
-        Wanted::default()
+impl Watch for NoWatch {
+    fn wants(&mut self, _: Span) -> Requested {
+        Requested::default()
     }
 
-    fn look(&mut self, _: Span, _: Seen) {}
+    fn look(&mut self, _: Span, _: Observed) {}
 }
 
 /// Time and traffic of a pass.
@@ -199,7 +199,7 @@ pub trait Solver {
     /// # Errors
     /// If the device fails, or if the computation does.
     fn advance(&mut self) -> Result<(Particles, StepReport), Self::Error> {
-        self.advance_watched(&mut Nobody)
+        self.advance_watched(&mut NoWatch)
     }
 
     /// Same as [`Solver::advance`], with bit-identical results, while `watch` observes the ends

@@ -165,7 +165,7 @@ fn is_none(count: &u64) -> bool {
 
 /// Predicted inflow of an emitter without a level, with solids in their poses at the start.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Promise {
+pub struct PredictedInflow {
     /// Flow rate, m³/s.
     pub rate: f64,
     /// Velocity times swept area of its box, m³/s; `None` for a mesh.
@@ -272,7 +272,10 @@ impl Sources {
 
     /// Predicts the inflow of each emitter with only `still` as an obstacle; `None` for emitters
     /// with a level.
-    pub fn promises(&self, still: Option<&SignedDistance>) -> Vec<Option<Promise>> {
+    pub fn predicted_inflows(
+        &self,
+        still: Option<&SignedDistance>,
+    ) -> Vec<Option<PredictedInflow>> {
         let solids = Solids::still(still);
         let all = self.emitters.iter();
         all.map(|it| (it.level.is_none()).then(|| Flow::of(self, it, &solids).promise()))

@@ -120,7 +120,7 @@ pub struct Context {
     pub counts_operations: bool,
     /// A fault injected into one pass, to show that a comparison detects it; `None` in
     /// every command.
-    pub spoil: Option<Spoil>,
+    pub spoil: Option<InjectedFault>,
     /// Passes compiled on this device.
     pub(super) compiled: Arc<Compiled>,
     fault: Arc<Mutex<Option<String>>>,
@@ -128,7 +128,7 @@ pub struct Context {
 
 /// A text replacement in one pass, with imports included, before it is compiled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Spoil {
+pub struct InjectedFault {
     /// Pass name. If a pass `NAME_dry` does part of the work of pass `NAME`, it gets the
     /// same fault.
     pub pass: &'static str,

@@ -8,7 +8,7 @@ use std::{
 use wgpu::{BindGroupLayout, Buffer, BufferUsages, ComputePipeline};
 
 use super::{
-    adapter::{Context, GpuError, Spoil},
+    adapter::{Context, GpuError, InjectedFault},
     buffer::{Buf, Element, Held, Wanted, Windows},
     edited,
     operations::Counting,
@@ -360,7 +360,7 @@ pub(super) fn source(
     Ok(source)
 }
 
-fn spoiled(source: &str, spoil: &Spoil) -> Result<String, GpuError> {
+fn spoiled(source: &str, spoil: &InjectedFault) -> Result<String, GpuError> {
     if !source.contains(spoil.from) {
         return Err(GpuError::Shader {
             name: spoil.pass.to_owned(),

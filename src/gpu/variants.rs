@@ -176,8 +176,10 @@ mod tests {
             assert!(is_known, "{pass}: {size:?}");
             let bindings = &reflection.bindings;
             let storage = bindings.iter().filter(|it| it.access.is_storage()).count();
+            // As many as flip/grid_to_particle takes with solids, a density correction and moving
+            // solids, whose distances its films' friction reads.
             assert!(
-                storage <= 13,
+                storage <= 14,
                 "{pass}: {storage} storage buffers, and lavapipe, the least that was tried, has 32"
             );
             let mut indices: Vec<u32> = bindings.iter().map(|it| it.index).collect();

@@ -6,8 +6,8 @@ use super::{
     Scene, WaveMaker, document::Document, error::SceneError, spec::AbsorptionSpec, words::shown,
 };
 use swell_domain::{
+    absorber::{AbsorberState, AbsorberStates, MOST},
     absorption::{Absorption, Asked, MOST_GAIN, level_along},
-    answer::{Answer, Answers, MOST},
     bounds::Bounds,
     motion::Motion,
     particles::Particles,
@@ -46,14 +46,14 @@ pub(super) fn build(
 
 impl WaveMaker {
     /// Returns the inward displacement from the domain's face at time `t`, metres.
-    pub(super) fn displacement(&self, answer: Option<&Answer>, t: f64) -> f64 {
-        let off = answer.map_or(0.0, |answer| answer.state(t).0);
+    pub(super) fn displacement(&self, absorber: Option<&AbsorberState>, t: f64) -> f64 {
+        let off = absorber.map_or(0.0, |absorber| absorber.state(t).0);
         self.room() + self.motion.displacement(t) + off
     }
 
     /// Bounds the speed between two times, m/s, including the absorber's motion.
-    pub(super) fn peak_speed(&self, answer: Option<&Answer>, t0: f64, t1: f64) -> f64 {
-        let off = answer.map_or(0.0, |answer| answer.peak_speed(t0, t1));
+    pub(super) fn peak_speed(&self, absorber: Option<&AbsorberState>, t0: f64, t1: f64) -> f64 {
+        let off = absorber.map_or(0.0, |absorber| absorber.peak_speed(t0, t1));
         self.motion.peak_speed(t0, t1) + off
     }
 
@@ -71,31 +71,35 @@ impl WaveMaker {
 
 impl Scene {
     /// Returns the wave makers with their absorber states.
-    pub(super) fn makers(&self) -> impl Iterator<Item = (&WaveMaker, Option<&Answer>)> {
-        let answers = self.answers.iter().map(Option::as_ref);
-        self.wave_makers.iter().zip(answers)
+    pub(super) fn makers(&self) -> impl Iterator<Item = (&WaveMaker, Option<&AbsorberState>)> {
+        let absorbers = self.absorbers.iter().map(Option::as_ref);
+        self.wave_makers.iter().zip(absorbers)
     }
 
     /// Returns the scene with the absorber states of `state`.
     #[must_use]
     pub fn after(&self, state: &Particles) -> Self {
         let mut scene = self.clone();
-        scene.take_answers(state);
+        scene.take_absorbers(state);
         scene
     }
 
     /// Maps the absorber states of another scene, wall by wall, to the absorbing walls of this one.
     /// The strings explain which walls could not take over their state.
-    pub fn carried(&self, other: &Self, answers: &Answers) -> (Answers, Vec<String>) {
-        let (mut carried, mut notes) = (Answers::default(), Vec::new());
-        for ((k, maker), answer) in self.wave_makers.iter().enumerate().zip(&mut carried) {
-            let mut theirs = other.wave_makers.iter().zip(answers);
+    pub fn carried(
+        &self,
+        other: &Self,
+        absorbers: &AbsorberStates,
+    ) -> (AbsorberStates, Vec<String>) {
+        let (mut carried, mut notes) = (AbsorberStates::default(), Vec::new());
+        for ((k, maker), absorber) in self.wave_makers.iter().enumerate().zip(&mut carried) {
+            let mut theirs = other.wave_makers.iter().zip(absorbers);
             let theirs = theirs.find(|(their, _)| their.wall == maker.wall);
-            let Some(found) = theirs.and_then(|(_, answer)| *answer) else {
+            let Some(found) = theirs.and_then(|(_, absorber)| *absorber) else {
                 continue;
             };
             match &maker.absorption {
-                Some(it) if found.displacement.abs() <= it.asked().room => *answer = Some(found),
+                Some(it) if found.displacement.abs() <= it.asked().room => *absorber = Some(found),
                 _ => notes.push(format!(
                     "wave_maker[{k}]: the wall {} was {} m off its own way and begins on it",
                     maker.wall.name(),
@@ -107,29 +111,29 @@ impl Scene {
     }
 
     /// Takes over the absorber states of `state`.
-    pub fn take_answers(&mut self, state: &Particles) {
-        self.answers = self.answers_in(state);
+    pub fn take_absorbers(&mut self, state: &Particles) {
+        self.absorbers = self.absorbers_in(state);
     }
 
     /// Returns the absorber states in `state` for the walls that absorb in this scene.
-    pub(super) fn answers_in(&self, state: &Particles) -> Answers {
-        let mut answers = state.walls;
-        for (k, answer) in answers.iter_mut().enumerate() {
+    pub(super) fn absorbers_in(&self, state: &Particles) -> AbsorberStates {
+        let mut absorbers = state.walls;
+        for (k, absorber) in absorbers.iter_mut().enumerate() {
             let maker = self.wave_makers.get(k);
-            *answer = answer.filter(|_| maker.is_some_and(|maker| maker.absorption.is_some()));
+            *absorber = absorber.filter(|_| maker.is_some_and(|maker| maker.absorption.is_some()));
         }
-        answers
+        absorbers
     }
 
     /// Updates the absorber states from the water at the end of `frame`, and stores
     /// them in `state`.
-    pub fn answer(&mut self, state: &mut Particles, frame: u32) {
-        self.answers = self.answers_to(state, self.shot.time(frame));
-        state.walls = self.answers;
+    pub fn update_absorbers(&mut self, state: &mut Particles, frame: u32) {
+        self.absorbers = self.absorbers_after(state, self.shot.time(frame));
+        state.walls = self.absorbers;
     }
 
-    fn answers_to(&self, state: &Particles, time: f64) -> Answers {
-        let mut answers = Answers::default();
+    fn absorbers_after(&self, state: &Particles, time: f64) -> AbsorberStates {
+        let mut absorbers = AbsorberStates::default();
         let walls = self.walls(time);
         // Along a periodic axis the water ends at the domain.
         let (min, max) = (self.domain.min, self.domain.max);
@@ -137,7 +141,7 @@ impl Scene {
             min: (min + walls.min).max(min),
             max: (min + walls.max).min(max),
         };
-        for ((maker, before), answer) in self.makers().zip(&mut answers) {
+        for ((maker, before), absorber) in self.makers().zip(&mut absorbers) {
             let Some(absorption) = &maker.absorption else {
                 continue;
             };
@@ -146,9 +150,9 @@ impl Scene {
             let level = level_along(state, self.particle_spacing(), &room, wall);
             let level = level.map(|level| level - still);
             let span = (time, self.shot.frame_seconds());
-            *answer = Some(absorption.answer(&maker.motion, before, span, level));
+            *absorber = Some(absorption.next_state(&maker.motion, before, span, level));
         }
-        answers
+        absorbers
     }
 
     /// Returns the part of the domain between the walls at the start, metres.
@@ -193,10 +197,10 @@ const AT_THE_END: f64 = 0.99;
 impl Held {
     /// Counts a frame, given the state at its end.
     pub fn add(&mut self, scene: &Scene, state: &Particles) {
-        let answers = scene.answers_in(state);
-        let makers = scene.wave_makers.iter().zip(&answers);
-        for ((maker, answer), count) in makers.zip(&mut self.0) {
-            let off = answer.map_or(0.0, |answer| answer.displacement.abs());
+        let absorbers = scene.absorbers_in(state);
+        let makers = scene.wave_makers.iter().zip(&absorbers);
+        for ((maker, absorber), count) in makers.zip(&mut self.0) {
+            let off = absorber.map_or(0.0, |absorber| absorber.displacement.abs());
             *count += u32::from(maker.absorption.is_some() && off > AT_THE_END * maker.room());
         }
     }
@@ -254,7 +258,7 @@ cfl = 1.0
         };
         assert_eq!(scene.peak_boundary_speed(0.0, 0.1), 0.0);
         let at_rest = substeps(&scene);
-        scene.answers[0] = Some(Answer {
+        scene.absorbers[0] = Some(AbsorberState {
             start: 0.0,
             displacement: 0.0,
             velocity: 1.2,

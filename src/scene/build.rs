@@ -20,7 +20,7 @@ use super::{
     words::{chain, extent, shown, shown_all},
 };
 use swell_domain::{
-    answer::Answers,
+    absorber::AbsorberStates,
     bounds::Bounds,
     mesh_file::{self, Digits, Loaded, MeshFormat},
     sampling,
@@ -144,7 +144,7 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
         probes,
         budget,
         effects: spec.effects,
-        answers: Answers::default(),
+        absorbers: AbsorberStates::default(),
     };
     Ok(scene.into_local())
 }

@@ -57,8 +57,8 @@ use std::path::PathBuf;
 use glam::{DAffine3, DQuat, DVec3};
 
 use swell_domain::{
+    absorber::AbsorberStates,
     absorption::Absorption,
-    answer::Answers,
     bounds::Bounds,
     holes::Holes,
     keep::{Compression, Keep},
@@ -122,7 +122,7 @@ pub struct Scene {
     /// Effects that the scene enables; each is `None` unless the scene names it.
     pub effects: Effects,
     /// State of the absorbing walls, taken from the solver's state; all `None` at the start.
-    pub answers: Answers,
+    pub absorbers: AbsorberStates,
 }
 
 impl Scene {

@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::Scene;
 use swell_domain::{
-    answer::Answers,
+    absorber::AbsorberStates,
     bounds::{Bounds, FAR},
     budget::{Breach, Watched},
     particles::Particles,
@@ -59,21 +59,21 @@ impl Scene {
     /// Returns the faces of the box at `time` including wave makers, relative to the domain's least
     /// corner, metres; ±[`FAR`] along periodic axes.
     pub fn walls(&self, time: f64) -> Bounds {
-        self.walls_by(&self.answers, time)
+        self.walls_by(&self.absorbers, time)
     }
 
     /// Returns [`Self::walls`] with the absorber states of `state` in place of the scene's.
     pub fn walls_after(&self, state: &Particles, time: f64) -> Bounds {
-        self.walls_by(&self.answers_in(state), time)
+        self.walls_by(&self.absorbers_in(state), time)
     }
 
-    fn walls_by(&self, answers: &Answers, time: f64) -> Bounds {
+    fn walls_by(&self, absorbers: &AbsorberStates, time: f64) -> Bounds {
         let (mut min, mut max) = (DVec3::ZERO, self.domain.size());
         for axis in (0..3).filter(|&axis| self.periodic[axis]) {
             (min[axis], max[axis]) = (-FAR, FAR);
         }
-        for (maker, answer) in self.wave_makers.iter().zip(answers) {
-            let inward = maker.displacement(answer.as_ref(), time);
+        for (maker, absorber) in self.wave_makers.iter().zip(absorbers) {
+            let inward = maker.displacement(absorber.as_ref(), time);
             if maker.wall.is_max {
                 max[maker.wall.axis] -= inward;
             } else {

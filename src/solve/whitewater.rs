@@ -264,7 +264,7 @@ impl Whitewater {
         if is_other_count(&self.scene, self.plan.counts.particles, water)? {
             self.resize(n)?;
         }
-        self.scene.take_answers(water);
+        self.scene.take_absorbers(water);
         let local = local(&self.scene, &water.position);
         self.program.upload(CORRECTED, 0, &local);
         self.program.upload(VELOCITY, 0, &water.velocity);

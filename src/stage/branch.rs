@@ -10,7 +10,7 @@ use glam::Vec3;
 
 use swell_cache::{CacheError, CacheReader, Clock, Parent};
 use swell_domain::{
-    answer::Answers, boundary::Boundary, bounds::Bounds, particles::Particles, pose::Pose,
+    absorber::AbsorberStates, boundary::Boundary, bounds::Bounds, particles::Particles, pose::Pose,
 };
 use swell_scene::{Scene, SceneError};
 
@@ -142,7 +142,7 @@ impl Branch {
         let mut particles = cache.read(from.frame)?.about(origin, scene.origin);
         let mut clock = entry.clock;
         let mut notes = Vec::new();
-        if clock.walls != Answers::default() {
+        if clock.walls != AbsorberStates::default() {
             let baked = super::baked_scene(&cache, &from.directory);
             let baked = baked.map_err(|source| BranchError::Scene {
                 file: from.directory.clone(),

@@ -11,7 +11,7 @@ use glam::DVec3;
 
 use swell_cache::ProbeValues;
 use swell_domain::{
-    answer::Answers,
+    absorber::AbsorberStates,
     particles::Particles,
     signed_distance::SignedDistance,
     solver::{PassTime, Solver, StepReport},
@@ -39,7 +39,7 @@ pub struct Drive<'a> {
     plan: Option<Plan>,
     frame: u32,
     /// State of the absorbing walls after that frame.
-    walls: Answers,
+    walls: AbsorberStates,
     /// Id of the next particle to enter.
     next_id: u32,
     watch: Option<Watch<'a>>,
@@ -135,7 +135,7 @@ impl<'a> Drive<'a> {
             solver,
             plan,
             frame: 0,
-            walls: Answers::default(),
+            walls: AbsorberStates::default(),
             next_id: 0,
             watch: None,
             pressure_points: Vec::new(),
@@ -226,7 +226,7 @@ impl<'a> Drive<'a> {
 
     /// The scene with its walls in their current position, which probes need during a frame.
     fn standing(&self) -> Cow<'a, Scene> {
-        if self.walls == Answers::default() || !self.is_recorded {
+        if self.walls == AbsorberStates::default() || !self.is_recorded {
             return Cow::Borrowed(self.scene);
         }
         let walls = self.walls;

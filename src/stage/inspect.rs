@@ -9,7 +9,7 @@ use std::{
 };
 
 use swell_cache::{CacheError, CacheReader, stream::Stream};
-use swell_domain::{signed_distance::SignedDistanceError, sources::Promise};
+use swell_domain::{signed_distance::SignedDistanceError, sources::PredictedInflow};
 use swell_gpu::{
     adapter::{Context, GpuError, enumerate},
     program::check_sizes,
@@ -110,7 +110,7 @@ pub struct ScenePlan {
     pub volume: Volume,
     /// What each emitter adds with solids in their start position; `None` for emitters that keep a
     /// level.
-    pub promises: Vec<Option<Promise>>,
+    pub promises: Vec<Option<PredictedInflow>>,
     /// Greatest number of particles that emitters without a level add until the end of the shot;
     /// `None` if the scene has no inlets.
     pub entering: Option<f64>,
@@ -177,7 +177,7 @@ pub fn plan(scene: &Scene, adapter: Option<&str>) -> Result<ScenePlan, PlanError
             parts.find_map(|part| check_sizes(context, &part.buffer_specs()).err())
         })
         .or(lacks);
-    let promises = start.promises();
+    let promises = start.predicted_inflows();
     let most = start.sources.most_entering(scene.shot.duration());
     let entering = promises.iter().zip(most).filter_map(|(promise, most)| {
         // Where nothing is in the way, to the particle.

@@ -7,7 +7,7 @@ use swell_domain::{
     particles::Particles,
     sampling::{BoundarySample, boundary_samples, fill_water},
     signed_distance::{SignedDistance, SignedDistanceError},
-    sources::{Promise, Sources},
+    sources::{PredictedInflow, Sources},
 };
 use swell_scene::{Method, Scene, four_digits};
 use swell_solve::{
@@ -134,7 +134,7 @@ impl Start {
     pub fn lints(&self, scene: &Scene) -> Vec<String> {
         let mut lints = Vec::from_iter(self.lint_dry());
         let most = self.sources.most_entering(scene.shot.duration());
-        for (index, (promise, most)) in self.promises().into_iter().zip(most).enumerate() {
+        for (index, (promise, most)) in self.predicted_inflows().into_iter().zip(most).enumerate() {
             let window = scene.emitters[index].window;
             let seconds = window.length(scene.shot.duration());
             if most == Some(0) && seconds > 0.0 {
@@ -183,7 +183,7 @@ impl Start {
     /// Warnings about the scene and its start, a sentence each.
     pub fn warnings(&self, scene: &Scene) -> Vec<String> {
         let mut warnings = [scene.warnings(), self.lints(scene)].concat();
-        for (index, promise) in self.promises().into_iter().enumerate() {
+        for (index, promise) in self.predicted_inflows().into_iter().enumerate() {
             if let Some(promise) = promise.filter(|promise| promise.covered > 0.0) {
                 warnings.push(format!(
                     "emitter[{index}]: solids cover {:.1} % of its cross-section all along its \
@@ -198,8 +198,9 @@ impl Start {
 
     /// What each emitter adds with solids in their start position; `None` for emitters that keep a
     /// level.
-    pub fn promises(&self) -> Vec<Option<Promise>> {
-        self.sources.promises(self.boundary.distance.as_ref())
+    pub fn predicted_inflows(&self) -> Vec<Option<PredictedInflow>> {
+        self.sources
+            .predicted_inflows(self.boundary.distance.as_ref())
     }
 
     /// Plans what the scene needs on a device with these limits.

@@ -4,7 +4,7 @@ use swell_cache::{Entry, ProbeRecord, ProbeValues, stream::PROBES};
 use swell_domain::{
     particles::Particles,
     probe::{Patch, Rate, elevation, energies, flux, front, load, run_up, volume},
-    solver::{Seen, Span, Wanted, Watch},
+    solver::{Observed, Requested, Span, Watch},
 };
 use swell_scene::{
     Scene,
@@ -160,8 +160,8 @@ fn is_due(probe: &Probe, substep: Span) -> bool {
 }
 
 impl Watch for Recorder<'_> {
-    fn wants(&mut self, substep: Span) -> Wanted {
-        let mut wanted = Wanted::default();
+    fn wants(&mut self, substep: Span) -> Requested {
+        let mut wanted = Requested::default();
         self.surfaces.clear();
         for (index, probe) in self.due(substep) {
             match probe.kind {
@@ -178,7 +178,7 @@ impl Watch for Recorder<'_> {
         wanted
     }
 
-    fn look(&mut self, substep: Span, seen: Seen) {
+    fn look(&mut self, substep: Span, seen: Observed) {
         let is_force = |probe: &Probe| matches!(probe.kind, ProbeKind::Force { .. });
         let is_seen = |probe: &Probe| is_due(probe, substep) && !is_force(probe);
         let found = of_state(self.scene, &seen.particles, &seen.pressures, is_seen);

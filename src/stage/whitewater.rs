@@ -49,7 +49,7 @@ pub use self::{
     checked::Stream,
     error::WhitewaterError,
     expected::{Expected, expected},
-    forecast::Crowding,
+    forecast::LimitForecast,
 };
 
 /// Folder of the streams in a cache.
@@ -116,7 +116,7 @@ pub enum Event {
     },
     /// If growth continues, there will be more particles than the settings allow. Sent at most
     /// once.
-    Crowding(Crowding),
+    LimitForecast(LimitForecast),
     /// The frames computed by this run are on the disk. Also sent before the error if a later frame
     /// failed.
     Written {
@@ -201,11 +201,11 @@ pub fn whitewater(
     };
     engine.set(&settings)?;
     let mut stream = match standing {
-        Some(_) => Growing::resume(&directory, &manifest, &cache)?,
+        Some(_) => StreamWriter::resume(&directory, &manifest, &cache)?,
         None => {
             // Only now: if calibration is stopped, the old stream stays intact.
             remove(&directory)?;
-            Growing::create(&directory, manifest, &cache, &settings)?
+            StreamWriter::create(&directory, manifest, &cache, &settings)?
         }
     };
     tell(Event::Ready {
@@ -240,7 +240,7 @@ pub fn whitewater(
                     seconds: began.elapsed().as_secs_f64(),
                 });
                 if let Some(crowding) = forecast.see(frame, stream.white.len()) {
-                    tell(Event::Crowding(crowding));
+                    tell(Event::LimitForecast(crowding));
                 }
             }
             Err(error) => {
@@ -296,7 +296,7 @@ impl Step<'_> {
     /// Runs the step and returns the number of new particles.
     fn run(
         &self,
-        stream: &mut Growing,
+        stream: &mut StreamWriter,
         engine: &mut Engine,
         water: &mut Water<'_>,
     ) -> Result<usize, WhitewaterError> {
@@ -361,14 +361,14 @@ const NEXT_ID: &str = "next_id";
 const WATER: &str = "water";
 
 /// A stream being written.
-struct Growing {
+struct StreamWriter {
     writer: CacheWriter,
     clock: Clock,
     white: Particles,
     next_id: u32,
 }
 
-impl Growing {
+impl StreamWriter {
     fn create(
         directory: &Path,
         manifest: Manifest,

@@ -174,7 +174,7 @@ const QUESTIONS: [Question; 6] = [
     },
 ];
 
-/// Answers every question from the measured frames of two solvers.
+/// AbsorberStates every question from the measured frames of two solvers.
 pub fn findings(courses: &[Course; 2], impact: Impact) -> Vec<Finding> {
     QUESTIONS
         .iter()

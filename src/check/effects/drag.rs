@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use crate::{
-    engine::{Io, Outcome, State, Twin, names, twin},
+    engine::{Io, Outcome, State, Comparison, names, comparison},
     flip::FlipState,
     pbf::{PbfState, bounds::Bounds},
     table::{entries, pair},
@@ -40,13 +40,13 @@ entries! {
     }
 }
 
-pub(super) const PBF: &[Twin<PbfState>] = &[twin(
+pub(super) const PBF: &[Comparison<PbfState>] = &[comparison(
     "effects/drag_by_density",
     || names![pbf::buffers::VELOCITY],
     by_density,
 )];
 
-pub(super) const FLIP: &[Twin<FlipState>] = &[twin(
+pub(super) const FLIP: &[Comparison<FlipState>] = &[comparison(
     "effects/drag_by_cells",
     || names![flip::buffers::SORTED_VELOCITY],
     by_cells,
@@ -84,7 +84,7 @@ fn by_density(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     );
     let neighbors = state.visited(io, &points)?;
     let inputs = state.inputs(&points, &neighbors);
-    let twin = drag_by_density(&settings, inputs, &velocity);
+    let reference = drag_by_density(&settings, inputs, &velocity);
     let density = measure_density(inputs);
     let seconds = inputs.substep.time_step;
     let fall = seconds * state.scene.water.gravity;
@@ -95,7 +95,7 @@ fn by_density(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
         let exposure = exposure((density[i] - own) / (1.0 - own), OF_DENSITY);
         let both = [velocity[i] - fall, fall];
         let blown = blown(&settings, seconds, [error, exposure], both);
-        pair(i, found[i], twin[i], [blown])
+        pair(i, found[i], reference[i], [blown])
     });
     Ok(())
 }
@@ -114,7 +114,7 @@ fn by_cells(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let bricks = &state.elements().bricks;
     let sorted = state.sorted();
     let share = |element| share(&state.model, bricks, &kind, sorted, element);
-    let twin = drag_by_cells(&settings, &step, sorted, share);
+    let reference = drag_by_cells(&settings, &step, sorted, share);
     let found = io
         .after
         .vectors(flip::buffers::SORTED_VELOCITY, state.particles())?;
@@ -126,7 +126,7 @@ fn by_cells(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
         pair(
             i,
             found[i],
-            twin[i],
+            reference[i],
             [blown(&settings, step.kick, [error, exposure], both)],
         )
     });

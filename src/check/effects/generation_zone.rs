@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use glam::DVec3;
 
 use crate::{
-    engine::{Io, Outcome, Twin, names, twin},
+    engine::{Io, Outcome, Comparison, names, comparison},
     flip::FlipState,
     pbf::PbfState,
     table::entries,
@@ -40,13 +40,13 @@ entries! {
     }
 }
 
-pub(super) const PBF: &[Twin<PbfState>] = &[twin(
+pub(super) const PBF: &[Comparison<PbfState>] = &[comparison(
     "effects/generate_particles",
     || names![pbf::buffers::VELOCITY],
     particles,
 )];
 
-pub(super) const FLIP: &[Twin<FlipState>] = &[twin(
+pub(super) const FLIP: &[Comparison<FlipState>] = &[comparison(
     "effects/generate_faces",
     || names![flip::buffers::FACE_VELOCITY, flip::buffers::FACE_CHANGE],
     faces,

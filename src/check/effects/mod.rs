@@ -2,7 +2,7 @@
 
 use swell_scene::effects::with_effects;
 
-use super::{engine::Twin, flip::FlipState, pbf::PbfState};
+use super::{engine::Comparison, flip::FlipState, pbf::PbfState};
 
 mod zone;
 
@@ -11,12 +11,12 @@ macro_rules! checks {
         $(mod $name;)+
 
         /// Returns the comparisons of passes on PBF's particles.
-        pub(super) fn pbf() -> Vec<&'static [Twin<PbfState>]> {
+        pub(super) fn pbf() -> Vec<&'static [Comparison<PbfState>]> {
             vec![$($name::PBF),+]
         }
 
         /// Returns the comparisons of passes on FLIP's grid and particles.
-        pub(super) fn flip() -> Vec<&'static [Twin<FlipState>]> {
+        pub(super) fn flip() -> Vec<&'static [Comparison<FlipState>]> {
             vec![$($name::FLIP),+]
         }
     };

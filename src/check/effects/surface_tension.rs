@@ -3,7 +3,7 @@
 use glam::{DVec2, DVec3};
 
 use crate::{
-    engine::{Io, NONE, Outcome, Twin, names, twin},
+    engine::{Io, NONE, Outcome, Comparison, names, comparison},
     flip::FlipState,
     pbf::PbfState,
     table::{Entry, each, entries, pair},
@@ -11,7 +11,7 @@ use crate::{
 use swell_compare::{rounding::U, tolerance::bounds};
 use swell_domain::poisson::Cells;
 use swell_gpu::buffer::Buf;
-use swell_reference::flip::effects::surface_tension as twins;
+use swell_reference::flip::effects::surface_tension as passes;
 use swell_scene::flip::Surface;
 use swell_solve::{
     effects::surface_tension::{BETWEEN, CURVATURE, SHARE},
@@ -63,18 +63,18 @@ entries! {
     }
 }
 
-pub(super) const PBF: &[Twin<PbfState>] = &[];
+pub(super) const PBF: &[Comparison<PbfState>] = &[];
 
-pub(super) const FLIP: &[Twin<FlipState>] = &[
-    twin("effects/tension_share", NONE, first),
-    twin("effects/tension_smooth", NONE, |state, io| {
+pub(super) const FLIP: &[Comparison<FlipState>] = &[
+    comparison("effects/tension_share", NONE, first),
+    comparison("effects/tension_smooth", NONE, |state, io| {
         smoothed(state, io, [SHARE, BETWEEN], &SECOND)
     }),
-    twin("effects/tension_smooth_again", NONE, |state, io| {
+    comparison("effects/tension_smooth_again", NONE, |state, io| {
         smoothed(state, io, [BETWEEN, SHARE], &THIRD)
     }),
-    twin("effects/tension_curvature", NONE, curvature),
-    twin(
+    comparison("effects/tension_curvature", NONE, curvature),
+    comparison(
         "effects/tension_push",
         || names![flip::buffers::FACE_VELOCITY],
         push,
@@ -84,10 +84,10 @@ pub(super) const FLIP: &[Twin<FlipState>] = &[
 fn first(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let elements = state.elements();
     let kind = &state.room().kind;
-    let twin = twins::first_share(&state.model, &elements.bricks, kind, state.density());
+    let reference = passes::first_share(&state.model, &elements.bricks, kind, state.density());
     let found = io.after.scalars(SHARE, elements.cells)?;
     io.table.each(&FIRST, elements.active(), |e| {
-        pair(e, found[e], twin[e], [twin[e]])
+        pair(e, found[e], reference[e], [reference[e]])
     });
     Ok(())
 }
@@ -101,10 +101,10 @@ fn smoothed(
     let elements = state.elements();
     let kind = &state.room().kind;
     let share = io.before.scalars(from, elements.cells)?;
-    let twin = twins::smooth(&state.model, &elements.bricks, kind, &share);
+    let reference = passes::smooth(&state.model, &elements.bricks, kind, &share);
     let found = io.after.scalars(to, elements.cells)?;
     io.table.each(entry, elements.active(), |e| {
-        pair(e, found[e], twin[e], [twin[e]])
+        pair(e, found[e], reference[e], [reference[e]])
     });
     Ok(())
 }
@@ -115,7 +115,7 @@ fn curvature(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let share = io.before.scalars(SHARE, elements.cells)?;
     let found = pairs(&io.after.get(CURVATURE, elements.cells)?);
     let about = |e: usize| {
-        let bent = twins::bent(model, bricks, kind, &share, e as u32)?;
+        let bent = passes::bent(model, bricks, kind, &share, e as u32)?;
         let slope = SLOPE.of([elements.largest_about(e, |e| share[e])]);
         Some((bent, slope))
     };
@@ -125,14 +125,14 @@ fn curvature(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
         let Some((bent, slope)) = &all[e - first] else {
             return pair(e, found[e].x, 0.0, [0.0; 6]);
         };
-        let inverse = |corner: &DVec3| 1.0 / corner.length().max(twins::LEAST_SLOPE);
+        let inverse = |corner: &DVec3| 1.0 / corner.length().max(passes::LEAST_SLOPE);
         let inverse = bent.corners.iter().map(inverse).sum::<f64>() / 8.0;
         let normals = NORMALS.of([*slope, inverse]);
-        let way = bent.off.abs() + twins::SHIFT * bent.bend.abs();
+        let way = bent.off.abs() + passes::SHIFT * bent.bend.abs();
         let magnitudes = [
             BEND.of([normals]),
             SQUARES.of([normals, bent.squares]),
-            OFF.of([*slope, bent.steep.max(twins::LEAST_SLOPE), bent.off.abs()]),
+            OFF.of([*slope, bent.steep.max(passes::LEAST_SLOPE), bent.off.abs()]),
             way,
             bent.squares,
             bent.bend.abs() + way * bent.squares,
@@ -167,7 +167,7 @@ fn push(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let found = elements.planes(&io.after, flip::buffers::FACE_VELOCITY)?;
     let tension = settings.coefficient / state.scene.water.rest_density;
     let given = (model, tension, step.kick);
-    let twin = twins::push(
+    let reference = passes::push(
         given,
         bricks,
         room,
@@ -184,17 +184,17 @@ fn push(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let over = step.kick * tension / model.cell_size().powi(2);
     io.table.each(&PUSHED, elements.active(), |e| {
         let (mut kappa, mut scale) = (0.0f64, 0.0f64);
-        for [water, air] in (0..3).filter_map(|axis| twins::sides(bricks, room, e as u32, axis)) {
+        for [water, air] in (0..3).filter_map(|axis| passes::sides(bricks, room, e as u32, axis)) {
             let theta = cells.theta(water, air);
-            let (_, weight) = twins::between(&curvature, theta, water, air);
+            let (_, weight) = passes::between(&curvature, theta, water, air);
             let [inside, outside] = [water, air].map(|e| curvature[e as usize]);
-            let share = inside.y.max(outside.y) / weight.max(twins::LEAST_WEIGHT);
+            let share = inside.y.max(outside.y) / weight.max(passes::LEAST_WEIGHT);
             let most = inside.x.abs().max(outside.x.abs());
             kappa = kappa.max(BETWEEN_CELLS.of([share, most]));
             scale += over / theta;
         }
-        let push = twin[e].distance(before[e]);
-        pair(e, found[e], twin[e], [kappa, scale, push, twin[e].length()])
+        let push = reference[e].distance(before[e]);
+        pair(e, found[e], reference[e], [kappa, scale, push, reference[e].length()])
     });
     Ok(())
 }

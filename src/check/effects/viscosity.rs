@@ -2,7 +2,7 @@
 //! has no pass.
 
 use crate::{
-    engine::{Io, NONE, Outcome, State, Twin, names, twin},
+    engine::{Io, NONE, Outcome, State, Comparison, names, comparison},
     flip::FlipState,
     pbf::{
         PbfState,
@@ -59,22 +59,22 @@ entries! {
     }
 }
 
-pub(super) const PBF: &[Twin<PbfState>] = &[
-    twin("effects/viscosity_gather", NONE, gather),
-    twin(
+pub(super) const PBF: &[Comparison<PbfState>] = &[
+    comparison("effects/viscosity_gather", NONE, gather),
+    comparison(
         "effects/viscosity_apply",
         || names![pbf::buffers::VELOCITY],
         apply,
     ),
 ];
 
-pub(super) const FLIP: &[Twin<FlipState>] = &[
-    twin("effects/viscosity_weigh", NONE, weigh),
-    Twin {
+pub(super) const FLIP: &[Comparison<FlipState>] = &[
+    comparison("effects/viscosity_weigh", NONE, weigh),
+    Comparison {
         is_due: |state, io| Ok(state.is_due(io, 0)),
-        ..twin("effects/viscosity_relax", || names![STEP], relax)
+        ..comparison("effects/viscosity_relax", || names![STEP], relax)
     },
-    twin(
+    comparison(
         "effects/viscosity_pressure",
         || names![pressure::PRESSURE],
         add_pressure,
@@ -170,12 +170,12 @@ fn gather(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     );
     let neighbors = state.visited(io, &points)?;
     let inputs = state.inputs(&points, &neighbors);
-    let twin = viscosity_gather(inputs, xsph, &velocity);
+    let reference = viscosity_gather(inputs, xsph, &velocity);
     let scale = xsph * inputs.model.calibration.density_scale;
     let found = io.after.vectors(VISCOSITY_CHANGE, n)?;
     io.table.each(&CHANGE, 0..n, |i| {
         let sums = Bounds(inputs).sums(i, relative_speed(&velocity, i));
-        pair(i, found[i], twin[i], [scale, sums.kernel()])
+        pair(i, found[i], reference[i], [scale, sums.kernel()])
     });
     Ok(())
 }
@@ -183,10 +183,10 @@ fn gather(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
 fn apply(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     let n = state.particles();
     let change = io.before.vectors(VISCOSITY_CHANGE, n)?;
-    let twin = viscosity_apply(&change, &io.before.vectors(pbf::buffers::VELOCITY, n)?);
+    let reference = viscosity_apply(&change, &io.before.vectors(pbf::buffers::VELOCITY, n)?);
     let found = io.after.vectors(pbf::buffers::VELOCITY, n)?;
     io.table.each(&VELOCITY, 0..n, |i| {
-        pair(i, found[i], twin[i], [twin[i].length()])
+        pair(i, found[i], reference[i], [reference[i].length()])
     });
     Ok(())
 }

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use crate::{
-    engine::{Io, NONE, Outcome, State, Twin, names, twin},
+    engine::{Io, NONE, Outcome, State, Comparison, names, comparison},
     flip::FlipState,
     pbf::{
         PbfState,
@@ -57,24 +57,24 @@ entries! {
     }
     "effects/grid_confinement" {
         GRID_VELOCITY = "velocity at faces", "m/s":
-            [moved: "what the twin answers when each |ω| grows or shrinks by the factor " GROWN,
+            [moved: "change of the reference when each |ω| is scaled by the factor " GROWN,
             push: "|the push| + Δt ε Δx of the largest |ω| about", v: "|v|"]
             8.0 * moved + 60.0 * U * push + 2.0 * U * v, "", tie TURNED;
     }
 }
 
-pub(super) const PBF: &[Twin<PbfState>] = &[
-    twin("effects/vorticity_curl", NONE, curl),
-    twin(
+pub(super) const PBF: &[Comparison<PbfState>] = &[
+    comparison("effects/vorticity_curl", NONE, curl),
+    comparison(
         "effects/vorticity_force",
         || names![pbf::buffers::VELOCITY],
         force,
     ),
 ];
 
-pub(super) const FLIP: &[Twin<FlipState>] = &[
-    twin("effects/grid_curl", NONE, curl_on_grid),
-    twin(
+pub(super) const FLIP: &[Comparison<FlipState>] = &[
+    comparison("effects/grid_curl", NONE, curl_on_grid),
+    comparison(
         "effects/grid_confinement",
         || names![flip::buffers::FACE_VELOCITY],
         confine_on_grid,
@@ -89,7 +89,7 @@ fn curl(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     );
     let neighbors = state.visited(io, &points)?;
     let inputs = state.inputs(&points, &neighbors);
-    let twin = vorticity_curl(inputs, &velocity);
+    let reference = vorticity_curl(inputs, &velocity);
     let scale = 2.0 * inputs.model.calibration.gradient_scale;
     let lengths = io.after.scalars(VORTICITY_LENGTH, n)?;
     let vectors = io.after.vectors(VORTICITY, n)?;
@@ -98,9 +98,9 @@ fn curl(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
         ROTATION.of([scale, sums.gradient()])
     });
     io.table
-        .each(&CURL, 0..n, |i| pair(i, vectors[i], twin[i], [errors[i]]));
+        .each(&CURL, 0..n, |i| pair(i, vectors[i], reference[i], [errors[i]]));
     io.table.each(&LENGTH, 0..n, |i| {
-        let exact = twin[i].length();
+        let exact = reference[i].length();
         pair(i, lengths[i], exact, [errors[i], exact])
     });
     Ok(())
@@ -118,7 +118,7 @@ fn force(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     let vorticity = io.before.vectors(VORTICITY, n)?;
     let neighbors = state.visited(io, &points)?;
     let inputs = state.inputs(&points, &neighbors);
-    let twin = vorticity_force(inputs, settings.strength, &vorticity, &velocity);
+    let reference = vorticity_force(inputs, settings.strength, &vorticity, &velocity);
     let strength: Vec<f64> = vorticity.iter().map(|w| w.length()).collect();
     let scale = inputs.model.calibration.gradient_scale;
     let h = inputs.model.calibration.support_radius;
@@ -142,7 +142,7 @@ fn force(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
             false => (slope, 1.0),
         };
         let magnitudes = [force, error, slope, rounding, velocity[i].length()];
-        Some(pair(i, found[i], twin[i], magnitudes))
+        Some(pair(i, found[i], reference[i], magnitudes))
     });
     Ok(())
 }
@@ -168,7 +168,7 @@ fn curl_on_grid(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let velocity = elements.planes(&io.before, flip::buffers::FACE_VELOCITY)?;
     let lengths = io.after.scalars(VORTICITY_LENGTH, elements.cells)?;
     let vectors = io.after.vectors(VORTICITY, elements.cells)?;
-    let twin = grid_curl(&state.model, &elements.bricks, state.room(), &velocity);
+    let reference = grid_curl(&state.model, &elements.bricks, state.room(), &velocity);
     let size = state.model.cell_size();
     let error = |e: usize| {
         // The pass also reads velocities two cells away: twice the reach of one neighbourhood.
@@ -178,10 +178,10 @@ fn curl_on_grid(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let errors = each(elements.active(), error);
     let error = |e: usize| errors[e - elements.active().start];
     io.table.each(&GRID_VORTICITY, elements.active(), |e| {
-        pair(e, vectors[e], twin[e], [error(e)])
+        pair(e, vectors[e], reference[e], [error(e)])
     });
     io.table.each(&GRID_LENGTH, elements.active(), |e| {
-        let exact = twin[e].length();
+        let exact = reference[e].length();
         pair(e, lengths[e], exact, [error(e), exact])
     });
     Ok(())
@@ -197,7 +197,7 @@ fn confine_on_grid(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let found = elements.planes(&io.after, flip::buffers::FACE_VELOCITY)?;
     let step = state.step();
     let (model, room, strength) = (&state.model, state.room(), settings.strength);
-    let twin = |omega: &[DVec3]| {
+    let reference = |omega: &[DVec3]| {
         grid_confinement(
             model,
             &step,
@@ -208,7 +208,7 @@ fn confine_on_grid(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
             &before,
         )
     };
-    let exact = twin(&omega);
+    let exact = reference(&omega);
     // Magnitudes err by 12 u, and differences pass that on: the bound is the reference's response
     // to such errors.
     let grown = |sign: f64| -> Vec<DVec3> {
@@ -219,7 +219,7 @@ fn confine_on_grid(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
         };
         omega.iter().enumerate().map(by).collect()
     };
-    let others = [1.0, -1.0].map(|sign| twin(&grown(sign)));
+    let others = [1.0, -1.0].map(|sign| reference(&grown(sign)));
     let scale = step.kick * strength * model.cell_size();
     io.table.each(&GRID_VELOCITY, elements.active(), |e| {
         let force = scale * elements.largest_about(e, |e| omega[e].length());

@@ -49,10 +49,10 @@ pub(super) fn particles<const N: usize>(
     let velocity = io.before.vectors(pbf::buffers::VELOCITY, n)?;
     let is_drop = state.drops(&io.before)?;
     let step = (state.scene.domain.size(), state.substep.time_step);
-    let twin = led_particles(zone, step, (&places, &is_drop), &velocity, wanted);
+    let reference = led_particles(zone, step, (&places, &is_drop), &velocity, wanted);
     let found = io.after.vectors(pbf::buffers::VELOCITY, n)?;
     io.table.each(entry, 0..n, |i| {
-        pair(i, found[i], twin[i], magnitudes(velocity[i].length()))
+        pair(i, found[i], reference[i], magnitudes(velocity[i].length()))
     });
     Ok(())
 }
@@ -80,10 +80,10 @@ pub(super) fn faces<const N: usize>(
         centers: &Centers::default(),
         old: &old,
     };
-    let twin = led_faces(zone, water, &before, wanted);
+    let reference = led_faces(zone, water, &before, wanted);
     io.table.each(entry, elements.active(), |e| {
         let sizes = [old[e].length(), before[e].length()];
-        pair(e, found[e], twin[e], magnitudes(sizes))
+        pair(e, found[e], reference[e], magnitudes(sizes))
     });
     Ok(())
 }

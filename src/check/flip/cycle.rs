@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use crate::{
-    engine::{Io, NONE, Outcome, Twin, twin},
+    engine::{Comparison, Io, NONE, Outcome, comparison},
     table::{Entry, each, pair},
 };
 use swell_domain::bricks::CELLS;
@@ -18,12 +18,12 @@ use swell_solve::{
 use super::{FlipState, rows::*};
 
 /// Comparisons of the multigrid's passes.
-pub(super) const TWINS: &[Twin<FlipState>] = &[
+pub(super) const COMPARISONS: &[Comparison<FlipState>] = &[
     of_level("pressure/coarsen", coarsen),
     of_level("pressure/smooth_first", |state, io| {
         smooth(state, io, &SMOOTHED_FIRST, About::Nothing)
     }),
-    Twin {
+    Comparison {
         is_due: |state, io| {
             // The last sweep of a cycle leaves the sums; the number of sweeps varies.
             if state.is_turn(io)? && state.is_early() {
@@ -31,7 +31,7 @@ pub(super) const TWINS: &[Twin<FlipState>] = &[
             }
             is_due(state, io)
         },
-        ..twin("pressure/smooth", NONE, |state, io| {
+        ..comparison("pressure/smooth", NONE, |state, io| {
             smooth(state, io, &SMOOTHED, About::Corrections)
         })
     },
@@ -46,10 +46,10 @@ pub(super) const TWINS: &[Twin<FlipState>] = &[
 const fn of_level(
     pass: &'static str,
     compare: fn(&mut FlipState, &mut Io<'_>) -> Outcome,
-) -> Twin<FlipState> {
-    Twin {
+) -> Comparison<FlipState> {
+    Comparison {
         is_due,
-        ..twin(pass, NONE, compare)
+        ..comparison(pass, NONE, compare)
     }
 }
 

@@ -1,6 +1,6 @@
 //! Gaps that close within the substep.
 
-use swell_reference::flip::{Gaps, Room, close_gaps as twin_close_gaps};
+use swell_reference::flip::{Gaps, Room, close_gaps as reference_close_gaps};
 use swell_scene::flip::Surface;
 use swell_solve::flip::buffers;
 
@@ -27,7 +27,7 @@ pub(super) fn close_gaps(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
         true => elements.scalars(&io.before, buffers::LIQUID_DISTANCE)?,
         false => vec![0.0; elements.cells],
     };
-    let twin = twin_close_gaps(&gaps, &mut distance);
+    let reference = reference_close_gaps(&gaps, &mut distance);
     let error = OF_GAP.of([CUT.of([state.place()])]);
     let active = elements.active();
     // Rounding decides where the outcome changes when all thresholds are shifted by the error.
@@ -40,12 +40,12 @@ pub(super) fn close_gaps(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let kind = io.after.get(buffers::CELL_KIND, elements.cells)?;
     let flux = elements.scalars(&io.after, buffers::SOLID_FLUX)?;
     io.table.each(&FILLING, active.clone(), |e| {
-        (!is_tie(e)).then(|| pair(e, kind[e], f64::from(twin.kind[e]), []))
+        (!is_tie(e)).then(|| pair(e, kind[e], f64::from(reference.kind[e]), []))
     });
     let rate = state.model.cell_size() / step.length;
     io.table.each(&FILLED, active.clone(), |e| {
-        let sizes = [error, rate, twin.solid_flux[e].abs()];
-        (!is_tie(e)).then(|| pair(e, flux[e], twin.solid_flux[e], sizes))
+        let sizes = [error, rate, reference.solid_flux[e].abs()];
+        (!is_tie(e)).then(|| pair(e, flux[e], reference.solid_flux[e], sizes))
     });
     if has_distance {
         let found = elements.scalars(&io.after, buffers::LIQUID_DISTANCE)?;
@@ -56,7 +56,7 @@ pub(super) fn close_gaps(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     state.room = Some(Room {
         kind,
         solid_flux: flux,
-        ..twin
+        ..reference
     });
     Ok(())
 }

@@ -9,11 +9,11 @@ use crate::{
 };
 use swell_domain::{boundary::Boundary, flip::VON_KARMAN, signed_distance::SignedDistance};
 use swell_reference::flip::{
-    Depth, LEAST_FILM, Model, Room, Solid, cut_cells as twin_cut_cells,
-    extrapolate as twin_extrapolate, find_change as twin_find_change, find_depth,
-    find_excess as twin_find_excess, find_water as twin_find_water, friction_rates,
-    gather_centers as twin_gather_centers, gather_faces as twin_gather_faces, is_near_half,
-    let_in as twin_let_in, wall_friction as twin_wall_friction,
+    Depth, LEAST_FILM, Model, Room, Solid, cut_cells as reference_cut_cells,
+    extrapolate as reference_extrapolate, find_change as reference_find_change, find_depth,
+    find_excess as reference_find_excess, find_water as reference_find_water, friction_rates,
+    gather_centers as reference_gather_centers, gather_faces as reference_gather_faces,
+    is_near_half, let_in as reference_let_in, wall_friction as reference_wall_friction,
 };
 use swell_scene::flip::Surface;
 use swell_solve::flip::buffers;
@@ -89,7 +89,7 @@ impl FlipState {
         };
         let model = Model::new(&self.model.scene, &boundary);
         let step = model.step(&self.elements().substep);
-        twin_cut_cells(&model, &step, &self.elements().bricks)
+        reference_cut_cells(&model, &step, &self.elements().bricks)
     }
 }
 
@@ -97,7 +97,7 @@ pub(super) fn cut_cells(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let has_moving = !state.boundary.moving.is_empty();
     let has_solids = state.boundary.distance.is_some() || has_moving;
     let (elements, step) = (state.elements(), state.step());
-    let twin = twin_cut_cells(&state.model, &step, &elements.bricks);
+    let reference = reference_cut_cells(&state.model, &step, &elements.bricks);
     let error = state.distance_error();
     let others: Vec<Room> = [-error, error]
         .into_iter()
@@ -117,15 +117,15 @@ pub(super) fn cut_cells(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
         solid_flux: elements.scalars(&io.after, buffers::SOLID_FLUX)?,
         volume: match has_solids {
             true => elements.scalars(&io.after, buffers::OPEN_VOLUME)?,
-            false => twin.volume.clone(),
+            false => reference.volume.clone(),
         },
         hats: match has_solids {
             true => elements.scalars(&io.after, buffers::OPEN_HATS)?,
-            false => twin.hats.clone(),
+            false => reference.hats.clone(),
         },
         closed_velocity: match has_moving {
             true => elements.planes(&io.after, buffers::CLOSED_VELOCITY)?,
-            false => twin.closed_velocity.clone(),
+            false => reference.closed_velocity.clone(),
         },
     };
     let cut = CUT.of([state.place()]);
@@ -134,35 +134,37 @@ pub(super) fn cut_cells(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let speed = solid.fold(wall[0].max(wall[1]), f64::max);
     let moved = |of: &dyn Fn(&Room) -> f64| others.iter().map(of).fold(0.0, f64::max);
     io.table.each(&KIND, elements.active(), |e| {
-        let is_tie = others.iter().any(|other| other.kind[e] != twin.kind[e]);
-        (!is_tie).then(|| pair(e, room.kind[e], f64::from(twin.kind[e]), []))
+        let is_tie = others
+            .iter()
+            .any(|other| other.kind[e] != reference.kind[e]);
+        (!is_tie).then(|| pair(e, room.kind[e], f64::from(reference.kind[e]), []))
     });
     io.table.each(&OPEN, elements.active(), |e| {
-        let moved = moved(&|other| other.open[e].distance(twin.open[e]));
-        pair(e, room.open[e], twin.open[e], [cut, moved])
+        let moved = moved(&|other| other.open[e].distance(reference.open[e]));
+        pair(e, room.open[e], reference.open[e], [cut, moved])
     });
     io.table.each(&FLUX, elements.active(), |e| {
-        let moved = moved(&|other| (other.solid_flux[e] - twin.solid_flux[e]).abs());
+        let moved = moved(&|other| (other.solid_flux[e] - reference.solid_flux[e]).abs());
         pair(
             e,
             room.solid_flux[e],
-            twin.solid_flux[e],
+            reference.solid_flux[e],
             [cut, speed, moved],
         )
     });
     if has_solids {
         io.table.each(&VOLUME, elements.active(), |e| {
-            let moved = moved(&|other| (other.volume[e] - twin.volume[e]).abs());
-            pair(e, room.volume[e], twin.volume[e], [cut, moved])
+            let moved = moved(&|other| (other.volume[e] - reference.volume[e]).abs());
+            pair(e, room.volume[e], reference.volume[e], [cut, moved])
         });
         io.table.each(&HATS, elements.active(), |e| {
-            let moved = moved(&|other| (other.hats[e] - twin.hats[e]).abs());
-            pair(e, room.hats[e], twin.hats[e], [cut, moved])
+            let moved = moved(&|other| (other.hats[e] - reference.hats[e]).abs());
+            pair(e, room.hats[e], reference.hats[e], [cut, moved])
         });
     }
     if has_moving {
         io.table.each(&CLOSED, elements.active(), |e| {
-            let exact = twin.closed_velocity[e];
+            let exact = reference.closed_velocity[e];
             let mut answers = others.iter().chain(&rounded);
             let is_tie = answers.any(|other| other.closed_velocity[e] != exact);
             let at = elements.bricks.cell(e as u32).map(|c| f64::from(c) + 0.5);
@@ -185,7 +187,7 @@ pub(super) fn gather_faces(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     }
     let (elements, step) = (state.elements(), state.step());
     let (bricks, sorted) = (&elements.bricks, state.sorted());
-    let twin = twin_gather_faces(&state.model, &step, bricks, sorted, state.room());
+    let reference = reference_gather_faces(&state.model, &step, bricks, sorted, state.room());
     let found = elements.faces(&io.after)?;
     let place = state.place();
     let error = |e: usize| {
@@ -195,7 +197,7 @@ pub(super) fn gather_faces(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
         }
         let (range, most) = (high - low, low.abs().max(high.abs()));
         let along = |axis: usize| {
-            let weight = twin.weight[e][axis];
+            let weight = reference.weight[e][axis];
             OF_FACE.of([place, count, weight, range[axis], most[axis]])
         };
         DVec3::from_array([0, 1, 2].map(along)).length()
@@ -204,18 +206,21 @@ pub(super) fn gather_faces(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let errors = each(active.clone(), error);
     let error = |e: usize| errors[e - active.start];
     io.table.each(&OLD, active.clone(), |e| {
-        pair(e, found.change[e], twin.change[e], [error(e)])
+        pair(e, found.change[e], reference.change[e], [error(e)])
     });
     io.table.each(&NEW, active.clone(), |e| {
         let magnitudes = [
             error(e),
             step.velocity_step.length(),
-            twin.velocity[e].length(),
+            reference.velocity[e].length(),
         ];
-        pair(e, found.velocity[e], twin.velocity[e], magnitudes)
+        pair(e, found.velocity[e], reference.velocity[e], magnitudes)
     });
-    io.table
-        .add_exact(&KNOWN, &found.layer[active.clone()], &twin.layer[active]);
+    io.table.add_exact(
+        &KNOWN,
+        &found.layer[active.clone()],
+        &reference.layer[active],
+    );
     Ok(())
 }
 
@@ -223,7 +228,7 @@ pub(super) fn gather_centers(state: &mut FlipState, io: &mut Io<'_>) -> Outcome 
     let settings = state.model.settings();
     let (elements, step, room) = (state.elements(), state.step(), state.room());
     let bricks = &elements.bricks;
-    let twin = twin_gather_centers(&state.model, &step, bricks, state.sorted(), room);
+    let reference = reference_gather_centers(&state.model, &step, bricks, state.sorted(), room);
     let share = 1.0 / f64::from(settings.particles_per_cell);
     let place = state.place();
     let error = |e: usize| {
@@ -238,7 +243,7 @@ pub(super) fn gather_centers(state: &mut FlipState, io: &mut Io<'_>) -> Outcome 
             })
             .sum();
         let least = (0.5 * open.min(room.hats[e])).max(0.02);
-        let relative = (count * share / least).min(twin[e].max(1.0));
+        let relative = (count * share / least).min(reference[e].max(1.0));
         OF_CENTER.of([share, place, count, least, relative])
     };
     let active = elements.active();
@@ -246,7 +251,7 @@ pub(super) fn gather_centers(state: &mut FlipState, io: &mut Io<'_>) -> Outcome 
     let error = |e: usize| errors[e - active.start];
     let density = elements.scalars(&io.after, buffers::DENSITY)?;
     io.table.each(&RELATIVE_DENSITY, active.clone(), |e| {
-        pair(e, density[e], twin[e], [error(e)])
+        pair(e, density[e], reference[e], [error(e)])
     });
     state.density = Some(density);
     Ok(())
@@ -257,7 +262,7 @@ pub(super) fn find_water(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let (elements, step, room) = (state.elements(), state.step(), state.room());
     let (bricks, density) = (&elements.bricks, state.density());
     let depth = find_depth(&state.model, &step, bricks, room, density);
-    let (twin, distances) = twin_find_water(&state.model, bricks, room, &depth);
+    let (reference, distances) = reference_find_water(&state.model, bricks, room, &depth);
     let cut = CUT.of([state.place()]);
     let active = elements.active();
     // Without averaging, a cell's own density leads to the same decision on both sides.
@@ -283,7 +288,7 @@ pub(super) fn find_water(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let is_tie = |e: usize| looked(e).1 || (is_averaged(e) && is_near(e));
     let kind = io.after.get(buffers::CELL_KIND, elements.cells)?;
     io.table.each(&WATER, active.clone(), |e| {
-        (!is_tie(e)).then(|| pair(e, kind[e], f64::from(twin[e]), []))
+        (!is_tie(e)).then(|| pair(e, kind[e], f64::from(reference[e]), []))
     });
     if state.model.settings().surface == Surface::GhostFluid {
         let distance = elements.scalars(&io.after, buffers::LIQUID_DISTANCE)?;
@@ -301,12 +306,12 @@ pub(super) fn find_water(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
 
 pub(super) fn find_excess(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let (elements, density) = (state.elements(), state.density());
-    let twin = twin_find_excess(&state.step(), &elements.bricks, state.room(), density);
+    let reference = reference_find_excess(&state.step(), &elements.bricks, state.room(), density);
     let excess = elements.scalars(&io.after, buffers::DENSITY_EXCESS)?;
     let cut = CUT.of([state.place()]);
     io.table.each(&EXCESS, elements.active(), |e| {
         let size = (density[e] - 1.0).abs().min(1.0) + density[e];
-        pair(e, excess[e], twin[e], [size, cut])
+        pair(e, excess[e], reference[e], [size, cut])
     });
     Ok(())
 }
@@ -319,19 +324,23 @@ pub(super) fn let_in(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
         true => elements.scalars(&io.before, buffers::DENSITY_EXCESS)?,
         false => Vec::new(),
     };
-    let mut twin = state.room().clone();
-    twin.solid_flux = elements.scalars(&io.before, buffers::SOLID_FLUX)?;
+    let mut reference = state.room().clone();
+    reference.solid_flux = elements.scalars(&io.before, buffers::SOLID_FLUX)?;
     let (step, size) = (state.step(), state.model.cell_size());
     let inlets = state.model.scene.inlets(step.start, step.length);
     let bricks = &elements.bricks;
-    twin_let_in(&inlets, size, bricks, &mut twin, density, &mut excess);
+    reference_let_in(&inlets, size, bricks, &mut reference, density, &mut excess);
     let found = elements.scalars(&io.after, buffers::SOLID_FLUX)?;
     let rates = inlets.iter().map(|inlet| inlet.rate);
     let rate = size * rates.fold(0.0, f64::max);
     let cut = CUT.of([state.place()]);
     io.table.each(&LET_IN, elements.active(), |e| {
-        let sizes = [rate * (1.0 + density[e]), cut, twin.solid_flux[e].abs()];
-        pair(e, found[e], twin.solid_flux[e], sizes)
+        let sizes = [
+            rate * (1.0 + density[e]),
+            cut,
+            reference.solid_flux[e].abs(),
+        ];
+        pair(e, found[e], reference.solid_flux[e], sizes)
     });
     if corrects {
         let found = elements.scalars(&io.after, buffers::DENSITY_EXCESS)?;
@@ -341,7 +350,7 @@ pub(super) fn let_in(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     }
     state.room = Some(Room {
         solid_flux: found,
-        ..twin
+        ..reference
     });
     Ok(())
 }
@@ -351,8 +360,8 @@ pub(super) fn wall_friction(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let (bricks, room) = (&elements.bricks, state.room());
     let before = elements.faces(&io.before)?;
     let rates = friction_rates(&state.model, &step, bricks, room, &before);
-    let mut twin = before.clone();
-    twin_wall_friction(&state.model, &step, bricks, room, &mut twin);
+    let mut reference = before.clone();
+    reference_wall_friction(&state.model, &step, bricks, room, &mut reference);
     let found = elements.faces(&io.after)?;
     let place = state.place();
     // Two components for each of four walls, each bounded by the largest speed around.
@@ -363,24 +372,27 @@ pub(super) fn wall_friction(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     io.table.each(&FRICTION, elements.active(), |e| {
         let (moved, slowed) = (step.length * at_most(e), step.length * rates[e].length());
         let magnitudes = [place, moved, slowed, before.velocity[e].length()];
-        pair(e, found.velocity[e], twin.velocity[e], magnitudes)
+        pair(e, found.velocity[e], reference.velocity[e], magnitudes)
     });
     Ok(())
 }
 
 pub(super) fn find_change(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let elements = state.elements();
-    let mut twin = elements.faces(&io.before)?;
-    let before = twin.change.clone();
-    twin_find_change(&state.model, &elements.bricks, state.room(), &mut twin);
+    let mut reference = elements.faces(&io.before)?;
+    let before = reference.change.clone();
+    reference_find_change(&state.model, &elements.bricks, state.room(), &mut reference);
     let found = elements.faces(&io.after)?;
     let active = elements.active();
     io.table.each(&CHANGE, active.clone(), |e| {
-        let size = twin.velocity[e].length() + before[e].length();
-        pair(e, found.change[e], twin.change[e], [size])
+        let size = reference.velocity[e].length() + before[e].length();
+        pair(e, found.change[e], reference.change[e], [size])
     });
-    io.table
-        .add_exact(&LAYER, &found.layer[active.clone()], &twin.layer[active]);
+    io.table.add_exact(
+        &LAYER,
+        &found.layer[active.clone()],
+        &reference.layer[active],
+    );
     Ok(())
 }
 
@@ -391,8 +403,8 @@ pub(super) fn extrapolate(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
         return Ok(());
     }
     let before = elements.faces(&io.before)?;
-    let mut twin = before.clone();
-    twin_extrapolate(&step, &elements.bricks, layer, &mut twin);
+    let mut reference = before.clone();
+    reference_extrapolate(&step, &elements.bricks, layer, &mut reference);
     let found = elements.faces(&io.after)?;
     let largest = |e: usize| {
         let sides = (0..7).map(|k| {
@@ -407,15 +419,15 @@ pub(super) fn extrapolate(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     };
     let active = elements.active();
     io.table.each(&SPREAD_VELOCITY, active.clone(), |e| {
-        pair(e, found.velocity[e], twin.velocity[e], [largest(e)])
+        pair(e, found.velocity[e], reference.velocity[e], [largest(e)])
     });
     io.table.each(&SPREAD_CHANGE, active.clone(), |e| {
-        pair(e, found.change[e], twin.change[e], [largest(e)])
+        pair(e, found.change[e], reference.change[e], [largest(e)])
     });
     io.table.add_exact(
         &SPREAD_LAYER,
         &found.layer[active.clone()],
-        &twin.layer[active],
+        &reference.layer[active],
     );
     Ok(())
 }

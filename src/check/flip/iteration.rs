@@ -2,14 +2,14 @@
 //! air touches.
 
 use crate::{
-    engine::{Io, NONE, Outcome, Twin, names, twin},
+    engine::{Comparison, Io, NONE, Outcome, comparison, names},
     table::pair,
 };
 use swell_domain::{bricks::CELLS, poisson::remove_means};
 use swell_gpu::buffer::Buf;
 use swell_reference::poisson::iteration::{
-    Decision, Limits, Progress, SolveState, Sum, differences, ipp_lower as twin_ipp_lower,
-    ipp_upper as twin_ipp_upper, products, verify as twin_verify,
+    Decision, Limits, Progress, SolveState, Sum, differences, ipp_lower as reference_ipp_lower,
+    ipp_upper as reference_ipp_upper, products, verify as reference_verify,
 };
 use swell_scene::flip::Preconditioner;
 use swell_solve::{
@@ -23,7 +23,7 @@ use swell_solve::{
 use super::{FlipState, rows::*};
 
 /// Comparisons of the passes of an iteration.
-pub(super) const TWINS: &[Twin<FlipState>] = &[
+pub(super) const COMPARISONS: &[Comparison<FlipState>] = &[
     early("pressure/precondition", NONE, precondition),
     early("pressure/ipp_lower", NONE, ipp_lower),
     early("pressure/ipp_upper", NONE, ipp_upper),
@@ -39,8 +39,8 @@ pub(super) const TWINS: &[Twin<FlipState>] = &[
     ),
     early("pressure/verify", NONE, verify),
     early("pressure/center", || names![VALUES], center),
-    twin("pressure/reduce", || names![solved::CONTROL], reduce),
-    twin("pressure/count_pockets", NONE, count_pockets),
+    comparison("pressure/reduce", || names![solved::CONTROL], reduce),
+    comparison("pressure/count_pockets", NONE, count_pockets),
 ];
 
 /// Array whose mean `pressure/center` removes.
@@ -51,10 +51,10 @@ const fn early(
     pass: &'static str,
     keeps: fn() -> Vec<String>,
     compare: fn(&mut FlipState, &mut Io<'_>) -> Outcome,
-) -> Twin<FlipState> {
-    Twin {
+) -> Comparison<FlipState> {
+    Comparison {
         is_due: |state, io| Ok(state.is_turn(io)? && state.is_due(io, 0)),
-        ..twin(pass, keeps, compare)
+        ..comparison(pass, keeps, compare)
     }
 }
 
@@ -138,9 +138,9 @@ fn ipp_lower(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let r = state.by_row(&io.after, solved::RESIDUAL)?;
     let d = state.by_row(&io.after, solved::INVERSE_DIAGONAL)?;
     let half = state.by_row(&io.after, solved::PRODUCT)?;
-    let twin = twin_ipp_lower(state.system(), &d, &r);
+    let reference = reference_ipp_lower(state.system(), &d, &r);
     state.add_rows(io.table, &IPP_LOWER, |i| {
-        (half[i], twin[i].value, [unit, d[i], twin[i].size])
+        (half[i], reference[i].value, [unit, d[i], reference[i].size])
     });
     Ok(())
 }
@@ -150,9 +150,9 @@ fn ipp_upper(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let d = state.by_row(&io.after, solved::INVERSE_DIAGONAL)?;
     let half = state.by_row(&io.after, solved::PRODUCT)?;
     let z = state.by_row(&io.after, solved::CORRECTION)?;
-    let twin = twin_ipp_upper(state.system(), &d, &half);
+    let reference = reference_ipp_upper(state.system(), &d, &half);
     state.add_rows(io.table, &IPP_UPPER, |i| {
-        (z[i], twin[i].value, [unit, twin[i].size])
+        (z[i], reference[i].value, [unit, reference[i].size])
     });
     state.note_sum(io, solved::RESIDUAL, solved::CORRECTION)
 }
@@ -201,11 +201,11 @@ fn verify(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let b = state.by_row(&io.after, solved::RHS)?;
     let r = state.by_row(&io.after, solved::RESIDUAL)?;
     let system = state.system();
-    let twin = twin_verify(system, &b, &terms);
+    let reference = reference_verify(system, &b, &terms);
     let errors: Vec<_> = terms.iter().map(|term| differences(system, term)).collect();
     state.add_rows(io.table, &VERIFIED_RESIDUAL, |i| {
         let error = errors.iter().map(|error| error[i]).sum();
-        (r[i], twin[i].value, [unit, error, twin[i].size])
+        (r[i], reference[i].value, [unit, error, reference[i].size])
     });
     state.sum = Some(products(&r, &r));
     Ok(())

@@ -33,7 +33,7 @@ use swell_solve::{
 
 use super::{
     Checked, effects,
-    engine::{Engine, Io, NONE, Outcome, State, Twin, names, twin},
+    engine::{Comparison, Engine, Io, NONE, Outcome, State, comparison, names},
     table::pair,
 };
 use elements::Elements;
@@ -41,50 +41,50 @@ use pressure::Assembled;
 use rows::{PLACE, WORK};
 
 /// Comparisons of FLIP's own passes.
-const TWINS: &[Twin<FlipState>] = &[
-    twin("flip/survey", NONE, sort::survey),
-    twin("flip/assign_cells", NONE, sort::assign_cells),
-    twin("flip/reorder", NONE, sort::reorder),
-    twin("flip/cut_cells", NONE, grid::cut_cells),
-    twin("flip/gather_faces", NONE, grid::gather_faces),
-    twin("flip/gather_centers", NONE, grid::gather_centers),
-    twin("flip/find_water", NONE, grid::find_water),
-    twin(
+const COMPARISONS: &[Comparison<FlipState>] = &[
+    comparison("flip/survey", NONE, sort::survey),
+    comparison("flip/assign_cells", NONE, sort::assign_cells),
+    comparison("flip/reorder", NONE, sort::reorder),
+    comparison("flip/cut_cells", NONE, grid::cut_cells),
+    comparison("flip/gather_faces", NONE, grid::gather_faces),
+    comparison("flip/gather_centers", NONE, grid::gather_centers),
+    comparison("flip/find_water", NONE, grid::find_water),
+    comparison(
         "flip/close_gaps",
         || names![buffers::LIQUID_DISTANCE],
         gaps::close_gaps,
     ),
-    twin("flip/find_excess", NONE, grid::find_excess),
-    twin(
+    comparison("flip/find_excess", NONE, grid::find_excess),
+    comparison(
         "flip/let_in",
         || names![buffers::SOLID_FLUX, buffers::DENSITY_EXCESS],
         grid::let_in,
     ),
-    twin(
+    comparison(
         "flip/wall_friction",
         elements::faces_kept,
         grid::wall_friction,
     ),
-    twin("flip/find_change", elements::faces_kept, grid::find_change),
-    twin("flip/extrapolate", elements::faces_kept, grid::extrapolate),
-    twin("flip/grid_to_particle", NONE, particles::grid_to_particle),
-    twin("flip/push_apart", NONE, particles::push_apart),
-    twin(
+    comparison("flip/find_change", elements::faces_kept, grid::find_change),
+    comparison("flip/extrapolate", elements::faces_kept, grid::extrapolate),
+    comparison("flip/grid_to_particle", NONE, particles::grid_to_particle),
+    comparison("flip/push_apart", NONE, particles::push_apart),
+    comparison(
         "flip/advect",
         || names![buffers::COUNTERS],
         particles::advect,
     ),
-    twin(
+    comparison(
         "flip/aim",
         || names![buffers::SORTED_POSITION],
         particles::aim,
     ),
-    twin("flip/boundary_work", NONE, boundary_work),
+    comparison("flip/boundary_work", NONE, boundary_work),
 ];
 
 /// Where the results of passes without a row of their own are compared.
-const BOTH_HALVES: &str = "the twin of flip/gather_faces and flip/gather_centers does both halves";
-const LABELLED: &str = "what they make is held against its twin after pressure/count_pockets";
+const BOTH_HALVES: &str = "compared together with flip/gather_faces and flip/gather_centers";
+const LABELLED: &str = "compared after pressure/count_pockets";
 
 /// Traces a substep of the frame after `particles`, the state at the end of `frame`, and compares
 /// it with the reference.
@@ -139,8 +139,13 @@ pub(crate) struct FlipState {
 }
 
 impl State for FlipState {
-    fn twins() -> Vec<&'static [Twin<Self>]> {
-        let own = [TWINS, pressure::TWINS, iteration::TWINS, cycle::TWINS];
+    fn comparisons() -> Vec<&'static [Comparison<Self>]> {
+        let own = [
+            COMPARISONS,
+            pressure::COMPARISONS,
+            iteration::COMPARISONS,
+            cycle::COMPARISONS,
+        ];
         [&own[..], &effects::flip()].concat()
     }
 

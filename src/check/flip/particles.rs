@@ -9,8 +9,8 @@ use crate::{
 };
 use swell_domain::bricks::Bricks;
 use swell_reference::flip::{
-    Given, Moved, Solid, advect as twin_advect, aim as twin_aim,
-    grid_to_particle as twin_grid_to_particle, push_apart as twin_push_apart,
+    Given, Moved, Solid, advect as reference_advect, aim as reference_aim,
+    grid_to_particle as reference_grid_to_particle, push_apart as reference_push_apart,
 };
 use swell_solve::{SolveError, flip::buffers, pressure::buffers as solved};
 
@@ -36,7 +36,7 @@ pub(super) fn grid_to_particle(state: &mut FlipState, io: &mut Io<'_>) -> Outcom
         false => None,
     };
     let (bricks, step, sorted) = (&elements.bricks, state.step(), state.sorted());
-    let twin = twin_grid_to_particle(
+    let reference = reference_grid_to_particle(
         &state.model,
         &step,
         bricks,
@@ -45,7 +45,7 @@ pub(super) fn grid_to_particle(state: &mut FlipState, io: &mut Io<'_>) -> Outcom
         state.room(),
         shift.as_deref(),
     );
-    let given = given(state, io, twin.is_drop.clone())?;
+    let given = given(state, io, reference.is_drop.clone())?;
     let place = state.place();
     let of_cell = |element: usize| {
         let element = element as u32;
@@ -68,13 +68,18 @@ pub(super) fn grid_to_particle(state: &mut FlipState, io: &mut Io<'_>) -> Outcom
         &GIVEN,
         all().map(|(i, [velocity, change, _])| {
             let magnitudes = [velocity, change, came(i)];
-            pair(i, given.velocity[i], twin.velocity[i], magnitudes)
+            pair(i, given.velocity[i], reference.velocity[i], magnitudes)
         }),
     );
     io.table.add(
         &CARRIED,
         all().map(|(i, [velocity, ..])| {
-            pair(i, given.carried[i], twin.carried[i], [velocity, came(i)])
+            pair(
+                i,
+                given.carried[i],
+                reference.carried[i],
+                [velocity, came(i)],
+            )
         }),
     );
     if !given.affine.is_empty() {
@@ -83,7 +88,7 @@ pub(super) fn grid_to_particle(state: &mut FlipState, io: &mut Io<'_>) -> Outcom
         io.table.add(
             &GIVEN_AFFINE,
             rows.map(|((i, [velocity, ..]), row)| {
-                let [found, exact] = [&given, &twin].map(|of| of.affine[i].row(row));
+                let [found, exact] = [&given, &reference].map(|of| of.affine[i].row(row));
                 pair(i, found, exact, [velocity, size])
             }),
         );
@@ -92,7 +97,7 @@ pub(super) fn grid_to_particle(state: &mut FlipState, io: &mut Io<'_>) -> Outcom
         io.table.add(
             &SHIFT,
             all().map(|(i, [.., error])| {
-                pair(i, given.displacement[i], twin.displacement[i], [error])
+                pair(i, given.displacement[i], reference.displacement[i], [error])
             }),
         );
     }
@@ -106,11 +111,11 @@ pub(super) fn aim(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let before = io.before.vectors(buffers::SORTED_POSITION, state.n)?;
     let after = io.after.vectors(buffers::SORTED_POSITION, state.n)?;
     let step = state.step();
-    let twin = twin_aim(&step, &before, given);
+    let reference = reference_aim(&step, &before, given);
     io.table.each(&AIMED, 0..state.n, |i| {
         let way = step.length * (given.carried[i].length() + given.velocity[i].length());
         let pushed = given.displacement[i].length();
-        pair(i, after[i], twin[i], [before[i].length(), way, pushed])
+        pair(i, after[i], reference[i], [before[i].length(), way, pushed])
     });
     Ok(())
 }
@@ -139,7 +144,7 @@ pub(super) fn push_apart(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
         return Ok(());
     };
     let (elements, sorted, step) = (state.elements(), state.sorted(), state.step());
-    let twin = twin_push_apart(
+    let reference = reference_push_apart(
         &state.model,
         &step,
         &elements.bricks,
@@ -159,7 +164,7 @@ pub(super) fn push_apart(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
                 .len()
         });
         let count = about.sum::<usize>() as f64;
-        let exact = before.displacement[i] + twin[i];
+        let exact = before.displacement[i] + reference[i];
         pair(
             i,
             found.displacement[i],
@@ -180,9 +185,9 @@ pub(super) fn advect(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let (step, start) = (state.step(), &state.sorted().cloud.position);
     let go = |start: &[DVec3]| {
         let (model, bricks) = (&state.model, &elements.bricks);
-        twin_advect(model, &step, bricks, start, &faces, &given)
+        reference_advect(model, &step, bricks, start, &faces, &given)
     };
-    let twin = go(start);
+    let reference = go(start);
     let fastest = faces.iter().map(|v| v.length()).fold(0.0, f64::max);
     let grid = state.distance_error();
     let reach = |x: &DVec3| START.of([x.length(), step.length, fastest, grid]);
@@ -205,7 +210,7 @@ pub(super) fn advect(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let position = io.after.vectors(buffers::POSITION, n)?;
     let velocity = io.after.vectors(buffers::VELOCITY, n)?;
     io.table.each(&MOVED, 0..n, |i| {
-        let x = twin.position[i];
+        let x = reference.position[i];
         let moved = answer(&|moved| apart(moved.position[i], x));
         // Rounding may put one of the two at the other end of a periodic axis.
         let found = period.image_by_rounding(position[i], x);
@@ -223,7 +228,7 @@ pub(super) fn advect(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let solids = step.solids.iter().map(Solid::fastest);
     let solids = solids.fold(0.0, f64::max);
     io.table.each(&ADVECTED, 0..n, |i| {
-        let v = twin.velocity[i];
+        let v = reference.velocity[i];
         let moved = answer(&|moved| moved.velocity[i].distance(v));
         let came = among * (given.velocity[i].length() + solids);
         pair(i, velocity[i], v, [moved, v.length() + came])
@@ -231,7 +236,7 @@ pub(super) fn advect(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let before = io.before.one(buffers::COUNTERS)?;
     let after = io.after.one(buffers::COUNTERS)?;
     let slowed = f64::from(after.capped) - f64::from(before.capped);
-    let exact = twin.capped as f64;
+    let exact = reference.capped as f64;
     let slack = answer(&|moved| (moved.capped as f64 - exact).abs());
     io.table.add(&SLOWED, [pair(0, slowed, exact, [slack])]);
     let ids = io.after.get(buffers::ID, n)?;

@@ -4,7 +4,7 @@
 use glam::DVec3;
 
 use crate::{
-    engine::{Io, NONE, Outcome, Twin, View, names, twin},
+    engine::{Comparison, Io, NONE, Outcome, View, comparison, names},
     table::{Entry, Table, pair},
 };
 use swell_compare::{
@@ -14,7 +14,7 @@ use swell_compare::{
 use swell_domain::poisson::{AIR, System, remove_means};
 use swell_gpu::buffer::Buf;
 use swell_reference::{
-    flip::{Centers, Waters, density_source as twin_density_source},
+    flip::{Centers, Waters, density_source as reference_density_source},
     poisson::{
         BUDGET, Solver,
         gradients::norm,
@@ -34,26 +34,26 @@ use swell_solve::{
 use super::{Elements, FlipState, iteration::PRODUCTS, rows::*};
 
 /// Comparisons of the passes before and after the iteration.
-pub(super) const TWINS: &[Twin<FlipState>] = &[
-    twin("pressure/build_system", NONE, build_system),
-    twin("pressure/divergence", NONE, divergence),
-    twin("pressure/density_source", NONE, density_source),
-    twin("pressure/multiply", NONE, multiply),
-    Twin {
+pub(super) const COMPARISONS: &[Comparison<FlipState>] = &[
+    comparison("pressure/build_system", NONE, build_system),
+    comparison("pressure/divergence", NONE, divergence),
+    comparison("pressure/density_source", NONE, density_source),
+    comparison("pressure/multiply", NONE, multiply),
+    Comparison {
         is_due: FlipState::is_done,
-        ..twin(
+        ..comparison(
             "pressure/project",
             || names![buffers::FACE_VELOCITY],
             project,
         )
     },
-    Twin {
+    Comparison {
         is_due: FlipState::is_done,
-        ..twin("pressure/measure_divergence", NONE, measure_divergence)
+        ..comparison("pressure/measure_divergence", NONE, measure_divergence)
     },
-    Twin {
+    Comparison {
         is_due: FlipState::is_done,
-        ..twin("pressure/displace", NONE, displace)
+        ..comparison("pressure/displace", NONE, displace)
     },
 ];
 
@@ -264,12 +264,12 @@ fn build_system(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     io.table.each(&COEFFICIENT, 0..system.cell.len(), |row| {
         let element = system.cell[row];
         let found = |axis: usize| f64::from(coefficient[axis * stride + blocked(element)]);
-        let twin = |axis: usize| system.coefficient[row][2 * axis];
-        let [found, twin] = [
+        let reference = |axis: usize| system.coefficient[row][2 * axis];
+        let [found, reference] = [
             DVec3::new(found(0), found(1), found(2)),
-            DVec3::new(twin(0), twin(1), twin(2)),
+            DVec3::new(reference(0), reference(1), reference(2)),
         ];
-        pair(element as usize, found, twin, [])
+        pair(element as usize, found, reference, [])
     });
     io.table
         .add_exact(&ROWS, &wet.map(is_row).collect::<Vec<_>>(), &expected);
@@ -289,14 +289,14 @@ fn divergence(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let velocity = state
         .elements()
         .planes(&io.before, buffers::FACE_VELOCITY)?;
-    let twin = state.waters().divergence(state.system(), &velocity);
+    let reference = state.waters().divergence(state.system(), &velocity);
     let flow = state.flow(&velocity);
     let (rhs, unit) = (state.by_row(&io.after, solved::RHS)?, state.unit());
     state.add_rows(io.table, &RHS, |row| {
-        (rhs[row], twin[row], [unit, flow[row]])
+        (rhs[row], reference[row], [unit, flow[row]])
     });
     let found = io.after.one(solved::STATS)?.divergence_before;
-    state.add_noted(io.table, &BEFORE, found, [&twin, &flow]);
+    state.add_noted(io.table, &BEFORE, found, [&reference, &flow]);
     Ok(())
 }
 
@@ -304,9 +304,9 @@ fn density_source(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     state.note_sum(io, solved::RHS, solved::RHS)?;
     let rhs = state.by_row(&io.after, solved::RHS)?;
     let centers = &state.assembled().centers;
-    let twin = twin_density_source(&state.model, state.system(), centers);
+    let reference = reference_density_source(&state.model, state.system(), centers);
     state.add_rows(io.table, &SOURCE, |row| {
-        (rhs[row], twin[row], [twin[row].abs()])
+        (rhs[row], reference[row], [reference[row].abs()])
     });
     Ok(())
 }
@@ -324,9 +324,9 @@ fn multiply(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     }
     let product = state.by_row(&io.after, solved::PRODUCT)?;
     let (system, unit) = (state.system(), state.unit());
-    let (twin, errors) = (system.apply(&direction), differences(system, &direction));
+    let (reference, errors) = (system.apply(&direction), differences(system, &direction));
     state.add_rows(io.table, &PRODUCT, |row| {
-        (product[row], twin[row], [unit, errors[row]])
+        (product[row], reference[row], [unit, errors[row]])
     });
     state.products += 1;
     Ok(())
@@ -337,11 +337,16 @@ fn project(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let terms = state.terms(&io.after)?;
     let (errors, x) = (state.difference_errors(&terms), sum(&terms));
     let waters = state.waters();
-    let mut twin = elements.planes(&io.before, buffers::FACE_VELOCITY)?;
-    waters.project(&waters.by_element(state.system(), &x), &mut twin);
+    let mut reference = elements.planes(&io.before, buffers::FACE_VELOCITY)?;
+    waters.project(&waters.by_element(state.system(), &x), &mut reference);
     let velocity = elements.planes(&io.after, buffers::FACE_VELOCITY)?;
     io.table.each(&PROJECTED, elements.active(), |e| {
-        pair(e, velocity[e], twin[e], [errors[e], twin[e].length()])
+        pair(
+            e,
+            velocity[e],
+            reference[e],
+            [errors[e], reference[e].length()],
+        )
     });
     let pressure = elements.scalars(&io.after, solved::PRESSURE)?;
     let scale = state.scene.water.rest_density * state.model.cell_size() / elements.substep.kick;
@@ -401,9 +406,14 @@ fn measure_divergence(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let velocity = state
         .elements()
         .planes(&io.before, buffers::FACE_VELOCITY)?;
-    let twin = state.waters().divergence(state.system(), &velocity);
+    let reference = state.waters().divergence(state.system(), &velocity);
     let found = io.after.one(solved::STATS)?.divergence_after;
-    state.add_noted(io.table, &AFTER, found, [&twin, &state.flow(&velocity)]);
+    state.add_noted(
+        io.table,
+        &AFTER,
+        found,
+        [&reference, &state.flow(&velocity)],
+    );
     Ok(())
 }
 
@@ -411,13 +421,18 @@ fn displace(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let terms = state.terms(&io.after)?;
     let (errors, x) = (state.difference_errors(&terms), sum(&terms));
     let waters = state.waters();
-    let twin = waters.displace(&waters.by_element(state.system(), &x));
+    let reference = waters.displace(&waters.by_element(state.system(), &x));
     let found = state
         .elements()
         .planes(&io.after, solved::FACE_DISPLACEMENT)?;
     io.table
         .each(&DISPLACEMENT, state.elements().active(), |e| {
-            pair(e, found[e], twin[e], [errors[e], twin[e].length()])
+            pair(
+                e,
+                found[e],
+                reference[e],
+                [errors[e], reference[e].length()],
+            )
         });
     let mut b = state.by_row(&io.after, solved::RHS)?;
     remove_means(&mut b, &state.system().pockets());

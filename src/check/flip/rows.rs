@@ -319,11 +319,11 @@ entries! {
     }
     "flip/advect" {
         MOVED = "position", "m":
-            [answer: "what the twin answers when its start moves along each axis by " START,
+            [answer: "what the reference answers when its start moves along each axis by " START,
             x: "|x|, and where a period carried it that four times"]
             answer + U * x, "";
         ADVECTED = "velocity", "m/s":
-            [answer: "what the twin answers when its start moves along each axis by " START,
+            [answer: "what the reference answers when its start moves along each axis by " START,
             size: "|v|, with solids |v| that came in and theirs too"]
             answer + 8.0 * U * size, "";
         SLOWED = "particles slowed", "": [answer: "how many more or fewer as starts move by " START]

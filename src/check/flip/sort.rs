@@ -9,7 +9,9 @@ use crate::{
 };
 use swell_domain::bricks::CELLS;
 use swell_gpu::buffer::Buf;
-use swell_reference::flip::{Cloud, Sorted, assign_cells as twin_cells, survey as twin_survey};
+use swell_reference::flip::{
+    Cloud, Sorted, assign_cells as reference_cells, survey as reference_survey,
+};
 use swell_scene::flip::Transfer;
 use swell_solve::{SolveError, flip::buffers, trace::Begun};
 
@@ -50,12 +52,14 @@ impl FlipState {
 }
 
 pub(super) fn survey(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
-    let twin = twin_survey(&state.model, &state.unsorted(&io.after)?);
-    let found = io.after.get(buffers::SURVEY_IS_WET, twin.is_wet.len())?;
+    let reference = reference_survey(&state.model, &state.unsorted(&io.after)?);
+    let found = io
+        .after
+        .get(buffers::SURVEY_IS_WET, reference.is_wet.len())?;
     let fastest = f64::from(io.after.one(buffers::SURVEY)?.speed_square);
-    let exact = twin.speed * twin.speed;
+    let exact = reference.speed * reference.speed;
     io.table.add(&SPEED, [pair(0, fastest, exact, [exact])]);
-    let is_wet: Vec<u32> = twin.is_wet.iter().map(|&wet| u32::from(wet)).collect();
+    let is_wet: Vec<u32> = reference.is_wet.iter().map(|&wet| u32::from(wet)).collect();
     io.table.add_exact(&WET, &found, &is_wet);
     // The device's substep follows from its own findings.
     let Begun {
@@ -94,9 +98,9 @@ pub(super) fn assign_cells(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let (n, elements) = (state.n, state.elements());
     let positions = io.before.vectors(buffers::POSITION, n)?;
     let cell_of = io.after.get(buffers::CELL_OF, n)?;
-    let twin = twin_cells(&state.model, &elements.bricks, &positions);
+    let reference = reference_cells(&state.model, &elements.bricks, &positions);
     let size = state.model.cell_size();
-    check_cells(&CELL, &positions, size, &cell_of, &twin, io.table);
+    check_cells(&CELL, &positions, size, &cell_of, &reference, io.table);
     let slot = io.after.get(buffers::SLOT_IN_CELL, n)?;
     let counts = io.after.get(buffers::CELL_START, elements.wet().end)?;
     check_slots([&COUNTS, &SLOTS], &cell_of, &slot, &counts, io.table);

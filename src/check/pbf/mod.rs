@@ -30,7 +30,7 @@ use swell_solve::{
 
 use super::{
     Checked, effects,
-    engine::{Engine, Io, NONE, Outcome, State, Twin, View, names, twin, wide},
+    engine::{Comparison, Engine, Io, NONE, Outcome, State, View, comparison, names, wide},
     flip::FlipState,
     table::{Table, pair},
 };
@@ -39,22 +39,22 @@ use rows::{SAMPLES, WEIGHTS};
 use whole::Whole;
 
 /// Comparisons of PBF's own passes.
-const TWINS: &[Twin<PbfState>] = &[
-    twin("pbf/predict", || names![buffers::VELOCITY], passes::predict),
-    twin("pbf/assign_cells", NONE, passes::assign_cells),
-    twin("pbf/reorder", NONE, passes::reorder),
-    twin("pbf/build_neighbors", NONE, lists::build_neighbors),
-    twin(
+const COMPARISONS: &[Comparison<PbfState>] = &[
+    comparison("pbf/predict", || names![buffers::VELOCITY], passes::predict),
+    comparison("pbf/assign_cells", NONE, passes::assign_cells),
+    comparison("pbf/reorder", NONE, passes::reorder),
+    comparison("pbf/build_neighbors", NONE, lists::build_neighbors),
+    comparison(
         "pbf/compute_lambda",
         || names![buffers::PREDICTED, buffers::PREDICTED_HIGH],
         passes::compute_lambda,
     ),
-    twin(
+    comparison(
         "pbf/compute_delta",
         || names![buffers::CORRECTED, buffers::WALL_WORK],
         passes::compute_delta,
     ),
-    twin(
+    comparison(
         "pbf/exchange",
         || {
             names![
@@ -65,13 +65,13 @@ const TWINS: &[Twin<PbfState>] = &[
         },
         passes::exchange,
     ),
-    twin("pbf/sum_error", NONE, stop::sum_error),
-    twin(
+    comparison("pbf/sum_error", NONE, stop::sum_error),
+    comparison(
         "pbf/decide",
         || names![buffers::CONTROL, buffers::COUNTERS],
         stop::decide,
     ),
-    twin(
+    comparison(
         "pbf/update_velocity",
         || {
             names![
@@ -82,8 +82,8 @@ const TWINS: &[Twin<PbfState>] = &[
         },
         passes::update_velocity,
     ),
-    twin("pbf/measure_density", NONE, passes::measure_density),
-    twin(
+    comparison("pbf/measure_density", NONE, passes::measure_density),
+    comparison(
         "pbf/boundary_work",
         || names![buffers::BOUNDARY_WORK],
         work::boundary_work,
@@ -165,8 +165,8 @@ pub(super) struct PbfState {
 }
 
 impl State for PbfState {
-    fn twins() -> Vec<&'static [Twin<Self>]> {
-        [&[TWINS][..], &effects::pbf()].concat()
+    fn comparisons() -> Vec<&'static [Comparison<Self>]> {
+        [&[COMPARISONS][..], &effects::pbf()].concat()
     }
 
     fn particles(&self) -> usize {

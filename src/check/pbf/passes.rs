@@ -170,7 +170,7 @@ pub(super) fn compute_lambda(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     }
     let n = state.particles();
     let phase = io.before.window(&buffers::PHASES)?;
-    let (points, mut twin) = state.stored(io)?;
+    let (points, mut reference) = state.stored(io)?;
     let neighbors = state.visited(io, &points)?;
     if !state.whole.has_start() {
         let near = state.listed(&points);
@@ -178,14 +178,14 @@ pub(super) fn compute_lambda(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     }
     let inputs = state.inputs(&points, &neighbors);
     let mut dense = vec![0.0; n];
-    passes::compute_lambda(inputs, Colour::All, &mut twin, &mut dense);
+    passes::compute_lambda(inputs, Colour::All, &mut reference, &mut dense);
     let bounds = Bounds(inputs);
     let found = state.places(&io.after, n)?.1;
     let handled = handled(&phase);
     io.table.each(&OF_LAMBDA, 0..handled.len(), |k| {
         let i = handled[k];
-        let error = bounds.lambda(i, &passes::row(inputs, i), twin[i]);
-        pair(i, found[i], twin[i], [error])
+        let error = bounds.lambda(i, &passes::row(inputs, i), reference[i]);
+        pair(i, found[i], reference[i], [error])
     });
     if control.is_some() {
         let density = io.after.get(buffers::DENSITY, n)?;
@@ -211,7 +211,7 @@ pub(super) fn compute_delta(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     let momentum = is_chebyshev.then_some(Momentum { factor, before });
     let inputs = state.inputs(&points, &neighbors);
     let plain = passes::compute_delta(inputs, Colour::All, None, &lambda);
-    let twin = match momentum {
+    let reference = match momentum {
         Some(_) => passes::compute_delta(inputs, Colour::All, momentum, &lambda),
         None => plain.clone(),
     };
@@ -233,7 +233,7 @@ pub(super) fn compute_delta(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
             .any(|way| way.length_squared() < 2e-12 * h * h);
         // The bound starts from the correction before walls and solids push, because these deflect
         // its error.
-        let to = twin[i].free;
+        let to = reference[i].free;
         let step = STEP.of([bounds.delta(i, &lambda), (to - points[i]).length()]);
         let last = match momentum {
             Some(_) => points[i] - before[i],
@@ -248,10 +248,10 @@ pub(super) fn compute_delta(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
         let x = points[i].length();
         let error = CORRECTED.of([MOMENTUM.of([factor, step, last.length()]), x]);
         let confined = bounds.confine(to, error);
-        let moved = pair(i, moved[i], twin[i].position, confined.magnitudes);
+        let moved = pair(i, moved[i], reference[i].position, confined.magnitudes);
         let work = works.as_ref().map(|[before, after]| {
             let [before, after] = [before, after].map(|work| f64::from(work[i]));
-            let added = twin[i].work;
+            let added = reference[i].work;
             let error = WORKED.of([factor, step, confined.push_error, x]);
             let sums = before.abs() + after.abs();
             let magnitudes = [
@@ -377,11 +377,16 @@ pub(super) fn measure_density(state: &mut PbfState, io: &mut Io<'_>) -> Outcome 
     points.extend(&state.model.samples);
     let neighbors = state.search(&points);
     let inputs = state.inputs(&points, &neighbors);
-    let twin = passes::measure_density(inputs);
+    let reference = passes::measure_density(inputs);
     let density = io.after.get(buffers::DENSITY, n)?;
     let bounds = Bounds(inputs);
     io.table.each(&MEASURED, 0..n, |i| {
-        pair(i, density[i], twin[i], [bounds.density(i, twin[i])])
+        pair(
+            i,
+            density[i],
+            reference[i],
+            [bounds.density(i, reference[i])],
+        )
     });
     Ok(())
 }

@@ -21,13 +21,13 @@ bounds! {
     pub(super) REACH = [error: "the position's error before walls and solids push", grid: "" GRID]
         error + grid, "";
     pub(super) PUSHED = [error: "the position's error before walls and solids push",
-        pushed: "near solids what the f64 twin's push answers when its input \
+        pushed: "near solids what the f64 reference's push answers when its input \
                  moves along each axis by " REACH,
         place: "by how much f32 misplaces a wall", x: "near solids |x|"]
         pushed.max(error) + (place + U * x), "";
     pub(super) OF_SOLIDS =
-        [answer: "near solids that move what the f64 twin's work of them answers when its input \
-                  moves along each axis by " REACH,
+        [answer: "near solids that move, change of the f64 reference's work of them when its \
+                  input moves along each axis by " REACH,
         work: "|their work|", push: "what they push", speed: "the fastest solid's"]
         answer + U * (16.0 * work + 60.0 * push * speed),
         "their velocity where they push has the rounding of that place";
@@ -79,7 +79,7 @@ entries! {
     }
     "pbf/predict" {
         PREDICT_POSITION = "predicted position", "m": [error: "" WAY,
-            moved: "near solids what the f64 twin answers when its input \
+            moved: "near solids what the f64 reference answers when its input \
                     moves along each axis by " REACH,
             place: "where a wall pushes, by how much f32 misplaces it",
             x: "where a solid pushes |x|, and four periods where one carries it"]
@@ -115,7 +115,7 @@ entries! {
     }
     "pbf/compute_delta" {
         OF_DELTA = "corrected position", "m": [error: "" CORRECTED,
-            moved: "near solids what the f64 twin answers when its input \
+            moved: "near solids what the f64 reference answers when its input \
                     moves along each axis by " REACH,
             place: "where a wall pushes, by how much f32 misplaces it",
             x: "where a solid pushes |x|"]

@@ -6,7 +6,8 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::{
-    super::bounds::Bounds, Emitter, ON_FACE, Promise, Shape, Solids, Sources, flow, places, swept,
+    super::bounds::Bounds, Emitter, ON_FACE, PredictedInflow, Shape, Solids, Sources, flow, places,
+    swept,
 };
 
 /// Samples per spacing of a position's path through the volume.
@@ -93,7 +94,7 @@ impl<'a> Flow<'a> {
     }
 
     /// Flow rate where the solids stay where they are.
-    pub(super) fn promise(&self) -> Promise {
+    pub(super) fn promise(&self) -> PredictedInflow {
         let layers = if self.is_aligned() { 1.0 } else { COUNTED };
         let end = self.duration(layers);
         let entering: Vec<_> = self
@@ -109,7 +110,7 @@ impl<'a> Flow<'a> {
         let part = |of: f64| if of > 0.0 { open / of } else { 1.0 };
         let bounds = &self.emitter.shape.bounds;
         let is_box = self.emitter.shape.mesh.is_none();
-        Promise {
+        PredictedInflow {
             rate: self.rate() * part(entering.len() as f64),
             asked: is_box.then(|| swept(bounds.size(), self.emitter.velocity)),
             open: part(entering.len() as f64),

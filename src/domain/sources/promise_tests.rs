@@ -16,7 +16,7 @@ fn a_promise_holds_for_oblique_flows() {
             let mut emitter = nozzle(DVec3::from(velocity));
             emitter.shape = block([0.0; 3], size);
             let sources = with(vec![emitter], Vec::new());
-            let [Some(promise)] = sources.promises(None)[..] else {
+            let [Some(promise)] = sources.predicted_inflows(None)[..] else {
                 panic!("one flow");
             };
             let frames = 1000;

@@ -368,7 +368,7 @@ fn water_that_a_solid_covers_enters_where_it_comes_out() {
         assert!((58..=59).contains(&layers), "{layers} layers");
         assert!(is_clear(&particles, &wall));
         assert!(exchanges.iter().all(|exchange| exchange.blocked == 0));
-        let [Some(promise)] = sources.promises(Some(&wall))[..] else {
+        let [Some(promise)] = sources.predicted_inflows(Some(&wall))[..] else {
             panic!("one flow");
         };
         assert!((promise.rate - 2.0 * 0.06).abs() < 1e-12 && promise.covered == 0.0);
@@ -424,7 +424,7 @@ fn water_that_never_comes_out_is_counted() {
     let (particles, _, exchanges) = meeting(&sources, &Solids::still(Some(&beam)), 75);
     assert_eq!(particles.len(), 240);
     assert!(is_clear(&particles, &beam));
-    let [Some(promise)] = sources.promises(Some(&beam))[..] else {
+    let [Some(promise)] = sources.predicted_inflows(Some(&beam))[..] else {
         panic!("one flow");
     };
     assert!((promise.covered - 1.0 / 3.0).abs() < 1e-12, "{promise:?}");
@@ -441,7 +441,7 @@ fn a_solid_flush_with_the_room_covers_it() {
         let beam = solid(&[bounds([from, -0.5, -0.5], [0.6, 0.1, 0.8])]);
         let sources = with(vec![nozzle(DVec3::new(2.0, 0.0, 0.0))], Vec::new());
         let (particles, _, exchanges) = meeting(&sources, &Solids::still(Some(&beam)), 75);
-        let [Some(promise)] = sources.promises(Some(&beam))[..] else {
+        let [Some(promise)] = sources.predicted_inflows(Some(&beam))[..] else {
             panic!("one flow");
         };
         let blocked: u64 = exchanges.iter().map(|exchange| exchange.blocked).sum();
@@ -545,7 +545,7 @@ fn a_mesh_is_promised_by_its_own_cross_section() {
         ..nozzle(DVec3::new(1.0, 0.0, 0.0))
     };
     let sources = with(vec![emitter], Vec::new());
-    let [Some(promise)] = sources.promises(None)[..] else {
+    let [Some(promise)] = sources.predicted_inflows(None)[..] else {
         panic!("one flow");
     };
     assert_eq!(promise.covered, 0.0);
@@ -563,7 +563,7 @@ fn a_mesh_is_promised_by_its_own_cross_section() {
 fn the_slowest_flow_promises_next_to_nothing() {
     for speed in [1e-12, 1e-200, f64::MIN_POSITIVE, 5e-324] {
         let sources = with(vec![nozzle(DVec3::new(speed, 0.0, 0.0))], Vec::new());
-        let [Some(promise)] = sources.promises(None)[..] else {
+        let [Some(promise)] = sources.predicted_inflows(None)[..] else {
             panic!("one flow");
         };
         assert!(

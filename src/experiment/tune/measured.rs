@@ -1,4 +1,4 @@
-//! Runs a variant of the scene (twin) and measures its difference from another.
+//! Runs a variant of the scene (variant) and measures its difference from another.
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
@@ -8,7 +8,7 @@ use swell_scene::{
     Scene,
     study::{
         RunsOn,
-        tune::{Quantity, Tune, Twin},
+        tune::{Quantity, Tune, Variant},
     },
 };
 use swell_stage::{
@@ -106,8 +106,8 @@ impl Measured {
 }
 
 /// Number of runs of a variant.
-pub(super) fn repeats(tune: &Tune, twin: &Twin) -> u32 {
-    match twin.spacing() >= tune.ladder[0].spacing() {
+pub(super) fn repeats(tune: &Tune, variant: &Variant) -> u32 {
+    match variant.spacing() >= tune.ladder[0].spacing() {
         true => tune.request.repeats.max(COARSE_REPEATS),
         false => tune.request.repeats,
     }
@@ -123,10 +123,10 @@ pub(super) fn stride(frames: u32) -> u32 {
 pub(super) fn measure(
     bench: &Bench<'_>,
     tune: &Tune,
-    twin: &Twin,
+    variant: &Variant,
     gauge: &Gauge,
 ) -> Result<Run, StudyError> {
-    let scene = &twin.scene;
+    let scene = &variant.scene;
     let start = Start::of(scene)?;
     let mut drive = Drive::new(bench.devices.of(RunsOn::Gpu), scene, &start, false)?;
     if tune.has_pressure() {
@@ -138,7 +138,7 @@ pub(super) fn measure(
         frames: tune.frames,
         ..Run::default()
     };
-    for repeat in 0..repeats(tune, twin) {
+    for repeat in 0..repeats(tune, variant) {
         drive.load(0, &start.particles)?;
         let mut seconds = 0.0;
         until_done(&mut drive, tune.frames, bench.stop, |step| {

@@ -1,5 +1,5 @@
 //! Finds the cheapest settings of a shot that keep errors within limits: runs variants of the scene
-//! (twins), fits models of error and time, runs what these propose, and writes the cheapest run
+//! (variants), fits models of error and time, runs what these propose, and writes the cheapest run
 //! within the limits as a scene.
 
 mod measured;
@@ -15,7 +15,7 @@ use swell_scene::{
     physics_hash,
     study::{
         RunsOn,
-        tune::{Bound, Knob, Limit, Setting, Tune, Twin},
+        tune::{Bound, Knob, Limit, Setting, Tune, Variant},
     },
 };
 use swell_stage::{gauge, prepare::Start};
@@ -46,7 +46,7 @@ enum Role {
     /// The scene's own settings at another spacing.
     Spacing,
     /// Noise-floor run: the same settings with a millionth more gravity.
-    Shaken,
+    NoiseFloor,
     /// The coarsest spacing with the reference's other settings.
     Fine,
     /// Index of a setting, and index of a value among its alternatives.
@@ -60,7 +60,7 @@ enum Role {
 impl Role {
     /// Whether its settings may be chosen.
     fn is_candidate(self) -> bool {
-        !matches!(self, Self::Shaken | Self::Reference)
+        !matches!(self, Self::NoiseFloor | Self::Reference)
     }
 }
 
@@ -68,7 +68,7 @@ impl Role {
 struct Trial<'a> {
     role: Role,
     why: &'static str,
-    twin: Cow<'a, Twin>,
+    variant: Cow<'a, Variant>,
     run: Run,
     /// Prediction of the models, where it was made before the run.
     predicted: Option<Proposal>,
@@ -90,17 +90,20 @@ struct Results<'a> {
 
 impl Kind for Tune {
     fn needs(&self) -> Option<Needs> {
-        needs_of(self.twins().map(|(_, twin)| (&twin.scene, RunsOn::Gpu)))
+        needs_of(
+            self.variants()
+                .map(|(_, variant)| (&variant.scene, RunsOn::Gpu)),
+        )
     }
 
     fn count(&self) -> usize {
-        self.twins().count()
+        self.variants().count()
     }
 
     /// Runs that are known in advance, the coarsest first; proposals are only run by the whole
     /// study.
     fn places(&self) -> Option<Vec<Place>> {
-        Some((0..self.twins().count()).map(Place::of).collect())
+        Some((0..self.variants().count()).map(Place::of).collect())
     }
 
     fn run(&self, bench: &mut Bench<'_>) -> Result<Option<Report>, StudyError> {
@@ -144,10 +147,10 @@ fn reference<'t>(trials: &'t [Trial<'_>]) -> Result<&'t Measured, StudyError> {
                 },
             ..
         }) => Ok(measured),
-        Some(Trial { twin, run, .. }) => Err(StudyError::Point(format!(
+        Some(Trial { variant, run, .. }) => Err(StudyError::Point(format!(
             "the run that the others are held against ({}) fails: {}; a greater \
              --reference is a coarser one",
-            twin.name(),
+            variant.name(),
             run.ended.as_deref().unwrap_or_default()
         ))),
         None => Err(StudyError::Stopped),
@@ -184,7 +187,9 @@ fn untold(name: &str) -> StudyError {
 /// Gauge for all runs; its cubes are those of the coarsest lattice.
 fn gauge_of(tune: &Tune) -> Result<Gauge, StudyError> {
     let scene = &tune.reference.scene;
-    let spacings = tune.twins().map(|(_, twin)| twin.scene.particle_spacing());
+    let spacings = tune
+        .variants()
+        .map(|(_, variant)| variant.scene.particle_spacing());
     let coarsest = spacings.fold(0.0, f64::max);
     let start = Start::of(scene)?.particles.position;
     let spacing = scene.particle_spacing();
@@ -204,17 +209,17 @@ impl<'a> Lab<'a> {
     fn known(&mut self, bench: &mut Bench<'_>) -> Result<Vec<Trial<'a>>, StudyError> {
         let tune = self.tune;
         let mut roles = vec![Role::Spacing; tune.ladder.len()];
-        roles.extend([Role::Shaken, Role::Fine]);
+        roles.extend([Role::NoiseFloor, Role::Fine]);
         for (k, knob) in tune.knobs.iter().enumerate() {
             roles.extend((0..knob.others.len()).map(|value| Role::Knob(k, value)));
         }
         roles.push(Role::Reference);
         let mut trials = Vec::new();
-        for (role, (why, twin)) in roles.into_iter().zip(tune.twins()) {
+        for (role, (why, variant)) in roles.into_iter().zip(tune.variants()) {
             if !bench.is_next_ours() {
                 continue;
             }
-            let Some(run) = self.run(bench, why, twin)? else {
+            let Some(run) = self.run(bench, why, variant)? else {
                 continue;
             };
             if let (true, None) = (trials.is_empty(), &run.ended) {
@@ -223,7 +228,7 @@ impl<'a> Lab<'a> {
             trials.push(Trial {
                 role,
                 why,
-                twin: Cow::Borrowed(twin),
+                variant: Cow::Borrowed(variant),
                 run,
                 predicted: None,
             });
@@ -245,20 +250,20 @@ impl<'a> Lab<'a> {
         &mut self,
         bench: &mut Bench<'_>,
         why: &str,
-        twin: &Twin,
+        variant: &Variant,
     ) -> Result<Option<Run>, StudyError> {
         let tune = self.tune;
         let measured = format!(
             "tune {} {:?} {:?}",
-            repeats(tune, twin),
+            repeats(tune, variant),
             self.gauge,
-            tune.has_pressure().then(|| twin.scene.pressure_points()),
+            tune.has_pressure().then(|| variant.scene.pressure_points()),
         );
-        let runs = [(&twin.scene, RunsOn::Gpu)];
+        let runs = [(&variant.scene, RunsOn::Gpu)];
         let key = bench.devices.key(&runs, tune.frames, &measured);
-        let name = format!("{why}: {}", twin.name());
+        let name = format!("{why}: {}", variant.name());
         let gauge = &self.gauge;
-        let measure = || measure(bench, tune, twin, gauge);
+        let measure = || measure(bench, tune, variant, gauge);
         let Some((run, stood)) = bench.point(&mut self.ledger, &name, key, measure)? else {
             return Ok(None);
         };
@@ -286,15 +291,15 @@ impl<'a> Lab<'a> {
                 break;
             };
             let settings = fitted.settings(&proposal.values);
-            let twin = self.tune.twin(proposal.spacing, &settings)?;
-            let hash = physics_hash(&twin.scene);
+            let variant = self.tune.variant(proposal.spacing, &settings)?;
+            let hash = physics_hash(&variant.scene);
             let mut known = results.trials.iter();
-            if known.any(|trial| physics_hash(&trial.twin.scene) == hash) {
+            if known.any(|trial| physics_hash(&trial.variant.scene) == hash) {
                 break;
             }
             bench.count += 1;
-            if let Some(run) = self.run(bench, "proposal", &twin)? {
-                results.take(twin, run, proposal);
+            if let Some(run) = self.run(bench, "proposal", &variant)? {
+                results.take(variant, run, proposal);
             }
         }
         Ok(())
@@ -350,7 +355,7 @@ impl<'a> Results<'a> {
     }
 
     /// Adds the run of a proposal and corrects the models by it.
-    fn take(&mut self, twin: Twin, run: Run, predicted: Proposal) {
+    fn take(&mut self, variant: Variant, run: Run, predicted: Proposal) {
         let errors = self.errors(&run);
         if let Some(fitted) = &mut self.fitted {
             fitted.correct(&errors, run.per_frame()[1], &predicted);
@@ -358,7 +363,7 @@ impl<'a> Results<'a> {
         self.trials.push(Trial {
             role: Role::Proposal,
             why: "proposal",
-            twin: Cow::Owned(twin),
+            variant: Cow::Owned(variant),
             run,
             predicted: Some(predicted),
         });
@@ -371,16 +376,16 @@ impl<'a> Results<'a> {
         }
         let fitted = self.fitted.as_ref()?;
         let values = fitted.values(trial.role)?;
-        Some(fitted.first.predict(trial.twin.spacing(), &values))
+        Some(fitted.first.predict(trial.variant.spacing(), &values))
     }
 
     /// Settings of a trial, each with the scene's own value, in the order of the page.
     fn settings(&self, trial: &Trial<'_>) -> Vec<(Setting, String)> {
         let tune = self.tune;
         let own_spacing = tune.own_spacing();
-        let first = trial.twin.set[0].clone();
+        let first = trial.variant.set[0].clone();
         let of = |knob: &Knob| {
-            let mut set = trial.twin.set.iter();
+            let mut set = trial.variant.set.iter();
             let found = set.find(|setting| setting.key == knob.key).cloned();
             let own = Setting {
                 key: knob.key,

@@ -27,7 +27,7 @@ impl<'a> Fitted<'a> {
         let ladder: Vec<(f64, &Run)> = trials
             .iter()
             .filter(|t| t.role == Role::Spacing && t.run.ended.is_none())
-            .map(|t| (t.twin.spacing(), &t.run))
+            .map(|t| (t.variant.spacing(), &t.run))
             .collect();
         let [(coarsest, _), .., (finest, _)] = ladder[..] else {
             return None;
@@ -48,9 +48,11 @@ impl<'a> Fitted<'a> {
             .map(|(d, run)| (*d, run.per_frame()[1]))
             .collect();
         let own = run(Role::Spacing).filter(|_| coarsest == tune.ladder[0].spacing());
-        let shaken = run(Role::Shaken);
-        let (settings, choices) = match (own, run(Role::Fine), shaken) {
-            (Some(own), Some(fine), Some(shaken)) => effects(tune, [own, fine, shaken], run),
+        let noise_floor = run(Role::NoiseFloor);
+        let (settings, choices) = match (own, run(Role::Fine), noise_floor) {
+            (Some(own), Some(fine), Some(noise_floor)) => {
+                effects(tune, [own, fine, noise_floor], run)
+            }
             _ => (Vec::new(), Vec::new()),
         };
         let model = Model {
@@ -127,10 +129,10 @@ type Choices<'a> = Vec<Vec<Option<Chosen<'a>>>>;
 
 /// Noise floor: difference of a run from one with a millionth more gravity, which no two bakes fall
 /// below.
-pub(super) fn floor(of: Quantity, own: &Run, shaken: &Run) -> Option<f64> {
+pub(super) fn floor(of: Quantity, own: &Run, noise_floor: &Run) -> Option<f64> {
     match of {
-        Quantity::Density => Some((own.measured.density - shaken.measured.density).abs()),
-        _ => own.measured.off(of, &shaken.measured),
+        Quantity::Density => Some((own.measured.density - noise_floor.measured.density).abs()),
+        _ => own.measured.off(of, &noise_floor.measured),
     }
 }
 
@@ -139,7 +141,7 @@ pub(super) fn floor(of: Quantity, own: &Run, shaken: &Run) -> Option<f64> {
 /// Differences within the noise floor count as none.
 fn effects<'a, 't>(
     tune: &'a Tune,
-    [own, fine, shaken]: [&Run; 3],
+    [own, fine, noise_floor]: [&Run; 3],
     run: impl Fn(Role) -> Option<&'t Run>,
 ) -> (Vec<Vec<Effect>>, Choices<'a>) {
     let limits = &tune.request.limits;
@@ -149,7 +151,7 @@ fn effects<'a, 't>(
             let of = limit.quantity;
             // Quantities without a value at this spacing count as unchanged.
             let added = off(other, of)? - off(own, of)?;
-            Some(added).filter(|added| added.abs() > floor(of, own, shaken).unwrap_or(0.0))
+            Some(added).filter(|added| added.abs() > floor(of, own, noise_floor).unwrap_or(0.0))
         });
         Effect {
             time: other.per_frame()[1] / own.per_frame()[1],
@@ -190,7 +192,7 @@ mod tests {
 
     use swell_scene::{
         Reach,
-        study::tune::{TuneRequest, Twin},
+        study::tune::{TuneRequest, Variant},
     };
 
     use super::{super::measured::Measured, *};
@@ -212,7 +214,7 @@ mod tests {
         Tune::load(request).expect("a shot")
     }
 
-    fn trial(role: Role, twin: &Twin, density: f64, seconds: f64) -> Trial<'_> {
+    fn trial(role: Role, variant: &Variant, density: f64, seconds: f64) -> Trial<'_> {
         let measured = Measured {
             density,
             ..Measured::default()
@@ -220,7 +222,7 @@ mod tests {
         Trial {
             role,
             why: "",
-            twin: Cow::Borrowed(twin),
+            variant: Cow::Borrowed(variant),
             run: Run {
                 frames: 1,
                 seconds: vec![seconds],
@@ -234,15 +236,16 @@ mod tests {
     /// Density errors of d / 10, times of 1e-5 d⁻⁴, and a noise floor of 1e-4. CFL 2 adds twice
     /// that; CFL ½ subtracts half of it, which is within the noise.
     fn trials(tune: &Tune) -> Vec<Trial<'_>> {
-        let of = |twin: &Twin| (0.1 * twin.spacing(), 1e-5 * twin.spacing().powi(-4));
+        let of = |variant: &Variant| (0.1 * variant.spacing(), 1e-5 * variant.spacing().powi(-4));
         let mut trials: Vec<_> = tune
             .ladder
             .iter()
-            .map(|twin| trial(Role::Spacing, twin, of(twin).0, of(twin).1))
+            .map(|variant| trial(Role::Spacing, variant, of(variant).0, of(variant).1))
             .collect();
         let (density, seconds) = of(&tune.ladder[0]);
-        let at = |role, twin, added, times| trial(role, twin, density + added, times * seconds);
-        trials.push(at(Role::Shaken, &tune.shaken, 1e-4, 1.0));
+        let at =
+            |role, variant, added, times| trial(role, variant, density + added, times * seconds);
+        trials.push(at(Role::NoiseFloor, &tune.noise_floor, 1e-4, 1.0));
         trials.push(at(Role::Fine, &tune.fine, -1e-3, 4.0));
         let cfl = &tune.knobs[0].others;
         trials.push(at(Role::Knob(0, 0), &cfl[0].1, 2e-4, 0.5));

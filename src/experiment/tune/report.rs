@@ -122,7 +122,7 @@ impl Results<'_> {
     fn failures(&self) -> Vec<String> {
         let failed = self.trials.iter().filter_map(|trial| {
             let message = trial.run.ended.as_ref()?;
-            Some(format!("failed: {}: {message}", trial.twin.name()))
+            Some(format!("failed: {}: {message}", trial.variant.name()))
         });
         failed.collect()
     }
@@ -144,7 +144,7 @@ impl Results<'_> {
 
     fn row(&self, trial: &Trial<'_>) -> Vec<String> {
         let (run, limits) = (&trial.run, &self.tune.request.limits);
-        let mut row = vec![trial.twin.name(), trial.why.to_owned()];
+        let mut row = vec![trial.variant.name(), trial.why.to_owned()];
         if let Some(message) = &run.ended {
             row.resize(9 + 2 * limits.len() + 1, String::new());
             row.push(message.clone());
@@ -191,7 +191,7 @@ impl Results<'_> {
         let mut run = what_was_run(bench.request);
         run.push(Part::Text(format!(
             "On {device}, by {} {}. Times are wall clock, in the program, without files: the \
-             median of {} of each twin, of three at least at the coarsest spacing, after one \
+             median of {} of each variant, of three at least at the coarsest spacing, after one \
              frame that does not count.",
             swell_domain::PROGRAM,
             swell_domain::VERSION,
@@ -257,7 +257,7 @@ impl Results<'_> {
 
 /// Label that distinguishes a run from the others of its curve.
 fn label(trial: &Trial<'_>) -> String {
-    let set = &trial.twin.set;
+    let set = &trial.variant.set;
     match trial.role {
         Role::Knob(..) => set[1].value.trim_matches('"').to_owned(),
         Role::Proposal => {

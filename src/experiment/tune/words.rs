@@ -83,7 +83,7 @@ impl Results<'_> {
         };
         let trial = &self.trials[place];
         let runs = self.candidates().len();
-        let (name, time, off) = (trial.twin.name(), self.time(trial), self.off(trial));
+        let (name, time, off) = (trial.variant.name(), self.time(trial), self.off(trial));
         match holds {
             true => format!("{name}: {time}; {off}: the cheapest of {runs} runs that holds."),
             false => format!(
@@ -101,7 +101,7 @@ impl Results<'_> {
             .trials
             .iter()
             .filter(|t| t.role == super::Role::Spacing);
-        let own = ladder.find(|t| t.twin.set[0].value == own && t.run.ended.is_none())?;
+        let own = ladder.find(|t| t.variant.set[0].value == own && t.run.ended.is_none())?;
         let ratio = chosen.run.per_frame()[1] / own.run.per_frame()[1];
         Some(format!(
             "The scene as it stands: {}; {}. The chosen settings take {} of its time.",
@@ -117,7 +117,7 @@ impl Results<'_> {
         let (place, true) = self.choice? else {
             return None;
         };
-        let is_coarsest = self.trials[place].twin.spacing() >= self.tune.ladder[0].spacing();
+        let is_coarsest = self.trials[place].variant.spacing() >= self.tune.ladder[0].spacing();
         is_coarsest.then(|| {
             "It is the coarsest that was run: a greater --reference looks at coarser ones."
                 .to_owned()
@@ -156,18 +156,19 @@ impl Results<'_> {
             let mut found = self.trials.iter().filter(move |t| t.role == role);
             found.next().filter(|t| t.run.ended.is_none())
         };
-        let (Some(own), Some(shaken)) = (run(super::Role::Spacing), run(super::Role::Shaken))
+        let (Some(own), Some(noise_floor)) =
+            (run(super::Role::Spacing), run(super::Role::NoiseFloor))
         else {
             return Vec::new();
         };
         let limits = self.tune.request.limits.iter().zip(&self.limits.errors);
         let of = |(limit, allowed): (&Limit, &f64)| {
-            let floor = floor(limit.quantity, &own.run, &shaken.run)?;
+            let floor = floor(limit.quantity, &own.run, &noise_floor.run)?;
             let name = limit.quantity.name();
             let what = format!(
                 "{name}: a millionth more gravity changes it by {} at {}",
                 self.told(limit, floor),
-                own.twin.name()
+                own.variant.name()
             );
             Some(if floor > *allowed {
                 format!("{what}, more than {limit}: no settings can promise that.")
@@ -268,7 +269,7 @@ impl Results<'_> {
         let at = self.tune.ladder[0].spacing();
         match tried.is_empty() {
             true => format!("tune: {was}; nothing else was tried"),
-            false => format!("tune: {was}; on twins of {at} m: {}", tried.join("; ")),
+            false => format!("tune: {was}; on variants of {at} m: {}", tried.join("; ")),
         }
     }
 

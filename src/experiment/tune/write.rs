@@ -52,12 +52,12 @@ pub(super) fn write(results: &Results<'_>, command: &str) -> Result<Option<PathB
     // Parses the text again to verify that it describes the scene that was run.
     let folder = file.parent().unwrap_or(Path::new(""));
     let read = Scene::parse_within(&text, file, folder, &[], tune.request.reach);
-    let is_it = |scene: &Scene| physics_hash(scene) == physics_hash(&trial.twin.scene);
+    let is_it = |scene: &Scene| physics_hash(scene) == physics_hash(&trial.variant.scene);
     if !read.as_ref().is_ok_and(is_it) {
         let why = read.err().map_or(String::new(), |e| format!(": {e}"));
         return Err(unfit(format!(
             "these settings cannot be written into the scene{why}; run it with {}",
-            trial.twin.name()
+            trial.variant.name()
         )));
     }
     fs::write(file, text).map_err(|e| fault(file, e))?;
@@ -94,7 +94,7 @@ fn settings(results: &Results<'_>, trial: &Trial<'_>) -> Vec<Setting> {
         });
     let chosen: Vec<Setting> = chosen.collect();
     let is_new = |key: &str| chosen.iter().all(|it| it.key != key);
-    let set = trial.twin.set.iter().filter(|it| is_new(it.key));
+    let set = trial.variant.set.iter().filter(|it| is_new(it.key));
     let with_others = set.map(|it| Setting {
         key: it.key.into(),
         value: it.value.clone(),

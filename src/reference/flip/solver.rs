@@ -19,7 +19,7 @@ use swell_domain::{
     gauge::Gauge,
     particles::Particles,
     poisson::FLUID,
-    solver::{PassTime, Projection, Seen, Solver, Span, StepReport, Watch},
+    solver::{Observed, PassTime, Projection, Solver, Span, StepReport, Watch},
 };
 use swell_scene::{
     Scene,
@@ -333,8 +333,8 @@ impl Flip {
     }
 
     /// Copies the state of absorbing walls from `state`.
-    pub fn take_answers(&mut self, state: &Particles) {
-        self.model.scene.take_answers(state);
+    pub fn take_absorbers(&mut self, state: &Particles) {
+        self.model.scene.take_absorbers(state);
     }
 
     /// Projects the velocities of particles, given in the order of their ids, over a substep, and
@@ -460,7 +460,7 @@ impl Flip {
         if !wanted.is_any() {
             return Ok(());
         }
-        let mut seen = Seen::default();
+        let mut seen = Observed::default();
         if wanted.particles {
             seen.particles.id.clone_from(&self.state.id);
             seen.particles.position.clone_from(&self.state.position);
@@ -528,7 +528,7 @@ impl Solver for Flip {
     fn load(&mut self, frame: u32, particles: &Particles) -> Result<(), ReferenceError> {
         self.state = particles.clone();
         self.frame = frame;
-        self.take_answers(particles);
+        self.take_absorbers(particles);
         Ok(())
     }
 
@@ -556,7 +556,7 @@ impl Solver for Flip {
             return Err(Breach::not_finite(frame, count, Some(first)).into());
         }
         self.frame = frame;
-        self.model.scene.answer(&mut self.state, frame);
+        self.model.scene.update_absorbers(&mut self.state, frame);
         let report = StepReport {
             substeps: done.substeps,
             iterations: done.iterations,

@@ -18,7 +18,7 @@ use swell_domain::{
     particles::Particles,
     pbf::chebyshev_factors,
     probe::fitted,
-    solver::{PassTime, Projection, Seen, Solver, Span, StepReport, Watch},
+    solver::{Observed, PassTime, Projection, Solver, Span, StepReport, Watch},
 };
 use swell_scene::{Iteration, Scene, Stop, step::projected_substep};
 
@@ -350,7 +350,7 @@ impl Pbf {
         if !wanted.is_any() {
             return Ok(());
         }
-        let mut seen = Seen::default();
+        let mut seen = Observed::default();
         if wanted.particles {
             seen.particles.id.clone_from(&self.state.id);
             let [positions, velocities] = self.rounded(position, velocity);
@@ -392,7 +392,7 @@ impl Pbf {
     /// Passes the state of absorbing walls to the projection.
     fn tell_grid(&mut self) {
         if let Some(grid) = &mut self.grid {
-            grid.take_answers(&self.state);
+            grid.take_absorbers(&self.state);
         }
     }
 }
@@ -403,7 +403,7 @@ impl Solver for Pbf {
     fn load(&mut self, frame: u32, particles: &Particles) -> Result<(), ReferenceError> {
         self.state = particles.clone();
         self.frame = frame;
-        self.scene.take_answers(particles);
+        self.scene.take_absorbers(particles);
         self.tell_grid();
         Ok(())
     }
@@ -446,7 +446,7 @@ impl Solver for Pbf {
             return Err(Breach::not_finite(frame, count, Some(first)).into());
         }
         self.frame = frame;
-        self.scene.answer(&mut self.state, frame);
+        self.scene.update_absorbers(&mut self.state, frame);
         self.tell_grid();
         (self.position, self.step) = (position, step);
         let report = StepReport {

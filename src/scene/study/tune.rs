@@ -107,14 +107,14 @@ impl Setting {
 
 /// A run of the shot with some settings changed.
 #[derive(Clone, Debug)]
-pub struct Twin {
+pub struct Variant {
     /// Settings applied to the scene.
     pub set: Vec<Setting>,
     /// The scene with these settings.
     pub scene: Scene,
 }
 
-impl Twin {
+impl Variant {
     /// Returns the settings as they would be written in a scene.
     pub fn name(&self) -> String {
         let words = self.set.iter();
@@ -143,7 +143,7 @@ pub struct Knob {
     /// The scene's own value as TOML.
     pub own: String,
     /// Other values: the settings for each, and its run at the coarsest spacing.
-    pub others: Vec<(Vec<Setting>, Twin)>,
+    pub others: Vec<(Vec<Setting>, Variant)>,
 }
 
 /// A shot and the runs that tune it.
@@ -158,15 +158,15 @@ pub struct Tune {
     /// Number of frames of each run.
     pub frames: u32,
     /// Runs with the scene's own settings at other spacings, from coarse to fine; at least two.
-    pub ladder: Vec<Twin>,
+    pub ladder: Vec<Variant>,
     /// Run that the others are compared with: finer in every setting.
-    pub reference: Twin,
+    pub reference: Variant,
     /// Run at the coarsest spacing with the reference's other settings; it isolates the error of
     /// the settings from that of the spacing.
-    pub fine: Twin,
+    pub fine: Variant,
     /// Noise-floor run: the coarsest with a millionth more gravity. Its difference is one that no
     /// settings can undercut.
-    pub shaken: Twin,
+    pub noise_floor: Variant,
     /// Settings other than the spacing.
     pub knobs: Vec<Knob>,
     /// Descriptions of what is not tried.
@@ -194,8 +194,8 @@ impl Tune {
         let mut untried = Vec::new();
         let mut ladder = Vec::new();
         for factor in LADDER {
-            match twin(&request, vec![at(factor)]) {
-                Ok(twin) => ladder.push(twin),
+            match variant(&request, vec![at(factor)]) {
+                Ok(variant) => ladder.push(variant),
                 Err(error) => untried.push(format!("{key} = {}: {error}", at(factor).value)),
             }
         }
@@ -207,10 +207,10 @@ impl Tune {
         };
         let coarsest = coarsest.set.clone();
         let finer = finer(&scene);
-        let with = |set: &[Setting], more: &[Setting]| twin(&request, [set, more].concat());
+        let with = |set: &[Setting], more: &[Setting]| variant(&request, [set, more].concat());
         let reference = with(&[at(1.0)], &finer)?;
         let fine = with(&coarsest, &finer)?;
-        let shaken = Twin {
+        let noise_floor = Variant {
             scene: laid(&request, &coarsest, &[shake(&scene)])?,
             set: coarsest.clone(),
         };
@@ -222,7 +222,7 @@ impl Tune {
             ladder,
             reference,
             fine,
-            shaken,
+            noise_floor,
             knobs,
             untried,
             scene,
@@ -234,10 +234,10 @@ impl Tune {
     ///
     /// # Errors
     /// If the scene is invalid with them.
-    pub fn twin(&self, spacing: f64, more: &[Setting]) -> Result<Twin, SceneError> {
+    pub fn variant(&self, spacing: f64, more: &[Setting]) -> Result<Variant, SceneError> {
         let key = spacing_key(self.scene.solver.method);
         let first = Setting::number(key, spacing);
-        twin(&self.request, [&[first], more].concat())
+        variant(&self.request, [&[first], more].concat())
     }
 
     /// Returns the spacings in a range, metres, that fit the water as well as those of the ladder;
@@ -261,12 +261,13 @@ impl Tune {
     }
 
     /// Returns all runs known in advance, each with the setting that it is for.
-    pub fn twins(&self) -> impl Iterator<Item = (&'static str, &Twin)> {
-        let ladder = self.ladder.iter().map(|twin| ("spacing", twin));
+    pub fn variants(&self) -> impl Iterator<Item = (&'static str, &Variant)> {
+        let ladder = self.ladder.iter().map(|variant| ("spacing", variant));
         let knobs = self.knobs.iter();
-        let others = knobs.flat_map(|knob| knob.others.iter().map(|(_, twin)| (knob.key, twin)));
+        let others =
+            knobs.flat_map(|knob| knob.others.iter().map(|(_, variant)| (knob.key, variant)));
         let apart = [
-            ("a millionth more gravity", &self.shaken),
+            ("a millionth more gravity", &self.noise_floor),
             ("finer settings", &self.fine),
         ];
         let last = [("reference", &self.reference)];
@@ -351,9 +352,9 @@ fn laid(request: &TuneRequest, set: &[Setting], more: &[String]) -> Result<Scene
     Scene::load_within(&request.scene, &overrides, request.reach)
 }
 
-fn twin(request: &TuneRequest, set: Vec<Setting>) -> Result<Twin, SceneError> {
+fn variant(request: &TuneRequest, set: Vec<Setting>) -> Result<Variant, SceneError> {
     let scene = laid(request, &set, &[])?;
-    Ok(Twin { set, scene })
+    Ok(Variant { set, scene })
 }
 
 fn shake(scene: &Scene) -> String {
@@ -516,13 +517,13 @@ fn knobs(
         let key = settings[0][0].key;
         let mut others = Vec::new();
         for set in settings {
-            match twin(request, [coarsest, &set].concat()) {
+            match variant(request, [coarsest, &set].concat()) {
                 // For example, a CFL number that is already the largest.
-                Ok(twin)
+                Ok(variant)
                     if own
                         .as_ref()
-                        .is_ok_and(|own| *own == physics_hash(&twin.scene)) => {}
-                Ok(twin) => others.push((set, twin)),
+                        .is_ok_and(|own| *own == physics_hash(&variant.scene)) => {}
+                Ok(variant) => others.push((set, variant)),
                 Err(error) => untried.push(format!("{key} = {}: {error}", set[0].value)),
             }
         }

@@ -386,8 +386,8 @@ impl Flip {
     }
 
     /// Copies the state of absorbing walls from `state`.
-    pub(crate) fn take_answers(&mut self, state: &Particles) {
-        self.scene.take_answers(state);
+    pub(crate) fn take_absorbers(&mut self, state: &Particles) {
+        self.scene.take_absorbers(state);
     }
 
     /// Surveys the particles and chooses the next substep; also returns whether it is the frame's
@@ -472,7 +472,7 @@ impl Solver for Flip {
         }
         self.state = particles.clone();
         self.frame = frame;
-        self.scene.take_answers(particles);
+        self.scene.take_absorbers(particles);
         self.upload_state();
         Ok(())
     }
@@ -500,7 +500,7 @@ impl Solver for Flip {
         };
         let capped = self.field(COUNTERS, 1)?[0].capped;
         self.frame += 1;
-        self.scene.answer(&mut self.state, self.frame);
+        self.scene.update_absorbers(&mut self.state, self.frame);
         if self.scene.domain.min != DVec3::ZERO {
             // World positions in the frame are rounded: continue from the written values, as a
             // resumed bake does.

@@ -12,7 +12,7 @@ use swell_domain::{
     gauge::Gauge,
     poisson::FLUID,
     probe::Patch,
-    solver::{Seen, Span, Wanted, Watch},
+    solver::{Observed, Requested, Span, Watch},
 };
 
 impl Flip {
@@ -42,8 +42,8 @@ impl Flip {
         }
     }
 
-    fn seen(&self, wanted: &Wanted) -> Result<Seen, SolveError> {
-        let mut seen = Seen::default();
+    fn seen(&self, wanted: &Requested) -> Result<Observed, SolveError> {
+        let mut seen = Observed::default();
         if wanted.particles {
             seen.particles = look(&self.program, &self.scene, &self.state, self.frame + 1)?;
             seen.particles.substep = self.state.substep;

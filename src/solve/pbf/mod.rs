@@ -15,7 +15,7 @@ use swell_domain::{
     pbf::{CAP, CONTACT, MAX_CORRECTION, REGULARIZATION},
     period::Period,
     probe::fitted,
-    solver::{PassTime, Seen, Solver, Span as Substep, StepReport, Wanted, Watch},
+    solver::{Observed, PassTime, Requested, Solver, Span as Substep, StepReport, Watch},
     sph::Calibration,
     substep::Which,
 };
@@ -355,8 +355,8 @@ impl Pbf {
     }
 
     /// Reads the requested data of the last substep, which was `step` seconds long.
-    fn seen(&mut self, wanted: &Wanted, step: f64) -> Result<Seen, SolveError> {
-        let mut seen = Seen::default();
+    fn seen(&mut self, wanted: &Requested, step: f64) -> Result<Observed, SolveError> {
+        let mut seen = Observed::default();
         if wanted.particles {
             seen.particles = look(&self.program, &self.scene, &self.state, self.frame + 1)?;
             seen.particles.substep = step;
@@ -408,7 +408,7 @@ impl Solver for Pbf {
         }
         self.state = particles.clone();
         self.frame = frame;
-        self.scene.take_answers(particles);
+        self.scene.take_absorbers(particles);
         upload(&self.program, &self.scene, &self.state);
         match &mut self.grid {
             Some(grid) => grid.load(frame, particles),
@@ -447,10 +447,10 @@ impl Solver for Pbf {
             return Err(Breach::not_finite(self.frame, count, None).into());
         }
         check_finite(self.frame, &self.state, Some(&density))?;
-        self.scene.answer(&mut self.state, self.frame);
+        self.scene.update_absorbers(&mut self.state, self.frame);
         self.state.substep = length / f64::from(substeps);
         if let Some(grid) = &mut self.grid {
-            grid.take_answers(&self.state);
+            grid.take_absorbers(&self.state);
         }
         if self.scene.domain.min != DVec3::ZERO {
             // World positions in the frame are rounded: continue from the written values, as a

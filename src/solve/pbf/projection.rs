@@ -45,8 +45,8 @@ impl Grid {
     }
 
     /// Copies the state of absorbing walls, so that the grid's walls match those of the particles.
-    pub(super) fn take_answers(&mut self, state: &Particles) {
-        self.flip.take_answers(state);
+    pub(super) fn take_absorbers(&mut self, state: &Particles) {
+        self.flip.take_absorbers(state);
     }
 
     /// Resets the sums of a frame.

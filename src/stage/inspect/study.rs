@@ -107,8 +107,8 @@ fn swept(sweep: &Sweep) -> Vec<Part> {
 /// Runs in their order, grouped by purpose.
 fn tuned(tune: &Tune) -> Vec<Part> {
     let mut parts: Vec<Part> = Vec::new();
-    for (why, twin) in tune.twins() {
-        let point = twin.name();
+    for (why, variant) in tune.variants() {
+        let point = variant.name();
         match parts.last_mut() {
             Some(part) if part.name == why => part.points.push(point),
             _ => parts.push(Part {

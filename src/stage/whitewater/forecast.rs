@@ -8,7 +8,7 @@ pub(super) const OVER: usize = 4;
 
 /// A predicted excess of whitewater, if growth continues as measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Crowding {
+pub struct LimitForecast {
     /// First frame that would have more than `max_particles`.
     pub frame: u32,
     /// Predicted number of particles at the last requested frame.
@@ -44,7 +44,7 @@ impl Forecast {
 
     /// Takes the number of particles of the next frame. Returns a prediction, once, when the line
     /// through it and the count [`OVER`] frames before exceeds the limit by the last frame.
-    pub(super) fn see(&mut self, frame: u32, count: usize) -> Option<Crowding> {
+    pub(super) fn see(&mut self, frame: u32, count: usize) -> Option<LimitForecast> {
         if count == 0 || self.counts.len() > OVER {
             self.counts.pop_front();
         }
@@ -58,7 +58,7 @@ impl Forecast {
         let until = (room / growth).floor() + 1.0;
         let left = f64::from(self.end.saturating_sub(frame));
         self.is_told = until <= left;
-        self.is_told.then(|| Crowding {
+        self.is_told.then(|| LimitForecast {
             frame: frame + until as u32,
             at_end: (count as f64 + growth * left) as u64,
             end: self.end,
@@ -73,7 +73,7 @@ mod tests {
     use super::*;
 
     /// The prediction, and the frame after which it is made, for counts from frame 1 on.
-    fn said(allowed: u32, end: u32, counts: &[usize]) -> Option<(u32, Crowding)> {
+    fn said(allowed: u32, end: u32, counts: &[usize]) -> Option<(u32, LimitForecast)> {
         let mut forecast = Forecast::new(allowed, end, 0);
         let mut all = (1u32..).zip(counts).filter_map(|(frame, &count)| {
             let found = forecast.see(frame, count);
@@ -92,7 +92,7 @@ mod tests {
         assert_eq!(when, 14);
         assert_eq!(
             found,
-            Crowding {
+            LimitForecast {
                 frame: 44,
                 at_end: 1500,
                 end: 60,

@@ -3,7 +3,7 @@
 
 use swell::{
     domain::{boundary::Boundary, particles::Particles},
-    gpu::adapter::Spoil,
+    gpu::adapter::InjectedFault,
     scene::{Method, effects::drag},
     stage::{check::check_frame, prepare::Start},
 };
@@ -77,7 +77,7 @@ fn drops_at_round_places_are_within_tolerance_and_a_fault_in_drag_is_seen() {
             }
             for [from, to] in spoils {
                 let mut spoiled = context.clone();
-                spoiled.spoil = Some(Spoil { pass, from, to });
+                spoiled.spoil = Some(InjectedFault { pass, from, to });
                 let found = checked(&spoiled);
                 assert!(
                     over(&found).contains(&row),

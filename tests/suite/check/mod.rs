@@ -19,7 +19,7 @@ use swell::{
         sources::{Emitter, Window},
         substep::Which,
     },
-    gpu::adapter::{Context, Needs, Spoil},
+    gpu::adapter::{Context, InjectedFault, Needs},
     scene::{
         Effects, Iteration, Method, Scene, Stop, Wall, WaveMaker,
         effects::{
@@ -193,7 +193,7 @@ fn faults(context: &Context, checked: &Checked<'_>, controls: &[Control]) -> (Ta
     // Faults in rows that are out of tolerance already would prove nothing.
     assert!(over(&clean).is_empty(), "{}", lines(&clean));
     let mut faults = String::new();
-    let unknown = |(_, why): &&(&str, &str)| *why == "no f64 twin";
+    let unknown = |(_, why): &&(&str, &str)| *why == "no reference pass";
     if let Some(pass) = clean.unchecked.iter().find(unknown) {
         faults += &format!("{pass:?}\n");
     }
@@ -539,7 +539,7 @@ fn work_of_moving_walls_is_within_tolerance_and_fails_where_it_should() {
 fn a_fault_has_to_occur() {
     let (scene, start) = case(Method::Pbf);
     let mut context = context();
-    context.spoil = Some(Spoil {
+    context.spoil = Some(InjectedFault {
         pass: "pbf/predict",
         from: "no such text",
         to: "",

@@ -11,7 +11,7 @@ use swell::{
         particles::Particles,
         whitewater::{Kind, Settings},
     },
-    gpu::adapter::{Context, Spoil},
+    gpu::adapter::{Context, InjectedFault},
     scene::{Scene, Wall, WaveMaker},
 };
 
@@ -193,7 +193,7 @@ fn each_fault_in_whitewater_is_found() {
             "potentials" => "whitewater/potentials",
             _ => "whitewater/advance",
         };
-        spoiled.spoil = Some(Spoil { pass, from, to });
+        spoiled.spoil = Some(InjectedFault { pass, from, to });
         let table = table(&spoiled, true);
         let over: Vec<_> = table.rows.iter().filter(|row| !row.is_within()).collect();
         let found = over

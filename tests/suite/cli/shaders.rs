@@ -181,7 +181,7 @@ fn outlines_colour_and_flicker_of_pictures_are_told() {
     }
     let asked = format!("{check} --colour --flicker");
     for frame in [0, 3] {
-        let said = job.expect(2, &format!("{asked} --frames {frame}"));
+        let said = job.expect(4, &format!("{asked} --frames {frame}"));
         let refusal = format!("and frame {frame} lacks one of them");
         assert!(said.contains(&refusal), "{said}");
     }

@@ -3,7 +3,7 @@
 use std::ptr;
 
 use swell::gpu::{
-    adapter::{Context, Spoil},
+    adapter::{Context, InjectedFault},
     buffer::Buf,
     program::Program,
     sort,
@@ -28,7 +28,7 @@ fn a_second_program_has_the_first_ones_passes_and_a_fault_its_own() {
     assert!(ptr::eq(first.pass(PASS), second.pass(PASS)));
     // Negative controls: another shader text, and another device.
     let mut spoiled = context.clone();
-    spoiled.spoil = Some(Spoil {
+    spoiled.spoil = Some(InjectedFault {
         pass: PASS,
         from: "workgroupBarrier();",
         to: "workgroupBarrier(); workgroupBarrier();",

@@ -5,7 +5,7 @@ use std::{path::Path, sync::atomic::AtomicBool};
 use crate::support::job::Job;
 use swell::{
     cache::CacheReader,
-    gpu::adapter::{Context, GpuError, Needs, Spoil},
+    gpu::adapter::{Context, GpuError, InjectedFault, Needs},
     scene::Scene,
     solve::SolveError,
     stage::{
@@ -95,7 +95,7 @@ fn few_workgroups_a_dimension_give_the_same_bytes() {
         assert_eq!(job.hash("whole"), job.hash("few"), "{solver}");
         // Negative control: a pass that uses only one dimension is detected.
         let mut spoiled = few.clone();
-        spoiled.spoil = Some(Spoil {
+        spoiled.spoil = Some(InjectedFault {
             pass,
             from: thread,
             to: "workgroup.x",
@@ -185,7 +185,7 @@ fn places_in_two_bindings_give_the_same_bytes() {
     assert_eq!(job.hash("whole"), job.hash("small"));
     // Negative control: an off-by-one in reading positions beyond the first page is detected.
     let mut spoiled = small.clone();
-    spoiled.spoil = Some(Spoil {
+    spoiled.spoil = Some(InjectedFault {
         pass: "pbf/compute_delta",
         from: "predicted_high[j - PAGE]",
         to: "predicted_high[(j - PAGE) ^ 1u]",

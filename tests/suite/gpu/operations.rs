@@ -1,7 +1,7 @@
 //! Operation counts that passes report.
 
 use swell::gpu::{
-    adapter::Spoil,
+    adapter::InjectedFault,
     buffer::Buf,
     operations::Operations,
     program::Program,
@@ -9,7 +9,7 @@ use swell::gpu::{
     sort::plain_pass,
 };
 
-use crate::support::{context, device::Lent};
+use crate::support::{context, device::PooledDevice};
 
 const COMPUTING: &str = "measure/arithmetic";
 const ESCAPED: Buf<[f32; 4]> = Buf::new("escaped");
@@ -23,7 +23,7 @@ const INDEX: u64 = 4;
 /// And one comparison with the number of elements.
 const GUARD: u64 = 1;
 
-fn counting(spoil: Option<Spoil>) -> Lent {
+fn counting(spoil: Option<InjectedFault>) -> PooledDevice {
     let mut context = context();
     context.counts_operations = true;
     context.spoil = spoil;
@@ -45,7 +45,7 @@ fn counted(program: &Program, pass: &'static str, threads: usize, runs: u64) -> 
 }
 
 /// Operations of `measure/arithmetic`.
-fn computed(threads: usize, spoil: Option<Spoil>) -> Operations {
+fn computed(threads: usize, spoil: Option<InjectedFault>) -> Operations {
     let context = counting(spoil);
     let program = Program::new(&context, &[ESCAPED.sized(1)], &[plain_pass(COMPUTING)], &[]);
     counted(&program.unwrap(), COMPUTING, threads, 1)
@@ -54,7 +54,7 @@ fn computed(threads: usize, spoil: Option<Spoil>) -> Operations {
 /// Operations of `measure/copy` with `words` in place of its copy, over values whose first
 /// components are 0, 1, 2, 3, 0, and so on; and the contents of `copy` afterwards, initially zeros.
 fn copied(words: &'static str, runs: u64) -> (Operations, Vec<[f32; 4]>) {
-    let context = counting(Some(Spoil {
+    let context = counting(Some(InjectedFault {
         pass: COPYING,
         from: "copy[i] = copied[i];",
         to: words,
@@ -80,7 +80,7 @@ fn loops_count_as_often_as_they_go_round() {
     let found = computed(THREADS as usize, None);
     assert_eq!(found, [THREADS * floats, THREADS * integers]);
     // Negative control: one addition of four numbers less.
-    let spoil = Spoil {
+    let spoil = InjectedFault {
         pass: COMPUTING,
         from: "a = a * FACTOR + TERM;",
         to: "a = a * FACTOR;",

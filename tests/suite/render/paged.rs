@@ -47,7 +47,7 @@ fn a_frame_of_particles_in_pages_is_the_frame_drawn_whole() {
         ("ssfr/splat_spray", "- page.first;", "- 0u * page.first;"),
     ] {
         let mut context = lowered();
-        context.spoil = Some(swell::gpu::adapter::Spoil { pass, from, to });
+        context.spoil = Some(swell::gpu::adapter::InjectedFault { pass, from, to });
         assert!(picture(&context) != whole, "{pass}");
     }
 }

@@ -8,7 +8,7 @@ use crate::support::{self, D, context, jitter, lattice};
 use glam::DVec3;
 use swell::{
     domain::{particles::Particles, solver::Solver},
-    gpu::adapter::{Context, Spoil},
+    gpu::adapter::{Context, InjectedFault},
     scene::{Iteration, Method, Scene, Stop, flip::Transfer},
     solve::flip::capacity,
 };
@@ -87,7 +87,7 @@ fn drops_fall_from_a_ceiling_as_from_anywhere() {
     // Negative control: the change on the faces around a drop, one of which belongs to the fixed
     // ceiling.
     let mut spoiled = context;
-    spoiled.spoil = Some(Spoil {
+    spoiled.spoil = Some(InjectedFault {
         pass: "flip/grid_to_particle",
         from: "let falling = sorted_velocity[k] + params.velocity_step[axis];",
         to: "let falling = sorted_velocity[k] + value_at(faces.change, a, b, c);",
@@ -118,7 +118,7 @@ fn a_drop_beside_a_solid_lies_still_on_the_floor() {
     assert!(speed < 9.81 / 50.0, "{speed} m/s");
     // Negative control: the walls are ignored after the rounds that keep a particle out of both.
     let mut spoiled = context;
-    spoiled.spoil = Some(Spoil {
+    spoiled.spoil = Some(InjectedFault {
         pass: "flip/advect",
         from: "at_walls(at_walls(v, free), x)",
         to: "at_walls(v, x)",

@@ -5,7 +5,7 @@ use crate::support::{context, jitter, lattice};
 use glam::DVec3;
 use swell::{
     domain::{boundary::Boundary, motion::Motion, particles::Particles, solver::Solver},
-    gpu::adapter::{Context, Spoil},
+    gpu::adapter::{Context, InjectedFault},
     scene::{
         Scene, Wall, WaveMaker, effects,
         flip::{Preconditioner, Transfer},
@@ -384,7 +384,7 @@ fn a_surface_that_passes_centres_of_cells_pushes_by_its_slope() {
     assert!(push < 2.0, "{push}");
     // Negative control: without a least distance to the surface.
     let mut spoiled = context;
-    spoiled.spoil = Some(Spoil {
+    spoiled.spoil = Some(InjectedFault {
         pass: "flip/find_water",
         from: "max(inside, LEAST_DEPTH)",
         to: "inside",

@@ -18,7 +18,7 @@ use swell::{
 
 use crate::support::{
     context,
-    device::{self, Lent},
+    device::{self, PooledDevice},
     flip::*,
     lattice, noise,
 };
@@ -48,7 +48,7 @@ fn both(context: &Context, scene: &Scene, particles: &Particles) -> [(Particles,
     ]
 }
 
-fn spoiled(from: &'static str, to: &'static str) -> Lent {
+fn spoiled(from: &'static str, to: &'static str) -> PooledDevice {
     device::spoiled("flip/wall_friction", from, to)
 }
 

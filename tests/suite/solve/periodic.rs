@@ -6,7 +6,7 @@ use crate::support::{self, context, flip as of_flip, jitter, max_distance, noise
 use glam::DVec3;
 use swell::{
     domain::{boundary::Boundary, particles::Particles, period::Period, solver::Solver},
-    gpu::adapter::{Context, Spoil},
+    gpu::adapter::{Context, InjectedFault},
     reference,
     scene::{Iteration, Method, Scene},
 };
@@ -124,12 +124,12 @@ fn where_the_joint_is_does_not_matter() {
         // Negative controls: one pass that does not see across the boundary, and walls there.
         let mut blind = context.clone();
         blind.spoil = Some(match method {
-            Method::Flip => Spoil {
+            Method::Flip => InjectedFault {
                 pass: "flip/advect",
                 from: "wrapped_cell(brick, dims)",
                 to: "brick",
             },
-            Method::Pbf => Spoil {
+            Method::Pbf => InjectedFault {
                 pass: "pbf/build_neighbors",
                 from: "wrapped_cell(centre +",
                 to: "(centre +",

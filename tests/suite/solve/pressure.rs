@@ -17,7 +17,7 @@ use swell::{
             remove_means,
         },
     },
-    gpu::adapter::{Context, Spoil},
+    gpu::adapter::{Context, InjectedFault},
     reference::poisson::gradients::{Precondition, norm, solve},
     scene::flip::Preconditioner,
     solve::{
@@ -169,7 +169,7 @@ fn iteration_counts_are_those_on_record() {
     assert!(off.is_empty(), "{off:?}");
     // Negative control: the multigrid's last level is swept once instead of eight times.
     let mut spoiled = context.clone();
-    spoiled.spoil = Some(Spoil {
+    spoiled.spoil = Some(InjectedFault {
         pass: "pressure/solve_coarse",
         from: "const SWEEPS = 8u;",
         to: "const SWEEPS = 1u;",

@@ -11,7 +11,7 @@ use swell::{
         particles::Particles,
         solver::{Solver, StepReport},
     },
-    gpu::adapter::{Context, Spoil},
+    gpu::adapter::{Context, InjectedFault},
     reference,
     scene::{Iteration, Scene, Wall, WaveMaker},
     solve::{pbf, plan::Plan},
@@ -442,7 +442,7 @@ fn particles_on_one_spot_part_also_at_the_surface() {
     assert!(distance > 0.4 * D, "{distance} m");
     // Negative control: without the push.
     let mut spoiled = context;
-    spoiled.spoil = Some(Spoil {
+    spoiled.spoil = Some(InjectedFault {
         pass: "flip/push_apart",
         from: "const SHARE = 0.25;",
         to: "const SHARE = 0.0;",

@@ -7,14 +7,14 @@ use crate::support::{
 use glam::DVec3;
 use swell::{
     domain::{boundary::Boundary, particles::Particles, solver::Solver},
-    gpu::adapter::{Context, Spoil},
+    gpu::adapter::{Context, InjectedFault},
     reference::flip::Flip as Reference,
     scene::Scene,
     solve::plan::Capacity,
 };
 
 /// Treats all cells that a solid cuts as air.
-const SPOIL: Spoil = Spoil {
+const SPOIL: InjectedFault = InjectedFault {
     pass: "flip/find_water",
     from: "select(share_of_room(element), share, is_in_wall)",
     to: "0.0",

@@ -6,7 +6,7 @@ use swell::{
         boundary::Boundary, motion::Motion, particles::Particles, sampling::BoundarySample,
         signed_distance::SignedDistance, solver::Solver,
     },
-    gpu::adapter::{Context, Spoil},
+    gpu::adapter::{Context, InjectedFault},
     reference::{flip::Flip as Reference, pbf::Pbf as PbfReference},
     scene::{
         Method, Scene,
@@ -143,7 +143,7 @@ fn an_elliptic_drum_moves_ideal_water_as_lamb_says() {
     assert!(found < 0.08, "{found}");
     // Control: closes faces that are open by less than 0.3, which also holds water at rest.
     let mut spoiled = context.clone();
-    spoiled.spoil = Some(Spoil {
+    spoiled.spoil = Some(InjectedFault {
         pass: "flip/cut_cells",
         from: "const LEAST_OPEN = 0.02",
         to: "const LEAST_OPEN = 0.3",
@@ -163,7 +163,7 @@ fn an_elliptic_drum_moves_ideal_water_as_lamb_says() {
     let (exact, _) = twin.advance().unwrap();
     let apart = (0..state.len()).map(|k| (velocity(&state, k) - velocity(&exact, k)).length());
     let apart = apart.fold(0.0, f64::max);
-    println!("{apart} m/s from the f64 twin");
+    println!("{apart} m/s from the f64 reference");
     assert!(apart < 2e-4, "{apart}");
 }
 
@@ -208,7 +208,7 @@ fn a_drum_of_pbf_takes_its_water_along() {
                 (0..state.len()).map(|k| (velocity(&state, k) - velocity(&exact, k)).length());
             let apart = apart.fold(0.0, f64::max);
             println!(
-                "{apart} m/s from the f64 twin, work {} and {}",
+                "{apart} m/s from the f64 reference, work {} and {}",
                 report.boundary_work, twins.boundary_work
             );
             assert!(apart < 1e-3, "{apart}");

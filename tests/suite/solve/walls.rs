@@ -14,7 +14,7 @@ use swell::{
         poisson::{AIR, FLUID},
         solver::Solver,
     },
-    gpu::adapter::Spoil,
+    gpu::adapter::InjectedFault,
     reference::flip::{Flip, Trace, survey},
     scene::{Scene, Wall, WaveMaker, step},
 };
@@ -179,7 +179,7 @@ fn water_before_a_wall_that_comes_leaves_no_gap() {
     assert!(found.iter().all(|gap| *gap < 0.15), "{found:?}");
     // Negative control: measured from the walls' next position.
     let mut spoiled = context.clone();
-    spoiled.spoil = Some(Spoil {
+    spoiled.spoil = Some(InjectedFault {
         pass: "flip/push_apart",
         from: "x - params.cut_min * params.cell_size",
         to: "x - params.wall_min",

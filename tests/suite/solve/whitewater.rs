@@ -6,7 +6,7 @@ use swell::{
         particles::Particles,
         whitewater::{Kind, Potentials, Settings, Thresholds},
     },
-    gpu::adapter::{Context, Spoil},
+    gpu::adapter::{Context, InjectedFault},
     scene::Scene,
 };
 
@@ -180,7 +180,7 @@ fn drops_land_on_the_surface() {
     });
     // Control: without the search it is deep in the water.
     let mut spoiled = context();
-    spoiled.spoil = Some(Spoil {
+    spoiled.spoil = Some(InjectedFault {
         pass: "whitewater/advance",
         from: "k < HALVINGS",
         to: "k < 0u",

@@ -4,7 +4,7 @@ use glam::{DVec2, DVec3};
 use swell::{
     cache::CacheReader,
     domain::{
-        answer::{Answer, Answers},
+        absorber::{AbsorberState, AbsorberStates},
         bounds::Bounds,
         probe::elevation,
     },
@@ -46,7 +46,7 @@ const WALLED: &str =
     "--set wave_maker=[] --set domain.max=[0.9,0.8,0.15] --set water.block.1.max=[0.9,0.375,0.15]";
 
 /// The absorber state of the single wall after each frame, from the ledger.
-fn answers(reader: &CacheReader) -> Vec<Option<Answer>> {
+fn answers(reader: &CacheReader) -> Vec<Option<AbsorberState>> {
     let entries = reader.entries().iter();
     entries.map(|entry| entry.clock.walls[0]).collect()
 }
@@ -181,7 +181,7 @@ fn a_branch_takes_answers_by_wall() {
         "{said}"
     );
     assert!(said.contains("off its own way and begins on it"), "{said}");
-    assert_eq!(first("small"), Answers::default());
+    assert_eq!(first("small"), AbsorberStates::default());
 }
 
 /// Water pushed against a wall that gives way up to the domain's face.

@@ -12,7 +12,7 @@ use crate::support::job::Job;
 use swell::{
     cache::CacheReader,
     domain::{budget::Watched, solver::StepReport},
-    gpu::adapter::{Context, Spoil},
+    gpu::adapter::{Context, InjectedFault},
     scene::Scene,
     stage::{
         bake::{self, BakeError, Event, Request},
@@ -36,11 +36,11 @@ fn opened(context: &Context) -> Device {
     Device::Open(Box::new(context.clone()))
 }
 
-const fn spoil(pass: &'static str, from: &'static str, to: &'static str) -> Spoil {
-    Spoil { pass, from, to }
+const fn spoil(pass: &'static str, from: &'static str, to: &'static str) -> InjectedFault {
+    InjectedFault { pass, from, to }
 }
 
-fn spoiled(context: &Context, spoil: Spoil) -> Device {
+fn spoiled(context: &Context, spoil: InjectedFault) -> Device {
     let mut context = context.clone();
     context.spoil = Some(spoil);
     opened(&context)
@@ -199,12 +199,12 @@ fn energy_rises_by_the_work_of_the_walls_alone() {
         (
             SOLVERS[0],
             "solver.pbf.grid_projection=false",
-            Spoil {
+            InjectedFault {
                 pass: "pbf/boundary_work",
                 from: "+= sum;",
                 to: "+= 0.0 * sum;",
             },
-            Spoil {
+            InjectedFault {
                 pass: "pbf/update_velocity",
                 from: "velocity[thread] = packed(v);",
                 to: "velocity[thread] = packed(1.3 * v);",
@@ -213,12 +213,12 @@ fn energy_rises_by_the_work_of_the_walls_alone() {
         (
             SOLVERS[1],
             "solver.pbf.grid_projection=true",
-            Spoil {
+            InjectedFault {
                 pass: "flip/boundary_work",
                 from: "boundary_work[thread / 64u] = sum;",
                 to: "boundary_work[thread / 64u] = 0.0 * sum;",
             },
-            Spoil {
+            InjectedFault {
                 pass: "flip/grid_to_particle",
                 from: "advanced + params.pic_blend",
                 to: "1.3 * advanced + params.pic_blend",

@@ -6,7 +6,7 @@ use std::{
     thread,
 };
 
-use swell::gpu::adapter::{Context, Spoil};
+use swell::gpu::adapter::{Context, InjectedFault};
 
 /// Idle devices. A device keeps its compiled passes, so a test reuses those that an earlier test
 /// compiled. No two tests use a device at once, so they never wait for each other's work.
@@ -14,13 +14,13 @@ static FREE: Mutex<Vec<Context>> = Mutex::new(Vec::new());
 
 /// A device taken from the pool. Dropping it returns the device.
 #[derive(Debug)]
-pub struct Lent {
+pub struct PooledDevice {
     context: Context,
     /// The same device without the changes made to `context`; this is what returns to the pool.
     clean: Context,
 }
 
-impl Deref for Lent {
+impl Deref for PooledDevice {
     type Target = Context;
 
     fn deref(&self) -> &Context {
@@ -28,13 +28,13 @@ impl Deref for Lent {
     }
 }
 
-impl DerefMut for Lent {
+impl DerefMut for PooledDevice {
     fn deref_mut(&mut self) -> &mut Context {
         &mut self.context
     }
 }
 
-impl Drop for Lent {
+impl Drop for PooledDevice {
     fn drop(&mut self) {
         // A device that reported an error, or whose test failed, is dropped.
         if !thread::panicking() && self.clean.check().is_ok() {
@@ -45,20 +45,20 @@ impl Drop for Lent {
 }
 
 /// A device on the best adapter, opened as every command opens it.
-pub fn context() -> Lent {
+pub fn context() -> PooledDevice {
     let free = FREE.lock().unwrap_or_else(PoisonError::into_inner).pop();
     let clean = free.unwrap_or_else(|| {
         Context::open(None).expect("tests need a Vulkan adapter; tools/test installs one")
     });
-    Lent {
+    PooledDevice {
         context: clean.clone(),
         clean,
     }
 }
 
 /// A device whose pass `pass` has `from` replaced by `to`: for negative controls.
-pub fn spoiled(pass: &'static str, from: &'static str, to: &'static str) -> Lent {
+pub fn spoiled(pass: &'static str, from: &'static str, to: &'static str) -> PooledDevice {
     let mut context = context();
-    context.spoil = Some(Spoil { pass, from, to });
+    context.spoil = Some(InjectedFault { pass, from, to });
     context
 }

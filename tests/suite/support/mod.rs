@@ -58,7 +58,7 @@ pub fn scene(size: [f64; 3]) -> Scene {
         solids: Vec::new(),
         moving_solids: Vec::new(),
         wave_makers: Vec::new(),
-        answers: Default::default(),
+        absorbers: Default::default(),
         emitters: Vec::new(),
         drains: Vec::new(),
         solver: SolverSettings {

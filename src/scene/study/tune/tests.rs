@@ -23,7 +23,7 @@ fn request(scene: &str, limits: &[&str]) -> TuneRequest {
 #[test]
 fn twins_differ_from_the_scene_in_what_they_are_called_for() {
     let tune = Tune::load(request("dam-break.toml", &["crest=2%"])).expect("a shot");
-    let spacings: Vec<f64> = tune.ladder.iter().map(Twin::spacing).collect();
+    let spacings: Vec<f64> = tune.ladder.iter().map(Variant::spacing).collect();
     // 0.064 does not divide 2 m.
     assert_eq!(spacings[..2], [0.1, 0.08]);
     assert!(
@@ -44,7 +44,7 @@ fn twins_differ_from_the_scene_in_what_they_are_called_for() {
     );
     assert_eq!(tune.fine.spacing(), 0.1);
     assert_ne!(
-        physics_hash(&tune.shaken.scene),
+        physics_hash(&tune.noise_floor.scene),
         physics_hash(&tune.ladder[0].scene)
     );
     let keys: Vec<_> = tune.knobs.iter().map(|knob| knob.key).collect();
@@ -56,7 +56,7 @@ fn twins_differ_from_the_scene_in_what_they_are_called_for() {
             "solver.pbf.iteration"
         ]
     );
-    let names: Vec<_> = tune.twins().map(|(_, twin)| twin.name()).collect();
+    let names: Vec<_> = tune.variants().map(|(_, variant)| variant.name()).collect();
     assert!(
         names.contains(
             &"solver.pbf.particle_spacing = 0.1, solver.pbf.iteration = \"chebyshev\"".into()

@@ -4,11 +4,11 @@ pub(super) mod pbf;
 pub(super) mod tension;
 pub(super) mod variants;
 
-use swell::gpu::adapter::Spoil;
+use swell::gpu::adapter::InjectedFault;
 
 /// A fault in one pass, and the rows that must fail first because of it.
 pub struct Control {
-    pub spoil: Spoil,
+    pub spoil: InjectedFault,
     pub pass: &'static str,
     pub fields: &'static [&'static str],
     /// Passes whose inputs the fault makes inconsistent, which may fail too.
@@ -29,7 +29,7 @@ pub const fn control(
     fields: &'static [&'static str],
 ) -> Control {
     Control {
-        spoil: Spoil { pass, from, to },
+        spoil: InjectedFault { pass, from, to },
         pass: fails,
         fields,
         follow: &[],

@@ -8,7 +8,7 @@ use swell::domain::whitewater::{KIND, Kind, RADIUS};
 use swell::gpu::adapter::Context;
 use swell::render::{Image, Moment, RenderScene, Water};
 
-use crate::support::device::Lent;
+use crate::support::device::PooledDevice;
 
 use super::rays::{INDEX, LEVEL, SPACING, pool_scene, reflectance, refracted, water};
 use super::support::{Eye, Setup, ball, context, draw_moment, spoiled, uniform_sky};
@@ -189,7 +189,7 @@ fn clouds_in_a_white_furnace_are_not_seen() {
 }
 
 /// Drops that emit no light.
-fn black_drops() -> Lent {
+fn black_drops() -> PooledDevice {
     spoiled(
         "rays/cast",
         "return sun + mix(around, sky_irradiance(view), 1.0 - exp(-optical_depth)) / PI;",

@@ -6,7 +6,7 @@ use swell::{
         AIR, FLUID,
         cases::{Case, Surface},
     },
-    gpu::adapter::{Context, Spoil},
+    gpu::adapter::{Context, InjectedFault},
     scene::flip::Preconditioner,
     solve::pressure::{blocked, buffers::LABEL},
 };
@@ -223,7 +223,7 @@ fn bodies_within_blocks_are_those_of_a_flood_fill() {
     assert_eq!((wrong, counted), (0, bodies as u32));
     // Negative control: one round instead of seven leaves bodies in parts.
     let mut spoiled = context();
-    spoiled.spoil = Some(Spoil {
+    spoiled.spoil = Some(InjectedFault {
         pass: "pressure/label_cells",
         from: "round < 7u",
         to: "round < 1u",
@@ -242,7 +242,7 @@ fn bodies_that_wind_through_blocks_are_those_of_a_flood_fill() {
     }
     // Negative control: without unions across a block's faces along z.
     let mut spoiled = context.clone();
-    spoiled.spoil = Some(Spoil {
+    spoiled.spoil = Some(InjectedFault {
         pass: "pressure/merge_labels",
         from: "across(own + z, lower.z + 256u + z, l.out.zl);",
         to: "",

@@ -5,7 +5,7 @@ use std::{fs, path::Path};
 use swell::{
     cache::{CacheReader, directory_hash, failed},
     domain::budget::Watched,
-    gpu::adapter::{Context, Spoil},
+    gpu::adapter::{Context, InjectedFault},
     scene::Scene,
     stage::{
         device::needs,
@@ -25,7 +25,7 @@ macro_rules! nan {
 }
 
 /// Resumes a sound cache on a device with a fault in one pass.
-pub(super) fn is_caught(context: &Context, scene: &Scene, sound: &Path, spoil: Spoil) {
+pub(super) fn is_caught(context: &Context, scene: &Scene, sound: &Path, spoil: InjectedFault) {
     let opened = spoiled(context, spoil);
     let mut broken = bake_copy(sound);
     broken.go_on(&opened, scene, "1-4");

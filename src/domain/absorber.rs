@@ -9,7 +9,7 @@ pub const MOST: usize = 6;
 /// uniformly accelerated motion.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Answer {
+pub struct AbsorberState {
     /// Time at which this state begins, seconds from the start of the shot.
     pub start: f64,
     /// Displacement at `start`, metres inward.
@@ -27,9 +27,9 @@ pub struct Answer {
 
 /// States of a scene's walls, in the order of its wave makers; `None` for walls that do not absorb,
 /// and before the first frame.
-pub type Answers = [Option<Answer>; MOST];
+pub type AbsorberStates = [Option<AbsorberState>; MOST];
 
-impl Answer {
+impl AbsorberState {
     /// Returns the displacement, metres inward, and the velocity, m/s inward, at time `t`, seconds.
     pub fn state(&self, t: f64) -> (f64, f64) {
         let s = t - self.start;
