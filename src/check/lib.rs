@@ -1,7 +1,7 @@
 //! Compares a substep on the GPU with the f64 reference, from the same inputs, pass by pass and as
 //! a whole.
 //!
-//! Each pass has a row in the table (`COMPARISONS`) of its solver or effect. The row names the pass,
+//! Each pass has a row in the table (`COMPARISONS`) of its solver or effect. It names the pass,
 //! the buffers that the pass overwrites and the comparison needs from before it, and a function
 //! that runs the reference pass on the pass's inputs. The compared values are declared in the same
 //! module (`entries!`): pass, field, unit, and a tolerance as an expression of magnitudes that each

@@ -233,10 +233,11 @@ impl From<&RenderJobError> for Blame {
                 | RenderError::UnderWater { .. },
             )
             | RenderJobError::NoWater
-            | RenderJobError::NoNeighbours(_)
             | RenderJobError::IsWhitewater(_)
             | RenderJobError::IntoCache { .. } => Self::Input,
-            RenderJobError::Whitewater(_) | RenderJobError::Mesh(_) => Self::Files,
+            RenderJobError::Whitewater(_)
+            | RenderJobError::Mesh(_)
+            | RenderJobError::NoNeighbours(_) => Self::Files,
             RenderJobError::Render(
                 RenderError::NotFinite { .. }
                 | RenderError::Write { .. }

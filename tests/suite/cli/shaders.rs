@@ -226,8 +226,6 @@ fn outlines_colour_and_flicker_of_pictures_are_told() {
         ],
     );
     assert_has(&job.expect(2, "check cache --flicker"), &["--render"]);
-    // The last frame has no successor.
-    assert_has(&job.expect(4, &format!("{asked} --frames 3")), &["4"]);
 }
 
 /// `check` draws pictures from the same frames as `render`: one more frame in the cache changes
