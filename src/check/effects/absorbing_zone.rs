@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use crate::{
-    engine::{Io, Outcome, Comparison, names, comparison},
+    engine::{Comparison, Io, Outcome, comparison, names},
     flip::FlipState,
     pbf::PbfState,
     table::entries,

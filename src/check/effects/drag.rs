@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use crate::{
-    engine::{Io, Outcome, State, Comparison, names, comparison},
+    engine::{Comparison, Io, Outcome, State, comparison, names},
     flip::FlipState,
     pbf::{PbfState, bounds::Bounds},
     table::{entries, pair},

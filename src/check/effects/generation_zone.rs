@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use glam::DVec3;
 
 use crate::{
-    engine::{Io, Outcome, Comparison, names, comparison},
+    engine::{Comparison, Io, Outcome, comparison, names},
     flip::FlipState,
     pbf::PbfState,
     table::entries,

@@ -3,7 +3,7 @@
 use glam::{DVec2, DVec3};
 
 use crate::{
-    engine::{Io, NONE, Outcome, Comparison, names, comparison},
+    engine::{Comparison, Io, NONE, Outcome, comparison, names},
     flip::FlipState,
     pbf::PbfState,
     table::{Entry, each, entries, pair},
@@ -194,7 +194,12 @@ fn push(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
             scale += over / theta;
         }
         let push = reference[e].distance(before[e]);
-        pair(e, found[e], reference[e], [kappa, scale, push, reference[e].length()])
+        pair(
+            e,
+            found[e],
+            reference[e],
+            [kappa, scale, push, reference[e].length()],
+        )
     });
     Ok(())
 }

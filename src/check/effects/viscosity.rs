@@ -2,7 +2,7 @@
 //! has no pass.
 
 use crate::{
-    engine::{Io, NONE, Outcome, State, Comparison, names, comparison},
+    engine::{Comparison, Io, NONE, Outcome, State, comparison, names},
     flip::FlipState,
     pbf::{
         PbfState,

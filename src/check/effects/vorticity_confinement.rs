@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use crate::{
-    engine::{Io, NONE, Outcome, State, Comparison, names, comparison},
+    engine::{Comparison, Io, NONE, Outcome, State, comparison, names},
     flip::FlipState,
     pbf::{
         PbfState,
@@ -97,8 +97,9 @@ fn curl(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
         let sums = Bounds(inputs).sums(i, relative_speed(&velocity, i));
         ROTATION.of([scale, sums.gradient()])
     });
-    io.table
-        .each(&CURL, 0..n, |i| pair(i, vectors[i], reference[i], [errors[i]]));
+    io.table.each(&CURL, 0..n, |i| {
+        pair(i, vectors[i], reference[i], [errors[i]])
+    });
     io.table.each(&LENGTH, 0..n, |i| {
         let exact = reference[i].length();
         pair(i, lengths[i], exact, [errors[i], exact])

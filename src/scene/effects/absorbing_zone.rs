@@ -60,12 +60,14 @@ impl Effect for Settings {
         Key::number("length", 1e-7..=1e6)
             .unit("metres")
             .also(", at least two particle spacings and no longer than the domain is")
-            .about("of each zone from its wall; one and a half wave lengths turn back less than \
-                    5 % of a wave's height"),
-        Key::number("period", 1e-6..=1e6)
-            .unit("s")
-            .about("of the longest waves that have to die out: velocities fall by 5π/period at the \
-                    wall, and by the square of the way into the zone before it"),
+            .about(
+                "of each zone from its wall; one and a half wave lengths turn back less than \
+                    5 % of a wave's height",
+            ),
+        Key::number("period", 1e-6..=1e6).unit("s").about(
+            "of the longest waves that have to die out: velocities fall by 5π/period at the \
+                    wall, and by the square of the way into the zone before it",
+        ),
     ];
 
     fn check(&self, doc: &Document<'_>, around: &Surroundings<'_>) -> Result<(), SceneError> {

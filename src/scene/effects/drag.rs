@@ -34,8 +34,10 @@ impl Effect for Settings {
     const KEYS: &'static [Key] = &[
         Key::number("drop_radius", 1e-6..=10.0)
             .unit("metres")
-            .about("of the drops that a particle stands for which flies alone; the \
-                    air slows small ones more"),
+            .about(
+                "of the drops that a particle stands for which flies alone; the \
+                    air slows small ones more",
+            ),
         Key::vector("wind", 3, -1e3..=1e3)
             .unit("m/s")
             .default("[0.0, 0.0, 0.0]")

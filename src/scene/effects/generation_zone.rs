@@ -340,16 +340,22 @@ impl Effect for Settings {
 
     const KEYS: &'static [Key] = &[
         Key::choices("walls", &words(&Wall::NAMED))
-            .also(", upright ones, each once, none of them periodic or a wave maker's, one at \
-                   least from which the waves come")
+            .also(
+                ", upright ones, each once, none of them periodic or a wave maker's, one at \
+                   least from which the waves come",
+            )
             .about("the walls before which the zones lie; the water's gravity goes along -y"),
         Key::number("length", 1e-7..=1e6)
             .unit("metres")
             .also(", at least two particle spacings and no longer than the domain is")
-            .about("of each zone from its wall; with one and a half wave lengths waves are within \
-                    5 % of those asked for"),
-        Key::inline("waves", WAVES_KEYS).about("what comes in; height, phase and velocity are \
-            given at each place of the zones"),
+            .about(
+                "of each zone from its wall; with one and a half wave lengths waves are within \
+                    5 % of those asked for",
+            ),
+        Key::inline("waves", WAVES_KEYS).about(
+            "what comes in; height, phase and velocity are \
+            given at each place of the zones",
+        ),
     ];
 
     fn check(&self, doc: &Document<'_>, around: &Surroundings<'_>) -> Result<(), SceneError> {
@@ -455,16 +461,21 @@ const SPECTRAL: &[&str] = &["sea", "focused"];
 const SPECTRA: [&str; 3] = words(&Spectrum::NAMED);
 
 const WAVES_KEYS: &[Key] = &[
-    Key::choice("kind", &["stokes", "sea", "focused"])
-        .about("`stokes`: regular waves to second order (Stokes 1847); `sea`: 64 waves of a \
-                spectrum by linear theory; `focused`: such waves, whose crests meet"),
+    Key::choice("kind", &["stokes", "sea", "focused"]).about(
+        "`stokes`: regular waves to second order (Stokes 1847); `sea`: 64 waves of a \
+                spectrum by linear theory; `focused`: such waves, whose crests meet",
+    ),
     Key::number("height", LENGTH)
         .unit("metres")
         .only("kind", &["stokes", "focused"])
-        .also(", at most the depth; regular waves up to 0.78 depths and no \
-               steeper than waves can be")
-        .about("of regular waves, from trough to crest; of a packet's crest above still \
-                water by linear theory"),
+        .also(
+            ", at most the depth; regular waves up to 0.78 depths and no \
+               steeper than waves can be",
+        )
+        .about(
+            "of regular waves, from trough to crest; of a packet's crest above still \
+                water by linear theory",
+        ),
     Key::number("period", PERIOD)
         .unit("seconds")
         .only("kind", &["stokes"])
@@ -492,14 +503,18 @@ const WAVES_KEYS: &[Key] = &[
         .unit("seconds")
         .computed(|| "a third of the peak's".to_owned())
         .only("kind", SPECTRAL)
-        .also(", a tenth to nine tenths of the peak's, of waves that are at least 10 \
-               particle spacings long")
+        .also(
+            ", a tenth to nine tenths of the peak's, of waves that are at least 10 \
+               particle spacings long",
+        )
         .about("of the shortest waves; what is left out is given to the others"),
     Key::number("spreading", 0.5..=1000.0)
         .absent()
         .only("kind", SPECTRAL)
-        .about("s of the spread over directions, (cos ½θ)^2s (Longuet-Higgins, Cartwright and \
-                Smith 1963): wind seas about 10, swell 75; left out, all waves go one way"),
+        .about(
+            "s of the spread over directions, (cos ½θ)^2s (Longuet-Higgins, Cartwright and \
+                Smith 1963): wind seas about 10, swell 75; left out, all waves go one way",
+        ),
     Key::whole("seed", 0..=u32::MAX)
         .default("0")
         .only("kind", SEA)

@@ -94,19 +94,25 @@ impl Effect for Settings {
             .unit("Pa s")
             .absent()
             .without(&["xsph"])
-            .about("μ, solved implicitly on FLIP's grid, or on that of PBF's projection; water \
-                    holds to solids, and to the walls of `domain.no_slip`"),
+            .about(
+                "μ, solved implicitly on FLIP's grid, or on that of PBF's projection; water \
+                    holds to solids, and to the walls of `domain.no_slip`",
+            ),
         Key::number("tolerance", 1e-6..=0.5)
             .computed(|| TOLERANCE.to_string())
             .with("coefficient")
-            .about("to which part of what it was a substep's solve brings the \
-                    error of the velocities"),
+            .about(
+                "to which part of what it was a substep's solve brings the \
+                    error of the velocities",
+            ),
         // Below a millionth, a frame of 32-bit velocities hardly changes.
         Key::number("xsph", 1e-6..=1.0)
             .absent()
             .without(&["coefficient"])
-            .about("c, the part of the neighbours' mean relative velocity that a substep of PBF, \
-                    or a frame of FLIP, takes over"),
+            .about(
+                "c, the part of the neighbours' mean relative velocity that a substep of PBF, \
+                    or a frame of FLIP, takes over",
+            ),
     ];
 
     fn check(&self, doc: &Document<'_>, around: &Surroundings<'_>) -> Result<(), SceneError> {

@@ -18,9 +18,10 @@ impl Effect for Settings {
 
     const KEYS: &'static [Key] = &[
         // Below a millionth, a frame of 32-bit velocities hardly changes.
-        Key::number("strength", 1e-6..=100.0)
-            .about("ε, metres per second squared for each 1/s of vorticity and metre of support \
-                    radius (PBF) or cell (FLIP)"),
+        Key::number("strength", 1e-6..=100.0).about(
+            "ε, metres per second squared for each 1/s of vorticity and metre of support \
+                    radius (PBF) or cell (FLIP)",
+        ),
     ];
 
     fn looks_at_neighbors(&self) -> bool {

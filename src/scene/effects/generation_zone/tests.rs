@@ -70,8 +70,13 @@ fn waves_fit_into_a_period_or_are_refused() {
     let stokes = "kind = \"stokes\", height = 0.1, period = 2.0";
     assert_eq!(load(stokes), Ok(()));
     let askew = load(&format!("{stokes}, direction_degrees = 30.0")).expect_err("refused");
-    assert!(askew.contains("waves.direction_degrees: waves that go towards 30 degrees do not \
-                            fit the period along z"), "{askew}");
+    assert!(
+        askew.contains(
+            "waves.direction_degrees: waves that go towards 30 degrees do not \
+                            fit the period along z"
+        ),
+        "{askew}"
+    );
     let sea = "kind = \"sea\", significant_height = 0.1, peak_period = 2.0, shortest_period = 1.0";
     assert_eq!(load(sea), Ok(()));
     let spread = load(&format!("{sea}, spreading = 10.0")).expect_err("refused");
