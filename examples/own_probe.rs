@@ -1,4 +1,4 @@
-//! Observes every substep of a bake with a probe of one's own: how far water reaches along x, which
+//! Observes every substep of the f64 solver with a probe of one's own: how far water reaches along x, which
 //! is compared with the start of a dam break over a dry bed (Ritter 1892: the front runs at
 //! 2 √(g h)).
 //!

@@ -12,15 +12,21 @@ fn main() -> Result<(), Box<dyn Error>> {
     let cache = CacheReader::open(&PathBuf::from(path))?;
     let manifest = cache.manifest();
     println!("{}, by {}", manifest.shot, manifest.solver);
-    for frame in 0..=cache.last_frame() {
-        // Frames whose particles were not kept have a report, but no particles.
-        if cache.kept(frame).is_err() {
+    // Positions in frames are relative to this point, metres; zero but far from the world's origin.
+    println!("origin {:?} m", manifest.origin);
+    for frame in cache.first_frame()..=cache.last_frame() {
+        // Some frames have a report but no particles (`[keep]` in the scene).
+        if !cache.has_particles(frame) {
             continue;
         }
         // Verifies the checksum. Positions in metres, velocities in m/s, both as [x, y, z].
         let state = cache.read(frame)?;
         let positions: &[[f32; 3]] = &state.position;
-        let count = positions.len().max(1) as f64;
+        if positions.is_empty() {
+            println!("frame {frame}: no water");
+            continue;
+        }
+        let count = positions.len() as f64;
         let center = [0, 1, 2].map(|axis| {
             let sum: f64 = positions.iter().map(|at| f64::from(at[axis])).sum();
             sum / count

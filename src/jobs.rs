@@ -8,6 +8,7 @@ use std::{
 };
 
 use crate::{
+    cache::CacheReader,
     domain::frame_range::FrameRange,
     scene::{Scene, look::Look},
     stage::{
@@ -47,7 +48,7 @@ pub fn bake(scene: &Scene) -> Bake<'_> {
 }
 
 /// Begins a render of the cache in `directory`: all frames, on the best adapter, into
-/// `renders/CACHE`.
+/// `renders/SHOT`.
 ///
 /// ```no_run
 /// # use swell::scene::look::Look;
@@ -56,13 +57,11 @@ pub fn bake(scene: &Scene) -> Bake<'_> {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn render<'a>(directory: impl AsRef<Path>, look: &Look) -> Render<'a> {
-    let cache = directory.as_ref();
-    let name = cache.file_name().unwrap_or(cache.as_os_str());
     Render {
         request: render::Request {
-            cache: cache.to_owned(),
+            cache: directory.as_ref().to_owned(),
             look: look.clone(),
-            directory: Path::new("renders").join(name),
+            directory: PathBuf::new(),
             frames: None,
             chunk: None,
             gpu: Gpu::default(),
@@ -81,7 +80,7 @@ pub fn render<'a>(directory: impl AsRef<Path>, look: &Look) -> Render<'a> {
 pub struct Bake<'a> {
     request: bake::Request,
     stop: &'a AtomicBool,
-    tell: Box<dyn FnMut(bake::Event) + 'a>,
+    tell: Box<dyn FnMut(bake::Event) + Send + 'a>,
 }
 
 impl<'a> Bake<'a> {
@@ -97,17 +96,17 @@ impl<'a> Bake<'a> {
         self
     }
 
-    /// Bakes these frames only, which begin at 1 or, with [`resume`](Self::resume), after the last
-    /// one in the cache.
+    /// Bakes up to the last of these frames. The first may be no later than the next frame to bake:
+    /// 1, the one after the cache's last, or the one after that of [`from`](Self::from).
     ///
     /// # Panics
-    /// If the range is empty.
+    /// If the range is empty, or longer than 10⁷ frames.
     pub fn frames(mut self, frames: RangeInclusive<u32>) -> Self {
         self.request.frames = Some(range(frames));
         self
     }
 
-    /// Continues a bake that is already in the directory.
+    /// Continues a bake that is already in the directory, or begins one if there is none.
     pub fn resume(mut self) -> Self {
         self.request.resume = true;
         self
@@ -121,15 +120,20 @@ impl<'a> Bake<'a> {
     }
 
     /// Calls `tell` with the progress.
-    pub fn on_event(mut self, tell: impl FnMut(bake::Event) + 'a) -> Self {
+    pub fn on_event(mut self, tell: impl FnMut(bake::Event) + Send + 'a) -> Self {
         self.tell = Box::new(tell);
         self
     }
 
     /// Ends after the current frame once `stop` is set.
-    pub fn stop_at(mut self, stop: &'a AtomicBool) -> Self {
+    pub fn stop_when(mut self, stop: &'a AtomicBool) -> Self {
         self.stop = stop;
         self
+    }
+
+    /// Returns the request, whose other fields can be set too.
+    pub fn request_mut(&mut self) -> &mut bake::Request {
+        &mut self.request
     }
 
     /// Bakes.
@@ -146,7 +150,7 @@ impl<'a> Bake<'a> {
 pub struct Render<'a> {
     request: render::Request,
     stop: &'a AtomicBool,
-    tell: Box<dyn FnMut(render::Event) + 'a>,
+    tell: Box<dyn FnMut(render::Event) + Send + 'a>,
 }
 
 impl<'a> Render<'a> {
@@ -165,7 +169,7 @@ impl<'a> Render<'a> {
     /// Renders these frames only.
     ///
     /// # Panics
-    /// If the range is empty.
+    /// If the range is empty, or longer than 10⁷ frames.
     pub fn frames(mut self, frames: RangeInclusive<u32>) -> Self {
         self.request.frames = Some(range(frames));
         self
@@ -178,15 +182,20 @@ impl<'a> Render<'a> {
     }
 
     /// Calls `tell` with the progress.
-    pub fn on_event(mut self, tell: impl FnMut(render::Event) + 'a) -> Self {
+    pub fn on_event(mut self, tell: impl FnMut(render::Event) + Send + 'a) -> Self {
         self.tell = Box::new(tell);
         self
     }
 
     /// Ends after the current frame once `stop` is set.
-    pub fn stop_at(mut self, stop: &'a AtomicBool) -> Self {
+    pub fn stop_when(mut self, stop: &'a AtomicBool) -> Self {
         self.stop = stop;
         self
+    }
+
+    /// Returns the request, whose other fields can be set too.
+    pub fn request_mut(&mut self) -> &mut render::Request {
+        &mut self.request
     }
 
     /// Renders.
@@ -195,6 +204,10 @@ impl<'a> Render<'a> {
     /// [`RenderJobError`]. Frames missing from the cache, and a folder that cannot be shared, are
     /// reported before anything is rendered.
     pub fn run(mut self) -> Result<render::Outcome, RenderJobError> {
+        if self.request.directory.as_os_str().is_empty() {
+            let cache = CacheReader::open(&self.request.cache)?;
+            self.request.directory = Path::new("renders").join(&cache.manifest().shot);
+        }
         render::render(&self.request, self.stop, &mut self.tell)
     }
 }

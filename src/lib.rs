@@ -42,7 +42,7 @@
 //! arrays, run a GPU pass of their own beside its reference, and observe substeps
 //! (`cargo run --release --example bake_and_render`).
 //!
-//! [`stage::Blame`] tells where the fault of an error lies: in the input, the device, the files, or
+//! [`stage::Blame`]`::from(&error)` tells where the fault of an error lies: in the input, the device, the files, or
 //! the numbers. The program's exit codes follow from it.
 //!
 //! # Crates
@@ -54,15 +54,14 @@
 //! cache -> stage::render -> render (GPU) -> images
 //! ```
 //!
-//! - Input files: [`scene`] parses and validates scene and look files, and plans passes and
-//!   buffers.
+//! - Input files: [`scene`] parses and validates scene, look and study files.
 //! - Complete jobs: [`stage`] combines the other crates without a terminal. Its jobs are
 //!   [bake](stage::bake), [render](stage::render), [export](stage::export),
 //!   [whitewater](stage::whitewater), [check](stage::check), [diff](stage::diff) and
 //!   [verify](stage::verify), among others.
 //! - Intermediate files: [`cache`] stores frames, ledger and manifest on disk.
 //! - Computation: [`gpu`] provides adapters, shader composition, passes recorded as data, scan and
-//!   sort; [`solve`] the particle solvers on the GPU; [`render`] pictures of frames, by
+//!   sort; [`solve`] the particle solvers on the GPU; [`mod@render`] pictures of frames, by
 //!   screen-space splats and by rays.
 //! - Accuracy: [`mod@reference`] implements the same solvers on the CPU in f64; [`check`] compares
 //!   a substep on the GPU with the reference, pass by pass; [`compare`] measures how much two sets

@@ -8,7 +8,7 @@ use super::{Fault, Place, Scene, SceneError, Wall};
 
 /// A scene under construction; [`Scene::builder`] begins one.
 ///
-/// Every key of a scene file can be set, and [`build`](Self::build) validates them and fills in
+/// Every key of a scene file can be given, and [`build`](Self::build) validates them and fills in
 /// defaults as for a file. `docs/keys.md` lists the keys with their units, ranges and defaults.
 ///
 /// ```
@@ -81,7 +81,7 @@ impl SceneBuilder {
         self.append("solid", solid)
     }
 
-    /// Adds a wave maker; `motion` is the TOML of its table, such as
+    /// Adds a wave maker; `motion` is the inside of an inline table of TOML, such as
     /// `kind = "sine", stroke = 0.1, period = 1.5`.
     pub fn wave_maker(self, wall: Wall, motion: &str) -> Self {
         self.push(
@@ -102,8 +102,8 @@ impl SceneBuilder {
             .set("solver.flip.cell_size", cell_size)
     }
 
-    /// Sets any key by its dotted path, such as `solver.pbf.iterations`; replaces a value that was
-    /// set before.
+    /// Sets a key outside of arrays of tables by its dotted path, such as `solver.pbf.iterations`;
+    /// replaces a value that was set before.
     pub fn set(mut self, key: &str, value: impl Into<Value>) -> Self {
         let value = value.into();
         match self.entry(key) {

@@ -490,7 +490,8 @@ fn numerical_diffusion(scene: &Scene, substeps: u32, seconds: f64, square: f64) 
         Method::Flip => {
             let flip = scene.solver.flip();
             let step = seconds / f64::from(substeps.max(1));
-            flip.pic_blend * flip.cell_size.powi(2) / (6.0 * step) + square * step / 8.0
+            let blend = scene.substep_pic_blend(step);
+            blend * flip.cell_size.powi(2) / (6.0 * step) + square * step / 8.0
         }
     }
 }
