@@ -42,8 +42,8 @@
 //! arrays, run a GPU pass of their own beside its reference, and observe substeps
 //! (`cargo run --release --example bake_and_render`).
 //!
-//! [`stage::Blame`]`::from(&error)` tells where the fault of an error lies: in the input, the device, the files, or
-//! the numbers. The program's exit codes follow from it.
+//! [`stage::Blame`]`::from(&error)` tells where the fault of an error lies: in the input, the
+//! device, the files, or the numbers. The program's exit codes follow from it.
 //!
 //! # Crates
 //!

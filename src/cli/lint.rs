@@ -39,9 +39,11 @@ impl DenyArgs {
             Some(Denied::Lint) => scene.lints(),
             None => return Ok(()),
         };
-        if is_start {
-            lints.extend(Start::of(scene)?.lints(scene));
-        }
+        let start = Start::of(scene)?;
+        lints.extend(match is_start {
+            true => start.lints(scene),
+            false => start.lint_emitters(scene),
+        });
         if lints.is_empty() {
             return Ok(());
         }

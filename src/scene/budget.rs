@@ -257,7 +257,7 @@ impl Budget {
                 let detail = format!(
                     "{} times the larger of {reached:.4} m/s, which gravity, effects and walls can \
                      bring {speed:.4} m/s of the fastest before to, and {:.4} m/s, an eighth of \
-                     the speed after a fall from the top of the water",
+                     the speed after a fall from twice the water's mean height",
                     shown(times),
                     fallen / SPEED_JUMP
                 );
@@ -300,9 +300,8 @@ impl Budget {
 
 impl Scene {
     /// Bounds the speed that gravity, effects and moving boundaries give in frame `frame` to a
-    /// particle of `speed`, m/s; at least a tenth of a spacing per frame.
-    ///
-    /// What absorbing walls add to their own motion is not included.
+    /// particle of `speed`, m/s; at least a tenth of a spacing per frame. What absorbing walls add
+    /// to their own motion is included as far as the scene has their states.
     pub fn reached_speed(&self, frame: u32, speed: f64) -> f64 {
         let length = self.shot.frame_seconds();
         let start = f64::from(frame.saturating_sub(1)) * length;
@@ -312,9 +311,9 @@ impl Scene {
         (speed + push + gained + self.effects.frees(self.grain())).max(least)
     }
 
-    /// Bounds the speed of a particle of `speed` after a fall from the top of the water, m/s. In a
-    /// long frame or a high column the foot of a column reaches it within a frame. A column's top
-    /// is twice as high as its mean potential energy, `energy` in joules, implies.
+    /// Bounds the speed of a particle of `speed` after a fall from twice the water's mean height,
+    /// which is the top of a column, m/s. In a long frame or a high column its foot reaches that
+    /// speed within a frame. `energy` is kinetic and potential, J.
     fn fallen_speed(&self, speed: f64, energy: f64, particles: usize) -> f64 {
         let mass = self.particle_mass() * particles.max(1) as f64;
         (speed * speed + 4.0 * energy.max(0.0) / mass).sqrt()

@@ -133,6 +133,13 @@ impl Start {
     /// whose flow differs from velocity times area.
     pub fn lints(&self, scene: &Scene) -> Vec<String> {
         let mut lints = Vec::from_iter(self.lint_dry());
+        lints.extend(self.lint_emitters(scene));
+        lints
+    }
+
+    /// Lints of emitters, which do not depend on the water at the start.
+    pub fn lint_emitters(&self, scene: &Scene) -> Vec<String> {
+        let mut lints = Vec::new();
         let most = self.sources.most_entering(scene.shot.duration());
         for (index, (promise, most)) in self.predicted_inflows().into_iter().zip(most).enumerate() {
             let window = scene.emitters[index].window;
@@ -167,7 +174,9 @@ impl Start {
     }
 
     fn lint_dry(&self) -> Option<String> {
-        if !self.particles.is_empty() || self.asked == Some(0.0) {
+        // A branch may begin dry where emitters fill it.
+        let is_fed = self.asked.is_none() && !self.sources.emitters.is_empty();
+        if !self.particles.is_empty() || self.asked == Some(0.0) || is_fed {
             return None;
         }
         let lint = match (self.asked, self.removed) {

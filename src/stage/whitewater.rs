@@ -187,8 +187,10 @@ pub fn whitewater(
                 (stop, &mut *tell),
             )?;
             let Some(settled) = settled else {
+                // A stream that was to be overwritten is as it was.
+                let standing = CacheReader::open(&directory).ok();
                 return Ok(Outcome {
-                    last_frame: cache.first_frame(),
+                    last_frame: standing.map_or(cache.first_frame(), |it| it.last_frame()),
                     frames: 0,
                     bytes: 0,
                     directory,

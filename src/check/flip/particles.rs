@@ -64,10 +64,14 @@ pub(super) fn grid_to_particle(state: &mut FlipState, io: &mut Io<'_>) -> Outcom
     let all = || errors.iter().copied();
     let fallen = step.velocity_step.length();
     let came = |i: usize| sorted.cloud.velocity[i].length() + fallen;
+    let rubbed = match step.solids.is_empty() {
+        true => 0.0,
+        false => fallen * state.distance_error() / (0.25 * state.model.cell_size()),
+    };
     io.table.add(
         &GIVEN,
         all().map(|(i, [velocity, change, _])| {
-            let magnitudes = [velocity, change, came(i)];
+            let magnitudes = [velocity, change, came(i), rubbed];
             pair(i, given.velocity[i], reference.velocity[i], magnitudes)
         }),
     );

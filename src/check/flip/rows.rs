@@ -297,8 +297,11 @@ entries! {
     }
     "flip/grid_to_particle" {
         GIVEN = "velocity", "m/s": [velocity: "" OF_FACES, change: "the same of the changes",
-            came: "|v| that came in and |g| Δt"]
-            velocity + change + 4.0 * U * came, "a drop's is their sum";
+            came: "|v| that came in and |g| Δt",
+            rubbed: "|g| Δt times the error of solids' distances over a quarter cell"]
+            velocity + change + 4.0 * U * came + 2.0 * rubbed,
+            "a drop's is their sum; friction turns with the solid's normal and fades with \
+             the distance";
         CARRIED = "velocity of the grid", "m/s": [velocity: "" OF_FACES,
             came: "|v| that came in and |g| Δt"]
             velocity + 4.0 * U * came, "the same";

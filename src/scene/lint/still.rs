@@ -8,6 +8,9 @@ use swell_domain::mesh::TriangleMesh;
 /// Number of water columns sampled along a wall.
 const COLUMNS: usize = 9;
 
+/// Most columns that are looked at for any water at all.
+const MOST_COLUMNS: usize = 4096;
+
 /// Still water.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Still {
@@ -41,6 +44,11 @@ impl Scene {
     /// Returns the water beside the rest position of a wall, as the median of some columns along
     /// it; `None` without water there, for a floor or ceiling, or if gravity is not along -y.
     pub(super) fn still_beside(&self, maker: &WaveMaker) -> Option<Still> {
+        self.still_in(maker, COLUMNS)
+    }
+
+    /// Same as [`Self::still_beside`], with this number of columns.
+    fn still_in(&self, maker: &WaveMaker, columns: usize) -> Option<Still> {
         let wall = maker.wall;
         if wall.axis == 1 || !self.is_down() {
             return None;
@@ -49,7 +57,7 @@ impl Scene {
         // Offsets that avoid the planes of box faces and edges.
         let away = maker.room() + 0.613 * self.particle_spacing();
         let column = |k: usize| {
-            let part = (k as f64 + 0.437) / COLUMNS as f64;
+            let part = (k as f64 + 0.437) / columns as f64;
             let mut at = min + part * size;
             at[wall.axis] = match wall.is_max {
                 true => self.domain.max[wall.axis] - away,
@@ -57,7 +65,7 @@ impl Scene {
             };
             self.column(at)
         };
-        let mut found: Vec<Still> = (0..COLUMNS).filter_map(column).collect();
+        let mut found: Vec<Still> = (0..columns).filter_map(column).collect();
         found.sort_by(|a, b| a.depth.total_cmp(&b.depth));
         found.get(found.len() / 2).copied()
     }
@@ -71,7 +79,11 @@ impl Scene {
         level: Option<f64>,
     ) -> Option<String> {
         let level = level?;
-        let is_dry = maker.wall.axis != 1 && self.still_beside(maker).is_none();
+        // A column per spacing, since water may be beside a part of the wall only.
+        let side = self.domain.size()[2 - maker.wall.axis.min(2)];
+        let columns =
+            ((side / self.particle_spacing()).ceil() as usize).clamp(COLUMNS, MOST_COLUMNS);
+        let is_dry = maker.wall.axis != 1 && self.still_in(maker, columns).is_none();
         (is_dry && self.emitters.is_empty()).then(|| {
             format!(
                 "wave_maker[{index}]: no water is beside its wall at rest, though water {} m deep \

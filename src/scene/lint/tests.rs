@@ -375,7 +375,10 @@ fn a_wall_without_water_is_said() {
     let block = cuboid([-1.0, -1.0, -1.0], [2.0, 3.0, 2.0]);
     only(&lints_beside(&block, &scene(0.0, solid)), dry);
     only(&lints_beside(&block, &scene(2.0, "")), dry);
-    // Controls: a solid as high as half of the water, and water that an emitter may bring.
+    // Controls: a solid as high as half of the water, one that leaves a gap of two spacings, and
+    // water that an emitter may bring.
+    let gap = cuboid([-1.0, -1.0, 0.1], [2.0, 3.0, 2.0]);
+    assert_eq!(lints_beside(&gap, &scene(0.0, solid)), [] as [&str; 0]);
     let low = cuboid([-1.0, -1.0, -1.0], [2.0, 0.5, 2.0]);
     assert_eq!(lints_beside(&low, &scene(0.0, solid)), [] as [&str; 0]);
     let emitter = "[[emitter]]\nmin = [0, 0, 0]\nmax = [1, 1, 1]\nvelocity = [1, 0, 0]\n";

@@ -4,14 +4,15 @@
 use glam::DVec3;
 use swell::{
     domain::{
-        boundary::Boundary, bounds::Bounds, particles::Particles, signed_distance::SignedDistance,
+        boundary::Boundary, bounds::Bounds, motion::Motion, particles::Particles,
+        signed_distance::SignedDistance,
     },
     scene::{Method, Scene},
     stage::{check::check_frame, prepare::Start},
 };
 
 use super::{Control, control, faults};
-use crate::support::{box_mesh, context, flip as rig, jitter, noise};
+use crate::support::{box_mesh, context, flip as rig, jitter, mover, noise};
 
 const FRICTION: &[Control] = &[
     control(
@@ -36,6 +37,22 @@ const FRICTION: &[Control] = &[
         &["velocity"],
     ),
 ];
+
+const DROPLETS: &[Control] = &[control(
+    "flip/grid_to_particle",
+    "select(carried[k + axis], v[axis], falls)",
+    "carried[k + axis]",
+    "flip/grid_to_particle",
+    &["velocity of the grid"],
+)];
+
+const MOVING: &[Control] = &[control(
+    "flip/grid_to_particle",
+    "let beside = v - friction.solid;",
+    "let beside = v;",
+    "flip/grid_to_particle",
+    &["velocity"],
+)];
 
 const GAPS: &[Control] = &[
     control(
@@ -91,8 +108,48 @@ fn checked(solid: &Boundary, level: f64, controls: &[Control]) -> String {
 #[test]
 fn friction_of_films_is_within_tolerance_and_fails_where_it_should() {
     let slope = DVec3::new(0.1, 1.0, 0.03).normalize();
-    let found = checked(&rig::half_space(slope, 1.3 * rig::DX), 1.6, FRICTION);
+    let solid = rig::half_space(slope, 1.3 * rig::DX);
+    let found = checked(&solid, 1.6, FRICTION);
     assert!(found.is_empty(), "{found}");
+
+    // A droplet that touches the slope, far from other water.
+    let (scene, mut start) = water(&solid, 1.6);
+    let far: Vec<bool> = (0..start.particles.len())
+        .map(|k| rig::position(&start.particles, k).x < 9.0 * rig::DX)
+        .collect();
+    start.particles.retain(&far);
+    let on_slope = |x: f64| (1.45 * rig::DX - slope.x * x - slope.z * 0.8) / slope.y;
+    let x = 13.3 * rig::DX;
+    start
+        .particles
+        .position
+        .push([x as f32, on_slope(x) as f32, 0.8]);
+    start.particles.velocity.push([-0.001, 0.0, 0.0]);
+    start.particles.id.push(100_000);
+    let state = start.particles.clone();
+    let checked = |context: &_| check_frame(context, &scene, &start, 0, &state);
+    let found = faults(&context(), &checked, DROPLETS).1;
+    assert!(found.is_empty(), "droplet: {found}");
+
+    // The same slope as a solid that moves along itself.
+    let (mut scene, mut start) = water(&solid, 1.6);
+    let bounds = Bounds {
+        min: DVec3::splat(-1.0),
+        max: DVec3::ONE,
+    };
+    let motion = Motion::ConstantVelocity {
+        velocity: 0.05,
+        until: None,
+    };
+    scene.moving_solids.push(mover(bounds, DVec3::X, motion));
+    start.boundary = Boundary {
+        moving: solid.distance.into_iter().collect(),
+        ..Boundary::default()
+    };
+    let state = start.particles.clone();
+    let checked = |context: &_| check_frame(context, &scene, &start, 0, &state);
+    let found = faults(&context(), &checked, MOVING).1;
+    assert!(found.is_empty(), "moving: {found}");
 }
 
 /// A box that hangs so many cells above the floor.
