@@ -5,16 +5,16 @@ use std::{fs, path::Path};
 /// Describes what `dir` is instead of a cache, as the rest of a sentence that begins with the path.
 pub(super) fn why_none(dir: &Path, is_cache: &dyn Fn(&Path) -> bool) -> String {
     if !dir.exists() {
-        return "is not there".to_owned();
+        return "does not exist".to_owned();
     }
     if !dir.is_dir() {
-        return "is a file, and a cache is a folder".to_owned();
+        return "is a file; a cache is a folder".to_owned();
     }
     let within = within(dir, is_cache);
     match &within[..] {
-        [] => "holds no cache: it has no manifest.json".to_owned(),
-        [one] => format!("holds no cache itself: {one} is one"),
-        several => format!("holds no cache itself: name one of {}", several.join(", ")),
+        [] => "is not a cache: it has no manifest.json".to_owned(),
+        [one] => format!("is not a cache; did you mean {one}?"),
+        several => format!("is not a cache; name one of {}", several.join(", ")),
     }
 }
 

@@ -255,7 +255,7 @@ fn check_length(path: &Path, expected: u64, found: u64) -> Result<(), CacheError
     }
     Err(CacheError::damaged(
         path,
-        format!("{found} bytes, and {expected} were written"),
+        format!("it has {found} bytes instead of {expected}"),
     ))
 }
 

@@ -26,7 +26,8 @@ pub enum CacheError {
     },
     /// A new bake was sent to a directory that holds other files.
     #[error(
-        "{} holds files that are no cache of ours ({found}); left untouched, choose another -o",
+        "{} contains files that do not belong to a cache ({found}) and was left untouched; choose \
+         another -o",
         dir.display()
     )]
     Occupied {
@@ -37,7 +38,8 @@ pub enum CacheError {
     },
     /// A new bake was sent to a directory that already holds a bake.
     #[error(
-        "{} already holds a cache; left untouched: --resume goes on, or choose another -o",
+        "{} already holds a cache and was left untouched; continue it with --resume, or choose \
+         another -o",
         dir.display()
     )]
     Exists {
@@ -68,7 +70,7 @@ pub enum CacheError {
     /// A bake in an older format, which can be read but not resumed.
     #[error(
         "{} was baked in cache format {found}, and this program writes {newest}: begin from one of \
-         its frames with --from {}:FRAME and another -o, or bake it anew",
+         its frames with --from {}:FRAME and another -o, or bake it again",
         dir.display(), dir.display()
     )]
     OldFormat {
@@ -81,8 +83,8 @@ pub enum CacheError {
     },
     /// A bake cannot be resumed with other probes: the existing frames were not observed by them.
     #[error(
-        "{} was baked with {cached}, and this run has {given}: what a probe sees while a frame is \
-         computed cannot be made up afterwards; go on with the same probes, or choose another -o",
+        "{} was baked with {cached}, and this run has {given}: a probe records while a frame is \
+         computed, not afterwards; continue with the same probes, or choose another -o",
         dir.display()
     )]
     OtherProbes {
@@ -106,7 +108,7 @@ pub enum CacheError {
     },
     /// The cache has a format version that this program does not read.
     #[error(
-        "{} has cache format {found}, and this program reads {oldest} to {newest}: bake it anew, \
+        "{} has cache format {found}, and this program reads {oldest} to {newest}: bake it again, \
          or use the program that wrote it",
         dir.display()
     )]

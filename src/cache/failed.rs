@@ -113,7 +113,7 @@ pub fn read(dir: &Path) -> Result<Failed, CacheError> {
     let is_as_written = text(&fields).as_bytes() == bytes;
     let recorded = fields.remove(CHECKSUM);
     if !is_as_written || recorded != Some(checksum(&fields).into()) {
-        return Err(damaged("its BLAKE3 is off"));
+        return Err(damaged("its BLAKE3 checksum does not match"));
     }
     let files = fields.remove(FILES).unwrap_or_default();
     let [scene, start] = <[FileRecord; 2]>::deserialize(files)
@@ -123,7 +123,7 @@ pub fn read(dir: &Path) -> Result<Failed, CacheError> {
     let last_frame = fields.get("last_frame").and_then(Value::as_u64);
     let last_frame = last_frame
         .and_then(|frame| u32::try_from(frame).ok())
-        .ok_or_else(|| damaged("it names no last_frame"))?;
+        .ok_or_else(|| damaged("it has no last_frame"))?;
     let walls = match fields.remove(WALLS) {
         Some(walls) => {
             AbsorberStates::deserialize(walls).map_err(|error| damaged(&error.to_string()))?

@@ -304,7 +304,7 @@ impl Head {
 
     fn misfit(&self, found: u64) -> String {
         let (count, size) = (self.count, self.row_size());
-        format!("its header promises {count} particles of {size} bytes, and {found} bytes follow")
+        format!("its header declares {count} particles of {size} bytes, and {found} bytes follow")
     }
 }
 
@@ -322,7 +322,7 @@ fn read_head(head: &[u8]) -> Result<Head, String> {
     // The parsed header hides duplicate names, alternative spellings and extra spaces, so it is
     // written again and compared byte for byte.
     if header_bytes(&header).map_err(|e| e.to_string())? != head {
-        return Err("its PLY header is not one of ours".to_owned());
+        return Err("its PLY header is not one that swell writes".to_owned());
     }
     let origin = read_origin(&header.comments)?;
     let (count, names) = layout(&header, origin)?;
@@ -346,7 +346,7 @@ fn read_origin(comments: &[String]) -> Result<DVec3, String> {
         .map(DVec3::from_array)
         .ok()
         .filter(|origin| origin.is_finite() && origin_comment(*origin) == *comment)
-        .ok_or_else(|| format!("comment `{comment}` is not one of ours"))
+        .ok_or_else(|| format!("comment `{comment}` is not one that swell writes"))
 }
 
 /// Number of rows and names of the attributes.
@@ -357,7 +357,7 @@ fn layout(header: &Header, origin: DVec3) -> Result<(usize, Vec<String>), String
     let mut elements = header.elements.values();
     let vertex = match (elements.next(), elements.next()) {
         (Some(vertex), None) if vertex.name == "vertex" => vertex,
-        _ => return Err("its one element is not `vertex`".to_owned()),
+        _ => return Err("its only element is not `vertex`".to_owned()),
     };
     let mut properties = vertex.properties.values();
     for (name, scalar) in fixed(origin) {
@@ -366,7 +366,7 @@ fn layout(header: &Header, origin: DVec3) -> Result<(usize, Vec<String>), String
             .next()
             .is_none_or(|p| p.name != name || p.data_type != kind)
         {
-            return Err(format!("property `{name}` is not where it belongs"));
+            return Err(format!("property `{name}` is in the wrong position"));
         }
     }
     let mut names = Vec::new();
@@ -375,7 +375,10 @@ fn layout(header: &Header, origin: DVec3) -> Result<(usize, Vec<String>), String
             || !is_attribute_name(&property.name)
             || names.last().is_some_and(|last| *last >= property.name)
         {
-            return Err(format!("property `{}` is not ours", property.name));
+            return Err(format!(
+                "property `{}` is not one that swell writes",
+                property.name
+            ));
         }
         names.push(property.name.clone());
     }

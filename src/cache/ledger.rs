@@ -189,7 +189,7 @@ impl Entry {
             }
         }
         if self.files.len() > STREAMS.iter().filter(announced).count() {
-            return Some("it names files that the manifest does not announce".to_owned());
+            return Some("it names files that the manifest does not declare".to_owned());
         }
         rows_misfit(manifest, &self.rows)
     }
@@ -205,7 +205,7 @@ pub(super) fn rows_misfit(manifest: &Manifest, rows: &Rows) -> Option<String> {
         let name = stream.name;
         if found.len() != tables.len() {
             return Some(format!(
-                "its {name} are not those that the manifest announces"
+                "its {name} are not those that the manifest declares"
             ));
         }
         let misfit = |(table, values): (&ProbeRecord, &Vec<_>)| {
@@ -220,7 +220,7 @@ pub(super) fn rows_misfit(manifest: &Manifest, rows: &Rows) -> Option<String> {
             return Some(format!("{value} among its {}", stream.name));
         }
     }
-    (rows.len() != expected).then(|| "it has rows that the manifest does not announce".to_owned())
+    (rows.len() != expected).then(|| "it has rows that the manifest does not declare".to_owned())
 }
 
 /// An [`Entry`] without its chain: what the chained hash covers.
@@ -315,7 +315,7 @@ impl Ledger {
             ledger.ends.push(ledger.whole_bytes);
         }
         if ledger.entries.is_empty() {
-            return Err(CacheError::damaged(path, "it has no whole line"));
+            return Err(CacheError::damaged(path, "it has no complete line"));
         }
         Ok(ledger)
     }
@@ -362,12 +362,12 @@ impl Ledger {
         }
         let chain = chained(&previous, &contents);
         if chain.to_hex().as_str() != entry.chain {
-            return Err(damaged("its chained hash is off"));
+            return Err(damaged("its chained hash does not match"));
         }
         if previous != self.chain {
             return Err(CacheError::damaged(
                 dir.join(manifest::FILE),
-                "its BLAKE3 is not the one in the ledger",
+                "its BLAKE3 checksum differs from the one in the ledger",
             ));
         }
         let frame = u32::try_from(number - 1)
@@ -391,7 +391,9 @@ pub(super) fn append(path: &Path, length: u64, line: &[u8]) -> Result<(), CacheE
     if found != length {
         return Err(CacheError::damaged(
             path,
-            format!("{found} bytes, and this bake wrote {length}: something else writes there"),
+            format!(
+                "it has {found} bytes, but this bake wrote {length}: another program writes to it"
+            ),
         ));
     }
     file.write_all(line)

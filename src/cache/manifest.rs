@@ -263,7 +263,7 @@ impl Manifest {
     /// Refuses values that could not be read back, and names that lead out of the cache.
     pub(super) fn check(&self) -> Result<(), String> {
         if !is_file_stem(&self.shot) {
-            return Err(format!("shot name `{}` is no file name", self.shot));
+            return Err(format!("shot name `{}` is not a file name", self.shot));
         }
         for (name, value) in [
             ("frames_per_second", self.frames_per_second),
@@ -285,10 +285,13 @@ impl Manifest {
                 .and_then(|rest| rest.strip_prefix('/'))
                 .is_some_and(is_relative);
             if record.file != SCENE && !is_asset {
-                return Err(format!("file name `{}` leads elsewhere", record.file));
+                return Err(format!(
+                    "file name `{}` leads out of the cache",
+                    record.file
+                ));
             }
             if self.files[..i].iter().any(|r| r.file == record.file) {
-                return Err(format!("`{}` is named twice", record.file));
+                return Err(format!("`{}` is listed twice", record.file));
             }
         }
         Ok(())

@@ -77,7 +77,7 @@ impl ProbeRecord {
     /// Why these cannot be one frame's values.
     pub(super) fn misfit(&self, values: &[Option<f64>]) -> Option<&'static str> {
         if is_by_frame(&self.rate_hz) {
-            return (values.len() != self.columns.len()).then_some("another number of columns");
+            return (values.len() != self.columns.len()).then_some("a different number of columns");
         }
         let looks = values.chunks(self.columns.len() + 1);
         let times: Option<Vec<f64>> = looks.clone().map(|look| look[0]).collect();
@@ -86,7 +86,7 @@ impl ProbeRecord {
             .all(|look| look.len() == self.columns.len() + 1);
         match times {
             Some(times) if are_whole && times.is_sorted() => None,
-            _ => Some("looks that are no times with their columns"),
+            _ => Some("samples that are not a time with its columns"),
         }
     }
 
@@ -108,7 +108,7 @@ impl ProbeRecord {
     pub(super) fn check_all(records: &[Self]) -> Result<(), String> {
         for (k, record) in records.iter().enumerate() {
             if !is_file_stem(&record.name) {
-                return Err(format!("probe name `{}` is no file name", record.name));
+                return Err(format!("probe name `{}` is not a file name", record.name));
             }
             let mut before = records[..k].iter();
             if before.any(|other| other.name.eq_ignore_ascii_case(&record.name)) {

@@ -321,8 +321,8 @@ impl CacheReader {
             problems.push(Problem {
                 file: self.dir.join(ledger::FILE),
                 what: format!(
-                    "its last line is torn after frame {}; --resume cuts it (a bake that runs \
-                     now may be writing it)",
+                    "its last line is truncated after frame {}; --resume removes it (a running \
+                     bake may still be writing it)",
                     self.last_frame()
                 ),
             });
@@ -413,7 +413,7 @@ pub(super) fn read_frame(
         return Err(CacheError::damaged(
             path,
             format!(
-                "{} particles, and the ledger has {}",
+                "it has {} particles, but the ledger lists {}",
                 particles.len(),
                 entry.particles
             ),
@@ -422,7 +422,7 @@ pub(super) fn read_frame(
     if !particles.attributes.keys().eq(&manifest.attributes) {
         return Err(CacheError::damaged(
             path,
-            "its attributes are not the manifest's",
+            "its attributes differ from those in the manifest",
         ));
     }
     Ok(particles)

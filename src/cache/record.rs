@@ -44,7 +44,10 @@ impl FileRecord {
         let path = dir.join(&self.file);
         disk::check_length_on_disk(&path, self.bytes)?;
         if disk::file_hash(&path)? != self.blake3 {
-            return Err(CacheError::damaged(path, "its BLAKE3 is off"));
+            return Err(CacheError::damaged(
+                path,
+                "its BLAKE3 checksum does not match",
+            ));
         }
         Ok(())
     }
@@ -54,7 +57,10 @@ impl FileRecord {
         let path = dir.join(&self.file);
         let content = disk::read_exactly(&path, self.bytes)?;
         if blake3::hash(&content).to_hex().as_str() != self.blake3 {
-            return Err(CacheError::damaged(path, "its BLAKE3 is off"));
+            return Err(CacheError::damaged(
+                path,
+                "its BLAKE3 checksum does not match",
+            ));
         }
         Ok(content)
     }

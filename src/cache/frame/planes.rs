@@ -140,7 +140,7 @@ pub fn read(mut content: impl io::Read) -> Result<Particles, String> {
     let particles = read_blocks(&mut body, head, content_of)?;
     match body.read(&mut [0]).map_err(fault)? {
         0 => Ok(particles),
-        _ => Err("more follows than its header promises".to_owned()),
+        _ => Err("it has more data than its header declares".to_owned()),
     }
 }
 

@@ -73,7 +73,7 @@ fn holds(cache: &Path, whole: &Path) -> u32 {
     let reader = CacheReader::open(cache).unwrap();
     for problem in reader.survey().problems {
         let may_lag = problem.file.starts_with(cache.join("probes"));
-        assert!(may_lag || problem.what.contains("torn"), "{problem:?}");
+        assert!(may_lag || problem.what.contains("truncated"), "{problem:?}");
     }
     assert!(ledger(whole).starts_with(&ledger(cache)));
     reader.last_frame()

@@ -289,7 +289,7 @@ fn another_format_is_named_not_guessed_at() {
         assert!(matches!(error, CacheError::Format { .. }), "{error:?}");
         let said = error.to_string();
         let expected =
-            format!("cache format {version}, and this program reads 1 to 2: bake it anew");
+            format!("cache format {version}, and this program reads 1 to 2: bake it again");
         assert!(said.contains(&expected) && !said.contains('\n'), "{said}");
     }
 }

@@ -484,7 +484,7 @@ fn a_bake_leaves_a_file_a_probe(solver: &str) {
         &format!("{bake} whole --resume --set probe[0].at=[0.0,1.0]"),
     );
     assert!(
-        said.contains("cannot be made up afterwards") && said.contains("[-0.6, 0.75]"),
+        said.contains("not afterwards; continue") && said.contains("[-0.6, 0.75]"),
         "{said}"
     );
     let said = job.expect(

@@ -383,8 +383,8 @@ fn damaged_missing_and_unasked_grids_are_found() {
         assert_eq!(problem.file, path);
         problem.what.clone()
     };
-    assert_eq!(problem(Some(&bad)), "its BLAKE3 is off");
-    assert!(problem(Some(&good[1..])).contains("were written"));
+    assert_eq!(problem(Some(&bad)), "its BLAKE3 checksum does not match");
+    assert!(problem(Some(&good[1..])).contains("bytes instead of"));
     assert_eq!(problem(None), "it is missing");
     let resumed = CacheWriter::resume(dir.path(), &manifest(Some(record())));
     assert!(matches!(resumed, Err(CacheError::Damaged { file, .. }) if file == path));

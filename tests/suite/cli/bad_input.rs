@@ -83,16 +83,16 @@ fn given() -> Job {
 
 /// Command, exit code, required part of the line.
 const FAULTS: [(&str, i32, &str); 21] = [
-    ("verify gone", 4, "gone is not there"),
+    ("verify gone", 4, "gone does not exist"),
     (
         "verify look.toml",
         4,
-        "look.toml is a file, and a cache is a folder",
+        "look.toml is a file; a cache is a folder",
     ),
     (
         "export shots --npy p.%04d.npy",
         4,
-        "shots holds no cache itself: name one of shots/flip, shots/pbf",
+        "shots is not a cache; name one of shots/flip, shots/pbf",
     ),
     ("verify damaged", 4, "small.0000.ply is damaged"),
     ("diff cache damaged", 4, "small.0000.ply is damaged"),

@@ -494,7 +494,7 @@ fn faults_are_one_clear_line() {
         "no-such-ffmpeg, which cannot be run",
     );
     clear(2, "view day --fps 0", "from 0.1 to 240");
-    clear(4, "view day --curves gone", "gone is not there");
+    clear(4, "view day --curves gone", "gone does not exist");
     assert!(!job.path("views").exists() && !job.path("day.mp4.part").exists());
     write(&job, "day", 13..=13, [32, 36]);
     clear(2, "view day", "shot.0013.png is 32 × 36");

@@ -176,7 +176,7 @@ fn what_does_not_compare_is_refused_in_words() {
             "cache cache --write-baseline x.json",
             "cannot be used with",
         ),
-        (4, "renders --write-baseline x.json", "holds no cache"),
+        (4, "renders --write-baseline x.json", "no manifest.json"),
     ] {
         assert_has(&job.expect(code, &format!("diff {arguments}")), &[words]);
     }

@@ -214,7 +214,7 @@ fn expected(key: &str, solver: &str) -> Option<String> {
     } else if key.starts_with("keep.") {
         "baked with keep = ".to_owned()
     } else if key.starts_with("probe[") {
-        "go on with the same probes".to_owned()
+        "continue with the same probes".to_owned()
     } else {
         format!("another scene: {key} was ")
     })

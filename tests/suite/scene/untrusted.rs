@@ -117,7 +117,7 @@ fn a_promise_of_a_trillion_is_refused_without_memory_for_it() {
         let cost = largest(|| {
             let read = frame::decode(&bytes, Path::new("frame"));
             let said = read.expect_err(many).to_string();
-            assert!(said.contains("promises"), "{said}");
+            assert!(said.contains("declares"), "{said}");
         });
         assert!(cost < MODEST, "{cost} bytes for {many} particles");
     }

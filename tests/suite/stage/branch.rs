@@ -296,7 +296,7 @@ fn a_frame_that_does_not_fit_is_refused_and_nothing_is_written() {
             "lie beyond the walls of the scene as they stand at 0.05 s",
         ),
         (4, "--from whole:4", "has frames 0 to 3, not 4"),
-        (4, "--from nowhere:1", "nowhere is not there"),
+        (4, "--from nowhere:1", "nowhere does not exist"),
         (2, "--from whole", "not a cache and a frame"),
         (2, "--from whole:x", "not a cache and a frame"),
         (

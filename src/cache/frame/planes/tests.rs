@@ -115,7 +115,7 @@ fn other_content_is_refused() {
     assert!(refused(&[&*sound, b"x"].concat()).contains("1 bytes follow"));
     for (content, words) in [
         (&content[..content.len() - 1], "and 95 bytes follow"),
-        (&[&*content, b"x"].concat(), "more follows"),
+        (&[&*content, b"x"].concat(), "more data"),
         (&plain(&NEAR, &particles), "not that of a compressed frame"),
     ] {
         let what = refused(&stream_of(content));
