@@ -13,7 +13,7 @@ pub struct Chunk {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ChunkError {
     /// The text is not two numbers separated by `/`.
-    #[error("`{0}` is no share: write 1/4 for the first of four")]
+    #[error("`{0}` is not a share: write 1/4 for the first of four")]
     Form(String),
     /// The index is not within 1..=count.
     #[error("there is no share {index} of {count}: the shares are 1/{count} to {count}/{count}")]

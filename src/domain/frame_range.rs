@@ -15,7 +15,7 @@ pub struct FrameRange {
 /// Error for a text that is not a frame range.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "`{part}` is no frame range: {what}; write 7, 1-240, 1-240x2, or several with commas between"
+    "`{part}` is not a frame range: {what}; write 7, 1-240, 1-240x2, or several with commas between"
 )]
 pub struct FrameRangeError {
     /// Item of the list that is wrong.
@@ -144,7 +144,7 @@ fn number(digits: &str) -> Result<u32, String> {
             .parse()
             .map_err(|_| format!("{digits} is more than {}", u32::MAX));
     }
-    Err(format!("`{digits}` is no frame number"))
+    Err(format!("`{digits}` is not a frame number"))
 }
 
 #[cfg(test)]
@@ -181,13 +181,13 @@ mod tests {
             ("1-9x0", "step is 0"),
             ("1-9:0", "step is 0"),
             ("3x2", "needs a range"),
-            ("-3", "no frame number"),
-            ("1-", "no frame number"),
-            ("1-2-3", "`2-3` is no frame number"),
-            ("1-9x2x2", "`2x2` is no frame number"),
-            ("+1", "no frame number"),
-            ("1.5", "no frame number"),
-            ("all", "no frame number"),
+            ("-3", "not a frame number"),
+            ("1-", "not a frame number"),
+            ("1-2-3", "`2-3` is not a frame number"),
+            ("1-9x2x2", "`2x2` is not a frame number"),
+            ("+1", "not a frame number"),
+            ("1.5", "not a frame number"),
+            ("all", "not a frame number"),
             ("4294967296", "more than 4294967295"),
             ("1-4294967295", "more than 10000000 frames"),
             ("1-9000000,1-9000000", "more than 10000000 frames"),

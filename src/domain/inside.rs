@@ -15,7 +15,7 @@ pub enum NoInside {
     /// The mesh is open, such as a tube or a sheet.
     #[error(
         "the mesh is open and has no inside: {why}; {holes}{parts}; close the mesh, or give its \
-         walls a thickness where water is to be inside of it"
+         walls a thickness if water is to be inside it"
     )]
     Open {
         /// What is wrong with the part that the holes belong to.
@@ -269,7 +269,7 @@ mod tests {
             error.to_string(),
             "the mesh is open and has no inside: no place in it is enclosed, as beside a sheet; 1 \
              hole: 4 open edges about (0.0000, 0.5000, 0.5000), 1.4142 m across; close the mesh, \
-             or give its walls a thickness where water is to be inside of it"
+             or give its walls a thickness if water is to be inside it"
         );
 
         let mut two_sided = sheet.clone();

@@ -55,7 +55,7 @@ impl fmt::Display for Keep {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum KeepError {
     /// The step is 0, and a bake could not resume from such frames.
-    #[error("every 0th frame is none, and a bake goes on from the frames that it keeps")]
+    #[error("every 0th frame is none, and a bake resumes from the frames that it keeps")]
     Zero,
     /// The text has any other fault.
     #[error("it names no frames")]

@@ -257,8 +257,8 @@ impl Crossing {
         };
         Some(format!(
             "{is}, the first is face {face} (counted from 1) with a corner at ({x}, {y}, {z}); \
-             each is taken as a fan about one corner, so part of it may fold back over itself; \
-             make it triangles where it was drawn"
+             each is split into a fan about one corner, so part of it may fold back over itself; \
+             triangulate it in the program that made it"
         ))
     }
 }

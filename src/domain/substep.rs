@@ -28,7 +28,7 @@ impl fmt::Display for Which {
 
 /// Error for a text that is not a substep.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("`{0}` is no substep: it is a number from 1 on, or last")]
+#[error("`{0}` is not a substep: give a number from 1 on, or last")]
 pub struct NoSubstep(String);
 
 impl FromStr for Which {

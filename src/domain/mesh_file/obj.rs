@@ -78,7 +78,10 @@ impl Geometry {
                 let mut corners = 0;
                 for word in words {
                     let index = vertex_index(word, self.vertices).ok_or_else(|| {
-                        format!("line {number}: {} names no vertex", quoted(word))
+                        format!(
+                            "line {number}: {} is not a valid vertex index",
+                            quoted(word)
+                        )
                     })?;
                     self.greatest = self.greatest.max((index, number));
                     corners += 1;

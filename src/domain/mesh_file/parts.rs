@@ -141,7 +141,7 @@ impl Reader {
                 None => None,
                 Some(index) => Some(obj::index_of(index, count).ok_or_else(|| {
                     format!(
-                        "line {number}: {} names no texture coordinate",
+                        "line {number}: {} is not a valid texture coordinate index",
                         quoted(word)
                     )
                 })?),
@@ -331,17 +331,17 @@ mod tests {
             (
                 "3/3 4/4",
                 "3/3 4/0",
-                "line 13: \"4/0\" names no texture coordinate",
+                "line 13: \"4/0\" is not a valid texture coordinate index",
             ),
             (
                 "3/3 4/4",
                 "3/3 4/-9",
-                "line 13: \"4/-9\" names no texture coordinate",
+                "line 13: \"4/-9\" is not a valid texture coordinate index",
             ),
             (
                 "3/3 4/4",
                 "3/3 4/99999999999999999999",
-                "line 13: \"4/99999999999999999999\" names no texture coordinate",
+                "line 13: \"4/99999999999999999999\" is not a valid texture coordinate index",
             ),
         ] {
             let text = FILE.replacen(from, to, 1);

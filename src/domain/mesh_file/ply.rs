@@ -244,7 +244,7 @@ fn body_fault(error: &ParseError, element: &ElementDef, lines: &str, header: usi
     let ElementDef { name, count, .. } = element;
     if error.kind() == ErrorKind::UnexpectedEof {
         return format!(
-            "the file ends within element {name:?}, of which the header promises {count}"
+            "the file ends within element {name:?}, of which the header declares {count}"
         );
     }
     let told = error.to_string();
@@ -259,9 +259,9 @@ fn body_fault(error: &ParseError, element: &ElementDef, lines: &str, header: usi
         .split_once("Value: '")
         .and_then(|(_, rest)| rest.split_once('\''));
     let what = match (odd, value) {
-        (Some(word), _) => format!("{} is no number", quoted(word)),
+        (Some(word), _) => format!("{} is not a number", quoted(word)),
         (None, Some((value, _))) => format!("{value} does not fit into its property's type"),
-        (None, None) => "it has fewer values than the header says".to_owned(),
+        (None, None) => "it has fewer values than the header declares".to_owned(),
     };
     format!(
         "line {}, element {name:?}: {}: {what}",
@@ -299,7 +299,7 @@ fn check_promise(
     // The last line may lack its line end.
     if needed > bytes_left as u128 + 1 {
         return Err(format!(
-            "the header promises {} of element \"{}\", which need {needed} bytes, but {bytes_left} \
+            "the header declares {} of element \"{}\", which need {needed} bytes, but {bytes_left} \
              are left",
             element.count, element.name
         ));

@@ -31,7 +31,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Raw, String> {
         return read_text(&lines_of(text));
     }
     let why = if is_solid {
-        "begins with \"solid\", but is no text"
+        "begins with \"solid\", but is not text"
     } else {
         "not an STL: no \"solid\" line"
     };
@@ -115,7 +115,7 @@ fn join(text: &str) -> Result<Joined, String> {
             continue;
         }
         if !is_within {
-            return Err(fault(&format!("{} outside of a solid", quoted(&line))));
+            return Err(fault(&format!("{} outside a solid", quoted(&line))));
         }
         if line.starts_with("endsolid") {
             is_within = false;

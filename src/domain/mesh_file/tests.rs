@@ -260,14 +260,17 @@ fn every_fault_is_named() {
             obj("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n"),
             "line 4: the face refers to vertex 4",
         ),
-        (obj("v 0 0 0\nf 1 2 0\n"), "line 2: \"0\" names no vertex"),
+        (
+            obj("v 0 0 0\nf 1 2 0\n"),
+            "line 2: \"0\" is not a valid vertex index",
+        ),
         (
             obj("v 0 0 0\nf 1 1\n"),
             "line 2: a face needs three corners",
         ),
         (
             obj("v 0 0 0\nf -9223372036854775808 1 1\n"),
-            "names no vertex",
+            "is not a valid vertex index",
         ),
         (
             obj("v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"),
@@ -283,7 +286,7 @@ fn every_fault_is_named() {
         ),
         (
             ply(&SQUARE_PLY.replace("vertex 4", "vertex 4000000000000")),
-            "promises 4000000000000",
+            "declares 4000000000000",
         ),
         (
             ply(&SQUARE_PLY.replace("4 0 1 2 3", "4 0 1 2 9")),
@@ -327,7 +330,7 @@ fn an_endless_promise_of_nothing_is_refused() {
     let bytes = b"ply\nformat binary_little_endian 1.0\nelement none 1152921504606846976\n\
         end_header\n";
     let message = parse(MeshFormat::Ply, bytes).expect_err("a false promise");
-    assert!(message.contains("promises"), "{message}");
+    assert!(message.contains("declares"), "{message}");
 }
 
 fn moved(mesh: &TriangleMesh, by: f64) -> TriangleMesh {
@@ -373,7 +376,7 @@ fn every_solid_of_a_text_is_read() {
     let message = parse(MeshFormat::Stl, &binary).expect_err("a byte less");
     assert!(
         message.ends_with(
-            "begins with \"solid\", but is no text, and 12 triangles need 684 bytes of 683"
+            "begins with \"solid\", but is not text, and 12 triangles need 684 bytes of 683"
         ),
         "{message}"
     );
@@ -408,7 +411,7 @@ fn every_group_of_an_obj_is_read_with_comments_marks_and_joined_lines() {
     }
     // Line numbers are those of the file, even after joined lines.
     let message = parse(MeshFormat::Obj, b"v 0 \\\n0 0\n# \\\nf 1 2 x").expect_err("no x");
-    assert_eq!(message, "mesh m: line 4: \"x\" names no vertex");
+    assert_eq!(message, "mesh m: line 4: \"x\" is not a valid vertex index");
     let wide: Vec<u8> = text.encode_utf16().flat_map(u16::to_le_bytes).collect();
     let message = parse(MeshFormat::Obj, &[&b"\xff\xfe"[..], &wide].concat()).expect_err("UTF-16");
     assert!(message.contains("UTF-16"), "{message}");
@@ -464,15 +467,15 @@ fn faults_of_text_files_are_told_in_one_line_with_their_place() {
         ),
         (
             ply("2 2 0 255", "2 two 0 255"),
-            "line 13, element \"vertex\": \"2 two 0 255\": \"two\" is no number",
+            "line 13, element \"vertex\": \"2 two 0 255\": \"two\" is not a number",
         ),
         (
             ply("2 2 0 255", "2 nan 0 255"),
-            "line 13, element \"vertex\": \"2 nan 0 255\": \"nan\" is no number",
+            "line 13, element \"vertex\": \"2 nan 0 255\": \"nan\" is not a number",
         ),
         (
             ply("2 2 0 255", "2 2 0"),
-            "line 13, element \"vertex\": \"2 2 0\": it has fewer values than the header says",
+            "line 13, element \"vertex\": \"2 2 0\": it has fewer values than the header declares",
         ),
         (
             ply("2 2 0 255", "2 2 0 256"),
@@ -480,15 +483,16 @@ fn faults_of_text_files_are_told_in_one_line_with_their_place() {
         ),
         (
             ply("4 0 1 2 3", "5 0 1 2 3"),
-            "line 15, element \"face\": \"5 0 1 2 3\": it has fewer values than the header says",
+            "line 15, element \"face\": \"5 0 1 2 3\": it has fewer values than the header \
+             declares",
         ),
         (
             ply("4 0 1 2 3\n", ""),
-            "promises 1 of element \"face\", which need 2 bytes, but 0 are left",
+            "declares 1 of element \"face\", which need 2 bytes, but 0 are left",
         ),
         (
             ply("element face 1", "element face 2"),
-            "the file ends within element \"face\", of which the header promises 2",
+            "the file ends within element \"face\", of which the header declares 2",
         ),
         (
             ply("element face 1", "element face 1\nelement face 1"),
@@ -520,7 +524,7 @@ fn faults_of_text_files_are_told_in_one_line_with_their_place() {
         ),
         (
             stl("endsolid cube\n", "endsolid\nthe end\n"),
-            "line 87: \"the end\" outside of a solid",
+            "line 87: \"the end\" outside a solid",
         ),
     ];
     for (result, expected) in cases {

@@ -28,7 +28,7 @@ const MAGIC: [u8; 8] = *b" BDV\0\0\0\0";
 /// Reads vertices in metres, and triangles.
 pub(super) fn read(bytes: &[u8]) -> Result<Raw, String> {
     if !bytes.starts_with(&MAGIC) {
-        return Err("no OpenVDB file".into());
+        return Err("not an OpenVDB file".into());
     }
     let bytes = with_lengths(bytes);
     let grid = caught(|| grid(&bytes))
@@ -118,7 +118,7 @@ pub struct GridFile {
 /// A message that says what is wrong.
 pub fn grids(bytes: &[u8]) -> Result<Vec<GridFile>, String> {
     if !bytes.starts_with(&MAGIC) {
-        return Err("no OpenVDB file".into());
+        return Err("not an OpenVDB file".into());
     }
     let bytes = with_lengths(bytes);
     caught(|| all_grids(&bytes))
@@ -138,7 +138,10 @@ fn all_grids(bytes: &[u8]) -> Result<Vec<GridFile>, String> {
             _ => None,
         };
         if found.end_pos > bytes.len() as u64 {
-            return Err(format!("torn: grid {} ends beyond the file", found.name));
+            return Err(format!(
+                "truncated: grid {} ends beyond the file",
+                found.name
+            ));
         }
         let voxel_size = match found.grid_type.starts_with("Tree_float_5_4_3") {
             true => Some(scale_of(

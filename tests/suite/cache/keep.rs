@@ -239,7 +239,7 @@ fn a_keep_that_nothing_could_go_on_from_is_named_with_its_line() {
     for (value, words) in [
         (
             "\"every 0\"",
-            "\"every 0\": every 0th frame is none, and a bake goes on",
+            "\"every 0\": every 0th frame is none, and a bake resumes",
         ),
         (
             "\"every\"",

@@ -97,8 +97,8 @@ fn shares_of_a_range_are_rendered_into_one_folder() {
     for (chunk, part) in [
         ("5/4", "there is no share 5 of 4: the shares are 1/4 to 4/4"),
         ("0/4", "there is no share 0 of 4"),
-        ("1/0", "`1/0` is no share: write 1/4"),
-        ("half", "`half` is no share"),
+        ("1/0", "`1/0` is not a share: write 1/4"),
+        ("half", "`half` is not a share"),
     ] {
         for command in [&format!("{render} new"), "export cache --npy new.%04d.npy"] {
             let said = job.expect(2, &format!("{command} --chunk {chunk}"));

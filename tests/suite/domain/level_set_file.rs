@@ -85,7 +85,7 @@ fn what_is_no_level_set_is_refused() {
     }
     let mut spoilt = SPHERE.to_vec();
     spoilt[0] = b'X';
-    assert!(told(&spoilt).contains("no OpenVDB file"));
+    assert!(told(&spoilt).contains("not an OpenVDB file"));
 }
 
 #[test]

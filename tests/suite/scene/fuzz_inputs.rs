@@ -170,7 +170,7 @@ fn each_fault_of_a_study_names_file_line_key_and_what_is_allowed() {
         (
             "60,120",
             "120-60",
-            "s.toml:6: pictures: `120-60` is no frame range",
+            "s.toml:6: pictures: `120-60` is not a frame range",
         ),
         (
             "scene.toml",
