@@ -17,7 +17,7 @@ pub enum GpuError {
     NoAdapter,
     /// `--adapter` matches nothing.
     #[error(
-        "no adapter `{request}`; allowed is the number of one of these, or a part of its name:{}",
+        "no adapter matches `{request}`; give the number of one of these, or a part of its name:{}",
         list(available)
     )]
     NoSuchAdapter {

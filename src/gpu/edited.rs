@@ -38,7 +38,8 @@ pub(super) fn check(
             (None, None) => {
                 let names: Vec<&str> = shipped.bindings.iter().map(|b| b.name.as_str()).collect();
                 return Err(format!(
-                    "its binding `{name}` is no buffer of the program; the shipped pass binds {}",
+                    "its binding `{name}` is not a buffer of the program; the shipped pass binds \
+                     {}",
                     names.join(", ")
                 ));
             }
@@ -142,7 +143,8 @@ mod tests {
         for (edits, words) in [
             (
                 &[("velocity", "velocities")][..],
-                "`velocities` is no buffer of the program; the shipped pass binds params, velocity",
+                "`velocities` is not a buffer of the program; the shipped pass binds params, \
+                 velocity",
             ),
             (
                 &[("array<vec4f>", "array<vec2f>")],

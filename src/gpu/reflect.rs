@@ -275,7 +275,7 @@ pub(super) fn reflect_at(
     };
     let stage = stage(&module).ok_or_else(|| {
         let count = module.entry_points.len();
-        fault(format!("{count} entry points, which are no pass"))
+        fault(format!("{count} entry points, which do not form a pass"))
     })?;
     let entries = 0..module.entry_points.len();
     let uses = |variable: naga::Handle<naga::GlobalVariable>, how: GlobalUse| {

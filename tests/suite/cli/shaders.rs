@@ -358,7 +358,7 @@ fn an_edit_that_the_program_cannot_bind_or_compose_is_refused_with_its_place() {
             "name",
             &[
                 "pbf/predict of --shaders",
-                "`velocities` is no buffer of the program",
+                "`velocities` is not a buffer of the program",
             ][..],
         ),
         ("layout", &["`params` is", "and the program has"]),
