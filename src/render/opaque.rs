@@ -105,7 +105,8 @@ impl Opaque {
     ) -> Result<(), RenderError> {
         if tells_apart && scene.solids.len() > MOST_SOLIDS {
             return Err(RenderError::Scene(format!(
-                "output.cryptomatte tells {MOST_SOLIDS} solids apart at most, and the scene has {}",
+                "output.cryptomatte distinguishes at most {MOST_SOLIDS} solids, and the scene has \
+                 {}",
                 scene.solids.len()
             )));
         }
@@ -121,7 +122,7 @@ impl Opaque {
                 for (point, &index) in points.iter_mut().zip(corners) {
                     *point = *mesh.vertices.get(index as usize).ok_or_else(|| {
                         RenderError::Scene(format!(
-                            "a triangle names vertex {index}, which is not there"
+                            "a triangle refers to vertex {index}, which does not exist"
                         ))
                     })?;
                 }
