@@ -58,7 +58,7 @@ pub enum SolveError {
         given: usize,
     },
     /// The frame has fewer substeps than the requested one.
-    #[error("substep {asked} was asked for, and the frame after frame {frame} has {count}")]
+    #[error("substep {asked} was requested, but the frame after frame {frame} has {count}")]
     NoSubstep {
         /// Requested substep, counted from 1.
         asked: u32,
