@@ -380,7 +380,7 @@ fn whole(state: &FlipState, mut x: Vec<f64>, velocity: &[DVec3], io: &mut Io<'_>
     let least = least_eigenvalue(&solver, b.len());
     // Also covers NaN, the result without any rows.
     if least.partial_cmp(&0.0) != Some(std::cmp::Ordering::Greater) {
-        let why = "nothing to solve: drops alone, or water that no air touches in one cell";
+        let why = "nothing to solve: only drops, or water that no air touches in one cell";
         io.table.unchecked.push(("whole projection", why));
         return Ok(());
     }
