@@ -21,8 +21,8 @@ pub(super) fn build(
     (gravity, seconds): (DVec3, f64),
 ) -> Result<Absorption, SceneError> {
     if axis == 1 || gravity.x != 0.0 || gravity.z != 0.0 || gravity.y >= 0.0 {
-        let problem = "a wall absorbs by the water's level: it is one along x or z, and \
-                       gravity is straight down";
+        let problem = "a wall absorbs by the water's level, so it has to face x or z, and gravity \
+            has to point straight down";
         return Err(doc.fault_of_plain(path, problem));
     }
     let absorption = Absorption::new(Asked {
@@ -34,8 +34,8 @@ pub(super) fn build(
     let gain = absorption.gain();
     if gain * seconds > MOST_GAIN {
         let problem = format!(
-            "the wall answers once a frame, and on {} m of water that has to be {:.1} times a \
-             second or more; raise shot.frames_per_second",
+            "the wall reacts once a frame, and on {} m of water that has to be at least {:.1} \
+             times a second; raise shot.frames_per_second",
             shown(spec.depth),
             gain / MOST_GAIN
         );
@@ -101,7 +101,7 @@ impl Scene {
             match &maker.absorption {
                 Some(it) if found.displacement.abs() <= it.asked().room => *absorber = Some(found),
                 _ => notes.push(format!(
-                    "wave_maker[{k}]: the wall {} was {} m off its own way and begins on it",
+                    "wave_maker[{k}]: the wall {} was {} m away from its own path and begins on it",
                     maker.wall.name(),
                     shown(found.displacement)
                 )),
@@ -180,7 +180,7 @@ pub(super) fn check_still(
     match (motion, absorption) {
         (Motion::Still, None) => {
             let problem =
-                "a wall that makes no waves and takes none in: it needs wave_maker.absorption";
+                "a wall that neither makes nor absorbs waves; give it wave_maker.absorption";
             Err(doc.fault_of(&format!("{path}.kind"), problem))
         }
         _ => Ok(()),
@@ -210,8 +210,8 @@ impl Held {
         let held = self.0.iter().enumerate().filter(|(_, count)| **count > 0);
         held.map(|(k, count)| {
             format!(
-                "wave_maker[{k}].absorption.room: the wall was at its end in {count} frames and \
-                 threw waves back; give it more"
+                "wave_maker[{k}].absorption.room: the wall was at the end of its range in {count} \
+                 frames and reflected waves; raise it"
             )
         })
         .collect()

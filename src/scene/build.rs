@@ -261,7 +261,7 @@ fn water_mesh(
         return Ok(placed);
     }
     let problem = format!(
-        "the water does not fit: it reaches over {}, the domain over {}",
+        "the water does not fit: it spans {}, the domain spans {}",
         extent(placed.mesh.bounds()),
         extent(Some(*domain))
     );
@@ -304,7 +304,7 @@ fn water_block(
             "min"
         };
         let problem = format!(
-            "the water does not fit: the block reaches over {}, the domain over {}",
+            "the water does not fit: the block spans {}, the domain spans {}",
             extent(Some(block)),
             extent(Some(*domain))
         );
@@ -377,7 +377,7 @@ fn static_solid(
         return Ok(placed);
     }
     let problem = format!(
-        "the mesh lies outside of the domain: it reaches over {}, the domain over {}",
+        "the mesh lies outside the domain: it spans {}, the domain spans {}",
         extent(placed.mesh.bounds()),
         extent(Some(*domain))
     );
@@ -433,9 +433,9 @@ fn coarse(loaded: &Loaded, placement: &Placement, spacing: f64) -> Option<String
     let step = reach.max_element();
     (loaded.digits == Digits::Single && step > MOST_STEP * spacing).then(|| {
         format!(
-            "32-bit floats about its coordinate {} are {step:.2e} m apart, more than {MOST_STEP} \
-             of the particle spacing of {} m; save it near its own zero and let translate move it, \
-             or as text with all digits, such as OBJ",
+            "32-bit floats near its coordinate {} are {step:.2e} m apart, more than {MOST_STEP} of \
+             the particle spacing of {} m; save it near its own origin and move it with translate, \
+             or save it as text with all digits, such as OBJ",
             shown(loaded.farthest()),
             shown(spacing)
         )

@@ -108,7 +108,7 @@ impl SceneBuilder {
         let value = value.into();
         match self.entry(key) {
             Some(entry) => *entry = value,
-            None => self = self.with_fault(key, "it is within a value that is no table"),
+            None => self = self.with_fault(key, "it is inside a value that is not a table"),
         }
         self
     }
@@ -170,7 +170,7 @@ impl SceneBuilder {
     fn append(mut self, key: &str, table: Table) -> Self {
         match self.entry(key).and_then(Value::as_array_mut) {
             Some(list) => list.push(table.into()),
-            None => self = self.with_fault(key, "it is no list of tables"),
+            None => self = self.with_fault(key, "it is not an array of tables"),
         }
         self
     }
@@ -226,12 +226,12 @@ mod tests {
             ),
             (
                 flume().set("shot.name.first", 1),
-                ["shot.name.first", "no table"],
+                ["shot.name.first", "not a table"],
             ),
             (flume().push("probe", "kind = "), ["probe", "flume"]),
             (
                 flume().push("shot.name", "a = 1"),
-                ["shot.name", "no list of tables"],
+                ["shot.name", "not an array of tables"],
             ),
             (
                 flume().set("solver.flip.celsize", 1.0),

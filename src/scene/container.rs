@@ -20,7 +20,7 @@ impl PlacedMesh {
         let name = self.file_name();
         (!self.holes.0.is_empty()).then(|| {
             format!(
-                "{name} is open and taken as closed: {}; inside is where its winding number is \
+                "{name} is open and treated as closed: {}; inside is where its winding number is \
                  above one half, about as if a flat cap closed each hole",
                 self.holes
             )
@@ -41,9 +41,9 @@ impl Scene {
             let warning = placed.warning()?;
             Some(match self.is_container(placed) {
                 true => format!(
-                    "{warning}; the scene puts water inside of it, and that water is left out: an \
-                     open mesh is solid up to a flat cap over each hole; give walls that hold \
-                     water a thickness, so that the mesh is closed"
+                    "{warning}; the scene puts water inside it, and that water is removed: an open \
+                     mesh is solid up to a flat cap over each hole; give walls that hold water a \
+                     thickness, so that the mesh is closed"
                 ),
                 false => warning,
             })

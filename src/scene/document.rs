@@ -78,11 +78,11 @@ impl<'a> Document<'a> {
             return self.fault(error.span(), String::new(), format!("{message}{hint}"));
         }
         let (path, message) = match self.header_at(span.start) {
-            Some(header) => (header, "a second table of this name".to_owned()),
+            Some(header) => (header, "this table is defined twice".to_owned()),
             None => {
                 let table = self.table_around(&span);
                 let place = table_name(&table).unwrap_or_else(|| "the file".to_owned());
-                let message = format!("a second key of this name in {place}");
+                let message = format!("this key is defined twice in {place}");
                 (join(&table, name), message)
             }
         };

@@ -41,7 +41,7 @@ fn set(root: &mut Table, key: &str, mut value: Value) -> Result<(), String> {
         let item = table.entry(part).or_insert_with(|| made(is_inline));
         is_inline = item.is_inline_table();
         let inner = item.as_table_like_mut();
-        table = inner.ok_or_else(|| format!("{} is no table", parts[..=depth].join(".")))?;
+        table = inner.ok_or_else(|| format!("{} is not a table", parts[..=depth].join(".")))?;
     }
     if let Some(old) = table.get_mut(last).and_then(Item::as_value_mut) {
         *value.decor_mut() = old.decor().clone();
@@ -182,7 +182,7 @@ pressure = { tolerance = 1e-3 }
         // Controls: invalid TOML, and a key that leads through a number.
         assert!(with_settings("[", &settings).is_err());
         let through = [set("solver.pbf.particle_spacing.deep", "1")];
-        let said = with_settings(text, &through).expect_err("no table");
-        assert_eq!(said, "solver.pbf.particle_spacing is no table");
+        let said = with_settings(text, &through).expect_err("not a table");
+        assert_eq!(said, "solver.pbf.particle_spacing is not a table");
     }
 }

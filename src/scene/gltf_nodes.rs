@@ -43,7 +43,7 @@ pub enum NodeError {
         what: String,
     },
     /// Nodes that are their own ancestors, or nested too deeply.
-    #[error("node {0} hangs under more than {MOST_NODES} nodes, or under itself")]
+    #[error("node {0} has more than {MOST_NODES} ancestors, or is under itself")]
     Hierarchy(String),
 }
 
@@ -261,11 +261,11 @@ fn data(uri: &str, beside: Beside<'_>) -> std::result::Result<Vec<u8>, String> {
     };
     let (_, text) = rest
         .split_once(";base64,")
-        .ok_or("its data are not in base 64")?;
+        .ok_or("its data are not base64")?;
     let engine = base64::engine::general_purpose::STANDARD;
     engine
         .decode(text)
-        .map_err(|error| format!("its data are no base 64: {error}"))
+        .map_err(|error| format!("its data are not valid base64: {error}"))
 }
 
 fn percent_decoded(uri: &str) -> std::result::Result<String, String> {
@@ -279,10 +279,10 @@ fn percent_decoded(uri: &str) -> std::result::Result<String, String> {
         }
         let digits = rest.get(..2).and_then(|two| std::str::from_utf8(two).ok());
         let byte = digits.and_then(|two| u8::from_str_radix(two, 16).ok());
-        bytes.push(byte.ok_or_else(|| format!("{uri} is no URI"))?);
+        bytes.push(byte.ok_or_else(|| format!("{uri} is not a URI"))?);
         rest = &rest[2..];
     }
-    String::from_utf8(bytes).map_err(|_| format!("{uri} is no text"))
+    String::from_utf8(bytes).map_err(|_| format!("{uri} is not UTF-8 text"))
 }
 
 /// Reads the local transform of a node with its animations.
@@ -325,11 +325,11 @@ fn hung(document: &Document, node: &Node<'_>, buffers: &[Option<Cow<'_, [u8]>>])
         }
         let reader = channel.reader(|buffer| buffers[buffer.index()].as_deref());
         let inputs = reader.read_inputs();
-        let times: Vec<f64> = (inputs.ok_or_else(|| fault("its times are not there".into()))?)
+        let times: Vec<f64> = (inputs.ok_or_else(|| fault("its times are missing".into()))?)
             .map(f64::from)
             .collect();
         let outputs = reader.read_outputs();
-        match outputs.ok_or_else(|| fault("its values are not there".into()))? {
+        match outputs.ok_or_else(|| fault("its values are missing".into()))? {
             ReadOutputs::Translations(values) => {
                 translation =
                     track(times, values.map(vector).collect(), &sampler).map_err(fault)?;

@@ -55,7 +55,7 @@ pub(super) fn build(
         }
     }
     if !(spec.surface || spec.velocity) {
-        let problem = "neither surface nor velocity is asked for";
+        let problem = "neither surface nor velocity is requested";
         return Err(doc.fault_of("grids.surface", problem));
     }
     Ok(Grids {

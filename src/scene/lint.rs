@@ -167,8 +167,8 @@ impl Scene {
         let duration = self.shot.duration();
         if back < duration {
             lints.push(format!(
-                "{}: waves are back from the wall opposite after {back:.1} s of {} s, \
-                 and no zone absorbs them",
+                "{}: waves return from the opposite wall after {back:.1} s of {} s, and no zone \
+                 absorbs them",
                 waves.key,
                 shown(duration)
             ));
@@ -212,7 +212,7 @@ impl Scene {
             if length < least * wave {
                 lints.push(format!(
                     "effects.{name}.length: {} m is {:.2} of a wave length, as waves of {} s are \
-                     {wave:.3} m long on {} m of water; one and a half are good, {least} the least",
+                     {wave:.3} m long on {} m of water; use one and a half, and at least {least}",
                     shown(length),
                     length / wave,
                     shown(period),
@@ -263,7 +263,7 @@ fn lint_depth(key: &str, depth: f64, still: Still) -> Option<String> {
     };
     ((depth / still.depth - 1.0).abs() > DEPTH).then(|| {
         format!(
-            "{key}: depth is {} m, and the scene's water stands {} m deep, {:.2} times as much{on}",
+            "{key}: depth is {} m, and the scene's water is {} m deep, {:.2} times as much{on}",
             shown(depth),
             shown(still.depth),
             still.depth / depth

@@ -460,7 +460,7 @@ fn check_pose(
 ) -> Result<(), SceneError> {
     let forward = DVec3::from(target) - DVec3::from(position);
     if forward.length() < 1e-6 {
-        return Err(doc.fault_of(&format!("{path}.target"), "is where the camera stands"));
+        return Err(doc.fault_of(&format!("{path}.target"), "is the position of the camera"));
     }
     let up = DVec3::from(camera.up).normalize_or_zero();
     if forward.normalize().cross(up).length() < 1e-6 {
@@ -478,14 +478,14 @@ fn check_crop(doc: &Document<'_>, image: &ImageSpec) -> Result<(), SceneError> {
         return fault("given together with overscan".to_owned());
     }
     if crop.iter().any(|side| side.fract() != 0.0) {
-        return fault(format!("{crop:?} is not of whole pixels"));
+        return fault(format!("{crop:?} is not in whole pixels"));
     }
     let [x0, y0, x1, y1] = crop;
     let (width, height) = (image.width, image.height);
     if x0 >= x1 || y0 >= y1 || x1 > f64::from(width) || y1 > f64::from(height) {
         return fault(format!(
-            "{crop:?} is no part of a {width} × {height} image; allowed is [x0, y0, x1, y1] with 0 \
-             ≤ x0 < x1 ≤ {width} and 0 ≤ y0 < y1 ≤ {height}"
+            "{crop:?} is not inside a {width} × {height} image; allowed: [x0, y0, x1, y1] with 0 ≤ \
+             x0 < x1 ≤ {width} and 0 ≤ y0 < y1 ≤ {height}"
         ));
     }
     Ok(())

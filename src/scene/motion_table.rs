@@ -85,9 +85,9 @@ fn check_points(
         }
         if *x < allowed.least {
             return Err(format!(
-                "{}, {}, lies outward of the start: displacements are from 0 on, inward (of a \
-                 solid: along its direction); a table that goes both ways has to begin at its end \
-                 outward: add {} m to each, and lead there from 0",
+                "{}, {}, lies outward of the start: displacements run from 0 on, inward (for a \
+                 solid: along its direction); a table that moves both ways has to begin at its \
+                 outward end: add {} m to each, and lead there from 0",
                 called(i),
                 shown_all(&[*t, *x]),
                 shown(-least)

@@ -342,7 +342,7 @@ fn check_way(
         return Ok(());
     }
     let problem = format!(
-        "the solid never comes into the domain: on its way it reaches over {}, the domain over {}",
+        "the solid never enters the domain: its path spans {}, the domain spans {}",
         extent(swept),
         extent(Some(*domain))
     );

@@ -31,7 +31,7 @@ pub(super) fn build(
         "domain.no_slip"
     };
     if !is_all && walls.len() < spec.no_slip.len() {
-        return Err(doc.fault_of(key, "a wall stands there twice"));
+        return Err(doc.fault_of(key, "a wall is listed twice"));
     }
     let is_none = |wall: &Wall| periodic[wall.axis];
     if let Some(wall) = walls.iter().find(|wall| !is_all && is_none(wall)) {
@@ -43,8 +43,8 @@ pub(super) fn build(
     }
     let walls: Vec<Wall> = walls.into_iter().filter(|wall| !is_none(wall)).collect();
     if method == Method::Pbf && !has_own && !walls.is_empty() {
-        let problem = "solver pbf has free-slip walls alone, but where an effect resolves them; \
-                       choose solver.method = \"flip\"";
+        let problem = "solver pbf has only free-slip walls unless an effect resolves them; choose \
+            solver.method = \"flip\"";
         return Err(doc.fault_of_plain(key, problem));
     }
     Ok(walls)

@@ -66,7 +66,7 @@ fn lay_over<'a>(
         .map(|s| s.trim().trim_end_matches(']'))
         .collect();
     if segments.iter().any(|s| s.is_empty()) {
-        return Err(format!("\"{key}\" is no dotted key; {ALLOWED}"));
+        return Err(format!("\"{key}\" is not a dotted key; {ALLOWED}"));
     }
     let value = respan(parse_value(value.trim())?, spans);
     let (first, rest) = segments.split_first().ok_or(ALLOWED)?;
@@ -135,7 +135,7 @@ fn enter<'t, 'a>(
                 .parse()
                 .ok()
                 .and_then(|index: usize| array.get_mut(index))
-                .ok_or_else(|| format!("\"{segment}\" is no index into an array of {len}"))
+                .ok_or_else(|| format!("\"{segment}\" is not an index into an array of {len}"))
         }
         other => Err(format!(
             "\"{segment}\" cannot be set within a value of type {}",

@@ -33,7 +33,7 @@ pub(super) fn read(doc: &Document<'_>, axes: &[Axis]) -> Result<[bool; 3], Scene
     let mut periodic = [false; 3];
     for axis in axes {
         if std::mem::replace(&mut periodic[*axis as usize], true) {
-            let problem = format!("{:?} stands there twice", axis.name());
+            let problem = format!("{:?} is listed twice", axis.name());
             return Err(doc.fault_of(KEY, problem));
         }
     }

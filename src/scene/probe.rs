@@ -256,7 +256,7 @@ pub(super) fn build_all(
         if let Some(known) = probes.iter().find(is_alike) {
             let mut problem = second(&known.name, &probe.name);
             if spec.name.is_none() {
-                problem += ", which it has by its kind and place: give it another";
+                problem += ", the default for its kind and position: set name to another";
             }
             return Err(doc.fault_of(&format!("{path}.name"), problem));
         }
@@ -267,11 +267,11 @@ pub(super) fn build_all(
 
 /// Describes why two probes cannot have these names.
 fn second(known: &str, name: &str) -> String {
-    let mut problem = format!("a second probe of the name {name:?}");
+    let mut problem = format!("a second probe is named {name:?}");
     if known != name {
         problem += &format!(
-            ": {known:?} is the same file where upper and lower case are not told apart, \
-             as on Windows and macOS"
+            ": {known:?} is the same file where upper and lower case are not distinguished, as on \
+             Windows and macOS"
         );
     }
     problem
@@ -345,7 +345,7 @@ fn kind(
     }
     let all = extent(Some(*domain));
     Err(fault(format!(
-        "{given:?} is outside of the domain, which reaches over {all}"
+        "{given:?} is outside the domain, which spans {all}"
     )))
 }
 
@@ -383,7 +383,7 @@ fn force(
             else {
                 let count = around.is_moving.len();
                 return Err(fault(&format!(
-                    "{number}: the scene has {count} [[solid]], which count from 0"
+                    "{number}: the scene has {count} [[solid]], counted from 0"
                 )));
             };
             let index = before.iter().filter(|&&other| other == moves).count();
@@ -444,11 +444,11 @@ fn why_no_pressure(solver: &Solver) -> Option<String> {
         return None;
     }
     let why = if pbf.iteration == Iteration::Chebyshev {
-        "with solver.pbf.iteration = \"chebyshev\" a part of each correction goes on from the one \
-         before, which no pressure stands for"
+        "with solver.pbf.iteration = \"chebyshev\" a part of each correction carries over from the \
+         one before, which no pressure represents"
     } else if pbf.artificial_pressure > 0.0 {
         "with solver.pbf.artificial_pressure above 0 particles are also held apart by a force that \
-         no pressure stands for"
+         no pressure represents"
     } else {
         return None;
     };

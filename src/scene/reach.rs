@@ -33,7 +33,7 @@ impl Reach {
             return Ok(path);
         }
         Err(format!(
-            "{} leads out of the folder {}; copy it there, or --allow-outside takes it where it is",
+            "{} leads out of the folder {}; copy it there, or allow it with --allow-outside",
             path.display(),
             real(folder).display()
         ))

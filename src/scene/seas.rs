@@ -113,7 +113,7 @@ pub(super) fn check_periods(
         return refuse("shortest_period", problem);
     }
     if ramp == 0.0 {
-        let problem = "a spectrum's motion has none that is at rest";
+        let problem = "a spectrum's motion is never at rest, so it needs a ramp";
         return refuse("ramp", problem.to_owned());
     }
     Ok(())
@@ -230,8 +230,8 @@ pub(super) fn check(
     let least = sea.asked().ramp + at / sea.least_group_speed();
     if time < least {
         let problem = format!(
-            "its slowest waves, of {:.3} m/s, are there after {least:.3} s if they \
-             leave when the ramp is over",
+            "its slowest waves, of {:.3} m/s, arrive after {least:.3} s if they leave when the \
+             ramp ends",
             sea.least_group_speed()
         );
         return refuse("time", problem);
@@ -249,7 +249,8 @@ pub(super) fn check_spacings(
         return Ok(());
     }
     let problem = format!(
-        "waves of {} s are {length:.3} m long, {:.1} particle spacings of at least {LEAST_WAVE}",
+        "waves of {} s are {length:.3} m long, {:.1} particle spacings; at least {LEAST_WAVE} are \
+         needed",
         shown(period),
         length / spacing
     );

@@ -343,7 +343,7 @@ impl Kind {
     fn misfit(&self, name: &str, value: &DeValue<'_>) -> Option<String> {
         match self {
             Self::NumberOrFalse(_) if value.is_bool() => {
-                (value.as_bool() == Some(true)).then(|| "true is no limit".to_owned())
+                (value.as_bool() == Some(true)).then(|| "true is not a limit".to_owned())
             }
             Self::Number(range) | Self::NumberOrFalse(range) => {
                 let given = number(value)?;
@@ -387,7 +387,7 @@ impl Kind {
             }
             Self::FileStem => {
                 let given = value.as_str()?;
-                (!is_file_stem(given)).then(|| format!("{given:?} is no safe file name"))
+                (!is_file_stem(given)).then(|| format!("{given:?} is not a safe file name"))
             }
             Self::Text(_) | Self::Points(..) | Self::Other(_) => None,
             Self::Flag | Self::Table(_) | Self::Inline(_) | Self::Tables(_) => None,
@@ -425,7 +425,7 @@ fn no_choice(name: &str, words: &[&str], given: &str) -> Option<String> {
     }
     let nearest = nearest(given, words).unwrap_or_default();
     Some(format!(
-        "{given:?} is no {name}; the nearest is {nearest:?}"
+        "{given:?} is not a value of {name}; the nearest is {nearest:?}"
     ))
 }
 

@@ -79,11 +79,13 @@ impl Track {
         let is_finite =
             |(t, x, q): &(f64, DVec3, DQuat)| t.is_finite() && x.is_finite() && q.is_finite();
         if let Some(k) = poses.iter().position(|pose| !is_finite(pose)) {
-            return Err(format!("pose {k} has a number that is none"));
+            return Err(format!("pose {k} has a number that is not finite"));
         }
         let unit = |(_, _, q): &(f64, DVec3, DQuat)| (q.length() - 1.0).abs() < 1e-6;
         if let Some(k) = poses.iter().position(|pose| !unit(pose)) {
-            return Err(format!("the quaternion of pose {k} is no unit one"));
+            return Err(format!(
+                "the quaternion of pose {k} is not a unit quaternion"
+            ));
         }
         if let Some(k) = poses
             .windows(2)
@@ -354,7 +356,7 @@ fn choose_prim<'a, 'b>(
     let Some(name) = name else {
         return match &moving[..] {
             [only] => Ok(only),
-            [] => Err("no prim of it has a transform".to_owned()),
+            [] => Err("none of its prims has a transform".to_owned()),
             several => Err(format!(
                 "it has {} prims with a transform: {}; name one as node",
                 several.len(),
@@ -453,7 +455,8 @@ fn sampled(
 ) -> std::result::Result<Vec<(f64, DVec3, DQuat)>, String> {
     if moves.jumps() {
         return Err(
-            "its keys are joined by steps, and a solid cannot jump; make them linear".to_owned(),
+            "its keys are interpolated in steps, and a solid cannot jump; make them linear"
+                .to_owned(),
         );
     }
     let end = shot.duration();
@@ -488,7 +491,8 @@ fn sampled(
         // Written so that NaN counts as deformed.
         if !most.iter().all(|part| *part < RIGID) || from_start.determinant() < 0.0 {
             return Err(format!(
-                "at {} s it has another size or shape than at the start; a solid keeps them",
+                "at {} s its size or shape differs from that at the start; a solid has to keep \
+                 both",
                 shown(time)
             ));
         }

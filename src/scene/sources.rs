@@ -149,7 +149,7 @@ fn region(
     let most = size + 2.0 * region.rounding();
     if most.min_element() < 0.5 * around.spacing {
         let problem = format!(
-            "its room, {} × {} × {} m, is too thin for one layer of particles {} m apart",
+            "its volume of {} × {} × {} m is too thin for one layer of particles {} m apart",
             shown(size.x),
             shown(size.y),
             shown(size.z),
@@ -161,7 +161,7 @@ fn region(
         return Ok(region);
     }
     let problem = format!(
-        "it does not fit: it reaches over {}, the domain over {}",
+        "it does not fit: it spans {}, the domain spans {}",
         extent(Some(bounds)),
         extent(Some(*domain))
     );
@@ -199,7 +199,7 @@ fn check_level(
         return Ok(());
     }
     refuse(format!(
-        "{} m is not within its room, which reaches from {} to {} m",
+        "{} m is not within its volume, which reaches from {} to {} m",
         shown(level),
         shown(min.y),
         shown(max.y)
@@ -226,8 +226,8 @@ fn check_velocity(
     }
     let way = velocity.abs() * frame;
     refuse(format!(
-        "in a frame its water goes {} × {} × {} m, and its room is {} × {} × {} \
-         m: make the room longer",
+        "in a frame its water moves {} × {} × {} m, and its volume is {} × {} × {} m: make it \
+         longer",
         shown(way.x),
         shown(way.y),
         shown(way.z),

@@ -419,7 +419,7 @@ fn operations(prim: &Prim) -> Result<(Vec<Operation>, bool)> {
         let mut named = Kind::NAMED.iter();
         let &(_, kind, width) = named
             .find(|(known, ..)| *known == kind)
-            .ok_or_else(|| of("not a transform that is known"))?;
+            .ok_or_else(|| of("not a known transform"))?;
         let Some(value) = prim.attributes.get(name) else {
             return Err(of("it has no value"));
         };
@@ -441,9 +441,9 @@ fn number(layer: &Layer, key: &str, left_out: f64) -> Result<f64> {
         None => Ok(left_out),
         Some(Value::Numbers(numbers)) => match numbers[..] {
             [number] if number > 0.0 && number.is_finite() => Ok(number),
-            _ => Err(format!("{key} is no positive number")),
+            _ => Err(format!("{key} is not a positive number")),
         },
-        Some(_) => Err(format!("{key} is no positive number")),
+        Some(_) => Err(format!("{key} is not a positive number")),
     }
 }
 

@@ -61,7 +61,11 @@ impl Layer {
                     layer.prims.push(reader.prim(&word)?);
                 }
                 Token::Word(word) if word == "reorder" => reader.pass_statement()?,
-                other => return Err(reader.tokens.fault(&format!("{other:?} begins no prim"))),
+                other => {
+                    return Err(reader
+                        .tokens
+                        .fault(&format!("{other:?} does not begin a prim")));
+                }
             }
         }
         Ok(layer)
@@ -194,7 +198,7 @@ impl<'a> Tokens<'a> {
             }
             let mut chars = rest.chars();
             let Some(next) = chars.next() else {
-                return Err(self.fault("a text has no end"));
+                return Err(self.fault("a string has no end"));
             };
             let escaped = (next == '\\').then(|| chars.next()).flatten();
             self.step(next.len_utf8() + escaped.map_or(0, char::len_utf8));
@@ -243,7 +247,7 @@ impl<'a> Tokens<'a> {
             let text = self.step(length);
             return match text.parse() {
                 Ok(number) => Ok(Token::Number(number)),
-                Err(_) => Err(self.fault(&format!("{text:?} is no number"))),
+                Err(_) => Err(self.fault(&format!("{text:?} is not a number"))),
             };
         }
         let is_of_word = |c: char| c.is_alphanumeric() || matches!(c, '_' | ':' | '.' | '!');
@@ -310,7 +314,11 @@ impl Reader<'_> {
                     self.pass_statement()?;
                 }
                 Token::Word(word) => self.property(&word, &mut prim.attributes)?,
-                other => return Err(self.tokens.fault(&format!("{other:?} begins no property"))),
+                other => {
+                    return Err(self
+                        .tokens
+                        .fault(&format!("{other:?} does not begin a property")));
+                }
             }
         }
         self.depth -= 1;
@@ -427,7 +435,7 @@ impl Reader<'_> {
             }
             Token::Sign(open @ ('(' | '[')) => self.list(open).map(Some),
             Token::Sign('{') => self.braces(),
-            other => Err(self.tokens.fault(&format!("{other:?} is no value"))),
+            other => Err(self.tokens.fault(&format!("{other:?} is not a value"))),
         }
     }
 

@@ -195,7 +195,7 @@ impl WhitewaterSettings {
             if let Some([least, greatest]) = values
                 && (greatest < least || (greatest == least && !may_be_equal))
             {
-                let problem = format!("[{least}, {greatest}] does not rise");
+                let problem = format!("[{least}, {greatest}] is not ascending");
                 return Err(doc.fault_of(key, problem));
             }
         }

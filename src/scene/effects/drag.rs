@@ -53,7 +53,7 @@ impl Effect for Settings {
         (worth > 1.0).then(|| {
             format!(
                 "effects.drag.drop_radius: a drop of {} m radius holds {worth:.1} times the water \
-                 of a particle, of which it is to be a part",
+                 of a particle, but may hold only a part of it",
                 shown(self.drop_radius)
             )
         })

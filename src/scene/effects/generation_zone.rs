@@ -319,8 +319,8 @@ impl Settings {
         let least = ramp + way / speed;
         if way.is_finite() && packet.time < least {
             let problem = format!(
-                "its slowest waves, of {speed:.3} m/s, are there after {least:.3} s if they leave \
-                 the zone when the ramp is over"
+                "its slowest waves, of {speed:.3} m/s, arrive after {least:.3} s if they leave the \
+                 zone when the ramp ends"
             );
             return refuse("time", problem);
         }
@@ -362,7 +362,7 @@ impl Effect for Settings {
         self.zone().check(doc, KEY, around)?;
         let refuse = |key: &str, problem| Err(doc.fault_of(&format!("{KEY}.{key}"), problem));
         if let Some(wall) = self.walls.iter().find(|wall| wall.axis == 1) {
-            let problem = format!("{} does not stand upright", wall.name());
+            let problem = format!("the wall {} is not upright", wall.name());
             return refuse("walls", problem);
         }
         let gravity = around.gravity;

@@ -39,8 +39,8 @@ impl Effect for Settings {
             true => Ok(()),
             false => Err(doc.fault_of_plain(
                 "effects.surface_tension",
-                "is a part of the projection, which solver.pbf.grid_projection = false goes \
-                 without: only true is allowed",
+                "is part of the projection, which solver.pbf.grid_projection = false turns off: \
+                 set it to true",
             )),
         }
     }

@@ -119,12 +119,12 @@ impl Effect for Settings {
         match (self.coefficient, self.xsph) {
             (None, None) => Err(doc.fault_of_plain(
                 "effects.viscosity",
-                "neither a coefficient, Pa s, nor xsph is given: one of them is needed",
+                "neither coefficient (Pa s) nor xsph is given; give one of them",
             )),
             (Some(_), _) if !around.has_projection => Err(doc.fault_of_plain(
                 "effects.viscosity.coefficient",
                 "it is solved on the grid of PBF's projection, which solver.pbf.grid_projection = \
-                 false goes without: only true is allowed",
+                 false turns off: set it to true",
             )),
             _ => Ok(()),
         }
@@ -141,9 +141,9 @@ impl Effect for Settings {
         let reynolds = (grain.gravity * grain.cell).sqrt() * grain.cell / viscosity;
         (reynolds > MOST_REYNOLDS).then(|| {
             format!(
-                "effects.viscosity.coefficient: the Reynolds number √(g Δx) Δx / ν of a \
-                 cell of {} m is {reynolds:.0}; above {MOST_REYNOLDS} the way to the grid \
-                 and back is more viscous",
+                "effects.viscosity.coefficient: the Reynolds number √(g Δx) Δx / ν of a cell of {} \
+                 m is {reynolds:.0}; above {MOST_REYNOLDS} the transfer to the grid and back is \
+                 more viscous",
                 shown(grain.cell)
             )
         })

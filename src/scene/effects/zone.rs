@@ -68,7 +68,7 @@ impl Zone<'_> {
         for (index, wall) in self.walls.iter().enumerate() {
             let name = wall.name();
             if self.walls[..index].contains(wall) {
-                return refuse(format!("{name:?} stands there twice"));
+                return refuse(format!("{name:?} is listed twice"));
             }
             if around.periodic[wall.axis] {
                 let problem = "domain.periodic joins both ends";
@@ -80,7 +80,7 @@ impl Zone<'_> {
             let room = around.domain.size()[wall.axis];
             if self.length > room {
                 let problem = format!(
-                    "before the wall {name} lie {} m, and the zone is {} m long",
+                    "the domain reaches {} m from the wall {name}, but the zone is {} m long",
                     shown(room),
                     shown(self.length)
                 );

@@ -148,14 +148,14 @@ pub(super) fn track<T: Blend>(
     };
     if times.is_empty() || values.len() != wanted {
         return Err(format!(
-            "{} values for {} times; {wanted} are wanted",
+            "{} values for {} times; {wanted} are needed",
             values.len(),
             times.len()
         ));
     }
     let ascends = times.windows(2).all(|pair| pair[0] < pair[1]);
     if !(ascends && times.iter().all(|time| time.is_finite())) {
-        return Err("its times do not ascend".to_owned());
+        return Err("its times are not in ascending order".to_owned());
     }
     Ok(Track {
         times,

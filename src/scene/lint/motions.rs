@@ -82,8 +82,8 @@ impl Scene {
                 false => met.min[wall.axis] - self.domain.min[wall.axis],
             };
             lints.push(format!(
-                "wave_maker[{index}].motion: the wall goes {} m in, and from {} m on through the \
-                 solid {}, which stands still",
+                "wave_maker[{index}].motion: the wall moves {} m inward, and from {} m on through \
+                 the solid {}, which does not move",
                 shown(farthest),
                 shown((first * 1e3).round() / 1e3),
                 solid.name()
@@ -168,7 +168,7 @@ fn lint_table(key: &str, unit: &str, motion: &Motion, shot: &Shot) -> Option<Str
     let speed = abrupt_end(points)?;
     (ends < duration - shot.frame_seconds()).then(|| {
         format!(
-            "{key}: its table ends in mid-motion: up to its last point, at {} s, it goes {} \
+            "{key}: its table ends in mid-motion: up to its last point, at {} s, it moves at {} \
              {unit}, and stops there within {} s",
             shown(ends),
             shown((speed * 1e3).round() / 1e3),

@@ -28,8 +28,8 @@ impl Scene {
             let place = self.origin + thin.place;
             lints.push(format!(
                 "solid.mesh of {}: it is {:.4} m thick at ({:.3}, {:.3}, {:.3}); water passes \
-                 through what is thinner than {least:.4} m, {LEAST_THICKNESS} times what \
-                 distances to solids are apart",
+                 through what is thinner than {least:.4} m, {LEAST_THICKNESS} times the spacing of \
+                 the grid of distances to solids",
                 placed.name(),
                 thin.thickness,
                 place.x,

@@ -59,8 +59,8 @@ fn what_is_hardly_meant_is_said_with_its_key_and_number() {
         (
             vec![stokes("height=0.11,depth=1.2")],
             vec![stokes("height=0.11,depth=1.05")],
-            "effects.generation_zone.waves: depth is 1.2 m, and the scene's water stands 1 m \
-             deep, 0.83 times as much",
+            "effects.generation_zone.waves: depth is 1.2 m, and the scene's water is 1 m deep, \
+             0.83 times as much",
         ),
         (
             vec![
@@ -99,7 +99,7 @@ fn what_is_hardly_meant_is_said_with_its_key_and_number() {
         (
             vec![sine.into(), "shot.frames=500".into()],
             vec![sine.into(), "shot.frames=400".into()],
-            "wave_maker[0].motion: waves are back from the wall opposite after 21.",
+            "wave_maker[0].motion: waves return from the opposite wall after 21.",
         ),
         (
             vec![sine.into(), "shot.frames=500".into()],
@@ -138,8 +138,8 @@ fn what_is_hardly_meant_is_said_with_its_key_and_number() {
         (
             vec![absorbing("depth=1.2,period=2.3,room=0.2")],
             vec![absorbing("depth=1.05,period=2.3,room=0.2")],
-            "wave_maker[0].absorption: depth is 1.2 m, and the scene's water stands 1 m \
-             deep, 0.83 times as much",
+            "wave_maker[0].absorption: depth is 1.2 m, and the scene's water is 1 m deep, 0.83 \
+             times as much",
         ),
         (
             vec![
@@ -150,7 +150,7 @@ fn what_is_hardly_meant_is_said_with_its_key_and_number() {
                 absorbing("depth=1.0,period=2.3,room=0.9"),
                 emitter("from=1.0"),
             ],
-            "emitter[0]: 0.200 m of its room are behind wave_maker[0] at rest",
+            "emitter[0]: 0.200 m of its volume are behind wave_maker[0] at rest",
         ),
         (
             vec![drain("from=6.0")],
@@ -302,7 +302,7 @@ fn a_table_that_moves_nothing_or_stops_short_is_said() {
             "[[0.0,0.0],[1.0,0.2],[2.0,0.4],[3.0,0.6]]",
             "[[0.0,0.0],[1.0,0.2],[2.0,0.4],[5.0,0.6]]",
             "wave_maker[0].motion: its table ends in mid-motion: up to its last point, at 3 s, it \
-             goes 0.2 m/s, and stops there within 1 s",
+             moves at 0.2 m/s, and stops there within 1 s",
         ),
         (
             "[[0.0,0.0],[5.0,0.0]]",
@@ -343,8 +343,8 @@ fn a_wall_that_goes_through_a_solid_is_said() {
     for (wall, x) in [("-x", 1.0), ("+x", 18.6)] {
         only(
             &lints_beside(&pier(x), &scene(wall, 1.2)),
-            "wave_maker[0].motion: the wall goes 1.2 m in, and from 1 m on through the solid \
-             box, which stands still",
+            "wave_maker[0].motion: the wall moves 1.2 m inward, and from 1 m on through the solid \
+             box, which does not move",
         );
         assert_eq!(lints_beside(&pier(x), &scene(wall, 0.9)), [] as [&str; 0]);
     }
@@ -401,8 +401,8 @@ fn a_depth_is_that_beside_the_wall() {
     let pool = cuboid([0.0; 3], [20.0, 1.0, 1.0]);
     only(
         &lints_beside(&pool, &scene(of_mesh, "", 1.2)),
-        "wave_maker[0].motion: depth is 1.2 m, and the scene's water stands 1 m \
-         deep, 0.83 times as much",
+        "wave_maker[0].motion: depth is 1.2 m, and the scene's water is 1 m deep, 0.83 times as \
+         much",
     );
     assert_eq!(
         lints_beside(&pool, &scene(of_mesh, "", 1.05)),
@@ -414,8 +414,8 @@ fn a_depth_is_that_beside_the_wall() {
     for bottom in [0.0, 0.4] {
         only(
             &lints_beside(&floor, &scene(&block(bottom), solid, 1.0)),
-            "wave_maker[0].motion: depth is 1 m, and the scene's water stands 0.6 m deep, 0.60 \
-             times as much, on solids 0.4 m high beside the wall",
+            "wave_maker[0].motion: depth is 1 m, and the scene's water is 0.6 m deep, 0.60 times \
+             as much, on solids 0.4 m high beside the wall",
         );
         let good = scene(&block(bottom), solid, 0.6);
         assert_eq!(lints_beside(&floor, &good), [] as [&str; 0], "{bottom}");

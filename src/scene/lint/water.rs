@@ -66,8 +66,8 @@ impl Scene {
             let part = made / asked - 1.0;
             if block.size().min_element() > 0.0 && part.abs() > ROUNDED {
                 lints.push(format!(
-                    "water.block[{index}]: {} m³ are asked for and {} m³ made, {:.1} % {}: it is \
-                     filled with whole layers, {x} × {y} × {z} particles {} m apart",
+                    "water.block[{index}]: {} m³ are requested and {} m³ are made, {:.1} % {}: it \
+                     is filled with whole layers, {x} × {y} × {z} particles {} m apart",
                     four_digits(asked),
                     four_digits(made),
                     100.0 * part.abs(),
@@ -111,8 +111,8 @@ impl Scene {
                 };
                 if behind > 1e-6 {
                     lints.push(format!(
-                        "emitter[{index}]: {behind:.3} m of its room are behind wave_maker[{k}] at \
-                         rest, and nothing enters there"
+                        "emitter[{index}]: {behind:.3} m of its volume are behind wave_maker[{k}] \
+                         at rest, where nothing enters"
                     ));
                 }
             }
@@ -153,8 +153,8 @@ particle_spacing = 0.05
         assert_eq!(
             scene(&[]).lints(),
             [
-                "water.block[0]: 0.07400 m³ are asked for and 0.05000 m³ made, 32.4 % less: it is \
-                 filled with whole layers, 20 × 1 × 20 particles 0.05 m apart"
+                "water.block[0]: 0.07400 m³ are requested and 0.05000 m³ are made, 32.4 % less: it \
+                 is filled with whole layers, 20 × 1 × 20 particles 0.05 m apart"
             ]
         );
         let more = scene(&["solver.pbf.particle_spacing=0.1"]).lints();

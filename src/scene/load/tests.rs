@@ -248,15 +248,18 @@ fn overrides_reach_everywhere_and_take_bare_words() {
 
     for (bad, expected) in [
         ("frames", "no \"=\""),
-        ("=3", "no dotted key"),
-        ("shot..frames=3", "no dotted key"),
+        ("=3", "not a dotted key"),
+        ("shot..frames=3", "not a dotted key"),
         ("shot.frames=", "neither a TOML value"),
         ("shot.frames={", "neither a TOML value"),
         (
             "shot.frames.x=3",
             "cannot be set within a value of type integer",
         ),
-        ("water.block[7].max=[1,1,1]", "no index into an array of 1"),
+        (
+            "water.block[7].max=[1,1,1]",
+            "not an index into an array of 1",
+        ),
         (
             "shot.frames=0",
             "with --set shot.frames=0: shot.frames: 0 is out of range; allowed: a whole number",

@@ -29,13 +29,13 @@ pub enum CameraFileError {
     #[error("{0}")]
     Usd(String),
     /// The file is neither USD nor valid glTF.
-    #[error("neither USD as text, which begins with #usda, nor glTF that can be read: {0}")]
+    #[error("it is neither USD as text, which begins with #usda, nor readable glTF: {0}")]
     Gltf(#[from] gltf::Error),
     /// The text has another encoding.
     #[error(transparent)]
     Text(#[from] NoText),
     /// The file has no camera.
-    #[error("no node of it has a camera")]
+    #[error("none of its nodes has a camera")]
     None,
     /// The file has several cameras, and none is named.
     #[error("it has {} cameras: {}; name one in camera.name", .0.len(), .0.join(", "))]
@@ -74,7 +74,7 @@ pub enum CameraFileError {
     #[error(transparent)]
     Node(#[from] NodeError),
     /// The camera has no valid pose at some time.
-    #[error("at {seconds} s camera {name} has no place or no direction: {what}")]
+    #[error("at {seconds} s camera {name} has no valid position or direction: {what}")]
     Pose {
         /// Name of the camera.
         name: String,
@@ -280,7 +280,7 @@ impl CameraFile {
             let what = if !(stand.forward.is_finite() && stand.up.is_finite()) {
                 "its matrix has no inverse"
             } else if !is_near {
-                "it stands more than 100 km from the origin"
+                "it is more than 100 km from the origin"
             } else {
                 continue;
             };

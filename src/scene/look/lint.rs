@@ -59,8 +59,8 @@ impl Look {
         (f64::from(samples) < wanted).then(|| {
             format!(
                 "image.samples: the lens draws a point at infinity, or at half of the focus \
-                 distance, as a disc {blur:.1} pixels wide, and {samples} samples are as many \
-                 ghosts of it; they are closer than a pixel from {wanted} on"
+                 distance, as a disc {blur:.1} pixels wide, and {samples} samples show as many \
+                 ghosts of it; from {wanted} samples on they are closer than a pixel"
             )
         })
     }

@@ -114,7 +114,7 @@ impl Look {
         let unused = &self.materials()?.unused;
         (!unused.is_empty()).then(|| {
             format!(
-                "{LIBRARY}: of a library Kd and map_Kd are used; this one also has {}",
+                "{LIBRARY}: only Kd and map_Kd of a library are used; this one also has {}",
                 unused.join(", ")
             )
         })
@@ -153,7 +153,7 @@ impl Materials {
             let key = format!("solids.material[{index}]");
             let is_same = |it: &Material| it.name.as_ref() == Some(&material.name);
             if reader.all.list.iter().any(is_same) {
-                let problem = format!("{:?} stands twice", material.name);
+                let problem = format!("{:?} is defined twice", material.name);
                 return Err(doc.fault_of(&format!("{key}.name"), problem));
             }
             reader.own(&key, material, solids.colour)?;
@@ -322,7 +322,7 @@ impl Reader<'_, '_> {
 
 /// Decodes a PNG to its size and colours, ignoring alpha.
 fn decoded(bytes: &[u8]) -> Result<([u32; 2], Vec<[u8; 3]>), String> {
-    let fail = |error: png::DecodingError| format!("it is no PNG that can be read: {error}");
+    let fail = |error: png::DecodingError| format!("it is not a readable PNG: {error}");
     let mut decoder = png::Decoder::new(Cursor::new(bytes));
     decoder.set_transformations(png::Transformations::normalize_to_color8());
     let mut reader = decoder.read_info().map_err(fail)?;

@@ -69,7 +69,7 @@ impl Library {
                 return Err("newmtl without a name".to_owned());
             }
             if self.entries.iter().any(|it| it.name == rest) {
-                return Err(format!("material {rest:?} stands twice"));
+                return Err(format!("material {rest:?} is defined twice"));
             }
             self.entries.push(Entry {
                 name: rest.to_owned(),
@@ -81,7 +81,7 @@ impl Library {
         }
         let Some(entry) = self.entries.last_mut() else {
             let shown: String = word.chars().take(20).collect();
-            return Err(format!("{shown:?} stands before the first newmtl"));
+            return Err(format!("{shown:?} comes before the first newmtl"));
         };
         match word {
             "Kd" => entry.colour = colour(rest)?,
@@ -225,12 +225,12 @@ mod tests {
             ("# nothing\n", "it has no material"),
             (
                 "Kd 1 1 1\nnewmtl a\n",
-                "line 1: \"Kd\" stands before the first newmtl",
+                "line 1: \"Kd\" comes before the first newmtl",
             ),
             ("newmtl\n", "line 1: newmtl without a name"),
             (
                 "newmtl a\n\nnewmtl a\n",
-                "line 3: material \"a\" stands twice",
+                "line 3: material \"a\" is defined twice",
             ),
             ("newmtl a\nKd 1 2\n", "line 2: Kd \"1 2\"; allowed"),
             ("newmtl a\nKd x 0 0\n", "line 2: Kd \"x 0 0\"; allowed"),
@@ -256,7 +256,7 @@ mod tests {
             ),
             (
                 "\u{89}PNG\r\n\u{1a}\n",
-                "line 1: \"\\u{89}PNG\" stands before",
+                "line 1: \"\\u{89}PNG\" comes before",
             ),
         ] {
             let problem = read(text.as_bytes()).unwrap_err();

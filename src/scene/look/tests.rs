@@ -168,7 +168,7 @@ fn a_second_key_and_a_number_of_300_digits_are_named_in_few_words() {
     let (line, key, message) = fault(&PLAIN.replace("width = 64", "width = 64\nwidth = 65"));
     assert_eq!((line, key.as_str()), (7, "image.width"));
     assert!(
-        message.contains("second key of this name in [image]"),
+        message.contains("this key is defined twice in [image]"),
         "{message}"
     );
     let (_, key, message) = fault(&PLAIN.replace("35.0", "1e308"));
@@ -286,7 +286,9 @@ fn an_unknown_variant_names_its_neighbour() {
     let (line, key, message) = fault(&format!("{PLAIN}[surface]\nfilter = \"curvature_flo\"\n"));
     assert_eq!((line, key.as_str()), (11, "surface.filter"));
     assert!(
-        message.contains("\"curvature_flo\" is no filter; the nearest is \"curvature_flow\""),
+        message.contains(
+            "\"curvature_flo\" is not a value of filter; the nearest is \"curvature_flow\""
+        ),
         "{message}"
     );
 }
@@ -374,11 +376,11 @@ fn a_look_without_newer_keys_keeps_its_hash() {
 #[test]
 fn a_crop_lies_within_the_image_on_whole_pixels_and_without_overscan() {
     for (lines, words) in [
-        ("crop = [0, 0, 65, 36]", "is no part of a 64 × 36 image"),
-        ("crop = [0, 0, 64, 37]", "is no part of a 64 × 36 image"),
-        ("crop = [10, 0, 10, 36]", "is no part of a 64 × 36 image"),
-        ("crop = [0, 20, 64, 19]", "is no part of a 64 × 36 image"),
-        ("crop = [0.5, 0, 64, 36]", "is not of whole pixels"),
+        ("crop = [0, 0, 65, 36]", "is not inside a 64 × 36 image"),
+        ("crop = [0, 0, 64, 37]", "is not inside a 64 × 36 image"),
+        ("crop = [10, 0, 10, 36]", "is not inside a 64 × 36 image"),
+        ("crop = [0, 20, 64, 19]", "is not inside a 64 × 36 image"),
+        ("crop = [0.5, 0, 64, 36]", "is not in whole pixels"),
         ("crop = [-1, 0, 64, 36]", "out of range"),
         (
             "crop = [0, 0, 8, 8]\noverscan = 1",

@@ -52,13 +52,13 @@ impl UsdCamera {
         let number = |key: &str, left_out: f64| match camera.attributes.get(key) {
             None => Ok(Curve::still(left_out)),
             Some(value) => Curve::of(value, 1, false)
-                .ok_or_else(|| fault(format!("{key} of {called} is no number"))),
+                .ok_or_else(|| fault(format!("{key} of {called} is not a number"))),
         };
         let length = |key: &str, left_out: f64| {
             let found = number(key, left_out)?;
             match found.is_above_zero() {
                 true => Ok(found),
-                false => Err(fault(format!("{key} of {called} is no positive number"))),
+                false => Err(fault(format!("{key} of {called} is not a positive number"))),
             }
         };
         // 0, the default of UsdGeomCamera, is a pinhole.
@@ -151,7 +151,7 @@ fn choose<'a, 'b>(
     let elsewhere = || elsewhere(layer).map(fault);
     let Some(name) = name else {
         return match chains {
-            [] => Err(elsewhere().unwrap_or_else(|| fault("no prim of it is a Camera"))),
+            [] => Err(elsewhere().unwrap_or_else(|| fault("none of its prims is a Camera"))),
             [only] => Ok(only),
             _ => Err(CameraFileError::Several(names())),
         };

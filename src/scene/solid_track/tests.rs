@@ -164,13 +164,17 @@ fn what_is_no_motion_of_a_solid_is_refused() {
             "given together with",
         ),
         (&turns, &[late], "the first pose is at 1 s"),
-        (&turns, &[long], "no unit one"),
+        (&turns, &[long], "not a unit quaternion"),
         (&turns, &["domain.periodic=[\"z\"]"], "domain.periodic"),
-        (&file("rotation", "STEP", quarter()), &[], "joined by steps"),
+        (
+            &file("rotation", "STEP", quarter()),
+            &[],
+            "interpolated in steps",
+        ),
         (
             &file("scale", "LINEAR", quarter()),
             &[],
-            "another size or shape",
+            "size or shape differs",
         ),
         (&b"no glTF".to_vec(), &[], "door.glb"),
     ] {
@@ -272,7 +276,7 @@ fn a_layer_without_time_codes_a_second_has_its_frames_a_second() {
     let none = MATRICES.replace("timeCodesPerSecond = 10", "framesPerSecond = 0");
     let error = load(none.as_bytes(), &[any]).unwrap_err();
     assert!(
-        error.contains("framesPerSecond is no positive number"),
+        error.contains("framesPerSecond is not a positive number"),
         "{error}"
     );
 }
@@ -424,10 +428,10 @@ fn what_is_no_motion_in_usd_is_refused() {
         (
             &larger,
             OF_USD,
-            "prim /door: at 0.5 s it has another size or shape",
+            "prim /door: at 0.5 s its size or shape differs",
         ),
         ("PXR-USDC\0", OF_USD, "binary USD; write it as text"),
-        ("#usda 1.0\n", any, "no prim of it has a transform"),
+        ("#usda 1.0\n", any, "none of its prims has a transform"),
     ] {
         let error = load(text.as_bytes(), &[set]).unwrap_err();
         assert!(

@@ -95,7 +95,7 @@ fn load(
 fn solvers(doc: &Document<'_>, spec: &Spanned<Vec<String>>) -> Result<[Method; 2], SceneError> {
     let of = |name: &String| {
         let named = Method::NAMED.iter().find(|(known, _)| known == name);
-        let fault = || doc.fault_at(spec.span(), format!("{name:?} is no solver"));
+        let fault = || doc.fault_at(spec.span(), format!("{name:?} is not a solver"));
         named.map(|(_, method)| *method).ok_or_else(fault)
     };
     match spec.get_ref().as_slice() {

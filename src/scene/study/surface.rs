@@ -223,9 +223,9 @@ fn errors(
             |problem: &str| doc.fault_at(word.span(), format!("{:?} {problem}", word.get_ref()));
         let mut named = PictureError::NAMED.iter();
         let named = named.find(|(name, _)| name == word.get_ref());
-        let (_, error) = named.ok_or_else(|| fault("is no error of a picture"))?;
+        let (_, error) = named.ok_or_else(|| fault("is not an error of a picture"))?;
         if errors.contains(error) {
-            return Err(fault("stands there twice"));
+            return Err(fault("is listed twice"));
         }
         errors.push(*error);
     }
@@ -239,7 +239,7 @@ fn read_line(doc: &Document<'_>, line: &LineSpec, file: &Path) -> Result<Line, S
     let key = line.key.get_ref();
     let known = |text: &str| SWEPT.iter().any(|swept| text.starts_with(swept));
     if !SWEPT.contains(&key.as_str()) {
-        let problem = format!("{key:?} is none of {}", SWEPT.join(", "));
+        let problem = format!("{key:?} is not one of {}", SWEPT.join(", "));
         return Err(doc.fault_at(line.key.span(), problem));
     }
     for set in &line.set {

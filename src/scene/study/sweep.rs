@@ -272,7 +272,8 @@ pub(super) fn parse(
         if let Some(name) = &method.get_ref().against {
             lines[place].against = Some(against(doc, name, &lines, place, errors[0])?);
             if lines[place].coarser.is_some() {
-                let problem = "with coarser, and these are not held against the own finest run";
+                let problem = "together with coarser, which is for errors that are compared with \
+                    the method's own finest run";
                 return Err(doc.fault_at(name.span(), problem).into());
             }
         }
@@ -303,7 +304,7 @@ fn errors(
         let named = ErrorMeasure::NAMED
             .iter()
             .find(|(name, _)| name == word.get_ref());
-        let (_, error) = named.ok_or_else(|| fault("is no error that is measured"))?;
+        let (_, error) = named.ok_or_else(|| fault("is not an error that is measured"))?;
         if errors
             .iter()
             .any(|other| other.measure() != error.measure())
@@ -311,7 +312,7 @@ fn errors(
             return Err(fault("is not measured in the same run as those before it"));
         }
         if errors.contains(error) {
-            return Err(fault("stands there twice"));
+            return Err(fault("is listed twice"));
         }
         errors.push(*error);
     }
@@ -352,7 +353,7 @@ fn against(
     }
     let found = lines.iter().position(|line| &line.name == name.get_ref());
     let found = found.filter(|&found| found != place);
-    let found = found.ok_or_else(|| fault("is the name of no other method"))?;
+    let found = found.ok_or_else(|| fault("is not the name of another method"))?;
     let setting = |line: &Line| {
         let points = line.points.iter();
         let values: Vec<_> = points.map(|p| (p.label.clone(), p.frames)).collect();
@@ -381,7 +382,7 @@ fn device(
             fault("the reference's projection is what these errors are measured against")
         }
         Some(device) => Ok(device),
-        None => fault(&format!("{word:?} is no device")),
+        None => fault(&format!("{word:?} is not a device")),
     }
 }
 
@@ -437,7 +438,7 @@ fn line(
         if !is_new {
             let problem = format!(
                 "the scene is the same as with a value before it: {} changes nothing with \
-                 solver.method {:?}, or the value stands there twice",
+                 solver.method {:?}, or the value is listed twice",
                 key.get_ref(),
                 scene.solver.method.name()
             );

@@ -295,7 +295,7 @@ fn check(request: &TuneRequest, scene: &Scene) -> Result<(), TuneError> {
         let name = limit.quantity.name();
         let mut before = request.limits[..k].iter();
         if before.any(|other| other.quantity == limit.quantity) {
-            return fault("--error", format!("{name} stands there twice"));
+            return fault("--error", format!("{name} is listed twice"));
         }
     }
     let wants = |quantity| request.limits.iter().any(|l| l.quantity == quantity);
@@ -313,7 +313,7 @@ fn check(request: &TuneRequest, scene: &Scene) -> Result<(), TuneError> {
     }
     if !(0.1..=10.0).contains(&request.reference) {
         let problem = format!(
-            "{} is no factor on the spacing; allowed is a number from 0.1 to 10",
+            "{} is not a factor on the spacing; allowed is a number from 0.1 to 10",
             shown(request.reference)
         );
         return fault("--reference", problem);

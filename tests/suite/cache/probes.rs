@@ -123,7 +123,8 @@ fn a_probe_that_cannot_be_is_told() {
             "kind = \"elevaton\"",
             &[],
             "probe[0].kind",
-            "\"elevaton\" is no kind; the nearest is \"elevation\"; allowed: \"elevation\"",
+            "\"elevaton\" is not a value of kind; the nearest is \"elevation\"; allowed: \
+             \"elevation\"",
         ),
         ("at = [0.0, 1.0]", &[], "probe[0].kind", "missing"),
         (
@@ -148,19 +149,19 @@ fn a_probe_that_cannot_be_is_told() {
             "kind = \"elevation\"\nat = [0.0, 1.5]",
             &[],
             "probe[0].at",
-            "outside of the domain",
+            "outside the domain",
         ),
         (
             "kind = \"elevation\"\nat = [nan, 1.0]",
             &[],
             "probe[0].at",
-            "outside of the domain",
+            "outside the domain",
         ),
         (
             "kind = \"pressure\"\nat = [0.0, 0.0, 1.0]",
             &[],
             "probe[0].at",
-            "outside of the domain",
+            "outside the domain",
         ),
         (
             "kind = \"volume\"\nat = [0.0]",
@@ -178,7 +179,7 @@ fn a_probe_that_cannot_be_is_told() {
             "kind = \"front\"\naxis = \"x\"",
             &[],
             "probe[0].axis",
-            "\"x\" is no axis",
+            "\"x\" is not a value of axis",
         ),
         (
             "kind = \"front\"\naxis = \"+x\"\nquantile = 0.0",
@@ -202,19 +203,19 @@ fn a_probe_that_cannot_be_is_told() {
             "kind = \"flux\"\naxis = \"-z\"\nat = [1.5]",
             &[],
             "probe[0].at",
-            "[1.5] is outside of the domain",
+            "[1.5] is outside the domain",
         ),
         (
             "kind = \"energy\"\nname = \"../up\"",
             &[],
             "probe[0].name",
-            "no safe file name",
+            "not a safe file name",
         ),
         (
             "kind = \"energy\"\nname = \"\"",
             &[],
             "probe[0].name",
-            "no safe file name",
+            "not a safe file name",
         ),
         (
             "kind = \"energy\"\nplace = 1",
@@ -226,13 +227,13 @@ fn a_probe_that_cannot_be_is_told() {
             "kind = \"energy\"\nname = \"a\"\n[[probe]]\nkind = \"volume\"\nname = \"A\"",
             &[],
             "probe[1].name",
-            "a second probe of the name",
+            "a second probe is named",
         ),
         (
             "kind = \"volume\"\nname = \"energy-1\"\n[[probe]]\nkind = \"energy\"",
             &[],
             "probe[1].name",
-            "a second probe of the name \"energy-1\", which it has by its kind and place",
+            "a second probe is named \"energy-1\", the default for its kind and position",
         ),
         (
             "kind = \"volume\"",
@@ -252,7 +253,7 @@ fn a_probe_that_cannot_be_is_told() {
                 "solver.pbf.grid_projection=false",
             ],
             "probe[0].kind",
-            "goes on from the one before",
+            "carries over from the one before",
         ),
         (
             pressure,

@@ -139,7 +139,7 @@ const FAULTS: [(&str, i32, &str); 21] = [
     (
         "render cache --look look-points.usda.toml",
         2,
-        "camera.file: points.usda: no prim of it is a Camera",
+        "camera.file: points.usda: none of its prims is a Camera",
     ),
     (
         "export cache --usd s.usda --look look-words.usda.toml",
@@ -155,7 +155,7 @@ const FAULTS: [(&str, i32, &str); 21] = [
     (
         "bake track-points.toml",
         2,
-        "points.usda: no prim of it has a transform",
+        "points.usda: none of its prims has a transform",
     ),
     (
         "bake solid-mesh.toml",

@@ -140,7 +140,7 @@ fn events_of_a_study_end_with_the_totals_of_its_points() {
         "refusal.toml",
         "kind = \"stability\"\n[[case]]\nnumber = 1\nname = \"a name that is none\"\n\
          scene = \"small.toml\"\ndevices = [\"cpu\"]\n\
-         set = [\"shot.name=../up\"]\nrefused = [\"no safe file name\"]\n",
+         set = [\"shot.name=../up\"]\nrefused = [\"not a safe file name\"]\n",
     );
     let told = events(&job, 0, "study refusal.toml -o s");
     let points = named(&told, "point");

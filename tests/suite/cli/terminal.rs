@@ -21,7 +21,7 @@ name = "a name that is none"
 scene = "small.toml"
 devices = ["cpu"]
 set = ["shot.name=../up"]
-refused = ["no safe file name"]
+refused = ["not a safe file name"]
 "#;
 
 /// A job with a baked frame in `cache/small/pbf`.
@@ -83,7 +83,7 @@ fn an_adapter_that_is_not_there_is_refused_by_every_command() {
     job.expect(0, "check small.toml --adapter 0");
     job.write("device.toml", &REFUSAL.replace("\"cpu\"", "\"5\""));
     let said = job.expect(2, "study device.toml");
-    assert_has(&said, &["case[0].devices[0]", "\"5\" is no device"]);
+    assert_has(&said, &["case[0].devices[0]", "\"5\" is not a device"]);
     // The cache records the adapter that it was baked on.
     let said = job.expect(2, "inspect cache/small/pbf --adapter 0");
     assert_has(&said, &["--adapter is for scenes"]);

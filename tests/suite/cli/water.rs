@@ -49,10 +49,9 @@ fn the_volume_that_is_made_stands_beside_the_one_asked_for() {
         "max = [0.8, 0.4, 0.8]",
         "max = [0.8, 0.37, 0.8]",
     );
-    let lint = "water.block[0]: 0.2368 m³ are asked for and 0.2560 m³ made, 8.1 % more: \
-                it is filled with whole layers, 8 × 4 × 8 particles 0.1 m apart";
-    let told =
-        "256 particles (0 left out where solids are), 0.2560 m³ of water of 0.2368 m³ asked for";
+    let lint = "water.block[0]: 0.2368 m³ are requested and 0.2560 m³ are made, 8.1 % more: it is \
+        filled with whole layers, 8 × 4 × 8 particles 0.1 m apart";
+    let told = "256 particles (0 removed inside solids), 0.2560 m³ of water of 0.2368 m³ asked for";
     for words in ["inspect water.toml", &format!("{BAKE} -o off")] {
         assert_has(&job.expect(0, words), &[&format!("warning: {lint}"), told]);
     }
@@ -223,9 +222,9 @@ fn water_in_an_open_mesh_is_told_of() {
         "[solver]\n",
         "[[solid]]\nmesh = \"cup.obj\"\n[solver]\n",
     );
-    let open = "cup.obj is open and taken as closed: 1 hole: 4 open edges about";
-    let container = "the scene puts water inside of it, and that water is left out: \
-        an open mesh is solid up to a flat cap over each hole";
+    let open = "cup.obj is open and treated as closed: 1 hole: 4 open edges about";
+    let container = "the scene puts water inside it, and that water is removed: an open mesh is \
+        solid up to a flat cap over each hole";
     for words in ["inspect water.toml", &format!("{BAKE} -o cup")] {
         let said = job.expect(0, words);
         let warned = said

@@ -238,8 +238,11 @@ fn what_cannot_be_tuned_is_refused_before_anything_runs() {
     let job = Job::of(&[("tiny.toml", SCENE)]);
     for (words, part) in [
         ("--error crest=2", "crest: 2 has no unit"),
-        ("--error crset=2%", "\"crset\" is no error that is measured"),
-        ("--error front=2Pa", "front: \"Pa\" is no unit of it"),
+        (
+            "--error crset=2%",
+            "\"crset\" is not an error that is measured",
+        ),
+        ("--error front=2Pa", "front: \"Pa\" is not one of its units"),
         (
             "--error pressure=2%",
             "--error: pressure: the scene has no [[probe]]",

@@ -142,8 +142,8 @@ fn each_fault_of_a_study_names_file_line_key_and_what_is_allowed() {
         (
             "solver_comparison",
             "comparison",
-            "s.toml:1: kind: \"comparison\" is no kind; the nearest is \"solver_comparison\"; \
-             allowed: \"solver_comparison\"",
+            "s.toml:1: kind: \"comparison\" is not a value of kind; the nearest is \
+             \"solver_comparison\"; allowed: \"solver_comparison\"",
         ),
         (
             "pictures",
@@ -160,7 +160,7 @@ fn each_fault_of_a_study_names_file_line_key_and_what_is_allowed() {
             "\"pbf\"]",
             "s.toml:4: solvers: [\"pbf\", \"pbf\"] are not two solvers",
         ),
-        ("\"flip\"]", "\"sph\"]", "solvers: \"sph\" is no solver"),
+        ("\"flip\"]", "\"sph\"]", "solvers: \"sph\" is not a solver"),
         (
             "1-240x2",
             "1-241",

@@ -189,11 +189,11 @@ fn a_mesh_far_from_zero_keeps_its_shape() {
     let (floats, _) = shape("floats.toml");
     assert!((floats.signed_volume() / near.signed_volume() - 1.0).abs() > 0.05);
     let said = job.expect(0, "inspect floats.toml");
-    let words = "warning: far.stl: 32-bit floats about its coordinate -5411987";
+    let words = "warning: far.stl: 32-bit floats near its coordinate -5411987";
     assert_has(&said, &[words, "are 5.00e-1 m apart"]);
     assert_has(
         &said,
-        &["let translate move it", "particle spacing of 0.02 m"],
+        &["move it with translate", "particle spacing of 0.02 m"],
     );
 }
 
@@ -240,7 +240,7 @@ fn a_mesh_as_wide_as_the_domain_fits_into_it() {
         assert_has(&said, &["not fit", "0.07500002", "0.075"]);
         if table != water {
             let said = read("lower.obj").expect_err("lower");
-            assert_has(&said, &["0.7 m is not within its room"]);
+            assert_has(&said, &["0.7 m is not within its volume"]);
         }
     }
 }
@@ -255,7 +255,7 @@ fn a_solid_that_touches_the_domain_is_outside_of_it() {
         Scene::load(&job.path("scene.toml"), &[]).map_err(|error| error.to_string())
     };
     let said = read("-0.3").expect_err("beside the domain");
-    assert_has(&said, &["outside of the domain"]);
+    assert_has(&said, &["outside the domain"]);
     assert!(read("-0.2999").is_ok());
 }
 

@@ -352,8 +352,8 @@ fn an_open_mesh_is_told_of_everywhere_and_a_tube_is_refused() {
     job.edit("small.toml", "period = 0.5", "period = 2.0");
     job.expect(0, "bake small.toml --device cpu --frames 1 -o closed");
     // The cache has its own copy under a name of its own.
-    let told = ".obj is open and taken as closed: 1 hole: 4 open edges about (0.5000, 0.5000, \
-                0.7000), 0.5657 m across; inside is where its winding number is above one half";
+    let told = ".obj is open and treated as closed: 1 hole: 4 open edges about (0.5000, 0.5000, \
+        0.7000), 0.5657 m across; inside is where its winding number is above one half";
     let manifest = |cache: &str| fs::read_to_string(job.path(cache).join("manifest.json")).unwrap();
     assert!(!manifest("closed").contains("warnings"));
     assert!(!job.expect(0, "inspect small.toml").contains("warning"));

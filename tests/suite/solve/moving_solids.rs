@@ -485,7 +485,7 @@ fn scenes_say_where_solids_go() {
         (
             &["solid[0].translate=[9, 0, 0]"],
             "solid[0].motion",
-            "never comes into the domain",
+            "never enters the domain",
         ),
         (
             &["solid[0].motion={kind=\"solitary\", height=0.1, depth=1}"],
@@ -565,7 +565,7 @@ fn scenes_say_where_solids_go() {
                 swing,
             ],
             "solid[0].turn",
-            "never comes into the domain",
+            "never enters the domain",
         ),
     ] {
         let error = parse(&alone, set).unwrap_err().to_string();

@@ -94,7 +94,7 @@ fn a_wall_without_room_says_so() {
     let small = "--frames 1-20 --set wave_maker.0.absorption.room=0.002";
     let said = job.expect(0, &format!("bake tank.toml {small} -o small"));
     assert!(
-        said.contains("wave_maker[0].absorption.room: the wall was at its end in"),
+        said.contains("wave_maker[0].absorption.room: the wall was at the end of its range in"),
         "{said}"
     );
 }
@@ -180,7 +180,10 @@ fn a_branch_takes_answers_by_wall() {
         said.contains("wave_maker[0]: the wall +x was -0.0"),
         "{said}"
     );
-    assert!(said.contains("off its own way and begins on it"), "{said}");
+    assert!(
+        said.contains("away from its own path and begins on it"),
+        "{said}"
+    );
     assert_eq!(first("small"), AbsorberStates::default());
 }
 
@@ -266,7 +269,7 @@ fn walls_that_cannot_absorb_are_refused_with_their_key() {
         ),
         (
             "wave_maker=[{wall=\"+x\",motion={kind=\"still\"}}]",
-            "wave_maker[0].motion.kind: a wall that makes no waves and takes none in",
+            "wave_maker[0].motion.kind: a wall that neither makes nor absorbs waves",
         ),
         (
             "wave_maker.0.absorption.gain=1",

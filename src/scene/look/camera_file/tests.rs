@@ -76,7 +76,7 @@ fn animated(nodes: &Value, yfov: f64, rows: &[Row<'_>]) -> Vec<u8> {
 }
 
 fn nothing(name: &str) -> std::result::Result<Vec<u8>, String> {
-    Err(format!("{name} is not there"))
+    Err(format!("{name} does not exist"))
 }
 
 fn read(bytes: &[u8]) -> Result<CameraFile> {
@@ -210,7 +210,7 @@ fn what_is_no_camera_is_told() {
     assert!(told(&good, Some("shot")).is_empty() && told(&good, Some("lens")).is_empty());
     let text = |document: Value| document.to_string().into_bytes();
     let none = text(json!({ "asset": { "version": "2.0" }, "nodes": [{}] }));
-    assert!(told(&none, None).contains("no node"));
+    assert!(told(&none, None).contains("none of its nodes"));
     let flat = json!({
         "asset": { "version": "2.0" }, "nodes": [{ "name": "plan", "camera": 0 }],
         "cameras": [{ "type": "orthographic",
@@ -229,7 +229,7 @@ fn what_is_no_camera_is_told() {
     let few: [Row<'_>; 1] = [(0, "translation", "LINEAR", &[0.0, 1.0], &[0.0; 3])];
     assert!(told(&animated(&plain, 0.5, &few), None).contains("1 values for 2 times"));
     let back: [Row<'_>; 1] = [(0, "translation", "LINEAR", &[1.0, 0.0], &[0.0; 6])];
-    assert!(told(&animated(&plain, 0.5, &back), None).contains("do not ascend"));
+    assert!(told(&animated(&plain, 0.5, &back), None).contains("not in ascending order"));
     let twice: [Row<'_>; 1] = [(0, "translation", "LINEAR", &[0.0, 1.0], &[0.0; 6])];
     let twice = [twice[0], twice[0]];
     let told_twice = told(&animated(&plain, 0.5, &twice), None);
@@ -255,7 +255,7 @@ fn what_is_no_camera_is_told() {
             }]
         }))
     };
-    assert!(told(&outside("a%20b.bin"), None).contains("a b.bin is not there"));
+    assert!(told(&outside("a%20b.bin"), None).contains("a b.bin does not exist"));
     // 0.0, then 1.0, 2.0, 3.0.
     let inside = outside("data:application/octet-stream;base64,AAAAAAAAgD8AAABAAABAQA==");
     let stand = read(&inside).unwrap().at(0.0);

@@ -310,7 +310,7 @@ fn what_gives_no_camera_says_why() {
             "2 cameras: /root/plan/second, /root/rig/shot_010/lens",
         ),
         (BLENDER, Some("gate"), "no camera is called \"gate\""),
-        (&without, None, "no prim of it is a Camera"),
+        (&without, None, "none of its prims is a Camera"),
         (
             &OPERATIONS.replace("rotateZYX = (10, 20, 30)", "rotateZYX = (10, 20)"),
             None,
@@ -319,7 +319,7 @@ fn what_gives_no_camera_says_why() {
         (
             &OPERATIONS.replace("xformOp:rotateX\"", "xformOp:shear\""),
             None,
-            "not a transform",
+            "not a known transform",
         ),
         (
             &OPERATIONS.replace("float focalLength = 50", "float focalLength = 0"),
@@ -329,7 +329,7 @@ fn what_gives_no_camera_says_why() {
         (
             &OPERATIONS.replace("float focalLength", "float fStop = 2.8\nfloat focalLength"),
             None,
-            "focusDistance of /a/b/cam is no positive number",
+            "focusDistance of /a/b/cam is not a positive number",
         ),
         (
             &OPERATIONS.replace(
@@ -337,7 +337,7 @@ fn what_gives_no_camera_says_why() {
                 "float fStop.timeSamples = { 0: 0, 5: 2.8 }\nfloat focalLength",
             ),
             None,
-            "fStop of /a/b/cam is no positive number",
+            "fStop of /a/b/cam is not a positive number",
         ),
         (
             &OPERATIONS.replace("upAxis = \"Y\"", "upAxis = \"X\""),
@@ -357,7 +357,7 @@ fn what_gives_no_camera_says_why() {
         (
             &OPERATIONS.replace("float focalLength = 50", "float focalLength = 5.0.0"),
             None,
-            "line 26: \"5.0.0\" is no number",
+            "line 26: \"5.0.0\" is not a number",
         ),
     ] {
         let error = camera(text, name).err().map(|error| error.to_string());

@@ -280,7 +280,7 @@ fn mark(doc: &Document<'_>, spec: &Spanned<MarkSpec>, others: usize) -> Result<M
     let fault = |problem: String| doc.fault_at(spec.of.span(), problem);
     let word = spec.of.get_ref();
     let named = Quantity::ALL.into_iter().find(|of| of.name() == word);
-    let of = named.ok_or_else(|| fault(format!("{word:?} is nothing that is measured")))?;
+    let of = named.ok_or_else(|| fault(format!("{word:?} is not a quantity that is measured")))?;
     if of.about().others > others {
         let problem = format!(
             "{word:?} takes {} [[case.against]], and there are {others}",
@@ -376,7 +376,7 @@ fn filled(set: &str, value: f64) -> std::result::Result<String, String> {
         let (before, term) = before.split_at(open);
         let factor = |text: &str| {
             text.parse::<f64>()
-                .map_err(|_| format!("{{{text}}} is none of {{}}, {{2*}}, {{2/}}"))
+                .map_err(|_| format!("{{{text}}} is not one of {{}}, {{2*}}, {{2/}}"))
         };
         out.push_str(before);
         match term.strip_prefix('{') {
@@ -405,7 +405,7 @@ fn methods(doc: &Document<'_>, words: &Option<Vec<Spanned<String>>>) -> Result<V
         let named = Method::NAMED
             .iter()
             .find(|(name, _)| name == word.get_ref());
-        let fault = || doc.fault_at(word.span(), format!("{:?} is no solver", word.get_ref()));
+        let fault = || doc.fault_at(word.span(), format!("{:?} is not a solver", word.get_ref()));
         named.map(|(_, method)| *method).ok_or_else(fault)
     };
     words.iter().map(of).collect()
@@ -419,7 +419,7 @@ fn devices(doc: &Document<'_>, words: &Option<Vec<Spanned<String>>>) -> Result<V
 }
 
 fn device(doc: &Document<'_>, word: &Spanned<String>) -> Result<RunsOn> {
-    let fault = || doc.fault_at(word.span(), format!("{:?} is no device", word.get_ref()));
+    let fault = || doc.fault_at(word.span(), format!("{:?} is not a device", word.get_ref()));
     RunsOn::named(word.get_ref()).ok_or_else(fault)
 }
 

@@ -33,8 +33,8 @@ pub(super) fn check_fit(
     {
         if error.measure() == Measure::Finest && frames % SAMPLES != 0 {
             return fault(format!(
-                "{} is taken at {SAMPLES} times, and {:?} with {label} has {frames} \
-                 frames, no multiple of that",
+                "{} is taken at {SAMPLES} times, and {:?} with {label} has {frames} frames, which \
+                 is not a multiple of that",
                 error.name(),
                 line.name
             ));
@@ -141,13 +141,14 @@ pub(super) fn check_coarser(
             match is_twice {
                 true => Ok(()),
                 false => fault(
-                    "a projection is held against one of the same particles on cells twice as \
+                    "a projection is compared with one of the same particles on cells twice as \
                      large, with eight times as many in each",
                 ),
             }
         }
         Measure::Report | Measure::Converged => fault(
-            "these errors say what the iterations leave, which no grid or step is coarser for",
+            "these errors measure what the iterations leave, so that no grid or step is coarser \
+             for them",
         ),
     }
 }

@@ -108,8 +108,9 @@ impl FromStr for Limit {
         let named = Quantity::NAMED
             .into_iter()
             .find(|(known, _)| *known == name);
-        let (_, quantity) = named
-            .ok_or_else(|| format!("{name:?} is no error that is measured; allowed: {names}"))?;
+        let (_, quantity) = named.ok_or_else(|| {
+            format!("{name:?} is not an error that is measured; allowed: {names}")
+        })?;
         let units = match quantity.unit() {
             None => "%".to_owned(),
             Some(unit) => format!("% or {unit}"),
@@ -123,15 +124,15 @@ impl FromStr for Limit {
             |what: String| format!("{name}: {what}; allowed is a number above 0 with {units}");
         let number: f64 = number
             .parse()
-            .map_err(|_| fault(format!("{number:?} is no number")))?;
+            .map_err(|_| fault(format!("{number:?} is not a number")))?;
         if !(number.is_finite() && number > 0.0) {
-            return Err(fault(format!("{} is no limit", shown(number))));
+            return Err(fault(format!("{} is not a limit", shown(number))));
         }
         let bound = match unit {
             "%" => Bound::Part(number / 100.0),
             "" => return Err(fault(format!("{} has no unit", shown(number)))),
             unit if Some(unit) == quantity.unit() => Bound::Absolute(number),
-            unit => return Err(fault(format!("{unit:?} is no unit of it"))),
+            unit => return Err(fault(format!("{unit:?} is not one of its units"))),
         };
         Ok(Self { quantity, bound })
     }
@@ -161,14 +162,14 @@ mod tests {
         );
         for (text, said) in [
             ("crest", "names: crest, front"),
-            ("crset=2%", "\"crset\" is no error"),
+            ("crset=2%", "\"crset\" is not an error"),
             ("crest=2", "crest: 2 has no unit"),
-            ("crest=2Pa", "crest: \"Pa\" is no unit of it"),
-            ("energy=2m", "energy: \"m\" is no unit of it"),
-            ("crest=%", "crest: \"\" is no number"),
-            ("crest=-1%", "crest: -1 is no limit"),
-            ("run_up=0m", "run_up: 0 is no limit"),
-            ("front=infm", "is no"),
+            ("crest=2Pa", "crest: \"Pa\" is not one of its units"),
+            ("energy=2m", "energy: \"m\" is not one of its units"),
+            ("crest=%", "crest: \"\" is not a number"),
+            ("crest=-1%", "crest: -1 is not a limit"),
+            ("run_up=0m", "run_up: 0 is not a limit"),
+            ("front=infm", "is not"),
         ] {
             let error = of(text).expect_err(text);
             assert!(error.contains(said), "{text}: {error}");

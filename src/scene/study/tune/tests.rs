@@ -122,7 +122,7 @@ fn what_does_not_fit_the_scene_is_named_by_its_option() {
     for (request, expected) in [
         (
             request("dam-break.toml", &["crest=2%", "crest=0.1m"]),
-            "--error: crest stands there twice",
+            "--error: crest is listed twice",
         ),
         (
             request("dam-break.toml", &["pressure=2%"]),
@@ -140,7 +140,7 @@ fn what_does_not_fit_the_scene_is_named_by_its_option() {
                 reference: 0.0,
                 ..sound()
             },
-            "--reference: 0 is no factor",
+            "--reference: 0 is not a factor",
         ),
         (
             TuneRequest {

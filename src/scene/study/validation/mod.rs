@@ -285,7 +285,7 @@ fn benchmark(
     let measure = measure.ok_or_else(|| {
         doc.fault_at(
             spec.measure.span(),
-            format!("{word:?} is nothing that is measured"),
+            format!("{word:?} is not a quantity that is measured"),
         )
     })?;
     let scale = scale(doc, spec, measure, at.clone())?;
@@ -302,7 +302,7 @@ fn benchmark(
         if !measure.curves().iter().any(|(name, _)| name == word) {
             let names: Vec<_> = measure.curves().iter().map(|(name, _)| *name).collect();
             let problem = format!(
-                "{word:?} is no curve of {}, which has {names:?}",
+                "{word:?} is not a curve of {}, which has {names:?}",
                 spec.measure.get_ref()
             );
             return Err(doc.fault_at(points.of.span(), problem));
@@ -377,7 +377,7 @@ fn trial(
     let device = match &spec.device {
         None => RunsOn::Gpu,
         Some(word) => RunsOn::named(word.get_ref()).ok_or_else(|| {
-            doc.fault_at(word.span(), format!("{:?} is no device", word.get_ref()))
+            doc.fault_at(word.span(), format!("{:?} is not a device", word.get_ref()))
         })?,
     };
     Ok(Trial {
@@ -391,7 +391,7 @@ fn method(doc: &Document<'_>, word: &Spanned<String>) -> Result<Method> {
     let named = Method::NAMED
         .iter()
         .find(|(name, _)| name == word.get_ref());
-    let fault = || doc.fault_at(word.span(), format!("{:?} is no solver", word.get_ref()));
+    let fault = || doc.fault_at(word.span(), format!("{:?} is not a solver", word.get_ref()));
     named.map(|(_, method)| *method).ok_or_else(fault)
 }
 
@@ -428,7 +428,7 @@ fn gate(
     }
     if matches!(bound, Bound::Within(_) | Bound::OffBy(_)) && spec.published.is_none() {
         return Err(fault(format!(
-            "{word:?} is held against no published number"
+            "{word:?} is compared with no published number"
         )));
     }
     let method = spec
@@ -464,13 +464,13 @@ fn gate(
     ) && bound.limit() < 0.0
     {
         return Err(fault(format!(
-            "a bound of {} holds for nothing",
+            "no value is within a bound of {}; allowed is 0 or more",
             bound.limit()
         )));
     }
     if matches!(bound, Bound::Within(_)) && spec.published == Some(0.0) {
         return Err(fault(
-            "a part of 0 is 0: off_by goes with published = 0".to_owned(),
+            "a part of 0 is 0: use off_by with published = 0".to_owned(),
         ));
     }
     if judged < least {
@@ -535,7 +535,7 @@ at = [[0.0, 0.2]]
                 "s.toml:4:",
                 "takes no stroke",
             ),
-            ("\"flip\"", "\"sph\"", "s.toml:9:", "no solver"),
+            ("\"flip\"", "\"sph\"", "s.toml:9:", "not a solver"),
             ("resolution = 20\n", "", "s.toml:8:", "resolution"),
             (
                 "\"celerity\"",
@@ -568,7 +568,7 @@ at = [[0.0, 0.2]]
                 "s.toml:12:",
                 "0 runs",
             ),
-            ("\"elevation\"", "\"front\"", "s.toml:17:", "is no curve"),
+            ("\"elevation\"", "\"front\"", "s.toml:17:", "is not a curve"),
         ] {
             let error = read(&TEXT.replacen(from, to, 1)).expect_err(to);
             assert!(

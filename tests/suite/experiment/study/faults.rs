@@ -14,7 +14,7 @@ fn devices_and_references_that_do_not_fit_are_refused() {
         (
             second,
             "name = \"b\"\ndevice = \"tpu\"\n",
-            "s.toml:16: method[1].device: \"tpu\" is no device; allowed: \"gpu\", or \"cpu\"",
+            "s.toml:16: method[1].device: \"tpu\" is not a device; allowed: \"gpu\", or \"cpu\"",
         ),
         (
             second,
@@ -56,8 +56,8 @@ fn devices_and_references_that_do_not_fit_are_refused() {
         "\"crest_error\"",
     );
     for (name, values, expected) in [
-        ("sor", "[1, 4]", "is the name of no other method"),
-        ("b", "[1, 4]", "is the name of no other method"),
+        ("sor", "[1, 4]", "is not the name of another method"),
+        ("b", "[1, 4]", "is not the name of another method"),
         ("jacobi", "[1, 8]", "has another key, other values"),
     ] {
         let lines = format!("name = \"b\"\nvalues = {values}\nagainst = \"{name}\"\n");
@@ -188,12 +188,12 @@ fn each_fault_names_file_line_key_and_what_is_allowed() {
         (
             "_mean\"",
             "_mode\"",
-            "errors[0]: \"density_error_mode\" is no error that is measured",
+            "errors[0]: \"density_error_mode\" is not an error that is measured",
         ),
         (
             "_max\"",
             "_mean\"",
-            "errors[1]: \"density_error_mean\" stands there twice",
+            "errors[1]: \"density_error_mean\" is listed twice",
         ),
         (
             "density_error_max",

@@ -41,7 +41,7 @@ name = "multigrid"
         (
             "cell_size=0.2",
             "cell_size=0.15",
-            "s.toml:7: coarser: a projection is held against",
+            "s.toml:7: coarser: a projection is compared with",
         ),
         (
             "particles_per_cell=64",
@@ -58,7 +58,7 @@ name = "multigrid"
     );
     let said = job.load(&report).unwrap_err();
     assert!(
-        said.contains("s.toml:8: coarser: these errors say what the iterations leave"),
+        said.contains("s.toml:8: coarser: these errors measure what the iterations leave"),
         "{said}"
     );
 
@@ -151,9 +151,9 @@ set = ["solver.method=flip"]
         (
             "\"cpu\"",
             "\"tpu\"",
-            "s.toml:5: values[1]: \"tpu\" is no device",
+            "s.toml:5: values[1]: \"tpu\" is not a device",
         ),
-        ("\"cpu\"", "\"gpu\"", "the value stands there twice"),
+        ("\"cpu\"", "\"gpu\"", "the value is listed twice"),
         (
             "name = \"pbf\"",
             "name = \"pbf\"\ndevice = \"cpu\"",

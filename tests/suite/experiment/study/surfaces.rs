@@ -73,7 +73,7 @@ fn what_a_surface_study_cannot_be_is_named() {
         (
             "key = \"surface.smoothing_width_m\"",
             "key = \"camera.focal_length_mm\"",
-            "s.toml:11: line[0].key: \"camera.focal_length_mm\" is none of surface.filter",
+            "s.toml:11: line[0].key: \"camera.focal_length_mm\" is not one of surface.filter",
         ),
         (
             "values = [0.0, 0.1]",
@@ -89,7 +89,7 @@ fn what_a_surface_study_cannot_be_is_named() {
         (
             "\"colour\"",
             "\"taste\"",
-            "errors[2]: \"taste\" is no error of a picture",
+            "errors[2]: \"taste\" is not an error of a picture",
         ),
         (
             "\"by voxels\"",

@@ -556,7 +556,7 @@ fn files_that_cannot_be_used_are_refused_with_their_key() {
         ),
         (
             "materials = \"no.mtl\"".to_owned(),
-            ["no.mtl line 3", "it is no PNG"],
+            ["no.mtl line 3", "readable PNG"],
         ),
         (
             "materials = \"out.mtl\"".to_owned(),
@@ -568,15 +568,15 @@ fn files_that_cannot_be_used_are_refused_with_their_key() {
         ),
         (
             texture("no.png"),
-            ["solids.material[0].texture.file", "it is no PNG"],
+            ["solids.material[0].texture.file", "readable PNG"],
         ),
         (
             texture("cut.png"),
-            ["solids.material[0].texture.file", "it is no PNG"],
+            ["solids.material[0].texture.file", "readable PNG"],
         ),
         (
             format!("{0}\n{0}", texture("a.png")),
-            ["solids.material[1].name", "stands twice"],
+            ["solids.material[1].name", "is defined twice"],
         ),
         (
             texture("a.png").replace("metres = 1.0", "metres = 0.0"),

@@ -88,7 +88,7 @@ pub const FLIP_FAULTS: &[Fault] = &[
         "transfer = \"flip\"",
         "transfer = \"pic\"",
         37,
-        &["\"pic\" is no transfer; the nearest is \"apic\""],
+        &["\"pic\" is not a value of transfer; the nearest is \"apic\""],
     ),
     (
         "transfer = \"flip\"",
@@ -118,14 +118,14 @@ pub const FLIP_FAULTS: &[Fault] = &[
         "surface = \"voxel\"",
         "surface = \"ghost\"",
         38,
-        &["\"ghost\" is no surface", "ghost_fluid"],
+        &["\"ghost\" is not a value of surface", "ghost_fluid"],
     ),
     (
         "\"ipp\"",
         "\"multigird\"",
         39,
         &[
-            "solver.flip.pressure.preconditioner: \"multigird\" is no preconditioner; \
+            "solver.flip.pressure.preconditioner: \"multigird\" is not a value of preconditioner; \
              the nearest is \"multigrid\"",
             "\"none\"",
         ],
@@ -167,19 +167,19 @@ pub const FLIP_FAULTS: &[Fault] = &[
         "max = [25.0, 12.6, 15.0]",
         "max = [25.0, 12.6, 15.0]\nwalls = \"noslip\"",
         9,
-        &["domain.walls: \"noslip\" is no walls; the nearest is \"no_slip\""],
+        &["domain.walls: \"noslip\" is not a value of walls; the nearest is \"no_slip\""],
     ),
     (
         "max = [25.0, 12.6, 15.0]",
         "max = [25.0, 12.6, 15.0]\nno_slip = [\"-y\", \"floor\"]",
         9,
-        &["domain.no_slip: \"floor\" is no no_slip"],
+        &["domain.no_slip: \"floor\" is not a value of no_slip"],
     ),
     (
         "max = [25.0, 12.6, 15.0]",
         "max = [25.0, 12.6, 15.0]\nno_slip = [\"-y\", \"+x\", \"-y\"]",
         9,
-        &["domain.no_slip: a wall stands there twice", "each once"],
+        &["domain.no_slip: a wall is listed twice", "each once"],
     ),
     (
         "max = [25.0, 12.6, 15.0]",

@@ -48,7 +48,7 @@ pub const KEY_FAULTS: &[Fault] = &[
         "[effects]",
         "[budget]\nenergy = true\n[effects]",
         33,
-        &["budget.energy: true is no limit", "or false"],
+        &["budget.energy: true is not a limit", "or false"],
     ),
     (
         "[effects]",
@@ -116,7 +116,7 @@ pub const KEY_FAULTS: &[Fault] = &[
         "[[probe]]\nkind = \"elevaton\"\n\n[effects]",
         33,
         &[
-            "probe[0].kind: \"elevaton\" is no kind; the nearest is \"elevation\"",
+            "probe[0].kind: \"elevaton\" is not a value of kind; the nearest is \"elevation\"",
             "\"elevation\", \"pressure\", \"energy\", \"volume\", \"front\", \"run_up\", \
              \"flux\" or \"force\"",
         ],
@@ -131,7 +131,7 @@ pub const KEY_FAULTS: &[Fault] = &[
         "[effects]",
         "[[probe]]\nkind = \"pressure\"\nat = [26.0, 1.0, 1.0]\n\n[effects]",
         34,
-        &["probe[0].at: [26.0, 1.0, 1.0] is outside of the domain"],
+        &["probe[0].at: [26.0, 1.0, 1.0] is outside the domain"],
     ),
     (
         "[effects]",
@@ -139,8 +139,8 @@ pub const KEY_FAULTS: &[Fault] = &[
          [effects]",
         37,
         &[
-            "probe[1].name: a second probe of the name \"a\": \"A\" is the same file where upper \
-             and lower case",
+            "probe[1].name: a second probe is named \"a\": \"A\" is the same file where upper and \
+             lower case",
             "upper and lower case taken alike",
         ],
     ),
@@ -149,13 +149,13 @@ pub const KEY_FAULTS: &[Fault] = &[
         "[[probe]]\nkind = \"energy\"\nname = \"a\"\n[[probe]]\nkind = \"volume\"\nname = \"a\"\n\n\
          [effects]",
         37,
-        &["probe[1].name: a second probe of the name \"a\""],
+        &["probe[1].name: a second probe is named \"a\""],
     ),
     (
         "[effects]",
         "[[probe]]\nkind = \"energy\"\nname = \"a/b\"\n\n[effects]",
         34,
-        &["probe[0].name: \"a/b\" is no safe file name"],
+        &["probe[0].name: \"a/b\" is not a safe file name"],
     ),
     (
         "stroke = 1.5",
@@ -203,7 +203,7 @@ pub const KEY_FAULTS: &[Fault] = &[
         "frames = 240",
         "frames = 240\nframes = 3",
         4,
-        &["shot.frames: a second key of this name in [shot]"],
+        &["shot.frames: this key is defined twice in [shot]"],
     ),
     ("frames = 240", "frames = = 3", 3, &["bad.toml:3"]),
     (
@@ -216,7 +216,7 @@ pub const KEY_FAULTS: &[Fault] = &[
         "xsph = 0.01",
         "",
         33,
-        &["neither a coefficient, Pa s, nor xsph is given"],
+        &["neither coefficient (Pa s) nor xsph is given"],
     ),
     (
         "xsph = 0.01",

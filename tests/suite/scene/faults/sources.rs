@@ -18,7 +18,7 @@ pub const SOURCE_FAULTS: &[Fault] = &[
         "[[emitter]]\nmin = [1.0, 2.0, 1.0]\nmax = [2.0, 13.0, 2.0]\nvelocity = [1.0, 0.0, 0.0]\n\
          [solver]\nmethod",
         28,
-        &["emitter[0].max: it does not fit: it reaches over [1, 2, 1] to [2, 13, 2]"],
+        &["emitter[0].max: it does not fit: it spans [1, 2, 1] to [2, 13, 2]"],
     ),
     (
         BEFORE,
@@ -26,8 +26,8 @@ pub const SOURCE_FAULTS: &[Fault] = &[
          [solver]\nmethod",
         28,
         &[
-            "emitter[0].max: its room, 1 × 0.04 × 1 m, is too thin for one layer of particles 0.1 \
-             m apart",
+            "emitter[0].max: its volume of 1 × 0.04 × 1 m is too thin for one layer of particles \
+             0.1 m apart",
         ],
     ),
     (
@@ -49,15 +49,18 @@ pub const SOURCE_FAULTS: &[Fault] = &[
          [solver]\nmethod",
         29,
         &[
-            "emitter[0].velocity: in a frame its water goes 0 × 1.5 × 0 m, \
-             and its room is 1 × 1 × 1 m: make the room longer",
+            "emitter[0].velocity: in a frame its water moves 0 × 1.5 × 0 m, and its volume is 1 × \
+             1 × 1 m: make it longer",
         ],
     ),
     (
         BEFORE,
         "[[emitter]]\nmin = [1.0, 2.0, 1.0]\nmax = [2.0, 3.0, 2.0]\nlevel = 1.5\n[solver]\nmethod",
         29,
-        &["emitter[0].level: 1.5 m is not within its room, which reaches from 2 to 3 m; allowed: "],
+        &[
+            "emitter[0].level: 1.5 m is not within its volume, which reaches from 2 to 3 m; \
+             allowed: ",
+        ],
     ),
     (
         BEFORE,

@@ -10,7 +10,7 @@ pub const VALUE_FAULTS: &[Fault] = &[
         "max = [25.0, 12.6, 15.0]\nwalls = \"no_slip\"",
         9,
         &[
-            "domain.walls: solver pbf has free-slip walls alone",
+            "domain.walls: solver pbf has only free-slip walls",
             "solver.method = \"flip\"",
         ],
     ),
@@ -18,7 +18,7 @@ pub const VALUE_FAULTS: &[Fault] = &[
         "max = [25.0, 12.6, 15.0]",
         "max = [25.0, 12.6, 15.0]\nno_slip = [\"-y\"]",
         9,
-        &["domain.no_slip: solver pbf has free-slip walls alone"],
+        &["domain.no_slip: solver pbf has only free-slip walls"],
     ),
     // Periodic axes.
     (
@@ -37,7 +37,7 @@ pub const VALUE_FAULTS: &[Fault] = &[
         "max = [25.0, 12.6, 15.0]",
         "max = [25.0, 12.6, 15.0]\nperiodic = [\"w\"]",
         9,
-        &["domain.periodic: \"w\" is no periodic"],
+        &["domain.periodic: \"w\" is not a value of periodic"],
     ),
     (
         "max = [25.0, 12.6, 15.0]",
@@ -49,7 +49,7 @@ pub const VALUE_FAULTS: &[Fault] = &[
         "max = [25.0, 12.6, 15.0]",
         "max = [25.0, 12.6, 15.0]\nperiodic = [\"z\", \"x\", \"z\"]",
         9,
-        &["domain.periodic: \"z\" stands there twice"],
+        &["domain.periodic: \"z\" is listed twice"],
     ),
     (
         "max = [25.0, 12.6, 15.0]",
@@ -128,9 +128,9 @@ pub const VALUE_FAULTS: &[Fault] = &[
         "\"base\"",
         "\"../up\"",
         2,
-        &["shot.name: \"../up\" is no safe file name", "letters"],
+        &["shot.name: \"../up\" is not a safe file name", "letters"],
     ),
-    ("\"base\"", "\"\"", 2, &["shot.name: \"\" is no safe"]),
+    ("\"base\"", "\"\"", 2, &["shot.name: \"\" is not a safe"]),
     (
         "iterations = 4",
         "iterations = 0",
@@ -165,14 +165,14 @@ pub const VALUE_FAULTS: &[Fault] = &[
         "iterations = 4",
         "iteration = \"gauss\"",
         30,
-        &["\"gauss\" is no iteration", "red_black"],
+        &["\"gauss\" is not a value of iteration", "red_black"],
     ),
     (
         "\"pbf\"",
         "\"sph\"",
         27,
         &[
-            "solver.method: \"sph\" is no method; the nearest is \"pbf\"",
+            "solver.method: \"sph\" is not a value of method; the nearest is \"pbf\"",
             "[solver.flip]",
         ],
     ),
@@ -192,13 +192,13 @@ pub const VALUE_FAULTS: &[Fault] = &[
         "[shot]",
         "[shot]\n[shot]",
         2,
-        &["shot: a second table of this name"],
+        &["shot: this table is defined twice"],
     ),
     (
         "stroke = 1.5",
         "stroke = 1.5, stroke = 2",
         24,
-        &["wave_maker[0].motion.stroke: a second key of this name in wave_maker[0].motion"],
+        &["wave_maker[0].motion.stroke: this key is defined twice in wave_maker[0].motion"],
     ),
     (
         "frames = 240",
@@ -315,7 +315,7 @@ pub const VALUE_FAULTS: &[Fault] = &[
         "[18.0, 0.0, 7.0]",
         "[80.0, 0.0, 7.0]",
         18,
-        &["solid[0].mesh: the mesh lies outside of the domain"],
+        &["solid[0].mesh: the mesh lies outside the domain"],
     ),
     (
         "scale = 2.0",
@@ -330,7 +330,7 @@ pub const VALUE_FAULTS: &[Fault] = &[
         "\"left\"",
         23,
         &[
-            "wave_maker[0].wall: \"left\" is no wall; the nearest is",
+            "wave_maker[0].wall: \"left\" is not a value of wall; the nearest is",
             "\"+z\"",
         ],
     ),
@@ -402,7 +402,7 @@ pub const VALUE_FAULTS: &[Fault] = &[
         "kind = \"wobble\"",
         24,
         &[
-            "motion.kind: \"wobble\" is no kind; the nearest is",
+            "motion.kind: \"wobble\" is not a value of kind; the nearest is",
             "solitary",
         ],
     ),
@@ -434,8 +434,8 @@ pub const VALUE_FAULTS: &[Fault] = &[
          shortest_period = 0.5",
         24,
         &[
-            "motion.shortest_period: waves of 0.5 s are 0.390 m long, 3.9 particle spacings of at \
-             least 10; allowed: ",
+            "motion.shortest_period: waves of 0.5 s are 0.390 m long, 3.9 particle spacings; at \
+             least 10 are needed; allowed: ",
         ],
     ),
     (
@@ -456,7 +456,7 @@ pub const VALUE_FAULTS: &[Fault] = &[
         "kind = \"sea\", significant_height = 0.1, peak_period = 3.0, depth = 1.0, \
          spectrum = \"jonswop\"",
         24,
-        &["motion.spectrum: \"jonswop\" is no spectrum; the nearest is \"jonswap\""],
+        &["motion.spectrum: \"jonswop\" is not a value of spectrum; the nearest is \"jonswap\""],
     ),
     (
         "kind = \"sine\", stroke = 1.5, period = 3.0, ramp = 1.0",

@@ -9,8 +9,8 @@ pub const ZONE_FAULTS: &[Fault] = &[
          surface_tension = { coefficient = 0.07 }",
         34,
         &[
-            "effects.surface_tension: is a part of the projection",
-            "only true is allowed",
+            "effects.surface_tension: is part of the projection",
+            "set it to true",
         ],
     ),
     (
@@ -38,7 +38,7 @@ pub const ZONE_FAULTS: &[Fault] = &[
         "viscosity = { xsph = 0.01 }\nabsorbing_zone = { walls = [\"+x\", \"+x\"], length = 3.0, \
          period = 2.0 }",
         34,
-        &["effects.absorbing_zone.walls: \"+x\" stands there twice; allowed: "],
+        &["effects.absorbing_zone.walls: \"+x\" is listed twice; allowed: "],
     ),
     (
         "viscosity = { xsph = 0.01 }",
@@ -52,21 +52,24 @@ pub const ZONE_FAULTS: &[Fault] = &[
         "viscosity = { xsph = 0.01 }\nabsorbing_zone = { walls = [\"+x\"], length = 26.0, \
          period = 2.0 }",
         34,
-        &["effects.absorbing_zone.length: before the wall +x lie 25 m, and the zone is 26 m long"],
+        &[
+            "effects.absorbing_zone.length: the domain reaches 25 m from the wall +x, but the zone \
+             is 26 m long",
+        ],
     ),
     (
         "viscosity = { xsph = 0.01 }",
         "viscosity = { xsph = 0.01 }\nabsorbing_zone = { walls = [\"right\"], length = 3.0, \
          period = 2.0 }",
         34,
-        &["effects.absorbing_zone.walls: \"right\" is no wall; the nearest is \"-x\""],
+        &["effects.absorbing_zone.walls: \"right\" is not a value of wall; the nearest is \"-x\""],
     ),
     (
         "viscosity = { xsph = 0.01 }",
         "viscosity = { xsph = 0.01 }\ngeneration_zone = { walls = [\"+y\"], length = 3.0, \
          waves = { kind = \"stokes\", height = 0.1, period = 2.0, depth = 1.0 } }",
         34,
-        &["effects.generation_zone.walls: +y does not stand upright; allowed: "],
+        &["effects.generation_zone.walls: the wall +y is not upright; allowed: "],
     ),
     (
         "viscosity = { xsph = 0.01 }",
@@ -90,7 +93,10 @@ pub const ZONE_FAULTS: &[Fault] = &[
         "viscosity = { xsph = 0.01 }\ngeneration_zone = { walls = [\"+x\", \"-z\"], length = 26.0, \
          waves = { kind = \"stokes\", height = 0.1, period = 2.0, depth = 1.0 } }",
         34,
-        &["effects.generation_zone.length: before the wall +x lie 25 m, and the zone is 26 m long"],
+        &[
+            "effects.generation_zone.length: the domain reaches 25 m from the wall +x, but the \
+             zone is 26 m long",
+        ],
     ),
     (
         "viscosity = { xsph = 0.01 }",
@@ -116,8 +122,8 @@ pub const ZONE_FAULTS: &[Fault] = &[
          waves = { kind = \"stokes\", height = 0.1, period = 0.7, depth = 1.0 } }",
         34,
         &[
-            "effects.generation_zone.waves.period: waves of 0.7 s are 0.765 m long, \
-             7.7 particle spacings of at least 10; allowed: ",
+            "effects.generation_zone.waves.period: waves of 0.7 s are 0.765 m long, 7.7 particle \
+             spacings; at least 10 are needed; allowed: ",
         ],
     ),
     (
@@ -152,7 +158,10 @@ pub const ZONE_FAULTS: &[Fault] = &[
          waves = { kind = \"sea\", significant_height = 0.1, peak_period = 2.0, ramp = 0, \
          depth = 1.0 } }",
         34,
-        &["effects.generation_zone.waves.ramp: a spectrum's motion has none that is at rest"],
+        &[
+            "effects.generation_zone.waves.ramp: a spectrum's motion is never at rest, so it needs \
+             a ramp",
+        ],
     ),
     (
         "viscosity = { xsph = 0.01 }",
@@ -190,9 +199,6 @@ pub const ZONE_FAULTS: &[Fault] = &[
          waves = { kind = \"focused\", height = 0.1, at = [5.0, 12.0], time = 9.0, \
          peak_period = 2.0, shortest_period = 1.0, depth = 1.0, direction_degrees = 90.0 } }",
         34,
-        &[
-            "effects.generation_zone.waves.time: its slowest waves, of 0.815 m/s, \
-             are there after 15.",
-        ],
+        &["effects.generation_zone.waves.time: its slowest waves, of 0.815 m/s, arrive after 15."],
     ),
 ];

@@ -122,19 +122,19 @@ fn each_fault_of_whitewater_names_file_line_key_and_what_is_allowed() {
             "lifetime = [1, 2]",
             "lifetime = [2, 1]",
             14,
-            &["foam.lifetime: [2, 1] does not rise; allowed: "],
+            &["foam.lifetime: [2, 1] is not ascending; allowed: "],
         ),
         (
             "radius = [0.001, 0.002]",
             "radius = [0.002, 0.001]",
             3,
-            &["radius: [0.002, 0.001] does not rise"],
+            &["radius: [0.002, 0.001] is not ascending"],
         ),
         (
             "energy = [0.5, 6]",
             "energy = [6, 6]",
             9,
-            &["emission.energy: [6, 6] does not rise"],
+            &["emission.energy: [6, 6] is not ascending"],
         ),
         (
             "seed = 5",
