@@ -108,7 +108,7 @@ pub fn words(line: &Line, discretisation: Option<f64>) -> String {
         return "nothing was measured".into();
     };
     if best.len() < 2 {
-        return "one setting alone has no knee".into();
+        return "a single setting has no knee".into();
     }
     let Knee {
         point,

@@ -16,7 +16,7 @@ pub enum PictureError {
     #[error(transparent)]
     Encode(#[from] png::EncodingError),
     /// It does not have the format that our renderer writes.
-    #[error("it is no 8-bit RGB or RGBA picture")]
+    #[error("it is not an 8-bit RGB or RGBA picture")]
     Kind,
 }
 

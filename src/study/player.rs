@@ -63,7 +63,7 @@ const KEYS: [(&str, &str); 6] = [
     ("Z", "a pixel of the picture is one of the screen"),
 ];
 const KEYS_OF_TWO: [(&str, &str); 4] = [
-    ("1, 2", "one of both alone"),
+    ("1, 2", "only one of the two"),
     ("S", "side by side"),
     ("W", "wipe: pull it across the picture"),
     ("D", "difference"),
