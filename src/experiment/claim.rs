@@ -57,7 +57,7 @@ fn write(file: &Path, name: &str, command: &str) -> io::Result<Claim> {
     if !text.is_empty() {
         return serde_json::from_str(&text).map_err(|error| {
             io::Error::other(format!(
-                "{error}: it was cut off or changed; remove it where the folder holds results of \
+                "{error}: it was truncated or changed; remove it if the folder holds results of \
                  {name}, or choose another -o"
             ))
         });
@@ -100,7 +100,7 @@ mod tests {
             .expect("a cause")
             .to_string();
         assert!(
-            said.contains("remove it where the folder holds results of dt"),
+            said.contains("remove it if the folder holds results of dt"),
             "{said}"
         );
         // Results without a claim are resumed.

@@ -174,7 +174,7 @@ fn parts(
 ) -> Result<Vec<Part>, StudyError> {
     let when = match impact.frame {
         Some(frame) => {
-            format!("The first wave meets what stands in its way in frame {frame}: the impact.")
+            format!("The first wave meets an obstacle in frame {frame}: the impact.")
         }
         None => "No wave meets anything: crest and splash are taken over all frames.".to_owned(),
     };
@@ -205,8 +205,8 @@ const MEASURED: &str = "Both solvers are measured alike, from the particles. Spa
     cubes two particle spacings wide; a cube at least half as full as at rest is water, and the \
     largest body of such cubes that touch by faces is the continuous water. A column's elevation \
     is the top of that body, smoothed once over its neighbours. Crest: the highest elevation of \
-    each row along the wave's way, median over the rows; the slope of its front face goes from the \
-    foremost place at 0.9 of the crest's height to the foremost at half of it (after the crest \
+    each row along the wave's path, median over the rows; the slope of its front face goes from \
+    the foremost place at 0.9 of the crest's height to the foremost at half of it (after the crest \
     front steepness of Kjeldsen and Myrhaug 1979). In the air is what lies more than a cube from \
     the continuous water. Values that differ by less than 5 % are called alike. Times are wall \
     clock, the whole frame, with writing beside it.";

@@ -65,7 +65,7 @@ pub enum StudyError {
     },
     /// The study cannot be divided into shares.
     #[error(
-        "a study of kind {0} has no shares: its points stand on one cache; run it without --chunk"
+        "a study of kind {0} has no shares: its points share one cache; run it without --chunk"
     )]
     NoShares(&'static str),
     /// The folder contains results of another study.

@@ -108,7 +108,7 @@ impl<M: Serialize + DeserializeOwned> Ledger<M> {
         let names = names(directory).map_err(fault(&path))?;
         let is_used = names.iter().any(|name| name != CLAIM);
         if is_used && !names.iter().any(|name| is_ledger(name)) {
-            let what = "it holds what is no study's: choose another -o";
+            let what = "it contains files that do not belong to a study; choose another -o";
             return Err(fault(directory)(io::Error::other(what)));
         }
         // Takes the lock first, so that the ledger cannot change between reading and writing.
@@ -132,7 +132,7 @@ impl<M: Serialize + DeserializeOwned> Ledger<M> {
             let read = read(&other, is_strict)?;
             if is_strict && read.is_torn {
                 warn(format!(
-                    "{} ends within a line, which is not taken: what wrote there was killed",
+                    "{} ends in an incomplete line, which is ignored: its writer was killed",
                     other.display()
                 ));
             }
@@ -189,12 +189,12 @@ impl<M: Clone + Serialize> Ledger<M> {
         for other in &self.others {
             for line in other.lines.iter().filter(|line| line.name == name) {
                 let why = if line.key.program != key.program {
-                    "is of another build of the program".to_owned()
+                    "was run by another build of the program".to_owned()
                 } else if line.key.devices != key.devices {
                     let [theirs, ours] = [&line.key, key].map(|key| key.devices.join(", "));
                     format!("ran on {theirs}, not on {ours}")
                 } else {
-                    "is of another scene, or of other settings of the study".to_owned()
+                    "was run with another scene, or other settings of the study".to_owned()
                 };
                 warn(format!("{}: `{name}` {why}; it is run again", other.file));
             }
@@ -215,7 +215,7 @@ impl<M: Clone + Serialize> Ledger<M> {
         });
         written.map_err(fault(&self.path))?;
         if !is_at(file, &self.path) {
-            let what = "it was taken away while its worker ran: what was run since is lost";
+            let what = "it was removed while its worker ran: what was run since is lost";
             return Err(fault(&self.path)(io::Error::other(what)));
         }
         let hash = line.key.hash.clone();
@@ -231,7 +231,7 @@ impl<M: Clone + Serialize> Ledger<M> {
             let mut lines = other.lines.iter();
             let line = lines.find(|line| !self.asked.contains(&line.name))?;
             Some(format!(
-                "{}: `{}` is no point of this study: it and other such lines are left out",
+                "{}: `{}` is not a point of this study: it and other such lines are ignored",
                 other.file, line.name
             ))
         };
@@ -406,7 +406,7 @@ mod tests {
 
         let mut ledger = open(Reader::Whole, &mut said).expect("free");
         assert!(
-            said[0].contains("2-of-2.jsonl ends within a line"),
+            said[0].contains("2-of-2.jsonl ends in an incomplete line"),
             "{said:?}"
         );
         said.clear();
@@ -447,7 +447,7 @@ mod tests {
         let ledger = open(Reader::Whole, &mut said).expect("free");
         let (shares, unknown) = ledger.joined();
         assert!(shares.is_empty(), "none was asked for: {shares:?}");
-        assert!(unknown.len() == 2 && unknown[1].contains("`jacobi, k = b` is no point"));
+        assert!(unknown.len() == 2 && unknown[1].contains("`jacobi, k = b` is not a point"));
         // Joining again, for example after a signal, reports the same shares, even where a share's
         // file is gone.
         drop(ledger);

@@ -355,7 +355,7 @@ impl Results<'_> {
         let gpu = gpu.map_or(String::new(), |gpu| format!("GPU: {}. ", gpu.identity()));
         format!(
             "{gpu}CPU: {}. By {} {}. Limits are those of the GPU's solvers. Particles, frames and \
-             seconds of each run stand in results.csv.",
+             seconds of each run are in results.csv.",
             self.devices.cpu.identity(),
             swell_domain::PROGRAM,
             swell_domain::VERSION
@@ -509,11 +509,11 @@ const EVERYWHERE: &str = "Every run is also held to no value that is not finite,
     they are missed. A run that ends early misses all of its marks.";
 
 const MEASURED: &str = "A run is measured after each output frame, from its particles and the \
-    solver's report; the number that is held against the mark is the worst of the frames, of means \
-    and ratios over time the last. d is the particle spacing, Δx the cell size; d or Δx is d with \
-    PBF and Δx with FLIP. A run beside another goes frame by frame with it, and particles are \
+    solver's report; the number that is compared with the mark is the worst of the frames, of \
+    means and ratios over time the last. d is the particle spacing, Δx the cell size; d or Δx is d \
+    with PBF and Δx with FLIP. A run beside another goes frame by frame with it, and particles are \
     matched by where they start. Energy is that of motion and of height over the domain's floor. \
-    The definitions stand at swell::scene::study::stability::Quantity.";
+    The definitions are at swell::scene::study::stability::Quantity.";
 
 const LIMITS: &str = "Found by bisection by ratio between a value that passes and one that fails, \
     on the GPU; a limit is that of one scene, and no promise for others.";

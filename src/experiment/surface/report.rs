@@ -86,7 +86,7 @@ impl Results<'_> {
             .zip(keys)
             .flat_map(|(line, key)| line.points.iter().map(move |point| (line, key, point)));
         match all.min_by(|a, b| a.2.error.total_cmp(&b.2.error)) {
-            None => "Nothing was measured: no point came to its end.".to_owned(),
+            None => "Nothing was measured: no point finished.".to_owned(),
             Some((line, key, point)) => format!(
                 "Least is off, by {}, {} with {key} = {}: {} in {} ms a frame.",
                 error.title(),
@@ -217,7 +217,7 @@ impl Results<'_> {
 const MEASURED: &str = "The scene is baked; each setting of the look then draws the same frames. A \
     time is the wall clock of a frame's picture with all its samples, median of the repeats, after \
     one picture that is not counted; spray is drawn as the look has it, whitewater is not. Depths, \
-    normals and silhouettes are taken at the centres of pixels and held against rays that the CPU \
+    normals and silhouettes are taken at the centres of pixels and compared with rays that the CPU \
     casts in f64 through the particles' own field (swell check --render). Colour is SSIMULACRA 2 \
     of the picture as a screen shows it, against one by rays with four times the look's samples \
     and voxels half as wide: light, sky, spray and set are shared with what is tested, and of rays \

@@ -227,7 +227,7 @@ impl Results<'_> {
             format!("{setting}: {ms} ms {of}, {title}: {value:.1e}; {why}")
         });
         match told.collect::<Vec<_>>().join("; ") {
-            none if none.is_empty() => "Nothing was measured: no point came to its end.".to_owned(),
+            none if none.is_empty() => "Nothing was measured: no point finished.".to_owned(),
             told => format!("The knee is {told}."),
         }
     }

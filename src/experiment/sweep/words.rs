@@ -18,7 +18,7 @@ impl Results<'_> {
             Measure::Finest => format!(
                 "Errors are differences from the same method's finest run, the last of its values, \
                  at {SAMPLES} equally spaced times, averaged. The crest, the front and the \
-                 elevation along the wave's way are measured from the particles with the same \
+                 elevation along the wave's path are measured from the particles with the same \
                  cubes for all runs; energy is ½ v² + g h a mass. Such a reference knows nothing \
                  of an error that all runs share, and the run next to it looks better than it is. \
                  After the impact particles are chaotic: only such sums are compared."
@@ -66,7 +66,7 @@ impl Results<'_> {
         texts.extend(self.sweep.lines.iter().filter_map(|line| {
             let other = &self.sweep.lines[line.against?];
             Some(format!(
-                "{} is held, value by value, against {}, not against its own finest run.",
+                "{} is compared, value by value, with {}, not with its own finest run.",
                 line.name, other.name
             ))
         }));

@@ -148,8 +148,8 @@ fn reference<'t>(trials: &'t [Trial<'_>]) -> Result<&'t Measured, StudyError> {
             ..
         }) => Ok(measured),
         Some(Trial { variant, run, .. }) => Err(StudyError::Point(format!(
-            "the run that the others are held against ({}) fails: {}; a greater \
-             --reference is a coarser one",
+            "the run that the others are compared with ({}) fails: {}; a greater --reference is a \
+             coarser one",
             variant.name(),
             run.ended.as_deref().unwrap_or_default()
         ))),

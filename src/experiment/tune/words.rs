@@ -50,7 +50,7 @@ impl Results<'_> {
             let name = limit.quantity.name();
             let off = match errors[k] {
                 Some(off) => format!("{name} {} off", self.told(limit, off)),
-                None => format!("{name} not to be told"),
+                None => format!("{name} not measured"),
             };
             let laws = match &predicted {
                 Some(predicted) => {
@@ -79,7 +79,7 @@ impl Results<'_> {
     /// The page's first sentence.
     pub(super) fn answer(&self) -> String {
         let Some((place, holds)) = self.choice else {
-            return "No run came to its end.".into();
+            return "No run finished.".into();
         };
         let trial = &self.trials[place];
         let runs = self.candidates().len();
@@ -181,7 +181,10 @@ impl Results<'_> {
 
     /// Describes the reference and its own estimated errors.
     pub(super) fn reference_in_words(&self) -> String {
-        let mut words = format!("Errors are told against {}.", self.tune.reference.name());
+        let mut words = format!(
+            "Errors are measured against {}.",
+            self.tune.reference.name()
+        );
         let Some(fitted) = &self.fitted else {
             return words;
         };

@@ -30,7 +30,7 @@ pub(super) fn check_target(tune: &Tune) -> Result<(), StudyError> {
     match fs::read_to_string(file) {
         Ok(text) if text.starts_with(MARK) => Ok(()),
         Ok(_) => {
-            let what = "it is no scene that swell tune wrote: choose another --write";
+            let what = "it is not a scene that swell tune wrote: choose another --write";
             Err(fault(file, io::Error::other(what)))
         }
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),

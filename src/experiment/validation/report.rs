@@ -395,8 +395,8 @@ fn where_run(bench: &Bench<'_>) -> String {
     let cpu = bench.devices.of(RunsOn::Cpu).identity();
     let (name, version) = (swell_domain::PROGRAM, swell_domain::VERSION);
     format!(
-        "{gpu}CPU: {cpu}. By {name} {version}. Particles, frames and seconds of each \
-         run stand in results.csv."
+        "{gpu}CPU: {cpu}. By {name} {version}. Particles, frames and seconds of each run are in \
+         results.csv."
     )
 }
 

@@ -268,7 +268,7 @@ fn what_cannot_be_tuned_is_refused_before_anything_runs() {
     // A scene that another author wrote is not overwritten.
     job.write("tiny.tuned.toml", "# mine");
     let said = job.expect(4, "tune tiny.toml --error front=2% -o out");
-    assert_has(&said, &["it is no scene that swell tune wrote"]);
+    assert_has(&said, &["it is not a scene that swell tune wrote"]);
     assert_eq!(
         fs::read_to_string(job.path("tiny.tuned.toml")).unwrap(),
         "# mine"

@@ -85,6 +85,6 @@ fn the_command_tells_each_point() {
     let output = run("plain");
     let said = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(4), "{said}");
-    assert!(said.contains("what is no study's"), "{said}");
+    assert!(said.contains("do not belong to a study"), "{said}");
     assert_eq!(fs::read_to_string(page).unwrap(), "mine");
 }

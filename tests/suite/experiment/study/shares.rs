@@ -201,19 +201,19 @@ fn what_no_share_has_is_run_and_what_does_not_fit_is_named() {
         .map(|event| event["text"].as_str().unwrap())
         .collect();
     assert!(
-        warnings[0].contains("results.2-of-3.jsonl ends within a line"),
+        warnings[0].contains("results.2-of-3.jsonl ends in an incomplete line"),
         "{warnings:?}"
     );
     let of_builds = warnings
         .iter()
-        .filter(|text| text.contains("is of another build of the program"));
+        .filter(|text| text.contains("was run by another build of the program"));
     assert_eq!((of_builds.count(), warnings.len()), (2, 3), "{warnings:?}");
 
     // After a change of the scene no result is reused, and each line is reported.
     shared.edit("tiny.toml", "[0.6, 0.6, 0.6]", "[0.6, 0.5, 0.6]");
     let said = shared.expect(0, "study s.toml -o out");
     assert_eq!(
-        said.matches("is of another scene, or of other settings")
+        said.matches("was run with another scene, or other settings")
             .count(),
         4,
         "{said}"

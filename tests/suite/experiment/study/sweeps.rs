@@ -269,7 +269,7 @@ against = "f64"
     assert!(coarse > 1e-3, "{energy:?}");
     let page = job.read("index.html");
     assert!(page.contains("On CPU f64 reference ("), "{page}");
-    assert!(page.contains("f32 is held, value by value, against f64"));
+    assert!(page.contains("f32 is compared, value by value, with f64"));
 
     // A point is identified by its settings and device, not by its method's name: with the names
     // swapped, the same four results are reused.
