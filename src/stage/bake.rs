@@ -421,7 +421,7 @@ fn last_frame(request: &Request) -> Result<u32, BakeError> {
     };
     let fault = |what: String| Err(BakeError::Frames(format!("{frames}: {what}")));
     if frames.len() as u64 != u64::from(frames.last() - frames.first()) + 1 {
-        return fault("leaves frames out, and each frame of a bake needs the one before".into());
+        return fault("skips frames, and each frame of a bake needs the one before".into());
     }
     if frames.last() > shot {
         return fault(format!("the shot has {shot} frames; raise shot.frames"));

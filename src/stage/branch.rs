@@ -106,8 +106,8 @@ pub enum BranchError {
     },
     /// Particles outside the scene's walls.
     #[error(
-        "--from {from}: {count} of {all} particles lie beyond the walls of the scene as they stand \
-         at {time} s; the first is particle {id} at {position:?}"
+        "--from {from}: {count} of {all} particles lie beyond the walls of the scene at {time} s; \
+         the first is particle {id} at {position:?}"
     )]
     Beyond {
         /// The frame.
@@ -162,9 +162,7 @@ impl Branch {
             shaders: manifest.edited_shaders().map(str::to_owned),
         };
         if origin != scene.origin {
-            notes.push(
-                "positions are rounded about another origin: the domain is another".to_owned(),
-            );
+            notes.push("positions are rounded about another origin: the domain differs".to_owned());
         }
         let text = scene.to_toml(&swell_scene::asset_path);
         let physics = swell_scene::physics_difference(cache.scene_toml(), &text);
@@ -298,7 +296,7 @@ fn take_attributes(particles: &mut Particles, declared: &[&str]) -> Vec<String> 
     }
     if !dropped.is_empty() {
         notes.push(format!(
-            "the scene has no use for {}: left out",
+            "the scene does not use {}, which is dropped",
             dropped.join(", ")
         ));
     }

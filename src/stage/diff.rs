@@ -111,7 +111,7 @@ pub enum DiffError {
         source: std::io::Error,
     },
     /// A file that is not a valid baseline.
-    #[error("{} is no baseline: {what}", file.display())]
+    #[error("{} is not a baseline: {what}", file.display())]
     Baseline {
         /// The file.
         file: PathBuf,
@@ -119,7 +119,10 @@ pub enum DiffError {
         what: String,
     },
     /// A folder without anything to compare.
-    #[error("{} holds no cache (no manifest.json) and no PNG or EXR picture", .0.display())]
+    #[error(
+        "{} contains neither a cache (no manifest.json) nor a PNG or EXR picture",
+        .0.display()
+    )]
     Empty(PathBuf),
     /// Arguments that cannot be combined.
     #[error("{0}")]
@@ -182,7 +185,7 @@ impl Subject {
             return Ok(Self::Baseline(Box::new(baseline)));
         }
         Err(DiffError::usage(format!(
-            "{} is no cache folder, baseline (.json) or picture (.png, .exr)",
+            "{} is not a cache folder, a baseline (.json) or a picture (.png, .exr)",
             path.display()
         )))
     }

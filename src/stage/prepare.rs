@@ -196,7 +196,7 @@ impl Start {
             if let Some(promise) = promise.filter(|promise| promise.covered > 0.0) {
                 warnings.push(format!(
                     "emitter[{index}]: solids cover {:.1} % of its cross-section all along its \
-                     room, and nothing enters there: it brings {:.4} m³/s",
+                     volume, and nothing enters there: it brings {:.4} m³/s",
                     100.0 * promise.covered,
                     promise.rate
                 ));

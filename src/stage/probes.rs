@@ -103,8 +103,8 @@ impl Looked {
         short
             .map(|([looked, asked], probe)| {
                 format!(
-                    "probe {} looked {looked} times of the {asked} that its rate_hz asks for: it \
-                     looks at the ends of substeps",
+                    "probe {} was sampled {looked} of the {asked} times that its rate_hz asks for: \
+                     it samples at the ends of substeps",
                     probe.name
                 )
             })

@@ -149,7 +149,7 @@ fn open(request: &Request) -> Result<Vec<Strip>, ViewError> {
         }
         if !path.is_dir() {
             return Err(ViewError::Asked(format!(
-                "{} is no folder: name a folder of pictures, a cache, or the folder of a study",
+                "{} is not a folder: name a folder of pictures, a cache, or the folder of a study",
                 path.display()
             )));
         }
@@ -166,8 +166,8 @@ fn open(request: &Request) -> Result<Vec<Strip>, ViewError> {
                 found => format!("; within it there are {}", found.join(", ")),
             };
             ViewError::Asked(format!(
-                "nothing to see in {}: it is no cache and no study, and has no \
-                 pictures (PNG, EXR){within}",
+                "nothing to view in {}: it is neither a cache nor a study, and has no pictures \
+                 (PNG, EXR){within}",
                 path.display()
             ))
         };
@@ -190,8 +190,7 @@ fn open(request: &Request) -> Result<Vec<Strip>, ViewError> {
         // The same shape up to the rounding of a side to whole pixels.
         if wide.abs_diff(high) > a.size[0].max(b.size[0]) {
             return Err(ViewError::Asked(format!(
-                "{} is {} × {} and {} is {} × {}: pictures that are held against \
-                 each other have one shape",
+                "{} is {} × {} and {} is {} × {}: pictures that are compared need the same shape",
                 a.path.display(),
                 a.size[0],
                 a.size[1],
@@ -232,7 +231,7 @@ fn chosen(
         let alone = strip.labels.len() - labels.len();
         if alone > 0 {
             tell(Event::Note(format!(
-                "{alone} of the {} frames of {} are left out: the other one has none of these",
+                "{alone} of the {} frames of {} are omitted: the other one does not have them",
                 strip.labels.len(),
                 strip.path.display()
             )));

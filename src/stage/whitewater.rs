@@ -427,7 +427,7 @@ impl StreamWriter {
             how,
         };
         if !is_of(&entry, cache) {
-            return Err(other("from water that is no longer there"));
+            return Err(other("from water that no longer exists"));
         }
         let next_id = match entry.report[NEXT_ID].as_u64() {
             Some(next) => next as u32,

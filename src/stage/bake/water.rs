@@ -14,8 +14,8 @@ pub(super) fn never_entered(blocked: u64) -> Vec<String> {
         many => format!("{many} particles of emitters"),
     };
     vec![format!(
-        "{words} did not enter in the frames computed now: solids covered the whole way \
-         through the emitter's room"
+        "{words} did not enter in the frames computed now: solids blocked the whole path through \
+         the emitter's volume"
     )]
 }
 
@@ -27,8 +27,8 @@ pub(super) fn overfull(scene: &Scene, most: usize) -> Vec<String> {
         return Vec::new();
     }
     vec![format!(
-        "the domain is overfull: {most} particles stand for {} m³ of water, \
-         and it has room for {} m³",
+        "the domain is overfull: {most} particles represent {} m³ of water, and it has room for {} \
+         m³",
         four_digits(made),
         four_digits(room)
     )]

@@ -179,10 +179,10 @@ fn take_spread(
             Err(DiffError::usage(format!("--spread {path}: {why}")))
         };
         if other.manifest().solver != cache.manifest().solver {
-            return refuse("another solver is no rounding");
+            return refuse("another solver is not a difference in rounding");
         }
         if counts(&bake) != counts(&expected) {
-            return refuse("another number of particles is no rounding");
+            return refuse("another number of particles is not a difference in rounding");
         }
         let adapter = adapter_of(other.manifest());
         match physics(cache.dir(), cache.scene_toml(), other.scene_toml())? {

@@ -17,7 +17,7 @@ use swell_domain::{particles::Particles, tolerance::Tolerance};
 fn check_tolerance(tolerance: &Tolerance, caches: [&CacheReader; 2]) -> Result<(), DiffError> {
     if tolerance.fields.is_empty() && tolerance.aggregates.is_empty() {
         return Err(DiffError::usage(
-            "the tolerance file has [pictures] alone; two caches need [position], [velocity], \
+            "the tolerance file has only [pictures]; two caches need [position], [velocity], \
              [attributes.NAME] or [aggregates]",
         ));
     }

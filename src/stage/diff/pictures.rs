@@ -143,7 +143,7 @@ fn limits(request: &Request) -> Option<&PictureLimits> {
 fn refuse_same(output: &Path, input: &Path) -> Result<(), DiffError> {
     match (output.canonicalize(), input.canonicalize()) {
         (Ok(output), Ok(input)) if output == input => Err(DiffError::usage(format!(
-            "--output {} is what is compared: choose another",
+            "--output {} is one of the compared pictures: choose another",
             input.display()
         ))),
         _ => Ok(()),

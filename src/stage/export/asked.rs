@@ -17,7 +17,7 @@ pub(super) fn check(request: &Request) -> Result<(), ExportError> {
         .iter()
         .any(|it| matches!(it, Target::Usd(..)));
     if request.look.is_some() && !has_shot {
-        return asked("--look gives --usd its camera, and there is no --usd".to_owned());
+        return asked("--look gives --usd its camera, but --usd is missing".to_owned());
     }
     let mut names = BTreeSet::new();
     for target in &request.targets {
@@ -54,7 +54,7 @@ pub(super) fn check(request: &Request) -> Result<(), ExportError> {
             if name.to_str().is_none_or(|it| it.contains(char::is_control)) {
                 return asked(format!(
                     "{flag}: {name:?} has a line end, another control character or bytes that are \
-                     no UTF-8, and USD's text cannot name layers so"
+                     not UTF-8, which USD as text cannot have in the name of a layer"
                 ));
             }
         }

@@ -32,7 +32,7 @@ pub enum ExportError {
     Usdc(#[from] UsdcError),
     /// A whitewater stream that does not exist.
     #[error(
-        "{} is not there: make it with `swell whitewater {}` (--name {stream})",
+        "{} does not exist: make it with `swell whitewater {}` (--name {stream})",
         directory.display(),
         posix::path(cache)
     )]
@@ -45,8 +45,8 @@ pub enum ExportError {
         cache: PathBuf,
     },
     /// A frame of a stream was made from other water.
-    #[error("{}: frame {frame} was made from water that is no longer there: make it again \
-             with `swell whitewater`", directory.display())]
+    #[error("{}: frame {frame} was made from water that no longer exists: make it again with \
+        `swell whitewater`", directory.display())]
     OldStream {
         /// Directory of the stream.
         directory: PathBuf,

@@ -61,8 +61,10 @@ pub enum FolderError {
         source: io::Error,
     },
     /// The name is taken by something else.
-    #[error("{} is {what}; choose another name, or export \
-             it anew with --overwrite", file.display())]
+    #[error(
+        "{} is {what}; choose another name, or export it again with --overwrite",
+        file.display()
+    )]
     Other {
         /// The existing file.
         file: PathBuf,
@@ -142,7 +144,7 @@ impl Wanted {
             return Err(at(&self.file)(io::ErrorKind::IsADirectory.into()));
         }
         let Some(Record { owner, source, .. }) = self.record() else {
-            return other("there, and not from an export");
+            return other("not from an export");
         };
         let rows = [
             (owner.shot == self.owner.shot, "of another shot"),

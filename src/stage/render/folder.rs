@@ -106,7 +106,7 @@ pub enum FolderError {
         source: io::Error,
     },
     /// A picture of another origin exists.
-    #[error("{} is {what}; choose another -o, or render it anew with --overwrite", file.display())]
+    #[error("{} is {what}; choose another -o, or render it again with --overwrite", file.display())]
     Other {
         /// The first such picture.
         file: PathBuf,
@@ -384,7 +384,7 @@ fn stranger(file: &Path, is_wanted: bool, wanted: &Wanted<'_>) -> Option<String>
         Ok(None) => return None,
         Ok(Some(found)) if !found.look_hash.is_empty() => found,
         Ok(Some(_)) => return is_wanted.then(|| "a picture of another program".to_owned()),
-        Err(_) => return is_wanted.then(|| "no picture that can be read".to_owned()),
+        Err(_) => return is_wanted.then(|| "not a readable picture".to_owned()),
     };
     let cache = (wanted.frame_hash)(found.frame);
     let name = file.file_name().unwrap_or_default().to_string_lossy();

@@ -11,7 +11,7 @@ use swell_domain::{particles::Particles, posix};
 pub enum StreamError {
     /// There is no stream of that name.
     #[error(
-        "the look draws whitewater `{stream}`, and {} is not there: make it with `swell \
+        "the look draws whitewater `{stream}`, but {} does not exist: make it with `swell \
          whitewater {}` (--name {stream})",
         directory.display(), posix::path(cache)
     )]
@@ -63,9 +63,9 @@ impl Whitewater {
         let stream = CacheReader::open(&directory)?;
         for &frame in frames {
             let how = match stream.has_particles(frame) {
-                false => "is not in it",
+                false => "is missing from it",
                 true if !is_of(stream.entry(frame)?, water) => {
-                    "was made from water that is no longer there"
+                    "was made from water that no longer exists"
                 }
                 true => continue,
             };

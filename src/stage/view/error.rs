@@ -15,7 +15,7 @@ pub enum ViewError {
     #[error("{0}")]
     Asked(String),
     /// A path that does not exist.
-    #[error("{} is not there", .0.display())]
+    #[error("{} does not exist", .0.display())]
     Missing(PathBuf),
     /// Reading a picture failed.
     #[error(transparent)]
@@ -27,7 +27,7 @@ pub enum ViewError {
     #[error("the cache's scene: {0}")]
     Scene(#[from] SceneError),
     /// A study that has no page yet.
-    #[error("{} is not there: {what}", page.display())]
+    #[error("{} does not exist: {what}", page.display())]
     Unfinished {
         /// Path of the missing page.
         page: PathBuf,

@@ -70,7 +70,7 @@ pub(super) fn open(folder: &Path, view: Option<&ViewSpec>) -> Result<Option<Stri
         if other.size != head.size {
             let [a, b] = [head.size, other.size].map(|[w, h]| format!("{w} × {h}"));
             return Err(ViewError::Asked(format!(
-                "{} is {a} and {} is {b}: pictures that are looked at in turn have one size",
+                "{} is {a} and {} is {b}: pictures of one sequence need the same size",
                 first.display(),
                 file.display()
             )));
@@ -80,9 +80,7 @@ pub(super) fn open(folder: &Path, view: Option<&ViewSpec>) -> Result<Option<Stri
     let is_light = files.values().any(|file| ending(file) == Some(1));
     let note = match (is_light, view) {
         (false, _) => "",
-        (true, None) => {
-            "The EXR files are shown through the view of a look that says nothing of it."
-        }
+        (true, None) => "The EXR files are shown through the view of a look that does not set one.",
         (true, Some(_)) => "The EXR files are shown through the view of the look.",
     };
     Ok(Some(Strip {
@@ -107,8 +105,8 @@ fn by_number(folder: &Path, found: &[PathBuf]) -> Result<BTreeMap<Label, PathBuf
         let shot = shot.get_or_insert_with(|| name.clone());
         if *shot != name {
             return Err(ViewError::Asked(format!(
-                "{} has pictures of two sequences, {shot}.* and {name}.*: put each \
-                 into a folder of its own",
+                "{} has pictures of two sequences, {shot}.* and {name}.*: put each into its own \
+                 folder",
                 folder.display()
             )));
         }

@@ -82,8 +82,8 @@ impl<'a> Reel<'a> {
             .or(known);
         if known.is_none() && labels.len() > 1 && (request.player || request.movie.is_some()) {
             tell(Event::Note(format!(
-                "{RATE} frames a second, since nothing says another rate: --fps, or \
-                 --curves with the cache"
+                "{RATE} frames a second is assumed: give another rate with --fps, or the cache \
+                 with --curves"
             )));
         }
         for strip in &strips {
@@ -298,8 +298,8 @@ impl<'a> Reel<'a> {
         let (bytes, is_beside) = store.told();
         if is_beside && self.request.placing == Placing::Auto {
             tell(Event::Note(format!(
-                "the page's pictures are {} MB and stand beside it in pictures/: move both \
-                 together, or take fewer (--frames), smaller (--width) or --pictures within",
+                "the page's pictures are {} MB and are beside it in pictures/: move both together, \
+                 or take fewer (--frames), smaller (--width) or --pictures within",
                 bytes / 1_000_000
             )));
         }

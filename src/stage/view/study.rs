@@ -49,7 +49,7 @@ fn unfinished(folder: &Path) -> Result<ViewError, ViewError> {
         format!("`{it}`")
     });
     let what = match &names[..] {
-        [] => format!("the study is not finished; {command} goes on with it"),
+        [] => format!("the study is not finished; {command} resumes it"),
         shares => format!(
             "shares of the study are not joined ({}); {command}, with the shares' other options \
              and without --chunk, joins them",

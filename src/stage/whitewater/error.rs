@@ -32,7 +32,7 @@ pub enum WhitewaterError {
     IsWhitewater(PathBuf),
     /// The bake that a stream was made from is missing or has changed.
     #[error(
-        "{} was made from a bake in {}, which is not there or another now: frame {frame}",
+        "{} was made from a bake in {}, which no longer exists or has changed: frame {frame}",
         stream.display(),
         cache.display()
     )]
@@ -45,7 +45,7 @@ pub enum WhitewaterError {
         frame: u32,
     },
     /// The bake does not have the requested frame.
-    #[error("frame {asked} was asked for, and the bake has frames {first} to {last}")]
+    #[error("frame {asked} was requested, but the bake has frames {first} to {last}")]
     NoFrame {
         /// The requested frame.
         asked: u32,
@@ -67,9 +67,9 @@ pub enum WhitewaterError {
     },
     /// More particles than the settings allow.
     #[error(
-        "frame {frame} has {count} whitewater particles, and max_particles is {allowed}: \
-         raise it, or lower emission.trapped_air_rate and emission.wave_crest_rate; the \
-         frames before it stand"
+        "frame {frame} has {count} whitewater particles, and max_particles is {allowed}: raise it, \
+         or lower emission.trapped_air_rate and emission.wave_crest_rate; the frames before it are \
+         kept"
     )]
     TooMany {
         /// The frame.

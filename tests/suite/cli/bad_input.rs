@@ -170,7 +170,7 @@ const FAULTS: [(&str, i32, &str); 21] = [
     (
         "export cache --usd shot.usda",
         4,
-        "shot.usda is there, and not from an export",
+        "shot.usda is not from an export",
     ),
 ];
 

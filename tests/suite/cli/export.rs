@@ -428,7 +428,7 @@ fn faults_are_one_clear_line() {
     clear(
         2,
         "export cache --npy p.%04d.npy --look look.toml",
-        "there is no --usd",
+        "--usd is missing",
     );
     clear(2, "export cache --mesh cache/m.%04d.ply", "in the cache");
     clear(
@@ -451,7 +451,7 @@ fn faults_are_one_clear_line() {
     clear(
         4,
         "export cache --npy p.%04d.npy",
-        "p.0002.npy is there, and not from an export",
+        "p.0002.npy is not from an export",
     );
     assert!(!job.path("p.0001.npy").exists(), "nothing was written");
     assert_eq!(fs::read(job.path("p.0002.npy")).unwrap(), b"mine");

@@ -257,7 +257,7 @@ fn light_is_shown_through_a_view() {
         image.shown().iter().map(pixel).collect::<Vec<_>>()
     };
     let said = job.expect(0, "view exr --player -o plain");
-    assert!(said.contains("a look that says nothing"), "{said}");
+    assert!(said.contains("a look that does not set one"), "{said}");
     let frames = shown(&job.path("plain/index.html"));
     assert_eq!(frames[0][0].size, [8, 4]);
     assert_eq!(frames[0][0].pixels, wanted(&plain));
@@ -474,10 +474,10 @@ fn faults_are_one_clear_line() {
     let job = made();
     let clear = |code, words: &str, part: &str| job.expect_clear(code, words, part);
     fs::create_dir_all(job.path("empty")).unwrap();
-    clear(2, "view empty", "nothing to see in empty");
+    clear(2, "view empty", "nothing to view in empty");
     clear(2, "view .", "; within it there are ./day");
-    clear(4, "view gone", "gone is not there");
-    clear(2, "view day/shot.0001.png", "is no folder");
+    clear(4, "view gone", "gone does not exist");
+    clear(2, "view day/shot.0001.png", "is not a folder");
     clear(
         2,
         "view day --frames 11-13",

@@ -190,7 +190,7 @@ fn an_overfull_box_is_told_of_from_five_per_cent_on() {
         "[[emitter]]\nmin = [0.2, 0.2, 0.2]\nmax = [0.6, 0.6, 0.6]\nvelocity = [0.0, 0.2, 0.0]\n\
          [solver]\n",
     );
-    let overfull = "warning: the domain is overfull: 544 particles stand for 0.5440 m³ of water, \
+    let overfull = "warning: the domain is overfull: 544 particles represent 0.5440 m³ of water, \
         and it has room for 0.5120 m³";
     for solver in ["flip", "pbf"] {
         let bake = format!("bake water.toml --device cpu --solver {solver}");

@@ -135,7 +135,7 @@ fn tolerances_come_from_a_file_and_judge_what_they_name() {
         ),
         (
             "[pictures]\nmax = 1\n",
-            &["[pictures] alone", "[aggregates]"],
+            &["only [pictures]", "[aggregates]"],
         ),
     ] {
         job.write("t.toml", text);
@@ -305,11 +305,11 @@ fn a_baseline_knows_its_adapter_by_hashes_and_others_by_aggregates() {
     );
 
     for (text, words) in [
-        ("{}", &["no baseline", "format_version"][..]),
-        ("not json", &["no baseline", "line 1"]),
+        ("{}", &["not a baseline", "format_version"][..]),
+        ("not json", &["not a baseline", "line 1"]),
         (
             &text.replace("\"volume\": {", "\"volum\": {"),
-            &["no baseline"],
+            &["not a baseline"],
         ),
         (
             &text.replacen(&format!("\"{hash}\","), "", 1),

@@ -155,7 +155,11 @@ fn what_does_not_compare_is_refused_in_words() {
     job.write("notes.txt", "");
     for (code, arguments, words) in [
         (4, "cache nowhere", "nowhere"),
-        (4, "cache empty", "no cache (no manifest.json) and no PNG"),
+        (
+            4,
+            "cache empty",
+            "neither a cache (no manifest.json) nor a PNG",
+        ),
         (
             2,
             "cache renders",
@@ -165,7 +169,7 @@ fn what_does_not_compare_is_refused_in_words() {
         (
             2,
             "cache notes.txt",
-            "no cache folder, baseline (.json) or picture",
+            "not a cache folder, a baseline (.json) or a picture",
         ),
         (2, "cache", "required"),
         (2, "cache cache -o out", "difference images"),

@@ -224,7 +224,7 @@ fn pictures_of_something_else_are_refused_and_left() {
     is_left(
         4,
         "cache --look look.toml",
-        &["small.0002.png", "no picture that can be read"],
+        &["small.0002.png", "not a readable picture"],
     );
     job.expect(0, "render cache --look wide.toml -o day --overwrite");
     job.expect(0, "render cache --look wide.toml -o wide");

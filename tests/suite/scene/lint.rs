@@ -51,7 +51,7 @@ fn a_probe_that_looks_less_often_than_it_should_is_told_of() {
     let (said, substeps) = bake("1000", "often");
     assert!(substeps < 33);
     let expected = format!(
-        "warning: probe volume-1 looked {substeps} times of the 33 that its rate_hz asks for"
+        "warning: probe volume-1 was sampled {substeps} of the 33 times that its rate_hz asks for"
     );
     assert_has(&said, &[&expected]);
     // Negative control: the solver steps at least as often as the probe samples.

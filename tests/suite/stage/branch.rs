@@ -175,7 +175,7 @@ fn attributes_made_zero_or_left_out_are_told() {
         "bake small.toml --solver flip --from apic:3 -o plain --frames 4",
     );
     assert!(
-        said.contains("note: the scene has no use for affine"),
+        said.contains("note: the scene does not use affine"),
         "{said}"
     );
     let read = |cache: &str| {
@@ -293,7 +293,7 @@ fn a_frame_that_does_not_fit_is_refused_and_nothing_is_written() {
         (
             2,
             &format!("--from whole:3 --set {wall}"),
-            "lie beyond the walls of the scene as they stand at 0.05 s",
+            "lie beyond the walls of the scene at 0.05 s",
         ),
         (4, "--from whole:4", "has frames 0 to 3, not 4"),
         (4, "--from nowhere:1", "nowhere does not exist"),

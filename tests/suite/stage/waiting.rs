@@ -121,8 +121,8 @@ fn what_never_enters_is_told_of() {
         "beam.obj",
         &BOX.replace("v 0.7", "v 1.2").replace(" 0.8 ", " 0.65 "),
     );
-    let covered = "emitter[0]: solids cover 50.0 % of its cross-section all along its room, \
-        and nothing enters there: it brings 0.0200 m³/s";
+    let covered = "emitter[0]: solids cover 50.0 % of its cross-section all along its volume, and \
+        nothing enters there: it brings 0.0200 m³/s";
     let said = job.expect(0, "inspect waiting.toml");
     assert_has(&said, &[covered, "emitter[0] brings 0.0200 m³/s"]);
     assert_eq!(job.json(0, "inspect waiting.toml")["entering"], 80.0);
@@ -136,8 +136,8 @@ fn what_never_enters_is_told_of() {
         &said,
         &[
             covered,
-            "warning: 16 particles of emitters did not enter in the frames computed now: \
-             solids covered the whole way",
+            "warning: 16 particles of emitters did not enter in the frames computed now: solids \
+             blocked the whole path",
         ],
     );
     assert_has(&job.expect(0, "inspect cache"), &[covered]);

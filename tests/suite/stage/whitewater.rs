@@ -277,5 +277,5 @@ fn a_look_draws_the_stream_that_it_names() {
         4,
         "render cache/small/pbf --look white.toml -o late --frames 8",
     );
-    assert_has(&said, &["frame 8", "not in it"]);
+    assert_has(&said, &["frame 8", "missing from it"]);
 }
