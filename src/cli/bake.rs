@@ -217,8 +217,8 @@ fn warn_of_room(progress: &Progress, room: Room) {
     if let Some(free) = room.short_of() {
         progress.say(
             &format!(
-                "warning: the disk has {} free, and the frames will take {}; a bake ends where it \
-                 is full, and --resume goes on",
+                "warning: the disk has {} free, but the frames will take {}; the bake ends when it \
+                 is full, and --resume continues it",
                 size(free),
                 taken(room)
             ),
@@ -271,7 +271,7 @@ pub(super) fn tell(progress: &Progress, event: Event) {
                 count => format!(", {count} boundary samples"),
             };
             let text = format!(
-                "{solver} on {device}\n{} ({removed} left out where solids are), \
+                "{solver} on {device}\n{} ({removed} removed inside solids), \
                  {}{samples}{memory}\n{span}",
                 count(particles as u64, "particle"),
                 output::water(volume)
@@ -394,9 +394,9 @@ fn warnings(frame: u32, report: &StepReport) -> Vec<Recurring> {
     }
     if projection.missed > 0 {
         let text = format!(
-            "{} solves missed their tolerance; of pressure the residual is up to {:.1e}, the \
-             divergence up to {:.1e} /s, and where these are small it was an effect's solve that \
-             needed more iterations than it may take",
+            "{} solves missed their tolerance; for pressure the residual is up to {:.1e} and the \
+             divergence up to {:.1e} /s; where these are small, an effect's solve needed more \
+             iterations than it is allowed",
             projection.missed, projection.residual, projection.divergence_after
         );
         let event = json!({ "missed": projection.missed, "residual": projection.residual });

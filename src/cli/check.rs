@@ -73,7 +73,7 @@ fn run_failed(args: &CheckArgs, progress: &Progress) -> Result<u8, Failure> {
         let error = Misplaced {
             option: "--frames, --substep, --solver or --set",
             what: "caches or scenes",
-            is: "a frame that failed: it says itself how it was baked",
+            is: "a frame that failed: it records how it was baked",
             source_file: args.source.clone(),
         };
         return Err(Failure {
@@ -83,7 +83,7 @@ fn run_failed(args: &CheckArgs, progress: &Progress) -> Result<u8, Failure> {
     }
     let Replayed { frame, failure } = replay_failed(&args.source, &args.gpu.read()?)?;
     let Some(failure) = failure else {
-        let text = format!("frame {frame} keeps its budgets now");
+        let text = format!("frame {frame} is within its budgets now");
         match progress.is_json() {
             true => progress.conclude(&text, json!({ "frame": frame })),
             false => output::print(&format!("{text}\n")),
@@ -187,7 +187,7 @@ fn source(args: &CheckArgs) -> Result<Source, Failure> {
         return Ok(Source::Scene(Box::new(scene)));
     }
     if args.solver.is_some() || !args.set.is_empty() {
-        let is = "a cache: it says what it was baked with";
+        let is = "a cache: it records what it was baked with";
         return Err(misplaced("--solver or --set", "scenes", is));
     }
     Ok(Source::Cache(args.source.clone(), args.frames.clone()))

@@ -132,8 +132,7 @@ fn show_caches(out: &mut String, diff: &CacheDiff) -> std::fmt::Result {
     if !diff.without_particles.is_empty() {
         writeln!(
             out,
-            "particles not kept on both sides: frames {}, of which what stands \
-             beside them is compared",
+            "particles not kept on both sides: frames {}, of which the other data are compared",
             ranges(&diff.without_particles)
         )?;
     }
@@ -141,7 +140,7 @@ fn show_caches(out: &mut String, diff: &CacheDiff) -> std::fmt::Result {
     for frame in diff.frames.iter().filter(lone).take(1) {
         writeln!(
             out,
-            "particles in frame {}: {} in both, {} in A alone{}, {} in B alone{}",
+            "particles in frame {}: {} in both, {} only in A{}, {} only in B{}",
             frame.frame,
             frame.matched,
             frame.only_a.count,
@@ -181,7 +180,7 @@ fn show_lone(out: &mut String, what: &str, side: &str, names: &str) -> std::fmt:
     if names.is_empty() {
         return Ok(());
     }
-    writeln!(out, "{what} in {side} alone: {names}")
+    writeln!(out, "{what} only in {side}: {names}")
 }
 
 /// The largest deviation of each field over all frames, each measure with its frame.
@@ -276,10 +275,10 @@ fn show_first_difference(out: &mut String, diff: &CacheDiff) -> std::fmt::Result
     match first {
         Some((frame, field, parting)) => writeln!(
             out,
-            "\nfirst other bit: frame {frame}, {field} of particle {}: A {:?}, B {:?}",
+            "\nfirst differing bit: frame {frame}, {field} of particle {}: A {:?}, B {:?}",
             parting.particle, parting.a, parting.b
         ),
-        None => writeln!(out, "\nno other bit in the particles that both have"),
+        None => writeln!(out, "\nno differing bit in the particles that both have"),
     }
 }
 
@@ -306,8 +305,8 @@ fn describe(frame: u32, fault: &Fault) -> String {
     let value = number(fault.value);
     let fault = match fault.measure {
         "bits" => format!("{what}: {value} particles are not the same{place}"),
-        "hash" => "the particles' hash is another one".to_owned(),
-        "on one side alone" => format!("{what}: {value} on one side alone"),
+        "hash" => "the particles' hash differs".to_owned(),
+        "on one side alone" => format!("{what}: {value} on only one side"),
         measure => format!(
             "{what}: {measure} {value}, allowed {}{place}",
             number(fault.limit)
@@ -351,7 +350,7 @@ fn show_baseline(out: &mut String, diff: &BaselineDiff) -> std::fmt::Result {
     if !diff.faults.is_empty() && diff.faults.iter().all(|f| f.fault.measure == "hash") {
         writeln!(
             out,
-            "the aggregates are within their limits: other bits, much the same water"
+            "the aggregates are within their limits: different bits, much the same water"
         )?;
     }
     Ok(())
@@ -387,8 +386,7 @@ fn show_written(file: &std::path::Path, written: &Written) -> String {
     }
     if written.is_spread_dropped {
         text += "spreads of another scene or other frames dropped: the limits are those of any \
-                 scene; --spread measures \
-                 them anew\n";
+            scene; --spread measures them again\n";
     }
     text
 }

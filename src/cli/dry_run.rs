@@ -22,7 +22,7 @@ impl DryRun {
         let frames = self.frames.len();
         let bytes = match self.bytes {
             Some(bytes) => format!("about {}", size(bytes)),
-            None => "nothing is known of their bytes".to_owned(),
+            None => "of unknown size".to_owned(),
         };
         let span = match self.frames[..] {
             [] => String::new(),
@@ -30,7 +30,7 @@ impl DryRun {
             [first, .., last] => format!(" ({first} to {last})"),
         };
         let text = format!(
-            "would make {}{span}, {bytes}; {} stand there; in {}{words}\n",
+            "would make {}{span}, {bytes}; {} already exist; in {}{words}\n",
             count(frames as u64, "frame"),
             self.standing,
             self.place,

@@ -157,7 +157,7 @@ pub(super) fn run(args: &ExportArgs, progress: &Progress) -> Result<u8, Failure>
     };
     progress.conclude(
         &format!(
-            "{} {} made ({}), {} stood there already{elsewhere}{}",
+            "{} {} made ({}), {} already existed{elsewhere}{}",
             if outcome.interrupted {
                 "ended by a signal:"
             } else {
@@ -257,7 +257,7 @@ fn tell(progress: &Progress, event: Event) {
                 format!(", {:.2} % of the particles' volume", 100.0 * volume)
             });
             let (text, status) = match made {
-                0 => ("stands there".to_owned(), Status::Skipped),
+                0 => ("already exists".to_owned(), Status::Skipped),
                 _ => (
                     format!("{} in {seconds:.2} s{held}", size(bytes)),
                     Status::Done,

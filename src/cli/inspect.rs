@@ -144,8 +144,8 @@ pub(super) fn run(args: &InspectArgs) -> Result<u8, Failure> {
 /// Error for the folder of a failed frame, which has neither plan nor ledger.
 fn broken_off(directory: &Path) -> Failure {
     let what = format!(
-        "{} is the frame that a bake broke off at, which no cache lists: `swell \
-         check {}` computes it again",
+        "{} is the frame at which a bake failed, which no cache lists; `swell check {}` computes \
+         it again",
         directory.display(),
         posix::path(directory)
     );
@@ -176,7 +176,7 @@ fn refuse_frames_beyond(args: &InspectArgs, file: &Path, frames: u32) -> Result<
 }
 
 /// Reason to refuse options of scenes for a cache.
-const CACHE: &str = "a cache: it says what it was baked with";
+const CACHE: &str = "a cache: it records what it was baked with";
 
 /// Refuses options of scenes for other subjects.
 fn refuse_options(args: &InspectArgs, is: &'static str, file: &Path) -> Result<(), Failure> {
@@ -249,7 +249,7 @@ fn show_plan(out: &mut String, scene: &Scene, planned: &ScenePlan) -> fmt::Resul
     };
     writeln!(
         out,
-        "{} ({} left out where solids are), {}, {samples}{} × {} × {} cells",
+        "{} ({} removed inside solids), {}, {samples}{} × {} × {} cells",
         count(planned.particles as u64, "particle"),
         planned.removed,
         output::water(planned.volume),
@@ -321,7 +321,7 @@ fn show_arrangement(out: &mut String, scene: &Scene, planned: &ScenePlan) -> fmt
         _ => {}
     }
     if let Some(page) = plan.page {
-        writeln!(out, "places in two bindings, {page} in the first")?;
+        writeln!(out, "positions in two bindings, {page} in the first")?;
     }
     if let Some(spacing) = planned.coarse_solids {
         writeln!(

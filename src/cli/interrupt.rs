@@ -29,7 +29,9 @@ impl Interrupt {
                 // The process ends with its temporary files in place; resuming clears them.
                 std::process::exit(EXIT_CODE);
             }
-            output::say("ends after the current frame, resumably; once more to end at once");
+            output::say(
+                "ending after the current frame, resumably; interrupt again to end at once",
+            );
         })?;
         Ok(interrupt)
     }

@@ -93,7 +93,7 @@ pub(super) fn run(args: &RenderArgs, progress: &Progress) -> Result<u8, Failure>
     progress.finish();
     progress.conclude(
         &format!(
-            "{} {} rendered, {} stood there already{}, in {}",
+            "{} {} rendered, {} already existed{}, in {}",
             if outcome.interrupted {
                 "ended by a signal:"
             } else {
@@ -143,7 +143,7 @@ pub(super) fn tell(progress: &Progress, event: Event) {
             let [width, height] = size;
             let others = match left_out {
                 0 => String::new(),
-                more => format!(" ({more} more were baked, and their particles not kept)"),
+                more => format!(" ({more} more were baked without keeping their particles)"),
             };
             progress.say(
                 &format!(
@@ -182,7 +182,7 @@ pub(super) fn tell(progress: &Progress, event: Event) {
             bytes,
         } => {
             let (text, status) = match skipped {
-                true => ("stands there".into(), Status::Skipped),
+                true => ("already exists".into(), Status::Skipped),
                 false => (format!("{seconds:.2} s"), Status::Done),
             };
             progress.wrote(bytes);

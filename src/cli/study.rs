@@ -106,7 +106,7 @@ pub(super) fn conduct(request: &Request, progress: &Progress) -> Result<u8, Fail
     }
     let Some(page) = outcome.page else {
         progress.conclude(
-            "ended by a signal; the same command goes on",
+            "ended by a signal; the same command resumes",
             json!({ "interrupted": true }),
         );
         return Ok(interrupt::EXIT_CODE as u8);
@@ -136,9 +136,9 @@ fn tell_share(progress: &Progress, request: &Request, chunk: Chunk, share: Share
     };
     progress.conclude(
         &format!(
-            "done: {} of share {chunk} run, {stood} stood there already; left of the \
-             whole study: {most}{left}; the same command without --chunk joins the shares \
-             and makes table and page",
+            "done: {} of share {chunk} run, {stood} already existed; left of the whole study: \
+             {most}{left}; the same command without --chunk joins the shares and makes table and \
+             page",
             count(ran as u64, "point")
         ),
         json!({

@@ -71,7 +71,8 @@ impl WhitewaterArgs {
         Err(Failure {
             code: 2,
             error: format!(
-                "`{name}` names no stream: letters, digits, `.`, `_` and `-` do (--name)"
+                "`{name}` is not a name for a stream; allowed are letters, digits, `.`, `_` and \
+                 `-` (--name)"
             )
             .into(),
         })

@@ -16,7 +16,7 @@ pub(super) fn show(out: &mut String, diff: &CacheDiff) -> std::fmt::Result {
     let lone = [("A", &diff.streams_only_a), ("B", &diff.streams_only_b)];
     for (side, names) in lone {
         for name in names {
-            writeln!(out, "{mark}{name} in {side} alone")?;
+            writeln!(out, "{mark}{name} only in {side}")?;
         }
     }
     for first in firsts(&diff.streams) {
@@ -69,7 +69,7 @@ fn describe(difference: &Difference) -> String {
     match difference {
         Difference::Value { key, a, b } => format!("{key}: A {a}, B {b}"),
         Difference::Bytes { a, b } => {
-            format!("other bytes ({a} and {b} of them)")
+            format!("different bytes ({a} and {b} of them)")
         }
         Difference::Grid(grid) => describe_grid(grid),
     }

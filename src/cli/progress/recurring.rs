@@ -55,7 +55,7 @@ impl Recurrences {
                 frames: 1,
                 worst: warning,
             });
-            let more = "; of the frames after it the end tells the worst";
+            let more = "; the worst of the frames after it is reported at the end";
             return Some((format!("{line}{more}"), event));
         };
         kind.frames += 1;

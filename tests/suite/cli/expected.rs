@@ -103,9 +103,9 @@ fn a_dry_run_tells_what_the_command_then_does() {
     for (share, told) in [
         (
             1,
-            "would make 1 frame (1), nothing is known of their bytes; 0 stand there; in day",
+            "would make 1 frame (1), of unknown size; 0 already exist; in day",
         ),
-        (2, "would make 0 frames, about 0 B; 1 stand there; in day"),
+        (2, "would make 0 frames, about 0 B; 1 already exist; in day"),
     ] {
         let said = job.expect(0, &format!("{render} --dry-run --chunk {share}/3"));
         assert_has(&said, &[told]);

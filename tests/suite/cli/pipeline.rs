@@ -143,7 +143,7 @@ fn a_study_bakes_renders_measures_and_tells() {
     let said = job.expect(0, "study study.toml -o out");
     assert!(said.contains("nothing left to bake"), "{said}");
     assert!(
-        said.contains("stands there") && !said.contains("substeps"),
+        said.contains("already exists") && !said.contains("substeps"),
         "{said}"
     );
     assert_eq!((read("results.csv"), read("index.html")), (csv, page));
@@ -443,11 +443,14 @@ fn a_new_look_leaves_the_cache_as_it_is() {
     let first = png("day", 1);
     assert!(
         job.expect(0, "render cache --look look.toml -o day")
-            .contains("0 frames rendered, 4 stood there")
+            .contains("0 frames rendered, 4 already existed")
     );
     fs::write(job.path("day/small.0001.png"), &first[..first.len() / 2]).unwrap();
     let said = job.expect(0, "render cache --look look.toml -o day");
-    assert!(said.contains("1 frame rendered, 3 stood there"), "{said}");
+    assert!(
+        said.contains("1 frame rendered, 3 already existed"),
+        "{said}"
+    );
     assert_eq!(png("day", 1), first);
     job.expect(4, "render cache --look wide.toml -o day");
     assert_eq!(png("day", 1), first);

@@ -36,8 +36,7 @@ const BAKE: &str = "bake water.toml --device cpu --frames 1";
 #[test]
 fn the_volume_that_is_made_stands_beside_the_one_asked_for() {
     let job = job();
-    let told =
-        "256 particles (0 left out where solids are), 0.2560 m³ of water of 0.2560 m³ asked for";
+    let told = "256 particles (0 removed inside solids), 0.2560 m³ of water of 0.2560 m³ asked for";
     let said = job.expect(0, "inspect water.toml");
     assert_has(&said, &[told]);
     assert!(!said.contains("warning"), "{said}");
@@ -165,7 +164,7 @@ fn a_scene_without_water_is_told_of() {
     );
     let said = job.expect(0, "inspect water.toml");
     assert!(
-        !said.contains(covered) && said.contains("(128 left out"),
+        !said.contains(covered) && said.contains("(128 removed"),
         "{said}"
     );
 }

@@ -37,7 +37,7 @@ fn equal_caches_are_equal_and_a_flipped_velocity_is_found() {
     assert_has(
         &said,
         &[
-            "first other bit: frame 3, velocity of particle 123: A [-1.0",
+            "first differing bit: frame 3, velocity of particle 123: A [-1.0",
             "OUT OF TOLERANCE",
         ],
     );
@@ -175,13 +175,13 @@ fn ids_frames_and_settings_that_differ_are_told() {
         &said,
         &[
             "solver.pbf.iterations was 4.0, is now 7.0",
-            "frames in B alone: 4",
-            "frame 1: 799 in both, 0 in A alone, 1 in B alone (first id 40)",
-            "no other bit in the particles that both have",
-            "frame 1, particles: 1 on one side alone",
+            "frames only in B: 4",
+            "frame 1: 799 in both, 0 only in A, 1 only in B (first id 40)",
+            "no differing bit in the particles that both have",
+            "frame 1, particles: 1 on only one side",
         ],
     );
-    assert_has(&job.expect(1, "diff b a"), &["frames in A alone: 4"]);
+    assert_has(&job.expect(1, "diff b a"), &["frames only in A: 4"]);
     // A different setting by itself is no fault.
     let made = Made {
         scene: &other,
@@ -239,7 +239,7 @@ fn a_baseline_knows_its_adapter_by_hashes_and_others_by_aggregates() {
     assert_has(
         &said,
         &[
-            "frame 3, the particles' hash is another one",
+            "frame 3, the particles' hash differs",
             "much the same water",
         ],
     );
@@ -301,7 +301,7 @@ fn a_baseline_knows_its_adapter_by_hashes_and_others_by_aggregates() {
     );
     assert_has(
         &job.expect(1, "diff short base.json"),
-        &["frames in B alone: 3-4"],
+        &["frames only in B: 3-4"],
     );
 
     for (text, words) in [
@@ -345,7 +345,7 @@ fn a_baked_cache_is_its_own_baseline_and_another_setting_is_not() {
         &said,
         &[
             "solver.pbf.iterations was 4.0, is now 5.0",
-            "first other bit: frame 1, position of particle",
+            "first differing bit: frame 1, position of particle",
         ],
     );
     let said = job.expect(1, "diff c base.json");

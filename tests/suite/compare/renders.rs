@@ -86,7 +86,7 @@ fn renders_are_compared_by_name_with_a_difference_image() {
         &said,
         &[
             "A is 40 × 32, B is 48 × 32",
-            "pictures in A alone: s.0002.exr",
+            "pictures only in A: s.0002.exr",
         ],
     );
     let said = job.expect(2, "diff a/s.0002.exr b/s.0002.png");

@@ -102,7 +102,7 @@ fn pictures_do_not_depend_on_what_was_rendered_before() {
     assert!(picture("one", 3) == picture("all", 3));
     assert!(picture("back", 5) == picture("all", 5) && picture("back", 1) == picture("all", 1));
     // Existing pictures are also identified by their neighbouring frames.
-    assert!(render("cache -o all").contains("6 stood there already"));
+    assert!(render("cache -o all").contains("6 already existed"));
     // Control: a bake that ended at frame 3 has nothing after it.
     cache(&job, "short", 3);
     render("short -o short-pictures");

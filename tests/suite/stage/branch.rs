@@ -233,7 +233,7 @@ fn the_other_commands_read_a_branch() {
     // As for any two caches of different lengths.
     let text = job.expect(1, "diff whole branch");
     assert!(
-        text.contains("frames in A alone: 0-2") && text.contains("compared frames 3-6"),
+        text.contains("frames only in A: 0-2") && text.contains("compared frames 3-6"),
         "{text}"
     );
     job.expect(
