@@ -399,7 +399,7 @@ mod tests {
             ),
             (
                 "[emission]\nenergy = [1, 1]",
-                &["w.toml:2", "emission.energy", "rise"],
+                &["w.toml:2", "emission.energy", "ascending"],
             ),
             ("[foam]\nlife = 1", &["w.toml:2", "lifetime"]),
             (
