@@ -359,9 +359,9 @@ mod tests {
     }
 
     /// Water that gravity has moved down a plane for a step: on 1:20 it stays; on 1:8 friction
-    /// takes g cos θ / 16 of it, with eight particles in a cell. Half a cell off the plane, and where it
-    /// runs faster than 1.41 times √(2 g Δx / 16), it keeps its velocity; so does a droplet that
-    /// slides.
+    /// takes g cos θ / 16 of it, with eight particles in a cell. Half a cell off the plane, and
+    /// where it runs faster than 1.41 times √(2 g Δx / 16), it keeps its velocity; so does a
+    /// droplet that slides.
     #[test]
     fn films_rest_on_gentle_slopes_and_run_down_steep_ones() {
         let film = |is_drop: bool| Film {
