@@ -383,7 +383,7 @@ mod tests {
         let two = names[..2].to_vec();
         let said = find(two, "5").expect_err("there is no 5").to_string();
         let lines: Vec<&str> = said.lines().collect();
-        assert!(lines[0].contains("no adapter `5`"), "{said}");
+        assert!(lines[0].contains("no adapter matches `5`"), "{said}");
         assert_eq!(
             lines[1..],
             ["  0: llvmpipe (LLVM 15.0.6, 256 bits)", "  1: NVIDIA L4"]

@@ -354,6 +354,8 @@ mod tests {
         assert_eq!(particles.attributes["b"], [2.0; 2]);
         assert_eq!(particles.attributes["c"], [0.0; 2]);
         assert!(!particles.attributes.contains_key("a"));
-        assert!(notes[0].contains("no c: zero") && notes[1].contains("for a: left out"));
+        assert!(
+            notes[0].contains("no c: zero") && notes[1].contains("not use a, which is dropped")
+        );
     }
 }

@@ -110,7 +110,7 @@ mod tests {
     fn a_kind_is_said_once_and_its_worst_at_the_end() {
         let mut told = Recurrences::default();
         let (line, event) = told.add(crowded(5, 2.5)).unwrap();
-        assert!(line.starts_with("warning: frame 5: a cell holds 2.5 times; of the frames"));
+        assert!(line.starts_with("warning: frame 5: a cell holds 2.5 times; the worst of"));
         assert_eq!(
             event,
             json!({

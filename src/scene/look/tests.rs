@@ -472,7 +472,7 @@ fn a_lens_with_too_few_samples_is_said() {
     let said = lints(&large);
     assert_eq!(said.len(), 1);
     assert!(
-        said[0].contains("10.9 pixels") && said[0].contains("from 94 on"),
+        said[0].contains("10.9 pixels") && said[0].contains("from 94 samples on"),
         "{said:?}"
     );
     let many = large.replace("[image]\n", "[image]\nsamples = 94\n");

@@ -144,7 +144,7 @@ const FAULTS: [(&str, i32, &str); 21] = [
     (
         "export cache --usd s.usda --look look-words.usda.toml",
         2,
-        "camera.file: words.usda: neither USD",
+        "camera.file: words.usda: it is neither USD",
     ),
     (
         "export cache --usd s.usda --look look-crate.usdc.toml",

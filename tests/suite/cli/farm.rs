@@ -330,7 +330,7 @@ fn the_environment_names_adapter_and_caches() {
         "inspect look.toml",
     ] {
         let said = with(&job, &none, 2, words);
-        assert_has(&said, &["no adapter `999`"]);
+        assert_has(&said, &["no adapter matches `999`"]);
         // The flag takes precedence.
         if !words.contains("new") {
             with(&job, &none, 0, &format!("{words} --adapter 0"));

@@ -72,7 +72,10 @@ fn an_adapter_that_is_not_there_is_refused_by_every_command() {
         // The first number runs all commands, further numbers one.
         for command in &commands[..if k == 0 { commands.len() } else { 1 }] {
             let said = job.expect(2, &format!("{command} --adapter {number}"));
-            assert_has(&said, &[&format!("no adapter `{number}`"), "\n  0: "]);
+            assert_has(
+                &said,
+                &[&format!("no adapter matches `{number}`"), "\n  0: "],
+            );
             let lines = said.lines().filter(|line| line.starts_with("  ")).count();
             assert_eq!(lines, count, "a line an adapter: {said}");
             assert!(!job.path("new").exists(), "{command} has written something");

@@ -151,7 +151,7 @@ fn a_scene_without_water_is_told_of() {
     ] {
         assert_has(
             &job.expect(0, &words),
-            &[&format!("warning: {covered}"), "0 particles (256 left out"],
+            &[&format!("warning: {covered}"), "0 particles (256 removed"],
         );
     }
     let denied = job.expect(2, "inspect water.toml --deny lint");

@@ -79,7 +79,7 @@ fn pictures_are_numbered_from_another_frame() {
     );
     // `--chunk` divides the whole range; existing pictures are skipped.
     let share = format!("{render} moved --number-from 1001 --chunk 2/2");
-    assert_has(&job.expect(0, &share), &["0 frames rendered, 1 stood"]);
+    assert_has(&job.expect(0, &share), &["0 frames rendered, 1 already"]);
     let rest = "render cache --look look.toml --frames 3 --number-from 1002 -o moved";
     assert_has(&job.expect(0, rest), &["1 frame rendered"]);
     let before = pictures(&job.path("moved"));
@@ -213,7 +213,7 @@ fn pictures_of_something_else_are_refused_and_left() {
     fs::write(day.join("notes.png"), "mine").unwrap();
     fs::write(day.join("small.0005.png.part"), "half").unwrap();
     let said = job.expect(0, "render cache --look look.toml -o day --frames 3-6");
-    assert!(said.contains("2 frames rendered, 2 stood"), "{said}");
+    assert!(said.contains("2 frames rendered, 2 already"), "{said}");
     assert!(!day.join("small.0005.png.part").exists());
     assert_eq!(fs::read_to_string(day.join("notes.png")).unwrap(), "mine");
     let both = pictures(&day);
