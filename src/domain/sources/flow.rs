@@ -93,7 +93,7 @@ impl<'a> Flow<'a> {
         }
     }
 
-    /// Flow rate where the solids stay where they are.
+    /// Predicts the inflow with solids at rest.
     pub(super) fn promise(&self) -> PredictedInflow {
         let layers = if self.is_aligned() { 1.0 } else { COUNTED };
         let end = self.duration(layers);
@@ -106,7 +106,7 @@ impl<'a> Flow<'a> {
             .collect();
         let count = |is: fn(&Looked) -> bool| entering.iter().filter(|it| is(it)).count() as f64;
         let open = count(|it| it.is_open);
-        // Of a flow so slow that two times round to one, nothing is counted.
+        // Flows so slow that times become indistinguishable are not counted.
         let part = |of: f64| if of > 0.0 { open / of } else { 1.0 };
         let bounds = &self.emitter.shape.bounds;
         let is_box = self.emitter.shape.mesh.is_none();
@@ -179,12 +179,12 @@ impl<'a> Flow<'a> {
         speeds.into_iter().filter(|speed| *speed != 0.0).count() == 1
     }
 
-    /// In which so many layers come in, seconds.
+    /// Returns the time in which this number of layers enters, seconds.
     fn duration(&self, layers: f64) -> f64 {
         (layers * self.sources.spacing / self.speed()).min(f64::MAX)
     }
 
-    /// Whether a position is in the room on its way, and open there.
+    /// Samples a position's path: whether it is inside the volume, and outside of solids there.
     fn looked(&self, cell: [i64; 3], passage: Passage) -> Looked {
         let mut looked = Looked::default();
         for time in self.looks(passage) {

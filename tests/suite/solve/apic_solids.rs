@@ -27,8 +27,8 @@ fn apic_on_a_beach_comes_to_rest() {
     let speed = reported(&job, "cache", "max_speed");
     let fastest = speed[31..].iter().fold(0.0, |most: f64, v| most.max(*v));
     println!("{fastest} m/s, {} J and {} J", energy[7], energy[39]);
-    // 0.06 m/s was measured, and 0.8 of the energy eight frames after the start.
-    assert!(fastest < 0.12, "{fastest}");
+    // The mark of hard case 36 for water at rest.
+    assert!(fastest < 0.02, "{fastest}");
     assert!(energy[39] < energy[7], "{energy:?}");
     job.copy_shaders("divided");
     job.edit(
