@@ -10,7 +10,7 @@ use std::{
 };
 
 use swell::{
-    scene::{Reach, Scene, look::Look},
+    files::{Reach, SceneBuilder, load_look_with},
     stage::{bake, render},
 };
 
@@ -28,7 +28,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             .nth(1)
             .unwrap_or_else(|| "cache/example".to_owned()),
     );
-    let scene = Scene::builder("drop")
+    let scene = SceneBuilder::new("drop")
         .frames(24, 24.0)
         .domain([0.0; 3], [2.0, 2.0, 1.0])
         .block([0.0; 3], [0.8, 0.6, 1.0])
@@ -51,7 +51,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         .run()?;
 
     let day = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/looks/day.toml");
-    let look = Look::load_with(&day, &CHANGES.map(str::to_owned), Reach::Folder)?;
+    let look = load_look_with(&day, &CHANGES.map(str::to_owned), Reach::Folder)?;
     swell::render(&cache, &look)
         .frames(22..=24)
         .to(folder.join("pictures"))

@@ -6,11 +6,11 @@
 #![expect(clippy::print_stdout, reason = "a program that says what it measured")]
 
 use std::error::Error;
+use swell::files::SceneBuilder;
 
 use swell::{
     domain::solver::{Observed, Requested, Solver as _, Span, Watch},
     reference::flip::Flip,
-    scene::Scene,
     stage::prepare::Start,
 };
 
@@ -34,7 +34,7 @@ impl Watch for Front {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let height = 0.5;
-    let scene = Scene::builder("front")
+    let scene = SceneBuilder::new("front")
         .frames(10, 24.0)
         .domain([0.0; 3], [3.0, 0.8, 0.2])
         .block([0.0; 3], [0.6, height, 0.2])

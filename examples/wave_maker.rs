@@ -5,11 +5,12 @@
 #![expect(clippy::print_stdout, reason = "a program that says what it measured")]
 
 use std::{env, error::Error, f64::consts::TAU, path::PathBuf};
+use swell::files::SceneBuilder;
 
 use swell::{
     cache::CacheReader,
     domain::motion::{piston_height_ratio, wave_number},
-    scene::{Scene, Wall},
+    scene::Wall,
     stage::device::Device,
 };
 
@@ -22,7 +23,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         .nth(1)
         .unwrap_or_else(|| "cache/example".to_owned());
     let cache = PathBuf::from(folder).join("waves");
-    let scene = Scene::builder("waves")
+    let scene = SceneBuilder::new("waves")
         .frames(96, 24.0)
         .domain([0.0; 3], [8.0, 0.9, 0.3])
         .block([0.0; 3], [8.0, DEPTH, 0.3])

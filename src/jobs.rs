@@ -24,8 +24,8 @@ static NEVER: AtomicBool = AtomicBool::new(false);
 /// Begins a bake of `scene`: the whole shot, on the best adapter, into `cache/SHOT/SOLVER`.
 ///
 /// ```no_run
-/// # use swell::{scene::Scene, stage::device::Device};
-/// # let scene = Scene::builder("drop").build()?;
+/// # use swell::{files::SceneBuilder, stage::device::Device};
+/// # let scene = SceneBuilder::new("drop").build()?;
 /// let outcome = swell::bake(&scene).to("cache/drop").device(Device::Cpu).run()?;
 /// println!("{} frames", outcome.frames);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -51,8 +51,7 @@ pub fn bake(scene: &Scene) -> Bake<'_> {
 /// `renders/SHOT`.
 ///
 /// ```no_run
-/// # use swell::scene::look::Look;
-/// let look = Look::load("scenes/looks/day.toml".as_ref())?;
+/// let look = swell::files::load_look("scenes/looks/day.toml".as_ref())?;
 /// swell::render("cache/drop", &look).frames(1..=24).to("out").run()?;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```

@@ -10,11 +10,11 @@
 //! adapter is used.
 //!
 //! ```
-//! use swell::{cache::CacheReader, scene::Scene, stage::device::Device};
+//! use swell::{cache::CacheReader, files::SceneBuilder, stage::device::Device};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! // A column of water one metre high in a box two metres wide. `Scene::load` reads a file.
-//! let scene = Scene::builder("drop")
+//! // A column of water one metre high in a box two metres wide. `files::load_scene` reads a file.
+//! let scene = SceneBuilder::new("drop")
 //!     .frames(24, 24.0)
 //!     .domain([0.0; 3], [2.0, 2.0, 1.0])
 //!     .block([0.0; 3], [0.5, 1.0, 1.0])
@@ -54,7 +54,8 @@
 //! cache -> stage::render -> render (GPU) -> images
 //! ```
 //!
-//! - Input files: [`scene`] parses and validates scene, look and study files.
+//! - Input: [`scene`] has scenes and looks as validated types; [`files`] reads them, and studies,
+//!   from the files that users write.
 //! - Complete jobs: [`stage`] combines the other crates without a terminal. Its jobs are
 //!   [bake](stage::bake), [render](stage::render), [export](stage::export),
 //!   [whitewater](stage::whitewater), [check](stage::check), [diff](stage::diff) and
@@ -98,6 +99,7 @@ pub use swell_compare as compare;
 pub use swell_domain as domain;
 pub use swell_experiment as experiment;
 pub use swell_export as export;
+pub use swell_files as files;
 pub use swell_gpu as gpu;
 pub use swell_reference as reference;
 pub use swell_render as render;

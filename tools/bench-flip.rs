@@ -16,6 +16,7 @@
 #![allow(missing_docs, reason = "a program")]
 
 use std::{path::Path, time::Instant};
+use swell::files::parse_scene;
 
 use swell::{
     domain::solver::{PassTime, Solver},
@@ -97,7 +98,7 @@ fn dam(options: &Options, height: f64) -> Result<(Scene, Start), Box<dyn std::er
         metres([WATER[0].min(x), WATER[1].min(y), WATER[2].min(z)]),
         options.settings
     );
-    let scene = Scene::parse(&text, Path::new("bench.toml"), Path::new("."), &[])?;
+    let scene = parse_scene(&text, Path::new("bench.toml"), Path::new("."), &[])?;
     let mut start = Start::of(&scene)?;
     start.particles.velocity.fill([2.0, 0.0, 0.0]);
     Ok((scene, start))

@@ -17,6 +17,7 @@
 #![allow(missing_docs, reason = "a program")]
 
 use std::{path::Path, time::Instant};
+use swell::files::parse_scene;
 
 use swell::{
     domain::solver::PassTime,
@@ -100,7 +101,7 @@ fn dam(count: usize, options: &Options) -> Result<(Scene, Start), Box<dyn std::e
         2.0 * edge,
         2.0 * edge
     );
-    let scene = Scene::parse(&text, Path::new("bench.toml"), Path::new("."), &[])?;
+    let scene = parse_scene(&text, Path::new("bench.toml"), Path::new("."), &[])?;
     let mut start = Start::of(&scene)?;
     start.particles.velocity.fill([2.0, 0.0, 0.0]);
     Ok((scene, start))

@@ -1,11 +1,12 @@
 //! Fuzzes the parser of scene files: any text gives a scene or an error.
 #![no_main]
 
+use swell::files::parse_scene;
 use std::path::Path;
 
 use libfuzzer_sys::fuzz_target;
 use swell::scene::Scene;
 
 fuzz_target!(|text: &str| {
-    let _ = Scene::parse(text, Path::new("scene.toml"), Path::new("/nowhere"), &[]);
+    let _ = parse_scene(text, Path::new("scene.toml"), Path::new("/nowhere"), &[]);
 });

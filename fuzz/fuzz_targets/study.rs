@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use libfuzzer_sys::fuzz_target;
-use swell::scene::study::Study;
+use swell::files::study::Study;
 
 fuzz_target!(|text: &str| {
     let _ = Study::parse(text, Path::new("study.toml"), Path::new("/nowhere"));

@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use libfuzzer_sys::fuzz_target;
-use swell::scene::tolerance;
+use swell::files::tolerance;
 
 fuzz_target!(|text: &str| {
     let _ = tolerance::parse(text, Path::new("tolerance.toml"));

@@ -1,6 +1,7 @@
 //! `swell bake SCENE`
 
 use std::path::{Path, PathBuf};
+use swell_files::load_scene_within;
 
 use clap::{
     Args,
@@ -9,7 +10,8 @@ use clap::{
 use serde_json::{Value, json};
 
 use swell_domain::{frame_range::FrameRange, solver::StepReport};
-use swell_scene::{Method, Reach, Scene, SceneError};
+use swell_files::Reach;
+use swell_scene::{Method, Scene, SceneError};
 use swell_stage::{
     bake::{Event, Request, Room, bake, expected},
     branch::BranchPoint,
@@ -101,7 +103,7 @@ pub(super) fn load(
 ) -> Result<Scene, SceneError> {
     let chosen = solver.map(Method::as_override);
     let overrides: Vec<String> = set.iter().cloned().chain(chosen).collect();
-    Scene::load_within(file, &overrides, reach(allow_outside))
+    load_scene_within(file, &overrides, reach(allow_outside))
 }
 
 /// Loads the scene. If a bake is to be resumed past the end of its shot, the shot is lengthened, so

@@ -1,12 +1,12 @@
 //! `swell check --render CACHE --look LOOK`
 
 use std::{fmt::Write as _, path::PathBuf};
+use swell_files::load_look;
 
 use clap::Args;
 use serde_json::json;
 
 use swell_domain::frame_range::FrameRange;
-use swell_scene::look::Look;
 use swell_stage::render::surfaces::{DEPTH, Event, NORMAL, Outcome, Request, check_render};
 
 use super::{
@@ -51,7 +51,7 @@ pub(super) fn run(
 ) -> Result<u8, Failure> {
     let request = Request {
         cache,
-        look: Look::load(look)?,
+        look: load_look(look)?,
         frames,
         colour: surface.colour,
         flicker: surface.flicker,

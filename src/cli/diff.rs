@@ -8,7 +8,7 @@ use clap::Args;
 use serde_json::json;
 
 use swell_domain::frame_range::{FrameRange, ranges};
-use swell_scene::tolerance;
+use swell_files::tolerance;
 use swell_stage::diff::{
     AggregatePeak, BaselineDiff, Basis, CacheDiff, Fault, Images, Outcome, PairDiff, PicturesDiff,
     Request, Written, aggregate_peaks, diff, write_baseline,

@@ -1,12 +1,12 @@
 //! `swell export CACHE`
 
 use std::path::PathBuf;
+use swell_files::load_look_within;
 
 use clap::{Args, ValueEnum};
 use serde_json::json;
 
 use swell_domain::{chunk::Chunk, frame_range::FrameRange};
-use swell_scene::look::Look;
 use swell_stage::export::{Event, Pattern, Request, Target, UsdWater, VOXELS, expected, export};
 
 use super::{
@@ -127,7 +127,7 @@ impl ExportArgs {
 
 pub(super) fn run(args: &ExportArgs, progress: &Progress) -> Result<u8, Failure> {
     let look = match &args.look {
-        Some(look) => Some(Look::load_within(look, bake::reach(args.allow_outside))?),
+        Some(look) => Some(load_look_within(look, bake::reach(args.allow_outside))?),
         None => None,
     };
     let request = Request {

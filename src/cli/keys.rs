@@ -3,7 +3,7 @@
 use clap::{Args, builder::PossibleValuesParser};
 
 use super::output;
-use swell_scene::keys::{File, page};
+use swell_files::keys::{File, page};
 
 #[derive(Args, Debug)]
 pub(super) struct KeysArgs {

@@ -1,12 +1,12 @@
 //! `swell render CACHE --look LOOK`
 
 use std::path::PathBuf;
+use swell_files::load_look_within;
 
 use clap::Args;
 use serde_json::json;
 
 use swell_domain::{chunk::Chunk, frame_range::FrameRange};
-use swell_scene::look::Look;
 use swell_stage::render::{Event, Request, expected, render};
 
 use super::{
@@ -62,7 +62,7 @@ pub(super) struct RenderArgs {
 }
 
 pub(super) fn run(args: &RenderArgs, progress: &Progress) -> Result<u8, Failure> {
-    let look = Look::load_within(&args.look, bake::reach(args.allow_outside))?;
+    let look = load_look_within(&args.look, bake::reach(args.allow_outside))?;
     let directory = match &args.output {
         Some(directory) => directory.clone(),
         None => {

@@ -7,7 +7,7 @@ use serde_json::json;
 
 use swell_domain::{chunk::Chunk, posix};
 use swell_experiment::{Event, PointEvent, PointStatus, Request, Share, study};
-use swell_scene::study::Study;
+use swell_files::study::Study;
 
 use super::{
     Failure, GpuArgs, OUT_OF_TOLERANCE, bake, count,

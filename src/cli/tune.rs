@@ -7,13 +7,11 @@ use serde_json::{Value, json};
 
 use swell_domain::{chunk::Chunk, frame_range::FrameRange, posix};
 use swell_experiment::{Request, dealt};
-use swell_scene::{
-    Method,
-    study::{
-        Study,
-        tune::{Limit, Tune, TuneRequest},
-    },
+use swell_files::study::{
+    Study,
+    tune::{Limit, Tune, TuneRequest},
 };
+use swell_scene::Method;
 use swell_stage::inspect::study::Outline;
 
 use super::{

@@ -4,12 +4,12 @@ use std::{
     path::{Path, PathBuf},
     process::{Command, Stdio},
 };
+use swell_files::load_look_within;
 
 use clap::{Args, ValueEnum};
 use serde_json::json;
 
 use swell_domain::frame_range::FrameRange;
-use swell_scene::look::Look;
 use swell_stage::view::{Aspect, Event, Placing, Request, SHEET, view};
 
 use super::{
@@ -112,7 +112,7 @@ fn rate(text: &str) -> Result<f64, String> {
 
 pub(super) fn run(args: &ViewArgs, progress: &Progress) -> Result<u8, Failure> {
     let look = match &args.look {
-        Some(look) => Some(Look::load_within(look, bake::reach(args.allow_outside))?),
+        Some(look) => Some(load_look_within(look, bake::reach(args.allow_outside))?),
         None => None,
     };
     let is_default = args.sheet.is_none() && args.movie.is_none() && !args.player;

@@ -6,7 +6,7 @@ use clap::Args;
 use serde_json::json;
 
 use swell_domain::whitewater::Kind;
-use swell_scene::whitewater::WhitewaterSettings;
+use swell_files::whitewater::WhitewaterSettings;
 use swell_stage::whitewater::{Event, LimitForecast, Request, expected, whitewater};
 
 use super::{

@@ -7,8 +7,9 @@ use rayon::prelude::*;
 
 use swell_cache::{CacheError, CacheReader, Manifest};
 use swell_domain::{frame_range::FrameRange, solver::StepReport};
+use swell_files::study::comparison::SolverComparison;
 use swell_gpu::adapter::Needs;
-use swell_scene::{Scene, Solid, study::comparison::SolverComparison};
+use swell_scene::{Scene, Solid};
 use swell_stage::{
     bake,
     device::{Device, shaders_note},

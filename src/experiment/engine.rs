@@ -15,8 +15,9 @@ use std::{
 use serde::{Serialize, de::DeserializeOwned};
 
 use swell_domain::chunk::Chunk;
+use swell_files::{physics_hash, study::RunsOn};
 use swell_gpu::adapter::{GpuError, Needs};
-use swell_scene::{Method, Scene, physics_hash, study::RunsOn};
+use swell_scene::{Method, Scene};
 use swell_stage::{
     device::{Gpu, Opened, needs},
     drive::{Drive, End, Step},

@@ -8,7 +8,7 @@
 //! the cheapest settings of a shot.
 //!
 //! A further kind needs one file here that implements `engine::Kind`, a parser in
-//! [`scene::study`](swell_scene::study), and a line in [`study`].
+//! [`scene::study`](swell_files::study), and a line in [`study`].
 
 mod claim;
 mod comparison;
@@ -26,8 +26,8 @@ pub mod validation;
 use std::{path::PathBuf, sync::atomic::AtomicBool};
 
 use swell_domain::chunk::Chunk;
+use swell_files::study::Study;
 use swell_gpu::adapter;
-use swell_scene::study::Study;
 use swell_stage::{bake, device::Gpu, inspect::study::Outline, render};
 
 use engine::{Bench, Kind, Work};

@@ -9,11 +9,11 @@ use serde::{Deserialize, Serialize};
 
 use swell_cache::CacheReader;
 use swell_domain::frame_range::FrameRange;
-use swell_gpu::adapter::{Context, Needs};
-use swell_scene::study::{
+use swell_files::study::{
     RunsOn,
     surface::{PictureError, Point, SurfaceStudy},
 };
+use swell_gpu::adapter::{Context, Needs};
 use swell_stage::{
     bake,
     device::{Device, Opened},

@@ -270,12 +270,13 @@ mod tests {
     use std::path::Path;
 
     use super::*;
+    use swell_files::parse_look;
 
     fn look(camera: &str) -> Look {
         let text = format!(
             "{camera}\n[image]\nwidth = 160\nheight = 90\n[sky]\nmodel = \"hosek_wilkie\"\n"
         );
-        Look::parse(&text, Path::new("look.toml")).unwrap()
+        parse_look(&text, Path::new("look.toml")).unwrap()
     }
 
     /// A film of 36 × 24 mm in a camera file with a focal length of 35 mm, shifted 1.8 mm to the
@@ -284,7 +285,7 @@ mod tests {
     #[test]
     fn the_film_of_a_file_is_fitted_too() {
         let folder = tempfile::tempdir().unwrap();
-        let plate = include_str!("../scene/look/usd_camera/plate.usda")
+        let plate = include_str!("../files/look/usd_camera/plate.usda")
             .replace("1025: 50", "1025: 35")
             .replace(
                 "verticalAperture = 20.25",
@@ -297,7 +298,7 @@ mod tests {
                 "[camera]\nfile = \"plate.usda\"\n{fit}{film}[image]\nwidth = 160\nheight = 90\n\
                  [sky]\nmodel = \"hosek_wilkie\"\n"
             );
-            Look::parse(&text, &folder.path().join("look.toml"))
+            parse_look(&text, &folder.path().join("look.toml"))
         };
         let (by_width, by_height) = (160.0 / 36.0, 90.0 / 24.0);
         // The look's own film sets only the aperture of a lens; no value of it moves anything.
@@ -327,14 +328,14 @@ mod tests {
     #[test]
     fn a_camera_s_file_begins_at_its_own_frame() {
         let folder = tempfile::tempdir().unwrap();
-        let plate = include_str!("../scene/look/usd_camera/plate.usda");
+        let plate = include_str!("../files/look/usd_camera/plate.usda");
         std::fs::write(folder.path().join("plate.usda"), plate).unwrap();
         let look = |start: &str| {
             let text = format!(
                 "[camera]\nfile = \"plate.usda\"\n{start}\n[image]\nwidth = 160\nheight = 90\n\
                  [sky]\nmodel = \"hosek_wilkie\"\n"
             );
-            Look::parse(&text, &folder.path().join("look.toml")).unwrap()
+            parse_look(&text, &folder.path().join("look.toml")).unwrap()
         };
         let begun = look("start = 1001");
         let rows = [

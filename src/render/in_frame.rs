@@ -110,7 +110,7 @@ mod tests {
         frame::Extent,
         samples::Sample,
     };
-    use swell_scene::look::Look;
+    use swell_files::parse_look;
 
     const SPACING: f32 = 0.1;
     /// Reach that a particle needs: a splat's 1.3 spacings, another 1.3 to the end of the field
@@ -122,7 +122,7 @@ mod tests {
         let text = "[camera]\nfocal_length_mm = 36.0\nposition = [0.0, 1.0, 0.0]\n\
                     target = [1.0, 0.9, 0.2]\n\
                     [image]\nwidth = 160\nheight = 90\n[sky]\nmodel = \"hosek_wilkie\"\n";
-        let look = Look::parse(text, FilePath::new("look.toml")).unwrap();
+        let look = parse_look(text, FilePath::new("look.toml")).unwrap();
         let setting = Setting {
             origin: DVec3::ZERO,
             extent: Extent::of(&look),

@@ -119,6 +119,7 @@ mod tests {
     use std::path::Path;
 
     use super::*;
+    use swell_files::parse_look;
 
     #[test]
     fn air_is_the_grounds_or_the_skys() {
@@ -129,7 +130,7 @@ mod tests {
                  height = 36\n[sky]\nmodel = \"hosek_wilkie\"\nturbidity = 5.0\n{line}\n\
                  [ground]\nhaze_m = 700.0\n"
             );
-            let look = Look::parse(&text, Path::new("t.toml")).unwrap();
+            let look = parse_look(&text, Path::new("t.toml")).unwrap();
             haze(look.spec())
         };
         assert_eq!(of(""), 700.0);

@@ -243,13 +243,13 @@ mod tests {
     use super::*;
     use crate::RenderScene;
     use swell_domain::bounds::Bounds;
+    use swell_files::parse_look;
     use swell_gpu::{
         raster::Draw,
         recording::Groups,
         reflect::{Access, reflect},
         shader::compose,
     };
-    use swell_scene::look::Look;
 
     const LIMITS: Limits = Limits {
         storage: 1 << 27,
@@ -271,7 +271,7 @@ mod tests {
              [sky]\nmodel = \"hosek_wilkie\"\n[sun]\nazimuth_degrees = 120.0\n\
              elevation_degrees = 35.0\n{more}"
         );
-        let look = Look::parse(&text, Path::new("look.toml")).unwrap();
+        let look = parse_look(&text, Path::new("look.toml")).unwrap();
         let scene = RenderScene {
             origin: DVec3::ZERO,
             domain: Bounds {

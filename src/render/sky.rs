@@ -309,12 +309,13 @@ mod tests {
     use std::path::Path;
 
     use super::*;
+    use swell_files::parse_look;
 
     fn look(extra: &str) -> Look {
         let text = format!(
             "[camera]\nfocal_length_mm = 35.0\nposition = [0, 1, 0]\ntarget = [1, 1, 0]\n{extra}"
         );
-        Look::parse(&text, Path::new("look.toml")).unwrap()
+        parse_look(&text, Path::new("look.toml")).unwrap()
     }
 
     #[test]

@@ -1,48 +1,14 @@
-//! Absorbing wave makers: reading their settings, and their positions including the absorber state.
+//! Absorbing wave makers: their positions including the absorber state.
 
 use glam::DVec3;
 
-use super::{
-    Scene, WaveMaker, document::Document, error::SceneError, spec::AbsorptionSpec, words::shown,
-};
+use super::{Scene, WaveMaker, words::shown};
 use swell_domain::{
     absorber::{AbsorberState, AbsorberStates, MOST},
-    absorption::{Absorption, Asked, MOST_GAIN, level_along},
+    absorption::level_along,
     bounds::Bounds,
-    motion::Motion,
     particles::Particles,
 };
-
-/// Reads and checks the table at `path` for a wall normal to `axis`, with frames of `seconds`.
-pub(super) fn build(
-    doc: &Document<'_>,
-    path: &str,
-    (spec, axis): (&AbsorptionSpec, usize),
-    (gravity, seconds): (DVec3, f64),
-) -> Result<Absorption, SceneError> {
-    if axis == 1 || gravity.x != 0.0 || gravity.z != 0.0 || gravity.y >= 0.0 {
-        let problem = "a wall absorbs by the water's level, so it has to face x or z, and gravity \
-            has to point straight down";
-        return Err(doc.fault_of_plain(path, problem));
-    }
-    let absorption = Absorption::new(Asked {
-        room: spec.room,
-        depth: spec.depth,
-        period: spec.period,
-        gravity: gravity.length(),
-    });
-    let gain = absorption.gain();
-    if gain * seconds > MOST_GAIN {
-        let problem = format!(
-            "the wall reacts once a frame, and on {} m of water that has to be at least {:.1} \
-             times a second; raise shot.frames_per_second",
-            shown(spec.depth),
-            gain / MOST_GAIN
-        );
-        return Err(doc.fault_of_plain(path, problem));
-    }
-    Ok(absorption)
-}
 
 impl WaveMaker {
     /// Returns the inward displacement from the domain's face at time `t`, metres.
@@ -64,7 +30,7 @@ impl WaveMaker {
     }
 
     /// Returns the largest inward displacement until `t`, metres.
-    pub(super) fn farthest(&self, t: f64) -> f64 {
+    pub fn farthest(&self, t: f64) -> f64 {
         2.0 * self.room() + self.motion.peak_displacement(t)
     }
 }
@@ -170,23 +136,6 @@ impl Scene {
     }
 }
 
-/// Rejects a wall that neither moves nor absorbs.
-pub(super) fn check_still(
-    doc: &Document<'_>,
-    path: &str,
-    motion: &Motion,
-    absorption: Option<&Absorption>,
-) -> Result<(), SceneError> {
-    match (motion, absorption) {
-        (Motion::Still, None) => {
-            let problem =
-                "a wall that neither makes nor absorbs waves; give it wave_maker.absorption";
-            Err(doc.fault_of(&format!("{path}.kind"), problem))
-        }
-        _ => Ok(()),
-    }
-}
-
 /// Counts the frames in which absorbing walls are at the end of their allowed displacement.
 #[derive(Default)]
 pub struct Held([u32; MOST]);
@@ -215,59 +164,5 @@ impl Held {
             )
         })
         .collect()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use std::path::Path;
-
-    use super::*;
-
-    const SCENE: &str = r#"
-[shot]
-name = "a"
-frames = 10
-frames_per_second = 20
-[domain]
-min = [0, 0, 0]
-max = [4, 1, 0.5]
-[[water.block]]
-min = [0, 0, 0]
-max = [4, 0.4, 0.5]
-[[wave_maker]]
-wall = "+x"
-motion = { kind = "still" }
-absorption = { depth = 0.4, period = 1.14, room = 0.3 }
-[solver]
-method = "flip"
-[solver.flip]
-cell_size = 0.1
-cfl = 1.0
-"#;
-
-    /// A wall that makes no waves and moves only as it absorbs: 1.2 m/s, and 2.2 m/s at the end
-    /// of a tenth of a second at 10 m/s². Without its state it is at rest.
-    #[test]
-    fn the_speed_of_an_absorbing_wall_counts() {
-        let mut scene =
-            Scene::parse(SCENE, Path::new("s.toml"), Path::new(""), &[]).expect("valid");
-        let substeps = |scene: &Scene| {
-            let first = scene.flip_substep(1, 0.0, 0.05, 0.0, (0, 0.0));
-            first.expect("few").0
-        };
-        assert_eq!(scene.peak_boundary_speed(0.0, 0.1), 0.0);
-        let at_rest = substeps(&scene);
-        scene.absorbers[0] = Some(AbsorberState {
-            start: 0.0,
-            displacement: 0.0,
-            velocity: 1.2,
-            acceleration: 10.0,
-            level: None,
-            mean: 0.0,
-        });
-        assert!((scene.peak_boundary_speed(0.0, 0.1) - 2.2).abs() < 1e-12);
-        // 1.7 m/s for 0.05 s are 0.085 m and gravity adds 0.025 m: more than a cell.
-        assert_eq!((at_rest, substeps(&scene)), (1.0, 2.0));
     }
 }

@@ -1,56 +1,31 @@
-//! Scene and look files, parsed into validated types.
+//! Scenes and looks as validated types, and what follows from them without a solver.
 
-pub mod axis;
 pub mod budget;
-pub mod edit;
 pub mod effects;
 pub mod flip;
-mod force;
-pub mod gltf_nodes;
 pub mod grids;
-pub mod keys;
+pub mod lint;
 pub mod look;
-pub mod measure;
-mod motion_spec;
-mod motion_table;
 pub mod moving_solid;
-pub mod no_slip;
-pub mod periodic;
+pub mod origin;
 pub mod probe;
-pub mod rig;
-pub mod step;
-pub mod study;
-pub mod tolerance;
-
-mod absorption;
-mod build;
-mod builder;
-mod container;
-mod difference;
-mod document;
-mod error;
-mod fit;
-mod keep;
-mod key;
-mod lint;
-mod load;
-mod origin;
-mod overrides;
-mod projection;
-mod reach;
-mod regular_waves;
-mod seas;
-mod settle;
+pub mod projection;
+pub mod rate;
 pub mod solid_grid;
 pub mod solid_track;
 pub mod sources;
-mod spec;
-mod usd_nodes;
-mod usda;
-mod wave_maker;
-pub mod whitewater;
-mod words;
-mod write;
+pub mod step;
+pub mod waves;
+pub mod words;
+
+mod absorption;
+mod assets;
+mod container;
+mod error;
+mod force;
+mod no_slip;
+mod periodic;
+mod whitewater;
 
 use std::path::PathBuf;
 
@@ -70,14 +45,11 @@ use swell_domain::{
 use swell_domain::named::read_by_name;
 
 pub use absorption::Held;
+pub use assets::asset_path;
 pub use budget::Budget;
-pub use builder::SceneBuilder;
-pub use difference::{physics_difference, physics_hash};
 pub use effects::Effects;
 pub use error::{Fault, Place, SceneError};
-pub use reach::Reach;
 pub use words::four_digits;
-pub use write::asset_path;
 
 /// A validated scene in SI units: every default is filled in and every referenced file is read.
 #[derive(Clone, Debug, PartialEq)]
@@ -273,7 +245,7 @@ impl Placement {
 
     /// Bounds the rounding error in the world, metres, for coordinates that are off by up to
     /// `in_file` in the file.
-    pub(crate) fn rounding(&self, in_file: DVec3) -> DVec3 {
+    pub fn rounding(&self, in_file: DVec3) -> DVec3 {
         self.world_from_file().matrix3.abs() * in_file
     }
 }

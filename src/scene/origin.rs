@@ -15,7 +15,7 @@ const NEAR: f64 = 2.0;
 /// the edge, the domain begins between q and 2 q from the local origin. Local coordinates are then
 /// between q and 4 q, so an `f32` is finer than 2⁻²² of the edge and a multiple of 2⁻²³ q, and its
 /// sum with the origin is exact in `f64` up to 2²⁹ edges away.
-pub(super) fn of(domain: &Bounds) -> DVec3 {
+pub fn of(domain: &Bounds) -> DVec3 {
     let [min, max] = [domain.min, domain.max].map(|p| p.to_array());
     DVec3::from_array(std::array::from_fn(|axis| {
         let edge = max[axis] - min[axis];
@@ -29,7 +29,8 @@ pub(super) fn of(domain: &Bounds) -> DVec3 {
 
 impl Scene {
     /// Converts world coordinates to coordinates relative to `self.origin`.
-    pub(super) fn into_local(mut self) -> Self {
+    #[must_use]
+    pub fn into_local(mut self) -> Self {
         let way = -self.origin;
         if way == DVec3::ZERO {
             return self;
@@ -74,22 +75,6 @@ fn carry(placed: &mut PlacedMesh, way: DVec3) {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// Individual particles move with the scene.
-    #[test]
-    fn particles_are_carried_with_their_domain() {
-        let text = "[shot]\nname = \"a\"\nframes = 1\nframes_per_second = 30\n[domain]\n\
-            min = [100, 0, 100]\nmax = [102, 2, 102]\n\
-            [[water.particles]]\nat = [[101.5, 1.0, 101.25]]\n[solver]\nmethod = \"pbf\"\n\
-            [solver.pbf]\nparticle_spacing = 0.1\n";
-        let world = Scene::parse(text, "s.toml".as_ref(), "".as_ref(), &[]).expect("valid");
-        let way = world.origin;
-        assert!(way.x > 90.0 && way.z > 90.0, "{way}");
-        let at = world.water.particles[0].at[0];
-        let local = DVec3::new(101.5, 1.0, 101.25) - way;
-        assert_eq!(at, local);
-        assert!(at.cmpge(world.domain.min).all() && at.cmple(world.domain.max).all());
-    }
 
     #[test]
     fn far_domains_begin_near_their_own_zero() {

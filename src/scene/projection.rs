@@ -7,7 +7,7 @@ use super::{
 };
 
 /// Edge of a cell, particle spacings; eight particles fill it, as with FLIP.
-pub(super) const PROJECTION_CELL: f64 = 2.0;
+pub const PROJECTION_CELL: f64 = 2.0;
 
 /// Rate r at which particles adopt the grid's velocity, over √(g / Δx): a viscosity of r Δx² / 6
 /// (Zhu and Bridson 2005), at any scale and step length. Without it, the relative motion of
@@ -70,7 +70,7 @@ impl Scene {
 }
 
 /// Returns the scales by which effects in this water are judged.
-pub(super) fn grain(water: &Water, solver: &Solver) -> Grain {
+pub fn grain(water: &Water, solver: &Solver) -> Grain {
     let (spacing, cell) = match solver.method {
         Method::Pbf => {
             let spacing = solver.pbf().particle_spacing;

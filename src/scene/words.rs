@@ -3,7 +3,7 @@
 use swell_domain::bounds::Bounds;
 
 /// Formats a number briefly: `1e308` instead of its 309 digits.
-pub(super) fn shown(value: f64) -> String {
+pub fn shown(value: f64) -> String {
     match value.abs() {
         0.0 => "0".to_owned(),
         size if (1e-4..1e7).contains(&size) || !size.is_finite() => format!("{value}"),
@@ -12,7 +12,7 @@ pub(super) fn shown(value: f64) -> String {
 }
 
 /// Formats numbers as a TOML array.
-pub(super) fn shown_all(values: &[f64]) -> String {
+pub fn shown_all(values: &[f64]) -> String {
     let words: Vec<_> = values.iter().map(|&value| shown(value)).collect();
     format!("[{}]", words.join(", "))
 }
@@ -34,7 +34,7 @@ const TYPES: [(&str, &str); 11] = [
 
 /// Replaces Rust's type names in serde's message: "invalid type: string \"fine\",
 /// expected a number".
-pub(super) fn plain_types(message: &str) -> String {
+pub fn plain_types(message: &str) -> String {
     let lines = message.lines().collect::<Vec<_>>().join("; ");
     let Some((before, expected)) = lines.rsplit_once("expected ") else {
         return lines;
@@ -53,7 +53,7 @@ pub(super) fn plain_types(message: &str) -> String {
 }
 
 /// Whether a name can be part of a file name.
-pub(super) fn is_file_stem(name: &str) -> bool {
+pub fn is_file_stem(name: &str) -> bool {
     (1..=100).contains(&name.len())
         && name.starts_with(|c: char| c.is_ascii_alphanumeric())
         && name
@@ -62,7 +62,7 @@ pub(super) fn is_file_stem(name: &str) -> bool {
 }
 
 /// Formats a box by its corners.
-pub(super) fn extent(bounds: Option<Bounds>) -> String {
+pub fn extent(bounds: Option<Bounds>) -> String {
     bounds.map_or_else(
         || "nothing".to_owned(),
         |b| {
@@ -73,7 +73,7 @@ pub(super) fn extent(bounds: Option<Bounds>) -> String {
 }
 
 /// Formats an error and its sources in one line.
-pub(super) fn chain(error: &dyn std::error::Error) -> String {
+pub fn chain(error: &dyn std::error::Error) -> String {
     let mut text = error.to_string();
     let mut source = error.source();
     while let Some(cause) = source {

@@ -4,6 +4,7 @@ mod expected;
 mod water;
 
 use std::{fs, path::PathBuf, sync::atomic::AtomicBool, time::Instant};
+use swell_files::scene_to_toml;
 
 use serde_json::{Value, json};
 
@@ -505,14 +506,14 @@ fn open_cache(
     parent: &Option<Parent>,
 ) -> Result<(CacheWriter, Clock, Particles), BakeError> {
     let scene = &request.scene;
-    let text = scene.to_toml(&swell_scene::asset_path);
+    let text = scene_to_toml(scene, &swell_scene::asset_path);
     let manifest = Manifest {
         format_version: Manifest::FORMAT_VERSION,
         program: swell_domain::PROGRAM.into(),
         program_version: swell_domain::VERSION.into(),
         shaders: device.shaders.clone(),
         shot: scene.shot.name.clone(),
-        scene_hash: swell_scene::physics_hash(scene),
+        scene_hash: swell_files::physics_hash(scene),
         solver: scene.solver.method.name().into(),
         device: device.name.clone(),
         driver: device.driver.clone(),
@@ -534,7 +535,7 @@ fn open_cache(
     let directory = &request.directory;
     if swell_cache::exists(directory) && request.resume {
         let cached = CacheReader::open(directory)?;
-        if let Some(difference) = swell_scene::physics_difference(cached.scene_toml(), &text)? {
+        if let Some(difference) = swell_files::physics_difference(cached.scene_toml(), &text)? {
             return Err(BakeError::OtherPhysics {
                 directory: directory.clone(),
                 difference,

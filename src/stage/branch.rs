@@ -5,6 +5,7 @@ use std::{
     fmt,
     path::PathBuf,
 };
+use swell_files::scene_to_toml;
 
 use glam::Vec3;
 
@@ -164,8 +165,8 @@ impl Branch {
         if origin != scene.origin {
             notes.push("positions are rounded about another origin: the domain differs".to_owned());
         }
-        let text = scene.to_toml(&swell_scene::asset_path);
-        let physics = swell_scene::physics_difference(cache.scene_toml(), &text);
+        let text = scene_to_toml(scene, &swell_scene::asset_path);
+        let physics = swell_files::physics_difference(cache.scene_toml(), &text);
         notes.extend(physics.map_err(|source| BranchError::Scene {
             file: from.directory.clone(),
             source,

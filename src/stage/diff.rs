@@ -10,6 +10,7 @@ use std::{
     fs,
     path::{Path, PathBuf},
 };
+use swell_files::recorded_scene;
 
 use serde::Serialize;
 
@@ -23,8 +24,9 @@ use swell_domain::{
     solver::StepReport,
     tolerance::{PictureLimits, Tolerance},
 };
+use swell_files::physics_difference;
 use swell_render::RenderError;
-use swell_scene::{Scene, SceneError, physics_difference};
+use swell_scene::{Scene, SceneError};
 use swell_study::measure::Gauge;
 
 pub use against_baseline::{Written, write_baseline};
@@ -267,7 +269,7 @@ fn physics(file: &Path, old: &str, new: &str) -> Result<Option<String>, DiffErro
 /// The cache's own copy of its scene.
 fn scene_of(cache: &CacheReader) -> Result<Scene, DiffError> {
     let file = cache.dir().join("scene.toml");
-    Scene::recorded(cache.scene_toml(), &file, cache.dir()).map_err(|source| DiffError::Scene {
+    recorded_scene(cache.scene_toml(), &file, cache.dir()).map_err(|source| DiffError::Scene {
         file: cache.dir().to_owned(),
         source,
     })

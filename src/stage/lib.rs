@@ -23,22 +23,20 @@ mod watch;
 pub mod whitewater;
 
 use std::path::Path;
+use swell_files::recorded_scene;
 
 use swell_cache::{CacheError, CacheReader};
 use swell_domain::{frame_range::FrameRange, signed_distance::SignedDistanceError};
+use swell_files::study::{StudyFileError, tune::TuneError};
 use swell_gpu::{adapter::GpuError, shader::ShadersError};
 use swell_reference::ReferenceError;
-use swell_scene::{
-    Scene, SceneError,
-    look::LookError,
-    study::{StudyFileError, tune::TuneError},
-};
+use swell_scene::{Scene, SceneError, look::LookError};
 use swell_solve::SolveError;
 
 /// The cache's own copy of its scene: what was baked, wherever the cache has been moved.
 fn baked_scene(cache: &CacheReader, directory: &Path) -> Result<Scene, SceneError> {
     let file = directory.join("scene.toml");
-    Scene::recorded(cache.scene_toml(), &file, directory)
+    recorded_scene(cache.scene_toml(), &file, directory)
 }
 
 /// The requested frames of a cache; by default all frames after its first that have particles.

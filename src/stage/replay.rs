@@ -2,6 +2,8 @@
 //! went wrong.
 
 use std::{fmt, path::Path};
+use swell_files::recorded_scene;
+use swell_files::scene_to_toml;
 
 use glam::{DVec3, Vec3};
 use serde_json::json;
@@ -383,7 +385,7 @@ pub(super) fn keep(
         "pass": place.map(|p| json!({ "name": p.pass, "substep": p.substep, "buffer": p.buffer })),
     });
     let failed = Failed {
-        scene_toml: scene.to_toml(&swell_scene::asset_path),
+        scene_toml: scene_to_toml(scene, &swell_scene::asset_path),
         start: state,
         last_frame: last,
         report,
@@ -453,7 +455,7 @@ pub fn replay_failed(directory: &Path, gpu: &Gpu) -> Result<Replayed, ReplayErro
     // The mesh files are in the cache that contains this folder.
     let cached = CacheReader::open(&directory.join(".."))?;
     let file = directory.join("scene.toml");
-    let scene = Scene::recorded(&scene_toml, &file, cached.dir())?;
+    let scene = recorded_scene(&scene_toml, &file, cached.dir())?;
     let start = Start::of_cache::<ReplayError>(&scene, &cached)?;
     if let Some(adapter) = &gpu.adapter {
         check_request(adapter)?;

@@ -27,11 +27,9 @@ use swell_domain::{
     particles::Particles,
     whitewater::{self, Births, Settings, Source, Thresholds},
 };
+use swell_files::whitewater::{WhitewaterSettings, written_out};
 use swell_gpu::adapter::Needs;
-use swell_scene::{
-    Scene,
-    whitewater::{WhitewaterSettings, written_out},
-};
+use swell_scene::Scene;
 
 use super::{
     device::{Device, Identity, PassTimes},

@@ -4,6 +4,7 @@ use std::{
     fmt::{self, Write},
     path::Path,
 };
+use swell_files::load_look_within;
 
 use super::{InspectArgs, misplaced};
 use crate::{Failure, bake, count, is_cache, named_adapter, size};
@@ -97,7 +98,7 @@ pub(super) fn planned(
     args: &InspectArgs,
     file: &Path,
 ) -> Result<(Look, Subject, LookPlan), Failure> {
-    let look = Look::load_within(file, bake::reach(args.allow_outside))?;
+    let look = load_look_within(file, bake::reach(args.allow_outside))?;
     let has_scene_options = !args.set.is_empty() || args.solver.is_some();
     let subject = match &args.scene {
         Some(cache) if is_cache(cache) && !has_scene_options => Subject::Cache(cache.clone()),

@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 
 use super::{InspectArgs, refuse_options};
 use crate::{Failure, bake, count};
-use swell_scene::study::Study;
+use swell_files::study::Study;
 use swell_stage::inspect::study::Outline;
 
 /// Whether a file is a study: it sets `kind` before its first table. False for an unreadable file.

@@ -1,6 +1,6 @@
 //! Finds by bisection how far a setting can go before a mark is missed.
 
-use swell_scene::study::stability::{Limit, Search, Trial};
+use swell_files::study::stability::{Limit, Search, Trial};
 
 use super::{
     super::{PointStatus, StudyError, engine::Bench, ledger::Ledger},

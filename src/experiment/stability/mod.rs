@@ -8,14 +8,12 @@ mod verdict;
 mod view;
 mod watch;
 
-use swell_gpu::adapter::Needs;
-use swell_scene::{
-    Scene,
-    study::{
-        RunsOn,
-        stability::{Bound, Held, Stability, Trial},
-    },
+use swell_files::study::{
+    RunsOn,
+    stability::{Bound, Held, Stability, Trial},
 };
+use swell_gpu::adapter::Needs;
+use swell_scene::Scene;
 
 use super::{
     PointStatus, StudyError,

@@ -1,12 +1,10 @@
 //! Table and page of a stability study.
 
-use swell_scene::{
-    Method,
-    study::{
-        RunsOn,
-        stability::{Bound, Case, Held, Limit, Mark, Quantity, Search, Stability},
-    },
+use swell_files::study::{
+    RunsOn,
+    stability::{Bound, Case, Held, Limit, Mark, Quantity, Search, Stability},
 };
+use swell_scene::Method;
 use swell_study::{
     chart::{self, Chart, Series},
     page::{Part, Tone},
@@ -513,7 +511,7 @@ const MEASURED: &str = "A run is measured after each output frame, from its part
     means and ratios over time the last. d is the particle spacing, Δx the cell size; d or Δx is d \
     with PBF and Δx with FLIP. A run beside another goes frame by frame with it, and particles are \
     matched by where they start. Energy is that of motion and of height over the domain's floor. \
-    The definitions are at swell::scene::study::stability::Quantity.";
+    The definitions are at swell::files::study::stability::Quantity.";
 
 const LIMITS: &str = "Found by bisection by ratio between a value that passes and one that fails, \
     on the GPU; a limit is that of one scene, and no promise for others.";

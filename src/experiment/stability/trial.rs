@@ -2,7 +2,7 @@
 
 use std::{sync::atomic::AtomicBool, time::Instant};
 
-use swell_scene::study::{
+use swell_files::study::{
     RunsOn,
     stability::{Attempt, Trial},
 };

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use swell_scene::study::stability::{Mark, Trial};
+use swell_files::study::stability::{Mark, Trial};
 
 use super::{super::PointStatus, report};
 

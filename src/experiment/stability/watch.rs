@@ -3,10 +3,8 @@
 use glam::DVec3;
 
 use swell_domain::{bounds::Bounds, probe::energies, solver::StepReport};
-use swell_scene::{
-    Scene,
-    study::stability::{Mark, Other, Over, Quantity},
-};
+use swell_files::study::stability::{Mark, Other, Over, Quantity};
+use swell_scene::Scene;
 use swell_study::stability::{Flight, filled_volume, least_spacing, matched, outside, point};
 
 use super::view::View;

@@ -1,6 +1,6 @@
 //! Table, curves and page of a study of the drawn surface.
 
-use swell_scene::study::{
+use swell_files::study::{
     RunsOn,
     surface::{PictureError, SurfaceStudy},
 };

@@ -3,15 +3,12 @@
 use glam::{DVec3, Vec3};
 
 use swell_domain::particles::Particles;
+use swell_files::study::sweep::{ErrorMeasure, Measure, Point, SAMPLES, Sweep};
 use swell_reference::{
     neighbors::{Cells, Crowd, Neighbors},
     pbf::constraint::distance_to_converged,
 };
-use swell_scene::{
-    Method, Scene,
-    flip::Preconditioner,
-    study::sweep::{ErrorMeasure, Measure, Point, SAMPLES, Sweep},
-};
+use swell_scene::{Method, Scene, flip::Preconditioner};
 use swell_stage::{
     device::Opened,
     drive::{Drive, Step},

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use swell_scene::study::sweep::ErrorMeasure;
+use swell_files::study::sweep::ErrorMeasure;
 
 /// Results of a point of a sweep.
 pub(super) type Run = super::super::Run<Measured>;

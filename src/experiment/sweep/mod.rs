@@ -7,8 +7,8 @@ mod projection;
 mod report;
 mod words;
 
+use swell_files::study::sweep::{ErrorMeasure, Line, Measure, Point, Sweep};
 use swell_gpu::adapter::Needs;
-use swell_scene::study::sweep::{ErrorMeasure, Line, Measure, Point, Sweep};
 use swell_stage::{gauge, prepare::Start};
 use swell_study::measure::Gauge;
 

@@ -9,12 +9,13 @@ use swell_domain::{
     poisson::{Cells, System},
     solver::Solver,
 };
+use swell_files::study::sweep::Point;
 use swell_gpu::adapter::Context;
 use swell_reference::{
     ReferenceError,
     poisson::{self, gradients::norm},
 };
-use swell_scene::{flip::Surface, study::sweep::Point};
+use swell_scene::flip::Surface;
 use swell_solve::{
     SolveError,
     flip::{

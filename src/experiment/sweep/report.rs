@@ -1,11 +1,10 @@
 //! Table, curves and page of a sweep.
 
 use std::collections::BTreeMap;
+use swell_files::scene_to_toml;
 
-use swell_scene::{
-    Iteration, Method, Scene, Stop, asset_path,
-    study::sweep::{ErrorMeasure, Line, Measure, Point, Sweep},
-};
+use swell_files::study::sweep::{ErrorMeasure, Line, Measure, Point, Sweep};
+use swell_scene::{Iteration, Method, Scene, Stop, asset_path};
 use swell_study::{
     chart::{Chart, Dot, Mark, Series},
     convergence_point::{Reading, TABLE_1, convergence_point},
@@ -478,7 +477,7 @@ impl Results<'_> {
         if let Some(point) = self.sweep.points().next() {
             let told = "The scene of the first point, every default written out:";
             run.push(Part::Text(told.into()));
-            run.push(Part::Code(point.scene.to_toml(&asset_path)));
+            run.push(Part::Code(scene_to_toml(&point.scene, &asset_path)));
         }
         parts.push(Part::Folded("What was run".into(), run));
         let measured = self.measured().into_iter().map(Part::Text).collect();

@@ -1,6 +1,6 @@
 //! Explanations of how a sweep was measured.
 
-use swell_scene::study::sweep::{FRAME_RATE, Measure, SAMPLES};
+use swell_files::study::sweep::{FRAME_RATE, Measure, SAMPLES};
 
 use super::report::Results;
 

@@ -4,13 +4,11 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use swell_domain::probe::run_up;
-use swell_scene::{
-    Scene,
-    study::{
-        RunsOn,
-        tune::{Quantity, Tune, Variant},
-    },
+use swell_files::study::{
+    RunsOn,
+    tune::{Quantity, Tune, Variant},
 };
+use swell_scene::Scene;
 use swell_stage::{
     drive::{Drive, Step},
     prepare::Start,

@@ -10,14 +10,14 @@ mod write;
 
 use std::borrow::Cow;
 
-use swell_gpu::adapter::Needs;
-use swell_scene::{
+use swell_files::{
     physics_hash,
     study::{
         RunsOn,
         tune::{Bound, Knob, Limit, Setting, Tune, Variant},
     },
 };
+use swell_gpu::adapter::Needs;
 use swell_stage::{gauge, prepare::Start};
 use swell_study::{
     measure::Gauge,

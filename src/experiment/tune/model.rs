@@ -1,6 +1,6 @@
 //! Models of error and time fitted to the variants of a shot.
 
-use swell_scene::study::tune::{Knob, Quantity, Setting, Tune};
+use swell_files::study::tune::{Knob, Quantity, Setting, Tune};
 use swell_study::tune::{Effect, Law, Model, Proposal};
 
 use super::{Role, Trial, measured::Run};
@@ -190,7 +190,7 @@ impl Fitted<'_> {
 mod tests {
     use std::{borrow::Cow, path::Path};
 
-    use swell_scene::{
+    use swell_files::{
         Reach,
         study::tune::{TuneRequest, Variant},
     };

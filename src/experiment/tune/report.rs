@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use swell_scene::study::{
+use swell_files::study::{
     RunsOn,
     tune::{Bound, Limit, Quantity, Setting},
 };

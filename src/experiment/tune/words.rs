@@ -1,6 +1,6 @@
 //! Formats numbers and settings of a tuned shot as text.
 
-use swell_scene::study::tune::{Bound, Limit, Quantity};
+use swell_files::study::tune::{Bound, Limit, Quantity};
 use swell_study::tune::Law;
 
 use super::{super::sweep::digits::significant, Results, Trial, model::floor};

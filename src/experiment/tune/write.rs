@@ -4,13 +4,14 @@ use std::{
     fs, io,
     path::{Path, PathBuf},
 };
+use swell_files::parse_scene_within;
 
-use swell_scene::{
-    Scene,
+use swell_files::{
     edit::{Setting, with_settings},
     physics_hash,
     study::tune::Tune,
 };
+use swell_scene::Scene;
 
 use super::{super::StudyError, Results, Trial};
 
@@ -51,7 +52,7 @@ pub(super) fn write(results: &Results<'_>, command: &str) -> Result<Option<PathB
     let text = header(results, trial, command) + &text;
     // Parses the text again to verify that it describes the scene that was run.
     let folder = file.parent().unwrap_or(Path::new(""));
-    let read = Scene::parse_within(&text, file, folder, &[], tune.request.reach);
+    let read = parse_scene_within(&text, file, folder, &[], tune.request.reach);
     let is_it = |scene: &Scene| physics_hash(scene) == physics_hash(&trial.variant.scene);
     if !read.as_ref().is_ok_and(is_it) {
         let why = read.err().map_or(String::new(), |e| format!(": {e}"));

@@ -11,8 +11,8 @@ use std::{collections::BTreeMap, sync::atomic::AtomicBool};
 
 use serde::{Deserialize, Serialize};
 
+use swell_files::study::validation::{Benchmark, Trial, Validation};
 use swell_gpu::adapter::Needs;
-use swell_scene::study::validation::{Benchmark, Trial, Validation};
 use swell_stage::{drive::Drive, prepare::Start};
 
 use super::{
@@ -31,10 +31,10 @@ pub type Run = super::Run<Measured>;
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Measured {
     /// Values by the names in
-    /// [`Measure::numbers`](swell_scene::study::validation::Measure::numbers), without those that
+    /// [`Measure::numbers`](swell_files::study::validation::Measure::numbers), without those that
     /// cannot be determined.
     pub numbers: BTreeMap<String, f64>,
-    /// Curves by the names in [`Measure::curves`](swell_scene::study::validation::Measure::curves).
+    /// Curves by the names in [`Measure::curves`](swell_files::study::validation::Measure::curves).
     pub curves: BTreeMap<String, Vec<(f64, f64)>>,
 }
 

@@ -5,7 +5,8 @@ use std::f64::consts::{PI, TAU};
 use glam::DVec2;
 
 use swell_domain::motion::{Motion, wave_number};
-use swell_scene::{Method, Scene, WaveMaker, study::validation::Measure};
+use swell_files::study::validation::Measure;
+use swell_scene::{Method, Scene, WaveMaker};
 use swell_study::waves;
 
 use super::{

@@ -7,11 +7,8 @@ use swell_domain::{
     particles::Particles,
     probe::{elevation, front, volume as volume_of},
 };
-use swell_scene::{
-    Scene,
-    probe::ProbeKind,
-    study::validation::{Benchmark, Measure},
-};
+use swell_files::study::validation::{Benchmark, Measure};
+use swell_scene::{Scene, probe::ProbeKind};
 use swell_stage::drive::Step;
 
 /// Fraction of the water behind the front, so that single particles running ahead do not count.

@@ -1,6 +1,6 @@
 //! Table and page of a validation study.
 
-use swell_scene::study::{
+use swell_files::study::{
     RunsOn,
     validation::{Benchmark, Bound, Gate, Trial, Validation},
 };

@@ -5,10 +5,8 @@ use std::f64::consts::{PI, TAU};
 use glam::{DVec3, Vec3};
 
 use swell_domain::particles::Particles;
-use swell_scene::{
-    Scene,
-    study::validation::{Benchmark, Measure},
-};
+use swell_files::study::validation::{Benchmark, Measure};
+use swell_scene::Scene;
 
 /// Moves the scene's particles to the initial state of the benchmark and sets their velocities.
 pub(super) fn prepare(benchmark: &Benchmark, scene: &Scene, particles: &mut Particles) {

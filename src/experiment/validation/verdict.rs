@@ -1,6 +1,6 @@
 //! Judges the gates of a benchmark.
 
-use swell_scene::study::validation::{Benchmark, Bound, Gate, Trial};
+use swell_files::study::validation::{Benchmark, Bound, Gate, Trial};
 use swell_study::waves;
 
 use super::{super::stability::Verdict, Run};
@@ -97,7 +97,7 @@ mod tests {
 
     use super::*;
     use crate::validation::Measured;
-    use swell_scene::study::Study;
+    use swell_files::study::Study;
 
     fn benchmark(name: &str) -> Benchmark {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/studies");

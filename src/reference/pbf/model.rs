@@ -340,6 +340,7 @@ mod tests {
     use std::{f64::consts::PI, path::Path};
 
     use super::*;
+    use swell_files::parse_scene;
 
     fn model() -> Model {
         let text = r#"
@@ -358,7 +359,7 @@ mod tests {
             [solver.pbf]
             particle_spacing = 0.1
         "#;
-        let scene = Scene::parse(text, Path::new("walls.toml"), Path::new("."), &[]);
+        let scene = parse_scene(text, Path::new("walls.toml"), Path::new("."), &[]);
         Model::new(&scene.expect("a scene"), &Boundary::default())
     }
 

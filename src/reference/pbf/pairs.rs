@@ -189,7 +189,7 @@ mod tests {
         pbf::{Model, Sorted, Substep},
     };
     use swell_domain::{boundary::Boundary, lanes::widely};
-    use swell_scene::Scene;
+    use swell_files::parse_scene;
 
     /// Roundings of a term: of a vector and its length, of the kernel's argument, of powers and
     /// products.
@@ -202,7 +202,7 @@ mod tests {
             [[water.block]]\nmin = [0.0, 0.0, 0.0]\nmax = [0.5, 0.5, 0.5]\n\
             [solver]\nmethod = \"pbf\"\n[solver.pbf]\nparticle_spacing = 0.1\n\
             artificial_pressure = 0.1\n";
-        let scene = Scene::parse(text, Path::new("lanes.toml"), Path::new("."), &[]).unwrap();
+        let scene = parse_scene(text, Path::new("lanes.toml"), Path::new("."), &[]).unwrap();
         let mut model = Model::new(&scene, &Boundary::default());
         let uneven = |k: usize| DVec3::new(0.31, 0.17, 0.23) * (k * k % 97) as f64 * 1e-3;
         let place =

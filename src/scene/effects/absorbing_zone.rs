@@ -3,16 +3,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{
-    super::{
-        Wall,
-        document::Document,
-        error::SceneError,
-        key::{Key, words},
-    },
-    Absorbs, Effect, Surroundings,
-    zone::Zone,
-};
+use super::{Absorbs, Effect, zone::Zone};
+use crate::Wall;
 
 /// Relaxation rate at the wall over the angular frequency of the waves.
 ///
@@ -50,30 +42,6 @@ impl Settings {
 }
 
 impl Effect for Settings {
-    const ABOUT: &'static str =
-        "Zones before walls in which waves die out (a sponge layer, Israeli and Orszag 1981)";
-
-    const KEYS: &'static [Key] = &[
-        Key::choices("walls", &words(&Wall::NAMED))
-            .also(", each once, none of them periodic or a wave maker's")
-            .about("the walls, whose wave is not turned back"),
-        Key::number("length", 1e-7..=1e6)
-            .unit("metres")
-            .also(", at least two particle spacings and no longer than the domain is")
-            .about(
-                "of each zone from its wall; one and a half wave lengths turn back less than \
-                    5 % of a wave's height",
-            ),
-        Key::number("period", 1e-6..=1e6).unit("s").about(
-            "of the longest waves that have to die out: velocities fall by 5π/period at the \
-                    wall, and by the square of the way into the zone before it",
-        ),
-    ];
-
-    fn check(&self, doc: &Document<'_>, around: &Surroundings<'_>) -> Result<(), SceneError> {
-        self.zone().check(doc, "effects.absorbing_zone", around)
-    }
-
     fn absorbs(&self) -> Option<Absorbs<'_>> {
         Some(Absorbs {
             zone: self.zone(),

@@ -5,10 +5,8 @@ use std::f64::consts::PI;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-use super::{
-    super::{key::Key, words::shown},
-    Effect, Grain, Push,
-};
+use super::{Effect, Grain, Push};
+use crate::words::shown;
 use swell_domain::air;
 
 /// `drag = { drop_radius = 0.001, wind = [8.0, 0.0, 0.0] }`.
@@ -29,21 +27,6 @@ impl Settings {
 }
 
 impl Effect for Settings {
-    const ABOUT: &'static str = "Drag of air on drops and thin sheets (Schiller and Naumann 1933)";
-
-    const KEYS: &'static [Key] = &[
-        Key::number("drop_radius", 1e-6..=10.0)
-            .unit("metres")
-            .about(
-                "of the drops that a particle stands for which flies alone; the \
-                    air slows small ones more",
-            ),
-        Key::vector("wind", 3, -1e3..=1e3)
-            .unit("m/s")
-            .default("[0.0, 0.0, 0.0]")
-            .about("velocity of the air"),
-    ];
-
     fn looks_at_neighbors(&self) -> bool {
         true
     }

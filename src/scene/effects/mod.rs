@@ -1,43 +1,20 @@
 //! Effects that a scene may name under `[effects]`: one entry in a list, and one
 //! file in each crate.
 //!
-//! An effect's file here holds its settings and their keys. Its contribution to each solver is in a
-//! file of the same name in `solve::effects`, the `f64` reference passes are in `reference`, and
-//! the comparison of the two is in `check`.
+//! An effect's file here holds its settings and their properties. Its keys are in a file of the same
+//! name in `files::effects`, its contribution to each solver in `solve::effects`, the `f64` reference
+//! passes in `reference`, and the comparison of the two in `check`.
 
 pub mod zone;
 
 use glam::DVec3;
 
-use super::{WaveMaker, document::Document, error::SceneError, key::Key, lint::Made};
-use swell_domain::{bounds::Bounds, open_waves::OpenWaves};
+use super::lint::Made;
+use swell_domain::open_waves::OpenWaves;
 use zone::Zone;
 
-/// Parts of a scene that an effect is checked against.
-pub(super) struct Surroundings<'a> {
-    pub(super) domain: &'a Bounds,
-    pub(super) periodic: [bool; 3],
-    pub(super) wave_makers: &'a [WaveMaker],
-    /// Gravitational acceleration, m/s².
-    pub(super) gravity: DVec3,
-    /// Least length of a zone, metres: two particle spacings.
-    pub(super) least_length: f64,
-    /// Whether the solver projects velocities on a grid.
-    pub(super) has_projection: bool,
-}
-
-/// Settings of an effect, with its keys and properties.
+/// Properties of an effect's settings.
 pub(super) trait Effect {
-    /// Description for the page of keys.
-    const ABOUT: &'static str;
-    /// The effect's keys.
-    const KEYS: &'static [Key];
-
-    /// Rejects settings that do not fit the scene.
-    fn check(&self, _: &Document<'_>, _: &Surroundings<'_>) -> Result<(), SceneError> {
-        Ok(())
-    }
-
     /// Returns the part of the effect that acts on PBF's projection grid as it does on FLIP's.
     fn on_projection(&self) -> Option<Self>
     where
@@ -100,24 +77,24 @@ pub(super) trait Effect {
 
 /// Scales by which the numbers of an effect are judged.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Grain {
+pub struct Grain {
     /// Density of the water, kg/m³.
-    pub(super) density: f64,
+    pub density: f64,
     /// Magnitude of gravity, m/s².
-    pub(super) gravity: f64,
+    pub gravity: f64,
     /// Particle spacing, metres.
-    pub(super) spacing: f64,
+    pub spacing: f64,
     /// Edge of a cell of the pressure grid, metres.
-    pub(super) cell: f64,
+    pub cell: f64,
 }
 
 /// Bounds on the acceleration of particles by an effect.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Push {
+pub struct Push {
     /// Largest acceleration, m/s².
-    pub(super) acceleration: f64,
+    pub acceleration: f64,
     /// Largest total gain of speed, m/s.
-    pub(super) speed: f64,
+    pub speed: f64,
 }
 
 impl Push {
@@ -167,23 +144,6 @@ macro_rules! effects {
             /// Keys of all effects.
             pub const NAMES: &[&str] = &[$(stringify!($name)),+];
 
-            /// Keys of each effect in a table of its own.
-            pub(super) const KEYS: &[Key] = &[$(
-                Key::inline(stringify!($name), <$name::Settings as Effect>::KEYS)
-                    .absent()
-                    .about(<$name::Settings as Effect>::ABOUT)
-            ),+];
-
-            /// Rejects settings that do not fit the scene.
-            pub(super) fn check(
-                &self,
-                doc: &Document<'_>,
-                around: &Surroundings<'_>,
-            ) -> Result<(), SceneError> {
-                $(self.$name.iter().try_for_each(|settings| settings.check(doc, around))?;)+
-                Ok(())
-            }
-
             /// Returns whether an effect is solved between two projections.
             pub fn act_between_projections(&self) -> bool {
                 false$(|| self.$name.as_ref().is_some_and(Effect::acts_between_projections))+
@@ -203,7 +163,7 @@ macro_rules! effects {
             }
 
             /// Returns the sum of the accelerations of all enabled effects.
-            pub(super) fn push(&self) -> Push {
+            pub fn push(&self) -> Push {
                 let mut all = Push::default();
                 $(
                     let push = self.$name.as_ref().map(Effect::push).unwrap_or_default();
@@ -215,7 +175,7 @@ macro_rules! effects {
 
             /// Returns the speed that energy released by the enabled effects may
             /// give to water, m/s.
-            pub(super) fn frees(&self, grain: Grain) -> f64 {
+            pub fn frees(&self, grain: Grain) -> f64 {
                 let mut all = 0.0;
                 $(all += self.$name.as_ref().map_or(0.0, |settings| settings.frees(grain));)+
                 all

@@ -5,10 +5,8 @@ use std::f64::consts::{PI, TAU};
 
 use serde::{Deserialize, Serialize};
 
-use super::{
-    super::{document::Document, error::SceneError, key::Key, words::shown},
-    Effect, Grain, Surroundings,
-};
+use super::{Effect, Grain};
+use crate::words::shown;
 
 /// Bond number ρ g d² / σ of a particle spacing d above which surface tension has no visible
 /// effect: the features that it shapes, about a capillary length wide, are smaller than a particle.
@@ -23,26 +21,8 @@ pub struct Settings {
 }
 
 impl Effect for Settings {
-    const ABOUT: &'static str =
-        "Surface tension, as the jump of the pressure at the surface (Kang, Fedkiw and Liu 2000)";
-
-    const KEYS: &'static [Key] = &[Key::number("coefficient", 1e-9..=1e6).unit("N/m").about(
-        "σ, of water in air 0.0728 at 20 °C; a substep is no longer than √(ρ Δx³ / (2π σ))",
-    )];
-
     fn on_projection(&self) -> Option<Self> {
         Some(self.clone())
-    }
-
-    fn check(&self, doc: &Document<'_>, around: &Surroundings<'_>) -> Result<(), SceneError> {
-        match around.has_projection {
-            true => Ok(()),
-            false => Err(doc.fault_of_plain(
-                "effects.surface_tension",
-                "is part of the projection, which solver.pbf.grid_projection = false turns off: \
-                 set it to true",
-            )),
-        }
     }
 
     fn lint(&self, grain: Grain) -> Option<String> {

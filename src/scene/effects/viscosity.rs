@@ -2,10 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{
-    super::{document::Document, error::SceneError, key::Key, words::shown},
-    Effect, Grain, Surroundings,
-};
+use super::{Effect, Grain};
+use crate::words::shown;
 use swell_domain::relaxation::Relaxation;
 
 /// Reynolds number √(g Δx) Δx / ν of a cell above which a viscosity ν has no visible effect. The
@@ -14,7 +12,7 @@ use swell_domain::relaxation::Relaxation;
 const MOST_REYNOLDS: f64 = 1000.0;
 
 /// Default of `tolerance`.
-const TOLERANCE: f64 = 1e-3;
+pub const TOLERANCE: f64 = 1e-3;
 
 /// `viscosity = { coefficient = 10.0 }`, or `viscosity = { xsph = 0.01 }`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -86,50 +84,6 @@ impl Settings {
 }
 
 impl Effect for Settings {
-    const ABOUT: &'static str = "viscosity: of so many Pa s (Batty and Bridson 2008), or XSPH's \
-        (Schechter and Bridson 2012)";
-
-    const KEYS: &'static [Key] = &[
-        Key::number("coefficient", 1e-6..=1e9)
-            .unit("Pa s")
-            .absent()
-            .without(&["xsph"])
-            .about(
-                "μ, solved implicitly on FLIP's grid, or on that of PBF's projection; water \
-                    holds to solids, and to the walls of `domain.no_slip`",
-            ),
-        Key::number("tolerance", 1e-6..=0.5)
-            .computed(|| TOLERANCE.to_string())
-            .with("coefficient")
-            .about(
-                "to which part of what it was a substep's solve brings the \
-                    error of the velocities",
-            ),
-        // Below a millionth, a frame of 32-bit velocities hardly changes.
-        Key::number("xsph", 1e-6..=1.0)
-            .absent()
-            .without(&["coefficient"])
-            .about(
-                "c, the part of the neighbours' mean relative velocity that a substep of PBF, \
-                    or a frame of FLIP, takes over",
-            ),
-    ];
-
-    fn check(&self, doc: &Document<'_>, around: &Surroundings<'_>) -> Result<(), SceneError> {
-        match (self.coefficient, self.xsph) {
-            (None, None) => Err(doc.fault_of_plain(
-                "effects.viscosity",
-                "neither coefficient (Pa s) nor xsph is given; give one of them",
-            )),
-            (Some(_), _) if !around.has_projection => Err(doc.fault_of_plain(
-                "effects.viscosity.coefficient",
-                "it is solved on the grid of PBF's projection, which solver.pbf.grid_projection = \
-                 false turns off: set it to true",
-            )),
-            _ => Ok(()),
-        }
-    }
-
     /// The grid already holds XSPH's mean of the neighbours' velocities, so c adds to the PIC blend
     /// and needs no pass of its own.
     fn blend(&self) -> f64 {

@@ -3,10 +3,7 @@
 
 use glam::DVec3;
 
-use super::{
-    super::{Wall, document::Document, error::SceneError, words::shown},
-    Surroundings,
-};
+use crate::Wall;
 
 /// Zones of equal length in front of some walls of the domain.
 #[derive(Clone, Copy, Debug)]
@@ -43,50 +40,5 @@ impl Zone<'_> {
     /// Returns the mask of the zone's walls, made of [`Wall::bit`].
     pub fn bits(&self) -> u32 {
         self.walls.iter().map(Wall::bit).sum()
-    }
-
-    /// Rejects walls and lengths that do not fit the scene; `effect` is the zone's key.
-    pub(super) fn check(
-        &self,
-        doc: &Document<'_>,
-        effect: &str,
-        around: &Surroundings<'_>,
-    ) -> Result<(), SceneError> {
-        let refuse = |problem: String| Err(doc.fault_of(&format!("{effect}.walls"), problem));
-        let length = |problem: String| Err(doc.fault_of(&format!("{effect}.length"), problem));
-        if self.walls.is_empty() {
-            return refuse("names no wall".to_owned());
-        }
-        if self.length < around.least_length {
-            let problem = format!(
-                "a zone of {} m is shorter than two particle spacings, {} m",
-                shown(self.length),
-                shown(around.least_length)
-            );
-            return length(problem);
-        }
-        for (index, wall) in self.walls.iter().enumerate() {
-            let name = wall.name();
-            if self.walls[..index].contains(wall) {
-                return refuse(format!("{name:?} is listed twice"));
-            }
-            if around.periodic[wall.axis] {
-                let problem = "domain.periodic joins both ends";
-                return refuse(format!("there is no wall {name}: {problem}"));
-            }
-            if around.wave_makers.iter().any(|maker| maker.wall == *wall) {
-                return refuse(format!("the wall {name} is a wave maker's"));
-            }
-            let room = around.domain.size()[wall.axis];
-            if self.length > room {
-                let problem = format!(
-                    "the domain reaches {} m from the wall {name}, but the zone is {} m long",
-                    shown(room),
-                    shown(self.length)
-                );
-                return length(problem);
-            }
-        }
-        Ok(())
     }
 }

@@ -4,7 +4,7 @@
 use glam::DVec3;
 
 use super::{
-    super::{Scene, Shot, WaveMaker, regular_waves::HIGHEST, seas::STEEPEST, words::shown},
+    super::{Scene, Shot, WaveMaker, waves::HIGHEST, waves::STEEPEST, words::shown},
     Still,
 };
 use swell_domain::{

@@ -7,6 +7,12 @@ use serde::Deserialize;
 
 use crate::Wall;
 
+/// Largest number of samples per pixel.
+pub const MOST_SAMPLES: u32 = 1024;
+
+/// Largest number of voxels per particle spacing.
+pub const MOST_VOXELS: f64 = 8.0;
+
 /// A look file.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -457,7 +463,12 @@ pub struct ViewSpec {
 
 impl Default for ViewSpec {
     fn default() -> Self {
-        super::default_of(super::keys::VIEW)
+        Self {
+            exposure_stops: 0.0,
+            transform: TransformSpec::Agx,
+            saturation: 1.0,
+            contrast: 1.0,
+        }
     }
 }
 

@@ -1,6 +1,7 @@
 //! `bake --dry-run`: predicts a bake without a device and without writing anything.
 
 use std::io;
+use swell_files::scene_to_toml;
 
 use super::{
     BakeError, Beginning, Request, beginning, check_count, check_first, grid_record, last_frame,
@@ -86,8 +87,8 @@ pub fn expected(request: &Request) -> Result<Expected, BakeError> {
     let stands = request.resume && swell_cache::exists(directory);
     let (first, standing) = if stands {
         let cached = CacheReader::open(directory)?;
-        let text = scene.to_toml(&swell_scene::asset_path);
-        if let Some(difference) = swell_scene::physics_difference(cached.scene_toml(), &text)? {
+        let text = scene_to_toml(scene, &swell_scene::asset_path);
+        if let Some(difference) = swell_files::physics_difference(cached.scene_toml(), &text)? {
             return Err(BakeError::OtherPhysics {
                 directory: directory.clone(),
                 difference,

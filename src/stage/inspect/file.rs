@@ -25,7 +25,7 @@ use swell_render::{
 };
 
 pub use swell_domain::mesh_file::vdb::GridFile;
-pub use swell_scene::rig::Rig;
+pub use swell_files::rig::Rig;
 
 /// Content of a file that `inspect` recognises by its extension.
 #[derive(Debug)]

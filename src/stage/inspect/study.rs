@@ -1,6 +1,6 @@
 //! Lists the runs of a study.
 
-use swell_scene::study::{
+use swell_files::study::{
     RunsOn, Study,
     stability::{Case, Held, Limit, Stability},
     sweep::Sweep,
@@ -44,7 +44,7 @@ impl Outline {
             Study::Sweep(it) => ("sweep", swept(it)),
             Study::Stability(it) => ("stability", held(it)),
             Study::Surface(it) => {
-                let part = |line: &swell_scene::study::surface::Line| Part {
+                let part = |line: &swell_files::study::surface::Line| Part {
                     name: line.name.clone(),
                     key: line.key.clone(),
                     points: line.points.iter().map(|it| it.label.clone()).collect(),
@@ -53,7 +53,7 @@ impl Outline {
             }
             Study::Tune(it) => ("tune", tuned(it)),
             Study::Validation(it) => {
-                let part = |benchmark: &swell_scene::study::validation::Benchmark| Part {
+                let part = |benchmark: &swell_files::study::validation::Benchmark| Part {
                     name: benchmark.name.clone(),
                     key: format!("gates: {}", benchmark.gates.len()),
                     points: (benchmark.runs.iter())
@@ -94,7 +94,7 @@ fn on(name: &str, device: RunsOn) -> String {
 }
 
 fn swept(sweep: &Sweep) -> Vec<Part> {
-    let part = |line: &swell_scene::study::sweep::Line| Part {
+    let part = |line: &swell_files::study::sweep::Line| Part {
         name: line.name.clone(),
         key: line.key.clone(),
         points: (line.points.iter())

@@ -8,7 +8,8 @@ use std::{
 use super::{Event, Request, SETTINGS, WhitewaterError, engine::Engine, water::Water};
 use swell_cache::CacheReader;
 use swell_domain::whitewater::{Settings, Thresholds};
-use swell_scene::{Scene, whitewater::WhitewaterSettings};
+use swell_files::whitewater::WhitewaterSettings;
+use swell_scene::Scene;
 
 /// Most frames that a shot's thresholds are calibrated on.
 const CALIBRATED_ON: usize = 16;

@@ -1,9 +1,9 @@
 //! Force and moment of the water on solids and walls, against water at rest.
 
 use std::{fs, path::Path};
+use swell::files::parse_scene;
 
 use crate::support::job::Job;
-use swell::scene::Scene;
 
 /// The unit cube from 0 to 1.
 const CUBE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\n\
@@ -179,7 +179,7 @@ fn a_force_that_cannot_be_is_told() {
     let parse = |line: &str, set: &[&str]| {
         let text = format!("{SCENE}\n[[probe]]\nkind = \"force\"\n{line}\n");
         let set: Vec<_> = set.iter().map(|&s| s.to_owned()).collect();
-        Scene::parse(&text, Path::new("a.toml"), &job.path(""), &set)
+        parse_scene(&text, Path::new("a.toml"), &job.path(""), &set)
     };
     let cases: &[(&str, &[&str], &str, &str)] = &[
         ("", &[], "probe[0].solid", "missing"),
@@ -223,7 +223,7 @@ fn a_force_that_cannot_be_is_told() {
     }
     // PBF has no force probe, and the message says so.
     let text = format!("{}\n[[probe]]\nkind = \"force\"\nsolid = \"-x\"\n", bare());
-    let parse = |set: &[String]| Scene::parse(&text, Path::new("a.toml"), &job.path(""), set);
+    let parse = |set: &[String]| parse_scene(&text, Path::new("a.toml"), &job.path(""), set);
     let error = parse(&["solver.method=pbf".to_owned()])
         .unwrap_err()
         .to_string();

@@ -1,9 +1,10 @@
 //! Probes that sample at substeps: their rates, their windows and the contents of their files.
 
 use std::{fs, path::Path};
+use swell::files::parse_scene;
+use swell::files::scene_to_toml;
 
 use crate::support::job::Job;
-use swell::scene::Scene;
 
 const SCENE: &str = r#"
 [shot]
@@ -206,7 +207,7 @@ fn a_rate_that_cannot_be_is_told() {
     let parse = |line: &str, set: &[&str]| {
         let text = format!("{SCENE}\n[[probe]]\nkind = \"energy\"\n{line}\n");
         let set: Vec<_> = set.iter().map(|&s| s.to_owned()).collect();
-        Scene::parse(&text, Path::new("a.toml"), Path::new(""), &set)
+        parse_scene(&text, Path::new("a.toml"), Path::new(""), &set)
     };
     let cases: &[(&str, &[&str], &str, &str)] = &[
         ("rate_hz = \"often\"", &[], "probe[0].rate_hz", "\"often\""),
@@ -240,11 +241,11 @@ fn a_rate_that_cannot_be_is_told() {
         &["solver.method=flip", "solver.flip.max_substeps=10"],
     ] {
         let scene = parse("rate_hz = 300.0\nwindow = 0.01", set).unwrap();
-        let text = scene.to_toml(&|_, _| String::new());
-        let again = Scene::parse(&text, Path::new("b.toml"), Path::new(""), &[]).unwrap();
+        let text = scene_to_toml(&scene, &|_, _| String::new());
+        let again = parse_scene(&text, Path::new("b.toml"), Path::new(""), &[]).unwrap();
         assert_eq!(again, scene);
     }
     let scene = parse("rate_hz = \"substep\"", &[]).unwrap();
-    let text = scene.to_toml(&|_, _| String::new());
+    let text = scene_to_toml(&scene, &|_, _| String::new());
     assert!(text.contains("rate_hz = \"substep\""), "{text}");
 }

@@ -1,14 +1,17 @@
 //! Probes: their scene keys, their cost and the files that they write into a cache.
 
 use std::{fs, path::Path};
+use swell::files::parse_scene;
+use swell::files::scene_to_toml;
 
 use crate::support::job::Job;
 use crate::support::{self, D, context, lattice};
 use glam::{DVec2, DVec3};
 use swell::{
     domain::{boundary::Boundary, probe::Rate, solver::Solver},
+    files::{physics_difference, physics_hash},
     scene::{
-        Method, Scene, SceneError, physics_difference, physics_hash,
+        Method, Scene, SceneError,
         probe::{Probe, ProbeKind},
     },
     solve::{
@@ -73,14 +76,14 @@ at = [-0.2]
 fn parse(probes: &str, set: &[&str]) -> Result<Scene, SceneError> {
     let set: Vec<_> = set.iter().map(|&s| s.to_owned()).collect();
     let text = format!("{SCENE}{probes}");
-    Scene::parse(&text, Path::new("a.toml"), Path::new(""), &set)
+    parse_scene(&text, Path::new("a.toml"), Path::new(""), &set)
 }
 
 #[test]
 fn scenes_say_what_is_measured() {
     let plain = parse("", &[]).unwrap();
     assert!(plain.probes.is_empty());
-    let text = |scene: &Scene| scene.to_toml(&|_, _| String::new());
+    let text = |scene: &Scene| scene_to_toml(scene, &|_, _| String::new());
     assert!(!text(&plain).contains("probe"));
     let scene = parse(PROBES, &[]).unwrap();
     let names: Vec<&str> = scene
@@ -105,7 +108,7 @@ fn scenes_say_what_is_measured() {
     let at = DVec2::new(0.0, 1.0);
     assert_eq!(scene.probes[2].kind, ProbeKind::Elevation { at });
     assert_eq!(scene.pressure_points(), [DVec3::new(-0.6, 0.8, 0.75)]);
-    let again = Scene::parse(&text(&scene), Path::new("b.toml"), Path::new(""), &[]).unwrap();
+    let again = parse_scene(&text(&scene), Path::new("b.toml"), Path::new(""), &[]).unwrap();
     assert_eq!(again, scene);
     // Probes only observe: they are no part of the physics.
     assert_eq!(physics_hash(&scene), physics_hash(&plain));

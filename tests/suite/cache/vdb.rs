@@ -1,6 +1,8 @@
 //! Grid files against independent readers, OpenVDB's own `vdb_print` and vdb-rs, and how a
 //! cache keeps them.
 use std::{collections::BTreeMap, fs, io::Cursor, path::Path, process::Command};
+use swell::files::parse_scene;
+use swell::files::scene_to_toml;
 
 use glam::DVec3;
 use serde_json::Value;
@@ -16,7 +18,7 @@ use swell::{
         sparse_grid::{Precision, SparseGrid},
         surface::Raster,
     },
-    scene::{Scene, physics_hash},
+    files::physics_hash,
 };
 
 const RASTER: Raster = Raster {
@@ -445,7 +447,7 @@ particles_per_cell = 27
 fn scenes_ask_for_grids() {
     let parse = |table: &str, set: &[&str]| {
         let set: Vec<_> = set.iter().map(|&s| s.to_owned()).collect();
-        Scene::parse(
+        parse_scene(
             &format!("{SCENE}{table}"),
             Path::new("a.toml"),
             Path::new(""),
@@ -454,15 +456,15 @@ fn scenes_ask_for_grids() {
     };
     let plain = parse("", &[]).unwrap();
     assert_eq!(plain.grids, None);
-    assert!(!plain.to_toml(&|_, _| String::new()).contains("grids"));
+    assert!(!scene_to_toml(&plain, &|_, _| String::new()).contains("grids"));
     let pbf = parse("[grids]\nsurface = true\n", &[]).unwrap();
     let grids = pbf.grids.unwrap();
     assert_eq!((grids.voxel_size, grids.velocity), (0.2, false));
     assert_eq!(grids.precision, Precision::Half);
     let flip = parse("[grids]\nsurface = true\n", &["solver.method=flip"]).unwrap();
     assert_eq!(flip.grids.unwrap().voxel_size, 0.25);
-    let written = pbf.to_toml(&|_, _| String::new());
-    let again = Scene::parse(&written, Path::new("b.toml"), Path::new(""), &[]).unwrap();
+    let written = scene_to_toml(&pbf, &|_, _| String::new());
+    let again = parse_scene(&written, Path::new("b.toml"), Path::new(""), &[]).unwrap();
     assert_eq!(again, pbf);
     // Grids are derived from the particles and are therefore no part of the physics.
     assert_eq!(physics_hash(&pbf), physics_hash(&plain));

@@ -1,12 +1,12 @@
 //! `swell export` as a user runs it: what it writes, resumes, shares and refuses.
 
 use std::{collections::BTreeMap, fs, path::Path};
+use swell::files::load_look;
 
 use glam::DVec3;
 use swell::{
     domain::{mesh::TriangleMesh, mesh_file::MeshFormat},
     render::eye,
-    scene::look::Look,
 };
 use tempfile::TempDir;
 
@@ -199,7 +199,7 @@ fn a_shot_names_its_layers_and_its_camera() {
         .unwrap();
     for frame in [1.0, 3.0] {
         let [own, again] = ["look.toml", "again.toml"].map(|file| {
-            let look = Look::load(&job.path(file)).unwrap();
+            let look = load_look(&job.path(file)).unwrap();
             eye(&look, DVec3::ZERO, frame, per_second)
         });
         assert!((own.position - again.position).length() < 1e-12);

@@ -259,8 +259,8 @@ fn inspect_knows_studies_frames_meshes_grids_and_pictures() {
 fn inspect_names_cameras_and_what_moves() {
     let job = Job::of(&[]);
     let write = |name: &str, text: &str| fs::write(job.path(name), text).unwrap();
-    let door = include_str!("../../../src/scene/solid_track/door.usda");
-    let lens = include_str!("../../../src/scene/look/usd_camera/blender_lens.usda");
+    let door = include_str!("../../../src/files/solid_track/door.usda");
+    let lens = include_str!("../../../src/files/look/usd_camera/blender_lens.usda");
     write("door.usda", door);
     write("lens.usda", lens);
     let taken = "def Xform \"set\" (\n    references = @set.usda@\n)\n{\n}\n";
@@ -294,7 +294,7 @@ fn inspect_names_cameras_and_what_moves() {
         ],
     );
     // A look states where in such a file its camera comes from.
-    let plate = include_str!("../../../src/scene/look/usd_camera/plate.usda");
+    let plate = include_str!("../../../src/files/look/usd_camera/plate.usda");
     write("plate.usda", plate);
     for (start, words) in [
         (

@@ -243,7 +243,7 @@ fn light_is_shown_through_a_view() {
     )
     .unwrap();
     let plain = ViewSpec::default();
-    let look = swell::scene::look::Look::load(&job.path("look.toml")).unwrap();
+    let look = swell::files::load_look(&job.path("look.toml")).unwrap();
     let wanted = |view: &ViewSpec| {
         let pixel = |p: &[f32; 4]| {
             // Half floats keep 11 bits.

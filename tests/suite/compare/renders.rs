@@ -1,15 +1,13 @@
 //! `swell diff` of renders, and what it refuses to compare.
 
 use std::{fs, path::Path};
+use swell::files::parse_look;
 
 use crate::support::job::{Job, LOOK, assert_has};
 use crate::support::made_cache::{Made, write_cache};
-use swell::{
-    render::{
-        Attributes, Image,
-        image::{read_png, write_exr, write_png},
-    },
-    scene::look::Look,
+use swell::render::{
+    Attributes, Image,
+    image::{read_png, write_exr, write_png},
 };
 
 /// A shaded ball; `spot` is added to the pixel at (10, 5).
@@ -30,7 +28,7 @@ fn picture(width: u32, spot: f32) -> Image {
 #[test]
 fn renders_are_compared_by_name_with_a_difference_image() {
     let job = Job::of(&[]);
-    let look = Look::parse(LOOK, Path::new("look.toml")).unwrap();
+    let look = parse_look(LOOK, Path::new("look.toml")).unwrap();
     let from = Attributes::default();
     for (folder, spot) in [("a", 0.25), ("b", 0.0)] {
         fs::create_dir(job.path(folder)).unwrap();
@@ -145,7 +143,7 @@ fn what_does_not_compare_is_refused_in_words() {
     );
     fs::create_dir(job.path("empty")).unwrap();
     fs::create_dir(job.path("renders")).unwrap();
-    let look = Look::parse(LOOK, Path::new("look.toml")).unwrap();
+    let look = parse_look(LOOK, Path::new("look.toml")).unwrap();
     write_png(
         &job.path("renders/s.0001.png"),
         &picture(48, 0.0),

@@ -12,11 +12,11 @@ use swell::{
         Devices,
         stability::{Run, Verdict, refusal, run_trial},
     },
-    gpu::adapter::Context,
-    scene::study::{
+    files::study::{
         RunsOn, Study,
         stability::{Bound, Case, Held, Mark, Quantity, Stability, Trial},
     },
+    gpu::adapter::Context,
     stage::device::Opened,
 };
 

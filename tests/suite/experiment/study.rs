@@ -16,7 +16,7 @@ use std::{
 
 use swell::{
     experiment::{self, Event, Outcome, PointStatus, Request, StudyError},
-    scene::study::{Study, sweep::Sweep},
+    files::study::{Study, sweep::Sweep},
     stage::device::Gpu,
 };
 use tempfile::TempDir;

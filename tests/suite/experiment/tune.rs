@@ -2,10 +2,10 @@
 //! requests are refused.
 
 use std::{collections::BTreeMap, fs};
+use swell::files::load_scene;
 
 use swell::{
-    cache::CacheReader, domain::aggregates::Aggregates, scene::Scene, stage::gauge,
-    study::measure::Gauge,
+    cache::CacheReader, domain::aggregates::Aggregates, stage::gauge, study::measure::Gauge,
 };
 
 use crate::support::{
@@ -133,7 +133,7 @@ fn the_cheapest_settings_that_hold_are_written_and_hold_when_they_are_baked() {
     job.expect(0, &format!("bake tiny.toml -o reference --set {set}"));
     let gauge = {
         let cache = CacheReader::open(&job.path("reference")).unwrap();
-        let scene = Scene::load(&job.path("reference/scene.toml"), &[]).unwrap();
+        let scene = load_scene(&job.path("reference/scene.toml"), &[]).unwrap();
         let start = cache.read(0).unwrap().position;
         // Twice the scene's spacing: 2.5 times the reference's, which is 0.8 of the scene's.
         gauge::gauge(&scene, 0.16, &start, scene.particle_spacing())

@@ -14,14 +14,12 @@ use swell::{
         stability::Verdict,
         validation::{Run, judge, run_benchmark},
     },
-    gpu::adapter::Context,
-    scene::{
-        probe::ProbeKind,
-        study::{
-            Study,
-            validation::{Benchmark, Measure, Validation},
-        },
+    files::study::{
+        Study,
+        validation::{Benchmark, Measure, Validation},
     },
+    gpu::adapter::Context,
+    scene::probe::ProbeKind,
     stage::device::Opened,
 };
 

@@ -1,12 +1,12 @@
 //! Adapters with small limits, and a device that is lost during a bake.
 
 use std::{path::Path, sync::atomic::AtomicBool};
+use swell::files::load_scene;
 
 use crate::support::job::Job;
 use swell::{
     cache::CacheReader,
     gpu::adapter::{Context, GpuError, InjectedFault, Needs},
-    scene::Scene,
     solve::SolveError,
     stage::{
         Blame,
@@ -25,7 +25,7 @@ fn request(job: &Job, solver: &str, cache: &str, context: &Context) -> Request {
         "shot.frames=4".to_owned(),
     ];
     Request {
-        scene: Scene::load(&job.path("small.toml"), &set).unwrap(),
+        scene: load_scene(&job.path("small.toml"), &set).unwrap(),
         directory: job.path(cache),
         frames: None,
         resume: true,
@@ -161,7 +161,7 @@ fn places_in_two_bindings_give_the_same_bytes() {
             "solver.pbf.particle_spacing=0.025",
             "shot.frames=2",
         ];
-        request.scene = Scene::load(&job.path("small.toml"), &set.map(str::to_owned)).unwrap();
+        request.scene = load_scene(&job.path("small.toml"), &set.map(str::to_owned)).unwrap();
         request.scene.solver.pbf.as_mut().unwrap().grid_projection = false;
         request
     };

@@ -1,6 +1,7 @@
 //! The f64 reference of PBF: compared with the GPU on the same inputs, and with exact solutions.
 
 use std::{fs, path::Path};
+use swell::files::parse_scene;
 
 use glam::DVec3;
 use swell::{
@@ -59,7 +60,7 @@ fn lively(spoil: &str) -> (Scene, Start) {
         vorticity_confinement = { strength = 0.5 }
     "#;
     let spoil: Vec<String> = spoil.split_whitespace().map(Into::into).collect();
-    let scene = Scene::parse(text, Path::new("lively.toml"), folder.path(), &spoil).unwrap();
+    let scene = parse_scene(text, Path::new("lively.toml"), folder.path(), &spoil).unwrap();
     let mut start = Start::of(&scene).unwrap();
     let particles = &mut start.particles;
     jitter(particles, 0.01);

@@ -7,6 +7,7 @@ mod mattes;
 mod windows;
 
 use std::path::Path;
+use swell::files::parse_look;
 
 use swell::{
     domain::{
@@ -54,7 +55,7 @@ impl Setup<'_> {
         let text = format!(
             "{text}[renderer]\nmethod = \"{method}\"\n[output]\nformats = [\"exr\"]\n{output}\n"
         );
-        Look::parse(&text, Path::new("test.toml")).unwrap()
+        parse_look(&text, Path::new("test.toml")).unwrap()
     }
 
     fn draw(&self, context: &Context) -> Image {

@@ -2,10 +2,9 @@
 //! added only where there is some; this does not change the picture.
 
 use std::path::Path;
+use swell::files::parse_look;
 
-use swell::{
-    domain::particles::Particles, gpu::adapter::Context, render::Renderer, scene::look::Look,
-};
+use swell::{domain::particles::Particles, gpu::adapter::Context, render::Renderer};
 
 use super::{
     analytic::{context, spoiled},
@@ -32,7 +31,7 @@ model = \"hosek_wilkie\"
 
 /// Renders several waters with one renderer and returns the last picture.
 fn last(context: &Context, waters: &[&Particles]) -> Vec<[f32; 4]> {
-    let look = Look::parse(LOOK, Path::new("listed.toml")).unwrap();
+    let look = parse_look(LOOK, Path::new("listed.toml")).unwrap();
     let mut renderer = Renderer::new(context, &look, &city_scene()).unwrap();
     let pictures = waters
         .iter()

@@ -1,6 +1,7 @@
 //! Roughness of the water's silhouette with splats, compared with rays in f64.
 
 use std::path::Path;
+use swell::files::parse_look;
 
 use glam::DVec3;
 use swell::{
@@ -25,7 +26,7 @@ fn look(surface: &str) -> Look {
          [image]\nwidth = 480\nheight = 270\n[surface]\n{surface}\
          [sky]\nmodel = \"hosek_wilkie\"\n"
     );
-    Look::parse(&text, Path::new("low.toml")).unwrap()
+    parse_look(&text, Path::new("low.toml")).unwrap()
 }
 
 /// A crest 2.4 m high across the domain, in layers along its surface whose particles are displaced

@@ -1,10 +1,10 @@
 //! Particles that exceed a single binding are drawn in several dispatches, which does not change
 //! the picture.
 
+use swell::files::parse_look;
 use swell::{
     gpu::adapter::{Context, Needs},
     render::{Image, Renderer},
-    scene::look::Look,
 };
 
 use super::pictures::{OBLIQUE, harbour};
@@ -14,7 +14,7 @@ use super::pictures::{OBLIQUE, harbour};
 const BINDING: u64 = 98_304;
 
 fn picture(context: &Context) -> Image {
-    let look = Look::parse(OBLIQUE, std::path::Path::new("paged.toml")).unwrap();
+    let look = parse_look(OBLIQUE, std::path::Path::new("paged.toml")).unwrap();
     let (scene, water) = harbour();
     assert!(water.len() > 1536, "{}", water.len());
     let mut renderer = Renderer::new(context, &look, &scene).unwrap();

@@ -1,9 +1,7 @@
 //! A frame that is rendered in parts reports its progress, and is the same picture.
 
-use swell::{
-    render::{Moment, Part, Renderer, Water},
-    scene::look::Look,
-};
+use swell::files::parse_look;
+use swell::render::{Moment, Part, Renderer, Water};
 
 use super::pictures::{ALL_AOVS, OBLIQUE, harbour};
 use crate::support::context;
@@ -18,7 +16,7 @@ fn each_part_of_a_frame_is_told_once() {
     let context = context();
     for method in ["ray", "ssfr"] {
         let text = format!("{OBLIQUE}[renderer]\nmethod = \"{method}\"\n{ALL_AOVS}");
-        let look = Look::parse(&text, std::path::Path::new("parts.toml")).unwrap();
+        let look = parse_look(&text, std::path::Path::new("parts.toml")).unwrap();
         let image = &look.spec().image;
         let bands = match method {
             "ray" => image.height.div_ceil(16),

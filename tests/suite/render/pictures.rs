@@ -6,18 +6,25 @@ use glam::DVec3;
 use swell::domain::bounds::Bounds;
 use swell::domain::mesh::TriangleMesh;
 use swell::domain::particles::Particles;
-use swell::render::image::{
-    read_exr_attributes, read_png_attributes, write_exr, write_png, write_png_with_attributes,
-};
-use swell::render::{Attributes, Image, RenderError, RenderScene, Renderer, view};
 use swell::scene::look::Look;
+use swell::{
+    files::{load_look, parse_look},
+    render::{
+        Attributes, Image, RenderError, RenderScene, Renderer,
+        image::{
+            read_exr_attributes, read_png_attributes, write_exr, write_png,
+            write_png_with_attributes,
+        },
+        view,
+    },
+};
 
 use crate::support::context;
 
 use super::scenes::{box_mesh, city_scene, city_water, slab};
 
 fn look(text: &str) -> Look {
-    Look::parse(text, Path::new("test.toml")).unwrap()
+    parse_look(text, Path::new("test.toml")).unwrap()
 }
 
 pub(super) const TOP_DOWN: &str = "[camera]
@@ -481,7 +488,7 @@ fn a_panorama_is_mirrored_and_a_damaged_one_refused() {
             "[sun]\n",
             "[water]\nabsorption_per_metre = [1000.0, 1000.0, 1000.0]\n[sun]\nintensity = 0.0\n",
         );
-    let parse = || Look::parse(&text, &folder.path().join("look.toml")).unwrap();
+    let parse = || parse_look(&text, &folder.path().join("look.toml")).unwrap();
     let image = render(&parse(), &tank(SPACING), &tank_water());
     // Black water under a sky of radiance 2 shows its reflectance at normal incidence, 2.04 %.
     let reflectance = (0.333f32 / 2.333).powi(2);
@@ -563,7 +570,7 @@ fn pictures() {
     let water = city_water();
     println!("{} particles on {}", water.len(), context.info.name);
     for name in std::env::var("SWELL_LOOKS").unwrap().split(',') {
-        let look = Look::load(Path::new(name)).unwrap();
+        let look = load_look(Path::new(name)).unwrap();
         let stem = Path::new(name)
             .file_stem()
             .unwrap()

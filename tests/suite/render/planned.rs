@@ -1,13 +1,13 @@
 //! Frames are refused before rendering and while rendering for the same reason.
 
 use glam::DVec3;
+use swell::files::parse_look;
 use swell::{
     gpu::{
         adapter::{Context, Needs},
         program::check_sizes,
     },
     render::{Limits, Moment, Plan, Renderer, Water},
-    scene::look::Look,
 };
 
 use super::pictures::{TOP_DOWN, tank};
@@ -38,7 +38,7 @@ fn what_is_planned_for_a_frame_is_refused_where_drawing_it_is() {
             &["particles", "shapes", "paths"],
         ),
     ] {
-        let look = Look::parse(
+        let look = parse_look(
             &format!("{TOP_DOWN}{more}"),
             std::path::Path::new("look.toml"),
         )

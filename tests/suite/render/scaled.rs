@@ -2,6 +2,7 @@
 //! length.
 
 use std::path::Path;
+use swell::files::parse_look;
 
 use glam::DVec3;
 use swell::{
@@ -44,7 +45,7 @@ fn look(method: &str, filter: &str, scale: f64) -> Look {
         0.5 * scale,
         0.42 * scale,
     );
-    Look::parse(&text, Path::new("scaled.toml")).unwrap()
+    parse_look(&text, Path::new("scaled.toml")).unwrap()
 }
 
 fn scaled(scale: f64) -> (RenderScene, Particles) {

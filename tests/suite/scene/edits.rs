@@ -7,6 +7,7 @@ use std::{collections::BTreeSet, fs, path::Path, sync::atomic::AtomicBool};
 use crate::support::job::Job;
 use swell::{
     domain::frame_range::FrameRange,
+    files::{load_scene, parse_scene},
     scene::Scene,
     stage::{
         Blame,
@@ -249,7 +250,7 @@ fn edits(solver: &str, settings: &[&str], more: &str) -> Found {
         .map(str::to_owned)
         .collect();
     let cache = job.path("cache");
-    run(Scene::load(&job.path("small.toml"), &set).unwrap(), &cache).unwrap();
+    run(load_scene(&job.path("small.toml"), &set).unwrap(), &cache).unwrap();
     let hash = job.hash("cache");
     // The scene as the cache has it, beside copies of its files.
     fs::create_dir(job.path("assets")).unwrap();
@@ -259,7 +260,7 @@ fn edits(solver: &str, settings: &[&str], more: &str) -> Found {
         fs::copy(file.path(), job.path("copy.obj")).unwrap();
     }
     let text = fs::read_to_string(cache.join("scene.toml")).unwrap();
-    let load = |text: &str| Scene::parse(text, Path::new("edited.toml"), job.folder.path(), &[]);
+    let load = |text: &str| parse_scene(text, Path::new("edited.toml"), job.folder.path(), &[]);
     run(load(&text).unwrap(), &cache).expect("control: the scene as it was");
     let base: Value = toml::from_str(&text).unwrap();
     let mut paths = Vec::new();

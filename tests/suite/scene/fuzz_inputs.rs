@@ -8,7 +8,8 @@ use std::path::Path;
 use proptest::prelude::*;
 use swell::{
     domain::{mesh::TriangleMesh, mesh_file::MeshFormat},
-    scene::{Method, Scene, SceneError, look::camera_file::CameraFile, study::Study, tolerance},
+    files::{load_scene, look::camera_file, parse_scene, study::Study, tolerance},
+    scene::{Method, Scene, SceneError},
 };
 
 use super::faults::{FLIP_FAULTS, KEY_FAULTS, SCENE, SOURCE_FAULTS, VALUE_FAULTS, ZONE_FAULTS};
@@ -18,7 +19,7 @@ const CUBE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nv 0 0 1\nv 1 0 1\nv 0 1 
     f 1 5 7 3\nf 2 4 8 6\nf 1 2 6 5\nf 3 7 8 4\nf 1 3 4 2\nf 5 6 8 7\n";
 
 /// A camera as Blender writes it.
-const CAMERA: &[u8] = include_bytes!("../../../src/scene/look/usd_camera/blender_lens.usda");
+const CAMERA: &[u8] = include_bytes!("../../../src/files/look/usd_camera/blender_lens.usda");
 
 /// A folder with one good mesh and some bad ones.
 fn assets() -> tempfile::TempDir {
@@ -38,7 +39,7 @@ fn assets() -> tempfile::TempDir {
 }
 
 fn parse(dir: &Path, text: &str) -> Result<Scene, SceneError> {
-    Scene::parse(text, Path::new("scenes/bad.toml"), dir, &[])
+    parse_scene(text, Path::new("scenes/bad.toml"), dir, &[])
 }
 
 #[test]
@@ -46,7 +47,7 @@ fn each_fault_names_file_line_key_and_what_is_allowed() {
     let dir = assets();
     let flip = [Method::Flip.as_override()];
     let parse = |text: &str, overrides: &[String]| {
-        Scene::parse(text, Path::new("scenes/bad.toml"), dir.path(), overrides)
+        parse_scene(text, Path::new("scenes/bad.toml"), dir.path(), overrides)
     };
     parse(SCENE, &[]).expect("the good scene is good");
     parse(SCENE, &flip).expect("the good scene is good for FLIP");
@@ -95,7 +96,7 @@ fn a_missing_table_and_a_missing_file_are_named() {
         message.contains("domain: missing; allowed: a table with at least min and max"),
         "{message}"
     );
-    let error = Scene::load(&dir.path().join("none.toml"), &[]).expect_err("no file");
+    let error = load_scene(&dir.path().join("none.toml"), &[]).expect_err("no file");
     assert!(matches!(error, SceneError::Read { .. }), "{error}");
 }
 
@@ -402,7 +403,7 @@ proptest! {
     ) {
         let bytes = mutate(CAMERA.to_vec(), &edits);
         let beside = |_: &str| Err("nothing is beside it".to_owned());
-        if let Ok(camera) = CameraFile::read(&bytes, None, &beside) {
+        if let Ok(camera) = camera_file::read(&bytes, None, &beside) {
             let stand = camera.at(0.1);
             prop_assert!(stand.position.is_finite() && (stand.forward.length() - 1.0).abs() < 1e-9);
         }
@@ -426,7 +427,7 @@ proptest! {
         known in "(shot|solver\\.pbf|solver\\.flip|water\\.block|effects|domain)\\.[a-z0-9_]{0,8}",
     ) {
         let overrides = [format!("{key}={value}"), format!("{known}={value}")];
-        let _ = Scene::parse(SCENE, Path::new("s.toml"), Path::new("/nowhere"), &overrides[..1]);
-        let _ = Scene::parse(SCENE, Path::new("s.toml"), Path::new("/nowhere"), &overrides[1..]);
+        let _ = parse_scene(SCENE, Path::new("s.toml"), Path::new("/nowhere"), &overrides[..1]);
+        let _ = parse_scene(SCENE, Path::new("s.toml"), Path::new("/nowhere"), &overrides[1..]);
     }
 }

@@ -1,10 +1,8 @@
 //! Meshes as other programs write them: what a scene makes of them, and what it reports.
 
 use glam::DVec3;
-use swell::{
-    domain::{mesh::TriangleMesh, signed_distance::SignedDistance},
-    scene::Scene,
-};
+use swell::domain::{mesh::TriangleMesh, signed_distance::SignedDistance};
+use swell::files::load_scene;
 
 use crate::support::job::{Job, assert_has};
 
@@ -50,7 +48,7 @@ fn prism(first: usize, floor_and_top: Option<&str>) -> String {
 }
 
 fn solid(job: &Job) -> TriangleMesh {
-    let scene = Scene::load(&job.path("scene.toml"), &[]).unwrap();
+    let scene = load_scene(&job.path("scene.toml"), &[]).unwrap();
     assert_eq!(scene.warnings(), Vec::<String>::new());
     scene.solids[0].mesh.clone()
 }
@@ -78,7 +76,7 @@ fn a_bay_in_a_polygon_is_open_whichever_corner_comes_first() {
     check(&mesh);
     // The bay is open to the water: the distance is that to the nearest of its walls, not
     // to a roof over it.
-    let scene = Scene::load(&job.path("scene.toml"), &[]).unwrap();
+    let scene = load_scene(&job.path("scene.toml"), &[]).unwrap();
     let field = SignedDistance::from_mesh(&mesh, &scene.domain, 0.05).unwrap();
     let found = field.sample(DVec3::new(1.0, 0.3, 0.65));
     assert!((found - 0.2).abs() < 0.01, "{found}");
@@ -169,7 +167,7 @@ fn a_mesh_far_from_zero_keeps_its_shape() {
     std::fs::write(job.path("far.stl"), binary_stl(&tub(way))).unwrap();
     std::fs::write(job.path("near.stl"), binary_stl(&tub([0, 0]))).unwrap();
     let shape = |name: &str| {
-        let scene = Scene::load(&job.path(name), &[]).unwrap();
+        let scene = load_scene(&job.path(name), &[]).unwrap();
         (scene.water.meshes[0].mesh.clone(), scene.warnings())
     };
     let (near, said) = shape("near.toml");
@@ -230,7 +228,7 @@ fn a_mesh_as_wide_as_the_domain_fits_into_it() {
         let read = |file: &str| {
             let text = format!("{head}{}", table.replace("FILE", file));
             job.write("scene.toml", &text);
-            Scene::load(&job.path("scene.toml"), &[]).map_err(|error| error.to_string())
+            load_scene(&job.path("scene.toml"), &[]).map_err(|error| error.to_string())
         };
         for file in ["wide.obj", "wide.stl"] {
             read(file).unwrap_or_else(|error| panic!("{file}: {error}"));
@@ -252,7 +250,7 @@ fn a_solid_that_touches_the_domain_is_outside_of_it() {
     let read = |z: &str| {
         let placed = format!("\"solid.obj\"\ntranslate = [0.0, 0.0, {z}]");
         job.write("scene.toml", &POOL.replace("\"solid.obj\"", &placed));
-        Scene::load(&job.path("scene.toml"), &[]).map_err(|error| error.to_string())
+        load_scene(&job.path("scene.toml"), &[]).map_err(|error| error.to_string())
     };
     let said = read("-0.3").expect_err("beside the domain");
     assert_has(&said, &["outside the domain"]);

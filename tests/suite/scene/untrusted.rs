@@ -15,7 +15,7 @@ use proptest::prelude::*;
 use swell::{
     cache::{self, CacheReader, CacheWriter, frame},
     domain::{mesh::TriangleMesh, mesh_file::MeshFormat},
-    scene::study::Study,
+    files::study::Study,
 };
 
 /// An allocator that records the largest allocation of each thread.

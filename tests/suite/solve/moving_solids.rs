@@ -2,6 +2,8 @@
 //! the volume that they displace.
 
 use std::{collections::BTreeMap, path::Path};
+use swell::files::parse_scene;
+use swell::files::scene_to_toml;
 
 use crate::support::{self, box_mesh, context, lattice, mover};
 use glam::{DVec3, Vec3};
@@ -450,20 +452,20 @@ fn scenes_say_where_solids_go() {
     std::fs::write(dir.path().join("box.obj"), OBJ).unwrap();
     let parse = |text: &str, set: &[&str]| {
         let set: Vec<_> = set.iter().map(|&s| s.to_owned()).collect();
-        Scene::parse(text, Path::new("a.toml"), dir.path(), &set)
+        parse_scene(text, Path::new("a.toml"), dir.path(), &set)
     };
     let scene = parse(SCENE, &[]).unwrap();
     assert!(scene.solids.is_empty());
     let solid = &scene.moving_solids[0];
     assert!((solid.pose(3.0).centre - DVec3::new(0.0, -0.5, 0.0)).length() < 1e-12);
     assert_eq!(scene.mesh_files().len(), 1);
-    let written = scene.to_toml(&|_, _| "box.obj".into());
+    let written = scene_to_toml(&scene, &|_, _| "box.obj".into());
     assert_eq!(parse(&written, &[]).unwrap(), scene);
     // The motion is part of the physics hash.
     let other = parse(SCENE, &["solid[0].motion.stroke=0.4"]).unwrap();
     assert_ne!(
-        swell::scene::physics_hash(&scene),
-        swell::scene::physics_hash(&other)
+        swell::files::physics_hash(&scene),
+        swell::files::physics_hash(&other)
     );
 
     for (set, key, words) in [
@@ -525,7 +527,7 @@ fn scenes_say_where_solids_go() {
                 .motion
                 .peak_speed(0.0, 2.0)
     );
-    let written = both.to_toml(&|_, _| "box.obj".into());
+    let written = scene_to_toml(&both, &|_, _| "box.obj".into());
     assert_eq!(parse(&written, &[]).unwrap(), both);
     let alone: String = SCENE
         .lines()
@@ -534,7 +536,7 @@ fn scenes_say_where_solids_go() {
         .collect();
     let swing = "solid[0].turn={ kind = \"sine\", swing_degrees = 40, period = 2 }";
     let swings = parse(&alone, &[TURN[0], TURN[1], swing]).unwrap();
-    let written = swings.to_toml(&|_, _| "box.obj".into());
+    let written = scene_to_toml(&swings, &|_, _| "box.obj".into());
     assert!(
         written.contains("swing_degrees = 40") && !written.contains("stroke"),
         "{written}"

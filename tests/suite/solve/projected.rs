@@ -2,6 +2,7 @@
 //! walls, on the GPU and in f64, compared with PBF without it.
 
 use std::f64::consts::{PI, TAU};
+use swell::files::load_scene;
 
 use glam::DVec3;
 use swell::{
@@ -334,7 +335,7 @@ fn a_period_is_whole_bricks_of_the_projection() {
             "solver.pbf.particle_spacing=0.1".to_owned(),
             format!("solver.pbf.grid_projection={key}"),
         ];
-        Scene::load(&file, &sets)
+        load_scene(&file, &sets)
     };
     for (width, key) in [(1.6, true), (3.2, true), (0.7, false)] {
         load(width, key).unwrap_or_else(|error| panic!("{width}: {error}"));

@@ -7,6 +7,7 @@ use std::{
     path::{Path, PathBuf},
     sync::atomic::AtomicBool,
 };
+use swell::files::load_scene;
 
 use crate::support::job::Job;
 use swell::{
@@ -29,7 +30,7 @@ fn case(name: &str) -> PathBuf {
 
 fn load(name: &str, set: &[&str]) -> Scene {
     let set: Vec<String> = set.iter().map(|&set| set.to_owned()).collect();
-    Scene::load(&case(name), &set).unwrap()
+    load_scene(&case(name), &set).unwrap()
 }
 
 fn opened(context: &Context) -> Device {

@@ -4,14 +4,12 @@ use std::{
     path::Path,
     sync::atomic::{AtomicBool, Ordering},
 };
+use swell::files::parse_scene;
 
-use swell::{
-    scene::Scene,
-    stage::{
-        device::{Opened, SolverError},
-        drive::{Drive, End, Step},
-        prepare::Start,
-    },
+use swell::stage::{
+    device::{Opened, SolverError},
+    drive::{Drive, End, Step},
+    prepare::Start,
 };
 
 const SCENE: &str = r#"
@@ -47,7 +45,7 @@ fn run(drive: &mut Drive<'_>, stop_after: u32) -> (End, Vec<Step>) {
 
 #[test]
 fn a_drive_stops_between_frames_and_goes_on_from_one() {
-    let scene = Scene::parse(SCENE, Path::new("block.toml"), Path::new(""), &[]).unwrap();
+    let scene = parse_scene(SCENE, Path::new("block.toml"), Path::new(""), &[]).unwrap();
     let start = Start::of(&scene).unwrap();
     let new = || Drive::new(&Opened::Cpu, &scene, &start, false).unwrap();
     let (end, whole) = run(&mut new(), 9);
@@ -72,7 +70,7 @@ fn a_drive_stops_between_frames_and_goes_on_from_one() {
 
 #[test]
 fn pressures_are_read_where_they_are_asked_for() {
-    let scene = Scene::parse(SCENE, Path::new("block.toml"), Path::new(""), &[]).unwrap();
+    let scene = parse_scene(SCENE, Path::new("block.toml"), Path::new(""), &[]).unwrap();
     let start = Start::of(&scene).unwrap();
     let mut drive = Drive::new(&Opened::Cpu, &scene, &start, false).unwrap();
     assert!(drive.advance().unwrap().pressures.is_empty());
@@ -86,7 +84,7 @@ fn pressures_are_read_where_they_are_asked_for() {
 /// An error of the observer ends the run, and no further frame is computed.
 #[test]
 fn an_observer_s_fault_ends_a_drive() {
-    let scene = Scene::parse(SCENE, Path::new("block.toml"), Path::new(""), &[]).unwrap();
+    let scene = parse_scene(SCENE, Path::new("block.toml"), Path::new(""), &[]).unwrap();
     let start = Start::of(&scene).unwrap();
     let mut drive = Drive::new(&Opened::Cpu, &scene, &start, false).unwrap();
     let mut seen = 0;

@@ -1,11 +1,13 @@
 //! Caches without a solver, for tests of code that reads them.
 use std::path::Path;
+use swell::files::parse_scene;
+use swell::files::scene_to_toml;
 
 use serde_json::Value;
 use swell::{
     cache::{CacheWriter, Clock, GridRecord, Manifest, ProbeRecord, ProbeValues},
     domain::{particles::Particles, solver::StepReport, sparse_grid::Precision},
-    scene::{Scene, physics_hash},
+    files::physics_hash,
 };
 
 pub const SCENE: &str = r#"
@@ -129,7 +131,7 @@ pub fn report(frame: u32) -> Value {
 
 /// Writes a cache of [`particles`] as a bake would.
 pub fn write_cache(path: &Path, made: &Made<'_>) {
-    let scene = Scene::parse(made.scene, Path::new("s.toml"), Path::new(""), &[]).unwrap();
+    let scene = parse_scene(made.scene, Path::new("s.toml"), Path::new(""), &[]).unwrap();
     let manifest = Manifest {
         format_version: Manifest::FORMAT_VERSION,
         program: "swell".to_owned(),
@@ -170,7 +172,7 @@ pub fn write_cache(path: &Path, made: &Made<'_>) {
         };
         probes.map(row).collect()
     };
-    let toml = scene.to_toml(&|_, hash| hash.to_owned());
+    let toml = scene_to_toml(&scene, &|_, hash| hash.to_owned());
     let mut writer = CacheWriter::create(
         path,
         manifest,

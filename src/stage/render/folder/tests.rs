@@ -1,8 +1,8 @@
 use std::fs::TryLockError;
+use swell_files::parse_look;
 
 use super::*;
 use swell_render::{Image, image::write_png_with_attributes};
-use swell_scene::look::Look;
 
 const LOOK: &str = r#"
 [camera]
@@ -66,7 +66,7 @@ fn picture(file: &Path, frame: u32, edit: impl FnOnce(&mut Attributes)) {
         look_hash: "day".to_owned(),
     };
     edit(&mut attributes);
-    let look = Look::parse(LOOK, Path::new("look.toml")).unwrap();
+    let look = parse_look(LOOK, Path::new("look.toml")).unwrap();
     let image = Image::new(4, 4);
     write_png_with_attributes(file, &image, &look.spec().view, &attributes).unwrap();
 }

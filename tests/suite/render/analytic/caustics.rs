@@ -4,6 +4,7 @@
 use glam::{DVec2, DVec3};
 use swell::domain::bounds::Bounds;
 use swell::domain::particles::Particles;
+use swell::files::parse_look;
 use swell::gpu::adapter::Context;
 use swell::gpu::adapter::GpuError;
 use swell::render::{RenderError, RenderScene, Renderer};
@@ -501,7 +502,7 @@ fn look(water: &str, method: &str) -> Result<Look, String> {
          [image]\nwidth = 64\nheight = 64\n[renderer]\nmethod = \"{method}\"\n[water]\n{water}\n\
          [sky]\nmodel = \"hosek_wilkie\"\n"
     );
-    Look::parse(&text, std::path::Path::new("look.toml")).map_err(|error| error.to_string())
+    parse_look(&text, std::path::Path::new("look.toml")).map_err(|error| error.to_string())
 }
 
 #[test]

@@ -2,10 +2,8 @@
 //! either method and in an exported camera.
 
 use glam::DVec3;
-use swell::{
-    render::{Image, Moment, Renderer, Water},
-    scene::look::Look,
-};
+use swell::files::parse_look;
+use swell::render::{Image, Moment, Renderer, Water};
 
 use super::support::{Eye, Setup, ball, context, scene, uniform_sky, write_sky};
 
@@ -62,7 +60,7 @@ fn drawn(method: &'static str, film: [f64; 2], fit: &str) -> Image {
     );
     let folder = tempfile::tempdir().unwrap();
     write_sky(&folder.path().join("sky.exr"), &uniform_sky);
-    let look = Look::parse(&text, &folder.path().join("look.toml")).unwrap();
+    let look = parse_look(&text, &folder.path().join("look.toml")).unwrap();
     let mut renderer = Renderer::new(&context(), &look, &set).unwrap();
     let (water, white) = (Water::new(water), Default::default());
     let moment = Moment::alone(&water, &white);

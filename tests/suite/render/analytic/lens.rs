@@ -1,10 +1,8 @@
 //! Depth of field: the blur disc of a small thing out of focus, and cameras from files.
 
 use glam::DVec3;
-use swell::{
-    render::{Image, Moment, Renderer, Water},
-    scene::look::Look,
-};
+use swell::files::parse_look;
+use swell::render::{Image, Moment, Renderer, Water};
 
 use super::support::{Eye, FILM, Setup, ball, context, draw, scene, uniform_sky, write_sky};
 
@@ -158,7 +156,7 @@ fn a_lens_and_a_shift_of_the_film_come_from_usd() {
             let text = format!(
                 "[camera]\nfile = \"eye.usda\"\nfilm_back_mm = [{FILM:?}, {FILM:?}]\n[image]{rest}"
             );
-            let look = Look::parse(&text, &folder.path().join("look.toml")).unwrap();
+            let look = parse_look(&text, &folder.path().join("look.toml")).unwrap();
             let mut renderer = Renderer::new(&context(), &look, &set).unwrap();
             let (water, white) = (Water::new(water.clone()), Default::default());
             let moment = Moment::alone(&water, &white);

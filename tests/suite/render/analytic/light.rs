@@ -1,6 +1,7 @@
 //! Illumination of the set: sky, sun, shadows and haze.
 
 use std::f64::consts::{PI, TAU};
+use swell::files::parse_look;
 
 use glam::{DMat3, DVec2, DVec3};
 use swell::domain::bounds::Bounds;
@@ -8,7 +9,6 @@ use swell::domain::mesh::TriangleMesh;
 use swell::domain::particles::Particles;
 use swell::gpu::adapter::Context;
 use swell::render::{Image, RenderError, RenderScene, Renderer};
-use swell::scene::look::Look;
 
 use super::geometry::{box_mesh, enter};
 use super::support::{
@@ -61,7 +61,7 @@ fn a_panorama_that_is_not_twice_as_wide_as_high_is_refused() {
         let white = (1.0f32, 1.0f32, 1.0f32);
         let file = folder.path().join("sky.exr");
         exr::prelude::write_rgb_file(file, 64, height, |_, _| white).unwrap();
-        let look = Look::parse(&setup.text(), &folder.path().join("look.toml")).unwrap();
+        let look = parse_look(&setup.text(), &folder.path().join("look.toml")).unwrap();
         Renderer::new(&context(), &look, &scene(1.0, 1.0)).err()
     };
     for height in [31, 64] {

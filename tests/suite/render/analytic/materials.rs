@@ -1,15 +1,18 @@
 //! Colours and textures on solids: texel by texel, with both methods.
 
 use std::path::Path;
+use swell::files::parse_look;
 
 use glam::{DVec2, DVec3};
 use swell::domain::mesh::TriangleMesh;
-use swell::domain::mesh_file::{MeshFormat, parts::Parts};
 use swell::domain::particles::Particles;
 use swell::domain::pose::Pose;
 use swell::gpu::adapter::Context;
-use swell::render::{Image, Moment, RenderError, RenderScene, Renderer, SolidParts, Water};
 use swell::scene::look::Look;
+use swell::{
+    domain::mesh_file::{MeshFormat, parts::Parts},
+    render::{Image, Moment, RenderError, RenderScene, Renderer, SolidParts, Water},
+};
 
 use super::support::{Eye, Setup, context, scene, spoiled, uniform_sky, write_sky};
 
@@ -160,7 +163,7 @@ impl Shown<'_> {
         }
         let text = setup.text();
         let text = text.replacen("[output]\n", &format!("{}\n[output]\n", self.solids), 1);
-        Look::parse(&text, &folder.join("look.toml")).unwrap()
+        parse_look(&text, &folder.join("look.toml")).unwrap()
     }
 
     fn image(&self, context: &Context) -> Result<Image, Box<(RenderError, Look)>> {
@@ -534,7 +537,7 @@ fn files_that_cannot_be_used_are_refused_with_their_key() {
         };
         let text = setup.text();
         let text = text.replacen("[output]\n", &format!("{solids}\n[output]\n"), 1);
-        Look::parse(&text, &inside("look.toml"))
+        parse_look(&text, &inside("look.toml"))
     };
     let texture = |file: &str| {
         format!(

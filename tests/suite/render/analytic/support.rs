@@ -1,13 +1,13 @@
 //! Cameras, skies and water with known properties, and the renderer's pictures of them.
 
 use std::path::Path;
+use swell::files::parse_look;
 
 use glam::{DVec2, DVec3};
 use swell::domain::bounds::Bounds;
 use swell::domain::particles::Particles;
 use swell::gpu::adapter::Context;
 use swell::render::{Image, Moment, RenderError, RenderScene, Renderer, Water};
-use swell::scene::look::Look;
 use wgpu::util::DeviceExt;
 
 pub(crate) use crate::support::device::{context, spoiled};
@@ -225,7 +225,7 @@ pub(super) fn renderer(
 ) -> Renderer {
     let folder = tempfile::tempdir().unwrap();
     write_sky(&folder.path().join("sky.exr"), sky);
-    let look = Look::parse(&setup.text(), &folder.path().join("look.toml")).unwrap();
+    let look = parse_look(&setup.text(), &folder.path().join("look.toml")).unwrap();
     Renderer::with_tile_limit(context, &look, scene, tile).unwrap()
 }
 

@@ -1,6 +1,7 @@
 //! Held-out solids, in closed form: black and transparent except for spray in front of them.
 
 use std::path::Path;
+use swell::files::parse_look;
 
 use swell::{
     domain::particles::Particles,
@@ -26,7 +27,7 @@ fn look(folder: &Path, method: &str, output: &str) -> Look {
         "{text}[ground]\nhaze_m = 1e7\n[sun]\nintensity = 0.0\n[renderer]\nmethod = \"{method}\"\n\
          [output]\nformats = [\"exr\"]\ncryptomatte = true\n{output}\n"
     );
-    Look::parse(&text, &folder.join("look.toml")).unwrap()
+    parse_look(&text, &folder.join("look.toml")).unwrap()
 }
 
 /// Radiance of spray under a sky of radiance 1: drops do not absorb.

@@ -91,8 +91,7 @@ fn pixels_within_overscan_are_those_of_the_plain_picture() {
                     .replace("[image]\n", &format!("[image]\n{image}\n"))
                     .replace("[surface]\n", "[surface]\nsmoothing_width_m = 0.0\n");
                 let bare = format!("{bare}[output]\nformats = [\"exr\"]\n{AOVS}\n");
-                text =
-                    swell::scene::look::Look::parse(&bare, std::path::Path::new("t.toml")).unwrap();
+                text = swell::files::parse_look(&bare, std::path::Path::new("t.toml")).unwrap();
             }
             super::draw(&context(), &text, &scene, &water)
         };

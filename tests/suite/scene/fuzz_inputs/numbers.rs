@@ -1,6 +1,7 @@
 //! Every number of a scene has a range, and its error message states it.
 
 use super::*;
+use swell::files::parse_scene;
 
 /// Every fractional number of a scene: key, override with `{}` in place of the number, and whether
 /// the range is the only constraint on it.
@@ -199,7 +200,7 @@ fn each_number_of_a_scene_has_a_range(text: &str, numbers: &[(&str, &str, bool)]
     let dir = assets();
     let load = |set: &str| {
         let set = [set.to_owned(), Method::Flip.as_override()];
-        Scene::parse(text, Path::new("s.toml"), dir.path(), &set).map(|_| ())
+        parse_scene(text, Path::new("s.toml"), dir.path(), &set).map(|_| ())
     };
     load("shot.frames=240").expect("the scene is good");
     each_number_has_a_range(load, numbers);
@@ -251,5 +252,5 @@ pub(super) fn each_number_has_a_range(
 fn a_wall_without_a_ramp_is_one() {
     let dir = assets();
     let set = ["wave_maker[0].motion.ramp=0".to_owned()];
-    Scene::parse(SCENE, Path::new("s.toml"), dir.path(), &set).expect("0 is none");
+    parse_scene(SCENE, Path::new("s.toml"), dir.path(), &set).expect("0 is none");
 }

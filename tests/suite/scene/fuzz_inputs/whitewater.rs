@@ -6,10 +6,8 @@ use std::path::Path;
 use proptest::prelude::*;
 use swell::{
     domain::whitewater::Thresholds,
-    scene::{
-        SceneError,
-        whitewater::{WhitewaterSettings, written_out},
-    },
+    files::whitewater::{WhitewaterSettings, written_out},
+    scene::SceneError,
 };
 
 use super::numbers::each_number_has_a_range;

@@ -1,0 +1,445 @@
+//! Builds a validated scene from its spec: reads files and checks that the parts fit together.
+
+mod solver;
+
+use std::path::Path;
+
+use glam::DVec3;
+
+use super::{
+    budget,
+    document::Document,
+    effects,
+    fit::{comes_into, fits},
+    grids, keep, moving_solid, no_slip, periodic, probe, sources,
+    spec::{BoxSpec, DomainSpec, MeshSpec, SceneSpec, SwarmSpec, WaterSpec},
+    wave_maker,
+};
+use swell_domain::{
+    absorber::AbsorberStates,
+    bounds::Bounds,
+    mesh_file::{self, Digits, Loaded, MeshFormat},
+    sampling,
+};
+use swell_scene::{
+    Method, PlacedMesh, Placement, Scene, SceneError, Swarm, Water,
+    moving_solid::{MAX_MOVING_SOLIDS, MovingSolid},
+    origin, projection,
+    words::{chain, extent, shown, shown_all},
+};
+
+pub(super) use solver::{CHEBYSHEV_RELAXATION, RELAXATION};
+
+/// Largest number of particles of a scene: ids have 32 bits, and 2²⁷ particles of 200
+/// bytes take 25 GiB.
+const MAX_PARTICLES: f64 = 134_217_728.0;
+
+/// Largest distance between adjacent coordinates of a mesh file, particle spacings; a larger one
+/// degrades the shape.
+const MOST_STEP: f64 = 0.01;
+
+/// Least edge of the domain, metres; equal to the least particle spacing.
+const LEAST_EDGE: f64 = 1e-8;
+
+type Result<T> = std::result::Result<T, SceneError>;
+
+/// Initial particle lattice of the chosen solver.
+struct Lattice {
+    spacing: f64,
+    /// Key that determines its spacing.
+    key: &'static str,
+    /// Least distance between two walls, metres.
+    least_gap: f64,
+}
+
+/// Builds the scene.
+pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Result<Scene> {
+    let shot = spec.shot;
+    let domain = domain(doc, &spec.domain)?;
+    let (solver, lattice) = solver::solver(doc, spec.solver, &domain)?;
+    let periodic = periodic::read(doc, &spec.domain.periodic)?;
+    periodic::check_solver(doc, periodic, &domain, &solver)?;
+    let between = spec.effects.act_between_projections();
+    let no_slip = no_slip::build(doc, &spec.domain, (solver.method, between), periodic)?;
+    let water = water(doc, base_dir, &spec.water, &domain, &lattice)?;
+    periodic::check_gravity(doc, periodic, water.gravity)?;
+    let around = wave_maker::Surroundings {
+        base_dir,
+        domain: &domain,
+        gravity: water.gravity,
+        least_gap: lattice.least_gap,
+        spacing: lattice.spacing,
+        shot: &shot,
+    };
+    let (solids, moving_solids) = solids(doc, &spec.solid, &around)?;
+    let moving = (0..spec.solid.len()).filter(|&k| spec.solid[k].moves());
+    let moving: Vec<usize> = moving.collect();
+    periodic::check_solids(doc, periodic, &moving_solids, |k| moving[k])?;
+    let wave_makers = wave_maker::build_all(doc, &spec.wave_maker, &around)?;
+    periodic::check_makers(doc, periodic, &wave_makers)?;
+    let around = sources::Around {
+        domain: &domain,
+        shot: &shot,
+        gravity: water.gravity,
+        spacing: lattice.spacing,
+        solids: &solids,
+        mesh: &|path, spec| placed_mesh(doc, base_dir, path, "file", (spec, lattice.spacing)),
+        block: &|path, spec| bounds(doc, path, spec),
+    };
+    let emitters = sources::emitters(doc, &spec.emitter, &around)?;
+    let drains = sources::drains(doc, &spec.drain, &around)?;
+    let entering = swell_scene::sources::most_entering(&emitters, lattice.spacing, &shot);
+    check_particle_count(doc, &water, entering, &domain, &lattice)?;
+    let around = effects::Surroundings {
+        domain: &domain,
+        periodic,
+        wave_makers: &wave_makers,
+        gravity: water.gravity,
+        least_length: 2.0 * lattice.spacing,
+        has_projection: solver.method == Method::Flip || solver.pbf().grid_projection,
+    };
+    effects::check(&spec.effects, doc, &around)?;
+    let grids = match &spec.grids {
+        Some(table) => Some(grids::build(doc, table, &domain, &solver)?),
+        None => None,
+    };
+    let kept = (spec.keep.as_ref().map(|table| keep::build(doc, table))).transpose()?;
+    let is_moving: Vec<bool> = spec.solid.iter().map(MeshSpec::moves).collect();
+    let around = probe::Around {
+        domain: &domain,
+        periodic,
+        shot: &shot,
+        solver: &solver,
+        solids: &solids,
+        moving: moving_solids.iter().map(|solid| &solid.placed).collect(),
+        is_moving: &is_moving,
+    };
+    let probes = probe::build_all(doc, &spec.probe, &around)?;
+    let duration = shot.duration();
+    let speeds = (wave_makers
+        .iter()
+        .map(|maker| maker.motion.peak_speed(0.0, duration)))
+    .chain((moving_solids.iter()).map(|solid| solid.peak_speed(0.0, duration)));
+    let scales = budget::Scales {
+        fall: (2.0 * water.gravity.length() * domain.size().length()).sqrt(),
+        push: speeds.fold(0.0, f64::max),
+        wind: spec.effects.push().speed + spec.effects.frees(projection::grain(&water, &solver)),
+        spacing: lattice.spacing,
+    };
+    let budget = budget::build(doc, &spec.budget, &shot, &solver, &scales)?;
+    let scene = Scene {
+        shot,
+        origin: origin::of(&domain),
+        domain,
+        no_slip,
+        periodic,
+        water,
+        solids,
+        moving_solids,
+        wave_makers,
+        emitters,
+        drains,
+        solver,
+        grids,
+        keep: kept.map(|it| it.particles),
+        compression: kept.and_then(|it| it.compression),
+        probes,
+        budget,
+        effects: spec.effects,
+        absorbers: AbsorberStates::default(),
+    };
+    Ok(scene.into_local())
+}
+
+/// Builds the static solids and the moving ones.
+fn solids(
+    doc: &Document<'_>,
+    specs: &[MeshSpec],
+    around: &wave_maker::Surroundings<'_>,
+) -> Result<(Vec<PlacedMesh>, Vec<MovingSolid>)> {
+    let (mut solids, mut moving) = (Vec::new(), Vec::new());
+    for (index, spec) in specs.iter().enumerate() {
+        let path = format!("solid[{index}]");
+        if !spec.moves() {
+            solids.push(static_solid(doc, &path, spec, around)?);
+            continue;
+        }
+        let key = match (&spec.track, &spec.motion) {
+            (Some(_), _) => "track",
+            (None, Some(_)) => "motion",
+            (None, None) => "turn",
+        };
+        let place = format!("{path}.{key}");
+        if moving.len() == MAX_MOVING_SOLIDS {
+            let problem = format!("at most {MAX_MOVING_SOLIDS} solids can move");
+            return Err(doc.fault_of_plain(&place, problem));
+        }
+        let placed = placed_mesh(doc, around.base_dir, &path, "mesh", (spec, around.spacing))?;
+        moving.push(moving_solid::build(doc, &path, placed, spec, around)?);
+    }
+    Ok((solids, moving))
+}
+
+/// Reads the domain.
+fn domain(doc: &Document<'_>, spec: &DomainSpec) -> Result<Bounds> {
+    let DomainSpec { min, max, .. } = *spec;
+    let domain = bounds(doc, "domain", &BoxSpec { min, max })?;
+    let size = domain.size();
+    if size.min_element() >= LEAST_EDGE {
+        return Ok(domain);
+    }
+    let problem = format!("its edges are {} m", shown_all(&size.to_array()));
+    Err(doc.fault_of("domain.max", problem))
+}
+
+/// Reads a box and checks that its edges are positive.
+fn bounds(doc: &Document<'_>, path: &str, spec: &BoxSpec) -> Result<Bounds> {
+    let [min, max] = [spec.min, spec.max].map(DVec3::from_array);
+    for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
+        if min[axis] >= max[axis] {
+            let problem = format!(
+                "the box is inverted: {name} ends at {} but starts at {}",
+                shown(max[axis]),
+                shown(min[axis])
+            );
+            return Err(doc.fault_of(&format!("{path}.max"), problem));
+        }
+    }
+    Ok(Bounds { min, max })
+}
+
+fn water(
+    doc: &Document<'_>,
+    base_dir: &Path,
+    spec: &WaterSpec,
+    domain: &Bounds,
+    lattice: &Lattice,
+) -> Result<Water> {
+    let mut water = Water {
+        rest_density: spec.rest_density,
+        gravity: DVec3::from_array(spec.gravity),
+        blocks: Vec::new(),
+        meshes: Vec::new(),
+        particles: Vec::new(),
+    };
+    for (index, block) in spec.block.iter().enumerate() {
+        let path = format!("water.block[{index}]");
+        water
+            .blocks
+            .push(water_block(doc, &path, block, domain, lattice)?);
+    }
+    for (index, mesh) in spec.mesh.iter().enumerate() {
+        let path = format!("water.mesh[{index}]");
+        water.meshes.push(water_mesh(
+            doc,
+            base_dir,
+            &path,
+            mesh,
+            (domain, lattice.spacing),
+        )?);
+    }
+    for (index, swarm) in spec.particles.iter().enumerate() {
+        let path = format!("water.particles[{index}].at");
+        water
+            .particles
+            .push(self::swarm(doc, &path, swarm, domain)?);
+    }
+    Ok(water)
+}
+
+fn water_mesh(
+    doc: &Document<'_>,
+    base_dir: &Path,
+    path: &str,
+    spec: &MeshSpec,
+    (domain, spacing): (&Bounds, f64),
+) -> Result<PlacedMesh> {
+    let placed = placed_mesh(doc, base_dir, path, "file", (spec, spacing))?;
+    if placed
+        .mesh
+        .bounds()
+        .is_some_and(|b| fits(&b, domain, placed.rounding))
+    {
+        return Ok(placed);
+    }
+    let problem = format!(
+        "the water does not fit: it spans {}, the domain spans {}",
+        extent(placed.mesh.bounds()),
+        extent(Some(*domain))
+    );
+    Err(doc.fault_of(&format!("{path}.file"), problem))
+}
+
+fn swarm(doc: &Document<'_>, path: &str, spec: &SwarmSpec, domain: &Bounds) -> Result<Swarm> {
+    let at: Vec<_> = spec.at.iter().copied().map(DVec3::from_array).collect();
+    // A NaN is in no box.
+    if let Some(p) = at.iter().find(|p| !domain.contains(**p)) {
+        let problem = format!(
+            "{} is not in the domain, {}",
+            shown_all(&p.to_array()),
+            extent(Some(*domain))
+        );
+        return Err(doc.fault_of(path, problem));
+    }
+    Ok(Swarm {
+        at,
+        velocity: DVec3::from_array(spec.velocity),
+    })
+}
+
+fn water_block(
+    doc: &Document<'_>,
+    path: &str,
+    spec: &BoxSpec,
+    domain: &Bounds,
+    lattice: &Lattice,
+) -> Result<Bounds> {
+    let block = bounds(doc, path, spec)?;
+    if !fits(&block, domain, DVec3::ZERO) {
+        let corner = Bounds {
+            min: block.min,
+            max: block.min,
+        };
+        let name = if fits(&corner, domain, DVec3::ZERO) {
+            "max"
+        } else {
+            "min"
+        };
+        let problem = format!(
+            "the water does not fit: the block spans {}, the domain spans {}",
+            extent(Some(block)),
+            extent(Some(*domain))
+        );
+        return Err(doc.fault_of(&format!("{path}.{name}"), problem));
+    }
+    if sampling::block_dims(&block, domain, lattice.spacing).contains(&0) {
+        let size = block.size();
+        let problem = format!(
+            "the block, {} × {} × {} m, is too thin for one layer of particles {} m apart",
+            shown(size.x),
+            shown(size.y),
+            shown(size.z),
+            shown(lattice.spacing)
+        );
+        return Err(doc.fault_of(&format!("{path}.max"), problem));
+    }
+    Ok(block)
+}
+
+fn check_particle_count(
+    doc: &Document<'_>,
+    water: &Water,
+    entering: f64,
+    domain: &Bounds,
+    lattice: &Lattice,
+) -> Result<()> {
+    let d = lattice.spacing;
+    let in_blocks = water
+        .blocks
+        .iter()
+        .map(|block| {
+            sampling::block_dims(block, domain, d)
+                .map(|n| n as f64)
+                .iter()
+                .product::<f64>()
+        })
+        .sum::<f64>();
+    // A mesh is filled on a grid over its bounds, which must fit as well.
+    let in_meshes = water
+        .meshes
+        .iter()
+        .filter_map(|m| m.mesh.bounds())
+        .map(|b| b.volume() / d.powi(3))
+        .sum::<f64>();
+    let placed: usize = water.particles.iter().map(|swarm| swarm.at.len()).sum();
+    let count = in_blocks + in_meshes + placed as f64 + entering;
+    if count > MAX_PARTICLES {
+        let problem = format!(
+            "the water would take about {count:.3e} particles {} m apart",
+            shown(d)
+        );
+        return Err(doc.fault_of(lattice.key, problem));
+    }
+    Ok(())
+}
+
+fn static_solid(
+    doc: &Document<'_>,
+    path: &str,
+    spec: &MeshSpec,
+    around: &wave_maker::Surroundings<'_>,
+) -> Result<PlacedMesh> {
+    let domain = around.domain;
+    let placed = placed_mesh(doc, around.base_dir, path, "mesh", (spec, around.spacing))?;
+    let overlaps = placed
+        .mesh
+        .bounds()
+        .is_some_and(|b| comes_into(&b, domain, placed.rounding));
+    if overlaps {
+        return Ok(placed);
+    }
+    let problem = format!(
+        "the mesh lies outside the domain: it spans {}, the domain spans {}",
+        extent(placed.mesh.bounds()),
+        extent(Some(*domain))
+    );
+    Err(doc.fault_of(&format!("{path}.mesh"), problem))
+}
+
+/// Reads the mesh of the table at `path`, whose file is in the key `name`, for particles
+/// `spacing` metres apart.
+fn placed_mesh(
+    doc: &Document<'_>,
+    base_dir: &Path,
+    path: &str,
+    name: &str,
+    (spec, spacing): (&MeshSpec, f64),
+) -> Result<PlacedMesh> {
+    let key = format!("{path}.{name}");
+    let fail = |problem: String| doc.fault_of(&key, problem);
+    let file = doc.find(base_dir, &key, &spec.file)?;
+    let bytes = MeshFormat::of(&file)
+        .and_then(|format| Ok((format, mesh_file::read_bytes(&file)?)))
+        .and_then(|(format, bytes)| Ok((Loaded::from_bytes(&bytes, format, &file)?, bytes)));
+    let (loaded, bytes) = bytes.map_err(|error| fail(chain(&error)))?;
+    let file_hash = blake3::hash(&bytes).to_hex().to_string();
+    if spec.blake3.as_ref().is_some_and(|hash| *hash != file_hash) {
+        let problem = format!("{} has BLAKE3 {file_hash}", file.display());
+        return Err(doc.fault_of(&format!("{path}.blake3"), problem));
+    }
+    let placement = Placement {
+        translate: DVec3::from_array(spec.translate),
+        rotate_degrees: DVec3::from_array(spec.rotate_degrees),
+        scale: spec.scale.into(),
+    };
+    let coarse = coarse(&loaded, &placement, spacing);
+    let rounding = placement.rounding(loaded.rounding());
+    let mesh = loaded.mesh.transformed(&placement.world_from_file());
+    let holes = mesh
+        .check_inside()
+        .map_err(|error| fail(format!("{}: {error}", file.display())))?;
+    Ok(PlacedMesh {
+        file,
+        file_hash,
+        placement,
+        mesh,
+        holes,
+        rounding: rounding.min(DVec3::splat(MOST_STEP * spacing)),
+        faults: [loaded.crossing, coarse].into_iter().flatten().collect(),
+    })
+}
+
+/// Warns if the coordinates are so far from zero that 32-bit floats do not resolve particles.
+fn coarse(loaded: &Loaded, placement: &Placement, spacing: f64) -> Option<String> {
+    let reach = placement.rounding(2.0 * loaded.rounding());
+    let step = reach.max_element();
+    (loaded.digits == Digits::Single && step > MOST_STEP * spacing).then(|| {
+        format!(
+            "32-bit floats near its coordinate {} are {step:.2e} m apart, more than {MOST_STEP} of \
+             the particle spacing of {} m; save it near its own origin and move it with translate, \
+             or save it as text with all digits, such as OBJ",
+            shown(loaded.farthest()),
+            shown(spacing)
+        )
+    })
+}

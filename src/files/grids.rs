@@ -1,0 +1,55 @@
+//! Reads `[grids]`: grids written with each frame beside its particles.
+
+use serde::Deserialize;
+
+use swell_domain::{
+    bounds::Bounds,
+    sparse_grid::{EDGE, Precision},
+    surface::{MAX_BRICKS, Raster},
+};
+use swell_scene::{Method, SceneError, Solver, grids::Grids, words::shown};
+
+use super::document::Document;
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct GridsSpec {
+    surface: bool,
+    velocity: bool,
+    voxel_size: Option<f64>,
+    precision: Precision,
+}
+
+/// Builds the settings for the chosen solver.
+pub(super) fn build(
+    doc: &Document<'_>,
+    spec: &GridsSpec,
+    domain: &Bounds,
+    solver: &Solver,
+) -> Result<Grids, SceneError> {
+    let (spacing, cell_size) = match solver.method {
+        Method::Pbf => {
+            let spacing = solver.pbf().particle_spacing;
+            (spacing, 2.0 * spacing)
+        }
+        Method::Flip => (solver.flip().particle_spacing(), solver.flip().cell_size),
+    };
+    if let Some(size) = spec.voxel_size {
+        let bricks = (domain.size() / (size * f64::from(EDGE))).ceil();
+        let fits = bricks.element_product() <= MAX_BRICKS;
+        if !(Raster::VOXEL_RATIO.contains(&(size / spacing)) && fits) {
+            let problem = format!("{} is out of range", shown(size));
+            return Err(doc.fault_of("grids.voxel_size", problem));
+        }
+    }
+    if !(spec.surface || spec.velocity) {
+        let problem = "neither surface nor velocity is requested";
+        return Err(doc.fault_of("grids.surface", problem));
+    }
+    Ok(Grids {
+        surface: spec.surface,
+        velocity: spec.velocity,
+        voxel_size: spec.voxel_size.unwrap_or(cell_size),
+        precision: spec.precision,
+    })
+}

@@ -1,0 +1,10 @@
+//! Tests of scenes' methods that need a scene from a file.
+
+mod absorption;
+mod budget;
+mod generation_zone;
+mod lint;
+mod lint_solids;
+mod lint_water;
+mod origin;
+mod step;

@@ -1,0 +1,390 @@
+//! Whitewater settings: how a stream of spray, foam and bubbles is derived from a finished bake.
+//! They do not affect the bake's physics.
+
+use std::{fmt::Write as _, path::Path};
+
+use serde::Deserialize;
+
+use super::{
+    document::Document,
+    key::{Interval, Key},
+};
+use swell_domain::{
+    text,
+    whitewater::{Settings, Thresholds},
+};
+use swell_scene::SceneError;
+
+/// Radius of whitewater particles, metres, from mist to a bucket.
+const RADIUS: Interval = 1e-6..=10.0;
+const RATE: Interval = 0.0..=1e7;
+const POTENTIAL: Interval = 0.0..=1e9;
+const SECONDS: Interval = 1e-4..=1e6;
+
+/// Default range of radii, particle spacings.
+const RADII: [f64; 2] = [0.025, 0.08];
+
+pub(super) const KEYS: &[Key] = &[
+    Key::whole("seed", 0..=u32::MAX)
+        .default("0")
+        .about("of all random numbers"),
+    Key::whole("max_particles", 1..=200_000_000)
+        .default("4000000")
+        .about("a frame with more ends the job, its last good frame kept"),
+    Key::vector("radius", 2, RADIUS)
+        .unit("metres")
+        .computed(|| format!("{} and {} particle spacings", RADII[0], RADII[1]))
+        .also(", rising")
+        .about("least and greatest radius of a whitewater particle, as it is drawn"),
+    Key::table("emission", EMISSION)
+        .default("{}")
+        .about("Where whitewater is born, and how much (Ihmsen et al. 2012)"),
+    Key::table("spray", SPRAY)
+        .default("{}")
+        .about("Drops in the air"),
+    Key::table("foam", FOAM)
+        .default("{}")
+        .about("What floats on the surface"),
+    Key::table("bubbles", BUBBLES)
+        .default("{}")
+        .about("Air under the surface"),
+];
+
+const EMISSION: &[Key] = &[
+    Key::number("trapped_air_rate", RATE)
+        .unit("1/s")
+        .default("250.0")
+        .about("born a second of one water particle where water meets water hardest; 0: none"),
+    Key::number("wave_crest_rate", RATE)
+        .unit("1/s")
+        .default("250.0")
+        .about("the same at the sharpest crests"),
+    Key::vector("trapped_air", 2, POTENTIAL)
+        .unit("m/s")
+        .computed(|| "what the shot gives".to_owned())
+        .also(", rising")
+        .about("from where to where the potential of trapped air grows from 0 to 1"),
+    Key::vector("wave_crest", 2, POTENTIAL)
+        .computed(|| "what the shot gives".to_owned())
+        .also(", rising")
+        .about("the same of wave crests"),
+    Key::vector("energy", 2, POTENTIAL)
+        .unit("J/kg")
+        .computed(|| "what the shot gives".to_owned())
+        .also(", rising")
+        .about("the same of v²/2, which the other two are multiplied by"),
+];
+
+const SPRAY: &[Key] = &[
+    Key::number("drop_radius", RADIUS)
+        .unit("metres")
+        .default("0.001")
+        .about("of the drops that a particle of spray stands for; the air slows small ones more"),
+    Key::vector("wind", 3, -1e3..=1e3)
+        .unit("m/s")
+        .default("[0.0, 0.0, 0.0]")
+        .about("velocity of the air"),
+];
+
+const FOAM: &[Key] = &[
+    Key::vector("lifetime", 2, SECONDS)
+        .unit("seconds")
+        .default("[0.5, 4.0]")
+        .also(", rising")
+        .about("least and greatest; a stronger cause leaves foam that lives longer"),
+    Key::whole("crowd", 1..=1_000_000)
+        .default("64")
+        .about("foam in a cube of one spacing from which on it dies faster"),
+];
+
+const BUBBLES: &[Key] = &[
+    Key::number("rise_speed", 0.0..=10.0)
+        .unit("m/s")
+        .default("0.25")
+        .about(
+            "through still water; bubbles of 1 to 10 mm rise at 0.2 to 0.3 m/s \
+             (Clift, Grace and Weber 1978)",
+        ),
+    Key::number("response", SECONDS)
+        .unit("seconds")
+        .default("0.1")
+        .about("how fast a bubble takes on what the water about it does"),
+];
+
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct WhitewaterSpec {
+    seed: u32,
+    max_particles: u32,
+    radius: Option<[f64; 2]>,
+    emission: EmissionSpec,
+    spray: SpraySpec,
+    foam: FoamSpec,
+    bubbles: BubblesSpec,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct EmissionSpec {
+    trapped_air_rate: f64,
+    wave_crest_rate: f64,
+    trapped_air: Option<[f64; 2]>,
+    wave_crest: Option<[f64; 2]>,
+    energy: Option<[f64; 2]>,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SpraySpec {
+    drop_radius: f64,
+    wind: [f64; 3],
+}
+
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FoamSpec {
+    lifetime: [f64; 2],
+    crowd: u32,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct BubblesSpec {
+    rise_speed: f64,
+    response: f64,
+}
+
+/// A validated settings file. Values that depend on the shot may be open.
+#[derive(Clone, Debug)]
+pub struct WhitewaterSettings {
+    spec: WhitewaterSpec,
+}
+
+impl WhitewaterSettings {
+    /// Reads, parses and validates a settings file.
+    ///
+    /// # Errors
+    /// If the file cannot be read, or for its first fault, with line, key and allowed values.
+    pub fn load(path: &Path) -> Result<Self, SceneError> {
+        let text = text::read(path).map_err(|source| SceneError::Read {
+            file: path.to_owned(),
+            source,
+        })?;
+        Self::parse(&text, path)
+    }
+
+    /// Parses and validates the text of a settings file; `file` names it in messages.
+    ///
+    /// # Errors
+    /// Those of [`Self::load`].
+    pub fn parse(text: &str, file: &Path) -> Result<Self, SceneError> {
+        let (doc, mut root) = Document::parse(text, file, &[], KEYS)?;
+        doc.settle(&mut root)?;
+        let spec = WhitewaterSpec::deserialize(toml::Deserializer::from(root))
+            .map_err(|error| doc.translate(&error))?;
+        let rising = [
+            ("radius", spec.radius, true),
+            ("emission.trapped_air", spec.emission.trapped_air, false),
+            ("emission.wave_crest", spec.emission.wave_crest, false),
+            ("emission.energy", spec.emission.energy, false),
+            ("foam.lifetime", Some(spec.foam.lifetime), true),
+        ];
+        for (key, values, may_be_equal) in rising {
+            if let Some([least, greatest]) = values
+                && (greatest < least || (greatest == least && !may_be_equal))
+            {
+                let problem = format!("[{least}, {greatest}] is not ascending");
+                return Err(doc.fault_of(key, problem));
+            }
+        }
+        Ok(Self { spec })
+    }
+
+    /// Whether thresholds of emission must be calibrated from the shot.
+    pub fn needs_calibration(&self) -> bool {
+        let emission = &self.spec.emission;
+        [emission.trapped_air, emission.wave_crest, emission.energy]
+            .iter()
+            .any(Option::is_none)
+    }
+
+    /// Returns complete settings for a shot of this particle spacing, metres. `shot` supplies the
+    /// thresholds that the file leaves open.
+    pub fn settled(&self, spacing: f64, shot: &Thresholds) -> Settings {
+        let WhitewaterSpec {
+            seed,
+            max_particles,
+            radius,
+            emission,
+            spray,
+            foam,
+            bubbles,
+        } = &self.spec;
+        Settings {
+            seed: *seed,
+            max_particles: *max_particles,
+            radius: radius.unwrap_or(RADII.map(|part| part * spacing)),
+            trapped_air_rate: emission.trapped_air_rate,
+            wave_crest_rate: emission.wave_crest_rate,
+            thresholds: Thresholds {
+                trapped_air: emission.trapped_air.unwrap_or(shot.trapped_air),
+                wave_crest: emission.wave_crest.unwrap_or(shot.wave_crest),
+                energy: emission.energy.unwrap_or(shot.energy),
+            },
+            drop_radius: spray.drop_radius,
+            wind: spray.wind,
+            lifetime: foam.lifetime,
+            crowd: foam.crowd,
+            rise_speed: bubbles.rise_speed,
+            response: bubbles.response,
+        }
+    }
+
+    /// Returns the BLAKE3 hash of all values including defaults, hexadecimal; the layout of the
+    /// file does not affect it.
+    pub fn hash(&self) -> String {
+        // `Debug` prints the shortest exact text of a float, so equal values, and only those,
+        // have equal text.
+        blake3::hash(format!("{:?}", self.spec).as_bytes())
+            .to_hex()
+            .to_string()
+    }
+}
+
+/// Returns a file with all settings, which [`WhitewaterSettings::parse`] reads back.
+pub fn written_out(settings: &Settings) -> String {
+    let Settings {
+        seed,
+        max_particles,
+        radius,
+        trapped_air_rate,
+        wave_crest_rate,
+        thresholds,
+        drop_radius,
+        wind,
+        lifetime,
+        crowd,
+        rise_speed,
+        response,
+    } = settings;
+    let mut text = format!("seed = {seed}\nmax_particles = {max_particles}\nradius = {radius:?}\n");
+    let mut table = |name: &str, rows: &[(&str, String)]| {
+        // Writing to a string does not fail.
+        let _ = write!(text, "\n[{name}]\n");
+        for (key, value) in rows {
+            let _ = writeln!(text, "{key} = {value}");
+        }
+    };
+    table(
+        "emission",
+        &[
+            ("trapped_air_rate", format!("{trapped_air_rate:?}")),
+            ("wave_crest_rate", format!("{wave_crest_rate:?}")),
+            ("trapped_air", format!("{:?}", thresholds.trapped_air)),
+            ("wave_crest", format!("{:?}", thresholds.wave_crest)),
+            ("energy", format!("{:?}", thresholds.energy)),
+        ],
+    );
+    table(
+        "spray",
+        &[
+            ("drop_radius", format!("{drop_radius:?}")),
+            ("wind", format!("{wind:?}")),
+        ],
+    );
+    table(
+        "foam",
+        &[
+            ("lifetime", format!("{lifetime:?}")),
+            ("crowd", crowd.to_string()),
+        ],
+    );
+    table(
+        "bubbles",
+        &[
+            ("rise_speed", format!("{rise_speed:?}")),
+            ("response", format!("{response:?}")),
+        ],
+    );
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parse(text: &str) -> Result<WhitewaterSettings, SceneError> {
+        WhitewaterSettings::parse(text, Path::new("w.toml"))
+    }
+
+    fn shot() -> Thresholds {
+        Thresholds {
+            trapped_air: [7.0, 30.0],
+            wave_crest: [2.5, 9.0],
+            energy: [0.5, 4.0],
+        }
+    }
+
+    #[test]
+    fn an_empty_file_leaves_the_rest_to_the_shot() {
+        let settings = parse("").expect("valid");
+        assert!(settings.needs_calibration());
+        let settled = settings.settled(0.1, &shot());
+        assert_eq!(settled.thresholds, shot());
+        assert_eq!(settled.radius, RADII.map(|part| part * 0.1));
+        let own = "[emission]\ntrapped_air = [1, 2]\nwave_crest = [3, 4]\nenergy = [5, 6]\n";
+        let settings = parse(own).expect("valid");
+        assert!(!settings.needs_calibration());
+        assert_eq!(settings.settled(0.1, &shot()).thresholds.energy, [5.0, 6.0]);
+    }
+
+    #[test]
+    fn what_is_written_out_reads_back_as_the_same() {
+        let text = "seed = 5\nradius = [0.001, 0.002]\n[emission]\ntrapped_air_rate = 12.5\n\
+            [spray]\nwind = [1, -2.5, 0]\n\
+            [foam]\nlifetime = [1, 2]\ncrowd = 3\n[bubbles]\nrise_speed = 0.1\nresponse = 0.5\n";
+        let settled = parse(text).expect("valid").settled(0.1, &shot());
+        let written = written_out(&settled);
+        let again = parse(&written).expect("what was written");
+        let other = Thresholds {
+            energy: [0.0, 1.0],
+            ..shot()
+        };
+        // The file is complete: neither spacing nor shot changes the result.
+        assert_eq!(again.settled(9.0, &other), settled);
+        assert!(!again.needs_calibration());
+    }
+
+    #[test]
+    fn hashes_are_of_the_content() {
+        let hash = |text: &str| parse(text).expect("valid").hash();
+        assert_eq!(hash(""), hash("[foam]\ncrowd = 64 # the default\n"));
+        assert_ne!(hash(""), hash("[foam]\ncrowd = 15\n"));
+        assert_ne!(hash(""), hash("[emission]\nenergy = [1, 2]\n"));
+    }
+
+    #[test]
+    fn faults_name_file_line_key_and_what_is_allowed() {
+        for (text, words) in [
+            (
+                "[foam]\nlifetime = [4, 1]",
+                &["w.toml:2", "foam.lifetime", "rising"][..],
+            ),
+            (
+                "[emission]\nenergy = [1, 1]",
+                &["w.toml:2", "emission.energy", "ascending"],
+            ),
+            ("[foam]\nlife = 1", &["w.toml:2", "lifetime"]),
+            (
+                "[spray]\ndrop_radius = -1",
+                &["w.toml:2", "spray.drop_radius"],
+            ),
+            ("max_particles = 0", &["w.toml:1", "max_particles"]),
+        ] {
+            let found = parse(text).expect_err("a fault").to_string();
+            for word in words {
+                assert!(found.contains(word), "{found}: {word}");
+            }
+        }
+    }
+}
