@@ -2,6 +2,8 @@
 
 use std::{fmt, io, path::PathBuf};
 
+use super::reach::ADVICE;
+
 /// Why a scene could not be loaded or compared.
 #[derive(Debug, thiserror::Error)]
 pub enum SceneError {
@@ -17,7 +19,7 @@ pub enum SceneError {
     #[error("{0}")]
     Fault(Box<Fault>),
     /// A malformed override.
-    #[error("--set {text}: {reason}")]
+    #[error("set {text}: {reason}")]
     Override {
         /// The override as given.
         text: String,
@@ -30,6 +32,13 @@ pub enum SceneError {
         /// Message of the parser.
         reason: String,
     },
+}
+
+impl SceneError {
+    /// Whether a path leads farther than its [`Reach`](crate::Reach) allows.
+    pub fn leads_out(&self) -> bool {
+        matches!(self, Self::Fault(fault) if fault.message.contains(ADVICE))
+    }
 }
 
 /// A fault in a file: its location, the key, what is wrong and what is allowed.
@@ -61,7 +70,7 @@ impl fmt::Display for Fault {
         write!(f, "{}", self.file.display())?;
         match &self.place {
             Place::Line(line) => write!(f, ":{line}")?,
-            Place::Override(text) => write!(f, " with --set {text}")?,
+            Place::Override(text) => write!(f, " with {text}")?,
             Place::Whole => {}
         }
         if !self.key.is_empty() {

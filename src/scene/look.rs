@@ -48,6 +48,13 @@ pub struct Window {
 #[error(transparent)]
 pub struct LookError(#[from] pub(super) SceneError);
 
+impl LookError {
+    /// Whether a path leads farther than its [`Reach`] allows.
+    pub fn leads_out(&self) -> bool {
+        self.0.leads_out()
+    }
+}
+
 const PANORAMA: &str = "sky.file";
 
 const METHOD: &str = "renderer.method";

@@ -9,9 +9,12 @@ pub enum Reach {
     /// Files below the folder of the file that names them, after symbolic links are resolved.
     #[default]
     Folder,
-    /// Any file that the user can read (`--allow-outside`).
+    /// Any file that the user can read.
     Anywhere,
 }
+
+/// What to do about a path that leads too far.
+pub(super) const ADVICE: &str = "copy it there, or allow files outside of it";
 
 impl Reach {
     /// Resolves `name` relative to `folder`.
@@ -33,7 +36,7 @@ impl Reach {
             return Ok(path);
         }
         Err(format!(
-            "{} leads out of the folder {}; copy it there, or allow it with --allow-outside",
+            "{} leads out of the folder {}; {ADVICE}",
             path.display(),
             real(folder).display()
         ))
@@ -164,7 +167,7 @@ mod tests {
         ] {
             let said = find(bad).expect_err(bad);
             assert!(
-                said.contains("leads out of the folder") && said.contains("--allow-outside"),
+                said.contains("leads out of the folder") && said.contains(ADVICE),
                 "{said}"
             );
             assert_eq!(
