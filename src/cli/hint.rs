@@ -181,3 +181,24 @@ fn study(error: &StudyError) -> Hint {
         _ => None,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn options_follow_what_an_error_advises() {
+        let exists = || CacheError::Exists { dir: "a b".into() };
+        let of_bake = BakeError::Cache(exists());
+        assert!(!of_bake.to_string().contains("--"));
+        assert!(crate::chain(&of_bake).ends_with("or choose another folder (--resume, -o)"));
+        let of_study = StudyError::Bake(BakeError::Cache(CacheError::OldFormat {
+            dir: "a b".into(),
+            found: 1,
+            newest: 2,
+        }));
+        assert_eq!(of(&of_study).as_deref(), Some("--from 'a b':FRAME, -o"));
+        // Without a bake there is nothing to resume.
+        assert_eq!(of(&exists()), None);
+    }
+}

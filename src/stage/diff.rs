@@ -222,14 +222,8 @@ pub fn diff(request: &Request) -> Result<Outcome, DiffError> {
     let is_baseline = matches!(b, Subject::Baseline(_));
     let tolerance = request.tolerance.as_ref();
     let misfits = [
-        (
-            request.images.is_some() && !is_render,
-            DiffError::NoImages,
-        ),
-        (
-            request.ignores_hashes && !is_baseline,
-            DiffError::NoHashes,
-        ),
+        (request.images.is_some() && !is_render, DiffError::NoImages),
+        (request.ignores_hashes && !is_baseline, DiffError::NoHashes),
         (
             is_render && tolerance.is_some_and(|t| t.pictures == PictureLimits::default()),
             DiffError::usage("the tolerance file has no [pictures]"),

@@ -8,7 +8,9 @@ fn literals(source: &str) -> Vec<String> {
     let mut found = Vec::new();
     let mut rest = source;
     while let Some(at) = rest.find(['"', '\'', '/', 'r']) {
-        let raw = rest[at..].strip_prefix('r').map(|it| it.split_at(hashes(it)));
+        let raw = rest[at..]
+            .strip_prefix('r')
+            .map(|it| it.split_at(hashes(it)));
         rest = &rest[at..];
         rest = if rest.starts_with("//") {
             &rest[rest.find('\n').unwrap_or(rest.len())..]
@@ -91,7 +93,12 @@ fn libraries_name_no_option() {
         seen += texts.len();
         // Advice to run OpenUSD's own program has options of it.
         let named = |text: &String| names_an_option(text) && !text.contains("usdcat");
-        found.extend(texts.into_iter().filter(named).map(|text| format!("{file}: {text}")));
+        found.extend(
+            texts
+                .into_iter()
+                .filter(named)
+                .map(|text| format!("{file}: {text}")),
+        );
     });
     assert!(seen > 5000, "{seen}");
     assert!(found.is_empty(), "{found:#?}");
@@ -118,7 +125,13 @@ fn an_option_in_a_literal_is_seen() {
     ];
     assert_eq!(found, expected);
     assert!(found.iter().all(|text| names_an_option(text)));
-    for sound in ["resume it, or choose another", "a -- b", "<!-- x", "one-off", "swell 0.1"] {
+    for sound in [
+        "resume it, or choose another",
+        "a -- b",
+        "<!-- x",
+        "one-off",
+        "swell 0.1",
+    ] {
         assert!(!names_an_option(sound), "{sound}");
     }
 }

@@ -15,7 +15,9 @@ pub(super) fn check(request: &Request) -> Result<(), ExportError> {
         .iter()
         .any(|it| matches!(it, Target::Usd(..)));
     if request.look.is_some() && !has_shot {
-        return asked("the look gives a USD shot its camera, but no USD shot is exported".to_owned());
+        return asked(
+            "the look gives a USD shot its camera, but no USD shot is exported".to_owned(),
+        );
     }
     let mut names = BTreeSet::new();
     for target in &request.targets {
