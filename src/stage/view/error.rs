@@ -14,7 +14,7 @@ pub enum ViewError {
     /// Nothing to make of the frames.
     #[error("nothing to make: ask for a sheet, a movie or a player")]
     Nothing,
-    /// A file, or a folder with a page or pictures, that no view made and that would be overwritten.
+    /// A file, or a folder with a page or pictures, that no view made and that would be replaced.
     #[error("{} was not made by a view: choose another folder", .0.display())]
     Foreign(PathBuf),
     /// A request that does not fit what is viewed, or nothing to show.
