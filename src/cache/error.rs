@@ -27,7 +27,7 @@ pub enum CacheError {
     /// A new bake was sent to a directory that holds other files.
     #[error(
         "{} contains files that do not belong to a cache ({found}) and was left untouched; choose \
-         another -o",
+         another folder",
         dir.display()
     )]
     Occupied {
@@ -38,8 +38,7 @@ pub enum CacheError {
     },
     /// A new bake was sent to a directory that already holds a bake.
     #[error(
-        "{} already holds a cache and was left untouched; continue it with --resume, or choose \
-         another -o",
+        "{} already holds a cache and was left untouched; resume it, or choose another folder",
         dir.display()
     )]
     Exists {
@@ -54,7 +53,7 @@ pub enum CacheError {
     },
     /// A bake cannot be resumed because this run differs in a field that decides its bytes.
     #[error(
-        "{} was baked with {field} = {cached}, and this run has {given}; choose another -o",
+        "{} was baked with {field} = {cached}, and this run has {given}; choose another folder",
         dir.display()
     )]
     OtherScene {
@@ -70,8 +69,8 @@ pub enum CacheError {
     /// A bake in an older format, which can be read but not resumed.
     #[error(
         "{} was baked in cache format {found}, and this program writes {newest}: begin from one of \
-         its frames with --from {}:FRAME and another -o, or bake it again",
-        dir.display(), dir.display()
+         its frames in another folder, or bake it again",
+        dir.display()
     )]
     OldFormat {
         /// The directory.
@@ -84,7 +83,7 @@ pub enum CacheError {
     /// A bake cannot be resumed with other probes: the existing frames were not observed by them.
     #[error(
         "{} was baked with {cached}, and this run has {given}: a probe records while a frame is \
-         computed, not afterwards; continue with the same probes, or choose another -o",
+         computed, not afterwards; continue with the same probes, or choose another folder",
         dir.display()
     )]
     OtherProbes {
@@ -97,7 +96,10 @@ pub enum CacheError {
     },
     /// A bake cannot be resumed because its frames began from another parent frame than this run
     /// asks for.
-    #[error("{} began from {cached}, and this run from {given}; choose another -o", dir.display())]
+    #[error(
+        "{} began from {cached}, and this run from {given}; choose another folder",
+        dir.display()
+    )]
     OtherParent {
         /// The directory.
         dir: PathBuf,

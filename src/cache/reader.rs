@@ -321,8 +321,8 @@ impl CacheReader {
             problems.push(Problem {
                 file: self.dir.join(ledger::FILE),
                 what: format!(
-                    "its last line is truncated after frame {}; --resume removes it (a running \
-                     bake may still be writing it)",
+                    "its last line is truncated after frame {}; a resumed bake removes it (a \
+                     running bake may still be writing it)",
                     self.last_frame()
                 ),
             });

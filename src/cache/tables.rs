@@ -80,7 +80,7 @@ impl Table<'_> {
     fn problem(&self, dir: &Path, entries: &[Entry]) -> Option<String> {
         let found = match std::fs::read(self.path(dir)) {
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
-                return Some("it is missing; --resume rewrites it".to_owned());
+                return Some("it is missing; a resumed bake rewrites it".to_owned());
             }
             Err(error) => return Some(format!("it cannot be read: {error}")),
             Ok(found) => found,
@@ -93,8 +93,8 @@ impl Table<'_> {
         let same = differs.unwrap_or(found.len().min(expected.len()));
         let line = 1 + expected[..same].iter().filter(|&&b| b == b'\n').count();
         Some(format!(
-            "line {line} differs from the ledger; --resume rewrites the file (a running bake may \
-             still be writing it)"
+            "line {line} differs from the ledger; a resumed bake rewrites the file (a running \
+             bake may still be writing it)"
         ))
     }
 }

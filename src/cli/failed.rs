@@ -11,7 +11,7 @@ use super::{
 use swell_domain::frame_range::ranges;
 
 /// Reports a frame that failed.
-pub(super) fn frame_failed(progress: &Progress, frame: u32, error: &dyn Error) {
+pub(super) fn frame_failed(progress: &Progress, frame: u32, error: &(dyn Error + 'static)) {
     let message = chain(error);
     progress.frame(
         &format!("frame {frame:4}  failed: {message}"),

@@ -7,6 +7,7 @@ mod diff;
 mod dry_run;
 mod export;
 mod failed;
+mod hint;
 mod inspect;
 pub mod interrupt;
 mod keys;
@@ -321,8 +322,8 @@ fn is_cache(path: &Path) -> bool {
     path.is_dir() || (!path.exists() && path.extension().is_none_or(|end| end != "toml"))
 }
 
-/// An error and its causes on one line.
-fn chain(error: &dyn Error) -> String {
+/// An error, its causes, and the options that do what it advises, on one line.
+fn chain(error: &(dyn Error + 'static)) -> String {
     let mut text = error.to_string();
     let mut cause = error.source();
     while let Some(error) = cause {
@@ -333,7 +334,10 @@ fn chain(error: &dyn Error) -> String {
         }
         cause = error.source();
     }
-    text
+    match hint::of(error) {
+        Some(options) => format!("{text} ({options})"),
+        None => text,
+    }
 }
 
 /// A count with its noun: `1 frame`, `2 frames`.

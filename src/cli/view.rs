@@ -10,7 +10,7 @@ use clap::{Args, ValueEnum};
 use serde_json::json;
 
 use swell_domain::frame_range::FrameRange;
-use swell_stage::view::{Aspect, Event, Placing, Request, SHEET, view};
+use swell_stage::view::{Aspect, Event, Placing, RATE, Request, SHEET, view};
 
 use super::{
     Failure, bake, count,
@@ -201,7 +201,22 @@ fn tell(progress: &Progress, event: Event) {
                 json!({ "event": "ready", "frames": frames, "width": width, "height": height }),
             );
         }
-        Event::Note(text) => progress.say(&text, json!({ "event": "note", "text": text })),
+        Event::Note(text) => note(progress, &text),
+        Event::AssumedRate => note(
+            progress,
+            &format!(
+                "{RATE} frames a second is assumed: give another rate with --fps, or the cache \
+                 with --curves"
+            ),
+        ),
+        Event::PicturesBeside(bytes) => note(
+            progress,
+            &format!(
+                "the page's pictures are {} MB and are beside it in pictures/: move both together, \
+                 or take fewer (--frames), smaller (--width) or --pictures within",
+                bytes / 1_000_000
+            ),
+        ),
         Event::Warning(text) => progress.say(
             &format!("warning: {text}"),
             json!({ "event": "warning", "what": "view", "text": text }),
@@ -212,4 +227,8 @@ fn tell(progress: &Progress, event: Event) {
             json!({ "event": "frame", "frame": label }),
         ),
     }
+}
+
+fn note(progress: &Progress, text: &str) {
+    progress.say(text, json!({ "event": "note", "text": text }));
 }

@@ -10,7 +10,7 @@ use swell_domain::aggregates::Aggregates;
 /// (lengths in particle spacings, everything else in its own unit), relative limit, reason. They
 /// are wide enough for water after an impact with either solver. The measurements are the largest
 /// over the shipped scenes in the frames that `tools/regress` bakes, with gravity changed in its
-/// last place (-9.81 to -9.810001, `swell diff --json`).
+/// last place (-9.81 to -9.810001, by a diff of the caches).
 const DEFAULT_TOLERANCES: [(&str, f64, f64, &str); 8] = [
     (
         "kinetic_energy",

@@ -1,4 +1,4 @@
-//! Shares of a range of frames or of the points of a study, as in `--chunk 1/4`.
+//! Shares of a range of frames or of the points of a study, written `1/4`.
 
 use std::{fmt, str::FromStr};
 

@@ -58,7 +58,7 @@ fn write(file: &Path, name: &str, command: &str) -> io::Result<Claim> {
         return serde_json::from_str(&text).map_err(|error| {
             io::Error::other(format!(
                 "{error}: it was truncated or changed; remove it if the folder holds results of \
-                 {name}, or choose another -o"
+                 {name}, or choose another folder"
             ))
         });
     }
@@ -85,7 +85,7 @@ mod tests {
         let error = take(&directory, "resolution").expect_err("another's");
         let said = error.to_string();
         assert!(
-            said.contains("the study dt, not of resolution") && said.contains("-o"),
+            said.contains("the study dt, not of resolution") && said.contains("another folder"),
             "{said}"
         );
         let claim = |directory: &Path| -> Claim {

@@ -64,13 +64,11 @@ pub enum StudyError {
         what: String,
     },
     /// The study cannot be divided into shares.
-    #[error(
-        "a study of kind {0} has no shares: its points share one cache; run it without --chunk"
-    )]
+    #[error("a study of kind {0} has no shares: its points share one cache; run all of it")]
     NoShares(&'static str),
     /// The folder contains results of another study.
     #[error(
-        "{} holds results of the study {found}, not of {name}; left untouched: choose another -o",
+        "{} holds results of the study {found}, not of {name}; left untouched: choose another folder",
         directory.display()
     )]
     OtherStudy {
@@ -81,6 +79,12 @@ pub enum StudyError {
         /// Study that was to be run.
         name: String,
     },
+    /// The folder contains files of something else than a study.
+    #[error("{} contains files that do not belong to a study; choose another folder", .0.display())]
+    Occupied(PathBuf),
+    /// The scene to write exists, and tuning did not make it.
+    #[error("{} exists and is not a tuned scene; choose another file", .0.display())]
+    NotTuned(PathBuf),
     /// A picture cannot be embedded in the page.
     #[error("{}", file.display())]
     Picture {
@@ -116,6 +120,8 @@ impl From<&StudyError> for Blame {
             StudyError::Point(_) | StudyError::NoShares(_) => Self::Input,
             StudyError::Stopped
             | StudyError::OtherStudy { .. }
+            | StudyError::Occupied(_)
+            | StudyError::NotTuned(_)
             | StudyError::File { .. }
             | StudyError::Picture { .. }
             | StudyError::Ledger { .. }

@@ -1,5 +1,5 @@
 //! Stored results, one line per finished point: `results.jsonl`, and for each share of a study
-//! (`--chunk 1/4`) a separate file beside it, `results.1-of-4.jsonl`, so that no two machines write
+//! (share 1 of 4) a separate file beside it, `results.1-of-4.jsonl`, so that no two machines write
 //! to the same file.
 //!
 //! A point in any ledger of the folder is not run again. A whole study copies the lines of shares
@@ -108,8 +108,7 @@ impl<M: Serialize + DeserializeOwned> Ledger<M> {
         let names = names(directory).map_err(fault(&path))?;
         let is_used = names.iter().any(|name| name != CLAIM);
         if is_used && !names.iter().any(|name| is_ledger(name)) {
-            let what = "it contains files that do not belong to a study; choose another -o";
-            return Err(fault(directory)(io::Error::other(what)));
+            return Err(StudyError::Occupied(directory.to_owned()));
         }
         // Takes the lock first, so that the ledger cannot change between reading and writing.
         let file = file.then(|| locked(&path)).transpose()?;

@@ -2,6 +2,8 @@
 
 use std::path::{Component, Path, PathBuf};
 
+use swell_scene::LEADS_OUT;
+
 /// How far the paths in a scene or a look may lead. A file from elsewhere must not read arbitrary
 /// files of the machine, and a cache that keeps copies must not carry them away.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -9,7 +11,7 @@ pub enum Reach {
     /// Files below the folder of the file that names them, after symbolic links are resolved.
     #[default]
     Folder,
-    /// Any file that the user can read (`--allow-outside`).
+    /// Any file that the user can read.
     Anywhere,
 }
 
@@ -33,7 +35,7 @@ impl Reach {
             return Ok(path);
         }
         Err(format!(
-            "{} leads out of the folder {}; copy it there, or allow it with --allow-outside",
+            "{} leads out of the folder {}; {LEADS_OUT}",
             path.display(),
             real(folder).display()
         ))
@@ -164,7 +166,7 @@ mod tests {
         ] {
             let said = find(bad).expect_err(bad);
             assert!(
-                said.contains("leads out of the folder") && said.contains("--allow-outside"),
+                said.contains("leads out of the folder") && said.contains(LEADS_OUT),
                 "{said}"
             );
             assert_eq!(

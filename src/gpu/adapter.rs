@@ -15,7 +15,7 @@ pub enum GpuError {
          `mesa-vulkan-drivers`, Fedora `mesa-vulkan-drivers`, Arch `vulkan-swrast`)"
     )]
     NoAdapter,
-    /// `--adapter` matches nothing.
+    /// No adapter has the number or name that was asked for.
     #[error(
         "no adapter matches `{request}`; give the number of one of these, or a part of its name:{}",
         list(available)
@@ -45,8 +45,8 @@ pub enum GpuError {
         /// Position and message.
         message: String,
     },
-    /// A shader of the `--shaders` folder does not compose or compile.
-    #[error("shader {name} of --shaders: {message}")]
+    /// A shader of the folder of edited ones does not compose or compile.
+    #[error("edited shader {name}: {message}")]
     EditedShader {
         /// Shader path.
         name: String,
@@ -66,7 +66,7 @@ pub enum GpuError {
     #[error(
         "pass {pass} binds {needed} storage buffers, and {adapter} allows {allowed} \
          (max_storage_buffers_per_shader_stage); use another adapter or a newer driver (of \
-         llvmpipe Mesa 22.3), or bake with --device cpu"
+         llvmpipe Mesa 22.3), or bake on the CPU"
     )]
     TooManyBuffers {
         /// Pass name.
@@ -149,7 +149,7 @@ fn instance() -> Instance {
     Instance::new(descriptor)
 }
 
-/// Lists all adapters of this machine in the driver's order, which `--adapter` indexes.
+/// Lists all adapters of this machine in the driver's order, in which a request numbers them.
 pub fn enumerate() -> Vec<Adapter> {
     pollster::block_on(instance().enumerate_adapters(Backends::all()))
 }

@@ -78,7 +78,7 @@ impl Composed {
 #[derive(Debug, thiserror::Error)]
 pub enum ShadersError {
     /// A file or folder cannot be read.
-    #[error("--shaders: cannot read {}", file.display())]
+    #[error("cannot read the shaders in {}", file.display())]
     Unreadable {
         /// Path concerned.
         file: PathBuf,
@@ -87,7 +87,7 @@ pub enum ShadersError {
     },
     /// A shipped file has no counterpart in the folder.
     #[error(
-        "--shaders {}: it lacks {file}; begin from a copy of the whole folder \
+        "the edited shaders in {} lack {file}; begin from a copy of the whole folder \
          shaders/ of swell's source",
         folder.display()
     )]

@@ -2,6 +2,9 @@
 
 use std::{fmt, io, path::PathBuf};
 
+/// What to do about a path that leads out of the folder of the file that names it.
+pub const LEADS_OUT: &str = "copy it there, or allow files outside of it";
+
 /// Why a scene could not be loaded or compared.
 #[derive(Debug, thiserror::Error)]
 pub enum SceneError {
@@ -17,7 +20,7 @@ pub enum SceneError {
     #[error("{0}")]
     Fault(Box<Fault>),
     /// A malformed override.
-    #[error("--set {text}: {reason}")]
+    #[error("set {text}: {reason}")]
     Override {
         /// The override as given.
         text: String,
@@ -30,6 +33,13 @@ pub enum SceneError {
         /// Message of the parser.
         reason: String,
     },
+}
+
+impl SceneError {
+    /// Whether a path leads farther than the file may reach.
+    pub fn leads_out(&self) -> bool {
+        matches!(self, Self::Fault(fault) if fault.message.contains(LEADS_OUT))
+    }
 }
 
 /// A fault in a file: its location, the key, what is wrong and what is allowed.
@@ -61,7 +71,7 @@ impl fmt::Display for Fault {
         write!(f, "{}", self.file.display())?;
         match &self.place {
             Place::Line(line) => write!(f, ":{line}")?,
-            Place::Override(text) => write!(f, " with --set {text}")?,
+            Place::Override(text) => write!(f, " with {text}")?,
             Place::Whole => {}
         }
         if !self.key.is_empty() {

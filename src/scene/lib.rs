@@ -48,7 +48,7 @@ pub use absorption::Held;
 pub use assets::asset_path;
 pub use budget::Budget;
 pub use effects::Effects;
-pub use error::{Fault, Place, SceneError};
+pub use error::{Fault, LEADS_OUT, Place, SceneError};
 pub use words::four_digits;
 
 /// A validated scene in SI units: every default is filled in and every referenced file is read.

@@ -41,6 +41,13 @@ pub struct Window {
 #[error(transparent)]
 pub struct LookError(#[from] pub SceneError);
 
+impl LookError {
+    /// Whether a path leads farther than the look may reach.
+    pub fn leads_out(&self) -> bool {
+        self.0.leads_out()
+    }
+}
+
 /// A validated look: every value is in range and every referenced file is read.
 #[derive(Clone, Debug)]
 pub struct Look {

@@ -12,7 +12,7 @@ use swell_cache::{
     Asset, CacheError, CacheReader, CacheWriter, Clock, GridRecord, Manifest, Parent, failed,
 };
 use swell_domain::{
-    budget::Breach, frame_range::FrameRange, keep::Keep, particles::Particles, posix,
+    budget::Breach, frame_range::FrameRange, keep::Keep, particles::Particles,
     signed_distance::SignedDistanceError, solver::StepReport, sources::Solids,
 };
 use swell_gpu::adapter::GpuError;
@@ -151,7 +151,7 @@ pub enum BakeError {
     Cache(#[from] CacheError),
     /// The bake in the cache has other physics.
     #[error(
-        "{directory} was baked from another scene: {difference}; choose another -o",
+        "{directory} was baked from another scene: {difference}; choose another folder",
         directory = .directory.display()
     )]
     OtherPhysics {
@@ -164,20 +164,20 @@ pub enum BakeError {
     #[error(transparent)]
     Branch(#[from] BranchError),
     /// Frames that a bake cannot compute.
-    #[error("--frames {0}")]
+    #[error("frames {0}")]
     Frames(String),
     /// A branch that begins at or after its last frame.
     #[error("{asked}: nothing is left to bake after frame {frame}; raise shot.frames")]
     NothingLeft {
-        /// The option that asks for it.
+        /// The part of the request that asks for it.
         asked: String,
         /// The frame to begin from.
         frame: u32,
     },
     /// A budget was exceeded; the state that the frame began with is kept.
     #[error(
-        "{failure}; the last good frame is kept, and `swell check {}` computes this one again",
-        posix::path(failed)
+        "{failure}; the last good frame is kept, and the inputs of this one are in {}",
+        failed.display()
     )]
     Budget {
         /// The exceeded budget, and where in the frame.
@@ -467,8 +467,8 @@ fn branched(request: &Request, last: u32, mut branch: Branch) -> Result<Beginnin
     if last <= frame {
         return Err(BakeError::NothingLeft {
             asked: match (&request.frames, &request.from) {
-                (Some(frames), _) => format!("--frames {frames}"),
-                (None, Some(from)) => format!("--from {from}"),
+                (Some(frames), _) => format!("frames {frames}"),
+                (None, Some(from)) => format!("from {from}"),
                 (None, None) => format!("a shot of {last} frames"),
             },
             frame,
@@ -489,7 +489,7 @@ fn check_first(request: &Request, next: u32) -> Result<(), BakeError> {
     match &request.frames {
         Some(frames) if frames.first() > next => Err(BakeError::Frames(format!(
             "{frames}: frame {next} has not been baked, and each frame needs the one \
-             before: --frames {next}-{}",
+             before: bake {next}-{}",
             frames.last()
         ))),
         _ => Ok(()),

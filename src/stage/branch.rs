@@ -92,7 +92,7 @@ pub enum BranchError {
     },
     /// The scene differs from the cache in a key that decides what particles represent.
     #[error(
-        "--from {from}: it was baked with {key} = {cached}, and the scene has {given}; a bake that \
+        "from {from}: it was baked with {key} = {cached}, and the scene has {given}; a bake that \
          begins from a frame keeps it"
     )]
     Unfit {
@@ -107,7 +107,7 @@ pub enum BranchError {
     },
     /// Particles outside the scene's walls.
     #[error(
-        "--from {from}: {count} of {all} particles lie beyond the walls of the scene at {time} s; \
+        "from {from}: {count} of {all} particles lie beyond the walls of the scene at {time} s; \
          the first is particle {id} at {position:?}"
     )]
     Beyond {

@@ -12,11 +12,10 @@ use swell_domain::{
     particles::Particles,
     solver::{PassTime, Solver, StepReport, Watch},
 };
-use swell_gpu::adapter::{Context, GpuError, Needs};
+use swell_gpu::adapter::{Context, Needs};
 use swell_reference::ReferenceError;
 use swell_scene::{Method, Scene, flip::Precision};
 use swell_solve::{
-    SolveError,
     flip::Flip,
     pbf::Pbf,
     plan::{Plan, device_limits},
@@ -25,9 +24,11 @@ use swell_solve::{
 use super::{Blame, prepare::Start};
 
 pub use swell_gpu::{
+    adapter::GpuError,
     ceilings::Ceilings,
     shader::{Shaders, ShadersError},
 };
+pub use swell_solve::SolveError;
 
 /// An adapter, and the shaders that run on it.
 #[derive(Clone, Debug, Default)]

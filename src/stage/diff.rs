@@ -126,7 +126,16 @@ pub enum DiffError {
         .0.display()
     )]
     Empty(PathBuf),
-    /// Arguments that cannot be combined.
+    /// Difference images of something else than renders.
+    #[error("difference images are of two renders; these are caches")]
+    NoImages,
+    /// Hashes to ignore where there are none.
+    #[error("hashes can be ignored for a cache and a baseline: nothing else has hashes")]
+    NoHashes,
+    /// A tolerance beside those of a baseline.
+    #[error("a tolerance is for two caches or two renders; a baseline states its own tolerances")]
+    OwnTolerances,
+    /// A request that does not fit what is compared.
     #[error("{0}")]
     Usage(String),
 }
@@ -148,7 +157,10 @@ impl DiffError {
 impl From<&DiffError> for Blame {
     fn from(error: &DiffError) -> Self {
         match error {
-            DiffError::Usage(_) => Self::Input,
+            DiffError::NoImages
+            | DiffError::NoHashes
+            | DiffError::OwnTolerances
+            | DiffError::Usage(_) => Self::Input,
             DiffError::Cache(_)
             | DiffError::Scene { .. }
             | DiffError::Picture(_)
@@ -212,25 +224,19 @@ pub fn diff(request: &Request) -> Result<Outcome, DiffError> {
     let is_baseline = matches!(b, Subject::Baseline(_));
     let tolerance = request.tolerance.as_ref();
     let misfits = [
-        (
-            request.images.is_some() && !is_render,
-            "--output takes difference images, of two renders; these are caches",
-        ),
-        (
-            request.ignores_hashes && !is_baseline,
-            "--ignore-hashes is for a cache and a baseline: nothing else has hashes",
-        ),
+        (request.images.is_some() && !is_render, DiffError::NoImages),
+        (request.ignores_hashes && !is_baseline, DiffError::NoHashes),
         (
             is_render && tolerance.is_some_and(|t| t.pictures == PictureLimits::default()),
-            "the tolerance file has no [pictures]",
+            DiffError::usage("the tolerance file has no [pictures]"),
         ),
         (
             matches!(a, Subject::Cache(_)) && is_baseline && tolerance.is_some(),
-            "--tolerance is for two caches or two renders; a baseline states its own tolerances",
+            DiffError::OwnTolerances,
         ),
     ];
-    if let Some((_, message)) = misfits.into_iter().find(|(is_off, _)| *is_off) {
-        return Err(DiffError::usage(message));
+    if let Some((_, misfit)) = misfits.into_iter().find(|(is_off, _)| *is_off) {
+        return Err(misfit);
     }
     Ok(match (a, b) {
         (Subject::Cache(a), Subject::Cache(b)) => {

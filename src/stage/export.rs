@@ -270,7 +270,7 @@ impl<'a> Job<'a> {
         if cache.manifest().is_whitewater() {
             return Err(ExportError::Asked(format!(
                 "{} is a stream of whitewater: export the cache that it was \
-                 made from, with --stream",
+                 made from, and name this stream of it",
                 request.cache.display()
             )));
         }

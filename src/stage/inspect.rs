@@ -35,7 +35,7 @@ pub use swell_cache::{
 /// An adapter of this machine.
 #[derive(Clone, Debug)]
 pub struct Adapter {
-    /// Index that `--adapter` accepts.
+    /// Number of the adapter, by which a request can name it.
     pub index: usize,
     /// Name of the adapter.
     pub name: String,

@@ -196,7 +196,7 @@ pub enum RenderJobError {
     #[error(transparent)]
     Whitewater(#[from] StreamError),
     /// The output would be written into a cache.
-    #[error("{} is in the cache {}: choose another -o", directory.display(), cache.display())]
+    #[error("{} is in the cache {}: choose another folder", directory.display(), cache.display())]
     IntoCache {
         /// The output folder.
         directory: PathBuf,

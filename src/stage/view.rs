@@ -85,6 +85,10 @@ pub enum Event {
     },
     /// Information for the user.
     Note(String),
+    /// [`RATE`] is assumed, as nothing tells the frames per second.
+    AssumedRate,
+    /// The page's pictures, of this many bytes, are too large for it and are beside it.
+    PicturesBeside(u64),
     /// Warning for the user.
     Warning(String),
     /// A frame's pictures were read.
@@ -112,9 +116,7 @@ pub fn view(
     tell: &mut dyn FnMut(Event),
 ) -> Result<Outcome, ViewError> {
     if request.sheet.is_none() && request.movie.is_none() && !request.player {
-        return Err(ViewError::Asked(
-            "nothing to make: --sheet, --movie or --player".to_owned(),
-        ));
+        return Err(ViewError::Nothing);
     }
     if let [folder] = &request.subjects[..]
         && study::is_one(folder)

@@ -1,4 +1,4 @@
-//! Names of the files in a study's folder, which the study writes and `swell view` reads.
+//! Names of the files in a study's folder, which the study writes and a view reads.
 
 use serde::{Deserialize, Serialize};
 

@@ -89,7 +89,7 @@ fn is_too_long(text: &str) -> bool {
     text.lines().count() > LONGEST
 }
 
-fn sources(folder: &Path, ends: &[&str], visit: &mut dyn FnMut(&Path)) {
+pub(super) fn sources(folder: &Path, ends: &[&str], visit: &mut dyn FnMut(&Path)) {
     for entry in fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
         let end = path.extension().and_then(|end| end.to_str());

@@ -68,6 +68,7 @@ mod gpu {
     mod shaders;
     mod sort;
 }
+mod messages;
 mod reference {
     mod densest;
     mod flip;

@@ -218,7 +218,7 @@ const MEASURED: &str = "The scene is baked; each setting of the look then draws 
     time is the wall clock of a frame's picture with all its samples, median of the repeats, after \
     one picture that is not counted; spray is drawn as the look has it, whitewater is not. Depths, \
     normals and silhouettes are taken at the centres of pixels and compared with rays that the CPU \
-    casts in f64 through the particles' own field (swell check --render). Colour is SSIMULACRA 2 \
+    casts in f64 through the particles' own field. Colour is SSIMULACRA 2 \
     of the picture as a screen shows it, against one by rays with four times the look's samples \
     and voxels half as wide: light, sky, spray and set are shared with what is tested, and of rays \
     all but samples and voxels.";

@@ -148,8 +148,8 @@ fn reference<'t>(trials: &'t [Trial<'_>]) -> Result<&'t Measured, StudyError> {
             ..
         }) => Ok(measured),
         Some(Trial { variant, run, .. }) => Err(StudyError::Point(format!(
-            "the run that the others are compared with ({}) fails: {}; a greater --reference is a \
-             coarser one",
+            "the run that the others are compared with ({}) fails: {}; a greater reference factor \
+             is a coarser one",
             variant.name(),
             run.ended.as_deref().unwrap_or_default()
         ))),
@@ -180,7 +180,7 @@ fn limits(tune: &Tune, reference: &Measured) -> Result<Limits, StudyError> {
 
 fn untold(name: &str) -> StudyError {
     StudyError::Point(format!(
-        "--error {name}: none of the frames that are measured has one"
+        "error {name}: none of the frames that are measured has one"
     ))
 }
 

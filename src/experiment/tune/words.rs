@@ -111,7 +111,7 @@ impl Results<'_> {
         ))
     }
 
-    /// Note that a greater `--reference` may find more, where the choice is at the coarsest
+    /// Note that a greater reference factor may find more, where the choice is at the coarsest
     /// spacing.
     pub(super) fn at_the_end(&self) -> Option<String> {
         let (place, true) = self.choice? else {
@@ -119,7 +119,7 @@ impl Results<'_> {
         };
         let is_coarsest = self.trials[place].variant.spacing() >= self.tune.ladder[0].spacing();
         is_coarsest.then(|| {
-            "It is the coarsest that was run: a greater --reference looks at coarser ones."
+            "It is the coarsest that was run: a greater reference factor looks at coarser ones."
                 .to_owned()
         })
     }

@@ -30,10 +30,7 @@ pub(super) fn check_target(tune: &Tune) -> Result<(), StudyError> {
     let file = &tune.request.target;
     match fs::read_to_string(file) {
         Ok(text) if text.starts_with(MARK) => Ok(()),
-        Ok(_) => {
-            let what = "it is not a scene that swell tune wrote: choose another --write";
-            Err(fault(file, io::Error::other(what)))
-        }
+        Ok(_) => Err(StudyError::NotTuned(file.clone())),
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
         Err(error) => Err(fault(file, error)),
     }
@@ -83,7 +80,7 @@ fn settings(results: &Results<'_>, trial: &Trial<'_>) -> Vec<Setting> {
     let solver = tune.request.solver.map(|method| Setting {
         key: "solver.method".into(),
         value: format!("{:?}", method.name()),
-        reason: "tune: --solver".into(),
+        reason: "tune: the solver asked for".into(),
     });
     let chosen = results
         .settings(trial)

@@ -523,7 +523,7 @@ fn a_camera_from_a_file() {
     assert_ne!(first.hash(), look(&text).unwrap().hash());
     for (from, to, key, words) in [
         ("shot.glb", "none.glb", "camera.file", "cannot read"),
-        ("shot.glb", "../out.glb", "camera.file", "--allow-outside"),
+        ("shot.glb", "../out.glb", "camera.file", "leads out"),
         (
             "file = \"shot.glb\"",
             "file = \"shot.glb\"\nname = \"b\"",

@@ -44,7 +44,7 @@ pub enum Study {
     Stability(Box<Stability>),
     /// `kind = "surface"`.
     Surface(Box<SurfaceStudy>),
-    /// Study of `swell tune`, which has no file.
+    /// Study that tunes a scene, which has no file.
     Tune(Box<Tune>),
     /// `kind = "validation"`.
     Validation(Box<Validation>),

@@ -4,7 +4,7 @@
 //! ```toml
 //! kind = "sweep"
 //! scene = "../dam-break.toml"
-//! set = ["solver.pbf.particle_spacing=0.1"]   # applied to the scene in every run, like --set
+//! set = ["solver.pbf.particle_spacing=0.1"]   # applied to the scene in every run
 //! key = "solver.pbf.iterations"               # changes from run to run
 //! values = [2, 4, 8, 16]                      # from coarse to fine
 //! seconds = 2.0                               # of the shot; or steps = 120, output frames

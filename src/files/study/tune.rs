@@ -1,7 +1,7 @@
-//! Runs of `swell tune`: variants of a shot that are coarser or have other settings, and a
+//! Runs of a tuning: variants of a shot that are coarser or have other settings, and a
 //! finer reference run.
 //!
-//! This kind of study has no file; the command line specifies it. The scene's own settings are run
+//! This kind of study has no file. The scene's own settings are run
 //! at several spacings, and one setting at a time is changed at the coarsest of them.
 
 mod limit;
@@ -69,10 +69,10 @@ pub enum TuneError {
     /// Fault in the scene, or in a variant that tuning needs.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// An option that does not fit the scene.
+    /// An option of the request that does not fit the scene.
     #[error("{option}: {problem}")]
     Option {
-        /// The option as typed.
+        /// Name of the option.
         option: &'static str,
         /// What is wrong, and what is allowed.
         problem: String,
@@ -200,7 +200,7 @@ impl Tune {
         }
         let [coarsest, _, ..] = &ladder[..] else {
             return Err(TuneError::Option {
-                option: "--reference",
+                option: "reference",
                 problem: format!("fewer than two spacings can be run: {}", untried.join("; ")),
             });
         };
@@ -294,13 +294,13 @@ fn check(request: &TuneRequest, scene: &Scene) -> Result<(), TuneError> {
         let name = limit.quantity.name();
         let mut before = request.limits[..k].iter();
         if before.any(|other| other.quantity == limit.quantity) {
-            return fault("--error", format!("{name} is listed twice"));
+            return fault("errors", format!("{name} is listed twice"));
         }
     }
     let wants = |quantity| request.limits.iter().any(|l| l.quantity == quantity);
     if wants(Quantity::Pressure) && scene.pressure_points().is_empty() {
         return fault(
-            "--error",
+            "errors",
             "pressure: the scene has no [[probe]] of kind = \"pressure\"".into(),
         );
     }
@@ -308,30 +308,30 @@ fn check(request: &TuneRequest, scene: &Scene) -> Result<(), TuneError> {
         && !(1..=scene.shot.frames).contains(&frames)
     {
         let problem = format!("the shot has frames 1 to {}", scene.shot.frames);
-        return fault("--frames", problem);
+        return fault("frames", problem);
     }
     if !(0.1..=10.0).contains(&request.reference) {
         let problem = format!(
             "{} is not a factor on the spacing; allowed is a number from 0.1 to 10",
             shown(request.reference)
         );
-        return fault("--reference", problem);
+        return fault("reference", problem);
     }
     for (option, value) in [
-        ("--seconds", request.seconds),
-        ("--per-frame", request.per_frame),
+        ("seconds", request.seconds),
+        ("per frame", request.per_frame),
     ] {
         if value.is_some_and(|value| !(value.is_finite() && value > 0.0)) {
             return fault(option, "allowed is a number above 0, seconds".into());
         }
     }
     if request.repeats == 0 {
-        return fault("--repeats", "allowed is a whole number from 1".into());
+        return fault("repeats", "allowed is a whole number from 1".into());
     }
     let folder = |file: &Path| file.parent().map(Path::to_owned).unwrap_or_default();
     if folder(&request.target) != folder(&request.scene) {
         let problem = "allowed is a file beside the scene, as its paths are relative to its folder";
-        return fault("--write", problem.into());
+        return fault("target", problem.into());
     }
     Ok(())
 }
@@ -538,7 +538,7 @@ fn knobs(
 /// Returns what tuning keeps as in the scene.
 fn others(method: Method) -> impl Iterator<Item = &'static str> {
     const BOTH: [&str; 2] = [
-        "the other solver: --solver tunes it",
+        "the other solver: a tuning of its own covers it",
         "two settings at once other than those that were proposed; steps by another length of a \
          frame; effects, walls and what else the scene says of the water",
     ];

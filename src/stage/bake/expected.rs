@@ -1,4 +1,4 @@
-//! `bake --dry-run`: predicts a bake without a device and without writing anything.
+//! Predicts a bake without a device and without writing anything.
 
 use std::io;
 use swell_files::scene_to_toml;

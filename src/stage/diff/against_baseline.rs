@@ -62,7 +62,7 @@ pub(super) fn compare(
     for &frame in asked.iter().flatten() {
         if !known.contains(&frame) {
             return Err(DiffError::usage(format!(
-                "--frames {frame}: {} has frames {}",
+                "frame {frame}: {} has frames {}",
                 request.b.display(),
                 ranges(&known)
             )));
@@ -176,7 +176,7 @@ fn take_spread(
         let bake = measured(&other)?;
         let refuse = |why: &str| {
             let path = path.display();
-            Err(DiffError::usage(format!("--spread {path}: {why}")))
+            Err(DiffError::usage(format!("spread of {path}: {why}")))
         };
         if other.manifest().solver != cache.manifest().solver {
             return refuse("another solver is not a difference in rounding");

@@ -65,7 +65,7 @@ fn wanted(
     match asked.find(|frame| !numbers.contains(frame)) {
         None => Ok(found),
         Some(frame) => Err(DiffError::usage(format!(
-            "--frames {}: {} has no picture of frame {frame}",
+            "frames {}: {} has no picture of frame {frame}",
             frames.map(ToString::to_string).unwrap_or_default(),
             folder.display()
         ))),
@@ -107,7 +107,7 @@ pub(super) fn compare_folders(request: &Request) -> Result<PicturesDiff, DiffErr
 pub(super) fn compare_files(request: &Request) -> Result<PicturesDiff, DiffError> {
     if let Some(frames) = &request.frames {
         return Err(DiffError::usage(format!(
-            "--frames {frames}: two pictures have no frames to choose from"
+            "frames {frames}: two pictures have no frames to choose from"
         )));
     }
     if encoding(&request.a) != encoding(&request.b) {
@@ -119,7 +119,7 @@ pub(super) fn compare_files(request: &Request) -> Result<PicturesDiff, DiffError
         if encoding(&images.path) != Some(Encoding::Srgb) {
             let path = images.path.display();
             return Err(DiffError::usage(format!(
-                "--output {path}: it has to end in .png"
+                "the difference image {path} has to end in .png"
             )));
         }
         for file in [&request.a, &request.b] {
@@ -143,7 +143,7 @@ fn limits(request: &Request) -> Option<&PictureLimits> {
 fn refuse_same(output: &Path, input: &Path) -> Result<(), DiffError> {
     match (output.canonicalize(), input.canonicalize()) {
         (Ok(output), Ok(input)) if output == input => Err(DiffError::usage(format!(
-            "--output {} is one of the compared pictures: choose another",
+            "the difference image {} is one of the compared pictures: choose another",
             input.display()
         ))),
         _ => Ok(()),

@@ -8,34 +8,34 @@ use super::{ExportError, Request, Target, UsdWater, beside};
 pub(super) fn check(request: &Request) -> Result<(), ExportError> {
     let asked = |what: String| Err(ExportError::Asked(what));
     if request.targets.is_empty() {
-        return asked(
-            "nothing to export: give --mesh, --usd, --npy, --csv, --bgeo or --vdb".to_owned(),
-        );
+        return Err(ExportError::Nothing);
     }
     let has_shot = request
         .targets
         .iter()
         .any(|it| matches!(it, Target::Usd(..)));
     if request.look.is_some() && !has_shot {
-        return asked("--look gives --usd its camera, but --usd is missing".to_owned());
+        return asked(
+            "the look gives a USD shot its camera, but no USD shot is exported".to_owned(),
+        );
     }
     let mut names = BTreeSet::new();
     for target in &request.targets {
-        let (flag, ending, file, allowed): (_, _, _, &[&str]) = match target {
+        let (kind, ending, file, allowed): (_, _, _, &[&str]) = match target {
             Target::Mesh(files) => (
-                "--mesh",
+                "a mesh",
                 files.ending(),
                 files.file(1),
                 &["ply", "obj", "usda", "usd", "usdc"],
             ),
-            Target::Npy(files) => ("--npy", files.ending(), files.file(1), &["npy"]),
-            Target::Csv(files) => ("--csv", files.ending(), files.file(1), &["csv"]),
-            Target::Bgeo(files) => ("--bgeo", files.ending(), files.file(1), &["bgeo"]),
-            Target::Vdb(files) => ("--vdb", files.ending(), files.file(1), &["vdb"]),
+            Target::Npy(files) => ("npy", files.ending(), files.file(1), &["npy"]),
+            Target::Csv(files) => ("csv", files.ending(), files.file(1), &["csv"]),
+            Target::Bgeo(files) => ("bgeo", files.ending(), files.file(1), &["bgeo"]),
+            Target::Vdb(files) => ("vdb", files.ending(), files.file(1), &["vdb"]),
             Target::Usd(file, _) => {
                 let ending = file.extension().unwrap_or_default().to_string_lossy();
                 (
-                    "--usd",
+                    "a USD shot",
                     ending.to_lowercase(),
                     beside(file, "0001"),
                     &["usda", "usd", "usdc"],
@@ -45,7 +45,7 @@ pub(super) fn check(request: &Request) -> Result<(), ExportError> {
         if !allowed.contains(&ending.as_str()) {
             let allowed = allowed.join(", .");
             return asked(format!(
-                "{flag} writes .{allowed}, and the name ends in `{ending}`"
+                "{kind} is written as .{allowed}, and the name ends in `{ending}`"
             ));
         }
         if let Target::Usd(file, _) = target {
@@ -53,7 +53,7 @@ pub(super) fn check(request: &Request) -> Result<(), ExportError> {
             let name = file.file_name().unwrap_or_default();
             if name.to_str().is_none_or(|it| it.contains(char::is_control)) {
                 return asked(format!(
-                    "{flag}: {name:?} has a line end, another control character or bytes that are \
+                    "{kind}: {name:?} has a line end, another control character or bytes that are \
                      not UTF-8, which USD as text cannot have in the name of a layer"
                 ));
             }
@@ -65,7 +65,7 @@ pub(super) fn check(request: &Request) -> Result<(), ExportError> {
         };
         if let (true, Some(stream)) = (is_water, &request.stream) {
             return asked(format!(
-                "{flag}: the stream `{stream}` has points, and no surface"
+                "{kind}: the stream `{stream}` has points, and no surface"
             ));
         }
         if !names.insert(file.clone()) {

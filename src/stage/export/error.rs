@@ -4,7 +4,6 @@ use std::{io, path::PathBuf};
 
 use crate::Blame;
 use swell_cache::CacheError;
-use swell_domain::posix;
 use swell_scene::{SceneError, look::LookError};
 
 use super::{FolderError, UsdcError};
@@ -12,7 +11,10 @@ use super::{FolderError, UsdcError};
 /// Why an export failed.
 #[derive(Debug, thiserror::Error)]
 pub enum ExportError {
-    /// Options that cannot be combined.
+    /// No files to make.
+    #[error("nothing to export: ask for a mesh, a USD shot, npy, csv, bgeo or vdb")]
+    Nothing,
+    /// Targets that cannot be combined.
     #[error("{0}")]
     Asked(String),
     /// Reading the cache failed.
@@ -31,11 +33,7 @@ pub enum ExportError {
     #[error(transparent)]
     Usdc(#[from] UsdcError),
     /// A whitewater stream that does not exist.
-    #[error(
-        "{} does not exist: make it with `swell whitewater {}` (--name {stream})",
-        directory.display(),
-        posix::path(cache)
-    )]
+    #[error("{} does not exist: make the stream first", directory.display())]
     NoStream {
         /// Name of the stream.
         stream: String,
@@ -45,8 +43,10 @@ pub enum ExportError {
         cache: PathBuf,
     },
     /// A frame of a stream was made from other water.
-    #[error("{}: frame {frame} was made from water that no longer exists: make it again with \
-        `swell whitewater`", directory.display())]
+    #[error(
+        "{}: frame {frame} was made from water that no longer exists: make it again",
+        directory.display()
+    )]
     OldStream {
         /// Directory of the stream.
         directory: PathBuf,
@@ -81,7 +81,8 @@ impl ExportError {
 impl From<&ExportError> for Blame {
     fn from(error: &ExportError) -> Self {
         match error {
-            ExportError::Asked(_)
+            ExportError::Nothing
+            | ExportError::Asked(_)
             | ExportError::Look(_)
             | ExportError::IntoCache { .. }
             | ExportError::Usdc(UsdcError::Missing { .. }) => Self::Input,

@@ -1,4 +1,4 @@
-//! `export --dry-run`: predicts an export without writing anything.
+//! Predicts an export without writing anything.
 
 use std::{collections::BTreeMap, path::Path};
 

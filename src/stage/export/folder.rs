@@ -61,10 +61,7 @@ pub enum FolderError {
         source: io::Error,
     },
     /// The name is taken by something else.
-    #[error(
-        "{} is {what}; choose another name, or export it again with --overwrite",
-        file.display()
-    )]
+    #[error("{} is {what}; choose another name, or overwrite it", file.display())]
     Other {
         /// The existing file.
         file: PathBuf,

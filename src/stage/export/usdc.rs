@@ -17,7 +17,7 @@ pub enum UsdcError {
     /// There is no Python with usd-core.
     #[error(
         "a name that ends in .usdc needs Python with usd-core (pip install usd-core), and \
-         `{python}` has none: {why}; give another one with --python, or write .usda"
+         `{python}` has none: {why}; name another Python, or write .usda"
     )]
     Missing {
         /// The program that was tried.

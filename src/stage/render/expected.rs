@@ -1,4 +1,4 @@
-//! `render --dry-run`: predicts a render without a device and without writing anything.
+//! Predicts a render without a device and without writing anything.
 
 use std::fs;
 

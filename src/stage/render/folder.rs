@@ -4,7 +4,7 @@
 //! enters or leaves. While processes are working, there is a folder `.swell/`:
 //!
 //! ```text
-//! work             locked by each working process: shared, or exclusively with --overwrite
+//! work             locked by each working process: shared, or exclusively to overwrite
 //! small.0001.lock  locked by the process that renders that frame
 //! small.0001.png   draft of a picture until it is complete
 //! ```
@@ -61,10 +61,7 @@ impl Owner {
             ("scene", self.scene_hash == other.scene_hash),
             ("cache", self.cache == other.cache),
             ("look", self.look_hash == other.look_hash),
-            (
-                "numbering (--number-from)",
-                self.numbering == other.numbering,
-            ),
+            ("numbering", self.numbering == other.numbering),
             (
                 "version of the program",
                 version_of(&self.software) == version_of(&other.software),
@@ -106,7 +103,7 @@ pub enum FolderError {
         source: io::Error,
     },
     /// A picture of another origin exists.
-    #[error("{} is {what}; choose another -o, or render it again with --overwrite", file.display())]
+    #[error("{} is {what}; choose another folder, or overwrite it", file.display())]
     Other {
         /// The first such picture.
         file: PathBuf,
@@ -116,7 +113,7 @@ pub enum FolderError {
     /// A picture of another origin would remain beside those to be rendered.
     #[error(
         "{} is {what}, and these frames would leave it: one folder would hold both; choose \
-         another -o, or remove it",
+         another folder, or remove it",
         file.display()
     )]
     Left {
@@ -127,7 +124,7 @@ pub enum FolderError {
     },
     /// Other processes are working in the folder and cannot share it.
     #[error(
-        "{} is in use: another process renders there {what}; wait for it, or choose another -o",
+        "{} is in use: another process renders there {what}; wait for it, or choose another folder",
         directory.display()
     )]
     InUse {
@@ -179,7 +176,7 @@ impl Folder {
             gate.write(&wanted.owner)?;
             fs::create_dir(&room).map_err(at(&room))?;
         } else if wanted.overwrite {
-            return Err(in_use("that --overwrite would harm"));
+            return Err(in_use("pictures that this one would overwrite"));
         } else {
             let owner = gate.owner().ok_or_else(|| in_use("already"))?;
             if let Some(what) = owner.difference(&wanted.owner) {
@@ -193,7 +190,7 @@ impl Folder {
             false => work.try_lock_shared(),
         };
         if !is_had(tried).map_err(at(&file))? {
-            return Err(in_use("with --overwrite"));
+            return Err(in_use("and overwrites pictures"));
         }
         Ok(Self {
             path: path.to_owned(),

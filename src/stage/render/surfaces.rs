@@ -1,4 +1,4 @@
-//! `check --render`: compares the surfaces in pictures of a cache with f64 rays through the
+//! Compares the surfaces in pictures of a cache with f64 rays through the
 //! particles' own field and, on request, pictures of the water with pictures by finer rays.
 
 use std::{

@@ -4,16 +4,15 @@ use std::path::{Path, PathBuf};
 
 use crate::whitewater::{directory, is_of};
 use swell_cache::{CacheError, CacheReader};
-use swell_domain::{particles::Particles, posix};
+use swell_domain::particles::Particles;
 
 /// Why a stream cannot be drawn.
 #[derive(Debug, thiserror::Error)]
 pub enum StreamError {
     /// There is no stream of that name.
     #[error(
-        "the look draws whitewater `{stream}`, but {} does not exist: make it with `swell \
-         whitewater {}` (--name {stream})",
-        directory.display(), posix::path(cache)
+        "the look draws whitewater `{stream}`, but {} does not exist: make the stream first",
+        directory.display()
     )]
     Missing {
         /// Name of the stream.
@@ -24,7 +23,7 @@ pub enum StreamError {
         cache: PathBuf,
     },
     /// The stream lacks a frame, or has one made from other water.
-    #[error("{}: frame {frame} {how}: make it again with `swell whitewater`", directory.display())]
+    #[error("{}: frame {frame} {how}: make it again", directory.display())]
     Frame {
         /// Directory of the stream.
         directory: PathBuf,

@@ -11,7 +11,13 @@ use swell_study::raster::RasterError;
 /// Why a view failed.
 #[derive(Debug, thiserror::Error)]
 pub enum ViewError {
-    /// Options that cannot be combined, or nothing to show.
+    /// Nothing to make of the frames.
+    #[error("nothing to make: ask for a sheet, a movie or a player")]
+    Nothing,
+    /// A file, or a folder with a page or pictures, that no view made and that would be replaced.
+    #[error("{} was not made by a view: choose another folder", .0.display())]
+    Foreign(PathBuf),
+    /// A request that does not fit what is viewed, or nothing to show.
     #[error("{0}")]
     Asked(String),
     /// A path that does not exist.
@@ -63,7 +69,7 @@ pub enum ViewError {
     },
     /// The external encoder that a movie needs cannot be run.
     #[error(
-        "{} needs {program}, which cannot be run ({source}): install it, name it with --ffmpeg, or \
+        "{} needs {program}, which cannot be run ({source}): install it, name another encoder, or \
          write a movie that ends in .apng",
         movie.display()
     )]
@@ -97,9 +103,11 @@ impl ViewError {
 impl From<&ViewError> for Blame {
     fn from(error: &ViewError) -> Self {
         match error {
-            ViewError::Asked(_) | ViewError::IntoCache { .. } | ViewError::NoEncoder { .. } => {
-                Self::Input
-            }
+            ViewError::Nothing
+            | ViewError::Foreign(_)
+            | ViewError::Asked(_)
+            | ViewError::IntoCache { .. }
+            | ViewError::NoEncoder { .. } => Self::Input,
             ViewError::Missing(_)
             | ViewError::Picture(_)
             | ViewError::Cache(_)

@@ -30,7 +30,7 @@ impl Kind {
             "mp4" => Ok(Self::Mp4),
             "webm" => Ok(Self::Webm),
             _ => Err(ViewError::Asked(format!(
-                "--movie {}: a movie ends in .apng, .mp4 or .webm",
+                "{}: a movie ends in .apng, .mp4 or .webm",
                 movie.display()
             ))),
         }

@@ -81,10 +81,7 @@ impl<'a> Reel<'a> {
             .or(curves.frames_per_second)
             .or(known);
         if known.is_none() && labels.len() > 1 && (request.player || request.movie.is_some()) {
-            tell(Event::Note(format!(
-                "{RATE} frames a second is assumed: give another rate with --fps, or the cache \
-                 with --curves"
-            )));
+            tell(Event::AssumedRate);
         }
         for strip in &strips {
             if let Some(warning) = curves.stranger(strip, &labels) {
@@ -297,11 +294,7 @@ impl<'a> Reel<'a> {
         };
         let (bytes, is_beside) = store.told();
         if is_beside && self.request.placing == Placing::Auto {
-            tell(Event::Note(format!(
-                "the page's pictures are {} MB and are beside it in pictures/: move both together, \
-                 or take fewer (--frames), smaller (--width) or --pictures within",
-                bytes / 1_000_000
-            )));
+            tell(Event::PicturesBeside(bytes));
         }
         store.finish(&player.to_html())
     }
@@ -330,9 +323,6 @@ pub(super) fn check_sheet(file: &Path) -> Result<(), ViewError> {
         .any(|part| part == SOFTWARE.as_bytes())
     {
         true => Ok(()),
-        false => Err(ViewError::Asked(format!(
-            "{} is not from swell view: choose another -o",
-            file.display()
-        ))),
+        false => Err(ViewError::Foreign(file.to_owned())),
     }
 }

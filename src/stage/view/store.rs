@@ -54,10 +54,7 @@ impl Store {
             Err(_) => !directory.join(FOLDER).exists() && !page.exists(),
         };
         if !is_ours {
-            return Err(ViewError::Asked(format!(
-                "{} holds a page or pictures that are not from swell view: choose another -o",
-                directory.display()
-            )));
+            return Err(ViewError::Foreign(directory.to_owned()));
         }
         let store = Self {
             directory: directory.to_owned(),

@@ -51,8 +51,8 @@ fn unfinished(folder: &Path) -> Result<ViewError, ViewError> {
     let what = match &names[..] {
         [] => format!("the study is not finished; {command} resumes it"),
         shares => format!(
-            "shares of the study are not joined ({}); {command}, with the shares' other options \
-             and without --chunk, joins them",
+            "shares of the study are not joined ({}); {command}, with the shares' other options, \
+             joins them",
             shares.join(", ")
         ),
     };
@@ -73,13 +73,13 @@ pub(super) fn view(
         return Err(unfinished(folder)?);
     }
     let asked = [
-        (request.movie.is_some(), "--movie"),
-        (request.frames.is_some(), "--frames"),
-        (request.curves.is_some(), "--curves"),
+        (request.movie.is_some(), "movie"),
+        (request.frames.is_some(), "frames"),
+        (request.curves.is_some(), "curves"),
     ];
-    if let Some((_, flag)) = asked.iter().find(|(is_asked, _)| *is_asked) {
+    if let Some((_, what)) = asked.iter().find(|(is_asked, _)| *is_asked) {
         return Err(ViewError::Asked(format!(
-            "{flag}: {} is a study, which has a page and no frames",
+            "{what}: {} is a study, which has a page and no frames",
             folder.display()
         )));
     }

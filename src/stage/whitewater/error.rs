@@ -55,10 +55,7 @@ pub enum WhitewaterError {
         last: u32,
     },
     /// The existing stream was made differently.
-    #[error(
-        "{} was made {how}; choose another --name, or --overwrite it",
-        directory.display()
-    )]
+    #[error("{} was made {how}; choose another name, or overwrite it", directory.display())]
     Other {
         /// Directory of the stream.
         directory: PathBuf,

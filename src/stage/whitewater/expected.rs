@@ -1,4 +1,4 @@
-//! `whitewater --dry-run`: predicts a job without a device and without writing anything.
+//! Predicts a job that makes whitewater without a device and without writing anything.
 
 use std::path::PathBuf;
 

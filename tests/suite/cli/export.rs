@@ -422,13 +422,13 @@ fn faults_are_one_clear_line() {
     clear(
         2,
         "export cache --mesh m.%04d.abc",
-        "--mesh writes .ply, .obj, .usda, .usd, .usdc",
+        "a mesh is written as .ply, .obj, .usda, .usd, .usdc",
     );
     clear(2, "export cache --usd s.usda --look gone.toml", "gone.toml");
     clear(
         2,
         "export cache --npy p.%04d.npy --look look.toml",
-        "--usd is missing",
+        "no USD shot is exported",
     );
     clear(2, "export cache --mesh cache/m.%04d.ply", "in the cache");
     clear(

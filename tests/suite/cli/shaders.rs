@@ -297,7 +297,7 @@ fn a_folder_that_is_not_whole_or_does_not_compile_is_refused_with_its_place() {
     for (shaders, words) in [
         ("torn", &["torn", "lacks shared/walls.wgsl"][..]),
         ("nowhere", &["cannot read nowhere"]),
-        ("broken", &["pbf/predict of --shaders", &place, "confined"]),
+        ("broken", &["edited shader pbf/predict", &place, "confined"]),
         ("torn --device cpu", &["--shaders run on a GPU"]),
     ] {
         let said = job.expect(
@@ -317,7 +317,7 @@ fn a_folder_that_is_not_whole_or_does_not_compile_is_refused_with_its_place() {
         2,
         "render cache --look look.toml -o pictures --shaders broken",
     );
-    assert_has(&said, &["ssfr/shade of --shaders", "no_such"]);
+    assert_has(&said, &["edited shader ssfr/shade", "no_such"]);
 }
 
 /// The program fixes bindings and layouts: an edit that changes them is refused before
@@ -357,7 +357,7 @@ fn an_edit_that_the_program_cannot_bind_or_compose_is_refused_with_its_place() {
         (
             "name",
             &[
-                "pbf/predict of --shaders",
+                "edited shader pbf/predict",
                 "`velocities` is not a buffer of the program",
             ][..],
         ),
@@ -365,7 +365,7 @@ fn an_edit_that_the_program_cannot_bind_or_compose_is_refused_with_its_place() {
         ("shared", &[&confine, "`b`"]),
         (
             "import",
-            &["shared/confined.wgsl of --shaders: no such file", &import],
+            &["edited shader shared/confined.wgsl: no such file", &import],
         ),
     ] {
         let said = job.expect(

@@ -516,7 +516,7 @@ fn faults_are_one_clear_line() {
     // Another program's files are not overwritten, and nothing is written into a cache.
     fs::create_dir(job.path("study")).unwrap();
     fs::write(job.path("study/index.html"), "a study").unwrap();
-    clear(2, "view day -o study", "choose another -o");
+    clear(2, "view day -o study", "choose another folder (-o)");
     assert_eq!(
         fs::read_to_string(job.path("study/index.html")).unwrap(),
         "a study"
@@ -525,7 +525,7 @@ fn faults_are_one_clear_line() {
     clear(
         2,
         "view day --sheet -o study",
-        "sheet.png is not from swell view",
+        "sheet.png was not made by a view",
     );
     write_cache(&job.path("cache"), &Made::default());
     clear(2, "view day -o cache/view", "in the cache");

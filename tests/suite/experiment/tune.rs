@@ -245,12 +245,12 @@ fn what_cannot_be_tuned_is_refused_before_anything_runs() {
         ("--error front=2Pa", "front: \"Pa\" is not one of its units"),
         (
             "--error pressure=2%",
-            "--error: pressure: the scene has no [[probe]]",
+            "errors: pressure: the scene has no [[probe]]",
         ),
         ("--error front=2% --frames 3-4", "--frames 3-4"),
         (
             "--error front=2% --write /tmp/t.toml",
-            "--write: allowed is a file beside",
+            "target: allowed is a file beside",
         ),
     ] {
         job.expect_clear(2, &format!("tune tiny.toml {words}"), part);
@@ -268,7 +268,7 @@ fn what_cannot_be_tuned_is_refused_before_anything_runs() {
     // A scene that another author wrote is not overwritten.
     job.write("tiny.tuned.toml", "# mine");
     let said = job.expect(4, "tune tiny.toml --error front=2% -o out");
-    assert_has(&said, &["it is not a scene that swell tune wrote"]);
+    assert_has(&said, &["is not a tuned scene", "(--write)"]);
     assert_eq!(
         fs::read_to_string(job.path("tiny.tuned.toml")).unwrap(),
         "# mine"

@@ -283,7 +283,7 @@ fn a_folder_in_use_is_shared_by_one_look_alone() {
     for look in ["look.toml", "wide.toml"] {
         let words = format!("render cache --look {look} -o busy --overwrite");
         let said = job.expect(4, &words);
-        assert_has(&said, &["busy is in use", "--overwrite"]);
+        assert_has(&said, &["busy is in use", "overwrite", "(-o)"]);
     }
     assert!(job.expect(0, &last).contains("1 frame rendered"));
     assert!(exists(".swell/work"), "the first is still at work");
@@ -302,7 +302,7 @@ fn a_folder_in_use_is_shared_by_one_look_alone() {
     // The next process removes what a dead process left.
     let child = stopped(&job, &format!("{render} --overwrite"));
     let said = job.expect(4, &last);
-    assert_has(&said, &["busy is in use", "--overwrite"]);
+    assert_has(&said, &["busy is in use", "overwrite", "(-o)"]);
     kill(child);
     assert!(exists(".swell/work"));
     assert!(job.expect(0, &last).contains("0 frames rendered"));

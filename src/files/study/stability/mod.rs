@@ -9,7 +9,7 @@
 //! number = 5                                  # several cases may share a number
 //! name = "film one particle thick"
 //! scene = "../../tests/hard_cases/05-film.toml"
-//! set = ["shot.frames=30"]                    # applied to the scene, like --set
+//! set = ["shot.frames=30"]                    # applied to the scene
 //! solvers = ["pbf", "flip"]                   # default: both
 //! devices = ["gpu", "cpu"]                    # default: both
 //! frames = 60                                 # default: the whole shot

@@ -122,46 +122,46 @@ fn what_does_not_fit_the_scene_is_named_by_its_option() {
     for (request, expected) in [
         (
             request("dam-break.toml", &["crest=2%", "crest=0.1m"]),
-            "--error: crest is listed twice",
+            "errors: crest is listed twice",
         ),
         (
             request("dam-break.toml", &["pressure=2%"]),
-            "--error: pressure: the scene has no [[probe]]",
+            "errors: pressure: the scene has no [[probe]]",
         ),
         (
             TuneRequest {
                 frames: Some(121),
                 ..sound()
             },
-            "--frames: the shot has frames 1 to 120",
+            "frames: the shot has frames 1 to 120",
         ),
         (
             TuneRequest {
                 reference: 0.0,
                 ..sound()
             },
-            "--reference: 0 is not a factor",
+            "reference: 0 is not a factor",
         ),
         (
             TuneRequest {
                 seconds: Some(-1.0),
                 ..sound()
             },
-            "--seconds: allowed is",
+            "seconds: allowed is",
         ),
         (
             TuneRequest {
                 repeats: 0,
                 ..sound()
             },
-            "--repeats: allowed is",
+            "repeats: allowed is",
         ),
         (
             TuneRequest {
                 target: PathBuf::from("/elsewhere/a.toml"),
                 ..sound()
             },
-            "--write: allowed is a file beside the scene",
+            "target: allowed is a file beside the scene",
         ),
         (request("no.toml", &["crest=2%"]), "cannot read"),
     ] {

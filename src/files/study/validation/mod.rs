@@ -8,7 +8,7 @@
 //! name = "piston, kh = 1"
 //! measure = "regular_waves"                   # a name of Measure
 //! scene = "../validation/piston.toml"
-//! set = ["shot.frames=400"]                   # applied to the scene of every run, like --set
+//! set = ["shot.frames=400"]                   # applied to the scene of every run
 //! stroke = 0.1                                # inputs of the measure: metres, seconds
 //! period = 2.3
 //! after = 6.0

@@ -61,7 +61,10 @@ fn a_one_percent_change_is_seen_without_hashes_where_the_spread_was_measured() {
     job.expect(1, "diff changed-here base.json --ignore-hashes");
     assert_has(
         &job.expect(2, "diff b here --ignore-hashes"),
-        &["--ignore-hashes is for a cache and a baseline"],
+        &[
+            "hashes can be ignored for a cache and a baseline",
+            "(--ignore-hashes)",
+        ],
     );
 
     // Rewriting the same frames keeps the spreads; other frames discard them, and the
