@@ -59,7 +59,7 @@ fn a_written_level_set_is_read_value_by_value() {
     }
 }
 
-/// Each byte of the first 1500 and every 53rd of the rest damaged, and the file cut anywhere: an
+/// Each byte of the first 900 and every 53rd of the rest damaged, and the file cut anywhere: an
 /// error, or as many leaves as the bytes have space for.
 #[test]
 fn no_damage_makes_the_reader_panic() {
@@ -72,8 +72,8 @@ fn no_damage_makes_the_reader_panic() {
         };
         let mut spoiled = file.to_vec();
         let mut refused = 0;
-        for at in (0..1500).chain((1500..file.len()).step_by(53)) {
-            for value in [0x00, 0x7f, 0x80, 0xff] {
+        for at in (0..900).chain((900..file.len()).step_by(53)) {
+            for value in [0x00, 0x7f, 0xff] {
                 spoiled[at] = value;
                 refused += u32::from(check(&spoiled).is_err());
                 spoiled[at] = file[at];

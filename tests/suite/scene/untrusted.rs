@@ -130,7 +130,7 @@ fn a_promise_of_a_trillion_is_refused_without_memory_for_it() {
 fn no_size_in_a_level_set_is_believed() {
     let good = include_bytes!("../domain/files/half.vdb");
     let mut refused = 0;
-    for at in (0..1500).chain((1500..good.len() - 8).step_by(61)) {
+    for at in (0..900).chain((900..good.len() - 8).step_by(61)) {
         for size in [1u64 << 40, u64::MAX >> 1, u64::MAX] {
             let mut bytes = good.to_vec();
             bytes[at..at + 8].copy_from_slice(&size.to_le_bytes());
