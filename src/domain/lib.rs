@@ -55,6 +55,7 @@ pub mod surface;
 pub mod text;
 pub mod thin;
 pub mod tolerance;
+pub mod vdb;
 mod voxels;
 pub mod water_mesh;
 pub mod whitewater;

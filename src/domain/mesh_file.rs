@@ -9,7 +9,7 @@ pub mod parts;
 mod ply;
 mod polygons;
 mod stl;
-pub mod vdb;
+mod vdb;
 
 use std::{
     borrow::Cow,

@@ -16,15 +16,16 @@ use swell_cache::{CacheError, frame};
 use swell_domain::{
     bounds::Bounds,
     mesh::TriangleMesh,
-    mesh_file::{MeshError, MeshFormat, read_bytes, vdb},
+    mesh_file::{MeshError, MeshFormat, read_bytes},
     particles::Particles,
+    vdb,
 };
 use swell_render::{
     RenderError,
     image::{Attributes, png_header, read_exr_attributes, read_png_attributes},
 };
 
-pub use swell_domain::mesh_file::vdb::GridFile;
+pub use swell_domain::vdb::GridFile;
 pub use swell_files::rig::Rig;
 
 /// Content of a file that `inspect` recognises by its extension.

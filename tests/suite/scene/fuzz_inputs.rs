@@ -7,7 +7,7 @@ use std::path::Path;
 
 use proptest::prelude::*;
 use swell::{
-    domain::{mesh::TriangleMesh, mesh_file::MeshFormat},
+    domain::{mesh::TriangleMesh, mesh_file::MeshFormat, vdb},
     files::{load_scene, look::camera_file, parse_scene, study::Study, tolerance},
     scene::{Method, Scene, SceneError},
 };
@@ -17,6 +17,9 @@ use crate::support::mutate::mutate;
 
 const CUBE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nv 0 0 1\nv 1 0 1\nv 0 1 1\nv 1 1 1\n\
     f 1 5 7 3\nf 2 4 8 6\nf 1 2 6 5\nf 3 7 8 4\nf 1 3 4 2\nf 5 6 8 7\n";
+
+/// A sphere by OpenVDB, in half precision.
+const LEVEL_SET: &[u8] = include_bytes!("../domain/files/half.vdb");
 
 /// A camera as Blender writes it.
 const CAMERA: &[u8] = include_bytes!("../../../src/files/look/usd_camera/blender_lens.usda");
@@ -355,6 +358,18 @@ proptest! {
             prop_assert!(mesh.triangles.iter().flatten().all(|&v| v < count));
             let _ = mesh.check_inside();
         }
+    }
+
+    #[test]
+    fn no_mutation_makes_the_reader_of_level_sets_panic(
+        edits in prop::collection::vec(any::<(u16, u8, u8)>(), 1..6),
+    ) {
+        let bytes = mutate(LEVEL_SET.to_vec(), &edits);
+        let read = TriangleMesh::from_bytes(&bytes, MeshFormat::Vdb, Path::new("fuzz"));
+        if let Ok(mesh) = read {
+            prop_assert!(mesh.vertices.iter().all(|v| v.is_finite()));
+        }
+        let _ = vdb::grids(&bytes);
     }
 
     #[test]

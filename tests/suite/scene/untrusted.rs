@@ -125,6 +125,25 @@ fn a_promise_of_a_trillion_is_refused_without_memory_for_it() {
     assert!(largest(|| drop(Vec::<u8>::with_capacity(2 * MODEST))) >= 2 * MODEST);
 }
 
+/// Any eight bytes of a level set in turn, among them each count, length and offset.
+#[test]
+fn no_size_in_a_level_set_is_believed() {
+    let good = include_bytes!("../domain/files/half.vdb");
+    let mut refused = 0;
+    for at in (0..900).chain((900..good.len() - 8).step_by(61)) {
+        for size in [1u64 << 40, u64::MAX >> 1, u64::MAX] {
+            let mut bytes = good.to_vec();
+            bytes[at..at + 8].copy_from_slice(&size.to_le_bytes());
+            let cost = largest(|| {
+                let read = TriangleMesh::from_bytes(&bytes, MeshFormat::Vdb, Path::new("mesh"));
+                refused += u32::from(read.is_err());
+            });
+            assert!(cost < MODEST, "{cost} bytes for {size} at {at}");
+        }
+    }
+    assert!(refused > 1000, "{refused}");
+}
+
 /// Contents of the baked cache's ledger, line by line, with another manifest's hash.
 fn contents(manifest: &[u8]) -> Vec<Vec<u8>> {
     let text = fs::read_to_string(stand_in::baked().join("frames.jsonl")).unwrap();

@@ -1,4 +1,4 @@
-//! OpenVDB's tree of 32³ × 16³ × 8³ nodes: its topology, then its buffers.
+//! Writes a tree: its topology, then its buffers.
 
 use std::collections::BTreeMap;
 use std::io::Write;
@@ -9,24 +9,10 @@ use rayon::prelude::*;
 
 use super::put_u32;
 use super::value::{self, Value};
-use swell_domain::sparse_grid::{Leaf, SparseGrid};
-
-/// Bits of a coordinate below a leaf, and below each kind of internal node.
-const LEAF_BITS: u32 = 3;
-const LOWER_BITS: u32 = LEAF_BITS + 4;
-const UPPER_BITS: u32 = LOWER_BITS + 5;
-
-/// `io/Compression.h`: how the inactive values of a buffer are encoded.
-mod inactive {
-    /// All are the background.
-    pub(super) const BACKGROUND: u8 = 0;
-    /// All are minus the background.
-    pub(super) const MINUS_BACKGROUND: u8 = 1;
-    /// A mask follows: set for the background, clear for minus the background.
-    pub(super) const EITHER: u8 = 3;
-    /// They are written like active values.
-    pub(super) const WRITTEN: u8 = 6;
-}
+use crate::{
+    sparse_grid::{Leaf, SparseGrid},
+    vdb::{LEAF_BITS, LOWER_BITS, UPPER_BITS, inactive, volume},
+};
 
 /// A grid's leaves, grouped by the nodes above them; each map is in file order.
 pub(super) struct Tree<'a, T> {
@@ -82,7 +68,7 @@ impl<'a, T: Value> Tree<'a, T> {
                 out.extend_from_slice(&x.to_le_bytes());
             }
             put_masks(out, 5, upper.keys());
-            put_tiles(out, iter::repeat_n(self.background, 1 << 15), is_half);
+            put_tiles(out, iter::repeat_n(self.background, volume(5)), is_half);
             for lower in upper.values() {
                 lower.put_topology(out, self.background, is_half);
             }
@@ -109,7 +95,7 @@ impl<'a, T: Value> Tree<'a, T> {
 impl<T: Value> Lower<'_, T> {
     fn put_topology(&self, out: &mut Vec<u8>, background: T, is_half: bool) {
         put_masks(out, 4, self.leaves.keys());
-        let mut tiles = vec![background; 1 << 12];
+        let mut tiles = vec![background; volume(4)];
         for &offset in &self.inside {
             tiles[offset] = background.negative();
         }
@@ -133,7 +119,7 @@ fn offset(voxel: [i32; 3], below: u32, above: u32) -> usize {
 /// Child mask of an internal node with `2^bits` children along an edge, and its value mask, which
 /// is empty.
 fn put_masks<'a>(out: &mut Vec<u8>, bits: u32, children: impl Iterator<Item = &'a usize>) {
-    let words = (1 << (3 * bits)) / 64;
+    let words = volume(bits) / 64;
     let mut mask = vec![0u64; words];
     for child in children {
         mask[child / 64] |= 1 << (child % 64);
@@ -146,7 +132,7 @@ fn put_masks<'a>(out: &mut Vec<u8>, bits: u32, children: impl Iterator<Item = &'
 /// nothing. OpenVDB omits them where it can, but in half precision it then omits their length too,
 /// and vdb-rs 0.6 expects one.
 fn put_tiles<T: Value>(out: &mut Vec<u8>, tiles: impl Iterator<Item = T>, is_half: bool) {
-    out.push(inactive::WRITTEN);
+    out.push(inactive::STORED);
     let mut bytes = Vec::new();
     for tile in tiles {
         value::put(&mut bytes, tile, is_half);

@@ -2,10 +2,12 @@
 
 use half::f16;
 
+use crate::vdb::FLOAT_TREE;
+
 /// A voxel's value.
 pub(super) trait Value: Copy + PartialEq + Send + Sync {
-    /// Name of the type in OpenVDB's tree type.
-    const NAME: &'static str;
+    /// OpenVDB's name of the tree.
+    const TREE: &'static str;
     /// How transforms act on vectors: like velocities.
     const VECTOR_TYPE: Option<&'static str>;
 
@@ -17,7 +19,7 @@ pub(super) trait Value: Copy + PartialEq + Send + Sync {
 }
 
 impl Value for f32 {
-    const NAME: &'static str = "float";
+    const TREE: &'static str = FLOAT_TREE;
     const VECTOR_TYPE: Option<&'static str> = None;
 
     fn negative(self) -> Self {
@@ -30,7 +32,7 @@ impl Value for f32 {
 }
 
 impl Value for [f32; 3] {
-    const NAME: &'static str = "vec3s";
+    const TREE: &'static str = "Tree_vec3s_5_4_3";
     const VECTOR_TYPE: Option<&'static str> = Some("contravariant relative");
 
     fn negative(self) -> Self {

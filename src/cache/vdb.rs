@@ -1,0 +1,75 @@
+//! A frame's grids as an OpenVDB file.
+
+use std::io::{self, Write};
+
+use glam::DVec3;
+
+use super::frame::{Stamp, Written};
+use swell_domain::{
+    sparse_grid::{Precision, SparseGrid},
+    vdb::{self, Grid, Metadata},
+};
+
+/// Grids of one frame.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Grids {
+    /// Level set `surface`, metres.
+    pub surface: Option<SparseGrid<f32>>,
+    /// Staggered velocity grid `vel`, m/s.
+    pub velocity: Option<SparseGrid<[f32; 3]>>,
+}
+
+impl Grids {
+    /// The grids translated by `way`, metres.
+    #[must_use]
+    pub fn moved(mut self, way: DVec3) -> Self {
+        if let Some(grid) = &mut self.surface {
+            grid.origin += way;
+        }
+        if let Some(grid) = &mut self.velocity {
+            grid.origin += way;
+        }
+        self
+    }
+}
+
+/// Writes one file.
+///
+/// # Errors
+/// Those of `out`.
+pub fn encode(
+    out: &mut impl Write,
+    stamp: &Stamp<'_>,
+    grids: &Grids,
+    precision: Precision,
+) -> io::Result<Written> {
+    let program = format!("{} {}", stamp.program, stamp.program_version);
+    let metadata = [
+        ("creator", Metadata::Text(program)),
+        ("frame", Metadata::Int(stamp.frame as i32)),
+        ("shot", Metadata::Text(stamp.shot.to_owned())),
+        ("time", Metadata::Double(stamp.time)),
+    ];
+    let surface = grids.surface.iter().map(|it| Grid::LevelSet("surface", it));
+    let velocity = grids.velocity.iter().map(|it| Grid::Staggered("vel", it));
+    let grids: Vec<_> = surface.chain(velocity).collect();
+    let bytes = vdb::encode(&metadata, &grids, precision);
+    out.write_all(&bytes)?;
+    Ok(Written {
+        bytes: bytes.len() as u64,
+        hash: blake3::hash(&bytes),
+    })
+}
+
+/// Hash of the values at this precision, independent of frame, shot and program.
+pub fn content_hash(grids: &Grids, precision: Precision) -> io::Result<blake3::Hash> {
+    let stamp = Stamp {
+        program: "",
+        program_version: "",
+        shot: "",
+        frame: 0,
+        time: 0.0,
+        origin: DVec3::ZERO,
+    };
+    encode(&mut io::sink(), &stamp, grids, precision).map(|written| written.hash)
+}
