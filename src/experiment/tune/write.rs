@@ -5,6 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use swell_domain::output::{self, FileError};
 use swell_scene::{
     Scene,
     edit::{Setting, with_settings},
@@ -17,13 +18,6 @@ use super::{super::StudyError, Results, Trial};
 /// First words of a scene that may be overwritten.
 const MARK: &str = "# Tuned by swell from ";
 
-fn fault(file: &Path, source: io::Error) -> StudyError {
-    StudyError::File {
-        file: file.to_owned(),
-        source,
-    }
-}
-
 /// Checks before the first run that the target file does not exist or is a tuned scene.
 pub(super) fn check_target(tune: &Tune) -> Result<(), StudyError> {
     let file = &tune.request.target;
@@ -31,10 +25,10 @@ pub(super) fn check_target(tune: &Tune) -> Result<(), StudyError> {
         Ok(text) if text.starts_with(MARK) => Ok(()),
         Ok(_) => {
             let what = "it is not a scene that swell tune wrote: choose another --write";
-            Err(fault(file, io::Error::other(what)))
+            Err(FileError::new(file, io::Error::other(what)).into())
         }
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
-        Err(error) => Err(fault(file, error)),
+        Err(error) => Err(FileError::new(file, error).into()),
     }
 }
 
@@ -60,7 +54,7 @@ pub(super) fn write(results: &Results<'_>, command: &str) -> Result<Option<PathB
             trial.variant.name()
         )));
     }
-    fs::write(file, text).map_err(|e| fault(file, e))?;
+    output::write(file, text)?;
     Ok(Some(file.clone()))
 }
 

@@ -14,6 +14,7 @@ use super::{
     ViewError,
     strip::{Label, Source, Strip, name_of},
 };
+use swell_domain::output::AtPath as _;
 use swell_render::{
     Attributes, RenderError,
     colour::{REC_709, Space},
@@ -41,10 +42,10 @@ fn numbered(path: &Path) -> Option<(String, u32)> {
 
 /// Pictures of a folder, sorted by name.
 pub(super) fn in_folder(folder: &Path) -> Result<Vec<PathBuf>, ViewError> {
-    let entries = fs::read_dir(folder).map_err(ViewError::at(folder))?;
+    let entries = fs::read_dir(folder).at(folder)?;
     let mut found = Vec::new();
     for entry in entries {
-        let path = entry.map_err(ViewError::at(folder))?.path();
+        let path = entry.at(folder)?.path();
         if ending(&path).is_some() && path.is_file() {
             found.push(path);
         }
@@ -166,7 +167,7 @@ fn head(file: &Path) -> Result<Head, ViewError> {
             frames_per_second: rate.map(|(many, of)| f64::from(many) / f64::from(of)),
         });
     }
-    let opened = File::open(file).map_err(ViewError::at(file))?;
+    let opened = File::open(file).at(file)?;
     let reader = png::Decoder::new(BufReader::new(opened)).read_info();
     let reader = reader.map_err(|error| damaged(file, error))?;
     let info = reader.info();
