@@ -215,20 +215,25 @@ pub fn create_folder(folder: &Path) -> Result<(), FileError> {
     sync_parent(folder)
 }
 
+/// Paths of a folder's entries, sorted; none if it does not exist.
+///
+/// # Errors
+/// [`FileError`].
+pub fn paths(folder: &Path) -> Result<Vec<PathBuf>, FileError> {
+    let entries = unless_missing(fs::read_dir(folder)).at(folder)?;
+    let paths = entries.into_iter().flatten().map(|it| Ok(it?.path()));
+    let mut paths: Vec<_> = paths.collect::<io::Result<_>>().at(folder)?;
+    paths.sort_unstable();
+    Ok(paths)
+}
+
 /// Names of a folder's entries, sorted; none if it does not exist.
 ///
 /// # Errors
 /// [`FileError`].
 pub fn names(folder: &Path) -> Result<Vec<String>, FileError> {
-    let entries = unless_missing(fs::read_dir(folder)).at(folder)?;
-    let name = |entry: io::Result<fs::DirEntry>| {
-        let entry = entry.at(folder)?;
-        Ok(entry.file_name().to_string_lossy().into_owned())
-    };
-    let names = entries.into_iter().flatten().map(name);
-    let mut names = names.collect::<Result<Vec<_>, FileError>>()?;
-    names.sort_unstable();
-    Ok(names)
+    let name = |path: &PathBuf| Some(path.file_name()?.to_string_lossy().into_owned());
+    Ok(paths(folder)?.iter().filter_map(name).collect())
 }
 
 /// Flushes the entries of a folder to the disk.
@@ -329,11 +334,6 @@ impl Lock {
     /// Whether the file is still the one at its path.
     pub fn is_there(&self) -> bool {
         is_at(&self.file, &self.path)
-    }
-
-    /// Path of the file.
-    pub fn path(&self) -> &Path {
-        &self.path
     }
 
     /// The locked file, open for reading and writing.

@@ -298,16 +298,8 @@ pub fn sizes(directory: &Path) -> Result<CacheSizes, SizesError> {
 /// Folders of a cache's whitewater streams, sorted by name.
 fn whitewater_folders(cache: &Path) -> Result<Vec<PathBuf>, SizesError> {
     let folder = cache.join(whitewater::FOLDER);
-    if !folder.exists() {
-        return Ok(Vec::new());
-    }
-    let paths = fs::read_dir(&folder).and_then(|found| {
-        let paths = found.map(|entry| Ok(entry?.path()));
-        paths.collect::<io::Result<Vec<_>>>()
-    });
-    let mut streams = paths.map_err(|source| unread(&folder, source))?;
+    let mut streams = output::paths(&folder).map_err(|error| unread(&error.path, error.source))?;
     streams.retain(|it| swell_cache::exists(it));
-    streams.sort();
     Ok(streams)
 }
 

@@ -2,7 +2,6 @@
 
 use std::{
     collections::BTreeMap,
-    fs,
     path::{Path, PathBuf},
 };
 
@@ -12,7 +11,7 @@ use super::{DiffError, Images, Request};
 use swell_compare::pictures::{self, Encoding, PairDiff, Picture, PicturesDiff, difference_image};
 use swell_domain::{
     frame_range::FrameRange,
-    output::{AtPath as _, create_folder},
+    output::{create_folder, paths},
     tolerance::PictureLimits,
 };
 use swell_render::{
@@ -46,8 +45,7 @@ pub(super) fn in_folder(
     frames: Option<&FrameRange>,
 ) -> Result<BTreeMap<String, PathBuf>, DiffError> {
     let mut found = BTreeMap::new();
-    for entry in fs::read_dir(folder).at(folder)? {
-        let path = entry.at(folder)?.path();
+    for path in paths(folder)? {
         let is_wanted = |frames: &FrameRange| frame_of(&path).is_some_and(|f| frames.contains(f));
         if is_picture(&path) && path.is_file() && frames.is_none_or(is_wanted) {
             let name = path.file_name().unwrap_or_default().to_string_lossy();

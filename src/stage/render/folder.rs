@@ -153,22 +153,25 @@ impl Folder {
             // it.
             check_standing(path, wanted, wanted.overwrite)?;
         }
-        let gate = Gate::close(path)?;
+        let gate = close_gate(path)?;
         let room = path.join(ROOM);
         let in_use = |what: &str| FolderError::InUse {
             directory: path.to_owned(),
             what: what.to_owned(),
         };
         if is_deserted(&room)? {
-            let is_ours = gate.owner().as_ref() == Some(&wanted.owner);
+            let is_ours = recorded(&gate).as_ref() == Some(&wanted.owner);
             check_standing(path, wanted, wanted.overwrite || is_ours)?;
             clear(path, &wanted.owner.shot)?;
-            gate.write(&wanted.owner)?;
+            if !is_ours {
+                let text = serde_json::to_string_pretty(&wanted.owner).map_err(io::Error::from);
+                gate.write(&(text.at(path)? + "\n"))?;
+            }
             fs::create_dir(&room).at(&room)?;
         } else if wanted.overwrite {
             return Err(in_use("that --overwrite would harm"));
         } else {
-            let owner = gate.owner().ok_or_else(|| in_use("already"))?;
+            let owner = recorded(&gate).ok_or_else(|| in_use("already"))?;
             if let Some(what) = owner.difference(&wanted.owner) {
                 return Err(in_use(&format!("another {what}")));
             }
@@ -217,7 +220,7 @@ impl Folder {
 impl Drop for Folder {
     fn drop(&mut self) {
         // The next process to enter clears what cannot be cleared now.
-        let Ok(_gate) = Gate::close(&self.path) else {
+        let Ok(_gate) = close_gate(&self.path) else {
             return;
         };
         self.work = None;
@@ -237,26 +240,14 @@ impl Drop for Folder {
     }
 }
 
-/// A lock on `render.json`: no other process enters or leaves. Its holder waits for no other lock.
-struct Gate(Lock);
+/// Locks `render.json`: no other process enters or leaves. The holder waits for no other lock.
+fn close_gate(folder: &Path) -> Result<Lock, FileError> {
+    Lock::wait(&folder.join(RECORD))
+}
 
-impl Gate {
-    fn close(folder: &Path) -> Result<Self, FileError> {
-        Lock::wait(&folder.join(RECORD)).map(Self)
-    }
-
-    /// The recorded owner; `None` if the file is empty or was left incomplete by a kill.
-    fn owner(&self) -> Option<Owner> {
-        serde_json::from_str(&self.0.read().ok()?).ok()
-    }
-
-    fn write(&self, owner: &Owner) -> Result<(), FileError> {
-        if self.owner().as_ref() == Some(owner) {
-            return Ok(());
-        }
-        let text = serde_json::to_string_pretty(owner).map_err(io::Error::from);
-        self.0.write(&(text.at(self.0.path())? + "\n"))
-    }
+/// The recorded owner; `None` if the file is empty or was left incomplete by a kill.
+fn recorded(gate: &Lock) -> Option<Owner> {
+    serde_json::from_str(&gate.read().ok()?).ok()
 }
 
 /// Whether no process is working; requires a closed gate.

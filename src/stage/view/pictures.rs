@@ -2,7 +2,7 @@
 
 use std::{
     collections::BTreeMap,
-    fs::{self, File},
+    fs::File,
     io::BufReader,
     path::{Path, PathBuf},
 };
@@ -14,7 +14,7 @@ use super::{
     ViewError,
     strip::{Label, Source, Strip, name_of},
 };
-use swell_domain::output::AtPath as _;
+use swell_domain::output::{self, AtPath as _};
 use swell_render::{
     Attributes, RenderError,
     colour::{REC_709, Space},
@@ -42,15 +42,8 @@ fn numbered(path: &Path) -> Option<(String, u32)> {
 
 /// Pictures of a folder, sorted by name.
 pub(super) fn in_folder(folder: &Path) -> Result<Vec<PathBuf>, ViewError> {
-    let entries = fs::read_dir(folder).at(folder)?;
-    let mut found = Vec::new();
-    for entry in entries {
-        let path = entry.at(folder)?.path();
-        if ending(&path).is_some() && path.is_file() {
-            found.push(path);
-        }
-    }
-    found.sort();
+    let mut found = output::paths(folder)?;
+    found.retain(|path| ending(path).is_some() && path.is_file());
     Ok(found)
 }
 

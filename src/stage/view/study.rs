@@ -145,11 +145,7 @@ fn pictures_in(folder: &Path, files: &mut Vec<PathBuf>) -> Result<(), ViewError>
     if !folder.is_dir() {
         return Ok(());
     }
-    let entries = fs::read_dir(folder).at(folder)?;
-    let paths = entries.map(|entry| entry.map(|entry| entry.path()));
-    let mut paths: Vec<PathBuf> = paths.collect::<Result<_, _>>().at(folder)?;
-    paths.sort();
-    for path in paths {
+    for path in output::paths(folder)? {
         let ending = path.extension().and_then(|ending| ending.to_str());
         if path.is_dir() {
             pictures_in(&path, files)?;
