@@ -1,6 +1,8 @@
 //! Explains why a path is not a cache.
 
-use std::{fs, path::Path};
+use std::path::Path;
+
+use swell_domain::output;
 
 /// Describes what `dir` is instead of a cache, as the rest of a sentence that begins with the path.
 pub(super) fn why_none(dir: &Path, is_cache: &dyn Fn(&Path) -> bool) -> String {
@@ -21,11 +23,10 @@ pub(super) fn why_none(dir: &Path, is_cache: &dyn Fn(&Path) -> bool) -> String {
 /// Paths of the entries of `dir` for which `is_one` holds, sorted. An unreadable folder counts as
 /// empty.
 pub fn within(dir: &Path, is_one: &dyn Fn(&Path) -> bool) -> Vec<String> {
-    let entries = fs::read_dir(dir).into_iter().flatten().flatten();
-    let found = entries
-        .map(|entry| entry.path())
-        .filter(|path| is_one(path));
-    let mut found: Vec<String> = found.map(|path| path.display().to_string()).collect();
-    found.sort();
+    let mut found = output::paths(dir).unwrap_or_default();
+    found.retain(|path| is_one(path));
     found
+        .iter()
+        .map(|path| path.display().to_string())
+        .collect()
 }

@@ -1,10 +1,11 @@
-//! Atomic file writes, the writer's lock, and the hash of a whole directory.
+//! Hashes and lengths of files, the writer's lock, and the free space of a disk.
 
-use std::fs::{self, File, TryLockError};
-use std::io::{self, Read, Write};
-use std::path::{Path, PathBuf};
+use std::fs::{self, File};
+use std::io::{self, Read};
+use std::path::Path;
 
-use super::error::{AtPath, CacheError};
+use super::error::CacheError;
+use swell_domain::output::{AtPath as _, FileError, Lock, names};
 
 /// Name of the lock file, held by the one writer.
 pub(super) const LOCK: &str = "lock";
@@ -12,18 +13,7 @@ pub(super) const LOCK: &str = "lock";
 pub(super) const TIMINGS: &str = "timings.jsonl";
 /// Content of our lock file. It distinguishes our lock from anyone else's, so that `create`
 /// restarts only an interrupted creation of our own.
-const LOCK_TEXT: &[u8] = b"swell cache: locked while a bake writes here\n";
-/// Extension of a file that is still being written.
-pub(super) const TEMPORARY: &str = "tmp";
-
-/// Appends `.tmp` to `path`. The temporary file is in the same folder, so the rename stays on one
-/// file system.
-pub(super) fn temporary(path: &Path) -> PathBuf {
-    let mut name = path.as_os_str().to_owned();
-    name.push(".");
-    name.push(TEMPORARY);
-    name.into()
-}
+const LOCK_TEXT: &str = "swell cache: locked while a bake writes here\n";
 
 /// Free bytes that the user may still write at `path`, which need not exist yet; `None` where the
 /// system does not report them.
@@ -44,131 +34,36 @@ fn free_at(_: &Path) -> Option<u64> {
     None
 }
 
-/// Writes `path` through a temporary file: flushes the content to the disk before the rename, and
-/// the directory entry after it.
-///
-/// # Errors
-/// `Io`. If the content cannot be written, the temporary file is removed and `path` is unchanged.
-pub(super) fn write_whole<T>(
-    path: &Path,
-    fill: impl FnOnce(&mut File) -> io::Result<T>,
-) -> Result<T, CacheError> {
-    let partial = temporary(path);
-    let create = || {
-        let mut file = File::create(&partial)?;
-        let filled = fill(&mut file)?;
-        file.sync_all()?;
-        Ok(filled)
-    };
-    let filled = create().at(&partial).inspect_err(|_| {
-        // The first error is the one to report; a file left here is cleared on resume.
-        let _ = fs::remove_file(&partial);
-    })?;
-    fs::rename(&partial, path).at(path)?;
-    sync_parent(path)?;
-    Ok(filled)
-}
-
-/// [`write_whole`] for content that is already in memory.
-pub(super) fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), CacheError> {
-    write_whole(path, |file| file.write_all(bytes))
-}
-
-/// Removes a file if it exists.
-pub(super) fn remove(path: &Path) -> Result<(), CacheError> {
-    match fs::remove_file(path) {
-        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
-        other => other.at(path),
-    }
-}
-
-/// Flushes the directory that holds `path`; without it a rename may not survive a power cut.
-fn sync_parent(path: &Path) -> Result<(), CacheError> {
-    match path.parent() {
-        Some(parent) if parent.as_os_str().is_empty() => sync_directory(Path::new(".")),
-        Some(parent) => sync_directory(parent),
-        None => Ok(()),
-    }
-}
-
-/// Flushes the entries of a directory to the disk.
-pub(super) fn sync_directory(dir: &Path) -> Result<(), CacheError> {
-    // Windows cannot open a directory as a file; NTFS journals the rename itself.
-    if cfg!(unix) {
-        File::open(dir).and_then(|d| d.sync_all()).at(dir)?;
-    }
-    Ok(())
-}
-
-/// Creates a directory and its ancestors, and flushes its entry in the parent.
-pub(super) fn create_directory(dir: &Path) -> Result<(), CacheError> {
-    fs::create_dir_all(dir).at(dir)?;
-    sync_parent(dir)
-}
-
-/// The writer's lock, held until it is dropped.
-#[derive(Debug)]
-pub(super) struct Lock(File);
-
-impl Drop for Lock {
-    fn drop(&mut self) {
-        // Closing the file is not enough: a process that another thread is spawning holds a copy of
-        // the handle until it calls exec, and would keep the lock for that moment.
-        let _ = self.0.unlock();
-    }
-}
-
-/// Takes the writer's lock. The file stays when the lock is released: removing it would allow two
-/// writers to lock two files of the same name.
+/// Takes the writer's lock. The file stays when the lock is released: it marks the folder.
 ///
 /// # Errors
 /// [`CacheError::Locked`], `Io`.
 pub(super) fn lock(dir: &Path) -> Result<Lock, CacheError> {
-    let path = dir.join(LOCK);
-    let mut file = File::options()
-        .read(true)
-        .append(true)
-        .create(true)
-        .open(&path)
-        .at(&path)?;
-    match file.try_lock() {
-        Ok(()) => {}
-        Err(TryLockError::WouldBlock) => {
-            return Err(CacheError::Locked {
-                dir: dir.to_owned(),
-            });
-        }
-        Err(TryLockError::Error(source)) => return Err(CacheError::Io { path, source }),
+    let lock = Lock::take(&dir.join(LOCK))?.ok_or_else(|| CacheError::Locked {
+        dir: dir.to_owned(),
+    })?;
+    if lock.file().metadata().at(&dir.join(LOCK))?.len() == 0 {
+        lock.write(LOCK_TEXT)?;
     }
-    if file.metadata().at(&path)?.len() == 0 {
-        file.write_all(LOCK_TEXT).at(&path)?;
-    }
-    Ok(Lock(file))
+    Ok(lock)
 }
 
 /// Whether `dir` has a lock file of ours. An empty one counts: the process may have been killed
 /// between creating the file and writing its text.
 pub(super) fn has_our_lock(dir: &Path) -> bool {
-    fs::read(dir.join(LOCK)).is_ok_and(|text| text.is_empty() || text == LOCK_TEXT)
+    fs::read(dir.join(LOCK)).is_ok_and(|text| text.is_empty() || text == LOCK_TEXT.as_bytes())
 }
 
 /// Whether a bake has claimed `dir` for its cache, judged by the text of the lock file only.
 pub(super) fn is_begun(dir: &Path) -> bool {
-    fs::read(dir.join(LOCK)).is_ok_and(|text| text == LOCK_TEXT)
-}
-
-/// Names of the entries of `dir`, sorted.
-pub(super) fn names(dir: &Path) -> Result<Vec<String>, CacheError> {
-    let mut names = Vec::new();
-    for entry in fs::read_dir(dir).at(dir)? {
-        names.push(entry.at(dir)?.file_name().to_string_lossy().into_owned());
-    }
-    names.sort_unstable();
-    Ok(names)
+    fs::read(dir.join(LOCK)).is_ok_and(|text| text == LOCK_TEXT.as_bytes())
 }
 
 /// BLAKE3 of a file's content, hex.
-pub(super) fn file_hash(path: &Path) -> Result<String, CacheError> {
+///
+/// # Errors
+/// [`FileError`].
+pub fn file_hash(path: &Path) -> Result<String, FileError> {
     let mut hasher = blake3::Hasher::new();
     File::open(path)
         .and_then(|file| hasher.update_reader(file).map(|_| ()))
@@ -180,14 +75,14 @@ pub(super) fn file_hash(path: &Path) -> Result<String, CacheError> {
 /// changed. Skips `lock` and `timings.jsonl` of the top folder and does not follow links.
 ///
 /// # Errors
-/// [`CacheError::Io`].
-pub fn directory_hash(dir: &Path) -> Result<String, CacheError> {
+/// [`FileError`].
+pub fn directory_hash(dir: &Path) -> Result<String, FileError> {
     let mut hasher = blake3::Hasher::new();
     hash_below(dir, "", &mut hasher)?;
     Ok(hasher.finalize().to_hex().to_string())
 }
 
-fn hash_below(dir: &Path, prefix: &str, hasher: &mut blake3::Hasher) -> Result<(), CacheError> {
+fn hash_below(dir: &Path, prefix: &str, hasher: &mut blake3::Hasher) -> Result<(), FileError> {
     for name in names(dir)? {
         if prefix.is_empty() && (name == LOCK || name == TIMINGS) {
             continue;
@@ -287,31 +182,5 @@ mod tests {
         fs::write(d.join("a"), "1").unwrap();
         fs::create_dir(d.join("empty")).unwrap();
         assert_ne!(hash(), first);
-    }
-
-    /// Simulates the copy of the handle that a process being spawned by another thread holds.
-    #[test]
-    fn a_copy_of_the_lock_file_does_not_keep_the_lock() {
-        let dir = tempfile::tempdir().unwrap();
-        let held = lock(dir.path()).unwrap();
-        let copy = held.0.try_clone().unwrap();
-        assert!(matches!(lock(dir.path()), Err(CacheError::Locked { .. })));
-        drop(held);
-        lock(dir.path()).unwrap();
-        drop(copy);
-    }
-
-    #[test]
-    fn a_failed_write_leaves_the_old_file_and_no_temporary_one() {
-        let dir = tempfile::tempdir().unwrap();
-        let path = dir.path().join("file");
-        write_whole(&path, |file| file.write_all(b"old")).unwrap();
-        let error = write_whole(&path, |file| {
-            file.write_all(b"ne")?;
-            Err::<(), _>(io::Error::other("torn"))
-        });
-        assert!(matches!(error, Err(CacheError::Io { .. })));
-        assert_eq!(fs::read(&path).unwrap(), b"old");
-        assert_eq!(names(dir.path()).unwrap(), ["file"]);
     }
 }

@@ -1,21 +1,15 @@
 //! Errors of reading and writing a cache.
 
-use std::io;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use swell_domain::keep::Keep;
+use swell_domain::{keep::Keep, output::FileError};
 
 /// Errors of a cache.
 #[derive(Debug, thiserror::Error)]
 pub enum CacheError {
     /// The operating system refused an operation.
-    #[error("{}", path.display())]
-    Io {
-        /// The file or folder.
-        path: PathBuf,
-        /// The operating system's error.
-        source: io::Error,
-    },
+    #[error(transparent)]
+    Io(#[from] FileError),
     /// The directory holds no manifest.
     #[error("{} {why}", dir.display())]
     NotACache {
@@ -176,19 +170,5 @@ impl CacheError {
             file: file.into(),
             what: what.into(),
         }
-    }
-}
-
-/// Adds the path that an [`io::Error`] lacks.
-pub(super) trait AtPath<T> {
-    fn at(self, path: &Path) -> Result<T, CacheError>;
-}
-
-impl<T> AtPath<T> for io::Result<T> {
-    fn at(self, path: &Path) -> Result<T, CacheError> {
-        self.map_err(|source| CacheError::Io {
-            path: path.to_owned(),
-            source,
-        })
     }
 }

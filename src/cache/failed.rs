@@ -10,13 +10,16 @@ use serde::Deserialize as _;
 use serde_json::{Map, Value, json};
 
 use super::{
-    disk,
-    error::{AtPath, CacheError},
+    error::CacheError,
     frame::{self, Stamp},
     manifest,
     record::FileRecord,
 };
-use swell_domain::{absorber::AbsorberStates, particles::Particles};
+use swell_domain::{
+    absorber::AbsorberStates,
+    output::{self, AtPath as _},
+    particles::Particles,
+};
 
 /// Name of the folder in the cache.
 pub const FAILED: &str = "failed";
@@ -59,11 +62,11 @@ pub fn is_failed(dir: &Path) -> bool {
 pub fn write(cache: &Path, failed: &Failed, stamp: &Stamp<'_>) -> Result<(), CacheError> {
     remove(cache)?;
     let dir = cache.join(FAILED);
-    disk::create_directory(&dir)?;
-    let file = |name: &str, bytes: &[u8]| disk::write_bytes(&dir.join(name), bytes);
+    output::create_folder(&dir)?;
+    let file = |name: &str, bytes: &[u8]| output::write(&dir.join(name), bytes);
     let scene = failed.scene_toml.as_bytes();
     file(manifest::SCENE, scene)?;
-    let start = disk::write_whole(&dir.join(START), |out| {
+    let start = output::write_with(&dir.join(START), |out| {
         frame::encode(out, stamp, &failed.start)
     })?;
     let start = FileRecord::of_written(START, &start);
@@ -80,7 +83,7 @@ pub fn write(cache: &Path, failed: &Failed, stamp: &Stamp<'_>) -> Result<(), Cac
     let checksum = checksum(fields);
     fields.insert(CHECKSUM.to_owned(), checksum.into());
     // Last, because the report is what marks the folder as replayable.
-    file(REPORT, text(fields).as_bytes())
+    Ok(file(REPORT, text(fields).as_bytes())?)
 }
 
 /// Content of the report file, fields sorted by name.
@@ -153,11 +156,7 @@ pub fn read(dir: &Path) -> Result<Failed, CacheError> {
 /// # Errors
 /// [`CacheError::Io`].
 pub fn remove(cache: &Path) -> Result<(), CacheError> {
-    let dir = cache.join(FAILED);
-    match fs::remove_dir_all(&dir) {
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(()),
-        other => other.at(&dir),
-    }
+    Ok(output::remove_folder(&cache.join(FAILED))?)
 }
 
 #[cfg(test)]

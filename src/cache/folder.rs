@@ -1,18 +1,18 @@
 //! The folder of a cache: which directories are acceptable for a new one, its subfolders, and the
 //! clean-up after a killed process.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::disk;
-use super::error::{AtPath, CacheError};
+use super::error::CacheError;
 use super::ledger;
 use super::manifest::{self, Manifest};
 use super::stream::{PARTICLES, STREAMS, Stream};
+use swell_domain::output::{self, AtPath as _, FileError, complete_name};
 
 /// The cache that contains `path`, or would contain it, with links resolved. A cache whose creation
 /// has only begun counts too.
-pub fn around(path: &Path) -> Option<PathBuf> {
+fn around(path: &Path) -> Option<PathBuf> {
     let mut real = std::path::absolute(path).ok()?;
     // A path that does not exist yet is resolved through its nearest existing ancestor.
     while real.canonicalize().map(|found| real = found).is_err() {
@@ -28,9 +28,32 @@ pub fn around(path: &Path) -> Option<PathBuf> {
         .map(Path::to_owned)
 }
 
+/// An output would be written into a cache.
+#[derive(Debug, thiserror::Error)]
+#[error("{} is in the cache {}: choose another {choose}", path.display(), cache.display())]
+pub struct IntoCache {
+    path: PathBuf,
+    cache: PathBuf,
+    choose: &'static str,
+}
+
+/// Refuses an output at `path` inside a cache. `choose` says what the user has to change.
+///
+/// # Errors
+/// [`IntoCache`].
+pub fn refuse_inside(path: &Path, choose: &'static str) -> Result<(), IntoCache> {
+    around(path).map_or(Ok(()), |cache| {
+        Err(IntoCache {
+            path: path.to_owned(),
+            cache,
+            choose,
+        })
+    })
+}
+
 /// Creates a folder for each stream of the manifest.
-pub(super) fn make_streams(dir: &Path, manifest: &Manifest) -> Result<(), CacheError> {
-    Stream::all(manifest).try_for_each(|stream| disk::create_directory(&dir.join(stream.folder)))
+pub(super) fn make_streams(dir: &Path, manifest: &Manifest) -> Result<(), FileError> {
+    Stream::all(manifest).try_for_each(|stream| output::create_folder(&dir.join(stream.folder)))
 }
 
 /// Refuses a directory that holds anything but an interrupted creation of our own: our lock, no
@@ -55,7 +78,7 @@ pub fn refuse_occupied(dir: &Path) -> Result<(), CacheError> {
         other if other.as_ref().is_ok_and(|m| !m.is_dir()) => {
             return occupied("it is a file".to_owned());
         }
-        other => other.at(dir).and_then(|_| disk::names(dir))?,
+        other => other.at(dir).and_then(|_| output::names(dir))?,
     };
     let Some(first) = names.first() else {
         return Ok(());
@@ -79,10 +102,9 @@ pub fn refuse_occupied(dir: &Path) -> Result<(), CacheError> {
     }
     for stream in &STREAMS {
         let path = dir.join(stream.folder);
-        let names = if path.is_dir() {
-            disk::names(&path)?
-        } else {
-            Vec::new()
+        let names = match path.is_dir() {
+            true => output::names(&path)?,
+            false => Vec::new(),
         };
         let first = names.first().map(|name| plain(name).to_owned());
         let is_ours = |name: &&String| {
@@ -100,22 +122,20 @@ pub fn refuse_occupied(dir: &Path) -> Result<(), CacheError> {
     Ok(())
 }
 
-/// A name without the extension of a temporary file.
+/// A name without the ending of an incomplete file.
 fn plain(name: &str) -> &str {
-    name.strip_suffix(disk::TEMPORARY)
-        .and_then(|name| name.strip_suffix('.'))
-        .unwrap_or(name)
+    complete_name(name).unwrap_or(name)
 }
 
 /// Removes everything that [`refuse_occupied`] accepts, except the lock.
-pub(super) fn clear_unfinished(dir: &Path) -> Result<(), CacheError> {
-    for name in disk::names(dir)? {
+pub(super) fn clear_unfinished(dir: &Path) -> Result<(), FileError> {
+    for name in output::names(dir)? {
         let path = dir.join(&name);
         let is_stream = STREAMS.iter().any(|stream| stream.folder == name);
         if is_stream || name == manifest::ASSETS {
-            fs::remove_dir_all(&path).at(&path)?;
+            output::remove_folder(&path)?;
         } else if name != disk::LOCK {
-            fs::remove_file(&path).at(&path)?;
+            output::remove_file(&path)?;
         }
     }
     Ok(())
@@ -124,14 +144,10 @@ pub(super) fn clear_unfinished(dir: &Path) -> Result<(), CacheError> {
 /// Removes what a crash leaves in the folders of all streams: temporary files, files after frame
 /// `last` (renamed, but without a line in the ledger), and particles that the manifest does not
 /// keep.
-pub(super) fn clear_leftovers(
-    dir: &Path,
-    manifest: &Manifest,
-    last: u32,
-) -> Result<(), CacheError> {
+pub(super) fn clear_leftovers(dir: &Path, manifest: &Manifest, last: u32) -> Result<(), FileError> {
     for stream in Stream::all(manifest) {
         let folder = dir.join(stream.folder);
-        for name in disk::names(&folder)? {
+        for name in output::names(&folder)? {
             let is_behind = frame_of(&name).is_some_and(|frame| {
                 let file = stream.frame_file(manifest, frame);
                 let is_ours = stream.is_by_frame() && Path::new(&file).ends_with(&name);
@@ -139,11 +155,10 @@ pub(super) fn clear_leftovers(
                 is_ours && (frame > last || !stays)
             });
             if is_behind || plain(&name).len() < name.len() {
-                let path = folder.join(&name);
-                fs::remove_file(&path).at(&path)?;
+                output::remove_file(&folder.join(&name))?;
             }
         }
-        disk::sync_directory(&folder)?;
+        output::sync_folder(&folder)?;
     }
     Ok(())
 }

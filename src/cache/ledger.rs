@@ -2,19 +2,21 @@
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
-use std::io::Write;
 use std::path::Path;
 
 use blake3::Hash;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::error::{AtPath, CacheError};
+use super::error::CacheError;
 use super::manifest::{self, Manifest};
 use super::probes::{ProbeRecord, ProbeValues};
 use super::record::FileRecord;
 use super::stream::{self, STREAMS, Stream};
-use swell_domain::absorber::AbsorberStates;
+use swell_domain::{
+    absorber::AbsorberStates,
+    output::{self, AtPath as _},
+};
 
 /// File name of the ledger.
 pub(super) const FILE: &str = "frames.jsonl";
@@ -386,7 +388,7 @@ impl Ledger {
 /// Appends a line and waits until it is on the disk. `length` is the expected length of the ledger
 /// so far; checking it each time detects a ledger that was removed or modified during the bake.
 pub(super) fn append(path: &Path, length: u64, line: &[u8]) -> Result<(), CacheError> {
-    let mut file = File::options().append(true).open(path).at(path)?;
+    let file = File::options().write(true).open(path).at(path)?;
     let found = file.metadata().at(path)?.len();
     if found != length {
         return Err(CacheError::damaged(
@@ -396,13 +398,7 @@ pub(super) fn append(path: &Path, length: u64, line: &[u8]) -> Result<(), CacheE
             ),
         ));
     }
-    file.write_all(line)
-        .and_then(|()| file.sync_data())
-        .at(path)
-        .inspect_err(|_| {
-            // Resume cuts half a line as well; the first error is the one to report.
-            let _ = file.set_len(length);
-        })
+    Ok(output::append(&file, line).at(path)?)
 }
 
 #[cfg(test)]

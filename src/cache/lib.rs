@@ -47,9 +47,9 @@ mod window;
 mod writer;
 
 pub use absent::within;
-pub use disk::{directory_hash, free_bytes};
+pub use disk::{directory_hash, file_hash, free_bytes};
 pub use error::CacheError;
-pub use folder::{around, refuse_occupied};
+pub use folder::{IntoCache, refuse_inside, refuse_occupied};
 pub use grids::GridRecord;
 pub use ledger::{Clock, Entry, Files, Rows};
 pub use manifest::{Manifest, Parent, exists};

@@ -8,12 +8,15 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::absent;
-use super::error::{AtPath, CacheError};
+use super::error::CacheError;
 use super::frame::Stamp;
 use super::grids::GridRecord;
 use super::probes::ProbeRecord;
 use super::record::{FileRecord, is_file_stem, is_relative};
-use swell_domain::keep::{Compression, Keep};
+use swell_domain::{
+    keep::{Compression, Keep},
+    output::AtPath as _,
+};
 
 /// File name of the manifest.
 pub(super) const FILE: &str = "manifest.json";

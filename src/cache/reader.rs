@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use rayon::prelude::*;
 
 use super::disk;
-use super::error::{AtPath, CacheError};
+use super::error::CacheError;
 use super::failed;
 use super::frame;
 use super::ledger::{self, Entry, Ledger};
@@ -15,8 +15,7 @@ use super::record::FileRecord;
 use super::stream::{self, OF_PARTICLES};
 use super::tables;
 use super::vdb::{self, Grids};
-use swell_domain::keep::Compression;
-use swell_domain::particles::Particles;
+use swell_domain::{keep::Compression, output::AtPath as _, particles::Particles};
 
 /// An open cache with its manifest, ledger, scene and the scene's files, all checked. Frames are
 /// checked when they are read. A bake may be running meanwhile: a line that is being written is not
@@ -378,7 +377,7 @@ impl Problem {
     fn of(error: CacheError, file: &Path) -> Self {
         let (file, what) = match error {
             CacheError::Damaged { file, what } => (file, what),
-            CacheError::Io { path, source } => (path, format!("it cannot be read: {source}")),
+            CacheError::Io(error) => (error.path, format!("it cannot be read: {}", error.source)),
             other => (file.to_owned(), other.to_string()),
         };
         Self { file, what }

@@ -11,7 +11,7 @@ use blake3::Hash;
 use serde_json::{Value, json};
 
 use super::disk;
-use super::error::{AtPath, CacheError};
+use super::error::CacheError;
 use super::frame;
 use super::ledger::{self, Clock, Contents, Files, Rows};
 use super::manifest::Manifest;
@@ -20,7 +20,10 @@ use super::record::FileRecord;
 use super::stream::{self, Layout, OF_PARTICLES, Stream};
 use super::tables;
 use super::window::Window;
-use swell_domain::particles::Particles;
+use swell_domain::{
+    output::{self, AtPath as _, FileError},
+    particles::Particles,
+};
 
 /// Counts of what one writer did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -97,7 +100,7 @@ impl Sink {
         for stream in Stream::all(manifest) {
             if let Layout::FileAFrame(encode) = stream.layout {
                 let file = stream.frame_file(manifest, clock.frame);
-                let written = disk::write_whole(&self.dir.join(&file), |out| {
+                let written = output::write_with(&self.dir.join(&file), |out| {
                     encode(out, manifest, &stamp, particles)
                 })?;
                 files.insert(
@@ -127,18 +130,18 @@ impl Sink {
 
     /// Removes the particles of the frame before `newest` unless they are kept: a bake now resumes
     /// from `newest`.
-    fn let_go_before(&self, newest: u32) -> Result<(), CacheError> {
+    fn let_go_before(&self, newest: u32) -> Result<(), FileError> {
         let manifest = &self.manifest;
         match newest.checked_sub(1) {
             Some(before) if !manifest.keeps(before) => {
                 let file = OF_PARTICLES.frame_file(manifest, before);
-                disk::remove(&self.dir.join(file))
+                output::remove_file(&self.dir.join(file))
             }
             _ => Ok(()),
         }
     }
 
-    fn note_timings(&self, frame: u32, timings: &Value) -> Result<(), CacheError> {
+    fn note_timings(&self, frame: u32, timings: &Value) -> Result<(), FileError> {
         if timings.is_null() {
             return Ok(());
         }

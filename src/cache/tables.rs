@@ -8,13 +8,12 @@ use std::fs::File;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use super::disk;
-use super::error::{AtPath, CacheError};
 use super::ledger::{Clock, Entry, Rows};
 use super::manifest::Manifest;
 use super::probes::ProbeRecord;
 use super::stream::{STREAMS, Stream};
 use super::window::Window;
+use swell_domain::output::{self, AtPath as _, FileError};
 
 /// One file: a table of a stream.
 struct Table<'a> {
@@ -104,10 +103,10 @@ pub(super) fn write_all(
     dir: &Path,
     manifest: &Manifest,
     entries: &[Entry],
-) -> Result<Vec<Window>, CacheError> {
+) -> Result<Vec<Window>, FileError> {
     let write = |table: Table<'_>| {
         let (text, window) = table.text(entries);
-        disk::write_bytes(&table.path(dir), text.as_bytes())?;
+        output::write(&table.path(dir), text)?;
         Ok(window)
     };
     all(manifest).map(write).collect()
@@ -120,7 +119,7 @@ pub(super) fn append(
     windows: &mut [Window],
     clock: Clock,
     rows: &Rows,
-) -> Result<(), CacheError> {
+) -> Result<(), FileError> {
     all(manifest).zip(windows).try_for_each(|(table, window)| {
         let path = table.path(dir);
         let mut file = File::options().append(true).open(&path).at(&path)?;

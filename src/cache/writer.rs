@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use serde_json::Value;
 
 use super::disk;
-use super::error::{AtPath, CacheError};
+use super::error::CacheError;
 use super::folder;
 use super::ledger::{self, Clock, Entry, Ledger};
 use super::manifest::{self, Manifest};
@@ -18,7 +18,10 @@ use super::reader::read_frame;
 use super::record::FileRecord;
 use super::sink::{Job, Sink, Summary, check, check_rows, rows_of};
 use super::tables;
-use swell_domain::particles::Particles;
+use swell_domain::{
+    output::{self, AtPath as _, Lock},
+    particles::Particles,
+};
 
 /// Most frames that wait for the disk; with the one being written, three are in memory.
 const DEPTH: usize = 2;
@@ -42,7 +45,7 @@ pub struct CacheWriter {
     sender: Option<SyncSender<Job>>,
     thread: Option<JoinHandle<Result<Summary, CacheError>>>,
     /// Held until the thread has ended: fields are dropped after `Drop::drop`.
-    _lock: disk::Lock,
+    _lock: Lock,
 }
 
 impl CacheWriter {
@@ -75,23 +78,23 @@ impl CacheWriter {
             return Err(CacheError::Unfit(what));
         }
         folder::refuse_occupied(dir)?;
-        disk::create_directory(dir)?;
+        output::create_folder(dir)?;
         let lock = disk::lock(dir)?;
         // Checked again under the lock: another process may have started in between.
         folder::refuse_occupied(dir)?;
         folder::clear_unfinished(dir)?;
 
         let manifest_bytes = manifest.to_bytes()?;
-        disk::write_bytes(&dir.join(manifest::SCENE), scene_toml.as_bytes())?;
+        output::write(&dir.join(manifest::SCENE), scene_toml)?;
         for asset in assets {
             let path = dir.join(manifest::ASSETS).join(&asset.name);
             let parent = path.parent().unwrap_or(dir);
-            disk::create_directory(parent)?;
-            disk::write_bytes(&path, &asset.bytes)?;
+            output::create_folder(parent)?;
+            output::write(&path, &asset.bytes)?;
         }
         folder::make_streams(dir, &manifest)?;
         let windows = tables::write_all(dir, &manifest, &[])?;
-        disk::write_bytes(&dir.join(ledger::FILE), b"")?;
+        output::write(&dir.join(ledger::FILE), b"")?;
 
         let seed = blake3::hash(&manifest_bytes);
         let mut sink = Sink {
@@ -104,7 +107,7 @@ impl CacheWriter {
         };
         sink.write(clock, start, &rows, &Value::Null)?;
         // Last, because the manifest is what makes the directory a cache.
-        disk::write_bytes(&dir.join(manifest::FILE), &manifest_bytes)?;
+        output::write(&dir.join(manifest::FILE), &manifest_bytes)?;
         Self::spawn(sink, manifest, clock.frame, lock)
     }
 
@@ -179,7 +182,7 @@ impl CacheWriter {
         sink: Sink,
         manifest: Manifest,
         last_frame: u32,
-        lock: disk::Lock,
+        lock: Lock,
     ) -> Result<Self, CacheError> {
         let (sender, jobs) = sync_channel(DEPTH);
         let dir = sink.dir.clone();

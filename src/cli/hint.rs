@@ -12,7 +12,7 @@ use swell_stage::{
     branch::BranchError,
     device::{GpuError, SolveError, SolverError},
     diff::DiffError,
-    export::{self, ExportError, UsdcError},
+    export::{ExportError, UsdcError},
     render::{self, RenderJobError, StreamError},
     verify::CacheError,
     view::ViewError,
@@ -109,7 +109,7 @@ fn render(error: &RenderJobError) -> Hint {
         RenderJobError::Folder(
             render::FolderError::Left { .. } | render::FolderError::InUse { .. },
         )
-        | RenderJobError::IntoCache { .. } => Some("-o".into()),
+        | RenderJobError::IntoCache(_) => Some("-o".into()),
         RenderJobError::Whitewater(StreamError::Missing { stream, cache, .. }) => {
             stream_of(cache, stream)
         }
@@ -132,7 +132,7 @@ fn export(error: &ExportError) -> Hint {
     match error {
         ExportError::Nothing => Some("--mesh, --usd, --npy, --csv, --bgeo, --vdb".into()),
         ExportError::Look(error) => look(error),
-        ExportError::Folder(export::FolderError::Other { .. }) => Some("--overwrite".into()),
+        ExportError::Taken { .. } => Some("--overwrite".into()),
         ExportError::Usdc(UsdcError::Missing { .. }) => Some("--python".into()),
         ExportError::NoStream { stream, cache, .. } => stream_of(cache, stream),
         ExportError::OldStream { .. } => Some("`swell whitewater`".into()),

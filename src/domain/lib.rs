@@ -33,6 +33,7 @@ pub mod mesh_file;
 pub mod motion;
 pub mod named;
 pub mod open_waves;
+pub mod output;
 pub mod particles;
 pub mod pbf;
 pub mod period;

@@ -1,16 +1,12 @@
 //! Records which study a results folder belongs to, because pages and lines of two studies must not
 //! mix.
 
-use std::{
-    fs,
-    io::{self, Read as _, Write as _},
-    path::Path,
-};
+use std::{fs, io, path::Path};
 
-use swell_stage::locked;
+use swell_domain::output::{AtPath as _, FileError, Lock, names};
 use swell_study::folder::{CLAIM, Claim, is_ledger};
 
-use super::{StudyError, ledger::names};
+use super::StudyError;
 
 /// Claims a folder for the study `name`, which `command` runs as a whole. The folder may be empty
 /// or hold results without a claim. Any number of processes may call this at once: the claim file
@@ -21,12 +17,7 @@ use super::{StudyError, ledger::names};
 /// cannot be read or written.
 pub(super) fn take(directory: &Path, name: &str, command: &str) -> Result<(), StudyError> {
     let file = directory.join(CLAIM);
-    let fault = |source| StudyError::File {
-        file: file.clone(),
-        source,
-    };
-    fs::create_dir_all(directory).map_err(fault)?;
-    let names = names(directory).map_err(fault)?;
+    let names = names(directory)?;
     if !names.is_empty() && !names.iter().any(|name| name == CLAIM || is_ledger(name)) {
         // Opening the results reports what is wrong with the folder.
         return Ok(());
@@ -36,7 +27,7 @@ pub(super) fn take(directory: &Path, name: &str, command: &str) -> Result<(), St
     let written = written.and_then(|text| serde_json::from_slice(&text).ok());
     let claim: Claim = match written {
         Some(claim) => claim,
-        None => write(&file, name, command).map_err(fault)?,
+        None => write(&file, name, command)?,
     };
     if claim.study == name {
         return Ok(());
@@ -49,24 +40,24 @@ pub(super) fn take(directory: &Path, name: &str, command: &str) -> Result<(), St
 }
 
 /// Writes the claim, or reads it if another process has just written it.
-fn write(file: &Path, name: &str, command: &str) -> io::Result<Claim> {
-    let mut record = locked::open(file)?;
-    record.lock()?;
-    let mut text = String::new();
-    record.read_to_string(&mut text)?;
+fn write(file: &Path, name: &str, command: &str) -> Result<Claim, FileError> {
+    let record = Lock::wait(file)?;
+    let text = record.read()?;
     if !text.is_empty() {
-        return serde_json::from_str(&text).map_err(|error| {
+        let claim = serde_json::from_str(&text).map_err(|error| {
             io::Error::other(format!(
                 "{error}: it was truncated or changed; remove it if the folder holds results of \
                  {name}, or choose another folder"
             ))
         });
+        return claim.at(file);
     }
     let claim = Claim {
         study: name.to_owned(),
         command: Some(command.to_owned()),
     };
-    record.write_all((serde_json::to_string(&claim)? + "\n").as_bytes())?;
+    let text = serde_json::to_string(&claim).map_err(io::Error::from);
+    record.write(&(text.at(file)? + "\n"))?;
     Ok(claim)
 }
 

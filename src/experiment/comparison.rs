@@ -6,7 +6,7 @@ use std::{fs, path::PathBuf};
 use rayon::prelude::*;
 
 use swell_cache::{CacheError, CacheReader, Manifest};
-use swell_domain::{frame_range::FrameRange, solver::StepReport};
+use swell_domain::{frame_range::FrameRange, output::AtPath as _, solver::StepReport};
 use swell_files::study::comparison::SolverComparison;
 use swell_gpu::adapter::Needs;
 use swell_scene::{Scene, Solid};
@@ -266,10 +266,7 @@ fn pictures(
     let address = |scene: &Scene, frame: u32| {
         let folder = picture_directory(request, scene);
         let file = folder.join(render::picture_name(cache, frame));
-        let bytes = fs::read(&file).map_err(|source| StudyError::File {
-            file: file.clone(),
-            source,
-        })?;
+        let bytes = fs::read(&file).at(&file)?;
         picture::data_uri(&bytes).map_err(|source| StudyError::Picture { file, source })
     };
     let row = |frame: u32| {

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use swell_cache::CacheError;
-use swell_domain::signed_distance::SignedDistanceError;
+use swell_domain::{output::FileError, signed_distance::SignedDistanceError};
 use swell_gpu::adapter::GpuError;
 use swell_reference::ReferenceError;
 use swell_scene::SceneError;
@@ -30,13 +30,8 @@ pub enum StudyError {
     #[error(transparent)]
     Scene(#[from] SceneError),
     /// A file cannot be read or written.
-    #[error("{}", file.display())]
-    File {
-        /// Path of the file.
-        file: PathBuf,
-        /// Error of the operating system.
-        source: std::io::Error,
-    },
+    #[error(transparent)]
+    File(#[from] FileError),
     /// A solid has no interior, or its distance grid would be too large.
     #[error(transparent)]
     Solid(#[from] SignedDistanceError),
@@ -122,7 +117,7 @@ impl From<&StudyError> for Blame {
             | StudyError::OtherStudy { .. }
             | StudyError::Occupied(_)
             | StudyError::NotTuned(_)
-            | StudyError::File { .. }
+            | StudyError::File(_)
             | StudyError::Picture { .. }
             | StudyError::Ledger { .. }
             | StudyError::Raster(_) => Self::Files,

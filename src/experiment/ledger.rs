@@ -7,15 +7,16 @@
 
 use std::{
     collections::{BTreeMap, BTreeSet},
-    fs::{self, File, OpenOptions},
-    io::{self, Write},
+    fs, io,
     path::{Path, PathBuf},
 };
 
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
-use swell_domain::chunk::Chunk;
-use swell_stage::locked::{is_at, is_had};
+use swell_domain::{
+    chunk::Chunk,
+    output::{AtPath as _, FileError, Lock, append, is_taken, names},
+};
 use swell_study::folder::{CLAIM, LEDGER, is_ledger, ledger_of};
 
 use super::{StudyError, run::Run};
@@ -61,7 +62,7 @@ pub(super) enum Reader {
 pub(super) struct Ledger<M> {
     path: PathBuf,
     /// `None` for [`Reader::Look`].
-    file: Option<File>,
+    file: Option<Lock>,
     /// Lines of its own ledger by hash.
     lines: BTreeMap<String, Line<M>>,
     /// Other ledgers of the folder in order of their names.
@@ -104,8 +105,7 @@ impl<M: Serialize + DeserializeOwned> Ledger<M> {
             Reader::Look => (ledger_of(None), false),
         };
         let path = directory.join(&own);
-        fs::create_dir_all(directory).map_err(fault(&path))?;
-        let names = names(directory).map_err(fault(&path))?;
+        let names = names(directory)?;
         let is_used = names.iter().any(|name| name != CLAIM);
         if is_used && !names.iter().any(|name| is_ledger(name)) {
             return Err(StudyError::Occupied(directory.to_owned()));
@@ -115,7 +115,7 @@ impl<M: Serialize + DeserializeOwned> Ledger<M> {
         let is_strict = reader == Reader::Whole;
         let standing = read::<M>(&path, reader != Reader::Look)?;
         if let Some(file) = &file {
-            file.set_len(standing.whole as u64).map_err(fault(&path))?;
+            file.file().set_len(standing.whole as u64).at(&path)?;
         }
         let mut others = Vec::new();
         for name in names
@@ -205,17 +205,14 @@ impl<M: Clone + Serialize> Ledger<M> {
     /// # Panics
     /// If the ledger was opened with [`Reader::Look`].
     pub(super) fn append(&mut self, line: Line<M>) -> Result<&Run<M>, StudyError> {
-        let mut file = self.file.as_ref().expect("opened to write");
+        let lock = self.file.as_ref().expect("opened to write");
         // Only finite numbers, strings and lists, which JSON can represent.
         let text = serde_json::to_string(&line).map_err(io::Error::other);
-        let written = text.and_then(|text| {
-            file.write_all(format!("{text}\n").as_bytes())?;
-            file.sync_data()
-        });
-        written.map_err(fault(&self.path))?;
-        if !is_at(file, &self.path) {
+        text.and_then(|text| append(lock.file(), format!("{text}\n").as_bytes()))
+            .at(&self.path)?;
+        if !lock.is_there() {
             let what = "it was removed while its worker ran: what was run since is lost";
-            return Err(fault(&self.path)(io::Error::other(what)));
+            return Err(FileError::new(&self.path, io::Error::other(what)).into());
         }
         let hash = line.key.hash.clone();
         Ok(&self.lines.entry(hash).or_insert(line).run)
@@ -241,40 +238,17 @@ impl<M: Clone + Serialize> Ledger<M> {
     }
 }
 
-fn fault(file: &Path) -> impl FnOnce(io::Error) -> StudyError + use<> {
-    let file = file.to_owned();
-    move |source| StudyError::File { file, source }
-}
-
-/// Names of the entries of a folder, sorted.
-pub(super) fn names(directory: &Path) -> io::Result<Vec<String>> {
-    let entries = fs::read_dir(directory)?;
-    let name =
-        |entry: io::Result<fs::DirEntry>| Ok(entry?.file_name().to_string_lossy().into_owned());
-    let mut names = entries.map(name).collect::<io::Result<Vec<_>>>()?;
-    names.sort();
-    Ok(names)
-}
-
-/// Opens a ledger for appending and locks it.
-fn locked(path: &Path) -> Result<File, StudyError> {
-    let mut options = OpenOptions::new();
-    let file = options.create(true).append(true).open(path);
-    let file = file.map_err(fault(path))?;
-    match is_had(file.try_lock()).map_err(fault(path))? {
-        true => Ok(file),
-        false => Err(fault(path)(io::Error::other("another process writes here"))),
-    }
+/// Locks a ledger for appending.
+fn locked(path: &Path) -> Result<Lock, FileError> {
+    let busy = || FileError::new(path, io::Error::other("another process writes here"));
+    Lock::take(path)?.ok_or_else(busy)
 }
 
 /// Fails if another process writes to this ledger.
-fn refuse_busy(path: &Path) -> Result<(), StudyError> {
-    let file = File::open(path).map_err(fault(path))?;
-    match is_had(file.try_lock_shared()).map_err(fault(path))? {
-        true => Ok(()),
-        false => Err(fault(path)(io::Error::other(
-            "a worker writes here: wait for it",
-        ))),
+fn refuse_busy(path: &Path) -> Result<(), FileError> {
+    match is_taken(path)? {
+        false => Ok(()),
+        true => Err(io::Error::other("a worker writes here: wait for it")).at(path),
     }
 }
 
@@ -282,9 +256,8 @@ fn refuse_busy(path: &Path) -> Result<(), StudyError> {
 /// and skipped otherwise.
 fn read<M: DeserializeOwned>(path: &Path, is_strict: bool) -> Result<Read<M>, StudyError> {
     let text = match fs::read(path) {
-        Ok(text) => text,
         Err(error) if error.kind() == io::ErrorKind::NotFound => Vec::new(),
-        Err(error) => return Err(fault(path)(error)),
+        other => other.at(path)?,
     };
     let whole = text.iter().rposition(|&byte| byte == b'\n');
     let whole = whole.map_or(0, |end| end + 1);

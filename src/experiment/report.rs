@@ -1,7 +1,6 @@
 //! Output of a study: `results.csv`, its curves, and the page.
 
-use std::{fs, path::Path};
-
+use swell_domain::output::{create_folder, write};
 use swell_study::{
     page::{self, Part},
     raster,
@@ -38,10 +37,7 @@ impl Report {
         write(&directory.join("results.csv"), csv(&self.table))?;
         let folder = directory.join("curves");
         if !self.curves.is_empty() {
-            fs::create_dir_all(&folder).map_err(|source| StudyError::File {
-                file: folder.clone(),
-                source,
-            })?;
+            create_folder(&folder)?;
         }
         for (name, svg) in &self.curves {
             write(&folder.join(format!("{name}.svg")), svg)?;
@@ -74,13 +70,6 @@ pub(super) fn what_was_run(request: &Request) -> Vec<Part> {
     let told = warnings.map(|warning| Part::Text(format!("Warning: {warning}")));
     let command = Part::Code(request.command.clone());
     [command].into_iter().chain(told).collect()
-}
-
-fn write(file: &Path, text: impl AsRef<[u8]>) -> Result<(), StudyError> {
-    fs::write(file, text).map_err(|source| StudyError::File {
-        file: file.to_owned(),
-        source,
-    })
 }
 
 /// Formats rows as CSV, with quotes where needed.

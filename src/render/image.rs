@@ -5,13 +5,12 @@ mod pixels;
 mod png_file;
 
 use std::borrow::Cow;
-use std::io::Write;
 use std::path::Path;
 
 use glam::{DMat4, DVec4};
 
 use super::{RenderError, cryptomatte::Matte};
-use swell_domain::eye::Eye;
+use swell_domain::{eye::Eye, output};
 use swell_scene::look::{ColourSpaceSpec, LightSpec, Window};
 
 pub use exr_file::{read_exr_attributes, write_exr};
@@ -202,18 +201,10 @@ pub fn read_header(path: &Path) -> Result<Option<Attributes>, RenderError> {
     }
 }
 
-/// Writes to a temporary file and renames it, so that a picture that exists is complete.
+/// Writes a picture that is complete when it exists.
 fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), RenderError> {
-    let fault = |source| RenderError::Write {
+    output::write(path, bytes).map_err(|error| RenderError::Write {
         file: path.to_owned(),
-        source,
-    };
-    let mut name = path.file_name().unwrap_or_default().to_owned();
-    name.push(".part");
-    let part = path.with_file_name(name);
-    let mut file = std::fs::File::create(&part).map_err(fault)?;
-    file.write_all(bytes)
-        .and_then(|()| file.sync_all())
-        .map_err(fault)?;
-    std::fs::rename(&part, path).map_err(fault)
+        source: error.source,
+    })
 }

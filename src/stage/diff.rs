@@ -20,6 +20,7 @@ use swell_compare::baseline::Baseline;
 use swell_domain::{
     aggregates::Aggregates,
     frame_range::FrameRange,
+    output::{AtPath as _, FileError},
     particles::Particles,
     solver::StepReport,
     tolerance::{PictureLimits, Tolerance},
@@ -105,13 +106,8 @@ pub enum DiffError {
     #[error(transparent)]
     Picture(#[from] RenderError),
     /// A file or folder that cannot be read or written.
-    #[error("{}", file.display())]
-    File {
-        /// The file or folder.
-        file: PathBuf,
-        /// The system's error.
-        source: std::io::Error,
-    },
+    #[error(transparent)]
+    File(#[from] FileError),
     /// A file that is not a valid baseline.
     #[error("{} is not a baseline: {what}", file.display())]
     Baseline {
@@ -144,14 +140,6 @@ impl DiffError {
     fn usage(message: impl Into<String>) -> Self {
         Self::Usage(message.into())
     }
-
-    /// Adds the file that an [`std::io::Error`] lacks.
-    fn at(file: &Path) -> impl Fn(std::io::Error) -> Self {
-        move |source| Self::File {
-            file: file.to_owned(),
-            source,
-        }
-    }
 }
 
 impl From<&DiffError> for Blame {
@@ -164,7 +152,7 @@ impl From<&DiffError> for Blame {
             DiffError::Cache(_)
             | DiffError::Scene { .. }
             | DiffError::Picture(_)
-            | DiffError::File { .. }
+            | DiffError::File(_)
             | DiffError::Baseline { .. }
             | DiffError::Empty(_) => Self::Files,
         }
@@ -181,7 +169,7 @@ enum Subject {
 
 impl Subject {
     fn of(path: &Path) -> Result<Self, DiffError> {
-        let is_folder = fs::metadata(path).map_err(DiffError::at(path))?.is_dir();
+        let is_folder = fs::metadata(path).at(path)?.is_dir();
         if is_folder && swell_cache::exists(path) {
             return Ok(Self::Cache(Box::new(CacheReader::open(path)?)));
         }

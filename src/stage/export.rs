@@ -14,6 +14,7 @@ mod shot;
 mod usdc;
 
 use std::{
+    fs,
     path::{Path, PathBuf},
     sync::{
         Arc,
@@ -24,10 +25,11 @@ use std::{
 
 use glam::DVec3;
 
-use swell_cache::{CacheError, CacheReader, GridRecord, frame::Stamp, vdb};
+use swell_cache::{CacheError, CacheReader, GridRecord, frame::Stamp, refuse_inside, vdb};
 use swell_domain::{
     chunk::{Chunk, share},
     frame_range::FrameRange,
+    output::{AtPath as _, Draft},
     sparse_grid::Precision,
     water_mesh::VOLUME,
 };
@@ -49,7 +51,6 @@ use self::{
 pub use self::{
     error::ExportError,
     expected::{Expected, expected},
-    folder::FolderError,
     pattern::{Pattern, PatternError},
     usdc::UsdcError,
 };
@@ -401,15 +402,10 @@ impl<'a> Job<'a> {
     }
 
     fn check(&self, wanted: &Wanted) -> Result<(), ExportError> {
-        if let Some(cache) = swell_cache::around(&wanted.file) {
-            return Err(ExportError::IntoCache {
-                file: wanted.file.clone(),
-                cache,
-            });
-        }
+        refuse_inside(&wanted.file, "name")?;
         match self.request.overwrite {
             true => Ok(()),
-            false => Ok(wanted.check()?),
+            false => wanted.check(),
         }
     }
 
@@ -433,22 +429,17 @@ impl<'a> Job<'a> {
             outcome.standing += 1;
             return Ok(());
         }
-        let bytes = bytes()?;
+        let write = |draft: &Draft, bytes| fs::write(draft.path(), bytes).at(draft.path());
+        let (bytes, draft) = (bytes()?, wanted.draft(&wanted.file));
         match &self.python {
             Some(python) if is_binary(&wanted.file) => {
-                let text = Wanted {
-                    file: wanted.file.with_extension("part.usda"),
-                    ..wanted.clone()
-                };
-                text.write(&bytes)?;
-                let converted = python.convert(&text.draft(), &wanted.draft());
-                // A leftover is overwritten next time.
-                let _ = std::fs::remove_file(text.draft());
-                converted?;
+                let text = wanted.draft(&wanted.file.with_extension("part.usda"));
+                write(&text, bytes)?;
+                python.convert(text.path(), draft.path())?;
             }
-            _ => wanted.write(&bytes)?,
+            _ => write(&draft, bytes)?,
         }
-        outcome.bytes += wanted.publish()?;
+        outcome.bytes += wanted.publish(draft)?;
         outcome.made += 1;
         Ok(())
     }

@@ -9,7 +9,11 @@ use std::{
 };
 
 use swell_cache::{CacheError, CacheReader, stream::Stream};
-use swell_domain::{signed_distance::SignedDistanceError, sources::PredictedInflow};
+use swell_domain::{
+    output::{self, FileError},
+    signed_distance::SignedDistanceError,
+    sources::PredictedInflow,
+};
 use swell_gpu::{
     adapter::{Context, GpuError, enumerate},
     program::check_sizes,
@@ -294,16 +298,8 @@ pub fn sizes(directory: &Path) -> Result<CacheSizes, SizesError> {
 /// Folders of a cache's whitewater streams, sorted by name.
 fn whitewater_folders(cache: &Path) -> Result<Vec<PathBuf>, SizesError> {
     let folder = cache.join(whitewater::FOLDER);
-    if !folder.exists() {
-        return Ok(Vec::new());
-    }
-    let paths = fs::read_dir(&folder).and_then(|found| {
-        let paths = found.map(|entry| Ok(entry?.path()));
-        paths.collect::<io::Result<Vec<_>>>()
-    });
-    let mut streams = paths.map_err(|source| unread(&folder, source))?;
+    let mut streams = output::paths(&folder).map_err(|error| unread(&error.path, error.source))?;
     streams.retain(|it| swell_cache::exists(it));
-    streams.sort();
     Ok(streams)
 }
 
@@ -373,16 +369,16 @@ pub fn plot(directory: &Path, folder: &Path) -> Result<Vec<PathBuf>, PlotError> 
     if manifest.probes.is_empty() {
         return Err(PlotError::NoProbes(directory.to_owned()));
     }
-    let fault = |file: &Path| {
-        let file = file.to_owned();
-        move |source| PlotError::Write { file, source }
+    let fault = |error: FileError| PlotError::Write {
+        file: error.path,
+        source: error.source,
     };
-    fs::create_dir_all(folder).map_err(fault(folder))?;
+    output::create_folder(folder).map_err(fault)?;
     let mut files = Vec::new();
     for (index, record) in manifest.probes.iter().enumerate() {
         let chart = probes::chart(&manifest.shot, record, index, reader.entries());
         let file = folder.join(format!("{}.svg", record.name));
-        fs::write(&file, chart.to_svg()).map_err(fault(&file))?;
+        output::write(&file, chart.to_svg()).map_err(fault)?;
         files.push(file);
     }
     Ok(files)

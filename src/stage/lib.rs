@@ -10,7 +10,6 @@ pub mod drive;
 pub mod export;
 pub mod gauge;
 pub mod inspect;
-pub mod locked;
 mod numbering;
 pub mod prepare;
 mod probes;

@@ -24,7 +24,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use swell_cache::{CacheError, CacheReader};
+use swell_cache::{CacheError, CacheReader, IntoCache, refuse_inside};
 use swell_domain::{
     chunk::{Chunk, share},
     frame_range::FrameRange,
@@ -196,13 +196,8 @@ pub enum RenderJobError {
     #[error(transparent)]
     Whitewater(#[from] StreamError),
     /// The output would be written into a cache.
-    #[error("{} is in the cache {}: choose another folder", directory.display(), cache.display())]
-    IntoCache {
-        /// The output folder.
-        directory: PathBuf,
-        /// The cache that contains it.
-        cache: PathBuf,
-    },
+    #[error(transparent)]
+    IntoCache(#[from] IntoCache),
 }
 
 impl RenderJobError {
@@ -234,7 +229,7 @@ impl From<&RenderJobError> for Blame {
             )
             | RenderJobError::NoWater
             | RenderJobError::IsWhitewater(_)
-            | RenderJobError::IntoCache { .. } => Self::Input,
+            | RenderJobError::IntoCache(_) => Self::Input,
             RenderJobError::Whitewater(_)
             | RenderJobError::Mesh(_)
             | RenderJobError::NoNeighbours(_) => Self::Files,
@@ -324,12 +319,7 @@ struct Asked {
 impl Asked {
     fn open(request: &Request) -> Result<Self, RenderJobError> {
         let cache = CacheReader::open(&request.cache)?;
-        if let Some(cache) = swell_cache::around(&request.directory) {
-            return Err(RenderJobError::IntoCache {
-                directory: request.directory.clone(),
-                cache,
-            });
-        }
+        refuse_inside(&request.directory, "folder")?;
         let all = super::frames_of(&cache, request.frames.as_ref());
         for &frame in &all {
             cache.kept(frame)?;

@@ -16,7 +16,7 @@ use std::{
     sync::atomic::AtomicBool,
 };
 
-use swell_cache::CacheReader;
+use swell_cache::{CacheReader, refuse_inside};
 use swell_domain::frame_range::FrameRange;
 use swell_scene::look::Look;
 
@@ -244,13 +244,7 @@ fn chosen(
 
 /// Refuses an output inside a cache.
 fn check_place(file: &Path) -> Result<(), ViewError> {
-    match swell_cache::around(file) {
-        None => Ok(()),
-        Some(cache) => Err(ViewError::IntoCache {
-            file: file.to_owned(),
-            cache,
-        }),
-    }
+    Ok(refuse_inside(file, "name")?)
 }
 
 /// Opens a cache that must exist.

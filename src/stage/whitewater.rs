@@ -13,7 +13,6 @@ mod settled;
 mod water;
 
 use std::{
-    fs,
     path::{Path, PathBuf},
     sync::atomic::{AtomicBool, Ordering},
     time::Instant,
@@ -24,6 +23,7 @@ use serde_json::{Value, json};
 use swell_cache::{Asset, CacheError, CacheReader, CacheWriter, Clock, Entry, Manifest};
 use swell_domain::{
     bounds::Bounds,
+    output,
     particles::Particles,
     whitewater::{self, Births, Settings, Source, Thresholds},
 };
@@ -466,9 +466,9 @@ fn remove(directory: &Path) -> Result<(), WhitewaterError> {
     if !swell_cache::exists(directory) {
         return Ok(());
     }
-    fs::remove_dir_all(directory).map_err(|source| WhitewaterError::Remove {
+    output::remove_folder(directory).map_err(|error| WhitewaterError::Remove {
         directory: directory.to_owned(),
-        source,
+        source: error.source,
     })
 }
 

@@ -6,6 +6,7 @@ use std::{
 };
 use swell_files::parse_scene_within;
 
+use swell_domain::output::{self, FileError};
 use swell_files::{
     edit::{Setting, with_settings},
     physics_hash,
@@ -18,13 +19,6 @@ use super::{super::StudyError, Results, Trial};
 /// First words of a scene that may be overwritten.
 const MARK: &str = "# Tuned by swell from ";
 
-fn fault(file: &Path, source: io::Error) -> StudyError {
-    StudyError::File {
-        file: file.to_owned(),
-        source,
-    }
-}
-
 /// Checks before the first run that the target file does not exist or is a tuned scene.
 pub(super) fn check_target(tune: &Tune) -> Result<(), StudyError> {
     let file = &tune.request.target;
@@ -32,7 +26,7 @@ pub(super) fn check_target(tune: &Tune) -> Result<(), StudyError> {
         Ok(text) if text.starts_with(MARK) => Ok(()),
         Ok(_) => Err(StudyError::NotTuned(file.clone())),
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
-        Err(error) => Err(fault(file, error)),
+        Err(error) => Err(FileError::new(file, error).into()),
     }
 }
 
@@ -58,7 +52,7 @@ pub(super) fn write(results: &Results<'_>, command: &str) -> Result<Option<PathB
             trial.variant.name()
         )));
     }
-    fs::write(file, text).map_err(|e| fault(file, e))?;
+    output::write(file, text)?;
     Ok(Some(file.clone()))
 }
 

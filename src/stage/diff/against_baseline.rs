@@ -2,7 +2,7 @@
 
 use std::{
     collections::BTreeMap,
-    fs,
+    io,
     path::{Path, PathBuf},
 };
 
@@ -17,7 +17,10 @@ use swell_compare::{
     },
     limits::default_tolerances,
 };
-use swell_domain::frame_range::{FrameRange, ranges};
+use swell_domain::{
+    frame_range::{FrameRange, ranges},
+    output::{self, AtPath as _},
+};
 
 /// Result of writing a baseline.
 #[derive(Clone, Debug, Serialize)]
@@ -42,7 +45,7 @@ pub struct Written {
 
 /// Reads and checks a baseline.
 pub(super) fn read(file: &Path) -> Result<Baseline, DiffError> {
-    let text = swell_domain::text::read(file).map_err(DiffError::at(file))?;
+    let text = swell_domain::text::read(file).at(file)?;
     let found: Result<Baseline, String> =
         serde_json::from_str(&text).map_err(|error| error.to_string());
     let checked = found.and_then(|found| found.check().map(|()| found));
@@ -197,10 +200,9 @@ fn take_spread(
 }
 
 fn write(file: &Path, baseline: &Baseline) -> Result<(), DiffError> {
-    let fault = DiffError::at(file);
-    let mut text = serde_json::to_vec_pretty(baseline).map_err(|error| fault(error.into()))?;
-    text.push(b'\n');
-    fs::write(file, text).map_err(fault)
+    let text = serde_json::to_string_pretty(baseline);
+    let text = text.map_err(io::Error::from).at(file)? + "\n";
+    Ok(output::write(file, text)?)
 }
 
 fn measure(cache: &CacheReader, frames: &[u32]) -> Result<Vec<Measured>, DiffError> {

@@ -2,7 +2,6 @@
 
 use std::{
     collections::BTreeMap,
-    fs,
     path::{Path, PathBuf},
 };
 
@@ -10,7 +9,11 @@ use rayon::prelude::*;
 
 use super::{DiffError, Images, Request};
 use swell_compare::pictures::{self, Encoding, PairDiff, Picture, PicturesDiff, difference_image};
-use swell_domain::{frame_range::FrameRange, tolerance::PictureLimits};
+use swell_domain::{
+    frame_range::FrameRange,
+    output::{create_folder, paths},
+    tolerance::PictureLimits,
+};
 use swell_render::{
     RenderError,
     image::{read_exr, read_png, write_rgb_png},
@@ -41,10 +44,8 @@ pub(super) fn in_folder(
     folder: &Path,
     frames: Option<&FrameRange>,
 ) -> Result<BTreeMap<String, PathBuf>, DiffError> {
-    let fault = DiffError::at(folder);
     let mut found = BTreeMap::new();
-    for entry in fs::read_dir(folder).map_err(&fault)? {
-        let path = entry.map_err(&fault)?.path();
+    for path in paths(folder)? {
         let is_wanted = |frames: &FrameRange| frame_of(&path).is_some_and(|f| frames.contains(f));
         if is_picture(&path) && path.is_file() && frames.is_none_or(is_wanted) {
             let name = path.file_name().unwrap_or_default().to_string_lossy();
@@ -79,7 +80,7 @@ pub(super) fn compare_folders(request: &Request) -> Result<PicturesDiff, DiffErr
         for folder in [&request.a, &request.b] {
             refuse_same(&images.path, folder)?;
         }
-        fs::create_dir_all(&images.path).map_err(DiffError::at(&images.path))?;
+        create_folder(&images.path)?;
     }
     let lone = |x: &BTreeMap<String, PathBuf>, y: &BTreeMap<String, PathBuf>| {
         let names = x.keys().filter(|name| !y.contains_key(*name));

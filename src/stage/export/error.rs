@@ -3,10 +3,11 @@
 use std::{io, path::PathBuf};
 
 use crate::Blame;
-use swell_cache::CacheError;
+use swell_cache::{CacheError, IntoCache};
+use swell_domain::output::FileError;
 use swell_scene::{SceneError, look::LookError};
 
-use super::{FolderError, UsdcError};
+use super::UsdcError;
 
 /// Why an export failed.
 #[derive(Debug, thiserror::Error)]
@@ -26,9 +27,20 @@ pub enum ExportError {
     /// The look is invalid.
     #[error(transparent)]
     Look(#[from] LookError),
-    /// The output folder cannot be used.
+    /// A file or folder that cannot be read, written or locked.
     #[error(transparent)]
-    Folder(#[from] FolderError),
+    File(#[from] FileError),
+    /// The name of a file is taken by something else.
+    #[error(
+        "{} is {what}; choose another name, or overwrite it",
+        file.display()
+    )]
+    Taken {
+        /// The existing file.
+        file: PathBuf,
+        /// What it is.
+        what: String,
+    },
     /// Binary USD cannot be written.
     #[error(transparent)]
     Usdc(#[from] UsdcError),
@@ -54,13 +66,8 @@ pub enum ExportError {
         frame: u32,
     },
     /// The output would be written into a cache.
-    #[error("{} is in the cache {}: choose another name", file.display(), cache.display())]
-    IntoCache {
-        /// The output file.
-        file: PathBuf,
-        /// The cache that contains it.
-        cache: PathBuf,
-    },
+    #[error(transparent)]
+    IntoCache(#[from] IntoCache),
     /// A grid file could not be encoded.
     #[error("frame {frame} as OpenVDB: {source}")]
     Vdb {
@@ -84,11 +91,12 @@ impl From<&ExportError> for Blame {
             ExportError::Nothing
             | ExportError::Asked(_)
             | ExportError::Look(_)
-            | ExportError::IntoCache { .. }
+            | ExportError::IntoCache(_)
             | ExportError::Usdc(UsdcError::Missing { .. }) => Self::Input,
             ExportError::Cache(_)
             | ExportError::Scene(_)
-            | ExportError::Folder(_)
+            | ExportError::File(_)
+            | ExportError::Taken { .. }
             | ExportError::Usdc(UsdcError::Failed { .. })
             | ExportError::NoStream { .. }
             | ExportError::OldStream { .. }

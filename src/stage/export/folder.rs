@@ -12,14 +12,15 @@
 //! A file is complete if its bytes match the record. A lock ends with its process.
 
 use std::{
-    fs::{self, File},
-    io::{self, Write as _},
+    fs, io,
     path::{Path, PathBuf},
 };
 
 use serde::{Deserialize, Serialize};
 
-use crate::locked::{is_at, is_had, open};
+use super::ExportError;
+use swell_cache::file_hash;
+use swell_domain::output::{self, AtPath as _, Draft, FileError, Lock};
 
 /// Folder of records and drafts.
 const ROOM: &str = ".swell-export";
@@ -49,32 +50,6 @@ struct Record {
     blake3: String,
 }
 
-/// Why a file cannot be made.
-#[derive(Debug, thiserror::Error)]
-pub enum FolderError {
-    /// A file or folder that cannot be read, written or locked.
-    #[error("{}", file.display())]
-    File {
-        /// The file or folder.
-        file: PathBuf,
-        /// The system's error.
-        source: io::Error,
-    },
-    /// The name is taken by something else.
-    #[error("{} is {what}; choose another name, or overwrite it", file.display())]
-    Other {
-        /// The existing file.
-        file: PathBuf,
-        /// What it is.
-        what: String,
-    },
-}
-
-fn at(file: &Path) -> impl FnOnce(io::Error) -> FolderError + use<> {
-    let file = file.to_owned();
-    move |source| FolderError::File { file, source }
-}
-
 /// A file to be made.
 #[derive(Clone, Debug)]
 pub(super) struct Wanted {
@@ -84,20 +59,6 @@ pub(super) struct Wanted {
     pub(super) source: String,
     /// Whether a file made from another source is replaced without asking.
     pub(super) follows: bool,
-}
-
-/// The exclusive right to make a file, held until it is dropped.
-#[derive(Debug)]
-pub(super) struct Claim {
-    lock: PathBuf,
-    _file: File,
-}
-
-impl Drop for Claim {
-    fn drop(&mut self) {
-        // A lock file that stays behind does no harm.
-        let _ = fs::remove_file(&self.lock);
-    }
 }
 
 impl Wanted {
@@ -114,9 +75,9 @@ impl Wanted {
         self.folder().join(ROOM).join(name)
     }
 
-    /// Path of the draft; it has the file's own extension.
-    pub(super) fn draft(&self) -> PathBuf {
-        self.beside("")
+    /// A draft of a file beside this one; it has that file's own extension.
+    pub(super) fn draft(&self, file: &Path) -> Draft {
+        Draft::within(&self.folder().join(ROOM), file)
     }
 
     fn record(&self) -> Option<Record> {
@@ -126,10 +87,10 @@ impl Wanted {
     /// Refuses an existing file of another origin.
     ///
     /// # Errors
-    /// [`FolderError::Other`]; [`FolderError::File`] if the name is a directory.
-    pub(super) fn check(&self) -> Result<(), FolderError> {
+    /// [`ExportError::Taken`]; [`ExportError::File`] if the name is a directory.
+    pub(super) fn check(&self) -> Result<(), ExportError> {
         let other = |what: &str| {
-            Err(FolderError::Other {
+            Err(ExportError::Taken {
                 file: self.file.clone(),
                 what: what.to_owned(),
             })
@@ -138,7 +99,7 @@ impl Wanted {
             return Ok(());
         }
         if self.file.is_dir() {
-            return Err(at(&self.file)(io::ErrorKind::IsADirectory.into()));
+            return Err(FileError::new(&self.file, io::ErrorKind::IsADirectory).into());
         }
         let Some(Record { owner, source, .. }) = self.record() else {
             return other("not from an export");
@@ -169,7 +130,7 @@ impl Wanted {
             let length = fs::metadata(&self.file).map(|found| found.len());
             is_ours
                 && length.is_ok_and(|length| length == record.bytes)
-                && hash(&self.file).is_ok_and(|hash| hash == record.blake3)
+                && file_hash(&self.file).is_ok_and(|hash| hash == record.blake3)
         };
         self.record().is_some_and(is_whole)
     }
@@ -177,70 +138,29 @@ impl Wanted {
     /// Claims the file for this process; `None` while another process has it.
     ///
     /// # Errors
-    /// [`FolderError::File`].
-    pub(super) fn claim(&self) -> Result<Option<Claim>, FolderError> {
-        let room = self.folder().join(ROOM);
-        fs::create_dir_all(&room).map_err(at(&room))?;
-        let lock = self.beside(".lock");
-        loop {
-            let file = open(&lock).map_err(at(&lock))?;
-            if !is_had(file.try_lock()).map_err(at(&lock))? {
-                return Ok(None);
-            }
-            // The previous holder may have removed the lock file in between.
-            if is_at(&file, &lock) {
-                return Ok(Some(Claim { lock, _file: file }));
-            }
-        }
+    /// [`FileError`].
+    pub(super) fn claim(&self) -> Result<Option<Lock>, FileError> {
+        Ok(Lock::take(&self.beside(".lock"))?.map(Lock::temporary))
     }
 
-    /// Writes bytes to the draft.
+    /// Writes the record of a complete draft and gives the draft its name. Returns its length,
+    /// bytes.
     ///
     /// # Errors
-    /// [`FolderError::File`].
-    pub(super) fn write(&self, bytes: &[u8]) -> Result<(), FolderError> {
-        let draft = self.draft();
-        fs::write(&draft, bytes).map_err(at(&draft))
-    }
-
-    /// Writes the record of a complete draft and renames the draft. Returns its length in bytes.
-    ///
-    /// # Errors
-    /// [`FolderError::File`].
-    pub(super) fn publish(&self) -> Result<u64, FolderError> {
-        let draft = self.draft();
-        let bytes = File::open(&draft)
-            .and_then(|file| {
-                file.sync_all()?;
-                Ok(file.metadata()?.len())
-            })
-            .map_err(at(&draft))?;
+    /// [`FileError`].
+    pub(super) fn publish(&self, mut draft: Draft) -> Result<u64, FileError> {
+        let found = fs::metadata(draft.path()).at(draft.path())?;
         let record = Record {
             owner: self.owner.clone(),
             source: self.source.clone(),
-            bytes,
-            blake3: hash(&draft).map_err(at(&draft))?,
+            bytes: found.len(),
+            blake3: file_hash(draft.path())?,
         };
         let name = self.beside(".json");
-        let partial = self.beside(".json.part");
-        let write = || {
-            let mut file = File::create(&partial)?;
-            file.write_all(serde_json::to_string_pretty(&record)?.as_bytes())?;
-            file.write_all(b"\n")?;
-            file.sync_all()?;
-            fs::rename(&partial, &name)
-        };
-        write().map_err(at(&name))?;
-        fs::rename(&draft, &self.file).map_err(at(&self.file))?;
-        Ok(bytes)
+        let text = serde_json::to_string_pretty(&record).map_err(io::Error::from);
+        output::write(&name, text.at(&name)? + "\n")?;
+        draft.publish()
     }
-}
-
-/// BLAKE3 of a file's content, hex.
-fn hash(file: &Path) -> io::Result<String> {
-    let mut hasher = blake3::Hasher::new();
-    hasher.update_reader(File::open(file)?)?;
-    Ok(hasher.finalize().to_hex().to_string())
 }
 
 #[cfg(test)]
@@ -268,9 +188,10 @@ mod tests {
         assert!(!one.stands() && one.check().is_ok());
         let claim = one.claim().unwrap().unwrap();
         assert!(one.claim().unwrap().is_none(), "one process at a time");
-        one.write(b"half").unwrap();
+        let draft = one.draft(&one.file);
+        fs::write(draft.path(), b"half").unwrap();
         assert!(!one.file.exists(), "a draft has no name yet");
-        one.publish().unwrap();
+        one.publish(draft).unwrap();
         drop(claim);
         assert!(one.stands() && one.check().is_ok());
         assert!(one.claim().unwrap().is_some());
@@ -278,7 +199,7 @@ mod tests {
         fs::write(&one.file, b"hurt").unwrap();
         assert!(!one.stands() && one.check().is_ok());
         let other = wanted(dir.path(), "frame 2");
-        assert!(matches!(other.check(), Err(FolderError::Other { .. })));
+        assert!(matches!(other.check(), Err(ExportError::Taken { .. })));
         let follows = Wanted {
             follows: true,
             ..other
@@ -291,6 +212,6 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let one = wanted(dir.path(), "frame 1");
         fs::write(&one.file, b"mine").unwrap();
-        assert!(matches!(one.check(), Err(FolderError::Other { .. })));
+        assert!(matches!(one.check(), Err(ExportError::Taken { .. })));
     }
 }

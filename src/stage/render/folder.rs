@@ -14,17 +14,14 @@
 
 use std::{
     collections::BTreeSet,
-    fs::{self, File},
-    io::{self, Read as _, Seek as _, Write as _},
+    fs, io,
     path::{Path, PathBuf},
 };
 
 use serde::{Deserialize, Serialize};
 
-use crate::{
-    locked::{is_at, is_had, open},
-    numbering::Numbering,
-};
+use crate::numbering::Numbering;
+use swell_domain::output::{self, AtPath as _, Draft, FileError, Lock, complete_name, names};
 use swell_render::{Attributes, image::read_header};
 
 /// Record of the pictures' owner; locked while a process enters or leaves.
@@ -95,13 +92,8 @@ pub(super) struct Wanted<'a> {
 #[derive(Debug, thiserror::Error)]
 pub enum FolderError {
     /// A file or folder that cannot be read, written or locked.
-    #[error("{}", file.display())]
-    File {
-        /// The file or folder.
-        file: PathBuf,
-        /// The system's error.
-        source: io::Error,
-    },
+    #[error(transparent)]
+    File(#[from] FileError),
     /// A picture of another origin exists.
     #[error("{} is {what}; choose another folder, or overwrite it", file.display())]
     Other {
@@ -135,11 +127,6 @@ pub enum FolderError {
     },
 }
 
-fn at(file: &Path) -> impl FnOnce(io::Error) -> FolderError + use<> {
-    let file = file.to_owned();
-    move |source| FolderError::File { file, source }
-}
-
 /// A process's registration in a folder, held while it works there.
 #[derive(Debug)]
 pub(super) struct Folder {
@@ -147,7 +134,7 @@ pub(super) struct Folder {
     /// Whether this process created the folder.
     is_new: bool,
     /// Lock on the work file; `None` while it is being released.
-    work: Option<File>,
+    work: Option<Lock>,
 }
 
 impl Folder {
@@ -163,39 +150,39 @@ impl Folder {
             // it.
             check_standing(path, wanted, wanted.overwrite)?;
         }
-        let mut gate = Gate::close(path)?;
+        let gate = close_gate(path)?;
         let room = path.join(ROOM);
         let in_use = |what: &str| FolderError::InUse {
             directory: path.to_owned(),
             what: what.to_owned(),
         };
         if is_deserted(&room)? {
-            let is_ours = gate.owner().as_ref() == Some(&wanted.owner);
+            let is_ours = recorded(&gate).as_ref() == Some(&wanted.owner);
             check_standing(path, wanted, wanted.overwrite || is_ours)?;
             clear(path, &wanted.owner.shot)?;
-            gate.write(&wanted.owner)?;
-            fs::create_dir(&room).map_err(at(&room))?;
+            if !is_ours {
+                let text = serde_json::to_string_pretty(&wanted.owner).map_err(io::Error::from);
+                gate.write(&(text.at(path)? + "\n"))?;
+            }
+            fs::create_dir(&room).at(&room)?;
         } else if wanted.overwrite {
             return Err(in_use("pictures that this one would overwrite"));
         } else {
-            let owner = gate.owner().ok_or_else(|| in_use("already"))?;
+            let owner = recorded(&gate).ok_or_else(|| in_use("already"))?;
             if let Some(what) = owner.difference(&wanted.owner) {
                 return Err(in_use(&format!("another {what}")));
             }
         }
         let file = room.join(WORK);
-        let work = open(&file).map_err(at(&file))?;
-        let tried = match wanted.overwrite {
-            true => work.try_lock(),
-            false => work.try_lock_shared(),
+        let work = match wanted.overwrite {
+            true => Lock::take(&file),
+            false => Lock::share(&file),
         };
-        if !is_had(tried).map_err(at(&file))? {
-            return Err(in_use("and overwrites pictures"));
-        }
+        let work = Some(work?.ok_or_else(|| in_use("and overwrites pictures"))?);
         Ok(Self {
             path: path.to_owned(),
             is_new,
-            work: Some(work),
+            work,
         })
     }
 
@@ -211,39 +198,26 @@ impl Folder {
         check_standing(path, wanted, wanted.overwrite || is_ours)
     }
 
-    /// Claims a frame, `small.0001`, for this process until the file is dropped; `None` while
+    /// Claims a frame, `small.0001`, for this process until the lock is dropped; `None` while
     /// another process has it.
     ///
     /// # Errors
     /// [`FolderError::File`].
-    pub(super) fn claim(&self, frame: &str) -> Result<Option<File>, FolderError> {
-        let file = self.path.join(ROOM).join(format!("{frame}.lock"));
-        let claim = open(&file).map_err(at(&file))?;
-        let is_ours = is_had(claim.try_lock()).map_err(at(&file))?;
-        Ok(is_ours.then_some(claim))
+    pub(super) fn claim(&self, frame: &str) -> Result<Option<Lock>, FolderError> {
+        let name = self.path.join(ROOM).join(format!("{frame}.lock"));
+        Ok(Lock::take(&name)?)
     }
 
-    /// Path of the draft of a claimed frame's picture.
-    pub(super) fn draft(&self, name: &str) -> PathBuf {
-        self.path.join(ROOM).join(name)
-    }
-
-    /// Moves a complete picture to its final name. Returns its size in bytes.
-    ///
-    /// # Errors
-    /// [`FolderError::File`].
-    pub(super) fn publish(&self, name: &str) -> Result<u64, FolderError> {
-        let (draft, file) = (self.draft(name), self.path.join(name));
-        let bytes = fs::metadata(&draft).map_err(at(&draft))?.len();
-        fs::rename(draft, &file).map_err(at(&file))?;
-        Ok(bytes)
+    /// Draft of a claimed frame's picture.
+    pub(super) fn draft(&self, name: &str) -> Draft {
+        Draft::within(&self.path.join(ROOM), &self.path.join(name))
     }
 }
 
 impl Drop for Folder {
     fn drop(&mut self) {
         // The next process to enter clears what cannot be cleared now.
-        let Ok(_gate) = Gate::close(&self.path) else {
+        let Ok(_gate) = close_gate(&self.path) else {
             return;
         };
         self.work = None;
@@ -251,11 +225,11 @@ impl Drop for Folder {
         if !is_deserted(&room).unwrap_or(false) {
             return;
         }
-        let _ = fs::remove_dir_all(room);
+        let _ = output::remove_folder(&room);
         // If nothing was rendered, nothing is left behind.
         let left = names(&self.path).unwrap_or_default();
-        if cfg!(unix) && left.len() == 1 && left.contains(RECORD) {
-            let _ = fs::remove_file(self.path.join(RECORD));
+        if cfg!(unix) && left == [RECORD] {
+            let _ = output::remove_file(&self.path.join(RECORD));
             if self.is_new {
                 let _ = fs::remove_dir(&self.path);
             }
@@ -263,89 +237,34 @@ impl Drop for Folder {
     }
 }
 
-/// A lock on `render.json`: no other process enters or leaves. Its holder waits for no other lock.
-struct Gate {
-    path: PathBuf,
-    file: File,
+/// Locks `render.json`: no other process enters or leaves. The holder waits for no other lock.
+fn close_gate(folder: &Path) -> Result<Lock, FileError> {
+    Lock::wait(&folder.join(RECORD))
 }
 
-impl Gate {
-    fn close(folder: &Path) -> Result<Self, FolderError> {
-        let path = folder.join(RECORD);
-        loop {
-            fs::create_dir_all(folder).map_err(at(folder))?;
-            let file = open(&path).map_err(at(&path))?;
-            file.lock().map_err(at(&path))?;
-            // Another process that rendered nothing may have removed it.
-            if is_at(&file, &path) {
-                return Ok(Self { path, file });
-            }
-        }
-    }
-
-    /// The recorded owner; `None` if the file is empty or was left incomplete by a kill.
-    fn owner(&mut self) -> Option<Owner> {
-        let mut text = String::new();
-        self.file.rewind().ok()?;
-        self.file.read_to_string(&mut text).ok()?;
-        serde_json::from_str(&text).ok()
-    }
-
-    fn write(&mut self, owner: &Owner) -> Result<(), FolderError> {
-        if self.owner().as_ref() == Some(owner) {
-            return Ok(());
-        }
-        let mut write = || {
-            let text = serde_json::to_string_pretty(owner)?;
-            self.file.set_len(0)?;
-            self.file.rewind()?;
-            self.file.write_all(text.as_bytes())?;
-            self.file.write_all(b"\n")?;
-            self.file.sync_all()
-        };
-        write().map_err(at(&self.path))
-    }
+/// The recorded owner; `None` if the file is empty or was left incomplete by a kill.
+fn recorded(gate: &Lock) -> Option<Owner> {
+    serde_json::from_str(&gate.read().ok()?).ok()
 }
 
 /// Whether no process is working; requires a closed gate.
-fn is_deserted(room: &Path) -> Result<bool, FolderError> {
+fn is_deserted(room: &Path) -> Result<bool, FileError> {
     let file = room.join(WORK);
-    match File::options().read(true).write(true).open(&file) {
-        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(true),
-        Err(error) => Err(at(&file)(error)),
-        Ok(work) => is_had(work.try_lock()).map_err(at(&file)),
-    }
+    Ok(!file.exists() || Lock::take(&file)?.is_some())
 }
 
 /// Removes what killed processes left: their work folder, and partial pictures beside the complete
 /// ones.
-fn clear(folder: &Path, shot: &str) -> Result<(), FolderError> {
-    let room = folder.join(ROOM);
-    match fs::remove_dir_all(&room) {
-        Err(error) if error.kind() == io::ErrorKind::NotFound => {}
-        other => other.map_err(at(&room))?,
-    }
+fn clear(folder: &Path, shot: &str) -> Result<(), FileError> {
+    output::remove_folder(&folder.join(ROOM))?;
     let is_half = |name: &String| {
-        let is_ours = name.starts_with(&format!("{shot}."));
-        is_ours && (name.ends_with(".png.part") || name.ends_with(".exr.part"))
+        let whole = complete_name(name).filter(|name| name.starts_with(&format!("{shot}.")));
+        whole.is_some_and(|name| name.ends_with(".png") || name.ends_with(".exr"))
     };
     for name in names(folder)?.iter().filter(|name| is_half(name)) {
-        let file = folder.join(name);
-        fs::remove_file(&file).map_err(at(&file))?;
+        output::remove_file(&folder.join(name))?;
     }
     Ok(())
-}
-
-/// Names of a folder's entries; empty if it does not exist.
-fn names(folder: &Path) -> Result<BTreeSet<String>, FolderError> {
-    let name = |entry: io::Result<fs::DirEntry>| {
-        let entry = entry.map_err(at(folder))?;
-        Ok(entry.file_name().to_string_lossy().into_owned())
-    };
-    match fs::read_dir(folder) {
-        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(BTreeSet::new()),
-        other => other.map_err(at(folder))?.map(name).collect(),
-    }
 }
 
 /// Refuses pictures of another owner, except those that `wanted` may replace.
@@ -359,7 +278,7 @@ fn check_standing(
         let is_replaced = wanted.names.contains(&name);
         if is_replaced && file.is_dir() {
             // No picture can take its name, whoever owns it.
-            return Err(at(&file)(io::ErrorKind::IsADirectory.into()));
+            return Err(FileError::new(&file, io::ErrorKind::IsADirectory).into());
         }
         let Some(what) = stranger(&file, is_replaced, wanted) else {
             continue;

@@ -1,13 +1,15 @@
 //! Writes a frame's pictures while the next frame is drawn.
 
 use std::{
-    fs::File,
     sync::Arc,
     thread::{JoinHandle, spawn},
     time::Instant,
 };
 
-use super::{Event, Outcome, RenderJobError, Request, folder::Folder, pictures::write};
+use super::{
+    Event, FolderError, Outcome, RenderJobError, Request, folder::Folder, pictures::write,
+};
+use swell_domain::output::Lock;
 use swell_render::{Attributes, Image};
 use swell_scene::look::FormatSpec;
 
@@ -21,7 +23,7 @@ pub(super) struct Drawn {
     pub(super) pictures: Vec<(String, FormatSpec)>,
     pub(super) attributes: Attributes,
     /// Keeps other processes from rendering the frame.
-    pub(super) claim: File,
+    pub(super) claim: Lock,
 }
 
 /// A frame whose pictures are being written.
@@ -38,9 +40,15 @@ impl Writing {
         let thread = spawn(move || {
             let mut bytes = 0;
             for (name, format) in &drawn.pictures {
-                let draft = folder.draft(name);
-                write(&draft, *format, &drawn.image, &drawn.attributes, &look)?;
-                bytes += folder.publish(name)?;
+                let mut draft = folder.draft(name);
+                write(
+                    draft.path(),
+                    *format,
+                    &drawn.image,
+                    &drawn.attributes,
+                    &look,
+                )?;
+                bytes += draft.publish().map_err(FolderError::File)?;
             }
             drop(drawn.claim);
             Ok((drawn.begin.elapsed().as_secs_f64(), bytes))

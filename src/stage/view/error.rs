@@ -3,7 +3,8 @@
 use std::{io, path::PathBuf};
 
 use crate::Blame;
-use swell_cache::CacheError;
+use swell_cache::{CacheError, IntoCache};
+use swell_domain::output::FileError;
 use swell_render::RenderError;
 use swell_scene::SceneError;
 use swell_study::raster::RasterError;
@@ -44,13 +45,8 @@ pub enum ViewError {
     #[error(transparent)]
     Sheet(#[from] RasterError),
     /// A file or folder that cannot be read or written.
-    #[error("{}", file.display())]
-    File {
-        /// The file or folder.
-        file: PathBuf,
-        /// The system's error.
-        source: io::Error,
-    },
+    #[error(transparent)]
+    File(#[from] FileError),
     /// A picture or movie that could not be encoded.
     #[error("{}", file.display())]
     Encode {
@@ -60,13 +56,8 @@ pub enum ViewError {
         source: png::EncodingError,
     },
     /// The output would be written into a cache.
-    #[error("{} is in the cache {}: choose another name", file.display(), cache.display())]
-    IntoCache {
-        /// The output file or folder.
-        file: PathBuf,
-        /// The cache that contains it.
-        cache: PathBuf,
-    },
+    #[error(transparent)]
+    IntoCache(#[from] IntoCache),
     /// The external encoder that a movie needs cannot be run.
     #[error(
         "{} needs {program}, which cannot be run ({source}): install it, name another encoder, or \
@@ -93,20 +84,13 @@ pub enum ViewError {
     },
 }
 
-impl ViewError {
-    pub(super) fn at<P: Into<PathBuf>>(file: P) -> impl FnOnce(io::Error) -> Self {
-        let file = file.into();
-        move |source| Self::File { file, source }
-    }
-}
-
 impl From<&ViewError> for Blame {
     fn from(error: &ViewError) -> Self {
         match error {
             ViewError::Nothing
             | ViewError::Foreign(_)
             | ViewError::Asked(_)
-            | ViewError::IntoCache { .. }
+            | ViewError::IntoCache(_)
             | ViewError::NoEncoder { .. } => Self::Input,
             ViewError::Missing(_)
             | ViewError::Picture(_)
@@ -114,7 +98,7 @@ impl From<&ViewError> for Blame {
             | ViewError::Scene(_)
             | ViewError::Unfinished { .. }
             | ViewError::Sheet(_)
-            | ViewError::File { .. }
+            | ViewError::File(_)
             | ViewError::Encode { .. }
             | ViewError::Encoder { .. } => Self::Files,
         }

@@ -1,13 +1,14 @@
 //! Movies: APNG written here, MP4 and WebM by ffmpeg.
 
 use std::{
-    fs::{self, File},
+    fs::File,
     io::{BufWriter, Read as _, Write as _},
-    path::{Path, PathBuf},
+    path::Path,
     process::{Child, Command, Stdio},
 };
 
 use super::ViewError;
+use swell_domain::output::{AtPath as _, Draft};
 use swell_study::{apng::Apng, rgb::Rgb};
 
 /// Format of a movie.
@@ -83,10 +84,9 @@ impl Kind {
     }
 }
 
-/// A movie being written; if it is dropped before it is finished, the partial file is removed.
+/// A movie being written.
 pub(super) struct Movie {
-    file: PathBuf,
-    part: PathBuf,
+    draft: Draft,
     writer: Option<Writer>,
     program: String,
 }
@@ -106,20 +106,18 @@ impl Movie {
         ffmpeg: &str,
     ) -> Result<Self, ViewError> {
         let kind = Kind::of(file)?;
-        let mut name = file.file_name().unwrap_or_default().to_owned();
-        name.push(".part");
-        let part = file.with_file_name(name);
+        let draft = Draft::beside(file);
+        let part = draft.path();
         let writer = match kind {
             Kind::Apng => {
-                let out = File::create(&part).map_err(ViewError::at(&part))?;
+                let out = File::create(part).at(part)?;
                 let begun = Apng::begin(BufWriter::new(out), size, count, frames_per_second);
                 Writer::Apng(begun.map_err(encode(file))?)
             }
-            _ => Writer::Ffmpeg(encoder(kind, file, &part, size, frames_per_second, ffmpeg)?),
+            _ => Writer::Ffmpeg(encoder(kind, file, part, size, frames_per_second, ffmpeg)?),
         };
         Ok(Self {
-            file: file.to_owned(),
-            part,
+            draft,
             writer: Some(writer),
             program: ffmpeg.to_owned(),
         })
@@ -128,7 +126,7 @@ impl Movie {
     /// Appends the next frame.
     pub(super) fn push(&mut self, frame: &Rgb) -> Result<(), ViewError> {
         match &mut self.writer {
-            Some(Writer::Apng(movie)) => movie.push(frame).map_err(encode(&self.file)),
+            Some(Writer::Apng(movie)) => movie.push(frame).map_err(encode(self.draft.target())),
             Some(Writer::Ffmpeg(child)) => {
                 let put = child
                     .stdin
@@ -147,25 +145,23 @@ impl Movie {
     /// Finishes the movie and renames it. Returns its size in bytes.
     pub(super) fn finish(mut self) -> Result<u64, ViewError> {
         self.close()?;
-        fs::rename(&self.part, &self.file).map_err(ViewError::at(&self.file))?;
-        let found = fs::metadata(&self.file).map_err(ViewError::at(&self.file))?;
-        Ok(found.len())
+        Ok(self.draft.publish()?)
     }
 
     fn close(&mut self) -> Result<(), ViewError> {
         match self.writer.take() {
-            Some(Writer::Apng(movie)) => movie.finish().map_err(encode(&self.file)),
+            Some(Writer::Apng(movie)) => movie.finish().map_err(encode(self.draft.target())),
             Some(Writer::Ffmpeg(mut child)) => {
                 drop(child.stdin.take());
                 let mut said = String::new();
                 if let Some(pipe) = &mut child.stderr {
                     let _ = pipe.read_to_string(&mut said);
                 }
-                let ended = child.wait().map_err(ViewError::at(&self.file))?;
+                let ended = child.wait().at(self.draft.target())?;
                 match ended.success() {
                     true => Ok(()),
                     false => Err(ViewError::Encoder {
-                        movie: self.file.clone(),
+                        movie: self.draft.target().to_owned(),
                         program: self.program.clone(),
                         said: one_line(&said, &ended.to_string()),
                     }),
@@ -182,8 +178,6 @@ impl Drop for Movie {
             let _ = child.kill();
             let _ = child.wait();
         }
-        // After `finish` the partial file no longer exists.
-        let _ = fs::remove_file(&self.part);
     }
 }
 
@@ -216,7 +210,7 @@ fn encoder(
         .args(["-framerate", &frames_per_second.to_string(), "-i", "-"])
         .args(kind.options())
         // An absolute path, because a name that begins with a hyphen would be read as an option.
-        .arg(std::path::absolute(part).map_err(ViewError::at(part))?)
+        .arg(std::path::absolute(part).at(part)?)
         .stdin(Stdio::piped())
         .stdout(Stdio::null())
         .stderr(Stdio::piped());

@@ -2,7 +2,7 @@
 
 use std::{
     collections::BTreeMap,
-    fs::{self, File},
+    fs::File,
     io::BufReader,
     path::{Path, PathBuf},
 };
@@ -14,6 +14,7 @@ use super::{
     ViewError,
     strip::{Label, Source, Strip, name_of},
 };
+use swell_domain::output::{self, AtPath as _};
 use swell_render::{
     Attributes, RenderError,
     colour::{REC_709, Space},
@@ -41,15 +42,8 @@ fn numbered(path: &Path) -> Option<(String, u32)> {
 
 /// Pictures of a folder, sorted by name.
 pub(super) fn in_folder(folder: &Path) -> Result<Vec<PathBuf>, ViewError> {
-    let entries = fs::read_dir(folder).map_err(ViewError::at(folder))?;
-    let mut found = Vec::new();
-    for entry in entries {
-        let path = entry.map_err(ViewError::at(folder))?.path();
-        if ending(&path).is_some() && path.is_file() {
-            found.push(path);
-        }
-    }
-    found.sort();
+    let mut found = output::paths(folder)?;
+    found.retain(|path| ending(path).is_some() && path.is_file());
     Ok(found)
 }
 
@@ -166,7 +160,7 @@ fn head(file: &Path) -> Result<Head, ViewError> {
             frames_per_second: rate.map(|(many, of)| f64::from(many) / f64::from(of)),
         });
     }
-    let opened = File::open(file).map_err(ViewError::at(file))?;
+    let opened = File::open(file).at(file)?;
     let reader = png::Decoder::new(BufReader::new(opened)).read_info();
     let reader = reader.map_err(|error| damaged(file, error))?;
     let info = reader.info();

@@ -12,9 +12,10 @@ use super::{
     Event, MOST, Outcome, PAGE_WIDTH, Placing, RATE, Request, ViewError, check_place,
     curves::Curves,
     movie::{self, Movie},
-    store::{Store, write},
+    store::Store,
     strip::{Label, Strip},
 };
+use swell_domain::output::{self, create_folder};
 use swell_study::{
     player::{Player, Set},
     rgb::Rgb,
@@ -135,7 +136,7 @@ impl<'a> Reel<'a> {
             check_sheet(&sheet_file)?;
         }
         if request.sheet.is_some() || request.player {
-            fs::create_dir_all(&self.directory).map_err(ViewError::at(&self.directory))?;
+            create_folder(&self.directory)?;
         }
         let store = || Store::begin(&self.directory, request.placing, MOST);
         let mut store = request.player.then(store).transpose()?;
@@ -250,7 +251,7 @@ impl<'a> Reel<'a> {
                 file: file.to_owned(),
                 source,
             })?;
-        write(file, &png)?;
+        output::write(file, &png)?;
         Ok(png.len() as u64)
     }
 

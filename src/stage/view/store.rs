@@ -8,6 +8,7 @@ use std::{
 use base64::{Engine as _, engine::general_purpose::STANDARD};
 
 use super::ViewError;
+use swell_domain::output::{self, AtPath as _, Draft};
 use swell_study::player::MARK;
 
 /// Where the pictures of a page are stored.
@@ -30,9 +31,11 @@ pub const MOST: u64 = 64_000_000;
 const PAGE: &str = "index.html";
 const FOLDER: &str = "pictures";
 
-/// Pictures of a page under construction; if it is dropped before it is finished, they are removed.
+/// Pictures of a page under construction.
 pub(super) struct Store {
     directory: PathBuf,
+    /// Those beside the page.
+    folder: Draft,
     placing: Placing,
     most: u64,
     /// Names and PNG data of the pictures to embed.
@@ -56,29 +59,18 @@ impl Store {
         if !is_ours {
             return Err(ViewError::Foreign(directory.to_owned()));
         }
-        let store = Self {
+        let folder = Draft::folder_beside(&directory.join(FOLDER));
+        output::remove_folder(folder.path())?;
+        Ok(Self {
             directory: directory.to_owned(),
+            folder,
             placing,
             most,
             kept: Vec::new(),
             bytes: 0,
             is_beside: false,
             names: Vec::new(),
-        };
-        store.clear()?;
-        Ok(store)
-    }
-
-    fn part(&self) -> PathBuf {
-        self.directory.join(format!("{FOLDER}.part"))
-    }
-
-    fn clear(&self) -> Result<(), ViewError> {
-        let part = self.part();
-        match part.exists() {
-            true => fs::remove_dir_all(&part).map_err(ViewError::at(&part)),
-            false => Ok(()),
-        }
+        })
     }
 
     /// Adds the next picture, a PNG, under this name.
@@ -91,11 +83,11 @@ impl Store {
         };
         if is_beside {
             self.is_beside = true;
-            let folder = self.part();
-            fs::create_dir_all(&folder).map_err(ViewError::at(&folder))?;
+            let folder = self.folder.path();
+            output::create_folder(folder)?;
             for (name, png) in std::mem::take(&mut self.kept) {
                 let file = folder.join(&name);
-                fs::write(&file, png).map_err(ViewError::at(&file))?;
+                fs::write(&file, png).at(&file)?;
                 self.names.push(name);
             }
         }
@@ -120,33 +112,15 @@ impl Store {
     }
 
     /// Writes the page, which contains [`Self::addresses`]. Returns its path and size in bytes.
-    pub(super) fn finish(self, html: &str) -> Result<(PathBuf, u64), ViewError> {
-        let folder = self.directory.join(FOLDER);
-        if folder.exists() {
-            fs::remove_dir_all(&folder).map_err(ViewError::at(&folder))?;
-        }
+    pub(super) fn finish(mut self, html: &str) -> Result<(PathBuf, u64), ViewError> {
+        output::remove_folder(self.folder.target())?;
         if self.is_beside {
-            fs::rename(self.part(), &folder).map_err(ViewError::at(&folder))?;
+            self.folder.publish()?;
         }
         let page = self.directory.join(PAGE);
-        write(&page, html.as_bytes())?;
+        output::write(&page, html)?;
         Ok((page, html.len() as u64))
     }
-}
-
-impl Drop for Store {
-    fn drop(&mut self) {
-        let _ = self.clear();
-    }
-}
-
-/// Writes a temporary file and renames it, so that an existing file is always complete.
-pub(super) fn write(file: &Path, bytes: &[u8]) -> Result<(), ViewError> {
-    let mut name = file.file_name().unwrap_or_default().to_owned();
-    name.push(".part");
-    let part = file.with_file_name(name);
-    fs::write(&part, bytes).map_err(ViewError::at(&part))?;
-    fs::rename(&part, file).map_err(ViewError::at(file))
 }
 
 /// Percent-encodes a file's name for an address.
@@ -195,7 +169,7 @@ mod tests {
         drop(filled(folder.path(), Placing::Beside, 0));
         assert!(
             folder.path().join("pictures/a.0 %.png").exists()
-                && !folder.path().join("pictures.part").exists()
+                && !folder.path().join("pictures.tmp").exists()
         );
         filled(folder.path(), Placing::Within, 0)
             .finish(MARK)

@@ -10,9 +10,9 @@ use rayon::prelude::*;
 use super::{
     Event, Outcome, Request, ViewError, check_place, pictures,
     reel::{COLUMNS, SOFTWARE, THUMB, check_sheet},
-    store::write,
     strip::name_of,
 };
+use swell_domain::output::{self, AtPath as _};
 use swell_scene::look::ViewSpec;
 use swell_study::{
     folder::{CLAIM, Claim, is_ledger, is_share},
@@ -28,20 +28,14 @@ const FOLDERS: [&str; 2] = ["pictures", "curves"];
 
 /// Whether a folder is that of a study.
 pub(super) fn is_one(folder: &Path) -> bool {
-    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
-    let mut names = entries.map(|entry| entry.file_name().to_string_lossy().into_owned());
-    names.any(|name| name == RESULTS || is_ledger(&name))
+    let names = output::names(folder).unwrap_or_default();
+    names.iter().any(|name| name == RESULTS || is_ledger(name))
 }
 
 /// Why there is no page yet, and how to make it.
 fn unfinished(folder: &Path) -> Result<ViewError, ViewError> {
-    let entries = fs::read_dir(folder).map_err(ViewError::at(folder))?;
-    let names = entries.map(|entry| Ok(entry?.file_name().to_string_lossy().into_owned()));
-    let mut names = names
-        .collect::<Result<Vec<_>, _>>()
-        .map_err(ViewError::at(folder))?;
+    let mut names = output::names(folder)?;
     names.retain(|name| is_share(name));
-    names.sort();
     let claim = fs::read(folder.join(CLAIM)).ok();
     let claim = claim.and_then(|text| serde_json::from_slice::<Claim>(&text).ok());
     let command = claim.and_then(|claim| claim.command);
@@ -92,7 +86,7 @@ pub(super) fn view(
             .files
             .extend(bytes.map(|bytes| ("contact sheet", directory.join("sheet.png"), bytes)));
     }
-    let bytes = fs::metadata(&page).map_err(ViewError::at(&page))?.len();
+    let bytes = fs::metadata(&page).at(&page)?.len();
     outcome
         .files
         .push(("the study's page", page.clone(), bytes));
@@ -141,8 +135,8 @@ fn sheet_of(
         file: file.clone(),
         source,
     })?;
-    fs::create_dir_all(directory).map_err(ViewError::at(directory))?;
-    write(&file, &png)?;
+    output::create_folder(directory)?;
+    output::write(&file, &png)?;
     Ok(Some(png.len() as u64))
 }
 
@@ -151,13 +145,7 @@ fn pictures_in(folder: &Path, files: &mut Vec<PathBuf>) -> Result<(), ViewError>
     if !folder.is_dir() {
         return Ok(());
     }
-    let entries = fs::read_dir(folder).map_err(ViewError::at(folder))?;
-    let paths = entries.map(|entry| entry.map(|entry| entry.path()));
-    let mut paths: Vec<PathBuf> = paths
-        .collect::<Result<_, _>>()
-        .map_err(ViewError::at(folder))?;
-    paths.sort();
-    for path in paths {
+    for path in output::paths(folder)? {
         let ending = path.extension().and_then(|ending| ending.to_str());
         if path.is_dir() {
             pictures_in(&path, files)?;

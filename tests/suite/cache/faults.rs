@@ -537,7 +537,7 @@ fn a_directory_removed_in_mid_bake_is_an_error() {
     let mut writer = create(dir.path());
     fs::remove_dir_all(dir.path().join("frames")).unwrap();
     let error = submit_until_error(&mut writer);
-    assert!(matches!(error, CacheError::Io { .. }), "{error}");
+    assert!(matches!(error, CacheError::Io(_)), "{error}");
     let again = Clock {
         frame: 1,
         ..Clock::default()
@@ -577,9 +577,9 @@ fn a_full_disk_is_an_error_and_the_bake_goes_on_after_it() {
     let temporary = d.join("frames/tank.0002.ply.tmp");
     std::os::unix::fs::symlink("/dev/full", &temporary).unwrap();
     match submit_until_error(&mut writer) {
-        CacheError::Io { path, source } => {
-            assert_eq!(path, temporary);
-            assert_eq!(source.kind(), std::io::ErrorKind::StorageFull);
+        CacheError::Io(error) => {
+            assert_eq!(error.path, temporary);
+            assert_eq!(error.source.kind(), std::io::ErrorKind::StorageFull);
         }
         other => panic!("{other}"),
     }

@@ -495,7 +495,7 @@ fn faults_are_one_clear_line() {
     );
     clear(2, "view day --fps 0", "from 0.1 to 240");
     clear(4, "view day --curves gone", "gone does not exist");
-    assert!(!job.path("views").exists() && !job.path("day.mp4.part").exists());
+    assert!(!job.path("views").exists() && !job.path("day.mp4.tmp").exists());
     write(&job, "day", 13..=13, [32, 36]);
     clear(2, "view day", "shot.0013.png is 32 × 36");
     fs::remove_file(job.path("day/shot.0013.png")).unwrap();
@@ -545,7 +545,7 @@ fn a_damaged_picture_ends_a_view_and_leaves_nothing_half_made() {
     );
     assert!(said.contains("shot.0007.png"), "{said}");
     let left = fs::read_dir(job.path("views/day")).unwrap().count();
-    assert!(left == 0 && !job.path("m.apng").exists() && !job.path("m.apng.part").exists());
+    assert!(left == 0 && !job.path("m.apng").exists() && !job.path("m.apng.tmp").exists());
     fs::write(&file, "no picture").unwrap();
     let said = job.expect(4, "view day");
     assert!(said.contains("shot.0007.png"), "{said}");
@@ -588,5 +588,5 @@ fn an_encoder_gets_every_pixel_and_its_words_are_told() {
         said.contains("./fail could not write late.mp4: Unknown encoder"),
         "{said}"
     );
-    assert!(!job.path("late.mp4").exists() && !job.path("late.mp4.part").exists());
+    assert!(!job.path("late.mp4").exists() && !job.path("late.mp4.tmp").exists());
 }

@@ -211,10 +211,10 @@ fn pictures_of_something_else_are_refused_and_left() {
     // The same look continues with any frames; files that are not ours, and leftovers of a dead
     // process, do not interfere.
     fs::write(day.join("notes.png"), "mine").unwrap();
-    fs::write(day.join("small.0005.png.part"), "half").unwrap();
+    fs::write(day.join("small.0005.png.tmp"), "half").unwrap();
     let said = job.expect(0, "render cache --look look.toml -o day --frames 3-6");
     assert!(said.contains("2 frames rendered, 2 already"), "{said}");
-    assert!(!day.join("small.0005.png.part").exists());
+    assert!(!day.join("small.0005.png.tmp").exists());
     assert_eq!(fs::read_to_string(day.join("notes.png")).unwrap(), "mine");
     let both = pictures(&day);
     assert!(first.iter().all(|(name, bytes)| both[name] == *bytes));

@@ -1,4 +1,3 @@
-use std::fs::TryLockError;
 use swell_files::parse_look;
 
 use super::*;
@@ -113,21 +112,21 @@ fn what_the_dead_left_goes_and_what_is_not_ours_stays() {
     fs::create_dir(d.join(ROOM)).unwrap();
     for name in [
         ".swell/work",
-        ".swell/small.0001.png.part",
-        "small.0001.png.part",
-        "small.0002.exr.part",
-        "other.0001.png.part",
-        "small.txt.part",
+        ".swell/small.0001.png.tmp",
+        "small.0001.png.tmp",
+        "small.0002.exr.tmp",
+        "other.0001.png.tmp",
+        "small.txt.tmp",
         "notes.txt",
     ] {
         fs::write(d.join(name), "half").unwrap();
     }
     fs::write(d.join(RECORD), "{ \"software\": ").unwrap();
     let held = enter("day", d, false).unwrap();
-    assert_eq!(names(&d.join(ROOM)).unwrap(), [WORK.to_owned()].into());
+    assert_eq!(names(&d.join(ROOM)).unwrap(), [WORK]);
     drop(held);
-    let left = [RECORD, "notes.txt", "other.0001.png.part", "small.txt.part"];
-    assert_eq!(names(d).unwrap(), left.map(str::to_owned).into());
+    let left = [RECORD, "notes.txt", "other.0001.png.tmp", "small.txt.tmp"];
+    assert_eq!(names(d).unwrap(), left);
     let text = fs::read_to_string(d.join(RECORD)).unwrap();
     assert_eq!(serde_json::from_str::<Owner>(&text).unwrap(), owner("day"));
 }
@@ -143,30 +142,11 @@ fn where_nothing_was_rendered_nothing_is_left() {
     assert!(folder.path().exists() && names(folder.path()).unwrap().is_empty());
     // A picture stays, and so does the record of its owner.
     let held = enter("day", &new, false).unwrap();
-    picture(&held.draft("small.0001.png"), 1, |_| ());
-    held.publish("small.0001.png").unwrap();
+    let mut draft = held.draft("small.0001.png");
+    picture(draft.path(), 1, |_| ());
+    draft.publish().unwrap();
     drop(held);
-    let left = ["render.json", "small.0001.png"].map(str::to_owned);
-    assert_eq!(names(&new).unwrap(), left.into());
-}
-
-/// A lock on a file that was removed meanwhile excludes nobody.
-#[cfg(unix)]
-#[test]
-fn a_gate_that_was_taken_away_is_made_anew() {
-    let folder = tempfile::tempdir().unwrap();
-    let record = folder.path().join(RECORD);
-    let first = Gate::close(folder.path()).unwrap();
-    let path = folder.path().to_owned();
-    let waiting = std::thread::spawn(move || Gate::close(&path).unwrap());
-    std::thread::sleep(std::time::Duration::from_millis(50));
-    fs::remove_file(&record).unwrap();
-    drop(first);
-    let second = waiting.join().unwrap();
-    let other = File::options().write(true).open(&record).unwrap();
-    assert!(matches!(other.try_lock(), Err(TryLockError::WouldBlock)));
-    drop(second);
-    other.try_lock().unwrap();
+    assert_eq!(names(&new).unwrap(), ["render.json", "small.0001.png"]);
 }
 
 /// Reported before any frame is rendered, whether or not the folder is ours.
@@ -179,8 +159,8 @@ fn a_folder_in_place_of_a_picture_is_refused_at_once() {
         picture(&d.join("small.0003.png"), 3, |_| ());
         fs::create_dir(d.join("small.0002.png")).unwrap();
         match enter("day", d, overwrite) {
-            Err(FolderError::File { file, source }) => {
-                assert_eq!(file, d.join("small.0002.png"));
+            Err(FolderError::File(FileError { path, source })) => {
+                assert_eq!(path, d.join("small.0002.png"));
                 assert_eq!(source.kind(), io::ErrorKind::IsADirectory);
             }
             other => panic!("{other:?}"),
