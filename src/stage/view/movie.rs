@@ -7,8 +7,8 @@ use std::{
     process::{Child, Command, Stdio},
 };
 
-use super::ViewError;
-use swell_study::{apng::Apng, rgb::Rgb};
+use super::{ViewError, apng::Apng};
+use swell_study::rgb::Rgb;
 
 /// Format of a movie.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -12,14 +12,12 @@ use super::{
     Event, MOST, Outcome, PAGE_WIDTH, Placing, RATE, Request, ViewError, check_place,
     curves::Curves,
     movie::{self, Movie},
+    player::{Player, Set},
+    sheet::{Cell, sheet},
     store::{Store, write},
     strip::{Label, Strip},
 };
-use swell_study::{
-    player::{Player, Set},
-    rgb::Rgb,
-    sheet::{Cell, sheet},
-};
+use swell_study::rgb::Rgb;
 
 /// A view that is ready to run.
 pub(super) struct Reel<'a> {

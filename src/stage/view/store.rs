@@ -7,8 +7,7 @@ use std::{
 
 use base64::{Engine as _, engine::general_purpose::STANDARD};
 
-use super::ViewError;
-use swell_study::player::MARK;
+use super::{ViewError, player::MARK};
 
 /// Where the pictures of a page are stored.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
