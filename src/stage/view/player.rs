@@ -177,7 +177,8 @@ impl Player {
 
 #[cfg(test)]
 mod tests {
-    use super::{super::chart::Series, *};
+    use super::*;
+    use swell_study::chart::Series;
 
     fn player(sets: usize) -> Player {
         let evil = "</script><script>\"&".to_owned();
