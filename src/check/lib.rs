@@ -16,6 +16,7 @@ pub mod flip;
 pub mod pbf;
 pub mod pictures;
 pub mod render;
+mod solids;
 mod sort;
 pub mod table;
 pub mod whitewater;

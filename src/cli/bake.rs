@@ -13,7 +13,7 @@ use swell_domain::{frame_range::FrameRange, solver::StepReport};
 use swell_files::Reach;
 use swell_scene::{Method, Scene, SceneError};
 use swell_stage::{
-    bake::{Event, Request, Room, bake, expected},
+    bake::{self, BakePlan, Event, Request, Room},
     branch::BranchPoint,
 };
 
@@ -123,8 +123,6 @@ fn load_lengthened(args: &BakeArgs) -> Result<Scene, SceneError> {
 pub(super) fn run(args: &BakeArgs, progress: &Progress) -> Result<u8, Failure> {
     let device = args.device.read()?;
     let scene = load_lengthened(args)?;
-    let is_start = args.from.is_none();
-    args.deny.check(&args.scene, &scene, is_start)?;
     let method = scene.solver.method.name();
     let root = || set_variable("SWELL_CACHE").map_or_else(|| PathBuf::from("cache"), PathBuf::from);
     let default = || root().join(&scene.shot.name).join(method);
@@ -137,11 +135,13 @@ pub(super) fn run(args: &BakeArgs, progress: &Progress) -> Result<u8, Failure> {
         device,
         time_passes: args.time_passes,
     };
-    if args.dry_run {
-        return dry_run(&request, progress);
-    }
-    let interrupt = Interrupt::install_or_warn();
-    let outcome = bake(&request, interrupt.flag(), &mut |event| {
+    let interrupt = (!args.dry_run).then(Interrupt::install_or_warn);
+    let plan = BakePlan::new(&request)?;
+    args.deny.check(&args.scene, &plan)?;
+    let Some(interrupt) = interrupt else {
+        return dry_run(&request.directory, &plan, progress);
+    };
+    let outcome = bake::run(&request, &plan, interrupt.flag(), &mut |event| {
         tell(progress, event)
     })?;
     progress.finish();
@@ -177,28 +177,26 @@ pub(super) fn run(args: &BakeArgs, progress: &Progress) -> Result<u8, Failure> {
     })
 }
 
-fn dry_run(request: &Request, progress: &Progress) -> Result<u8, Failure> {
-    let found = expected(request)?;
-    for warning in &found.warnings {
+fn dry_run(directory: &Path, plan: &BakePlan<'_>, progress: &Progress) -> Result<u8, Failure> {
+    let room = Room::of(directory, plan, plan.first)?;
+    for warning in plan.warnings.iter().chain(&plan.notes) {
         let (text, event) = warned(warning);
         progress.say(&text, event);
     }
-    warn_of_room(progress, found.room);
+    warn_of_room(progress, room);
     let told = DryRun {
-        frames: (found.first..=found.last).collect(),
-        standing: found.standing as usize,
-        bytes: Some(found.room.bytes),
-        place: output::path(&request.directory),
+        frames: (plan.first..=plan.last).collect(),
+        standing: plan.standing as usize,
+        bytes: Some(room.bytes),
+        place: output::path(directory),
     };
-    let particles = count(found.particles as u64, "particle");
-    let words = format!(
-        ", with {particles} at the start, {}",
-        output::water(found.volume)
-    );
+    let (start, volume) = (&plan.start, plan.volume());
+    let particles = count(start.particles.len() as u64, "particle");
+    let words = format!(", with {particles} at the start, {}", output::water(volume));
     let more = json!({
-        "particles": found.particles, "removed": found.removed, "volume": found.volume.made,
-        "volume_asked": found.volume.asked,
-        "disk_free": found.room.free,
+        "particles": start.particles.len(), "removed": start.removed, "volume": volume.made,
+        "volume_asked": volume.asked,
+        "disk_free": room.free,
     });
     told.tell(progress, &words, more);
     Ok(0)

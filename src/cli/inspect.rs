@@ -15,6 +15,7 @@ use clap::Args;
 use swell_domain::posix;
 use swell_scene::{Method, Scene};
 use swell_stage::{
+    bake::BakePlan,
     inspect::{
         Adapter, Entry, LIST_BUDGET, MOST_NODES, Manifest, PARTICLES, PROBES, ScenePlan, adapters,
         cache, plan, plot,
@@ -115,15 +116,12 @@ pub(super) fn run(args: &InspectArgs) -> Result<u8, Failure> {
         }
         Some(file) => {
             let scene = bake::load(file, &args.set, args.solver, args.allow_outside)?;
-            args.deny.check(file, &scene, true)?;
-            refuse_frames_beyond(args, file, scene.shot.frames)?;
+            let planned = of_scene(args, file, &scene)?;
+            let _ = show_plan(&mut text, &planned);
             let adapter = named_adapter(args.adapter.as_ref());
-            let planned = plan(&scene, adapter.as_deref())?;
-            let _ = show_plan(&mut text, &scene, &planned);
-            misfit = planned.misfit;
             match args.time {
-                Some(frames) if misfit.is_none() => {
-                    let timed = time(&scene, adapter.as_deref(), frames)?;
+                Some(frames) if planned.misfit.is_none() => {
+                    let timed = time(&planned.bake, adapter.as_deref(), frames)?;
                     let _ = show_time(&mut text, &timed);
                 }
                 _ => {
@@ -131,6 +129,7 @@ pub(super) fn run(args: &InspectArgs) -> Result<u8, Failure> {
                     let _ = write!(text, "\n{}", output::shares(&shares, None));
                 }
             }
+            misfit = planned.misfit;
         }
         None => {}
     }
@@ -139,6 +138,19 @@ pub(super) fn run(args: &InspectArgs) -> Result<u8, Failure> {
     }
     output::print(&text);
     misfit.map_or(Ok(0), |misfit| Err(misfit.into()))
+}
+
+/// Plans a scene for the chosen adapter, unless it is denied.
+fn of_scene<'a>(
+    args: &InspectArgs,
+    file: &Path,
+    scene: &'a Scene,
+) -> Result<ScenePlan<'a>, Failure> {
+    refuse_frames_beyond(args, file, scene.shot.frames)?;
+    let bake = BakePlan::of(scene)?;
+    args.deny.check(file, &bake)?;
+    let adapter = named_adapter(args.adapter.as_ref());
+    Ok(plan(bake, adapter.as_deref())?)
 }
 
 /// Error for the folder of a failed frame, which has neither plan nor ledger.
@@ -229,8 +241,9 @@ fn show_adapter(out: &mut String, adapter: &Adapter) -> fmt::Result {
     Ok(())
 }
 
-fn show_plan(out: &mut String, scene: &Scene, planned: &ScenePlan) -> fmt::Result {
-    let plan = &planned.plan;
+fn show_plan(out: &mut String, planned: &ScenePlan<'_>) -> fmt::Result {
+    let (plan, bake) = (&planned.plan, &planned.bake);
+    let (scene, start) = (bake.scene, &bake.start);
     let shot = &scene.shot;
     writeln!(
         out,
@@ -240,7 +253,7 @@ fn show_plan(out: &mut String, scene: &Scene, planned: &ScenePlan) -> fmt::Resul
         shot.frames_per_second,
         scene.solver.method.name()
     )?;
-    for warning in &planned.warnings {
+    for warning in &bake.warnings {
         writeln!(out, "warning: {warning}")?;
     }
     let samples = match plan.counts.boundary_samples {
@@ -250,20 +263,20 @@ fn show_plan(out: &mut String, scene: &Scene, planned: &ScenePlan) -> fmt::Resul
     writeln!(
         out,
         "{} ({} removed inside solids), {}, {samples}{} × {} × {} cells",
-        count(planned.particles as u64, "particle"),
-        planned.removed,
-        output::water(planned.volume),
+        count(start.particles.len() as u64, "particle"),
+        start.removed,
+        output::water(bake.volume()),
         plan.grid_dims[0],
         plan.grid_dims[1],
         plan.grid_dims[2]
     )?;
-    for (index, promise) in planned.promises.iter().enumerate() {
-        match promise {
-            Some(promise) => writeln!(out, "emitter[{index}] brings {:.4} m³/s", promise.rate)?,
+    for (index, inflow) in bake.inflows.iter().enumerate() {
+        match inflow.predicted {
+            Some(inflow) => writeln!(out, "emitter[{index}] brings {:.4} m³/s", inflow.rate)?,
             None => writeln!(out, "emitter[{index}] keeps a level")?,
         }
     }
-    if let Some(most) = planned.entering {
+    if let Some(most) = bake.entering() {
         let particles = count(most as u64, "particle");
         writeln!(
             out,
@@ -301,14 +314,18 @@ fn show_plan(out: &mut String, scene: &Scene, planned: &ScenePlan) -> fmt::Resul
         0 => writeln!(out)?,
         lists => writeln!(out, ", and {:.0} for neighbour lists", each(lists))?,
     }
-    show_arrangement(out, scene, planned)?;
+    show_arrangement(out, planned)?;
     Ok(())
 }
 
 /// Describes how limits on bindings and lists changed the plan.
-fn show_arrangement(out: &mut String, scene: &Scene, planned: &ScenePlan) -> fmt::Result {
+fn show_arrangement(out: &mut String, planned: &ScenePlan<'_>) -> fmt::Result {
     let plan = &planned.plan;
-    match (scene.solver.method, plan.has_lists, plan.chunks.len()) {
+    match (
+        planned.bake.scene.solver.method,
+        plan.has_lists,
+        plan.chunks.len(),
+    ) {
         (Method::Pbf, false, _) => writeln!(
             out,
             "no neighbour lists: they would take more than {}; each pass searches the cells",
@@ -323,7 +340,7 @@ fn show_arrangement(out: &mut String, scene: &Scene, planned: &ScenePlan) -> fmt
     if let Some(page) = plan.page {
         writeln!(out, "positions in two bindings, {page} in the first")?;
     }
-    if let Some(spacing) = planned.coarse_solids {
+    if let Some(spacing) = planned.coarse_solids() {
         writeln!(
             out,
             "signed distance of solids every {spacing:.4} m, coarser than the water, with at \

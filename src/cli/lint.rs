@@ -4,8 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 
-use swell_scene::Scene;
-use swell_stage::prepare::Start;
+use swell_stage::bake::BakePlan;
 
 use super::Failure;
 
@@ -32,18 +31,12 @@ struct Refused {
 }
 
 impl DenyArgs {
-    /// Refuses `scene` of `file` if `--deny lint` is given and there are lints. `is_start` says
-    /// whether it begins with its own water.
-    pub(super) fn check(&self, file: &Path, scene: &Scene, is_start: bool) -> Result<(), Failure> {
-        let mut lints = match self.deny {
-            Some(Denied::Lint) => scene.lints(),
+    /// Refuses the planned scene of `file` if `--deny lint` is given and there are lints.
+    pub(super) fn check(&self, file: &Path, plan: &BakePlan<'_>) -> Result<(), Failure> {
+        let lints = match self.deny {
+            Some(Denied::Lint) => plan.lints(),
             None => return Ok(()),
         };
-        let start = Start::of(scene)?;
-        lints.extend(match is_start {
-            true => start.lints(scene),
-            false => start.lint_emitters(scene),
-        });
         if lints.is_empty() {
             return Ok(());
         }

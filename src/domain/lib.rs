@@ -17,7 +17,6 @@ pub mod bricks;
 pub mod budget;
 pub mod bvh;
 pub mod chunk;
-pub mod cloud;
 pub mod eye;
 pub mod flip;
 pub mod frame_range;

@@ -135,27 +135,41 @@ impl Solids<'_> {
     /// there: not so for a post, a pinnacle or an awning, nor for a parapet on a house.
     fn is_barrier(&self, place: DVec3, normal: DVec3) -> bool {
         let (u, v) = normal.any_orthonormal_pair();
-        let reach = CURVED * self.spacing;
-        let (mut within, mut covered, mut thin) = (0.0, 0.0, 0.0);
-        for (i, j) in (-AROUND..=AROUND).flat_map(|i| (-AROUND..=AROUND).map(move |j| (i, j))) {
-            let p = place + self.spacing * (f64::from(i) * u + f64::from(j) * v);
-            if i * i + j * j > AROUND * AROUND || !self.domain.contains(p) {
-                continue;
-            }
-            within += 1.0;
-            let met = |side: f64| self.next(p - side * reach * normal, side * normal, 2.0 * reach);
-            let both = met(1.0).zip(met(-1.0));
-            let layer = both.map(|((front, _), (back, _))| 2.0 * reach - front - back);
-            covered += f64::from(u8::from(layer.is_some() || self.is_solid(p)));
-            let is_layer = layer.is_some_and(|it| it < 2.0 * self.least);
-            let is_apart = || {
-                ![-reach, reach]
-                    .iter()
-                    .any(|way| self.is_solid(p + *way * normal))
-            };
-            thin += f64::from(u8::from(is_layer && is_apart()));
+        let steps = || -AROUND..=AROUND;
+        let disc = steps().flat_map(|i| steps().map(move |j| (i, j)));
+        let layers: Vec<(DVec3, Option<f64>)> = disc
+            .filter(|(i, j)| i * i + j * j <= AROUND * AROUND)
+            .map(|(i, j)| place + self.spacing * (f64::from(i) * u + f64::from(j) * v))
+            .filter(|p| self.domain.contains(*p))
+            .map(|p| (p, self.layer(p, normal)))
+            .collect();
+        let suffice = |count: usize, part: f64| count as f64 >= part * layers.len() as f64;
+        let thin = || {
+            let is_thin = |layer: f64| layer < 2.0 * self.least;
+            layers.iter().filter(move |(_, it)| it.is_some_and(is_thin))
+        };
+        // Rays are cheap beside winding numbers, and few places pass this test.
+        if !suffice(thin().count(), THIN) {
+            return false;
         }
-        covered >= COVERED * within && thin >= THIN * within
+        let reach = CURVED * self.spacing;
+        let is_apart = |p: DVec3| {
+            ![-reach, reach]
+                .iter()
+                .any(|way| self.is_solid(p + *way * normal))
+        };
+        let is_covered = |p: DVec3, layer: Option<f64>| layer.is_some() || self.is_solid(p);
+        let covered = layers.iter().filter(|(p, layer)| is_covered(*p, *layer));
+        suffice(thin().filter(|(p, _)| is_apart(*p)).count(), THIN)
+            && suffice(covered.count(), COVERED)
+    }
+
+    /// Thickness of what two rays towards `p` from either side meet, if both meet something.
+    fn layer(&self, p: DVec3, normal: DVec3) -> Option<f64> {
+        let reach = CURVED * self.spacing;
+        let met = |side: f64| self.next(p - side * reach * normal, side * normal, 2.0 * reach);
+        let ((front, _), (back, _)) = met(1.0).zip(met(-1.0))?;
+        Some(2.0 * reach - front - back)
     }
 }
 

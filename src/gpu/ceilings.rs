@@ -1,8 +1,9 @@
 //! Measures the peak performance of a device, with which passes are compared.
 
 use super::{
-    adapter::{Context, GpuError},
+    adapter::Context,
     buffer::Buf,
+    error::GpuError,
     operations::Operations,
     program::Program,
     recording::{Command, Recording, Timer},

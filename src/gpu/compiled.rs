@@ -6,7 +6,8 @@ use std::{
 };
 
 use super::{
-    adapter::{Context, GpuError},
+    adapter::Context,
+    error::GpuError,
     program::{Pass, source},
     raster::{RasterPass, RasterSpec},
 };

@@ -5,6 +5,7 @@ pub mod buffer;
 pub mod ceilings;
 mod compiled;
 mod edited;
+mod error;
 pub mod operations;
 pub mod program;
 pub mod raster;

@@ -13,7 +13,8 @@ use naga::{
 use wgpu::BufferUsages;
 
 use super::{
-    adapter::{Context, GpuError},
+    adapter::Context,
+    error::GpuError,
     program::{self, Pass, Program},
     recording::{Bind, Size, bind, bound, dispatch_sized},
     reflect,

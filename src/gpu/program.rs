@@ -8,9 +8,10 @@ use std::{
 use wgpu::{BindGroupLayout, Buffer, BufferUsages, ComputePipeline};
 
 use super::{
-    adapter::{Context, GpuError, InjectedFault},
+    adapter::{Context, InjectedFault},
     buffer::{Buf, Element, Held, Wanted, Windows},
     edited,
+    error::GpuError,
     operations::Counting,
     raster::RasterPass,
     reflect::{Access, Binding, Reflection, Stage, reflect, reflect_at},

@@ -9,8 +9,9 @@ use wgpu::{
 };
 
 use super::{
-    adapter::{Context, GpuError},
+    adapter::Context,
     compiled::compiled_raster,
+    error::GpuError,
     program::{Program, checked, shader},
     recording::{Bind, bind},
     reflect::{Binding, Stage},

@@ -7,8 +7,9 @@ use wgpu::{
 };
 
 use super::{
-    adapter::{Context, GpuError},
+    adapter::Context,
     buffer::{Buf, Workgroups},
+    error::GpuError,
     operations::{Operations, count},
     program::Program,
     raster::{self, CopyTexture, Draw, Drawn, Target},

@@ -9,7 +9,7 @@ use naga::{
     valid::GlobalUse,
 };
 
-use super::{adapter::GpuError, buffer::Scalar};
+use super::{buffer::Scalar, error::GpuError};
 
 /// How a buffer, texture or sampler is bound.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -10,7 +10,7 @@ use std::{
 
 use include_dir::{Dir, include_dir};
 
-use super::adapter::GpuError;
+use super::error::GpuError;
 
 static SHADERS: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/../../shaders");
 

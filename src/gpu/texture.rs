@@ -2,10 +2,7 @@
 
 use wgpu::{Sampler, Texture, TextureFormat, TextureUsages};
 
-use super::{
-    adapter::{Context, GpuError},
-    program::Program,
-};
+use super::{adapter::Context, error::GpuError, program::Program};
 
 /// Description of a texture to allocate: two-dimensional, one mip level, one sample.
 #[derive(Clone, Debug, PartialEq, Eq)]

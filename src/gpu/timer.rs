@@ -5,7 +5,8 @@ use std::{collections::BTreeMap, time::Instant};
 use wgpu::{CommandEncoder, QuerySet};
 
 use super::{
-    adapter::{Context, GpuError},
+    adapter::Context,
+    error::GpuError,
     operations::Operations,
     program::Program,
     recording::{Recorded, Recording, dispatch, encode},

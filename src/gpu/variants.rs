@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::{adapter::GpuError, shader};
+use super::{error::GpuError, shader};
 
 /// Combinations of conditions that a plan can set; every pass must compose under each.
 const VARIANTS: [&[&str]; 65] = [

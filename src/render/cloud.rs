@@ -1,6 +1,9 @@
 //! Drops and bubbles of a frame as participating media for rays, and their grid at an instant in
 //! the device's layout.
 
+mod density;
+mod shade;
+
 use std::f64::consts::PI;
 
 use glam::{DVec3, Vec3};
@@ -10,12 +13,12 @@ use super::{
     paths::Path,
     uniform::{self, Particle},
 };
-use swell_domain::{
-    cloud::{Cloud, Drop, shade::Shade},
-    particles::Particles,
-    whitewater::RADIUS,
-};
+use swell_domain::{particles::Particles, whitewater::RADIUS};
 use swell_scene::look::Look;
+
+use density::Cloud;
+pub(super) use density::Drop;
+use shade::Shade;
 
 /// Radius, in splat radii, of a ball with the mean square distance of what is splatted for a
 /// particle: 1.6 for its mist and for the centres of its drops, which have a radius of up to a

@@ -12,13 +12,9 @@ use swell_gpu::program::Program;
 use swell_scene::Scene;
 
 use super::{
-    buffers::{SOLID_DISTANCE, SOLID_GRID},
-    flip::buffers::SOLID_GRIDS,
+    buffers::{SAMPLE_VELOCITY, SOLID_DISTANCE, SOLID_GRID, SOLID_GRIDS},
     params::{SolidGrid, SolidGrids},
-    pbf::{
-        buffers::{BOUNDARY_CELL_START, SAMPLE_VELOCITY},
-        upload_places,
-    },
+    pbf::{buffers::BOUNDARY_CELL_START, upload_places},
     plan::{Counts, Plan},
 };
 

@@ -5,7 +5,7 @@ use swell_gpu::buffer::Buf;
 
 pub use swell_gpu::sort::{CELL_OF, CELL_START, ELEMENT_COUNT, ID, ORDER, PLACED, SLOT_IN_CELL};
 
-use super::params::{Counters, SolidGrid};
+use super::params::{Counters, SolidGrid, SolidGrids};
 
 /// Position of each particle, in storage order.
 pub const POSITION: Buf<[f32; 3]> = Buf::new("position");
@@ -32,3 +32,7 @@ pub const BOUNDARY_WORK: Buf<f32> = Buf::new("boundary_work");
 pub const SOLID_DISTANCE: Buf<f32> = Buf::new("solid_distance");
 /// Geometry of the static solids' signed-distance grid.
 pub const SOLID_GRID: Buf<SolidGrid> = Buf::uniform("solid_grid");
+/// Geometry and motion of all solids' signed-distance grids.
+pub const SOLID_GRIDS: Buf<SolidGrids> = Buf::uniform("solid_grids");
+/// Velocity of each boundary sample of PBF, m/s.
+pub const SAMPLE_VELOCITY: Buf<[f32; 3]> = Buf::new("sample_velocity");

@@ -13,9 +13,16 @@ use swell_gpu::{
 };
 use swell_scene::{Method, Scene};
 
-use super::{effects::Addition, flip, pbf, pbf::buffers::SAMPLE_VELOCITY};
+use super::{buffers::SAMPLE_VELOCITY, effects::Addition, flip, pbf};
 
-pub use super::pbf::plan::{LIST_BUDGET, LIST_CAPACITY, shared_constants};
+/// Neighbours that a list of PBF holds. If a particle has more, passes search the cells for it, and
+/// the report counts it. At rest, h = 2d gives 32 neighbours; in the dam break of `tools/bench pbf`
+/// no list of 48 overflowed.
+pub const LIST_CAPACITY: u32 = 48;
+
+/// Device memory that neighbour lists may take, bytes. In a larger scene each pass searches the
+/// cells.
+pub const LIST_BUDGET: u64 = 4 << 30;
 
 /// Device limits that determine the layout of buffers, bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

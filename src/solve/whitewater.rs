@@ -27,7 +27,6 @@ use swell_scene::Scene;
 use super::{
     SolveError,
     boundary::{self, Movers},
-    flip::buffers::SOLID_GRIDS,
     pbf::{buffers::*, params, plan::cell_count, record::sorting},
     plan::{Counts, Plan, Table, in_order},
     state::is_other_count,

@@ -10,10 +10,10 @@ use swell_files::scene_to_toml;
 use glam::Vec3;
 
 use swell_cache::{CacheError, CacheReader, Clock, Parent};
-use swell_domain::{
-    absorber::AbsorberStates, boundary::Boundary, bounds::Bounds, particles::Particles, pose::Pose,
-};
+use swell_domain::{absorber::AbsorberStates, bounds::Bounds, particles::Particles, pose::Pose};
 use swell_scene::{Scene, SceneError};
+
+use super::prepare::Start;
 
 /// A frame of a cache, written `CACHE:120`.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -179,26 +179,26 @@ impl Branch {
             notes,
         })
     }
+}
 
-    /// Adds a note if solids of the scene cover particles.
-    pub fn note_covered(&mut self, scene: &Scene, boundary: &Boundary) {
-        let time = self.clock.time;
-        let still = boundary.distance.iter().map(|field| (field, Pose::START));
-        let solids = boundary.moving.iter().zip(&scene.moving_solids);
-        let moving = solids.map(|(field, solid)| (field, solid.pose(time)));
-        let fields: Vec<_> = still.chain(moving).collect();
-        let is_covered = |x: &&[f32; 3]| {
-            let x = Vec3::from_array(**x).as_dvec3();
-            fields
-                .iter()
-                .any(|(field, pose)| field.sample(pose.back(x)) < 0.0)
-        };
-        match self.particles.position.iter().filter(is_covered).count() {
-            0 => {}
-            count => self.notes.push(format!(
-                "{count} particles lie within solids of the scene, which will push them out"
-            )),
-        }
+/// Note about particles of a start at `time` seconds that solids of the scene cover.
+pub(super) fn note_covered(scene: &Scene, start: &Start, time: f64) -> Option<String> {
+    let boundary = &start.boundary;
+    let still = boundary.distance.iter().map(|field| (field, Pose::START));
+    let solids = boundary.moving.iter().zip(&scene.moving_solids);
+    let moving = solids.map(|(field, solid)| (field, solid.pose(time)));
+    let fields: Vec<_> = still.chain(moving).collect();
+    let is_covered = |x: &&[f32; 3]| {
+        let x = Vec3::from_array(**x).as_dvec3();
+        fields
+            .iter()
+            .any(|(field, pose)| field.sample(pose.back(x)) < 0.0)
+    };
+    match start.particles.position.iter().filter(is_covered).count() {
+        0 => None,
+        count => Some(format!(
+            "{count} particles lie within solids of the scene, which will push them out"
+        )),
     }
 }
 

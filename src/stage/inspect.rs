@@ -12,21 +12,15 @@ use swell_cache::{CacheError, CacheReader, stream::Stream};
 use swell_domain::{
     output::{self, FileError},
     signed_distance::SignedDistanceError,
-    sources::PredictedInflow,
 };
 use swell_gpu::{
     adapter::{Context, GpuError, enumerate},
     program::check_sizes,
 };
-use swell_scene::{Scene, SceneError};
+use swell_scene::SceneError;
 use swell_solve::plan::{DeviceLimits, Plan, device_limits};
 
-use super::{
-    Blame,
-    device::needs,
-    prepare::{Start, Volume},
-    probes, whitewater,
-};
+use super::{Blame, bake::BakePlan, device::needs, prepare::Start, probes, whitewater};
 
 pub use swell_scene::solid_grid::MOST_NODES;
 pub use swell_solve::plan::LIST_BUDGET;
@@ -101,32 +95,27 @@ pub fn adapters() -> Result<Vec<Adapter>, GpuError> {
     }
 }
 
-/// A scene's plan, and the limits that it was made for.
+/// A bake's plan, with the passes and buffers that an adapter would need for it.
 #[derive(Debug)]
-pub struct ScenePlan {
+pub struct ScenePlan<'a> {
+    /// What is known without a device.
+    pub bake: BakePlan<'a>,
     /// Passes and buffers.
     pub plan: Plan,
-    /// Number of particles at the start.
-    pub particles: usize,
-    /// Particles left out because a solid covers them or they lie behind a wall.
-    pub removed: usize,
-    /// Volume of water at the start.
-    pub volume: Volume,
-    /// What each emitter adds with solids in their start position; `None` for emitters that keep a
-    /// level.
-    pub promises: Vec<Option<PredictedInflow>>,
-    /// Greatest number of particles that emitters without a level add until the end of the shot;
-    /// `None` if the scene has no inlets.
-    pub entering: Option<f64>,
-    /// Warnings about the scene, a sentence each.
-    pub warnings: Vec<String>,
-    /// Node spacing of the solids' signed distance, metres, if the limit of [`MOST_NODES`] makes it
-    /// coarser than the particle spacing.
-    pub coarse_solids: Option<f64>,
     /// The adapter whose limits were used; `None` if the machine has none.
     pub adapter: Option<String>,
     /// Why that adapter could not bake the scene.
     pub misfit: Option<GpuError>,
+}
+
+impl ScenePlan<'_> {
+    /// Node spacing of the solids' signed distance, metres, if the limit of [`MOST_NODES`] makes it
+    /// coarser than the particle spacing.
+    pub fn coarse_solids(&self) -> Option<f64> {
+        let distance = self.bake.start.boundary.distance.as_ref();
+        let spacing = distance.map(|distance| distance.spacing);
+        spacing.filter(|&spacing| spacing > self.bake.scene.particle_spacing())
+    }
 }
 
 /// Limits that every recent Vulkan adapter meets, for machines without an adapter.
@@ -136,32 +125,12 @@ const COMMON_LIMITS: DeviceLimits = DeviceLimits {
     list_budget: LIST_BUDGET,
 };
 
-/// Why a scene could not be planned.
-#[derive(Debug, thiserror::Error)]
-pub enum PlanError {
-    /// A solid without an inside, or too large a distance grid.
-    #[error(transparent)]
-    Solid(#[from] SignedDistanceError),
-    /// The requested adapter cannot be opened or does not suffice.
-    #[error(transparent)]
-    Gpu(#[from] GpuError),
-}
-
-impl From<&PlanError> for Blame {
-    fn from(error: &PlanError) -> Self {
-        match error {
-            PlanError::Solid(error) => error.into(),
-            PlanError::Gpu(error) => error.into(),
-        }
-    }
-}
-
-/// Plans a scene without allocating or compiling anything.
+/// Plans the passes of a bake without allocating or compiling anything.
 ///
 /// # Errors
-/// A solid without an inside, or too large a distance grid; an adapter that does not exist or open.
-pub fn plan(scene: &Scene, adapter: Option<&str>) -> Result<ScenePlan, PlanError> {
-    let start = Start::of(scene)?;
+/// An adapter that does not exist or open.
+pub fn plan<'a>(bake: BakePlan<'a>, adapter: Option<&str>) -> Result<ScenePlan<'a>, GpuError> {
+    let scene = bake.scene;
     let mut lacks = None;
     let context = match Context::open_for(adapter, needs(scene)) {
         Ok(context) => Some(context),
@@ -170,36 +139,19 @@ pub fn plan(scene: &Scene, adapter: Option<&str>) -> Result<ScenePlan, PlanError
             lacks = Some(error);
             Some(Context::open(adapter)?)
         }
-        Err(error) => return Err(error.into()),
+        Err(error) => return Err(error),
     };
     let limits = context.as_ref().map_or(COMMON_LIMITS, device_limits);
-    let plan = start.shown_plan(scene, limits);
-    let misfit = context
-        .as_ref()
-        .and_then(|context| {
-            let mut parts = plan.parts();
-            parts.find_map(|part| check_sizes(context, &part.buffer_specs()).err())
-        })
-        .or(lacks);
-    let promises = start.predicted_inflows();
-    let most = start.sources.most_entering(scene.shot.duration());
-    let entering = promises.iter().zip(most).filter_map(|(promise, most)| {
-        // Where nothing is in the way, to the particle.
-        Some((most? as f64 * promise.as_ref()?.open).ceil())
-    });
-    let entering: f64 = entering.sum();
-    let distance = start.boundary.distance.as_ref();
-    let spacing = distance.map(|distance| distance.spacing);
+    let plan = bake.start.shown_plan(scene, limits);
+    let unfit = |context: &Context| {
+        let mut parts = plan.parts();
+        parts.find_map(|part| check_sizes(context, &part.buffer_specs()).err())
+    };
+    let misfit = context.as_ref().and_then(unfit).or(lacks);
     Ok(ScenePlan {
-        coarse_solids: spacing.filter(|&spacing| spacing > scene.particle_spacing()),
+        bake,
         plan,
         misfit,
-        particles: start.particles.len(),
-        removed: start.removed,
-        volume: start.volume(scene),
-        warnings: start.warnings(scene),
-        entering: scene.has_inlets().then_some(entering),
-        promises,
         adapter: context.map(|context| context.info.name),
     })
 }

@@ -7,16 +7,13 @@ use swell_domain::{
     particles::Particles,
     sampling::{BoundarySample, boundary_samples, fill_water},
     signed_distance::{SignedDistance, SignedDistanceError},
-    sources::{PredictedInflow, Sources},
+    sources::Sources,
 };
-use swell_scene::{Method, Scene, four_digits};
+use swell_scene::{Method, Scene};
 use swell_solve::{
     flip,
     plan::{Capacity, Counts, DeviceLimits, Plan},
 };
-
-/// Fraction by which whole rows of particles may change an emitter's flow.
-const ROUNDED: f64 = 0.02;
 
 /// Volume of water at a start, m³.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -129,51 +126,8 @@ impl Start {
         }
     }
 
-    /// Lints that need the start itself: no water although the scene asks for some, and emitters
-    /// whose flow differs from velocity times area.
-    pub fn lints(&self, scene: &Scene) -> Vec<String> {
-        let mut lints = Vec::from_iter(self.lint_dry());
-        lints.extend(self.lint_emitters(scene));
-        lints
-    }
-
-    /// Lints of emitters, which do not depend on the water at the start.
-    pub fn lint_emitters(&self, scene: &Scene) -> Vec<String> {
-        let mut lints = Vec::new();
-        let most = self.sources.most_entering(scene.shot.duration());
-        for (index, (promise, most)) in self.predicted_inflows().into_iter().zip(most).enumerate() {
-            let window = scene.emitters[index].window;
-            let seconds = window.length(scene.shot.duration());
-            if most == Some(0) && seconds > 0.0 {
-                lints.push(format!(
-                    "emitter[{index}]: nothing enters: no layer of particles \
-                     comes in within its {} s",
-                    four_digits(seconds)
-                ));
-            } else if let Some(promise) = promise
-                && let Some(asked) = promise.asked
-                && promise.open > 0.0
-            {
-                let made = promise.rate / promise.open;
-                let part = made / asked - 1.0;
-                if part.abs() > ROUNDED {
-                    lints.push(format!(
-                        "emitter[{index}]: its box and velocity ask for {} m³/s, and {} \
-                         m³/s enter, {:.1} % {}: across the flow there are whole rows \
-                         of particles {} m apart",
-                        four_digits(asked),
-                        four_digits(made),
-                        100.0 * part.abs(),
-                        if part < 0.0 { "less" } else { "more" },
-                        scene.particle_spacing()
-                    ));
-                }
-            }
-        }
-        lints
-    }
-
-    fn lint_dry(&self) -> Option<String> {
+    /// Lint of a start without water although the scene asks for some.
+    pub(super) fn lint_dry(&self) -> Option<String> {
         // A branch may begin dry where emitters fill it.
         let is_fed = self.asked.is_none() && !self.sources.emitters.is_empty();
         if !self.particles.is_empty() || self.asked == Some(0.0) || is_fed {
@@ -187,29 +141,6 @@ impl Start {
             _ => "water: solids or walls cover all of the scene's water, and no particle is left",
         };
         Some(lint.to_owned())
-    }
-
-    /// Warnings about the scene and its start, a sentence each.
-    pub fn warnings(&self, scene: &Scene) -> Vec<String> {
-        let mut warnings = [scene.warnings(), self.lints(scene)].concat();
-        for (index, promise) in self.predicted_inflows().into_iter().enumerate() {
-            if let Some(promise) = promise.filter(|promise| promise.covered > 0.0) {
-                warnings.push(format!(
-                    "emitter[{index}]: solids cover {:.1} % of its cross-section all along its \
-                     volume, and nothing enters there: it brings {:.4} m³/s",
-                    100.0 * promise.covered,
-                    promise.rate
-                ));
-            }
-        }
-        warnings
-    }
-
-    /// What each emitter adds with solids in their start position; `None` for emitters that keep a
-    /// level.
-    pub fn predicted_inflows(&self) -> Vec<Option<PredictedInflow>> {
-        self.sources
-            .predicted_inflows(self.boundary.distance.as_ref())
     }
 
     /// Plans what the scene needs on a device with these limits.

@@ -1,16 +1,15 @@
 //! Measures how long a scene's frames take, by computing its first ones without keeping them.
 
-use swell_domain::{signed_distance::SignedDistanceError, statistics::median};
+use swell_domain::statistics::median;
 use swell_gpu::adapter::GpuError;
-use swell_scene::Scene;
 
 pub use swell_solve::plan::Share;
 
 use super::{
     Blame,
+    bake::BakePlan,
     device::{Gpu, Identity, Opened, SolverError, needs},
     drive::Drive,
-    prepare::Start,
 };
 
 /// Measured times of frames.
@@ -32,9 +31,6 @@ pub struct Timed {
 /// Why frames could not be timed.
 #[derive(Debug, thiserror::Error)]
 pub enum TimeError {
-    /// A solid without an inside, or too large a distance grid.
-    #[error(transparent)]
-    Solid(#[from] SignedDistanceError),
     /// The adapter cannot be opened or does not suffice.
     #[error(transparent)]
     Gpu(#[from] GpuError),
@@ -46,24 +42,23 @@ pub enum TimeError {
 impl From<&TimeError> for Blame {
     fn from(error: &TimeError) -> Self {
         match error {
-            TimeError::Solid(error) => error.into(),
             TimeError::Gpu(error) => error.into(),
             TimeError::Solve(error) => error.into(),
         }
     }
 }
 
-/// Computes `frames` frames of a scene after its first, which warms up the device, and keeps
+/// Computes `frames` frames of a plan after its first, which warms up the device, and keeps
 /// nothing.
 ///
 /// # Errors
 /// [`TimeError`], also for frames with invalid numbers.
-pub fn time(scene: &Scene, adapter: Option<&str>, frames: u32) -> Result<Timed, TimeError> {
-    let start = Start::of(scene)?;
+pub fn time(plan: &BakePlan<'_>, adapter: Option<&str>, frames: u32) -> Result<Timed, TimeError> {
+    let (scene, start) = (plan.scene, &plan.start);
     let gpu = Gpu::from(adapter.map(str::to_owned));
     let opened = Opened::Gpu(Box::new(gpu.open(needs(scene))?));
     let (mut seconds, mut substeps) = (Vec::new(), 0);
-    let mut drive = Drive::new(&opened, scene, &start, false)?;
+    let mut drive = Drive::new(&opened, scene, start, false)?;
     drive.advance()?;
     for _ in 0..frames {
         let step = drive.advance()?;
@@ -71,7 +66,7 @@ pub fn time(scene: &Scene, adapter: Option<&str>, frames: u32) -> Result<Timed, 
         substeps += step.report.substeps;
     }
     drop(drive);
-    let mut drive = Drive::new(&opened, scene, &start, true)?;
+    let mut drive = Drive::new(&opened, scene, start, true)?;
     drive.advance()?;
     let before = drive.shares();
     for _ in 0..frames {

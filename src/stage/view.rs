@@ -1,12 +1,16 @@
 //! `view`: shows pictures, a cache or a study as a contact sheet, a movie, or a page that plays the
 //! frames. The subjects are only read.
 
+mod apng;
 mod curves;
 mod error;
 mod movie;
 mod particles;
 mod pictures;
+mod player;
+mod points;
 mod reel;
+mod sheet;
 mod store;
 mod strip;
 mod study;
@@ -30,7 +34,7 @@ pub use self::{
     error::ViewError,
     store::{MOST, Placing},
 };
-pub use swell_study::points::Aspect;
+pub use points::Aspect;
 
 /// What to view, and in which form.
 #[derive(Clone, Debug)]

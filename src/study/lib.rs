@@ -5,10 +5,8 @@
 //! measures hard cases, and [`waves`] measures benchmarks whose answer is known from theory or
 //! experiment. A sweep finds the [`knee`] and, for the paper's Table 1, the [`convergence_point`];
 //! [`tune`] finds the cheapest settings that keep an error below its limit. [`measure`], [`chart`]
-//! and [`page`] serve every kind of study. [`player`], [`sheet`] and [`apng`] show pictures frame
-//! by frame, and [`folder`] names the files that a study leaves.
+//! and [`page`] serve every kind of study, and [`folder`] names the files that a study leaves.
 
-pub mod apng;
 pub mod chart;
 pub mod comparison;
 pub mod convergence_point;
@@ -17,11 +15,8 @@ pub mod knee;
 pub mod measure;
 pub mod page;
 pub mod picture;
-pub mod player;
-pub mod points;
 pub mod raster;
 pub mod rgb;
-pub mod sheet;
 pub mod stability;
 pub mod tune;
 pub mod waves;

@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use crate::{
     engine::{Io, Outcome},
-    pbf::{GRID, TURNED},
+    solids::{GRID, TURNED},
     table::{each, pair},
 };
 use swell_domain::{boundary::Boundary, flip::VON_KARMAN, signed_distance::SignedDistance};

@@ -3,7 +3,7 @@
 //! system, its right-hand side, products, differences of the solution, the residual. Velocities,
 //! displacements and pressures in Pa remain f32.
 
-use crate::{pbf::GRID, sort::NEAR_FACE, table::entries};
+use crate::{solids::GRID, sort::NEAR_FACE, table::entries};
 use swell_compare::{deviation::relative, rounding::U, tolerance::bounds};
 
 bounds! {

@@ -10,7 +10,8 @@ use swell_compare::rounding::{
 use swell_domain::{bounds::FAR, pbf::CONTACT, pose::Pose};
 use swell_reference::pbf::passes::{Inputs, Row};
 
-use super::rows::{DELTA, GRID, OF_SOLIDS, PUSHED, REACH, REPULSION, TURNED};
+use super::rows::{DELTA, OF_SOLIDS, PUSHED, REACH, REPULSION};
+use crate::solids::{GRID, TURNED};
 
 /// Inputs that the bounds of a pass depend on.
 pub(crate) struct Bounds<'a>(pub(crate) Inputs<'a>);

@@ -8,8 +8,6 @@ mod stop;
 mod whole;
 mod work;
 
-pub(super) use rows::{GRID, TURNED};
-
 use glam::DVec3;
 
 use swell_domain::{boundary::Boundary, particles::Particles, solver::Solver, substep::Which};

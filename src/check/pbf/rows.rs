@@ -1,23 +1,13 @@
 //! Values that a check of PBF compares, and their tolerances; U = 2⁻²⁴, sums as in
 //! `compare::rounding`.
 
-use crate::{sort::NEAR_FACE, table::entries};
+use crate::{solids::GRID, sort::NEAR_FACE, table::entries};
 use swell_compare::{
     rounding::{DENSITY, GRADIENT, LAMBDA, U, WALL_GRADIENT},
     tolerance::bounds,
 };
 
 bounds! {
-    /// Error of a distance grid on the device, metres.
-    pub(crate) GRID = [offset: "a place's distance to the grid's origin", origin: "|origin|",
-        spacing: "the grid's"]
-        U * (7.0 * offset + origin + 48.0 * spacing),
-        "differences and quotients of a place in the grid";
-    pub(crate) TURNED = [grid: "" GRID,
-        radius: "how far places within a turning solid's grid are from its point of rest",
-        centre: "|that point|"]
-        grid + U * (40.0 * radius + centre),
-        "a place is turned back by a quaternion that is a mean of two, normalised";
     pub(super) REACH = [error: "the position's error before walls and solids push", grid: "" GRID]
         error + grid, "";
     pub(super) PUSHED = [error: "the position's error before walls and solids push",

@@ -5,14 +5,11 @@ use std::path::Path;
 
 use serde_json::{Map, Value, json};
 
-use super::{
-    CACHE, InspectArgs, broken_off, file, look, refuse_frames_beyond, refuse_options, study,
-};
+use super::{CACHE, InspectArgs, broken_off, file, look, refuse_options, study};
 use crate::{Failure, bake, is_cache, named_adapter, output};
 use swell_scene::Scene;
 use swell_stage::{
-    bake::shot_bytes,
-    inspect::{Adapter, Entry, Manifest, PARTICLES, ScenePlan, adapters, cache, plan, sizes},
+    inspect::{Adapter, Entry, Manifest, PARTICLES, ScenePlan, adapters, cache, sizes},
     replay::is_failed,
     time::{Timed, time},
 };
@@ -53,23 +50,22 @@ fn adapter(adapter: &Adapter) -> Value {
 
 fn of_scene(args: &InspectArgs, file: &Path) -> Result<(Value, Option<Failure>), Failure> {
     let scene = bake::load(file, &args.set, args.solver, args.allow_outside)?;
-    args.deny.check(file, &scene, true)?;
-    refuse_frames_beyond(args, file, scene.shot.frames)?;
+    let planned = super::of_scene(args, file, &scene)?;
+    let mut object = scene_json(&planned);
+    object["disk_bytes"] = json!(planned.bake.bytes()?);
     let adapter = named_adapter(args.adapter.as_ref());
-    let planned = plan(&scene, adapter.as_deref())?;
-    let mut object = scene_json(&scene, &planned);
-    object["disk_bytes"] = json!(shot_bytes(&scene)?);
     object["time"] = match args.time {
         Some(frames) if planned.misfit.is_none() => {
-            timed_json(&scene, &time(&scene, adapter.as_deref(), frames)?)
+            timed_json(&scene, &time(&planned.bake, adapter.as_deref(), frames)?)
         }
         _ => Value::Null,
     };
     Ok((object, planned.misfit.map(Failure::from)))
 }
 
-fn scene_json(scene: &Scene, planned: &ScenePlan) -> Value {
-    let plan = &planned.plan;
+fn scene_json(planned: &ScenePlan<'_>) -> Value {
+    let (plan, bake) = (&planned.plan, &planned.bake);
+    let (scene, start, volume) = (bake.scene, &bake.start, bake.volume());
     let passes = plan.parts().flat_map(|part| &part.passes);
     let passes = passes.map(|pass| json!({ "pass": pass.spec.name, "part": pass.owner }));
     let buffers = plan.parts().flat_map(|part| &part.buffers);
@@ -86,14 +82,14 @@ fn scene_json(scene: &Scene, planned: &ScenePlan) -> Value {
         "frames": scene.shot.frames,
         "frames_per_second": scene.shot.frames_per_second,
         "solver": scene.solver.method.name(),
-        "particles": planned.particles,
-        "removed": planned.removed,
-        "volume": planned.volume.made,
-        "volume_asked": planned.volume.asked,
+        "particles": start.particles.len(),
+        "removed": start.removed,
+        "volume": volume.made,
+        "volume_asked": volume.asked,
         "boundary_samples": plan.counts.boundary_samples,
         "cells": plan.grid_dims,
-        "entering": planned.entering,
-        "warnings": planned.warnings,
+        "entering": bake.entering(),
+        "warnings": bake.warnings,
         "adapter": planned.adapter,
         "misfit": planned.misfit.as_ref().map(ToString::to_string),
         "passes": passes.collect::<Vec<_>>(),

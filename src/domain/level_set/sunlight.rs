@@ -105,7 +105,7 @@ fn is_within(p: DVec3, size: DVec3) -> bool {
 
 /// Bilinear interpolation in a plane of nodes; light that enters through the sides has no path
 /// behind it.
-pub(crate) fn between(plane: &[f32], [nx, nz]: [usize; 2], x: f64, z: f64) -> f64 {
+pub fn between(plane: &[f32], [nx, nz]: [usize; 2], x: f64, z: f64) -> f64 {
     let last = |n: usize| (n - 1) as f64;
     if !(x >= 0.0 && z >= 0.0 && x <= last(nx) && z <= last(nz)) {
         return 0.0;

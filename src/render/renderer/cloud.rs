@@ -6,13 +6,13 @@ use super::{room, shade::draws_spray, whitewater::is_bubble};
 use crate::{
     RenderError, RenderScene,
     buffers::{CLOUD, CLOUD_WORDS},
-    cloud::{drops_of, grid, white_of},
+    cloud::{Drop, drops_of, grid, white_of},
     paths::Path,
     plan::Limits,
     rays::voxel,
     uniform::{self, Particle},
 };
-use swell_domain::{cloud::Drop, particles::Particles};
+use swell_domain::particles::Particles;
 use swell_gpu::program::Program;
 use swell_scene::look::{Look, MethodSpec};
 

@@ -6,9 +6,10 @@ use rayon::prelude::*;
 use super::{
     Renderer,
     build::room,
+    drawn::{Drawn, cameras},
     shade::draws_spray,
     splats::{Pages, ROWS, filled},
-    taken::{Taken, cameras, frame_seconds, hidden, sort},
+    taken::{Taken, frame_seconds},
 };
 use crate::{
     Moment, RenderError,
@@ -17,12 +18,11 @@ use crate::{
         SHAPES, SPRAY_PARAMS,
     },
     camera::pose,
-    in_frame::blocks_in_frame,
     lighting::spray_density,
     paths::Path,
     plan::per_particle,
     shapes::shapes,
-    uniform::{Block, Page, Particle, SprayParams},
+    uniform::{Block, Page, Particle, Shape, SprayParams},
 };
 use swell_domain::level_set::kernels::Kernels;
 use swell_gpu::{buffer::Workgroups, program::BufferSpec, recording::spread};
@@ -46,125 +46,137 @@ pub(super) struct Loaded {
     pub(super) ahead: Vec<Particle>,
 }
 
+/// Division of a frame's visible particles into dispatches.
+struct Paged {
+    pages: Vec<Page>,
+    /// Indices of the particles that hold air, a small part of all, in ascending order.
+    aired: Vec<u32>,
+}
+
+impl Paged {
+    fn of(pages: Pages, packed: &[Particle]) -> Self {
+        let aired = (0u32..).zip(packed).filter(|(_, it)| it.air & 0xffff > 0);
+        let aired: Vec<u32> = aired.map(|(index, _)| index).collect();
+        let page = |(k, count): (usize, usize)| {
+            let first = k * pages.page;
+            let before = |end: usize| aired.partition_point(|&index| (index as usize) < end);
+            let aired = before(first)..before(first + count);
+            Page {
+                first: first as u32,
+                count: count as u32,
+                aired_first: aired.start as u32,
+                aired_count: aired.len() as u32,
+            }
+        };
+        let shares = pages.shares(packed.len()).enumerate();
+        Self {
+            pages: shares.map(page).collect(),
+            aired,
+        }
+    }
+}
+
 impl Renderer {
-    /// Uploads a frame's particles, relative to the domain's least corner.
+    /// Uploads a frame's particles, relative to the domain's least corner: takes them, culls and
+    /// sorts them, and divides them into pages.
     pub(super) fn load(&mut self, frame: u32, moment: &Moment<'_>) -> Result<Loaded, RenderError> {
-        let Taken {
-            mut packed,
-            mut ways,
-        } = Taken::of(&self.look, &self.scene, frame, moment)?;
-        let is_ssfr = self.look.spec().renderer.method == MethodSpec::Ssfr;
-        if is_ssfr && self.is_under_water(frame, &packed) {
-            return Err(RenderError::UnderWater { frame });
-        }
-        let wants_motion = self.look.wants(AovSpec::Forward);
-        if let Some(water) = &mut self.water {
-            water.take(&packed, &ways);
-        }
-        if let Some(caustics) = &mut self.caustics {
-            caustics.forget();
-        }
-        if let Some(sea) = &mut self.sea {
-            sea.take(&packed, &ways);
-        }
-        if let Some(cloud) = &mut self.cloud {
-            let water = (&packed[..], &ways[..]);
-            cloud.take(
-                &self.look,
-                &self.scene,
-                self.plan.radius,
-                water,
-                moment.white,
-            );
-        }
+        let taken = Taken::of(&self.look, &self.scene, frame, moment)?;
+        self.refuse_under_water(frame, &taken.packed)?;
+        self.load_rays(&taken, moment);
         self.load_spray(frame, moment);
         if !self.program.has(PARTICLES.name()) {
             return Ok(Loaded::default());
         }
         let cameras = cameras(&self.look, &self.setting(0), frame);
-        let hidden = hidden(&self.look, &self.scene, &packed);
-        let seen = sort(
-            (&self.look, &self.scene),
-            (frame, &cameras),
-            hidden.as_ref(),
-            &mut packed,
-            &mut ways,
-        );
-        let shapes = match self.program.has(SHAPES.name()) {
-            true => shapes(&packed, seen, &self.scene, self.plan.radius),
-            false => Vec::new(),
-        };
-        packed.truncate(seen);
-        let count = seen as u32;
-        self.reserve(seen)?;
-        if let Some(hidden) = hidden {
-            self.load_blocks(blocks_in_frame(hidden.blocks, &cameras))?;
+        let mut drawn = Drawn::of(taken, &self.look, &self.scene, frame, &cameras);
+        let shapes = self.shapes(&drawn);
+        drawn.packed.truncate(drawn.seen);
+        self.reserve(drawn.seen)?;
+        if let Some(blocks) = drawn.blocks.take() {
+            self.load_blocks(blocks)?;
         }
-        let aired = self.load_aired(&packed);
-        let pages = self.pages();
-        let aired = self.load_pages(pages, packed.len(), &aired);
-        for (buffer, shares) in [
-            (PARTICLE_GROUPS, pages.shares(seen).collect()),
-            (AIRED_GROUPS, aired),
-        ] {
+        self.load_pages(&Paged::of(self.pages(), &drawn.packed));
+        self.load_drawn(&drawn, &shapes);
+        Ok(Loaded {
+            count: drawn.seen as u32,
+            ahead: self.ahead(drawn, moment),
+        })
+    }
+
+    /// Refuses a picture by splats from within the water.
+    fn refuse_under_water(&self, frame: u32, packed: &[Particle]) -> Result<(), RenderError> {
+        let is_ssfr = self.look.spec().renderer.method == MethodSpec::Ssfr;
+        match is_ssfr && self.is_under_water(frame, packed) {
+            true => Err(RenderError::UnderWater { frame }),
+            false => Ok(()),
+        }
+    }
+
+    /// Hands a frame's particles to what rays meet.
+    fn load_rays(&mut self, Taken { packed, ways }: &Taken, moment: &Moment<'_>) {
+        if let Some(water) = &mut self.water {
+            water.take(packed, ways);
+        }
+        if let Some(caustics) = &mut self.caustics {
+            caustics.forget();
+        }
+        if let Some(sea) = &mut self.sea {
+            sea.take(packed, ways);
+        }
+        if let Some(cloud) = &mut self.cloud {
+            let (water, radius) = ((&packed[..], &ways[..]), self.plan.radius);
+            cloud.take(&self.look, &self.scene, radius, water, moment.white);
+        }
+    }
+
+    /// Ellipsoids of the visible particles; none where the look splats spheres.
+    fn shapes(&self, drawn: &Drawn) -> Vec<Shape> {
+        match self.program.has(SHAPES.name()) {
+            true => shapes(&drawn.packed, drawn.seen, &self.scene, self.plan.radius),
+            false => Vec::new(),
+        }
+    }
+
+    /// Uploads visible particles with their shapes and paths.
+    fn load_drawn(&self, drawn: &Drawn, shapes: &[Shape]) {
+        self.program.upload(PARTICLES, 0, &drawn.packed);
+        if self.program.has(SHAPES.name()) {
+            self.program.upload(SHAPES, 0, shapes);
+        }
+        if self.program.has(PATHS.name()) {
+            let packed: Vec<_> = drawn.ways.iter().map(Path::packed).collect();
+            self.program.upload(PATHS, 0, &packed);
+        }
+    }
+
+    /// Visible particles with their mean velocity to the next frame, if a channel shows it.
+    fn ahead(&self, drawn: Drawn, moment: &Moment<'_>) -> Vec<Particle> {
+        if !self.look.wants(AovSpec::Forward) || moment.beside()[1].is_none() {
+            return Vec::new();
+        }
+        let seconds = frame_seconds(&self.scene);
+        let mut ahead = drawn.packed;
+        for (particle, way) in ahead.iter_mut().zip(&drawn.ways) {
+            particle.velocity = (way.way(seconds).as_vec3() / seconds).to_array();
+        }
+        ahead
+    }
+
+    /// Uploads the range of particles of each dispatch, and the particles with air.
+    fn load_pages(&self, Paged { pages, aired }: &Paged) {
+        if self.program.has(AIRED.name()) {
+            self.program.upload(AIRED, 0, aired);
+        }
+        self.program.upload_windows(&PAGES, pages);
+        let share = |page: &Page| [page.count, page.aired_count];
+        for (buffer, kind) in [(PARTICLE_GROUPS, 0), (AIRED_GROUPS, 1)] {
             if self.program.has(buffer.name()) {
-                let groups = |share: &usize| spread(&self.program.context, ROWS, *share as u64);
-                let groups: Vec<Workgroups> = shares.iter().map(|n| groups(n).into()).collect();
+                let context = &self.program.context;
+                let groups = |page| spread(context, ROWS, share(page)[kind].into()).into();
+                let groups: Vec<Workgroups> = pages.iter().map(groups).collect();
                 self.program.upload(buffer, 0, &groups);
             }
         }
-        self.program.upload(PARTICLES, 0, &packed);
-        if self.program.has(SHAPES.name()) {
-            self.program.upload(SHAPES, 0, &shapes);
-        }
-        if self.program.has(PATHS.name()) {
-            let packed: Vec<_> = ways.iter().map(Path::packed).collect();
-            self.program.upload(PATHS, 0, &packed);
-        }
-        let mut ahead = Vec::new();
-        if wants_motion && moment.beside()[1].is_some() {
-            let seconds = frame_seconds(&self.scene);
-            for (particle, way) in packed.iter_mut().zip(&ways) {
-                particle.velocity = (way.way(seconds).as_vec3() / seconds).to_array();
-            }
-            ahead = packed;
-        }
-        Ok(Loaded { count, ahead })
-    }
-
-    /// Uploads the indices of the particles that hold air, a small part of all, and returns them in
-    /// ascending order.
-    fn load_aired(&self, packed: &[Particle]) -> Vec<u32> {
-        if !self.program.has(AIRED.name()) {
-            return Vec::new();
-        }
-        let aired = (0u32..).zip(packed).filter(|(_, it)| it.air & 0xffff > 0);
-        let aired: Vec<u32> = aired.map(|(index, _)| index).collect();
-        self.program.upload(AIRED, 0, &aired);
-        aired
-    }
-
-    /// Uploads the range of particles of each dispatch, and returns the number of particles with
-    /// air in each page.
-    fn load_pages(&self, pages: Pages, particles: usize, aired: &[u32]) -> Vec<usize> {
-        let counts: Vec<usize> = pages.shares(particles).collect();
-        let mut windows = Vec::new();
-        for (k, &count) in counts.iter().enumerate() {
-            let first = k * pages.page;
-            let before = |end: usize| aired.partition_point(|&index| (index as usize) < end);
-            let aired = before(first)..before(first + count);
-            windows.push(Page {
-                first: first as u32,
-                count: count as u32,
-                aired_first: aired.start as u32,
-                aired_count: aired.len() as u32,
-            });
-        }
-        self.program.upload_windows(&PAGES, &windows);
-        windows
-            .iter()
-            .map(|page| page.aired_count as usize)
-            .collect()
     }
 
     /// Uploads the blocks of water that replace hidden particles; the rest of the buffer gets empty

@@ -3,17 +3,17 @@
 use super::{
     build::room,
     cloud::{RayCloud, room_of},
+    drawn::{Drawn, cameras},
     load::of_particles,
     setting,
     splats::Pages,
-    taken::{Taken, cameras, hidden, sort},
+    taken::Taken,
     water::RayWater,
     whitewater::Whitewater,
 };
 use crate::{
     Moment, RenderError, RenderScene,
     buffers::{BLOCKS, CLOUD_WORDS, LEVEL_VALUES, PARTICLES, WHITEWATER},
-    in_frame::blocks_in_frame,
     plan::{Limits, Plan},
 };
 use swell_scene::look::Look;
@@ -33,17 +33,14 @@ impl Plan {
         limits: &Limits,
     ) -> Result<Self, RenderError> {
         let mut plan = Self::new(look, scene, limits)?;
-        let Taken {
-            mut packed,
-            mut ways,
-        } = Taken::of(look, scene, frame, moment)?;
+        let taken = Taken::of(look, scene, frame, moment)?;
         if let Some(mut water) = RayWater::of(look, scene) {
-            water.take(&packed, &ways);
+            water.take(&taken.packed, &taken.ways);
             let values = water.level(0.0, scene).values.len();
             plan.grow(LEVEL_VALUES.sized(values));
         }
         if let Some(mut cloud) = RayCloud::of(look, scene) {
-            let water = (&packed[..], &ways[..]);
+            let water = (&taken.packed[..], &taken.ways[..]);
             cloud.take(look, scene, plan.radius, water, moment.white);
             let (_, words) = cloud.grid(0.0, scene);
             plan.grow(CLOUD_WORDS.sized(room_of(words.len(), limits.storage)));
@@ -56,19 +53,11 @@ impl Plan {
             return Ok(plan);
         }
         let cameras = cameras(look, &setting(&plan, scene, 0), frame);
-        let hidden = hidden(look, scene, &packed);
-        let seen = sort(
-            (look, scene),
-            (frame, &cameras),
-            hidden.as_ref(),
-            &mut packed,
-            &mut ways,
-        );
-        for buffer in of_particles(look, Pages::new(room(seen), limits.storage)) {
+        let drawn = Drawn::of(taken, look, scene, frame, &cameras);
+        for buffer in of_particles(look, Pages::new(room(drawn.seen), limits.storage)) {
             plan.grow(buffer);
         }
-        if let Some(hidden) = hidden {
-            let blocks = blocks_in_frame(hidden.blocks, &cameras);
+        if let Some(blocks) = drawn.blocks {
             plan.grow(BLOCKS.sized(room(blocks.len())));
         }
         Ok(plan)

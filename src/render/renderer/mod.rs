@@ -4,6 +4,7 @@
 mod aovs;
 mod build;
 mod cloud;
+mod drawn;
 mod load;
 mod measured;
 mod parts;

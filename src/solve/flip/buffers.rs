@@ -3,7 +3,7 @@
 //! "Cells" are arrays with 512 values per brick slot, all zero in slot 0. "Planes" are three such
 //! arrays in sequence, one per component, with a value for the lower face of each cell.
 
-use crate::params::{DeviceBrick, FlipParams, Inlets, SolidGrids, SurveyHead};
+use crate::params::{DeviceBrick, FlipParams, Inlets, SurveyHead};
 use swell_gpu::buffer::{Buf, Windows, Workgroups};
 
 pub use crate::buffers::*;
@@ -75,5 +75,3 @@ pub const OPEN_HATS: Buf<f32> = Buf::new("open_hats");
 pub const CLOSED_VELOCITY: Buf<f32> = Buf::new("closed_velocity");
 /// Boxes where water enters. Exists only with emitters that have a velocity.
 pub const INLETS: Buf<Inlets> = Buf::uniform("inlets");
-/// Geometry and motion of all solids' signed-distance grids.
-pub const SOLID_GRIDS: Buf<SolidGrids> = Buf::uniform("solid_grids");

@@ -40,9 +40,6 @@ pub const WALL_WORK: Buf<f32> = Buf::new("wall_work");
 /// Index of the first boundary sample of each cell, and finally the number of samples.
 pub const BOUNDARY_CELL_START: Buf<u32> = Buf::new("boundary_cell_start");
 
-/// Velocity of each boundary sample, m/s.
-pub const SAMPLE_VELOCITY: Buf<[f32; 3]> = Buf::new("sample_velocity");
-
 /// Returns the buffer with the lists of one chunk's particles, which [`NEIGHBOR_LIST`] is bound to.
 pub fn list_of(chunk: usize) -> Buf<[u32; 4]> {
     Buf::named(format!("{}.{chunk}", NEIGHBOR_LIST.name()))

@@ -2,7 +2,7 @@
 
 use crate::{
     effects, flip,
-    plan::{Chunk, Counts, DeviceLimits, Plan, Table, in_order},
+    plan::{Chunk, Counts, DeviceLimits, LIST_CAPACITY, Plan, Table, in_order},
 };
 use swell_domain::sph::Calibration;
 use swell_gpu::{
@@ -13,23 +13,13 @@ use swell_gpu::{
 use swell_scene::{Iteration, Scene, Stop};
 
 use super::{buffers::*, record::Commands};
-use crate::flip::buffers::SOLID_GRIDS;
 
 /// Returns the constants for every pass that declares them.
-pub fn shared_constants(plan: &Plan) -> Vec<(&'static str, f64)> {
+pub(super) fn shared_constants(plan: &Plan) -> Vec<(&'static str, f64)> {
     let mut constants = vec![("LIST_CAPACITY", f64::from(LIST_CAPACITY))];
     constants.extend(plan.page.map(|page| ("PAGE", page as f64)));
     constants
 }
-
-/// Neighbours that a list holds. If a particle has more, passes search the cells for it, and the
-/// report counts it. At rest, h = 2d gives 32 neighbours; in the dam break of `tools/bench pbf` no
-/// list of 48 overflowed.
-pub const LIST_CAPACITY: u32 = 48;
-
-/// Device memory that neighbour lists may take, bytes. In a larger scene each pass searches the
-/// cells.
-pub const LIST_BUDGET: u64 = 4 << 30;
 
 /// Particles per block of lists; a chunk consists of whole blocks.
 const LIST_BLOCK: usize = 512;

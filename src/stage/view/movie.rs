@@ -7,9 +7,9 @@ use std::{
     process::{Child, Command, Stdio},
 };
 
-use super::ViewError;
+use super::{ViewError, apng::Apng};
 use swell_domain::output::{AtPath as _, Draft};
-use swell_study::{apng::Apng, rgb::Rgb};
+use swell_study::rgb::Rgb;
 
 /// Format of a movie.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

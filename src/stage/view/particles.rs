@@ -5,7 +5,9 @@ use std::path::Path;
 use glam::{DVec3, Vec3};
 
 use super::{
-    ViewError, reader,
+    ViewError,
+    points::{Around, Aspect, Projection},
+    reader,
     strip::{Label, Source, Strip},
 };
 use crate::baked_scene;
@@ -14,10 +16,7 @@ use swell_domain::{
     bounds::Bounds, frame_range::FrameRange, particles::Particles, statistics::percentile,
 };
 use swell_scene::Scene;
-use swell_study::{
-    points::{Around, Aspect, Projection},
-    rgb::Rgb,
-};
+use swell_study::rgb::Rgb;
 
 /// Width of a picture, pixels.
 const WIDTH: usize = 960;

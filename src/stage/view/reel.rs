@@ -12,15 +12,13 @@ use super::{
     Event, MOST, Outcome, PAGE_WIDTH, Placing, RATE, Request, ViewError, check_place,
     curves::Curves,
     movie::{self, Movie},
+    player::{Player, Set},
+    sheet::{Cell, sheet},
     store::Store,
     strip::{Label, Strip},
 };
 use swell_domain::output::{self, create_folder};
-use swell_study::{
-    player::{Player, Set},
-    rgb::Rgb,
-    sheet::{Cell, sheet},
-};
+use swell_study::rgb::Rgb;
 
 /// A view that is ready to run.
 pub(super) struct Reel<'a> {

@@ -7,9 +7,8 @@ use std::{
 
 use base64::{Engine as _, engine::general_purpose::STANDARD};
 
-use super::ViewError;
+use super::{ViewError, player::MARK};
 use swell_domain::output::{self, AtPath as _, Draft};
-use swell_study::player::MARK;
 
 /// Where the pictures of a page are stored.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

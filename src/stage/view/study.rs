@@ -10,6 +10,7 @@ use rayon::prelude::*;
 use super::{
     Event, Outcome, Request, ViewError, check_place, pictures,
     reel::{COLUMNS, SOFTWARE, THUMB, check_sheet},
+    sheet::{Cell, sheet},
     strip::name_of,
 };
 use swell_domain::output::{self, AtPath as _};
@@ -17,7 +18,6 @@ use swell_scene::look::ViewSpec;
 use swell_study::{
     folder::{CLAIM, Claim, is_ledger, is_share},
     rgb::Rgb,
-    sheet::{Cell, sheet},
 };
 
 /// File that a finished study leaves besides its ledgers.

@@ -6,8 +6,8 @@
 
 use glam::{DVec2, DVec3};
 
-use super::rgb::Rgb;
 use swell_domain::{bounds::Bounds, mesh::TriangleMesh, particles::Particles};
+use swell_study::rgb::Rgb;
 
 /// Viewing direction.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -23,7 +23,7 @@ pub enum Aspect {
 
 /// A parallel projection of a box to a picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Projection {
+pub(super) struct Projection {
     right: DVec3,
     up: DVec3,
     /// Unit vector towards the eye.
@@ -38,14 +38,14 @@ pub struct Projection {
 
 /// What is drawn besides the particles; metres, relative to the particles' origin.
 #[derive(Clone, Copy, Debug)]
-pub struct Around<'a> {
+pub(super) struct Around<'a> {
     /// Drawn as its edges.
-    pub domain: Bounds,
+    pub(super) domain: Bounds,
     /// The box that the walls currently leave to the water, drawn as its edges if it differs from
     /// the domain.
-    pub walls: Bounds,
+    pub(super) walls: Bounds,
     /// Drawn in grey.
-    pub solids: &'a [TriangleMesh],
+    pub(super) solids: &'a [TriangleMesh],
 }
 
 const GROUND: [f32; 3] = [15.0, 18.0, 23.0];
@@ -68,7 +68,7 @@ const FINER: usize = 2;
 
 impl Projection {
     /// Projects a domain onto a picture of `width` columns.
-    pub fn of(from: Aspect, domain: &Bounds, width: usize) -> Self {
+    pub(super) fn of(from: Aspect, domain: &Bounds, width: usize) -> Self {
         let (right, up) = match from {
             Aspect::Side => (DVec3::X, DVec3::Y),
             Aspect::Top => (DVec3::X, DVec3::NEG_Z),
@@ -104,7 +104,7 @@ impl Projection {
 
     /// The same view for positions that are larger by `way`, metres.
     #[must_use]
-    pub fn moved(self, way: DVec3) -> Self {
+    pub(super) fn moved(self, way: DVec3) -> Self {
         Self {
             centre: self.centre + way,
             ..self
@@ -112,7 +112,7 @@ impl Projection {
     }
 
     /// Columns and rows of a picture.
-    pub fn size(&self) -> [usize; 2] {
+    pub(super) fn size(&self) -> [usize; 2] {
         self.size
     }
 
@@ -128,7 +128,13 @@ impl Projection {
 
     /// Draws a frame: balls with the particle spacing (metres) as diameter, coloured by speed up to
     /// `top` m/s.
-    pub fn draw(&self, water: &Particles, spacing: f64, top: f64, around: &Around<'_>) -> Rgb {
+    pub(super) fn draw(
+        &self,
+        water: &Particles,
+        spacing: f64,
+        top: f64,
+        around: &Around<'_>,
+    ) -> Rgb {
         let size = self.size.map(|side| side * FINER);
         let mut canvas = Canvas {
             projection: self,

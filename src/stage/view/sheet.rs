@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::{
+use swell_study::{
     page::escaped,
     raster::{self, RasterError},
     rgb::Rgb,
@@ -10,11 +10,11 @@ use super::{
 
 /// A picture of a sheet.
 #[derive(Clone, Debug)]
-pub struct Cell {
+pub(super) struct Cell {
     /// Text below the picture.
-    pub label: String,
+    pub(super) label: String,
     /// The picture, already in its final size.
-    pub picture: Rgb,
+    pub(super) picture: Rgb,
 }
 
 /// Margin around everything and between pictures, pixels.
@@ -32,7 +32,12 @@ const LETTER: f64 = 6.6;
 ///
 /// # Errors
 /// [`RasterError`] for a sheet that is too large.
-pub fn sheet(title: &str, note: &str, cells: &[Cell], columns: usize) -> Result<Rgb, RasterError> {
+pub(super) fn sheet(
+    title: &str,
+    note: &str,
+    cells: &[Cell],
+    columns: usize,
+) -> Result<Rgb, RasterError> {
     let columns = columns.clamp(1, cells.len().max(1));
     let most = |axis: usize| cells.iter().map(|cell| cell.picture.size[axis]).max();
     let place = [0, 1].map(|axis| most(axis).unwrap_or(1));

@@ -6,8 +6,6 @@
 //! they lie between nodes. The result depends only on the drops: the order of summation does not
 //! change with the number of threads.
 
-pub mod shade;
-
 use std::ops::Range;
 
 use glam::DVec3;
@@ -15,15 +13,15 @@ use half::f16;
 use rayon::prelude::*;
 
 /// Voxels along the edge of a brick.
-pub const EDGE: u32 = 8;
+pub(crate) const EDGE: u32 = 8;
 /// Nodes along the edge of a brick; those on its far side belong to the next brick as well.
-pub const NODES: u32 = EDGE + 1;
+pub(crate) const NODES: u32 = EDGE + 1;
 /// Values of a brick: one per node.
-pub const VALUES: usize = (NODES * NODES * NODES) as usize;
+pub(crate) const VALUES: usize = (NODES * NODES * NODES) as usize;
 /// Table entry of a brick without drops; occupied bricks are numbered from 1.
-pub const EMPTY: u32 = 0;
+pub(crate) const EMPTY: u32 = 0;
 /// Flags of a table entry: the brick holds drops, the brick holds bubbles.
-pub const HAS: [u32; 2] = [1 << 30, 1 << 31];
+pub(crate) const HAS: [u32; 2] = [1 << 30, 1 << 31];
 
 /// Smallest kernel radius, voxels: each drop reaches nodes on all sides.
 const LEAST_REACH: f64 = 1.5;
@@ -32,32 +30,32 @@ const OF_BALL: f64 = 1.341_640_786_499_874;
 
 /// A cloud of drops or of bubbles.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Drop {
+pub(crate) struct Drop {
     /// Position, metres.
-    pub place: DVec3,
+    pub(crate) place: DVec3,
     /// Radius of the ball that the cloud fills, metres.
-    pub radius: f64,
+    pub(crate) radius: f64,
     /// Optical cross-section, m²: extinction times volume.
-    pub area: f64,
+    pub(crate) area: f64,
     /// Whether this is a bubble in the water rather than a drop in the air.
-    pub is_bubble: bool,
+    pub(crate) is_bubble: bool,
 }
 
 /// Optical density of drops and of bubbles over the box that holds them.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Cloud {
+pub(crate) struct Cloud {
     /// Least corner, metres: a multiple of a brick's edge.
-    pub corner: DVec3,
+    pub(crate) corner: DVec3,
     /// Edge length of a voxel, metres.
-    pub voxel: f64,
+    pub(crate) voxel: f64,
     /// Bricks along each axis; a single empty one if there are no drops.
-    pub bricks: [u32; 3],
+    pub(crate) bricks: [u32; 3],
     /// Entry of each brick, x fastest: [`EMPTY`], or the 1-based index of its block in `values`,
     /// combined with the flags of [`HAS`].
-    pub table: Vec<u32>,
+    pub(crate) table: Vec<u32>,
     /// [`VALUES`] for each occupied brick, in 1/m: drops in the lower 16 bits and bubbles in the
     /// upper ones, both in half precision. Node (i, j, k) is element i + 9 j + 81 k.
-    pub values: Vec<u32>,
+    pub(crate) values: Vec<u32>,
 }
 
 /// The nodes that a drop reaches, counted from the grid's corner, and the factor of its kernel.
@@ -122,7 +120,7 @@ impl Cloud {
     /// Builds the grid of `drops`, whose positions are in metres from the least corner of a domain
     /// of `size`, with voxels of `voxel` metres. Drops that have flown farther from the domain than
     /// the domain's own size are left out.
-    pub fn new(drops: &[Drop], size: DVec3, voxel: f64) -> Self {
+    pub(crate) fn new(drops: &[Drop], size: DVec3, voxel: f64) -> Self {
         let is_near = |drop: &&Drop| {
             drop.area > 0.0 && drop.place.cmpgt(-size).all() && drop.place.cmplt(2.0 * size).all()
         };
@@ -224,13 +222,13 @@ impl Cloud {
     }
 
     /// Returns the extent of the grid, metres.
-    pub fn size(&self) -> DVec3 {
+    pub(crate) fn size(&self) -> DVec3 {
         DVec3::from_array(self.bricks.map(f64::from)) * (self.voxel * f64::from(EDGE))
     }
 
     /// Returns the densities of drops and of bubbles at `p`, 1/m: trilinear between nodes, zero
     /// beyond the grid.
-    pub fn densities(&self, p: DVec3) -> [f64; 2] {
+    pub(crate) fn densities(&self, p: DVec3) -> [f64; 2] {
         let at = (p - self.corner) / self.voxel;
         let end = DVec3::from_array(self.bricks.map(|n| f64::from(n * EDGE)));
         if !(at.cmpge(DVec3::ZERO).all() && at.cmplt(end).all()) {
@@ -260,24 +258,7 @@ impl Cloud {
         }
         sums
     }
-
-    /// Returns the total cross-sections of drops and of bubbles in the grid, m².
-    pub fn areas(&self) -> [f64; 2] {
-        let mut sums = [0.0; 2];
-        // Nodes that bricks share count once in total.
-        let share = |c: u32| if c == 0 || c == EDGE { 0.5 } else { 1.0 };
-        for (index, &word) in (0u32..).zip(self.values.iter()) {
-            let at = index % VALUES as u32;
-            let [x, y, z] = [at % NODES, at / NODES % NODES, at / NODES / NODES];
-            let weight = share(x) * share(y) * share(z) * self.voxel.powi(3);
-            for (sum, bits) in sums.iter_mut().zip([word as u16, (word >> 16) as u16]) {
-                *sum += weight * f64::from(f16::from_bits(bits).to_f32());
-            }
-        }
-        sums
-    }
 }
 
 #[cfg(test)]
-#[path = "cloud/tests.rs"]
 mod tests;

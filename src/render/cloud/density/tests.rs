@@ -1,6 +1,6 @@
 #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
-use super::{shade::Shade, *};
+use super::{super::shade::Shade, *};
 
 const SIZE: DVec3 = DVec3::splat(4.0);
 const VOXEL: f64 = 0.1;
@@ -25,6 +25,22 @@ fn sums(drops: &[Drop]) -> [f64; 2] {
     })
 }
 
+/// Total cross-sections of drops and of bubbles in the grid, m².
+fn areas(cloud: &Cloud) -> [f64; 2] {
+    let mut sums = [0.0; 2];
+    // Nodes that bricks share count once in total.
+    let share = |c: u32| if c == 0 || c == EDGE { 0.5 } else { 1.0 };
+    for (index, &word) in (0u32..).zip(cloud.values.iter()) {
+        let at = index % VALUES as u32;
+        let [x, y, z] = [at % NODES, at / NODES % NODES, at / NODES / NODES];
+        let weight = share(x) * share(y) * share(z) * cloud.voxel.powi(3);
+        for (sum, bits) in sums.iter_mut().zip([word as u16, (word >> 16) as u16]) {
+            *sum += weight * f64::from(f16::from_bits(bits).to_f32());
+        }
+    }
+    sums
+}
+
 #[test]
 fn a_grid_holds_what_the_drops_hold() {
     for count in [1, 3, 200] {
@@ -35,8 +51,8 @@ fn a_grid_holds_what_the_drops_hold() {
             let wanted = sums(&drops);
             (0..2).all(|k| (areas[k] - wanted[k]).abs() <= wanted[k] / 2048.0)
         };
-        assert!(off(cloud.areas()), "{count}: {:?}", cloud.areas());
-        assert!(!off(cloud.areas().map(|a| 1.001 * a + 1e-9)), "the control");
+        assert!(off(areas(&cloud)), "{count}: {:?}", areas(&cloud));
+        assert!(!off(areas(&cloud).map(|a| 1.001 * a + 1e-9)), "the control");
         // At the voxels' midpoints the trilinear field has the same integral.
         let [nx, ny, nz] = cloud.bricks.map(|n| n * EDGE);
         let mut integral = [0.0; 2];

@@ -3,8 +3,8 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::Cloud;
-use crate::level_set::sunlight::between;
+use super::density::Cloud;
+use swell_domain::level_set::sunlight::between;
 
 /// Distance between the lattice's nodes, voxels, unless that gives too many nodes.
 const PITCH: f64 = 2.0;
@@ -15,20 +15,20 @@ const LOOK: f64 = 1.0;
 
 /// Optical depths towards a distant source, at nodes over a cloud's grid.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Shade {
+pub(super) struct Shade {
     /// Nodes along each axis; the first lies at the grid's least corner.
-    pub nodes: [u32; 3],
+    pub(super) nodes: [u32; 3],
     /// Distance between nodes, metres.
-    pub pitch: f64,
+    pub(super) pitch: f64,
     /// Optical depths, x fastest.
-    pub depths: Vec<f32>,
+    pub(super) depths: Vec<f32>,
 }
 
 impl Shade {
     /// Computes the depths for light from `towards`, a unit vector that points upward. Planes are
     /// swept downward, each one from the plane above, which blurs a shadow's edge by about one
     /// pitch per plane.
-    pub fn new(cloud: &Cloud, towards: DVec3) -> Self {
+    pub(super) fn new(cloud: &Cloud, towards: DVec3) -> Self {
         let size = cloud.size();
         let mut pitch = PITCH * cloud.voxel;
         let nodes_of = |pitch: f64| (size / pitch).ceil() + 1.0;

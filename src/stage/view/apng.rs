@@ -4,10 +4,10 @@ use std::io::Write;
 
 use png::{BitDepth, ColorType, EncodingError};
 
-use super::rgb::Rgb;
+use swell_study::rgb::Rgb;
 
 /// An animation that is being written; it loops forever.
-pub struct Apng<W: Write> {
+pub(super) struct Apng<W: Write> {
     writer: png::Writer<W>,
 }
 
@@ -16,7 +16,7 @@ impl<W: Write> Apng<W> {
     ///
     /// # Errors
     /// An error of the writer, or a side longer than PNG allows.
-    pub fn begin(
+    pub(super) fn begin(
         out: W,
         size: [usize; 2],
         count: usize,
@@ -40,7 +40,7 @@ impl<W: Write> Apng<W> {
     ///
     /// # Errors
     /// An error of the writer; a frame of another size, or more frames than announced.
-    pub fn push(&mut self, frame: &Rgb) -> Result<(), EncodingError> {
+    pub(super) fn push(&mut self, frame: &Rgb) -> Result<(), EncodingError> {
         self.writer.write_image_data(frame.pixels.as_flattened())
     }
 
@@ -48,7 +48,7 @@ impl<W: Write> Apng<W> {
     ///
     /// # Errors
     /// An error of the writer.
-    pub fn finish(self) -> Result<(), EncodingError> {
+    pub(super) fn finish(self) -> Result<(), EncodingError> {
         self.writer.finish()
     }
 }
