@@ -3,10 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use serde::{Serialize, Serializer};
-use ssimulacra2::{LinearRgb, compute_frame_ssimulacra2};
 
-use super::deviation::{Value, out_of_limits};
-use swell_domain::{statistics::percentile, tolerance::PictureLimits};
+use super::{
+    deviation::{Value, out_of_limits},
+    perceptual,
+};
+use swell_domain::{feature::MissingFeature, statistics::percentile, tolerance::PictureLimits};
 
 /// How the values of an image represent light.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -110,10 +112,13 @@ impl PicturesDiff {
 }
 
 /// Compares two images; b is the reference. `None` if sizes, corners or encodings differ.
-pub fn compare(a: &Picture, b: &Picture) -> Option<PictureDiff> {
+///
+/// # Errors
+/// [`MissingFeature`] without the feature `perceptual`.
+pub fn compare(a: &Picture, b: &Picture) -> Result<Option<PictureDiff>, MissingFeature> {
     let of = |it: &Picture| (it.width, it.height, it.corner, it.encoding);
     if of(a) != of(b) {
-        return None;
+        return Ok(None);
     }
     let errors = errors(a, b);
     let (mut max, mut max_at) = (0.0, None);
@@ -126,14 +131,14 @@ pub fn compare(a: &Picture, b: &Picture) -> Option<PictureDiff> {
         let pixels = picture.pixels.iter();
         pixels.map(|pixel| pixel.map(f32::to_bits)).collect()
     };
-    Some(PictureDiff {
+    Ok(Some(PictureDiff {
         mean: errors.iter().sum::<f64>() / errors.len().max(1) as f64,
         p99: percentile(errors, 0.99).unwrap_or(0.0),
         max,
         max_at,
-        perceptual: perceptual(a, b),
+        perceptual: perceptual::score(a, b)?,
         is_identical: bits(a) == bits(b),
-    })
+    }))
 }
 
 impl PictureDiff {
@@ -184,41 +189,6 @@ fn errors(a: &Picture, b: &Picture) -> Vec<f64> {
     a.pixels.iter().zip(&b.pixels).map(worst).collect()
 }
 
-fn perceptual(a: &Picture, b: &Picture) -> Option<f64> {
-    let light = |picture: &Picture| {
-        let pixels = picture
-            .pixels
-            .iter()
-            .map(|&pixel| light(pixel, picture.encoding));
-        LinearRgb::new(pixels.collect(), picture.width, picture.height).ok()
-    };
-    compute_frame_ssimulacra2(light(a)?, light(b)?).ok()
-}
-
-/// Linear light over black, clamped to 0 to 1; NaN becomes black.
-fn light([r, g, b, alpha]: [f32; 4], encoding: Encoding) -> [f32; 3] {
-    [r, g, b].map(|value| {
-        let linear = match encoding {
-            Encoding::Srgb => alpha * linear_from_srgb(value),
-            Encoding::Linear => value,
-        };
-        if linear.is_nan() {
-            0.0
-        } else {
-            linear.clamp(0.0, 1.0)
-        }
-    })
-}
-
-/// Transfer function of IEC 61966-2-1.
-fn linear_from_srgb(value: f32) -> f32 {
-    if value <= 0.04045 {
-        value / 12.92
-    } else {
-        ((value + 0.055) / 1.055).powf(2.4)
-    }
-}
-
 /// Returns |a − b| of red, green and blue times `gain` in 8 bits per channel, 255 where it is 1 or
 /// more or not finite. If only alpha differs, its difference goes into all three.
 pub fn difference_image(a: &Picture, b: &Picture, gain: f64) -> Vec<[u8; 3]> {
@@ -235,9 +205,13 @@ pub fn difference_image(a: &Picture, b: &Picture, gain: f64) -> Vec<[u8; 3]> {
     a.pixels.iter().zip(&b.pixels).map(pixel).collect()
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "perceptual"))]
 mod tests {
     use super::*;
+
+    fn compare(a: &Picture, b: &Picture) -> Option<PictureDiff> {
+        super::compare(a, b).expect("the feature is on")
+    }
 
     /// A shaded ball on a gradient.
     fn picture(encoding: Encoding) -> Picture {
@@ -341,25 +315,6 @@ mod tests {
         assert_eq!(image[5], [32, 0, 0]);
         assert_eq!(image[6], [0; 3]);
         assert_eq!(difference_image(&a, &b, 4.0)[5], [128, 0, 0]);
-    }
-
-    /// IEC 61966-2-1: half of the code value is 0.2140 of the light, and the linear segment meets
-    /// the curve.
-    #[test]
-    fn light_is_that_of_srgb() {
-        let one = |value: f32, alpha: f32| light([value, 0.0, 0.0, alpha], Encoding::Srgb)[0];
-        for (code, linear) in [(0.5, 0.214_041_14), (1.0, 1.0), (0.02, 0.02 / 12.92)] {
-            // Powers have an error of a few f32 roundings.
-            assert!((one(code, 1.0) - linear).abs() < 4.0 * f32::EPSILON * linear);
-        }
-        let edge: f32 = 0.04045;
-        let [below, above] = [edge, f32::from_bits(edge.to_bits() + 1)].map(linear_from_srgb);
-        assert!((below - above).abs() < 1e-7, "{below} {above}");
-        assert_eq!(one(0.5, 0.5), 0.5 * one(0.5, 1.0));
-        assert_eq!(
-            light([0.5, f32::NAN, 2.0, 0.5], Encoding::Linear),
-            [0.5, 0.0, 1.0]
-        );
     }
 
     #[test]

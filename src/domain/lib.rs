@@ -19,6 +19,7 @@ pub mod bvh;
 pub mod chunk;
 pub mod cloud;
 pub mod eye;
+pub mod feature;
 pub mod flip;
 pub mod frame_range;
 pub mod gauge;

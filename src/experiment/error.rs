@@ -113,7 +113,9 @@ impl From<&StudyError> for Blame {
             StudyError::Solid(error) => error.into(),
             StudyError::Gpu(error) => error.into(),
             StudyError::Solve(error) => error.into(),
-            StudyError::Point(_) | StudyError::NoShares(_) => Self::Input,
+            StudyError::Point(_)
+            | StudyError::NoShares(_)
+            | StudyError::Raster(RasterError::MissingFeature(_)) => Self::Input,
             StudyError::Stopped
             | StudyError::OtherStudy { .. }
             | StudyError::File { .. }

@@ -28,7 +28,13 @@ use std::{path::PathBuf, sync::atomic::AtomicBool};
 use swell_domain::chunk::Chunk;
 use swell_gpu::adapter;
 use swell_scene::study::Study;
-use swell_stage::{bake, device::Gpu, inspect::study::Outline, render};
+use swell_stage::{
+    bake,
+    device::Gpu,
+    inspect::study::Outline,
+    render::{self, gallery},
+};
+use swell_study::raster::{self, RasterError};
 
 use engine::{Bench, Kind, Work};
 
@@ -152,6 +158,21 @@ pub fn dealt(study: &Study, chunk: Chunk) -> Result<Vec<bool>, StudyError> {
     Ok(chunk.deal(&ranks))
 }
 
+/// Checks that this build can score and draw what a study asks for.
+fn require_features(request: &Request) -> Result<(), StudyError> {
+    let has_charts = match &request.study {
+        Study::SolverComparison(_) | Study::Stability(_) | Study::Validation(_) => false,
+        Study::Sweep(_) | Study::Surface(_) | Study::Tune(_) => request.chunk.is_none(),
+    };
+    if has_charts {
+        raster::require().map_err(RasterError::from)?;
+    }
+    match &request.study {
+        Study::Surface(study) if surface::is_scored(study) => Ok(gallery::require_scores()?),
+        _ => Ok(()),
+    }
+}
+
 /// Runs a study or a share of it, and keeps results that the folder already has. Reports progress
 /// through `tell`. Setting `stop` ends the study after the current frame; an unfinished point is
 /// run again next time.
@@ -167,6 +188,7 @@ pub fn study(
     if let Some(adapter) = &request.gpu.adapter {
         adapter::check_request(adapter)?;
     }
+    require_features(request)?;
     for warning in request.study.warnings() {
         tell(Event::Warning(warning));
     }

@@ -139,6 +139,11 @@ fn hashes(study: &SurfaceStudy, request: &Request) -> Result<String, StudyError>
     Ok(hashes.collect::<Result<Vec<_>, StudyError>>()?.join(" "))
 }
 
+/// Whether a study scores its pictures by finer rays.
+pub(super) fn is_scored(study: &SurfaceStudy) -> bool {
+    study.errors.contains(&PictureError::Colour)
+}
+
 /// State shared by all points.
 struct Room<'s, 'b> {
     study: &'s SurfaceStudy,
@@ -155,16 +160,12 @@ impl<'b> Room<'_, 'b> {
         let measured = format!(
             "surface {} {} {} {} {}",
             study.repeats,
-            self.is_scored(),
+            is_scored(study),
             self.frames,
             study.look.hash(),
             point.look.hash(),
         );
         bench.devices.key(&scene, study.frames.last(), &measured)
-    }
-
-    fn is_scored(&self) -> bool {
-        self.study.errors.contains(&PictureError::Colour)
     }
 
     fn measure(&mut self, bench: &Bench<'b>, point: &Point) -> Result<Run, StudyError> {
@@ -177,7 +178,7 @@ impl<'b> Room<'_, 'b> {
                     &cache(bench.request),
                     &study.look,
                     &study.frames,
-                    self.is_scored(),
+                    is_scored(study),
                 )?;
                 self.gallery.insert(opened)
             }

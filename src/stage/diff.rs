@@ -18,6 +18,7 @@ use swell_cache::{CacheError, CacheReader, Manifest};
 use swell_compare::baseline::Baseline;
 use swell_domain::{
     aggregates::Aggregates,
+    feature::MissingFeature,
     frame_range::FrameRange,
     particles::Particles,
     solver::StepReport,
@@ -127,6 +128,9 @@ pub enum DiffError {
     /// Arguments that cannot be combined.
     #[error("{0}")]
     Usage(String),
+    /// Pictures are compared, and the feature `perceptual` is off.
+    #[error(transparent)]
+    MissingFeature(#[from] MissingFeature),
 }
 
 impl DiffError {
@@ -146,7 +150,7 @@ impl DiffError {
 impl From<&DiffError> for Blame {
     fn from(error: &DiffError) -> Self {
         match error {
-            DiffError::Usage(_) => Self::Input,
+            DiffError::Usage(_) | DiffError::MissingFeature(_) => Self::Input,
             DiffError::Cache(_)
             | DiffError::Scene { .. }
             | DiffError::Picture(_)

@@ -27,6 +27,7 @@ use std::{
 use swell_cache::{CacheError, CacheReader};
 use swell_domain::{
     chunk::{Chunk, share},
+    feature::MissingFeature,
     frame_range::FrameRange,
     mesh_file::MeshError,
     particles::Particles,
@@ -203,6 +204,9 @@ pub enum RenderJobError {
         /// The cache that contains it.
         cache: PathBuf,
     },
+    /// Pictures are scored, and the feature `perceptual` is off.
+    #[error(transparent)]
+    MissingFeature(#[from] MissingFeature),
 }
 
 impl RenderJobError {
@@ -234,7 +238,8 @@ impl From<&RenderJobError> for Blame {
             )
             | RenderJobError::NoWater
             | RenderJobError::IsWhitewater(_)
-            | RenderJobError::IntoCache { .. } => Self::Input,
+            | RenderJobError::IntoCache { .. }
+            | RenderJobError::MissingFeature(_) => Self::Input,
             RenderJobError::Whitewater(_)
             | RenderJobError::Mesh(_)
             | RenderJobError::NoNeighbours(_) => Self::Files,

@@ -19,6 +19,7 @@ use std::{
 use swell_cache::CacheReader;
 use swell_domain::frame_range::FrameRange;
 use swell_scene::look::Look;
+use swell_study::raster::{self, RasterError};
 
 use self::{
     curves::Curves,
@@ -115,6 +116,9 @@ pub fn view(
         return Err(ViewError::Asked(
             "nothing to make: --sheet, --movie or --player".to_owned(),
         ));
+    }
+    if request.sheet.is_some() {
+        raster::require().map_err(RasterError::from)?;
     }
     if let [folder] = &request.subjects[..]
         && study::is_one(folder)

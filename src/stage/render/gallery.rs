@@ -17,7 +17,7 @@ use swell_check::{
     pictures::{score, shown},
     render::Surfaces,
 };
-use swell_compare::pictures::Picture;
+use swell_compare::{perceptual, pictures::Picture};
 use swell_domain::{eye::Eye, frame_range::FrameRange, particles::Particles};
 use swell_gpu::adapter::Context;
 use swell_reference::rays::Seen;
@@ -57,6 +57,14 @@ pub struct Drawn {
     /// SSIMULACRA 2 score against finer rays, mean over the frames; `None` if pictures are not
     /// scored.
     pub score: Option<f64>,
+}
+
+/// Checks that this build can score pictures.
+///
+/// # Errors
+/// [`RenderJobError::MissingFeature`].
+pub fn require_scores() -> Result<(), RenderJobError> {
+    Ok(perceptual::require()?)
 }
 
 impl<'a> Gallery<'a> {
@@ -121,7 +129,7 @@ impl<'a> Gallery<'a> {
                 *seconds += begun.elapsed().as_secs_f64();
             }
             if let Some(truth) = &frame.picture {
-                scores.extend(score(&shown(&image, &look.spec().view), truth));
+                scores.extend(score(&shown(&image, &look.spec().view), truth)?);
             }
             let surface = look.of_surface(look.spec().renderer.method);
             let mut renderer = frame.renderer(self.context, &surface)?;

@@ -15,7 +15,7 @@ use swell_check::{
     pictures::{Residual, score, shown},
     render::{Summary, Surfaces},
 };
-use swell_compare::pictures::Picture;
+use swell_compare::{perceptual, pictures::Picture};
 use swell_domain::{
     eye::Eye, frame_range::FrameRange, level_set::kernels::Kernels, particles::Particles,
 };
@@ -135,6 +135,9 @@ pub fn check_render(
     stop: &AtomicBool,
     tell: &mut dyn FnMut(Event),
 ) -> Result<Outcome, RenderJobError> {
+    if request.colour {
+        perceptual::require()?;
+    }
     let cache = CacheReader::open(&request.cache)?;
     let scene = baked_scene(&cache, &request.cache)?;
     let frames: Vec<u32> = match &request.frames {
@@ -315,7 +318,7 @@ impl<'a> Pictures<'a> {
         for ((_, method), found) in METHODS.iter().zip(&mut self.methods) {
             let all = draw(&still.of_water(*method))?;
             if *colour {
-                found.scores.extend(score(&all[middle], &truth[middle]));
+                found.scores.extend(score(&all[middle], &truth[middle])?);
             }
             if let (Some(residual), Some(moved)) = (residual(&all), &moved) {
                 found.flickers.push(residual.beyond(moved));

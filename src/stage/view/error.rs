@@ -97,9 +97,10 @@ impl ViewError {
 impl From<&ViewError> for Blame {
     fn from(error: &ViewError) -> Self {
         match error {
-            ViewError::Asked(_) | ViewError::IntoCache { .. } | ViewError::NoEncoder { .. } => {
-                Self::Input
-            }
+            ViewError::Asked(_)
+            | ViewError::IntoCache { .. }
+            | ViewError::NoEncoder { .. }
+            | ViewError::Sheet(RasterError::MissingFeature(_)) => Self::Input,
             ViewError::Missing(_)
             | ViewError::Picture(_)
             | ViewError::Cache(_)
