@@ -7,6 +7,7 @@ use swell_domain::keep::Keep;
 
 /// Errors of a cache.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum CacheError {
     /// The operating system refused an operation.
     #[error("{}", path.display())]

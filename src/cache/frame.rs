@@ -65,6 +65,7 @@ pub struct Stamp<'a> {
 
 /// Length and BLAKE3 of what was written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Written {
     /// Length in bytes.
     pub bytes: u64,

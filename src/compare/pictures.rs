@@ -39,6 +39,7 @@ pub struct Picture {
 /// Measures of the difference between two images. A pixel's error is the largest |a − b| of its
 /// channels, in the file's own values: 1 is 255 in a PNG, and scene-linear white in an EXR.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct PictureDiff {
     /// Mean error over the pixels.
     pub mean: f64,

@@ -13,6 +13,7 @@ use swell_study::{picture::PictureError, raster::RasterError};
 
 /// Reason why a study failed.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum StudyError {
     /// A signal ended the study; the same command resumes it.
     #[error("ended by a signal")]

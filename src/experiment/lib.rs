@@ -111,6 +111,7 @@ pub enum PointStatus {
 
 /// Outcome of a study.
 #[derive(Clone, Debug, Default)]
+#[non_exhaustive]
 pub struct Outcome {
     /// Path of the page; `None` for a share, and where a signal ended the study.
     pub page: Option<PathBuf>,
@@ -124,6 +125,7 @@ pub struct Outcome {
 
 /// Outcome of a share of a study.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Share {
     /// Number of points that were run.
     pub ran: usize,

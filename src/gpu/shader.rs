@@ -76,6 +76,7 @@ impl Composed {
 
 /// Error in a folder of edited shaders.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ShadersError {
     /// A file or folder cannot be read.
     #[error("--shaders: cannot read {}", file.display())]

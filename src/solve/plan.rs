@@ -90,6 +90,7 @@ pub struct PlannedBuffer {
 
 /// Buffers that a module declares, each once.
 #[derive(Clone, Debug, Default)]
+#[non_exhaustive]
 pub struct Table {
     rows: Vec<PlannedBuffer>,
 }

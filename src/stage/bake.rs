@@ -101,6 +101,7 @@ pub enum Event {
 
 /// Result of a bake that met no error.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Outcome {
     /// Last frame in the cache.
     pub last_frame: u32,
@@ -122,6 +123,7 @@ pub struct Outcome {
 
 /// Why a bake failed.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum BakeError {
     /// The scene or one of its meshes is invalid.
     #[error(transparent)]

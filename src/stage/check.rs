@@ -88,6 +88,7 @@ pub enum Event<'a> {
 
 /// Result of a check.
 #[derive(Clone, Debug, Default)]
+#[non_exhaustive]
 pub struct Outcome {
     /// All frames combined: for each row the value that deviates most.
     pub table: Table,
@@ -105,6 +106,7 @@ pub struct Outcome {
 
 /// Why a check could not be made.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum CheckError {
     /// Reading the cache failed.
     #[error(transparent)]

@@ -88,6 +88,7 @@ impl Outcome {
 
 /// Why two things could not be compared.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum DiffError {
     /// Reading a cache failed.
     #[error(transparent)]

@@ -157,6 +157,7 @@ pub enum Event {
 
 /// Result of an export.
 #[derive(Clone, Debug, Default)]
+#[non_exhaustive]
 pub struct Outcome {
     /// Number of files made by this run.
     pub made: usize,

@@ -34,6 +34,7 @@ pub use swell_cache::{
 
 /// An adapter of this machine.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Adapter {
     /// Index that `--adapter` accepts.
     pub index: usize,
@@ -99,6 +100,7 @@ pub fn adapters() -> Result<Vec<Adapter>, GpuError> {
 
 /// A scene's plan, and the limits that it was made for.
 #[derive(Debug)]
+#[non_exhaustive]
 pub struct ScenePlan {
     /// Passes and buffers.
     pub plan: Plan,
@@ -134,6 +136,7 @@ const COMMON_LIMITS: DeviceLimits = DeviceLimits {
 
 /// Why a scene could not be planned.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum PlanError {
     /// A solid without an inside, or too large a distance grid.
     #[error(transparent)]
@@ -211,6 +214,7 @@ pub fn cache(directory: &Path) -> Result<(Manifest, Vec<Entry>), CacheError> {
 
 /// Sizes of a cache on disk and on a device.
 #[derive(Debug)]
+#[non_exhaustive]
 pub struct CacheSizes {
     /// Bytes of all its files.
     pub bytes: u64,
@@ -227,6 +231,7 @@ pub struct CacheSizes {
 
 /// Why a cache's sizes could not be determined.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum SizesError {
     /// Reading the cache failed.
     #[error(transparent)]
@@ -336,6 +341,7 @@ fn folder_bytes(folder: &Path) -> Result<u64, SizesError> {
 
 /// Why a cache's probes could not be plotted.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum PlotError {
     /// Reading the cache failed.
     #[error(transparent)]

@@ -1,7 +1,6 @@
 //! `render`: turns a particle cache and a look into an image sequence. The cache is only read.
 //!
-//! Several processes may render one look of one cache into one folder; each frame is then rendered
-//! by one of them.
+//! Several processes may render one look of one cache into one folder, each frame by one of them.
 
 mod expected;
 mod folder;
@@ -27,7 +26,6 @@ use std::{
 use swell_cache::{CacheError, CacheReader};
 use swell_domain::{
     chunk::{Chunk, share},
-    feature::MissingFeature,
     frame_range::FrameRange,
     mesh_file::MeshError,
     particles::Particles,
@@ -140,6 +138,7 @@ pub enum Event {
 
 /// Result of a render.
 #[derive(Clone, Debug, Default)]
+#[non_exhaustive]
 pub struct Outcome {
     /// Number of frames rendered by this run.
     pub rendered: u32,
@@ -155,6 +154,7 @@ pub struct Outcome {
 
 /// Why a render failed.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum RenderJobError {
     /// Nothing was compared, which must not count as a success.
     #[error("nothing was compared: no water is seen in these frames")]
@@ -206,7 +206,7 @@ pub enum RenderJobError {
     },
     /// Pictures are scored, and the feature `perceptual` is off.
     #[error(transparent)]
-    MissingFeature(#[from] MissingFeature),
+    MissingFeature(#[from] swell_domain::feature::MissingFeature),
 }
 
 impl RenderJobError {
@@ -242,8 +242,8 @@ impl From<&RenderJobError> for Blame {
             | RenderJobError::MissingFeature(_) => Self::Input,
             RenderJobError::Whitewater(_)
             | RenderJobError::Mesh(_)
-            | RenderJobError::NoNeighbours(_) => Self::Files,
-            RenderJobError::Render(
+            | RenderJobError::NoNeighbours(_)
+            | RenderJobError::Render(
                 RenderError::NotFinite { .. }
                 | RenderError::Write { .. }
                 | RenderError::Format { .. },
@@ -577,8 +577,7 @@ impl Job<'_> {
         };
         let mut written = Ok(());
         let picture = renderer.render_parts(frame, &around.moment(&white), &mut |part| {
-            // Reports the previous frame as soon as it is on disk, not only after this frame is
-            // drawn.
+            // Reports the previous frame as soon as it is on disk, before this one is drawn.
             let is_there = self.writing.as_ref().is_some_and(Writing::is_finished);
             if is_there && written.is_ok() {
                 written = end_writing(&mut self.writing, outcome, tell);

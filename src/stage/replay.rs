@@ -394,6 +394,7 @@ pub(super) fn keep(
 
 /// Why a frame could not be recomputed.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ReplayError {
     /// Reading the folder or its cache failed.
     #[error(transparent)]

@@ -15,6 +15,7 @@ use super::{
 
 /// Measured times of frames.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Timed {
     /// Device that they ran on.
     pub device: Identity,
@@ -31,6 +32,7 @@ pub struct Timed {
 
 /// Why frames could not be timed.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum TimeError {
     /// A solid without an inside, or too large a distance grid.
     #[error(transparent)]

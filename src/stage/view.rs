@@ -94,6 +94,7 @@ pub enum Event {
 
 /// Result of a view.
 #[derive(Clone, Debug, Default)]
+#[non_exhaustive]
 pub struct Outcome {
     /// Kind, path and bytes of each file made.
     pub files: Vec<(&'static str, PathBuf, u64)>,

@@ -46,6 +46,7 @@ impl Room {
 
 /// Prediction of a bake.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Expected {
     /// First frame that would be computed.
     pub first: u32,

@@ -21,6 +21,7 @@ use swell_domain::frame_range::{FrameRange, ranges};
 
 /// Result of writing a baseline.
 #[derive(Clone, Debug, Serialize)]
+#[non_exhaustive]
 pub struct Written {
     /// The adapter whose hashes were stored.
     pub adapter: String,

@@ -11,6 +11,7 @@ use super::{FolderError, UsdcError};
 
 /// Why an export failed.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ExportError {
     /// Options that cannot be combined.
     #[error("{0}")]

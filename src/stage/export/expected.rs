@@ -6,6 +6,7 @@ use super::{Content, ExportError, Job, Request, Target, is_binary, share};
 
 /// Prediction of an export.
 #[derive(Clone, Debug, Default)]
+#[non_exhaustive]
 pub struct Expected {
     /// Frames of this process's share.
     pub frames: Vec<u32>,

@@ -51,6 +51,7 @@ struct Record {
 
 /// Why a file cannot be made.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum FolderError {
     /// A file or folder that cannot be read, written or locked.
     #[error("{}", file.display())]

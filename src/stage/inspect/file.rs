@@ -44,6 +44,7 @@ pub enum FileContents {
 
 /// Particles of one frame.
 #[derive(Debug)]
+#[non_exhaustive]
 pub struct FrameFile {
     /// Comments of its header: program, shot, frame, time, and the origin if the scene has one.
     pub comments: Vec<String>,
@@ -60,6 +61,7 @@ pub struct FrameFile {
 
 /// A mesh as a scene would load it, in the file's own frame and unit.
 #[derive(Debug)]
+#[non_exhaustive]
 pub struct MeshFile {
     /// Number of distinct vertices.
     pub vertices: usize,
@@ -73,6 +75,7 @@ pub struct MeshFile {
 
 /// A picture.
 #[derive(Debug)]
+#[non_exhaustive]
 pub struct PictureFile {
     /// `png` or `exr`.
     pub format: &'static str,
@@ -90,6 +93,7 @@ pub struct PictureFile {
 
 /// Why a file could not be described.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum FileError {
     /// The file cannot be read.
     #[error("cannot read {}", file.display())]

@@ -49,6 +49,7 @@ struct Framed {
 
 /// Result of drawing the frames with a look.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Drawn {
     /// Wall-clock seconds of each repeat for the pictures of all frames.
     pub seconds: Vec<f64>,

@@ -28,6 +28,7 @@ pub enum Subject {
 
 /// A look's plan, and the limits that it was made for.
 #[derive(Debug)]
+#[non_exhaustive]
 pub struct LookPlan {
     /// Name of each pass, and how often it runs.
     pub passes: Vec<(&'static str, Runs)>,

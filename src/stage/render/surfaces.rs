@@ -106,6 +106,7 @@ pub enum Event {
 
 /// Result of a check.
 #[derive(Clone, Debug, Default)]
+#[non_exhaustive]
 pub struct Outcome {
     /// One row per method.
     pub rows: Vec<Row>,

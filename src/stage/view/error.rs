@@ -10,6 +10,7 @@ use swell_study::raster::RasterError;
 
 /// Why a view failed.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ViewError {
     /// Options that cannot be combined, or nothing to show.
     #[error("{0}")]
