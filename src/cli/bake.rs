@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 use swell_domain::{frame_range::FrameRange, solver::StepReport};
 use swell_scene::{Method, Reach, Scene, SceneError};
 use swell_stage::{
-    bake::{Event, Request, Room, bake, expected},
+    bake::{DiskSpace, Event, Request, bake, expected},
     branch::BranchPoint,
 };
 
@@ -181,11 +181,11 @@ fn dry_run(request: &Request, progress: &Progress) -> Result<u8, Failure> {
         let (text, event) = warned(warning);
         progress.say(&text, event);
     }
-    warn_of_room(progress, found.room);
+    warn_of_disk(progress, found.disk);
     let told = DryRun {
         frames: (found.first..=found.last).collect(),
         standing: found.standing as usize,
-        bytes: Some(found.room.bytes),
+        bytes: Some(found.disk.bytes),
         place: output::path(&request.directory),
     };
     let particles = count(found.particles as u64, "particle");
@@ -196,33 +196,33 @@ fn dry_run(request: &Request, progress: &Progress) -> Result<u8, Failure> {
     let more = json!({
         "particles": found.particles, "removed": found.removed, "volume": found.volume.made,
         "volume_asked": found.volume.asked,
-        "disk_free": found.room.free,
+        "disk_free": found.disk.free,
     });
     told.tell(progress, &words, more);
     Ok(0)
 }
 
 /// Disk space that the frames will need, in words.
-fn taken(room: Room) -> String {
-    let compressed = if room.is_compressed {
+fn taken(disk: DiskSpace) -> String {
+    let compressed = if disk.is_compressed {
         " before compression"
     } else {
         ""
     };
-    format!("about {}{compressed}", size(room.bytes))
+    format!("about {}{compressed}", size(disk.bytes))
 }
 
 /// Warns if the disk cannot hold the frames.
-fn warn_of_room(progress: &Progress, room: Room) {
-    if let Some(free) = room.short_of() {
+fn warn_of_disk(progress: &Progress, disk: DiskSpace) {
+    if let Some(free) = disk.short_of() {
         progress.say(
             &format!(
                 "warning: the disk has {} free, but the frames will take {}; the bake ends when it \
                  is full, and --resume continues it",
                 size(free),
-                taken(room)
+                taken(disk)
             ),
-            json!({ "event": "warning", "what": "disk", "free": free, "bytes": room.bytes }),
+            json!({ "event": "warning", "what": "disk", "free": free, "bytes": disk.bytes }),
         );
     }
 }
@@ -237,7 +237,7 @@ pub(super) fn tell(progress: &Progress, event: Event) {
             boundary_samples,
             solver,
             bytes,
-            room,
+            disk,
             first,
             last,
             parent,
@@ -250,11 +250,11 @@ pub(super) fn tell(progress: &Progress, event: Event) {
                 let (text, event) = warned(warning);
                 progress.say(&text, event);
             }
-            warn_of_room(progress, room);
+            warn_of_disk(progress, disk);
             let span = if first > last {
                 "nothing left to bake".into()
             } else {
-                let disk = taken(room);
+                let disk = taken(disk);
                 format!("frames {first} to {last}, {disk} on the disk")
             };
             let memory = bytes.map_or(String::new(), |bytes| match bytes {
@@ -295,7 +295,7 @@ pub(super) fn tell(progress: &Progress, event: Event) {
                     "volume": volume.made, "volume_asked": volume.asked,
                     "boundary_samples": boundary_samples, "bytes": bytes.map(|(all, _)| all),
                     "list_bytes": bytes.map(|(_, lists)| lists), "first": first, "last": last,
-                    "frames": frames, "disk_bytes": room.bytes, "disk_free": room.free,
+                    "frames": frames, "disk_bytes": disk.bytes, "disk_free": disk.free,
                 }),
             );
         }

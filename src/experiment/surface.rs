@@ -71,7 +71,7 @@ impl Kind for SurfaceStudy {
     fn run(&self, bench: &mut Bench<'_>) -> Result<Option<Report>, StudyError> {
         let mut ledger = bench.ledger()?;
         baked(self, bench)?;
-        let mut room = Room {
+        let mut shared = Shared {
             study: self,
             gallery: None,
             frames: hashes(self, bench.request)?,
@@ -81,8 +81,8 @@ impl Kind for SurfaceStudy {
             let mut of_line = Vec::new();
             for point in &line.points {
                 let name = format!("{}, {} = {}", line.name, line.key, point.label);
-                let key = room.key(bench, point);
-                let measure = || room.measure(bench, point);
+                let key = shared.key(bench, point);
+                let measure = || shared.measure(bench, point);
                 if let Some((run, stood)) = bench.point(&mut ledger, &name, key, measure)? {
                     bench.told(name, status(&self.errors, &run, stood));
                     of_line.push(run);
@@ -145,7 +145,7 @@ pub(super) fn is_scored(study: &SurfaceStudy) -> bool {
 }
 
 /// State shared by all points.
-struct Room<'s, 'b> {
+struct Shared<'s, 'b> {
     study: &'s SurfaceStudy,
     /// Opened for the first point that is measured.
     gallery: Option<Gallery<'b>>,
@@ -153,7 +153,7 @@ struct Room<'s, 'b> {
     frames: String,
 }
 
-impl<'b> Room<'_, 'b> {
+impl<'b> Shared<'_, 'b> {
     fn key(&self, bench: &Bench<'_>, point: &Point) -> Key {
         let study = self.study;
         let scene = [(&study.scene, RunsOn::Gpu)];

@@ -9,7 +9,7 @@ use wgpu::{BindGroupLayout, Buffer, BufferUsages, ComputePipeline};
 
 use super::{
     adapter::{Context, GpuError, InjectedFault},
-    buffer::{Buf, Element, Held, Wanted, Windows},
+    buffer::{Buf, BufferLayout, Element, Readback, Windows},
     edited,
     operations::Counting,
     raster::RasterPass,
@@ -29,7 +29,7 @@ pub struct BufferSpec {
     /// Whether passes bind parts of it: it may then be larger than the binding limit.
     pub is_windowed: bool,
     /// Element layout.
-    pub element: Held,
+    pub element: BufferLayout,
 }
 
 impl BufferSpec {
@@ -237,7 +237,7 @@ impl Program {
     ///
     /// # Errors
     /// [`GpuError::Lost`].
-    pub fn download<W: Wanted>(&self, wanted: W) -> Result<W::Values, GpuError> {
+    pub fn download<W: Readback>(&self, wanted: W) -> Result<W::Values, GpuError> {
         let context = &self.context;
         let mut encoder = context.device.create_command_encoder(&Default::default());
         let spans = wanted.spans();

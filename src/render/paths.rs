@@ -8,7 +8,7 @@
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-use super::{moment::Ids, uniform};
+use super::{inputs::Ids, uniform};
 use swell_domain::particles::Particles;
 
 /// Path of a particle about its frame's instant: x(t) = x + v t + (square + cube t) t², in metres

@@ -7,7 +7,7 @@ use super::{
 };
 use swell_domain::{
     absorber::{AbsorberState, AbsorberStates, MOST},
-    absorption::{Absorption, Asked, MOST_GAIN, level_along},
+    absorption::{AbsorberParameters as Asked, Absorption, MOST_GAIN, level_along},
     bounds::Bounds,
     motion::Motion,
     particles::Particles,

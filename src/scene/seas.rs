@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 
 use super::{document::Document, error::SceneError, motion_spec::check_speed, words::shown};
 use swell_domain::motion::{
-    Asked, DEEPEST, MADSEN_LIMIT, Motion, Phases, Sea, Spectrum, wave_number,
+    DEEPEST, MADSEN_LIMIT, Motion, Phases, Sea, SeaParameters as Asked, Spectrum, wave_number,
 };
 
 /// Default of the shortest period over the peak period. What is left out has 1.5 % of the energy of

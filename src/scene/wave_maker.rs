@@ -16,7 +16,7 @@ use super::{
 };
 use swell_domain::{
     bounds::Bounds,
-    motion::{Asked, Motion, Phases},
+    motion::{Motion, Phases, SeaParameters as Asked},
 };
 
 type Result<T> = std::result::Result<T, SceneError>;

@@ -17,7 +17,7 @@ use super::{
 };
 use swell_domain::{
     bounds::Bounds,
-    motion::{Asked, Motion, Phases, RegularWaves, Spectrum},
+    motion::{Motion, Phases, RegularWaves, SeaParameters as Asked, Spectrum},
     probe::Rate,
 };
 

@@ -28,7 +28,7 @@ use super::{
     time::Share,
 };
 
-pub use self::expected::{Expected, Room, expected, shot_bytes};
+pub use self::expected::{DiskSpace, Expected, expected, shot_bytes};
 
 /// What to bake, where, and on which device.
 #[derive(Clone, Debug)]
@@ -70,7 +70,7 @@ pub enum Event {
         /// GPU memory in total and for neighbour lists, bytes; `None` on the CPU.
         bytes: Option<(u64, u64)>,
         /// Disk space that the frames will need, and that is free.
-        room: Room,
+        disk: DiskSpace,
         /// First frame that will be computed.
         first: u32,
         /// Last frame that will be computed.
@@ -258,7 +258,7 @@ pub fn bake(
         boundary_samples: start.boundary.sample_count(),
         solver: scene.solver.method.name(),
         bytes: drive.bytes(),
-        room: Room::of(request, &start.particles, first, last)?,
+        disk: DiskSpace::of(request, &start.particles, first, last)?,
         first,
         last,
         parent,

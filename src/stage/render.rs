@@ -576,7 +576,7 @@ impl Job<'_> {
             None => Particles::default(),
         };
         let mut written = Ok(());
-        let picture = renderer.render_parts(frame, &around.moment(&white), &mut |part| {
+        let picture = renderer.render_parts(frame, &around.inputs(&white), &mut |part| {
             // Reports the previous frame as soon as it is on disk, before this one is drawn.
             let is_there = self.writing.as_ref().is_some_and(Writing::is_finished);
             if is_there && written.is_ok() {

@@ -8,7 +8,7 @@ use crate::{
 };
 use swell_domain::bricks::CELLS;
 use swell_reference::poisson::multigrid::{
-    About, Brick, Levels, MOST_AIR, Rounding, above_offset, place,
+    Brick, Levels, MOST_AIR, Rounding, Surroundings, above_offset, place,
 };
 use swell_solve::{
     SolveError,
@@ -21,7 +21,7 @@ use super::{FlipState, rows::*};
 pub(super) const COMPARISONS: &[Comparison<FlipState>] = &[
     of_level("pressure/coarsen", coarsen),
     of_level("pressure/smooth_first", |state, io| {
-        smooth(state, io, &SMOOTHED_FIRST, About::Nothing)
+        smooth(state, io, &SMOOTHED_FIRST, Surroundings::Nothing)
     }),
     Comparison {
         is_due: |state, io| {
@@ -32,11 +32,11 @@ pub(super) const COMPARISONS: &[Comparison<FlipState>] = &[
             is_due(state, io)
         },
         ..comparison("pressure/smooth", NONE, |state, io| {
-            smooth(state, io, &SMOOTHED, About::Corrections)
+            smooth(state, io, &SMOOTHED, Surroundings::Corrections)
         })
     },
     of_level("pressure/smooth_corrected", |state, io| {
-        smooth(state, io, &SMOOTHED_CORRECTED, About::WithAbove)
+        smooth(state, io, &SMOOTHED_CORRECTED, Surroundings::WithAbove)
     }),
     of_level("pressure/restrict", restrict),
     of_level("pressure/solve_coarse", solve_coarse),
@@ -109,7 +109,12 @@ impl Cycle {
     }
 }
 
-fn smooth(state: &FlipState, io: &mut Io<'_>, entry: &'static Entry<1>, about: About) -> Outcome {
+fn smooth(
+    state: &FlipState,
+    io: &mut Io<'_>,
+    entry: &'static Entry<1>,
+    about: Surroundings,
+) -> Outcome {
     let cycle = Cycle::of(state, io)?;
     let (levels, blocks) = (&cycle.levels, cycle.blocks());
     let solved = each(0..blocks.len(), |k| {

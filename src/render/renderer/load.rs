@@ -11,7 +11,7 @@ use super::{
     taken::{Taken, cameras, frame_seconds, hidden, sort},
 };
 use crate::{
-    Moment, RenderError,
+    FrameInputs, RenderError,
     buffers::{
         AIRED, AIRED_GROUPS, BLOCK_GROUPS, BLOCKS, PAGES, PARTICLE_GROUPS, PARTICLES, PATHS,
         SHAPES, SPRAY_PARAMS,
@@ -48,11 +48,15 @@ pub(super) struct Loaded {
 
 impl Renderer {
     /// Uploads a frame's particles, relative to the domain's least corner.
-    pub(super) fn load(&mut self, frame: u32, moment: &Moment<'_>) -> Result<Loaded, RenderError> {
+    pub(super) fn load(
+        &mut self,
+        frame: u32,
+        inputs: &FrameInputs<'_>,
+    ) -> Result<Loaded, RenderError> {
         let Taken {
             mut packed,
             mut ways,
-        } = Taken::of(&self.look, &self.scene, frame, moment)?;
+        } = Taken::of(&self.look, &self.scene, frame, inputs)?;
         let is_ssfr = self.look.spec().renderer.method == MethodSpec::Ssfr;
         if is_ssfr && self.is_under_water(frame, &packed) {
             return Err(RenderError::UnderWater { frame });
@@ -74,10 +78,10 @@ impl Renderer {
                 &self.scene,
                 self.plan.radius,
                 water,
-                moment.white,
+                inputs.white,
             );
         }
-        self.load_spray(frame, moment);
+        self.load_spray(frame, inputs);
         if !self.program.has(PARTICLES.name()) {
             return Ok(Loaded::default());
         }
@@ -122,7 +126,7 @@ impl Renderer {
             self.program.upload(PATHS, 0, &packed);
         }
         let mut ahead = Vec::new();
-        if wants_motion && moment.beside()[1].is_some() {
+        if wants_motion && inputs.beside()[1].is_some() {
             let seconds = frame_seconds(&self.scene);
             for (particle, way) in packed.iter_mut().zip(&ways) {
                 particle.velocity = (way.way(seconds).as_vec3() / seconds).to_array();
@@ -207,7 +211,7 @@ impl Renderer {
     /// Uploads the range of the spray sums: depths up to the domain's farthest corner and speeds up
     /// to the largest, both with a margin for motion within a frame and rounded up to powers of
     /// two, so that rounding differs little between frames.
-    fn load_spray(&self, frame: u32, moment: &Moment<'_>) {
+    fn load_spray(&self, frame: u32, inputs: &FrameInputs<'_>) {
         if !draws_spray(&self.look) {
             return;
         }
@@ -218,7 +222,7 @@ impl Renderer {
             .abs()
             .max((eye - self.scene.domain.size()).abs())
             .length();
-        let fastest = (moment.water.particles.max_speed()).max(moment.white.max_speed());
+        let fastest = (inputs.water.particles.max_speed()).max(inputs.white.max_speed());
         let room = |x: f64| (1.25 * x + 1.0).log2().ceil().exp2() as f32;
         let params = SprayParams {
             density: spray_density(&self.look) as f32,

@@ -11,7 +11,7 @@ use super::{
     whitewater::Whitewater,
 };
 use crate::{
-    Moment, RenderError, RenderScene,
+    FrameInputs, RenderError, RenderScene,
     buffers::{BLOCKS, CLOUD_WORDS, LEVEL_VALUES, PARTICLES, WHITEWATER},
     in_frame::blocks_in_frame,
     plan::{Limits, Plan},
@@ -29,14 +29,14 @@ impl Plan {
         look: &Look,
         scene: &RenderScene,
         frame: u32,
-        moment: &Moment<'_>,
+        inputs: &FrameInputs<'_>,
         limits: &Limits,
     ) -> Result<Self, RenderError> {
         let mut plan = Self::new(look, scene, limits)?;
         let Taken {
             mut packed,
             mut ways,
-        } = Taken::of(look, scene, frame, moment)?;
+        } = Taken::of(look, scene, frame, inputs)?;
         if let Some(mut water) = RayWater::of(look, scene) {
             water.take(&packed, &ways);
             let values = water.level(0.0, scene).values.len();
@@ -44,12 +44,12 @@ impl Plan {
         }
         if let Some(mut cloud) = RayCloud::of(look, scene) {
             let water = (&packed[..], &ways[..]);
-            cloud.take(look, scene, plan.radius, water, moment.white);
+            cloud.take(look, scene, plan.radius, water, inputs.white);
             let (_, words) = cloud.grid(0.0, scene);
             plan.grow(CLOUD_WORDS.sized(room_of(words.len(), limits.storage)));
         }
         if let Some(whitewater) = Whitewater::of(look, scene) {
-            let drawn = whitewater.packed(scene, frame, moment.white)?;
+            let drawn = whitewater.packed(scene, frame, inputs.white)?;
             plan.grow(WHITEWATER.sized(room(drawn.len())));
         }
         if !plan.has(PARTICLES.name()) {

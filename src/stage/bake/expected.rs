@@ -12,7 +12,7 @@ use swell_scene::Scene;
 
 /// Disk space that the frames still to be baked will need, and that is free.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Room {
+pub struct DiskSpace {
     /// Bytes of the frames that will be computed and kept, each assumed as large as the start's. An
     /// underestimate if emitters add water.
     pub bytes: u64,
@@ -22,7 +22,7 @@ pub struct Room {
     pub free: Option<u64>,
 }
 
-impl Room {
+impl DiskSpace {
     /// Space for the frames `first` to `last` of the request's cache, given the particles at its
     /// start.
     pub(super) fn of(
@@ -61,7 +61,7 @@ pub struct Expected {
     /// Volume of water at the start.
     pub volume: Volume,
     /// Disk space that the frames would need, and that is free.
-    pub room: Room,
+    pub disk: DiskSpace,
     /// The frame of another cache that a new bake would begin from, if it does.
     pub parent: Option<Parent>,
     /// Warnings about the scene and its beginning, a sentence each.
@@ -101,14 +101,14 @@ pub fn expected(request: &Request) -> Result<Expected, BakeError> {
         (clock.frame + 1, 0)
     };
     check_first(request, first)?;
-    let room = Room::of(request, &start.particles, first, last)?;
+    let disk = DiskSpace::of(request, &start.particles, first, last)?;
     Ok(Expected {
         first,
         last,
         standing,
         particles: start.particles.len(),
         removed: start.removed,
-        room,
+        disk,
         parent,
         volume: start.volume(scene),
         warnings: [start.warnings(scene), notes].concat(),

@@ -20,7 +20,7 @@ use swell_check::{
 use swell_compare::{perceptual, pictures::Picture};
 use swell_domain::{eye::Eye, frame_range::FrameRange, particles::Particles};
 use swell_gpu::adapter::Context;
-use swell_reference::rays::Seen;
+use swell_reference::rays::RayHit;
 use swell_render::{RenderScene, Renderer, eye};
 use swell_scene::{
     Scene,
@@ -42,7 +42,7 @@ struct Framed {
     set: RenderScene,
     around: Around,
     eye: Eye,
-    seen: Vec<Seen>,
+    seen: Vec<RayHit>,
     /// Picture by finer rays; `None` if pictures are not scored.
     picture: Option<Picture>,
 }
@@ -121,12 +121,12 @@ impl<'a> Gallery<'a> {
         for frame in &self.frames {
             let picture = look.of_water(look.spec().renderer.method);
             let mut renderer = frame.renderer(self.context, &picture)?;
-            let moment = frame.around.moment(&white);
-            let image = renderer.render_moment(frame.number, &moment)?;
+            let inputs = frame.around.inputs(&white);
+            let image = renderer.render_inputs(frame.number, &inputs)?;
             for seconds in &mut drawn.seconds {
                 let around = frame.around.anew();
                 let begun = Instant::now();
-                renderer.render_moment(frame.number, &around.moment(&white))?;
+                renderer.render_inputs(frame.number, &around.inputs(&white))?;
                 *seconds += begun.elapsed().as_secs_f64();
             }
             if let Some(truth) = &frame.picture {

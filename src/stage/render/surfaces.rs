@@ -20,7 +20,7 @@ use swell_domain::{
     eye::Eye, frame_range::FrameRange, level_set::kernels::Kernels, particles::Particles,
 };
 use swell_gpu::adapter::{Context, Needs};
-use swell_reference::rays::{Seen, cast};
+use swell_reference::rays::{RayHit, cast};
 use swell_render::{RenderError, RenderScene, Renderer, eye, opaque};
 use swell_scene::look::{Look, MethodSpec};
 
@@ -257,7 +257,7 @@ impl Set<'_> {
         let set = render_scene(self.scene, look, frame, &around.water.particles)?;
         let mut renderer =
             Renderer::new(self.context, look, &set).map_err(|error| told(error, look))?;
-        let image = renderer.render_moment(frame, &around.moment(&Particles::default()))?;
+        let image = renderer.render_inputs(frame, &around.inputs(&Particles::default()))?;
         Ok(shown(&image, &look.spec().view))
     }
 }
@@ -336,7 +336,7 @@ pub(super) fn truth(
     set: &RenderScene,
     frame: u32,
     water: &Particles,
-) -> Result<(Vec<Seen>, usize), RenderError> {
+) -> Result<(Vec<RayHit>, usize), RenderError> {
     let (corner, size) = (set.domain.min, set.domain.size());
     let places: Vec<DVec3> = water
         .position

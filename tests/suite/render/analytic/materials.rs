@@ -8,7 +8,7 @@ use swell::domain::mesh_file::{MeshFormat, parts::Parts};
 use swell::domain::particles::Particles;
 use swell::domain::pose::Pose;
 use swell::gpu::adapter::Context;
-use swell::render::{Image, Moment, RenderError, RenderScene, Renderer, SolidParts, Water};
+use swell::render::{FrameInputs, Image, RenderError, RenderScene, Renderer, SolidParts, Water};
 use swell::scene::look::Look;
 
 use super::support::{Eye, Setup, context, scene, spoiled, uniform_sky, write_sky};
@@ -170,7 +170,7 @@ impl Shown<'_> {
             .map_err(|error| Box::new((error, look.clone())))?;
         let (water, white) = (Water::new(Particles::default()), Particles::default());
         Ok(renderer
-            .render_moment(1, &Moment::alone(&water, &white))
+            .render_inputs(1, &FrameInputs::alone(&water, &white))
             .unwrap())
     }
 
