@@ -2,8 +2,6 @@
 
 use swell_domain::feature::MissingFeature;
 
-use super::pictures::Picture;
-
 /// Fails, because this build cannot score pictures.
 ///
 /// # Errors
@@ -15,7 +13,11 @@ pub fn require() -> Result<(), MissingFeature> {
     })
 }
 
-pub(super) fn score(_a: &Picture, _b: &Picture) -> Result<Option<f64>, MissingFeature> {
+pub(super) fn score(
+    _a: Vec<[f32; 3]>,
+    _b: Vec<[f32; 3]>,
+    _size: [usize; 2],
+) -> Result<Option<f64>, MissingFeature> {
     require().map(|()| None)
 }
 

@@ -132,12 +132,18 @@ pub fn compare(a: &Picture, b: &Picture) -> Result<Option<PictureDiff>, MissingF
         let pixels = picture.pixels.iter();
         pixels.map(|pixel| pixel.map(f32::to_bits)).collect()
     };
+    let light_of = |picture: &Picture| {
+        let pixels = picture.pixels.iter();
+        pixels
+            .map(|&pixel| light(pixel, picture.encoding))
+            .collect()
+    };
     Ok(Some(PictureDiff {
         mean: errors.iter().sum::<f64>() / errors.len().max(1) as f64,
         p99: percentile(errors, 0.99).unwrap_or(0.0),
         max,
         max_at,
-        perceptual: perceptual::score(a, b)?,
+        perceptual: perceptual::score(light_of(a), light_of(b), [a.width, a.height])?,
         is_identical: bits(a) == bits(b),
     }))
 }
@@ -188,6 +194,30 @@ fn errors(a: &Picture, b: &Picture) -> Vec<f64> {
         channels.fold(0.0, f64::max)
     };
     a.pixels.iter().zip(&b.pixels).map(worst).collect()
+}
+
+/// Linear light over black, clamped to 0 to 1; NaN becomes black.
+fn light([r, g, b, alpha]: [f32; 4], encoding: Encoding) -> [f32; 3] {
+    [r, g, b].map(|value| {
+        let linear = match encoding {
+            Encoding::Srgb => alpha * linear_from_srgb(value),
+            Encoding::Linear => value,
+        };
+        if linear.is_nan() {
+            0.0
+        } else {
+            linear.clamp(0.0, 1.0)
+        }
+    })
+}
+
+/// Transfer function of IEC 61966-2-1.
+fn linear_from_srgb(value: f32) -> f32 {
+    if value <= 0.04045 {
+        value / 12.92
+    } else {
+        ((value + 0.055) / 1.055).powf(2.4)
+    }
 }
 
 /// Returns |a − b| of red, green and blue times `gain` in 8 bits per channel, 255 where it is 1 or
@@ -316,6 +346,25 @@ mod tests {
         assert_eq!(image[5], [32, 0, 0]);
         assert_eq!(image[6], [0; 3]);
         assert_eq!(difference_image(&a, &b, 4.0)[5], [128, 0, 0]);
+    }
+
+    /// IEC 61966-2-1: half of the code value is 0.2140 of the light, and the linear segment meets
+    /// the curve.
+    #[test]
+    fn light_is_that_of_srgb() {
+        let one = |value: f32, alpha: f32| light([value, 0.0, 0.0, alpha], Encoding::Srgb)[0];
+        for (code, linear) in [(0.5, 0.214_041_14), (1.0, 1.0), (0.02, 0.02 / 12.92)] {
+            // Powers have an error of a few f32 roundings.
+            assert!((one(code, 1.0) - linear).abs() < 4.0 * f32::EPSILON * linear);
+        }
+        let edge: f32 = 0.04045;
+        let [below, above] = [edge, f32::from_bits(edge.to_bits() + 1)].map(linear_from_srgb);
+        assert!((below - above).abs() < 1e-7, "{below} {above}");
+        assert_eq!(one(0.5, 0.5), 0.5 * one(0.5, 1.0));
+        assert_eq!(
+            light([0.5, f32::NAN, 2.0, 0.5], Encoding::Linear),
+            [0.5, 0.0, 1.0]
+        );
     }
 
     #[test]
