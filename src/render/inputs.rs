@@ -49,7 +49,7 @@ pub struct FrameInputs<'a> {
 }
 
 impl<'a> FrameInputs<'a> {
-    /// Creates a moment without neighbouring frames.
+    /// Inputs without neighbouring frames.
     pub fn alone(water: &'a Water, white: &'a Particles) -> Self {
         Self {
             water,

@@ -290,7 +290,7 @@ fn has_place(page: &str, tool: &str) -> bool {
 }
 
 #[test]
-fn the_peers_tables_have_their_place() {
+fn performance_page_has_one_marker_for_the_peers_tables() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let page = fs::read_to_string(root.join("docs/performance.md")).unwrap();
     assert!(has_place(&page, "tools/bench peers"));

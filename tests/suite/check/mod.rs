@@ -536,7 +536,7 @@ fn work_of_moving_walls_is_within_tolerance_and_fails_where_it_should() {
 
 /// A fault that no longer matches its shader is an error, not a control that passes.
 #[test]
-fn a_fault_has_to_occur() {
+fn injected_fault_that_matches_no_shader_text_is_an_error() {
     let (scene, start) = case(Method::Pbf);
     let mut context = context();
     context.spoil = Some(InjectedFault {

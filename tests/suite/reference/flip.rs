@@ -381,7 +381,7 @@ fn the_gpu_follows_the_reference() {
 
 /// Negative controls: each row detects a reference with another input, changed by the amount below.
 #[test]
-fn every_row_sees_what_is_off() {
+fn each_row_sees_a_reference_with_changed_inputs() {
     let context = context();
     let unseen = RefCell::new(Vec::new());
     let look = |case: &Case, pair: &Pair, spoiled: &Trace, name: &str| {
@@ -459,7 +459,7 @@ fn every_row_sees_what_is_off() {
 
 /// Conjugate gradients, which whole frames use, and a sparse factor give the same result.
 #[test]
-fn a_factor_changes_nothing() {
+fn sparse_factor_and_conjugate_gradients_agree() {
     for case in [dam(), pocket()] {
         let iterated = trace(&case);
         let mut reference = Reference::new(&case.scene, &case.boundary);

@@ -136,7 +136,7 @@ fn boundary_of(mesh: &swell::domain::mesh::TriangleMesh, domain: &Bounds, d: f64
 /// per axis. The GPU's error is as pbf.rs derives, 2e-5 d where corrections are up to 0.1 d,
 /// and proportional to them.
 #[test]
-fn one_iteration_is_the_papers() {
+fn one_iteration_of_pbf_matches_the_papers_formulas() {
     let paper = Paper::new(D, 2.0);
     for (part, repulsion, relaxation, is_bounded) in [
         (0.98, 0.0, 1.0, false),

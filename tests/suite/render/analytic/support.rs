@@ -203,7 +203,7 @@ pub(crate) fn draw(
     draw_inputs(context, setup, sky, scene, &inputs, frame).unwrap()
 }
 
-/// Like [`draw`], for a moment with its neighbouring frames.
+/// Like [`draw`], with neighbouring frames.
 pub(crate) fn draw_inputs(
     context: &Context,
     setup: &Setup,
