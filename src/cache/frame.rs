@@ -332,7 +332,7 @@ fn read_head(head: &[u8]) -> Result<Head, String> {
         count,
         origin,
         names,
-        planes: planes::Content::told(&header.comments),
+        planes: planes::Content::from_comments(&header.comments),
     })
 }
 

@@ -154,9 +154,9 @@ fn kind_of(study: &Study) -> &dyn Kind {
 /// # Errors
 /// [`StudyError::NoShares`] if the study cannot be divided.
 pub fn dealt(study: &Study, chunk: Chunk) -> Result<Vec<bool>, StudyError> {
-    let places = kind_of(study).places();
-    let places = places.ok_or(StudyError::NoShares(Outline::of(study).kind))?;
-    let ranks: Vec<usize> = places.iter().map(|place| place.rank).collect();
+    let units = kind_of(study).work_units();
+    let units = units.ok_or(StudyError::NoShares(Outline::of(study).kind))?;
+    let ranks: Vec<usize> = units.iter().map(|unit| unit.rank).collect();
     Ok(chunk.deal(&ranks))
 }
 
@@ -199,7 +199,7 @@ pub fn study(
         None => (Work::Whole, kind.count()),
         Some(chunk) => {
             let is_ours = dealt(&request.study, chunk)?;
-            let places = kind.places().into_iter().flatten().zip(&is_ours);
+            let places = kind.work_units().into_iter().flatten().zip(&is_ours);
             let count = places.filter(|(_, is)| **is).map(|(place, _)| place.points);
             let count = count.sum();
             (Work::Share(chunk, is_ours), count)

@@ -22,7 +22,7 @@ use swell_stage::{
 
 use super::{
     Event, PointStatus, Request, StudyError,
-    engine::{Bench, Kind, Place},
+    engine::{Bench, Kind, WorkUnit},
     ledger::Key,
     report::Report,
 };
@@ -64,7 +64,7 @@ impl Kind for SurfaceStudy {
     }
 
     /// Returns `None`: all points draw frames of the same cache.
-    fn places(&self) -> Option<Vec<Place>> {
+    fn work_units(&self) -> Option<Vec<WorkUnit>> {
         None
     }
 
@@ -84,7 +84,7 @@ impl Kind for SurfaceStudy {
                 let key = shared.key(bench, point);
                 let measure = || shared.measure(bench, point);
                 if let Some((run, stood)) = bench.point(&mut ledger, &name, key, measure)? {
-                    bench.told(name, status(&self.errors, &run, stood));
+                    bench.report_point(name, status(&self.errors, &run, stood));
                     of_line.push(run);
                 }
             }

@@ -433,7 +433,7 @@ pub(super) fn shader(
 ) -> Result<Shader, GpuError> {
     let source = source(context, name, defines)?;
     let blamed = |error| context.shaders.blamed(error);
-    let place = |line| source.place(line);
+    let place = |line| source.location(line);
     let reflection = reflect_at(name, &source.text, &place).map_err(blamed)?;
     if let Some(shipped) = context.shaders.shipped_beside(name) {
         let known = reflect(name, &shipped.compose(name, defines)?)?;

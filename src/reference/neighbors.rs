@@ -218,7 +218,7 @@ impl Neighbors {
     /// within it; boundary samples closer than `h`.
     pub fn listed_within(crowd: &SortedPoints<'_>, h: f64) -> Self {
         let cells = &crowd.cells;
-        if !places::are_told(cells.dims.into_iter(), cells.period != Period::default()) {
+        if !places::can_pack(cells.dims.into_iter(), cells.period != Period::default()) {
             return Self::search(crowd, h);
         }
         let (fluid, solid) = crowd.points.split_at(crowd.particles);

@@ -1,6 +1,6 @@
 //! Screen-space fluid rendering: from particles to a picture.
 //!
-//! A frame is drawn from a [`FrameInputs`]: its particles and those of the frames around it. For each
+//! A frame is drawn from [`FrameInputs`]: its particles and those of the frames around it. For each
 //! sample of the picture, solids are rasterised; particles are splatted as spheres into eye-space
 //! depth and thickness, and blocks add the thickness of the water behind them; curvature flow or
 //! the narrow-range filter smooths the depth; normals are differences of the depth; and each pixel

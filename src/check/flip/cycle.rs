@@ -8,7 +8,7 @@ use crate::{
 };
 use swell_domain::bricks::CELLS;
 use swell_reference::poisson::multigrid::{
-    Brick, Levels, MOST_AIR, Rounding, Surroundings, above_offset, place,
+    Brick, Levels, MOST_AIR, Rounding, Surroundings, above_offset, block_index,
 };
 use swell_solve::{
     SolveError,
@@ -180,7 +180,7 @@ fn coarsen(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
             for axis in 0..3 {
                 let lower = (0..8).filter(|c| c >> axis & 1 == 0);
                 let fine = &levels.coefficient[axis];
-                let faces = lower.map(|c| f64::from(fine[place(slot, block, c)]));
+                let faces = lower.map(|c| f64::from(fine[block_index(slot, block, c)]));
                 let is_end = is_end(at, axis);
                 let exact = if is_end {
                     0.0
@@ -189,7 +189,7 @@ fn coarsen(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
                 };
                 shared.push(pair(at, fine[at], exact, [exact]));
             }
-            let air = (0..8).map(|c| levels.dirichlet[place(slot, block, c)]);
+            let air = (0..8).map(|c| levels.dirichlet[block_index(slot, block, c)]);
             let exact = 0.5 * air.map(|air| air.min(MOST_AIR)).sum::<f64>();
             airs.push(pair(at, levels.dirichlet[at], exact, [unit, exact]));
             let kind = kinds[(64 * slot + block) as usize] & 3;

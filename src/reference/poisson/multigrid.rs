@@ -88,7 +88,7 @@ struct Block {
 }
 
 /// Returns the index of cell `c` of a block.
-pub fn place(slot: u32, block: u32, c: usize) -> usize {
+pub fn block_index(slot: u32, block: u32, c: usize) -> usize {
     (CELLS * slot + block) as usize + 64 * c
 }
 
@@ -124,7 +124,7 @@ impl Levels {
     ) -> Option<[Expected; 8]> {
         let solution = (self.block(level, slot, block, about)).solution(rounding, rhs_error)?;
         Some(std::array::from_fn(|c| Expected {
-            place: place(slot, block, c),
+            place: block_index(slot, block, c),
             value: solution[c][0],
             error: solution[c][1],
         }))
@@ -145,7 +145,7 @@ impl Levels {
         let sum: f64 = found.inflow.iter().sum();
         // The magnitudes of the inflow only, without those of the residuals.
         let size: f64 = (0..8)
-            .map(|c| found.size[c] - self.residual[place(slot, block, c)].abs())
+            .map(|c| found.size[c] - self.residual[block_index(slot, block, c)].abs())
             .sum();
         [
             Expected {
@@ -221,7 +221,7 @@ impl Levels {
             inflow: [0.0; 8],
         };
         for c in 0..8 {
-            let own = place(slot, block, c);
+            let own = block_index(slot, block, c);
             found.matrix[c][c] += self.dirichlet[own];
             found.rhs[c] = self.residual[own];
             found.size[c] = found.rhs[c].abs();
@@ -233,7 +233,7 @@ impl Levels {
                     true => (slot, block),
                     false => self.beside(level, slot, block, axis, is_up),
                 };
-                let other = place(there, other_block, other_c);
+                let other = block_index(there, other_block, other_c);
                 let owner = if is_up { other } else { own };
                 let shared = f64::from(self.coefficient[axis][owner]);
                 found.matrix[c][c] += shared;

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::{
     Renderer,
-    build::room,
+    build::capacity_for,
     shade::draws_spray,
     splats::{Pages, ROWS, filled},
     taken::{Taken, cameras, frame_seconds, hidden, sort},
@@ -129,7 +129,7 @@ impl Renderer {
         if wants_motion && inputs.beside()[1].is_some() {
             let seconds = frame_seconds(&self.scene);
             for (particle, way) in packed.iter_mut().zip(&ways) {
-                particle.velocity = (way.way(seconds).as_vec3() / seconds).to_array();
+                particle.velocity = (way.displacement(seconds).as_vec3() / seconds).to_array();
             }
             ahead = packed;
         }
@@ -178,7 +178,7 @@ impl Renderer {
             return Ok(());
         }
         let groups = spread(&self.program.context, ROWS, blocks.len() as u64);
-        let room = room(blocks.len());
+        let room = capacity_for(blocks.len());
         if room > self.blocks {
             self.program.refit(&[BLOCKS.sized(room)], &[])?;
             self.blocks = room;
@@ -195,7 +195,7 @@ impl Renderer {
         if particles <= self.capacity {
             return Ok(());
         }
-        let capacity = room(particles);
+        let capacity = capacity_for(particles);
         let pages = Pages {
             capacity,
             ..self.pages()

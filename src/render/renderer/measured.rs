@@ -1,7 +1,7 @@
 //! Plan of a frame with known particles, without a device.
 
 use super::{
-    build::room,
+    build::capacity_for,
     cloud::{RayCloud, room_of},
     load::of_particles,
     setting,
@@ -50,7 +50,7 @@ impl Plan {
         }
         if let Some(whitewater) = Whitewater::of(look, scene) {
             let drawn = whitewater.packed(scene, frame, inputs.white)?;
-            plan.grow(WHITEWATER.sized(room(drawn.len())));
+            plan.grow(WHITEWATER.sized(capacity_for(drawn.len())));
         }
         if !plan.has(PARTICLES.name()) {
             return Ok(plan);
@@ -64,12 +64,12 @@ impl Plan {
             &mut packed,
             &mut ways,
         );
-        for buffer in of_particles(look, Pages::new(room(seen), limits.storage)) {
+        for buffer in of_particles(look, Pages::new(capacity_for(seen), limits.storage)) {
             plan.grow(buffer);
         }
         if let Some(hidden) = hidden {
             let blocks = blocks_in_frame(hidden.blocks, &cameras);
-            plan.grow(BLOCKS.sized(room(blocks.len())));
+            plan.grow(BLOCKS.sized(capacity_for(blocks.len())));
         }
         Ok(plan)
     }

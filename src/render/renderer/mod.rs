@@ -24,7 +24,7 @@ use super::image::{Image, View};
 use super::plan::{Limits, Plan};
 use super::samples::samples_of;
 use super::{FrameInputs, RenderError, RenderScene, Water, sea::Sea, uniform};
-use build::room;
+use build::capacity_for;
 use cloud::RayCloud;
 pub use parts::Part;
 use parts::Parts;
@@ -118,8 +118,8 @@ impl Renderer {
             is_slow: true,
             plan,
             program,
-            capacity: room(0),
-            blocks: room(0),
+            capacity: capacity_for(0),
+            blocks: capacity_for(0),
             water: RayWater::of(look, scene),
             cloud: RayCloud::of(look, scene),
             caustics: Caustics::of(look, scene),

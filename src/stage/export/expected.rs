@@ -34,7 +34,7 @@ pub fn expected(request: &Request) -> Result<Expected, ExportError> {
         ..Expected::default()
     };
     for (wanted, bytes) in shots {
-        if request.overwrite || !wanted.stands() {
+        if request.overwrite || !wanted.is_complete() {
             let size = (!is_binary(&wanted.file)).then_some(bytes.len() as u64);
             found.add(size);
         }
@@ -44,7 +44,7 @@ pub fn expected(request: &Request) -> Result<Expected, ExportError> {
         let content = Content::new(&job, frame);
         let mut stands = true;
         for (index, (target, wanted)) in job.files(frame)?.into_iter().enumerate() {
-            if !request.overwrite && wanted.stands() {
+            if !request.overwrite && wanted.is_complete() {
                 continue;
             }
             stands = false;

@@ -15,8 +15,8 @@ pub(super) struct Near(BTreeMap<u32, Arc<Water>>);
 /// A frame with those around it.
 pub(super) struct Around {
     pub(super) water: Arc<Water>,
-    /// In the order of [`FrameInputs::around`]; `None` if the cache does not have the frame or the look
-    /// does not use it.
+    /// In the order of [`FrameInputs::around`]; `None` if the cache does not have the frame or the
+    /// look does not use it.
     others: [Option<Arc<Water>>; 2 * REACH as usize],
 }
 

@@ -277,7 +277,7 @@ fn grid_vorticity_and_its_confinement_are_fedkiws() {
     let turning: Vec<DVec3> = (0..elements)
         .map(|e| DVec3::new(face(e, 0), face(e, 1), face(e, 2)))
         .collect();
-    let curl = grid_curl(model, &trace.bricks, &trace.room, &turning);
+    let curl = grid_curl(model, &trace.bricks, &trace.space, &turning);
     let at = |x: i64, y: i64, z: i64| trace.bricks.element([x, y, z]) as usize;
     for place in [at(5, 5, 5), at(1, 8, 6), at(6, 6, 1)] {
         assert!(
@@ -295,7 +295,7 @@ fn grid_vorticity_and_its_confinement_are_fedkiws() {
         model,
         &step,
         &trace.bricks,
-        &trace.room,
+        &trace.space,
         0.7,
         &rising,
         &turning,
