@@ -17,9 +17,11 @@ fn main() {
     for name in SOURCES {
         println!("cargo::rerun-if-changed={name}");
     }
-    let features: Vec<String> = env::vars()
+    let mut features: Vec<String> = env::vars()
         .filter_map(|(name, _)| Some(name.strip_prefix("CARGO_FEATURE_")?.to_lowercase()))
+        .filter(|name| name != "default")
         .collect();
+    features.sort();
     let told = |name: &str| env::var(name).unwrap_or_else(|_| "unknown".to_owned());
     let features = match features.is_empty() {
         true => "none".to_owned(),

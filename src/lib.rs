@@ -74,6 +74,15 @@
 //!   motion.
 //! - Terminal: [`cli`] parses arguments and prints results.
 //!
+//! # Features
+//!
+//! Both are on by default. Without one, what needs it fails with
+//! [`MissingFeature`](domain::feature::MissingFeature).
+//!
+//! - `charts`: charts of studies and contact sheets as PNG ([`study::raster`]), by resvg.
+//! - `perceptual`: the SSIMULACRA 2 score of pictures ([`compare::perceptual`]), which comparisons
+//!   of renders and checks of colour contain.
+//!
 //! # Units and axes
 //!
 //! All quantities are in SI units; looks also use degrees, millimetres on film, and stops. Axes are

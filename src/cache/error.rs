@@ -6,6 +6,7 @@ use swell_domain::{keep::Keep, output::FileError};
 
 /// Errors of a cache.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum CacheError {
     /// The operating system refused an operation.
     #[error(transparent)]

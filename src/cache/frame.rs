@@ -65,6 +65,7 @@ pub struct Stamp<'a> {
 
 /// Length and BLAKE3 of what was written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Written {
     /// Length in bytes.
     pub bytes: u64,
@@ -331,7 +332,7 @@ fn read_head(head: &[u8]) -> Result<Head, String> {
         count,
         origin,
         names,
-        planes: planes::Content::told(&header.comments),
+        planes: planes::Content::from_comments(&header.comments),
     })
 }
 

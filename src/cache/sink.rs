@@ -27,6 +27,7 @@ use swell_domain::{
 
 /// Counts of what one writer did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Summary {
     /// Frames written by this writer.
     pub frames: u32,

@@ -9,7 +9,7 @@ use glam::{DVec3, Vec3};
 
 use swell_gpu::{
     buffer::{Buf, Windows},
-    recording::Moment,
+    recording::TracePoint,
 };
 use swell_scene::flip::Precision;
 use swell_solve::{
@@ -210,7 +210,7 @@ impl<S: State> Engine<S> {
 
     /// Handles a dispatch, before and after it runs.
     pub(super) fn observe(&mut self, traced: Traced<'_>) -> Result<(), SolveError> {
-        if traced.moment == Moment::Before {
+        if traced.point == TracePoint::Before {
             (self.last, self.now) = (self.now, traced.pass);
             if !self.ran.contains(&traced.pass) {
                 self.ran.push(traced.pass);
@@ -222,7 +222,7 @@ impl<S: State> Engine<S> {
         let Some(reference) = reference else {
             return Ok(());
         };
-        if traced.moment == Moment::Before {
+        if traced.point == TracePoint::Before {
             self.kept.clear();
             for variable in (reference.keeps)() {
                 let buffer = traced.buffer(&variable).to_owned();

@@ -3,6 +3,7 @@
 //! All pictures are compared as a screen shows them, through the look's view transform.
 
 use swell_compare::pictures::{Encoding, Picture, compare};
+use swell_domain::feature::MissingFeature;
 use swell_render::{Image, view};
 use swell_scene::look::ViewSpec;
 
@@ -24,8 +25,11 @@ pub fn shown(image: &Image, spec: &ViewSpec) -> Picture {
 /// Returns the SSIMULACRA 2 score (Sneyers 2022) of a picture against its ground truth: 100 is
 /// identical, 90 visually lossless, 70 small differences, below 30 bad. `None` if a side is shorter
 /// than 8 pixels.
-pub fn score(picture: &Picture, truth: &Picture) -> Option<f64> {
-    compare(picture, truth)?.perceptual
+///
+/// # Errors
+/// [`MissingFeature`] without the feature `perceptual`.
+pub fn score(picture: &Picture, truth: &Picture) -> Result<Option<f64>, MissingFeature> {
+    Ok(compare(picture, truth)?.and_then(|diff| diff.perceptual))
 }
 
 /// Deviation of the middle one of three consecutive frames from the mean of its neighbours, per
@@ -116,10 +120,11 @@ mod tests {
     }
 
     /// A picture shifted by two pixels has a lower score, by four an even lower one.
+    #[cfg(feature = "perceptual")]
     #[test]
     fn a_shifted_picture_has_a_lower_score() {
         let truth = frame(0.0, 0.1, 1);
-        let scores = [0.0, 2.0, 4.0].map(|way| score(&frame(way, 0.1, 1), &truth));
+        let scores = [0.0, 2.0, 4.0].map(|way| score(&frame(way, 0.1, 1), &truth).unwrap());
         assert_eq!(scores[0], Some(100.0));
         assert!(scores[0] > scores[1] && scores[1] > scores[2], "{scores:?}");
         assert!(scores[2].is_some());

@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::edges::{Outline, Outlined, Outlines};
 use swell_domain::eye::Eye;
-use swell_reference::rays::Seen;
+use swell_reference::rays::RayHit;
 use swell_render::Image;
 
 /// Water closer than this many spacings, plus this fraction of its depth, in front of an opaque
@@ -46,7 +46,7 @@ impl Surfaces {
     /// Adds a picture with depth and normals as seen by `eye`, with particles of `spacing` metres.
     ///
     /// # Panics Panics if the picture lacks these channels.
-    pub fn add(&mut self, image: &Image, truth: &[Seen], eye: &Eye, spacing: f64) {
+    pub fn add(&mut self, image: &Image, truth: &[RayHit], eye: &Eye, spacing: f64) {
         let z = image.aovs.z.as_ref().expect("a depth");
         let n = image.aovs.n.as_ref().expect("normals");
         let outline = || Outlined {

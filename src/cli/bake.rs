@@ -13,7 +13,7 @@ use swell_domain::{frame_range::FrameRange, solver::StepReport};
 use swell_files::Reach;
 use swell_scene::{Method, Scene, SceneError};
 use swell_stage::{
-    bake::{self, BakePlan, Event, Request, Room},
+    bake::{self, BakePlan, DiskSpace, Event, Request},
     branch::BranchPoint,
 };
 
@@ -178,16 +178,16 @@ pub(super) fn run(args: &BakeArgs, progress: &Progress) -> Result<u8, Failure> {
 }
 
 fn dry_run(directory: &Path, plan: &BakePlan<'_>, progress: &Progress) -> Result<u8, Failure> {
-    let room = Room::of(directory, plan, plan.first)?;
+    let disk = DiskSpace::of(directory, plan, plan.first)?;
     for warning in plan.warnings.iter().chain(&plan.notes) {
         let (text, event) = warned(warning);
         progress.say(&text, event);
     }
-    warn_of_room(progress, room);
+    warn_of_disk(progress, disk);
     let told = DryRun {
         frames: (plan.first..=plan.last).collect(),
         standing: plan.standing as usize,
-        bytes: Some(room.bytes),
+        bytes: Some(disk.bytes),
         place: output::path(directory),
     };
     let (start, volume) = (&plan.start, plan.volume());
@@ -196,33 +196,33 @@ fn dry_run(directory: &Path, plan: &BakePlan<'_>, progress: &Progress) -> Result
     let more = json!({
         "particles": start.particles.len(), "removed": start.removed, "volume": volume.made,
         "volume_asked": volume.asked,
-        "disk_free": room.free,
+        "disk_free": disk.free,
     });
     told.tell(progress, &words, more);
     Ok(0)
 }
 
 /// Disk space that the frames will need, in words.
-fn taken(room: Room) -> String {
-    let compressed = if room.is_compressed {
+fn taken(disk: DiskSpace) -> String {
+    let compressed = if disk.is_compressed {
         " before compression"
     } else {
         ""
     };
-    format!("about {}{compressed}", size(room.bytes))
+    format!("about {}{compressed}", size(disk.bytes))
 }
 
 /// Warns if the disk cannot hold the frames.
-fn warn_of_room(progress: &Progress, room: Room) {
-    if let Some(free) = room.short_of() {
+fn warn_of_disk(progress: &Progress, disk: DiskSpace) {
+    if let Some(free) = disk.short_of() {
         progress.say(
             &format!(
                 "warning: the disk has {} free, but the frames will take {}; the bake ends when it \
                  is full, and --resume continues it",
                 size(free),
-                taken(room)
+                taken(disk)
             ),
-            json!({ "event": "warning", "what": "disk", "free": free, "bytes": room.bytes }),
+            json!({ "event": "warning", "what": "disk", "free": free, "bytes": disk.bytes }),
         );
     }
 }
@@ -237,7 +237,7 @@ pub(super) fn tell(progress: &Progress, event: Event) {
             boundary_samples,
             solver,
             bytes,
-            room,
+            disk,
             first,
             last,
             parent,
@@ -250,11 +250,11 @@ pub(super) fn tell(progress: &Progress, event: Event) {
                 let (text, event) = warned(warning);
                 progress.say(&text, event);
             }
-            warn_of_room(progress, room);
+            warn_of_disk(progress, disk);
             let span = if first > last {
                 "nothing left to bake".into()
             } else {
-                let disk = taken(room);
+                let disk = taken(disk);
                 format!("frames {first} to {last}, {disk} on the disk")
             };
             let memory = bytes.map_or(String::new(), |bytes| match bytes {
@@ -295,7 +295,7 @@ pub(super) fn tell(progress: &Progress, event: Event) {
                     "volume": volume.made, "volume_asked": volume.asked,
                     "boundary_samples": boundary_samples, "bytes": bytes.map(|(all, _)| all),
                     "list_bytes": bytes.map(|(_, lists)| lists), "first": first, "last": last,
-                    "frames": frames, "disk_bytes": room.bytes, "disk_free": room.free,
+                    "frames": frames, "disk_bytes": disk.bytes, "disk_free": disk.free,
                 }),
             );
         }

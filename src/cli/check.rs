@@ -5,7 +5,7 @@ use std::{collections::BTreeMap, fmt::Write as _, path::PathBuf};
 use clap::Args;
 use serde_json::json;
 
-use swell_domain::{frame_range::FrameRange, substep::Which};
+use swell_domain::{frame_range::FrameRange, substep::SubstepChoice};
 use swell_scene::Method;
 use swell_stage::{
     check::{Event, FirstOver, Outcome, Request, Row, Source, Table, check},
@@ -33,7 +33,7 @@ pub(super) struct CheckArgs {
     /// before it run, and are not compared. With 1, the default, a frame of a cache is itself what
     /// the passes read.
     #[arg(long, value_name = "N|last")]
-    substep: Option<Which>,
+    substep: Option<SubstepChoice>,
     /// Of a scene: which solver, pbf or flip.
     #[arg(long, value_name = "SOLVER", value_parser = bake::method)]
     solver: Option<Method>,

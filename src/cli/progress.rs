@@ -20,7 +20,7 @@ use serde_json::{Map, Value, json};
 pub(super) use self::recurring::Recurring;
 use self::{
     recurring::Recurrences,
-    within::{Told, Within},
+    within::{Notice, Within},
 };
 use super::output;
 
@@ -113,7 +113,7 @@ impl Job {
     /// The same estimate during a frame with the progress `told`: the rest of it, plus the frames
     /// after it, each as long as the recent ones, or else as this one. `None` before its first
     /// part, and before there are frames.
-    fn seconds_left_within(&self, told: &Told) -> Option<f64> {
+    fn seconds_left_within(&self, told: &Notice) -> Option<f64> {
         let left = told.left?.as_secs_f64();
         let after = self.frames.checked_sub(self.seen + 1)?;
         let own = told.elapsed.as_secs_f64() + left;
@@ -456,7 +456,7 @@ mod tests {
         // The eight most recent took 2 s each, and ten are left.
         assert_eq!(job.seconds_left(), Some(20.0));
         // During the next frame, half of which is drawn in 3 s, with nine more after it.
-        let told = |left| Told {
+        let told = |left| Notice {
             line: false,
             event: false,
             elapsed: Duration::from_secs(3),

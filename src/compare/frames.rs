@@ -14,6 +14,7 @@ use swell_domain::{
 
 /// Differences between two frames, and those that are out of tolerance.
 #[derive(Clone, Debug, Serialize)]
+#[non_exhaustive]
 pub struct FrameDiff {
     /// Output frame number.
     pub frame: u32,
@@ -42,6 +43,7 @@ pub struct Missing {
 
 /// One field of all particles that both frames have.
 #[derive(Clone, Debug, Serialize)]
+#[non_exhaustive]
 pub struct FieldDiff {
     /// `position`, `velocity`, or an attribute's name.
     pub field: String,

@@ -8,6 +8,11 @@ pub mod caches;
 pub mod deviation;
 pub mod frames;
 pub mod limits;
+#[cfg(feature = "perceptual")]
+pub mod perceptual;
+#[cfg(not(feature = "perceptual"))]
+#[path = "no_perceptual.rs"]
+pub mod perceptual;
 pub mod pictures;
 pub mod rounding;
 pub mod spread;

@@ -3,10 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use serde::{Serialize, Serializer};
-use ssimulacra2::{LinearRgb, compute_frame_ssimulacra2};
 
-use super::deviation::{Value, out_of_limits};
-use swell_domain::{statistics::percentile, tolerance::PictureLimits};
+use super::{
+    deviation::{Value, out_of_limits},
+    perceptual,
+};
+use swell_domain::{feature::MissingFeature, statistics::percentile, tolerance::PictureLimits};
 
 /// How the values of an image represent light.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -37,6 +39,7 @@ pub struct Picture {
 /// Measures of the difference between two images. A pixel's error is the largest |a − b| of its
 /// channels, in the file's own values: 1 is 255 in a PNG, and scene-linear white in an EXR.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct PictureDiff {
     /// Mean error over the pixels.
     pub mean: f64,
@@ -110,10 +113,13 @@ impl PicturesDiff {
 }
 
 /// Compares two images; b is the reference. `None` if sizes, corners or encodings differ.
-pub fn compare(a: &Picture, b: &Picture) -> Option<PictureDiff> {
+///
+/// # Errors
+/// [`MissingFeature`] without the feature `perceptual`.
+pub fn compare(a: &Picture, b: &Picture) -> Result<Option<PictureDiff>, MissingFeature> {
     let of = |it: &Picture| (it.width, it.height, it.corner, it.encoding);
     if of(a) != of(b) {
-        return None;
+        return Ok(None);
     }
     let errors = errors(a, b);
     let (mut max, mut max_at) = (0.0, None);
@@ -126,14 +132,20 @@ pub fn compare(a: &Picture, b: &Picture) -> Option<PictureDiff> {
         let pixels = picture.pixels.iter();
         pixels.map(|pixel| pixel.map(f32::to_bits)).collect()
     };
-    Some(PictureDiff {
+    let light_of = |picture: &Picture| {
+        let pixels = picture.pixels.iter();
+        pixels
+            .map(|&pixel| light(pixel, picture.encoding))
+            .collect()
+    };
+    Ok(Some(PictureDiff {
         mean: errors.iter().sum::<f64>() / errors.len().max(1) as f64,
         p99: percentile(errors, 0.99).unwrap_or(0.0),
         max,
         max_at,
-        perceptual: perceptual(a, b),
+        perceptual: perceptual::score(light_of(a), light_of(b), [a.width, a.height])?,
         is_identical: bits(a) == bits(b),
-    })
+    }))
 }
 
 impl PictureDiff {
@@ -184,17 +196,6 @@ fn errors(a: &Picture, b: &Picture) -> Vec<f64> {
     a.pixels.iter().zip(&b.pixels).map(worst).collect()
 }
 
-fn perceptual(a: &Picture, b: &Picture) -> Option<f64> {
-    let light = |picture: &Picture| {
-        let pixels = picture
-            .pixels
-            .iter()
-            .map(|&pixel| light(pixel, picture.encoding));
-        LinearRgb::new(pixels.collect(), picture.width, picture.height).ok()
-    };
-    compute_frame_ssimulacra2(light(a)?, light(b)?).ok()
-}
-
 /// Linear light over black, clamped to 0 to 1; NaN becomes black.
 fn light([r, g, b, alpha]: [f32; 4], encoding: Encoding) -> [f32; 3] {
     [r, g, b].map(|value| {
@@ -235,9 +236,13 @@ pub fn difference_image(a: &Picture, b: &Picture, gain: f64) -> Vec<[u8; 3]> {
     a.pixels.iter().zip(&b.pixels).map(pixel).collect()
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "perceptual"))]
 mod tests {
     use super::*;
+
+    fn compare(a: &Picture, b: &Picture) -> Option<PictureDiff> {
+        super::compare(a, b).expect("the feature is on")
+    }
 
     /// A shaded ball on a gradient.
     fn picture(encoding: Encoding) -> Picture {

@@ -49,6 +49,7 @@ pub enum Difference {
 
 /// Difference of two grids of the same name, voxel by voxel.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct GridDiff {
     /// Grid name: `surface` (metres) or `vel` (m/s).
     pub grid: String,

@@ -32,7 +32,7 @@ pub const MOST_GAIN: f64 = 0.5;
 
 /// What a wall is asked to absorb.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Asked {
+pub struct AbsorberParameters {
     /// Distance of the wall from the domain's face at the start, and the farthest it may leave its
     /// prescribed path, metres.
     pub room: f64,
@@ -48,7 +48,7 @@ pub struct Asked {
 /// `lag`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Absorption {
-    asked: Asked,
+    asked: AbsorberParameters,
     /// Wall velocity per level, 1/s.
     gain: f64,
     /// Delay of the response, seconds.
@@ -63,7 +63,7 @@ impl Absorption {
     /// (c₀ − i Σcⱼ) U/ω ([`piston_elevation`]). Nothing is reflected where U = −a ω/c₀. The level
     /// is then η = a (1 + i Σcⱼ/c₀), so that U = −ω/(c₀ + i Σcⱼ) η: the modulus is the gain, the
     /// phase the lag.
-    pub fn new(asked: Asked) -> Self {
+    pub fn new(asked: AbsorberParameters) -> Self {
         let frequency = TAU / asked.period;
         let [progressive, local] = piston_elevation(frequency, asked.depth, asked.gravity);
         Self {
@@ -74,7 +74,7 @@ impl Absorption {
     }
 
     /// Returns the request that this law was derived from.
-    pub fn asked(&self) -> &Asked {
+    pub fn asked(&self) -> &AbsorberParameters {
         &self.asked
     }
 
@@ -116,7 +116,7 @@ impl Absorption {
                 mean: over.unwrap_or_default(),
             };
         };
-        let Asked { period, room, .. } = self.asked;
+        let AbsorberParameters { period, room, .. } = self.asked;
         let memory = MEMORY * period;
         let (mean, foreseen) = match (before.level, over) {
             (Some(last), Some(level)) => {
@@ -188,8 +188,8 @@ mod tests {
     const GRAVITY: f64 = 9.81;
     const SECONDS: f64 = 1.0 / 48.0;
 
-    fn asked(period: f64) -> Asked {
-        Asked {
+    fn asked(period: f64) -> AbsorberParameters {
+        AbsorberParameters {
             room: 10.0,
             depth: DEPTH,
             period,
@@ -265,7 +265,7 @@ mod tests {
             assert!(found < most, "{kh}: {found}");
         }
         // Negative control: half of the gain, from a depth four times that of the water.
-        let other = Absorption::new(Asked {
+        let other = Absorption::new(AbsorberParameters {
             depth: 4.0 * DEPTH,
             ..asked(period(0.5))
         });
@@ -309,7 +309,7 @@ mod tests {
 
     #[test]
     fn it_goes_on_without_a_jump_and_keeps_to_its_room() {
-        let wall = Absorption::new(Asked {
+        let wall = Absorption::new(AbsorberParameters {
             room: 0.05,
             ..asked(2.0)
         });

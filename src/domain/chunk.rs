@@ -11,6 +11,7 @@ pub struct Chunk {
 
 /// Error for a text that is not a share.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum ChunkError {
     /// The text is not two numbers separated by `/`.
     #[error("`{0}` is not a share: write 1/4 for the first of four")]

@@ -53,6 +53,7 @@ impl fmt::Display for Keep {
 
 /// Error for a text that does not select frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum KeepError {
     /// The step is 0, and a bake could not resume from such frames.
     #[error("every 0th frame is none, and a bake resumes from the frames that it keeps")]

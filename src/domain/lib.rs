@@ -18,6 +18,7 @@ pub mod budget;
 pub mod bvh;
 pub mod chunk;
 pub mod eye;
+pub mod feature;
 pub mod flip;
 pub mod frame_range;
 pub mod gauge;

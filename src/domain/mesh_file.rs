@@ -31,6 +31,7 @@ const MAX_COORDINATE: f64 = 1e9;
 
 /// Reason why a mesh could not be loaded.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum MeshError {
     /// The file cannot be read.
     #[error("cannot read mesh {file}")]

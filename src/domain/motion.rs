@@ -24,7 +24,7 @@ pub use linear_theory::{piston_elevation, piston_height_ratio, wave_number};
 pub use pairs::DEEPEST;
 use regular::Cycle as _;
 pub use regular::RegularWaves;
-pub use sea::{Asked, Phases, Sea};
+pub use sea::{Phases, Sea, SeaParameters};
 use solitary::Goring;
 pub use spectrum::Spectrum;
 pub use stokes::{MADSEN_LIMIT, Stokes};
@@ -289,7 +289,7 @@ mod tests {
             Motion::Table {
                 points: vec![[0.0, 0.0], [0.5, 0.2], [0.9, 2.0], [2.0, 2.0], [5.0, 0.5]],
             },
-            Motion::Sea(Sea::new(Asked {
+            Motion::Sea(Sea::new(SeaParameters {
                 spectrum: Spectrum::Tma,
                 peak_period: 1.5,
                 peak_enhancement: 3.3,
@@ -303,7 +303,7 @@ mod tests {
                 },
                 second_order: false,
             })),
-            Motion::Sea(Sea::new(Asked {
+            Motion::Sea(Sea::new(SeaParameters {
                 spectrum: Spectrum::Tma,
                 peak_period: 1.5,
                 peak_enhancement: 3.3,

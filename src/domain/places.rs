@@ -13,7 +13,7 @@ const MOST_CELLS: usize = 4000;
 
 /// Returns whether packed positions work in a grid of cells of size h. They do not for periodic
 /// axes, whose steps do not wrap with the period.
-pub fn are_told(mut dims: impl Iterator<Item = usize>, is_periodic: bool) -> bool {
+pub fn can_pack(mut dims: impl Iterator<Item = usize>, is_periodic: bool) -> bool {
     !is_periodic && dims.all(|cells| cells <= MOST_CELLS)
 }
 
@@ -74,8 +74,8 @@ mod tests {
 
     #[test]
     fn words_tell_places_of_so_many_cells() {
-        assert!(are_told([4000, 1, 7].into_iter(), false));
-        assert!(!are_told([4001, 1, 7].into_iter(), false));
-        assert!(!are_told([4, 1, 7].into_iter(), true));
+        assert!(can_pack([4000, 1, 7].into_iter(), false));
+        assert!(!can_pack([4001, 1, 7].into_iter(), false));
+        assert!(!can_pack([4, 1, 7].into_iter(), true));
     }
 }

@@ -30,6 +30,7 @@ pub struct SignedDistance {
 
 /// Reason why there is no signed distance.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum SignedDistanceError {
     /// The mesh has no inside.
     #[error(transparent)]

@@ -354,7 +354,7 @@ impl Sources {
         let (shape, d) = (&emitter.shape, self.spacing);
         let mut room = shape.bounds;
         room.max.y = room.max.y.min(level);
-        let dims = (0..3).map(|axis| places(room.size()[axis], d));
+        let dims = (0..3).map(|axis| particles_along(room.size()[axis], d));
         let dims: Vec<usize> = dims.collect();
         let count: usize = dims.iter().product();
         let place = |n: usize| {
@@ -429,7 +429,7 @@ fn by_chance(frame: u32, of: u32) -> f64 {
 }
 
 /// Returns how many particles fit into `length`, at least one.
-pub fn places(length: f64, spacing: f64) -> usize {
+pub fn particles_along(length: f64, spacing: f64) -> usize {
     ((length / spacing).round() as usize).max(1)
 }
 
@@ -450,7 +450,7 @@ fn swept(size: DVec3, velocity: DVec3) -> f64 {
 /// The same of a lattice of particles, which has whole rows across a flow along axes.
 pub fn flow(size: DVec3, velocity: DVec3, spacing: f64) -> f64 {
     let across = DVec3::from_array(std::array::from_fn(|axis| match velocity[axis] {
-        0.0 => places(size[axis], spacing) as f64 * spacing,
+        0.0 => particles_along(size[axis], spacing) as f64 * spacing,
         _ => size[axis],
     }));
     swept(across, velocity)

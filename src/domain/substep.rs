@@ -4,20 +4,20 @@ use std::{fmt, str::FromStr};
 
 /// Selects a substep of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Which {
+pub enum SubstepChoice {
     /// The substep with this number, counted from 1.
     Number(u32),
     /// The last substep of the frame, whatever its number.
     Last,
 }
 
-impl Default for Which {
+impl Default for SubstepChoice {
     fn default() -> Self {
         Self::Number(1)
     }
 }
 
-impl fmt::Display for Which {
+impl fmt::Display for SubstepChoice {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Number(number) => write!(f, "{number}"),
@@ -31,7 +31,7 @@ impl fmt::Display for Which {
 #[error("`{0}` is not a substep: give a number from 1 on, or last")]
 pub struct NoSubstep(String);
 
-impl FromStr for Which {
+impl FromStr for SubstepChoice {
     type Err = NoSubstep;
 
     fn from_str(text: &str) -> Result<Self, NoSubstep> {
@@ -55,15 +55,15 @@ mod tests {
     #[test]
     fn a_substep_is_a_number_from_1_on_or_last() {
         for (text, which) in [
-            ("1", Which::Number(1)),
-            ("12", Which::Number(12)),
-            ("last", Which::Last),
+            ("1", SubstepChoice::Number(1)),
+            ("12", SubstepChoice::Number(12)),
+            ("last", SubstepChoice::Last),
         ] {
             assert_eq!(text.parse(), Ok(which));
             assert_eq!(which.to_string(), text);
         }
         for text in ["", "0", "-1", "+1", "1.5", "first", "Last", "4294967296"] {
-            let error = text.parse::<Which>().unwrap_err().to_string();
+            let error = text.parse::<SubstepChoice>().unwrap_err().to_string();
             assert!(error.contains("from 1 on, or last"), "{text}: {error}");
         }
     }

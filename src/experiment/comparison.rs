@@ -25,7 +25,7 @@ use swell_study::{
 
 use super::{
     Event, Request, StudyError,
-    engine::{Bench, Kind, Place},
+    engine::{Bench, Kind, WorkUnit},
     report::{Report, what_was_run},
 };
 
@@ -40,7 +40,7 @@ impl Kind for SolverComparison {
     }
 
     /// Returns `None`: the two bakes cannot be divided among shares.
-    fn places(&self) -> Option<Vec<Place>> {
+    fn work_units(&self) -> Option<Vec<WorkUnit>> {
         None
     }
 

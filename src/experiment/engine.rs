@@ -44,7 +44,7 @@ pub(super) trait Kind {
 
     /// Units of work that are divided among shares, in the order of [`Bench::is_next_ours`]. `None`
     /// where all points depend on one cache, so that the study cannot be divided.
-    fn places(&self) -> Option<Vec<Place>>;
+    fn work_units(&self) -> Option<Vec<WorkUnit>>;
 
     /// Runs, measures and draws the study; returns `None` where only a share was run or missing
     /// points were counted.
@@ -57,14 +57,14 @@ pub(super) trait Kind {
 /// A unit of work among those that are divided among shares: a point, or a search that takes
 /// several.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Place {
+pub(super) struct WorkUnit {
     /// Rank within its line, from cheap to expensive.
     pub(super) rank: usize,
     /// Largest number of points that it takes.
     pub(super) points: usize,
 }
 
-impl Place {
+impl WorkUnit {
     /// A unit of one point.
     pub(super) fn of(rank: usize) -> Self {
         Self { rank, points: 1 }
@@ -238,7 +238,7 @@ impl<'a> Bench<'a> {
     }
 
     /// Reports the outcome of the next point.
-    pub(super) fn told(&mut self, name: String, status: PointStatus) {
+    pub(super) fn report_point(&mut self, name: String, status: PointStatus) {
         if matches!(self.work, Work::Look) {
             return;
         }

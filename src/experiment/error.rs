@@ -13,6 +13,7 @@ use swell_study::{picture::PictureError, raster::RasterError};
 
 /// Reason why a study failed.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum StudyError {
     /// A signal ended the study; the same command resumes it.
     #[error("ended by a signal")]
@@ -112,7 +113,9 @@ impl From<&StudyError> for Blame {
             StudyError::Solid(error) => error.into(),
             StudyError::Gpu(error) => error.into(),
             StudyError::Solve(error) => error.into(),
-            StudyError::Point(_) | StudyError::NoShares(_) => Self::Input,
+            StudyError::Point(_)
+            | StudyError::NoShares(_)
+            | StudyError::Raster(RasterError::MissingFeature(_)) => Self::Input,
             StudyError::Stopped
             | StudyError::OtherStudy { .. }
             | StudyError::Occupied(_)

@@ -28,7 +28,13 @@ use std::{path::PathBuf, sync::atomic::AtomicBool};
 use swell_domain::chunk::Chunk;
 use swell_files::study::Study;
 use swell_gpu::adapter;
-use swell_stage::{bake, device::Gpu, inspect::study::Outline, render};
+use swell_stage::{
+    bake,
+    device::Gpu,
+    inspect::study::Outline,
+    render::{self, gallery},
+};
+use swell_study::raster::{self, RasterError};
 
 use engine::{Bench, Kind, Work};
 
@@ -105,6 +111,7 @@ pub enum PointStatus {
 
 /// Outcome of a study.
 #[derive(Clone, Debug, Default)]
+#[non_exhaustive]
 pub struct Outcome {
     /// Path of the page; `None` for a share, and where a signal ended the study.
     pub page: Option<PathBuf>,
@@ -118,6 +125,7 @@ pub struct Outcome {
 
 /// Outcome of a share of a study.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Share {
     /// Number of points that were run.
     pub ran: usize,
@@ -146,10 +154,25 @@ fn kind_of(study: &Study) -> &dyn Kind {
 /// # Errors
 /// [`StudyError::NoShares`] if the study cannot be divided.
 pub fn dealt(study: &Study, chunk: Chunk) -> Result<Vec<bool>, StudyError> {
-    let places = kind_of(study).places();
-    let places = places.ok_or(StudyError::NoShares(Outline::of(study).kind))?;
-    let ranks: Vec<usize> = places.iter().map(|place| place.rank).collect();
+    let units = kind_of(study).work_units();
+    let units = units.ok_or(StudyError::NoShares(Outline::of(study).kind))?;
+    let ranks: Vec<usize> = units.iter().map(|unit| unit.rank).collect();
     Ok(chunk.deal(&ranks))
+}
+
+/// Checks that this build can score and draw what a study asks for.
+fn require_features(request: &Request) -> Result<(), StudyError> {
+    let has_charts = match &request.study {
+        Study::SolverComparison(_) | Study::Stability(_) | Study::Validation(_) => false,
+        Study::Sweep(_) | Study::Surface(_) | Study::Tune(_) => request.chunk.is_none(),
+    };
+    if has_charts {
+        raster::require().map_err(RasterError::from)?;
+    }
+    match &request.study {
+        Study::Surface(study) if surface::is_scored(study) => Ok(gallery::require_scores()?),
+        _ => Ok(()),
+    }
 }
 
 /// Runs a study or a share of it, and keeps results that the folder already has. Reports progress
@@ -167,6 +190,7 @@ pub fn study(
     if let Some(adapter) = &request.gpu.adapter {
         adapter::check_request(adapter)?;
     }
+    require_features(request)?;
     for warning in request.study.warnings() {
         tell(Event::Warning(warning));
     }
@@ -175,7 +199,7 @@ pub fn study(
         None => (Work::Whole, kind.count()),
         Some(chunk) => {
             let is_ours = dealt(&request.study, chunk)?;
-            let places = kind.places().into_iter().flatten().zip(&is_ours);
+            let places = kind.work_units().into_iter().flatten().zip(&is_ours);
             let count = places.filter(|(_, is)| **is).map(|(place, _)| place.points);
             let count = count.sum();
             (Work::Share(chunk, is_ours), count)

@@ -22,7 +22,7 @@ use swell_stage::{
 
 use super::{
     Event, PointStatus, Request, StudyError,
-    engine::{Bench, Kind, Place},
+    engine::{Bench, Kind, WorkUnit},
     ledger::Key,
     report::Report,
 };
@@ -64,14 +64,14 @@ impl Kind for SurfaceStudy {
     }
 
     /// Returns `None`: all points draw frames of the same cache.
-    fn places(&self) -> Option<Vec<Place>> {
+    fn work_units(&self) -> Option<Vec<WorkUnit>> {
         None
     }
 
     fn run(&self, bench: &mut Bench<'_>) -> Result<Option<Report>, StudyError> {
         let mut ledger = bench.ledger()?;
         baked(self, bench)?;
-        let mut room = Room {
+        let mut shared = Shared {
             study: self,
             gallery: None,
             frames: hashes(self, bench.request)?,
@@ -81,10 +81,10 @@ impl Kind for SurfaceStudy {
             let mut of_line = Vec::new();
             for point in &line.points {
                 let name = format!("{}, {} = {}", line.name, line.key, point.label);
-                let key = room.key(bench, point);
-                let measure = || room.measure(bench, point);
+                let key = shared.key(bench, point);
+                let measure = || shared.measure(bench, point);
                 if let Some((run, stood)) = bench.point(&mut ledger, &name, key, measure)? {
-                    bench.told(name, status(&self.errors, &run, stood));
+                    bench.report_point(name, status(&self.errors, &run, stood));
                     of_line.push(run);
                 }
             }
@@ -139,8 +139,13 @@ fn hashes(study: &SurfaceStudy, request: &Request) -> Result<String, StudyError>
     Ok(hashes.collect::<Result<Vec<_>, StudyError>>()?.join(" "))
 }
 
+/// Whether a study scores its pictures by finer rays.
+pub(super) fn is_scored(study: &SurfaceStudy) -> bool {
+    study.errors.contains(&PictureError::Colour)
+}
+
 /// State shared by all points.
-struct Room<'s, 'b> {
+struct Shared<'s, 'b> {
     study: &'s SurfaceStudy,
     /// Opened for the first point that is measured.
     gallery: Option<Gallery<'b>>,
@@ -148,23 +153,19 @@ struct Room<'s, 'b> {
     frames: String,
 }
 
-impl<'b> Room<'_, 'b> {
+impl<'b> Shared<'_, 'b> {
     fn key(&self, bench: &Bench<'_>, point: &Point) -> Key {
         let study = self.study;
         let scene = [(&study.scene, RunsOn::Gpu)];
         let measured = format!(
             "surface {} {} {} {} {}",
             study.repeats,
-            self.is_scored(),
+            is_scored(study),
             self.frames,
             study.look.hash(),
             point.look.hash(),
         );
         bench.devices.key(&scene, study.frames.last(), &measured)
-    }
-
-    fn is_scored(&self) -> bool {
-        self.study.errors.contains(&PictureError::Colour)
     }
 
     fn measure(&mut self, bench: &Bench<'b>, point: &Point) -> Result<Run, StudyError> {
@@ -177,7 +178,7 @@ impl<'b> Room<'_, 'b> {
                     &cache(bench.request),
                     &study.look,
                     &study.frames,
-                    self.is_scored(),
+                    is_scored(study),
                 )?;
                 self.gallery.insert(opened)
             }

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use swell_domain::{
-    absorption::{Absorption, Asked, MOST_GAIN},
+    absorption::{AbsorberParameters, Absorption, MOST_GAIN},
     motion::Motion,
 };
 use swell_scene::{SceneError, words::shown};
@@ -22,7 +22,7 @@ pub(super) fn build(
             has to point straight down";
         return Err(doc.fault_of_plain(path, problem));
     }
-    let absorption = Absorption::new(Asked {
+    let absorption = Absorption::new(AbsorberParameters {
         room: spec.room,
         depth: spec.depth,
         period: spec.period,

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 
 use super::{document::Document, motion_spec::check_speed};
 use swell_domain::motion::{
-    Asked, DEEPEST, MADSEN_LIMIT, Motion, Phases, Sea, Spectrum, wave_number,
+    DEEPEST, MADSEN_LIMIT, Motion, Phases, Sea, SeaParameters, Spectrum, wave_number,
 };
 use swell_scene::{
     SceneError,
@@ -23,7 +23,7 @@ const LEAST_WAVE: f64 = 10.0;
 type Result<T> = std::result::Result<T, SceneError>;
 
 /// Builds the motion of the table at `path`, for a sea or a packet.
-pub(super) fn build(doc: &Document<'_>, path: &str, asked: Asked) -> Result<Motion> {
+pub(super) fn build(doc: &Document<'_>, path: &str, asked: SeaParameters) -> Result<Motion> {
     let refuse = |key: &str, problem: String| Err(doc.fault_of(&format!("{path}.{key}"), problem));
     let periods = [asked.peak_period, asked.shortest_period, asked.ramp];
     check_periods(doc, path, periods, asked.gravity)?;
@@ -51,7 +51,7 @@ pub(super) fn build(doc: &Document<'_>, path: &str, asked: Asked) -> Result<Moti
 }
 
 /// Checks that second-order theory is valid for the waves and known for the shortest of them.
-fn check_second_order(asked: &Asked) -> std::result::Result<(), String> {
+fn check_second_order(asked: &SeaParameters) -> std::result::Result<(), String> {
     let (depth, gravity) = (asked.depth, asked.gravity);
     let shortest = wave_number(TAU / asked.shortest_period, depth, gravity) * depth;
     if shortest > DEEPEST {
@@ -174,8 +174,8 @@ pub(super) fn asked(
     [peak_period, depth, gravity]: [f64; 3],
     [shortest_period, ramp]: [Option<f64>; 2],
     phases: Phases,
-) -> Asked {
-    Asked {
+) -> SeaParameters {
+    SeaParameters {
         spectrum,
         peak_enhancement,
         peak_period,

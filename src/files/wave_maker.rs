@@ -14,7 +14,7 @@ use super::{
 };
 use swell_domain::{
     bounds::Bounds,
-    motion::{Asked, Motion, Phases},
+    motion::{Motion, Phases, SeaParameters},
 };
 use swell_scene::{SceneError, Shot, WaveMaker, waves, words::shown};
 
@@ -212,7 +212,7 @@ pub(super) fn motion(
             let left_out = [shortest_period, ramp];
             let shape = seas::shape(doc, path, spectrum, peak_enhancement)?;
             let asked = seas::asked(shape, water, left_out, phases);
-            let asked = Asked {
+            let asked = SeaParameters {
                 second_order,
                 ..asked
             };
@@ -235,7 +235,7 @@ pub(super) fn motion(
             let left_out = [shortest_period, ramp];
             let shape = seas::shape(doc, path, spectrum, peak_enhancement)?;
             let asked = seas::asked(shape, water, left_out, phases);
-            let asked = Asked {
+            let asked = SeaParameters {
                 second_order,
                 ..asked
             };

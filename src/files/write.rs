@@ -15,7 +15,7 @@ use super::{
 };
 use swell_domain::{
     bounds::Bounds,
-    motion::{Asked, Motion, Phases, RegularWaves, Spectrum},
+    motion::{Motion, Phases, RegularWaves, SeaParameters, Spectrum},
     probe::Rate,
 };
 use swell_scene::{
@@ -324,7 +324,7 @@ fn turned(turn: &Motion) -> Value {
 }
 
 /// Gravity is omitted because it is that of the water.
-fn waves(asked: &Asked) -> (&'static str, Table) {
+fn waves(asked: &SeaParameters) -> (&'static str, Table) {
     let mut rows = table([
         ("depth", value(&asked.depth)),
         ("spectrum", value(&asked.spectrum)),

@@ -56,7 +56,7 @@ where
 
 /// Element layout of a buffer, for comparison with the shader variable of its name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Held {
+pub struct BufferLayout {
     /// Bytes per value.
     pub bytes: u32,
     /// Scalar type of a value's components.
@@ -226,7 +226,7 @@ impl<T: Element> Buf<T> {
             bytes: self.offset + (count * size_of::<T>()) as u64,
             is_uniform: self.is_uniform,
             is_windowed: false,
-            element: Held {
+            element: BufferLayout {
                 bytes: size_of::<T>() as u32,
                 scalar: T::SCALAR,
                 head: self.offset as u32,
@@ -296,7 +296,7 @@ impl<T: Element> Windows<T> {
             bytes: (count * STRIDE) as u64,
             is_uniform: true,
             is_windowed: false,
-            element: Held {
+            element: BufferLayout {
                 bytes: size_of::<T>() as u32,
                 scalar: T::SCALAR,
                 head: 0,
@@ -322,7 +322,7 @@ pub struct First<T> {
 }
 
 /// Data read back together: [`Buf::first`] of one buffer, or a tuple of those of several.
-pub trait Wanted {
+pub trait Readback {
     /// One vector of values per buffer.
     type Values;
 
@@ -333,7 +333,7 @@ pub trait Wanted {
     fn values(bytes: &mut dyn Iterator<Item = &[u8]>) -> Self::Values;
 }
 
-impl<T: bytemuck::Pod> Wanted for First<T> {
+impl<T: bytemuck::Pod> Readback for First<T> {
     type Values = Vec<T>;
 
     fn spans(&self) -> Vec<(&str, u64, usize)> {
@@ -348,7 +348,7 @@ impl<T: bytemuck::Pod> Wanted for First<T> {
 
 macro_rules! wanted_tuple {
     ($($name:ident: $place:tt),+) => {
-        impl<$($name: Wanted),+> Wanted for ($($name,)+) {
+        impl<$($name: Readback),+> Readback for ($($name,)+) {
             type Values = ($($name::Values,)+);
 
             fn spans(&self) -> Vec<(&str, u64, usize)> {

@@ -102,7 +102,7 @@ fn same_layout(now: &Layout, before: &Layout) -> Result<(), String> {
 mod tests {
     use super::{
         super::{
-            buffer::{Held, Scalar},
+            buffer::{BufferLayout, Scalar},
             reflect::reflect,
         },
         *,
@@ -127,7 +127,7 @@ mod tests {
             bytes: 64,
             is_uniform,
             is_windowed: false,
-            element: Held {
+            element: BufferLayout {
                 bytes: 16,
                 scalar: Scalar::F32,
                 head: 0,

@@ -9,7 +9,7 @@ use wgpu::{BindGroupLayout, Buffer, BufferUsages, ComputePipeline};
 
 use super::{
     adapter::{Context, InjectedFault},
-    buffer::{Buf, Element, Held, Wanted, Windows},
+    buffer::{Buf, BufferLayout, Element, Readback, Windows},
     edited,
     error::GpuError,
     operations::Counting,
@@ -30,7 +30,7 @@ pub struct BufferSpec {
     /// Whether passes bind parts of it: it may then be larger than the binding limit.
     pub is_windowed: bool,
     /// Element layout.
-    pub element: Held,
+    pub element: BufferLayout,
 }
 
 impl BufferSpec {
@@ -238,7 +238,7 @@ impl Program {
     ///
     /// # Errors
     /// [`GpuError::Lost`].
-    pub fn download<W: Wanted>(&self, wanted: W) -> Result<W::Values, GpuError> {
+    pub fn download<W: Readback>(&self, wanted: W) -> Result<W::Values, GpuError> {
         let context = &self.context;
         let mut encoder = context.device.create_command_encoder(&Default::default());
         let spans = wanted.spans();
@@ -434,7 +434,7 @@ pub(super) fn shader(
 ) -> Result<Shader, GpuError> {
     let source = source(context, name, defines)?;
     let blamed = |error| context.shaders.blamed(error);
-    let place = |line| source.place(line);
+    let place = |line| source.location(line);
     let reflection = reflect_at(name, &source.text, &place).map_err(blamed)?;
     if let Some(shipped) = context.shaders.shipped_beside(name) {
         let known = reflect(name, &shipped.compose(name, defines)?)?;

@@ -172,7 +172,7 @@ pub(super) enum Size {
 
 /// Point in time of a traced dispatch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Moment {
+pub enum TracePoint {
     /// Before a dispatch: the buffers hold its inputs.
     Before,
     /// After a dispatch: the buffers hold its outputs.
@@ -242,11 +242,11 @@ impl Recording {
     pub fn trace<E: From<GpuError>>(
         &self,
         program: &Program,
-        mut observe: impl FnMut(Moment, &'static str, &[Bind]) -> Result<(), E>,
+        mut observe: impl FnMut(TracePoint, &'static str, &[Bind]) -> Result<(), E>,
     ) -> Result<(), E> {
         for step in &self.steps {
             if let Recorded::Dispatch { pass, binds, .. } = step {
-                observe(Moment::Before, pass, binds)?;
+                observe(TracePoint::Before, pass, binds)?;
             }
             let mut encoder = program
                 .context
@@ -256,7 +256,7 @@ impl Recording {
             program.context.queue.submit([encoder.finish()]);
             program.context.check()?;
             if let Recorded::Dispatch { pass, binds, .. } = step {
-                observe(Moment::After, pass, binds)?;
+                observe(TracePoint::After, pass, binds)?;
             }
         }
         Ok(())

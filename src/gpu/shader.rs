@@ -65,7 +65,7 @@ pub(super) struct Composed {
 
 impl Composed {
     /// Origin of a line of the text, counted from 1, such as `shared/walls.wgsl:12`.
-    pub(super) fn place(&self, line: usize) -> String {
+    pub(super) fn location(&self, line: usize) -> String {
         let place = line.checked_sub(1).and_then(|index| self.places.get(index));
         place.map_or_else(
             || format!("line {line}"),
@@ -76,6 +76,7 @@ impl Composed {
 
 /// Error in a folder of edited shaders.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ShadersError {
     /// A file or folder cannot be read.
     #[error("cannot read the shaders in {}", file.display())]

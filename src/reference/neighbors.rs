@@ -154,7 +154,7 @@ impl Runs {
 
 /// Points in cells: particles first, then boundary samples on solids, each sorted by cell.
 #[derive(Clone, Debug)]
-pub struct Crowd<'a> {
+pub struct SortedPoints<'a> {
     /// Cells of edge h or more.
     pub cells: Cells,
     /// Positions, metres.
@@ -179,7 +179,7 @@ struct Block {
 impl Neighbors {
     /// Finds the points closer than `radius` to each particle, by nine runs of three cells
     /// (Hoetzlein 2014).
-    pub fn search(crowd: &Crowd<'_>, radius: f64) -> Self {
+    pub fn search(crowd: &SortedPoints<'_>, radius: f64) -> Self {
         let (fluid, solid) = crowd.points.split_at(crowd.particles);
         let groups = [
             (0, fluid, crowd.cells.starts(fluid)),
@@ -216,9 +216,9 @@ impl Neighbors {
     /// Lists the neighbours of PBF's lists (pbf/build_neighbors): particles by quantized positions,
     /// where these are in use, some of which are slightly farther than `h` and count once they come
     /// within it; boundary samples closer than `h`.
-    pub fn listed_within(crowd: &Crowd<'_>, h: f64) -> Self {
+    pub fn listed_within(crowd: &SortedPoints<'_>, h: f64) -> Self {
         let cells = &crowd.cells;
-        if !places::are_told(cells.dims.into_iter(), cells.period != Period::default()) {
+        if !places::can_pack(cells.dims.into_iter(), cells.period != Period::default()) {
             return Self::search(crowd, h);
         }
         let (fluid, solid) = crowd.points.split_at(crowd.particles);
@@ -252,7 +252,7 @@ impl Neighbors {
 
     /// Finds the same as [`Self::search`] by testing every pair: slow, but simple enough to be an
     /// oracle.
-    pub fn naive(crowd: &Crowd<'_>, radius: f64) -> Self {
+    pub fn naive(crowd: &SortedPoints<'_>, radius: f64) -> Self {
         let x = crowd.points;
         Self::listed(crowd.particles, |i, members| {
             [0..crowd.particles, crowd.particles..x.len()].map(|group| {
@@ -437,7 +437,7 @@ mod tests {
             let id: Vec<u32> = (0..points.len() as u32).collect();
             let order = cells.order(&points, &id).into_iter();
             let points: Vec<DVec3> = order.map(|k| points[k]).collect();
-            let crowd = Crowd {
+            let crowd = SortedPoints {
                 cells,
                 points: &points,
                 particles: points.len(),
@@ -450,7 +450,7 @@ mod tests {
                 assert_eq!(fast.of(i), slow.of(i), "particle {i}");
             }
             // With walls instead, some neighbours are not found.
-            let walled = Crowd {
+            let walled = SortedPoints {
                 cells: Cells {
                     period: Period::default(),
                     ..cells
@@ -498,7 +498,7 @@ mod tests {
         for scale in [1.0, 0.3] {
             let cloud = |count| halton(count, size * scale);
             let points = crowded(cells, &cloud(1500), &cloud(90));
-            let crowd = Crowd {
+            let crowd = SortedPoints {
                 cells,
                 points: &points,
                 particles: 1500,
@@ -545,7 +545,7 @@ mod tests {
         let cells = Cells::new(size, 0.21);
         let particles = fluid.len();
         let points = crowded(cells, &fluid, &solid);
-        let crowd = Crowd {
+        let crowd = SortedPoints {
             cells,
             points: &points,
             particles,
@@ -568,7 +568,7 @@ mod tests {
             assert_eq!(sorted(solid), expected_solid, "particle {i}");
         }
         // Cells smaller than the radius lose pairs: the comparison can fail.
-        let narrow = Crowd {
+        let narrow = SortedPoints {
             cells: Cells::new(size, 0.1),
             ..crowd
         };

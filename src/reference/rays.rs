@@ -24,7 +24,7 @@ const HALVINGS: u32 = 40;
 
 /// What a pixel's ray hits.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Seen {
+pub struct RayHit {
     /// Depth along the optical axis of the first opaque surface, metres; infinite in the sky.
     pub opaque: f64,
     /// Depth along the optical axis of water in front of that, and the unit normal out of the
@@ -40,7 +40,7 @@ pub fn cast(
     kernels: &Kernels,
     (size, spacing): (DVec3, f64),
     solids: &TriangleMesh,
-) -> Vec<Seen> {
+) -> Vec<RayHit> {
     let tree = Bvh::new(solids);
     let coarse = LevelSet::of_kernels(kernels, size, spacing / VOXELS);
     let water = Water {
@@ -58,7 +58,7 @@ pub fn cast(
             };
             let solid = tree.first_along(eye.position, ray, ground);
             let opaque = solid.map_or(ground, |(t, _)| t);
-            Seen {
+            RayHit {
                 opaque,
                 water: water.along(eye.position, ray, opaque),
             }

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 use super::{
     RenderScene,
-    moment::{Ids, Moment, REACH},
+    inputs::{FrameInputs, Ids, REACH},
     neighbors::smoothstep,
     uniform::Particle,
 };
@@ -103,10 +103,10 @@ impl Fall {
 
 /// Computes the state of each particle of a frame. Where a frame is missing or lacks the particle,
 /// the nearest frame towards the current one takes its place.
-pub(super) fn standing(moment: &Moment<'_>, fall: &Fall) -> Vec<Standing> {
-    let own = moment.water.weights(fall.spacing);
-    let ids = Ids::of(&moment.water.particles);
-    let around = moment.around.map(|water| {
+pub(super) fn standing(inputs: &FrameInputs<'_>, fall: &Fall) -> Vec<Standing> {
+    let own = inputs.water.weights(fall.spacing);
+    let ids = Ids::of(&inputs.water.particles);
+    let around = inputs.around.map(|water| {
         let water = water?;
         let particles = &water.particles;
         Some((
@@ -119,7 +119,7 @@ pub(super) fn standing(moment: &Moment<'_>, fall: &Fall) -> Vec<Standing> {
         .into_par_iter()
         .map(|index| {
             let id = ids.id(index);
-            let here = (own[index], moment.water.particles.velocity[index], 0);
+            let here = (own[index], inputs.water.particles.velocity[index], 0);
             let or = |k: usize, near: (f32, [f32; 3], usize)| {
                 let found = around[k].as_ref().and_then(|(ids, weights, velocities)| {
                     let place = ids.find(id)?;
@@ -209,7 +209,7 @@ fn packed(air: f32, company: f32, radius: f32) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::moment::Water;
+    use crate::inputs::Water;
     use swell_domain::particles::Particles;
 
     fn random() -> impl FnMut() -> f32 {
@@ -333,7 +333,7 @@ mod tests {
             ..Particles::default()
         });
         let white = Particles::default();
-        let standing = standing(&Moment::alone(&water, &white), &fall);
+        let standing = standing(&FrameInputs::alone(&water, &white), &fall);
         classify(&mut particles, &standing, &look, &fall);
         let drop = particles[1000];
         assert_eq!((drop.tag, drop.air >> 16), (0, 0));
@@ -379,8 +379,8 @@ mod tests {
         let frames = [-2.0, -1.0, 0.0, 1.0, 2.0].map(at_frame);
         let [first, before, water, after, last] = &frames;
         let white = Particles::default();
-        let alone = Moment::alone(water, &white);
-        let around = Moment {
+        let alone = FrameInputs::alone(water, &white);
+        let around = FrameInputs {
             around: [first, before, after, last].map(Some),
             ..alone
         };
@@ -388,12 +388,12 @@ mod tests {
             density_per_metre: 1.0,
             speed_m_per_s: 3.0,
         };
-        [around, alone].map(|moment| {
+        [around, alone].map(|inputs| {
             let mut packed: Vec<_> = position.iter().map(|&p| at(p, 0.0)).collect();
             for particle in &mut packed {
                 particle.velocity = velocity;
             }
-            classify(&mut packed, &standing(&moment, &fall), &look, &fall);
+            classify(&mut packed, &standing(&inputs, &fall), &look, &fall);
             packed.iter().map(air).sum::<f32>() / packed.len() as f32
         })
     }

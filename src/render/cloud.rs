@@ -93,7 +93,7 @@ pub(super) fn grid(
     let moved: Vec<Drop> = drops
         .iter()
         .map(|(drop, path)| Drop {
-            place: drop.place + path.way(seconds),
+            place: drop.place + path.displacement(seconds),
             ..*drop
         })
         .collect();

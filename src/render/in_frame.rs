@@ -72,7 +72,7 @@ pub(super) fn in_frame(
         .map(|(index, particle)| {
             let place = Vec3::from(particle.position);
             let way = |seconds: f32| match paths.get(index) {
-                Some(path) => path.way(seconds).as_vec3(),
+                Some(path) => path.displacement(seconds).as_vec3(),
                 None => Vec3::ZERO,
             };
             (views.iter()).any(|view| view.sees(place + way(view.seconds), reach))

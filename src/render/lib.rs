@@ -1,6 +1,6 @@
 //! Screen-space fluid rendering: from particles to a picture.
 //!
-//! A frame is drawn from a [`Moment`]: its particles and those of the frames around it. For each
+//! A frame is drawn from [`FrameInputs`]: its particles and those of the frames around it. For each
 //! sample of the picture, solids are rasterised; particles are splatted as spheres into eye-space
 //! depth and thickness, and blocks add the thickness of the water behind them; curvature flow or
 //! the narrow-range filter smooths the depth; normals are differences of the depth; and each pixel
@@ -20,9 +20,9 @@ mod frame;
 mod hidden;
 pub mod image;
 mod in_frame;
+mod inputs;
 mod lighting;
 mod materials;
-mod moment;
 mod neighbors;
 mod opaque;
 mod paths;
@@ -52,7 +52,7 @@ use swell_scene::Wall;
 
 pub use camera::{eye, lens};
 pub use image::{Attributes, Image};
-pub use moment::{Moment, REACH, Water, frames_around};
+pub use inputs::{FrameInputs, REACH, Water, frames_around};
 pub use opaque::opaque;
 pub use plan::{Limits, Plan, Runs};
 pub use renderer::{Part, Renderer};

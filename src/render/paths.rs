@@ -8,7 +8,7 @@
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-use super::{moment::Ids, uniform};
+use super::{inputs::Ids, uniform};
 use swell_domain::particles::Particles;
 
 /// Path of a particle about its frame's instant: x(t) = x + v t + (square + cube t) t², in metres
@@ -32,7 +32,7 @@ impl Path {
     }
 
     /// Displacement from the position at the frame's instant, metres.
-    pub(super) fn way(&self, seconds: f32) -> DVec3 {
+    pub(super) fn displacement(&self, seconds: f32) -> DVec3 {
         let [square, cube] = match seconds < 0.0 {
             true => self.before,
             false => self.after,
@@ -141,7 +141,7 @@ mod tests {
     /// Largest distance of a path from the circle within half a frame, metres.
     fn off(path: &Path) -> f64 {
         let at = |part: f64| {
-            let place = DVec3::X + path.way((part * SECONDS) as f32);
+            let place = DVec3::X + path.displacement((part * SECONDS) as f32);
             let (sin, cos) = (TURN * part).sin_cos();
             (place - DVec3::new(cos, sin, 0.0)).length()
         };
@@ -200,7 +200,7 @@ mod tests {
             DVec3::splat(10.0),
         )[0];
         for t in [-0.05, -0.02, 0.03, 0.1] {
-            let off = found.way(t as f32) - (v * t + 0.5 * g * t * t);
+            let off = found.displacement(t as f32) - (v * t + 0.5 * g * t * t);
             assert!(off.length() < 1e-5, "{t}: {off}");
         }
     }

@@ -93,7 +93,7 @@ pub(super) fn level_set(
 ) -> LevelSet {
     let moved: Vec<DVec3> = places
         .iter()
-        .map(|(position, path)| position.as_dvec3() + path.way(seconds))
+        .map(|(position, path)| position.as_dvec3() + path.displacement(seconds))
         .collect();
     let size = scene.domain.size();
     let kernels = Kernels::fit(&moved, size, scene.particle_spacing);

@@ -128,7 +128,7 @@ impl Sea {
         let moved: Vec<DVec3> = self
             .places
             .iter()
-            .map(|(p, path)| p.as_dvec3() + path.way(camera.seconds))
+            .map(|(p, path)| p.as_dvec3() + path.displacement(camera.seconds))
             .collect();
         let edges = Edges::new(&moved, scene.domain.size(), scene.particle_spacing);
         let uniform = self.uniform(&edges, scene);

@@ -97,6 +97,7 @@ pub struct PlannedBuffer {
 
 /// Buffers that a module declares, each once.
 #[derive(Clone, Debug, Default)]
+#[non_exhaustive]
 pub struct Table {
     rows: Vec<PlannedBuffer>,
 }
@@ -214,7 +215,7 @@ impl Plan {
     /// Returns whether quantized position words are in use (shared/place.wgsl).
     pub fn has_places(&self, scene: &Scene) -> bool {
         let dims = self.grid_dims.iter().map(|&cells| cells as usize);
-        places::are_told(dims, scene.is_periodic())
+        places::can_pack(dims, scene.is_periodic())
     }
 
     /// Returns a plan without buffers and passes.

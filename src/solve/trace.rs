@@ -1,11 +1,11 @@
 //! Runs a substep dispatch by dispatch, so that each pass can be compared with its f64 reference
 //! pass.
 
-use swell_domain::{solver::Solver, substep::Which};
+use swell_domain::{solver::Solver, substep::SubstepChoice};
 use swell_gpu::{
     buffer::{Buf, Scalar, Windows},
     program::Program,
-    recording::{Bind, Moment, Recording},
+    recording::{Bind, Recording, TracePoint},
     reflect::{Access, Binding},
 };
 use swell_scene::flip::Precision;
@@ -25,7 +25,7 @@ use super::{
 #[derive(Clone, Copy)]
 pub struct Traced<'a> {
     /// Whether the dispatch is about to run or has run.
-    pub moment: Moment,
+    pub point: TracePoint,
     /// Name of the pass.
     pub pass: &'static str,
     /// Explicit bindings; a variable without one is bound to the buffer of its own name.
@@ -192,7 +192,7 @@ pub enum Span {
     /// From this substep, counted from 1, to the end of the frame.
     From(u32),
     /// One substep.
-    Only(Which),
+    Only(SubstepChoice),
 }
 
 /// A substep that is being traced.
@@ -230,9 +230,9 @@ pub(super) fn trace(
     observe: &mut dyn FnMut(Traced<'_>) -> Result<(), SolveError>,
 ) -> Result<(), SolveError> {
     recordings.iter().try_for_each(|recording| {
-        recording.trace(program, |moment, pass, binds| {
+        recording.trace(program, |point, pass, binds| {
             observe(Traced {
-                moment,
+                point,
                 pass,
                 binds,
                 program,

@@ -1,11 +1,11 @@
 //! `bake`: turns a scene into a particle cache.
 
+mod disk;
 mod error;
 mod frames;
 mod inflow;
 mod manifest;
 mod plan;
-mod room;
 mod water;
 
 use std::{path::PathBuf, sync::atomic::AtomicBool};
@@ -24,7 +24,7 @@ use super::{
 };
 use frames::Frames;
 
-pub use self::{error::BakeError, inflow::Inflow, plan::BakePlan, room::Room};
+pub use self::{disk::DiskSpace, error::BakeError, inflow::Inflow, plan::BakePlan};
 
 /// What to bake, where, and on which device.
 #[derive(Clone, Debug)]
@@ -66,7 +66,7 @@ pub enum Event {
         /// GPU memory in total and for neighbour lists, bytes; `None` on the CPU.
         bytes: Option<(u64, u64)>,
         /// Disk space that the frames will need, and that is free.
-        room: Room,
+        disk: DiskSpace,
         /// First frame that will be computed.
         first: u32,
         /// Last frame that will be computed.
@@ -97,6 +97,7 @@ pub enum Event {
 
 /// Result of a bake that met no error.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Outcome {
     /// Last frame in the cache.
     pub last_frame: u32,
@@ -146,8 +147,8 @@ pub fn run(
     let device = opened.identity();
     let (writer, clock, state) = open_cache(request, plan, &device)?;
     let first = clock.frame + 1;
-    let room = Room::of(&request.directory, plan, first)?;
-    tell(ready(plan, device, drive.bytes(), room, first));
+    let disk = DiskSpace::of(&request.directory, plan, first)?;
+    tell(ready(plan, device, drive.bytes(), disk, first));
     drive.load_watched(&start.particles, clock.frame, &state)?;
     drive.go_on_with(clock.next_id);
     let mut frames = Frames::new(request, plan, writer, clock);
@@ -211,7 +212,7 @@ fn ready(
     plan: &BakePlan<'_>,
     device: Identity,
     bytes: Option<(u64, u64)>,
-    room: Room,
+    disk: DiskSpace,
     first: u32,
 ) -> Event {
     Event::Ready {
@@ -222,7 +223,7 @@ fn ready(
         boundary_samples: plan.start.boundary.sample_count(),
         solver: plan.scene.solver.method.name(),
         bytes,
-        room,
+        disk,
         first,
         last: plan.last,
         parent: plan.parent.clone(),

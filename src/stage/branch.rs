@@ -78,6 +78,7 @@ pub struct Branch {
 
 /// Why a scene cannot begin from a frame.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum BranchError {
     /// Reading the cache or its frame failed.
     #[error(transparent)]

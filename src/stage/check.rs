@@ -11,7 +11,7 @@ use swell_cache::{CacheError, CacheReader, Manifest};
 use swell_check::{flip, pbf};
 use swell_domain::{
     frame_range::FrameRange, particles::Particles, signed_distance::SignedDistanceError,
-    substep::Which,
+    substep::SubstepChoice,
 };
 use swell_gpu::adapter::{Context, GpuError, Needs};
 use swell_scene::{Method, Scene, SceneError};
@@ -41,7 +41,7 @@ pub struct Request {
     /// Source of the inputs.
     pub source: Source,
     /// Which substep to check of the frame that follows each input.
-    pub substep: Which,
+    pub substep: SubstepChoice,
     /// Adapter and shaders.
     pub gpu: Gpu,
 }
@@ -88,6 +88,7 @@ pub enum Event<'a> {
 
 /// Result of a check.
 #[derive(Clone, Debug, Default)]
+#[non_exhaustive]
 pub struct Outcome {
     /// All frames combined: for each row the value that deviates most.
     pub table: Table,
@@ -105,6 +106,7 @@ pub struct Outcome {
 
 /// Why a check could not be made.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum CheckError {
     /// Reading the cache failed.
     #[error(transparent)]
@@ -219,7 +221,12 @@ struct Step {
 }
 
 impl Step {
-    fn check(&self, context: &Context, frame: u32, which: Which) -> Result<Checked, CheckError> {
+    fn check(
+        &self,
+        context: &Context,
+        frame: u32,
+        which: SubstepChoice,
+    ) -> Result<Checked, CheckError> {
         let particles = match &self.cache {
             Some(cache) => cache.read(frame)?,
             None => self.start.particles.clone(),
@@ -260,7 +267,12 @@ impl Subject {
         }
     }
 
-    fn check(&self, context: &Context, frame: u32, which: Which) -> Result<Checked, CheckError> {
+    fn check(
+        &self,
+        context: &Context,
+        frame: u32,
+        which: SubstepChoice,
+    ) -> Result<Checked, CheckError> {
         match self {
             Self::Step(step) => step.check(context, frame, which),
             Self::Whitewater(stream) => Ok(Checked {
@@ -319,7 +331,7 @@ pub fn check_frame(
     frame: u32,
     particles: &Particles,
 ) -> Result<Table, SolveError> {
-    let first = Which::default();
+    let first = SubstepChoice::default();
     Ok(check_substep(context, scene, start, frame, particles, first)?.table)
 }
 
@@ -335,7 +347,7 @@ pub fn check_substep(
     start: &Start,
     frame: u32,
     particles: &Particles,
-    which: Which,
+    which: SubstepChoice,
 ) -> Result<Checked, SolveError> {
     if particles.is_empty() {
         return Ok(Checked::default());

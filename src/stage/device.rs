@@ -62,6 +62,7 @@ impl From<Option<String>> for Gpu {
 
 /// The device to run on.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub enum Device {
     /// An adapter to open.
     Gpu(Gpu),
@@ -179,6 +180,7 @@ pub fn shaders_note(edited: Option<&str>) -> String {
 
 /// An error of either solver.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum SolverError {
     /// The solver on the GPU failed.
     #[error(transparent)]

@@ -19,6 +19,7 @@ use swell_cache::{CacheError, CacheReader, Manifest};
 use swell_compare::baseline::Baseline;
 use swell_domain::{
     aggregates::Aggregates,
+    feature::MissingFeature,
     frame_range::FrameRange,
     output::{AtPath as _, FileError},
     particles::Particles,
@@ -90,6 +91,7 @@ impl Outcome {
 
 /// Why two things could not be compared.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum DiffError {
     /// Reading a cache failed.
     #[error(transparent)]
@@ -134,6 +136,9 @@ pub enum DiffError {
     /// A request that does not fit what is compared.
     #[error("{0}")]
     Usage(String),
+    /// Pictures are compared, and the feature `perceptual` is off.
+    #[error(transparent)]
+    MissingFeature(#[from] MissingFeature),
 }
 
 impl DiffError {
@@ -148,7 +153,8 @@ impl From<&DiffError> for Blame {
             DiffError::NoImages
             | DiffError::NoHashes
             | DiffError::OwnTolerances
-            | DiffError::Usage(_) => Self::Input,
+            | DiffError::Usage(_)
+            | DiffError::MissingFeature(_) => Self::Input,
             DiffError::Cache(_)
             | DiffError::Scene { .. }
             | DiffError::Picture(_)

@@ -158,6 +158,7 @@ pub enum Event {
 
 /// Result of an export.
 #[derive(Clone, Debug, Default)]
+#[non_exhaustive]
 pub struct Outcome {
     /// Number of files made by this run.
     pub made: usize,
@@ -416,7 +417,7 @@ impl<'a> Job<'a> {
         outcome: &mut Outcome,
         bytes: impl FnOnce() -> Result<Vec<u8>, ExportError>,
     ) -> Result<(), ExportError> {
-        let stands = || !self.request.overwrite && wanted.stands();
+        let stands = || !self.request.overwrite && wanted.is_complete();
         if stands() {
             outcome.standing += 1;
             return Ok(());
@@ -511,7 +512,7 @@ impl<'a> Job<'a> {
         let shot = self.shot(source.frame);
         let makers = match self.stream {
             Some(_) => Vec::new(),
-            None => shot::ways(&self.scene, content.particles()?, source.frame),
+            None => shot::displacements(&self.scene, content.particles()?, source.frame),
         };
         let told = match water {
             UsdWater::Points => usd::Water::Points(content.particles()?),

@@ -32,6 +32,7 @@ pub use swell_cache::{
 
 /// An adapter of this machine.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Adapter {
     /// Number of the adapter, by which a request can name it.
     pub index: usize,
@@ -167,6 +168,7 @@ pub fn cache(directory: &Path) -> Result<(Manifest, Vec<Entry>), CacheError> {
 
 /// Sizes of a cache on disk and on a device.
 #[derive(Debug)]
+#[non_exhaustive]
 pub struct CacheSizes {
     /// Bytes of all its files.
     pub bytes: u64,
@@ -183,6 +185,7 @@ pub struct CacheSizes {
 
 /// Why a cache's sizes could not be determined.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum SizesError {
     /// Reading the cache failed.
     #[error(transparent)]
@@ -284,6 +287,7 @@ fn folder_bytes(folder: &Path) -> Result<u64, SizesError> {
 
 /// Why a cache's probes could not be plotted.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum PlotError {
     /// Reading the cache failed.
     #[error(transparent)]

@@ -1,7 +1,6 @@
 //! `render`: turns a particle cache and a look into an image sequence. The cache is only read.
 //!
-//! Several processes may render one look of one cache into one folder; each frame is then rendered
-//! by one of them.
+//! Several processes may render one look of one cache into one folder, each frame by one of them.
 
 mod expected;
 mod folder;
@@ -139,6 +138,7 @@ pub enum Event {
 
 /// Result of a render.
 #[derive(Clone, Debug, Default)]
+#[non_exhaustive]
 pub struct Outcome {
     /// Number of frames rendered by this run.
     pub rendered: u32,
@@ -154,6 +154,7 @@ pub struct Outcome {
 
 /// Why a render failed.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum RenderJobError {
     /// Nothing was compared, which must not count as a success.
     #[error("nothing was compared: no water is seen in these frames")]
@@ -198,6 +199,9 @@ pub enum RenderJobError {
     /// The output would be written into a cache.
     #[error(transparent)]
     IntoCache(#[from] IntoCache),
+    /// Pictures are scored, and the feature `perceptual` is off.
+    #[error(transparent)]
+    MissingFeature(#[from] swell_domain::feature::MissingFeature),
 }
 
 impl RenderJobError {
@@ -229,11 +233,12 @@ impl From<&RenderJobError> for Blame {
             )
             | RenderJobError::NoWater
             | RenderJobError::IsWhitewater(_)
-            | RenderJobError::IntoCache(_) => Self::Input,
+            | RenderJobError::IntoCache(_)
+            | RenderJobError::MissingFeature(_) => Self::Input,
             RenderJobError::Whitewater(_)
             | RenderJobError::Mesh(_)
-            | RenderJobError::NoNeighbours(_) => Self::Files,
-            RenderJobError::Render(
+            | RenderJobError::NoNeighbours(_)
+            | RenderJobError::Render(
                 RenderError::NotFinite { .. }
                 | RenderError::Write { .. }
                 | RenderError::Format { .. },
@@ -561,9 +566,8 @@ impl Job<'_> {
             None => Particles::default(),
         };
         let mut written = Ok(());
-        let picture = renderer.render_parts(frame, &around.moment(&white), &mut |part| {
-            // Reports the previous frame as soon as it is on disk, not only after this frame is
-            // drawn.
+        let picture = renderer.render_parts(frame, &around.inputs(&white), &mut |part| {
+            // Reports the previous frame as soon as it is on disk, before this one is drawn.
             let is_there = self.writing.as_ref().is_some_and(Writing::is_finished);
             if is_there && written.is_ok() {
                 written = end_writing(&mut self.writing, outcome, tell);

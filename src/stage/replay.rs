@@ -23,7 +23,7 @@ use swell_domain::{
 };
 use swell_gpu::{
     adapter::{GpuError, check_request},
-    recording::Moment,
+    recording::TracePoint,
 };
 use swell_scene::{Method, Scene, SceneError};
 use swell_solve::{
@@ -45,7 +45,7 @@ use super::{
 
 /// Where in a frame something first went wrong.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Place {
+pub struct FaultOrigin {
     /// Number of the substep in the frame, from 1.
     pub substep: u32,
     /// Name of the pass.
@@ -61,7 +61,7 @@ pub struct Failure {
     pub breach: Breach,
     /// Where it first happened; `None` on the CPU, where passes are not traced, and if the state
     /// that the frame began with is at fault.
-    pub place: Option<Place>,
+    pub place: Option<FaultOrigin>,
 }
 
 impl fmt::Display for Failure {
@@ -70,7 +70,7 @@ impl fmt::Display for Failure {
         match &self.place {
             // No pass adds water.
             None if self.breach.watched == Watched::Count => write!(f, "emitters brought them"),
-            Some(Place {
+            Some(FaultOrigin {
                 substep,
                 pass,
                 buffer,
@@ -152,7 +152,7 @@ struct Finder<'a> {
     start_volume: Option<f64>,
     /// Whether the substep has reached the density correction, whose residual has no budget.
     is_correcting: bool,
-    place: Option<Place>,
+    place: Option<FaultOrigin>,
 }
 
 /// Unit roundoff of f32.
@@ -177,7 +177,7 @@ impl Finder<'_> {
     }
 
     fn observe(&mut self, begun: Begun, traced: Traced<'_>) -> Result<(), SolveError> {
-        if traced.moment == Moment::Before {
+        if traced.point == TracePoint::Before {
             return Ok(());
         }
         match traced.pass {
@@ -192,7 +192,7 @@ impl Finder<'_> {
         let Some(buffer) = found else {
             return Ok(());
         };
-        self.place = Some(Place {
+        self.place = Some(FaultOrigin {
             substep: begun.number,
             pass: traced.pass,
             buffer,
@@ -396,6 +396,7 @@ pub(super) fn keep(
 
 /// Why a frame could not be recomputed.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ReplayError {
     /// Reading the folder or its cache failed.
     #[error(transparent)]

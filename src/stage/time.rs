@@ -14,6 +14,7 @@ use super::{
 
 /// Measured times of frames.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Timed {
     /// Device that they ran on.
     pub device: Identity,
@@ -30,6 +31,7 @@ pub struct Timed {
 
 /// Why frames could not be timed.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum TimeError {
     /// The adapter cannot be opened or does not suffice.
     #[error(transparent)]

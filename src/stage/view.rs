@@ -23,6 +23,7 @@ use std::{
 use swell_cache::{CacheReader, refuse_inside};
 use swell_domain::frame_range::FrameRange;
 use swell_scene::look::Look;
+use swell_study::raster::{self, RasterError};
 
 use self::{
     curves::Curves,
@@ -101,6 +102,7 @@ pub enum Event {
 
 /// Result of a view.
 #[derive(Clone, Debug, Default)]
+#[non_exhaustive]
 pub struct Outcome {
     /// Kind, path and bytes of each file made.
     pub files: Vec<(&'static str, PathBuf, u64)>,
@@ -121,6 +123,9 @@ pub fn view(
 ) -> Result<Outcome, ViewError> {
     if request.sheet.is_none() && request.movie.is_none() && !request.player {
         return Err(ViewError::Nothing);
+    }
+    if request.sheet.is_some() {
+        raster::require().map_err(RasterError::from)?;
     }
     if let [folder] = &request.subjects[..]
         && study::is_one(folder)

@@ -125,6 +125,7 @@ pub enum Event {
 
 /// Result of a job.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Outcome {
     /// Last frame in the stream.
     pub last_frame: u32,

@@ -8,6 +8,7 @@ const MAX_WIDTH: u32 = 640;
 
 /// Why a picture cannot be embedded in a page.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum PictureError {
     /// It is not a PNG, or a truncated one.
     #[error(transparent)]

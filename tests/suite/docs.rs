@@ -42,6 +42,100 @@ fn every_path_that_a_document_names_is_there() {
     assert_eq!(missing(root, said), ["src/no_such_room"]);
 }
 
+/// Lines of a page without its blocks of code.
+fn prose(page: &str) -> impl Iterator<Item = &str> {
+    let mut is_code = false;
+    page.lines().filter(move |line| {
+        let is_fence = line.trim_start().starts_with("```");
+        is_code ^= is_fence;
+        !is_code && !is_fence
+    })
+}
+
+/// Anchors of a page's headings, by the rule of GitHub and mdbook.
+fn anchors(page: &str) -> Vec<String> {
+    let headings = prose(page).filter(|line| line.starts_with('#'));
+    let is_kept = |c: &char| c.is_alphanumeric() || " -_".contains(*c);
+    let anchor = |line: &str| -> String {
+        let text = line.trim_start_matches('#').trim().to_lowercase();
+        text.chars()
+            .filter(is_kept)
+            .collect::<String>()
+            .replace(' ', "-")
+    };
+    headings.map(anchor).collect()
+}
+
+/// Relative targets of a page's links and pictures.
+fn links(page: &str) -> Vec<String> {
+    // Inline code is between backticks.
+    let text = prose(page).collect::<Vec<_>>().join("\n");
+    let text: String = text.split('`').step_by(2).collect();
+    let targets = text.split("](").skip(1);
+    let targets = targets.filter_map(|rest| rest.split_once(')').map(|(target, _)| target));
+    let is_relative = |target: &&str| !target.contains("://");
+    targets.filter(is_relative).map(str::to_owned).collect()
+}
+
+/// Links of a page, with that text, that lead to no file or heading, or from the site's pages to
+/// what is not in the site.
+fn dead_links(root: &Path, page: &str, text: &str) -> Vec<String> {
+    let folder = root.join(page).parent().unwrap().canonicalize().unwrap();
+    let leads = |link: &String| {
+        let (path, anchor) = link.split_once('#').unwrap_or((link, ""));
+        let Ok(file) = folder.join(path).canonicalize() else {
+            return false;
+        };
+        let is_in_site = !page.starts_with("docs/") || file.starts_with(&folder);
+        let target = match path {
+            "" => text.to_owned(),
+            _ if anchor.is_empty() => return is_in_site,
+            _ => fs::read_to_string(file).unwrap(),
+        };
+        is_in_site && anchors(&target).iter().any(|it| it == anchor)
+    };
+    links(text)
+        .into_iter()
+        .filter(|link| !leads(link))
+        .collect()
+}
+
+#[test]
+fn links_of_pages_lead_somewhere() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let summary = fs::read_to_string(root.join("docs/SUMMARY.md")).unwrap();
+    let mut pages = [
+        "README.md",
+        "CHANGELOG.md",
+        "CONTRIBUTING.md",
+        "SECURITY.md",
+    ]
+    .map(str::to_owned)
+    .to_vec();
+    for entry in fs::read_dir(root.join("docs")).unwrap() {
+        let name = entry.unwrap().file_name().into_string().unwrap();
+        if name.ends_with(".md") {
+            let is_listed = name == "SUMMARY.md" || links(&summary).contains(&name);
+            assert!(is_listed, "docs/SUMMARY.md lacks {name}");
+            pages.push(format!("docs/{name}"));
+        }
+    }
+    let (mut seen, mut dead) = (0, Vec::new());
+    for page in &pages {
+        let text = fs::read_to_string(root.join(page)).unwrap();
+        seen += links(&text).len();
+        let found = dead_links(root, page, &text);
+        dead.extend(found.into_iter().map(|link| format!("{page}: {link}")));
+    }
+    assert!(seen > 150, "{seen}");
+    assert!(dead.is_empty(), "{dead:#?}");
+    // Negative controls; code is no link.
+    let text = "# A `b`, c\n[a](#a-b-c) [b](#b) [c](no.md) [d](look.md#no) [e](../README.md) \
+                `[f](g)`\n```sh\n# [h](i)\n```\n[j](look.md#spray)";
+    let found = dead_links(root, "docs/page.md", text);
+    assert_eq!(found, ["#b", "no.md", "look.md#no", "../README.md"]);
+}
+
 /// Crates of the workspace that a manifest depends on, without its tests.
 fn depends_on(manifest: &str) -> Vec<&str> {
     let needed = manifest.split("[dev-dependencies]").next().unwrap();
@@ -196,7 +290,7 @@ fn has_place(page: &str, tool: &str) -> bool {
 }
 
 #[test]
-fn the_peers_tables_have_their_place() {
+fn performance_page_has_one_marker_for_the_peers_tables() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let page = fs::read_to_string(root.join("docs/performance.md")).unwrap();
     assert!(has_place(&page, "tools/bench peers"));

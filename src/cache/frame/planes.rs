@@ -45,7 +45,7 @@ impl Content {
     }
 
     /// The encoding that these comments announce.
-    pub(super) fn told(comments: &[String]) -> Option<Self> {
+    pub(super) fn from_comments(comments: &[String]) -> Option<Self> {
         let all = [Self::Values, Self::Differences];
         all.into_iter().find(|it| comments.contains(&it.comment()))
     }

@@ -83,7 +83,7 @@ pub(super) const FLIP: &[Comparison<FlipState>] = &[
 
 fn first(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let elements = state.elements();
-    let kind = &state.room().kind;
+    let kind = &state.space().kind;
     let reference = passes::first_share(&state.model, &elements.bricks, kind, state.density());
     let found = io.after.scalars(SHARE, elements.cells)?;
     io.table.each(&FIRST, elements.active(), |e| {
@@ -99,7 +99,7 @@ fn smoothed(
     entry: &'static Entry<1>,
 ) -> Outcome {
     let elements = state.elements();
-    let kind = &state.room().kind;
+    let kind = &state.space().kind;
     let share = io.before.scalars(from, elements.cells)?;
     let reference = passes::smooth(&state.model, &elements.bricks, kind, &share);
     let found = io.after.scalars(to, elements.cells)?;
@@ -111,7 +111,7 @@ fn smoothed(
 
 fn curvature(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let elements = state.elements();
-    let (model, bricks, kind) = (&state.model, &elements.bricks, &state.room().kind);
+    let (model, bricks, kind) = (&state.model, &elements.bricks, &state.space().kind);
     let share = io.before.scalars(SHARE, elements.cells)?;
     let found = pairs(&io.after.get(CURVATURE, elements.cells)?);
     let about = |e: usize| {
@@ -157,7 +157,7 @@ fn push(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
         return Ok(());
     };
     let (elements, step) = (state.elements(), state.step());
-    let (model, bricks, room) = (&state.model, &elements.bricks, state.room());
+    let (model, bricks, space) = (&state.model, &elements.bricks, state.space());
     let curvature = pairs(&io.before.get(CURVATURE, elements.cells)?);
     let distance = match model.settings().surface {
         Surface::GhostFluid => Some(elements.scalars(&io.before, flip::buffers::LIQUID_DISTANCE)?),
@@ -170,21 +170,21 @@ fn push(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let reference = passes::push(
         given,
         bricks,
-        room,
+        space,
         distance.as_deref(),
         &curvature,
         &before,
     );
     let cells = Cells {
         bricks,
-        kind: &room.kind,
+        kind: &space.kind,
         open: &[],
         distance: distance.as_deref(),
     };
     let over = step.kick * tension / model.cell_size().powi(2);
     io.table.each(&PUSHED, elements.active(), |e| {
         let (mut kappa, mut scale) = (0.0f64, 0.0f64);
-        for [water, air] in (0..3).filter_map(|axis| passes::sides(bricks, room, e as u32, axis)) {
+        for [water, air] in (0..3).filter_map(|axis| passes::sides(bricks, space, e as u32, axis)) {
             let theta = cells.theta(water, air);
             let (_, weight) = passes::between(&curvature, theta, water, air);
             let [inside, outside] = [water, air].map(|e| curvature[e as usize]);

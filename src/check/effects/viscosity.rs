@@ -89,7 +89,7 @@ fn weigh(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
         model: &state.model,
         step: &step,
         bricks: &elements.bricks,
-        room: state.room(),
+        space: state.space(),
         // The solve reads neither.
         centers: &Centers::default(),
         old: &[],

@@ -169,7 +169,7 @@ fn curl_on_grid(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let velocity = elements.planes(&io.before, flip::buffers::FACE_VELOCITY)?;
     let lengths = io.after.scalars(VORTICITY_LENGTH, elements.cells)?;
     let vectors = io.after.vectors(VORTICITY, elements.cells)?;
-    let reference = grid_curl(&state.model, &elements.bricks, state.room(), &velocity);
+    let reference = grid_curl(&state.model, &elements.bricks, state.space(), &velocity);
     let size = state.model.cell_size();
     let error = |e: usize| {
         // The pass also reads velocities two cells away: twice the reach of one neighbourhood.
@@ -197,13 +197,13 @@ fn confine_on_grid(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let before = elements.planes(&io.before, flip::buffers::FACE_VELOCITY)?;
     let found = elements.planes(&io.after, flip::buffers::FACE_VELOCITY)?;
     let step = state.step();
-    let (model, room, strength) = (&state.model, state.room(), settings.strength);
+    let (model, space, strength) = (&state.model, state.space(), settings.strength);
     let reference = |omega: &[DVec3]| {
         grid_confinement(
             model,
             &step,
             &elements.bricks,
-            room,
+            space,
             strength,
             omega,
             &before,

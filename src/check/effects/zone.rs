@@ -75,7 +75,7 @@ pub(super) fn faces<const N: usize>(
         model: &state.model,
         step: &step,
         bricks: &elements.bricks,
-        room: state.room(),
+        space: state.space(),
         // Zones do not read them.
         centers: &Centers::default(),
         old: &old,

@@ -8,7 +8,7 @@ use crate::{
 };
 use swell_domain::bricks::CELLS;
 use swell_reference::poisson::multigrid::{
-    About, Brick, Levels, MOST_AIR, Rounding, above_offset, place,
+    Brick, Levels, MOST_AIR, Rounding, Surroundings, above_offset, block_index,
 };
 use swell_solve::{
     SolveError,
@@ -21,7 +21,7 @@ use super::{FlipState, rows::*};
 pub(super) const COMPARISONS: &[Comparison<FlipState>] = &[
     of_level("pressure/coarsen", coarsen),
     of_level("pressure/smooth_first", |state, io| {
-        smooth(state, io, &SMOOTHED_FIRST, About::Nothing)
+        smooth(state, io, &SMOOTHED_FIRST, Surroundings::Nothing)
     }),
     Comparison {
         is_due: |state, io| {
@@ -32,11 +32,11 @@ pub(super) const COMPARISONS: &[Comparison<FlipState>] = &[
             is_due(state, io)
         },
         ..comparison("pressure/smooth", NONE, |state, io| {
-            smooth(state, io, &SMOOTHED, About::Corrections)
+            smooth(state, io, &SMOOTHED, Surroundings::Corrections)
         })
     },
     of_level("pressure/smooth_corrected", |state, io| {
-        smooth(state, io, &SMOOTHED_CORRECTED, About::WithAbove)
+        smooth(state, io, &SMOOTHED_CORRECTED, Surroundings::WithAbove)
     }),
     of_level("pressure/restrict", restrict),
     of_level("pressure/solve_coarse", solve_coarse),
@@ -109,7 +109,12 @@ impl Cycle {
     }
 }
 
-fn smooth(state: &FlipState, io: &mut Io<'_>, entry: &'static Entry<1>, about: About) -> Outcome {
+fn smooth(
+    state: &FlipState,
+    io: &mut Io<'_>,
+    entry: &'static Entry<1>,
+    about: Surroundings,
+) -> Outcome {
     let cycle = Cycle::of(state, io)?;
     let (levels, blocks) = (&cycle.levels, cycle.blocks());
     let solved = each(0..blocks.len(), |k| {
@@ -175,7 +180,7 @@ fn coarsen(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
             for axis in 0..3 {
                 let lower = (0..8).filter(|c| c >> axis & 1 == 0);
                 let fine = &levels.coefficient[axis];
-                let faces = lower.map(|c| f64::from(fine[place(slot, block, c)]));
+                let faces = lower.map(|c| f64::from(fine[block_index(slot, block, c)]));
                 let is_end = is_end(at, axis);
                 let exact = if is_end {
                     0.0
@@ -184,7 +189,7 @@ fn coarsen(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
                 };
                 shared.push(pair(at, fine[at], exact, [exact]));
             }
-            let air = (0..8).map(|c| levels.dirichlet[place(slot, block, c)]);
+            let air = (0..8).map(|c| levels.dirichlet[block_index(slot, block, c)]);
             let exact = 0.5 * air.map(|air| air.min(MOST_AIR)).sum::<f64>();
             airs.push(pair(at, levels.dirichlet[at], exact, [unit, exact]));
             let kind = kinds[(64 * slot + block) as usize] & 3;

@@ -1,6 +1,6 @@
 //! Gaps that close within the substep.
 
-use swell_reference::flip::{Gaps, Room, close_gaps as reference_close_gaps};
+use swell_reference::flip::{Gaps, OpenSpace, close_gaps as reference_close_gaps};
 use swell_scene::flip::Surface;
 use swell_solve::flip::buffers;
 
@@ -12,13 +12,13 @@ use crate::{
 
 /// Compares the pass, from the kinds, densities, velocities and fluxes on the device.
 pub(super) fn close_gaps(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
-    let (elements, step, room) = (state.elements(), state.step(), state.room());
+    let (elements, step, space) = (state.elements(), state.step(), state.space());
     let faces = elements.faces(&io.before)?;
     let gaps = Gaps {
         model: &state.model,
         step: &step,
         bricks: &elements.bricks,
-        room,
+        space,
         density: state.density(),
         velocity: &faces.velocity,
     };
@@ -53,7 +53,7 @@ pub(super) fn close_gaps(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
             (!is_tie(e)).then(|| pair(e, found[e], distance[e], [distance[e].abs()]))
         });
     }
-    state.room = Some(Room {
+    state.space = Some(OpenSpace {
         kind,
         solid_flux: flux,
         ..reference

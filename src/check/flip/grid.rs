@@ -9,7 +9,7 @@ use crate::{
 };
 use swell_domain::{boundary::Boundary, flip::VON_KARMAN, signed_distance::SignedDistance};
 use swell_reference::flip::{
-    Depth, LEAST_FILM, Model, Room, Solid, cut_cells as reference_cut_cells,
+    Depth, LEAST_FILM, Model, OpenSpace, Solid, cut_cells as reference_cut_cells,
     extrapolate as reference_extrapolate, find_change as reference_find_change, find_depth,
     find_excess as reference_find_excess, find_water as reference_find_water, friction_rates,
     gather_centers as reference_gather_centers, gather_faces as reference_gather_faces,
@@ -75,7 +75,7 @@ impl FlipState {
 
     /// Returns the reference's open space with the solids' distances shifted by `shift` and their
     /// nodes by `place`, metres.
-    fn shifted_room(&self, shift: f64, place: DVec3) -> Room {
+    fn shifted_room(&self, shift: f64, place: DVec3) -> OpenSpace {
         let moved = |grid: &SignedDistance| SignedDistance {
             origin: grid.origin + place,
             values: grid.values.iter().map(|&v| v + shift as f32).collect(),
@@ -99,7 +99,7 @@ pub(super) fn cut_cells(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let (elements, step) = (state.elements(), state.step());
     let reference = reference_cut_cells(&state.model, &step, &elements.bricks);
     let error = state.distance_error();
-    let others: Vec<Room> = [-error, error]
+    let others: Vec<OpenSpace> = [-error, error]
         .into_iter()
         .filter(|_| has_solids)
         .map(|shift| state.shifted_room(shift, DVec3::ZERO))
@@ -107,11 +107,11 @@ pub(super) fn cut_cells(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     // If several nodes are equally close to a cell's centre, the chosen one decides whether a solid
     // is near at all, and so whether its velocity appears at faces that it does not touch.
     let side = |k: usize, axis: usize| if k >> axis & 1 == 0 { error } else { -error };
-    let rounded: Vec<Room> = (0..8)
+    let rounded: Vec<OpenSpace> = (0..8)
         .filter(|_| has_moving)
         .map(|k| state.shifted_room(0.0, DVec3::new(side(k, 0), side(k, 1), side(k, 2))))
         .collect();
-    let room = Room {
+    let space = OpenSpace {
         kind: io.after.get(buffers::CELL_KIND, elements.cells)?,
         open: elements.planes(&io.after, buffers::FACE_OPEN)?,
         solid_flux: elements.scalars(&io.after, buffers::SOLID_FLUX)?,
@@ -132,22 +132,22 @@ pub(super) fn cut_cells(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let wall = step.wall_velocity.map(|v| v.abs().max_element());
     let solid = step.solids.iter().map(Solid::fastest);
     let speed = solid.fold(wall[0].max(wall[1]), f64::max);
-    let moved = |of: &dyn Fn(&Room) -> f64| others.iter().map(of).fold(0.0, f64::max);
+    let moved = |of: &dyn Fn(&OpenSpace) -> f64| others.iter().map(of).fold(0.0, f64::max);
     io.table.each(&KIND, elements.active(), |e| {
         let is_tie = others
             .iter()
             .any(|other| other.kind[e] != reference.kind[e]);
-        (!is_tie).then(|| pair(e, room.kind[e], f64::from(reference.kind[e]), []))
+        (!is_tie).then(|| pair(e, space.kind[e], f64::from(reference.kind[e]), []))
     });
     io.table.each(&OPEN, elements.active(), |e| {
         let moved = moved(&|other| other.open[e].distance(reference.open[e]));
-        pair(e, room.open[e], reference.open[e], [cut, moved])
+        pair(e, space.open[e], reference.open[e], [cut, moved])
     });
     io.table.each(&FLUX, elements.active(), |e| {
         let moved = moved(&|other| (other.solid_flux[e] - reference.solid_flux[e]).abs());
         pair(
             e,
-            room.solid_flux[e],
+            space.solid_flux[e],
             reference.solid_flux[e],
             [cut, speed, moved],
         )
@@ -155,11 +155,11 @@ pub(super) fn cut_cells(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     if has_solids {
         io.table.each(&VOLUME, elements.active(), |e| {
             let moved = moved(&|other| (other.volume[e] - reference.volume[e]).abs());
-            pair(e, room.volume[e], reference.volume[e], [cut, moved])
+            pair(e, space.volume[e], reference.volume[e], [cut, moved])
         });
         io.table.each(&HATS, elements.active(), |e| {
             let moved = moved(&|other| (other.hats[e] - reference.hats[e]).abs());
-            pair(e, room.hats[e], reference.hats[e], [cut, moved])
+            pair(e, space.hats[e], reference.hats[e], [cut, moved])
         });
     }
     if has_moving {
@@ -173,10 +173,10 @@ pub(super) fn cut_cells(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
                 solid.passage.spin.length() * (x.length() + solid.pose.centre.length())
             });
             let far = far.fold(0.0, f64::max);
-            (!is_tie).then(|| pair(e, room.closed_velocity[e], exact, [exact.length(), far]))
+            (!is_tie).then(|| pair(e, space.closed_velocity[e], exact, [exact.length(), far]))
         });
     }
-    state.room = Some(room);
+    state.space = Some(space);
     Ok(())
 }
 
@@ -187,7 +187,7 @@ pub(super) fn gather_faces(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     }
     let (elements, step) = (state.elements(), state.step());
     let (bricks, sorted) = (&elements.bricks, state.sorted());
-    let reference = reference_gather_faces(&state.model, &step, bricks, sorted, state.room());
+    let reference = reference_gather_faces(&state.model, &step, bricks, sorted, state.space());
     let found = elements.faces(&io.after)?;
     let place = state.place();
     let error = |e: usize| {
@@ -226,9 +226,9 @@ pub(super) fn gather_faces(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
 
 pub(super) fn gather_centers(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let settings = state.model.settings();
-    let (elements, step, room) = (state.elements(), state.step(), state.room());
+    let (elements, step, space) = (state.elements(), state.step(), state.space());
     let bricks = &elements.bricks;
-    let reference = reference_gather_centers(&state.model, &step, bricks, state.sorted(), room);
+    let reference = reference_gather_centers(&state.model, &step, bricks, state.sorted(), space);
     let share = 1.0 / f64::from(settings.particles_per_cell);
     let place = state.place();
     let error = |e: usize| {
@@ -238,11 +238,11 @@ pub(super) fn gather_centers(state: &mut FlipState, io: &mut Io<'_>) -> Outcome 
         let part = |step: i32| if step == 0 { 0.75 } else { 0.125 };
         let open: f64 = neighborhood()
             .map(|offset| {
-                let volume = room.volume[bricks.near(e as u32, offset) as usize];
+                let volume = space.volume[bricks.near(e as u32, offset) as usize];
                 offset.into_iter().map(part).product::<f64>() * volume
             })
             .sum();
-        let least = (0.5 * open.min(room.hats[e])).max(0.02);
+        let least = (0.5 * open.min(space.hats[e])).max(0.02);
         let relative = (count * share / least).min(reference[e].max(1.0));
         OF_CENTER.of([share, place, count, least, relative])
     };
@@ -259,17 +259,17 @@ pub(super) fn gather_centers(state: &mut FlipState, io: &mut Io<'_>) -> Outcome 
 
 /// Compares the pass, from the densities on the device.
 pub(super) fn find_water(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
-    let (elements, step, room) = (state.elements(), state.step(), state.room());
+    let (elements, step, space) = (state.elements(), state.step(), state.space());
     let (bricks, density) = (&elements.bricks, state.density());
-    let depth = find_depth(&state.model, &step, bricks, room, density);
-    let (reference, distances) = reference_find_water(&state.model, bricks, room, &depth);
+    let depth = find_depth(&state.model, &step, bricks, space, density);
+    let (reference, distances) = reference_find_water(&state.model, bricks, space, &depth);
     let cut = CUT.of([state.place()]);
     let active = elements.active();
     // Without averaging, a cell's own density leads to the same decision on both sides.
     let looked = each(active.clone(), |e| {
         let about = neighborhood().map(|offset| density[bricks.near(e as u32, offset) as usize]);
         let mean = OF_MEAN.of([about.fold(depth[e].share, f64::max)]);
-        let is_tie = is_near_half(&step, bricks, room, e as u32, NEAR_HALF.of([cut, mean]));
+        let is_tie = is_near_half(&step, bricks, space, e as u32, NEAR_HALF.of([cut, mean]));
         (mean, is_tie)
     });
     let looked = |e: usize| looked[e - active.start];
@@ -283,7 +283,7 @@ pub(super) fn find_water(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let is_near = |e: usize| {
         let Depth { share, cells, .. } = depth[e];
         let is_near_film = (share - LEAST_FILM).abs() <= of_half(e) || cells.abs() <= moved(e);
-        (share - 0.5).abs() <= of_half(e) || (room.hats[e] < 1.0 && is_near_film)
+        (share - 0.5).abs() <= of_half(e) || (space.hats[e] < 1.0 && is_near_film)
     };
     let is_tie = |e: usize| looked(e).1 || (is_averaged(e) && is_near(e));
     let kind = io.after.get(buffers::CELL_KIND, elements.cells)?;
@@ -296,17 +296,17 @@ pub(super) fn find_water(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
             (!is_tie(e)).then(|| pair(e, distance[e], distances[e], [moved(e), size]))
         });
     }
-    let room = Room {
+    let space = OpenSpace {
         kind,
-        ..room.clone()
+        ..space.clone()
     };
-    state.room = Some(room);
+    state.space = Some(space);
     Ok(())
 }
 
 pub(super) fn find_excess(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let (elements, density) = (state.elements(), state.density());
-    let reference = reference_find_excess(&state.step(), &elements.bricks, state.room(), density);
+    let reference = reference_find_excess(&state.step(), &elements.bricks, state.space(), density);
     let excess = elements.scalars(&io.after, buffers::DENSITY_EXCESS)?;
     let cut = CUT.of([state.place()]);
     io.table.each(&EXCESS, elements.active(), |e| {
@@ -324,7 +324,7 @@ pub(super) fn let_in(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
         true => elements.scalars(&io.before, buffers::DENSITY_EXCESS)?,
         false => Vec::new(),
     };
-    let mut reference = state.room().clone();
+    let mut reference = state.space().clone();
     reference.solid_flux = elements.scalars(&io.before, buffers::SOLID_FLUX)?;
     let (step, size) = (state.step(), state.model.cell_size());
     let inlets = state.model.scene.inlets(step.start, step.length);
@@ -348,7 +348,7 @@ pub(super) fn let_in(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
             pair(e, found[e], excess[e], [])
         });
     }
-    state.room = Some(Room {
+    state.space = Some(OpenSpace {
         solid_flux: found,
         ..reference
     });
@@ -357,11 +357,11 @@ pub(super) fn let_in(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
 
 pub(super) fn wall_friction(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let (elements, step) = (state.elements(), state.step());
-    let (bricks, room) = (&elements.bricks, state.room());
+    let (bricks, space) = (&elements.bricks, state.space());
     let before = elements.faces(&io.before)?;
-    let rates = friction_rates(&state.model, &step, bricks, room, &before);
+    let rates = friction_rates(&state.model, &step, bricks, space, &before);
     let mut reference = before.clone();
-    reference_wall_friction(&state.model, &step, bricks, room, &mut reference);
+    reference_wall_friction(&state.model, &step, bricks, space, &mut reference);
     let found = elements.faces(&io.after)?;
     let place = state.place();
     // Two components for each of four walls, each bounded by the largest speed around.
@@ -381,7 +381,12 @@ pub(super) fn find_change(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let elements = state.elements();
     let mut reference = elements.faces(&io.before)?;
     let before = reference.change.clone();
-    reference_find_change(&state.model, &elements.bricks, state.room(), &mut reference);
+    reference_find_change(
+        &state.model,
+        &elements.bricks,
+        state.space(),
+        &mut reference,
+    );
     let found = elements.faces(&io.after)?;
     let active = elements.active();
     io.table.each(&CHANGE, active.clone(), |e| {

@@ -15,11 +15,12 @@ use std::collections::BTreeMap;
 use glam::DVec3;
 
 use swell_domain::{
-    boundary::Boundary, particles::Particles, poisson::FLUID, solver::Solver, substep::Which,
+    boundary::Boundary, particles::Particles, poisson::FLUID, solver::Solver,
+    substep::SubstepChoice,
 };
 use swell_gpu::adapter::Context;
 use swell_reference::{
-    flip::{Given, Model, Room, Sorted, Step, is_filling},
+    flip::{GridTransfer, Model, OpenSpace, Sorted, Step, is_filling},
     poisson::iteration::Sum,
 };
 use swell_scene::{Scene, step::Substep};
@@ -97,7 +98,7 @@ pub fn check(
     plan: Plan,
     boundary: &Boundary,
     (frame, particles): (u32, &Particles),
-    which: Which,
+    which: SubstepChoice,
 ) -> Result<Checked, SolveError> {
     let mut solver = Flip::new(context, scene, plan, boundary, false)?;
     solver.load(frame, particles)?;
@@ -125,11 +126,11 @@ pub(crate) struct FlipState {
     pub(super) given_substep: Option<Substep>,
     elements: Option<Elements>,
     sorted: Option<Sorted>,
-    room: Option<Room>,
+    space: Option<OpenSpace>,
     /// Densities at cell centres, as on the device.
     density: Option<Vec<f64>>,
     assembled: Option<Assembled>,
-    given: Option<Given>,
+    given: Option<GridTransfer>,
     /// Number of runs of each pass of an iteration on each level.
     runs: BTreeMap<(&'static str, u32), usize>,
     /// Number of compared runs of pressure/multiply.
@@ -178,7 +179,7 @@ impl FlipState {
             given_substep: None,
             elements: None,
             sorted: None,
-            room: None,
+            space: None,
             density: None,
             assembled: None,
             given: None,
@@ -207,8 +208,8 @@ impl FlipState {
         }
     }
 
-    pub(super) fn room(&self) -> &Room {
-        self.room.as_ref().expect("after flip/cut_cells")
+    pub(super) fn space(&self) -> &OpenSpace {
+        self.space.as_ref().expect("after flip/cut_cells")
     }
 
     pub(super) fn density(&self) -> &[f64] {
@@ -232,9 +233,9 @@ fn boundary_work(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let pressure = elements.scalars(&io.after, solved::PRESSURE)?;
     let flux = elements.scalars(&io.after, buffers::SOLID_FLUX)?;
     let kind = io.before.get(buffers::CELL_KIND, elements.cells)?;
-    let (step, bricks, room) = (state.step(), &elements.bricks, state.room());
+    let (step, bricks, space) = (state.step(), &elements.bricks, state.space());
     let density = elements.scalars(&io.before, buffers::DENSITY)?;
-    let is_filling = |e: usize| is_filling(&step, bricks, room, &density, e as u32);
+    let is_filling = |e: usize| is_filling(&step, bricks, space, &density, e as u32);
     let wet = elements.wet();
     let sums = io.after.get(buffers::BOUNDARY_WORK, wet.len() / 64)?;
     let term = |e: usize| match kind[e] {

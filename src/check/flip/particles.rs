@@ -9,7 +9,7 @@ use crate::{
 };
 use swell_domain::bricks::Bricks;
 use swell_reference::flip::{
-    Given, Moved, Solid, advect as reference_advect, aim as reference_aim,
+    GridTransfer, Moved, Solid, advect as reference_advect, aim as reference_aim,
     grid_to_particle as reference_grid_to_particle, push_apart as reference_push_apart,
 };
 use swell_solve::{SolveError, flip::buffers, pressure::buffers as solved};
@@ -42,7 +42,7 @@ pub(super) fn grid_to_particle(state: &mut FlipState, io: &mut Io<'_>) -> Outcom
         bricks,
         sorted,
         &faces,
-        state.room(),
+        state.space(),
         shift.as_deref(),
     );
     let given = given(state, io, reference.is_drop.clone())?;
@@ -126,14 +126,14 @@ pub(super) fn aim(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
 
 /// Reads the values that the device transferred to each particle; `is_drop` follows from the
 /// device's cell kinds.
-fn given(state: &FlipState, io: &Io<'_>, is_drop: Vec<bool>) -> Result<Given, SolveError> {
+fn given(state: &FlipState, io: &Io<'_>, is_drop: Vec<bool>) -> Result<GridTransfer, SolveError> {
     let is_pushed = state.model.settings().density_correction || state.given_substep.is_some();
     let displacement = match is_pushed {
         true => io.after.vectors(buffers::PUSHED, state.n)?,
         false => vec![DVec3::ZERO; state.n],
     };
     let cloud = state.unsorted(&io.after)?;
-    Ok(Given {
+    Ok(GridTransfer {
         velocity: cloud.velocity,
         affine: cloud.affine,
         carried: io.after.vectors(buffers::CARRIED, state.n)?,

@@ -89,7 +89,7 @@ impl FlipState {
 
     fn waters(&self) -> Waters<'_> {
         let centers = &self.assembled().centers;
-        Waters::new(&self.model, &self.elements().bricks, self.room(), centers)
+        Waters::new(&self.model, &self.elements().bricks, self.space(), centers)
     }
 
     pub(super) fn precision(&self) -> Precision {
@@ -136,7 +136,7 @@ impl FlipState {
     /// Returns [`OF_DIFFERENCE`] of all terms, by element.
     fn difference_errors(&self, terms: &[Vec<f64>]) -> Vec<f64> {
         let near = &self.assembled().near;
-        let waters = Waters::new(&self.model, &self.elements().bricks, self.room(), near);
+        let waters = Waters::new(&self.model, &self.elements().bricks, self.space(), near);
         let mut errors = vec![0.0; self.elements().cells];
         for term in terms {
             let differences = waters.displace(&waters.by_element(self.system(), term));
@@ -149,11 +149,11 @@ impl FlipState {
 
     /// Returns Σ |f u| plus the magnitude of the solids' flux for each row.
     fn flow(&self, velocity: &[DVec3]) -> Vec<f64> {
-        let (bricks, room) = (&self.elements().bricks, self.room());
+        let (bricks, space) = (&self.elements().bricks, self.space());
         let of_row = |&element: &u32| {
             let through = |e: u32, axis: usize| {
                 let e = e as usize;
-                (room.open[e][axis] * velocity[e][axis]).abs()
+                (space.open[e][axis] * velocity[e][axis]).abs()
             };
             let sum: f64 = (0..3)
                 .map(|axis| {
@@ -162,7 +162,7 @@ impl FlipState {
                     through(element, axis) + through(bricks.near(element, up), axis)
                 })
                 .sum();
-            sum + room.solid_flux[element as usize].abs()
+            sum + space.solid_flux[element as usize].abs()
         };
         self.system().cell.iter().map(of_row).collect()
     }
@@ -223,7 +223,7 @@ fn build_system(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
         settings.pressure.preconditioner,
         Preconditioner::Jacobi | Preconditioner::Ipp
     );
-    let kinds = &state.room().kind;
+    let kinds = &state.space().kind;
     let outside = centers.distance.iter().zip(kinds);
     let near = Centers {
         distance: outside
@@ -235,7 +235,7 @@ fn build_system(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
         ..centers.clone()
     };
     let system_of =
-        |centers| Waters::new(&state.model, &elements.bricks, state.room(), centers).system();
+        |centers| Waters::new(&state.model, &elements.bricks, state.space(), centers).system();
     let (system, sizes) = (system_of(&centers), system_of(&near).dirichlet);
     let coefficient = io
         .after

@@ -10,7 +10,7 @@ use crate::{
     table::pair,
 };
 use swell_domain::places::{SKIN, are_near};
-use swell_reference::neighbors::{Crowd, Neighbors};
+use swell_reference::neighbors::{Neighbors, SortedPoints};
 use swell_solve::{
     SolveError,
     pbf::buffers,
@@ -72,7 +72,7 @@ impl PbfState {
         let mut order = self.model.cells.order(&points[..n], &ids);
         order.extend(n..points.len());
         let sorted: Vec<DVec3> = order.iter().map(|&k| points[k]).collect();
-        let crowd = Crowd {
+        let crowd = SortedPoints {
             cells: self.model.cells,
             points: &sorted,
             particles: n,

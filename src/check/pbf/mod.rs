@@ -10,7 +10,9 @@ mod work;
 
 use glam::DVec3;
 
-use swell_domain::{boundary::Boundary, particles::Particles, solver::Solver, substep::Which};
+use swell_domain::{
+    boundary::Boundary, particles::Particles, solver::Solver, substep::SubstepChoice,
+};
 use swell_gpu::adapter::Context;
 use swell_reference::{
     neighbors::Neighbors,
@@ -100,7 +102,7 @@ pub fn check(
     plan: Plan,
     [boundary, uploaded]: [&Boundary; 2],
     (frame, particles): (u32, &Particles),
-    which: Which,
+    which: SubstepChoice,
 ) -> Result<Checked, SolveError> {
     let mut solver = Pbf::new(context, scene, plan.clone(), uploaded, false)?;
     solver.load(frame, particles)?;
@@ -109,8 +111,8 @@ pub fn check(
     let length = scene.shot.frame_seconds();
     let time_step = length / f64::from(substeps);
     let number = match which {
-        Which::Number(number) => number,
-        Which::Last => substeps,
+        SubstepChoice::Number(number) => number,
+        SubstepChoice::Last => substeps,
     };
     let end = f64::from(frame) * length + f64::from(number) * time_step;
     let mut model = Model::new(scene, boundary);

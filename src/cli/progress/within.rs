@@ -17,7 +17,7 @@ pub(super) struct Within {
 
 /// What is due after a part, and the time estimate.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Told {
+pub(super) struct Notice {
     /// Whether a line is due.
     pub(super) line: bool,
     /// Whether an event is due.
@@ -37,7 +37,7 @@ impl Within {
         name: &str,
         (done, count): (u64, u64),
         now: Instant,
-    ) -> Told {
+    ) -> Notice {
         let same = under_way.as_mut().filter(|it| it.name == name && done > 0);
         let Some(within) = same else {
             *under_way = Some(Self {
@@ -46,7 +46,7 @@ impl Within {
                 line: now,
                 event: now,
             });
-            return Told {
+            return Notice {
                 line: false,
                 event: true,
                 elapsed: Duration::ZERO,
@@ -62,7 +62,7 @@ impl Within {
         };
         let elapsed = now - within.begun;
         let parts = count.saturating_sub(done) as f64 / done as f64;
-        Told {
+        Notice {
             line: due(&mut within.line, LINES),
             event: due(&mut within.event, EVENTS),
             elapsed,

@@ -27,7 +27,7 @@ const SLOWEST_GROUP: u32 = 40;
 
 /// Parameters of the waves, as in a scene.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Asked {
+pub struct SeaParameters {
     /// Distribution of energy over frequencies.
     pub spectrum: Spectrum,
     /// Peak period, seconds.
@@ -89,7 +89,7 @@ struct Wave {
 /// the wall within the domain.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sea {
-    asked: Asked,
+    asked: SeaParameters,
     waves: Vec<Wave>,
     /// Second-order solution, if requested.
     pairs: Option<Arc<Pairs>>,
@@ -101,7 +101,7 @@ impl Sea {
     /// Computes the wall's motion for these waves. In linear theory, a wall with speed u cos(ωt)
     /// makes waves in phase with it whose height is H/S times its stroke (Dean and Dalrymple
     /// 1991, §6).
-    pub fn new(asked: Asked) -> Self {
+    pub fn new(asked: SeaParameters) -> Self {
         let peak = asked.peak_period.recip();
         let step = peak / f64::from(LINES);
         let first = (LEAST_RATIO * f64::from(LINES)) as u32;
@@ -163,7 +163,7 @@ impl Sea {
     }
 
     /// Returns the parameters that this motion was derived from.
-    pub fn asked(&self) -> &Asked {
+    pub fn asked(&self) -> &SeaParameters {
         &self.asked
     }
 
@@ -259,8 +259,8 @@ impl Sea {
 mod tests {
     use super::*;
 
-    fn asked(phases: Phases) -> Asked {
-        Asked {
+    fn asked(phases: Phases) -> SeaParameters {
+        SeaParameters {
             spectrum: Spectrum::Jonswap,
             peak_period: 1.6,
             peak_enhancement: 3.3,
@@ -357,7 +357,7 @@ mod tests {
     #[test]
     fn in_shallow_water_the_elevation_is_the_walls_own_speed_on_its_way() {
         let depth = 0.01;
-        let sea = Sea::new(Asked {
+        let sea = Sea::new(SeaParameters {
             peak_period: 60.0,
             shortest_period: 30.0,
             ramp: 60.0,
@@ -429,7 +429,7 @@ mod tests {
             time: 14.0,
         };
         let [first, second] = [false, true].map(|second_order| {
-            Sea::new(Asked {
+            Sea::new(SeaParameters {
                 second_order,
                 ..asked(packet)
             })
@@ -451,7 +451,7 @@ mod tests {
     #[test]
     fn the_second_order_keeps_the_wall_in_place() {
         let first = sea(1);
-        let second = Sea::new(Asked {
+        let second = Sea::new(SeaParameters {
             second_order: true,
             ..first.asked.clone()
         });

@@ -6,8 +6,8 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::{
-    super::bounds::Bounds, Emitter, ON_FACE, PredictedInflow, Shape, Solids, Sources, flow, places,
-    swept,
+    super::bounds::Bounds, Emitter, ON_FACE, PredictedInflow, Shape, Solids, Sources, flow,
+    particles_along, swept,
 };
 
 /// Samples per spacing of a position's path through the volume.
@@ -335,7 +335,7 @@ struct Line {
 impl Line {
     fn of(bounds: &Bounds, axis: usize, speed: f64, spacing: f64) -> Self {
         let (min, max) = (bounds.min[axis], bounds.max[axis]);
-        let places = (speed == 0.0).then(|| places(max - min, spacing));
+        let places = (speed == 0.0).then(|| particles_along(max - min, spacing));
         // Across the flow, positions are centred.
         let first = match places {
             Some(n) => 0.5 * (min + max) - 0.5 * spacing * (n as f64 - 1.0),

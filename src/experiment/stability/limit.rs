@@ -61,7 +61,7 @@ pub(super) fn find(
             name = format!("{name}: {}", found.words(&limit.unit));
             bench.count = (bench.count + found.tries).saturating_sub(most);
         }
-        bench.told(name, status);
+        bench.report_point(name, status);
     }
     Ok(Some(found))
 }

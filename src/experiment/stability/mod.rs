@@ -17,7 +17,7 @@ use swell_scene::Scene;
 
 use super::{
     PointStatus, StudyError,
-    engine::{Bench, Kind, Place, needs_of},
+    engine::{Bench, Kind, WorkUnit, needs_of},
     ledger::Ledger,
     report::Report,
 };
@@ -58,15 +58,15 @@ impl Kind for Stability {
 
     /// Trials, then searches for limits, which take many runs each. Expected refusals are only
     /// tried by the whole study.
-    fn places(&self) -> Option<Vec<Place>> {
+    fn work_units(&self) -> Option<Vec<WorkUnit>> {
         let trials = |held: &Held| match held {
             Held::Runs(trials) => trials.len(),
             Held::Test(_) | Held::Refusal { .. } => 0,
         };
         let trials: usize = self.cases.iter().map(|case| trials(&case.held)).sum();
-        let mut places = vec![Place::of(0); trials];
+        let mut places = vec![WorkUnit::of(0); trials];
         for limit in &self.limits {
-            let search = Place {
+            let search = WorkUnit {
                 rank: 1,
                 points: limit::most_tries(limit),
             };
@@ -91,7 +91,7 @@ impl Kind for Stability {
                         let method = trial.scene.solver.method.name();
                         let name = format!("{title}, {method}, {}", trial.device.name());
                         if let Some((run, stood)) = point(bench, &mut ledger, &name, trial)? {
-                            bench.told(name, run.status(trial, stood));
+                            bench.report_point(name, run.status(trial, stood));
                             of_case.push(run);
                         }
                     }
@@ -106,7 +106,7 @@ impl Kind for Stability {
                             ..Run::default()
                         });
                         let name = format!("{title}, {method}, {device}");
-                        bench.told(name, PointStatus::Done(0.0, Vec::new()));
+                        bench.report_point(name, PointStatus::Done(0.0, Vec::new()));
                     }
                 }
             }

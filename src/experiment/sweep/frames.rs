@@ -5,7 +5,7 @@ use glam::{DVec3, Vec3};
 use swell_domain::particles::Particles;
 use swell_files::study::sweep::{ErrorMeasure, Measure, Point, SAMPLES, Sweep};
 use swell_reference::{
-    neighbors::{Cells, Crowd, Neighbors},
+    neighbors::{Cells, Neighbors, SortedPoints},
     pbf::constraint::distance_to_converged,
 };
 use swell_scene::{Method, Scene, flip::Preconditioner};
@@ -171,7 +171,7 @@ fn neighbor_visits(scene: &Scene, end: &Particles, run: &Measured) -> f64 {
     let cells = Cells::periodic(scene.domain.size(), radius, scene.period());
     let order = cells.order(&positions, &end.id);
     let points: Vec<DVec3> = order.iter().map(|&k| positions[k]).collect();
-    let crowd = Crowd {
+    let crowd = SortedPoints {
         cells,
         points: &points,
         particles: points.len(),

@@ -14,7 +14,7 @@ use swell_study::measure::Gauge;
 
 use super::{
     PointStatus, StudyError,
-    engine::{Bench, Kind, Place, needs_of},
+    engine::{Bench, Kind, WorkUnit, needs_of},
     ledger::Key,
     report::Report,
 };
@@ -30,9 +30,15 @@ impl Kind for Sweep {
         self.points().count() + self.lines.iter().flat_map(|line| &line.coarser).count()
     }
 
-    fn places(&self) -> Option<Vec<Place>> {
+    fn work_units(&self) -> Option<Vec<WorkUnit>> {
         let of_line = |line: &Line| 0..line.points.iter().chain(&line.coarser).count();
-        Some(self.lines.iter().flat_map(of_line).map(Place::of).collect())
+        Some(
+            self.lines
+                .iter()
+                .flat_map(of_line)
+                .map(WorkUnit::of)
+                .collect(),
+        )
     }
 
     fn run(&self, bench: &mut Bench<'_>) -> Result<Option<Report>, StudyError> {
@@ -59,7 +65,7 @@ impl Kind for Sweep {
                 let key = lab.key(bench, point, finest);
                 let measure = || lab.measure(bench, point, finest);
                 if let Some((run, stood)) = bench.point(&mut ledger, &name, key, measure)? {
-                    bench.told(name, status(&self.errors, &run, stood));
+                    bench.report_point(name, status(&self.errors, &run, stood));
                     of_line.push(run);
                 }
             }

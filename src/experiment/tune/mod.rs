@@ -26,7 +26,7 @@ use swell_study::{
 
 use super::{
     PointStatus, StudyError,
-    engine::{Bench, Kind, Place, needs_of},
+    engine::{Bench, Kind, WorkUnit, needs_of},
     ledger::Ledger,
     report::Report,
 };
@@ -102,8 +102,8 @@ impl Kind for Tune {
 
     /// Runs that are known in advance, the coarsest first; proposals are only run by the whole
     /// study.
-    fn places(&self) -> Option<Vec<Place>> {
-        Some((0..self.variants().count()).map(Place::of).collect())
+    fn work_units(&self) -> Option<Vec<WorkUnit>> {
+        Some((0..self.variants().count()).map(WorkUnit::of).collect())
     }
 
     fn run(&self, bench: &mut Bench<'_>) -> Result<Option<Report>, StudyError> {
@@ -272,7 +272,7 @@ impl<'a> Lab<'a> {
             Some(message) => PointStatus::Failed(message.clone()),
             None => PointStatus::Done(1e3 * run.per_frame()[1], Vec::new()),
         };
-        bench.told(name, status);
+        bench.report_point(name, status);
         Ok(Some(run))
     }
 

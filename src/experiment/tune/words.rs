@@ -7,7 +7,7 @@ use super::{super::sweep::digits::significant, Results, Trial, model::floor};
 
 impl Results<'_> {
     /// Formats an error in the unit of its limit: `1.7 %` or `0.043 m`.
-    pub(super) fn told(&self, limit: &Limit, value: f64) -> String {
+    pub(super) fn describe(&self, limit: &Limit, value: f64) -> String {
         match limit.bound {
             Bound::Part(_) => format!("{} %", significant(self.in_unit(limit, value))),
             Bound::Absolute(_) => {
@@ -49,12 +49,15 @@ impl Results<'_> {
         let of = |(k, limit): (usize, &Limit)| {
             let name = limit.quantity.name();
             let off = match errors[k] {
-                Some(off) => format!("{name} {} off", self.told(limit, off)),
+                Some(off) => format!("{name} {} off", self.describe(limit, off)),
                 None => format!("{name} not measured"),
             };
             let laws = match &predicted {
                 Some(predicted) => {
-                    format!(", the laws say {}", self.told(limit, predicted.errors[k]))
+                    format!(
+                        ", the laws say {}",
+                        self.describe(limit, predicted.errors[k])
+                    )
                 }
                 None => String::new(),
             };
@@ -167,7 +170,7 @@ impl Results<'_> {
             let name = limit.quantity.name();
             let what = format!(
                 "{name}: a millionth more gravity changes it by {} at {}",
-                self.told(limit, floor),
+                self.describe(limit, floor),
                 own.variant.name()
             );
             Some(if floor > *allowed {
@@ -195,7 +198,7 @@ impl Results<'_> {
             .partition(|(_, law)| law.is_seen());
         let seen: Vec<_> = (seen.iter())
             .map(|(limit, law)| {
-                let own = self.told(limit, law.of_reference());
+                let own = self.describe(limit, law.of_reference());
                 format!("{} {own}", limit.quantity.name())
             })
             .collect();
@@ -235,7 +238,7 @@ impl Results<'_> {
         let limits = self.tune.request.limits.iter().zip(&fitted.first.errors);
         rows.extend(limits.map(|(limit, law)| {
             let own = match law.reference > 0.0 && law.is_seen() {
-                true => self.told(limit, law.of_reference()),
+                true => self.describe(limit, law.of_reference()),
                 false => String::new(),
             };
             row(limit.quantity.title().to_owned(), law, own)
@@ -290,7 +293,7 @@ impl Results<'_> {
                     format!(
                         "{} {sign}{}",
                         limit.quantity.name(),
-                        self.told(limit, added.abs())
+                        self.describe(limit, added.abs())
                     )
                 });
                 let errors = errors.collect::<Vec<_>>().join(", ");

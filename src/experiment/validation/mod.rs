@@ -17,7 +17,7 @@ use swell_stage::{drive::Drive, prepare::Start};
 
 use super::{
     Devices, PointStatus, StudyError,
-    engine::{Bench, Kind, Place, needs_of, until_done},
+    engine::{Bench, Kind, WorkUnit, needs_of, until_done},
     report::Report,
 };
 use record::Record;
@@ -51,13 +51,13 @@ impl Kind for Validation {
             .sum()
     }
 
-    fn places(&self) -> Option<Vec<Place>> {
+    fn work_units(&self) -> Option<Vec<WorkUnit>> {
         let of_benchmark = |benchmark: &Benchmark| 0..benchmark.runs.len();
         Some(
             self.benchmarks
                 .iter()
                 .flat_map(of_benchmark)
-                .map(Place::of)
+                .map(WorkUnit::of)
                 .collect(),
         )
     }
@@ -82,7 +82,7 @@ impl Kind for Validation {
                     .key(&scenes, trial.scene.shot.frames, &measured);
                 let measure = || run_benchmark(bench.devices, benchmark, trial, bench.stop);
                 if let Some((run, stood)) = bench.point(&mut ledger, &name, key, measure)? {
-                    bench.told(name, status(&run, stood));
+                    bench.report_point(name, status(&run, stood));
                     runs.push(run);
                 }
             }

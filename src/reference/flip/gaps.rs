@@ -6,7 +6,7 @@ use swell_domain::{
 };
 
 use super::{
-    Model, Room, Step,
+    Model, OpenSpace, Step,
     grid::{along, corner, per_cell},
     water::open_parts,
 };
@@ -49,7 +49,7 @@ pub struct Gaps<'a> {
     /// Layout of the elements.
     pub bricks: &'a Bricks,
     /// Open space, with cell kinds from [`super::find_water`].
-    pub room: &'a Room,
+    pub space: &'a OpenSpace,
     /// Relative densities from [`super::gather_centers`].
     pub density: &'a [f64],
     /// Velocities at the lower faces, including gravity, m/s. Shape (elements, 3 components).
@@ -59,9 +59,9 @@ pub struct Gaps<'a> {
 impl Gaps<'_> {
     /// Returns the length along an axis that a cell lacks, in cells.
     fn lack(&self, element: u32, axis: usize) -> f64 {
-        let parts = open_parts(self.step, self.bricks, self.room, element);
-        let room = (parts[axis] * parts[3]).min(1.0);
-        room * (1.0 - self.density[element as usize]).clamp(0.0, 1.0)
+        let parts = open_parts(self.step, self.bricks, self.space, element);
+        let space = (parts[axis] * parts[3]).min(1.0);
+        space * (1.0 - self.density[element as usize]).clamp(0.0, 1.0)
     }
 
     /// Returns the area of a cell's faces across an axis that walls leave open.
@@ -78,13 +78,13 @@ impl Gaps<'_> {
             let here = self.bricks.near(element, along(axis, side * k));
             let there = self.bricks.near(element, along(axis, side * (k + 1)));
             let face = if side > 0 { there } else { here } as usize;
-            let open = self.room.open[face][axis];
+            let open = self.space.open[face][axis];
             let least = (LEAST_WAY + lean) * self.across(here, axis);
             if (side < 0 || there >= CELLS) && open < least {
                 // On a partly closed face the velocity is that of the water.
                 let moves = !self.model.scene.moving_solids.is_empty();
                 end.velocity = match open > 0.0 {
-                    true if moves => self.room.closed_velocity[face][axis],
+                    true if moves => self.space.closed_velocity[face][axis],
                     true => 0.0,
                     false => self.velocity[face][axis],
                 };
@@ -110,7 +110,7 @@ impl Gaps<'_> {
     /// cells: the missing length times the area across; `None` if no gap closes. `lean` shifts the
     /// thresholds, to find decisions that rounding may change.
     pub fn filled(&self, element: u32, lean: f64) -> Option<f64> {
-        let is_looked_at = self.room.kind[element as usize] == AIR;
+        let is_looked_at = self.space.kind[element as usize] == AIR;
         let is_wet = element < CELLS * (self.bricks.wet + 1);
         let along_axis = |axis: usize| {
             let low = self.end(element, axis, -1, lean)?;
@@ -136,16 +136,16 @@ impl Gaps<'_> {
 
 /// Turns the cells of closing gaps into water: returns the updated kinds and fluxes, and updates
 /// the distances to the surface, metres.
-pub fn close_gaps(gaps: &Gaps<'_>, distance: &mut [f64]) -> Room {
+pub fn close_gaps(gaps: &Gaps<'_>, distance: &mut [f64]) -> OpenSpace {
     let filled = per_cell(gaps.bricks, |element| gaps.filled(element, 0.0));
     let size = gaps.model.cell_size();
-    let mut room = gaps.room.clone();
+    let mut space = gaps.space.clone();
     for (e, part) in filled.into_iter().enumerate() {
         if let Some(part) = part {
-            room.kind[e] = FLUID;
-            room.solid_flux[e] += part * size / gaps.step.length;
+            space.kind[e] = FLUID;
+            space.solid_flux[e] += part * size / gaps.step.length;
             distance[e] = -size;
         }
     }
-    room
+    space
 }

@@ -29,9 +29,9 @@ pub use rotation::{grid_confinement, grid_curl};
 pub use solids::Solid;
 pub use solver::{Flip, Trace};
 pub use sort::{Cloud, Sorted, Survey, assign_cells, reorder, survey};
-pub use to_grid::{Faces, Room, cut_cells, gather_faces};
+pub use to_grid::{Faces, OpenSpace, cut_cells, gather_faces};
 pub use to_particles::{
-    Given, Moved, advect, aim, extrapolate, find_change, grid_to_particle, push_apart,
+    GridTransfer, Moved, advect, aim, extrapolate, find_change, grid_to_particle, push_apart,
 };
 pub use wall_friction::{friction_rates, wall_friction};
 pub use water::{

@@ -4,7 +4,7 @@
 use glam::DVec3;
 
 use super::{
-    Centers, Model, Room,
+    Centers, Model, OpenSpace,
     grid::{along, per_cell, planes},
 };
 use swell_domain::{
@@ -16,7 +16,7 @@ use swell_domain::{
 #[derive(Clone, Debug)]
 pub struct Waters<'a> {
     bricks: &'a Bricks,
-    room: &'a Room,
+    space: &'a OpenSpace,
     /// Open fractions of the lower faces, as planes.
     open: Vec<f64>,
     distance: Option<&'a [f64]>,
@@ -24,11 +24,16 @@ pub struct Waters<'a> {
 
 impl<'a> Waters<'a> {
     /// Collects the inputs of a substep; the ghost-fluid surface is included if the scene uses it.
-    pub fn new(model: &Model, bricks: &'a Bricks, room: &'a Room, centers: &'a Centers) -> Self {
+    pub fn new(
+        model: &Model,
+        bricks: &'a Bricks,
+        space: &'a OpenSpace,
+        centers: &'a Centers,
+    ) -> Self {
         Self {
             bricks,
-            room,
-            open: planes(&room.open),
+            space,
+            open: planes(&space.open),
             distance: model.has_ghost_fluid().then_some(&centers.distance),
         }
     }
@@ -37,7 +42,7 @@ impl<'a> Waters<'a> {
     pub fn cells(&self) -> Cells<'_, f64> {
         Cells {
             bricks: self.bricks,
-            kind: &self.room.kind,
+            kind: &self.space.kind,
             open: &self.open,
             distance: self.distance,
         }
@@ -50,12 +55,12 @@ impl<'a> Waters<'a> {
 
     /// Reference pass of `pressure/divergence`: −(Σ ± f u + solid flux) for each row, m/s.
     pub fn divergence(&self, system: &System, velocity: &[DVec3]) -> Vec<f64> {
-        system.rhs(self.cells(), &planes(velocity), &self.room.solid_flux)
+        system.rhs(self.cells(), &planes(velocity), &self.space.solid_flux)
     }
 
     /// Converts values per row to values per element; 0 where there is no row.
     pub fn by_element(&self, system: &System, rows: &[f64]) -> Vec<f64> {
-        let mut values = vec![0.0; self.room.kind.len()];
+        let mut values = vec![0.0; self.space.kind.len()];
         for (&element, &value) in system.cell.iter().zip(rows) {
             values[element as usize] = value;
         }
@@ -66,11 +71,11 @@ impl<'a> Waters<'a> {
     /// flow.
     fn differences(&self, q: &[f64]) -> Vec<DVec3> {
         let cells = self.cells();
-        let kind = |e: u32| self.room.kind[e as usize];
+        let kind = |e: u32| self.space.kind[e as usize];
         per_cell(self.bricks, |own| {
             DVec3::from_array([0, 1, 2].map(|axis| {
                 let before = self.bricks.near(own, along(axis, -1));
-                if self.room.open[own as usize][axis] <= 0.0 {
+                if self.space.open[own as usize][axis] <= 0.0 {
                     return 0.0;
                 }
                 let part = match (kind(before), kind(own)) {

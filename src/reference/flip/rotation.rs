@@ -3,13 +3,13 @@
 use glam::DVec3;
 
 use super::{
-    Model, Room, Step,
+    Model, OpenSpace, Step,
     grid::{along, per_cell},
 };
 use swell_domain::{bricks::Bricks, poisson::FLUID};
 
-fn is_water(room: &Room, element: u32) -> bool {
-    room.kind[element as usize] == FLUID
+fn is_water(space: &OpenSpace, element: u32) -> bool {
+    space.kind[element as usize] == FLUID
 }
 
 /// Returns the mean velocity of a cell's faces along each axis.
@@ -20,16 +20,21 @@ fn at_center(bricks: &Bricks, velocity: &[DVec3], element: u32) -> DVec3 {
 
 /// Returns ω = ∇ × u at the centres of cells with water, 1/s, by differences between the
 /// neighbouring cells; one-sided if a neighbour has no water. Shape (elements).
-pub fn grid_curl(model: &Model, bricks: &Bricks, room: &Room, velocity: &[DVec3]) -> Vec<DVec3> {
+pub fn grid_curl(
+    model: &Model,
+    bricks: &Bricks,
+    space: &OpenSpace,
+    velocity: &[DVec3],
+) -> Vec<DVec3> {
     per_cell(bricks, |element| {
-        if !is_water(room, element) {
+        if !is_water(space, element) {
             return DVec3::ZERO;
         }
         let slope = |axis: usize| {
             let [before, after] = [-1, 1].map(|step| bricks.near(element, along(axis, step)));
-            let count = [before, after].map(|e| f64::from(u8::from(is_water(room, e))));
+            let count = [before, after].map(|e| f64::from(u8::from(is_water(space, e))));
             let value = |e: u32| {
-                let kept = if is_water(room, e) { e } else { element };
+                let kept = if is_water(space, e) { e } else { element };
                 at_center(bricks, velocity, kept)
             };
             (value(after) - value(before)) / (model.cell_size() * (count[0] + count[1]).max(1.0))
@@ -45,7 +50,7 @@ pub fn grid_confinement(
     model: &Model,
     step: &Step<'_>,
     bricks: &Bricks,
-    room: &Room,
+    space: &OpenSpace,
     strength: f64,
     vorticity: &[DVec3],
     velocity: &[DVec3],
@@ -80,9 +85,9 @@ pub fn grid_confinement(
     per_cell(bricks, |element| {
         let e = element as usize;
         let pushed = |axis: usize| {
-            let is_between = is_water(room, element)
-                && is_water(room, bricks.near(element, along(axis, -1)))
-                && room.open[e][axis] > 0.0;
+            let is_between = is_water(space, element)
+                && is_water(space, bricks.near(element, along(axis, -1)))
+                && space.open[e][axis] > 0.0;
             if is_between {
                 confinement(element, axis)
             } else {

@@ -3,7 +3,7 @@
 use glam::{DMat3, DVec3, Vec3};
 
 use super::{
-    Centers, Cloud, Faces, Gaps, Given, Model, Room, Sorted, Step, Waters, advect, aim,
+    Centers, Cloud, Faces, Gaps, GridTransfer, Model, OpenSpace, Sorted, Step, Waters, advect, aim,
     assign_cells, close_gaps, cut_cells,
     effects::{self, Flying, Water},
     extrapolate, find_buried, find_change, find_depth, find_excess, find_water, gather_centers,
@@ -59,7 +59,7 @@ pub struct Trace {
     /// Particles at the substep's start, sorted by cell.
     pub sorted: Sorted,
     /// Open space of the cells.
-    pub room: Room,
+    pub space: OpenSpace,
     /// Densities at cell centres.
     pub centers: Centers,
     /// Face velocities after the extrapolation of the last layer.
@@ -76,7 +76,7 @@ pub struct Trace {
     pub displacement: Option<Vec<DVec3>>,
     /// Values transferred from the grid to the particles, in the order of `sorted`, before the
     /// particles moved.
-    pub given: Given,
+    pub given: GridTransfer,
     /// Particles at the substep's end, in the order of `sorted`.
     pub after: Cloud,
     /// Number of particles whose displacement was reduced to the cap.
@@ -168,31 +168,31 @@ impl Flip {
             let sorted = reorder(&bricks, cloud, &cell);
             (bricks, sorted)
         });
-        let mut room = timings.time("flip/cut_cells", || cut_cells(model, &step, &bricks));
+        let mut space = timings.time("flip/cut_cells", || cut_cells(model, &step, &bricks));
         let flying = Flying {
             model,
             step: &step,
             bricks: &bricks,
-            kind: &room.kind,
+            kind: &space.kind,
         };
         effects::on_particles(&model.scene.effects, flying, &mut sorted, timings);
         let mut faces = timings.time("flip/gather_faces", || {
-            gather_faces(model, &step, &bricks, &sorted, &room)
+            gather_faces(model, &step, &bricks, &sorted, &space)
         });
         let density = timings.time("flip/gather_centers", || {
-            gather_centers(model, &step, &bricks, &sorted, &room)
+            gather_centers(model, &step, &bricks, &sorted, &space)
         });
         let (kind, mut distance) = timings.time("flip/find_water", || {
-            let depth = find_depth(model, &step, &bricks, &room, &density);
-            find_water(model, &bricks, &room, &depth)
+            let depth = find_depth(model, &step, &bricks, &space, &density);
+            find_water(model, &bricks, &space, &depth)
         });
-        room.kind = kind;
-        room = timings.time("flip/close_gaps", || {
+        space.kind = kind;
+        space = timings.time("flip/close_gaps", || {
             let gaps = Gaps {
                 model,
                 step: &step,
                 bricks: &bricks,
-                room: &room,
+                space: &space,
                 density: &density,
                 velocity: &faces.velocity,
             };
@@ -200,7 +200,7 @@ impl Flip {
         });
         let mut excess = match model.settings().density_correction {
             true => timings.time("flip/find_excess", || {
-                find_excess(&step, &bricks, &room, &density)
+                find_excess(&step, &bricks, &space, &density)
             }),
             false => Vec::new(),
         };
@@ -208,7 +208,7 @@ impl Flip {
             timings.time("flip/let_in", || {
                 let inlets = model.scene.inlets(step.start, step.length);
                 let size = model.cell_size();
-                let_in(&inlets, size, &bricks, &mut room, &density, &mut excess);
+                let_in(&inlets, size, &bricks, &mut space, &density, &mut excess);
             });
         }
         let centers = Centers {
@@ -219,19 +219,19 @@ impl Flip {
         let acts_between = model.scene.effects.act_between_projections();
         if !model.scene.no_slip.is_empty() && !acts_between {
             timings.time("flip/wall_friction", || {
-                wall_friction(model, &step, &bricks, &room, &mut faces);
+                wall_friction(model, &step, &bricks, &space, &mut faces);
             });
         }
         let water = Water {
             model,
             step: &step,
             bricks: &bricks,
-            room: &room,
+            space: &space,
             centers: &centers,
             old: &faces.change,
         };
         effects::on_faces(&model.scene.effects, water, &mut faces.velocity, timings);
-        let waters = Waters::new(model, &bricks, &room, &centers);
+        let waters = Waters::new(model, &bricks, &space, &centers);
         let project = |centers, faces: &mut Faces, timings: &mut Timings| {
             project(model, timings, *factor_budget, &waters, centers, faces)
         };
@@ -242,7 +242,7 @@ impl Flip {
                 model,
                 step: &step,
                 bricks: &bricks,
-                room: &room,
+                space: &space,
                 centers: &centers,
                 old: &faces.change,
             };
@@ -251,14 +251,14 @@ impl Flip {
         }
         let (projected, displacement) = project(Some(&centers), &mut faces, timings)?;
         timings.time("flip/extrapolate", || {
-            find_change(model, &bricks, &room, &mut faces);
+            find_change(model, &bricks, &space, &mut faces);
             for layer in 2..=step.layers as u32 {
                 extrapolate(&step, &bricks, layer, &mut faces);
             }
         });
         let mut given = timings.time("flip/grid_to_particle", || {
             let displacement = displacement.as_deref();
-            grid_to_particle(model, &step, &bricks, &sorted, &faces, &room, displacement)
+            grid_to_particle(model, &step, &bricks, &sorted, &faces, &space, displacement)
         });
         if displacement.is_some() {
             let pushed = timings.time("flip/push_apart", || {
@@ -292,7 +292,7 @@ impl Flip {
             given,
             bricks,
             sorted,
-            room,
+            space,
             centers,
             faces,
             projected,
@@ -323,9 +323,9 @@ impl Flip {
         let step = self.model.step(substep);
         let taken = |change: &DVec3| (-*change / substep.kick).as_vec3().to_array();
         self.field = Some(Field {
-            is_buried: find_buried(&step, &trace.bricks, &trace.room),
+            is_buried: find_buried(&step, &trace.bricks, &trace.space),
             bricks: trace.bricks.clone(),
-            kind: trace.room.kind.clone(),
+            kind: trace.space.kind.clone(),
             pressure: trace.pressure.clone(),
             taken: trace.faces.change.iter().map(taken).collect(),
         });
@@ -509,12 +509,12 @@ impl Flip {
 impl Model {
     /// Returns the work of walls and solids that move in a substep, joules (flip/boundary_work).
     fn boundary_work(&self, step: &Step<'_>, trace: &Trace) -> f64 {
-        let Trace { bricks, room, .. } = trace;
-        let terms = (0..room.kind.len()).map(|e| {
-            let is_filling = is_filling(step, bricks, room, &trace.centers.density, e as u32);
+        let Trace { bricks, space, .. } = trace;
+        let terms = (0..space.kind.len()).map(|e| {
+            let is_filling = is_filling(step, bricks, space, &trace.centers.density, e as u32);
             match is_filling {
                 true => 0.0,
-                false => -trace.pressure[e] * room.solid_flux[e],
+                false => -trace.pressure[e] * space.solid_flux[e],
             }
         });
         let sum: f64 = terms.sum();

@@ -24,7 +24,7 @@ const LEAST_OPEN: f64 = 0.02;
 
 /// The space that walls and solids leave open for water.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Room {
+pub struct OpenSpace {
     /// [`AIR`], [`FLUID`](swell_domain::poisson::FLUID) or [`SOLID`]. Shape (elements), as for
     /// every array here.
     pub kind: Vec<u32>,
@@ -120,7 +120,7 @@ pub(super) fn hats(model: &Model, bricks: &Bricks, sorted: &Sorted) -> Vec<Hats>
 /// Computes the open fractions of each cell and of its lower faces, and the flux of solids through
 /// the closed parts (Batty et al. 2007). [`super::find_water`] later decides which open cells are
 /// water.
-pub fn cut_cells(model: &Model, step: &Step<'_>, bricks: &Bricks) -> Room {
+pub fn cut_cells(model: &Model, step: &Step<'_>, bricks: &Bricks) -> OpenSpace {
     #[derive(Clone, Default)]
     struct Cell {
         kind: u32,
@@ -202,7 +202,7 @@ pub fn cut_cells(model: &Model, step: &Step<'_>, bricks: &Bricks) -> Room {
         }
     };
     let cells = per_cell(bricks, of_cell);
-    Room {
+    OpenSpace {
         kind: cells.iter().map(|cell| cell.kind).collect(),
         open: cells.iter().map(|cell| cell.open).collect(),
         solid_flux: cells.iter().map(|cell| cell.flux).collect(),
@@ -219,7 +219,7 @@ pub fn gather_faces(
     step: &Step<'_>,
     bricks: &Bricks,
     sorted: &Sorted,
-    room: &Room,
+    space: &OpenSpace,
 ) -> Faces {
     let hats = hats(model, bricks, sorted);
     let sums = per_cell(bricks, |element| {
@@ -240,9 +240,9 @@ pub fn gather_faces(
     let change: Vec<DVec3> = sums.iter().map(mean).collect();
     let velocity = per_cell(bricks, |element| {
         let e = element as usize;
-        let is_closed = room.open[e].cmpeq(DVec3::ZERO);
+        let is_closed = space.open[e].cmpeq(DVec3::ZERO);
         let moved = change[e] + step.velocity_step;
-        DVec3::select(is_closed, room.closed_velocity[e], moved)
+        DVec3::select(is_closed, space.closed_velocity[e], moved)
     });
     let is_known = |weight: DVec3| weight.cmpgt(DVec3::ZERO).bitmask();
     let layer = |&(_, weight): &(DVec3, DVec3)| {

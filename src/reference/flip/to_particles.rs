@@ -4,7 +4,7 @@ use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
 use super::{
-    Faces, Model, Room, Sorted, Step,
+    Faces, Model, OpenSpace, Sorted, Step,
     grid::{along, neighborhood, per_cell},
     solids,
 };
@@ -23,7 +23,7 @@ const NO_NEED: u32 = 0x7f_7f7f;
 
 /// Values transferred from the grid to each particle, in sorted order.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Given {
+pub struct GridTransfer {
     /// New velocity of the particle, m/s. Shape (particles).
     pub velocity: Vec<DVec3>,
     /// New affine matrix, 1/s. Shape (particles) for APIC, else empty.
@@ -58,17 +58,17 @@ fn is_known(tags: u32, axis: usize) -> bool {
 
 /// Marks the faces to which the projection gave a velocity (layer 1), and stores the change of
 /// velocity.
-pub fn find_change(model: &Model, bricks: &Bricks, room: &Room, faces: &mut Faces) {
+pub fn find_change(model: &Model, bricks: &Bricks, space: &OpenSpace, faces: &mut Faces) {
     let tags = per_cell(bricks, |element| {
         let e = element as usize;
-        let own = room.kind[e];
+        let own = space.kind[e];
         if (bricks.cell(element).iter().zip(&model.cells)).any(|(cell, cells)| cell > cells) {
             return NO_NEED;
         }
         let found = |axis: usize| {
             let before = bricks.near(element, along(axis, -1));
-            let kind = room.kind[before as usize];
-            let is_closed = room.open[e][axis] == 0.0;
+            let kind = space.kind[before as usize];
+            let is_closed = space.open[e][axis] == 0.0;
             // A closed face between two solid cells has no velocity of its own; slot 0 lies beyond
             // the domain.
             let is_buried = own == SOLID && (kind == SOLID || before < CELLS);
@@ -211,16 +211,16 @@ pub fn grid_to_particle(
     bricks: &Bricks,
     sorted: &Sorted,
     faces: &Faces,
-    room: &Room,
+    space: &OpenSpace,
     displacement: Option<&[DVec3]>,
-) -> Given {
+) -> GridTransfer {
     let is_apic = !sorted.cloud.affine.is_empty();
     let size = model.cell_size();
     let of_cell = |element: u32| {
         let stencils = [0, 1, 2].map(|axis| stencil(model, bricks, element, axis));
         // Weight of each face; closed faces count fully, with the velocity of the wall or solid.
         let parts = [0, 1, 2].map(|axis| {
-            stencils[axis].map(|e| match room.open[e][axis] {
+            stencils[axis].map(|e| match space.open[e][axis] {
                 open if open > 0.0 && !step.solids.is_empty() => open,
                 _ => 1.0,
             })
@@ -236,7 +236,7 @@ pub fn grid_to_particle(
         let shift = displacement.map(|of| by_parts(values(of)));
         let cell = super::grid::corner(bricks, element);
         let is_near = |kind| {
-            let of = |offset| room.kind[bricks.near(element, offset) as usize];
+            let of = |offset| space.kind[bricks.near(element, offset) as usize];
             neighborhood().any(|offset| of(within(model, bricks, element, offset)) == kind)
         };
         let is_drop = !is_near(FLUID);
@@ -322,7 +322,7 @@ pub fn grid_to_particle(
         .filter(|&element| !sorted.of(element).is_empty())
         .flat_map_iter(of_cell)
         .collect();
-    Given {
+    GridTransfer {
         velocity: all.iter().map(|given| given.0).collect(),
         affine: (all.iter().filter(|_| is_apic))
             .map(|given| given.1)
@@ -336,7 +336,7 @@ pub fn grid_to_particle(
 /// Displaces each particle so that its own new velocity takes it to where the grid's velocity would
 /// take it from its original position; isolated droplets keep theirs. Adds the displacement of each
 /// (flip/aim). Metres. Shape (particles), in sorted order.
-pub fn aim(step: &Step<'_>, position: &[DVec3], given: &Given) -> Vec<DVec3> {
+pub fn aim(step: &Step<'_>, position: &[DVec3], given: &GridTransfer) -> Vec<DVec3> {
     let one = |(i, &x): (usize, &DVec3)| {
         let beside = match given.is_drop[i] {
             true => DVec3::ZERO,
@@ -467,7 +467,7 @@ pub fn advect(
     bricks: &Bricks,
     position: &[DVec3],
     velocity: &[DVec3],
-    given: &Given,
+    given: &GridTransfer,
 ) -> Moved {
     let contact = model.contact_distance();
     let (low, high) = (step.walls.min + contact, step.walls.max - contact);

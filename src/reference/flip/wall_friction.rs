@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::{
-    Faces, Model, Room, Step,
+    Faces, Model, OpenSpace, Step,
     grid::{corner, per_cell},
 };
 use swell_domain::{bricks::Bricks, flip::VON_KARMAN};
@@ -18,10 +18,10 @@ pub fn wall_friction(
     model: &Model,
     step: &Step<'_>,
     bricks: &Bricks,
-    room: &Room,
+    space: &OpenSpace,
     faces: &mut Faces,
 ) {
-    let rates = friction_rates(model, step, bricks, room, faces);
+    let rates = friction_rates(model, step, bricks, space, faces);
     for (velocity, rate) in faces.velocity.iter_mut().zip(rates) {
         *velocity /= 1.0 + step.length * rate;
     }
@@ -33,7 +33,7 @@ pub fn friction_rates(
     model: &Model,
     step: &Step<'_>,
     bricks: &Bricks,
-    room: &Room,
+    space: &OpenSpace,
     faces: &Faces,
 ) -> Vec<DVec3> {
     let is_known = |e: usize, axis: usize| faces.layer[e] >> (8 * axis) & KNOWN != 0;
@@ -56,7 +56,7 @@ pub fn friction_rates(
         let e = element as usize;
         let parts = model.wall_parts(step, corner(bricks, element) + 0.5);
         let rate = |own: usize| {
-            if room.open[e][own] == 0.0 || !is_known(e, own) {
+            if space.open[e][own] == 0.0 || !is_known(e, own) {
                 return 0.0;
             }
             let of_walls = [1, 2].map(|turn| {

@@ -4,7 +4,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::{
-    Model, Room, Sorted, Step,
+    Model, OpenSpace, Sorted, Step,
     grid::{along, corner, neighborhood, per_cell},
     to_grid::hats,
 };
@@ -79,7 +79,7 @@ pub fn gather_centers(
     step: &Step<'_>,
     bricks: &Bricks,
     sorted: &Sorted,
-    room: &Room,
+    space: &OpenSpace,
 ) -> Vec<f64> {
     let hats = hats(model, bricks, sorted);
     let is_mirrored = model.settings().density_correction;
@@ -103,7 +103,7 @@ pub fn gather_centers(
         // A smaller open volume counts as that of one particle.
         let of_solids = match step.solids.is_empty() {
             true => 1.0,
-            false => room.hats[element as usize].max(particle_share),
+            false => space.hats[element as usize].max(particle_share),
         };
         let of_walls = room_of_hats(is_mirrored, step, bricks, element).max(LEAST_ROOM);
         sum * particle_share / (of_walls * of_solids)
@@ -112,18 +112,23 @@ pub fn gather_centers(
 
 /// Returns the open part of a cell's extent along each axis, given walls, and the fraction of it
 /// that solids leave open.
-pub(super) fn open_parts(step: &Step<'_>, bricks: &Bricks, room: &Room, element: u32) -> [f64; 4] {
+pub(super) fn open_parts(
+    step: &Step<'_>,
+    bricks: &Bricks,
+    space: &OpenSpace,
+    element: u32,
+) -> [f64; 4] {
     let extent = step.open_extent(corner(bricks, element));
     let part = match step.solids.is_empty() {
         true => 1.0,
-        false => part_of_solids(extent, room.volume[element as usize]),
+        false => part_of_solids(extent, space.volume[element as usize]),
     };
     [extent.x, extent.y, extent.z, part]
 }
 
 /// Returns whether a cell's centre is inside a wall or solid.
-fn is_buried(step: &Step<'_>, bricks: &Bricks, room: &Room, element: u32) -> bool {
-    let parts = open_parts(step, bricks, room, element);
+fn is_buried(step: &Step<'_>, bricks: &Bricks, space: &OpenSpace, element: u32) -> bool {
+    let parts = open_parts(step, bricks, space, element);
     parts.into_iter().any(|part| part < HALF)
 }
 
@@ -131,16 +136,16 @@ fn is_buried(step: &Step<'_>, bricks: &Bricks, room: &Room, element: u32) -> boo
 pub fn is_filling(
     step: &Step<'_>,
     bricks: &Bricks,
-    room: &Room,
+    space: &OpenSpace,
     density: &[f64],
     element: u32,
 ) -> bool {
-    density[element as usize] < 0.5 && !is_buried(step, bricks, room, element)
+    density[element as usize] < 0.5 && !is_buried(step, bricks, space, element)
 }
 
 /// Returns which cells have their centre inside a wall or solid. Shape (elements).
-pub fn find_buried(step: &Step<'_>, bricks: &Bricks, room: &Room) -> Vec<bool> {
-    per_cell(bricks, |element| is_buried(step, bricks, room, element))
+pub fn find_buried(step: &Step<'_>, bricks: &Bricks, space: &OpenSpace) -> Vec<bool> {
+    per_cell(bricks, |element| is_buried(step, bricks, space, element))
 }
 
 /// Makes room for water that enters where water already is: the projection lets the excess of such
@@ -149,19 +154,19 @@ pub fn let_in(
     inlets: &[Inlet],
     cell_size: f64,
     bricks: &Bricks,
-    room: &mut Room,
+    space: &mut OpenSpace,
     density: &[f64],
     excess: &mut [f64],
 ) {
-    for element in CELLS..room.kind.len() as u32 {
+    for element in CELLS..space.kind.len() as u32 {
         let (e, cell) = (element as usize, bricks.cell(element));
         let within = inlets.iter().filter(|inlet| inlet.contains(cell));
         let rate = within.map(|inlet| inlet.rate).fold(0.0, f64::max);
-        if room.kind[e] != FLUID || rate == 0.0 {
+        if space.kind[e] != FLUID || rate == 0.0 {
             continue;
         }
         let over = (density[e] - 1.0).clamp(0.0, MOST_OVER);
-        room.solid_flux[e] -= over * room.volume[e] * cell_size * rate;
+        space.solid_flux[e] -= over * space.volume[e] * cell_size * rate;
         if let Some(excess) = excess.get_mut(e) {
             *excess = excess.min(0.0);
         }
@@ -176,12 +181,12 @@ const MOST_OVER: f64 = 1.0;
 pub fn is_near_half(
     step: &Step<'_>,
     bricks: &Bricks,
-    room: &Room,
+    space: &OpenSpace,
     element: u32,
     error: f64,
 ) -> bool {
     neighborhood().any(|offset| {
-        let parts = open_parts(step, bricks, room, bricks.near(element, offset));
+        let parts = open_parts(step, bricks, space, bricks.near(element, offset));
         parts.into_iter().any(|part| (part - HALF).abs() < error)
     })
 }
@@ -192,7 +197,7 @@ pub fn is_near_half(
 fn density_before(
     step: &Step<'_>,
     bricks: &Bricks,
-    room: &Room,
+    space: &OpenSpace,
     density: &[f64],
     element: u32,
 ) -> f64 {
@@ -205,7 +210,7 @@ fn density_before(
             (true, true) => -1,
         },
     );
-    let is_open = |other: u32| other >= CELLS && !is_buried(step, bricks, room, other);
+    let is_open = |other: u32| other >= CELLS && !is_buried(step, bricks, space, other);
     let there = bricks.near(element, inward);
     if inward != [0; 3] && is_open(there) {
         return density[there as usize];
@@ -215,7 +220,7 @@ fn density_before(
         let other = bricks.near(element, along(axis, side));
         if is_open(other) {
             let face = if side < 0 { element } else { other };
-            let weight = room.open[face as usize][axis];
+            let weight = space.open[face as usize][axis];
             sum += weight * density[other as usize];
             weights += weight;
         }
@@ -252,13 +257,13 @@ const LEAST_OPEN: f64 = 0.02;
 fn share_of_room(
     step: &Step<'_>,
     bricks: &Bricks,
-    room: &Room,
+    space: &OpenSpace,
     density: &[f64],
     particle_share: f64,
     element: u32,
 ) -> f64 {
-    let water = |e: u32| density[e as usize] * room.hats[e as usize].max(particle_share);
-    let own = room.hats[element as usize];
+    let water = |e: u32| density[e as usize] * space.hats[e as usize].max(particle_share);
+    let own = space.hats[element as usize];
     let (mut sum, mut rooms) = (water(element), own.max(LEAST_ROOM));
     let alone = sum / rooms;
     let up = -step.velocity_step;
@@ -270,7 +275,7 @@ fn share_of_room(
             let other = bricks.near(element, along(axis, side));
             let face = if side < 0 { element } else { other };
             let open = match other >= CELLS {
-                true => room.open[face as usize][axis],
+                true => space.open[face as usize][axis],
                 false => 0.0,
             };
             // Faces up to 60° off the direction are above, others beside or below. Positions
@@ -284,7 +289,7 @@ fn share_of_room(
             }
             if other >= CELLS {
                 sum += open * water(other);
-                rooms += open * room.hats[other as usize];
+                rooms += open * space.hats[other as usize];
             }
         }
     }
@@ -302,11 +307,11 @@ fn share_of_room(
 fn below_surface(
     step: &Step<'_>,
     bricks: &Bricks,
-    room: &Room,
+    space: &OpenSpace,
     element: u32,
     of_room: f64,
 ) -> (f64, f64) {
-    let own = room.hats[element as usize];
+    let own = space.hats[element as usize];
     if own <= LEAST_ROOM {
         return (of_room, 0.0);
     }
@@ -314,7 +319,7 @@ fn below_surface(
         let [before, after] = [-1, 1].map(|side| {
             let other = bricks.near(element, along(axis, side));
             if other >= CELLS {
-                room.hats[other as usize]
+                space.hats[other as usize]
             } else {
                 own
             }
@@ -335,23 +340,23 @@ pub fn find_depth(
     model: &Model,
     step: &Step<'_>,
     bricks: &Bricks,
-    room: &Room,
+    space: &OpenSpace,
     density: &[f64],
 ) -> Vec<Depth> {
     let particle_share = 1.0 / f64::from(model.settings().particles_per_cell);
     per_cell(bricks, |element| {
         let extent = step.open_extent(corner(bricks, element));
-        let is_cut = room.hats[element as usize] < 1.0;
+        let is_cut = space.hats[element as usize] < 1.0;
         let share = if extent.cmplt(DVec3::splat(HALF)).any() {
-            density_before(step, bricks, room, density, element)
+            density_before(step, bricks, space, density, element)
         } else if is_cut {
-            share_of_room(step, bricks, room, density, particle_share, element)
+            share_of_room(step, bricks, space, density, particle_share, element)
         } else {
             density[element as usize]
         };
         let of_room = share.clamp(0.0, 1.0);
         let (below, lean) = match is_cut {
-            true => below_surface(step, bricks, room, element, of_room),
+            true => below_surface(step, bricks, space, element, of_room),
             false => (of_room, 0.0),
         };
         // Across a flat surface the density is 1/2 at the surface, and falls as s − s²/2 with the
@@ -372,7 +377,7 @@ pub fn find_depth(
 pub fn find_water(
     model: &Model,
     bricks: &Bricks,
-    room: &Room,
+    space: &OpenSpace,
     depth: &[Depth],
 ) -> (Vec<u32>, Vec<f64>) {
     let cells = per_cell(bricks, |element| {
@@ -383,7 +388,7 @@ pub fn find_water(
             ..
         } = depth[element as usize];
         let is_water = (share >= 0.5 || is_film) && element < CELLS * (bricks.wet + 1);
-        let kind = match room.kind[element as usize] {
+        let kind = match space.kind[element as usize] {
             SOLID => SOLID,
             _ if is_water => FLUID,
             _ => AIR,
@@ -400,21 +405,26 @@ pub fn find_water(
 
 /// Returns the excess of density, or deficit inside the water, as a fraction of a cell: the source
 /// of the density correction (Kugelstadt et al. 2019). Shape (elements).
-pub fn find_excess(step: &Step<'_>, bricks: &Bricks, room: &Room, density: &[f64]) -> Vec<f64> {
+pub fn find_excess(
+    step: &Step<'_>,
+    bricks: &Bricks,
+    space: &OpenSpace,
+    density: &[f64],
+) -> Vec<f64> {
     per_cell(bricks, |element| {
         let e = element as usize;
-        if room.kind[e] != FLUID {
+        if space.kind[e] != FLUID {
             return 0.0;
         }
         // Beyond the domain there is neither a cell nor air. A gap filled by close_gaps still
         // counts as air.
         let is_air = |other: u32| {
-            let kind = room.kind[other as usize];
-            let is_filling = || is_filling(step, bricks, room, density, other);
+            let kind = space.kind[other as usize];
+            let is_filling = || is_filling(step, bricks, space, density, other);
             other >= CELLS && (kind == AIR || is_filling())
         };
         let touches_air = neighborhood().any(|offset| is_air(bricks.near(element, offset)));
         let least = if touches_air { 0.0 } else { -MOST_EXCESS };
-        (density[e] - 1.0).clamp(least, MOST_EXCESS) * room.volume[e]
+        (density[e] - 1.0).clamp(least, MOST_EXCESS) * space.volume[e]
     })
 }

@@ -10,7 +10,7 @@ use super::{
 use crate::{
     ReferenceError, Timings,
     flip::{Cloud, Flip},
-    neighbors::{Crowd, Neighbors},
+    neighbors::{Neighbors, SortedPoints},
 };
 use swell_domain::{
     boundary::Boundary,
@@ -65,7 +65,7 @@ impl Sorted {
         let mut points: Vec<DVec3> = order.iter().map(|&k| position[k]).collect();
         points.extend(&model.samples);
         let neighbors = timings.time("pbf/build_neighbors", || {
-            let crowd = Crowd {
+            let crowd = SortedPoints {
                 cells: model.cells,
                 points: &points,
                 particles: order.len(),

@@ -58,7 +58,7 @@ pub struct Rounding {
 
 /// Values around a block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum About {
+pub enum Surroundings {
     /// Zero.
     Nothing,
     /// The latest corrections.
@@ -88,7 +88,7 @@ struct Block {
 }
 
 /// Returns the index of cell `c` of a block.
-pub fn place(slot: u32, block: u32, c: usize) -> usize {
+pub fn block_index(slot: u32, block: u32, c: usize) -> usize {
     (CELLS * slot + block) as usize + 64 * c
 }
 
@@ -118,13 +118,13 @@ impl Levels {
         &self,
         level: usize,
         (slot, block): (u32, u32),
-        about: About,
+        about: Surroundings,
         rounding: Rounding,
         rhs_error: [f64; 8],
     ) -> Option<[Expected; 8]> {
         let solution = (self.block(level, slot, block, about)).solution(rounding, rhs_error)?;
         Some(std::array::from_fn(|c| Expected {
-            place: place(slot, block, c),
+            place: block_index(slot, block, c),
             value: solution[c][0],
             error: solution[c][1],
         }))
@@ -139,13 +139,13 @@ impl Levels {
         (slot, block): (u32, u32),
         rounding: Rounding,
     ) -> [Expected; 2] {
-        let found = self.block(level, slot, block, About::Corrections);
+        let found = self.block(level, slot, block, Surroundings::Corrections);
         let above = self.bricks[slot as usize].above;
         let at = |block: u32| (above + above_offset(block)) as usize;
         let sum: f64 = found.inflow.iter().sum();
         // The magnitudes of the inflow only, without those of the residuals.
         let size: f64 = (0..8)
-            .map(|c| found.size[c] - self.residual[place(slot, block, c)].abs())
+            .map(|c| found.size[c] - self.residual[block_index(slot, block, c)].abs())
             .sum();
         [
             Expected {
@@ -213,7 +213,7 @@ impl Levels {
         }
     }
 
-    fn block(&self, level: usize, slot: u32, block: u32, about: About) -> Block {
+    fn block(&self, level: usize, slot: u32, block: u32, about: Surroundings) -> Block {
         let mut found = Block {
             matrix: [[0.0; 8]; 8],
             rhs: [0.0; 8],
@@ -221,7 +221,7 @@ impl Levels {
             inflow: [0.0; 8],
         };
         for c in 0..8 {
-            let own = place(slot, block, c);
+            let own = block_index(slot, block, c);
             found.matrix[c][c] += self.dirichlet[own];
             found.rhs[c] = self.residual[own];
             found.size[c] = found.rhs[c].abs();
@@ -233,16 +233,16 @@ impl Levels {
                     true => (slot, block),
                     false => self.beside(level, slot, block, axis, is_up),
                 };
-                let other = place(there, other_block, other_c);
+                let other = block_index(there, other_block, other_c);
                 let owner = if is_up { other } else { own };
                 let shared = f64::from(self.coefficient[axis][owner]);
                 found.matrix[c][c] += shared;
                 if is_inner {
                     found.matrix[c][other_c] -= shared;
-                } else if about != About::Nothing {
+                } else if about != Surroundings::Nothing {
                     let mut value = self.correction[other];
                     let mut size = value.abs();
-                    if about == About::WithAbove {
+                    if about == Surroundings::WithAbove {
                         let brick = self.bricks[there as usize].above;
                         let more = self.correction[(brick + above_offset(other_block)) as usize];
                         value += more;
@@ -317,7 +317,7 @@ struct Cycle {
 }
 
 impl Cycle {
-    fn smooth(&mut self, level: usize, colour: u32, about: About) -> Option<()> {
+    fn smooth(&mut self, level: usize, colour: u32, about: Surroundings) -> Option<()> {
         for (slot, block) in self.values.coloured(level, colour) {
             let rhs_error = self.errors.block(level, slot, block, about).rhs;
             let at = (slot, block);
@@ -349,18 +349,18 @@ impl Cycle {
     fn run(&mut self, first: usize) -> Option<()> {
         let last = self.values.levels.len() - 1;
         for level in first..last {
-            self.smooth(level, 0, About::Nothing)?;
-            self.smooth(level, 1, About::Corrections)?;
+            self.smooth(level, 0, Surroundings::Nothing)?;
+            self.smooth(level, 1, Surroundings::Corrections)?;
             self.restrict(level);
         }
-        self.smooth(last, 0, About::Nothing)?;
+        self.smooth(last, 0, Surroundings::Nothing)?;
         for _ in 0..SWEEPS {
-            self.smooth(last, 1, About::Corrections)?;
-            self.smooth(last, 0, About::Corrections)?;
+            self.smooth(last, 1, Surroundings::Corrections)?;
+            self.smooth(last, 0, Surroundings::Corrections)?;
         }
         for level in (first..last).rev() {
-            self.smooth(level, 1, About::WithAbove)?;
-            self.smooth(level, 0, About::Corrections)?;
+            self.smooth(level, 1, Surroundings::WithAbove)?;
+            self.smooth(level, 0, Surroundings::Corrections)?;
         }
         Some(())
     }

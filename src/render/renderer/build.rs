@@ -206,7 +206,7 @@ fn plan_ray(plan: &mut Plan, look: &Look, scene: &RenderScene, set: &Set<'_>) {
 
 /// Capacity for a number of particles, rounded up to a power of two, so that few frames cause a
 /// reallocation.
-pub(super) fn room(particles: usize) -> usize {
+pub(super) fn capacity_for(particles: usize) -> usize {
     particles.next_power_of_two()
 }
 

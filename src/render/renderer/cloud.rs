@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::{room, shade::draws_spray, whitewater::is_bubble};
+use super::{capacity_for, shade::draws_spray, whitewater::is_bubble};
 use crate::{
     RenderError, RenderScene,
     buffers::{CLOUD, CLOUD_WORDS},
@@ -91,7 +91,7 @@ impl RayCloud {
 
 /// Capacity in words for a required number of them, within a binding of `storage` bytes.
 pub(super) fn room_of(words: usize, storage: u64) -> usize {
-    let room = room(words);
+    let room = capacity_for(words);
     match room as u64 > storage / 4 {
         true => words,
         false => room,

@@ -5,14 +5,14 @@ use rayon::prelude::*;
 
 use super::{
     Renderer,
-    build::room,
+    build::capacity_for,
     drawn::{Drawn, cameras},
     shade::draws_spray,
     splats::{Pages, ROWS, filled},
     taken::{Taken, frame_seconds},
 };
 use crate::{
-    Moment, RenderError,
+    FrameInputs, RenderError,
     buffers::{
         AIRED, AIRED_GROUPS, BLOCK_GROUPS, BLOCKS, PAGES, PARTICLE_GROUPS, PARTICLES, PATHS,
         SHAPES, SPRAY_PARAMS,
@@ -79,11 +79,15 @@ impl Paged {
 impl Renderer {
     /// Uploads a frame's particles, relative to the domain's least corner: takes them, culls and
     /// sorts them, and divides them into pages.
-    pub(super) fn load(&mut self, frame: u32, moment: &Moment<'_>) -> Result<Loaded, RenderError> {
-        let taken = Taken::of(&self.look, &self.scene, frame, moment)?;
+    pub(super) fn load(
+        &mut self,
+        frame: u32,
+        inputs: &FrameInputs<'_>,
+    ) -> Result<Loaded, RenderError> {
+        let taken = Taken::of(&self.look, &self.scene, frame, inputs)?;
         self.refuse_under_water(frame, &taken.packed)?;
-        self.load_rays(&taken, moment);
-        self.load_spray(frame, moment);
+        self.load_rays(&taken, inputs);
+        self.load_spray(frame, inputs);
         if !self.program.has(PARTICLES.name()) {
             return Ok(Loaded::default());
         }
@@ -99,7 +103,7 @@ impl Renderer {
         self.load_drawn(&drawn, &shapes);
         Ok(Loaded {
             count: drawn.seen as u32,
-            ahead: self.ahead(drawn, moment),
+            ahead: self.ahead(drawn, inputs),
         })
     }
 
@@ -113,7 +117,7 @@ impl Renderer {
     }
 
     /// Hands a frame's particles to what rays meet.
-    fn load_rays(&mut self, Taken { packed, ways }: &Taken, moment: &Moment<'_>) {
+    fn load_rays(&mut self, Taken { packed, ways }: &Taken, inputs: &FrameInputs<'_>) {
         if let Some(water) = &mut self.water {
             water.take(packed, ways);
         }
@@ -125,7 +129,7 @@ impl Renderer {
         }
         if let Some(cloud) = &mut self.cloud {
             let (water, radius) = ((&packed[..], &ways[..]), self.plan.radius);
-            cloud.take(&self.look, &self.scene, radius, water, moment.white);
+            cloud.take(&self.look, &self.scene, radius, water, inputs.white);
         }
     }
 
@@ -150,14 +154,14 @@ impl Renderer {
     }
 
     /// Visible particles with their mean velocity to the next frame, if a channel shows it.
-    fn ahead(&self, drawn: Drawn, moment: &Moment<'_>) -> Vec<Particle> {
-        if !self.look.wants(AovSpec::Forward) || moment.beside()[1].is_none() {
+    fn ahead(&self, drawn: Drawn, inputs: &FrameInputs<'_>) -> Vec<Particle> {
+        if !self.look.wants(AovSpec::Forward) || inputs.beside()[1].is_none() {
             return Vec::new();
         }
         let seconds = frame_seconds(&self.scene);
         let mut ahead = drawn.packed;
         for (particle, way) in ahead.iter_mut().zip(&drawn.ways) {
-            particle.velocity = (way.way(seconds).as_vec3() / seconds).to_array();
+            particle.velocity = (way.displacement(seconds).as_vec3() / seconds).to_array();
         }
         ahead
     }
@@ -186,7 +190,7 @@ impl Renderer {
             return Ok(());
         }
         let groups = spread(&self.program.context, ROWS, blocks.len() as u64);
-        let room = room(blocks.len());
+        let room = capacity_for(blocks.len());
         if room > self.blocks {
             self.program.refit(&[BLOCKS.sized(room)], &[])?;
             self.blocks = room;
@@ -203,7 +207,7 @@ impl Renderer {
         if particles <= self.capacity {
             return Ok(());
         }
-        let capacity = room(particles);
+        let capacity = capacity_for(particles);
         let pages = Pages {
             capacity,
             ..self.pages()
@@ -219,7 +223,7 @@ impl Renderer {
     /// Uploads the range of the spray sums: depths up to the domain's farthest corner and speeds up
     /// to the largest, both with a margin for motion within a frame and rounded up to powers of
     /// two, so that rounding differs little between frames.
-    fn load_spray(&self, frame: u32, moment: &Moment<'_>) {
+    fn load_spray(&self, frame: u32, inputs: &FrameInputs<'_>) {
         if !draws_spray(&self.look) {
             return;
         }
@@ -230,7 +234,7 @@ impl Renderer {
             .abs()
             .max((eye - self.scene.domain.size()).abs())
             .length();
-        let fastest = (moment.water.particles.max_speed()).max(moment.white.max_speed());
+        let fastest = (inputs.water.particles.max_speed()).max(inputs.white.max_speed());
         let room = |x: f64| (1.25 * x + 1.0).log2().ceil().exp2() as f32;
         let params = SprayParams {
             density: spray_density(&self.look) as f32,

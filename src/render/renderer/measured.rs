@@ -1,7 +1,7 @@
 //! Plan of a frame with known particles, without a device.
 
 use super::{
-    build::room,
+    build::capacity_for,
     cloud::{RayCloud, room_of},
     drawn::{Drawn, cameras},
     load::of_particles,
@@ -12,7 +12,7 @@ use super::{
     whitewater::Whitewater,
 };
 use crate::{
-    Moment, RenderError, RenderScene,
+    FrameInputs, RenderError, RenderScene,
     buffers::{BLOCKS, CLOUD_WORDS, LEVEL_VALUES, PARTICLES, WHITEWATER},
     plan::{Limits, Plan},
 };
@@ -29,11 +29,11 @@ impl Plan {
         look: &Look,
         scene: &RenderScene,
         frame: u32,
-        moment: &Moment<'_>,
+        inputs: &FrameInputs<'_>,
         limits: &Limits,
     ) -> Result<Self, RenderError> {
         let mut plan = Self::new(look, scene, limits)?;
-        let taken = Taken::of(look, scene, frame, moment)?;
+        let taken = Taken::of(look, scene, frame, inputs)?;
         if let Some(mut water) = RayWater::of(look, scene) {
             water.take(&taken.packed, &taken.ways);
             let values = water.level(0.0, scene).values.len();
@@ -41,24 +41,24 @@ impl Plan {
         }
         if let Some(mut cloud) = RayCloud::of(look, scene) {
             let water = (&taken.packed[..], &taken.ways[..]);
-            cloud.take(look, scene, plan.radius, water, moment.white);
+            cloud.take(look, scene, plan.radius, water, inputs.white);
             let (_, words) = cloud.grid(0.0, scene);
             plan.grow(CLOUD_WORDS.sized(room_of(words.len(), limits.storage)));
         }
         if let Some(whitewater) = Whitewater::of(look, scene) {
-            let drawn = whitewater.packed(scene, frame, moment.white)?;
-            plan.grow(WHITEWATER.sized(room(drawn.len())));
+            let drawn = whitewater.packed(scene, frame, inputs.white)?;
+            plan.grow(WHITEWATER.sized(capacity_for(drawn.len())));
         }
         if !plan.has(PARTICLES.name()) {
             return Ok(plan);
         }
         let cameras = cameras(look, &setting(&plan, scene, 0), frame);
         let drawn = Drawn::of(taken, look, scene, frame, &cameras);
-        for buffer in of_particles(look, Pages::new(room(drawn.seen), limits.storage)) {
+        for buffer in of_particles(look, Pages::new(capacity_for(drawn.seen), limits.storage)) {
             plan.grow(buffer);
         }
         if let Some(blocks) = drawn.blocks {
-            plan.grow(BLOCKS.sized(room(blocks.len())));
+            plan.grow(BLOCKS.sized(capacity_for(blocks.len())));
         }
         Ok(plan)
     }

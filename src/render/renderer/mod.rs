@@ -24,8 +24,8 @@ use super::cryptomatte::{Covers, unique};
 use super::image::{Image, View};
 use super::plan::{Limits, Plan};
 use super::samples::samples_of;
-use super::{Moment, RenderError, RenderScene, Water, sea::Sea, uniform};
-use build::room;
+use super::{FrameInputs, RenderError, RenderScene, Water, sea::Sea, uniform};
+use build::capacity_for;
 use cloud::RayCloud;
 pub use parts::Part;
 use parts::Parts;
@@ -119,8 +119,8 @@ impl Renderer {
             is_slow: true,
             plan,
             program,
-            capacity: room(0),
-            blocks: room(0),
+            capacity: capacity_for(0),
+            blocks: capacity_for(0),
             water: RayWater::of(look, scene),
             cloud: RayCloud::of(look, scene),
             caustics: Caustics::of(look, scene),
@@ -177,7 +177,7 @@ impl Renderer {
         white: &Particles,
     ) -> Result<Image, RenderError> {
         let water = Water::new(particles.clone());
-        self.render_moment(frame, &Moment::alone(&water, white))
+        self.render_inputs(frame, &FrameInputs::alone(&water, white))
     }
 
     /// Like [`Renderer::render_with`], with the frames around it: motion blur then follows the
@@ -186,27 +186,31 @@ impl Renderer {
     /// # Errors
     /// As for [`Renderer::render`], and [`RenderError::UnderWater`] where the screen-space method
     /// cannot draw what the camera sees.
-    pub fn render_moment(&mut self, frame: u32, moment: &Moment<'_>) -> Result<Image, RenderError> {
-        self.render_parts(frame, moment, &mut |_| {})
+    pub fn render_inputs(
+        &mut self,
+        frame: u32,
+        inputs: &FrameInputs<'_>,
+    ) -> Result<Image, RenderError> {
+        self.render_parts(frame, inputs, &mut |_| {})
     }
 
-    /// Like [`Renderer::render_moment`]. Calls `tell` with the progress before the first part of
+    /// Like [`Renderer::render_inputs`]. Calls `tell` with the progress before the first part of
     /// the picture and after each one.
     ///
     /// # Errors
-    /// As for [`Renderer::render_moment`].
+    /// As for [`Renderer::render_inputs`].
     pub fn render_parts(
         &mut self,
         frame: u32,
-        moment: &Moment<'_>,
+        inputs: &FrameInputs<'_>,
         tell: &mut dyn FnMut(Part),
     ) -> Result<Image, RenderError> {
         let samples = samples_of(&self.look).len();
         let count = samples * self.sample.len() + self.aov_samples().len() * self.aovs.len();
         let parts = &mut Parts::new(count, tell);
-        let loaded = self.load(frame, moment)?;
+        let loaded = self.load(frame, inputs)?;
         if let Some(whitewater) = &mut self.whitewater {
-            let white = moment.white;
+            let white = inputs.white;
             let grew = whitewater.load(&mut self.program, &self.scene, frame, white)?;
             if grew {
                 self.record();

@@ -1,7 +1,7 @@
 //! Plans the passes that splat particles into the frame.
 
 use super::{
-    build::room,
+    build::capacity_for,
     shade::{draws_spray, tells_foam, wants_spray_aovs},
 };
 use crate::{
@@ -142,7 +142,7 @@ impl Pages {
 /// Plans the particle buffers. With an open shutter, the passes in `moving`, which draw samples,
 /// move particles along their paths.
 pub(super) fn plan_particles(plan: &mut Plan, look: &Look, moving: &[&'static str]) {
-    let particles = room(0);
+    let particles = capacity_for(0);
     plan.per_particle(&PARTICLES, particles, look);
     plan.windows(&PAGES, &[Page::default()]);
     if look.spec().water.spray.is_some() {
@@ -159,7 +159,7 @@ pub(super) fn plan_particles(plan: &mut Plan, look: &Look, moving: &[&'static st
 
 /// Plans an ellipsoid for each particle.
 pub(super) fn plan_shapes(plan: &mut Plan, look: &Look) {
-    plan.per_particle(&SHAPES, room(0), look);
+    plan.per_particle(&SHAPES, capacity_for(0), look);
     for pass in ["ssfr/splat_depth", "ssfr/splat_owner"] {
         plan.define(pass, "ELLIPSOIDS");
     }
@@ -180,7 +180,7 @@ pub(super) fn plan_body(plan: &mut Plan, spacing: f64) -> Vec<Command> {
     plan.values(&THICKNESS_PARAMS, &[scale]);
     plan.buffer(&THICKNESS, pixels / 4);
     plan.buffer(&PARTICLE_GROUPS, 1);
-    plan.buffer(&BLOCKS, room(0));
+    plan.buffer(&BLOCKS, capacity_for(0));
     plan.buffer(&BLOCK_GROUPS, 1);
     let params = Bind::whole("params", &THICKNESS_PARAMS);
     vec![

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use crate::{
-    Moment, RenderError, RenderScene,
+    FrameInputs, RenderError, RenderScene,
     aeration::{self, CLEAR, Fall},
     paths::{Path, paths},
     uniform::Particle,
@@ -23,20 +23,20 @@ impl Taken {
         look: &Look,
         scene: &RenderScene,
         frame: u32,
-        moment: &Moment<'_>,
+        inputs: &FrameInputs<'_>,
     ) -> Result<Self, RenderError> {
-        let water = &moment.water.particles;
+        let water = &inputs.water.particles;
         let spec = look.spec();
         let mut packed = pack(scene, frame, water)?;
         if let Some(spray) = &spec.water.spray {
             let fall = Fall::of(scene, packed.len());
-            let standing = aeration::standing(moment, &fall);
+            let standing = aeration::standing(inputs, &fall);
             aeration::classify(&mut packed, &standing, spray, &fall);
         }
         let ways = match spec.image.shutter > 0.0 || look.wants(AovSpec::Forward) {
             true => paths(
                 water,
-                moment.beside(),
+                inputs.beside(),
                 frame_seconds(scene),
                 scene.domain.size(),
             ),

@@ -13,7 +13,7 @@ use swell_domain::{
 use swell_gpu::{program::Program, recording::spread};
 use swell_scene::look::{Look, MethodSpec};
 
-use super::room;
+use super::capacity_for;
 
 /// Depth, in particle spacings, at which the water above a bubble has removed 63 % of its white.
 const FADING: f64 = 2.0;
@@ -55,7 +55,7 @@ impl Whitewater {
         let packed = self.packed(scene, frame, white)?;
         let grew = packed.len() > self.capacity;
         if grew {
-            self.capacity = room(packed.len());
+            self.capacity = capacity_for(packed.len());
             program.refit(&[WHITEWATER.sized(self.capacity)], &[])?;
         }
         self.params.count = packed.len() as u32;

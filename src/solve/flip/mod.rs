@@ -25,7 +25,7 @@ use swell_domain::{
     particles::Particles,
     shores::Shores,
     solver::{PassTime, Solver, StepReport, Watch},
-    substep::Which,
+    substep::SubstepChoice,
 };
 use swell_gpu::{
     adapter::Context,
@@ -542,10 +542,10 @@ impl TraceFrame for Flip {
             };
             let is_traced = match span {
                 Span::From(first) => begun.number >= first,
-                Span::Only(Which::Number(number)) => begun.number == number,
+                Span::Only(SubstepChoice::Number(number)) => begun.number == number,
                 // This look ahead does not change anything: the substep's own survey finds the
                 // same.
-                Span::Only(Which::Last) => self.look(&totals, plain)?.2,
+                Span::Only(SubstepChoice::Last) => self.look(&totals, plain)?.2,
             };
             let is_last = if is_traced {
                 self.go_on(&mut totals, &mut |program, recordings| {
@@ -556,7 +556,7 @@ impl TraceFrame for Flip {
             };
             match span {
                 Span::Only(_) if is_traced => return Ok(begun.number),
-                Span::Only(Which::Number(asked)) if is_last => {
+                Span::Only(SubstepChoice::Number(asked)) if is_last => {
                     return Err(SolveError::NoSubstep {
                         asked,
                         frame: self.frame,

@@ -17,7 +17,7 @@ use swell_domain::{
     probe::fitted,
     solver::{Observed, PassTime, Requested, Solver, Span as Substep, StepReport, Watch},
     sph::Calibration,
-    substep::Which,
+    substep::SubstepChoice,
 };
 use swell_gpu::{
     adapter::Context,
@@ -505,8 +505,8 @@ impl TraceFrame for Pbf {
         let count = self.substeps()?;
         let (first, last) = match span {
             Span::From(first) => (first, count),
-            Span::Only(Which::Last) => (count, count),
-            Span::Only(Which::Number(number)) => (number, number),
+            Span::Only(SubstepChoice::Last) => (count, count),
+            Span::Only(SubstepChoice::Number(number)) => (number, number),
         };
         if last > count {
             return Err(SolveError::NoSubstep {

@@ -4,7 +4,7 @@ use swell_cache::{CacheError, CacheReader, Clock, Parent, refuse_occupied};
 use swell_domain::{signed_distance::SignedDistanceError, sources::Solids};
 use swell_scene::Scene;
 
-use super::{BakeError, Inflow, Request, room};
+use super::{BakeError, Inflow, Request, disk};
 use crate::{
     branch::{Branch, note_covered},
     prepare::{Start, Volume},
@@ -168,8 +168,8 @@ impl<'a> BakePlan<'a> {
     /// # Errors
     /// Particles that cannot be stored in a frame.
     pub fn bytes(&self) -> Result<u64, CacheError> {
-        let frame = room::frame_bytes(self.scene, &self.start.particles)?;
-        let later = room::bytes_of(self.scene, frame, self.first, self.last);
+        let frame = disk::frame_bytes(self.scene, &self.start.particles)?;
+        let later = disk::bytes_of(self.scene, frame, self.first, self.last);
         Ok(frame.iter().sum::<u64>() + later)
     }
 

@@ -24,6 +24,7 @@ use swell_domain::{
 
 /// Result of writing a baseline.
 #[derive(Clone, Debug, Serialize)]
+#[non_exhaustive]
 pub struct Written {
     /// The adapter whose hashes were stored.
     pub adapter: String,

@@ -158,7 +158,7 @@ fn compare_pair(
     images: Option<&Images>,
 ) -> Result<PairDiff, DiffError> {
     let [a, b] = [load(files[0])?, load(files[1])?];
-    let diff = pictures::compare(&a, &b);
+    let diff = pictures::compare(&a, &b)?;
     let image = match (&diff, images) {
         (Some(_), Some(images)) => {
             let pixels = difference_image(&a, &b, images.gain);

@@ -11,6 +11,7 @@ use super::UsdcError;
 
 /// Why an export failed.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ExportError {
     /// No files to make.
     #[error("nothing to export: ask for a mesh, a USD shot, npy, csv, bgeo or vdb")]

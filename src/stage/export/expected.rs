@@ -6,6 +6,7 @@ use super::{Content, ExportError, Job, Request, Target, is_binary, share};
 
 /// Prediction of an export.
 #[derive(Clone, Debug, Default)]
+#[non_exhaustive]
 pub struct Expected {
     /// Frames of this process's share.
     pub frames: Vec<u32>,
@@ -33,7 +34,7 @@ pub fn expected(request: &Request) -> Result<Expected, ExportError> {
         ..Expected::default()
     };
     for (wanted, bytes) in shots {
-        if request.overwrite || !wanted.stands() {
+        if request.overwrite || !wanted.is_complete() {
             let size = (!is_binary(&wanted.file)).then_some(bytes.len() as u64);
             found.add(size);
         }
@@ -43,7 +44,7 @@ pub fn expected(request: &Request) -> Result<Expected, ExportError> {
         let content = Content::new(&job, frame);
         let mut stands = true;
         for (index, (target, wanted)) in job.files(frame)?.into_iter().enumerate() {
-            if !request.overwrite && wanted.stands() {
+            if !request.overwrite && wanted.is_complete() {
                 continue;
             }
             stands = false;

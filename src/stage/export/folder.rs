@@ -124,7 +124,7 @@ impl Wanted {
     }
 
     /// Whether the file exists and is complete.
-    pub(super) fn stands(&self) -> bool {
+    pub(super) fn is_complete(&self) -> bool {
         let is_whole = |record: Record| {
             let is_ours = record.owner == self.owner && record.source == self.source;
             let length = fs::metadata(&self.file).map(|found| found.len());
@@ -185,7 +185,7 @@ mod tests {
     fn a_file_stands_while_its_bytes_and_its_source_do() {
         let dir = tempfile::tempdir().unwrap();
         let one = wanted(dir.path(), "frame 1");
-        assert!(!one.stands() && one.check().is_ok());
+        assert!(!one.is_complete() && one.check().is_ok());
         let claim = one.claim().unwrap().unwrap();
         assert!(one.claim().unwrap().is_none(), "one process at a time");
         let draft = one.draft(&one.file);
@@ -193,18 +193,18 @@ mod tests {
         assert!(!one.file.exists(), "a draft has no name yet");
         one.publish(draft).unwrap();
         drop(claim);
-        assert!(one.stands() && one.check().is_ok());
+        assert!(one.is_complete() && one.check().is_ok());
         assert!(one.claim().unwrap().is_some());
         // Other bytes: may be replaced, because the record is ours.
         fs::write(&one.file, b"hurt").unwrap();
-        assert!(!one.stands() && one.check().is_ok());
+        assert!(!one.is_complete() && one.check().is_ok());
         let other = wanted(dir.path(), "frame 2");
         assert!(matches!(other.check(), Err(ExportError::Taken { .. })));
         let follows = Wanted {
             follows: true,
             ..other
         };
-        assert!(follows.check().is_ok() && !follows.stands());
+        assert!(follows.check().is_ok() && !follows.is_complete());
     }
 
     #[test]

@@ -16,6 +16,7 @@ pub struct Pattern {
 
 /// Why a text is not such a file name.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum PatternError {
     /// It has no placeholder, or more than one.
     #[error(

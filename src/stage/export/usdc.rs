@@ -13,6 +13,7 @@ const CONVERT: &str = "import sys\nfrom pxr import Sdf\n\
 
 /// Why binary USD cannot be written.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum UsdcError {
     /// There is no Python with usd-core.
     #[error(

@@ -45,6 +45,7 @@ pub enum FileContents {
 
 /// Particles of one frame.
 #[derive(Debug)]
+#[non_exhaustive]
 pub struct FrameFile {
     /// Comments of its header: program, shot, frame, time, and the origin if the scene has one.
     pub comments: Vec<String>,
@@ -61,6 +62,7 @@ pub struct FrameFile {
 
 /// A mesh as a scene would load it, in the file's own frame and unit.
 #[derive(Debug)]
+#[non_exhaustive]
 pub struct MeshFile {
     /// Number of distinct vertices.
     pub vertices: usize,
@@ -74,6 +76,7 @@ pub struct MeshFile {
 
 /// A picture.
 #[derive(Debug)]
+#[non_exhaustive]
 pub struct PictureFile {
     /// `png` or `exr`.
     pub format: &'static str,
@@ -91,6 +94,7 @@ pub struct PictureFile {
 
 /// Why a file could not be described.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum FileError {
     /// The file cannot be read.
     #[error("cannot read {}", file.display())]

@@ -9,6 +9,7 @@ use swell_files::study::{
 
 /// Outline of a study, in the order of its file.
 #[derive(Debug)]
+#[non_exhaustive]
 pub struct Outline {
     /// Kind, as in the file's `kind`.
     pub kind: &'static str,

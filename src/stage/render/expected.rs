@@ -11,6 +11,7 @@ use super::{
 
 /// Prediction of a render.
 #[derive(Clone, Debug, Default)]
+#[non_exhaustive]
 pub struct Expected {
     /// Frames of this process's share.
     pub frames: Vec<u32>,

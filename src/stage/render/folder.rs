@@ -90,6 +90,7 @@ pub(super) struct Wanted<'a> {
 
 /// Why pictures cannot be written to a folder.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum FolderError {
     /// A file or folder that cannot be read, written or locked.
     #[error(transparent)]

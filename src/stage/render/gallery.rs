@@ -17,10 +17,10 @@ use swell_check::{
     pictures::{score, shown},
     render::Surfaces,
 };
-use swell_compare::pictures::Picture;
+use swell_compare::{perceptual, pictures::Picture};
 use swell_domain::{eye::Eye, frame_range::FrameRange, particles::Particles};
 use swell_gpu::adapter::Context;
-use swell_reference::rays::Seen;
+use swell_reference::rays::RayHit;
 use swell_render::{RenderScene, Renderer, eye};
 use swell_scene::{
     Scene,
@@ -42,13 +42,14 @@ struct Framed {
     set: RenderScene,
     around: Around,
     eye: Eye,
-    seen: Vec<Seen>,
+    seen: Vec<RayHit>,
     /// Picture by finer rays; `None` if pictures are not scored.
     picture: Option<Picture>,
 }
 
 /// Result of drawing the frames with a look.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Drawn {
     /// Wall-clock seconds of each repeat for the pictures of all frames.
     pub seconds: Vec<f64>,
@@ -57,6 +58,14 @@ pub struct Drawn {
     /// SSIMULACRA 2 score against finer rays, mean over the frames; `None` if pictures are not
     /// scored.
     pub score: Option<f64>,
+}
+
+/// Checks that this build can score pictures.
+///
+/// # Errors
+/// [`RenderJobError::MissingFeature`].
+pub fn require_scores() -> Result<(), RenderJobError> {
+    Ok(perceptual::require()?)
 }
 
 impl<'a> Gallery<'a> {
@@ -112,16 +121,16 @@ impl<'a> Gallery<'a> {
         for frame in &self.frames {
             let picture = look.of_water(look.spec().renderer.method);
             let mut renderer = frame.renderer(self.context, &picture)?;
-            let moment = frame.around.moment(&white);
-            let image = renderer.render_moment(frame.number, &moment)?;
+            let inputs = frame.around.inputs(&white);
+            let image = renderer.render_inputs(frame.number, &inputs)?;
             for seconds in &mut drawn.seconds {
                 let around = frame.around.anew();
                 let begun = Instant::now();
-                renderer.render_moment(frame.number, &around.moment(&white))?;
+                renderer.render_inputs(frame.number, &around.inputs(&white))?;
                 *seconds += begun.elapsed().as_secs_f64();
             }
             if let Some(truth) = &frame.picture {
-                scores.extend(score(&shown(&image, &look.spec().view), truth));
+                scores.extend(score(&shown(&image, &look.spec().view), truth)?);
             }
             let surface = look.of_surface(look.spec().renderer.method);
             let mut renderer = frame.renderer(self.context, &surface)?;

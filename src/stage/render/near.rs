@@ -5,7 +5,7 @@ use std::{collections::BTreeMap, sync::Arc};
 use super::pictures::others;
 use swell_cache::{CacheError, CacheReader};
 use swell_domain::particles::Particles;
-use swell_render::{Moment, REACH, Water, frames_around};
+use swell_render::{FrameInputs, REACH, Water, frames_around};
 use swell_scene::look::Look;
 
 /// Recently read frames, so that consecutive frames are read only once.
@@ -15,8 +15,8 @@ pub(super) struct Near(BTreeMap<u32, Arc<Water>>);
 /// A frame with those around it.
 pub(super) struct Around {
     pub(super) water: Arc<Water>,
-    /// In the order of [`Moment::around`]; `None` if the cache does not have the frame or the look
-    /// does not use it.
+    /// In the order of [`FrameInputs::around`]; `None` if the cache does not have the frame or the
+    /// look does not use it.
     others: [Option<Arc<Water>>; 2 * REACH as usize],
 }
 
@@ -64,8 +64,8 @@ impl Around {
     }
 
     /// The input of a picture, with the frame's whitewater.
-    pub(super) fn moment<'a>(&'a self, white: &'a Particles) -> Moment<'a> {
-        Moment {
+    pub(super) fn inputs<'a>(&'a self, white: &'a Particles) -> FrameInputs<'a> {
+        FrameInputs {
             water: &self.water,
             around: self.others.each_ref().map(Option::as_deref),
             white,

@@ -43,7 +43,7 @@ fn around(cache: &CacheReader, look: &Look, frame: u32) -> Result<String, CacheE
     Ok(format!(" around {}", hasher.finalize().to_hex()))
 }
 
-/// The frames around a frame with their indices, in the order of [`Moment::around`].
+/// The frames around a frame with their indices, in the order of [`FrameInputs::around`].
 pub(super) fn others(frame: u32) -> impl Iterator<Item = (usize, u32)> {
     let reach = i64::from(REACH);
     let offsets = (-reach..=reach).filter(|&offset| offset != 0);

@@ -12,7 +12,7 @@ use swell_gpu::{
     adapter::{Context, GpuError},
     program::check_sizes,
 };
-use swell_render::{Limits, Moment, Plan, RenderScene, Runs, Water};
+use swell_render::{FrameInputs, Limits, Plan, RenderScene, Runs, Water};
 use swell_scene::{Scene, look::Look};
 
 /// What the camera sees in the plan.
@@ -28,6 +28,7 @@ pub enum Subject {
 
 /// A look's plan, and the limits that it was made for.
 #[derive(Debug)]
+#[non_exhaustive]
 pub struct LookPlan {
     /// Name of each pass, and how often it runs.
     pub passes: Vec<(&'static str, Runs)>,
@@ -120,8 +121,8 @@ impl Planned {
                 let start = Start::of(scene)?;
                 let set = render_scene(scene, look, 0, &start.particles)?;
                 let (water, white) = (Water::new(start.particles), Particles::default());
-                let moment = Moment::alone(&water, &white);
-                Self::of_frame(look, &set, (0, &moment), limits)
+                let inputs = FrameInputs::alone(&water, &white);
+                Self::of_frame(look, &set, (0, &inputs), limits)
             }
             Subject::Cache(directory) => {
                 let cache = CacheReader::open(directory)?;
@@ -138,7 +139,7 @@ impl Planned {
                 let most = cache.entries().iter().map(|entry| entry.particles).max();
                 Ok(Self {
                     particles: most.unwrap_or(0) as usize,
-                    ..Self::of_frame(look, &set, (frame, &around.moment(&white)), limits)?
+                    ..Self::of_frame(look, &set, (frame, &around.inputs(&white)), limits)?
                 })
             }
         }
@@ -147,13 +148,13 @@ impl Planned {
     fn of_frame(
         look: &Look,
         set: &RenderScene,
-        (frame, moment): (u32, &Moment<'_>),
+        (frame, inputs): (u32, &FrameInputs<'_>),
         limits: &Limits,
     ) -> Result<Self, RenderJobError> {
-        let plan = Plan::of_frame(look, set, frame, moment, limits);
+        let plan = Plan::of_frame(look, set, frame, inputs, limits);
         Ok(Self {
             plan: plan.map_err(|error| told(error, look))?,
-            particles: moment.water.particles.len(),
+            particles: inputs.water.particles.len(),
             frame: Some(frame),
         })
     }

@@ -15,12 +15,12 @@ use swell_check::{
     pictures::{Residual, score, shown},
     render::{Summary, Surfaces},
 };
-use swell_compare::pictures::Picture;
+use swell_compare::{perceptual, pictures::Picture};
 use swell_domain::{
     eye::Eye, frame_range::FrameRange, level_set::kernels::Kernels, particles::Particles,
 };
 use swell_gpu::adapter::{Context, Needs};
-use swell_reference::rays::{Seen, cast};
+use swell_reference::rays::{RayHit, cast};
 use swell_render::{RenderError, RenderScene, Renderer, eye, opaque};
 use swell_scene::look::{Look, MethodSpec};
 
@@ -106,6 +106,7 @@ pub enum Event {
 
 /// Result of a check.
 #[derive(Clone, Debug, Default)]
+#[non_exhaustive]
 pub struct Outcome {
     /// One row per method.
     pub rows: Vec<Row>,
@@ -135,6 +136,9 @@ pub fn check_render(
     stop: &AtomicBool,
     tell: &mut dyn FnMut(Event),
 ) -> Result<Outcome, RenderJobError> {
+    if request.colour {
+        perceptual::require()?;
+    }
     let cache = CacheReader::open(&request.cache)?;
     let scene = baked_scene(&cache, &request.cache)?;
     let frames: Vec<u32> = match &request.frames {
@@ -253,7 +257,7 @@ impl Set<'_> {
         let set = render_scene(self.scene, look, frame, &around.water.particles)?;
         let mut renderer =
             Renderer::new(self.context, look, &set).map_err(|error| told(error, look))?;
-        let image = renderer.render_moment(frame, &around.moment(&Particles::default()))?;
+        let image = renderer.render_inputs(frame, &around.inputs(&Particles::default()))?;
         Ok(shown(&image, &look.spec().view))
     }
 }
@@ -315,7 +319,7 @@ impl<'a> Pictures<'a> {
         for ((_, method), found) in METHODS.iter().zip(&mut self.methods) {
             let all = draw(&still.of_water(*method))?;
             if *colour {
-                found.scores.extend(score(&all[middle], &truth[middle]));
+                found.scores.extend(score(&all[middle], &truth[middle])?);
             }
             if let (Some(residual), Some(moved)) = (residual(&all), &moved) {
                 found.flickers.push(residual.beyond(moved));
@@ -332,7 +336,7 @@ pub(super) fn truth(
     set: &RenderScene,
     frame: u32,
     water: &Particles,
-) -> Result<(Vec<Seen>, usize), RenderError> {
+) -> Result<(Vec<RayHit>, usize), RenderError> {
     let (corner, size) = (set.domain.min, set.domain.size());
     let places: Vec<DVec3> = water
         .position

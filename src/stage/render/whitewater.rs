@@ -8,6 +8,7 @@ use swell_domain::particles::Particles;
 
 /// Why a stream cannot be drawn.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum StreamError {
     /// There is no stream of that name.
     #[error(

@@ -11,6 +11,7 @@ use swell_study::raster::RasterError;
 
 /// Why a view failed.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ViewError {
     /// Nothing to make of the frames.
     #[error("nothing to make: ask for a sheet, a movie or a player")]
@@ -91,7 +92,8 @@ impl From<&ViewError> for Blame {
             | ViewError::Foreign(_)
             | ViewError::Asked(_)
             | ViewError::IntoCache(_)
-            | ViewError::NoEncoder { .. } => Self::Input,
+            | ViewError::NoEncoder { .. }
+            | ViewError::Sheet(RasterError::MissingFeature(_)) => Self::Input,
             ViewError::Missing(_)
             | ViewError::Picture(_)
             | ViewError::Cache(_)

@@ -291,7 +291,7 @@ impl<'a> Reel<'a> {
             frames_per_second: self.rate,
             curves: self.curves.charts.clone(),
         };
-        let (bytes, is_beside) = store.told();
+        let (bytes, is_beside) = store.summary();
         if is_beside && self.request.placing == Placing::Auto {
             tell(Event::PicturesBeside(bytes));
         }

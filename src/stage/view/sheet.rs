@@ -89,7 +89,7 @@ fn shortened(text: &str, width: usize, scale: f64) -> String {
     escaped(&ends.into_iter().collect::<String>())
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "charts"))]
 mod tests {
     use super::*;
 

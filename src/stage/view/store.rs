@@ -94,7 +94,7 @@ impl Store {
     }
 
     /// Bytes of pictures so far, and whether they are stored beside the page.
-    pub(super) fn told(&self) -> (u64, bool) {
+    pub(super) fn summary(&self) -> (u64, bool) {
         (self.bytes, self.is_beside)
     }
 
@@ -147,7 +147,7 @@ mod tests {
     fn pictures_stand_beside_a_page_that_would_hold_too_much() {
         let folder = tempfile::tempdir().unwrap();
         let store = filled(folder.path(), Placing::Auto, 40);
-        assert_eq!(store.told(), (40, false));
+        assert_eq!(store.summary(), (40, false));
         assert_eq!(
             store.addresses()[1],
             "data:image/png;base64,AQEBAQEBAQEBAQ=="
@@ -156,7 +156,7 @@ mod tests {
         assert!(!folder.path().join(FOLDER).exists());
 
         let store = filled(folder.path(), Placing::Auto, 39);
-        assert_eq!(store.told(), (40, true));
+        assert_eq!(store.summary(), (40, true));
         assert_eq!(store.addresses()[3], "pictures/a.3%20%25.png");
         store.finish(MARK).unwrap();
         assert_eq!(

@@ -11,6 +11,7 @@ use crate::{Blame, device::SolverError};
 
 /// Why whitewater could not be made.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum WhitewaterError {
     /// Reading or writing the bake's or the stream's cache failed.
     #[error(transparent)]

@@ -7,6 +7,7 @@ use swell_cache::{CacheReader, stream::PARTICLES};
 
 /// Prediction of a job.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Expected {
     /// Directory of the stream.
     pub directory: PathBuf,

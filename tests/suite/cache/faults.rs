@@ -510,7 +510,7 @@ fn submit_until_error(writer: &mut CacheWriter) -> CacheError {
 }
 
 #[test]
-fn unfit_frames_speak_up_on_finish() {
+fn malformed_frames_are_an_error_on_finish() {
     let dir = tempfile::tempdir().unwrap();
     let mut writer = create(dir.path());
     let mut spoiled = start();

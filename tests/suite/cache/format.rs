@@ -16,7 +16,7 @@ use tempfile::TempDir;
 use crate::support::cache::*;
 
 #[test]
-fn what_goes_in_comes_out() {
+fn a_cache_reads_back_as_it_was_written() {
     let dir = tempfile::tempdir().unwrap();
     let summary = bake(dir.path(), 3);
     assert_eq!((summary.frames, summary.last_frame), (3, 3));
@@ -505,7 +505,7 @@ fn what_cannot_be_cached_is_refused_before_anything_is_written() {
 }
 
 #[test]
-fn frames_come_in_turn() {
+fn writer_refuses_frames_out_of_order() {
     let dir = tempfile::tempdir().unwrap();
     let mut writer = create(dir.path());
     for frame in [0, 2] {

@@ -174,7 +174,7 @@ fn water_at_rest_bears_on_solids_and_walls_in_the_reference() {
 }
 
 #[test]
-fn a_force_that_cannot_be_is_told() {
+fn impossible_force_probe_is_refused_by_key() {
     let job = Job::of(&[("cube.obj", CUBE)]);
     let parse = |line: &str, set: &[&str]| {
         let text = format!("{SCENE}\n[[probe]]\nkind = \"force\"\n{line}\n");

@@ -203,7 +203,7 @@ fn the_reference_looks_at_substeps() {
 }
 
 #[test]
-fn a_rate_that_cannot_be_is_told() {
+fn impossible_probe_rate_is_refused_by_key() {
     let parse = |line: &str, set: &[&str]| {
         let text = format!("{SCENE}\n[[probe]]\nkind = \"energy\"\n{line}\n");
         let set: Vec<_> = set.iter().map(|&s| s.to_owned()).collect();

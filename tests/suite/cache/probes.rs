@@ -119,7 +119,7 @@ fn scenes_say_what_is_measured() {
 }
 
 #[test]
-fn a_probe_that_cannot_be_is_told() {
+fn impossible_probe_is_refused_by_key() {
     let pressure = "kind = \"pressure\"\nat = [0.0, 1.0, 1.0]";
     let cases: &[(&str, &[&str], &str, &str)] = &[
         (

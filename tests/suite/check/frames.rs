@@ -6,7 +6,7 @@ use glam::DVec3;
 use swell::{
     domain::{
         boundary::Boundary, bounds::Bounds, mesh::TriangleMesh, motion::Motion,
-        particles::Particles, solver::Solver, substep::Which,
+        particles::Particles, solver::Solver, substep::SubstepChoice,
     },
     gpu::adapter::Context,
     scene::{
@@ -384,7 +384,7 @@ fn far_walls_hold(context: &Context, method: Method, change: fn(&mut Scene), con
     assert!(faults.is_empty(), "{faults}");
 }
 
-fn of_substep(context: &Context, scene: &Scene, start: &Start, which: Which) -> Checked {
+fn of_substep(context: &Context, scene: &Scene, start: &Start, which: SubstepChoice) -> Checked {
     check_substep(context, scene, start, 0, &start.particles, which).unwrap()
 }
 
@@ -393,17 +393,17 @@ fn of_substep(context: &Context, scene: &Scene, start: &Start, which: Which) -> 
 fn substeps_are_checked(method: Method, spoils: &[Control]) {
     let context = context();
     let (scene, start) = pressed(method);
-    let last = of_substep(&context, &scene, &start, Which::Last);
+    let last = of_substep(&context, &scene, &start, SubstepChoice::Last);
     let count = last.substep.unwrap();
     assert!(count >= 3, "{count}");
     for number in 1..=count {
-        let checked = of_substep(&context, &scene, &start, Which::Number(number));
+        let checked = of_substep(&context, &scene, &start, SubstepChoice::Number(number));
         assert_eq!(checked.substep, Some(number));
         let table = &checked.table;
         assert!(over(table).is_empty(), "{number}: {}", lines(table));
         assert_eq!(number == count, lines(table) == lines(&last.table));
     }
-    let beyond = Which::Number(count + 1);
+    let beyond = SubstepChoice::Number(count + 1);
     let error = check_substep(&context, &scene, &start, 0, &start.particles, beyond);
     let found = match error {
         Err(SolveError::NoSubstep {
@@ -417,9 +417,9 @@ fn substeps_are_checked(method: Method, spoils: &[Control]) {
     for spoil in spoils {
         let mut spoiled = context.clone();
         spoiled.spoil = Some(spoil.spoil);
-        let first = of_substep(&spoiled, &scene, &start, Which::default());
+        let first = of_substep(&spoiled, &scene, &start, SubstepChoice::default());
         assert!(over(&first.table).is_empty(), "{}", lines(&first.table));
-        let last = of_substep(&spoiled, &scene, &start, Which::Last);
+        let last = of_substep(&spoiled, &scene, &start, SubstepChoice::Last);
         let expected: Vec<_> = spoil
             .fields
             .iter()
@@ -467,12 +467,12 @@ fn every_substep_of_flip_is_within_tolerance() {
 /// without the fault no row is.
 fn last_substep_sees(scene: &Scene, start: &Start, controls: &[Control]) {
     let context = context();
-    let sound = of_substep(&context, scene, start, Which::Last).table;
+    let sound = of_substep(&context, scene, start, SubstepChoice::Last).table;
     assert!(over(&sound).is_empty(), "{}", lines(&sound));
     for control in controls {
         let mut spoiled = context.clone();
         spoiled.spoil = Some(control.spoil);
-        let table = of_substep(&spoiled, scene, start, Which::Last).table;
+        let table = of_substep(&spoiled, scene, start, SubstepChoice::Last).table;
         for &field in control.fields {
             let row = (control.pass, field);
             assert!(over(&table).contains(&row), "{row:?}: {}", lines(&table));

@@ -17,7 +17,7 @@ use swell::{
         sampling::BoundarySample,
         signed_distance::SignedDistance,
         sources::{Emitter, Window},
-        substep::Which,
+        substep::SubstepChoice,
     },
     gpu::adapter::{Context, InjectedFault, Needs},
     scene::{
@@ -260,7 +260,7 @@ fn pbf_is_within_tolerance_and_each_row_fails_where_it_should() {
     let plan = start.plan(&scene, device_limits(&context));
     let boundaries = [&start.boundary, &moved];
     let state = (0, &start.particles);
-    let first = Which::default();
+    let first = SubstepChoice::default();
     let checked = pbf::check(&context, &scene, plan, boundaries, state, first).unwrap();
     let found = over(&checked.table);
     assert!(
@@ -448,7 +448,7 @@ fn pbf_table(
     let boundaries = [&start.boundary; 2];
     let state = (0, &start.particles);
     let plan = start.plan(scene, limits);
-    let first = Which::default();
+    let first = SubstepChoice::default();
     Ok(pbf::check(context, scene, plan, boundaries, state, first)?.table)
 }
 
@@ -536,7 +536,7 @@ fn work_of_moving_walls_is_within_tolerance_and_fails_where_it_should() {
 
 /// A fault that no longer matches its shader is an error, not a control that passes.
 #[test]
-fn a_fault_has_to_occur() {
+fn injected_fault_that_matches_no_shader_text_is_an_error() {
     let (scene, start) = case(Method::Pbf);
     let mut context = context();
     context.spoil = Some(InjectedFault {

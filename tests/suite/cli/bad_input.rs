@@ -175,7 +175,7 @@ const FAULTS: [(&str, i32, &str); 21] = [
 ];
 
 #[test]
-fn each_fault_is_one_line() {
+fn bad_input_is_reported_in_one_line() {
     let job = given();
     let names = || {
         let entries = fs::read_dir(job.folder.path()).unwrap();

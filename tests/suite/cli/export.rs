@@ -357,7 +357,7 @@ fn files_are_numbered_from_another_frame() {
 }
 
 #[test]
-fn what_stands_whole_is_not_made_again() {
+fn export_skips_complete_files() {
     let job = made();
     fs::create_dir(job.path("out")).unwrap();
     let words = "export cache --mesh out/m.%04d.ply --npy out/p.%04d.npy";
@@ -410,7 +410,7 @@ fn shares_fill_one_folder_as_one_export_does() {
 }
 
 #[test]
-fn faults_are_one_clear_line() {
+fn faults_of_export_are_one_line_with_exit_code() {
     let job = made();
     let clear = |code, words: &str, part: &str| job.expect_clear(code, words, part);
     clear(2, "export cache", "nothing to export");

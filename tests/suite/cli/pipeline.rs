@@ -360,7 +360,7 @@ fn no_adapter_names_the_package() {
 /// The table of exit codes in docs/commands.md: a missing path is a cache's fault, or a scene's if
 /// it is named like one.
 #[test]
-fn what_is_missing_ends_as_the_table_says() {
+fn missing_paths_exit_with_the_documented_codes() {
     let job = Job::new();
     let commands = [
         (4, "check missing"),

@@ -48,7 +48,7 @@ fn the_version_is_short_or_says_what_was_built() {
     assert!(is_hash || hash == "unknown", "{commit}");
     assert_has(value("target"), &[std::env::consts::ARCH]);
     assert!(matches!(value("profile"), "release" | "debug"), "{long}");
-    assert_eq!(value("features"), "none");
+    assert_eq!(value("features"), "charts, perceptual");
 }
 
 fn git(folder: &Path, words: &str) -> String {

@@ -470,7 +470,7 @@ fn a_study_has_its_page_and_a_sheet() {
 }
 
 #[test]
-fn faults_are_one_clear_line() {
+fn faults_of_view_are_one_line_with_exit_code() {
     let job = made();
     let clear = |code, words: &str, part: &str| job.expect_clear(code, words, part);
     fs::create_dir_all(job.path("empty")).unwrap();

@@ -7,7 +7,7 @@ use std::{
 };
 
 /// Top-level modules whose submodules are free of import cycles.
-const ROOMS: [&str; 8] = [
+const CRATES: [&str; 8] = [
     "cache",
     "compare",
     "domain",
@@ -44,16 +44,16 @@ fn paths(tree: &str) -> Vec<String> {
 }
 
 /// Submodules that a file `depth` levels below its top-level module imports, without its tests.
-fn imports(room: &str, text: &str, depth: usize, modules: &BTreeSet<String>) -> BTreeSet<String> {
+fn imports(krate: &str, text: &str, depth: usize, modules: &BTreeSet<String>) -> BTreeSet<String> {
     let code = text.split("\nmod tests {").next().unwrap_or("");
     let is_code = |line: &&str| !line.trim_start().starts_with("//");
     let code: Vec<&str> = code.lines().filter(is_code).collect();
     let code = code.join("\n");
-    let ways = ["super::".repeat(depth), format!("crate::{room}::")];
+    let prefixes = ["super::".repeat(depth), format!("crate::{krate}::")];
     let uses = code.split("use ").skip(1);
     let trees = uses.filter_map(|rest| rest.split(';').next());
     let named = trees.flat_map(paths).filter_map(|path| {
-        let rest = ways.iter().find_map(|way| path.strip_prefix(way))?;
+        let rest = prefixes.iter().find_map(|way| path.strip_prefix(way))?;
         rest.split("::").next().map(str::to_owned)
     });
     named.filter(|name| modules.contains(name)).collect()
@@ -61,7 +61,7 @@ fn imports(room: &str, text: &str, depth: usize, modules: &BTreeSet<String>) -> 
 
 /// Collects the imports of each submodule from the files below `folder`.
 fn gather(
-    room: &str,
+    krate: &str,
     folder: &Path,
     module: Option<&str>,
     depth: usize,
@@ -73,7 +73,7 @@ fn gather(
         let stem = path.file_stem().unwrap().to_str().unwrap().to_owned();
         let name = module.unwrap_or(&stem);
         if path.is_dir() {
-            gather(room, &path, Some(name), depth + 1, modules, found);
+            gather(krate, &path, Some(name), depth + 1, modules, found);
             continue;
         }
         let is_root = stem == "mod";
@@ -82,7 +82,7 @@ fn gather(
         }
         let text = fs::read_to_string(&path).unwrap();
         let below = if is_root { depth - 1 } else { depth };
-        let mut all = imports(room, &text, below, modules);
+        let mut all = imports(krate, &text, below, modules);
         all.remove(name);
         found.entry(name.to_owned()).or_default().extend(all);
     }
@@ -110,8 +110,10 @@ fn circle(of: &BTreeMap<String, BTreeSet<String>>) -> Option<Vec<String>> {
 }
 
 /// For each submodule of a top-level module, the siblings that it imports.
-fn of_room(room: &str) -> BTreeMap<String, BTreeSet<String>> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("src").join(room);
+fn of_crate(krate: &str) -> BTreeMap<String, BTreeSet<String>> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("src")
+        .join(krate);
     let names = fs::read_dir(&folder)
         .unwrap()
         .map(|entry| entry.unwrap().path());
@@ -120,17 +122,17 @@ fn of_room(room: &str) -> BTreeMap<String, BTreeSet<String>> {
         .collect();
     modules.remove("mod");
     let mut found = BTreeMap::new();
-    gather(room, &folder, None, 1, &modules, &mut found);
+    gather(krate, &folder, None, 1, &modules, &mut found);
     found
 }
 
 #[test]
-fn modules_of_a_room_import_each_other_one_way() {
-    for room in ROOMS {
-        assert_eq!(circle(&of_room(room)), None, "{room}");
+fn modules_of_a_crate_import_each_other_without_cycles() {
+    for krate in CRATES {
+        assert_eq!(circle(&of_crate(krate)), None, "{krate}");
     }
     // Negative controls: the imports are found, also within braces, and one back makes a cycle.
-    let mut found = of_room("scene");
+    let mut found = of_crate("scene");
     assert!(found["build"].contains("document") && found["document"].contains("key"));
     assert!(found["keys"].contains("look") && found["look"].contains("key"));
     let modules = BTreeSet::from(["document".to_owned()]);
@@ -146,6 +148,6 @@ fn modules_of_a_room_import_each_other_one_way() {
         .insert("build".to_owned());
     let way = circle(&found).unwrap();
     assert!(["build", "document"].map(|name| way.iter().any(|module| module == name)) == [true; 2]);
-    let of_cache = of_room("cache");
+    let of_cache = of_crate("cache");
     assert!(of_cache["writer"].contains("sink") && of_cache["tables"].contains("ledger"));
 }

@@ -149,7 +149,7 @@ fn rows_to_grid(case: &Case, pair: &Pair, trace: &Trace) -> Vec<Row> {
     let mut rows = vec![
         row(
             "cell_kind",
-            off(&pair.bits(CELL_KIND), &trace.room.kind),
+            off(&pair.bits(CELL_KIND), &trace.space.kind),
             0.0,
         ),
         row(
@@ -161,13 +161,13 @@ fn rows_to_grid(case: &Case, pair: &Pair, trace: &Trace) -> Vec<Row> {
         // 50 u of those, and an area changes by up to √3 times the change of its corners.
         row(
             "face_open",
-            largest(&pair.field(FACE_OPEN, 3), &planes(&trace.room.open)),
+            largest(&pair.field(FACE_OPEN, 3), &planes(&trace.space.open)),
             2.0 * 50.0 * U,
         ),
         // Six such areas times up to 2.5 m/s of a wall or solid.
         row(
             "solid_flux",
-            largest(&pair.field(SOLID_FLUX, 1), &trace.room.solid_flux),
+            largest(&pair.field(SOLID_FLUX, 1), &trace.space.solid_flux),
             6.0 * 2.5 * 2.0 * 50.0 * U,
         ),
     ];
@@ -223,7 +223,7 @@ fn rows_of_motion(case: &Case, pair: &Pair, trace: &Trace) -> Vec<Row> {
     let step = case.scene.shot.frame_seconds();
     let projected = &trace.projected;
     let reported = pair.report.projection.unwrap();
-    let n = trace.room.kind.len();
+    let n = trace.space.kind.len();
     // A projection does not enlarge its input; with the residual r the velocities are off by ‖r‖ /
     // √λ in the Euclidean norm. Twice that: gradients and their differences round as well.
     let rows = (projected.system.cell.len() as f64).sqrt();
@@ -381,7 +381,7 @@ fn the_gpu_follows_the_reference() {
 
 /// Negative controls: each row detects a reference with another input, changed by the amount below.
 #[test]
-fn every_row_sees_what_is_off() {
+fn each_row_sees_a_reference_with_changed_inputs() {
     let context = context();
     let unseen = RefCell::new(Vec::new());
     let look = |case: &Case, pair: &Pair, spoiled: &Trace, name: &str| {
@@ -459,7 +459,7 @@ fn every_row_sees_what_is_off() {
 
 /// Conjugate gradients, which whole frames use, and a sparse factor give the same result.
 #[test]
-fn a_factor_changes_nothing() {
+fn sparse_factor_and_conjugate_gradients_agree() {
     for case in [dam(), pocket()] {
         let iterated = trace(&case);
         let mut reference = Reference::new(&case.scene, &case.boundary);

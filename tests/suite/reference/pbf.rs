@@ -147,7 +147,7 @@ fn show(values: &[f64]) -> String {
 }
 
 #[test]
-fn one_substep_on_the_gpu_and_in_f64() {
+fn one_pbf_substep_on_the_gpu_matches_f64() {
     let context = context();
     for kind in KINDS {
         let (scene, start) = lively(kind);
@@ -190,7 +190,7 @@ fn one_substep_on_the_gpu_and_in_f64() {
 }
 
 #[test]
-fn not_a_number_is_an_error() {
+fn velocity_that_is_not_a_number_is_an_error() {
     let (scene, mut start) = lively("");
     start.particles.velocity[7][1] = f32::NAN;
     let mut solver = Pbf::new(&scene, &start.boundary);
@@ -379,11 +379,11 @@ fn iterations_approach_what_is_converged() {
     }
 }
 
-/// Cost of the sparse factor: `cargo test --release --test suite reference::pbf::factor_costs --
+/// Cost of the sparse factor: `cargo test --release --test suite reference::pbf::sparse_factor_cost_is_printed_by_size --
 /// --ignored --nocapture`.
 #[test]
 #[ignore = "minutes and gigabytes"]
-fn factor_costs() {
+fn sparse_factor_cost_is_printed_by_size() {
     for count in [13, 20, 25, 31] {
         let (scene, particles) = squeezed(count);
         let (model, substep, sorted) = sorted(&scene, &particles);

@@ -54,7 +54,7 @@ impl Grid {
             model: self.model(),
             step: &step,
             bricks: &self.trace.bricks,
-            room: &self.trace.room,
+            space: &self.trace.space,
             centers: &self.trace.centers,
             old: &self.trace.faces.change,
         })

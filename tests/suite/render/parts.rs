@@ -1,7 +1,7 @@
 //! A frame that is rendered in parts reports its progress, and is the same picture.
 
 use swell::files::parse_look;
-use swell::render::{Moment, Part, Renderer, Water};
+use swell::render::{FrameInputs, Part, Renderer, Water};
 
 use super::pictures::{ALL_AOVS, OBLIQUE, harbour};
 use crate::support::context;
@@ -12,7 +12,7 @@ use crate::support::context;
 fn each_part_of_a_frame_is_told_once() {
     let (scene, water) = harbour();
     let (water, white) = (Water::new(water), Default::default());
-    let moment = Moment::alone(&water, &white);
+    let inputs = FrameInputs::alone(&water, &white);
     let context = context();
     for method in ["ray", "ssfr"] {
         let text = format!("{OBLIQUE}[renderer]\nmethod = \"{method}\"\n{ALL_AOVS}");
@@ -26,7 +26,7 @@ fn each_part_of_a_frame_is_told_once() {
         let count = bands * (image.samples + aovs);
         let mut renderer = Renderer::with_tile_limit(&context, &look, &scene, 16).unwrap();
         let mut told = Vec::new();
-        let drawn = renderer.render_parts(3, &moment, &mut |part| told.push(part));
+        let drawn = renderer.render_parts(3, &inputs, &mut |part| told.push(part));
         let drawn = drawn.unwrap();
         // A quick sample, such as those after the first here, is reported as one.
         let done: Vec<u32> = told.iter().map(|part| part.done).collect();
@@ -40,7 +40,7 @@ fn each_part_of_a_frame_is_told_once() {
         assert!(told.iter().all(|part| part.count == count));
         let whole = Renderer::new(&context, &look, &scene)
             .unwrap()
-            .render_moment(3, &moment);
+            .render_inputs(3, &inputs);
         assert!(drawn == whole.unwrap(), "{method}");
     }
 }

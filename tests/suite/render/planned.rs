@@ -7,7 +7,7 @@ use swell::{
         adapter::{Context, Needs},
         program::check_sizes,
     },
-    render::{Limits, Moment, Plan, Renderer, Water},
+    render::{FrameInputs, Limits, Plan, Renderer, Water},
 };
 
 use super::pictures::{TOP_DOWN, tank};
@@ -30,7 +30,7 @@ fn what_is_planned_for_a_frame_is_refused_where_drawing_it_is() {
     let scene = tank(SPACING);
     let particles = slab(scene.domain.min, DVec3::new(8.0, 3.2, 6.0), SPACING);
     let (water, white) = (Water::new(particles), Default::default());
-    let moment = Moment::alone(&water, &white);
+    let inputs = FrameInputs::alone(&water, &white);
     for (more, names) in [
         ("[renderer]\nmethod = \"ray\"\n", &["level_values"][..]),
         (
@@ -44,7 +44,7 @@ fn what_is_planned_for_a_frame_is_refused_where_drawing_it_is() {
         )
         .unwrap();
         let plan = |context: &Context| {
-            Plan::of_frame(&look, &scene, 1, &moment, &Limits::of(context)).unwrap()
+            Plan::of_frame(&look, &scene, 1, &inputs, &Limits::of(context)).unwrap()
         };
         let whole = plan(&crate::support::context());
         let stored = whole.buffers.iter().filter(|buffer| !buffer.is_uniform);
@@ -54,7 +54,7 @@ fn what_is_planned_for_a_frame_is_refused_where_drawing_it_is() {
             let context = lowered(storage);
             let planned = check_sizes(&context, &plan(&context).buffers).err();
             let renderer = Renderer::new(&context, &look, &scene);
-            let drawn = renderer.and_then(|mut it| it.render_moment(1, &moment));
+            let drawn = renderer.and_then(|mut it| it.render_inputs(1, &inputs));
             (
                 planned.map(|error| error.to_string()),
                 drawn.err().map(|error| error.to_string()),

@@ -323,7 +323,7 @@ fn seeds() -> Vec<(MeshFormat, Vec<u8>)> {
 }
 
 #[test]
-fn the_seeds_are_cubes() {
+fn mesh_fuzz_seeds_load_as_cubes() {
     for (format, bytes) in seeds() {
         let mesh = TriangleMesh::from_bytes(&bytes, format, Path::new("seed")).expect("a cube");
         assert_eq!(

@@ -136,7 +136,7 @@ fn boundary_of(mesh: &swell::domain::mesh::TriangleMesh, domain: &Bounds, d: f64
 /// per axis. The GPU's error is as pbf.rs derives, 2e-5 d where corrections are up to 0.1 d,
 /// and proportional to them.
 #[test]
-fn one_iteration_is_the_papers() {
+fn one_iteration_of_pbf_matches_the_papers_formulas() {
     let paper = Paper::new(D, 2.0);
     for (part, repulsion, relaxation, is_bounded) in [
         (0.98, 0.0, 1.0, false),
@@ -277,7 +277,7 @@ fn grid_vorticity_and_its_confinement_are_fedkiws() {
     let turning: Vec<DVec3> = (0..elements)
         .map(|e| DVec3::new(face(e, 0), face(e, 1), face(e, 2)))
         .collect();
-    let curl = grid_curl(model, &trace.bricks, &trace.room, &turning);
+    let curl = grid_curl(model, &trace.bricks, &trace.space, &turning);
     let at = |x: i64, y: i64, z: i64| trace.bricks.element([x, y, z]) as usize;
     for place in [at(5, 5, 5), at(1, 8, 6), at(6, 6, 1)] {
         assert!(
@@ -295,7 +295,7 @@ fn grid_vorticity_and_its_confinement_are_fedkiws() {
         model,
         &step,
         &trace.bricks,
-        &trace.room,
+        &trace.space,
         0.7,
         &rising,
         &turning,

@@ -397,7 +397,7 @@ fn too_fast_for_its_substeps_is_an_error() {
 }
 
 #[test]
-fn not_a_number_is_an_error() {
+fn velocity_that_is_not_a_number_is_an_error() {
     let context = context();
     let scene = scene([1.0; 3]);
     let mut particles = lattice([0.3; 3], [3, 3, 3], [D; 3]);
@@ -438,7 +438,7 @@ fn names(plan: &Plan) -> (Vec<&str>, Vec<&str>) {
 /// What the scene does not name costs no pass, no buffer and no byte, and exactly the planned
 /// passes run.
 #[test]
-fn only_what_the_scene_calls_for() {
+fn plan_of_a_bare_scene_has_no_pass_or_buffer_of_effects() {
     let context = context();
     let mut scene = scene([1.0; 3]);
     let particles = lattice([0.0; 3], [5, 5, 5], [D; 3]);

@@ -206,7 +206,7 @@ fn reflections(plan: &Plan) -> BTreeMap<&'static str, Reflection> {
 
 /// `update_velocity` writes positions back exactly when an effect reads neighbours there.
 #[test]
-fn places_are_kept_for_effects_that_read_them_alone() {
+fn positions_are_written_back_only_for_effects_that_read_them() {
     let all = with_effects(pbf(|_| {})).effects;
     let mut seen = [0; 2];
     for keep in std::iter::once("none").chain(Effects::NAMES.iter().copied()) {
@@ -389,7 +389,7 @@ fn a_plan_that_parts_from_its_commands_is_seen() {
 /// Watched buffers are f32 arrays that some pass writes and that the survey of particles does not
 /// cover.
 #[test]
-fn what_is_watched_is_written() {
+fn watched_buffers_are_written_by_a_pass() {
     let is_watchable = |plan: &Plan, row: &PlannedBuffer| {
         let mut bindings = reflections(plan).into_values().flat_map(|r| r.bindings);
         let is_written = bindings.any(|b| b.name == row.spec.name && b.access == Access::ReadWrite);

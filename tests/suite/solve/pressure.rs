@@ -424,7 +424,7 @@ fn no_divergence_takes_no_iteration() {
 
 /// Drops of one cell, a cell without an open face, an empty box, all in the same arrays.
 #[test]
-fn odd_cells_and_changing_bricks() {
+fn pressure_of_odd_cells_converges_while_bricks_change() {
     let context = context();
     let hash = |c: [u32; 3]| (c[0] * 7 + c[1] * 13 + c[2] * 29 + c[0] * c[1] * c[2]) % 11;
     let spray = Case::new(

@@ -284,7 +284,7 @@ fn gpu_and_f64_push_alike_and_the_wall_pays_for_it() {
 }
 
 #[test]
-fn a_scene_that_does_not_name_it_has_none_of_it() {
+fn scene_without_projection_plans_no_pass_of_it() {
     let context = context();
     let (scene, particles) = tank(10);
     let plan =

@@ -210,7 +210,7 @@ fn the_sliver_at_a_wall_is_water_beside_a_solid_too() {
         let mut reference = Flip::new(&scene, &boundary);
         reference.load(0, &particles).unwrap();
         let trace = one_substep(&mut reference, 1.0);
-        let kind = |x: i64, y: i64| trace.room.kind[trace.bricks.element([x, y, 4]) as usize];
+        let kind = |x: i64, y: i64| trace.space.kind[trace.bricks.element([x, y, 4]) as usize];
         for y in 2..6 {
             assert_eq!((kind(0, y), kind(1, y)), (FLUID, FLUID), "{y}");
         }

@@ -89,7 +89,7 @@ fn sloshing_is_taken_out_by_a_wall_that_absorbs() {
 }
 
 #[test]
-fn a_wall_without_room_says_so() {
+fn absorbing_wall_at_the_end_of_its_range_is_a_warning() {
     let job = Job::of(&[("tank.toml", TANK)]);
     let small = "--frames 1-20 --set wave_maker.0.absorption.room=0.002";
     let said = job.expect(0, &format!("bake tank.toml {small} -o small"));
@@ -151,7 +151,7 @@ fn a_bake_goes_on_with_the_wall_where_it_stood() {
 /// A wall whose saved displacement is out of range starts at the scene's position, with a warning.
 /// Saved states are matched by wall, not by the order of the wave makers.
 #[test]
-fn a_branch_takes_answers_by_wall() {
+fn branch_matches_absorber_states_by_wall() {
     let job = Job::of(&[("tank.toml", TANK)]);
     job.expect(0, "bake tank.toml --frames 1-12 -o cache");
     let first = |cache: &str| {
@@ -239,7 +239,7 @@ fn forces_are_those_on_the_wall_where_it_stands() {
 
 /// Without absorption no line of the ledger names a wall.
 #[test]
-fn other_caches_have_no_byte_of_it() {
+fn ledger_without_absorption_names_no_wall() {
     let job = Job::of(&[("tank.toml", TANK)]);
     job.expect(0, &format!("bake tank.toml --frames 1-2 {WALLED} -o plain"));
     job.expect(0, "bake tank.toml --frames 1-2 -o absorbs");

@@ -141,7 +141,7 @@ fn flip_bakes_in_which_water_comes_and_goes_close_and_go_on() {
 }
 
 #[test]
-fn so_do_those_of_the_reference() {
+fn reference_bakes_in_which_water_comes_and_goes_close_and_go_on() {
     holds("pbf", "cpu");
     holds("flip", "cpu");
 }

@@ -198,7 +198,7 @@ fn a_limit_is_foretold_from_the_first_frames() {
 }
 
 #[test]
-fn what_cannot_be_is_refused() {
+fn whitewater_with_impossible_settings_is_refused() {
     let job = baked();
     let said = job.expect(2, "whitewater cache/small/pbf --last 9");
     assert_has(&said, &["frame 9", "0 to 8"]);

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::{
-    Centers, Model, Room, Sorted, Step,
+    Centers, Model, OpenSpace, Sorted, Step,
     grid::{corner, per_cell},
 };
 use crate::Timings;
@@ -20,7 +20,7 @@ pub struct Water<'a> {
     /// Layout of the elements.
     pub bricks: &'a Bricks,
     /// Open space and cell kinds.
-    pub room: &'a Room,
+    pub space: &'a OpenSpace,
     /// Densities and surface distances at cell centres.
     pub centers: &'a Centers,
     /// Velocities at faces before gravity, m/s.
@@ -49,7 +49,7 @@ pub fn led_faces(
             }
         };
         let change = DVec3::new(change(0), change(1), change(2));
-        let is_open = water.room.open[e].cmpgt(DVec3::ZERO);
+        let is_open = water.space.open[e].cmpgt(DVec3::ZERO);
         velocity[e] + DVec3::select(is_open, change, DVec3::ZERO)
     })
 }

@@ -4,7 +4,7 @@ use glam::{DMat3, DVec2, DVec3};
 
 use super::{
     super::{
-        Model, Room,
+        Model, OpenSpace,
         grid::{along, neighborhood, per_cell},
     },
     Acts, Water,
@@ -82,7 +82,7 @@ pub fn first_share(model: &Model, bricks: &Bricks, kind: &[u32], density: &[f64]
 
 /// Derivatives of the smoothed water fraction around a cell; lengths in cells.
 #[derive(Clone, Copy, Debug)]
-pub struct Bent {
+pub struct Curvature {
     /// Gradients at the eight corners.
     pub corners: [DVec3; 8],
     /// −∇·n of the level set through the cell's centre.
@@ -95,7 +95,7 @@ pub struct Bent {
     pub off: f64,
 }
 
-impl Bent {
+impl Curvature {
     /// Computes the derivatives from the water fractions of 27 cells, x fastest.
     pub fn of(shares: &[f64; 27]) -> Self {
         let places = [0, 1, 2, 3, 4, 5, 6, 7].map(|c: usize| [c & 1, c >> 1 & 1, c >> 2]);
@@ -137,9 +137,9 @@ pub fn bent(
     kind: &[u32],
     share: &[f64],
     element: u32,
-) -> Option<Bent> {
+) -> Option<Curvature> {
     let about = || mirrored(model, bricks, kind, element).map(|other| share[other as usize]);
-    (share[element as usize] > 0.0).then(|| Bent::of(&about()))
+    (share[element as usize] > 0.0).then(|| Curvature::of(&about()))
 }
 
 /// Returns κ Δx of the surface near each cell, and the gradient of the water fraction there, per
@@ -164,10 +164,10 @@ pub fn between(curvature: &[DVec2], theta: f64, water: u32, air: u32) -> (f64, f
 
 /// Returns the cells of water and of air on both sides of a lower face, in this order, if the
 /// surface crosses it.
-pub fn sides(bricks: &Bricks, room: &Room, element: u32, axis: usize) -> Option<[u32; 2]> {
+pub fn sides(bricks: &Bricks, space: &OpenSpace, element: u32, axis: usize) -> Option<[u32; 2]> {
     let before = bricks.near(element, along(axis, -1));
-    let is_open = room.open[element as usize][axis] > 0.0;
-    match [element, before].map(|e| room.kind[e as usize]) {
+    let is_open = space.open[element as usize][axis] > 0.0;
+    match [element, before].map(|e| space.kind[e as usize]) {
         [FLUID, AIR] if is_open => Some([element, before]),
         [AIR, FLUID] if is_open => Some([before, element]),
         _ => None,
@@ -180,7 +180,7 @@ pub fn sides(bricks: &Bricks, room: &Room, element: u32, axis: usize) -> Option<
 pub fn push(
     (model, tension, seconds): (&Model, f64, f64),
     bricks: &Bricks,
-    room: &Room,
+    space: &OpenSpace,
     distance: Option<&[f64]>,
     curvature: &[DVec2],
     velocity: &[DVec3],
@@ -188,14 +188,14 @@ pub fn push(
     let scale = seconds * tension / model.cell_size().powi(2);
     let cells = Cells {
         bricks,
-        kind: &room.kind,
+        kind: &space.kind,
         open: &[],
         distance,
     };
     per_cell(bricks, |element| {
         let mut pushed = velocity[element as usize];
         for axis in 0..3 {
-            let Some([water, air]) = sides(bricks, room, element, axis) else {
+            let Some([water, air]) = sides(bricks, space, element, axis) else {
                 continue;
             };
             let theta = cells.theta(water, air);
@@ -212,11 +212,11 @@ impl Acts for Settings {
             model,
             step,
             bricks,
-            room,
+            space,
             centers,
             ..
         } = water;
-        let kind = &room.kind;
+        let kind = &space.kind;
         let smooth = |share: &[f64]| smooth(model, bricks, kind, share);
         let share = timings.time("effects/tension_share", || {
             first_share(model, bricks, kind, &centers.density)
@@ -230,7 +230,7 @@ impl Acts for Settings {
             let tension = self.coefficient / model.scene.water.rest_density;
             let distance = model.has_ghost_fluid().then_some(&centers.distance[..]);
             let step = (model, tension, step.kick);
-            push(step, bricks, room, distance, &curvature, velocity)
+            push(step, bricks, space, distance, &curvature, velocity)
         });
     }
 }

@@ -104,7 +104,7 @@ impl Around<'_> {
     }
 
     fn is_water(&self, offset: [i32; 3]) -> bool {
-        self.water.room.kind[self.near(offset) as usize] == FLUID
+        self.water.space.kind[self.near(offset) as usize] == FLUID
     }
 
     /// Returns the walls that the centre of a lower face lies behind: the minimum and the maximum
@@ -131,7 +131,7 @@ impl Around<'_> {
             };
         }
         let is_wet = self.is_water(offset) || self.is_water(beside(offset, axis, -1));
-        match (self.water.room.open[element as usize][axis] > 0.0, is_wet) {
+        match (self.water.space.open[element as usize][axis] > 0.0, is_wet) {
             (false, _) => Face::Closed,
             (true, true) => Face::Moves,
             (true, false) => Face::InAir,

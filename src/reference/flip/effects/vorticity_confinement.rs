@@ -15,15 +15,15 @@ impl Acts for Settings {
             model,
             step,
             bricks,
-            room,
+            space,
             ..
         } = water;
         let vorticity = timings.time("effects/grid_curl", || {
-            grid_curl(model, bricks, room, velocity)
+            grid_curl(model, bricks, space, velocity)
         });
         *velocity = timings.time("effects/grid_confinement", || {
             let strength = self.strength;
-            grid_confinement(model, step, bricks, room, strength, &vorticity, velocity)
+            grid_confinement(model, step, bricks, space, strength, &vorticity, velocity)
         });
     }
 }

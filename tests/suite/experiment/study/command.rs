@@ -5,7 +5,7 @@ use std::{fs, process::Command};
 use super::{ITERATIONS, Job};
 
 #[test]
-fn the_command_tells_each_point() {
+fn study_command_reports_each_point() {
     let job = Job::new();
     fs::write(job.folder.path().join("s.toml"), ITERATIONS).unwrap();
     let run = |progress: &str| {

@@ -33,7 +33,7 @@ fn job() -> Job {
 }
 
 #[test]
-fn a_surface_is_drawn_once_and_told() {
+fn surface_study_draws_each_point_once_and_reports_it() {
     let job = job();
     let (outcome, points) = job.run(SURFACE, false).unwrap();
     assert_eq!((points.len(), stands(&points)), (4, 0));

@@ -381,7 +381,7 @@ fn energy_error(context: &Context) -> f64 {
 
 /// Energy is conserved within 1 %.
 #[test]
-fn what_comes_in_lands() {
+fn caustics_conserve_energy() {
     let error = energy_error(&context());
     assert!(error < 0.01, "{error}");
     let (from, to) = ("light * share, layer", "1.02 * light * share, layer");

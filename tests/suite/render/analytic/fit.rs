@@ -3,7 +3,7 @@
 
 use glam::DVec3;
 use swell::files::parse_look;
-use swell::render::{Image, Moment, Renderer, Water};
+use swell::render::{FrameInputs, Image, Renderer, Water};
 
 use super::support::{Eye, Setup, ball, context, scene, uniform_sky, write_sky};
 
@@ -63,8 +63,8 @@ fn drawn(method: &'static str, film: [f64; 2], fit: &str) -> Image {
     let look = parse_look(&text, &folder.path().join("look.toml")).unwrap();
     let mut renderer = Renderer::new(&context(), &look, &set).unwrap();
     let (water, white) = (Water::new(water), Default::default());
-    let moment = Moment::alone(&water, &white);
-    renderer.render_moment(1, &moment).unwrap()
+    let inputs = FrameInputs::alone(&water, &white);
+    renderer.render_inputs(1, &inputs).unwrap()
 }
 
 /// A millimetre of film is 96 / 36 pixels where the image uses the film's width and 54 / 24 where

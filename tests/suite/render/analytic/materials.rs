@@ -11,7 +11,7 @@ use swell::gpu::adapter::Context;
 use swell::scene::look::Look;
 use swell::{
     domain::mesh_file::{MeshFormat, parts::Parts},
-    render::{Image, Moment, RenderError, RenderScene, Renderer, SolidParts, Water},
+    render::{FrameInputs, Image, RenderError, RenderScene, Renderer, SolidParts, Water},
 };
 
 use super::support::{Eye, Setup, context, scene, spoiled, uniform_sky, write_sky};
@@ -173,7 +173,7 @@ impl Shown<'_> {
             .map_err(|error| Box::new((error, look.clone())))?;
         let (water, white) = (Water::new(Particles::default()), Particles::default());
         Ok(renderer
-            .render_moment(1, &Moment::alone(&water, &white))
+            .render_inputs(1, &FrameInputs::alone(&water, &white))
             .unwrap())
     }
 

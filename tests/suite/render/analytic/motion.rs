@@ -2,9 +2,9 @@
 
 use glam::DVec3;
 use swell::domain::particles::Particles;
-use swell::render::{Image, Moment, Water};
+use swell::render::{FrameInputs, Image, Water};
 
-use super::support::{Eye, Setup, ball, context, draw_moment, scene, uniform_sky};
+use super::support::{Eye, Setup, ball, context, draw_inputs, scene, uniform_sky};
 
 /// Acceleration along z, m/s²: 4.8 m of displacement a frame before and after, at 24 frames a
 /// second.
@@ -48,16 +48,16 @@ fn shift(method: &'static str, around: [Option<&Water>; 4]) -> f64 {
             ..Setup::new(eye())
         };
         let (water, white) = (Water::new(thrown(0.0)), Particles::default());
-        let moment = Moment {
+        let inputs = FrameInputs {
             around,
-            ..Moment::alone(&water, &white)
+            ..FrameInputs::alone(&water, &white)
         };
-        let drawn = draw_moment(
+        let drawn = draw_inputs(
             &context(),
             &setup,
             &uniform_sky,
             &scene(0.4, 1.0),
-            &moment,
+            &inputs,
             1,
         );
         middle(&drawn.unwrap())
@@ -98,16 +98,16 @@ fn motion(method: &'static str, after: Option<&Water>) -> f64 {
     };
     let water = Water::new(ball(eye().target, DVec3::Z * 3.0));
     let white = Particles::default();
-    let moment = Moment {
+    let inputs = FrameInputs {
         around: [None, None, after, None],
-        ..Moment::alone(&water, &white)
+        ..FrameInputs::alone(&water, &white)
     };
-    let drawn = draw_moment(
+    let drawn = draw_inputs(
         &context(),
         &setup,
         &uniform_sky,
         &scene(0.4, 1.0),
-        &moment,
+        &inputs,
         1,
     );
     let forward = drawn.unwrap().aovs.forward.unwrap();

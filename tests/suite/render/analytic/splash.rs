@@ -4,10 +4,10 @@ use glam::DVec3;
 use swell::domain::bounds::Bounds;
 use swell::domain::whitewater::RADIUS as SIZE;
 use swell::gpu::adapter::Context;
-use swell::render::{Moment, RenderScene, Water};
+use swell::render::{FrameInputs, RenderScene, Water};
 
 use super::geometry::box_mesh;
-use super::support::{ball, context, draw_moment, scene, spoiled, uniform_sky};
+use super::support::{ball, context, draw_inputs, scene, spoiled, uniform_sky};
 use super::water::{BLACK, INDEX, RADIUS, eye_at, meetings, setup_at};
 
 const LEVEL: f64 = 2.0;
@@ -37,8 +37,8 @@ fn mirrored(context: &Context) -> [f64; 2] {
     let radius = vec![CLOUD_RADIUS as f32];
     white.attributes.insert(SIZE.to_owned(), radius);
     let water = Water::new(ball(DVec3::new(5.0, LEVEL - RADIUS, 5.0), DVec3::ZERO));
-    let moment = Moment::alone(&water, &white);
-    let image = draw_moment(context, &setup, &uniform_sky, &scene, &moment, 1).unwrap();
+    let inputs = FrameInputs::alone(&water, &white);
+    let image = draw_inputs(context, &setup, &uniform_sky, &scene, &inputs, 1).unwrap();
     let [mut cloud, mut bare] = [const { Vec::new() }; 2];
     for (i, at) in meetings(&image, &setup.eye).iter().enumerate() {
         let is_water = (at.position.y - LEVEL).abs() < 0.1 && at.position.x < CLOUD.x - 0.5;

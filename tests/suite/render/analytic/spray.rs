@@ -7,12 +7,12 @@ use swell::domain::bounds::Bounds;
 use swell::domain::particles::Particles;
 use swell::domain::whitewater::RADIUS;
 use swell::gpu::adapter::Context;
-use swell::render::{Image, Moment, RenderError, RenderScene, Water};
+use swell::render::{FrameInputs, Image, RenderError, RenderScene, Water};
 
 use super::geometry::box_mesh;
 use super::rays;
 use super::support::{
-    Eye, Setup, ball, context, draw, draw_moment, kernel, scene, spoiled, uniform_sky,
+    Eye, Setup, ball, context, draw, draw_inputs, kernel, scene, spoiled, uniform_sky,
 };
 
 fn black_sky(_: DVec3, _: DVec2) -> [f64; 3] {
@@ -63,8 +63,8 @@ impl Cloud {
             particle_spacing: self.spacing,
             ..scene(1.0, 1.0)
         };
-        let moment = Moment::alone(&water, &white);
-        draw_moment(context, &setup, sky, &scene, &moment, 1).unwrap()
+        let inputs = FrameInputs::alone(&water, &white);
+        draw_inputs(context, &setup, sky, &scene, &inputs, 1).unwrap()
     }
 }
 
@@ -397,9 +397,9 @@ fn is_refused(method: &'static str, height: f64) -> bool {
         ..Setup::new(Eye::new([5.0, height, 5.0], [9.0, height, 5.5], 60.0))
     };
     let (water, white) = (Water::new(rays::water()), Particles::default());
-    let moment = Moment::alone(&water, &white);
+    let inputs = FrameInputs::alone(&water, &white);
     let scene = rays::pool_scene();
-    match draw_moment(&context(), &setup, &uniform_sky, &scene, &moment, 7) {
+    match draw_inputs(&context(), &setup, &uniform_sky, &scene, &inputs, 7) {
         Ok(_) => false,
         Err(RenderError::UnderWater { frame: 7 }) => true,
         Err(other) => panic!("{other}"),

@@ -7,7 +7,7 @@ use glam::{DVec2, DVec3};
 use swell::domain::bounds::Bounds;
 use swell::domain::particles::Particles;
 use swell::gpu::adapter::Context;
-use swell::render::{Image, Moment, RenderError, RenderScene, Renderer, Water};
+use swell::render::{FrameInputs, Image, RenderError, RenderScene, Renderer, Water};
 use wgpu::util::DeviceExt;
 
 pub(crate) use crate::support::device::{context, spoiled};
@@ -199,20 +199,20 @@ pub(crate) fn draw(
 ) -> Image {
     let water = Water::new(water.clone());
     let white = Particles::default();
-    let moment = Moment::alone(&water, &white);
-    draw_moment(context, setup, sky, scene, &moment, frame).unwrap()
+    let inputs = FrameInputs::alone(&water, &white);
+    draw_inputs(context, setup, sky, scene, &inputs, frame).unwrap()
 }
 
-/// Like [`draw`], for a moment with its neighbouring frames.
-pub(crate) fn draw_moment(
+/// Like [`draw`], with neighbouring frames.
+pub(crate) fn draw_inputs(
     context: &Context,
     setup: &Setup,
     sky: &dyn Fn(DVec3, DVec2) -> [f64; 3],
     scene: &RenderScene,
-    moment: &Moment<'_>,
+    inputs: &FrameInputs<'_>,
     frame: u32,
 ) -> Result<Image, RenderError> {
-    renderer(context, setup, sky, scene, u32::MAX).render_moment(frame, moment)
+    renderer(context, setup, sky, scene, u32::MAX).render_inputs(frame, inputs)
 }
 
 /// A renderer that draws frames in tiles of at most `tile` pixels.

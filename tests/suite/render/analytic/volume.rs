@@ -6,12 +6,12 @@ use glam::{DVec2, DVec3};
 use swell::domain::particles::Particles;
 use swell::domain::whitewater::{KIND, Kind, RADIUS};
 use swell::gpu::adapter::Context;
-use swell::render::{Image, Moment, RenderScene, Water};
+use swell::render::{FrameInputs, Image, RenderScene, Water};
 
 use crate::support::device::PooledDevice;
 
 use super::rays::{INDEX, LEVEL, SPACING, pool_scene, reflectance, refracted, water};
-use super::support::{Eye, Setup, ball, context, draw_moment, spoiled, uniform_sky};
+use super::support::{Eye, Setup, ball, context, draw_inputs, spoiled, uniform_sky};
 
 /// Spacing of drops in a slab, and radius of each, m: so wide that the density between them is
 /// uniform to a thousandth.
@@ -95,8 +95,8 @@ impl Shot<'_> {
             particle_spacing: SPACING,
             ..pool_scene()
         };
-        let moment = Moment::alone(&body, self.white);
-        draw_moment(context, &setup, sky, &scene, &moment, 1).unwrap()
+        let inputs = FrameInputs::alone(&body, self.white);
+        draw_inputs(context, &setup, sky, &scene, &inputs, 1).unwrap()
     }
 }
 
@@ -319,8 +319,8 @@ fn spread(context: &Context, speed: f64, shutter: f64) -> [f64; 2] {
         ..Setup::new(eye)
     };
     let water = Water::new(water());
-    let moment = Moment::alone(&water, &white);
-    let image = draw_moment(context, &setup, &uniform_sky, &pool_scene(), &moment, 1).unwrap();
+    let inputs = FrameInputs::alone(&water, &white);
+    let image = draw_inputs(context, &setup, &uniform_sky, &pool_scene(), &inputs, 1).unwrap();
     let place = |i: usize| (i % 64) as f64 - 31.5;
     let sum = |weigh: &dyn Fn(usize) -> f64| -> f64 {
         let all = image.beauty.iter().enumerate();

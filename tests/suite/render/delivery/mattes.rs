@@ -77,7 +77,7 @@ fn wrong(context: &Context, method: &str) -> (usize, BTreeMap<&'static str, usiz
 }
 
 #[test]
-fn mattes_are_of_what_stands_there() {
+fn cryptomattes_cover_the_objects_seen_at_each_pixel() {
     for (method, pass) in [("ssfr", "ssfr/shade_objects"), ("ray", "rays/objects")] {
         let (off, seen) = wrong(&context(), method);
         assert!(

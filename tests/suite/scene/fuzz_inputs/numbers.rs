@@ -249,7 +249,7 @@ pub(super) fn each_number_has_a_range(
 
 /// The ramp is the only key of [`NUMBERS`] that accepts 0 in addition to its range.
 #[test]
-fn a_wall_without_a_ramp_is_one() {
+fn wave_maker_accepts_a_ramp_of_zero() {
     let dir = assets();
     let set = ["wave_maker[0].motion.ramp=0".to_owned()];
     parse_scene(SCENE, Path::new("s.toml"), dir.path(), &set).expect("0 is none");

@@ -10,7 +10,7 @@ use super::{BakePlan, manifest::grid_record};
 
 /// Disk space that the frames still to be baked will need, and that is free.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Room {
+pub struct DiskSpace {
     /// Bytes of the frames that will be computed and kept, each assumed as large as the start's. An
     /// underestimate if emitters add water.
     pub bytes: u64,
@@ -20,7 +20,7 @@ pub struct Room {
     pub free: Option<u64>,
 }
 
-impl Room {
+impl DiskSpace {
     /// Space for the frames of a plan from `first` on, in the cache `directory`.
     ///
     /// # Errors

@@ -38,7 +38,7 @@ impl Water {
 /// Water and whitewater from which a picture is made. Missing neighbouring frames change blur and
 /// spray, as [`frames_around`] says. The result does not depend on what was drawn before.
 #[derive(Clone, Copy, Debug)]
-pub struct Moment<'a> {
+pub struct FrameInputs<'a> {
     /// Water of the frame itself.
     pub water: &'a Water,
     /// Water of the frames 2 and 1 before, and 1 and 2 after; `None` for a frame that does not
@@ -48,8 +48,8 @@ pub struct Moment<'a> {
     pub white: &'a Particles,
 }
 
-impl<'a> Moment<'a> {
-    /// Creates a moment without neighbouring frames.
+impl<'a> FrameInputs<'a> {
+    /// Inputs without neighbouring frames.
     pub fn alone(water: &'a Water, white: &'a Particles) -> Self {
         Self {
             water,
