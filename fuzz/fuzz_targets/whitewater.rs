@@ -5,7 +5,10 @@
 use std::path::Path;
 
 use libfuzzer_sys::fuzz_target;
-use swell::{domain::whitewater::Thresholds, files::whitewater::{WhitewaterSettings, written_out}};
+use swell::{
+    domain::whitewater::Thresholds,
+    files::whitewater::{WhitewaterSettings, written_out},
+};
 
 fuzz_target!(|text: &str| {
     let shot = Thresholds {

@@ -77,6 +77,7 @@ pub fn file_hash(path: &Path) -> Result<String, FileError> {
 /// # Errors
 /// [`FileError`].
 pub fn directory_hash(dir: &Path) -> Result<String, FileError> {
+    fs::metadata(dir).at(dir)?;
     let mut hasher = blake3::Hasher::new();
     hash_below(dir, "", &mut hasher)?;
     Ok(hasher.finalize().to_hex().to_string())

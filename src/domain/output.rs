@@ -166,6 +166,19 @@ pub fn write(path: &Path, bytes: impl AsRef<[u8]>) -> Result<(), FileError> {
     write_with(path, |file| file.write_all(bytes.as_ref()))
 }
 
+/// [`write`] for a path that the user names: a link keeps leading to the file, and what is no file,
+/// such as a pipe, is written directly.
+///
+/// # Errors
+/// [`FileError`].
+pub fn write_named(path: &Path, bytes: impl AsRef<[u8]>) -> Result<(), FileError> {
+    let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+    match fs::metadata(&target) {
+        Ok(found) if !found.is_file() && !found.is_dir() => fs::write(&target, bytes).at(path),
+        _ => write(&target, bytes),
+    }
+}
+
 /// Appends to a file and waits until that is on the disk. If it fails, the file is cut back to its
 /// former length.
 ///
@@ -245,9 +258,13 @@ pub fn sync_folder(folder: &Path) -> Result<(), FileError> {
     if !cfg!(unix) {
         return Ok(());
     }
+    // Some network file systems flush no folders, and a folder may be writable but not readable.
+    let is_without = |error: &io::Error| {
+        use io::ErrorKind::{InvalidInput, PermissionDenied, Unsupported};
+        matches!(error.kind(), InvalidInput | PermissionDenied | Unsupported)
+    };
     match File::open(folder).and_then(|folder| folder.sync_all()) {
-        // Some network file systems flush no folders.
-        Err(error) if error.kind() == io::ErrorKind::InvalidInput => Ok(()),
+        Err(error) if is_without(&error) => Ok(()),
         other => other.at(folder),
     }
 }
@@ -370,7 +387,7 @@ impl Lock {
 
 impl Drop for Lock {
     fn drop(&mut self) {
-        if self.is_temporary {
+        if self.is_temporary && self.is_there() {
             // A lock file that stays behind does no harm.
             let _ = remove_file(&self.path);
         }

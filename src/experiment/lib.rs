@@ -8,7 +8,7 @@
 //! the cheapest settings of a shot.
 //!
 //! A further kind needs one file here that implements `engine::Kind`, a parser in
-//! [`scene::study`](swell_files::study), and a line in [`study`].
+//! [`files::study`](swell_files::study), and a line in [`study`].
 
 mod claim;
 mod comparison;

@@ -138,7 +138,7 @@ impl SceneBuilder {
     /// Validates the scene, reads its files and fills in defaults.
     ///
     /// # Errors
-    /// As for [`Scene::load`]: the first fault, with its key and what is allowed.
+    /// As for [`load_scene`](crate::load_scene): the first fault, with its key and what is allowed.
     pub fn build(&self) -> Result<Scene, SceneError> {
         let name = self.root["shot"].get("name").and_then(Value::as_str);
         let file = PathBuf::from(format!("{} (built in code)", name.unwrap_or_default()));

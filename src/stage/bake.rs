@@ -132,6 +132,9 @@ pub fn bake(
 
 /// Like [`bake`], with the request's plan.
 ///
+/// # Panics
+/// If the plan is of another request.
+///
 /// # Errors
 /// As for [`bake`].
 pub fn run(
@@ -141,6 +144,10 @@ pub fn run(
     tell: &mut dyn FnMut(Event),
 ) -> Result<Outcome, BakeError> {
     let (scene, start) = (plan.scene, &plan.start);
+    assert!(
+        std::ptr::eq(scene, &request.scene),
+        "a bake has its own plan"
+    );
     let opened = request.device.open(needs(scene))?;
     let opened = opened.counting(request.time_passes);
     let mut drive = Drive::unloaded(&opened, scene, start, request.time_passes)?.with_probes();

@@ -142,7 +142,7 @@ fn headers(bytes: &[u8]) -> Result<Vec<Header>, String> {
     }
     let mut compression = compression::ZIP | compression::ACTIVE_MASK;
     if (version::SELECTIVE..version::PER_GRID).contains(&version) {
-        compression = u32::from(cursor.byte()? == 1) * compression::ZIP;
+        compression = u32::from(cursor.byte()? != 0) * compression::ZIP;
     }
     cursor.take(IDENTIFIER)?;
     metadata(&mut cursor)?;

@@ -52,7 +52,7 @@ pub(super) fn write(results: &Results<'_>, command: &str) -> Result<Option<PathB
             trial.variant.name()
         )));
     }
-    output::write(file, text)?;
+    output::write_named(file, text)?;
     Ok(Some(file.clone()))
 }
 

@@ -1,13 +1,12 @@
 //! Compares the tables with what is read and written, and the page with the tables.
 
-use crate::write::written;
-use crate::{load_scene, parse_scene};
 use std::{collections::BTreeSet, path::Path};
-use swell_scene::Scene;
 
+use swell_scene::{Scene, look::ViewSpec};
 use toml::{Table, Value};
 
 use super::{super::key::*, super::*, *};
+use crate::{load_scene, parse_scene, write::written};
 
 /// A scene with every table, each as small as possible.
 const LEAST: &str = r#"
@@ -360,4 +359,27 @@ fn the_page_of_keys_is_the_one_that_is_tracked() {
     assert!(now.contains(
         "| `tolerance` | a number from 1e-14 to 0.99, of the right-hand side's norm | `1e-5` |"
     ));
+}
+
+const LOOK: &str = "[camera]
+focal_length_mm = 35.0
+position = [0.0, 3.0, 0.0]
+target = [10.0, 1.0, 0.0]
+[image]
+width = 64
+height = 36
+[sky]
+model = \"hosek_wilkie\"
+";
+
+/// A program that has no look views pictures as a look does that says nothing of it.
+#[test]
+fn view_without_keys_is_the_default_view() {
+    let view = |text: &str| {
+        let look = parse_look(text, Path::new("a.toml")).expect("valid");
+        format!("{:?}", look.spec().view)
+    };
+    let default = format!("{:?}", ViewSpec::default());
+    assert_eq!(view(LOOK), default);
+    assert_ne!(view(&format!("{LOOK}[view]\ncontrast = 1.1\n")), default);
 }

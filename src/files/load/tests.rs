@@ -1,13 +1,13 @@
 mod written;
 
-use crate::scene_to_toml;
-use crate::{load_scene, parse_scene, recorded_scene};
 use std::{fs, path::PathBuf};
 
 use glam::DVec3;
 
 use super::super::{physics_difference, physics_hash};
 use super::*;
+use crate::scene_to_toml;
+use crate::{load_scene, parse_scene, recorded_scene};
 use swell_domain::{motion::Motion, sampling, signed_distance::SignedDistance};
 use swell_scene::{
     Iteration, Method, PlacedMesh, Stop, asset_path,

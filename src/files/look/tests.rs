@@ -2,12 +2,12 @@
 
 #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
-use crate::{load_look, parse_look};
 use std::path::Path;
 
 use proptest::prelude::*;
 
 use super::camera_file;
+use crate::{load_look, parse_look};
 use swell_scene::{
     Place, SceneError,
     look::{LookError, canonical},

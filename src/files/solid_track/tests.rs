@@ -1,13 +1,13 @@
 #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
-use crate::parse_scene;
-use crate::scene_to_toml;
 use std::{f64::consts::FRAC_PI_2, path::Path};
 
 use glam::{DQuat, DVec3};
 use serde_json::{Value, json};
 
 use crate::look::camera_file::tests::glb;
+use crate::parse_scene;
+use crate::scene_to_toml;
 use swell_scene::Scene;
 
 const CUBE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nv 0 0 1\nv 1 0 1\nv 0 1 1\nv 1 1 1\n\

@@ -1,12 +1,12 @@
 //! `kind = "solver_comparison"`: two solvers on one scene, rendered with one look.
 
-use crate::load_look_within;
 use std::path::Path;
 
 use serde::Deserialize;
 use toml::{Spanned, de::DeTable};
 
 use super::{super::document::Document, SceneFile, StudyFileError, load_with};
+use crate::load_look_within;
 use swell_domain::frame_range::FrameRange;
 use swell_scene::{
     Method, Scene, SceneError,

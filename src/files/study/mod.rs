@@ -12,7 +12,6 @@ pub mod sweep;
 pub mod tune;
 pub mod validation;
 
-use crate::load_scene_within;
 use std::{
     ops::Range,
     path::{Path, PathBuf},
@@ -22,6 +21,7 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::{Reach, document::Document, keys, reach};
+use crate::load_scene_within;
 use swell_scene::{Fault, Place, Scene, SceneError, look::LookError};
 
 use swell_domain::text;

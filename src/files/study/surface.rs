@@ -16,13 +16,13 @@
 //! values = [0.0, 0.1, 0.2]
 //! ```
 
-use crate::{load_look_with, load_look_within};
 use std::{ops::Range, path::Path};
 
 use serde::Deserialize;
 use toml::{Spanned, Value, de::DeTable};
 
 use super::{super::document::Document, SceneFile, StudyFileError, load_with};
+use crate::{load_look_with, load_look_within};
 use swell_domain::frame_range::FrameRange;
 use swell_scene::{
     Fault, Place, Scene, SceneError,

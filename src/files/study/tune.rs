@@ -6,9 +6,9 @@
 
 mod limit;
 
-use crate::load_scene_within;
 use std::path::{Path, PathBuf};
 
+use crate::load_scene_within;
 use swell_domain::{bounds::Bounds, sampling::block_dims, text};
 
 use super::super::{Reach, physics_hash};

@@ -203,7 +203,7 @@ fn take_spread(
 fn write(file: &Path, baseline: &Baseline) -> Result<(), DiffError> {
     let text = serde_json::to_string_pretty(baseline);
     let text = text.map_err(io::Error::from).at(file)? + "\n";
-    Ok(output::write(file, text)?)
+    Ok(output::write_named(file, text)?)
 }
 
 fn measure(cache: &CacheReader, frames: &[u32]) -> Result<Vec<Measured>, DiffError> {

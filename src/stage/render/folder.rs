@@ -205,8 +205,12 @@ impl Folder {
     /// # Errors
     /// [`FolderError::File`].
     pub(super) fn claim(&self, frame: &str) -> Result<Option<Lock>, FolderError> {
-        let name = self.path.join(ROOM).join(format!("{frame}.lock"));
-        Ok(Lock::take(&name)?)
+        let room = self.path.join(ROOM);
+        if !self.work.as_ref().is_some_and(Lock::is_there) {
+            let what = io::Error::other("it was removed while this process worked there");
+            return Err(FileError::new(&room, what).into());
+        }
+        Ok(Lock::take(&room.join(format!("{frame}.lock")))?)
     }
 
     /// Draft of a claimed frame's picture.

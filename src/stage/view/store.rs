@@ -81,9 +81,10 @@ impl Store {
             placing => placing == Placing::Beside,
         };
         if is_beside {
-            self.is_beside = true;
             let folder = self.folder.path();
-            output::create_folder(folder)?;
+            if !std::mem::replace(&mut self.is_beside, true) {
+                output::create_folder(folder)?;
+            }
             for (name, png) in std::mem::take(&mut self.kept) {
                 let file = folder.join(&name);
                 fs::write(&file, png).at(&file)?;

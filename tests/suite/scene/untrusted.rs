@@ -1,7 +1,6 @@
 //! Untrusted files: readers believe no count or size in a header, survive any damage without a
 //! panic, and follow no path out of the scene's folder.
 
-use crate::support::cache as stand_in;
 use std::{
     alloc::{GlobalAlloc, Layout, System},
     cell::Cell,
@@ -9,6 +8,7 @@ use std::{
     path::Path,
 };
 
+use crate::support::cache as stand_in;
 use crate::support::job::Job;
 use crate::support::mutate::mutate;
 use proptest::prelude::*;

@@ -91,8 +91,12 @@ impl<'a> Tree<'a> {
     pub(super) fn leaf(&mut self, origin: [i32; 3]) -> Result<Leaf<f32>, String> {
         let active = self.cursor.take(VOXELS / 8)?;
         if self.version < version::PER_GRID {
-            // First voxel, number of buffers.
-            self.cursor.take(12 + 1)?;
+            // The first voxel, which is known, and the number of buffers.
+            self.cursor.take(12)?;
+            let buffers = self.cursor.byte()?;
+            if buffers != 1 {
+                return Err(format!("a leaf with {buffers} buffers; allowed is 1"));
+            }
         }
         let stored = self.stored(active, VOXELS)?;
         let unpacked = self.unpacked(&stored)?;
@@ -177,11 +181,18 @@ impl<'a> Tree<'a> {
         if self.compression & compression::BLOSC != 0 {
             return blosc::decompress(stored.bytes, stored.size).map(Cow::Owned);
         }
-        let mut unpacked = vec![0; stored.size];
+        let mut unpacked = Vec::with_capacity(stored.size);
         ZlibDecoder::new(stored.bytes)
-            .read_exact(&mut unpacked)
+            .take(stored.size as u64 + 1)
+            .read_to_end(&mut unpacked)
             .map_err(|error| format!("damaged: zipped values: {error}"))?;
-        Ok(unpacked.into())
+        match unpacked.len() == stored.size {
+            true => Ok(unpacked.into()),
+            false => Err(format!(
+                "damaged: zipped values of other than {} bytes",
+                stored.size
+            )),
+        }
     }
 }
 

@@ -1,9 +1,9 @@
 //! Scenes written out: all keys are present, and reading gives an equal scene.
 
-use crate::scene_to_toml;
 use std::collections::BTreeSet;
 
 use super::*;
+use crate::scene_to_toml;
 
 #[test]
 fn what_is_written_loads_again_equal() {

@@ -1,6 +1,5 @@
 //! Serde types of a stability study, and their conversion to runs.
 
-use crate::load_scene_within;
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
@@ -14,6 +13,7 @@ use super::{
     },
     Attempt, Bound, Case, Held, Limit, Mark, Other, Quantity, Search, Stability, Trial,
 };
+use crate::load_scene_within;
 use swell_domain::bounds::Bounds;
 use swell_scene::{Method, Scene, SceneError};
 

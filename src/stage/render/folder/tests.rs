@@ -125,7 +125,7 @@ fn what_the_dead_left_goes_and_what_is_not_ours_stays() {
     let held = enter("day", d, false).unwrap();
     assert_eq!(names(&d.join(ROOM)).unwrap(), [WORK]);
     drop(held);
-    let left = [RECORD, "notes.txt", "other.0001.png.tmp", "small.txt.tmp"];
+    let left = ["notes.txt", "other.0001.png.tmp", RECORD, "small.txt.tmp"];
     assert_eq!(names(d).unwrap(), left);
     let text = fs::read_to_string(d.join(RECORD)).unwrap();
     assert_eq!(serde_json::from_str::<Owner>(&text).unwrap(), owner("day"));
