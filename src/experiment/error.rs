@@ -64,7 +64,8 @@ pub enum StudyError {
     NoShares(&'static str),
     /// The folder contains results of another study.
     #[error(
-        "{} holds results of the study {found}, not of {name}; left untouched: choose another folder",
+        "{} holds results of the study {found}, not of {name}; left untouched: choose another \
+         folder",
         directory.display()
     )]
     OtherStudy {

@@ -18,9 +18,9 @@ const METHOD: &str = "solver.method";
 /// versions never match.
 const CANONICAL_FORM: &str = "swell scene physics 2";
 
-/// Returns the first key whose value differs between two scenes written by [`scene_to_toml`](crate::scene_to_toml), with
-/// both values: the method first, then the other keys in alphabetical order. Returns `None` if the
-/// physics is the same.
+/// Returns the first key whose value differs between two scenes written by
+/// [`scene_to_toml`](crate::scene_to_toml), with both values: the method first, then the other keys
+/// in alphabetical order. Returns `None` if the physics is the same.
 ///
 /// Ignored are keys that the table of keys declares as not physical, settings of the solver that is
 /// not chosen, and paths of meshes whose hashes are given in both.

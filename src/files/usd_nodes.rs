@@ -124,7 +124,8 @@ impl UsdNodes {
     }
 }
 
-/// Follows `SdfLayer::GetTimeCodesPerSecond`: `timeCodesPerSecond`, else `framesPerSecond`, else 24.
+/// Follows `SdfLayer::GetTimeCodesPerSecond`: `timeCodesPerSecond`, else `framesPerSecond`, else
+/// 24.
 fn rate(layer: &Layer) -> Result<Rate> {
     let keys = ["timeCodesPerSecond", "framesPerSecond"];
     let said = (keys.into_iter()).find(|key| layer.metadata.contains_key(*key));

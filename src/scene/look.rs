@@ -25,7 +25,12 @@ pub use spec::{
     SolidsOutput, SplatSpec, SpraySpec, SunSpec, SurfaceSpec, TextureSpec, TransformSpec, ViewSpec,
     WaterSpec, WaveMakersSpec, WhitewaterLook, WindowsSpec,
 };
-use spec::{MOST_SAMPLES, MOST_VOXELS};
+
+/// Largest number of samples per pixel.
+pub const MOST_SAMPLES: u32 = 1024;
+
+/// Largest number of voxels per particle spacing.
+pub const MOST_VOXELS: f64 = 8.0;
 
 /// A rectangle of pixels, relative to the upper-left pixel of the look's image.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -42,8 +42,8 @@ impl PartialEq for Track {
 
 impl Track {
     /// Creates the track of a solid whose initial placement is `mesh`, from poses: time in seconds,
-    /// ascending from 0, position of the reference point in metres, and rotation, of which the first
-    /// is the identity.
+    /// ascending from 0, position of the reference point in metres, and rotation (at first the
+    /// identity).
     ///
     /// # Errors
     /// A description of the first fault of the poses.

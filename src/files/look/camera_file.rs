@@ -1,5 +1,5 @@
-//! Reads a camera from a file: glTF 2.0 (Khronos 2021), with its node's place in the hierarchy and its
-//! animations, or USD as text.
+//! Reads a camera from a file: glTF 2.0 (Khronos 2021), with its node's place in the hierarchy and
+//! its animations, or USD as text.
 //!
 //! glTF is in metres with y up, and a camera looks along its own −z, as in a look's world. Sampled
 //! are translation, rotation and scale of the camera's node and of all its ancestors; a camera's

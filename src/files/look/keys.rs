@@ -1,10 +1,7 @@
 //! Keys of a look.
 
 use super::super::key::{Interval, Key, words};
-use swell_scene::look::{
-    FitSpec,
-    spec::{MOST_SAMPLES, MOST_VOXELS},
-};
+use swell_scene::look::{FitSpec, MOST_SAMPLES, MOST_VOXELS};
 
 pub(in super::super) const KEYS: &[Key] = &[
     Key::table("camera", CAMERA).about(

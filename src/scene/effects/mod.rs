@@ -1,9 +1,9 @@
 //! Effects that a scene may name under `[effects]`: one entry in a list, and one
 //! file in each crate.
 //!
-//! An effect's file here holds its settings and their properties. Its keys are in a file of the same
-//! name in `files::effects`, its contribution to each solver in `solve::effects`, the `f64` reference
-//! passes in `reference`, and the comparison of the two in `check`.
+//! An effect's file here holds its settings and their properties. Its keys are in a file of that
+//! name in `files::effects`, its contribution to each solver in `solve::effects`, the `f64`
+//! reference passes in `reference`, and the comparison of the two in `check`.
 
 pub mod zone;
 

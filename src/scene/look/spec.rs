@@ -7,12 +7,6 @@ use serde::Deserialize;
 
 use crate::Wall;
 
-/// Largest number of samples per pixel.
-pub const MOST_SAMPLES: u32 = 1024;
-
-/// Largest number of voxels per particle spacing.
-pub const MOST_VOXELS: f64 = 8.0;
-
 /// A look file.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]

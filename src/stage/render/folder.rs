@@ -210,7 +210,8 @@ impl Folder {
             let what = io::Error::other("it was removed while this process worked there");
             return Err(FileError::new(&room, what).into());
         }
-        Ok(Lock::take(&room.join(format!("{frame}.lock")))?)
+        let name = room.join(format!("{frame}.lock"));
+        Ok(Lock::take(&name)?)
     }
 
     /// Draft of a claimed frame's picture.

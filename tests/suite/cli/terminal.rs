@@ -138,7 +138,7 @@ fn standard_output_that_takes_nothing_is_exit_code_4() {
     for (code, command) in [
         (2, "bake none.toml --progress json"),
         (4, "verify none"),
-        (2, "bake small.toml --adapter 999 --progress json"),
+        (2, "bake small.toml -o new --adapter 999 --progress json"),
     ] {
         let status = job.command(command).stdout(full()).status().unwrap();
         assert_eq!(status.code(), Some(code), "{command}");

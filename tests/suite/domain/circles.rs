@@ -1,4 +1,4 @@
-//! Submodules of a top-level module import each other without cycles, direct or indirect.
+//! Modules of a crate import each other without cycles, direct or indirect.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -6,12 +6,14 @@ use std::{
     path::Path,
 };
 
-/// Top-level modules whose submodules are free of import cycles.
-const CRATES: [&str; 8] = [
+/// Crates whose modules are free of import cycles.
+const CRATES: [&str; 10] = [
     "cache",
     "compare",
     "domain",
     "experiment",
+    "export",
+    "files",
     "reference",
     "render",
     "scene",
@@ -43,13 +45,13 @@ fn paths(tree: &str) -> Vec<String> {
     items.iter().flat_map(whole).collect()
 }
 
-/// Submodules that a file `depth` levels below its top-level module imports, without its tests.
-fn imports(krate: &str, text: &str, depth: usize, modules: &BTreeSet<String>) -> BTreeSet<String> {
+/// Modules of its crate that a file imports which is `depth` levels deep, without its tests.
+fn imports(text: &str, depth: usize, modules: &BTreeSet<String>) -> BTreeSet<String> {
     let code = text.split("\nmod tests {").next().unwrap_or("");
     let is_code = |line: &&str| !line.trim_start().starts_with("//");
     let code: Vec<&str> = code.lines().filter(is_code).collect();
     let code = code.join("\n");
-    let prefixes = ["super::".repeat(depth), format!("crate::{krate}::")];
+    let prefixes = ["super::".repeat(depth), "crate::".to_owned()];
     let uses = code.split("use ").skip(1);
     let trees = uses.filter_map(|rest| rest.split(';').next());
     let named = trees.flat_map(paths).filter_map(|path| {
@@ -59,9 +61,8 @@ fn imports(krate: &str, text: &str, depth: usize, modules: &BTreeSet<String>) ->
     named.filter(|name| modules.contains(name)).collect()
 }
 
-/// Collects the imports of each submodule from the files below `folder`.
+/// Collects the imports of each module from the files below `folder`.
 fn gather(
-    krate: &str,
     folder: &Path,
     module: Option<&str>,
     depth: usize,
@@ -73,16 +74,16 @@ fn gather(
         let stem = path.file_stem().unwrap().to_str().unwrap().to_owned();
         let name = module.unwrap_or(&stem);
         if path.is_dir() {
-            gather(krate, &path, Some(name), depth + 1, modules, found);
+            gather(&path, Some(name), depth + 1, modules, found);
             continue;
         }
-        let is_root = stem == "mod";
+        let is_root = stem == "mod" || (module.is_none() && stem == "lib");
         if module.is_none() && is_root {
             continue;
         }
         let text = fs::read_to_string(&path).unwrap();
         let below = if is_root { depth - 1 } else { depth };
-        let mut all = imports(krate, &text, below, modules);
+        let mut all = imports(&text, below, modules);
         all.remove(name);
         found.entry(name.to_owned()).or_default().extend(all);
     }
@@ -109,7 +110,7 @@ fn circle(of: &BTreeMap<String, BTreeSet<String>>) -> Option<Vec<String>> {
         .find_map(|module| walk(of, &mut vec![module.clone()]))
 }
 
-/// For each submodule of a top-level module, the siblings that it imports.
+/// For each module of a crate, the others that it imports.
 fn of_crate(krate: &str) -> BTreeMap<String, BTreeSet<String>> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("src")
@@ -120,9 +121,9 @@ fn of_crate(krate: &str) -> BTreeMap<String, BTreeSet<String>> {
     let mut modules: BTreeSet<_> = names
         .map(|path| path.file_stem().unwrap().to_str().unwrap().to_owned())
         .collect();
-    modules.remove("mod");
+    modules.remove("lib");
     let mut found = BTreeMap::new();
-    gather(krate, &folder, None, 1, &modules, &mut found);
+    gather(&folder, None, 1, &modules, &mut found);
     found
 }
 
@@ -132,15 +133,15 @@ fn modules_of_a_crate_import_each_other_without_cycles() {
         assert_eq!(circle(&of_crate(krate)), None, "{krate}");
     }
     // Negative controls: the imports are found, also within braces, and one back makes a cycle.
-    let mut found = of_crate("scene");
+    let mut found = of_crate("files");
     assert!(found["build"].contains("document") && found["document"].contains("key"));
     assert!(found["keys"].contains("look") && found["look"].contains("key"));
     let modules = BTreeSet::from(["document".to_owned()]);
     for nested in [
-        "use super::{\n    super::{Method, document::Document},\n    SceneFile,\n};",
-        "use crate::{domain::mesh, scene::{Method, document::Document}};",
+        "use super::{\n    super::{Reach, document::Document},\n    SceneFile,\n};",
+        "use crate::{Reach, document::Document};",
     ] {
-        assert_eq!(imports("scene", nested, 2, &modules), modules, "{nested}");
+        assert_eq!(imports(nested, 2, &modules), modules, "{nested}");
     }
     found
         .get_mut("document")

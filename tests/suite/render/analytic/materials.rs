@@ -1,17 +1,16 @@
 //! Colours and textures on solids: texel by texel, with both methods.
 
 use std::path::Path;
-use swell::files::parse_look;
 
 use glam::{DVec2, DVec3};
-use swell::domain::mesh::TriangleMesh;
-use swell::domain::particles::Particles;
-use swell::domain::pose::Pose;
-use swell::gpu::adapter::Context;
-use swell::scene::look::Look;
 use swell::{
+    domain::mesh::TriangleMesh,
     domain::mesh_file::{MeshFormat, parts::Parts},
+    domain::{particles::Particles, pose::Pose},
+    files::parse_look,
+    gpu::adapter::Context,
     render::{FrameInputs, Image, RenderError, RenderScene, Renderer, SolidParts, Water},
+    scene::look::Look,
 };
 
 use super::support::{Eye, Setup, context, scene, spoiled, uniform_sky, write_sky};
