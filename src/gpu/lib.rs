@@ -1,6 +1,7 @@
 //! GPU layer: devices, shaders, buffers and recorded passes, independent of fluids.
 
 pub mod adapter;
+pub mod bindings;
 pub mod buffer;
 pub mod ceilings;
 mod compiled;

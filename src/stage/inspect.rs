@@ -13,10 +13,7 @@ use swell_domain::{
     output::{self, FileError},
     signed_distance::SignedDistanceError,
 };
-use swell_gpu::{
-    adapter::{Context, GpuError, enumerate},
-    program::check_sizes,
-};
+use swell_gpu::adapter::{Context, GpuError, enumerate};
 use swell_scene::SceneError;
 use swell_solve::plan::{DeviceLimits, Plan, device_limits};
 
@@ -144,11 +141,10 @@ pub fn plan<'a>(bake: BakePlan<'a>, adapter: Option<&str>) -> Result<ScenePlan<'
     };
     let limits = context.as_ref().map_or(COMMON_LIMITS, device_limits);
     let plan = bake.start.shown_plan(scene, limits);
-    let unfit = |context: &Context| {
-        let mut parts = plan.parts();
-        parts.find_map(|part| check_sizes(context, &part.buffer_specs()).err())
-    };
-    let misfit = context.as_ref().and_then(unfit).or(lacks);
+    let unfit = context
+        .as_ref()
+        .and_then(|context| plan.check(context).err());
+    let misfit = unfit.or(lacks);
     Ok(ScenePlan {
         bake,
         plan,

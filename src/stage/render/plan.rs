@@ -8,10 +8,7 @@ use super::{RenderJobError, Whitewater, near::Near, render_scene, told};
 use crate::{baked_scene, prepare::Start};
 use swell_cache::{CacheReader, Entry};
 use swell_domain::{bounds::Bounds, particles::Particles};
-use swell_gpu::{
-    adapter::{Context, GpuError},
-    program::check_sizes,
-};
+use swell_gpu::adapter::{Context, GpuError};
 use swell_render::{FrameInputs, Limits, Plan, RenderScene, Runs, Water};
 use swell_scene::{Scene, look::Look};
 
@@ -79,7 +76,7 @@ pub fn plan(
     } = Planned::of(look, subject, &limits)?;
     let misfit = context
         .as_ref()
-        .and_then(|context| check_sizes(context, &plan.buffers).err());
+        .and_then(|context| plan.check(context).err());
     let textures = plan.textures.iter().map(|texture| {
         let format = format!("{:?}", texture.format);
         (texture.name.clone(), texture.size, format, texture.bytes())
