@@ -7,6 +7,7 @@ pub mod ceilings;
 mod compiled;
 mod edited;
 mod error;
+mod hidden;
 pub mod operations;
 pub mod program;
 pub mod raster;
