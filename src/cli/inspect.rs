@@ -104,6 +104,12 @@ pub(super) fn run(args: &InspectArgs) -> Result<u8, Failure> {
     {
         return Err(misplaced("--time", "scenes", "a look", subject));
     }
+    if args.subject.is_none() && args.require.require.is_some() {
+        return Err(Failure {
+            code: 2,
+            error: "--require is for scenes and looks; --adapters lists all".into(),
+        });
+    }
     if args.json {
         return json::run(args);
     }

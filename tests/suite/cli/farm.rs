@@ -405,6 +405,12 @@ fn software_adapters_are_refused_on_request() {
     let said = job.expect(2, "bake small.toml --device cpu --require gpu -o fifth");
     assert_has(&said, &["--require asks for a GPU, and --device is cpu"]);
     job.expect(2, "bake small.toml --require cpu -o fifth");
+    for words in [
+        "inspect cache --require gpu",
+        "inspect --adapters --require gpu",
+    ] {
+        assert_has(&job.expect(2, words), &["--require", "scenes"]);
+    }
 }
 
 /// Without any driver a plan is made for common limits, unless a GPU is required.
