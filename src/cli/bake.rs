@@ -231,6 +231,7 @@ pub(super) fn tell(progress: &Progress, event: Event) {
     match event {
         Event::Ready {
             device,
+            software_warning,
             particles,
             removed,
             volume,
@@ -246,6 +247,7 @@ pub(super) fn tell(progress: &Progress, event: Event) {
         } => {
             let frames = u64::from((last + 1).saturating_sub(first));
             progress.begin(frames);
+            progress.warn_of_adapter(software_warning.as_deref());
             for warning in &warnings {
                 let (text, event) = warned(warning);
                 progress.say(&text, event);

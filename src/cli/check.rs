@@ -81,7 +81,12 @@ fn run_failed(args: &CheckArgs, progress: &Progress) -> Result<u8, Failure> {
             error: Box::new(error),
         });
     }
-    let Replayed { frame, failure } = replay_failed(&args.source, &args.gpu.read()?)?;
+    let Replayed {
+        frame,
+        software_warning,
+        failure,
+    } = replay_failed(&args.source, &args.gpu.read()?)?;
+    progress.warn_of_adapter(software_warning.as_deref());
     let Some(failure) = failure else {
         let text = format!("frame {frame} is within its budgets now");
         match progress.is_json() {
@@ -197,12 +202,14 @@ fn tell(progress: &Progress, event: &Event<'_>) {
     match event {
         Event::Ready {
             device,
+            software_warning,
             solver,
             particles,
             frames,
             warnings,
         } => {
             progress.begin(*frames as u64);
+            progress.warn_of_adapter(software_warning.as_deref());
             for warning in warnings {
                 let (text, event) = bake::warned(warning);
                 progress.say(&text, event);

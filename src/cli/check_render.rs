@@ -77,8 +77,13 @@ pub(super) fn run(
 
 fn tell(progress: &Progress, event: Event) {
     match event {
-        Event::Ready { device, frames } => {
+        Event::Ready {
+            device,
+            software_warning,
+            frames,
+        } => {
             progress.begin(frames as u64);
+            progress.warn_of_adapter(software_warning.as_deref());
             progress.say(
                 &format!(
                     "{} on {device} against rays in f64",

@@ -10,6 +10,7 @@ use swell_scene::{SceneError, look::LookError};
 use swell_stage::{
     bake::BakeError,
     branch::BranchError,
+    check::CheckError,
     device::{GpuError, SolveError, SolverError},
     diff::DiffError,
     export::{ExportError, UsdcError},
@@ -35,6 +36,8 @@ pub(super) fn of(error: &(dyn Error + 'static)) -> Hint {
         .or_else(|| error.downcast_ref().and_then(view))
         .or_else(|| error.downcast_ref().and_then(diff))
         .or_else(|| error.downcast_ref().and_then(study))
+        .or_else(|| error.downcast_ref().and_then(check))
+        .or_else(|| error.downcast_ref().and_then(device))
 }
 
 fn scene(error: &SceneError) -> Hint {
@@ -90,9 +93,18 @@ fn cache(error: &CacheError) -> Hint {
     }
 }
 
+/// Of any job on an adapter.
+fn device(error: &GpuError) -> Hint {
+    let is_refused = matches!(error, GpuError::Software { .. });
+    is_refused.then_some("--require, SWELL_REQUIRE_GPU".into())
+}
+
 /// Of a job that the CPU can do as well.
 fn gpu(error: &GpuError) -> Hint {
-    matches!(error, GpuError::TooManyBuffers { .. }).then_some("--device cpu".into())
+    let is_other = matches!(error, GpuError::TooManyBuffers { .. });
+    is_other
+        .then_some("--device cpu".into())
+        .or_else(|| device(error))
 }
 
 fn solver(error: &SolverError) -> Hint {
@@ -105,6 +117,7 @@ fn solver(error: &SolverError) -> Hint {
 fn render(error: &RenderJobError) -> Hint {
     match error {
         RenderJobError::Look(error) => look(error),
+        RenderJobError::Gpu(error) => device(error),
         RenderJobError::Folder(render::FolderError::Other { .. }) => Some("-o, --overwrite".into()),
         RenderJobError::Folder(
             render::FolderError::Left { .. } | render::FolderError::InUse { .. },
@@ -149,6 +162,13 @@ fn whitewater(error: &WhitewaterError) -> Hint {
     }
 }
 
+fn check(error: &CheckError) -> Hint {
+    match error {
+        CheckError::Gpu(error) => device(error),
+        _ => None,
+    }
+}
+
 fn view(error: &ViewError) -> Hint {
     match error {
         ViewError::Nothing => Some("--sheet, --movie, --player".into()),
@@ -172,6 +192,7 @@ fn study(error: &StudyError) -> Hint {
         StudyError::Bake(error) => bake(error),
         StudyError::Render(error) => render(error),
         StudyError::Scene(error) => scene(error),
+        StudyError::Gpu(error) => device(error),
         StudyError::NoShares(_) => Some("without --chunk".into()),
         StudyError::OtherStudy { .. } | StudyError::Occupied(_) => Some("-o".into()),
         StudyError::NotTuned(_) => Some("--write".into()),
@@ -195,6 +216,14 @@ mod tests {
             newest: 2,
         }));
         assert_eq!(of(&of_study).as_deref(), Some("--from 'a b':FRAME, -o"));
+        let of_check = CheckError::Gpu(GpuError::Software {
+            adapter: "llvmpipe".into(),
+            advice: None,
+        });
+        assert_eq!(
+            of(&of_check).as_deref(),
+            Some("--require, SWELL_REQUIRE_GPU")
+        );
         // Without a bake there is nothing to resume.
         assert_eq!(of(&exists()), None);
     }

@@ -16,6 +16,7 @@ use swell_domain::posix;
 use swell_scene::{Method, Scene};
 use swell_stage::{
     bake::BakePlan,
+    device::Gpu,
     inspect::{
         Adapter, Entry, LIST_BUDGET, MOST_NODES, Manifest, PARTICLES, PROBES, ScenePlan, adapters,
         cache, plan, plot,
@@ -25,7 +26,8 @@ use swell_stage::{
 };
 
 use super::{
-    Failure, bake, check::Misplaced, count, is_cache, lint::DenyArgs, named_adapter, output, size,
+    Failure, RequireArgs, bake, check::Misplaced, count, is_cache, lint::DenyArgs, named_adapter,
+    output, size,
 };
 
 #[derive(Args, Debug)]
@@ -69,10 +71,23 @@ pub(super) struct InspectArgs {
     #[arg(long, value_name = "NAME", requires = "subject")]
     adapter: Option<String>,
     #[command(flatten)]
+    require: RequireArgs,
+    #[command(flatten)]
     deny: DenyArgs,
     /// Print one JSON object.
     #[arg(long, conflicts_with = "plot")]
     json: bool,
+}
+
+impl InspectArgs {
+    /// The adapter to plan for.
+    fn gpu(&self) -> Gpu {
+        Gpu {
+            adapter: named_adapter(self.adapter.as_ref()),
+            is_hardware_required: self.require.is_gpu(),
+            ..Gpu::default()
+        }
+    }
 }
 
 pub(super) fn run(args: &InspectArgs) -> Result<u8, Failure> {
@@ -88,6 +103,12 @@ pub(super) fn run(args: &InspectArgs) -> Result<u8, Failure> {
         && look::is_look(subject)
     {
         return Err(misplaced("--time", "scenes", "a look", subject));
+    }
+    if args.subject.is_none() && args.require.require.is_some() {
+        return Err(Failure {
+            code: 2,
+            error: "--require is for scenes and looks; --adapters lists all".into(),
+        });
     }
     if args.json {
         return json::run(args);
@@ -118,10 +139,9 @@ pub(super) fn run(args: &InspectArgs) -> Result<u8, Failure> {
             let scene = bake::load(file, &args.set, args.solver, args.allow_outside)?;
             let planned = of_scene(args, file, &scene)?;
             let _ = show_plan(&mut text, &planned);
-            let adapter = named_adapter(args.adapter.as_ref());
             match args.time {
                 Some(frames) if planned.misfit.is_none() => {
-                    let timed = time(&planned.bake, adapter.as_deref(), frames)?;
+                    let timed = time(&planned.bake, &args.gpu(), frames)?;
                     let _ = show_time(&mut text, &timed);
                 }
                 _ => {
@@ -149,8 +169,7 @@ fn of_scene<'a>(
     refuse_frames_beyond(args, file, scene.shot.frames)?;
     let bake = BakePlan::of(scene)?;
     args.deny.check(file, &bake)?;
-    let adapter = named_adapter(args.adapter.as_ref());
-    Ok(plan(bake, adapter.as_deref())?)
+    Ok(plan(bake, &args.gpu())?)
 }
 
 /// Error for the folder of a failed frame, which has neither plan nor ledger.
@@ -195,11 +214,12 @@ fn refuse_options(args: &InspectArgs, is: &'static str, file: &Path) -> Result<(
     if args.time.is_some() {
         return Err(misplaced("--time", "scenes", is, file));
     }
-    if args.set.is_empty() && args.solver.is_none() && args.adapter.is_none() {
+    let has_adapter = args.adapter.is_some() || args.require.require.is_some();
+    if args.set.is_empty() && args.solver.is_none() && !has_adapter {
         return Ok(());
     }
     Err(misplaced(
-        "--set, --solver or --adapter",
+        "--set, --solver, --require or --adapter",
         "scenes",
         is,
         file,
@@ -286,6 +306,9 @@ fn show_plan(out: &mut String, planned: &ScenePlan<'_>) -> fmt::Result {
     match &planned.adapter {
         Some(name) => writeln!(out, "planned for {name}")?,
         None => writeln!(out, "planned for common limits: no adapter here")?,
+    }
+    if let Some(warning) = &planned.software_warning {
+        writeln!(out, "warning: {warning}")?;
     }
     writeln!(out, "\npass                          for")?;
     for pass in plan.parts().flat_map(|part| &part.passes) {

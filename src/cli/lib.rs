@@ -134,6 +134,8 @@ struct GpuArgs {
     /// hang the device.
     #[arg(long, value_name = "DIR")]
     shaders: Option<PathBuf>,
+    #[command(flatten)]
+    require: RequireArgs,
 }
 
 impl GpuArgs {
@@ -142,7 +144,31 @@ impl GpuArgs {
         Ok(Gpu {
             adapter: named_adapter(self.adapter.as_ref()),
             shaders: shaders.unwrap_or_default(),
+            is_hardware_required: self.require.is_gpu(),
         })
+    }
+}
+
+/// What an adapter has to be.
+#[derive(Args, Debug)]
+struct RequireArgs {
+    /// With gpu, refuse an adapter that is software (exit code 3). SWELL_REQUIRE_GPU in the
+    /// environment does the same with any value but 0.
+    #[arg(long, value_enum, value_name = "KIND")]
+    require: Option<Required>,
+}
+
+#[derive(ValueEnum, Clone, Copy, Debug)]
+enum Required {
+    Gpu,
+}
+
+impl RequireArgs {
+    /// Whether software adapters are refused. The environment is ignored on the CPU and by commands
+    /// without an adapter.
+    fn is_gpu(&self) -> bool {
+        let variable = set_variable("SWELL_REQUIRE_GPU");
+        matches!(self.require, Some(Required::Gpu)) || variable.is_some_and(|value| value != "0")
     }
 }
 
@@ -183,12 +209,17 @@ enum DeviceKind {
 
 impl DeviceArgs {
     fn read(&self) -> Result<Device, Failure> {
-        let GpuArgs { adapter, shaders } = &self.gpu;
-        let fault = match (self.device, adapter, shaders) {
+        let GpuArgs {
+            adapter,
+            shaders,
+            require,
+        } = &self.gpu;
+        let fault = match (self.device, adapter, shaders, require.require) {
             (DeviceKind::Gpu, ..) => return Ok(Device::Gpu(self.gpu.read()?)),
-            (DeviceKind::Cpu, None, None) => return Ok(Device::Cpu),
-            (DeviceKind::Cpu, Some(name), _) => format!("--adapter {name} names a GPU"),
-            (DeviceKind::Cpu, None, Some(_)) => "--shaders run on a GPU".to_owned(),
+            (DeviceKind::Cpu, None, None, None) => return Ok(Device::Cpu),
+            (DeviceKind::Cpu, Some(name), ..) => format!("--adapter {name} names a GPU"),
+            (DeviceKind::Cpu, None, Some(_), _) => "--shaders run on a GPU".to_owned(),
+            (DeviceKind::Cpu, None, None, Some(_)) => "--require asks for a GPU".to_owned(),
         };
         Err(Failure {
             code: 2,

@@ -139,6 +139,8 @@ struct State {
     bytes: Option<u64>,
     /// Progress within a frame, or before the first one.
     within: Option<Within>,
+    /// Whether the adapter was warned of.
+    is_adapter_told: bool,
     /// Warnings about the job's frames.
     recurrences: Recurrences,
     /// Fields that the command adds to the last event.
@@ -170,6 +172,7 @@ impl Progress {
                 failed: 0,
                 bytes: None,
                 within: None,
+                is_adapter_told: false,
                 recurrences: Recurrences::default(),
                 end: Map::new(),
             }),
@@ -216,6 +219,18 @@ impl Progress {
             },
         }
         output::log(text);
+    }
+
+    /// Prints a warning about the adapter, if there is one: once in a command, which may open it for
+    /// several jobs.
+    pub(super) fn warn_of_adapter(&self, warning: Option<&str>) {
+        let Some(text) = warning else { return };
+        if !std::mem::replace(&mut self.state.borrow_mut().is_adapter_told, true) {
+            self.say(
+                &format!("warning: {text}"),
+                json!({ "event": "warning", "what": "adapter", "text": text }),
+            );
+        }
     }
 
     /// Handles a warning about a frame: prints it if it is the first of its kind in the job;

@@ -134,12 +134,14 @@ pub(super) fn tell(progress: &Progress, event: Event) {
     match event {
         Event::Ready {
             device,
+            software_warning,
             size,
             frames,
             left_out,
             warnings,
         } => {
             progress.begin(frames as u64);
+            progress.warn_of_adapter(software_warning.as_deref());
             let [width, height] = size;
             let others = match left_out {
                 0 => String::new(),

@@ -75,6 +75,7 @@ pub(super) fn conduct(request: &Request, progress: &Progress) -> Result<u8, Fail
             let (text, event) = bake::warned(&warning);
             progress.say(&text, event);
         }
+        Event::SoftwareWarning(warning) => progress.warn_of_adapter(Some(&warning)),
         Event::Bake(event) => bake::tell(progress, *event),
         Event::Render(event) => render::tell(progress, event),
         Event::Point(event) => {

@@ -152,6 +152,7 @@ fn tell(progress: &Progress, event: Event) {
         ),
         Event::Ready {
             device,
+            software_warning,
             water,
             directory,
             thresholds,
@@ -161,6 +162,7 @@ fn tell(progress: &Progress, event: Event) {
         } => {
             let frames = u64::from((last + 1).saturating_sub(first));
             progress.begin(frames);
+            progress.warn_of_adapter(software_warning.as_deref());
             let [air, crest, energy] = [
                 thresholds.trapped_air,
                 thresholds.wave_crest,

@@ -30,7 +30,7 @@ use swell_files::study::Study;
 use swell_gpu::adapter;
 use swell_stage::{
     bake,
-    device::Gpu,
+    device::{Gpu, Opened},
     inspect::study::Outline,
     render::{self, gallery},
 };
@@ -67,6 +67,8 @@ pub enum Event {
     Solver(&'static str),
     /// Warning about the study or one of its scenes.
     Warning(String),
+    /// Warning about the adapter, as [`Opened::software_warning`].
+    SoftwareWarning(String),
     /// Progress of a bake.
     Bake(Box<bake::Event>),
     /// Progress of a render.
@@ -206,6 +208,10 @@ pub fn study(
         }
     };
     let devices = Devices::open(&request.gpu, kind.needs())?;
+    let software_warning = devices.gpu.as_ref().and_then(Opened::software_warning);
+    if let Some(warning) = software_warning {
+        tell(Event::SoftwareWarning(warning));
+    }
     claim::take(&request.directory, &request.name, &request.command)?;
     let mut bench = Bench::new(request, &devices, stop, tell, (work, count));
     let report = match kind.run(&mut bench) {

@@ -2,9 +2,9 @@
 
 use std::sync::{Arc, Mutex};
 
-use wgpu::{Adapter, AdapterInfo, Backends, Device, Features, Instance, Limits, Queue};
+use wgpu::{Adapter, AdapterInfo, Backends, Device, DeviceType, Features, Instance, Limits, Queue};
 
-use super::{compiled::Compiled, shader::Shaders};
+use super::{compiled::Compiled, hidden, shader::Shaders};
 
 pub use super::error::GpuError;
 
@@ -19,6 +19,11 @@ pub struct Context {
     pub info: AdapterInfo,
     /// Limits of the device: those of the adapter, unless they were lowered.
     pub limits: Limits,
+    /// Whether the adapter computes on the processor.
+    pub is_software: bool,
+    /// If the adapter is software: what makes Vulkan show the GPUs that the machine seems to have.
+    /// `None` if it seems to have none, or if Vulkan shows one.
+    pub advice: Option<String>,
     /// Whether passes can be timed with device timestamps.
     pub has_timestamps: bool,
     /// Whether passes may compute in f64; only if that was requested.
@@ -125,22 +130,33 @@ fn find(names: Vec<String>, request: &str) -> Result<usize, GpuError> {
 pub fn check_request(request: &str) -> Result<(), GpuError> {
     let adapters = enumerate();
     if adapters.is_empty() {
-        return Err(GpuError::NoAdapter);
+        return Err(no_adapter());
     }
     find(names(&adapters), request).map(|_| ())
 }
 
+/// The error of a machine without adapters.
+pub fn no_adapter() -> GpuError {
+    GpuError::NoAdapter {
+        advice: hidden::advice(),
+    }
+}
+
+fn is_software(info: &AdapterInfo) -> bool {
+    info.device_type == DeviceType::Cpu
+}
+
 fn choose(mut adapters: Vec<Adapter>, request: Option<&str>) -> Result<Adapter, GpuError> {
     if adapters.is_empty() {
-        return Err(GpuError::NoAdapter);
+        return Err(no_adapter());
     }
     let Some(request) = request else {
         // Hardware before software adapters; within a kind, the driver's order.
         adapters.sort_by_key(|adapter| match adapter.get_info().device_type {
-            wgpu::DeviceType::DiscreteGpu => 0,
-            wgpu::DeviceType::IntegratedGpu => 1,
-            wgpu::DeviceType::VirtualGpu => 2,
-            wgpu::DeviceType::Cpu | wgpu::DeviceType::Other => 3,
+            DeviceType::DiscreteGpu => 0,
+            DeviceType::IntegratedGpu => 1,
+            DeviceType::VirtualGpu => 2,
+            DeviceType::Cpu | DeviceType::Other => 3,
         });
         return Ok(adapters.swap_remove(0));
     };
@@ -177,7 +193,9 @@ impl Context {
         needs: Needs,
         lower: impl FnOnce(&mut Limits),
     ) -> Result<Self, GpuError> {
-        let adapter = choose(enumerate(), request)?;
+        let adapters = enumerate();
+        let shows_gpu = adapters.iter().any(|it| !is_software(&it.get_info()));
+        let adapter = choose(adapters, request)?;
         let info = adapter.get_info();
         let mut limits = adapter.limits();
         lower(&mut limits);
@@ -210,6 +228,8 @@ impl Context {
         Ok(Self {
             device,
             queue,
+            is_software: is_software(&info),
+            advice: (!shows_gpu).then(hidden::advice).flatten(),
             info,
             limits,
             has_timestamps,
@@ -220,6 +240,31 @@ impl Context {
             compiled: Arc::default(),
             fault,
         })
+    }
+
+    /// Warning for a software adapter on a machine that seems to have a GPU which Vulkan does not
+    /// show.
+    pub fn software_warning(&self) -> Option<String> {
+        let advice = self.advice.as_ref()?;
+        Some(format!(
+            "{} is a software adapter, and Vulkan does not show the GPU that this machine seems \
+             to have; {advice}",
+            self.info.name
+        ))
+    }
+
+    /// Fails if the adapter is software.
+    ///
+    /// # Errors
+    /// [`GpuError::Software`].
+    pub fn require_hardware(&self) -> Result<(), GpuError> {
+        match self.is_software {
+            true => Err(GpuError::Software {
+                adapter: self.info.name.clone(),
+                advice: self.advice.clone(),
+            }),
+            false => Ok(()),
+        }
     }
 
     /// Fails if the device was lost or has reported an error since it was opened.

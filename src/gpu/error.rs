@@ -5,10 +5,24 @@
 pub enum GpuError {
     /// There is no adapter.
     #[error(
-        "no GPU adapter found; install a Vulkan driver (software: Debian and Ubuntu \
-         `mesa-vulkan-drivers`, Fedora `mesa-vulkan-drivers`, Arch `vulkan-swrast`)"
+        "no GPU adapter found; {}install a Vulkan driver (software: Debian and Ubuntu \
+         `mesa-vulkan-drivers`, Fedora `mesa-vulkan-drivers`, Arch `vulkan-swrast`)",
+        before(advice.as_deref())
     )]
-    NoAdapter,
+    NoAdapter {
+        /// What makes Vulkan show the GPUs that the machine seems to have; `None` if it seems to
+        /// have none.
+        advice: Option<String>,
+    },
+    /// The adapter is software, and a GPU is required.
+    #[error("adapter {adapter} is software, and a GPU is required{}", after(advice.as_deref()))]
+    Software {
+        /// Adapter name.
+        adapter: String,
+        /// What makes Vulkan show the GPUs that the machine seems to have; `None` if it seems to
+        /// have none, or if Vulkan shows one.
+        advice: Option<String>,
+    },
     /// No adapter has the number or name that was asked for.
     #[error(
         "no adapter matches `{request}`; give the number of one of these, or a part of its name:{}",
@@ -89,6 +103,16 @@ pub enum GpuError {
         /// Adapter name.
         adapter: String,
     },
+}
+
+/// Advice about GPUs ahead of that about software.
+fn before(advice: Option<&str>) -> String {
+    advice.map_or(String::new(), |advice| format!("{advice}; or "))
+}
+
+/// Advice about GPUs at the end of a message.
+fn after(advice: Option<&str>) -> String {
+    advice.map_or(String::new(), |advice| format!("; {advice}"))
 }
 
 /// Formats names with their numbers, one per line.

@@ -1,11 +1,13 @@
 //! GPU layer: devices, shaders, buffers and recorded passes, independent of fluids.
 
 pub mod adapter;
+pub mod bindings;
 pub mod buffer;
 pub mod ceilings;
 mod compiled;
 mod edited;
 mod error;
+mod hidden;
 pub mod operations;
 pub mod program;
 pub mod raster;

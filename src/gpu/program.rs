@@ -9,6 +9,7 @@ use wgpu::{BindGroupLayout, Buffer, BufferUsages, ComputePipeline};
 
 use super::{
     adapter::{Context, InjectedFault},
+    bindings,
     buffer::{Buf, BufferLayout, Element, Readback, Windows},
     edited,
     error::GpuError,
@@ -448,17 +449,7 @@ pub(super) fn shader(
             adapter: context.info.name.clone(),
         });
     }
-    let is_storage = |binding: &&Binding| binding.access.is_storage();
-    let needed = reflection.bindings.iter().filter(is_storage).count() as u32;
-    let allowed = context.limits.max_storage_buffers_per_shader_stage;
-    if needed > allowed {
-        return Err(GpuError::TooManyBuffers {
-            pass: name.to_owned(),
-            needed,
-            allowed,
-            adapter: context.info.name.clone(),
-        });
-    }
+    bindings::check(context, name, &reflection.bindings)?;
     let visibility = match reflection.stage {
         Stage::Compute => wgpu::ShaderStages::COMPUTE,
         Stage::Raster { .. } => wgpu::ShaderStages::VERTEX_FRAGMENT,

@@ -50,7 +50,7 @@ impl Timer {
     /// Uses device timestamps; the host clock on adapters without them, and on software adapters,
     /// whose timestamps tell when a pass was queued.
     pub fn new(context: &Context) -> Self {
-        let is_software = context.info.device_type == wgpu::DeviceType::Cpu;
+        let is_software = context.is_software;
         let clock = match context.has_timestamps && !is_software {
             true => Clock::Device(Queries::new(context)),
             false => Clock::Host,

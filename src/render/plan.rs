@@ -7,9 +7,10 @@ use std::collections::BTreeMap;
 
 use super::{RenderError, buffers::FILLS, closed::Closed, frame::Extent, uniform::Fill};
 use swell_gpu::{
-    adapter::Context,
+    adapter::{Context, GpuError},
+    bindings::check_bindings,
     buffer::{Buf, Element, Windows},
-    program::{BufferSpec, PassSpec, Program},
+    program::{BufferSpec, PassSpec, Program, check_sizes},
     raster::RasterSpec,
     recording::{Bind, Command},
     texture::{SamplerSpec, TextureSpec},
@@ -112,8 +113,8 @@ impl Plan {
         buffers.sum::<u64>() + textures.sum::<u64>()
     }
 
-    /// Builds the program on a device and uploads the contents that stay constant across frames.
-    pub(super) fn program(&self, context: &Context) -> Result<Program, RenderError> {
+    /// Compute and raster passes in the form that a program compiles, by name.
+    fn specs(&self) -> (Vec<PassSpec>, Vec<RasterSpec>) {
         let all = [&self.once, &self.water, &self.sample, &self.aovs];
         let commands = || all.into_iter().flatten();
         let mut rasters: BTreeMap<&'static str, RasterSpec> = BTreeMap::new();
@@ -134,8 +135,29 @@ impl Plan {
                 _ => {}
             }
         }
-        let passes: Vec<PassSpec> = passes.into_values().collect();
-        let rasters: Vec<RasterSpec> = rasters.into_values().collect();
+        (
+            passes.into_values().collect(),
+            rasters.into_values().collect(),
+        )
+    }
+
+    /// Checks that an adapter can allocate the buffers, and that it can bind as many as each pass
+    /// needs.
+    ///
+    /// # Errors
+    /// That of a renderer built with this plan: [`GpuError::TooLarge`],
+    /// [`GpuError::TooManyBuffers`].
+    pub fn check(&self, context: &Context) -> Result<(), GpuError> {
+        check_sizes(context, &self.buffers)?;
+        let (passes, rasters) = self.specs();
+        let passes = passes.iter().map(|it| (it.name, &it.defines[..]));
+        check_bindings(context, passes)?;
+        check_bindings(context, rasters.iter().map(|it| (it.name, it.defines)))
+    }
+
+    /// Builds the program on a device and uploads the contents that stay constant across frames.
+    pub(super) fn program(&self, context: &Context) -> Result<Program, RenderError> {
+        let (passes, rasters) = self.specs();
         let program = Program::new(context, &self.buffers, &passes, &[])?
             .with_rasters(&rasters)?
             .with_textures(&self.textures, &self.samplers)?;

@@ -7,8 +7,9 @@
 
 use swell_domain::{places, solver::PassTime};
 use swell_gpu::{
-    adapter::Context,
-    program::{BufferSpec, PassSpec},
+    adapter::{Context, GpuError},
+    bindings::check_bindings,
+    program::{BufferSpec, PassSpec, check_sizes},
     recording::Command,
 };
 use swell_scene::{Method, Scene};
@@ -311,6 +312,20 @@ impl Plan {
     /// Returns the passes in the form that a program compiles, without those of the projection.
     pub fn pass_specs(&self) -> Vec<PassSpec> {
         self.passes.iter().map(|row| row.spec.clone()).collect()
+    }
+
+    /// Checks that an adapter can allocate the buffers, and that it can bind as many as each pass
+    /// needs, of the projection as well.
+    ///
+    /// # Errors
+    /// That of a solver built with this plan: [`GpuError::TooLarge`],
+    /// [`GpuError::TooManyBuffers`].
+    pub fn check(&self, context: &Context) -> Result<(), GpuError> {
+        self.parts().try_for_each(|part| {
+            check_sizes(context, &part.buffer_specs())?;
+            let passes = part.passes.iter().map(|pass| &pass.spec);
+            check_bindings(context, passes.map(|spec| (spec.name, &spec.defines[..])))
+        })
     }
 
     pub(super) fn declare(&mut self, table: Table) {

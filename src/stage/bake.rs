@@ -53,6 +53,8 @@ pub enum Event {
     Ready {
         /// Adapter and driver, or the f64 reference.
         device: Identity,
+        /// Warning about the adapter, as [`Opened::software_warning`].
+        software_warning: Option<String>,
         /// Number of particles at the start.
         particles: usize,
         /// Particles left out because a solid covers them or they lie behind a wall.
@@ -155,7 +157,7 @@ pub fn run(
     let (writer, clock, state) = open_cache(request, plan, &device)?;
     let first = clock.frame + 1;
     let disk = DiskSpace::of(&request.directory, plan, first)?;
-    tell(ready(plan, device, drive.bytes(), disk, first));
+    tell(ready(plan, &opened, drive.bytes(), disk, first));
     drive.load_watched(&start.particles, clock.frame, &state)?;
     drive.go_on_with(clock.next_id);
     let mut frames = Frames::new(request, plan, writer, clock);
@@ -217,13 +219,14 @@ fn open_cache(
 
 fn ready(
     plan: &BakePlan<'_>,
-    device: Identity,
+    opened: &Opened,
     bytes: Option<(u64, u64)>,
     disk: DiskSpace,
     first: u32,
 ) -> Event {
     Event::Ready {
-        device,
+        device: opened.identity(),
+        software_warning: opened.software_warning(),
         particles: plan.start.particles.len(),
         removed: plan.start.removed,
         volume: plan.volume(),

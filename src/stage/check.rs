@@ -66,6 +66,8 @@ pub enum Event<'a> {
     Ready {
         /// Adapter and driver.
         device: String,
+        /// Warning about the adapter, as [`Context::software_warning`].
+        software_warning: Option<String>,
         /// Name of the solver.
         solver: &'static str,
         /// Number of particles at the start.
@@ -166,6 +168,7 @@ pub fn check(
             info.driver_info,
             shaders_note(shaders.as_deref())
         ),
+        software_warning: context.software_warning(),
         solver: subject.name(),
         particles: subject.particles(),
         frames: frames.len(),

@@ -37,15 +37,20 @@ pub struct Gpu {
     pub adapter: Option<String>,
     /// Shaders to run; the built-in ones by default.
     pub shaders: Shaders,
+    /// Whether a software adapter is refused.
+    pub is_hardware_required: bool,
 }
 
 impl Gpu {
     /// Opens the adapter for passes with these needs.
     ///
     /// # Errors
-    /// Those of [`Context::open_for`].
+    /// Those of [`Context::open_for`]; [`GpuError::Software`] where hardware is required.
     pub fn open(&self, needs: Needs) -> Result<Context, GpuError> {
         let mut context = Context::open_for(self.adapter.as_deref(), needs)?;
+        if self.is_hardware_required {
+            context.require_hardware()?;
+        }
         context.shaders = self.shaders.clone();
         Ok(context)
     }
@@ -55,7 +60,7 @@ impl From<Option<String>> for Gpu {
     fn from(adapter: Option<String>) -> Self {
         Self {
             adapter,
-            shaders: Shaders::default(),
+            ..Self::default()
         }
     }
 }
@@ -270,6 +275,14 @@ impl Opened {
                 backend: "CPU".into(),
                 shaders: None,
             },
+        }
+    }
+
+    /// Warning about the adapter, as [`Context::software_warning`].
+    pub fn software_warning(&self) -> Option<String> {
+        match self {
+            Self::Gpu(context) => context.software_warning(),
+            Self::Cpu => None,
         }
     }
 

@@ -13,14 +13,17 @@ use swell_domain::{
     output::{self, FileError},
     signed_distance::SignedDistanceError,
 };
-use swell_gpu::{
-    adapter::{Context, GpuError, enumerate},
-    program::check_sizes,
-};
+use swell_gpu::adapter::{Context, GpuError, Needs, enumerate, no_adapter};
 use swell_scene::SceneError;
 use swell_solve::plan::{DeviceLimits, Plan, device_limits};
 
-use super::{Blame, bake::BakePlan, device::needs, prepare::Start, probes, whitewater};
+use super::{
+    Blame,
+    bake::BakePlan,
+    device::{Gpu, needs},
+    prepare::Start,
+    probes, whitewater,
+};
 
 pub use swell_scene::solid_grid::MOST_NODES;
 pub use swell_solve::plan::LIST_BUDGET;
@@ -90,7 +93,7 @@ pub fn adapters() -> Result<Vec<Adapter>, GpuError> {
         })
         .collect();
     if found.is_empty() {
-        Err(GpuError::NoAdapter)
+        Err(no_adapter())
     } else {
         Ok(found)
     }
@@ -105,6 +108,8 @@ pub struct ScenePlan<'a> {
     pub plan: Plan,
     /// The adapter whose limits were used; `None` if the machine has none.
     pub adapter: Option<String>,
+    /// Warning about that adapter, as [`Context::software_warning`].
+    pub software_warning: Option<String>,
     /// Why that adapter could not bake the scene.
     pub misfit: Option<GpuError>,
 }
@@ -129,30 +134,30 @@ const COMMON_LIMITS: DeviceLimits = DeviceLimits {
 /// Plans the passes of a bake without allocating or compiling anything.
 ///
 /// # Errors
-/// An adapter that does not exist or open.
-pub fn plan<'a>(bake: BakePlan<'a>, adapter: Option<&str>) -> Result<ScenePlan<'a>, GpuError> {
+/// An adapter that does not exist or open, or is software where hardware is required.
+pub fn plan<'a>(bake: BakePlan<'a>, gpu: &Gpu) -> Result<ScenePlan<'a>, GpuError> {
     let scene = bake.scene;
     let mut lacks = None;
-    let context = match Context::open_for(adapter, needs(scene)) {
+    let context = match gpu.open(needs(scene)) {
         Ok(context) => Some(context),
-        Err(GpuError::NoAdapter) => None,
+        Err(GpuError::NoAdapter { .. }) if !gpu.is_hardware_required => None,
         Err(error @ GpuError::NoF64 { .. }) => {
             lacks = Some(error);
-            Some(Context::open(adapter)?)
+            Some(gpu.open(Needs::default())?)
         }
         Err(error) => return Err(error),
     };
     let limits = context.as_ref().map_or(COMMON_LIMITS, device_limits);
     let plan = bake.start.shown_plan(scene, limits);
-    let unfit = |context: &Context| {
-        let mut parts = plan.parts();
-        parts.find_map(|part| check_sizes(context, &part.buffer_specs()).err())
-    };
-    let misfit = context.as_ref().and_then(unfit).or(lacks);
+    let unfit = context
+        .as_ref()
+        .and_then(|context| plan.check(context).err());
+    let misfit = unfit.or(lacks);
     Ok(ScenePlan {
         bake,
         plan,
         misfit,
+        software_warning: context.as_ref().and_then(Context::software_warning),
         adapter: context.map(|context| context.info.name),
     })
 }

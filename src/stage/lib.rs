@@ -68,7 +68,8 @@ impl From<&GpuError> for Blame {
             | GpuError::NoF64 { .. }
             | GpuError::NoSuchAdapter { .. }
             | GpuError::EditedShader { .. } => Self::Input,
-            GpuError::NoAdapter
+            GpuError::NoAdapter { .. }
+            | GpuError::Software { .. }
             | GpuError::Open { .. }
             | GpuError::TooManyBuffers { .. }
             | GpuError::Lost(_)

@@ -95,6 +95,8 @@ pub enum Event {
     Ready {
         /// Name of the adapter.
         device: String,
+        /// Warning about the adapter, as [`Context::software_warning`].
+        software_warning: Option<String>,
         /// Width and height of the images, pixels.
         size: [u32; 2],
         /// Number of frames to render.
@@ -283,6 +285,7 @@ pub fn render(
             shaders_note(request.gpu.shaders.edited()),
             baked_note(cache.manifest())
         ),
+        software_warning: context.software_warning(),
         size: [image.width, image.height],
         frames: frames.len(),
         left_out,

@@ -437,6 +437,8 @@ pub fn is_failed(directory: &Path) -> bool {
 pub struct Replayed {
     /// Number of the frame.
     pub frame: u32,
+    /// Warning about the adapter, as [`Opened::software_warning`].
+    pub software_warning: Option<String>,
     /// What went wrong again; `None` if nothing did.
     pub failure: Option<Failure>,
 }
@@ -465,15 +467,11 @@ pub fn replay_failed(directory: &Path, gpu: &Gpu) -> Result<Replayed, ReplayErro
         Some("cpu") => Device::Cpu,
         _ => Device::Gpu(gpu.clone()),
     };
-    let failure = replay(
-        &device.open(needs(&scene))?,
-        &scene,
-        &start,
-        last_frame,
-        &state,
-    )?;
+    let opened = device.open(needs(&scene))?;
+    let failure = replay(&opened, &scene, &start, last_frame, &state)?;
     Ok(Replayed {
         frame: last_frame + 1,
+        software_warning: opened.software_warning(),
         failure,
     })
 }

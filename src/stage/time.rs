@@ -55,9 +55,8 @@ impl From<&TimeError> for Blame {
 ///
 /// # Errors
 /// [`TimeError`], also for frames with invalid numbers.
-pub fn time(plan: &BakePlan<'_>, adapter: Option<&str>, frames: u32) -> Result<Timed, TimeError> {
+pub fn time(plan: &BakePlan<'_>, gpu: &Gpu, frames: u32) -> Result<Timed, TimeError> {
     let (scene, start) = (plan.scene, &plan.start);
-    let gpu = Gpu::from(adapter.map(str::to_owned));
     let opened = Opened::Gpu(Box::new(gpu.open(needs(scene))?));
     let (mut seconds, mut substeps) = (Vec::new(), 0);
     let mut drive = Drive::new(&opened, scene, start, false)?;

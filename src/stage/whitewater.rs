@@ -87,6 +87,8 @@ pub enum Event {
     Ready {
         /// Adapter and driver, or the f64 reference.
         device: Identity,
+        /// Warning about the adapter, as [`crate::device::Opened::software_warning`].
+        software_warning: Option<String>,
         /// Number of water particles.
         water: usize,
         /// Directory of the stream.
@@ -211,6 +213,7 @@ pub fn whitewater(
     };
     tell(Event::Ready {
         device: identity,
+        software_warning: opened.software_warning(),
         water: particles,
         directory: directory.clone(),
         thresholds: settings.thresholds,

@@ -6,7 +6,7 @@ use std::path::Path;
 use serde_json::{Map, Value, json};
 
 use super::{CACHE, InspectArgs, broken_off, file, look, refuse_options, study};
-use crate::{Failure, bake, is_cache, named_adapter, output};
+use crate::{Failure, bake, is_cache, output};
 use swell_scene::Scene;
 use swell_stage::{
     inspect::{Adapter, Entry, Manifest, PARTICLES, ScenePlan, adapters, cache, sizes},
@@ -53,10 +53,9 @@ fn of_scene(args: &InspectArgs, file: &Path) -> Result<(Value, Option<Failure>),
     let planned = super::of_scene(args, file, &scene)?;
     let mut object = scene_json(&planned);
     object["disk_bytes"] = json!(planned.bake.bytes()?);
-    let adapter = named_adapter(args.adapter.as_ref());
     object["time"] = match args.time {
         Some(frames) if planned.misfit.is_none() => {
-            timed_json(&scene, &time(&planned.bake, adapter.as_deref(), frames)?)
+            timed_json(&scene, &time(&planned.bake, &args.gpu(), frames)?)
         }
         _ => Value::Null,
     };
@@ -91,6 +90,7 @@ fn scene_json(planned: &ScenePlan<'_>) -> Value {
         "entering": bake.entering(),
         "warnings": bake.warnings,
         "adapter": planned.adapter,
+        "adapter_warning": planned.software_warning,
         "misfit": planned.misfit.as_ref().map(ToString::to_string),
         "passes": passes.collect::<Vec<_>>(),
         "buffers": buffers.collect::<Vec<_>>(),
@@ -139,6 +139,7 @@ fn of_look(args: &InspectArgs, file: &Path) -> Result<(Value, Option<Failure>), 
         "frame": planned.frame,
         "warnings": look.lints(),
         "adapter": planned.adapter,
+        "adapter_warning": planned.software_warning,
         "misfit": planned.misfit.as_ref().map(ToString::to_string),
         "passes": passes.collect::<Vec<_>>(),
         "textures": textures.collect::<Vec<_>>(),

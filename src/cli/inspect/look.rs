@@ -7,7 +7,7 @@ use std::{
 use swell_files::load_look_within;
 
 use super::{InspectArgs, misplaced};
-use crate::{Failure, bake, count, is_cache, named_adapter, size};
+use crate::{Failure, bake, count, is_cache, size};
 use swell_scene::look::{AovSpec, FitSpec, FormatSpec, Look, MethodSpec};
 use swell_stage::render::{LookPlan, Subject, plan};
 
@@ -112,8 +112,7 @@ pub(super) fn planned(
             return Err(misplaced("--set or --solver", "scenes", is, file));
         }
     };
-    let adapter = named_adapter(args.adapter.as_ref());
-    let planned = plan(&look, &subject, adapter.as_deref())?;
+    let planned = plan(&look, &subject, &args.gpu())?;
     Ok((look, subject, planned))
 }
 
@@ -165,6 +164,9 @@ fn show_plan(
     match &planned.adapter {
         Some(name) => writeln!(out, "planned for {name}")?,
         None => writeln!(out, "planned for common limits: no adapter here")?,
+    }
+    if let Some(warning) = &planned.software_warning {
+        writeln!(out, "warning: {warning}")?;
     }
     writeln!(
         out,

@@ -5,13 +5,10 @@ use std::path::PathBuf;
 use glam::DVec3;
 
 use super::{RenderJobError, Whitewater, near::Near, render_scene, told};
-use crate::{baked_scene, prepare::Start};
+use crate::{baked_scene, device::Gpu, prepare::Start};
 use swell_cache::{CacheReader, Entry};
 use swell_domain::{bounds::Bounds, particles::Particles};
-use swell_gpu::{
-    adapter::{Context, GpuError},
-    program::check_sizes,
-};
+use swell_gpu::adapter::{Context, GpuError, Needs};
 use swell_render::{FrameInputs, Limits, Plan, RenderScene, Runs, Water};
 use swell_scene::{Scene, look::Look};
 
@@ -44,6 +41,8 @@ pub struct LookPlan {
     pub frame: Option<u32>,
     /// The adapter whose limits were used; `None` if the machine has none.
     pub adapter: Option<String>,
+    /// Warning about that adapter, as [`Context::software_warning`].
+    pub software_warning: Option<String>,
     /// Why that adapter could not render it.
     pub misfit: Option<GpuError>,
 }
@@ -60,15 +59,11 @@ const COMMON_LIMITS: Limits = Limits {
 ///
 /// # Errors
 /// Errors of the subject's scene or cache, or of the look's panorama; an adapter that does not
-/// exist or open.
-pub fn plan(
-    look: &Look,
-    subject: &Subject,
-    adapter: Option<&str>,
-) -> Result<LookPlan, RenderJobError> {
-    let context = match Context::open(adapter) {
+/// exist or open, or is software where hardware is required.
+pub fn plan(look: &Look, subject: &Subject, gpu: &Gpu) -> Result<LookPlan, RenderJobError> {
+    let context = match gpu.open(Needs::default()) {
         Ok(context) => Some(context),
-        Err(GpuError::NoAdapter) => None,
+        Err(GpuError::NoAdapter { .. }) if !gpu.is_hardware_required => None,
         Err(error) => return Err(error.into()),
     };
     let limits = context.as_ref().map_or(COMMON_LIMITS, Limits::of);
@@ -79,7 +74,7 @@ pub fn plan(
     } = Planned::of(look, subject, &limits)?;
     let misfit = context
         .as_ref()
-        .and_then(|context| check_sizes(context, &plan.buffers).err());
+        .and_then(|context| plan.check(context).err());
     let textures = plan.textures.iter().map(|texture| {
         let format = format!("{:?}", texture.format);
         (texture.name.clone(), texture.size, format, texture.bytes())
@@ -94,6 +89,7 @@ pub fn plan(
         bytes: plan.bytes(),
         particles,
         frame,
+        software_warning: context.as_ref().and_then(Context::software_warning),
         adapter: context.map(|context| context.info.name),
         misfit,
     })

@@ -92,6 +92,8 @@ pub enum Event {
     Ready {
         /// Name of the adapter.
         device: String,
+        /// Warning about the adapter, as [`Context::software_warning`].
+        software_warning: Option<String>,
         /// Number of frames to check.
         frames: usize,
     },
@@ -157,6 +159,7 @@ pub fn check_render(
     let context = request.gpu.open(Needs::default())?;
     tell(Event::Ready {
         device: context.info.name.clone(),
+        software_warning: context.software_warning(),
         frames: frames.len(),
     });
     let mut surfaces = METHODS.map(|_| (Surfaces::default(), 0.0));

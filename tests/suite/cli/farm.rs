@@ -348,3 +348,83 @@ fn the_environment_names_adapter_and_caches() {
     }
     with(&job, &[("SWELL_ADAPTER", "")], 0, "check small.toml");
 }
+
+/// On request a software adapter is refused with the device's exit code, and nothing is written.
+/// Controls: the same commands without the request, and on an adapter that is hardware.
+#[test]
+fn software_adapters_are_refused_on_request() {
+    let job = Job::new();
+    job.expect(0, "bake small.toml -o cache --device cpu --frames 1");
+    let adapters = job.json(0, "inspect --adapters");
+    let all = adapters["adapters"].as_array().unwrap();
+    let is_software = |it: &&serde_json::Value| it["kind"].as_str().unwrap().ends_with(", Cpu");
+    let commands = [
+        "inspect small.toml",
+        "inspect look.toml",
+        "check small.toml",
+        "bake small.toml --frames 1 -o new",
+        "render cache --look look.toml -o new",
+        "whitewater cache",
+    ];
+    let required = |value| [("SWELL_REQUIRE_GPU", value)];
+    if let Some(software) = all.iter().find(is_software) {
+        let (index, name) = (&software["index"], software["name"].as_str().unwrap());
+        for words in commands {
+            let words = format!("{words} --adapter {index}");
+            let said = with(&job, &[], 3, &format!("{words} --require gpu"));
+            let expected = format!("adapter {name} is software, and a GPU is required");
+            assert_has(&said, &[&expected, "(--require, SWELL_REQUIRE_GPU)"]);
+            assert_has(&with(&job, &required("1"), 3, &words), &[&expected]);
+            assert!(!job.path("new").exists() && !job.path("cache/whitewater").exists());
+        }
+        for words in &commands[..3] {
+            let words = format!("{words} --adapter {index}");
+            for value in ["", "0"] {
+                let said = with(&job, &required(value), 0, &words);
+                assert!(!said.contains("is required"), "{said}");
+            }
+        }
+    }
+    if let Some(hardware) = all.iter().find(|it| !is_software(it)) {
+        for words in commands {
+            let words = format!("{words} --adapter {} --require gpu", hardware["index"]);
+            job.expect(0, &words);
+            if words.contains("new") {
+                fs::remove_dir_all(job.path("new")).unwrap();
+            }
+        }
+    }
+    // The reference on the processor is asked for by name, and a dry run opens no device.
+    for words in [
+        "bake small.toml --device cpu --frames 1 -o third",
+        "bake small.toml --frames 1 -o fourth --dry-run",
+        "inspect cache",
+    ] {
+        with(&job, &required("1"), 0, words);
+    }
+    let said = job.expect(2, "bake small.toml --device cpu --require gpu -o fifth");
+    assert_has(&said, &["--require asks for a GPU, and --device is cpu"]);
+    job.expect(2, "bake small.toml --require cpu -o fifth");
+    for words in [
+        "inspect cache --require gpu",
+        "inspect --adapters --require gpu",
+    ] {
+        assert_has(&job.expect(2, words), &["--require", "scenes"]);
+    }
+}
+
+/// Without any driver a plan is made for common limits, unless a GPU is required.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_required_gpu_has_to_be_there() {
+    let job = Job::new();
+    let none = [
+        ("VK_DRIVER_FILES", "/nonexistent"),
+        ("VK_ICD_FILENAMES", "/nonexistent"),
+    ];
+    for words in ["inspect small.toml", "inspect look.toml"] {
+        assert_has(&with(&job, &none, 0, words), &["no adapter here"]);
+        let said = with(&job, &none, 3, &format!("{words} --require gpu"));
+        assert_has(&said, &["no GPU adapter found"]);
+    }
+}

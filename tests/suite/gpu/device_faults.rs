@@ -6,7 +6,10 @@ use swell::files::load_scene;
 use crate::support::job::Job;
 use swell::{
     cache::CacheReader,
-    gpu::adapter::{Context, GpuError, InjectedFault, Needs},
+    gpu::{
+        adapter::{Context, GpuError, InjectedFault, Needs},
+        bindings::MOST_STORAGE_BUFFERS,
+    },
     solve::SolveError,
     stage::{
         Blame,
@@ -263,6 +266,47 @@ fn an_adapter_that_binds_few_buffers_is_refused_by_figures() {
     assert_eq!(Blame::from(&error), Blame::Device, "exit code 3");
     // Negative control: as many as any of our passes binds (`gpu::shaders`) are enough.
     run(&request(&job, "pbf", "enough", &opened(13))).unwrap();
+}
+
+/// What `inspect` plans is refused where the bake refuses it, with the same pass and figures. As
+/// many storage buffers as the plan needs suffice for the bake; with one less both are refused.
+#[test]
+fn a_pass_that_binds_too_many_buffers_is_refused_in_the_plan() {
+    let job = Job::new();
+    let opened = |most: u32| {
+        Context::open_lowered(None, Needs::default(), |limits| {
+            limits.max_storage_buffers_per_shader_stage = most;
+        })
+        .unwrap()
+    };
+    for solver in ["pbf", "flip"] {
+        let planned = |context: &Context| {
+            let scene = request(&job, solver, "planned", context).scene;
+            let start = swell::stage::prepare::Start::of(&scene).unwrap();
+            let limits = swell::solve::plan::device_limits(context);
+            start.shown_plan(&scene, limits).check(context).err()
+        };
+        let mut most = 3;
+        while let Some(error) = planned(&opened(most)) {
+            let GpuError::TooManyBuffers {
+                needed, allowed, ..
+            } = error
+            else {
+                panic!("{error}")
+            };
+            assert!(needed > most && allowed == most, "{needed} {allowed}");
+            most = needed;
+        }
+        assert!((5..=MOST_STORAGE_BUFFERS).contains(&most), "{most}");
+        let few = opened(most - 1);
+        let refused = planned(&few).expect("a pass needs one more").to_string();
+        let said = run(&request(&job, solver, solver, &few)).unwrap_err();
+        assert_eq!(said.to_string(), refused);
+        assert!(refused.contains(&format!("binds {most} storage buffers")));
+        assert!(!job.path(solver).exists());
+        // Negative control.
+        run(&request(&job, solver, solver, &opened(most))).unwrap();
+    }
 }
 
 /// Destroys the device after the second frame is computed.
