@@ -14,6 +14,9 @@ from typing import Callable, NamedTuple
 # A step starts only while this part of its limit is left of the whole time.
 LEAST_PART = 0.2
 
+# Limits of steps are for GPUs; a software adapter, on cores that are shared, gets more.
+SOFTWARE_FACTOR = 4
+
 # Coarse enough for a software adapter: 1 620 particles of the quickstart by either solver.
 COARSE = {"pbf": "solver.pbf.particle_spacing=0.5", "flip": "solver.flip.cell_size=1"}
 
@@ -84,7 +87,8 @@ class Session:
         return self.start + self.minutes * 60 - time.monotonic()
 
     def begin(self, step):
-        self.step_end = time.monotonic() + min(step.limit, self.left())
+        limit = step.limit * (SOFTWARE_FACTOR if self.software else 1)
+        self.step_end = time.monotonic() + min(limit, self.left())
         name = re.sub(r"[^a-z0-9]+", "-", f"{step.group} {step.name}".lower()).strip("-")
         self.log = self.output / "logs" / f"{name}.log"
 
