@@ -35,13 +35,13 @@ mod periodic;
 mod probe;
 mod reach;
 mod regular_waves;
-#[cfg(test)]
-mod scene_tests;
 mod seas;
 mod settle;
 mod solid_track;
 mod sources;
 mod spec;
+#[cfg(test)]
+mod tests;
 mod usd_nodes;
 mod usda;
 mod wave_maker;

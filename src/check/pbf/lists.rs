@@ -64,13 +64,15 @@ impl PbfState {
         self.search_within(points, self.model.calibration.support_radius)
     }
 
-    /// Finds the points closer than `radius`. Sorts again, because the order by cells in f64 may
-    /// differ from the device's if a particle lies on a face.
+    /// Finds the points closer than `radius`. Sorts again, because the cell in f64 of a point on a
+    /// face may differ from that by which the device has sorted it.
     fn search_within(&self, points: &[DVec3], radius: f64) -> Neighbors {
         let n = self.particles();
         let ids: Vec<u32> = (0..points.len() as u32).collect();
-        let mut order = self.model.cells.order(&points[..n], &ids);
-        order.extend(n..points.len());
+        let (particles, samples) = points.split_at(n);
+        let mut order = self.model.cells.order(particles, &ids);
+        let samples = self.model.cells.order(samples, &ids);
+        order.extend(samples.into_iter().map(|k| n + k));
         let sorted: Vec<DVec3> = order.iter().map(|&k| points[k]).collect();
         let crowd = SortedPoints {
             cells: self.model.cells,

@@ -5,6 +5,7 @@ mod films;
 mod frames;
 mod gaps;
 mod periodic;
+mod quay;
 mod viscous;
 mod whitewater;
 

@@ -159,8 +159,9 @@ fn sources(dir: &Path, out: &mut Vec<std::path::PathBuf>) {
 }
 
 /// Files of each effect: its settings, its passes, its check, and its f64 reference passes.
-const EFFECT_FILES: [&str; 5] = [
+const EFFECT_FILES: [&str; 6] = [
     "scene/effects",
+    "files/effects",
     "solve/effects",
     "check/effects",
     "reference/pbf/effects",
