@@ -166,8 +166,8 @@ pub fn write(path: &Path, bytes: impl AsRef<[u8]>) -> Result<(), FileError> {
     write_with(path, |file| file.write_all(bytes.as_ref()))
 }
 
-/// [`write`] for a path that the user names: a link keeps leading to the file, and what is no file,
-/// such as a pipe, is written directly.
+/// As [`write()`] for a path that the user names: a link keeps leading to the file, and what is no
+/// file, such as a pipe, is written directly.
 ///
 /// # Errors
 /// [`FileError`].

@@ -25,7 +25,7 @@ use swell_scene::{
 
 /// Returns the scene as TOML with all defaults and with motion tables in place; loading it
 /// gives an equal scene. `mesh_path` maps a file and its hash to the path to write, relative to
-/// where the text will be stored: [`asset_path`] for a cache.
+/// where the text will be stored: [`asset_path`](swell_scene::asset_path) for a cache.
 pub fn scene_to_toml(scene: &Scene, mesh_path: &dyn Fn(&Path, &str) -> String) -> String {
     let mut out = String::new();
     write_tables(&mut out, keys::SCENE, "", &written(scene, mesh_path));
