@@ -221,8 +221,8 @@ impl Progress {
         output::log(text);
     }
 
-    /// Prints a warning about the adapter, if there is one: once in a command, which may open it for
-    /// several jobs.
+    /// Prints a warning about the adapter, if there is one: once in a command, which may open it
+    /// for several jobs.
     pub(super) fn warn_of_adapter(&self, warning: Option<&str>) {
         let Some(text) = warning else { return };
         if !std::mem::replace(&mut self.state.borrow_mut().is_adapter_told, true) {

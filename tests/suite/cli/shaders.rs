@@ -296,7 +296,7 @@ fn a_folder_that_is_not_whole_or_does_not_compile_is_refused_with_its_place() {
     let place = format!("pbf/predict.wgsl:{}:", before.count() + 1);
     for (shaders, words) in [
         ("torn", &["torn", "lack shared/walls.wgsl"][..]),
-        ("nowhere", &["cannot read nowhere"]),
+        ("nowhere", &["cannot read the shaders in nowhere"]),
         ("broken", &["edited shader pbf/predict", &place, "confined"]),
         ("torn --device cpu", &["--shaders run on a GPU"]),
     ] {

@@ -61,7 +61,7 @@ fn imports(text: &str, depth: usize, modules: &BTreeSet<String>) -> BTreeSet<Str
     named.filter(|name| modules.contains(name)).collect()
 }
 
-/// Collects the imports of each module from the files below `folder`.
+/// Collects the imports of each module from the files below `folder`, without those of tests.
 fn gather(
     folder: &Path,
     module: Option<&str>,
@@ -72,6 +72,9 @@ fn gather(
     for entry in fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
         let stem = path.file_stem().unwrap().to_str().unwrap().to_owned();
+        if stem == "tests" {
+            continue;
+        }
         let name = module.unwrap_or(&stem);
         if path.is_dir() {
             gather(&path, Some(name), depth + 1, modules, found);
