@@ -166,6 +166,7 @@ mod tests {
         fs::write(d.join("a"), "1").unwrap();
         fs::create_dir(d.join("sub")).unwrap();
         fs::write(d.join("sub/b"), "2").unwrap();
+        assert!(directory_hash(&d.join("none")).is_err());
         let hash = || directory_hash(d).unwrap();
         let first = hash();
         fs::write(d.join(TIMINGS), "3").unwrap();

@@ -140,7 +140,7 @@ struct State {
     /// Progress within a frame, or before the first one.
     within: Option<Within>,
     /// Whether the adapter was warned of.
-    is_adapter_told: bool,
+    has_warned_of_adapter: bool,
     /// Warnings about the job's frames.
     recurrences: Recurrences,
     /// Fields that the command adds to the last event.
@@ -172,7 +172,7 @@ impl Progress {
                 failed: 0,
                 bytes: None,
                 within: None,
-                is_adapter_told: false,
+                has_warned_of_adapter: false,
                 recurrences: Recurrences::default(),
                 end: Map::new(),
             }),
@@ -225,7 +225,7 @@ impl Progress {
     /// for several jobs.
     pub(super) fn warn_of_adapter(&self, warning: Option<&str>) {
         let Some(text) = warning else { return };
-        if !std::mem::replace(&mut self.state.borrow_mut().is_adapter_told, true) {
+        if !std::mem::replace(&mut self.state.borrow_mut().has_warned_of_adapter, true) {
             self.say(
                 &format!("warning: {text}"),
                 json!({ "event": "warning", "what": "adapter", "text": text }),

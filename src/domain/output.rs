@@ -515,4 +515,37 @@ mod tests {
         assert!(write(&folder, "").is_err());
         assert_eq!(names(dir.path()).unwrap(), ["file", "folder", "folder.tmp"]);
     }
+
+    /// Control: a file that is not written through a link replaces the link.
+    #[cfg(unix)]
+    #[test]
+    fn write_named_keeps_links_and_devices() {
+        let dir = tempfile::tempdir().unwrap();
+        let [file, link] = ["file", "link"].map(|name| dir.path().join(name));
+        fs::write(&file, "old").unwrap();
+        std::os::unix::fs::symlink("file", &link).unwrap();
+        write_named(&link, "new").unwrap();
+        assert!(link.is_symlink());
+        assert_eq!(fs::read_to_string(&file).unwrap(), "new");
+        write_named(Path::new("/dev/null"), "gone").unwrap();
+        assert!(!fs::metadata("/dev/null").unwrap().is_file());
+        write(&link, "own").unwrap();
+        assert!(!link.is_symlink());
+        assert_eq!(fs::read_to_string(&file).unwrap(), "new");
+    }
+
+    /// A lock whose file was removed leaves the file that another process has locked since.
+    #[cfg(unix)]
+    #[test]
+    fn dropped_temporary_lock_removes_only_its_own_file() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("lock");
+        let lost = Lock::take(&path).unwrap().unwrap().temporary();
+        fs::remove_file(&path).unwrap();
+        let held = Lock::take(&path).unwrap().unwrap().temporary();
+        drop(lost);
+        assert!(held.is_there());
+        drop(held);
+        assert!(!path.exists());
+    }
 }

@@ -224,27 +224,35 @@ fn load_with(
     overrides: impl Iterator<Item = (String, Range<usize>)>,
 ) -> Result<Scene, SceneError> {
     let (overrides, spans): (Vec<_>, Vec<_>) = overrides.unzip();
-    load_scene_within(&file.path, &overrides, doc.reach()).map_err(|error| {
-        let (text, message) = match &error {
-            SceneError::Read { source, .. } => {
-                return unreadable(doc, file.named, &file.path, source);
-            }
-            SceneError::Fault(fault) => match fault.as_ref() {
-                Fault {
-                    place: Place::Override(text),
-                    key,
-                    message,
-                    ..
-                } => (text, format!("{key}: {message}")),
-                _ => return error,
-            },
-            SceneError::Override { text, reason } => (text, reason.clone()),
+    load_scene_within(&file.path, &overrides, doc.reach()).map_err(|error| match &error {
+        SceneError::Read { source, .. } => unreadable(doc, file.named, &file.path, source),
+        _ => in_study(doc, (&overrides, &spans), error),
+    })
+}
+
+/// Locates a fault of an override in the study file, which sets it at one of `spans`; returns other
+/// errors as they are.
+fn in_study(
+    doc: &Document<'_>,
+    (overrides, spans): (&[String], &[Range<usize>]),
+    error: SceneError,
+) -> SceneError {
+    let (text, message) = match &error {
+        SceneError::Fault(fault) => match fault.as_ref() {
+            Fault {
+                place: Place::Override(text),
+                key,
+                message,
+                ..
+            } => (text, format!("{key}: {message}")),
             _ => return error,
-        };
-        let place = overrides.iter().position(|known| known == text);
-        place.map_or(error, |place| {
-            doc.fault_plain(spans[place].clone(), message)
-        })
+        },
+        SceneError::Override { text, reason } => (text, reason.clone()),
+        _ => return error,
+    };
+    let place = overrides.iter().position(|known| known == text);
+    place.map_or(error, |place| {
+        doc.fault_plain(spans[place].clone(), message)
     })
 }
 

@@ -21,11 +21,11 @@ use std::{ops::Range, path::Path};
 use serde::Deserialize;
 use toml::{Spanned, Value, de::DeTable};
 
-use super::{super::document::Document, SceneFile, StudyFileError, load_with};
+use super::{super::document::Document, SceneFile, StudyFileError, in_study, load_with};
 use crate::{load_look_with, load_look_within};
 use swell_domain::frame_range::FrameRange;
 use swell_scene::{
-    Fault, Place, Scene, SceneError,
+    Scene, SceneError,
     look::{Look, LookError},
 };
 
@@ -276,23 +276,6 @@ fn load_look(
     overrides: impl Iterator<Item = (String, Range<usize>)>,
 ) -> Result<Look, SceneError> {
     let (overrides, spans): (Vec<_>, Vec<_>) = overrides.unzip();
-    load_look_with(file, &overrides, doc.reach()).map_err(|LookError(error)| {
-        let (text, message) = match &error {
-            SceneError::Fault(fault) => match fault.as_ref() {
-                Fault {
-                    place: Place::Override(text),
-                    key,
-                    message,
-                    ..
-                } => (text, format!("{key}: {message}")),
-                _ => return error,
-            },
-            SceneError::Override { text, reason } => (text, reason.clone()),
-            _ => return error,
-        };
-        let place = overrides.iter().position(|known| known == text);
-        place.map_or(error, |place| {
-            doc.fault_plain(spans[place].clone(), message)
-        })
-    })
+    load_look_with(file, &overrides, doc.reach())
+        .map_err(|LookError(error)| in_study(doc, (&overrides, &spans), error))
 }
