@@ -3,6 +3,10 @@
 // substep and be compressed there, and the density correction would lift it again. The cells of
 // such a gap count as water with the divergence that fills them, so that the projection stops the
 // water at the end of the gap.
+//
+// A surface that water is about to hit moves on with it: near a cell's centre, where the pressure
+// is 0, it would let all inflow out through the faces towards air, at a speed that grows without
+// bound as θ and the substep shrink. Such a cell counts as full.
 #import "shared/thread.wgsl"
 #import "shared/flip_neighborhood.wgsl"
 #import "shared/flip_buried.wgsl"
@@ -121,6 +125,33 @@ fn filled(element: u32, cell: vec3f) -> f32 {
     return most;
 }
 
+#ifdef GHOST_FLUID
+// Inflow, in units of gravity's velocity change, from which a surface starts to count as that of a
+// full cell; from twice as much it does. Water at rest on a floor has 1.
+const LEAST_INFLOW = 2.0;
+
+// Velocity that the projection has to stop, m/s: the right-hand side of the cell's row.
+fn inflow(element: u32) -> f32 {
+    var sum = -solid_flux[element];
+    for (var axis = 0u; axis < 3u; axis++) {
+        var step = vec3i(0);
+        step[axis] = 1;
+        let lower = axis * params.stride + element;
+        let upper = axis * params.stride + element_at(step);
+        sum += face_open[lower] * face_velocity[lower] - face_open[upper] * face_velocity[upper];
+    }
+    return sum;
+}
+
+// Distance of the surface by which the projection finds the pressure in a cell of water.
+fn hit_distance(element: u32) -> f32 {
+    let own = liquid_distance[element];
+    let least = LEAST_INFLOW * length(params.velocity_step);
+    let part = select(0.0, clamp(inflow(element) / least - 1.0, 0.0, 1.0), least > 0.0);
+    return mix(own, min(own, -params.cell_size), part);
+}
+#endif
+
 @compute @workgroup_size(64)
 fn main(
     @builtin(workgroup_id) workgroup: vec3u,
@@ -132,8 +163,15 @@ fn main(
         return;
     }
     let element = thread + CELLS;
+    let kind = cell_kind[element];
+#ifdef GHOST_FLUID
+    for (var once = 0; once < select(0, 1, kind == FLUID); once++) {
+        open_neighborhood(element);
+        liquid_distance[element] = hit_distance(element);
+    }
+#endif
     var most = -1.0;
-    for (var once = 0; once < select(0, 1, cell_kind[element] == AIR); once++) {
+    for (var once = 0; once < select(0, 1, kind == AIR); once++) {
         open_neighborhood(element);
         most = filled(element, vec3f(own_cell(element)));
     }

@@ -27,6 +27,7 @@ pub(super) fn close_gaps(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
         true => elements.scalars(&io.before, buffers::LIQUID_DISTANCE)?,
         false => vec![0.0; elements.cells],
     };
+    let before = distance.clone();
     let reference = reference_close_gaps(&gaps, &mut distance);
     let error = OF_GAP.of([CUT.of([state.place()])]);
     let active = elements.active();
@@ -50,7 +51,17 @@ pub(super) fn close_gaps(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     if has_distance {
         let found = elements.scalars(&io.after, buffers::LIQUID_DISTANCE)?;
         io.table.each(&FULL, active.clone(), |e| {
-            (!is_tie(e)).then(|| pair(e, found[e], distance[e], [distance[e].abs()]))
+            let own = before[e];
+            let [change, flow] = match gaps.is_hit(e as u32) {
+                true => {
+                    let terms = gaps.inflow(e as u32).map(|v| v.abs().element_sum());
+                    let flow = terms.into_iter().sum::<f64>() / gaps.least_inflow();
+                    [own - own.min(-state.model.cell_size()), flow]
+                }
+                false => [0.0; 2],
+            };
+            let sizes = [own.abs().max(distance[e].abs()), change, flow];
+            (!is_tie(e)).then(|| pair(e, found[e], distance[e], sizes))
         });
     }
     state.space = Some(OpenSpace {

@@ -1,5 +1,7 @@
 //! Reference pass of flip/close_gaps.
 
+use glam::DVec3;
+use rayon::prelude::*;
 use swell_domain::{
     bricks::{Bricks, CELLS},
     poisson::{AIR, FLUID},
@@ -24,6 +26,10 @@ const LEAST_CLOSING: f64 = 0.25;
 /// A face with a smaller open fraction ends a gap: all the water that fills the gap would have to
 /// pass it.
 const LEAST_WAY: f64 = 0.5;
+
+/// Inflow, in units of gravity's velocity change, from which a surface starts to count as that of a
+/// full cell; from twice as much it does. Water at rest on a floor has 1.
+const LEAST_INFLOW: f64 = 2.0;
 
 /// End of a gap.
 #[derive(Clone, Copy, Debug, Default)]
@@ -53,7 +59,7 @@ pub struct Gaps<'a> {
     /// Relative densities from [`super::gather_centers`].
     pub density: &'a [f64],
     /// Velocities at the lower faces, including gravity, m/s. Shape (elements, 3 components).
-    pub velocity: &'a [glam::DVec3],
+    pub velocity: &'a [DVec3],
 }
 
 impl Gaps<'_> {
@@ -106,12 +112,54 @@ impl Gaps<'_> {
         None
     }
 
+    /// Returns whether a cell is in a brick with particles.
+    fn is_wet(&self, element: u32) -> bool {
+        element < CELLS * (self.bricks.wet + 1)
+    }
+
+    /// Returns the terms of the velocity that the projection has to stop in a cell, m/s: of the
+    /// lower faces, of the upper faces and of walls and solids. Their sum is the right-hand side of
+    /// the cell's row.
+    pub fn inflow(&self, element: u32) -> [DVec3; 3] {
+        let through = |face: u32| self.space.open[face as usize] * self.velocity[face as usize];
+        let upper = |axis: usize| through(self.bricks.near(element, along(axis, 1)))[axis];
+        [
+            through(element),
+            -DVec3::new(upper(0), upper(1), upper(2)),
+            -DVec3::X * self.space.solid_flux[element as usize],
+        ]
+    }
+
+    /// Returns whether an inflow may change the distance to a cell's surface.
+    pub fn is_hit(&self, element: u32) -> bool {
+        let is_water = self.space.kind[element as usize] == FLUID;
+        is_water && self.is_wet(element) && self.least_inflow() > 0.0
+    }
+
+    /// Returns the least inflow by which a surface counts as that of a full cell in part, m/s.
+    pub fn least_inflow(&self) -> f64 {
+        LEAST_INFLOW * self.step.velocity_step.length()
+    }
+
+    /// Returns the distance to the surface by which the projection finds a cell's pressure, metres.
+    /// A surface that water is about to hit moves on with it: near a cell's centre, where the
+    /// pressure is 0, it would let all inflow out through the faces towards air, at a speed that
+    /// grows without bound as θ and the substep shrink. Such a cell counts as full.
+    pub fn hit_distance(&self, element: u32, own: f64) -> f64 {
+        if !self.is_hit(element) {
+            return own;
+        }
+        let inflow: DVec3 = self.inflow(element).into_iter().sum();
+        let part = (inflow.element_sum() / self.least_inflow() - 1.0).clamp(0.0, 1.0);
+        own + part * (own.min(-self.model.cell_size()) - own)
+    }
+
     /// Returns the volume of a cell that fills in the substep because the ends of a gap meet, in
     /// cells: the missing length times the area across; `None` if no gap closes. `lean` shifts the
     /// thresholds, to find decisions that rounding may change.
     pub fn filled(&self, element: u32, lean: f64) -> Option<f64> {
         let is_looked_at = self.space.kind[element as usize] == AIR;
-        let is_wet = element < CELLS * (self.bricks.wet + 1);
+        let is_wet = self.is_wet(element);
         let along_axis = |axis: usize| {
             let low = self.end(element, axis, -1, lean)?;
             let high = self.end(element, axis, 1, lean)?;
@@ -135,9 +183,11 @@ impl Gaps<'_> {
 }
 
 /// Turns the cells of closing gaps into water: returns the updated kinds and fluxes, and updates
-/// the distances to the surface, metres.
+/// the distances to the surface, metres, also where water hits a surface.
 pub fn close_gaps(gaps: &Gaps<'_>, distance: &mut [f64]) -> OpenSpace {
     let filled = per_cell(gaps.bricks, |element| gaps.filled(element, 0.0));
+    (distance.par_iter_mut().enumerate())
+        .for_each(|(e, distance)| *distance = gaps.hit_distance(e as u32, *distance));
     let size = gaps.model.cell_size();
     let mut space = gaps.space.clone();
     for (e, part) in filled.into_iter().enumerate() {

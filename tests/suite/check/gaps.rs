@@ -31,6 +31,13 @@ const CONTROLS: &[Control] = &[
         &["flux with what fills gaps"],
     ),
     control(
+        "flip/close_gaps",
+        "LEAST_INFLOW = 2.0",
+        "LEAST_INFLOW = 2.001",
+        "flip/close_gaps",
+        &["distance of the surface"],
+    ),
+    control(
         "flip/find_excess",
         "density[found] < 0.5",
         "density[found] < -0.5",
