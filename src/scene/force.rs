@@ -14,7 +14,7 @@ impl Scene {
     /// to the scene's origin, metres. Patches that face a wall of the domain less than half a cell
     /// away are left out: no water fits between.
     pub fn patches(&self, bearer: Bearer, time: f64) -> Vec<Patch> {
-        let edge = self.solver.flip().cell_size;
+        let edge = self.solver.cell_size();
         let (mesh, pose) = match bearer {
             Bearer::Solid(index) => (&self.solids[index].mesh, Pose::START),
             Bearer::MovingSolid(index) => {

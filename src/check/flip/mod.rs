@@ -23,7 +23,7 @@ use swell_reference::{
     flip::{GridTransfer, Model, OpenSpace, Sorted, Step, is_filling},
     poisson::iteration::Sum,
 };
-use swell_scene::{Scene, step::Substep};
+use swell_scene::{FlipScene, step::Substep};
 use swell_solve::{
     SolveError,
     flip::{Flip, buffers},
@@ -94,7 +94,7 @@ const LABELLED: &str = "compared after pressure/count_pockets";
 /// not have the substep.
 pub fn check(
     context: &Context,
-    scene: &Scene,
+    scene: &FlipScene,
     plan: Plan,
     boundary: &Boundary,
     (frame, particles): (u32, &Particles),
@@ -116,7 +116,7 @@ pub fn check(
 
 /// State that the comparisons share during the substep.
 pub(crate) struct FlipState {
-    pub(super) scene: Scene,
+    pub(super) scene: FlipScene,
     boundary: Boundary,
     pub(super) model: Model,
     n: usize,
@@ -168,7 +168,7 @@ impl State for FlipState {
 
 impl FlipState {
     /// Creates the state for `n` particles at the end of a frame.
-    pub(super) fn new(scene: &Scene, boundary: &Boundary, (frame, n): (u32, usize)) -> Self {
+    pub(super) fn new(scene: &FlipScene, boundary: &Boundary, (frame, n): (u32, usize)) -> Self {
         Self {
             scene: scene.clone(),
             boundary: boundary.clone(),

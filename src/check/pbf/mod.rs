@@ -18,7 +18,7 @@ use swell_reference::{
     neighbors::Neighbors,
     pbf::{Model, Substep, passes::Inputs},
 };
-use swell_scene::{Scene, Stop, step::projected_substep};
+use swell_scene::{PbfScene, Stop, step::projected_substep};
 use swell_solve::{
     SolveError,
     flip::buffers::BRICKS,
@@ -98,7 +98,7 @@ const COMPARISONS: &[Comparison<PbfState>] = &[
 /// not have the substep.
 pub fn check(
     context: &Context,
-    scene: &Scene,
+    scene: &PbfScene,
     plan: Plan,
     [boundary, uploaded]: [&Boundary; 2],
     (frame, particles): (u32, &Particles),
@@ -152,7 +152,7 @@ pub fn check(
 
 /// State that the comparisons share during the substep.
 pub(super) struct PbfState {
-    pub(super) scene: Scene,
+    pub(super) scene: PbfScene,
     model: Model,
     /// Whether the model's samples are those of the device.
     has_samples: bool,
@@ -216,7 +216,7 @@ impl PbfState {
     /// Reads the state of the iteration to a density error before the pass; `None` if the number of
     /// iterations is fixed.
     fn control(&self, io: &Io<'_>) -> Result<Option<IterationControl>, SolveError> {
-        match self.scene.solver.pbf().stop {
+        match self.scene.settings().stop {
             Stop::DensityError { .. } => Ok(Some(io.before.one(buffers::CONTROL)?)),
             _ => Ok(None),
         }

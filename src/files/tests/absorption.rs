@@ -33,6 +33,7 @@ cfl = 1.0
 fn the_speed_of_an_absorbing_wall_counts() {
     let mut scene = parse_scene(SCENE, Path::new("s.toml"), Path::new(""), &[]).expect("valid");
     let substeps = |scene: &Scene| {
+        let scene = scene.with_flip().expect("a scene of FLIP");
         let first = scene.flip_substep(1, 0.0, 0.05, 0.0, (0, 0.0));
         first.expect("few").0
     };

@@ -22,7 +22,7 @@ use swell_domain::{
     solver::{Observed, PassTime, Projection, Solver, Span, StepReport, Watch},
 };
 use swell_scene::{
-    Scene,
+    FlipScene,
     flip::{AFFINE, Transfer},
     step::Substep,
 };
@@ -98,9 +98,9 @@ impl Trace {
 }
 
 impl Flip {
-    /// Creates the solver for a scene that uses FLIP, with its solids. It solves for pressures by
+    /// Creates the solver for a scene, with its solids. It solves for pressures by
     /// conjugate gradients, which are as accurate as a direct factorisation in a tenth of its time.
-    pub fn new(scene: &Scene, boundary: &Boundary) -> Self {
+    pub fn new(scene: &FlipScene, boundary: &Boundary) -> Self {
         Self {
             model: Model::new(scene, boundary),
             factor_budget: 0,

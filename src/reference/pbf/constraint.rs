@@ -21,7 +21,7 @@ use super::{
 };
 use crate::{ReferenceError, Timings};
 use swell_domain::{boundary::Boundary, particles::Particles};
-use swell_scene::Scene;
+use swell_scene::PbfScene;
 
 /// Newton steps after which the nonlinear solve fails.
 const MAX_STEPS: usize = 100;
@@ -159,7 +159,7 @@ pub fn converged(
 ///
 /// # Errors Returns the errors of [`converged`].
 pub fn distance_to_converged(
-    scene: &Scene,
+    scene: &PbfScene,
     boundary: &Boundary,
     frame: u32,
     state: &Particles,

@@ -12,7 +12,7 @@ use swell_domain::{
     signed_distance::SignedDistance,
     sph::{Calibration, half_space_fraction},
 };
-use swell_scene::Scene;
+use swell_scene::{PbfScene, Scene};
 
 /// Particles that a pass handles, by the parity of their sorted index.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -120,9 +120,9 @@ impl Substep {
 }
 
 impl Model {
-    /// Creates the model of a scene that uses PBF, with its solids in world space.
-    pub fn new(scene: &Scene, boundary: &Boundary) -> Self {
-        let settings = scene.solver.pbf();
+    /// Creates the model of a scene, with its solids in world space.
+    pub fn new(scene: &PbfScene, boundary: &Boundary) -> Self {
+        let settings = scene.settings();
         let calibration = Calibration::new(settings.particle_spacing, settings.support_ratio);
         let (size, support) = (scene.domain.size(), calibration.support_radius);
         let origin = scene.domain.min;
@@ -360,7 +360,8 @@ mod tests {
             particle_spacing = 0.1
         "#;
         let scene = parse_scene(text, Path::new("walls.toml"), Path::new("."), &[]);
-        Model::new(&scene.expect("a scene"), &Boundary::default())
+        let scene = scene.expect("a scene").with_pbf().expect("of PBF");
+        Model::new(&scene, &Boundary::default())
     }
 
     fn walls() -> Bounds {

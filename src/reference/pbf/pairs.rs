@@ -203,6 +203,7 @@ mod tests {
             [solver]\nmethod = \"pbf\"\n[solver.pbf]\nparticle_spacing = 0.1\n\
             artificial_pressure = 0.1\n";
         let scene = parse_scene(text, Path::new("lanes.toml"), Path::new("."), &[]).unwrap();
+        let scene = scene.with_pbf().unwrap();
         let mut model = Model::new(&scene, &Boundary::default());
         let uneven = |k: usize| DVec3::new(0.31, 0.17, 0.23) * (k * k % 97) as f64 * 1e-3;
         let place =

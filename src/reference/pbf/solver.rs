@@ -20,12 +20,12 @@ use swell_domain::{
     probe::fitted,
     solver::{Observed, PassTime, Projection, Solver, Span, StepReport, Watch},
 };
-use swell_scene::{Iteration, Scene, Stop, step::projected_substep};
+use swell_scene::{Iteration, PbfScene, Scene, Stop, step::projected_substep};
 
 /// PBF in f64. Frames are rounded to f32, as when written, and the next frame starts from the
 /// rounded state.
 pub struct Pbf {
-    scene: Scene,
+    scene: PbfScene,
     model: Model,
     /// FLIP solver that projects velocities, if the scene uses a projection.
     grid: Option<Flip>,
@@ -235,8 +235,8 @@ pub fn iterate_among<'a>(
 }
 
 impl Pbf {
-    /// Creates the solver for a scene that uses PBF, with its solids.
-    pub fn new(scene: &Scene, boundary: &Boundary) -> Self {
+    /// Creates the solver for a scene, with its solids.
+    pub fn new(scene: &PbfScene, boundary: &Boundary) -> Self {
         Self {
             model: Model::new(scene, boundary),
             is_drop: Vec::new(),

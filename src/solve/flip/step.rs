@@ -9,19 +9,24 @@ use swell_domain::{
     bricks::{Bricks, CELLS, table_dims},
     flip::{CAP, CONTACT, stored_cells},
 };
-use swell_scene::{Scene, step::Substep};
+use swell_scene::{FlipScene, step::Substep};
 
 /// Returns the walls that cut a substep's cells, in cells.
-pub(super) fn cut(scene: &Scene, step: &Substep) -> Bounds {
-    let (walls, size) = (scene.walls(step.start), scene.solver.flip().cell_size);
+pub(super) fn cut(scene: &FlipScene, step: &Substep) -> Bounds {
+    let (walls, size) = (scene.walls(step.start), scene.settings().cell_size);
     Bounds {
         min: walls.min / size,
         max: walls.max / size,
     }
 }
 
-pub(super) fn params(scene: &Scene, plan: &Plan, bricks: &Bricks, step: &Substep) -> FlipParams {
-    let flip = scene.solver.flip();
+pub(super) fn params(
+    scene: &FlipScene,
+    plan: &Plan,
+    bricks: &Bricks,
+    step: &Substep,
+) -> FlipParams {
+    let flip = scene.settings();
     let after = scene.walls(step.start + step.length);
     let cut = cut(scene, step);
     let speed = scene.wall_velocity(step.start + step.length, step.length);
@@ -58,7 +63,7 @@ pub(super) fn params(scene: &Scene, plan: &Plan, bricks: &Bricks, step: &Substep
 }
 
 /// Returns the uniform with the boxes of cells where water enters.
-pub(super) fn inlets(scene: &Scene, step: &Substep) -> Inlets {
+pub(super) fn inlets(scene: &FlipScene, step: &Substep) -> Inlets {
     let mut inlets = Inlets::default();
     let all = scene.inlets(step.start, step.length);
     for (k, inlet) in all.into_iter().enumerate() {

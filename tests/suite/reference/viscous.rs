@@ -27,13 +27,13 @@ struct Grid {
 
 impl Grid {
     fn of(case: &Case) -> Self {
-        let mut reference = Reference::new(&case.scene, &case.boundary);
+        let mut reference = Reference::new(&case.scene.with_flip().unwrap(), &case.boundary);
         reference.load(FRAME, &case.particles).unwrap();
         let cloud = reference.cloud();
         let found = survey(reference.model(), &cloud);
         let length = case.scene.shot.frame_seconds();
         let start = f64::from(FRAME) * length;
-        let (_, substep) = (case.scene)
+        let (_, substep) = (reference.model().scene)
             .flip_substep(FRAME + 1, start, length, found.speed, (0, 0.0))
             .unwrap();
         let trace = reference.substep(&cloud, &found.is_wet, &substep).unwrap();
