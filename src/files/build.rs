@@ -16,7 +16,6 @@ use super::{
     wave_maker,
 };
 use swell_domain::{
-    absorber::AbsorberStates,
     bounds::Bounds,
     mesh_file::{self, Digits, Loaded, MeshFormat},
     sampling,
@@ -154,7 +153,6 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
         probes,
         budget,
         effects: spec.effects,
-        absorbers: AbsorberStates::default(),
     };
     Ok(scene.into_local())
 }

@@ -97,7 +97,7 @@ impl Water {
             starts: model.cells.starts(&points),
             sample_starts: model.cells.starts(&model.samples),
             velocity: order.iter().map(|&k| wide(&water.velocity[k])).collect(),
-            walls: scene.walls_after(water, time),
+            walls: scene.walls(&water.walls, time),
             model,
             points,
             order,

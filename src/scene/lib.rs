@@ -33,7 +33,6 @@ use std::path::PathBuf;
 use glam::{DAffine3, DQuat, DVec3};
 
 use swell_domain::{
-    absorber::AbsorberStates,
     absorption::Absorption,
     bounds::Bounds,
     holes::Holes,
@@ -98,8 +97,6 @@ pub struct Scene {
     pub budget: Budget,
     /// Effects that the scene enables; each is `None` unless the scene names it.
     pub effects: Effects,
-    /// State of the absorbing walls, taken from the solver's state; all `None` at the start.
-    pub absorbers: AbsorberStates,
 }
 
 impl Scene {

@@ -3,7 +3,6 @@
 use std::ops::Deref;
 
 use super::{Method, Pbf, Scene, flip::Flip, projection::PROJECTION_CELL};
-use swell_domain::particles::Particles;
 
 /// A method with its settings.
 #[derive(Clone, Debug, PartialEq)]
@@ -109,27 +108,6 @@ impl<S> SceneWith<S> {
     /// Returns the settings of the solver.
     pub fn settings(&self) -> &S {
         &self.settings
-    }
-
-    /// Returns the scene with the absorber states of `state`.
-    #[must_use]
-    pub fn after(&self, state: &Particles) -> Self
-    where
-        S: Clone,
-    {
-        let mut scene = self.clone();
-        scene.take_absorbers(state);
-        scene
-    }
-
-    /// Takes over the absorber states of `state`; see [`Scene::take_absorbers`].
-    pub fn take_absorbers(&mut self, state: &Particles) {
-        self.scene.take_absorbers(state);
-    }
-
-    /// Updates the absorber states; see [`Scene::update_absorbers`].
-    pub fn update_absorbers(&mut self, state: &mut Particles, frame: u32) {
-        self.scene.update_absorbers(state, frame);
     }
 }
 

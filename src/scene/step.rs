@@ -58,22 +58,13 @@ pub fn projected_substep(start: f64, length: f64, before: f64) -> Substep {
 impl Scene {
     /// Returns the faces of the box at `time` including wave makers, relative to the domain's least
     /// corner, metres; ±[`FAR`] along periodic axes.
-    pub fn walls(&self, time: f64) -> Bounds {
-        self.walls_by(&self.absorbers, time)
-    }
-
-    /// Returns [`Self::walls`] with the absorber states of `state` in place of the scene's.
-    pub fn walls_after(&self, state: &Particles, time: f64) -> Bounds {
-        self.walls_by(&self.absorbers_in(state), time)
-    }
-
-    fn walls_by(&self, absorbers: &AbsorberStates, time: f64) -> Bounds {
+    pub fn walls(&self, absorbers: &AbsorberStates, time: f64) -> Bounds {
         let (mut min, mut max) = (DVec3::ZERO, self.domain.size());
         for axis in (0..3).filter(|&axis| self.periodic[axis]) {
             (min[axis], max[axis]) = (-FAR, FAR);
         }
-        for (maker, absorber) in self.wave_makers.iter().zip(absorbers) {
-            let inward = maker.displacement(absorber.as_ref(), time);
+        for (maker, absorber) in self.makers(absorbers) {
+            let inward = maker.displacement(absorber, time);
             if maker.wall.is_max {
                 max[maker.wall.axis] -= inward;
             } else {
@@ -85,8 +76,8 @@ impl Scene {
 
     /// Returns the mean velocity of each face over the `step` seconds before `time`, along its
     /// axis, m/s; 0 if `step` is 0.
-    pub fn wall_velocity(&self, time: f64, step: f64) -> Bounds {
-        let (before, after) = (self.walls(time - step), self.walls(time));
+    pub fn wall_velocity(&self, absorbers: &AbsorberStates, time: f64, step: f64) -> Bounds {
+        let [before, after] = [time - step, time].map(|time| self.walls(absorbers, time));
         let speed = |after: DVec3, before: DVec3| match step {
             0.0 => DVec3::ZERO,
             step => (after - before) / step,
@@ -178,13 +169,18 @@ impl PbfScene {
     ///
     /// # Errors
     /// If there are more than `max_substeps`.
-    pub fn pbf_substeps(&self, frame: u32, speed: f64) -> Result<u32, Breach> {
+    pub fn pbf_substeps(
+        &self,
+        absorbers: &AbsorberStates,
+        frame: u32,
+        speed: f64,
+    ) -> Result<u32, Breach> {
         let pbf = self.settings();
         let length = self.shot.frame_seconds();
         let start = f64::from(frame) * length;
         let wall = self
-            .makers()
-            .map(|(maker, answer)| maker.peak_speed(answer, start, start + length));
+            .makers(absorbers)
+            .map(|(maker, absorber)| maker.peak_speed(absorber, start, start + length));
         let gained = self.water.gravity.length() * length + self.effects.push().gained(length);
         let solids = self.moving_solids.iter();
         let solids = solids.map(|solid| solid.peak_speed(start, start + length));
@@ -215,6 +211,7 @@ impl FlipScene {
     /// If the frame has more than `max_substeps`.
     pub fn flip_substep(
         &self,
+        absorbers: &AbsorberStates,
         frame: u32,
         start: f64,
         remaining: f64,
@@ -222,7 +219,7 @@ impl FlipScene {
         (done, before): (u32, f64),
     ) -> Result<(f64, Substep), Breach> {
         let flip = self.settings();
-        let fastest = speed.max(self.peak_boundary_speed(start, start + remaining));
+        let fastest = speed.max(self.peak_boundary_speed(absorbers, start, start + remaining));
         let (gravity, push) = (self.water.gravity.length(), self.effects.push());
         // Solves v t + g t² = cfl Δx.
         let room = flip.cfl * flip.cell_size;

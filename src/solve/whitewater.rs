@@ -268,12 +268,17 @@ impl Whitewater {
         if is_other_count(&self.scene, self.plan.counts.particles, water)? {
             self.resize(n)?;
         }
-        self.scene.take_absorbers(water);
         let local = local(&self.scene, &water.position);
         self.program.upload(CORRECTED, 0, &local);
         self.program.upload(VELOCITY, 0, &water.velocity);
         self.program.upload(ID, 0, &water.id);
-        let mut params = params(&self.scene, &self.calibration, &self.plan, time, seconds);
+        let mut params = params(
+            &self.scene,
+            &self.calibration,
+            &self.plan,
+            &water.walls,
+            (time, seconds),
+        );
         // Whitewater falls under gravity, however the water's own solver applies it.
         params.velocity_step = (self.scene.water.gravity * seconds).as_vec3().to_array();
         self.program.upload(PARAMS, 0, &[params]);

@@ -249,7 +249,7 @@ fn check_walls(
     scene: &Scene,
     particles: &Particles,
 ) -> Result<(), BranchError> {
-    let walls = scene.walls_after(particles, clock.time);
+    let walls = scene.walls(&particles.walls, clock.time);
     let corner = scene.domain.min;
     // Along periodic axes there are no walls nearby, and particles have to lie in the domain.
     let room = Bounds {

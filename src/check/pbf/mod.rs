@@ -106,8 +106,8 @@ pub fn check(
 ) -> Result<Checked, SolveError> {
     let mut solver = Pbf::new(context, scene, plan.clone(), uploaded, false)?;
     solver.load(frame, particles)?;
-    let scene = &scene.after(particles);
-    let substeps = scene.pbf_substeps(frame, particles.max_speed())?;
+    let absorbers = &particles.walls;
+    let substeps = scene.pbf_substeps(absorbers, frame, particles.max_speed())?;
     let length = scene.shot.frame_seconds();
     let time_step = length / f64::from(substeps);
     let number = match which {
@@ -120,7 +120,7 @@ pub fn check(
     let mut engine = Engine::new(PbfState {
         model,
         has_samples: false,
-        substep: Substep::new(scene, end, time_step),
+        substep: Substep::new(scene, absorbers, end, time_step),
         lists: Lists::new(&plan),
         whole: Whole::default(),
         is_over: false,
@@ -128,7 +128,7 @@ pub fn check(
         plan,
     });
     let mut of_grid = scene.of_projection().map(|grid| {
-        let mut state = FlipState::new(&grid, boundary, (frame, particles.len()));
+        let mut state = FlipState::new(&grid, boundary, (frame, particles));
         let before = if number > 1 {
             time_step
         } else {

@@ -88,7 +88,7 @@ impl<'a> View<'a> {
 
     /// Current faces of the box including wave makers, in the coordinates of the particles.
     pub(super) fn walls(&self) -> Bounds {
-        let walls = self.scene.walls_after(&self.state, self.time());
+        let walls = self.scene.walls(&self.state.walls, self.time());
         let origin = self.scene.domain.min;
         Bounds {
             min: origin + walls.min,

@@ -6,6 +6,7 @@ use super::solids::Solid;
 pub(super) use swell_domain::flip::ON_FACE;
 use swell_domain::flip::open_extent;
 use swell_domain::{
+    absorber::AbsorberStates,
     boundary::Boundary,
     bounds::Bounds,
     bricks::{Bricks, EDGE, table_dims},
@@ -145,15 +146,15 @@ impl Model {
         Bricks::periodic(cells, periodic, &is_wet, reach, 1)
     }
 
-    /// Returns the parameters of `substep`.
-    pub fn step(&self, substep: &Substep) -> Step<'_> {
+    /// Returns the parameters of `substep`, in which absorbing walls have these states.
+    pub fn step(&self, substep: &Substep, absorbers: &AbsorberStates) -> Step<'_> {
         let Substep {
             start,
             length,
             kick,
             ..
         } = *substep;
-        let (before, after) = (self.scene.walls(start), self.scene.walls(start + length));
+        let [before, after] = [start, start + length].map(|time| self.scene.walls(absorbers, time));
         Step {
             start,
             length,

@@ -167,7 +167,7 @@ pub fn distance_to_converged(
 ) -> Result<f64, ReferenceError> {
     let mut model = Model::new(scene, boundary);
     let time = f64::from(frame) * scene.shot.frame_seconds();
-    let substep = Substep::new(scene, time, 0.0);
+    let substep = Substep::new(scene, &state.walls, time, 0.0);
     model.stand(scene, time, 0.0);
     let position = local(scene, state);
     let solved = converged(&model, &substep, &position, tolerance)?;

@@ -4,6 +4,7 @@ use glam::DVec3;
 
 use crate::neighbors::Cells;
 use swell_domain::{
+    absorber::AbsorberStates,
     boundary::Boundary,
     bounds::Bounds,
     pbf::{CAP, CONTACT, MAX_CORRECTION, REGULARIZATION},
@@ -101,13 +102,14 @@ pub struct Substep {
 }
 
 impl Substep {
-    /// Creates a substep that ends at `time` and is `time_step` long, seconds.
-    pub fn new(scene: &Scene, time: f64, time_step: f64) -> Self {
+    /// Creates a substep that ends at `time` and is `time_step` long, seconds, and in which absorbing
+    /// walls have these states.
+    pub fn new(scene: &Scene, absorbers: &AbsorberStates, time: f64, time_step: f64) -> Self {
         Self {
             time,
             time_step,
-            walls: scene.walls(time),
-            wall_velocity: scene.wall_velocity(time, time_step),
+            walls: scene.walls(absorbers, time),
+            wall_velocity: scene.wall_velocity(absorbers, time, time_step),
         }
     }
 

@@ -84,7 +84,13 @@ impl Flip {
             ..self.plan.counts
         })?;
         let frame = whole_frame(&self.scene);
-        let params = step::params(&self.scene, &self.plan, &self.bricks, &frame);
+        let params = step::params(
+            &self.scene,
+            &self.plan,
+            &self.state.walls,
+            &self.bricks,
+            &frame,
+        );
         self.program.upload(PARAMS, 0, &[params]);
         Ok(())
     }

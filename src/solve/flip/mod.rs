@@ -100,13 +100,15 @@ impl Flip {
         upload_constants(&program, &plan, scene);
         let bricks = bricks(scene, plan.grid_dims, &no_water(scene, plan.grid_dims), 0);
         let frame = whole_frame(scene);
-        program.upload(PARAMS, 0, &[step::params(scene, &plan, &bricks, &frame)]);
+        let state = Particles::default();
+        let params = step::params(scene, &plan, &state.walls, &bricks, &frame);
+        program.upload(PARAMS, 0, &[params]);
         Ok(Self {
             recordings: recordings(&program, &plan, scene),
             pressure: pressure_solver(scene, &plan),
             timer: is_timed.then(|| Timer::new(context)),
             bricks,
-            cut: step::cut(scene, &frame),
+            cut: step::cut(scene, &state.walls, &frame),
             kick: frame.kick,
             program,
             plan,
@@ -114,7 +116,7 @@ impl Flip {
             movers: Movers::of(boundary, scene),
             shores: Shores::new(boundary, scene.domain.min, scene.settings().cell_size)
                 .joined(scene.periodic),
-            state: Particles::default(),
+            state,
             frame: 0,
         })
     }
@@ -187,6 +189,7 @@ impl Flip {
         }
         let frame = self.frame + 1;
         let chosen = (self.scene).flip_substep(
+            &self.state.walls,
             frame,
             start,
             remaining,
@@ -200,7 +203,7 @@ impl Flip {
     /// water.
     fn with_shores(&self, is_wet: &[bool], substep: &Substep) -> Vec<bool> {
         let size = self.scene.settings().cell_size;
-        let cut = step::cut(&self.scene, substep);
+        let cut = step::cut(&self.scene, &self.state.walls, substep);
         let moving = self.scene.moving_solids.iter();
         let least = self.scene.domain.min;
         let pose = |solid: &MovingSolid| solid.pose(substep.start).moved(-least).scaled(1.0 / size);
@@ -225,9 +228,9 @@ impl Flip {
             })?;
         }
         let bricks = &self.bricks;
-        let params = step::params(&self.scene, &self.plan, bricks, substep);
+        let params = step::params(&self.scene, &self.plan, &self.state.walls, bricks, substep);
         let groups = groups(&self.program, &self.scene, &params, layers);
-        self.cut = step::cut(&self.scene, substep);
+        self.cut = step::cut(&self.scene, &self.state.walls, substep);
         self.kick = substep.kick;
         self.program.upload(PARAMS, 0, &[params]);
         (self.program).upload(BRICKS, 0, bytemuck::cast_slice(&bricks.records));
@@ -387,7 +390,7 @@ impl Flip {
 
     /// Copies the state of absorbing walls from `state`.
     pub(crate) fn take_absorbers(&mut self, state: &Particles) {
-        self.scene.take_absorbers(state);
+        self.state.walls = state.walls;
     }
 
     /// Surveys the particles and chooses the next substep; also returns whether it is the frame's
@@ -472,7 +475,6 @@ impl Solver for Flip {
         }
         self.state = particles.clone();
         self.frame = frame;
-        self.scene.take_absorbers(particles);
         self.upload_state();
         Ok(())
     }

@@ -5,6 +5,7 @@ use crate::{
     plan::Plan,
 };
 use swell_domain::{
+    absorber::AbsorberStates,
     bounds::Bounds,
     bricks::{Bricks, CELLS, table_dims},
     flip::{CAP, CONTACT, stored_cells},
@@ -12,8 +13,11 @@ use swell_domain::{
 use swell_scene::{FlipScene, step::Substep};
 
 /// Returns the walls that cut a substep's cells, in cells.
-pub(super) fn cut(scene: &FlipScene, step: &Substep) -> Bounds {
-    let (walls, size) = (scene.walls(step.start), scene.settings().cell_size);
+pub(super) fn cut(scene: &FlipScene, absorbers: &AbsorberStates, step: &Substep) -> Bounds {
+    let (walls, size) = (
+        scene.walls(absorbers, step.start),
+        scene.settings().cell_size,
+    );
     Bounds {
         min: walls.min / size,
         max: walls.max / size,
@@ -23,13 +27,14 @@ pub(super) fn cut(scene: &FlipScene, step: &Substep) -> Bounds {
 pub(super) fn params(
     scene: &FlipScene,
     plan: &Plan,
+    absorbers: &AbsorberStates,
     bricks: &Bricks,
     step: &Substep,
 ) -> FlipParams {
     let flip = scene.settings();
-    let after = scene.walls(step.start + step.length);
-    let cut = cut(scene, step);
-    let speed = scene.wall_velocity(step.start + step.length, step.length);
+    let after = scene.walls(absorbers, step.start + step.length);
+    let cut = cut(scene, absorbers, step);
+    let speed = scene.wall_velocity(absorbers, step.start + step.length, step.length);
     FlipParams {
         wall_min: after.min.as_vec3().to_array(),
         particle_count: plan.counts.particles as u32,

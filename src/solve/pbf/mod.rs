@@ -9,6 +9,7 @@ pub(super) mod record;
 use glam::{DVec3, Vec3};
 
 use swell_domain::{
+    absorber::AbsorberStates,
     boundary::Boundary,
     budget::Breach,
     particles::Particles,
@@ -71,12 +72,12 @@ pub(super) fn params(
     scene: &PbfScene,
     calibration: &Calibration,
     plan: &Plan,
-    time: f64,
-    step: f64,
+    absorbers: &AbsorberStates,
+    (time, step): (f64, f64),
 ) -> Params {
     let pbf = scene.settings();
-    let walls = scene.walls(time);
-    let wall_velocity = scene.wall_velocity(time, step);
+    let walls = scene.walls(absorbers, time);
+    let wall_velocity = scene.wall_velocity(absorbers, time, step);
     let Period(period) = scene.period();
     let natural_lambda = 1.0 / calibration.bulk_gradient_squares;
     Params {
@@ -236,7 +237,14 @@ impl Pbf {
     }
 
     fn params(&self, time: f64, step: f64) -> Params {
-        params(&self.scene, &self.calibration, &self.plan, time, step)
+        let (scene, absorbers) = (&self.scene, &self.state.walls);
+        params(
+            scene,
+            &self.calibration,
+            &self.plan,
+            absorbers,
+            (time, step),
+        )
     }
 
     /// Resets the counters and sums of a frame.
@@ -307,7 +315,8 @@ impl Pbf {
 
     /// Returns the number of substeps in the next frame.
     fn substeps(&self) -> Result<u32, SolveError> {
-        let substeps = (self.scene).pbf_substeps(self.frame, self.state.max_speed())?;
+        let substeps =
+            (self.scene).pbf_substeps(&self.state.walls, self.frame, self.state.max_speed())?;
         Ok(substeps)
     }
 
@@ -408,7 +417,6 @@ impl Solver for Pbf {
         }
         self.state = particles.clone();
         self.frame = frame;
-        self.scene.take_absorbers(particles);
         upload(&self.program, &self.scene, &self.state);
         match &mut self.grid {
             Some(grid) => grid.load(frame, particles),

@@ -250,7 +250,7 @@ fn squeezed(count: usize) -> (Scene, Particles) {
 
 fn sorted(scene: &Scene, particles: &Particles) -> (Model, Substep, Sorted) {
     let model = Model::new(&scene.with_pbf().unwrap(), &Boundary::default());
-    let substep = Substep::new(scene, 0.0, 0.0);
+    let substep = Substep::new(scene, &particles.walls, 0.0, 0.0);
     let position = local(scene, particles);
     let sorted = Sorted::new(&model, &position, &particles.id, &mut Timings::default());
     (model, substep, sorted)

@@ -215,7 +215,7 @@ fn bulk(test: impl Fn(passes::Inputs<'_>, usize, DVec3)) {
     let scene = scene([2.0; 3]);
     let particles = lattice([0.5; 3], [9; 3], [D; 3]);
     let model = Model::new(&scene.with_pbf().unwrap(), &Boundary::default());
-    let substep = Substep::new(&scene, 0.01, 0.01);
+    let substep = Substep::new(&scene, &Default::default(), 0.01, 0.01);
     let places = local(&scene, &particles);
     let sorted = Sorted::new(&model, &places, &particles.id, &mut Timings::default());
     let middle = sorted
@@ -272,7 +272,7 @@ fn grid_vorticity_and_its_confinement_are_fedkiws() {
     let trace = traced(&scene, &particles, 0.01);
     let reference = FlipReference::new(&scene.with_flip().unwrap(), &Boundary::default());
     let model = reference.model();
-    let step = model.step(&step_of(0.01, 1.0));
+    let step = model.step(&step_of(0.01, 1.0), &Default::default());
     let spin = DVec3::new(0.5, -1.0, 2.0);
     let center = DVec3::splat(0.6);
     let elements = trace.faces.velocity.len() as u32;
@@ -383,7 +383,7 @@ fn substeps_move_by_at_most_twice_the_cfl() {
         scene.water.gravity = DVec3::ZERO;
         pbf_of(&mut scene).cfl = cfl;
         let model = Model::new(&scene.with_pbf().unwrap(), &Boundary::default());
-        let substep = Substep::new(&scene, 0.01, 0.01);
+        let substep = Substep::new(&scene, &Default::default(), 0.01, 0.01);
         let (start, fast) = (DVec3::splat(0.8), DVec3::new(30.0, 0.0, 0.0));
         let (x, v) = passes::predict(&model, &substep, start, fast);
         close((x - start).x, 2.0 * cfl * D, 1e-12, "predicted");

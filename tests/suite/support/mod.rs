@@ -59,7 +59,6 @@ pub fn scene(size: [f64; 3]) -> Scene {
         solids: Vec::new(),
         moving_solids: Vec::new(),
         wave_makers: Vec::new(),
-        absorbers: Default::default(),
         emitters: Vec::new(),
         drains: Vec::new(),
         solver: SolverSettings::Pbf(Settings {

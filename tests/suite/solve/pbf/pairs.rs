@@ -252,7 +252,7 @@ fn lambda_is_summed_over_the_corrections() {
     assert!(single.iter().fold(0.0, |most: f64, l| most.max(l.abs())) > 0.02 * largest);
 
     let model = Model::new(&scene.with_pbf().unwrap(), &Boundary::default());
-    let substep = Substep::new(&scene, 0.01, 0.01);
+    let substep = Substep::new(&scene, &Default::default(), 0.01, 0.01);
     let mut timings = Timings::default();
     let mut sorted = Sorted::new(
         &model,
