@@ -31,7 +31,7 @@ static NEVER: AtomicBool = AtomicBool::new(false);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn bake(scene: &Scene) -> Bake<'_> {
-    let solver = scene.solver.method.name();
+    let solver = scene.solver.method().name();
     Bake {
         request: bake::Request {
             scene: scene.clone(),

@@ -15,7 +15,7 @@ use swell_domain::{
 };
 use swell_gpu::adapter::Context;
 use swell_reference::whitewater::{Moved, Neighbor, Surveyed, Water, White};
-use swell_scene::Scene;
+use swell_scene::PbfScene;
 use swell_solve::{
     SolveError,
     whitewater::{SHARE, SURFACE_AT, Whitewater},
@@ -83,7 +83,7 @@ entries! {
 #[derive(Clone, Copy, Debug)]
 pub struct Frame<'a> {
     /// [`Scene::of_whitewater`] of the baked scene.
-    pub scene: &'a Scene,
+    pub scene: &'a PbfScene,
     /// Solids of the scene.
     pub boundary: &'a Boundary,
     /// Settings of the whitewater stream.

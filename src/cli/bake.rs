@@ -123,7 +123,7 @@ fn load_lengthened(args: &BakeArgs) -> Result<Scene, SceneError> {
 pub(super) fn run(args: &BakeArgs, progress: &Progress) -> Result<u8, Failure> {
     let device = args.device.read()?;
     let scene = load_lengthened(args)?;
-    let method = scene.solver.method.name();
+    let method = scene.solver.method().name();
     let root = || set_variable("SWELL_CACHE").map_or_else(|| PathBuf::from("cache"), PathBuf::from);
     let default = || root().join(&scene.shot.name).join(method);
     let request = Request {

@@ -271,7 +271,7 @@ fn show_plan(out: &mut String, planned: &ScenePlan<'_>) -> fmt::Result {
         shot.name,
         shot.frames,
         shot.frames_per_second,
-        scene.solver.method.name()
+        scene.solver.method().name()
     )?;
     for warning in &bake.warnings {
         writeln!(out, "warning: {warning}")?;
@@ -345,7 +345,7 @@ fn show_plan(out: &mut String, planned: &ScenePlan<'_>) -> fmt::Result {
 fn show_arrangement(out: &mut String, planned: &ScenePlan<'_>) -> fmt::Result {
     let plan = &planned.plan;
     match (
-        planned.bake.scene.solver.method,
+        planned.bake.scene.solver.method(),
         plan.has_lists,
         plan.chunks.len(),
     ) {

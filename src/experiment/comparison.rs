@@ -46,7 +46,7 @@ impl Kind for SolverComparison {
 
     fn run(&self, bench: &mut Bench<'_>) -> Result<Option<Report>, StudyError> {
         for scene in &self.scenes {
-            bench.tell(Event::Solver(scene.solver.method.name()));
+            bench.tell(Event::Solver(scene.solver.method().name()));
             bake_and_render(self, bench, scene)?;
         }
         let request = bench.request;
@@ -115,12 +115,12 @@ fn cache_directory(request: &Request, scene: &Scene) -> PathBuf {
     request
         .directory
         .join("cache")
-        .join(scene.solver.method.name())
+        .join(scene.solver.method().name())
 }
 
 fn picture_directory(request: &Request, scene: &Scene) -> PathBuf {
     let pictures = request.directory.join("pictures");
-    pictures.join(scene.solver.method.name())
+    pictures.join(scene.solver.method().name())
 }
 
 /// Distance along the wave's path to the first obstacle, a solid or the far wall, less the gauge's
@@ -280,7 +280,7 @@ fn pictures(
         columns: comparison
             .scenes
             .iter()
-            .map(|scene| scene.solver.method.name().to_owned())
+            .map(|scene| scene.solver.method().name().to_owned())
             .collect(),
         rows: comparison
             .pictures

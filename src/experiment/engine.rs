@@ -17,7 +17,7 @@ use serde::{Serialize, de::DeserializeOwned};
 use swell_domain::chunk::Chunk;
 use swell_files::{physics_hash, study::RunsOn};
 use swell_gpu::adapter::{GpuError, Needs};
-use swell_scene::{Method, Scene};
+use swell_scene::Scene;
 use swell_stage::{
     device::{Gpu, Opened, needs},
     drive::{Drive, End, Step},
@@ -120,11 +120,7 @@ impl Devices {
     /// program.
     pub(super) fn key(&self, runs: &[(&Scene, RunsOn)], frames: u32, measured: &str) -> Key {
         let of = |(scene, device): &(&Scene, RunsOn)| {
-            let solver = &scene.solver;
-            let most = match solver.method {
-                Method::Pbf => solver.pbf().max_substeps,
-                Method::Flip => solver.flip().max_substeps,
-            };
+            let most = scene.solver.max_substeps();
             let (physics, identity) = (physics_hash(scene), self.of(*device).identity());
             format!(
                 "{physics} {most} {:?} {:?} {identity}",

@@ -85,13 +85,16 @@ impl<'de> Deserialize<'de> for Limit {
     }
 }
 
-/// Speeds that a scene causes by itself, m/s, and its particle spacing, metres.
+/// Speeds that a scene causes by itself, m/s, its particle spacing, metres, and the tolerance of its
+/// pressure solve.
 pub(super) struct Scales {
     pub(super) fall: f64,
     pub(super) push: f64,
     /// Wind and other effects whose work is not counted.
     pub(super) wind: f64,
     pub(super) spacing: f64,
+    /// Of FLIP's settings, chosen or not; 0 without them.
+    pub(super) tolerance: f64,
 }
 
 /// Builds the limits for the chosen solver.
@@ -102,15 +105,15 @@ pub(super) fn build(
     solver: &Solver,
     scales: &Scales,
 ) -> Result<Budget, SceneError> {
-    let tolerance = (solver.flip.as_ref()).map_or(0.0, |flip| flip.pressure.tolerance);
+    let tolerance = scales.tolerance;
     let slowest = LEAST_SPEED * scales.spacing * shot.frames_per_second;
     let speed = (SPEED * (scales.fall + scales.push + scales.wind)).max(slowest);
-    let energy = match solver.method {
+    let energy = match solver.method() {
         Method::Pbf => PBF_ENERGY,
         Method::Flip => FLIP_ENERGY,
     };
     let energy = (scales.wind == 0.0).then_some(energy);
-    let of_flip = |limit: f64| (solver.method == Method::Flip).then_some(limit);
+    let of_flip = |limit: f64| (solver.method() == Method::Flip).then_some(limit);
     let residual = match spec.residual {
         Some(Limit(Some(limit))) if limit < tolerance => {
             let problem = format!("{} is out of range", shown(limit));

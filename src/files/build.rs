@@ -16,18 +16,18 @@ use super::{
     wave_maker,
 };
 use swell_domain::{
-    absorber::AbsorberStates,
     bounds::Bounds,
     mesh_file::{self, Digits, Loaded, MeshFormat},
     sampling,
 };
 use swell_scene::{
-    Method, PlacedMesh, Placement, Scene, SceneError, Swarm, Water,
+    PlacedMesh, Placement, Scene, SceneError, Solver, Swarm, Water,
     moving_solid::{MAX_MOVING_SOLIDS, MovingSolid},
     origin, projection,
     words::{chain, extent, shown, shown_all},
 };
 
+use solver::Solvers;
 pub(super) use solver::{CHEBYSHEV_RELAXATION, RELAXATION};
 
 /// Largest number of particles of a scene: ids have 32 bits, and 2²⁷ particles of 200
@@ -56,11 +56,15 @@ struct Lattice {
 pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Result<Scene> {
     let shot = spec.shot;
     let domain = domain(doc, &spec.domain)?;
-    let (solver, lattice) = solver::solver(doc, spec.solver, &domain)?;
+    let Solvers {
+        chosen: solver,
+        unchosen,
+        lattice,
+    } = solver::solvers(doc, spec.solver, &domain)?;
     let periodic = periodic::read(doc, &spec.domain.periodic)?;
     periodic::check_solver(doc, periodic, &domain, &solver)?;
     let between = spec.effects.act_between_projections();
-    let no_slip = no_slip::build(doc, &spec.domain, (solver.method, between), periodic)?;
+    let no_slip = no_slip::build(doc, &spec.domain, (solver.method(), between), periodic)?;
     let water = water(doc, base_dir, &spec.water, &domain, &lattice)?;
     periodic::check_gravity(doc, periodic, water.gravity)?;
     let around = wave_maker::Surroundings {
@@ -96,7 +100,7 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
         wave_makers: &wave_makers,
         gravity: water.gravity,
         least_length: 2.0 * lattice.spacing,
-        has_projection: solver.method == Method::Flip || solver.pbf().grid_projection,
+        has_projection: solver.pbf().is_none_or(|pbf| pbf.grid_projection),
     };
     effects::check(&spec.effects, doc, &around)?;
     let grids = match &spec.grids {
@@ -120,11 +124,13 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
         .iter()
         .map(|maker| maker.motion.peak_speed(0.0, duration)))
     .chain((moving_solids.iter()).map(|solid| solid.peak_speed(0.0, duration)));
+    let flip = solver.flip().or(unchosen.as_ref().and_then(Solver::flip));
     let scales = budget::Scales {
         fall: (2.0 * water.gravity.length() * domain.size().length()).sqrt(),
         push: speeds.fold(0.0, f64::max),
         wind: spec.effects.push().speed + spec.effects.frees(projection::grain(&water, &solver)),
         spacing: lattice.spacing,
+        tolerance: flip.map_or(0.0, |flip| flip.pressure.tolerance),
     };
     let budget = budget::build(doc, &spec.budget, &shot, &solver, &scales)?;
     let scene = Scene {
@@ -140,13 +146,13 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
         emitters,
         drains,
         solver,
+        unchosen,
         grids,
         keep: kept.map(|it| it.particles),
         compression: kept.and_then(|it| it.compression),
         probes,
         budget,
         effects: spec.effects,
-        absorbers: AbsorberStates::default(),
     };
     Ok(scene.into_local())
 }

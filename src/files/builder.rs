@@ -215,7 +215,10 @@ mod tests {
             (scene.shot.frames, scene.shot.frames_per_second),
             (48, 25.0)
         );
-        assert_eq!((scene.solver.flip().cfl, scene.probes.len()), (1.5, 1));
+        assert_eq!(
+            (scene.solver.flip().expect("FLIP").cfl, scene.probes.len()),
+            (1.5, 1)
+        );
     }
 
     #[test]

@@ -7,7 +7,7 @@ use swell_domain::{
     sparse_grid::{EDGE, Precision},
     surface::{MAX_BRICKS, Raster},
 };
-use swell_scene::{Method, SceneError, Solver, grids::Grids, words::shown};
+use swell_scene::{SceneError, Solver, grids::Grids, words::shown};
 
 use super::document::Document;
 
@@ -27,17 +27,10 @@ pub(super) fn build(
     domain: &Bounds,
     solver: &Solver,
 ) -> Result<Grids, SceneError> {
-    let (spacing, cell_size) = match solver.method {
-        Method::Pbf => {
-            let spacing = solver.pbf().particle_spacing;
-            (spacing, 2.0 * spacing)
-        }
-        Method::Flip => (solver.flip().particle_spacing(), solver.flip().cell_size),
-    };
     if let Some(size) = spec.voxel_size {
         let bricks = (domain.size() / (size * f64::from(EDGE))).ceil();
         let fits = bricks.element_product() <= MAX_BRICKS;
-        if !(Raster::VOXEL_RATIO.contains(&(size / spacing)) && fits) {
+        if !(Raster::VOXEL_RATIO.contains(&(size / solver.particle_spacing())) && fits) {
             let problem = format!("{} is out of range", shown(size));
             return Err(doc.fault_of("grids.voxel_size", problem));
         }
@@ -49,7 +42,7 @@ pub(super) fn build(
     Ok(Grids {
         surface: spec.surface,
         velocity: spec.velocity,
-        voxel_size: spec.voxel_size.unwrap_or(cell_size),
+        voxel_size: spec.voxel_size.unwrap_or(solver.cell_size()),
         precision: spec.precision,
     })
 }

@@ -5,7 +5,7 @@ use glam::DVec3;
 use super::{axis::Axis, document::Document};
 use swell_domain::{bounds::Bounds, bricks::EDGE};
 use swell_scene::{
-    Method, SceneError, Solver, WaveMaker,
+    SceneError, Solver, WaveMaker,
     moving_solid::MovingSolid,
     projection::PROJECTION_CELL,
     words::{shown, shown_all},
@@ -49,9 +49,9 @@ pub(super) fn check_solver(
             let period = format!("the period along {} is {} m", axis.name(), shown(length));
             Err(doc.fault_of_plain(KEY, format!("{period}: {problem}")))
         };
-        match solver.method {
-            Method::Flip => {
-                let (size, edge) = (solver.flip().cell_size, f64::from(EDGE));
+        match solver {
+            Solver::Flip(flip) => {
+                let (size, edge) = (flip.cell_size, f64::from(EDGE));
                 if !is_whole(length / size / edge, edge) {
                     return refuse(format!(
                         "{:.3} cells of {} m, and FLIP asks for a multiple of {EDGE} of them",
@@ -60,8 +60,8 @@ pub(super) fn check_solver(
                     ));
                 }
             }
-            Method::Pbf => {
-                let spacing = solver.pbf().particle_spacing;
+            Solver::Pbf(pbf) => {
+                let spacing = pbf.particle_spacing;
                 if !is_whole(length / spacing, 1.0) {
                     return refuse(format!(
                         "{:.3} particle spacings of {} m, and PBF asks for a whole number",
@@ -69,7 +69,7 @@ pub(super) fn check_solver(
                         shown(spacing)
                     ));
                 }
-                let support = spacing * solver.pbf().support_ratio;
+                let support = spacing * pbf.support_ratio;
                 if length / support < LEAST_CELLS * (1.0 - ROUNDING) {
                     return refuse(format!(
                         "{:.3} support radii of {} m, and PBF asks for at least {LEAST_CELLS}",
@@ -78,7 +78,7 @@ pub(super) fn check_solver(
                     ));
                 }
                 let (cell, edge) = (PROJECTION_CELL * spacing, f64::from(EDGE));
-                if solver.pbf().grid_projection && !is_whole(length / cell / edge, edge) {
+                if pbf.grid_projection && !is_whole(length / cell / edge, edge) {
                     return refuse(format!(
                         "{:.3} particle spacings of {} m, and PBF with grid_projection asks for a \
                          multiple of {} (without, for a whole number)",

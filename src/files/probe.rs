@@ -244,7 +244,7 @@ fn force(
 
 /// PBF's pressure is defined at particles, not on faces.
 fn why_no_force(solver: &Solver) -> Option<String> {
-    (solver.method == Method::Pbf).then(|| {
+    (solver.method() == Method::Pbf).then(|| {
         "solver pbf has no pressure on faces that a force could be summed from; choose \
          solver.method = \"flip\""
             .to_owned()
@@ -256,17 +256,13 @@ fn why_not_so_often(rate: Rate, shot: &Shot, solver: &Solver) -> Option<String> 
     let Rate::Hertz(rate) = rate else {
         return None;
     };
-    let most = match solver.method {
-        Method::Pbf => solver.pbf().max_substeps,
-        Method::Flip => solver.flip().max_substeps,
-    };
-    let highest = shot.frames_per_second * f64::from(most);
+    let highest = shot.frames_per_second * f64::from(solver.max_substeps());
     let is_possible = LEAST_RATE <= rate && rate <= highest;
     (!is_possible).then(|| {
         format!(
             "{rate} a second; from {LEAST_RATE} to {highest} are possible: shot.frames_per_second \
              × solver.{}.max_substeps",
-            solver.method.name()
+            solver.method().name()
         )
     })
 }
@@ -277,10 +273,7 @@ const LEAST_RATE: f64 = 1e-3;
 /// PBF's pressure is the sum of its multipliers λ, which is complete only if all
 /// corrections derive from λ.
 fn why_no_pressure(solver: &Solver) -> Option<String> {
-    if solver.method != Method::Pbf {
-        return None;
-    }
-    let pbf = solver.pbf();
+    let pbf = solver.pbf()?;
     if pbf.grid_projection {
         return None;
     }
@@ -299,11 +292,8 @@ fn why_no_pressure(solver: &Solver) -> Option<String> {
 /// The volume is counted on voxels of one spacing; their bricks are addressed by a
 /// table over the water.
 fn why_no_volume(domain: &Bounds, solver: &Solver) -> Option<String> {
-    let spacing = match solver.method {
-        Method::Pbf => solver.pbf().particle_spacing,
-        Method::Flip => solver.flip().particle_spacing(),
-    };
-    let bricks = (domain.size() / (spacing * f64::from(EDGE))).ceil();
+    let brick = solver.particle_spacing() * f64::from(EDGE);
+    let bricks = (domain.size() / brick).ceil();
     let is_too_large = bricks.element_product() > MAX_BRICKS;
     is_too_large.then(|| {
         format!("the domain has more than {MAX_BRICKS} bricks of {EDGE}³ particle spacings")

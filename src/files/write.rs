@@ -19,7 +19,7 @@ use swell_domain::{
     probe::Rate,
 };
 use swell_scene::{
-    Budget, Iteration, Pbf, PlacedMesh, Scene, Stop,
+    Budget, Iteration, Pbf, PlacedMesh, Scene, Solver, Stop,
     probe::{Probe, ProbeKind},
 };
 
@@ -139,12 +139,16 @@ fn written_water(scene: &Scene, mesh_path: &dyn Fn(&Path, &str) -> String) -> Ta
 }
 
 fn written_solver(scene: &Scene) -> Table {
-    let mut solver = table([("method", value(&scene.solver.method))]);
-    if let Some(settings) = &scene.solver.pbf {
-        solver.insert("pbf".to_owned(), Value::Table(pbf(settings)));
-    }
-    if let Some(settings) = &scene.solver.flip {
-        solver.insert("flip".to_owned(), value(settings));
+    let mut solver = table([("method", value(&scene.solver.method()))]);
+    for settings in [Some(&scene.solver), scene.unchosen.as_ref()]
+        .into_iter()
+        .flatten()
+    {
+        let rows = match settings {
+            Solver::Pbf(settings) => Value::Table(pbf(settings)),
+            Solver::Flip(settings) => value(settings),
+        };
+        solver.insert(settings.method().name().to_owned(), rows);
     }
     solver
 }

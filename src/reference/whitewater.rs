@@ -14,7 +14,7 @@ use swell_domain::{
         AIR_BELOW, FLIGHT_STEPS, HALVINGS, KIND, Kind, OUTWARD, Potentials, SURFACE, Settings,
     },
 };
-use swell_scene::Scene;
+use swell_scene::PbfScene;
 
 use super::{ReferenceError, pbf::Model};
 
@@ -83,7 +83,7 @@ struct Found {
 impl Water {
     /// Takes the water of `scene`, which is [`Scene::of_whitewater`] of the baked scene, at `time`,
     /// seconds.
-    pub fn new(scene: &Scene, boundary: &Boundary, water: &Particles, time: f64) -> Self {
+    pub fn new(scene: &PbfScene, boundary: &Boundary, water: &Particles, time: f64) -> Self {
         let mut model = Model::new(scene, boundary);
         model.stand(scene, time, 0.0);
         let origin = scene.domain.min;
@@ -97,7 +97,7 @@ impl Water {
             starts: model.cells.starts(&points),
             sample_starts: model.cells.starts(&model.samples),
             velocity: order.iter().map(|&k| wide(&water.velocity[k])).collect(),
-            walls: scene.walls_after(water, time),
+            walls: scene.walls(&water.walls, time),
             model,
             points,
             order,
@@ -318,7 +318,7 @@ fn fly(settings: &Settings, gravity: DVec3, seconds: f64, start: DVec3) -> (DVec
 /// Whitewater for the frames of one bake, on the CPU.
 #[derive(Debug)]
 pub struct Whitewater {
-    scene: Scene,
+    scene: PbfScene,
     boundary: Boundary,
     settings: Option<Settings>,
     water: Option<(Water, f64)>,
@@ -327,7 +327,7 @@ pub struct Whitewater {
 impl Whitewater {
     /// Creates whitewater for the water of `scene`, which is [`Scene::of_whitewater`] of the baked
     /// scene.
-    pub fn new(scene: &Scene, boundary: &Boundary) -> Self {
+    pub fn new(scene: &PbfScene, boundary: &Boundary) -> Self {
         Self {
             scene: scene.clone(),
             boundary: boundary.clone(),

@@ -13,13 +13,21 @@ use swell_domain::{
 impl WaveMaker {
     /// Returns the inward displacement from the domain's face at time `t`, metres.
     pub(super) fn displacement(&self, absorber: Option<&AbsorberState>, t: f64) -> f64 {
-        let off = absorber.map_or(0.0, |absorber| absorber.state(t).0);
+        let off = self.absorbing(absorber).map_or(0.0, |it| it.state(t).0);
         self.room() + self.motion.displacement(t) + off
+    }
+
+    /// Returns the state if the wall absorbs; a branch may start from walls that do where its own
+    /// do not.
+    fn absorbing<'a>(&self, absorber: Option<&'a AbsorberState>) -> Option<&'a AbsorberState> {
+        absorber.filter(|_| self.absorption.is_some())
     }
 
     /// Bounds the speed between two times, m/s, including the absorber's motion.
     pub(super) fn peak_speed(&self, absorber: Option<&AbsorberState>, t0: f64, t1: f64) -> f64 {
-        let off = absorber.map_or(0.0, |absorber| absorber.peak_speed(t0, t1));
+        let off = self
+            .absorbing(absorber)
+            .map_or(0.0, |it| it.peak_speed(t0, t1));
         self.motion.peak_speed(t0, t1) + off
     }
 
@@ -36,18 +44,13 @@ impl WaveMaker {
 }
 
 impl Scene {
-    /// Returns the wave makers with their absorber states.
-    pub(super) fn makers(&self) -> impl Iterator<Item = (&WaveMaker, Option<&AbsorberState>)> {
-        let absorbers = self.absorbers.iter().map(Option::as_ref);
+    /// Returns the wave makers with their states of `absorbers`.
+    pub(super) fn makers<'a>(
+        &'a self,
+        absorbers: &'a AbsorberStates,
+    ) -> impl Iterator<Item = (&'a WaveMaker, Option<&'a AbsorberState>)> {
+        let absorbers = absorbers.iter().map(Option::as_ref);
         self.wave_makers.iter().zip(absorbers)
-    }
-
-    /// Returns the scene with the absorber states of `state`.
-    #[must_use]
-    pub fn after(&self, state: &Particles) -> Self {
-        let mut scene = self.clone();
-        scene.take_absorbers(state);
-        scene
     }
 
     /// Maps the absorber states of another scene, wall by wall, to the absorbing walls of this one.
@@ -76,38 +79,21 @@ impl Scene {
         (carried, notes)
     }
 
-    /// Takes over the absorber states of `state`.
-    pub fn take_absorbers(&mut self, state: &Particles) {
-        self.absorbers = self.absorbers_in(state);
-    }
-
-    /// Returns the absorber states in `state` for the walls that absorb in this scene.
-    pub(super) fn absorbers_in(&self, state: &Particles) -> AbsorberStates {
-        let mut absorbers = state.walls;
-        for (k, absorber) in absorbers.iter_mut().enumerate() {
-            let maker = self.wave_makers.get(k);
-            *absorber = absorber.filter(|_| maker.is_some_and(|maker| maker.absorption.is_some()));
-        }
-        absorbers
-    }
-
-    /// Updates the absorber states from the water at the end of `frame`, and stores
-    /// them in `state`.
-    pub fn update_absorbers(&mut self, state: &mut Particles, frame: u32) {
-        self.absorbers = self.absorbers_after(state, self.shot.time(frame));
-        state.walls = self.absorbers;
+    /// Updates the absorber states in `state` from its water, which is that at the end of `frame`.
+    pub fn update_absorbers(&self, state: &mut Particles, frame: u32) {
+        state.walls = self.absorbers_after(state, self.shot.time(frame));
     }
 
     fn absorbers_after(&self, state: &Particles, time: f64) -> AbsorberStates {
         let mut absorbers = AbsorberStates::default();
-        let walls = self.walls(time);
+        let walls = self.walls(&state.walls, time);
         // Along a periodic axis the water ends at the domain.
         let (min, max) = (self.domain.min, self.domain.max);
         let room = Bounds {
             min: (min + walls.min).max(min),
             max: (min + walls.max).min(max),
         };
-        for ((maker, before), absorber) in self.makers().zip(&mut absorbers) {
+        for ((maker, before), absorber) in self.makers(&state.walls).zip(&mut absorbers) {
             let Some(absorption) = &maker.absorption else {
                 continue;
             };
@@ -146,9 +132,7 @@ const AT_THE_END: f64 = 0.99;
 impl Held {
     /// Counts a frame, given the state at its end.
     pub fn add(&mut self, scene: &Scene, state: &Particles) {
-        let absorbers = scene.absorbers_in(state);
-        let makers = scene.wave_makers.iter().zip(&absorbers);
-        for ((maker, absorber), count) in makers.zip(&mut self.0) {
+        for ((maker, absorber), count) in scene.makers(&state.walls).zip(&mut self.0) {
             let off = absorber.map_or(0.0, |absorber| absorber.displacement.abs());
             *count += u32::from(maker.absorption.is_some() && off > AT_THE_END * maker.room());
         }

@@ -2,6 +2,7 @@
 
 use super::{Scene, words::shown};
 use swell_domain::{
+    absorber::AbsorberStates,
     budget::{Breach, Watched},
     solver::StepReport,
 };
@@ -173,11 +174,11 @@ impl Budget {
 impl Scene {
     /// Bounds the speed that gravity, effects and moving boundaries give in frame `frame` to a
     /// particle of `speed`, m/s; at least a tenth of a spacing per frame. What absorbing walls add
-    /// to their own motion is included as far as the scene has their states.
+    /// to their own motion is not included.
     pub fn reached_speed(&self, frame: u32, speed: f64) -> f64 {
         let length = self.shot.frame_seconds();
         let start = f64::from(frame.saturating_sub(1)) * length;
-        let push = self.peak_boundary_speed(start, start + length);
+        let push = self.peak_boundary_speed(&AbsorberStates::default(), start, start + length);
         let least = LEAST_ENERGY_SPEED * self.particle_spacing() / length;
         let gained = self.water.gravity.length() * length + self.effects.push().gained(length);
         (speed + push + gained + self.effects.frees(self.grain())).max(least)

@@ -4,6 +4,7 @@ use glam::DVec3;
 
 use super::{Scene, Wall, probe::Bearer};
 use swell_domain::{
+    absorber::AbsorberStates,
     mesh::TriangleMesh,
     pose::Pose,
     probe::{Patch, patches},
@@ -13,15 +14,15 @@ impl Scene {
     /// Returns the wetted surface of `bearer` at `time` as patches no longer than a cell, relative
     /// to the scene's origin, metres. Patches that face a wall of the domain less than half a cell
     /// away are left out: no water fits between.
-    pub fn patches(&self, bearer: Bearer, time: f64) -> Vec<Patch> {
-        let edge = self.solver.flip().cell_size;
+    pub fn patches(&self, bearer: Bearer, absorbers: &AbsorberStates, time: f64) -> Vec<Patch> {
+        let edge = self.solver.cell_size();
         let (mesh, pose) = match bearer {
             Bearer::Solid(index) => (&self.solids[index].mesh, Pose::START),
             Bearer::MovingSolid(index) => {
                 let solid = &self.moving_solids[index];
                 (&solid.placed.mesh, solid.pose(time))
             }
-            Bearer::Wall(wall) => return patches(&self.face(wall, time), edge),
+            Bearer::Wall(wall) => return patches(&self.face(wall, absorbers, time), edge),
         };
         let meets_water = |patch: &Patch| {
             let outside = patch.at + 0.5 * edge * patch.normal();
@@ -34,8 +35,8 @@ impl Scene {
     }
 
     /// Returns a wall of the domain at `time`, counter-clockwise as seen from inside.
-    fn face(&self, wall: Wall, time: f64) -> TriangleMesh {
-        let walls = self.walls(time);
+    fn face(&self, wall: Wall, absorbers: &AbsorberStates, time: f64) -> TriangleMesh {
+        let walls = self.walls(absorbers, time);
         let at = if wall.is_max { walls.max } else { walls.min }[wall.axis];
         let (u, v) = ((wall.axis + 1) % 3, (wall.axis + 2) % 3);
         let corner = |end_u: usize, end_v: usize| {

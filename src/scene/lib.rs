@@ -25,6 +25,7 @@ mod error;
 mod force;
 mod no_slip;
 mod periodic;
+mod solver;
 mod whitewater;
 
 use std::path::PathBuf;
@@ -32,7 +33,6 @@ use std::path::PathBuf;
 use glam::{DAffine3, DQuat, DVec3};
 
 use swell_domain::{
-    absorber::AbsorberStates,
     absorption::Absorption,
     bounds::Bounds,
     holes::Holes,
@@ -49,6 +49,7 @@ pub use assets::asset_path;
 pub use budget::Budget;
 pub use effects::Effects;
 pub use error::{Fault, LEADS_OUT, Place, SceneError};
+pub use solver::{ByMethod, FlipScene, PbfScene, SceneWith, Solver};
 pub use words::four_digits;
 
 /// A validated scene in SI units: every default is filled in and every referenced file is read.
@@ -79,8 +80,11 @@ pub struct Scene {
     pub emitters: Vec<Emitter<sources::Region>>,
     /// Regions where water leaves during the shot.
     pub drains: Vec<Drain<sources::Region>>,
-    /// The chosen method and the settings of each solver.
+    /// The chosen method with its settings.
     pub solver: Solver,
+    /// Settings of the method that is not chosen, if the file has them: they are written with the
+    /// scene, so that the method of what was recorded can be changed, and change no result.
+    pub unchosen: Option<Solver>,
     /// Grids written with each frame beside the particles; `None` writes none.
     pub grids: Option<grids::Grids>,
     /// Frames whose particles stay on disk; `None` keeps all of them.
@@ -93,8 +97,6 @@ pub struct Scene {
     pub budget: Budget,
     /// Effects that the scene enables; each is `None` unless the scene names it.
     pub effects: Effects,
-    /// State of the absorbing walls, taken from the solver's state; all `None` at the start.
-    pub absorbers: AbsorberStates,
 }
 
 impl Scene {
@@ -112,18 +114,15 @@ impl Scene {
     /// Returns the particle spacing d of the chosen solver, metres: the distance between neighbours
     /// on the initial lattice.
     pub fn particle_spacing(&self) -> f64 {
-        match self.solver.method {
-            Method::Pbf => self.solver.pbf().particle_spacing,
-            Method::Flip => self.solver.flip().particle_spacing(),
-        }
+        self.solver.particle_spacing()
     }
 
     /// Returns the names of the attributes that each particle carries beside position, velocity and
     /// id.
     pub fn declared_attributes(&self) -> &'static [&'static str] {
-        match self.solver.method {
-            Method::Pbf => &[],
-            Method::Flip => self.solver.flip().attributes(),
+        match &self.solver {
+            Solver::Pbf(_) => &[],
+            Solver::Flip(flip) => flip.attributes(),
         }
     }
 }
@@ -308,36 +307,6 @@ pub struct WaveMaker {
     pub motion: Motion,
     /// Active absorption of incoming waves; `None` for a wall that does not absorb.
     pub absorption: Option<Absorption>,
-}
-
-/// Settings of the solvers. Those of the chosen method are always present; those of the other may
-/// be.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Solver {
-    /// The chosen method.
-    pub method: Method,
-    /// Settings of position-based fluids.
-    pub pbf: Option<Pbf>,
-    /// Settings of PIC/FLIP.
-    pub flip: Option<flip::Flip>,
-}
-
-impl Solver {
-    /// Returns the settings of PBF.
-    ///
-    /// # Panics
-    /// If there are none. They are always present when PBF is the chosen method.
-    pub fn pbf(&self) -> &Pbf {
-        self.pbf.as_ref().expect("a scene with [solver.pbf]")
-    }
-
-    /// Returns the settings of FLIP.
-    ///
-    /// # Panics
-    /// If there are none. They are always present when FLIP is the chosen method.
-    pub fn flip(&self) -> &flip::Flip {
-        self.flip.as_ref().expect("a scene with [solver.flip]")
-    }
 }
 
 /// A fluid solver.

@@ -8,7 +8,7 @@ mod water;
 use std::f64::consts::{PI, TAU};
 
 use self::still::Still;
-use super::{Method, Scene, Wall, WaveMaker, waves::STEEPEST, words::shown};
+use super::{Scene, Wall, WaveMaker, waves::STEEPEST, words::shown};
 use swell_domain::motion::{Motion, Phases, piston_height_ratio, wave_number};
 
 /// Least wave height, particle spacings: half a cell of FLIP. FLIP keeps 0.96 of the height of a
@@ -242,7 +242,7 @@ impl Scene {
 
     /// Warns about many layers of particles without grid projection.
     fn lint_layers(&self, level: Option<f64>, lints: &mut Vec<String>) {
-        if self.solver.method != Method::Pbf || self.solver.pbf().grid_projection {
+        if self.solver.pbf().is_none_or(|pbf| pbf.grid_projection) {
             return;
         }
         let layers = level.map_or(0.0, |level| level / self.particle_spacing());

@@ -4,6 +4,7 @@ use glam::{DQuat, DVec3};
 
 use super::{PlacedMesh, Scene, solid_track::Track};
 use swell_domain::{
+    absorber::AbsorberStates,
     boundary::Boundary,
     mesh::TriangleMesh,
     motion::Motion,
@@ -130,8 +131,8 @@ impl MovingSolid {
 impl Scene {
     /// Bounds the speed of wave makers, with what absorbing ones add to their own motion, and of
     /// moving solids within `[t0, t1]`, m/s.
-    pub fn peak_boundary_speed(&self, t0: f64, t1: f64) -> f64 {
-        let makers = self.makers();
+    pub fn peak_boundary_speed(&self, absorbers: &AbsorberStates, t0: f64, t1: f64) -> f64 {
+        let makers = self.makers(absorbers);
         let makers = makers.map(|(maker, absorber)| maker.peak_speed(absorber, t0, t1));
         let solids = self.moving_solids.iter();
         let solids = solids.map(|solid| solid.peak_speed(t0, t1));

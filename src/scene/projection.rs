@@ -1,7 +1,7 @@
 //! PBF's projection grid, represented as the FLIP scene whose projection it is.
 
 use super::{
-    Method, Scene, Solver, Water,
+    FlipScene, PbfScene, Scene, SceneWith, Solver, Water,
     effects::Grain,
     flip::{Flip, Precision, Preconditioner, Pressure, Surface, Transfer},
 };
@@ -22,14 +22,14 @@ const PRESSURE: Pressure = Pressure {
     max_iterations: 400,
 };
 
-impl Scene {
+impl PbfScene {
     /// Returns the same water, walls and solids with FLIP on cells of twice the particle spacing,
     /// of which PBF uses only the velocities; `None` without grid projection.
-    pub fn of_projection(&self) -> Option<Self> {
-        if self.solver.method != Method::Pbf || !self.solver.pbf().grid_projection {
+    pub fn of_projection(&self) -> Option<FlipScene> {
+        let pbf = self.settings();
+        if !pbf.grid_projection {
             return None;
         }
-        let pbf = self.solver.pbf();
         let cell_size = PROJECTION_CELL * pbf.particle_spacing;
         let rate = PIC_RATE * (self.water.gravity.length() / cell_size).sqrt();
         let flip = Flip {
@@ -43,21 +43,16 @@ impl Scene {
             density_correction: false,
             pressure: PRESSURE,
         };
-        let mut scene = self.clone();
-        scene.solver.method = Method::Flip;
-        scene.solver.flip = Some(flip);
-        scene.effects = self.effects.on_projection();
-        Some(scene)
-    }
-
-    /// Returns the scales by which effects are judged.
-    pub(super) fn grain(&self) -> Grain {
-        grain(&self.water, &self.solver)
+        let scene = Scene {
+            effects: self.effects.on_projection(),
+            ..Scene::clone(self)
+        };
+        Some(SceneWith::new(scene, flip))
     }
 
     /// Returns the gravity in PBF's prediction, m/s²; zero if the projection has applied it.
     pub fn predicted_gravity(&self) -> glam::DVec3 {
-        match self.solver.pbf().grid_projection {
+        match self.settings().grid_projection {
             true => glam::DVec3::ZERO,
             false => self.water.gravity,
         }
@@ -65,26 +60,23 @@ impl Scene {
 
     /// Whether pressures are read from PBF's multipliers instead of from a projection.
     pub fn reads_multipliers(&self) -> bool {
-        !self.solver.pbf().grid_projection && !self.pressure_points().is_empty()
+        !self.settings().grid_projection && !self.pressure_points().is_empty()
+    }
+}
+
+impl Scene {
+    /// Returns the scales by which effects are judged.
+    pub(super) fn grain(&self) -> Grain {
+        grain(&self.water, &self.solver)
     }
 }
 
 /// Returns the scales by which effects in this water are judged.
 pub fn grain(water: &Water, solver: &Solver) -> Grain {
-    let (spacing, cell) = match solver.method {
-        Method::Pbf => {
-            let spacing = solver.pbf().particle_spacing;
-            (spacing, PROJECTION_CELL * spacing)
-        }
-        Method::Flip => {
-            let flip = solver.flip();
-            (flip.particle_spacing(), flip.cell_size)
-        }
-    };
     Grain {
         density: water.rest_density,
         gravity: water.gravity.length(),
-        spacing,
-        cell,
+        spacing: solver.particle_spacing(),
+        cell: solver.cell_size(),
     }
 }

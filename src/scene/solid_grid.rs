@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use super::{Method, Scene};
+use super::{Scene, Solver};
 use swell_domain::{
     bounds::Bounds, flip, mesh::TriangleMesh, pbf, signed_distance::fitting_spacing,
 };
@@ -20,12 +20,9 @@ impl Scene {
     /// Returns the margin of the signed distance around the solids, metres. In a periodic domain it
     /// includes the largest displacement of a particle beyond the domain in a substep.
     pub fn solid_margin(&self) -> f64 {
-        let way = match self.solver.method {
-            Method::Pbf => pbf::CAP * self.solver.pbf().cfl * self.particle_spacing(),
-            Method::Flip => {
-                let solver = self.solver.flip();
-                flip::CAP * solver.cfl * solver.cell_size
-            }
+        let way = match &self.solver {
+            Solver::Pbf(pbf) => pbf::CAP * pbf.cfl * pbf.particle_spacing,
+            Solver::Flip(flip) => flip::CAP * flip.cfl * flip.cell_size,
         };
         let beyond = if self.is_periodic() { way } else { 0.0 };
         MARGIN * self.particle_spacing() + beyond

@@ -79,7 +79,7 @@ impl Scene {
 
     /// Returns the inflow volumes on FLIP's cells in a substep of `length` seconds from `start`.
     pub fn inlets(&self, start: f64, length: f64) -> Vec<Inlet> {
-        let (corner, size) = (self.domain.min, self.solver.flip().cell_size);
+        let (corner, size) = (self.domain.min, self.solver.cell_size());
         let left = self.seconds_left(start, length);
         let inlet = |it: &Emitter<Region>| {
             let bounds = self.entered(it);

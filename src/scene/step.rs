@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::Scene;
+use super::{FlipScene, PbfScene, Scene};
 use swell_domain::{
     absorber::AbsorberStates,
     bounds::{Bounds, FAR},
@@ -58,22 +58,13 @@ pub fn projected_substep(start: f64, length: f64, before: f64) -> Substep {
 impl Scene {
     /// Returns the faces of the box at `time` including wave makers, relative to the domain's least
     /// corner, metres; ±[`FAR`] along periodic axes.
-    pub fn walls(&self, time: f64) -> Bounds {
-        self.walls_by(&self.absorbers, time)
-    }
-
-    /// Returns [`Self::walls`] with the absorber states of `state` in place of the scene's.
-    pub fn walls_after(&self, state: &Particles, time: f64) -> Bounds {
-        self.walls_by(&self.absorbers_in(state), time)
-    }
-
-    fn walls_by(&self, absorbers: &AbsorberStates, time: f64) -> Bounds {
+    pub fn walls(&self, absorbers: &AbsorberStates, time: f64) -> Bounds {
         let (mut min, mut max) = (DVec3::ZERO, self.domain.size());
         for axis in (0..3).filter(|&axis| self.periodic[axis]) {
             (min[axis], max[axis]) = (-FAR, FAR);
         }
-        for (maker, absorber) in self.wave_makers.iter().zip(absorbers) {
-            let inward = maker.displacement(absorber.as_ref(), time);
+        for (maker, absorber) in self.makers(absorbers) {
+            let inward = maker.displacement(absorber, time);
             if maker.wall.is_max {
                 max[maker.wall.axis] -= inward;
             } else {
@@ -85,8 +76,8 @@ impl Scene {
 
     /// Returns the mean velocity of each face over the `step` seconds before `time`, along its
     /// axis, m/s; 0 if `step` is 0.
-    pub fn wall_velocity(&self, time: f64, step: f64) -> Bounds {
-        let (before, after) = (self.walls(time - step), self.walls(time));
+    pub fn wall_velocity(&self, absorbers: &AbsorberStates, time: f64, step: f64) -> Bounds {
+        let [before, after] = [time - step, time].map(|time| self.walls(absorbers, time));
         let speed = |after: DVec3, before: DVec3| match step {
             0.0 => DVec3::ZERO,
             step => (after - before) / step,
@@ -107,18 +98,89 @@ impl Scene {
         self.has_movers() || self.has_inlets()
     }
 
+    /// Returns the time from `start`, where a substep of `length` begins, to the end of its frame,
+    /// seconds; never less than `length`.
+    pub fn seconds_left(&self, start: f64, length: f64) -> f64 {
+        let frame = self.shot.frame_seconds();
+        // Starts accumulate rounding errors.
+        let before = (start / frame + 1e-6).floor();
+        ((before + 1.0) * frame - start).max(length)
+    }
+
+    /// Describes the step limit of effects, as the end of a message.
+    fn stable_step(&self) -> String {
+        match self.effects.longest_step(self.grain()) {
+            (longest, name) if longest.is_finite() => {
+                format!(", and at effects.{name} no longer than {longest:.3e} s")
+            }
+            _ => String::new(),
+        }
+    }
+
+    /// Returns the position of the densest particle, given all relative densities; world
+    /// coordinates, metres.
+    pub fn densest_particle(&self, state: &Particles, density: &[f64]) -> Option<[f64; 3]> {
+        let both = state.position.iter().zip(density);
+        let densest = both.max_by(|(_, a), (_, b)| a.total_cmp(b))?;
+        let place = DVec3::from(densest.0.map(f64::from));
+        Some((self.origin + place).to_array())
+    }
+
+    /// Returns the centre of the densest cell of FLIP's grid, given all relative densities; world
+    /// coordinates, metres.
+    pub fn densest_cell(&self, cells: impl Iterator<Item = ([u32; 3], f64)>) -> Option<[f64; 3]> {
+        let (cell, _) = cells.max_by(|(_, a), (_, b)| a.total_cmp(b))?;
+        let middle = DVec3::from(cell.map(|k| f64::from(k) + 0.5));
+        let place = self.domain.min + middle * self.solver.cell_size();
+        Some((self.origin + place).to_array())
+    }
+
+    /// Returns the energies and density errors of a state, summed in order; counts of steps are 0.
+    pub fn report(&self, state: &Particles, density: impl Iterator<Item = f64>) -> StepReport {
+        let mass = self.particle_mass();
+        let (kinetic, potential) = energies(state, mass, self.water.gravity, self.domain.min);
+        let errors: Vec<f64> = density.map(|rho| (rho - 1.0).max(0.0)).collect();
+        // The fold starts at 0 because an empty `sum` is −0.
+        let mean = errors.iter().fold(0.0, |sum, error| sum + error) / errors.len().max(1) as f64;
+        let max = errors.iter().fold(0.0, |most: f64, error| most.max(*error));
+        StepReport {
+            substeps: 0,
+            iterations: 0,
+            density_error_mean: mean,
+            density_error_p99: percentile(errors, 0.99).unwrap_or(0.0),
+            density_error_max: max,
+            kinetic_energy: kinetic,
+            potential_energy: potential,
+            max_speed: state.max_speed(),
+            capped: 0,
+            searched: 0,
+            boundary_work: 0.0,
+            volume: None,
+            projection: None,
+            exchange: None,
+            densest_at: None,
+        }
+    }
+}
+
+impl PbfScene {
     /// Returns the number of equal substeps that PBF's CFL number requires in the frame after
     /// `frame`, for a fastest particle of `speed`, m/s, gravity, effects, wave makers and solids.
     ///
     /// # Errors
     /// If there are more than `max_substeps`.
-    pub fn pbf_substeps(&self, frame: u32, speed: f64) -> Result<u32, Breach> {
-        let pbf = self.solver.pbf();
+    pub fn pbf_substeps(
+        &self,
+        absorbers: &AbsorberStates,
+        frame: u32,
+        speed: f64,
+    ) -> Result<u32, Breach> {
+        let pbf = self.settings();
         let length = self.shot.frame_seconds();
         let start = f64::from(frame) * length;
         let wall = self
-            .makers()
-            .map(|(maker, answer)| maker.peak_speed(answer, start, start + length));
+            .makers(absorbers)
+            .map(|(maker, absorber)| maker.peak_speed(absorber, start, start + length));
         let gained = self.water.gravity.length() * length + self.effects.push().gained(length);
         let solids = self.moving_solids.iter();
         let solids = solids.map(|solid| solid.peak_speed(start, start + length));
@@ -138,16 +200,9 @@ impl Scene {
         }
         Ok(wanted as u32)
     }
+}
 
-    /// Returns the time from `start`, where a substep of `length` begins, to the end of its frame,
-    /// seconds; never less than `length`.
-    pub fn seconds_left(&self, start: f64, length: f64) -> f64 {
-        let frame = self.shot.frame_seconds();
-        // Starts accumulate rounding errors.
-        let before = (start / frame + 1e-6).floor();
-        ((before + 1.0) * frame - start).max(length)
-    }
-
+impl FlipScene {
     /// Returns how many equal substeps FLIP's CFL number requires in the `remaining` seconds from
     /// `start`, and the first of them. The fastest particle has `speed`, m/s; `done` substeps of
     /// `frame` are complete, and the last substep (of any frame) took `before` seconds.
@@ -156,14 +211,15 @@ impl Scene {
     /// If the frame has more than `max_substeps`.
     pub fn flip_substep(
         &self,
+        absorbers: &AbsorberStates,
         frame: u32,
         start: f64,
         remaining: f64,
         speed: f64,
         (done, before): (u32, f64),
     ) -> Result<(f64, Substep), Breach> {
-        let flip = self.solver.flip();
-        let fastest = speed.max(self.peak_boundary_speed(start, start + remaining));
+        let flip = self.settings();
+        let fastest = speed.max(self.peak_boundary_speed(absorbers, start, start + remaining));
         let (gravity, push) = (self.water.gravity.length(), self.effects.push());
         // Solves v t + g t² = cfl Δx.
         let room = flip.cfl * flip.cell_size;
@@ -204,68 +260,13 @@ impl Scene {
         Ok((wanted, substep))
     }
 
-    /// Describes the step limit of effects, as the end of a message.
-    fn stable_step(&self) -> String {
-        match self.effects.longest_step(self.grain()) {
-            (longest, name) if longest.is_finite() => {
-                format!(", and at effects.{name} no longer than {longest:.3e} s")
-            }
-            _ => String::new(),
-        }
-    }
-
     /// Returns the PIC blend α of a FLIP substep of `length` seconds, 1 − (1 − α)^(Δt / frame),
     /// where effects add to the frame's α. A fixed α would double the dissipation when Δt halves.
     pub fn substep_pic_blend(&self, length: f64) -> f64 {
         let blends = self.effects.blends().into_iter();
         let kept: f64 = blends.map(|blend| 1.0 - blend).product();
-        let kept = (1.0 - self.solver.flip().pic_blend) * kept;
+        let kept = (1.0 - self.settings().pic_blend) * kept;
         1.0 - kept.powf(length / self.shot.frame_seconds())
-    }
-
-    /// Returns the position of the densest particle, given all relative densities; world
-    /// coordinates, metres.
-    pub fn densest_particle(&self, state: &Particles, density: &[f64]) -> Option<[f64; 3]> {
-        let both = state.position.iter().zip(density);
-        let densest = both.max_by(|(_, a), (_, b)| a.total_cmp(b))?;
-        let place = DVec3::from(densest.0.map(f64::from));
-        Some((self.origin + place).to_array())
-    }
-
-    /// Returns the centre of the densest cell of FLIP's grid, given all relative densities; world
-    /// coordinates, metres.
-    pub fn densest_cell(&self, cells: impl Iterator<Item = ([u32; 3], f64)>) -> Option<[f64; 3]> {
-        let (cell, _) = cells.max_by(|(_, a), (_, b)| a.total_cmp(b))?;
-        let middle = DVec3::from(cell.map(|k| f64::from(k) + 0.5));
-        let place = self.domain.min + middle * self.solver.flip().cell_size;
-        Some((self.origin + place).to_array())
-    }
-
-    /// Returns the energies and density errors of a state, summed in order; counts of steps are 0.
-    pub fn report(&self, state: &Particles, density: impl Iterator<Item = f64>) -> StepReport {
-        let mass = self.particle_mass();
-        let (kinetic, potential) = energies(state, mass, self.water.gravity, self.domain.min);
-        let errors: Vec<f64> = density.map(|rho| (rho - 1.0).max(0.0)).collect();
-        // The fold starts at 0 because an empty `sum` is −0.
-        let mean = errors.iter().fold(0.0, |sum, error| sum + error) / errors.len().max(1) as f64;
-        let max = errors.iter().fold(0.0, |most: f64, error| most.max(*error));
-        StepReport {
-            substeps: 0,
-            iterations: 0,
-            density_error_mean: mean,
-            density_error_p99: percentile(errors, 0.99).unwrap_or(0.0),
-            density_error_max: max,
-            kinetic_energy: kinetic,
-            potential_energy: potential,
-            max_speed: state.max_speed(),
-            capped: 0,
-            searched: 0,
-            boundary_work: 0.0,
-            volume: None,
-            projection: None,
-            exchange: None,
-            densest_at: None,
-        }
     }
 }
 

@@ -1,15 +1,14 @@
 //! The scene as whitewater generation sees it.
 
-use super::{Effects, Iteration, Method, Pbf, Scene, Stop};
+use super::{Effects, Iteration, Pbf, PbfScene, Scene, SceneWith, Stop};
 use swell_domain::whitewater::SUPPORT;
 
 impl Scene {
     /// Returns the scene as whitewater generation sees it for either solver: the same water, walls
     /// and solids as particles of one spacing, with a support radius of [`SUPPORT`] spacings.
     #[must_use]
-    pub fn of_whitewater(&self) -> Self {
-        let mut scene = self.clone();
-        scene.solver.pbf = Some(Pbf {
+    pub fn of_whitewater(&self) -> PbfScene {
+        let pbf = Pbf {
             particle_spacing: self.particle_spacing(),
             support_ratio: SUPPORT,
             iteration: Iteration::Jacobi,
@@ -20,10 +19,12 @@ impl Scene {
             artificial_pressure: 0.0,
             grid_projection: false,
             max_substeps: 1,
-        });
-        scene.solver.method = Method::Pbf;
-        scene.effects = Effects::default();
-        scene.probes.clear();
-        scene
+        };
+        let scene = Self {
+            effects: Effects::default(),
+            probes: Vec::new(),
+            ..self.clone()
+        };
+        SceneWith::new(scene, pbf)
     }
 }

@@ -12,7 +12,7 @@ use swell_gpu::{
     program::{BufferSpec, PassSpec, check_sizes},
     recording::Command,
 };
-use swell_scene::{Method, Scene};
+use swell_scene::{ByMethod, Scene};
 
 use super::{buffers::SAMPLE_VELOCITY, effects::Addition, flip, pbf};
 
@@ -199,17 +199,17 @@ pub struct Plan {
 impl Plan {
     /// Plans the solver that `scene` selects.
     pub fn new(scene: &Scene, counts: Counts, limits: DeviceLimits) -> Self {
-        match scene.solver.method {
-            Method::Pbf => pbf::plan::plan(scene, counts, limits),
-            Method::Flip => flip::plan::plan(scene, counts, true),
+        match &scene.by_method() {
+            ByMethod::Pbf(scene) => pbf::plan::plan(scene, counts, limits),
+            ByMethod::Flip(scene) => flip::plan::plan(scene, counts, true),
         }
     }
 
     /// Returns every command that a solver with this plan may run for `scene`.
     pub fn commands(&self, scene: &Scene) -> Vec<Command> {
-        match scene.solver.method {
-            Method::Pbf => pbf::plan::commands(self, scene),
-            Method::Flip => flip::plan::commands(self, scene),
+        match &scene.by_method() {
+            ByMethod::Pbf(scene) => pbf::plan::commands(self, scene),
+            ByMethod::Flip(scene) => flip::plan::commands(self, scene),
         }
     }
 

@@ -22,7 +22,7 @@ use swell_gpu::{
     recording::{Command, Recording, Timer},
     sort,
 };
-use swell_scene::Scene;
+use swell_scene::PbfScene;
 
 use super::{
     SolveError,
@@ -55,7 +55,7 @@ pub const ADVANCE: &str = "whitewater/advance";
 pub struct Whitewater {
     program: Program,
     plan: Plan,
-    scene: Scene,
+    scene: PbfScene,
     calibration: Calibration,
     survey: Recording,
     /// Boundary to upload again when the water's particle count changes or solids move. `None` if
@@ -69,8 +69,8 @@ pub struct Whitewater {
 }
 
 /// Plans the passes for the water's potentials, and buffers for `white` whitewater particles.
-fn plan(scene: &Scene, boundary: &Boundary, water: usize, white: usize) -> Plan {
-    let pbf = scene.solver.pbf();
+fn plan(scene: &PbfScene, boundary: &Boundary, water: usize, white: usize) -> Plan {
+    let pbf = scene.settings();
     let support = Calibration::new(pbf.particle_spacing, pbf.support_ratio).support_radius;
     let counts = Counts {
         particles: water,
@@ -120,7 +120,12 @@ fn survey_commands(plan: &Plan) -> Vec<Command> {
     commands
 }
 
-fn pass(name: &'static str, plan: &Plan, scene: &Scene, settings: Option<&Settings>) -> PassSpec {
+fn pass(
+    name: &'static str,
+    plan: &Plan,
+    scene: &PbfScene,
+    settings: Option<&Settings>,
+) -> PassSpec {
     let conditions = [
         ("SOLIDS", plan.has_solids()),
         ("MOVING_SOLIDS", plan.counts.moving_nodes > 0),
@@ -158,7 +163,7 @@ fn pass(name: &'static str, plan: &Plan, scene: &Scene, settings: Option<&Settin
 fn set_up(
     program: &Program,
     plan: &Plan,
-    scene: &Scene,
+    scene: &PbfScene,
     boundary: &Boundary,
     calibration: &Calibration,
 ) -> Recording {
@@ -177,7 +182,7 @@ impl Whitewater {
     /// compile, or the device fails.
     pub fn new(
         context: &Context,
-        scene: &Scene,
+        scene: &PbfScene,
         boundary: &Boundary,
         water: usize,
         is_timed: bool,
@@ -188,7 +193,7 @@ impl Whitewater {
             .map(|name| pass(name, &plan, scene, None))
             .collect();
         let program = Program::new(context, &plan.buffer_specs(), &passes, &[])?;
-        let pbf = scene.solver.pbf();
+        let pbf = scene.settings();
         let calibration = Calibration::new(pbf.particle_spacing, pbf.support_ratio);
         Ok(Self {
             survey: set_up(&program, &plan, scene, boundary, &calibration),
@@ -263,12 +268,17 @@ impl Whitewater {
         if is_other_count(&self.scene, self.plan.counts.particles, water)? {
             self.resize(n)?;
         }
-        self.scene.take_absorbers(water);
         let local = local(&self.scene, &water.position);
         self.program.upload(CORRECTED, 0, &local);
         self.program.upload(VELOCITY, 0, &water.velocity);
         self.program.upload(ID, 0, &water.id);
-        let mut params = params(&self.scene, &self.calibration, &self.plan, time, seconds);
+        let mut params = params(
+            &self.scene,
+            &self.calibration,
+            &self.plan,
+            &water.walls,
+            (time, seconds),
+        );
         // Whitewater falls under gravity, however the water's own solver applies it.
         params.velocity_step = (self.scene.water.gravity * seconds).as_vec3().to_array();
         self.program.upload(PARAMS, 0, &[params]);
@@ -366,7 +376,7 @@ impl Whitewater {
 }
 
 /// Returns positions relative to the domain's minimum corner.
-fn local(scene: &Scene, positions: &[[f32; 3]]) -> Vec<[f32; 3]> {
+fn local(scene: &PbfScene, positions: &[[f32; 3]]) -> Vec<[f32; 3]> {
     let origin = scene.domain.min;
     let one = |p: &[f32; 3]| {
         let x: DVec3 = Vec3::from_array(*p).as_dvec3() - origin;

@@ -231,7 +231,7 @@ fn ready(
         removed: plan.start.removed,
         volume: plan.volume(),
         boundary_samples: plan.start.boundary.sample_count(),
-        solver: plan.scene.solver.method.name(),
+        solver: plan.scene.solver.method().name(),
         bytes,
         disk,
         first,

@@ -207,7 +207,7 @@ fn check_keys(from: &BranchPoint, cache: &CacheReader, scene: &Scene) -> Result<
     let manifest = cache.manifest();
     let quoted = |name: &str| format!("{name:?}");
     let number = |value: f64| format!("{value:?}");
-    let spacing = match scene.solver.method {
+    let spacing = match scene.solver.method() {
         swell_scene::Method::Pbf => "solver.pbf.particle_spacing",
         swell_scene::Method::Flip => {
             "the particle spacing of solver.flip (cell_size, particles_per_cell)"
@@ -217,7 +217,7 @@ fn check_keys(from: &BranchPoint, cache: &CacheReader, scene: &Scene) -> Result<
         (
             "solver.method",
             quoted(&manifest.solver),
-            quoted(scene.solver.method.name()),
+            quoted(scene.solver.method().name()),
         ),
         (
             "shot.frames_per_second",
@@ -249,7 +249,7 @@ fn check_walls(
     scene: &Scene,
     particles: &Particles,
 ) -> Result<(), BranchError> {
-    let walls = scene.walls_after(particles, clock.time);
+    let walls = scene.walls(&particles.walls, clock.time);
     let corner = scene.domain.min;
     // Along periodic axes there are no walls nearby, and particles have to lie in the domain.
     let room = Bounds {

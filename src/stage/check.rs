@@ -14,7 +14,7 @@ use swell_domain::{
     substep::SubstepChoice,
 };
 use swell_gpu::adapter::{Context, GpuError, Needs};
-use swell_scene::{Method, Scene, SceneError};
+use swell_scene::{ByMethod, Scene, SceneError};
 use swell_solve::{SolveError, plan::device_limits};
 
 use super::{
@@ -251,7 +251,7 @@ impl Subject {
 
     fn name(&self) -> &'static str {
         match self {
-            Self::Step(step) => step.scene.solver.method.name(),
+            Self::Step(step) => step.scene.solver.method().name(),
             Self::Whitewater(_) => Manifest::WHITEWATER,
         }
     }
@@ -357,11 +357,13 @@ pub fn check_substep(
     }
     let plan = start.plan_of(scene, particles, device_limits(context));
     let boundary = &start.boundary;
-    match scene.solver.method {
-        Method::Pbf => {
+    match &scene.by_method() {
+        ByMethod::Pbf(scene) => {
             let boundaries = [boundary; 2];
             pbf::check(context, scene, plan, boundaries, (frame, particles), which)
         }
-        Method::Flip => flip::check(context, scene, plan, boundary, (frame, particles), which),
+        ByMethod::Flip(scene) => {
+            flip::check(context, scene, plan, boundary, (frame, particles), which)
+        }
     }
 }

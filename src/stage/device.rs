@@ -14,7 +14,7 @@ use swell_domain::{
 };
 use swell_gpu::adapter::{Context, Needs};
 use swell_reference::ReferenceError;
-use swell_scene::{Method, Scene, flip::Precision};
+use swell_scene::{ByMethod, Scene, flip::Precision};
 use swell_solve::{
     flip::Flip,
     pbf::Pbf,
@@ -236,8 +236,7 @@ impl Device {
 
 /// Adapter features that a scene's passes need.
 pub fn needs(scene: &Scene) -> Needs {
-    let flip = scene.solver.flip.as_ref();
-    let flip = flip.filter(|_| scene.solver.method == Method::Flip);
+    let flip = scene.solver.flip();
     Needs {
         f64: flip.is_some_and(|flip| flip.pressure.precision == Precision::F64),
     }
@@ -311,11 +310,13 @@ impl Opened {
         is_timed: bool,
     ) -> Result<Built, SolverError> {
         let boundary = &start.boundary;
-        let method = scene.solver.method;
+        let by_method = &scene.by_method();
         let Self::Gpu(context) = self else {
-            let solver: Box<dyn Solver<Error = SolverError>> = match method {
-                Method::Pbf => Box::new(Unified(swell_reference::pbf::Pbf::new(scene, boundary))),
-                Method::Flip => {
+            let solver: Box<dyn Solver<Error = SolverError>> = match by_method {
+                ByMethod::Pbf(scene) => {
+                    Box::new(Unified(swell_reference::pbf::Pbf::new(scene, boundary)))
+                }
+                ByMethod::Flip(scene) => {
                     Box::new(Unified(swell_reference::flip::Flip::new(scene, boundary)))
                 }
             };
@@ -323,9 +324,11 @@ impl Opened {
         };
         let plan = start.plan(scene, device_limits(context));
         let planned = Some(start.shown_plan(scene, device_limits(context)));
-        let solver: Box<dyn Solver<Error = SolverError>> = match method {
-            Method::Pbf => Box::new(Unified(Pbf::new(context, scene, plan, boundary, is_timed)?)),
-            Method::Flip => Box::new(Unified(Flip::new(
+        let solver: Box<dyn Solver<Error = SolverError>> = match by_method {
+            ByMethod::Pbf(scene) => {
+                Box::new(Unified(Pbf::new(context, scene, plan, boundary, is_timed)?))
+            }
+            ByMethod::Flip(scene) => Box::new(Unified(Flip::new(
                 context, scene, plan, boundary, is_timed,
             )?)),
         };

@@ -2,7 +2,6 @@
 //! experiments use it.
 
 use std::{
-    borrow::Cow,
     sync::atomic::{AtomicBool, Ordering},
     time::Instant,
 };
@@ -194,8 +193,8 @@ impl<'a> Drive<'a> {
     /// A device error, invalid numbers, or an exceeded budget if budgets are checked.
     pub fn advance(&mut self) -> Result<Step, SolverError> {
         let begin = Instant::now();
-        let scene = self.standing();
-        let mut recorder = Recorder::new(&scene, self.scene.shot.time(self.frame + 1));
+        let end = self.scene.shot.time(self.frame + 1);
+        let mut recorder = Recorder::new(self.scene, self.walls, end);
         let (mut particles, mut report) = match self.is_recorded {
             true => self.solver.advance_watched(&mut recorder)?,
             false => self.solver.advance()?,
@@ -222,18 +221,6 @@ impl<'a> Drive<'a> {
             looks: recorder.into_values(),
             seconds: begin.elapsed().as_secs_f64(),
         })
-    }
-
-    /// The scene with its walls in their current position, which probes need during a frame.
-    fn standing(&self) -> Cow<'a, Scene> {
-        if self.walls == AbsorberStates::default() || !self.is_recorded {
-            return Cow::Borrowed(self.scene);
-        }
-        let walls = self.walls;
-        Cow::Owned(self.scene.after(&Particles {
-            walls,
-            ..Particles::default()
-        }))
     }
 
     /// Runs emitters and drains at the end of the frame, if the scene has any.

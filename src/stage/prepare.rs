@@ -9,7 +9,7 @@ use swell_domain::{
     signed_distance::{SignedDistance, SignedDistanceError},
     sources::Sources,
 };
-use swell_scene::{Method, Scene};
+use swell_scene::{ByMethod, Method, Scene};
 use swell_solve::{
     flip,
     plan::{Capacity, Counts, DeviceLimits, Plan},
@@ -163,11 +163,11 @@ impl Start {
 
     /// Plans the frame after one that ended with `particles`.
     pub fn plan_of(&self, scene: &Scene, particles: &Particles, limits: DeviceLimits) -> Plan {
-        let bricks = match (scene.solver.method, scene.of_projection()) {
-            (Method::Pbf, None) => Capacity::default(),
-            (Method::Pbf, Some(grid)) => flip::capacity(&grid, particles),
-            (Method::Flip, _) => flip::capacity(scene, particles),
+        let grid = match scene.by_method() {
+            ByMethod::Pbf(scene) => scene.of_projection(),
+            ByMethod::Flip(scene) => Some(scene),
         };
+        let bricks = grid.map_or_else(Capacity::default, |grid| flip::capacity(&grid, particles));
         let counts = Counts {
             particles: particles.len(),
             bricks,
@@ -187,7 +187,7 @@ fn boundary(scene: &Scene) -> Result<Boundary, SignedDistanceError> {
     let sampled = |mesh| samples(scene, mesh, distance.as_ref());
     let moving = scene.moving_solids.iter().map(|solid| &solid.placed.mesh);
     // FLIP uses only the signed distance of solids.
-    let (samples, moving_samples) = match scene.solver.method {
+    let (samples, moving_samples) = match scene.solver.method() {
         Method::Pbf => (
             meshes(scene).flat_map(sampled).collect(),
             moving.map(|mesh| all_samples(scene, mesh)).collect(),

@@ -2,6 +2,7 @@
 
 use swell_cache::{Entry, ProbeRecord, ProbeValues, stream::PROBES};
 use swell_domain::{
+    absorber::AbsorberStates,
     particles::Particles,
     probe::{Patch, Rate, elevation, energies, flux, front, load, run_up, volume},
     solver::{Observed, Requested, Span, Watch},
@@ -115,6 +116,8 @@ impl Looked {
 /// Records the values of probes during a frame.
 pub(super) struct Recorder<'a> {
     scene: &'a Scene,
+    /// State of the absorbing walls in the frame.
+    walls: AbsorberStates,
     /// Time at the end of the frame, seconds.
     end: f64,
     values: ProbeValues,
@@ -124,9 +127,10 @@ pub(super) struct Recorder<'a> {
 
 impl<'a> Recorder<'a> {
     /// A recorder for the frame that ends at `end` seconds.
-    pub(super) fn new(scene: &'a Scene, end: f64) -> Self {
+    pub(super) fn new(scene: &'a Scene, walls: AbsorberStates, end: f64) -> Self {
         Self {
             scene,
+            walls,
             end,
             values: vec![Vec::new(); scene.probes.len()],
             surfaces: Vec::new(),
@@ -168,7 +172,7 @@ impl Watch for Recorder<'_> {
                 ProbeKind::Pressure { .. } => wanted.pressures = true,
                 ProbeKind::Force { on, .. } => {
                     // At the substep's start, as the cells were cut for which the pressure holds.
-                    let patches = self.scene.patches(on, substep.start);
+                    let patches = self.scene.patches(on, &self.walls, substep.start);
                     wanted.patches.extend_from_slice(&patches);
                     self.surfaces.push((index, patches));
                 }

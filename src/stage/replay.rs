@@ -25,7 +25,7 @@ use swell_gpu::{
     adapter::{GpuError, check_request},
     recording::TracePoint,
 };
-use swell_scene::{Method, Scene, SceneError};
+use swell_scene::{ByMethod, Method, Scene, SceneError, Solver, flip::Precision};
 use swell_solve::{
     SolveError,
     flip::{Flip, buffers::*},
@@ -127,14 +127,22 @@ pub fn replay(
         made,
         energy: before.energy(),
         start_volume: before.start_volume(),
+        precision: None,
         is_correcting: false,
         place: None,
     };
     let plan = start.plan_of(scene, state, device_limits(context));
     let boundary = &start.boundary;
-    match scene.solver.method {
-        Method::Pbf => finder.trace(last, Pbf::new(context, scene, plan, boundary, false)?)?,
-        Method::Flip => finder.trace(last, Flip::new(context, scene, plan, boundary, false)?)?,
+    match &scene.by_method() {
+        ByMethod::Pbf(scene) => {
+            let grid = scene.of_projection();
+            finder.precision = grid.map(|grid| grid.settings().pressure.precision);
+            finder.trace(last, Pbf::new(context, scene, plan, boundary, false)?)?;
+        }
+        ByMethod::Flip(scene) => {
+            finder.precision = Some(scene.settings().pressure.precision);
+            finder.trace(last, Flip::new(context, scene, plan, boundary, false)?)?;
+        }
     }
     let place = finder.place;
     Ok(Some(Failure { breach, place }))
@@ -150,6 +158,8 @@ struct Finder<'a> {
     made: Option<StepReport>,
     energy: f64,
     start_volume: Option<f64>,
+    /// Precision of the pressure solve; `None` without a projection.
+    precision: Option<Precision>,
     /// Whether the substep has reached the density correction, whose residual has no budget.
     is_correcting: bool,
     place: Option<FaultOrigin>,
@@ -224,13 +234,13 @@ impl Finder<'_> {
             Watched::DensityErrorMean | Watched::DensityErrorP99 | Watched::DensityErrorMax
                 if is_measured(traced.pass) =>
             {
-                let count = match self.scene.solver.method {
+                let count = match self.scene.solver.method() {
                     Method::Pbf => n,
                     // The buffer continues beyond the water of this substep with stale values.
                     Method::Flip => (traced.one(PARAMS)?.wet_cells + CELLS) as usize,
                 };
                 let mut density = traced.read(DENSITY, count)?;
-                if self.scene.solver.method == Method::Flip {
+                if self.scene.solver.method() == Method::Flip {
                     let mut kind = traced.read(CELL_KIND, count)?.into_iter();
                     density.retain(|_| kind.next() == Some(FLUID));
                 }
@@ -244,7 +254,9 @@ impl Finder<'_> {
                 Ok((measured > limit).then(|| DENSITY.name().to_owned()))
             }
             Watched::Residual if traced.pass == "pressure/reduce" && !self.is_correcting => {
-                let precision = self.scene.solver.flip().pressure.precision;
+                let Some(precision) = self.precision else {
+                    return Ok(None);
+                };
                 let control = traced.pressure_control(precision)?;
                 let is_over = control.state == DONE && control.residual() > limit;
                 Ok(is_over.then(|| pressure::buffers::CONTROL.name().to_owned()))
@@ -287,9 +299,9 @@ impl Finder<'_> {
     /// Speed above which the scene's `max_substeps` do not suffice, m/s.
     fn most_speed(&self) -> f64 {
         let solver = &self.scene.solver;
-        let way = match solver.method {
-            Method::Pbf => solver.pbf().cfl * solver.pbf().particle_spacing,
-            Method::Flip => solver.flip().cfl * solver.flip().cell_size,
+        let way = match solver {
+            Solver::Pbf(pbf) => pbf.cfl * pbf.particle_spacing,
+            Solver::Flip(flip) => flip.cfl * flip.cell_size,
         };
         way * self.breach.limit * self.scene.shot.frames_per_second
     }

@@ -320,7 +320,7 @@ impl Step<'_> {
         let spacing = self.scene.particle_spacing();
         let died = whitewater::grow_older(self.settings, &mut white, spacing, seconds);
         let corner = self.scene.domain.min;
-        let walls = self.scene.walls_after(&now, clock.time);
+        let walls = self.scene.walls(&now.walls, clock.time);
         let births = Births::of(
             self.settings,
             &Source {

@@ -88,7 +88,7 @@ impl FlipState {
             moving_samples: Vec::new(),
         };
         let model = Model::new(&self.model.scene, &boundary);
-        let step = model.step(&self.elements().substep);
+        let step = model.step(&self.elements().substep, &self.absorbers);
         reference_cut_cells(&model, &step, &self.elements().bricks)
     }
 }

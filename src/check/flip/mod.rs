@@ -15,15 +15,15 @@ use std::collections::BTreeMap;
 use glam::DVec3;
 
 use swell_domain::{
-    boundary::Boundary, particles::Particles, poisson::FLUID, solver::Solver,
-    substep::SubstepChoice,
+    absorber::AbsorberStates, boundary::Boundary, particles::Particles, poisson::FLUID,
+    solver::Solver, substep::SubstepChoice,
 };
 use swell_gpu::adapter::Context;
 use swell_reference::{
     flip::{GridTransfer, Model, OpenSpace, Sorted, Step, is_filling},
     poisson::iteration::Sum,
 };
-use swell_scene::{Scene, step::Substep};
+use swell_scene::{FlipScene, step::Substep};
 use swell_solve::{
     SolveError,
     flip::{Flip, buffers},
@@ -94,7 +94,7 @@ const LABELLED: &str = "compared after pressure/count_pockets";
 /// not have the substep.
 pub fn check(
     context: &Context,
-    scene: &Scene,
+    scene: &FlipScene,
     plan: Plan,
     boundary: &Boundary,
     (frame, particles): (u32, &Particles),
@@ -102,8 +102,7 @@ pub fn check(
 ) -> Result<Checked, SolveError> {
     let mut solver = Flip::new(context, scene, plan, boundary, false)?;
     solver.load(frame, particles)?;
-    let scene = &scene.after(particles);
-    let mut engine = Engine::new(FlipState::new(scene, boundary, (frame, particles.len())));
+    let mut engine = Engine::new(FlipState::new(scene, boundary, (frame, particles)));
     let traced = solver.trace_frame(Span::Only(which), &mut |begun, traced| {
         engine.state.begun = begun;
         engine.observe(traced)
@@ -116,10 +115,12 @@ pub fn check(
 
 /// State that the comparisons share during the substep.
 pub(crate) struct FlipState {
-    pub(super) scene: Scene,
+    pub(super) scene: FlipScene,
     boundary: Boundary,
     pub(super) model: Model,
     n: usize,
+    /// State of the absorbing walls.
+    pub(super) absorbers: AbsorberStates,
     frame: u32,
     pub(super) begun: Begun,
     /// The substep, if it does not follow from the survey: that of a projection for another solver.
@@ -167,13 +168,18 @@ impl State for FlipState {
 }
 
 impl FlipState {
-    /// Creates the state for `n` particles at the end of a frame.
-    pub(super) fn new(scene: &Scene, boundary: &Boundary, (frame, n): (u32, usize)) -> Self {
+    /// Creates the state for the particles at the end of a frame.
+    pub(super) fn new(
+        scene: &FlipScene,
+        boundary: &Boundary,
+        (frame, particles): (u32, &Particles),
+    ) -> Self {
         Self {
             scene: scene.clone(),
             boundary: boundary.clone(),
             model: Model::new(scene, boundary),
-            n,
+            n: particles.len(),
+            absorbers: particles.walls,
             frame,
             begun: Begun::default(),
             given_substep: None,
@@ -217,7 +223,7 @@ impl FlipState {
     }
 
     pub(super) fn step(&self) -> Step<'_> {
-        self.model.step(&self.elements().substep)
+        self.model.step(&self.elements().substep, &self.absorbers)
     }
 
     /// Returns [`PLACE`], the rounding error of a position in cells.

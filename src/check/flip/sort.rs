@@ -73,14 +73,19 @@ pub(super) fn survey(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let substep = match state.given_substep {
         Some(substep) => substep,
         None => {
-            (state
-                .scene
-                .flip_substep(frame, start, remaining, speed, (number - 1, before))?)
+            (state.scene.flip_substep(
+                &state.absorbers,
+                frame,
+                start,
+                remaining,
+                speed,
+                (number - 1, before),
+            )?)
             .1
         }
     };
     let flags: Vec<bool> = found.iter().map(|&flag| flag != 0).collect();
-    let bricks = (state.model).bricks(&flags, &state.model.step(&substep));
+    let bricks = (state.model).bricks(&flags, &state.model.step(&substep, &state.absorbers));
     state.elements = Some(Elements {
         cells: (CELLS * (bricks.active + 1)) as usize,
         stride: 0,

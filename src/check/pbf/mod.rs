@@ -18,7 +18,7 @@ use swell_reference::{
     neighbors::Neighbors,
     pbf::{Model, Substep, passes::Inputs},
 };
-use swell_scene::{Scene, Stop, step::projected_substep};
+use swell_scene::{PbfScene, Stop, step::projected_substep};
 use swell_solve::{
     SolveError,
     flip::buffers::BRICKS,
@@ -98,7 +98,7 @@ const COMPARISONS: &[Comparison<PbfState>] = &[
 /// not have the substep.
 pub fn check(
     context: &Context,
-    scene: &Scene,
+    scene: &PbfScene,
     plan: Plan,
     [boundary, uploaded]: [&Boundary; 2],
     (frame, particles): (u32, &Particles),
@@ -106,8 +106,8 @@ pub fn check(
 ) -> Result<Checked, SolveError> {
     let mut solver = Pbf::new(context, scene, plan.clone(), uploaded, false)?;
     solver.load(frame, particles)?;
-    let scene = &scene.after(particles);
-    let substeps = scene.pbf_substeps(frame, particles.max_speed())?;
+    let absorbers = &particles.walls;
+    let substeps = scene.pbf_substeps(absorbers, frame, particles.max_speed())?;
     let length = scene.shot.frame_seconds();
     let time_step = length / f64::from(substeps);
     let number = match which {
@@ -120,7 +120,7 @@ pub fn check(
     let mut engine = Engine::new(PbfState {
         model,
         has_samples: false,
-        substep: Substep::new(scene, end, time_step),
+        substep: Substep::new(scene, absorbers, end, time_step),
         lists: Lists::new(&plan),
         whole: Whole::default(),
         is_over: false,
@@ -128,7 +128,7 @@ pub fn check(
         plan,
     });
     let mut of_grid = scene.of_projection().map(|grid| {
-        let mut state = FlipState::new(&grid, boundary, (frame, particles.len()));
+        let mut state = FlipState::new(&grid, boundary, (frame, particles));
         let before = if number > 1 {
             time_step
         } else {
@@ -152,7 +152,7 @@ pub fn check(
 
 /// State that the comparisons share during the substep.
 pub(super) struct PbfState {
-    pub(super) scene: Scene,
+    pub(super) scene: PbfScene,
     model: Model,
     /// Whether the model's samples are those of the device.
     has_samples: bool,
@@ -216,7 +216,7 @@ impl PbfState {
     /// Reads the state of the iteration to a density error before the pass; `None` if the number of
     /// iterations is fixed.
     fn control(&self, io: &Io<'_>) -> Result<Option<IterationControl>, SolveError> {
-        match self.scene.solver.pbf().stop {
+        match self.scene.settings().stop {
             Stop::DensityError { .. } => Ok(Some(io.before.one(buffers::CONTROL)?)),
             _ => Ok(None),
         }

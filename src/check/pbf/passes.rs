@@ -207,7 +207,7 @@ pub(super) fn compute_delta(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     let neighbors = state.visited(io, &points)?;
     let before = &io.before.vectors(buffers::CORRECTED, n)?;
     let factor = f64::from(phase.acceleration);
-    let is_chebyshev = state.scene.solver.pbf().iteration == Iteration::Chebyshev;
+    let is_chebyshev = state.scene.settings().iteration == Iteration::Chebyshev;
     let momentum = is_chebyshev.then_some(Momentum { factor, before });
     let inputs = state.inputs(&points, &neighbors);
     let plain = passes::compute_delta(inputs, Colour::All, None, &lambda);
@@ -295,7 +295,7 @@ pub(super) fn exchange(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
         let i = handled[k];
         pair(i, left[i], came[i], [])
     });
-    if state.scene.solver.pbf().iteration == Iteration::Chebyshev {
+    if state.scene.settings().iteration == Iteration::Chebyshev {
         let kept = io.after.vectors(buffers::CORRECTED, n)?;
         io.table.each(&KEPT, 0..handled.len(), |k| {
             let i = handled[k];

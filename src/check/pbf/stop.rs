@@ -25,7 +25,7 @@ pub(super) fn sum_error(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
 }
 
 pub(super) fn decide(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
-    let Stop::DensityError { density_error, .. } = state.scene.solver.pbf().stop else {
+    let Stop::DensityError { density_error, .. } = state.scene.settings().stop else {
         return Ok(());
     };
     let sums = io

@@ -80,7 +80,7 @@ fn scene_json(planned: &ScenePlan<'_>) -> Value {
         "shot": scene.shot.name,
         "frames": scene.shot.frames,
         "frames_per_second": scene.shot.frames_per_second,
-        "solver": scene.solver.method.name(),
+        "solver": scene.solver.method().name(),
         "particles": start.particles.len(),
         "removed": start.removed,
         "volume": volume.made,

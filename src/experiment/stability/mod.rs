@@ -88,7 +88,7 @@ impl Kind for Stability {
                         if !bench.is_next_ours() {
                             continue;
                         }
-                        let method = trial.scene.solver.method.name();
+                        let method = trial.scene.solver.method().name();
                         let name = format!("{title}, {method}, {}", trial.device.name());
                         if let Some((run, stood)) = point(bench, &mut ledger, &name, trial)? {
                             bench.report_point(name, run.status(trial, stood));

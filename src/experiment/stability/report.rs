@@ -176,7 +176,7 @@ impl Results<'_> {
                 Held::Runs(trials) => {
                     let mut of_case: Vec<Row<'_>> = Vec::new();
                     for (trial, run) in trials.iter().zip(runs) {
-                        let method = trial.scene.solver.method;
+                        let method = trial.scene.solver.method();
                         let verdicts = trial.marks.iter().zip(run.verdicts(trial));
                         for (place, (mark, verdict)) in verdicts.enumerate() {
                             let on = On {

@@ -11,7 +11,7 @@ use swell_domain::{
     signed_distance::SignedDistanceError,
     solver::StepReport,
 };
-use swell_scene::{Method, Scene, probe::ProbeKind};
+use swell_scene::{Scene, Solver, probe::ProbeKind};
 use swell_stage::{drive::Step, prepare::Start};
 
 /// A scene and the current state of its run.
@@ -75,29 +75,20 @@ impl<'a> View<'a> {
 
     /// Unit of lengths: the particle spacing with PBF, the cell size with FLIP, metres.
     pub(super) fn resolution(&self) -> f64 {
-        match self.scene.solver.method {
-            Method::Pbf => self.scene.particle_spacing(),
-            Method::Flip => self.scene.solver.flip().cell_size,
-        }
+        self.scene.solver.resolution()
     }
 
     /// Cap on a particle's displacement in a substep, metres.
     pub(super) fn cap(&self) -> f64 {
-        match self.scene.solver.method {
-            Method::Pbf => {
-                let pbf = self.scene.solver.pbf();
-                swell_domain::pbf::CAP * pbf.cfl * pbf.particle_spacing
-            }
-            Method::Flip => {
-                let flip = self.scene.solver.flip();
-                swell_domain::flip::CAP * flip.cfl * flip.cell_size
-            }
+        match &self.scene.solver {
+            Solver::Pbf(pbf) => swell_domain::pbf::CAP * pbf.cfl * pbf.particle_spacing,
+            Solver::Flip(flip) => swell_domain::flip::CAP * flip.cfl * flip.cell_size,
         }
     }
 
     /// Current faces of the box including wave makers, in the coordinates of the particles.
     pub(super) fn walls(&self) -> Bounds {
-        let walls = self.scene.walls_after(&self.state, self.time());
+        let walls = self.scene.walls(&self.state.walls, self.time());
         let origin = self.scene.domain.min;
         Bounds {
             min: origin + walls.min,

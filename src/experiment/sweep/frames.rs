@@ -8,7 +8,7 @@ use swell_reference::{
     neighbors::{Cells, Neighbors, SortedPoints},
     pbf::constraint::distance_to_converged,
 };
-use swell_scene::{Method, Scene, flip::Preconditioner};
+use swell_scene::{ByMethod, PbfScene, Scene, flip::Preconditioner};
 use swell_stage::{
     device::Opened,
     drive::{Drive, Step},
@@ -69,19 +69,21 @@ pub(super) fn measure(
         run.seconds.push(seconds);
     }
     let measured = &mut run.measured;
-    if sweep.errors[0].measure() == Measure::Converged {
-        let boundary = &start.boundary;
-        let distance = distance_to_converged(scene, boundary, point.frames, &end, CONVERGED)?;
-        measured.distance = Some(distance);
-    }
-    match (scene.solver.method, opened) {
-        (Method::Pbf, _) => measured.work = neighbor_visits(scene, &end, measured),
-        (Method::Flip, Opened::Gpu(_)) => {
-            measured.work *= products(scene.solver.flip().pressure.preconditioner);
+    match (&scene.by_method(), opened) {
+        (ByMethod::Pbf(scene), _) => {
+            if sweep.errors[0].measure() == Measure::Converged {
+                let (boundary, frame) = (&start.boundary, point.frames);
+                let distance = distance_to_converged(scene, boundary, frame, &end, CONVERGED)?;
+                measured.distance = Some(distance);
+            }
+            measured.work = neighbor_visits(scene, &end, measured);
+        }
+        (ByMethod::Flip(scene), Opened::Gpu(_)) => {
+            measured.work *= products(scene.settings().pressure.preconditioner);
         }
         // The two halves of the reference's incomplete Cholesky read as much as one product, like
         // IPP.
-        (Method::Flip, Opened::Cpu) => measured.work *= products(Preconditioner::Ipp),
+        (ByMethod::Flip(_), Opened::Cpu) => measured.work *= products(Preconditioner::Ipp),
     }
     Ok(run)
 }
@@ -163,8 +165,8 @@ fn specific_energy(scene: &Scene, particles: &Particles) -> f64 {
 /// Neighbour visits of a PBF run: particles × mean neighbours at the run's end × passes over them,
 /// which are one for λ and one for the corrections of each iteration, and the search of each
 /// substep.
-fn neighbor_visits(scene: &Scene, end: &Particles, run: &Measured) -> f64 {
-    let pbf = scene.solver.pbf();
+fn neighbor_visits(scene: &PbfScene, end: &Particles, run: &Measured) -> f64 {
+    let pbf = scene.settings();
     let radius = pbf.support_ratio * pbf.particle_spacing;
     let place = |x: &[f32; 3]| Vec3::from_array(*x).as_dvec3() - scene.domain.min;
     let positions: Vec<DVec3> = end.position.iter().map(place).collect();

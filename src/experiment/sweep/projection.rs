@@ -15,7 +15,7 @@ use swell_reference::{
     ReferenceError,
     poisson::{self, gradients::norm},
 };
-use swell_scene::flip::Surface;
+use swell_scene::{FlipScene, flip::Surface};
 use swell_solve::{
     SolveError,
     flip::{
@@ -106,13 +106,18 @@ impl<'a> Projections<'a> {
     }
 
     /// Creates a solver loaded with the state.
-    fn loaded(&mut self, bench: &Bench<'_>, point: &Point) -> Result<Flip, StudyError> {
+    fn loaded(
+        &mut self,
+        bench: &Bench<'_>,
+        point: &Point,
+        scene: &FlipScene,
+    ) -> Result<Flip, StudyError> {
         let frames = self.made_by.frames;
         let state = self.state(bench)?;
         let context = context(bench, point);
-        let start = Start::of(&point.scene)?;
-        let plan = start.plan(&point.scene, device_limits(context));
-        let mut solver = Flip::new(context, &point.scene, plan, &start.boundary, false)?;
+        let start = Start::of(scene)?;
+        let plan = start.plan(scene, device_limits(context));
+        let mut solver = Flip::new(context, scene, plan, &start.boundary, false)?;
         solver.load(frames, state)?;
         Ok(solver)
     }
@@ -125,9 +130,10 @@ impl<'a> Projections<'a> {
         point: &Point,
         repeats: u32,
     ) -> Result<Run, StudyError> {
-        let mut solver = self.loaded(bench, point)?;
+        let scene = of_flip(point)?;
+        let mut solver = self.loaded(bench, point, &scene)?;
         let substep = solver.carry_to_grid()?;
-        let grid = Grid::read(&solver, point)?;
+        let grid = Grid::read(&solver, &scene)?;
         solver.project(&substep)?;
         let mut measured = Measured {
             substeps: 1,
@@ -153,7 +159,7 @@ impl<'a> Projections<'a> {
                 ..self.errors(&solver, &grid)?
             });
         }
-        let settings = &point.scene.solver.flip().pressure;
+        let settings = &scene.settings().pressure;
         measured.work = measured.iterations as f64 * products(settings.preconditioner);
         self.one(bench, seconds, measured)
     }
@@ -227,9 +233,10 @@ impl<'a> Projections<'a> {
 
     /// Exact projection of the state on the grid of a point.
     fn resolved(&mut self, bench: &Bench<'_>, point: &Point) -> Result<Resolved, StudyError> {
-        let mut solver = self.loaded(bench, point)?;
+        let scene = of_flip(point)?;
+        let mut solver = self.loaded(bench, point, &scene)?;
         let substep = solver.carry_to_grid()?;
-        let grid = Grid::read(&solver, point)?;
+        let grid = Grid::read(&solver, &scene)?;
         let cells = grid.cells(&solver);
         let system = System::new(cells);
         let exact = self.exact(&system, &system.rhs(cells, &grid.velocity, &grid.flux))?;
@@ -246,7 +253,7 @@ impl<'a> Projections<'a> {
             ]
         };
         let stride = grid.kind.len();
-        let size = point.scene.solver.flip().cell_size;
+        let size = scene.settings().cell_size;
         let faces = system.gradient(cells, &exact.q).into_iter();
         let faces = faces.map(|(face, difference)| {
             let velocity = f64::from(grid.velocity[face]) - difference;
@@ -312,6 +319,15 @@ impl<'a> Projections<'a> {
     }
 }
 
+/// Returns a point's scene, which FLIP has to solve.
+fn of_flip(point: &Point) -> Result<FlipScene, StudyError> {
+    let wrong = || "projections are measured with solver.method flip".to_owned();
+    point
+        .scene
+        .with_flip()
+        .ok_or_else(|| StudyError::Point(wrong()))
+}
+
 fn context<'a>(bench: &'a Bench<'_>, point: &Point) -> &'a Context {
     match bench.devices.of(point.device) {
         Opened::Gpu(context) => context,
@@ -320,9 +336,9 @@ fn context<'a>(bench: &'a Bench<'_>, point: &Point) -> &'a Context {
 }
 
 impl Grid {
-    fn read(solver: &Flip, point: &Point) -> Result<Self, SolveError> {
+    fn read(solver: &Flip, scene: &FlipScene) -> Result<Self, SolveError> {
         let stride = solver.plan().counts.bricks.slots * CELLS as usize;
-        let has_distance = point.scene.solver.flip().surface == Surface::GhostFluid;
+        let has_distance = scene.settings().surface == Surface::GhostFluid;
         let distance = has_distance.then(|| solver.field(LIQUID_DISTANCE, stride));
         Ok(Self {
             kind: solver.field(CELL_KIND, stride)?,

@@ -327,7 +327,11 @@ impl Results<'_> {
     }
 
     fn work_name(&self) -> &'static str {
-        let has = |method| self.sweep.points().any(|p| p.scene.solver.method == method);
+        let has = |method| {
+            self.sweep
+                .points()
+                .any(|p| p.scene.solver.method() == method)
+        };
         match (has(Method::Pbf), has(Method::Flip)) {
             (_, false) => "neighbour visits",
             (false, true) => "matrix-vector products",
@@ -542,7 +546,7 @@ fn found(run: &Run, reading: Reading) -> Option<String> {
 
 /// Milliseconds and convergence point in the paper for a scene's iteration.
 fn paper(scene: &Scene) -> Option<(f64, u32)> {
-    let pbf = scene.solver.pbf.as_ref()?;
+    let pbf = scene.solver.pbf()?;
     let Stop::Iterations(count) = pbf.stop else {
         return None;
     };

@@ -6,7 +6,7 @@ use glam::DVec2;
 
 use swell_domain::motion::{Motion, wave_number};
 use swell_files::study::validation::Measure;
-use swell_scene::{Method, Scene, WaveMaker};
+use swell_scene::{Scene, WaveMaker};
 use swell_study::waves;
 
 use super::{
@@ -486,13 +486,10 @@ fn taylor_green(record: &Record<'_>, out: &mut Measured) {
 /// in each step, whose mean is U⁴ k² / 4, from an energy of U² / 4 that a viscosity ν reduces at
 /// the rate 4 ν k² (the loss described by Zehnder, Narain and Thomaszewski 2018).
 fn numerical_diffusion(scene: &Scene, substeps: u32, seconds: f64, square: f64) -> f64 {
-    match scene.solver.method {
-        Method::Pbf => f64::NAN,
-        Method::Flip => {
-            let flip = scene.solver.flip();
-            let step = seconds / f64::from(substeps.max(1));
-            let blend = scene.substep_pic_blend(step);
-            blend * flip.cell_size.powi(2) / (6.0 * step) + square * step / 8.0
-        }
-    }
+    let Some(scene) = scene.with_flip() else {
+        return f64::NAN;
+    };
+    let step = seconds / f64::from(substeps.max(1));
+    let blend = scene.substep_pic_blend(step);
+    blend * scene.settings().cell_size.powi(2) / (6.0 * step) + square * step / 8.0
 }

@@ -259,12 +259,12 @@ fn orders(benchmark: &Benchmark, runs: &[Run], name: &str) -> String {
     let mut methods: Vec<_> = benchmark
         .runs
         .iter()
-        .map(|run| run.scene.solver.method)
+        .map(|run| run.scene.solver.method())
         .collect();
     methods.dedup();
     let of_method = |method| {
         let all = benchmark.runs.iter().zip(runs);
-        let own = all.filter(|(trial, _)| trial.scene.solver.method == method);
+        let own = all.filter(|(trial, _)| trial.scene.solver.method() == method);
         let errors = own.map(|(trial, run)| {
             Some((
                 trial.resolution,
@@ -339,7 +339,7 @@ fn table(results: &[Result<'_>]) -> Vec<Vec<String>> {
             })
         };
         let head = |trial: &Trial| {
-            let method = trial.scene.solver.method.name();
+            let method = trial.scene.solver.method().name();
             vec![
                 benchmark.name.clone(),
                 method.to_owned(),

@@ -26,26 +26,34 @@ const MAX_AXIS_CELLS: f64 = 65_536.0;
 const LEAST_SPACINGS: f64 = 2.0;
 const LEAST_CELLS: f64 = 3.0;
 
-/// Reads the method and all given tables, and returns the lattice of the chosen solver.
-pub(super) fn solver(
-    doc: &Document<'_>,
-    spec: SolverSpec,
-    domain: &Bounds,
-) -> Result<(Solver, Lattice)> {
-    let solver = Solver {
-        method: spec.method,
-        pbf: spec.pbf.map(Pbf::from),
-        flip: spec.flip,
+/// Settings of both methods, and the lattice of the chosen one.
+pub(super) struct Solvers {
+    pub(super) chosen: Solver,
+    pub(super) unchosen: Option<Solver>,
+    pub(super) lattice: Lattice,
+}
+
+/// Reads the method and all given tables.
+pub(super) fn solvers(doc: &Document<'_>, spec: SolverSpec, domain: &Bounds) -> Result<Solvers> {
+    let pbf = spec.pbf.map(|pbf| Solver::Pbf(pbf.into()));
+    let flip = spec.flip.map(Solver::Flip);
+    let (chosen, unchosen) = match spec.method {
+        Method::Pbf => (pbf, flip),
+        Method::Flip => (flip, pbf),
     };
-    let lattice = match (solver.method, &solver.pbf, &solver.flip) {
-        (Method::Pbf, Some(pbf), _) => fit_pbf(doc, pbf, domain)?,
-        (Method::Flip, _, Some(flip)) => fit_flip(doc, flip, domain)?,
-        (method, ..) => {
-            let problem = format!("the scene has no table [solver.{}]", method.name());
-            return Err(doc.fault_of("solver.method", problem));
-        }
+    let Some(chosen) = chosen else {
+        let problem = format!("the scene has no table [solver.{}]", spec.method.name());
+        return Err(doc.fault_of("solver.method", problem));
     };
-    Ok((solver, lattice))
+    let lattice = match &chosen {
+        Solver::Pbf(pbf) => fit_pbf(doc, pbf, domain)?,
+        Solver::Flip(flip) => fit_flip(doc, flip, domain)?,
+    };
+    Ok(Solvers {
+        chosen,
+        unchosen,
+        lattice,
+    })
 }
 
 fn fit_pbf(doc: &Document<'_>, pbf: &Pbf, domain: &Bounds) -> Result<Lattice> {

@@ -10,7 +10,7 @@ use crate::scene_to_toml;
 use crate::{load_scene, parse_scene, recorded_scene};
 use swell_domain::{motion::Motion, sampling, signed_distance::SignedDistance};
 use swell_scene::{
-    Iteration, Method, PlacedMesh, Stop, asset_path,
+    Iteration, Method, PlacedMesh, Solver, Stop, asset_path,
     flip::{Preconditioner, Surface, Transfer},
 };
 
@@ -111,7 +111,7 @@ fn everything_that_is_written_is_meant() {
             points: vec![[0.0, 0.0], [1.0, 0.5]]
         }
     );
-    let pbf = scene.solver.pbf();
+    let pbf = scene.solver.pbf().expect("PBF");
     assert_eq!(pbf.iteration, Iteration::Jacobi);
     assert_eq!(
         pbf.stop,
@@ -124,7 +124,8 @@ fn everything_that_is_written_is_meant() {
         (pbf.support_ratio, pbf.cfl, pbf.relaxation, pbf.max_substeps),
         (2.0, 1.0, 0.5, 32)
     );
-    let flip = scene.solver.flip();
+    let unchosen = scene.unchosen.as_ref().and_then(Solver::flip);
+    let flip = unchosen.expect("a table");
     assert_eq!(flip.transfer, Transfer::Apic);
     assert_eq!(flip.pressure.preconditioner, Preconditioner::Ipp);
     assert_eq!((flip.cell_size, flip.particle_spacing()), (0.25, 0.125));
@@ -159,7 +160,7 @@ fn what_a_scene_leaves_out_is_what_its_page_says() {
     let scene = load(&[]);
     assert_eq!(scene.water.rest_density, 1000.0);
     assert_eq!(scene.water.gravity, DVec3::new(0.0, -9.81, 0.0));
-    let pbf = scene.solver.pbf();
+    let pbf = scene.solver.pbf().expect("PBF");
     assert_eq!(pbf.stop, Stop::Iterations(4));
     assert!(pbf.grid_projection);
     assert_eq!(pbf.iteration, Iteration::RedBlack);
@@ -170,7 +171,8 @@ fn what_a_scene_leaves_out_is_what_its_page_says() {
         pbf.artificial_pressure,
     ];
     assert_eq!((numbers, pbf.max_substeps), ([2.0, 1.0, 1.0, 0.0], 32));
-    let flip = scene.solver.flip();
+    let unchosen = scene.unchosen.as_ref().and_then(Solver::flip);
+    let flip = unchosen.expect("a table");
     let pressure = &flip.pressure;
     assert_eq!(
         (flip.cfl, flip.pic_blend, pressure.tolerance),
@@ -188,7 +190,7 @@ fn what_a_scene_leaves_out_is_what_its_page_says() {
     };
     assert_eq!(scene.wave_makers[0].motion, sine);
     let chebyshev = load(&["solver.pbf.iteration=chebyshev"]);
-    let pbf = chebyshev.solver.pbf();
+    let pbf = chebyshev.solver.pbf().expect("PBF");
     assert_eq!((pbf.relaxation, pbf.spectral_radius), (0.7, 0.98));
     // The diagonal of 4 × 3 × 12 m is 13 m. The wall moves at up to π stroke / period; within the
     // shot, 0.2 s of the ramp, its bound is lower.
@@ -221,7 +223,8 @@ fn either_solver_of_a_scene_can_be_chosen() {
     assert_eq!(scene.particle_spacing(), 0.1);
     let flip = parse(dir.path(), FULL, &["solver.method=flip"]).expect("valid");
     assert_eq!(flip.particle_spacing(), 0.125);
-    assert_eq!(flip.solver.pbf, scene.solver.pbf);
+    assert_eq!(flip.unchosen.as_ref(), Some(&scene.solver));
+    assert_eq!(scene.unchosen.as_ref(), Some(&flip.solver));
     assert_ne!(physics_hash(&scene), physics_hash(&flip));
     // The other solver is not checked against the scene.
     let coarse = "solver.flip.cell_size=2.0";
@@ -241,8 +244,11 @@ fn overrides_reach_everywhere_and_take_bare_words() {
         "shot.name=other-name",
     ];
     let scene = parse(dir.path(), FULL, &overrides).expect("valid");
-    assert_eq!(scene.solver.pbf().iteration, Iteration::RedBlack);
-    assert_eq!(scene.solver.pbf().particle_spacing, 0.2);
+    assert_eq!(
+        scene.solver.pbf().expect("PBF").iteration,
+        Iteration::RedBlack
+    );
+    assert_eq!(scene.solver.pbf().expect("PBF").particle_spacing, 0.2);
     assert_eq!(scene.water.blocks[0].max.x, 2.0);
     assert_eq!(scene.water.blocks[0].min.x, 0.5);
     assert_eq!(scene.effects.viscosity.and_then(|v| v.xsph), Some(0.02));
@@ -294,7 +300,7 @@ fn the_scene_of_a_cache_that_is_older_than_a_key_is_read_as_it_was_baked() {
     let older = written.replace("grid_projection = true\n", "");
     assert_ne!(older, written);
     let recorded = recorded_scene(&older, file, dir.path()).expect("valid");
-    assert!(!recorded.solver.pbf().grid_projection);
+    assert!(!recorded.solver.pbf().expect("PBF").grid_projection);
     let difference = physics_difference(&older, &written).expect("TOML");
     assert_eq!(
         difference.as_deref(),
@@ -306,7 +312,7 @@ fn the_scene_of_a_cache_that_is_older_than_a_key_is_read_as_it_was_baked() {
         now
     );
     let today = parse_scene(&older, file, dir.path(), &[]).expect("valid");
-    assert!(today.solver.pbf().grid_projection);
+    assert!(today.solver.pbf().expect("PBF").grid_projection);
     // A key in a table of an array.
     let sea = "{kind=\"sea\",significant_height=0.1,peak_period=3.0,shortest_period=2.0,depth=1.0}";
     let sea = format!("wave_maker=[{{wall=\"-x\",motion={sea}}}]");

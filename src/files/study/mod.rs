@@ -272,7 +272,7 @@ mod tests {
             let file = entry.expect("a study").path();
             match Study::load(&file).unwrap_or_else(|error| panic!("{error}")) {
                 Study::SolverComparison(comparison) => {
-                    let methods = comparison.scenes.map(|scene| scene.solver.method);
+                    let methods = comparison.scenes.map(|scene| scene.solver.method());
                     assert_eq!(methods, [Method::Pbf, Method::Flip], "{}", file.display());
                     comparisons += 1;
                 }

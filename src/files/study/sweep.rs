@@ -35,7 +35,7 @@ use super::{
     RunsOn, SceneFile, StudyFileError, load_with,
 };
 use fit::{check_coarser, check_converged, check_fit, check_weighed};
-use swell_scene::{Method, Scene, SceneError, words::shown};
+use swell_scene::{Method, Scene, SceneError, Solver, words::shown};
 
 /// Key that changes the length of a frame.
 pub const FRAME_RATE: &str = "shot.frames_per_second";
@@ -327,7 +327,7 @@ fn errors(
 fn state(doc: &Document<'_>, spec: &SweepSpec, base_dir: &Path) -> Result<Point, SceneError> {
     let fixed: Vec<_> = spec.set.iter().collect();
     let scene = load(doc, spec, base_dir, &fixed, None)?;
-    if scene.solver.method != Method::Flip {
+    if scene.solver.method() != Method::Flip {
         let problem = "these are measured with solver.method flip, which set does not choose";
         return Err(doc.fault_at(spec.errors.span(), problem));
     }
@@ -441,7 +441,7 @@ fn line(
                 "the scene is the same as with a value before it: {} changes nothing with \
                  solver.method {:?}, or the value is listed twice",
                 key.get_ref(),
-                scene.solver.method.name()
+                scene.solver.method().name()
             );
             return Err(doc.fault_at(value.span(), problem));
         }
@@ -502,8 +502,13 @@ fn load(
 /// double the dissipation.
 fn tie_pic_blend(scene: &mut Scene, own_rate: f64) {
     let exponent = own_rate / scene.shot.frames_per_second;
-    if let Some(flip) = &mut scene.solver.flip {
-        flip.pic_blend = 1.0 - (1.0 - flip.pic_blend).powf(exponent);
+    for solver in [Some(&mut scene.solver), scene.unchosen.as_mut()]
+        .into_iter()
+        .flatten()
+    {
+        if let Solver::Flip(flip) = solver {
+            flip.pic_blend = 1.0 - (1.0 - flip.pic_blend).powf(exponent);
+        }
     }
 }
 

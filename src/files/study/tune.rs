@@ -12,7 +12,11 @@ use crate::load_scene_within;
 use swell_domain::{bounds::Bounds, sampling::block_dims, text};
 
 use super::super::{Reach, physics_hash};
-use swell_scene::{Iteration, Method, Scene, SceneError, Stop, flip::Preconditioner, words::shown};
+use swell_scene::{
+    Iteration, Method, Scene, SceneError, Solver, Stop,
+    flip::{Flip, Preconditioner},
+    words::shown,
+};
 
 pub use limit::{Bound, Limit, Quantity};
 
@@ -123,14 +127,7 @@ impl Variant {
 
     /// Returns PBF's particle spacing or FLIP's cell size, metres.
     pub fn spacing(&self) -> f64 {
-        spacing(&self.scene)
-    }
-}
-
-fn spacing(scene: &Scene) -> f64 {
-    match scene.solver.method {
-        Method::Pbf => scene.solver.pbf().particle_spacing,
-        Method::Flip => scene.solver.flip().cell_size,
+        self.scene.solver.resolution()
     }
 }
 
@@ -185,9 +182,12 @@ impl Tune {
         let scene = laid(&request, &[], &[])?;
         check(&request, &scene)?;
         let frames = request.frames.unwrap_or(scene.shot.frames);
-        let key = spacing_key(scene.solver.method);
+        let key = spacing_key(scene.solver.method());
         let at = |factor: f64| {
-            let d = fitting(&scene, factor * request.reference * spacing(&scene));
+            let d = fitting(
+                &scene,
+                factor * request.reference * scene.solver.resolution(),
+            );
             Setting::number(key, d)
         };
         let mut untried = Vec::new();
@@ -205,7 +205,7 @@ impl Tune {
             });
         };
         let coarsest = coarsest.set.clone();
-        let finer = finer(&scene);
+        let finer = finer(&scene.solver);
         let with = |set: &[Setting], more: &[Setting]| variant(&request, [set, more].concat());
         let reference = with(&[at(1.0)], &finer)?;
         let fine = with(&coarsest, &finer)?;
@@ -213,8 +213,8 @@ impl Tune {
             scene: laid(&request, &coarsest, &[shake(&scene)])?,
             set: coarsest.clone(),
         };
-        let knobs = knobs(&request, &scene, &coarsest, &mut untried);
-        untried.extend(others(scene.solver.method).map(str::to_owned));
+        let knobs = knobs(&request, &scene.solver, &coarsest, &mut untried);
+        untried.extend(others(scene.solver.method()).map(str::to_owned));
         Ok(Self {
             text,
             frames,
@@ -234,7 +234,7 @@ impl Tune {
     /// # Errors
     /// If the scene is invalid with them.
     pub fn variant(&self, spacing: f64, more: &[Setting]) -> Result<Variant, SceneError> {
-        let key = spacing_key(self.scene.solver.method);
+        let key = spacing_key(self.scene.solver.method());
         let first = Setting::number(key, spacing);
         variant(&self.request, [&[first], more].concat())
     }
@@ -256,7 +256,7 @@ impl Tune {
 
     /// Returns the scene's own spacing as TOML.
     pub fn own_spacing(&self) -> String {
-        shown(spacing(&self.scene))
+        shown(self.scene.solver.resolution())
     }
 
     /// Returns all runs known in advance, each with the setting that it is for.
@@ -373,7 +373,7 @@ fn four_digits(value: f64) -> f64 {
 /// Returns the largest relative distance of the sides of the water's blocks from whole numbers of
 /// particles. The lattice adds this error before anything moves, and it follows no convergence law.
 fn misfit(scene: &Scene, spacing: f64) -> f64 {
-    let lattice = spacing * scene.particle_spacing() / self::spacing(scene);
+    let lattice = spacing * scene.particle_spacing() / scene.solver.resolution();
     let sides = |block: &Bounds| {
         let size = block.size().to_array();
         let dims = block_dims(block, &scene.domain, lattice);
@@ -385,7 +385,7 @@ fn misfit(scene: &Scene, spacing: f64) -> f64 {
 
 /// Returns the spacing near `spacing` that fits the water best; the scene's own is kept.
 fn fitting(scene: &Scene, spacing: f64) -> f64 {
-    let own = self::spacing(scene);
+    let own = scene.solver.resolution();
     if (spacing / own - 1.0).abs() < 1e-9 {
         return own;
     }
@@ -396,19 +396,12 @@ fn fitting(scene: &Scene, spacing: f64) -> f64 {
 }
 
 /// Scales the CFL number; a smaller one raises the allowed number of substeps in proportion.
-fn cfl(scene: &Scene, factor: f64) -> Vec<Setting> {
-    let ([cfl, most], own, substeps) = match scene.solver.method {
-        Method::Pbf => {
-            let pbf = scene.solver.pbf();
-            let keys = ["solver.pbf.cfl", "solver.pbf.max_substeps"];
-            (keys, pbf.cfl, pbf.max_substeps)
-        }
-        Method::Flip => {
-            let flip = scene.solver.flip();
-            let keys = ["solver.flip.cfl", "solver.flip.max_substeps"];
-            (keys, flip.cfl, flip.max_substeps)
-        }
+fn cfl(solver: &Solver, factor: f64) -> Vec<Setting> {
+    let ([cfl, most], own) = match solver {
+        Solver::Pbf(pbf) => (["solver.pbf.cfl", "solver.pbf.max_substeps"], pbf.cfl),
+        Solver::Flip(flip) => (["solver.flip.cfl", "solver.flip.max_substeps"], flip.cfl),
     };
+    let substeps = solver.max_substeps();
     let value = Setting::number(cfl, (factor * own).min(MOST_CFL));
     match factor < 1.0 {
         true => vec![
@@ -439,8 +432,8 @@ fn stop(stop: Stop, factor: f64) -> Vec<Setting> {
     }
 }
 
-fn tolerance(scene: &Scene, factor: f64) -> Vec<Setting> {
-    let own = scene.solver.flip().pressure.tolerance;
+fn tolerance(flip: &Flip, factor: f64) -> Vec<Setting> {
+    let own = flip.pressure.tolerance;
     // 1e-5 × 10 is not 1e-4 in binary.
     let value = format!("{:.3e}", own * factor).parse().unwrap_or(own);
     vec![Setting::number("solver.flip.pressure.tolerance", value)]
@@ -448,11 +441,11 @@ fn tolerance(scene: &Scene, factor: f64) -> Vec<Setting> {
 
 /// Settings of the reference beside its spacing: half the step, and twice the iterations or a tenth
 /// of the tolerance.
-fn finer(scene: &Scene) -> Vec<Setting> {
-    let step = cfl(scene, 0.5);
-    let solve = match scene.solver.method {
-        Method::Pbf => stop(scene.solver.pbf().stop, 2.0),
-        Method::Flip => tolerance(scene, 0.1),
+fn finer(solver: &Solver) -> Vec<Setting> {
+    let step = cfl(solver, 0.5);
+    let solve = match solver {
+        Solver::Pbf(pbf) => stop(pbf.stop, 2.0),
+        Solver::Flip(flip) => tolerance(flip, 0.1),
     };
     [step, solve].concat()
 }
@@ -461,13 +454,13 @@ fn finer(scene: &Scene) -> Vec<Setting> {
 /// reported in `untried`; values that change nothing are dropped.
 fn knobs(
     request: &TuneRequest,
-    scene: &Scene,
+    solver: &Solver,
     coarsest: &[Setting],
     untried: &mut Vec<String>,
 ) -> Vec<Knob> {
-    let values: Vec<(String, Vec<Vec<Setting>>)> = match scene.solver.method {
-        Method::Pbf => {
-            let pbf = scene.solver.pbf();
+    let cfl = |factor| cfl(solver, factor);
+    let values: Vec<(String, Vec<Vec<Setting>>)> = match solver {
+        Solver::Pbf(pbf) => {
             let own = match pbf.stop {
                 Stop::Iterations(count) => count.to_string(),
                 Stop::DensityError { density_error, .. } => shown(density_error),
@@ -476,7 +469,7 @@ fn knobs(
                 .iter()
                 .filter(|(_, kind)| *kind != pbf.iteration);
             vec![
-                (shown(pbf.cfl), vec![cfl(scene, 2.0), cfl(scene, 0.5)]),
+                (shown(pbf.cfl), vec![cfl(2.0), cfl(0.5)]),
                 (own, vec![stop(pbf.stop, 0.5), stop(pbf.stop, 2.0)]),
                 (
                     format!("{:?}", pbf.iteration.name()),
@@ -486,8 +479,7 @@ fn knobs(
                 ),
             ]
         }
-        Method::Flip => {
-            let flip = scene.solver.flip();
+        Solver::Flip(flip) => {
             let own = flip.pressure.preconditioner;
             let kinds = [
                 Preconditioner::Jacobi,
@@ -497,10 +489,10 @@ fn knobs(
             let kinds = kinds.into_iter().filter(|kind| *kind != own);
             let key = "solver.flip.pressure.preconditioner";
             vec![
-                (shown(flip.cfl), vec![cfl(scene, 2.0), cfl(scene, 0.5)]),
+                (shown(flip.cfl), vec![cfl(2.0), cfl(0.5)]),
                 (
                     shown(flip.pressure.tolerance),
-                    vec![tolerance(scene, 100.0), tolerance(scene, 10.0)],
+                    vec![tolerance(flip, 100.0), tolerance(flip, 10.0)],
                 ),
                 (
                     format!("{:?}", own.name()),

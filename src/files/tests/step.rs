@@ -2,8 +2,11 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use swell_domain::particles::Particles;
-use swell_scene::Scene;
+use swell_domain::{
+    absorber::{AbsorberStates, MOST},
+    particles::Particles,
+};
+use swell_scene::{FlipScene, Method, PbfScene, Scene};
 
 use crate::parse_scene;
 
@@ -39,6 +42,20 @@ fn scene(set: &[&str]) -> Scene {
     parse_scene(SCENE, Path::new("s.toml"), Path::new(""), &set).expect("valid")
 }
 
+/// No wall absorbs.
+const AT_REST: AbsorberStates = [None; MOST];
+
+fn pbf(set: &[&str]) -> PbfScene {
+    scene(set).with_pbf().expect("a scene of PBF")
+}
+
+fn flip(set: &[&str]) -> FlipScene {
+    let method = Method::Flip.as_override();
+    scene(&[set, &[&*method]].concat())
+        .with_flip()
+        .expect("a scene of FLIP")
+}
+
 #[test]
 fn pbf_takes_as_many_substeps_as_the_way_has_cfl_lengths() {
     // In a frame of 0.2 s gravity adds 2 m/s. The displacement is (v + 2 m/s) 0.2 s; a substep
@@ -53,24 +70,24 @@ fn pbf_takes_as_many_substeps_as_the_way_has_cfl_lengths() {
         // A displacement below that of a substep takes one substep.
         (5.0, 0.1, 1),
     ] {
-        let found = scene(&[&format!("solver.pbf.cfl={cfl}")]).pbf_substeps(0, speed);
+        let found = pbf(&[&format!("solver.pbf.cfl={cfl}")]).pbf_substeps(&AT_REST, 0, speed);
         assert_eq!(found.ok(), Some(substeps), "cfl {cfl}, {speed} m/s");
     }
-    let still = scene(&["water.gravity=[0, 0, 0]", "solver.pbf.cfl=1.0"]);
-    assert_eq!(still.pbf_substeps(0, 0.0).ok(), Some(1));
+    let still = pbf(&["water.gravity=[0, 0, 0]", "solver.pbf.cfl=1.0"]);
+    assert_eq!(still.pbf_substeps(&AT_REST, 0, 0.0).ok(), Some(1));
 }
 
 /// Drops of 0.05 mm fly with the wind at once, never faster: (2 + 9) m/s × 0.2 s / 0.1 m.
 #[test]
 fn no_wind_makes_a_drop_faster_than_itself() {
     let windy = "effects.drag={drop_radius=0.00005,wind=[9,0,0]}";
-    let found = scene(&["solver.pbf.cfl=1.0", windy]).pbf_substeps(0, 0.0);
+    let found = pbf(&["solver.pbf.cfl=1.0", windy]).pbf_substeps(&AT_REST, 0, 0.0);
     assert_eq!(found.ok(), Some(22));
-    let flip = scene(&["solver.method=flip", windy]);
+    let flip = flip(&[windy]);
     // Solution of 9 t + g t² = 0.6 m.
     let longest = (-9.0 + f64::sqrt(81.0 + 24.0)) / 20.0;
     let substep = flip
-        .flip_substep(1, 0.0, 0.2, 0.0, (0, 0.0))
+        .flip_substep(&AT_REST, 1, 0.0, 0.2, 0.0, (0, 0.0))
         .expect("few enough")
         .1;
     assert!(
@@ -83,21 +100,20 @@ fn no_wind_makes_a_drop_faster_than_itself() {
 /// = 80.9 m/s², which is 16.2 m/s in a frame of 0.2 s.
 #[test]
 fn wind_shortens_substeps() {
-    let of = |more: &[&str]| scene(&[&["solver.pbf.cfl=1.0"], more].concat());
+    let of = |more: &[&str]| pbf(&[&["solver.pbf.cfl=1.0"], more].concat());
     let windy = "effects.drag={drop_radius=0.001,wind=[0,0,20]}";
-    assert_eq!(of(&[]).pbf_substeps(0, 0.0).ok(), Some(4));
+    assert_eq!(of(&[]).pbf_substeps(&AT_REST, 0, 0.0).ok(), Some(4));
     // (2 + 16.2) m/s × 0.2 s / 0.1 m.
-    assert_eq!(of(&[windy]).pbf_substeps(0, 0.0).ok(), Some(37));
+    assert_eq!(of(&[windy]).pbf_substeps(&AT_REST, 0, 0.0).ok(), Some(37));
     let still = "effects.drag={drop_radius=0.001}";
-    assert_eq!(of(&[still]).pbf_substeps(0, 0.0).ok(), Some(4));
-    let flip = |more: &str| {
-        let scene = of(&["solver.method=flip", more]);
-        let substep = scene.flip_substep(1, 0.0, 0.2, 0.0, (0, 0.0));
+    assert_eq!(of(&[still]).pbf_substeps(&AT_REST, 0, 0.0).ok(), Some(4));
+    let length = |more: &str| {
+        let substep = flip(&[more]).flip_substep(&AT_REST, 1, 0.0, 0.2, 0.0, (0, 0.0));
         substep.expect("few enough").1.length
     };
     // g t² = 3 × 0.2 m: 0.245 s with gravity only, 0.081 s in the wind; one step
     // or three in 0.2 s.
-    assert!((flip(still) - 0.2).abs() < 1e-12 && (flip(windy) - 0.2 / 3.0).abs() < 1e-12);
+    assert!((length(still) - 0.2).abs() < 1e-12 && (length(windy) - 0.2 / 3.0).abs() < 1e-12);
 }
 
 /// √(1000 kg/m³ × (0.2 m)³ / (2π σ)) is 0.0598 s for σ = 356 N/m: four substeps in 0.2 s. Cells
@@ -110,16 +126,16 @@ fn capillary_waves_shorten_substeps() {
         "water.rest_density=1000",
         "solver.pbf.cfl=1.0",
     ];
-    let of = |more: &[&str]| scene(&[&still[..], &[tension], more].concat());
-    assert_eq!(of(&[]).pbf_substeps(0, 0.0).ok(), Some(4));
-    let fine = of(&["solver.pbf.particle_spacing=0.05"]);
-    assert_eq!(fine.pbf_substeps(0, 0.0).ok(), Some(10));
-    let flip = of(&["solver.method=flip"]);
-    let substep = flip.flip_substep(1, 0.0, 0.2, 0.0, (0, 0.0));
+    let tense = [&still[..], &[tension]].concat();
+    let with = |set| [&tense[..], &[set]].concat();
+    assert_eq!(pbf(&tense).pbf_substeps(&AT_REST, 0, 0.0).ok(), Some(4));
+    let fine = pbf(&with("solver.pbf.particle_spacing=0.05"));
+    assert_eq!(fine.pbf_substeps(&AT_REST, 0, 0.0).ok(), Some(10));
+    let substep = flip(&tense).flip_substep(&AT_REST, 1, 0.0, 0.2, 0.0, (0, 0.0));
     assert!((substep.expect("few enough").1.length - 0.05).abs() < 1e-12);
-    let few = of(&["solver.method=flip", "solver.flip.max_substeps=3"]);
+    let few = flip(&with("solver.flip.max_substeps=3"));
     let breach = few
-        .flip_substep(1, 0.0, 0.2, 0.0, (0, 0.0))
+        .flip_substep(&AT_REST, 1, 0.0, 0.2, 0.0, (0, 0.0))
         .expect_err("4 are asked");
     let said = breach.to_string();
     assert!(
@@ -127,17 +143,18 @@ fn capillary_waves_shorten_substeps() {
         "{said}"
     );
     // Control: without surface tension one is enough.
-    let scene = scene(&still);
-    assert_eq!(scene.pbf_substeps(0, 0.0).ok(), Some(1));
+    assert_eq!(pbf(&still).pbf_substeps(&AT_REST, 0, 0.0).ok(), Some(1));
 }
 
 #[test]
 fn pbf_refuses_more_substeps_than_it_may_take_and_takes_as_many() {
     // (v + 2 m/s) 0.2 s over 0.1 m: 38 m/s give 80 substeps.
-    let most = |count: u32| scene(&[&format!("solver.pbf.max_substeps={count}")]);
-    assert_eq!(most(81).pbf_substeps(3, 38.01).ok(), Some(81));
-    assert_eq!(most(82).pbf_substeps(3, 38.01).ok(), Some(81));
-    let breach = most(80).pbf_substeps(3, 38.01).expect_err("81 are asked");
+    let most = |count: u32| pbf(&[&format!("solver.pbf.max_substeps={count}")]);
+    assert_eq!(most(81).pbf_substeps(&AT_REST, 3, 38.01).ok(), Some(81));
+    assert_eq!(most(82).pbf_substeps(&AT_REST, 3, 38.01).ok(), Some(81));
+    let breach = most(80)
+        .pbf_substeps(&AT_REST, 3, 38.01)
+        .expect_err("81 are asked");
     let said = breach.to_string();
     assert!(
         said.contains("frame 4") && said.contains("81") && said.contains("80"),
@@ -149,25 +166,25 @@ fn pbf_refuses_more_substeps_than_it_may_take_and_takes_as_many() {
 fn a_wall_counts_in_the_frames_in_which_it_moves_and_only_there() {
     // Without gravity, 3 m/s are 6 spacings in a frame of 0.2 s and 1 m/s two. The wall rests
     // from frame 5 on.
-    let scene = scene(&["water.gravity=[0, 0, 0]", "solver.pbf.cfl=0.999", WALL]);
+    let scene = pbf(&["water.gravity=[0, 0, 0]", "solver.pbf.cfl=0.999", WALL]);
     let counts: Vec<_> = (0..7)
-        .map(|frame| scene.pbf_substeps(frame, 1.0).ok())
+        .map(|frame| scene.pbf_substeps(&AT_REST, frame, 1.0).ok())
         .collect();
     let expected = [7, 7, 7, 7, 7, 3, 3].map(Some);
     assert_eq!(counts, expected);
     // The faster of the two counts, not their sum.
-    assert_eq!(scene.pbf_substeps(0, 4.0).ok(), Some(9));
+    assert_eq!(scene.pbf_substeps(&AT_REST, 0, 4.0).ok(), Some(9));
 }
 
 #[test]
 fn flip_takes_substeps_in_which_nothing_moves_further_than_cfl_cells() {
     // v t + g t² = 3 × 0.2 m with 4 m/s and 10 m/s²: t = (√(16 + 24) − 4) / 20 s.
-    let scene = scene(&["solver.method=flip"]);
+    let scene = flip(&[]);
     let longest = (40f64.sqrt() - 4.0) / 20.0;
     for (part, count) in [(0.9995, 4.0), (1.0005, 5.0)] {
         let remaining = 4.0 * longest * part;
         let (wanted, substep) = scene
-            .flip_substep(1, 0.3, remaining, 4.0, (0, 0.0))
+            .flip_substep(&AT_REST, 1, 0.3, remaining, 4.0, (0, 0.0))
             .expect("few enough");
         assert_eq!(wanted, count, "{part}");
         // The substeps are equal, and this is the first.
@@ -181,14 +198,18 @@ fn flip_takes_substeps_in_which_nothing_moves_further_than_cfl_cells() {
 
 #[test]
 fn flip_counts_the_substeps_that_are_over_and_walls() {
-    let scene = scene(&["solver.method=flip", "water.gravity=[0, 0, 0]", WALL]);
+    let scene = flip(&["water.gravity=[0, 0, 0]", WALL]);
     // 3.99 m/s for 0.3 s are 5.985 cells: two substeps of at most 3.
-    let count = |speed, done| scene.flip_substep(1, 1.0, 0.3, speed, (done, 0.0));
+    let count = |speed, done| scene.flip_substep(&AT_REST, 1, 1.0, 0.3, speed, (done, 0.0));
     assert_eq!(count(3.99, 0).ok().map(|found| found.0), Some(2.0));
     assert_eq!(count(3.99, 3).ok().map(|found| found.0), Some(2.0));
     assert!(count(3.99, 4).is_err(), "six, and five may be");
     // In the first second the wall is faster than the water: 3 m/s for 0.41 s are 6.15 cells.
-    let beside = |start| scene.flip_substep(1, start, 0.41, 0.0, (0, 0.0)).ok();
+    let beside = |start| {
+        scene
+            .flip_substep(&AT_REST, 1, start, 0.41, 0.0, (0, 0.0))
+            .ok()
+    };
     assert_eq!(beside(0.5).map(|found| found.0), Some(3.0));
     assert_eq!(beside(1.0).map(|found| found.0), Some(1.0));
 }
@@ -197,22 +218,22 @@ fn flip_counts_the_substeps_that_are_over_and_walls() {
 fn walls_stand_where_their_motions_have_brought_them() {
     let scene = scene(&[WALL]);
     for (time, x, z) in [(0.0, 0.0, 2.0), (0.5, 1.5, 1.95), (2.0, 3.0, 1.8)] {
-        let walls = scene.walls(time);
+        let walls = scene.walls(&AT_REST, time);
         let (min, max) = (DVec3::new(x, 0.0, 0.0), DVec3::new(10.0, 4.0, z));
         assert!((walls.min - min).length() < 1e-14, "{time}: {walls:?}");
         assert!((walls.max - max).length() < 1e-14, "{time}: {walls:?}");
     }
     // Half the wall's speed over a step half-way through which it stops.
-    let velocity = scene.wall_velocity(1.1, 0.2);
+    let velocity = scene.wall_velocity(&AT_REST, 1.1, 0.2);
     assert!((velocity.min - DVec3::new(1.5, 0.0, 0.0)).length() < 1e-13);
     assert!((velocity.max - DVec3::new(0.0, 0.0, -0.1)).length() < 1e-13);
-    assert_eq!(scene.wall_velocity(0.5, 0.0).min, DVec3::ZERO);
+    assert_eq!(scene.wall_velocity(&AT_REST, 0.5, 0.0).min, DVec3::ZERO);
 }
 
 #[test]
 fn substeps_of_a_frame_take_together_what_the_frame_takes() {
     // pic_blend 0.05 and XSPH's 0.2 leave 0.95 × 0.8 of the particles' velocity.
-    let scene = scene(&["solver.method=flip"]);
+    let scene = flip(&[]);
     let frame = 0.2;
     for parts in [[0.2, 0.0, 0.0], [0.1, 0.05, 0.05], [0.19, 0.005, 0.005]] {
         assert!((parts.iter().sum::<f64>() - frame).abs() < 1e-15);

@@ -6,6 +6,7 @@ use super::solids::Solid;
 pub(super) use swell_domain::flip::ON_FACE;
 use swell_domain::flip::open_extent;
 use swell_domain::{
+    absorber::AbsorberStates,
     boundary::Boundary,
     bounds::Bounds,
     bricks::{Bricks, EDGE, table_dims},
@@ -16,7 +17,7 @@ use swell_domain::{
     signed_distance::SignedDistance,
 };
 use swell_scene::{
-    Scene,
+    FlipScene,
     flip::{Flip, Surface},
     step::Substep,
 };
@@ -25,7 +26,7 @@ use swell_scene::{
 #[derive(Clone, Debug)]
 pub struct Model {
     /// The scene.
-    pub scene: Scene,
+    pub scene: FlipScene,
     /// Cells of the domain along each axis; storage has one more for the upper faces.
     pub cells: [u32; 3],
     /// Signed distances of solids in their initial pose: all static solids as one grid, if there
@@ -63,17 +64,17 @@ pub struct Step<'a> {
 }
 
 impl Model {
-    /// Creates the model of a scene that uses FLIP, with its solids in world space.
-    pub fn new(scene: &Scene, boundary: &Boundary) -> Self {
+    /// Creates the model of a scene, with its solids in world space.
+    pub fn new(scene: &FlipScene, boundary: &Boundary) -> Self {
         let local = |grid: &SignedDistance| SignedDistance {
             origin: grid.origin - scene.domain.min,
             ..grid.clone()
         };
         let solids = boundary.distance.iter().chain(&boundary.moving);
         Self {
-            cells: scene.domain.cells(scene.solver.flip().cell_size),
+            cells: scene.domain.cells(scene.settings().cell_size),
             solids: solids.map(local).collect(),
-            shores: Shores::new(boundary, scene.domain.min, scene.solver.flip().cell_size)
+            shores: Shores::new(boundary, scene.domain.min, scene.settings().cell_size)
                 .joined(scene.periodic),
             at_rest: usize::from(boundary.distance.is_some()),
             scene: scene.clone(),
@@ -82,7 +83,7 @@ impl Model {
 
     /// Returns FLIP's settings.
     pub fn settings(&self) -> &Flip {
-        self.scene.solver.flip()
+        self.scene.settings()
     }
 
     /// Returns Δx, metres.
@@ -145,15 +146,15 @@ impl Model {
         Bricks::periodic(cells, periodic, &is_wet, reach, 1)
     }
 
-    /// Returns the parameters of `substep`.
-    pub fn step(&self, substep: &Substep) -> Step<'_> {
+    /// Returns the parameters of `substep`, in which absorbing walls have these states.
+    pub fn step(&self, substep: &Substep, absorbers: &AbsorberStates) -> Step<'_> {
         let Substep {
             start,
             length,
             kick,
             ..
         } = *substep;
-        let (before, after) = (self.scene.walls(start), self.scene.walls(start + length));
+        let [before, after] = [start, start + length].map(|time| self.scene.walls(absorbers, time));
         Step {
             start,
             length,

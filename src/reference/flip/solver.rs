@@ -22,7 +22,7 @@ use swell_domain::{
     solver::{Observed, PassTime, Projection, Solver, Span, StepReport, Watch},
 };
 use swell_scene::{
-    Scene,
+    FlipScene,
     flip::{AFFINE, Transfer},
     step::Substep,
 };
@@ -98,9 +98,9 @@ impl Trace {
 }
 
 impl Flip {
-    /// Creates the solver for a scene that uses FLIP, with its solids. It solves for pressures by
+    /// Creates the solver for a scene, with its solids. It solves for pressures by
     /// conjugate gradients, which are as accurate as a direct factorisation in a tenth of its time.
-    pub fn new(scene: &Scene, boundary: &Boundary) -> Self {
+    pub fn new(scene: &FlipScene, boundary: &Boundary) -> Self {
         Self {
             model: Model::new(scene, boundary),
             factor_budget: 0,
@@ -159,9 +159,10 @@ impl Flip {
             model,
             timings,
             factor_budget,
+            state,
             ..
         } = self;
-        let step = model.step(substep);
+        let step = model.step(substep, &state.walls);
         let (bricks, mut sorted) = timings.time("flip/reorder", || {
             let bricks = model.bricks(is_wet, &step);
             let cell = assign_cells(model, &bricks, &cloud.position);
@@ -320,7 +321,7 @@ impl Flip {
                 substep.length,
             )?;
         }
-        let step = self.model.step(substep);
+        let step = self.model.step(substep, &self.state.walls);
         let taken = |change: &DVec3| (-*change / substep.kick).as_vec3().to_array();
         self.field = Some(Field {
             is_buried: find_buried(&step, &trace.bricks, &trace.space),
@@ -334,7 +335,7 @@ impl Flip {
 
     /// Copies the state of absorbing walls from `state`.
     pub fn take_absorbers(&mut self, state: &Particles) {
-        self.model.scene.take_absorbers(state);
+        self.state.walls = state.walls;
     }
 
     /// Projects the velocities of particles, given in the order of their ids, over a substep, and
@@ -358,7 +359,7 @@ impl Flip {
         }
         let mut trace = self.judged_substep((frame, number), cloud, &surveyed.is_wet, substep)?;
         trace.add_to(all);
-        let step = self.model.step(substep);
+        let step = self.model.step(substep, &self.state.walls);
         let work = self.model.boundary_work(&step, &trace);
         let order = by_id(&trace.sorted.cloud);
         let is_drop = &trace.given.is_drop;
@@ -395,6 +396,7 @@ impl Flip {
                 return Err(breach.in_substep(report.substeps.max(1)).into());
             }
             let (wanted, substep) = (self.model.scene).flip_substep(
+                &self.state.walls,
                 frame,
                 start + elapsed,
                 length - elapsed,
@@ -404,7 +406,8 @@ impl Flip {
             report.substeps += 1;
             let number = (frame, report.substeps);
             let trace = self.judged_substep(number, cloud, &surveyed.is_wet, &substep)?;
-            report.boundary_work += (self.model).boundary_work(&self.model.step(&substep), &trace);
+            let step = self.model.step(&substep, &self.state.walls);
+            report.boundary_work += self.model.boundary_work(&step, &trace);
             for projected in trace.projections() {
                 report.iterations += u64::from(projected.solution.iterations);
             }
@@ -528,7 +531,6 @@ impl Solver for Flip {
     fn load(&mut self, frame: u32, particles: &Particles) -> Result<(), ReferenceError> {
         self.state = particles.clone();
         self.frame = frame;
-        self.take_absorbers(particles);
         Ok(())
     }
 

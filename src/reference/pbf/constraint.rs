@@ -21,7 +21,7 @@ use super::{
 };
 use crate::{ReferenceError, Timings};
 use swell_domain::{boundary::Boundary, particles::Particles};
-use swell_scene::Scene;
+use swell_scene::PbfScene;
 
 /// Newton steps after which the nonlinear solve fails.
 const MAX_STEPS: usize = 100;
@@ -159,7 +159,7 @@ pub fn converged(
 ///
 /// # Errors Returns the errors of [`converged`].
 pub fn distance_to_converged(
-    scene: &Scene,
+    scene: &PbfScene,
     boundary: &Boundary,
     frame: u32,
     state: &Particles,
@@ -167,7 +167,7 @@ pub fn distance_to_converged(
 ) -> Result<f64, ReferenceError> {
     let mut model = Model::new(scene, boundary);
     let time = f64::from(frame) * scene.shot.frame_seconds();
-    let substep = Substep::new(scene, time, 0.0);
+    let substep = Substep::new(scene, &state.walls, time, 0.0);
     model.stand(scene, time, 0.0);
     let position = local(scene, state);
     let solved = converged(&model, &substep, &position, tolerance)?;

@@ -4,6 +4,7 @@ use glam::DVec3;
 
 use crate::neighbors::Cells;
 use swell_domain::{
+    absorber::AbsorberStates,
     boundary::Boundary,
     bounds::Bounds,
     pbf::{CAP, CONTACT, MAX_CORRECTION, REGULARIZATION},
@@ -12,7 +13,7 @@ use swell_domain::{
     signed_distance::SignedDistance,
     sph::{Calibration, half_space_fraction},
 };
-use swell_scene::Scene;
+use swell_scene::{PbfScene, Scene};
 
 /// Particles that a pass handles, by the parity of their sorted index.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -101,13 +102,14 @@ pub struct Substep {
 }
 
 impl Substep {
-    /// Creates a substep that ends at `time` and is `time_step` long, seconds.
-    pub fn new(scene: &Scene, time: f64, time_step: f64) -> Self {
+    /// Creates a substep that ends at `time` and is `time_step` long, seconds, and in which absorbing
+    /// walls have these states.
+    pub fn new(scene: &Scene, absorbers: &AbsorberStates, time: f64, time_step: f64) -> Self {
         Self {
             time,
             time_step,
-            walls: scene.walls(time),
-            wall_velocity: scene.wall_velocity(time, time_step),
+            walls: scene.walls(absorbers, time),
+            wall_velocity: scene.wall_velocity(absorbers, time, time_step),
         }
     }
 
@@ -120,9 +122,9 @@ impl Substep {
 }
 
 impl Model {
-    /// Creates the model of a scene that uses PBF, with its solids in world space.
-    pub fn new(scene: &Scene, boundary: &Boundary) -> Self {
-        let settings = scene.solver.pbf();
+    /// Creates the model of a scene, with its solids in world space.
+    pub fn new(scene: &PbfScene, boundary: &Boundary) -> Self {
+        let settings = scene.settings();
         let calibration = Calibration::new(settings.particle_spacing, settings.support_ratio);
         let (size, support) = (scene.domain.size(), calibration.support_radius);
         let origin = scene.domain.min;
@@ -360,7 +362,8 @@ mod tests {
             particle_spacing = 0.1
         "#;
         let scene = parse_scene(text, Path::new("walls.toml"), Path::new("."), &[]);
-        Model::new(&scene.expect("a scene"), &Boundary::default())
+        let scene = scene.expect("a scene").with_pbf().expect("of PBF");
+        Model::new(&scene, &Boundary::default())
     }
 
     fn walls() -> Bounds {

@@ -203,6 +203,7 @@ mod tests {
             [solver]\nmethod = \"pbf\"\n[solver.pbf]\nparticle_spacing = 0.1\n\
             artificial_pressure = 0.1\n";
         let scene = parse_scene(text, Path::new("lanes.toml"), Path::new("."), &[]).unwrap();
+        let scene = scene.with_pbf().unwrap();
         let mut model = Model::new(&scene, &Boundary::default());
         let uneven = |k: usize| DVec3::new(0.31, 0.17, 0.23) * (k * k % 97) as f64 * 1e-3;
         let place =
@@ -210,7 +211,11 @@ mod tests {
         model.samples = (0..64).map(|k| place(k) + DVec3::splat(0.33)).collect();
         model.sample_weights = (0..64).map(|k| 0.5 + 0.01 * f64::from(k)).collect();
         let points = (0..512).map(|k| place(k) + uneven(k) + 0.3).collect();
-        (model, Substep::new(&scene, 0.0, 0.01), points)
+        (
+            model,
+            Substep::new(&scene, &Default::default(), 0.0, 0.01),
+            points,
+        )
     }
 
     /// Every sum has the same bits with the processor's widest instructions and with scalar ones.

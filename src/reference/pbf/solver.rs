@@ -20,12 +20,12 @@ use swell_domain::{
     probe::fitted,
     solver::{Observed, PassTime, Projection, Solver, Span, StepReport, Watch},
 };
-use swell_scene::{Iteration, Scene, Stop, step::projected_substep};
+use swell_scene::{Iteration, PbfScene, Scene, Stop, step::projected_substep};
 
 /// PBF in f64. Frames are rounded to f32, as when written, and the next frame starts from the
 /// rounded state.
 pub struct Pbf {
-    scene: Scene,
+    scene: PbfScene,
     model: Model,
     /// FLIP solver that projects velocities, if the scene uses a projection.
     grid: Option<Flip>,
@@ -235,8 +235,8 @@ pub fn iterate_among<'a>(
 }
 
 impl Pbf {
-    /// Creates the solver for a scene that uses PBF, with its solids.
-    pub fn new(scene: &Scene, boundary: &Boundary) -> Self {
+    /// Creates the solver for a scene, with its solids.
+    pub fn new(scene: &PbfScene, boundary: &Boundary) -> Self {
         Self {
             model: Model::new(scene, boundary),
             is_drop: Vec::new(),
@@ -378,7 +378,7 @@ impl Pbf {
 
     /// Returns the relative densities of the state, in its order.
     fn density(&mut self, time: f64) -> Vec<f64> {
-        let substep = Substep::new(&self.scene, time, 0.0);
+        let substep = Substep::new(&self.scene, &self.state.walls, time, 0.0);
         self.model.stand(&self.scene, time, 0.0);
         let (model, timings) = (&self.model, &mut self.timings);
         let position = local(&self.scene, &self.state);
@@ -403,7 +403,6 @@ impl Solver for Pbf {
     fn load(&mut self, frame: u32, particles: &Particles) -> Result<(), ReferenceError> {
         self.state = particles.clone();
         self.frame = frame;
-        self.scene.take_absorbers(particles);
         self.tell_grid();
         Ok(())
     }
@@ -415,9 +414,9 @@ impl Solver for Pbf {
         let frame = self.frame + 1;
         let length = self.scene.shot.frame_seconds();
         let start = f64::from(self.frame) * length;
-        let substeps = self
-            .scene
-            .pbf_substeps(self.frame, self.state.max_speed())?;
+        let substeps =
+            self.scene
+                .pbf_substeps(&self.state.walls, self.frame, self.state.max_speed())?;
         let step = length / f64::from(substeps);
         let mut position = local(&self.scene, &self.state);
         let mut velocity: Vec<DVec3> = self.state.velocity.iter().map(widen).collect();
@@ -428,7 +427,12 @@ impl Solver for Pbf {
             boundary_work +=
                 self.project((k, begin), step, &mut position, &mut velocity, &mut all)?;
             self.state.substep = step;
-            let substep = Substep::new(&self.scene, start + f64::from(k) * step, step);
+            let substep = Substep::new(
+                &self.scene,
+                &self.state.walls,
+                start + f64::from(k) * step,
+                step,
+            );
             let (some, slowed, work) = self.step(&substep, &mut position, &mut velocity);
             iterations += u64::from(some);
             capped += slowed;

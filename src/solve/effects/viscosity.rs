@@ -8,7 +8,7 @@ use swell_gpu::{
     program::Program,
     recording::{Bind, Command},
 };
-use swell_scene::{Method, Scene, effects::viscosity::Settings};
+use swell_scene::{Scene, effects::viscosity::Settings};
 
 use super::{Addition, Between, OnDevice, Turns, pass};
 
@@ -102,14 +102,8 @@ fn back() -> Command {
 /// Returns the relaxation of the implicit solve on a FLIP scene's grid.
 fn relaxation(settings: &Settings, scene: &Scene, length: f64) -> Option<Relaxation> {
     // PBF's own scene has no grid; the scene of its projection does.
-    if scene.solver.method != Method::Flip {
-        return None;
-    }
-    settings.relaxation(
-        length,
-        scene.solver.flip().cell_size,
-        scene.water.rest_density,
-    )
+    let flip = scene.solver.flip()?;
+    settings.relaxation(length, flip.cell_size, scene.water.rest_density)
 }
 
 impl OnDevice for Settings {

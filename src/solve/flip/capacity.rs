@@ -10,17 +10,22 @@ use swell_domain::{
     flip::{layers, stored_cells},
     particles::Particles,
 };
-use swell_scene::{Scene, step::Substep};
+use swell_scene::{FlipScene, step::Substep};
 
 use super::{Flip, PARAMS, plan, pressure_solver, recordings, step, upload_constants};
 
 /// Returns wetness flags of the domain's bricks, none set.
-pub(super) fn no_water(scene: &Scene, grid_dims: [u32; 3]) -> Vec<bool> {
+pub(super) fn no_water(scene: &FlipScene, grid_dims: [u32; 3]) -> Vec<bool> {
     let dims = table_dims(stored_cells(grid_dims, scene.periodic));
     vec![false; dims.iter().map(|&n| n as usize).product()]
 }
 
-pub(super) fn bricks(scene: &Scene, grid_dims: [u32; 3], is_wet: &[bool], layers: usize) -> Bricks {
+pub(super) fn bricks(
+    scene: &FlipScene,
+    grid_dims: [u32; 3],
+    is_wet: &[bool],
+    layers: usize,
+) -> Bricks {
     let reach = (layers as u32).div_ceil(EDGE);
     let cells = stored_cells(grid_dims, scene.periodic);
     Bricks::periodic(cells, scene.periodic, is_wet, reach, LEVELS)
@@ -34,11 +39,11 @@ pub(super) fn capacity_of(bricks: &Bricks) -> Capacity {
 }
 
 /// Returns the bricks that a particle state needs in a scene.
-pub fn capacity(scene: &Scene, particles: &Particles) -> Capacity {
-    let grid_dims = scene.domain.cells(scene.solver.flip().cell_size);
+pub fn capacity(scene: &FlipScene, particles: &Particles) -> Capacity {
+    let grid_dims = scene.domain.cells(scene.settings().cell_size);
     let mut is_wet = no_water(scene, grid_dims);
     let dims = table_dims(stored_cells(grid_dims, scene.periodic)).map(|n| n as usize);
-    let edge = f64::from(EDGE) * scene.solver.flip().cell_size;
+    let edge = f64::from(EDGE) * scene.settings().cell_size;
     for position in &particles.position {
         let x = glam::Vec3::from_array(*position).as_dvec3() - scene.domain.min;
         let at: [usize; 3] =
@@ -51,7 +56,7 @@ pub fn capacity(scene: &Scene, particles: &Particles) -> Capacity {
 
 /// Returns the substep of the first survey, which reads only parameters that do not depend on the
 /// substep.
-pub(super) fn whole_frame(scene: &Scene) -> Substep {
+pub(super) fn whole_frame(scene: &FlipScene) -> Substep {
     Substep {
         start: 0.0,
         length: scene.shot.frame_seconds(),
@@ -79,7 +84,13 @@ impl Flip {
             ..self.plan.counts
         })?;
         let frame = whole_frame(&self.scene);
-        let params = step::params(&self.scene, &self.plan, &self.bricks, &frame);
+        let params = step::params(
+            &self.scene,
+            &self.plan,
+            &self.state.walls,
+            &self.bricks,
+            &frame,
+        );
         self.program.upload(PARAMS, 0, &[params]);
         Ok(())
     }

@@ -34,7 +34,7 @@ use swell_gpu::{
     recording::{Recording, Timer},
     sort,
 };
-use swell_scene::{Scene, moving_solid::MovingSolid, step::Substep};
+use swell_scene::{FlipScene, moving_solid::MovingSolid, step::Substep};
 
 use super::{
     SolveError,
@@ -57,7 +57,7 @@ pub(super) use totals::FrameTotals;
 pub struct Flip {
     program: Program,
     plan: Plan,
-    scene: Scene,
+    scene: FlipScene,
     movers: Option<Movers>,
     shores: Shores,
     recordings: Recordings,
@@ -89,7 +89,7 @@ impl Flip {
     /// compile, or the device fails.
     pub fn new(
         context: &Context,
-        scene: &Scene,
+        scene: &FlipScene,
         plan: Plan,
         boundary: &Boundary,
         is_timed: bool,
@@ -100,21 +100,23 @@ impl Flip {
         upload_constants(&program, &plan, scene);
         let bricks = bricks(scene, plan.grid_dims, &no_water(scene, plan.grid_dims), 0);
         let frame = whole_frame(scene);
-        program.upload(PARAMS, 0, &[step::params(scene, &plan, &bricks, &frame)]);
+        let state = Particles::default();
+        let params = step::params(scene, &plan, &state.walls, &bricks, &frame);
+        program.upload(PARAMS, 0, &[params]);
         Ok(Self {
             recordings: recordings(&program, &plan, scene),
             pressure: pressure_solver(scene, &plan),
             timer: is_timed.then(|| Timer::new(context)),
             bricks,
-            cut: step::cut(scene, &frame),
+            cut: step::cut(scene, &state.walls, &frame),
             kick: frame.kick,
             program,
             plan,
             scene: scene.clone(),
             movers: Movers::of(boundary, scene),
-            shores: Shores::new(boundary, scene.domain.min, scene.solver.flip().cell_size)
+            shores: Shores::new(boundary, scene.domain.min, scene.settings().cell_size)
                 .joined(scene.periodic),
-            state: Particles::default(),
+            state,
             frame: 0,
         })
     }
@@ -187,6 +189,7 @@ impl Flip {
         }
         let frame = self.frame + 1;
         let chosen = (self.scene).flip_substep(
+            &self.state.walls,
             frame,
             start,
             remaining,
@@ -199,8 +202,8 @@ impl Flip {
     /// Extends `is_wet`, the bricks that hold particles, by bricks near solids that belong to the
     /// water.
     fn with_shores(&self, is_wet: &[bool], substep: &Substep) -> Vec<bool> {
-        let size = self.scene.solver.flip().cell_size;
-        let cut = step::cut(&self.scene, substep);
+        let size = self.scene.settings().cell_size;
+        let cut = step::cut(&self.scene, &self.state.walls, substep);
         let moving = self.scene.moving_solids.iter();
         let least = self.scene.domain.min;
         let pose = |solid: &MovingSolid| solid.pose(substep.start).moved(-least).scaled(1.0 / size);
@@ -225,9 +228,9 @@ impl Flip {
             })?;
         }
         let bricks = &self.bricks;
-        let params = step::params(&self.scene, &self.plan, bricks, substep);
+        let params = step::params(&self.scene, &self.plan, &self.state.walls, bricks, substep);
         let groups = groups(&self.program, &self.scene, &params, layers);
-        self.cut = step::cut(&self.scene, substep);
+        self.cut = step::cut(&self.scene, &self.state.walls, substep);
         self.kick = substep.kick;
         self.program.upload(PARAMS, 0, &[params]);
         (self.program).upload(BRICKS, 0, bytemuck::cast_slice(&bricks.records));
@@ -311,7 +314,7 @@ impl Flip {
             kick: substep.kick,
             rest_density: self.scene.water.rest_density,
         };
-        let cell_size = self.scene.solver.flip().cell_size;
+        let cell_size = self.scene.settings().cell_size;
         self.pressure
             .set_topology(&self.program, &self.bricks, cell_size);
         self.pressure.project_by(&self.program, scale, run)
@@ -349,7 +352,7 @@ impl Flip {
                 .run_between(&self.program, turns.again, run)?;
             self.project_within_budget(substep, totals, run)?;
         }
-        if self.scene.solver.flip().density_correction {
+        if self.scene.settings().density_correction {
             let corrected = self.pressure.correct_by(&self.program, run)?;
             totals.projection.correction_iterations += u64::from(corrected.iterations);
             totals.projection.missed += u32::from(corrected.is_missed);
@@ -359,7 +362,7 @@ impl Flip {
             &[&self.recordings.to_particles, &self.recordings.watch],
         )?;
         let work = self.watched(totals.substeps)?;
-        let face = self.scene.solver.flip().cell_size.powi(2);
+        let face = self.scene.settings().cell_size.powi(2);
         totals.work += face * substep.kick * work;
         self.state.substep = substep.length;
         Ok(())
@@ -387,7 +390,7 @@ impl Flip {
 
     /// Copies the state of absorbing walls from `state`.
     pub(crate) fn take_absorbers(&mut self, state: &Particles) {
-        self.scene.take_absorbers(state);
+        self.state.walls = state.walls;
     }
 
     /// Surveys the particles and chooses the next substep; also returns whether it is the frame's
@@ -416,7 +419,7 @@ impl Flip {
 
     fn upload_state(&self) {
         upload(&self.program, &self.scene, &self.state);
-        let names = self.scene.solver.flip().attributes();
+        let names = self.scene.settings().attributes();
         if !names.is_empty() {
             let mut rows = vec![0.0f32; names.len() * self.state.len()];
             for (k, name) in names.iter().enumerate() {
@@ -443,7 +446,7 @@ impl Flip {
             &position,
             &velocity,
         );
-        let names = self.scene.solver.flip().attributes();
+        let names = self.scene.settings().attributes();
         if !names.is_empty() {
             let rows = self.field(AFFINE, names.len() * n)?;
             for (k, name) in names.iter().enumerate() {
@@ -472,7 +475,6 @@ impl Solver for Flip {
         }
         self.state = particles.clone();
         self.frame = frame;
-        self.scene.take_absorbers(particles);
         self.upload_state();
         Ok(())
     }
@@ -571,13 +573,13 @@ impl TraceFrame for Flip {
 }
 
 /// Binds the commands of a plan to the current buffers of the program.
-fn recordings(program: &Program, plan: &Plan, scene: &Scene) -> Recordings {
+fn recordings(program: &Program, plan: &Plan, scene: &FlipScene) -> Recordings {
     let effects = effects::of_flip(scene, CELLS as usize * plan.counts.bricks.slots);
     Recordings::new(program, &Commands::new(plan, scene, &effects))
 }
 
-fn pressure_solver(scene: &Scene, plan: &Plan) -> PressureSolver {
-    let flip = scene.solver.flip();
+fn pressure_solver(scene: &FlipScene, plan: &Plan) -> PressureSolver {
+    let flip = scene.settings();
     PressureSolver::new(
         &flip.pressure,
         flip.density_correction,
@@ -586,11 +588,11 @@ fn pressure_solver(scene: &Scene, plan: &Plan) -> PressureSolver {
 }
 
 /// Uploads data that does not change between substeps.
-fn upload_constants(program: &Program, plan: &Plan, scene: &Scene) {
+fn upload_constants(program: &Program, plan: &Plan, scene: &FlipScene) {
     let cells = plan.counts.bricks.wet * CELLS as usize;
     sort::upload_lengths(program, &CELL_START, cells);
     program.upload(ELEMENT_COUNT, 0, &[[plan.counts.particles as u32, 0, 0, 0]]);
     program.upload_windows(&AXES, &numbers(0, 3));
     // Layer 2 is the first that is extrapolated.
-    program.upload_windows(&LAYERS, &numbers(2, layers(scene.solver.flip().cfl)));
+    program.upload_windows(&LAYERS, &numbers(2, layers(scene.settings().cfl)));
 }

@@ -11,7 +11,7 @@ use swell_domain::{
 };
 use swell_gpu::{program::PassSpec, recording::Command, sort};
 use swell_scene::{
-    Scene,
+    FlipScene,
     flip::{Surface, Transfer},
 };
 
@@ -24,8 +24,8 @@ use super::{
 const FACES: usize = 9;
 
 /// Plans FLIP with its projection for `scene`; `moves` says whether it moves particles.
-pub(crate) fn plan(scene: &Scene, counts: Counts, moves: bool) -> Plan {
-    let flip = scene.solver.flip();
+pub(crate) fn plan(scene: &FlipScene, counts: Counts, moves: bool) -> Plan {
+    let flip = scene.settings();
     let mut plan = Plan::bare(counts, scene.domain.cells(flip.cell_size));
     plan.moves = moves;
     let effects = effects::of_flip(scene, CELLS as usize * counts.bricks.slots);
@@ -64,8 +64,8 @@ pub(crate) fn plan(scene: &Scene, counts: Counts, moves: bool) -> Plan {
 }
 
 /// Returns every command of a substep, with those of projections on any brick layout.
-pub(crate) fn commands(plan: &Plan, scene: &Scene) -> Vec<Command> {
-    let flip = scene.solver.flip();
+pub(crate) fn commands(plan: &Plan, scene: &FlipScene) -> Vec<Command> {
+    let flip = scene.settings();
     let effects = effects::of_flip(scene, CELLS as usize * plan.counts.bricks.slots);
     let commands = Commands::new(plan, scene, &effects);
     let projection = pressure::all_commands(flip.pressure.preconditioner, flip.density_correction);
@@ -82,13 +82,13 @@ pub(crate) fn commands(plan: &Plan, scene: &Scene) -> Vec<Command> {
 /// Returns whether particles that are too close to each other are pushed apart: with the density
 /// correction, which only sees cells, and for a solver whose own corrections only act on
 /// compression.
-pub(super) fn pushes(plan: &Plan, scene: &Scene) -> bool {
-    scene.solver.flip().density_correction || !plan.moves
+pub(super) fn pushes(plan: &Plan, scene: &FlipScene) -> bool {
+    scene.settings().density_correction || !plan.moves
 }
 
 /// Returns the defines for all passes of the plan; a pass ignores those that it does not use.
-fn conditions(plan: &Plan, scene: &Scene) -> Vec<&'static str> {
-    let flip = scene.solver.flip();
+fn conditions(plan: &Plan, scene: &FlipScene) -> Vec<&'static str> {
+    let flip = scene.settings();
     let all = [
         ("SOLIDS", plan.has_solids()),
         ("MOVING_SOLIDS", plan.counts.moving_nodes > 0),
@@ -104,11 +104,11 @@ fn conditions(plan: &Plan, scene: &Scene) -> Vec<&'static str> {
 }
 
 /// Returns whether the pass that pushes particles apart reads [`PLACE`].
-fn has_places(plan: &Plan, scene: &Scene) -> bool {
+fn has_places(plan: &Plan, scene: &FlipScene) -> bool {
     pushes(plan, scene) && plan.has_places(scene)
 }
 
-fn buffers(plan: &Plan, scene: &Scene) -> Table {
+fn buffers(plan: &Plan, scene: &FlipScene) -> Table {
     let mut table = Table::default();
     particles(plan, scene, &mut table);
     bricks(plan, scene, &mut table);
@@ -119,8 +119,8 @@ fn buffers(plan: &Plan, scene: &Scene) -> Table {
     table
 }
 
-fn particles(plan: &Plan, scene: &Scene, table: &mut Table) {
-    let flip = scene.solver.flip();
+fn particles(plan: &Plan, scene: &FlipScene, table: &mut Table) {
+    let flip = scene.settings();
     let n = plan.counts.particles;
     let vectors = [POSITION, VELOCITY, SORTED_POSITION, SORTED_VELOCITY];
     table.extend("flip", vectors.map(|buffer| buffer.sized(n)));
@@ -145,8 +145,8 @@ fn particles(plan: &Plan, scene: &Scene, table: &mut Table) {
 }
 
 /// Declares buffers whose size follows the number of bricks, which changes during a run.
-fn bricks(plan: &Plan, scene: &Scene, table: &mut Table) {
-    let flip = scene.solver.flip();
+fn bricks(plan: &Plan, scene: &FlipScene, table: &mut Table) {
+    let flip = scene.settings();
     let slots = plan.counts.bricks.slots;
     let wet = plan.counts.bricks.wet * CELLS as usize;
     let all = slots * CELLS as usize;

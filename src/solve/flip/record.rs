@@ -14,7 +14,7 @@ use swell_gpu::{
     recording::{Bind, Command, Groups, Recording, spread},
     sort,
 };
-use swell_scene::Scene;
+use swell_scene::FlipScene;
 
 use super::{buffers::*, plan::pushes};
 
@@ -95,7 +95,11 @@ pub(super) struct Commands {
 }
 
 impl Commands {
-    pub(super) fn new(plan: &Plan, scene: &Scene, effects: &[(&'static str, Addition)]) -> Self {
+    pub(super) fn new(
+        plan: &Plan,
+        scene: &FlipScene,
+        effects: &[(&'static str, Addition)],
+    ) -> Self {
         let n = plan.counts.particles;
         let between = || {
             effects
@@ -138,7 +142,7 @@ impl Commands {
 /// dispatches.
 pub(super) fn groups(
     program: &Program,
-    scene: &Scene,
+    scene: &FlipScene,
     params: &FlipParams,
     needed: usize,
 ) -> Vec<Workgroups> {
@@ -149,7 +153,7 @@ pub(super) fn groups(
         FIRST_LAYER + needed.saturating_sub(1),
         of(params.active_cells),
     );
-    let planned = FIRST_LAYER + layers(scene.solver.flip().cfl);
+    let planned = FIRST_LAYER + layers(scene.settings().cfl);
     all.resize(all.len().max(planned), Workgroups::default());
     all
 }
@@ -182,11 +186,11 @@ fn along(pass: &'static str, size: usize, axis: usize) -> Command {
 
 /// Returns whether the wall-friction model slows water along no-slip walls; not if an effect
 /// resolves the friction on the grid.
-fn slows_along_walls(scene: &Scene) -> bool {
+fn slows_along_walls(scene: &FlipScene) -> bool {
     !scene.no_slip.is_empty() && !scene.effects.act_between_projections()
 }
 
-fn to_grid(plan: &Plan, scene: &Scene, effects: &[(&'static str, Addition)]) -> Vec<Command> {
+fn to_grid(plan: &Plan, scene: &FlipScene, effects: &[(&'static str, Addition)]) -> Vec<Command> {
     let n = plan.counts.particles;
     let cells = plan.counts.bricks.wet * CELLS as usize;
     let mut commands = vec![
@@ -211,7 +215,7 @@ fn to_grid(plan: &Plan, scene: &Scene, effects: &[(&'static str, Addition)]) -> 
     commands.push(over("flip/gather_centers", ACTIVE));
     commands.push(over("flip/find_water", ACTIVE));
     commands.push(over("flip/close_gaps", WET));
-    if scene.solver.flip().density_correction {
+    if scene.settings().density_correction {
         commands.push(over("flip/find_excess", ACTIVE));
     }
     if scene.has_inlets() {
@@ -226,7 +230,7 @@ fn to_grid(plan: &Plan, scene: &Scene, effects: &[(&'static str, Addition)]) -> 
     commands
 }
 
-fn watch(plan: &Plan, scene: &Scene) -> Vec<Command> {
+fn watch(plan: &Plan, scene: &FlipScene) -> Vec<Command> {
     let look = |PlannedBuffer { spec, .. }: &PlannedBuffer| Command::Dispatch {
         pass: "flip/find_not_finite",
         binds: vec![Bind {
@@ -244,8 +248,8 @@ fn watch(plan: &Plan, scene: &Scene) -> Vec<Command> {
     commands
 }
 
-fn to_particles(plan: &Plan, scene: &Scene) -> Vec<Command> {
-    let flip = scene.solver.flip();
+fn to_particles(plan: &Plan, scene: &FlipScene) -> Vec<Command> {
+    let flip = scene.settings();
     let mut commands = vec![over("flip/find_change", ACTIVE)];
     for k in 0..layers(flip.cfl).saturating_sub(1) {
         let binds = vec![LAYERS.bind(k)];

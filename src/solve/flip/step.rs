@@ -5,26 +5,36 @@ use crate::{
     plan::Plan,
 };
 use swell_domain::{
+    absorber::AbsorberStates,
     bounds::Bounds,
     bricks::{Bricks, CELLS, table_dims},
     flip::{CAP, CONTACT, stored_cells},
 };
-use swell_scene::{Scene, step::Substep};
+use swell_scene::{FlipScene, step::Substep};
 
 /// Returns the walls that cut a substep's cells, in cells.
-pub(super) fn cut(scene: &Scene, step: &Substep) -> Bounds {
-    let (walls, size) = (scene.walls(step.start), scene.solver.flip().cell_size);
+pub(super) fn cut(scene: &FlipScene, absorbers: &AbsorberStates, step: &Substep) -> Bounds {
+    let (walls, size) = (
+        scene.walls(absorbers, step.start),
+        scene.settings().cell_size,
+    );
     Bounds {
         min: walls.min / size,
         max: walls.max / size,
     }
 }
 
-pub(super) fn params(scene: &Scene, plan: &Plan, bricks: &Bricks, step: &Substep) -> FlipParams {
-    let flip = scene.solver.flip();
-    let after = scene.walls(step.start + step.length);
-    let cut = cut(scene, step);
-    let speed = scene.wall_velocity(step.start + step.length, step.length);
+pub(super) fn params(
+    scene: &FlipScene,
+    plan: &Plan,
+    absorbers: &AbsorberStates,
+    bricks: &Bricks,
+    step: &Substep,
+) -> FlipParams {
+    let flip = scene.settings();
+    let after = scene.walls(absorbers, step.start + step.length);
+    let cut = cut(scene, absorbers, step);
+    let speed = scene.wall_velocity(absorbers, step.start + step.length, step.length);
     FlipParams {
         wall_min: after.min.as_vec3().to_array(),
         particle_count: plan.counts.particles as u32,
@@ -58,7 +68,7 @@ pub(super) fn params(scene: &Scene, plan: &Plan, bricks: &Bricks, step: &Substep
 }
 
 /// Returns the uniform with the boxes of cells where water enters.
-pub(super) fn inlets(scene: &Scene, step: &Substep) -> Inlets {
+pub(super) fn inlets(scene: &FlipScene, step: &Substep) -> Inlets {
     let mut inlets = Inlets::default();
     let all = scene.inlets(step.start, step.length);
     for (k, inlet) in all.into_iter().enumerate() {

@@ -78,7 +78,7 @@ impl Flip {
         let gauge = Gauge {
             bricks: &self.bricks,
             cells: self.plan.grid_dims,
-            cell_size: self.scene.solver.flip().cell_size,
+            cell_size: self.scene.settings().cell_size,
             kind: &kind,
             is_buried: &self.find_buried()?,
             pressure: &pressure,

@@ -9,6 +9,7 @@ pub(super) mod record;
 use glam::{DVec3, Vec3};
 
 use swell_domain::{
+    absorber::AbsorberStates,
     boundary::Boundary,
     budget::Breach,
     particles::Particles,
@@ -26,7 +27,7 @@ use swell_gpu::{
     recording::{Recording, Timer, spread},
     sort,
 };
-use swell_scene::{Scene, Stop};
+use swell_scene::{PbfScene, Stop};
 
 use super::{
     SolveError,
@@ -49,7 +50,7 @@ const NOBODY: [f32; 4] = [1e15, 1e15, 1e15, 0.0];
 pub struct Pbf {
     program: Program,
     plan: Plan,
-    scene: Scene,
+    scene: PbfScene,
     calibration: Calibration,
     substep: Recording,
     measure: Recording,
@@ -68,15 +69,15 @@ pub struct Pbf {
 
 /// Returns the parameters of a substep that ends at `time` and is `step` seconds long.
 pub(super) fn params(
-    scene: &Scene,
+    scene: &PbfScene,
     calibration: &Calibration,
     plan: &Plan,
-    time: f64,
-    step: f64,
+    absorbers: &AbsorberStates,
+    (time, step): (f64, f64),
 ) -> Params {
-    let pbf = scene.solver.pbf();
-    let walls = scene.walls(time);
-    let wall_velocity = scene.wall_velocity(time, step);
+    let pbf = scene.settings();
+    let walls = scene.walls(absorbers, time);
+    let wall_velocity = scene.wall_velocity(absorbers, time, step);
     let Period(period) = scene.period();
     let natural_lambda = 1.0 / calibration.bulk_gradient_squares;
     Params {
@@ -129,7 +130,7 @@ pub(super) fn upload_places(
 fn set_up(
     program: &Program,
     plan: &Plan,
-    scene: &Scene,
+    scene: &PbfScene,
     boundary: &Boundary,
     calibration: &Calibration,
 ) -> [Recording; 2] {
@@ -152,14 +153,14 @@ impl Pbf {
     /// compile, or the device fails.
     pub fn new(
         context: &Context,
-        scene: &Scene,
+        scene: &PbfScene,
         plan: Plan,
         boundary: &Boundary,
         is_timed: bool,
     ) -> Result<Self, SolveError> {
         let (buffers, passes) = (plan.buffer_specs(), plan.pass_specs());
         let program = Program::new(context, &buffers, &passes, &shared_constants(&plan))?;
-        let pbf = scene.solver.pbf();
+        let pbf = scene.settings();
         let calibration = Calibration::new(pbf.particle_spacing, pbf.support_ratio);
         let [substep, measure] = set_up(&program, &plan, scene, boundary, &calibration);
         Ok(Self {
@@ -236,7 +237,14 @@ impl Pbf {
     }
 
     fn params(&self, time: f64, step: f64) -> Params {
-        params(&self.scene, &self.calibration, &self.plan, time, step)
+        let (scene, absorbers) = (&self.scene, &self.state.walls);
+        params(
+            scene,
+            &self.calibration,
+            &self.plan,
+            absorbers,
+            (time, step),
+        )
     }
 
     /// Resets the counters and sums of a frame.
@@ -289,7 +297,7 @@ impl Pbf {
             );
         }
         effects::upload(&self.program, &self.scene, (time, step));
-        if let Stop::DensityError { .. } = self.scene.solver.pbf().stop {
+        if let Stop::DensityError { .. } = self.scene.settings().stop {
             self.program.upload(CONTROL, 0, &[self.control()]);
         }
         Ok(())
@@ -307,7 +315,8 @@ impl Pbf {
 
     /// Returns the number of substeps in the next frame.
     fn substeps(&self) -> Result<u32, SolveError> {
-        let substeps = (self.scene).pbf_substeps(self.frame, self.state.max_speed())?;
+        let substeps =
+            (self.scene).pbf_substeps(&self.state.walls, self.frame, self.state.max_speed())?;
         Ok(substeps)
     }
 
@@ -342,7 +351,7 @@ impl Pbf {
         let n = self.plan.counts.particles;
         let wanted = (POSITION.first(n), LAMBDA_SUM.first(n));
         let (position, lambda) = self.program.download(wanted)?;
-        let relaxation = self.scene.solver.pbf().relaxation;
+        let relaxation = self.scene.settings().relaxation;
         let density = self.scene.water.rest_density;
         let scale = self.calibration.pressure_scale(density, relaxation, step);
         let particles = position.iter().zip(&lambda);
@@ -408,7 +417,6 @@ impl Solver for Pbf {
         }
         self.state = particles.clone();
         self.frame = frame;
-        self.scene.take_absorbers(particles);
         upload(&self.program, &self.scene, &self.state);
         match &mut self.grid {
             Some(grid) => grid.load(frame, particles),
@@ -457,7 +465,7 @@ impl Solver for Pbf {
             // resumed bake does.
             upload(&self.program, &self.scene, &self.state);
         }
-        let iterations = match self.scene.solver.pbf().stop {
+        let iterations = match self.scene.settings().stop {
             Stop::Iterations(count) => u64::from(count) * u64::from(substeps),
             Stop::DensityError { .. } => u64::from(counters.iterations),
         };

@@ -10,7 +10,7 @@ use swell_gpu::{
     recording::Command,
     sort,
 };
-use swell_scene::{Iteration, Scene, Stop};
+use swell_scene::{Iteration, PbfScene, Stop};
 
 use super::{buffers::*, record::Commands};
 
@@ -28,8 +28,8 @@ const LIST_BLOCK: usize = 512;
 const LIST_FOURS: usize = LIST_CAPACITY as usize / 4;
 
 /// Plans PBF for `scene`.
-pub(crate) fn plan(scene: &Scene, counts: Counts, limits: DeviceLimits) -> Plan {
-    let pbf = scene.solver.pbf();
+pub(crate) fn plan(scene: &PbfScene, counts: Counts, limits: DeviceLimits) -> Plan {
+    let pbf = scene.settings();
     let calibration = Calibration::new(pbf.particle_spacing, pbf.support_ratio);
     let (size, support) = (scene.domain.size(), calibration.support_radius);
     let mut plan = Plan::bare(counts, scene.period().cells(size, support));
@@ -55,7 +55,7 @@ pub(crate) fn plan(scene: &Scene, counts: Counts, limits: DeviceLimits) -> Plan 
 }
 
 /// Returns every command of a substep and of a frame's final measurement.
-pub(crate) fn commands(plan: &Plan, scene: &Scene) -> Vec<Command> {
+pub(crate) fn commands(plan: &Plan, scene: &PbfScene) -> Vec<Command> {
     let effects = effects::of_pbf(scene, plan.counts.particles);
     let commands = Commands::new(plan, scene, &effects);
     [commands.substep, commands.measure].concat()
@@ -105,12 +105,12 @@ fn choose_lists(plan: &mut Plan, limits: DeviceLimits) {
 }
 
 /// Returns whether lists are built from [`PLACE`].
-fn has_places(plan: &Plan, scene: &Scene) -> bool {
+fn has_places(plan: &Plan, scene: &PbfScene) -> bool {
     plan.has_lists && plan.has_places(scene)
 }
 
 /// Returns the defines for all passes of the plan; a pass ignores those that it does not use.
-fn conditions(plan: &Plan, scene: &Scene) -> Vec<&'static str> {
+fn conditions(plan: &Plan, scene: &PbfScene) -> Vec<&'static str> {
     let mut conditions = Vec::new();
     if plan.has_solids() {
         conditions.push("SOLIDS");
@@ -127,7 +127,7 @@ fn conditions(plan: &Plan, scene: &Scene) -> Vec<&'static str> {
     if has_places(plan, scene) {
         conditions.push("PLACES");
     }
-    if scene.solver.pbf().grid_projection {
+    if scene.settings().grid_projection {
         conditions.push("PROJECTED");
     }
     if plan.page.is_some() {
@@ -137,8 +137,8 @@ fn conditions(plan: &Plan, scene: &Scene) -> Vec<&'static str> {
 }
 
 /// Returns the defines and constants of a single pass.
-fn own(name: &'static str, scene: &Scene) -> PassSpec {
-    let pbf = scene.solver.pbf();
+fn own(name: &'static str, scene: &PbfScene) -> PassSpec {
+    let pbf = scene.settings();
     let is_adaptive = matches!(pbf.stop, Stop::DensityError { .. });
     let all: &[(&str, bool)] = match name {
         "pbf/predict" => &[("WALL_WORK", scene.has_movers())],
@@ -167,7 +167,7 @@ fn own(name: &'static str, scene: &Scene) -> PassSpec {
     }
 }
 
-fn buffers(plan: &Plan, scene: &Scene, phases: usize) -> Table {
+fn buffers(plan: &Plan, scene: &PbfScene, phases: usize) -> Table {
     let n = plan.counts.particles;
     let cells = cell_count(plan);
     let mut table = Table::default();
@@ -200,11 +200,11 @@ fn buffers(plan: &Plan, scene: &Scene, phases: usize) -> Table {
     ];
     table.extend("pbf", vectors.map(|buffer| buffer.sized(n)));
     table.extend("pbf", [ID.sized(n), SORTED_ID.sized(n), DENSITY.sized(n)]);
-    if scene.solver.pbf().grid_projection {
+    if scene.settings().grid_projection {
         table.extend("pbf", [IS_DROP.sized(n), SORTED_IS_DROP.sized(n)]);
     }
     table.add("pbf", COUNTERS.sized(1));
-    if let Stop::DensityError { .. } = scene.solver.pbf().stop {
+    if let Stop::DensityError { .. } = scene.settings().stop {
         table.add("pbf", CONTROL.sized(1));
         table.add("pbf", ERROR_SUMS.sized(n.div_ceil(256)));
     }

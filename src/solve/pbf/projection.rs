@@ -15,7 +15,7 @@ use swell_domain::{
     solver::{Projection, Solver},
 };
 use swell_gpu::{adapter::Context, program::Program};
-use swell_scene::Scene;
+use swell_scene::PbfScene;
 
 /// A FLIP solver that projects velocities but does not move particles.
 pub(super) struct Grid {
@@ -27,7 +27,7 @@ impl Grid {
     /// Builds the grid if the plan has one.
     pub(super) fn of(
         context: &Context,
-        scene: &Scene,
+        scene: &PbfScene,
         plan: &Plan,
         boundary: &Boundary,
     ) -> Result<Option<Self>, SolveError> {

@@ -2,7 +2,7 @@
 
 use crate::{effects::Addition, params::Phase, plan::Plan};
 use swell_gpu::{recording::Command, sort};
-use swell_scene::Scene;
+use swell_scene::PbfScene;
 
 use super::{buffers::*, iteration::Builder, plan::cell_count};
 
@@ -17,7 +17,7 @@ pub(super) struct Commands {
 }
 
 impl Commands {
-    pub(super) fn new(plan: &Plan, scene: &Scene, effects: &[(&'static str, Addition)]) -> Self {
+    pub(super) fn new(plan: &Plan, scene: &PbfScene, effects: &[(&'static str, Addition)]) -> Self {
         let mut builder = Builder::new(plan);
         Self {
             substep: substep(plan, scene, effects, &mut builder),
@@ -42,11 +42,11 @@ pub(crate) fn sorting(plan: &Plan) -> Vec<Command> {
 
 fn substep(
     plan: &Plan,
-    scene: &Scene,
+    scene: &PbfScene,
     effects: &[(&'static str, Addition)],
     builder: &mut Builder<'_>,
 ) -> Vec<Command> {
-    let pbf = scene.solver.pbf();
+    let pbf = scene.settings();
     let mut commands = vec![Command::over("pbf/predict", plan.counts.particles)];
     if scene.reads_multipliers() {
         commands.push(Command::clear(&LAMBDA_SUM));

@@ -19,7 +19,7 @@ pub(super) fn manifest(plan: &BakePlan<'_>, device: &Identity) -> Manifest {
         shaders: device.shaders.clone(),
         shot: scene.shot.name.clone(),
         scene_hash: swell_files::physics_hash(scene),
-        solver: scene.solver.method.name().into(),
+        solver: scene.solver.method().name().into(),
         device: device.name.clone(),
         driver: device.driver.clone(),
         backend: device.backend.clone(),

@@ -30,7 +30,7 @@ fn name(wall: Wall) -> String {
 /// Displacement of each wave maker from the domain's side at a frame, metres, given the frame's
 /// state.
 pub(super) fn displacements(scene: &Scene, state: &Particles, frame: u32) -> Vec<(String, DVec3)> {
-    let walls = scene.walls_after(state, scene.shot.time(frame));
+    let walls = scene.walls(&state.walls, scene.shot.time(frame));
     let size = scene.domain.size();
     let makers = scene.wave_makers.iter().map(|maker| maker.wall);
     makers

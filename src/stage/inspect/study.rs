@@ -36,7 +36,7 @@ impl Outline {
         let (kind, parts) = match study {
             Study::SolverComparison(it) => {
                 let part = |scene: &swell_scene::Scene| Part {
-                    name: scene.solver.method.name().to_owned(),
+                    name: scene.solver.method().name().to_owned(),
                     key: format!("frames {}, pictures {}", it.frames, it.pictures),
                     points: vec![scene.shot.name.clone()],
                 };
@@ -129,7 +129,7 @@ fn held(stability: &Stability) -> Vec<Part> {
             Held::Runs(trials) => (
                 "runs".to_owned(),
                 (trials.iter())
-                    .map(|it| on(it.scene.solver.method.name(), it.device))
+                    .map(|it| on(it.scene.solver.method().name(), it.device))
                     .collect(),
             ),
             Held::Refusal { attempts, .. } => (

@@ -39,7 +39,7 @@ pub(super) fn render_scene(
         particle_spacing: scene.particle_spacing(),
         frames_per_second: scene.shot.frames_per_second,
         gravity: scene.water.gravity,
-        wave_makers: plates(scene, &scene.walls_after(state, time)),
+        wave_makers: plates(scene, &scene.walls(&state.walls, time)),
         waves: scene.effects.waves(scene.water.gravity),
     })
 }

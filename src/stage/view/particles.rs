@@ -115,7 +115,7 @@ impl Balls {
     fn walls(&self, water: &Particles, time: f64) -> Bounds {
         let scene = &self.scene;
         let mut walls = scene.domain;
-        let now = scene.walls_after(water, time);
+        let now = scene.walls(&water.walls, time);
         for maker in &scene.wave_makers {
             let (axis, corner) = (maker.wall.axis, scene.domain.min);
             match maker.wall.is_max {

@@ -7,7 +7,7 @@ use swell_cache::CacheReader;
 use swell_check::Table;
 use swell_domain::{boundary::Boundary, whitewater::Settings};
 use swell_gpu::adapter::Context;
-use swell_scene::Scene;
+use swell_scene::PbfScene;
 
 use super::{WhitewaterError, is_of, recorded, water::Water};
 
@@ -15,7 +15,7 @@ use super::{WhitewaterError, is_of, recorded, water::Water};
 pub struct Stream {
     stream: CacheReader,
     cache: CacheReader,
-    scene: Scene,
+    scene: PbfScene,
     boundary: Boundary,
     settings: Settings,
     particles: usize,

@@ -7,7 +7,7 @@ use swell_domain::{
     solver::PassTime,
     whitewater::{Potentials, Settings},
 };
-use swell_scene::Scene;
+use swell_scene::PbfScene;
 
 pub(super) enum Engine {
     Gpu(Box<swell_solve::whitewater::Whitewater>),
@@ -19,7 +19,7 @@ impl Engine {
     /// scene.
     pub(super) fn new(
         opened: &Opened,
-        scene: &Scene,
+        scene: &PbfScene,
         boundary: &Boundary,
         water: usize,
         is_timed: bool,

@@ -335,7 +335,7 @@ fn probes_leave_the_water_as_it_is() {
     let mut scene = support::scene([1.6, 1.6, 0.8]);
     let particles = lattice([0.0; 3], [6, 10, 8], [D; 3]);
     let plain = support::run(&context, &scene, &particles, 10).0;
-    assert_eq!(scene.solver.method, Method::Pbf);
+    assert_eq!(scene.solver.method(), Method::Pbf);
     scene.probes.push(Probe {
         name: "p".to_owned(),
         kind: ProbeKind::Pressure {
@@ -379,12 +379,14 @@ fn the_reference_sees_the_same_pressure() {
         let boundary = &start.boundary;
         let plan = start.plan(&scene, device_limits(&context));
         let [gpu, cpu] = if method == "pbf" {
-            let gpu = Pbf::new(&context, &scene, plan, boundary, false).unwrap();
-            let cpu = swell::reference::pbf::Pbf::new(&scene, boundary);
+            let gpu =
+                Pbf::new(&context, &scene.with_pbf().unwrap(), plan, boundary, false).unwrap();
+            let cpu = swell::reference::pbf::Pbf::new(&scene.with_pbf().unwrap(), boundary);
             [seen(gpu, &start, &points), seen(cpu, &start, &points)]
         } else {
-            let gpu = Flip::new(&context, &scene, plan, boundary, false).unwrap();
-            let cpu = swell::reference::flip::Flip::new(&scene, boundary);
+            let gpu =
+                Flip::new(&context, &scene.with_flip().unwrap(), plan, boundary, false).unwrap();
+            let cpu = swell::reference::flip::Flip::new(&scene.with_flip().unwrap(), boundary);
             [seen(gpu, &start, &points), seen(cpu, &start, &points)]
         };
         println!("{method}: {gpu:?} {cpu:?}");

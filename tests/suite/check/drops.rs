@@ -9,7 +9,7 @@ use swell::{
 };
 
 use super::{lines, over};
-use crate::support::{context, flip as of_flip};
+use crate::support::{choose, context, flip as of_flip, pbf_of};
 
 /// The positions are on faces and corners of cells of 0.1 m, the last one beside a wall.
 #[test]
@@ -37,10 +37,10 @@ fn drops_at_round_places_are_within_tolerance_and_a_fault_in_drag_is_seen() {
             (1e-3, [12.0, 0.0, -3.0]),
         ] {
             let mut scene = of_flip::scene([16.0, 40.0, 8.0]);
-            let pbf = scene.solver.pbf.as_mut().unwrap();
+            let pbf = pbf_of(&mut scene);
             pbf.particle_spacing = of_flip::DX / 2.0;
             pbf.grid_projection = true;
-            scene.solver.method = method;
+            choose(&mut scene, method);
             scene.effects.drag = Some(drag::Settings { drop_radius, wind });
             let start = Start {
                 particles: Particles {

@@ -7,7 +7,7 @@ use swell::{
         boundary::Boundary, bounds::Bounds, motion::Motion, particles::Particles,
         signed_distance::SignedDistance,
     },
-    scene::{Method, Scene},
+    scene::Scene,
     stage::{check::check_frame, prepare::Start},
 };
 
@@ -73,8 +73,7 @@ const GAPS: &[Control] = &[
 
 /// Water up to `level` cells over `solid`, with random velocities that friction acts on.
 fn water(solid: &Boundary, level: f64) -> (Scene, Start) {
-    let mut scene = rig::scene([16.0, 12.0, 8.0]);
-    scene.solver.method = Method::Flip;
+    let scene = rig::scene([16.0, 12.0, 8.0]);
     let mut particles = rig::block([0; 3], [16, 6, 8]);
     let distance = solid.distance.as_ref().unwrap();
     let keep: Vec<bool> = (0..particles.len())

@@ -25,7 +25,7 @@ use super::{
     controls::{Control, control, flip::SYSTEM},
     faults, lines, over,
 };
-use crate::support::{D, box_mesh, context, lattice, noise};
+use crate::support::{D, box_mesh, context, flip_of, lattice, noise, pbf_of};
 
 /// A sphere of 20 · 4² triangles, an icosahedron whose faces are subdivided twice.
 fn sphere(centre: DVec3, radius: f64) -> TriangleMesh {
@@ -86,8 +86,8 @@ fn tank(method: Method, speed: f64) -> (Scene, Start) {
     let (mut scene, _) = case(method);
     scene.effects = Effects::default();
     scene.domain.max = DVec3::new(1.2, 1.6, 1.2);
-    scene.solver.pbf.as_mut().unwrap().cfl = 1.0;
-    scene.solver.flip.as_mut().unwrap().cfl = 1.0;
+    pbf_of(&mut scene).cfl = 1.0;
+    flip_of(&mut scene).cfl = 1.0;
     scene.water.blocks.push(Bounds {
         min: DVec3::ZERO,
         max: DVec3::new(1.2, 0.7, 1.2),
@@ -168,7 +168,14 @@ fn a_sphere_in_a_tank_of_pbf_is_within_tolerance() {
     let context = context();
     let (scene, start) = tank(Method::Pbf, 0.0);
     let plan = start.plan(&scene, device_limits(&context));
-    let solver = Pbf::new(&context, &scene, plan, &start.boundary, false).unwrap();
+    let solver = Pbf::new(
+        &context,
+        &scene.with_pbf().unwrap(),
+        plan,
+        &start.boundary,
+        false,
+    )
+    .unwrap();
     let (faults, mut state) = follow(&context, &scene, &start, solver, FRAMES);
     assert!(faults.is_empty(), "{faults}");
     // Particles may not touch it by themselves: one is placed inside.
@@ -191,9 +198,16 @@ fn a_sphere_that_moves_through_pbf_is_within_tolerance() {
     let context = context();
     for grid_projection in [true, false] {
         let (mut scene, start) = tank(Method::Pbf, 0.9);
-        scene.solver.pbf.as_mut().unwrap().grid_projection = grid_projection;
+        pbf_of(&mut scene).grid_projection = grid_projection;
         let plan = start.plan(&scene, device_limits(&context));
-        let solver = Pbf::new(&context, &scene, plan, &start.boundary, false).unwrap();
+        let solver = Pbf::new(
+            &context,
+            &scene.with_pbf().unwrap(),
+            plan,
+            &start.boundary,
+            false,
+        )
+        .unwrap();
         let frames = if grid_projection { 2 } else { FRAMES / 3 };
         let (faults, mut state) = follow(&context, &scene, &start, solver, frames);
         assert!(faults.is_empty(), "{faults}");
@@ -240,7 +254,14 @@ fn a_sphere_in_a_tank_of_flip_is_within_tolerance() {
     for speed in [0.0, 0.9] {
         let (scene, start) = tank(Method::Flip, speed);
         let plan = start.plan(&scene, device_limits(&context));
-        let solver = Flip::new(&context, &scene, plan, &start.boundary, false).unwrap();
+        let solver = Flip::new(
+            &context,
+            &scene.with_flip().unwrap(),
+            plan,
+            &start.boundary,
+            false,
+        )
+        .unwrap();
         let (faults, mut state) = follow(&context, &scene, &start, solver, FRAMES);
         assert!(faults.is_empty(), "{faults}");
         // Particles rarely touch it by themselves: one is placed inside.
@@ -319,8 +340,8 @@ fn close_in(scene: &mut Scene, walls: &[(usize, f64)]) {
 /// Walls that close in on moving water, with several substeps per frame.
 fn pressed(method: Method) -> (Scene, Start) {
     let (mut scene, start) = case(method);
-    scene.solver.pbf.as_mut().unwrap().cfl = 0.06;
-    scene.solver.flip.as_mut().unwrap().cfl = 0.03;
+    pbf_of(&mut scene).cfl = 0.06;
+    flip_of(&mut scene).cfl = 0.03;
     close_in(&mut scene, &[(0, 2.0), (5, 0.7)]);
     (scene, start)
 }
@@ -367,7 +388,7 @@ fn far_walls_are_within_tolerance_and_fail_where_they_should() {
     )
     .and(SYSTEM)];
     let chebyshev = |scene: &mut Scene| {
-        let settings = scene.solver.pbf.as_mut().unwrap();
+        let settings = pbf_of(scene);
         (settings.iteration, settings.relaxation) = (Iteration::Chebyshev, 0.7);
     };
     let as_it_is = |_: &mut Scene| {};
@@ -505,7 +526,7 @@ fn particles_at_the_cap_are_within_tolerance() {
         &["position", "velocity"],
     );
     for (cfl, control) in [(0.004, begins), (0.024, ends)] {
-        scene.solver.pbf.as_mut().unwrap().cfl = cfl;
+        pbf_of(&mut scene).cfl = cfl;
         last_substep_sees(&scene, &start, &[control]);
     }
 }
@@ -521,7 +542,7 @@ fn layers_that_round_alike_are_within_tolerance() {
     scene.domain.max = DVec3::new(1.6, 1.6, 1.0);
     start.boundary = Boundary::default();
     start.particles = lattice([D / 2.0; 3], [16, 6, 10], [D; 3]);
-    let settings = scene.solver.pbf.as_mut().unwrap();
+    let settings = pbf_of(&mut scene);
     (settings.cfl, settings.iteration, settings.stop) =
         (1.0, Iteration::RedBlack, Stop::Iterations(4));
     let speed = D / scene.shot.frame_seconds();
@@ -558,7 +579,7 @@ fn faces_that_a_plate_closes_are_within_tolerance() {
     let (mut scene, start) = tank(Method::Flip, 0.0);
     let velocity = start.particles.velocity;
     scene.effects = case(Method::Flip).0.effects;
-    let cell = scene.solver.flip.as_ref().unwrap().cell_size;
+    let cell = flip_of(&mut scene).cell_size;
     let at = 3.0 * cell;
     scene.solids[0].mesh = box_mesh(Bounds {
         min: DVec3::new(at - 0.4 * cell, -0.1, -0.1),

@@ -4,7 +4,7 @@
 use glam::DVec3;
 use swell::{
     domain::{boundary::Boundary, bounds::Bounds, motion::Motion, particles::Particles},
-    scene::{Method, Scene, Wall, WaveMaker},
+    scene::{Scene, Wall, WaveMaker},
     stage::{check::check_frame, prepare::Start},
 };
 
@@ -57,7 +57,6 @@ const CONTROLS: &[Control] = &[
 /// one wall moves, and the floor too if it is a moving solid.
 fn landing(floor: &Boundary, height: f64) -> (Scene, Start) {
     let mut scene = rig::scene([16.0, 24.0, 8.0]);
-    scene.solver.method = Method::Flip;
     scene.shot.frames_per_second = 50.0;
     rig::flip(&mut scene).cfl = 2.0;
     scene.wave_makers.push(WaveMaker {

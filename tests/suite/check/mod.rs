@@ -40,7 +40,7 @@ use swell::{
     },
 };
 
-use crate::support::{self, D, context, jitter, lattice, noise};
+use crate::support::{self, D, choose, context, flip_of, jitter, lattice, noise, pbf_of};
 use controls::{
     Control, control,
     flip::{FLIP, FLIP_WALLS},
@@ -79,8 +79,7 @@ const CFL: f64 = 0.1;
 /// one block of cells.
 fn case(method: Method) -> (Scene, Start) {
     let mut scene = support::scene([1.6, 6.4, 1.6]);
-    scene.solver.method = method;
-    scene.solver.flip = Some(swell::scene::flip::Flip {
+    scene.unchosen = Some(swell::scene::Solver::Flip(swell::scene::flip::Flip {
         cell_size: 2.0 * D,
         particles_per_cell: 8,
         transfer: Transfer::Flip,
@@ -95,7 +94,8 @@ fn case(method: Method) -> (Scene, Start) {
             tolerance: 1e-5,
             max_iterations: 40,
         },
-    });
+    }));
+    choose(&mut scene, method);
     scene.effects.viscosity = Some(viscosity::Settings::xsph(0.1));
     scene.effects.vorticity_confinement = Some(vorticity_confinement::Settings { strength: 1.0 });
     scene.effects.drag = Some(drag::Settings {
@@ -136,7 +136,7 @@ fn case(method: Method) -> (Scene, Start) {
             window: Window::default(),
         });
     }
-    scene.solver.pbf.as_mut().unwrap().cfl = CFL;
+    pbf_of(&mut scene).cfl = CFL;
     let mut particles = lattice([-0.01, 0.2, -0.01], [8, 6, 7], [0.9 * D; 3]);
     jitter(&mut particles, 0.02 * D);
     for (k, v) in particles.velocity.iter_mut().enumerate() {
@@ -262,7 +262,15 @@ fn pbf_is_within_tolerance_and_each_row_fails_where_it_should() {
     let boundaries = [&start.boundary, &moved];
     let state = (0, &start.particles);
     let first = SubstepChoice::default();
-    let checked = pbf::check(&context, &scene, plan, boundaries, state, first).unwrap();
+    let checked = pbf::check(
+        &context,
+        &scene.with_pbf().unwrap(),
+        plan,
+        boundaries,
+        state,
+        first,
+    )
+    .unwrap();
     let found = over(&checked.table);
     assert!(
         found.contains(&("upload of solids", "sample positions")),
@@ -277,7 +285,7 @@ fn pbf_is_within_tolerance_and_each_row_fails_where_it_should() {
 #[test]
 fn pbf_with_a_projection_is_within_tolerance_and_fails_where_it_should() {
     let (mut scene, start) = case(Method::Pbf);
-    scene.solver.pbf.as_mut().unwrap().grid_projection = true;
+    pbf_of(&mut scene).grid_projection = true;
     scene.effects.surface_tension = Some(surface_tension::Settings { coefficient: 50.0 });
     let controls = [
         control(
@@ -312,7 +320,7 @@ fn pbf_with_a_projection_is_within_tolerance_and_fails_where_it_should() {
 #[test]
 fn pbf_until_a_density_error() {
     let (mut scene, start) = case(Method::Pbf);
-    let settings = scene.solver.pbf.as_mut().unwrap();
+    let settings = pbf_of(&mut scene);
     settings.iteration = Iteration::Chebyshev;
     settings.relaxation = 0.7;
     settings.artificial_pressure = 0.1;
@@ -450,7 +458,15 @@ fn pbf_table(
     let state = (0, &start.particles);
     let plan = start.plan(scene, limits);
     let first = SubstepChoice::default();
-    Ok(pbf::check(context, scene, plan, boundaries, state, first)?.table)
+    Ok(pbf::check(
+        context,
+        &scene.with_pbf().unwrap(),
+        plan,
+        boundaries,
+        state,
+        first,
+    )?
+    .table)
 }
 
 /// The other precisions of the projection. f64 has the tolerances of its own roundoff: an error of
@@ -486,7 +502,7 @@ fn flip_is_within_tolerance_in_each_precision_of_its_projection() {
         .and(&["pressure/multiply", "pressure/verify"]),
     ];
     let precision = |scene: &mut Scene, precision| {
-        scene.solver.flip.as_mut().unwrap().pressure.precision = precision;
+        flip_of(scene).pressure.precision = precision;
     };
     precision(&mut scene, Precision::F64);
     hold(&context, &scene, &start, &controls, &elsewhere);

@@ -220,7 +220,7 @@ fn effects_are_within_tolerance_across_joints_and_fail_where_they_should() {
         ),
     ];
     for ((mut scene, start), controls) in [(pbf, &controls[..]), (flip, &[])] {
-        scene.effects = case(scene.solver.method).0.effects;
+        scene.effects = case(scene.solver.method()).0.effects;
         let checked = |context: &_| check_frame(context, &scene, &start, 0, &start.particles);
         let (clean, mut all) = faults(&context, &checked, controls);
         for Control { spoil, pass, .. } in controls {

@@ -90,7 +90,7 @@ fn wrong(case: &Case) -> Vec<String> {
                     let of = format!(
                         "{}, {}, {}: {} is {value:?}, mark {:?}, {}",
                         case.name,
-                        trial.scene.solver.method.name(),
+                        trial.scene.solver.method().name(),
                         trial.device.name(),
                         mark.of.name(),
                         mark.bound,

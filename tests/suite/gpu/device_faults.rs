@@ -4,6 +4,7 @@ use std::{path::Path, sync::atomic::AtomicBool};
 use swell::files::load_scene;
 
 use crate::support::job::Job;
+use crate::support::pbf_of;
 use swell::{
     cache::CacheReader,
     gpu::{
@@ -116,7 +117,7 @@ fn small_bindings_split_the_lists_and_give_the_same_bytes() {
     // PBF without its projection, whose grid has larger buffers than the lists.
     let alone = |cache: &str, context: &Context| {
         let mut request = request(&job, "pbf", cache, context);
-        request.scene.solver.pbf.as_mut().unwrap().grid_projection = false;
+        pbf_of(&mut request.scene).grid_projection = false;
         request
     };
     run(&alone("whole", &whole)).unwrap();
@@ -165,7 +166,7 @@ fn places_in_two_bindings_give_the_same_bytes() {
             "shot.frames=2",
         ];
         request.scene = load_scene(&job.path("small.toml"), &set.map(str::to_owned)).unwrap();
-        request.scene.solver.pbf.as_mut().unwrap().grid_projection = false;
+        pbf_of(&mut request.scene).grid_projection = false;
         request
     };
     let whole = Context::open(None).unwrap();

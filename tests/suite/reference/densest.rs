@@ -33,7 +33,7 @@ fn the_densest_cell_is_where_a_clump_is() {
         let middle = (DVec3::from(cell) + 0.5) * flip::DX;
         let water = with_clump(flip::block([0; 3], [8, 4, 8]), middle, 0.1 * flip::DX);
         let mut gpu = flip::solver(&context(), &scene, &water);
-        let mut reference = Flip::new(&scene, &Boundary::default());
+        let mut reference = Flip::new(&scene.with_flip().unwrap(), &Boundary::default());
         reference.load(0, &water).unwrap();
         let reports = [gpu.advance().unwrap().1, reference.advance().unwrap().1];
         for report in reports {
@@ -52,12 +52,12 @@ fn the_densest_particle_is_where_a_clump_is() {
     let mut scene = scene([1.0; 3]);
     scene.origin = DVec3::new(1000.0, 0.0, -500.0);
     scene.water.gravity = DVec3::ZERO;
-    let paper = Paper::new(D, scene.solver.pbf().support_ratio);
+    let paper = Paper::new(D, scene.solver.pbf().unwrap().support_ratio);
     let block = lattice([0.0; 3], [10, 5, 10], [D; 3]);
     for middle in [DVec3::new(0.31, 0.22, 0.64), DVec3::new(0.73, 0.18, 0.27)] {
         let water = with_clump(block.clone(), middle, 0.3 * D);
         let mut gpu = solver(&context(), &scene, &water, &Boundary::default());
-        let mut reference = Pbf::new(&scene, &Boundary::default());
+        let mut reference = Pbf::new(&scene.with_pbf().unwrap(), &Boundary::default());
         reference.load(0, &water).unwrap();
         for (state, report) in [gpu.advance().unwrap(), reference.advance().unwrap()] {
             let positions: Vec<DVec3> = (state.position.iter())

@@ -52,7 +52,7 @@ fn gpu(context: &Context, case: &Case) -> (Flip, Particles, StepReport) {
         &case.scene,
         &case.particles,
         &case.boundary,
-        capacity(&case.scene, &case.particles),
+        capacity(&case.scene.with_flip().unwrap(), &case.particles),
     );
     gpu.load(FRAME, &case.particles).unwrap();
     let (state, report) = gpu.advance().unwrap();
@@ -61,7 +61,10 @@ fn gpu(context: &Context, case: &Case) -> (Flip, Particles, StepReport) {
 }
 
 fn trace(case: &Case) -> Trace {
-    trace_with(case, Reference::new(&case.scene, &case.boundary))
+    trace_with(
+        case,
+        Reference::new(&case.scene.with_flip().unwrap(), &case.boundary),
+    )
 }
 
 fn trace_with(case: &Case, mut reference: Reference) -> Trace {
@@ -71,7 +74,10 @@ fn trace_with(case: &Case, mut reference: Reference) -> Trace {
     let length = case.scene.shot.frame_seconds();
     let (wanted, substep) = case
         .scene
+        .with_flip()
+        .unwrap()
         .flip_substep(
+            &case.particles.walls,
             FRAME + 1,
             f64::from(FRAME) * length,
             length,
@@ -142,7 +148,7 @@ fn norm(a: &[f64], b: &[f64]) -> f64 {
 
 /// Compares what particles and solids contribute to the grid.
 fn rows_to_grid(case: &Case, pair: &Pair, trace: &Trace) -> Vec<Row> {
-    let settings = case.scene.solver.flip();
+    let settings = case.scene.solver.flip().unwrap();
     let off = |found: &[u32], known: &[u32]| {
         (found.iter().zip(known)).filter(|(a, b)| a != b).count() as f64
     };
@@ -292,7 +298,7 @@ fn rows_of_motion(case: &Case, pair: &Pair, trace: &Trace) -> Vec<Row> {
         x,
         step * given + 3f64.sqrt() * displaced + 2.0 * DX * PLACE,
     ));
-    if case.scene.solver.flip().transfer == Transfer::Apic {
+    if case.scene.solver.flip().unwrap().transfer == Transfer::Apic {
         let mut gap = 0.0f64;
         for (k, &id) in trace.after.id.iter().enumerate() {
             for (c, name) in AFFINE.iter().enumerate() {
@@ -462,7 +468,7 @@ fn each_row_sees_a_reference_with_changed_inputs() {
 fn sparse_factor_and_conjugate_gradients_agree() {
     for case in [dam(), pocket()] {
         let iterated = trace(&case);
-        let mut reference = Reference::new(&case.scene, &case.boundary);
+        let mut reference = Reference::new(&case.scene.with_flip().unwrap(), &case.boundary);
         reference.set_factor_budget(BUDGET);
         let direct = trace_with(&case, reference);
         assert!(iterated.projected.solution.iterations > 0);
@@ -502,7 +508,7 @@ fn whole_frames_agree_in_aggregates() {
     let particles = block([0; 3], [7, 8, 8]);
     let context = context();
     let mut gpu = solver(&context, &scene, &particles);
-    let mut reference = Reference::new(&scene, &Boundary::default());
+    let mut reference = Reference::new(&scene.with_flip().unwrap(), &Boundary::default());
     reference.load(0, &particles).unwrap();
     let mut substeps = 0;
     for frame in 1..=12 {
@@ -528,11 +534,11 @@ fn whole_frames_agree_in_aggregates() {
     }
     assert!(substeps > 12);
     // A solver that loads a saved state continues with the same bytes.
-    let mut first = Reference::new(&scene, &Boundary::default());
+    let mut first = Reference::new(&scene.with_flip().unwrap(), &Boundary::default());
     first.load(0, &particles).unwrap();
     let (middle, _) = first.advance().unwrap();
     let (end, _) = first.advance().unwrap();
-    let mut again = Reference::new(&scene, &Boundary::default());
+    let mut again = Reference::new(&scene.with_flip().unwrap(), &Boundary::default());
     again.load(1, &middle).unwrap();
     assert!(again.advance().unwrap().0 == end);
 }

@@ -22,7 +22,7 @@ use swell::{
     stage::prepare::Start,
 };
 
-use crate::support::{D, context, jitter, lattice, noise, scene, solver};
+use crate::support::{D, context, jitter, lattice, noise, pbf_of, scene, solver};
 
 const BOX: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\n\
     f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 4 8 7 3\nf 1 5 8 4\nf 2 3 7 6\n";
@@ -71,7 +71,7 @@ fn lively(spoil: &str) -> (Scene, Start) {
 }
 
 fn reference(scene: &Scene, start: &Start) -> (Particles, StepReport) {
-    let mut solver = Pbf::new(scene, &start.boundary);
+    let mut solver = Pbf::new(&scene.with_pbf().unwrap(), &start.boundary);
     solver.load(0, &start.particles).unwrap();
     solver.advance().unwrap()
 }
@@ -193,7 +193,7 @@ fn one_pbf_substep_on_the_gpu_matches_f64() {
 fn velocity_that_is_not_a_number_is_an_error() {
     let (scene, mut start) = lively("");
     start.particles.velocity[7][1] = f32::NAN;
-    let mut solver = Pbf::new(&scene, &start.boundary);
+    let mut solver = Pbf::new(&scene.with_pbf().unwrap(), &start.boundary);
     solver.load(0, &start.particles).unwrap();
     let fault = solver.advance().unwrap_err();
     assert!(
@@ -249,8 +249,8 @@ fn squeezed(count: usize) -> (Scene, Particles) {
 }
 
 fn sorted(scene: &Scene, particles: &Particles) -> (Model, Substep, Sorted) {
-    let model = Model::new(scene, &Boundary::default());
-    let substep = Substep::new(scene, 0.0, 0.0);
+    let model = Model::new(&scene.with_pbf().unwrap(), &Boundary::default());
+    let substep = Substep::new(scene, &particles.walls, 0.0, 0.0);
     let position = local(scene, particles);
     let sorted = Sorted::new(&model, &position, &particles.id, &mut Timings::default());
     (model, substep, sorted)
@@ -351,7 +351,7 @@ fn iterations_approach_what_is_converged() {
     for iteration in [Iteration::Jacobi, Iteration::RedBlack, Iteration::Chebyshev] {
         let mut distances = Vec::new();
         for count in [1, 4, 16, 64] {
-            let settings = scene.solver.pbf.as_mut().unwrap();
+            let settings = pbf_of(&mut scene);
             settings.iteration = iteration;
             settings.stop = Stop::Iterations(count);
             settings.relaxation = if iteration == Iteration::Chebyshev {
@@ -367,7 +367,10 @@ fn iterations_approach_what_is_converged() {
                 sources: Default::default(),
             };
             let (state, _) = reference(&scene, &start);
-            distances.push(distance_to_converged(&scene, &boundary, 1, &state, 1e-8).unwrap());
+            distances.push(
+                distance_to_converged(&scene.with_pbf().unwrap(), &boundary, 1, &state, 1e-8)
+                    .unwrap(),
+            );
         }
         println!("{iteration:?}: {}", show(&distances));
         // A hundredth of a spacing is invisible in a film frame; Chebyshev is far below.

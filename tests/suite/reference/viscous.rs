@@ -27,14 +27,21 @@ struct Grid {
 
 impl Grid {
     fn of(case: &Case) -> Self {
-        let mut reference = Reference::new(&case.scene, &case.boundary);
+        let mut reference = Reference::new(&case.scene.with_flip().unwrap(), &case.boundary);
         reference.load(FRAME, &case.particles).unwrap();
         let cloud = reference.cloud();
         let found = survey(reference.model(), &cloud);
         let length = case.scene.shot.frame_seconds();
         let start = f64::from(FRAME) * length;
-        let (_, substep) = (case.scene)
-            .flip_substep(FRAME + 1, start, length, found.speed, (0, 0.0))
+        let (_, substep) = (reference.model().scene)
+            .flip_substep(
+                &case.particles.walls,
+                FRAME + 1,
+                start,
+                length,
+                found.speed,
+                (0, 0.0),
+            )
             .unwrap();
         let trace = reference.substep(&cloud, &found.is_wet, &substep).unwrap();
         Self {
@@ -49,7 +56,7 @@ impl Grid {
     }
 
     fn cells(&self) -> Vec<Cell> {
-        let step = self.model().step(&self.substep);
+        let step = self.model().step(&self.substep, &Default::default());
         viscosity_weigh(Water {
             model: self.model(),
             step: &step,

@@ -4,7 +4,7 @@
 use std::f64::consts::PI;
 
 use crate::support::flip::*;
-use crate::support::{self, D, context, jitter, lattice};
+use crate::support::{self, D, context, jitter, lattice, pbf_of};
 use glam::DVec3;
 use swell::{
     domain::{particles::Particles, solver::Solver},
@@ -20,7 +20,7 @@ fn mean(state: &Particles, f: impl Fn(usize) -> DVec3) -> DVec3 {
 
 /// State after `frames` frames of the scene's solver.
 fn advanced(context: &Context, scene: &Scene, particles: &Particles, frames: u32) -> Particles {
-    match scene.solver.method {
+    match scene.solver.method() {
         Method::Pbf => support::run(context, scene, particles, frames).0,
         Method::Flip => run(context, scene, particles, frames).0,
     }
@@ -29,7 +29,7 @@ fn advanced(context: &Context, scene: &Scene, particles: &Particles, frames: u32
 /// A box of water in free flight, for each solver and transfer.
 fn throws() -> Vec<(&'static str, Scene)> {
     let mut pbf = support::scene([4.0, 6.0, 4.0]);
-    pbf.solver.pbf.as_mut().unwrap().cfl = 2.0;
+    pbf_of(&mut pbf).cfl = 2.0;
     let of_flip = scene([40.0, 60.0, 40.0]);
     let mut apic = of_flip.clone();
     flip(&mut apic).transfer = Transfer::Apic;
@@ -52,7 +52,7 @@ fn flown(x: DVec3, v: DVec3, steps: f64, dt: f64) -> (DVec3, DVec3) {
 fn drops_fall_from_a_ceiling_as_from_anywhere() {
     let steps = 20;
     let mut projected = support::scene([4.0, 6.0, 4.0]);
-    projected.solver.pbf.as_mut().unwrap().grid_projection = true;
+    pbf_of(&mut projected).grid_projection = true;
     // Above the water of the other tests and far from each other. Particles closer to the ceiling
     // would be pushed by it.
     let places: [[f32; 3]; 4] = [
@@ -107,7 +107,7 @@ fn a_drop_beside_a_solid_lies_still_on_the_floor() {
     let wall = half_space(DVec3::X, 0.4);
     let drop = lattice([0.4, 0.3, 0.8], [1; 3], [D / 2.0; 3]);
     let falls = |context: &Context| {
-        let most = capacity(&scene, &drop);
+        let most = capacity(&scene.with_flip().unwrap(), &drop);
         let mut solver = solver_with(context, &scene, &drop, &wall, most);
         let states = (0..40).map(|_| solver.advance().unwrap().0);
         velocity(&states.last().unwrap(), 0).length()
@@ -135,7 +135,7 @@ fn free_flight_is_a_parabola() {
     let start = DVec3::new(0.5, 2.0, -0.25);
     for (name, scene) in throws() {
         let mut particles = lattice([1.5, 3.5, 1.5], [10, 10, 10], [D / 2.0; 3]);
-        if scene.solver.method == Method::Pbf {
+        if scene.solver.method() == Method::Pbf {
             particles = lattice([1.5, 3.5, 1.5], [5, 5, 5], [D; 3]);
         }
         particles.velocity.fill(start.as_vec3().to_array());
@@ -196,7 +196,7 @@ fn pbf_keeps_mass_and_momentum() {
     particles.velocity.fill([0.5, 0.25, -0.25]);
     let mut drifts = Vec::new();
     for iteration in [Iteration::Jacobi, Iteration::RedBlack, Iteration::Chebyshev] {
-        let pbf = scene.solver.pbf.as_mut().unwrap();
+        let pbf = pbf_of(&mut scene);
         pbf.iteration = iteration;
         pbf.stop = Stop::Iterations(4);
         // Jacobi at ω = 1 overshoots, and corrections that are clamped are no longer pairwise.

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use crate::support::flip::*;
-use crate::support::{self, D, context, lattice};
+use crate::support::{self, D, context, lattice, pbf_of};
 use glam::{DVec2, DVec3, Vec3};
 use swell::{
     domain::{
@@ -26,7 +26,7 @@ fn built(
     scene: &Scene,
     particles: &Particles,
 ) -> Box<dyn Solver<Error = SolveError>> {
-    match scene.solver.method {
+    match scene.solver.method() {
         Method::Pbf => Box::new(support::solver(
             context,
             scene,
@@ -285,7 +285,7 @@ fn pbf_standing_waves_have_about_their_period() {
     let spacings = 32;
     let length = spacings as f64 * D;
     let mut scene = support::scene([length, 0.6 * length, 0.4]);
-    scene.solver.pbf.as_mut().unwrap().stop = Stop::Iterations(16);
+    pbf_of(&mut scene).stop = Stop::Iterations(16);
     scene.effects.viscosity = Some(effects::viscosity::Settings::xsph(0.1));
     let particles = lattice([0.0; 3], [spacings, spacings * 10 / 32, 4], [D; 3]);
     let settled = support::run(&context, &scene, &particles, 150).0;
@@ -300,6 +300,6 @@ fn pbf_standing_waves_have_about_their_period() {
     println!(
         "PBF, {spacings} spacings: {ratio:.4} of the period, {left:.2} of the amplitude after three"
     );
-    let support = scene.solver.pbf().support_ratio * D;
+    let support = scene.solver.pbf().unwrap().support_ratio * D;
     check_period("pbf", &wave, ratio, (wave.number() * support).powi(2) / 2.0);
 }

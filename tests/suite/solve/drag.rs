@@ -7,7 +7,7 @@ use swell::{
 };
 
 use crate::support::{
-    self, context, flip as of_flip,
+    self, choose, context, flip as of_flip, pbf_of,
     solvers::{on_cpu, on_gpu},
 };
 
@@ -18,10 +18,10 @@ const FRAMES_PER_SECOND: f64 = 100.0;
 /// A box that is periodic along x, so that wind is unbounded there.
 fn scene(method: Method, cells: [f64; 3]) -> Scene {
     let mut scene = of_flip::scene(cells);
-    let pbf = scene.solver.pbf.as_mut().unwrap();
+    let pbf = pbf_of(&mut scene);
     pbf.particle_spacing = of_flip::DX / 2.0;
     pbf.grid_projection = true;
-    scene.solver.method = method;
+    choose(&mut scene, method);
     scene.periodic = [true, false, false];
     scene.shot.frames_per_second = FRAMES_PER_SECOND;
     scene

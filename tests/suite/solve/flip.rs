@@ -265,7 +265,7 @@ fn buffers_grow_with_the_water_and_change_nothing() {
     scene.shot.frames_per_second = 30.0;
     let mut particles = block([0; 3], [8, 12, 16]);
     jitter(&mut particles, 0.01);
-    let start = capacity(&scene, &particles);
+    let start = capacity(&scene.with_flip().unwrap(), &particles);
     let mut small = solver(&context, &scene, &particles);
     let large = Capacity {
         wet: 200,
@@ -453,7 +453,7 @@ fn water_stays_out_of_solids() {
         &scene,
         &particles,
         &solid,
-        capacity(&scene, &particles),
+        capacity(&scene.with_flip().unwrap(), &particles),
     );
     let mut before = f64::INFINITY;
     for frame in 0..40 {

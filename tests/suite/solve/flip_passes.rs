@@ -251,7 +251,7 @@ fn face_fractions_of_a_plane_are_exact() {
             &scene,
             &particles,
             &half_space(n, d),
-            capacity(&scene, &particles),
+            capacity(&scene.with_flip().unwrap(), &particles),
         );
         solver.advance().unwrap();
         let open = Field::new(&solver, FACE_OPEN, 3);

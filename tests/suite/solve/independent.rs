@@ -4,7 +4,7 @@
 
 use crate::support::flip::{self as rig, DX, block, flip, position, velocity};
 use crate::support::paper::Paper;
-use crate::support::{self, D, box_mesh, context, jitter, lattice, scene};
+use crate::support::{self, D, box_mesh, context, jitter, lattice, pbf_of, scene};
 use glam::{DVec3, Vec3};
 use swell::{
     domain::{
@@ -39,14 +39,22 @@ fn both(scene: &Scene, particles: &Particles, frames: u32) -> [(Particles, StepR
             .last()
             .unwrap()
     }
-    match scene.solver.method {
+    match scene.solver.method() {
         Method::Pbf => [
             support::run(&context(), scene, particles, frames),
-            on(PbfReference::new(scene, &none), particles, frames),
+            on(
+                PbfReference::new(&scene.with_pbf().unwrap(), &none),
+                particles,
+                frames,
+            ),
         ],
         Method::Flip => [
             rig::run(&context(), scene, particles, frames),
-            on(FlipReference::new(scene, &none), particles, frames),
+            on(
+                FlipReference::new(&scene.with_flip().unwrap(), &none),
+                particles,
+                frames,
+            ),
         ],
     }
 }
@@ -69,7 +77,7 @@ fn passes_are_given_the_papers_constants() {
     for (d, ratio) in CASES {
         let paper = Paper::new(d, ratio);
         let mut scene = scene([10.0 * d, 12.0 * d, 8.0 * d]);
-        let pbf = scene.solver.pbf.as_mut().unwrap();
+        let pbf = pbf_of(&mut scene);
         (pbf.particle_spacing, pbf.support_ratio) = (d, ratio);
         (pbf.relaxation, pbf.artificial_pressure, pbf.cfl) = (0.7, 0.2, 0.9);
         scene.shot.frames_per_second = 200.0;
@@ -112,7 +120,7 @@ fn passes_are_given_the_papers_constants() {
         let plane = 315.0 / 256.0 * (1.0 - (0.5 / ratio).powi(2)).powi(4) / paper.h;
         let weight = paper.deficit * d * d / (paper.volume * plane);
         close(weights.sum(), area * weight, 1e-6, "weights");
-        let model = Model::new(&scene, &boundary);
+        let model = Model::new(&scene.with_pbf().unwrap(), &boundary);
         close(
             model.sample_weights.iter().sum(),
             area * weight,
@@ -145,7 +153,7 @@ fn one_iteration_of_pbf_matches_the_papers_formulas() {
     ] {
         let mut scene = scene([2.0; 3]);
         scene.water.gravity = DVec3::ZERO;
-        let pbf = scene.solver.pbf.as_mut().unwrap();
+        let pbf = pbf_of(&mut scene);
         (pbf.iteration, pbf.stop) = (Iteration::Jacobi, Stop::Iterations(1));
         (pbf.relaxation, pbf.artificial_pressure) = (relaxation, repulsion);
         pbf.cfl = 4.0;
@@ -206,8 +214,8 @@ fn two_particles_are_slowed_by_xsph() {
 fn bulk(test: impl Fn(passes::Inputs<'_>, usize, DVec3)) {
     let scene = scene([2.0; 3]);
     let particles = lattice([0.5; 3], [9; 3], [D; 3]);
-    let model = Model::new(&scene, &Boundary::default());
-    let substep = Substep::new(&scene, 0.01, 0.01);
+    let model = Model::new(&scene.with_pbf().unwrap(), &Boundary::default());
+    let substep = Substep::new(&scene, &Default::default(), 0.01, 0.01);
     let places = local(&scene, &particles);
     let sorted = Sorted::new(&model, &places, &particles.id, &mut Timings::default());
     let middle = sorted
@@ -262,9 +270,9 @@ fn vorticity_and_its_confinement_are_the_papers() {
 fn grid_vorticity_and_its_confinement_are_fedkiws() {
     let (scene, particles) = rig::tank([12; 3], 12);
     let trace = traced(&scene, &particles, 0.01);
-    let reference = FlipReference::new(&scene, &Boundary::default());
+    let reference = FlipReference::new(&scene.with_flip().unwrap(), &Boundary::default());
     let model = reference.model();
-    let step = model.step(&step_of(0.01, 1.0));
+    let step = model.step(&step_of(0.01, 1.0), &Default::default());
     let spin = DVec3::new(0.5, -1.0, 2.0);
     let center = DVec3::splat(0.6);
     let elements = trace.faces.velocity.len() as u32;
@@ -317,7 +325,7 @@ fn step_of(length: f64, displacement: f64) -> step::Substep {
 
 /// Runs one substep of the f64 reference.
 fn traced(scene: &Scene, particles: &Particles, length: f64) -> swell::reference::flip::Trace {
-    let mut reference = FlipReference::new(scene, &Boundary::default());
+    let mut reference = FlipReference::new(&scene.with_flip().unwrap(), &Boundary::default());
     reference.load(0, particles).unwrap();
     let cloud = reference.cloud();
     let found = survey(reference.model(), &cloud);
@@ -373,9 +381,9 @@ fn substeps_move_by_at_most_twice_the_cfl() {
     for cfl in [0.5, 1.0] {
         let mut scene = scene([2.0; 3]);
         scene.water.gravity = DVec3::ZERO;
-        scene.solver.pbf.as_mut().unwrap().cfl = cfl;
-        let model = Model::new(&scene, &Boundary::default());
-        let substep = Substep::new(&scene, 0.01, 0.01);
+        pbf_of(&mut scene).cfl = cfl;
+        let model = Model::new(&scene.with_pbf().unwrap(), &Boundary::default());
+        let substep = Substep::new(&scene, &Default::default(), 0.01, 0.01);
         let (start, fast) = (DVec3::splat(0.8), DVec3::new(30.0, 0.0, 0.0));
         let (x, v) = passes::predict(&model, &substep, start, fast);
         close((x - start).x, 2.0 * cfl * D, 1e-12, "predicted");
@@ -419,7 +427,7 @@ fn a_drop_comes_to_rest_at_the_contact_distance() {
     ] {
         let mut particles = lattice([0.4, contact / 2.0, 0.4], [1; 3], [contact; 3]);
         // Without the density correction, which would push the drop off the wall.
-        if let Some(flip) = &mut scene.solver.flip {
+        if let swell::scene::Solver::Flip(flip) = &mut scene.solver {
             flip.density_correction = false;
         }
         particles.velocity.fill([0.0, -0.5, 0.0]);

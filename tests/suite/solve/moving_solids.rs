@@ -5,7 +5,7 @@ use std::{collections::BTreeMap, path::Path};
 use swell::files::parse_scene;
 use swell::files::scene_to_toml;
 
-use crate::support::{self, box_mesh, context, lattice, mover};
+use crate::support::{self, box_mesh, context, flip_of, lattice, mover};
 use glam::{DVec3, Vec3};
 use swell::{
     domain::{
@@ -14,7 +14,7 @@ use swell::{
     },
     gpu::adapter::Context,
     scene::{
-        Method, Scene,
+        Scene,
         flip::{Flip as Settings, Precision, Preconditioner, Pressure, Surface, Transfer},
         moving_solid::MovingSolid,
     },
@@ -33,8 +33,7 @@ const DX: f64 = 0.1;
 
 fn scene(cells: [f64; 3]) -> Scene {
     let mut scene = support::scene(cells.map(|n| n * DX));
-    scene.solver.method = Method::Flip;
-    scene.solver.flip = Some(Settings {
+    scene.solver = swell::scene::Solver::Flip(Settings {
         cell_size: DX,
         particles_per_cell: 8,
         transfer: Transfer::Flip,
@@ -68,11 +67,11 @@ fn solver(context: &Context, scene: &Scene, particles: &Particles) -> Flip {
     let boundary = boundary(scene);
     let counts = Counts {
         particles: particles.len(),
-        bricks: capacity(scene, particles),
+        bricks: capacity(&scene.with_flip().unwrap(), particles),
         ..Counts::of_solids(&boundary)
     };
     let plan = Plan::new(scene, counts, device_limits(context));
-    Flip::new(context, scene, plan, &boundary, false).unwrap()
+    Flip::new(context, &scene.with_flip().unwrap(), plan, &boundary, false).unwrap()
 }
 
 /// Water in cells `from` to `to`, without what is inside `solid` or closer to it than half a
@@ -230,7 +229,7 @@ fn nothing_ends_within_a_box_faster_than_the_cfl_limit() {
         max: DVec3::splat(0.72),
     };
     // 12 m/s at 100 frames a second: 1.2 cells a frame, with cfl 0.5.
-    scene.solver.flip.as_mut().unwrap().cfl = 0.5;
+    flip_of(&mut scene).cfl = 0.5;
     let motion = Motion::ConstantVelocity {
         velocity: 12.0,
         until: None,
@@ -383,7 +382,7 @@ fn scenes_without_moving_solids_have_nothing_for_them() {
     let names = |scene: &Scene, boundary: &Boundary| {
         let counts = Counts {
             particles: particles.len(),
-            bricks: capacity(scene, &particles),
+            bricks: capacity(&scene.with_flip().unwrap(), &particles),
             ..Counts::of_solids(boundary)
         };
         let plan = Plan::new(scene, counts, device_limits(&context));

@@ -41,7 +41,7 @@ where
 
 /// State and report after one frame, on the GPU and with the reference.
 fn both(context: &Context, scene: &Scene, particles: &Particles) -> [(Particles, StepReport); 2] {
-    let cpu = reference::flip::Flip::new(scene, &Boundary::default());
+    let cpu = reference::flip::Flip::new(&scene.with_flip().unwrap(), &Boundary::default());
     [
         first_frame(solver(context, scene, particles), particles),
         first_frame(cpu, particles),

@@ -17,8 +17,8 @@ use swell::{
 fn compressed() -> (Scene, Particles) {
     let mut scene = scene([1.0, 1.4, 1.0]);
     scene.water.gravity = DVec3::ZERO;
-    scene.solver.pbf.as_mut().unwrap().iteration = Iteration::Jacobi;
-    scene.solver.pbf.as_mut().unwrap().stop = Stop::Iterations(1);
+    pbf_of(&mut scene).iteration = Iteration::Jacobi;
+    pbf_of(&mut scene).stop = Stop::Iterations(1);
     let mut particles = lattice([0.0; 3], [10, 10, 10], [D, 0.96 * D, D]);
     jitter(&mut particles, 0.15 * D);
     (scene, particles)
@@ -88,10 +88,10 @@ fn colours_and_stops_converge() {
     let context = context();
     let start = run(&context, &scene, &particles, 1).1.density_error_mean;
     for iteration in [Iteration::Jacobi, Iteration::RedBlack] {
-        scene.solver.pbf.as_mut().unwrap().iteration = iteration;
+        pbf_of(&mut scene).iteration = iteration;
         let mut last = start;
         for count in [4, 16, 64] {
-            scene.solver.pbf.as_mut().unwrap().stop = Stop::Iterations(count);
+            pbf_of(&mut scene).stop = Stop::Iterations(count);
             let (_, report) = run(&context, &scene, &particles, 1);
             assert_eq!(
                 report.iterations,
@@ -108,7 +108,7 @@ fn colours_and_stops_converge() {
         // Stopping at a density error: a looser bound takes fewer iterations, and the bound is met.
         let mut counts = Vec::new();
         for density_error in [0.01, 0.002] {
-            scene.solver.pbf.as_mut().unwrap().stop = Stop::DensityError {
+            pbf_of(&mut scene).stop = Stop::DensityError {
                 density_error,
                 max_iterations: 200,
             };
@@ -139,9 +139,9 @@ fn red_black_leaves_less_error_than_jacobi() {
     scene.shot.frames_per_second = 1000.0;
     let particles = lattice([0.0; 3], [16, 20, 16], [D, 0.97 * D, D]);
     for count in [4, 16, 64] {
-        scene.solver.pbf.as_mut().unwrap().stop = Stop::Iterations(count);
+        pbf_of(&mut scene).stop = Stop::Iterations(count);
         let [jacobi, red_black] = [Iteration::Jacobi, Iteration::RedBlack].map(|iteration| {
-            scene.solver.pbf.as_mut().unwrap().iteration = iteration;
+            pbf_of(&mut scene).iteration = iteration;
             let (_, report) = run(&context, &scene, &particles, 1);
             println!(
                 "{count:3} {iteration:?}: mean {:.3} %, max {:.2} %",
@@ -165,7 +165,7 @@ fn chebyshev_leaves_less_error_than_red_black() {
     scene.shot.frames_per_second = 1000.0;
     let particles = lattice([0.0; 3], [16, 20, 16], [D, 0.97 * D, D]);
     let mut error = |iteration: Iteration, spectral_radius: f64, count: u32| {
-        let pbf = scene.solver.pbf.as_mut().unwrap();
+        let pbf = pbf_of(&mut scene);
         pbf.stop = Stop::Iterations(count);
         pbf.iteration = iteration;
         pbf.spectral_radius = spectral_radius;
@@ -272,7 +272,8 @@ fn chunked_lists_and_no_lists() {
         };
         let plan = Plan::new(&scene, counts, limits);
         assert_eq!((plan.chunks.len(), plan.has_lists), (chunks, has_lists));
-        let mut solver = Pbf::new(&context, &scene, plan, &boundary, false).unwrap();
+        let mut solver =
+            Pbf::new(&context, &scene.with_pbf().unwrap(), plan, &boundary, false).unwrap();
         solver.load(0, &particles).unwrap();
         advance(&mut solver, 3)
     };
@@ -321,7 +322,7 @@ fn lists_that_overflow_and_particles_that_are_slowed_are_counted() {
     let mut scene = scene([2.0, 2.0, 2.0]);
     scene.water.gravity = DVec3::ZERO;
     const CAP: f64 = 0.2;
-    scene.solver.pbf.as_mut().unwrap().cfl = CAP;
+    pbf_of(&mut scene).cfl = CAP;
     let (frame, mut counted) = (scene.shot.frame_seconds(), Vec::new());
     // Particles far apart, and a cluster in which each particle has all others as neighbours: more
     // than a list holds, or fewer.
@@ -384,7 +385,7 @@ fn coincident_particles_part() {
 fn too_fast_for_its_substeps_is_an_error() {
     let context = context();
     let mut scene = scene([1.0; 3]);
-    scene.solver.pbf.as_mut().unwrap().max_substeps = 4;
+    pbf_of(&mut scene).max_substeps = 4;
     let mut particles = lattice([0.3; 3], [2, 2, 2], [D; 3]);
     particles.velocity[3] = [100.0, 0.0, 0.0];
     let mut solver = solver(&context, &scene, &particles, &Boundary::default());
@@ -493,7 +494,7 @@ fn plan_of_a_bare_scene_has_no_pass_or_buffer_of_effects() {
 #[test]
 fn bytes_per_particle() {
     let mut scene = scene([25.0, 12.6, 15.0]);
-    scene.solver.pbf.as_mut().unwrap().particle_spacing = 0.1;
+    pbf_of(&mut scene).particle_spacing = 0.1;
     let counts = Counts {
         particles: 201_000,
         ..Counts::default()

@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use crate::support::{self, context, flip as of_flip, jitter, max_distance, noise};
+use crate::support::{self, choose, context, flip as of_flip, jitter, max_distance, noise, pbf_of};
 use glam::DVec3;
 use swell::{
     domain::{boundary::Boundary, particles::Particles, period::Period, solver::Solver},
@@ -17,10 +17,10 @@ const METHODS: [Method; 2] = [Method::Flip, Method::Pbf];
 fn open_box(method: Method, periodic: [bool; 3]) -> Scene {
     let mut scene = of_flip::scene([16.0, 16.0, 8.0]);
     of_flip::flip(&mut scene).pressure.tolerance = 1e-6;
-    scene.solver.pbf.as_mut().unwrap().particle_spacing = of_flip::DX / 2.0;
+    pbf_of(&mut scene).particle_spacing = of_flip::DX / 2.0;
     // Which particles are red depends on the order of the cells, and so on where the boundary is.
-    scene.solver.pbf.as_mut().unwrap().iteration = Iteration::Jacobi;
-    scene.solver.method = method;
+    pbf_of(&mut scene).iteration = Iteration::Jacobi;
+    choose(&mut scene, method);
     scene.periodic = periodic;
     scene.shot.frames_per_second = 50.0;
     scene
@@ -33,7 +33,7 @@ fn block(cells: [usize; 3]) -> Particles {
 
 /// State after `frames` frames on the GPU.
 fn run(context: &Context, scene: &Scene, particles: &Particles, frames: u32) -> Particles {
-    match scene.solver.method {
+    match scene.solver.method() {
         Method::Flip => of_flip::run(context, scene, particles, frames).0,
         Method::Pbf => support::run(context, scene, particles, frames).0,
     }
@@ -48,9 +48,15 @@ fn twin(scene: &Scene, particles: &Particles, frames: u32) -> Particles {
             state = solver.advance().unwrap().0;
         }
     };
-    match scene.solver.method {
-        Method::Flip => advance(&mut reference::flip::Flip::new(scene, &none)),
-        Method::Pbf => advance(&mut reference::pbf::Pbf::new(scene, &none)),
+    match scene.solver.method() {
+        Method::Flip => advance(&mut reference::flip::Flip::new(
+            &scene.with_flip().unwrap(),
+            &none,
+        )),
+        Method::Pbf => advance(&mut reference::pbf::Pbf::new(
+            &scene.with_pbf().unwrap(),
+            &none,
+        )),
     }
     state
 }

@@ -27,7 +27,7 @@ use swell::{
     solve::plan::*,
 };
 
-use crate::support::{self, flip, mover};
+use crate::support::{self, flip, mover, pbf_of};
 
 /// A scene, the counts of its contents, and the limits of a device.
 struct Case {
@@ -55,7 +55,7 @@ impl Case {
 
     fn with_solids(mut self) -> Self {
         self.counts.solid_grid = [12; 3];
-        if self.scene.solver.method == Method::Pbf {
+        if self.scene.solver.method() == Method::Pbf {
             self.counts.boundary_samples = 700;
         }
         self
@@ -112,7 +112,7 @@ fn with_wave_maker(mut scene: Scene) -> Scene {
 
 fn pbf(change: impl FnOnce(&mut swell::scene::Pbf)) -> Scene {
     let mut scene = support::scene([2.0; 3]);
-    change(scene.solver.pbf.as_mut().unwrap());
+    change(pbf_of(&mut scene));
     scene
 }
 

@@ -26,13 +26,13 @@ const GRAVITY: f64 = 9.81;
 fn projected(size: [f64; 3], frames_per_second: f64) -> Scene {
     let mut scene = scene(size);
     scene.shot.frames_per_second = frames_per_second;
-    scene.solver.pbf.as_mut().unwrap().grid_projection = true;
+    pbf_of(&mut scene).grid_projection = true;
     scene
 }
 
 fn without(scene: &Scene) -> Scene {
     let mut scene = scene.clone();
-    scene.solver.pbf.as_mut().unwrap().grid_projection = false;
+    pbf_of(&mut scene).grid_projection = false;
     scene
 }
 
@@ -41,7 +41,7 @@ fn on_gpu(scene: &Scene, particles: &Particles) -> pbf::Pbf {
 }
 
 fn in_f64(scene: &Scene, particles: &Particles) -> reference::pbf::Pbf {
-    let mut solver = reference::pbf::Pbf::new(scene, &Boundary::default());
+    let mut solver = reference::pbf::Pbf::new(&scene.with_pbf().unwrap(), &Boundary::default());
     solver.load(0, particles).unwrap();
     solver
 }
@@ -199,7 +199,7 @@ fn a_standing_wave_that_decides_on_its_substeps_keeps_its_height() {
     let (mut scene, particles, period) = wave();
     scene.shot.frames_per_second = 24.0;
     let mut left = |cfl: f64| {
-        scene.solver.pbf.as_mut().unwrap().cfl = cfl;
+        pbf_of(&mut scene).cfl = cfl;
         swing(&scene, &particles, period).1
     };
     // (0.2 m/s + g / 24) / 24 is a quarter of a spacing; at up to 0.3 m/s it is 0.3 of one.
@@ -351,7 +351,7 @@ fn falling_column(factor: f64, iteration: Iteration, gravity: f64) -> Vec<Partic
         [2.4 * factor, 2.0 * factor, 0.8 * factor],
         60.0 / factor.sqrt(),
     );
-    let pbf = scene.solver.pbf.as_mut().unwrap();
+    let pbf = pbf_of(&mut scene);
     (pbf.particle_spacing, pbf.iteration) = (D * factor, iteration);
     scene.water.gravity.y = -gravity;
     let mut solver = on_gpu(&scene, &lattice([0.0; 3], [8, 16, 8], [D * factor; 3]));

@@ -22,7 +22,7 @@ use swell::{
     solve::SolveError,
 };
 
-use crate::support::{self, context, flip as of_flip};
+use crate::support::{self, choose, context, flip as of_flip, pbf_of};
 use of_flip::DX;
 
 const METHODS: [Method; 2] = [Method::Flip, Method::Pbf];
@@ -35,10 +35,10 @@ const RHO: f64 = 1000.0;
 /// A drop in the middle of a box of `cells` cells, with frames of four of the longest substeps.
 fn scene(method: Method, cells: f64) -> Scene {
     let mut scene = of_flip::scene([cells; 3]);
-    let pbf = scene.solver.pbf.as_mut().unwrap();
+    let pbf = pbf_of(&mut scene);
     pbf.particle_spacing = DX / 2.0;
     pbf.grid_projection = true;
-    scene.solver.method = method;
+    choose(&mut scene, method);
     scene.water.gravity = DVec3::ZERO;
     scene.effects.surface_tension = Some(Settings { coefficient: SIGMA });
     scene.shot.frames_per_second = 0.2501 / longest(SIGMA);
@@ -92,7 +92,7 @@ fn solver(
     scene: &Scene,
     particles: &Particles,
 ) -> Box<dyn Solver<Error = SolveError>> {
-    match scene.solver.method {
+    match scene.solver.method() {
         Method::Pbf => {
             let none = Boundary::default();
             Box::new(support::solver(context, scene, particles, &none))
@@ -201,8 +201,14 @@ fn the_reference_has_laplaces_pressure() {
             inside.unwrap()
         };
         let inside = match method {
-            Method::Flip => inside(&mut reference::flip::Flip::new(&scene, &none)),
-            Method::Pbf => inside(&mut reference::pbf::Pbf::new(&scene, &none)),
+            Method::Flip => inside(&mut reference::flip::Flip::new(
+                &scene.with_flip().unwrap(),
+                &none,
+            )),
+            Method::Pbf => inside(&mut reference::pbf::Pbf::new(
+                &scene.with_pbf().unwrap(),
+                &none,
+            )),
         };
         println!("{method:?}: {:.4} of 2 σ / R", inside / expected);
         assert!(

@@ -29,7 +29,10 @@ fn spoiled(context: &Context) -> Context {
 /// A capacity for every brick: water may be anywhere.
 fn everywhere(scene: &Scene) -> Capacity {
     let full = (scene.domain.size() / DX).round().as_uvec3();
-    swell::solve::flip::capacity(scene, &block([0; 3], full.to_array().map(|n| n as usize)))
+    swell::solve::flip::capacity(
+        &scene.with_flip().unwrap(),
+        &block([0; 3], full.to_array().map(|n| n as usize)),
+    )
 }
 
 /// Open part of the lowest cells above the floor.
@@ -78,7 +81,7 @@ fn water_that_is_pressed_against_a_solid_comes_back_to_its_depth() {
         let bricks = everywhere(&scene);
         height(solver_with(context, &scene, &particles, &boundary, bricks))
     };
-    let mut reference = Reference::new(&scene, &boundary);
+    let mut reference = Reference::new(&scene.with_flip().unwrap(), &boundary);
     reference.load(0, &particles).unwrap();
     let found = [on(&context), height(reference)];
     println!("{found:?}");

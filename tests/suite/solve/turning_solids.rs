@@ -20,9 +20,9 @@ use swell::{
 };
 
 use crate::support::{
-    box_mesh, context,
+    box_mesh, choose, context,
     flip::{DX, position, scene, velocity},
-    lattice, placed,
+    lattice, pbf_of, placed,
 };
 
 /// Semi-axes of the drum, m.
@@ -102,11 +102,11 @@ fn ideal(at: DVec2, spin: f64, angle: f64) -> DVec2 {
 fn gpu(context: &Context, scene: &Scene, boundary: &Boundary, particles: &Particles) -> Flip {
     let counts = Counts {
         particles: particles.len(),
-        bricks: capacity(scene, particles),
+        bricks: capacity(&scene.with_flip().unwrap(), particles),
         ..Counts::of_solids(boundary)
     };
     let plan = Plan::new(scene, counts, device_limits(context));
-    Flip::new(context, scene, plan, boundary, false).unwrap()
+    Flip::new(context, &scene.with_flip().unwrap(), plan, boundary, false).unwrap()
 }
 
 /// Rms error of the particles' velocities relative to the rms of the ideal ones.
@@ -158,7 +158,7 @@ fn an_elliptic_drum_moves_ideal_water_as_lamb_says() {
     assert!(off(&particles, &state, -1.0, middle) > 1.9);
     assert!(off(&particles, &state, 1.0, 0.0) > 0.5);
 
-    let mut twin = Reference::new(&scene, &boundary);
+    let mut twin = Reference::new(&scene.with_flip().unwrap(), &boundary);
     twin.load(FRAME, &particles).unwrap();
     let (exact, _) = twin.advance().unwrap();
     let apart = (0..state.len()).map(|k| (velocity(&state, k) - velocity(&exact, k)).length());
@@ -185,18 +185,19 @@ fn part(state: &Particles, spin: f64, angle: f64) -> f64 {
 fn a_drum_of_pbf_takes_its_water_along() {
     let context = context();
     let (mut scene, mut boundary, particles) = case(1.0, 0.0);
-    scene.solver.method = Method::Pbf;
+    choose(&mut scene, Method::Pbf);
     let spacing = DX / 2.0;
-    scene.solver.pbf.as_mut().unwrap().particle_spacing = spacing;
+    pbf_of(&mut scene).particle_spacing = spacing;
     boundary.moving_samples = vec![rim(spacing)];
     let counts = Counts {
         particles: particles.len(),
         ..Counts::of_solids(&boundary)
     };
     let plan = Plan::new(&scene, counts, device_limits(&context));
-    let mut solver = Pbf::new(&context, &scene, plan, &boundary, false).unwrap();
+    let mut solver =
+        Pbf::new(&context, &scene.with_pbf().unwrap(), plan, &boundary, false).unwrap();
     solver.load(0, &particles).unwrap();
-    let mut twin = PbfReference::new(&scene, &boundary);
+    let mut twin = PbfReference::new(&scene.with_pbf().unwrap(), &boundary);
     twin.load(0, &particles).unwrap();
     let mut state = particles.clone();
     for frame in 0..20 {

@@ -14,7 +14,7 @@ use swell::{
     scene::{Method, Scene, Wall, effects::viscosity::Settings},
 };
 
-use crate::support::{self, context, flip as of_flip, flip::DX};
+use crate::support::{self, choose, context, flip as of_flip, flip::DX, pbf_of};
 
 const METHODS: [Method; 2] = [Method::Flip, Method::Pbf];
 
@@ -24,8 +24,8 @@ const GAP: usize = 16;
 /// A box full of water between no-slip plates below and above, periodic along x and z.
 fn plates(method: Method, coefficient: f64, frames_per_second: f64) -> Scene {
     let mut scene = of_flip::scene([8.0, GAP as f64, 8.0]);
-    scene.solver.method = method;
-    let pbf = scene.solver.pbf.as_mut().unwrap();
+    choose(&mut scene, method);
+    let pbf = pbf_of(&mut scene);
     pbf.particle_spacing = DX / 2.0;
     pbf.grid_projection = true;
     of_flip::flip(&mut scene).pic_blend = 0.0;
@@ -38,7 +38,7 @@ fn plates(method: Method, coefficient: f64, frames_per_second: f64) -> Scene {
 }
 
 fn solver(context: &Context, scene: &Scene, start: &Particles) -> Box<dyn Advance> {
-    match scene.solver.method {
+    match scene.solver.method() {
         Method::Flip => Box::new(of_flip::solver(context, scene, start)),
         Method::Pbf => Box::new(support::solver(context, scene, start, &Boundary::default())),
     }

@@ -21,7 +21,7 @@ use swell::{
 
 /// One substep of the f64 reference that begins at `start`, seconds.
 fn traced(scene: &Scene, particles: &Particles, start: f64) -> Trace {
-    let mut reference = Flip::new(scene, &Boundary::default());
+    let mut reference = Flip::new(&scene.with_flip().unwrap(), &Boundary::default());
     reference.load(0, particles).unwrap();
     one_substep(&mut reference, start)
 }
@@ -172,7 +172,7 @@ fn water_before_a_wall_that_comes_leaves_no_gap() {
             until: None,
         },
     }];
-    let mut twin = Flip::new(&scene, &Boundary::default());
+    let mut twin = Flip::new(&scene.with_flip().unwrap(), &Boundary::default());
     twin.load(0, &particles).unwrap();
     let found = [gap(rig::solver(&context, &scene, &particles)), gap(twin)];
     println!("{found:?}");
@@ -207,7 +207,7 @@ fn the_sliver_at_a_wall_is_water_beside_a_solid_too() {
     }
     scene.domain.max.y += 2.0 * DX;
     for boundary in [Boundary::default(), floor] {
-        let mut reference = Flip::new(&scene, &boundary);
+        let mut reference = Flip::new(&scene.with_flip().unwrap(), &boundary);
         reference.load(0, &particles).unwrap();
         let trace = one_substep(&mut reference, 1.0);
         let kind = |x: i64, y: i64| trace.space.kind[trace.bricks.element([x, y, 4]) as usize];

@@ -11,7 +11,7 @@ use swell::{
 };
 
 use crate::support::{
-    context, flip as of_flip, plan,
+    choose, context, flip as of_flip, pbf_of, plan,
     solvers::{on_cpu, on_gpu},
 };
 
@@ -54,10 +54,10 @@ fn waves(walls: &[Wall], length: f64) -> Option<generation_zone::Settings> {
 /// 16 × 8 × 8 cells of FLIP, or twice as many spacings of PBF, with water in the lower half.
 fn half_full(method: Method) -> (Scene, Particles) {
     let mut scene = of_flip::scene([16.0, 8.0, 8.0]);
-    let pbf = scene.solver.pbf.as_mut().unwrap();
+    let pbf = pbf_of(&mut scene);
     pbf.particle_spacing = of_flip::DX / 2.0;
     pbf.grid_projection = true;
-    scene.solver.method = method;
+    choose(&mut scene, method);
     scene.shot.frames_per_second = 50.0;
     (scene, of_flip::block([0; 3], [16, 4, 8]))
 }
@@ -181,7 +181,7 @@ fn drops_over_a_zone_fall_freely() {
             }
             if method == Method::Pbf {
                 let mut scene = scene.clone();
-                scene.solver.pbf.as_mut().unwrap().grid_projection = false;
+                pbf_of(&mut scene).grid_projection = false;
                 let found = falls(&on_gpu(&context, &scene, &particles, frames));
                 assert!(found[1] > 0.8 * free, "{found:?}");
             }

@@ -10,7 +10,7 @@ use swell::{
     },
     gpu::{adapter::Context, buffer::Buf},
     scene::{
-        Method, Scene,
+        Scene,
         flip::{Flip as Settings, Precision, Preconditioner, Pressure, Surface, Transfer},
     },
     solve::{
@@ -19,6 +19,7 @@ use swell::{
     },
 };
 
+pub use crate::support::flip_of as flip;
 use crate::support::{lattice, scene as box_scene};
 
 /// Cell size, metres.
@@ -46,13 +47,9 @@ pub fn settings() -> Settings {
 /// A box of `cells` cells.
 pub fn scene(cells: [f64; 3]) -> Scene {
     let mut scene = box_scene(cells.map(|n| n * DX));
-    scene.solver.method = Method::Flip;
-    scene.solver.flip = Some(settings());
+    scene.unchosen = Some(scene.solver);
+    scene.solver = settings().into();
     scene
-}
-
-pub fn flip(scene: &mut Scene) -> &mut Settings {
-    scene.solver.flip.as_mut().unwrap()
 }
 
 pub fn solver_with(
@@ -68,7 +65,8 @@ pub fn solver_with(
         ..Counts::of_solids(boundary)
     };
     let plan = Plan::new(scene, counts, device_limits(context));
-    let mut solver = Flip::new(context, scene, plan, boundary, false).unwrap();
+    let mut solver =
+        Flip::new(context, &scene.with_flip().unwrap(), plan, boundary, false).unwrap();
     solver.load(0, particles).unwrap();
     solver
 }
@@ -79,7 +77,7 @@ pub fn solver(context: &Context, scene: &Scene, particles: &Particles) -> Flip {
         scene,
         particles,
         &Boundary::default(),
-        capacity(scene, particles),
+        capacity(&scene.with_flip().unwrap(), particles),
     )
 }
 

@@ -26,6 +26,7 @@ use swell::{
     scene::{
         Budget, Effects, Iteration, Method, Pbf as Settings, PlacedMesh, Placement, Scene, Shot,
         Solver as SolverSettings, Stop, Water,
+        flip::Flip,
         moving_solid::{MovingSolid, Slide, Turn},
     },
     solve::{pbf, plan::*},
@@ -58,31 +59,60 @@ pub fn scene(size: [f64; 3]) -> Scene {
         solids: Vec::new(),
         moving_solids: Vec::new(),
         wave_makers: Vec::new(),
-        absorbers: Default::default(),
         emitters: Vec::new(),
         drains: Vec::new(),
-        solver: SolverSettings {
-            method: Method::Pbf,
-            flip: None,
-            pbf: Some(Settings {
-                particle_spacing: D,
-                support_ratio: 2.0,
-                iteration: Iteration::RedBlack,
-                spectral_radius: 0.98,
-                stop: Stop::Iterations(4),
-                cfl: 1.0,
-                relaxation: 1.0,
-                artificial_pressure: 0.0,
-                grid_projection: false,
-                max_substeps: 32,
-            }),
-        },
+        solver: SolverSettings::Pbf(Settings {
+            particle_spacing: D,
+            support_ratio: 2.0,
+            iteration: Iteration::RedBlack,
+            spectral_radius: 0.98,
+            stop: Stop::Iterations(4),
+            cfl: 1.0,
+            relaxation: 1.0,
+            artificial_pressure: 0.0,
+            grid_projection: false,
+            max_substeps: 32,
+        }),
+        unchosen: None,
         grids: None,
         keep: None,
         compression: None,
         probes: Vec::new(),
         budget: Budget::default(),
         effects: Effects::default(),
+    }
+}
+
+/// The scene's settings of both methods, as far as it has them.
+fn settings_of(scene: &mut Scene) -> impl Iterator<Item = &mut SolverSettings> {
+    [Some(&mut scene.solver), scene.unchosen.as_mut()]
+        .into_iter()
+        .flatten()
+}
+
+/// The scene's settings of PBF, chosen or not.
+pub fn pbf_of(scene: &mut Scene) -> &mut Settings {
+    let found = settings_of(scene).find_map(|solver| match solver {
+        SolverSettings::Pbf(pbf) => Some(pbf),
+        SolverSettings::Flip(_) => None,
+    });
+    found.unwrap()
+}
+
+/// The scene's settings of FLIP, chosen or not.
+pub fn flip_of(scene: &mut Scene) -> &mut Flip {
+    let found = settings_of(scene).find_map(|solver| match solver {
+        SolverSettings::Pbf(_) => None,
+        SolverSettings::Flip(flip) => Some(flip),
+    });
+    found.unwrap()
+}
+
+/// Chooses a method whose settings the scene has.
+pub fn choose(scene: &mut Scene, method: Method) {
+    if scene.solver.method() != method {
+        let other = scene.unchosen.as_mut().unwrap();
+        std::mem::swap(&mut scene.solver, other);
     }
 }
 
@@ -136,7 +166,8 @@ pub fn solver(
     boundary: &Boundary,
 ) -> pbf::Pbf {
     let plan = plan(context, scene, particles.len(), boundary);
-    let mut solver = pbf::Pbf::new(context, scene, plan, boundary, false).unwrap();
+    let mut solver =
+        pbf::Pbf::new(context, &scene.with_pbf().unwrap(), plan, boundary, false).unwrap();
     solver.load(0, particles).unwrap();
     solver
 }

@@ -9,7 +9,7 @@ use swell::{
 
 /// State of the particles after `frames` frames on the GPU.
 pub fn on_gpu(context: &Context, scene: &Scene, particles: &Particles, frames: u32) -> Particles {
-    match scene.solver.method {
+    match scene.solver.method() {
         Method::Flip => super::flip::run(context, scene, particles, frames).0,
         Method::Pbf => super::run(context, scene, particles, frames).0,
     }
@@ -23,8 +23,14 @@ pub fn on_cpu(scene: &Scene, particles: &Particles, frames: u32) -> Particles {
         let states = (0..frames).map(|_| solver.advance().unwrap().0);
         states.last().unwrap()
     };
-    match scene.solver.method {
-        Method::Flip => advance(&mut reference::flip::Flip::new(scene, &none)),
-        Method::Pbf => advance(&mut reference::pbf::Pbf::new(scene, &none)),
+    match scene.solver.method() {
+        Method::Flip => advance(&mut reference::flip::Flip::new(
+            &scene.with_flip().unwrap(),
+            &none,
+        )),
+        Method::Pbf => advance(&mut reference::pbf::Pbf::new(
+            &scene.with_pbf().unwrap(),
+            &none,
+        )),
     }
 }

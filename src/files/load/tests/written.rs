@@ -20,7 +20,9 @@ fn what_is_written_loads_again_equal() {
     assert_eq!(scene.mesh_files().len(), 1);
 
     // Control: a scene with one other number is not equal.
-    scene.solver.flip.as_mut().expect("a table").cfl = 0.9;
+    if let Some(Solver::Flip(flip)) = &mut scene.unchosen {
+        flip.cfl = 0.9;
+    }
     assert_ne!(scene, again);
     // A mesh that differs from the baked one is rejected.
     fs::write(

@@ -41,10 +41,15 @@ pub(super) fn check_fit(
             ));
         }
         let is_same = |state: &Point| {
-            let water =
-                |scene: &Scene| (scene.solver.method, scene.particle_spacing(), scene.domain);
+            let water = |scene: &Scene| {
+                (
+                    scene.solver.method(),
+                    scene.particle_spacing(),
+                    scene.domain,
+                )
+            };
             water(scene) == water(&state.scene)
-                && scene.solver.flip().cell_size == state.scene.solver.flip().cell_size
+                && scene.solver.cell_size() == state.scene.solver.cell_size()
         };
         if !state.is_none_or(is_same) {
             return fault(format!(
@@ -98,7 +103,7 @@ pub(super) fn check_converged(
     let fault = |problem: String| Err(doc.fault_at(spec.errors.span(), problem));
     for Point { scene, label, .. } in &line.points {
         let name = &line.name;
-        if scene.solver.method != Method::Pbf {
+        if scene.solver.method() != Method::Pbf {
             return fault(format!(
                 "distance_to_converged is measured with solver.method pbf, and {name:?} \
                  with {label} has another"
@@ -134,9 +139,10 @@ pub(super) fn check_coarser(
         Measure::Finest if physics_hash(coarser) != physics_hash(finest) => Ok(()),
         Measure::Finest => fault("the scene is that of the last value: this changes nothing"),
         Measure::Projection => {
-            let size = |scene: &Scene| scene.solver.flip().cell_size;
+            let size = |scene: &Scene| scene.solver.cell_size();
             let is_same = |a: f64, b: f64| (a - b).abs() <= 1e-9 * b;
-            let is_twice = is_same(size(coarser), 2.0 * size(finest))
+            let is_twice = coarser.solver.method() == finest.solver.method()
+                && is_same(size(coarser), 2.0 * size(finest))
                 && is_same(coarser.particle_spacing(), finest.particle_spacing())
                 && coarser.domain == finest.domain;
             match is_twice {

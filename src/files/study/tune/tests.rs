@@ -35,7 +35,7 @@ fn twins_differ_from_the_scene_in_what_they_are_called_for() {
         physics_hash(&tune.scene),
         "the last is the scene itself"
     );
-    let pbf = tune.reference.scene.solver.pbf();
+    let pbf = tune.reference.scene.solver.pbf().expect("PBF");
     assert_eq!((pbf.particle_spacing, pbf.cfl), (0.04, 0.5));
     assert_eq!(
         (pbf.stop, pbf.max_substeps),
@@ -93,7 +93,7 @@ fn the_other_solver_has_settings_of_its_own() {
     });
     let tune = tune.expect("a shot");
     assert_eq!(tune.most_seconds(), Some(0.5), "60 s over 120 frames");
-    let flip = tune.reference.scene.solver.flip();
+    let flip = tune.reference.scene.solver.flip().expect("FLIP");
     assert_eq!(
         (flip.cell_size, flip.cfl, flip.pressure.tolerance),
         (0.08, 1.5, 1e-6)

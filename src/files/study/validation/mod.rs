@@ -89,7 +89,7 @@ pub struct Trial {
 impl Trial {
     /// Returns solver and resolution, for a legend or a line.
     pub fn name(&self) -> String {
-        format!("{}, {}", self.scene.solver.method.name(), self.resolution)
+        format!("{}, {}", self.scene.solver.method().name(), self.resolution)
     }
 }
 
@@ -483,7 +483,7 @@ impl Gate {
     /// Returns whether the gate judges this run.
     pub fn judges(&self, run: &Trial) -> bool {
         self.method
-            .is_none_or(|method| method == run.scene.solver.method)
+            .is_none_or(|method| method == run.scene.solver.method())
             && self
                 .resolution
                 .is_none_or(|resolution| resolution == run.resolution)

@@ -10,23 +10,19 @@ use swell::{
     scene::{
         Scene, Wall,
         effects::surface_tension,
-        flip::{AFFINE, Flip, Preconditioner, Surface, Transfer},
+        flip::{AFFINE, Preconditioner, Surface, Transfer},
     },
     stage::prepare::Start,
 };
 
 use super::{Control, control, flip::SYSTEM, tension::TENSION};
-use crate::support::{D, lattice, mover, noise, turning};
+use crate::support::{D, flip_of as flip, lattice, mover, noise, turning};
 
 /// A change of the common case, and the faults that its check must detect.
 pub struct Variant {
     pub name: &'static str,
     pub change: fn(&mut Scene, &mut Start),
     pub controls: &'static [Control],
-}
-
-fn flip(scene: &mut Scene) -> &mut Flip {
-    scene.solver.flip.as_mut().unwrap()
 }
 
 /// Noise of 1 m/s.

@@ -123,7 +123,7 @@ fn each_fault_names_file_line_key_and_what_is_allowed() {
     let counts = sweep.lines[0]
         .points
         .iter()
-        .map(|p| p.scene.solver.pbf().stop);
+        .map(|p| p.scene.solver.pbf().unwrap().stop);
     assert_eq!(
         counts.collect::<Vec<_>>(),
         [Stop::Iterations(1), Stop::Iterations(4)]

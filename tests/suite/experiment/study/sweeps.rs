@@ -219,7 +219,14 @@ set = ["solver.method=flip", "shot.frames_per_second=50"]
 name = "pbf"
 "#;
     let sweep = job.load(text).unwrap();
-    let blend = |k: usize| sweep.lines[0].points[k].scene.solver.flip().pic_blend;
+    let blend = |k: usize| {
+        sweep.lines[0].points[k]
+            .scene
+            .solver
+            .flip()
+            .unwrap()
+            .pic_blend
+    };
     // The same blend per second at each rate: two frames at 100 Hz keep what one at 50 Hz keeps.
     assert!((blend(0) - 0.05).abs() < 1e-12);
     assert!(((1.0 - blend(1)).powi(2) - 0.95).abs() < 1e-12);

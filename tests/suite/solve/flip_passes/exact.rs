@@ -44,9 +44,9 @@ pub(super) fn both(
         }
         last.unwrap()
     }
-    let bricks = capacity(scene, particles);
+    let bricks = capacity(&scene.with_flip().unwrap(), particles);
     let gpu = solver_with(context, scene, particles, boundary, bricks);
-    let cpu = reference::flip::Flip::new(scene, boundary);
+    let cpu = reference::flip::Flip::new(&scene.with_flip().unwrap(), boundary);
     [
         ("GPU", run(gpu, particles, frames)),
         ("reference", run(cpu, particles, frames)),

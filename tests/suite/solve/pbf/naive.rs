@@ -21,7 +21,7 @@ pub(super) struct Naive {
 
 impl Naive {
     pub(super) fn new(scene: &Scene, particles: &Particles) -> Self {
-        let pbf = scene.solver.pbf();
+        let pbf = scene.solver.pbf().unwrap();
         Self {
             positions: particles
                 .position

@@ -27,14 +27,14 @@ use swell::{
 
 use super::{Naive, ONE_ITERATION_TOLERANCE};
 use crate::support::{
-    D, context, device::spoiled, jitter, lattice, noise, run, scene as box_scene, solver,
+    D, context, device::spoiled, jitter, lattice, noise, pbf_of, run, scene as box_scene, solver,
 };
 
 /// A scene without gravity that runs `iterations` Jacobi iterations.
 fn scene(size: [f64; 3], iterations: u32) -> Scene {
     let mut scene = box_scene(size);
     scene.water.gravity = DVec3::ZERO;
-    let pbf = scene.solver.pbf.as_mut().unwrap();
+    let pbf = pbf_of(&mut scene);
     pbf.iteration = Iteration::Jacobi;
     pbf.stop = Stop::Iterations(iterations);
     scene
@@ -136,7 +136,7 @@ fn push_length() -> f64 {
 /// the reference.
 fn pushes(context: &Context, particles: &Particles, blobs: usize) -> [Vec<[DVec3; 2]>; 2] {
     let scene = scene([4.0, 3.0, 3.0], 1);
-    let mut cpu = reference::pbf::Pbf::new(&scene, &Boundary::default());
+    let mut cpu = reference::pbf::Pbf::new(&scene.with_pbf().unwrap(), &Boundary::default());
     cpu.load(0, particles).unwrap();
     let states = [
         run(context, &scene, particles, 1).0,
@@ -251,8 +251,8 @@ fn lambda_is_summed_over_the_corrections() {
     let largest = sums.iter().fold(0.0, |most: f64, sum| most.max(sum.abs()));
     assert!(single.iter().fold(0.0, |most: f64, l| most.max(l.abs())) > 0.02 * largest);
 
-    let model = Model::new(&scene, &Boundary::default());
-    let substep = Substep::new(&scene, 0.01, 0.01);
+    let model = Model::new(&scene.with_pbf().unwrap(), &Boundary::default());
+    let substep = Substep::new(&scene, &Default::default(), 0.01, 0.01);
     let mut timings = Timings::default();
     let mut sorted = Sorted::new(
         &model,
@@ -290,7 +290,7 @@ fn lambda_is_summed_over_the_corrections() {
     // (`a_linear_pressure_pushes_by_its_gradient`).
     let scale = -1000.0 * naive.calibration.linear_gradient / (0.01 * 0.01);
     let h = naive.calibration.support_radius;
-    let mut cpu = reference::pbf::Pbf::new(&scene, &Boundary::default());
+    let mut cpu = reference::pbf::Pbf::new(&scene.with_pbf().unwrap(), &Boundary::default());
     cpu.load(0, &particles).unwrap();
     cpu.advance().unwrap();
     for at in [DVec3::ONE, DVec3::new(0.93, 1.04, 0.99)] {

@@ -49,6 +49,30 @@ fn a_replay_names_the_pass_of_a_residual_in_each_precision() {
     }
 }
 
+/// PBF's projection has a precision of its own, which is not that of FLIP's settings.
+#[test]
+fn a_replay_of_pbf_names_the_pass_of_a_residual() {
+    let context = crate::support::context();
+    for precision in ["f32", "f64"] {
+        let precision = format!("solver.flip.pressure.precision={precision}");
+        let sets = [
+            SOLVERS[0],
+            "budget.residual=1e-9",
+            "solver.pbf.grid_projection=true",
+            "solver.flip.pressure.tolerance=1e-12",
+            &precision,
+        ];
+        let broken = bake(&opened(&context), &load("34-not-a-number", &sets), "1-2");
+        let Failure { breach, place } = broken.failure();
+        assert_eq!(breach.watched, Watched::Residual, "{sets:?}: {breach}");
+        let found = place
+            .as_ref()
+            .map(|place| (place.pass, place.buffer.as_str()));
+        let expected = ("pressure/reduce", "pressure_control");
+        assert_eq!(found, Some(expected), "{sets:?}: {breach}");
+    }
+}
+
 /// The pass that writes a NaN is found where its words are those of f64.
 #[test]
 fn a_replay_names_the_pass_of_a_number_that_is_none_in_f64() {
