@@ -6,7 +6,8 @@
 //
 // A surface that water is about to hit moves on with it: near a cell's centre, where the pressure
 // is 0, it would let all inflow out through the faces towards air, at a speed that grows without
-// bound as θ and the substep shrink. Such a cell counts as full.
+// bound as θ and the substep shrink. Such a cell counts as full, unless a wall or solid is beside
+// it: that would stop a whole cell of water at once where part of one arrives.
 #import "shared/thread.wgsl"
 #import "shared/flip_neighborhood.wgsl"
 #import "shared/flip_buried.wgsl"
@@ -130,25 +131,34 @@ fn filled(element: u32, cell: vec3f) -> f32 {
 // full cell; from twice as much it does. Water at rest on a floor has 1.
 const LEAST_INFLOW = 2.0;
 
-// Velocity that the projection has to stop, m/s: the right-hand side of the cell's row.
-fn inflow(element: u32) -> f32 {
-    var sum = -solid_flux[element];
+struct Hit {
+    // Velocity that the projection has to stop, m/s: the right-hand side of the cell's row.
+    inflow: f32,
+    // Smallest open fraction of the cell's faces.
+    open: f32,
+}
+
+fn hit(element: u32) -> Hit {
+    var found = Hit(-solid_flux[element], 1.0);
     for (var axis = 0u; axis < 3u; axis++) {
         var step = vec3i(0);
         step[axis] = 1;
         let lower = axis * params.stride + element;
         let upper = axis * params.stride + element_at(step);
-        sum += face_open[lower] * face_velocity[lower] - face_open[upper] * face_velocity[upper];
+        found.inflow += face_open[lower] * face_velocity[lower];
+        found.inflow -= face_open[upper] * face_velocity[upper];
+        found.open = min(found.open, min(face_open[lower], face_open[upper]));
     }
-    return sum;
+    return found;
 }
 
 // Distance of the surface by which the projection finds the pressure in a cell of water.
 fn hit_distance(element: u32) -> f32 {
     let own = liquid_distance[element];
+    let found = hit(element);
     let least = LEAST_INFLOW * length(params.velocity_step);
-    let part = select(0.0, clamp(inflow(element) / least - 1.0, 0.0, 1.0), least > 0.0);
-    return mix(own, min(own, -params.cell_size), part);
+    let part = select(0.0, clamp(found.inflow / least - 1.0, 0.0, 1.0), least > 0.0);
+    return mix(own, min(own, -params.cell_size), part * found.open);
 }
 #endif
 

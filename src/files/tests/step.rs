@@ -197,6 +197,18 @@ fn flip_takes_substeps_in_which_nothing_moves_further_than_cfl_cells() {
 }
 
 #[test]
+fn flip_takes_substeps_in_which_short_surface_waves_are_stable() {
+    // Δt = √(0.2 m / 10 m/s²), where 3 cells would allow √3 times that.
+    let scene = flip(&[]);
+    let longest = 0.02f64.sqrt();
+    for (part, count) in [(0.9995, 4.0), (1.0005, 5.0)] {
+        let remaining = 4.0 * longest * part;
+        let found = scene.flip_substep(&AT_REST, 1, 0.3, remaining, 0.0, (0, 0.0));
+        assert_eq!(found.expect("few enough").0, count, "{part}");
+    }
+}
+
+#[test]
 fn flip_counts_the_substeps_that_are_over_and_walls() {
     let scene = flip(&["water.gravity=[0, 0, 0]", WALL]);
     // 3.99 m/s for 0.3 s are 5.985 cells: two substeps of at most 3.

@@ -141,17 +141,27 @@ impl Gaps<'_> {
         LEAST_INFLOW * self.step.velocity_step.length()
     }
 
+    /// Returns the smallest open fraction of a cell's faces.
+    fn least_open(&self, element: u32) -> f64 {
+        let open = |face: u32, axis: usize| self.space.open[face as usize][axis];
+        let upper = |axis: usize| open(self.bricks.near(element, along(axis, 1)), axis);
+        (0..3)
+            .map(|axis| open(element, axis).min(upper(axis)))
+            .fold(1.0, f64::min)
+    }
+
     /// Returns the distance to the surface by which the projection finds a cell's pressure, metres.
     /// A surface that water is about to hit moves on with it: near a cell's centre, where the
     /// pressure is 0, it would let all inflow out through the faces towards air, at a speed that
-    /// grows without bound as θ and the substep shrink. Such a cell counts as full.
+    /// grows without bound as θ and the substep shrink. Such a cell counts as full, unless a wall or
+    /// solid is beside it: that would stop a whole cell of water at once where part of one arrives.
     pub fn hit_distance(&self, element: u32, own: f64) -> f64 {
         if !self.is_hit(element) {
             return own;
         }
         let inflow: DVec3 = self.inflow(element).into_iter().sum();
         let part = (inflow.element_sum() / self.least_inflow() - 1.0).clamp(0.0, 1.0);
-        own + part * (own.min(-self.model.cell_size()) - own)
+        own + part * self.least_open(element) * (own.min(-self.model.cell_size()) - own)
     }
 
     /// Returns the volume of a cell that fills in the substep because the ends of a gap meet, in
