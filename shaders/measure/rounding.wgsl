@@ -2,11 +2,14 @@
 // The host compares the results with its own in f64.
 #import "shared/thread.wgsl"
 
-struct Phase {
+// What shared/pressure_two_sum.wgsl needs of a pressure phase.
+struct Opaque {
     opaque_zero: u32,
 }
 
-@group(0) @binding(0) var<storage, read> phase: Phase;
+var<private> phase: Opaque;
+
+@group(0) @binding(0) var<storage, read> rounding_zero: array<u32>;
 // a, b, minus the rounded product a b, and an angle.
 @group(0) @binding(1) var<storage, read> rounding_operands: array<vec4f>;
 // A subnormal number, and the least normal one.
@@ -31,6 +34,7 @@ fn main(
     if i >= arrayLength(&rounding_operands) {
         return;
     }
+    phase.opaque_zero = rounding_zero[0];
     let operands = rounding_operands[i];
     let a = operands.x;
     let b = operands.y;

@@ -10,7 +10,7 @@ use super::{
 };
 
 const PASS: &str = "measure/rounding";
-const PHASE: Buf<u32> = Buf::new("phase");
+const ZERO: Buf<u32> = Buf::new("rounding_zero");
 const OPERANDS: Buf<[f32; 4]> = Buf::new("rounding_operands");
 const SMALL: Buf<[f32; 2]> = Buf::new("rounding_small");
 const RESULTS: Buf<[f32; 4]> = Buf::new("rounding_results");
@@ -60,7 +60,7 @@ impl Rounding {
     /// [`GpuError::Shader`], [`GpuError::Lost`].
     pub fn measure(context: &Context) -> Result<Self, GpuError> {
         let buffers = [
-            PHASE.sized(1),
+            ZERO.sized(1),
             OPERANDS.sized(COUNT),
             SMALL.sized(COUNT),
             RESULTS.sized(4 * COUNT),

@@ -1,6 +1,6 @@
 // What an imprecise device computes in place of an operation: the exact result and an error, which
-// a hash of the result's bits chooses. `mod.rs` declares the constants ahead of this text, `call.rs`
-// writes versions for vectors, and `rewrite.rs` replaces the operations.
+// a hash of the result's bits chooses. `mod.rs` declares the constants ahead of this text,
+// `call.rs` writes versions for vectors, and `rewrite.rs` replaces the operations.
 
 fn imprecise_flush(x: f32) -> f32 {
     let is_subnormal = IMPRECISE_FLUSHES && (bitcast<u32>(x) & 0x7f800000u) == 0u;
