@@ -9,6 +9,7 @@ use swell_domain::{frame_range::FrameRange, substep::SubstepChoice};
 use swell_scene::Method;
 use swell_stage::{
     check::{Event, FirstOver, Outcome, Request, Row, Source, Table, check},
+    device::{Gpu, Imprecision},
     replay::{Replayed, is_failed, replay_failed},
 };
 
@@ -50,6 +51,10 @@ pub(super) struct CheckArgs {
     json: bool,
     #[command(flatten)]
     gpu: GpuArgs,
+    /// Let the passes compute as imprecisely as Vulkan permits, to see whether the scene would be
+    /// within tolerance on any GPU: vulkan-worst, or vulkan-worst:SEED for other errors.
+    #[arg(long, value_name = "PROFILE", conflicts_with = "render")]
+    imprecision: Option<Imprecision>,
     /// How to tell progress.
     #[arg(long, value_enum, default_value_t)]
     pub(super) progress: Mode,
@@ -69,9 +74,10 @@ pub(super) struct Misplaced {
 /// succeeds.
 fn run_failed(args: &CheckArgs, progress: &Progress) -> Result<u8, Failure> {
     let has_solver = args.solver.is_some() || !args.set.is_empty();
-    if args.frames.is_some() || args.substep.is_some() || has_solver {
+    let is_imprecise = args.imprecision.is_some();
+    if args.frames.is_some() || args.substep.is_some() || has_solver || is_imprecise {
         let error = Misplaced {
-            option: "--frames, --substep, --solver or --set",
+            option: "--frames, --substep, --solver, --set or --imprecision",
             what: "caches or scenes",
             is: "a frame that failed: it records how it was baked",
             source_file: args.source.clone(),
@@ -111,7 +117,10 @@ pub(super) fn run(args: &CheckArgs, progress: &Progress) -> Result<u8, Failure> 
     let request = Request {
         source: source(args)?,
         substep: args.substep.unwrap_or_default(),
-        gpu: args.gpu.read()?,
+        gpu: Gpu {
+            imprecision: args.imprecision,
+            ..args.gpu.read()?
+        },
     };
     let interrupt = Interrupt::install_or_warn();
     let outcome = check(&request, interrupt.flag(), &mut |event| {

@@ -18,8 +18,8 @@ use swell_stage::{
     bake::BakePlan,
     device::Gpu,
     inspect::{
-        Adapter, Entry, LIST_BUDGET, MOST_NODES, Manifest, PARTICLES, PROBES, ScenePlan, adapters,
-        cache, plan, plot,
+        Adapter, Entry, LIST_BUDGET, MOST_NODES, Manifest, PARTICLES, PROBES, Rounding, ScenePlan,
+        adapters, cache, plan, plot,
     },
     replay::is_failed,
     time::{Timed, time},
@@ -258,7 +258,31 @@ fn show_adapter(out: &mut String, adapter: &Adapter) -> fmt::Result {
         "   f64 in shaders: {}",
         if adapter.has_f64 { "yes" } else { "no" }
     )?;
-    Ok(())
+    match &adapter.rounding {
+        Ok(rounding) => show_rounding(out, rounding),
+        Err(why) => writeln!(out, "   rounding: not measured: {why}"),
+    }
+}
+
+fn show_rounding(out: &mut String, rounding: &Rounding) -> fmt::Result {
+    writeln!(
+        out,
+        "   largest errors, ulp: {:.2} of division, {:.2} of square roots, {:.2} of inverse ones; \
+         sine {:.0e}",
+        rounding.division, rounding.square_root, rounding.inverse_square_root, rounding.sine
+    )?;
+    let yes = |is_so| if is_so { "yes" } else { "no" };
+    writeln!(
+        out,
+        "   a b + c rounded once: {}; subnormal numbers lost: {}",
+        yes(rounding.contracts),
+        yes(rounding.flushes_inputs || rounding.flushes_results)
+    )?;
+    writeln!(
+        out,
+        "   two words keep what one loses: {}",
+        yes(rounding.keeps_two_words())
+    )
 }
 
 fn show_plan(out: &mut String, planned: &ScenePlan<'_>) -> fmt::Result {

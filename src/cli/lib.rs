@@ -145,6 +145,7 @@ impl GpuArgs {
             adapter: named_adapter(self.adapter.as_ref()),
             shaders: shaders.unwrap_or_default(),
             is_hardware_required: self.require.is_gpu(),
+            imprecision: None,
         })
     }
 }

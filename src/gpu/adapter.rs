@@ -1,10 +1,12 @@
 //! Finds adapters and opens devices on them.
 
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, OnceLock};
 
 use wgpu::{Adapter, AdapterInfo, Backends, Device, DeviceType, Features, Instance, Limits, Queue};
 
-use super::{compiled::Compiled, hidden, shader::Shaders};
+use super::{
+    compiled::Compiled, hidden, imprecision::Imprecision, rounding::Rounding, shader::Shaders,
+};
 
 pub use super::error::GpuError;
 
@@ -37,6 +39,10 @@ pub struct Context {
     /// A fault injected into one pass, to show that a comparison detects it; `None` in
     /// every command.
     pub spoil: Option<InjectedFault>,
+    /// How much less precisely passes compute than the device does.
+    pub(super) imprecision: Option<Imprecision>,
+    /// What [`Context::rounding`] measured.
+    rounding: Arc<OnceLock<Rounding>>,
     /// Passes compiled on this device.
     pub(super) compiled: Arc<Compiled>,
     fault: Arc<Mutex<Option<String>>>,
@@ -183,6 +189,23 @@ impl Context {
         Self::open_lowered(request, needs, |_| {})
     }
 
+    /// Same as [`Self::open`] on a device whose passes compute as imprecisely as a profile says,
+    /// which its name tells. Passes may also compute in f64, which stays precise.
+    ///
+    /// # Errors
+    /// Those of [`Self::open`]; [`GpuError::NoImprecision`] on an adapter without f64.
+    pub fn open_imprecise(request: Option<&str>, profile: Imprecision) -> Result<Self, GpuError> {
+        match Self::open_for(request, Needs { f64: true }) {
+            Ok(mut context) => {
+                context.imprecision = Some(profile);
+                context.info.name += &format!(" with the errors of {profile}");
+                Ok(context)
+            }
+            Err(GpuError::NoF64 { adapter }) => Err(GpuError::NoImprecision { adapter }),
+            Err(error) => Err(error),
+        }
+    }
+
     /// Same as [`Self::open_for`] on a device with lower limits than the adapter has, as set by
     /// `lower`. Exceeding them is then an error of the device, as on an adapter with these limits.
     ///
@@ -237,9 +260,26 @@ impl Context {
             shaders: Shaders::default(),
             counts_operations: false,
             spoil: None,
+            imprecision: None,
+            rounding: Arc::default(),
             compiled: Arc::default(),
             fault,
         })
+    }
+
+    /// Measures the device's rounding, once unless its shaders were changed.
+    ///
+    /// # Errors
+    /// Those of [`Rounding::measure`].
+    pub fn rounding(&self) -> Result<Rounding, GpuError> {
+        if self.spoil.is_some() || self.shaders.edited().is_some() {
+            return Rounding::measure(self);
+        }
+        if let Some(rounding) = self.rounding.get() {
+            return Ok(*rounding);
+        }
+        let rounding = Rounding::measure(self)?;
+        Ok(*self.rounding.get_or_init(|| rounding))
     }
 
     /// Warning for a software adapter on a machine that seems to have a GPU which Vulkan does not

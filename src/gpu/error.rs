@@ -70,6 +70,27 @@ pub enum GpuError {
         /// Adapter name.
         adapter: String,
     },
+    /// A profile of imprecision was requested, and the adapter has no 64-bit floats.
+    #[error(
+        "{adapter} has no 64-bit floats in shaders (SHADER_F64), with which a profile of \
+         imprecision computes what it then makes imprecise"
+    )]
+    NoImprecision {
+        /// Adapter name.
+        adapter: String,
+    },
+    /// The adapter loses what two words of a number have to keep.
+    #[error(
+        "{adapter} loses {lost}, without which precision = \"f32_refined\" is no better than \
+         \"f32\": its driver simplifies what shaders compute; use \"f64\" or \"f32\", PBF \
+         without grid_projection, another driver, or the CPU"
+    )]
+    NoErrorTerms {
+        /// Adapter name.
+        adapter: String,
+        /// What is lost.
+        lost: &'static str,
+    },
     /// A pass binds more storage buffers than the adapter supports.
     #[error(
         "pass {pass} binds {needed} storage buffers, and {adapter} allows {allowed} \

@@ -1,6 +1,7 @@
 //! Passes and buffers by name, built on a device.
 
 use std::{
+    borrow::Cow,
     collections::BTreeMap,
     sync::{Arc, OnceLock},
 };
@@ -455,7 +456,13 @@ pub(super) fn shader(
         Stage::Raster { .. } => wgpu::ShaderStages::VERTEX_FRAGMENT,
     };
     let entries = entries(&reflection.bindings, visibility);
-    let source = wgpu::ShaderSource::Wgsl(source.text.into());
+    let source = match &context.imprecision {
+        Some(profile) => {
+            let module = profile.applied(name, &source.text).map_err(blamed)?;
+            wgpu::ShaderSource::Naga(Cow::Owned(module))
+        }
+        None => wgpu::ShaderSource::Wgsl(source.text.into()),
+    };
     let (module, layout, pipeline_layout) = module(context, name, &entries, source)?;
     Ok(Shader {
         module,

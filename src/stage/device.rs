@@ -26,6 +26,7 @@ use super::{Blame, prepare::Start};
 pub use swell_gpu::{
     adapter::GpuError,
     ceilings::Ceilings,
+    imprecision::{Imprecision, UnknownProfile},
     shader::{Shaders, ShadersError},
 };
 pub use swell_solve::SolveError;
@@ -39,6 +40,8 @@ pub struct Gpu {
     pub shaders: Shaders,
     /// Whether a software adapter is refused.
     pub is_hardware_required: bool,
+    /// How much less precisely it computes than it could.
+    pub imprecision: Option<Imprecision>,
 }
 
 impl Gpu {
@@ -47,7 +50,11 @@ impl Gpu {
     /// # Errors
     /// Those of [`Context::open_for`]; [`GpuError::Software`] where hardware is required.
     pub fn open(&self, needs: Needs) -> Result<Context, GpuError> {
-        let mut context = Context::open_for(self.adapter.as_deref(), needs)?;
+        let adapter = self.adapter.as_deref();
+        let mut context = match self.imprecision {
+            Some(profile) => Context::open_imprecise(adapter, profile)?,
+            None => Context::open_for(adapter, needs)?,
+        };
         if self.is_hardware_required {
             context.require_hardware()?;
         }

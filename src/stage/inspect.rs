@@ -28,6 +28,8 @@ use super::{
 pub use swell_scene::solid_grid::MOST_NODES;
 pub use swell_solve::plan::LIST_BUDGET;
 
+pub use swell_gpu::rounding::Rounding;
+
 pub use swell_cache::{
     Entry, Manifest,
     stream::{PARTICLES, PROBES},
@@ -51,9 +53,11 @@ pub struct Adapter {
     pub has_timestamps: bool,
     /// Whether its shaders support f64.
     pub has_f64: bool,
+    /// How it rounds, or why that could not be measured.
+    pub rounding: Result<Rounding, String>,
 }
 
-/// Lists all adapters.
+/// Lists all adapters, and opens each for a moment to measure its rounding.
 ///
 /// # Errors
 /// [`GpuError::NoAdapter`].
@@ -89,6 +93,9 @@ pub fn adapters() -> Result<Vec<Adapter>, GpuError> {
                 ],
                 has_timestamps: swell_gpu::adapter::has_timestamps(adapter),
                 has_f64: swell_gpu::adapter::has_f64(adapter),
+                rounding: Context::open(Some(&index.to_string()))
+                    .and_then(|context| context.rounding())
+                    .map_err(|error| error.to_string()),
             }
         })
         .collect();

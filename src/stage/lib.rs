@@ -66,6 +66,8 @@ impl From<&GpuError> for Blame {
         match error {
             GpuError::TooLarge { .. }
             | GpuError::NoF64 { .. }
+            | GpuError::NoImprecision { .. }
+            | GpuError::NoErrorTerms { .. }
             | GpuError::NoSuchAdapter { .. }
             | GpuError::EditedShader { .. } => Self::Input,
             GpuError::NoAdapter { .. }

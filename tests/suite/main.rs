@@ -63,6 +63,7 @@ mod gpu {
     mod ceilings;
     mod compiled;
     mod device_faults;
+    mod imprecision;
     mod operations;
     mod raster;
     mod shaders;
@@ -131,6 +132,7 @@ mod stage {
     mod device_cpu;
     mod drive;
     mod far_origin;
+    mod imprecise;
     mod sources;
     mod substeps;
     mod waiting;

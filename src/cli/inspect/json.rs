@@ -9,7 +9,7 @@ use super::{CACHE, InspectArgs, broken_off, file, look, refuse_options, study};
 use crate::{Failure, bake, is_cache, output};
 use swell_scene::Scene;
 use swell_stage::{
-    inspect::{Adapter, Entry, Manifest, PARTICLES, ScenePlan, adapters, cache, sizes},
+    inspect::{Adapter, Entry, Manifest, PARTICLES, Rounding, ScenePlan, adapters, cache, sizes},
     replay::is_failed,
     time::{Timed, time},
 };
@@ -45,6 +45,17 @@ fn adapter(adapter: &Adapter) -> Value {
         "index": adapter.index, "name": adapter.name, "kind": adapter.kind,
         "driver": adapter.driver, "limits": limits,
         "pass_times": adapter.has_timestamps, "f64": adapter.has_f64,
+        "rounding": adapter.rounding.as_ref().map_or(Value::Null, rounding),
+    })
+}
+
+fn rounding(of: &Rounding) -> Value {
+    json!({
+        "division_ulp": of.division, "square_root_ulp": of.square_root,
+        "inverse_square_root_ulp": of.inverse_square_root, "length_ulp": of.length,
+        "exponential_ulp": of.exponential, "logarithm_ulp": of.logarithm, "power_ulp": of.power,
+        "sine": of.sine, "contracts": of.contracts, "flushes_inputs": of.flushes_inputs,
+        "flushes_results": of.flushes_results, "keeps_two_words": of.keeps_two_words(),
     })
 }
 

@@ -61,6 +61,7 @@ use buffers::{PHASES, SIZES, read_control, read_reals};
 pub use params::{
     PressureBrick, PressureControl, PressureControl64, PressurePhase, PressureStats, ReduceStep,
 };
+pub(crate) use plan::require;
 use plan::{PHASE_COUNT, Phase, SIZE_COUNT, Size};
 pub use plan::{passes, planned};
 pub(super) use stages::all_commands;

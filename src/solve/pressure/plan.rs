@@ -3,6 +3,7 @@
 use crate::plan::{Table, in_order};
 use swell_domain::bricks::CELLS;
 use swell_gpu::{
+    adapter::{Context, GpuError},
     buffer::Buf,
     program::PassSpec,
     recording::{Bind, Command, Groups},
@@ -201,6 +202,17 @@ pub fn passes(
     names
         .map(|name| pass(name, settings, surface, is_periodic))
         .collect()
+}
+
+/// Checks that the device keeps what two words of a number have to.
+///
+/// # Errors
+/// [`GpuError::NoErrorTerms`] if it does not, and errors of measuring it.
+pub(crate) fn require(context: &Context, settings: &Pressure) -> Result<(), GpuError> {
+    match settings.precision {
+        Precision::F32Refined => context.rounding()?.require_two_words(context),
+        Precision::F32 | Precision::F64 => Ok(()),
+    }
 }
 
 /// Returns a pass with all defines of the projection; a pass ignores those that it does not use.

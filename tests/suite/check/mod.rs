@@ -4,6 +4,7 @@ mod drops;
 mod films;
 mod frames;
 mod gaps;
+mod imprecise;
 mod periodic;
 mod quay;
 mod viscous;

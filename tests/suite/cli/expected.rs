@@ -197,6 +197,12 @@ fn inspect_tells_programs_what_it_prints() {
     let adapters = job.json(0, "inspect --adapters");
     assert_eq!(adapters["adapters"][0]["index"], 0);
     assert!(adapters["adapters"][0]["limits"]["max_buffer_size"].is_u64());
+    let rounding = &adapters["adapters"][0]["rounding"];
+    assert!(
+        (0.4..=2.5).contains(&rounding["division_ulp"].as_f64().unwrap()),
+        "{rounding}"
+    );
+    assert_eq!(rounding["keeps_two_words"], true);
     // Faults are the same as without --json.
     job.expect(2, "inspect cache --json --time 1");
     job.expect(2, "inspect none.toml --json");

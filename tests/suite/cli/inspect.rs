@@ -20,7 +20,12 @@ fn inspect_shows_plan_and_frames() {
         frames.lines().filter(|line| line.contains("m/s")).count() >= 2,
         "{frames}"
     );
-    assert!(shown("inspect --adapters").contains("max_storage_buffer_binding_size"));
+    let adapters = shown("inspect --adapters");
+    assert!(adapters.contains("max_storage_buffer_binding_size"));
+    assert!(
+        adapters.contains("two words keep what one loses: yes"),
+        "{adapters}"
+    );
 }
 
 /// The purposes of passes and buffers: counts and bytes without running a device, milliseconds with

@@ -424,6 +424,23 @@ fn a_check_takes_any_substep_of_a_frame() {
 }
 
 #[test]
+fn a_check_names_the_errors_that_it_adds() {
+    let job = Job::new();
+    let said = job.expect(0, "check small.toml --imprecision vulkan-worst:3");
+    assert!(said.contains("with the errors of vulkan-worst:3"), "{said}");
+    let said = job.expect(2, "check small.toml --imprecision vulkan-best");
+    assert!(
+        said.contains("there is vulkan-worst, or vulkan-worst:SEED"),
+        "{said}"
+    );
+    job.expect(2, "check small.toml --imprecision vulkan-worst:-1");
+    job.expect(
+        2,
+        "check c --render --look look.toml --imprecision vulkan-worst",
+    );
+}
+
+#[test]
 fn a_new_look_leaves_the_cache_as_it_is() {
     let job = Job::new();
     job.expect(0, "bake small.toml -o cache --frames 1-4");
