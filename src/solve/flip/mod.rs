@@ -94,7 +94,7 @@ impl Flip {
         boundary: &Boundary,
         is_timed: bool,
     ) -> Result<Self, SolveError> {
-        pressure::require(context, &scene.solver.flip().pressure)?;
+        pressure::require(context, &scene.settings().pressure)?;
         let (buffers, passes) = (plan.buffer_specs(), plan.pass_specs());
         let program = Program::new(context, &buffers, &passes, &[])?;
         upload_distance(boundary, &program, scene);

@@ -7,13 +7,14 @@ use swell::{
 };
 
 use super::{case, lines, over, run};
+use crate::support::pbf_of;
 
 /// Checks moving water with a solid: PBF with its projection, FLIP with ghost fluid and density
 /// correction.
 fn checked(context: &Context, method: Method) -> Table {
     let (mut scene, start) = case(method);
     if method == Method::Pbf {
-        scene.solver.pbf.as_mut().unwrap().grid_projection = true;
+        pbf_of(&mut scene).grid_projection = true;
     }
     run(context, &scene, &start)
 }

@@ -178,7 +178,7 @@ fn marks_are_passed_as_imprecisely_as_vulkan_permits() {
             panic!("{}", case.name)
         };
         let is_meant = |trial: &&Trial| {
-            trial.device == RunsOn::Gpu && trial.scene.solver.method == Method::Flip
+            trial.device == RunsOn::Gpu && trial.scene.solver.method() == Method::Flip
         };
         for trial in trials.iter().filter(is_meant) {
             let run = run_trial(&devices(&context), trial, &AtomicBool::new(false)).unwrap();

@@ -89,6 +89,7 @@ fn refusal(precision: Precision, spoil: InjectedFault) -> Option<String> {
     context.spoil = Some(spoil);
     let mut scene = scene([4.0; 3]);
     flip(&mut scene).pressure.precision = precision;
+    let scene = scene.with_flip().unwrap();
     let particles = block([0; 3], [2; 3]);
     let counts = Counts {
         particles: particles.len(),
