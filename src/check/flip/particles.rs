@@ -160,15 +160,20 @@ pub(super) fn push_apart(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
         state.model.settings().apart_from_walls(),
         state.scene.domain.size().max_element(),
     );
-    let period = state.model.period().0.max_element();
+    let (period, kept) = (state.model.period(), state.model.settings().apart());
     io.table.each(&PUSHED, 0..state.n, |i| {
+        let position = &sorted.cloud.position;
+        let is_near = |j: usize| {
+            let way = period.shortest(position[i] - position[j]);
+            j != i && way.length() < 1.001 * kept
+        };
         let about = neighborhood().map(|offset| {
-            sorted
-                .of(elements.bricks.near(sorted.cell[i], offset))
-                .len()
+            let there = sorted.of(elements.bricks.near(sorted.cell[i], offset));
+            there.filter(|&j| is_near(j)).count()
         });
         let count = about.sum::<usize>() as f64;
         let exact = before.displacement[i] + reference[i];
+        let period = period.0.max_element();
         pair(
             i,
             found.displacement[i],
