@@ -151,6 +151,39 @@ mod tests {
         *,
     };
 
+    /// Arguments of sines and cosines that are not known to be within half a turn.
+    fn unbounded_angles(text: &str) -> Vec<&str> {
+        let is_word = |c: char| c.is_alphanumeric() || c == '_';
+        let arguments = ["sin(", "cos("].into_iter().flat_map(|call| {
+            text.match_indices(call).filter_map(move |(at, _)| {
+                let is_call = !text[..at].ends_with(is_word);
+                let rest = &text[at + call.len()..];
+                is_call.then(|| rest.split(')').next().unwrap_or(rest))
+            })
+        });
+        let angles = text.lines().filter_map(|line| {
+            let value = line.trim().strip_prefix("let angle = ")?;
+            (!value.starts_with("angle_of(") && !value.starts_with("line_angle(")).then_some(value)
+        });
+        // Directions of ripples are within ± 80°.
+        let arguments = arguments.filter(|it| !["angle", "turn"].contains(it));
+        arguments.chain(angles).collect()
+    }
+
+    /// Devices need not have sines beyond half a turn.
+    #[test]
+    fn sines_take_angles_within_half_a_turn() {
+        let mut count = 0;
+        for form in forms().expect("they compose") {
+            let found = unbounded_angles(&form.text);
+            assert!(found.is_empty(), "{} {:?}: {found:?}", form.pass, form.defines);
+            count += form.text.matches("cos(angle)").count();
+        }
+        assert!(count > 10, "{count}");
+        let faults = unbounded_angles("let angle = k * x;\nlet y = 2.0 * cos(k * x) + acos(z);");
+        assert_eq!(faults, ["k * x", "k * x;"]);
+    }
+
     #[test]
     fn every_pass_validates_in_every_variant() {
         let passes = shader::pass_files().len();
