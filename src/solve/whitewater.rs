@@ -93,7 +93,7 @@ fn plan(scene: &Scene, boundary: &Boundary, water: usize, white: usize) -> Plan 
     table.extend("whitewater", fours.map(|buffer| buffer.sized(water)));
     table.extend(
         "whitewater",
-        [ID.sized(water), SORTED_ID.sized(water), SHARE.sized(water)],
+        [ID.sized(2 * water), SHARE.sized(water)],
     );
     table.extend(
         "whitewater",

@@ -128,15 +128,15 @@ pub(super) fn aim(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
 /// device's cell kinds.
 fn given(state: &FlipState, io: &Io<'_>, is_drop: Vec<bool>) -> Result<GridTransfer, SolveError> {
     let is_pushed = state.model.settings().density_correction || state.given_substep.is_some();
-    let displacement = match is_pushed {
-        true => io.after.vectors(buffers::PUSHED, state.n)?,
-        false => vec![DVec3::ZERO; state.n],
-    };
+    let rows = if is_pushed { 2 * state.n } else { state.n };
+    let mut carried = io.after.vectors(buffers::CARRIED, rows)?;
+    let mut displacement = carried.split_off(state.n);
+    displacement.resize(state.n, DVec3::ZERO);
     let cloud = state.unsorted(&io.after)?;
     Ok(GridTransfer {
         velocity: cloud.velocity,
         affine: cloud.affine,
-        carried: io.after.vectors(buffers::CARRIED, state.n)?,
+        carried,
         displacement,
         is_drop,
     })

@@ -143,7 +143,7 @@ pub(super) fn reorder(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     let expected: Vec<u32> = (0..n).map(|i| ids[at(i)]).collect();
     io.table.add_exact(
         &REORDER_ID,
-        &io.after.get(buffers::SORTED_ID, n)?,
+        &io.after.get(buffers::sorted_id(n), n)?,
         &expected,
     );
     if state.has_words() {
@@ -157,7 +157,7 @@ pub(super) fn reorder(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     if state.model.settings.grid_projection {
         let drops = io.before.get(buffers::IS_DROP, n)?;
         let expected: Vec<u32> = (0..n).map(|i| drops[at(i)]).collect();
-        let found = io.after.get(buffers::SORTED_IS_DROP, n)?;
+        let found = io.after.get(buffers::IS_DROP, 2 * n)?.split_off(n);
         io.table.add_exact(&REORDER_DROP, &found, &expected);
     }
     Ok(())
@@ -311,7 +311,7 @@ pub(super) fn update_velocity(state: &mut PbfState, io: &mut Io<'_>) -> Outcome 
     let starts = io.before.vectors(buffers::START_POSITION, n)?;
     let velocities = io.before.vectors(buffers::SORTED_VELOCITY, n)?;
     let drops = match state.model.settings.grid_projection {
-        true => io.before.get(buffers::SORTED_IS_DROP, n)?,
+        true => io.before.get(buffers::IS_DROP, 2 * n)?.split_off(n),
         false => Vec::new(),
     };
     let position = io.after.vectors(buffers::POSITION, n)?;
@@ -359,7 +359,7 @@ pub(super) fn update_velocity(state: &mut PbfState, io: &mut Io<'_>) -> Outcome 
             pair(i, places[i], positions[i], [])
         });
     }
-    let ids = io.before.get(buffers::SORTED_ID, n)?;
+    let ids = io.before.get(buffers::sorted_id(n), n)?;
     io.table
         .add_exact(&UPDATE_ID, &io.after.get(buffers::ID, n)?, &ids);
     if !drops.is_empty() {

@@ -297,8 +297,8 @@ fn pbf_with_a_projection_is_within_tolerance_and_fails_where_it_should() {
         ),
         control(
             "pbf/update_velocity",
-            "v *= f32(sorted_is_drop[thread]);",
-            "v *= 1.0 - f32(sorted_is_drop[thread]);",
+            "v *= f32(own_is_drop);",
+            "v *= 1.0 - f32(own_is_drop);",
             "pbf/update_velocity",
             &["velocity"],
         ),

@@ -134,7 +134,7 @@ pub const PBF: &[Control] = &[
     control(
         "pbf/reorder",
         "= id[source]",
-        "= id[source] + 0u * source; sorted_id[thread] = id[source] ^ 1u",
+        "= id[source] ^ 1u",
         "pbf/reorder",
         &["id"],
     ),
@@ -241,8 +241,8 @@ pub const PBF: &[Control] = &[
     ),
     control(
         "pbf/update_velocity",
-        "= sorted_id[thread]",
-        "= sorted_id[thread] ^ 1u",
+        "id[thread] = id[params.particle_count + thread]",
+        "id[thread] = id[params.particle_count + thread] ^ 1u",
         "pbf/update_velocity",
         &["id"],
     ),
