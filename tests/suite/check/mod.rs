@@ -1,4 +1,5 @@
 //! `check` passes on what the device computes, and each of its rows fails if its pass is spoiled.
+mod arithmetic;
 mod coincident;
 mod controls;
 mod drops;
