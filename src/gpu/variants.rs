@@ -198,7 +198,12 @@ mod tests {
         let mut count = 0;
         for form in forms().expect("they compose") {
             let found = unbounded_angles(&form.text);
-            assert!(found.is_empty(), "{} {:?}: {found:?}", form.pass, form.defines);
+            assert!(
+                found.is_empty(),
+                "{} {:?}: {found:?}",
+                form.pass,
+                form.defines
+            );
             count += form.text.matches("cos(angle)").count();
         }
         assert!(count > 10, "{count}");
@@ -248,7 +253,7 @@ mod tests {
                 (true, Stage::Raster { .. }) => true,
                 (true, Stage::Compute) => {
                     [[64, 1, 1], [32, 8, 1], [16, 4, 1], [8, 8, 1]].contains(&size)
-                },
+                }
                 (false, stage) => {
                     stage == Stage::Compute && [[64, 1, 1], [256, 1, 1]].contains(&size)
                 }

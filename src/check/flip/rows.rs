@@ -310,7 +310,8 @@ entries! {
             2.0 * velocity / size, "";
     }
     "flip/push_apart" {
-        PUSHED = "displacement", "m": [count: "particles that are closer", apart: "the distance that is kept",
+        PUSHED = "displacement", "m": [count: "particles that are closer",
+            apart: "the distance that is kept",
             period: "the longest of a domain that joins its own end",
             extent: "the domain's longest side", displacement: "its own value"]
             U * (count * (0.25 * (count + 16.0) * apart + 0.5 * period) + 4.0 * apart

@@ -340,7 +340,10 @@ impl Pbf {
     /// order. Call it before the state is uploaded again.
     fn particle_pressures(&self, step: f64) -> Result<Vec<(DVec3, f64)>, SolveError> {
         let n = self.plan.counts.particles;
-        let wanted = (POSITION.first(n), lambda_sum(self.scene.has_movers(), n).first(n));
+        let wanted = (
+            POSITION.first(n),
+            lambda_sum(self.scene.has_movers(), n).first(n),
+        );
         let (position, lambda) = self.program.download(wanted)?;
         let relaxation = self.scene.solver.pbf().relaxation;
         let density = self.scene.water.rest_density;

@@ -4,7 +4,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use rayon::prelude::*;
 
-use super::{DiffError, Request, adapter_of, aggregates, bake_of, of_caches, physics, scene_of, streams};
+use super::{
+    DiffError, Request, adapter_of, aggregates, bake_of, of_caches, physics, scene_of, streams,
+};
 use swell_cache::{CacheError, CacheReader};
 use swell_compare::{
     caches::CacheDiff,
