@@ -72,7 +72,8 @@ fn caches_of_different_devices_are_judged_by_aggregates() {
     let raised = |_: u32, particles: &mut Particles| {
         particles.position.iter_mut().for_each(|p| p[1] += 0.2);
     };
-    let spoils: [(&str, &str, &dyn Fn(u32, &mut Particles)); 3] = [
+    type Spoil<'a> = &'a dyn Fn(u32, &mut Particles);
+    let spoils: [(&str, &str, Spoil<'_>); 3] = [
         ("nudged", "another device", &nudged),
         ("raised", "another device", &raised),
         ("same", "a device", &nudged),
