@@ -227,16 +227,15 @@ pub(super) fn compute_delta(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     let (h, period) = (state.model.calibration.support_radius, state.model.period());
     let one = |i: usize| {
         // Rounding may decide whether particles that are almost at the same position count as
-        // coincident, for which a hash decides the direction.
-        let is_nearly_coincident = (neighbors.all(i))
-            .map(|j| {
-                period
-                    .shortest(points[i] - points[j as usize])
-                    .length_squared()
-            })
-            .any(|square| square > 0.0 && square < 2e-12 * h * h);
-        // A list of a wrong sort may have the particle itself.
-        let has_itself = neighbors.all(i).any(|j| j as usize == i);
+        // coincident, for which a hash decides the direction, and of several the last one visited
+        // counts.
+        let square = |j: u32| {
+            let way = period.shortest(points[i] - points[j as usize]);
+            way.length_squared()
+        };
+        let squares = || neighbors.all(i).map(square);
+        let is_undecided = squares().any(|square| square > 0.0 && square < 2e-12 * h * h)
+            || squares().filter(|&square| square == 0.0).count() > 1;
         // The bound starts from the correction before walls and solids push, because these deflect
         // its error.
         let to = reference[i].free;
@@ -248,8 +247,7 @@ pub(super) fn compute_delta(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
         // Whether the semi-iteration extrapolates is decided before it adds to the step.
         let along = (plain[i].free - points[i]).dot(last).abs();
         let is_across = along <= ACROSS.of([step, last.length()]);
-        if has_itself || is_nearly_coincident || (factor != 1.0 && is_across && last != DVec3::ZERO)
-        {
+        if is_undecided || (factor != 1.0 && is_across && last != DVec3::ZERO) {
             return None;
         }
         let x = points[i].length();

@@ -3,10 +3,11 @@
 use super::{Control, control};
 
 /// Passes that look for neighbours in cells that do not contain them, and so do not find them.
-const UNSORTED: [&str; 5] = [
+const UNSORTED: [&str; 6] = [
     "sort/place",
     "sort/stabilize",
     "pbf/build_neighbors",
+    "pbf/compute_delta",
     "pbf/measure_density",
     "pbf/assign_cells",
 ];
