@@ -17,14 +17,12 @@
 
 @group(0) @binding(2) var<storage, read> face_velocity: array<f32>;
 @group(0) @binding(3) var<storage, read> sorted_position: array<Vector>;
-@group(0) @binding(4) var<storage, read> sorted_id: array<u32>;
+// Velocities, and with CORRECTION displacements behind them.
 @group(0) @binding(5) var<storage, read> carried: array<Vector>;
-#ifdef CORRECTION
-@group(0) @binding(12) var<storage, read> pushed: array<Vector>;
-#endif
 @group(0) @binding(13) var<storage, read> is_drop: array<u32>;
 @group(0) @binding(6) var<storage, read_write> position: array<Vector>;
 @group(0) @binding(9) var<storage, read_write> velocity: array<Vector>;
+// In storage order, and behind that in sorted order.
 @group(0) @binding(10) var<storage, read_write> id: array<u32>;
 // Counts slowed particles, and non-finite values, which clamping would hide.
 @group(0) @binding(11) var<storage, read_write> counters: Counters;
@@ -110,7 +108,7 @@ fn main(
         velocity_at(start + 0.5 * params.time_step * here, here), here, is_drop[i] > 0u);
     var way = params.time_step * between;
 #ifdef CORRECTION
-    way += three(pushed[i]);
+    way += three(carried[params.particle_count + i]);
 #endif
     if !is_finite(start + way) {
         atomicAdd(&counters.not_finite, 1u);
@@ -185,5 +183,5 @@ fn main(
 #endif
     position[i] = packed(x);
     velocity[i] = packed(v);
-    id[i] = sorted_id[i];
+    id[i] = id[params.particle_count + i];
 }

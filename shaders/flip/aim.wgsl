@@ -7,8 +7,8 @@
 #import "shared/flip_params.wgsl"
 
 @group(0) @binding(1) var<storage, read_write> sorted_position: array<Vector>;
+// Velocities, and behind them displacements.
 @group(0) @binding(2) var<storage, read> carried: array<Vector>;
-@group(0) @binding(4) var<storage, read> pushed: array<Vector>;
 @group(0) @binding(5) var<storage, read> is_drop: array<u32>;
 @group(0) @binding(3) var<storage, read> velocity: array<Vector>;
 
@@ -23,6 +23,7 @@ fn main(
         return;
     }
     let beside = select(three(carried[i]) - three(velocity[i]), vec3f(0.0), is_drop[i] > 0u);
+    let pushed = three(carried[params.particle_count + i]);
     sorted_position[i] = packed(
-        three(sorted_position[i]) + params.time_step * beside + three(pushed[i]));
+        three(sorted_position[i]) + params.time_step * beside + pushed);
 }

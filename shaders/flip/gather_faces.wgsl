@@ -6,8 +6,6 @@
 #import "shared/flip_neighborhood.wgsl"
 #import "shared/flip_axis.wgsl"
 #import "shared/flip_walls.wgsl"
-#import "shared/finite.wgsl"
-#import "shared/counters.wgsl"
 
 @group(0) @binding(2) var<storage, read> momentum_before: array<f32>;
 @group(0) @binding(12) var<storage, read> momentum_after: array<f32>;
@@ -23,9 +21,6 @@
 #ifdef MOVING_SOLIDS
 @group(0) @binding(10) var<storage, read> closed_velocity: array<f32>;
 #endif
-
-// Counts non-finite values, which a comparison would hide.
-@group(0) @binding(11) var<storage, read_write> counters: Counters;
 
 @compute @workgroup_size(64)
 fn main(
@@ -63,9 +58,6 @@ fn main(
             momentum += momentum_after[of_before];
             weight += weight_after[of_before];
         }
-    }
-    if !is_finite(vec3f(momentum, weight, 0.0)) {
-        atomicAdd(&counters.not_finite, 1u);
     }
     let is_known = weight > 0.0;
     let velocity = select(0.0, momentum / max(weight, 1e-30), is_known);

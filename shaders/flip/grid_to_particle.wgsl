@@ -26,7 +26,7 @@
 @group(0) @binding(2) var<storage, read> cell_start: array<u32>;
 @group(0) @binding(3) var<storage, read> sorted_position: array<Vector>;
 @group(0) @binding(4) var<storage, read> face_velocity: array<f32>;
-// Three floats per particle, as in `sorted_velocity`, `carried` and `pushed`.
+// Three floats per particle, as in `sorted_velocity` and `carried`.
 @group(0) @binding(5) var<storage, read_write> velocity: array<f32>;
 #ifdef SOLIDS
 @group(0) @binding(15) var<storage, read> face_open: array<f32>;
@@ -38,12 +38,10 @@
 @group(0) @binding(6) var<storage, read> face_change: array<f32>;
 #endif
 @group(0) @binding(12) var<storage, read> cell_kind: array<u32>;
+// The displacements by which particles are pushed apart follow, if they are.
 @group(0) @binding(10) var<storage, read_write> carried: array<f32>;
 // 1 if the particle is an isolated droplet, far from all water with a pressure.
 @group(0) @binding(14) var<storage, read_write> is_drop: array<u32>;
-#ifdef PUSHED
-@group(0) @binding(13) var<storage, read_write> pushed: array<f32>;
-#endif
 #ifdef CORRECTION
 @group(0) @binding(11) var<storage, read> face_displacement: array<f32>;
 #endif
@@ -354,10 +352,10 @@ fn give(i: u32, axis: u32, f: vec3f, faces: Component, falls: bool, beyond: f32)
     velocity[k] = select(kept, falling, falls);
 #endif
 #ifdef CORRECTION
-    pushed[k] = per_whole * value_at(faces.shift, a, b, c);
+    carried[3u * params.particle_count + k] = per_whole * value_at(faces.shift, a, b, c);
 #else
 #ifdef PUSHED
-    pushed[k] = 0.0;
+    carried[3u * params.particle_count + k] = 0.0;
 #endif
 #endif
 }

@@ -9,8 +9,10 @@
 
 @group(0) @binding(2) var<storage, read> cell_start: array<u32>;
 @group(0) @binding(3) var<storage, read> sorted_position: array<Vector>;
-@group(0) @binding(4) var<storage, read> sorted_id: array<u32>;
-@group(0) @binding(5) var<storage, read_write> pushed: array<Vector>;
+// In storage order, and behind that in sorted order.
+@group(0) @binding(4) var<storage, read> id: array<u32>;
+// Velocities, and behind them the displacements.
+@group(0) @binding(5) var<storage, read_write> carried: array<Vector>;
 @group(0) @binding(6) var<storage, read> is_drop: array<u32>;
 #ifdef PLACES
 #import "shared/place.wgsl"
@@ -49,7 +51,7 @@ fn main(
     find_slots(cell);
     // The target distance is below half a cell: closer particles lie in one of eight cells.
     let side = select(vec3i(1), vec3i(-1), p - vec3f(cell) < vec3f(0.5));
-    let own = sorted_id[i];
+    let own = id[params.particle_count + i];
     let apart = params.apart;
     let of_walls = params.apart_from_walls;
     // Uses the walls at the substep's start, when the particles are at these positions. With the
@@ -91,13 +93,15 @@ fn main(
                 let way = way_from(j, x);
                 let square = dot(way, way);
                 let distance = sqrt(square);
+                let other = id[params.particle_count + j];
                 let direction = select(
-                    way / max(distance, 1e-20), pair_direction(own, sorted_id[j]), square == 0.0);
+                    way / max(distance, 1e-20), pair_direction(own, other), square == 0.0);
                 push += max(apart - distance, 0.0) * direction;
             }
         }
     }
     push *= SHARE;
     push *= min(1.0, MOST * apart / max(length(push), 1e-20));
-    pushed[i] = packed(three(pushed[i]) + push);
+    let own_push = params.particle_count + i;
+    carried[own_push] = packed(three(carried[own_push]) + push);
 }

@@ -6,10 +6,10 @@
 @group(0) @binding(1) var<storage, read> order: array<u32>;
 @group(0) @binding(2) var<storage, read> position: array<Vector>;
 @group(0) @binding(3) var<storage, read> velocity: array<Vector>;
-@group(0) @binding(4) var<storage, read> id: array<u32>;
+// In storage order, and behind that in sorted order.
+@group(0) @binding(4) var<storage, read_write> id: array<u32>;
 @group(0) @binding(5) var<storage, read_write> sorted_position: array<Vector>;
 @group(0) @binding(6) var<storage, read_write> sorted_velocity: array<Vector>;
-@group(0) @binding(9) var<storage, read_write> sorted_id: array<u32>;
 #ifdef PLACES
 #import "shared/place.wgsl"
 @group(0) @binding(12) var<storage, read_write> place: array<u32>;
@@ -36,7 +36,7 @@ fn main(
     place[i] = place_word(three(x) * params.inverse_cell_size);
 #endif
     sorted_velocity[i] = velocity[source];
-    sorted_id[i] = id[source];
+    id[params.particle_count + i] = id[source];
 #ifdef APIC
     for (var k = 0u; k < 9u; k++) {
         sorted_affine[9u * i + k] = affine[9u * source + k];

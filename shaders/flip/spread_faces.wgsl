@@ -6,6 +6,8 @@
 #import "shared/bricks.wgsl"
 #import "shared/flip_params.wgsl"
 #import "shared/flip_axis.wgsl"
+#import "shared/finite.wgsl"
+#import "shared/counters.wgsl"
 
 @group(0) @binding(1) var<storage, read> bricks: array<Brick>;
 @group(0) @binding(2) var<storage, read> cell_start: array<u32>;
@@ -20,6 +22,8 @@
 #ifdef APIC
 @group(0) @binding(9) var<storage, read> sorted_affine: array<f32>;
 #endif
+// Counts non-finite values, which the comparison of a weight would hide.
+@group(0) @binding(12) var<storage, read_write> counters: Counters;
 
 fn store_before(plane: u32, element: u32, momentum: vec3f, weight: vec3f) {
     let first = plane * params.partial_stride + element;
@@ -83,6 +87,10 @@ fn main(
         lower_momentum += both * (a.x * v);
         upper_momentum += both * (a.y * v);
 #endif
+    }
+    let sums = (lower_momentum + upper_momentum) + (lower_weight + upper_weight);
+    if !is_finite(sums[0] + sums[1] + sums[2]) {
+        atomicAdd(&counters.not_finite, 1u);
     }
     store_before(0u, element, lower_momentum[0], lower_weight[0]);
     store_before(3u, element, lower_momentum[1], lower_weight[1]);

@@ -26,8 +26,9 @@ var<private> sample_rate: f32;
 // Counts non-finite values, which clamping would hide.
 @group(0) @binding(11) var<storage, read_write> counters: Counters;
 #ifdef PRESSURE
-// Σ λ over the substep's corrections, which is proportional to the pressure.
+#ifndef WALL_WORK
 @group(0) @binding(12) var<storage, read_write> lambda_sum: array<f32>;
+#endif
 #endif
 #ifdef ARTIFICIAL_PRESSURE
 // W at Δq = 0.2 h over W(0): (1 − 0.04)³.
@@ -103,7 +104,12 @@ fn main(
     delta = -params.gradient_scale * delta + own_lambda * wall_term(own_position).gradient;
     delta *= params.relaxation;
 #ifdef PRESSURE
+    // Σ λ over the substep's corrections, which is proportional to the pressure.
+#ifdef WALL_WORK
+    wall_work[2u * params.particle_count + i] += own_lambda;
+#else
     lambda_sum[i] += own_lambda;
+#endif
 #endif
     if !is_finite(own_position + delta) {
         atomicAdd(&counters.not_finite, 1u);

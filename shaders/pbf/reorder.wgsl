@@ -10,16 +10,16 @@
 @group(0) @binding(2) var<storage, read> corrected: array<Vector>;
 @group(0) @binding(10) var<storage, read> order: array<u32>;
 @group(0) @binding(11) var<storage, read> velocity: array<Vector>;
-@group(0) @binding(12) var<storage, read> id: array<u32>;
+// In storage order, and behind that in sorted order.
+@group(0) @binding(12) var<storage, read_write> id: array<u32>;
 @group(0) @binding(13) var<storage, read_write> start_position: array<Vector>;
 @group(0) @binding(14) var<storage, read_write> sorted_velocity: array<Vector>;
-@group(0) @binding(15) var<storage, read_write> sorted_id: array<u32>;
 #ifdef PLACES
 @group(0) @binding(3) var<storage, read_write> place: array<u32>;
 #endif
 #ifdef PROJECTED
-@group(0) @binding(16) var<storage, read> is_drop: array<u32>;
-@group(0) @binding(17) var<storage, read_write> sorted_is_drop: array<u32>;
+// In storage order, and behind that in sorted order.
+@group(0) @binding(16) var<storage, read_write> is_drop: array<u32>;
 #endif
 
 @compute @workgroup_size(64)
@@ -37,11 +37,11 @@ fn main(
     set_predicted(thread, vec4f(three(x), 0.0));
     start_position[thread] = x;
     sorted_velocity[thread] = velocity[source];
-    sorted_id[thread] = id[source];
+    id[params.particle_count + thread] = id[source];
 #ifdef PLACES
     place[thread] = place_word(three(x) * params.inverse_support_radius);
 #endif
 #ifdef PROJECTED
-    sorted_is_drop[thread] = is_drop[source];
+    is_drop[params.particle_count + thread] = is_drop[source];
 #endif
 }

@@ -13,14 +13,14 @@
 #import "shared/counters.wgsl"
 
 @group(0) @binding(10) var<storage, read> start_position: array<Vector>;
-@group(0) @binding(11) var<storage, read> sorted_id: array<u32>;
 @group(0) @binding(17) var<storage, read> sorted_velocity: array<Vector>;
 @group(0) @binding(12) var<storage, read_write> position: array<Vector>;
 @group(0) @binding(13) var<storage, read_write> velocity: array<Vector>;
+// In storage order, and behind that in sorted order.
 @group(0) @binding(14) var<storage, read_write> id: array<u32>;
 @group(0) @binding(15) var<storage, read_write> counters: Counters;
 #ifdef PROJECTED
-@group(0) @binding(16) var<storage, read> sorted_is_drop: array<u32>;
+// In storage order, and behind that in sorted order.
 @group(0) @binding(18) var<storage, read_write> is_drop: array<u32>;
 #endif
 
@@ -40,8 +40,9 @@ fn main(
     // Water moves with the grid's flow and not with its own velocity: the corrections of each step
     // would accumulate in a velocity that never moves it. Isolated droplets move with their own
     // velocity.
-    v *= f32(sorted_is_drop[thread]);
-    is_drop[thread] = sorted_is_drop[thread];
+    let own_is_drop = is_drop[params.particle_count + thread];
+    v *= f32(own_is_drop);
+    is_drop[thread] = own_is_drop;
 #endif
     v += three(sorted_velocity[thread]);
     let distance = length(v) * params.time_step;
@@ -60,5 +61,5 @@ fn main(
     set_predicted(thread, vec4f(x, 0.0));
 #endif
     velocity[thread] = packed(v);
-    id[thread] = sorted_id[thread];
+    id[thread] = id[params.particle_count + thread];
 }

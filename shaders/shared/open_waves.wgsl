@@ -1,3 +1,5 @@
+#import "shared/angle.wgsl"
+
 override WAVE_COUNT: u32;
 // Depth of the water at rest, metres.
 override WAVE_DEPTH: f32;
@@ -15,9 +17,7 @@ fn wave_velocity(x: vec3f) -> vec3f {
     for (var i = 0u; i < WAVE_COUNT; i++) {
         let wave = open_waves[2u * i];
         let speed = open_waves[2u * i + 1u];
-        let turns = dot(wave.xy, x.xz) + wave.z;
-        // Device sines have an error of 2⁻¹¹ within half a turn, and no guarantee beyond.
-        let angle = 6.2831853 * (turns - round(turns));
+        let angle = angle_of(dot(wave.xy, x.xz) + wave.z);
         let up = exp(wave.w * (y - WAVE_DEPTH));
         let down = exp(-wave.w * (y + WAVE_DEPTH));
         let along = (up + down) * cos(angle);

@@ -1,5 +1,6 @@
 // The sea beyond the box (src/render/sea.rs): height of its surface, and its intersection with
 // rays. The importing shader must bind `sea` and `sea_values`.
+#import "shared/angle.wgsl"
 #import "shared/camera.wgsl"
 #import "shared/box.wgsl"
 
@@ -79,6 +80,11 @@ fn edge_part(at: vec2f) -> f32 {
     return 1.0 - t * t * (3.0 - 2.0 * t);
 }
 
+// Phase of a wave component at x and z, in −π..π.
+fn line_angle(line: vec4f, at: vec2f) -> f32 {
+    return angle_of((dot(line.xy, at) + line.z) / 6.2831853);
+}
+
 // Height of the surface, without waves that a pixel of `footprint` metres cannot resolve.
 fn sea_height(at: vec2f, footprint: f32) -> f32 {
     let part = edge_part(at);
@@ -90,7 +96,8 @@ fn sea_height(at: vec2f, footprint: f32) -> f32 {
             if fine > FINEST {
                 break;
             }
-            waves += line.w * exp(-0.125 * fine * fine) * cos(dot(line.xy, at) + line.z);
+            let angle = line_angle(line, at);
+            waves += line.w * exp(-0.125 * fine * fine) * cos(angle);
         }
     }
     let open = (1.0 - part) * (sea.level + waves);
@@ -132,7 +139,7 @@ fn sea_velocity(at: vec2f) -> vec3f {
     for (var i = 0u; i < sea.lines; i++) {
         let line = sea_values[2u * i];
         let speeds = sea_values[2u * i + 1u];
-        let angle = dot(line.xy, at) + line.z;
+        let angle = line_angle(line, at);
         let along = line.xy / length(line.xy) * (speeds.y * cos(angle));
         sum += vec3f(along.x, speeds.x * line.w * sin(angle), along.y);
     }

@@ -1,4 +1,5 @@
 // Waves finer than the particles, as normals: a world-anchored sum of sines with ω² = g k.
+#import "shared/angle.wgsl"
 #import "shared/ssfr_noise.wgsl"
 #import "shared/ssfr_optics.wgsl"
 
@@ -28,9 +29,10 @@ fn ripple_at(p: vec2f, seconds: f32, wavelength: f32, slope: f32, footprint: f32
         let direction = vec2f(cos(turn), sin(turn));
         let phase = k * dot(direction, p) - sqrt(9.81 * k) * seconds + f * 2.4
             + select(bend.x, bend.y, i > 2);
+        let angle = angle_of(phase / (2.0 * PI));
         let wide = 0.5 * k * footprint;
         let kept = exp(-0.5 * wide * wide);
-        out.slope += direction * (share * 1.41421356 * kept * cos(phase));
+        out.slope += direction * (share * 1.41421356 * kept * cos(angle));
         out.lost += share * share * (1.0 - kept * kept);
     }
     return out;

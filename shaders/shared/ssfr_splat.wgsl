@@ -27,10 +27,13 @@ fn body_radius(camera: Camera, particle: Particle) -> f32 {
     return camera.radius * select(f32(part) / 1023.0, 1.0, part == 1023u);
 }
 
-// Row of the i-th pixel of a box `width` wide, exact below 2²² pixels; software adapters divide
-// integers one lane at a time.
+// Row of the i-th pixel of a box `width` wide, exact below 2²³ pixels and 2²⁰ rows: a quotient errs
+// by 2.5 ulp on some devices, so by a row at most. Software adapters divide integers one lane at a
+// time.
 fn row_of(i: u32, width: u32) -> u32 {
-    return u32((f32(i) + 0.5) / f32(width));
+    let row = u32((f32(i) + 0.5) / f32(width));
+    let low = row * width;
+    return select(row, row - 1u, i < low) + select(0u, 1u, i >= low + width);
 }
 
 // Pixels that the sphere may touch: least and greatest, inclusive; x > z where there are none.

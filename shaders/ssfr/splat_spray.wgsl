@@ -1,4 +1,5 @@
 // Splats aerated water near or in front of the surface, at half resolution; this whitens the water.
+#import "shared/angle.wgsl"
 #import "shared/camera.wgsl"
 #import "shared/ssfr_splat.wgsl"
 #import "shared/ssfr_lanes.wgsl"
@@ -69,9 +70,9 @@ fn soft_chord(ray: vec3f, c: vec3f, radius: f32) -> f32 {
 // Deterministic random direction by particle and channel.
 fn turned(id: u32, channel: u32) -> vec3f {
     let up = 2.0 * random(id, channel) - 1.0;
-    let turn = 2.0 * 3.14159265 * random(id, channel + 1u);
+    let angle = angle_of(random(id, channel + 1u));
     let across = sqrt(max(1.0 - up * up, 0.0));
-    return vec3f(across * cos(turn), up, across * sin(turn));
+    return vec3f(across * cos(angle), up, across * sin(angle));
 }
 
 // Random number with a triangular distribution, mean 0 and variance 1.

@@ -112,9 +112,9 @@ impl View<'_> {
         if let Some(kept) = self.kept {
             if let Some(words) = kept.get(name) {
                 let bytes: &[u8] = bytemuck::cast_slice(words);
-                return Ok(bytemuck::pod_collect_to_vec(
-                    &bytes[..count * size_of::<T>()],
-                ));
+                let first = variable.place(0) as usize;
+                let last = first + count * size_of::<T>();
+                return Ok(bytemuck::pod_collect_to_vec(&bytes[first..last]));
             }
             let is_written = self.traced.writes(self.buffer(name));
             assert!(

@@ -9,6 +9,7 @@
 //!
 //! The comparisons of an effect are in one file of `effects`, for both solvers.
 
+pub mod arithmetic;
 pub mod edges;
 mod effects;
 mod engine;

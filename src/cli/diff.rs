@@ -101,8 +101,13 @@ pub(super) fn run(args: &DiffArgs) -> Result<u8, Failure> {
     let is_within = outcome.is_within();
     let verdict = match (is_within, &request.tolerance, &outcome) {
         (false, ..) => "OUT OF TOLERANCE",
-        (true, None, Outcome::Caches(diff)) if !diff.without_particles.is_empty() => {
+        (true, None, Outcome::Caches(diff))
+            if diff.device_limits.is_none() && !diff.without_particles.is_empty() =>
+        {
             "the same in all that both keep"
+        }
+        (true, None, Outcome::Caches(diff)) if diff.device_limits.is_some() => {
+            "aggregates within the limits for different devices"
         }
         (true, None, Outcome::Caches(_) | Outcome::Pictures(_)) => "the same, bit for bit",
         _ => "within tolerance",
@@ -125,6 +130,13 @@ fn show_caches(out: &mut String, diff: &CacheDiff) -> std::fmt::Result {
     let [a, b] = &diff.bakes;
     writeln!(out, "A is {a}\nB is {b}")?;
     show_physics(out, diff.physics.as_deref())?;
+    if diff.device_limits.is_some() {
+        writeln!(
+            out,
+            "by aggregates: on different devices roundings differ, so that bits cannot match; a \
+             tolerance file judges by other limits"
+        )?;
+    }
     show_lone(out, "frames", "A", &ranges(&diff.only_a))?;
     show_lone(out, "frames", "B", &ranges(&diff.only_b))?;
     let numbers: Vec<u32> = diff.frames.iter().map(|frame| frame.frame).collect();
@@ -155,7 +167,10 @@ fn show_caches(out: &mut String, diff: &CacheDiff) -> std::fmt::Result {
         .iter()
         .map(|f| (f.frame, f.aggregates))
         .collect();
-    show_aggregates(out, &aggregate_peaks(&pairs), |_| None)?;
+    show_aggregates(out, &aggregate_peaks(&pairs), |peak| {
+        let limit = diff.device_limits.as_ref()?.get(peak.name)?;
+        Some(limit.allowed(peak.b.unwrap_or(0.0)))
+    })?;
     show_first_difference(out, diff)?;
     streams::show(out, diff)?;
     let faults = diff.frames.iter().flat_map(|frame| {

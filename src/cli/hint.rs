@@ -78,12 +78,23 @@ fn bake(error: &BakeError) -> Hint {
     }
 }
 
+/// Options of a bake that goes on from a frame of another cache.
+fn branch_of(dir: &Path) -> String {
+    format!("--from {}:FRAME, -o", posix::path(dir))
+}
+
+/// Whether a field of a manifest says on what it was baked.
+fn is_of_device(field: &str) -> bool {
+    ["device", "driver", "backend"].contains(&field)
+}
+
 /// Of a cache that a bake writes.
 fn cache(error: &CacheError) -> Hint {
     match error {
         CacheError::Exists { .. } => Some("--resume, -o".into()),
-        CacheError::OldFormat { dir, .. } => {
-            Some(format!("--from {}:FRAME, -o", posix::path(dir)).into())
+        CacheError::OldFormat { dir, .. } => Some(branch_of(dir).into()),
+        CacheError::OtherScene { dir, field, .. } if is_of_device(field) => {
+            Some(branch_of(dir).into())
         }
         CacheError::Occupied { .. }
         | CacheError::OtherScene { .. }
@@ -216,6 +227,19 @@ mod tests {
             newest: 2,
         }));
         assert_eq!(of(&of_study).as_deref(), Some("--from 'a b':FRAME, -o"));
+        let other = |field: &str| {
+            let other = CacheError::OtherScene {
+                dir: "a b".into(),
+                field: field.into(),
+                cached: "one".into(),
+                given: "another".into(),
+            };
+            of(&BakeError::Cache(other))
+        };
+        for field in ["device", "driver", "backend"] {
+            assert_eq!(other(field).as_deref(), Some("--from 'a b':FRAME, -o"));
+        }
+        assert_eq!(other("solver").as_deref(), Some("-o"));
         let of_check = CheckError::Gpu(GpuError::Software {
             adapter: "llvmpipe".into(),
             advice: None,

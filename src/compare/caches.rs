@@ -1,6 +1,9 @@
 //! Summary of the differences between two caches.
 
+use std::collections::BTreeMap;
+
 use serde::Serialize;
+use swell_domain::tolerance::Limit;
 
 use super::{frames::FrameDiff, streams::StreamDiff};
 
@@ -25,8 +28,11 @@ pub struct CacheDiff {
     pub streams_only_b: Vec<String>,
     /// Differences in streams beside the particles, by frame.
     pub streams: Vec<StreamDiff>,
-    /// Whether stream differences are judged: only without a tolerance, because a tolerance does
-    /// not name streams.
+    /// Limits of aggregates by which caches of different devices are judged if no tolerance is
+    /// given: roundings differ, so that bits cannot be the same.
+    pub device_limits: Option<BTreeMap<String, Limit>>,
+    /// Whether stream differences are judged: only where every bit has to be the same, because a
+    /// tolerance does not name streams.
     pub streams_judged: bool,
 }
 

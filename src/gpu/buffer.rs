@@ -204,6 +204,14 @@ impl<T> Buf<T> {
         }
     }
 
+    /// Returns the description of the values that follow the first `count`.
+    pub fn after(self, count: usize) -> Self {
+        Self {
+            offset: self.place(count),
+            ..self
+        }
+    }
+
     /// Selects the first `count` values for reading.
     pub fn first(self, count: usize) -> First<T> {
         First {
@@ -213,7 +221,7 @@ impl<T> Buf<T> {
     }
 
     /// Byte offset of value `index`.
-    pub(super) fn place(&self, index: usize) -> u64 {
+    pub fn place(&self, index: usize) -> u64 {
         self.offset + (index * size_of::<T>()) as u64
     }
 }

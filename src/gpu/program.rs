@@ -192,9 +192,10 @@ impl Program {
     /// of this program, ordered before later submissions.
     pub fn copy<T>(&self, to: &Buf<T>, from: &Self, source: &Buf<T>, count: usize) {
         let bytes = (count * size_of::<T>()) as u64;
+        let (first, place) = (source.place(0), to.place(0));
         let (source, to) = (from.buffer(source.name()), self.buffer(to.name()));
         let mut encoder = (self.context.device).create_command_encoder(&Default::default());
-        encoder.copy_buffer_to_buffer(source, 0, to, 0, bytes);
+        encoder.copy_buffer_to_buffer(source, first, to, place, bytes);
         self.context.queue.submit([encoder.finish()]);
     }
 

@@ -40,6 +40,13 @@ pub fn compose(name: &str, defines: &[&str]) -> Result<String, GpuError> {
     Shaders::default().compose(name, defines)
 }
 
+/// Texts of all shipped files.
+#[cfg(test)]
+pub(super) fn shipped_texts() -> impl Iterator<Item = &'static str> {
+    let files = SHADERS.dirs().flat_map(Dir::files);
+    files.filter_map(|file| file.contents_utf8())
+}
+
 fn is_wgsl(path: &Path) -> bool {
     path.extension()
         .is_some_and(|extension| extension == "wgsl")

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use super::{error::GpuError, shader};
 
 /// Combinations of conditions that a plan can set; every pass must compose under each.
-const VARIANTS: [&[&str]; 65] = [
+const VARIANTS: [&[&str]; 71] = [
     &[],
     &["SOLIDS"],
     &["NEIGHBOR_LIST"],
@@ -15,12 +15,24 @@ const VARIANTS: [&[&str]; 65] = [
         "PLACES",
         "SOLIDS",
         "DENSITY",
-        "ADAPTIVE",
         "ARTIFICIAL_PRESSURE",
     ],
-    &["SOLIDS", "DENSITY", "ADAPTIVE", "ARTIFICIAL_PRESSURE"],
+    &["SOLIDS", "DENSITY", "ARTIFICIAL_PRESSURE"],
     &["NEIGHBOR_LIST", "SOLIDS", "PRESSURE"],
     &["PROJECTED", "SOLIDS"],
+    &["WALL_WORK"],
+    &["WALL_WORK", "SOLIDS", "MOVING_SOLIDS"],
+    &[
+        "PAGED",
+        "PROJECTED",
+        "NEIGHBOR_LIST",
+        "PLACES",
+        "SOLIDS",
+        "MOVING_SOLIDS",
+        "WALL_WORK",
+        "DENSITY",
+        "PRESSURE",
+    ],
     &["PAGED"],
     &["NEIGHBOR_EFFECTS"],
     &["NEIGHBOR_EFFECTS", "PAGED", "PROJECTED"],
@@ -96,6 +108,9 @@ const VARIANTS: [&[&str]; 65] = [
     &["CAUSTICS", "SEA", "PALETTE", "SPRAY", "LIGHTS"],
     &["LISTED"],
     &["LISTED", "DRY"],
+    &["LISTED", "DRY", "BARE"],
+    &["NARROW"],
+    &["NARROW", "PAGED", "ELLIPSOIDS"],
     &["LISTED", "MATERIALS", "PALETTE", "SPRAY", "LIGHTS"],
     &["LISTED", "DRY", "MATERIALS", "PALETTE", "SPRAY", "LIGHTS"],
 ];
@@ -151,11 +166,75 @@ mod tests {
         *,
     };
 
+    /// Storage buffers that a pass may bind on every adapter that is tried.
+    const PORTABLE: u32 = 10;
+
+    /// Passes that bind more in some variant, `compute_delta` where positions take two buffers.
+    /// None may join them, and their numbers only fall.
+    const ABOVE: [(&str, u32); 2] = [("flip/grid_to_particle", 13), ("pbf/compute_delta", 11)];
+
+    /// Arguments of sines and cosines that are not known to be within half a turn.
+    fn unbounded_angles(text: &str) -> Vec<&str> {
+        let is_word = |c: char| c.is_alphanumeric() || c == '_';
+        let arguments = ["sin(", "cos("].into_iter().flat_map(|call| {
+            text.match_indices(call).filter_map(move |(at, _)| {
+                let is_call = !text[..at].ends_with(is_word);
+                let rest = &text[at + call.len()..];
+                is_call.then(|| rest.split(')').next().unwrap_or(rest))
+            })
+        });
+        let angles = text.lines().filter_map(|line| {
+            let value = line.trim().strip_prefix("let angle = ")?;
+            (!value.starts_with("angle_of(") && !value.starts_with("line_angle(")).then_some(value)
+        });
+        // Directions of ripples are within ± 80°.
+        let arguments = arguments.filter(|it| !["angle", "turn"].contains(it));
+        arguments.chain(angles).collect()
+    }
+
+    /// Devices need not have sines beyond half a turn.
+    #[test]
+    fn sines_take_angles_within_half_a_turn() {
+        let mut count = 0;
+        for form in forms().expect("they compose") {
+            let found = unbounded_angles(&form.text);
+            assert!(
+                found.is_empty(),
+                "{} {:?}: {found:?}",
+                form.pass,
+                form.defines
+            );
+            count += form.text.matches("cos(angle)").count();
+        }
+        assert!(count > 10, "{count}");
+        let faults = unbounded_angles("let angle = k * x;\nlet y = 2.0 * cos(k * x) + acos(z);");
+        assert_eq!(faults, ["k * x", "k * x;"]);
+    }
+
+    /// Names after `#ifdef` and `#ifndef` in the lines of a shader.
+    fn conditions(text: &str) -> impl Iterator<Item = &str> {
+        let asked = |line: &'_ str| line.starts_with("#ifdef") || line.starts_with("#ifndef");
+        let lines = text.lines().map(str::trim).filter(move |line| asked(line));
+        lines.filter_map(|line| line.split_whitespace().nth(1))
+    }
+
+    #[test]
+    fn every_condition_of_a_shader_is_in_a_variant() {
+        let known: BTreeSet<&str> = VARIANTS.into_iter().flatten().copied().collect();
+        let asked: BTreeSet<&str> = shader::shipped_texts().flat_map(conditions).collect();
+        assert!(asked.len() > 30, "{asked:?}");
+        let unknown: Vec<_> = asked.difference(&known).collect();
+        assert!(unknown.is_empty(), "{unknown:?} are in no variant");
+        let unused: Vec<_> = known.difference(&asked).collect();
+        assert!(unused.is_empty(), "{unused:?} are in no shader");
+    }
+
     #[test]
     fn every_pass_validates_in_every_variant() {
         let passes = shader::pass_files().len();
         let forms = forms().expect("they compose");
         let mut most = 0;
+        let mut counts = std::collections::BTreeMap::new();
         assert!(passes >= 30 && forms.len() > 2 * passes, "{}", forms.len());
         for Form {
             pass,
@@ -172,7 +251,9 @@ mod tests {
             let is_drawing = pass.starts_with("ssfr/") || pass.starts_with("rays/");
             let is_known = match (is_drawing, reflection.stage) {
                 (true, Stage::Raster { .. }) => true,
-                (true, Stage::Compute) => [[64, 1, 1], [32, 8, 1], [16, 4, 1]].contains(&size),
+                (true, Stage::Compute) => {
+                    [[64, 1, 1], [32, 8, 1], [16, 4, 1], [8, 8, 1]].contains(&size)
+                }
                 (false, stage) => {
                     stage == Stage::Compute && [[64, 1, 1], [256, 1, 1]].contains(&size)
                 }
@@ -181,6 +262,8 @@ mod tests {
             let bindings = &reflection.bindings;
             let storage = storage_buffers(bindings);
             most = most.max(storage);
+            let count = counts.entry(pass.clone()).or_insert(0);
+            *count = storage.max(*count);
             assert!(
                 storage <= MOST_STORAGE_BUFFERS,
                 "{pass}: {storage} storage buffers, and lavapipe, the least that was tried, has 32"
@@ -194,6 +277,10 @@ mod tests {
             );
         }
         assert_eq!(most, MOST_STORAGE_BUFFERS);
+        println!("{counts:?}");
+        counts.retain(|pass, count| *count > PORTABLE || ABOVE.iter().any(|it| it.0 == pass));
+        let expected = ABOVE.map(|(pass, count)| (pass.to_owned(), count));
+        assert_eq!(counts.into_iter().collect::<Vec<_>>(), expected);
         // Negative control: an undeclared type.
         let text = shader::compose("pbf/predict", &[]).expect("it composes");
         assert!(reflect("pbf/predict", &text).is_ok());

@@ -10,12 +10,10 @@ fn pcg(value: u32) -> u32 {
 }
 
 /// Returns a unit vector for a pair of particles at the same position: opposite for (a, b) and (b,
-/// a).
+/// a). It points to a hashed point of a cube, with odd coordinates up to 1023.
 pub(super) fn pair_direction(a: u32, b: u32) -> DVec3 {
     let seed = pcg(a.min(b) ^ pcg(a.max(b)));
-    let z = f64::from(seed & 0xffff) / 32767.5 - 1.0;
-    let angle = f64::from(seed >> 16) * (std::f64::consts::TAU / 65536.0);
-    let r = (1.0 - z * z).max(0.0).sqrt();
+    let part = |shift: u32| 2.0 * f64::from(seed >> shift & 1023) - 1023.0;
     let sign = if a < b { 1.0 } else { -1.0 };
-    sign * DVec3::new(r * angle.cos(), r * angle.sin(), z)
+    sign * DVec3::new(part(0), part(10), part(20)).normalize()
 }

@@ -11,15 +11,17 @@ use super::params::{Counters, SolidGrid, SolidGrids};
 pub const POSITION: Buf<[f32; 3]> = Buf::new("position");
 /// Velocity of each particle, in storage order.
 pub const VELOCITY: Buf<[f32; 3]> = Buf::new("velocity");
-/// Id of each particle, in sorted order.
-pub const SORTED_ID: Buf<u32> = Buf::new("sorted_id");
+/// Ids in sorted order, which follow those of `n` particles in storage order.
+pub fn sorted_id(n: usize) -> Buf<u32> {
+    ID.after(n)
+}
 /// Quantized position of each particle in one word, in sorted order, in steps of 1/256 of h or of a
 /// cell (shared/place.wgsl).
 pub const PLACE: Buf<u32> = Buf::new("place");
 /// Velocity of each particle, in sorted order.
 pub const SORTED_VELOCITY: Buf<[f32; 3]> = Buf::new("sorted_velocity");
 /// 1 for each particle that is an isolated droplet, far from all water with a pressure on the grid,
-/// else 0; in storage order. Absent if PBF has no grid.
+/// else 0; in storage order, and with PBF behind that in sorted order. Absent if PBF has no grid.
 pub const IS_DROP: Buf<u32> = Buf::new("is_drop");
 /// Relative density ρ/ρ0: per particle in sorted order (PBF), or per cell, 0 without water (FLIP).
 pub const DENSITY: Buf<f32> = Buf::new("density");

@@ -91,10 +91,7 @@ fn plan(scene: &PbfScene, boundary: &Boundary, water: usize, white: usize) -> Pl
     table.extend("whitewater", vectors.map(|buffer| buffer.sized(water)));
     let fours = [SURFACE_AT, POTENTIAL];
     table.extend("whitewater", fours.map(|buffer| buffer.sized(water)));
-    table.extend(
-        "whitewater",
-        [ID.sized(water), SORTED_ID.sized(water), SHARE.sized(water)],
-    );
+    table.extend("whitewater", [ID.sized(2 * water), SHARE.sized(water)]);
     table.extend(
         "whitewater",
         [WHITE_POSITION, WHITE_VELOCITY].map(|b| b.sized(white)),

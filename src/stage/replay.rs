@@ -220,7 +220,7 @@ impl Finder<'_> {
             Watched::Speed | Watched::SpeedJump => self.too_fast(traced, limit),
             Watched::Substeps => self.too_fast(traced, self.most_speed()),
             Watched::Particles => {
-                for buffer in [ID, SORTED_ID] {
+                for buffer in [ID, sorted_id(n)] {
                     if traced.writes(buffer.name()) {
                         let mut id = traced.read(buffer.clone(), n)?;
                         id.sort_unstable();

@@ -45,7 +45,7 @@ use rows::{PLACE, WORK};
 const COMPARISONS: &[Comparison<FlipState>] = &[
     comparison("flip/survey", NONE, sort::survey),
     comparison("flip/assign_cells", NONE, sort::assign_cells),
-    comparison("flip/reorder", NONE, sort::reorder),
+    comparison("flip/reorder", || names![buffers::ID], sort::reorder),
     comparison("flip/cut_cells", NONE, grid::cut_cells),
     comparison("flip/gather_faces", NONE, grid::gather_faces),
     comparison("flip/gather_centers", NONE, grid::gather_centers),
@@ -72,7 +72,7 @@ const COMPARISONS: &[Comparison<FlipState>] = &[
     comparison("flip/push_apart", NONE, particles::push_apart),
     comparison(
         "flip/advect",
-        || names![buffers::COUNTERS],
+        || names![buffers::COUNTERS, buffers::ID],
         particles::advect,
     ),
     comparison(

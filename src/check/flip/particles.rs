@@ -128,15 +128,15 @@ pub(super) fn aim(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
 /// device's cell kinds.
 fn given(state: &FlipState, io: &Io<'_>, is_drop: Vec<bool>) -> Result<GridTransfer, SolveError> {
     let is_pushed = state.model.settings().density_correction || state.given_substep.is_some();
-    let displacement = match is_pushed {
-        true => io.after.vectors(buffers::PUSHED, state.n)?,
-        false => vec![DVec3::ZERO; state.n],
-    };
+    let rows = if is_pushed { 2 * state.n } else { state.n };
+    let mut carried = io.after.vectors(buffers::CARRIED, rows)?;
+    let mut displacement = carried.split_off(state.n);
+    displacement.resize(state.n, DVec3::ZERO);
     let cloud = state.unsorted(&io.after)?;
     Ok(GridTransfer {
         velocity: cloud.velocity,
         affine: cloud.affine,
-        carried: io.after.vectors(buffers::CARRIED, state.n)?,
+        carried,
         displacement,
         is_drop,
     })
@@ -160,15 +160,20 @@ pub(super) fn push_apart(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
         state.model.settings().apart_from_walls(),
         state.scene.domain.size().max_element(),
     );
-    let period = state.model.period().0.max_element();
+    let (period, kept) = (state.model.period(), state.model.settings().apart());
     io.table.each(&PUSHED, 0..state.n, |i| {
+        let position = &sorted.cloud.position;
+        let is_near = |j: usize| {
+            let way = period.shortest(position[i] - position[j]);
+            j != i && way.length() < 1.001 * kept
+        };
         let about = neighborhood().map(|offset| {
-            sorted
-                .of(elements.bricks.near(sorted.cell[i], offset))
-                .len()
+            let there = sorted.of(elements.bricks.near(sorted.cell[i], offset));
+            there.filter(|&j| is_near(j)).count()
         });
         let count = about.sum::<usize>() as f64;
         let exact = before.displacement[i] + reference[i];
+        let period = period.0.max_element();
         pair(
             i,
             found.displacement[i],

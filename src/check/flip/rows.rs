@@ -314,11 +314,14 @@ entries! {
             2.0 * velocity / size, "";
     }
     "flip/push_apart" {
-        PUSHED = "displacement", "m": [count: "particles about", apart: "the distance that is kept",
+        PUSHED = "displacement", "m": [count: "particles that are closer",
+            apart: "the distance that is kept",
             period: "the longest of a domain that joins its own end",
             extent: "the domain's longest side", displacement: "its own value"]
-            U * (count * (8.0 * apart + 2.0 * period) + 2.0 * extent + 2.0 * displacement),
-            "a difference, a root, a quotient and a product for each; the walls' places; a sum";
+            U * (count * (0.25 * (count + 16.0) * apart + 0.5 * period) + 4.0 * apart
+                + 2.0 * extent + 2.0 * displacement),
+            "a quarter of a difference, a root, a quotient and a product for each, or of a \
+             hashed direction, and of their sum; the cap's root and quotient; the walls' places";
     }
     "flip/aim" {
         AIMED = "position", "m": [x: "|x|", way: "Δt (|u| + |v|)", pushed: "what it is pushed by"]

@@ -47,7 +47,12 @@ impl FlipState {
 
     fn sorted_now(&self, view: &View<'_>) -> Result<Cloud, SolveError> {
         let vectors = [buffers::SORTED_POSITION, buffers::SORTED_VELOCITY];
-        self.cloud(view, vectors, buffers::SORTED_ID, buffers::SORTED_AFFINE)
+        self.cloud(
+            view,
+            vectors,
+            buffers::sorted_id(self.n),
+            buffers::SORTED_AFFINE,
+        )
     }
 }
 

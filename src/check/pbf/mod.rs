@@ -42,7 +42,11 @@ use whole::Whole;
 const COMPARISONS: &[Comparison<PbfState>] = &[
     comparison("pbf/predict", || names![buffers::VELOCITY], passes::predict),
     comparison("pbf/assign_cells", NONE, passes::assign_cells),
-    comparison("pbf/reorder", NONE, passes::reorder),
+    comparison(
+        "pbf/reorder",
+        || names![buffers::ID, buffers::IS_DROP],
+        passes::reorder,
+    ),
     comparison("pbf/build_neighbors", NONE, lists::build_neighbors),
     comparison(
         "pbf/compute_lambda",
@@ -77,7 +81,9 @@ const COMPARISONS: &[Comparison<PbfState>] = &[
             names![
                 buffers::PREDICTED,
                 buffers::PREDICTED_HIGH,
-                buffers::COUNTERS
+                buffers::COUNTERS,
+                buffers::ID,
+                buffers::IS_DROP
             ]
         },
         passes::update_velocity,

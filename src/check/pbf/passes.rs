@@ -143,7 +143,7 @@ pub(super) fn reorder(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     let expected: Vec<u32> = (0..n).map(|i| ids[at(i)]).collect();
     io.table.add_exact(
         &REORDER_ID,
-        &io.after.get(buffers::SORTED_ID, n)?,
+        &io.after.get(buffers::sorted_id(n), n)?,
         &expected,
     );
     if state.has_words() {
@@ -157,7 +157,7 @@ pub(super) fn reorder(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     if state.model.settings.grid_projection {
         let drops = io.before.get(buffers::IS_DROP, n)?;
         let expected: Vec<u32> = (0..n).map(|i| drops[at(i)]).collect();
-        let found = io.after.get(buffers::SORTED_IS_DROP, n)?;
+        let found = io.after.get(buffers::IS_DROP, 2 * n)?.split_off(n);
         io.table.add_exact(&REORDER_DROP, &found, &expected);
     }
     Ok(())
@@ -226,11 +226,16 @@ pub(super) fn compute_delta(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     let bounds = Bounds(inputs);
     let (h, period) = (state.model.calibration.support_radius, state.model.period());
     let one = |i: usize| {
-        // For coincident particles a hash decides their direction, with sines whose accuracy WGSL
-        // does not specify.
-        let is_coincident = (neighbors.all(i))
-            .map(|j| period.shortest(points[i] - points[j as usize]))
-            .any(|way| way.length_squared() < 2e-12 * h * h);
+        // Rounding may decide whether particles that are almost at the same position count as
+        // coincident, for which a hash decides the direction, and of several the last one visited
+        // counts.
+        let square = |j: u32| {
+            let way = period.shortest(points[i] - points[j as usize]);
+            way.length_squared()
+        };
+        let squares = || neighbors.all(i).map(square);
+        let is_undecided = squares().any(|square| square > 0.0 && square < 2e-12 * h * h)
+            || squares().filter(|&square| square == 0.0).count() > 1;
         // The bound starts from the correction before walls and solids push, because these deflect
         // its error.
         let to = reference[i].free;
@@ -242,7 +247,7 @@ pub(super) fn compute_delta(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
         // Whether the semi-iteration extrapolates is decided before it adds to the step.
         let along = (plain[i].free - points[i]).dot(last).abs();
         let is_across = along <= ACROSS.of([step, last.length()]);
-        if is_coincident || (factor != 1.0 && is_across && last != DVec3::ZERO) {
+        if is_undecided || (factor != 1.0 && is_across && last != DVec3::ZERO) {
             return None;
         }
         let x = points[i].length();
@@ -311,7 +316,7 @@ pub(super) fn update_velocity(state: &mut PbfState, io: &mut Io<'_>) -> Outcome 
     let starts = io.before.vectors(buffers::START_POSITION, n)?;
     let velocities = io.before.vectors(buffers::SORTED_VELOCITY, n)?;
     let drops = match state.model.settings.grid_projection {
-        true => io.before.get(buffers::SORTED_IS_DROP, n)?,
+        true => io.before.get(buffers::IS_DROP, 2 * n)?.split_off(n),
         false => Vec::new(),
     };
     let position = io.after.vectors(buffers::POSITION, n)?;
@@ -359,7 +364,7 @@ pub(super) fn update_velocity(state: &mut PbfState, io: &mut Io<'_>) -> Outcome 
             pair(i, places[i], positions[i], [])
         });
     }
-    let ids = io.before.get(buffers::SORTED_ID, n)?;
+    let ids = io.before.get(buffers::sorted_id(n), n)?;
     io.table
         .add_exact(&UPDATE_ID, &io.after.get(buffers::ID, n)?, &ids);
     if !drops.is_empty() {

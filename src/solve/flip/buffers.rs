@@ -32,11 +32,10 @@ pub const SORTED_POSITION: Buf<[f32; 3]> = Buf::new("sorted_position");
 pub const AFFINE: Buf<f32> = Buf::new("affine");
 /// Nine velocity gradients per particle, in sorted order, 1/s. APIC only.
 pub const SORTED_AFFINE: Buf<f32> = Buf::new("sorted_affine");
-/// Velocity that advects each particle, in sorted order, m/s.
+/// Velocity that advects each particle, in sorted order, m/s. If particles are pushed apart, their
+/// displacements by the density correction and by the repulsion between close particles follow,
+/// metres.
 pub const CARRIED: Buf<[f32; 3]> = Buf::new("carried");
-/// Displacement of each particle by the density correction and by the repulsion between close
-/// particles, in sorted order, metres. Exists only if particles are pushed apart.
-pub const PUSHED: Buf<[f32; 3]> = Buf::new("pushed");
 
 /// Sums over the particles of a cell, in planes of cells with water. For the 18 faces of one
 /// component that the particles reach: momentum for the nine faces before the cell and the nine

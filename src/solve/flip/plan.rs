@@ -124,12 +124,10 @@ fn particles(plan: &Plan, scene: &FlipScene, table: &mut Table) {
     let n = plan.counts.particles;
     let vectors = [POSITION, VELOCITY, SORTED_POSITION, SORTED_VELOCITY];
     table.extend("flip", vectors.map(|buffer| buffer.sized(n)));
-    table.extend("flip", [ID.sized(n), SORTED_ID.sized(n)]);
+    table.add("flip", ID.sized(2 * n));
     table.add("flip", IS_DROP.sized(n));
-    table.watch("flip", CARRIED.sized(n));
-    if pushes(plan, scene) {
-        table.watch("flip", PUSHED.sized(n));
-    }
+    let carried = if pushes(plan, scene) { 2 * n } else { n };
+    table.watch("flip", CARRIED.sized(carried));
     if has_places(plan, scene) {
         table.add("flip", PLACE.sized(n));
     }

@@ -46,7 +46,7 @@ impl Flip {
         let own = &self.program;
         program.copy(&POSITION, own, &SORTED_POSITION, n);
         program.copy(&VELOCITY, own, &VELOCITY, n);
-        program.copy(&ID, own, &SORTED_ID, n);
+        program.copy(&ID, own, &sorted_id(n), n);
         program.copy(&IS_DROP, own, &IS_DROP, n);
         Ok(())
     }

@@ -21,8 +21,6 @@ pub const PREDICTED_HIGH: Buf<[f32; 4]> = Buf::new("predicted_high");
 pub const CORRECTED: Buf<[f32; 3]> = Buf::new("corrected");
 /// Position at the substep's start, in sorted order.
 pub const START_POSITION: Buf<[f32; 3]> = Buf::new("start_position");
-/// [`IS_DROP`] in sorted order.
-pub const SORTED_IS_DROP: Buf<u32> = Buf::new("sorted_is_drop");
 /// Neighbours of the particles of a chunk, in blocks of particles, four neighbours per value; a
 /// shader variable.
 pub const NEIGHBOR_LIST: Buf<[u32; 4]> = Buf::new("neighbor_list");
@@ -33,10 +31,20 @@ pub const NEIGHBOR_COUNT: Buf<u32> = Buf::new("neighbor_count");
 pub const CONTROL: Buf<IterationControl> = Buf::new("control");
 /// Sums of the density errors of 256 particles each.
 pub const ERROR_SUMS: Buf<f32> = Buf::new("error_sums");
-/// Σ λ over the iterations of a substep, in sorted order, m².
+/// Σ λ over the iterations of a substep, in sorted order, m². With moving walls or solids it is
+/// behind [`WALL_WORK`]: see [`lambda_sum`].
 pub const LAMBDA_SUM: Buf<f32> = Buf::new("lambda_sum");
-/// Work by moving walls on each particle, in two halves: by its prediction and by its corrections.
+/// Work by moving walls on each particle, in two halves: by its corrections and by its prediction.
 pub const WALL_WORK: Buf<f32> = Buf::new("wall_work");
+
+/// Returns [`LAMBDA_SUM`] of `n` particles, where it is with or without walls or solids that move.
+pub fn lambda_sum(has_movers: bool, n: usize) -> Buf<f32> {
+    match has_movers {
+        true => WALL_WORK.after(2 * n),
+        false => LAMBDA_SUM,
+    }
+}
+
 /// Index of the first boundary sample of each cell, and finally the number of samples.
 pub const BOUNDARY_CELL_START: Buf<u32> = Buf::new("boundary_cell_start");
 

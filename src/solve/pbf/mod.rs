@@ -349,7 +349,10 @@ impl Pbf {
     /// order. Call it before the state is uploaded again.
     fn particle_pressures(&self, step: f64) -> Result<Vec<(DVec3, f64)>, SolveError> {
         let n = self.plan.counts.particles;
-        let wanted = (POSITION.first(n), LAMBDA_SUM.first(n));
+        let wanted = (
+            POSITION.first(n),
+            lambda_sum(self.scene.has_movers(), n).first(n),
+        );
         let (position, lambda) = self.program.download(wanted)?;
         let relaxation = self.scene.settings().relaxation;
         let density = self.scene.water.rest_density;
@@ -386,7 +389,7 @@ impl Pbf {
         self.measure.run(&self.program, self.timer.as_mut())?;
         let n = self.plan.counts.particles;
         let state = (POSITION.first(n), VELOCITY.first(n), ID.first(n));
-        let measured = (SORTED_ID.first(n), DENSITY.first(n), COUNTERS.first(1));
+        let measured = (sorted_id(n).first(n), DENSITY.first(n), COUNTERS.first(1));
         let ((position, velocity, id), (sorted_id, density, counters)) =
             self.program.download((state, measured))?;
         check_ids(self.frame + 1, &self.state.id, &id)?;

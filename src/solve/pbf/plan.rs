@@ -199,20 +199,21 @@ fn buffers(plan: &Plan, scene: &PbfScene, phases: usize) -> Table {
         SORTED_VELOCITY,
     ];
     table.extend("pbf", vectors.map(|buffer| buffer.sized(n)));
-    table.extend("pbf", [ID.sized(n), SORTED_ID.sized(n), DENSITY.sized(n)]);
+    table.extend("pbf", [ID.sized(2 * n), DENSITY.sized(n)]);
     if scene.settings().grid_projection {
-        table.extend("pbf", [IS_DROP.sized(n), SORTED_IS_DROP.sized(n)]);
+        table.add("pbf", IS_DROP.sized(2 * n));
     }
     table.add("pbf", COUNTERS.sized(1));
     if let Stop::DensityError { .. } = scene.settings().stop {
         table.add("pbf", CONTROL.sized(1));
         table.add("pbf", ERROR_SUMS.sized(n.div_ceil(256)));
     }
-    if scene.reads_multipliers() {
+    let has_sums = scene.reads_multipliers();
+    if has_sums && !scene.has_movers() {
         table.add("probes", LAMBDA_SUM.sized(n));
     }
     if scene.has_movers() {
-        table.add("budget", WALL_WORK.sized(2 * n));
+        table.add("budget", WALL_WORK.sized((2 + usize::from(has_sums)) * n));
         table.add("budget", BOUNDARY_WORK.sized(n.div_ceil(64)));
     }
     if plan.has_solids() {

@@ -48,11 +48,10 @@ fn substep(
 ) -> Vec<Command> {
     let pbf = scene.settings();
     let mut commands = vec![Command::over("pbf/predict", plan.counts.particles)];
-    if scene.reads_multipliers() {
-        commands.push(Command::clear(&LAMBDA_SUM));
-    }
     if scene.has_movers() {
         commands.insert(0, Command::clear(&WALL_WORK));
+    } else if scene.reads_multipliers() {
+        commands.push(Command::clear(&LAMBDA_SUM));
     }
     commands.extend(sorting(plan));
     if plan.has_lists {

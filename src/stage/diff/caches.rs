@@ -1,17 +1,38 @@
 //! Compares two caches: their frames, the streams besides the particles, and the ledgers' lines.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use rayon::prelude::*;
 
-use super::{DiffError, Request, aggregates, bake_of, of_caches, physics, scene_of, streams};
+use super::{
+    DiffError, Request, adapter_of, aggregates, bake_of, of_caches, physics, scene_of, streams,
+};
 use swell_cache::{CacheError, CacheReader};
 use swell_compare::{
     caches::CacheDiff,
     frames::{self, FrameDiff},
+    limits::{StatedLimit, default_tolerances},
     streams::StreamDiff,
 };
-use swell_domain::{particles::Particles, tolerance::Tolerance};
+use swell_domain::{
+    particles::Particles,
+    tolerance::{Limit, Tolerance},
+};
+
+/// Limits of aggregates for caches of different devices, those of a baseline on an adapter that it
+/// does not know; `None` for caches of the same device.
+fn device_limits([a, b]: [&CacheReader; 2]) -> Option<BTreeMap<String, Limit>> {
+    let (a, b) = (a.manifest(), b.manifest());
+    let limits = default_tolerances(b.particle_spacing).into_iter();
+    let limit = |(name, stated): (String, StatedLimit)| {
+        let limit = Limit {
+            absolute: stated.absolute,
+            relative: stated.relative,
+        };
+        (name, limit)
+    };
+    (adapter_of(a) != adapter_of(b)).then(|| limits.map(limit).collect())
+}
 
 /// Refuses a tolerance that limits nothing here, because everything would pass it.
 fn check_tolerance(tolerance: &Tolerance, caches: [&CacheReader; 2]) -> Result<(), DiffError> {
@@ -44,6 +65,15 @@ pub(super) fn compare(
     if let Some(tolerance) = tolerance {
         check_tolerance(tolerance, [a, b])?;
     }
+    let device_limits = match tolerance {
+        Some(_) => None,
+        None => device_limits([a, b]),
+    };
+    let by_aggregates = device_limits.clone().map(|aggregates| Tolerance {
+        aggregates,
+        ..Tolerance::default()
+    });
+    let tolerance = tolerance.or(by_aggregates.as_ref());
     let [in_a, in_b] = [a, b]
         .map(|cache| -> BTreeSet<u32> { (cache.first_frame()..=cache.last_frame()).collect() });
     let (chosen, only_a, only_b): (Vec<u32>, _, _) = match &request.frames {
@@ -104,6 +134,7 @@ pub(super) fn compare(
         streams_only_a: streams::lone(a, b),
         streams_only_b: streams::lone(b, a),
         streams: beside.into_iter().flatten().collect(),
+        device_limits,
         streams_judged: tolerance.is_none(),
     })
 }

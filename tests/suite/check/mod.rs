@@ -1,4 +1,6 @@
 //! `check` passes on what the device computes, and each of its rows fails if its pass is spoiled.
+mod arithmetic;
+mod coincident;
 mod controls;
 mod drops;
 mod films;
@@ -305,8 +307,8 @@ fn pbf_with_a_projection_is_within_tolerance_and_fails_where_it_should() {
         ),
         control(
             "pbf/update_velocity",
-            "v *= f32(sorted_is_drop[thread]);",
-            "v *= 1.0 - f32(sorted_is_drop[thread]);",
+            "v *= f32(own_is_drop);",
+            "v *= 1.0 - f32(own_is_drop);",
             "pbf/update_velocity",
             &["velocity"],
         ),

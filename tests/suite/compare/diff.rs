@@ -63,6 +63,51 @@ fn equal_caches_are_equal_and_a_flipped_velocity_is_found() {
     job.expect(0, "diff spoiled b --frames 0-2");
 }
 
+/// Caches of different devices: other bits are expected, other water is not.
+#[test]
+fn caches_of_different_devices_are_judged_by_aggregates() {
+    let job = Job::of(&[]);
+    write_cache(&job.path("b"), &Made::default());
+    let nudged = |_: u32, particles: &mut Particles| particles.position[5][0] += 1e-6;
+    let raised = |_: u32, particles: &mut Particles| {
+        particles.position.iter_mut().for_each(|p| p[1] += 0.2);
+    };
+    type Spoil<'a> = &'a dyn Fn(u32, &mut Particles);
+    let spoils: [(&str, &str, Spoil<'_>); 3] = [
+        ("nudged", "another device", &nudged),
+        ("raised", "another device", &raised),
+        ("same", "a device", &nudged),
+    ];
+    for (name, device, spoil) in spoils {
+        let made = Made {
+            device,
+            spoil,
+            ..Made::default()
+        };
+        write_cache(&job.path(name), &made);
+    }
+    let said = job.expect(0, "diff nudged b");
+    assert_has(
+        &said,
+        &[
+            "by aggregates: on different devices roundings differ",
+            "first differing bit: frame 0",
+            "aggregates within the limits for different devices",
+        ],
+    );
+    let limits = &job.json(0, "diff nudged b")["diff"]["device_limits"];
+    assert!(limits["volume"]["relative"].is_number(), "{limits}");
+    let said = job.expect(1, "diff raised b");
+    assert_has(&said, &["out: ", "OUT OF TOLERANCE"]);
+    // Negative control: on the same device every bit counts, and there are no such limits.
+    let said = job.expect(1, "diff same b");
+    assert!(!said.contains("by aggregates"), "{said}");
+    // A tolerance judges what it names, on any device.
+    job.write("tight.toml", "[position]\nmax = 1e-7\n");
+    let said = job.expect(1, "diff nudged b --tolerance tight.toml");
+    assert!(!said.contains("by aggregates"), "{said}");
+}
+
 #[test]
 fn tolerances_come_from_a_file_and_judge_what_they_name() {
     let job = Job::of(&[]);

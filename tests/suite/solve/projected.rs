@@ -295,11 +295,7 @@ fn scene_without_projection_plans_no_pass_of_it() {
     // Besides the projection's own buffers: flags of particles that count as drops, before and
     // after a sort.
     let flags = |plan: &Plan| -> u64 {
-        let names = ["is_drop", "sorted_is_drop"];
-        let found = plan
-            .buffers
-            .iter()
-            .filter(|row| names.contains(&row.spec.name.as_str()));
+        let found = plan.buffers.iter().filter(|row| row.spec.name == "is_drop");
         found.map(|row| row.spec.bytes).sum()
     };
     assert_eq!(

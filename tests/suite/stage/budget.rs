@@ -372,8 +372,8 @@ fn nothing_leaves_the_domain_and_a_ledger_that_does_not_close_ends_the_bake() {
             ),
             spoil(
                 "pbf/update_velocity",
-                "id[thread] = sorted_id[thread];",
-                "id[thread] = sorted_id[thread & 0xfffffffeu];",
+                "id[thread] = id[params.particle_count + thread];",
+                "id[thread] = id[params.particle_count + (thread & 0xfffffffeu)];",
             ),
         ),
         (
@@ -385,8 +385,8 @@ fn nothing_leaves_the_domain_and_a_ledger_that_does_not_close_ends_the_bake() {
             ),
             spoil(
                 "flip/advect",
-                "id[i] = sorted_id[i];",
-                "id[i] = sorted_id[i] + 7u;",
+                "id[i] = id[params.particle_count + i];",
+                "id[i] = id[params.particle_count + i] + 7u;",
             ),
         ),
     ] {

@@ -61,8 +61,8 @@ pub const FLIP: &[Control] = &[
     ),
     control(
         "flip/reorder",
-        "sorted_id[i] = id[source]",
-        "sorted_id[i] = id[source] ^ 1u",
+        "= id[source]",
+        "= id[source] ^ 1u",
         "flip/reorder",
         &["id"],
     ),
@@ -467,8 +467,8 @@ pub const FLIP: &[Control] = &[
     ),
     control(
         "flip/advect",
-        "= sorted_id[i]",
-        "= sorted_id[i] ^ 1u",
+        "id[i] = id[params.particle_count + i]",
+        "id[i] = id[params.particle_count + i] ^ 1u",
         "flip/advect",
         &["id"],
     ),

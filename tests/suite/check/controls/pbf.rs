@@ -3,10 +3,11 @@
 use super::{Control, control};
 
 /// Passes that look for neighbours in cells that do not contain them, and so do not find them.
-const UNSORTED: [&str; 5] = [
+const UNSORTED: [&str; 6] = [
     "sort/place",
     "sort/stabilize",
     "pbf/build_neighbors",
+    "pbf/compute_delta",
     "pbf/measure_density",
     "pbf/assign_cells",
 ];
@@ -134,7 +135,7 @@ pub const PBF: &[Control] = &[
     control(
         "pbf/reorder",
         "= id[source]",
-        "= id[source] + 0u * source; sorted_id[thread] = id[source] ^ 1u",
+        "= id[source] ^ 1u",
         "pbf/reorder",
         &["id"],
     ),
@@ -241,8 +242,8 @@ pub const PBF: &[Control] = &[
     ),
     control(
         "pbf/update_velocity",
-        "= sorted_id[thread]",
-        "= sorted_id[thread] ^ 1u",
+        "id[thread] = id[params.particle_count + thread]",
+        "id[thread] = id[params.particle_count + thread] ^ 1u",
         "pbf/update_velocity",
         &["id"],
     ),

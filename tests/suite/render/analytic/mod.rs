@@ -6,6 +6,7 @@
 //! its thickness are those of a sphere.
 
 mod caustics;
+mod devices;
 mod filtered;
 mod fit;
 mod geometry;

@@ -326,6 +326,16 @@ pub(crate) fn kernel(
     input: &[[f32; 4]],
 ) -> Vec<[f32; 4]> {
     let shared = swell::gpu::shader::compose(import, &[]).unwrap();
+    kernel_after(context, &shared, body, input)
+}
+
+/// The same after any text.
+pub(crate) fn kernel_after(
+    context: &Context,
+    shared: &str,
+    body: &str,
+    input: &[[f32; 4]],
+) -> Vec<[f32; 4]> {
     let count = input.len();
     let text = format!(
         "{shared}

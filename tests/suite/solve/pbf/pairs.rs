@@ -201,10 +201,7 @@ fn two_on_one_spot_part_as_far_as_lambda_says() {
             "pair_direction(i, coincident) * 2.02",
         ),
         ("select(-1.0, 1.0, a < b)", "1.0"),
-        (
-            "f32(seed & 0xffffu) / 32767.5",
-            "f32(seed & 0xffffu) / 33095.2",
-        ),
+        ("vec3f(2u * bits) - 1023.0", "vec3f(2u * bits) - 1003.0"),
     ] {
         let control = spoiled("pbf/compute_delta", from, to);
         let [other, _] = pushes(&control, &particles, BLOBS);
