@@ -228,13 +228,11 @@ impl FlipScene {
         // on the step holds.
         let by_acceleration = longest(fastest, gravity + push.acceleration);
         let longest = by_acceleration.max(longest(fastest + push.speed, gravity));
+        let longest = longest.min(self.effects.longest_step(self.grain()).0);
         // Surface waves of two cells have ω² of about 1.4 g / Δx on the grid, up to 4.8 g / Δx where
         // the surface is near cells' centres, and are stable for ω Δt < 2. In longer steps they make
         // noise in slow water.
-        let of_short_waves = (flip.cell_size / gravity).sqrt();
-        let longest = longest
-            .min(of_short_waves)
-            .min(self.effects.longest_step(self.grain()).0);
+        let longest = longest.min((flip.cell_size / gravity).sqrt());
         let wanted = if longest.is_finite() {
             (remaining / longest).ceil().max(1.0)
         } else {

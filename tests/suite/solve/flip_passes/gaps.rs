@@ -1,14 +1,13 @@
-//! Water that hits an obstacle.
+//! Water that falls on an obstacle.
 
 use glam::DVec3;
 use swell::{
     domain::{boundary::Boundary, particles::Particles},
-    gpu::adapter::Context,
     scene::Scene,
 };
 
 use super::exact::both;
-use crate::support::{context, device::spoiled, flip::*, lattice};
+use crate::support::{context, device::spoiled, flip::*};
 
 /// A slab of water from wall to wall, one cell above a floor that it would pass within the substep,
 /// at `speed` cells per substep.
@@ -59,45 +58,4 @@ fn a_slab_that_lands_within_a_substep_goes_as_far_as_the_floor() {
     let control = spoiled("flip/close_gaps", "CLOSES = 0.75", "CLOSES = 7.5");
     let [(_, least, _), _] = speeds(&control, 1.4);
     assert!((least + 1.4).abs() < 1e-6, "{least}");
-}
-
-/// Speed of two slabs that meet head-on, m/s.
-const SPEED: f64 = 4.0;
-
-/// Largest speed, in units of that of the slabs, in each of six frames after two slabs of `layers`
-/// half cells have met in free fall.
-fn speeds_of_slabs_that_meet(context: &Context, layers: usize) -> [(&'static str, Vec<f64>); 2] {
-    let mut scene = scene([32.0, 24.0, 4.0]);
-    scene.shot.frames_per_second = 100.0;
-    let mut particles = lattice([0.0, 8.0 * DX, 0.0], [64, layers, 8], [DX / 2.0; 3]);
-    for k in 0..particles.len() {
-        let is_left = position(&particles, k).x < 16.0 * DX;
-        particles.velocity[k] = [if is_left { SPEED } else { -SPEED } as f32, 0.0, 0.0];
-    }
-    let mut all = [("GPU", Vec::new()), ("reference", Vec::new())];
-    for frames in 1..=6 {
-        let states = both(context, &scene, &particles, &Boundary::default(), frames);
-        for ((_, all), (_, state, _)) in all.iter_mut().zip(states) {
-            let fall = DVec3::Y * -9.81 * f64::from(frames) / 100.0;
-            let speeds = (0..state.len()).map(|k| (velocity(&state, k) - fall).length() / SPEED);
-            all.push(speeds.fold(0.0, f64::max));
-        }
-    }
-    all
-}
-
-#[test]
-fn slabs_that_meet_splash_as_fast_wherever_the_surface_cuts_the_cells() {
-    let control = spoiled(
-        "flip/close_gaps",
-        "LEAST_INFLOW = 2.0",
-        "LEAST_INFLOW = 2e9",
-    );
-    for layers in [10, 11] {
-        for context in [&context(), &control] {
-            for (name, speeds) in speeds_of_slabs_that_meet(context, layers) {
-                println!("{layers} {name}: {speeds:.3?}");
-            }
-        }
-    }
 }
