@@ -82,7 +82,7 @@ entries! {
 /// Inputs of a frame of whitewater.
 #[derive(Clone, Copy, Debug)]
 pub struct Frame<'a> {
-    /// [`Scene::of_whitewater`] of the baked scene.
+    /// [`of_whitewater`](swell_scene::Scene::of_whitewater) of the baked scene.
     pub scene: &'a PbfScene,
     /// Solids of the scene.
     pub boundary: &'a Boundary,

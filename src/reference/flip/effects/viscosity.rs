@@ -1,7 +1,7 @@
 //! Viscosity on the grid (Batty and Bridson 2008). XSPH increases the PIC fraction, which
-//! [`Scene::substep_pic_blend`] takes into account; on the grid itself it does nothing.
+//! [`FlipScene::substep_pic_blend`] takes into account; on the grid itself it does nothing.
 //!
-//! [`Scene::substep_pic_blend`]: swell_scene::Scene::substep_pic_blend
+//! [`FlipScene::substep_pic_blend`]: swell_scene::SceneWith::substep_pic_blend
 
 use glam::{DVec2, DVec3};
 
