@@ -40,7 +40,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         .block([0.0; 3], [0.6, height, 0.2])
         .flip(0.05)
         .build()?;
-    let scene = scene.with_flip().ok_or("FLIP is not its method")?;
+    let scene = scene.with_flip().ok_or("the scene does not use FLIP")?;
     let start = Start::of(&scene)?;
     let mut solver = Flip::new(&scene, &start.boundary);
     solver.load(0, &start.particles)?;

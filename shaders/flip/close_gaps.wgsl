@@ -6,8 +6,8 @@
 //
 // A surface that water is about to hit moves on with it: near a cell's centre, where the pressure
 // is 0, it would let all inflow out through the faces towards air, at a speed that grows without
-// bound as θ and the substep shrink. Such a cell counts as full, unless a wall or solid is beside
-// it: that would stop a whole cell of water at once where part of one arrives.
+// bound as θ and the substep shrink. Such a cell counts as full, in proportion to its least open
+// face: beside a wall that would stop a whole cell of water at once where part of one arrives.
 #import "shared/thread.wgsl"
 #import "shared/flip_neighborhood.wgsl"
 #import "shared/flip_buried.wgsl"
@@ -132,7 +132,8 @@ fn filled(element: u32, cell: vec3f) -> f32 {
 const LEAST_INFLOW = 2.0;
 
 struct Hit {
-    // Velocity that the projection has to stop, m/s: the right-hand side of the cell's row.
+    // Velocity that the projection has to stop, m/s: the right-hand side of the cell's row, before
+    // inlets, wall friction and effects.
     inflow: f32,
     // Smallest open fraction of the cell's faces.
     open: f32,

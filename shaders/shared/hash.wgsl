@@ -11,7 +11,7 @@ fn pcg(value: u32) -> u32 {
 fn pair_direction(a: u32, b: u32) -> vec3f {
     let seed = pcg(min(a, b) ^ pcg(max(a, b)));
     let bits = vec3u(seed, seed >> 10u, seed >> 20u) & vec3u(1023u);
-    let way = vec3f(2u * bits) - 1023.0;
+    let direction = vec3f(2u * bits) - 1023.0;
     let sign = select(-1.0, 1.0, a < b);
-    return way * (sign * inverseSqrt(dot(way, way)));
+    return direction * (sign * inverseSqrt(dot(direction, direction)));
 }

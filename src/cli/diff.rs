@@ -29,7 +29,8 @@ pub(super) struct DiffArgs {
     /// Frames to compare, such as 1-240x2; all where left out.
     #[arg(long, value_name = "RANGE")]
     frames: Option<FrameRange>,
-    /// Limits (TOML); equal in every bit where left out.
+    /// Limits (TOML); where left out, equal in every bit on one device, and within the limits of a
+    /// new baseline on two.
     #[arg(long, value_name = "FILE")]
     tolerance: Option<PathBuf>,
     /// Print one JSON object.

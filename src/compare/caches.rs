@@ -42,7 +42,10 @@ impl CacheDiff {
         let same_streams = self.streams.is_empty()
             && self.streams_only_a.is_empty()
             && self.streams_only_b.is_empty();
-        self.only_a.is_empty()
+        // Aggregates are judged by frame: without one nothing is.
+        let is_judged = self.streams_judged || !self.frames.is_empty();
+        is_judged
+            && self.only_a.is_empty()
             && self.only_b.is_empty()
             && self.frames.iter().all(|frame| frame.faults.is_empty())
             && (same_streams || !self.streams_judged)

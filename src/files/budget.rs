@@ -85,8 +85,8 @@ impl<'de> Deserialize<'de> for Limit {
     }
 }
 
-/// Speeds that a scene causes by itself, m/s, its particle spacing, metres, and the tolerance of its
-/// pressure solve.
+/// Speeds that a scene causes by itself, m/s, its particle spacing, metres, and the tolerance of
+/// its pressure solve.
 pub(super) struct Scales {
     pub(super) fall: f64,
     pub(super) push: f64,

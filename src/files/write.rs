@@ -140,10 +140,8 @@ fn written_water(scene: &Scene, mesh_path: &dyn Fn(&Path, &str) -> String) -> Ta
 
 fn written_solver(scene: &Scene) -> Table {
     let mut solver = table([("method", value(&scene.solver.method()))]);
-    for settings in [Some(&scene.solver), scene.unchosen.as_ref()]
-        .into_iter()
-        .flatten()
-    {
+    // The chosen method's settings stand where both are of one method.
+    for settings in scene.unchosen.iter().chain([&scene.solver]) {
         let rows = match settings {
             Solver::Pbf(settings) => Value::Table(pbf(settings)),
             Solver::Flip(settings) => value(settings),

@@ -22,7 +22,7 @@ pub const SLOT_IN_CELL: Buf<u32> = Buf::new("slot_in_cell");
 pub const PLACED: Buf<u32> = Buf::new("placed");
 /// Elements by cell, and within a cell by id.
 pub const ORDER: Buf<u32> = Buf::new("order");
-/// Id of each element, in storage order.
+/// Id of each element, in storage order; ids in sorted order follow.
 pub const ID: Buf<u32> = Buf::new("id");
 /// Number of elements, in the first component.
 pub const ELEMENT_COUNT: Buf<[u32; 4]> = Buf::uniform("element_count");

@@ -277,7 +277,6 @@ mod tests {
             );
         }
         assert_eq!(most, MOST_STORAGE_BUFFERS);
-        println!("{counts:?}");
         counts.retain(|pass, count| *count > PORTABLE || ABOVE.iter().any(|it| it.0 == pass));
         let expected = ABOVE.map(|(pass, count)| (pass.to_owned(), count));
         assert_eq!(counts.into_iter().collect::<Vec<_>>(), expected);

@@ -81,7 +81,8 @@ struct Found {
 }
 
 impl Water {
-    /// Takes the water of `scene`, which is [`of_whitewater`](swell_scene::Scene::of_whitewater) of the baked scene, at `time`,
+    /// Takes the water of `scene`, which is
+    /// [`of_whitewater`](swell_scene::Scene::of_whitewater) of the baked scene, at `time`,
     /// seconds.
     pub fn new(scene: &PbfScene, boundary: &Boundary, water: &Particles, time: f64) -> Self {
         let mut model = Model::new(scene, boundary);
@@ -325,7 +326,8 @@ pub struct Whitewater {
 }
 
 impl Whitewater {
-    /// Creates whitewater for the water of `scene`, which is [`of_whitewater`](swell_scene::Scene::of_whitewater) of the baked
+    /// Creates whitewater for the water of `scene`, which is
+    /// [`of_whitewater`](swell_scene::Scene::of_whitewater) of the baked
     /// scene.
     pub fn new(scene: &PbfScene, boundary: &Boundary) -> Self {
         Self {

@@ -107,13 +107,29 @@ impl Scene {
         ((before + 1.0) * frame - start).max(length)
     }
 
-    /// Describes the step limit of effects, as the end of a message.
-    fn stable_step(&self) -> String {
+    /// Returns the longest substep of a grid projection for surface waves, √(Δx / g) seconds;
+    /// infinite without gravity. Waves of two cells have ω² of about 1.4 g / Δx on the grid (up to
+    /// 4.8 g / Δx where the surface is near cells' centres) and are stable for ω Δt < 2. In longer
+    /// substeps they make noise in slow water.
+    fn longest_wave_step(&self) -> f64 {
+        (self.solver.cell_size() / self.water.gravity.length()).sqrt()
+    }
+
+    /// Describes the step limits of surface waves, if they are the narrowest, and of effects, as
+    /// the end of a message.
+    fn stable_step(&self, is_of_waves: bool) -> String {
+        let of_waves = match is_of_waves {
+            true => format!(
+                ", for surface waves of two cells no longer than {:.3e} s",
+                self.longest_wave_step()
+            ),
+            false => String::new(),
+        };
         match self.effects.longest_step(self.grain()) {
             (longest, name) if longest.is_finite() => {
-                format!(", and at effects.{name} no longer than {longest:.3e} s")
+                format!("{of_waves}, and at effects.{name} no longer than {longest:.3e} s")
             }
-            _ => String::new(),
+            _ => of_waves,
         }
     }
 
@@ -164,8 +180,8 @@ impl Scene {
 }
 
 impl PbfScene {
-    /// Returns the number of equal substeps that PBF's CFL number requires in the frame after
-    /// `frame`, for a fastest particle of `speed`, m/s, gravity, effects, wave makers and solids.
+    /// Returns the number of equal substeps that PBF's CFL number, and short surface waves with its
+    /// projection (Δt ≤ √(Δx / g)), require in the frame after `frame`, for a fastest particle of `speed`, m/s, gravity, effects, wave makers and solids.
     ///
     /// # Errors
     /// If there are more than `max_substeps`.
@@ -186,12 +202,16 @@ impl PbfScene {
         let solids = solids.map(|solid| solid.peak_speed(start, start + length));
         let speed = wall.chain(solids).fold(speed + gained, f64::max);
         let wanted = (speed * length / (pbf.cfl * pbf.particle_spacing))
-            .max(length / self.effects.longest_step(self.grain()).0)
-            .ceil()
-            .max(1.0);
+            .max(length / self.effects.longest_step(self.grain()).0);
+        let of_waves = match pbf.grid_projection {
+            true => length / self.longest_wave_step(),
+            false => 0.0,
+        };
+        let is_of_waves = of_waves > wanted;
+        let wanted = wanted.max(of_waves).ceil().max(1.0);
         if wanted > f64::from(pbf.max_substeps) {
             let most = f64::from(pbf.max_substeps);
-            let stable = self.stable_step();
+            let stable = self.stable_step(is_of_waves);
             let detail = format!("{speed:.3} m/s at solver.pbf.cfl {}{stable}", pbf.cfl);
             return Err(Breach {
                 detail: Some(detail),
@@ -204,8 +224,9 @@ impl PbfScene {
 
 impl FlipScene {
     /// Returns how many equal substeps FLIP's CFL number and short surface waves (Δt ≤ √(Δx / g))
-    /// require in the `remaining` seconds from `start`, and the first of them. The fastest particle has `speed`, m/s; `done` substeps of
-    /// `frame` are complete, and the last substep (of any frame) took `before` seconds.
+    /// require in the `remaining` seconds from `start`, and the first of them. The fastest particle
+    /// has `speed`, m/s; `done` substeps of `frame` are complete, and the last substep (of any
+    /// frame) took `before` seconds.
     ///
     /// # Errors
     /// If the frame has more than `max_substeps`.
@@ -229,10 +250,9 @@ impl FlipScene {
         let by_acceleration = longest(fastest, gravity + push.acceleration);
         let longest = by_acceleration.max(longest(fastest + push.speed, gravity));
         let longest = longest.min(self.effects.longest_step(self.grain()).0);
-        // Surface waves of two cells have ω² of about 1.4 g / Δx on the grid, up to 4.8 g / Δx where
-        // the surface is near cells' centres, and are stable for ω Δt < 2. In longer steps they make
-        // noise in slow water.
-        let longest = longest.min((flip.cell_size / gravity).sqrt());
+        let of_waves = self.longest_wave_step();
+        let is_of_waves = of_waves < longest;
+        let longest = longest.min(of_waves);
         let wanted = if longest.is_finite() {
             (remaining / longest).ceil().max(1.0)
         } else {
@@ -246,7 +266,7 @@ impl FlipScene {
                 "up to {reached:.3} m/s, particles {speed:.3}, with gravity, effects, wave makers \
                  and moving solids, at solver.flip.cfl {}{}",
                 flip.cfl,
-                self.stable_step()
+                self.stable_step(is_of_waves)
             );
             let (asked, most) = (f64::from(done) + wanted, f64::from(flip.max_substeps));
             return Err(Breach {

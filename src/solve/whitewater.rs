@@ -172,7 +172,8 @@ fn set_up(
 }
 
 impl Whitewater {
-    /// Creates the passes for `water` particles of `scene`, which is [`of_whitewater`](swell_scene::Scene::of_whitewater) of
+    /// Creates the passes for `water` particles of `scene`, which is
+    /// [`of_whitewater`](swell_scene::Scene::of_whitewater) of
     /// the baked scene. Call [`Self::set`] before [`Self::advance`].
     ///
     /// # Errors Returns an error if a buffer exceeds the adapter's limits, a shader does not

@@ -40,7 +40,7 @@ pub struct Gpu {
     pub shaders: Shaders,
     /// Whether a software adapter is refused.
     pub is_hardware_required: bool,
-    /// How much less precisely it computes than it could.
+    /// Simulated imprecision.
     pub imprecision: Option<Imprecision>,
 }
 

@@ -49,7 +49,8 @@ pub struct Request {
     pub b: PathBuf,
     /// Frames to compare; all if `None`.
     pub frames: Option<FrameRange>,
-    /// Tolerances; if `None`, every bit must be equal.
+    /// Tolerances; if `None`, every bit must be equal, or between devices the aggregates must be
+    /// within the limits of a new baseline.
     pub tolerance: Option<Tolerance>,
     /// Where to write difference images; none if `None`.
     pub images: Option<Images>,

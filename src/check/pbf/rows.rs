@@ -46,7 +46,7 @@ bounds! {
     pub(super) ACROSS = [error: "" STEP, last: "|the last step|"]
         2.0 * error * last,
         "Δx · the last step = 0, whose sign decides whether a semi-iteration goes on; and where \
-         two particles are closer than 1.5e-6 h without being on one spot, or three are on one";
+         two particles are closer than 1.5e-6 h without being coincident, or three coincide";
     pub(super) WORKED = [factor: "that of Chebyshev, or 1", error: "" STEP, push: "" PUSHED,
         x: "|x|"]
         (2.0 * factor - 1.0) * error + push + U * x,

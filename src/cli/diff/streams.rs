@@ -39,7 +39,11 @@ pub(super) fn show(out: &mut String, diff: &CacheDiff) -> std::fmt::Result {
     }
     let is_shown = !diff.streams.is_empty() || lone.iter().any(|(_, names)| !names.is_empty());
     if is_shown && !diff.streams_judged {
-        writeln!(out, "not judged: the tolerance file names none of these")?;
+        let why = match diff.device_limits {
+            Some(_) => "they were baked on different devices",
+            None => "the tolerance file names none of these",
+        };
+        writeln!(out, "not judged: {why}")?;
     }
     Ok(())
 }

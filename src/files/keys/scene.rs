@@ -430,9 +430,10 @@ const FLIP: &[Key] = &[
         "α, the part of the velocity taken from the grid; a viscosity of α Δx² / \
          (6 Δt); unused by apic",
     ),
-    Key::number("cfl", CFL)
-        .default("3.0")
-        .about("largest displacement in a substep, in cells; as many substeps as that asks"),
+    Key::number("cfl", CFL).default("3.0").about(
+        "largest displacement in a substep, in cells; a frame has as many substeps as that and \
+             Δt ≤ √(Δx / g) ask",
+    ),
     Key::whole("max_substeps", MANY)
         .not_physics()
         .default("32")

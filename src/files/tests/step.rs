@@ -111,9 +111,9 @@ fn wind_shortens_substeps() {
         let substep = flip(&[more]).flip_substep(&AT_REST, 1, 0.0, 0.2, 0.0, (0, 0.0));
         substep.expect("few enough").1.length
     };
-    // g t² = 3 × 0.2 m: 0.245 s with gravity only, 0.081 s in the wind; one step
+    // 0.141 s with gravity only, for surface waves, and 0.081 s in the wind for 3 × 0.2 m; two steps
     // or three in 0.2 s.
-    assert!((length(still) - 0.2).abs() < 1e-12 && (length(windy) - 0.2 / 3.0).abs() < 1e-12);
+    assert!((length(still) - 0.1).abs() < 1e-12 && (length(windy) - 0.2 / 3.0).abs() < 1e-12);
 }
 
 /// √(1000 kg/m³ × (0.2 m)³ / (2π σ)) is 0.0598 s for σ = 356 N/m: four substeps in 0.2 s. Cells
@@ -206,6 +206,22 @@ fn flip_takes_substeps_in_which_short_surface_waves_are_stable() {
         let found = scene.flip_substep(&AT_REST, 1, 0.3, remaining, 0.0, (0, 0.0));
         assert_eq!(found.expect("few enough").0, count, "{part}");
     }
+    // PBF's projection has cells of 0.2 m too; in its own steps of gravity's fall, 10 m/s² × 0.2 s,
+    // particles may go far with this CFL number.
+    let wanted = |more| pbf(&["solver.pbf.cfl=5.0", more]).pbf_substeps(&AT_REST, 0, 0.0);
+    assert_eq!(wanted("solver.pbf.grid_projection=true").ok(), Some(2));
+    assert_eq!(wanted("solver.pbf.grid_projection=false").ok(), Some(1));
+    // The message names what asks for more than is allowed.
+    let scene = flip(&["solver.flip.max_substeps=1"]);
+    let found = scene.flip_substep(&AT_REST, 1, 0.0, 0.2, 0.0, (0, 0.0));
+    let detail = found
+        .err()
+        .and_then(|breach| breach.detail)
+        .unwrap_or_default();
+    assert!(
+        detail.contains("for surface waves of two cells no longer than 1.414e-1 s"),
+        "{detail}"
+    );
 }
 
 #[test]

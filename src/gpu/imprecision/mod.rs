@@ -156,11 +156,7 @@ impl Imprecision {
 mod tests {
     use naga::Expression;
 
-    use super::{
-        super::shader::{compose, pass_files},
-        call::PREFIX,
-        *,
-    };
+    use super::{super::variants::forms, call::PREFIX, *};
 
     /// Calls of this module's functions from a pass's own, by name.
     fn calls(profile: &Imprecision, name: &str, text: &str) -> Vec<String> {
@@ -190,10 +186,10 @@ mod tests {
     #[test]
     fn every_pass_is_valid_when_it_is_imprecise() {
         let mut replaced = 0;
-        for name in pass_files() {
-            let text = compose(&name, &[]).expect("it composes");
-            replaced += calls(&Imprecision::vulkan_worst(1), &name, &text).len();
-            assert_eq!(calls(&Imprecision::NONE, &name, &text), [""; 0], "{name}");
+        for form in forms().expect("they compose") {
+            let (name, text) = (&form.pass, &form.text);
+            replaced += calls(&Imprecision::vulkan_worst(1), name, text).len();
+            assert_eq!(calls(&Imprecision::NONE, name, text), [""; 0], "{name}");
         }
         assert!(replaced > 3000, "{replaced}");
     }

@@ -119,7 +119,7 @@ impl Gaps<'_> {
 
     /// Returns the terms of the velocity that the projection has to stop in a cell, m/s: of the
     /// lower faces, of the upper faces and of walls and solids. Their sum is the right-hand side of
-    /// the cell's row.
+    /// the cell's row, before inlets, wall friction and effects.
     pub fn inflow(&self, element: u32) -> [DVec3; 3] {
         let through = |face: u32| self.space.open[face as usize] * self.velocity[face as usize];
         let upper = |axis: usize| through(self.bricks.near(element, along(axis, 1)))[axis];
@@ -153,8 +153,9 @@ impl Gaps<'_> {
     /// Returns the distance to the surface by which the projection finds a cell's pressure, metres.
     /// A surface that water is about to hit moves on with it: near a cell's centre, where the
     /// pressure is 0, it would let all inflow out through the faces towards air, at a speed that
-    /// grows without bound as θ and the substep shrink. Such a cell counts as full, unless a wall or
-    /// solid is beside it: that would stop a whole cell of water at once where part of one arrives.
+    /// grows without bound as θ and the substep shrink. Such a cell counts as full, in proportion to
+    /// its least open face: beside a wall that would stop a whole cell of water at once where part
+    /// of one arrives.
     pub fn hit_distance(&self, element: u32, own: f64) -> f64 {
         if !self.is_hit(element) {
             return own;

@@ -102,8 +102,8 @@ pub struct Substep {
 }
 
 impl Substep {
-    /// Creates a substep that ends at `time` and is `time_step` long, seconds, and in which absorbing
-    /// walls have these states.
+    /// Creates a substep that ends at `time` and is `time_step` long, seconds, and in which
+    /// absorbing walls have these states.
     pub fn new(scene: &Scene, absorbers: &AbsorberStates, time: f64, time_step: f64) -> Self {
         Self {
             time,

@@ -34,7 +34,8 @@ pub const ERROR_SUMS: Buf<f32> = Buf::new("error_sums");
 /// Σ λ over the iterations of a substep, in sorted order, m². With moving walls or solids it is
 /// behind [`WALL_WORK`]: see [`lambda_sum`].
 pub const LAMBDA_SUM: Buf<f32> = Buf::new("lambda_sum");
-/// Work by moving walls on each particle, in two halves: by its corrections and by its prediction.
+/// Work by moving walls on each particle, in two parts: by its corrections and by its prediction.
+/// [`LAMBDA_SUM`] follows where it is needed.
 pub const WALL_WORK: Buf<f32> = Buf::new("wall_work");
 
 /// Returns [`LAMBDA_SUM`] of `n` particles, where it is with or without walls or solids that move.

@@ -15,7 +15,8 @@ pub(super) enum Engine {
 }
 
 impl Engine {
-    /// Prepares for `water` particles of `scene`, which is [`of_whitewater`](swell_scene::Scene::of_whitewater) of the baked
+    /// Prepares for `water` particles of `scene`, which is
+    /// [`of_whitewater`](swell_scene::Scene::of_whitewater) of the baked
     /// scene.
     pub(super) fn new(
         opened: &Opened,

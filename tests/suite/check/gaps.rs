@@ -112,7 +112,8 @@ fn landing(floor: &Boundary, height: f64) -> (Scene, Start) {
     (scene, start)
 }
 
-/// A slab in free fall whose flow converges: water runs into cells beside air and no wall, at 3 g Δt.
+/// A slab in free fall whose flow converges: water runs into cells beside air and no wall, at
+/// 3 g Δt.
 fn converging() -> (Scene, Start) {
     let mut scene = rig::scene([16.0, 24.0, 8.0]);
     scene.shot.frames_per_second = 100.0;
