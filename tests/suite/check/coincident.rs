@@ -30,8 +30,11 @@ fn coincident_particles_are_within_tolerance_and_a_fault_in_their_direction_is_s
         };
         assert_eq!(row(&clean).0, 0, "{method:?}: {}", lines(&clean));
         for (from, to) in [
-            ("way * (sign", "way * vec3f(1.00048828, 1.0, 1.0) * (sign"),
-            ("way * (sign", "(way + 0.3) * (sign"),
+            (
+                "direction * (sign",
+                "direction * vec3f(1.00048828, 1.0, 1.0) * (sign",
+            ),
+            ("direction * (sign", "(direction + 0.3) * (sign"),
         ] {
             let mut spoiled = context.clone();
             spoiled.spoil = Some(InjectedFault { pass, from, to });
