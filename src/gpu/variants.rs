@@ -187,7 +187,8 @@ mod tests {
             let value = line.trim().strip_prefix("let angle = ")?;
             (!value.starts_with("angle_of(") && !value.starts_with("line_angle(")).then_some(value)
         });
-        // Directions of ripples are within ± 80°, and operands of measure/rounding within half a turn.
+        // Directions of ripples are within ± 80°, and operands of measure/rounding within half a
+        // turn.
         let arguments = arguments.filter(|it| !["angle", "turn", "operands.w"].contains(it));
         arguments.chain(angles).collect()
     }

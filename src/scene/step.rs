@@ -181,7 +181,8 @@ impl Scene {
 
 impl PbfScene {
     /// Returns the number of equal substeps that PBF's CFL number, and short surface waves with its
-    /// projection (Δt ≤ √(Δx / g)), require in the frame after `frame`, for a fastest particle of `speed`, m/s, gravity, effects, wave makers and solids.
+    /// projection (Δt ≤ √(Δx / g)), require in the frame after `frame`, for a fastest particle of
+    /// `speed`, m/s, gravity, effects, wave makers and solids.
     ///
     /// # Errors
     /// If there are more than `max_substeps`.

@@ -141,8 +141,8 @@ entries! {
             change: "what an inflow can change it by",
             flow: "Σ|terms of the inflow| / the least inflow"]
             4.0 * U * size + (7.0 * flow + 48.0) * U * change,
-            "a cell, a copy, or a mix of both: 4 operations, a sum of 7 products, and at most twice \
-             its quotient (5 u) by a length (16 u) of a rounded velocity (1 u)", tie OF_GAP;
+            "a cell, a copy, or a mix of both: 4 operations, a sum of 7 products, and at most \
+             twice its quotient (5 u) by a length (16 u) of a rounded velocity (1 u)", tie OF_GAP;
     }
     "flip/find_excess" {
         EXCESS = "density excess", "": [excess: "|ρ − 1| with ρ", cut: "" CUT]

@@ -116,8 +116,8 @@ fn wind_shortens_substeps() {
         let substep = flip(&[more]).flip_substep(&AT_REST, 1, 0.0, 0.2, 0.0, (0, 0.0));
         substep.expect("few enough").1.length
     };
-    // 0.141 s with gravity only, for surface waves, and 0.081 s in the wind for 3 × 0.2 m; two steps
-    // or three in 0.2 s.
+    // 0.141 s with gravity only, for surface waves, and 0.081 s in the wind for 3 × 0.2 m; two
+    // steps or three in 0.2 s.
     assert!((length(still) - 0.1).abs() < 1e-12 && (length(windy) - 0.2 / 3.0).abs() < 1e-12);
 }
 

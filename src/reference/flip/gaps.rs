@@ -153,9 +153,9 @@ impl Gaps<'_> {
     /// Returns the distance to the surface by which the projection finds a cell's pressure, metres.
     /// A surface that water is about to hit moves on with it: near a cell's centre, where the
     /// pressure is 0, it would let all inflow out through the faces towards air, at a speed that
-    /// grows without bound as θ and the substep shrink. Such a cell counts as full, in proportion to
-    /// its least open face: beside a wall that would stop a whole cell of water at once where part
-    /// of one arrives.
+    /// grows without bound as θ and the substep shrink. Such a cell counts as full, in proportion
+    /// to its least open face: beside a wall that would stop a whole cell of water at once where
+    /// part of one arrives.
     pub fn hit_distance(&self, element: u32, own: f64) -> f64 {
         if !self.is_hit(element) {
             return own;
