@@ -19,11 +19,6 @@ var<private> phase: Opaque;
 
 #import "shared/pressure_two_sum.wgsl"
 
-// The same as in pressure/advance.
-fn leading(x: f32) -> f32 {
-    return bitcast<f32>(bitcast<u32>(x) & 0xfffff000u);
-}
-
 @compute @workgroup_size(64)
 fn main(
     @builtin(workgroup_id) workgroup: vec3u,

@@ -16,13 +16,6 @@
 @group(0) @binding(4) var<storage, read_write> pressure_residual: array<real>;
 @group(0) @binding(5) var<storage, read_write> pressure_solution: array<real>;
 
-#ifdef TWO_WORDS
-// The 12 leading bits of the mantissa: the product of two such numbers is exact.
-fn leading(x: f32) -> f32 {
-    return bitcast<f32>(bitcast<u32>(x) & 0xfffff000u);
-}
-#endif
-
 @compute @workgroup_size(64)
 fn main(
     @builtin(workgroup_id) workgroup: vec3u,

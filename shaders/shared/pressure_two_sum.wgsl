@@ -13,3 +13,8 @@ fn two_sum(a: f32, b: f32) -> vec2f {
     let rounded_a = hidden(sum - rounded_b);
     return vec2f(sum, (a - rounded_a) + (b - rounded_b));
 }
+
+// The 12 leading bits of the mantissa: the product of two such numbers is exact.
+fn leading(x: f32) -> f32 {
+    return bitcast<f32>(bitcast<u32>(x) & 0xfffff000u);
+}

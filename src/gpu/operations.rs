@@ -206,6 +206,27 @@ struct Meter<'a> {
     sums: [Handle<GlobalVariable>; 2],
 }
 
+/// Applies `rewrite` to each block that a statement contains.
+pub(super) fn nested_blocks(statement: &mut Statement, rewrite: &mut dyn FnMut(&mut Block)) {
+    match statement {
+        Statement::Block(block) => rewrite(block),
+        Statement::If { accept, reject, .. } => {
+            rewrite(accept);
+            rewrite(reject);
+        }
+        Statement::Switch { cases, .. } => {
+            cases.iter_mut().for_each(|case| rewrite(&mut case.body));
+        }
+        Statement::Loop {
+            body, continuing, ..
+        } => {
+            rewrite(body);
+            rewrite(continuing);
+        }
+        _ => {}
+    }
+}
+
 impl Meter<'_> {
     /// Instruments a function; `tell` is called at the end of an entry point.
     fn put_into(&self, function: &mut Function, tell: Option<Handle<Function>>) {
@@ -221,25 +242,11 @@ impl Meter<'_> {
     ) -> Block {
         let mut metered = Block::with_capacity(2 * block.len());
         for (mut statement, span) in block.span_into_iter() {
-            let mut inner = |block: &mut Block| {
+            nested_blocks(&mut statement, &mut |block| {
                 *block = self.block(function, std::mem::take(block), tell);
-            };
+            });
             let mut emitted = None;
-            match &mut statement {
-                Statement::Block(block) => inner(block),
-                Statement::If { accept, reject, .. } => {
-                    inner(accept);
-                    inner(reject);
-                }
-                Statement::Switch { cases, .. } => {
-                    cases.iter_mut().for_each(|case| inner(&mut case.body));
-                }
-                Statement::Loop {
-                    body, continuing, ..
-                } => {
-                    inner(body);
-                    inner(continuing);
-                }
+            match &statement {
                 Statement::Emit(range) => emitted = Some(range.clone()),
                 // naga ends each path through a function with a return.
                 Statement::Return { .. } => {

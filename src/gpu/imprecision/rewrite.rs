@@ -9,6 +9,7 @@ use naga::{
 };
 
 use super::{
+    super::operations::nested_blocks,
     Imprecision,
     call::{Call, PREFIX},
 };
@@ -62,33 +63,17 @@ impl Seen<'_> {
     ) -> Block {
         let mut rewritten = Block::with_capacity(2 * block.len());
         for (mut statement, span) in block.span_into_iter() {
-            let mut inner = |block: &mut Block| {
+            nested_blocks(&mut statement, &mut |block| {
                 *block = self.block(expressions, mem::take(block), find);
-            };
-            match &mut statement {
-                Statement::Block(block) => inner(block),
-                Statement::If { accept, reject, .. } => {
-                    inner(accept);
-                    inner(reject);
-                }
-                Statement::Switch { cases, .. } => {
-                    cases.iter_mut().for_each(|case| inner(&mut case.body));
-                }
-                Statement::Loop {
-                    body, continuing, ..
-                } => {
-                    inner(body);
-                    inner(continuing);
-                }
+            });
+            match statement {
                 Statement::Emit(range) => {
-                    for handle in range.clone() {
+                    for handle in range {
                         self.emit(expressions, &mut rewritten, handle, find);
                     }
-                    continue;
                 }
-                _ => {}
+                _ => rewritten.push(statement, span),
             }
-            rewritten.push(statement, span);
         }
         rewritten
     }

@@ -161,21 +161,19 @@ fn follow(
     (faults, state)
 }
 
+fn pbf_solver(context: &Context, scene: &Scene, start: &Start) -> Pbf {
+    let plan = start.plan(scene, device_limits(context));
+    let scene = scene.with_pbf().unwrap();
+    Pbf::new(context, &scene, plan, &start.boundary, false).unwrap()
+}
+
 /// The bound of corrections that end in a curved solid must not begin where the solid pushed the
 /// particles to: two of three frames would be out of tolerance here, by up to 1.58.
 #[test]
 fn a_sphere_in_a_tank_of_pbf_is_within_tolerance() {
     let context = context();
     let (scene, start) = tank(Method::Pbf, 0.0);
-    let plan = start.plan(&scene, device_limits(&context));
-    let solver = Pbf::new(
-        &context,
-        &scene.with_pbf().unwrap(),
-        plan,
-        &start.boundary,
-        false,
-    )
-    .unwrap();
+    let solver = pbf_solver(&context, &scene, &start);
     let (faults, mut state) = follow(&context, &scene, &start, solver, FRAMES);
     assert!(faults.is_empty(), "{faults}");
     // Particles may not touch it by themselves: one is placed inside.
@@ -199,15 +197,7 @@ fn a_sphere_that_moves_through_pbf_is_within_tolerance() {
     for grid_projection in [true, false] {
         let (mut scene, start) = tank(Method::Pbf, 0.9);
         pbf_of(&mut scene).grid_projection = grid_projection;
-        let plan = start.plan(&scene, device_limits(&context));
-        let solver = Pbf::new(
-            &context,
-            &scene.with_pbf().unwrap(),
-            plan,
-            &start.boundary,
-            false,
-        )
-        .unwrap();
+        let solver = pbf_solver(&context, &scene, &start);
         let frames = if grid_projection { 2 } else { FRAMES / 3 };
         let (faults, mut state) = follow(&context, &scene, &start, solver, frames);
         assert!(faults.is_empty(), "{faults}");

@@ -2,12 +2,13 @@
 
 use std::f64::consts::{PI, TAU};
 
-use crate::support::{self, choose, context, flip as of_flip, jitter, max_distance, noise, pbf_of};
+use crate::support::{
+    self, choose, context, flip as of_flip, jitter, max_distance, noise, pbf_of, solvers::on_cpu,
+};
 use glam::DVec3;
 use swell::{
-    domain::{boundary::Boundary, particles::Particles, period::Period, solver::Solver},
+    domain::{particles::Particles, period::Period, solver::Solver},
     gpu::adapter::{Context, InjectedFault},
-    reference,
     scene::{Iteration, Method, Scene},
 };
 
@@ -37,28 +38,6 @@ fn run(context: &Context, scene: &Scene, particles: &Particles, frames: u32) -> 
         Method::Flip => of_flip::run(context, scene, particles, frames).0,
         Method::Pbf => support::run(context, scene, particles, frames).0,
     }
-}
-
-fn twin(scene: &Scene, particles: &Particles, frames: u32) -> Particles {
-    let none = Boundary::default();
-    let mut state = particles.clone();
-    let mut advance = |solver: &mut dyn Solver<Error = reference::ReferenceError>| {
-        solver.load(0, particles).unwrap();
-        for _ in 0..frames {
-            state = solver.advance().unwrap().0;
-        }
-    };
-    match scene.solver.method() {
-        Method::Flip => advance(&mut reference::flip::Flip::new(
-            &scene.with_flip().unwrap(),
-            &none,
-        )),
-        Method::Pbf => advance(&mut reference::pbf::Pbf::new(
-            &scene.with_pbf().unwrap(),
-            &none,
-        )),
-    }
-    state
 }
 
 /// Particles moved by `way` and wrapped into the box.
@@ -158,11 +137,11 @@ fn where_the_joint_is_does_not_matter_to_the_reference() {
     for method in METHODS {
         let scene = open_box(method, [false, false, true]);
         let (start, way, frames) = (leaning(), DVec3::new(0.0, 0.0, 0.4), 2);
-        let there = twin(&scene, &start, frames);
-        let moved = twin(&scene, &shifted(&scene, &start, way), frames);
+        let there = on_cpu(&scene, &start, frames);
+        let moved = on_cpu(&scene, &shifted(&scene, &start, way), frames);
         let mut rounded = start.clone();
         jitter(&mut rounded, 2e-7);
-        let answer = max_distance(&there, &twin(&scene, &rounded, frames));
+        let answer = max_distance(&there, &on_cpu(&scene, &rounded, frames));
         let off = apart(scene.period(), &there, &moved, way);
         println!("{method:?}: {off:.2e}, a rounding {answer:.2e}");
         assert!(off <= 10.0 * answer, "{method:?}: {off} {answer}");
@@ -172,7 +151,7 @@ fn where_the_joint_is_does_not_matter_to_the_reference() {
         let off = apart(
             scene.period(),
             &there,
-            &twin(&walled, &start, frames),
+            &on_cpu(&walled, &start, frames),
             DVec3::ZERO,
         );
         assert!(off > 20.0 * answer, "{method:?} with walls: {off}");
@@ -318,7 +297,7 @@ fn a_full_box_at_rest_stays() {
         let particles = block([16, 16, 8]);
         for after in [
             run(&context, &scene, &particles, 2),
-            twin(&scene, &particles, 2),
+            on_cpu(&scene, &particles, 2),
         ] {
             let off = max_distance(&after, &particles);
             assert!(off < 1e-6, "{method:?}: {off}");
