@@ -3,6 +3,7 @@
 //! All results depend only on the arguments: random numbers are hashes of indices.
 
 mod displace;
+mod relax;
 
 use glam::DVec3;
 

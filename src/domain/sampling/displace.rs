@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use super::{
     super::{bounds::Bounds, signed_distance::SignedDistance},
+    relax::{Share, relax},
     uniform,
 };
 
@@ -27,8 +28,8 @@ const SCATTER: f64 = 0.02;
 /// Iterations for particles between a solid and a wall, or between two solids.
 const ROUNDS: usize = 8;
 
-/// Removes particles in `solid` and moves those that are too close to it outward; returns the
-/// number removed. The count that stays matches the open volume of the particles' cubes to half a
+/// Removes particles in `solid`, moves those that are too close to it outward and spreads those
+/// beside it evenly; returns the number removed. The count that stays matches the open volume of the particles' cubes to half a
 /// particle, unless there is no space outside of the solid.
 pub(super) fn displace(
     positions: &mut Vec<DVec3>,
@@ -36,10 +37,12 @@ pub(super) fn displace(
     domain: &Bounds,
     spacing: f64,
 ) -> usize {
-    let open: Vec<f64> = positions
+    let lattice = positions.clone();
+    let closed: Vec<Share> = positions
         .par_iter()
-        .map(|p| open_part(solid, *p, spacing))
+        .map(|p| closed_share(solid, *p, spacing))
         .collect();
+    let open: Vec<f64> = closed.iter().map(|share| 1.0 - share.volume).collect();
     let kept = balanced(positions, &open, spacing);
     let before = positions.len();
     let mut kept = kept.into_iter();
@@ -51,40 +54,52 @@ pub(super) fn displace(
     positions
         .par_iter_mut()
         .for_each(|p| *p = moved_out(*p, distance, gradient, &room, clearance));
+    relax(positions, &lattice, &closed, solid, domain, spacing);
     // Between a solid and a wall, or between two solids, there may be no space.
     positions.retain(|p| solid.sample(*p) > 0.0);
     before - positions.len()
 }
 
-/// Fraction of the cube of edge `spacing` around `p` that lies outside of `solid`, 0..1, summed
-/// over small cubes.
-fn open_part(solid: &SignedDistance, p: DVec3, spacing: f64) -> f64 {
+/// Returns the part of the cube of edge `spacing` around `p` that lies in `solid`, at its centroid,
+/// summed over small cubes.
+fn closed_share(solid: &SignedDistance, p: DVec3, spacing: f64) -> Share {
     let distance = solid.sample(p);
     // Half of the cube's diagonal, plus interpolation's error at edges.
     if distance.abs() > spacing {
-        return if distance > 0.0 { 1.0 } else { 0.0 };
+        return Share {
+            position: p,
+            volume: if distance > 0.0 { 0.0 } else { 1.0 },
+        };
     }
     const NODES: usize = PARTS + 1;
     let index = |at: [usize; 3]| at[0] + NODES * (at[1] + NODES * at[2]);
     let cell = |k: usize, edge: usize| [k % edge, k / edge % edge, k / (edge * edge)];
-    let nodes: [f64; NODES.pow(3)] = std::array::from_fn(|k| {
-        let at = DVec3::from_array(cell(k, NODES).map(|i| i as f64 / PARTS as f64 - 0.5));
-        solid.sample(p + spacing * at)
-    });
-    // Positive distances over all distances at a small cube's eight corners: exact for a face
+    let place = |at: [usize; 3]| DVec3::from_array(at.map(|i| i as f64 / PARTS as f64 - 0.5));
+    let nodes: [f64; NODES.pow(3)] =
+        std::array::from_fn(|k| solid.sample(p + spacing * place(cell(k, NODES))));
+    // Negative distances over all distances at a small cube's eight corners: exact for a face
     // parallel to the cube's, including one that coincides with a face of it.
-    let part = |k: usize| {
-        let at = cell(k, PARTS);
-        let (mut open, mut all) = (0.0, 0.0);
+    let part = |at: [usize; 3]| {
+        let (mut closed, mut all) = (0.0, 0.0);
         for corner in 0..8 {
             let distance = nodes[index([0, 1, 2].map(|axis| at[axis] + (corner >> axis & 1)))];
-            open += distance.max(0.0);
+            closed += (-distance).max(0.0);
             all += distance.abs();
         }
-        if all > 0.0 { open / all } else { 0.5 }
+        if all > 0.0 { closed / all } else { 0.5 }
     };
-    let parts = PARTS.pow(3);
-    (0..parts).map(part).sum::<f64>() / parts as f64
+    let half = DVec3::splat(0.5 / PARTS as f64);
+    let (mut volume, mut moment) = (0.0, DVec3::ZERO);
+    for k in 0..PARTS.pow(3) {
+        let at = cell(k, PARTS);
+        let part = part(at);
+        volume += part;
+        moment += part * (place(at) + half);
+    }
+    Share {
+        position: p + spacing * moment / f64::max(volume, f64::MIN_POSITIVE),
+        volume: volume / PARTS.pow(3) as f64,
+    }
 }
 
 /// Selects which particles stay: those whose cubes are at least half open, with more or fewer added

@@ -183,6 +183,60 @@ fn water_beside_slopes_has_its_volume() {
     }
 }
 
+/// Largest relative deviation of the density from the lattice's, over all water within three
+/// spacings of `body`, with a quadratic kernel. `body` counts as filled, by samples a fifth of a
+/// spacing apart.
+fn unevenness(water: &[DVec3], body: Bounds, domain: &Bounds, spacing: f64) -> f64 {
+    const PARTS: f64 = 5.0;
+    let radius = 2.2 * spacing;
+    let kernel = |distance: f64| (1.0 - distance / radius).max(0.0).powi(2);
+    let inside = fill_blocks(&[body], domain, spacing / PARTS);
+    let [water_grid, body_grid] = [water, &inside].map(|points| PointGrid::over(points, radius));
+    let density = |p: DVec3| {
+        let mut sum = 0.0;
+        water_grid.for_each_near(water, p, |_, r| sum += kernel(r));
+        body_grid.for_each_near(&inside, p, |_, r| sum += kernel(r) / PARTS.powi(3));
+        sum
+    };
+    let lattice = fill_blocks(&[*domain], domain, spacing);
+    let lattice_grid = PointGrid::over(&lattice, radius);
+    let mut exact = 0.0;
+    let middle = lattice
+        .iter()
+        .min_by(|a, b| a.length().total_cmp(&b.length()));
+    lattice_grid.for_each_near(&lattice, *middle.expect("some"), |_, r| exact += kernel(r));
+    let shell = body.grown(3.0 * spacing);
+    let near = water.iter().filter(|p| shell.contains(**p));
+    near.map(|p| (density(*p) / exact - 1.0).abs())
+        .fold(0.0, f64::max)
+}
+
+#[test]
+fn water_beside_a_solid_that_fits_no_lattice_is_even() {
+    let spacing = 0.05;
+    let domain = cuboid([-1.0; 3], [1.0; 3]);
+    for shift in [0.02, 0.025, 0.04] {
+        let body = cuboid(
+            [-0.5 + shift, -0.4, -0.3 - shift],
+            [0.5, 0.4 + 0.6 * shift, 0.3],
+        );
+        let mesh = box_mesh(body);
+        let solid = SignedDistance::from_mesh(&mesh, &domain, spacing).expect("closed");
+        let fill = fill_water(&[domain], [], Some(&solid), &domain, spacing).expect("no mesh");
+        let places = fill.particles.position.iter();
+        let places: Vec<_> = places
+            .map(|p| DVec3::from_array(p.map(f64::from)))
+            .collect();
+        let after = unevenness(&places, body, &domain, spacing);
+        // Control: the lattice without what is in the solid.
+        let lattice = fill_blocks(&[domain], &domain, spacing);
+        let open = lattice.into_iter().filter(|p| solid.sample(*p) > 0.0);
+        let before = unevenness(&open.collect::<Vec<_>>(), body, &domain, spacing);
+        println!("{shift}: {before} {after}");
+        assert!(after < 0.1 && before > 0.14, "{shift}: {before} {after}");
+    }
+}
+
 #[test]
 fn water_meshes_do_not_double_blocks() {
     let domain = cuboid([0.0; 3], [2.0; 3]);
