@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use crate::{
-    engine::{Io, Outcome},
+    engine::{Io, Outcome, View},
     sort::{check_cells, check_slots},
     table::{each, pair},
 };
@@ -16,9 +16,14 @@ use swell_reference::{
     },
 };
 use swell_scene::Iteration;
-use swell_solve::{params::Phase, pbf::buffers};
+use swell_solve::{SolveError, params::Phase, pbf::buffers};
 
 use super::{PbfState, State, bounds::Bounds, rows::*};
+
+/// Reads the flags of isolated droplets, as bits.
+fn drop_flags(view: &View<'_>, count: usize) -> Result<Vec<u32>, SolveError> {
+    view.get(buffers::IS_DROP.retyped(), count)
+}
 
 pub(super) fn predict(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     let n = state.particles();
@@ -155,9 +160,9 @@ pub(super) fn reorder(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
             .add_exact(&REORDER_PLACE, &found, &state.lists.words);
     }
     if state.model.settings.grid_projection {
-        let drops = io.before.get(buffers::IS_DROP, n)?;
+        let drops = drop_flags(&io.before, n)?;
         let expected: Vec<u32> = (0..n).map(|i| drops[at(i)]).collect();
-        let found = io.after.get(buffers::IS_DROP, 2 * n)?.split_off(n);
+        let found = drop_flags(&io.after, 2 * n)?.split_off(n);
         io.table.add_exact(&REORDER_DROP, &found, &expected);
     }
     Ok(())
@@ -316,7 +321,7 @@ pub(super) fn update_velocity(state: &mut PbfState, io: &mut Io<'_>) -> Outcome 
     let starts = io.before.vectors(buffers::START_POSITION, n)?;
     let velocities = io.before.vectors(buffers::SORTED_VELOCITY, n)?;
     let drops = match state.model.settings.grid_projection {
-        true => io.before.get(buffers::IS_DROP, 2 * n)?.split_off(n),
+        true => drop_flags(&io.before, 2 * n)?.split_off(n),
         false => Vec::new(),
     };
     let position = io.after.vectors(buffers::POSITION, n)?;
@@ -368,7 +373,7 @@ pub(super) fn update_velocity(state: &mut PbfState, io: &mut Io<'_>) -> Outcome 
     io.table
         .add_exact(&UPDATE_ID, &io.after.get(buffers::ID, n)?, &ids);
     if !drops.is_empty() {
-        let found = io.after.get(buffers::IS_DROP, n)?;
+        let found = drop_flags(&io.after, n)?;
         io.table.add_exact(&UPDATE_DROP, &found, &drops);
     }
     state.whole.end(ends);
