@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use crate::{
-    engine::{Io, Outcome, View},
+    engine::{Io, Outcome},
     sort::{check_cells, check_slots},
     table::{each, pair},
 };
@@ -16,14 +16,9 @@ use swell_reference::{
     },
 };
 use swell_scene::Iteration;
-use swell_solve::{SolveError, params::Phase, pbf::buffers};
+use swell_solve::{params::Phase, pbf::buffers};
 
 use super::{PbfState, State, bounds::Bounds, rows::*};
-
-/// Reads the flags of isolated droplets, as bits.
-fn drop_flags(view: &View<'_>, count: usize) -> Result<Vec<u32>, SolveError> {
-    view.get(buffers::IS_DROP.retyped(), count)
-}
 
 pub(super) fn predict(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     let n = state.particles();
@@ -160,10 +155,10 @@ pub(super) fn reorder(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
             .add_exact(&REORDER_PLACE, &found, &state.lists.words);
     }
     if state.model.settings.grid_projection {
-        let drops = drop_flags(&io.before, n)?;
-        let expected: Vec<u32> = (0..n).map(|i| drops[at(i)]).collect();
-        let found = drop_flags(&io.after, 2 * n)?.split_off(n);
-        io.table.add_exact(&REORDER_DROP, &found, &expected);
+        let drops = io.before.scalars(buffers::IS_DROP, n)?;
+        let found = io.after.scalars(buffers::IS_DROP, 2 * n)?.split_off(n);
+        io.table
+            .each(&REORDER_DROP, 0..n, |i| pair(i, found[i], drops[at(i)], []));
     }
     Ok(())
 }
@@ -321,7 +316,7 @@ pub(super) fn update_velocity(state: &mut PbfState, io: &mut Io<'_>) -> Outcome 
     let starts = io.before.vectors(buffers::START_POSITION, n)?;
     let velocities = io.before.vectors(buffers::SORTED_VELOCITY, n)?;
     let drops = match state.model.settings.grid_projection {
-        true => drop_flags(&io.before, 2 * n)?.split_off(n),
+        true => io.before.scalars(buffers::IS_DROP, 2 * n)?.split_off(n),
         false => Vec::new(),
     };
     let position = io.after.vectors(buffers::POSITION, n)?;
@@ -331,7 +326,7 @@ pub(super) fn update_velocity(state: &mut PbfState, io: &mut Io<'_>) -> Outcome 
     let one = |i: usize| {
         let (end, v) = (ends[i], velocities[i]);
         let start = match drops.get(i) {
-            Some(0) => end,
+            Some(0.0) => end,
             _ => starts[i],
         };
         let (x, then, is_capped) = passes::update_velocity(model, substep, end, start, v);
@@ -373,8 +368,9 @@ pub(super) fn update_velocity(state: &mut PbfState, io: &mut Io<'_>) -> Outcome 
     io.table
         .add_exact(&UPDATE_ID, &io.after.get(buffers::ID, n)?, &ids);
     if !drops.is_empty() {
-        let found = drop_flags(&io.after, n)?;
-        io.table.add_exact(&UPDATE_DROP, &found, &drops);
+        let found = io.after.scalars(buffers::IS_DROP, n)?;
+        io.table
+            .each(&UPDATE_DROP, 0..n, |i| pair(i, found[i], drops[i], []));
     }
     state.whole.end(ends);
     state.is_over = true;
