@@ -19,7 +19,8 @@
 @group(0) @binding(3) var<storage, read> sorted_position: array<Vector>;
 // Velocities, and with CORRECTION displacements behind them.
 @group(0) @binding(5) var<storage, read> carried: array<Vector>;
-@group(0) @binding(13) var<storage, read> is_drop: array<u32>;
+// Three floats per particle, and behind those of all particles, 1 for each isolated droplet.
+@group(0) @binding(13) var<storage, read> sorted_velocity: array<f32>;
 @group(0) @binding(6) var<storage, read_write> position: array<Vector>;
 @group(0) @binding(9) var<storage, read_write> velocity: array<Vector>;
 // In storage order, and behind that in sorted order.
@@ -104,8 +105,8 @@ fn main(
     let here = three(carried[i]);
     // A droplet continues ballistically: along its path the faces do not carry its velocity, and
     // those around may belong to other water.
-    let between = select(
-        velocity_at(start + 0.5 * params.time_step * here, here), here, is_drop[i] > 0u);
+    let is_drop = sorted_velocity[3u * params.particle_count + i] > 0.0;
+    let between = select(velocity_at(start + 0.5 * params.time_step * here, here), here, is_drop);
     var way = params.time_step * between;
 #ifdef CORRECTION
     way += three(carried[params.particle_count + i]);
@@ -120,7 +121,8 @@ fn main(
     }
     let low = params.wall_min + params.contact_distance;
     let high = params.wall_max - params.contact_distance;
-    var v = three(velocity[i]);
+    var v = vec3f(
+        sorted_velocity[3u * i], sorted_velocity[3u * i + 1u], sorted_velocity[3u * i + 2u]);
 #ifdef MOVING_SOLIDS
     // Steps of at most half a node spacing relative to the fastest solid, so that thin solids are
     // not skipped.

@@ -9,8 +9,8 @@
 @group(0) @binding(1) var<storage, read_write> sorted_position: array<Vector>;
 // Velocities, and behind them displacements.
 @group(0) @binding(2) var<storage, read> carried: array<Vector>;
-@group(0) @binding(5) var<storage, read> is_drop: array<u32>;
-@group(0) @binding(3) var<storage, read> velocity: array<Vector>;
+// Three floats per particle, and behind those of all particles, 1 for each isolated droplet.
+@group(0) @binding(3) var<storage, read> sorted_velocity: array<f32>;
 
 @compute @workgroup_size(64)
 fn main(
@@ -22,7 +22,10 @@ fn main(
     if i >= params.particle_count {
         return;
     }
-    let beside = select(three(carried[i]) - three(velocity[i]), vec3f(0.0), is_drop[i] > 0u);
+    let velocity = vec3f(
+        sorted_velocity[3u * i], sorted_velocity[3u * i + 1u], sorted_velocity[3u * i + 2u]);
+    let is_drop = sorted_velocity[3u * params.particle_count + i] > 0.0;
+    let beside = select(three(carried[i]) - velocity, vec3f(0.0), is_drop);
     let pushed = three(carried[params.particle_count + i]);
     sorted_position[i] = packed(
         three(sorted_position[i]) + params.time_step * beside + pushed);

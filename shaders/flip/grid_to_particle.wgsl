@@ -25,13 +25,14 @@
 
 @group(0) @binding(2) var<storage, read> cell_start: array<u32>;
 @group(0) @binding(3) var<storage, read> sorted_position: array<Vector>;
+// Velocities, and with CORRECTION displacements behind them.
 @group(0) @binding(4) var<storage, read> face_velocity: array<f32>;
-// Three floats per particle, as in `sorted_velocity` and `carried`.
-@group(0) @binding(5) var<storage, read_write> velocity: array<f32>;
+// Three floats per particle, as in `carried`. Behind those of all particles, 1 for each isolated
+// droplet, far from all water with a pressure, else 0.
+@group(0) @binding(5) var<storage, read_write> sorted_velocity: array<f32>;
 #ifdef SOLIDS
 @group(0) @binding(15) var<storage, read> face_open: array<f32>;
 #endif
-@group(0) @binding(9) var<storage, read> sorted_velocity: array<f32>;
 #ifdef APIC
 @group(0) @binding(6) var<storage, read_write> affine: array<f32>;
 #else
@@ -40,11 +41,6 @@
 @group(0) @binding(12) var<storage, read> cell_kind: array<u32>;
 // The displacements by which particles are pushed apart follow, if they are.
 @group(0) @binding(10) var<storage, read_write> carried: array<f32>;
-// 1 if the particle is an isolated droplet, far from all water with a pressure.
-@group(0) @binding(14) var<storage, read_write> is_drop: array<u32>;
-#ifdef CORRECTION
-@group(0) @binding(11) var<storage, read> face_displacement: array<f32>;
-#endif
 
 // Values at the 18 faces: columns along c, rows along b.
 struct Values {
@@ -68,8 +64,7 @@ fn changes(faces: vec3u) -> vec3f {
 
 #ifdef CORRECTION
 fn displacements(faces: vec3u) -> vec3f {
-    return vec3f(
-        face_displacement[faces.x], face_displacement[faces.y], face_displacement[faces.z]);
+    return velocities(faces + 3u * params.stride);
 }
 #endif
 
@@ -291,9 +286,10 @@ fn slowed(v: vec3f, friction: Friction, falls: bool) -> vec3f {
 // to where it finds room. An isolated droplet moves with its own velocity.
 fn rub(i: u32, x: vec3f, falls: bool) {
     let k = 3u * i;
-    let v = slowed(vec3f(velocity[k], velocity[k + 1u], velocity[k + 2u]), friction_at(x), falls);
+    let own = vec3f(sorted_velocity[k], sorted_velocity[k + 1u], sorted_velocity[k + 2u]);
+    let v = slowed(own, friction_at(x), falls);
     for (var axis = 0u; axis < 3u; axis++) {
-        velocity[k + axis] = v[axis];
+        sorted_velocity[k + axis] = v[axis];
         carried[k + axis] = select(carried[k + axis], v[axis], falls);
     }
 }
@@ -336,7 +332,7 @@ fn give(i: u32, axis: u32, f: vec3f, faces: Component, falls: bool, beyond: f32)
     let u = select(per_whole * value_at(faces.speeds, a, b, c), falling, falls);
     carried[k] = u;
 #ifdef APIC
-    velocity[k] = u;
+    sorted_velocity[k] = u;
     // Derivatives of the hat functions, 1 per cell.
     let of_b = select(vec3f(0.0, -1.0, 1.0), vec3f(-1.0, 1.0, 0.0), f.y < 0.5);
     let of_c = select(vec3f(0.0, -1.0, 1.0), vec3f(-1.0, 1.0, 0.0), f.z < 0.5);
@@ -349,7 +345,7 @@ fn give(i: u32, axis: u32, f: vec3f, faces: Component, falls: bool, beyond: f32)
     let advanced = sorted_velocity[k] + per_whole * value_at(faces.change, a, b, c);
     let kept = clamp(advanced + params.pic_blend * (u - advanced), faces.range.x - beyond,
         faces.range.y + beyond);
-    velocity[k] = select(kept, falling, falls);
+    sorted_velocity[k] = select(kept, falling, falls);
 #endif
 #ifdef CORRECTION
     carried[3u * params.particle_count + k] = per_whole * value_at(faces.shift, a, b, c);
@@ -429,6 +425,6 @@ fn main(
             rub_all(i, three(sorted_position[i]), about.is_dry);
         }
 #endif
-        is_drop[i] = u32(about.is_dry);
+        sorted_velocity[3u * params.particle_count + i] = f32(about.is_dry);
     }
 }

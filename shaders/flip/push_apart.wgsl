@@ -13,7 +13,8 @@
 @group(0) @binding(4) var<storage, read> id: array<u32>;
 // Velocities, and behind them the displacements.
 @group(0) @binding(5) var<storage, read_write> carried: array<Vector>;
-@group(0) @binding(6) var<storage, read> is_drop: array<u32>;
+// Three floats per particle, and behind those of all particles, 1 for each isolated droplet.
+@group(0) @binding(6) var<storage, read> sorted_velocity: array<f32>;
 #ifdef PLACES
 #import "shared/place.wgsl"
 @group(0) @binding(7) var<storage, read> place: array<u32>;
@@ -60,7 +61,8 @@ fn main(
         - max(of_walls - 2.0 * (params.cut_max * params.cell_size - x), vec3f(0.0));
     // An isolated droplet may rest as close to a wall as it can: if pushed off, it would fall again
     // in each step.
-    push = select(push, vec3f(0.0), is_drop[i] > 0u);
+    let is_drop = sorted_velocity[3u * params.particle_count + i] > 0.0;
+    push = select(push, vec3f(0.0), is_drop);
 #ifdef PERIODIC
     push = select(push, vec3f(0.0), is_periodic());
 #endif

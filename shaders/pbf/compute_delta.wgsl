@@ -14,8 +14,8 @@
 #ifdef WALL_WORK
 #import "shared/wall_work.wgsl"
 #ifdef MOVING_SOLIDS
-@group(0) @binding(14) var<storage, read> sample_velocity: array<Vector>;
-
+// Index of the velocity of the first boundary sample in `solid_distance`.
+var<private> first_velocity: u32;
 // Sum over boundary samples: density gradient towards each, times its velocity.
 var<private> sample_rate: f32;
 #endif
@@ -62,7 +62,10 @@ fn visit(i: u32, j: u32) {
 #ifdef MOVING_SOLIDS
     let sample = select(0u, j - fluid_count, other.w > 0.0);
     let slope = select(0.0, inverse_r * other.w * s * s, other.w > 0.0);
-    sample_rate += slope * dot(d, three(sample_velocity[sample]));
+    let first = first_velocity + 3u * sample;
+    let velocity = vec3f(
+        solid_distance[first], solid_distance[first + 1u], solid_distance[first + 2u]);
+    sample_rate += slope * dot(d, velocity);
 #endif
 #endif
     coincident = select(coincident, j, r2 * inverse_h * inverse_h < 1e-12);
@@ -94,6 +97,7 @@ fn main(
     coincident = i;
 #ifdef WALL_WORK
 #ifdef MOVING_SOLIDS
+    first_velocity = solid_grids.nodes;
     sample_rate = 0.0;
 #endif
 #endif

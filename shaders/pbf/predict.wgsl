@@ -17,7 +17,7 @@
 // Counts non-finite values, which clamping would hide.
 @group(0) @binding(12) var<storage, read_write> counters: Counters;
 #ifdef PROJECTED
-@group(0) @binding(14) var<storage, read> is_drop: array<u32>;
+@group(0) @binding(14) var<storage, read> is_drop: array<f32>;
 #endif
 
 #ifdef PROJECTED
@@ -73,7 +73,7 @@ fn main(
 #ifdef PROJECTED
     // Water was moved here by the grid's flow, not by its own velocity. The velocity therefore only
     // loses its component into walls and solids.
-    velocity[thread] = packed(select(stopped(v, free), v + taken, is_drop[thread] > 0u));
+    velocity[thread] = packed(select(stopped(v, free), v + taken, is_drop[thread] > 0.0));
 #else
     velocity[thread] = packed(v + taken);
 #endif

@@ -19,7 +19,7 @@
 #endif
 #ifdef PROJECTED
 // In storage order, and behind that in sorted order.
-@group(0) @binding(16) var<storage, read_write> is_drop: array<u32>;
+@group(0) @binding(16) var<storage, read_write> is_drop: array<f32>;
 #endif
 
 @compute @workgroup_size(64)

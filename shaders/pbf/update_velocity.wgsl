@@ -21,7 +21,7 @@
 @group(0) @binding(15) var<storage, read_write> counters: Counters;
 #ifdef PROJECTED
 // In storage order, and behind that in sorted order.
-@group(0) @binding(18) var<storage, read_write> is_drop: array<u32>;
+@group(0) @binding(18) var<storage, read_write> is_drop: array<f32>;
 #endif
 
 @compute @workgroup_size(64)
@@ -41,7 +41,7 @@ fn main(
     // would accumulate in a velocity that never moves it. Isolated droplets move with their own
     // velocity.
     let own_is_drop = is_drop[params.particle_count + thread];
-    v *= f32(own_is_drop);
+    v *= own_is_drop;
     is_drop[thread] = own_is_drop;
 #endif
     v += three(sorted_velocity[thread]);

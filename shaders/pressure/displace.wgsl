@@ -1,7 +1,7 @@
-// Displacements of the density correction at the faces, metres.
+// Displacements of the density correction at the faces, metres, behind the faces' velocities.
 #import "shared/pressure_gradient.wgsl"
 
-@group(0) @binding(6) var<storage, read_write> face_displacement: array<f32>;
+@group(0) @binding(6) var<storage, read_write> face_velocity: array<f32>;
 
 @compute @workgroup_size(64)
 fn main(
@@ -18,7 +18,8 @@ fn main(
     for (var c = 0u; c < 8u; c++) {
         for (var axis = 0u; axis < 3u; axis++) {
             let face = face_at(s, c, axis);
-            face_displacement[face.element] = f32(select(0.0, -face.difference, face.is_open));
+            let displacement = f32(select(0.0, -face.difference, face.is_open));
+            face_velocity[3u * phase.stride + face.element] = displacement;
         }
     }
 }

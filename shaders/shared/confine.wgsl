@@ -22,6 +22,7 @@ fn to_world(way: vec3f) -> vec3f {
     return way;
 }
 #endif
+// With PBF and moving solids, the velocities of boundary samples follow, three floats each.
 @group(0) @binding(8) var<storage, read> solid_distance: array<f32>;
 
 fn solid_node(node: vec3u) -> f32 {

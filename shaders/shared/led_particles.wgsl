@@ -10,7 +10,7 @@
 @group(0) @binding(10) var<storage, read> position: array<Vector>;
 @group(0) @binding(11) var<storage, read_write> velocity: array<Vector>;
 #ifdef PROJECTED
-@group(0) @binding(12) var<storage, read> is_drop: array<u32>;
+@group(0) @binding(12) var<storage, read> is_drop: array<f32>;
 #endif
 
 @compute @workgroup_size(64)
@@ -25,7 +25,7 @@ fn main(
     }
     let i = phase_particle(thread);
 #ifdef PROJECTED
-    lead(i, three(position[i]), is_drop[i] > 0u);
+    lead(i, three(position[i]), is_drop[i] > 0.0);
 #else
     lead(i, three(position[i]), false);
 #endif

@@ -19,7 +19,8 @@ struct SolidGrids {
     fastest: f32,
     // Length of the substep, seconds.
     length: f32,
-    padding: u32,
+    // Number of nodes of all grids.
+    nodes: u32,
 }
 @group(0) @binding(7) var<uniform> solid_grids: SolidGrids;
 

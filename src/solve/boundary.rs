@@ -12,7 +12,7 @@ use swell_gpu::program::Program;
 use swell_scene::Scene;
 
 use super::{
-    buffers::{SAMPLE_VELOCITY, SOLID_DISTANCE, SOLID_GRID, SOLID_GRIDS},
+    buffers::{SOLID_DISTANCE, SOLID_GRID, SOLID_GRIDS, sample_velocity},
     params::{SolidGrid, SolidGrids},
     pbf::{buffers::BOUNDARY_CELL_START, upload_places},
     plan::{Counts, Plan},
@@ -28,6 +28,11 @@ impl Counts {
             moving_nodes: boundary.moving.iter().map(|grid| grid.values.len()).sum(),
             ..Self::default()
         }
+    }
+
+    /// Number of nodes of all solids' signed-distance grids.
+    pub(super) fn solid_nodes(&self) -> usize {
+        self.solid_grid.iter().product::<usize>() + self.moving_nodes
     }
 }
 
@@ -95,7 +100,7 @@ pub(super) fn upload_samples(
             .iter()
             .map(|&(_, k)| three(samples[k].velocity))
             .collect();
-        program.upload(SAMPLE_VELOCITY, 0, &velocities);
+        program.upload(sample_velocity(plan.counts.solid_nodes()), 0, &velocities);
     }
 }
 
@@ -132,6 +137,7 @@ impl Movers {
             first += grid.values.len() as u32;
             resting.count += 1;
         }
+        resting.nodes = first;
         let statics = boundary.grids().count() - boundary.moving.len();
         let solids = scene.moving_solids.iter().zip(&boundary.moving);
         (!boundary.moving.is_empty()).then(|| Self {

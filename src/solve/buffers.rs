@@ -21,8 +21,8 @@ pub const PLACE: Buf<u32> = Buf::new("place");
 /// Velocity of each particle, in sorted order.
 pub const SORTED_VELOCITY: Buf<[f32; 3]> = Buf::new("sorted_velocity");
 /// 1 for each particle that is an isolated droplet, far from all water with a pressure on the grid,
-/// else 0; in storage order, and with PBF behind that in sorted order. Absent if PBF has no grid.
-pub const IS_DROP: Buf<u32> = Buf::new("is_drop");
+/// else 0; in storage order, and behind that in sorted order. Exists only in PBF with a grid.
+pub const IS_DROP: Buf<f32> = Buf::new("is_drop");
 /// Relative density ρ/ρ0: per particle in sorted order (PBF), or per cell, 0 without water (FLIP).
 pub const DENSITY: Buf<f32> = Buf::new("density");
 /// Events that passes count over a frame.
@@ -31,10 +31,13 @@ pub const COUNTERS: Buf<Counters> = Buf::new("counters");
 /// Δt; for FLIP over a substep, divided by Δx² Δt, W/m².
 pub const BOUNDARY_WORK: Buf<f32> = Buf::new("boundary_work");
 /// Signed distances at the nodes of all solids' grids, one grid after another, x fastest, metres.
+/// With PBF and moving solids, [`sample_velocity`] follows.
 pub const SOLID_DISTANCE: Buf<f32> = Buf::new("solid_distance");
 /// Geometry of the static solids' signed-distance grid.
 pub const SOLID_GRID: Buf<SolidGrid> = Buf::uniform("solid_grid");
 /// Geometry and motion of all solids' signed-distance grids.
 pub const SOLID_GRIDS: Buf<SolidGrids> = Buf::uniform("solid_grids");
-/// Velocity of each boundary sample of PBF, m/s.
-pub const SAMPLE_VELOCITY: Buf<[f32; 3]> = Buf::new("sample_velocity");
+/// Velocity of each boundary sample of PBF, m/s, behind the distances at `nodes` nodes.
+pub fn sample_velocity(nodes: usize) -> Buf<[f32; 3]> {
+    SOLID_DISTANCE.after(nodes).retyped()
+}

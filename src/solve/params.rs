@@ -179,8 +179,8 @@ mirror!(
         fastest: f32,
         /// Length of the substep, seconds.
         length: f32,
-        /// Unused.
-        padding: u32,
+        /// Number of nodes of all grids.
+        nodes: u32,
     }
 );
 

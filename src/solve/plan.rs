@@ -14,7 +14,7 @@ use swell_gpu::{
 };
 use swell_scene::{ByMethod, Scene};
 
-use super::{buffers::SAMPLE_VELOCITY, effects::Addition, flip, pbf};
+use super::{effects::Addition, flip, pbf};
 
 /// Neighbours that a list of PBF holds. If a particle has more, passes search the cells for it, and
 /// the report counts it. At rest, h = 2d gives 32 neighbours; in the dam break of `tools/bench pbf`
@@ -298,10 +298,10 @@ impl Plan {
             || self.counts.moving_nodes > 0
     }
 
-    /// Returns whether PBF's boundary samples have velocities, which is so if solids move.
+    /// Returns whether boundary samples have velocities: in PBF's plan if solids move.
     pub(super) fn has_sample_velocities(&self) -> bool {
-        let is_it = |name: &str| name == SAMPLE_VELOCITY.name();
-        self.buffers.iter().any(|buffer| is_it(&buffer.spec.name))
+        let reads_them = |name: &str| name == "pbf/compute_delta";
+        self.counts.moving_nodes > 0 && self.passes.iter().any(|pass| reads_them(pass.spec.name))
     }
 
     /// Returns names and sizes of the buffers, without those of the projection.

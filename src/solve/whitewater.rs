@@ -98,8 +98,7 @@ fn plan(scene: &PbfScene, boundary: &Boundary, water: usize, white: usize) -> Pl
     );
     table.add("whitewater", WHITE_COUNT.sized(1));
     if plan.has_solids() {
-        let nodes: usize = counts.solid_grid.iter().product();
-        table.add("solids", SOLID_DISTANCE.sized(nodes + counts.moving_nodes));
+        table.add("solids", SOLID_DISTANCE.sized(counts.solid_nodes()));
         table.add("solids", BOUNDARY_CELL_START.sized(cells + 1));
         match counts.moving_nodes {
             0 => table.add("solids", SOLID_GRID.sized(1)),

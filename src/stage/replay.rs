@@ -23,6 +23,7 @@ use swell_domain::{
 };
 use swell_gpu::{
     adapter::{GpuError, check_request},
+    buffer::Buf,
     recording::TracePoint,
 };
 use swell_scene::{ByMethod, Method, Scene, SceneError, Solver, flip::Precision};
@@ -277,14 +278,17 @@ impl Finder<'_> {
                 let is_over = self.start_volume.is_some_and(|start| drift(start) > limit);
                 Ok(is_over.then(|| POSITION.name().to_owned()))
             }
-            Watched::Energy if traced.writes(VELOCITY.name()) || traced.writes(POSITION.name()) => {
-                let energy = self.energy_of(traced)?;
+            Watched::Energy => {
+                let Some(velocity) = written_velocity(traced) else {
+                    return Ok(None);
+                };
+                let energy = self.energy_of(traced, velocity.clone())?;
                 let work = self
                     .made
                     .as_ref()
                     .map_or(0.0, |report| report.boundary_work);
                 let allowed = self.scene.allowed_energy(n, self.energy, work, limit);
-                Ok((energy > allowed).then(|| VELOCITY.name().to_owned()))
+                Ok((energy > allowed).then(|| velocity.name().to_owned()))
             }
             Watched::Capped if traced.writes(COUNTERS.name()) => {
                 let capped = f64::from(traced.counters()?.capped);
@@ -326,10 +330,10 @@ impl Finder<'_> {
         Ok(local.iter().map(world).collect())
     }
 
-    /// Kinetic and potential energy of the current positions and velocities, J; their order does
+    /// Kinetic and potential energy of the current positions and of `velocity`, J; their order does
     /// not matter.
-    fn energy_of(&self, traced: &Traced<'_>) -> Result<f64, SolveError> {
-        let velocity = traced.read(VELOCITY, self.state.len())?;
+    fn energy_of(&self, traced: &Traced<'_>, velocity: Buf<[f32; 3]>) -> Result<f64, SolveError> {
+        let velocity = traced.read(velocity, self.state.len())?;
         let state = Particles {
             position: self.positions(traced)?,
             velocity,
@@ -338,6 +342,13 @@ impl Finder<'_> {
         let report = self.scene.report(&state, [].into_iter());
         Ok(self.scene.total_energy(state.len(), &report))
     }
+}
+
+/// Velocities that a pass leaves, if it writes velocities or positions.
+fn written_velocity(traced: &Traced<'_>) -> Option<Buf<[f32; 3]>> {
+    let is_written = |buffer: &Buf<[f32; 3]>| traced.writes(buffer.name());
+    let written = [VELOCITY, SORTED_VELOCITY].into_iter().find(is_written);
+    written.or_else(|| is_written(&POSITION).then_some(VELOCITY))
 }
 
 /// Whether a pass leaves the densities that a frame's report describes. Those within a PBF

@@ -12,7 +12,7 @@ use swell_reference::flip::{
     GridTransfer, Moved, Solid, advect as reference_advect, aim as reference_aim,
     grid_to_particle as reference_grid_to_particle, push_apart as reference_push_apart,
 };
-use swell_solve::{SolveError, flip::buffers, pressure::buffers as solved};
+use swell_solve::{SolveError, flip::buffers};
 
 use super::{FlipState, elements::neighborhood, rows::*};
 
@@ -32,7 +32,7 @@ pub(super) fn grid_to_particle(state: &mut FlipState, io: &mut Io<'_>) -> Outcom
     let elements = state.elements();
     let faces = elements.faces(&io.before)?;
     let shift = match state.model.settings().density_correction {
-        true => Some(elements.planes(&io.before, solved::FACE_DISPLACEMENT)?),
+        true => Some(elements.planes(&io.before, buffers::face_displacement(elements.stride))?),
         false => None,
     };
     let (bricks, step, sorted) = (&elements.bricks, state.step(), state.sorted());
@@ -132,10 +132,9 @@ fn given(state: &FlipState, io: &Io<'_>, is_drop: Vec<bool>) -> Result<GridTrans
     let mut carried = io.after.vectors(buffers::CARRIED, rows)?;
     let mut displacement = carried.split_off(state.n);
     displacement.resize(state.n, DVec3::ZERO);
-    let cloud = state.unsorted(&io.after)?;
     Ok(GridTransfer {
-        velocity: cloud.velocity,
-        affine: cloud.affine,
+        velocity: io.after.vectors(buffers::SORTED_VELOCITY, state.n)?,
+        affine: state.slopes(&io.after, buffers::AFFINE)?,
         carried,
         displacement,
         is_drop,

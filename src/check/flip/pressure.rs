@@ -422,18 +422,16 @@ fn displace(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let (errors, x) = (state.difference_errors(&terms), sum(&terms));
     let waters = state.waters();
     let reference = waters.displace(&waters.by_element(state.system(), &x));
-    let found = state
-        .elements()
-        .planes(&io.after, solved::FACE_DISPLACEMENT)?;
-    io.table
-        .each(&DISPLACEMENT, state.elements().active(), |e| {
-            pair(
-                e,
-                found[e],
-                reference[e],
-                [errors[e], reference[e].length()],
-            )
-        });
+    let elements = state.elements();
+    let found = elements.planes(&io.after, buffers::face_displacement(elements.stride))?;
+    io.table.each(&DISPLACEMENT, elements.active(), |e| {
+        pair(
+            e,
+            found[e],
+            reference[e],
+            [errors[e], reference[e].length()],
+        )
+    });
     let mut b = state.by_row(&io.after, solved::RHS)?;
     remove_means(&mut b, &state.system().pockets());
     let [residual, allowed] = state.residual(&b, &x, CORRECTION_TOLERANCE);

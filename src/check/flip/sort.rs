@@ -26,21 +26,30 @@ impl FlipState {
         id: Buf<u32>,
         affine: Buf<f32>,
     ) -> Result<Cloud, SolveError> {
+        Ok(Cloud {
+            position: view.vectors(position, self.n)?,
+            velocity: view.vectors(velocity, self.n)?,
+            affine: self.slopes(view, affine)?,
+            id: view.get(id, self.n)?,
+        })
+    }
+
+    /// Reads velocity gradients; none without APIC.
+    pub(super) fn slopes(
+        &self,
+        view: &View<'_>,
+        affine: Buf<f32>,
+    ) -> Result<Vec<DMat3>, SolveError> {
         let rows = match self.model.settings().transfer {
             Transfer::Flip => Vec::new(),
             Transfer::Apic => view.get(affine.retyped::<[f32; 9]>(), self.n)?,
         };
         let matrix = |row: &[f32; 9]| DMat3::from_cols_array(&row.map(f64::from)).transpose();
-        Ok(Cloud {
-            position: view.vectors(position, self.n)?,
-            velocity: view.vectors(velocity, self.n)?,
-            affine: rows.iter().map(matrix).collect(),
-            id: view.get(id, self.n)?,
-        })
+        Ok(rows.iter().map(matrix).collect())
     }
 
     /// Reads the particles after the pass.
-    pub(super) fn unsorted(&self, view: &View<'_>) -> Result<Cloud, SolveError> {
+    fn unsorted(&self, view: &View<'_>) -> Result<Cloud, SolveError> {
         let vectors = [buffers::POSITION, buffers::VELOCITY];
         self.cloud(view, vectors, buffers::ID, buffers::AFFINE)
     }

@@ -257,7 +257,7 @@ impl PbfState {
             return Ok(vec![false; n]);
         }
         let flags = view.get(buffers::IS_DROP, n)?;
-        Ok(flags.into_iter().map(|flag| flag > 0).collect())
+        Ok(flags.into_iter().map(|flag| flag > 0.0).collect())
     }
 
     /// Reads positions followed by the samples, as effects see them.

@@ -155,10 +155,10 @@ pub(super) fn reorder(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
             .add_exact(&REORDER_PLACE, &found, &state.lists.words);
     }
     if state.model.settings.grid_projection {
-        let drops = io.before.get(buffers::IS_DROP, n)?;
-        let expected: Vec<u32> = (0..n).map(|i| drops[at(i)]).collect();
-        let found = io.after.get(buffers::IS_DROP, 2 * n)?.split_off(n);
-        io.table.add_exact(&REORDER_DROP, &found, &expected);
+        let drops = io.before.scalars(buffers::IS_DROP, n)?;
+        let found = io.after.scalars(buffers::IS_DROP, 2 * n)?.split_off(n);
+        io.table
+            .each(&REORDER_DROP, 0..n, |i| pair(i, found[i], drops[at(i)], []));
     }
     Ok(())
 }
@@ -316,7 +316,7 @@ pub(super) fn update_velocity(state: &mut PbfState, io: &mut Io<'_>) -> Outcome 
     let starts = io.before.vectors(buffers::START_POSITION, n)?;
     let velocities = io.before.vectors(buffers::SORTED_VELOCITY, n)?;
     let drops = match state.model.settings.grid_projection {
-        true => io.before.get(buffers::IS_DROP, 2 * n)?.split_off(n),
+        true => io.before.scalars(buffers::IS_DROP, 2 * n)?.split_off(n),
         false => Vec::new(),
     };
     let position = io.after.vectors(buffers::POSITION, n)?;
@@ -326,7 +326,7 @@ pub(super) fn update_velocity(state: &mut PbfState, io: &mut Io<'_>) -> Outcome 
     let one = |i: usize| {
         let (end, v) = (ends[i], velocities[i]);
         let start = match drops.get(i) {
-            Some(0) => end,
+            Some(0.0) => end,
             _ => starts[i],
         };
         let (x, then, is_capped) = passes::update_velocity(model, substep, end, start, v);
@@ -368,8 +368,9 @@ pub(super) fn update_velocity(state: &mut PbfState, io: &mut Io<'_>) -> Outcome 
     io.table
         .add_exact(&UPDATE_ID, &io.after.get(buffers::ID, n)?, &ids);
     if !drops.is_empty() {
-        let found = io.after.get(buffers::IS_DROP, n)?;
-        io.table.add_exact(&UPDATE_DROP, &found, &drops);
+        let found = io.after.scalars(buffers::IS_DROP, n)?;
+        io.table
+            .each(&UPDATE_DROP, 0..n, |i| pair(i, found[i], drops[i], []));
     }
     state.whole.end(ends);
     state.is_over = true;

@@ -28,6 +28,11 @@ pub const BRICK_SLOT: Buf<u32> = Buf::new("brick_slot");
 
 /// Position of each particle, in sorted order.
 pub const SORTED_POSITION: Buf<[f32; 3]> = Buf::new("sorted_position");
+/// 1 for each of `n` particles that is an isolated droplet, far from all water with a pressure,
+/// else 0; in sorted order, behind [`SORTED_VELOCITY`].
+pub fn is_drop(n: usize) -> Buf<f32> {
+    SORTED_VELOCITY.after(n).retyped()
+}
 /// Nine velocity gradients per particle, in storage order, 1/s. APIC only.
 pub const AFFINE: Buf<f32> = Buf::new("affine");
 /// Nine velocity gradients per particle, in sorted order, 1/s. APIC only.
@@ -48,8 +53,14 @@ pub const PARTIAL_SUMS: [Buf<f32>; 4] = [
     Buf::new("weight_before"),
     Buf::new("weight_after"),
 ];
-/// Planes: face velocity, m/s; a closed face holds the velocity of the solid.
+/// Planes: face velocity, m/s; a closed face holds the velocity of the solid. With the density
+/// correction, [`face_displacement`] follows.
 pub const FACE_VELOCITY: Buf<f32> = Buf::new("face_velocity");
+/// Planes: displacement of water by the density correction, metres; 0 on faces that are closed or
+/// touch no water. Follows three planes of `stride` velocities.
+pub fn face_displacement(stride: usize) -> Buf<f32> {
+    FACE_VELOCITY.after(3 * stride)
+}
 /// Planes: first the velocity before forces and projection, then the change by these, m/s.
 pub const FACE_CHANGE: Buf<f32> = Buf::new("face_change");
 /// Planes: open fraction of the face, 0 to 1.

@@ -9,7 +9,11 @@ use swell_domain::{
     bricks::{CELLS, table_dims},
     flip::{layers, stored_cells},
 };
-use swell_gpu::{program::PassSpec, recording::Command, sort};
+use swell_gpu::{
+    program::{BufferSpec, PassSpec},
+    recording::Command,
+    sort,
+};
 use swell_scene::{
     FlipScene,
     flip::{Surface, Transfer},
@@ -34,11 +38,7 @@ pub(crate) fn plan(scene: &FlipScene, counts: Counts, moves: bool) -> Plan {
         table.extend(name, addition.buffers.clone());
     }
     let (settings, has_correction) = (&flip.pressure, flip.density_correction);
-    table.append(pressure::planned(
-        settings,
-        has_correction,
-        counts.bricks.slots,
-    ));
+    table.append(pressure::planned(settings, counts.bricks.slots));
     plan.declare(table);
     let commands = Commands::new(&plan, scene, &effects);
     let defines = conditions(&plan, scene);
@@ -122,10 +122,14 @@ fn buffers(plan: &Plan, scene: &FlipScene) -> Table {
 fn particles(plan: &Plan, scene: &FlipScene, table: &mut Table) {
     let flip = scene.settings();
     let n = plan.counts.particles;
-    let vectors = [POSITION, VELOCITY, SORTED_POSITION, SORTED_VELOCITY];
+    let vectors = [POSITION, VELOCITY, SORTED_POSITION];
     table.extend("flip", vectors.map(|buffer| buffer.sized(n)));
+    let sorted_velocity = BufferSpec {
+        bytes: is_drop(n).place(n),
+        ..SORTED_VELOCITY.sized(n)
+    };
+    table.add("flip", sorted_velocity);
     table.add("flip", ID.sized(2 * n));
-    table.add("flip", IS_DROP.sized(n));
     let carried = if pushes(plan, scene) { 2 * n } else { n };
     table.watch("flip", CARRIED.sized(carried));
     if has_places(plan, scene) {
@@ -156,7 +160,9 @@ fn bricks(plan: &Plan, scene: &FlipScene, table: &mut Table) {
     table.add("sort", CELL_START.sized(wet + 1));
     table.extend("sort", sort::scan_buffers(&CELL_START, wet));
     table.extend("flip", PARTIAL_SUMS.map(|sums| sums.sized(FACES * wet)));
-    for planes in [FACE_VELOCITY, FACE_CHANGE, FACE_OPEN] {
+    let planes = if flip.density_correction { 6 } else { 3 };
+    table.watch("flip", FACE_VELOCITY.sized(planes * all));
+    for planes in [FACE_CHANGE, FACE_OPEN] {
         table.watch("flip", planes.sized(3 * all));
     }
     table.extend(
@@ -174,8 +180,7 @@ fn bricks(plan: &Plan, scene: &FlipScene, table: &mut Table) {
     if plan.has_solids() {
         table.watch("solids", OPEN_VOLUME.sized(all));
         table.watch("solids", OPEN_HATS.sized(all));
-        let nodes = plan.counts.solid_grid.iter().product::<usize>() + plan.counts.moving_nodes;
-        table.add("solids", SOLID_DISTANCE.sized(nodes));
+        table.add("solids", SOLID_DISTANCE.sized(plan.counts.solid_nodes()));
         if plan.counts.moving_nodes > 0 {
             table.watch("solids", CLOSED_VELOCITY.sized(3 * all));
             table.add("solids", SOLID_GRIDS.sized(1));

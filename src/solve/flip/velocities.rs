@@ -19,7 +19,7 @@ impl Flip {
 
     /// Copies positions, velocities and ids, in storage order, from `program`; projects the
     /// velocities over the `length` seconds from `start` on; and copies particles back in sorted
-    /// order.
+    /// order, with the flags of droplets.
     ///
     /// # Errors Returns an error if the device fails, a value is not finite, or a projection
     /// exceeds its budget.
@@ -45,9 +45,9 @@ impl Flip {
         self.run_substep(&survey.is_wet, &substep, totals, run)?;
         let own = &self.program;
         program.copy(&POSITION, own, &SORTED_POSITION, n);
-        program.copy(&VELOCITY, own, &VELOCITY, n);
+        program.copy(&VELOCITY, own, &SORTED_VELOCITY, n);
         program.copy(&ID, own, &sorted_id(n), n);
-        program.copy(&IS_DROP, own, &IS_DROP, n);
+        program.copy(&IS_DROP, own, &is_drop(n), n);
         Ok(())
     }
 }

@@ -189,7 +189,6 @@ fn buffers(plan: &Plan, scene: &PbfScene, phases: usize) -> Table {
 
     table.add("pbf", PARAMS.sized(1));
     table.add("pbf", PHASES.sized(phases));
-    let samples = plan.counts.boundary_samples;
     table.extend("pbf", place_buffers(places(plan), plan.page));
     let vectors = [
         CORRECTED,
@@ -217,15 +216,13 @@ fn buffers(plan: &Plan, scene: &PbfScene, phases: usize) -> Table {
         table.add("budget", BOUNDARY_WORK.sized(n.div_ceil(64)));
     }
     if plan.has_solids() {
-        let nodes = plan.counts.solid_grid.iter().product::<usize>() + plan.counts.moving_nodes;
-        table.add("solids", SOLID_DISTANCE.sized(nodes));
-        match plan.counts.moving_nodes {
-            0 => table.add("solids", SOLID_GRID.sized(1)),
-            _ => {
-                table.add("solids", SOLID_GRIDS.sized(1));
-                table.add("budget", SAMPLE_VELOCITY.sized(samples));
-            }
-        }
+        let (velocities, grids) = match plan.counts.moving_nodes {
+            0 => (0, SOLID_GRID.sized(1)),
+            _ => (3 * plan.counts.boundary_samples, SOLID_GRIDS.sized(1)),
+        };
+        let distances = plan.counts.solid_nodes();
+        table.add("solids", SOLID_DISTANCE.sized(distances + velocities));
+        table.add("solids", grids);
         table.add("solids", BOUNDARY_CELL_START.sized(cells + 1));
     }
     table

@@ -20,9 +20,6 @@ pub enum Real {}
 
 /// Cells: pressure, Pa; 0 without water.
 pub const PRESSURE: Buf<f32> = Buf::new("pressure");
-/// Planes: displacement of water by the density correction, metres; 0 on faces that are closed or
-/// touch no water.
-pub const FACE_DISPLACEMENT: Buf<f32> = Buf::new("face_displacement");
 /// Planes, blocked: coefficient of the lower face; 0 if nothing flows through it.
 pub const COEFFICIENT: Buf<f32> = Buf::new("pressure_coefficient");
 /// Cells, blocked: sum of the coefficients to air cells.

@@ -21,13 +21,15 @@
 //! | `liquid_distance` | `f32` cells | metres, negative in water; ghost-fluid surface only |
 //! | `density_excess` | `f32` cells | ρ/ρ_target − 1 to correct; density correction only |
 //!
+//! With the density correction `face_velocity` holds three planes more, for displacements.
+//!
 //! # Outputs
 //!
 //! Of the buffers in [`planned`], the projection fills `pressure` (Pa, natural cell order, 0
-//! without water) and `face_displacement` (planes, metres, 0 on faces that are closed or touch no
-//! water); it updates `face_velocity` in place. Only cells of wet slots are FLUID. Cells of a brick
-//! beyond the box are AIR with closed lower faces; one of these faces is the box's own wall. Only
-//! faces between two cells of water, or between water and air, change.
+//! without water). It updates `face_velocity` in place, and behind that fills the displacements
+//! (planes, metres, 0 on faces that are closed or touch no water). Only cells of wet slots are
+//! FLUID. Cells of a brick beyond the box are AIR with closed lower faces; one of these faces is
+//! the box's own wall. Only faces between two cells of water, or between water and air, change.
 //!
 //! # Use
 //!
@@ -36,7 +38,7 @@
 //! let mut pressure = PressureSolver::new(..);    // once, and again when the slots grow
 //! pressure.set_topology(&program, &bricks, cell_size)  // each substep, after uploading `bricks`
 //! pressure.project(&program, Scale { .. }, timer)  // builds, solves, subtracts; waits once
-//! pressure.correct(&program, timer)  // same system: density_excess -> face_displacement
+//! pressure.correct(&program, timer)  // same system: density_excess -> displacements
 //! ```
 
 pub mod buffers;

@@ -142,7 +142,7 @@ fn has_diagonal(settings: &Pressure) -> bool {
 
 /// Returns the buffers that the projection adds to its inputs (see the module documentation);
 /// `capacity` is in slots.
-pub fn planned(settings: &Pressure, has_correction: bool, capacity: usize) -> Table {
+pub fn planned(settings: &Pressure, capacity: usize) -> Table {
     let cells = capacity * CELLS as usize;
     let precision = settings.precision;
     let reals = |buffer: Buf<Real>, count: usize| match precision {
@@ -183,9 +183,6 @@ pub fn planned(settings: &Pressure, has_correction: bool, capacity: usize) -> Ta
     );
     if has_diagonal(settings) {
         table.add(owner, reals(INVERSE_DIAGONAL, cells));
-    }
-    if has_correction {
-        table.watch(owner, FACE_DISPLACEMENT.sized(3 * cells));
     }
     table
 }

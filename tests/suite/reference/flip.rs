@@ -30,11 +30,11 @@ use swell::{
             Flip,
             buffers::{
                 CELL_KIND, DENSITY, FACE_CHANGE, FACE_LAYER, FACE_OPEN, FACE_VELOCITY,
-                LIQUID_DISTANCE, SOLID_FLUX,
+                LIQUID_DISTANCE, SOLID_FLUX, face_displacement,
             },
             capacity,
         },
-        pressure::buffers::{FACE_DISPLACEMENT, PRESSURE},
+        pressure::buffers::PRESSURE,
     },
 };
 
@@ -263,7 +263,8 @@ fn rows_of_motion(case: &Case, pair: &Pair, trace: &Trace) -> Vec<Row> {
         let source = trace.centers.excess.iter().map(|e| e * e).sum::<f64>();
         // The solver stops at 1e-2, pressure::CORRECTION_TOLERANCE; densities round as above.
         let bound = STIFFNESS * DX * (1e-2 * source.sqrt() + 8.0 * PLACE * rows);
-        let found = pair.field(FACE_DISPLACEMENT, 3);
+        let stride = pair.gpu.plan().counts.bricks.slots * CELLS as usize;
+        let found = pair.field(face_displacement(stride), 3);
         let gap = norm(&found, &planes(displacement));
         out.push(row("face_displacement", gap, bound));
         displaced = largest(&found, &planes(displacement));

@@ -405,7 +405,7 @@ fn watched_buffers_are_written_by_a_pass() {
             watched.insert(row.spec.name.clone());
         }
     }
-    assert_eq!(watched.len(), 14, "{watched:?}");
+    assert_eq!(watched.len(), 13, "{watched:?}");
     // Negative controls: a buffer of integers, and one that no pass writes.
     let case = Case::new(grid(|_| {})).with_solids();
     let plan = case.plan();

@@ -24,7 +24,7 @@ use swell::{
         flip::buffers::{DENSITY_EXCESS, FACE_VELOCITY, SOLID_FLUX},
         pressure::{
             blocked,
-            buffers::{BLOCK, COEFFICIENT, DIRECTION, DIRICHLET, FACE_DISPLACEMENT, RHS},
+            buffers::{BLOCK, COEFFICIENT, DIRECTION, DIRICHLET, RHS},
         },
     },
 };
@@ -549,7 +549,7 @@ fn the_correction_carries_the_excess_out() {
         solved.iterations > 0 && solved.residual <= 1e-2,
         "{solved:?}"
     );
-    let displacement = rig.planes(FACE_DISPLACEMENT);
+    let displacement = rig.displacements();
     let none = vec![0.0; rig.case.kind.len()];
     let carried = rig.system.rhs(rig.case.cells(), &displacement, &none);
     let wanted: Vec<f64> = rig

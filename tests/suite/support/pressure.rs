@@ -44,12 +44,12 @@ impl Rig {
             CaseSurface::Voxel => Surface::Voxel,
             CaseSurface::GhostFluid => Surface::GhostFluid,
         };
-        let mut specs = pressure::planned(settings, true, capacity).specs();
+        let mut specs = pressure::planned(settings, capacity).specs();
         specs.extend([
             BRICKS.sized(capacity),
             CELL_KIND.sized(cells),
             FACE_OPEN.sized(3 * cells),
-            FACE_VELOCITY.sized(3 * cells),
+            FACE_VELOCITY.sized(6 * cells),
             SOLID_FLUX.sized(cells),
             LIQUID_DISTANCE.sized(cells),
             DENSITY_EXCESS.sized(cells),
@@ -99,6 +99,11 @@ impl Rig {
         (0..3)
             .flat_map(|axis| all[axis * stride..][..self.case.kind.len()].to_vec())
             .collect()
+    }
+
+    /// The displacements of the density correction.
+    pub fn displacements(&self) -> Vec<f32> {
+        self.planes(face_displacement(self.capacity * CELLS as usize))
     }
 
     /// Sets the right-hand side of each row, by means of the solid flux.

@@ -123,7 +123,7 @@ fn a_precision_takes_its_own_bytes_and_features() {
     let slots = 10;
     let bytes = |precision| {
         let settings = in_precision(precision, 1e-5);
-        let all = planned(&settings, true, slots).specs();
+        let all = planned(&settings, slots).specs();
         let of = |name: &str| all.iter().find(|spec| spec.name == name).unwrap().bytes;
         let total: u64 = all.iter().map(|spec| spec.bytes).sum();
         (of(SOLUTION.name()), of(RHS.name()), total)
