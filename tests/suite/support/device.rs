@@ -1,6 +1,7 @@
 //! A pool of GPU devices that tests share.
 
 use std::{
+    env,
     ops::{Deref, DerefMut},
     sync::{Mutex, PoisonError},
     thread,
@@ -44,11 +45,14 @@ impl Drop for PooledDevice {
     }
 }
 
-/// A device on the best adapter, opened as every command opens it.
+/// A device on the adapter that `SWELL_ADAPTER` names or on the best one, opened as every command
+/// opens it.
 pub fn context() -> PooledDevice {
     let free = FREE.lock().unwrap_or_else(PoisonError::into_inner).pop();
     let clean = free.unwrap_or_else(|| {
-        Context::open(None).expect("tests need a Vulkan adapter; tools/test installs one")
+        let adapter = env::var("SWELL_ADAPTER").ok();
+        Context::open(adapter.as_deref())
+            .expect("tests need a Vulkan adapter; tools/test installs one")
     });
     PooledDevice {
         context: clean.clone(),

@@ -1,6 +1,6 @@
 //! Ripples: waves of deep water, and how they deflect reflections.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, SQRT_2, TAU};
 
 use glam::{DVec2, DVec3};
 use swell::gpu::adapter::Context;
@@ -166,9 +166,17 @@ fn slopes_that_a_pixel_cannot_show_are_in_its_roughness() {
     };
     let (all, none) = total(0.0);
     assert!(none < 1e-9, "{none}");
+    // Vulkan lets sines err by 2⁻¹¹. What is shown has the square of a direction's length, which
+    // errs by 2 √2 of that, and of the fitted amplitude of a cosine, by 2 × 4 / π; what is lost has
+    // neither.
+    let of_sines = (2.0 * SQRT_2 + 8.0 / PI) * context.rounding().unwrap().sine;
     for footprint in [0.05, 0.2] {
         let (sum, lost) = total(footprint);
-        assert!((sum / all - 1.0).abs() < 1e-4, "{footprint}: {sum} {all}");
+        let allowed = 1e-4 + of_sines * lost / all;
+        assert!(
+            (sum / all - 1.0).abs() < allowed,
+            "{footprint}: {sum} {all}"
+        );
         // Control: the lost part is not negligible.
         assert!(lost > 0.02 * all, "{lost} {all}");
     }
