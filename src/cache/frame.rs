@@ -3,11 +3,10 @@
 //! Positions are world coordinates: `float`, or `double` if the scene has its own origin, which is
 //! then recorded in a comment.
 //!
-//! The header goes through ply-rs-bw; the rows are packed here. 200 000 particles, hash included,
-//! are written at 2.2 GB/s, against 0.28 GB/s through the library's property-by-property path; the
-//! disk takes 0.7 GB/s with a flush (2 cores; the ignored test `packed_rows_against_per_property`
-//! prints these figures). Another test compares the packed rows with the library's own, byte for
-//! byte. [`planes`] holds the same content, compressed.
+//! The header goes through ply-rs-bw; the rows are packed here, some while those before are hashed
+//! and written. The ignored test `packed_rows_against_per_property` compares the speed with that of
+//! the library's property-by-property path. Another test compares the packed rows with the
+//! library's own, byte for byte. [`planes`] holds the same content, compressed.
 
 pub mod planes;
 
@@ -19,9 +18,10 @@ use ply_rs_bw::parser::{Parser, Reader};
 use ply_rs_bw::ply::{
     Addable, DefaultElement, ElementDef, Encoding, Header, PropertyDef, PropertyType, ScalarType,
 };
+use rayon::prelude::*;
 
 use super::error::CacheError;
-use swell_domain::particles::Particles;
+use swell_domain::particles::{AT_ONCE, Particles};
 
 /// Columns of every row, in this order, before the attributes; the first three are the position.
 const FIXED: [(&str, ScalarType); 7] = [
@@ -37,9 +37,10 @@ const FIXED: [(&str, ScalarType); 7] = [
 const VALUE: usize = 4;
 /// Prefix of the comment that records the origin.
 const ORIGIN: &str = "origin ";
-/// Rows packed at a time: about half a megabyte, so that writing takes little memory at any frame
-/// size.
-const ROWS_AT_ONCE: usize = 16_384;
+/// Rows packed at a time: about half a megabyte, which the next step finds in a cache.
+const ROWS_AT_ONCE: usize = 1 << 14;
+/// Rows that a thread packs at a time.
+const ROWS_OF_A_TASK: usize = 1 << 11;
 /// Bytes searched for the header. Our headers have a few hundred bytes; the limit keeps a file
 /// without line ends from being read as one line.
 const HEADER_LIMIT: usize = 1 << 16;
@@ -110,7 +111,19 @@ fn is_attribute_name(name: &str) -> bool {
 }
 
 fn first_unordered(ids: &[u32]) -> Option<usize> {
-    ids.windows(2).position(|w| w[0] >= w[1]).map(|i| i + 1)
+    let pairs = ids.par_windows(2).with_min_len(AT_ONCE);
+    pairs.position_first(|w| w[0] >= w[1]).map(|i| i + 1)
+}
+
+/// Length in bytes of the file that [`encode`] writes.
+///
+/// # Errors
+/// A header that cannot be written.
+pub fn length(stamp: &Stamp<'_>, particles: &Particles) -> io::Result<u64> {
+    let names = particles.attributes.keys().map(String::as_str);
+    let head = header_bytes(&header(stamp, particles.len(), names))?;
+    let rows = particles.len() * row_size(stamp.origin, particles.attributes.len());
+    Ok((head.len() + rows) as u64)
 }
 
 /// Writes one frame. The particles must pass [`check`].
@@ -123,14 +136,18 @@ pub fn encode(
     particles: &Particles,
 ) -> io::Result<Written> {
     let names = particles.attributes.keys().map(String::as_str);
-    let mut buffer = header_bytes(&header(stamp, particles.len(), names))?;
+    let head = header_bytes(&header(stamp, particles.len(), names))?;
     let mut out = Counted::new(out);
-    out.write_all(&buffer)?;
-    for first in (0..particles.len()).step_by(ROWS_AT_ONCE) {
+    out.write_all(&head)?;
+    let (mut rows, mut next) = (Vec::new(), Vec::new());
+    for first in (0..=particles.len()).step_by(ROWS_AT_ONCE) {
         let end = particles.len().min(first + ROWS_AT_ONCE);
-        pack(particles, stamp.origin, first..end, &mut buffer);
-        out.write_all(&buffer)?;
+        out.write_beside(&rows, || {
+            pack(particles, stamp.origin, first..end, &mut next)
+        })?;
+        std::mem::swap(&mut rows, &mut next);
     }
+    out.write_beside(&rows, || {})?;
     Ok(out.written())
 }
 
@@ -148,6 +165,19 @@ impl<W: Write> Counted<W> {
             hasher: blake3::Hasher::new(),
             bytes: 0,
         }
+    }
+
+    /// Writes all of `buffer` while other threads hash it and do `work`.
+    fn write_beside(&mut self, buffer: &[u8], work: impl FnOnce() + Send) -> io::Result<()> {
+        self.bytes += buffer.len() as u64;
+        let (out, hasher) = (&mut self.out, &mut self.hasher);
+        rayon::in_place_scope(|scope| {
+            scope.spawn(|_| work());
+            scope.spawn(|_| {
+                hasher.update_rayon(buffer);
+            });
+            out.write_all(buffer)
+        })
     }
 
     fn written(self) -> Written {
@@ -227,23 +257,27 @@ fn pack(particles: &Particles, origin: DVec3, range: std::ops::Range<usize>, row
     let columns: Vec<&[f32]> = particles.attributes.values().map(Vec::as_slice).collect();
     let row_size = row_size(origin, columns.len());
     rows.resize(range.len() * row_size, 0);
-    for (row, i) in rows.chunks_exact_mut(row_size).zip(range) {
-        let ([p, v], id) = (
-            [particles.position[i], particles.velocity[i]],
-            particles.id[i],
-        );
-        let rest = if origin == DVec3::ZERO {
-            put(row, p.map(f32::to_le_bytes))
-        } else {
-            let world = [0, 1, 2].map(|axis| origin[axis] + f64::from(p[axis]));
-            put(row, world.map(f64::to_le_bytes))
-        };
-        let rest = put(rest, v.map(f32::to_le_bytes));
-        let rest = put(rest, [id.to_le_bytes()]);
-        for (place, column) in rest.chunks_exact_mut(VALUE).zip(&columns) {
-            place.copy_from_slice(&column[i].to_le_bytes());
+    let tasks = rows.par_chunks_mut(ROWS_OF_A_TASK * row_size);
+    let firsts = range.into_par_iter().step_by(ROWS_OF_A_TASK);
+    tasks.zip(firsts).for_each(|(rows, first)| {
+        for (row, i) in rows.chunks_exact_mut(row_size).zip(first..) {
+            let ([p, v], id) = (
+                [particles.position[i], particles.velocity[i]],
+                particles.id[i],
+            );
+            let rest = if origin == DVec3::ZERO {
+                put(row, p.map(f32::to_le_bytes))
+            } else {
+                let world = [0, 1, 2].map(|axis| origin[axis] + f64::from(p[axis]));
+                put(row, world.map(f64::to_le_bytes))
+            };
+            let rest = put(rest, v.map(f32::to_le_bytes));
+            let rest = put(rest, [id.to_le_bytes()]);
+            for (place, column) in rest.chunks_exact_mut(VALUE).zip(&columns) {
+                place.copy_from_slice(&column[i].to_le_bytes());
+            }
         }
-    }
+    });
 }
 
 /// Writes values at the start of a row and returns the rest of it.

@@ -56,7 +56,8 @@ impl FileRecord {
     pub(super) fn read(&self, dir: &Path) -> Result<Vec<u8>, CacheError> {
         let path = dir.join(&self.file);
         let content = disk::read_exactly(&path, self.bytes)?;
-        if blake3::hash(&content).to_hex().as_str() != self.blake3 {
+        let hash = blake3::Hasher::new().update_rayon(&content).finalize();
+        if hash.to_hex().as_str() != self.blake3 {
             return Err(CacheError::damaged(
                 path,
                 "its BLAKE3 checksum does not match",

@@ -3,8 +3,12 @@
 use std::collections::BTreeMap;
 
 use glam::{DVec3, Vec3};
+use rayon::prelude::*;
 
 use super::absorber::AbsorberStates;
+
+/// Particles that a thread takes at a time: a task takes longer than to hand it over.
+pub const AT_ONCE: usize = 1 << 14;
 
 /// Particles in the order of their ids.
 ///
@@ -67,10 +71,7 @@ impl Particles {
 
     /// Returns the largest speed, m/s; 0 without particles.
     pub fn max_speed(&self) -> f64 {
-        self.velocity
-            .iter()
-            .map(|v| Vec3::from_array(*v).as_dvec3().length())
-            .fold(0.0, f64::max)
+        max_speed(&self.velocity)
     }
 
     /// Returns how many particles have values that are not finite, and a description of the first;
@@ -78,9 +79,14 @@ impl Particles {
     pub fn first_not_finite(&self, density: Option<&[f64]>) -> Option<(u64, String)> {
         let is_bad = |v: &[f32; 3]| !v.iter().all(|x| x.is_finite());
         let density = |k: usize| density.map_or(1.0, |density| density[k]);
-        let mut bad = (0..self.len()).filter(|&k| {
-            is_bad(&self.position[k]) || is_bad(&self.velocity[k]) || !density(k).is_finite()
-        });
+        let is_bad = |k: &usize| {
+            is_bad(&self.position[*k]) || is_bad(&self.velocity[*k]) || !density(*k).is_finite()
+        };
+        let all = (0..self.len()).into_par_iter().with_min_len(AT_ONCE);
+        if !all.any(|k| is_bad(&k)) {
+            return None;
+        }
+        let mut bad = (0..self.len()).filter(is_bad);
         let k = bad.next()?;
         let first = format!(
             "particle {} first: position {:?}, velocity {:?}, relative density {}",
@@ -91,4 +97,12 @@ impl Particles {
         );
         Some((1 + bad.count() as u64, first))
     }
+}
+
+/// Returns the largest of these speeds, m/s; 0 for none. NaN does not count.
+pub fn max_speed(velocity: &[[f32; 3]]) -> f64 {
+    // The root of the largest square has the bits of the largest root.
+    let square = |v: &[f32; 3]| Vec3::from_array(*v).as_dvec3().length_squared();
+    let all = velocity.par_iter().with_min_len(AT_ONCE);
+    all.map(square).reduce(|| 0.0, f64::max).sqrt()
 }

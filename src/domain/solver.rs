@@ -3,7 +3,7 @@
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-use super::{particles::Particles, probe::Patch, sources::Exchange};
+use super::{absorber::AbsorberStates, particles::Particles, probe::Patch, sources::Exchange};
 
 /// Report on the steps of one output frame.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -181,6 +181,44 @@ impl PassTime {
     }
 }
 
+/// A frame that a solver has computed, still to be read. It may be read on another thread, while
+/// the solver computes the next frame.
+pub struct Unread<E> {
+    /// State of the absorbing walls at the frame's end.
+    pub walls: AbsorberStates,
+    read: Box<Read<E>>,
+}
+
+type Read<E> = dyn FnOnce() -> Result<(Particles, StepReport), E> + Send;
+
+impl<E> Unread<E> {
+    /// A frame that `read` reads, with the walls at its end.
+    pub fn new(
+        walls: AbsorberStates,
+        read: impl FnOnce() -> Result<(Particles, StepReport), E> + Send + 'static,
+    ) -> Self {
+        let read = Box::new(read);
+        Self { walls, read }
+    }
+
+    /// Returns the state and its report.
+    ///
+    /// # Errors
+    /// If the computation has failed.
+    pub fn read(self) -> Result<(Particles, StepReport), E> {
+        (self.read)()
+    }
+
+    /// Converts the error.
+    pub fn map_err<F: From<E>>(self) -> Unread<F>
+    where
+        E: 'static,
+    {
+        let read = self.read;
+        Unread::new(self.walls, move || Ok(read()?))
+    }
+}
+
 /// A solver that advances a state of particles frame by frame.
 ///
 /// The state that it returns contains all that it needs for the next frame.
@@ -194,23 +232,31 @@ pub trait Solver {
     /// If the device fails, or if the state does not fit what the solver was built for.
     fn load(&mut self, frame: u32, particles: &Particles) -> Result<(), Self::Error>;
 
-    /// Computes the next frame.
+    /// Computes the next frame while `watch` observes the ends of substeps, which has no influence
+    /// on the result. After an error, also one of reading the frame, a state has to be loaded.
     ///
     /// # Errors
     /// If the device fails, or if the computation does.
+    fn compute(&mut self, watch: &mut dyn Watch) -> Result<Unread<Self::Error>, Self::Error>;
+
+    /// Computes the next frame and reads it.
+    ///
+    /// # Errors
+    /// As [`Solver::compute`].
     fn advance(&mut self) -> Result<(Particles, StepReport), Self::Error> {
         self.advance_watched(&mut NoWatch)
     }
 
-    /// Same as [`Solver::advance`], with bit-identical results, while `watch` observes the ends
-    /// of substeps.
+    /// Same as [`Solver::advance`] while `watch` observes the ends of substeps.
     ///
     /// # Errors
-    /// As [`Solver::advance`].
+    /// As [`Solver::compute`].
     fn advance_watched(
         &mut self,
         watch: &mut dyn Watch,
-    ) -> Result<(Particles, StepReport), Self::Error>;
+    ) -> Result<(Particles, StepReport), Self::Error> {
+        self.compute(watch)?.read()
+    }
 
     /// Returns the pressure of the last substep at world points, metres, in Pa relative to the air;
     /// `None` where there was no water. Valid only for scenes with a pressure probe: others do not

@@ -14,7 +14,7 @@
 
 use std::{borrow::Cow, marker::PhantomData};
 
-use super::{program::BufferSpec, reflect::Layout};
+use super::{program::BufferSpec, readback::First, reflect::Layout};
 
 /// Scalar type of the components of a value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -321,57 +321,3 @@ impl<T: Element> Windows<T> {
         bytes
     }
 }
-
-/// Selects the first values of a buffer.
-#[derive(Clone, Debug)]
-pub struct First<T> {
-    pub(super) buffer: Buf<T>,
-    pub(super) count: usize,
-}
-
-/// Data read back together: [`Buf::first`] of one buffer, or a tuple of those of several.
-pub trait Readback {
-    /// One vector of values per buffer.
-    type Values;
-
-    /// Returns name, byte offset and length in bytes of each buffer's part.
-    fn spans(&self) -> Vec<(&str, u64, usize)>;
-
-    /// Converts the bytes of each part to values, in the same order.
-    fn values(bytes: &mut dyn Iterator<Item = &[u8]>) -> Self::Values;
-}
-
-impl<T: bytemuck::Pod> Readback for First<T> {
-    type Values = Vec<T>;
-
-    fn spans(&self) -> Vec<(&str, u64, usize)> {
-        let bytes = self.count * size_of::<T>();
-        vec![(self.buffer.name(), self.buffer.offset, bytes)]
-    }
-
-    fn values(bytes: &mut dyn Iterator<Item = &[u8]>) -> Vec<T> {
-        bytemuck::pod_collect_to_vec(bytes.next().unwrap_or_default())
-    }
-}
-
-macro_rules! wanted_tuple {
-    ($($name:ident: $place:tt),+) => {
-        impl<$($name: Readback),+> Readback for ($($name,)+) {
-            type Values = ($($name::Values,)+);
-
-            fn spans(&self) -> Vec<(&str, u64, usize)> {
-                [$(self.$place.spans()),+].concat()
-            }
-
-            fn values(bytes: &mut dyn Iterator<Item = &[u8]>) -> Self::Values {
-                ($($name::values(bytes),)+)
-            }
-        }
-    };
-}
-
-wanted_tuple!(A: 0, B: 1);
-wanted_tuple!(A: 0, B: 1, C: 2);
-wanted_tuple!(A: 0, B: 1, C: 2, D: 3);
-wanted_tuple!(A: 0, B: 1, C: 2, D: 3, E: 4);
-wanted_tuple!(A: 0, B: 1, C: 2, D: 3, E: 4, F: 5);

@@ -12,6 +12,7 @@ pub mod imprecision;
 pub mod operations;
 pub mod program;
 pub mod raster;
+pub mod readback;
 pub mod recording;
 pub mod reflect;
 pub mod rounding;

@@ -11,11 +11,12 @@ use wgpu::{BindGroupLayout, Buffer, BufferUsages, ComputePipeline};
 use super::{
     adapter::{Context, InjectedFault},
     bindings,
-    buffer::{Buf, BufferLayout, Element, Readback, Windows},
+    buffer::{Buf, BufferLayout, Element, Windows},
     edited,
     error::GpuError,
     operations::Counting,
     raster::RasterPass,
+    readback::{Copied, Mapped, Readback, Staging},
     reflect::{Access, Binding, Reflection, Stage, reflect, reflect_at},
     shader::Composed,
 };
@@ -102,6 +103,7 @@ pub struct Program {
     pub(super) rasters: BTreeMap<&'static str, Arc<RasterPass>>,
     pub(super) textures: BTreeMap<String, wgpu::Texture>,
     pub(super) samplers: BTreeMap<&'static str, wgpu::Sampler>,
+    staging: Staging,
 }
 
 impl Program {
@@ -135,6 +137,7 @@ impl Program {
             rasters: BTreeMap::new(),
             textures: BTreeMap::new(),
             samplers: BTreeMap::new(),
+            staging: Staging::default(),
         })
     }
 
@@ -242,43 +245,30 @@ impl Program {
     /// # Errors
     /// [`GpuError::Lost`].
     pub fn download<W: Readback>(&self, wanted: W) -> Result<W::Values, GpuError> {
+        Ok(W::values(self.map(wanted)?.views()))
+    }
+
+    /// Like [`Self::download`], without a copy: the values are those of memory that the device
+    /// wrote. Later submissions do not change them.
+    ///
+    /// # Errors
+    /// [`GpuError::Lost`].
+    pub fn map<W: Readback>(&self, wanted: W) -> Result<Mapped<W>, GpuError> {
         let context = &self.context;
         let mut encoder = context.device.create_command_encoder(&Default::default());
-        let spans = wanted.spans();
-        let staging: Vec<Option<Buffer>> = spans
-            .iter()
-            .map(|&(name, offset, bytes)| {
-                let bytes = bytes.next_multiple_of(4) as u64;
-                (bytes > 0).then(|| {
-                    let buffer = context.device.create_buffer(&wgpu::BufferDescriptor {
-                        label: Some("readback"),
-                        size: bytes,
-                        usage: BufferUsages::COPY_DST | BufferUsages::MAP_READ,
-                        mapped_at_creation: false,
-                    });
-                    encoder.copy_buffer_to_buffer(self.buffer(name), offset, &buffer, 0, bytes);
-                    buffer
-                })
-            })
-            .collect();
-        context.queue.submit([encoder.finish()]);
-        for buffer in staging.iter().flatten() {
-            // A failed mapping is reported when its range is requested.
-            buffer.map_async(wgpu::MapMode::Read, .., |_| {});
+        let mut copies: Vec<Option<Copied>> = Vec::new();
+        for (name, offset, bytes) in wanted.spans() {
+            copies.push((bytes > 0).then(|| {
+                let copy = self.staging.copy(&context.device, bytes);
+                let (source, length) = (self.buffer(name), bytes.next_multiple_of(4) as u64);
+                encoder.copy_buffer_to_buffer(source, offset, copy.buffer(), 0, length);
+                copy
+            }));
         }
+        context.queue.submit([encoder.finish()]);
+        copies.iter().flatten().for_each(Copied::request);
         context.wait()?;
-        let views = staging
-            .iter()
-            .map(|buffer| buffer.as_ref().map(|buffer| buffer.get_mapped_range(..)));
-        let views = views
-            .map(Option::transpose)
-            .collect::<Result<Vec<_>, _>>()
-            .map_err(|error| GpuError::Lost(error.to_string()))?;
-        let mut bytes = views
-            .iter()
-            .zip(&spans)
-            .map(|(view, &(_, _, bytes))| view.as_ref().map_or(&[][..], |view| &view[..bytes]));
-        Ok(W::values(&mut bytes))
+        Mapped::new(copies)
     }
 }
 

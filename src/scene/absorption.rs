@@ -84,6 +84,11 @@ impl Scene {
         state.walls = self.absorbers_after(state, self.shot.time(frame));
     }
 
+    /// Returns whether a wall absorbs: [`Self::update_absorbers`] then needs the water.
+    pub fn has_absorbers(&self) -> bool {
+        self.wave_makers.iter().any(|it| it.absorption.is_some())
+    }
+
     fn absorbers_after(&self, state: &Particles, time: f64) -> AbsorberStates {
         let mut absorbers = AbsorberStates::default();
         let walls = self.walls(&state.walls, time);

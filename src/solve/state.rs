@@ -1,10 +1,17 @@
 //! Transfer of a particle state to and from the device, and checks on it.
 
-use glam::Vec3;
+use std::sync::{
+    Arc,
+    atomic::{AtomicU32, Ordering},
+};
+
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
 
 use swell_domain::{
+    absorber::AbsorberStates,
     budget::{Breach, Watched},
-    particles::Particles,
+    particles::{AT_ONCE, Particles},
 };
 use swell_gpu::program::Program;
 use swell_scene::Scene;
@@ -37,80 +44,157 @@ pub(super) fn upload(program: &Program, scene: &Scene, state: &Particles) {
         let x = (Vec3::from_array(*p).as_dvec3() - origin).as_vec3();
         x.to_array()
     };
-    let position: Vec<[f32; 3]> = state.position.iter().map(local).collect();
+    let position = state.position.par_iter().with_min_len(AT_ONCE);
+    let position: Vec<[f32; 3]> = position.map(local).collect();
     program.upload(POSITION, 0, &position);
     program.upload(VELOCITY, 0, &state.velocity);
     program.upload(ID, 0, &state.id);
 }
 
-/// Writes downloaded positions and velocities, which come in any order, into the slots given by
-/// their ids.
-pub(super) fn take_over(
-    state: &mut Particles,
-    scene: &Scene,
-    slot_of: &impl Fn(u32) -> usize,
-    id: &[u32],
-    position: &[[f32; 3]],
-    velocity: &[[f32; 3]],
-) {
-    let origin = scene.domain.min;
-    for (k, &id) in id.iter().enumerate() {
-        let slot = slot_of(id);
-        let world = origin + Vec3::from_array(position[k]).as_dvec3();
-        state.position[slot] = world.as_vec3().to_array();
-        state.velocity[slot] = velocity[k];
+/// Ids of a loaded state, ascending, and the index of each in it.
+pub(super) struct Ids {
+    all: Vec<u32>,
+    /// Index of each id up to the last; `None` where the ids count from 0.
+    index: Option<Vec<u32>>,
+}
+
+/// No index.
+const NONE: u32 = u32::MAX;
+
+impl Ids {
+    pub(super) fn new(all: &[u32]) -> Self {
+        let top = all.last().map_or(0, |&id| id as usize + 1);
+        let index = (top > all.len()).then(|| {
+            let mut index = vec![NONE; top];
+            for (k, &id) in (0..).zip(all) {
+                index[id as usize] = k;
+            }
+            index
+        });
+        let all = all.to_vec();
+        Self { all, index }
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.all.len()
+    }
+
+    pub(super) fn all(&self) -> &[u32] {
+        &self.all
+    }
+
+    fn index(&self, id: u32) -> u32 {
+        match &self.index {
+            Some(index) => index.get(id as usize).copied().unwrap_or(NONE),
+            None => id,
+        }
+    }
+
+    /// Returns for each id of the state where it is among the downloaded ones.
+    ///
+    /// # Errors
+    /// Returns the breach of `frame` if the downloaded ids are not a permutation of the state's.
+    pub(super) fn places(&self, frame: u32, found: &[u32]) -> Result<Places, Breach> {
+        let places: Vec<AtomicU32> = self.all.iter().map(|_| AtomicU32::new(NONE)).collect();
+        let found = found.par_iter().with_min_len(AT_ONCE).enumerate();
+        found.for_each(|(k, id)| {
+            if let Some(place) = places.get(self.index(*id) as usize) {
+                place.store(k as u32, Ordering::Relaxed);
+            }
+        });
+        // As many ids as places: each id that is unknown or repeated leaves a place empty.
+        let all = places.par_iter().with_min_len(AT_ONCE);
+        let is_empty = |place: &&AtomicU32| place.load(Ordering::Relaxed) == NONE;
+        match all.filter(is_empty).count() {
+            0 => Ok(Places(places)),
+            wrong => Err(Breach::new(frame, Watched::Particles, wrong as f64, 0.0)),
+        }
     }
 }
 
-/// Downloads current positions and velocities, in the order of `state` and in world coordinates.
-/// `state` is the frame's initial state; its attributes are not copied.
-pub(super) fn look(
-    program: &Program,
-    scene: &Scene,
-    state: &Particles,
-    frame: u32,
-) -> Result<Particles, SolveError> {
-    let n = state.len();
-    let wanted = (POSITION.first(n), VELOCITY.first(n), ID.first(n));
-    let (position, velocity, id) = program.download(wanted)?;
-    check_ids(frame, &state.id, &id)?;
-    let mut now = Particles {
-        position: vec![[0.0; 3]; n],
-        velocity: vec![[0.0; 3]; n],
-        id: state.id.clone(),
-        ..Particles::default()
-    };
-    let slot_of = slots_by_id(&state.id);
-    take_over(&mut now, scene, &slot_of, &id, &position, &velocity);
-    Ok(now)
+/// Indices into what was downloaded, in the order of the state.
+pub(super) struct Places(Vec<AtomicU32>);
+
+impl Places {
+    /// Computes a value from each index.
+    pub(super) fn collect<T: Send>(&self, value: impl Fn(usize) -> T + Sync) -> Vec<T> {
+        let all = self.0.par_iter().with_min_len(AT_ONCE);
+        all.map(|place| value(place.load(Ordering::Relaxed) as usize))
+            .collect()
+    }
 }
 
-/// Returns a map from id to index in the state.
-pub(super) fn slots_by_id(ids: &[u32]) -> impl Fn(u32) -> usize + use<> {
-    let top = ids.iter().max().map_or(0, |&id| id as usize + 1);
-    let mut slots = vec![0; top];
-    for (slot, &id) in ids.iter().enumerate() {
-        slots[id as usize] = slot;
-    }
-    move |id| slots[id as usize]
+/// What a solver keeps on the host of its state, besides what it computes of it.
+#[derive(Clone)]
+pub(super) struct Carried {
+    pub(super) ids: Arc<Ids>,
+    /// State of the absorbing walls.
+    pub(super) walls: AbsorberStates,
+    /// Length of the last substep, seconds; 0 before the first.
+    pub(super) substep: f64,
 }
 
-/// Checks that the downloaded ids are a permutation of the uploaded ones, before they are used as
-/// indices.
-pub(super) fn check_ids(frame: u32, sent: &[u32], found: &[u32]) -> Result<(), Breach> {
-    let top = sent.iter().max().map_or(0, |&id| id as usize + 1);
-    let mut is_missing = vec![false; top];
-    for &id in sent {
-        is_missing[id as usize] = true;
+impl Carried {
+    pub(super) fn new(state: &Particles) -> Self {
+        Self {
+            ids: Arc::new(Ids::new(&state.id)),
+            walls: state.walls,
+            substep: state.substep,
+        }
     }
-    let is_wrong = |&&id: &&u32| match is_missing.get_mut(id as usize) {
-        Some(missing) => !std::mem::replace(missing, false),
-        None => true,
-    };
-    match found.iter().filter(is_wrong).count() {
-        0 => Ok(()),
-        wrong => Err(Breach::new(frame, Watched::Particles, wrong as f64, 0.0)),
+
+    pub(super) fn len(&self) -> usize {
+        self.ids.len()
     }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Returns the state with downloaded positions, relative to the domain's minimum corner, and
+    /// velocities; without attributes.
+    pub(super) fn state(
+        &self,
+        scene: &Scene,
+        places: &Places,
+        position: &[[f32; 3]],
+        velocity: &[[f32; 3]],
+    ) -> Particles {
+        let origin = scene.domain.min;
+        let world = |k: usize| {
+            let x = origin + Vec3::from_array(position[k]).as_dvec3();
+            x.as_vec3().to_array()
+        };
+        Particles {
+            position: places.collect(world),
+            velocity: places.collect(|k| velocity[k]),
+            id: self.ids.all().to_vec(),
+            walls: self.walls,
+            substep: self.substep,
+            ..Particles::default()
+        }
+    }
+
+    /// Downloads current positions and velocities, in the order of the state and in world
+    /// coordinates; without attributes.
+    pub(super) fn look(
+        &self,
+        program: &Program,
+        scene: &Scene,
+        frame: u32,
+    ) -> Result<Particles, SolveError> {
+        let n = self.len();
+        let found = program.map((POSITION.first(n), VELOCITY.first(n), ID.first(n)))?;
+        let (position, velocity, id) = found.views();
+        let places = self.ids.places(frame, id)?;
+        Ok(self.state(scene, &places, position, velocity))
+    }
+}
+
+/// Returns whether the next frame depends on the frame's state as it is written: world positions
+/// are rounded, and absorbing walls follow the water.
+pub(super) fn is_awaited(scene: &Scene) -> bool {
+    scene.domain.min != DVec3::ZERO || scene.has_absorbers()
 }
 
 /// Checks that a state is finite. `density` holds one relative density per particle, in the state's

@@ -86,7 +86,7 @@ pub enum Event {
         frame: u32,
         /// Report of its substeps.
         report: StepReport,
-        /// Wall-clock time it took, seconds.
+        /// Wall-clock time since the frame before was done, or since the run began, seconds.
         seconds: f64,
     },
     /// The frames computed by this run are on the disk. Also sent before the error if a later frame
@@ -161,7 +161,7 @@ pub fn run(
     drive.load_watched(&start.particles, clock.frame, &state)?;
     drive.go_on_with(clock.next_id);
     let mut frames = Frames::new(request, plan, writer, clock);
-    let ended = drive.run(plan.last, stop, |step| frames.add(step, tell));
+    let ended = drive.run_ahead(plan.last, stop, |step| frames.add(step, tell));
     let (end, broken) = match ended {
         Ok(end) => (end, None),
         Err(BakeError::Solve(error)) => (End::Done, Some(error)),

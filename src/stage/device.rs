@@ -10,7 +10,7 @@ use glam::DVec3;
 use swell_domain::{
     budget::Breach,
     particles::Particles,
-    solver::{PassTime, Solver, StepReport, Watch},
+    solver::{PassTime, Solver, Unread, Watch},
 };
 use swell_gpu::adapter::{Context, Needs};
 use swell_reference::ReferenceError;
@@ -249,10 +249,13 @@ pub fn needs(scene: &Scene) -> Needs {
     }
 }
 
+/// A solver of either method on either device.
+pub type AnySolver = dyn Solver<Error = SolverError> + Send;
+
 /// A scene's solver, and its plan.
 pub struct Built {
     /// The solver, without a state yet.
-    pub solver: Box<dyn Solver<Error = SolverError>>,
+    pub solver: Box<AnySolver>,
     /// Plan of the passes and buffers on the GPU; `None` on the CPU.
     pub plan: Option<Plan>,
 }
@@ -319,7 +322,7 @@ impl Opened {
         let boundary = &start.boundary;
         let by_method = &scene.by_method();
         let Self::Gpu(context) = self else {
-            let solver: Box<dyn Solver<Error = SolverError>> = match by_method {
+            let solver: Box<AnySolver> = match by_method {
                 ByMethod::Pbf(scene) => {
                     Box::new(Unified(swell_reference::pbf::Pbf::new(scene, boundary)))
                 }
@@ -331,7 +334,7 @@ impl Opened {
         };
         let plan = start.plan(scene, device_limits(context));
         let planned = Some(start.shown_plan(scene, device_limits(context)));
-        let solver: Box<dyn Solver<Error = SolverError>> = match by_method {
+        let solver: Box<AnySolver> = match by_method {
             ByMethod::Pbf(scene) => {
                 Box::new(Unified(Pbf::new(context, scene, plan, boundary, is_timed)?))
             }
@@ -351,6 +354,7 @@ struct Unified<S>(S);
 
 impl<S: Solver> Solver for Unified<S>
 where
+    S::Error: 'static,
     SolverError: From<S::Error>,
 {
     type Error = SolverError;
@@ -359,11 +363,8 @@ where
         Ok(self.0.load(frame, particles)?)
     }
 
-    fn advance_watched(
-        &mut self,
-        watch: &mut dyn Watch,
-    ) -> Result<(Particles, StepReport), SolverError> {
-        Ok(self.0.advance_watched(watch)?)
+    fn compute(&mut self, watch: &mut dyn Watch) -> Result<Unread<SolverError>, SolverError> {
+        Ok(self.0.compute(watch)?.map_err())
     }
 
     fn pressures(&self, points: &[DVec3]) -> Result<Vec<Option<f64>>, SolverError> {

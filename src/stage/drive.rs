@@ -2,7 +2,10 @@
 //! experiments use it.
 
 use std::{
-    sync::atomic::{AtomicBool, Ordering},
+    sync::{
+        atomic::{AtomicBool, Ordering},
+        mpsc::{SyncSender, sync_channel},
+    },
     time::Instant,
 };
 
@@ -13,14 +16,14 @@ use swell_domain::{
     absorber::AbsorberStates,
     particles::Particles,
     signed_distance::SignedDistance,
-    solver::{PassTime, Solver, StepReport},
+    solver::{NoWatch, PassTime, StepReport, Unread},
     sources::{Exchange, Solids, Sources},
 };
 use swell_scene::Scene;
 use swell_solve::plan::{Plan, Share};
 
 use super::{
-    device::{Built, Opened, SolverError},
+    device::{AnySolver, Built, Opened, SolverError},
     prepare::Start,
     probes::{Recorder, is_recorded},
     watch::Watch,
@@ -33,19 +36,30 @@ pub struct Drive<'a> {
     sources: Option<Exchanged>,
     /// Least id that an entering particle may have.
     first_id: u32,
-    solver: Box<dyn Solver<Error = SolverError>>,
     /// Plan of the passes and buffers on the GPU; `None` on the CPU.
     plan: Option<Plan>,
+    /// Id of the next particle to enter.
+    next_id: u32,
+    ahead: Ahead<'a>,
+    behind: Behind<'a>,
+}
+
+/// Computes frames.
+struct Ahead<'a> {
+    scene: &'a Scene,
+    solver: Box<AnySolver>,
     frame: u32,
     /// State of the absorbing walls after that frame.
     walls: AbsorberStates,
-    /// Id of the next particle to enter.
-    next_id: u32,
-    watch: Option<Watch<'a>>,
     /// Positions at which pressures are read after each frame, metres.
     pressure_points: Vec<DVec3>,
     /// Whether probes sample at substeps.
     is_recorded: bool,
+}
+
+/// Reads and checks computed frames, possibly while the next one is computed.
+struct Behind<'a> {
+    watch: Option<Watch<'a>>,
     /// Report of the last frame that the solver completed, even if that frame then exceeded a
     /// budget.
     report: Option<StepReport>,
@@ -94,6 +108,15 @@ pub struct Step {
     pub seconds: f64,
 }
 
+/// A frame that the solver has computed, still to be read and checked.
+struct Computed {
+    frame: u32,
+    unread: Unread<SolverError>,
+    pressures: Vec<Option<f64>>,
+    looks: ProbeValues,
+    begin: Instant,
+}
+
 /// How a run without an error ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum End {
@@ -131,15 +154,20 @@ impl<'a> Drive<'a> {
             scene,
             sources: Exchanged::of(start),
             first_id: next_after(&start.particles),
-            solver,
             plan,
-            frame: 0,
-            walls: AbsorberStates::default(),
             next_id: 0,
-            watch: None,
-            pressure_points: Vec::new(),
-            is_recorded: false,
-            report: None,
+            ahead: Ahead {
+                scene,
+                solver,
+                frame: 0,
+                walls: AbsorberStates::default(),
+                pressure_points: Vec::new(),
+                is_recorded: false,
+            },
+            behind: Behind {
+                watch: None,
+                report: None,
+            },
         })
     }
 
@@ -149,9 +177,9 @@ impl<'a> Drive<'a> {
     /// # Errors
     /// A device error; a state that does not belong to the scene.
     pub fn load(&mut self, frame: u32, state: &Particles) -> Result<(), SolverError> {
-        self.solver.load(frame, state)?;
-        (self.frame, self.watch) = (frame, None);
-        self.walls = state.walls;
+        self.ahead.solver.load(frame, state)?;
+        (self.ahead.frame, self.behind.watch) = (frame, None);
+        self.ahead.walls = state.walls;
         self.next_id = self.first_id.max(next_after(state));
         Ok(())
     }
@@ -170,20 +198,20 @@ impl<'a> Drive<'a> {
         state: &Particles,
     ) -> Result<(), SolverError> {
         self.load(frame, state)?;
-        self.watch = Some(Watch::new(self.scene, start, frame, state));
+        self.behind.watch = Some(Watch::new(self.scene, start, frame, state));
         Ok(())
     }
 
     /// Reads pressures after each frame if the scene has pressure probes.
     pub fn with_pressures(mut self) -> Self {
-        self.pressure_points = self.scene.pressure_points();
+        self.ahead.pressure_points = self.scene.pressure_points();
         self
     }
 
     /// Additionally lets probes that ask for it sample during a frame.
     pub fn with_probes(mut self) -> Self {
         let mut probes = self.scene.probes.iter();
-        self.is_recorded = probes.any(is_recorded);
+        self.ahead.is_recorded = probes.any(is_recorded);
         self.with_pressures()
     }
 
@@ -193,34 +221,11 @@ impl<'a> Drive<'a> {
     /// A device error, invalid numbers, or an exceeded budget if budgets are checked.
     pub fn advance(&mut self) -> Result<Step, SolverError> {
         let begin = Instant::now();
-        let end = self.scene.shot.time(self.frame + 1);
-        let mut recorder = Recorder::new(self.scene, self.walls, end);
-        let (mut particles, mut report) = match self.is_recorded {
-            true => self.solver.advance_watched(&mut recorder)?,
-            false => self.solver.advance()?,
-        };
-        let watched = match &mut self.watch {
-            Some(watch) => watch.look(&particles, &mut report),
-            None => Ok(()),
-        };
-        self.report = Some(report.clone());
-        watched?;
-        let pressures = match self.pressure_points[..] {
-            [] => Vec::new(),
-            _ => self.solver.pressures(&self.pressure_points)?,
-        };
-        self.frame += 1;
-        self.walls = particles.walls;
-        report.exchange = self.exchange(&mut particles)?;
-        Ok(Step {
-            frame: self.frame,
-            particles,
-            next_id: self.sources.as_ref().map(|_| self.next_id),
-            report,
-            pressures,
-            looks: recorder.into_values(),
-            seconds: begin.elapsed().as_secs_f64(),
-        })
+        let mut step = self.behind.read(self.ahead.compute()?)?;
+        step.report.exchange = self.exchange(&mut step.particles)?;
+        step.next_id = self.sources.as_ref().map(|_| self.next_id);
+        step.seconds = begin.elapsed().as_secs_f64();
+        Ok(step)
     }
 
     /// Runs emitters and drains at the end of the frame, if the scene has any.
@@ -234,15 +239,14 @@ impl<'a> Drive<'a> {
             moving: &it.moving,
             pose: &|index, seconds| scene.moving_solids[index].pose(seconds),
         };
-        let next_id = &mut self.next_id;
-        let exchange = it.sources.exchange(self.frame, &solids, particles, next_id);
-        if self.watch.is_some() {
-            let budget = &self.scene.budget;
-            budget.check_count(self.frame, particles.len())?;
+        let (frame, next_id) = (self.ahead.frame, &mut self.next_id);
+        let exchange = it.sources.exchange(frame, &solids, particles, next_id);
+        if self.behind.watch.is_some() {
+            scene.budget.check_count(frame, particles.len())?;
         }
         if exchange.entered > 0 || exchange.left > 0 {
-            self.solver.load(self.frame, particles)?;
-            if let Some(watch) = &mut self.watch {
+            self.ahead.solver.load(frame, particles)?;
+            if let Some(watch) = &mut self.behind.watch {
                 watch.take_over(particles);
             }
         }
@@ -260,7 +264,7 @@ impl<'a> Drive<'a> {
         stop: &AtomicBool,
         mut observe: impl FnMut(Step) -> Result<(), E>,
     ) -> Result<End, E> {
-        while self.frame < last {
+        while self.ahead.frame < last {
             if stop.load(Ordering::Relaxed) {
                 return Ok(End::Stopped);
             }
@@ -269,10 +273,43 @@ impl<'a> Drive<'a> {
         Ok(End::Done)
     }
 
+    /// Like [`Self::run`], but each frame is read, checked and observed while the solver computes
+    /// the next one, at most. Frame by frame where water enters or leaves, because that changes
+    /// what the next frame begins with.
+    ///
+    /// # Errors
+    /// Those of [`Drive::run`], at the same frame; the solver ends with the frame that it is
+    /// computing.
+    pub(super) fn run_ahead<E: From<SolverError>>(
+        &mut self,
+        last: u32,
+        stop: &AtomicBool,
+        mut observe: impl FnMut(Step) -> Result<(), E>,
+    ) -> Result<End, E> {
+        if self.sources.is_some() {
+            return self.run(last, stop, observe);
+        }
+        let (ahead, behind) = (&mut self.ahead, &mut self.behind);
+        // Without a queue: the solver waits where the frame before is not read yet.
+        let (sender, computed) = sync_channel(0);
+        std::thread::scope(|scope| {
+            let solver = std::thread::Builder::new()
+                .name("solver".to_owned())
+                .spawn_scoped(scope, move || ahead.run(last, stop, &sender))
+                .expect("the system has a thread to spare");
+            for computed in computed {
+                observe(behind.read(computed?)?)?;
+            }
+            Ok(solver
+                .join()
+                .unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
+        })
+    }
+
     /// Report of the last frame that the solver completed, even if that frame then exceeded a
     /// budget.
     pub(super) fn report(&self) -> Option<&StepReport> {
-        self.report.as_ref()
+        self.behind.report.as_ref()
     }
 
     /// GPU memory in total and for neighbour lists, bytes; `None` on the CPU.
@@ -288,7 +325,73 @@ impl<'a> Drive<'a> {
 
     /// Times of passes, if measured.
     pub fn timings(&self) -> Vec<PassTime> {
-        self.solver.timings()
+        self.ahead.solver.timings()
+    }
+}
+
+impl Ahead<'_> {
+    /// Computes frames up to `last` for `reader`, until that hangs up; setting `stop` ends it
+    /// between two frames.
+    fn run(
+        &mut self,
+        last: u32,
+        stop: &AtomicBool,
+        reader: &SyncSender<Result<Computed, SolverError>>,
+    ) -> End {
+        while self.frame < last {
+            if stop.load(Ordering::Relaxed) {
+                return End::Stopped;
+            }
+            let computed = self.compute();
+            let is_last = computed.is_err();
+            if reader.send(computed).is_err() || is_last {
+                break;
+            }
+        }
+        End::Done
+    }
+
+    fn compute(&mut self) -> Result<Computed, SolverError> {
+        let begin = Instant::now();
+        let end = self.scene.shot.time(self.frame + 1);
+        let mut recorder = Recorder::new(self.scene, self.walls, end);
+        let unread = match self.is_recorded {
+            true => self.solver.compute(&mut recorder)?,
+            false => self.solver.compute(&mut NoWatch)?,
+        };
+        self.frame += 1;
+        self.walls = unread.walls;
+        Ok(Computed {
+            frame: self.frame,
+            unread,
+            pressures: match self.pressure_points[..] {
+                [] => Vec::new(),
+                _ => self.solver.pressures(&self.pressure_points)?,
+            },
+            looks: recorder.into_values(),
+            begin,
+        })
+    }
+}
+
+impl Behind<'_> {
+    fn read(&mut self, computed: Computed) -> Result<Step, SolverError> {
+        let (particles, mut report) = computed.unread.read()?;
+        let watched = match &mut self.watch {
+            Some(watch) => watch.look(&particles, &mut report),
+            None => Ok(()),
+        };
+        self.report = Some(report.clone());
+        watched?;
+        Ok(Step {
+            frame: computed.frame,
+            particles,
+            next_id: None,
+            report,
+            pressures: computed.pressures,
+            looks: computed.looks,
+            seconds: computed.begin.elapsed().as_secs_f64(),
+        })
     }
 }
 

@@ -1,10 +1,11 @@
 //! Checks a bake's budgets at the end of each frame, the same for every solver.
 
 use glam::Vec3;
+use rayon::prelude::*;
 
 use swell_domain::{
     budget::{Breach, Watched},
-    particles::Particles,
+    particles::{AT_ONCE, Particles},
     probe::volume,
     solver::StepReport,
 };
@@ -95,9 +96,16 @@ impl<'a> Watch<'a> {
         let farthest = domain.min.abs().max(domain.max.abs()).max_element();
         let room = domain.grown(ROUNDINGS * f64::from(f32::EPSILON) * farthest);
         let is_outside = |x: &&[f32; 3]| !room.contains(Vec3::from_array(**x).as_dvec3());
-        let outside = particles.position.iter().filter(is_outside).count();
-        let pairs = particles.id.iter().zip(&self.id);
-        let lost = self.id.len().abs_diff(particles.len()) + pairs.filter(|(a, b)| a != b).count();
+        let position = particles.position.par_iter().with_min_len(AT_ONCE);
+        let outside = position.filter(is_outside).count();
+        let lost = match particles.id == self.id {
+            true => 0,
+            false => {
+                let pairs = particles.id.iter().zip(&self.id);
+                let fewer = self.id.len().abs_diff(particles.len());
+                fewer + pairs.filter(|(a, b)| a != b).count()
+            }
+        };
         if outside + lost == 0 {
             return Ok(());
         }

@@ -13,6 +13,8 @@ mod differences;
 use std::io::{self, Read as _, Write};
 use std::path::Path;
 
+use rayon::prelude::*;
+
 use super::{
     Counted, HEADER_LIMIT, Head, Stamp, Unpacked, Written, header, header_bytes, pack, read_head,
     row_size,
@@ -79,22 +81,35 @@ fn encode_as(
     let length = head.len() + particles.len() * row_size;
     stream.set_pledged_src_size(Some(length as u64))?;
     stream.write_all(&head)?;
-    let (mut rows, mut planes) = (Vec::new(), Vec::new());
-    for first in (0..particles.len()).step_by(ROWS) {
-        let end = particles.len().min(first + ROWS);
-        pack(particles, stamp.origin, first..end, &mut rows);
-        if content == Content::Differences {
-            differences::take(&mut rows, stamp.origin, row_size);
-        }
-        turn(&rows, row_size, &mut planes);
-        for plane in planes.chunks_exact(end - first) {
-            stream.write_all(plane)?;
-            // Ends a Zstandard block, so that the next plane has its own statistics.
-            stream.flush()?;
-        }
+    let (mut rows, mut planes, mut next) = (Vec::new(), Vec::new(), Vec::new());
+    for first in (0..=particles.len()).step_by(ROWS) {
+        let range = first..particles.len().min(first + ROWS);
+        rayon::in_place_scope(|scope| {
+            scope.spawn(|_| {
+                pack(particles, stamp.origin, range, &mut rows);
+                if content == Content::Differences {
+                    differences::take(&mut rows, stamp.origin, row_size);
+                }
+                turn(&rows, row_size, &mut next);
+            });
+            compress(&mut stream, &planes, row_size)
+        })?;
+        std::mem::swap(&mut planes, &mut next);
     }
+    compress(&mut stream, &planes, row_size)?;
     stream.finish()?;
     Ok(counted.written())
+}
+
+/// Compresses a block of `count` planes.
+fn compress(stream: &mut impl Write, planes: &[u8], count: usize) -> io::Result<()> {
+    let rows = planes.len() / count;
+    for plane in planes.chunks_exact(rows.max(1)) {
+        stream.write_all(plane)?;
+        // Ends a Zstandard block, so that the next plane has its own statistics.
+        stream.flush()?;
+    }
+    Ok(())
 }
 
 /// Reads one frame. Memory grows only with the data found, not with what the header promises.
@@ -179,13 +194,14 @@ fn read_blocks(
 fn turn(table: &[u8], width: usize, turned: &mut Vec<u8>) {
     let height = table.len() / width;
     turned.resize(table.len(), 0);
-    for (column, place) in turned.chunks_exact_mut(height).enumerate() {
+    let columns = turned.par_chunks_exact_mut(height.max(1)).enumerate();
+    columns.for_each(|(column, place)| {
         let bytes = table[column..].iter().step_by(width);
         place
             .iter_mut()
             .zip(bytes)
             .for_each(|(to, from)| *to = *from);
-    }
+    });
 }
 
 #[cfg(test)]

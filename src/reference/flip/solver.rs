@@ -19,7 +19,7 @@ use swell_domain::{
     gauge::Gauge,
     particles::Particles,
     poisson::FLUID,
-    solver::{Observed, PassTime, Projection, Solver, Span, StepReport, Watch},
+    solver::{Observed, PassTime, Projection, Solver, Span, StepReport, Unread, Watch},
 };
 use swell_scene::{
     FlipScene,
@@ -534,10 +534,7 @@ impl Solver for Flip {
         Ok(())
     }
 
-    fn advance_watched(
-        &mut self,
-        watch: &mut dyn Watch,
-    ) -> Result<(Particles, StepReport), ReferenceError> {
+    fn compute(&mut self, watch: &mut dyn Watch) -> Result<Unread<ReferenceError>, ReferenceError> {
         let mut cloud = self.cloud();
         let (done, density) = if self.state.is_empty() {
             let report = self.model.scene.report(&self.state, [].into_iter());
@@ -568,7 +565,8 @@ impl Solver for Flip {
             densest_at: done.densest_at,
             ..self.model.scene.report(&self.state, density.into_iter())
         };
-        Ok((self.state.clone(), report))
+        let state = self.state.clone();
+        Ok(Unread::new(state.walls, move || Ok((state, report))))
     }
 
     /// Returns the projection's pressures, interpolated between cell centres, Pa; `None` outside

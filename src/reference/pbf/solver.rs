@@ -18,7 +18,7 @@ use swell_domain::{
     particles::Particles,
     pbf::chebyshev_factors,
     probe::fitted,
-    solver::{Observed, PassTime, Projection, Solver, Span, StepReport, Watch},
+    solver::{Observed, PassTime, Projection, Solver, Span, StepReport, Unread, Watch},
 };
 use swell_scene::{Iteration, PbfScene, Scene, Stop, step::projected_substep};
 
@@ -407,10 +407,7 @@ impl Solver for Pbf {
         Ok(())
     }
 
-    fn advance_watched(
-        &mut self,
-        watch: &mut dyn Watch,
-    ) -> Result<(Particles, StepReport), ReferenceError> {
+    fn compute(&mut self, watch: &mut dyn Watch) -> Result<Unread<ReferenceError>, ReferenceError> {
         let frame = self.frame + 1;
         let length = self.scene.shot.frame_seconds();
         let start = f64::from(self.frame) * length;
@@ -462,7 +459,8 @@ impl Solver for Pbf {
             densest_at: self.scene.densest_particle(&self.state, &density),
             ..self.scene.report(&self.state, density.into_iter())
         };
-        Ok((self.state.clone(), report))
+        let state = self.state.clone();
+        Ok(Unread::new(state.walls, move || Ok((state, report))))
     }
 
     /// Computes pressures from Σ λ by

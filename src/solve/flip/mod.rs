@@ -7,6 +7,7 @@
 
 pub mod buffers;
 mod capacity;
+mod ended;
 pub(super) mod plan;
 mod record;
 mod step;
@@ -14,9 +15,12 @@ mod totals;
 mod velocities;
 mod watch;
 
+use std::sync::Arc;
+
 use glam::DVec3;
 
 use swell_domain::{
+    absorber::AbsorberStates,
     boundary::Boundary,
     bounds::Bounds,
     bricks::{Bricks, CELLS, table_dims},
@@ -24,7 +28,7 @@ use swell_domain::{
     flip::{layers, stored_cells},
     particles::Particles,
     shores::Shores,
-    solver::{PassTime, Solver, StepReport, Watch},
+    solver::{PassTime, Solver, StepReport, Unread, Watch},
     substep::SubstepChoice,
 };
 use swell_gpu::{
@@ -43,12 +47,13 @@ use super::{
     params::Counters,
     plan::{Counts, Plan},
     pressure::{self, PressureSolver},
-    state::{check_finite, check_ids, is_other_count, slots_by_id, take_over, upload},
+    state::{Carried, is_awaited, is_other_count, upload},
     trace::{Begun, Observe, Run, Span, TraceFrame, trace},
 };
 use buffers::*;
 pub use capacity::capacity;
 use capacity::{bricks, capacity_of, no_water, whole_frame};
+use ended::{Ended, ReadFrame};
 pub(super) use record::over_cells;
 use record::{Commands, Recordings, groups, numbers};
 pub(super) use totals::FrameTotals;
@@ -57,13 +62,13 @@ pub(super) use totals::FrameTotals;
 pub struct Flip {
     program: Program,
     plan: Plan,
-    scene: FlipScene,
+    scene: Arc<FlipScene>,
     movers: Option<Movers>,
     shores: Shores,
     recordings: Recordings,
     pressure: PressureSolver,
     timer: Option<Timer>,
-    state: Particles,
+    state: Carried,
     frame: u32,
     /// Bricks of the last substep.
     bricks: Bricks,
@@ -101,7 +106,7 @@ impl Flip {
         upload_constants(&program, &plan, scene);
         let bricks = bricks(scene, plan.grid_dims, &no_water(scene, plan.grid_dims), 0);
         let frame = whole_frame(scene);
-        let state = Particles::default();
+        let state = Carried::new(&Particles::default());
         let params = step::params(scene, &plan, &state.walls, &bricks, &frame);
         program.upload(PARAMS, 0, &[params]);
         Ok(Self {
@@ -113,7 +118,7 @@ impl Flip {
             kick: frame.kick,
             program,
             plan,
-            scene: scene.clone(),
+            scene: Arc::new(scene.clone()),
             movers: Movers::of(boundary, scene),
             shores: Shores::new(boundary, scene.domain.min, scene.settings().cell_size)
                 .joined(scene.periodic),
@@ -389,9 +394,9 @@ impl Flip {
         Ok(sums.into_iter().map(f64::from).sum())
     }
 
-    /// Copies the state of absorbing walls from `state`.
-    pub(crate) fn take_absorbers(&mut self, state: &Particles) {
-        self.state.walls = state.walls;
+    /// Sets the state of absorbing walls.
+    pub(crate) fn take_absorbers(&mut self, walls: AbsorberStates) {
+        self.state.walls = walls;
     }
 
     /// Surveys the particles and chooses the next substep; also returns whether it is the frame's
@@ -418,13 +423,13 @@ impl Flip {
         Ok(is_last)
     }
 
-    fn upload_state(&self) {
-        upload(&self.program, &self.scene, &self.state);
+    fn upload_state(&self, state: &Particles) {
+        upload(&self.program, &self.scene, state);
         let names = self.scene.settings().attributes();
         if !names.is_empty() {
-            let mut rows = vec![0.0f32; names.len() * self.state.len()];
+            let mut rows = vec![0.0f32; names.len() * state.len()];
             for (k, name) in names.iter().enumerate() {
-                let values = self.state.attributes.get(*name).into_iter().flatten();
+                let values = state.attributes.get(*name).into_iter().flatten();
                 for (row, value) in rows.chunks_exact_mut(names.len()).zip(values) {
                     row[k] = *value;
                 }
@@ -433,32 +438,29 @@ impl Flip {
         }
     }
 
-    fn read_state(&mut self) -> Result<(), SolveError> {
-        let n = self.state.len();
-        let wanted = (POSITION.first(n), VELOCITY.first(n), ID.first(n));
-        let (position, velocity, id) = self.program.download(wanted)?;
-        check_ids(self.frame + 1, &self.state.id, &id)?;
-        let slot_of = slots_by_id(&self.state.id);
-        take_over(
-            &mut self.state,
-            &self.scene,
-            &slot_of,
-            &id,
-            &position,
-            &velocity,
-        );
-        let names = self.scene.settings().attributes();
-        if !names.is_empty() {
-            let rows = self.field(AFFINE, names.len() * n)?;
-            for (k, name) in names.iter().enumerate() {
-                let mut values = vec![0.0; n];
-                for (row, id) in rows.chunks_exact(names.len()).zip(&id) {
-                    values[slot_of(*id)] = row[k];
-                }
-                self.state.attributes.insert((*name).to_owned(), values);
-            }
-        }
-        Ok(())
+    /// Maps the frame that the substeps in `totals` have computed.
+    fn ended(&self, totals: &FrameTotals) -> Result<Ended, SolveError> {
+        let (n, names) = (self.state.len(), self.scene.settings().attributes());
+        let cells = match self.state.is_empty() {
+            true => 0,
+            false => (self.bricks.wet as usize + 1) * CELLS as usize,
+        };
+        let state = (POSITION.first(n), VELOCITY.first(n), ID.first(n));
+        let rows = match names.is_empty() {
+            // Without attributes the buffer does not exist.
+            true => None,
+            false => Some(self.program.map(AFFINE.first(names.len() * n))?),
+        };
+        let of_cells = (DENSITY.first(cells), CELL_KIND.first(cells));
+        Ok(Ended {
+            scene: self.scene.clone(),
+            frame: self.frame + 1,
+            substeps: totals.substeps,
+            state: self.state.clone(),
+            bricks: self.bricks.clone(),
+            rows,
+            found: (self.program).map((state, of_cells, COUNTERS.first(1)))?,
+        })
     }
 
     /// Length of a cell array up to the last slot of the finest level in the last substep.
@@ -474,51 +476,50 @@ impl Solver for Flip {
         if is_other_count(&self.scene, self.plan.counts.particles, particles)? {
             self.resize(particles.len())?;
         }
-        self.state = particles.clone();
+        self.state = Carried::new(particles);
         self.frame = frame;
-        self.upload_state();
+        self.upload_state(particles);
         Ok(())
     }
 
-    fn advance_watched(
-        &mut self,
-        watch: &mut dyn Watch,
-    ) -> Result<(Particles, StepReport), SolveError> {
+    fn compute(&mut self, watch: &mut dyn Watch) -> Result<Unread<SolveError>, SolveError> {
         self.program.upload(COUNTERS, 0, &[Counters::default()]);
         let totals = if self.state.is_empty() {
             FrameTotals::default()
         } else {
             self.timed(|flip, run| flip.run_substeps(watch, run))?
         };
-        self.read_state()?;
-        check_finite(self.frame + 1, &self.state, None).map_err(|breach| {
-            match totals.substeps {
-                0 => breach,
-                last => breach.in_substep(last),
-            }
-        })?;
-        let (density, densest_at) = match self.state.is_empty() {
-            true => Default::default(),
-            false => self.densities()?,
-        };
-        let capped = self.field(COUNTERS, 1)?[0].capped;
+        let ended = self.ended(&totals)?;
         self.frame += 1;
-        self.scene.update_absorbers(&mut self.state, self.frame);
-        if self.scene.domain.min != DVec3::ZERO {
-            // World positions in the frame are rounded: continue from the written values, as a
-            // resumed bake does.
-            self.upload_state();
+        let capped = ended.found.views().2[0].capped;
+        self.state.walls = AbsorberStates::default();
+        let mut read: Box<ReadFrame> = Box::new(move || ended.read());
+        if is_awaited(&self.scene) {
+            let (mut state, densities) = read()?;
+            self.scene.update_absorbers(&mut state, self.frame);
+            self.state.walls = state.walls;
+            if self.scene.domain.min != DVec3::ZERO {
+                // World positions in the frame are rounded: continue from the written values, as
+                // a resumed bake does.
+                self.upload_state(&state);
+            }
+            read = Box::new(move || Ok((state, densities)));
         }
-        let report = StepReport {
-            substeps: totals.substeps,
-            iterations: totals.iterations,
-            capped: u64::from(capped),
-            boundary_work: totals.work,
-            projection: Some(totals.projection),
-            densest_at,
-            ..self.scene.report(&self.state, density.into_iter())
-        };
-        Ok((self.state.clone(), report))
+        let (scene, walls) = (self.scene.clone(), self.state.walls);
+        Ok(Unread::new(walls, move || {
+            let (mut state, (density, densest_at)) = read()?;
+            state.walls = walls;
+            let report = StepReport {
+                substeps: totals.substeps,
+                iterations: totals.iterations,
+                capped: u64::from(capped),
+                boundary_work: totals.work,
+                projection: Some(totals.projection),
+                densest_at,
+                ..scene.report(&state, density.into_iter())
+            };
+            Ok((state, report))
+        }))
     }
 
     fn pressures(&self, points: &[DVec3]) -> Result<Vec<Option<f64>>, SolveError> {

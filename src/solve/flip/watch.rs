@@ -3,14 +3,13 @@
 use glam::DVec3;
 
 use super::{
-    super::{SolveError, pressure, state::look, trace::Run},
-    CELL_KIND, DENSITY, FACE_CHANGE, Flip, FrameTotals, OPEN_VOLUME,
+    super::{SolveError, pressure, trace::Run},
+    CELL_KIND, FACE_CHANGE, Flip, FrameTotals, OPEN_VOLUME,
 };
 use swell_domain::{
     bricks::CELLS,
     flip::{HALF, open_extent, part_of_solids},
     gauge::Gauge,
-    poisson::FLUID,
     probe::Patch,
     solver::{Observed, Requested, Span, Watch},
 };
@@ -45,8 +44,8 @@ impl Flip {
     fn seen(&self, wanted: &Requested) -> Result<Observed, SolveError> {
         let mut seen = Observed::default();
         if wanted.particles {
-            seen.particles = look(&self.program, &self.scene, &self.state, self.frame + 1)?;
-            seen.particles.substep = self.state.substep;
+            let frame = self.frame + 1;
+            seen.particles = self.state.look(&self.program, &self.scene, frame)?;
         }
         if wanted.pressures {
             seen.pressures = self.pressures_at(&self.scene.pressure_points())?;
@@ -91,26 +90,6 @@ impl Flip {
             .iter()
             .map(|one| look(&gauge, place(one) - origin, one))
             .collect())
-    }
-
-    /// Returns the relative densities in cells of water in the last substep, and the position of
-    /// the densest cell.
-    pub(super) fn densities(&self) -> Result<(Vec<f64>, Option<[f64; 3]>), SolveError> {
-        let cells = (self.bricks.wet as usize + 1) * CELLS as usize;
-        let wanted = (DENSITY.first(cells), CELL_KIND.first(cells));
-        let (density, kind) = self.program.download(wanted)?;
-        let of_cells = (0u32..).zip(density).zip(kind);
-        let in_water = of_cells.filter(|&(_, kind)| kind == FLUID);
-        let water: Vec<(u32, f64)> = in_water
-            .map(|((element, density), _)| (element, f64::from(density)))
-            .collect();
-        let cells = water.iter();
-        let densest = (self.scene)
-            .densest_cell(cells.map(|&(element, density)| (self.bricks.cell(element), density)));
-        Ok((
-            water.into_iter().map(|(_, density)| density).collect(),
-            densest,
-        ))
     }
 
     /// See [`Gauge::taken`].

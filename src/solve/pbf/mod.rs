@@ -6,17 +6,19 @@ pub(super) mod plan;
 mod projection;
 pub(super) mod record;
 
+use std::sync::Arc;
+
 use glam::{DVec3, Vec3};
 
 use swell_domain::{
     absorber::AbsorberStates,
     boundary::Boundary,
     budget::Breach,
-    particles::Particles,
+    particles::{Particles, max_speed},
     pbf::{CAP, CONTACT, MAX_CORRECTION, REGULARIZATION},
     period::Period,
     probe::fitted,
-    solver::{Observed, PassTime, Requested, Solver, Span as Substep, StepReport, Watch},
+    solver::{Observed, PassTime, Requested, Solver, Span as Substep, StepReport, Unread, Watch},
     sph::Calibration,
     substep::SubstepChoice,
 };
@@ -24,6 +26,7 @@ use swell_gpu::{
     adapter::Context,
     buffer::Buf,
     program::Program,
+    readback::{First, Mapped},
     recording::{Recording, Timer, spread},
     sort,
 };
@@ -35,7 +38,7 @@ use super::{
     effects,
     params::{Counters, IterationControl, Params},
     plan::{Counts, Plan, device_limits},
-    state::{check_finite, check_ids, is_other_count, look, slots_by_id, take_over, upload},
+    state::{Carried, check_finite, is_awaited, is_other_count, upload},
     trace::{Begun, Observe, Run, Span, TraceFrame, Traced, trace},
 };
 use buffers::*;
@@ -50,7 +53,7 @@ const NOBODY: [f32; 4] = [1e15, 1e15, 1e15, 0.0];
 pub struct Pbf {
     program: Program,
     plan: Plan,
-    scene: PbfScene,
+    scene: Arc<PbfScene>,
     calibration: Calibration,
     substep: Recording,
     measure: Recording,
@@ -60,7 +63,9 @@ pub struct Pbf {
     boundary: Option<Boundary>,
     movers: Option<Movers>,
     timer: Option<Timer>,
-    state: Particles,
+    state: Carried,
+    /// Largest speed in the state, m/s.
+    speed: f64,
     frame: u32,
     /// Positions relative to the domain's minimum corner, metres, and pressures, Pa, of the
     /// particles in the last substep; empty if the scene does not need them.
@@ -171,11 +176,12 @@ impl Pbf {
             timer: is_timed.then(|| Timer::new(context)),
             program,
             plan,
-            scene: scene.clone(),
+            scene: Arc::new(scene.clone()),
             calibration,
             substep,
             measure,
-            state: Particles::default(),
+            state: Carried::new(&Particles::default()),
+            speed: 0.0,
             frame: 0,
             pressed: Vec::new(),
         })
@@ -315,9 +321,8 @@ impl Pbf {
 
     /// Returns the number of substeps in the next frame.
     fn substeps(&self) -> Result<u32, SolveError> {
-        let substeps =
-            (self.scene).pbf_substeps(&self.state.walls, self.frame, self.state.max_speed())?;
-        Ok(substeps)
+        let walls = &self.state.walls;
+        Ok(self.scene.pbf_substeps(walls, self.frame, self.speed)?)
     }
 
     /// Returns the end time and the length of the k-th substep, seconds.
@@ -370,7 +375,8 @@ impl Pbf {
     fn seen(&mut self, wanted: &Requested, step: f64) -> Result<Observed, SolveError> {
         let mut seen = Observed::default();
         if wanted.particles {
-            seen.particles = look(&self.program, &self.scene, &self.state, self.frame + 1)?;
+            let frame = self.frame + 1;
+            seen.particles = self.state.look(&self.program, &self.scene, frame)?;
             seen.particles.substep = step;
         }
         if wanted.pressures {
@@ -382,32 +388,57 @@ impl Pbf {
         Ok(seen)
     }
 
-    /// Sorts particles at the frame's final positions, measures the density there, and downloads
-    /// the state.
-    fn read_state(&mut self, time: f64) -> Result<(Vec<f64>, Counters), SolveError> {
+    /// Sorts particles at the frame's final positions, measures the density there, and maps the
+    /// frame.
+    fn measured(&mut self, time: f64) -> Result<Measured, SolveError> {
         self.program.upload(PARAMS, 0, &[self.params(time, 0.0)]);
         self.measure.run(&self.program, self.timer.as_mut())?;
         let n = self.plan.counts.particles;
         let state = (POSITION.first(n), VELOCITY.first(n), ID.first(n));
         let measured = (sorted_id(n).first(n), DENSITY.first(n), COUNTERS.first(1));
-        let ((position, velocity, id), (sorted_id, density, counters)) =
-            self.program.download((state, measured))?;
-        check_ids(self.frame + 1, &self.state.id, &id)?;
-        check_ids(self.frame + 1, &self.state.id, &sorted_id)?;
-        let slot_of = slots_by_id(&self.state.id);
-        take_over(
-            &mut self.state,
-            &self.scene,
-            &slot_of,
-            &id,
-            &position,
-            &velocity,
-        );
-        let mut by_slot = vec![0.0; n];
-        for (&id, &value) in sorted_id.iter().zip(&density) {
-            by_slot[slot_of(id)] = f64::from(value);
+        Ok(Measured {
+            scene: self.scene.clone(),
+            frame: self.frame + 1,
+            state: self.state.clone(),
+            found: self.program.map((state, measured))?,
+        })
+    }
+}
+
+type OfState = (First<[f32; 3]>, First<[f32; 3]>, First<u32>);
+type OfMeasure = (First<u32>, First<f32>, First<Counters>);
+
+/// Reads a state and the relative density of each particle.
+type ReadState = dyn FnOnce() -> Result<(Particles, Vec<f64>), SolveError> + Send;
+
+/// A frame in mapped memory.
+struct Measured {
+    scene: Arc<PbfScene>,
+    frame: u32,
+    /// With the walls before the frame.
+    state: Carried,
+    found: Mapped<(OfState, OfMeasure)>,
+}
+
+impl Measured {
+    fn counters(&self) -> Counters {
+        self.found.views().1.2[0]
+    }
+
+    /// Returns the state, and the relative density of each particle.
+    fn read(self) -> Result<(Particles, Vec<f64>), SolveError> {
+        let ((position, velocity, id), (sorted_id, density, counters)) = self.found.views();
+        let ids = &self.state.ids;
+        let places = ids.places(self.frame, id)?;
+        let sorted_places = ids.places(self.frame, sorted_id)?;
+        if counters[0].not_finite > 0 {
+            let count = counters[0].not_finite.into();
+            return Err(Breach::not_finite(self.frame, count, None).into());
         }
-        Ok((by_slot, counters[0]))
+        let state = (self.state).state(&self.scene, &places, position, velocity);
+        let density = sorted_places.collect(|k| f64::from(density[k]));
+        check_finite(self.frame, &state, Some(&density))?;
+        Ok((state, density))
     }
 }
 
@@ -418,19 +449,17 @@ impl Solver for Pbf {
         if is_other_count(&self.scene, self.plan.counts.particles, particles)? {
             self.resize(particles.len())?;
         }
-        self.state = particles.clone();
+        self.state = Carried::new(particles);
+        self.speed = particles.max_speed();
         self.frame = frame;
-        upload(&self.program, &self.scene, &self.state);
+        upload(&self.program, &self.scene, particles);
         match &mut self.grid {
             Some(grid) => grid.load(frame, particles),
             None => Ok(()),
         }
     }
 
-    fn advance_watched(
-        &mut self,
-        watch: &mut dyn Watch,
-    ) -> Result<(Particles, StepReport), SolveError> {
+    fn compute(&mut self, watch: &mut dyn Watch) -> Result<Unread<SolveError>, SolveError> {
         let length = self.scene.shot.frame_seconds();
         let start = f64::from(self.frame) * length;
         let substeps = self.substeps()?;
@@ -448,25 +477,29 @@ impl Solver for Pbf {
                 watch.look(substep, self.seen(&wanted, step)?);
             }
         }
-        let (density, counters) = self.read_state(start + length)?;
+        self.state.substep = length / f64::from(substeps);
+        let measured = self.measured(start + length)?;
+        self.speed = max_speed(measured.found.views().0.1);
         if self.scene.reads_multipliers() {
             self.pressed = self.particle_pressures(length / f64::from(substeps))?;
         }
         self.frame += 1;
-        if counters.not_finite > 0 {
-            let count = counters.not_finite.into();
-            return Err(Breach::not_finite(self.frame, count, None).into());
+        let counters = measured.counters();
+        let mut read: Box<ReadState> = Box::new(move || measured.read());
+        self.state.walls = AbsorberStates::default();
+        if is_awaited(&self.scene) {
+            let (mut state, density) = read()?;
+            self.scene.update_absorbers(&mut state, self.frame);
+            self.state.walls = state.walls;
+            if self.scene.domain.min != DVec3::ZERO {
+                // World positions in the frame are rounded: continue from the written values, as
+                // a resumed bake does.
+                upload(&self.program, &self.scene, &state);
+            }
+            read = Box::new(move || Ok((state, density)));
         }
-        check_finite(self.frame, &self.state, Some(&density))?;
-        self.scene.update_absorbers(&mut self.state, self.frame);
-        self.state.substep = length / f64::from(substeps);
         if let Some(grid) = &mut self.grid {
-            grid.take_absorbers(&self.state);
-        }
-        if self.scene.domain.min != DVec3::ZERO {
-            // World positions in the frame are rounded: continue from the written values, as a
-            // resumed bake does.
-            upload(&self.program, &self.scene, &self.state);
+            grid.take_absorbers(self.state.walls);
         }
         let iterations = match self.scene.settings().stop {
             Stop::Iterations(count) => u64::from(count) * u64::from(substeps),
@@ -474,17 +507,22 @@ impl Solver for Pbf {
         };
         let grid = self.grid.as_ref().map(Grid::done);
         let work = self.boundary_work(length / f64::from(substeps))?;
-        let report = StepReport {
-            substeps,
-            iterations,
-            capped: u64::from(counters.capped),
-            searched: u64::from(counters.searched),
-            boundary_work: work + grid.as_ref().map_or(0.0, |grid| grid.1),
-            projection: grid.map(|grid| grid.0),
-            densest_at: self.scene.densest_particle(&self.state, &density),
-            ..self.scene.report(&self.state, density.into_iter())
-        };
-        Ok((self.state.clone(), report))
+        let (scene, walls) = (self.scene.clone(), self.state.walls);
+        Ok(Unread::new(walls, move || {
+            let (mut state, density) = read()?;
+            state.walls = walls;
+            let report = StepReport {
+                substeps,
+                iterations,
+                capped: u64::from(counters.capped),
+                searched: u64::from(counters.searched),
+                boundary_work: work + grid.as_ref().map_or(0.0, |grid| grid.1),
+                projection: grid.map(|grid| grid.0),
+                densest_at: scene.densest_particle(&state, &density),
+                ..scene.report(&state, density.into_iter())
+            };
+            Ok((state, report))
+        }))
     }
 
     /// Fits a plane to the pressures of particles around each point; with a projection, returns the

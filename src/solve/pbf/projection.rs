@@ -10,6 +10,7 @@ use crate::{
     trace::Run,
 };
 use swell_domain::{
+    absorber::AbsorberStates,
     boundary::Boundary,
     particles::Particles,
     solver::{Projection, Solver},
@@ -45,8 +46,8 @@ impl Grid {
     }
 
     /// Copies the state of absorbing walls, so that the grid's walls match those of the particles.
-    pub(super) fn take_absorbers(&mut self, state: &Particles) {
-        self.flip.take_absorbers(state);
+    pub(super) fn take_absorbers(&mut self, walls: AbsorberStates) {
+        self.flip.take_absorbers(walls);
     }
 
     /// Resets the sums of a frame.

@@ -63,7 +63,7 @@ pub(super) fn frame_bytes(scene: &Scene, particles: &Particles) -> Result<[u64; 
     };
     // Writing to a sink cannot fail, so an error is a fault of the content.
     let unfit = |error: io::Error| CacheError::Unfit(error.to_string());
-    let own = frame::encode(&mut io::sink(), &stamp, particles).map_err(unfit)?;
+    let own = frame::length(&stamp, particles).map_err(unfit)?;
     let grids = match &scene.grids {
         Some(grids) => {
             let record = grid_record(scene, grids);
@@ -75,5 +75,5 @@ pub(super) fn frame_bytes(scene: &Scene, particles: &Particles) -> Result<[u64; 
         }
         None => 0,
     };
-    Ok([own.bytes, grids])
+    Ok([own, grids])
 }

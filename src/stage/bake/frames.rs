@@ -27,6 +27,8 @@ pub(super) struct Frames<'a> {
     blocked: u64,
     /// Greatest number of particles.
     most: usize,
+    /// When the frame before was done.
+    before: Instant,
 }
 
 impl<'a> Frames<'a> {
@@ -47,6 +49,7 @@ impl<'a> Frames<'a> {
             held: Held::default(),
             blocked: 0,
             most: plan.start.particles.len(),
+            before: Instant::now(),
         }
     }
 
@@ -54,11 +57,12 @@ impl<'a> Frames<'a> {
     pub(super) fn add(&mut self, step: Step, tell: &mut dyn FnMut(Event)) -> Result<(), BakeError> {
         let scene = self.scene;
         self.looked.add(scene, step.frame, &step.looks);
-        let begin = Instant::now();
         let time = scene.shot.time(step.frame);
         let looks = Some(step.looks);
         let seen = probes::look(scene, time, &step.particles, &step.pressures, looks);
-        let seconds = step.seconds + begin.elapsed().as_secs_f64();
+        let now = Instant::now();
+        let seconds = (now - self.before).as_secs_f64();
+        self.before = now;
         let Step {
             frame,
             particles,
