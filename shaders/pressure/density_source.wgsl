@@ -3,6 +3,8 @@
 #import "shared/pressure_site.wgsl"
 #import "shared/pressure_sum.wgsl"
 
+alias Terms = real;
+
 @group(0) @binding(2) var<storage, read> pressure_block: array<u32>;
 @group(0) @binding(3) var<storage, read> density_excess: array<f32>;
 @group(0) @binding(6) var<storage, read_write> pressure_rhs: array<real>;
@@ -34,5 +36,8 @@ fn main(
 #endif
         square += b * b;
     }
-    sum_workgroup(square, local, thread_index(workgroup, workgroups, 0u, 1u));
+    let sum = sum_workgroup(square, local);
+    if local == 0u {
+        pressure_sums[4u * thread_index(workgroup, workgroups, 0u, 1u) + SQUARE] = sum;
+    }
 }

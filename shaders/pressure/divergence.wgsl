@@ -3,6 +3,8 @@
 #import "shared/pressure_divergence.wgsl"
 #import "shared/pressure_sum.wgsl"
 
+alias Terms = real;
+
 @group(0) @binding(6) var<storage, read_write> pressure_rhs: array<real>;
 @group(0) @binding(7) var<storage, read_write> pressure_residual: array<real>;
 @group(0) @binding(8) var<storage, read_write> pressure_solution: array<real>;
@@ -36,6 +38,8 @@ fn main(
 #endif
     }
     let squares = b.lo * b.lo + b.hi * b.hi;
-    sum_workgroup((squares.x + squares.y) + (squares.z + squares.w), local,
-        thread_index(workgroup, workgroups, 0u, 1u));
+    let square = sum_workgroup((squares.x + squares.y) + (squares.z + squares.w), local);
+    if local == 0u {
+        pressure_sums[4u * thread_index(workgroup, workgroups, 0u, 1u) + SQUARE] = square;
+    }
 }

@@ -4,7 +4,8 @@
 #import "shared/pressure_ipp.wgsl"
 
 @group(0) @binding(6) var<storage, read> pressure_residual: array<real>;
-@group(0) @binding(7) var<storage, read_write> pressure_product: array<real>;
+// Its second half takes the result.
+@group(0) @binding(7) var<storage, read_write> pressure_correction: array<real>;
 
 fn scaled(first: u32, s: u32, t: u32) -> vec4r {
     return inverse_diagonals(first, s, t) * residuals(first, s, t);
@@ -46,7 +47,8 @@ fn main(
         l.iz * within.zl,
     ));
     for (var c = 0u; c < 4u; c++) {
-        pressure_product[own + 64u * c] = d.lo[c] * (r.lo[c] + flow.lo[c]);
-        pressure_product[own + 64u * c + 256u] = d.hi[c] * (r.hi[c] + flow.hi[c]);
+        let e = phase.stride + own + 64u * c;
+        pressure_correction[e] = d.lo[c] * (r.lo[c] + flow.lo[c]);
+        pressure_correction[e + 256u] = d.hi[c] * (r.hi[c] + flow.hi[c]);
     }
 }

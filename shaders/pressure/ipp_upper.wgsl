@@ -3,16 +3,19 @@
 #import "shared/pressure_ipp.wgsl"
 #import "shared/pressure_sum.wgsl"
 
+alias Terms = real;
+
 @group(0) @binding(6) var<storage, read> pressure_residual: array<real>;
-@group(0) @binding(7) var<storage, read> pressure_product: array<real>;
+// The correction, and the result of the first half after it.
 @group(0) @binding(8) var<storage, read_write> pressure_correction: array<real>;
 
-fn halves(first: u32, s: u32, t: u32) -> vec4r {
+fn halves(at: u32, s: u32, t: u32) -> vec4r {
+    let first = phase.stride + at;
     return vec4r(
-        pressure_product[first],
-        pressure_product[first + s],
-        pressure_product[first + t],
-        pressure_product[first + s + t],
+        pressure_correction[first],
+        pressure_correction[first + s],
+        pressure_correction[first + t],
+        pressure_correction[first + s + t],
     );
 }
 
@@ -48,5 +51,8 @@ fn main(
         pressure_correction[e + 256u] = z.y;
         product += pressure_residual[e] * z.x + pressure_residual[e + 256u] * z.y;
     }
-    sum_workgroup(product, local, thread_index(workgroup, workgroups, 0u, 1u));
+    let sum = sum_workgroup(product, local);
+    if local == 0u {
+        pressure_sums[4u * thread_index(workgroup, workgroups, 0u, 1u) + CORRECTED] = sum;
+    }
 }

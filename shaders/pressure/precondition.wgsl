@@ -2,6 +2,8 @@
 #import "shared/pressure_phase.wgsl"
 #import "shared/pressure_sum.wgsl"
 
+alias Terms = real;
+
 @group(0) @binding(1) var<storage, read> pressure_residual: array<real>;
 @group(0) @binding(2) var<storage, read_write> pressure_correction: array<real>;
 #ifdef DIAGONAL
@@ -30,5 +32,8 @@ fn main(
             product += r * z;
         }
     }
-    sum_workgroup(product, local, thread_index(workgroup, workgroups, 0u, 1u));
+    let sum = sum_workgroup(product, local);
+    if local == 0u {
+        pressure_sums[4u * thread_index(workgroup, workgroups, 0u, 1u) + CORRECTED] = sum;
+    }
 }

@@ -2,6 +2,8 @@
 #import "shared/pressure_links.wgsl"
 #import "shared/pressure_sum.wgsl"
 
+alias Terms = real;
+
 @group(0) @binding(5) var<storage, read> pressure_solution: array<real>;
 @group(0) @binding(6) var<storage, read> pressure_rhs: array<real>;
 @group(0) @binding(7) var<storage, read_write> pressure_residual: array<real>;
@@ -59,5 +61,8 @@ fn main(
         pressure_residual[own + 64u * c] = r.lo[c];
         pressure_residual[own + 64u * c + 256u] = r.hi[c];
     }
-    sum_workgroup(dot_pair(r, r), local, thread_index(workgroup, workgroups, 0u, 1u));
+    let square = sum_workgroup(dot_pair(r, r), local);
+    if local == 0u {
+        pressure_sums[4u * thread_index(workgroup, workgroups, 0u, 1u) + SQUARE] = square;
+    }
 }

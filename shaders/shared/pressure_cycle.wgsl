@@ -5,9 +5,17 @@
 // summed into it, and its value is added to all eight cells. The coarse coefficients
 // (pressure/coarsen) are half of the Galerkin ones, which compensates for this piecewise-constant
 // transfer.
+//
+// Where a workgroup has one brick, it takes the latest values within the brick, but around it those
+// from before the pass: on the way down 0, on the way up the first smoothing plus the coarse
+// correction. Down the first colour comes first, up the second, so that the cycle is symmetric. The
+// smoother M of the system A converges, because M + Mᵀ − A is diagonally dominant. Compared with a
+// smoother that sees across bricks it costs no iteration, or one in ten, and one dispatch instead
+// of three.
 #import "shared/pressure_links.wgsl"
 
 @group(0) @binding(5) var<storage, read_write> pressure_residual: array<real>;
+// The correction, and after it that of the first smoothing of levels with dispatches of their own.
 @group(0) @binding(6) var<storage, read_write> pressure_correction: array<real>;
 
 fn last_slot(level: u32) -> u32 {
@@ -42,29 +50,43 @@ fn corrections(first: u32, s: u32, t: u32) -> vec4r {
     );
 }
 
-fn corrections_about(s: Site) -> Sides {
-    let lower = blocked_lower(s);
-    let upper = blocked_upper(s);
+// Corrections around a block. `lower` and `upper` are offsets for each side, such as that of the
+// first smoothing.
+fn corrections_at(s: Site, lower: vec3u, upper: vec3u) -> Sides {
+    let l = lower + blocked_lower(s);
+    let u = upper + blocked_upper(s);
     return Sides(
-        corrections(lower.x + 64u, 128u, 256u),
-        corrections(upper.x, 128u, 256u),
-        corrections(lower.y + 128u, 64u, 256u),
-        corrections(upper.y, 64u, 256u),
-        corrections(lower.z + 256u, 64u, 128u),
-        corrections(upper.z, 64u, 128u),
+        corrections(l.x + 64u, 128u, 256u),
+        corrections(u.x, 128u, 256u),
+        corrections(l.y + 128u, 64u, 256u),
+        corrections(u.y, 64u, 256u),
+        corrections(l.z + 256u, 64u, 128u),
+        corrections(u.z, 64u, 128u),
     );
 }
 
-fn store_correction(s: Site, z: Pair) {
-    let own = blocked(s.slot, s.block);
-    pressure_correction[own] = z.lo.x;
-    pressure_correction[own + 64u] = z.lo.y;
-    pressure_correction[own + 128u] = z.lo.z;
-    pressure_correction[own + 192u] = z.lo.w;
-    pressure_correction[own + 256u] = z.hi.x;
-    pressure_correction[own + 320u] = z.hi.y;
-    pressure_correction[own + 384u] = z.hi.z;
-    pressure_correction[own + 448u] = z.hi.w;
+fn corrections_about(s: Site) -> Sides {
+    return corrections_at(s, vec3u(0u), vec3u(0u));
+}
+
+// What the first smoothing left around a block.
+fn smoothed_about(s: Site) -> Sides {
+    return corrections_at(s, vec3u(phase.stride), vec3u(phase.stride));
+}
+
+// The block with 0 in place of what is around it in other bricks.
+fn alone(s: Site) -> Site {
+    var kept = s;
+    kept.lower_slot = select(vec3u(0u), s.lower_slot, s.lower_slot == vec3u(s.slot));
+    kept.upper_slot = select(vec3u(0u), s.upper_slot, s.upper_slot == vec3u(s.slot));
+    return kept;
+}
+
+fn store_correction(first: u32, z: Pair) {
+    for (var c = 0u; c < 4u; c++) {
+        pressure_correction[first + 64u * c] = z.lo[c];
+        pressure_correction[first + 64u * c + 256u] = z.hi[c];
+    }
 }
 
 // Inflow from the values around the block.
@@ -130,18 +152,34 @@ fn solve_block(l: Links, rhs: Pair) -> Pair {
 
 // Smooths the first colour, with all other values still 0.
 fn smooth_first_at(s: Site) {
-    store_correction(s, solve_block(links_at(s), residual_at(s)));
+    store_correction(blocked(s.slot, s.block), solve_block(links_at(s), residual_at(s)));
+}
+
+// The block's solution for given values around it.
+fn solve_about(l: Links, r: Pair, about: Sides) -> Pair {
+    let flow = inflow(l, about);
+    return solve_block(l, Pair(r.lo + flow.lo, r.hi + flow.hi));
 }
 
 // Smooths one colour from the latest values of the other; returns the block's share of residual ·
 // correction.
 fn smooth_at(s: Site) -> real {
-    let l = links_at(s);
     let r = residual_at(s);
-    let flow = inflow(l, corrections_about(s));
-    let z = solve_block(l, Pair(r.lo + flow.lo, r.hi + flow.hi));
-    store_correction(s, z);
+    let z = solve_about(links_at(s), r, corrections_about(s));
+    store_correction(blocked(s.slot, s.block), z);
     return dot_pair(r, z);
+}
+
+// Smooths a brick from a correction of 0, one thread per block, both colours in turn.
+fn smooth_brick(s: Site, colour: u32, r: Pair, is_on: bool) {
+    let own = phase.stride + blocked(s.slot, s.block);
+    if is_on && colour == 0u {
+        store_correction(own, solve_block(links_at(s), r));
+    }
+    storageBarrier();
+    if is_on && colour == 1u {
+        store_correction(own, solve_about(links_at(s), r, smoothed_about(alone(s))));
+    }
 }
 
 // Values of the coarse cells above the blocks around this one.
@@ -175,23 +213,66 @@ fn above_about(s: Site) -> Above {
     );
 }
 
+// Adds the coarse values above the blocks around a block.
+fn with_above(about: Sides, above: Above) -> Sides {
+    return Sides(
+        about.xl + above.lower.x,
+        about.xu + above.upper.x,
+        about.yl + above.lower.y,
+        about.yu + above.upper.y,
+        about.zl + above.lower.z,
+        about.zu + above.upper.z,
+    );
+}
+
 // Smooths the second colour after the coarser level's solve: the first colour's values have the
 // coarse values above them added.
 fn smooth_corrected_at(s: Site) -> real {
-    let l = links_at(s);
     let r = residual_at(s);
-    var about = corrections_about(s);
-    let above = above_about(s);
-    about.xl += above.lower.x;
-    about.xu += above.upper.x;
-    about.yl += above.lower.y;
-    about.yu += above.upper.y;
-    about.zl += above.lower.z;
-    about.zu += above.upper.z;
-    let flow = inflow(l, about);
-    let z = solve_block(l, Pair(r.lo + flow.lo, r.hi + flow.hi));
-    store_correction(s, z);
+    let about = with_above(corrections_about(s), above_about(s));
+    let z = solve_about(links_at(s), r, about);
+    store_correction(blocked(s.slot, s.block), z);
     return dot_pair(r, z);
+}
+
+// The same where a workgroup has one brick; then, in the second step, the first colour, which takes
+// the new values of its own brick.
+fn prolong_at(s: Site, is_second: bool) -> real {
+    let r = residual_at(s);
+    let is_new_lower = (s.lower_slot == vec3u(s.slot)) & vec3<bool>(is_second);
+    let is_new_upper = (s.upper_slot == vec3u(s.slot)) & vec3<bool>(is_second);
+    let smoothed = vec3u(phase.stride);
+    let left = corrections_at(s, select(smoothed, vec3u(0u), is_new_lower),
+        select(smoothed, vec3u(0u), is_new_upper));
+    let above = above_about(s);
+    let about = with_above(left, Above(
+        select(above.lower, vec3r(0.0), is_new_lower),
+        select(above.upper, vec3r(0.0), is_new_upper),
+    ));
+    let z = solve_about(links_at(s), r, about);
+    store_correction(blocked(s.slot, s.block), z);
+    return dot_pair(r, z);
+}
+
+// What a block of the first colour passes down after the first smoothing: half of the sum of its
+// residuals. It was solved with 0 around it, so that is the inflow since then.
+fn passed_by_first(s: Site) -> real {
+    return 0.5 * sum_pair(inflow(links_at(s), smoothed_about(s)));
+}
+
+// The same for the second colour, which was solved with the values of its own brick around it: the
+// inflow from other bricks, at most one along each axis.
+fn passed_by_second(s: Site) -> real {
+    let l = links_at(s);
+    let is_lower = s.lower_slot != vec3u(s.slot);
+    let beside = select(s.upper_slot, s.lower_slot, is_lower);
+    let block = select(s.upper_block, s.lower_block, is_lower);
+    let slot = select(beside, vec3u(0u), beside == vec3u(s.slot));
+    let at = phase.stride + 512u * slot + block + select(vec3u(0u), BLOCKED, is_lower);
+    let x = dot(select(l.out.xu, l.out.xl, is_lower.x), corrections(at.x, 128u, 256u));
+    let y = dot(select(l.out.yu, l.out.yl, is_lower.y), corrections(at.y, 64u, 256u));
+    let z = dot(select(l.out.zu, l.out.zl, is_lower.z), corrections(at.z, 64u, 128u));
+    return 0.5 * (x + y + z);
 }
 
 // Restricts the residual of a first-colour block after the second colour's sweep, summed into the

@@ -5,16 +5,14 @@ struct PressurePhase {
     // Index into `levels`, and index of the coarsest level.
     level: u32,
     last_level: u32,
-    // Colour of the 2³ blocks, in a checkerboard pattern.
-    colour: u32,
-    // Decision of pressure/reduce, and the number of partial sums that it adds up.
+    // Decision of pressure/reduce, and the number of workgroups whose partial sums it adds up.
     step: u32,
     sum_count: u32,
     // Distance between planes of an array, in elements: 512 times its slots.
     stride: u32,
     max_iterations: u32,
-    // Whether the pockets are listed in `pressure_pocket_cells`.
-    has_pockets: u32,
+    // Parts of pockets in `pressure_pocket_parts`; 0 until the pockets are listed.
+    pocket_parts: u32,
     tolerance_square: f32,
     // Cell size Δx, metres.
     cell_size: f32,
@@ -22,6 +20,7 @@ struct PressurePhase {
     pressure_scale: f32,
     // Always 0, but unknown to the shader compiler.
     opaque_zero: u32,
+    padding: u32,
     // For each level: first slot, bricks, active bricks (finest level only), 0.
     levels: array<vec4u, 8>,
 }

@@ -31,15 +31,24 @@ struct Site {
 
 // Block `block` of brick `slot`; bricks after slot `last` count as absent.
 fn site_at(slot: u32, block: u32, last: u32) -> Site {
+    return site_beside(slot, block, bricks_beside(slot, block, last));
+}
+
+// The bricks beside a brick at a block's own end of each axis. Along each axis at most one
+// neighbour of the block lies in another brick.
+fn bricks_beside(slot: u32, block: u32, last: u32) -> vec3u {
     let at = vec3u(block & 3u, (block >> 2u) & 3u, block >> 4u);
-    // Along each axis at most one neighbour lies in another brick.
     let side = select(vec3u(3u, 4u, 5u), vec3u(0u, 1u, 2u), at < vec3u(2u));
-    var far = vec3u(
+    let far = vec3u(
         pressure_bricks[slot].faces[side.x],
         pressure_bricks[slot].faces[side.y],
         pressure_bricks[slot].faces[side.z],
     );
-    far = select(far, vec3u(0u), far > vec3u(last));
+    return select(far, vec3u(0u), far > vec3u(last));
+}
+
+fn site_beside(slot: u32, block: u32, far: vec3u) -> Site {
+    let at = vec3u(block & 3u, (block >> 2u) & 3u, block >> 4u);
     let step = vec3u(1u, 4u, 16u);
     let is_first = at == vec3u(0u);
     let is_last = at == vec3u(3u);

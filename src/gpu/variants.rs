@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use super::{error::GpuError, shader};
 
 /// Combinations of conditions that a plan can set; every pass must compose under each.
-const VARIANTS: [&[&str]; 71] = [
+const VARIANTS: [&[&str]; 74] = [
     &[],
     &["SOLIDS"],
     &["NEIGHBOR_LIST"],
@@ -53,6 +53,9 @@ const VARIANTS: [&[&str]; 71] = [
     &["TWO_WORDS"],
     &["GHOST_FLUID", "DIAGONAL", "F64"],
     &["F64"],
+    &["MULTIGRID"],
+    &["MULTIGRID", "TWO_WORDS"],
+    &["MULTIGRID", "F64"],
     &["PERIODIC"],
     &[
         "PERIODIC",

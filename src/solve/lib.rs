@@ -20,7 +20,9 @@ use params::{
     Counters, FlipParams, Inlets, IterationControl, Params, Phase, SolidGrid, SolidGrids,
     SurveyHead,
 };
-use pressure::{PressureBrick, PressureControl, PressureControl64, PressurePhase, PressureStats};
+use pressure::{
+    PocketPart, PressureBrick, PressureControl, PressureControl64, PressurePhase, PressureStats,
+};
 
 /// Returns the host-side layouts of all structs shared with the shaders, under their WGSL names.
 pub fn mirrors() -> Vec<Layout> {
@@ -40,6 +42,7 @@ pub fn mirrors() -> Vec<Layout> {
         PressureControl64::layout(),
         PressureStats::layout(),
         PressureBrick::layout(),
+        PocketPart::layout(),
     ]
 }
 

@@ -15,31 +15,19 @@ use swell_solve::{
     pressure::{PressureBrick, PressurePhase, buffers as solved},
 };
 
-use super::{FlipState, rows::*};
+use super::{FlipState, iteration::CORRECTED, rows::*};
 
 /// Comparisons of the multigrid's passes.
 pub(super) const COMPARISONS: &[Comparison<FlipState>] = &[
     of_level("pressure/coarsen", coarsen),
     of_level("pressure/smooth_first", |state, io| {
-        smooth(state, io, &SMOOTHED_FIRST, Surroundings::Nothing)
-    }),
-    Comparison {
-        is_due: |state, io| {
-            // The last sweep of a cycle leaves the sums; the number of sweeps varies.
-            if state.is_turn(io)? && state.is_early() {
-                state.note_sum(io, solved::RESIDUAL, solved::CORRECTION)?;
-            }
-            is_due(state, io)
-        },
-        ..comparison("pressure/smooth", NONE, |state, io| {
-            smooth(state, io, &SMOOTHED, Surroundings::Corrections)
-        })
-    },
-    of_level("pressure/smooth_corrected", |state, io| {
-        smooth(state, io, &SMOOTHED_CORRECTED, Surroundings::WithAbove)
+        let cycle = Cycle::of(state, io)?;
+        smoothed(&cycle, io, &SMOOTHED_FIRST);
+        Ok(())
     }),
     of_level("pressure/restrict", restrict),
     of_level("pressure/solve_coarse", solve_coarse),
+    of_level("pressure/prolong", prolong),
 ];
 
 /// Returns a comparison of the first few runs on each level.
@@ -60,14 +48,14 @@ fn is_due(state: &mut FlipState, io: &Io<'_>) -> Result<bool, SolveError> {
 }
 
 /// The levels after the pass.
-struct Cycle {
+pub(super) struct Cycle {
     phase: PressurePhase,
     levels: Levels,
     rounding: Rounding,
 }
 
 impl Cycle {
-    fn of(state: &FlipState, io: &Io<'_>) -> Result<Self, SolveError> {
+    pub(super) fn of(state: &FlipState, io: &Io<'_>) -> Result<Self, SolveError> {
         let phase = io.before.window(&solved::PHASES)?;
         let reals = |buffer, cells| io.after.reals(&buffer, state.precision(), cells);
         let level = |&[first, count, ..]: &[u32; 4]| first..first + count;
@@ -75,6 +63,7 @@ impl Cycle {
         let levels: Vec<Range<u32>> = all.iter().map(level).collect();
         let slots = levels[phase.last_level as usize].end as usize;
         let (cells, stride) = (slots * CELLS as usize, phase.stride as usize);
+        let corrections = reals(solved::CORRECTION, stride + cells)?;
         let planes = io.after.get(solved::COEFFICIENT, 2 * stride + cells)?;
         let bricks = io.after.get(solved::BRICKS, slots)?;
         let brick = |brick: &PressureBrick| Brick {
@@ -89,7 +78,8 @@ impl Cycle {
                 coefficient: [0, 1, 2].map(|axis| planes[axis * stride..][..cells].to_vec()),
                 dirichlet: reals(solved::DIRICHLET, cells)?,
                 residual: reals(solved::RESIDUAL, cells)?,
-                correction: reals(solved::CORRECTION, cells)?,
+                correction: corrections[..cells].to_vec(),
+                smoothed: corrections[stride..].to_vec(),
             },
             rounding: Rounding {
                 unit: state.unit(),
@@ -103,43 +93,57 @@ impl Cycle {
         self.phase.level as usize
     }
 
-    /// Returns the blocks of the phase's colour, with their slots.
-    fn blocks(&self) -> Vec<(u32, u32)> {
-        self.levels.coloured(self.level(), self.phase.colour)
+    /// Compares one colour of the phase's level with `found`.
+    fn compare(
+        &self,
+        io: &mut Io<'_>,
+        entry: &'static Entry<1>,
+        (colour, about): (u32, Surroundings),
+        found: &[f64],
+    ) {
+        let blocks = self.levels.coloured(self.level(), colour);
+        let solved = each(0..blocks.len(), |k| {
+            let levels = &self.levels;
+            let solved = levels.solved(self.level(), blocks[k], about, self.rounding, [0.0; 8]);
+            let pairs = solved.map(|cells| {
+                cells.map(|cell| {
+                    let found = found[cell.place];
+                    Some(pair(cell.place, found, cell.value, [cell.error]))
+                })
+            });
+            pairs.unwrap_or([None; 8])
+        });
+        io.table.add(entry, solved.into_iter().flatten());
     }
 }
 
-fn smooth(
-    state: &FlipState,
-    io: &mut Io<'_>,
-    entry: &'static Entry<1>,
-    about: Surroundings,
-) -> Outcome {
-    let cycle = Cycle::of(state, io)?;
-    let (levels, blocks) = (&cycle.levels, cycle.blocks());
-    let solved = each(0..blocks.len(), |k| {
-        let solved = levels.solved(cycle.level(), blocks[k], about, cycle.rounding, [0.0; 8]);
-        let pairs = solved.map(|cells| {
-            cells.map(|cell| {
-                let found = levels.correction[cell.place];
-                Some(pair(cell.place, found, cell.value, [cell.error]))
-            })
-        });
-        pairs.unwrap_or([None; 8])
-    });
-    io.table.add(entry, solved.into_iter().flatten());
-    Ok(())
+/// Compares the first smoothing of the phase's level.
+pub(super) fn smoothed(cycle: &Cycle, io: &mut Io<'_>, entry: &'static Entry<1>) {
+    let found = &cycle.levels.smoothed;
+    cycle.compare(io, entry, (0, Surroundings::Nothing), found);
+    cycle.compare(io, entry, (1, Surroundings::SmoothedWithin), found);
 }
 
 fn restrict(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let cycle = Cycle::of(state, io)?;
-    let blocks = cycle.blocks().into_iter();
-    let above = |block| (cycle.levels).restricted(cycle.level(), block, cycle.rounding);
-    let pairs = blocks.flat_map(above).map(|cell| {
+    let passed = cycle.levels.restricted(cycle.level(), cycle.rounding);
+    let pairs = passed.into_iter().map(|cell| {
         let found = cycle.levels.residual[cell.place];
         pair(cell.place, found, cell.value, [cell.error])
     });
     io.table.add(&RESTRICTED, pairs);
+    smoothed(&cycle, io, &SMOOTHED);
+    Ok(())
+}
+
+fn prolong(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+    let cycle = Cycle::of(state, io)?;
+    let found = &cycle.levels.correction;
+    cycle.compare(io, &PROLONGED, (1, Surroundings::SmoothedWithAbove), found);
+    cycle.compare(io, &PROLONGED, (0, Surroundings::Prolonged), found);
+    if cycle.level() == 0 {
+        state.note_sum(io, CORRECTED, [solved::RESIDUAL, solved::CORRECTION])?;
+    }
     Ok(())
 }
 
@@ -148,8 +152,13 @@ fn solve_coarse(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let cycle = Cycle::of(state, io)?;
     let levels = &cycle.levels;
     let Range { start, end } = levels.levels[cycle.level()];
+    // The finest level's residuals are those of the solve.
+    let passed = if cycle.level() == 0 { end } else { start };
     let [corrections, residuals] =
-        [start, end].map(|slot| (CELLS * slot) as usize..levels.correction.len());
+        [start, passed].map(|slot| (CELLS * slot) as usize..levels.correction.len());
+    if cycle.level() == 0 {
+        state.note_sum(io, CORRECTED, [solved::RESIDUAL, solved::CORRECTION])?;
+    }
     let Some([values, errors]) = levels.solve_coarse(cycle.level(), cycle.rounding) else {
         io.table.leave_out(&COARSE_SOLVED, corrections.len());
         io.table.leave_out(&COARSE_RESIDUAL, residuals.len());

@@ -134,10 +134,10 @@ pub(crate) struct FlipState {
     given: Option<GridTransfer>,
     /// Number of runs of each pass of an iteration on each level.
     runs: BTreeMap<(&'static str, u32), usize>,
-    /// Number of compared runs of pressure/multiply.
-    products: usize,
-    /// Expected total of the partial sums of the latest pass that wrote any.
-    sum: Option<Sum>,
+    /// Whether the pockets' sums follow pressure/verify.
+    follows_verify: bool,
+    /// Expected totals of the partial sums of each kind, by the latest pass that wrote them.
+    sums: [Option<Sum>; 4],
 }
 
 impl State for FlipState {
@@ -190,8 +190,8 @@ impl FlipState {
             assembled: None,
             given: None,
             runs: BTreeMap::new(),
-            products: 0,
-            sum: None,
+            follows_verify: false,
+            sums: [None; 4],
         }
     }
 

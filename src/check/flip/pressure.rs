@@ -31,14 +31,13 @@ use swell_solve::{
     },
 };
 
-use super::{Elements, FlipState, iteration::PRODUCTS, rows::*};
+use super::{Elements, FlipState, iteration::SQUARE, rows::*};
 
 /// Comparisons of the passes before and after the iteration.
 pub(super) const COMPARISONS: &[Comparison<FlipState>] = &[
     comparison("pressure/build_system", NONE, build_system),
     comparison("pressure/divergence", NONE, divergence),
     comparison("pressure/density_source", NONE, density_source),
-    comparison("pressure/multiply", NONE, multiply),
     Comparison {
         is_due: FlipState::is_done,
         ..comparison(
@@ -120,8 +119,19 @@ impl FlipState {
         view: &View<'_>,
         buffer: Buf<Real>,
     ) -> Result<Vec<f64>, SolveError> {
-        let values = view.reals(&buffer, self.precision(), self.elements().cells)?;
-        Ok(self.rows_of(&values))
+        self.by_row_of(view, buffer, 0)
+    }
+
+    /// Reads one of the arrays that a buffer of the projection holds, by row.
+    pub(super) fn by_row_of(
+        &self,
+        view: &View<'_>,
+        buffer: Buf<Real>,
+        array: usize,
+    ) -> Result<Vec<f64>, SolveError> {
+        let Elements { cells, stride, .. } = *self.elements();
+        let values = view.reals(&buffer, self.precision(), array * stride + cells)?;
+        Ok(self.rows_of(&values[array * stride..]))
     }
 
     /// Reads the terms whose sum is the solution, by row.
@@ -285,7 +295,7 @@ fn build_system(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
 }
 
 fn divergence(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
-    state.note_sum(io, solved::RHS, solved::RHS)?;
+    state.note_sum(io, SQUARE, [solved::RHS; 2])?;
     let velocity = state
         .elements()
         .planes(&io.before, buffers::FACE_VELOCITY)?;
@@ -301,34 +311,13 @@ fn divergence(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
 }
 
 fn density_source(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
-    state.note_sum(io, solved::RHS, solved::RHS)?;
+    state.note_sum(io, SQUARE, [solved::RHS; 2])?;
     let rhs = state.by_row(&io.after, solved::RHS)?;
     let centers = &state.assembled().centers;
     let reference = reference_density_source(&state.model, state.system(), centers);
     state.add_rows(io.table, &SOURCE, |row| {
         (rhs[row], reference[row], [reference[row].abs()])
     });
-    Ok(())
-}
-
-fn multiply(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
-    if state.is_turn(io)? && state.is_due(io, 0) {
-        state.note_sum(io, solved::DIRECTION, solved::PRODUCT)?;
-    }
-    if state.products == PRODUCTS {
-        return Ok(());
-    }
-    let direction = state.by_row(&io.after, solved::DIRECTION)?;
-    if direction.iter().all(|&value| value == 0.0) {
-        return Ok(());
-    }
-    let product = state.by_row(&io.after, solved::PRODUCT)?;
-    let (system, unit) = (state.system(), state.unit());
-    let (reference, errors) = (system.apply(&direction), differences(system, &direction));
-    state.add_rows(io.table, &PRODUCT, |row| {
-        (product[row], reference[row], [unit, errors[row]])
-    });
-    state.products += 1;
     Ok(())
 }
 

@@ -63,6 +63,12 @@ bounds! {
     pub(super) OF_BETA = [sum: "" OF_SUM, unit: "U, or 2⁻⁵³ with f64", value: "|the sum|",
         before: "that before it"]
         ((sum + 4.0 * unit * value) / before).abs(), "";
+    pub(super) OF_FORESEEN = [unit: "U, or 2⁻⁵³ with f64", terms: "‖r‖² + 2 |α r·q| + α² ‖q‖²",
+        alpha: "|α|", moved: "" OF_ALPHA, overlap: "|r·q|", of_overlap: "its " OF_SUM,
+        square: "‖q‖²", of_square: "its " OF_SUM]
+        8.0 * unit * terms + 2.0 * (alpha * of_overlap + moved * (overlap + of_overlap))
+            + alpha * alpha * of_square
+            + moved * (2.0 * alpha + moved) * (square + of_square), "";
     pub(super) NEAR_TARGET = [sum: "" OF_SUM, unit: "U, or 2⁻⁵³ with f64",
         target: "‖b‖² tolerance², or 0"]
         sum + 2.0 * unit * target, "the target";
@@ -183,15 +189,21 @@ entries! {
         LABELS = "labels of water that no air touches", "": [] 0.0, "the least place of each";
         POCKETS = "pockets", "": [] 0.0, "a count";
     }
+    "pressure/sum_pockets" {
+        POCKET_SUM = "sums over parts of pockets", "": [unit: "U, or 2⁻⁵³ with f64",
+            n: "cells of the part", size: "Σ|x| over it"]
+            unit * (n / 256.0 + 9.0) * size, "a thread's cells, and a tree of 8 sums";
+    }
     "pressure/center" {
         CENTERED = "values less their mean", "": [unit: "U, or 2⁻⁵³ with f64",
             n: "cells of the pocket", size: "Σ|x| over it", value: "|x|"]
-            unit * ((n / 256.0 + 14.0) * size / n + value), "the mean's error, and one difference";
+            unit * ((n / 1048576.0 + 36.0) * size / n + value),
+            "the mean's error, of parts of 4096 cells, and one difference";
     }
     "pressure/reduce" {
         SCALARS = "sums and what follows", "": [sum: "of a sum " OF_SUM, alpha: "of α " OF_ALPHA,
-            beta: "of β " OF_BETA]
-            sum + alpha + beta, "";
+            beta: "of β " OF_BETA, foreseen: "of the residual after a step " OF_FORESEEN]
+            sum + alpha + beta + foreseen, "";
         DECIDED = "state, iterations, restarts", "": [] 0.0, "whole numbers", tie NEAR_TARGET;
     }
     "pressure/precondition" {
@@ -213,18 +225,16 @@ entries! {
             [off: "what the block's solution answers to a right-hand side off by " OF_BLOCK]
             off, "", tie PIVOT;
     }
-    "pressure/smooth" {
+    "pressure/restrict" {
+        RESTRICTED = "residual of the coarser level", "": [error: "" OF_RESTRICTION] error, "";
         SMOOTHED = "correction", "":
             [off: "what the block's solution answers to a right-hand side off by " OF_BLOCK]
             off, "", tie PIVOT;
     }
-    "pressure/smooth_corrected" {
-        SMOOTHED_CORRECTED = "correction", "":
+    "pressure/prolong" {
+        PROLONGED = "correction", "":
             [off: "what the block's solution answers to a right-hand side off by " OF_BLOCK]
             off, "", tie PIVOT;
-    }
-    "pressure/restrict" {
-        RESTRICTED = "residual of the coarser level", "": [error: "" OF_RESTRICTION] error, "";
     }
     "pressure/solve_coarse" {
         COARSE_SOLVED = "correction", "":
@@ -236,16 +246,17 @@ entries! {
                    and of each restriction " OF_RESTRICTION]
             off, "", tie PIVOT;
     }
-    "pressure/direction" {
+    "pressure/advance" {
         DIRECTED = "direction", "": [unit: "U, or 2⁻⁵³ with f64", size: "|z| + |β p|"]
             2.0 * unit * size, "";
-    }
-    "pressure/advance" {
         ADVANCED_SOLUTION = "solution, both words", "": [one: "with one word " ONE_WORD,
             two: "with two " TWO_WORDS]
             one + two, "";
         ADVANCED_RESIDUAL = "residual", "": [unit: "U, or 2⁻⁵³ with f64", size: "|r| + |α A p|"]
             2.0 * unit * size, "";
+        SMOOTHED_NEXT = "next correction", "":
+            [off: "what the block's solution answers to a right-hand side off by " OF_BLOCK]
+            off, "", tie PIVOT;
     }
     "pressure/verify" {
         VERIFIED_RESIDUAL = "residual", "": [unit: "U, or 2⁻⁵³ with f64",
@@ -261,8 +272,8 @@ entries! {
     }
     "pressure/multiply" {
         PRODUCT = "system times direction", "m/s": [unit: "U, or 2⁻⁵³ with f64",
-            differences: "Σ c |x − x'|"]
-            12.0 * unit * differences, "by differences";
+            differences: "Σ c |x − x'|", size: "Σ c (|z| + |β p|) of a row and its neighbours"]
+            unit * (12.0 * differences + 2.0 * size), "by differences, of a rounded direction";
     }
     "pressure/project" {
         PROJECTED = "velocity at faces", "m/s":

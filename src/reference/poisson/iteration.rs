@@ -52,6 +52,21 @@ pub fn differences(system: &System, x: &[f64]) -> Vec<f64> {
         .collect()
 }
 
+/// Returns Σ c (x + x') plus the air term for each row: how far rounding errors of up to x move the
+/// system's image.
+pub fn sums(system: &System, x: &[f64]) -> Vec<f64> {
+    (0..x.len())
+        .map(|i| {
+            let shared = system.neighbor[i].iter().zip(&system.coefficient[i]);
+            let inner: f64 = shared
+                .filter(|(j, _)| **j != NONE)
+                .map(|(&j, c)| c * (x[i] + x[j as usize]))
+                .sum();
+            inner + system.dirichlet[i] * x[i]
+        })
+        .collect()
+}
+
 /// Returns Σ over the lower (`first` = 0) or the upper (1) neighbours of row `i`: coefficient times
 /// `value`.
 fn shared(system: &System, i: usize, first: usize, value: impl Fn(usize) -> f64) -> Sum {
@@ -123,12 +138,10 @@ pub enum Decision {
         /// Whether there are pockets that the host has not listed yet.
         wants_pockets: bool,
     },
-    /// Computes β, from residual · correction.
-    Direction,
-    /// Computes α, from direction · its image.
-    Length,
-    /// Tests the updated ‖r‖².
-    Check(Limits),
+    /// Tests ‖r‖² as the last step left it, and computes β.
+    Direction(Limits),
+    /// Computes α, and tests the ‖r‖² that this step will leave.
+    Length(Limits),
     /// Tests ‖r‖² of the true residual.
     Verified(Limits),
 }
@@ -172,9 +185,13 @@ impl Progress {
                     restarts: 0,
                 };
             }
-            Decision::Direction => self.is_first = false,
-            Decision::Length => {}
-            Decision::Check(limits) => {
+            Decision::Direction(limits) => {
+                self.is_first = false;
+                if sum <= limits.target {
+                    self.state = SolveState::Verifying;
+                }
+            }
+            Decision::Length(limits) => {
                 self.iterations += 1;
                 if sum <= limits.target || self.iterations >= limits.iterations {
                     self.state = SolveState::Verifying;
@@ -284,14 +301,17 @@ mod tests {
             (SolveState::Iterating, 0, 0)
         );
         let checked = begun
-            .after(Decision::Direction, 4.0)
-            .after(Decision::Check(limits), 2.0);
+            .after(Decision::Direction(limits), 4.0)
+            .after(Decision::Length(limits), 2.0);
         assert_eq!(
             (checked.state, checked.is_first),
             (SolveState::Iterating, false)
         );
-        let small = checked.after(Decision::Check(limits), 0.5);
-        assert_eq!(small.state, SolveState::Verifying);
+        let small = checked.after(Decision::Length(limits), 0.5);
+        assert_eq!((small.state, small.iterations), (SolveState::Verifying, 2));
+        // The residual fell further than the step foresaw.
+        let late = checked.after(Decision::Direction(limits), 0.5);
+        assert_eq!((late.state, late.iterations), (SolveState::Verifying, 1));
         // The updated residual was too optimistic.
         let again = small.after(Decision::Verified(limits), 2.0);
         assert_eq!(
@@ -302,7 +322,7 @@ mod tests {
             small.after(Decision::Verified(limits), 1.0).state,
             SolveState::Done
         );
-        let last = again.after(Decision::Check(limits), 2.0);
+        let last = again.after(Decision::Length(limits), 2.0);
         assert_eq!(
             last.after(Decision::Verified(limits), 2.0).state,
             SolveState::Done

@@ -42,6 +42,8 @@ pub struct Levels {
     pub residual: Vec<f64>,
     /// Solutions.
     pub correction: Vec<f64>,
+    /// What the first smoothing left on levels whose bricks are smoothed one by one.
+    pub smoothed: Vec<f64>,
 }
 
 /// Rounding model of the device.
@@ -65,6 +67,24 @@ pub enum Surroundings {
     Corrections,
     /// The latest corrections plus the coarser level's.
     WithAbove,
+    /// What the first smoothing left.
+    Smoothed,
+    /// The same in the block's own brick; zero in others.
+    SmoothedWithin,
+    /// The same in other bricks; zero in the block's own.
+    SmoothedBeyond,
+    /// What the first smoothing left plus the coarser level's corrections.
+    SmoothedWithAbove,
+    /// The latest corrections in the block's own brick; in others what the first smoothing left
+    /// plus the coarser level's corrections.
+    Prolonged,
+}
+
+/// How the brick beside a block enters.
+enum Beside<'a> {
+    Nothing,
+    Values(&'a [f64]),
+    WithAbove(&'a [f64]),
 }
 
 /// Expected value at an index, with an error bound.
@@ -92,6 +112,11 @@ pub fn block_index(slot: u32, block: u32, c: usize) -> usize {
     (CELLS * slot + block) as usize + 64 * c
 }
 
+/// Returns the colour of a block.
+fn colour(block: u32) -> u32 {
+    ((block & 1) + (block >> 2 & 1) + (block >> 4 & 1)) % 2
+}
+
 /// Returns the offset of the cell above a block from the cell above block 0.
 pub fn above_offset(block: u32) -> u32 {
     let at = [block & 3, block >> 2 & 3, block >> 4];
@@ -103,17 +128,21 @@ pub fn above_offset(block: u32) -> u32 {
 impl Levels {
     /// Returns the blocks of one colour of a level, with their slots.
     pub fn coloured(&self, level: usize, colour: u32) -> Vec<(u32, u32)> {
-        let is_of =
-            move |block: &u32| ((block & 1) + (block >> 2 & 1) + (block >> 4 & 1)) % 2 == colour;
+        let blocks = self.blocks(level).into_iter();
+        blocks.filter(|at| self::colour(at.1) == colour).collect()
+    }
+
+    /// Returns the blocks of a level, with their slots.
+    fn blocks(&self, level: usize) -> Vec<(u32, u32)> {
         (self.levels[level].clone())
-            .flat_map(|slot| (0..64).filter(is_of).map(move |block| (slot, block)))
+            .flat_map(|slot| (0..64).map(move |block| (slot, block)))
             .collect()
     }
 
-    /// Reference pass of `pressure/smooth_first`, `pressure/smooth` and
-    /// `pressure/smooth_corrected`: the corrections of a block of a level; `None` if rounding
-    /// decides whether it has a solution. `rhs_error` bounds the error of the right-hand side
-    /// itself.
+    /// Reference pass of `pressure/smooth_first` and of the smoothing of `pressure/restrict`,
+    /// `pressure/prolong` and `pressure/advance`: the corrections of a block of a level; `None` if
+    /// rounding decides whether it has a solution. `rhs_error` bounds the error of the right-hand
+    /// side itself.
     pub fn solved(
         &self,
         level: usize,
@@ -130,10 +159,39 @@ impl Levels {
         }))
     }
 
-    /// Reference pass of `pressure/restrict`: residuals above a block of the first colour and above
-    /// its neighbour along x. The former gets half of the inflow since it was solved, the latter,
+    /// Reference pass of `pressure/restrict`: the residuals of a level, from the first smoothing of
+    /// the finer one. Each is half of what a block left: the first colour was solved with zero around
+    /// it, the second with the values of its own brick.
+    pub fn restricted(&self, level: usize, rounding: Rounding) -> Vec<Expected> {
+        let of = |(slot, block): (u32, u32)| {
+            let about = match colour(block) {
+                0 => Surroundings::Smoothed,
+                _ => Surroundings::SmoothedBeyond,
+            };
+            let found = self.block(level - 1, slot, block, about);
+            let above = self.bricks[slot as usize].above;
+            Expected {
+                place: (above + above_offset(block)) as usize,
+                value: 0.5 * found.inflow.iter().sum::<f64>(),
+                error: (rounding.restricted)([
+                    rounding.unit,
+                    self.inflow_size(&found, slot, block),
+                ]),
+            }
+        };
+        self.blocks(level - 1).into_iter().map(of).collect()
+    }
+
+    /// Returns the sum of magnitudes of a block's inflow.
+    fn inflow_size(&self, found: &Block, slot: u32, block: u32) -> f64 {
+        let own = |c: usize| self.residual[block_index(slot, block, c)].abs();
+        (0..8).map(|c| found.size[c] - own(c)).sum()
+    }
+
+    /// Residuals above a block of the first colour and above its neighbour along x, within
+    /// `pressure/solve_coarse`. The former gets half of the inflow since it was solved, the latter,
     /// which was solved last, 0.
-    pub fn restricted(
+    fn restricted_pair(
         &self,
         level: usize,
         (slot, block): (u32, u32),
@@ -143,10 +201,7 @@ impl Levels {
         let above = self.bricks[slot as usize].above;
         let at = |block: u32| (above + above_offset(block)) as usize;
         let sum: f64 = found.inflow.iter().sum();
-        // The magnitudes of the inflow only, without those of the residuals.
-        let size: f64 = (0..8)
-            .map(|c| found.size[c] - self.residual[block_index(slot, block, c)].abs())
-            .sum();
+        let size = self.inflow_size(&found, slot, block);
         [
             Expected {
                 place: at(block),
@@ -161,10 +216,10 @@ impl Levels {
         ]
     }
 
-    /// Reference pass of `pressure/solve_coarse`: from the residuals on level `first` down to the
-    /// last level, symmetric sweeps there, and back up. Returns the corrections and residuals of
-    /// the levels, and their error bounds; `None` if rounding decides whether a block has a
-    /// solution.
+    /// Reference pass of `pressure/solve_coarse`: the residuals on level `first` from the finer
+    /// level, down to the last level, symmetric sweeps there, and back up. Returns the corrections
+    /// and residuals of the levels, and their error bounds; `None` if rounding decides whether a
+    /// block has a solution.
     pub fn solve_coarse(&self, first: usize, rounding: Rounding) -> Option<[Self; 2]> {
         let mut values = self.clone();
         let own = (CELLS * self.levels[first].end) as usize;
@@ -172,6 +227,12 @@ impl Levels {
         values.correction.fill(0.0);
         let mut errors = values.clone();
         errors.residual.fill(0.0);
+        if first > 0 {
+            for passed in self.restricted(first, rounding) {
+                values.residual[passed.place] = passed.value;
+                errors.residual[passed.place] = passed.error;
+            }
+        }
         let mut cycle = Cycle {
             values,
             errors,
@@ -213,6 +274,25 @@ impl Levels {
         }
     }
 
+    /// Returns the values beside a block, in its own brick or in another.
+    fn around(&self, about: Surroundings, is_own: bool) -> Beside<'_> {
+        match (about, is_own) {
+            (Surroundings::Nothing, _)
+            | (Surroundings::SmoothedWithin, false)
+            | (Surroundings::SmoothedBeyond, true) => Beside::Nothing,
+            (Surroundings::Corrections, _) | (Surroundings::Prolonged, true) => {
+                Beside::Values(&self.correction)
+            }
+            (Surroundings::WithAbove, _) => Beside::WithAbove(&self.correction),
+            (Surroundings::Smoothed, _)
+            | (Surroundings::SmoothedWithin, true)
+            | (Surroundings::SmoothedBeyond, false) => Beside::Values(&self.smoothed),
+            (Surroundings::SmoothedWithAbove, _) | (Surroundings::Prolonged, false) => {
+                Beside::WithAbove(&self.smoothed)
+            }
+        }
+    }
+
     fn block(&self, level: usize, slot: u32, block: u32, about: Surroundings) -> Block {
         let mut found = Block {
             matrix: [[0.0; 8]; 8],
@@ -239,10 +319,15 @@ impl Levels {
                 found.matrix[c][c] += shared;
                 if is_inner {
                     found.matrix[c][other_c] -= shared;
-                } else if about != Surroundings::Nothing {
-                    let mut value = self.correction[other];
+                } else {
+                    let (values, has_above) = match self.around(about, there == slot) {
+                        Beside::Nothing => continue,
+                        Beside::Values(values) => (values, false),
+                        Beside::WithAbove(values) => (values, true),
+                    };
+                    let mut value = values[other];
                     let mut size = value.abs();
-                    if about == Surroundings::WithAbove {
+                    if has_above {
                         let brick = self.bricks[there as usize].above;
                         let more = self.correction[(brick + above_offset(other_block)) as usize];
                         value += more;
@@ -337,8 +422,8 @@ impl Cycle {
 
     fn restrict(&mut self, level: usize) {
         for at in self.values.coloured(level, 0) {
-            let found = self.values.restricted(level, at, self.rounding);
-            let carried = self.errors.restricted(level, at, self.rounding);
+            let found = self.values.restricted_pair(level, at, self.rounding);
+            let carried = self.errors.restricted_pair(level, at, self.rounding);
             for (found, carried) in found.into_iter().zip(carried) {
                 self.values.residual[found.place] = found.value;
                 self.errors.residual[found.place] = carried.value + found.error;

@@ -10,8 +10,8 @@ use swell_gpu::{
 };
 
 use super::{
-    Precision, PressureBrick, PressureControl, PressureControl64, PressurePhase, PressureStats,
-    SolveError,
+    PocketPart, Precision, PressureBrick, PressureControl, PressureControl64, PressurePhase,
+    PressureStats, SolveError,
 };
 
 /// Placeholder type for an f32 or f64 on the device, depending on the precision of the solve.
@@ -30,12 +30,11 @@ pub const BLOCK: Buf<u32> = Buf::new("pressure_block");
 pub const RHS: Buf<Real> = Buf::new("pressure_rhs");
 /// Cells, blocked: residual r.
 pub const RESIDUAL: Buf<Real> = Buf::new("pressure_residual");
-/// Cells, blocked: preconditioned residual M⁻¹ r.
+/// Cells, blocked, two arrays: preconditioned residual M⁻¹ r; and A p, whose place the
+/// preconditioner uses for what it computes first.
 pub const CORRECTION: Buf<Real> = Buf::new("pressure_correction");
 /// Cells, blocked: search direction p.
 pub const DIRECTION: Buf<Real> = Buf::new("pressure_direction");
-/// Cells, blocked: A p.
-pub const PRODUCT: Buf<Real> = Buf::new("pressure_product");
 /// Cells, blocked, one array per term of the precision: the sum of the terms is q, m/s.
 pub const SOLUTION: Buf<Real> = Buf::new("pressure_solution");
 /// Cells, blocked: reciprocal of the diagonal. Exists only with a preconditioner that needs it.
@@ -45,11 +44,13 @@ pub const INVERSE_DIAGONAL: Buf<Real> = Buf::new("pressure_inverse_diagonal");
 pub const LABEL: Buf<u32> = Buf::new("pressure_label");
 /// Blocked indices of the pockets' cells, pocket by pocket.
 pub const POCKET_CELLS: Buf<u32> = Buf::new("pressure_pocket_cells");
-/// Half-open range of each pocket in [`POCKET_CELLS`].
-pub const POCKET_RANGES: Buf<[u32; 2]> = Buf::new("pressure_pocket_ranges");
+/// Parts of the pockets, as ranges in [`POCKET_CELLS`].
+pub const POCKET_PARTS: Buf<PocketPart> = Buf::new("pressure_pocket_parts");
+/// The sum over each part, of the array that is being centred.
+pub const POCKET_SUMS: Buf<Real> = Buf::new("pressure_pocket_sums");
 /// Topology of the bricks, one record per slot.
 pub const BRICKS: Buf<PressureBrick> = Buf::new("pressure_bricks");
-/// One partial sum per workgroup.
+/// Four partial sums per workgroup (shared/pressure_sum.wgsl).
 pub const SUMS: Buf<Real> = Buf::new("pressure_sums");
 /// Scalars of the iteration, in f32.
 pub const CONTROL: Buf<PressureControl> = Buf::new("pressure_control");
@@ -59,8 +60,8 @@ pub const CONTROL_F64: Buf<PressureControl64> = Buf::new("pressure_control");
 pub const STATS: Buf<PressureStats> = Buf::new("pressure_stats");
 /// Workgroups of every dispatch when it runs, indexed by `Size`.
 pub const SIZES: Buf<Workgroups> = Buf::new("pressure_sizes");
-/// Three copies of [`SIZES`]: for iterations, the verification, and the steps after it. Copies of
-/// inactive states are zero.
+/// Four copies of [`SIZES`]: for iterations, the verification, what follows it, and the step of an
+/// iteration. Copies that are not due are zero.
 pub const GROUPS: Buf<Workgroups> = Buf::new("pressure_groups");
 /// Parameters of each dispatch, indexed by `Phase`.
 pub const PHASES: Windows<PressurePhase> = Windows::new("phase", "pressure_phases");

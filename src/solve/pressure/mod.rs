@@ -61,11 +61,12 @@ use super::{SolveError, trace::Run};
 
 use buffers::{PHASES, SIZES, read_control, read_reals};
 pub use params::{
-    PressureBrick, PressureControl, PressureControl64, PressurePhase, PressureStats, ReduceStep,
+    PocketPart, PressureBrick, PressureControl, PressureControl64, PressurePhase, PressureStats,
+    ReduceStep,
 };
 pub(crate) use plan::require;
 use plan::{PHASE_COUNT, Phase, SIZE_COUNT, Size};
-pub use plan::{passes, planned};
+pub use plan::{STEP_OF_FINEST, passes, planned};
 pub(super) use stages::all_commands;
 use stages::{SINGLE, Shape, Stages};
 pub use swell_domain::poisson::{AIR, FLUID, SOLID};
@@ -163,7 +164,7 @@ impl PressureSolver {
             stages: BTreeMap::new(),
             shape: Shape {
                 levels: 1,
-                dispatched: 1,
+                dispatched: 0,
                 has_pockets: false,
             },
             phase: PressurePhase {
@@ -199,8 +200,7 @@ impl PressureSolver {
             levels: used.len(),
             dispatched: (1..used.len())
                 .find(|&level| used[level].count <= SINGLE)
-                .unwrap_or(used.len() - 1)
-                .max(1),
+                .unwrap_or(used.len() - 1),
             has_pockets: false,
         };
         self.set_sizes(program, bricks.active, used);
@@ -217,7 +217,6 @@ impl PressureSolver {
         self.sizes = [Workgroups::default(); SIZE_COUNT];
         for (level, &Level { count, .. }) in levels.iter().enumerate() {
             self.sizes[Size::Full(level).index()] = groups(64 * count);
-            self.sizes[Size::Half(level).index()] = groups(32 * count);
         }
         self.sizes[Size::Single.index()] = [1, 1, 1].into();
         self.sizes[Size::Active.index()] = groups(64 * active);
@@ -253,7 +252,7 @@ impl PressureSolver {
         let pressure = scale.rest_density * f64::from(self.phase.cell_size) / scale.kick;
         self.phase.pressure_scale = pressure as f32;
         // Each substep searches for pockets again.
-        self.phase.has_pockets = 0;
+        self.phase.pocket_parts = 0;
         self.shape.has_pockets = false;
         self.pockets = 0;
         let tolerance = self.settings.tolerance;
@@ -369,9 +368,8 @@ impl PressureSolver {
     }
 
     fn upload_phases(&self, program: &Program) {
-        let has_halves = self.settings.preconditioner == Preconditioner::Multigrid;
         let phases: Vec<_> = (0..PHASE_COUNT)
-            .map(|index| Phase::fill(index, self.phase, has_halves))
+            .map(|index| Phase::fill(index, self.phase))
             .collect();
         program.upload_windows(&PHASES, &phases);
     }
@@ -380,15 +378,14 @@ impl PressureSolver {
     fn find_pockets(&mut self, program: &Program) -> Result<(), SolveError> {
         let cells = (CELLS * (self.phase.levels[0][1] + 1)) as usize;
         let labels = program.read(buffers::LABEL, cells)?;
-        let (cells, ranges) = pockets::list(&labels);
+        let (cells, parts) = pockets::list(&labels);
         program.upload(buffers::POCKET_CELLS, 0, &cells);
-        program.upload(buffers::POCKET_RANGES, 0, &ranges);
-        self.pockets = ranges.len() as u32;
-        self.sizes[Size::Pockets.index()] =
-            spread(&program.context, 1, u64::from(self.pockets)).into();
+        program.upload(buffers::POCKET_PARTS, 0, &parts);
+        self.pockets = pockets::count(&parts);
+        self.sizes[Size::Pockets.index()] = spread(&program.context, 1, parts.len() as u64).into();
         program.upload(SIZES, 0, &self.sizes);
         self.shape.has_pockets = true;
-        self.phase.has_pockets = 1;
+        self.phase.pocket_parts = parts.len() as u32;
         self.upload_phases(program);
         Ok(())
     }

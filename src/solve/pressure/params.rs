@@ -9,18 +9,16 @@ mirror!(
         level: u32,
         /// Index of the coarsest level.
         last_level: u32,
-        /// Colour of the 2³ blocks, in a checkerboard pattern.
-        colour: u32,
         /// Decision of `pressure/reduce`, or whether `pressure/center` records the mean.
         step: u32,
-        /// Number of partial sums that `pressure/reduce` adds up.
+        /// Number of workgroups whose partial sums `pressure/reduce` adds up.
         sum_count: u32,
         /// Distance between planes of an array, in elements: 512 times its slots.
         stride: u32,
         /// Most iterations of a solve.
         max_iterations: u32,
-        /// Whether the pockets have been listed.
-        has_pockets: u32,
+        /// Parts of pockets; 0 until the pockets have been listed.
+        pocket_parts: u32,
         /// Square of the tolerance for the relative residual.
         tolerance_square: f32,
         /// Cell size Δx, metres.
@@ -29,6 +27,8 @@ mirror!(
         pressure_scale: f32,
         /// Always 0, but unknown to the shader compiler.
         opaque_zero: u32,
+        /// Unused.
+        padding: u32,
         /// For each level: first slot, bricks, active bricks (finest level only), 0.
         levels: [[u32; 4]; super::LEVELS],
     }
@@ -132,6 +132,20 @@ mirror!(
     }
 );
 
+mirror!(
+    /// `PocketPart` of shared/pressure_pockets.wgsl: cells of a pocket that one workgroup sums.
+    PocketPart {
+        /// First index in `pressure_pocket_cells`.
+        first: u32,
+        /// Index after the last.
+        end: u32,
+        /// First part of the same pocket.
+        first_part: u32,
+        /// Part after its last.
+        end_part: u32,
+    }
+);
+
 /// Decisions of `pressure/reduce`, by number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ReduceStep {
@@ -139,10 +153,8 @@ pub enum ReduceStep {
     Begin,
     /// Computes β.
     Direction,
-    /// Computes α.
+    /// Computes α, and tests the residual after that step.
     Length,
-    /// Tests the updated residual.
-    Check,
     /// Tests the true residual.
     Verified,
 }

@@ -20,11 +20,11 @@ use super::{
 /// Indices into `pressure_phases`.
 #[derive(Clone, Copy)]
 pub(super) enum Phase {
-    /// Blocks of a (level, colour); passes over a whole level use colour 0.
-    Level(usize, usize),
+    /// Blocks of a level.
+    Level(usize),
     /// Parameters of `pressure/reduce`.
     Reduce(ReduceStep),
-    /// Parameters of `pressure/center`; `true` if it records the means.
+    /// Parameters of `pressure/sum_pockets` and `pressure/center`; `true` if it records the means.
     Center(bool),
 }
 
@@ -34,25 +34,22 @@ pub(super) const PHASE_COUNT: usize = Phase::Center(true).index() + 1;
 impl Phase {
     pub(super) const fn index(self) -> usize {
         match self {
-            Self::Level(level, colour) => 2 * level + colour,
-            Self::Reduce(step) => 2 * LEVELS + step as usize,
-            Self::Center(is_noted) => 2 * LEVELS + 5 + is_noted as usize,
+            Self::Level(level) => level,
+            Self::Reduce(step) => LEVELS + step as usize,
+            Self::Center(is_noted) => LEVELS + 4 + is_noted as usize,
         }
     }
 
     /// Returns `base` with the fields of this phase.
-    pub(super) fn fill(index: usize, base: PressurePhase, half_sums: bool) -> PressurePhase {
-        let wet = base.levels[0][1];
+    pub(super) fn fill(index: usize, base: PressurePhase) -> PressurePhase {
         let mut phase = base;
-        if index < 2 * LEVELS {
-            (phase.level, phase.colour) = (index as u32 / 2, index as u32 % 2);
-        } else if index < 2 * LEVELS + 5 {
-            phase.step = (index - 2 * LEVELS) as u32;
-            // The preconditioner's last two passes cover one colour each.
-            let is_half = half_sums && phase.step == ReduceStep::Direction as u32;
-            phase.sum_count = if is_half { 2 * wet.div_ceil(2) } else { wet };
+        phase.sum_count = base.levels[0][1];
+        if index < LEVELS {
+            phase.level = index as u32;
+        } else if index < LEVELS + 4 {
+            phase.step = (index - LEVELS) as u32;
         } else {
-            phase.step = (index - 2 * LEVELS - 5) as u32;
+            phase.step = (index - LEVELS - 4) as u32;
         }
         phase
     }
@@ -63,11 +60,9 @@ impl Phase {
 pub(super) enum Size {
     /// One thread per block of a level.
     Full(usize),
-    /// One thread per block of one colour of a level.
-    Half(usize),
     /// One workgroup.
     Single,
-    /// One workgroup per pocket.
+    /// One workgroup per part of a pocket.
     Pockets,
     /// One thread per block of the active bricks.
     Active,
@@ -76,14 +71,20 @@ pub(super) enum Size {
 /// Number of sizes.
 pub(super) const SIZE_COUNT: usize = Size::Active.index() + 1;
 
+/// Section of `pressure_groups` for the step of an iteration; the others are numbered by state.
+const STEP: u32 = 3;
+
+/// Index in `pressure_groups` of a dispatch over the finest level that takes the step of an
+/// iteration.
+pub const STEP_OF_FINEST: usize = STEP as usize * SIZE_COUNT + Size::Full(0).index();
+
 impl Size {
     pub(super) const fn index(self) -> usize {
         match self {
             Self::Full(level) => level,
-            Self::Half(level) => LEVELS + level,
-            Self::Single => 2 * LEVELS,
-            Self::Pockets => 2 * LEVELS + 1,
-            Self::Active => 2 * LEVELS + 2,
+            Self::Single => LEVELS,
+            Self::Pockets => LEVELS + 1,
+            Self::Active => LEVELS + 2,
         }
     }
 }
@@ -97,6 +98,8 @@ pub(super) enum When {
     InTurn,
     /// While the solve iterates.
     Iterating,
+    /// When an iteration has found the length of its step.
+    Stepping,
     /// When the solve has converged by its updated residual.
     Verifying,
     /// When the solve has ended.
@@ -123,6 +126,7 @@ pub(super) fn run_on(
         When::Always => Groups::at(&SIZES, size.index()),
         When::InTurn => Groups::Threads(1),
         When::Iterating => section(ITERATING),
+        When::Stepping => section(STEP),
         When::Verifying => section(VERIFYING),
         When::Done => section(DONE),
     };
@@ -160,24 +164,25 @@ pub fn planned(settings: &Pressure, capacity: usize) -> Table {
             BLOCK.sized(cells / 8),
             reals(RHS, cells),
             reals(RESIDUAL, cells),
-            reals(CORRECTION, cells),
+            reals(CORRECTION, 2 * cells),
             reals(DIRECTION, cells),
-            reals(PRODUCT, cells),
             reals(SOLUTION, precision.terms() * cells),
             LABEL.sized(cells),
             POCKET_CELLS.sized(cells),
-            POCKET_RANGES.sized(cells / 2),
+            // The water of a pocket has two cells at least.
+            POCKET_PARTS.sized(cells / 2),
+            reals(POCKET_SUMS, cells / 2),
             BRICKS.sized(capacity),
-            // One sum per workgroup, and space for the excess workgroups of a two-dimensional
+            // Sums of each workgroup, and space for the excess workgroups of a two-dimensional
             // dispatch.
-            reals(SUMS, capacity + 1024),
+            reals(SUMS, 4 * (capacity + 1024)),
             match precision {
                 Precision::F32 | Precision::F32Refined => CONTROL.sized(1),
                 Precision::F64 => CONTROL_F64.sized(1),
             },
             STATS.sized(1),
             SIZES.sized(SIZE_COUNT),
-            GROUPS.sized(3 * SIZE_COUNT),
+            GROUPS.sized(4 * SIZE_COUNT),
             PHASES.sized(PHASE_COUNT),
         ],
     );
@@ -217,6 +222,10 @@ fn pass(name: &'static str, settings: &Pressure, surface: Surface, is_periodic: 
     let conditions = [
         ("GHOST_FLUID", surface == Surface::GhostFluid),
         ("DIAGONAL", has_diagonal(settings)),
+        (
+            "MULTIGRID",
+            settings.preconditioner == Preconditioner::Multigrid,
+        ),
         ("TWO_WORDS", settings.precision == Precision::F32Refined),
         ("F64", settings.precision == Precision::F64),
         ("PERIODIC", is_periodic),

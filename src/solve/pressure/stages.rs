@@ -18,15 +18,13 @@ use super::{
 /// Most bricks of a level that one workgroup can process together with all coarser levels.
 pub(super) const SINGLE: u32 = 4;
 
-/// Symmetric sweeps if there is only one level.
-const SWEEPS: usize = 8;
-
 /// Parameters that determine the command lists.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Shape {
     /// Number of levels.
     pub levels: usize,
-    /// Number of levels with dispatches of their own; one workgroup processes the others.
+    /// Number of levels with dispatches of their own; one workgroup processes the others, at least
+    /// the last.
     pub dispatched: usize,
     /// Whether means are removed over pockets.
     pub has_pockets: bool,
@@ -48,14 +46,14 @@ pub(super) struct Stages<T> {
 
 impl Stages<Vec<Command>> {
     pub(super) fn new(preconditioner: Preconditioner, has_correction: bool, shape: Shape) -> Self {
-        let finest = |pass, when| run(pass, Phase::Level(0, 0), when, Size::Full(0));
-        let finish = |pass| run(pass, Phase::Level(0, 0), When::Done, Size::Active);
+        let finest = |pass, when| run(pass, Phase::Level(0), when, Size::Full(0));
+        let finish = |pass| run(pass, Phase::Level(0), When::Done, Size::Active);
         Self {
             project: build(preconditioner, shape),
             correct: has_correction.then(|| vec![finest("pressure/density_source", When::Always)]),
-            begin: begin(shape),
+            begin: begin(preconditioner, shape),
             iterate: iteration(preconditioner, shape),
-            verify: verification(shape),
+            verify: verification(preconditioner, shape),
             finish_project: vec![
                 finish("pressure/project"),
                 finest("pressure/measure_divergence", When::Done),
@@ -90,7 +88,7 @@ impl Stages<Vec<Command>> {
 pub(crate) fn all_commands(preconditioner: Preconditioner, has_correction: bool) -> Vec<Command> {
     let mut all = Vec::new();
     for levels in (1..=LEVELS).rev() {
-        for dispatched in 1..levels.max(2) {
+        for dispatched in usize::from(levels > 1)..levels {
             for has_pockets in [false, true] {
                 let shape = Shape {
                     levels,
@@ -113,24 +111,39 @@ fn reduce(step: ReduceStep) -> Command {
     )
 }
 
-fn center(values: &Buf<Real>, is_noted: bool, when: When) -> Command {
-    run_on(
-        "pressure/center",
-        Phase::Center(is_noted),
-        when,
-        Size::Pockets,
-        Some(values),
-    )
+/// Removes the mean of `values` over each pocket.
+fn center(values: &Buf<Real>, is_noted: bool, when: When) -> [Command; 2] {
+    ["pressure/sum_pockets", "pressure/center"].map(|pass| {
+        run_on(
+            pass,
+            Phase::Center(is_noted),
+            when,
+            Size::Pockets,
+            Some(values),
+        )
+    })
+}
+
+/// Returns the start of a V-cycle that does not follow `pressure/advance`.
+fn smooth_first(preconditioner: Preconditioner) -> Option<Command> {
+    (preconditioner == Preconditioner::Multigrid).then(|| {
+        run(
+            "pressure/smooth_first",
+            Phase::Level(0),
+            When::Iterating,
+            Size::Full(0),
+        )
+    })
 }
 
 fn build(preconditioner: Preconditioner, shape: Shape) -> Vec<Command> {
-    let finest = |pass| run(pass, Phase::Level(0, 0), When::Always, Size::Full(0));
+    let finest = |pass| run(pass, Phase::Level(0), When::Always, Size::Full(0));
     let mut commands = vec![Command::clear(&STATS), finest("pressure/build_system")];
     if preconditioner == Preconditioner::Multigrid {
         commands.extend((1..shape.levels).map(|level| {
             run(
                 "pressure/coarsen",
-                Phase::Level(level, 0),
+                Phase::Level(level),
                 When::Always,
                 Size::Full(level),
             )
@@ -145,97 +158,94 @@ fn build(preconditioner: Preconditioner, shape: Shape) -> Vec<Command> {
     commands
 }
 
-fn begin(shape: Shape) -> Vec<Command> {
+fn begin(preconditioner: Preconditioner, shape: Shape) -> Vec<Command> {
     let mut commands = Vec::new();
     if shape.has_pockets {
-        commands.push(center(&RHS, true, When::Always));
+        commands.extend(center(&RHS, true, When::Always));
         // With a solution of 0, the true residual is the right-hand side.
         commands.push(run(
             "pressure/verify",
-            Phase::Level(0, 0),
+            Phase::Level(0),
             When::Always,
             Size::Full(0),
         ));
     }
     commands.push(reduce(ReduceStep::Begin));
+    commands.extend(smooth_first(preconditioner));
     commands
 }
 
 fn iteration(preconditioner: Preconditioner, shape: Shape) -> Vec<Command> {
-    let finest = |pass| run(pass, Phase::Level(0, 0), When::Iterating, Size::Full(0));
+    let finest = |pass| run(pass, Phase::Level(0), When::Iterating, Size::Full(0));
     let mut commands = match preconditioner {
         Preconditioner::None | Preconditioner::Jacobi => vec![finest("pressure/precondition")],
         Preconditioner::Ipp => vec![finest("pressure/ipp_lower"), finest("pressure/ipp_upper")],
         Preconditioner::Multigrid => cycle(shape),
     };
     if shape.has_pockets {
-        commands.push(center(&CORRECTION, false, When::Iterating));
+        commands.extend(center(&CORRECTION, false, When::Iterating));
     }
     commands.extend([
         reduce(ReduceStep::Direction),
-        finest("pressure/direction"),
         finest("pressure/multiply"),
         reduce(ReduceStep::Length),
-        finest("pressure/advance"),
+        run(
+            "pressure/advance",
+            Phase::Level(0),
+            When::Stepping,
+            Size::Full(0),
+        ),
     ]);
     if shape.has_pockets {
-        commands.push(center(&RESIDUAL, false, When::Iterating));
+        commands.extend(center(&RESIDUAL, false, When::Iterating));
+        commands.extend(smooth_first(preconditioner));
     }
-    commands.push(reduce(ReduceStep::Check));
     commands
 }
 
-/// One symmetric V-cycle: down with the first colour, then the second; up with the second colour,
-/// then the first.
+/// One symmetric V-cycle after the first smoothing of the finest level.
 fn cycle(shape: Shape) -> Vec<Command> {
-    let half = |pass, level, colour| {
-        run(
-            pass,
-            Phase::Level(level, colour),
-            When::Iterating,
-            Size::Half(level),
-        )
-    };
-    let mut commands = Vec::new();
-    if shape.levels == 1 {
-        commands.push(half("pressure/smooth_first", 0, 0));
-        for _ in 0..SWEEPS {
-            commands.extend([1, 0].map(|colour| half("pressure/smooth", 0, colour)));
-        }
-        return commands;
-    }
-    for level in 0..shape.dispatched {
-        commands.extend([
-            half("pressure/smooth_first", level, 0),
-            half("pressure/smooth", level, 1),
-            half("pressure/restrict", level, 0),
-        ]);
-    }
-    commands.push(run(
-        "pressure/solve_coarse",
-        Phase::Level(shape.dispatched, 0),
-        When::Iterating,
-        Size::Single,
-    ));
-    for level in (0..shape.dispatched).rev() {
-        commands.extend([
-            half("pressure/smooth_corrected", level, 1),
-            half("pressure/smooth", level, 0),
-        ]);
-    }
-    commands
+    let on = |pass, level, size| run(pass, Phase::Level(level), When::Iterating, size);
+    let down = (1..shape.dispatched).map(|level| on("pressure/restrict", level, Size::Full(level)));
+    let coarse = on("pressure/solve_coarse", shape.dispatched, Size::Single);
+    let up = (0..shape.dispatched).rev();
+    let up = up.map(|level| on("pressure/prolong", level, Size::Full(level)));
+    down.chain([coarse]).chain(up).collect()
 }
 
-fn verification(shape: Shape) -> Vec<Command> {
+fn verification(preconditioner: Preconditioner, shape: Shape) -> Vec<Command> {
     let mut commands = vec![run(
         "pressure/verify",
-        Phase::Level(0, 0),
+        Phase::Level(0),
         When::Verifying,
         Size::Full(0),
     )];
     if shape.has_pockets {
-        commands.push(center(&RESIDUAL, false, When::Verifying));
+        commands.extend(center(&RESIDUAL, false, When::Verifying));
     }
     commands.push(reduce(ReduceStep::Verified));
+    commands.extend(smooth_first(preconditioner));
     commands
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_iteration_has_two_dispatches_a_level_and_four_more() {
+        let dispatches = |levels, dispatched| {
+            let shape = Shape {
+                levels,
+                dispatched,
+                has_pockets: false,
+            };
+            iteration(Preconditioner::Multigrid, shape).len()
+        };
+        for (levels, dispatched) in [(2, 1), (3, 2), (4, 3), (8, 7)] {
+            assert_eq!(dispatches(levels, dispatched), 4 + 2 * dispatched);
+        }
+        // One workgroup also solves a single brick.
+        assert_eq!(dispatches(1, 0), 5);
+    }
 }

@@ -482,7 +482,7 @@ fn flip_is_within_tolerance_in_each_precision_of_its_projection() {
     let off = |factor| {
         control(
             "pressure/multiply",
-            "pressure_product[own + 64u * c] = product.lo[c]",
+            "pressure_correction[phase.stride + e] = product.lo[c]",
             factor,
             "pressure/multiply",
             &["system times direction"],
@@ -492,7 +492,7 @@ fn flip_is_within_tolerance_in_each_precision_of_its_projection() {
     let elsewhere: Vec<&str> = FLIP.iter().map(|control| control.pass).collect();
     let sort = ["sort/scan_blocks", "sort/add_block_sums", "sort/place"];
     let elsewhere = [&elsewhere[..], &sort, &["sort/stabilize"]].concat();
-    let slight = "pressure_product[own + 64u * c] = product.lo[c] * 1.000000001";
+    let slight = "pressure_correction[phase.stride + e] = product.lo[c] * 1.000000001";
     let controls = [
         off(slight),
         control(
@@ -510,7 +510,7 @@ fn flip_is_within_tolerance_in_each_precision_of_its_projection() {
     precision(&mut scene, Precision::F64);
     hold(&context, &scene, &start, &controls, &elsewhere);
     precision(&mut scene, Precision::F32);
-    let gross = "pressure_product[own + 64u * c] = product.lo[c] * 1.0001";
+    let gross = "pressure_correction[phase.stride + e] = product.lo[c] * 1.0001";
     hold(&context, &scene, &start, &[off(gross)], &elsewhere);
     // In f32 the slight fault vanishes: 1.000000001 rounds to 1.
     let mut spoiled = context.clone();

@@ -74,11 +74,9 @@ const DEEP: &[Control] = &[control(
     &["kind of block"],
 )
 .and(&[
-    "pressure/smooth_first",
-    "pressure/smooth",
-    "pressure/smooth_corrected",
     "pressure/restrict",
     "pressure/solve_coarse",
+    "pressure/prolong",
 ])];
 
 /// Water from end to end, two bricks deep. (With one brick, every coarser block touches the floor

@@ -23,11 +23,11 @@ pub const SYSTEM: &[&str] = &[
     "pressure/center",
     "pressure/reduce",
     "pressure/coarsen",
+    "pressure/sum_pockets",
     "pressure/smooth_first",
-    "pressure/smooth",
-    "pressure/smooth_corrected",
-    "pressure/restrict",
     "pressure/solve_coarse",
+    "pressure/prolong",
+    "pressure/advance",
 ];
 
 pub const FLIP: &[Control] = &[
@@ -201,8 +201,8 @@ pub const FLIP: &[Control] = &[
     ),
     control(
         "pressure/multiply",
-        "pressure_product[own + 64u * c] = product.lo[c]",
-        "pressure_product[own + 64u * c] = product.lo[c] * 1.001",
+        "pressure_correction[phase.stride + e] = product.lo[c]",
+        "pressure_correction[phase.stride + e] = product.lo[c] * 1.001",
         "pressure/multiply",
         &["system times direction"],
     )
@@ -502,25 +502,11 @@ pub const FLIP: &[Control] = &[
     )
     .and(&["pressure/reduce"]),
     control(
-        "pressure/smooth",
-        "r.lo + flow.lo",
-        "r.lo - flow.lo",
-        "pressure/smooth",
+        "pressure/prolong",
+        "about.zu + above.upper.z",
+        "about.zu + 1.01 * above.upper.z",
+        "pressure/prolong",
         &["correction"],
-    ),
-    control(
-        "pressure/smooth_corrected",
-        "about.zu += above.upper.z",
-        "about.zu -= above.upper.z",
-        "pressure/smooth_corrected",
-        &["correction"],
-    ),
-    control(
-        "pressure/restrict",
-        "0.5 * sum_pair(flow)",
-        "0.5001 * sum_pair(flow)",
-        "pressure/restrict",
-        &["residual of the coarser level"],
     ),
     // Further controls, with something to restrict and to sweep, are in the variant of a channel.
     control(
@@ -538,12 +524,20 @@ pub const FLIP: &[Control] = &[
         &["residuals of the coarser levels"],
     ),
     control(
-        "pressure/direction",
-        "z + beta *",
-        "z - beta *",
-        "pressure/direction",
+        "pressure/advance",
+        "correction + kept",
+        "correction - kept",
+        "pressure/advance",
         &["direction"],
     ),
+    control(
+        "pressure/advance",
+        "wr + w * (",
+        "wr - w * (",
+        "pressure/advance",
+        &["next correction"],
+    )
+    .and(&["pressure/reduce"]),
     control(
         "pressure/advance",
         "+ alpha_small * p",
@@ -553,8 +547,8 @@ pub const FLIP: &[Control] = &[
     ),
     control(
         "pressure/advance",
-        "- alpha * pressure_product[e]",
-        "- 1.001 * alpha * pressure_product[e]",
+        "- alpha * pressure_correction[phase.stride + e]",
+        "- 1.001 * alpha * pressure_correction[phase.stride + e]",
         "pressure/advance",
         &["residual"],
     ),
@@ -567,16 +561,16 @@ pub const FLIP: &[Control] = &[
     ),
     control(
         "pressure/reduce",
-        "pressure_control.alpha = pressure_control.product",
-        "pressure_control.alpha = 1.001 * pressure_control.product",
+        "pressure_control.alpha = alpha",
+        "pressure_control.alpha = 1.001 * alpha",
         "pressure/reduce",
         &["sums and what follows"],
     ),
     // A sum that does not match the values that the pass wrote.
     control(
         "pressure/multiply",
-        "sum_workgroup(dot_pair",
-        "sum_workgroup(1.001 * dot_pair",
+        "vec3r(dot_pair(p, product)",
+        "vec3r(1.001 * dot_pair(p, product)",
         "pressure/reduce",
         &["sums and what follows"],
     ),
@@ -594,5 +588,10 @@ pub const FLIP: &[Control] = &[
         "pressure/count_pockets",
         &["labels of water that no air touches", "pockets"],
     )
-    .and(&["pressure/center", "pressure/reduce", "pressure/verify"]),
+    .and(&[
+        "pressure/sum_pockets",
+        "pressure/center",
+        "pressure/reduce",
+        "pressure/verify",
+    ]),
 ];

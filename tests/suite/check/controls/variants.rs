@@ -112,6 +112,14 @@ fn channel(scene: &mut Scene, start: &mut Start) {
     stir(&mut start.particles);
 }
 
+/// Ten bricks in a row, so that a level of five has dispatches of its own.
+fn long_channel(scene: &mut Scene, start: &mut Start) {
+    scene.domain.max = DVec3::new(16.0, 1.4, 1.4);
+    start.boundary = Boundary::default();
+    start.particles = lattice([0.0; 3], [156, 6, 10], [D; 3]);
+    stir(&mut start.particles);
+}
+
 /// Water below its minimum distance from the floor, next to a solid whose distances are half as
 /// steep as they should be: each push goes half of the required length, and none of it upwards.
 fn corner(_: &mut Scene, start: &mut Start) {
@@ -257,6 +265,14 @@ pub const VARIANTS: &[Variant] = &[
         change: pocket,
         controls: &[
             control(
+                "pressure/sum_pockets",
+                "pressure_pocket_sums[index] = total",
+                "pressure_pocket_sums[index] = 1.001 * total",
+                "pressure/sum_pockets",
+                &["sums over parts of pockets"],
+            )
+            .and(&["pressure/center"]),
+            control(
                 "pressure/center",
                 "-= mean",
                 "-= 1.1 * mean",
@@ -270,7 +286,7 @@ pub const VARIANTS: &[Variant] = &[
                 "pressure/count_pockets",
                 &["labels of water that no air touches", "pockets"],
             )
-            .and(&["pressure/center", "pressure/reduce"]),
+            .and(&["pressure/sum_pockets", "pressure/center", "pressure/reduce"]),
             control(
                 "pressure/count_pockets",
                 "atomicAdd(&pressure_stats.pockets, 1u)",
@@ -286,8 +302,8 @@ pub const VARIANTS: &[Variant] = &[
         controls: &[
             control(
                 "pressure/solve_coarse",
-                "about.xu += above.upper.x;",
-                "about.xu += 1.01 * above.upper.x;",
+                "about.xu + above.upper.x",
+                "about.xu + 1.01 * above.upper.x",
                 "pressure/solve_coarse",
                 &["correction"],
             ),
@@ -301,8 +317,8 @@ pub const VARIANTS: &[Variant] = &[
             // The way back up is omitted, the wrong colour restricted, one sweep replaces eight.
             control(
                 "pressure/solve_coarse",
-                "let above = above_about(s);",
-                "let above = Above(vec3r(0.0), vec3r(0.0));",
+                "with_above(corrections_about(s), above_about(s))",
+                "corrections_about(s)",
                 "pressure/solve_coarse",
                 &["correction"],
             ),
@@ -318,6 +334,61 @@ pub const VARIANTS: &[Variant] = &[
                 "const SWEEPS = 8u;",
                 "const SWEEPS = 1u;",
                 "pressure/solve_coarse",
+                &["correction"],
+            ),
+        ],
+    },
+    Variant {
+        name: "long channel",
+        change: long_channel,
+        controls: &[
+            control(
+                "pressure/restrict",
+                "0.5 * sum_pair(inflow",
+                "0.5001 * sum_pair(inflow",
+                "pressure/restrict",
+                &["residual of the coarser level"],
+            ),
+            control(
+                "pressure/restrict",
+                "0.5 * (x + y + z)",
+                "0.5 * (y + z - x)",
+                "pressure/restrict",
+                &["residual of the coarser level"],
+            ),
+            control(
+                "pressure/restrict",
+                "r.lo + flow.lo",
+                "r.lo - flow.lo",
+                "pressure/restrict",
+                &["correction"],
+            ),
+            control(
+                "pressure/restrict",
+                "smoothed_about(alone(s))",
+                "smoothed_about(s)",
+                "pressure/restrict",
+                &["correction"],
+            ),
+            control(
+                "pressure/solve_coarse",
+                "0.5 * (x + y + z)",
+                "0.5 * (y + z - x)",
+                "pressure/solve_coarse",
+                &["residuals of the coarser levels"],
+            ),
+            control(
+                "pressure/solve_coarse",
+                "0.5 * sum_pair(inflow",
+                "0.505 * sum_pair(inflow",
+                "pressure/solve_coarse",
+                &["residuals of the coarser levels"],
+            ),
+            control(
+                "pressure/prolong",
+                "select(above.lower, vec3r(0.0), is_new_lower)",
+                "select(1.01 * above.lower, vec3r(0.0), is_new_lower)",
+                "pressure/prolong",
                 &["correction"],
             ),
         ],

@@ -135,10 +135,11 @@ fn a_precision_takes_its_own_bytes_and_features() {
     assert_eq!((refined.0, refined.1), (2 * cells, cells));
     assert_eq!((double.0, double.1), (2 * cells, 2 * cells));
     assert_eq!(refined.2 - plain.2, cells);
-    // Six vectors and the Dirichlet part of the rows, the sums, and five scalars.
+    // Six vectors and the Dirichlet part of the rows, sums of pockets, four sums per workgroup, and
+    // five scalars.
     assert_eq!(
         double.2 - plain.2,
-        7 * cells + 4 * (slots as u64 + 1024) + 20
+        7 * cells + cells / 2 + 4 * 4 * (slots as u64 + 1024) + 20
     );
 
     let context = context();
