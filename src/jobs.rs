@@ -33,7 +33,7 @@ static NEVER: AtomicBool = AtomicBool::new(false);
 pub fn bake(scene: &Scene) -> Bake<'_> {
     let solver = scene.solver.method().name();
     Bake {
-        request: bake::Request {
+        request: bake::BakeRequest {
             scene: scene.clone(),
             directory: Path::new("cache").join(&scene.shot.name).join(solver),
             frames: None,
@@ -57,7 +57,7 @@ pub fn bake(scene: &Scene) -> Bake<'_> {
 /// ```
 pub fn render<'a>(directory: impl AsRef<Path>, look: &Look) -> Render<'a> {
     Render {
-        request: render::Request {
+        request: render::RenderRequest {
             cache: directory.as_ref().to_owned(),
             look: look.clone(),
             directory: PathBuf::new(),
@@ -77,7 +77,7 @@ pub fn render<'a>(directory: impl AsRef<Path>, look: &Look) -> Render<'a> {
 /// A bake that has not begun; [`bake()`] makes one.
 #[must_use = "nothing is baked until `run`"]
 pub struct Bake<'a> {
-    request: bake::Request,
+    request: bake::BakeRequest,
     stop: &'a AtomicBool,
     tell: Box<dyn FnMut(bake::Event) + Send + 'a>,
 }
@@ -131,7 +131,7 @@ impl<'a> Bake<'a> {
     }
 
     /// Returns the request, whose other fields can be set too.
-    pub fn request_mut(&mut self) -> &mut bake::Request {
+    pub fn request_mut(&mut self) -> &mut bake::BakeRequest {
         &mut self.request
     }
 
@@ -139,7 +139,7 @@ impl<'a> Bake<'a> {
     ///
     /// # Errors
     /// [`BakeError`]; the frames that were completed before are in the cache.
-    pub fn run(mut self) -> Result<bake::Outcome, BakeError> {
+    pub fn run(mut self) -> Result<bake::BakeOutcome, BakeError> {
         bake::bake(&self.request, self.stop, &mut self.tell)
     }
 }
@@ -147,7 +147,7 @@ impl<'a> Bake<'a> {
 /// A render that has not begun; [`render()`] makes one.
 #[must_use = "nothing is rendered until `run`"]
 pub struct Render<'a> {
-    request: render::Request,
+    request: render::RenderRequest,
     stop: &'a AtomicBool,
     tell: Box<dyn FnMut(render::Event) + Send + 'a>,
 }
@@ -193,7 +193,7 @@ impl<'a> Render<'a> {
     }
 
     /// Returns the request, whose other fields can be set too.
-    pub fn request_mut(&mut self) -> &mut render::Request {
+    pub fn request_mut(&mut self) -> &mut render::RenderRequest {
         &mut self.request
     }
 
@@ -202,7 +202,7 @@ impl<'a> Render<'a> {
     /// # Errors
     /// [`RenderJobError`]. Frames missing from the cache, and a folder that cannot be shared, are
     /// reported before anything is rendered.
-    pub fn run(mut self) -> Result<render::Outcome, RenderJobError> {
+    pub fn run(mut self) -> Result<render::RenderOutcome, RenderJobError> {
         if self.request.directory.as_os_str().is_empty() {
             let cache = CacheReader::open(&self.request.cache)?;
             self.request.directory = Path::new("renders").join(&cache.manifest().shot);

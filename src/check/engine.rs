@@ -24,7 +24,7 @@ use swell_solve::{
 use super::{sort, table::Table};
 
 /// Result of a comparison, whose findings are in the table.
-pub(super) type Outcome = Result<(), SolveError>;
+pub(super) type PassResult = Result<(), SolveError>;
 
 /// Comparison of a pass with its reference pass. `S` is the state that a solver's comparisons share
 /// during the substep.
@@ -38,14 +38,14 @@ pub(super) struct Comparison<S> {
     pub(super) is_due: fn(&mut S, &Io<'_>) -> Result<bool, SolveError>,
     /// Computes what the pass should have written, and adds that and what it did write to the
     /// table.
-    pub(super) compare: fn(&mut S, &mut Io<'_>) -> Outcome,
+    pub(super) compare: fn(&mut S, &mut Io<'_>) -> PassResult,
 }
 
 /// Returns a [`Comparison`] that compares every run.
 pub(super) const fn comparison<S>(
     pass: &'static str,
     keeps: fn() -> Vec<String>,
-    compare: fn(&mut S, &mut Io<'_>) -> Outcome,
+    compare: fn(&mut S, &mut Io<'_>) -> PassResult,
 ) -> Comparison<S> {
     Comparison {
         pass,

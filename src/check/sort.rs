@@ -7,7 +7,7 @@ use swell_gpu::buffer::{Buf, Windows};
 use swell_solve::buffers;
 
 use super::{
-    engine::{Comparison, Io, NONE, Outcome, State, comparison, names},
+    engine::{Comparison, Io, NONE, PassResult, State, comparison, names},
     table::{Entry, Table, entries, pair},
 };
 
@@ -54,7 +54,7 @@ pub(super) fn comparisons<S: State>() -> Comparisons<S> {
     ]
 }
 
-fn scan(io: &mut Io<'_>) -> Outcome {
+fn scan(io: &mut Io<'_>) -> PassResult {
     let length = io.before.window(&LENGTH)?[0] as usize;
     let (mut scanned, mut totals) = (Vec::with_capacity(length), Vec::new());
     for block in io.before.get(VALUES, length)?.chunks(BLOCK) {
@@ -72,7 +72,7 @@ fn scan(io: &mut Io<'_>) -> Outcome {
     Ok(())
 }
 
-fn add(io: &mut Io<'_>) -> Outcome {
+fn add(io: &mut Io<'_>) -> PassResult {
     let length = io.before.window(&LENGTH)?[0] as usize;
     let sums = io.before.get(BLOCK_SUMS, length.div_ceil(BLOCK))?;
     let mut values = io.before.get(VALUES, length)?;
@@ -84,7 +84,7 @@ fn add(io: &mut Io<'_>) -> Outcome {
     Ok(())
 }
 
-fn place(n: usize, io: &mut Io<'_>) -> Outcome {
+fn place(n: usize, io: &mut Io<'_>) -> PassResult {
     let cell_of = io.before.get(buffers::CELL_OF, n)?;
     let slot = io.before.get(buffers::SLOT_IN_CELL, n)?;
     // `cell_start` up to the largest key.
@@ -102,7 +102,7 @@ fn place(n: usize, io: &mut Io<'_>) -> Outcome {
     Ok(())
 }
 
-fn stabilize(n: usize, io: &mut Io<'_>) -> Outcome {
+fn stabilize(n: usize, io: &mut Io<'_>) -> PassResult {
     let cell_of = io.before.get(buffers::CELL_OF, n)?;
     let id = io.before.get(buffers::ID, n)?;
     let mut order = io.before.get(buffers::PLACED, n)?;

@@ -13,7 +13,7 @@ use swell_domain::{frame_range::FrameRange, solver::StepReport};
 use swell_files::Reach;
 use swell_scene::{Method, Scene, SceneError};
 use swell_stage::{
-    bake::{self, BakePlan, DiskSpace, Event, Request},
+    bake::{self, BakePlan, BakeRequest, DiskSpace, Event},
     branch::BranchPoint,
 };
 
@@ -126,7 +126,7 @@ pub(super) fn run(args: &BakeArgs, progress: &Progress) -> Result<u8, Failure> {
     let method = scene.solver.method().name();
     let root = || set_variable("SWELL_CACHE").map_or_else(|| PathBuf::from("cache"), PathBuf::from);
     let default = || root().join(&scene.shot.name).join(method);
-    let request = Request {
+    let request = BakeRequest {
         directory: args.output.clone().unwrap_or_else(default),
         scene,
         frames: args.frames.clone(),

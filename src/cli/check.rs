@@ -8,7 +8,7 @@ use serde_json::json;
 use swell_domain::{frame_range::FrameRange, substep::SubstepChoice};
 use swell_scene::Method;
 use swell_stage::{
-    check::{Event, FirstOver, Outcome, Request, Row, Source, Table, check},
+    check::{CheckOutcome, CheckRequest, Event, FirstOver, Row, Source, Table, check},
     device::{Gpu, Imprecision},
     replay::{Replayed, is_failed, replay_failed},
 };
@@ -114,7 +114,7 @@ pub(super) fn run(args: &CheckArgs, progress: &Progress) -> Result<u8, Failure> 
     if let Some(look) = args.surface.look() {
         return run_render(args, look, progress);
     }
-    let request = Request {
+    let request = CheckRequest {
         source: source(args)?,
         substep: args.substep.unwrap_or_default(),
         gpu: Gpu {
@@ -258,7 +258,7 @@ fn tell(progress: &Progress, event: &Event<'_>) {
     }
 }
 
-fn to_json(outcome: &Outcome) -> serde_json::Value {
+fn to_json(outcome: &CheckOutcome) -> serde_json::Value {
     let first = outcome.first_over.map(|first| {
         json!({
             "frame": first.frame, "substep": first.substep, "pass": first.pass,
@@ -322,7 +322,7 @@ fn show(table: &Table) -> String {
 }
 
 /// The substeps that the table covers.
-fn show_substeps(outcome: &Outcome) -> String {
+fn show_substeps(outcome: &CheckOutcome) -> String {
     let checked = outcome.frames.iter().zip(&outcome.substeps);
     let all: Vec<String> = checked
         .map(|(frame, substep)| match substep {
@@ -336,7 +336,7 @@ fn show_substeps(outcome: &Outcome) -> String {
     }
 }
 
-fn verdict(outcome: &Outcome) -> String {
+fn verdict(outcome: &CheckOutcome) -> String {
     match outcome.first_over {
         None if outcome.interrupted => {
             format!("ended by a signal after {} frames", outcome.frames.len())

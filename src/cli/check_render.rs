@@ -7,7 +7,9 @@ use clap::Args;
 use serde_json::json;
 
 use swell_domain::frame_range::FrameRange;
-use swell_stage::render::surfaces::{DEPTH, Event, NORMAL, Outcome, Request, check_render};
+use swell_stage::render::surfaces::{
+    DEPTH, Event, NORMAL, SurfaceOutcome, SurfaceRequest, check_render,
+};
 
 use super::{
     Failure, GpuArgs, count,
@@ -49,7 +51,7 @@ pub(super) fn run(
     gpu: &GpuArgs,
     (json, progress): (bool, &Progress),
 ) -> Result<u8, Failure> {
-    let request = Request {
+    let request = SurfaceRequest {
         cache,
         look: load_look(look)?,
         frames,
@@ -100,7 +102,7 @@ fn tell(progress: &Progress, event: Event) {
     }
 }
 
-fn to_json(outcome: &Outcome, is_within: bool) -> serde_json::Value {
+fn to_json(outcome: &SurfaceOutcome, is_within: bool) -> serde_json::Value {
     json!({
         "device": outcome.device,
         "frames": outcome.frames,
@@ -114,7 +116,7 @@ fn to_json(outcome: &Outcome, is_within: bool) -> serde_json::Value {
     })
 }
 
-fn show(outcome: &Outcome, is_within: bool) -> String {
+fn show(outcome: &SurfaceOutcome, is_within: bool) -> String {
     let mut text = format!(
         "{} on {} against rays in f64 ({:.1} s a frame)\n\
          {:6} {:>9} {:>15} {:>15} {:>15} {:>15} {:>8} {:>10}\n",
@@ -168,7 +170,7 @@ fn show(outcome: &Outcome, is_within: bool) -> String {
 }
 
 /// The water's edges: their offset and roughness.
-fn outlines(text: &mut String, outcome: &Outcome) {
+fn outlines(text: &mut String, outcome: &SurfaceOutcome) {
     let _ = writeln!(
         text,
         "{:17} {:>9} {:>15} {:>15} {:>15} {:>15}",
@@ -197,7 +199,7 @@ fn outlines(text: &mut String, outcome: &Outcome) {
 }
 
 /// Scores and flicker of the pictures, as far as requested.
-fn pictures(text: &mut String, outcome: &Outcome) {
+fn pictures(text: &mut String, outcome: &SurfaceOutcome) {
     for row in &outcome.rows {
         if let Some(score) = row.score {
             let _ = writeln!(

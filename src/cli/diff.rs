@@ -10,8 +10,8 @@ use serde_json::json;
 use swell_domain::frame_range::{FrameRange, ranges};
 use swell_files::tolerance;
 use swell_stage::diff::{
-    AggregatePeak, BaselineDiff, Basis, CacheDiff, Fault, Images, Outcome, PairDiff, PicturesDiff,
-    Request, Written, aggregate_peaks, diff, write_baseline,
+    AggregatePeak, BaselineDiff, Basis, CacheDiff, DiffOutcome, DiffRequest, Fault, Images,
+    PairDiff, PicturesDiff, Written, aggregate_peaks, diff, write_baseline,
 };
 
 use super::{Failure, OUT_OF_TOLERANCE, output};
@@ -76,7 +76,7 @@ pub(super) fn run(args: &DiffArgs) -> Result<u8, Failure> {
         }
         (None, None) => unreachable!("clap asks for one of them"),
     };
-    let request = Request {
+    let request = DiffRequest {
         a: args.a.clone(),
         b: b.clone(),
         frames: args.frames.clone(),
@@ -95,22 +95,22 @@ pub(super) fn run(args: &DiffArgs) -> Result<u8, Failure> {
     );
     // Writing to a String cannot fail.
     let _ = match &outcome {
-        Outcome::Caches(diff) => show_caches(&mut text, diff),
-        Outcome::Baseline(diff) => show_baseline(&mut text, diff),
-        Outcome::Pictures(diff) => show_pictures(&mut text, diff, args.gain),
+        DiffOutcome::Caches(diff) => show_caches(&mut text, diff),
+        DiffOutcome::Baseline(diff) => show_baseline(&mut text, diff),
+        DiffOutcome::Pictures(diff) => show_pictures(&mut text, diff, args.gain),
     };
     let is_within = outcome.is_within();
     let verdict = match (is_within, &request.tolerance, &outcome) {
         (false, ..) => "OUT OF TOLERANCE",
-        (true, None, Outcome::Caches(diff))
+        (true, None, DiffOutcome::Caches(diff))
             if diff.device_limits.is_none() && !diff.without_particles.is_empty() =>
         {
             "the same in all that both keep"
         }
-        (true, None, Outcome::Caches(diff)) if diff.device_limits.is_some() => {
+        (true, None, DiffOutcome::Caches(diff)) if diff.device_limits.is_some() => {
             "aggregates within the limits for different devices"
         }
-        (true, None, Outcome::Caches(_) | Outcome::Pictures(_)) => "the same, bit for bit",
+        (true, None, DiffOutcome::Caches(_) | DiffOutcome::Pictures(_)) => "the same, bit for bit",
         _ => "within tolerance",
     };
     let _ = writeln!(text, "\n{verdict}");

@@ -7,7 +7,9 @@ use clap::{Args, ValueEnum};
 use serde_json::json;
 
 use swell_domain::{chunk::Chunk, frame_range::FrameRange};
-use swell_stage::export::{Event, Pattern, Request, Target, UsdWater, VOXELS, expected, export};
+use swell_stage::export::{
+    Event, ExportRequest, Pattern, Target, UsdWater, VOXELS, expected, export,
+};
 
 use super::{
     Failure, bake, count,
@@ -130,7 +132,7 @@ pub(super) fn run(args: &ExportArgs, progress: &Progress) -> Result<u8, Failure>
         Some(look) => Some(load_look_within(look, bake::reach(args.allow_outside))?),
         None => None,
     };
-    let request = Request {
+    let request = ExportRequest {
         cache: args.cache.clone(),
         stream: args.stream.clone(),
         targets: args.targets(),
@@ -180,7 +182,7 @@ pub(super) fn run(args: &ExportArgs, progress: &Progress) -> Result<u8, Failure>
     refuse_failed(&outcome.failed)
 }
 
-fn dry_run(request: &Request, progress: &Progress) -> Result<u8, Failure> {
+fn dry_run(request: &ExportRequest, progress: &Progress) -> Result<u8, Failure> {
     let found = expected(request)?;
     let is_made = |frame: &u32| !found.standing.contains(frame);
     let told = DryRun {
@@ -195,7 +197,7 @@ fn dry_run(request: &Request, progress: &Progress) -> Result<u8, Failure> {
 }
 
 /// The output folders, without duplicates.
-fn places(request: &Request) -> Vec<String> {
+fn places(request: &ExportRequest) -> Vec<String> {
     let file = |target: &Target| match target {
         Target::Mesh(files)
         | Target::Npy(files)

@@ -7,7 +7,7 @@ use clap::Args;
 use serde_json::json;
 
 use swell_domain::{chunk::Chunk, frame_range::FrameRange};
-use swell_stage::render::{Event, Request, expected, render};
+use swell_stage::render::{Event, RenderRequest, expected, render};
 
 use super::{
     Failure, GpuArgs, bake, count,
@@ -71,7 +71,7 @@ pub(super) fn run(args: &RenderArgs, progress: &Progress) -> Result<u8, Failure>
             PathBuf::from("renders").join(format!("{}-{look}", manifest.shot))
         }
     };
-    let request = Request {
+    let request = RenderRequest {
         cache: args.cache.clone(),
         look,
         directory,
@@ -116,7 +116,7 @@ pub(super) fn run(args: &RenderArgs, progress: &Progress) -> Result<u8, Failure>
     refuse_failed(&outcome.failed)
 }
 
-fn dry_run(request: &Request, progress: &Progress) -> Result<u8, Failure> {
+fn dry_run(request: &RenderRequest, progress: &Progress) -> Result<u8, Failure> {
     let found = expected(request)?;
     let bytes = found.bytes();
     let is_made = |frame: &u32| !found.standing.contains(frame);

@@ -6,7 +6,7 @@ use clap::Args;
 use serde_json::json;
 
 use swell_domain::{chunk::Chunk, posix};
-use swell_experiment::{Event, PointEvent, PointStatus, Request, Share, study};
+use swell_experiment::{Event, PointEvent, PointStatus, Share, StudyRequest, study};
 use swell_files::study::Study;
 
 use super::{
@@ -44,7 +44,7 @@ pub(super) fn run(args: &StudyArgs, progress: &Progress) -> Result<u8, Failure> 
     let name = args.study.file_stem().unwrap_or_default();
     let default = || PathBuf::from("studies").join(name);
     let directory = args.output.clone().unwrap_or_else(default);
-    let request = Request {
+    let request = StudyRequest {
         name: name.to_string_lossy().into_owned(),
         study: Study::load_within(&args.study, bake::reach(args.allow_outside))?,
         command: format!(
@@ -64,7 +64,7 @@ pub(super) fn run(args: &StudyArgs, progress: &Progress) -> Result<u8, Failure> 
 }
 
 /// Runs a study of any kind, and reports its progress.
-pub(super) fn conduct(request: &Request, progress: &Progress) -> Result<u8, Failure> {
+pub(super) fn conduct(request: &StudyRequest, progress: &Progress) -> Result<u8, Failure> {
     let interrupt = Interrupt::install_or_warn();
     let outcome = study(request, interrupt.flag(), &mut |event| match event {
         Event::Solver(name) => progress.say(
@@ -126,7 +126,7 @@ pub(super) fn conduct(request: &Request, progress: &Progress) -> Result<u8, Fail
 }
 
 /// Reports the result of a share, and how to complete the study.
-fn tell_share(progress: &Progress, request: &Request, chunk: Chunk, share: Share) {
+fn tell_share(progress: &Progress, request: &StudyRequest, chunk: Chunk, share: Share) {
     let Share {
         ran, stood, left, ..
     } = share;

@@ -6,7 +6,7 @@ use clap::Args;
 use serde_json::{Value, json};
 
 use swell_domain::{chunk::Chunk, frame_range::FrameRange, posix};
-use swell_experiment::{Request, dealt};
+use swell_experiment::{StudyRequest, dealt};
 use swell_files::study::{
     Study,
     tune::{Limit, Tune, TuneRequest},
@@ -79,7 +79,7 @@ pub(super) fn run(args: &TuneArgs, progress: &Progress) -> Result<u8, Failure> {
     }
     let name = format!("{}-tune", stem(&args.scene));
     let default = || PathBuf::from("studies").join(&name);
-    let request = Request {
+    let request = StudyRequest {
         directory: args.output.clone().unwrap_or_else(default),
         command: command(args),
         study: Study::Tune(Box::new(tune)),

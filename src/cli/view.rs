@@ -10,7 +10,7 @@ use clap::{Args, ValueEnum};
 use serde_json::json;
 
 use swell_domain::frame_range::FrameRange;
-use swell_stage::view::{Aspect, Event, Placing, RATE, Request, SHEET, view};
+use swell_stage::view::{Aspect, Event, Placing, RATE, SHEET, ViewRequest, view};
 
 use super::{
     Failure, bake, count,
@@ -117,7 +117,7 @@ pub(super) fn run(args: &ViewArgs, progress: &Progress) -> Result<u8, Failure> {
     };
     let is_default = args.sheet.is_none() && args.movie.is_none() && !args.player;
     let sheet = args.sheet.or(is_default.then_some(None));
-    let request = Request {
+    let request = ViewRequest {
         subjects: args.subjects.clone(),
         directory: args.output.clone(),
         frames: args.frames.clone(),

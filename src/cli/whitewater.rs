@@ -7,7 +7,7 @@ use serde_json::json;
 
 use swell_domain::whitewater::Kind;
 use swell_files::whitewater::WhitewaterSettings;
-use swell_stage::whitewater::{Event, LimitForecast, Request, expected, whitewater};
+use swell_stage::whitewater::{Event, LimitForecast, WhitewaterRequest, expected, whitewater};
 
 use super::{
     DeviceArgs, Failure, count,
@@ -84,7 +84,7 @@ pub(super) fn run(args: &WhitewaterArgs, progress: &Progress) -> Result<u8, Fail
         Some(file) => WhitewaterSettings::load(file)?,
         None => WhitewaterSettings::parse("", &PathBuf::from("no settings file"))?,
     };
-    let request = Request {
+    let request = WhitewaterRequest {
         cache: args.cache.clone(),
         name: args.name()?,
         settings,
@@ -131,7 +131,7 @@ pub(super) fn run(args: &WhitewaterArgs, progress: &Progress) -> Result<u8, Fail
     })
 }
 
-fn dry_run(request: &Request, progress: &Progress) -> Result<u8, Failure> {
+fn dry_run(request: &WhitewaterRequest, progress: &Progress) -> Result<u8, Failure> {
     let found = expected(request)?;
     let told = DryRun {
         frames: (found.first..=found.last).collect(),

@@ -24,7 +24,7 @@ use swell_study::{
 };
 
 use super::{
-    Event, Request, StudyError,
+    Event, StudyError, StudyRequest,
     engine::{Bench, Kind, WorkUnit},
     report::{Report, what_was_run},
 };
@@ -79,7 +79,7 @@ fn bake_and_render(
     let (request, stop) = (bench.request, bench.stop);
     let last = comparison.frames.last().max(comparison.pictures.last());
     let cache = cache_directory(request, scene);
-    let bake = bake::Request {
+    let bake = bake::BakeRequest {
         scene: scene.clone(),
         directory: cache.clone(),
         frames: FrameRange::inclusive(1, last),
@@ -92,7 +92,7 @@ fn bake_and_render(
     if bake::bake(&bake, stop, &mut tell)?.interrupted {
         return Err(StudyError::Stopped);
     }
-    let render = render::Request {
+    let render = render::RenderRequest {
         cache,
         look: comparison.look.clone(),
         directory: picture_directory(request, scene),
@@ -111,14 +111,14 @@ fn bake_and_render(
     }
 }
 
-fn cache_directory(request: &Request, scene: &Scene) -> PathBuf {
+fn cache_directory(request: &StudyRequest, scene: &Scene) -> PathBuf {
     request
         .directory
         .join("cache")
         .join(scene.solver.method().name())
 }
 
-fn picture_directory(request: &Request, scene: &Scene) -> PathBuf {
+fn picture_directory(request: &StudyRequest, scene: &Scene) -> PathBuf {
     let pictures = request.directory.join("pictures");
     pictures.join(scene.solver.method().name())
 }
@@ -166,7 +166,7 @@ fn course(cache: &CacheReader, gauge: &Gauge, frames: &FrameRange) -> Result<Cou
 }
 
 fn parts(
-    request: &Request,
+    request: &StudyRequest,
     comparison: &SolverComparison,
     caches: &[CacheReader; 2],
     courses: &[Course; 2],
@@ -259,7 +259,7 @@ fn run_table(caches: &[CacheReader; 2], courses: &[Course; 2]) -> Vec<Vec<String
 }
 
 fn pictures(
-    request: &Request,
+    request: &StudyRequest,
     comparison: &SolverComparison,
     cache: &CacheReader,
 ) -> Result<Part, StudyError> {

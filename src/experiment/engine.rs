@@ -25,7 +25,7 @@ use swell_stage::{
 use swell_study::folder::ledger_of;
 
 use super::{
-    Event, PointEvent, PointStatus, Request, StudyError,
+    Event, PointEvent, PointStatus, StudyError, StudyRequest,
     ledger::{Key, Ledger, Line, Reader},
     report::Report,
     run::Run,
@@ -167,7 +167,7 @@ pub(super) enum Work {
 
 /// Context in which a kind of study runs.
 pub(super) struct Bench<'a> {
-    pub(super) request: &'a Request,
+    pub(super) request: &'a StudyRequest,
     pub(super) devices: &'a Devices,
     pub(super) stop: &'a AtomicBool,
     tell: RefCell<&'a mut dyn FnMut(Event)>,
@@ -191,7 +191,7 @@ pub(super) struct Bench<'a> {
 
 impl<'a> Bench<'a> {
     pub(super) fn new(
-        request: &'a Request,
+        request: &'a StudyRequest,
         devices: &'a Devices,
         stop: &'a AtomicBool,
         tell: &'a mut dyn FnMut(Event),

@@ -44,7 +44,7 @@ pub use run::Run;
 
 /// A study to run, and where its results go.
 #[derive(Clone, Debug)]
-pub struct Request {
+pub struct StudyRequest {
     /// Name of the study, the title of its page.
     pub name: String,
     /// The validated study.
@@ -114,7 +114,7 @@ pub enum PointStatus {
 /// Outcome of a study.
 #[derive(Clone, Debug, Default)]
 #[non_exhaustive]
-pub struct Outcome {
+pub struct StudyOutcome {
     /// Path of the page; `None` for a share, and where a signal ended the study.
     pub page: Option<PathBuf>,
     /// Outcome of a share; `None` for a whole study, and where a signal ended it.
@@ -163,7 +163,7 @@ pub fn dealt(study: &Study, chunk: Chunk) -> Result<Vec<bool>, StudyError> {
 }
 
 /// Checks that this build can score and draw what a study asks for.
-fn require_features(request: &Request) -> Result<(), StudyError> {
+fn require_features(request: &StudyRequest) -> Result<(), StudyError> {
     let has_charts = match &request.study {
         Study::SolverComparison(_) | Study::Stability(_) | Study::Validation(_) => false,
         Study::Sweep(_) | Study::Surface(_) | Study::Tune(_) => request.chunk.is_none(),
@@ -184,10 +184,10 @@ fn require_features(request: &Request) -> Result<(), StudyError> {
 /// # Errors
 /// [`StudyError`] describes all causes; `stop` is not an error but gives an empty outcome.
 pub fn study(
-    request: &Request,
+    request: &StudyRequest,
     stop: &AtomicBool,
     tell: &mut dyn FnMut(Event),
-) -> Result<Outcome, StudyError> {
+) -> Result<StudyOutcome, StudyError> {
     // Checked even where no point needs an adapter, so that a misspelled name is not ignored.
     if let Some(adapter) = &request.gpu.adapter {
         adapter::check_request(adapter)?;
@@ -215,7 +215,7 @@ pub fn study(
     claim::take(&request.directory, &request.name, &request.command)?;
     let mut bench = Bench::new(request, &devices, stop, tell, (work, count));
     let report = match kind.run(&mut bench) {
-        Err(StudyError::Stopped) => return Ok(Outcome::default()),
+        Err(StudyError::Stopped) => return Ok(StudyOutcome::default()),
         report => report?,
     };
     if let Some(report) = report {
@@ -231,8 +231,8 @@ pub fn study(
         left: look.left.get(),
         is_left_at_most: look.is_left_at_most.get(),
     });
-    Ok(Outcome {
+    Ok(StudyOutcome {
         share,
-        ..Outcome::default()
+        ..StudyOutcome::default()
     })
 }

@@ -6,7 +6,7 @@ use swell_study::{
     raster,
 };
 
-use super::{Outcome, Request, StudyError};
+use super::{StudyError, StudyOutcome, StudyRequest};
 
 /// Content that a kind of study draws.
 #[derive(Default)]
@@ -30,9 +30,9 @@ impl Report {
     /// Writes all files. `shares` is a note for readers about the times of points that shares ran.
     pub(super) fn write(
         self,
-        request: &Request,
+        request: &StudyRequest,
         shares: Option<String>,
-    ) -> Result<Outcome, StudyError> {
+    ) -> Result<StudyOutcome, StudyError> {
         let directory = &request.directory;
         write(&directory.join("results.csv"), csv(&self.table))?;
         let folder = directory.join("curves");
@@ -55,7 +55,7 @@ impl Report {
         parts.extend(self.parts);
         let page = directory.join("index.html");
         write(&page, page::html(&request.name, &parts))?;
-        Ok(Outcome {
+        Ok(StudyOutcome {
             page: Some(page),
             share: None,
             findings: self.findings,
@@ -65,7 +65,7 @@ impl Report {
 }
 
 /// Parts of the page with the command as typed and the study's warnings.
-pub(super) fn what_was_run(request: &Request) -> Vec<Part> {
+pub(super) fn what_was_run(request: &StudyRequest) -> Vec<Part> {
     let warnings = request.study.warnings().into_iter();
     let told = warnings.map(|warning| Part::Text(format!("Warning: {warning}")));
     let command = Part::Code(request.command.clone());

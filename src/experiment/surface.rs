@@ -21,7 +21,7 @@ use swell_stage::{
 };
 
 use super::{
-    Event, PointStatus, Request, StudyError,
+    Event, PointStatus, StudyError, StudyRequest,
     engine::{Bench, Kind, WorkUnit},
     ledger::Key,
     report::Report,
@@ -106,14 +106,14 @@ fn status(errors: &[PictureError], run: &Run, stood: bool) -> PointStatus {
     }
 }
 
-fn cache(request: &Request) -> PathBuf {
+fn cache(request: &StudyRequest) -> PathBuf {
     request.directory.join("cache")
 }
 
 /// Bakes the scene up to the last frame that the pictures depend on, and resumes an existing cache.
 fn baked(study: &SurfaceStudy, bench: &mut Bench<'_>) -> Result<(), StudyError> {
     let last = (study.frames.last() + REACH).min(study.scene.shot.frames);
-    let request = bake::Request {
+    let request = bake::BakeRequest {
         scene: study.scene.clone(),
         directory: cache(bench.request),
         frames: FrameRange::inclusive(1, last),
@@ -130,7 +130,7 @@ fn baked(study: &SurfaceStudy, bench: &mut Bench<'_>) -> Result<(), StudyError> 
 }
 
 /// Hashes of the drawn frames.
-fn hashes(study: &SurfaceStudy, request: &Request) -> Result<String, StudyError> {
+fn hashes(study: &SurfaceStudy, request: &StudyRequest) -> Result<String, StudyError> {
     let cache = CacheReader::open(&cache(request))?;
     let hashes = study
         .frames

@@ -28,7 +28,7 @@ pub use self::{disk::DiskSpace, error::BakeError, inflow::Inflow, plan::BakePlan
 
 /// What to bake, where, and on which device.
 #[derive(Clone, Debug)]
-pub struct Request {
+pub struct BakeRequest {
     /// The validated scene.
     pub scene: Scene,
     /// Directory of the cache.
@@ -100,7 +100,7 @@ pub enum Event {
 /// Result of a bake that met no error.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
-pub struct Outcome {
+pub struct BakeOutcome {
     /// Last frame in the cache.
     pub last_frame: u32,
     /// Number of frames computed by this run.
@@ -125,10 +125,10 @@ pub struct Outcome {
 /// # Errors
 /// [`BakeError`]; the frames that were completed before are in the cache.
 pub fn bake(
-    request: &Request,
+    request: &BakeRequest,
     stop: &AtomicBool,
     tell: &mut dyn FnMut(Event),
-) -> Result<Outcome, BakeError> {
+) -> Result<BakeOutcome, BakeError> {
     run(request, &BakePlan::new(request)?, stop, tell)
 }
 
@@ -140,11 +140,11 @@ pub fn bake(
 /// # Errors
 /// As for [`bake`].
 pub fn run(
-    request: &Request,
+    request: &BakeRequest,
     plan: &BakePlan<'_>,
     stop: &AtomicBool,
     tell: &mut dyn FnMut(Event),
-) -> Result<Outcome, BakeError> {
+) -> Result<BakeOutcome, BakeError> {
     let (scene, start) = (plan.scene, &plan.start);
     assert!(
         std::ptr::eq(scene, &request.scene),
@@ -183,7 +183,7 @@ pub fn run(
         Some((passes, shares)) => (opened.pass_times(passes)?, shares),
         None => Default::default(),
     };
-    Ok(Outcome {
+    Ok(BakeOutcome {
         last_frame: summary.last_frame,
         frames: summary.frames,
         bytes: summary.bytes,
@@ -198,7 +198,7 @@ pub fn run(
 /// Creates the planned cache or resumes it: returns the writer, its clock and the state at that
 /// point.
 fn open_cache(
-    request: &Request,
+    request: &BakeRequest,
     plan: &BakePlan<'_>,
     device: &Identity,
 ) -> Result<(CacheWriter, Clock, Particles), BakeError> {
@@ -244,7 +244,12 @@ fn ready(
 
 /// The error of a frame that could not be computed. If a budget was exceeded, keeps the frame's
 /// inputs first.
-fn end(request: &Request, opened: &Opened, plan: &BakePlan<'_>, error: SolverError) -> BakeError {
+fn end(
+    request: &BakeRequest,
+    opened: &Opened,
+    plan: &BakePlan<'_>,
+    error: SolverError,
+) -> BakeError {
     let Some(breach) = error.breach() else {
         return error.into();
     };

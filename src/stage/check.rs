@@ -38,7 +38,7 @@ pub enum Source {
 
 /// What to check.
 #[derive(Clone, Debug)]
-pub struct Request {
+pub struct CheckRequest {
     /// Source of the inputs.
     pub source: Source,
     /// Which substep to check of the frame that follows each input.
@@ -92,7 +92,7 @@ pub enum Event<'a> {
 /// Result of a check.
 #[derive(Clone, Debug, Default)]
 #[non_exhaustive]
-pub struct Outcome {
+pub struct CheckOutcome {
     /// All frames combined: for each row the value that deviates most.
     pub table: Table,
     /// The first row out of tolerance.
@@ -153,10 +153,10 @@ impl From<&CheckError> for Blame {
 /// # Errors
 /// [`CheckError`]. A row out of tolerance is not an error; it is reported in the outcome.
 pub fn check(
-    request: &Request,
+    request: &CheckRequest,
     stop: &AtomicBool,
     tell: &mut dyn FnMut(Event<'_>),
-) -> Result<Outcome, CheckError> {
+) -> Result<CheckOutcome, CheckError> {
     let (subject, frames) = open(&request.source)?;
     let context = request.gpu.open(subject.needs())?;
     let shaders = context.shaders.edited().map(str::to_owned);
@@ -175,9 +175,9 @@ pub fn check(
         frames: frames.len(),
         warnings: subject.warnings(),
     });
-    let mut outcome = Outcome {
+    let mut outcome = CheckOutcome {
         shaders,
-        ..Outcome::default()
+        ..CheckOutcome::default()
     };
     for frame in frames {
         outcome.interrupted = stop.load(Ordering::Relaxed);

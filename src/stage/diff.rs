@@ -42,7 +42,7 @@ pub use swell_compare::{
 
 /// What to compare with what.
 #[derive(Clone, Debug)]
-pub struct Request {
+pub struct DiffRequest {
     /// A cache, a folder of pictures, or a picture.
     pub a: PathBuf,
     /// The reference: the same kind of thing, or a baseline.
@@ -70,7 +70,7 @@ pub struct Images {
 /// Result of a comparison.
 #[derive(Clone, Debug, Serialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
-pub enum Outcome {
+pub enum DiffOutcome {
     /// Two caches.
     Caches(CacheDiff),
     /// A cache and a baseline.
@@ -79,7 +79,7 @@ pub enum Outcome {
     Pictures(PicturesDiff),
 }
 
-impl Outcome {
+impl DiffOutcome {
     /// Whether nothing is out of tolerance and nothing is missing on one side.
     pub fn is_within(&self) -> bool {
         match self {
@@ -213,7 +213,7 @@ impl Subject {
 ///
 /// # Errors
 /// [`DiffError`]; a difference is not an error.
-pub fn diff(request: &Request) -> Result<Outcome, DiffError> {
+pub fn diff(request: &DiffRequest) -> Result<DiffOutcome, DiffError> {
     let (a, b) = (Subject::of(&request.a)?, Subject::of(&request.b)?);
     let is_render = matches!(a, Subject::Folder | Subject::Picture);
     let is_baseline = matches!(b, Subject::Baseline(_));
@@ -235,16 +235,16 @@ pub fn diff(request: &Request) -> Result<Outcome, DiffError> {
     }
     Ok(match (a, b) {
         (Subject::Cache(a), Subject::Cache(b)) => {
-            Outcome::Caches(caches::compare([&a, &b], request)?)
+            DiffOutcome::Caches(caches::compare([&a, &b], request)?)
         }
         (Subject::Cache(a), Subject::Baseline(b)) => {
-            Outcome::Baseline(against_baseline::compare(&a, &b, request)?)
+            DiffOutcome::Baseline(against_baseline::compare(&a, &b, request)?)
         }
         (Subject::Folder, Subject::Folder) => {
-            Outcome::Pictures(pictures::compare_folders(request)?)
+            DiffOutcome::Pictures(pictures::compare_folders(request)?)
         }
         (Subject::Picture, Subject::Picture) => {
-            Outcome::Pictures(pictures::compare_files(request)?)
+            DiffOutcome::Pictures(pictures::compare_files(request)?)
         }
         (a, b) => {
             return Err(DiffError::usage(format!(

@@ -87,7 +87,7 @@ pub enum Target {
 
 /// What to export.
 #[derive(Clone, Debug)]
-pub struct Request {
+pub struct ExportRequest {
     /// Directory of the cache.
     pub cache: PathBuf,
     /// Name of a whitewater stream to export instead of the water.
@@ -159,7 +159,7 @@ pub enum Event {
 /// Result of an export.
 #[derive(Clone, Debug, Default)]
 #[non_exhaustive]
-pub struct Outcome {
+pub struct ExportOutcome {
     /// Number of files made by this run.
     pub made: usize,
     /// Bytes of these files.
@@ -181,10 +181,10 @@ pub struct Outcome {
 /// [`ExportError`]. Existing files of another origin and frames missing from the cache are reported
 /// before anything is written; a damaged frame only when it is read.
 pub fn export(
-    request: &Request,
+    request: &ExportRequest,
     stop: &AtomicBool,
     tell: &mut dyn FnMut(Event),
-) -> Result<Outcome, ExportError> {
+) -> Result<ExportOutcome, ExportError> {
     let job = Job::new(request)?;
     let share = share(&job.frames, request.chunk).to_vec();
     let shots = job.shots()?;
@@ -194,7 +194,7 @@ pub fn export(
         files: request.targets.len(),
         warnings: job.lints(),
     });
-    let mut outcome = Outcome::default();
+    let mut outcome = ExportOutcome::default();
     for (wanted, bytes) in shots {
         job.make(&wanted, &mut outcome, || Ok(bytes))?;
     }
@@ -252,7 +252,7 @@ fn warning(volume: f64) -> Option<String> {
 
 /// A running export.
 struct Job<'a> {
-    request: &'a Request,
+    request: &'a ExportRequest,
     cache: CacheReader,
     /// The whitewater stream to export instead of the water.
     stream: Option<CacheReader>,
@@ -266,7 +266,7 @@ struct Job<'a> {
 }
 
 impl<'a> Job<'a> {
-    fn new(request: &'a Request) -> Result<Self, ExportError> {
+    fn new(request: &'a ExportRequest) -> Result<Self, ExportError> {
         asked::check(request)?;
         let cache = CacheReader::open(&request.cache)?;
         if cache.manifest().is_whitewater() {
@@ -414,7 +414,7 @@ impl<'a> Job<'a> {
     fn make(
         &self,
         wanted: &Wanted,
-        outcome: &mut Outcome,
+        outcome: &mut ExportOutcome,
         bytes: impl FnOnce() -> Result<Vec<u8>, ExportError>,
     ) -> Result<(), ExportError> {
         let stands = || !self.request.overwrite && wanted.is_complete();
@@ -560,7 +560,7 @@ fn is_binary(file: &Path) -> bool {
         .is_some_and(|end| end.eq_ignore_ascii_case("usdc"))
 }
 
-fn open_stream(request: &Request, stream: &str) -> Result<CacheReader, ExportError> {
+fn open_stream(request: &ExportRequest, stream: &str) -> Result<CacheReader, ExportError> {
     let directory = directory(&request.cache, stream);
     if !swell_cache::exists(&directory) {
         return Err(ExportError::NoStream {

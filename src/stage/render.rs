@@ -64,7 +64,7 @@ const POLL: Duration = Duration::from_millis(50);
 
 /// What to render, and where.
 #[derive(Clone, Debug)]
-pub struct Request {
+pub struct RenderRequest {
     /// Directory of the cache.
     pub cache: PathBuf,
     /// Camera, light, shading, output.
@@ -141,7 +141,7 @@ pub enum Event {
 /// Result of a render.
 #[derive(Clone, Debug, Default)]
 #[non_exhaustive]
-pub struct Outcome {
+pub struct RenderOutcome {
     /// Number of frames rendered by this run.
     pub rendered: u32,
     /// Number of frames that existed already, or that another process rendered meanwhile.
@@ -259,10 +259,10 @@ impl From<&RenderJobError> for Blame {
 /// [`RenderJobError`]. Frames missing from the cache, and a folder that cannot be shared, are
 /// reported before anything is rendered.
 pub fn render(
-    request: &Request,
+    request: &RenderRequest,
     stop: &AtomicBool,
     tell: &mut dyn FnMut(Event),
-) -> Result<Outcome, RenderJobError> {
+) -> Result<RenderOutcome, RenderJobError> {
     let Asked {
         cache,
         whitewater,
@@ -325,7 +325,7 @@ struct Asked {
 }
 
 impl Asked {
-    fn open(request: &Request) -> Result<Self, RenderJobError> {
+    fn open(request: &RenderRequest) -> Result<Self, RenderJobError> {
         let cache = CacheReader::open(&request.cache)?;
         refuse_inside(&request.directory, "folder")?;
         let all = super::frames_of(&cache, request.frames.as_ref());
@@ -375,7 +375,7 @@ fn told(error: RenderError, look: &Look) -> RenderJobError {
 
 /// Enters the output folder, registering this process there.
 fn enter(
-    request: &Request,
+    request: &RenderRequest,
     cache: &CacheReader,
     frames: &[u32],
     numbering: Numbering,
@@ -387,7 +387,7 @@ fn enter(
 
 /// What this process will do in the output folder; `of_frame` gives a frame's hash.
 fn wanted<'a>(
-    request: &Request,
+    request: &RenderRequest,
     cache: &CacheReader,
     (frames, numbering): (&[u32], Numbering),
     of_frame: &'a dyn Fn(u32) -> Option<String>,
@@ -423,7 +423,7 @@ enum Done {
 
 /// A running render.
 struct Job<'a> {
-    request: &'a Request,
+    request: &'a RenderRequest,
     folder: Arc<Folder>,
     /// The frame drawn last, whose pictures are being encoded and written while the next one is
     /// drawn.
@@ -448,8 +448,8 @@ impl Job<'_> {
         frames: Vec<u32>,
         stop: &AtomicBool,
         tell: &mut dyn FnMut(Event),
-    ) -> Result<Outcome, RenderJobError> {
-        let mut outcome = Outcome::default();
+    ) -> Result<RenderOutcome, RenderJobError> {
+        let mut outcome = RenderOutcome::default();
         let drawn = self.draw_all(frames, stop, (&mut outcome, tell));
         // However it ended, what was drawn before is kept.
         let written = end_writing(&mut self.writing, &mut outcome, tell);
@@ -460,7 +460,7 @@ impl Job<'_> {
         &mut self,
         mut frames: Vec<u32>,
         stop: &AtomicBool,
-        (outcome, tell): (&mut Outcome, &mut dyn FnMut(Event)),
+        (outcome, tell): (&mut RenderOutcome, &mut dyn FnMut(Event)),
     ) -> Result<(), RenderJobError> {
         let mut is_told = false;
         while !frames.is_empty() {
@@ -511,7 +511,7 @@ impl Job<'_> {
     fn frame(
         &mut self,
         frame: u32,
-        told: (&mut Outcome, &mut dyn FnMut(Event)),
+        told: (&mut RenderOutcome, &mut dyn FnMut(Event)),
     ) -> Result<Done, RenderJobError> {
         let begin = Instant::now();
         let request = self.request;
@@ -549,7 +549,7 @@ impl Job<'_> {
     fn draw(
         &mut self,
         frame: u32,
-        (outcome, tell): (&mut Outcome, &mut dyn FnMut(Event)),
+        (outcome, tell): (&mut RenderOutcome, &mut dyn FnMut(Event)),
     ) -> Result<Image, RenderJobError> {
         let look = &self.request.look;
         let around = self.near.around(&self.cache, look, frame)?;

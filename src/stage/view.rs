@@ -39,7 +39,7 @@ pub use points::Aspect;
 
 /// What to view, and in which form.
 #[derive(Clone, Debug)]
-pub struct Request {
+pub struct ViewRequest {
     /// A folder of pictures, a cache, or the folder of a study; or two to compare, each a folder of
     /// pictures or a cache.
     pub subjects: Vec<PathBuf>,
@@ -103,7 +103,7 @@ pub enum Event {
 /// Result of a view.
 #[derive(Clone, Debug, Default)]
 #[non_exhaustive]
-pub struct Outcome {
+pub struct ViewOutcome {
     /// Kind, path and bytes of each file made.
     pub files: Vec<(&'static str, PathBuf, u64)>,
     /// The file to open in a browser.
@@ -117,10 +117,10 @@ pub struct Outcome {
 /// # Errors
 /// [`ViewError`]; then no incomplete file is left.
 pub fn view(
-    request: &Request,
+    request: &ViewRequest,
     stop: &AtomicBool,
     tell: &mut dyn FnMut(Event),
-) -> Result<Outcome, ViewError> {
+) -> Result<ViewOutcome, ViewError> {
     if request.sheet.is_none() && request.movie.is_none() && !request.player {
         return Err(ViewError::Nothing);
     }
@@ -140,7 +140,7 @@ pub fn view(
 }
 
 /// Caches whose curves are drawn, with their names: the requested one, or those that are viewed.
-fn caches(request: &Request, strips: &[Strip]) -> Vec<(String, PathBuf)> {
+fn caches(request: &ViewRequest, strips: &[Strip]) -> Vec<(String, PathBuf)> {
     if let Some(cache) = &request.curves {
         return vec![(String::new(), cache.clone())];
     }
@@ -152,7 +152,7 @@ fn caches(request: &Request, strips: &[Strip]) -> Vec<(String, PathBuf)> {
 }
 
 /// Opens the subjects.
-fn open(request: &Request) -> Result<Vec<Strip>, ViewError> {
+fn open(request: &ViewRequest) -> Result<Vec<Strip>, ViewError> {
     let view = request.look.as_ref().map(|look| &look.spec().view);
     let open = |path: &PathBuf| {
         if !path.exists() {

@@ -56,7 +56,7 @@ pub(super) const FOLDER: &str = "whitewater";
 const SETTINGS: &str = "whitewater.toml";
 /// What to make.
 #[derive(Clone, Debug)]
-pub struct Request {
+pub struct WhitewaterRequest {
     /// Directory of the bake's cache.
     pub cache: PathBuf,
     /// Name of the stream.
@@ -128,7 +128,7 @@ pub enum Event {
 /// Result of a job.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
-pub struct Outcome {
+pub struct WhitewaterOutcome {
     /// Last frame in the stream.
     pub last_frame: u32,
     /// Number of frames computed by this run.
@@ -161,10 +161,10 @@ pub fn directory(cache: &Path, name: &str) -> PathBuf {
 /// # Errors
 /// [`WhitewaterError`]; the frames that were completed before are in the stream.
 pub fn whitewater(
-    request: &Request,
+    request: &WhitewaterRequest,
     stop: &AtomicBool,
     tell: &mut dyn FnMut(Event),
-) -> Result<Outcome, WhitewaterError> {
+) -> Result<WhitewaterOutcome, WhitewaterError> {
     let (cache, last) = asked(request)?;
     let directory = directory(&request.cache, &request.name);
     let scene = super::baked_scene(&cache, &request.cache)?.of_whitewater();
@@ -190,7 +190,7 @@ pub fn whitewater(
             let Some(settled) = settled else {
                 // A stream that was to be overwritten is as it was.
                 let standing = CacheReader::open(&directory).ok();
-                return Ok(Outcome {
+                return Ok(WhitewaterOutcome {
                     last_frame: standing.map_or(cache.first_frame(), |it| it.last_frame()),
                     frames: 0,
                     bytes: 0,
@@ -259,7 +259,7 @@ pub fn whitewater(
     tell(Event::Written {
         bytes: summary.bytes,
     });
-    Ok(Outcome {
+    Ok(WhitewaterOutcome {
         last_frame: summary.last_frame,
         frames: summary.frames,
         bytes: summary.bytes,
@@ -273,7 +273,7 @@ pub fn whitewater(
 }
 
 /// Opens the bake, and determines the last frame to make.
-fn asked(request: &Request) -> Result<(CacheReader, u32), WhitewaterError> {
+fn asked(request: &WhitewaterRequest) -> Result<(CacheReader, u32), WhitewaterError> {
     let cache = CacheReader::open(&request.cache)?;
     if cache.manifest().is_whitewater() {
         return Err(WhitewaterError::IsWhitewater(request.cache.clone()));
@@ -447,7 +447,7 @@ impl StreamWriter {
 /// The existing stream, if it was made with the same settings; `None` if there is none or it is to
 /// be overwritten.
 fn standing(
-    request: &Request,
+    request: &WhitewaterRequest,
     directory: &Path,
     manifest: &Manifest,
 ) -> Result<Option<CacheReader>, WhitewaterError> {
@@ -483,7 +483,7 @@ fn other(stream: &CacheReader, hash: &str) -> Option<&'static str> {
 }
 
 /// Hash of everything except the device that decides a stream's bytes: settings and bake.
-fn hash(cache: &CacheReader, request: &Request) -> Result<String, CacheError> {
+fn hash(cache: &CacheReader, request: &WhitewaterRequest) -> Result<String, CacheError> {
     let first = &cache.entry(cache.first_frame())?.chain;
     let hash = blake3::hash(format!("{} {first}", request.settings.hash()).as_bytes());
     Ok(hash.to_hex().to_string())
@@ -492,7 +492,7 @@ fn hash(cache: &CacheReader, request: &Request) -> Result<String, CacheError> {
 /// The manifest of the stream: that of the bake with the fields that differ.
 fn manifest(
     cache: &CacheReader,
-    request: &Request,
+    request: &WhitewaterRequest,
     identity: &Identity,
 ) -> Result<Manifest, WhitewaterError> {
     let baked = cache.manifest();

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use crate::{
-    engine::{Comparison, Io, Outcome, comparison, names},
+    engine::{Comparison, Io, PassResult, comparison, names},
     flip::FlipState,
     pbf::PbfState,
     table::entries,
@@ -36,7 +36,7 @@ pub(super) const FLIP: &[Comparison<FlipState>] = &[comparison(
     faces,
 )];
 
-fn particles(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
+fn particles(state: &mut PbfState, io: &mut Io<'_>) -> PassResult {
     let Some(settings) = &state.scene.effects.absorbing_zone else {
         return Ok(());
     };
@@ -46,7 +46,7 @@ fn particles(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     zone::particles(state, io, settings.zone(), &VELOCITY, none, |v| [part, v])
 }
 
-fn faces(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+fn faces(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let Some(settings) = &state.scene.effects.absorbing_zone else {
         return Ok(());
     };

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use crate::{
-    engine::{Comparison, Io, Outcome, State, comparison, names},
+    engine::{Comparison, Io, PassResult, State, comparison, names},
     flip::FlipState,
     pbf::{PbfState, bounds::Bounds},
     table::{entries, pair},
@@ -73,7 +73,7 @@ fn blown(
     BLOWN.of([off, exposure, reach(against), slack, most, wind.length()])
 }
 
-fn by_density(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
+fn by_density(state: &mut PbfState, io: &mut Io<'_>) -> PassResult {
     let Some(settings) = state.scene.effects.drag.clone() else {
         return Ok(());
     };
@@ -100,7 +100,7 @@ fn by_density(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     Ok(())
 }
 
-fn by_cells(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+fn by_cells(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let Some(settings) = state.scene.effects.drag.clone() else {
         return Ok(());
     };

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use glam::DVec3;
 
 use crate::{
-    engine::{Comparison, Io, Outcome, comparison, names},
+    engine::{Comparison, Io, PassResult, comparison, names},
     flip::FlipState,
     pbf::PbfState,
     table::entries,
@@ -62,7 +62,7 @@ fn sizes(waves: &OpenWaves, rate: f64, size: DVec3, step: f64) -> [f64; 3] {
     [rate * step / (1.0 + rate * step), wave, speed]
 }
 
-fn particles(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
+fn particles(state: &mut PbfState, io: &mut Io<'_>) -> PassResult {
     let Some(settings) = &state.scene.effects.generation_zone else {
         return Ok(());
     };
@@ -79,7 +79,7 @@ fn particles(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     zone::particles(state, io, zone, &VELOCITY, wanted, magnitudes)
 }
 
-fn faces(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+fn faces(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let Some(settings) = &state.scene.effects.generation_zone else {
         return Ok(());
     };

@@ -3,7 +3,7 @@
 use glam::{DVec2, DVec3};
 
 use crate::{
-    engine::{Comparison, Io, NONE, Outcome, comparison, names},
+    engine::{Comparison, Io, NONE, PassResult, comparison, names},
     flip::FlipState,
     pbf::PbfState,
     table::{Entry, each, entries, pair},
@@ -81,7 +81,7 @@ pub(super) const FLIP: &[Comparison<FlipState>] = &[
     ),
 ];
 
-fn first(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+fn first(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let elements = state.elements();
     let kind = &state.space().kind;
     let reference = passes::first_share(&state.model, &elements.bricks, kind, state.density());
@@ -97,7 +97,7 @@ fn smoothed(
     io: &mut Io<'_>,
     [from, to]: [Buf<f32>; 2],
     entry: &'static Entry<1>,
-) -> Outcome {
+) -> PassResult {
     let elements = state.elements();
     let kind = &state.space().kind;
     let share = io.before.scalars(from, elements.cells)?;
@@ -109,7 +109,7 @@ fn smoothed(
     Ok(())
 }
 
-fn curvature(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+fn curvature(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let elements = state.elements();
     let (model, bricks, kind) = (&state.model, &elements.bricks, &state.space().kind);
     let share = io.before.scalars(SHARE, elements.cells)?;
@@ -152,7 +152,7 @@ fn pairs(values: &[[f32; 2]]) -> Vec<DVec2> {
     values.iter().map(wide).collect()
 }
 
-fn push(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+fn push(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let Some(settings) = &state.scene.effects.surface_tension else {
         return Ok(());
     };

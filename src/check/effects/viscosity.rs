@@ -2,7 +2,7 @@
 //! has no pass.
 
 use crate::{
-    engine::{Comparison, Io, NONE, Outcome, State, comparison, names},
+    engine::{Comparison, Io, NONE, PassResult, State, comparison, names},
     flip::FlipState,
     pbf::{
         PbfState,
@@ -81,7 +81,7 @@ pub(super) const FLIP: &[Comparison<FlipState>] = &[
     ),
 ];
 
-fn weigh(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+fn weigh(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let elements = state.elements();
     let active = elements.active();
     let step = state.step();
@@ -109,7 +109,7 @@ fn weigh(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     Ok(())
 }
 
-fn relax(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+fn relax(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let elements = state.elements();
     let [reach, gain, momentum, _] = io.before.window(&GAINS)?.map(f64::from);
     let velocity = elements.planes(&io.before, FROM)?;
@@ -146,7 +146,7 @@ fn relax(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     Ok(())
 }
 
-fn add_pressure(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+fn add_pressure(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let elements = state.elements();
     let before = io.before.scalars(pressure::PRESSURE, elements.cells)?;
     let earlier = io.before.scalars(EARLIER, elements.cells)?;
@@ -158,7 +158,7 @@ fn add_pressure(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     Ok(())
 }
 
-fn gather(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
+fn gather(state: &mut PbfState, io: &mut Io<'_>) -> PassResult {
     let settings = state.scene.effects.viscosity.as_ref();
     let Some(xsph) = settings.and_then(|settings| settings.xsph) else {
         return Ok(());
@@ -180,7 +180,7 @@ fn gather(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     Ok(())
 }
 
-fn apply(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
+fn apply(state: &mut PbfState, io: &mut Io<'_>) -> PassResult {
     let n = state.particles();
     let change = io.before.vectors(VISCOSITY_CHANGE, n)?;
     let reference = viscosity_apply(&change, &io.before.vectors(pbf::buffers::VELOCITY, n)?);

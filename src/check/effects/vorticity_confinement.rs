@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use crate::{
-    engine::{Comparison, Io, NONE, Outcome, State, comparison, names},
+    engine::{Comparison, Io, NONE, PassResult, State, comparison, names},
     flip::FlipState,
     pbf::{
         PbfState,
@@ -81,7 +81,7 @@ pub(super) const FLIP: &[Comparison<FlipState>] = &[
     ),
 ];
 
-fn curl(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
+fn curl(state: &mut PbfState, io: &mut Io<'_>) -> PassResult {
     let n = state.particles();
     let (points, velocity) = (
         state.moved(io)?,
@@ -107,7 +107,7 @@ fn curl(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     Ok(())
 }
 
-fn force(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
+fn force(state: &mut PbfState, io: &mut Io<'_>) -> PassResult {
     let Some(settings) = state.scene.effects.vorticity_confinement.clone() else {
         return Ok(());
     };
@@ -164,7 +164,7 @@ fn slope(bounds: &Bounds<'_>, strength: &[f64], i: usize) -> f64 {
     sum.length()
 }
 
-fn curl_on_grid(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+fn curl_on_grid(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let elements = state.elements();
     let velocity = elements.planes(&io.before, flip::buffers::FACE_VELOCITY)?;
     let lengths = io.after.scalars(VORTICITY_LENGTH, elements.cells)?;
@@ -188,7 +188,7 @@ fn curl_on_grid(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     Ok(())
 }
 
-fn confine_on_grid(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+fn confine_on_grid(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let Some(settings) = &state.scene.effects.vorticity_confinement else {
         return Ok(());
     };

@@ -4,7 +4,7 @@
 use glam::DVec3;
 
 use crate::{
-    engine::{Io, Outcome, State},
+    engine::{Io, PassResult, State},
     flip::FlipState,
     pbf::PbfState,
     table::{Entry, pair},
@@ -43,7 +43,7 @@ pub(super) fn particles<const N: usize>(
     entry: &'static Entry<N>,
     wanted: impl Fn(DVec3) -> DVec3 + Send + Sync,
     magnitudes: impl Fn(f64) -> [f64; N] + Send + Sync,
-) -> Outcome {
+) -> PassResult {
     let n = state.particles();
     let places = io.before.vectors(pbf::buffers::POSITION, n)?;
     let velocity = io.before.vectors(pbf::buffers::VELOCITY, n)?;
@@ -66,7 +66,7 @@ pub(super) fn faces<const N: usize>(
     entry: &'static Entry<N>,
     wanted: impl Fn(DVec3) -> DVec3 + Send + Sync,
     magnitudes: impl Fn([f64; 2]) -> [f64; N] + Send + Sync,
-) -> Outcome {
+) -> PassResult {
     let (elements, step) = (state.elements(), state.step());
     let old = elements.planes(&io.before, flip::buffers::FACE_CHANGE)?;
     let before = elements.planes(&io.before, flip::buffers::FACE_VELOCITY)?;

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use crate::{
-    engine::{Comparison, Io, NONE, Outcome, comparison},
+    engine::{Comparison, Io, NONE, PassResult, comparison},
     table::{Entry, each, pair},
 };
 use swell_domain::bricks::CELLS;
@@ -33,7 +33,7 @@ pub(super) const COMPARISONS: &[Comparison<FlipState>] = &[
 /// Returns a comparison of the first few runs on each level.
 const fn of_level(
     pass: &'static str,
-    compare: fn(&mut FlipState, &mut Io<'_>) -> Outcome,
+    compare: fn(&mut FlipState, &mut Io<'_>) -> PassResult,
 ) -> Comparison<FlipState> {
     Comparison {
         is_due,
@@ -124,7 +124,7 @@ pub(super) fn smoothed(cycle: &Cycle, io: &mut Io<'_>, entry: &'static Entry<1>)
     cycle.compare(io, entry, (1, Surroundings::SmoothedWithin), found);
 }
 
-fn restrict(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+fn restrict(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let cycle = Cycle::of(state, io)?;
     let passed = cycle.levels.restricted(cycle.level(), cycle.rounding);
     let pairs = passed.into_iter().map(|cell| {
@@ -136,7 +136,7 @@ fn restrict(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     Ok(())
 }
 
-fn prolong(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+fn prolong(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let cycle = Cycle::of(state, io)?;
     let found = &cycle.levels.correction;
     cycle.compare(io, &PROLONGED, (1, Surroundings::SmoothedWithAbove), found);
@@ -148,7 +148,7 @@ fn prolong(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
 }
 
 /// Compares all corrections that the pass leaves, and the residuals that it passes down.
-fn solve_coarse(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+fn solve_coarse(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let cycle = Cycle::of(state, io)?;
     let levels = &cycle.levels;
     let Range { start, end } = levels.levels[cycle.level()];
@@ -175,7 +175,7 @@ fn solve_coarse(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     Ok(())
 }
 
-fn coarsen(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+fn coarsen(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let cycle = Cycle::of(state, io)?;
     let (levels, unit) = (&cycle.levels, state.unit());
     let is_end = |at, axis| state.is_periodic() && levels.is_closed_end(at, axis);

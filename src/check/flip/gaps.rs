@@ -6,12 +6,12 @@ use swell_solve::flip::buffers;
 
 use super::{FlipState, rows::*};
 use crate::{
-    engine::{Io, Outcome},
+    engine::{Io, PassResult},
     table::{each, pair},
 };
 
 /// Compares the pass, from the kinds, densities, velocities and fluxes on the device.
-pub(super) fn close_gaps(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+pub(super) fn close_gaps(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let (elements, step, space) = (state.elements(), state.step(), state.space());
     let faces = elements.faces(&io.before)?;
     let gaps = Gaps {

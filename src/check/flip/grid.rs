@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use crate::{
-    engine::{Io, Outcome},
+    engine::{Io, PassResult},
     solids::{GRID, TURNED},
     table::{each, pair},
 };
@@ -93,7 +93,7 @@ impl FlipState {
     }
 }
 
-pub(super) fn cut_cells(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+pub(super) fn cut_cells(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let has_moving = !state.boundary.moving.is_empty();
     let has_solids = state.boundary.distance.is_some() || has_moving;
     let (elements, step) = (state.elements(), state.step());
@@ -181,7 +181,7 @@ pub(super) fn cut_cells(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
 }
 
 /// Compares the faces after the last of the three axes.
-pub(super) fn gather_faces(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+pub(super) fn gather_faces(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     if io.before.window(&buffers::AXES)?[0] < 2 {
         return Ok(());
     }
@@ -224,7 +224,7 @@ pub(super) fn gather_faces(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     Ok(())
 }
 
-pub(super) fn gather_centers(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+pub(super) fn gather_centers(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let settings = state.model.settings();
     let (elements, step, space) = (state.elements(), state.step(), state.space());
     let bricks = &elements.bricks;
@@ -258,7 +258,7 @@ pub(super) fn gather_centers(state: &mut FlipState, io: &mut Io<'_>) -> Outcome 
 }
 
 /// Compares the pass, from the densities on the device.
-pub(super) fn find_water(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+pub(super) fn find_water(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let (elements, step, space) = (state.elements(), state.step(), state.space());
     let (bricks, density) = (&elements.bricks, state.density());
     let depth = find_depth(&state.model, &step, bricks, space, density);
@@ -304,7 +304,7 @@ pub(super) fn find_water(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     Ok(())
 }
 
-pub(super) fn find_excess(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+pub(super) fn find_excess(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let (elements, density) = (state.elements(), state.density());
     let reference = reference_find_excess(&state.step(), &elements.bricks, state.space(), density);
     let excess = elements.scalars(&io.after, buffers::DENSITY_EXCESS)?;
@@ -317,7 +317,7 @@ pub(super) fn find_excess(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
 }
 
 /// Compares the pass, from the densities, the flux and the excess on the device.
-pub(super) fn let_in(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+pub(super) fn let_in(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let (elements, density) = (state.elements(), state.density());
     let corrects = state.model.settings().density_correction;
     let mut excess = match corrects {
@@ -355,7 +355,7 @@ pub(super) fn let_in(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     Ok(())
 }
 
-pub(super) fn wall_friction(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+pub(super) fn wall_friction(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let (elements, step) = (state.elements(), state.step());
     let (bricks, space) = (&elements.bricks, state.space());
     let before = elements.faces(&io.before)?;
@@ -377,7 +377,7 @@ pub(super) fn wall_friction(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     Ok(())
 }
 
-pub(super) fn find_change(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+pub(super) fn find_change(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let elements = state.elements();
     let mut reference = elements.faces(&io.before)?;
     let before = reference.change.clone();
@@ -401,7 +401,7 @@ pub(super) fn find_change(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     Ok(())
 }
 
-pub(super) fn extrapolate(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+pub(super) fn extrapolate(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let layer = io.before.window(&buffers::LAYERS)?[0];
     let (elements, step) = (state.elements(), state.step());
     if layer > step.layers as u32 {

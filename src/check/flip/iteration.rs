@@ -2,7 +2,7 @@
 //! air touches.
 
 use crate::{
-    engine::{Comparison, Io, NONE, Outcome, comparison, names},
+    engine::{Comparison, Io, NONE, PassResult, comparison, names},
     table::pair,
 };
 use swell_domain::{bricks::CELLS, poisson::remove_means};
@@ -65,7 +65,7 @@ const VALUES: Buf<Real> = Buf::new("values");
 const fn early(
     pass: &'static str,
     keeps: fn() -> Vec<String>,
-    compare: fn(&mut FlipState, &mut Io<'_>) -> Outcome,
+    compare: fn(&mut FlipState, &mut Io<'_>) -> PassResult,
 ) -> Comparison<FlipState> {
     Comparison {
         is_due: |state, io| {
@@ -141,7 +141,12 @@ impl FlipState {
 
     /// Computes the sum of products of two arrays, which the bricks' partial sums of a kind should
     /// add up to.
-    pub(super) fn note_sum(&mut self, io: &Io<'_>, kind: usize, [a, b]: [Buf<Real>; 2]) -> Outcome {
+    pub(super) fn note_sum(
+        &mut self,
+        io: &Io<'_>,
+        kind: usize,
+        [a, b]: [Buf<Real>; 2],
+    ) -> PassResult {
         let [a, b] = [self.by_row(&io.after, a)?, self.by_row(&io.after, b)?];
         self.sums[kind] = Some(products(&a, &b));
         Ok(())
@@ -164,7 +169,7 @@ impl FlipState {
     }
 }
 
-fn precondition(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+fn precondition(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let unit = state.unit();
     let r = state.by_row(&io.after, solved::RESIDUAL)?;
     let z = state.by_row(&io.after, solved::CORRECTION)?;
@@ -180,7 +185,7 @@ fn precondition(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     Ok(())
 }
 
-fn ipp_lower(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+fn ipp_lower(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let unit = state.unit();
     let r = state.by_row(&io.after, solved::RESIDUAL)?;
     let d = state.by_row(&io.after, solved::INVERSE_DIAGONAL)?;
@@ -192,7 +197,7 @@ fn ipp_lower(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     Ok(())
 }
 
-fn ipp_upper(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+fn ipp_upper(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let unit = state.unit();
     let d = state.by_row(&io.after, solved::INVERSE_DIAGONAL)?;
     let half = state.product(io)?;
@@ -204,7 +209,7 @@ fn ipp_upper(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     state.note_sum(io, CORRECTED, [solved::RESIDUAL, solved::CORRECTION])
 }
 
-fn multiply(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+fn multiply(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let unit = state.unit();
     let last = state.by_row(&io.after, solved::DIRECTION)?;
     let [p, sizes] = state.direction(io, &last)?;
@@ -226,7 +231,7 @@ fn multiply(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     Ok(())
 }
 
-fn advance(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+fn advance(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let control = io.before.control(state.precision())?;
     let (unit, alpha) = (state.unit(), control.alpha);
     let last = state.by_row(&io.before, solved::DIRECTION)?;
@@ -264,7 +269,7 @@ fn advance(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     Ok(())
 }
 
-fn verify(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+fn verify(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let (terms, unit) = (state.terms(&io.after)?, state.unit());
     let b = state.by_row(&io.after, solved::RHS)?;
     let r = state.by_row(&io.after, solved::RESIDUAL)?;
@@ -279,7 +284,7 @@ fn verify(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     Ok(())
 }
 
-fn sum_pockets(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+fn sum_pockets(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let (precision, unit) = (state.precision(), state.unit());
     let count = io.before.window(&solved::PHASES)?.pocket_parts as usize;
     let parts = io.after.get(solved::POCKET_PARTS, count)?;
@@ -301,7 +306,7 @@ fn sum_pockets(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     Ok(())
 }
 
-fn center(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+fn center(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let unit = state.unit();
     let before = state.by_row(&io.before, VALUES)?;
     let found = state.by_row(&io.after, VALUES)?;
@@ -325,7 +330,7 @@ fn center(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
 }
 
 /// Checks that the cells of each pocket have its smallest element as label, and all others 0.
-fn count_pockets(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+fn count_pockets(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let wet = state.elements().wet();
     let labels = io.after.get(solved::LABEL, wet.end)?;
     let counted = io.after.one(solved::STATS)?.pockets;
@@ -359,7 +364,7 @@ struct Reduced {
 }
 
 /// Compares the sums of the partial sums and the decisions based on them.
-fn reduce(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+fn reduce(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let phase = io.before.window(&solved::PHASES)?;
     let before = io.before.control(state.precision())?;
     let step = STEPS[phase.step as usize];

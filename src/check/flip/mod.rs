@@ -34,7 +34,7 @@ use swell_solve::{
 
 use super::{
     Checked, effects,
-    engine::{Comparison, Engine, Io, NONE, Outcome, State, comparison, names},
+    engine::{Comparison, Engine, Io, NONE, PassResult, State, comparison, names},
     table::pair,
 };
 use elements::Elements;
@@ -234,7 +234,7 @@ impl FlipState {
 }
 
 /// Compares the work, from the pressure and the flux on the device.
-fn boundary_work(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+fn boundary_work(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let elements = state.elements();
     let pressure = elements.scalars(&io.after, solved::PRESSURE)?;
     let flux = elements.scalars(&io.after, buffers::SOLID_FLUX)?;

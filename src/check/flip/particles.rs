@@ -4,7 +4,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::{
-    engine::{Io, Outcome},
+    engine::{Io, PassResult},
     table::pair,
 };
 use swell_domain::bricks::Bricks;
@@ -28,7 +28,7 @@ fn of_faces(bricks: &Bricks, values: &[DVec3], element: u32, place: f64) -> f64 
     DVec3::from_array([0, 1, 2].map(error)).length()
 }
 
-pub(super) fn grid_to_particle(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+pub(super) fn grid_to_particle(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let elements = state.elements();
     let faces = elements.faces(&io.before)?;
     let shift = match state.model.settings().density_correction {
@@ -110,7 +110,7 @@ pub(super) fn grid_to_particle(state: &mut FlipState, io: &mut Io<'_>) -> Outcom
 }
 
 /// Compares the pass, from the values that the device transferred to the particles.
-pub(super) fn aim(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+pub(super) fn aim(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let given = state.given.as_ref().expect("after flip/grid_to_particle");
     let before = io.before.vectors(buffers::SORTED_POSITION, state.n)?;
     let after = io.after.vectors(buffers::SORTED_POSITION, state.n)?;
@@ -142,7 +142,7 @@ fn given(state: &FlipState, io: &Io<'_>, is_drop: Vec<bool>) -> Result<GridTrans
 }
 
 /// Compares the displacements of the sorted particles, which the pass adds to `displacement`.
-pub(super) fn push_apart(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+pub(super) fn push_apart(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let Some(before) = state.given.take() else {
         return Ok(());
     };
@@ -184,7 +184,7 @@ pub(super) fn push_apart(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     Ok(())
 }
 
-pub(super) fn advect(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+pub(super) fn advect(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let Some(given) = state.given.take() else {
         return Ok(());
     };

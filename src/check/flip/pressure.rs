@@ -4,7 +4,7 @@
 use glam::DVec3;
 
 use crate::{
-    engine::{Comparison, Io, NONE, Outcome, View, comparison, names},
+    engine::{Comparison, Io, NONE, PassResult, View, comparison, names},
     table::{Entry, Table, pair},
 };
 use swell_compare::{
@@ -214,7 +214,7 @@ impl FlipState {
     }
 }
 
-fn build_system(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+fn build_system(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let settings = state.model.settings();
     let elements = state.elements();
     let cells = elements.cells;
@@ -294,7 +294,7 @@ fn build_system(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     Ok(())
 }
 
-fn divergence(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+fn divergence(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     state.note_sum(io, SQUARE, [solved::RHS; 2])?;
     let velocity = state
         .elements()
@@ -310,7 +310,7 @@ fn divergence(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     Ok(())
 }
 
-fn density_source(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+fn density_source(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     state.note_sum(io, SQUARE, [solved::RHS; 2])?;
     let rhs = state.by_row(&io.after, solved::RHS)?;
     let centers = &state.assembled().centers;
@@ -321,7 +321,7 @@ fn density_source(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     Ok(())
 }
 
-fn project(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+fn project(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let elements = state.elements();
     let terms = state.terms(&io.after)?;
     let (errors, x) = (state.difference_errors(&terms), sum(&terms));
@@ -348,7 +348,7 @@ fn project(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
 }
 
 /// Solves the device's own system directly and compares the result with that of the iteration.
-fn whole(state: &FlipState, mut x: Vec<f64>, velocity: &[DVec3], io: &mut Io<'_>) -> Outcome {
+fn whole(state: &FlipState, mut x: Vec<f64>, velocity: &[DVec3], io: &mut Io<'_>) -> PassResult {
     let mut b = state.by_row(&io.after, solved::RHS)?;
     let system = state.system();
     let solver = match Solver::new(system, BUDGET) {
@@ -391,7 +391,7 @@ fn whole(state: &FlipState, mut x: Vec<f64>, velocity: &[DVec3], io: &mut Io<'_>
     Ok(())
 }
 
-fn measure_divergence(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+fn measure_divergence(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let velocity = state
         .elements()
         .planes(&io.before, buffers::FACE_VELOCITY)?;
@@ -406,7 +406,7 @@ fn measure_divergence(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     Ok(())
 }
 
-fn displace(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+fn displace(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let terms = state.terms(&io.after)?;
     let (errors, x) = (state.difference_errors(&terms), sum(&terms));
     let waters = state.waters();

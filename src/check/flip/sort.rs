@@ -3,7 +3,7 @@
 use glam::{DMat3, DVec3};
 
 use crate::{
-    engine::{Io, Outcome, View},
+    engine::{Io, PassResult, View},
     sort::{check_cells, check_slots},
     table::pair,
 };
@@ -65,7 +65,7 @@ impl FlipState {
     }
 }
 
-pub(super) fn survey(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+pub(super) fn survey(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let reference = reference_survey(&state.model, &state.unsorted(&io.after)?);
     let found = io
         .after
@@ -109,7 +109,7 @@ pub(super) fn survey(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     Ok(())
 }
 
-pub(super) fn assign_cells(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+pub(super) fn assign_cells(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let params = io.after.one(buffers::PARAMS)?;
     if let Some(elements) = &mut state.elements {
         elements.stride = params.stride as usize;
@@ -126,7 +126,7 @@ pub(super) fn assign_cells(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     Ok(())
 }
 
-pub(super) fn reorder(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+pub(super) fn reorder(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let n = state.n;
     let (before, after) = (state.unsorted(&io.after)?, state.sorted_now(&io.after)?);
     let order = io.before.get(buffers::ORDER, n)?;

@@ -6,7 +6,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::{
-    engine::{Io, Outcome},
+    engine::{Io, PassResult},
     table::pair,
 };
 use swell_domain::places::{SKIN, are_near};
@@ -179,7 +179,7 @@ impl PbfState {
     }
 }
 
-pub(super) fn build_neighbors(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
+pub(super) fn build_neighbors(state: &mut PbfState, io: &mut Io<'_>) -> PassResult {
     let n = state.particles();
     let phase = io.before.window(&buffers::PHASES)?;
     let (points, _) = state.stored(io)?;

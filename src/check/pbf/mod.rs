@@ -30,7 +30,7 @@ use swell_solve::{
 
 use super::{
     Checked, effects,
-    engine::{Comparison, Engine, Io, NONE, Outcome, State, View, comparison, names, wide},
+    engine::{Comparison, Engine, Io, NONE, PassResult, State, View, comparison, names, wide},
     flip::FlipState,
     table::{Table, pair},
 };
@@ -199,7 +199,7 @@ impl PbfState {
 
     /// Takes the boundary samples from the device, as inputs of its passes, and compares them as
     /// outputs of the upload.
-    fn take_samples(&mut self, io: &mut Io<'_>) -> Outcome {
+    fn take_samples(&mut self, io: &mut Io<'_>) -> PassResult {
         let (n, samples) = (self.particles(), self.plan.counts.boundary_samples);
         if samples == 0 || std::mem::replace(&mut self.has_samples, true) {
             return Ok(());

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use crate::{
-    engine::{Io, Outcome},
+    engine::{Io, PassResult},
     sort::{check_cells, check_slots},
     table::{each, pair},
 };
@@ -20,7 +20,7 @@ use swell_solve::{params::Phase, pbf::buffers};
 
 use super::{PbfState, State, bounds::Bounds, rows::*};
 
-pub(super) fn predict(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
+pub(super) fn predict(state: &mut PbfState, io: &mut Io<'_>) -> PassResult {
     let n = state.particles();
     state.take_samples(io)?;
     if state.is_over {
@@ -107,7 +107,7 @@ pub(super) fn predict(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     Ok(())
 }
 
-pub(super) fn assign_cells(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
+pub(super) fn assign_cells(state: &mut PbfState, io: &mut Io<'_>) -> PassResult {
     let n = state.particles();
     let cells = &state.model.cells;
     let points = io.before.vectors(buffers::CORRECTED, n)?;
@@ -123,7 +123,7 @@ pub(super) fn assign_cells(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     Ok(())
 }
 
-pub(super) fn reorder(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
+pub(super) fn reorder(state: &mut PbfState, io: &mut Io<'_>) -> PassResult {
     let n = state.particles();
     let order = io.before.get(buffers::ORDER, n)?;
     let predicted = io.before.vectors(buffers::CORRECTED, n)?;
@@ -163,7 +163,7 @@ pub(super) fn reorder(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     Ok(())
 }
 
-pub(super) fn compute_lambda(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
+pub(super) fn compute_lambda(state: &mut PbfState, io: &mut Io<'_>) -> PassResult {
     let control = state.control(io)?;
     if control.is_some_and(|control| control.is_done == 1) {
         return Ok(());
@@ -197,7 +197,7 @@ pub(super) fn compute_lambda(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     Ok(())
 }
 
-pub(super) fn compute_delta(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
+pub(super) fn compute_delta(state: &mut PbfState, io: &mut Io<'_>) -> PassResult {
     if (state.control(io)?).is_some_and(|control| control.is_done == 1) {
         return Ok(());
     }
@@ -283,7 +283,7 @@ pub(super) fn compute_delta(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     Ok(())
 }
 
-pub(super) fn exchange(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
+pub(super) fn exchange(state: &mut PbfState, io: &mut Io<'_>) -> PassResult {
     if (state.control(io)?).is_some_and(|control| control.is_done == 1) {
         return Ok(());
     }
@@ -310,7 +310,7 @@ pub(super) fn exchange(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     Ok(())
 }
 
-pub(super) fn update_velocity(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
+pub(super) fn update_velocity(state: &mut PbfState, io: &mut Io<'_>) -> PassResult {
     let n = state.particles();
     let ends = state.places(&io.before, n)?.0;
     let starts = io.before.vectors(buffers::START_POSITION, n)?;
@@ -377,7 +377,7 @@ pub(super) fn update_velocity(state: &mut PbfState, io: &mut Io<'_>) -> Outcome 
     Ok(())
 }
 
-pub(super) fn measure_density(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
+pub(super) fn measure_density(state: &mut PbfState, io: &mut Io<'_>) -> PassResult {
     let n = state.particles();
     let mut points = state.places(&io.before, n)?.0;
     points.extend(&state.model.samples);

@@ -1,7 +1,7 @@
 //! The stop at a density error.
 
 use crate::{
-    engine::{Io, Outcome},
+    engine::{Io, PassResult},
     table::pair,
 };
 use swell_scene::Stop;
@@ -12,7 +12,7 @@ use super::{
     rows::{DECISION, ERROR_SUMS, NEAR_TARGET},
 };
 
-pub(super) fn sum_error(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
+pub(super) fn sum_error(state: &mut PbfState, io: &mut Io<'_>) -> PassResult {
     let n = state.particles();
     let density = io.before.get(buffers::DENSITY, n)?;
     let sums = io.after.get(buffers::ERROR_SUMS, n.div_ceil(256))?;
@@ -24,7 +24,7 @@ pub(super) fn sum_error(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     Ok(())
 }
 
-pub(super) fn decide(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
+pub(super) fn decide(state: &mut PbfState, io: &mut Io<'_>) -> PassResult {
     let Stop::DensityError { density_error, .. } = state.scene.settings().stop else {
         return Ok(());
     };

@@ -1,7 +1,7 @@
 //! Work of moving walls on the particles, over m / Δt².
 
 use crate::{
-    engine::{Io, Outcome},
+    engine::{Io, PassResult},
     table::pair,
 };
 use swell_solve::pbf::buffers;
@@ -21,7 +21,7 @@ impl PbfState {
     }
 }
 
-pub(super) fn boundary_work(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
+pub(super) fn boundary_work(state: &mut PbfState, io: &mut Io<'_>) -> PassResult {
     let n = state.particles();
     let groups = n.div_ceil(64);
     let work = io.before.get(buffers::WALL_WORK, 2 * n)?;

@@ -12,7 +12,7 @@ use swell_study::{
 
 use super::{
     super::{
-        Devices, Request,
+        Devices, StudyRequest,
         report::{Report, what_was_run},
     },
     Run, Verdict,
@@ -123,7 +123,7 @@ pub(super) fn bound(bound: Bound) -> String {
 }
 
 impl Results<'_> {
-    pub(super) fn draw(&self, request: &Request) -> Report {
+    pub(super) fn draw(&self, request: &StudyRequest) -> Report {
         let rows = self.rows();
         let findings = self.findings(&rows);
         let (_, marks) = &findings[0];
@@ -276,7 +276,7 @@ impl Results<'_> {
 
     fn parts(
         &self,
-        request: &Request,
+        request: &StudyRequest,
         rows: &[Row<'_>],
         findings: &[(String, String)],
     ) -> Vec<Part> {

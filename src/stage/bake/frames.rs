@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use swell_cache::{CacheWriter, Clock, Summary, failed};
 use swell_scene::{Held, Scene};
 
-use super::{BakeError, BakePlan, Event, Request, water};
+use super::{BakeError, BakePlan, BakeRequest, Event, water};
 use crate::{drive::Step, probes};
 
 /// Writes the frames of a running bake, and counts what it warns of at its end.
@@ -34,7 +34,7 @@ pub(super) struct Frames<'a> {
 impl<'a> Frames<'a> {
     /// Before the frame that follows the one at which `clock` stands.
     pub(super) fn new(
-        request: &'a Request,
+        request: &'a BakeRequest,
         plan: &BakePlan<'a>,
         writer: CacheWriter,
         clock: Clock,

@@ -4,7 +4,7 @@ use swell_cache::{CacheError, CacheReader, Clock, Parent, refuse_occupied};
 use swell_domain::{signed_distance::SignedDistanceError, sources::Solids};
 use swell_scene::Scene;
 
-use super::{BakeError, Inflow, Request, disk};
+use super::{BakeError, BakeRequest, Inflow, disk};
 use crate::{
     branch::{Branch, note_covered},
     prepare::{Start, Volume},
@@ -52,7 +52,7 @@ impl<'a> BakePlan<'a> {
     ///
     /// # Errors
     /// Those of [`bake`](super::bake) that need no device.
-    pub fn new(request: &'a Request) -> Result<Self, BakeError> {
+    pub fn new(request: &'a BakeRequest) -> Result<Self, BakeError> {
         let (scene, directory) = (&request.scene, &request.directory);
         let last = last_frame(request)?;
         let is_resumed = request.resume && swell_cache::exists(directory);
@@ -100,7 +100,7 @@ impl<'a> BakePlan<'a> {
     }
 
     /// The plan from a frame of another cache, after which `last` has to come.
-    fn branched(request: &'a Request, last: u32, branch: Branch) -> Result<Self, BakeError> {
+    fn branched(request: &'a BakeRequest, last: u32, branch: Branch) -> Result<Self, BakeError> {
         let scene = &request.scene;
         let frame = branch.clock.frame;
         if last <= frame {
@@ -126,7 +126,7 @@ impl<'a> BakePlan<'a> {
 
     /// The plan that goes on after the last frame of the request's cache, with the start of that
     /// bake.
-    fn resumed(request: &'a Request, branch: Option<Branch>) -> Result<Self, BakeError> {
+    fn resumed(request: &'a BakeRequest, branch: Option<Branch>) -> Result<Self, BakeError> {
         let (scene, directory) = (&request.scene, &request.directory);
         let cached = CacheReader::open(directory)?;
         let text = swell_files::scene_to_toml(scene, &swell_scene::asset_path);
@@ -215,7 +215,7 @@ impl<'a> BakePlan<'a> {
 
 /// The last requested frame. A bake computes every frame up to it, and a scene is validated only up
 /// to its own last frame.
-fn last_frame(request: &Request) -> Result<u32, BakeError> {
+fn last_frame(request: &BakeRequest) -> Result<u32, BakeError> {
     let shot = request.scene.shot.frames;
     let Some(frames) = &request.frames else {
         return Ok(shot);
@@ -231,7 +231,7 @@ fn last_frame(request: &Request) -> Result<u32, BakeError> {
 }
 
 /// Refuses a range whose first frame lies beyond the next one to bake.
-fn check_first(request: &Request, next: u32) -> Result<(), BakeError> {
+fn check_first(request: &BakeRequest, next: u32) -> Result<(), BakeError> {
     match &request.frames {
         Some(frames) if frames.first() > next => Err(BakeError::Frames(format!(
             "{frames}: frame {next} has not been baked, and each frame needs the one \

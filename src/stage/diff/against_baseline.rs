@@ -9,7 +9,9 @@ use std::{
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::{DiffError, Request, adapter_of, aggregates, bake_of, of_caches, physics, scene_of};
+use super::{
+    DiffError, DiffRequest, adapter_of, aggregates, bake_of, of_caches, physics, scene_of,
+};
 use swell_cache::{CacheError, CacheReader};
 use swell_compare::{
     baseline::{
@@ -59,7 +61,7 @@ pub(super) fn read(file: &Path) -> Result<Baseline, DiffError> {
 pub(super) fn compare(
     cache: &CacheReader,
     baseline: &Baseline,
-    request: &Request,
+    request: &DiffRequest,
 ) -> Result<BaselineDiff, DiffError> {
     let known: Vec<u32> = baseline.frames.iter().map(|frame| frame.frame).collect();
     let asked: Option<Vec<u32>> = request.frames.as_ref().map(|range| range.iter().collect());

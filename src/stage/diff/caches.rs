@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use rayon::prelude::*;
 
 use super::{
-    DiffError, Request, adapter_of, aggregates, bake_of, of_caches, physics, scene_of, streams,
+    DiffError, DiffRequest, adapter_of, aggregates, bake_of, of_caches, physics, scene_of, streams,
 };
 use swell_cache::{CacheError, CacheReader};
 use swell_compare::{
@@ -59,7 +59,7 @@ fn check_tolerance(tolerance: &Tolerance, caches: [&CacheReader; 2]) -> Result<(
 
 pub(super) fn compare(
     [a, b]: [&CacheReader; 2],
-    request: &Request,
+    request: &DiffRequest,
 ) -> Result<CacheDiff, DiffError> {
     let tolerance = request.tolerance.as_ref();
     if let Some(tolerance) = tolerance {

@@ -7,7 +7,7 @@ use std::{
 
 use rayon::prelude::*;
 
-use super::{DiffError, Images, Request};
+use super::{DiffError, DiffRequest, Images};
 use swell_compare::pictures::{self, Encoding, PairDiff, Picture, PicturesDiff, difference_image};
 use swell_domain::{
     frame_range::FrameRange,
@@ -73,7 +73,7 @@ fn wanted(
     }
 }
 
-pub(super) fn compare_folders(request: &Request) -> Result<PicturesDiff, DiffError> {
+pub(super) fn compare_folders(request: &DiffRequest) -> Result<PicturesDiff, DiffError> {
     let [a, b] = [&request.a, &request.b].map(|folder| wanted(folder, request.frames.as_ref()));
     let (a, b) = (a?, b?);
     if let Some(images) = &request.images {
@@ -105,7 +105,7 @@ pub(super) fn compare_folders(request: &Request) -> Result<PicturesDiff, DiffErr
     })
 }
 
-pub(super) fn compare_files(request: &Request) -> Result<PicturesDiff, DiffError> {
+pub(super) fn compare_files(request: &DiffRequest) -> Result<PicturesDiff, DiffError> {
     if let Some(frames) = &request.frames {
         return Err(DiffError::usage(format!(
             "frames {frames}: two pictures have no frames to choose from"
@@ -137,7 +137,7 @@ pub(super) fn compare_files(request: &Request) -> Result<PicturesDiff, DiffError
     })
 }
 
-fn limits(request: &Request) -> Option<&PictureLimits> {
+fn limits(request: &DiffRequest) -> Option<&PictureLimits> {
     request.tolerance.as_ref().map(|t| &t.pictures)
 }
 

@@ -2,10 +2,10 @@
 
 use std::collections::BTreeSet;
 
-use super::{ExportError, Request, Target, UsdWater, beside};
+use super::{ExportError, ExportRequest, Target, UsdWater, beside};
 
 /// Refuses targets that cannot be combined, and file names that two targets share.
-pub(super) fn check(request: &Request) -> Result<(), ExportError> {
+pub(super) fn check(request: &ExportRequest) -> Result<(), ExportError> {
     let asked = |what: String| Err(ExportError::Asked(what));
     if request.targets.is_empty() {
         return Err(ExportError::Nothing);

@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeMap, path::Path};
 
-use super::{Content, ExportError, Job, Request, Target, is_binary, share};
+use super::{Content, ExportError, ExportRequest, Job, Target, is_binary, share};
 
 /// Prediction of an export.
 #[derive(Clone, Debug, Default)]
@@ -24,7 +24,7 @@ pub struct Expected {
 ///
 /// # Errors
 /// Those of [`export`](super::export).
-pub fn expected(request: &Request) -> Result<Expected, ExportError> {
+pub fn expected(request: &ExportRequest) -> Result<Expected, ExportError> {
     let job = Job::new(request)?;
     let frames = share(&job.frames, request.chunk).to_vec();
     let shots = job.shots()?;

@@ -3,7 +3,7 @@
 use std::fs;
 
 use super::{
-    Asked, RenderJobError, Request,
+    Asked, RenderJobError, RenderRequest,
     folder::Folder,
     pictures::{is_current, pictures, whole_attributes},
     wanted,
@@ -36,7 +36,7 @@ impl Expected {
 ///
 /// # Errors
 /// Those of [`render`](super::render) that need no device.
-pub fn expected(request: &Request) -> Result<Expected, RenderJobError> {
+pub fn expected(request: &RenderRequest) -> Result<Expected, RenderJobError> {
     let Asked {
         cache,
         whitewater,

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{Request, whitewater::Whitewater};
+use super::{RenderRequest, whitewater::Whitewater};
 use crate::{device::shaders_note, numbering::Numbering};
 use swell_cache::{CacheError, CacheReader, Manifest};
 use swell_render::{
@@ -14,7 +14,7 @@ use swell_scene::look::{FormatSpec, Look};
 /// The complete metadata of a frame's pictures, including all inputs.
 pub(super) fn whole_attributes(
     cache: &CacheReader,
-    request: &Request,
+    request: &RenderRequest,
     whitewater: Option<&Whitewater>,
     frame: u32,
 ) -> Result<Attributes, CacheError> {
@@ -55,7 +55,7 @@ pub(super) fn others(frame: u32) -> impl Iterator<Item = (usize, u32)> {
 /// Metadata of a frame's pictures without the inputs other than the frame itself.
 pub(super) fn attributes(
     cache: &CacheReader,
-    request: &Request,
+    request: &RenderRequest,
     frame: u32,
 ) -> Result<Attributes, CacheError> {
     let manifest = cache.manifest();

@@ -42,7 +42,7 @@ pub const FINER: (u32, f64) = (4, 2.0);
 
 /// What to check.
 #[derive(Clone, Debug)]
-pub struct Request {
+pub struct SurfaceRequest {
     /// Directory of the cache.
     pub cache: PathBuf,
     /// Camera and surface; spray and whitewater are left out.
@@ -109,7 +109,7 @@ pub enum Event {
 /// Result of a check.
 #[derive(Clone, Debug, Default)]
 #[non_exhaustive]
-pub struct Outcome {
+pub struct SurfaceOutcome {
     /// One row per method.
     pub rows: Vec<Row>,
     /// Frames that were checked.
@@ -134,10 +134,10 @@ pub struct Outcome {
 /// Errors of the cache, its scene or the device; a frame that cannot be rendered; no visible water
 /// in any frame.
 pub fn check_render(
-    request: &Request,
+    request: &SurfaceRequest,
     stop: &AtomicBool,
     tell: &mut dyn FnMut(Event),
-) -> Result<Outcome, RenderJobError> {
+) -> Result<SurfaceOutcome, RenderJobError> {
     if request.colour {
         perceptual::require()?;
     }
@@ -164,9 +164,9 @@ pub fn check_render(
     });
     let mut surfaces = METHODS.map(|_| (Surfaces::default(), 0.0));
     let mut pictures = Pictures::new(request);
-    let mut outcome = Outcome {
+    let mut outcome = SurfaceOutcome {
         device: context.info.name.clone(),
-        ..Outcome::default()
+        ..SurfaceOutcome::default()
     };
     let (mut outside, mut all) = (0usize, 0usize);
     for frame in frames {
@@ -275,14 +275,14 @@ struct Pictured {
 
 /// Measurements of the pictures of all methods and of the reference.
 struct Pictures<'a> {
-    request: &'a Request,
+    request: &'a SurfaceRequest,
     /// In the order of [`METHODS`].
     methods: [Pictured; 2],
     residuals: Vec<f64>,
 }
 
 impl<'a> Pictures<'a> {
-    fn new(request: &'a Request) -> Self {
+    fn new(request: &'a SurfaceRequest) -> Self {
         Self {
             request,
             methods: METHODS.map(|_| Pictured::default()),
@@ -292,7 +292,7 @@ impl<'a> Pictures<'a> {
 
     /// Draws and measures what is requested of a frame seen from `eye`.
     fn take(&mut self, set: &Set<'_>, frame: u32, eye: &Eye) -> Result<(), RenderJobError> {
-        let Request {
+        let SurfaceRequest {
             look,
             colour,
             flicker,

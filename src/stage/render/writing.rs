@@ -7,7 +7,8 @@ use std::{
 };
 
 use super::{
-    Event, FolderError, Outcome, RenderJobError, Request, folder::Folder, pictures::write,
+    Event, FolderError, RenderJobError, RenderOutcome, RenderRequest, folder::Folder,
+    pictures::write,
 };
 use swell_domain::output::Lock;
 use swell_render::{Attributes, Image};
@@ -34,7 +35,7 @@ pub(super) struct Writing {
 }
 
 impl Writing {
-    pub(super) fn begin(drawn: Drawn, folder: &Arc<Folder>, request: &Request) -> Self {
+    pub(super) fn begin(drawn: Drawn, folder: &Arc<Folder>, request: &RenderRequest) -> Self {
         let (folder, look) = (folder.clone(), request.look.clone());
         let frame = drawn.frame;
         let thread = spawn(move || {
@@ -76,7 +77,7 @@ impl Writing {
 /// Waits for the pictures that are being written, and reports them.
 pub(super) fn end_writing(
     writing: &mut Option<Writing>,
-    outcome: &mut Outcome,
+    outcome: &mut RenderOutcome,
     tell: &mut dyn FnMut(Event),
 ) -> Result<(), RenderJobError> {
     if let Some(writing) = writing.take() {

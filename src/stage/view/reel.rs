@@ -9,7 +9,7 @@ use std::{
 use rayon::prelude::*;
 
 use super::{
-    Event, MOST, Outcome, PAGE_WIDTH, Placing, RATE, Request, ViewError, check_place,
+    Event, MOST, PAGE_WIDTH, Placing, RATE, ViewError, ViewOutcome, ViewRequest, check_place,
     curves::Curves,
     movie::{self, Movie},
     player::{Player, Set},
@@ -22,7 +22,7 @@ use swell_study::rgb::Rgb;
 
 /// A view that is ready to run.
 pub(super) struct Reel<'a> {
-    request: &'a Request,
+    request: &'a ViewRequest,
     strips: Vec<Strip>,
     labels: Vec<Label>,
     curves: Curves,
@@ -50,7 +50,7 @@ pub(super) const COLUMNS: usize = 6;
 impl<'a> Reel<'a> {
     /// Takes strips of the same shape that all have the `labels`.
     pub(super) fn of(
-        request: &'a Request,
+        request: &'a ViewRequest,
         strips: Vec<Strip>,
         labels: Vec<Label>,
         curves: Curves,
@@ -119,7 +119,7 @@ impl<'a> Reel<'a> {
         self,
         stop: &AtomicBool,
         tell: &mut dyn FnMut(Event),
-    ) -> Result<Outcome, ViewError> {
+    ) -> Result<ViewOutcome, ViewError> {
         let request = self.request;
         tell(Event::Ready {
             frames: self.labels.len(),
@@ -144,9 +144,9 @@ impl<'a> Reel<'a> {
         let numbers: Vec<usize> = (0..self.labels.len()).collect();
         for part in numbers.chunks(2 * rayon::current_num_threads()) {
             if stop.load(Ordering::Relaxed) {
-                return Ok(Outcome {
+                return Ok(ViewOutcome {
                     interrupted: true,
-                    ..Outcome::default()
+                    ..ViewOutcome::default()
                 });
             }
             let read = |&k: &usize| self.framed(k, on_sheet.binary_search(&k).is_ok());
@@ -164,7 +164,7 @@ impl<'a> Reel<'a> {
                 tell(Event::Frame(self.labels[*k].words()));
             }
         }
-        let mut outcome = Outcome::default();
+        let mut outcome = ViewOutcome::default();
         if let (Some(movie), Some(file)) = (movie, &request.movie) {
             outcome.files.push(("movie", file.clone(), movie.finish()?));
         }

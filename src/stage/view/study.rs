@@ -8,7 +8,7 @@ use std::{
 use rayon::prelude::*;
 
 use super::{
-    Event, Outcome, Request, ViewError, check_place, pictures,
+    Event, ViewError, ViewOutcome, ViewRequest, check_place, pictures,
     reel::{COLUMNS, SOFTWARE, THUMB, check_sheet},
     sheet::{Cell, sheet},
     strip::name_of,
@@ -58,10 +58,10 @@ fn unfinished(folder: &Path) -> Result<ViewError, ViewError> {
 
 /// Returns the study's page, and makes a sheet of its pictures if requested and if there are any.
 pub(super) fn view(
-    request: &Request,
+    request: &ViewRequest,
     folder: &Path,
     tell: &mut dyn FnMut(Event),
-) -> Result<Outcome, ViewError> {
+) -> Result<ViewOutcome, ViewError> {
     let page = folder.join(PAGE);
     if !page.is_file() {
         return Err(unfinished(folder)?);
@@ -77,7 +77,7 @@ pub(super) fn view(
             folder.display()
         )));
     }
-    let mut outcome = Outcome::default();
+    let mut outcome = ViewOutcome::default();
     if let Some(most) = request.sheet {
         let default = || Path::new("views").join(name_of(folder));
         let directory = request.directory.clone().unwrap_or_else(default);

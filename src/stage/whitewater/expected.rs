@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::{Request, WhitewaterError, asked, hash, other};
+use super::{WhitewaterError, WhitewaterRequest, asked, hash, other};
 use swell_cache::{CacheReader, stream::PARTICLES};
 
 /// Prediction of a job.
@@ -26,7 +26,7 @@ pub struct Expected {
 ///
 /// # Errors
 /// Those of [`whitewater`](super::whitewater()) that need no device.
-pub fn expected(request: &Request) -> Result<Expected, WhitewaterError> {
+pub fn expected(request: &WhitewaterRequest) -> Result<Expected, WhitewaterError> {
     let (cache, last) = asked(request)?;
     let directory = super::directory(&request.cache, &request.name);
     let mut found = Expected {

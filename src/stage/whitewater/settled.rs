@@ -5,7 +5,7 @@ use std::{
     sync::atomic::{AtomicBool, Ordering},
 };
 
-use super::{Event, Request, SETTINGS, WhitewaterError, engine::Engine, water::Water};
+use super::{Event, SETTINGS, WhitewaterError, WhitewaterRequest, engine::Engine, water::Water};
 use swell_cache::CacheReader;
 use swell_domain::whitewater::{Settings, Thresholds};
 use swell_files::whitewater::WhitewaterSettings;
@@ -31,7 +31,7 @@ pub(super) fn recorded(
 /// Settings of a new stream, and how many frames were used to calibrate them; `None` if a signal
 /// stopped the calibration.
 pub(super) fn settle(
-    request: &Request,
+    request: &WhitewaterRequest,
     scene: &Scene,
     (engine, water): (&mut Engine, &mut Water<'_>),
     (stop, tell): (&AtomicBool, &mut dyn FnMut(Event)),

@@ -15,7 +15,7 @@ use std::{
 };
 
 use swell::{
-    experiment::{self, Event, Outcome, PointStatus, Request, StudyError},
+    experiment::{self, Event, PointStatus, StudyError, StudyOutcome, StudyRequest},
     files::study::{Study, sweep::Sweep},
     stage::device::Gpu,
 };
@@ -90,9 +90,9 @@ impl Job {
     }
 
     /// Runs the study and returns the outcome and the status of each point.
-    fn run(&self, text: &str, stop: bool) -> Result<(Outcome, Vec<PointStatus>), StudyError> {
+    fn run(&self, text: &str, stop: bool) -> Result<(StudyOutcome, Vec<PointStatus>), StudyError> {
         let study = Study::parse(text, Path::new("s.toml"), self.folder.path()).unwrap();
-        let request = Request {
+        let request = StudyRequest {
             name: "tiny-study".into(),
             study,
             directory: self.folder.path().join("out"),

@@ -14,21 +14,21 @@ use swell::{
     solve::SolveError,
     stage::{
         Blame,
-        bake::{BakeError, Event, Request, bake},
+        bake::{BakeError, BakeRequest, Event, bake},
         device::{Device, SolverError},
     },
 };
 
 /// The small scene with enough particles that lists and grids fill more than one
 /// workgroup of each pass.
-fn request(job: &Job, solver: &str, cache: &str, context: &Context) -> Request {
+fn request(job: &Job, solver: &str, cache: &str, context: &Context) -> BakeRequest {
     let set = [
         format!("solver.method={solver}"),
         "solver.pbf.particle_spacing=0.05".to_owned(),
         "solver.flip.cell_size=0.1".to_owned(),
         "shot.frames=4".to_owned(),
     ];
-    Request {
+    BakeRequest {
         scene: load_scene(&job.path("small.toml"), &set).unwrap(),
         directory: job.path(cache),
         frames: None,
@@ -39,7 +39,7 @@ fn request(job: &Job, solver: &str, cache: &str, context: &Context) -> Request {
     }
 }
 
-fn run(request: &Request) -> Result<(), BakeError> {
+fn run(request: &BakeRequest) -> Result<(), BakeError> {
     bake(request, &AtomicBool::new(false), &mut |_| {}).map(|_| ())
 }
 
@@ -312,7 +312,7 @@ fn a_pass_that_binds_too_many_buffers_is_refused_in_the_plan() {
 }
 
 /// Destroys the device after the second frame is computed.
-fn lose(request: &Request, context: &Context) -> BakeError {
+fn lose(request: &BakeRequest, context: &Context) -> BakeError {
     let stop = AtomicBool::new(false);
     bake(request, &stop, &mut |event| {
         if matches!(event, Event::Frame { frame: 2, .. }) {

@@ -11,7 +11,7 @@ use swell::{
     scene::Scene,
     stage::{
         Blame,
-        bake::{BakeError, Request, bake},
+        bake::{BakeError, BakeRequest, bake},
         device::Device,
     },
 };
@@ -171,8 +171,8 @@ fn others(value: &Value) -> Vec<Value> {
     }
 }
 
-fn request(scene: Scene, cache: &Path) -> Request {
-    Request {
+fn request(scene: Scene, cache: &Path) -> BakeRequest {
+    BakeRequest {
         scene,
         directory: cache.to_owned(),
         frames: FrameRange::inclusive(1, 1),

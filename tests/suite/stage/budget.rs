@@ -16,7 +16,7 @@ use swell::{
     gpu::adapter::{Context, InjectedFault},
     scene::Scene,
     stage::{
-        bake::{self, BakeError, Event, Request},
+        bake::{self, BakeError, BakeRequest, Event},
         device::Device,
         replay::Failure,
     },
@@ -62,7 +62,7 @@ impl Baked {
     }
 
     fn go_on(&mut self, device: &Device, scene: &Scene, frames: &str) {
-        let request = Request {
+        let request = BakeRequest {
             scene: scene.clone(),
             directory: self.cache(),
             frames: Some(frames.parse().unwrap()),

@@ -6,9 +6,9 @@ use swell::{
     files::load_scene,
     gpu::{adapter::Context, imprecision::Imprecision},
     stage::{
-        bake::{Request, bake},
+        bake::{BakeRequest, bake},
         device::Device,
-        diff::{self, Outcome, diff},
+        diff::{self, DiffOutcome, diff},
     },
 };
 use tempfile::TempDir;
@@ -23,7 +23,7 @@ fn compared(shot: &str, solver: &str, profile: Imprecision) -> (bool, String) {
     let set = [format!("solver.method={solver}")];
     let scene = load_scene(&root.join(format!("scenes/{shot}.toml")), &set).unwrap();
     let folder = TempDir::new().unwrap();
-    let request = Request {
+    let request = BakeRequest {
         scene,
         directory: folder.path().join("cache"),
         frames: Some(FRAMES.parse().unwrap()),
@@ -33,7 +33,7 @@ fn compared(shot: &str, solver: &str, profile: Imprecision) -> (bool, String) {
         time_passes: false,
     };
     bake(&request, &AtomicBool::new(false), &mut |_| {}).unwrap();
-    let request = diff::Request {
+    let request = diff::DiffRequest {
         a: request.directory,
         b: root.join(format!("tests/baselines/{shot}-{solver}.json")),
         frames: request.frames,
@@ -42,7 +42,7 @@ fn compared(shot: &str, solver: &str, profile: Imprecision) -> (bool, String) {
         ignores_hashes: false,
     };
     let outcome = diff(&request).unwrap();
-    assert!(matches!(outcome, Outcome::Baseline(_)), "{outcome:?}");
+    assert!(matches!(outcome, DiffOutcome::Baseline(_)), "{outcome:?}");
     (outcome.is_within(), format!("{outcome:?}"))
 }
 
