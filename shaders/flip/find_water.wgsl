@@ -121,8 +121,8 @@ fn below_surface(element: u32, of_room: f32) -> f32 {
     let up = -params.velocity_step;
     let lengths = sqrt(dot(to_open, to_open) * dot(up, up));
     let upright = dot(to_open, up) / max(lengths, 1e-20);
-    // Not `mix`, for which drivers compute x + a (y - x): a result near 0 then errs by a rounding of
-    // x, and the distance to the surface by the square root of that.
+    // Not `mix`, for which drivers compute x + a (y - x): a result near 0 then errs by a rounding
+    // of x, and the distance to the surface by the square root of that.
     let level = abs(upright);
     let of_solid = of_room * (1.0 - level) + select(0.0, level, upright > 0.0);
     return select(of_room, of_solid * (1.0 - room) + of_room * room, room > LEAST_ROOM);

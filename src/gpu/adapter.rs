@@ -322,9 +322,13 @@ impl Context {
 
     /// Waits until all submitted work is done.
     ///
+    /// A device that is known to be lost is not polled again: wgpu would then free all memory, that
+    /// which a [`Mapped`](super::readback::Mapped) is being read from too.
+    ///
     /// # Errors
     /// [`GpuError::Lost`] if the device was lost or has reported an error.
     pub fn wait(&self) -> Result<(), GpuError> {
+        self.check()?;
         self.device
             .poll(wgpu::PollType::wait_indefinitely())
             .map_err(|error| GpuError::Lost(error.to_string()))?;

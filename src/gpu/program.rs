@@ -245,7 +245,7 @@ impl Program {
     /// # Errors
     /// [`GpuError::Lost`].
     pub fn download<W: Readback>(&self, wanted: W) -> Result<W::Values, GpuError> {
-        Ok(W::values(self.map(wanted)?.views()))
+        Ok(W::values(self.map(wanted)?.views()?))
     }
 
     /// Like [`Self::download`], without a copy: the values are those of memory that the device
@@ -268,7 +268,7 @@ impl Program {
         context.queue.submit([encoder.finish()]);
         copies.iter().flatten().for_each(Copied::request);
         context.wait()?;
-        Mapped::new(copies)
+        Mapped::new(context.clone(), copies)
     }
 }
 

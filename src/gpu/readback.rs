@@ -10,7 +10,7 @@ use std::{
 
 use wgpu::{Buffer, BufferUsages, BufferView, Device};
 
-use super::{buffer::Buf, error::GpuError};
+use super::{adapter::Context, buffer::Buf, error::GpuError};
 
 /// Idle buffers that are kept; the one that has waited longest goes first.
 const KEPT: usize = 16;
@@ -170,23 +170,30 @@ impl Drop for Copied {
 
 /// Values of buffers in memory that the device wrote, which may be read on any thread.
 pub struct Mapped<W> {
+    context: Context,
     copies: Vec<Option<Copied>>,
     wanted: PhantomData<fn() -> W>,
 }
 
 impl<W: Readback> Mapped<W> {
     /// Maps copies whose mappings the device has granted.
-    pub(super) fn new(mut copies: Vec<Option<Copied>>) -> Result<Self, GpuError> {
+    pub(super) fn new(context: Context, mut copies: Vec<Option<Copied>>) -> Result<Self, GpuError> {
         copies.iter_mut().flatten().try_for_each(Copied::map)?;
         Ok(Self {
+            context,
             copies,
             wanted: PhantomData,
         })
     }
 
     /// Returns the values.
-    pub fn views(&self) -> W::Views<'_> {
+    ///
+    /// # Errors
+    /// [`GpuError::Lost`] if the device was lost since: its memory may be gone.
+    pub fn views(&self) -> Result<W::Views<'_>, GpuError> {
+        self.context.check()?;
         let copies = self.copies.iter();
-        W::views(&mut copies.map(|copy| copy.as_ref().map_or(&[][..], Copied::bytes)))
+        let bytes = |copy: &'_ Option<Copied>| copy.as_ref().map_or(&[][..], Copied::bytes);
+        Ok(W::views(&mut copies.map(bytes)))
     }
 }

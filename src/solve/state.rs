@@ -185,7 +185,7 @@ impl Carried {
     ) -> Result<Particles, SolveError> {
         let n = self.len();
         let found = program.map((POSITION.first(n), VELOCITY.first(n), ID.first(n)))?;
-        let (position, velocity, id) = found.views();
+        let (position, velocity, id) = found.views()?;
         let places = self.ids.places(frame, id)?;
         Ok(self.state(scene, &places, position, velocity))
     }

@@ -107,7 +107,8 @@ pub struct BakeOutcome {
     pub frames: u32,
     /// Bytes of frames written by this run.
     pub bytes: u64,
-    /// Seconds that the solver waited for the disk.
+    /// Seconds for which frames that were read waited for the disk; the solver may have computed
+    /// the next one meanwhile.
     pub waited: f64,
     /// Whether a signal ended it before the last frame.
     pub interrupted: bool,

@@ -297,12 +297,14 @@ impl<'a> Drive<'a> {
                 .name("solver".to_owned())
                 .spawn_scoped(scope, move || ahead.run(last, stop, &sender))
                 .expect("the system has a thread to spare");
-            for computed in computed {
+            let read = computed.into_iter().try_for_each(|computed| {
                 observe(behind.read(computed?)?)?;
-            }
-            Ok(solver
-                .join()
-                .unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
+                Ok(())
+            });
+            // An error of a frame that was read is the first, whatever the solver ended with.
+            let ended = solver.join();
+            read?;
+            Ok(ended.unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
         })
     }
 

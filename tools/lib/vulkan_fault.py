@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """Commits one error in the use of Vulkan, which a validation layer has to report: the negative control of
-tools/lib/validation.
+tools/lib/drivers validation.
 
     vulkan_fault.py nothing    two fills of a buffer with a barrier between them
     vulkan_fault.py hazard     the same without the barrier, which only synchronization validation sees

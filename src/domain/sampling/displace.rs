@@ -29,8 +29,10 @@ const SCATTER: f64 = 0.02;
 const ROUNDS: usize = 8;
 
 /// Removes particles in `solid`, moves those that are too close to it outward and spreads those
-/// beside it evenly; returns the number removed. The count that stays matches the open volume of the particles' cubes to half a
-/// particle, unless there is no space outside of the solid.
+/// beside it evenly; returns the number removed.
+///
+/// The count that stays matches the open volume of the particles' cubes to half a particle, unless
+/// there is no space outside of the solid.
 pub(super) fn displace(
     positions: &mut Vec<DVec3>,
     solid: &SignedDistance,

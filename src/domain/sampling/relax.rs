@@ -52,12 +52,15 @@ pub(super) fn relax(
     domain: &Bounds,
     spacing: f64,
 ) {
-    let near = |reach: f64| {
+    let within = |least: f64, most: f64| {
         move |p: &DVec3| {
-            let distance = solid.sample(*p);
-            distance < reach * spacing
+            let distance = solid.sample(*p) / spacing;
+            least < distance && distance < most
         }
     };
+    // Points deeper in the solid have no water within the kernel's radius.
+    const DEPTH: f64 = RADIUS + 1.0;
+    let near = |reach: f64| within(-DEPTH, reach);
     let moving: Vec<usize> = (0..water.len())
         .into_par_iter()
         .filter(|&i| near(REACH)(&water[i]))
@@ -66,16 +69,17 @@ pub(super) fn relax(
     let fixed = (water.par_iter())
         .filter(|p| !is_moving(p) && near(REACH + RADIUS)(p))
         .map(|p| (*p, 1.0));
-    let beyond = beyond(lattice, near(REACH), spacing);
+    let in_solid = (closed.par_iter())
+        .filter(|share| share.volume > 0.0 && is_moving(&share.position))
+        .map(|share| (share.position, share.volume));
+    let around = (lattice.par_iter().copied())
+        .filter(within(-DEPTH - RADIUS, REACH + RADIUS))
+        .collect::<Vec<_>>();
+    let beyond = beyond(&around, near(REACH), spacing);
     let (mut places, volumes): (Vec<DVec3>, Vec<f64>) = (moving.par_iter())
         .map(|&i| (water[i], 1.0))
         .chain(fixed)
-        .chain(
-            closed
-                .par_iter()
-                .filter(|c| c.volume > 0.0)
-                .map(|c| (c.position, c.volume)),
-        )
+        .chain(in_solid)
         .chain(beyond.into_par_iter().map(|p| (p, 1.0)))
         .unzip();
     let radius = RADIUS * spacing;
@@ -127,11 +131,12 @@ fn beyond(lattice: &[DVec3], is_near: impl Fn(&DVec3) -> bool + Sync, spacing: f
         .filter(|at| at.length() < RADIUS)
         .collect();
     let neighbors = PointGrid::over(lattice, RADIUS * spacing);
-    let at_edge = |p: &&DVec3| {
+    let is_inner = |p: &DVec3| {
         let mut count = 0;
-        neighbors.for_each_near(lattice, **p, |_, _| count += 1);
-        is_near(p) && count < offsets.len()
+        neighbors.for_each_near(lattice, *p, |_, _| count += 1);
+        count == offsets.len()
     };
+    let at_edge = |p: &&DVec3| is_near(p) && !is_inner(p);
     let edge: Vec<&DVec3> = lattice.par_iter().filter(at_edge).collect();
     let mut taken = lattice.to_vec();
     let mut grid = PointGrid::over(lattice, OVERLAP_SPACINGS * spacing);

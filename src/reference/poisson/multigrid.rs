@@ -160,8 +160,8 @@ impl Levels {
     }
 
     /// Reference pass of `pressure/restrict`: the residuals of a level, from the first smoothing of
-    /// the finer one. Each is half of what a block left: the first colour was solved with zero around
-    /// it, the second with the values of its own brick.
+    /// the finer one. Each is half of what a block left: the first colour was solved with zero
+    /// around it, the second with the values of its own brick.
     pub fn restricted(&self, level: usize, rounding: Rounding) -> Vec<Expected> {
         let of = |(slot, block): (u32, u32)| {
             let about = match colour(block) {

@@ -37,11 +37,11 @@ pub(super) struct Ended {
 impl Ended {
     /// Returns the state and its densities.
     pub(super) fn read(self) -> Result<(Particles, Densities), SolveError> {
-        let ((position, velocity, id), (density, kind), _) = self.found.views();
+        let ((position, velocity, id), (density, kind), _) = self.found.views()?;
         let places = self.state.ids.places(self.frame, id)?;
         let mut state = (self.state).state(&self.scene, &places, position, velocity);
         if let Some(rows) = &self.rows {
-            let (rows, names) = (rows.views(), self.scene.settings().attributes());
+            let (rows, names) = (rows.views()?, self.scene.settings().attributes());
             for (k, name) in names.iter().enumerate() {
                 let values = places.collect(|place| rows[names.len() * place + k]);
                 state.attributes.insert((*name).to_owned(), values);

@@ -491,7 +491,7 @@ impl Solver for Flip {
         };
         let ended = self.ended(&totals)?;
         self.frame += 1;
-        let capped = ended.found.views().2[0].capped;
+        let capped = ended.found.views()?.2[0].capped;
         self.state.walls = AbsorberStates::default();
         let mut read: Box<ReadFrame> = Box::new(move || ended.read());
         if is_awaited(&self.scene) {

@@ -421,13 +421,13 @@ struct Measured {
 }
 
 impl Measured {
-    fn counters(&self) -> Counters {
-        self.found.views().1.2[0]
+    fn counters(&self) -> Result<Counters, SolveError> {
+        Ok(self.found.views()?.1.2[0])
     }
 
     /// Returns the state, and the relative density of each particle.
     fn read(self) -> Result<(Particles, Vec<f64>), SolveError> {
-        let ((position, velocity, id), (sorted_id, density, counters)) = self.found.views();
+        let ((position, velocity, id), (sorted_id, density, counters)) = self.found.views()?;
         let ids = &self.state.ids;
         let places = ids.places(self.frame, id)?;
         let sorted_places = ids.places(self.frame, sorted_id)?;
@@ -479,12 +479,12 @@ impl Solver for Pbf {
         }
         self.state.substep = length / f64::from(substeps);
         let measured = self.measured(start + length)?;
-        self.speed = max_speed(measured.found.views().0.1);
+        self.speed = max_speed(measured.found.views()?.0.1);
         if self.scene.reads_multipliers() {
             self.pressed = self.particle_pressures(length / f64::from(substeps))?;
         }
         self.frame += 1;
-        let counters = measured.counters();
+        let counters = measured.counters()?;
         let mut read: Box<ReadState> = Box::new(move || measured.read());
         self.state.walls = AbsorberStates::default();
         if is_awaited(&self.scene) {

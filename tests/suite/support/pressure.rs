@@ -13,7 +13,7 @@ use swell::{
         flip::buffers::*,
         pressure::{
             self, PressureSolver, Projected, Scale, Solved, blocked,
-            buffers::{Real, SOLUTION, read_reals},
+            buffers::{COEFFICIENT, DIRICHLET, Real, SOLUTION, read_reals},
         },
     },
 };
@@ -146,5 +146,40 @@ impl Rig {
     /// The solution, one value per row, with all terms of its extended precision summed.
     pub fn solution(&self) -> Vec<f64> {
         self.sum(SOLUTION, self.precision.terms())
+    }
+}
+
+impl Rig {
+    /// Number of rows on the device that differ from those of the f64 system by more than rounding: θ
+    /// and its inverse are rounded a few times at ε = 6e-8, and so is their sum.
+    pub fn wrong_rows(&self, system: &System) -> usize {
+        let cells = 512 * (self.case.bricks.slots() + 3);
+        let wanted = COEFFICIENT.first(3 * cells);
+        let coefficient = self.program.download(wanted).unwrap();
+        // The rig's precision is one of the f32 ones.
+        let wanted = DIRICHLET.retyped::<f32>().first(cells);
+        let dirichlet = self.program.download(wanted).unwrap();
+        let is_off =
+            |found: f32, expected: f64| (f64::from(found) - expected).abs() > 1e-6 * expected;
+        let mut is_row = vec![false; cells];
+        let mut wrong = 0;
+        for (row, &element) in system.cell.iter().enumerate() {
+            let place = blocked(element);
+            is_row[place] = true;
+            let is_wrong = is_off(dirichlet[place], system.dirichlet[row])
+                || (0..3).any(|axis| {
+                    is_off(
+                        coefficient[axis * cells + place],
+                        system.coefficient[row][2 * axis],
+                    )
+                });
+            wrong += usize::from(is_wrong);
+        }
+        let wet = 512..512 * (self.case.bricks.wet as usize + 1);
+        let beyond = wet.filter(|&e| {
+            !is_row[e]
+                && (dirichlet[e] != 0.0 || (0..3).any(|axis| coefficient[axis * cells + e] != 0.0))
+        });
+        wrong + beyond.count()
     }
 }
