@@ -193,7 +193,7 @@ impl<W: Readback> Mapped<W> {
     pub fn views(&self) -> Result<W::Views<'_>, GpuError> {
         self.context.check()?;
         let copies = self.copies.iter();
-        let bytes = |copy: &'_ Option<Copied>| copy.as_ref().map_or(&[][..], Copied::bytes);
-        Ok(W::views(&mut copies.map(bytes)))
+        let mut bytes = copies.map(|copy| copy.as_ref().map_or(&[][..], Copied::bytes));
+        Ok(W::views(&mut bytes))
     }
 }

@@ -297,10 +297,8 @@ impl<'a> Drive<'a> {
                 .name("solver".to_owned())
                 .spawn_scoped(scope, move || ahead.run(last, stop, &sender))
                 .expect("the system has a thread to spare");
-            let read = computed.into_iter().try_for_each(|computed| {
-                observe(behind.read(computed?)?)?;
-                Ok(())
-            });
+            let read =
+                (computed.into_iter()).try_for_each(|computed| observe(behind.read(computed?)?));
             // An error of a frame that was read is the first, whatever the solver ended with.
             let ended = solver.join();
             read?;

@@ -317,6 +317,8 @@ fn lose(request: &BakeRequest, context: &Context) -> BakeError {
     bake(request, &stop, &mut |event| {
         if matches!(event, Event::Frame { frame: 2, .. }) {
             context.device.destroy();
+            // The next frame may be computed already: once the loss is known it is not read.
+            context.wait().unwrap_err();
         }
     })
     .unwrap_err()
