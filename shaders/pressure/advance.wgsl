@@ -55,13 +55,11 @@ fn main(
     @builtin(local_invocation_index) local: u32,
 ) {
     let group = thread_index(workgroup, workgroups, 0u, 1u);
-    let range = phase.levels[0];
-    let is_wet = group < range.y;
-    let slot = select(0u, range.x + group, is_wet);
+    let slot = brick_slot(group, 0u);
     let colour = local >> 5u;
     let block = coloured_block(local & 31u, colour);
     var r = Pair(vec4r(0.0), vec4r(0.0));
-    for (var once = u32(is_wet); once > 0u; once -= 1u) {
+    for (var once = u32(slot != 0u); once > 0u; once -= 1u) {
         let own = blocked(slot, block);
         for (var c = 0u; c < 4u; c++) {
             r.lo[c] = advance_at(own + 64u * c);
@@ -75,6 +73,6 @@ fn main(
     }
 #ifdef MULTIGRID
     let s = site_at(slot, block, last_slot(0u));
-    smooth_brick(s, colour, r, is_wet && pressure_control.state == ITERATING);
+    smooth_brick(s, colour, r, slot != 0u && pressure_control.state == ITERATING);
 #endif
 }

@@ -18,8 +18,7 @@ fn main(
     @builtin(local_invocation_index) local: u32,
 ) {
     let i = thread_index(workgroup, workgroups, local, 64u);
-    let range = phase.levels[0];
-    let slot = select(0u, range.x + i / 64u, i / 64u < range.y);
+    let slot = brick_slot(i / 64u, 0u);
     let block = i & 63u;
     let rows = pressure_block[64u * slot + block] >> 8u;
     let own = natural(slot, block);

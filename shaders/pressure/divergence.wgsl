@@ -16,9 +16,8 @@ fn main(
     @builtin(local_invocation_index) local: u32,
 ) {
     let i = thread_index(workgroup, workgroups, local, 64u);
-    let range = phase.levels[0];
-    let slot = select(0u, range.x + i / 64u, i / 64u < range.y);
-    let s = site_at(slot, i & 63u, range.z);
+    let slot = brick_slot(i / 64u, 0u);
+    let s = site_at(slot, i & 63u, phase.levels[0].z);
     let b = outflow(s);
     let most = largest_divergence(b, local);
     if local == 0u {

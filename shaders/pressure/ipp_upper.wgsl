@@ -26,9 +26,7 @@ fn main(
     @builtin(local_invocation_index) local: u32,
 ) {
     let i = thread_index(workgroup, workgroups, local, 64u);
-    let range = phase.levels[0];
-    let slot = select(0u, range.x + i / 64u, i / 64u < range.y);
-    let s = site_at(slot, i & 63u, range.x + range.y - 1u);
+    let s = site_at(brick_slot(i / 64u, 0u), i & 63u, last_slot(0u));
     let own = blocked(s.slot, s.block);
     let upper = blocked_upper(s);
     let l = links_at(s);

@@ -34,9 +34,8 @@ fn main(
     @builtin(local_invocation_index) local: u32,
 ) {
     let group = thread_index(workgroup, workgroups, 0u, 1u);
-    let range = phase.levels[0];
-    let slot = select(0u, range.x + group, group < range.y);
-    let s = site_at(slot, local, range.x + range.y - 1u);
+    let slot = brick_slot(group, 0u);
+    let s = site_at(slot, local, last_slot(0u));
     let own = blocked(s.slot, s.block);
     let lower = blocked_lower(s);
     let upper = blocked_upper(s);
@@ -53,7 +52,7 @@ fn main(
     let product = apply(links_at(s), p, about);
     var overlap = real(0.0);
     // Excess threads leave slot 0 at 0.
-    for (var c = select(4u, 0u, group < range.y); c < 4u; c++) {
+    for (var c = select(4u, 0u, slot != 0u); c < 4u; c++) {
         let e = own + 64u * c;
         pressure_correction[phase.stride + e] = product.lo[c];
         pressure_correction[phase.stride + e + 256u] = product.hi[c];

@@ -13,17 +13,15 @@ fn main(
     @builtin(local_invocation_index) local: u32,
 ) {
     let group = thread_index(workgroup, workgroups, 0u, 1u);
-    let range = phase.levels[phase.level];
-    let is_brick = group < range.y;
-    let slot = select(0u, range.x + group, is_brick);
+    let slot = brick_slot(group, phase.level);
     let colour = local >> 5u;
     let s = site_at(slot, coloured_block(local & 31u, colour), last_slot(phase.level));
     var product = real(0.0);
-    if is_brick && colour == 1u {
+    if slot != 0u && colour == 1u {
         product = prolong_at(s, false);
     }
     storageBarrier();
-    if is_brick && colour == 0u {
+    if slot != 0u && colour == 0u {
         product = prolong_at(s, true);
     }
     let sum = sum_workgroup(product, local);

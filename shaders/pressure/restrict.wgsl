@@ -12,9 +12,7 @@ fn main(
     @builtin(local_invocation_index) local: u32,
 ) {
     let group = thread_index(workgroup, workgroups, 0u, 1u);
-    let range = phase.levels[phase.level];
-    let is_brick = group < range.y;
-    let slot = select(0u, range.x + group, is_brick);
+    let slot = brick_slot(group, phase.level);
     // Eight threads for each brick below; each takes 2³ of its blocks.
     let child = bricks[slot].children[local >> 3u];
     let last = last_slot(phase.level - 1u);
@@ -35,5 +33,5 @@ fn main(
     storageBarrier();
     let colour = local >> 5u;
     let s = site_at(slot, coloured_block(local & 31u, colour), last_slot(phase.level));
-    smooth_brick(s, colour, residual_at(s), is_brick);
+    smooth_brick(s, colour, residual_at(s), slot != 0u);
 }

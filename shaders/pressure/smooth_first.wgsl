@@ -9,10 +9,8 @@ fn main(
     @builtin(local_invocation_index) local: u32,
 ) {
     let group = thread_index(workgroup, workgroups, 0u, 1u);
-    let range = phase.levels[0];
-    let is_wet = group < range.y;
     let colour = local >> 5u;
-    let slot = select(0u, range.x + group, is_wet);
+    let slot = brick_slot(group, 0u);
     let s = site_at(slot, coloured_block(local & 31u, colour), last_slot(0u));
-    smooth_brick(s, colour, residual_at(s), is_wet);
+    smooth_brick(s, colour, residual_at(s), slot != 0u);
 }

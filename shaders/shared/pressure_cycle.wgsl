@@ -18,11 +18,6 @@
 // The correction, and after it that of the first smoothing of levels with dispatches of their own.
 @group(0) @binding(6) var<storage, read_write> pressure_correction: array<real>;
 
-fn last_slot(level: u32) -> u32 {
-    let range = phase.levels[level];
-    return range.x + range.y - 1u;
-}
-
 fn residual_at(s: Site) -> Pair {
     let own = blocked(s.slot, s.block);
     return Pair(

@@ -26,3 +26,14 @@ struct PressurePhase {
 }
 
 @group(0) @binding(0) var<uniform> phase: PressurePhase;
+
+// Slot of a workgroup's brick on a level. Slot 0, which holds nothing, if the workgroup has none.
+fn brick_slot(group: u32, level: u32) -> u32 {
+    let range = phase.levels[level];
+    return select(0u, range.x + group, group < range.y);
+}
+
+fn last_slot(level: u32) -> u32 {
+    let range = phase.levels[level];
+    return range.x + range.y - 1u;
+}

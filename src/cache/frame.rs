@@ -37,7 +37,8 @@ const FIXED: [(&str, ScalarType); 7] = [
 const VALUE: usize = 4;
 /// Prefix of the comment that records the origin.
 const ORIGIN: &str = "origin ";
-/// Rows packed at a time: about half a megabyte, which the next step finds in a cache.
+/// Rows packed at a time: about half a megabyte, so that they stay in the cache until they are
+/// hashed and written.
 const ROWS_AT_ONCE: usize = 1 << 14;
 /// Rows that a thread packs at a time.
 const ROWS_OF_A_TASK: usize = 1 << 11;

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::{
     super::{bounds::Bounds, signed_distance::SignedDistance},
-    relax::{Share, relax},
+    relax::{ClosedPart, relax},
     uniform,
 };
 
@@ -40,11 +40,11 @@ pub(super) fn displace(
     spacing: f64,
 ) -> usize {
     let lattice = positions.clone();
-    let closed: Vec<Share> = positions
+    let closed: Vec<ClosedPart> = positions
         .par_iter()
-        .map(|p| closed_share(solid, *p, spacing))
+        .map(|p| closed_part(solid, *p, spacing))
         .collect();
-    let open: Vec<f64> = closed.iter().map(|share| 1.0 - share.volume).collect();
+    let open: Vec<f64> = closed.iter().map(|part| 1.0 - part.volume).collect();
     let kept = balanced(positions, &open, spacing);
     let before = positions.len();
     let mut kept = kept.into_iter();
@@ -64,11 +64,11 @@ pub(super) fn displace(
 
 /// Returns the part of the cube of edge `spacing` around `p` that lies in `solid`, at its centroid,
 /// summed over small cubes.
-fn closed_share(solid: &SignedDistance, p: DVec3, spacing: f64) -> Share {
+fn closed_part(solid: &SignedDistance, p: DVec3, spacing: f64) -> ClosedPart {
     let distance = solid.sample(p);
     // Half of the cube's diagonal, plus interpolation's error at edges.
     if distance.abs() > spacing {
-        return Share {
+        return ClosedPart {
             position: p,
             volume: if distance > 0.0 { 0.0 } else { 1.0 },
         };
@@ -98,7 +98,7 @@ fn closed_share(solid: &SignedDistance, p: DVec3, spacing: f64) -> Share {
         volume += part;
         moment += part * (place(at) + half);
     }
-    Share {
+    ClosedPart {
         position: p + spacing * moment / f64::max(volume, f64::MIN_POSITIVE),
         volume: volume / PARTS.pow(3) as f64,
     }

@@ -27,9 +27,9 @@ const LONGEST_MOVE: f64 = 0.1;
 /// Shorter moves are rounding errors: water on a lattice that fits its solids stays there.
 const SHORTEST_MOVE: f64 = 1e-6;
 
-/// A point with the volume that it stands for, in cubed spacings.
+/// The part of a particle's cube that a solid fills: its centroid and volume, cubed spacings.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Share {
+pub(super) struct ClosedPart {
     pub position: DVec3,
     pub volume: f64,
 }
@@ -47,7 +47,7 @@ pub(super) struct Share {
 pub(super) fn relax(
     water: &mut [DVec3],
     lattice: &[DVec3],
-    closed: &[Share],
+    closed: &[ClosedPart],
     solid: &SignedDistance,
     domain: &Bounds,
     spacing: f64,
@@ -70,8 +70,8 @@ pub(super) fn relax(
         .filter(|p| !is_moving(p) && near(REACH + RADIUS)(p))
         .map(|p| (*p, 1.0));
     let in_solid = (closed.par_iter())
-        .filter(|share| share.volume > 0.0 && is_moving(&share.position))
-        .map(|share| (share.position, share.volume));
+        .filter(|part| part.volume > 0.0 && is_moving(&part.position))
+        .map(|part| (part.position, part.volume));
     let around = (lattice.par_iter().copied())
         .filter(within(-DEPTH - RADIUS, REACH + RADIUS))
         .collect::<Vec<_>>();
