@@ -233,8 +233,8 @@ fn water_beside_a_solid_that_fits_no_lattice_is_even() {
         let open = lattice.into_iter().filter(|p| solid.sample(*p) > 0.0);
         let before = unevenness(&open.collect::<Vec<_>>(), body, &domain, spacing);
         println!("{shift}: {before} {after}");
-        // A neighbour one spacing away is 6 % of the density. Counts are right to half a particle in
-        // a block, so that one neighbour and a half may be amiss.
+        // A neighbour one spacing away is 6 % of the density. Counts are right to half a particle
+        // in a block, so that one neighbour and a half may be amiss.
         assert!(after < 0.1 && before > 0.14, "{shift}: {before} {after}");
     }
 }
