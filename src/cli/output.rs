@@ -70,7 +70,11 @@ pub(super) fn print(text: &str) {
 /// operations per second, their fractions of the adapter's ceilings, and what limits the pass; then
 /// the share of each part per frame, over `frames` frames.
 pub(super) fn pass_times(progress: &Progress, times: &PassTimes, parts: &[Share], frames: u32) {
-    let PassTimes { passes, ceilings } = times;
+    let PassTimes {
+        passes,
+        ceilings,
+        traffic,
+    } = times;
     if passes.is_empty() {
         return;
     }
@@ -81,12 +85,26 @@ pub(super) fn pass_times(progress: &Progress, times: &PassTimes, parts: &[Share]
             "bandwidth": ceilings.map(|of| of.bandwidth),
             "arithmetic": ceilings.map(|of| of.arithmetic),
             "start": ceilings.map(|of| of.start),
+            "submissions": traffic.map(|of| of.submissions), "waits": traffic.map(|of| of.waits),
+            "bytes_read": traffic.map(|of| of.bytes_read),
         }));
     }
     print_pass_times(passes, ceilings.as_ref());
     let runs: u64 = passes.iter().map(|time| time.runs).sum();
-    let each = runs as f64 / f64::from(frames.max(1));
-    print(&format!("\n{runs} runs of passes, {each:.0} a frame"));
+    let per_frame = |count: u64| count as f64 / f64::from(frames.max(1));
+    print(&format!(
+        "\n{runs} runs of passes, {:.0} a frame",
+        per_frame(runs)
+    ));
+    if let Some(traffic) = traffic {
+        print(&format!(
+            "; without timing {:.1} submissions a frame, {:.1} waits for the device, {:.0} bytes \
+             read back",
+            per_frame(traffic.submissions),
+            per_frame(traffic.waits),
+            per_frame(traffic.bytes_read)
+        ));
+    }
     if let Some(Ceilings {
         bandwidth,
         arithmetic,

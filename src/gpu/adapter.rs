@@ -5,7 +5,12 @@ use std::sync::{Arc, Mutex, OnceLock};
 use wgpu::{Adapter, AdapterInfo, Backends, Device, DeviceType, Features, Instance, Limits, Queue};
 
 use super::{
-    compiled::Compiled, hidden, imprecision::Imprecision, rounding::Rounding, shader::Shaders,
+    compiled::Compiled,
+    hidden,
+    imprecision::Imprecision,
+    rounding::Rounding,
+    shader::Shaders,
+    traffic::{Counters, Traffic},
 };
 
 pub use super::error::GpuError;
@@ -45,6 +50,7 @@ pub struct Context {
     rounding: Arc<OnceLock<Rounding>>,
     /// Passes compiled on this device.
     pub(super) compiled: Arc<Compiled>,
+    pub(super) counters: Arc<Counters>,
     fault: Arc<Mutex<Option<String>>>,
 }
 
@@ -263,8 +269,14 @@ impl Context {
             imprecision: None,
             rounding: Arc::default(),
             compiled: Arc::default(),
+            counters: Arc::default(),
             fault,
         })
+    }
+
+    /// Returns what the host has asked of the device since it was opened.
+    pub fn traffic(&self) -> Traffic {
+        self.counters.now()
     }
 
     /// Measures the device's rounding, once unless its shaders were changed.

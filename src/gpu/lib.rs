@@ -20,4 +20,5 @@ pub mod shader;
 pub mod sort;
 pub mod texture;
 mod timer;
+pub mod traffic;
 pub mod variants;

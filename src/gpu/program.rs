@@ -200,6 +200,7 @@ impl Program {
         let mut encoder = (self.context.device).create_command_encoder(&Default::default());
         encoder.copy_buffer_to_buffer(source, first, to, place, bytes);
         self.context.queue.submit([encoder.finish()]);
+        self.context.counters.submitted();
     }
 
     /// Returns the names of the passes and of the buffers, sorted.
@@ -266,8 +267,11 @@ impl Program {
             }));
         }
         context.queue.submit([encoder.finish()]);
+        context.counters.submitted();
         copies.iter().flatten().for_each(Copied::request);
         context.wait()?;
+        let bytes = copies.iter().flatten().map(|copy| copy.len() as u64);
+        context.counters.waited(bytes.sum());
         Mapped::new(context.clone(), copies)
     }
 }

@@ -141,6 +141,10 @@ impl Copied {
         &self.buffer
     }
 
+    pub(super) fn len(&self) -> usize {
+        self.bytes
+    }
+
     /// Asks for the mapping, which is there after the next wait for the device.
     pub(super) fn request(&self) {
         // A failed mapping is reported when its range is requested.

@@ -218,6 +218,7 @@ impl Recording {
         program: &Program,
         timer: Option<&mut Timer>,
     ) -> Result<(), GpuError> {
+        program.context.counters.submitted();
         if let Some(timer) = timer {
             return recordings
                 .iter()

@@ -162,12 +162,17 @@ pub fn run(
     drive.load_watched(&start.particles, clock.frame, &state)?;
     drive.go_on_with(clock.next_id);
     let mut frames = Frames::new(request, plan, writer, clock);
+    let before = opened.traffic();
     let ended = drive.run_ahead(plan.last, stop, |step| frames.add(step, tell));
     let (end, broken) = match ended {
         Ok(end) => (end, None),
         Err(BakeError::Solve(error)) => (End::Done, Some(error)),
         Err(error) => return Err(error),
     };
+    let traffic = opened
+        .traffic()
+        .zip(before)
+        .map(|(all, before)| all - before);
     // What was computed before a failure is kept.
     let (summary, warnings) = frames.finish()?;
     tell(Event::Written {
@@ -181,7 +186,10 @@ pub fn run(
         return Err(self::end(request, &opened, plan, error));
     }
     let (passes, shares) = match times {
-        Some((passes, shares)) => (opened.pass_times(passes)?, shares),
+        Some((passes, shares)) => {
+            let times = opened.pass_times(passes)?;
+            (PassTimes { traffic, ..times }, shares)
+        }
         None => Default::default(),
     };
     Ok(BakeOutcome {

@@ -28,6 +28,7 @@ pub use swell_gpu::{
     ceilings::Ceilings,
     imprecision::{Imprecision, UnknownProfile},
     shader::{Shaders, ShadersError},
+    traffic::Traffic,
 };
 pub use swell_solve::SolveError;
 
@@ -99,6 +100,8 @@ pub struct PassTimes {
     pub passes: Vec<PassTime>,
     /// Ceilings of the adapter; `None` unless passes were timed on one.
     pub ceilings: Option<Ceilings>,
+    /// What the host asked of the device for all frames of a bake; `None` unless timed on one.
+    pub traffic: Option<Traffic>,
 }
 
 impl PassTimes {
@@ -110,6 +113,7 @@ impl PassTimes {
         Ok(Self {
             passes,
             ceilings: Some(Ceilings::measure(context)?),
+            traffic: None,
         })
     }
 }
@@ -304,8 +308,16 @@ impl Opened {
             Self::Gpu(context) => PassTimes::on(context, passes),
             Self::Cpu => Ok(PassTimes {
                 passes,
-                ceilings: None,
+                ..PassTimes::default()
             }),
+        }
+    }
+
+    /// What the host has asked of the device since it was opened; `None` without an adapter.
+    pub fn traffic(&self) -> Option<Traffic> {
+        match self {
+            Self::Gpu(context) => Some(context.traffic()),
+            Self::Cpu => None,
         }
     }
 
