@@ -191,14 +191,14 @@ impl Program {
         self.buffers.contains_key(name)
     }
 
-    /// Copies the first `count` values of a buffer of another program on the same device into one
-    /// of this program, ordered before later submissions.
-    pub fn copy<T>(&self, to: &Buf<T>, from: &Self, source: &Buf<T>, count: usize) {
-        let bytes = (count * size_of::<T>()) as u64;
-        let (first, place) = (source.place(0), to.place(0));
-        let (source, to) = (from.buffer(source.name()), self.buffer(to.name()));
+    /// Copies values of buffers of another program on the same device into buffers of this one, in
+    /// a single submission.
+    pub fn copy_from(&self, from: &Self, copies: &[BufferCopy]) {
         let mut encoder = (self.context.device).create_command_encoder(&Default::default());
-        encoder.copy_buffer_to_buffer(source, first, to, place, bytes);
+        for copy in copies {
+            let [source, to] = [from.buffer(&copy.source), self.buffer(&copy.target)];
+            encoder.copy_buffer_to_buffer(source, copy.first, to, copy.place, copy.bytes);
+        }
         self.context.queue.submit([encoder.finish()]);
         self.context.counters.submitted();
     }
@@ -273,6 +273,28 @@ impl Program {
         let bytes = copies.iter().flatten().map(|copy| copy.len() as u64);
         context.counters.waited(bytes.sum());
         Mapped::new(context.clone(), copies)
+    }
+}
+
+/// A copy between buffers of two programs.
+pub struct BufferCopy {
+    source: String,
+    first: u64,
+    target: String,
+    place: u64,
+    bytes: u64,
+}
+
+impl BufferCopy {
+    /// The first `count` values of `source`, to the beginning of `target`.
+    pub fn of<T>(source: &Buf<T>, target: &Buf<T>, count: usize) -> Self {
+        Self {
+            source: source.name().to_owned(),
+            first: source.place(0),
+            target: target.name().to_owned(),
+            place: target.place(0),
+            bytes: (count * size_of::<T>()) as u64,
+        }
     }
 }
 

@@ -29,23 +29,20 @@ pub(super) struct Ended {
     pub(super) state: Carried,
     /// Bricks of the last substep.
     pub(super) bricks: Bricks,
-    /// A row of attributes for each particle, if the scene has any.
-    pub(super) rows: Option<Mapped<First<f32>>>,
-    pub(super) found: Mapped<(OfState, OfCells, First<Counters>)>,
+    /// The last are rows of attributes, one for each particle, if the scene has any.
+    pub(super) found: Mapped<(OfState, OfCells, First<Counters>, First<f32>)>,
 }
 
 impl Ended {
     /// Returns the state and its densities.
     pub(super) fn read(self) -> Result<(Particles, Densities), SolveError> {
-        let ((position, velocity, id), (density, kind), _) = self.found.views()?;
+        let ((position, velocity, id), (density, kind), _, rows) = self.found.views()?;
         let places = self.state.ids.places(self.frame, id)?;
         let mut state = (self.state).state(&self.scene, &places, position, velocity);
-        if let Some(rows) = &self.rows {
-            let (rows, names) = (rows.views()?, self.scene.settings().attributes());
-            for (k, name) in names.iter().enumerate() {
-                let values = places.collect(|place| rows[names.len() * place + k]);
-                state.attributes.insert((*name).to_owned(), values);
-            }
+        let names = self.scene.settings().attributes();
+        for (k, name) in names.iter().enumerate() {
+            let values = places.collect(|place| rows[names.len() * place + k]);
+            state.attributes.insert((*name).to_owned(), values);
         }
         check_finite(self.frame, &state, None).map_err(|breach| match self.substeps {
             0 => breach,

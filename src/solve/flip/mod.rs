@@ -381,12 +381,9 @@ impl Flip {
             true => self.bricks.wet as usize * (CELLS / 64) as usize,
             false => 0,
         };
+        // Without moving walls the buffer does not exist, and none of it is read.
         let wanted = (COUNTERS.first(1), BOUNDARY_WORK.first(groups));
-        let (counters, sums) = match groups {
-            // Without moving walls the buffer does not exist.
-            0 => (self.program.read(COUNTERS, 1)?, Vec::new()),
-            _ => self.program.download(wanted)?,
-        };
+        let (counters, sums) = self.program.download(wanted)?;
         if counters[0].not_finite > 0 {
             let breach = Breach::not_finite(self.frame + 1, counters[0].not_finite.into(), None);
             return Err(breach.in_substep(substep).into());
@@ -446,20 +443,16 @@ impl Flip {
             false => (self.bricks.wet as usize + 1) * CELLS as usize,
         };
         let state = (POSITION.first(n), VELOCITY.first(n), ID.first(n));
-        let rows = match names.is_empty() {
-            // Without attributes the buffer does not exist.
-            true => None,
-            false => Some(self.program.map(AFFINE.first(names.len() * n))?),
-        };
         let of_cells = (DENSITY.first(cells), CELL_KIND.first(cells));
+        // Without attributes the buffer does not exist, and none of it is read.
+        let rows = AFFINE.first(names.len() * n);
         Ok(Ended {
             scene: self.scene.clone(),
             frame: self.frame + 1,
             substeps: totals.substeps,
             state: self.state.clone(),
             bricks: self.bricks.clone(),
-            rows,
-            found: (self.program).map((state, of_cells, COUNTERS.first(1)))?,
+            found: (self.program).map((state, of_cells, COUNTERS.first(1), rows))?,
         })
     }
 

@@ -7,7 +7,7 @@ use super::{
 };
 use crate::params::Counters;
 use swell_domain::budget::Breach;
-use swell_gpu::program::Program;
+use swell_gpu::program::{BufferCopy, Program};
 use swell_scene::step::projected_substep;
 
 impl Flip {
@@ -31,10 +31,12 @@ impl Flip {
         run: &mut Run<'_>,
     ) -> Result<(), SolveError> {
         let n = self.state.len();
-        let own = &self.program;
-        own.copy(&POSITION, program, &POSITION, n);
-        own.copy(&VELOCITY, program, &VELOCITY, n);
-        own.copy(&ID, program, &ID, n);
+        let state = [
+            BufferCopy::of(&POSITION, &POSITION, n),
+            BufferCopy::of(&VELOCITY, &VELOCITY, n),
+            BufferCopy::of(&ID, &ID, n),
+        ];
+        self.program.copy_from(program, &state);
         let survey = self.survey(run)?;
         totals.substeps += 1;
         if survey.not_finite > 0 {
@@ -43,11 +45,13 @@ impl Flip {
         }
         let substep = projected_substep(start, length, self.state.substep);
         self.run_substep(&survey.is_wet, &substep, totals, run)?;
-        let own = &self.program;
-        program.copy(&POSITION, own, &SORTED_POSITION, n);
-        program.copy(&VELOCITY, own, &SORTED_VELOCITY, n);
-        program.copy(&ID, own, &sorted_id(n), n);
-        program.copy(&IS_DROP, own, &is_drop(n), n);
+        let projected = [
+            BufferCopy::of(&SORTED_POSITION, &POSITION, n),
+            BufferCopy::of(&SORTED_VELOCITY, &VELOCITY, n),
+            BufferCopy::of(&sorted_id(n), &ID, n),
+            BufferCopy::of(&is_drop(n), &IS_DROP, n),
+        ];
+        program.copy_from(&self.program, &projected);
         Ok(())
     }
 }

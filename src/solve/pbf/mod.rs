@@ -265,18 +265,6 @@ impl Pbf {
         }
     }
 
-    /// Returns the work by moving walls on the water in the last frame, joules; its substeps were
-    /// `step` seconds long.
-    fn boundary_work(&self, step: f64) -> Result<f64, SolveError> {
-        if !self.scene.has_movers() {
-            return Ok(0.0);
-        }
-        let groups = self.plan.counts.particles.div_ceil(64);
-        let sums = self.field(BOUNDARY_WORK, groups)?;
-        let sum: f64 = sums.into_iter().map(f64::from).sum();
-        Ok(self.scene.particle_mass() / step * sum)
-    }
-
     /// Projects velocities and uploads the uniforms for the substep that ends at `time`.
     fn prepare_substep(
         &mut self,
@@ -395,7 +383,17 @@ impl Pbf {
         self.measure.run(&self.program, self.timer.as_mut())?;
         let n = self.plan.counts.particles;
         let state = (POSITION.first(n), VELOCITY.first(n), ID.first(n));
-        let measured = (sorted_id(n).first(n), DENSITY.first(n), COUNTERS.first(1));
+        // Without moving walls the buffer does not exist.
+        let groups = match self.scene.has_movers() {
+            true => n.div_ceil(64),
+            false => 0,
+        };
+        let measured = (
+            sorted_id(n).first(n),
+            DENSITY.first(n),
+            COUNTERS.first(1),
+            BOUNDARY_WORK.first(groups),
+        );
         Ok(Measured {
             scene: self.scene.clone(),
             frame: self.frame + 1,
@@ -406,7 +404,7 @@ impl Pbf {
 }
 
 type OfState = (First<[f32; 3]>, First<[f32; 3]>, First<u32>);
-type OfMeasure = (First<u32>, First<f32>, First<Counters>);
+type OfMeasure = (First<u32>, First<f32>, First<Counters>, First<f32>);
 
 /// Reads a state and the relative density of each particle.
 type ReadState = dyn FnOnce() -> Result<(Particles, Vec<f64>), SolveError> + Send;
@@ -425,9 +423,18 @@ impl Measured {
         Ok(self.found.views()?.1.2[0])
     }
 
+    /// Returns the work by moving walls on the water in the frame, joules; its substeps were
+    /// `step` seconds long.
+    fn boundary_work(&self, step: f64) -> Result<f64, SolveError> {
+        let sums = self.found.views()?.1.3;
+        let sum: f64 = sums.iter().copied().map(f64::from).sum();
+        Ok(self.scene.particle_mass() / step * sum)
+    }
+
     /// Returns the state, and the relative density of each particle.
     fn read(self) -> Result<(Particles, Vec<f64>), SolveError> {
-        let ((position, velocity, id), (sorted_id, density, counters)) = self.found.views()?;
+        let (state, (sorted_id, density, counters, _)) = self.found.views()?;
+        let (position, velocity, id) = state;
         let ids = &self.state.ids;
         let places = ids.places(self.frame, id)?;
         let sorted_places = ids.places(self.frame, sorted_id)?;
@@ -485,6 +492,7 @@ impl Solver for Pbf {
         }
         self.frame += 1;
         let counters = measured.counters()?;
+        let work = measured.boundary_work(length / f64::from(substeps))?;
         let mut read: Box<ReadState> = Box::new(move || measured.read());
         self.state.walls = AbsorberStates::default();
         if is_awaited(&self.scene) {
@@ -506,7 +514,6 @@ impl Solver for Pbf {
             Stop::DensityError { .. } => u64::from(counters.iterations),
         };
         let grid = self.grid.as_ref().map(Grid::done);
-        let work = self.boundary_work(length / f64::from(substeps))?;
         let (scene, walls) = (self.scene.clone(), self.state.walls);
         Ok(Unread::new(walls, move || {
             let (mut state, density) = read()?;
