@@ -13,7 +13,7 @@ use super::{
     fit::{comes_into, fits},
     grids, keep, moving_solid, no_slip, periodic, probe, sources,
     spec::{BoxSpec, DomainSpec, MeshSpec, SceneSpec, SwarmSpec, WaterSpec},
-    wave_maker,
+    start_waves, wave_maker,
 };
 use swell_domain::{
     bounds::Bounds,
@@ -67,6 +67,14 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
     let no_slip = no_slip::build(doc, &spec.domain, (solver.method(), between), periodic)?;
     let water = water(doc, base_dir, &spec.water, &domain, &lattice)?;
     periodic::check_gravity(doc, periodic, water.gravity)?;
+    let around = start_waves::Surroundings {
+        domain: &domain,
+        periodic,
+        gravity: water.gravity.to_array(),
+        spacing: lattice.spacing,
+        has_other_water: !water.blocks.is_empty() || !water.meshes.is_empty(),
+    };
+    start_waves::check(doc, &water.waves, &around)?;
     let around = wave_maker::Surroundings {
         base_dir,
         domain: &domain,
@@ -226,6 +234,7 @@ fn water(
         gravity: DVec3::from_array(spec.gravity),
         blocks: Vec::new(),
         meshes: Vec::new(),
+        waves: spec.wave.clone(),
         particles: Vec::new(),
     };
     for (index, block) in spec.block.iter().enumerate() {
@@ -357,8 +366,13 @@ fn check_particle_count(
         .filter_map(|m| m.mesh.bounds())
         .map(|b| b.volume() / d.powi(3))
         .sum::<f64>();
+    // Up to a crest of the depth.
+    let below_waves = water.waves.first().map_or(0.0, |wave| {
+        let size = domain.size();
+        size.x * size.z * (2.0 * wave.depth()).min(size.y) / d.powi(3)
+    });
     let placed: usize = water.particles.iter().map(|swarm| swarm.at.len()).sum();
-    let count = in_blocks + in_meshes + placed as f64 + entering;
+    let count = in_blocks + in_meshes + below_waves + placed as f64 + entering;
     if count > MAX_PARTICLES {
         let problem = format!(
             "the water would take about {count:.3e} particles {} m apart",

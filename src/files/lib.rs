@@ -40,6 +40,7 @@ mod settle;
 mod solid_track;
 mod sources;
 mod spec;
+mod start_waves;
 #[cfg(test)]
 mod tests;
 mod usd_nodes;

@@ -12,7 +12,7 @@ use super::{
     motion_spec::{MotionSpec, TurnSpec},
     probe::ProbeSpec,
 };
-use swell_scene::{Effects, Iteration, Method, Shot, Wall, flip::Flip};
+use swell_scene::{Effects, Iteration, Method, Shot, Wall, flip::Flip, start_waves::StartWave};
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -65,6 +65,8 @@ pub(super) struct WaterSpec {
     pub(super) block: Vec<BoxSpec>,
     #[serde(default)]
     pub(super) mesh: Vec<MeshSpec>,
+    #[serde(default)]
+    pub(super) wave: Vec<StartWave>,
     #[serde(default)]
     pub(super) particles: Vec<SwarmSpec>,
 }

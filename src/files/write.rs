@@ -127,6 +127,11 @@ fn written_water(scene: &Scene, mesh_path: &dyn Fn(&Path, &str) -> String) -> Ta
     let meshes = scene.water.meshes.iter();
     let meshes = meshes.map(|placed| mesh("file", placed, mesh_path));
     insert_tables(&mut water, "mesh", meshes);
+    let waves = scene.water.waves.iter().map(|wave| match value(wave) {
+        Value::Table(wave) => wave,
+        _ => unreachable!("a wave is a table"),
+    });
+    insert_tables(&mut water, "wave", waves);
     let swarms = scene.water.particles.iter().map(|swarm| {
         let at = swarm.at.iter().copied().map(vector).collect();
         table([

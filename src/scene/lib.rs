@@ -14,6 +14,7 @@ pub mod rate;
 pub mod solid_grid;
 pub mod solid_track;
 pub mod sources;
+pub mod start_waves;
 pub mod step;
 pub mod waves;
 pub mod words;
@@ -167,6 +168,9 @@ pub struct Water {
     pub blocks: Vec<Bounds>,
     /// Closed meshes filled with water at rest.
     pub meshes: Vec<PlacedMesh>,
+    /// Waves at the start. The water below them fills the domain, and there are no blocks and
+    /// meshes beside it.
+    pub waves: Vec<start_waves::StartWave>,
     /// Particles whose positions the scene lists one by one.
     pub particles: Vec<Swarm>,
 }

@@ -82,6 +82,10 @@ impl Scene {
             self.lint_packet(&waves, &mut lints);
             made.push((None, waves));
         }
+        for waves in self.made_at_start() {
+            self.lint_waves(&waves, still, &mut lints);
+            made.push((None, waves));
+        }
         if let Some(level) = level {
             self.lint_zones(level, &made, &mut lints);
         }

@@ -50,20 +50,22 @@ impl Start {
         let boundary = boundary(scene)?;
         // Moving solids displace the water of the start as well.
         let movers = scene.moving_solids.iter().map(|solid| &solid.placed.mesh);
-        let at_start = match scene.moving_solids[..] {
-            [] => None,
-            _ => distance(scene, meshes(scene).chain(movers))?,
+        let (block, air) = scene.start_waves().unzip();
+        let at_start = match (&scene.moving_solids[..], &air) {
+            ([], None) => None,
+            _ => distance(scene, meshes(scene).chain(movers).chain(&air))?,
         };
         let water = scene.water.meshes.iter().map(|placed| &placed.mesh);
         let room = scene.start_domain();
         let fill = fill_water(
-            &scene.start_blocks(),
+            &[scene.start_blocks(), block.into_iter().collect()].concat(),
             water,
             at_start.as_ref().or(boundary.distance.as_ref()),
             &room,
             spacing,
         )?;
         let (mut particles, mut removed) = (fill.particles, fill.removed);
+        scene.move_with_waves(&particles.position, &mut particles.velocity);
         for swarm in &scene.water.particles {
             for at in &swarm.at {
                 if room != scene.domain && !room.contains(*at) {

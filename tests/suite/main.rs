@@ -121,6 +121,7 @@ mod solve {
     mod turning_solids;
     mod viscous;
     mod walls;
+    mod start_waves;
     mod wave_wall;
     mod whitewater;
     mod zones;

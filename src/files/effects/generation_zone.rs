@@ -66,12 +66,8 @@ impl Declared for Settings {
             let problem = "waves need gravity along -y".to_owned();
             return refuse("waves.kind", problem);
         }
-        check_waves(
-            &self.waves,
-            doc,
-            gravity.length(),
-            0.5 * around.least_length,
-        )?;
+        let spacing = 0.5 * around.least_length;
+        check_waves(&self.waves, doc, WAVES, gravity.length(), spacing)?;
         let [_, depth, degrees] = self.waves.common();
         let height = around.domain.size().y;
         if depth > height {
@@ -119,25 +115,26 @@ impl Declared for Settings {
     }
 }
 
-/// Rejects waves that are outside of theory or that particles `spacing` metres
+/// Rejects waves of the table at `path` that are outside of theory or that particles `spacing` metres
 /// apart cannot resolve.
-fn check_waves(
+pub(crate) fn check_waves(
     waves: &Waves,
     doc: &Document<'_>,
+    path: &str,
     gravity: f64,
     spacing: f64,
 ) -> Result<(), SceneError> {
     if let Waves::Stokes(regular) = waves {
         let asked = regular.asked(gravity);
-        regular_waves::check_stokes(doc, WAVES, &asked)?;
+        regular_waves::check_stokes(doc, path, &asked)?;
         let length = TAU / asked.wave_number();
-        let period = format!("{WAVES}.period");
+        let period = format!("{path}.period");
         seas::check_spacings(doc, &period, [asked.period, length, spacing])?;
     }
     if let Some((asked, enhancement)) = waves.spectral(gravity) {
-        seas::shape(doc, WAVES, asked.spectrum, enhancement)?;
+        seas::shape(doc, path, asked.spectrum, enhancement)?;
         let periods = [asked.peak_period, asked.shortest_period, asked.ramp];
-        seas::check_periods(doc, WAVES, periods, gravity)?;
+        seas::check_periods(doc, path, periods, gravity)?;
         let (key, stands) = match asked.meeting {
             Meeting::Random {
                 significant_height, ..
@@ -148,14 +145,14 @@ fn check_waves(
             }
             Meeting::Focused { height, .. } => ("height", seas::check_depth(height, asked.depth)),
         };
-        stands.map_err(|problem| doc.fault_of(&format!("{WAVES}.{key}"), problem))?;
+        stands.map_err(|problem| doc.fault_of(&format!("{path}.{key}"), problem))?;
         let k = wave_number(TAU / asked.shortest_period, asked.depth, gravity);
         let shortest = [asked.shortest_period, TAU / k, spacing];
-        let key = format!("{WAVES}.shortest_period");
+        let key = format!("{path}.shortest_period");
         seas::check_spacings(doc, &key, shortest)?;
     }
     check_speed(waves.by(gravity).most_speed())
-        .map_err(|problem| doc.fault_of_plain(WAVES, problem))
+        .map_err(|problem| doc.fault_of_plain(path, problem))
 }
 
 /// Rejects a packet whose crests meet outside of the domain, or before its slowest waves can

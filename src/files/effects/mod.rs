@@ -37,7 +37,7 @@ trait Declared {
 
 macro_rules! declared {
     ($($name:ident),+ $(,)?) => {
-        $(mod $name;)+
+        $(pub(super) mod $name;)+
 
         /// Keys of each effect in a table of its own.
         pub(super) const KEYS: &[Key] = &[$(

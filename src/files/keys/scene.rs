@@ -8,7 +8,7 @@ use super::super::{
     build::{CHEBYSHEV_RELAXATION, RELAXATION},
     effects, keep,
     key::{Interval, Key, words},
-    no_slip, probe,
+    no_slip, probe, start_waves,
 };
 use super::{
     budget::BUDGET,
@@ -132,6 +132,8 @@ const WATER: &[Key] = &[
         .about("acceleration of all water"),
     Key::tables("block", BLOCK).about("A box full of water"),
     Key::tables("mesh", WATER_MESH).about("A mesh full of water"),
+    Key::tables("wave", start_waves::KEYS)
+        .about("Waves that are on the water at the start, which fills the domain below them"),
     Key::tables("particles", PARTICLES).about("Single particles, one by one"),
 ];
 

@@ -211,6 +211,28 @@ impl Waves {
         self.common()[0]
     }
 
+    /// Returns what lints have to know of the waves of `key`.
+    pub(crate) fn made(&self, key: String) -> Made {
+        let (height, crest) = match self {
+            Self::Stokes(waves) => (waves.height, 0.5 * waves.height),
+            Self::Sea(sea) => (sea.significant_height, CREST * sea.significant_height),
+            Self::Focused(packet) => (packet.height, packet.height),
+        };
+        let [period, depth, _] = self.common();
+        Made {
+            key,
+            height,
+            crest,
+            period: Some(period),
+            depth: Some(depth),
+            ramp: 0.0,
+            meets: match self {
+                Self::Focused(packet) => Some(packet.time),
+                Self::Stokes(_) | Self::Sea(_) => None,
+            },
+        }
+    }
+
     /// Returns the waves for a gravity, m/s².
     pub fn by(&self, gravity: f64) -> OpenWaves {
         let direction = self.common()[2].to_radians();
@@ -250,24 +272,7 @@ impl Effect for Settings {
     }
 
     fn makes(&self) -> Option<Made> {
-        let (height, crest) = match &self.waves {
-            Waves::Stokes(waves) => (waves.height, 0.5 * waves.height),
-            Waves::Sea(sea) => (sea.significant_height, CREST * sea.significant_height),
-            Waves::Focused(packet) => (packet.height, packet.height),
-        };
-        let [period, depth, _] = self.waves.common();
-        Some(Made {
-            key: WAVES.to_owned(),
-            height,
-            crest,
-            period: Some(period),
-            depth: Some(depth),
-            ramp: 0.0,
-            meets: match &self.waves {
-                Waves::Focused(packet) => Some(packet.time),
-                Waves::Stokes(_) | Waves::Sea(_) => None,
-            },
-        })
+        Some(self.waves.made(WAVES.to_owned()))
     }
 
     fn waves(&self, gravity: DVec3) -> Option<OpenWaves> {

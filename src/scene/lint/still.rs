@@ -36,7 +36,7 @@ impl Scene {
         let boxes = meshes.filter_map(|placed| placed.mesh.bounds());
         let all = self.water.blocks.iter().copied().chain(boxes);
         let standing = all.filter(|it| it.min.y <= floor + self.particle_spacing());
-        let top = standing.map(|it| it.max.y - floor);
+        let top = standing.map(|it| it.max.y - floor).chain(self.wave_depth());
         let deepest = top.fold(0.0, f64::max).min(self.domain.size().y);
         (self.is_down() && deepest > 0.0).then_some(deepest)
     }
@@ -113,7 +113,9 @@ impl Scene {
         let blocks = blocks.map(|block| [block.min.y, block.max.y]);
         let meshes = self.water.meshes.iter();
         let meshes = meshes.flat_map(|placed| stretches(&placed.mesh, at));
-        let top = topmost(floor, near, blocks.chain(meshes).collect()).min(self.domain.max.y);
+        let below_waves = self.wave_depth().map(|depth| [bottom, bottom + depth]);
+        let water = blocks.chain(meshes).chain(below_waves).collect();
+        let top = topmost(floor, near, water).min(self.domain.max.y);
         let found = Still {
             depth: top - floor,
             floor: floor - bottom,

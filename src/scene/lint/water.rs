@@ -39,7 +39,8 @@ impl Scene {
             .iter()
             .map(|placed| placed.mesh.capped_volume());
         let particles = self.water.particles.iter().map(|swarm| swarm.at.len());
-        blocks + meshes.sum::<f64>() + particles.sum::<usize>() as f64 * self.particle_volume()
+        let particles = particles.sum::<usize>() as f64 * self.particle_volume();
+        blocks + meshes.sum::<f64>() + self.wave_volume() + particles
     }
 
     /// Returns the volume that a particle represents, m³.
@@ -50,7 +51,7 @@ impl Scene {
     /// Warns about a scene without water and emitters.
     fn lint_dry(&self, lints: &mut Vec<String>) {
         let water = &self.water;
-        let is_dry = water.blocks.is_empty() && water.meshes.is_empty();
+        let is_dry = water.blocks.is_empty() && water.meshes.is_empty() && water.waves.is_empty();
         if is_dry && water.particles.iter().all(|it| it.at.is_empty()) && self.emitters.is_empty() {
             lints.push("water: the scene holds no water, and no [[emitter]] brings any".to_owned());
         }

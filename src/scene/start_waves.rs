@@ -1,0 +1,182 @@
+//! Waves that are on the water at the start, as specified in a scene.
+
+use glam::{DVec2, DVec3};
+use serde::{Deserialize, Serialize};
+
+use swell_domain::{
+    bounds::Bounds,
+    initial_waves::{InitialWave, InitialWaves},
+    mesh::TriangleMesh,
+    open_waves::{OpenSea, OpenWaves},
+    solitary_wave::SolitaryWave,
+};
+
+use crate::{
+    Scene,
+    effects::generation_zone::{Regular, Sea, Waves},
+    lint::Made,
+    waves,
+};
+
+/// Key of the waves.
+pub const KEY: &str = "water.wave";
+
+/// Largest height of a solitary wave, in depths: at this height third-order theory leaves 13 % of
+/// √(g d) of the velocities unexplained, and beyond it more.
+pub const HIGHEST_SOLITARY: f64 = 0.5;
+
+/// One `[[water.wave]]`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum StartWave {
+    /// A solitary wave to third order.
+    Solitary(Solitary),
+    /// Regular waves to second order; their ramp is not used.
+    Stokes(Regular),
+    /// Waves of a spectrum with random phases; their ramp is not used.
+    Sea(Sea),
+}
+
+/// A solitary wave as specified in a scene.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Solitary {
+    /// Height of the crest above still water, metres.
+    pub height: f64,
+    /// Still-water depth, metres.
+    pub depth: f64,
+    /// Distance of the crest from the domain's least corner, along the wave's direction, metres.
+    pub at: f64,
+    /// Direction of propagation, from +x towards +z.
+    pub direction_degrees: f64,
+}
+
+impl StartWave {
+    /// Returns the depth of still water, metres.
+    pub fn depth(&self) -> f64 {
+        match self {
+            Self::Solitary(wave) => wave.depth,
+            Self::Stokes(waves) => waves.depth,
+            Self::Sea(sea) => sea.depth,
+        }
+    }
+
+    /// Returns the direction of propagation, degrees from +x towards +z.
+    pub fn direction_degrees(&self) -> f64 {
+        match self {
+            Self::Solitary(wave) => wave.direction_degrees,
+            Self::Stokes(waves) => waves.direction_degrees,
+            Self::Sea(sea) => sea.direction_degrees,
+        }
+    }
+
+    /// Returns the waves of an open sea that these are; `None` for a solitary wave.
+    pub fn open(&self) -> Option<Waves> {
+        match self {
+            Self::Solitary(_) => None,
+            Self::Stokes(waves) => Some(Waves::Stokes(waves.clone())),
+            Self::Sea(sea) => Some(Waves::Sea(sea.clone())),
+        }
+    }
+
+    /// Returns the wave at its full height, for a gravity, m/s².
+    pub fn at_start(&self, gravity: f64) -> InitialWave {
+        let degrees = self.direction_degrees();
+        let direction = DVec2::from_angle(degrees.to_radians());
+        match self {
+            Self::Solitary(solitary) => InitialWave::Solitary {
+                wave: SolitaryWave {
+                    height: solitary.height,
+                    depth: solitary.depth,
+                    gravity,
+                },
+                direction,
+                crest: solitary.at,
+            },
+            Self::Stokes(regular) => {
+                let water = [regular.height, regular.period, regular.depth, gravity];
+                let asked = waves::regular(water, Some(0.0));
+                InitialWave::Open(OpenWaves::regular(&asked, direction))
+            }
+            Self::Sea(sea) => {
+                let asked = OpenSea {
+                    ramp: 0.0,
+                    ..sea.asked(gravity)
+                };
+                InitialWave::Open(OpenWaves::sea(&asked, degrees.to_radians()))
+            }
+        }
+    }
+
+    /// Returns what lints have to know of the wave `index`.
+    fn made(&self, index: usize) -> Made {
+        let key = format!("{KEY}[{index}]");
+        match self {
+            Self::Solitary(wave) => Made {
+                key,
+                height: wave.height,
+                crest: wave.height,
+                period: None,
+                depth: Some(wave.depth),
+                ramp: 0.0,
+                meets: None,
+            },
+            Self::Stokes(waves) => Waves::Stokes(waves.clone()).made(key),
+            Self::Sea(sea) => Waves::Sea(sea.clone()).made(key),
+        }
+    }
+}
+
+impl Scene {
+    /// Returns the waves at the start; `None` if the scene has none.
+    pub fn initial_waves(&self) -> Option<InitialWaves> {
+        let gravity = self.water.gravity.length();
+        let waves = self.water.waves.iter();
+        InitialWaves::new(waves.map(|wave| wave.at_start(gravity)).collect())
+    }
+
+    /// Returns the box that water below waves fills, up to a whole layer of particles above the
+    /// highest crest, and the closed mesh of the air above the waves, which takes away what is too
+    /// much; `None` without waves.
+    pub fn start_waves(&self) -> Option<(Bounds, TriangleMesh)> {
+        let waves = self.initial_waves()?;
+        let (room, spacing) = (self.start_domain(), self.particle_spacing());
+        let surface = waves.over(&room, self.domain.min, self.solid_margin(), spacing);
+        let highest = surface.highest();
+        let layers = ((highest - room.min.y) / spacing).ceil();
+        let mut block = room;
+        block.max.y = (room.min.y + layers * spacing).min(room.max.y);
+        let top = self.domain.max.y.max(highest) + self.solid_margin();
+        Some((block, surface.air(top)))
+    }
+
+    /// Returns the volume of water below the waves of the start, m³; 0 without any.
+    pub(crate) fn wave_volume(&self) -> f64 {
+        let spacing = self.particle_spacing();
+        self.initial_waves().map_or(0.0, |waves| {
+            waves.volume(&self.start_domain(), self.domain.min, spacing)
+        })
+    }
+
+    /// Returns the depth of still water below the waves of the start, metres.
+    pub(crate) fn wave_depth(&self) -> Option<f64> {
+        self.water.waves.first().map(StartWave::depth)
+    }
+
+    /// Returns what lints have to know of the waves of the start.
+    pub(crate) fn made_at_start(&self) -> impl Iterator<Item = Made> + '_ {
+        let waves = self.water.waves.iter().enumerate();
+        waves.map(|(index, wave)| wave.made(index))
+    }
+
+    /// Sets the velocities that particles have in the waves of the start.
+    pub fn move_with_waves(&self, position: &[[f32; 3]], velocity: &mut [[f32; 3]]) {
+        let Some(waves) = self.initial_waves() else {
+            return;
+        };
+        for (position, velocity) in position.iter().zip(velocity) {
+            let place = DVec3::from_array(position.map(f64::from)) - self.domain.min;
+            *velocity = waves.velocity(place).as_vec3().to_array();
+        }
+    }
+}

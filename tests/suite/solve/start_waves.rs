@@ -1,0 +1,160 @@
+//! Waves that are on the water at the start run as theory has it, with both solvers.
+
+use std::f64::consts::TAU;
+
+use swell::cache::CacheReader;
+
+use crate::support::job::Job;
+
+const SPACING: f64 = 0.05;
+const DEPTH: f64 = 1.0;
+const GRAVITY: f64 = 9.81;
+
+fn scene(name: &str, length: f64, periodic: &str, wave: &str) -> String {
+    format!(
+        r#"
+[shot]
+name = "{name}"
+frames = 40
+frames_per_second = 24
+[domain]
+min = [3.0, -1.0, 0.0]
+max = [{}, 0.5, 0.2]
+periodic = [{periodic}]
+[[water.wave]]
+depth = {DEPTH}
+{wave}
+[solver]
+[solver.flip]
+cell_size = 0.1
+[solver.pbf]
+particle_spacing = {SPACING}
+"#,
+        3.0 + length
+    )
+}
+
+/// Depths of the water in columns two spacings wide, by the volume of their particles, with the
+/// columns' distances from the domain's least corner.
+fn columns(job: &Job, cache: &str, frame: u32, length: f64) -> Vec<(f64, f64)> {
+    let width = 2.0 * SPACING;
+    let state = CacheReader::open(&job.path(cache)).unwrap();
+    let state = state.read(frame).unwrap();
+    let mut depths = vec![0.0; (length / width).round() as usize];
+    let last = depths.len() - 1;
+    for position in &state.position {
+        let column = (f64::from(position[0]) - 3.0) / width;
+        depths[(column.max(0.0) as usize).min(last)] += SPACING.powi(3) / (width * 0.2);
+    }
+    let at = |k: usize| width * (k as f64 + 0.5);
+    let depths = depths.into_iter().enumerate();
+    depths.map(|(k, depth)| (at(k), depth)).collect()
+}
+
+/// Elevation over H of a solitary wave to first order, and its celerity to third (Grimshaw 1971).
+fn solitary(height: f64, x: f64) -> f64 {
+    let number = (0.75 * height / DEPTH.powi(3)).sqrt();
+    (number * x).cosh().powi(-2)
+}
+
+fn celerity(height: f64) -> f64 {
+    let e = height / DEPTH;
+    (GRAVITY * DEPTH * (1.0 + e - e * e / 20.0 - 3.0 / 70.0 * e.powi(3))).sqrt()
+}
+
+/// Height and place of the solitary wave that fits best, by least squares. The shape of first order
+/// fits waves of third order to 3 % of the height.
+fn fitted(columns: &[(f64, f64)], height: f64) -> (f64, f64) {
+    let places = (0..900).map(|k| 1.0 + 0.01 * f64::from(k));
+    let fit = |at: f64| {
+        let shape = |x: f64| solitary(height, x - at);
+        let both = columns.iter().map(|&(x, depth)| shape(x) * (depth - DEPTH));
+        let square: f64 = columns.iter().map(|&(x, _)| shape(x).powi(2)).sum();
+        (both.sum::<f64>() / square, at, square)
+    };
+    let explained = |&(a, _, square): &(f64, f64, f64)| a * a * square;
+    let best = places.map(fit);
+    let best = best.max_by(|a, b| explained(a).total_cmp(&explained(b)));
+    let (height, at, _) = best.unwrap();
+    (height, at)
+}
+
+/// After 5.7 depths the crest is within a spacing of where theory has it, and the wave has its
+/// height. Controls: a wave of linear celerity would be 0.5 m behind, and one without the motion of
+/// its water splits into two of half the height (mutant `start-wave-at-rest`).
+#[test]
+fn a_solitary_wave_of_the_start_keeps_height_and_celerity() {
+    const HEIGHT: f64 = 0.2;
+    let job = Job::of(&[(
+        "solitary.toml",
+        &scene(
+            "solitary",
+            12.0,
+            "",
+            "kind = \"solitary\"\nheight = 0.2\nat = 3.5",
+        ),
+    )]);
+    for solver in ["flip", "pbf"] {
+        job.expect(
+            0,
+            &format!("bake solitary.toml --solver {solver} -o {solver}"),
+        );
+        let (before, _) = fitted(&columns(&job, solver, 0, 12.0), HEIGHT);
+        let (height, at) = fitted(&columns(&job, solver, 40, 12.0), HEIGHT);
+        let (time, place) = (40.0 / 24.0, 3.5 + celerity(HEIGHT) * 40.0 / 24.0);
+        println!("{solver}: {before:.4} {height:.4} m, {at:.3} for {place:.3} m");
+        assert!((before / HEIGHT - 1.0).abs() < 0.03, "{solver}: {before}");
+        assert!((height / before - 1.0).abs() < 0.03, "{solver}: {height}");
+        assert!((at - place).abs() < SPACING, "{solver}: {at}");
+        let linear = 3.5 + (GRAVITY * DEPTH).sqrt() * time;
+        assert!((at - linear).abs() > 5.0 * SPACING);
+    }
+}
+
+/// Amplitude and phase of the elevation's part with this wave number.
+fn harmonic(columns: &[(f64, f64)], number: f64) -> (f64, f64) {
+    let part = |f: fn(f64) -> f64| {
+        let terms = columns.iter().map(|&(x, depth)| depth * f(number * x));
+        2.0 * terms.sum::<f64>() / columns.len() as f64
+    };
+    let (cosine, sine) = (part(f64::cos), part(f64::sin));
+    (cosine.hypot(sine), sine.atan2(cosine))
+}
+
+/// Two regular waves in a periodic tank are where theory has them after a period and a quarter.
+/// Control: a frame earlier they are not.
+#[test]
+fn regular_waves_of_the_start_run_through_a_periodic_tank() {
+    const LENGTH: f64 = 5.6;
+    let number = 2.0 * TAU / LENGTH;
+    let frequency = (GRAVITY * number * (number * DEPTH).tanh()).sqrt();
+    let wave = format!(
+        "kind = \"stokes\"\nheight = 0.2\nperiod = {}",
+        TAU / frequency
+    );
+    let job = Job::of(&[("stokes.toml", &scene("stokes", LENGTH, "\"x\"", &wave))]);
+    for solver in ["flip", "pbf"] {
+        job.expect(
+            0,
+            &format!("bake stokes.toml --solver {solver} -o {solver}"),
+        );
+        let (before, phase) = harmonic(&columns(&job, solver, 0, LENGTH), number);
+        assert!(
+            (before / 0.1 - 1.0).abs() < 0.03 && phase.abs() < 0.02,
+            "{before} {phase}"
+        );
+        let off = |frame: u32| {
+            let (amplitude, phase) = harmonic(&columns(&job, solver, frame, LENGTH), number);
+            let ahead = frequency * f64::from(40) / 24.0 - phase;
+            (amplitude, (ahead + 0.5 * TAU).rem_euclid(TAU) - 0.5 * TAU)
+        };
+        let (amplitude, ahead) = off(40);
+        println!("{solver}: {amplitude:.4} m, {ahead:.3}; {:.3}", off(39).1);
+        assert!(
+            (amplitude / before - 1.0).abs() < 0.06,
+            "{solver}: {amplitude}"
+        );
+        assert!(ahead.abs() < 0.08, "{solver}: {ahead}");
+        assert!(off(39).1.abs() > 0.12, "{solver}");
+    }
+}
