@@ -7,7 +7,7 @@ use glam::DVec3;
 use super::frame::{Stamp, Written};
 use swell_domain::{
     sparse_grid::{Precision, SparseGrid},
-    vdb::{self, Grid, Metadata},
+    vdb::{self, Metadata, VdbGrid},
 };
 
 /// Grids of one frame.
@@ -50,8 +50,14 @@ pub fn encode(
         ("shot", Metadata::Text(stamp.shot.to_owned())),
         ("time", Metadata::Double(stamp.time)),
     ];
-    let surface = grids.surface.iter().map(|it| Grid::LevelSet("surface", it));
-    let velocity = grids.velocity.iter().map(|it| Grid::Staggered("vel", it));
+    let surface = grids
+        .surface
+        .iter()
+        .map(|it| VdbGrid::LevelSet("surface", it));
+    let velocity = grids
+        .velocity
+        .iter()
+        .map(|it| VdbGrid::Staggered("vel", it));
     let grids: Vec<_> = surface.chain(velocity).collect();
     let bytes = vdb::encode(&metadata, &grids, precision);
     out.write_all(&bytes)?;

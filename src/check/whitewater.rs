@@ -11,7 +11,7 @@ use swell_compare::{
 use swell_domain::{
     boundary::Boundary,
     particles::Particles,
-    whitewater::{KIND, Kind, OUTWARD, Potentials, SURFACE, Settings},
+    whitewater::{CalibratedSettings, KIND, OUTWARD, Potentials, SURFACE, WhitewaterKind},
 };
 use swell_gpu::adapter::Context;
 use swell_reference::whitewater::{Moved, Neighbor, Surveyed, Water, White};
@@ -87,7 +87,7 @@ pub struct Frame<'a> {
     /// Solids of the scene.
     pub boundary: &'a Boundary,
     /// Settings of the whitewater stream.
-    pub settings: &'a Settings,
+    pub settings: &'a CalibratedSettings,
     /// Water at the frame's end.
     pub water: &'a Particles,
     /// Whitewater at the end of the previous frame.
@@ -287,7 +287,8 @@ impl<'a> Comparison<'a> {
                 let before = White {
                     position: (wide(white.position[k]) - corner).as_vec3().as_dvec3(),
                     velocity: wide(white.velocity[k]),
-                    kind: Kind::of_number(white.attributes[KIND][k]).unwrap_or(Kind::Foam),
+                    kind: WhitewaterKind::of_number(white.attributes[KIND][k])
+                        .unwrap_or(WhitewaterKind::Foam),
                 };
                 let moved = self.water.advance(settings, gravity, seconds, before);
                 (moved, self.moved_errors(&before, &moved, gravity))

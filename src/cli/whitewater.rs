@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use serde_json::json;
 
-use swell_domain::whitewater::Kind;
+use swell_domain::whitewater::WhitewaterKind;
 use swell_files::whitewater::WhitewaterSettings;
 use swell_stage::whitewater::{Event, LimitForecast, WhitewaterRequest, expected, whitewater};
 
@@ -196,7 +196,7 @@ fn tell(progress: &Progress, event: Event) {
             born,
             seconds,
         } => {
-            let kinds = Kind::ALL.into_iter().zip(census);
+            let kinds = WhitewaterKind::ALL.into_iter().zip(census);
             let words: Vec<String> = kinds
                 .map(|(kind, many)| format!("{many} {}", kind.name()))
                 .collect();

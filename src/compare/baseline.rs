@@ -13,7 +13,7 @@ use super::{
     limits::StatedLimit,
     spread::{self, Spread},
 };
-use swell_domain::{aggregates::Aggregates, particles::Particles, tolerance::Limit};
+use swell_domain::{aggregates::Aggregates, particles::Particles, tolerance::ErrorLimit};
 
 /// Format version that this program writes and reads.
 pub const FORMAT_VERSION: u32 = 1;
@@ -117,7 +117,7 @@ pub struct FramePair {
     /// Aggregates of the cache and of the baseline.
     pub aggregates: [Aggregates; 2],
     /// Limits of their differences, by name.
-    pub limits: BTreeMap<String, Limit>,
+    pub limits: BTreeMap<String, ErrorLimit>,
 }
 
 impl BaselineDiff {
@@ -288,13 +288,13 @@ impl Baseline {
     /// Returns the limits of a frame's aggregates; empty for a frame that the baseline does not
     /// have. For bit-identical particles the limit is the rounding of a sum of n terms of one sign,
     /// n ε of the sum (Higham 2002, eq. 4.4).
-    pub fn limits(&self, adapter: Option<&str>, found: &Measured) -> BTreeMap<String, Limit> {
+    pub fn limits(&self, adapter: Option<&str>, found: &Measured) -> BTreeMap<String, ErrorLimit> {
         let mut frames = self.frames.iter().enumerate();
         let Some((index, expected)) = frames.find(|(_, f)| f.frame == found.frame.frame) else {
             return BTreeMap::new();
         };
         if self.is_same(adapter, index, found) {
-            let limit = Limit {
+            let limit = ErrorLimit {
                 absolute: 0.0,
                 relative: expected.particles as f64 * f64::EPSILON,
             };
@@ -306,7 +306,7 @@ impl Baseline {
             spread.copied().unwrap_or(0.0)
         };
         let limit = |(name, stated): (&String, &StatedLimit)| {
-            let limit = Limit {
+            let limit = ErrorLimit {
                 absolute: stated.absolute + stated.spreads * spread(name),
                 relative: stated.relative,
             };

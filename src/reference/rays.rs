@@ -11,7 +11,7 @@ use swell_domain::{
     eye::Eye,
     level_set::{
         FIRST, LevelSet, VOXELS,
-        kernels::{Field, Kernels},
+        kernels::{KernelField, Kernels},
     },
     mesh::TriangleMesh,
 };
@@ -67,7 +67,7 @@ pub fn cast(
 }
 
 struct Water<'a> {
-    field: Field<'a>,
+    field: KernelField<'a>,
     coarse: &'a LevelSet,
 }
 

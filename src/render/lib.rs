@@ -45,7 +45,8 @@ use std::path::PathBuf;
 use glam::DVec3;
 
 use swell_domain::{
-    bounds::Bounds, mesh::TriangleMesh, mesh_file::parts::Parts, open_waves::OpenWaves, pose::Pose,
+    bounds::Bounds, mesh::TriangleMesh, mesh_file::parts::MeshParts, open_waves::OpenWaves,
+    pose::Pose,
 };
 use swell_gpu::adapter::GpuError;
 use swell_scene::Wall;
@@ -87,7 +88,7 @@ pub struct SolidParts {
     /// Name of the mesh's file without its extension.
     pub name: String,
     /// Parts to which the mesh's triangles belong.
-    pub parts: Parts,
+    pub parts: MeshParts,
     /// Current pose of the solid.
     pub pose: Pose,
 }

@@ -11,7 +11,7 @@ use swell_domain::{
     solver::PassTime,
     sph::Calibration,
     whitewater::{
-        AIR_BELOW, FLIGHT_STEPS, HALVINGS, KIND, OUTWARD, Potentials, SURFACE, Settings,
+        AIR_BELOW, CalibratedSettings, FLIGHT_STEPS, HALVINGS, KIND, OUTWARD, Potentials, SURFACE,
         WATER_ABOVE,
     },
 };
@@ -62,7 +62,7 @@ pub struct Whitewater {
     /// neither can happen.
     boundary: Option<Boundary>,
     movers: Option<Movers>,
-    settings: Option<Settings>,
+    settings: Option<CalibratedSettings>,
     /// Number of whitewater particles that the buffers can hold.
     capacity: usize,
     timer: Option<Timer>,
@@ -120,7 +120,7 @@ fn pass(
     name: &'static str,
     plan: &Plan,
     scene: &PbfScene,
-    settings: Option<&Settings>,
+    settings: Option<&CalibratedSettings>,
 ) -> PassSpec {
     let conditions = [
         ("SOLIDS", plan.has_solids()),
@@ -210,7 +210,7 @@ impl Whitewater {
     /// Prepares the motion of whitewater with these settings.
     ///
     /// # Errors Returns an error if a shader does not compile or the device fails.
-    pub fn set(&mut self, settings: &Settings) -> Result<(), SolveError> {
+    pub fn set(&mut self, settings: &CalibratedSettings) -> Result<(), SolveError> {
         let pass = pass(ADVANCE, &self.plan, &self.scene, Some(settings));
         self.program.refit(&[], &[pass])?;
         self.settings = Some(settings.clone());

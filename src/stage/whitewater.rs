@@ -25,7 +25,7 @@ use swell_domain::{
     bounds::Bounds,
     output,
     particles::Particles,
-    whitewater::{self, Births, Settings, Source, Thresholds},
+    whitewater::{self, Births, CalibratedSettings, SeedWater, Thresholds},
 };
 use swell_files::whitewater::{WhitewaterSettings, written_out};
 use swell_gpu::adapter::Needs;
@@ -291,7 +291,7 @@ fn asked(request: &WhitewaterRequest) -> Result<(CacheReader, u32), WhitewaterEr
 
 /// Computes a frame of a stream from the one before.
 struct Step<'a> {
-    settings: &'a Settings,
+    settings: &'a CalibratedSettings,
     scene: &'a Scene,
     cache: &'a CacheReader,
 }
@@ -323,7 +323,7 @@ impl Step<'_> {
         let walls = self.scene.walls(&now.walls, clock.time);
         let births = Births::of(
             self.settings,
-            &Source {
+            &SeedWater {
                 water: &now,
                 potentials: &potentials,
                 frame,
@@ -377,7 +377,7 @@ impl StreamWriter {
         directory: &Path,
         manifest: Manifest,
         cache: &CacheReader,
-        settings: &Settings,
+        settings: &CalibratedSettings,
     ) -> Result<Self, WhitewaterError> {
         let mut assets = vec![Asset {
             name: SETTINGS.to_owned(),

@@ -8,7 +8,7 @@ use crate::{
 };
 use swell_domain::{
     particles::Particles,
-    whitewater::{KIND, Kind, RADIUS},
+    whitewater::{KIND, RADIUS, WhitewaterKind},
 };
 use swell_gpu::{program::Program, recording::spread};
 use swell_scene::look::{Look, MethodSpec};
@@ -95,18 +95,21 @@ impl Whitewater {
     }
 }
 
-fn kind(white: &Particles, index: usize) -> Option<Kind> {
+fn kind(white: &Particles, index: usize) -> Option<WhitewaterKind> {
     let kind = white.attributes.get(KIND).and_then(|all| all.get(index));
-    kind.and_then(|&number| Kind::of_number(number))
+    kind.and_then(|&number| WhitewaterKind::of_number(number))
 }
 
 /// Whether a particle is foam or a bubble; particles without a kind are spray.
 fn is_foam(white: &Particles, index: usize) -> bool {
-    matches!(kind(white, index), Some(Kind::Foam | Kind::Bubble))
+    matches!(
+        kind(white, index),
+        Some(WhitewaterKind::Foam | WhitewaterKind::Bubble)
+    )
 }
 
 /// Whether a particle is a bubble, which is in the water rather than in front of it; particles
 /// without a kind are spray.
 pub(super) fn is_bubble(white: &Particles, index: usize) -> bool {
-    kind(white, index) == Some(Kind::Bubble)
+    kind(white, index) == Some(WhitewaterKind::Bubble)
 }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use crate::{baked_scene, device::SolverError, prepare::Start};
 use swell_cache::CacheReader;
 use swell_check::Table;
-use swell_domain::{boundary::Boundary, whitewater::Settings};
+use swell_domain::{boundary::Boundary, whitewater::CalibratedSettings};
 use swell_gpu::adapter::Context;
 use swell_scene::PbfScene;
 
@@ -17,7 +17,7 @@ pub struct Stream {
     cache: CacheReader,
     scene: PbfScene,
     boundary: Boundary,
-    settings: Settings,
+    settings: CalibratedSettings,
     particles: usize,
 }
 

@@ -7,7 +7,7 @@ use std::{
 
 use super::{Event, SETTINGS, WhitewaterError, WhitewaterRequest, engine::Engine, water::Water};
 use swell_cache::CacheReader;
-use swell_domain::whitewater::{Settings, Thresholds};
+use swell_domain::whitewater::{CalibratedSettings, Thresholds};
 use swell_files::whitewater::WhitewaterSettings;
 use swell_scene::Scene;
 
@@ -19,7 +19,7 @@ pub(super) fn recorded(
     stream: &CacheReader,
     directory: &Path,
     scene: &Scene,
-) -> Result<Settings, WhitewaterError> {
+) -> Result<CalibratedSettings, WhitewaterError> {
     let bytes = stream.asset(SETTINGS)?;
     let text = String::from_utf8_lossy(&bytes);
     let file = directory.join("assets").join(SETTINGS);
@@ -35,7 +35,7 @@ pub(super) fn settle(
     scene: &Scene,
     (engine, water): (&mut Engine, &mut Water<'_>),
     (stop, tell): (&AtomicBool, &mut dyn FnMut(Event)),
-) -> Result<Option<(Settings, Option<usize>)>, WhitewaterError> {
+) -> Result<Option<(CalibratedSettings, Option<usize>)>, WhitewaterError> {
     let cache = water.cache();
     let frames: Vec<u32> = match request.settings.needs_calibration() {
         true => (cache.first_frame() + 1..=cache.last_frame())

@@ -9,7 +9,7 @@ use swell::{
         boundary::Boundary,
         motion::Motion,
         particles::Particles,
-        whitewater::{Kind, Settings},
+        whitewater::{CalibratedSettings, WhitewaterKind},
     },
     gpu::adapter::{Context, InjectedFault},
     scene::{PbfScene, Wall, WaveMaker},
@@ -51,7 +51,7 @@ fn clouds() -> Particles {
                 0.45 + 0.4 * number(2),
             );
             let v = 4.0 * DVec3::new(number(3), number(4), number(5));
-            (x, v, Kind::ALL[k as usize % 3])
+            (x, v, WhitewaterKind::ALL[k as usize % 3])
         })
         .collect();
     white(&all)
@@ -59,7 +59,7 @@ fn clouds() -> Particles {
 
 fn table(context: &Context, periodic: bool) -> Table {
     let (scene, water) = splash(periodic);
-    let settings = Settings {
+    let settings = CalibratedSettings {
         wind: [2.0, 0.0, -1.0],
         ..settings()
     };

@@ -5,7 +5,7 @@ use std::path::Path;
 use glam::{DVec2, DVec3};
 use swell::{
     domain::mesh::TriangleMesh,
-    domain::mesh_file::{MeshFormat, parts::Parts},
+    domain::mesh_file::{MeshFormat, parts::MeshParts},
     domain::{particles::Particles, pose::Pose},
     files::parse_look,
     gpu::adapter::Context,
@@ -85,7 +85,7 @@ fn of_text(text: &str) -> RenderScene {
         solids: vec![TriangleMesh::from_bytes(bytes, MeshFormat::Obj, file).unwrap()],
         parts: vec![SolidParts {
             name: "face".to_owned(),
-            parts: Parts::from_bytes(bytes, MeshFormat::Obj, file).unwrap(),
+            parts: MeshParts::from_bytes(bytes, MeshFormat::Obj, file).unwrap(),
             pose: Pose::START,
         }],
         ..scene(1.0, 1.0)
