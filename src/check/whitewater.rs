@@ -14,7 +14,7 @@ use swell_domain::{
     whitewater::{CalibratedSettings, KIND, OUTWARD, Potentials, SURFACE, WhitewaterKind},
 };
 use swell_gpu::adapter::Context;
-use swell_reference::whitewater::{Moved, Neighbor, Surveyed, Water, White};
+use swell_reference::whitewater::{Moved, Neighbor, SortedWater, Surveyed, White};
 use swell_scene::PbfScene;
 use swell_solve::{
     SolveError,
@@ -142,7 +142,7 @@ pub fn check(context: &Context, frame: Frame<'_>) -> Result<Table, SolveError> {
 /// The water in f64, with rounding bounds of each particle's sums.
 struct Comparison<'a> {
     frame: Frame<'a>,
-    water: Water,
+    water: SortedWater,
     surveyed: Vec<Surveyed>,
     errors: Vec<Errors>,
 }
@@ -161,7 +161,7 @@ struct Errors {
 
 impl<'a> Comparison<'a> {
     fn of(frame: Frame<'a>) -> Self {
-        let water = Water::new(frame.scene, frame.boundary, frame.water, frame.time);
+        let water = SortedWater::new(frame.scene, frame.boundary, frame.water, frame.time);
         let n = water.points.len();
         let surveyed: Vec<Surveyed> = (0..n).into_par_iter().map(|i| water.survey(i)).collect();
         let errors = (0..n).into_par_iter();
@@ -399,7 +399,7 @@ struct About {
     free: f64,
 }
 
-fn errors_of(water: &Water, i: usize, surveyed: &Surveyed) -> Errors {
+fn errors_of(water: &SortedWater, i: usize, surveyed: &Surveyed) -> Errors {
     let (x, h) = (water.points[i], water.model.calibration.support_radius);
     let (mut fluid, mut solids, mut all) = (Sums::default(), Sums::default(), Sums::default());
     let mut solid = 0.0;

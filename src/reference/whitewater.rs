@@ -22,7 +22,7 @@ use super::{ReferenceError, pbf::Model};
 /// Water at a frame's end, sorted by cell, with the walls and solids around it. Positions are
 /// relative to the domain's minimum corner.
 #[derive(Clone, Debug)]
-pub struct Water {
+pub struct SortedWater {
     /// Kernels, boundary samples on solids, cells.
     pub model: Model,
     /// Faces of the box, displaced by wave makers.
@@ -81,7 +81,7 @@ struct Found {
     velocity: DVec3,
 }
 
-impl Water {
+impl SortedWater {
     /// Takes the water of `scene`, which is
     /// [`of_whitewater`](swell_scene::Scene::of_whitewater) of the baked scene, at `time`,
     /// seconds.
@@ -330,7 +330,7 @@ pub struct Whitewater {
     scene: PbfScene,
     boundary: Boundary,
     settings: Option<CalibratedSettings>,
-    water: Option<(Water, f64)>,
+    water: Option<(SortedWater, f64)>,
 }
 
 impl Whitewater {
@@ -354,7 +354,7 @@ impl Whitewater {
     /// Takes the water of the frame at `time`, `seconds` after the previous one, and returns the
     /// potentials of its particles, in the water's order.
     pub fn survey(&mut self, water: &Particles, time: f64, seconds: f64) -> Vec<Potentials> {
-        let sorted = Water::new(&self.scene, &self.boundary, water, time);
+        let sorted = SortedWater::new(&self.scene, &self.boundary, water, time);
         let n = water.len();
         let surveyed: Vec<Surveyed> = (0..n).into_par_iter().map(|i| sorted.survey(i)).collect();
         let found: Vec<Potentials> = (0..n)

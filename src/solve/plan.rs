@@ -99,11 +99,11 @@ pub struct PlannedBuffer {
 /// Buffers that a module declares, each once.
 #[derive(Clone, Debug, Default)]
 #[non_exhaustive]
-pub struct Table {
+pub struct BufferTable {
     rows: Vec<PlannedBuffer>,
 }
 
-impl Table {
+impl BufferTable {
     pub(super) fn add(&mut self, owner: &'static str, spec: BufferSpec) {
         self.rows.push(PlannedBuffer {
             spec,
@@ -328,7 +328,7 @@ impl Plan {
         })
     }
 
-    pub(super) fn declare(&mut self, table: Table) {
+    pub(super) fn declare(&mut self, table: BufferTable) {
         self.buffers.extend(table.rows);
     }
 

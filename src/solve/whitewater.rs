@@ -28,7 +28,7 @@ use super::{
     SolveError,
     boundary::{self, Movers},
     pbf::{buffers::*, params, plan::cell_count, record::sorting},
-    plan::{Counts, Plan, Table, in_order},
+    plan::{BufferTable, Counts, Plan, in_order},
     state::is_other_count,
 };
 
@@ -78,7 +78,7 @@ fn plan(scene: &PbfScene, boundary: &Boundary, water: usize, white: usize) -> Pl
     };
     let mut plan = Plan::bare(counts, scene.period().cells(scene.domain.size(), support));
     let cells = cell_count(&plan);
-    let mut table = Table::default();
+    let mut table = BufferTable::default();
     table.add("sort", CELL_START.sized(cells + 1));
     table.extend("sort", sort::scan_buffers(&CELL_START, cells));
     let keys = [CELL_OF, SLOT_IN_CELL, PLACED, ORDER];

@@ -13,7 +13,7 @@ use swell_compare::{rounding::U, tolerance::bounds};
 use swell_reference::{
     flip::{
         Centers,
-        effects::{Water, led_faces},
+        effects::{FaceInputs, led_faces},
     },
     pbf::effects::led_particles,
 };
@@ -71,7 +71,7 @@ pub(super) fn faces<const N: usize>(
     let old = elements.planes(&io.before, flip::buffers::FACE_CHANGE)?;
     let before = elements.planes(&io.before, flip::buffers::FACE_VELOCITY)?;
     let found = elements.planes(&io.after, flip::buffers::FACE_VELOCITY)?;
-    let water = Water {
+    let water = FaceInputs {
         model: &state.model,
         step: &step,
         bricks: &elements.bricks,

@@ -20,7 +20,7 @@ use swell_domain::{
 };
 use swell_gpu::adapter::Context;
 use swell_reference::{
-    flip::{GridTransfer, Model, OpenSpace, Sorted, Step, is_filling},
+    flip::{FlipSubstep, GridTransfer, Model, OpenSpace, Sorted, is_filling},
     poisson::iteration::Sum,
 };
 use swell_scene::{FlipScene, step::Substep};
@@ -222,7 +222,7 @@ impl FlipState {
         self.density.as_ref().expect("after flip/gather_centers")
     }
 
-    pub(super) fn step(&self) -> Step<'_> {
+    pub(super) fn step(&self) -> FlipSubstep<'_> {
         self.model.step(&self.elements().substep, &self.absorbers)
     }
 

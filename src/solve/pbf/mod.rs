@@ -43,7 +43,7 @@ use super::{
 };
 use buffers::*;
 use plan::{cell_count, places, shared_constants};
-use projection::Grid;
+use projection::ProjectionGrid;
 use record::Commands;
 
 /// Dummy particle: far from everything, and still finite when squared.
@@ -57,7 +57,7 @@ pub struct Pbf {
     calibration: Calibration,
     substep: Recording,
     measure: Recording,
-    grid: Option<Grid>,
+    grid: Option<ProjectionGrid>,
     /// Boundary to upload again when the particle count changes or, with moving solids, in each
     /// substep. `None` if neither can happen.
     boundary: Option<Boundary>,
@@ -172,7 +172,7 @@ impl Pbf {
             boundary: (scene.has_sources() || !boundary.moving.is_empty())
                 .then(|| boundary.clone()),
             movers: Movers::of(boundary, scene),
-            grid: Grid::of(context, scene, &plan, boundary)?,
+            grid: ProjectionGrid::of(context, scene, &plan, boundary)?,
             timer: is_timed.then(|| Timer::new(context)),
             program,
             plan,
@@ -378,7 +378,7 @@ impl Pbf {
 
     /// Sorts particles at the frame's final positions, measures the density there, and maps the
     /// frame.
-    fn measured(&mut self, time: f64) -> Result<Measured, SolveError> {
+    fn measured(&mut self, time: f64) -> Result<MappedFrame, SolveError> {
         self.program.upload(PARAMS, 0, &[self.params(time, 0.0)]);
         self.measure.run(&self.program, self.timer.as_mut())?;
         let n = self.plan.counts.particles;
@@ -394,7 +394,7 @@ impl Pbf {
             COUNTERS.first(1),
             BOUNDARY_WORK.first(groups),
         );
-        Ok(Measured {
+        Ok(MappedFrame {
             scene: self.scene.clone(),
             frame: self.frame + 1,
             state: self.state.clone(),
@@ -410,7 +410,7 @@ type OfMeasure = (First<u32>, First<f32>, First<Counters>, First<f32>);
 type ReadState = dyn FnOnce() -> Result<(Particles, Vec<f64>), SolveError> + Send;
 
 /// A frame in mapped memory.
-struct Measured {
+struct MappedFrame {
     scene: Arc<PbfScene>,
     frame: u32,
     /// With the walls before the frame.
@@ -418,7 +418,7 @@ struct Measured {
     found: Mapped<(OfState, OfMeasure)>,
 }
 
-impl Measured {
+impl MappedFrame {
     fn counters(&self) -> Result<Counters, SolveError> {
         Ok(self.found.views()?.1.2[0])
     }
@@ -513,7 +513,7 @@ impl Solver for Pbf {
             Stop::Iterations(count) => u64::from(count) * u64::from(substeps),
             Stop::DensityError { .. } => u64::from(counters.iterations),
         };
-        let grid = self.grid.as_ref().map(Grid::done);
+        let grid = self.grid.as_ref().map(ProjectionGrid::done);
         let (scene, walls) = (self.scene.clone(), self.state.walls);
         Ok(Unread::new(walls, move || {
             let (mut state, density) = read()?;
