@@ -4,7 +4,7 @@ use std::io::{self, Write};
 
 use glam::DVec3;
 
-use super::frame::{Stamp, Written};
+use super::frame::{Stamp, WrittenFile};
 use swell_domain::{
     sparse_grid::{Precision, SparseGrid},
     vdb::{self, Metadata, VdbGrid},
@@ -42,7 +42,7 @@ pub fn encode(
     stamp: &Stamp<'_>,
     grids: &Grids,
     precision: Precision,
-) -> io::Result<Written> {
+) -> io::Result<WrittenFile> {
     let program = format!("{} {}", stamp.program, stamp.program_version);
     let metadata = [
         ("creator", Metadata::Text(program)),
@@ -61,7 +61,7 @@ pub fn encode(
     let grids: Vec<_> = surface.chain(velocity).collect();
     let bytes = vdb::encode(&metadata, &grids, precision);
     out.write_all(&bytes)?;
-    Ok(Written {
+    Ok(WrittenFile {
         bytes: bytes.len() as u64,
         hash: blake3::hash(&bytes),
     })

@@ -6,8 +6,8 @@ use rayon::prelude::*;
 use serde::{Serialize, Serializer};
 
 use swell_compare::{
-    deviation::{Deviation, Value, relative},
-    tolerance::{Bound, Text},
+    deviation::{ComparedValue, Deviation, relative},
+    tolerance::{BoundExpression, Text},
 };
 
 /// A row of a check: one field that one pass writes.
@@ -69,7 +69,7 @@ pub struct Entry<const N: usize> {
     /// Compared field.
     pub field: Field,
     /// Largest allowed difference.
-    pub tolerance: &'static Bound<N>,
+    pub tolerance: &'static BoundExpression<N>,
 }
 
 /// Declares entries, grouped by pass:
@@ -83,7 +83,7 @@ macro_rules! entries {
         $($(pub(super) static $name: $crate::table::Entry<
             { swell_compare::tolerance::count!($($magnitudes)*) }
         > = {
-            static TOLERANCE: swell_compare::tolerance::Bound<
+            static TOLERANCE: swell_compare::tolerance::BoundExpression<
                 { swell_compare::tolerance::count!($($magnitudes)*) }
             > = swell_compare::tolerance::bound!([$($magnitudes)*] $value, $reason);
             $crate::table::Entry {
@@ -188,7 +188,7 @@ pub struct Table {
 impl Table {
     /// Adds a run of a pass. `None` is a value that is left out because either outcome is correct
     /// within rounding; a NaN is out of tolerance.
-    pub fn add<T: Value, const N: usize, P: Into<Option<Pair<T, N>>>>(
+    pub fn add<T: ComparedValue, const N: usize, P: Into<Option<Pair<T, N>>>>(
         &mut self,
         entry: &'static Entry<N>,
         pairs: impl IntoIterator<Item = P>,
@@ -231,7 +231,7 @@ impl Table {
     }
 
     /// Adds a run of a pass, evaluating the values of a range in parallel.
-    pub fn each<T: Value + Send, const N: usize, P: Into<Option<Pair<T, N>>> + Send>(
+    pub fn each<T: ComparedValue + Send, const N: usize, P: Into<Option<Pair<T, N>>> + Send>(
         &mut self,
         entry: &'static Entry<N>,
         range: Range<usize>,

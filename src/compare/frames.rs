@@ -83,7 +83,7 @@ pub struct Fault {
 }
 
 /// A field of the particles that both frames have.
-struct Field<const N: usize> {
+struct PairedField<const N: usize> {
     name: String,
     ids: Vec<u32>,
     a: Vec<[f32; N]>,
@@ -108,7 +108,7 @@ pub fn compare(
         ("velocity", &a.velocity, &b.velocity),
     ];
     for (name, a_values, b_values) in vectors {
-        let field = Field::of(name, &a.id, &matches.pairs, a_values, b_values);
+        let field = PairedField::of(name, &a.id, &matches.pairs, a_values, b_values);
         fields.push(field.compare(tolerance, &mut faults));
     }
     for (name, a_values) in &a.attributes {
@@ -116,7 +116,7 @@ pub fn compare(
             continue;
         };
         let [a_values, b_values] = [a_values, b_values].map(|values| scalars(values));
-        let field = Field::of(name, &a.id, &matches.pairs, &a_values, &b_values);
+        let field = PairedField::of(name, &a.id, &matches.pairs, &a_values, &b_values);
         fields.push(field.compare(tolerance, &mut faults));
     }
     lone_attributes(particles, tolerance, &mut faults);
@@ -255,7 +255,7 @@ fn scalars(values: &[f32]) -> Vec<[f32; 1]> {
     values.iter().map(|&value| [value]).collect()
 }
 
-impl<const N: usize> Field<N> {
+impl<const N: usize> PairedField<N> {
     fn of(
         name: &str,
         ids: &[u32],

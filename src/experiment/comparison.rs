@@ -16,7 +16,7 @@ use swell_stage::{
     gauge, render,
 };
 use swell_study::{
-    comparison::{self, Course, Finding, Impact, Row},
+    comparison::{self, Course, Finding, FrameRow, Impact},
     measure::Gauge,
     median,
     page::Part,
@@ -144,7 +144,7 @@ fn course(cache: &CacheReader, gauge: &Gauge, frames: &FrameRange) -> Result<Cou
         let entry = cache.entry(frame)?;
         let report: Option<StepReport> = serde_json::from_value(entry.report.clone()).ok();
         let particles = cache.read(frame)?;
-        Ok(Row {
+        Ok(FrameRow {
             frame,
             time: entry.clock.time,
             seconds: seconds.get(&frame).copied(),
@@ -213,7 +213,7 @@ const MEASURED: &str = "Both solvers are measured alike, from the particles. Spa
     clock, the whole frame, with writing beside it.";
 
 /// Median of a quantity over the rows of a course, with `digits` decimals.
-fn middle(course: &Course, digits: usize, value: fn(&Row) -> Option<f64>) -> String {
+fn middle(course: &Course, digits: usize, value: fn(&FrameRow) -> Option<f64>) -> String {
     let middle = median(course.rows.iter().filter_map(value).collect());
     middle.map_or("none".into(), |value| format!("{value:.digits$}"))
 }

@@ -33,7 +33,7 @@ use swell_domain::{
     sparse_grid::Precision,
     water_mesh::VOLUME,
 };
-use swell_export::{Source, mesh, mesh::Placed, table, usd};
+use swell_export::{FileOrigin, mesh, mesh::Placed, table, usd};
 use swell_scene::{Scene, look::Look};
 
 use super::{
@@ -447,7 +447,7 @@ impl<'a> Job<'a> {
 
     fn bytes(&self, target: &Target, content: &Content<'_>) -> Result<Vec<u8>, ExportError> {
         let (scene, frame) = (&self.scene, content.frame);
-        let source = Source {
+        let source = FileOrigin {
             software: &self.software,
             shot: &self.source().manifest().shot,
             frame,
@@ -507,7 +507,7 @@ impl<'a> Job<'a> {
         &self,
         water: UsdWater,
         content: &Content<'_>,
-        source: &Source<'_>,
+        source: &FileOrigin<'_>,
     ) -> Result<Vec<u8>, ExportError> {
         let shot = self.shot(source.frame);
         let makers = match self.stream {
@@ -515,20 +515,20 @@ impl<'a> Job<'a> {
             None => shot::displacements(&self.scene, content.particles()?, source.frame),
         };
         let told = match water {
-            UsdWater::Points => usd::Water::Points(content.particles()?),
-            UsdWater::Mesh => usd::Water::Mesh(content.mesh()?, self.scene.domain.min),
+            UsdWater::Points => usd::WaterFrame::Points(content.particles()?),
+            UsdWater::Mesh => usd::WaterFrame::Mesh(content.mesh()?, self.scene.domain.min),
         };
         Ok(usd::frame(&shot, self.kind(water), &told, &makers))
     }
 
-    fn kind(&self, water: UsdWater) -> usd::Kind {
+    fn kind(&self, water: UsdWater) -> usd::WaterRepresentation {
         let is_own = self.stream.is_some();
         match water {
-            UsdWater::Points if is_own => usd::Kind::Points { width: None },
-            UsdWater::Points => usd::Kind::Points {
+            UsdWater::Points if is_own => usd::WaterRepresentation::Points { width: None },
+            UsdWater::Points => usd::WaterRepresentation::Points {
                 width: Some(shot::width(self.scene.particle_spacing())),
             },
-            UsdWater::Mesh => usd::Kind::Mesh,
+            UsdWater::Mesh => usd::WaterRepresentation::Mesh,
         }
     }
 
@@ -536,7 +536,7 @@ impl<'a> Job<'a> {
     fn shot(&self, frame: u32) -> usd::Shot<'_> {
         let number = |frame: Option<&u32>| frame.map_or(0, |&frame| self.numbering.of(frame));
         usd::Shot {
-            source: Source {
+            source: FileOrigin {
                 software: &self.software,
                 shot: &self.source().manifest().shot,
                 frame: self.numbering.of(frame),

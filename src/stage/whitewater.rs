@@ -20,7 +20,7 @@ use std::{
 
 use serde_json::{Value, json};
 
-use swell_cache::{Asset, CacheError, CacheReader, CacheWriter, Clock, Entry, Manifest};
+use swell_cache::{Asset, CacheError, CacheReader, CacheWriter, Clock, LedgerEntry, Manifest};
 use swell_domain::{
     bounds::Bounds,
     output,
@@ -145,7 +145,7 @@ pub struct WhitewaterOutcome {
 
 /// Whether a stream's frame was made from the frame of this number in `cache`; the first frame is
 /// always empty.
-pub fn is_of(frame: &Entry, cache: &CacheReader) -> bool {
+pub fn is_of(frame: &LedgerEntry, cache: &CacheReader) -> bool {
     let now = cache.entry(frame.frame).map(|entry| &*entry.chain).ok();
     frame.frame == cache.first_frame() || frame.report[WATER].as_str() == now
 }

@@ -9,7 +9,9 @@ use super::{CACHE, InspectArgs, broken_off, file, look, refuse_options, study};
 use crate::{Failure, bake, is_cache, output};
 use swell_scene::Scene;
 use swell_stage::{
-    inspect::{Adapter, Entry, Manifest, PARTICLES, Rounding, ScenePlan, adapters, cache, sizes},
+    inspect::{
+        Adapter, LedgerEntry, Manifest, PARTICLES, Rounding, ScenePlan, adapters, cache, sizes,
+    },
     replay::is_failed,
     time::{Timed, time},
 };
@@ -204,7 +206,7 @@ fn of_cache(directory: &Path) -> Result<Value, Failure> {
     }))
 }
 
-fn frame(manifest: &Manifest, entry: &Entry, newest: u32) -> Value {
+fn frame(manifest: &Manifest, entry: &LedgerEntry, newest: u32) -> Value {
     let is_there = manifest.has_particles(entry.frame, newest);
     let bytes = entry.file(PARTICLES).filter(|_| is_there);
     json!({

@@ -138,18 +138,18 @@ impl Results<'_> {
         run.measured.work / frames
     }
 
-    fn lines(&self, error: ErrorMeasure) -> Vec<knee::Line> {
+    fn lines(&self, error: ErrorMeasure) -> Vec<knee::MethodCurve> {
         let lines = self.sweep.lines.iter().enumerate();
         let point = |k: usize, index: usize, point: &Point| {
             let run = &self.runs[k][index];
-            Some(knee::Point {
+            Some(knee::CostPoint {
                 label: point.label.clone(),
                 error: self.error(k, index, error)?,
                 time: self.time(run),
                 work: self.work(run),
             })
         };
-        let of = |(k, line): (usize, &Line)| knee::Line {
+        let of = |(k, line): (usize, &Line)| knee::MethodCurve {
             name: line.name.clone(),
             points: (line.points.iter().enumerate())
                 .filter_map(|(index, p)| point(k, index, p))
@@ -159,7 +159,7 @@ impl Results<'_> {
     }
 
     /// Each error of each line, with its discretisation error.
-    fn each(&self) -> Vec<(ErrorMeasure, usize, knee::Line, Option<f64>)> {
+    fn each(&self) -> Vec<(ErrorMeasure, usize, knee::MethodCurve, Option<f64>)> {
         let errors = self.sweep.errors.iter();
         let of = |&error: &ErrorMeasure| {
             let lines = self.lines(error).into_iter().enumerate();
@@ -189,7 +189,7 @@ impl Results<'_> {
         let error = self.sweep.errors[0];
         let each = self.each();
         let of_error = each.iter().filter(|(of, ..)| *of == error);
-        let mut knees: Vec<(&knee::Line, Knee<'_>, String)> = of_error
+        let mut knees: Vec<(&knee::MethodCurve, Knee<'_>, String)> = of_error
             .filter_map(|(_, k, line, discretisation)| {
                 let knee = knee::knee(line, *discretisation)?;
                 let key = &self.sweep.lines[*k].key;
@@ -276,9 +276,9 @@ impl Results<'_> {
         });
         let failures = self.failures().into_iter();
         let notes = failures.map(|text| format!("failed: {text}")).chain(zeros);
-        let series = |(k, line): (usize, &knee::Line)| {
+        let series = |(k, line): (usize, &knee::MethodCurve)| {
             let knee = knee::knee(line, self.discretisation(k, error));
-            let dot = |point: &knee::Point| Dot {
+            let dot = |point: &knee::CostPoint| Dot {
                 at: if cost == Cost::Time {
                     point.time[1]
                 } else {

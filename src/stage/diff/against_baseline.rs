@@ -15,7 +15,7 @@ use super::{
 use swell_cache::{CacheError, CacheReader};
 use swell_compare::{
     baseline::{
-        Baseline, BaselineDiff, BaselineFrame, FORMAT_VERSION, Lost, Measured, particles_hash,
+        Baseline, BaselineDiff, BaselineFrame, FORMAT_VERSION, Lost, MeasuredFrame, particles_hash,
     },
     limits::default_tolerances,
 };
@@ -208,13 +208,13 @@ fn write(file: &Path, baseline: &Baseline) -> Result<(), DiffError> {
     Ok(output::write_named(file, text)?)
 }
 
-fn measure(cache: &CacheReader, frames: &[u32]) -> Result<Vec<Measured>, DiffError> {
+fn measure(cache: &CacheReader, frames: &[u32]) -> Result<Vec<MeasuredFrame>, DiffError> {
     cache.check_beside(frames)?;
     let scene = scene_of(cache)?;
     let gauge = of_caches(&scene, &[cache])?;
     let one = |&frame: &u32| {
         let particles = cache.read(frame)?;
-        Ok(Measured {
+        Ok(MeasuredFrame {
             hash: particles_hash(&particles),
             frame: BaselineFrame {
                 frame,

@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::{RenderJobError, Whitewater, near::Near, render_scene, told};
 use crate::{baked_scene, device::Gpu, prepare::Start};
-use swell_cache::{CacheReader, Entry};
+use swell_cache::{CacheReader, LedgerEntry};
 use swell_domain::{bounds::Bounds, particles::Particles};
 use swell_gpu::adapter::{Context, GpuError, Needs};
 use swell_render::{FrameInputs, Limits, Plan, RenderScene, Runs, Water};
@@ -159,7 +159,7 @@ impl Planned {
 /// The frame with the most particles among those kept; of equal ones the fastest, whose surface is
 /// usually the largest. The last frame if none is kept.
 fn fullest(cache: &CacheReader) -> u32 {
-    let speed = |entry: &Entry| entry.report["max_speed"].as_f64().unwrap_or(0.0);
+    let speed = |entry: &LedgerEntry| entry.report["max_speed"].as_f64().unwrap_or(0.0);
     let kept = cache.entries().iter();
     let kept = kept.filter(|entry| cache.has_particles(entry.frame));
     let fullest = kept.max_by(|a, b| {

@@ -8,7 +8,7 @@ use super::{
     strip::{Label, Strip},
 };
 use crate::probes;
-use swell_cache::{CacheReader, Entry};
+use swell_cache::{CacheReader, LedgerEntry};
 use swell_domain::solver::StepReport;
 use swell_study::chart::{Chart, Series};
 
@@ -101,7 +101,7 @@ fn of_two(name: &str, mut chart: Chart) -> Chart {
 type Line = (&'static str, fn(&StepReport) -> f64);
 
 /// Charts of the ledger's reports, independent of probes.
-fn of_ledger(shot: &str, entries: &[Entry]) -> Vec<Chart> {
+fn of_ledger(shot: &str, entries: &[LedgerEntry]) -> Vec<Chart> {
     const CHARTS: [(&str, &str, &[Line]); 3] = [
         (
             "energy",
@@ -121,7 +121,7 @@ fn of_ledger(shot: &str, entries: &[Entry]) -> Vec<Chart> {
             ],
         ),
     ];
-    let read = |entry: &Entry| -> (f64, Option<StepReport>) {
+    let read = |entry: &LedgerEntry| -> (f64, Option<StepReport>) {
         (
             entry.clock.time,
             serde_json::from_value(entry.report.clone()).ok(),
