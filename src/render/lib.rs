@@ -53,7 +53,7 @@ use swell_scene::Wall;
 
 pub use camera::{eye, lens};
 pub use image::{Attributes, Image};
-pub use inputs::{FrameInputs, REACH, Water, frames_around};
+pub use inputs::{FrameInputs, REACH, WaterParticles, frames_around};
 pub use opaque::opaque;
 pub use plan::{Limits, Plan, Runs};
 pub use renderer::{Part, Renderer};

@@ -19,7 +19,7 @@ use super::capacity_for;
 const FADING: f64 = 2.0;
 
 /// Settings with which a look draws whitewater.
-pub(super) struct Whitewater {
+pub(super) struct WhitewaterDrawing {
     params: uniform::WhitewaterParams,
     /// Whether bubbles are splatted too; rays traverse them instead.
     has_bubbles: bool,
@@ -27,7 +27,7 @@ pub(super) struct Whitewater {
     capacity: usize,
 }
 
-impl Whitewater {
+impl WhitewaterDrawing {
     /// Returns `None` where the look draws no whitewater.
     pub(super) fn of(look: &Look, scene: &RenderScene) -> Option<Self> {
         let spec = look.spec().whitewater.as_ref()?;

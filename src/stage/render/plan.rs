@@ -9,7 +9,7 @@ use crate::{baked_scene, device::Gpu, prepare::Start};
 use swell_cache::{CacheReader, LedgerEntry};
 use swell_domain::{bounds::Bounds, particles::Particles};
 use swell_gpu::adapter::{Context, GpuError, Needs};
-use swell_render::{FrameInputs, Limits, Plan, RenderScene, Runs, Water};
+use swell_render::{FrameInputs, Limits, Plan, RenderScene, Runs, WaterParticles};
 use swell_scene::{Scene, look::Look};
 
 /// What the camera sees in the plan.
@@ -116,7 +116,7 @@ impl Planned {
             Subject::Scene(scene) => {
                 let start = Start::of(scene)?;
                 let set = render_scene(scene, look, 0, &start.particles)?;
-                let (water, white) = (Water::new(start.particles), Particles::default());
+                let (water, white) = (WaterParticles::new(start.particles), Particles::default());
                 let inputs = FrameInputs::alone(&water, &white);
                 Self::of_frame(look, &set, (0, &inputs), limits)
             }

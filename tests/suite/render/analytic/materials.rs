@@ -9,7 +9,7 @@ use swell::{
     domain::{particles::Particles, pose::Pose},
     files::parse_look,
     gpu::adapter::Context,
-    render::{FrameInputs, Image, RenderError, RenderScene, Renderer, SolidParts, Water},
+    render::{FrameInputs, Image, RenderError, RenderScene, Renderer, SolidParts, WaterParticles},
     scene::look::Look,
 };
 
@@ -170,9 +170,9 @@ impl Shown<'_> {
         let look = self.look(folder.path());
         let mut renderer = Renderer::new(context, &look, self.scene)
             .map_err(|error| Box::new((error, look.clone())))?;
-        let (water, white) = (Water::new(Particles::default()), Particles::default());
+        let water = WaterParticles::new(Particles::default());
         Ok(renderer
-            .render_inputs(1, &FrameInputs::alone(&water, &white))
+            .render_inputs(1, &FrameInputs::alone(&water, &Particles::default()))
             .unwrap())
     }
 

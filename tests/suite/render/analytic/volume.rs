@@ -6,7 +6,7 @@ use glam::{DVec2, DVec3};
 use swell::domain::particles::Particles;
 use swell::domain::whitewater::{KIND, RADIUS, WhitewaterKind};
 use swell::gpu::adapter::Context;
-use swell::render::{FrameInputs, Image, RenderScene, Water};
+use swell::render::{FrameInputs, Image, RenderScene, WaterParticles};
 
 use crate::support::device::PooledDevice;
 
@@ -90,7 +90,7 @@ impl Shot<'_> {
         } else {
             Particles::default()
         };
-        let body = Water::new(body);
+        let body = WaterParticles::new(body);
         let scene = RenderScene {
             particle_spacing: SPACING,
             ..pool_scene()
@@ -318,7 +318,7 @@ fn spread(context: &Context, speed: f64, shutter: f64) -> [f64; 2] {
         sun: [0.0, 90.0, 0.0],
         ..Setup::new(eye)
     };
-    let water = Water::new(water());
+    let water = WaterParticles::new(water());
     let inputs = FrameInputs::alone(&water, &white);
     let image = draw_inputs(context, &setup, &uniform_sky, &pool_scene(), &inputs, 1).unwrap();
     let place = |i: usize| (i % 64) as f64 - 31.5;
