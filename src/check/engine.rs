@@ -21,7 +21,7 @@ use swell_solve::{
     trace::Traced,
 };
 
-use super::{sort, table::Table};
+use super::{sort, table::CheckTable};
 
 /// Result of a comparison, whose findings are in the table.
 pub(super) type PassResult = Result<(), SolveError>;
@@ -85,21 +85,21 @@ pub(super) struct Io<'a> {
     /// Name of the previous pass.
     pub(super) last: &'static str,
     /// Buffers before the dispatch.
-    pub(super) before: View<'a>,
+    pub(super) before: TracedBuffers<'a>,
     /// Buffers after the dispatch.
-    pub(super) after: View<'a>,
+    pub(super) after: TracedBuffers<'a>,
     /// Table that comparisons are added to.
-    pub(super) table: &'a mut Table,
+    pub(super) table: &'a mut CheckTable,
 }
 
 /// The device's buffers at one time.
-pub(super) struct View<'a> {
+pub(super) struct TracedBuffers<'a> {
     traced: Traced<'a>,
     /// Saved values of buffers that the pass writes; `None` for the view after it.
     kept: Option<&'a BTreeMap<String, Vec<u32>>>,
 }
 
-impl View<'_> {
+impl TracedBuffers<'_> {
     /// Returns the name of the buffer that a variable is bound to.
     pub(super) fn buffer<'b>(&'b self, variable: &'b str) -> &'b str {
         self.traced.buffer(variable)
@@ -185,7 +185,7 @@ pub(super) fn wide(values: &[[f32; 3]]) -> Vec<DVec3> {
 /// Runs the comparisons of a solver.
 pub(super) struct Engine<S: State> {
     pub(super) state: S,
-    pub(super) table: Table,
+    pub(super) table: CheckTable,
     reference_passes: Vec<&'static [Comparison<S>]>,
     sort: sort::Comparisons<S>,
     ran: Vec<&'static str>,
@@ -198,7 +198,7 @@ impl<S: State> Engine<S> {
     pub(super) fn new(state: S) -> Self {
         Self {
             state,
-            table: Table::default(),
+            table: CheckTable::default(),
             reference_passes: S::comparisons(),
             sort: sort::comparisons(),
             ran: Vec::new(),
@@ -237,11 +237,11 @@ impl<S: State> Engine<S> {
         let io = &mut Io {
             pass: traced.pass,
             last: self.last,
-            before: View {
+            before: TracedBuffers {
                 traced,
                 kept: Some(&self.kept),
             },
-            after: View { traced, kept: None },
+            after: TracedBuffers { traced, kept: None },
             table: &mut self.table,
         };
         match (reference.is_due)(&mut self.state, io)? {
@@ -251,7 +251,7 @@ impl<S: State> Engine<S> {
     }
 
     /// Returns the table, with the passes that have no row.
-    pub(super) fn finish(mut self) -> Table {
+    pub(super) fn finish(mut self) -> CheckTable {
         for pass in self.ran {
             if !self.table.has(pass) {
                 let known = S::ELSEWHERE.iter().find(|(name, _)| *name == pass);

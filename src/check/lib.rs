@@ -22,13 +22,13 @@ mod sort;
 pub mod table;
 pub mod whitewater;
 
-pub use table::{Row, Table};
+pub use table::{CheckRow, CheckTable};
 
 /// Result of comparing a substep with its reference passes.
 #[derive(Clone, Debug, Default)]
 pub struct Checked {
     /// Comparisons; empty if there is no water.
-    pub table: Table,
+    pub table: CheckTable,
     /// Number of the substep in its frame, from 1; `None` if there is no water.
     pub substep: Option<u32>,
 }

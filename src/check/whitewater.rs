@@ -22,7 +22,7 @@ use swell_solve::{
 };
 
 use super::{
-    Table,
+    CheckTable,
     table::{entries, pair},
 };
 
@@ -101,7 +101,7 @@ pub struct Frame<'a> {
 /// Compares the frame's passes with their reference passes.
 ///
 /// # Errors Returns an error if the device fails or a value is not finite.
-pub fn check(context: &Context, frame: Frame<'_>) -> Result<Table, SolveError> {
+pub fn check(context: &Context, frame: Frame<'_>) -> Result<CheckTable, SolveError> {
     let Frame {
         scene,
         boundary,
@@ -112,7 +112,7 @@ pub fn check(context: &Context, frame: Frame<'_>) -> Result<Table, SolveError> {
     let mut device = Whitewater::new(context, scene, boundary, n, false)?;
     device.set(frame.settings)?;
     let potentials = device.survey(water, frame.time, frame.seconds)?;
-    let mut table = Table::default();
+    let mut table = CheckTable::default();
     let reference = Comparison::of(frame);
     reference.survey(
         &mut table,
@@ -174,7 +174,7 @@ impl<'a> Comparison<'a> {
         }
     }
 
-    fn survey(&self, table: &mut Table, share: &[f32], surface: &[[f32; 4]]) {
+    fn survey(&self, table: &mut CheckTable, share: &[f32], surface: &[[f32; 4]]) {
         let n = self.surveyed.len();
         let [least, _] = SURFACE;
         table.each(&SHARE_OF, 0..n, |i| {
@@ -197,7 +197,7 @@ impl<'a> Comparison<'a> {
     }
 
     /// Compares the potentials; `found` is in the order of the original water.
-    fn potentials(&self, table: &mut Table, found: &[Potentials]) {
+    fn potentials(&self, table: &mut CheckTable, found: &[Potentials]) {
         let n = self.surveyed.len();
         let rows: Vec<(Potentials, [f64; 3], [f64; 5])> = (0..n)
             .into_par_iter()
@@ -271,7 +271,7 @@ impl<'a> Comparison<'a> {
         [sums, n, weight, crest, own_error.sure + outward]
     }
 
-    fn advance(&self, table: &mut Table, found: &Particles) {
+    fn advance(&self, table: &mut CheckTable, found: &Particles) {
         let Frame {
             scene,
             settings,
@@ -349,9 +349,9 @@ impl<'a> Comparison<'a> {
     }
 
     /// Collects magnitudes around a position.
-    fn about(&self, x: DVec3) -> About {
+    fn about(&self, x: DVec3) -> ParticleSurroundings {
         let h = self.water.model.calibration.support_radius;
-        let mut about = About::default();
+        let mut about = ParticleSurroundings::default();
         let (mut weighted, mut solid) = (Sums::default(), 0.0);
         let (mut least, mut most) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         self.water.about(x, |neighbor, way| {
@@ -388,7 +388,7 @@ impl<'a> Comparison<'a> {
 }
 
 #[derive(Clone, Copy, Debug, Default)]
-struct About {
+struct ParticleSurroundings {
     sums: Sums,
     /// Σ p³ over the water.
     kernel: f64,

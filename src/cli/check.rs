@@ -8,7 +8,7 @@ use serde_json::json;
 use swell_domain::{frame_range::FrameRange, substep::SubstepChoice};
 use swell_scene::Method;
 use swell_stage::{
-    check::{CheckOutcome, CheckRequest, Event, FirstOver, Row, Source, Table, check},
+    check::{CheckOutcome, CheckRequest, CheckRow, CheckTable, Event, FirstOver, Source, check},
     device::{Gpu, Imprecision},
     replay::{Replayed, is_failed, replay_failed},
 };
@@ -286,7 +286,7 @@ fn short(value: f64) -> String {
     }
 }
 
-fn line(row: &Row) -> String {
+fn line(row: &CheckRow) -> String {
     let worst = &row.worst;
     format!(
         "{:28} {:30} {:>4} {:>9} {:>6} {:>9} {:>9} {:>9} {:>8}{}",
@@ -303,7 +303,7 @@ fn line(row: &Row) -> String {
     )
 }
 
-fn show(table: &Table) -> String {
+fn show(table: &CheckTable) -> String {
     let mut text = format!(
         "{:28} {:30} {:>4} {:>9} {:>6} {:>9} {:>9} {:>9} {:>8}\n",
         "pass", "field", "unit", "values", "ties", "max", "worst", "allowed", "part"

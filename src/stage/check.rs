@@ -25,7 +25,7 @@ use super::{
     whitewater::{Stream, WhitewaterError},
 };
 
-pub use swell_check::{Checked, Row, Table};
+pub use swell_check::{CheckRow, CheckTable, Checked};
 
 /// Where the inputs of the step come from.
 #[derive(Clone, Debug)]
@@ -94,7 +94,7 @@ pub enum Event<'a> {
 #[non_exhaustive]
 pub struct CheckOutcome {
     /// All frames combined: for each row the value that deviates most.
-    pub table: Table,
+    pub table: CheckTable,
     /// The first row out of tolerance.
     pub first_over: Option<FirstOver>,
     /// Frames that were checked.
@@ -339,7 +339,7 @@ pub fn check_frame(
     start: &Start,
     frame: u32,
     particles: &Particles,
-) -> Result<Table, SolveError> {
+) -> Result<CheckTable, SolveError> {
     let first = SubstepChoice::default();
     Ok(check_substep(context, scene, start, frame, particles, first)?.table)
 }

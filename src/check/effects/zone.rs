@@ -7,7 +7,7 @@ use crate::{
     engine::{Io, PassResult, State},
     flip::FlipState,
     pbf::PbfState,
-    table::{Entry, pair},
+    table::{CheckEntry, pair},
 };
 use swell_compare::{rounding::U, tolerance::bounds};
 use swell_reference::{
@@ -40,7 +40,7 @@ pub(super) fn particles<const N: usize>(
     state: &PbfState,
     io: &mut Io<'_>,
     zone: Zone<'_>,
-    entry: &'static Entry<N>,
+    entry: &'static CheckEntry<N>,
     wanted: impl Fn(DVec3) -> DVec3 + Send + Sync,
     magnitudes: impl Fn(f64) -> [f64; N] + Send + Sync,
 ) -> PassResult {
@@ -63,7 +63,7 @@ pub(super) fn faces<const N: usize>(
     state: &FlipState,
     io: &mut Io<'_>,
     zone: Zone<'_>,
-    entry: &'static Entry<N>,
+    entry: &'static CheckEntry<N>,
     wanted: impl Fn(DVec3) -> DVec3 + Send + Sync,
     magnitudes: impl Fn([f64; 2]) -> [f64; N] + Send + Sync,
 ) -> PassResult {

@@ -30,9 +30,11 @@ use swell_solve::{
 
 use super::{
     Checked, effects,
-    engine::{Comparison, Engine, Io, NONE, PassResult, State, View, comparison, names, wide},
+    engine::{
+        Comparison, Engine, Io, NONE, PassResult, State, TracedBuffers, comparison, names, wide,
+    },
     flip::FlipState,
-    table::{Table, pair},
+    table::{CheckTable, pair},
 };
 use lists::Lists;
 use rows::{SAMPLES, WEIGHTS};
@@ -148,7 +150,7 @@ pub fn check(
         _ => engine.observe(traced),
     })?;
     engine.state.add_whole(boundary, &mut engine.table);
-    let mut table = of_grid.map_or_else(Table::default, Engine::finish);
+    let mut table = of_grid.map_or_else(CheckTable::default, Engine::finish);
     table.absorb(engine.finish());
     Ok(Checked {
         table,
@@ -237,7 +239,11 @@ impl PbfState {
     }
 
     /// Reads the first `count` entries of `predicted`: positions, and the values in w.
-    fn places(&self, view: &View<'_>, count: usize) -> Result<(Vec<DVec3>, Vec<f64>), SolveError> {
+    fn places(
+        &self,
+        view: &TracedBuffers<'_>,
+        count: usize,
+    ) -> Result<(Vec<DVec3>, Vec<f64>), SolveError> {
         let low = self.plan.page.unwrap_or(count).min(count);
         let mut all = view.get(buffers::PREDICTED, low)?;
         if low < count {
@@ -251,7 +257,7 @@ impl PbfState {
     }
 
     /// Reads which particles the grid found to be isolated droplets, in storage order.
-    pub(super) fn drops(&self, view: &View<'_>) -> Result<Vec<bool>, SolveError> {
+    pub(super) fn drops(&self, view: &TracedBuffers<'_>) -> Result<Vec<bool>, SolveError> {
         let n = self.particles();
         if !self.model.settings.grid_projection {
             return Ok(vec![false; n]);

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use crate::{baked_scene, device::SolverError, prepare::Start};
 use swell_cache::CacheReader;
-use swell_check::Table;
+use swell_check::CheckTable;
 use swell_domain::{boundary::Boundary, whitewater::CalibratedSettings};
 use swell_gpu::adapter::Context;
 use swell_scene::PbfScene;
@@ -80,7 +80,7 @@ impl Stream {
     ///
     /// # Errors
     /// Errors of the files or the device.
-    pub fn check(&self, context: &Context, frame: u32) -> Result<Table, WhitewaterError> {
+    pub fn check(&self, context: &Context, frame: u32) -> Result<CheckTable, WhitewaterError> {
         let water = Water::of(&self.cache, self.scene.period()).at(frame)?;
         let time = self.cache.entry(frame)?.clock.time;
         let white = self.stream.read(frame - 1)?;

@@ -3,7 +3,7 @@
 
 use glam::DVec3;
 use swell::{
-    check::Table,
+    check::CheckTable,
     check::whitewater::{Frame, check},
     domain::{
         boundary::Boundary,
@@ -57,7 +57,7 @@ fn clouds() -> Particles {
     white(&all)
 }
 
-fn table(context: &Context, periodic: bool) -> Table {
+fn table(context: &Context, periodic: bool) -> CheckTable {
     let (scene, water) = splash(periodic);
     let settings = CalibratedSettings {
         wind: [2.0, 0.0, -1.0],
