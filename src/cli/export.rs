@@ -8,7 +8,7 @@ use serde_json::json;
 
 use swell_domain::{chunk::Chunk, frame_range::FrameRange};
 use swell_stage::export::{
-    Event, ExportRequest, Pattern, Target, UsdWater, VOXELS, expected, export,
+    ExportEvent, ExportRequest, Pattern, Target, UsdWater, VOXELS, expected, export,
 };
 
 use super::{
@@ -216,9 +216,9 @@ fn places(request: &ExportRequest) -> Vec<String> {
     places
 }
 
-fn tell(progress: &Progress, event: Event) {
+fn tell(progress: &Progress, event: ExportEvent) {
     match event {
-        Event::Ready {
+        ExportEvent::Ready {
             frames,
             files,
             warnings,
@@ -239,7 +239,7 @@ fn tell(progress: &Progress, event: Event) {
                 );
             }
         }
-        Event::Warning { frame, off, text } => {
+        ExportEvent::Warning { frame, off, text } => {
             progress.recur(Recurring {
                 what: "volume",
                 frame,
@@ -248,7 +248,7 @@ fn tell(progress: &Progress, event: Event) {
                 event: json!({}),
             });
         }
-        Event::Frame {
+        ExportEvent::Frame {
             frame,
             made,
             bytes,
@@ -275,6 +275,6 @@ fn tell(progress: &Progress, event: Event) {
                 }),
             );
         }
-        Event::Failed { frame, error } => frame_failed(progress, frame, &*error),
+        ExportEvent::Failed { frame, error } => frame_failed(progress, frame, &*error),
     }
 }

@@ -7,7 +7,9 @@ use serde_json::json;
 
 use swell_domain::whitewater::WhitewaterKind;
 use swell_files::whitewater::WhitewaterSettings;
-use swell_stage::whitewater::{Event, LimitForecast, WhitewaterRequest, expected, whitewater};
+use swell_stage::whitewater::{
+    LimitForecast, WhitewaterEvent, WhitewaterRequest, expected, whitewater,
+};
 
 use super::{
     DeviceArgs, Failure, count,
@@ -143,14 +145,14 @@ fn dry_run(request: &WhitewaterRequest, progress: &Progress) -> Result<u8, Failu
     Ok(0)
 }
 
-fn tell(progress: &Progress, event: Event) {
+fn tell(progress: &Progress, event: WhitewaterEvent) {
     match event {
-        Event::Calibrated { done, count } => progress.part(
+        WhitewaterEvent::Calibrated { done, count } => progress.part(
             "thresholds are calibrated on the shot's frames",
             (done as u64, count as u64),
             json!({ "of": "calibration" }),
         ),
-        Event::Ready {
+        WhitewaterEvent::Ready {
             device,
             software_warning,
             water,
@@ -190,7 +192,7 @@ fn tell(progress: &Progress, event: Event) {
                 }),
             );
         }
-        Event::Frame {
+        WhitewaterEvent::Frame {
             frame,
             census,
             born,
@@ -214,7 +216,7 @@ fn tell(progress: &Progress, event: Event) {
                 }),
             );
         }
-        Event::LimitForecast(LimitForecast {
+        WhitewaterEvent::LimitForecast(LimitForecast {
             frame,
             at_end,
             end,
@@ -235,6 +237,6 @@ fn tell(progress: &Progress, event: Event) {
                 }),
             );
         }
-        Event::Written { bytes } => progress.wrote(bytes),
+        WhitewaterEvent::Written { bytes } => progress.wrote(bytes),
     }
 }

@@ -20,7 +20,7 @@ use swell_gpu::adapter::{GpuError, Needs};
 use swell_scene::Scene;
 use swell_stage::{
     device::{Gpu, Opened, needs},
-    drive::{Drive, End, Step},
+    drive::{ComputedFrame, Drive, End},
 };
 use swell_study::folder::ledger_of;
 
@@ -354,7 +354,7 @@ pub(super) fn until_done(
     drive: &mut Drive<'_>,
     last: u32,
     stop: &AtomicBool,
-    observe: impl FnMut(Step) -> Result<(), StudyError>,
+    observe: impl FnMut(ComputedFrame) -> Result<(), StudyError>,
 ) -> Result<(), StudyError> {
     match drive.run(last, stop, observe)? {
         End::Done => Ok(()),

@@ -70,9 +70,9 @@ pub enum Event {
     /// Warning about the adapter, as [`Opened::software_warning`].
     SoftwareWarning(String),
     /// Progress of a bake.
-    Bake(Box<bake::Event>),
+    Bake(Box<bake::BakeEvent>),
     /// Progress of a render.
-    Render(render::Event),
+    Render(render::RenderEvent),
     /// Outcome of a point.
     Point(PointEvent),
     /// A share ran points that the whole study has copied, now or earlier.

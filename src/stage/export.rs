@@ -50,7 +50,7 @@ use self::{
 
 pub use self::{
     error::ExportError,
-    expected::{Expected, expected},
+    expected::{ExpectedExport, expected},
     pattern::{Pattern, PatternError},
     usdc::UsdcError,
 };
@@ -115,7 +115,7 @@ pub struct ExportRequest {
 
 /// Progress of a running export.
 #[derive(Clone, Debug)]
-pub enum Event {
+pub enum ExportEvent {
     /// The cache is open.
     Ready {
         /// Number of frames in this process's share.
@@ -183,13 +183,13 @@ pub struct ExportOutcome {
 pub fn export(
     request: &ExportRequest,
     stop: &AtomicBool,
-    tell: &mut dyn FnMut(Event),
+    tell: &mut dyn FnMut(ExportEvent),
 ) -> Result<ExportOutcome, ExportError> {
-    let job = Job::new(request)?;
+    let job = ExportJob::new(request)?;
     let share = share(&job.frames, request.chunk).to_vec();
     let shots = job.shots()?;
     job.check_all(&share, &shots)?;
-    tell(Event::Ready {
+    tell(ExportEvent::Ready {
         frames: share.len(),
         files: request.targets.len(),
         warnings: job.lints(),
@@ -211,7 +211,7 @@ pub fn export(
                 Err(error) if request.keep_going && error.is_of_frame() => {
                     outcome.failed.push(frame);
                     let error = Arc::new(error);
-                    tell(Event::Failed { frame, error });
+                    tell(ExportEvent::Failed { frame, error });
                     continue 'frames;
                 }
                 made => made?,
@@ -221,13 +221,13 @@ pub fn export(
         if let Some(held) = volume
             && let Some(warning) = warning(held)
         {
-            tell(Event::Warning {
+            tell(ExportEvent::Warning {
                 frame,
                 off: (held - 1.0).abs(),
                 text: warning,
             });
         }
-        tell(Event::Frame {
+        tell(ExportEvent::Frame {
             frame,
             made: outcome.made - before.0,
             bytes: outcome.bytes - before.1,
@@ -251,7 +251,7 @@ fn warning(volume: f64) -> Option<String> {
 }
 
 /// A running export.
-struct Job<'a> {
+struct ExportJob<'a> {
     request: &'a ExportRequest,
     cache: CacheReader,
     /// The whitewater stream to export instead of the water.
@@ -265,7 +265,7 @@ struct Job<'a> {
     software: String,
 }
 
-impl<'a> Job<'a> {
+impl<'a> ExportJob<'a> {
     fn new(request: &'a ExportRequest) -> Result<Self, ExportError> {
         asked::check(request)?;
         let cache = CacheReader::open(&request.cache)?;

@@ -11,7 +11,7 @@ use swell_reference::{
 use swell_scene::{ByMethod, PbfScene, Scene, flip::Preconditioner};
 use swell_stage::{
     device::Opened,
-    drive::{Drive, Step},
+    drive::{ComputedFrame, Drive},
     prepare::Start,
 };
 use swell_study::measure::Gauge;
@@ -89,7 +89,7 @@ pub(super) fn measure(
 }
 
 impl Measured {
-    fn look(&mut self, point: &Point, gauge: Option<&Gauge>, step: &Step) {
+    fn look(&mut self, point: &Point, gauge: Option<&Gauge>, step: &ComputedFrame) {
         let report = &step.report;
         self.substeps += u64::from(report.substeps);
         self.iterations += report.iterations;
@@ -112,7 +112,7 @@ impl Measured {
 
     /// Records the pressure errors. `weights` are the hydrostatic pressures at the pressure probes,
     /// Pa; empty where not requested.
-    fn weigh(&mut self, weights: &[f64], step: &Step) {
+    fn weigh(&mut self, weights: &[f64], step: &ComputedFrame) {
         let off = |(p, weight): (&Option<f64>, &f64)| Some((p.as_ref()? / weight - 1.0).abs());
         let all: Option<Vec<f64>> = step.pressures.iter().zip(weights).map(off).collect();
         if !weights.is_empty() {

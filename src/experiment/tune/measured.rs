@@ -10,7 +10,7 @@ use swell_files::study::{
 };
 use swell_scene::Scene;
 use swell_stage::{
-    drive::{Drive, Step},
+    drive::{ComputedFrame, Drive},
     prepare::Start,
 };
 use swell_study::measure::Gauge;
@@ -154,7 +154,7 @@ pub(super) fn measure(
 }
 
 impl Measured {
-    fn look(&mut self, scene: &Scene, gauge: &Gauge, frames: u32, step: Step) {
+    fn look(&mut self, scene: &Scene, gauge: &Gauge, frames: u32, step: ComputedFrame) {
         self.substeps += u64::from(step.report.substeps);
         self.iterations += step.report.iterations;
         self.density += step.report.density_error_mean;
@@ -165,7 +165,7 @@ impl Measured {
     }
 }
 
-fn sample(scene: &Scene, gauge: &Gauge, step: Step) -> Sample {
+fn sample(scene: &Scene, gauge: &Gauge, step: ComputedFrame) -> Sample {
     let (particles, spacing) = (&step.particles, scene.particle_spacing());
     // With a density of 1 and the lattice's particle masses, energy over volume is energy per mass.
     let gravity: DVec3 = scene.water.gravity;

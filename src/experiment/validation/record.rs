@@ -9,7 +9,7 @@ use swell_domain::{
 };
 use swell_files::study::validation::{Benchmark, Measure};
 use swell_scene::{Scene, probe::ProbeKind};
-use swell_stage::drive::Step;
+use swell_stage::drive::ComputedFrame;
 
 /// Fraction of the water behind the front, so that single particles running ahead do not count.
 const FRONT: f64 = 0.995;
@@ -64,7 +64,7 @@ impl<'a> Record<'a> {
     }
 
     /// Adds a frame.
-    pub(super) fn look(&mut self, step: &Step) {
+    pub(super) fn look(&mut self, step: &ComputedFrame) {
         self.substeps += step.report.substeps;
         self.rows.push(Row {
             time: f64::from(step.frame) * self.scene.shot.frame_seconds(),

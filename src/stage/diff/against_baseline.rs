@@ -27,7 +27,7 @@ use swell_domain::{
 /// Result of writing a baseline.
 #[derive(Clone, Debug, Serialize)]
 #[non_exhaustive]
-pub struct Written {
+pub struct WrittenBaseline {
     /// The adapter whose hashes were stored.
     pub adapter: String,
     /// Number of frames, including the start.
@@ -111,7 +111,7 @@ pub fn write_baseline(
     file: &Path,
     frames: Option<&FrameRange>,
     spread: &[PathBuf],
-) -> Result<Written, DiffError> {
+) -> Result<WrittenBaseline, DiffError> {
     let cache = CacheReader::open(cache)?;
     let before = match file.try_exists() {
         Ok(false) => None,
@@ -151,7 +151,7 @@ pub fn write_baseline(
     baseline.hashes.insert(adapter.clone(), hashes);
     write(file, &baseline)?;
     let others = baseline.hashes.into_keys();
-    Ok(Written {
+    Ok(WrittenBaseline {
         kept: others.filter(|other| *other != adapter).collect(),
         adapter,
         frames: frames.len(),

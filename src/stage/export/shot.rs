@@ -7,7 +7,7 @@ use std::{
 
 use glam::DVec3;
 
-use super::{Job, Target, UsdWater, Wanted, beside};
+use super::{ExportJob, Target, UsdWater, Wanted, beside};
 use swell_cache::CacheError;
 use swell_domain::particles::Particles;
 use swell_export::usd::{self, CameraFrame, Root, Solid, WaveMaker};
@@ -72,7 +72,7 @@ fn maker(scene: &Scene, wall: Wall) -> WaveMaker {
     }
 }
 
-impl Job<'_> {
+impl ExportJob<'_> {
     /// The files of each shot that belong to no frame, its manifest and its root, with their
     /// content.
     pub(super) fn shots(&self) -> Result<Vec<(Wanted, Vec<u8>)>, CacheError> {

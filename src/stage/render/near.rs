@@ -13,7 +13,7 @@ use swell_scene::look::Look;
 pub(super) struct Near(BTreeMap<u32, Arc<WaterParticles>>);
 
 /// A frame with those around it.
-pub(super) struct Around {
+pub(super) struct NearbyFrames {
     pub(super) water: Arc<WaterParticles>,
     /// In the order of [`FrameInputs::around`]; `None` if the cache does not have the frame or the
     /// look does not use it.
@@ -27,7 +27,7 @@ impl Near {
         cache: &CacheReader,
         look: &Look,
         frame: u32,
-    ) -> Result<Around, CacheError> {
+    ) -> Result<NearbyFrames, CacheError> {
         let reach = frames_around(look);
         self.0.retain(|&other, _| other.abs_diff(frame) <= reach);
         let water = self.read(cache, frame)?;
@@ -37,7 +37,7 @@ impl Near {
                 found[side] = Some(self.read(cache, other)?);
             }
         }
-        Ok(Around {
+        Ok(NearbyFrames {
             water,
             others: found,
         })
@@ -53,7 +53,7 @@ impl Near {
     }
 }
 
-impl Around {
+impl NearbyFrames {
     /// The same frames without cached results for the frame's own water, as when the frame is first
     /// drawn.
     pub(super) fn anew(&self) -> Self {

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use glam::DVec3;
 
-use super::{RenderJobError, Whitewater, near::Near, render_scene, told};
+use super::{RenderJobError, WhitewaterStream, near::Near, render_scene, told};
 use crate::{baked_scene, device::Gpu, prepare::Start};
 use swell_cache::{CacheReader, LedgerEntry};
 use swell_domain::{bounds::Bounds, particles::Particles};
@@ -126,9 +126,8 @@ impl Planned {
                 let scene = baked_scene(&cache, directory)?;
                 let around = Near::default().around(&cache, look, frame)?;
                 let white = match &look.spec().whitewater {
-                    Some(of) => {
-                        Whitewater::open(directory, &of.stream, &cache, &[frame])?.read(frame)?
-                    }
+                    Some(of) => WhitewaterStream::open(directory, &of.stream, &cache, &[frame])?
+                        .read(frame)?,
                     None => Particles::default(),
                 };
                 let set = render_scene(&scene, look, frame, &around.water.particles)?;

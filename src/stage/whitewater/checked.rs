@@ -9,7 +9,7 @@ use swell_domain::{boundary::Boundary, whitewater::CalibratedSettings};
 use swell_gpu::adapter::Context;
 use swell_scene::PbfScene;
 
-use super::{WhitewaterError, is_of, recorded, water::Water};
+use super::{WhitewaterError, is_of, recorded, water::WaterReader};
 
 /// A stream, and everything that its frames are made from.
 pub struct Stream {
@@ -57,7 +57,7 @@ impl Stream {
             }
         }
         let scene = baked_scene(&cache, &place)?.of_whitewater();
-        let begin = Water::of(&cache, scene.period()).at(cache.first_frame())?;
+        let begin = WaterReader::of(&cache, scene.period()).at(cache.first_frame())?;
         let particles = begin.len();
         let boundary = Start::with(&scene, begin)?.boundary;
         let settings = recorded(&stream, directory, &scene)?;
@@ -81,7 +81,7 @@ impl Stream {
     /// # Errors
     /// Errors of the files or the device.
     pub fn check(&self, context: &Context, frame: u32) -> Result<CheckTable, WhitewaterError> {
-        let water = Water::of(&self.cache, self.scene.period()).at(frame)?;
+        let water = WaterReader::of(&self.cache, self.scene.period()).at(frame)?;
         let time = self.cache.entry(frame)?.clock.time;
         let white = self.stream.read(frame - 1)?;
         let one = swell_check::whitewater::Frame {

@@ -5,7 +5,10 @@ use std::{
     sync::atomic::{AtomicBool, Ordering},
 };
 
-use super::{Event, SETTINGS, WhitewaterError, WhitewaterRequest, engine::Engine, water::Water};
+use super::{
+    SETTINGS, WhitewaterError, WhitewaterEvent, WhitewaterRequest, engine::Engine,
+    water::WaterReader,
+};
 use swell_cache::CacheReader;
 use swell_domain::whitewater::{CalibratedSettings, Thresholds};
 use swell_files::whitewater::WhitewaterSettings;
@@ -33,8 +36,8 @@ pub(super) fn recorded(
 pub(super) fn settle(
     request: &WhitewaterRequest,
     scene: &Scene,
-    (engine, water): (&mut Engine, &mut Water<'_>),
-    (stop, tell): (&AtomicBool, &mut dyn FnMut(Event)),
+    (engine, water): (&mut Engine, &mut WaterReader<'_>),
+    (stop, tell): (&AtomicBool, &mut dyn FnMut(WhitewaterEvent)),
 ) -> Result<Option<(CalibratedSettings, Option<usize>)>, WhitewaterError> {
     let cache = water.cache();
     let frames: Vec<u32> = match request.settings.needs_calibration() {
@@ -50,7 +53,7 @@ pub(super) fn settle(
     let mut all = Vec::new();
     let count = chosen.len();
     for (done, &frame) in chosen.iter().enumerate() {
-        tell(Event::Calibrated { done, count });
+        tell(WhitewaterEvent::Calibrated { done, count });
         if stop.load(Ordering::Relaxed) {
             return Ok(None);
         }
@@ -59,7 +62,7 @@ pub(super) fn settle(
         all.extend(engine.survey(&water.at(frame)?, time, seconds)?);
     }
     if count > 0 {
-        tell(Event::Calibrated { done: count, count });
+        tell(WhitewaterEvent::Calibrated { done: count, count });
     }
     let shot = Thresholds::calibrate(&all);
     let settings = request.settings.settled(scene.particle_spacing(), &shot);
