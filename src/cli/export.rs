@@ -41,7 +41,7 @@ pub(super) struct ExportArgs {
         value_name = "WATER",
         requires = "usd"
     )]
-    usd_water: Water,
+    usd_water: WaterForm,
     /// Particles as NumPy arrays, such as p.%04d.npy.
     #[arg(long, value_name = "FILES")]
     npy: Option<Pattern>,
@@ -96,7 +96,7 @@ pub(super) struct ExportArgs {
 }
 
 #[derive(ValueEnum, Clone, Copy, Debug, Default)]
-enum Water {
+enum WaterForm {
     #[default]
     Points,
     Mesh,
@@ -112,8 +112,8 @@ fn voxels(text: &str) -> Result<f64, String> {
 impl ExportArgs {
     fn targets(&self) -> Vec<Target> {
         let water = match self.usd_water {
-            Water::Points => UsdWater::Points,
-            Water::Mesh => UsdWater::Mesh,
+            WaterForm::Points => UsdWater::Points,
+            WaterForm::Mesh => UsdWater::Mesh,
         };
         let all = [
             self.mesh.clone().map(Target::Mesh),

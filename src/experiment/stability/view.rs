@@ -15,7 +15,7 @@ use swell_scene::{Scene, Solver, probe::ProbeKind};
 use swell_stage::{drive::ComputedFrame, prepare::Start};
 
 /// A scene and the current state of its run.
-pub(super) struct View<'a> {
+pub(super) struct RunView<'a> {
     pub(super) scene: &'a Scene,
     pub(super) start: Start,
     /// Number of finished frames.
@@ -31,7 +31,7 @@ pub(super) struct View<'a> {
     volume: OnceCell<f64>,
 }
 
-impl<'a> View<'a> {
+impl<'a> RunView<'a> {
     pub(super) fn new(scene: &'a Scene) -> Result<Self, SignedDistanceError> {
         let start = Start::of(scene)?;
         Ok(Self {

@@ -16,18 +16,18 @@ use super::{
         report::{Report, what_was_run},
         sweep::digits::{shortened, significant},
     },
-    Run,
+    SurfaceRun,
 };
 
-struct Results<'a> {
+struct SurfaceResults<'a> {
     study: &'a SurfaceStudy,
     /// Runs of each line, in the order of its points.
-    runs: &'a [Vec<Run>],
+    runs: &'a [Vec<SurfaceRun>],
     device: String,
 }
 
-pub(super) fn draw(study: &SurfaceStudy, bench: &Bench<'_>, runs: &[Vec<Run>]) -> Report {
-    let results = Results {
+pub(super) fn draw(study: &SurfaceStudy, bench: &Bench<'_>, runs: &[Vec<SurfaceRun>]) -> Report {
+    let results = SurfaceResults {
         study,
         runs,
         device: bench.devices.of(RunsOn::Gpu).identity().to_string(),
@@ -52,7 +52,7 @@ pub(super) fn draw(study: &SurfaceStudy, bench: &Bench<'_>, runs: &[Vec<Run>]) -
     }
 }
 
-impl Results<'_> {
+impl SurfaceResults<'_> {
     fn lines(&self, error: PictureError) -> Vec<knee::MethodCurve> {
         let lines = self.study.lines.iter().zip(self.runs);
         lines

@@ -19,15 +19,15 @@ use super::{
         report::{Report, what_was_run},
     },
     digits::{shortened, significant},
-    measured::{self, Run},
+    measured::{self, SweepRun},
 };
 
 /// Results to draw.
-pub(super) struct Results<'a> {
+pub(super) struct SweepResults<'a> {
     pub(super) sweep: &'a Sweep,
     devices: &'a Devices,
     /// Runs of each line in the order of its points, then of its coarser point if it has one.
-    runs: &'a [Vec<Run>],
+    runs: &'a [Vec<SweepRun>],
     /// Whether costs are per frame rather than per run, which requires that all runs have the same
     /// number of frames.
     is_per_frame: bool,
@@ -41,9 +41,9 @@ enum Cost {
     Work,
 }
 
-pub(super) fn draw(sweep: &Sweep, bench: &Bench<'_>, runs: &[Vec<Run>]) -> Report {
+pub(super) fn draw(sweep: &Sweep, bench: &Bench<'_>, runs: &[Vec<SweepRun>]) -> Report {
     let frames = || sweep.points().map(|point| point.frames);
-    let results = Results {
+    let results = SweepResults {
         sweep,
         devices: bench.devices,
         runs,
@@ -72,9 +72,9 @@ pub(super) fn draw(sweep: &Sweep, bench: &Bench<'_>, runs: &[Vec<Run>]) -> Repor
     }
 }
 
-impl Results<'_> {
+impl SweepResults<'_> {
     /// Every run with its line and point; the coarser run is the last of its line.
-    fn all(&self) -> impl Iterator<Item = (usize, &Line, &Point, &Run)> {
+    fn all(&self) -> impl Iterator<Item = (usize, &Line, &Point, &SweepRun)> {
         let lines = self.sweep.lines.iter().zip(self.runs).enumerate();
         lines.flat_map(|(k, (line, runs))| {
             let points = line.points.iter().chain(&line.coarser);
@@ -85,13 +85,13 @@ impl Results<'_> {
     }
 
     /// Runs that reached their end.
-    pub(super) fn done(&self) -> impl Iterator<Item = &Run> {
+    pub(super) fn done(&self) -> impl Iterator<Item = &SweepRun> {
         self.all()
             .map(|(.., run)| run)
             .filter(|run| run.ended.is_none())
     }
 
-    fn coarser(&self, line: usize) -> Option<&Run> {
+    fn coarser(&self, line: usize) -> Option<&SweepRun> {
         self.runs[line].get(self.sweep.lines[line].points.len())
     }
 
@@ -120,7 +120,7 @@ impl Results<'_> {
     }
 
     /// Minimum, median and maximum time, milliseconds.
-    fn time(&self, run: &Run) -> [f64; 3] {
+    fn time(&self, run: &SweepRun) -> [f64; 3] {
         let frames = if self.is_per_frame {
             1.0
         } else {
@@ -129,7 +129,7 @@ impl Results<'_> {
         run.per_frame().map(|seconds| 1e3 * seconds * frames)
     }
 
-    fn work(&self, run: &Run) -> f64 {
+    fn work(&self, run: &SweepRun) -> f64 {
         let frames = if self.is_per_frame {
             f64::from(run.frames)
         } else {
@@ -232,7 +232,7 @@ impl Results<'_> {
     }
 
     fn failures(&self) -> Vec<String> {
-        let failed = |(_, line, point, run): (usize, &Line, &Point, &Run)| {
+        let failed = |(_, line, point, run): (usize, &Line, &Point, &SweepRun)| {
             let key = self.key(line, point);
             let message = run.ended.as_ref()?;
             Some(format!("{}, {key} = {}: {message}", line.name, point.label))
@@ -539,7 +539,7 @@ fn unique<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
     known
 }
 
-fn found(run: &Run, reading: Reading) -> Option<String> {
+fn found(run: &SweepRun, reading: Reading) -> Option<String> {
     let errors: Vec<f64> = run.measured.density.iter().map(|frame| frame[0]).collect();
     convergence_point(&errors, reading).map(|step| step.to_string())
 }
