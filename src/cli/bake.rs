@@ -22,7 +22,7 @@ use super::{
     dry_run::DryRun,
     interrupt::{self, Interrupt},
     lint::DenyArgs,
-    output,
+    output, pass_times,
     progress::{Mode, Progress, Recurring, Status},
     set_variable, size,
 };
@@ -169,7 +169,7 @@ pub(super) fn run(args: &BakeArgs, progress: &Progress) -> Result<u8, Failure> {
             "interrupted": outcome.interrupted, "directory": output::path(&request.directory),
         }),
     );
-    output::pass_times(progress, &outcome.passes, &outcome.shares, outcome.frames);
+    pass_times::report(progress, &outcome.passes, &outcome.shares, outcome.frames);
     Ok(if outcome.interrupted {
         interrupt::EXIT_CODE as u8
     } else {

@@ -27,7 +27,7 @@ use swell_stage::{
 
 use super::{
     Failure, RequireArgs, bake, check::Misplaced, count, is_cache, lint::DenyArgs, named_adapter,
-    output, size,
+    output, pass_times, size,
 };
 
 #[derive(Args, Debug)]
@@ -146,7 +146,7 @@ pub(super) fn run(args: &InspectArgs) -> Result<u8, Failure> {
                 }
                 _ => {
                     let shares = planned.plan.shares(&[]);
-                    let _ = write!(text, "\n{}", output::shares(&shares, None));
+                    let _ = write!(text, "\n{}", pass_times::shares(&shares, None));
                 }
             }
             misfit = planned.misfit;
@@ -409,7 +409,11 @@ fn show_time(out: &mut String, timed: &Timed) -> fmt::Result {
          by pass, one by one:\n",
         timed.substeps, timed.device
     )?;
-    write!(out, "{}", output::shares(&timed.shares, Some(timed.frames)))
+    write!(
+        out,
+        "{}",
+        pass_times::shares(&timed.shares, Some(timed.frames))
+    )
 }
 
 fn show_cache(out: &mut String, manifest: &Manifest, entries: &[LedgerEntry]) -> fmt::Result {

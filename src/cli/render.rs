@@ -14,7 +14,7 @@ use super::{
     dry_run::DryRun,
     failed::{failed_in_all, frame_failed, refuse_failed},
     interrupt::{self, Interrupt},
-    output,
+    output, pass_times,
     progress::{Mode, Progress, Status},
 };
 
@@ -109,7 +109,7 @@ pub(super) fn run(args: &RenderArgs, progress: &Progress) -> Result<u8, Failure>
             "interrupted": outcome.interrupted, "directory": output::path(&request.directory),
         }),
     );
-    output::pass_times(progress, &outcome.passes, &[], outcome.rendered);
+    pass_times::report(progress, &outcome.passes, &[], outcome.rendered);
     if outcome.interrupted {
         return Ok(interrupt::EXIT_CODE as u8);
     }

@@ -15,7 +15,7 @@ use super::{
     DeviceArgs, Failure, count,
     dry_run::DryRun,
     interrupt::{self, Interrupt},
-    output,
+    output, pass_times,
     progress::{Mode, Progress, Status},
     size,
 };
@@ -126,7 +126,7 @@ pub(super) fn run(args: &WhitewaterArgs, progress: &Progress) -> Result<u8, Fail
             "interrupted": outcome.interrupted, "directory": output::path(&outcome.directory),
         }),
     );
-    output::pass_times(progress, &outcome.passes, &[], outcome.frames);
+    pass_times::report(progress, &outcome.passes, &[], outcome.frames);
     Ok(match outcome.interrupted {
         true => interrupt::EXIT_CODE as u8,
         false => 0,

@@ -13,6 +13,7 @@ use std::{path::PathBuf, sync::atomic::AtomicBool};
 use swell_cache::{CacheWriter, Clock, Parent, failed};
 use swell_domain::{frame_range::FrameRange, particles::Particles, solver::StepReport};
 use swell_scene::Scene;
+use swell_solve::plan::Share;
 
 use super::{
     branch::BranchPoint,
@@ -20,7 +21,6 @@ use super::{
     drive::{Drive, End},
     prepare::Volume,
     probes, replay,
-    time::Share,
 };
 use frames::Frames;
 

@@ -6,7 +6,7 @@ use std::path::Path;
 use serde_json::{Map, Value, json};
 
 use super::{CACHE, InspectArgs, broken_off, file, look, refuse_options, study};
-use crate::{Failure, bake, is_cache, output};
+use crate::{Failure, bake, is_cache, output, pass_times};
 use swell_scene::Scene;
 use swell_stage::{
     inspect::{
@@ -121,7 +121,7 @@ fn timed_json(scene: &Scene, timed: &Timed) -> Value {
         "seconds": { "least": least, "median": median, "greatest": greatest },
         "substeps": timed.substeps,
         "shot_seconds": median * f64::from(scene.shot.frames),
-        "parts": output::parts_json(&timed.shares),
+        "parts": pass_times::parts_json(&timed.shares),
     })
 }
 
