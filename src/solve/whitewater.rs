@@ -26,8 +26,8 @@ use swell_scene::PbfScene;
 
 use super::{
     SolveError,
-    boundary::{self, Movers},
-    pbf::{buffers::*, params, plan::cell_count, record::sorting},
+    boundary::Movers,
+    pbf::{buffers::*, params, plan::cell_count, record::sorting, samples},
     plan::{BufferTable, Counts, Plan, in_order},
     state::is_other_count,
 };
@@ -166,7 +166,7 @@ fn set_up(
     sort::upload_lengths(program, &CELL_START, cell_count(plan));
     let water = plan.counts.particles as u32;
     program.upload(ELEMENT_COUNT, 0, &[[water, 0, 0, 0]]);
-    boundary::upload(boundary, program, scene, plan, calibration);
+    samples::upload(boundary, program, scene, plan, calibration);
     Recording::new(program, &survey_commands(plan))
 }
 
@@ -283,7 +283,7 @@ impl Whitewater {
             let (program, scene) = (&self.program, &self.scene);
             movers.upload(program, scene, time - seconds, seconds);
             let now = (time, seconds);
-            boundary::upload_samples(boundary, program, scene, &self.plan, &self.calibration, now);
+            samples::upload_samples(boundary, program, scene, &self.plan, &self.calibration, now);
         }
         self.survey.run(&self.program, self.timer.as_mut())?;
         let (potential, order) = (self.program).download((POTENTIAL.first(n), ORDER.first(n)))?;

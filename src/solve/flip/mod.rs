@@ -54,7 +54,6 @@ use buffers::*;
 pub use capacity::capacity;
 use capacity::{bricks, capacity_of, no_water, whole_frame};
 use ended::{Ended, ReadFrame};
-pub(super) use record::over_cells;
 use record::{Commands, Recordings, groups, numbers};
 pub(super) use totals::FrameTotals;
 

@@ -5,6 +5,7 @@ mod iteration;
 pub(super) mod plan;
 mod projection;
 pub(super) mod record;
+pub(super) mod samples;
 
 use std::sync::Arc;
 
@@ -34,7 +35,7 @@ use swell_scene::{PbfScene, Stop};
 
 use super::{
     SolveError,
-    boundary::{self, Movers},
+    boundary::Movers,
     effects,
     params::{Counters, IterationControl, Params},
     plan::{Counts, Plan, device_limits},
@@ -113,23 +114,6 @@ pub(super) fn params(
     }
 }
 
-/// Uploads entries of [`PREDICTED`] from index `first` on, split at the end of a page.
-pub(super) fn upload_places(
-    program: &Program,
-    page: Option<usize>,
-    first: usize,
-    places: &[[f32; 4]],
-) {
-    let page = page.unwrap_or(usize::MAX);
-    let (low, high) = places.split_at(page.saturating_sub(first).min(places.len()));
-    if !low.is_empty() {
-        program.upload(PREDICTED, first, low);
-    }
-    if !high.is_empty() {
-        program.upload(PREDICTED_HIGH, first.max(page) - page, high);
-    }
-}
-
 /// Uploads data that does not change between substeps; returns the recordings of a substep and of a
 /// frame's final measurement.
 fn set_up(
@@ -145,8 +129,8 @@ fn set_up(
     program.upload_windows(&PHASES, &commands.phases);
     sort::upload_lengths(program, &CELL_START, cell_count(plan));
     program.upload(ELEMENT_COUNT, 0, &[[particles as u32, 0, 0, 0]]);
-    upload_places(program, plan.page, places(plan) - 1, &[NOBODY]);
-    boundary::upload(boundary, program, scene, plan, calibration);
+    samples::upload_places(program, plan.page, places(plan) - 1, &[NOBODY]);
+    samples::upload(boundary, program, scene, plan, calibration);
     [&commands.substep, &commands.measure].map(|commands| Recording::new(program, commands))
 }
 
@@ -281,7 +265,7 @@ impl Pbf {
         if let (Some(movers), Some(boundary)) = (&self.movers, &self.boundary) {
             let (program, scene) = (&self.program, &self.scene);
             movers.upload(program, scene, time - step, step);
-            boundary::upload_samples(
+            samples::upload_samples(
                 boundary,
                 program,
                 scene,
