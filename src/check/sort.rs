@@ -7,7 +7,7 @@ use swell_gpu::buffer::{Buf, Windows};
 use swell_solve::buffers;
 
 use super::{
-    engine::{Comparison, Io, NONE, PassResult, State, comparison, names},
+    comparison::{Comparison, Io, NONE, PassResult, State, comparison, names},
     table::{CheckEntry, CheckTable, entries, pair},
 };
 

@@ -9,7 +9,7 @@ use std::{
 };
 
 use swell_cache::{CacheError, CacheReader, Manifest};
-use swell_check::{arithmetic, flip, pbf};
+use swell_check::{arithmetic, check_flip, check_pbf};
 use swell_domain::{
     frame_range::FrameRange, particles::Particles, signed_distance::SignedDistanceError,
     substep::SubstepChoice,
@@ -366,10 +366,10 @@ pub fn check_substep(
     match &scene.by_method() {
         ByMethod::Pbf(scene) => {
             let boundaries = [boundary; 2];
-            pbf::check(context, scene, plan, boundaries, (frame, particles), which)
+            check_pbf(context, scene, plan, boundaries, (frame, particles), which)
         }
         ByMethod::Flip(scene) => {
-            flip::check(context, scene, plan, boundary, (frame, particles), which)
+            check_flip(context, scene, plan, boundary, (frame, particles), which)
         }
     }
 }

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use glam::DVec3;
 
 use crate::{
-    engine::{Comparison, Io, PassResult, comparison, names},
+    comparison::{Comparison, Io, PassResult, comparison, names},
     flip::FlipState,
     pbf::PbfState,
     table::entries,

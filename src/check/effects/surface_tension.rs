@@ -3,7 +3,7 @@
 use glam::{DVec2, DVec3};
 
 use crate::{
-    engine::{Comparison, Io, NONE, PassResult, comparison, names},
+    comparison::{Comparison, Io, NONE, PassResult, comparison, names},
     flip::FlipState,
     pbf::PbfState,
     table::{CheckEntry, each, entries, pair},

@@ -2,7 +2,7 @@
 //! has no pass.
 
 use crate::{
-    engine::{Comparison, Io, NONE, PassResult, State, comparison, names},
+    comparison::{Comparison, Io, NONE, PassResult, State, comparison, names},
     flip::FlipState,
     pbf::{
         PbfState,

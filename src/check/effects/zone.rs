@@ -4,7 +4,7 @@
 use glam::DVec3;
 
 use crate::{
-    engine::{Io, PassResult, State},
+    comparison::{Io, PassResult, State},
     flip::FlipState,
     pbf::PbfState,
     table::{CheckEntry, pair},

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use crate::{
-    engine::{Comparison, Io, NONE, PassResult, comparison},
+    comparison::{Comparison, Io, NONE, PassResult, comparison},
     table::{CheckEntry, each, pair},
 };
 use swell_domain::bricks::CELLS;

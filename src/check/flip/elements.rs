@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use glam::DVec3;
 
-use crate::engine::{TracedBuffers, names};
+use crate::comparison::{TracedBuffers, names};
 use swell_domain::bricks::{Bricks, CELLS};
 use swell_gpu::buffer::Buf;
 use swell_reference::flip::Faces;

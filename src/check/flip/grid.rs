@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use crate::{
-    engine::{Io, PassResult},
+    comparison::{Io, PassResult},
     solids::{GRID, TURNED},
     table::{each, pair},
 };

@@ -4,7 +4,7 @@
 use glam::DVec3;
 
 use crate::{
-    engine::{Comparison, Io, NONE, PassResult, TracedBuffers, comparison, names},
+    comparison::{Comparison, Io, NONE, PassResult, TracedBuffers, comparison, names},
     table::{CheckEntry, CheckTable, pair},
 };
 use swell_compare::{

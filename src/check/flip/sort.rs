@@ -3,7 +3,7 @@
 use glam::{DMat3, DVec3};
 
 use crate::{
-    engine::{Io, PassResult, TracedBuffers},
+    comparison::{Io, PassResult, TracedBuffers},
     sort::{check_cells, check_slots},
     table::pair,
 };

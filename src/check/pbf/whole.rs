@@ -57,7 +57,7 @@ struct Outcome {
 }
 
 impl PbfState {
-    pub(super) fn add_whole(&mut self, boundary: &Boundary, table: &mut CheckTable) {
+    pub(crate) fn add_whole(&mut self, boundary: &Boundary, table: &mut CheckTable) {
         let Some(start) = self.whole.start.take() else {
             return;
         };

@@ -13,7 +13,7 @@ mod viscous;
 mod whitewater;
 
 use swell::{
-    check::pbf,
+    check::check_pbf,
     domain::{
         bounds::Bounds,
         motion::{Motion, Spectrum},
@@ -265,7 +265,7 @@ fn pbf_is_within_tolerance_and_each_row_fails_where_it_should() {
     let boundaries = [&start.boundary, &moved];
     let state = (0, &start.particles);
     let first = SubstepChoice::default();
-    let checked = pbf::check(
+    let checked = check_pbf(
         &context,
         &scene.with_pbf().unwrap(),
         plan,
@@ -461,7 +461,7 @@ fn pbf_table(
     let state = (0, &start.particles);
     let plan = start.plan(scene, limits);
     let first = SubstepChoice::default();
-    Ok(pbf::check(
+    Ok(check_pbf(
         context,
         &scene.with_pbf().unwrap(),
         plan,
