@@ -83,7 +83,7 @@ entries! {
 #[derive(Clone, Copy, Debug)]
 pub struct Frame<'a> {
     /// [`of_whitewater`](swell_scene::Scene::of_whitewater) of the baked scene.
-    pub scene: &'a PbfScene,
+    pub scene: &'a PbfScene<'static>,
     /// Solids of the scene.
     pub boundary: &'a Boundary,
     /// Settings of the whitewater stream.

@@ -327,7 +327,7 @@ fn fly(
 /// Whitewater for the frames of one bake, on the CPU.
 #[derive(Debug)]
 pub struct Whitewater {
-    scene: PbfScene,
+    scene: PbfScene<'static>,
     boundary: Boundary,
     settings: Option<CalibratedSettings>,
     water: Option<(SortedWater, f64)>,
@@ -339,7 +339,7 @@ impl Whitewater {
     /// scene.
     pub fn new(scene: &PbfScene, boundary: &Boundary) -> Self {
         Self {
-            scene: scene.clone(),
+            scene: scene.to_owned_scene(),
             boundary: boundary.clone(),
             settings: None,
             water: None,

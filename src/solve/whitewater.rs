@@ -55,7 +55,7 @@ pub const ADVANCE: &str = "whitewater/advance";
 pub struct Whitewater {
     program: Program,
     plan: Plan,
-    scene: PbfScene,
+    scene: PbfScene<'static>,
     calibration: Calibration,
     survey: Recording,
     /// Boundary to upload again when the water's particle count changes or solids move. `None` if
@@ -198,7 +198,7 @@ impl Whitewater {
                 .then(|| boundary.clone()),
             movers: Movers::of(boundary, scene),
             timer: is_timed.then(|| Timer::new(context)),
-            scene: scene.clone(),
+            scene: scene.to_owned_scene(),
             settings: None,
             capacity: 0,
             calibration,

@@ -90,7 +90,7 @@ pub(super) fn comparisons() -> [&'static [Comparison<FlipState>]; 4] {
 
 /// State that the comparisons share during the substep.
 pub(crate) struct FlipState {
-    pub(super) scene: FlipScene,
+    pub(super) scene: FlipScene<'static>,
     boundary: Boundary,
     pub(super) model: Model,
     n: usize,
@@ -140,7 +140,7 @@ impl FlipState {
         (frame, particles): (u32, &Particles),
     ) -> Self {
         Self {
-            scene: scene.clone(),
+            scene: scene.to_owned_scene(),
             boundary: boundary.clone(),
             model: Model::new(scene, boundary),
             n: particles.len(),

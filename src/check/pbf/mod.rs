@@ -86,7 +86,7 @@ pub(super) const COMPARISONS: &[Comparison<PbfState>] = &[
 
 /// State that the comparisons share during the substep.
 pub(super) struct PbfState {
-    pub(super) scene: PbfScene,
+    pub(super) scene: PbfScene<'static>,
     model: Model,
     /// Whether the model's samples are those of the device.
     has_samples: bool,
@@ -118,7 +118,7 @@ impl PbfState {
         let mut model = Model::new(scene, boundary);
         model.stand(scene, end, time_step);
         Self {
-            scene: scene.clone(),
+            scene: scene.to_owned_scene(),
             model,
             has_samples: false,
             substep: Substep::new(scene, absorbers, end, time_step),

@@ -320,7 +320,7 @@ impl<'a> Projections<'a> {
 }
 
 /// Returns a point's scene, which FLIP has to solve.
-fn of_flip(point: &Point) -> Result<FlipScene, StudyError> {
+fn of_flip(point: &Point) -> Result<FlipScene<'_>, StudyError> {
     let wrong = || "projections are measured with solver.method flip".to_owned();
     point
         .scene

@@ -26,7 +26,7 @@ use swell_scene::{
 #[derive(Clone, Debug)]
 pub struct Model {
     /// The scene.
-    pub scene: FlipScene,
+    pub scene: FlipScene<'static>,
     /// Cells of the domain along each axis; storage has one more for the upper faces.
     pub cells: [u32; 3],
     /// Signed distances of solids in their initial pose: all static solids as one grid, if there
@@ -77,7 +77,7 @@ impl Model {
             shores: Shores::new(boundary, scene.domain.min, scene.settings().cell_size)
                 .joined(scene.periodic),
             at_rest: usize::from(boundary.distance.is_some()),
-            scene: scene.clone(),
+            scene: scene.to_owned_scene(),
         }
     }
 

@@ -54,7 +54,7 @@ const NOBODY: [f32; 4] = [1e15, 1e15, 1e15, 0.0];
 pub struct Pbf {
     program: Program,
     plan: Plan,
-    scene: Arc<PbfScene>,
+    scene: Arc<PbfScene<'static>>,
     calibration: Calibration,
     substep: Recording,
     measure: Recording,
@@ -160,7 +160,7 @@ impl Pbf {
             timer: is_timed.then(|| Timer::new(context)),
             program,
             plan,
-            scene: Arc::new(scene.clone()),
+            scene: Arc::new(scene.to_owned_scene()),
             calibration,
             substep,
             measure,
@@ -395,7 +395,7 @@ type ReadState = dyn FnOnce() -> Result<(Particles, Vec<f64>), SolveError> + Sen
 
 /// A frame in mapped memory.
 struct MappedFrame {
-    scene: Arc<PbfScene>,
+    scene: Arc<PbfScene<'static>>,
     frame: u32,
     /// With the walls before the frame.
     state: Carried,

@@ -15,7 +15,7 @@ use super::{WhitewaterError, is_of, recorded, water::WaterReader};
 pub struct Stream {
     stream: CacheReader,
     cache: CacheReader,
-    scene: PbfScene,
+    scene: PbfScene<'static>,
     boundary: Boundary,
     settings: CalibratedSettings,
     particles: usize,

@@ -21,7 +21,7 @@ use crate::support::{
 };
 
 /// Turbulent water in a box whose first wall has moved in.
-fn splash(periodic: bool) -> (PbfScene, Particles) {
+fn splash(periodic: bool) -> (PbfScene<'static>, Particles) {
     let mut scene = support::scene([1.6, 1.6, 0.9]);
     scene.periodic = [false, false, periodic];
     scene.wave_makers.push(WaveMaker {
