@@ -4,7 +4,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::{
-    super::{Model, Sorted, FlipSubstep, grid::neighborhood},
+    super::{FlipSubstep, Model, Sorted, grid::neighborhood},
     Acts, Flying,
 };
 use crate::Timings;
