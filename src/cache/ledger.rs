@@ -64,7 +64,7 @@ pub type Rows = BTreeMap<String, ProbeValues>;
 
 /// One line of the ledger.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "struct Entry")]
 pub struct LedgerEntry {
     /// Frame number; 0 is the start.
     pub frame: u32,

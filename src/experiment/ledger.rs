@@ -36,6 +36,7 @@ pub(super) struct Key {
 
 /// A finished point as stored in a ledger.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(expecting = "struct Line")]
 pub(super) struct LedgerLine<M> {
     #[serde(flatten)]
     pub(super) key: Key,

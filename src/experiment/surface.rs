@@ -32,6 +32,7 @@ type SurfaceRun = super::run::Run<SurfaceMeasurements>;
 
 /// Measurements besides the time.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(expecting = "struct Measured")]
 struct SurfaceMeasurements {
     /// Errors of the surface; `None` where no water was visible.
     surface: Option<Summary>,

@@ -15,6 +15,7 @@ pub type StabilityRun = super::super::Run<Vec<MarkMeasurement>>;
 
 /// Measurement for a mark.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(expecting = "struct Measured")]
 pub struct MarkMeasurement {
     /// Value compared with the bound; `None` where it is not finite.
     pub value: Option<f64>,

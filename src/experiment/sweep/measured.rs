@@ -9,6 +9,7 @@ pub(super) type SweepRun = super::super::Run<SweepMeasurements>;
 
 /// Measurements besides the time.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(expecting = "struct Measured")]
 pub(super) struct SweepMeasurements {
     /// Number of substeps over all frames.
     pub(super) substeps: u64,

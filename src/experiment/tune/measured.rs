@@ -32,6 +32,7 @@ pub(super) type TuneRun = super::super::run::Run<TuneMeasurements>;
 
 /// Measurements besides the time.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(expecting = "struct Measured")]
 pub(super) struct TuneMeasurements {
     /// Number of substeps over all frames.
     pub(super) substeps: u64,

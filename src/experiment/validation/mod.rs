@@ -29,6 +29,7 @@ pub type BenchmarkRun = super::Run<BenchmarkMeasurements>;
 
 /// Measurements that a benchmark takes from a run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(expecting = "struct Measured")]
 pub struct BenchmarkMeasurements {
     /// Values by the names in
     /// [`Measure::numbers`](swell_files::study::validation::Measure::numbers), without those that
