@@ -38,15 +38,15 @@ fn main() -> Result<(), Box<dyn Error>> {
     swell::bake(&scene)
         .to(&cache)
         .on_event(|event| match event {
-            bake::Event::Ready {
+            bake::BakeEvent::Ready {
                 device, particles, ..
             } => {
                 println!("{particles} particles on {device}");
             }
-            bake::Event::Frame { frame, report, .. } => {
+            bake::BakeEvent::Frame { frame, report, .. } => {
                 println!("frame {frame}: {:.2} m/s", report.max_speed);
             }
-            bake::Event::Written { .. } => {}
+            bake::BakeEvent::Written { .. } => {}
         })
         .run()?;
 
@@ -56,7 +56,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         .frames(22..=24)
         .to(folder.join("pictures"))
         .on_event(|event| {
-            if let render::Event::Frame { frame, seconds, .. } = event {
+            if let render::RenderEvent::Frame { frame, seconds, .. } = event {
                 println!("picture {frame}: {seconds:.2} s");
             }
         })

@@ -79,7 +79,7 @@ pub fn render<'a>(directory: impl AsRef<Path>, look: &Look) -> Render<'a> {
 pub struct Bake<'a> {
     request: bake::BakeRequest,
     stop: &'a AtomicBool,
-    tell: Box<dyn FnMut(bake::Event) + Send + 'a>,
+    tell: Box<dyn FnMut(bake::BakeEvent) + Send + 'a>,
 }
 
 impl<'a> Bake<'a> {
@@ -119,7 +119,7 @@ impl<'a> Bake<'a> {
     }
 
     /// Calls `tell` with the progress.
-    pub fn on_event(mut self, tell: impl FnMut(bake::Event) + Send + 'a) -> Self {
+    pub fn on_event(mut self, tell: impl FnMut(bake::BakeEvent) + Send + 'a) -> Self {
         self.tell = Box::new(tell);
         self
     }
@@ -149,7 +149,7 @@ impl<'a> Bake<'a> {
 pub struct Render<'a> {
     request: render::RenderRequest,
     stop: &'a AtomicBool,
-    tell: Box<dyn FnMut(render::Event) + Send + 'a>,
+    tell: Box<dyn FnMut(render::RenderEvent) + Send + 'a>,
 }
 
 impl<'a> Render<'a> {
@@ -181,7 +181,7 @@ impl<'a> Render<'a> {
     }
 
     /// Calls `tell` with the progress.
-    pub fn on_event(mut self, tell: impl FnMut(render::Event) + Send + 'a) -> Self {
+    pub fn on_event(mut self, tell: impl FnMut(render::RenderEvent) + Send + 'a) -> Self {
         self.tell = Box::new(tell);
         self
     }

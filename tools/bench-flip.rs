@@ -86,7 +86,10 @@ fn cells(word: &str) -> Result<[f64; 3], String> {
         .map_err(|_| format!("--box wants three numbers of cells, not `{word}`"))
 }
 
-fn dam(options: &Options, height: f64) -> Result<(FlipScene, Start), Box<dyn std::error::Error>> {
+fn dam(
+    options: &Options,
+    height: f64,
+) -> Result<(FlipScene<'static>, Start), Box<dyn std::error::Error>> {
     let metres = |cells: [f64; 3]| format!("{:?}", cells.map(|n| n / 10.0));
     let [x, y, z] = options.cells;
     let text = format!(
@@ -99,7 +102,7 @@ fn dam(options: &Options, height: f64) -> Result<(FlipScene, Start), Box<dyn std
         options.settings
     );
     let scene = parse_scene(&text, Path::new("bench.toml"), Path::new("."), &[])?;
-    let scene = scene.with_flip().ok_or("a scene of FLIP")?;
+    let scene = scene.with_flip().ok_or("a scene of FLIP")?.to_owned_scene();
     let mut start = Start::of(&scene)?;
     start.particles.velocity.fill([2.0, 0.0, 0.0]);
     Ok((scene, start))

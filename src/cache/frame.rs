@@ -68,7 +68,7 @@ pub struct Stamp<'a> {
 /// Length and BLAKE3 of what was written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
-pub struct Written {
+pub struct WrittenFile {
     /// Length in bytes.
     pub bytes: u64,
     /// BLAKE3 of the bytes.
@@ -135,7 +135,7 @@ pub fn encode(
     out: &mut impl Write,
     stamp: &Stamp<'_>,
     particles: &Particles,
-) -> io::Result<Written> {
+) -> io::Result<WrittenFile> {
     let names = particles.attributes.keys().map(String::as_str);
     let head = header_bytes(&header(stamp, particles.len(), names))?;
     let mut out = Counted::new(out);
@@ -181,8 +181,8 @@ impl<W: Write> Counted<W> {
         })
     }
 
-    fn written(self) -> Written {
-        Written {
+    fn written(self) -> WrittenFile {
+        WrittenFile {
             bytes: self.bytes,
             hash: self.hasher.finalize(),
         }

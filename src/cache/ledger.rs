@@ -64,8 +64,8 @@ pub type Rows = BTreeMap<String, ProbeValues>;
 
 /// One line of the ledger.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Entry {
+#[serde(deny_unknown_fields, expecting = "struct Entry")]
+pub struct LedgerEntry {
     /// Frame number; 0 is the start.
     pub frame: u32,
     /// Number of particles in the frame's file.
@@ -110,7 +110,7 @@ struct EntryOfFormat1 {
     chain: String,
 }
 
-impl From<EntryOfFormat1> for Entry {
+impl From<EntryOfFormat1> for LedgerEntry {
     fn from(old: EntryOfFormat1) -> Self {
         let particles = FileRecord {
             file: old.file,
@@ -138,7 +138,7 @@ impl From<EntryOfFormat1> for Entry {
     }
 }
 
-impl Entry {
+impl LedgerEntry {
     fn parse(line: &[u8], format_version: u32) -> serde_json::Result<Self> {
         match format_version {
             1 => serde_json::from_slice::<EntryOfFormat1>(line).map(Self::from),
@@ -225,7 +225,7 @@ pub(super) fn rows_misfit(manifest: &Manifest, rows: &Rows) -> Option<String> {
     (rows.len() != expected).then(|| "it has rows that the manifest does not declare".to_owned())
 }
 
-/// An [`Entry`] without its chain: what the chained hash covers.
+/// A [`LedgerEntry`] without its chain: what the chained hash covers.
 #[derive(Serialize)]
 pub(super) struct Contents<'a> {
     pub(super) frame: u32,
@@ -279,7 +279,7 @@ fn chained(previous: &Hash, contents: &[u8]) -> Hash {
 #[derive(Debug)]
 pub(super) struct Ledger {
     /// Entries in order, the start first; never empty.
-    pub(super) entries: Vec<Entry>,
+    pub(super) entries: Vec<LedgerEntry>,
     /// Chained hash of the last whole line.
     pub(super) chain: Hash,
     /// Total length of the whole lines, bytes.
@@ -345,7 +345,7 @@ impl Ledger {
         let number = self.entries.len() + 1;
         let damaged =
             |what: &str| CacheError::damaged(dir.join(FILE), format!("line {number}: {what}"));
-        let entry = Entry::parse(line, manifest.format_version)
+        let entry = LedgerEntry::parse(line, manifest.format_version)
             .map_err(|error| damaged(&in_line(&error)))?;
         let (contents, tail) = line.split_at(line.len().saturating_sub(CHAIN_LEN));
         if !tail.starts_with(CHAIN_KEY) {
@@ -432,7 +432,7 @@ mod tests {
             match line(time, &Value::Null) {
                 Err(_) => prop_assert!(!time.is_finite()),
                 Ok(line) => {
-                    let entry: Entry = serde_json::from_slice(&line).unwrap();
+                    let entry: LedgerEntry = serde_json::from_slice(&line).unwrap();
                     prop_assert_eq!(entry.clock.time.to_bits(), bits);
                 }
             }
@@ -444,7 +444,7 @@ mod tests {
         let report = serde_json::json!({ "note": "a\nb\",\"chain\":\"x", "list": [1, null] });
         let line = line(0.5, &report).unwrap();
         assert_eq!(line.iter().filter(|&&b| b == b'\n').count(), 1);
-        let entry: Entry = serde_json::from_slice(&line).unwrap();
+        let entry: LedgerEntry = serde_json::from_slice(&line).unwrap();
         assert_eq!(entry.report, report);
     }
 }

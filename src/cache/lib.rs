@@ -51,7 +51,7 @@ pub use disk::{directory_hash, file_hash, free_bytes};
 pub use error::CacheError;
 pub use folder::{IntoCache, refuse_inside, refuse_occupied};
 pub use grids::GridRecord;
-pub use ledger::{Clock, Entry, Files, Rows};
+pub use ledger::{Clock, Files, LedgerEntry, Rows};
 pub use manifest::{Manifest, Parent, exists};
 pub use probes::{Look, ProbeRecord, ProbeValues};
 pub use reader::{CacheReader, Problem, VerifyReport, survey};

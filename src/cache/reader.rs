@@ -9,7 +9,7 @@ use super::disk;
 use super::error::CacheError;
 use super::failed;
 use super::frame;
-use super::ledger::{self, Entry, Ledger};
+use super::ledger::{self, Ledger, LedgerEntry};
 use super::manifest::{self, Manifest};
 use super::record::FileRecord;
 use super::stream::{self, OF_PARTICLES};
@@ -143,7 +143,7 @@ impl CacheReader {
     }
 
     /// The ledger: one entry per frame without gaps, the start first; never empty.
-    pub fn entries(&self) -> &[Entry] {
+    pub fn entries(&self) -> &[LedgerEntry] {
         &self.ledger.entries
     }
 
@@ -162,7 +162,7 @@ impl CacheReader {
     ///
     /// # Errors
     /// [`CacheError::NoFrame`].
-    pub fn entry(&self, frame: u32) -> Result<&Entry, CacheError> {
+    pub fn entry(&self, frame: u32) -> Result<&LedgerEntry, CacheError> {
         let index = frame.checked_sub(self.first_frame());
         index
             .and_then(|index| self.ledger.entries.get(usize::try_from(index).ok()?))
@@ -183,7 +183,7 @@ impl CacheReader {
     ///
     /// # Errors
     /// [`CacheError::NoFrame`], [`CacheError::NotKept`].
-    pub fn kept(&self, frame: u32) -> Result<&Entry, CacheError> {
+    pub fn kept(&self, frame: u32) -> Result<&LedgerEntry, CacheError> {
         let entry = self.entry(frame)?;
         let has = |frame: &u32| self.has_particles(*frame);
         match self.manifest.keep {
@@ -227,7 +227,11 @@ impl CacheReader {
     ///
     /// # Errors
     /// [`CacheError::Io`].
-    pub fn grids(&self, entry: &Entry, particles: &Particles) -> Result<Option<Grids>, CacheError> {
+    pub fn grids(
+        &self,
+        entry: &LedgerEntry,
+        particles: &Particles,
+    ) -> Result<Option<Grids>, CacheError> {
         let manifest = &self.manifest;
         let (Some(asked), Some(record)) = (&manifest.grids, entry.file(stream::GRIDS)) else {
             return Ok(None);
@@ -258,10 +262,10 @@ impl CacheReader {
     /// be read.
     pub fn check_beside(&self, frames: &[u32]) -> Result<(), CacheError> {
         let entries = frames.iter().map(|&frame| self.entry(frame));
-        let entries: Vec<&Entry> = entries.collect::<Result<_, CacheError>>()?;
+        let entries: Vec<&LedgerEntry> = entries.collect::<Result<_, CacheError>>()?;
         let problems: Vec<Problem> = entries
             .into_par_iter()
-            .flat_map_iter(Entry::files_beside)
+            .flat_map_iter(LedgerEntry::files_beside)
             .filter_map(|record| self.problem(record))
             .collect();
         let first = problems.into_iter().next();
@@ -281,7 +285,10 @@ impl CacheReader {
     }
 
     /// Tables that do not match these lines of the ledger.
-    fn table_problems<'a>(&'a self, entries: &'a [Entry]) -> impl Iterator<Item = Problem> + 'a {
+    fn table_problems<'a>(
+        &'a self,
+        entries: &'a [LedgerEntry],
+    ) -> impl Iterator<Item = Problem> + 'a {
         let problems = tables::problems(&self.dir, &self.manifest, entries);
         problems.map(|(file, what)| Problem { file, what })
     }
@@ -327,7 +334,7 @@ impl CacheReader {
             });
         }
         let newest = self.last_frame();
-        let there = |entry| Entry::files_there(entry, &self.manifest, newest);
+        let there = |entry| LedgerEntry::files_there(entry, &self.manifest, newest);
         let mut frames: Vec<Problem> = entries
             .par_iter()
             .flat_map_iter(there)
@@ -385,7 +392,7 @@ impl Problem {
 }
 
 /// The record of a frame's particles, which every entry has: the ledger's reader checks it.
-fn particles_record<'a>(dir: &Path, entry: &'a Entry) -> Result<&'a FileRecord, CacheError> {
+fn particles_record<'a>(dir: &Path, entry: &'a LedgerEntry) -> Result<&'a FileRecord, CacheError> {
     let no_particles = || {
         let what = format!("frame {} has no particles", entry.frame);
         CacheError::damaged(dir.join(ledger::FILE), what)
@@ -397,7 +404,7 @@ fn particles_record<'a>(dir: &Path, entry: &'a Entry) -> Result<&'a FileRecord, 
 pub(super) fn read_frame(
     dir: &Path,
     manifest: &Manifest,
-    entry: &Entry,
+    entry: &LedgerEntry,
 ) -> Result<Particles, CacheError> {
     let record = particles_record(dir, entry)?;
     let path = dir.join(&record.file);

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::disk;
 use super::error::CacheError;
-use super::frame::Written;
+use super::frame::WrittenFile;
 
 /// A file in a cache.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -24,14 +24,14 @@ impl FileRecord {
     pub(super) fn new(file: impl Into<String>, content: &[u8]) -> Self {
         Self::of_written(
             file,
-            &Written {
+            &WrittenFile {
                 bytes: content.len() as u64,
                 hash: blake3::hash(content),
             },
         )
     }
 
-    pub(super) fn of_written(file: impl Into<String>, written: &Written) -> Self {
+    pub(super) fn of_written(file: impl Into<String>, written: &WrittenFile) -> Self {
         Self {
             file: file.into(),
             bytes: written.bytes,

@@ -56,7 +56,7 @@ pub(super) struct Sink {
 
 /// A frame to be written.
 #[derive(Debug)]
-pub(super) struct Job {
+pub(super) struct WriteJob {
     pub(super) clock: Clock,
     pub(super) particles: Particles,
     pub(super) rows: Rows,
@@ -67,7 +67,7 @@ pub(super) struct Job {
 impl Sink {
     pub(super) fn run(
         mut self,
-        jobs: &Receiver<Job>,
+        jobs: &Receiver<WriteJob>,
         last_frame: u32,
     ) -> Result<Summary, CacheError> {
         let mut summary = Summary {

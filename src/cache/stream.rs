@@ -3,7 +3,7 @@
 
 use std::io::{self, Write};
 
-use super::frame::{self, Stamp, Written, planes};
+use super::frame::{self, Stamp, WrittenFile, planes};
 use super::grids::GridRecord;
 use super::manifest::Manifest;
 use super::probes::ProbeRecord;
@@ -83,7 +83,7 @@ pub enum Content {
 }
 
 /// Writes the file of a frame.
-type Encode = fn(&mut dyn Write, &Manifest, &Stamp<'_>, &Particles) -> io::Result<Written>;
+type Encode = fn(&mut dyn Write, &Manifest, &Stamp<'_>, &Particles) -> io::Result<WrittenFile>;
 
 /// How the files of a stream grow with the bake.
 #[derive(Debug)]
@@ -152,7 +152,7 @@ fn encode_particles(
     manifest: &Manifest,
     stamp: &Stamp<'_>,
     particles: &Particles,
-) -> io::Result<Written> {
+) -> io::Result<WrittenFile> {
     match manifest.compression {
         Some(Compression::Zstd) => planes::encode(&mut out, stamp, particles),
         None => frame::encode(&mut out, stamp, particles),
@@ -164,7 +164,7 @@ fn encode_grids(
     manifest: &Manifest,
     stamp: &Stamp<'_>,
     particles: &Particles,
-) -> io::Result<Written> {
+) -> io::Result<WrittenFile> {
     let Some(asked) = &manifest.grids else {
         return Err(io::Error::other("no grids are asked for"));
     };

@@ -8,7 +8,7 @@ use std::fs::File;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use super::ledger::{Clock, Entry, Rows};
+use super::ledger::{Clock, LedgerEntry, Rows};
 use super::manifest::Manifest;
 use super::probes::ProbeRecord;
 use super::stream::{STREAMS, Stream};
@@ -16,7 +16,7 @@ use super::window::Window;
 use swell_domain::output::{self, AtPath as _, FileError};
 
 /// One file: a table of a stream.
-struct Table<'a> {
+struct TableFile<'a> {
     stream: &'static Stream,
     /// Index among the stream's tables.
     index: usize,
@@ -24,10 +24,10 @@ struct Table<'a> {
 }
 
 /// The files of a bake with this manifest.
-fn all(manifest: &Manifest) -> impl Iterator<Item = Table<'_>> {
+fn all(manifest: &Manifest) -> impl Iterator<Item = TableFile<'_>> {
     STREAMS.iter().flat_map(move |stream| {
         let records = stream.tables(manifest).iter().enumerate();
-        records.map(move |(index, record)| Table {
+        records.map(move |(index, record)| TableFile {
             stream,
             index,
             record,
@@ -35,13 +35,13 @@ fn all(manifest: &Manifest) -> impl Iterator<Item = Table<'_>> {
     })
 }
 
-impl Table<'_> {
+impl TableFile<'_> {
     fn path(&self, dir: &Path) -> PathBuf {
         dir.join(self.stream.table_file(&self.record.name))
     }
 
     /// Content of the file after these frames, and the window that later rows look back on.
-    fn text(&self, entries: &[Entry]) -> (String, Window) {
+    fn text(&self, entries: &[LedgerEntry]) -> (String, Window) {
         let mut window = Window::default();
         let header = format!("frame,time_s,{}\n", self.record.file_columns().join(","));
         let rows = entries
@@ -76,7 +76,7 @@ impl Table<'_> {
     }
 
     /// How the file differs from the ledger.
-    fn problem(&self, dir: &Path, entries: &[Entry]) -> Option<String> {
+    fn problem(&self, dir: &Path, entries: &[LedgerEntry]) -> Option<String> {
         let found = match std::fs::read(self.path(dir)) {
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
                 return Some("it is missing; a resumed bake rewrites it".to_owned());
@@ -102,9 +102,9 @@ impl Table<'_> {
 pub(super) fn write_all(
     dir: &Path,
     manifest: &Manifest,
-    entries: &[Entry],
+    entries: &[LedgerEntry],
 ) -> Result<Vec<Window>, FileError> {
-    let write = |table: Table<'_>| {
+    let write = |table: TableFile<'_>| {
         let (text, window) = table.text(entries);
         output::write(&table.path(dir), text)?;
         Ok(window)
@@ -132,7 +132,7 @@ pub(super) fn append(
 pub(super) fn problems(
     dir: &Path,
     manifest: &Manifest,
-    entries: &[Entry],
+    entries: &[LedgerEntry],
 ) -> impl Iterator<Item = (PathBuf, String)> {
     all(manifest).filter_map(move |table| Some((table.path(dir), table.problem(dir, entries)?)))
 }

@@ -4,10 +4,10 @@ use std::io::{self, Write};
 
 use glam::DVec3;
 
-use super::frame::{Stamp, Written};
+use super::frame::{Stamp, WrittenFile};
 use swell_domain::{
     sparse_grid::{Precision, SparseGrid},
-    vdb::{self, Grid, Metadata},
+    vdb::{self, Metadata, VdbGrid},
 };
 
 /// Grids of one frame.
@@ -42,7 +42,7 @@ pub fn encode(
     stamp: &Stamp<'_>,
     grids: &Grids,
     precision: Precision,
-) -> io::Result<Written> {
+) -> io::Result<WrittenFile> {
     let program = format!("{} {}", stamp.program, stamp.program_version);
     let metadata = [
         ("creator", Metadata::Text(program)),
@@ -50,12 +50,18 @@ pub fn encode(
         ("shot", Metadata::Text(stamp.shot.to_owned())),
         ("time", Metadata::Double(stamp.time)),
     ];
-    let surface = grids.surface.iter().map(|it| Grid::LevelSet("surface", it));
-    let velocity = grids.velocity.iter().map(|it| Grid::Staggered("vel", it));
+    let surface = grids
+        .surface
+        .iter()
+        .map(|it| VdbGrid::LevelSet("surface", it));
+    let velocity = grids
+        .velocity
+        .iter()
+        .map(|it| VdbGrid::Staggered("vel", it));
     let grids: Vec<_> = surface.chain(velocity).collect();
     let bytes = vdb::encode(&metadata, &grids, precision);
     out.write_all(&bytes)?;
-    Ok(Written {
+    Ok(WrittenFile {
         bytes: bytes.len() as u64,
         hash: blake3::hash(&bytes),
     })

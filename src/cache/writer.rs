@@ -11,12 +11,12 @@ use serde_json::Value;
 use super::disk;
 use super::error::CacheError;
 use super::folder;
-use super::ledger::{self, Clock, Entry, Ledger};
+use super::ledger::{self, Clock, Ledger, LedgerEntry};
 use super::manifest::{self, Manifest};
 use super::probes::ProbeValues;
 use super::reader::read_frame;
 use super::record::FileRecord;
-use super::sink::{Job, Sink, Summary, check, check_rows, rows_of};
+use super::sink::{Sink, Summary, WriteJob, check, check_rows, rows_of};
 use super::tables;
 use swell_domain::{
     output::{self, AtPath as _, Lock},
@@ -42,7 +42,7 @@ pub struct CacheWriter {
     manifest: Manifest,
     next_frame: u32,
     waiting: Duration,
-    sender: Option<SyncSender<Job>>,
+    sender: Option<SyncSender<WriteJob>>,
     thread: Option<JoinHandle<Result<Summary, CacheError>>>,
     /// Held until the thread has ended: fields are dropped after `Drop::drop`.
     _lock: Lock,
@@ -126,7 +126,10 @@ impl CacheWriter {
     ///   `start_particles` are not compared).
     /// - [`CacheError::Damaged`], with the cache untouched, for the manifest, scene, assets,
     ///   ledger, the last frame, or an earlier frame that is missing or of another length.
-    pub fn resume(dir: &Path, given: &Manifest) -> Result<(Self, Entry, Particles), CacheError> {
+    pub fn resume(
+        dir: &Path,
+        given: &Manifest,
+    ) -> Result<(Self, LedgerEntry, Particles), CacheError> {
         let (manifest, seed) = Manifest::read(dir)?;
         manifest.expect(dir, given)?;
         let lock = disk::lock(dir)?;
@@ -232,7 +235,7 @@ impl CacheWriter {
             return Err(CacheError::Stopped);
         };
         let begin = Instant::now();
-        let sent = sender.send(Job {
+        let sent = sender.send(WriteJob {
             clock,
             particles,
             rows: rows_of(probes),

@@ -10,7 +10,7 @@ use swell_gpu::{
     sort::plain_pass,
 };
 
-use super::table::{Entry, Table, entries, pair};
+use super::table::{CheckEntry, CheckTable, entries, pair};
 
 const PASS: &str = "measure/accuracy";
 const NUMBERS: Buf<[f32; 2]> = Buf::new("numbers");
@@ -53,15 +53,15 @@ fn numbers() -> Vec<[f32; 2]> {
 ///
 /// # Errors
 /// [`GpuError`], for a device that is lost and a shader that does not compile.
-pub fn check(context: &Context) -> Result<Table, GpuError> {
+pub fn check(context: &Context) -> Result<CheckTable, GpuError> {
     let numbers = numbers();
     let buffers = [NUMBERS.sized(COUNT), RESULTS.sized(COUNT)];
     let program = Program::new(context, &buffers, &[plain_pass(PASS)], &[])?;
     program.upload(NUMBERS, 0, &numbers);
     Recording::new(&program, &[Command::over(PASS, COUNT)]).run(&program, None)?;
     let results = program.read(RESULTS, COUNT)?;
-    let mut table = Table::default();
-    let mut add = |entry: &'static Entry<1>, lane: usize, exact: fn(f64, f64) -> f64| {
+    let mut table = CheckTable::default();
+    let mut add = |entry: &'static CheckEntry<1>, lane: usize, exact: fn(f64, f64) -> f64| {
         table.each(entry, 0..COUNT, |k| {
             let [x, y] = numbers[k].map(f64::from);
             let exact = exact(x, y);

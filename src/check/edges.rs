@@ -38,16 +38,16 @@ pub struct Outlined {
 
 /// Kind of an edge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Kind {
+enum EdgeKind {
     Silhouette,
     Waterline,
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Point {
+struct EdgePoint {
     /// Position, pixels from the upper left pixel's centre.
     at: DVec2,
-    kind: Kind,
+    kind: EdgeKind,
     /// Pixels per spacing at the water's depth.
     scale: f64,
     /// The two pixels.
@@ -61,7 +61,7 @@ impl Outlined {
 
     /// Returns the edge points. `unit` is the size of a spacing in pixels at a depth of one metre;
     /// `spacing` is in metres.
-    fn points(&self, unit: f64, spacing: f64) -> Vec<Point> {
+    fn points(&self, unit: f64, spacing: f64) -> Vec<EdgePoint> {
         let mut points = Vec::new();
         let height = self.water.len() / self.width.max(1);
         for y in 0..height {
@@ -80,11 +80,11 @@ impl Outlined {
                     if gap < -BEFORE {
                         continue;
                     }
-                    points.push(Point {
+                    points.push(EdgePoint {
                         at: DVec2::new(x as f64, y as f64) + 0.5 * step,
                         kind: match gap >= BEHIND {
-                            true => Kind::Silhouette,
-                            false => Kind::Waterline,
+                            true => EdgeKind::Silhouette,
+                            false => EdgeKind::Waterline,
                         },
                         scale: unit / depth,
                         pair: [wet, dry],
@@ -97,14 +97,14 @@ impl Outlined {
 
     /// Returns the distance of a point outside this outline, pixels; `edge` are the outline's edge
     /// points. `None` if none is near.
-    fn distance(&self, edge: &[Point], point: &Point) -> Option<f64> {
+    fn distance(&self, edge: &[EdgePoint], point: &EdgePoint) -> Option<f64> {
         let sign = match point.pair.map(|pixel| self.is_wet(pixel)) {
             [true, true] => -1.0,
             [false, false] => 1.0,
             // The truth's edge passes here as well.
             _ => return Some(0.0),
         };
-        let squared = |other: &Point| other.at.distance_squared(point.at);
+        let squared = |other: &EdgePoint| other.at.distance_squared(point.at);
         let nearest = edge.iter().map(squared).fold(f64::INFINITY, f64::min);
         (nearest.sqrt() <= REACH * point.scale).then(|| sign * nearest.sqrt())
     }
@@ -113,7 +113,7 @@ impl Outlined {
 /// Deviations of an edge point, spacings.
 #[derive(Clone, Copy, Debug)]
 struct Deviation {
-    kind: Kind,
+    kind: EdgeKind,
     /// Distance from the truth's edge; `None` if that is not near.
     off: Option<f64>,
     /// Distance from the local mean of `off`.
@@ -180,16 +180,16 @@ impl Outlines {
 
     /// Returns the statistics of edges in front of a far background; `None` if there are none.
     pub fn silhouette(&self) -> Option<Outline> {
-        self.of(Kind::Silhouette)
+        self.of(EdgeKind::Silhouette)
     }
 
     /// Returns the statistics of edges where water meets an opaque surface; `None` if there are
     /// none.
     pub fn waterline(&self) -> Option<Outline> {
-        self.of(Kind::Waterline)
+        self.of(EdgeKind::Waterline)
     }
 
-    fn of(&self, kind: Kind) -> Option<Outline> {
+    fn of(&self, kind: EdgeKind) -> Option<Outline> {
         let all: Vec<&Deviation> = self.0.iter().filter(|it| it.kind == kind).collect();
         let near: Vec<(f64, &Deviation)> =
             all.iter().filter_map(|it| Some((it.off?, *it))).collect();

@@ -7,8 +7,8 @@ use swell_gpu::buffer::{Buf, Windows};
 use swell_solve::buffers;
 
 use super::{
-    engine::{Comparison, Io, NONE, PassResult, State, comparison, names},
-    table::{Entry, Table, entries, pair},
+    comparison::{Comparison, Io, NONE, PassResult, State, comparison, names},
+    table::{CheckEntry, CheckTable, entries, pair},
 };
 
 /// Variables of the scan.
@@ -115,12 +115,12 @@ fn stabilize(n: usize, io: &mut Io<'_>) -> PassResult {
 /// Compares the cells of positions with `exact`; within rounding of a cell's face either cell is
 /// correct.
 pub(super) fn check_cells(
-    entry: &'static Entry<0>,
+    entry: &'static CheckEntry<0>,
     places: &[DVec3],
     cell_size: f64,
     found: &[u32],
     exact: &[u32],
-    table: &mut Table,
+    table: &mut CheckTable,
 ) {
     table.each(entry, 0..found.len(), |i| {
         let place = places[i] / cell_size;
@@ -133,11 +133,11 @@ pub(super) fn check_cells(
 
 /// Compares slots in cells, and the counts that assigned them, with the keys themselves.
 pub(super) fn check_slots(
-    [counts_entry, slots_entry]: [&'static Entry<0>; 2],
+    [counts_entry, slots_entry]: [&'static CheckEntry<0>; 2],
     cell_of: &[u32],
     slot: &[u32],
     counts: &[u32],
-    table: &mut Table,
+    table: &mut CheckTable,
 ) {
     let mut expected = vec![0; counts.len()];
     let mut keys: Vec<[u32; 2]> = Vec::with_capacity(slot.len());

@@ -6,13 +6,13 @@ use rayon::prelude::*;
 use serde::{Serialize, Serializer};
 
 use swell_compare::{
-    deviation::{Deviation, Value, relative},
-    tolerance::{Bound, Text},
+    deviation::{ComparedValue, Deviation, relative},
+    tolerance::{BoundExpression, Text},
 };
 
 /// A row of a check: one field that one pass writes.
 #[derive(Debug, Serialize)]
-pub struct Field {
+pub struct CheckField {
     /// Name of the pass, or of the comparison if several passes produced the field.
     pub pass: &'static str,
     /// Name of the field.
@@ -23,7 +23,7 @@ pub struct Field {
     pub derivation: Derivation,
 }
 
-impl PartialEq for Field {
+impl PartialEq for CheckField {
     fn eq(&self, other: &Self) -> bool {
         (self.pass, self.name) == (other.pass, other.name)
     }
@@ -65,11 +65,11 @@ impl Serialize for Derivation {
 }
 
 /// A field with its tolerance: an expression of `N` magnitudes that each value supplies.
-pub struct Entry<const N: usize> {
+pub struct CheckEntry<const N: usize> {
     /// Compared field.
-    pub field: Field,
+    pub field: CheckField,
     /// Largest allowed difference.
-    pub tolerance: &'static Bound<N>,
+    pub tolerance: &'static BoundExpression<N>,
 }
 
 /// Declares entries, grouped by pass:
@@ -80,14 +80,14 @@ macro_rules! entries {
         $($name:ident = $field:literal, $unit:literal:
             [$($magnitudes:tt)*] $value:expr, $reason:literal $(, tie $tie:ident)?;)+
     })+) => {
-        $($(pub(super) static $name: $crate::table::Entry<
+        $($(pub(super) static $name: $crate::table::CheckEntry<
             { swell_compare::tolerance::count!($($magnitudes)*) }
         > = {
-            static TOLERANCE: swell_compare::tolerance::Bound<
+            static TOLERANCE: swell_compare::tolerance::BoundExpression<
                 { swell_compare::tolerance::count!($($magnitudes)*) }
             > = swell_compare::tolerance::bound!([$($magnitudes)*] $value, $reason);
-            $crate::table::Entry {
-                field: $crate::table::Field {
+            $crate::table::CheckEntry {
+                field: $crate::table::CheckField {
                     pass: $pass,
                     name: $field,
                     unit: $unit,
@@ -151,10 +151,10 @@ pub struct Worst {
 
 /// Summary of all compared runs of a pass in a traced substep.
 #[derive(Clone, Debug, Serialize)]
-pub struct Row {
+pub struct CheckRow {
     /// Compared field.
     #[serde(flatten)]
-    pub field: &'static Field,
+    pub field: &'static CheckField,
     /// Number of compared runs of the pass.
     pub runs: usize,
     /// Number of compared values.
@@ -169,7 +169,7 @@ pub struct Row {
     pub deviation: Deviation,
 }
 
-impl Row {
+impl CheckRow {
     /// Returns whether every value is within its tolerance.
     pub fn is_within(&self) -> bool {
         self.over == 0
@@ -178,22 +178,22 @@ impl Row {
 
 /// The rows of a check, in the order in which their passes first ran.
 #[derive(Clone, Debug, Default, Serialize)]
-pub struct Table {
+pub struct CheckTable {
     /// One row per field.
-    pub rows: Vec<Row>,
+    pub rows: Vec<CheckRow>,
     /// Passes that ran without a comparison, each with the reason.
     pub unchecked: Vec<(&'static str, &'static str)>,
 }
 
-impl Table {
+impl CheckTable {
     /// Adds a run of a pass. `None` is a value that is left out because either outcome is correct
     /// within rounding; a NaN is out of tolerance.
-    pub fn add<T: Value, const N: usize, P: Into<Option<Pair<T, N>>>>(
+    pub fn add<T: ComparedValue, const N: usize, P: Into<Option<Pair<T, N>>>>(
         &mut self,
-        entry: &'static Entry<N>,
+        entry: &'static CheckEntry<N>,
         pairs: impl IntoIterator<Item = P>,
     ) {
-        let mut row = Row {
+        let mut row = CheckRow {
             field: &entry.field,
             runs: 1,
             values: 0,
@@ -231,9 +231,9 @@ impl Table {
     }
 
     /// Adds a run of a pass, evaluating the values of a range in parallel.
-    pub fn each<T: Value + Send, const N: usize, P: Into<Option<Pair<T, N>>> + Send>(
+    pub fn each<T: ComparedValue + Send, const N: usize, P: Into<Option<Pair<T, N>>> + Send>(
         &mut self,
-        entry: &'static Entry<N>,
+        entry: &'static CheckEntry<N>,
         range: Range<usize>,
         one: impl Fn(usize) -> P + Send + Sync,
     ) {
@@ -241,7 +241,7 @@ impl Table {
     }
 
     /// Adds to the number of values left out of a row, if they were only counted.
-    pub fn add_ties<const N: usize>(&mut self, entry: &'static Entry<N>, ties: usize) {
+    pub fn add_ties<const N: usize>(&mut self, entry: &'static CheckEntry<N>, ties: usize) {
         let known = self.rows.iter_mut().find(|row| *row.field == entry.field);
         if let Some(row) = known {
             row.ties += ties;
@@ -249,12 +249,12 @@ impl Table {
     }
 
     /// Adds a run in which rounding decides all `count` values.
-    pub fn leave_out<const N: usize>(&mut self, entry: &'static Entry<N>, count: usize) {
+    pub fn leave_out<const N: usize>(&mut self, entry: &'static CheckEntry<N>, count: usize) {
         self.add(entry, vec![None::<Pair<f64, N>>; count]);
     }
 
     /// Adds a run with integer outputs: every difference is out of tolerance.
-    pub fn add_exact(&mut self, entry: &'static Entry<0>, value: &[u32], reference: &[u32]) {
+    pub fn add_exact(&mut self, entry: &'static CheckEntry<0>, value: &[u32], reference: &[u32]) {
         let same = value.len() == reference.len();
         let one = |(index, (&value, &reference)): (usize, (&u32, &u32))| {
             let value = if same { f64::from(value) } else { f64::NAN };
@@ -275,7 +275,7 @@ impl Table {
         }
     }
 
-    fn merge(&mut self, row: Row) {
+    fn merge(&mut self, row: CheckRow) {
         let Some(known) = self.rows.iter_mut().find(|known| known.field == row.field) else {
             self.rows.push(row);
             return;
@@ -291,7 +291,7 @@ impl Table {
     }
 
     /// Returns the first row that is out of tolerance.
-    pub fn first_over(&self) -> Option<&Row> {
+    pub fn first_over(&self) -> Option<&CheckRow> {
         self.rows.iter().find(|row| !row.is_within())
     }
 
@@ -318,7 +318,7 @@ mod tests {
 
     #[test]
     fn the_worst_is_that_of_the_least_room() {
-        let mut table = Table::default();
+        let mut table = CheckTable::default();
         // The larger error has the larger tolerance.
         let pairs = [Some(one(3, 1.5, 1.0)), None, None, Some(one(4, 1.25, 0.3))];
         table.add(&FIELD, pairs);
@@ -338,11 +338,11 @@ mod tests {
     #[test]
     fn no_number_and_no_tolerance_are_out() {
         for (value, tolerance) in [(f64::NAN, 1.0), (1.0 + 1e-9, 0.0), (1.1, f64::NAN)] {
-            let mut table = Table::default();
+            let mut table = CheckTable::default();
             table.add(&FIELD, [one(0, value, tolerance)]);
             assert!(table.first_over().is_some(), "{value} {tolerance}");
         }
-        let mut table = Table::default();
+        let mut table = CheckTable::default();
         table.add(&FIELD, [one(0, 1.0, 0.0)]);
         table.add_exact(&WHOLE, &[1, 2], &[1, 2]);
         assert!(table.first_over().is_none());

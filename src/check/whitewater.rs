@@ -11,10 +11,10 @@ use swell_compare::{
 use swell_domain::{
     boundary::Boundary,
     particles::Particles,
-    whitewater::{KIND, Kind, OUTWARD, Potentials, SURFACE, Settings},
+    whitewater::{CalibratedSettings, KIND, OUTWARD, Potentials, SURFACE, WhitewaterKind},
 };
 use swell_gpu::adapter::Context;
-use swell_reference::whitewater::{Moved, Neighbor, Surveyed, Water, White};
+use swell_reference::whitewater::{Moved, Neighbor, SortedWater, Surveyed, White};
 use swell_scene::PbfScene;
 use swell_solve::{
     SolveError,
@@ -22,7 +22,7 @@ use swell_solve::{
 };
 
 use super::{
-    Table,
+    CheckTable,
     table::{entries, pair},
 };
 
@@ -83,11 +83,11 @@ entries! {
 #[derive(Clone, Copy, Debug)]
 pub struct Frame<'a> {
     /// [`of_whitewater`](swell_scene::Scene::of_whitewater) of the baked scene.
-    pub scene: &'a PbfScene,
+    pub scene: &'a PbfScene<'static>,
     /// Solids of the scene.
     pub boundary: &'a Boundary,
     /// Settings of the whitewater stream.
-    pub settings: &'a Settings,
+    pub settings: &'a CalibratedSettings,
     /// Water at the frame's end.
     pub water: &'a Particles,
     /// Whitewater at the end of the previous frame.
@@ -101,7 +101,7 @@ pub struct Frame<'a> {
 /// Compares the frame's passes with their reference passes.
 ///
 /// # Errors Returns an error if the device fails or a value is not finite.
-pub fn check(context: &Context, frame: Frame<'_>) -> Result<Table, SolveError> {
+pub fn check(context: &Context, frame: Frame<'_>) -> Result<CheckTable, SolveError> {
     let Frame {
         scene,
         boundary,
@@ -112,7 +112,7 @@ pub fn check(context: &Context, frame: Frame<'_>) -> Result<Table, SolveError> {
     let mut device = Whitewater::new(context, scene, boundary, n, false)?;
     device.set(frame.settings)?;
     let potentials = device.survey(water, frame.time, frame.seconds)?;
-    let mut table = Table::default();
+    let mut table = CheckTable::default();
     let reference = Comparison::of(frame);
     reference.survey(
         &mut table,
@@ -142,7 +142,7 @@ pub fn check(context: &Context, frame: Frame<'_>) -> Result<Table, SolveError> {
 /// The water in f64, with rounding bounds of each particle's sums.
 struct Comparison<'a> {
     frame: Frame<'a>,
-    water: Water,
+    water: SortedWater,
     surveyed: Vec<Surveyed>,
     errors: Vec<Errors>,
 }
@@ -161,7 +161,7 @@ struct Errors {
 
 impl<'a> Comparison<'a> {
     fn of(frame: Frame<'a>) -> Self {
-        let water = Water::new(frame.scene, frame.boundary, frame.water, frame.time);
+        let water = SortedWater::new(frame.scene, frame.boundary, frame.water, frame.time);
         let n = water.points.len();
         let surveyed: Vec<Surveyed> = (0..n).into_par_iter().map(|i| water.survey(i)).collect();
         let errors = (0..n).into_par_iter();
@@ -174,7 +174,7 @@ impl<'a> Comparison<'a> {
         }
     }
 
-    fn survey(&self, table: &mut Table, share: &[f32], surface: &[[f32; 4]]) {
+    fn survey(&self, table: &mut CheckTable, share: &[f32], surface: &[[f32; 4]]) {
         let n = self.surveyed.len();
         let [least, _] = SURFACE;
         table.each(&SHARE_OF, 0..n, |i| {
@@ -197,7 +197,7 @@ impl<'a> Comparison<'a> {
     }
 
     /// Compares the potentials; `found` is in the order of the original water.
-    fn potentials(&self, table: &mut Table, found: &[Potentials]) {
+    fn potentials(&self, table: &mut CheckTable, found: &[Potentials]) {
         let n = self.surveyed.len();
         let rows: Vec<(Potentials, [f64; 3], [f64; 5])> = (0..n)
             .into_par_iter()
@@ -271,7 +271,7 @@ impl<'a> Comparison<'a> {
         [sums, n, weight, crest, own_error.sure + outward]
     }
 
-    fn advance(&self, table: &mut Table, found: &Particles) {
+    fn advance(&self, table: &mut CheckTable, found: &Particles) {
         let Frame {
             scene,
             settings,
@@ -287,7 +287,8 @@ impl<'a> Comparison<'a> {
                 let before = White {
                     position: (wide(white.position[k]) - corner).as_vec3().as_dvec3(),
                     velocity: wide(white.velocity[k]),
-                    kind: Kind::of_number(white.attributes[KIND][k]).unwrap_or(Kind::Foam),
+                    kind: WhitewaterKind::of_number(white.attributes[KIND][k])
+                        .unwrap_or(WhitewaterKind::Foam),
                 };
                 let moved = self.water.advance(settings, gravity, seconds, before);
                 (moved, self.moved_errors(&before, &moved, gravity))
@@ -348,9 +349,9 @@ impl<'a> Comparison<'a> {
     }
 
     /// Collects magnitudes around a position.
-    fn about(&self, x: DVec3) -> About {
+    fn about(&self, x: DVec3) -> ParticleSurroundings {
         let h = self.water.model.calibration.support_radius;
-        let mut about = About::default();
+        let mut about = ParticleSurroundings::default();
         let (mut weighted, mut solid) = (Sums::default(), 0.0);
         let (mut least, mut most) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         self.water.about(x, |neighbor, way| {
@@ -387,7 +388,7 @@ impl<'a> Comparison<'a> {
 }
 
 #[derive(Clone, Copy, Debug, Default)]
-struct About {
+struct ParticleSurroundings {
     sums: Sums,
     /// Σ p³ over the water.
     kernel: f64,
@@ -398,7 +399,7 @@ struct About {
     free: f64,
 }
 
-fn errors_of(water: &Water, i: usize, surveyed: &Surveyed) -> Errors {
+fn errors_of(water: &SortedWater, i: usize, surveyed: &Surveyed) -> Errors {
     let (x, h) = (water.points[i], water.model.calibration.support_radius);
     let (mut fluid, mut solids, mut all) = (Sums::default(), Sums::default(), Sums::default());
     let mut solid = 0.0;

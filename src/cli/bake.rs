@@ -13,7 +13,7 @@ use swell_domain::{frame_range::FrameRange, solver::StepReport};
 use swell_files::Reach;
 use swell_scene::{Method, Scene, SceneError};
 use swell_stage::{
-    bake::{self, BakePlan, BakeRequest, DiskSpace, Event},
+    bake::{self, BakeEvent, BakePlan, BakeRequest, DiskSpace},
     branch::BranchPoint,
 };
 
@@ -22,7 +22,7 @@ use super::{
     dry_run::DryRun,
     interrupt::{self, Interrupt},
     lint::DenyArgs,
-    output,
+    output, pass_times,
     progress::{Mode, Progress, Recurring, Status},
     set_variable, size,
 };
@@ -169,7 +169,7 @@ pub(super) fn run(args: &BakeArgs, progress: &Progress) -> Result<u8, Failure> {
             "interrupted": outcome.interrupted, "directory": output::path(&request.directory),
         }),
     );
-    output::pass_times(progress, &outcome.passes, &outcome.shares, outcome.frames);
+    pass_times::report(progress, &outcome.passes, &outcome.shares, outcome.frames);
     Ok(if outcome.interrupted {
         interrupt::EXIT_CODE as u8
     } else {
@@ -227,9 +227,9 @@ fn warn_of_disk(progress: &Progress, disk: DiskSpace) {
     }
 }
 
-pub(super) fn tell(progress: &Progress, event: Event) {
+pub(super) fn tell(progress: &Progress, event: BakeEvent) {
     match event {
-        Event::Ready {
+        BakeEvent::Ready {
             device,
             software_warning,
             particles,
@@ -301,7 +301,7 @@ pub(super) fn tell(progress: &Progress, event: Event) {
                 }),
             );
         }
-        Event::Frame {
+        BakeEvent::Frame {
             frame,
             report,
             seconds,
@@ -315,7 +315,7 @@ pub(super) fn tell(progress: &Progress, event: Event) {
                 json!({ "event": "frame", "frame": frame, "seconds": seconds, "report": report }),
             );
         }
-        Event::Written { bytes } => progress.wrote(bytes),
+        BakeEvent::Written { bytes } => progress.wrote(bytes),
     }
 }
 

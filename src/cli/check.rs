@@ -8,7 +8,9 @@ use serde_json::json;
 use swell_domain::{frame_range::FrameRange, substep::SubstepChoice};
 use swell_scene::Method;
 use swell_stage::{
-    check::{CheckOutcome, CheckRequest, Event, FirstOver, Row, Source, Table, check},
+    check::{
+        CheckEvent, CheckInput, CheckOutcome, CheckRequest, CheckRow, CheckTable, FirstOver, check,
+    },
     device::{Gpu, Imprecision},
     replay::{Replayed, is_failed, replay_failed},
 };
@@ -179,7 +181,7 @@ fn run_render(args: &CheckArgs, look: &PathBuf, progress: &Progress) -> Result<u
     )
 }
 
-fn source(args: &CheckArgs) -> Result<Source, Failure> {
+fn source(args: &CheckArgs) -> Result<CheckInput, Failure> {
     let misplaced = |option, what, is| Failure {
         code: 2,
         error: Box::new(Misplaced {
@@ -198,18 +200,18 @@ fn source(args: &CheckArgs) -> Result<Source, Failure> {
             ));
         }
         let scene = bake::load(&args.source, &args.set, args.solver, args.allow_outside)?;
-        return Ok(Source::Scene(Box::new(scene)));
+        return Ok(CheckInput::Scene(Box::new(scene)));
     }
     if args.solver.is_some() || !args.set.is_empty() {
         let is = "a cache: it records what it was baked with";
         return Err(misplaced("--solver or --set", "scenes", is));
     }
-    Ok(Source::Cache(args.source.clone(), args.frames.clone()))
+    Ok(CheckInput::Cache(args.source.clone(), args.frames.clone()))
 }
 
-fn tell(progress: &Progress, event: &Event<'_>) {
+fn tell(progress: &Progress, event: &CheckEvent<'_>) {
     match event {
-        Event::Ready {
+        CheckEvent::Ready {
             device,
             software_warning,
             solver,
@@ -231,7 +233,7 @@ fn tell(progress: &Progress, event: &Event<'_>) {
                 }),
             );
         }
-        Event::Frame {
+        CheckEvent::Frame {
             frame,
             checked,
             seconds,
@@ -286,7 +288,7 @@ fn short(value: f64) -> String {
     }
 }
 
-fn line(row: &Row) -> String {
+fn line(row: &CheckRow) -> String {
     let worst = &row.worst;
     format!(
         "{:28} {:30} {:>4} {:>9} {:>6} {:>9} {:>9} {:>9} {:>8}{}",
@@ -303,7 +305,7 @@ fn line(row: &Row) -> String {
     )
 }
 
-fn show(table: &Table) -> String {
+fn show(table: &CheckTable) -> String {
     let mut text = format!(
         "{:28} {:30} {:>4} {:>9} {:>6} {:>9} {:>9} {:>9} {:>8}\n",
         "pass", "field", "unit", "values", "ties", "max", "worst", "allowed", "part"

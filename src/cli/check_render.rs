@@ -8,7 +8,7 @@ use serde_json::json;
 
 use swell_domain::frame_range::FrameRange;
 use swell_stage::render::surfaces::{
-    DEPTH, Event, NORMAL, SurfaceOutcome, SurfaceRequest, check_render,
+    DEPTH, NORMAL, SurfaceOutcome, SurfaceRequest, SurfacesEvent, check_render,
 };
 
 use super::{
@@ -77,9 +77,9 @@ pub(super) fn run(
     })
 }
 
-fn tell(progress: &Progress, event: Event) {
+fn tell(progress: &Progress, event: SurfacesEvent) {
     match event {
-        Event::Ready {
+        SurfacesEvent::Ready {
             device,
             software_warning,
             frames,
@@ -94,7 +94,7 @@ fn tell(progress: &Progress, event: Event) {
                 json!({ "event": "ready", "device": device, "frames": frames }),
             );
         }
-        Event::Frame { frame, seconds } => progress.frame(
+        SurfacesEvent::Frame { frame, seconds } => progress.frame(
             &format!("frame {frame:4}  {seconds:.2} s"),
             Status::Done,
             json!({ "event": "frame", "frame": frame, "seconds": seconds }),

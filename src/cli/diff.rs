@@ -11,7 +11,7 @@ use swell_domain::frame_range::{FrameRange, ranges};
 use swell_files::tolerance;
 use swell_stage::diff::{
     AggregatePeak, BaselineDiff, Basis, CacheDiff, DiffOutcome, DiffRequest, Fault, Images,
-    PairDiff, PicturesDiff, Written, aggregate_peaks, diff, write_baseline,
+    PairDiff, PicturesDiff, WrittenBaseline, aggregate_peaks, diff, write_baseline,
 };
 
 use super::{Failure, OUT_OF_TOLERANCE, output};
@@ -372,7 +372,7 @@ fn show_baseline(out: &mut String, diff: &BaselineDiff) -> std::fmt::Result {
     Ok(())
 }
 
-fn show_written(file: &std::path::Path, written: &Written) -> String {
+fn show_written(file: &std::path::Path, written: &WrittenBaseline) -> String {
     let mut text = format!(
         "{}: {} frames of {}{}\n",
         file.display(),

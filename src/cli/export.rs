@@ -8,7 +8,7 @@ use serde_json::json;
 
 use swell_domain::{chunk::Chunk, frame_range::FrameRange};
 use swell_stage::export::{
-    Event, ExportRequest, Pattern, Target, UsdWater, VOXELS, expected, export,
+    ExportEvent, ExportRequest, Pattern, Target, UsdWater, VOXELS, expected, export,
 };
 
 use super::{
@@ -41,7 +41,7 @@ pub(super) struct ExportArgs {
         value_name = "WATER",
         requires = "usd"
     )]
-    usd_water: Water,
+    usd_water: WaterForm,
     /// Particles as NumPy arrays, such as p.%04d.npy.
     #[arg(long, value_name = "FILES")]
     npy: Option<Pattern>,
@@ -96,7 +96,7 @@ pub(super) struct ExportArgs {
 }
 
 #[derive(ValueEnum, Clone, Copy, Debug, Default)]
-enum Water {
+enum WaterForm {
     #[default]
     Points,
     Mesh,
@@ -112,8 +112,8 @@ fn voxels(text: &str) -> Result<f64, String> {
 impl ExportArgs {
     fn targets(&self) -> Vec<Target> {
         let water = match self.usd_water {
-            Water::Points => UsdWater::Points,
-            Water::Mesh => UsdWater::Mesh,
+            WaterForm::Points => UsdWater::Points,
+            WaterForm::Mesh => UsdWater::Mesh,
         };
         let all = [
             self.mesh.clone().map(Target::Mesh),
@@ -216,9 +216,9 @@ fn places(request: &ExportRequest) -> Vec<String> {
     places
 }
 
-fn tell(progress: &Progress, event: Event) {
+fn tell(progress: &Progress, event: ExportEvent) {
     match event {
-        Event::Ready {
+        ExportEvent::Ready {
             frames,
             files,
             warnings,
@@ -239,7 +239,7 @@ fn tell(progress: &Progress, event: Event) {
                 );
             }
         }
-        Event::Warning { frame, off, text } => {
+        ExportEvent::Warning { frame, off, text } => {
             progress.recur(Recurring {
                 what: "volume",
                 frame,
@@ -248,7 +248,7 @@ fn tell(progress: &Progress, event: Event) {
                 event: json!({}),
             });
         }
-        Event::Frame {
+        ExportEvent::Frame {
             frame,
             made,
             bytes,
@@ -275,6 +275,6 @@ fn tell(progress: &Progress, event: Event) {
                 }),
             );
         }
-        Event::Failed { frame, error } => frame_failed(progress, frame, &*error),
+        ExportEvent::Failed { frame, error } => frame_failed(progress, frame, &*error),
     }
 }

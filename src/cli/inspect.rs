@@ -18,8 +18,8 @@ use swell_stage::{
     bake::BakePlan,
     device::Gpu,
     inspect::{
-        Adapter, Entry, LIST_BUDGET, MOST_NODES, Manifest, PARTICLES, PROBES, Rounding, ScenePlan,
-        adapters, cache, plan, plot,
+        Adapter, LIST_BUDGET, LedgerEntry, MOST_NODES, Manifest, PARTICLES, PROBES, Rounding,
+        ScenePlan, adapters, cache, plan, plot,
     },
     replay::is_failed,
     time::{Timed, time},
@@ -27,7 +27,7 @@ use swell_stage::{
 
 use super::{
     Failure, RequireArgs, bake, check::Misplaced, count, is_cache, lint::DenyArgs, named_adapter,
-    output, size,
+    output, pass_times, size,
 };
 
 #[derive(Args, Debug)]
@@ -146,7 +146,7 @@ pub(super) fn run(args: &InspectArgs) -> Result<u8, Failure> {
                 }
                 _ => {
                     let shares = planned.plan.shares(&[]);
-                    let _ = write!(text, "\n{}", output::shares(&shares, None));
+                    let _ = write!(text, "\n{}", pass_times::shares(&shares, None));
                 }
             }
             misfit = planned.misfit;
@@ -409,10 +409,14 @@ fn show_time(out: &mut String, timed: &Timed) -> fmt::Result {
          by pass, one by one:\n",
         timed.substeps, timed.device
     )?;
-    write!(out, "{}", output::shares(&timed.shares, Some(timed.frames)))
+    write!(
+        out,
+        "{}",
+        pass_times::shares(&timed.shares, Some(timed.frames))
+    )
 }
 
-fn show_cache(out: &mut String, manifest: &Manifest, entries: &[Entry]) -> fmt::Result {
+fn show_cache(out: &mut String, manifest: &Manifest, entries: &[LedgerEntry]) -> fmt::Result {
     writeln!(
         out,
         "{}: {} by {} {}",
@@ -489,7 +493,7 @@ fn show_cache(out: &mut String, manifest: &Manifest, entries: &[Entry]) -> fmt::
 }
 
 /// One line per column of each probe: its minimum, maximum and last value.
-fn show_probes(out: &mut String, manifest: &Manifest, entries: &[Entry]) -> fmt::Result {
+fn show_probes(out: &mut String, manifest: &Manifest, entries: &[LedgerEntry]) -> fmt::Result {
     if manifest.probes.is_empty() {
         return Ok(());
     }
@@ -501,7 +505,8 @@ fn show_probes(out: &mut String, manifest: &Manifest, entries: &[Entry]) -> fmt:
     for (index, probe) in manifest.probes.iter().enumerate() {
         for (k, column) in probe.columns.iter().enumerate() {
             let values = || {
-                let of = |entry| probe.looks(Entry::row(entry, PROBES, index), entry.clock.time);
+                let of =
+                    |entry| probe.looks(LedgerEntry::row(entry, PROBES, index), entry.clock.time);
                 entries.iter().flat_map(of).map(|look| look.values[k])
             };
             let least = values().flatten().min_by(f64::total_cmp);
@@ -520,7 +525,7 @@ fn show_probes(out: &mut String, manifest: &Manifest, entries: &[Entry]) -> fmt:
 }
 
 /// Iterations and the fields of `projection`; the start has neither.
-fn projection_columns(entry: &Entry) -> String {
+fn projection_columns(entry: &LedgerEntry) -> String {
     let of = |table: Option<&serde_json::Value>, key: &str| table?.get(key)?.as_f64();
     let projection = entry.report.get("projection");
     let number = |value: Option<f64>| value.map_or("-".to_owned(), |v| format!("{v}"));

@@ -14,6 +14,7 @@ mod keys;
 mod lint;
 mod log;
 mod output;
+mod pass_times;
 mod progress;
 mod render;
 mod shell;

@@ -64,7 +64,7 @@ impl Status {
 const RECENT: usize = 8;
 
 /// Frames of one job: their number and the progress.
-struct Job {
+struct JobProgress {
     frames: u64,
     seen: u64,
     /// When the last of them ended, or when the job began.
@@ -73,7 +73,7 @@ struct Job {
     recent: VecDeque<Duration>,
 }
 
-impl Job {
+impl JobProgress {
     fn new(frames: u64) -> Self {
         Self {
             frames,
@@ -129,7 +129,7 @@ fn tenths(seconds: f64) -> f64 {
 /// State of a whole command.
 struct State {
     bar: Option<ProgressBar>,
-    job: Job,
+    job: JobProgress,
     /// Whether the job was started by [`Progress::set_frames`].
     is_set: bool,
     done: u64,
@@ -165,7 +165,7 @@ impl Progress {
             begun: Instant::now(),
             state: RefCell::new(State {
                 bar: None,
-                job: Job::new(0),
+                job: JobProgress::new(0),
                 is_set: false,
                 done: 0,
                 skipped: 0,
@@ -189,7 +189,7 @@ impl Progress {
         self.sum_up();
         self.finish();
         let mut state = self.state.borrow_mut();
-        state.job = Job::new(frames);
+        state.job = JobProgress::new(frames);
         state.is_set = false;
         state.bar = (self.mode == Mode::Auto).then(|| bar(frames));
     }
@@ -456,7 +456,7 @@ mod tests {
     #[test]
     fn the_time_left_is_that_of_the_last_frames() {
         let begin = Instant::now();
-        let mut job = Job::new(24);
+        let mut job = JobProgress::new(24);
         job.before = begin;
         assert_eq!(job.seconds_left(), None);
         // Frames that existed already carry no information.
@@ -481,9 +481,9 @@ mod tests {
         assert_eq!(job.seconds_left_within(&half), Some(21.0));
         assert_eq!(job.seconds_left_within(&told(None)), None);
         // The first frame is all that is known about the others.
-        let first = Job::new(10);
+        let first = JobProgress::new(10);
         assert_eq!(first.seconds_left_within(&half), Some(57.0));
-        assert_eq!(Job::new(0).seconds_left_within(&half), None);
+        assert_eq!(JobProgress::new(0).seconds_left_within(&half), None);
         for _ in 0..10 {
             job.add(Status::Skipped, now);
         }

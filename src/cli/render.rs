@@ -7,14 +7,14 @@ use clap::Args;
 use serde_json::json;
 
 use swell_domain::{chunk::Chunk, frame_range::FrameRange};
-use swell_stage::render::{Event, RenderRequest, expected, render};
+use swell_stage::render::{RenderEvent, RenderRequest, expected, render};
 
 use super::{
     Failure, GpuArgs, bake, count,
     dry_run::DryRun,
     failed::{failed_in_all, frame_failed, refuse_failed},
     interrupt::{self, Interrupt},
-    output,
+    output, pass_times,
     progress::{Mode, Progress, Status},
 };
 
@@ -109,7 +109,7 @@ pub(super) fn run(args: &RenderArgs, progress: &Progress) -> Result<u8, Failure>
             "interrupted": outcome.interrupted, "directory": output::path(&request.directory),
         }),
     );
-    output::pass_times(progress, &outcome.passes, &[], outcome.rendered);
+    pass_times::report(progress, &outcome.passes, &[], outcome.rendered);
     if outcome.interrupted {
         return Ok(interrupt::EXIT_CODE as u8);
     }
@@ -130,9 +130,9 @@ fn dry_run(request: &RenderRequest, progress: &Progress) -> Result<u8, Failure> 
     Ok(0)
 }
 
-pub(super) fn tell(progress: &Progress, event: Event) {
+pub(super) fn tell(progress: &Progress, event: RenderEvent) {
     match event {
-        Event::Ready {
+        RenderEvent::Ready {
             device,
             software_warning,
             size,
@@ -165,19 +165,19 @@ pub(super) fn tell(progress: &Progress, event: Event) {
                 );
             }
         }
-        Event::Waiting { frames } => progress.say(
+        RenderEvent::Waiting { frames } => progress.say(
             &format!(
                 "waiting for {} that other processes render",
                 count(frames as u64, "frame")
             ),
             json!({ "event": "waiting", "frames": frames }),
         ),
-        Event::Part { frame, part } => progress.part(
+        RenderEvent::Part { frame, part } => progress.part(
             &format!("frame {frame:4}"),
             (part.done.into(), part.count.into()),
             json!({ "of": "frame", "frame": frame }),
         ),
-        Event::Frame {
+        RenderEvent::Frame {
             frame,
             seconds,
             skipped,
@@ -197,6 +197,6 @@ pub(super) fn tell(progress: &Progress, event: Event) {
                 }),
             );
         }
-        Event::Failed { frame, error } => frame_failed(progress, frame, &*error),
+        RenderEvent::Failed { frame, error } => frame_failed(progress, frame, &*error),
     }
 }

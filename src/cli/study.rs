@@ -6,7 +6,7 @@ use clap::Args;
 use serde_json::json;
 
 use swell_domain::{chunk::Chunk, posix};
-use swell_experiment::{Event, PointEvent, PointStatus, Share, StudyRequest, study};
+use swell_experiment::{PointEvent, PointStatus, Share, StudyEvent, StudyRequest, study};
 use swell_files::study::Study;
 
 use super::{
@@ -67,18 +67,18 @@ pub(super) fn run(args: &StudyArgs, progress: &Progress) -> Result<u8, Failure> 
 pub(super) fn conduct(request: &StudyRequest, progress: &Progress) -> Result<u8, Failure> {
     let interrupt = Interrupt::install_or_warn();
     let outcome = study(request, interrupt.flag(), &mut |event| match event {
-        Event::Solver(name) => progress.say(
+        StudyEvent::Solver(name) => progress.say(
             &format!("solver {name}"),
             json!({ "event": "solver", "solver": name }),
         ),
-        Event::Warning(warning) => {
+        StudyEvent::Warning(warning) => {
             let (text, event) = bake::warned(&warning);
             progress.say(&text, event);
         }
-        Event::SoftwareWarning(warning) => progress.warn_of_adapter(Some(&warning)),
-        Event::Bake(event) => bake::tell(progress, *event),
-        Event::Render(event) => render::tell(progress, event),
-        Event::Point(event) => {
+        StudyEvent::SoftwareWarning(warning) => progress.warn_of_adapter(Some(&warning)),
+        StudyEvent::Bake(event) => bake::tell(progress, *event),
+        StudyEvent::Render(event) => render::tell(progress, event),
+        StudyEvent::Point(event) => {
             progress.set_frames(event.count as u64);
             let (text, json) = point(&event);
             let status = match event.status {
@@ -88,7 +88,7 @@ pub(super) fn conduct(request: &StudyRequest, progress: &Progress) -> Result<u8,
             };
             progress.frame(&text, status, json);
         }
-        Event::Joined {
+        StudyEvent::Joined {
             share,
             file,
             points,

@@ -10,7 +10,7 @@ use clap::{Args, ValueEnum};
 use serde_json::json;
 
 use swell_domain::frame_range::FrameRange;
-use swell_stage::view::{Aspect, Event, Placing, RATE, SHEET, ViewRequest, view};
+use swell_stage::view::{Aspect, Placing, RATE, SHEET, ViewEvent, ViewRequest, view};
 
 use super::{
     Failure, bake, count,
@@ -191,9 +191,9 @@ fn open(page: &Path) {
     ));
 }
 
-fn tell(progress: &Progress, event: Event) {
+fn tell(progress: &Progress, event: ViewEvent) {
     match event {
-        Event::Ready { frames, size } => {
+        ViewEvent::Ready { frames, size } => {
             progress.begin(frames as u64);
             let [width, height] = size;
             progress.say(
@@ -201,15 +201,15 @@ fn tell(progress: &Progress, event: Event) {
                 json!({ "event": "ready", "frames": frames, "width": width, "height": height }),
             );
         }
-        Event::Note(text) => note(progress, &text),
-        Event::AssumedRate => note(
+        ViewEvent::Note(text) => note(progress, &text),
+        ViewEvent::AssumedRate => note(
             progress,
             &format!(
                 "{RATE} frames a second is assumed: give another rate with --fps, or the cache \
                  with --curves"
             ),
         ),
-        Event::PicturesBeside(bytes) => note(
+        ViewEvent::PicturesBeside(bytes) => note(
             progress,
             &format!(
                 "the page's pictures are {} MB and are beside it in pictures/: move both together, \
@@ -217,11 +217,11 @@ fn tell(progress: &Progress, event: Event) {
                 bytes / 1_000_000
             ),
         ),
-        Event::Warning(text) => progress.say(
+        ViewEvent::Warning(text) => progress.say(
             &format!("warning: {text}"),
             json!({ "event": "warning", "what": "view", "text": text }),
         ),
-        Event::Frame(label) => progress.frame(
+        ViewEvent::Frame(label) => progress.frame(
             &label,
             Status::Done,
             json!({ "event": "frame", "frame": label }),

@@ -5,15 +5,17 @@ use std::path::PathBuf;
 use clap::Args;
 use serde_json::json;
 
-use swell_domain::whitewater::Kind;
+use swell_domain::whitewater::WhitewaterKind;
 use swell_files::whitewater::WhitewaterSettings;
-use swell_stage::whitewater::{Event, LimitForecast, WhitewaterRequest, expected, whitewater};
+use swell_stage::whitewater::{
+    LimitForecast, WhitewaterEvent, WhitewaterRequest, expected, whitewater,
+};
 
 use super::{
     DeviceArgs, Failure, count,
     dry_run::DryRun,
     interrupt::{self, Interrupt},
-    output,
+    output, pass_times,
     progress::{Mode, Progress, Status},
     size,
 };
@@ -124,7 +126,7 @@ pub(super) fn run(args: &WhitewaterArgs, progress: &Progress) -> Result<u8, Fail
             "interrupted": outcome.interrupted, "directory": output::path(&outcome.directory),
         }),
     );
-    output::pass_times(progress, &outcome.passes, &[], outcome.frames);
+    pass_times::report(progress, &outcome.passes, &[], outcome.frames);
     Ok(match outcome.interrupted {
         true => interrupt::EXIT_CODE as u8,
         false => 0,
@@ -143,14 +145,14 @@ fn dry_run(request: &WhitewaterRequest, progress: &Progress) -> Result<u8, Failu
     Ok(0)
 }
 
-fn tell(progress: &Progress, event: Event) {
+fn tell(progress: &Progress, event: WhitewaterEvent) {
     match event {
-        Event::Calibrated { done, count } => progress.part(
+        WhitewaterEvent::Calibrated { done, count } => progress.part(
             "thresholds are calibrated on the shot's frames",
             (done as u64, count as u64),
             json!({ "of": "calibration" }),
         ),
-        Event::Ready {
+        WhitewaterEvent::Ready {
             device,
             software_warning,
             water,
@@ -190,13 +192,13 @@ fn tell(progress: &Progress, event: Event) {
                 }),
             );
         }
-        Event::Frame {
+        WhitewaterEvent::Frame {
             frame,
             census,
             born,
             seconds,
         } => {
-            let kinds = Kind::ALL.into_iter().zip(census);
+            let kinds = WhitewaterKind::ALL.into_iter().zip(census);
             let words: Vec<String> = kinds
                 .map(|(kind, many)| format!("{many} {}", kind.name()))
                 .collect();
@@ -214,7 +216,7 @@ fn tell(progress: &Progress, event: Event) {
                 }),
             );
         }
-        Event::LimitForecast(LimitForecast {
+        WhitewaterEvent::LimitForecast(LimitForecast {
             frame,
             at_end,
             end,
@@ -235,6 +237,6 @@ fn tell(progress: &Progress, event: Event) {
                 }),
             );
         }
-        Event::Written { bytes } => progress.wrote(bytes),
+        WhitewaterEvent::Written { bytes } => progress.wrote(bytes),
     }
 }

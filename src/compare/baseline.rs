@@ -13,7 +13,7 @@ use super::{
     limits::StatedLimit,
     spread::{self, Spread},
 };
-use swell_domain::{aggregates::Aggregates, particles::Particles, tolerance::Limit};
+use swell_domain::{aggregates::Aggregates, particles::Particles, tolerance::ErrorLimit};
 
 /// Format version that this program writes and reads.
 pub const FORMAT_VERSION: u32 = 1;
@@ -60,7 +60,7 @@ pub struct BaselineFrame {
 
 /// One frame of the cache that is compared with a baseline.
 #[derive(Clone, Debug)]
-pub struct Measured {
+pub struct MeasuredFrame {
     /// Particle count and aggregates.
     pub frame: BaselineFrame,
     /// [`particles_hash`] of the particles.
@@ -117,7 +117,7 @@ pub struct FramePair {
     /// Aggregates of the cache and of the baseline.
     pub aggregates: [Aggregates; 2],
     /// Limits of their differences, by name.
-    pub limits: BTreeMap<String, Limit>,
+    pub limits: BTreeMap<String, ErrorLimit>,
 }
 
 impl BaselineDiff {
@@ -166,7 +166,12 @@ impl Baseline {
     /// Takes over what remains valid of the previous baseline. For the same scene and frames that
     /// is everything but the aggregates; these as well if they agree and were measured on an
     /// adapter that the old baseline did not know.
-    pub fn inherit(&mut self, before: Self, is_same_scene: bool, measured: &[Measured]) -> Lost {
+    pub fn inherit(
+        &mut self,
+        before: Self,
+        is_same_scene: bool,
+        measured: &[MeasuredFrame],
+    ) -> Lost {
         let adapter = self.aggregates_from.clone();
         let number = |frame: &BaselineFrame| frame.frame;
         let has_spread = !before.spread_from.is_empty();
@@ -205,7 +210,7 @@ impl Baseline {
     pub fn compare(
         &self,
         adapter: Option<&str>,
-        measured: &[Measured],
+        measured: &[MeasuredFrame],
     ) -> (Basis, Vec<BaselineFault>) {
         let hashes = adapter.and_then(|adapter| self.hashes.get(adapter));
         let mut faults = Vec::new();
@@ -243,8 +248,8 @@ impl Baseline {
     }
 
     /// Returns the aggregates of the frames that both have, with the limits of their differences.
-    pub fn pairs(&self, adapter: Option<&str>, measured: &[Measured]) -> Vec<FramePair> {
-        let pair = |found: &Measured| {
+    pub fn pairs(&self, adapter: Option<&str>, measured: &[MeasuredFrame]) -> Vec<FramePair> {
+        let pair = |found: &MeasuredFrame| {
             let frame = found.frame.frame;
             let expected = self.frames.iter().find(|f| f.frame == frame)?;
             Some(FramePair {
@@ -279,7 +284,7 @@ impl Baseline {
 
     /// Whether the baseline's aggregates of the frame at `index` were measured from these
     /// very particles.
-    fn is_same(&self, adapter: Option<&str>, index: usize, found: &Measured) -> bool {
+    fn is_same(&self, adapter: Option<&str>, index: usize, found: &MeasuredFrame) -> bool {
         let known = adapter.filter(|adapter| *adapter == self.aggregates_from);
         let hashes = known.and_then(|adapter| self.hashes.get(adapter));
         hashes.and_then(|hashes| hashes.get(index)) == Some(&found.hash)
@@ -288,13 +293,17 @@ impl Baseline {
     /// Returns the limits of a frame's aggregates; empty for a frame that the baseline does not
     /// have. For bit-identical particles the limit is the rounding of a sum of n terms of one sign,
     /// n ε of the sum (Higham 2002, eq. 4.4).
-    pub fn limits(&self, adapter: Option<&str>, found: &Measured) -> BTreeMap<String, Limit> {
+    pub fn limits(
+        &self,
+        adapter: Option<&str>,
+        found: &MeasuredFrame,
+    ) -> BTreeMap<String, ErrorLimit> {
         let mut frames = self.frames.iter().enumerate();
         let Some((index, expected)) = frames.find(|(_, f)| f.frame == found.frame.frame) else {
             return BTreeMap::new();
         };
         if self.is_same(adapter, index, found) {
-            let limit = Limit {
+            let limit = ErrorLimit {
                 absolute: 0.0,
                 relative: expected.particles as f64 * f64::EPSILON,
             };
@@ -306,7 +315,7 @@ impl Baseline {
             spread.copied().unwrap_or(0.0)
         };
         let limit = |(name, stated): (&String, &StatedLimit)| {
-            let limit = Limit {
+            let limit = ErrorLimit {
                 absolute: stated.absolute + stated.spreads * spread(name),
                 relative: stated.relative,
             };
@@ -381,7 +390,7 @@ mod tests {
         }
     }
 
-    fn measured(hash: &str, aggregates: Aggregates) -> Vec<Measured> {
+    fn measured(hash: &str, aggregates: Aggregates) -> Vec<MeasuredFrame> {
         let frame = BaselineFrame {
             frame: 3,
             particles: 10,
@@ -389,7 +398,7 @@ mod tests {
             spread: None,
         };
         let hash = hash.to_owned();
-        vec![Measured { frame, hash }]
+        vec![MeasuredFrame { frame, hash }]
     }
 
     fn baseline() -> Baseline {
@@ -411,7 +420,11 @@ mod tests {
         named(&baseline(), Some(adapter), &measured(hash, found))
     }
 
-    fn named(baseline: &Baseline, adapter: Option<&str>, measured: &[Measured]) -> Vec<String> {
+    fn named(
+        baseline: &Baseline,
+        adapter: Option<&str>,
+        measured: &[MeasuredFrame],
+    ) -> Vec<String> {
         let (_, faults) = baseline.compare(adapter, measured);
         let name = |f: BaselineFault| format!("{} {}", f.fault.what, f.fault.measure);
         faults.into_iter().map(name).collect()

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use serde::Serialize;
-use swell_domain::tolerance::Limit;
+use swell_domain::tolerance::ErrorLimit;
 
 use super::{frames::FrameDiff, streams::StreamDiff};
 
@@ -30,7 +30,7 @@ pub struct CacheDiff {
     pub streams: Vec<StreamDiff>,
     /// Limits of aggregates by which caches of different devices are judged if no tolerance is
     /// given: roundings differ, so that bits cannot be the same.
-    pub device_limits: Option<BTreeMap<String, Limit>>,
+    pub device_limits: Option<BTreeMap<String, ErrorLimit>>,
     /// Whether stream differences are judged: only where every bit has to be the same, because a
     /// tolerance does not name streams.
     pub streams_judged: bool,

@@ -5,7 +5,7 @@ use serde::Serialize;
 use swell_domain::statistics::percentile;
 
 /// A value that can be compared: scalars and 3-vectors, f32 or f64.
-pub trait Value: Copy {
+pub trait ComparedValue: Copy {
     /// Returns the Euclidean norm.
     fn norm(self) -> f64;
     /// Returns the norm of the difference, in f64; infinite if either value is not finite, so that
@@ -13,7 +13,7 @@ pub trait Value: Copy {
     fn error(self, reference: Self) -> f64;
 }
 
-impl Value for f64 {
+impl ComparedValue for f64 {
     fn norm(self) -> f64 {
         self.abs()
     }
@@ -23,7 +23,7 @@ impl Value for f64 {
     }
 }
 
-impl Value for f32 {
+impl ComparedValue for f32 {
     fn norm(self) -> f64 {
         f64::from(self).abs()
     }
@@ -33,7 +33,7 @@ impl Value for f32 {
     }
 }
 
-impl Value for [f64; 3] {
+impl ComparedValue for [f64; 3] {
     fn norm(self) -> f64 {
         glam::DVec3::from(self).length()
     }
@@ -43,7 +43,7 @@ impl Value for [f64; 3] {
     }
 }
 
-impl Value for glam::DVec3 {
+impl ComparedValue for glam::DVec3 {
     fn norm(self) -> f64 {
         self.length()
     }
@@ -53,7 +53,7 @@ impl Value for glam::DVec3 {
     }
 }
 
-impl Value for [f32; 3] {
+impl ComparedValue for [f32; 3] {
     fn norm(self) -> f64 {
         self.map(f64::from).norm()
     }
@@ -95,7 +95,7 @@ pub struct Deviation {
 
 impl Deviation {
     /// Measures pairs of a value and its reference.
-    pub fn of<T: Value>(pairs: impl IntoIterator<Item = (T, T)>) -> Self {
+    pub fn of<T: ComparedValue>(pairs: impl IntoIterator<Item = (T, T)>) -> Self {
         let mut reference_squares = 0.0;
         let mut this = Self::default();
         let errors: Vec<f64> = pairs
@@ -125,7 +125,7 @@ impl Deviation {
     ///
     /// # Panics
     /// If the lengths differ.
-    pub fn between<T: Value>(values: &[T], reference: &[T]) -> Self {
+    pub fn between<T: ComparedValue>(values: &[T], reference: &[T]) -> Self {
         assert_eq!(values.len(), reference.len(), "pairs of values");
         Self::of(values.iter().copied().zip(reference.iter().copied()))
     }
@@ -165,7 +165,7 @@ pub fn relative(error: f64, scale: f64) -> f64 {
 }
 
 /// Returns the index of the first pair whose error exceeds `tolerance`.
-pub fn first_over<T: Value>(
+pub fn first_over<T: ComparedValue>(
     pairs: impl IntoIterator<Item = (T, T)>,
     tolerance: f64,
 ) -> Option<usize> {

@@ -9,7 +9,7 @@ use super::{
 use swell_domain::{
     aggregates::Aggregates,
     particles::Particles,
-    tolerance::{FieldLimits, Limit, Tolerance},
+    tolerance::{ErrorLimit, FieldLimits, Tolerance},
 };
 
 /// Differences between two frames, and those that are out of tolerance.
@@ -83,7 +83,7 @@ pub struct Fault {
 }
 
 /// A field of the particles that both frames have.
-struct Field<const N: usize> {
+struct PairedField<const N: usize> {
     name: String,
     ids: Vec<u32>,
     a: Vec<[f32; N]>,
@@ -108,7 +108,7 @@ pub fn compare(
         ("velocity", &a.velocity, &b.velocity),
     ];
     for (name, a_values, b_values) in vectors {
-        let field = Field::of(name, &a.id, &matches.pairs, a_values, b_values);
+        let field = PairedField::of(name, &a.id, &matches.pairs, a_values, b_values);
         fields.push(field.compare(tolerance, &mut faults));
     }
     for (name, a_values) in &a.attributes {
@@ -116,7 +116,7 @@ pub fn compare(
             continue;
         };
         let [a_values, b_values] = [a_values, b_values].map(|values| scalars(values));
-        let field = Field::of(name, &a.id, &matches.pairs, &a_values, &b_values);
+        let field = PairedField::of(name, &a.id, &matches.pairs, &a_values, &b_values);
         fields.push(field.compare(tolerance, &mut faults));
     }
     lone_attributes(particles, tolerance, &mut faults);
@@ -141,7 +141,7 @@ pub fn compare(
 /// for its name.
 pub fn aggregate_faults(
     [a, b]: &[Aggregates; 2],
-    limit_of: impl Fn(&str) -> Option<Limit>,
+    limit_of: impl Fn(&str) -> Option<ErrorLimit>,
 ) -> Vec<Fault> {
     let values = a.values().into_iter().zip(b.values());
     let mut faults = Vec::new();
@@ -255,7 +255,7 @@ fn scalars(values: &[f32]) -> Vec<[f32; 1]> {
     values.iter().map(|&value| [value]).collect()
 }
 
-impl<const N: usize> Field<N> {
+impl<const N: usize> PairedField<N> {
     fn of(
         name: &str,
         ids: &[u32],
@@ -454,7 +454,7 @@ mod tests {
         );
         // A tolerance that judges no particles ignores them.
         let aggregates = Tolerance {
-            aggregates: BTreeMap::from([("volume".to_owned(), Limit::default())]),
+            aggregates: BTreeMap::from([("volume".to_owned(), ErrorLimit::default())]),
             ..Tolerance::default()
         };
         assert!(compared(&a, &b, Some(&aggregates)).faults.is_empty());
@@ -536,15 +536,15 @@ mod tests {
             front: None,
             ..b
         };
-        let limit = |absolute, relative| Limit { absolute, relative };
-        let judged = |name: &'static str, given: Limit| {
+        let limit = |absolute, relative| ErrorLimit { absolute, relative };
+        let judged = |name: &'static str, given: ErrorLimit| {
             aggregate_faults(&[a, b], |asked| (asked == name).then_some(given)).len()
         };
         assert_eq!(judged("volume", limit(0.2, 0.03)), 0);
         assert_eq!(judged("volume", limit(0.2, 0.02)), 1);
         // A front on only one side exceeds any limit.
         assert_eq!(judged("front", limit(1e9, 0.0)), 1);
-        assert_eq!(judged("density_error", Limit::default()), 0);
+        assert_eq!(judged("density_error", ErrorLimit::default()), 0);
         let peaks = aggregate_peaks(&[(3, [b, b]), (4, [a, b]), (5, [a, b])]);
         let volume = peaks.iter().find(|p| p.name == "volume").expect("there");
         assert_eq!(

@@ -19,4 +19,4 @@ pub mod spread;
 pub mod streams;
 pub mod tolerance;
 
-pub use deviation::{Deviation, Value};
+pub use deviation::{ComparedValue, Deviation};

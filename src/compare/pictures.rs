@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use serde::{Serialize, Serializer};
 
 use super::{
-    deviation::{Value, out_of_limits},
+    deviation::{ComparedValue, out_of_limits},
     perceptual,
 };
 use swell_domain::{feature::MissingFeature, statistics::percentile, tolerance::PictureLimits};

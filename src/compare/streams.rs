@@ -6,7 +6,7 @@ use std::cmp::Ordering;
 use serde::Serialize;
 use serde_json::Value as Json;
 
-use super::Value;
+use super::ComparedValue;
 use swell_domain::sparse_grid::{Leaf, SparseGrid, VOXELS};
 
 /// Differences in one stream of one frame.
@@ -64,7 +64,11 @@ pub struct GridDiff {
 }
 
 /// Compares grids whose voxels have the same positions.
-pub fn grids<T: Value + PartialEq>(name: &str, a: &SparseGrid<T>, b: &SparseGrid<T>) -> GridDiff {
+pub fn grids<T: ComparedValue + PartialEq>(
+    name: &str,
+    a: &SparseGrid<T>,
+    b: &SparseGrid<T>,
+) -> GridDiff {
     let mut found = GridDiff {
         grid: name.to_owned(),
         active: [a.active_count(), b.active_count()],
@@ -90,7 +94,7 @@ pub fn grids<T: Value + PartialEq>(name: &str, a: &SparseGrid<T>, b: &SparseGrid
 }
 
 impl GridDiff {
-    fn leaf<T: Value + PartialEq>(&mut self, a: &Leaf<T>, b: &Leaf<T>) {
+    fn leaf<T: ComparedValue + PartialEq>(&mut self, a: &Leaf<T>, b: &Leaf<T>) {
         for element in 0..VOXELS {
             match (a.is_active(element), b.is_active(element)) {
                 (false, false) => {}
@@ -100,7 +104,7 @@ impl GridDiff {
         }
     }
 
-    fn voxel<T: Value + PartialEq>(&mut self, a: &Leaf<T>, b: &Leaf<T>, element: usize) {
+    fn voxel<T: ComparedValue + PartialEq>(&mut self, a: &Leaf<T>, b: &Leaf<T>, element: usize) {
         let (x, y) = (a.values[element], b.values[element]);
         self.different += u64::from(x != y);
         let error = x.error(y);
@@ -113,7 +117,7 @@ impl GridDiff {
 
 /// Row of a probe for one frame.
 #[derive(Clone, Copy, Debug)]
-pub struct Row<'a> {
+pub struct ProbeRow<'a> {
     /// Names of the columns.
     pub columns: &'a [String],
     /// Values; `None` where there was nothing to measure.
@@ -122,8 +126,8 @@ pub struct Row<'a> {
 
 /// Returns the columns in which two rows differ in any bit, or that only one side has; in a's
 /// order, then b's.
-pub fn rows(a: Row<'_>, b: Row<'_>) -> Vec<Difference> {
-    let value = |row: Row<'_>, column: &String| {
+pub fn rows(a: ProbeRow<'_>, b: ProbeRow<'_>) -> Vec<Difference> {
+    let value = |row: ProbeRow<'_>, column: &String| {
         let index = row.columns.iter().position(|c| c == column)?;
         Some(row.values.get(index).copied().flatten())
     };
@@ -222,7 +226,7 @@ mod tests {
     #[test]
     fn a_row_differs_in_the_columns_that_are_named() {
         let columns = ["eta_m", "depth_m", "speed_m_s"].map(str::to_owned);
-        let row = |columns, values| Row { columns, values };
+        let row = |columns, values| ProbeRow { columns, values };
         let b = row(&columns, &[Some(1.0), None, Some(0.0)]);
         assert_eq!(rows(b, b), []);
         let value = |key: &str, a: Json, b: Json| Difference::Value {

@@ -8,21 +8,21 @@
 use std::fmt;
 
 /// An expression of `N` magnitudes.
-pub struct Bound<const N: usize> {
+pub struct BoundExpression<const N: usize> {
     /// Printed form and explanation.
     pub text: Text,
     /// Evaluates the bound, from the magnitudes in the order of their declaration.
     pub of: fn([f64; N]) -> f64,
 }
 
-impl<const N: usize> Bound<N> {
+impl<const N: usize> BoundExpression<N> {
     /// Evaluates the bound, from the magnitudes in the order of their declaration.
     pub fn of(&self, magnitudes: [f64; N]) -> f64 {
         (self.of)(magnitudes)
     }
 }
 
-/// Printed form of a [`Bound`].
+/// Printed form of a [`BoundExpression`].
 pub struct Text {
     /// Source text of the expression.
     pub expression: &'static str,
@@ -132,12 +132,13 @@ fn whole_numbers(word: &str) -> String {
     out + rest
 }
 
-/// Builds a [`Bound`]: `[name: "what it is", other: "what it is" ITS_BOUND] expression, "reason"`.
+/// Builds a [`BoundExpression`]:
+/// `[name: "what it is", other: "what it is" ITS_BOUND] expression, "reason"`.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! bound {
     ([$($name:ident: $words:literal $($bound:ident)?),* $(,)?] $value:expr, $reason:literal) => {
-        $crate::tolerance::Bound {
+        $crate::tolerance::BoundExpression {
             text: $crate::tolerance::Text {
                 expression: stringify!($value),
                 magnitudes: &[$($crate::tolerance::Magnitude {
@@ -172,7 +173,7 @@ pub use crate::optional;
 macro_rules! bounds {
     ($($(#[$meta:meta])* $visible:vis $name:ident = [$($magnitudes:tt)*]
         $value:expr, $reason:literal;)+) => {
-        $($(#[$meta])* $visible static $name: $crate::tolerance::Bound<
+        $($(#[$meta])* $visible static $name: $crate::tolerance::BoundExpression<
             { $crate::tolerance::count!($($magnitudes)*) }
         > = $crate::tolerance::bound!([$($magnitudes)*] $value, $reason);)+
     };

@@ -33,7 +33,7 @@ pub struct Gauge<'a> {
 
 /// A cell.
 #[derive(Clone, Copy)]
-enum Cell {
+enum CellState {
     /// Its pressure, Pa.
     Water(f64),
     /// Water whose centre lies within a wall or a solid, and the projection's pressure there, Pa.
@@ -56,7 +56,7 @@ enum Reading {
     Load,
 }
 
-impl Cell {
+impl CellState {
     /// Pressure of water that is not buried.
     fn water(self) -> Option<f64> {
         match self {
@@ -125,16 +125,17 @@ impl Gauge<'_> {
             (scaled[axis].floor() as i64).clamp(0, last)
         });
         let own = match self.cell(own, reading) {
-            Cell::Water(pressure) | Cell::Buried(pressure) => pressure,
-            Cell::Air => return Found::Air,
-            Cell::Solid => return Found::Solid,
+            CellState::Water(pressure) | CellState::Buried(pressure) => pressure,
+            CellState::Air => return Found::Air,
+            CellState::Solid => return Found::Solid,
         };
         let first = (scaled - 0.5).floor();
         let part = scaled - 0.5 - first;
         let place = |corner: usize| -> [i64; 3] {
             std::array::from_fn(|axis| first[axis] as i64 + (corner >> axis & 1) as i64)
         };
-        let around: [Cell; 8] = std::array::from_fn(|corner| self.cell(place(corner), reading));
+        let around: [CellState; 8] =
+            std::array::from_fn(|corner| self.cell(place(corner), reading));
         let weight = |corner: usize| -> f64 {
             (0..3)
                 .map(|axis| [1.0 - part[axis], part[axis]][corner >> axis & 1])
@@ -143,12 +144,12 @@ impl Gauge<'_> {
         let last = (reading == Reading::Load).then(|| place(7));
         let beyond = |corner: usize| self.beyond(&around, corner, last);
         let value = |corner: usize| match around[corner] {
-            Cell::Water(pressure) => pressure,
-            Cell::Air => 0.0,
+            CellState::Water(pressure) => pressure,
+            CellState::Air => 0.0,
             // Without a water cell whose centre is in the open, the buried cells' own pressures
             // have to do.
-            Cell::Buried(pressure) => beyond(corner).unwrap_or(pressure),
-            Cell::Solid => beyond(corner).unwrap_or(own),
+            CellState::Buried(pressure) => beyond(corner).unwrap_or(pressure),
+            CellState::Solid => beyond(corner).unwrap_or(own),
         };
         Found::Water((0..8).map(|corner| weight(corner) * value(corner)).sum())
     }
@@ -156,7 +157,12 @@ impl Gauge<'_> {
     /// Extrapolates into a solid or buried cell among eight: the mean over the water cells that are
     /// the fewest axis steps away; `None` if there are none. If `last` gives the cell with the
     /// greatest coordinates of the eight, what the faces remove counts as well.
-    fn beyond(&self, around: &[Cell; 8], corner: usize, last: Option<[i64; 3]>) -> Option<f64> {
+    fn beyond(
+        &self,
+        around: &[CellState; 8],
+        corner: usize,
+        last: Option<[i64; 3]>,
+    ) -> Option<f64> {
         let steps = |other: usize| (corner ^ other).count_ones();
         let water = || (0..8).filter_map(|other| Some((other, around[other].water()?)));
         let nearest = water().map(|(other, _)| steps(other)).min()?;
@@ -200,20 +206,20 @@ impl Gauge<'_> {
     }
 
     /// Cells outside of the domain are solid.
-    fn cell(&self, cell: [i64; 3], reading: Reading) -> Cell {
+    fn cell(&self, cell: [i64; 3], reading: Reading) -> CellState {
         let cell = self.bricks.wrapped(cell);
         let is_inside = (0..3).all(|axis| (0..i64::from(self.cells[axis])).contains(&cell[axis]));
         let element = self.element(cell).filter(|_| is_inside);
         let Some(element) = element else {
-            return Cell::Solid;
+            return CellState::Solid;
         };
         let is_buried = self.is_buried[element];
         match self.kind[element] {
-            FLUID if is_buried => Cell::Buried(self.pressure[element]),
-            FLUID => Cell::Water(self.pressure[element]),
+            FLUID if is_buried => CellState::Buried(self.pressure[element]),
+            FLUID => CellState::Water(self.pressure[element]),
             // Behind a surface there is no air.
-            AIR if reading == Reading::Field || !is_buried => Cell::Air,
-            _ => Cell::Solid,
+            AIR if reading == Reading::Field || !is_buried => CellState::Air,
+            _ => CellState::Solid,
         }
     }
 }

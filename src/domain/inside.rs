@@ -23,7 +23,7 @@ pub enum NoInside {
         /// The holes of that part.
         holes: Holes,
         /// The connected parts of the whole mesh.
-        parts: Parts,
+        parts: PartCount,
     },
     /// The mesh is closed but flat.
     #[error("the mesh encloses no volume near {place}: a plate needs a thickness")]
@@ -48,7 +48,7 @@ pub enum NoInside {
 
 /// Number of connected parts of a mesh.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Parts {
+pub struct PartCount {
     /// All connected parts.
     pub count: usize,
     /// Parts that consist of a single triangle.
@@ -56,7 +56,7 @@ pub struct Parts {
 }
 
 /// Empty for a connected mesh; otherwise tells which of the parts a message refers to.
-impl fmt::Display for Parts {
+impl fmt::Display for PartCount {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { count, lone } = self;
         match (count, lone) {
@@ -111,7 +111,7 @@ impl TriangleMesh {
             }
         }
         let all = self.parts();
-        let parts = Parts {
+        let parts = PartCount {
             count: all.len(),
             lone: all.iter().filter(|part| part.triangles.len() == 1).count(),
         };
@@ -161,7 +161,7 @@ impl TriangleMesh {
 }
 
 /// Checks that a connected part has an inside.
-fn check_part(part: &TriangleMesh, parts: Parts) -> Result<(), NoInside> {
+fn check_part(part: &TriangleMesh, parts: PartCount) -> Result<(), NoInside> {
     let holes = Holes::of(part);
     let open = |why, holes| Err(NoInside::Open { why, holes, parts });
     if holes.missing(part) > MOST_MISSING {

@@ -39,7 +39,7 @@ pub struct Isosurface {
 
 /// Extracts the mesh where the field of `level` equals `iso`; 0 is the surface of the water.
 pub fn extract(level: &LevelSet, iso: f32) -> Isosurface {
-    let grid = Grid::over(level, iso);
+    let grid = NodeGrid::over(level, iso);
     let blocks = grid.nodes.map(|n| (n - 1).div_ceil(EDGE));
     let count = blocks.map(|n| n as usize).iter().product::<usize>();
     let faces: Vec<[u64; 3]> = (0..count)
@@ -69,7 +69,7 @@ pub fn extract(level: &LevelSet, iso: f32) -> Isosurface {
 
 /// The grid of nodes: the level set's own, a last layer in the far side, and one layer of air
 /// beyond each side.
-struct Grid<'a> {
+struct NodeGrid<'a> {
     level: &'a LevelSet,
     iso: f32,
     /// Nodes along each axis, those of air included.
@@ -79,7 +79,7 @@ struct Grid<'a> {
     last: [(u32, f32); 3],
 }
 
-impl<'a> Grid<'a> {
+impl<'a> NodeGrid<'a> {
     fn over(level: &'a LevelSet, iso: f32) -> Self {
         let ends = level.size.to_array().map(|length| {
             let end = length / level.voxel;

@@ -69,7 +69,7 @@ pub enum Meeting {
 
 /// One wave of the sum: elevation a cos θ with θ = k·x − ωt + φ.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Line {
+pub struct WaveComponent {
     /// Wave vector k along x and z, rad/m.
     pub number: DVec2,
     /// Angular frequency ω, rad/s.
@@ -82,7 +82,7 @@ pub struct Line {
     pub speed: f64,
 }
 
-impl Line {
+impl WaveComponent {
     /// A free wave of linear theory (Dean and Dalrymple 1991, §3): its velocity amplitude is
     /// aω / tanh kh.
     fn free(elevation: f64, frequency: f64, number: DVec2, phase: f64, depth: f64) -> Self {
@@ -106,7 +106,7 @@ impl Line {
 #[derive(Clone, Debug, PartialEq)]
 pub struct OpenWaves {
     /// All waves of the sum.
-    pub lines: Vec<Line>,
+    pub lines: Vec<WaveComponent>,
     /// Period of regular waves, seconds; `None` for a sea.
     pub period: Option<f64>,
     depth: f64,
@@ -121,8 +121,8 @@ impl OpenWaves {
         let (k, frequency) = (waves.wave_number(), TAU / waves.period);
         let a = 0.5 * waves.height;
         let square = (k * waves.depth).tanh().powi(2);
-        let first = Line::free(a, frequency, k * direction, 0.0, waves.depth);
-        let second = Line {
+        let first = WaveComponent::free(a, frequency, k * direction, 0.0, waves.depth);
+        let second = WaveComponent {
             number: 2.0 * first.number,
             frequency: 2.0 * frequency,
             phase: 0.0,
@@ -165,7 +165,7 @@ impl OpenWaves {
                 Meeting::Random { .. } => TAU * chance(line, 0),
                 Meeting::Focused { at, time, .. } => frequency * time - number.dot(at),
             };
-            Line::free(a, frequency, number, phase, asked.depth)
+            WaveComponent::free(a, frequency, number, phase, asked.depth)
         });
         Self {
             lines: lines.collect(),
@@ -185,7 +185,7 @@ impl OpenWaves {
     pub fn velocity(&self, place: DVec3, t: f64) -> DVec3 {
         let at = DVec2::new(place.x, place.z);
         let y = place.y.clamp(0.0, self.depth);
-        let of = |line: &Line| {
+        let of = |line: &WaveComponent| {
             let k = line.number.length();
             let (sin, cos) = line.angle(at, t).sin_cos();
             // cosh ky / cosh kh and sinh ky / cosh kh.
@@ -200,7 +200,7 @@ impl OpenWaves {
 
     /// Returns the surface elevation above still water at x and z, metres.
     pub fn elevation(&self, at: DVec2, t: f64) -> f64 {
-        let of = |line: &Line| line.elevation * line.angle(at, t).cos();
+        let of = |line: &WaveComponent| line.elevation * line.angle(at, t).cos();
         self.grown(t) * self.lines.iter().map(of).sum::<f64>()
     }
 
@@ -222,7 +222,7 @@ impl OpenWaves {
 
     /// Returns the smallest group velocity of the waves, m/s (Dean and Dalrymple 1991, eq. 4.82).
     pub fn least_group_speed(&self) -> f64 {
-        let of = |line: &Line| {
+        let of = |line: &WaveComponent| {
             let k = line.number.length();
             let twice = 2.0 * k * self.depth;
             0.5 * line.frequency / k * (1.0 + twice / twice.min(300.0).sinh())
@@ -416,7 +416,7 @@ mod tests {
         let most = 1.6 / 0.55;
         for ratio in [0.9, 1.0, 1.02, 1.25, 1.8] {
             let expected = area(ratio) / area(most);
-            let below = |l: &&Line| l.frequency < TAU * ratio / 1.6;
+            let below = |l: &&WaveComponent| l.frequency < TAU * ratio / 1.6;
             let found = sea.lines.iter().filter(below).count() as f64 / f64::from(LINES);
             // Each wave carries 1/64 of the energy.
             assert!(

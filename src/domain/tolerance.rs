@@ -10,7 +10,7 @@ pub struct Tolerance {
     /// Limits by field: `position` (metres), `velocity` (m/s), and attributes by name.
     pub fields: BTreeMap<String, FieldLimits>,
     /// Limits by the names of [`Aggregates::NAMES`](super::aggregates::Aggregates::NAMES).
-    pub aggregates: BTreeMap<String, Limit>,
+    pub aggregates: BTreeMap<String, ErrorLimit>,
     /// Limits of image comparisons.
     pub pictures: PictureLimits,
 }
@@ -29,14 +29,14 @@ pub struct FieldLimits {
 
 /// A limit of the form |a − b| ≤ absolute + relative · |b|.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Limit {
+pub struct ErrorLimit {
     /// Absolute term, in the value's unit.
     pub absolute: f64,
     /// Factor relative to the reference b.
     pub relative: f64,
 }
 
-impl Limit {
+impl ErrorLimit {
     /// Returns the largest allowed error for `reference`.
     pub fn allowed(&self, reference: f64) -> f64 {
         self.absolute + self.relative * reference.abs()

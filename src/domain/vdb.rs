@@ -12,7 +12,7 @@ mod write;
 use cursor::Cursor;
 
 pub use read::{GridFile, LevelSet, grids, level_set};
-pub use write::{Grid, encode};
+pub use write::{VdbGrid, encode};
 
 /// First bytes of a file: the number 0x56444220 in 64 bits.
 const MAGIC: [u8; 8] = *b" BDV\0\0\0\0";

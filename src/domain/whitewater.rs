@@ -12,7 +12,7 @@ mod thresholds;
 use crate::particles::Particles;
 
 pub use ages::grow_older;
-pub use seeds::{Births, Source};
+pub use seeds::{Births, SeedWater};
 pub use thresholds::{Potentials, Thresholds};
 
 /// Names of a whitewater particle's attributes besides position, velocity and id, sorted as in
@@ -20,7 +20,7 @@ pub use thresholds::{Potentials, Thresholds};
 pub const ATTRIBUTES: [&str; 4] = [AGE, KIND, LIFE, RADIUS];
 /// Attribute: time since birth, seconds.
 pub const AGE: &str = "age";
-/// Attribute: [`Kind`] as a number.
+/// Attribute: [`WhitewaterKind`] as a number.
 pub const KIND: &str = "kind";
 /// Attribute: remaining life as foam, seconds.
 pub const LIFE: &str = "life";
@@ -48,7 +48,7 @@ pub const HALVINGS: u32 = 5;
 
 /// Kind of a whitewater particle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
+pub enum WhitewaterKind {
     /// A drop in the air, which flies.
     Spray,
     /// Foam on the surface, which the water carries.
@@ -57,7 +57,7 @@ pub enum Kind {
     Bubble,
 }
 
-impl Kind {
+impl WhitewaterKind {
     /// All kinds, in the order of their numbers.
     pub const ALL: [Self; 3] = [Self::Spray, Self::Foam, Self::Bubble];
 
@@ -97,7 +97,7 @@ impl Kind {
 
 /// Settings of a whitewater stream: a settings file with its thresholds calibrated.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Settings {
+pub struct CalibratedSettings {
     /// Seed of all random numbers.
     pub seed: u32,
     /// Largest number of particles; a frame with more ends the job.
@@ -132,13 +132,13 @@ pub fn none() -> Particles {
     }
 }
 
-/// Counts the particles of each kind, in the order of [`Kind::ALL`].
+/// Counts the particles of each kind, in the order of [`WhitewaterKind::ALL`].
 pub fn census(particles: &Particles) -> [usize; 3] {
     let kinds = particles
         .attributes
         .get(KIND)
         .map_or(&[][..], Vec::as_slice);
-    Kind::ALL.map(|kind| kinds.iter().filter(|&&k| k == kind.number()).count())
+    WhitewaterKind::ALL.map(|kind| kinds.iter().filter(|&&k| k == kind.number()).count())
 }
 
 /// A pseudo-random number in 0..1 for these keys, mixed as in splitmix64 (Steele, Lea and
@@ -153,10 +153,10 @@ fn random(seed: u32, id: u32, frame: u32, channel: u32) -> f64 {
 
 #[cfg(test)]
 mod tests_support {
-    use super::{Settings, Thresholds};
+    use super::{CalibratedSettings, Thresholds};
 
-    pub(super) fn settings() -> Settings {
-        Settings {
+    pub(super) fn settings() -> CalibratedSettings {
+        CalibratedSettings {
             seed: 1,
             max_particles: 1_000_000,
             radius: [0.005, 0.02],
@@ -198,11 +198,11 @@ mod tests {
 
     #[test]
     fn kinds_have_numbers_and_shares() {
-        for kind in Kind::ALL {
-            assert_eq!(Kind::of_number(kind.number()), Some(kind));
+        for kind in WhitewaterKind::ALL {
+            assert_eq!(WhitewaterKind::of_number(kind.number()), Some(kind));
         }
-        assert_eq!(Kind::of_number(0.5), None);
-        let kinds = [0.0, 0.5, 1.0].map(Kind::of_share);
-        assert_eq!(kinds, Kind::ALL);
+        assert_eq!(WhitewaterKind::of_number(0.5), None);
+        let kinds = [0.0, 0.5, 1.0].map(WhitewaterKind::of_share);
+        assert_eq!(kinds, WhitewaterKind::ALL);
     }
 }

@@ -16,7 +16,7 @@ use swell_stage::{
     gauge, render,
 };
 use swell_study::{
-    comparison::{self, Course, Finding, Impact, Row},
+    comparison::{self, Course, Finding, FrameRow, Impact},
     measure::Gauge,
     median,
     page::Part,
@@ -24,12 +24,12 @@ use swell_study::{
 };
 
 use super::{
-    Event, StudyError, StudyRequest,
-    engine::{Bench, Kind, WorkUnit},
+    StudyError, StudyEvent, StudyRequest,
+    engine::{Bench, StudyKind, WorkUnit},
     report::{Report, what_was_run},
 };
 
-impl Kind for SolverComparison {
+impl StudyKind for SolverComparison {
     /// Returns `None`: bakes and renders open the adapter themselves.
     fn needs(&self) -> Option<Needs> {
         None
@@ -46,7 +46,7 @@ impl Kind for SolverComparison {
 
     fn run(&self, bench: &mut Bench<'_>) -> Result<Option<Report>, StudyError> {
         for scene in &self.scenes {
-            bench.tell(Event::Solver(scene.solver.method().name()));
+            bench.tell(StudyEvent::Solver(scene.solver.method().name()));
             bake_and_render(self, bench, scene)?;
         }
         let request = bench.request;
@@ -88,7 +88,7 @@ fn bake_and_render(
         device: Device::Gpu(request.gpu.clone()),
         time_passes: false,
     };
-    let mut tell = |event| bench.tell(Event::Bake(Box::new(event)));
+    let mut tell = |event| bench.tell(StudyEvent::Bake(Box::new(event)));
     if bake::bake(&bake, stop, &mut tell)?.interrupted {
         return Err(StudyError::Stopped);
     }
@@ -104,7 +104,7 @@ fn bake_and_render(
         keep_going: false,
         time_passes: false,
     };
-    let mut tell = |event| bench.tell(Event::Render(event));
+    let mut tell = |event| bench.tell(StudyEvent::Render(event));
     match render::render(&render, stop, &mut tell)?.interrupted {
         true => Err(StudyError::Stopped),
         false => Ok(()),
@@ -144,7 +144,7 @@ fn course(cache: &CacheReader, gauge: &Gauge, frames: &FrameRange) -> Result<Cou
         let entry = cache.entry(frame)?;
         let report: Option<StepReport> = serde_json::from_value(entry.report.clone()).ok();
         let particles = cache.read(frame)?;
-        Ok(Row {
+        Ok(FrameRow {
             frame,
             time: entry.clock.time,
             seconds: seconds.get(&frame).copied(),
@@ -213,7 +213,7 @@ const MEASURED: &str = "Both solvers are measured alike, from the particles. Spa
     clock, the whole frame, with writing beside it.";
 
 /// Median of a quantity over the rows of a course, with `digits` decimals.
-fn middle(course: &Course, digits: usize, value: fn(&Row) -> Option<f64>) -> String {
+fn middle(course: &Course, digits: usize, value: fn(&FrameRow) -> Option<f64>) -> String {
     let middle = median(course.rows.iter().filter_map(value).collect());
     middle.map_or("none".into(), |value| format!("{value:.digits$}"))
 }

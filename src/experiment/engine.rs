@@ -20,13 +20,13 @@ use swell_gpu::adapter::{GpuError, Needs};
 use swell_scene::Scene;
 use swell_stage::{
     device::{Gpu, Opened, needs},
-    drive::{Drive, End, Step},
+    drive::{ComputedFrame, Drive, End},
 };
 use swell_study::folder::ledger_of;
 
 use super::{
-    Event, PointEvent, PointStatus, StudyError, StudyRequest,
-    ledger::{Key, Ledger, Line, Reader},
+    PointEvent, PointStatus, StudyError, StudyEvent, StudyRequest,
+    ledger::{Key, Ledger, LedgerAccess, LedgerLine},
     report::Report,
     run::Run,
 };
@@ -35,7 +35,7 @@ use super::{
 const FORM: &str = "swell study 3";
 
 /// A kind of study: what it runs, measures and draws.
-pub(super) trait Kind {
+pub(super) trait StudyKind {
     /// Requirements of its runs on an adapter; `None` where they need none.
     fn needs(&self) -> Option<Needs>;
 
@@ -170,7 +170,7 @@ pub(super) struct Bench<'a> {
     pub(super) request: &'a StudyRequest,
     pub(super) devices: &'a Devices,
     pub(super) stop: &'a AtomicBool,
-    tell: RefCell<&'a mut dyn FnMut(Event)>,
+    tell: RefCell<&'a mut dyn FnMut(StudyEvent)>,
     work: Work,
     pub(super) count: usize,
     /// Number of points reported so far.
@@ -194,7 +194,7 @@ impl<'a> Bench<'a> {
         request: &'a StudyRequest,
         devices: &'a Devices,
         stop: &'a AtomicBool,
-        tell: &'a mut dyn FnMut(Event),
+        tell: &'a mut dyn FnMut(StudyEvent),
         (work, count): (Work, usize),
     ) -> Self {
         Self {
@@ -215,7 +215,7 @@ impl<'a> Bench<'a> {
         }
     }
 
-    pub(super) fn tell(&self, event: Event) {
+    pub(super) fn tell(&self, event: StudyEvent) {
         (self.tell.borrow_mut())(event);
     }
 
@@ -224,7 +224,7 @@ impl<'a> Bench<'a> {
         !matches!(self.work, Work::Whole)
     }
 
-    /// Whether the next unit of [`Kind::places`] is to be run or counted here.
+    /// Whether the next unit of [`StudyKind::places`] is to be run or counted here.
     pub(super) fn is_next_ours(&mut self) -> bool {
         self.dealt += 1;
         match &self.work {
@@ -239,7 +239,7 @@ impl<'a> Bench<'a> {
             return;
         }
         self.number += 1;
-        self.tell(Event::Point(PointEvent {
+        self.tell(StudyEvent::Point(PointEvent {
             number: self.number,
             count: self.count,
             name,
@@ -247,17 +247,17 @@ impl<'a> Bench<'a> {
         }));
     }
 
-    fn reader(&self) -> Reader {
+    fn reader(&self) -> LedgerAccess {
         match self.work {
-            Work::Whole => Reader::Whole,
-            Work::Share(chunk, _) => Reader::Share(chunk),
-            Work::Look => Reader::Look,
+            Work::Whole => LedgerAccess::Whole,
+            Work::Share(chunk, _) => LedgerAccess::Share(chunk),
+            Work::Look => LedgerAccess::Look,
         }
     }
 
     /// Opens the results in the study's folder.
     pub(super) fn ledger<M: Serialize + DeserializeOwned>(&self) -> Result<Ledger<M>, StudyError> {
-        let warn = &mut |text| self.tell(Event::Warning(text));
+        let warn = &mut |text| self.tell(StudyEvent::Warning(text));
         Ledger::open(&self.request.directory, self.reader(), warn)
     }
 
@@ -271,7 +271,7 @@ impl<'a> Bench<'a> {
         measure: impl FnOnce() -> Result<Run<M>, StudyError>,
     ) -> Result<Option<(Run<M>, bool)>, StudyError> {
         let add = |to: &Cell<usize>| to.set(to.get() + 1);
-        let warn = &mut |text| self.tell(Event::Warning(text));
+        let warn = &mut |text| self.tell(StudyEvent::Warning(text));
         if let Some(run) = ledger.find(name, &key, self.reader(), warn)? {
             add(&self.stood);
             self.there.borrow_mut().insert(key.hash);
@@ -298,7 +298,7 @@ impl<'a> Bench<'a> {
         };
         let name = name.to_owned();
         self.there.borrow_mut().insert(key.hash.clone());
-        let run = ledger.append(Line {
+        let run = ledger.append(LedgerLine {
             key,
             name,
             share,
@@ -314,14 +314,14 @@ impl<'a> Bench<'a> {
         for (share, points) in &shares {
             let file = ledger_of(share.parse().ok());
             let (share, points) = (share.clone(), *points);
-            self.tell(Event::Joined {
+            self.tell(StudyEvent::Joined {
                 share,
                 file,
                 points,
             });
         }
         for text in unknown {
-            self.tell(Event::Warning(text));
+            self.tell(StudyEvent::Warning(text));
         }
         *self.shares.borrow_mut() = shares;
     }
@@ -354,7 +354,7 @@ pub(super) fn until_done(
     drive: &mut Drive<'_>,
     last: u32,
     stop: &AtomicBool,
-    observe: impl FnMut(Step) -> Result<(), StudyError>,
+    observe: impl FnMut(ComputedFrame) -> Result<(), StudyError>,
 ) -> Result<(), StudyError> {
     match drive.run(last, stop, observe)? {
         End::Done => Ok(()),

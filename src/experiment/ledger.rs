@@ -36,7 +36,8 @@ pub(super) struct Key {
 
 /// A finished point as stored in a ledger.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(super) struct Line<M> {
+#[serde(expecting = "struct Line")]
+pub(super) struct LedgerLine<M> {
     #[serde(flatten)]
     pub(super) key: Key,
     /// Name of the point in reports.
@@ -49,7 +50,7 @@ pub(super) struct Line<M> {
 
 /// Purpose for which the ledgers of a folder are opened.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Reader {
+pub(super) enum LedgerAccess {
     /// To run the whole study: no share may be running, and invalid lines are errors.
     Whole,
     /// To run a share: other shares may be running.
@@ -61,10 +62,10 @@ pub(super) enum Reader {
 /// Results in a folder, with a ledger open for appending.
 pub(super) struct Ledger<M> {
     path: PathBuf,
-    /// `None` for [`Reader::Look`].
+    /// `None` for [`LedgerAccess::Look`].
     file: Option<Lock>,
     /// Lines of its own ledger by hash.
-    lines: BTreeMap<String, Line<M>>,
+    lines: BTreeMap<String, LedgerLine<M>>,
     /// Other ledgers of the folder in order of their names.
     others: Vec<Other<M>>,
     /// Names of the points that were looked up.
@@ -76,12 +77,12 @@ pub(super) struct Ledger<M> {
 /// Another ledger of the folder.
 struct Other<M> {
     file: String,
-    lines: Vec<Line<M>>,
+    lines: Vec<LedgerLine<M>>,
 }
 
 /// Lines of a file.
 struct Read<M> {
-    lines: Vec<Line<M>>,
+    lines: Vec<LedgerLine<M>>,
     /// Number of bytes in complete lines.
     whole: usize,
     is_torn: bool,
@@ -96,13 +97,13 @@ impl<M: Serialize + DeserializeOwned> Ledger<M> {
     /// process writes to the ledger; [`StudyError::Ledger`] for an invalid line.
     pub(super) fn open(
         directory: &Path,
-        reader: Reader,
+        reader: LedgerAccess,
         warn: &mut dyn FnMut(String),
     ) -> Result<Self, StudyError> {
         let (own, file) = match reader {
-            Reader::Whole => (ledger_of(None), true),
-            Reader::Share(chunk) => (ledger_of(Some(chunk)), true),
-            Reader::Look => (ledger_of(None), false),
+            LedgerAccess::Whole => (ledger_of(None), true),
+            LedgerAccess::Share(chunk) => (ledger_of(Some(chunk)), true),
+            LedgerAccess::Look => (ledger_of(None), false),
         };
         let path = directory.join(&own);
         let names = names(directory)?;
@@ -112,8 +113,8 @@ impl<M: Serialize + DeserializeOwned> Ledger<M> {
         }
         // Takes the lock first, so that the ledger cannot change between reading and writing.
         let file = file.then(|| locked(&path)).transpose()?;
-        let is_strict = reader == Reader::Whole;
-        let standing = read::<M>(&path, reader != Reader::Look)?;
+        let is_strict = reader == LedgerAccess::Whole;
+        let standing = read::<M>(&path, reader != LedgerAccess::Look)?;
         if let Some(file) = &file {
             file.file().set_len(standing.whole as u64).at(&path)?;
         }
@@ -125,7 +126,7 @@ impl<M: Serialize + DeserializeOwned> Ledger<M> {
             let other = directory.join(&name);
             // The whole study waits for all shares; a share waits for the whole study, which runs
             // what is missing.
-            if is_strict || name == LEDGER && reader != Reader::Look {
+            if is_strict || name == LEDGER && reader != LedgerAccess::Look {
                 refuse_busy(&other)?;
             }
             let read = read(&other, is_strict)?;
@@ -159,7 +160,7 @@ impl<M: Clone + Serialize> Ledger<M> {
         &mut self,
         name: &str,
         key: &Key,
-        reader: Reader,
+        reader: LedgerAccess,
         warn: &mut dyn FnMut(String),
     ) -> Result<Option<Run<M>>, StudyError> {
         self.asked.insert(name.to_owned());
@@ -173,9 +174,9 @@ impl<M: Clone + Serialize> Ledger<M> {
             of_share.insert(key.hash.clone());
         }
         match (found, reader) {
-            (Some(line), Reader::Whole) if !is_own => Ok(Some(self.append(line)?.clone())),
+            (Some(line), LedgerAccess::Whole) if !is_own => Ok(Some(self.append(line)?.clone())),
             (Some(line), _) => Ok(Some(line.run)),
-            (None, Reader::Whole) => {
+            (None, LedgerAccess::Whole) => {
                 self.others_differ(name, key, warn);
                 Ok(None)
             }
@@ -203,8 +204,8 @@ impl<M: Clone + Serialize> Ledger<M> {
     /// Appends a line and synchronises it to disk.
     ///
     /// # Panics
-    /// If the ledger was opened with [`Reader::Look`].
-    pub(super) fn append(&mut self, line: Line<M>) -> Result<&Run<M>, StudyError> {
+    /// If the ledger was opened with [`LedgerAccess::Look`].
+    pub(super) fn append(&mut self, line: LedgerLine<M>) -> Result<&Run<M>, StudyError> {
         let lock = self.file.as_ref().expect("opened to write");
         // Only finite numbers, strings and lists, which JSON can represent.
         let text = serde_json::to_string(&line).map_err(io::Error::other);
@@ -296,8 +297,8 @@ fn in_line(error: &serde_json::Error) -> String {
 mod tests {
     use super::*;
 
-    fn line(hash: &str) -> Line<Vec<f64>> {
-        Line {
+    fn line(hash: &str) -> LedgerLine<Vec<f64>> {
+        LedgerLine {
             key: Key {
                 hash: hash.into(),
                 program: "p".into(),
@@ -313,8 +314,8 @@ mod tests {
         }
     }
 
-    fn line_of(share: &str, hash: &str) -> Line<Vec<f64>> {
-        Line {
+    fn line_of(share: &str, hash: &str) -> LedgerLine<Vec<f64>> {
+        LedgerLine {
             share: Some(share.to_owned()),
             ..line(hash)
         }
@@ -323,7 +324,7 @@ mod tests {
     #[test]
     fn a_torn_line_is_cut_off_and_a_spoiled_one_is_named() {
         let folder = tempfile::tempdir().expect("a folder");
-        let open = || Ledger::<Vec<f64>>::open(folder.path(), Reader::Whole, &mut |_| ());
+        let open = || Ledger::<Vec<f64>>::open(folder.path(), LedgerAccess::Whole, &mut |_| ());
         let mut ledger = open().expect("new");
         ledger.append(line("a")).expect("written");
         ledger.append(line("b")).expect("written");
@@ -358,14 +359,14 @@ mod tests {
         let open = |reader, said: &mut Vec<String>| {
             Ledger::<Vec<f64>>::open(folder.path(), reader, &mut |text| said.push(text))
         };
-        let share = |text: &str| Reader::Share(text.parse().expect("a share"));
+        let share = |text: &str| LedgerAccess::Share(text.parse().expect("a share"));
         let mut said = Vec::new();
         let mut first = open(share("1/2"), &mut said).expect("new");
         first.append(line_of("1/2", "a")).expect("written");
         let mut second = open(share("2/2"), &mut said).expect("beside the first");
         assert!(open(share("2/2"), &mut said).is_err(), "twice");
         second.append(line_of("2/2", "b")).expect("written");
-        let error = open(Reader::Whole, &mut said).err().expect("at work");
+        let error = open(LedgerAccess::Whole, &mut said).err().expect("at work");
         assert!(
             error.to_string().contains("results.1-of-2.jsonl"),
             "{error}"
@@ -376,15 +377,15 @@ mod tests {
         fs::write(&path, format!("{text}{{\"has")).expect("written");
         assert!(said.is_empty(), "{said:?}");
 
-        let mut ledger = open(Reader::Whole, &mut said).expect("free");
+        let mut ledger = open(LedgerAccess::Whole, &mut said).expect("free");
         assert!(
             said[0].contains("2-of-2.jsonl ends in an incomplete line"),
             "{said:?}"
         );
         said.clear();
-        let mut find = |of: &Line<Vec<f64>>, said: &mut Vec<String>| {
+        let mut find = |of: &LedgerLine<Vec<f64>>, said: &mut Vec<String>| {
             let warn = &mut |text| said.push(text);
-            let found = ledger.find(&of.name, &of.key, Reader::Whole, warn);
+            let found = ledger.find(&of.name, &of.key, LedgerAccess::Whole, warn);
             found.expect("readable")
         };
         assert_eq!(find(&line("a"), &mut said), Some(line("a").run));
@@ -416,7 +417,7 @@ mod tests {
         assert_eq!(shares, [("1/2".to_owned(), 1)]);
         assert!(unknown.is_empty(), "{unknown:?}");
         drop(ledger);
-        let ledger = open(Reader::Whole, &mut said).expect("free");
+        let ledger = open(LedgerAccess::Whole, &mut said).expect("free");
         let (shares, unknown) = ledger.joined();
         assert!(shares.is_empty(), "none was asked for: {shares:?}");
         assert!(unknown.len() == 2 && unknown[1].contains("`jacobi, k = b` is not a point"));
@@ -424,9 +425,9 @@ mod tests {
         // file is gone.
         drop(ledger);
         fs::remove_file(folder.path().join("results.1-of-2.jsonl")).expect("there");
-        let mut ledger = open(Reader::Whole, &mut said).expect("free");
-        let mut find = |of: &Line<Vec<f64>>| {
-            let found = ledger.find(&of.name, &of.key, Reader::Whole, &mut |_| ());
+        let mut ledger = open(LedgerAccess::Whole, &mut said).expect("free");
+        let mut find = |of: &LedgerLine<Vec<f64>>| {
+            let found = ledger.find(&of.name, &of.key, LedgerAccess::Whole, &mut |_| ());
             found.expect("readable")
         };
         assert_eq!(find(&line("a")), Some(line("a").run));
@@ -435,12 +436,12 @@ mod tests {
         let each = ["1/2", "2/2"].map(|share| (share.to_owned(), 1));
         assert_eq!(shares, each);
         // A point run by the whole study belongs to no share.
-        let own = Line {
+        let own = LedgerLine {
             name: "own".to_owned(),
             ..line("d")
         };
         ledger.append(own.clone()).expect("written");
-        let found = ledger.find(&own.name, &own.key, Reader::Whole, &mut |_| ());
+        let found = ledger.find(&own.name, &own.key, LedgerAccess::Whole, &mut |_| ());
         assert!(found.expect("readable").is_some());
         assert_eq!(ledger.joined().0, each);
 
@@ -448,7 +449,7 @@ mod tests {
         // shares.
         drop(ledger);
         fs::write(&path, format!("{{}}\n{text}")).expect("written");
-        let error = open(Reader::Whole, &mut said).err().expect("spoiled");
+        let error = open(LedgerAccess::Whole, &mut said).err().expect("spoiled");
         let error = error.to_string();
         assert!(error.contains("results.2-of-2.jsonl:1: missing"), "{error}");
         let mut first = open(share("1/2"), &mut said).expect("its own is whole");

@@ -36,7 +36,7 @@ use swell_stage::{
 };
 use swell_study::raster::{self, RasterError};
 
-use engine::{Bench, Kind, Work};
+use engine::{Bench, StudyKind, Work};
 
 pub use engine::Devices;
 pub use error::StudyError;
@@ -62,7 +62,7 @@ pub struct StudyRequest {
 
 /// Progress of a running study.
 #[derive(Clone, Debug)]
-pub enum Event {
+pub enum StudyEvent {
     /// The bake of the named solver begins or resumes.
     Solver(&'static str),
     /// Warning about the study or one of its scenes.
@@ -70,9 +70,9 @@ pub enum Event {
     /// Warning about the adapter, as [`Opened::software_warning`].
     SoftwareWarning(String),
     /// Progress of a bake.
-    Bake(Box<bake::Event>),
+    Bake(Box<bake::BakeEvent>),
     /// Progress of a render.
-    Render(render::Event),
+    Render(render::RenderEvent),
     /// Outcome of a point.
     Point(PointEvent),
     /// A share ran points that the whole study has copied, now or earlier.
@@ -140,7 +140,7 @@ pub struct Share {
     pub is_left_at_most: bool,
 }
 
-fn kind_of(study: &Study) -> &dyn Kind {
+fn kind_of(study: &Study) -> &dyn StudyKind {
     match study {
         Study::SolverComparison(comparison) => &**comparison,
         Study::Sweep(sweep) => &**sweep,
@@ -186,7 +186,7 @@ fn require_features(request: &StudyRequest) -> Result<(), StudyError> {
 pub fn study(
     request: &StudyRequest,
     stop: &AtomicBool,
-    tell: &mut dyn FnMut(Event),
+    tell: &mut dyn FnMut(StudyEvent),
 ) -> Result<StudyOutcome, StudyError> {
     // Checked even where no point needs an adapter, so that a misspelled name is not ignored.
     if let Some(adapter) = &request.gpu.adapter {
@@ -194,7 +194,7 @@ pub fn study(
     }
     require_features(request)?;
     for warning in request.study.warnings() {
-        tell(Event::Warning(warning));
+        tell(StudyEvent::Warning(warning));
     }
     let kind = kind_of(&request.study);
     let (work, count) = match request.chunk {
@@ -210,7 +210,7 @@ pub fn study(
     let devices = Devices::open(&request.gpu, kind.needs())?;
     let software_warning = devices.gpu.as_ref().and_then(Opened::software_warning);
     if let Some(warning) = software_warning {
-        tell(Event::SoftwareWarning(warning));
+        tell(StudyEvent::SoftwareWarning(warning));
     }
     claim::take(&request.directory, &request.name, &request.command)?;
     let mut bench = Bench::new(request, &devices, stop, tell, (work, count));

@@ -21,18 +21,19 @@ use swell_stage::{
 };
 
 use super::{
-    Event, PointStatus, StudyError, StudyRequest,
-    engine::{Bench, Kind, WorkUnit},
+    PointStatus, StudyError, StudyEvent, StudyRequest,
+    engine::{Bench, StudyKind, WorkUnit},
     ledger::Key,
     report::Report,
 };
 
 /// Results of a point.
-type Run = super::run::Run<Measured>;
+type SurfaceRun = super::run::Run<SurfaceMeasurements>;
 
 /// Measurements besides the time.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-struct Measured {
+#[serde(expecting = "struct Measured")]
+struct SurfaceMeasurements {
     /// Errors of the surface; `None` where no water was visible.
     surface: Option<Summary>,
     /// SSIMULACRA 2 score against a reference by finer rays; `None` where the study does not ask
@@ -40,7 +41,7 @@ struct Measured {
     score: Option<f64>,
 }
 
-impl Measured {
+impl SurfaceMeasurements {
     /// Returns `None` where the error was not measured.
     fn error(&self, of: PictureError) -> Option<f64> {
         let surface = self.surface.as_ref();
@@ -54,7 +55,7 @@ impl Measured {
     }
 }
 
-impl Kind for SurfaceStudy {
+impl StudyKind for SurfaceStudy {
     fn needs(&self) -> Option<Needs> {
         Some(Needs::default())
     }
@@ -94,7 +95,7 @@ impl Kind for SurfaceStudy {
     }
 }
 
-fn status(errors: &[PictureError], run: &Run, stood: bool) -> PointStatus {
+fn status(errors: &[PictureError], run: &SurfaceRun, stood: bool) -> PointStatus {
     let known = |of: &PictureError| Some((of.name(), run.measured.error(*of)?));
     match &run.ended {
         _ if stood => PointStatus::Stands,
@@ -122,7 +123,7 @@ fn baked(study: &SurfaceStudy, bench: &mut Bench<'_>) -> Result<(), StudyError> 
         device: Device::Gpu(bench.request.gpu.clone()),
         time_passes: false,
     };
-    let mut tell = |event| bench.tell(Event::Bake(Box::new(event)));
+    let mut tell = |event| bench.tell(StudyEvent::Bake(Box::new(event)));
     match bake::bake(&request, bench.stop, &mut tell)?.interrupted {
         true => Err(StudyError::Stopped),
         false => Ok(()),
@@ -168,7 +169,7 @@ impl<'b> Shared<'_, 'b> {
         bench.devices.key(&scene, study.frames.last(), &measured)
     }
 
-    fn measure(&mut self, bench: &Bench<'b>, point: &Point) -> Result<Run, StudyError> {
+    fn measure(&mut self, bench: &Bench<'b>, point: &Point) -> Result<SurfaceRun, StudyError> {
         let study = self.study;
         let gallery = match &self.gallery {
             Some(gallery) => gallery,
@@ -184,12 +185,12 @@ impl<'b> Shared<'_, 'b> {
             }
         };
         let drawn = gallery.draw(&point.look, study.repeats)?;
-        Ok(Run {
+        Ok(SurfaceRun {
             particles: gallery.particles(),
             frames: study.frames.len() as u32,
             seconds: drawn.seconds,
             ended: None,
-            measured: Measured {
+            measured: SurfaceMeasurements {
                 surface: drawn.surface,
                 score: drawn.score,
             },
@@ -197,7 +198,7 @@ impl<'b> Shared<'_, 'b> {
     }
 }
 
-/// Adapter of the study, which [`Kind::needs`] requests.
+/// Adapter of the study, which [`StudyKind::needs`] requests.
 fn context<'a>(bench: &Bench<'a>) -> &'a Context {
     match bench.devices.of(RunsOn::Gpu) {
         Opened::Gpu(context) => context,

@@ -9,7 +9,7 @@ pub mod usd;
 
 /// Origin of a file, written into it as metadata.
 #[derive(Clone, Copy, Debug)]
-pub struct Source<'a> {
+pub struct FileOrigin<'a> {
     /// Name and version of the program.
     pub software: &'a str,
     /// Name of the shot.

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use glam::DVec3;
 
-use super::Source;
+use super::FileOrigin;
 use swell_domain::water_mesh::WaterMesh;
 
 /// A mesh and its position in the world.
@@ -21,11 +21,11 @@ pub struct Placed<'a> {
 
 /// Writes binary little-endian PLY: x y z (`float`, or `double` for a scene far from the world's
 /// origin), nx ny nz, vx vy vz in m/s; triangles.
-pub fn ply(placed: &Placed<'_>, source: &Source<'_>) -> Vec<u8> {
+pub fn ply(placed: &Placed<'_>, source: &FileOrigin<'_>) -> Vec<u8> {
     let &Placed { water, corner, .. } = placed;
     let kind = if placed.is_far { "double" } else { "float" };
     let mut out = Vec::new();
-    let Source {
+    let FileOrigin {
         software,
         shot,
         frame,
@@ -70,9 +70,9 @@ fn put(out: &mut Vec<u8>, values: &[f32]) {
 }
 
 /// Writes Wavefront OBJ with normals. The format cannot hold velocities.
-pub fn obj(placed: &Placed<'_>, source: &Source<'_>) -> Vec<u8> {
+pub fn obj(placed: &Placed<'_>, source: &FileOrigin<'_>) -> Vec<u8> {
     let &Placed { water, corner, .. } = placed;
-    let Source {
+    let FileOrigin {
         software,
         shot,
         frame,

@@ -9,7 +9,7 @@ mod text;
 
 use glam::{DQuat, DVec3, Vec3};
 
-use super::Source;
+use super::FileOrigin;
 use swell_domain::{
     bounds::Bounds, eye::Eye, mesh::TriangleMesh, particles::Particles, pose::Pose,
     water_mesh::WaterMesh,
@@ -21,7 +21,7 @@ use text::{Text, asset, name, quoted};
 #[derive(Clone, Copy, Debug)]
 pub struct Shot<'a> {
     /// Program, shot name and frame; the shot's name is also that of the root prim.
-    pub source: Source<'a>,
+    pub source: FileOrigin<'a>,
     /// Name of the prim that holds the water: `water`, or a stream's name.
     pub water: &'a str,
     /// Frames per second.
@@ -34,7 +34,7 @@ pub struct Shot<'a> {
 
 /// Representation of a shot's water.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Kind {
+pub enum WaterRepresentation {
     /// Points.
     Points {
         /// Diameter of each point, metres; if `None`, the attribute `radius` holds half of it.
@@ -67,7 +67,7 @@ pub struct WaveMaker {
 
 /// The camera at a frame.
 #[derive(Clone, Copy, Debug)]
-pub struct View {
+pub struct CameraFrame {
     /// Frame number.
     pub frame: u32,
     /// Camera, relative to the scene's origin.
@@ -84,7 +84,7 @@ pub struct Root<'a> {
     /// Properties of the shot.
     pub shot: Shot<'a>,
     /// Representation of the water.
-    pub kind: Kind,
+    pub kind: WaterRepresentation,
     /// Names of the particles' attributes; used only for points.
     pub attributes: Vec<String>,
     /// File name of each frame's layer, beside the root; names must not contain line ends.
@@ -96,7 +96,7 @@ pub struct Root<'a> {
     /// Walls that move; their displacements are in the frames' layers.
     pub wave_makers: Vec<WaveMaker>,
     /// Camera of a look, per frame; empty without one.
-    pub camera: Vec<View>,
+    pub camera: Vec<CameraFrame>,
 }
 
 /// An attribute of the water with one value per frame.
@@ -108,7 +108,7 @@ struct Sampled {
 }
 
 /// Attributes of the water in the frames' layers.
-fn sampled(kind: Kind, attributes: &[String]) -> Vec<Sampled> {
+fn sampled(kind: WaterRepresentation, attributes: &[String]) -> Vec<Sampled> {
     let of = |kind, name: &str, metadata| Sampled {
         kind,
         name: name.to_owned(),
@@ -116,7 +116,7 @@ fn sampled(kind: Kind, attributes: &[String]) -> Vec<Sampled> {
     };
     let mut all = vec![of("float3[]", "extent", "")];
     match kind {
-        Kind::Points { width } => {
+        WaterRepresentation::Points { width } => {
             if width.is_none() {
                 all.push(of("float[]", "widths", "interpolation = \"vertex\""));
             }
@@ -126,7 +126,7 @@ fn sampled(kind: Kind, attributes: &[String]) -> Vec<Sampled> {
             let own = attributes.iter().map(|it| format!("primvars:{}", name(it)));
             all.extend(own.map(|it| of("float[]", &it, "interpolation = \"vertex\"")));
         }
-        Kind::Mesh => {
+        WaterRepresentation::Mesh => {
             all.push(of("int[]", "faceVertexCounts", ""));
             all.push(of("int[]", "faceVertexIndices", ""));
             all.push(of("normal3f[]", "normals", "interpolation = \"vertex\""));
@@ -138,22 +138,22 @@ fn sampled(kind: Kind, attributes: &[String]) -> Vec<Sampled> {
 }
 
 /// Writes the attributes of the water that are the same in all frames.
-fn put_constants(text: &mut Text, kind: Kind) {
+fn put_constants(text: &mut Text, kind: WaterRepresentation) {
     match kind {
-        Kind::Points { width: Some(width) } => {
+        WaterRepresentation::Points { width: Some(width) } => {
             text.line(&format!("float[] widths = [{}] (", width as f32));
             text.line("    interpolation = \"constant\"");
             text.line(")");
         }
-        Kind::Points { width: None } => {}
-        Kind::Mesh => text.line("uniform token subdivisionScheme = \"none\""),
+        WaterRepresentation::Points { width: None } => {}
+        WaterRepresentation::Mesh => text.line("uniform token subdivisionScheme = \"none\""),
     }
 }
 
-fn schema(kind: Kind) -> &'static str {
+fn schema(kind: WaterRepresentation) -> &'static str {
     match kind {
-        Kind::Points { .. } => "Points",
-        Kind::Mesh => "Mesh",
+        WaterRepresentation::Points { .. } => "Points",
+        WaterRepresentation::Mesh => "Mesh",
     }
 }
 
@@ -365,7 +365,7 @@ fn put_mesh(text: &mut Text, vertices: &[DVec3], triangles: &[[u32; 3]]) {
     text.line("uniform token subdivisionScheme = \"none\"");
 }
 
-fn put_camera(text: &mut Text, views: &[View]) {
+fn put_camera(text: &mut Text, views: &[CameraFrame]) {
     let Some(first) = views.first() else {
         return;
     };
@@ -375,7 +375,7 @@ fn put_camera(text: &mut Text, views: &[View]) {
     let film = first.film_width_mm / 100.0;
     text.open("def Camera \"camera\"");
     text.line("float2 clippingRange = (0.01, 100000)");
-    let samples = |value: &dyn Fn(&View) -> String| {
+    let samples = |value: &dyn Fn(&CameraFrame) -> String| {
         views
             .iter()
             .map(|view| (view.frame, value(view)))
@@ -392,7 +392,7 @@ fn put_camera(text: &mut Text, views: &[View]) {
     if views.iter().any(|view| view.eye.axis != [0.0; 2]) {
         for (axis, name, sign) in [(0, "horizontal", -1.0), (1, "vertical", 1.0)] {
             // Offset of the film's centre from the axis, to the right and up.
-            let offset = |view: &View| sign * view.eye.axis[axis] / width * film;
+            let offset = |view: &CameraFrame| sign * view.eye.axis[axis] / width * film;
             let offsets = samples(&|view| (offset(view) as f32).to_string());
             text.samples(&format!("float {name}ApertureOffset"), &offsets);
         }
@@ -430,7 +430,7 @@ fn extent(points: &[[f32; 3]], margin: f64) -> String {
 
 /// The water of a frame.
 #[derive(Clone, Copy, Debug)]
-pub enum Water<'a> {
+pub enum WaterFrame<'a> {
     /// Points, relative to the scene's origin.
     Points(&'a Particles),
     /// A mesh, and the position of its origin relative to the scene's, metres.
@@ -441,8 +441,8 @@ pub enum Water<'a> {
 /// layer can also be opened without the root.
 pub fn frame(
     shot: &Shot<'_>,
-    kind: Kind,
-    water: &Water<'_>,
+    kind: WaterRepresentation,
+    water: &WaterFrame<'_>,
     makers: &[(String, DVec3)],
 ) -> Vec<u8> {
     let at = shot.source.frame;
@@ -456,8 +456,8 @@ pub fn frame(
         quoted(&name(shot.water))
     ));
     match water {
-        Water::Points(particles) => put_points(&mut text, kind, at, particles),
-        Water::Mesh(mesh, corner) => put_water_mesh(&mut text, at, mesh, *corner),
+        WaterFrame::Points(particles) => put_points(&mut text, kind, at, particles),
+        WaterFrame::Mesh(mesh, corner) => put_water_mesh(&mut text, at, mesh, *corner),
     }
     put_constants(&mut text, kind);
     text.close();
@@ -475,15 +475,15 @@ pub fn frame(
     text.into_bytes()
 }
 
-fn put_points(text: &mut Text, kind: Kind, at: u32, particles: &Particles) {
+fn put_points(text: &mut Text, kind: WaterRepresentation, at: u32, particles: &Particles) {
     let own = match kind {
-        Kind::Points { width: None } => particles.attributes.get("radius"),
+        WaterRepresentation::Points { width: None } => particles.attributes.get("radius"),
         _ => None,
     };
     let margin = match (kind, own) {
         (_, Some(radii)) => f64::from(radii.iter().copied().fold(0.0, f32::max)),
-        (Kind::Points { width }, None) => 0.5 * width.unwrap_or(0.0),
-        (Kind::Mesh, None) => 0.0,
+        (WaterRepresentation::Points { width }, None) => 0.5 * width.unwrap_or(0.0),
+        (WaterRepresentation::Mesh, None) => 0.0,
     };
     let extent = extent(&particles.position, margin);
     text.samples("float3[] extent", &[(at, extent)]);

@@ -12,7 +12,7 @@ use super::{
 use swell_domain::{
     aggregates::Aggregates,
     text,
-    tolerance::{FieldLimits, Limit, PictureLimits, Tolerance},
+    tolerance::{ErrorLimit, FieldLimits, PictureLimits, Tolerance},
 };
 use swell_scene::SceneError;
 
@@ -153,14 +153,14 @@ fn fields(spec: ToleranceSpec) -> BTreeMap<String, FieldLimits> {
 fn aggregates(
     doc: &Document<'_>,
     spec: &ToleranceSpec,
-) -> Result<BTreeMap<String, Limit>, SceneError> {
+) -> Result<BTreeMap<String, ErrorLimit>, SceneError> {
     let mut limits = BTreeMap::new();
     for (name, spec) in &spec.aggregates {
         if spec.absolute.is_none() && spec.relative.is_none() {
             let message = "no limit; allowed: absolute, relative or both, which then add up";
             return Err(doc.fault_plain(name.span(), message.to_owned()));
         }
-        let limit = Limit {
+        let limit = ErrorLimit {
             absolute: spec.absolute.unwrap_or(0.0),
             relative: spec.relative.unwrap_or(0.0),
         };

@@ -11,7 +11,7 @@ use super::{
 };
 use swell_domain::{
     text,
-    whitewater::{Settings, Thresholds},
+    whitewater::{CalibratedSettings, Thresholds},
 };
 use swell_scene::SceneError;
 
@@ -210,7 +210,7 @@ impl WhitewaterSettings {
 
     /// Returns complete settings for a shot of this particle spacing, metres. `shot` supplies the
     /// thresholds that the file leaves open.
-    pub fn settled(&self, spacing: f64, shot: &Thresholds) -> Settings {
+    pub fn settled(&self, spacing: f64, shot: &Thresholds) -> CalibratedSettings {
         let WhitewaterSpec {
             seed,
             max_particles,
@@ -220,7 +220,7 @@ impl WhitewaterSettings {
             foam,
             bubbles,
         } = &self.spec;
-        Settings {
+        CalibratedSettings {
             seed: *seed,
             max_particles: *max_particles,
             radius: radius.unwrap_or(RADII.map(|part| part * spacing)),
@@ -252,8 +252,8 @@ impl WhitewaterSettings {
 }
 
 /// Returns a file with all settings, which [`WhitewaterSettings::parse`] reads back.
-pub fn written_out(settings: &Settings) -> String {
-    let Settings {
+pub fn written_out(settings: &CalibratedSettings) -> String {
+    let CalibratedSettings {
         seed,
         max_particles,
         radius,

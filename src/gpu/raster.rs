@@ -157,12 +157,12 @@ fn compile(context: &Context, spec: &RasterSpec) -> Result<RasterPass, GpuError>
 }
 
 /// A [`Draw`] with its bind group.
-pub(super) struct Drawn {
+pub(super) struct BoundDraw {
     pub(super) draw: Draw,
     group: BindGroup,
 }
 
-impl Drawn {
+impl BoundDraw {
     pub(super) fn new(program: &Program, draw: &Draw) -> Self {
         let pass = program.raster(draw.raster.name);
         let name = draw.raster.name;

@@ -12,7 +12,7 @@ use super::{
     error::GpuError,
     operations::{Operations, count},
     program::Program,
-    raster::{self, CopyTexture, Draw, Drawn, Target},
+    raster::{self, BoundDraw, CopyTexture, Draw, Target},
     reflect::{Access, Binding},
 };
 
@@ -159,7 +159,7 @@ pub(super) enum Recorded {
         /// Number of runs while operations were counted.
         runs: Cell<u32>,
     },
-    Draw(Drawn),
+    Draw(BoundDraw),
     Clear(String),
     ClearDepth(Target),
     CopyTexture(CopyTexture),
@@ -340,7 +340,7 @@ impl Recorded {
 
 fn record(program: &Program, command: &Command) -> Option<Recorded> {
     match command {
-        Command::Draw(draw) => Some(Recorded::Draw(Drawn::new(program, draw))),
+        Command::Draw(draw) => Some(Recorded::Draw(BoundDraw::new(program, draw))),
         Command::Clear(buffer) => Some(Recorded::Clear(buffer.clone())),
         Command::ClearDepth(target) => Some(Recorded::ClearDepth(target.clone())),
         Command::CopyTexture(copy) => Some(Recorded::CopyTexture(copy.clone())),

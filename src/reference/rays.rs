@@ -11,7 +11,7 @@ use swell_domain::{
     eye::Eye,
     level_set::{
         FIRST, LevelSet, VOXELS,
-        kernels::{Field, Kernels},
+        kernels::{KernelField, Kernels},
     },
     mesh::TriangleMesh,
 };
@@ -43,7 +43,7 @@ pub fn cast(
 ) -> Vec<RayHit> {
     let tree = Bvh::new(solids);
     let coarse = LevelSet::of_kernels(kernels, size, spacing / VOXELS);
-    let water = Water {
+    let water = TracedWater {
         field: kernels.field(),
         coarse: &coarse,
     };
@@ -66,12 +66,12 @@ pub fn cast(
         .collect()
 }
 
-struct Water<'a> {
-    field: Field<'a>,
+struct TracedWater<'a> {
+    field: KernelField<'a>,
     coarse: &'a LevelSet,
 }
 
-impl Water<'_> {
+impl TracedWater<'_> {
     /// Returns where a ray from the air first meets the water before `bound`, and the normal there;
     /// on a side of the box, the normal of the side.
     fn along(&self, origin: DVec3, ray: DVec3, bound: f64) -> Option<(f64, DVec3)> {

@@ -11,7 +11,8 @@ use swell_domain::{
     budget::Breach,
     particles::Particles,
     whitewater::{
-        AIR_BELOW, FLIGHT_STEPS, HALVINGS, KIND, Kind, OUTWARD, Potentials, SURFACE, Settings,
+        AIR_BELOW, CalibratedSettings, FLIGHT_STEPS, HALVINGS, KIND, OUTWARD, Potentials, SURFACE,
+        WhitewaterKind,
     },
 };
 use swell_scene::PbfScene;
@@ -21,7 +22,7 @@ use super::{ReferenceError, pbf::Model};
 /// Water at a frame's end, sorted by cell, with the walls and solids around it. Positions are
 /// relative to the domain's minimum corner.
 #[derive(Clone, Debug)]
-pub struct Water {
+pub struct SortedWater {
     /// Kernels, boundary samples on solids, cells.
     pub model: Model,
     /// Faces of the box, displaced by wave makers.
@@ -57,7 +58,7 @@ pub struct White {
     /// Velocity, m/s.
     pub velocity: DVec3,
     /// Kind.
-    pub kind: Kind,
+    pub kind: WhitewaterKind,
 }
 
 /// A whitewater particle after a frame, with the margin of the decisions made on its path.
@@ -80,7 +81,7 @@ struct Found {
     velocity: DVec3,
 }
 
-impl Water {
+impl SortedWater {
     /// Takes the water of `scene`, which is
     /// [`of_whitewater`](swell_scene::Scene::of_whitewater) of the baked scene, at `time`,
     /// seconds.
@@ -222,14 +223,14 @@ impl Water {
     /// water's frame, under `gravity`, m/s².
     pub fn advance(
         &self,
-        settings: &Settings,
+        settings: &CalibratedSettings,
         gravity: DVec3,
         seconds: f64,
         white: White,
     ) -> Moved {
         let start = white.position;
         let before = white.velocity;
-        let is_drop = white.kind == Kind::Spray;
+        let is_drop = white.kind == WhitewaterKind::Spray;
         let (way, mut velocity) = match is_drop {
             true => fly(settings, gravity, seconds, before),
             false => (seconds * before, before),
@@ -243,7 +244,7 @@ impl Water {
         let mut is_pushed = self.is_touched(start + way);
         let mut place = self.allowed(start + way);
         let (mut water, is_in_water) = look(place);
-        if white.kind != Kind::Foam && is_in_water == is_drop {
+        if white.kind != WhitewaterKind::Foam && is_in_water == is_drop {
             let (mut near, mut far) = (0.0, 1.0);
             for _ in 0..HALVINGS {
                 let middle = 0.5 * (near + far);
@@ -262,12 +263,14 @@ impl Water {
                 true => water.velocity,
                 false => before,
             };
-        } else if white.kind == Kind::Foam && !is_in_water {
+        } else if white.kind == WhitewaterKind::Foam && !is_in_water {
             velocity = before + seconds * gravity;
         } else if !is_drop {
             let (rise, kept) = match white.kind {
-                Kind::Bubble => (settings.rise_speed, (-seconds / settings.response).exp()),
-                Kind::Foam | Kind::Spray => (0.0, 0.0),
+                WhitewaterKind::Bubble => {
+                    (settings.rise_speed, (-seconds / settings.response).exp())
+                }
+                WhitewaterKind::Foam | WhitewaterKind::Spray => (0.0, 0.0),
             };
             let aim = water.velocity - rise * gravity.normalize_or_zero();
             velocity = aim + kept * (before - aim);
@@ -278,12 +281,12 @@ impl Water {
         let white = White {
             position: place,
             velocity,
-            kind: Kind::of_share(water.share),
+            kind: WhitewaterKind::of_share(water.share),
         };
         Moved {
             white,
             share: water.share,
-            margin: Kind::THRESHOLDS
+            margin: WhitewaterKind::THRESHOLDS
                 .iter()
                 .map(|threshold| (water.share - threshold).abs())
                 .fold(margin, f64::min),
@@ -302,7 +305,12 @@ pub enum Neighbor {
 }
 
 /// Returns the displacement, metres, of a drop in the air, and its velocity after it, m/s.
-fn fly(settings: &Settings, gravity: DVec3, seconds: f64, start: DVec3) -> (DVec3, DVec3) {
+fn fly(
+    settings: &CalibratedSettings,
+    gravity: DVec3,
+    seconds: f64,
+    start: DVec3,
+) -> (DVec3, DVec3) {
     let wind = DVec3::from_array(settings.wind);
     let step = seconds / f64::from(FLIGHT_STEPS);
     let (mut way, mut velocity) = (DVec3::ZERO, start);
@@ -319,10 +327,10 @@ fn fly(settings: &Settings, gravity: DVec3, seconds: f64, start: DVec3) -> (DVec
 /// Whitewater for the frames of one bake, on the CPU.
 #[derive(Debug)]
 pub struct Whitewater {
-    scene: PbfScene,
+    scene: PbfScene<'static>,
     boundary: Boundary,
-    settings: Option<Settings>,
-    water: Option<(Water, f64)>,
+    settings: Option<CalibratedSettings>,
+    water: Option<(SortedWater, f64)>,
 }
 
 impl Whitewater {
@@ -331,7 +339,7 @@ impl Whitewater {
     /// scene.
     pub fn new(scene: &PbfScene, boundary: &Boundary) -> Self {
         Self {
-            scene: scene.clone(),
+            scene: scene.to_owned_scene(),
             boundary: boundary.clone(),
             settings: None,
             water: None,
@@ -339,14 +347,14 @@ impl Whitewater {
     }
 
     /// Prepares the motion of whitewater with these settings.
-    pub fn set(&mut self, settings: &Settings) {
+    pub fn set(&mut self, settings: &CalibratedSettings) {
         self.settings = Some(settings.clone());
     }
 
     /// Takes the water of the frame at `time`, `seconds` after the previous one, and returns the
     /// potentials of its particles, in the water's order.
     pub fn survey(&mut self, water: &Particles, time: f64, seconds: f64) -> Vec<Potentials> {
-        let sorted = Water::new(&self.scene, &self.boundary, water, time);
+        let sorted = SortedWater::new(&self.scene, &self.boundary, water, time);
         let n = water.len();
         let surveyed: Vec<Surveyed> = (0..n).into_par_iter().map(|i| sorted.survey(i)).collect();
         let found: Vec<Potentials> = (0..n)
@@ -376,7 +384,8 @@ impl Whitewater {
             let one = White {
                 position: (wide(white.position[k]) - origin).as_vec3().as_dvec3(),
                 velocity: wide(white.velocity[k]),
-                kind: Kind::of_number(white.attributes[KIND][k]).unwrap_or(Kind::Foam),
+                kind: WhitewaterKind::of_number(white.attributes[KIND][k])
+                    .unwrap_or(WhitewaterKind::Foam),
             };
             water.advance(settings, gravity, *seconds, one).white
         };

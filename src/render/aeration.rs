@@ -209,7 +209,7 @@ fn packed(air: f32, company: f32, radius: f32) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::inputs::Water;
+    use crate::inputs::WaterParticles;
     use swell_domain::particles::Particles;
 
     fn random() -> impl FnMut() -> f32 {
@@ -326,7 +326,7 @@ mod tests {
             speed_m_per_s: 3.0,
         };
         let fall = still(0.1);
-        let water = Water::new(Particles {
+        let water = WaterParticles::new(Particles {
             position: particles.iter().map(|p| p.position).collect(),
             velocity: particles.iter().map(|p| p.velocity).collect(),
             id: (0..1001).collect(),
@@ -369,7 +369,7 @@ mod tests {
             .collect();
         let at_frame = |k: f32| {
             let v = [0, 1, 2].map(|axis| velocity[axis] + k * fall.seconds * acceleration[axis]);
-            Water::new(Particles {
+            WaterParticles::new(Particles {
                 position: position.clone(),
                 velocity: vec![v; position.len()],
                 id: (0..position.len() as u32).collect(),

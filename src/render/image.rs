@@ -38,7 +38,7 @@ pub struct Image {
     /// Cryptomatte layer, where the look requests one.
     pub matte: Option<Matte>,
     /// Camera of the picture; `None` for a picture without a camera.
-    pub view: Option<View>,
+    pub view: Option<CameraAttributes>,
     /// Colour space of the light in the EXR file; in memory the light is always Rec. 709.
     pub exr_space: ColourSpaceSpec,
 }
@@ -46,7 +46,7 @@ pub struct Image {
 /// Camera of a picture at the frame's instant, in the form of OpenEXR's standard attributes:
 /// row-major matrices that row vectors (x, y, z, 1) multiply from the left.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct View {
+pub struct CameraAttributes {
     /// From world space to camera space: x right, y up, z towards the viewer; metres.
     pub world_to_camera: [f32; 16],
     /// From world space to the picture after division by the last coordinate, with (0, 0) in its
@@ -56,7 +56,7 @@ pub struct View {
     pub frames_per_second: f64,
 }
 
-impl View {
+impl CameraAttributes {
     /// Converts a camera in world space.
     pub fn of(eye: &Eye, frames_per_second: f64) -> Self {
         let [width, height] = eye.size.map(f64::from);

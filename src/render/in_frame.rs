@@ -18,7 +18,7 @@ const REACH: f32 = 6.0;
 const WIDER: f32 = 8.0;
 
 /// View frustum of a camera: four planes through the eye, and the plane of the eye itself.
-struct View {
+struct ViewFrustum {
     position: Vec3,
     /// Inward unit normals.
     planes: [Vec3; 5],
@@ -26,7 +26,7 @@ struct View {
     seconds: f32,
 }
 
-impl View {
+impl ViewFrustum {
     /// Frustum of the whole padded frame, with the margin that filters need.
     fn of(camera: &Camera) -> Self {
         let [right, up, forward] = [camera.right, camera.up, camera.forward].map(Vec3::from);
@@ -65,7 +65,7 @@ pub(super) fn in_frame(
     cameras: &[Camera],
     spacing: f32,
 ) -> Vec<bool> {
-    let views: Vec<View> = cameras.iter().map(View::of).collect();
+    let views: Vec<ViewFrustum> = cameras.iter().map(ViewFrustum::of).collect();
     let longest = cameras.iter().fold(spacing, |most, it| most.max(it.radius));
     let reach = REACH * longest;
     (particles.par_iter().enumerate())
@@ -82,7 +82,7 @@ pub(super) fn in_frame(
 
 /// Keeps the blocks of which one of a frame's cameras may see a part.
 pub(super) fn blocks_in_frame(mut blocks: Vec<Block>, cameras: &[Camera]) -> Vec<Block> {
-    let views: Vec<View> = cameras.iter().map(View::of).collect();
+    let views: Vec<ViewFrustum> = cameras.iter().map(ViewFrustum::of).collect();
     let radius = cameras
         .iter()
         .fold(0.0, |most: f32, it| most.max(it.radius));
@@ -90,7 +90,7 @@ pub(super) fn blocks_in_frame(mut blocks: Vec<Block>, cameras: &[Camera]) -> Vec
         let (low, high) = (Vec3::from(block.low), Vec3::from(block.high));
         let reach = 0.5 * (high - low).length() + radius;
         let way = |seconds: f32| seconds * Vec3::from(block.velocity);
-        let is_seen = |view: &View| view.sees(0.5 * (low + high) + way(view.seconds), reach);
+        let is_seen = |view: &ViewFrustum| view.sees(0.5 * (low + high) + way(view.seconds), reach);
         views.iter().any(is_seen)
     });
     blocks

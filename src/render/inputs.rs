@@ -11,14 +11,14 @@ pub const REACH: u32 = 2;
 
 /// Particles of a frame, with lazily computed properties.
 #[derive(Debug, Default)]
-pub struct Water {
+pub struct WaterParticles {
     /// Particles as the cache stores them.
     pub particles: Particles,
     /// Weight of each particle's neighbours.
     weights: OnceLock<Vec<f32>>,
 }
 
-impl Water {
+impl WaterParticles {
     /// Creates the water of a frame from its particles.
     pub fn new(particles: Particles) -> Self {
         Self {
@@ -40,17 +40,17 @@ impl Water {
 #[derive(Clone, Copy, Debug)]
 pub struct FrameInputs<'a> {
     /// Water of the frame itself.
-    pub water: &'a Water,
+    pub water: &'a WaterParticles,
     /// Water of the frames 2 and 1 before, and 1 and 2 after; `None` for a frame that does not
     /// exist.
-    pub around: [Option<&'a Water>; 2 * REACH as usize],
+    pub around: [Option<&'a WaterParticles>; 2 * REACH as usize],
     /// Spray, foam and bubbles of the frame.
     pub white: &'a Particles,
 }
 
 impl<'a> FrameInputs<'a> {
     /// Inputs without neighbouring frames.
-    pub fn alone(water: &'a Water, white: &'a Particles) -> Self {
+    pub fn alone(water: &'a WaterParticles, white: &'a Particles) -> Self {
         Self {
             water,
             around: [None; 2 * REACH as usize],

@@ -45,14 +45,15 @@ use std::path::PathBuf;
 use glam::DVec3;
 
 use swell_domain::{
-    bounds::Bounds, mesh::TriangleMesh, mesh_file::parts::Parts, open_waves::OpenWaves, pose::Pose,
+    bounds::Bounds, mesh::TriangleMesh, mesh_file::parts::MeshParts, open_waves::OpenWaves,
+    pose::Pose,
 };
 use swell_gpu::adapter::GpuError;
 use swell_scene::Wall;
 
 pub use camera::{eye, lens};
 pub use image::{Attributes, Image};
-pub use inputs::{FrameInputs, REACH, Water, frames_around};
+pub use inputs::{FrameInputs, REACH, WaterParticles, frames_around};
 pub use opaque::opaque;
 pub use plan::{Limits, Plan, Runs};
 pub use renderer::{Part, Renderer};
@@ -87,7 +88,7 @@ pub struct SolidParts {
     /// Name of the mesh's file without its extension.
     pub name: String,
     /// Parts to which the mesh's triangles belong.
-    pub parts: Parts,
+    pub parts: MeshParts,
     /// Current pose of the solid.
     pub pose: Pose,
 }

@@ -39,7 +39,7 @@ pub(super) fn weights(positions: &[[f32; 3]], spacing: f32) -> Vec<f32> {
     let found: Vec<f32> = order
         .par_chunk_by(|a, b| a.0 == b.0)
         .flat_map_iter(|own| {
-            let about = About::cell(own[0].0, &order, &sorted);
+            let about = PaddedPositions::cell(own[0].0, &order, &sorted);
             let of = |&(_, index): &([i32; 3], u32)| {
                 let place = positions[index as usize];
                 widely(Weigh {
@@ -64,9 +64,9 @@ const OFTEN: usize = 64;
 
 /// Positions in and around a cell, one list per axis, padded to whole SIMD lanes with positions of
 /// zero weight.
-struct About([Vec<f32>; 3]);
+struct PaddedPositions([Vec<f32>; 3]);
 
-impl About {
+impl PaddedPositions {
     /// Gathers the positions of a cell and its 26 neighbours; `sorted` is in the order of cells.
     fn cell(cell: [i32; 3], order: &[([i32; 3], u32)], sorted: &[Vec<f32>; 3]) -> Self {
         let columns = columns(order, cell);
@@ -86,7 +86,7 @@ impl About {
 /// Sums the weights of candidates around a point: 1 up to the first distance of the span, 0 from
 /// the second on.
 struct Weigh<'a> {
-    about: &'a About,
+    about: &'a PaddedPositions,
     place: [f32; 3],
     span: [f32; 2],
 }

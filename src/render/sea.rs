@@ -16,7 +16,7 @@ use swell_domain::{
         edges::{Edges, nodes_along},
     },
     motion::Spectrum,
-    open_waves::{LINES, Line, Meeting, OpenSea, OpenWaves},
+    open_waves::{LINES, Meeting, OpenSea, OpenWaves, WaveComponent},
 };
 use swell_gpu::program::Program;
 use swell_scene::look::{Look, SeaSpec, SeaWavesSpec};
@@ -79,7 +79,7 @@ pub(super) fn plan_sea(plan: &mut Plan, look: &Look, scene: &RenderScene, passes
 pub(super) struct Sea {
     look: SeaSpec,
     /// Wave components in order of decreasing wavelength.
-    lines: Vec<Line>,
+    lines: Vec<WaveComponent>,
     waves: Option<OpenWaves>,
     /// Positions and paths of the body's particles.
     places: Vec<(Vec3, Path)>,

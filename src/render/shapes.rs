@@ -17,7 +17,7 @@ use super::{
 };
 use swell_domain::level_set::{
     eigen,
-    kernels::{ALONE, Ellipsoid, Field, Kernels},
+    kernels::{ALONE, Ellipsoid, KernelField, Kernels},
 };
 
 /// Default splat radius over particle spacing; 0.5 √3 closes a lattice seen along its diagonal.
@@ -72,7 +72,7 @@ const ROUND: f64 = 0.9;
 /// Squares the flattening of a kernel. The outermost particles of a half-space lattice, with
 /// kernels 0.63 as high as wide, then give a surface 0.47 spacings above them with a roughness of
 /// 0.02; the water's own surface is half a spacing above. Unmodified kernels would give 0.74.
-fn shape(kernel: &Ellipsoid, field: &Field<'_>, factor: f64, thinnest: f64) -> Shape {
+fn shape(kernel: &Ellipsoid, field: &KernelField<'_>, factor: f64, thinnest: f64) -> Shape {
     let (inverse, turn) = eigen::symmetric(kernel.inverse);
     let longest = 1.0 / inverse.min_element();
     let mut axes = inverse
@@ -95,7 +95,7 @@ fn shape(kernel: &Ellipsoid, field: &Field<'_>, factor: f64, thinnest: f64) -> S
 /// Distance from `centre` along `axis` to the end of the field's water, on the side where it ends
 /// sooner and at most `most`, metres: by linear interpolation between the values at both ends and
 /// one Newton step.
-fn reach(centre: DVec3, axis: DVec3, most: f64, field: &Field<'_>) -> f64 {
+fn reach(centre: DVec3, axis: DVec3, most: f64, field: &KernelField<'_>) -> f64 {
     let (inner, gradient) = field.value_and_gradient(centre);
     let outward = if gradient.dot(axis) > 0.0 {
         -axis

@@ -22,10 +22,10 @@ const PRESSURE: Pressure = Pressure {
     max_iterations: 400,
 };
 
-impl PbfScene {
+impl PbfScene<'_> {
     /// Returns the same water, walls and solids with FLIP on cells of twice the particle spacing,
     /// of which PBF uses only the velocities; `None` without grid projection.
-    pub fn of_projection(&self) -> Option<FlipScene> {
+    pub fn of_projection(&self) -> Option<FlipScene<'static>> {
         let pbf = self.settings();
         if !pbf.grid_projection {
             return None;

@@ -1,6 +1,6 @@
 //! The solver of a scene, and scenes whose method is known to the compiler.
 
-use std::ops::Deref;
+use std::{borrow::Cow, ops::Deref};
 
 use super::{Method, Pbf, Scene, flip::Flip, projection::PROJECTION_CELL};
 
@@ -85,14 +85,15 @@ impl From<Flip> for Solver {
     }
 }
 
-/// A scene that is solved with the settings `S`: see [`PbfScene`] and [`FlipScene`].
+/// A scene that is solved with the settings `S`: see [`PbfScene`] and [`FlipScene`]. It borrows a
+/// scene whose solver they are, or owns one.
 #[derive(Clone, Debug)]
-pub struct SceneWith<S> {
-    scene: Scene,
+pub struct SceneWith<'a, S> {
+    scene: Cow<'a, Scene>,
     settings: S,
 }
 
-impl<S: Clone + Into<Solver>> SceneWith<S> {
+impl<S: Clone + Into<Solver>> SceneWith<'_, S> {
     /// Returns `scene` with `settings` as its solver's, and no others.
     pub fn new(scene: Scene, settings: S) -> Self {
         let scene = Scene {
@@ -100,18 +101,31 @@ impl<S: Clone + Into<Solver>> SceneWith<S> {
             unchosen: None,
             ..scene
         };
-        Self { scene, settings }
+        Self {
+            scene: Cow::Owned(scene),
+            settings,
+        }
     }
 }
 
-impl<S> SceneWith<S> {
+impl<S> SceneWith<'_, S> {
     /// Returns the settings of the solver.
     pub fn settings(&self) -> &S {
         &self.settings
     }
 }
 
-impl<S> Deref for SceneWith<S> {
+impl<S: Clone> SceneWith<'_, S> {
+    /// Returns the same with a copy of the scene, for what outlives it.
+    pub fn to_owned_scene(&self) -> SceneWith<'static, S> {
+        SceneWith {
+            scene: Cow::Owned(Scene::clone(self)),
+            settings: self.settings.clone(),
+        }
+    }
+}
+
+impl<S> Deref for SceneWith<'_, S> {
     type Target = Scene;
 
     fn deref(&self) -> &Scene {
@@ -120,37 +134,32 @@ impl<S> Deref for SceneWith<S> {
 }
 
 /// A scene that PBF solves.
-pub type PbfScene = SceneWith<Pbf>;
+pub type PbfScene<'a> = SceneWith<'a, Pbf>;
 
 /// A scene that FLIP solves.
-pub type FlipScene = SceneWith<Flip>;
+pub type FlipScene<'a> = SceneWith<'a, Flip>;
 
 /// A scene by its method.
 #[derive(Clone, Debug)]
-pub enum ByMethod {
+pub enum ByMethod<'a> {
     /// A scene that PBF solves.
-    Pbf(PbfScene),
+    Pbf(PbfScene<'a>),
     /// A scene that FLIP solves.
-    Flip(FlipScene),
+    Flip(FlipScene<'a>),
 }
 
 impl Scene {
     /// Returns the scene with the settings of its method.
-    pub fn by_method(&self) -> ByMethod {
+    pub fn by_method(&self) -> ByMethod<'_> {
+        let scene = Cow::Borrowed(self);
         match self.solver.clone() {
-            Solver::Pbf(settings) => ByMethod::Pbf(SceneWith {
-                scene: self.clone(),
-                settings,
-            }),
-            Solver::Flip(settings) => ByMethod::Flip(SceneWith {
-                scene: self.clone(),
-                settings,
-            }),
+            Solver::Pbf(settings) => ByMethod::Pbf(SceneWith { scene, settings }),
+            Solver::Flip(settings) => ByMethod::Flip(SceneWith { scene, settings }),
         }
     }
 
     /// Returns the scene with the settings of PBF, if that is its method.
-    pub fn with_pbf(&self) -> Option<PbfScene> {
+    pub fn with_pbf(&self) -> Option<PbfScene<'_>> {
         match self.by_method() {
             ByMethod::Pbf(scene) => Some(scene),
             ByMethod::Flip(_) => None,
@@ -158,7 +167,7 @@ impl Scene {
     }
 
     /// Returns the scene with the settings of FLIP, if that is its method.
-    pub fn with_flip(&self) -> Option<FlipScene> {
+    pub fn with_flip(&self) -> Option<FlipScene<'_>> {
         match self.by_method() {
             ByMethod::Pbf(_) => None,
             ByMethod::Flip(scene) => Some(scene),

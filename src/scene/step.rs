@@ -196,7 +196,7 @@ fn density_errors(density: impl Iterator<Item = f64>) -> [f64; 3] {
     [mean, percentile(errors, 0.99).unwrap_or(0.0), max]
 }
 
-impl PbfScene {
+impl PbfScene<'_> {
     /// Returns the number of equal substeps that PBF's CFL number, and short surface waves with its
     /// projection (Δt ≤ √(Δx / g)), require in the frame after `frame`, for a fastest particle of
     /// `speed`, m/s, gravity, effects, wave makers and solids.
@@ -240,7 +240,7 @@ impl PbfScene {
     }
 }
 
-impl FlipScene {
+impl FlipScene<'_> {
     /// Returns how many equal substeps FLIP's CFL number and short surface waves (Δt ≤ √(Δx / g))
     /// require in the `remaining` seconds from `start`, and the first of them. The fastest particle
     /// has `speed`, m/s; `done` substeps of `frame` are complete, and the last substep (of any

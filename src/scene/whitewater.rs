@@ -7,7 +7,7 @@ impl Scene {
     /// Returns the scene as whitewater generation sees it for either solver: the same water, walls
     /// and solids as particles of one spacing, with a support radius of [`SUPPORT`] spacings.
     #[must_use]
-    pub fn of_whitewater(&self) -> PbfScene {
+    pub fn of_whitewater(&self) -> PbfScene<'static> {
         let pbf = Pbf {
             particle_spacing: self.particle_spacing(),
             support_ratio: SUPPORT,

@@ -3,8 +3,10 @@
 mod air;
 pub mod boundary;
 pub mod buffers;
+mod by_method;
 pub mod effects;
 pub mod flip;
+mod grid;
 pub mod params;
 pub mod pbf;
 pub mod plan;

@@ -12,9 +12,9 @@ use swell_gpu::{
     program::{BufferSpec, PassSpec, check_sizes},
     recording::Command,
 };
-use swell_scene::{ByMethod, Scene};
+use swell_scene::Scene;
 
-use super::{effects::Addition, flip, pbf};
+use super::effects::Addition;
 
 /// Neighbours that a list of PBF holds. If a particle has more, passes search the cells for it, and
 /// the report counts it. At rest, h = 2d gives 32 neighbours; in the dam break of `tools/bench pbf`
@@ -99,11 +99,11 @@ pub struct PlannedBuffer {
 /// Buffers that a module declares, each once.
 #[derive(Clone, Debug, Default)]
 #[non_exhaustive]
-pub struct Table {
+pub struct BufferTable {
     rows: Vec<PlannedBuffer>,
 }
 
-impl Table {
+impl BufferTable {
     pub(super) fn add(&mut self, owner: &'static str, spec: BufferSpec) {
         self.rows.push(PlannedBuffer {
             spec,
@@ -197,22 +197,6 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// Plans the solver that `scene` selects.
-    pub fn new(scene: &Scene, counts: Counts, limits: DeviceLimits) -> Self {
-        match &scene.by_method() {
-            ByMethod::Pbf(scene) => pbf::plan::plan(scene, counts, limits),
-            ByMethod::Flip(scene) => flip::plan::plan(scene, counts, true),
-        }
-    }
-
-    /// Returns every command that a solver with this plan may run for `scene`.
-    pub fn commands(&self, scene: &Scene) -> Vec<Command> {
-        match &scene.by_method() {
-            ByMethod::Pbf(scene) => pbf::plan::commands(self, scene),
-            ByMethod::Flip(scene) => flip::plan::commands(self, scene),
-        }
-    }
-
     /// Returns whether quantized position words are in use (shared/place.wgsl).
     pub fn has_places(&self, scene: &Scene) -> bool {
         let dims = self.grid_dims.iter().map(|&cells| cells as usize);
@@ -328,7 +312,7 @@ impl Plan {
         })
     }
 
-    pub(super) fn declare(&mut self, table: Table) {
+    pub(super) fn declare(&mut self, table: BufferTable) {
         self.buffers.extend(table.rows);
     }
 

@@ -8,18 +8,8 @@ use swell_gpu::{
     recording::{Bind, Recording, TracePoint},
     reflect::{Access, Binding},
 };
-use swell_scene::flip::Precision;
 
-use super::{
-    SolveError,
-    buffers::COUNTERS,
-    params::{Counters, IterationControl},
-    pbf,
-    pressure::{
-        PressureControl64, PressureStats,
-        buffers::{Real, STATS, read_control, read_reals},
-    },
-};
+use super::{SolveError, buffers::COUNTERS, params::Counters};
 
 /// A dispatch of a traced substep, observed just before or just after it runs.
 #[derive(Clone, Copy)]
@@ -64,44 +54,11 @@ impl Traced<'_> {
         Ok(self.program.read(buffer, count)?)
     }
 
-    /// Reads the first `count` values of an array in the projection's precision.
-    ///
-    /// # Errors Returns an error if the device fails.
-    pub fn reals(
-        &self,
-        buffer: &Buf<Real>,
-        precision: Precision,
-        count: usize,
-    ) -> Result<Vec<f64>, SolveError> {
-        read_reals(self.program, buffer, precision, count)
-    }
-
     /// Reads the counters of the frame.
     ///
     /// # Errors Returns an error if the device fails.
     pub fn counters(&self) -> Result<Counters, SolveError> {
         self.one(COUNTERS)
-    }
-
-    /// Reads the state of PBF's iteration to a density error.
-    ///
-    /// # Errors Returns an error if the device fails.
-    pub fn iteration_control(&self) -> Result<IterationControl, SolveError> {
-        self.one(pbf::buffers::CONTROL)
-    }
-
-    /// Reads the scalars of a projection in `precision`, which determines their layout.
-    ///
-    /// # Errors Returns an error if the device fails.
-    pub fn pressure_control(&self, precision: Precision) -> Result<PressureControl64, SolveError> {
-        Ok(read_control(self.program, precision)?.0)
-    }
-
-    /// Reads the statistics of a projection.
-    ///
-    /// # Errors Returns an error if the device fails.
-    pub fn pressure_stats(&self) -> Result<PressureStats, SolveError> {
-        self.one(STATS)
     }
 
     /// Returns the name of the buffer that a shader variable is bound to.

@@ -11,7 +11,7 @@ use swell_domain::{
     solver::PassTime,
     sph::Calibration,
     whitewater::{
-        AIR_BELOW, FLIGHT_STEPS, HALVINGS, KIND, OUTWARD, Potentials, SURFACE, Settings,
+        AIR_BELOW, CalibratedSettings, FLIGHT_STEPS, HALVINGS, KIND, OUTWARD, Potentials, SURFACE,
         WATER_ABOVE,
     },
 };
@@ -26,9 +26,9 @@ use swell_scene::PbfScene;
 
 use super::{
     SolveError,
-    boundary::{self, Movers},
-    pbf::{buffers::*, params, plan::cell_count, record::sorting},
-    plan::{Counts, Plan, Table, in_order},
+    boundary::Movers,
+    pbf::{buffers::*, params, plan::cell_count, record::sorting, samples},
+    plan::{BufferTable, Counts, Plan, in_order},
     state::is_other_count,
 };
 
@@ -55,14 +55,14 @@ pub const ADVANCE: &str = "whitewater/advance";
 pub struct Whitewater {
     program: Program,
     plan: Plan,
-    scene: PbfScene,
+    scene: PbfScene<'static>,
     calibration: Calibration,
     survey: Recording,
     /// Boundary to upload again when the water's particle count changes or solids move. `None` if
     /// neither can happen.
     boundary: Option<Boundary>,
     movers: Option<Movers>,
-    settings: Option<Settings>,
+    settings: Option<CalibratedSettings>,
     /// Number of whitewater particles that the buffers can hold.
     capacity: usize,
     timer: Option<Timer>,
@@ -78,7 +78,7 @@ fn plan(scene: &PbfScene, boundary: &Boundary, water: usize, white: usize) -> Pl
     };
     let mut plan = Plan::bare(counts, scene.period().cells(scene.domain.size(), support));
     let cells = cell_count(&plan);
-    let mut table = Table::default();
+    let mut table = BufferTable::default();
     table.add("sort", CELL_START.sized(cells + 1));
     table.extend("sort", sort::scan_buffers(&CELL_START, cells));
     let keys = [CELL_OF, SLOT_IN_CELL, PLACED, ORDER];
@@ -120,7 +120,7 @@ fn pass(
     name: &'static str,
     plan: &Plan,
     scene: &PbfScene,
-    settings: Option<&Settings>,
+    settings: Option<&CalibratedSettings>,
 ) -> PassSpec {
     let conditions = [
         ("SOLIDS", plan.has_solids()),
@@ -166,7 +166,7 @@ fn set_up(
     sort::upload_lengths(program, &CELL_START, cell_count(plan));
     let water = plan.counts.particles as u32;
     program.upload(ELEMENT_COUNT, 0, &[[water, 0, 0, 0]]);
-    boundary::upload(boundary, program, scene, plan, calibration);
+    samples::upload(boundary, program, scene, plan, calibration);
     Recording::new(program, &survey_commands(plan))
 }
 
@@ -198,7 +198,7 @@ impl Whitewater {
                 .then(|| boundary.clone()),
             movers: Movers::of(boundary, scene),
             timer: is_timed.then(|| Timer::new(context)),
-            scene: scene.clone(),
+            scene: scene.to_owned_scene(),
             settings: None,
             capacity: 0,
             calibration,
@@ -210,7 +210,7 @@ impl Whitewater {
     /// Prepares the motion of whitewater with these settings.
     ///
     /// # Errors Returns an error if a shader does not compile or the device fails.
-    pub fn set(&mut self, settings: &Settings) -> Result<(), SolveError> {
+    pub fn set(&mut self, settings: &CalibratedSettings) -> Result<(), SolveError> {
         let pass = pass(ADVANCE, &self.plan, &self.scene, Some(settings));
         self.program.refit(&[], &[pass])?;
         self.settings = Some(settings.clone());
@@ -283,7 +283,7 @@ impl Whitewater {
             let (program, scene) = (&self.program, &self.scene);
             movers.upload(program, scene, time - seconds, seconds);
             let now = (time, seconds);
-            boundary::upload_samples(boundary, program, scene, &self.plan, &self.calibration, now);
+            samples::upload_samples(boundary, program, scene, &self.plan, &self.calibration, now);
         }
         self.survey.run(&self.program, self.timer.as_mut())?;
         let (potential, order) = (self.program).download((POTENTIAL.first(n), ORDER.first(n)))?;

@@ -13,6 +13,7 @@ use std::{path::PathBuf, sync::atomic::AtomicBool};
 use swell_cache::{CacheWriter, Clock, Parent, failed};
 use swell_domain::{frame_range::FrameRange, particles::Particles, solver::StepReport};
 use swell_scene::Scene;
+use swell_solve::plan::Share;
 
 use super::{
     branch::BranchPoint,
@@ -20,7 +21,6 @@ use super::{
     drive::{Drive, End},
     prepare::Volume,
     probes, replay,
-    time::Share,
 };
 use frames::Frames;
 
@@ -48,7 +48,7 @@ pub struct BakeRequest {
 
 /// Progress of a running bake.
 #[derive(Clone, Debug)]
-pub enum Event {
+pub enum BakeEvent {
     /// The device is open and the scene is filled with water.
     Ready {
         /// Adapter and driver, or the f64 reference.
@@ -128,7 +128,7 @@ pub struct BakeOutcome {
 pub fn bake(
     request: &BakeRequest,
     stop: &AtomicBool,
-    tell: &mut dyn FnMut(Event),
+    tell: &mut dyn FnMut(BakeEvent),
 ) -> Result<BakeOutcome, BakeError> {
     run(request, &BakePlan::new(request)?, stop, tell)
 }
@@ -144,7 +144,7 @@ pub fn run(
     request: &BakeRequest,
     plan: &BakePlan<'_>,
     stop: &AtomicBool,
-    tell: &mut dyn FnMut(Event),
+    tell: &mut dyn FnMut(BakeEvent),
 ) -> Result<BakeOutcome, BakeError> {
     let (scene, start) = (plan.scene, &plan.start);
     assert!(
@@ -175,7 +175,7 @@ pub fn run(
         .map(|(all, before)| all - before);
     // What was computed before a failure is kept.
     let (summary, warnings) = frames.finish()?;
-    tell(Event::Written {
+    tell(BakeEvent::Written {
         bytes: summary.bytes,
     });
     let times = request
@@ -232,8 +232,8 @@ fn ready(
     bytes: Option<(u64, u64)>,
     disk: DiskSpace,
     first: u32,
-) -> Event {
-    Event::Ready {
+) -> BakeEvent {
+    BakeEvent::Ready {
         device: opened.identity(),
         software_warning: opened.software_warning(),
         particles: plan.start.particles.len(),

@@ -9,7 +9,7 @@ use std::{
 };
 
 use swell_cache::{CacheError, CacheReader, Manifest};
-use swell_check::{arithmetic, flip, pbf};
+use swell_check::{arithmetic, check_flip, check_pbf};
 use swell_domain::{
     frame_range::FrameRange, particles::Particles, signed_distance::SignedDistanceError,
     substep::SubstepChoice,
@@ -25,11 +25,11 @@ use super::{
     whitewater::{Stream, WhitewaterError},
 };
 
-pub use swell_check::{Checked, Row, Table};
+pub use swell_check::{CheckRow, CheckTable, Checked};
 
 /// Where the inputs of the step come from.
 #[derive(Clone, Debug)]
-pub enum Source {
+pub enum CheckInput {
     /// A scene's start: frame 0.
     Scene(Box<Scene>),
     /// Frames of a cache; its last frame if none are given.
@@ -40,7 +40,7 @@ pub enum Source {
 #[derive(Clone, Debug)]
 pub struct CheckRequest {
     /// Source of the inputs.
-    pub source: Source,
+    pub source: CheckInput,
     /// Which substep to check of the frame that follows each input.
     pub substep: SubstepChoice,
     /// Adapter and shaders.
@@ -62,7 +62,7 @@ pub struct FirstOver {
 
 /// Progress of a running check.
 #[derive(Clone, Debug)]
-pub enum Event<'a> {
+pub enum CheckEvent<'a> {
     /// The device is open.
     Ready {
         /// Adapter and driver.
@@ -94,7 +94,7 @@ pub enum Event<'a> {
 #[non_exhaustive]
 pub struct CheckOutcome {
     /// All frames combined: for each row the value that deviates most.
-    pub table: Table,
+    pub table: CheckTable,
     /// The first row out of tolerance.
     pub first_over: Option<FirstOver>,
     /// Frames that were checked.
@@ -155,13 +155,13 @@ impl From<&CheckError> for Blame {
 pub fn check(
     request: &CheckRequest,
     stop: &AtomicBool,
-    tell: &mut dyn FnMut(Event<'_>),
+    tell: &mut dyn FnMut(CheckEvent<'_>),
 ) -> Result<CheckOutcome, CheckError> {
     let (subject, frames) = open(&request.source)?;
     let context = request.gpu.open(subject.needs())?;
     let shaders = context.shaders.edited().map(str::to_owned);
     let info = &context.info;
-    tell(Event::Ready {
+    tell(CheckEvent::Ready {
         device: format!(
             "{} ({} {}){}",
             info.name,
@@ -191,7 +191,7 @@ pub fn check(
             let solved = mem::replace(&mut checked.table, arithmetic::check(&context)?);
             checked.table.absorb(solved);
         }
-        tell(Event::Frame {
+        tell(CheckEvent::Frame {
             frame,
             checked: &checked,
             seconds: begin.elapsed().as_secs_f64(),
@@ -217,19 +217,19 @@ pub fn check(
 
 /// What is checked.
 enum Subject {
-    Step(Box<Step>),
+    Step(Box<CheckedStep>),
     /// Frames of a whitewater stream.
     Whitewater(Box<Stream>),
 }
 
 /// A solver's step, from a scene's start or from frames of a cache.
-struct Step {
+struct CheckedStep {
     scene: Scene,
     start: Start,
     cache: Option<CacheReader>,
 }
 
-impl Step {
+impl CheckedStep {
     fn check(
         &self,
         context: &Context,
@@ -293,18 +293,18 @@ impl Subject {
     }
 }
 
-fn open(source: &Source) -> Result<(Subject, Vec<u32>), CheckError> {
+fn open(source: &CheckInput) -> Result<(Subject, Vec<u32>), CheckError> {
     match source {
-        Source::Scene(scene) => {
+        CheckInput::Scene(scene) => {
             let start = Start::of(scene)?;
-            let step = Step {
+            let step = CheckedStep {
                 scene: (**scene).clone(),
                 start,
                 cache: None,
             };
             Ok((Subject::Step(Box::new(step)), vec![0]))
         }
-        Source::Cache(directory, frames) => {
+        CheckInput::Cache(directory, frames) => {
             let cache = CacheReader::open(directory)?;
             let frames: Vec<u32> = match frames {
                 Some(frames) => frames.iter().collect(),
@@ -319,7 +319,7 @@ fn open(source: &Source) -> Result<(Subject, Vec<u32>), CheckError> {
             }
             let scene = super::baked_scene(&cache, directory)?;
             let start = Start::of_cache::<CheckError>(&scene, &cache)?;
-            let step = Step {
+            let step = CheckedStep {
                 scene,
                 start,
                 cache: Some(cache),
@@ -339,7 +339,7 @@ pub fn check_frame(
     start: &Start,
     frame: u32,
     particles: &Particles,
-) -> Result<Table, SolveError> {
+) -> Result<CheckTable, SolveError> {
     let first = SubstepChoice::default();
     Ok(check_substep(context, scene, start, frame, particles, first)?.table)
 }
@@ -366,10 +366,10 @@ pub fn check_substep(
     match &scene.by_method() {
         ByMethod::Pbf(scene) => {
             let boundaries = [boundary; 2];
-            pbf::check(context, scene, plan, boundaries, (frame, particles), which)
+            check_pbf(context, scene, plan, boundaries, (frame, particles), which)
         }
         ByMethod::Flip(scene) => {
-            flip::check(context, scene, plan, boundary, (frame, particles), which)
+            check_flip(context, scene, plan, boundary, (frame, particles), which)
         }
     }
 }

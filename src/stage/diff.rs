@@ -31,7 +31,7 @@ use swell_render::RenderError;
 use swell_scene::{Scene, SceneError};
 use swell_study::measure::Gauge;
 
-pub use against_baseline::{Written, write_baseline};
+pub use against_baseline::{WrittenBaseline, write_baseline};
 pub use swell_compare::{
     baseline::{BaselineDiff, BaselineFault, Basis, FramePair},
     caches::CacheDiff,

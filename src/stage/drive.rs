@@ -89,7 +89,7 @@ impl Exchanged {
 
 /// A computed frame.
 #[derive(Clone, Debug)]
-pub struct Step {
+pub struct ComputedFrame {
     /// Number of the frame.
     pub frame: u32,
     /// State at its end, after emitters and drains acted.
@@ -219,7 +219,7 @@ impl<'a> Drive<'a> {
     ///
     /// # Errors
     /// A device error, invalid numbers, or an exceeded budget if budgets are checked.
-    pub fn advance(&mut self) -> Result<Step, SolverError> {
+    pub fn advance(&mut self) -> Result<ComputedFrame, SolverError> {
         let begin = Instant::now();
         let mut step = self.behind.read(self.ahead.compute()?)?;
         step.report.exchange = self.exchange(&mut step.particles)?;
@@ -262,7 +262,7 @@ impl<'a> Drive<'a> {
         &mut self,
         last: u32,
         stop: &AtomicBool,
-        mut observe: impl FnMut(Step) -> Result<(), E>,
+        mut observe: impl FnMut(ComputedFrame) -> Result<(), E>,
     ) -> Result<End, E> {
         while self.ahead.frame < last {
             if stop.load(Ordering::Relaxed) {
@@ -284,7 +284,7 @@ impl<'a> Drive<'a> {
         &mut self,
         last: u32,
         stop: &AtomicBool,
-        mut observe: impl FnMut(Step) -> Result<(), E>,
+        mut observe: impl FnMut(ComputedFrame) -> Result<(), E>,
     ) -> Result<End, E> {
         if self.sources.is_some() {
             return self.run(last, stop, observe);
@@ -375,7 +375,7 @@ impl Ahead<'_> {
 }
 
 impl Behind<'_> {
-    fn read(&mut self, computed: Computed) -> Result<Step, SolverError> {
+    fn read(&mut self, computed: Computed) -> Result<ComputedFrame, SolverError> {
         let (particles, mut report) = computed.unread.read()?;
         let watched = match &mut self.watch {
             Some(watch) => watch.look(&particles, &mut report),
@@ -383,7 +383,7 @@ impl Behind<'_> {
         };
         self.report = Some(report.clone());
         watched?;
-        Ok(Step {
+        Ok(ComputedFrame {
             frame: computed.frame,
             particles,
             next_id: None,

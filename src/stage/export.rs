@@ -33,7 +33,7 @@ use swell_domain::{
     sparse_grid::Precision,
     water_mesh::VOLUME,
 };
-use swell_export::{Source, mesh, mesh::Placed, table, usd};
+use swell_export::{FileOrigin, mesh, mesh::Placed, table, usd};
 use swell_scene::{Scene, look::Look};
 
 use super::{
@@ -50,7 +50,7 @@ use self::{
 
 pub use self::{
     error::ExportError,
-    expected::{Expected, expected},
+    expected::{ExpectedExport, expected},
     pattern::{Pattern, PatternError},
     usdc::UsdcError,
 };
@@ -115,7 +115,7 @@ pub struct ExportRequest {
 
 /// Progress of a running export.
 #[derive(Clone, Debug)]
-pub enum Event {
+pub enum ExportEvent {
     /// The cache is open.
     Ready {
         /// Number of frames in this process's share.
@@ -183,13 +183,13 @@ pub struct ExportOutcome {
 pub fn export(
     request: &ExportRequest,
     stop: &AtomicBool,
-    tell: &mut dyn FnMut(Event),
+    tell: &mut dyn FnMut(ExportEvent),
 ) -> Result<ExportOutcome, ExportError> {
-    let job = Job::new(request)?;
+    let job = ExportJob::new(request)?;
     let share = share(&job.frames, request.chunk).to_vec();
     let shots = job.shots()?;
     job.check_all(&share, &shots)?;
-    tell(Event::Ready {
+    tell(ExportEvent::Ready {
         frames: share.len(),
         files: request.targets.len(),
         warnings: job.lints(),
@@ -211,7 +211,7 @@ pub fn export(
                 Err(error) if request.keep_going && error.is_of_frame() => {
                     outcome.failed.push(frame);
                     let error = Arc::new(error);
-                    tell(Event::Failed { frame, error });
+                    tell(ExportEvent::Failed { frame, error });
                     continue 'frames;
                 }
                 made => made?,
@@ -221,13 +221,13 @@ pub fn export(
         if let Some(held) = volume
             && let Some(warning) = warning(held)
         {
-            tell(Event::Warning {
+            tell(ExportEvent::Warning {
                 frame,
                 off: (held - 1.0).abs(),
                 text: warning,
             });
         }
-        tell(Event::Frame {
+        tell(ExportEvent::Frame {
             frame,
             made: outcome.made - before.0,
             bytes: outcome.bytes - before.1,
@@ -251,7 +251,7 @@ fn warning(volume: f64) -> Option<String> {
 }
 
 /// A running export.
-struct Job<'a> {
+struct ExportJob<'a> {
     request: &'a ExportRequest,
     cache: CacheReader,
     /// The whitewater stream to export instead of the water.
@@ -265,7 +265,7 @@ struct Job<'a> {
     software: String,
 }
 
-impl<'a> Job<'a> {
+impl<'a> ExportJob<'a> {
     fn new(request: &'a ExportRequest) -> Result<Self, ExportError> {
         asked::check(request)?;
         let cache = CacheReader::open(&request.cache)?;
@@ -447,7 +447,7 @@ impl<'a> Job<'a> {
 
     fn bytes(&self, target: &Target, content: &Content<'_>) -> Result<Vec<u8>, ExportError> {
         let (scene, frame) = (&self.scene, content.frame);
-        let source = Source {
+        let source = FileOrigin {
             software: &self.software,
             shot: &self.source().manifest().shot,
             frame,
@@ -507,7 +507,7 @@ impl<'a> Job<'a> {
         &self,
         water: UsdWater,
         content: &Content<'_>,
-        source: &Source<'_>,
+        source: &FileOrigin<'_>,
     ) -> Result<Vec<u8>, ExportError> {
         let shot = self.shot(source.frame);
         let makers = match self.stream {
@@ -515,20 +515,20 @@ impl<'a> Job<'a> {
             None => shot::displacements(&self.scene, content.particles()?, source.frame),
         };
         let told = match water {
-            UsdWater::Points => usd::Water::Points(content.particles()?),
-            UsdWater::Mesh => usd::Water::Mesh(content.mesh()?, self.scene.domain.min),
+            UsdWater::Points => usd::WaterFrame::Points(content.particles()?),
+            UsdWater::Mesh => usd::WaterFrame::Mesh(content.mesh()?, self.scene.domain.min),
         };
         Ok(usd::frame(&shot, self.kind(water), &told, &makers))
     }
 
-    fn kind(&self, water: UsdWater) -> usd::Kind {
+    fn kind(&self, water: UsdWater) -> usd::WaterRepresentation {
         let is_own = self.stream.is_some();
         match water {
-            UsdWater::Points if is_own => usd::Kind::Points { width: None },
-            UsdWater::Points => usd::Kind::Points {
+            UsdWater::Points if is_own => usd::WaterRepresentation::Points { width: None },
+            UsdWater::Points => usd::WaterRepresentation::Points {
                 width: Some(shot::width(self.scene.particle_spacing())),
             },
-            UsdWater::Mesh => usd::Kind::Mesh,
+            UsdWater::Mesh => usd::WaterRepresentation::Mesh,
         }
     }
 
@@ -536,7 +536,7 @@ impl<'a> Job<'a> {
     fn shot(&self, frame: u32) -> usd::Shot<'_> {
         let number = |frame: Option<&u32>| frame.map_or(0, |&frame| self.numbering.of(frame));
         usd::Shot {
-            source: Source {
+            source: FileOrigin {
                 software: &self.software,
                 shot: &self.source().manifest().shot,
                 frame: self.numbering.of(frame),

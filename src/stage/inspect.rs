@@ -31,7 +31,7 @@ pub use swell_solve::plan::LIST_BUDGET;
 pub use swell_gpu::rounding::Rounding;
 
 pub use swell_cache::{
-    Entry, Manifest,
+    LedgerEntry, Manifest,
     stream::{PARTICLES, PROBES},
 };
 
@@ -173,7 +173,7 @@ pub fn plan<'a>(bake: BakePlan<'a>, gpu: &Gpu) -> Result<ScenePlan<'a>, GpuError
 ///
 /// # Errors
 /// [`CacheError`].
-pub fn cache(directory: &Path) -> Result<(Manifest, Vec<Entry>), CacheError> {
+pub fn cache(directory: &Path) -> Result<(Manifest, Vec<LedgerEntry>), CacheError> {
     let reader = CacheReader::open(directory)?;
     Ok((reader.manifest().clone(), reader.entries().to_vec()))
 }

@@ -1,6 +1,6 @@
 //! Evaluates a scene's probes.
 
-use swell_cache::{Entry, ProbeRecord, ProbeValues, stream::PROBES};
+use swell_cache::{LedgerEntry, ProbeRecord, ProbeValues, stream::PROBES};
 use swell_domain::{
     absorber::AbsorberStates,
     particles::Particles,
@@ -270,9 +270,14 @@ fn within(scene: &Scene, axis: usize, place: f64) -> f64 {
 }
 
 /// Chart of the values of the probe at `index` over time, one line per column.
-pub(super) fn chart(shot: &str, record: &ProbeRecord, index: usize, entries: &[Entry]) -> Chart {
+pub(super) fn chart(
+    shot: &str,
+    record: &ProbeRecord,
+    index: usize,
+    entries: &[LedgerEntry],
+) -> Chart {
     let columns = || record.columns.iter().map(|column| column.rsplit_once('_'));
-    let looks = |entry: &'_ Entry| {
+    let looks = |entry: &'_ LedgerEntry| {
         let looks = record.looks(entry.row(PROBES, index), entry.clock.time);
         looks
             .map(|look| (look.time, look.values.to_vec()))

@@ -43,8 +43,8 @@ use self::folder::{Folder, Owner, Wanted};
 use self::near::Near;
 use self::pictures::{attributes, baked_note, is_current, name, pictures, whole_attributes};
 use self::set::{render_scene, solid_names};
-use self::whitewater::Whitewater;
-use self::writing::{Drawn, Writing, end_writing};
+use self::whitewater::WhitewaterStream;
+use self::writing::{DrawnFrame, Writing, end_writing};
 use super::{
     Blame,
     device::{Gpu, PassTimes, shaders_note},
@@ -52,7 +52,7 @@ use super::{
 };
 
 pub use self::{
-    expected::{Expected, expected},
+    expected::{ExpectedRender, expected},
     folder::FolderError,
     pictures::picture_name,
     plan::{LookPlan, Subject, plan},
@@ -90,7 +90,7 @@ pub struct RenderRequest {
 
 /// Progress of a running render.
 #[derive(Clone, Debug)]
-pub enum Event {
+pub enum RenderEvent {
     /// The device is open.
     Ready {
         /// Name of the adapter.
@@ -261,7 +261,7 @@ impl From<&RenderJobError> for Blame {
 pub fn render(
     request: &RenderRequest,
     stop: &AtomicBool,
-    tell: &mut dyn FnMut(Event),
+    tell: &mut dyn FnMut(RenderEvent),
 ) -> Result<RenderOutcome, RenderJobError> {
     let Asked {
         cache,
@@ -278,7 +278,7 @@ pub fn render(
     let image = &request.look.spec().image;
     let rate = cache.manifest().frames_per_second;
     let camera = ends.map(|ends| request.look.lint_camera(ends, rate));
-    tell(Event::Ready {
+    tell(RenderEvent::Ready {
         device: format!(
             "{}{}{}",
             context.info.name,
@@ -291,7 +291,7 @@ pub fn render(
         left_out,
         warnings: [request.look.lints(), camera.unwrap_or_default()].concat(),
     });
-    let mut job = Job {
+    let mut job = RenderJob {
         request,
         folder: Arc::new(folder),
         writing: None,
@@ -315,7 +315,7 @@ pub fn render(
 /// The resources that a request names, checked to exist.
 struct Asked {
     cache: CacheReader,
-    whitewater: Option<Whitewater>,
+    whitewater: Option<WhitewaterStream>,
     /// Frames of this process's share.
     frames: Vec<u32>,
     /// The first and the last frame of all shares.
@@ -342,7 +342,7 @@ impl Asked {
             return Err(RenderJobError::IsWhitewater(request.cache.clone()));
         }
         let whitewater = match &request.look.spec().whitewater {
-            Some(look) => Some(Whitewater::open(
+            Some(look) => Some(WhitewaterStream::open(
                 &request.cache,
                 &look.stream,
                 &cache,
@@ -415,14 +415,14 @@ fn wanted<'a>(
 /// What happened to a frame.
 enum Done {
     /// It was drawn, and its pictures are to be written.
-    Drawn(Box<Drawn>),
+    Drawn(Box<DrawnFrame>),
     Stands,
     /// Another process is rendering it.
     Elsewhere,
 }
 
 /// A running render.
-struct Job<'a> {
+struct RenderJob<'a> {
     request: &'a RenderRequest,
     folder: Arc<Folder>,
     /// The frame drawn last, whose pictures are being encoded and written while the next one is
@@ -430,7 +430,7 @@ struct Job<'a> {
     writing: Option<Writing>,
     cache: CacheReader,
     /// The whitewater stream that the look draws.
-    whitewater: Option<Whitewater>,
+    whitewater: Option<WhitewaterStream>,
     scene: Scene,
     context: Context,
     numbering: Numbering,
@@ -442,12 +442,12 @@ struct Job<'a> {
     times: BTreeMap<&'static str, PassTime>,
 }
 
-impl Job<'_> {
+impl RenderJob<'_> {
     fn run(
         &mut self,
         frames: Vec<u32>,
         stop: &AtomicBool,
-        tell: &mut dyn FnMut(Event),
+        tell: &mut dyn FnMut(RenderEvent),
     ) -> Result<RenderOutcome, RenderJobError> {
         let mut outcome = RenderOutcome::default();
         let drawn = self.draw_all(frames, stop, (&mut outcome, tell));
@@ -460,7 +460,7 @@ impl Job<'_> {
         &mut self,
         mut frames: Vec<u32>,
         stop: &AtomicBool,
-        (outcome, tell): (&mut RenderOutcome, &mut dyn FnMut(Event)),
+        (outcome, tell): (&mut RenderOutcome, &mut dyn FnMut(RenderEvent)),
     ) -> Result<(), RenderJobError> {
         let mut is_told = false;
         while !frames.is_empty() {
@@ -478,7 +478,7 @@ impl Job<'_> {
                     }
                     Ok(Done::Stands) => {
                         outcome.skipped += 1;
-                        tell(Event::Frame {
+                        tell(RenderEvent::Frame {
                             frame,
                             seconds: 0.0,
                             skipped: true,
@@ -489,14 +489,14 @@ impl Job<'_> {
                     Err(error) if self.request.keep_going && error.is_of_frame() => {
                         outcome.failed.push(frame);
                         let error = Arc::new(error);
-                        tell(Event::Failed { frame, error });
+                        tell(RenderEvent::Failed { frame, error });
                     }
                     Err(error) => return Err(error),
                 }
             }
             if elsewhere.len() == frames.len() {
                 if !is_told {
-                    tell(Event::Waiting {
+                    tell(RenderEvent::Waiting {
                         frames: frames.len(),
                     });
                     is_told = true;
@@ -511,7 +511,7 @@ impl Job<'_> {
     fn frame(
         &mut self,
         frame: u32,
-        told: (&mut RenderOutcome, &mut dyn FnMut(Event)),
+        told: (&mut RenderOutcome, &mut dyn FnMut(RenderEvent)),
     ) -> Result<Done, RenderJobError> {
         let begin = Instant::now();
         let request = self.request;
@@ -536,7 +536,7 @@ impl Job<'_> {
             return Ok(Done::Stands);
         }
         let image = self.draw(frame, told)?;
-        Ok(Done::Drawn(Box::new(Drawn {
+        Ok(Done::Drawn(Box::new(DrawnFrame {
             frame,
             begin,
             image,
@@ -549,7 +549,7 @@ impl Job<'_> {
     fn draw(
         &mut self,
         frame: u32,
-        (outcome, tell): (&mut RenderOutcome, &mut dyn FnMut(Event)),
+        (outcome, tell): (&mut RenderOutcome, &mut dyn FnMut(RenderEvent)),
     ) -> Result<Image, RenderJobError> {
         let look = &self.request.look;
         let around = self.near.around(&self.cache, look, frame)?;
@@ -575,7 +575,7 @@ impl Job<'_> {
             if is_there && written.is_ok() {
                 written = end_writing(&mut self.writing, outcome, tell);
             }
-            tell(Event::Part { frame, part });
+            tell(RenderEvent::Part { frame, part });
         });
         written?;
         let picture = picture.map_err(|error| told(error, look))?;

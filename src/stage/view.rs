@@ -28,7 +28,7 @@ use swell_study::raster::{self, RasterError};
 use self::{
     curves::Curves,
     reel::{Reel, names},
-    strip::{Label, Source, Strip},
+    strip::{Label, PictureSource, Strip},
 };
 
 pub use self::{
@@ -80,7 +80,7 @@ pub const RATE: f64 = 24.0;
 
 /// Progress of a running view.
 #[derive(Clone, Debug)]
-pub enum Event {
+pub enum ViewEvent {
     /// The subjects are open.
     Ready {
         /// Number of frames.
@@ -119,7 +119,7 @@ pub struct ViewOutcome {
 pub fn view(
     request: &ViewRequest,
     stop: &AtomicBool,
-    tell: &mut dyn FnMut(Event),
+    tell: &mut dyn FnMut(ViewEvent),
 ) -> Result<ViewOutcome, ViewError> {
     if request.sheet.is_none() && request.movie.is_none() && !request.player {
         return Err(ViewError::Nothing);
@@ -146,7 +146,7 @@ fn caches(request: &ViewRequest, strips: &[Strip]) -> Vec<(String, PathBuf)> {
     }
     let named = names(strips).into_iter().zip(strips);
     named
-        .filter(|(_, strip)| matches!(strip.source, Source::Cache(_)))
+        .filter(|(_, strip)| matches!(strip.source, PictureSource::Cache(_)))
         .map(|(name, strip)| (name, strip.path.clone()))
         .collect()
 }
@@ -190,7 +190,8 @@ fn open(request: &ViewRequest) -> Result<Vec<Strip>, ViewError> {
         .map(open)
         .collect::<Result<_, _>>()?;
     if let [a, b] = &mut strips[..]
-        && let (Source::Cache(first), Source::Cache(second)) = (&mut a.source, &mut b.source)
+        && let (PictureSource::Cache(first), PictureSource::Cache(second)) =
+            (&mut a.source, &mut b.source)
     {
         first.top = first.top.max(second.top);
         second.like(first);
@@ -218,7 +219,7 @@ fn open(request: &ViewRequest) -> Result<Vec<Strip>, ViewError> {
 fn chosen(
     strips: &[Strip],
     frames: Option<&FrameRange>,
-    tell: &mut dyn FnMut(Event),
+    tell: &mut dyn FnMut(ViewEvent),
 ) -> Result<Vec<Label>, ViewError> {
     if let Some(frames) = frames {
         let labels: Vec<Label> = frames.iter().map(Label::Frame).collect();
@@ -241,7 +242,7 @@ fn chosen(
     for strip in strips {
         let alone = strip.labels.len() - labels.len();
         if alone > 0 {
-            tell(Event::Note(format!(
+            tell(ViewEvent::Note(format!(
                 "{alone} of the {} frames of {} are omitted: the other one does not have them",
                 strip.labels.len(),
                 strip.path.display()

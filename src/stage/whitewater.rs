@@ -20,12 +20,12 @@ use std::{
 
 use serde_json::{Value, json};
 
-use swell_cache::{Asset, CacheError, CacheReader, CacheWriter, Clock, Entry, Manifest};
+use swell_cache::{Asset, CacheError, CacheReader, CacheWriter, Clock, LedgerEntry, Manifest};
 use swell_domain::{
     bounds::Bounds,
     output,
     particles::Particles,
-    whitewater::{self, Births, Settings, Source, Thresholds},
+    whitewater::{self, Births, CalibratedSettings, SeedWater, Thresholds},
 };
 use swell_files::whitewater::{WhitewaterSettings, written_out};
 use swell_gpu::adapter::Needs;
@@ -40,13 +40,13 @@ use self::{
     engine::Engine,
     forecast::Forecast,
     settled::{recorded, settle},
-    water::Water,
+    water::WaterReader,
 };
 
 pub use self::{
     checked::Stream,
     error::WhitewaterError,
-    expected::{Expected, expected},
+    expected::{ExpectedWhitewater, expected},
     forecast::LimitForecast,
 };
 
@@ -75,7 +75,7 @@ pub struct WhitewaterRequest {
 
 /// Progress of a running job.
 #[derive(Clone, Debug)]
-pub enum Event {
+pub enum WhitewaterEvent {
     /// Progress of the calibration of thresholds: sent before the first frame and after each.
     Calibrated {
         /// Number of frames evaluated.
@@ -145,7 +145,7 @@ pub struct WhitewaterOutcome {
 
 /// Whether a stream's frame was made from the frame of this number in `cache`; the first frame is
 /// always empty.
-pub fn is_of(frame: &Entry, cache: &CacheReader) -> bool {
+pub fn is_of(frame: &LedgerEntry, cache: &CacheReader) -> bool {
     let now = cache.entry(frame.frame).map(|entry| &*entry.chain).ok();
     frame.frame == cache.first_frame() || frame.report[WATER].as_str() == now
 }
@@ -163,12 +163,12 @@ pub fn directory(cache: &Path, name: &str) -> PathBuf {
 pub fn whitewater(
     request: &WhitewaterRequest,
     stop: &AtomicBool,
-    tell: &mut dyn FnMut(Event),
+    tell: &mut dyn FnMut(WhitewaterEvent),
 ) -> Result<WhitewaterOutcome, WhitewaterError> {
     let (cache, last) = asked(request)?;
     let directory = directory(&request.cache, &request.name);
     let scene = super::baked_scene(&cache, &request.cache)?.of_whitewater();
-    let mut water = Water::of(&cache, scene.period());
+    let mut water = WaterReader::of(&cache, scene.period());
     let begin = water.at(cache.first_frame())?;
     let particles = begin.len();
     let boundary = Start::with(&scene, begin)?.boundary;
@@ -211,7 +211,7 @@ pub fn whitewater(
             StreamWriter::create(&directory, manifest, &cache, &settings)?
         }
     };
-    tell(Event::Ready {
+    tell(WhitewaterEvent::Ready {
         device: identity,
         software_warning: opened.software_warning(),
         water: particles,
@@ -229,7 +229,7 @@ pub fn whitewater(
             break;
         }
         let began = Instant::now();
-        let step = Step {
+        let step = StreamStep {
             settings: &settings,
             scene: &scene,
             cache: &cache,
@@ -237,26 +237,26 @@ pub fn whitewater(
         match step.run(&mut stream, &mut engine, &mut water) {
             Ok(born) => {
                 let frame = stream.clock.frame;
-                tell(Event::Frame {
+                tell(WhitewaterEvent::Frame {
                     frame,
                     census: whitewater::census(&stream.white),
                     born,
                     seconds: began.elapsed().as_secs_f64(),
                 });
                 if let Some(crowding) = forecast.see(frame, stream.white.len()) {
-                    tell(Event::LimitForecast(crowding));
+                    tell(WhitewaterEvent::LimitForecast(crowding));
                 }
             }
             Err(error) => {
                 // What was computed before a failure is kept.
                 let bytes = stream.writer.finish()?.bytes;
-                tell(Event::Written { bytes });
+                tell(WhitewaterEvent::Written { bytes });
                 return Err(error);
             }
         }
     }
     let summary = stream.writer.finish()?;
-    tell(Event::Written {
+    tell(WhitewaterEvent::Written {
         bytes: summary.bytes,
     });
     Ok(WhitewaterOutcome {
@@ -290,19 +290,19 @@ fn asked(request: &WhitewaterRequest) -> Result<(CacheReader, u32), WhitewaterEr
 }
 
 /// Computes a frame of a stream from the one before.
-struct Step<'a> {
-    settings: &'a Settings,
+struct StreamStep<'a> {
+    settings: &'a CalibratedSettings,
     scene: &'a Scene,
     cache: &'a CacheReader,
 }
 
-impl Step<'_> {
+impl StreamStep<'_> {
     /// Runs the step and returns the number of new particles.
     fn run(
         &self,
         stream: &mut StreamWriter,
         engine: &mut Engine,
-        water: &mut Water<'_>,
+        water: &mut WaterReader<'_>,
     ) -> Result<usize, WhitewaterError> {
         let frame = stream.clock.frame + 1;
         let before = stream.clock.time;
@@ -323,7 +323,7 @@ impl Step<'_> {
         let walls = self.scene.walls(&now.walls, clock.time);
         let births = Births::of(
             self.settings,
-            &Source {
+            &SeedWater {
                 water: &now,
                 potentials: &potentials,
                 frame,
@@ -377,7 +377,7 @@ impl StreamWriter {
         directory: &Path,
         manifest: Manifest,
         cache: &CacheReader,
-        settings: &Settings,
+        settings: &CalibratedSettings,
     ) -> Result<Self, WhitewaterError> {
         let mut assets = vec![Asset {
             name: SETTINGS.to_owned(),

@@ -19,7 +19,7 @@ pub const CLAIMS: &str = "The paper sees a better defined crest with PBF (its Fi
 
 /// Measurements of one frame of one solver.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Row {
+pub struct FrameRow {
     /// Number of the output frame.
     pub frame: u32,
     /// Simulated time, seconds.
@@ -42,7 +42,7 @@ pub struct Course {
     /// Name of the solver: `pbf`, `flip`.
     pub solver: String,
     /// Rows in frame order; the same frames for every solver.
-    pub rows: Vec<Row>,
+    pub rows: Vec<FrameRow>,
 }
 
 /// The moment when the water reaches the first obstacle.
@@ -71,7 +71,7 @@ impl Impact {
     /// metres.
     pub fn of(courses: &[Course], obstacle: f64) -> Self {
         let first = |course: &Course| {
-            let is_there = |row: &&Row| row.measures.front >= Some(obstacle);
+            let is_there = |row: &&FrameRow| row.measures.front >= Some(obstacle);
             course.rows.iter().find(is_there).map(|row| row.frame)
         };
         Self {
@@ -79,11 +79,11 @@ impl Impact {
         }
     }
 
-    fn is_before(self, row: &Row) -> bool {
+    fn is_before(self, row: &FrameRow) -> bool {
         self.frame.is_none_or(|frame| row.frame < frame)
     }
 
-    fn is_after(self, row: &Row) -> bool {
+    fn is_after(self, row: &FrameRow) -> bool {
         self.frame.is_none_or(|frame| row.frame >= frame)
     }
 }
@@ -255,7 +255,7 @@ pub fn summary(findings: &[Finding]) -> String {
 }
 
 /// Column name and value; `None` is an empty cell.
-type Column = (&'static str, fn(&Row) -> Option<f64>);
+type Column = (&'static str, fn(&FrameRow) -> Option<f64>);
 
 const COLUMNS: [Column; 13] = [
     ("frame", |row| Some(row.frame.into())),
@@ -290,7 +290,7 @@ pub fn table(courses: &[Course]) -> Vec<Vec<String>> {
 
 /// The curves of the page: each measure against simulated time.
 pub fn charts(courses: &[Course], impact: Impact) -> Vec<Chart> {
-    type Value = fn(&Row) -> Option<f64>;
+    type Value = fn(&FrameRow) -> Option<f64>;
     let measured: [(&str, &str, Value); 7] = [
         ("Crest above the still level", "m", |row| {
             Some(row.measures.crest_height)
@@ -336,7 +336,7 @@ mod tests {
 
     /// Ten frames with the front advancing a metre per frame; `measures` is the same in each.
     fn course(solver: &str, measures: Measures, seconds: f64) -> Course {
-        let row = |frame: u32| Row {
+        let row = |frame: u32| FrameRow {
             frame,
             time: 0.1 * f64::from(frame),
             seconds: Some(seconds),

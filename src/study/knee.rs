@@ -5,16 +5,16 @@ pub const OF_NO_ACCOUNT: f64 = 0.1;
 
 /// A method's points, in the order of its settings.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Line {
+pub struct MethodCurve {
     /// Name of the method.
     pub name: String,
     /// The measured points.
-    pub points: Vec<Point>,
+    pub points: Vec<CostPoint>,
 }
 
 /// Cost and error of one setting.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Point {
+pub struct CostPoint {
     /// Name of the setting.
     pub label: String,
     /// Minimum, median and maximum time of the repeats, in any consistent unit.
@@ -26,8 +26,8 @@ pub struct Point {
 }
 
 /// The Pareto front of a line in time and error, from the cheapest point on.
-fn best(line: &Line) -> Vec<&Point> {
-    let mut points: Vec<&Point> = line.points.iter().filter(|p| p.error > 0.0).collect();
+fn best(line: &MethodCurve) -> Vec<&CostPoint> {
+    let mut points: Vec<&CostPoint> = line.points.iter().filter(|p| p.error > 0.0).collect();
     points.sort_by(|a, b| {
         a.time[1]
             .total_cmp(&b.time[1])
@@ -44,7 +44,7 @@ fn best(line: &Line) -> Vec<&Point> {
 
 /// The cheapest setting whose error is at most a tenth of the discretisation error; `None` if there
 /// is none.
-fn first_of_no_account(line: &Line, discretisation: f64) -> Option<&Point> {
+fn first_of_no_account(line: &MethodCurve, discretisation: f64) -> Option<&CostPoint> {
     let mut points = best(line).into_iter();
     points.find(|point| point.error <= OF_NO_ACCOUNT * discretisation)
 }
@@ -53,7 +53,7 @@ fn first_of_no_account(line: &Line, discretisation: f64) -> Option<&Point> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Knee<'a> {
     /// The setting at the knee.
-    pub point: &'a Point,
+    pub point: &'a CostPoint,
     /// Whether its error is at most a tenth of the discretisation error. Otherwise the setting has
     /// the least error × time: up to it x times the time buys more than x times the accuracy,
     /// beyond it less.
@@ -64,9 +64,9 @@ pub struct Knee<'a> {
 
 /// The knee of a line, given the discretisation error if it is known; `None` for a line without
 /// points.
-pub fn knee(line: &Line, discretisation: Option<f64>) -> Option<Knee<'_>> {
+pub fn knee(line: &MethodCurve, discretisation: Option<f64>) -> Option<Knee<'_>> {
     let enough = discretisation.and_then(|error| first_of_no_account(line, error));
-    let product = |point: &&Point| point.time[1] * point.error;
+    let product = |point: &&CostPoint| point.time[1] * point.error;
     let least = || {
         best(line)
             .into_iter()
@@ -83,7 +83,7 @@ pub fn knee(line: &Line, discretisation: Option<f64>) -> Option<Knee<'_>> {
 }
 
 /// "x times the time buys y times the accuracy".
-fn bargain(from: &Point, to: &Point) -> String {
+fn bargain(from: &CostPoint, to: &CostPoint) -> String {
     format!(
         "from {} to {} {:.2} times the time buys {:.2} times the accuracy",
         from.label,
@@ -100,7 +100,7 @@ pub const BEST_THAT_WAS_RUN: &str = "the best that was run, so that more may sti
 const LEAST_IN_COMMON: usize = 2;
 
 /// Describes the knee of a line in words, given the discretisation error if it is known.
-pub fn words(line: &Line, discretisation: Option<f64>) -> String {
+pub fn words(line: &MethodCurve, discretisation: Option<f64>) -> String {
     let best = best(line);
     let (Some(knee), Some(first), Some(last)) =
         (knee(line, discretisation), best.first(), best.last())
@@ -143,7 +143,7 @@ pub fn words(line: &Line, discretisation: Option<f64>) -> String {
 
 /// Error of a line at a time between those of its points: its best points joined by straight lines
 /// in the logarithmic chart.
-fn at_time(line: &Line, time: f64) -> Option<f64> {
+fn at_time(line: &MethodCurve, time: f64) -> Option<f64> {
     let best = best(line);
     let pair = best
         .windows(2)
@@ -167,10 +167,10 @@ pub struct Rivalry {
 }
 
 /// Compares the points of line `index` with every other line at the same time.
-pub fn rivalry(lines: &[Line], index: usize) -> Vec<Rivalry> {
+pub fn rivalry(lines: &[MethodCurve], index: usize) -> Vec<Rivalry> {
     let others = lines.iter().enumerate().filter(|(k, _)| *k != index);
     let points = || lines[index].points.iter().filter(|p| p.error > 0.0);
-    let ratio = |other: &Line, point: &Point| {
+    let ratio = |other: &MethodCurve, point: &CostPoint| {
         let theirs = at_time(other, point.time[1])?;
         Some((point.label.clone(), theirs / point.error))
     };
@@ -221,13 +221,13 @@ impl Rivalry {
 mod tests {
     use super::*;
 
-    fn line(name: &str, points: &[(f64, f64)]) -> Line {
-        Line {
+    fn line(name: &str, points: &[(f64, f64)]) -> MethodCurve {
+        MethodCurve {
             name: name.into(),
             points: points
                 .iter()
                 .enumerate()
-                .map(|(k, &(time, error))| Point {
+                .map(|(k, &(time, error))| CostPoint {
                     label: format!("s{k}"),
                     time: [time; 3],
                     work: time,

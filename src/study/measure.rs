@@ -170,7 +170,7 @@ impl Gauge {
         }
         let water = self.water(position, spacing);
         let elevation = self.smoothed(&water.elevation);
-        let rows: Vec<Row> = (0..self.dims[2])
+        let rows: Vec<ColumnRow> = (0..self.dims[2])
             .filter_map(|t| self.row(&elevation, t))
             .collect();
         let faces: Vec<Face> = rows.iter().filter_map(|row| row.face).collect();
@@ -194,13 +194,13 @@ impl Gauge {
         }
     }
 
-    fn water(&self, position: &[[f32; 3]], spacing: f64) -> Water {
+    fn water(&self, position: &[[f32; 3]], spacing: f64) -> WaterBins {
         let rest = (self.edge / spacing).powi(3);
         let counts = self.counts(position);
         let body = self.body(&counts, rest);
         let tops = self.tops(&counts, &body, rest);
         let column = |(top, fill): (usize, f64)| (top as f64 + fill) * self.edge;
-        Water {
+        WaterBins {
             elevation: tops.iter().map(|top| top.map(column)).collect(),
             counts,
             body,
@@ -292,7 +292,7 @@ impl Gauge {
         (0..nx * nz).map(|k| column(k % nx, k / nx)).collect()
     }
 
-    fn volume(&self, water: &Water) -> f64 {
+    fn volume(&self, water: &WaterBins) -> f64 {
         let tops = water.tops.iter().flatten();
         let (columns, fills) = tops.fold((0, 0.0), |(n, sum), (_, fill)| (n + 1, sum + fill));
         // The cubes below the tops count as full.
@@ -324,7 +324,7 @@ impl Gauge {
         (0..nx * nz).into_par_iter().map(column).collect()
     }
 
-    fn row(&self, elevation: &[Option<f64>], t: usize) -> Option<Row> {
+    fn row(&self, elevation: &[Option<f64>], t: usize) -> Option<ColumnRow> {
         let row = &elevation[t * self.dims[0]..][..self.dims[0]];
         let above = |s: usize| Some((*row.get(s)?)? - self.still);
         let last = (0..row.len()).rev().find(|&s| row[s].is_some())?;
@@ -347,7 +347,7 @@ impl Gauge {
                 front: self.edge * (half? + 0.5),
             })
         };
-        Some(Row {
+        Some(ColumnRow {
             crest,
             face: (crest > self.edge).then(face).flatten(),
         })
@@ -376,7 +376,7 @@ impl Gauge {
 }
 
 /// Particles binned into cubes.
-struct Water {
+struct WaterBins {
     counts: Vec<u32>,
     /// Whether each cube belongs to the continuous water.
     body: Vec<bool>,
@@ -388,7 +388,7 @@ struct Water {
 }
 
 /// One row of columns along the wave's direction.
-struct Row {
+struct ColumnRow {
     crest: f64,
     face: Option<Face>,
 }

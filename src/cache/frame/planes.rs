@@ -16,8 +16,8 @@ use std::path::Path;
 use rayon::prelude::*;
 
 use super::{
-    Counted, HEADER_LIMIT, Head, Stamp, Unpacked, Written, header, header_bytes, pack, read_head,
-    row_size,
+    Counted, HEADER_LIMIT, Head, Stamp, Unpacked, WrittenFile, header, header_bytes, pack,
+    read_head, row_size,
 };
 use crate::error::CacheError;
 use swell_domain::particles::Particles;
@@ -61,7 +61,7 @@ pub fn encode(
     out: &mut impl Write,
     stamp: &Stamp<'_>,
     particles: &Particles,
-) -> io::Result<Written> {
+) -> io::Result<WrittenFile> {
     encode_as(Content::Differences, out, stamp, particles)
 }
 
@@ -70,7 +70,7 @@ fn encode_as(
     out: &mut impl Write,
     stamp: &Stamp<'_>,
     particles: &Particles,
-) -> io::Result<Written> {
+) -> io::Result<WrittenFile> {
     let names = particles.attributes.keys().map(String::as_str);
     let mut header = header(stamp, particles.len(), names);
     header.comments.push(content.comment());

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use crate::{
-    engine::{Comparison, Io, PassResult, comparison, names},
+    comparison::{Comparison, Io, PassResult, comparison, names},
     flip::FlipState,
     pbf::PbfState,
     table::entries,

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use crate::{
-    engine::{Comparison, Io, PassResult, State, comparison, names},
+    comparison::{Comparison, Io, PassResult, State, comparison, names},
     flip::FlipState,
     pbf::{PbfState, bounds::Bounds},
     table::{entries, pair},

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use glam::DVec3;
 
 use crate::{
-    engine::{Comparison, Io, PassResult, comparison, names},
+    comparison::{Comparison, Io, PassResult, comparison, names},
     flip::FlipState,
     pbf::PbfState,
     table::entries,
@@ -56,7 +56,7 @@ pub(super) const FLIP: &[Comparison<FlipState>] = &[comparison(
 /// Σ|u|, m/s.
 fn sizes(waves: &OpenWaves, rate: f64, size: DVec3, step: f64) -> [f64; 3] {
     let speed = waves.most_speed();
-    let turns = |line: &swell_domain::open_waves::Line| line.number.length() / TAU;
+    let turns = |line: &swell_domain::open_waves::WaveComponent| line.number.length() / TAU;
     let most = waves.lines.iter().map(turns).fold(0.0, f64::max);
     let wave = WAVE.of([speed, most * size.length(), waves.lines.len() as f64]);
     [rate * step / (1.0 + rate * step), wave, speed]

@@ -2,7 +2,7 @@
 
 use swell_scene::effects::with_effects;
 
-use super::{engine::Comparison, flip::FlipState, pbf::PbfState};
+use super::{comparison::Comparison, flip::FlipState, pbf::PbfState};
 
 mod zone;
 

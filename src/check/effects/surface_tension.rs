@@ -3,10 +3,10 @@
 use glam::{DVec2, DVec3};
 
 use crate::{
-    engine::{Comparison, Io, NONE, PassResult, comparison, names},
+    comparison::{Comparison, Io, NONE, PassResult, comparison, names},
     flip::FlipState,
     pbf::PbfState,
-    table::{Entry, each, entries, pair},
+    table::{CheckEntry, each, entries, pair},
 };
 use swell_compare::{rounding::U, tolerance::bounds};
 use swell_domain::poisson::Cells;
@@ -96,7 +96,7 @@ fn smoothed(
     state: &mut FlipState,
     io: &mut Io<'_>,
     [from, to]: [Buf<f32>; 2],
-    entry: &'static Entry<1>,
+    entry: &'static CheckEntry<1>,
 ) -> PassResult {
     let elements = state.elements();
     let kind = &state.space().kind;

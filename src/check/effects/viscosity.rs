@@ -2,7 +2,7 @@
 //! has no pass.
 
 use crate::{
-    engine::{Comparison, Io, NONE, PassResult, State, comparison, names},
+    comparison::{Comparison, Io, NONE, PassResult, State, comparison, names},
     flip::FlipState,
     pbf::{
         PbfState,
@@ -17,8 +17,8 @@ use swell_compare::{
 use swell_reference::{
     flip::Centers,
     flip::effects::{
-        Water,
-        viscosity::{Cell, viscosity_relax, viscosity_weigh},
+        FaceInputs,
+        viscosity::{ViscousCell, viscosity_relax, viscosity_weigh},
     },
     pbf::effects::viscosity::{viscosity_apply, viscosity_gather},
 };
@@ -85,7 +85,7 @@ fn weigh(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let elements = state.elements();
     let active = elements.active();
     let step = state.step();
-    let cells = viscosity_weigh(Water {
+    let cells = viscosity_weigh(FaceInputs {
         model: &state.model,
         step: &step,
         bricks: &elements.bricks,
@@ -94,7 +94,7 @@ fn weigh(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
         centers: &Centers::default(),
         old: &[],
     });
-    let words: Vec<u32> = cells.iter().map(Cell::word).collect();
+    let words: Vec<u32> = cells.iter().map(ViscousCell::word).collect();
     let found = io.after.get(WORD, elements.cells)?;
     (io.table).add_exact(&WORDS, &found[active.clone()], &words[active.clone()]);
     let velocity = elements.planes(&io.after, flip::buffers::FACE_VELOCITY)?;
@@ -116,7 +116,7 @@ fn relax(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let change = elements.planes(&io.before, STEP)?;
     let start = elements.planes(&io.before, START)?;
     let words = io.before.get(WORD, elements.cells)?;
-    let cells: Vec<Cell> = words.into_iter().map(Cell::of_word).collect();
+    let cells: Vec<ViscousCell> = words.into_iter().map(ViscousCell::of_word).collect();
     let (to, step) = viscosity_relax(
         (&elements.bricks, &cells),
         [reach, gain, momentum],

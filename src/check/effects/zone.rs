@@ -4,16 +4,16 @@
 use glam::DVec3;
 
 use crate::{
-    engine::{Io, PassResult, State},
+    comparison::{Io, PassResult, State},
     flip::FlipState,
     pbf::PbfState,
-    table::{Entry, pair},
+    table::{CheckEntry, pair},
 };
 use swell_compare::{rounding::U, tolerance::bounds};
 use swell_reference::{
     flip::{
         Centers,
-        effects::{Water, led_faces},
+        effects::{FaceInputs, led_faces},
     },
     pbf::effects::led_particles,
 };
@@ -40,7 +40,7 @@ pub(super) fn particles<const N: usize>(
     state: &PbfState,
     io: &mut Io<'_>,
     zone: Zone<'_>,
-    entry: &'static Entry<N>,
+    entry: &'static CheckEntry<N>,
     wanted: impl Fn(DVec3) -> DVec3 + Send + Sync,
     magnitudes: impl Fn(f64) -> [f64; N] + Send + Sync,
 ) -> PassResult {
@@ -63,7 +63,7 @@ pub(super) fn faces<const N: usize>(
     state: &FlipState,
     io: &mut Io<'_>,
     zone: Zone<'_>,
-    entry: &'static Entry<N>,
+    entry: &'static CheckEntry<N>,
     wanted: impl Fn(DVec3) -> DVec3 + Send + Sync,
     magnitudes: impl Fn([f64; 2]) -> [f64; N] + Send + Sync,
 ) -> PassResult {
@@ -71,7 +71,7 @@ pub(super) fn faces<const N: usize>(
     let old = elements.planes(&io.before, flip::buffers::FACE_CHANGE)?;
     let before = elements.planes(&io.before, flip::buffers::FACE_VELOCITY)?;
     let found = elements.planes(&io.after, flip::buffers::FACE_VELOCITY)?;
-    let water = Water {
+    let water = FaceInputs {
         model: &state.model,
         step: &step,
         bricks: &elements.bricks,

@@ -3,8 +3,8 @@
 use std::ops::Range;
 
 use crate::{
-    engine::{Comparison, Io, NONE, PassResult, comparison},
-    table::{Entry, each, pair},
+    comparison::{Comparison, Io, NONE, PassResult, comparison},
+    table::{CheckEntry, each, pair},
 };
 use swell_domain::bricks::CELLS;
 use swell_reference::poisson::multigrid::{
@@ -97,7 +97,7 @@ impl Cycle {
     fn compare(
         &self,
         io: &mut Io<'_>,
-        entry: &'static Entry<1>,
+        entry: &'static CheckEntry<1>,
         (colour, about): (u32, Surroundings),
         found: &[f64],
     ) {
@@ -118,7 +118,7 @@ impl Cycle {
 }
 
 /// Compares the first smoothing of the phase's level.
-pub(super) fn smoothed(cycle: &Cycle, io: &mut Io<'_>, entry: &'static Entry<1>) {
+pub(super) fn smoothed(cycle: &Cycle, io: &mut Io<'_>, entry: &'static CheckEntry<1>) {
     let found = &cycle.levels.smoothed;
     cycle.compare(io, entry, (0, Surroundings::Nothing), found);
     cycle.compare(io, entry, (1, Surroundings::SmoothedWithin), found);

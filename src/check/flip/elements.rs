@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use glam::DVec3;
 
-use crate::engine::{View, names};
+use crate::comparison::{TracedBuffers, names};
 use swell_domain::bricks::{Bricks, CELLS};
 use swell_gpu::buffer::Buf;
 use swell_reference::flip::Faces;
@@ -55,7 +55,7 @@ impl Elements {
     /// Reads an array of cells.
     pub(crate) fn scalars(
         &self,
-        view: &View<'_>,
+        view: &TracedBuffers<'_>,
         buffer: Buf<f32>,
     ) -> Result<Vec<f64>, SolveError> {
         view.scalars(buffer, self.cells)
@@ -64,7 +64,7 @@ impl Elements {
     /// Reads three planes as one vector per cell.
     pub(crate) fn planes(
         &self,
-        view: &View<'_>,
+        view: &TracedBuffers<'_>,
         buffer: Buf<f32>,
     ) -> Result<Vec<DVec3>, SolveError> {
         let values = view.scalars(buffer, 2 * self.stride + self.cells)?;
@@ -74,7 +74,7 @@ impl Elements {
     }
 
     /// Reads velocities, changes and layers at faces.
-    pub(super) fn faces(&self, view: &View<'_>) -> Result<Faces, SolveError> {
+    pub(super) fn faces(&self, view: &TracedBuffers<'_>) -> Result<Faces, SolveError> {
         Ok(Faces {
             velocity: self.planes(view, buffers::FACE_VELOCITY)?,
             change: self.planes(view, buffers::FACE_CHANGE)?,

@@ -6,7 +6,7 @@ use swell_solve::flip::buffers;
 
 use super::{FlipState, rows::*};
 use crate::{
-    engine::{Io, PassResult},
+    comparison::{Io, PassResult},
     table::{each, pair},
 };
 

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use crate::{
-    engine::{Io, PassResult},
+    comparison::{Io, PassResult},
     solids::{GRID, TURNED},
     table::{each, pair},
 };
@@ -21,16 +21,16 @@ use swell_solve::flip::buffers;
 use super::{FlipState, elements::neighborhood, rows::*};
 
 /// Number of particles in the 27 cells around one, and the range of their velocities.
-struct About {
+struct Neighborhood {
     count: f64,
     low: DVec3,
     high: DVec3,
 }
 
 impl FlipState {
-    fn about(&self, element: usize) -> About {
+    fn about(&self, element: usize) -> Neighborhood {
         let (bricks, sorted) = (&self.elements().bricks, self.sorted());
-        let mut about = About {
+        let mut about = Neighborhood {
             count: 0.0,
             low: DVec3::splat(f64::INFINITY),
             high: DVec3::splat(f64::NEG_INFINITY),
@@ -191,7 +191,7 @@ pub(super) fn gather_faces(state: &mut FlipState, io: &mut Io<'_>) -> PassResult
     let found = elements.faces(&io.after)?;
     let place = state.place();
     let error = |e: usize| {
-        let About { count, low, high } = state.about(e);
+        let Neighborhood { count, low, high } = state.about(e);
         if count == 0.0 {
             return 0.0;
         }

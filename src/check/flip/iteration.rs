@@ -2,7 +2,7 @@
 //! air touches.
 
 use crate::{
-    engine::{Comparison, Io, NONE, PassResult, comparison, names},
+    comparison::{Comparison, Io, NONE, PassResult, comparison, names},
     table::pair,
 };
 use swell_domain::{bricks::CELLS, poisson::remove_means};

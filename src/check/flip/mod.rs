@@ -16,25 +16,16 @@ use glam::DVec3;
 
 use swell_domain::{
     absorber::AbsorberStates, boundary::Boundary, particles::Particles, poisson::FLUID,
-    solver::Solver, substep::SubstepChoice,
 };
-use swell_gpu::adapter::Context;
 use swell_reference::{
-    flip::{GridTransfer, Model, OpenSpace, Sorted, Step, is_filling},
+    flip::{FlipSubstep, GridTransfer, Model, OpenSpace, Sorted, is_filling},
     poisson::iteration::Sum,
 };
 use swell_scene::{FlipScene, step::Substep};
-use swell_solve::{
-    SolveError,
-    flip::{Flip, buffers},
-    plan::Plan,
-    pressure::buffers as solved,
-    trace::{Begun, Span, TraceFrame},
-};
+use swell_solve::{flip::buffers, pressure::buffers as solved, trace::Begun};
 
 use super::{
-    Checked, effects,
-    engine::{Comparison, Engine, Io, NONE, PassResult, State, comparison, names},
+    comparison::{Comparison, Io, NONE, PassResult, State, comparison, names},
     table::pair,
 };
 use elements::Elements;
@@ -87,35 +78,19 @@ const COMPARISONS: &[Comparison<FlipState>] = &[
 const BOTH_HALVES: &str = "compared together with flip/gather_faces and flip/gather_centers";
 const LABELLED: &str = "compared after pressure/count_pockets";
 
-/// Traces a substep of the frame after `particles`, the state at the end of `frame`, and compares
-/// it with the reference.
-///
-/// # Errors Returns an error if the device fails, a numerical budget is exceeded, or the frame does
-/// not have the substep.
-pub fn check(
-    context: &Context,
-    scene: &FlipScene,
-    plan: Plan,
-    boundary: &Boundary,
-    (frame, particles): (u32, &Particles),
-    which: SubstepChoice,
-) -> Result<Checked, SolveError> {
-    let mut solver = Flip::new(context, scene, plan, boundary, false)?;
-    solver.load(frame, particles)?;
-    let mut engine = Engine::new(FlipState::new(scene, boundary, (frame, particles)));
-    let traced = solver.trace_frame(Span::Only(which), &mut |begun, traced| {
-        engine.state.begun = begun;
-        engine.observe(traced)
-    })?;
-    Ok(Checked {
-        table: engine.finish(),
-        substep: Some(traced),
-    })
+/// Returns the comparisons of FLIP's own passes and of its projection.
+pub(super) fn comparisons() -> [&'static [Comparison<FlipState>]; 4] {
+    [
+        COMPARISONS,
+        pressure::COMPARISONS,
+        iteration::COMPARISONS,
+        cycle::COMPARISONS,
+    ]
 }
 
 /// State that the comparisons share during the substep.
 pub(crate) struct FlipState {
-    pub(super) scene: FlipScene,
+    pub(super) scene: FlipScene<'static>,
     boundary: Boundary,
     pub(super) model: Model,
     n: usize,
@@ -141,16 +116,6 @@ pub(crate) struct FlipState {
 }
 
 impl State for FlipState {
-    fn comparisons() -> Vec<&'static [Comparison<Self>]> {
-        let own = [
-            COMPARISONS,
-            pressure::COMPARISONS,
-            iteration::COMPARISONS,
-            cycle::COMPARISONS,
-        ];
-        [&own[..], &effects::flip()].concat()
-    }
-
     fn particles(&self) -> usize {
         self.n
     }
@@ -175,7 +140,7 @@ impl FlipState {
         (frame, particles): (u32, &Particles),
     ) -> Self {
         Self {
-            scene: scene.clone(),
+            scene: scene.to_owned_scene(),
             boundary: boundary.clone(),
             model: Model::new(scene, boundary),
             n: particles.len(),
@@ -222,7 +187,7 @@ impl FlipState {
         self.density.as_ref().expect("after flip/gather_centers")
     }
 
-    pub(super) fn step(&self) -> Step<'_> {
+    pub(super) fn step(&self) -> FlipSubstep<'_> {
         self.model.step(&self.elements().substep, &self.absorbers)
     }
 

@@ -4,7 +4,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::{
-    engine::{Io, PassResult},
+    comparison::{Io, PassResult},
     table::pair,
 };
 use swell_domain::bricks::Bricks;

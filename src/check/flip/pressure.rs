@@ -4,8 +4,8 @@
 use glam::DVec3;
 
 use crate::{
-    engine::{Comparison, Io, NONE, PassResult, View, comparison, names},
-    table::{Entry, Table, pair},
+    comparison::{Comparison, Io, NONE, PassResult, TracedBuffers, comparison, names},
+    table::{CheckEntry, CheckTable, pair},
 };
 use swell_compare::{
     deviation::relative,
@@ -116,7 +116,7 @@ impl FlipState {
     /// Reads an array of the projection, by row.
     pub(super) fn by_row(
         &self,
-        view: &View<'_>,
+        view: &TracedBuffers<'_>,
         buffer: Buf<Real>,
     ) -> Result<Vec<f64>, SolveError> {
         self.by_row_of(view, buffer, 0)
@@ -125,7 +125,7 @@ impl FlipState {
     /// Reads one of the arrays that a buffer of the projection holds, by row.
     pub(super) fn by_row_of(
         &self,
-        view: &View<'_>,
+        view: &TracedBuffers<'_>,
         buffer: Buf<Real>,
         array: usize,
     ) -> Result<Vec<f64>, SolveError> {
@@ -135,7 +135,7 @@ impl FlipState {
     }
 
     /// Reads the terms whose sum is the solution, by row.
-    pub(super) fn terms(&self, view: &View<'_>) -> Result<Vec<Vec<f64>>, SolveError> {
+    pub(super) fn terms(&self, view: &TracedBuffers<'_>) -> Result<Vec<Vec<f64>>, SolveError> {
         let Elements { cells, stride, .. } = *self.elements();
         let (precision, terms) = (self.precision(), self.precision().terms());
         let values = view.reals(&solved::SOLUTION, precision, stride * (terms - 1) + cells)?;
@@ -180,8 +180,8 @@ impl FlipState {
     /// Adds one value per row to the table.
     pub(super) fn add_rows<const N: usize>(
         &self,
-        table: &mut Table,
-        entry: &'static Entry<N>,
+        table: &mut CheckTable,
+        entry: &'static CheckEntry<N>,
         one: impl Fn(usize) -> (f64, f64, [f64; N]) + Send + Sync,
     ) {
         let cells = &self.system().cell;
@@ -194,8 +194,8 @@ impl FlipState {
     /// Compares the largest divergence that the device recorded with that of `rows`.
     fn add_noted(
         &self,
-        table: &mut Table,
-        entry: &'static Entry<2>,
+        table: &mut CheckTable,
+        entry: &'static CheckEntry<2>,
         found: f32,
         [rows, flow]: [&[f64]; 2],
     ) {

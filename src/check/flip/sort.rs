@@ -3,7 +3,7 @@
 use glam::{DMat3, DVec3};
 
 use crate::{
-    engine::{Io, PassResult, View},
+    comparison::{Io, PassResult, TracedBuffers},
     sort::{check_cells, check_slots},
     table::pair,
 };
@@ -21,7 +21,7 @@ impl FlipState {
     /// Reads particles from four arrays: position, velocity, id, velocity gradients.
     fn cloud(
         &self,
-        view: &View<'_>,
+        view: &TracedBuffers<'_>,
         [position, velocity]: [Buf<[f32; 3]>; 2],
         id: Buf<u32>,
         affine: Buf<f32>,
@@ -37,7 +37,7 @@ impl FlipState {
     /// Reads velocity gradients; none without APIC.
     pub(super) fn slopes(
         &self,
-        view: &View<'_>,
+        view: &TracedBuffers<'_>,
         affine: Buf<f32>,
     ) -> Result<Vec<DMat3>, SolveError> {
         let rows = match self.model.settings().transfer {
@@ -49,12 +49,12 @@ impl FlipState {
     }
 
     /// Reads the particles after the pass.
-    fn unsorted(&self, view: &View<'_>) -> Result<Cloud, SolveError> {
+    fn unsorted(&self, view: &TracedBuffers<'_>) -> Result<Cloud, SolveError> {
         let vectors = [buffers::POSITION, buffers::VELOCITY];
         self.cloud(view, vectors, buffers::ID, buffers::AFFINE)
     }
 
-    fn sorted_now(&self, view: &View<'_>) -> Result<Cloud, SolveError> {
+    fn sorted_now(&self, view: &TracedBuffers<'_>) -> Result<Cloud, SolveError> {
         let vectors = [buffers::SORTED_POSITION, buffers::SORTED_VELOCITY];
         self.cloud(
             view,

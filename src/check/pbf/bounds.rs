@@ -8,7 +8,7 @@ use swell_compare::rounding::{
     WALL_GRADIENT, WALL_PLACE,
 };
 use swell_domain::{bounds::FAR, pbf::CONTACT, pose::Pose};
-use swell_reference::pbf::passes::{Inputs, Row};
+use swell_reference::pbf::passes::{DensityConstraint, Inputs};
 
 use super::rows::{DELTA, OF_SOLIDS, PUSHED, REACH, REPULSION};
 use crate::solids::{GRID, TURNED};
@@ -81,7 +81,7 @@ impl Bounds<'_> {
     }
 
     /// Returns the bound [`LAMBDA`].
-    pub(super) fn lambda(&self, i: usize, row: &Row, lambda: f64) -> f64 {
+    pub(super) fn lambda(&self, i: usize, row: &DensityConstraint, lambda: f64) -> f64 {
         let scale = self.0.model.calibration.gradient_scale;
         let sums = self.sums(i, |j| self.mass(j));
         let [_, walls] = self.walls(self.0.points[i]);

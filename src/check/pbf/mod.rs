@@ -10,36 +10,24 @@ mod work;
 
 use glam::DVec3;
 
-use swell_domain::{
-    boundary::Boundary, particles::Particles, solver::Solver, substep::SubstepChoice,
-};
-use swell_gpu::adapter::Context;
+use swell_domain::{absorber::AbsorberStates, boundary::Boundary};
 use swell_reference::{
     neighbors::Neighbors,
     pbf::{Model, Substep, passes::Inputs},
 };
-use swell_scene::{PbfScene, Stop, step::projected_substep};
-use swell_solve::{
-    SolveError,
-    flip::buffers::BRICKS,
-    params::IterationControl,
-    pbf::{Pbf, buffers},
-    plan::Plan,
-    trace::{Span, TraceFrame},
-};
+use swell_scene::{PbfScene, Stop};
+use swell_solve::{SolveError, params::IterationControl, pbf::buffers, plan::Plan};
 
 use super::{
-    Checked, effects,
-    engine::{Comparison, Engine, Io, NONE, PassResult, State, View, comparison, names, wide},
-    flip::FlipState,
-    table::{Table, pair},
+    comparison::{Comparison, Io, NONE, PassResult, State, TracedBuffers, comparison, names, wide},
+    table::pair,
 };
 use lists::Lists;
 use rows::{SAMPLES, WEIGHTS};
 use whole::Whole;
 
 /// Comparisons of PBF's own passes.
-const COMPARISONS: &[Comparison<PbfState>] = &[
+pub(super) const COMPARISONS: &[Comparison<PbfState>] = &[
     comparison("pbf/predict", || names![buffers::VELOCITY], passes::predict),
     comparison("pbf/assign_cells", NONE, passes::assign_cells),
     comparison(
@@ -96,69 +84,9 @@ const COMPARISONS: &[Comparison<PbfState>] = &[
     ),
 ];
 
-/// Traces a substep of the frame after `particles`, the state at the end of `frame`, and compares
-/// it with the reference. `boundary` holds the solids for the reference, `uploaded` those for the
-/// device; they differ only in tests.
-///
-/// # Errors Returns an error if the device fails, a numerical budget is exceeded, or the frame does
-/// not have the substep.
-pub fn check(
-    context: &Context,
-    scene: &PbfScene,
-    plan: Plan,
-    [boundary, uploaded]: [&Boundary; 2],
-    (frame, particles): (u32, &Particles),
-    which: SubstepChoice,
-) -> Result<Checked, SolveError> {
-    let mut solver = Pbf::new(context, scene, plan.clone(), uploaded, false)?;
-    solver.load(frame, particles)?;
-    let absorbers = &particles.walls;
-    let substeps = scene.pbf_substeps(absorbers, frame, particles.max_speed())?;
-    let length = scene.shot.frame_seconds();
-    let time_step = length / f64::from(substeps);
-    let number = match which {
-        SubstepChoice::Number(number) => number,
-        SubstepChoice::Last => substeps,
-    };
-    let end = f64::from(frame) * length + f64::from(number) * time_step;
-    let mut model = Model::new(scene, boundary);
-    model.stand(scene, end, time_step);
-    let mut engine = Engine::new(PbfState {
-        model,
-        has_samples: false,
-        substep: Substep::new(scene, absorbers, end, time_step),
-        lists: Lists::new(&plan),
-        whole: Whole::default(),
-        is_over: false,
-        scene: scene.clone(),
-        plan,
-    });
-    let mut of_grid = scene.of_projection().map(|grid| {
-        let mut state = FlipState::new(&grid, boundary, (frame, particles));
-        let before = if number > 1 {
-            time_step
-        } else {
-            particles.substep
-        };
-        state.given_substep = Some(projected_substep(end - time_step, time_step, before));
-        Engine::new(state)
-    });
-    let traced = solver.trace_frame(Span::Only(which), &mut |_, traced| match &mut of_grid {
-        Some(of_grid) if traced.has(BRICKS.name()) => of_grid.observe(traced),
-        _ => engine.observe(traced),
-    })?;
-    engine.state.add_whole(boundary, &mut engine.table);
-    let mut table = of_grid.map_or_else(Table::default, Engine::finish);
-    table.absorb(engine.finish());
-    Ok(Checked {
-        table,
-        substep: Some(traced),
-    })
-}
-
 /// State that the comparisons share during the substep.
 pub(super) struct PbfState {
-    pub(super) scene: PbfScene,
+    pub(super) scene: PbfScene<'static>,
     model: Model,
     /// Whether the model's samples are those of the device.
     has_samples: bool,
@@ -171,10 +99,6 @@ pub(super) struct PbfState {
 }
 
 impl State for PbfState {
-    fn comparisons() -> Vec<&'static [Comparison<Self>]> {
-        [&[COMPARISONS][..], &effects::pbf()].concat()
-    }
-
     fn particles(&self) -> usize {
         self.plan.counts.particles
     }
@@ -183,6 +107,28 @@ impl State for PbfState {
 }
 
 impl PbfState {
+    /// Creates the state for a substep that ends at time `end` after `time_step` seconds.
+    pub(super) fn new(
+        scene: &PbfScene,
+        boundary: &Boundary,
+        plan: Plan,
+        absorbers: &AbsorberStates,
+        (end, time_step): (f64, f64),
+    ) -> Self {
+        let mut model = Model::new(scene, boundary);
+        model.stand(scene, end, time_step);
+        Self {
+            scene: scene.to_owned_scene(),
+            model,
+            has_samples: false,
+            substep: Substep::new(scene, absorbers, end, time_step),
+            lists: Lists::new(&plan),
+            plan,
+            whole: Whole::default(),
+            is_over: false,
+        }
+    }
+
     pub(super) fn inputs<'b>(
         &'b self,
         points: &'b [DVec3],
@@ -237,7 +183,11 @@ impl PbfState {
     }
 
     /// Reads the first `count` entries of `predicted`: positions, and the values in w.
-    fn places(&self, view: &View<'_>, count: usize) -> Result<(Vec<DVec3>, Vec<f64>), SolveError> {
+    fn places(
+        &self,
+        view: &TracedBuffers<'_>,
+        count: usize,
+    ) -> Result<(Vec<DVec3>, Vec<f64>), SolveError> {
         let low = self.plan.page.unwrap_or(count).min(count);
         let mut all = view.get(buffers::PREDICTED, low)?;
         if low < count {
@@ -251,7 +201,7 @@ impl PbfState {
     }
 
     /// Reads which particles the grid found to be isolated droplets, in storage order.
-    pub(super) fn drops(&self, view: &View<'_>) -> Result<Vec<bool>, SolveError> {
+    pub(super) fn drops(&self, view: &TracedBuffers<'_>) -> Result<Vec<bool>, SolveError> {
         let n = self.particles();
         if !self.model.settings.grid_projection {
             return Ok(vec![false; n]);

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use crate::{
-    engine::{Io, PassResult},
+    comparison::{Io, PassResult},
     sort::{check_cells, check_slots},
     table::{each, pair},
 };

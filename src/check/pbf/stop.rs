@@ -1,7 +1,7 @@
 //! The stop at a density error.
 
 use crate::{
-    engine::{Io, PassResult},
+    comparison::{Io, PassResult},
     table::pair,
 };
 use swell_scene::Stop;

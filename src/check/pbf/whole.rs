@@ -4,7 +4,7 @@
 
 use glam::DVec3;
 
-use crate::table::{Table, pair};
+use crate::table::{CheckTable, pair};
 use swell_compare::deviation::Deviation;
 use swell_domain::boundary::Boundary;
 use swell_reference::{
@@ -57,7 +57,7 @@ struct Outcome {
 }
 
 impl PbfState {
-    pub(super) fn add_whole(&mut self, boundary: &Boundary, table: &mut Table) {
+    pub(crate) fn add_whole(&mut self, boundary: &Boundary, table: &mut CheckTable) {
         let Some(start) = self.whole.start.take() else {
             return;
         };

@@ -1,7 +1,7 @@
 //! Work of moving walls on the particles, over m / Δt².
 
 use crate::{
-    engine::{Io, PassResult},
+    comparison::{Io, PassResult},
     table::pair,
 };
 use swell_solve::pbf::buffers;

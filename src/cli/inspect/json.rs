@@ -6,10 +6,12 @@ use std::path::Path;
 use serde_json::{Map, Value, json};
 
 use super::{CACHE, InspectArgs, broken_off, file, look, refuse_options, study};
-use crate::{Failure, bake, is_cache, output};
+use crate::{Failure, bake, is_cache, output, pass_times};
 use swell_scene::Scene;
 use swell_stage::{
-    inspect::{Adapter, Entry, Manifest, PARTICLES, Rounding, ScenePlan, adapters, cache, sizes},
+    inspect::{
+        Adapter, LedgerEntry, Manifest, PARTICLES, Rounding, ScenePlan, adapters, cache, sizes,
+    },
     replay::is_failed,
     time::{Timed, time},
 };
@@ -119,7 +121,7 @@ fn timed_json(scene: &Scene, timed: &Timed) -> Value {
         "seconds": { "least": least, "median": median, "greatest": greatest },
         "substeps": timed.substeps,
         "shot_seconds": median * f64::from(scene.shot.frames),
-        "parts": output::parts_json(&timed.shares),
+        "parts": pass_times::parts_json(&timed.shares),
     })
 }
 
@@ -204,7 +206,7 @@ fn of_cache(directory: &Path) -> Result<Value, Failure> {
     }))
 }
 
-fn frame(manifest: &Manifest, entry: &Entry, newest: u32) -> Value {
+fn frame(manifest: &Manifest, entry: &LedgerEntry, newest: u32) -> Value {
     let is_there = manifest.has_particles(entry.frame, newest);
     let bytes = entry.file(PARTICLES).filter(|_| is_there);
     json!({

@@ -32,7 +32,7 @@ impl Recurring {
 }
 
 /// Warnings of one kind in a job.
-struct Kind {
+struct WarningGroup {
     worst: Recurring,
     frames: u64,
     first: u32,
@@ -41,7 +41,7 @@ struct Kind {
 
 /// Warnings of a job by kind, in order of first occurrence.
 #[derive(Default)]
-pub(super) struct Recurrences(Vec<Kind>);
+pub(super) struct Recurrences(Vec<WarningGroup>);
 
 impl Recurrences {
     /// Adds a warning. Returns the line and the event to print now if it is the first of its kind.
@@ -49,7 +49,7 @@ impl Recurrences {
         let known = self.0.iter_mut().find(|it| it.worst.what == warning.what);
         let Some(kind) = known else {
             let (line, event) = warning.said();
-            self.0.push(Kind {
+            self.0.push(WarningGroup {
                 first: warning.frame,
                 last: warning.frame,
                 frames: 1,
@@ -72,7 +72,7 @@ impl Recurrences {
         let kinds = std::mem::take(&mut self.0).into_iter();
         let more = kinds.filter(|kind| kind.frames > 1);
         more.map(|kind| {
-            let Kind {
+            let WarningGroup {
                 worst,
                 frames,
                 first,

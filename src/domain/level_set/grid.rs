@@ -12,7 +12,7 @@ pub(super) const HALVES: usize = 2;
 const SPARSEST: usize = 16;
 
 /// Points sorted by cell.
-pub(super) struct Grid {
+pub(super) struct BinnedPoints {
     /// Requested edge length, and that of the cells themselves, metres.
     edge: f64,
     cell: f64,
@@ -22,7 +22,7 @@ pub(super) struct Grid {
     pub(super) order: Vec<u32>,
 }
 
-impl Grid {
+impl BinnedPoints {
     pub(super) fn new(places: &[DVec3], edge: f64) -> Self {
         let min = places
             .par_iter()
@@ -127,10 +127,10 @@ mod tests {
         let scattered: Vec<DVec3> = (0..100).map(place).collect();
         // Points at the limit of f32, and no points.
         let farther: Vec<DVec3> = scattered.iter().map(|p| 1e31 * *p).collect();
-        assert_eq!(Grid::new(&farther, 1.0).order.len(), farther.len());
-        assert_eq!(Grid::new(&[], 1.0).cells, [1; 3]);
+        assert_eq!(BinnedPoints::new(&farther, 1.0).order.len(), farther.len());
+        assert_eq!(BinnedPoints::new(&[], 1.0).cells, [1; 3]);
         for places in [&scattered[..], &scattered[..50]] {
-            let grid = Grid::new(places, 1.0);
+            let grid = BinnedPoints::new(places, 1.0);
             assert!(grid.starts.len() <= SPARSEST * (places.len() + 1) + 1);
             assert_eq!(grid.edge(), 1.0);
             for &p in places {
@@ -141,7 +141,7 @@ mod tests {
             }
         }
         // Negative control: one cluster by itself keeps the requested cell size.
-        assert_eq!(Grid::new(&scattered[..50], 1.0).cell, 1.0);
-        assert!(Grid::new(&scattered, 1.0).cell > 1.0);
+        assert_eq!(BinnedPoints::new(&scattered[..50], 1.0).cell, 1.0);
+        assert!(BinnedPoints::new(&scattered, 1.0).cell > 1.0);
     }
 }

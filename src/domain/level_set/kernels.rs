@@ -24,7 +24,7 @@ use rayon::prelude::*;
 
 use super::{
     eigen,
-    grid::{Grid, HALVES},
+    grid::{BinnedPoints, HALVES},
     moments::{AT_ONCE, Moments, Near},
 };
 
@@ -170,12 +170,12 @@ impl Kernels {
     }
 
     /// Returns the field, which evaluates at any point.
-    pub fn field(&self) -> Field<'_> {
+    pub fn field(&self) -> KernelField<'_> {
         let longest = self.ellipsoids.par_iter().map(|it| it.longest);
         let farthest = longest.reduce(|| f64::MIN_POSITIVE, f64::max);
         let places: Vec<DVec3> = self.ellipsoids.par_iter().map(|it| it.centre).collect();
-        let grid = Grid::new(&places, farthest / HALVES as f64);
-        Field {
+        let grid = BinnedPoints::new(&places, farthest / HALVES as f64);
+        KernelField {
             kernels: self,
             centres: grid.sorted(&places),
             farthest: farthest * farthest,
@@ -185,16 +185,16 @@ impl Kernels {
 }
 
 /// The field of a set of kernels, which a level set samples.
-pub struct Field<'a> {
+pub struct KernelField<'a> {
     kernels: &'a Kernels,
-    grid: Grid,
+    grid: BinnedPoints,
     /// Centres in the grid's order.
     centres: Vec<DVec3>,
     /// Squared distance beyond which no kernel reaches a point, m².
     farthest: f64,
 }
 
-impl Field<'_> {
+impl KernelField<'_> {
     /// Visits the kernels that may reach a point, in the grid's order.
     fn for_each(&self, x: DVec3, mut visit: impl FnMut(&Ellipsoid)) {
         let mut near = [0; AT_ONCE];
@@ -286,7 +286,7 @@ fn fit(places: &[DVec3], count: usize, calibration: &Calibration) -> Vec<Ellipso
     let reach = NEAR * calibration.spacing;
     // 27 % of the points in the visited cells are within reach; with cells of the full radius it
     // would be 16 %.
-    let grid = Grid::new(places, reach / HALVES as f64);
+    let grid = BinnedPoints::new(places, reach / HALVES as f64);
     let sorted = grid.sorted(places);
     (0..count)
         .into_par_iter()

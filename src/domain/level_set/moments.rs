@@ -3,7 +3,7 @@
 use glam::{DMat3, DVec3};
 use pulp::{Simd, WithSimd};
 
-use super::grid::{Grid, HALVES};
+use super::grid::{BinnedPoints, HALVES};
 use crate::lanes::{positive, widely};
 
 /// Points that are processed together.
@@ -22,7 +22,11 @@ pub(super) struct Moments {
 impl Moments {
     /// Sums over the points within `reach`, `place` itself included, with the paper's weight
     /// 1 − (r / R)³; `sorted` holds the points in the grid's order.
-    pub(super) fn about(place: DVec3, (grid, sorted): (&Grid, &[DVec3]), reach: f64) -> Self {
+    pub(super) fn about(
+        place: DVec3,
+        (grid, sorted): (&BinnedPoints, &[DVec3]),
+        reach: f64,
+    ) -> Self {
         let mut near = Near::new(reach);
         grid.for_each_run(place, HALVES, |run| {
             for places in sorted[run].chunks(AT_ONCE) {
@@ -177,7 +181,7 @@ mod tests {
     fn sums_are_those_of_each_neighbour() {
         let place = |k: u64| DVec3::from([0, 1, 2].map(|axis| uniform(3 * k + axis)));
         let places: Vec<DVec3> = (0..700).map(place).collect();
-        let grid = Grid::new(&places, 0.2);
+        let grid = BinnedPoints::new(&places, 0.2);
         let sorted = grid.sorted(&places);
         let mut most = 0;
         for &place in &places[..100] {

@@ -3,7 +3,7 @@
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
-use super::grid::Grid;
+use super::grid::BinnedPoints;
 
 /// Radius within which particles contribute, particle spacings: a surface lies within 2.5 of one.
 const NEAR: f64 = 3.0;
@@ -15,7 +15,7 @@ const SPREAD: f64 = 1e-2;
 pub struct Velocities<'a> {
     places: &'a [DVec3],
     velocities: &'a [[f32; 3]],
-    grid: Grid,
+    grid: BinnedPoints,
 }
 
 impl<'a> Velocities<'a> {
@@ -25,7 +25,7 @@ impl<'a> Velocities<'a> {
         Self {
             places,
             velocities,
-            grid: Grid::new(places, NEAR * spacing),
+            grid: BinnedPoints::new(places, NEAR * spacing),
         }
     }
 

@@ -12,7 +12,7 @@ pub type Places = [[f32; 2]; 3];
 
 /// Parts of a mesh, for each triangle in the mesh's order.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Parts {
+pub struct MeshParts {
     /// Names of each part: of its material (`usemtl`), then of its groups (`g`), then of its object
     /// (`o`). Only OBJ has names.
     pub names: Vec<Vec<String>>,
@@ -23,7 +23,7 @@ pub struct Parts {
     pub places: Vec<Option<Places>>,
 }
 
-impl Parts {
+impl MeshParts {
     /// Reads the parts of the mesh that [`crate::mesh::TriangleMesh::from_bytes`] reads from the
     /// same bytes.
     ///
@@ -43,7 +43,7 @@ impl Parts {
                 places: Vec::new(),
             });
         }
-        let found = Reader::of_file(bytes).map_err(fail)?;
+        let found = PartsReader::of_file(bytes).map_err(fail)?;
         // Both readers must count the same corners.
         if found.corners.len() != welded.in_file {
             return Err(fail("its faces are counted in two ways".into()));
@@ -67,7 +67,7 @@ struct Corner {
 }
 
 #[derive(Default)]
-struct Reader {
+struct PartsReader {
     coordinates: Vec<[f32; 2]>,
     material: String,
     groups: Vec<String>,
@@ -80,7 +80,7 @@ struct Reader {
     names: Vec<Vec<String>>,
 }
 
-impl Reader {
+impl PartsReader {
     /// Reads all corners of an OBJ file, in the order of its faces.
     fn of_file(bytes: &[u8]) -> Result<Self, String> {
         let text = lines_of(without_mark(bytes)?);
@@ -189,7 +189,7 @@ impl Reader {
         self.coordinates.get(at).copied().map(Vec2::from_array)
     }
 
-    fn into_parts(self, welded: &Welded) -> Parts {
+    fn into_parts(self, welded: &Welded) -> MeshParts {
         let file = |corner: u32| self.corners.get(corner as usize);
         // Corners of split triangles: their ends come before them in the list.
         let mut between: Vec<(u32, Option<Vec2>)> = Vec::with_capacity(welded.between.len());
@@ -222,7 +222,7 @@ impl Reader {
         if places.iter().all(Option::is_none) {
             places.clear();
         }
-        Parts {
+        MeshParts {
             names: self.names,
             of,
             places,
@@ -241,8 +241,8 @@ mod tests {
         vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nusemtl wall\nf 1/1 2/2 3/3 4/4\nf 1 1 2\ng front left\n\
         usemtl roof\nf 1//1 2//1 5/\n";
 
-    fn parts(text: &str) -> Result<Parts, MeshError> {
-        Parts::from_bytes(text.as_bytes(), MeshFormat::Obj, Path::new("a.obj"))
+    fn parts(text: &str) -> Result<MeshParts, MeshError> {
+        MeshParts::from_bytes(text.as_bytes(), MeshFormat::Obj, Path::new("a.obj"))
     }
 
     #[test]
@@ -359,7 +359,8 @@ mod tests {
             property float z\n\
             element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n\
             0 1 0\n3 0 1 2\n";
-        let found = Parts::from_bytes(ply.as_bytes(), MeshFormat::Ply, Path::new("a.ply")).unwrap();
+        let found =
+            MeshParts::from_bytes(ply.as_bytes(), MeshFormat::Ply, Path::new("a.ply")).unwrap();
         assert_eq!(found.names, [Vec::<String>::new()]);
         assert_eq!((found.of, found.places), (vec![0], Vec::new()));
     }

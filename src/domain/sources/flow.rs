@@ -30,7 +30,7 @@ pub(super) struct Flow<'a> {
     sources: &'a Sources,
     emitter: &'a Emitter<Shape>,
     solids: Solids<'a>,
-    lines: [Line; 3],
+    lines: [LatticeAxis; 3],
 }
 
 /// Particles that enter at a frame's end.
@@ -66,7 +66,8 @@ impl<'a> Flow<'a> {
             sources,
             emitter,
             solids: *solids,
-            lines: [0, 1, 2].map(|axis| Line::of(bounds, axis, velocity[axis], sources.spacing)),
+            lines: [0, 1, 2]
+                .map(|axis| LatticeAxis::of(bounds, axis, velocity[axis], sources.spacing)),
         }
     }
 
@@ -320,7 +321,7 @@ struct Looked {
 }
 
 /// One axis of a lattice that moves through a box.
-struct Line {
+struct LatticeAxis {
     min: f64,
     max: f64,
     /// Coordinate of position 0 at the start, metres.
@@ -332,7 +333,7 @@ struct Line {
     places: Option<usize>,
 }
 
-impl Line {
+impl LatticeAxis {
     fn of(bounds: &Bounds, axis: usize, speed: f64, spacing: f64) -> Self {
         let (min, max) = (bounds.min[axis], bounds.max[axis]);
         let places = (speed == 0.0).then(|| particles_along(max - min, spacing));

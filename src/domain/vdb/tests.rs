@@ -37,7 +37,7 @@ fn written(precision: Precision) -> (SparseGrid<f32>, Vec<u8>) {
         inside: vec![[16, 0, 0]],
     };
     let metadata = [("frame", Metadata::Int(3))];
-    let bytes = encode(&metadata, &[Grid::LevelSet("surface", &grid)], precision);
+    let bytes = encode(&metadata, &[VdbGrid::LevelSet("surface", &grid)], precision);
     (grid, bytes)
 }
 

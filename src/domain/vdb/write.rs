@@ -9,7 +9,7 @@ mod value;
 use super::{IDENTIFIER, MAGIC, Metadata, compression, version};
 use crate::sparse_grid::{Precision, SparseGrid};
 use tree::Tree;
-use value::Value;
+use value::VoxelValue;
 
 /// OpenVDB version that the files claim to be written by.
 const LIBRARY_VERSION: [u32; 2] = [10, 0];
@@ -18,7 +18,7 @@ const COMPRESSION: u32 = compression::ZIP | compression::ACTIVE_MASK;
 
 /// A grid to write, with its name.
 #[derive(Clone, Copy, Debug)]
-pub enum Grid<'a> {
+pub enum VdbGrid<'a> {
     /// Signed distances, negative inside.
     LevelSet(&'a str, &'a SparseGrid<f32>),
     /// Vectors whose components lie on the faces of voxels.
@@ -26,14 +26,22 @@ pub enum Grid<'a> {
 }
 
 /// Returns a file with these metadata, sorted by name, and grids.
-pub fn encode(metadata: &[(&str, Metadata)], grids: &[Grid<'_>], precision: Precision) -> Vec<u8> {
+pub fn encode(
+    metadata: &[(&str, Metadata)],
+    grids: &[VdbGrid<'_>],
+    precision: Precision,
+) -> Vec<u8> {
     let mut body = Vec::new();
     put_metadata(&mut body, metadata);
     put_u32(&mut body, grids.len() as u32);
     for grid in grids {
         match *grid {
-            Grid::LevelSet(name, grid) => put_grid(&mut body, name, "level set", grid, precision),
-            Grid::Staggered(name, grid) => put_grid(&mut body, name, "staggered", grid, precision),
+            VdbGrid::LevelSet(name, grid) => {
+                put_grid(&mut body, name, "level set", grid, precision)
+            }
+            VdbGrid::Staggered(name, grid) => {
+                put_grid(&mut body, name, "staggered", grid, precision)
+            }
         }
     }
     [header(&body), body].concat()
@@ -70,7 +78,7 @@ fn identifier(body: &[u8]) -> String {
     )
 }
 
-fn put_grid<T: Value>(
+fn put_grid<T: VoxelValue>(
     body: &mut Vec<u8>,
     name: &str,
     class: &str,
@@ -100,7 +108,7 @@ fn put_grid<T: Value>(
     }
 }
 
-fn put_grid_metadata<T: Value>(
+fn put_grid_metadata<T: VoxelValue>(
     body: &mut Vec<u8>,
     name: &str,
     class: &str,

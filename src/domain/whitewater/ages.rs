@@ -2,14 +2,14 @@
 
 use rayon::prelude::*;
 
-use super::{AGE, KIND, Kind, LIFE, Settings};
+use super::{AGE, CalibratedSettings, KIND, LIFE, WhitewaterKind};
 use crate::particles::Particles;
 
 /// Advances ages by `seconds` and reduces the life of foam, by a factor that rises with the number
 /// of foam particles in its cube of one spacing once there are more than `settings.crowd`. Removes
 /// particles without life left, and returns how many.
 pub fn grow_older(
-    settings: &Settings,
+    settings: &CalibratedSettings,
     particles: &mut Particles,
     spacing: f64,
     seconds: f64,
@@ -41,7 +41,7 @@ pub fn grow_older(
 }
 
 fn is_foam(particles: &Particles, k: usize) -> bool {
-    particles.attributes[KIND][k] == Kind::Foam.number()
+    particles.attributes[KIND][k] == WhitewaterKind::Foam.number()
 }
 
 /// The cubes that contain foam, sorted, one entry per particle.
@@ -78,7 +78,7 @@ mod tests {
     use super::super::{RADIUS, none, tests_support::settings};
     use super::*;
 
-    fn crowd(count: u32, kind: Kind, life: f32) -> Particles {
+    fn crowd(count: u32, kind: WhitewaterKind, life: f32) -> Particles {
         let mut all = none();
         for id in 0..count {
             all.position.push([0.05, 0.05, 0.05]);
@@ -102,13 +102,13 @@ mod tests {
     #[test]
     fn foam_ages_and_the_others_only_grow_older() {
         let settings = settings();
-        let mut foam = crowd(2, Kind::Foam, 1.0);
+        let mut foam = crowd(2, WhitewaterKind::Foam, 1.0);
         assert_eq!(grow_older(&settings, &mut foam, 0.1, 0.25), 0);
         assert_eq!(foam.attributes[LIFE], [0.75, 0.75]);
         assert_eq!(foam.attributes[AGE], [0.25, 0.25]);
         assert_eq!(grow_older(&settings, &mut foam, 0.1, 0.75), 2);
         assert!(foam.is_empty() && foam.attributes[AGE].is_empty());
-        for kind in [Kind::Spray, Kind::Bubble] {
+        for kind in [WhitewaterKind::Spray, WhitewaterKind::Bubble] {
             let mut other = crowd(1, kind, 0.1);
             assert_eq!(grow_older(&settings, &mut other, 0.1, 5.0), 0);
             assert_eq!(other.attributes[LIFE], [0.1]);
@@ -118,12 +118,12 @@ mod tests {
     #[test]
     fn crowded_foam_dies_sooner() {
         let settings = settings();
-        let mut packed = crowd(3 * settings.crowd, Kind::Foam, 1.0);
+        let mut packed = crowd(3 * settings.crowd, WhitewaterKind::Foam, 1.0);
         assert_eq!(grow_older(&settings, &mut packed, 0.1, 0.25), 0);
         assert_eq!(packed.attributes[LIFE][0], 0.25);
         // Bubbles in the same position do not crowd foam.
-        let mut few = crowd(settings.crowd, Kind::Foam, 1.0);
-        let mut bubbles = crowd(3 * settings.crowd, Kind::Bubble, 1.0);
+        let mut few = crowd(settings.crowd, WhitewaterKind::Foam, 1.0);
+        let mut bubbles = crowd(3 * settings.crowd, WhitewaterKind::Bubble, 1.0);
         few.position.append(&mut bubbles.position);
         few.velocity.append(&mut bubbles.velocity);
         few.id.extend(settings.crowd..4 * settings.crowd);
@@ -140,7 +140,7 @@ mod tests {
     #[test]
     fn who_is_left_keeps_what_it_has() {
         let settings = settings();
-        let mut some = crowd(3, Kind::Foam, 1.0);
+        let mut some = crowd(3, WhitewaterKind::Foam, 1.0);
         some.attributes.entry(LIFE.to_owned()).or_default()[1] = 0.1;
         some.position[2] = [0.07, 0.05, 0.05];
         assert_eq!(grow_older(&settings, &mut some, 0.1, 0.5), 1);

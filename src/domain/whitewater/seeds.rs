@@ -3,7 +3,10 @@
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-use super::{AGE, KIND, Kind, LIFE, Potentials, RADIUS, Settings, random, thresholds::grown};
+use super::{
+    AGE, CalibratedSettings, KIND, LIFE, Potentials, RADIUS, WhitewaterKind, random,
+    thresholds::grown,
+};
 use crate::{bounds::Bounds, particles::Particles, period::Period};
 
 /// Random channels reserved per birth.
@@ -11,7 +14,7 @@ const CHANNELS: u32 = 8;
 
 /// Water at a frame's end.
 #[derive(Clone, Copy, Debug)]
-pub struct Source<'a> {
+pub struct SeedWater<'a> {
     /// The water's particles.
     pub water: &'a Particles,
     /// Potentials of each particle.
@@ -40,7 +43,7 @@ pub struct Births {
 struct Born {
     position: Vec3,
     velocity: Vec3,
-    kind: Kind,
+    kind: WhitewaterKind,
     life: f32,
     radius: f32,
 }
@@ -50,7 +53,7 @@ impl Births {
     /// 2012, eq. 8), with stochastic rounding. They begin in a cylinder around its position along
     /// its velocity, with a radius and a length of half a spacing; the paper's length, the distance
     /// moved in a frame, would lead ahead of the water.
-    pub fn of(settings: &Settings, source: &Source<'_>) -> Self {
+    pub fn of(settings: &CalibratedSettings, source: &SeedWater<'_>) -> Self {
         let n = source.water.len();
         let born = (0..n).into_par_iter().flat_map_iter(|i| {
             let (potential, strength) = strength(settings, &source.potentials[i], source.seconds);
@@ -97,7 +100,7 @@ impl Births {
 }
 
 /// Strength of the stronger of the two causes, 0 to 1, and expected number of births in `seconds`.
-fn strength(settings: &Settings, potentials: &Potentials, seconds: f64) -> (f64, f64) {
+fn strength(settings: &CalibratedSettings, potentials: &Potentials, seconds: f64) -> (f64, f64) {
     let thresholds = &settings.thresholds;
     let trapped_air = grown(potentials.trapped_air, thresholds.trapped_air);
     let wave_crest = grown(potentials.wave_crest, thresholds.wave_crest);
@@ -109,7 +112,13 @@ fn strength(settings: &Settings, potentials: &Potentials, seconds: f64) -> (f64,
     )
 }
 
-fn seed(settings: &Settings, source: &Source<'_>, i: usize, potential: f64, channel: u32) -> Born {
+fn seed(
+    settings: &CalibratedSettings,
+    source: &SeedWater<'_>,
+    i: usize,
+    potential: f64,
+    channel: u32,
+) -> Born {
     let random = |k: u32| random(settings.seed, source.water.id[i], source.frame, channel + k);
     let (x, v) = (
         Vec3::from_array(source.water.position[i]).as_dvec3(),
@@ -130,7 +139,7 @@ fn seed(settings: &Settings, source: &Source<'_>, i: usize, potential: f64, chan
     Born {
         position: place.as_vec3(),
         velocity: v.as_vec3(),
-        kind: Kind::of_share(source.potentials[i].share),
+        kind: WhitewaterKind::of_share(source.potentials[i].share),
         life: life as f32,
         // Most are small: the square puts the mean at a third of the range.
         radius: between(settings.radius, random(4).powi(2)) as f32,
@@ -151,8 +160,8 @@ mod tests {
         }
     }
 
-    fn source<'a>(water: &'a Particles, potentials: &'a [Potentials]) -> Source<'a> {
-        Source {
+    fn source<'a>(water: &'a Particles, potentials: &'a [Potentials]) -> SeedWater<'a> {
+        SeedWater {
             water,
             potentials,
             frame: 3,
@@ -235,7 +244,7 @@ mod tests {
         let mut twice = none();
         again.join(&mut twice, 7);
         assert_eq!(all, twice);
-        let other = Settings {
+        let other = CalibratedSettings {
             seed: 9,
             ..settings.clone()
         };

@@ -4,7 +4,7 @@ use swell_files::study::stability::{Limit, Search, Trial};
 
 use super::{
     super::{PointStatus, StudyError, engine::Bench, ledger::Ledger},
-    Measured, Run, Verdict, point, report,
+    MarkMeasurement, StabilityRun, Verdict, point, report,
 };
 
 /// Result of a search for a limit.
@@ -23,7 +23,7 @@ pub(super) struct Found {
 /// and one is missing.
 pub(super) fn find(
     bench: &mut Bench<'_>,
-    ledger: &mut Ledger<Vec<Measured>>,
+    ledger: &mut Ledger<Vec<MarkMeasurement>>,
     limit: &Limit,
     search: &Search,
 ) -> Result<Option<Found>, StudyError> {
@@ -83,7 +83,7 @@ pub(super) fn most_tries(limit: &Limit) -> usize {
 }
 
 /// Describes the first mark that a run misses.
-fn missed(run: &Run, trial: &Trial) -> Option<String> {
+fn missed(run: &StabilityRun, trial: &Trial) -> Option<String> {
     if let Some(message) = &run.ended {
         return Some(message.clone());
     }

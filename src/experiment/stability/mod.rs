@@ -17,18 +17,18 @@ use swell_scene::Scene;
 
 use super::{
     PointStatus, StudyError,
-    engine::{Bench, Kind, WorkUnit, needs_of},
+    engine::{Bench, StudyKind, WorkUnit, needs_of},
     ledger::Ledger,
     report::Report,
 };
-use report::Results;
+use report::StabilityResults;
 
 pub(super) use report::number;
 
 pub use trial::{refusal, run_trial};
-pub use verdict::{Measured, Run, Verdict};
+pub use verdict::{MarkMeasurement, StabilityRun, Verdict};
 
-impl Kind for Stability {
+impl StudyKind for Stability {
     fn needs(&self) -> Option<Needs> {
         let mut runs = Vec::new();
         for case in &self.cases {
@@ -101,9 +101,9 @@ impl Kind for Stability {
                     for attempt in attempts {
                         let (method, device) = (attempt.method.name(), attempt.device.name());
                         // Refusals are quick and not stored: they are tried every time.
-                        of_case.push(Run {
+                        of_case.push(StabilityRun {
                             ended: refusal(bench.devices, attempt)?,
-                            ..Run::default()
+                            ..StabilityRun::default()
                         });
                         let name = format!("{title}, {method}, {device}");
                         bench.report_point(name, PointStatus::Done(0.0, Vec::new()));
@@ -126,7 +126,7 @@ impl Kind for Stability {
             return Ok(None);
         }
         bench.joined(&ledger);
-        let results = Results {
+        let results = StabilityResults {
             stability: self,
             devices: bench.devices,
             runs,
@@ -149,10 +149,10 @@ fn scenes(trial: &Trial) -> impl Iterator<Item = (&Scene, RunsOn)> {
 /// looked up.
 fn point(
     bench: &Bench<'_>,
-    ledger: &mut Ledger<Vec<Measured>>,
+    ledger: &mut Ledger<Vec<MarkMeasurement>>,
     name: &str,
     trial: &Trial,
-) -> Result<Option<(Run, bool)>, StudyError> {
+) -> Result<Option<(StabilityRun, bool)>, StudyError> {
     let mut measured = String::new();
     for other in &trial.others {
         measured += &format!("{} {} ", other.scale, other.shift);

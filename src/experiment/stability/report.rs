@@ -15,16 +15,16 @@ use super::{
         Devices, StudyRequest,
         report::{Report, what_was_run},
     },
-    Run, Verdict,
+    StabilityRun, Verdict,
     limit::Found,
 };
 
 /// All results of a study.
-pub(super) struct Results<'a> {
+pub(super) struct StabilityResults<'a> {
     pub(super) stability: &'a Stability,
     pub(super) devices: &'a Devices,
     /// Runs of each case, one per trial or attempt.
-    pub(super) runs: Vec<Vec<Run>>,
+    pub(super) runs: Vec<Vec<StabilityRun>>,
     pub(super) limits: Vec<(&'a Limit, &'a Search, Found)>,
 }
 
@@ -39,14 +39,14 @@ enum To<'a> {
 /// Outcome of a requirement on one device.
 struct On<'a> {
     device: RunsOn,
-    run: &'a Run,
+    run: &'a StabilityRun,
     verdict: Verdict,
     /// Index of the mark in the trial.
     place: usize,
 }
 
 /// Requirement on a solver in a case, with its outcome on each device.
-struct Row<'a> {
+struct RequirementRow<'a> {
     case: &'a Case,
     method: Method,
     to: To<'a>,
@@ -59,7 +59,7 @@ impl On<'_> {
     }
 }
 
-impl Row<'_> {
+impl RequirementRow<'_> {
     /// The worse verdict of both devices: a failure on one of them remains a failure.
     fn verdict(&self) -> Verdict {
         let order = [
@@ -122,7 +122,7 @@ pub(super) fn bound(bound: Bound) -> String {
     }
 }
 
-impl Results<'_> {
+impl StabilityResults<'_> {
     pub(super) fn draw(&self, request: &StudyRequest) -> Report {
         let rows = self.rows();
         let findings = self.findings(&rows);
@@ -145,7 +145,7 @@ impl Results<'_> {
     }
 
     /// Requirements case by case, with the outcomes of devices side by side.
-    fn rows(&self) -> Vec<Row<'_>> {
+    fn rows(&self) -> Vec<RequirementRow<'_>> {
         let mut rows = Vec::new();
         for (case, runs) in self.stability.cases.iter().zip(&self.runs) {
             match &case.held {
@@ -165,7 +165,7 @@ impl Results<'_> {
                             },
                             place: 0,
                         };
-                        rows.push(Row {
+                        rows.push(RequirementRow {
                             case,
                             method: attempt.method,
                             to: To::Refusal(words),
@@ -174,7 +174,7 @@ impl Results<'_> {
                     }
                 }
                 Held::Runs(trials) => {
-                    let mut of_case: Vec<Row<'_>> = Vec::new();
+                    let mut of_case: Vec<RequirementRow<'_>> = Vec::new();
                     for (trial, run) in trials.iter().zip(runs) {
                         let method = trial.scene.solver.method();
                         let verdicts = trial.marks.iter().zip(run.verdicts(trial));
@@ -186,10 +186,12 @@ impl Results<'_> {
                                 place,
                             };
                             let to = To::Mark(mark);
-                            let same = |row: &&mut Row<'_>| row.method == method && row.to == to;
+                            let same = |row: &&mut RequirementRow<'_>| {
+                                row.method == method && row.to == to
+                            };
                             match of_case.iter_mut().find(same) {
                                 Some(row) => row.on.push(on),
-                                None => of_case.push(Row {
+                                None => of_case.push(RequirementRow {
                                     case,
                                     method,
                                     to,
@@ -206,9 +208,10 @@ impl Results<'_> {
         rows
     }
 
-    fn findings(&self, rows: &[Row<'_>]) -> Vec<(String, String)> {
-        let holds =
-            |row: &&Row<'_>| matches!(row.verdict(), Verdict::Passes | Verdict::PassesUnexpectedly);
+    fn findings(&self, rows: &[RequirementRow<'_>]) -> Vec<(String, String)> {
+        let holds = |row: &&RequirementRow<'_>| {
+            matches!(row.verdict(), Verdict::Passes | Verdict::PassesUnexpectedly)
+        };
         let held = rows.iter().filter(holds).count();
         let mut findings = vec![("marks".to_owned(), format!("{held} of {} hold", rows.len()))];
         for (what, verdict) in [
@@ -229,7 +232,7 @@ impl Results<'_> {
     }
 
     /// Rows of `results.csv`: one per mark and device, then one per limit.
-    fn table(&self, rows: &[Row<'_>]) -> Vec<Vec<String>> {
+    fn table(&self, rows: &[RequirementRow<'_>]) -> Vec<Vec<String>> {
         let titles =
             "number,case,solver,device,quantity,value,mark,verdict,particles,frames,seconds,ended";
         let mut table = vec![strings(titles.split(','))];
@@ -277,7 +280,7 @@ impl Results<'_> {
     fn parts(
         &self,
         request: &StudyRequest,
-        rows: &[Row<'_>],
+        rows: &[RequirementRow<'_>],
         findings: &[(String, String)],
     ) -> Vec<Part> {
         let text = |text: &String| Part::Text(text.clone());
@@ -365,9 +368,9 @@ fn strings<'a>(cells: impl IntoIterator<Item = &'a str>) -> Vec<String> {
     cells.into_iter().map(str::to_owned).collect()
 }
 
-fn names(rows: &[Row<'_>], verdict: Verdict) -> Vec<String> {
+fn names(rows: &[RequirementRow<'_>], verdict: Verdict) -> Vec<String> {
     let rows = rows.iter().filter(|row| row.verdict() == verdict);
-    rows.map(Row::name).collect()
+    rows.map(RequirementRow::name).collect()
 }
 
 /// Formats a value for `results.csv`.
@@ -376,7 +379,7 @@ fn exact(value: Option<f64>) -> String {
 }
 
 /// Table of all marks and refusals, case by case.
-fn verdicts(rows: &[Row<'_>]) -> Part {
+fn verdicts(rows: &[RequirementRow<'_>]) -> Part {
     let mut out: Vec<(Tone, Vec<String>)> = Vec::new();
     let mut before = None;
     for row in rows {
@@ -421,9 +424,9 @@ fn verdicts(rows: &[Row<'_>]) -> Part {
 }
 
 /// One chart per mark whose value changes over time, with one curve per solver and device.
-fn curves(case: &Case, rows: &[Row<'_>]) -> Vec<Part> {
+fn curves(case: &Case, rows: &[RequirementRow<'_>]) -> Vec<Part> {
     let own = rows.iter().filter(|row| std::ptr::eq(row.case, case));
-    let own: Vec<(&Row<'_>, &Mark)> = own
+    let own: Vec<(&RequirementRow<'_>, &Mark)> = own
         .filter_map(|row| match row.to {
             To::Mark(mark) => Some((row, mark)),
             To::Refusal(_) => None,
@@ -466,12 +469,12 @@ fn when(mark: &Mark) -> String {
 }
 
 /// Returns `None` where the values are constant.
-fn chart(rows: &[(&Row<'_>, &Mark)]) -> Option<String> {
+fn chart(rows: &[(&RequirementRow<'_>, &Mark)]) -> Option<String> {
     let (_, mark) = rows.first()?;
     let runs = rows
         .iter()
         .flat_map(|(row, _)| row.on.iter().map(move |on| (row, on)));
-    let curve = |(row, on): (&&Row<'_>, &On<'_>)| {
+    let curve = |(row, on): (&&RequirementRow<'_>, &On<'_>)| {
         let name = format!("{} {}", row.method.name(), on.device.name());
         let measured = on.run.measured.get(on.place)?;
         Some(Series::curve(&name, measured.curve.iter().copied()))

@@ -10,8 +10,8 @@ use swell_stage::{device::SolverError, drive::Drive};
 
 use super::{
     super::{Devices, StudyError, engine::until_done},
-    verdict::{Measured, Run},
-    view::View,
+    verdict::{MarkMeasurement, StabilityRun},
+    view::RunView,
     watch::{Beside, Watch},
 };
 
@@ -20,8 +20,12 @@ use super::{
 /// # Errors
 /// Failures that the numbers did not cause: of the device or a file, or [`StudyError::Stopped`] if
 /// `stop` was set before the end.
-pub fn run_trial(devices: &Devices, trial: &Trial, stop: &AtomicBool) -> Result<Run, StudyError> {
-    let mut run = Run::default();
+pub fn run_trial(
+    devices: &Devices,
+    trial: &Trial,
+    stop: &AtomicBool,
+) -> Result<StabilityRun, StudyError> {
+    let mut run = StabilityRun::default();
     if let Err(error) = go(devices, trial, stop, &mut run) {
         run.ended = Some(error.of_the_point()?);
     }
@@ -32,15 +36,15 @@ fn go(
     devices: &Devices,
     trial: &Trial,
     stop: &AtomicBool,
-    run: &mut Run,
+    run: &mut StabilityRun,
 ) -> Result<(), StudyError> {
-    let mut view = View::new(&trial.scene)?;
+    let mut view = RunView::new(&trial.scene)?;
     let mut own = drive(devices, trial.device, &view)?;
     run.particles = view.state.len();
     let mut drives = Vec::new();
     let mut beside = Vec::new();
     for other in &trial.others {
-        let theirs = View::new(&other.scene)?;
+        let theirs = RunView::new(&other.scene)?;
         drives.push(drive(devices, other.device, &theirs)?);
         beside.push(Beside::new(theirs, other, &view));
     }
@@ -65,13 +69,17 @@ fn go(
     run.seconds.push(seconds);
     let measured = watches.iter();
     run.measured = measured
-        .map(|watch| Measured::new(watch.value(), &watch.curve, watch.mark))
+        .map(|watch| MarkMeasurement::new(watch.value(), &watch.curve, watch.mark))
         .collect();
     ended
 }
 
 /// Creates a run at its start.
-fn drive<'a>(devices: &Devices, device: RunsOn, view: &View<'a>) -> Result<Drive<'a>, SolverError> {
+fn drive<'a>(
+    devices: &Devices,
+    device: RunsOn,
+    view: &RunView<'a>,
+) -> Result<Drive<'a>, SolverError> {
     let drive = Drive::new(devices.of(device), view.scene, &view.start, false)?;
     Ok(drive.with_pressures())
 }
@@ -89,7 +97,7 @@ pub fn refusal(devices: &Devices, attempt: &Attempt) -> Result<Option<String>, S
         Ok(scene) => scene,
     };
     let begun = || {
-        let view = View::new(scene)?;
+        let view = RunView::new(scene)?;
         let mut drive = drive(devices, attempt.device, &view)?;
         let mut frames = (0..FIRST_FRAMES).map(|_| drive.advance());
         Ok::<_, StudyError>(frames.try_for_each(|step| step.map(|_| ()))?)

@@ -11,11 +11,12 @@ const CURVE: usize = 160;
 
 /// Run with the measurement for each mark, in the order of [`Trial::marks`]; or an attempt that
 /// should be refused.
-pub type Run = super::super::Run<Vec<Measured>>;
+pub type StabilityRun = super::super::Run<Vec<MarkMeasurement>>;
 
 /// Measurement for a mark.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Measured {
+#[serde(expecting = "struct Measured")]
+pub struct MarkMeasurement {
     /// Value compared with the bound; `None` where it is not finite.
     pub value: Option<f64>,
     /// Time in seconds of the shot and value; the worst of several frames where there are many.
@@ -56,7 +57,7 @@ impl Verdict {
     }
 }
 
-impl Measured {
+impl MarkMeasurement {
     pub(super) fn new(value: Option<f64>, curve: &[[f64; 2]], mark: &Mark) -> Self {
         let bin = curve.len().div_ceil(CURVE).max(1);
         let worst = |points: &[[f64; 2]]| {
@@ -81,10 +82,10 @@ impl Measured {
     }
 }
 
-impl Run {
+impl StabilityRun {
     /// Returns the verdict on each mark. A run that ended early meets none.
     pub fn verdicts(&self, trial: &Trial) -> Vec<Verdict> {
-        let none = Measured::default();
+        let none = MarkMeasurement::default();
         let marks = trial.marks.iter().enumerate();
         marks
             .map(|(k, mark)| {

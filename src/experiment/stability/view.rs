@@ -12,10 +12,10 @@ use swell_domain::{
     solver::StepReport,
 };
 use swell_scene::{Scene, Solver, probe::ProbeKind};
-use swell_stage::{drive::Step, prepare::Start};
+use swell_stage::{drive::ComputedFrame, prepare::Start};
 
 /// A scene and the current state of its run.
-pub(super) struct View<'a> {
+pub(super) struct RunView<'a> {
     pub(super) scene: &'a Scene,
     pub(super) start: Start,
     /// Number of finished frames.
@@ -31,7 +31,7 @@ pub(super) struct View<'a> {
     volume: OnceCell<f64>,
 }
 
-impl<'a> View<'a> {
+impl<'a> RunView<'a> {
     pub(super) fn new(scene: &'a Scene) -> Result<Self, SignedDistanceError> {
         let start = Start::of(scene)?;
         Ok(Self {
@@ -47,7 +47,7 @@ impl<'a> View<'a> {
     }
 
     /// Updates the state with a finished frame.
-    pub(super) fn take(&mut self, step: Step) {
+    pub(super) fn take(&mut self, step: ComputedFrame) {
         let (domain, spacing) = (&self.scene.domain, self.scene.particle_spacing());
         let probes = self.scene.probes.iter();
         let levels = probes.filter_map(|probe| match probe.kind {

@@ -7,11 +7,11 @@ use swell_files::study::stability::{Mark, Other, Over, Quantity};
 use swell_scene::Scene;
 use swell_study::stability::{Flight, filled_volume, least_spacing, matched, outside, point};
 
-use super::view::View;
+use super::view::RunView;
 
 /// A run beside the measured one, with the correspondence of their particles.
 pub(super) struct Beside<'a> {
-    pub(super) view: View<'a>,
+    pub(super) view: RunView<'a>,
     pub(super) other: &'a Other,
     /// Index in this run of each particle of the measured run; `None` where it has no counterpart.
     pub(super) partner: Vec<Option<usize>>,
@@ -21,12 +21,12 @@ pub(super) struct Beside<'a> {
 
 /// Maps a position of the other run, relative to that run's origin, to the measured run's
 /// coordinates.
-fn to_ours(p: DVec3, origin: DVec3, view: &View<'_>, other: &Other) -> DVec3 {
+fn to_ours(p: DVec3, origin: DVec3, view: &RunView<'_>, other: &Other) -> DVec3 {
     (p + view.scene.origin - other.shift) / other.scale - origin
 }
 
 impl<'a> Beside<'a> {
-    pub(super) fn new(view: View<'a>, other: &'a Other, ours: &View<'_>) -> Self {
+    pub(super) fn new(view: RunView<'a>, other: &'a Other, ours: &RunView<'_>) -> Self {
         let partner = matched(
             &ours.state.position,
             &view.state.position,
@@ -66,7 +66,7 @@ pub(super) struct Watch<'a> {
 }
 
 /// Initial value of the memory of a quantity.
-fn remembered(mark: &Mark, run: &View<'_>) -> Vec<f64> {
+fn remembered(mark: &Mark, run: &RunView<'_>) -> Vec<f64> {
     let (scene, start) = (run.scene, &run.start.particles);
     let of_start = |number: f64| mark.since.is_none().then_some(number);
     match mark.of {
@@ -94,7 +94,7 @@ fn remembered(mark: &Mark, run: &View<'_>) -> Vec<f64> {
 }
 
 impl<'a> Watch<'a> {
-    pub(super) fn new(mark: &'a Mark, run: &View<'_>) -> Self {
+    pub(super) fn new(mark: &'a Mark, run: &RunView<'_>) -> Self {
         let start = &run.start.particles;
         let is_flight = mark.of == Quantity::BallisticError;
         Self {
@@ -107,7 +107,7 @@ impl<'a> Watch<'a> {
     }
 
     /// Updates the mark after a frame.
-    pub(super) fn look(&mut self, run: &View<'_>, beside: &[Beside<'_>], report: &StepReport) {
+    pub(super) fn look(&mut self, run: &RunView<'_>, beside: &[Beside<'_>], report: &StepReport) {
         let from = self.mark.after.max(self.mark.since.unwrap_or(0.0));
         let counts = run.time() >= from * (1.0 - 1e-9);
         // Quantities that integrate from the start need every frame; means begin where the mark
@@ -131,7 +131,7 @@ impl<'a> Watch<'a> {
         self.value.filter(|value| value.is_finite())
     }
 
-    fn number(&mut self, run: &View<'_>, beside: &[Beside<'_>], report: &StepReport) -> f64 {
+    fn number(&mut self, run: &RunView<'_>, beside: &[Beside<'_>], report: &StepReport) -> f64 {
         let scene = run.scene;
         let spacing = scene.particle_spacing();
         let (start, now) = (&run.start.particles, &run.state);
@@ -256,7 +256,7 @@ impl<'a> Watch<'a> {
         self.memory[0] / self.memory[1]
     }
 
-    fn difference(&self, run: &View<'_>, beside: &[Beside<'_>]) -> f64 {
+    fn difference(&self, run: &RunView<'_>, beside: &[Beside<'_>]) -> f64 {
         let [other, ..] = beside else {
             return f64::NAN;
         };
@@ -274,7 +274,7 @@ impl<'a> Watch<'a> {
     }
 }
 
-fn displacement_error(run: &View<'_>, beside: &[Beside<'_>]) -> f64 {
+fn displacement_error(run: &RunView<'_>, beside: &[Beside<'_>]) -> f64 {
     let [other, ..] = beside else {
         return f64::NAN;
     };
@@ -330,7 +330,7 @@ fn largest(values: impl IntoIterator<Item = f64>) -> f64 {
     values.into_iter().fold(0.0, larger)
 }
 
-fn pressure_error(run: &View<'_>, pressures: impl Iterator<Item = f64>) -> f64 {
+fn pressure_error(run: &RunView<'_>, pressures: impl Iterator<Item = f64>) -> f64 {
     let scene = run.scene;
     let surface = top(&run.start.particles.position) + 0.5 * scene.particle_spacing();
     let weight = scene.water.rest_density * scene.water.gravity.length();
@@ -340,7 +340,7 @@ fn pressure_error(run: &View<'_>, pressures: impl Iterator<Item = f64>) -> f64 {
 }
 
 /// Differences between the elevation probes of two runs, in metres of the first run.
-fn gaps(a: &View<'_>, b: &View<'_>, scale: f64) -> Vec<f64> {
+fn gaps(a: &RunView<'_>, b: &RunView<'_>, scale: f64) -> Vec<f64> {
     let pairs = a.elevations.iter().zip(&b.elevations);
     let gap = |(a, b): (&Option<f64>, &Option<f64>)| match (a, b) {
         (Some(a), Some(b)) => (a - b / scale).abs(),

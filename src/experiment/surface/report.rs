@@ -16,18 +16,18 @@ use super::{
         report::{Report, what_was_run},
         sweep::digits::{shortened, significant},
     },
-    Run,
+    SurfaceRun,
 };
 
-struct Results<'a> {
+struct SurfaceResults<'a> {
     study: &'a SurfaceStudy,
     /// Runs of each line, in the order of its points.
-    runs: &'a [Vec<Run>],
+    runs: &'a [Vec<SurfaceRun>],
     device: String,
 }
 
-pub(super) fn draw(study: &SurfaceStudy, bench: &Bench<'_>, runs: &[Vec<Run>]) -> Report {
-    let results = Results {
+pub(super) fn draw(study: &SurfaceStudy, bench: &Bench<'_>, runs: &[Vec<SurfaceRun>]) -> Report {
+    let results = SurfaceResults {
         study,
         runs,
         device: bench.devices.of(RunsOn::Gpu).identity().to_string(),
@@ -52,21 +52,21 @@ pub(super) fn draw(study: &SurfaceStudy, bench: &Bench<'_>, runs: &[Vec<Run>]) -
     }
 }
 
-impl Results<'_> {
-    fn lines(&self, error: PictureError) -> Vec<knee::Line> {
+impl SurfaceResults<'_> {
+    fn lines(&self, error: PictureError) -> Vec<knee::MethodCurve> {
         let lines = self.study.lines.iter().zip(self.runs);
         lines
             .map(|(line, runs)| {
                 let points = line.points.iter().zip(runs).filter_map(|(point, run)| {
                     let is_done = run.ended.is_none();
-                    Some(knee::Point {
+                    Some(knee::CostPoint {
                         label: point.label.clone(),
                         time: run.per_frame().map(|seconds| 1e3 * seconds),
                         work: 0.0,
                         error: run.measured.error(error).filter(|_| is_done)?,
                     })
                 });
-                knee::Line {
+                knee::MethodCurve {
                     name: line.name.clone(),
                     points: points.collect(),
                 }
@@ -117,9 +117,9 @@ impl Results<'_> {
     }
 
     fn chart(&self, error: PictureError) -> Chart {
-        let series = |line: &knee::Line| {
+        let series = |line: &knee::MethodCurve| {
             let knee = knee::knee(line, None);
-            let dot = |point: &knee::Point| Dot {
+            let dot = |point: &knee::CostPoint| Dot {
                 at: point.time[1],
                 value: Some(point.error),
                 label: point.label.clone(),

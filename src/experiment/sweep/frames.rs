@@ -11,7 +11,7 @@ use swell_reference::{
 use swell_scene::{ByMethod, PbfScene, Scene, flip::Preconditioner};
 use swell_stage::{
     device::Opened,
-    drive::{Drive, Step},
+    drive::{ComputedFrame, Drive},
     prepare::Start,
 };
 use swell_study::measure::Gauge;
@@ -21,7 +21,7 @@ use super::{
         StudyError,
         engine::{Bench, until_done},
     },
-    measured::{Measured, Run, Sample},
+    measured::{Sample, SweepMeasurements, SweepRun},
 };
 
 /// Compression at which constraints count as met: the next Newton step would move particles by less
@@ -36,7 +36,7 @@ pub(super) fn measure(
     point: &Point,
     sweep: &Sweep,
     gauge: Option<&Gauge>,
-) -> Result<Run, StudyError> {
+) -> Result<SweepRun, StudyError> {
     let scene = &point.scene;
     let start = Start::of(scene)?;
     let opened = bench.devices.of(point.device);
@@ -47,10 +47,10 @@ pub(super) fn measure(
         weights = still_pressures(scene, &start.particles);
     }
     drive.advance()?;
-    let mut run = Run {
+    let mut run = SweepRun {
         particles: start.particles.len(),
         frames: point.frames,
-        ..Run::default()
+        ..SweepRun::default()
     };
     let mut end = Particles::default();
     for repeat in 0..sweep.repeats {
@@ -88,8 +88,8 @@ pub(super) fn measure(
     Ok(run)
 }
 
-impl Measured {
-    fn look(&mut self, point: &Point, gauge: Option<&Gauge>, step: &Step) {
+impl SweepMeasurements {
+    fn look(&mut self, point: &Point, gauge: Option<&Gauge>, step: &ComputedFrame) {
         let report = &step.report;
         self.substeps += u64::from(report.substeps);
         self.iterations += report.iterations;
@@ -112,7 +112,7 @@ impl Measured {
 
     /// Records the pressure errors. `weights` are the hydrostatic pressures at the pressure probes,
     /// Pa; empty where not requested.
-    fn weigh(&mut self, weights: &[f64], step: &Step) {
+    fn weigh(&mut self, weights: &[f64], step: &ComputedFrame) {
         let off = |(p, weight): (&Option<f64>, &f64)| Some((p.as_ref()? / weight - 1.0).abs());
         let all: Option<Vec<f64>> = step.pressures.iter().zip(weights).map(off).collect();
         if !weights.is_empty() {
@@ -165,7 +165,7 @@ fn specific_energy(scene: &Scene, particles: &Particles) -> f64 {
 /// Neighbour visits of a PBF run: particles × mean neighbours at the run's end × passes over them,
 /// which are one for λ and one for the corrections of each iteration, and the search of each
 /// substep.
-fn neighbor_visits(scene: &PbfScene, end: &Particles, run: &Measured) -> f64 {
+fn neighbor_visits(scene: &PbfScene, end: &Particles, run: &SweepMeasurements) -> f64 {
     let pbf = scene.settings();
     let radius = pbf.support_ratio * pbf.particle_spacing;
     let place = |x: &[f32; 3]| Vec3::from_array(*x).as_dvec3() - scene.domain.min;

@@ -5,11 +5,12 @@ use serde::{Deserialize, Serialize};
 use swell_files::study::sweep::ErrorMeasure;
 
 /// Results of a point of a sweep.
-pub(super) type Run = super::super::Run<Measured>;
+pub(super) type SweepRun = super::super::Run<SweepMeasurements>;
 
 /// Measurements besides the time.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub(super) struct Measured {
+#[serde(expecting = "struct Measured")]
+pub(super) struct SweepMeasurements {
     /// Number of substeps over all frames.
     pub(super) substeps: u64,
     /// Number of iterations over all frames.
@@ -81,7 +82,11 @@ fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
 
 /// Error of a run, compared with `finest` where the measure needs it; `None` where it was not
 /// measured.
-pub(super) fn error(of: ErrorMeasure, run: &Measured, finest: Option<&Measured>) -> Option<f64> {
+pub(super) fn error(
+    of: ErrorMeasure,
+    run: &SweepMeasurements,
+    finest: Option<&SweepMeasurements>,
+) -> Option<f64> {
     let density = |k: usize| mean(run.density.iter().map(move |frame| frame[k]));
     let against = |difference: fn(&Sample, &Sample) -> Option<f64>| {
         let pairs = run.samples.iter().zip(&finest?.samples);
@@ -128,7 +133,7 @@ mod tests {
             energy,
             profile: vec![level; 4],
         };
-        let run = Measured {
+        let run = SweepMeasurements {
             samples: vec![
                 sample(Some(1.0), 0.5, 9.0, 1.0),
                 sample(None, 0.7, 8.0, 1.5),
@@ -136,14 +141,14 @@ mod tests {
             density: vec![[0.01, 0.02, 0.3], [0.03, 0.04, 0.5]],
             speed: vec![9.0, 5.0, 1.0, 2.0],
             weight: vec![Some(0.9), None, Some(0.1), Some(0.3)],
-            ..Measured::default()
+            ..SweepMeasurements::default()
         };
-        let finest = Measured {
+        let finest = SweepMeasurements {
             samples: vec![
                 sample(Some(1.5), 0.4, 10.0, 1.2),
                 sample(Some(2.0), 0.4, 10.0, 1.2),
             ],
-            ..Measured::default()
+            ..SweepMeasurements::default()
         };
         let against = |of| error(of, &run, Some(&finest)).expect("measured");
         assert!((against(ErrorMeasure::Front) - 0.5).abs() < 1e-12);

@@ -14,14 +14,14 @@ use swell_study::measure::Gauge;
 
 use super::{
     PointStatus, StudyError,
-    engine::{Bench, Kind, WorkUnit, needs_of},
+    engine::{Bench, StudyKind, WorkUnit, needs_of},
     ledger::Key,
     report::Report,
 };
-use measured::{Run, error};
+use measured::{SweepRun, error};
 use projection::Projections;
 
-impl Kind for Sweep {
+impl StudyKind for Sweep {
     fn needs(&self) -> Option<Needs> {
         needs_of(self.points().map(|point| (&point.scene, point.device)))
     }
@@ -79,7 +79,7 @@ impl Kind for Sweep {
     }
 }
 
-fn status(errors: &[ErrorMeasure], run: &Run, stood: bool) -> PointStatus {
+fn status(errors: &[ErrorMeasure], run: &SweepRun, stood: bool) -> PointStatus {
     let known = |of: &ErrorMeasure| Some((of.name(), error(*of, &run.measured, None)?));
     match &run.ended {
         _ if stood => PointStatus::Stands,
@@ -106,7 +106,7 @@ impl Lab<'_> {
         bench: &Bench<'_>,
         point: &Point,
         finest: Option<&Point>,
-    ) -> Result<Run, StudyError> {
+    ) -> Result<SweepRun, StudyError> {
         match (&mut self.projections, finest) {
             (None, _) => frames::measure(bench, point, self.sweep, self.gauge.as_ref()),
             (Some(projections), None) => projections.measure(bench, point, self.sweep.repeats),

@@ -32,7 +32,7 @@ use super::{
         engine::{Bench, until_done},
     },
     frames::products,
-    measured::{Measured, ProjectionErrors, Run},
+    measured::{ProjectionErrors, SweepMeasurements, SweepRun},
 };
 
 /// Projections of one state.
@@ -68,7 +68,7 @@ struct Resolved {
 }
 
 /// State of the grid before a projection.
-struct Grid {
+struct GridState {
     kind: Vec<u32>,
     open: Vec<f32>,
     distance: Option<Vec<f32>>,
@@ -129,15 +129,15 @@ impl<'a> Projections<'a> {
         bench: &Bench<'_>,
         point: &Point,
         repeats: u32,
-    ) -> Result<Run, StudyError> {
+    ) -> Result<SweepRun, StudyError> {
         let scene = of_flip(point)?;
         let mut solver = self.loaded(bench, point, &scene)?;
         let substep = solver.carry_to_grid()?;
-        let grid = Grid::read(&solver, &scene)?;
+        let grid = GridState::read(&solver, &scene)?;
         solver.project(&substep)?;
-        let mut measured = Measured {
+        let mut measured = SweepMeasurements {
             substeps: 1,
-            ..Measured::default()
+            ..SweepMeasurements::default()
         };
         let mut seconds = Vec::new();
         for _ in 0..repeats {
@@ -172,7 +172,7 @@ impl<'a> Projections<'a> {
         bench: &Bench<'_>,
         fine: &Point,
         coarse: &Point,
-    ) -> Result<Run, StudyError> {
+    ) -> Result<SweepRun, StudyError> {
         let begin = Instant::now();
         let [fine, coarse] = [self.resolved(bench, fine)?, self.resolved(bench, coarse)?];
         if (fine.step - coarse.step).abs() > 1e-9 * fine.step {
@@ -200,7 +200,7 @@ impl<'a> Projections<'a> {
             let (off, all): (Vec<f64>, Vec<f64>) = pairs.map(|(c, f)| (c - f, f)).unzip();
             norm(&off) / norm(&all)
         };
-        let measured = Measured {
+        let measured = SweepMeasurements {
             substeps: 1,
             projection: Some(ProjectionErrors {
                 pressure: relative(true),
@@ -210,7 +210,7 @@ impl<'a> Projections<'a> {
                 has_factor: fine.has_factor && coarse.has_factor,
                 ..ProjectionErrors::default()
             }),
-            ..Measured::default()
+            ..SweepMeasurements::default()
         };
         self.one(bench, vec![begin.elapsed().as_secs_f64()], measured)
     }
@@ -220,9 +220,9 @@ impl<'a> Projections<'a> {
         &mut self,
         bench: &Bench<'_>,
         seconds: Vec<f64>,
-        measured: Measured,
-    ) -> Result<Run, StudyError> {
-        Ok(Run {
+        measured: SweepMeasurements,
+    ) -> Result<SweepRun, StudyError> {
+        Ok(SweepRun {
             particles: self.state(bench)?.len(),
             frames: 1,
             seconds,
@@ -236,7 +236,7 @@ impl<'a> Projections<'a> {
         let scene = of_flip(point)?;
         let mut solver = self.loaded(bench, point, &scene)?;
         let substep = solver.carry_to_grid()?;
-        let grid = Grid::read(&solver, &scene)?;
+        let grid = GridState::read(&solver, &scene)?;
         let cells = grid.cells(&solver);
         let system = System::new(cells);
         let exact = self.exact(&system, &system.rhs(cells, &grid.velocity, &grid.flux))?;
@@ -271,7 +271,7 @@ impl<'a> Projections<'a> {
     }
 
     /// Errors of the device's solution.
-    fn errors(&mut self, solver: &Flip, grid: &Grid) -> Result<ProjectionErrors, StudyError> {
+    fn errors(&mut self, solver: &Flip, grid: &GridState) -> Result<ProjectionErrors, StudyError> {
         let cells = grid.cells(solver);
         let system = System::new(cells);
         let exact = self.exact(&system, &system.rhs(cells, &grid.velocity, &grid.flux))?;
@@ -320,7 +320,7 @@ impl<'a> Projections<'a> {
 }
 
 /// Returns a point's scene, which FLIP has to solve.
-fn of_flip(point: &Point) -> Result<FlipScene, StudyError> {
+fn of_flip(point: &Point) -> Result<FlipScene<'_>, StudyError> {
     let wrong = || "projections are measured with solver.method flip".to_owned();
     point
         .scene
@@ -335,7 +335,7 @@ fn context<'a>(bench: &'a Bench<'_>, point: &Point) -> &'a Context {
     }
 }
 
-impl Grid {
+impl GridState {
     fn read(solver: &Flip, scene: &FlipScene) -> Result<Self, SolveError> {
         let stride = solver.plan().counts.bricks.slots * CELLS as usize;
         let has_distance = scene.settings().surface == Surface::GhostFluid;

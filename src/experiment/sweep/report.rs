@@ -19,15 +19,15 @@ use super::{
         report::{Report, what_was_run},
     },
     digits::{shortened, significant},
-    measured::{self, Run},
+    measured::{self, SweepRun},
 };
 
 /// Results to draw.
-pub(super) struct Results<'a> {
+pub(super) struct SweepResults<'a> {
     pub(super) sweep: &'a Sweep,
     devices: &'a Devices,
     /// Runs of each line in the order of its points, then of its coarser point if it has one.
-    runs: &'a [Vec<Run>],
+    runs: &'a [Vec<SweepRun>],
     /// Whether costs are per frame rather than per run, which requires that all runs have the same
     /// number of frames.
     is_per_frame: bool,
@@ -41,9 +41,9 @@ enum Cost {
     Work,
 }
 
-pub(super) fn draw(sweep: &Sweep, bench: &Bench<'_>, runs: &[Vec<Run>]) -> Report {
+pub(super) fn draw(sweep: &Sweep, bench: &Bench<'_>, runs: &[Vec<SweepRun>]) -> Report {
     let frames = || sweep.points().map(|point| point.frames);
-    let results = Results {
+    let results = SweepResults {
         sweep,
         devices: bench.devices,
         runs,
@@ -72,9 +72,9 @@ pub(super) fn draw(sweep: &Sweep, bench: &Bench<'_>, runs: &[Vec<Run>]) -> Repor
     }
 }
 
-impl Results<'_> {
+impl SweepResults<'_> {
     /// Every run with its line and point; the coarser run is the last of its line.
-    fn all(&self) -> impl Iterator<Item = (usize, &Line, &Point, &Run)> {
+    fn all(&self) -> impl Iterator<Item = (usize, &Line, &Point, &SweepRun)> {
         let lines = self.sweep.lines.iter().zip(self.runs).enumerate();
         lines.flat_map(|(k, (line, runs))| {
             let points = line.points.iter().chain(&line.coarser);
@@ -85,13 +85,13 @@ impl Results<'_> {
     }
 
     /// Runs that reached their end.
-    pub(super) fn done(&self) -> impl Iterator<Item = &Run> {
+    pub(super) fn done(&self) -> impl Iterator<Item = &SweepRun> {
         self.all()
             .map(|(.., run)| run)
             .filter(|run| run.ended.is_none())
     }
 
-    fn coarser(&self, line: usize) -> Option<&Run> {
+    fn coarser(&self, line: usize) -> Option<&SweepRun> {
         self.runs[line].get(self.sweep.lines[line].points.len())
     }
 
@@ -120,7 +120,7 @@ impl Results<'_> {
     }
 
     /// Minimum, median and maximum time, milliseconds.
-    fn time(&self, run: &Run) -> [f64; 3] {
+    fn time(&self, run: &SweepRun) -> [f64; 3] {
         let frames = if self.is_per_frame {
             1.0
         } else {
@@ -129,7 +129,7 @@ impl Results<'_> {
         run.per_frame().map(|seconds| 1e3 * seconds * frames)
     }
 
-    fn work(&self, run: &Run) -> f64 {
+    fn work(&self, run: &SweepRun) -> f64 {
         let frames = if self.is_per_frame {
             f64::from(run.frames)
         } else {
@@ -138,18 +138,18 @@ impl Results<'_> {
         run.measured.work / frames
     }
 
-    fn lines(&self, error: ErrorMeasure) -> Vec<knee::Line> {
+    fn lines(&self, error: ErrorMeasure) -> Vec<knee::MethodCurve> {
         let lines = self.sweep.lines.iter().enumerate();
         let point = |k: usize, index: usize, point: &Point| {
             let run = &self.runs[k][index];
-            Some(knee::Point {
+            Some(knee::CostPoint {
                 label: point.label.clone(),
                 error: self.error(k, index, error)?,
                 time: self.time(run),
                 work: self.work(run),
             })
         };
-        let of = |(k, line): (usize, &Line)| knee::Line {
+        let of = |(k, line): (usize, &Line)| knee::MethodCurve {
             name: line.name.clone(),
             points: (line.points.iter().enumerate())
                 .filter_map(|(index, p)| point(k, index, p))
@@ -159,7 +159,7 @@ impl Results<'_> {
     }
 
     /// Each error of each line, with its discretisation error.
-    fn each(&self) -> Vec<(ErrorMeasure, usize, knee::Line, Option<f64>)> {
+    fn each(&self) -> Vec<(ErrorMeasure, usize, knee::MethodCurve, Option<f64>)> {
         let errors = self.sweep.errors.iter();
         let of = |&error: &ErrorMeasure| {
             let lines = self.lines(error).into_iter().enumerate();
@@ -189,7 +189,7 @@ impl Results<'_> {
         let error = self.sweep.errors[0];
         let each = self.each();
         let of_error = each.iter().filter(|(of, ..)| *of == error);
-        let mut knees: Vec<(&knee::Line, Knee<'_>, String)> = of_error
+        let mut knees: Vec<(&knee::MethodCurve, Knee<'_>, String)> = of_error
             .filter_map(|(_, k, line, discretisation)| {
                 let knee = knee::knee(line, *discretisation)?;
                 let key = &self.sweep.lines[*k].key;
@@ -232,7 +232,7 @@ impl Results<'_> {
     }
 
     fn failures(&self) -> Vec<String> {
-        let failed = |(_, line, point, run): (usize, &Line, &Point, &Run)| {
+        let failed = |(_, line, point, run): (usize, &Line, &Point, &SweepRun)| {
             let key = self.key(line, point);
             let message = run.ended.as_ref()?;
             Some(format!("{}, {key} = {}: {message}", line.name, point.label))
@@ -276,9 +276,9 @@ impl Results<'_> {
         });
         let failures = self.failures().into_iter();
         let notes = failures.map(|text| format!("failed: {text}")).chain(zeros);
-        let series = |(k, line): (usize, &knee::Line)| {
+        let series = |(k, line): (usize, &knee::MethodCurve)| {
             let knee = knee::knee(line, self.discretisation(k, error));
-            let dot = |point: &knee::Point| Dot {
+            let dot = |point: &knee::CostPoint| Dot {
                 at: if cost == Cost::Time {
                     point.time[1]
                 } else {
@@ -539,7 +539,7 @@ fn unique<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
     known
 }
 
-fn found(run: &Run, reading: Reading) -> Option<String> {
+fn found(run: &SweepRun, reading: Reading) -> Option<String> {
     let errors: Vec<f64> = run.measured.density.iter().map(|frame| frame[0]).collect();
     convergence_point(&errors, reading).map(|step| step.to_string())
 }

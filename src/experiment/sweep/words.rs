@@ -2,9 +2,9 @@
 
 use swell_files::study::sweep::{FRAME_RATE, Measure, SAMPLES};
 
-use super::report::Results;
+use super::report::SweepResults;
 
-impl Results<'_> {
+impl SweepResults<'_> {
     /// Paragraphs for the page.
     pub(super) fn measured(&self) -> Vec<String> {
         let mut texts = vec![KNEE.to_owned(), EQUAL_TIME.to_owned(), WORK.to_owned()];

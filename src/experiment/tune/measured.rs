@@ -10,7 +10,7 @@ use swell_files::study::{
 };
 use swell_scene::Scene;
 use swell_stage::{
-    drive::{Drive, Step},
+    drive::{ComputedFrame, Drive},
     prepare::Start,
 };
 use swell_study::measure::Gauge;
@@ -28,11 +28,12 @@ const SAMPLES: u32 = 24;
 const COARSE_REPEATS: u32 = 3;
 
 /// Results of a variant.
-pub(super) type Run = super::super::run::Run<Measured>;
+pub(super) type TuneRun = super::super::run::Run<TuneMeasurements>;
 
 /// Measurements besides the time.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub(super) struct Measured {
+#[serde(expecting = "struct Measured")]
+pub(super) struct TuneMeasurements {
     /// Number of substeps over all frames.
     pub(super) substeps: u64,
     /// Number of iterations over all frames.
@@ -73,7 +74,7 @@ impl Sample {
     }
 }
 
-impl Measured {
+impl TuneMeasurements {
     fn values(&self, of: Quantity) -> impl Iterator<Item = Option<f64>> {
         self.samples.iter().flat_map(move |s| s.values(of))
     }
@@ -123,7 +124,7 @@ pub(super) fn measure(
     tune: &Tune,
     variant: &Variant,
     gauge: &Gauge,
-) -> Result<Run, StudyError> {
+) -> Result<TuneRun, StudyError> {
     let scene = &variant.scene;
     let start = Start::of(scene)?;
     let mut drive = Drive::new(bench.devices.of(RunsOn::Gpu), scene, &start, false)?;
@@ -131,10 +132,10 @@ pub(super) fn measure(
         drive = drive.with_pressures();
     }
     drive.advance()?;
-    let mut run = Run {
+    let mut run = TuneRun {
         particles: start.particles.len(),
         frames: tune.frames,
-        ..Run::default()
+        ..TuneRun::default()
     };
     for repeat in 0..repeats(tune, variant) {
         drive.load(0, &start.particles)?;
@@ -153,8 +154,8 @@ pub(super) fn measure(
     Ok(run)
 }
 
-impl Measured {
-    fn look(&mut self, scene: &Scene, gauge: &Gauge, frames: u32, step: Step) {
+impl TuneMeasurements {
+    fn look(&mut self, scene: &Scene, gauge: &Gauge, frames: u32, step: ComputedFrame) {
         self.substeps += u64::from(step.report.substeps);
         self.iterations += step.report.iterations;
         self.density += step.report.density_error_mean;
@@ -165,7 +166,7 @@ impl Measured {
     }
 }
 
-fn sample(scene: &Scene, gauge: &Gauge, step: Step) -> Sample {
+fn sample(scene: &Scene, gauge: &Gauge, step: ComputedFrame) -> Sample {
     let (particles, spacing) = (&step.particles, scene.particle_spacing());
     // With a density of 1 and the lattice's particle masses, energy over volume is energy per mass.
     let gravity: DVec3 = scene.water.gravity;
@@ -184,17 +185,21 @@ fn sample(scene: &Scene, gauge: &Gauge, step: Step) -> Sample {
 mod tests {
     use super::*;
 
-    fn run(crest: [f64; 2], front: [Option<f64>; 2], pressures: [[Option<f64>; 2]; 2]) -> Measured {
+    fn run(
+        crest: [f64; 2],
+        front: [Option<f64>; 2],
+        pressures: [[Option<f64>; 2]; 2],
+    ) -> TuneMeasurements {
         let sample = |k: usize| Sample {
             crest: crest[k],
             front: front[k],
             pressures: pressures[k].to_vec(),
             ..Sample::default()
         };
-        Measured {
+        TuneMeasurements {
             density: crest[0] / 100.0,
             samples: vec![sample(0), sample(1)],
-            ..Measured::default()
+            ..TuneMeasurements::default()
         }
     }
 

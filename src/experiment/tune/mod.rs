@@ -26,11 +26,11 @@ use swell_study::{
 
 use super::{
     PointStatus, StudyError,
-    engine::{Bench, Kind, WorkUnit, needs_of},
+    engine::{Bench, StudyKind, WorkUnit, needs_of},
     ledger::Ledger,
     report::Report,
 };
-use measured::{Measured, Run, measure, repeats};
+use measured::{TuneMeasurements, TuneRun, measure, repeats};
 use model::Fitted;
 
 /// Largest number of proposals to run; each one corrects the models by the result of the previous
@@ -69,13 +69,13 @@ struct Trial<'a> {
     role: Role,
     why: &'static str,
     variant: Cow<'a, Variant>,
-    run: Run,
+    run: TuneRun,
     /// Prediction of the models, where it was made before the run.
     predicted: Option<Proposal>,
 }
 
 /// Results of all runs.
-struct Results<'a> {
+struct TuneResults<'a> {
     tune: &'a Tune,
     trials: Vec<Trial<'a>>,
     /// Models fitted to the runs; `None` where too few runs reached their end.
@@ -88,7 +88,7 @@ struct Results<'a> {
     choice: Option<(usize, bool)>,
 }
 
-impl Kind for Tune {
+impl StudyKind for Tune {
     fn needs(&self) -> Option<Needs> {
         needs_of(
             self.variants()
@@ -118,7 +118,7 @@ impl Kind for Tune {
             return Ok(None);
         }
         let limits = limits(self, reference(&trials)?)?;
-        let mut results = Results {
+        let mut results = TuneResults {
             tune: self,
             fitted: Fitted::of(self, &trials),
             trials,
@@ -135,12 +135,12 @@ impl Kind for Tune {
 }
 
 /// Measurements of the reference run.
-fn reference<'t>(trials: &'t [Trial<'_>]) -> Result<&'t Measured, StudyError> {
+fn reference<'t>(trials: &'t [Trial<'_>]) -> Result<&'t TuneMeasurements, StudyError> {
     let mut found = trials.iter().filter(|t| t.role == Role::Reference);
     match found.next() {
         Some(Trial {
             run:
-                Run {
+                TuneRun {
                     ended: None,
                     measured,
                     ..
@@ -158,7 +158,7 @@ fn reference<'t>(trials: &'t [Trial<'_>]) -> Result<&'t Measured, StudyError> {
 }
 
 /// Limits in the quantities' own units.
-fn limits(tune: &Tune, reference: &Measured) -> Result<Limits, StudyError> {
+fn limits(tune: &Tune, reference: &TuneMeasurements) -> Result<Limits, StudyError> {
     let of = |limit: &Limit| match limit.bound {
         Bound::Absolute(value) => Ok(value),
         Bound::Part(part) => reference
@@ -200,7 +200,7 @@ fn gauge_of(tune: &Tune) -> Result<Gauge, StudyError> {
 struct Lab<'a> {
     tune: &'a Tune,
     gauge: Gauge,
-    ledger: Ledger<Measured>,
+    ledger: Ledger<TuneMeasurements>,
 }
 
 impl<'a> Lab<'a> {
@@ -236,7 +236,7 @@ impl<'a> Lab<'a> {
         Ok(trials)
     }
 
-    fn check_told(&self, coarsest: &Measured) -> Result<(), StudyError> {
+    fn check_told(&self, coarsest: &TuneMeasurements) -> Result<(), StudyError> {
         for limit in &self.tune.request.limits {
             if coarsest.whole(limit.quantity).is_none() {
                 return Err(untold(limit.quantity.name()));
@@ -251,7 +251,7 @@ impl<'a> Lab<'a> {
         bench: &mut Bench<'_>,
         why: &str,
         variant: &Variant,
-    ) -> Result<Option<Run>, StudyError> {
+    ) -> Result<Option<TuneRun>, StudyError> {
         let tune = self.tune;
         let measured = format!(
             "tune {} {:?} {:?}",
@@ -281,7 +281,7 @@ impl<'a> Lab<'a> {
     fn propose(
         &mut self,
         bench: &mut Bench<'_>,
-        results: &mut Results<'a>,
+        results: &mut TuneResults<'a>,
     ) -> Result<(), StudyError> {
         for _ in 0..PROPOSALS {
             let Some(proposal) = results.proposal() else {
@@ -306,16 +306,16 @@ impl<'a> Lab<'a> {
     }
 }
 
-impl<'a> Results<'a> {
+impl<'a> TuneResults<'a> {
     /// Measurements of the reference run, which exist for all results.
-    fn reference(&self) -> &Measured {
+    fn reference(&self) -> &TuneMeasurements {
         let mut all = self.trials.iter().filter(|t| t.role == Role::Reference);
         let found = all.next().map(|trial| &trial.run.measured);
         found.expect("a run that the others are held against")
     }
 
     /// Errors of a run in the order of the limits; `None` where it did not reach its end.
-    fn errors(&self, run: &Run) -> Vec<Option<f64>> {
+    fn errors(&self, run: &TuneRun) -> Vec<Option<f64>> {
         let reference = self.reference();
         let limits = self.tune.request.limits.iter();
         let off = limits.map(|limit| run.measured.off(limit.quantity, reference));
@@ -355,7 +355,7 @@ impl<'a> Results<'a> {
     }
 
     /// Adds the run of a proposal and corrects the models by it.
-    fn take(&mut self, variant: Variant, run: Run, predicted: Proposal) {
+    fn take(&mut self, variant: Variant, run: TuneRun, predicted: Proposal) {
         let errors = self.errors(&run);
         if let Some(fitted) = &mut self.fitted {
             fitted.correct(&errors, run.per_frame()[1], &predicted);

@@ -3,7 +3,7 @@
 use swell_files::study::tune::{Knob, Quantity, Setting, Tune};
 use swell_study::tune::{Effect, Law, Model, Proposal};
 
-use super::{Role, Trial, measured::Run};
+use super::{Role, Trial, measured::TuneRun};
 
 /// Fitted models, and the settings to which their values refer.
 pub(super) struct Fitted<'a> {
@@ -24,7 +24,7 @@ impl<'a> Fitted<'a> {
             found.next().map(|t| &t.run).filter(|r| r.ended.is_none())
         };
         let reference = run(Role::Reference)?;
-        let ladder: Vec<(f64, &Run)> = trials
+        let ladder: Vec<(f64, &TuneRun)> = trials
             .iter()
             .filter(|t| t.role == Role::Spacing && t.run.ended.is_none())
             .map(|t| (t.variant.spacing(), &t.run))
@@ -129,7 +129,7 @@ type Choices<'a> = Vec<Vec<Option<Chosen<'a>>>>;
 
 /// Noise floor: difference of a run from one with a millionth more gravity, which no two bakes fall
 /// below.
-pub(super) fn floor(of: Quantity, own: &Run, noise_floor: &Run) -> Option<f64> {
+pub(super) fn floor(of: Quantity, own: &TuneRun, noise_floor: &TuneRun) -> Option<f64> {
     match of {
         Quantity::Density => Some((own.measured.density - noise_floor.measured.density).abs()),
         _ => own.measured.off(of, &noise_floor.measured),
@@ -141,12 +141,12 @@ pub(super) fn floor(of: Quantity, own: &Run, noise_floor: &Run) -> Option<f64> {
 /// Differences within the noise floor count as none.
 fn effects<'a, 't>(
     tune: &'a Tune,
-    [own, fine, noise_floor]: [&Run; 3],
-    run: impl Fn(Role) -> Option<&'t Run>,
+    [own, fine, noise_floor]: [&TuneRun; 3],
+    run: impl Fn(Role) -> Option<&'t TuneRun>,
 ) -> (Vec<Vec<Effect>>, Choices<'a>) {
     let limits = &tune.request.limits;
-    let off = |run: &Run, of: Quantity| run.measured.off(of, &fine.measured);
-    let effect = |other: &Run| {
+    let off = |run: &TuneRun, of: Quantity| run.measured.off(of, &fine.measured);
+    let effect = |other: &TuneRun| {
         let errors = limits.iter().map(|limit| {
             let of = limit.quantity;
             // Quantities without a value at this spacing count as unchanged.
@@ -195,7 +195,7 @@ mod tests {
         study::tune::{TuneRequest, Variant},
     };
 
-    use super::{super::measured::Measured, *};
+    use super::{super::measured::TuneMeasurements, *};
 
     fn tune() -> Tune {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
@@ -215,19 +215,19 @@ mod tests {
     }
 
     fn trial(role: Role, variant: &Variant, density: f64, seconds: f64) -> Trial<'_> {
-        let measured = Measured {
+        let measured = TuneMeasurements {
             density,
-            ..Measured::default()
+            ..TuneMeasurements::default()
         };
         Trial {
             role,
             why: "",
             variant: Cow::Borrowed(variant),
-            run: Run {
+            run: TuneRun {
                 frames: 1,
                 seconds: vec![seconds],
                 measured,
-                ..Run::default()
+                ..TuneRun::default()
             },
             predicted: None,
         }

@@ -17,11 +17,15 @@ use super::{
         report::{Report, what_was_run},
         sweep::digits::{shortened, significant},
     },
-    Results, Role, Trial,
+    Role, Trial, TuneResults,
 };
 
 /// Draws the report; `written` is the path of the scene with the chosen settings.
-pub(super) fn draw(results: &Results<'_>, bench: &Bench<'_>, written: Option<PathBuf>) -> Report {
+pub(super) fn draw(
+    results: &TuneResults<'_>,
+    bench: &Bench<'_>,
+    written: Option<PathBuf>,
+) -> Report {
     let answer = results.answer();
     let mut findings = vec![answer.clone()];
     findings.extend(results.at_the_end());
@@ -52,7 +56,7 @@ pub(super) fn draw(results: &Results<'_>, bench: &Bench<'_>, written: Option<Pat
     }
 }
 
-impl Results<'_> {
+impl TuneResults<'_> {
     fn chosen(&self) -> Option<&Trial<'_>> {
         Some(&self.trials[self.choice?.0])
     }

@@ -3,9 +3,9 @@
 use swell_files::study::tune::{Bound, Limit, Quantity};
 use swell_study::tune::Law;
 
-use super::{super::sweep::digits::significant, Results, Trial, model::floor};
+use super::{super::sweep::digits::significant, Trial, TuneResults, model::floor};
 
-impl Results<'_> {
+impl TuneResults<'_> {
     /// Formats an error in the unit of its limit: `1.7 %` or `0.043 m`.
     pub(super) fn describe(&self, limit: &Limit, value: f64) -> String {
         match limit.bound {

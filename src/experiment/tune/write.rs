@@ -14,7 +14,7 @@ use swell_files::{
 };
 use swell_scene::Scene;
 
-use super::{super::StudyError, Results, Trial};
+use super::{super::StudyError, Trial, TuneResults};
 
 /// First words of a scene that may be overwritten.
 const MARK: &str = "# Tuned by swell from ";
@@ -32,7 +32,10 @@ pub(super) fn check_target(tune: &Tune) -> Result<(), StudyError> {
 
 /// Writes the scene of the chosen run; returns `None` and writes nothing where no run meets the
 /// limits.
-pub(super) fn write(results: &Results<'_>, command: &str) -> Result<Option<PathBuf>, StudyError> {
+pub(super) fn write(
+    results: &TuneResults<'_>,
+    command: &str,
+) -> Result<Option<PathBuf>, StudyError> {
     let Some((place, true)) = results.choice else {
         return Ok(None);
     };
@@ -57,7 +60,7 @@ pub(super) fn write(results: &Results<'_>, command: &str) -> Result<Option<PathB
 }
 
 /// Comment lines above the scene.
-fn header(results: &Results<'_>, trial: &Trial<'_>, command: &str) -> String {
+fn header(results: &TuneResults<'_>, trial: &Trial<'_>, command: &str) -> String {
     let scene = results.tune.request.scene.file_name().unwrap_or_default();
     let mut lines = vec![
         format!("{}: {command}", scene.to_string_lossy()),
@@ -69,7 +72,7 @@ fn header(results: &Results<'_>, trial: &Trial<'_>, command: &str) -> String {
     format!("{MARK}{}\n\n", lines.join("\n"))
 }
 
-fn settings(results: &Results<'_>, trial: &Trial<'_>) -> Vec<Setting> {
+fn settings(results: &TuneResults<'_>, trial: &Trial<'_>) -> Vec<Setting> {
     let tune = results.tune;
     let solver = tune.request.solver.map(|method| Setting {
         key: "solver.method".into(),

@@ -17,7 +17,7 @@ use swell_stage::{drive::Drive, prepare::Start};
 
 use super::{
     Devices, PointStatus, StudyError,
-    engine::{Bench, Kind, WorkUnit, needs_of, until_done},
+    engine::{Bench, StudyKind, WorkUnit, needs_of, until_done},
     report::Report,
 };
 use record::Record;
@@ -25,11 +25,12 @@ use record::Record;
 pub use verdict::{Judged, judge};
 
 /// Results of a run.
-pub type Run = super::Run<Measured>;
+pub type BenchmarkRun = super::Run<BenchmarkMeasurements>;
 
 /// Measurements that a benchmark takes from a run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Measured {
+#[serde(expecting = "struct Measured")]
+pub struct BenchmarkMeasurements {
     /// Values by the names in
     /// [`Measure::numbers`](swell_files::study::validation::Measure::numbers), without those that
     /// cannot be determined.
@@ -38,7 +39,7 @@ pub struct Measured {
     pub curves: BTreeMap<String, Vec<(f64, f64)>>,
 }
 
-impl Kind for Validation {
+impl StudyKind for Validation {
     fn needs(&self) -> Option<Needs> {
         let runs = self.benchmarks.iter().flat_map(|benchmark| &benchmark.runs);
         needs_of(runs.map(|run| (&run.scene, run.device)))
@@ -92,7 +93,7 @@ impl Kind for Validation {
             return Ok(None);
         }
         bench.joined(&ledger);
-        let judged = |(benchmark, runs): (_, Vec<Run>)| {
+        let judged = |(benchmark, runs): (_, Vec<BenchmarkRun>)| {
             let judged = judge(benchmark, &runs);
             (benchmark, runs, judged)
         };
@@ -101,7 +102,7 @@ impl Kind for Validation {
     }
 }
 
-fn status(run: &Run, stood: bool) -> PointStatus {
+fn status(run: &BenchmarkRun, stood: bool) -> PointStatus {
     match &run.ended {
         Some(message) => PointStatus::Failed(message.clone()),
         None if stood => PointStatus::Stands,
@@ -119,8 +120,8 @@ pub fn run_benchmark(
     benchmark: &Benchmark,
     trial: &Trial,
     stop: &AtomicBool,
-) -> Result<Run, StudyError> {
-    let mut run = Run::default();
+) -> Result<BenchmarkRun, StudyError> {
+    let mut run = BenchmarkRun::default();
     if let Err(error) = go(devices, benchmark, trial, stop, &mut run) {
         run.ended = Some(error.of_the_point()?);
     }
@@ -132,7 +133,7 @@ fn go(
     benchmark: &Benchmark,
     trial: &Trial,
     stop: &AtomicBool,
-    run: &mut Run,
+    run: &mut BenchmarkRun,
 ) -> Result<(), StudyError> {
     let scene = &trial.scene;
     let mut start = Start::of(scene)?;

@@ -10,8 +10,8 @@ use swell_scene::{Scene, WaveMaker};
 use swell_study::waves;
 
 use super::{
-    Measured,
-    record::{Record, Row},
+    BenchmarkMeasurements,
+    record::{FrameRecord, Record},
 };
 
 /// Gravity of the published numbers, m/s², regardless of the scene.
@@ -40,8 +40,8 @@ const CURVE: usize = 400;
 
 type Curve = Vec<(f64, f64)>;
 
-pub(super) fn of(record: &Record<'_>) -> Measured {
-    let mut out = Measured::default();
+pub(super) fn of(record: &Record<'_>) -> BenchmarkMeasurements {
+    let mut out = BenchmarkMeasurements::default();
     match record.benchmark.measure {
         Measure::RegularWaves => regular_waves(record, &mut out),
         Measure::WavesByTheory => waves_by_theory(record, &mut out),
@@ -63,7 +63,7 @@ pub(super) fn of(record: &Record<'_>) -> Measured {
     out
 }
 
-impl Measured {
+impl BenchmarkMeasurements {
     fn put(&mut self, name: &str, value: Option<f64>) {
         if let Some(value) = value {
             self.numbers.insert(name.to_owned(), value);
@@ -76,7 +76,7 @@ impl Measured {
 }
 
 /// Value of each frame over its time in seconds; frames without a value are left out.
-fn over_time(rows: &[Row], of: impl Fn(&Row) -> Option<f64>) -> Curve {
+fn over_time(rows: &[FrameRecord], of: impl Fn(&FrameRecord) -> Option<f64>) -> Curve {
     rows.iter()
         .filter_map(|row| Some((row.time, of(row)?)))
         .collect()
@@ -94,7 +94,7 @@ fn mean(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     (count > 0).then(|| sum / f64::from(count))
 }
 
-fn regular_waves(record: &Record<'_>, out: &mut Measured) {
+fn regular_waves(record: &Record<'_>, out: &mut BenchmarkMeasurements) {
     let scale = record.benchmark.scale;
     let omega = TAU / scale.period;
     let gauges = record.gauges();
@@ -182,7 +182,7 @@ type Both = Vec<[f64; 3]>;
 
 /// Compares with theory from `after` on, relative to the mean level, which is above the still-water
 /// level by the volume that a wall displaces.
-fn waves_by_theory(record: &Record<'_>, out: &mut Measured) {
+fn waves_by_theory(record: &Record<'_>, out: &mut BenchmarkMeasurements) {
     let Some(theory) = Theory::of(record.scene) else {
         return;
     };
@@ -227,7 +227,7 @@ fn waves_by_theory(record: &Record<'_>, out: &mut Measured) {
 
 /// Second harmonic of regular waves: bound to them, it is constant along the flume; a free wave,
 /// which travels more slowly, makes it vary.
-fn second_harmonic(period: f64, after: f64, gauges: &[Both], out: &mut Measured) {
+fn second_harmonic(period: f64, after: f64, gauges: &[Both], out: &mut BenchmarkMeasurements) {
     let omega = 2.0 * TAU / period;
     let amplitude = |samples: &Both, k: usize| -> Option<f64> {
         let curve: Curve = samples.iter().map(|s| (s[0], s[k])).collect();
@@ -247,7 +247,7 @@ fn second_harmonic(period: f64, after: f64, gauges: &[Both], out: &mut Measured)
     out.put("second_harmonic_spread", Some((most - least) / of_theory));
 }
 
-fn solitary_wave(record: &Record<'_>, out: &mut Measured) {
+fn solitary_wave(record: &Record<'_>, out: &mut BenchmarkMeasurements) {
     let scale = record.benchmark.scale;
     let gauges = record.gauges();
     let above = |gauge: usize| -> Curve {
@@ -273,7 +273,7 @@ fn solitary_wave(record: &Record<'_>, out: &mut Measured) {
     }
 }
 
-fn dam_break(record: &Record<'_>, out: &mut Measured) {
+fn dam_break(record: &Record<'_>, out: &mut BenchmarkMeasurements) {
     let benchmark = record.benchmark;
     let a = benchmark.scale.length;
     let front = over_time(&record.rows, |row| row.of_water.first().map(|x| x / a));
@@ -300,13 +300,13 @@ fn dam_break(record: &Record<'_>, out: &mut Measured) {
     out.draw("column", column);
 }
 
-fn dry_bed(record: &Record<'_>, out: &mut Measured) {
+fn dry_bed(record: &Record<'_>, out: &mut BenchmarkMeasurements) {
     let scale = record.benchmark.scale;
     let celerity = (GRAVITY * scale.depth).sqrt();
-    let time = |row: &Row| row.time * celerity / scale.depth;
+    let time = |row: &FrameRecord| row.time * celerity / scale.depth;
     let [from, until] = DRY_BED;
-    let looked_at = |row: &&Row| (from - 1e-9..=until + 1e-9).contains(&time(row));
-    let rows: Vec<&Row> = record.rows.iter().filter(looked_at).collect();
+    let looked_at = |row: &&FrameRecord| (from - 1e-9..=until + 1e-9).contains(&time(row));
+    let rows: Vec<&FrameRecord> = record.rows.iter().filter(looked_at).collect();
     let Some(bins) = rows.first().map(|row| row.of_water.len()) else {
         return;
     };
@@ -321,7 +321,7 @@ fn dry_bed(record: &Record<'_>, out: &mut Measured) {
         "depth_at_dam",
         mean(depths).map(|depth| depth / scale.depth),
     );
-    let beyond = |row: &&Row| (row.time, width * row.of_water[dam..].iter().sum::<f64>());
+    let beyond = |row: &&FrameRecord| (row.time, width * row.of_water[dam..].iter().sum::<f64>());
     let flow = waves::slope(&rows.iter().map(beyond).collect::<Vec<_>>());
     out.put(
         "flow_at_dam",
@@ -329,7 +329,7 @@ fn dry_bed(record: &Record<'_>, out: &mut Measured) {
     );
     // Between the still water and the tip, because near the tip the solution holds only for water
     // without friction.
-    let gaps = |row: &Row| -> Vec<f64> {
+    let gaps = |row: &FrameRecord| -> Vec<f64> {
         let of_bin = |(bin, depth): (usize, &f64)| {
             let exact = waves::ritter(middle(bin), row.time, scale.depth, GRAVITY);
             let is_between = middle(bin) > -celerity * row.time && exact > 0.1 * scale.depth;
@@ -340,11 +340,11 @@ fn dry_bed(record: &Record<'_>, out: &mut Measured) {
     };
     let mean_gap = rows.iter().filter_map(|row| mean(gaps(row)));
     out.put("profile_error", mean(mean_gap));
-    let largest = |row: &&Row| gaps(row).into_iter().fold(0.0, f64::max);
+    let largest = |row: &&FrameRecord| gaps(row).into_iter().fold(0.0, f64::max);
     let worst: Vec<f64> = rows.iter().map(largest).collect();
     // Means over one unit of T at either end.
     let part = |from: f64| {
-        let within = |row: &Row| (from - 1e-9..=from + 1.0 + 1e-9).contains(&time(row));
+        let within = |row: &FrameRecord| (from - 1e-9..=from + 1.0 + 1e-9).contains(&time(row));
         let both = rows.iter().zip(&worst);
         mean(both.filter(|(row, _)| within(row)).map(|(_, gap)| *gap))
     };
@@ -353,7 +353,7 @@ fn dry_bed(record: &Record<'_>, out: &mut Measured) {
         out.put("profile_worst_falls", Some(late / early));
     }
     let middle_row = rows.iter().min_by(|a, b| {
-        let far = |row: &Row| (time(row) - 0.5 * (from + until)).abs();
+        let far = |row: &FrameRecord| (time(row) - 0.5 * (from + until)).abs();
         far(a).total_cmp(&far(b))
     });
     if let Some(row) = middle_row {
@@ -367,7 +367,7 @@ fn dry_bed(record: &Record<'_>, out: &mut Measured) {
     }
 }
 
-fn block_impact(record: &Record<'_>, out: &mut Measured) {
+fn block_impact(record: &Record<'_>, out: &mut BenchmarkMeasurements) {
     // The scene's probes are in the order H1 to H4 and P1 to P4.
     let levels: Vec<Curve> = (0..4).map(|gauge| level(record, gauge)).collect();
     out.put("arrival", levels[1].first().map(|(t, _)| *t));
@@ -400,7 +400,7 @@ fn block_impact(record: &Record<'_>, out: &mut Measured) {
     let first = volumes().next().copied().unwrap_or(f64::NAN);
     let off = volumes().map(|volume| (volume / first - 1.0).abs());
     out.put("volume_error", Some(off.fold(0.0, f64::max)));
-    let wet = |row: &&Row| row.pressures.iter().take(4).flatten().any(|p| *p > 0.0);
+    let wet = |row: &&FrameRecord| row.pressures.iter().take(4).flatten().any(|p| *p > 0.0);
     out.put("onset", record.rows.iter().find(wet).map(|row| row.time));
     out.draw("height_2", levels[1].clone());
     out.draw("height_4", levels[3].clone());
@@ -408,7 +408,7 @@ fn block_impact(record: &Record<'_>, out: &mut Measured) {
 }
 
 /// A wall that deflects a jet of cross-section A absorbs all of its momentum, ρ A v² per second.
-fn jet_impact(record: &Record<'_>, out: &mut Measured) {
+fn jet_impact(record: &Record<'_>, out: &mut BenchmarkMeasurements) {
     let scale = record.benchmark.scale;
     let whole = DENSITY * scale.length.powi(2) * scale.speed.powi(2);
     let force = over_time(&record.rows, |row| Some(row.force? / whole));
@@ -417,7 +417,7 @@ fn jet_impact(record: &Record<'_>, out: &mut Measured) {
     out.draw("force", force);
 }
 
-fn standing_wave(record: &Record<'_>, out: &mut Measured) {
+fn standing_wave(record: &Record<'_>, out: &mut BenchmarkMeasurements) {
     let amplitude = over_time(&record.rows, |row| row.of_water.first().copied());
     let start = amplitude.first().map_or(f64::NAN, |(_, a)| *a);
     out.put("period", waves::period(&amplitude, 0.1 * start.abs()));
@@ -434,7 +434,7 @@ fn standing_wave(record: &Record<'_>, out: &mut Measured) {
     );
 }
 
-fn hydrostatic(record: &Record<'_>, out: &mut Measured) {
+fn hydrostatic(record: &Record<'_>, out: &mut BenchmarkMeasurements) {
     let scale = record.benchmark.scale;
     let floor = record.scene.domain.min.y;
     let points = record.scene.pressure_points();
@@ -458,7 +458,7 @@ fn hydrostatic(record: &Record<'_>, out: &mut Measured) {
     out.draw("pressure", ratios);
 }
 
-fn taylor_green(record: &Record<'_>, out: &mut Measured) {
+fn taylor_green(record: &Record<'_>, out: &mut BenchmarkMeasurements) {
     let scale = record.benchmark.scale;
     let energy = over_time(&record.rows, |row| row.of_water.first().copied());
     // Turnover time at the vortex centre, where the vorticity is 2 k U.

@@ -9,7 +9,7 @@ use swell_domain::{
 };
 use swell_files::study::validation::{Benchmark, Measure};
 use swell_scene::{Scene, probe::ProbeKind};
-use swell_stage::drive::Step;
+use swell_stage::drive::ComputedFrame;
 
 /// Fraction of the water behind the front, so that single particles running ahead do not count.
 const FRONT: f64 = 0.995;
@@ -20,7 +20,7 @@ const BIN: f64 = 0.25;
 
 /// Data of a frame.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Row {
+pub(super) struct FrameRecord {
     /// Time in seconds of the shot.
     pub(super) time: f64,
     /// Largest speed of a particle, m/s.
@@ -40,7 +40,7 @@ pub(super) struct Record<'a> {
     pub(super) benchmark: &'a Benchmark,
     pub(super) scene: &'a Scene,
     /// Frames, beginning with the initial state.
-    pub(super) rows: Vec<Row>,
+    pub(super) rows: Vec<FrameRecord>,
     /// Number of substeps over all frames.
     pub(super) substeps: u32,
 }
@@ -53,20 +53,20 @@ impl<'a> Record<'a> {
             rows: Vec::new(),
             substeps: 0,
         };
-        let row = Row {
+        let row = FrameRecord {
             levels: record.levels(start),
             pressures: vec![None; scene.pressure_points().len()],
             of_water: record.of_water(start),
-            ..Row::default()
+            ..FrameRecord::default()
         };
         record.rows.push(row);
         record
     }
 
     /// Adds a frame.
-    pub(super) fn look(&mut self, step: &Step) {
+    pub(super) fn look(&mut self, step: &ComputedFrame) {
         self.substeps += step.report.substeps;
-        self.rows.push(Row {
+        self.rows.push(FrameRecord {
             time: f64::from(step.frame) * self.scene.shot.frame_seconds(),
             speed: step.report.max_speed,
             levels: self.levels(&step.particles),

@@ -16,11 +16,11 @@ use super::{
         report::{Report, what_was_run},
         stability::{Verdict, number},
     },
-    Judged, Run,
+    BenchmarkRun, Judged,
 };
 
 /// A benchmark with its runs and the verdicts on its gates.
-type Result<'a> = (&'a Benchmark, Vec<Run>, Vec<Judged<'a>>);
+type Result<'a> = (&'a Benchmark, Vec<BenchmarkRun>, Vec<Judged<'a>>);
 
 pub(super) fn draw(validation: &Validation, bench: &Bench<'_>, results: &[Result<'_>]) -> Report {
     let all = || {
@@ -96,7 +96,7 @@ fn bound(gate: &Gate) -> String {
     }
 }
 
-fn measured(judged: &Judged<'_>, run: Option<&Run>) -> String {
+fn measured(judged: &Judged<'_>, run: Option<&BenchmarkRun>) -> String {
     let ended = run.and_then(|run| run.ended.as_ref());
     match (ended, judged.measured, judged.gate.bound) {
         (Some(message), ..) => format!("ended: {message}"),
@@ -113,7 +113,7 @@ fn title(benchmark: &Benchmark, of: &str) -> &'static str {
     named.next().map_or("", |(_, title)| title)
 }
 
-fn run_of<'a>((benchmark, runs, _): &'a Result<'_>, trial: &Trial) -> Option<&'a Run> {
+fn run_of<'a>((benchmark, runs, _): &'a Result<'_>, trial: &Trial) -> Option<&'a BenchmarkRun> {
     let place = benchmark
         .runs
         .iter()
@@ -229,7 +229,7 @@ fn of_benchmark(result: &Result<'_>) -> Vec<Part> {
             .collect(),
     ];
     for (name, title) in benchmark.measure.numbers() {
-        let value = |run: &Run| run.measured.numbers.get(*name).copied();
+        let value = |run: &BenchmarkRun| run.measured.numbers.get(*name).copied();
         let mut row = vec![(*title).to_owned()];
         row.extend(
             runs.iter()
@@ -248,7 +248,7 @@ fn of_benchmark(result: &Result<'_>) -> Vec<Part> {
 
 /// Order of convergence of a number by solver, where it is published and there are at least two
 /// resolutions.
-fn orders(benchmark: &Benchmark, runs: &[Run], name: &str) -> String {
+fn orders(benchmark: &Benchmark, runs: &[BenchmarkRun], name: &str) -> String {
     let published = benchmark
         .gates
         .iter()
@@ -283,7 +283,7 @@ fn orders(benchmark: &Benchmark, runs: &[Run], name: &str) -> String {
 
 fn chart(
     benchmark: &Benchmark,
-    runs: &[Run],
+    runs: &[BenchmarkRun],
     (name, [title, x, y]): &(&str, [&str; 3]),
 ) -> Option<String> {
     let series = benchmark.runs.iter().zip(runs).filter_map(|(trial, run)| {
@@ -328,7 +328,7 @@ fn table(results: &[Result<'_>]) -> Vec<Vec<String>> {
     let exact = |value: Option<f64>| value.map_or(String::new(), |value| format!("{value:.6e}"));
     for result in results {
         let (benchmark, runs, judged) = result;
-        let tail = |run: Option<&Run>| {
+        let tail = |run: Option<&BenchmarkRun>| {
             run.map_or(vec![String::new(); 4], |run| {
                 vec![
                     run.particles.to_string(),

@@ -3,7 +3,7 @@
 use swell_files::study::validation::{Benchmark, Bound, Gate, Trial};
 use swell_study::waves;
 
-use super::{super::stability::Verdict, Run};
+use super::{super::stability::Verdict, BenchmarkRun};
 
 /// A gate with its verdict on one or several runs.
 #[derive(Clone, Debug)]
@@ -22,12 +22,12 @@ pub struct Judged<'a> {
 
 /// Judges each gate with each of its runs, in the order of the file. A run that ended early passes
 /// no gate.
-pub fn judge<'a>(benchmark: &'a Benchmark, runs: &[Run]) -> Vec<Judged<'a>> {
+pub fn judge<'a>(benchmark: &'a Benchmark, runs: &[BenchmarkRun]) -> Vec<Judged<'a>> {
     let mut judged = Vec::new();
     for gate in &benchmark.gates {
         let all = benchmark.runs.iter().zip(runs);
         let all: Vec<_> = all.filter(|(trial, _)| gate.judges(trial)).collect();
-        let number = |run: &Run| match run.ended {
+        let number = |run: &BenchmarkRun| match run.ended {
             Some(_) => None,
             None => run.measured.numbers.get(&gate.of).copied(),
         };
@@ -39,8 +39,9 @@ pub fn judge<'a>(benchmark: &'a Benchmark, runs: &[Run]) -> Vec<Judged<'a>> {
             let measured = numbers.and_then(|numbers| over_all(gate, &numbers));
             judged.push(Judged::new(gate, None, measured));
         } else {
-            let of_run =
-                |(trial, run): (&'a Trial, &Run)| Judged::new(gate, Some(trial), number(run));
+            let of_run = |(trial, run): (&'a Trial, &BenchmarkRun)| {
+                Judged::new(gate, Some(trial), number(run))
+            };
             judged.extend(all.into_iter().map(of_run));
         }
     }
@@ -96,7 +97,7 @@ mod tests {
     use std::path::Path;
 
     use super::*;
-    use crate::validation::Measured;
+    use crate::validation::BenchmarkMeasurements;
     use swell_files::study::Study;
 
     fn benchmark(name: &str) -> Benchmark {
@@ -114,13 +115,13 @@ mod tests {
         found
     }
 
-    fn runs(numbers: &[f64], of: &str) -> Vec<Run> {
-        let run = |number: &f64| Run {
-            measured: Measured {
+    fn runs(numbers: &[f64], of: &str) -> Vec<BenchmarkRun> {
+        let run = |number: &f64| BenchmarkRun {
+            measured: BenchmarkMeasurements {
                 numbers: [(of.to_owned(), *number)].into(),
-                ..Measured::default()
+                ..BenchmarkMeasurements::default()
             },
-            ..Run::default()
+            ..BenchmarkRun::default()
         };
         numbers.iter().map(run).collect()
     }
@@ -163,7 +164,7 @@ mod tests {
         benchmark.gates.retain(|gate| gate.of == "celerity");
         // FLIP's gate is 2 %, PBF's is 3 %, and both runs are 2.5 % slow.
         let mut runs = runs(&[3.431 * 0.975; 2], "celerity");
-        let verdicts = |benchmark: &Benchmark, runs: &[Run]| -> Vec<Verdict> {
+        let verdicts = |benchmark: &Benchmark, runs: &[BenchmarkRun]| -> Vec<Verdict> {
             judge(benchmark, runs)
                 .iter()
                 .map(|judged| judged.verdict)

@@ -2,7 +2,7 @@ use super::*;
 
 fn shot() -> Shot<'static> {
     Shot {
-        source: Source {
+        source: FileOrigin {
             software: "swell 0",
             shot: "a-b",
             frame: 7,
@@ -31,9 +31,10 @@ fn a_frame_says_its_units_and_its_points() {
         attributes: [("age".to_owned(), vec![0.5])].into(),
         ..Particles::default()
     };
-    let kind = Kind::Points { width: Some(0.2) };
+    let kind = WaterRepresentation::Points { width: Some(0.2) };
     let way = [("wall_minus_x".to_owned(), DVec3::X)];
-    let text = String::from_utf8(frame(&shot(), kind, &Water::Points(&particles), &way)).unwrap();
+    let text =
+        String::from_utf8(frame(&shot(), kind, &WaterFrame::Points(&particles), &way)).unwrap();
     for part in [
         "metersPerUnit = 1\n",
         "upAxis = \"Y\"",
@@ -73,7 +74,7 @@ fn a_root_plays_the_frames_that_it_is_given() {
     };
     let root_of = Root {
         shot: shot(),
-        kind: Kind::Mesh,
+        kind: WaterRepresentation::Mesh,
         attributes: Vec::new(),
         layers: vec![(7, "s.0007.usda".to_owned()), (9, "s.0009.usda".to_owned())],
         manifest: "s.manifest.usda".to_owned(),

@@ -45,15 +45,15 @@ fn scene(set: &[&str]) -> Scene {
 /// No wall absorbs.
 const AT_REST: AbsorberStates = [None; MOST];
 
-fn pbf(set: &[&str]) -> PbfScene {
-    scene(set).with_pbf().expect("a scene of PBF")
+fn pbf(set: &[&str]) -> PbfScene<'static> {
+    let scene = scene(set);
+    scene.with_pbf().expect("a scene of PBF").to_owned_scene()
 }
 
-fn flip(set: &[&str]) -> FlipScene {
+fn flip(set: &[&str]) -> FlipScene<'static> {
     let method = Method::Flip.as_override();
-    scene(&[set, &[&*method]].concat())
-        .with_flip()
-        .expect("a scene of FLIP")
+    let scene = scene(&[set, &[&*method]].concat());
+    scene.with_flip().expect("a scene of FLIP").to_owned_scene()
 }
 
 #[test]

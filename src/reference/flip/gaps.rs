@@ -8,7 +8,7 @@ use swell_domain::{
 };
 
 use super::{
-    Model, OpenSpace, Step,
+    FlipSubstep, Model, OpenSpace,
     grid::{along, corner, per_cell},
     water::open_parts,
 };
@@ -51,7 +51,7 @@ pub struct Gaps<'a> {
     /// Scene and grid.
     pub model: &'a Model,
     /// Parameters of the substep.
-    pub step: &'a Step<'a>,
+    pub step: &'a FlipSubstep<'a>,
     /// Layout of the elements.
     pub bricks: &'a Bricks,
     /// Open space, with cell kinds from [`super::find_water`].

@@ -22,7 +22,7 @@ mod water;
 
 pub use gaps::{Gaps, close_gaps};
 pub use grid::planes;
-pub use model::{Model, Step};
+pub use model::{FlipSubstep, Model};
 pub use pressure::{Waters, density_source};
 pub use projection::Projected;
 pub use rotation::{grid_confinement, grid_curl};

@@ -26,7 +26,7 @@ use swell_scene::{
 #[derive(Clone, Debug)]
 pub struct Model {
     /// The scene.
-    pub scene: FlipScene,
+    pub scene: FlipScene<'static>,
     /// Cells of the domain along each axis; storage has one more for the upper faces.
     pub cells: [u32; 3],
     /// Signed distances of solids in their initial pose: all static solids as one grid, if there
@@ -40,7 +40,7 @@ pub struct Model {
 
 /// Parameters of one substep.
 #[derive(Clone, Debug)]
-pub struct Step<'a> {
+pub struct FlipSubstep<'a> {
     /// Start of the substep, seconds into the shot.
     pub start: f64,
     /// Length Δt, seconds.
@@ -77,7 +77,7 @@ impl Model {
             shores: Shores::new(boundary, scene.domain.min, scene.settings().cell_size)
                 .joined(scene.periodic),
             at_rest: usize::from(boundary.distance.is_some()),
-            scene: scene.clone(),
+            scene: scene.to_owned_scene(),
         }
     }
 
@@ -135,7 +135,7 @@ impl Model {
     /// Lays out the bricks with particles (`is_wet`), those that count as water near walls and
     /// solids, and those within reach of the step's layers of faces. The elements are those of the
     /// GPU.
-    pub fn bricks(&self, is_wet: &[bool], step: &Step<'_>) -> Bricks {
+    pub fn bricks(&self, is_wet: &[bool], step: &FlipSubstep<'_>) -> Bricks {
         let periodic = self.scene.periodic;
         let cells = stored_cells(self.cells, periodic);
         let reach = (step.layers as u32).div_ceil(EDGE);
@@ -147,7 +147,7 @@ impl Model {
     }
 
     /// Returns the parameters of `substep`, in which absorbing walls have these states.
-    pub fn step(&self, substep: &Substep, absorbers: &AbsorberStates) -> Step<'_> {
+    pub fn step(&self, substep: &Substep, absorbers: &AbsorberStates) -> FlipSubstep<'_> {
         let Substep {
             start,
             length,
@@ -155,7 +155,7 @@ impl Model {
             ..
         } = *substep;
         let [before, after] = [start, start + length].map(|time| self.scene.walls(absorbers, time));
-        Step {
+        FlipSubstep {
             start,
             length,
             velocity_step: self.scene.water.gravity * kick,
@@ -190,7 +190,7 @@ impl Model {
 }
 
 /// The six walls as half-spaces that cut cells. A cell is given by its minimum corner, in cells.
-impl Step<'_> {
+impl FlipSubstep<'_> {
     /// Returns the open part of a cell's extent along each axis.
     pub(super) fn open_extent(&self, cell: DVec3) -> DVec3 {
         open_extent(cell, [self.cut.min, self.cut.max])

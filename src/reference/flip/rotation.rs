@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::{
-    Model, OpenSpace, Step,
+    FlipSubstep, Model, OpenSpace,
     grid::{along, per_cell},
 };
 use swell_domain::{bricks::Bricks, poisson::FLUID};
@@ -48,7 +48,7 @@ pub fn grid_curl(
 /// et al. 2001), at faces between two cells of water.
 pub fn grid_confinement(
     model: &Model,
-    step: &Step<'_>,
+    step: &FlipSubstep<'_>,
     bricks: &Bricks,
     space: &OpenSpace,
     strength: f64,

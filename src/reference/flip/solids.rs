@@ -279,7 +279,7 @@ fn stopped(v: DVec3, push: DVec3) -> DVec3 {
 
 /// Removes the velocity component into the walls that `x` touches or is beyond. The walls are moved
 /// inward by the contact distance.
-pub(super) fn at_walls(model: &Model, step: &super::Step<'_>, v: DVec3, x: DVec3) -> DVec3 {
+pub(super) fn at_walls(model: &Model, step: &super::FlipSubstep<'_>, v: DVec3, x: DVec3) -> DVec3 {
     let contact = model.contact_distance();
     let [slowest, fastest] = step.wall_velocity;
     let v = DVec3::select(x.cmplt(step.walls.min + contact), v.max(slowest), v);
@@ -294,7 +294,7 @@ const CORNER_ROUNDS: usize = 4;
 /// velocity.
 pub(super) fn go(
     model: &Model,
-    step: &super::Step<'_>,
+    step: &super::FlipSubstep<'_>,
     start: DVec3,
     way: DVec3,
     velocity: DVec3,

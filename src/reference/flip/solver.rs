@@ -3,9 +3,9 @@
 use glam::{DMat3, DVec3, Vec3};
 
 use super::{
-    Centers, Cloud, Faces, Gaps, GridTransfer, Model, OpenSpace, Sorted, Step, Waters, advect, aim,
-    assign_cells, close_gaps, cut_cells,
-    effects::{self, Flying, Water},
+    Centers, Cloud, Faces, FlipSubstep, Gaps, GridTransfer, Model, OpenSpace, Sorted, Waters,
+    advect, aim, assign_cells, close_gaps, cut_cells,
+    effects::{self, FaceInputs, Flying},
     extrapolate, find_buried, find_change, find_depth, find_excess, find_water, gather_centers,
     gather_faces, grid_to_particle, is_filling, let_in,
     projection::{Projected, project},
@@ -36,11 +36,11 @@ pub struct Flip {
     frame: u32,
     timings: Timings,
     /// Pressure field of the last substep; `None` before the first.
-    field: Option<Field>,
+    field: Option<PressureField>,
 }
 
 /// A pressure field on cells.
-struct Field {
+struct PressureField {
     bricks: Bricks,
     kind: Vec<u32>,
     /// Whether each cell's centre is inside a wall or solid.
@@ -223,7 +223,7 @@ impl Flip {
                 wall_friction(model, &step, &bricks, &space, &mut faces);
             });
         }
-        let water = Water {
+        let water = FaceInputs {
             model,
             step: &step,
             bricks: &bricks,
@@ -239,7 +239,7 @@ impl Flip {
         let (mut earlier, mut is_short) = (None, false);
         if acts_between {
             earlier = Some(project(None, &mut faces, timings)?.0);
-            let water = Water {
+            let water = FaceInputs {
                 model,
                 step: &step,
                 bricks: &bricks,
@@ -323,7 +323,7 @@ impl Flip {
         }
         let step = self.model.step(substep, &self.state.walls);
         let taken = |change: &DVec3| (-*change / substep.kick).as_vec3().to_array();
-        self.field = Some(Field {
+        self.field = Some(PressureField {
             is_buried: find_buried(&step, &trace.bricks, &trace.space),
             bricks: trace.bricks.clone(),
             kind: trace.space.kind.clone(),
@@ -511,7 +511,7 @@ impl Flip {
 
 impl Model {
     /// Returns the work of walls and solids that move in a substep, joules (flip/boundary_work).
-    fn boundary_work(&self, step: &Step<'_>, trace: &Trace) -> f64 {
+    fn boundary_work(&self, step: &FlipSubstep<'_>, trace: &Trace) -> f64 {
         let Trace { bricks, space, .. } = trace;
         let terms = (0..space.kind.len()).map(|e| {
             let is_filling = is_filling(step, bricks, space, &trace.centers.density, e as u32);

@@ -4,7 +4,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::{
-    Model, Sorted, Step,
+    FlipSubstep, Model, Sorted,
     grid::{corner, neighborhood, per_cell},
     model::ON_FACE,
     solids::{cut, face_sums, open_part_of_hat},
@@ -120,9 +120,9 @@ pub(super) fn hats(model: &Model, bricks: &Bricks, sorted: &Sorted) -> Vec<Hats>
 /// Computes the open fractions of each cell and of its lower faces, and the flux of solids through
 /// the closed parts (Batty et al. 2007). [`super::find_water`] later decides which open cells are
 /// water.
-pub fn cut_cells(model: &Model, step: &Step<'_>, bricks: &Bricks) -> OpenSpace {
+pub fn cut_cells(model: &Model, step: &FlipSubstep<'_>, bricks: &Bricks) -> OpenSpace {
     #[derive(Clone, Default)]
-    struct Cell {
+    struct CutCell {
         kind: u32,
         open: DVec3,
         flux: f64,
@@ -188,7 +188,7 @@ pub fn cut_cells(model: &Model, step: &Step<'_>, bricks: &Bricks) -> OpenSpace {
                 + (of_walls[side] - open[side]) * velocity[side]
         });
         let is_open = volume >= ON_FACE * ON_FACE || (open[0] + open[1]).cmpgt(DVec3::ZERO).any();
-        Cell {
+        CutCell {
             kind: if is_open { AIR } else { SOLID },
             open: open[0],
             flux: (high - low).element_sum(),
@@ -216,7 +216,7 @@ pub fn cut_cells(model: &Model, step: &Step<'_>, bricks: &Bricks) -> OpenSpace {
 /// and `flip/gather_faces` together.
 pub fn gather_faces(
     model: &Model,
-    step: &Step<'_>,
+    step: &FlipSubstep<'_>,
     bricks: &Bricks,
     sorted: &Sorted,
     space: &OpenSpace,

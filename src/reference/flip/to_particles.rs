@@ -4,7 +4,7 @@ use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
 use super::{
-    Faces, Model, OpenSpace, Sorted, Step,
+    Faces, FlipSubstep, Model, OpenSpace, Sorted,
     grid::{along, neighborhood, per_cell},
     solids,
 };
@@ -85,7 +85,7 @@ pub fn find_change(model: &Model, bricks: &Bricks, space: &OpenSpace, faces: &mu
 
 /// Extrapolates velocities by one layer: a face gets the mean of its neighbours in earlier layers.
 /// On faces with a velocity from particles only the change is extrapolated.
-pub fn extrapolate(step: &Step<'_>, bricks: &Bricks, layer: u32, faces: &mut Faces) {
+pub fn extrapolate(step: &FlipSubstep<'_>, bricks: &Bricks, layer: u32, faces: &mut Faces) {
     let filled = per_cell(bricks, |element| {
         let e = element as usize;
         let tags = faces.layer[e];
@@ -207,7 +207,7 @@ fn range_of(values: &[f64; 18]) -> [f64; 2] {
 /// velocities, extended by a margin.
 pub fn grid_to_particle(
     model: &Model,
-    step: &Step<'_>,
+    step: &FlipSubstep<'_>,
     bricks: &Bricks,
     sorted: &Sorted,
     faces: &Faces,
@@ -336,7 +336,7 @@ pub fn grid_to_particle(
 /// Displaces each particle so that its own new velocity takes it to where the grid's velocity would
 /// take it from its original position; isolated droplets keep theirs. Adds the displacement of each
 /// (flip/aim). Metres. Shape (particles), in sorted order.
-pub fn aim(step: &Step<'_>, position: &[DVec3], given: &GridTransfer) -> Vec<DVec3> {
+pub fn aim(step: &FlipSubstep<'_>, position: &[DVec3], given: &GridTransfer) -> Vec<DVec3> {
     let one = |(i, &x): (usize, &DVec3)| {
         let beside = match given.is_drop[i] {
             true => DVec3::ZERO,
@@ -417,7 +417,7 @@ const MOST: f64 = 0.25;
 /// to a wall as they can. Shape (particles).
 pub fn push_apart(
     model: &Model,
-    step: &Step<'_>,
+    step: &FlipSubstep<'_>,
     bricks: &Bricks,
     sorted: &Sorted,
     is_drop: &[bool],
@@ -463,7 +463,7 @@ pub fn push_apart(
 /// farther than the cap is slowed.
 pub fn advect(
     model: &Model,
-    step: &Step<'_>,
+    step: &FlipSubstep<'_>,
     bricks: &Bricks,
     position: &[DVec3],
     velocity: &[DVec3],

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::{
-    Faces, Model, OpenSpace, Step,
+    Faces, FlipSubstep, Model, OpenSpace,
     grid::{corner, per_cell},
 };
 use swell_domain::{bricks::Bricks, flip::VON_KARMAN};
@@ -16,7 +16,7 @@ const KNOWN: u32 = 0x80;
 /// face at distance y.
 pub fn wall_friction(
     model: &Model,
-    step: &Step<'_>,
+    step: &FlipSubstep<'_>,
     bricks: &Bricks,
     space: &OpenSpace,
     faces: &mut Faces,
@@ -31,7 +31,7 @@ pub fn wall_friction(
 /// (elements).
 pub fn friction_rates(
     model: &Model,
-    step: &Step<'_>,
+    step: &FlipSubstep<'_>,
     bricks: &Bricks,
     space: &OpenSpace,
     faces: &Faces,
@@ -76,7 +76,7 @@ pub fn friction_rates(
 impl Model {
     /// Returns the part of the layer of one cell beside each no-slip wall that rows of faces at
     /// `place` represent, across each axis.
-    fn wall_parts(&self, step: &Step<'_>, place: DVec3) -> DVec3 {
+    fn wall_parts(&self, step: &FlipSubstep<'_>, place: DVec3) -> DVec3 {
         let part = |distance: f64| (1.5 - distance).clamp(0.0, 1.0);
         (self.scene.no_slip.iter()).fold(DVec3::ZERO, |mut parts, wall| {
             let axis = wall.axis;

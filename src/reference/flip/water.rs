@@ -4,7 +4,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::{
-    Model, OpenSpace, Sorted, Step,
+    FlipSubstep, Model, OpenSpace, Sorted,
     grid::{along, corner, neighborhood, per_cell},
     to_grid::hats,
 };
@@ -52,7 +52,7 @@ fn hat_below(t: f64) -> f64 {
 
 /// Returns the part of the hat function around a cell's centre that walls leave open; 1 along an
 /// axis where particles are mirrored.
-fn room_of_hats(is_mirrored: bool, step: &Step<'_>, bricks: &Bricks, element: u32) -> f64 {
+fn room_of_hats(is_mirrored: bool, step: &FlipSubstep<'_>, bricks: &Bricks, element: u32) -> f64 {
     let cell = corner(bricks, element);
     let along_axis = |axis: usize| {
         let center = cell[axis] + 0.5;
@@ -76,7 +76,7 @@ fn at_center(weights: &[DVec3; 3], offset: [i32; 3]) -> f64 {
 /// With a density correction, particles count with their mirror images at walls. Shape (elements).
 pub fn gather_centers(
     model: &Model,
-    step: &Step<'_>,
+    step: &FlipSubstep<'_>,
     bricks: &Bricks,
     sorted: &Sorted,
     space: &OpenSpace,
@@ -113,7 +113,7 @@ pub fn gather_centers(
 /// Returns the open part of a cell's extent along each axis, given walls, and the fraction of it
 /// that solids leave open.
 pub(super) fn open_parts(
-    step: &Step<'_>,
+    step: &FlipSubstep<'_>,
     bricks: &Bricks,
     space: &OpenSpace,
     element: u32,
@@ -127,14 +127,14 @@ pub(super) fn open_parts(
 }
 
 /// Returns whether a cell's centre is inside a wall or solid.
-fn is_buried(step: &Step<'_>, bricks: &Bricks, space: &OpenSpace, element: u32) -> bool {
+fn is_buried(step: &FlipSubstep<'_>, bricks: &Bricks, space: &OpenSpace, element: u32) -> bool {
     let parts = open_parts(step, bricks, space, element);
     parts.into_iter().any(|part| part < HALF)
 }
 
 /// Returns whether a cell, if it is water, is mostly empty, as in closing gaps (flip/close_gaps).
 pub fn is_filling(
-    step: &Step<'_>,
+    step: &FlipSubstep<'_>,
     bricks: &Bricks,
     space: &OpenSpace,
     density: &[f64],
@@ -144,7 +144,7 @@ pub fn is_filling(
 }
 
 /// Returns which cells have their centre inside a wall or solid. Shape (elements).
-pub fn find_buried(step: &Step<'_>, bricks: &Bricks, space: &OpenSpace) -> Vec<bool> {
+pub fn find_buried(step: &FlipSubstep<'_>, bricks: &Bricks, space: &OpenSpace) -> Vec<bool> {
     per_cell(bricks, |element| is_buried(step, bricks, space, element))
 }
 
@@ -179,7 +179,7 @@ const MOST_OVER: f64 = 1.0;
 /// Returns whether a rounding error of `error` may decide if the centre of a cell, or of one around
 /// it, is inside a wall or solid.
 pub fn is_near_half(
-    step: &Step<'_>,
+    step: &FlipSubstep<'_>,
     bricks: &Bricks,
     space: &OpenSpace,
     element: u32,
@@ -195,7 +195,7 @@ pub fn is_near_half(
 /// inward of the walls, or if its centre is inside too, the mean over the cell's faces to other
 /// cells, weighted by their open fractions.
 fn density_before(
-    step: &Step<'_>,
+    step: &FlipSubstep<'_>,
     bricks: &Bricks,
     space: &OpenSpace,
     density: &[f64],
@@ -255,7 +255,7 @@ const LEAST_OPEN: f64 = 0.02;
 /// mean over its open faces: particles, at their distance from solids, may not fit into it, and as
 /// air, without pressure, it would draw in the water around it without end.
 fn share_of_room(
-    step: &Step<'_>,
+    step: &FlipSubstep<'_>,
     bricks: &Bricks,
     space: &OpenSpace,
     density: &[f64],
@@ -305,7 +305,7 @@ fn share_of_room(
 /// counts as below the surface if it is a floor, as above it if it is a ceiling, and like the open
 /// part if it is a wall.
 fn below_surface(
-    step: &Step<'_>,
+    step: &FlipSubstep<'_>,
     bricks: &Bricks,
     space: &OpenSpace,
     element: u32,
@@ -338,7 +338,7 @@ fn below_surface(
 /// Derives the water around each cell's centre from the densities. Shape (elements).
 pub fn find_depth(
     model: &Model,
-    step: &Step<'_>,
+    step: &FlipSubstep<'_>,
     bricks: &Bricks,
     space: &OpenSpace,
     density: &[f64],
@@ -406,7 +406,7 @@ pub fn find_water(
 /// Returns the excess of density, or deficit inside the water, as a fraction of a cell: the source
 /// of the density correction (Kugelstadt et al. 2019). Shape (elements).
 pub fn find_excess(
-    step: &Step<'_>,
+    step: &FlipSubstep<'_>,
     bricks: &Bricks,
     space: &OpenSpace,
     density: &[f64],

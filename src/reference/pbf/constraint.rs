@@ -17,7 +17,7 @@ use rayon::prelude::*;
 
 use super::{
     Model, Sorted, Substep, local,
-    passes::{Inputs, Row, measure_density, row},
+    passes::{DensityConstraint, Inputs, measure_density, row},
 };
 use crate::{ReferenceError, Timings};
 use swell_domain::{boundary::Boundary, particles::Particles};
@@ -56,7 +56,7 @@ pub struct Converged {
 /// # Errors Returns [`ReferenceError::Factor`] if the matrix is not positive definite or memory
 /// does not hold its factor.
 pub fn linearised(inputs: Inputs<'_>, regularization: f64) -> Result<Correction, ReferenceError> {
-    let rows: Vec<Row> = (0..inputs.particles())
+    let rows: Vec<DensityConstraint> = (0..inputs.particles())
         .into_par_iter()
         .map(|i| row(inputs, i))
         .collect();

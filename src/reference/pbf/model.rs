@@ -362,7 +362,8 @@ mod tests {
             particle_spacing = 0.1
         "#;
         let scene = parse_scene(text, Path::new("walls.toml"), Path::new("."), &[]);
-        let scene = scene.expect("a scene").with_pbf().expect("of PBF");
+        let scene = scene.expect("a scene");
+        let scene = scene.with_pbf().expect("of PBF");
         Model::new(&scene, &Boundary::default())
     }
 

@@ -137,7 +137,7 @@ pub fn compute_lambda(inputs: Inputs<'_>, colour: Colour, lambda: &mut [f64], de
 
 /// A density constraint at the current positions.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Row {
+pub struct DensityConstraint {
     /// ρ/ρ0.
     pub density: f64,
     /// ∇_i C_i, 1/m.
@@ -148,7 +148,7 @@ pub struct Row {
 
 /// Returns the constraint of particle `i`.
 #[inline]
-pub fn row(inputs: Inputs<'_>, i: usize) -> Row {
+pub fn row(inputs: Inputs<'_>, i: usize) -> DensityConstraint {
     let (kernel, gradient, squares) = widely(RowSums {
         inputs,
         particle: i,
@@ -157,7 +157,7 @@ pub fn row(inputs: Inputs<'_>, i: usize) -> Row {
     let scale = calibration.gradient_scale;
     let (wall, wall_gradient) = inputs.model.wall_term(x, &inputs.substep.walls);
     let own = wall_gradient - scale * gradient;
-    Row {
+    DensityConstraint {
         density: calibration.density_scale * (1.0 + kernel) + wall,
         own,
         squares: own.length_squared() + scale * scale * squares,

@@ -25,7 +25,7 @@ use swell_scene::{Iteration, PbfScene, Scene, Stop, step::projected_substep};
 /// PBF in f64. Frames are rounded to f32, as when written, and the next frame starts from the
 /// rounded state.
 pub struct Pbf {
-    scene: PbfScene,
+    scene: PbfScene<'static>,
     model: Model,
     /// FLIP solver that projects velocities, if the scene uses a projection.
     grid: Option<Flip>,
@@ -241,7 +241,7 @@ impl Pbf {
             model: Model::new(scene, boundary),
             is_drop: Vec::new(),
             grid: scene.of_projection().map(|grid| Flip::new(&grid, boundary)),
-            scene: scene.clone(),
+            scene: scene.to_owned_scene(),
             state: Particles::default(),
             frame: 0,
             timings: Timings::default(),

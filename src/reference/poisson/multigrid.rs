@@ -89,7 +89,7 @@ enum Beside<'a> {
 
 /// Expected value at an index, with an error bound.
 #[derive(Clone, Copy, Debug)]
-pub struct Expected {
+pub struct ExpectedValue {
     /// Index of the value.
     pub place: usize,
     /// Value in f64.
@@ -150,9 +150,9 @@ impl Levels {
         about: Surroundings,
         rounding: Rounding,
         rhs_error: [f64; 8],
-    ) -> Option<[Expected; 8]> {
+    ) -> Option<[ExpectedValue; 8]> {
         let solution = (self.block(level, slot, block, about)).solution(rounding, rhs_error)?;
-        Some(std::array::from_fn(|c| Expected {
+        Some(std::array::from_fn(|c| ExpectedValue {
             place: block_index(slot, block, c),
             value: solution[c][0],
             error: solution[c][1],
@@ -162,7 +162,7 @@ impl Levels {
     /// Reference pass of `pressure/restrict`: the residuals of a level, from the first smoothing of
     /// the finer one. Each is half of what a block left: the first colour was solved with zero
     /// around it, the second with the values of its own brick.
-    pub fn restricted(&self, level: usize, rounding: Rounding) -> Vec<Expected> {
+    pub fn restricted(&self, level: usize, rounding: Rounding) -> Vec<ExpectedValue> {
         let of = |(slot, block): (u32, u32)| {
             let about = match colour(block) {
                 0 => Surroundings::Smoothed,
@@ -170,7 +170,7 @@ impl Levels {
             };
             let found = self.block(level - 1, slot, block, about);
             let above = self.bricks[slot as usize].above;
-            Expected {
+            ExpectedValue {
                 place: (above + above_offset(block)) as usize,
                 value: 0.5 * found.inflow.iter().sum::<f64>(),
                 error: (rounding.restricted)([
@@ -196,19 +196,19 @@ impl Levels {
         level: usize,
         (slot, block): (u32, u32),
         rounding: Rounding,
-    ) -> [Expected; 2] {
+    ) -> [ExpectedValue; 2] {
         let found = self.block(level, slot, block, Surroundings::Corrections);
         let above = self.bricks[slot as usize].above;
         let at = |block: u32| (above + above_offset(block)) as usize;
         let sum: f64 = found.inflow.iter().sum();
         let size = self.inflow_size(&found, slot, block);
         [
-            Expected {
+            ExpectedValue {
                 place: at(block),
                 value: 0.5 * sum,
                 error: (rounding.restricted)([rounding.unit, size]),
             },
-            Expected {
+            ExpectedValue {
                 place: at(block ^ 1),
                 value: 0.0,
                 error: 0.0,
@@ -407,7 +407,7 @@ impl Cycle {
             let rhs_error = self.errors.block(level, slot, block, about).rhs;
             let at = (slot, block);
             let solved = (self.values).solved(level, at, about, self.rounding, rhs_error)?;
-            for Expected {
+            for ExpectedValue {
                 place,
                 value,
                 error,

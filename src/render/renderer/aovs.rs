@@ -1,6 +1,6 @@
 //! Renders additional channels and reads them back from the device.
 
-use super::{Renderer, parts::Parts};
+use super::{Renderer, parts::PartProgress};
 use crate::{
     RenderError,
     buffers::{NEXT_CAMERA, PARTICLES, aovs},
@@ -78,7 +78,7 @@ impl Renderer {
         frame: u32,
         setting: &Setting,
         ahead: &[Particle],
-        parts: &mut Parts<'_>,
+        parts: &mut PartProgress<'_>,
     ) -> Result<Aovs, RenderError> {
         if !ahead.is_empty() {
             self.program.upload(PARTICLES, 0, ahead);

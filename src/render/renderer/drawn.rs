@@ -37,7 +37,7 @@ fn picked<T: Copy + Send + Sync>(values: &[T], indices: &[u32]) -> Vec<T> {
 }
 
 /// Particles of a frame in the order in which they are drawn.
-pub(super) struct Drawn {
+pub(super) struct DrawnParticles {
     /// Visible particles first, strip by strip and front to back, so that occluders are splatted
     /// first; then those that are hidden or outside the frame.
     pub(super) packed: Vec<Particle>,
@@ -49,7 +49,7 @@ pub(super) struct Drawn {
     pub(super) blocks: Option<Vec<Block>>,
 }
 
-impl Drawn {
+impl DrawnParticles {
     /// Culls and sorts particles for a frame's cameras.
     pub(super) fn of(
         taken: Taken,

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::{
     Renderer,
     build::capacity_for,
-    drawn::{Drawn, cameras},
+    drawn::{DrawnParticles, cameras},
     shade::draws_spray,
     splats::{Pages, ROWS, filled},
     taken::{Taken, frame_seconds},
@@ -92,7 +92,7 @@ impl Renderer {
             return Ok(Loaded::default());
         }
         let cameras = cameras(&self.look, &self.setting(0), frame);
-        let mut drawn = Drawn::of(taken, &self.look, &self.scene, frame, &cameras);
+        let mut drawn = DrawnParticles::of(taken, &self.look, &self.scene, frame, &cameras);
         let shapes = self.shapes(&drawn);
         drawn.packed.truncate(drawn.seen);
         self.reserve(drawn.seen)?;
@@ -134,7 +134,7 @@ impl Renderer {
     }
 
     /// Ellipsoids of the visible particles; none where the look splats spheres.
-    fn shapes(&self, drawn: &Drawn) -> Vec<Shape> {
+    fn shapes(&self, drawn: &DrawnParticles) -> Vec<Shape> {
         match self.program.has(SHAPES.name()) {
             true => shapes(&drawn.packed, drawn.seen, &self.scene, self.plan.radius),
             false => Vec::new(),
@@ -142,7 +142,7 @@ impl Renderer {
     }
 
     /// Uploads visible particles with their shapes and paths.
-    fn load_drawn(&self, drawn: &Drawn, shapes: &[Shape]) {
+    fn load_drawn(&self, drawn: &DrawnParticles, shapes: &[Shape]) {
         self.program.upload(PARTICLES, 0, &drawn.packed);
         if self.program.has(SHAPES.name()) {
             self.program.upload(SHAPES, 0, shapes);
@@ -154,7 +154,7 @@ impl Renderer {
     }
 
     /// Visible particles with their mean velocity to the next frame, if a channel shows it.
-    fn ahead(&self, drawn: Drawn, inputs: &FrameInputs<'_>) -> Vec<Particle> {
+    fn ahead(&self, drawn: DrawnParticles, inputs: &FrameInputs<'_>) -> Vec<Particle> {
         if !self.look.wants(AovSpec::Forward) || inputs.beside()[1].is_none() {
             return Vec::new();
         }

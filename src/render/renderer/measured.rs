@@ -3,13 +3,13 @@
 use super::{
     build::capacity_for,
     cloud::{RayCloud, room_of},
-    drawn::{Drawn, cameras},
+    drawn::{DrawnParticles, cameras},
     load::of_particles,
     setting,
     splats::Pages,
     taken::Taken,
     water::RayWater,
-    whitewater::Whitewater,
+    whitewater::WhitewaterDrawing,
 };
 use crate::{
     FrameInputs, RenderError, RenderScene,
@@ -45,7 +45,7 @@ impl Plan {
             let (_, words) = cloud.grid(0.0, scene);
             plan.grow(CLOUD_WORDS.sized(room_of(words.len(), limits.storage)));
         }
-        if let Some(whitewater) = Whitewater::of(look, scene) {
+        if let Some(whitewater) = WhitewaterDrawing::of(look, scene) {
             let drawn = whitewater.packed(scene, frame, inputs.white)?;
             plan.grow(WHITEWATER.sized(capacity_for(drawn.len())));
         }
@@ -53,7 +53,7 @@ impl Plan {
             return Ok(plan);
         }
         let cameras = cameras(look, &setting(&plan, scene, 0), frame);
-        let drawn = Drawn::of(taken, look, scene, frame, &cameras);
+        let drawn = DrawnParticles::of(taken, look, scene, frame, &cameras);
         for buffer in of_particles(look, Pages::new(capacity_for(drawn.seen), limits.storage)) {
             plan.grow(buffer);
         }

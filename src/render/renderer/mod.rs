@@ -21,14 +21,14 @@ use super::buffers::{CAMERA, objects, picture};
 use super::camera::{Setting, camera, eye};
 use super::caustics::{Caustics, above};
 use super::cryptomatte::{Covers, unique};
-use super::image::{Image, View};
+use super::image::{CameraAttributes, Image};
 use super::plan::{Limits, Plan};
 use super::samples::samples_of;
-use super::{FrameInputs, RenderError, RenderScene, Water, sea::Sea, uniform};
+use super::{FrameInputs, RenderError, RenderScene, WaterParticles, sea::Sea, uniform};
 use build::capacity_for;
 use cloud::RayCloud;
 pub use parts::Part;
-use parts::Parts;
+use parts::PartProgress;
 use shade::draws_spray;
 use splats::Pages;
 use swell_domain::{particles::Particles, solver::PassTime};
@@ -40,7 +40,7 @@ use swell_gpu::{
 };
 use swell_scene::look::Look;
 use water::RayWater;
-use whitewater::Whitewater;
+use whitewater::WhitewaterDrawing;
 
 /// Near plane of opaque geometry, particle spacings.
 const NEAR: f64 = 0.12;
@@ -73,7 +73,7 @@ pub struct Renderer {
     /// `None` where the look has no sea.
     sea: Option<Sea>,
     /// `None` where the look draws no whitewater.
-    whitewater: Option<Whitewater>,
+    whitewater: Option<WhitewaterDrawing>,
     timer: Option<Timer>,
     /// Names of the scene's solids in Cryptomatte layers.
     solids: Vec<String>,
@@ -125,7 +125,7 @@ impl Renderer {
             cloud: RayCloud::of(look, scene),
             caustics: Caustics::of(look, scene),
             sea: Sea::of(look, scene),
-            whitewater: Whitewater::of(look, scene),
+            whitewater: WhitewaterDrawing::of(look, scene),
             timer: None,
             solids: unique(&vec!["solid".to_owned(); scene.solids.len()]),
         };
@@ -176,7 +176,7 @@ impl Renderer {
         particles: &Particles,
         white: &Particles,
     ) -> Result<Image, RenderError> {
-        let water = Water::new(particles.clone());
+        let water = WaterParticles::new(particles.clone());
         self.render_inputs(frame, &FrameInputs::alone(&water, white))
     }
 
@@ -207,7 +207,7 @@ impl Renderer {
     ) -> Result<Image, RenderError> {
         let samples = samples_of(&self.look).len();
         let count = samples * self.sample.len() + self.aov_samples().len() * self.aovs.len();
-        let parts = &mut Parts::new(count, tell);
+        let parts = &mut PartProgress::new(count, tell);
         let loaded = self.load(frame, inputs)?;
         if let Some(whitewater) = &mut self.whitewater {
             let white = inputs.white;
@@ -230,7 +230,7 @@ impl Renderer {
         let rate = self.scene.frames_per_second;
         let eye = eye(&self.look, DVec3::ZERO, frame.into(), rate);
         let mut image = Image::of(self.look.window(), eye.size);
-        image.view = Some(View::of(&eye, rate));
+        image.view = Some(CameraAttributes::of(&eye, rate));
         image.exr_space = self.look.spec().output.colour_space;
         if !self.plan.aovs.is_empty() {
             image.aovs = self.draw_aovs(frame, &setting, &loaded.ahead, parts)?;
@@ -323,7 +323,7 @@ impl Renderer {
         &mut self,
         camera: &uniform::Camera,
         aovs: bool,
-        parts: &mut Parts<'_>,
+        parts: &mut PartProgress<'_>,
     ) -> Result<(), RenderError> {
         if let Some(water) = &mut self.water {
             let grew = water.stand_at(camera.seconds, &mut self.program, &self.scene)?;

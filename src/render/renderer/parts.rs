@@ -21,12 +21,12 @@ pub struct Part {
 }
 
 /// Counts the finished parts of a frame and reports progress.
-pub(super) struct Parts<'a> {
+pub(super) struct PartProgress<'a> {
     pub(super) part: Part,
     tell: &'a mut dyn FnMut(Part),
 }
 
-impl<'a> Parts<'a> {
+impl<'a> PartProgress<'a> {
     /// Starts at none of `count` and reports it.
     pub(super) fn new(count: usize, tell: &'a mut dyn FnMut(Part)) -> Self {
         let part = Part {
@@ -75,7 +75,7 @@ impl Renderer {
     pub(super) fn run_portions(
         &mut self,
         aovs: bool,
-        parts: &mut Parts<'_>,
+        parts: &mut PartProgress<'_>,
     ) -> Result<(), RenderError> {
         let recordings = if aovs { &self.aovs } else { &self.sample };
         let begun = Instant::now();

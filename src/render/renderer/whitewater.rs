@@ -8,7 +8,7 @@ use crate::{
 };
 use swell_domain::{
     particles::Particles,
-    whitewater::{KIND, Kind, RADIUS},
+    whitewater::{KIND, RADIUS, WhitewaterKind},
 };
 use swell_gpu::{program::Program, recording::spread};
 use swell_scene::look::{Look, MethodSpec};
@@ -19,7 +19,7 @@ use super::capacity_for;
 const FADING: f64 = 2.0;
 
 /// Settings with which a look draws whitewater.
-pub(super) struct Whitewater {
+pub(super) struct WhitewaterDrawing {
     params: uniform::WhitewaterParams,
     /// Whether bubbles are splatted too; rays traverse them instead.
     has_bubbles: bool,
@@ -27,7 +27,7 @@ pub(super) struct Whitewater {
     capacity: usize,
 }
 
-impl Whitewater {
+impl WhitewaterDrawing {
     /// Returns `None` where the look draws no whitewater.
     pub(super) fn of(look: &Look, scene: &RenderScene) -> Option<Self> {
         let spec = look.spec().whitewater.as_ref()?;
@@ -95,18 +95,21 @@ impl Whitewater {
     }
 }
 
-fn kind(white: &Particles, index: usize) -> Option<Kind> {
+fn kind(white: &Particles, index: usize) -> Option<WhitewaterKind> {
     let kind = white.attributes.get(KIND).and_then(|all| all.get(index));
-    kind.and_then(|&number| Kind::of_number(number))
+    kind.and_then(|&number| WhitewaterKind::of_number(number))
 }
 
 /// Whether a particle is foam or a bubble; particles without a kind are spray.
 fn is_foam(white: &Particles, index: usize) -> bool {
-    matches!(kind(white, index), Some(Kind::Foam | Kind::Bubble))
+    matches!(
+        kind(white, index),
+        Some(WhitewaterKind::Foam | WhitewaterKind::Bubble)
+    )
 }
 
 /// Whether a particle is a bubble, which is in the water rather than in front of it; particles
 /// without a kind are spray.
 pub(super) fn is_bubble(white: &Particles, index: usize) -> bool {
-    kind(white, index) == Some(Kind::Bubble)
+    kind(white, index) == Some(WhitewaterKind::Bubble)
 }

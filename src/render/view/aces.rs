@@ -16,7 +16,7 @@ const DIM_SURROUND: f64 = 0.9811;
 const SATURATION: [f64; 2] = [0.96, 0.93];
 
 /// Values derived from the constants above.
-struct Parts {
+struct AcesConstants {
     /// Matrices from Rec. 709 to ACES2065-1, from that to ACEScg, and from that to Rec. 709.
     matrices: [DMat3; 3],
     /// Luminance coefficients of AP1.
@@ -24,7 +24,7 @@ struct Parts {
     output_tone: Tone<9>,
 }
 
-static PARTS: LazyLock<Parts> = LazyLock::new(|| Parts {
+static PARTS: LazyLock<AcesConstants> = LazyLock::new(|| AcesConstants {
     matrices: [
         REC_709.to(ACES_2065),
         ACES_2065.to(ACES_CG),
@@ -54,7 +54,7 @@ pub(super) fn aces(scene: DVec3) -> DVec3 {
     display.clamp(DVec3::ZERO, DVec3::ONE)
 }
 
-impl Parts {
+impl AcesConstants {
     /// Scales the saturation about grey.
     fn saturated(&self, v: DVec3, saturation: f64) -> DVec3 {
         let grey = DVec3::splat(self.luminance.dot(v));

@@ -3,7 +3,7 @@
 
 use std::f64::consts::TAU;
 
-use swell_domain::open_waves::Line;
+use swell_domain::open_waves::WaveComponent;
 use swell_gpu::{buffer::Buf, program::Program};
 use swell_scene::{Scene, effects::generation_zone::Settings};
 
@@ -39,7 +39,7 @@ impl OnDevice for Settings {
     fn upload(&self, program: &Program, scene: &Scene, (time, _): (f64, f64)) {
         let waves = self.incoming(scene.water.gravity);
         let grown = waves.grown(time);
-        let of = |line: &Line| {
+        let of = |line: &WaveComponent| {
             let k = line.number.length();
             let turns = line.number / TAU;
             let phase = ((line.phase - line.frequency * time) / TAU).rem_euclid(1.0);

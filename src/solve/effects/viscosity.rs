@@ -1,7 +1,7 @@
 //! Viscosity on the GPU: an implicit solve on FLIP's grid for a viscosity in Pa s, or XSPH on PBF's
 //! particles.
 
-use crate::flip::{buffers::FACE_VELOCITY, over_cells};
+use crate::grid::{FACE_VELOCITY, over_cells};
 use swell_domain::relaxation::Relaxation;
 use swell_gpu::{
     buffer::{Buf, Windows},

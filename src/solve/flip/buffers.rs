@@ -4,9 +4,12 @@
 //! arrays in sequence, one per component, with a value for the lower face of each cell.
 
 use crate::params::{DeviceBrick, FlipParams, Inlets, SurveyHead};
-use swell_gpu::buffer::{Buf, Windows, Workgroups};
+use swell_gpu::buffer::{Buf, Windows};
 
-pub use crate::buffers::*;
+pub use crate::{
+    buffers::*,
+    grid::{FACE_VELOCITY, GROUPS},
+};
 
 /// Parameters of a substep.
 pub const PARAMS: Buf<FlipParams> = Buf::uniform("params");
@@ -14,9 +17,6 @@ pub const PARAMS: Buf<FlipParams> = Buf::uniform("params");
 pub const AXES: Windows<[u32; 4]> = Windows::new("axis", "axes");
 /// Index of the layer that velocities are extrapolated to.
 pub const LAYERS: Windows<[u32; 4]> = Windows::new("layer", "layers");
-/// Indirect dispatch sizes: over cells with water, over cells within reach too, and over each
-/// further layer.
-pub const GROUPS: Buf<Workgroups> = Buf::new("groups");
 /// Data from which the host chooses the length of a substep.
 pub const SURVEY: Buf<SurveyHead> = Buf::new("survey");
 /// Whether each brick of the domain holds water; stored behind [`SURVEY`].
@@ -53,9 +53,6 @@ pub const PARTIAL_SUMS: [Buf<f32>; 4] = [
     Buf::new("weight_before"),
     Buf::new("weight_after"),
 ];
-/// Planes: face velocity, m/s; a closed face holds the velocity of the solid. With the density
-/// correction, [`face_displacement`] follows.
-pub const FACE_VELOCITY: Buf<f32> = Buf::new("face_velocity");
 /// Planes: displacement of water by the density correction, metres; 0 on faces that are closed or
 /// touch no water. Follows three planes of `stride` velocities.
 pub fn face_displacement(stride: usize) -> Buf<f32> {

@@ -22,7 +22,7 @@ type OfCells = (First<f32>, First<u32>);
 
 /// A frame in mapped memory.
 pub(super) struct Ended {
-    pub(super) scene: Arc<FlipScene>,
+    pub(super) scene: Arc<FlipScene<'static>>,
     pub(super) frame: u32,
     pub(super) substeps: u32,
     /// With the walls before the frame.

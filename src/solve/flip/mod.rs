@@ -54,7 +54,6 @@ use buffers::*;
 pub use capacity::capacity;
 use capacity::{bricks, capacity_of, no_water, whole_frame};
 use ended::{Ended, ReadFrame};
-pub(super) use record::over_cells;
 use record::{Commands, Recordings, groups, numbers};
 pub(super) use totals::FrameTotals;
 
@@ -62,7 +61,7 @@ pub(super) use totals::FrameTotals;
 pub struct Flip {
     program: Program,
     plan: Plan,
-    scene: Arc<FlipScene>,
+    scene: Arc<FlipScene<'static>>,
     movers: Option<Movers>,
     shores: Shores,
     recordings: Recordings,
@@ -118,7 +117,7 @@ impl Flip {
             kick: frame.kick,
             program,
             plan,
-            scene: Arc::new(scene.clone()),
+            scene: Arc::new(scene.to_owned_scene()),
             movers: Movers::of(boundary, scene),
             shores: Shores::new(boundary, scene.domain.min, scene.settings().cell_size)
                 .joined(scene.periodic),

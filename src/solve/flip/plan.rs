@@ -2,7 +2,7 @@
 
 use crate::{
     effects,
-    plan::{Counts, Plan, Table, in_order},
+    plan::{BufferTable, Counts, Plan, in_order},
     pressure,
 };
 use swell_domain::{
@@ -108,8 +108,8 @@ fn has_places(plan: &Plan, scene: &FlipScene) -> bool {
     pushes(plan, scene) && plan.has_places(scene)
 }
 
-fn buffers(plan: &Plan, scene: &FlipScene) -> Table {
-    let mut table = Table::default();
+fn buffers(plan: &Plan, scene: &FlipScene) -> BufferTable {
+    let mut table = BufferTable::default();
     particles(plan, scene, &mut table);
     bricks(plan, scene, &mut table);
     if scene.is_worked_on() {
@@ -119,7 +119,7 @@ fn buffers(plan: &Plan, scene: &FlipScene) -> Table {
     table
 }
 
-fn particles(plan: &Plan, scene: &FlipScene, table: &mut Table) {
+fn particles(plan: &Plan, scene: &FlipScene, table: &mut BufferTable) {
     let flip = scene.settings();
     let n = plan.counts.particles;
     let vectors = [POSITION, VELOCITY, SORTED_POSITION];
@@ -147,7 +147,7 @@ fn particles(plan: &Plan, scene: &FlipScene, table: &mut Table) {
 }
 
 /// Declares buffers whose size follows the number of bricks, which changes during a run.
-fn bricks(plan: &Plan, scene: &FlipScene, table: &mut Table) {
+fn bricks(plan: &Plan, scene: &FlipScene, table: &mut BufferTable) {
     let flip = scene.settings();
     let slots = plan.counts.bricks.slots;
     let wet = plan.counts.bricks.wet * CELLS as usize;

@@ -3,6 +3,7 @@
 use crate::{
     SolveError,
     effects::Addition,
+    grid::{ACTIVE, WET, over_listed},
     params::FlipParams,
     plan::{Plan, PlannedBuffer},
     trace::Run,
@@ -17,12 +18,6 @@ use swell_gpu::{
 use swell_scene::FlipScene;
 
 use super::{buffers::*, plan::pushes};
-
-/// Index in [`GROUPS`] of dispatches over cells with water.
-const WET: usize = 0;
-
-/// Index in [`GROUPS`] of dispatches over cells with water or within reach.
-const ACTIVE: usize = 1;
 
 /// Index in [`GROUPS`] of the dispatch over the first extrapolated layer; further layers follow.
 pub(super) const FIRST_LAYER: usize = 2;
@@ -164,24 +159,11 @@ pub(super) fn numbers(first: u32, count: usize) -> Vec<[u32; 4]> {
 }
 
 fn over(pass: &'static str, size: usize) -> Command {
-    bound(pass, size, Vec::new())
-}
-
-/// Returns a dispatch over cells with water or within reach.
-pub(crate) fn over_cells(pass: &'static str, binds: Vec<Bind>) -> Command {
-    bound(pass, ACTIVE, binds)
-}
-
-fn bound(pass: &'static str, size: usize, binds: Vec<Bind>) -> Command {
-    Command::Dispatch {
-        pass,
-        binds,
-        groups: Groups::at(&GROUPS, size),
-    }
+    over_listed(pass, size, Vec::new())
 }
 
 fn along(pass: &'static str, size: usize, axis: usize) -> Command {
-    bound(pass, size, vec![AXES.bind(axis)])
+    over_listed(pass, size, vec![AXES.bind(axis)])
 }
 
 /// Returns whether the wall-friction model slows water along no-slip walls; not if an effect
@@ -253,7 +235,7 @@ fn to_particles(plan: &Plan, scene: &FlipScene) -> Vec<Command> {
     let mut commands = vec![over("flip/find_change", ACTIVE)];
     for k in 0..layers(flip.cfl).saturating_sub(1) {
         let binds = vec![LAYERS.bind(k)];
-        commands.push(bound("flip/extrapolate", FIRST_LAYER + k, binds));
+        commands.push(over_listed("flip/extrapolate", FIRST_LAYER + k, binds));
     }
     commands.push(over("flip/grid_to_particle", WET));
     if pushes(plan, scene) {

@@ -5,6 +5,7 @@ mod iteration;
 pub(super) mod plan;
 mod projection;
 pub(super) mod record;
+pub(super) mod samples;
 
 use std::sync::Arc;
 
@@ -34,7 +35,7 @@ use swell_scene::{PbfScene, Stop};
 
 use super::{
     SolveError,
-    boundary::{self, Movers},
+    boundary::Movers,
     effects,
     params::{Counters, IterationControl, Params},
     plan::{Counts, Plan, device_limits},
@@ -43,7 +44,7 @@ use super::{
 };
 use buffers::*;
 use plan::{cell_count, places, shared_constants};
-use projection::Grid;
+use projection::ProjectionGrid;
 use record::Commands;
 
 /// Dummy particle: far from everything, and still finite when squared.
@@ -53,11 +54,11 @@ const NOBODY: [f32; 4] = [1e15, 1e15, 1e15, 0.0];
 pub struct Pbf {
     program: Program,
     plan: Plan,
-    scene: Arc<PbfScene>,
+    scene: Arc<PbfScene<'static>>,
     calibration: Calibration,
     substep: Recording,
     measure: Recording,
-    grid: Option<Grid>,
+    grid: Option<ProjectionGrid>,
     /// Boundary to upload again when the particle count changes or, with moving solids, in each
     /// substep. `None` if neither can happen.
     boundary: Option<Boundary>,
@@ -113,23 +114,6 @@ pub(super) fn params(
     }
 }
 
-/// Uploads entries of [`PREDICTED`] from index `first` on, split at the end of a page.
-pub(super) fn upload_places(
-    program: &Program,
-    page: Option<usize>,
-    first: usize,
-    places: &[[f32; 4]],
-) {
-    let page = page.unwrap_or(usize::MAX);
-    let (low, high) = places.split_at(page.saturating_sub(first).min(places.len()));
-    if !low.is_empty() {
-        program.upload(PREDICTED, first, low);
-    }
-    if !high.is_empty() {
-        program.upload(PREDICTED_HIGH, first.max(page) - page, high);
-    }
-}
-
 /// Uploads data that does not change between substeps; returns the recordings of a substep and of a
 /// frame's final measurement.
 fn set_up(
@@ -145,8 +129,8 @@ fn set_up(
     program.upload_windows(&PHASES, &commands.phases);
     sort::upload_lengths(program, &CELL_START, cell_count(plan));
     program.upload(ELEMENT_COUNT, 0, &[[particles as u32, 0, 0, 0]]);
-    upload_places(program, plan.page, places(plan) - 1, &[NOBODY]);
-    boundary::upload(boundary, program, scene, plan, calibration);
+    samples::upload_places(program, plan.page, places(plan) - 1, &[NOBODY]);
+    samples::upload(boundary, program, scene, plan, calibration);
     [&commands.substep, &commands.measure].map(|commands| Recording::new(program, commands))
 }
 
@@ -172,11 +156,11 @@ impl Pbf {
             boundary: (scene.has_sources() || !boundary.moving.is_empty())
                 .then(|| boundary.clone()),
             movers: Movers::of(boundary, scene),
-            grid: Grid::of(context, scene, &plan, boundary)?,
+            grid: ProjectionGrid::of(context, scene, &plan, boundary)?,
             timer: is_timed.then(|| Timer::new(context)),
             program,
             plan,
-            scene: Arc::new(scene.clone()),
+            scene: Arc::new(scene.to_owned_scene()),
             calibration,
             substep,
             measure,
@@ -281,7 +265,7 @@ impl Pbf {
         if let (Some(movers), Some(boundary)) = (&self.movers, &self.boundary) {
             let (program, scene) = (&self.program, &self.scene);
             movers.upload(program, scene, time - step, step);
-            boundary::upload_samples(
+            samples::upload_samples(
                 boundary,
                 program,
                 scene,
@@ -378,7 +362,7 @@ impl Pbf {
 
     /// Sorts particles at the frame's final positions, measures the density there, and maps the
     /// frame.
-    fn measured(&mut self, time: f64) -> Result<Measured, SolveError> {
+    fn measured(&mut self, time: f64) -> Result<MappedFrame, SolveError> {
         self.program.upload(PARAMS, 0, &[self.params(time, 0.0)]);
         self.measure.run(&self.program, self.timer.as_mut())?;
         let n = self.plan.counts.particles;
@@ -394,7 +378,7 @@ impl Pbf {
             COUNTERS.first(1),
             BOUNDARY_WORK.first(groups),
         );
-        Ok(Measured {
+        Ok(MappedFrame {
             scene: self.scene.clone(),
             frame: self.frame + 1,
             state: self.state.clone(),
@@ -410,15 +394,15 @@ type OfMeasure = (First<u32>, First<f32>, First<Counters>, First<f32>);
 type ReadState = dyn FnOnce() -> Result<(Particles, Vec<f64>), SolveError> + Send;
 
 /// A frame in mapped memory.
-struct Measured {
-    scene: Arc<PbfScene>,
+struct MappedFrame {
+    scene: Arc<PbfScene<'static>>,
     frame: u32,
     /// With the walls before the frame.
     state: Carried,
     found: Mapped<(OfState, OfMeasure)>,
 }
 
-impl Measured {
+impl MappedFrame {
     fn counters(&self) -> Result<Counters, SolveError> {
         Ok(self.found.views()?.1.2[0])
     }
@@ -513,7 +497,7 @@ impl Solver for Pbf {
             Stop::Iterations(count) => u64::from(count) * u64::from(substeps),
             Stop::DensityError { .. } => u64::from(counters.iterations),
         };
-        let grid = self.grid.as_ref().map(Grid::done);
+        let grid = self.grid.as_ref().map(ProjectionGrid::done);
         let (scene, walls) = (self.scene.clone(), self.state.walls);
         Ok(Unread::new(walls, move || {
             let (mut state, density) = read()?;

@@ -2,7 +2,7 @@
 
 use crate::{
     effects, flip,
-    plan::{Chunk, Counts, DeviceLimits, LIST_CAPACITY, Plan, Table, in_order},
+    plan::{BufferTable, Chunk, Counts, DeviceLimits, LIST_CAPACITY, Plan, in_order},
 };
 use swell_domain::sph::Calibration;
 use swell_gpu::{
@@ -167,10 +167,10 @@ fn own(name: &'static str, scene: &PbfScene) -> PassSpec {
     }
 }
 
-fn buffers(plan: &Plan, scene: &PbfScene, phases: usize) -> Table {
+fn buffers(plan: &Plan, scene: &PbfScene, phases: usize) -> BufferTable {
     let n = plan.counts.particles;
     let cells = cell_count(plan);
-    let mut table = Table::default();
+    let mut table = BufferTable::default();
     if plan.has_lists {
         for (index, chunk) in plan.chunks.iter().enumerate() {
             let fours = chunk.count.next_multiple_of(LIST_BLOCK) * LIST_FOURS;

@@ -19,12 +19,12 @@ use swell_gpu::{adapter::Context, program::Program};
 use swell_scene::PbfScene;
 
 /// A FLIP solver that projects velocities but does not move particles.
-pub(super) struct Grid {
+pub(super) struct ProjectionGrid {
     flip: Flip,
     totals: FrameTotals,
 }
 
-impl Grid {
+impl ProjectionGrid {
     /// Builds the grid if the plan has one.
     pub(super) fn of(
         context: &Context,

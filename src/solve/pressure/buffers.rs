@@ -4,6 +4,7 @@
 //! ([`super::blocked`]). A [`Real`] has the precision of the solve,
 //! `solver.flip.pressure.precision`.
 
+use crate::trace::Traced;
 use swell_gpu::{
     buffer::{Buf, Windows, Workgroups},
     program::Program,
@@ -102,4 +103,23 @@ pub fn read_control(
         }
     };
     Ok((control, stats[0]))
+}
+
+impl Traced<'_> {
+    /// Reads the scalars of a projection in `precision`, which determines their layout.
+    ///
+    /// # Errors Returns an error if the device fails.
+    pub fn pressure_control(&self, precision: Precision) -> Result<PressureControl64, SolveError> {
+        match precision {
+            Precision::F32 | Precision::F32Refined => Ok(self.one(CONTROL)?.into()),
+            Precision::F64 => self.one(CONTROL_F64),
+        }
+    }
+
+    /// Reads the statistics of a projection.
+    ///
+    /// # Errors Returns an error if the device fails.
+    pub fn pressure_stats(&self) -> Result<PressureStats, SolveError> {
+        self.one(STATS)
+    }
 }

@@ -1,6 +1,6 @@
 //! Buffers, passes and dispatch sizes of the projection.
 
-use crate::plan::{Table, in_order};
+use crate::plan::{BufferTable, in_order};
 use swell_domain::bricks::CELLS;
 use swell_gpu::{
     adapter::{Context, GpuError},
@@ -146,7 +146,7 @@ fn has_diagonal(settings: &Pressure) -> bool {
 
 /// Returns the buffers that the projection adds to its inputs (see the module documentation);
 /// `capacity` is in slots.
-pub fn planned(settings: &Pressure, capacity: usize) -> Table {
+pub fn planned(settings: &Pressure, capacity: usize) -> BufferTable {
     let cells = capacity * CELLS as usize;
     let precision = settings.precision;
     let reals = |buffer: Buf<Real>, count: usize| match precision {
@@ -154,7 +154,7 @@ pub fn planned(settings: &Pressure, capacity: usize) -> Table {
         Precision::F64 => buffer.retyped::<f64>().sized(count),
     };
     let owner = "pressure";
-    let mut table = Table::default();
+    let mut table = BufferTable::default();
     table.watch(owner, PRESSURE.sized(cells));
     table.extend(
         owner,

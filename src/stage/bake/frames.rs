@@ -7,8 +7,8 @@ use serde_json::{Value, json};
 use swell_cache::{CacheWriter, Clock, Summary, failed};
 use swell_scene::{Held, Scene};
 
-use super::{BakeError, BakePlan, BakeRequest, Event, water};
-use crate::{drive::Step, probes};
+use super::{BakeError, BakeEvent, BakePlan, BakeRequest, water};
+use crate::{drive::ComputedFrame, probes};
 
 /// Writes the frames of a running bake, and counts what it warns of at its end.
 pub(super) struct Frames<'a> {
@@ -54,7 +54,11 @@ impl<'a> Frames<'a> {
     }
 
     /// Evaluates the probes of a frame, submits it to the writer and reports it.
-    pub(super) fn add(&mut self, step: Step, tell: &mut dyn FnMut(Event)) -> Result<(), BakeError> {
+    pub(super) fn add(
+        &mut self,
+        step: ComputedFrame,
+        tell: &mut dyn FnMut(BakeEvent),
+    ) -> Result<(), BakeError> {
         let scene = self.scene;
         self.looked.add(scene, step.frame, &step.looks);
         let time = scene.shot.time(step.frame);
@@ -63,7 +67,7 @@ impl<'a> Frames<'a> {
         let now = Instant::now();
         let seconds = (now - self.before).as_secs_f64();
         self.before = now;
-        let Step {
+        let ComputedFrame {
             frame,
             particles,
             next_id,
@@ -90,7 +94,7 @@ impl<'a> Frames<'a> {
             // Left by an earlier bake that failed at this frame.
             failed::remove(self.directory)?;
         }
-        tell(Event::Frame {
+        tell(BakeEvent::Frame {
             frame,
             report,
             seconds,

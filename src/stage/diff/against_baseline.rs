@@ -15,7 +15,7 @@ use super::{
 use swell_cache::{CacheError, CacheReader};
 use swell_compare::{
     baseline::{
-        Baseline, BaselineDiff, BaselineFrame, FORMAT_VERSION, Lost, Measured, particles_hash,
+        Baseline, BaselineDiff, BaselineFrame, FORMAT_VERSION, Lost, MeasuredFrame, particles_hash,
     },
     limits::default_tolerances,
 };
@@ -27,7 +27,7 @@ use swell_domain::{
 /// Result of writing a baseline.
 #[derive(Clone, Debug, Serialize)]
 #[non_exhaustive]
-pub struct Written {
+pub struct WrittenBaseline {
     /// The adapter whose hashes were stored.
     pub adapter: String,
     /// Number of frames, including the start.
@@ -111,7 +111,7 @@ pub fn write_baseline(
     file: &Path,
     frames: Option<&FrameRange>,
     spread: &[PathBuf],
-) -> Result<Written, DiffError> {
+) -> Result<WrittenBaseline, DiffError> {
     let cache = CacheReader::open(cache)?;
     let before = match file.try_exists() {
         Ok(false) => None,
@@ -151,7 +151,7 @@ pub fn write_baseline(
     baseline.hashes.insert(adapter.clone(), hashes);
     write(file, &baseline)?;
     let others = baseline.hashes.into_keys();
-    Ok(Written {
+    Ok(WrittenBaseline {
         kept: others.filter(|other| *other != adapter).collect(),
         adapter,
         frames: frames.len(),
@@ -208,13 +208,13 @@ fn write(file: &Path, baseline: &Baseline) -> Result<(), DiffError> {
     Ok(output::write_named(file, text)?)
 }
 
-fn measure(cache: &CacheReader, frames: &[u32]) -> Result<Vec<Measured>, DiffError> {
+fn measure(cache: &CacheReader, frames: &[u32]) -> Result<Vec<MeasuredFrame>, DiffError> {
     cache.check_beside(frames)?;
     let scene = scene_of(cache)?;
     let gauge = of_caches(&scene, &[cache])?;
     let one = |&frame: &u32| {
         let particles = cache.read(frame)?;
-        Ok(Measured {
+        Ok(MeasuredFrame {
             hash: particles_hash(&particles),
             frame: BaselineFrame {
                 frame,

@@ -16,16 +16,16 @@ use swell_compare::{
 };
 use swell_domain::{
     particles::Particles,
-    tolerance::{Limit, Tolerance},
+    tolerance::{ErrorLimit, Tolerance},
 };
 
 /// Limits of aggregates for caches of different devices, those of a baseline on an adapter that it
 /// does not know; `None` for caches of the same device.
-fn device_limits([a, b]: [&CacheReader; 2]) -> Option<BTreeMap<String, Limit>> {
+fn device_limits([a, b]: [&CacheReader; 2]) -> Option<BTreeMap<String, ErrorLimit>> {
     let (a, b) = (a.manifest(), b.manifest());
     let limits = default_tolerances(b.particle_spacing).into_iter();
     let limit = |(name, stated): (String, StatedLimit)| {
-        let limit = Limit {
+        let limit = ErrorLimit {
             absolute: stated.absolute,
             relative: stated.relative,
         };

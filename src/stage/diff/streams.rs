@@ -5,18 +5,18 @@ use glam::DVec3;
 use serde_json::{Value as Json, json};
 
 use swell_cache::{
-    CacheError, CacheReader, Entry, GridRecord, Look, ProbeRecord,
+    CacheError, CacheReader, GridRecord, LedgerEntry, Look, ProbeRecord,
     stream::{Content, PARTICLES, STREAMS, Stream},
     vdb,
 };
-use swell_compare::streams::{self, Difference, Row, StreamDiff};
+use swell_compare::streams::{self, Difference, ProbeRow, StreamDiff};
 use swell_domain::{particles::Particles, probe::Rate};
 
 /// A frame in one of the two caches, with its particles as read.
 #[derive(Clone, Copy)]
 pub(super) struct Side<'a> {
     pub(super) cache: &'a CacheReader,
-    pub(super) entry: &'a Entry,
+    pub(super) entry: &'a LedgerEntry,
     /// `None` if one of the two caches has not kept them.
     pub(super) particles: Option<&'a Particles>,
 }
@@ -165,11 +165,11 @@ fn looks_apart(tables: [&ProbeRecord; 2], looks: &[Vec<Look<'_>>; 2]) -> Vec<Dif
     let is_many = tables.iter().any(|table| table.rate_hz != Rate::Frame);
     let of_look = |(k, (x, y)): (usize, (&Look<'_>, &Look<'_>))| {
         let mut found = streams::rows(
-            Row {
+            ProbeRow {
                 columns: &tables[0].columns,
                 values: x.values,
             },
-            Row {
+            ProbeRow {
                 columns: &tables[1].columns,
                 values: y.values,
             },

@@ -4,7 +4,7 @@ use std::cell::OnceCell;
 
 use glam::DVec3;
 
-use super::Job;
+use super::ExportJob;
 use swell_cache::CacheError;
 use swell_domain::{
     particles::Particles,
@@ -13,14 +13,14 @@ use swell_domain::{
 
 /// A frame's content; each part is read or computed on first use.
 pub(super) struct Content<'a> {
-    job: &'a Job<'a>,
+    job: &'a ExportJob<'a>,
     pub(super) frame: u32,
     particles: OnceCell<Particles>,
     mesh: OnceCell<WaterMesh>,
 }
 
 impl<'a> Content<'a> {
-    pub(super) fn new(job: &'a Job<'a>, frame: u32) -> Self {
+    pub(super) fn new(job: &'a ExportJob<'a>, frame: u32) -> Self {
         Self {
             job,
             frame,

@@ -2,12 +2,12 @@
 
 use std::{collections::BTreeMap, path::Path};
 
-use super::{Content, ExportError, ExportRequest, Job, Target, is_binary, share};
+use super::{Content, ExportError, ExportJob, ExportRequest, Target, is_binary, share};
 
 /// Prediction of an export.
 #[derive(Clone, Debug, Default)]
 #[non_exhaustive]
-pub struct Expected {
+pub struct ExpectedExport {
     /// Frames of this process's share.
     pub frames: Vec<u32>,
     /// Those of them whose files all exist.
@@ -24,14 +24,14 @@ pub struct Expected {
 ///
 /// # Errors
 /// Those of [`export`](super::export).
-pub fn expected(request: &ExportRequest) -> Result<Expected, ExportError> {
-    let job = Job::new(request)?;
+pub fn expected(request: &ExportRequest) -> Result<ExpectedExport, ExportError> {
+    let job = ExportJob::new(request)?;
     let frames = share(&job.frames, request.chunk).to_vec();
     let shots = job.shots()?;
     job.check_all(&frames, &shots)?;
-    let mut found = Expected {
+    let mut found = ExpectedExport {
         bytes: Some(0),
-        ..Expected::default()
+        ..ExpectedExport::default()
     };
     for (wanted, bytes) in shots {
         if request.overwrite || !wanted.is_complete() {
@@ -68,7 +68,7 @@ pub fn expected(request: &ExportRequest) -> Result<Expected, ExportError> {
 
 /// Bytes of a file, found by computing its content; `None` for binary USD.
 fn size_of(
-    job: &Job<'_>,
+    job: &ExportJob<'_>,
     target: &Target,
     file: &Path,
     content: &Content<'_>,
@@ -79,7 +79,7 @@ fn size_of(
     }
 }
 
-impl Expected {
+impl ExpectedExport {
     fn add(&mut self, size: Option<u64>) {
         self.files += 1;
         self.bytes = self.bytes.zip(size).map(|(all, size)| all + size);

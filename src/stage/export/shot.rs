@@ -7,10 +7,10 @@ use std::{
 
 use glam::DVec3;
 
-use super::{Job, Target, UsdWater, Wanted, beside};
+use super::{ExportJob, Target, UsdWater, Wanted, beside};
 use swell_cache::CacheError;
 use swell_domain::particles::Particles;
-use swell_export::usd::{self, Root, Solid, View, WaveMaker};
+use swell_export::usd::{self, CameraFrame, Root, Solid, WaveMaker};
 use swell_scene::{Scene, Wall};
 
 /// Name part of the shot's manifest layer, in the place of a frame number.
@@ -72,7 +72,7 @@ fn maker(scene: &Scene, wall: Wall) -> WaveMaker {
     }
 }
 
-impl Job<'_> {
+impl ExportJob<'_> {
     /// The files of each shot that belong to no frame, its manifest and its root, with their
     /// content.
     pub(super) fn shots(&self) -> Result<Vec<(Wanted, Vec<u8>)>, CacheError> {
@@ -159,12 +159,12 @@ impl Job<'_> {
     }
 
     /// The look's camera at each frame; empty without a look.
-    fn views(&self) -> Vec<View> {
+    fn views(&self) -> Vec<CameraFrame> {
         let Some(look) = &self.request.look else {
             return Vec::new();
         };
         let per_second = self.scene.shot.frames_per_second;
-        let view = |&frame: &u32| View {
+        let view = |&frame: &u32| CameraFrame {
             frame: self.numbering.of(frame),
             eye: swell_render::eye(look, self.scene.origin, frame.into(), per_second),
             film_width_mm: look.film_mm()[0],

@@ -12,7 +12,7 @@ use super::{
 /// Prediction of a render.
 #[derive(Clone, Debug, Default)]
 #[non_exhaustive]
-pub struct Expected {
+pub struct ExpectedRender {
     /// Frames of this process's share.
     pub frames: Vec<u32>,
     /// Those of them whose pictures exist.
@@ -21,7 +21,7 @@ pub struct Expected {
     pub frame_bytes: Option<u64>,
 }
 
-impl Expected {
+impl ExpectedRender {
     /// Predicted bytes of the pictures to be made; `None` if unknown.
     pub fn bytes(&self) -> Option<u64> {
         let made = self.frames.len() - self.standing.len();
@@ -36,7 +36,7 @@ impl Expected {
 ///
 /// # Errors
 /// Those of [`render`](super::render) that need no device.
-pub fn expected(request: &RenderRequest) -> Result<Expected, RenderJobError> {
+pub fn expected(request: &RenderRequest) -> Result<ExpectedRender, RenderJobError> {
     let Asked {
         cache,
         whitewater,
@@ -49,7 +49,7 @@ pub fn expected(request: &RenderRequest) -> Result<Expected, RenderJobError> {
         &request.directory,
         &wanted(request, &cache, (&frames, numbering), &of_frame)?,
     )?;
-    let mut found = Expected::default();
+    let mut found = ExpectedRender::default();
     let mut bytes = 0;
     for &frame in &frames {
         let attributes = whole_attributes(&cache, request, whitewater.as_ref(), frame)?;

@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::{
     RenderJobError,
-    near::{Around, Near},
+    near::{Near, NearbyFrames},
     render_scene,
     surfaces::{FINER, Set, truth},
     told,
@@ -40,7 +40,7 @@ pub struct Gallery<'a> {
 struct Framed {
     number: u32,
     set: RenderScene,
-    around: Around,
+    around: NearbyFrames,
     eye: Eye,
     seen: Vec<RayHit>,
     /// Picture by finer rays; `None` if pictures are not scored.
@@ -50,7 +50,7 @@ struct Framed {
 /// Result of drawing the frames with a look.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
-pub struct Drawn {
+pub struct DrawnLook {
     /// Wall-clock seconds of each repeat for the pictures of all frames.
     pub seconds: Vec<f64>,
     /// Error of the surface over all frames; `None` if no water was visible.
@@ -109,8 +109,8 @@ impl<'a> Gallery<'a> {
     ///
     /// # Errors
     /// A device error, or a frame that cannot be drawn.
-    pub fn draw(&self, look: &Look, repeats: u32) -> Result<Drawn, RenderJobError> {
-        let mut drawn = Drawn {
+    pub fn draw(&self, look: &Look, repeats: u32) -> Result<DrawnLook, RenderJobError> {
+        let mut drawn = DrawnLook {
             seconds: vec![0.0; repeats as usize],
             surface: None,
             score: None,

@@ -5,19 +5,19 @@ use std::{collections::BTreeMap, sync::Arc};
 use super::pictures::others;
 use swell_cache::{CacheError, CacheReader};
 use swell_domain::particles::Particles;
-use swell_render::{FrameInputs, REACH, Water, frames_around};
+use swell_render::{FrameInputs, REACH, WaterParticles, frames_around};
 use swell_scene::look::Look;
 
 /// Recently read frames, so that consecutive frames are read only once.
 #[derive(Default)]
-pub(super) struct Near(BTreeMap<u32, Arc<Water>>);
+pub(super) struct Near(BTreeMap<u32, Arc<WaterParticles>>);
 
 /// A frame with those around it.
-pub(super) struct Around {
-    pub(super) water: Arc<Water>,
+pub(super) struct NearbyFrames {
+    pub(super) water: Arc<WaterParticles>,
     /// In the order of [`FrameInputs::around`]; `None` if the cache does not have the frame or the
     /// look does not use it.
-    others: [Option<Arc<Water>>; 2 * REACH as usize],
+    others: [Option<Arc<WaterParticles>>; 2 * REACH as usize],
 }
 
 impl Near {
@@ -27,7 +27,7 @@ impl Near {
         cache: &CacheReader,
         look: &Look,
         frame: u32,
-    ) -> Result<Around, CacheError> {
+    ) -> Result<NearbyFrames, CacheError> {
         let reach = frames_around(look);
         self.0.retain(|&other, _| other.abs_diff(frame) <= reach);
         let water = self.read(cache, frame)?;
@@ -37,28 +37,28 @@ impl Near {
                 found[side] = Some(self.read(cache, other)?);
             }
         }
-        Ok(Around {
+        Ok(NearbyFrames {
             water,
             others: found,
         })
     }
 
-    fn read(&mut self, cache: &CacheReader, frame: u32) -> Result<Arc<Water>, CacheError> {
+    fn read(&mut self, cache: &CacheReader, frame: u32) -> Result<Arc<WaterParticles>, CacheError> {
         if let Some(water) = self.0.get(&frame) {
             return Ok(water.clone());
         }
-        let water = Arc::new(Water::new(cache.read(frame)?));
+        let water = Arc::new(WaterParticles::new(cache.read(frame)?));
         self.0.insert(frame, water.clone());
         Ok(water)
     }
 }
 
-impl Around {
+impl NearbyFrames {
     /// The same frames without cached results for the frame's own water, as when the frame is first
     /// drawn.
     pub(super) fn anew(&self) -> Self {
         Self {
-            water: Arc::new(Water::new(self.water.particles.clone())),
+            water: Arc::new(WaterParticles::new(self.water.particles.clone())),
             others: self.others.clone(),
         }
     }

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{RenderRequest, whitewater::Whitewater};
+use super::{RenderRequest, whitewater::WhitewaterStream};
 use crate::{device::shaders_note, numbering::Numbering};
 use swell_cache::{CacheError, CacheReader, Manifest};
 use swell_render::{
@@ -15,7 +15,7 @@ use swell_scene::look::{FormatSpec, Look};
 pub(super) fn whole_attributes(
     cache: &CacheReader,
     request: &RenderRequest,
-    whitewater: Option<&Whitewater>,
+    whitewater: Option<&WhitewaterStream>,
     frame: u32,
 ) -> Result<Attributes, CacheError> {
     let mut attributes = attributes(cache, request, frame)?;

@@ -4,12 +4,12 @@ use std::path::PathBuf;
 
 use glam::DVec3;
 
-use super::{RenderJobError, Whitewater, near::Near, render_scene, told};
+use super::{RenderJobError, WhitewaterStream, near::Near, render_scene, told};
 use crate::{baked_scene, device::Gpu, prepare::Start};
-use swell_cache::{CacheReader, Entry};
+use swell_cache::{CacheReader, LedgerEntry};
 use swell_domain::{bounds::Bounds, particles::Particles};
 use swell_gpu::adapter::{Context, GpuError, Needs};
-use swell_render::{FrameInputs, Limits, Plan, RenderScene, Runs, Water};
+use swell_render::{FrameInputs, Limits, Plan, RenderScene, Runs, WaterParticles};
 use swell_scene::{Scene, look::Look};
 
 /// What the camera sees in the plan.
@@ -116,7 +116,7 @@ impl Planned {
             Subject::Scene(scene) => {
                 let start = Start::of(scene)?;
                 let set = render_scene(scene, look, 0, &start.particles)?;
-                let (water, white) = (Water::new(start.particles), Particles::default());
+                let (water, white) = (WaterParticles::new(start.particles), Particles::default());
                 let inputs = FrameInputs::alone(&water, &white);
                 Self::of_frame(look, &set, (0, &inputs), limits)
             }
@@ -126,9 +126,8 @@ impl Planned {
                 let scene = baked_scene(&cache, directory)?;
                 let around = Near::default().around(&cache, look, frame)?;
                 let white = match &look.spec().whitewater {
-                    Some(of) => {
-                        Whitewater::open(directory, &of.stream, &cache, &[frame])?.read(frame)?
-                    }
+                    Some(of) => WhitewaterStream::open(directory, &of.stream, &cache, &[frame])?
+                        .read(frame)?,
                     None => Particles::default(),
                 };
                 let set = render_scene(&scene, look, frame, &around.water.particles)?;
@@ -159,7 +158,7 @@ impl Planned {
 /// The frame with the most particles among those kept; of equal ones the fastest, whose surface is
 /// usually the largest. The last frame if none is kept.
 fn fullest(cache: &CacheReader) -> u32 {
-    let speed = |entry: &Entry| entry.report["max_speed"].as_f64().unwrap_or(0.0);
+    let speed = |entry: &LedgerEntry| entry.report["max_speed"].as_f64().unwrap_or(0.0);
     let kept = cache.entries().iter();
     let kept = kept.filter(|entry| cache.has_particles(entry.frame));
     let fullest = kept.max_by(|a, b| {

@@ -3,7 +3,7 @@
 use super::RenderJobError;
 use swell_domain::{
     bounds::Bounds,
-    mesh_file::{MeshError, MeshFormat, parts::Parts, read_bytes},
+    mesh_file::{MeshError, MeshFormat, parts::MeshParts, read_bytes},
     particles::Particles,
     pose::Pose,
 };
@@ -57,7 +57,7 @@ fn solid_parts(scene: &Scene, time: f64) -> Result<Vec<SolidParts>, MeshError> {
                 detail: "it has changed since the scene was read".to_owned(),
             });
         }
-        let mut parts = Parts::from_bytes(&bytes, MeshFormat::of(&placed.file)?, &placed.file)?;
+        let mut parts = MeshParts::from_bytes(&bytes, MeshFormat::of(&placed.file)?, &placed.file)?;
         let way = placed.placement.world_from_file();
         if way.matrix3.determinant() < 0.0 {
             parts.turn();

@@ -59,7 +59,7 @@ pub struct SurfaceRequest {
 
 /// Result for one render method.
 #[derive(Clone, Debug, serde::Serialize)]
-pub struct Row {
+pub struct SurfaceRow {
     /// `ssfr` or `ray`.
     pub method: &'static str,
     /// Error of the surface over all frames; `None` if no water was visible.
@@ -77,7 +77,7 @@ pub struct Row {
     pub residual: Option<f64>,
 }
 
-impl Row {
+impl SurfaceRow {
     /// Whether the method meets its tolerance: rays have one, splats are only measured.
     pub fn is_within(&self) -> bool {
         let of_rays = |it: &Summary| it.depth[1] <= DEPTH && it.normal[0] <= NORMAL;
@@ -87,7 +87,7 @@ impl Row {
 
 /// Progress of a running check.
 #[derive(Clone, Debug)]
-pub enum Event {
+pub enum SurfacesEvent {
     /// The device is open.
     Ready {
         /// Name of the adapter.
@@ -111,7 +111,7 @@ pub enum Event {
 #[non_exhaustive]
 pub struct SurfaceOutcome {
     /// One row per method.
-    pub rows: Vec<Row>,
+    pub rows: Vec<SurfaceRow>,
     /// Frames that were checked.
     pub frames: Vec<u32>,
     /// Fraction of the particles whose centres lie outside the surface.
@@ -136,7 +136,7 @@ pub struct SurfaceOutcome {
 pub fn check_render(
     request: &SurfaceRequest,
     stop: &AtomicBool,
-    tell: &mut dyn FnMut(Event),
+    tell: &mut dyn FnMut(SurfacesEvent),
 ) -> Result<SurfaceOutcome, RenderJobError> {
     if request.colour {
         perceptual::require()?;
@@ -157,7 +157,7 @@ pub fn check_render(
         }
     }
     let context = request.gpu.open(Needs::default())?;
-    tell(Event::Ready {
+    tell(SurfacesEvent::Ready {
         device: context.info.name.clone(),
         software_warning: context.software_warning(),
         frames: frames.len(),
@@ -204,7 +204,7 @@ pub fn check_render(
         };
         pictures.take(&set, frame, &eye)?;
         outcome.frames.push(frame);
-        tell(Event::Frame {
+        tell(SurfacesEvent::Frame {
             frame,
             seconds: whole.elapsed().as_secs_f64(),
         });
@@ -219,7 +219,7 @@ pub fn check_render(
     outcome.truth_residual = mean(&pictures.residuals);
     let found = surfaces.into_iter().zip(&pictures.methods);
     for ((method, _), ((surface, seconds), pictures)) in METHODS.into_iter().zip(found) {
-        outcome.rows.push(Row {
+        outcome.rows.push(SurfaceRow {
             method,
             surface: surface.summary(),
             seconds: seconds / count,

@@ -39,11 +39,11 @@ pub enum StreamError {
 }
 
 /// A whitewater stream beside the water.
-pub(super) struct Whitewater {
+pub(super) struct WhitewaterStream {
     stream: CacheReader,
 }
 
-impl Whitewater {
+impl WhitewaterStream {
     /// Opens the stream and checks that it has all requested frames, each made from the water that
     /// is now in `water`.
     pub(super) fn open(

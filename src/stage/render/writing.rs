@@ -7,7 +7,7 @@ use std::{
 };
 
 use super::{
-    Event, FolderError, RenderJobError, RenderOutcome, RenderRequest, folder::Folder,
+    FolderError, RenderEvent, RenderJobError, RenderOutcome, RenderRequest, folder::Folder,
     pictures::write,
 };
 use swell_domain::output::Lock;
@@ -15,7 +15,7 @@ use swell_render::{Attributes, Image};
 use swell_scene::look::FormatSpec;
 
 /// A frame that is drawn but not yet written.
-pub(super) struct Drawn {
+pub(super) struct DrawnFrame {
     pub(super) frame: u32,
     /// When work on it began.
     pub(super) begin: Instant,
@@ -35,7 +35,7 @@ pub(super) struct Writing {
 }
 
 impl Writing {
-    pub(super) fn begin(drawn: Drawn, folder: &Arc<Folder>, request: &RenderRequest) -> Self {
+    pub(super) fn begin(drawn: DrawnFrame, folder: &Arc<Folder>, request: &RenderRequest) -> Self {
         let (folder, look) = (folder.clone(), request.look.clone());
         let frame = drawn.frame;
         let thread = spawn(move || {
@@ -78,12 +78,12 @@ impl Writing {
 pub(super) fn end_writing(
     writing: &mut Option<Writing>,
     outcome: &mut RenderOutcome,
-    tell: &mut dyn FnMut(Event),
+    tell: &mut dyn FnMut(RenderEvent),
 ) -> Result<(), RenderJobError> {
     if let Some(writing) = writing.take() {
         let (frame, seconds, bytes) = writing.end()?;
         outcome.rendered += 1;
-        tell(Event::Frame {
+        tell(RenderEvent::Frame {
             frame,
             seconds,
             skipped: false,

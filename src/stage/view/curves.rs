@@ -8,7 +8,7 @@ use super::{
     strip::{Label, Strip},
 };
 use crate::probes;
-use swell_cache::{CacheReader, Entry};
+use swell_cache::{CacheReader, LedgerEntry};
 use swell_domain::solver::StepReport;
 use swell_study::chart::{Chart, Series};
 
@@ -98,11 +98,11 @@ fn of_two(name: &str, mut chart: Chart) -> Chart {
 }
 
 /// Name of a curve, and the quantity of the solver's report that it shows.
-type Line = (&'static str, fn(&StepReport) -> f64);
+type ReportCurve = (&'static str, fn(&StepReport) -> f64);
 
 /// Charts of the ledger's reports, independent of probes.
-fn of_ledger(shot: &str, entries: &[Entry]) -> Vec<Chart> {
-    const CHARTS: [(&str, &str, &[Line]); 3] = [
+fn of_ledger(shot: &str, entries: &[LedgerEntry]) -> Vec<Chart> {
+    const CHARTS: [(&str, &str, &[ReportCurve]); 3] = [
         (
             "energy",
             "J",
@@ -121,7 +121,7 @@ fn of_ledger(shot: &str, entries: &[Entry]) -> Vec<Chart> {
             ],
         ),
     ];
-    let read = |entry: &Entry| -> (f64, Option<StepReport>) {
+    let read = |entry: &LedgerEntry| -> (f64, Option<StepReport>) {
         (
             entry.clock.time,
             serde_json::from_value(entry.report.clone()).ok(),
@@ -131,13 +131,13 @@ fn of_ledger(shot: &str, entries: &[Entry]) -> Vec<Chart> {
     if reports.iter().all(|(_, report)| report.is_none()) {
         return Vec::new();
     }
-    let series = |(name, of): &Line| {
+    let series = |(name, of): &ReportCurve| {
         let points = reports
             .iter()
             .map(|(time, report)| (*time, report.as_ref().map(of)));
         Series::curve(name, points)
     };
-    let chart = |(title, unit, lines): &(&str, &str, &[Line])| Chart {
+    let chart = |(title, unit, lines): &(&str, &str, &[ReportCurve])| Chart {
         title: format!("{shot}: {title}"),
         x_label: "time, s".to_owned(),
         y_label: (*unit).to_owned(),

@@ -13,7 +13,7 @@ use swell_study::rgb::Rgb;
 
 /// Format of a movie.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(super) enum MovieFormat {
     /// Lossless, large, played by every browser.
     Apng,
     /// H.264.
@@ -22,7 +22,7 @@ pub(super) enum Kind {
     Webm,
 }
 
-impl Kind {
+impl MovieFormat {
     /// Determined by the file's extension.
     pub(super) fn of(movie: &Path) -> Result<Self, ViewError> {
         let ending = movie.extension().unwrap_or_default().to_string_lossy();
@@ -105,11 +105,11 @@ impl Movie {
         frames_per_second: f64,
         ffmpeg: &str,
     ) -> Result<Self, ViewError> {
-        let kind = Kind::of(file)?;
+        let kind = MovieFormat::of(file)?;
         let draft = Draft::beside(file);
         let part = draft.path();
         let writer = match kind {
-            Kind::Apng => {
+            MovieFormat::Apng => {
                 let out = File::create(part).at(part)?;
                 let begun = Apng::begin(BufWriter::new(out), size, count, frames_per_second);
                 Writer::Apng(begun.map_err(encode(file))?)
@@ -187,7 +187,7 @@ fn encode(file: &Path) -> impl FnOnce(png::EncodingError) -> ViewError {
 }
 
 fn encoder(
-    kind: Kind,
+    kind: MovieFormat,
     file: &Path,
     part: &Path,
     [width, height]: [usize; 2],

@@ -6,9 +6,9 @@ use glam::{DVec3, Vec3};
 
 use super::{
     ViewError,
-    points::{Around, Aspect, Projection},
+    points::{Aspect, Projection, Scenery},
     reader,
-    strip::{Label, Source, Strip},
+    strip::{Label, PictureSource, Strip},
 };
 use crate::baked_scene;
 use swell_cache::CacheReader;
@@ -59,7 +59,7 @@ pub(super) fn open(
         labels: kept.into_iter().map(Label::Frame).collect(),
         size: projection.size(),
         frames_per_second: Some(rate),
-        source: Source::Cache(Box::new(Balls {
+        source: PictureSource::Cache(Box::new(Balls {
             cache,
             scene,
             projection,
@@ -102,7 +102,7 @@ impl Balls {
         });
         let still = scene.solids.iter().map(|solid| solid.mesh.clone());
         let solids: Vec<_> = still.chain(moving).collect();
-        let around = Around {
+        let around = Scenery {
             domain: scene.domain,
             walls: self.walls(&water, time),
             solids: &solids,

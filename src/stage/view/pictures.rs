@@ -12,7 +12,7 @@ use glam::{DMat3, DVec3};
 
 use super::{
     ViewError,
-    strip::{Label, Source, Strip, name_of},
+    strip::{Label, PictureSource, Strip, name_of},
 };
 use swell_domain::output::{self, AtPath as _};
 use swell_render::{
@@ -84,7 +84,7 @@ pub(super) fn open(folder: &Path, view: Option<&ViewSpec>) -> Result<Option<Stri
         labels: files.keys().cloned().collect(),
         size: head.size,
         frames_per_second: rate,
-        source: Source::Files(files, Box::new(view.cloned().unwrap_or_default())),
+        source: PictureSource::Files(files, Box::new(view.cloned().unwrap_or_default())),
     }))
 }
 

@@ -38,7 +38,7 @@ pub(super) struct Projection {
 
 /// What is drawn besides the particles; metres, relative to the particles' origin.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Around<'a> {
+pub(super) struct Scenery<'a> {
     /// Drawn as its edges.
     pub(super) domain: Bounds,
     /// The box that the walls currently leave to the water, drawn as its edges if it differs from
@@ -133,7 +133,7 @@ impl Projection {
         water: &Particles,
         spacing: f64,
         top: f64,
-        around: &Around<'_>,
+        around: &Scenery<'_>,
     ) -> Rgb {
         let size = self.size.map(|side| side * FINER);
         let mut canvas = Canvas {
@@ -290,8 +290,8 @@ mod tests {
         max: DVec3::new(4.0, 2.0, 1.0),
     };
 
-    fn around(solids: &[TriangleMesh]) -> Around<'_> {
-        Around {
+    fn around(solids: &[TriangleMesh]) -> Scenery<'_> {
+        Scenery {
             domain: TANK,
             walls: TANK,
             solids,

@@ -9,11 +9,11 @@ use std::{
 use rayon::prelude::*;
 
 use super::{
-    Event, MOST, PAGE_WIDTH, Placing, RATE, ViewError, ViewOutcome, ViewRequest, check_place,
+    MOST, PAGE_WIDTH, Placing, RATE, ViewError, ViewEvent, ViewOutcome, ViewRequest, check_place,
     curves::Curves,
     movie::{self, Movie},
     player::{Player, Set},
-    sheet::{Cell, sheet},
+    sheet::{SheetPicture, sheet},
     store::Store,
     strip::{Label, Strip},
 };
@@ -35,7 +35,7 @@ pub(super) struct Reel<'a> {
 /// One frame, read and reduced to the forms that are needed.
 struct Framed {
     joined: Option<Rgb>,
-    cell: Option<Cell>,
+    cell: Option<SheetPicture>,
     /// One PNG per strip.
     page: Vec<Vec<u8>>,
 }
@@ -54,7 +54,7 @@ impl<'a> Reel<'a> {
         strips: Vec<Strip>,
         labels: Vec<Label>,
         curves: Curves,
-        tell: &mut dyn FnMut(Event),
+        tell: &mut dyn FnMut(ViewEvent),
     ) -> Result<Self, ViewError> {
         let names = names(&strips);
         let default = || Path::new("views").join(names.join("-vs-").replace(['/', '\\', ' '], "-"));
@@ -66,13 +66,13 @@ impl<'a> Reel<'a> {
             check_place(file)?;
         }
         if let Some(movie) = &request.movie {
-            movie::Kind::of(movie)?;
+            movie::MovieFormat::of(movie)?;
         }
         let mut notes: Vec<String> = strips.iter().map(Strip::said).collect();
         notes.retain(|note| !note.is_empty());
         notes.dedup();
         for note in &notes {
-            tell(Event::Note(note.clone()));
+            tell(ViewEvent::Note(note.clone()));
         }
         let known = strips.iter().find_map(|strip| strip.frames_per_second);
         let known = request
@@ -80,11 +80,11 @@ impl<'a> Reel<'a> {
             .or(curves.frames_per_second)
             .or(known);
         if known.is_none() && labels.len() > 1 && (request.player || request.movie.is_some()) {
-            tell(Event::AssumedRate);
+            tell(ViewEvent::AssumedRate);
         }
         for strip in &strips {
             if let Some(warning) = curves.stranger(strip, &labels) {
-                tell(Event::Warning(warning));
+                tell(ViewEvent::Warning(warning));
             }
         }
         Ok(Self {
@@ -118,10 +118,10 @@ impl<'a> Reel<'a> {
     pub(super) fn run(
         self,
         stop: &AtomicBool,
-        tell: &mut dyn FnMut(Event),
+        tell: &mut dyn FnMut(ViewEvent),
     ) -> Result<ViewOutcome, ViewError> {
         let request = self.request;
-        tell(Event::Ready {
+        tell(ViewEvent::Ready {
             frames: self.labels.len(),
             size: self.strips[0].size,
         });
@@ -161,7 +161,7 @@ impl<'a> Reel<'a> {
                         store.push(self.file_name(strip, *k), png)?;
                     }
                 }
-                tell(Event::Frame(self.labels[*k].words()));
+                tell(ViewEvent::Frame(self.labels[*k].words()));
             }
         }
         let mut outcome = ViewOutcome::default();
@@ -222,7 +222,7 @@ impl<'a> Reel<'a> {
             .time(label)
             .map_or_else(String::new, |time| format!(", {time:.2} s"));
         Ok(Framed {
-            cell: is_on_sheet.then(|| Cell {
+            cell: is_on_sheet.then(|| SheetPicture {
                 label: label.words() + &time,
                 picture: joined(THUMB),
             }),
@@ -234,7 +234,7 @@ impl<'a> Reel<'a> {
         })
     }
 
-    fn write_sheet(&self, file: &Path, cells: &[Cell]) -> Result<u64, ViewError> {
+    fn write_sheet(&self, file: &Path, cells: &[SheetPicture]) -> Result<u64, ViewError> {
         let columns = COLUMNS / self.strips.len();
         let shown = match (cells.len(), self.labels.len()) {
             (some, all) if some < all => format!("{some} of {all} frames. "),
@@ -256,7 +256,7 @@ impl<'a> Reel<'a> {
     fn write_page(
         &self,
         store: Store,
-        tell: &mut dyn FnMut(Event),
+        tell: &mut dyn FnMut(ViewEvent),
     ) -> Result<(PathBuf, u64), ViewError> {
         let addresses = store.addresses();
         let count = self.strips.len();
@@ -293,7 +293,7 @@ impl<'a> Reel<'a> {
         };
         let (bytes, is_beside) = store.summary();
         if is_beside && self.request.placing == Placing::Auto {
-            tell(Event::PicturesBeside(bytes));
+            tell(ViewEvent::PicturesBeside(bytes));
         }
         store.finish(&player.to_html())
     }

@@ -10,7 +10,7 @@ use swell_study::{
 
 /// A picture of a sheet.
 #[derive(Clone, Debug)]
-pub(super) struct Cell {
+pub(super) struct SheetPicture {
     /// Text below the picture.
     pub(super) label: String,
     /// The picture, already in its final size.
@@ -35,7 +35,7 @@ const LETTER: f64 = 6.6;
 pub(super) fn sheet(
     title: &str,
     note: &str,
-    cells: &[Cell],
+    cells: &[SheetPicture],
     columns: usize,
 ) -> Result<Rgb, RasterError> {
     let columns = columns.clamp(1, cells.len().max(1));
@@ -93,8 +93,8 @@ fn shortened(text: &str, width: usize, scale: f64) -> String {
 mod tests {
     use super::*;
 
-    fn cell(label: &str, size: [usize; 2], colour: [u8; 3]) -> Cell {
-        Cell {
+    fn cell(label: &str, size: [usize; 2], colour: [u8; 3]) -> SheetPicture {
+        SheetPicture {
             label: label.to_owned(),
             picture: Rgb::filled(size, colour),
         }
@@ -102,7 +102,7 @@ mod tests {
 
     #[test]
     fn pictures_stand_in_rows_with_their_labels_below() {
-        let cells: Vec<Cell> = (0..7u8)
+        let cells: Vec<SheetPicture> = (0..7u8)
             .map(|k| cell(&format!("frame {k}"), [100, 50], [200, k, 9]))
             .collect();
         let all = sheet("a title", "a note", &cells, 4).unwrap();

@@ -53,11 +53,11 @@ pub(super) struct Strip {
     pub(super) size: [usize; 2],
     /// Frame rate, if the pictures or the cache specify it.
     pub(super) frames_per_second: Option<f64>,
-    pub(super) source: Source,
+    pub(super) source: PictureSource,
 }
 
 /// Source of the pictures.
-pub(super) enum Source {
+pub(super) enum PictureSource {
     /// Files, and the view transform for EXR light.
     Files(BTreeMap<Label, PathBuf>, Box<ViewSpec>),
     /// Particles of a cache.
@@ -68,8 +68,8 @@ impl Strip {
     /// Description of the whole strip; may be empty.
     pub(super) fn said(&self) -> String {
         match &self.source {
-            Source::Files(..) => self.note.clone(),
-            Source::Cache(balls) => balls.note(),
+            PictureSource::Files(..) => self.note.clone(),
+            PictureSource::Cache(balls) => balls.note(),
         }
     }
 
@@ -80,7 +80,7 @@ impl Strip {
     /// Reads or draws the picture with one of its labels.
     pub(super) fn picture(&self, label: &Label) -> Result<Rgb, ViewError> {
         match &self.source {
-            Source::Files(files, view) => {
+            PictureSource::Files(files, view) => {
                 let file = files.get(label).ok_or_else(|| self.lacks(label))?;
                 let picture = pictures::read(file, view)?;
                 if picture.size == self.size {
@@ -91,7 +91,7 @@ impl Strip {
                     file.display()
                 )))
             }
-            Source::Cache(balls) => match label {
+            PictureSource::Cache(balls) => match label {
                 Label::Frame(frame) => balls.draw(*frame),
                 Label::Name(_) => Err(self.lacks(label)),
             },
@@ -101,14 +101,14 @@ impl Strip {
     /// Recorded origin of the picture with this label.
     pub(super) fn attributes(&self, label: &Label) -> Option<Attributes> {
         match &self.source {
-            Source::Files(files, _) => pictures::attributes(files.get(label)?),
-            Source::Cache(_) => None,
+            PictureSource::Files(files, _) => pictures::attributes(files.get(label)?),
+            PictureSource::Cache(_) => None,
         }
     }
 
     pub(super) fn lacks(&self, label: &Label) -> ViewError {
         let path = self.path.display();
-        if let (Source::Cache(balls), Label::Frame(frame)) = (&self.source, label) {
+        if let (PictureSource::Cache(balls), Label::Frame(frame)) = (&self.source, label) {
             return balls.lacks(*frame);
         }
         ViewError::Asked(match label {

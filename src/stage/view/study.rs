@@ -8,9 +8,9 @@ use std::{
 use rayon::prelude::*;
 
 use super::{
-    Event, ViewError, ViewOutcome, ViewRequest, check_place, pictures,
+    ViewError, ViewEvent, ViewOutcome, ViewRequest, check_place, pictures,
     reel::{COLUMNS, SOFTWARE, THUMB, check_sheet},
-    sheet::{Cell, sheet},
+    sheet::{SheetPicture, sheet},
     strip::name_of,
 };
 use swell_domain::output::{self, AtPath as _};
@@ -60,7 +60,7 @@ fn unfinished(folder: &Path) -> Result<ViewError, ViewError> {
 pub(super) fn view(
     request: &ViewRequest,
     folder: &Path,
-    tell: &mut dyn FnMut(Event),
+    tell: &mut dyn FnMut(ViewEvent),
 ) -> Result<ViewOutcome, ViewError> {
     let page = folder.join(PAGE);
     if !page.is_file() {
@@ -99,7 +99,7 @@ fn sheet_of(
     folder: &Path,
     directory: &Path,
     most: usize,
-    tell: &mut dyn FnMut(Event),
+    tell: &mut dyn FnMut(ViewEvent),
 ) -> Result<Option<u64>, ViewError> {
     let mut files = Vec::new();
     for name in FOLDERS {
@@ -108,7 +108,7 @@ fn sheet_of(
     let all = files.len();
     files.truncate(most);
     if files.is_empty() {
-        tell(Event::Note(format!(
+        tell(ViewEvent::Note(format!(
             "{} has no pictures for a sheet",
             folder.display()
         )));
@@ -117,15 +117,15 @@ fn sheet_of(
     let file = directory.join("sheet.png");
     check_place(directory)?;
     check_sheet(&file)?;
-    let cell = |path: &PathBuf| -> Result<Cell, ViewError> {
+    let cell = |path: &PathBuf| -> Result<SheetPicture, ViewError> {
         let picture = pictures::read(path, &ViewSpec::default())?;
         let name = path.strip_prefix(folder).unwrap_or(path).with_extension("");
-        Ok(Cell {
+        Ok(SheetPicture {
             label: name.display().to_string(),
             picture: picture.resized(Rgb::within(picture.size, THUMB)),
         })
     };
-    let cells: Vec<Cell> = files.par_iter().map(cell).collect::<Result<_, _>>()?;
+    let cells: Vec<SheetPicture> = files.par_iter().map(cell).collect::<Result<_, _>>()?;
     let note = match cells.len() {
         some if some < all => format!("{some} of {all} pictures of the study."),
         all => format!("{all} pictures of the study."),

@@ -4,20 +4,20 @@ use std::path::{Path, PathBuf};
 
 use crate::{baked_scene, device::SolverError, prepare::Start};
 use swell_cache::CacheReader;
-use swell_check::Table;
-use swell_domain::{boundary::Boundary, whitewater::Settings};
+use swell_check::CheckTable;
+use swell_domain::{boundary::Boundary, whitewater::CalibratedSettings};
 use swell_gpu::adapter::Context;
 use swell_scene::PbfScene;
 
-use super::{WhitewaterError, is_of, recorded, water::Water};
+use super::{WhitewaterError, is_of, recorded, water::WaterReader};
 
 /// A stream, and everything that its frames are made from.
 pub struct Stream {
     stream: CacheReader,
     cache: CacheReader,
-    scene: PbfScene,
+    scene: PbfScene<'static>,
     boundary: Boundary,
-    settings: Settings,
+    settings: CalibratedSettings,
     particles: usize,
 }
 
@@ -57,7 +57,7 @@ impl Stream {
             }
         }
         let scene = baked_scene(&cache, &place)?.of_whitewater();
-        let begin = Water::of(&cache, scene.period()).at(cache.first_frame())?;
+        let begin = WaterReader::of(&cache, scene.period()).at(cache.first_frame())?;
         let particles = begin.len();
         let boundary = Start::with(&scene, begin)?.boundary;
         let settings = recorded(&stream, directory, &scene)?;
@@ -80,8 +80,8 @@ impl Stream {
     ///
     /// # Errors
     /// Errors of the files or the device.
-    pub fn check(&self, context: &Context, frame: u32) -> Result<Table, WhitewaterError> {
-        let water = Water::of(&self.cache, self.scene.period()).at(frame)?;
+    pub fn check(&self, context: &Context, frame: u32) -> Result<CheckTable, WhitewaterError> {
+        let water = WaterReader::of(&self.cache, self.scene.period()).at(frame)?;
         let time = self.cache.entry(frame)?.clock.time;
         let white = self.stream.read(frame - 1)?;
         let one = swell_check::whitewater::Frame {

@@ -8,7 +8,7 @@ use swell_cache::{CacheReader, stream::PARTICLES};
 /// Prediction of a job.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
-pub struct Expected {
+pub struct ExpectedWhitewater {
     /// Directory of the stream.
     pub directory: PathBuf,
     /// First frame that would be computed.
@@ -26,10 +26,10 @@ pub struct Expected {
 ///
 /// # Errors
 /// Those of [`whitewater`](super::whitewater()) that need no device.
-pub fn expected(request: &WhitewaterRequest) -> Result<Expected, WhitewaterError> {
+pub fn expected(request: &WhitewaterRequest) -> Result<ExpectedWhitewater, WhitewaterError> {
     let (cache, last) = asked(request)?;
     let directory = super::directory(&request.cache, &request.name);
-    let mut found = Expected {
+    let mut found = ExpectedWhitewater {
         first: cache.first_frame() + 1,
         last,
         standing: 0,

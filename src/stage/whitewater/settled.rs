@@ -5,9 +5,12 @@ use std::{
     sync::atomic::{AtomicBool, Ordering},
 };
 
-use super::{Event, SETTINGS, WhitewaterError, WhitewaterRequest, engine::Engine, water::Water};
+use super::{
+    SETTINGS, WhitewaterError, WhitewaterEvent, WhitewaterRequest, engine::Engine,
+    water::WaterReader,
+};
 use swell_cache::CacheReader;
-use swell_domain::whitewater::{Settings, Thresholds};
+use swell_domain::whitewater::{CalibratedSettings, Thresholds};
 use swell_files::whitewater::WhitewaterSettings;
 use swell_scene::Scene;
 
@@ -19,7 +22,7 @@ pub(super) fn recorded(
     stream: &CacheReader,
     directory: &Path,
     scene: &Scene,
-) -> Result<Settings, WhitewaterError> {
+) -> Result<CalibratedSettings, WhitewaterError> {
     let bytes = stream.asset(SETTINGS)?;
     let text = String::from_utf8_lossy(&bytes);
     let file = directory.join("assets").join(SETTINGS);
@@ -33,9 +36,9 @@ pub(super) fn recorded(
 pub(super) fn settle(
     request: &WhitewaterRequest,
     scene: &Scene,
-    (engine, water): (&mut Engine, &mut Water<'_>),
-    (stop, tell): (&AtomicBool, &mut dyn FnMut(Event)),
-) -> Result<Option<(Settings, Option<usize>)>, WhitewaterError> {
+    (engine, water): (&mut Engine, &mut WaterReader<'_>),
+    (stop, tell): (&AtomicBool, &mut dyn FnMut(WhitewaterEvent)),
+) -> Result<Option<(CalibratedSettings, Option<usize>)>, WhitewaterError> {
     let cache = water.cache();
     let frames: Vec<u32> = match request.settings.needs_calibration() {
         true => (cache.first_frame() + 1..=cache.last_frame())
@@ -50,7 +53,7 @@ pub(super) fn settle(
     let mut all = Vec::new();
     let count = chosen.len();
     for (done, &frame) in chosen.iter().enumerate() {
-        tell(Event::Calibrated { done, count });
+        tell(WhitewaterEvent::Calibrated { done, count });
         if stop.load(Ordering::Relaxed) {
             return Ok(None);
         }
@@ -59,7 +62,7 @@ pub(super) fn settle(
         all.extend(engine.survey(&water.at(frame)?, time, seconds)?);
     }
     if count > 0 {
-        tell(Event::Calibrated { done: count, count });
+        tell(WhitewaterEvent::Calibrated { done: count, count });
     }
     let shot = Thresholds::calibrate(&all);
     let settings = request.settings.settled(scene.particle_spacing(), &shot);

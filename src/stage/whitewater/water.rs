@@ -6,14 +6,14 @@ use swell_cache::{CacheError, CacheReader};
 use swell_domain::{particles::Particles, period::Period};
 
 /// Reads frames in ascending order, and interpolates those between two kept frames.
-pub(super) struct Water<'a> {
+pub(super) struct WaterReader<'a> {
     cache: &'a CacheReader,
     period: Period,
     /// Frames read last, the older first.
     read: Vec<(u32, Particles)>,
 }
 
-impl<'a> Water<'a> {
+impl<'a> WaterReader<'a> {
     pub(super) fn of(cache: &'a CacheReader, period: Period) -> Self {
         Self {
             cache,

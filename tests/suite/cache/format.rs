@@ -6,7 +6,7 @@ use std::path::Path;
 
 use serde_json::Value;
 use swell::cache::{
-    Asset, CacheError, CacheReader, CacheWriter, Clock, Entry, Manifest, ProbeValues,
+    Asset, CacheError, CacheReader, CacheWriter, Clock, LedgerEntry, Manifest, ProbeValues,
     directory_hash,
     stream::{GRIDS, PARTICLES, PROBES, STREAMS},
 };
@@ -295,7 +295,7 @@ fn another_format_is_named_not_guessed_at() {
 }
 
 /// Formats a line as in format 1, in which a line does not list its files by stream.
-fn line_of_format_1(entry: &Entry, manifest: Option<&str>) -> Vec<u8> {
+fn line_of_format_1(entry: &LedgerEntry, manifest: Option<&str>) -> Vec<u8> {
     let particles = entry.file(PARTICLES).unwrap();
     let grids = entry.file(GRIDS).unwrap();
     let rows = serde_json::to_string(&entry.rows[PROBES]).unwrap();
@@ -323,7 +323,7 @@ fn a_cache_of_the_first_format_is_read_and_not_gone_on_with() {
     let text = fs::read_to_string(d.join("manifest.json")).unwrap();
     let old = text.replacen("\"format_version\": 2", "\"format_version\": 1", 1);
     let hash = blake3::hash(old.as_bytes()).to_hex();
-    let lines = |of: &dyn Fn(&Entry, Option<&str>) -> Vec<u8>| -> Vec<Vec<u8>> {
+    let lines = |of: &dyn Fn(&LedgerEntry, Option<&str>) -> Vec<u8>| -> Vec<Vec<u8>> {
         let entries = now.entries().iter();
         entries
             .map(|entry| of(entry, (entry.frame == 0).then_some(hash.as_str())))
@@ -340,7 +340,7 @@ fn a_cache_of_the_first_format_is_read_and_not_gone_on_with() {
     assert_eq!(report, CacheReader::verify(&now).unwrap());
     reader.check_beside(&[0, 1, 2, 3]).unwrap();
     for (old, new) in reader.entries().iter().zip(now.entries()) {
-        let unchained = |entry: &Entry| Entry {
+        let unchained = |entry: &LedgerEntry| LedgerEntry {
             chain: String::new(),
             manifest: None,
             ..entry.clone()
@@ -369,13 +369,13 @@ fn a_cache_of_the_first_format_is_read_and_not_gone_on_with() {
     assert_eq!(directory_hash(d).unwrap(), before);
 
     // A line of one format is invalid in a cache of the other.
-    let no_grids = |entry: &Entry, hash: Option<&str>| {
+    let no_grids = |entry: &LedgerEntry, hash: Option<&str>| {
         let line = String::from_utf8(line_of_format_1(entry, hash)).unwrap();
         line.replace("\"grids\":", "\"meshes\":").into_bytes()
     };
     write(&lines(&no_grids));
     assert_eq!(damaged_file(CacheReader::open(d)), d.join(LEDGER));
-    let newer = |entry: &Entry, _: Option<&str>| {
+    let newer = |entry: &LedgerEntry, _: Option<&str>| {
         let files = serde_json::to_string(&entry.files).unwrap();
         format!(
             r#"{{"frame":{},"particles":7,"files":{files}}}"#,

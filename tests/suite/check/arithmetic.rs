@@ -1,7 +1,7 @@
 //! Arithmetic of the device by itself.
 
 use swell::{
-    check::{Table, arithmetic},
+    check::{CheckTable, arithmetic},
     gpu::adapter::InjectedFault,
 };
 
@@ -10,7 +10,7 @@ use crate::support::{context, job::Job};
 
 const PASS: &str = "measure/accuracy";
 
-fn spoiled(from: &'static str, to: &'static str) -> Table {
+fn spoiled(from: &'static str, to: &'static str) -> CheckTable {
     let mut context = context();
     let pass = PASS;
     context.spoil = Some(InjectedFault { pass, from, to });

@@ -23,7 +23,7 @@ fn coincident_particles_are_within_tolerance_and_a_fault_in_their_direction_is_s
         }
         let clean = run(&context, &scene, &start);
         assert!(over(&clean).is_empty(), "{method:?}: {}", lines(&clean));
-        let row = |table: &swell::check::Table| {
+        let row = |table: &swell::check::CheckTable| {
             let mut rows = table.rows.iter();
             let row = rows.find(|row| (row.field.pass, row.field.name) == (pass, field));
             row.map(|row| (row.ties, row.worst.ratio)).unwrap()

@@ -3,7 +3,7 @@
 use swell::{
     gpu::{adapter::Context, imprecision::Imprecision},
     scene::Method,
-    stage::check::Table,
+    stage::check::CheckTable,
 };
 
 use super::{case, lines, over, run};
@@ -11,7 +11,7 @@ use crate::support::pbf_of;
 
 /// Checks moving water with a solid: PBF with its projection, FLIP with ghost fluid and density
 /// correction.
-fn checked(context: &Context, method: Method) -> Table {
+fn checked(context: &Context, method: Method) -> CheckTable {
     let (mut scene, start) = case(method);
     if method == Method::Pbf {
         pbf_of(&mut scene).grid_projection = true;

@@ -13,7 +13,7 @@ mod viscous;
 mod whitewater;
 
 use swell::{
-    check::pbf,
+    check::check_pbf,
     domain::{
         bounds::Bounds,
         motion::{Motion, Spectrum},
@@ -38,7 +38,7 @@ use swell::{
         plan::{DeviceLimits, device_limits},
     },
     stage::{
-        check::{Table, check_frame},
+        check::{CheckTable, check_frame},
         prepare::Start,
     },
 };
@@ -165,17 +165,17 @@ fn case(method: Method) -> (Scene, Start) {
     (scene, start)
 }
 
-fn run(context: &Context, scene: &Scene, start: &Start) -> Table {
+fn run(context: &Context, scene: &Scene, start: &Start) -> CheckTable {
     check_frame(context, scene, start, 0, &start.particles).unwrap()
 }
 
-fn over(table: &Table) -> Vec<(&'static str, &'static str)> {
+fn over(table: &CheckTable) -> Vec<(&'static str, &'static str)> {
     let rows = table.rows.iter().filter(|row| !row.is_within());
     rows.map(|row| (row.field.pass, row.field.name)).collect()
 }
 
-fn lines(table: &Table) -> String {
-    let line = |row: &swell::check::Row| {
+fn lines(table: &CheckTable) -> String {
+    let line = |row: &swell::check::CheckRow| {
         format!(
             "{} {}: {} values, {} ties, {} over, {:?}\n",
             row.field.pass, row.field.name, row.values, row.ties, row.over, row.worst
@@ -188,11 +188,11 @@ fn lines(table: &Table) -> String {
 const FOLLOW: [&str; 3] = ["whole solve", "whole projection", "whole correction"];
 
 /// A check, on a context whose shaders may be spoiled.
-type Checked<'a> = dyn Fn(&Context) -> Result<Table, SolveError> + 'a;
+type Checked<'a> = dyn Fn(&Context) -> Result<CheckTable, SolveError> + 'a;
 
 /// Returns the clean table, and the controls that are not detected where they should be,
 /// or elsewhere too.
-fn faults(context: &Context, checked: &Checked<'_>, controls: &[Control]) -> (Table, String) {
+fn faults(context: &Context, checked: &Checked<'_>, controls: &[Control]) -> (CheckTable, String) {
     let clean = checked(context).unwrap();
     // Faults in rows that are out of tolerance already would prove nothing.
     assert!(over(&clean).is_empty(), "{}", lines(&clean));
@@ -235,7 +235,7 @@ fn faults(context: &Context, checked: &Checked<'_>, controls: &[Control]) -> (Ta
 fn hold(context: &Context, scene: &Scene, start: &Start, controls: &[Control], elsewhere: &[&str]) {
     let checked = |context: &Context| check_frame(context, scene, start, 0, &start.particles);
     let (clean, mut faults) = faults(context, &checked, controls);
-    let covered = |row: &swell::check::Row| {
+    let covered = |row: &swell::check::CheckRow| {
         let field = row.field;
         let is_of =
             |control: &Control| control.pass == field.pass && control.fields.contains(&field.name);
@@ -265,7 +265,7 @@ fn pbf_is_within_tolerance_and_each_row_fails_where_it_should() {
     let boundaries = [&start.boundary, &moved];
     let state = (0, &start.particles);
     let first = SubstepChoice::default();
-    let checked = pbf::check(
+    let checked = check_pbf(
         &context,
         &scene.with_pbf().unwrap(),
         plan,
@@ -456,12 +456,12 @@ fn pbf_table(
     scene: &Scene,
     start: &Start,
     limits: DeviceLimits,
-) -> Result<Table, SolveError> {
+) -> Result<CheckTable, SolveError> {
     let boundaries = [&start.boundary; 2];
     let state = (0, &start.particles);
     let plan = start.plan(scene, limits);
     let first = SubstepChoice::default();
-    Ok(pbf::check(
+    Ok(check_pbf(
         context,
         &scene.with_pbf().unwrap(),
         plan,

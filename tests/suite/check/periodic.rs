@@ -6,7 +6,7 @@ use swell::{
     scene::{Effects, Method, Scene},
     solve::plan::{DeviceLimits, device_limits},
     stage::{
-        check::{Table, check_frame},
+        check::{CheckTable, check_frame},
         prepare::Start,
     },
 };
@@ -183,7 +183,7 @@ fn pbf_is_within_tolerance_across_joints_and_fails_where_it_should() {
     let mut all = String::new();
     for (limits, controls) in [(limits, PBF), (none, &searched[..])] {
         let checked =
-            |context: &_| -> Result<Table, _> { pbf_table(context, &scene, &start, limits) };
+            |context: &_| -> Result<CheckTable, _> { pbf_table(context, &scene, &start, limits) };
         all += &faults(&context, &checked, controls).1;
     }
     assert!(all.is_empty(), "{all}");

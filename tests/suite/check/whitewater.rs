@@ -3,13 +3,13 @@
 
 use glam::DVec3;
 use swell::{
-    check::Table,
+    check::CheckTable,
     check::whitewater::{Frame, check},
     domain::{
         boundary::Boundary,
         motion::Motion,
         particles::Particles,
-        whitewater::{Kind, Settings},
+        whitewater::{CalibratedSettings, WhitewaterKind},
     },
     gpu::adapter::{Context, InjectedFault},
     scene::{PbfScene, Wall, WaveMaker},
@@ -21,7 +21,7 @@ use crate::support::{
 };
 
 /// Turbulent water in a box whose first wall has moved in.
-fn splash(periodic: bool) -> (PbfScene, Particles) {
+fn splash(periodic: bool) -> (PbfScene<'static>, Particles) {
     let mut scene = support::scene([1.6, 1.6, 0.9]);
     scene.periodic = [false, false, periodic];
     scene.wave_makers.push(WaveMaker {
@@ -51,15 +51,15 @@ fn clouds() -> Particles {
                 0.45 + 0.4 * number(2),
             );
             let v = 4.0 * DVec3::new(number(3), number(4), number(5));
-            (x, v, Kind::ALL[k as usize % 3])
+            (x, v, WhitewaterKind::ALL[k as usize % 3])
         })
         .collect();
     white(&all)
 }
 
-fn table(context: &Context, periodic: bool) -> Table {
+fn table(context: &Context, periodic: bool) -> CheckTable {
     let (scene, water) = splash(periodic);
-    let settings = Settings {
+    let settings = CalibratedSettings {
         wind: [2.0, 0.0, -1.0],
         ..settings()
     };

@@ -7,8 +7,10 @@ use std::{
 };
 
 /// Crates whose modules are free of import cycles.
-const CRATES: [&str; 10] = [
+const CRATES: [&str; 14] = [
     "cache",
+    "check",
+    "cli",
     "compare",
     "domain",
     "experiment",
@@ -17,6 +19,8 @@ const CRATES: [&str; 10] = [
     "reference",
     "render",
     "scene",
+    "solve",
+    "stage",
     "study",
 ];
 

@@ -10,7 +10,7 @@ use crate::support::context;
 use swell::{
     experiment::{
         Devices,
-        stability::{Run, Verdict, refusal, run_trial},
+        stability::{StabilityRun, Verdict, refusal, run_trial},
     },
     files::study::{
         RunsOn, Study,
@@ -56,7 +56,7 @@ fn in_suite(trial: &Trial) -> Trial {
     trial
 }
 
-fn run(trial: &Trial) -> Run {
+fn run(trial: &Trial) -> StabilityRun {
     run_trial(&devices(&context()), trial, &AtomicBool::new(false)).unwrap()
 }
 
@@ -78,7 +78,7 @@ fn wrong(case: &Case) -> Vec<String> {
         Held::Runs(trials) => {
             let trials: Vec<Trial> = trials.iter().map(in_suite).collect();
             // In parallel, because the longest case bounds the time of the whole suite.
-            let runs: Vec<Run> = thread::scope(|scope| {
+            let runs: Vec<StabilityRun> = thread::scope(|scope| {
                 let begun: Vec<_> = (trials.iter())
                     .map(|trial| scope.spawn(|| run(trial)))
                     .collect();
@@ -216,7 +216,7 @@ fn a_mark_beyond_what_is_measured_is_missed() {
             if !trial.marks.iter().any(known) {
                 assert!(run.passes(trial), "{}", case.name);
             }
-            let ended = Run {
+            let ended = StabilityRun {
                 ended: Some("too fast".into()),
                 ..run
             };

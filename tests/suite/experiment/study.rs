@@ -15,7 +15,7 @@ use std::{
 };
 
 use swell::{
-    experiment::{self, Event, PointStatus, StudyError, StudyOutcome, StudyRequest},
+    experiment::{self, PointStatus, StudyError, StudyEvent, StudyOutcome, StudyRequest},
     files::study::{Study, sweep::Sweep},
     stage::device::Gpu,
 };
@@ -102,7 +102,7 @@ impl Job {
         };
         let mut points = Vec::new();
         let outcome = experiment::study(&request, &AtomicBool::new(stop), &mut |event| {
-            if let Event::Point(point) = event {
+            if let StudyEvent::Point(point) = event {
                 assert!(point.number <= point.count, "{point:?}");
                 points.push(point.status);
             }

@@ -12,7 +12,7 @@ use swell::{
     experiment::{
         Devices,
         stability::Verdict,
-        validation::{Run, judge, run_benchmark},
+        validation::{BenchmarkRun, judge, run_benchmark},
     },
     files::study::{
         Study,
@@ -38,7 +38,7 @@ fn parsed(text: &str) -> Validation {
     }
 }
 
-fn runs(context: &Context, benchmark: &Benchmark) -> Vec<Run> {
+fn runs(context: &Context, benchmark: &Benchmark) -> Vec<BenchmarkRun> {
     let devices = Devices {
         gpu: Some(Opened::Gpu(Box::new(context.clone()))),
         cpu: Opened::Cpu,
@@ -60,7 +60,7 @@ fn missed(context: &Context, benchmark: &Benchmark) -> Vec<String> {
 }
 
 /// Lists the gates of a benchmark that these runs miss.
-fn missed_by(benchmark: &Benchmark, runs: &[Run]) -> Vec<String> {
+fn missed_by(benchmark: &Benchmark, runs: &[BenchmarkRun]) -> Vec<String> {
     let mut missed = Vec::new();
     for judged in judge(benchmark, runs) {
         if !matches!(judged.verdict, Verdict::Passes | Verdict::KnownFailure) {

@@ -14,7 +14,7 @@ use swell::{
     solve::SolveError,
     stage::{
         Blame,
-        bake::{BakeError, BakeRequest, Event, bake},
+        bake::{BakeError, BakeEvent, BakeRequest, bake},
         device::{Device, SolverError},
     },
 };
@@ -315,7 +315,7 @@ fn a_pass_that_binds_too_many_buffers_is_refused_in_the_plan() {
 fn lose(request: &BakeRequest, context: &Context) -> BakeError {
     let stop = AtomicBool::new(false);
     bake(request, &stop, &mut |event| {
-        if matches!(event, Event::Frame { frame: 2, .. }) {
+        if matches!(event, BakeEvent::Frame { frame: 2, .. }) {
             context.device.destroy();
             // The next frame may be computed already: once the loss is known it is not read.
             let is_known = (0..10_000).any(|_| {

@@ -7,8 +7,8 @@ use swell::{
     reference::flip::{
         Flip as Reference, Model, Trace,
         effects::{
-            Water,
-            viscosity::{Cell, stresses, viscosity_relax, viscosity_weigh},
+            FaceInputs,
+            viscosity::{ViscousCell, stresses, viscosity_relax, viscosity_weigh},
         },
         survey,
     },
@@ -55,9 +55,9 @@ impl Grid {
         self.reference.model()
     }
 
-    fn cells(&self) -> Vec<Cell> {
+    fn cells(&self) -> Vec<ViscousCell> {
         let step = self.model().step(&self.substep, &Default::default());
-        viscosity_weigh(Water {
+        viscosity_weigh(FaceInputs {
             model: self.model(),
             step: &step,
             bricks: &self.trace.bricks,
@@ -70,7 +70,7 @@ impl Grid {
     /// Runs a number of iterations from `start`.
     fn solved(
         &self,
-        cells: &[Cell],
+        cells: &[ViscousCell],
         start: &[DVec3],
         how: &Relaxation,
         iterations: u32,
@@ -86,7 +86,7 @@ impl Grid {
 
     /// √Σ D (a − b)² over the faces that move, with the system's diagonal D: the norm of
     /// the error bound.
-    fn apart(&self, cells: &[Cell], reach: f64, a: &[DVec3], b: &[DVec3]) -> f64 {
+    fn apart(&self, cells: &[ViscousCell], reach: f64, a: &[DVec3], b: &[DVec3]) -> f64 {
         let mut sum = 0.0;
         for (element, cell) in cells.iter().enumerate() {
             for axis in (0..3).filter(|&axis| cell.moves[axis]) {
@@ -107,7 +107,7 @@ fn the_error_that_is_left_is_what_was_asked_for() {
         let grid = Grid::of(&case);
         let cells = grid.cells();
         assert!(cells.iter().any(|cell| cell.moves[0]));
-        assert!((cells.iter()).all(|cell| Cell::of_word(cell.word()) == *cell));
+        assert!((cells.iter()).all(|cell| ViscousCell::of_word(cell.word()) == *cell));
         let start = &grid.trace.faces.velocity;
         for reach in [0.1, 3.0, 100.0] {
             let close = Relaxation::new(reach, 1.0, 1.0, 1e-12);

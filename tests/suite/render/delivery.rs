@@ -12,7 +12,7 @@ use swell::files::parse_look;
 use swell::{
     domain::{
         particles::Particles,
-        whitewater::{KIND, Kind, RADIUS},
+        whitewater::{KIND, RADIUS, WhitewaterKind},
     },
     gpu::adapter::Context,
     render::{Image, RenderScene, Renderer},
@@ -75,7 +75,11 @@ fn draw(context: &Context, look: &Look, scene: &RenderScene, water: &Particles) 
 fn white() -> Particles {
     let mut white = Particles::default();
     let mut kinds = Vec::new();
-    for (kind, y) in [(Kind::Spray, 1.1), (Kind::Foam, 0.62), (Kind::Bubble, 0.55)] {
+    for (kind, y) in [
+        (WhitewaterKind::Spray, 1.1),
+        (WhitewaterKind::Foam, 0.62),
+        (WhitewaterKind::Bubble, 0.55),
+    ] {
         for i in 0..40u16 {
             let (x, z) = (f32::from(i % 8), f32::from(i / 8));
             white.position.push([1.0 + 0.2 * x, y, 1.0 + 0.3 * z]);

@@ -1,7 +1,7 @@
 //! A frame that is rendered in parts reports its progress, and is the same picture.
 
 use swell::files::parse_look;
-use swell::render::{FrameInputs, Part, Renderer, Water};
+use swell::render::{FrameInputs, Part, Renderer, WaterParticles};
 
 use super::pictures::{ALL_AOVS, OBLIQUE, harbour};
 use crate::support::context;
@@ -11,7 +11,7 @@ use crate::support::context;
 #[test]
 fn each_part_of_a_frame_is_told_once() {
     let (scene, water) = harbour();
-    let (water, white) = (Water::new(water), Default::default());
+    let (water, white) = (WaterParticles::new(water), Default::default());
     let inputs = FrameInputs::alone(&water, &white);
     let context = context();
     for method in ["ray", "ssfr"] {

@@ -4,7 +4,7 @@ use glam::DVec3;
 use swell::files::parse_look;
 use swell::{
     gpu::adapter::{Context, GpuError, Needs},
-    render::{FrameInputs, Limits, Plan, Renderer, Water},
+    render::{FrameInputs, Limits, Plan, Renderer, WaterParticles},
 };
 
 use super::pictures::{TOP_DOWN, tank};
@@ -26,7 +26,7 @@ fn lowered(storage: u64) -> Context {
 fn what_is_planned_for_a_frame_is_refused_where_drawing_it_is() {
     let scene = tank(SPACING);
     let particles = slab(scene.domain.min, DVec3::new(8.0, 3.2, 6.0), SPACING);
-    let (water, white) = (Water::new(particles), Default::default());
+    let (water, white) = (WaterParticles::new(particles), Default::default());
     let inputs = FrameInputs::alone(&water, &white);
     for (more, names) in [
         ("[renderer]\nmethod = \"ray\"\n", &["level_values"][..]),
@@ -77,7 +77,7 @@ fn what_is_planned_for_a_frame_is_refused_where_drawing_it_is() {
 fn a_pass_that_binds_too_many_buffers_is_refused_in_the_plan_and_in_drawing() {
     let scene = tank(SPACING);
     let particles = slab(scene.domain.min, DVec3::new(8.0, 3.2, 6.0), SPACING);
-    let (water, white) = (Water::new(particles), Default::default());
+    let (water, white) = (WaterParticles::new(particles), Default::default());
     let inputs = FrameInputs::alone(&water, &white);
     let opened = |most: u32| {
         Context::open_lowered(None, Needs::default(), |limits| {

@@ -4,7 +4,7 @@ use glam::DVec3;
 use swell::{
     domain::{
         particles::Particles,
-        whitewater::{Kind, Potentials, Settings, Thresholds},
+        whitewater::{CalibratedSettings, Potentials, Thresholds, WhitewaterKind},
     },
     gpu::adapter::{Context, InjectedFault},
     scene::Scene,
@@ -37,8 +37,8 @@ fn both(check: impl Fn(Option<&Context>)) {
 fn one(
     device: Option<&Context>,
     (scene, water): &(Scene, Particles),
-    settings: &Settings,
-    (x, v, kind): (DVec3, DVec3, Kind),
+    settings: &CalibratedSettings,
+    (x, v, kind): (DVec3, DVec3, WhitewaterKind),
     steps: (u32, f64),
 ) -> Particles {
     run(
@@ -55,7 +55,7 @@ fn one(
 /// ball with a radius of 10 m.
 #[test]
 fn a_heavy_drop_flies_along_a_parabola() {
-    let settings = Settings {
+    let settings = CalibratedSettings {
         drop_radius: 10.0,
         ..settings()
     };
@@ -65,15 +65,15 @@ fn a_heavy_drop_flies_along_a_parabola() {
             device,
             &pool(4.0, 0.0),
             &settings,
-            (start, v, Kind::Spray),
+            (start, v, WhitewaterKind::Spray),
             (4, 0.05),
         );
         let expected = start + 0.2 * v - 0.5 * 9.81 * 0.04 * DVec3::Y;
         let off = place(&moved, 0).distance(expected);
         assert!(off < 2e-4, "{off}");
-        assert_eq!(kind(&moved, 0), Kind::Spray);
+        assert_eq!(kind(&moved, 0), WhitewaterKind::Spray);
         // Control: a drop of one millimetre deviates.
-        let light = Settings {
+        let light = CalibratedSettings {
             drop_radius: 5e-4,
             ..settings.clone()
         };
@@ -81,7 +81,7 @@ fn a_heavy_drop_flies_along_a_parabola() {
             device,
             &pool(4.0, 0.0),
             &light,
-            (start, v, Kind::Spray),
+            (start, v, WhitewaterKind::Spray),
             (4, 0.05),
         );
         assert!(place(&moved, 0).distance(expected) > 2e-2);
@@ -92,17 +92,17 @@ fn a_heavy_drop_flies_along_a_parabola() {
 /// wind carries it along.
 #[test]
 fn a_drop_falls_as_fast_as_drops_do() {
-    let settings = Settings {
+    let settings = CalibratedSettings {
         drop_radius: 5e-4,
         wind: [3.0, 0.0, 0.0],
         ..settings()
     };
     let start = DVec3::new(1.0, 11.5, 1.0);
     both(|device| {
-        let drop = (start, DVec3::ZERO, Kind::Spray);
+        let drop = (start, DVec3::ZERO, WhitewaterKind::Spray);
         let moved = one(device, &pool(12.0, 0.0), &settings, drop, (60, 0.04));
         let v = velocity(&moved, 0);
-        assert_eq!(kind(&moved, 0), Kind::Spray);
+        assert_eq!(kind(&moved, 0), WhitewaterKind::Spray);
         assert!((-v.y / 4.03 - 1.0).abs() < 0.06, "{v}");
         assert!((v.x - 3.0).abs() < 0.01, "{v}");
     });
@@ -117,19 +117,19 @@ fn foam_goes_with_its_water() {
             device,
             &pool(2.0, 0.5),
             &settings(),
-            (x, v, Kind::Foam),
+            (x, v, WhitewaterKind::Foam),
             (6, 0.05),
         );
         let off = place(&moved, 0).distance(x + 0.15 * DVec3::X);
         assert!(off < 1e-5, "{off}");
-        assert_eq!(kind(&moved, 0), Kind::Foam);
+        assert_eq!(kind(&moved, 0), WhitewaterKind::Foam);
         // Foam at rest takes on the speed of the water within a frame, in which it moves by half of
         // the water's displacement.
         let moved = one(
             device,
             &pool(2.0, 0.5),
             &settings(),
-            (x, DVec3::ZERO, Kind::Foam),
+            (x, DVec3::ZERO, WhitewaterKind::Foam),
             (1, 0.05),
         );
         assert!(velocity(&moved, 0).distance(v) < 1e-5);
@@ -143,10 +143,10 @@ fn bubbles_rise_at_their_speed_and_float_up_as_foam() {
     let x = DVec3::new(1.0, 0.2, 1.0);
     let settings = settings();
     both(|device| {
-        let bubble = (x, DVec3::ZERO, Kind::Bubble);
+        let bubble = (x, DVec3::ZERO, WhitewaterKind::Bubble);
         let moved = one(device, &pool(2.0, 0.0), &settings, bubble, (40, 0.025));
         let v = velocity(&moved, 0);
-        assert_eq!(kind(&moved, 0), Kind::Bubble);
+        assert_eq!(kind(&moved, 0), WhitewaterKind::Bubble);
         assert!((v.y / settings.rise_speed - 1.0).abs() < 1e-3, "{v}");
         // From rest: rise speed times (t − response); trapezoids over frames of half the response
         // make it 2 % longer.
@@ -154,7 +154,7 @@ fn bubbles_rise_at_their_speed_and_float_up_as_foam() {
         let expected = settings.rise_speed * (1.0 - settings.response);
         assert!((way / expected - 1.0).abs() < 0.02, "{way} {expected}");
         let moved = one(device, &pool(2.0, 0.0), &settings, bubble, (160, 0.025));
-        assert_eq!(kind(&moved, 0), Kind::Foam);
+        assert_eq!(kind(&moved, 0), WhitewaterKind::Foam);
         let y = place(&moved, 0).y;
         assert!((y - DEPTH).abs() < D, "{y}");
     });
@@ -167,7 +167,7 @@ fn drops_land_on_the_surface() {
     let drop = (
         DVec3::new(1.0, 1.2, 1.0),
         DVec3::new(0.0, -6.0, 0.0),
-        Kind::Spray,
+        WhitewaterKind::Spray,
     );
     let (surface, settings) = (DEPTH + 0.06, settings());
     let landed = |device: Option<&Context>| one(device, &pool(2.0, 0.0), &settings, drop, (1, 0.1));
@@ -175,7 +175,7 @@ fn drops_land_on_the_surface() {
         let moved = landed(device);
         let y = place(&moved, 0).y;
         assert!((y - surface).abs() < 0.03, "{y}");
-        assert_eq!(kind(&moved, 0), Kind::Foam);
+        assert_eq!(kind(&moved, 0), WhitewaterKind::Foam);
         assert!(velocity(&moved, 0).length() < 1e-5);
     });
     // Control: without the search it is deep in the water.

@@ -4,7 +4,7 @@
 use std::fs;
 
 use crate::support::job::Job;
-use swell::cache::{CacheReader, Entry};
+use swell::cache::{CacheReader, LedgerEntry};
 
 /// Grids and probes for the small scene; no frame stores the pressure that its probe measures.
 const WATCHED: &str = r#"
@@ -36,7 +36,7 @@ fn file(job: &Job, cache: &str, name: &str) -> Vec<u8> {
 }
 
 /// A ledger entry without its chain hash, which depends on the manifest.
-fn told(job: &Job, cache: &str, frame: u32) -> Entry {
+fn told(job: &Job, cache: &str, frame: u32) -> LedgerEntry {
     let reader = CacheReader::open(&job.path(cache)).unwrap();
     let mut entry = reader.entry(frame).unwrap().clone();
     entry.chain.clear();

@@ -16,7 +16,7 @@ use swell::{
     gpu::adapter::{Context, InjectedFault},
     scene::Scene,
     stage::{
-        bake::{self, BakeError, BakeRequest, Event},
+        bake::{self, BakeError, BakeEvent, BakeRequest},
         device::Device,
         replay::Failure,
     },
@@ -73,11 +73,11 @@ impl Baked {
         };
         let never = AtomicBool::new(false);
         let ended = bake::bake(&request, &never, &mut |event| match event {
-            Event::Ready {
+            BakeEvent::Ready {
                 removed, particles, ..
             } => (self.removed, self.particles) = (removed, particles),
-            Event::Frame { report, .. } => self.reports.push(report),
-            Event::Written { .. } => {}
+            BakeEvent::Frame { report, .. } => self.reports.push(report),
+            BakeEvent::Written { .. } => {}
         });
         self.error = ended.err();
     }

@@ -8,7 +8,7 @@ use swell::files::parse_scene;
 
 use swell::stage::{
     device::{Opened, SolverError},
-    drive::{Drive, End, Step},
+    drive::{ComputedFrame, Drive, End},
     prepare::Start,
 };
 
@@ -32,9 +32,9 @@ kind = "pressure"
 at = [0.15, 0.05, 0.15]
 "#;
 
-fn run(drive: &mut Drive<'_>, stop_after: u32) -> (End, Vec<Step>) {
+fn run(drive: &mut Drive<'_>, stop_after: u32) -> (End, Vec<ComputedFrame>) {
     let stop = AtomicBool::new(stop_after == 0);
-    let mut steps: Vec<Step> = Vec::new();
+    let mut steps: Vec<ComputedFrame> = Vec::new();
     let end = drive.run(4, &stop, |step| {
         stop.store(step.frame >= stop_after, Ordering::Relaxed);
         steps.push(step);

@@ -4,7 +4,10 @@ use swell::{
     domain::{
         boundary::Boundary,
         particles::Particles,
-        whitewater::{AGE, KIND, Kind, LIFE, Potentials, RADIUS, Settings, Thresholds, none},
+        whitewater::{
+            AGE, CalibratedSettings, KIND, LIFE, Potentials, RADIUS, Thresholds, WhitewaterKind,
+            none,
+        },
     },
     gpu::adapter::Context,
     reference,
@@ -12,8 +15,8 @@ use swell::{
     solve,
 };
 
-pub fn settings() -> Settings {
-    Settings {
+pub fn settings() -> CalibratedSettings {
+    CalibratedSettings {
         seed: 1,
         max_particles: 1_000_000,
         radius: [0.005, 0.02],
@@ -34,7 +37,7 @@ pub fn settings() -> Settings {
 }
 
 /// Whitewater particles with these positions, velocities and kinds.
-pub fn white(all: &[(DVec3, DVec3, Kind)]) -> Particles {
+pub fn white(all: &[(DVec3, DVec3, WhitewaterKind)]) -> Particles {
     let mut made = none();
     for (id, (x, v, kind)) in (0..).zip(all) {
         made.position.push(x.as_vec3().to_array());
@@ -64,8 +67,8 @@ pub fn velocity(white: &Particles, k: usize) -> DVec3 {
     Vec3::from_array(white.velocity[k]).as_dvec3()
 }
 
-pub fn kind(white: &Particles, k: usize) -> Kind {
-    Kind::of_number(white.attributes[KIND][k]).unwrap()
+pub fn kind(white: &Particles, k: usize) -> WhitewaterKind {
+    WhitewaterKind::of_number(white.attributes[KIND][k]).unwrap()
 }
 
 /// Runs whitewater over water at rest for `frames` frames of `seconds` each, on the GPU or, without
@@ -73,7 +76,7 @@ pub fn kind(white: &Particles, k: usize) -> Kind {
 pub fn run(
     context: Option<&Context>,
     (scene, water): (&Scene, &Particles),
-    settings: &Settings,
+    settings: &CalibratedSettings,
     white: &Particles,
     (frames, seconds): (u32, f64),
 ) -> (Vec<Potentials>, Particles) {

@@ -8,7 +8,7 @@ use flate2::{Compression, write::ZlibEncoder};
 use rayon::prelude::*;
 
 use super::put_u32;
-use super::value::{self, Value};
+use super::value::{self, VoxelValue};
 use crate::{
     sparse_grid::{Leaf, SparseGrid},
     vdb::{LEAF_BITS, LOWER_BITS, UPPER_BITS, inactive, volume},
@@ -27,7 +27,7 @@ struct Lower<'a, T> {
     inside: Vec<usize>,
 }
 
-impl<'a, T: Value> Tree<'a, T> {
+impl<'a, T: VoxelValue> Tree<'a, T> {
     pub(super) fn of(grid: &'a SparseGrid<T>) -> Self {
         let mut tree = Self {
             background: grid.background,
@@ -92,7 +92,7 @@ impl<'a, T: Value> Tree<'a, T> {
     }
 }
 
-impl<T: Value> Lower<'_, T> {
+impl<T: VoxelValue> Lower<'_, T> {
     fn put_topology(&self, out: &mut Vec<u8>, background: T, is_half: bool) {
         put_masks(out, 4, self.leaves.keys());
         let mut tiles = vec![background; volume(4)];
@@ -131,7 +131,7 @@ fn put_masks<'a>(out: &mut Vec<u8>, bits: u32, children: impl Iterator<Item = &'
 /// The values of an internal node, all inactive and all written; zip compresses them to almost
 /// nothing. OpenVDB omits them where it can, but in half precision it then omits their length too,
 /// and vdb-rs 0.6 expects one.
-fn put_tiles<T: Value>(out: &mut Vec<u8>, tiles: impl Iterator<Item = T>, is_half: bool) {
+fn put_tiles<T: VoxelValue>(out: &mut Vec<u8>, tiles: impl Iterator<Item = T>, is_half: bool) {
     out.push(inactive::STORED);
     let mut bytes = Vec::new();
     for tile in tiles {
@@ -141,7 +141,7 @@ fn put_tiles<T: Value>(out: &mut Vec<u8>, tiles: impl Iterator<Item = T>, is_hal
 }
 
 /// A leaf's mask again, followed by its active values.
-fn buffer<T: Value>(leaf: &Leaf<T>, background: T, is_half: bool) -> Vec<u8> {
+fn buffer<T: VoxelValue>(leaf: &Leaf<T>, background: T, is_half: bool) -> Vec<u8> {
     let mut out = Vec::new();
     put_words(&mut out, &leaf.active);
     let mut is_background = [0u64; 8];

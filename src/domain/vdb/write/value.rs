@@ -5,7 +5,7 @@ use half::f16;
 use crate::vdb::FLOAT_TREE;
 
 /// A voxel's value.
-pub(super) trait Value: Copy + PartialEq + Send + Sync {
+pub(super) trait VoxelValue: Copy + PartialEq + Send + Sync {
     /// OpenVDB's name of the tree.
     const TREE: &'static str;
     /// How transforms act on vectors: like velocities.
@@ -18,7 +18,7 @@ pub(super) trait Value: Copy + PartialEq + Send + Sync {
     fn components(&self) -> &[f32];
 }
 
-impl Value for f32 {
+impl VoxelValue for f32 {
     const TREE: &'static str = FLOAT_TREE;
     const VECTOR_TYPE: Option<&'static str> = None;
 
@@ -31,7 +31,7 @@ impl Value for f32 {
     }
 }
 
-impl Value for [f32; 3] {
+impl VoxelValue for [f32; 3] {
     const TREE: &'static str = "Tree_vec3s_5_4_3";
     const VECTOR_TYPE: Option<&'static str> = Some("contravariant relative");
 
@@ -45,7 +45,7 @@ impl Value for [f32; 3] {
 }
 
 /// Appends a buffer value: two or four bytes per component.
-pub(super) fn put<T: Value>(out: &mut Vec<u8>, value: T, is_half: bool) {
+pub(super) fn put<T: VoxelValue>(out: &mut Vec<u8>, value: T, is_half: bool) {
     for &x in value.components() {
         if is_half {
             out.extend_from_slice(&f16::from_f32(x).to_le_bytes());
@@ -56,7 +56,7 @@ pub(super) fn put<T: Value>(out: &mut Vec<u8>, value: T, is_half: bool) {
 }
 
 /// Appends a tree value: four bytes per component, rounded to half precision if the buffers are.
-pub(super) fn put_whole<T: Value>(out: &mut Vec<u8>, value: T, is_half: bool) {
+pub(super) fn put_whole<T: VoxelValue>(out: &mut Vec<u8>, value: T, is_half: bool) {
     for &x in value.components() {
         let x = if is_half {
             f16::from_f32(x).to_f32()

@@ -4,7 +4,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::{
-    super::{Model, Sorted, Step, grid::neighborhood},
+    super::{FlipSubstep, Model, Sorted, grid::neighborhood},
     Acts, Flying,
 };
 use crate::Timings;
@@ -42,7 +42,7 @@ pub fn share(model: &Model, bricks: &Bricks, kind: &[u32], sorted: &Sorted, elem
 /// the step, m/s (effects/drag_by_cells).
 pub fn drag_by_cells(
     settings: &Settings,
-    step: &Step<'_>,
+    step: &FlipSubstep<'_>,
     sorted: &Sorted,
     share: impl Fn(u32) -> f64 + Sync,
 ) -> Vec<DVec3> {

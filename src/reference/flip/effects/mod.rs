@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::{
-    Centers, Model, OpenSpace, Sorted, Step,
+    Centers, FlipSubstep, Model, OpenSpace, Sorted,
     grid::{corner, per_cell},
 };
 use crate::Timings;
@@ -12,11 +12,11 @@ use swell_scene::effects::{Effects, with_effects, zone::Zone};
 
 /// Inputs of an effect on faces, besides the velocities.
 #[derive(Clone, Copy)]
-pub struct Water<'a> {
+pub struct FaceInputs<'a> {
     /// Scene and grid.
     pub model: &'a Model,
     /// Parameters of the substep.
-    pub step: &'a Step<'a>,
+    pub step: &'a FlipSubstep<'a>,
     /// Layout of the elements.
     pub bricks: &'a Bricks,
     /// Open space and cell kinds.
@@ -32,11 +32,11 @@ pub struct Water<'a> {
 /// (elements).
 pub fn led_faces(
     zone: Zone<'_>,
-    water: Water<'_>,
+    water: FaceInputs<'_>,
     velocity: &[DVec3],
     wanted: impl Fn(DVec3) -> DVec3 + Sync,
 ) -> Vec<DVec3> {
-    let Water { model, bricks, .. } = water;
+    let FaceInputs { model, bricks, .. } = water;
     let size = model.scene.domain.size();
     per_cell(bricks, |element| {
         let e = element as usize;
@@ -60,7 +60,7 @@ pub struct Flying<'a> {
     /// Scene and grid.
     pub model: &'a Model,
     /// Parameters of the substep.
-    pub step: &'a Step<'a>,
+    pub step: &'a FlipSubstep<'a>,
     /// Layout of the elements.
     pub bricks: &'a Bricks,
     /// Kinds of the cells, as far as solids determine them.
@@ -73,13 +73,13 @@ trait Acts {
     fn on_particles(&self, _: Flying<'_>, _: &mut Sorted, _: &mut Timings) {}
 
     /// Acts on the face velocities, m/s, before the projection.
-    fn on_faces(&self, _: Water<'_>, _velocity: &mut Vec<DVec3>, _: &mut Timings) {}
+    fn on_faces(&self, _: FaceInputs<'_>, _velocity: &mut Vec<DVec3>, _: &mut Timings) {}
 
     /// Acts on the face velocities, m/s, between two projections; returns whether it needs more
     /// iterations than the settings allow.
     fn between_projections(
         &self,
-        _: Water<'_>,
+        _: FaceInputs<'_>,
         _velocity: &mut Vec<DVec3>,
         _: &mut Timings,
     ) -> bool {
@@ -109,7 +109,7 @@ macro_rules! twins {
         /// whether one needs more iterations than the settings allow.
         pub(super) fn between_projections(
             named: &Effects,
-            water: Water<'_>,
+            water: FaceInputs<'_>,
             velocity: &mut Vec<DVec3>,
             timings: &mut Timings,
         ) -> bool {
@@ -125,7 +125,7 @@ macro_rules! twins {
         /// Applies the scene's effects to the face velocities, m/s.
         pub(super) fn on_faces(
             named: &Effects,
-            water: Water<'_>,
+            water: FaceInputs<'_>,
             velocity: &mut Vec<DVec3>,
             timings: &mut Timings,
         ) {

@@ -7,7 +7,7 @@ use super::{
         Model, OpenSpace,
         grid::{along, neighborhood, per_cell},
     },
-    Acts, Water,
+    Acts, FaceInputs,
 };
 use crate::Timings;
 use swell_domain::{
@@ -207,8 +207,8 @@ pub fn push(
 }
 
 impl Acts for Settings {
-    fn on_faces(&self, water: Water<'_>, velocity: &mut Vec<DVec3>, timings: &mut Timings) {
-        let Water {
+    fn on_faces(&self, water: FaceInputs<'_>, velocity: &mut Vec<DVec3>, timings: &mut Timings) {
+        let FaceInputs {
             model,
             step,
             bricks,

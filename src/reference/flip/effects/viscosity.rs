@@ -7,7 +7,7 @@ use glam::{DVec2, DVec3};
 
 use super::{
     super::grid::{along, corner, per_cell},
-    Acts, Water,
+    Acts, FaceInputs,
 };
 use crate::Timings;
 use swell_domain::{
@@ -29,7 +29,7 @@ enum Face {
 
 /// Data of a cell for the solve.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Cell {
+pub struct ViscousCell {
     /// Whether the cell is water.
     pub is_water: bool,
     /// Which of its lower faces move.
@@ -50,7 +50,7 @@ pub struct Edge {
     pub weight: [u32; 2],
 }
 
-impl Cell {
+impl ViscousCell {
     /// Unpacks the word of shaders/shared/viscous_word.wgsl.
     pub fn of_word(word: u32) -> Self {
         let bit = |place: usize| word >> place & 1 == 1;
@@ -91,14 +91,14 @@ fn beside(offset: [i32; 3], axis: usize, step: i32) -> [i32; 3] {
     std::array::from_fn(|k| offset[k] + step[k])
 }
 
-/// A cell and its surroundings, from which its [`Cell`] is derived.
-struct Around<'a> {
-    water: Water<'a>,
+/// A cell and its surroundings, from which its [`ViscousCell`] is derived.
+struct CellSurroundings<'a> {
+    water: FaceInputs<'a>,
     element: u32,
     corner: DVec3,
 }
 
-impl Around<'_> {
+impl CellSurroundings<'_> {
     fn near(&self, offset: [i32; 3]) -> u32 {
         self.water.bricks.near(self.element, offset)
     }
@@ -178,11 +178,11 @@ impl Around<'_> {
         }
     }
 
-    fn cell(&self) -> Cell {
+    fn cell(&self) -> ViscousCell {
         let moves = std::array::from_fn(|axis| self.face([0; 3], axis) == Face::Moves);
         let whole =
             |axis: usize| moves[axis] && self.is_water([0; 3]) && self.is_water(along(axis, -1));
-        Cell {
+        ViscousCell {
             is_water: self.is_water([0; 3]),
             moves,
             is_whole: std::array::from_fn(whole),
@@ -193,10 +193,10 @@ impl Around<'_> {
 
 /// Determines which faces a viscous solve moves, and the water fraction that weights each stress
 /// (effects/viscosity_weigh). Shape (elements).
-pub fn viscosity_weigh(water: Water<'_>) -> Vec<Cell> {
+pub fn viscosity_weigh(water: FaceInputs<'_>) -> Vec<ViscousCell> {
     per_cell(water.bricks, |element| {
         let corner = corner(water.bricks, element);
-        Around {
+        CellSurroundings {
             water,
             element,
             corner,
@@ -208,7 +208,7 @@ pub fn viscosity_weigh(water: Water<'_>) -> Vec<Cell> {
 /// Returns an edge's contribution to K u and to K's diagonal at the face along `axis` on its upper
 /// side along `other`; the edge passes through the minimum corner of the cell at `offset`.
 fn stress(
-    (bricks, cells): (&Bricks, &[Cell]),
+    (bricks, cells): (&Bricks, &[ViscousCell]),
     velocity: &[DVec3],
     element: u32,
     offset: [i32; 3],
@@ -232,7 +232,7 @@ fn stress(
 
 /// Returns K u and K's diagonal at the lower face along `axis` of a cell.
 pub fn stresses(
-    (bricks, cells): (&Bricks, &[Cell]),
+    (bricks, cells): (&Bricks, &[ViscousCell]),
     velocity: &[DVec3],
     element: u32,
     axis: usize,
@@ -259,7 +259,7 @@ pub fn stresses(
 /// Runs an iteration of (M + κ K) u = M u* with the given κ, gain and momentum: returns the
 /// velocities and their changes, m/s (effects/viscosity_relax). Shapes (elements).
 pub fn viscosity_relax(
-    (bricks, cells): (&Bricks, &[Cell]),
+    (bricks, cells): (&Bricks, &[ViscousCell]),
     [reach, gain, momentum]: [f64; 3],
     start: &[DVec3],
     (velocity, change): (&[DVec3], &[DVec3]),
@@ -289,7 +289,7 @@ pub fn viscosity_relax(
 impl Acts for Settings {
     fn between_projections(
         &self,
-        water: Water<'_>,
+        water: FaceInputs<'_>,
         velocity: &mut Vec<DVec3>,
         timings: &mut Timings,
     ) -> bool {

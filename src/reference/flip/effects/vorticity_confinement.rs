@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::{Acts, Water};
+use super::{Acts, FaceInputs};
 use crate::{
     Timings,
     flip::{grid_confinement, grid_curl},
@@ -10,8 +10,8 @@ use crate::{
 use swell_scene::effects::vorticity_confinement::Settings;
 
 impl Acts for Settings {
-    fn on_faces(&self, water: Water<'_>, velocity: &mut Vec<DVec3>, timings: &mut Timings) {
-        let Water {
+    fn on_faces(&self, water: FaceInputs<'_>, velocity: &mut Vec<DVec3>, timings: &mut Timings) {
+        let FaceInputs {
             model,
             step,
             bricks,

@@ -3,7 +3,7 @@
 
 use glam::DVec3;
 use swell::files::parse_look;
-use swell::render::{FrameInputs, Image, Renderer, Water};
+use swell::render::{FrameInputs, Image, Renderer, WaterParticles};
 
 use super::support::{Eye, Setup, ball, context, scene, uniform_sky, write_sky};
 
@@ -62,7 +62,7 @@ fn drawn(method: &'static str, film: [f64; 2], fit: &str) -> Image {
     write_sky(&folder.path().join("sky.exr"), &uniform_sky);
     let look = parse_look(&text, &folder.path().join("look.toml")).unwrap();
     let mut renderer = Renderer::new(&context(), &look, &set).unwrap();
-    let (water, white) = (Water::new(water), Default::default());
+    let (water, white) = (WaterParticles::new(water), Default::default());
     let inputs = FrameInputs::alone(&water, &white);
     renderer.render_inputs(1, &inputs).unwrap()
 }

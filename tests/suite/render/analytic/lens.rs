@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use swell::files::parse_look;
-use swell::render::{FrameInputs, Image, Renderer, Water};
+use swell::render::{FrameInputs, Image, Renderer, WaterParticles};
 
 use super::support::{Eye, FILM, Setup, ball, context, draw, scene, uniform_sky, write_sky};
 
@@ -158,7 +158,7 @@ fn a_lens_and_a_shift_of_the_film_come_from_usd() {
             );
             let look = parse_look(&text, &folder.path().join("look.toml")).unwrap();
             let mut renderer = Renderer::new(&context(), &look, &set).unwrap();
-            let (water, white) = (Water::new(water.clone()), Default::default());
+            let (water, white) = (WaterParticles::new(water.clone()), Default::default());
             let inputs = FrameInputs::alone(&water, &white);
             renderer.render_inputs(1, &inputs).unwrap()
         };

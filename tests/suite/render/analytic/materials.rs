@@ -5,11 +5,11 @@ use std::path::Path;
 use glam::{DVec2, DVec3};
 use swell::{
     domain::mesh::TriangleMesh,
-    domain::mesh_file::{MeshFormat, parts::Parts},
+    domain::mesh_file::{MeshFormat, parts::MeshParts},
     domain::{particles::Particles, pose::Pose},
     files::parse_look,
     gpu::adapter::Context,
-    render::{FrameInputs, Image, RenderError, RenderScene, Renderer, SolidParts, Water},
+    render::{FrameInputs, Image, RenderError, RenderScene, Renderer, SolidParts, WaterParticles},
     scene::look::Look,
 };
 
@@ -85,7 +85,7 @@ fn of_text(text: &str) -> RenderScene {
         solids: vec![TriangleMesh::from_bytes(bytes, MeshFormat::Obj, file).unwrap()],
         parts: vec![SolidParts {
             name: "face".to_owned(),
-            parts: Parts::from_bytes(bytes, MeshFormat::Obj, file).unwrap(),
+            parts: MeshParts::from_bytes(bytes, MeshFormat::Obj, file).unwrap(),
             pose: Pose::START,
         }],
         ..scene(1.0, 1.0)
@@ -170,9 +170,9 @@ impl Shown<'_> {
         let look = self.look(folder.path());
         let mut renderer = Renderer::new(context, &look, self.scene)
             .map_err(|error| Box::new((error, look.clone())))?;
-        let (water, white) = (Water::new(Particles::default()), Particles::default());
+        let water = WaterParticles::new(Particles::default());
         Ok(renderer
-            .render_inputs(1, &FrameInputs::alone(&water, &white))
+            .render_inputs(1, &FrameInputs::alone(&water, &Particles::default()))
             .unwrap())
     }
 

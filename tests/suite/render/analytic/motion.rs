@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use swell::domain::particles::Particles;
-use swell::render::{FrameInputs, Image, Water};
+use swell::render::{FrameInputs, Image, WaterParticles};
 
 use super::support::{Eye, Setup, ball, context, draw_inputs, scene, uniform_sky};
 
@@ -37,7 +37,7 @@ fn middle(image: &Image) -> f64 {
 
 /// Shift of the ball to the right, pixels, in the mean of instants a quarter of a frame before and
 /// after.
-fn shift(method: &'static str, around: [Option<&Water>; 4]) -> f64 {
+fn shift(method: &'static str, around: [Option<&WaterParticles>; 4]) -> f64 {
     let shot = |shutter: f64| {
         let setup = Setup {
             samples: 2,
@@ -47,7 +47,7 @@ fn shift(method: &'static str, around: [Option<&Water>; 4]) -> f64 {
             background: false,
             ..Setup::new(eye())
         };
-        let (water, white) = (Water::new(thrown(0.0)), Particles::default());
+        let (water, white) = (WaterParticles::new(thrown(0.0)), Particles::default());
         let inputs = FrameInputs {
             around,
             ..FrameInputs::alone(&water, &white)
@@ -67,7 +67,10 @@ fn shift(method: &'static str, around: [Option<&Water>; 4]) -> f64 {
 
 #[test]
 fn blur_follows_the_curve_through_the_frames_around() {
-    let (before, after) = (Water::new(thrown(-1.0)), Water::new(thrown(1.0)));
+    let (before, after) = (
+        WaterParticles::new(thrown(-1.0)),
+        WaterParticles::new(thrown(1.0)),
+    );
     // A parabola is its own Hermite curve.
     let away = 0.5 * PUSH * (0.25 * SECONDS).powi(2);
     let expected = away * 240.0 / 50f64.sqrt();
@@ -90,13 +93,13 @@ fn blur_follows_the_curve_through_the_frames_around() {
 }
 
 /// Motion of the middle of the ball to the next frame, pixels to the right.
-fn motion(method: &'static str, after: Option<&Water>) -> f64 {
+fn motion(method: &'static str, after: Option<&WaterParticles>) -> f64 {
     let setup = Setup {
         method,
         surface: "radius_m = 0.4\nsmoothing_width_m = 0.0\n".to_owned(),
         ..Setup::new(eye())
     };
-    let water = Water::new(ball(eye().target, DVec3::Z * 3.0));
+    let water = WaterParticles::new(ball(eye().target, DVec3::Z * 3.0));
     let white = Particles::default();
     let inputs = FrameInputs {
         around: [None, None, after, None],
@@ -116,7 +119,7 @@ fn motion(method: &'static str, after: Option<&Water>) -> f64 {
 
 #[test]
 fn motion_vectors_lead_to_the_next_frame() {
-    let after = Water::new(ball(eye().target + DVec3::Z * 0.3, DVec3::Z * 8.0));
+    let after = WaterParticles::new(ball(eye().target + DVec3::Z * 0.3, DVec3::Z * 8.0));
     // The front of the ball is 0.4 m nearer than its centre.
     let scale = 240.0 / (50f64.sqrt() - 0.4);
     for method in ["ssfr", "ray"] {

@@ -4,7 +4,7 @@ use glam::DVec3;
 use swell::domain::bounds::Bounds;
 use swell::domain::whitewater::RADIUS as SIZE;
 use swell::gpu::adapter::Context;
-use swell::render::{FrameInputs, RenderScene, Water};
+use swell::render::{FrameInputs, RenderScene, WaterParticles};
 
 use super::geometry::box_mesh;
 use super::support::{ball, context, draw_inputs, scene, spoiled, uniform_sky};
@@ -36,7 +36,7 @@ fn mirrored(context: &Context) -> [f64; 2] {
     let mut white = ball(CLOUD, DVec3::ZERO);
     let radius = vec![CLOUD_RADIUS as f32];
     white.attributes.insert(SIZE.to_owned(), radius);
-    let water = Water::new(ball(DVec3::new(5.0, LEVEL - RADIUS, 5.0), DVec3::ZERO));
+    let water = WaterParticles::new(ball(DVec3::new(5.0, LEVEL - RADIUS, 5.0), DVec3::ZERO));
     let inputs = FrameInputs::alone(&water, &white);
     let image = draw_inputs(context, &setup, &uniform_sky, &scene, &inputs, 1).unwrap();
     let [mut cloud, mut bare] = [const { Vec::new() }; 2];

@@ -7,7 +7,7 @@ use swell::domain::bounds::Bounds;
 use swell::domain::particles::Particles;
 use swell::domain::whitewater::RADIUS;
 use swell::gpu::adapter::Context;
-use swell::render::{FrameInputs, Image, RenderError, RenderScene, Water};
+use swell::render::{FrameInputs, Image, RenderError, RenderScene, WaterParticles};
 
 use super::geometry::box_mesh;
 use super::rays;
@@ -57,7 +57,7 @@ impl Cloud {
         white
             .attributes
             .insert(RADIUS.to_owned(), vec![SIZE as f32]);
-        let water = Water::new(Particles::default());
+        let water = WaterParticles::new(Particles::default());
         let scene = RenderScene {
             solids: self.solids.iter().map(|&it| box_mesh(it)).collect(),
             particle_spacing: self.spacing,
@@ -396,7 +396,7 @@ fn is_refused(method: &'static str, height: f64) -> bool {
         method,
         ..Setup::new(Eye::new([5.0, height, 5.0], [9.0, height, 5.5], 60.0))
     };
-    let (water, white) = (Water::new(rays::water()), Particles::default());
+    let (water, white) = (WaterParticles::new(rays::water()), Particles::default());
     let inputs = FrameInputs::alone(&water, &white);
     let scene = rays::pool_scene();
     match draw_inputs(&context(), &setup, &uniform_sky, &scene, &inputs, 7) {

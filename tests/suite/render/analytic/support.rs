@@ -7,7 +7,7 @@ use glam::{DVec2, DVec3};
 use swell::domain::bounds::Bounds;
 use swell::domain::particles::Particles;
 use swell::gpu::adapter::Context;
-use swell::render::{FrameInputs, Image, RenderError, RenderScene, Renderer, Water};
+use swell::render::{FrameInputs, Image, RenderError, RenderScene, Renderer, WaterParticles};
 use wgpu::util::DeviceExt;
 
 pub(crate) use crate::support::device::{context, spoiled};
@@ -197,7 +197,7 @@ pub(crate) fn draw(
     water: &Particles,
     frame: u32,
 ) -> Image {
-    let water = Water::new(water.clone());
+    let water = WaterParticles::new(water.clone());
     let white = Particles::default();
     let inputs = FrameInputs::alone(&water, &white);
     draw_inputs(context, setup, sky, scene, &inputs, frame).unwrap()

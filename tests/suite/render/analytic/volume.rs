@@ -4,9 +4,9 @@ use std::f64::consts::PI;
 
 use glam::{DVec2, DVec3};
 use swell::domain::particles::Particles;
-use swell::domain::whitewater::{KIND, Kind, RADIUS};
+use swell::domain::whitewater::{KIND, RADIUS, WhitewaterKind};
 use swell::gpu::adapter::Context;
-use swell::render::{FrameInputs, Image, RenderScene, Water};
+use swell::render::{FrameInputs, Image, RenderScene, WaterParticles};
 
 use crate::support::device::PooledDevice;
 
@@ -22,7 +22,7 @@ const WIDE: f64 = 0.4;
 struct Slab {
     low: f64,
     high: f64,
-    kind: Kind,
+    kind: WhitewaterKind,
 }
 
 /// Extinction of a slab, 1/m, at a density of 1.
@@ -90,7 +90,7 @@ impl Shot<'_> {
         } else {
             Particles::default()
         };
-        let body = Water::new(body);
+        let body = WaterParticles::new(body);
         let scene = RenderScene {
             particle_spacing: SPACING,
             ..pool_scene()
@@ -121,12 +121,12 @@ fn black_sky(_: DVec3, _: DVec2) -> [f64; 3] {
 const OVER: Slab = Slab {
     low: 6.0,
     high: 7.0,
-    kind: Kind::Spray,
+    kind: WhitewaterKind::Spray,
 };
 const UNDER: Slab = Slab {
     low: 0.5,
     high: 1.25,
-    kind: Kind::Bubble,
+    kind: WhitewaterKind::Bubble,
 };
 
 /// Density that gives the slab an optical depth of 1 straight through.
@@ -299,7 +299,7 @@ fn a_slab_shades_the_floor_as_beer_says() {
 fn spread(context: &Context, speed: f64, shutter: f64) -> [f64; 2] {
     const SAMPLES: u32 = 8;
     let mut white = ball(DVec3::new(5.0, 0.7, 5.0), DVec3::new(speed, 0.0, 0.0));
-    for (name, value) in [(RADIUS, 0.2), (KIND, Kind::Bubble.number())] {
+    for (name, value) in [(RADIUS, 0.2), (KIND, WhitewaterKind::Bubble.number())] {
         white.attributes.insert(name.to_owned(), vec![value]);
     }
     let eye = Eye {
@@ -318,7 +318,7 @@ fn spread(context: &Context, speed: f64, shutter: f64) -> [f64; 2] {
         sun: [0.0, 90.0, 0.0],
         ..Setup::new(eye)
     };
-    let water = Water::new(water());
+    let water = WaterParticles::new(water());
     let inputs = FrameInputs::alone(&water, &white);
     let image = draw_inputs(context, &setup, &uniform_sky, &pool_scene(), &inputs, 1).unwrap();
     let place = |i: usize| (i % 64) as f64 - 31.5;

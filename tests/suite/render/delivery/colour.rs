@@ -7,7 +7,7 @@ use glam::{DMat3, DVec3};
 use swell::{
     render::{
         Image,
-        image::{View, read_exr, write_exr},
+        image::{CameraAttributes, read_exr, write_exr},
     },
     scene::look::{ColourSpaceSpec, LightSpec},
 };
@@ -37,7 +37,7 @@ fn written(file: &Path, space: ColourSpaceSpec) -> Vec<[f32; 4]> {
             COLOURS.map(|[r, g, b, _]| [r, g, b]).to_vec(),
         )],
         exr_space: space,
-        view: Some(View {
+        view: Some(CameraAttributes {
             world_to_camera: [0.0; 16],
             world_to_ndc: [0.0; 16],
             frames_per_second: 24.0,

@@ -4,7 +4,7 @@ use half::f16;
 use swell::{
     domain::{
         particles::Particles,
-        whitewater::{KIND, Kind, RADIUS},
+        whitewater::{KIND, RADIUS, WhitewaterKind},
     },
     gpu::adapter::Context,
     render::{Image, Renderer},
@@ -168,7 +168,7 @@ fn foam_and_bubbles_have_a_layer_of_their_own() {
     for method in METHODS {
         let (scene, water) = harbour();
         let look = setup(method, ALL).look();
-        let draw = |kinds: &[Kind]| {
+        let draw = |kinds: &[WhitewaterKind]| {
             let all = white();
             let kept: Vec<usize> = (0..all.len())
                 .filter(|&i| {
@@ -196,19 +196,19 @@ fn foam_and_bubbles_have_a_layer_of_their_own() {
         };
         let none = draw(&[]);
         assert_eq!(layer(&none, LightSpec::Foam), 0.0, "{method}");
-        let drops = draw(&[Kind::Spray]);
+        let drops = draw(&[WhitewaterKind::Spray]);
         assert_eq!(layer(&drops, LightSpec::Foam), 0.0, "{method}");
         assert!(
             layer(&drops, LightSpec::Spray) > 1.1 * layer(&none, LightSpec::Spray),
             "{method}"
         );
-        let foam = draw(&[Kind::Foam]);
+        let foam = draw(&[WhitewaterKind::Foam]);
         let gained = layer(&foam, LightSpec::Foam);
         assert!(
             gained > 10.0 * (layer(&foam, LightSpec::Spray) - layer(&none, LightSpec::Spray)).abs(),
             "{method}: {gained}"
         );
-        let bubbles = draw(&[Kind::Bubble]);
+        let bubbles = draw(&[WhitewaterKind::Bubble]);
         assert!(layer(&bubbles, LightSpec::Foam) > 0.0, "{method}");
     }
 }
