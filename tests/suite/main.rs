@@ -115,13 +115,13 @@ mod solve {
     mod pressure;
     mod projected;
     mod sources;
+    mod start_waves;
     mod tension;
     mod thin;
     mod thin_water;
     mod turning_solids;
     mod viscous;
     mod walls;
-    mod start_waves;
     mod wave_wall;
     mod whitewater;
     mod zones;
