@@ -11,9 +11,9 @@ use super::{
     document::Document,
     effects,
     fit::{comes_into, fits},
-    grids, keep, moving_solid, no_slip, periodic, probe, sources,
-    spec::{BoxSpec, DomainSpec, MeshSpec, SceneSpec, SwarmSpec, WaterSpec},
-    wave_maker,
+    grids, keep,
+    keys::{BoxSpec, DomainSpec, MeshSpec, SceneSpec, SolidSpec, SwarmSpec, WaterSpec},
+    moving_solid, no_slip, periodic, probe, sources, wave_maker,
 };
 use swell_domain::{
     bounds::Bounds,
@@ -61,7 +61,7 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
         unchosen,
         lattice,
     } = solver::solvers(doc, spec.solver, &domain)?;
-    let periodic = periodic::read(doc, &spec.domain.periodic)?;
+    let periodic = periodic::read(doc, spec.domain.periodic.as_deref().unwrap_or_default())?;
     periodic::check_solver(doc, periodic, &domain, &solver)?;
     let between = spec.effects.act_between_projections();
     let no_slip = no_slip::build(doc, &spec.domain, (solver.method(), between), periodic)?;
@@ -108,7 +108,7 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
         None => None,
     };
     let kept = (spec.keep.as_ref().map(|table| keep::build(doc, table))).transpose()?;
-    let is_moving: Vec<bool> = spec.solid.iter().map(MeshSpec::moves).collect();
+    let is_moving: Vec<bool> = spec.solid.iter().map(SolidSpec::moves).collect();
     let around = probe::Around {
         domain: &domain,
         periodic,
@@ -160,7 +160,7 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
 /// Builds the static solids and the moving ones.
 fn solids(
     doc: &Document<'_>,
-    specs: &[MeshSpec],
+    specs: &[SolidSpec],
     around: &wave_maker::Surroundings<'_>,
 ) -> Result<(Vec<PlacedMesh>, Vec<MovingSolid>)> {
     let (mut solids, mut moving) = (Vec::new(), Vec::new());
@@ -180,7 +180,7 @@ fn solids(
             let problem = format!("at most {MAX_MOVING_SOLIDS} solids can move");
             return Err(doc.fault_of_plain(&place, problem));
         }
-        let placed = placed_mesh(doc, around.base_dir, &path, "mesh", (spec, around.spacing))?;
+        let placed = solid_mesh(doc, &path, spec, around)?;
         moving.push(moving_solid::build(doc, &path, placed, spec, around)?);
     }
     Ok((solids, moving))
@@ -372,11 +372,11 @@ fn check_particle_count(
 fn static_solid(
     doc: &Document<'_>,
     path: &str,
-    spec: &MeshSpec,
+    spec: &SolidSpec,
     around: &wave_maker::Surroundings<'_>,
 ) -> Result<PlacedMesh> {
     let domain = around.domain;
-    let placed = placed_mesh(doc, around.base_dir, path, "mesh", (spec, around.spacing))?;
+    let placed = solid_mesh(doc, path, spec, around)?;
     let overlaps = placed
         .mesh
         .bounds()
@@ -390,6 +390,16 @@ fn static_solid(
         extent(Some(*domain))
     );
     Err(doc.fault_of(&format!("{path}.mesh"), problem))
+}
+
+fn solid_mesh(
+    doc: &Document<'_>,
+    path: &str,
+    spec: &SolidSpec,
+    around: &wave_maker::Surroundings<'_>,
+) -> Result<PlacedMesh> {
+    let mesh = (&spec.placed(), around.spacing);
+    placed_mesh(doc, around.base_dir, path, "mesh", mesh)
 }
 
 /// Reads the mesh of the table at `path`, whose file is in the key `name`, for particles

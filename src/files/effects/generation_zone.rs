@@ -16,9 +16,10 @@ use swell_scene::{
 
 use super::{Declared, Surroundings, zone};
 use crate::{
+    declare::{Keyed, keys},
     document::Document,
     key::{Interval, Key, words},
-    motion_spec::check_speed,
+    motion::check_speed,
     regular_waves, seas,
 };
 
@@ -29,30 +30,30 @@ const LENGTH: Interval = 1e-9..=1e6;
 
 const PERIOD: Interval = 1e-4..=1e6;
 
+keys! { fields of Settings {
+    walls: Vec<Wall> = choices(&words(&Wall::NAMED))
+        .also(
+            ", upright ones, each once, none of them periodic or a wave maker's, one at \
+             least from which the waves come",
+        )
+        .about("the walls before which the zones lie; the water's gravity goes along -y"),
+    length: f64 = number(1e-7..=1e6)
+        .unit("metres")
+        .also(", at least two particle spacings and no longer than the domain is")
+        .about(
+            "of each zone from its wall; with one and a half wave lengths waves are within \
+             5 % of those asked for",
+        ),
+    waves: Waves = inline().about(
+        "what comes in; height, phase and velocity are \
+         given at each place of the zones",
+    ),
+} }
+
 impl Declared for Settings {
     const ABOUT: &'static str = "Zones before walls in which water is led towards given waves, \
                                  which run in from there, and in which what runs out dies \
                                  (relaxation zones, Jacobsen, Fuhrman and Fredsøe 2012)";
-
-    const KEYS: &'static [Key] = &[
-        Key::choices("walls", &words(&Wall::NAMED))
-            .also(
-                ", upright ones, each once, none of them periodic or a wave maker's, one at \
-                   least from which the waves come",
-            )
-            .about("the walls before which the zones lie; the water's gravity goes along -y"),
-        Key::number("length", 1e-7..=1e6)
-            .unit("metres")
-            .also(", at least two particle spacings and no longer than the domain is")
-            .about(
-                "of each zone from its wall; with one and a half wave lengths waves are within \
-                    5 % of those asked for",
-            ),
-        Key::inline("waves", WAVES_KEYS).about(
-            "what comes in; height, phase and velocity are \
-            given at each place of the zones",
-        ),
-    ];
 
     fn check(&self, doc: &Document<'_>, around: &Surroundings<'_>) -> Result<(), SceneError> {
         zone::check(&self.zone(), doc, KEY, around)?;
@@ -213,21 +214,25 @@ const SPECTRAL: &[&str] = &["sea", "focused"];
 
 const SPECTRA: [&str; 3] = words(&Spectrum::NAMED);
 
+impl Keyed for Waves {
+    const KEYS: &'static [Key] = WAVES_KEYS;
+}
+
 const WAVES_KEYS: &[Key] = &[
     Key::choice("kind", &["stokes", "sea", "focused"]).about(
         "`stokes`: regular waves to second order (Stokes 1847); `sea`: 64 waves of a \
-                spectrum by linear theory; `focused`: such waves, whose crests meet",
+         spectrum by linear theory; `focused`: such waves, whose crests meet",
     ),
     Key::number("height", LENGTH)
         .unit("metres")
         .only("kind", &["stokes", "focused"])
         .also(
             ", at most the depth; regular waves up to 0.78 depths and no \
-               steeper than waves can be",
+             steeper than waves can be",
         )
         .about(
             "of regular waves, from trough to crest; of a packet's crest above still \
-                water by linear theory",
+             water by linear theory",
         ),
     Key::number("period", PERIOD)
         .unit("seconds")
@@ -258,7 +263,7 @@ const WAVES_KEYS: &[Key] = &[
         .only("kind", SPECTRAL)
         .also(
             ", a tenth to nine tenths of the peak's, of waves that are at least 10 \
-               particle spacings long",
+             particle spacings long",
         )
         .about("of the shortest waves; what is left out is given to the others"),
     Key::number("spreading", 0.5..=1000.0)
@@ -266,7 +271,7 @@ const WAVES_KEYS: &[Key] = &[
         .only("kind", SPECTRAL)
         .about(
             "s of the spread over directions, (cos ½θ)^2s (Longuet-Higgins, Cartwright and \
-                Smith 1963): wind seas about 10, swell 75; left out, all waves go one way",
+             Smith 1963): wind seas about 10, swell 75; left out, all waves go one way",
         ),
     Key::whole("seed", 0..=u32::MAX)
         .default("0")
