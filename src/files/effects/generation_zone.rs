@@ -214,6 +214,7 @@ const SPECTRAL: &[&str] = &["sea", "focused"];
 
 const SPECTRA: [&str; 3] = words(&Spectrum::NAMED);
 
+/// A test compares them with the fields of each kind.
 impl Keyed for Waves {
     const KEYS: &'static [Key] = WAVES_KEYS;
 }
