@@ -206,66 +206,42 @@ impl WallMotionSpec {
     }
 }
 
-/// A motion of a solid is one of a wall with fewer kinds.
-impl From<&SolidMotionSpec> for WallMotionSpec {
-    fn from(spec: &SolidMotionSpec) -> Self {
-        Self {
-            kind: spec.kind,
-            velocity: spec.velocity,
-            until: spec.until,
-            stroke: spec.stroke,
-            period: spec.period,
-            ramp: spec.ramp,
-            file: spec.file.clone(),
-            points: spec.points.clone(),
-            ..Self::default()
+/// Converts the motion of a solid, which is one of a wall with fewer kinds, in both directions.
+macro_rules! motion_of_solid {
+    ($spec:ident, $velocity:ident, $stroke:ident) => {
+        impl From<&$spec> for WallMotionSpec {
+            fn from(spec: &$spec) -> Self {
+                Self {
+                    kind: spec.kind,
+                    velocity: spec.$velocity,
+                    until: spec.until,
+                    stroke: spec.$stroke,
+                    period: spec.period,
+                    ramp: spec.ramp,
+                    file: spec.file.clone(),
+                    points: spec.points.clone(),
+                    ..Self::default()
+                }
+            }
         }
-    }
+
+        impl From<WallMotionSpec> for $spec {
+            fn from(spec: WallMotionSpec) -> Self {
+                Self {
+                    kind: spec.kind,
+                    $velocity: spec.velocity,
+                    until: spec.until,
+                    $stroke: spec.stroke,
+                    period: spec.period,
+                    ramp: spec.ramp,
+                    file: spec.file,
+                    points: spec.points,
+                }
+            }
+        }
+    };
 }
 
-impl From<WallMotionSpec> for SolidMotionSpec {
-    fn from(spec: WallMotionSpec) -> Self {
-        Self {
-            kind: spec.kind,
-            velocity: spec.velocity,
-            until: spec.until,
-            stroke: spec.stroke,
-            period: spec.period,
-            ramp: spec.ramp,
-            file: spec.file,
-            points: spec.points,
-        }
-    }
-}
-
-/// A rotation is a motion whose distances are angles.
-impl From<&TurnSpec> for WallMotionSpec {
-    fn from(spec: &TurnSpec) -> Self {
-        Self {
-            kind: spec.kind,
-            velocity: spec.degrees_per_second,
-            until: spec.until,
-            stroke: spec.swing_degrees,
-            period: spec.period,
-            ramp: spec.ramp,
-            file: spec.file.clone(),
-            points: spec.points.clone(),
-            ..Self::default()
-        }
-    }
-}
-
-impl From<WallMotionSpec> for TurnSpec {
-    fn from(spec: WallMotionSpec) -> Self {
-        Self {
-            kind: spec.kind,
-            degrees_per_second: spec.velocity,
-            until: spec.until,
-            swing_degrees: spec.stroke,
-            period: spec.period,
-            ramp: spec.ramp,
-            file: spec.file,
-            points: spec.points,
-        }
-    }
-}
+motion_of_solid!(SolidMotionSpec, velocity, stroke);
+// Angles take the place of distances.
+motion_of_solid!(TurnSpec, degrees_per_second, swing_degrees);
