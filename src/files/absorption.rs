@@ -8,7 +8,7 @@ use swell_domain::{
 };
 use swell_scene::{SceneError, words::shown};
 
-use super::{document::Document, spec::AbsorptionSpec};
+use super::{document::Document, keys::AbsorptionSpec};
 
 /// Reads and checks the table at `path` for a wall normal to `axis`, with frames of `seconds`.
 pub(super) fn build(

@@ -1,10 +1,10 @@
 //! Reads `[budget]`: limits on a bake, which stops where one is exceeded.
 
-use serde::{Deserialize, Deserializer};
+use serde::{Deserialize, Serialize};
 
 use swell_scene::{Budget, Method, SceneError, Shot, Solver, budget::SPEED_JUMP, words::shown};
 
-use super::document::Document;
+use super::{document::Document, keys::BudgetSpec};
 
 /// Defaults that depend on the scene; the others are in the table of keys.
 const SPEED: f64 = 4.0;
@@ -51,37 +51,27 @@ pub(super) fn energy_words() -> String {
     )
 }
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct BudgetSpec {
-    speed: Option<Limit>,
-    speed_jump: Option<Limit>,
-    density_error_mean: Limit,
-    density_error_p99: Limit,
-    density_error_max: Option<Limit>,
-    capped: Limit,
-    residual: Option<Limit>,
-    divergence: Limit,
-    volume: Limit,
-    energy: Option<Limit>,
-    particles: Limit,
+/// A limit as written.
+#[derive(Clone, Copy, Debug, Deserialize, Serialize)]
+#[serde(untagged)]
+pub(crate) enum Limit {
+    /// `false`: nothing is too much.
+    Off(bool),
+    Most(f64),
 }
 
-#[derive(Clone, Copy)]
-struct Limit(Option<f64>);
+impl From<Option<f64>> for Limit {
+    fn from(limit: Option<f64>) -> Self {
+        limit.map_or(Self::Off(false), Self::Most)
+    }
+}
 
-impl<'de> Deserialize<'de> for Limit {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        #[derive(Deserialize)]
-        #[serde(untagged)]
-        enum Written {
-            Off(#[expect(dead_code, reason = "only `false` is allowed")] bool),
-            Limit(f64),
+impl From<Limit> for Option<f64> {
+    fn from(limit: Limit) -> Self {
+        match limit {
+            Limit::Off(_) => None,
+            Limit::Most(limit) => Some(limit),
         }
-        Ok(Self(match Written::deserialize(deserializer)? {
-            Written::Off(_) => None,
-            Written::Limit(limit) => Some(limit),
-        }))
     }
 }
 
@@ -115,25 +105,42 @@ pub(super) fn build(
     let energy = (scales.wind == 0.0).then_some(energy);
     let of_flip = |limit: f64| (solver.method() == Method::Flip).then_some(limit);
     let residual = match spec.residual {
-        Some(Limit(Some(limit))) if limit < tolerance => {
+        Some(Limit::Most(limit)) if limit < tolerance => {
             let problem = format!("{} is out of range", shown(limit));
             return Err(doc.fault_of("budget.residual", problem));
         }
-        Some(Limit(limit)) => limit,
+        Some(limit) => limit.into(),
         None => Some(RESIDUAL.max(tolerance)),
     };
     Ok(Budget {
-        speed: spec.speed.map_or(Some(speed), |limit| limit.0),
-        speed_jump: spec.speed_jump.map_or(of_flip(SPEED_JUMP), |limit| limit.0),
-        density_error_mean: spec.density_error_mean.0,
-        density_error_p99: spec.density_error_p99.0,
-        density_error_max: (spec.density_error_max)
-            .map_or(of_flip(DENSITY_ERROR_MAX), |limit| limit.0),
-        capped: spec.capped.0,
+        speed: spec.speed.map_or(Some(speed), Limit::into),
+        speed_jump: spec.speed_jump.map_or(of_flip(SPEED_JUMP), Limit::into),
+        density_error_mean: spec.density_error_mean.into(),
+        density_error_p99: spec.density_error_p99.into(),
+        density_error_max: (spec.density_error_max).map_or(of_flip(DENSITY_ERROR_MAX), Limit::into),
+        capped: spec.capped.into(),
         residual,
-        divergence: spec.divergence.0,
-        volume: spec.volume.0,
-        energy: spec.energy.map_or(energy, |limit| limit.0),
-        particles: spec.particles.0,
+        divergence: spec.divergence.into(),
+        volume: spec.volume.into(),
+        energy: spec.energy.map_or(energy, Limit::into),
+        particles: spec.particles.into(),
     })
+}
+
+impl From<&Budget> for BudgetSpec {
+    fn from(budget: &Budget) -> Self {
+        Self {
+            speed: Some(budget.speed.into()),
+            speed_jump: Some(budget.speed_jump.into()),
+            density_error_mean: budget.density_error_mean.into(),
+            density_error_p99: budget.density_error_p99.into(),
+            density_error_max: Some(budget.density_error_max.into()),
+            capped: budget.capped.into(),
+            residual: Some(budget.residual.into()),
+            divergence: budget.divergence.into(),
+            volume: budget.volume.into(),
+            energy: Some(budget.energy.into()),
+            particles: budget.particles.into(),
+        }
+    }
 }

@@ -11,9 +11,9 @@ use super::{
     document::Document,
     effects,
     fit::{comes_into, fits},
-    grids, keep, moving_solid, no_slip, periodic, probe, sources,
-    spec::{BoxSpec, DomainSpec, MeshSpec, SceneSpec, SwarmSpec, WaterSpec},
-    start_waves, wave_maker,
+    grids, keep,
+    keys::{BoxSpec, DomainSpec, MeshSpec, SceneSpec, SolidSpec, SwarmSpec, WaterSpec},
+    moving_solid, no_slip, periodic, probe, sources, start_waves, wave_maker,
 };
 use swell_domain::{
     bounds::Bounds,
@@ -61,7 +61,7 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
         unchosen,
         lattice,
     } = solver::solvers(doc, spec.solver, &domain)?;
-    let periodic = periodic::read(doc, &spec.domain.periodic)?;
+    let periodic = periodic::read(doc, spec.domain.periodic.as_deref().unwrap_or_default())?;
     periodic::check_solver(doc, periodic, &domain, &solver)?;
     let between = spec.effects.act_between_projections();
     let no_slip = no_slip::build(doc, &spec.domain, (solver.method(), between), periodic)?;
@@ -70,7 +70,7 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
     let around = start_waves::Surroundings {
         domain: &domain,
         periodic,
-        gravity: water.gravity.to_array(),
+        gravity: water.gravity,
         spacing: lattice.spacing,
         has_other_water: !water.blocks.is_empty() || !water.meshes.is_empty(),
     };
@@ -116,7 +116,7 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
         None => None,
     };
     let kept = (spec.keep.as_ref().map(|table| keep::build(doc, table))).transpose()?;
-    let is_moving: Vec<bool> = spec.solid.iter().map(MeshSpec::moves).collect();
+    let is_moving: Vec<bool> = spec.solid.iter().map(SolidSpec::moves).collect();
     let around = probe::Around {
         domain: &domain,
         periodic,
@@ -168,7 +168,7 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
 /// Builds the static solids and the moving ones.
 fn solids(
     doc: &Document<'_>,
-    specs: &[MeshSpec],
+    specs: &[SolidSpec],
     around: &wave_maker::Surroundings<'_>,
 ) -> Result<(Vec<PlacedMesh>, Vec<MovingSolid>)> {
     let (mut solids, mut moving) = (Vec::new(), Vec::new());
@@ -188,7 +188,7 @@ fn solids(
             let problem = format!("at most {MAX_MOVING_SOLIDS} solids can move");
             return Err(doc.fault_of_plain(&place, problem));
         }
-        let placed = placed_mesh(doc, around.base_dir, &path, "mesh", (spec, around.spacing))?;
+        let placed = solid_mesh(doc, &path, spec, around)?;
         moving.push(moving_solid::build(doc, &path, placed, spec, around)?);
     }
     Ok((solids, moving))
@@ -366,11 +366,7 @@ fn check_particle_count(
         .filter_map(|m| m.mesh.bounds())
         .map(|b| b.volume() / d.powi(3))
         .sum::<f64>();
-    // Up to a crest of the depth.
-    let below_waves = water.waves.first().map_or(0.0, |wave| {
-        let size = domain.size();
-        size.x * size.z * (2.0 * wave.depth()).min(size.y) / d.powi(3)
-    });
+    let below_waves = start_waves::most_volume(&water.waves, domain) / d.powi(3);
     let placed: usize = water.particles.iter().map(|swarm| swarm.at.len()).sum();
     let count = in_blocks + in_meshes + below_waves + placed as f64 + entering;
     if count > MAX_PARTICLES {
@@ -386,11 +382,11 @@ fn check_particle_count(
 fn static_solid(
     doc: &Document<'_>,
     path: &str,
-    spec: &MeshSpec,
+    spec: &SolidSpec,
     around: &wave_maker::Surroundings<'_>,
 ) -> Result<PlacedMesh> {
     let domain = around.domain;
-    let placed = placed_mesh(doc, around.base_dir, path, "mesh", (spec, around.spacing))?;
+    let placed = solid_mesh(doc, path, spec, around)?;
     let overlaps = placed
         .mesh
         .bounds()
@@ -404,6 +400,16 @@ fn static_solid(
         extent(Some(*domain))
     );
     Err(doc.fault_of(&format!("{path}.mesh"), problem))
+}
+
+fn solid_mesh(
+    doc: &Document<'_>,
+    path: &str,
+    spec: &SolidSpec,
+    around: &wave_maker::Surroundings<'_>,
+) -> Result<PlacedMesh> {
+    let mesh = (&spec.placed(), around.spacing);
+    placed_mesh(doc, around.base_dir, path, "mesh", mesh)
 }
 
 /// Reads the mesh of the table at `path`, whose file is in the key `name`, for particles

@@ -1,24 +1,13 @@
 //! Reads `[grids]`: grids written with each frame beside its particles.
 
-use serde::Deserialize;
-
 use swell_domain::{
     bounds::Bounds,
-    sparse_grid::{EDGE, Precision},
+    sparse_grid::EDGE,
     surface::{MAX_BRICKS, Raster},
 };
 use swell_scene::{SceneError, Solver, grids::Grids, words::shown};
 
-use super::document::Document;
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct GridsSpec {
-    surface: bool,
-    velocity: bool,
-    voxel_size: Option<f64>,
-    precision: Precision,
-}
+use super::{document::Document, keys::GridsSpec};
 
 /// Builds the settings for the chosen solver.
 pub(super) fn build(

@@ -1,34 +1,11 @@
 //! `[keep]`: which data of a bake stay on disk, and their compression.
 
-use serde::Deserialize;
-
-use super::document::Document;
+use super::{document::Document, keys::KeepSpec};
 use swell_domain::keep::{Compression, Keep};
 use swell_scene::SceneError;
 
 /// Values of `compression`.
 pub(super) const COMPRESSIONS: [&str; 2] = ["none", "zstd"];
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct KeepSpec {
-    #[serde(default = "all")]
-    particles: String,
-    #[serde(default)]
-    compression: CompressionSpec,
-}
-
-#[derive(Clone, Copy, Default, Deserialize)]
-#[serde(rename_all = "lowercase")]
-enum CompressionSpec {
-    #[default]
-    None,
-    Zstd,
-}
-
-fn all() -> String {
-    Keep::All.to_string()
-}
 
 /// Validated settings.
 #[derive(Clone, Copy)]
@@ -42,20 +19,16 @@ pub(super) fn build(doc: &Document<'_>, spec: &KeepSpec) -> Result<Kept, SceneEr
     let particles = text
         .parse()
         .map_err(|error| doc.fault_of("keep.particles", format!("{text:?}: {error}")))?;
-    let compression = match spec.compression {
-        CompressionSpec::None => None,
-        CompressionSpec::Zstd => Some(Compression::Zstd),
-    };
     Ok(Kept {
         particles,
-        compression,
+        compression: (spec.compression == COMPRESSIONS[1]).then_some(Compression::Zstd),
     })
 }
 
 /// Returns the value of `compression` in a scene.
 pub(super) fn name(compression: Option<Compression>) -> &'static str {
     match compression {
-        None => "none",
-        Some(Compression::Zstd) => "zstd",
+        None => COMPRESSIONS[0],
+        Some(Compression::Zstd) => COMPRESSIONS[1],
     }
 }

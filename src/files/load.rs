@@ -9,7 +9,12 @@ use swell_scene::{Scene, SceneError};
 
 #[cfg(doc)]
 use super::scene_to_toml;
-use super::{Reach, build, difference::younger, document::Document, keys, spec::SceneSpec};
+use super::{
+    Reach, build,
+    difference::younger,
+    document::Document,
+    keys::{self, SceneSpec},
+};
 
 /// Loads a scene file with overrides applied. An override is a dotted key and a TOML value or
 /// bare word, such as `solver.pbf.iterations=8`. Mesh and table paths are relative to the file

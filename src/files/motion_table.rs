@@ -3,7 +3,7 @@
 
 use std::{fs::File, io::Read as _, path::Path};
 
-use super::{document::Document, motion_spec::check_speed};
+use super::{document::Document, motion::check_speed};
 use swell_domain::{motion::Motion, text};
 use swell_scene::{
     SceneError,
@@ -21,7 +21,7 @@ pub(super) struct Allowed {
     /// Least displacement or angle.
     least: f64,
     /// Checks the speed between two points.
-    check_speed: fn(f64) -> Result<()>,
+    pub(super) check_speed: fn(f64) -> Result<()>,
 }
 
 /// Displacements, metres, that never go behind the start.

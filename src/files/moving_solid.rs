@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use swell_domain::{bounds::Bounds, motion::Motion};
+use swell_domain::bounds::Bounds;
 use swell_scene::{
     PlacedMesh, SceneError, Shot,
     moving_solid::{MovingSolid, Slide, Turn},
@@ -12,11 +12,10 @@ use swell_scene::{
 use super::{
     document::Document,
     fit::comes_into,
-    motion_spec::{MotionSpec, TurnSpec, check_speed},
-    motion_table::{self, ANGLES},
-    solid_track,
-    spec::MeshSpec,
-    wave_maker,
+    keys::{MeshSpec, SolidSpec, WallMotionSpec},
+    motion::{self, check_speed},
+    motion_table::{ANGLES, Allowed, WAYS},
+    solid_track, wave_maker,
 };
 
 /// Least length of a direction vector; only its direction matters.
@@ -24,12 +23,30 @@ const LEAST_DIRECTION: f64 = 1e-6;
 
 type Result<T> = std::result::Result<T, SceneError>;
 
+impl SolidSpec {
+    /// Whether it is a moving solid.
+    pub(super) fn moves(&self) -> bool {
+        self.motion.is_some() || self.turn.is_some() || self.track.is_some()
+    }
+
+    /// Returns its mesh at the start.
+    pub(super) fn placed(&self) -> MeshSpec {
+        MeshSpec {
+            file: self.mesh.clone(),
+            blake3: self.blake3.clone(),
+            translate: self.translate,
+            rotate_degrees: self.rotate_degrees,
+            scale: self.scale,
+        }
+    }
+}
+
 /// Builds the moving solid at `path` from its mesh and its keys.
 pub(super) fn build(
     doc: &Document<'_>,
     path: &str,
     placed: PlacedMesh,
-    spec: &MeshSpec,
+    spec: &SolidSpec,
     around: &wave_maker::Surroundings<'_>,
 ) -> Result<MovingSolid> {
     let at = |key: &str| format!("{path}.{key}");
@@ -40,12 +57,13 @@ pub(super) fn build(
             false => Ok(found),
         }
     };
-    let motion = |key: &str, spec: &MotionSpec| {
-        wave_maker::motion(doc, &at(key), around.base_dir, spec, around.gravity)
+    let motion = |key: &str, spec: &WallMotionSpec, allowed: Allowed| {
+        let by = (around.gravity.length(), allowed);
+        motion::build(doc, &at(key), around.base_dir, spec, by)
     };
     let slide = match (spec.direction, &spec.motion) {
         (Some(way), Some(moves)) => {
-            let motion = motion("motion", moves)?;
+            let motion = motion("motion", &moves.into(), WAYS)?;
             let direction = direction("direction", way)?;
             Some(Slide { direction, motion })
         }
@@ -53,7 +71,7 @@ pub(super) fn build(
     };
     let turn = match (spec.pivot, spec.axis, &spec.turn) {
         (Some(pivot), Some(axis), Some(turns)) => {
-            let motion = turn_motion(doc, &at("turn"), around, turns)?;
+            let motion = motion("turn", &turns.into(), ANGLES)?;
             let pivot = DVec3::from_array(pivot);
             Some(Turn::new(
                 pivot,
@@ -80,37 +98,6 @@ pub(super) fn build(
     };
     check_way(doc, &solid, path, around.domain, around.shot)?;
     Ok(solid)
-}
-
-/// Reads a rotation, in degrees.
-fn turn_motion(
-    doc: &Document<'_>,
-    place: &str,
-    around: &wave_maker::Surroundings<'_>,
-    spec: &TurnSpec,
-) -> Result<Motion> {
-    match *spec {
-        TurnSpec::ConstantVelocity {
-            degrees_per_second,
-            until,
-        } => Ok(Motion::ConstantVelocity {
-            velocity: degrees_per_second,
-            until,
-        }),
-        TurnSpec::Sine {
-            swing_degrees,
-            period,
-            ramp,
-        } => Ok(Motion::Sine {
-            stroke: swing_degrees,
-            period,
-            ramp: ramp.unwrap_or(period),
-        }),
-        TurnSpec::Table {
-            ref file,
-            ref points,
-        } => motion_table::table(doc, place, around.base_dir, (file, points), ANGLES),
-    }
 }
 
 /// Checks that the solid enters the domain at some time and that its motion is plausible: a

@@ -2,7 +2,7 @@
 
 use swell_scene::{Method, SceneError, Wall};
 
-use super::{document::Document, spec::DomainSpec};
+use super::{document::Document, keys::DomainSpec};
 
 /// Values of `domain.walls`, which applies to all six walls.
 pub(super) const WALLS: [&str; 2] = ["free_slip", "no_slip"];
@@ -15,17 +15,16 @@ pub(super) fn build(
     (method, has_own): (Method, bool),
     periodic: [bool; 3],
 ) -> Result<Vec<Wall>, SceneError> {
+    let listed = spec.no_slip.as_deref().unwrap_or_default();
     let is_all = spec.walls.as_deref() == Some(WALLS[1]);
     let all = Wall::NAMED.iter().map(|&(_, wall)| wall);
-    let walls: Vec<Wall> = all
-        .filter(|wall| is_all || spec.no_slip.contains(wall))
-        .collect();
+    let walls: Vec<Wall> = all.filter(|wall| is_all || listed.contains(wall)).collect();
     let key = if is_all {
         "domain.walls"
     } else {
         "domain.no_slip"
     };
-    if !is_all && walls.len() < spec.no_slip.len() {
+    if !is_all && walls.len() < listed.len() {
         return Err(doc.fault_of(key, "a wall is listed twice"));
     }
     let is_none = |wall: &Wall| periodic[wall.axis];

@@ -1,22 +1,17 @@
 //! `[[probe]]`: quantities measured at each frame and written beside the particles.
 
 use glam::{DVec2, DVec3};
-use serde::Deserialize;
 
-use super::document::Document;
+use super::{
+    document::Document,
+    keys::{BearerSpec, ProbeSpec},
+};
 use swell_domain::{bounds::Bounds, probe::Rate, sparse_grid::EDGE, surface::MAX_BRICKS};
 use swell_scene::{
-    Iteration, Method, PlacedMesh, SceneError, Shot, Solver, Wall,
+    Iteration, Method, PlacedMesh, SceneError, Shot, Solver,
     probe::{Bearer, Probe, ProbeKind},
     words::extent,
 };
-
-#[derive(Clone, Copy, Deserialize)]
-#[serde(untagged)]
-enum BearerSpec {
-    Number(usize),
-    Wall(Wall),
-}
 
 /// Default for a front: spray ahead of a breaking wave is less than the remainder.
 const FRONT_QUANTILE: f64 = 0.995;
@@ -26,21 +21,6 @@ const RUN_UP_QUANTILE: f64 = 1.0;
 /// Describes both defaults.
 pub(super) fn quantile_words() -> String {
     format!("{FRONT_QUANTILE} of a front, {RUN_UP_QUANTILE} of a run_up")
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct ProbeSpec {
-    kind: String,
-    name: Option<String>,
-    at: Option<Vec<f64>>,
-    axis: Option<Wall>,
-    quantile: Option<f64>,
-    #[serde(default)]
-    rate_hz: Rate,
-    window: Option<f64>,
-    solid: Option<BearerSpec>,
-    about: Option<[f64; 3]>,
 }
 
 /// Parts of the scene that probes are checked against.

@@ -2,7 +2,7 @@
 
 use super::{
     document::Document,
-    motion_spec::check_speed,
+    motion::check_speed,
     seas::{check_spacings, check_steepness},
 };
 use swell_domain::motion::{

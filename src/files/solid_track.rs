@@ -9,7 +9,7 @@ use gltf::Gltf;
 use super::{
     document::Document,
     gltf_nodes::{Beside, Nodes, named},
-    spec::TrackSpec,
+    keys::TrackSpec,
     usd_nodes::{self, UsdNodes},
     usda::Prim,
 };

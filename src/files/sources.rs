@@ -1,12 +1,11 @@
 //! `[[emitter]]` and `[[drain]]`: where water enters and leaves during the shot.
 
 use glam::DVec3;
-use toml::{Table, Value};
 
 use super::{
     document::Document,
     fit::fits,
-    spec::{BoxSpec, DrainSpec, EmitterSpec, MeshSpec},
+    keys::{BoxSpec, DrainSpec, EmitterSpec, MeshSpec},
 };
 use swell_domain::{
     bounds::Bounds,
@@ -235,45 +234,4 @@ fn check_solids(
         Region::Mesh(_) => format!("{path}.mesh.file"),
     };
     Err(doc.fault_of(&key, "the emitter lies within a solid"))
-}
-
-/// Writers for the parts of a source's table.
-pub(super) struct Written<'a> {
-    pub(super) corners: &'a dyn Fn(&Bounds) -> Table,
-    pub(super) mesh: &'a dyn Fn(&PlacedMesh) -> Table,
-    pub(super) origin: DVec3,
-}
-
-impl Written<'_> {
-    pub(super) fn emitter(&self, emitter: &Emitter<Region>) -> Table {
-        let velocity = emitter.velocity.to_array();
-        let mut rows = self.room(&emitter.shape, emitter.level, emitter.window);
-        rows.insert("velocity".to_owned(), numbers(&velocity));
-        rows
-    }
-
-    pub(super) fn drain(&self, drain: &Drain<Region>) -> Table {
-        let mut rows = self.room(&drain.shape, drain.level, drain.window);
-        rows.extend(drain.rate.map(|rate| ("rate".to_owned(), rate.into())));
-        rows
-    }
-
-    fn room(&self, region: &Region, level: Option<f64>, window: Window) -> Table {
-        let mut rows = match region {
-            Region::Block(block) => (self.corners)(&block.moved(self.origin)),
-            Region::Mesh(placed) => {
-                Table::from_iter([("mesh".to_owned(), Value::Table((self.mesh)(placed)))])
-            }
-        };
-        rows.insert("from".to_owned(), window.from.into());
-        let level = level.map(|level| level + self.origin.y);
-        for (name, value) in [("level", level), ("until", window.until)] {
-            rows.extend(value.map(|value| (name.to_owned(), value.into())));
-        }
-        rows
-    }
-}
-
-fn numbers(of: &[f64]) -> Value {
-    Value::Array(of.iter().map(|&x| x.into()).collect())
 }

@@ -2,12 +2,9 @@
 
 use std::f64::consts::TAU;
 
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 
-use swell_domain::{
-    bounds::Bounds,
-    motion::{Spectrum, wave_number},
-};
+use swell_domain::{bounds::Bounds, motion::wave_number};
 use swell_scene::{
     SceneError,
     start_waves::{HIGHEST_SOLITARY, KEY, StartWave},
@@ -15,100 +12,63 @@ use swell_scene::{
 };
 
 use crate::{
+    declare::Keyed,
     document::Document,
     effects::generation_zone::check_waves,
-    key::{Interval, Key, words},
+    key::Key,
+    wave_keys::{self, LENGTH},
 };
 
-const LENGTH: Interval = 1e-9..=1e6;
-
-const PERIOD: Interval = 1e-4..=1e6;
-
-const SPECTRA: [&str; 3] = words(&Spectrum::NAMED);
+const SEA: &[&str] = &["sea"];
 
 type Result<T> = std::result::Result<T, SceneError>;
 
 /// How far a length of a periodic axis may be from a whole number of wave lengths, in wave lengths.
 const FITS: f64 = 0.01;
 
-pub(super) const KEYS: &[Key] = &[
-    Key::choice("kind", &["solitary", "stokes", "sea"]).about(
-        "`solitary`: one wave to third order (Grimshaw 1971); `stokes`: regular waves to second \
-         order (Stokes 1847); `sea`: 64 waves of a spectrum by linear theory, the same as a \
-         generation zone with these keys brings in at the start of its shot",
-    ),
-    Key::number("height", LENGTH)
-        .unit("metres")
-        .only("kind", &["solitary", "stokes"])
-        .also(
-            ", of a solitary wave at most half the depth; regular waves up to 0.78 depths and no \
-             steeper than waves can be",
-        )
-        .about(
-            "of a solitary wave's crest above still water; of regular waves, from trough to crest",
+/// A test compares them with the fields of each kind.
+impl Keyed for StartWave {
+    const KEYS: &'static [Key] = &[
+        Key::choice("kind", &["solitary", "stokes", "sea"]).about(
+            "`solitary`: one wave to third order (Grimshaw 1971); `stokes`: regular waves to \
+             second order (Stokes 1847); `sea`: 64 waves of a spectrum by linear theory",
         ),
-    Key::number("period", PERIOD)
-        .unit("seconds")
-        .only("kind", &["stokes"])
-        .also(", of waves that are at least 10 particle spacings long")
-        .about("of the waves"),
-    Key::number("significant_height", LENGTH)
-        .unit("metres")
-        .only("kind", &["sea"])
-        .also(", at most the depth and no steeper at the peak than waves can be")
-        .about("four times the root of the elevation's variance"),
-    Key::number("peak_period", PERIOD)
-        .unit("seconds")
-        .only("kind", &["sea"])
-        .about("of the waves with the most energy"),
-    Key::choice("spectrum", &SPECTRA)
-        .default("\"jonswap\"")
-        .only("kind", &["sea"])
-        .about("as a wave maker's"),
-    Key::number("peak_enhancement", 1.0..=20.0)
-        .computed(|| "3.3".to_owned())
-        .only("kind", &["sea"])
-        .also(", not with spectrum = \"pierson_moskowitz\"")
-        .about("γ, how much higher the peak is than Pierson and Moskowitz's"),
-    Key::number("shortest_period", PERIOD)
-        .unit("seconds")
-        .computed(|| "a third of the peak's".to_owned())
-        .only("kind", &["sea"])
-        .also(
-            ", a tenth to nine tenths of the peak's, of waves that are at least 10 \
-               particle spacings long",
-        )
-        .about("of the shortest waves; what is left out is given to the others"),
-    Key::number("spreading", 0.5..=1000.0)
-        .absent()
-        .only("kind", &["sea"])
-        .about(
-            "s of the spread over directions, (cos ½θ)^2s (Longuet-Higgins, Cartwright and \
-                Smith 1963): wind seas about 10, swell 75; left out, all waves go one way",
-        ),
-    Key::whole("seed", 0..=u32::MAX)
-        .default("0")
-        .only("kind", &["sea"])
-        .about("another number makes another sea of the same spectrum"),
-    Key::number("at", -1e6..=1e6)
-        .unit("metres")
-        .only("kind", &["solitary"])
-        .about("of the crest from the domain's least corner, along the way that the wave goes"),
-    Key::number("depth", LENGTH)
-        .unit("metres")
-        .also(", no more than the domain is high, and the same for all waves")
-        .about("of the water at rest, from the domain's floor"),
-    Key::number("direction_degrees", -360.0..=360.0)
-        .unit("degrees")
-        .default("0.0")
-        .about("where most of the waves go, from +x towards +z"),
-];
+        Key::number("height", LENGTH)
+            .unit("metres")
+            .only("kind", &["solitary", "stokes"])
+            .also(
+                ", of a solitary wave at most half the depth; regular waves up to 0.78 depths \
+                 and no steeper than waves can be",
+            )
+            .about(
+                "of a solitary wave's crest above still water; of regular waves, from trough to \
+                 crest",
+            ),
+        wave_keys::period(),
+        wave_keys::significant_height(SEA),
+        wave_keys::peak_period(SEA),
+        wave_keys::spectrum(SEA),
+        wave_keys::peak_enhancement(SEA),
+        wave_keys::shortest_period(SEA),
+        wave_keys::spreading(SEA),
+        wave_keys::seed(SEA),
+        Key::number("at", -1e6..=1e6)
+            .unit("metres")
+            .only("kind", &["solitary"])
+            .about("of the crest from the domain's least corner, along the way that the wave goes"),
+        Key::number("depth", LENGTH)
+            .unit("metres")
+            .also(", no more than the domain is high, and the same for all waves")
+            .about("of the water at rest, from the domain's floor"),
+        wave_keys::direction_degrees(),
+    ];
+}
 
 /// What the waves have to fit.
 pub(super) struct Surroundings<'a> {
     pub(super) domain: &'a Bounds,
     pub(super) periodic: [bool; 3],
-    pub(super) gravity: [f64; 3],
+    pub(super) gravity: DVec3,
     pub(super) spacing: f64,
     /// Whether the scene has blocks or meshes of water.
     pub(super) has_other_water: bool,
@@ -150,7 +110,7 @@ fn check_one(
     around: &Surroundings<'_>,
 ) -> Result<()> {
     let refuse = |key: &str, problem: String| Err(doc.fault_of(&format!("{path}.{key}"), problem));
-    let [x, y, z] = around.gravity;
+    let DVec3 { x, y, z } = around.gravity;
     if x != 0.0 || z != 0.0 || y >= 0.0 {
         return refuse("kind", "waves need gravity along -y".to_owned());
     }
@@ -198,7 +158,7 @@ fn check_periods(
                 return refuse("spreading", problem);
             }
             StartWave::Stokes(waves) if along.abs() > 1e-6 => {
-                let k = wave_number(TAU / waves.period, waves.depth, -around.gravity[1]);
+                let k = wave_number(TAU / waves.period, waves.depth, -around.gravity.y);
                 let count = size * along.abs() * k / TAU;
                 if count < 0.5 || (count - count.round()).abs() > FITS {
                     let problem = format!(
@@ -222,4 +182,13 @@ fn check_periods(
         }
     }
     Ok(())
+}
+
+/// Most water below waves, m³: as deep as up to a crest that is one depth high.
+pub(super) fn most_volume(waves: &[StartWave], domain: &Bounds) -> f64 {
+    let size = domain.size();
+    let deepest = |wave: &StartWave| (2.0 * wave.depth()).min(size.y);
+    waves
+        .first()
+        .map_or(0.0, |wave| size.x * size.z * deepest(wave))
 }

@@ -1,22 +1,15 @@
 //! Wave makers: reading their motions, and checking that walls do not collide.
 
-use std::{f64::consts::PI, path::Path};
+use std::path::Path;
 
 use glam::DVec3;
 
 use super::{
-    absorption,
-    document::Document,
-    motion_spec::{MotionSpec, check_speed},
-    motion_table::{WAYS, table},
-    regular_waves, seas,
-    spec::WaveMakerSpec,
+    absorption, document::Document, keys::WaveMakerSpec, motion, motion_table::WAYS, regular_waves,
+    seas,
 };
-use swell_domain::{
-    bounds::Bounds,
-    motion::{Motion, Phases, SeaParameters},
-};
-use swell_scene::{SceneError, Shot, WaveMaker, waves, words::shown};
+use swell_domain::{bounds::Bounds, motion::Motion};
+use swell_scene::{SceneError, Shot, WaveMaker, words::shown};
 
 type Result<T> = std::result::Result<T, SceneError>;
 
@@ -46,7 +39,8 @@ pub(super) fn build_all(
             let problem = format!("a second wave maker on the wall {}", spec.wall.name());
             return Err(doc.fault_of(&format!("{path}.wall"), problem));
         }
-        let motion = motion(doc, &place, around.base_dir, &spec.motion, around.gravity)?;
+        let by = (around.gravity.length(), WAYS);
+        let motion = motion::build(doc, &place, around.base_dir, &spec.motion, by)?;
         if let Motion::Sea(sea) = &motion {
             let rest = spec.absorption.as_ref().map_or(0.0, |it| it.room);
             let size = around.domain.size()[spec.wall.axis] - rest;
@@ -128,122 +122,4 @@ fn meeting_time(a: &WaveMaker, b: &WaveMaker, room: f64, duration: f64) -> Optio
         let closing = a.peak_speed(t, t + step) + b.peak_speed(t, t + step);
         gap < closing * step
     })
-}
-
-/// Builds the motion of the table at `path`.
-pub(super) fn motion(
-    doc: &Document<'_>,
-    path: &str,
-    base_dir: &Path,
-    spec: &MotionSpec,
-    gravity: DVec3,
-) -> Result<Motion> {
-    match *spec {
-        MotionSpec::Still => Ok(Motion::Still),
-        MotionSpec::ConstantVelocity { velocity, until } => {
-            Ok(Motion::ConstantVelocity { velocity, until })
-        }
-        MotionSpec::Sine {
-            stroke,
-            period,
-            ramp,
-        } => {
-            check_speed(PI * stroke / period)
-                .map_err(|problem| doc.fault_of_plain(path, problem))?;
-            Ok(Motion::Sine {
-                stroke,
-                period,
-                ramp: ramp.unwrap_or(period),
-            })
-        }
-        MotionSpec::Solitary { height, depth } => {
-            if height > depth {
-                let problem = format!(
-                    "a wave of {} m on {} m of water",
-                    shown(height),
-                    shown(depth)
-                );
-                return Err(doc.fault_of(&format!("{path}.height"), problem));
-            }
-            if gravity.length() == 0.0 {
-                let problem = "a solitary wave needs gravity";
-                return Err(doc.fault_of(&format!("{path}.kind"), problem));
-            }
-            Ok(Motion::Solitary {
-                height,
-                depth,
-                gravity: gravity.length(),
-            })
-        }
-        MotionSpec::Stokes {
-            height,
-            period,
-            depth,
-            ramp,
-        } => {
-            let water = [height, period, depth, gravity.length()];
-            regular_waves::stokes(doc, path, waves::regular(water, ramp))
-        }
-        MotionSpec::Cnoidal {
-            height,
-            period,
-            depth,
-            ramp,
-        } => {
-            let water = [height, period, depth, gravity.length()];
-            regular_waves::cnoidal(doc, path, waves::regular(water, ramp))
-        }
-        MotionSpec::Sea {
-            significant_height,
-            seed,
-            spectrum,
-            peak_enhancement,
-            peak_period,
-            shortest_period,
-            depth,
-            ramp,
-            second_order,
-        } => {
-            let water = [peak_period, depth, gravity.length()];
-            let phases = Phases::Random {
-                significant_height,
-                seed,
-            };
-            let left_out = [shortest_period, ramp];
-            let shape = seas::shape(doc, path, spectrum, peak_enhancement)?;
-            let asked = seas::asked(shape, water, left_out, phases);
-            let asked = SeaParameters {
-                second_order,
-                ..asked
-            };
-            seas::build(doc, path, asked)
-        }
-        MotionSpec::Focused {
-            height,
-            at,
-            time,
-            spectrum,
-            peak_enhancement,
-            peak_period,
-            shortest_period,
-            depth,
-            ramp,
-            second_order,
-        } => {
-            let water = [peak_period, depth, gravity.length()];
-            let phases = Phases::Focused { height, at, time };
-            let left_out = [shortest_period, ramp];
-            let shape = seas::shape(doc, path, spectrum, peak_enhancement)?;
-            let asked = seas::asked(shape, water, left_out, phases);
-            let asked = SeaParameters {
-                second_order,
-                ..asked
-            };
-            seas::build(doc, path, asked)
-        }
-        MotionSpec::Table {
-            ref file,
-            ref points,
-        } => table(doc, path, base_dir, (file, points), WAYS),
-    }
 }

@@ -1,13 +1,15 @@
 //! Whitewater settings: how a stream of spray, foam and bubbles is derived from a finished bake.
 //! They do not affect the bake's physics.
 
-use std::{fmt::Write as _, path::Path};
+use std::path::Path;
 
 use serde::Deserialize;
 
 use super::{
+    declare::{Keyed, keys},
     document::Document,
     key::{Interval, Key},
+    write::to_toml,
 };
 use swell_domain::{
     text,
@@ -24,135 +26,95 @@ const SECONDS: Interval = 1e-4..=1e6;
 /// Default range of radii, particle spacings.
 const RADII: [f64; 2] = [0.025, 0.08];
 
-pub(super) const KEYS: &[Key] = &[
-    Key::whole("seed", 0..=u32::MAX)
+/// Keys of a settings file.
+pub(super) const KEYS: &[Key] = WhitewaterSpec::KEYS;
+
+keys! { struct WhitewaterSpec {
+    seed: u32 = whole(0..=u32::MAX)
         .default("0")
         .about("of all random numbers"),
-    Key::whole("max_particles", 1..=200_000_000)
+    max_particles: u32 = whole(1..=200_000_000)
         .default("4000000")
         .about("a frame with more ends the job, its last good frame kept"),
-    Key::vector("radius", 2, RADIUS)
+    radius: Option<[f64; 2]> = vector(2, RADIUS)
         .unit("metres")
         .computed(|| format!("{} and {} particle spacings", RADII[0], RADII[1]))
         .also(", rising")
         .about("least and greatest radius of a whitewater particle, as it is drawn"),
-    Key::table("emission", EMISSION)
+    emission: EmissionSpec = table()
         .default("{}")
         .about("Where whitewater is born, and how much (Ihmsen et al. 2012)"),
-    Key::table("spray", SPRAY)
+    spray: SpraySpec = table()
         .default("{}")
         .about("Drops in the air"),
-    Key::table("foam", FOAM)
+    foam: FoamSpec = table()
         .default("{}")
         .about("What floats on the surface"),
-    Key::table("bubbles", BUBBLES)
+    bubbles: BubblesSpec = table()
         .default("{}")
         .about("Air under the surface"),
-];
+} }
 
-const EMISSION: &[Key] = &[
-    Key::number("trapped_air_rate", RATE)
+keys! { struct EmissionSpec {
+    trapped_air_rate: f64 = number(RATE)
         .unit("1/s")
         .default("250.0")
         .about("born a second of one water particle where water meets water hardest; 0: none"),
-    Key::number("wave_crest_rate", RATE)
+    wave_crest_rate: f64 = number(RATE)
         .unit("1/s")
         .default("250.0")
         .about("the same at the sharpest crests"),
-    Key::vector("trapped_air", 2, POTENTIAL)
+    trapped_air: Option<[f64; 2]> = vector(2, POTENTIAL)
         .unit("m/s")
         .computed(|| "what the shot gives".to_owned())
         .also(", rising")
         .about("from where to where the potential of trapped air grows from 0 to 1"),
-    Key::vector("wave_crest", 2, POTENTIAL)
+    wave_crest: Option<[f64; 2]> = vector(2, POTENTIAL)
         .computed(|| "what the shot gives".to_owned())
         .also(", rising")
         .about("the same of wave crests"),
-    Key::vector("energy", 2, POTENTIAL)
+    energy: Option<[f64; 2]> = vector(2, POTENTIAL)
         .unit("J/kg")
         .computed(|| "what the shot gives".to_owned())
         .also(", rising")
         .about("the same of v²/2, which the other two are multiplied by"),
-];
+} }
 
-const SPRAY: &[Key] = &[
-    Key::number("drop_radius", RADIUS)
+keys! { struct SpraySpec {
+    drop_radius: f64 = number(RADIUS)
         .unit("metres")
         .default("0.001")
         .about("of the drops that a particle of spray stands for; the air slows small ones more"),
-    Key::vector("wind", 3, -1e3..=1e3)
+    wind: [f64; 3] = vector(3, -1e3..=1e3)
         .unit("m/s")
         .default("[0.0, 0.0, 0.0]")
         .about("velocity of the air"),
-];
+} }
 
-const FOAM: &[Key] = &[
-    Key::vector("lifetime", 2, SECONDS)
+keys! { struct FoamSpec {
+    lifetime: [f64; 2] = vector(2, SECONDS)
         .unit("seconds")
         .default("[0.5, 4.0]")
         .also(", rising")
         .about("least and greatest; a stronger cause leaves foam that lives longer"),
-    Key::whole("crowd", 1..=1_000_000)
+    crowd: u32 = whole(1..=1_000_000)
         .default("64")
         .about("foam in a cube of one spacing from which on it dies faster"),
-];
+} }
 
-const BUBBLES: &[Key] = &[
-    Key::number("rise_speed", 0.0..=10.0)
+keys! { struct BubblesSpec {
+    rise_speed: f64 = number(0.0..=10.0)
         .unit("m/s")
         .default("0.25")
         .about(
             "through still water; bubbles of 1 to 10 mm rise at 0.2 to 0.3 m/s \
              (Clift, Grace and Weber 1978)",
         ),
-    Key::number("response", SECONDS)
+    response: f64 = number(SECONDS)
         .unit("seconds")
         .default("0.1")
         .about("how fast a bubble takes on what the water about it does"),
-];
-
-#[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct WhitewaterSpec {
-    seed: u32,
-    max_particles: u32,
-    radius: Option<[f64; 2]>,
-    emission: EmissionSpec,
-    spray: SpraySpec,
-    foam: FoamSpec,
-    bubbles: BubblesSpec,
-}
-
-#[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct EmissionSpec {
-    trapped_air_rate: f64,
-    wave_crest_rate: f64,
-    trapped_air: Option<[f64; 2]>,
-    wave_crest: Option<[f64; 2]>,
-    energy: Option<[f64; 2]>,
-}
-
-#[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct SpraySpec {
-    drop_radius: f64,
-    wind: [f64; 3],
-}
-
-#[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct FoamSpec {
-    lifetime: [f64; 2],
-    crowd: u32,
-}
-
-#[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct BubblesSpec {
-    rise_speed: f64,
-    response: f64,
-}
+} }
 
 /// A validated settings file. Values that depend on the shot may be open.
 #[derive(Clone, Debug)]
@@ -253,60 +215,35 @@ impl WhitewaterSettings {
 
 /// Returns a file with all settings, which [`WhitewaterSettings::parse`] reads back.
 pub fn written_out(settings: &CalibratedSettings) -> String {
-    let CalibratedSettings {
-        seed,
-        max_particles,
-        radius,
-        trapped_air_rate,
-        wave_crest_rate,
-        thresholds,
-        drop_radius,
-        wind,
-        lifetime,
-        crowd,
-        rise_speed,
-        response,
-    } = settings;
-    let mut text = format!("seed = {seed}\nmax_particles = {max_particles}\nradius = {radius:?}\n");
-    let mut table = |name: &str, rows: &[(&str, String)]| {
-        // Writing to a string does not fail.
-        let _ = write!(text, "\n[{name}]\n");
-        for (key, value) in rows {
-            let _ = writeln!(text, "{key} = {value}");
-        }
-    };
-    table(
-        "emission",
-        &[
-            ("trapped_air_rate", format!("{trapped_air_rate:?}")),
-            ("wave_crest_rate", format!("{wave_crest_rate:?}")),
-            ("trapped_air", format!("{:?}", thresholds.trapped_air)),
-            ("wave_crest", format!("{:?}", thresholds.wave_crest)),
-            ("energy", format!("{:?}", thresholds.energy)),
-        ],
-    );
-    table(
-        "spray",
-        &[
-            ("drop_radius", format!("{drop_radius:?}")),
-            ("wind", format!("{wind:?}")),
-        ],
-    );
-    table(
-        "foam",
-        &[
-            ("lifetime", format!("{lifetime:?}")),
-            ("crowd", crowd.to_string()),
-        ],
-    );
-    table(
-        "bubbles",
-        &[
-            ("rise_speed", format!("{rise_speed:?}")),
-            ("response", format!("{response:?}")),
-        ],
-    );
-    text
+    let Thresholds {
+        trapped_air,
+        wave_crest,
+        energy,
+    } = settings.thresholds;
+    to_toml(&WhitewaterSpec {
+        seed: settings.seed,
+        max_particles: settings.max_particles,
+        radius: Some(settings.radius),
+        emission: EmissionSpec {
+            trapped_air_rate: settings.trapped_air_rate,
+            wave_crest_rate: settings.wave_crest_rate,
+            trapped_air: Some(trapped_air),
+            wave_crest: Some(wave_crest),
+            energy: Some(energy),
+        },
+        spray: SpraySpec {
+            drop_radius: settings.drop_radius,
+            wind: settings.wind,
+        },
+        foam: FoamSpec {
+            lifetime: settings.lifetime,
+            crowd: settings.crowd,
+        },
+        bubbles: BubblesSpec {
+            rise_speed: settings.rise_speed,
+            response: settings.response,
+        },
+    })
 }
 
 #[cfg(test)]

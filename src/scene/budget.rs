@@ -56,23 +56,6 @@ pub struct Before {
 }
 
 impl Budget {
-    /// Returns each limit with its quantity, in the order of the table of keys.
-    pub fn rows(&self) -> [(Watched, Option<f64>); 11] {
-        [
-            (Watched::Speed, self.speed),
-            (Watched::SpeedJump, self.speed_jump),
-            (Watched::DensityErrorMean, self.density_error_mean),
-            (Watched::DensityErrorP99, self.density_error_p99),
-            (Watched::DensityErrorMax, self.density_error_max),
-            (Watched::Capped, self.capped),
-            (Watched::Residual, self.residual),
-            (Watched::Divergence, self.divergence),
-            (Watched::Volume, self.volume),
-            (Watched::Energy, self.energy),
-            (Watched::Count, self.particles),
-        ]
-    }
-
     /// Compares the number of particles after frame `frame` with its limit.
     ///
     /// # Errors

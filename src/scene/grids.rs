@@ -1,11 +1,9 @@
 //! `[grids]`: grids written with each frame beside its particles.
 
-use serde::Serialize;
-
 use swell_domain::sparse_grid::Precision;
 
 /// Grids written with each frame.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Grids {
     /// Whether to write a level set of the water's surface.
     pub surface: bool,

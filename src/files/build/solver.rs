@@ -3,7 +3,7 @@
 use super::{
     super::{
         document::Document,
-        spec::{PbfSpec, SolverSpec},
+        keys::{PbfSpec, SolverSpec},
     },
     Lattice, Result,
 };

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use glam::{DVec2, DVec3};
 
 use swell_domain::{
-    motion::{Spectrum, wave_number},
+    motion::wave_number,
     open_waves::Meeting,
 };
 use swell_scene::{
@@ -16,43 +16,41 @@ use swell_scene::{
 
 use super::{Declared, Surroundings, zone};
 use crate::{
+    declare::{Keyed, keys},
     document::Document,
-    key::{Interval, Key, words},
-    motion_spec::check_speed,
+    key::{Key, words},
+    motion::check_speed,
     regular_waves, seas,
+    wave_keys::{self, LENGTH, PERIOD},
 };
 
 /// Keys of the effect and of its waves.
 const KEY: &str = "effects.generation_zone";
 
-const LENGTH: Interval = 1e-9..=1e6;
-
-const PERIOD: Interval = 1e-4..=1e6;
+keys! { fields of Settings {
+    walls: Vec<Wall> = choices(&words(&Wall::NAMED))
+        .also(
+            ", upright ones, each once, none of them periodic or a wave maker's, one at \
+             least from which the waves come",
+        )
+        .about("the walls before which the zones lie; the water's gravity goes along -y"),
+    length: f64 = number(1e-7..=1e6)
+        .unit("metres")
+        .also(", at least two particle spacings and no longer than the domain is")
+        .about(
+            "of each zone from its wall; with one and a half wave lengths waves are within \
+             5 % of those asked for",
+        ),
+    waves: Waves = inline().about(
+        "what comes in; height, phase and velocity are \
+         given at each place of the zones",
+    ),
+} }
 
 impl Declared for Settings {
     const ABOUT: &'static str = "Zones before walls in which water is led towards given waves, \
                                  which run in from there, and in which what runs out dies \
                                  (relaxation zones, Jacobsen, Fuhrman and Fredsøe 2012)";
-
-    const KEYS: &'static [Key] = &[
-        Key::choices("walls", &words(&Wall::NAMED))
-            .also(
-                ", upright ones, each once, none of them periodic or a wave maker's, one at \
-                   least from which the waves come",
-            )
-            .about("the walls before which the zones lie; the water's gravity goes along -y"),
-        Key::number("length", 1e-7..=1e6)
-            .unit("metres")
-            .also(", at least two particle spacings and no longer than the domain is")
-            .about(
-                "of each zone from its wall; with one and a half wave lengths waves are within \
-                    5 % of those asked for",
-            ),
-        Key::inline("waves", WAVES_KEYS).about(
-            "what comes in; height, phase and velocity are \
-            given at each place of the zones",
-        ),
-    ];
 
     fn check(&self, doc: &Document<'_>, around: &Surroundings<'_>) -> Result<(), SceneError> {
         zone::check(&self.zone(), doc, KEY, around)?;
@@ -208,67 +206,35 @@ const PACKET: &[&str] = &["focused"];
 
 const SPECTRAL: &[&str] = &["sea", "focused"];
 
-const SPECTRA: [&str; 3] = words(&Spectrum::NAMED);
+/// A test compares them with the fields of each kind.
+impl Keyed for Waves {
+    const KEYS: &'static [Key] = WAVES_KEYS;
+}
 
 const WAVES_KEYS: &[Key] = &[
     Key::choice("kind", &["stokes", "sea", "focused"]).about(
         "`stokes`: regular waves to second order (Stokes 1847); `sea`: 64 waves of a \
-                spectrum by linear theory; `focused`: such waves, whose crests meet",
+         spectrum by linear theory; `focused`: such waves, whose crests meet",
     ),
     Key::number("height", LENGTH)
         .unit("metres")
         .only("kind", &["stokes", "focused"])
         .also(
             ", at most the depth; regular waves up to 0.78 depths and no \
-               steeper than waves can be",
+             steeper than waves can be",
         )
         .about(
             "of regular waves, from trough to crest; of a packet's crest above still \
-                water by linear theory",
+             water by linear theory",
         ),
-    Key::number("period", PERIOD)
-        .unit("seconds")
-        .only("kind", &["stokes"])
-        .also(", of waves that are at least 10 particle spacings long")
-        .about("of the waves"),
-    Key::number("significant_height", LENGTH)
-        .unit("metres")
-        .only("kind", SEA)
-        .also(", at most the depth and no steeper at the peak than waves can be")
-        .about("four times the root of the elevation's variance"),
-    Key::number("peak_period", PERIOD)
-        .unit("seconds")
-        .only("kind", SPECTRAL)
-        .about("of the waves with the most energy"),
-    Key::choice("spectrum", &SPECTRA)
-        .default("\"jonswap\"")
-        .only("kind", SPECTRAL)
-        .about("as a wave maker's"),
-    Key::number("peak_enhancement", 1.0..=20.0)
-        .computed(|| "3.3".to_owned())
-        .only("kind", SPECTRAL)
-        .also(", not with spectrum = \"pierson_moskowitz\"")
-        .about("γ, how much higher the peak is than Pierson and Moskowitz's"),
-    Key::number("shortest_period", PERIOD)
-        .unit("seconds")
-        .computed(|| "a third of the peak's".to_owned())
-        .only("kind", SPECTRAL)
-        .also(
-            ", a tenth to nine tenths of the peak's, of waves that are at least 10 \
-               particle spacings long",
-        )
-        .about("of the shortest waves; what is left out is given to the others"),
-    Key::number("spreading", 0.5..=1000.0)
-        .absent()
-        .only("kind", SPECTRAL)
-        .about(
-            "s of the spread over directions, (cos ½θ)^2s (Longuet-Higgins, Cartwright and \
-                Smith 1963): wind seas about 10, swell 75; left out, all waves go one way",
-        ),
-    Key::whole("seed", 0..=u32::MAX)
-        .default("0")
-        .only("kind", SEA)
-        .about("another number makes another sea of the same spectrum"),
+    wave_keys::period(),
+    wave_keys::significant_height(SEA),
+    wave_keys::peak_period(SPECTRAL),
+    wave_keys::spectrum(SPECTRAL),
+    wave_keys::peak_enhancement(SPECTRAL),
+    wave_keys::shortest_period(SPECTRAL),
+    wave_keys::spreading(SPECTRAL),
+    wave_keys::seed(SEA),
     Key::vector("at", 2, 0.0..=1e6)
         .unit("metres")
         .only("kind", PACKET)
@@ -288,8 +254,5 @@ const WAVES_KEYS: &[Key] = &[
         .computed(|| "two periods (of the peak)".to_owned())
         .also("; 0 of regular waves alone")
         .about("how long the waves take to grow to their full height"),
-    Key::number("direction_degrees", -360.0..=360.0)
-        .unit("degrees")
-        .default("0.0")
-        .about("where most of the waves go, from +x towards +z"),
+    wave_keys::direction_degrees(),
 ];

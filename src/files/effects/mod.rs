@@ -7,7 +7,7 @@ use glam::DVec3;
 use swell_domain::bounds::Bounds;
 use swell_scene::{Effects, SceneError, WaveMaker, effects::with_effects};
 
-use crate::{document::Document, key::Key};
+use crate::{declare::Keyed, document::Document, key::Key};
 
 /// Parts of a scene that an effect is checked against.
 pub(super) struct Surroundings<'a> {
@@ -23,11 +23,9 @@ pub(super) struct Surroundings<'a> {
 }
 
 /// Settings of an effect with their keys.
-trait Declared {
+trait Declared: Keyed {
     /// Description for the page of keys.
     const ABOUT: &'static str;
-    /// The effect's keys.
-    const KEYS: &'static [Key];
 
     /// Rejects settings that do not fit the scene.
     fn check(&self, _: &Document<'_>, _: &Surroundings<'_>) -> Result<(), SceneError> {
@@ -40,14 +38,16 @@ macro_rules! declared {
         $(pub(super) mod $name;)+
 
         /// Keys of each effect in a table of its own.
-        pub(super) const KEYS: &[Key] = &[$(
-            Key::inline(
-                stringify!($name),
-                <swell_scene::effects::$name::Settings as Declared>::KEYS,
-            )
-            .absent()
-            .about(<swell_scene::effects::$name::Settings as Declared>::ABOUT)
-        ),+];
+        impl Keyed for Effects {
+            const KEYS: &'static [Key] = &[$(
+                Key::inline(
+                    stringify!($name),
+                    <swell_scene::effects::$name::Settings as Keyed>::KEYS,
+                )
+                .absent()
+                .about(<swell_scene::effects::$name::Settings as Declared>::ABOUT)
+            ),+];
+        }
 
         /// Rejects settings that do not fit the scene.
         pub(super) fn check(

@@ -3,15 +3,17 @@
 use swell_scene::{SceneError, effects::surface_tension::Settings};
 
 use super::{Declared, Surroundings};
-use crate::{document::Document, key::Key};
+use crate::{declare::keys, document::Document};
+
+keys! { fields of Settings {
+    coefficient: f64 = number(1e-9..=1e6).unit("N/m").about(
+        "σ, of water in air 0.0728 at 20 °C; a substep is no longer than √(ρ Δx³ / (2π σ))",
+    ),
+} }
 
 impl Declared for Settings {
     const ABOUT: &'static str =
         "Surface tension, as the jump of the pressure at the surface (Kang, Fedkiw and Liu 2000)";
-
-    const KEYS: &'static [Key] = &[Key::number("coefficient", 1e-9..=1e6).unit("N/m").about(
-        "σ, of water in air 0.0728 at 20 °C; a substep is no longer than √(ρ Δx³ / (2π σ))",
-    )];
 
     fn check(&self, doc: &Document<'_>, around: &Surroundings<'_>) -> Result<(), SceneError> {
         match around.has_projection {

@@ -6,37 +6,37 @@ use swell_scene::{
 };
 
 use super::{Declared, Surroundings};
-use crate::{document::Document, key::Key};
+use crate::{declare::keys, document::Document};
+
+keys! { fields of Settings {
+    coefficient: Option<f64> = number(1e-6..=1e9)
+        .unit("Pa s")
+        .absent()
+        .without(&["xsph"])
+        .about(
+            "μ, solved implicitly on FLIP's grid, or on that of PBF's projection; water \
+             holds to solids, and to the walls of `domain.no_slip`",
+        ),
+    tolerance: Option<f64> = number(1e-6..=0.5)
+        .computed(|| TOLERANCE.to_string())
+        .with("coefficient")
+        .about(
+            "to which part of what it was a substep's solve brings the \
+             error of the velocities",
+        ),
+    // Below a millionth, a frame of 32-bit velocities hardly changes.
+    xsph: Option<f64> = number(1e-6..=1.0)
+        .absent()
+        .without(&["coefficient"])
+        .about(
+            "c, the part of the neighbours' mean relative velocity that a substep of PBF, \
+             or a frame of FLIP, takes over",
+        ),
+} }
 
 impl Declared for Settings {
     const ABOUT: &'static str = "viscosity: of so many Pa s (Batty and Bridson 2008), or XSPH's \
         (Schechter and Bridson 2012)";
-
-    const KEYS: &'static [Key] = &[
-        Key::number("coefficient", 1e-6..=1e9)
-            .unit("Pa s")
-            .absent()
-            .without(&["xsph"])
-            .about(
-                "μ, solved implicitly on FLIP's grid, or on that of PBF's projection; water \
-                    holds to solids, and to the walls of `domain.no_slip`",
-            ),
-        Key::number("tolerance", 1e-6..=0.5)
-            .computed(|| TOLERANCE.to_string())
-            .with("coefficient")
-            .about(
-                "to which part of what it was a substep's solve brings the \
-                    error of the velocities",
-            ),
-        // Below a millionth, a frame of 32-bit velocities hardly changes.
-        Key::number("xsph", 1e-6..=1.0)
-            .absent()
-            .without(&["coefficient"])
-            .about(
-                "c, the part of the neighbours' mean relative velocity that a substep of PBF, \
-                    or a frame of FLIP, takes over",
-            ),
-    ];
 
     fn check(&self, doc: &Document<'_>, around: &Surroundings<'_>) -> Result<(), SceneError> {
         match (self.coefficient, self.xsph) {

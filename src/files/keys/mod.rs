@@ -1,24 +1,37 @@
 //! The keys of all files that users write, each declared once: name, type, range, unit, default,
 //! whether it affects the physics, and purpose.
 //!
-//! Derived from these tables are validation and the wording of faults (`super::document`), the
-//! defaults, the scene as written into a cache (`super::write`), the comparison on resume
-//! (`super::difference`), and the reference page ([`page`], printed by `swell keys`).
+//! Derived from a table are the struct that it is read into (`super::declare`), validation and the
+//! wording of faults (`super::document`), the defaults, the scene as written into a cache
+//! (`super::write`), the comparison on resume (`super::difference`), and the reference page
+//! ([`page`], printed by `swell keys`).
 
 mod budget;
 mod motion;
+mod outputs;
 mod page;
 mod scene;
+mod solver;
 mod study;
 #[cfg(test)]
 mod tests;
 
-use super::{key::Key, look, tolerance, whitewater};
+use super::{declare::Keyed, key::Key, look, tolerance, whitewater};
 
 pub use page::page;
 
-pub(super) use scene::KEYS as SCENE;
+pub(super) use budget::BudgetSpec;
+pub(super) use motion::{MotionKind, SolidMotionSpec, TrackSpec, TurnSpec, WallMotionSpec};
+pub(super) use outputs::{BearerSpec, GridsSpec, KeepSpec, ProbeSpec};
+pub(super) use scene::{
+    AbsorptionSpec, BoxSpec, DomainSpec, DrainSpec, EmitterSpec, MeshSpec, ScaleSpec, SceneSpec,
+    SolidSpec, SwarmSpec, WaterSpec, WaveMakerSpec,
+};
+pub(super) use solver::{PbfSpec, SolverSpec};
 pub(super) use study::KEYS as STUDY;
+
+/// Keys of a scene.
+pub(super) const SCENE: &[Key] = SceneSpec::KEYS;
 
 /// A kind of file with keys.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

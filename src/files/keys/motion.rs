@@ -1,7 +1,49 @@
 //! Keys of the motions of wave makers and solids.
 
-use super::super::key::{Interval, Key, words};
-use swell_domain::motion::Spectrum;
+use super::super::{
+    declare::keys,
+    key::{Interval, Key, words},
+};
+use swell_domain::{motion::Spectrum, named::read_by_name};
+
+/// Kind of a motion.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum MotionKind {
+    #[default]
+    Still,
+    ConstantVelocity,
+    Sine,
+    Solitary,
+    Stokes,
+    Cnoidal,
+    Sea,
+    Focused,
+    Table,
+}
+
+impl MotionKind {
+    /// All kinds with the names used in scenes.
+    const NAMED: [(&'static str, Self); 9] = [
+        ("still", Self::Still),
+        ("constant_velocity", Self::ConstantVelocity),
+        ("sine", Self::Sine),
+        ("solitary", Self::Solitary),
+        ("stokes", Self::Stokes),
+        ("cnoidal", Self::Cnoidal),
+        ("sea", Self::Sea),
+        ("focused", Self::Focused),
+        ("table", Self::Table),
+    ];
+
+    fn name(self) -> &'static str {
+        Self::NAMED[self as usize].0
+    }
+}
+
+read_by_name!(MotionKind);
+
+/// Kinds of which solids move.
+const OF_SOLIDS: &[&str] = &["constant_velocity", "sine", "table"];
 
 /// Metres: a stroke, a wave height or the depth of the water. The upper bound is
 /// that of the domain.
@@ -11,84 +53,103 @@ const LENGTH: Interval = 1e-9..=1e6;
 const PERIOD: Interval = 1e-4..=1e6;
 
 // The speed of sound in water is 1500 m/s.
-const VELOCITY: Key = Key::number("velocity", 1e-9..=1e5)
-    .unit("m/s")
-    .only("kind", &["constant_velocity"])
-    .about("steady speed, inward or along direction");
-const UNTIL: Key = Key::number("until", 1e-6..=1e9)
-    .unit("seconds")
-    .absent()
-    .only("kind", &["constant_velocity"])
-    .about("when it stops");
-const STROKE: Key = Key::number("stroke", LENGTH)
-    .unit("metres")
-    .only("kind", &["sine"])
-    .about(
-        "the whole distance from one end of the way to the other, twice the amplitude: x(t) = \
-         stroke/2 (1 − cos(2π t / period)), times the ramp; the S of H/S in wave maker theory \
-         (Dean and Dalrymple 1991)",
-    );
-const CYCLE: Key = Key::number("period", PERIOD)
-    .unit("seconds")
-    .only("kind", &["sine"])
-    .about("of one cycle, there and back");
-const RAMP: Key = Key::number_or_zero("ramp", PERIOD)
-    .unit("seconds")
-    .computed(|| "one period".to_owned())
-    .only("kind", &["sine"])
-    .about("how long the motion takes to reach its full stroke; 0: it begins with it");
-const FILE: Key = Key::text(
-    "file",
-    "a table of time and displacement (seconds, metres), two numbers a line, \
-     relative to the scene file",
-)
-.absent()
-.only("kind", &["table"])
-.about(
-    "displacements from a file, a comma, a semicolon, a tab or spaces between the two; the \
-     written-out scene has them as points",
-);
-const POINTS: Key = Key::points(
-    "points",
-    2,
-    "at least two [seconds, metres], times rising from 0 on, displacements from 0 on, inward or \
-     along direction, the first 0, all up to 1e9, no faster than 100000 m/s",
-)
-.only("kind", &["table"])
-.without(&["file"])
-.about("displacements in place");
+const fn velocity(name: &'static str) -> Key {
+    Key::number(name, 1e-9..=1e5)
+        .unit("m/s")
+        .only("kind", &["constant_velocity"])
+        .about("steady speed, inward or along direction")
+}
 
-pub(super) const SOLID_MOTION: &[Key] = &[
-    Key::choice("kind", &["constant_velocity", "sine", "table"])
+const fn until(name: &'static str) -> Key {
+    Key::number(name, 1e-6..=1e9)
+        .unit("seconds")
+        .absent()
+        .only("kind", &["constant_velocity"])
+        .about("when it stops")
+}
+
+const fn stroke(name: &'static str) -> Key {
+    Key::number(name, LENGTH)
+        .unit("metres")
+        .only("kind", &["sine"])
+        .about(
+            "the whole distance from one end of the way to the other, twice the amplitude: \
+             x(t) = stroke/2 (1 − cos(2π t / period)), times the ramp; the S of H/S in wave \
+             maker theory (Dean and Dalrymple 1991)",
+        )
+}
+
+const fn cycle(name: &'static str) -> Key {
+    Key::number(name, PERIOD)
+        .unit("seconds")
+        .only("kind", &["sine"])
+        .about("of one cycle, there and back")
+}
+
+const fn ramp(name: &'static str) -> Key {
+    Key::number_or_zero(name, PERIOD)
+        .unit("seconds")
+        .computed(|| "one period".to_owned())
+        .only("kind", &["sine"])
+        .about("how long the motion takes to reach its full stroke; 0: it begins with it")
+}
+
+const fn file(name: &'static str) -> Key {
+    Key::text(
+        name,
+        "a table of time and displacement (seconds, metres), two numbers a line, \
+         relative to the scene file",
+    )
+    .absent()
+    .only("kind", &["table"])
+    .about(
+        "displacements from a file, a comma, a semicolon, a tab or spaces between the two; the \
+         written-out scene has them as points",
+    )
+}
+
+const fn points(name: &'static str) -> Key {
+    Key::points(
+        name,
+        2,
+        "at least two [seconds, metres], times rising from 0 on, displacements from 0 on, inward \
+         or along direction, the first 0, all up to 1e9, no faster than 100000 m/s",
+    )
+    .only("kind", &["table"])
+    .without(&["file"])
+    .about("displacements in place")
+}
+
+keys! { struct SolidMotionSpec {
+    kind: MotionKind = choice(OF_SOLIDS)
         .also("; solitary and regular waves, seas and packets are made by a wall")
         .about("kind of motion"),
-    VELOCITY,
-    UNTIL,
-    STROKE,
-    CYCLE,
-    RAMP,
-    FILE,
-    POINTS,
-];
+    velocity: Option<f64> = velocity,
+    until: Option<f64> = until,
+    stroke: Option<f64> = stroke,
+    period: Option<f64> = cycle,
+    ramp: Option<f64> = ramp,
+    file: Option<String> = file,
+    points: Option<Vec<[f64; 2]>> = points,
+} }
 
-pub(super) const SOLID_TURN: &[Key] = &[
-    Key::choice("kind", &["constant_velocity", "sine", "table"]).about("kind of motion"),
-    Key::number("degrees_per_second", 1e-9..=1e9)
+keys! { struct TurnSpec {
+    kind: MotionKind = choice(OF_SOLIDS).about("kind of motion"),
+    degrees_per_second: Option<f64> = number(1e-9..=1e9)
         .unit("degrees/s")
         .only("kind", &["constant_velocity"])
         .about("steady speed"),
-    UNTIL,
-    Key::number("swing_degrees", 1e-9..=1e9)
+    until: Option<f64> = until,
+    swing_degrees: Option<f64> = number(1e-9..=1e9)
         .unit("degrees")
         .only("kind", &["sine"])
         .about(
             "the whole angle from one end of the way to the other: swing/2 (1 − cos(2π t / \
              period)), times the ramp; the solid stands at one end at the start",
         ),
-    CYCLE,
-    RAMP,
-    Key::text(
-        "file",
+    period: Option<f64> = cycle,
+    ramp: Option<f64> = ramp,
+    file: Option<String> = text(
         "a table of time and angle (seconds, degrees), two numbers a line, \
          relative to the scene file",
     )
@@ -98,51 +159,34 @@ pub(super) const SOLID_TURN: &[Key] = &[
         "angles from a file, a comma, a semicolon, a tab or spaces between the two; the \
          written-out scene has them as points",
     ),
-    Key::points(
-        "points",
+    points: Option<Vec<[f64; 2]>> = points(
         2,
         "at least two [seconds, degrees], times rising from 0 on, the first angle 0, all up to 1e9",
     )
     .only("kind", &["table"])
     .without(&["file"])
     .about("angles in place, joined by a monotone cubic"),
-];
+} }
 
 /// Motions with a spectrum.
 const SEAS: &[&str] = &["sea", "focused"];
 
-const SPECTRA: [&str; 3] = words(&Spectrum::NAMED);
-
-pub(super) const WALL_MOTION: &[Key] = &[
-    Key::choice(
-        "kind",
-        &[
-            "still",
-            "constant_velocity",
-            "sine",
-            "solitary",
-            "stokes",
-            "cnoidal",
-            "sea",
-            "focused",
-            "table",
-        ],
-    )
-    .about(
+keys! { #[derive(Default)] struct WallMotionSpec {
+    kind: MotionKind = choice(&words(&MotionKind::NAMED)).about(
         "kind of motion; `still`, with absorption alone, makes no waves; `solitary` is Goring \
          1978; `stokes` (second order, Schäffer 1996 and Madsen 1971) and `cnoidal` (shallow \
          water, Goring 1978) make regular waves without free ones; `sea` and `focused` follow a \
          spectrum, by linear theory or to second order",
     ),
-    VELOCITY,
-    UNTIL,
-    STROKE,
-    Key::number("period", PERIOD)
+    velocity: Option<f64> = velocity,
+    until: Option<f64> = until,
+    stroke: Option<f64> = stroke,
+    period: Option<f64> = number(PERIOD)
         .unit("seconds")
         .only("kind", &["sine", "stokes", "cnoidal"])
         .also("; regular waves are at least 10 particle spacings long, cnoidal ones 8 depths")
         .about("of one cycle, there and back; of regular waves"),
-    Key::number_or_zero("ramp", PERIOD)
+    ramp: Option<f64> = number_or_zero(PERIOD)
         .unit("seconds")
         .computed(|| "one period of a sine, two (of the peak) of other waves,".to_owned())
         .only("kind", &["sine", "stokes", "cnoidal", "sea", "focused"])
@@ -150,7 +194,7 @@ pub(super) const WALL_MOTION: &[Key] = &[
             "how long the motion takes to reach its full size; 0, of a sine and of regular waves \
              alone: it begins with it",
         ),
-    Key::number("height", LENGTH)
+    height: Option<f64> = number(LENGTH)
         .unit("metres")
         .only("kind", &["solitary", "stokes", "cnoidal", "focused"])
         .also(", at most the depth; regular waves are up to 0.78 depths high and do not break")
@@ -159,27 +203,27 @@ pub(super) const WALL_MOTION: &[Key] = &[
              = √(3H/4d), c = √(g (d + H)); of regular waves, trough to crest; of a packet's \
              crest by linear theory",
         ),
-    Key::number("depth", LENGTH)
+    depth: Option<f64> = number(LENGTH)
         .unit("metres")
         .only("kind", &["solitary", "stokes", "cnoidal", "sea", "focused"])
         .about("of the water at rest"),
-    Key::choice("spectrum", &SPECTRA)
+    spectrum: Option<Spectrum> = choice(&words(&Spectrum::NAMED))
         .default("\"jonswap\"")
         .only("kind", SEAS)
         .about(
             "how the energy is spread: JONSWAP (Hasselmann et al. 1973), Pierson and Moskowitz \
              1964, TMA (Bouws et al. 1985)",
         ),
-    Key::number("peak_enhancement", 1.0..=20.0)
+    peak_enhancement: Option<f64> = number(1.0..=20.0)
         .computed(|| "3.3".to_owned())
         .only("kind", SEAS)
         .also(", not with spectrum = \"pierson_moskowitz\"")
         .about("γ, how much higher the peak is than Pierson and Moskowitz's"),
-    Key::number("peak_period", PERIOD)
+    peak_period: Option<f64> = number(PERIOD)
         .unit("seconds")
         .only("kind", SEAS)
         .about("of the waves with the most energy; the sea comes again after 200 of them"),
-    Key::number("shortest_period", PERIOD)
+    shortest_period: Option<f64> = number(PERIOD)
         .unit("seconds")
         .computed(|| "a third of the peak's".to_owned())
         .only("kind", SEAS)
@@ -188,26 +232,26 @@ pub(super) const WALL_MOTION: &[Key] = &[
              particle spacings long",
         )
         .about("of the shortest waves that are made; what is left out is given to the others"),
-    Key::number("significant_height", LENGTH)
+    significant_height: Option<f64> = number(LENGTH)
         .unit("metres")
         .only("kind", &["sea"])
         .also(", at most the depth and no steeper at the peak than waves can be")
         .about("four times the root of the elevation's variance"),
-    Key::whole("seed", 0..=u32::MAX)
+    seed: Option<u32> = whole(0..=u32::MAX)
         .default("0")
         .only("kind", &["sea"])
         .about("another number makes another sea of the same spectrum"),
-    Key::number("at", LENGTH)
+    at: Option<f64> = number(LENGTH)
         .unit("metres")
         .only("kind", &["focused"])
         .also(", inside of the domain")
         .about("where the packet's crests meet, from where the wall is at the start"),
-    Key::number("time", PERIOD)
+    time: Option<f64> = number(PERIOD)
         .unit("seconds")
         .only("kind", &["focused"])
         .also(", late enough for its slowest waves to be there")
         .about("when they meet"),
-    Key::flag("second_order")
+    second_order: Option<bool> = flag()
         .default("false")
         .only("kind", SEAS)
         .also(
@@ -218,19 +262,17 @@ pub(super) const WALL_MOTION: &[Key] = &[
             "whether the wall moves at sums and differences of frequencies too, so that it makes \
              no free waves of them (Schäffer 1996)",
         ),
-    FILE,
-    POINTS,
-];
+    file: Option<String> = file,
+    points: Option<Vec<[f64; 2]>> = points,
+} }
 
-pub(super) const SOLID_TRACK: &[Key] = &[
-    Key::text(
-        "file",
+keys! { struct TrackSpec {
+    file: Option<String> = text(
         "a glTF file (.gltf or .glb) or USD as text (.usda), relative to the scene file",
     )
     .absent()
     .about("its node's animation carries the solid; the written-out scene has it as poses"),
-    Key::text(
-        "node",
+    node: Option<String> = text(
         "the name of a node in the file; of USD its path will do too",
     )
     .absent()
@@ -239,15 +281,14 @@ pub(super) const SOLID_TRACK: &[Key] = &[
         "whose motion it is, with that of the nodes above it; left out: the file's only node, or \
          USD's only prim with a transform",
     ),
-    Key::number("start", -1e6..=1e6)
+    start: Option<f64> = number(-1e6..=1e6)
         .absent()
         .with("file")
         .about(
             "the file's frame that is frame 1 of the shot, such as 1001: of USD a time code, of \
              glTF a frame of the shot's rate",
         ),
-    Key::points(
-        "poses",
+    poses: Option<Vec<[f64; 8]>> = points(
         8,
         "rows of [seconds, x, y, z, qx, qy, qz, qw], times rising from 0 on, places in metres, \
          unit quaternions, the first [0, 0, 0, 1]",
@@ -257,4 +298,4 @@ pub(super) const SOLID_TRACK: &[Key] = &[
     .about(
         "the motion in place: where a point of the solid is, and how the solid is turned about it",
     ),
-];
+} }

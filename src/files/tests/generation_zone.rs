@@ -1,4 +1,10 @@
-use crate::parse_scene;
+use std::{collections::BTreeSet, fmt::Debug};
+
+use serde::de::DeserializeOwned;
+
+use swell_scene::effects::generation_zone::{Packet, Regular, Sea, Waves};
+
+use crate::{declare::Keyed, parse_scene};
 
 /// Waves oblique to a period, or spread over directions, have different phases at its two ends.
 #[test]
@@ -32,4 +38,26 @@ fn waves_fit_into_a_period_or_are_refused() {
         spread.contains("waves.spreading: spread waves do not fit the period along z"),
         "{spread}"
     );
+}
+
+/// Each kind of waves is a struct of its own, whose fields are its keys.
+#[test]
+fn keys_of_waves_are_the_fields_of_their_kind() {
+    fn fields<T: DeserializeOwned + Debug>() -> BTreeSet<String> {
+        let unknown = toml::from_str::<T>("none = 1").expect_err("no field has this name");
+        let names = unknown.message().split('`').skip(3).step_by(2);
+        names.map(str::to_owned).collect()
+    }
+    let keys = |kind: &str| -> BTreeSet<String> {
+        let of_kind = Waves::KEYS.iter().filter(|key| {
+            let is_of = |(_, among): (_, &[&str])| among.contains(&kind);
+            key.name != "kind" && key.only.is_none_or(is_of)
+        });
+        of_kind.map(|key| key.name.to_owned()).collect()
+    };
+    assert_eq!(keys("stokes"), fields::<Regular>());
+    assert_eq!(keys("sea"), fields::<Sea>());
+    assert_eq!(keys("focused"), fields::<Packet>());
+    // Control: kinds differ.
+    assert_ne!(keys("sea"), fields::<Packet>());
 }
