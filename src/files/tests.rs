@@ -7,4 +7,5 @@ mod lint;
 mod lint_solids;
 mod lint_water;
 mod origin;
+mod start_waves;
 mod step;

@@ -58,13 +58,18 @@ impl Start {
         let water = scene.water.meshes.iter().map(|placed| &placed.mesh);
         let room = scene.start_domain();
         let fill = fill_water(
-            &[scene.start_blocks(), block.into_iter().collect()].concat(),
+            &[scene.start_blocks(), Vec::from_iter(block)].concat(),
             water,
             at_start.as_ref().or(boundary.distance.as_ref()),
             &room,
             spacing,
         )?;
         let (mut particles, mut removed) = (fill.particles, fill.removed);
+        if block.is_some() {
+            // The air above waves took away what no solid did.
+            let below = scene.wave_volume() / scene.particle_volume();
+            removed = (below.round() as usize).saturating_sub(particles.len());
+        }
         scene.move_with_waves(&particles.position, &mut particles.velocity);
         for swarm in &scene.water.particles {
             for at in &swarm.at {

@@ -40,21 +40,26 @@ fn waves_fit_into_a_period_or_are_refused() {
     );
 }
 
+/// The names of a struct's fields.
+pub(super) fn fields<T: DeserializeOwned + Debug>() -> BTreeSet<String> {
+    let unknown = toml::from_str::<T>("none = 1").expect_err("no field has this name");
+    let names = unknown.message().split('`').skip(3).step_by(2);
+    names.map(str::to_owned).collect()
+}
+
+/// The keys of a table whose `kind` is this.
+pub(super) fn keys_of<T: Keyed>(kind: &str) -> BTreeSet<String> {
+    let of_kind = T::KEYS.iter().filter(|key| {
+        let is_of = |(_, among): (_, &[&str])| among.contains(&kind);
+        key.name != "kind" && key.only.is_none_or(is_of)
+    });
+    of_kind.map(|key| key.name.to_owned()).collect()
+}
+
 /// Each kind of waves is a struct of its own, whose fields are its keys.
 #[test]
 fn keys_of_waves_are_the_fields_of_their_kind() {
-    fn fields<T: DeserializeOwned + Debug>() -> BTreeSet<String> {
-        let unknown = toml::from_str::<T>("none = 1").expect_err("no field has this name");
-        let names = unknown.message().split('`').skip(3).step_by(2);
-        names.map(str::to_owned).collect()
-    }
-    let keys = |kind: &str| -> BTreeSet<String> {
-        let of_kind = Waves::KEYS.iter().filter(|key| {
-            let is_of = |(_, among): (_, &[&str])| among.contains(&kind);
-            key.name != "kind" && key.only.is_none_or(is_of)
-        });
-        of_kind.map(|key| key.name.to_owned()).collect()
-    };
+    let keys = keys_of::<Waves>;
     assert_eq!(keys("stokes"), fields::<Regular>());
     assert_eq!(keys("sea"), fields::<Sea>());
     assert_eq!(keys("focused"), fields::<Packet>());

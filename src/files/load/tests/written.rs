@@ -134,6 +134,24 @@ motion = { kind = "sea", significant_height = 0.1, peak_period = 3.0, shortest_p
 [[wave_maker]]
 wall = "-y"
 motion = { kind = "focused", height = 0.1, at = 1.0, time = 9.0, spectrum = "tma", peak_period = 3.0, shortest_period = 2.0, depth = 1.0 }
+[[water.wave]]
+kind = "solitary"
+height = 0.2
+depth = 1.0
+at = 1.0
+[[water.wave]]
+kind = "stokes"
+height = 0.1
+period = 2.0
+depth = 1.0
+[[water.wave]]
+kind = "sea"
+significant_height = 0.1
+peak_period = 3.0
+peak_enhancement = 2.0
+shortest_period = 2.0
+depth = 1.0
+seed = 5
 [[emitter]]
 min = [1.0, 1.0, 0.5]
 max = [1.5, 1.5, 1.5]
@@ -164,7 +182,8 @@ generation_zone = { walls = ["+x"], length = 1.0, waves = { kind = "sea", signif
     let packet = "effects.generation_zone={walls=[\"+x\"],length=1.0,waves={kind=\"focused\",\
                   height=0.1,at=[1.0,1.0],time=40.0,peak_period=3.0,depth=1.0,spreading=4.0,\
                   direction_degrees=180.0}}";
-    let scene = parse(dir.path(), slab, &["domain.periodic=[]", packet]).expect("valid");
+    let open = ["domain.periodic=[]", packet, "water.wave.2.spreading=4.0"];
+    let scene = parse(dir.path(), slab, &open).expect("valid");
     let toml = scene_to_toml(&scene, &|_, _| "a.obj".to_owned());
     collect_keys("", &toml::from_str(&toml).expect("TOML"), &mut written);
     // A motion's file is written as the points read from it; `walls` is written as the list
