@@ -5,6 +5,7 @@ pub mod bindings;
 pub mod buffer;
 pub mod ceilings;
 mod compiled;
+pub mod copies;
 mod edited;
 mod error;
 mod hidden;

@@ -191,18 +191,6 @@ impl Program {
         self.buffers.contains_key(name)
     }
 
-    /// Copies values of buffers of another program on the same device into buffers of this one, in
-    /// a single submission.
-    pub fn copy_from(&self, from: &Self, copies: &[BufferCopy]) {
-        let mut encoder = (self.context.device).create_command_encoder(&Default::default());
-        for copy in copies {
-            let [source, to] = [from.buffer(&copy.source), self.buffer(&copy.target)];
-            encoder.copy_buffer_to_buffer(source, copy.first, to, copy.place, copy.bytes);
-        }
-        self.context.queue.submit([encoder.finish()]);
-        self.context.counters.submitted();
-    }
-
     /// Returns the names of the passes and of the buffers, sorted.
     pub fn names(&self) -> (Vec<&str>, Vec<&str>) {
         (
@@ -273,28 +261,6 @@ impl Program {
         let bytes = copies.iter().flatten().map(|copy| copy.len() as u64);
         context.counters.waited(bytes.sum());
         Mapped::new(context.clone(), copies)
-    }
-}
-
-/// A copy between buffers of two programs.
-pub struct BufferCopy {
-    source: String,
-    first: u64,
-    target: String,
-    place: u64,
-    bytes: u64,
-}
-
-impl BufferCopy {
-    /// The first `count` values of `source`, to the beginning of `target`.
-    pub fn of<T>(source: &Buf<T>, target: &Buf<T>, count: usize) -> Self {
-        Self {
-            source: source.name().to_owned(),
-            first: source.place(0),
-            target: target.name().to_owned(),
-            place: target.place(0),
-            bytes: (count * size_of::<T>()) as u64,
-        }
     }
 }
 

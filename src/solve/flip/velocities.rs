@@ -7,7 +7,7 @@ use super::{
 };
 use crate::params::Counters;
 use swell_domain::budget::Breach;
-use swell_gpu::program::{BufferCopy, Program};
+use swell_gpu::{copies::BufferCopy, program::Program};
 use swell_scene::step::projected_substep;
 
 impl Flip {

@@ -8,6 +8,7 @@ use crate::support::job::Job;
 
 const SPACING: f64 = 0.05;
 const DEPTH: f64 = 1.0;
+const WIDTH: f64 = 0.3;
 const GRAVITY: f64 = 9.81;
 
 fn scene(name: &str, length: f64, periodic: &str, wave: &str) -> String {
@@ -19,7 +20,7 @@ frames = 40
 frames_per_second = 24
 [domain]
 min = [3.0, -1.0, 0.0]
-max = [{}, 0.5, 0.2]
+max = [{}, 0.5, {WIDTH}]
 periodic = [{periodic}]
 [[water.wave]]
 depth = {DEPTH}
@@ -44,7 +45,7 @@ fn columns(job: &Job, cache: &str, frame: u32, length: f64) -> Vec<(f64, f64)> {
     let last = depths.len() - 1;
     for position in &state.position {
         let column = (f64::from(position[0]) - 3.0) / width;
-        depths[(column.max(0.0) as usize).min(last)] += SPACING.powi(3) / (width * 0.2);
+        depths[(column.max(0.0) as usize).min(last)] += SPACING.powi(3) / (width * WIDTH);
     }
     let at = |k: usize| width * (k as f64 + 0.5);
     let depths = depths.into_iter().enumerate();
@@ -145,7 +146,7 @@ fn regular_waves_of_the_start_run_through_a_periodic_tank() {
         );
         let off = |frame: u32| {
             let (amplitude, phase) = harmonic(&columns(&job, solver, frame, LENGTH), number);
-            let ahead = frequency * f64::from(40) / 24.0 - phase;
+            let ahead = frequency * 40.0 / 24.0 - phase;
             (amplitude, (ahead + 0.5 * TAU).rem_euclid(TAU) - 0.5 * TAU)
         };
         let (amplitude, ahead) = off(40);

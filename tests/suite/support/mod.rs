@@ -54,6 +54,7 @@ pub fn scene(size: [f64; 3]) -> Scene {
             gravity: DVec3::new(0.0, -9.81, 0.0),
             blocks: Vec::new(),
             meshes: Vec::new(),
+            waves: Vec::new(),
             particles: Vec::new(),
         },
         solids: Vec::new(),
