@@ -55,6 +55,7 @@ pub fn scene(size: [f64; 3]) -> Scene {
             blocks: Vec::new(),
             meshes: Vec::new(),
             particles: Vec::new(),
+            waves: Vec::new(),
         },
         solids: Vec::new(),
         moving_solids: Vec::new(),
