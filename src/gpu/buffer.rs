@@ -14,19 +14,61 @@
 
 use std::{borrow::Cow, marker::PhantomData};
 
-use super::{program::BufferSpec, readback::First, reflect::Layout};
+use super::reflect::Layout;
+pub use super::reflect::Scalar;
 
-/// Scalar type of the components of a value.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Scalar {
-    /// `f32`.
-    F32,
-    /// `f64`.
-    F64,
-    /// `u32`.
-    U32,
-    /// Several types, as in a struct, whose members [`Mirror::layout`] lists.
-    Mixed,
+/// Description of a buffer to allocate.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct BufferSpec {
+    /// Unique name; shader variables of this name bind it.
+    pub name: String,
+    /// Size in bytes; rounded up to a multiple of 16.
+    pub bytes: u64,
+    /// Whether passes bind it as a uniform.
+    pub is_uniform: bool,
+    /// Whether passes bind parts of it: it may then be larger than the binding limit.
+    pub is_windowed: bool,
+    /// Element layout.
+    pub element: BufferLayout,
+}
+
+impl BufferSpec {
+    /// Returns the description with [`Self::is_windowed`] set.
+    pub fn windowed(self) -> Self {
+        Self {
+            is_windowed: true,
+            ..self
+        }
+    }
+}
+
+/// Selects the first values of a buffer.
+#[derive(Clone, Debug)]
+pub struct First<T> {
+    pub(super) buffer: Buf<T>,
+    pub(super) count: usize,
+}
+
+/// Binding of a shader variable to a resource of another name.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Bind {
+    /// WGSL variable.
+    pub variable: &'static str,
+    /// Name of the buffer, texture or sampler.
+    pub buffer: String,
+    /// Byte offset and length; `None` binds the whole buffer.
+    pub window: Option<(u64, u64)>,
+}
+
+impl Bind {
+    /// Binds `variable` to all of `buffer`.
+    pub fn whole<T>(variable: &'static str, buffer: &Buf<T>) -> Self {
+        Self {
+            variable,
+            buffer: buffer.name().to_owned(),
+            window: None,
+        }
+    }
 }
 
 /// A plain-old-data value with the same layout on the device.
@@ -286,9 +328,9 @@ impl<T> Windows<T> {
     }
 
     /// Binds the variable to window `index`.
-    pub fn bind(&self, index: usize) -> super::recording::Bind {
+    pub fn bind(&self, index: usize) -> Bind {
         const { assert!(size_of::<T>() <= STRIDE) };
-        super::recording::Bind {
+        Bind {
             variable: self.variable,
             buffer: self.name.clone().into_owned(),
             window: Some(((index * STRIDE) as u64, size_of::<T>() as u64)),

@@ -2,7 +2,7 @@
 //! their layout.
 
 use super::{
-    program::BufferSpec,
+    buffer::BufferSpec,
     reflect::{Access, Binding, ElementType, Layout, Reflection},
 };
 

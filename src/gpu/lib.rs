@@ -19,6 +19,7 @@ pub mod reflect;
 pub mod rounding;
 pub mod shader;
 pub mod sort;
+mod statements;
 pub mod texture;
 mod timer;
 pub mod traffic;

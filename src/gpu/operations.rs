@@ -18,6 +18,7 @@ use super::{
     program::{self, Pass, Program},
     recording::{Bind, Size, bind, bound, dispatch_sized},
     reflect,
+    statements::nested_blocks,
 };
 
 /// Operations on floats and on integers, for each component of a vector. Multiplication, addition,
@@ -204,27 +205,6 @@ struct Meter<'a> {
     types: &'a UniqueArena<Type>,
     /// Sums of operations on floats and on integers.
     sums: [Handle<GlobalVariable>; 2],
-}
-
-/// Applies `rewrite` to each block that a statement contains.
-pub(super) fn nested_blocks(statement: &mut Statement, rewrite: &mut dyn FnMut(&mut Block)) {
-    match statement {
-        Statement::Block(block) => rewrite(block),
-        Statement::If { accept, reject, .. } => {
-            rewrite(accept);
-            rewrite(reject);
-        }
-        Statement::Switch { cases, .. } => {
-            cases.iter_mut().for_each(|case| rewrite(&mut case.body));
-        }
-        Statement::Loop {
-            body, continuing, ..
-        } => {
-            rewrite(body);
-            rewrite(continuing);
-        }
-        _ => {}
-    }
 }
 
 impl Meter<'_> {

@@ -11,7 +11,7 @@ use wgpu::{BindGroupLayout, Buffer, BufferUsages, ComputePipeline};
 use super::{
     adapter::{Context, InjectedFault},
     bindings,
-    buffer::{Buf, BufferLayout, Element, Windows},
+    buffer::{Buf, BufferSpec, Element, Windows},
     edited,
     error::GpuError,
     operations::Counting,
@@ -20,31 +20,6 @@ use super::{
     reflect::{Access, Binding, Reflection, Stage, reflect, reflect_at},
     shader::Composed,
 };
-
-/// Description of a buffer to allocate.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct BufferSpec {
-    /// Unique name; shader variables of this name bind it.
-    pub name: String,
-    /// Size in bytes; rounded up to a multiple of 16.
-    pub bytes: u64,
-    /// Whether passes bind it as a uniform.
-    pub is_uniform: bool,
-    /// Whether passes bind parts of it: it may then be larger than the binding limit.
-    pub is_windowed: bool,
-    /// Element layout.
-    pub element: BufferLayout,
-}
-
-impl BufferSpec {
-    /// Returns the description with [`Self::is_windowed`] set.
-    pub fn windowed(self) -> Self {
-        Self {
-            is_windowed: true,
-            ..self
-        }
-    }
-}
 
 /// Description of a compute pass to compile.
 #[derive(Clone, Debug, PartialEq)]

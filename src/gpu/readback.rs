@@ -10,19 +10,13 @@ use std::{
 
 use wgpu::{Buffer, BufferUsages, BufferView, Device};
 
-use super::{adapter::Context, buffer::Buf, error::GpuError};
+pub use super::buffer::First;
+use super::{adapter::Context, error::GpuError};
 
 /// Idle buffers that are kept; the one that has waited longest goes first.
 const KEPT: usize = 16;
 /// Sizes are multiples of this, bytes.
 const GRAIN: usize = 1 << 12;
-
-/// Selects the first values of a buffer.
-#[derive(Clone, Debug)]
-pub struct First<T> {
-    pub(super) buffer: Buf<T>,
-    pub(super) count: usize,
-}
 
 /// Data read back together: [`Buf::first`] of one buffer, or a tuple of those of several.
 pub trait Readback {

@@ -16,29 +16,7 @@ use super::{
     reflect::{Access, Binding},
 };
 
-pub use super::timer::Timer;
-
-/// Binding of a shader variable to a resource of another name.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Bind {
-    /// WGSL variable.
-    pub variable: &'static str,
-    /// Name of the buffer, texture or sampler.
-    pub buffer: String,
-    /// Byte offset and length; `None` binds the whole buffer.
-    pub window: Option<(u64, u64)>,
-}
-
-impl Bind {
-    /// Binds `variable` to all of `buffer`.
-    pub fn whole<T>(variable: &'static str, buffer: &Buf<T>) -> Self {
-        Self {
-            variable,
-            buffer: buffer.name().to_owned(),
-            window: None,
-        }
-    }
-}
+pub use super::{buffer::Bind, timer::Timer};
 
 /// Number of workgroups of a dispatch.
 #[derive(Clone, Debug, PartialEq, Eq)]

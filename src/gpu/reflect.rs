@@ -9,7 +9,21 @@ use naga::{
     valid::GlobalUse,
 };
 
-use super::{buffer::Scalar, error::GpuError};
+use super::error::GpuError;
+
+/// Scalar type of the components of a value.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Scalar {
+    /// `f32`.
+    F32,
+    /// `f64`.
+    F64,
+    /// `u32`.
+    U32,
+    /// Several types, as in a struct, whose members
+    /// [`Mirror::layout`](super::buffer::Mirror::layout) lists.
+    Mixed,
+}
 
 /// How a buffer, texture or sampler is bound.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

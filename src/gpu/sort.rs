@@ -6,8 +6,8 @@
 //! about ten reads per particle at rest, and quadratic only if all particles share a cell.
 
 use super::{
-    buffer::{Buf, Windows},
-    program::{BufferSpec, PassSpec, Program},
+    buffer::{Buf, BufferSpec, Windows},
+    program::{PassSpec, Program},
     recording::{Bind, Command},
 };
 

@@ -9,8 +9,8 @@ use super::{RenderError, buffers::FILLS, closed::Closed, frame::Extent, uniform:
 use swell_gpu::{
     adapter::{Context, GpuError},
     bindings::check_bindings,
-    buffer::{Buf, Element, Windows},
-    program::{BufferSpec, PassSpec, Program, check_sizes},
+    buffer::{Buf, BufferSpec, Element, Windows},
+    program::{PassSpec, Program, check_sizes},
     raster::RasterSpec,
     recording::{Bind, Command},
     texture::{SamplerSpec, TextureSpec},

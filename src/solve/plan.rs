@@ -9,7 +9,8 @@ use swell_domain::{places, solver::PassTime};
 use swell_gpu::{
     adapter::{Context, GpuError},
     bindings::check_bindings,
-    program::{BufferSpec, PassSpec, check_sizes},
+    buffer::BufferSpec,
+    program::{PassSpec, check_sizes},
     recording::Command,
 };
 use swell_scene::Scene;

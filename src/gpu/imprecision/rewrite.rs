@@ -9,7 +9,7 @@ use naga::{
 };
 
 use super::{
-    super::operations::nested_blocks,
+    super::statements::nested_blocks,
     Imprecision,
     call::{Call, PREFIX},
 };

@@ -25,7 +25,10 @@ use crate::{
     uniform::{Block, Page, Particle, Shape, SprayParams},
 };
 use swell_domain::level_set::kernels::Kernels;
-use swell_gpu::{buffer::Workgroups, program::BufferSpec, recording::spread};
+use swell_gpu::{
+    buffer::{BufferSpec, Workgroups},
+    recording::spread,
+};
 use swell_scene::look::{AovSpec, Look, MethodSpec};
 
 /// Distance in particle spacings within which a particle affects the field at the eye: the support

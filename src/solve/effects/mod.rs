@@ -7,7 +7,8 @@
 mod zone;
 
 use swell_gpu::{
-    program::{BufferSpec, PassSpec, Program},
+    buffer::BufferSpec,
+    program::{PassSpec, Program},
     recording::Command,
 };
 use swell_scene::{Scene, effects::with_effects};

@@ -9,11 +9,7 @@ use swell_domain::{
     bricks::{CELLS, table_dims},
     flip::{layers, stored_cells},
 };
-use swell_gpu::{
-    program::{BufferSpec, PassSpec},
-    recording::Command,
-    sort,
-};
+use swell_gpu::{buffer::BufferSpec, program::PassSpec, recording::Command, sort};
 use swell_scene::{
     FlipScene,
     flip::{Surface, Transfer},

@@ -5,11 +5,7 @@ use crate::{
     plan::{BufferTable, Chunk, Counts, DeviceLimits, LIST_CAPACITY, Plan, in_order},
 };
 use swell_domain::sph::Calibration;
-use swell_gpu::{
-    program::{BufferSpec, PassSpec},
-    recording::Command,
-    sort,
-};
+use swell_gpu::{buffer::BufferSpec, program::PassSpec, recording::Command, sort};
 use swell_scene::{Iteration, PbfScene, Stop};
 
 use super::{buffers::*, record::Commands};
