@@ -66,7 +66,7 @@ fn celerity(height: f64) -> f64 {
 /// Height and place of the solitary wave that fits best, by least squares. The shape of first order
 /// fits waves of third order to 3 % of the height.
 fn fitted(columns: &[(f64, f64)], height: f64) -> (f64, f64) {
-    let places = (0..900).map(|k| 1.0 + 0.01 * f64::from(k));
+    let places = (0..1000).map(|k| 4.0 + 0.01 * f64::from(k));
     let fit = |at: f64| {
         let shape = |x: f64| solitary(height, x - at);
         let both = columns.iter().map(|&(x, depth)| shape(x) * (depth - DEPTH));
@@ -86,13 +86,14 @@ fn fitted(columns: &[(f64, f64)], height: f64) -> (f64, f64) {
 #[test]
 fn a_solitary_wave_of_the_start_keeps_height_and_celerity() {
     const HEIGHT: f64 = 0.2;
+    const LENGTH: f64 = 18.0;
     let job = Job::of(&[(
         "solitary.toml",
         &scene(
             "solitary",
-            12.0,
+            LENGTH,
             "",
-            "kind = \"solitary\"\nheight = 0.2\nat = 3.5",
+            "kind = \"solitary\"\nheight = 0.2\nat = 6.0",
         ),
     )]);
     for solver in ["flip", "pbf"] {
@@ -100,14 +101,14 @@ fn a_solitary_wave_of_the_start_keeps_height_and_celerity() {
             0,
             &format!("bake solitary.toml --solver {solver} -o {solver}"),
         );
-        let (before, _) = fitted(&columns(&job, solver, 0, 12.0), HEIGHT);
-        let (height, at) = fitted(&columns(&job, solver, 40, 12.0), HEIGHT);
-        let (time, place) = (40.0 / 24.0, 3.5 + celerity(HEIGHT) * 40.0 / 24.0);
+        let (before, _) = fitted(&columns(&job, solver, 0, LENGTH), HEIGHT);
+        let (height, at) = fitted(&columns(&job, solver, 40, LENGTH), HEIGHT);
+        let (time, place) = (40.0 / 24.0, 6.0 + celerity(HEIGHT) * 40.0 / 24.0);
         println!("{solver}: {before:.4} {height:.4} m, {at:.3} for {place:.3} m");
         assert!((before / HEIGHT - 1.0).abs() < 0.03, "{solver}: {before}");
         assert!((height / before - 1.0).abs() < 0.03, "{solver}: {height}");
         assert!((at - place).abs() < SPACING, "{solver}: {at}");
-        let linear = 3.5 + (GRAVITY * DEPTH).sqrt() * time;
+        let linear = 6.0 + (GRAVITY * DEPTH).sqrt() * time;
         assert!((at - linear).abs() > 5.0 * SPACING);
     }
 }
@@ -122,15 +123,17 @@ fn harmonic(columns: &[(f64, f64)], number: f64) -> (f64, f64) {
     (cosine.hypot(sine), sine.atan2(cosine))
 }
 
-/// Two regular waves in a periodic tank are where theory has them after a period and a quarter.
-/// Control: a frame earlier they are not.
+/// Two regular waves in a periodic tank are where theory has them after a period and a quarter. To
+/// third order they run 0.7 % faster, which is 0.05 radians by then. Control: a frame earlier they
+/// are not there.
 #[test]
 fn regular_waves_of_the_start_run_through_a_periodic_tank() {
+    const HEIGHT: f64 = 0.1;
     const LENGTH: f64 = 5.6;
     let number = 2.0 * TAU / LENGTH;
     let frequency = (GRAVITY * number * (number * DEPTH).tanh()).sqrt();
     let wave = format!(
-        "kind = \"stokes\"\nheight = 0.2\nperiod = {}",
+        "kind = \"stokes\"\nheight = {HEIGHT}\nperiod = {}",
         TAU / frequency
     );
     let job = Job::of(&[("stokes.toml", &scene("stokes", LENGTH, "\"x\"", &wave))]);
@@ -141,7 +144,7 @@ fn regular_waves_of_the_start_run_through_a_periodic_tank() {
         );
         let (before, phase) = harmonic(&columns(&job, solver, 0, LENGTH), number);
         assert!(
-            (before / 0.1 - 1.0).abs() < 0.03 && phase.abs() < 0.02,
+            (2.0 * before / HEIGHT - 1.0).abs() < 0.03 && phase.abs() < 0.02,
             "{before} {phase}"
         );
         let off = |frame: u32| {
