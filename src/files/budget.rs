@@ -1,79 +1,14 @@
 //! Reads `[budget]`: limits on a bake, which stops where one is exceeded.
 
-use serde::{Deserialize, Serialize};
-
 use swell_scene::{Budget, Method, SceneError, Shot, Solver, budget::SPEED_JUMP, words::shown};
 
-use super::{document::Document, keys::BudgetSpec};
-
-/// Defaults that depend on the scene; the others are in the table of keys.
-const SPEED: f64 = 4.0;
-
-const RESIDUAL: f64 = 1e-2;
-
-/// Boundary work misses what a wall does to the drops that it overtakes without pressure: 6 % of a
-/// frame in the small box of tests/hard_cases/24-leaving.toml, 0.1 % in the quickstart.
-const FLIP_ENERGY: f64 = 0.1;
-
-/// With few corrections and long frames PBF creates energy: 4 % per frame in the quickstart, 7 %
-/// with Chebyshev's iteration.
-const PBF_ENERGY: f64 = 0.25;
-
-/// Default with FLIP. Splashes of the shipped scenes reach 0.9, water that leaked along a wall 24.
-const DENSITY_ERROR_MAX: f64 = 4.0;
-
-/// Least default speed limit, spacings per frame, for scenes without gravity or moving walls.
-const LEAST_SPEED: f64 = 10.0;
-
-/// Describes the default of `budget.speed`.
-pub(super) fn speed_words() -> String {
-    format!(
-        "{SPEED} (√(2 g × the domain's diagonal) + the fastest wall or moving solid), at least \
-         {LEAST_SPEED} spacings a frame"
-    )
-}
-
-pub(super) fn speed_jump_words() -> String {
-    format!("false with pbf, {SPEED_JUMP:?} with flip")
-}
-
-pub(super) fn density_error_max_words() -> String {
-    format!("false with pbf, {DENSITY_ERROR_MAX:?} with flip")
-}
-
-pub(super) fn residual_words() -> String {
-    format!("{RESIDUAL}, or the tolerance where that is larger")
-}
-
-pub(super) fn energy_words() -> String {
-    format!(
-        "{PBF_ENERGY} with pbf, {FLIP_ENERGY} with flip, false in a wind or with surface tension"
-    )
-}
-
-/// A limit as written.
-#[derive(Clone, Copy, Debug, Deserialize, Serialize)]
-#[serde(untagged)]
-pub(crate) enum Limit {
-    /// `false`: nothing is too much.
-    Off(bool),
-    Most(f64),
-}
-
-impl From<Option<f64>> for Limit {
-    fn from(limit: Option<f64>) -> Self {
-        limit.map_or(Self::Off(false), Self::Most)
-    }
-}
-
-impl From<Limit> for Option<f64> {
-    fn from(limit: Limit) -> Self {
-        match limit {
-            Limit::Off(_) => None,
-            Limit::Most(limit) => Some(limit),
-        }
-    }
-}
+use super::{
+    document::Document,
+    keys::{
+        BudgetSpec,
+        budget::{DENSITY_ERROR_MAX, FLIP_ENERGY, LEAST_SPEED, Limit, PBF_ENERGY, RESIDUAL, SPEED},
+    },
+};
 
 /// Speeds that a scene causes by itself, m/s, its particle spacing, metres, and the tolerance of
 /// its pressure solve.

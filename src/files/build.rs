@@ -28,7 +28,6 @@ use swell_scene::{
 };
 
 use solver::Solvers;
-pub(super) use solver::{CHEBYSHEV_RELAXATION, RELAXATION};
 
 /// Largest number of particles of a scene: ids have 32 bits, and 2²⁷ particles of 200
 /// bytes take 25 GiB.

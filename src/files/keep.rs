@@ -1,11 +1,11 @@
 //! `[keep]`: which data of a bake stay on disk, and their compression.
 
-use super::{document::Document, keys::KeepSpec};
+use super::{
+    document::Document,
+    keys::{COMPRESSIONS, KeepSpec},
+};
 use swell_domain::keep::{Compression, Keep};
 use swell_scene::SceneError;
-
-/// Values of `compression`.
-pub(super) const COMPRESSIONS: [&str; 2] = ["none", "zstd"];
 
 /// Validated settings.
 #[derive(Clone, Copy)]

@@ -31,6 +31,7 @@ mod motion;
 mod motion_table;
 mod moving_solid;
 mod no_slip;
+mod open_waves;
 mod overrides;
 mod periodic;
 mod probe;
@@ -40,12 +41,13 @@ mod seas;
 mod settle;
 mod solid_track;
 mod sources;
+mod speed;
 mod start_waves;
 #[cfg(test)]
 mod tests;
+mod toml_text;
 mod usd_nodes;
 mod usda;
-mod wave_keys;
 mod wave_maker;
 mod write;
 

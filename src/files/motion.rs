@@ -13,21 +13,6 @@ use swell_scene::{SceneError, waves, words::shown};
 
 type Result<T> = std::result::Result<T, SceneError>;
 
-/// Largest speed of a motion, m/s; equal to the largest `velocity`.
-const MAX_SPEED: f64 = 1e5;
-
-/// Checks that the speed that results from all keys of a motion is within the range of a velocity.
-pub(super) fn check_speed(speed: f64) -> std::result::Result<(), String> {
-    if speed <= MAX_SPEED {
-        return Ok(());
-    }
-    Err(format!(
-        "it moves at {} m/s; allowed: up to {} m/s",
-        shown(speed),
-        shown(MAX_SPEED)
-    ))
-}
-
 /// Returns the value of a key that the table of keys requires for the kind of the motion.
 fn needed<T: Copy>(value: Option<T>) -> T {
     value.expect("the table of keys requires it for this kind")

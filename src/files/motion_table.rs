@@ -3,7 +3,7 @@
 
 use std::{fs::File, io::Read as _, path::Path};
 
-use super::{document::Document, motion::check_speed};
+use super::{document::Document, speed::check_speed};
 use swell_domain::{motion::Motion, text};
 use swell_scene::{
     SceneError,

@@ -13,9 +13,11 @@ use super::{
     document::Document,
     fit::comes_into,
     keys::{MeshSpec, SolidSpec, WallMotionSpec},
-    motion::{self, check_speed},
+    motion,
     motion_table::{ANGLES, Allowed, WAYS},
-    solid_track, wave_maker,
+    solid_track,
+    speed::check_speed,
+    wave_maker,
 };
 
 /// Least length of a direction vector; only its direction matters.

@@ -2,10 +2,10 @@
 
 use swell_scene::{Method, SceneError, Wall};
 
-use super::{document::Document, keys::DomainSpec};
-
-/// Values of `domain.walls`, which applies to all six walls.
-pub(super) const WALLS: [&str; 2] = ["free_slip", "no_slip"];
+use super::{
+    document::Document,
+    keys::{DomainSpec, WALLS},
+};
 
 /// Returns the walls of `domain.walls` or `domain.no_slip` in the order of [`Wall::NAMED`], without
 /// those of periodic axes. `has_own` says whether an effect enforces no-slip with either solver.

@@ -4,7 +4,7 @@ use glam::{DVec2, DVec3};
 
 use super::{
     document::Document,
-    keys::{BearerSpec, ProbeSpec},
+    keys::{BearerSpec, FRONT_QUANTILE, ProbeSpec, RUN_UP_QUANTILE},
 };
 use swell_domain::{bounds::Bounds, probe::Rate, sparse_grid::EDGE, surface::MAX_BRICKS};
 use swell_scene::{
@@ -12,16 +12,6 @@ use swell_scene::{
     probe::{Bearer, Probe, ProbeKind},
     words::extent,
 };
-
-/// Default for a front: spray ahead of a breaking wave is less than the remainder.
-const FRONT_QUANTILE: f64 = 0.995;
-/// Default for a run-up, which already ignores water detached from the body.
-const RUN_UP_QUANTILE: f64 = 1.0;
-
-/// Describes both defaults.
-pub(super) fn quantile_words() -> String {
-    format!("{FRONT_QUANTILE} of a front, {RUN_UP_QUANTILE} of a run_up")
-}
 
 /// Parts of the scene that probes are checked against.
 pub(super) struct Around<'a> {

@@ -2,8 +2,8 @@
 
 use super::{
     document::Document,
-    motion::check_speed,
     seas::{check_spacings, check_steepness},
+    speed::check_speed,
 };
 use swell_domain::motion::{
     Cnoidal, LEAST_CNOIDAL_LENGTH, MADSEN_LIMIT, Motion, NoCnoidal, RegularWaves, Stokes,

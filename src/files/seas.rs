@@ -3,7 +3,7 @@
 
 use std::f64::consts::TAU;
 
-use super::{document::Document, motion::check_speed};
+use super::{document::Document, speed::check_speed};
 use swell_domain::motion::{
     DEEPEST, MADSEN_LIMIT, Motion, Phases, Sea, SeaParameters, Spectrum, wave_number,
 };

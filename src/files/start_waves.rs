@@ -14,9 +14,8 @@ use swell_scene::{
 use crate::{
     declare::Keyed,
     document::Document,
-    effects::generation_zone::check_waves,
     key::Key,
-    wave_keys::{self, LENGTH},
+    open_waves::{self, LENGTH},
 };
 
 const SEA: &[&str] = &["sea"];
@@ -44,14 +43,14 @@ impl Keyed for StartWave {
                 "of a solitary wave's crest above still water; of regular waves, from trough to \
                  crest",
             ),
-        wave_keys::period(),
-        wave_keys::significant_height(SEA),
-        wave_keys::peak_period(SEA),
-        wave_keys::spectrum(SEA),
-        wave_keys::peak_enhancement(SEA),
-        wave_keys::shortest_period(SEA),
-        wave_keys::spreading(SEA),
-        wave_keys::seed(SEA),
+        open_waves::period(),
+        open_waves::significant_height(SEA),
+        open_waves::peak_period(SEA),
+        open_waves::spectrum(SEA),
+        open_waves::peak_enhancement(SEA),
+        open_waves::shortest_period(SEA),
+        open_waves::spreading(SEA),
+        open_waves::seed(SEA),
         Key::number("at", -1e6..=1e6)
             .unit("metres")
             .only("kind", &["solitary"])
@@ -60,7 +59,7 @@ impl Keyed for StartWave {
             .unit("metres")
             .also(", no more than the domain is high, and the same for all waves")
             .about("of the water at rest, from the domain's floor"),
-        wave_keys::direction_degrees(),
+        open_waves::direction_degrees(),
     ];
 }
 
@@ -121,7 +120,7 @@ fn check_one(
         return refuse("depth", problem);
     }
     if let Some(open) = wave.open() {
-        check_waves(&open, doc, path, -y, around.spacing)?;
+        open_waves::check(&open, doc, path, -y, around.spacing)?;
     }
     if let StartWave::Solitary(solitary) = wave
         && solitary.height > HIGHEST_SOLITARY * solitary.depth

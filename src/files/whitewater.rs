@@ -9,7 +9,7 @@ use super::{
     declare::{Keyed, keys},
     document::Document,
     key::{Interval, Key},
-    write::to_toml,
+    toml_text::to_toml,
 };
 use swell_domain::{
     text,

@@ -7,6 +7,7 @@ pub mod grids;
 pub mod lint;
 pub mod look;
 pub mod moving_solid;
+pub mod open_waves;
 pub mod origin;
 pub mod probe;
 pub mod projection;

@@ -13,8 +13,8 @@ use swell_domain::{
 
 use crate::{
     Scene,
-    effects::generation_zone::{Regular, Sea, Waves},
     lint::Made,
+    open_waves::{Regular, Sea, Waves},
     waves,
 };
 

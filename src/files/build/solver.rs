@@ -3,7 +3,7 @@
 use super::{
     super::{
         document::Document,
-        keys::{PbfSpec, SolverSpec},
+        keys::{CHEBYSHEV_RELAXATION, PbfSpec, RELAXATION, SolverSpec},
     },
     Lattice, Result,
 };
@@ -81,12 +81,6 @@ fn fit_flip(doc: &Document<'_>, flip: &Flip, domain: &Bounds) -> Result<Lattice>
     check_grid(doc, domain, &lattice, flip.cell_size, MAX_FLIP_CELLS)?;
     Ok(lattice)
 }
-
-/// Default of the relaxation ω.
-pub(in super::super) const RELAXATION: f64 = 1.0;
-
-/// Default ω of the Chebyshev semi-iteration; 1 overshoots (table in solve/pbf/iteration.rs).
-pub(in super::super) const CHEBYSHEV_RELAXATION: f64 = 0.7;
 
 impl From<PbfSpec> for Pbf {
     fn from(spec: PbfSpec) -> Self {

@@ -1,27 +1,20 @@
 //! Keys and checks of generation zones.
 
-use std::f64::consts::TAU;
-
 use glam::{DVec2, DVec3};
 
-use swell_domain::{
-    motion::wave_number,
-    open_waves::Meeting,
-};
 use swell_scene::{
     SceneError, Wall,
-    effects::generation_zone::{Packet, Settings, WAVES, Waves},
+    effects::generation_zone::{Settings, WAVES},
+    open_waves::{Packet, Waves},
     words::shown,
 };
 
 use super::{Declared, Surroundings, zone};
 use crate::{
-    declare::{Keyed, keys},
+    declare::keys,
     document::Document,
-    key::{Key, words},
-    motion::check_speed,
-    regular_waves, seas,
-    wave_keys::{self, LENGTH, PERIOD},
+    key::words,
+    open_waves,
 };
 
 /// Keys of the effect and of its waves.
@@ -65,7 +58,7 @@ impl Declared for Settings {
             return refuse("waves.kind", problem);
         }
         let spacing = 0.5 * around.least_length;
-        check_waves(&self.waves, doc, WAVES, gravity.length(), spacing)?;
+        open_waves::check(&self.waves, doc, WAVES, gravity.length(), spacing)?;
         let [_, depth, degrees] = self.waves.common();
         let height = around.domain.size().y;
         if depth > height {
@@ -111,46 +104,6 @@ impl Declared for Settings {
         }
         Ok(())
     }
-}
-
-/// Rejects waves of the table at `path` that are outside of theory or that particles `spacing` metres
-/// apart cannot resolve.
-pub(crate) fn check_waves(
-    waves: &Waves,
-    doc: &Document<'_>,
-    path: &str,
-    gravity: f64,
-    spacing: f64,
-) -> Result<(), SceneError> {
-    if let Waves::Stokes(regular) = waves {
-        let asked = regular.asked(gravity);
-        regular_waves::check_stokes(doc, path, &asked)?;
-        let length = TAU / asked.wave_number();
-        let period = format!("{path}.period");
-        seas::check_spacings(doc, &period, [asked.period, length, spacing])?;
-    }
-    if let Some((asked, enhancement)) = waves.spectral(gravity) {
-        seas::shape(doc, path, asked.spectrum, enhancement)?;
-        let periods = [asked.peak_period, asked.shortest_period, asked.ramp];
-        seas::check_periods(doc, path, periods, gravity)?;
-        let (key, stands) = match asked.meeting {
-            Meeting::Random {
-                significant_height, ..
-            } => {
-                let water = [asked.depth, gravity];
-                let stands = seas::check_height(significant_height, asked.peak_period, water);
-                ("significant_height", stands)
-            }
-            Meeting::Focused { height, .. } => ("height", seas::check_depth(height, asked.depth)),
-        };
-        stands.map_err(|problem| doc.fault_of(&format!("{path}.{key}"), problem))?;
-        let k = wave_number(TAU / asked.shortest_period, asked.depth, gravity);
-        let shortest = [asked.shortest_period, TAU / k, spacing];
-        let key = format!("{path}.shortest_period");
-        seas::check_spacings(doc, &key, shortest)?;
-    }
-    check_speed(waves.by(gravity).most_speed())
-        .map_err(|problem| doc.fault_of_plain(path, problem))
 }
 
 /// Rejects a packet whose crests meet outside of the domain, or before its slowest waves can
@@ -199,60 +152,3 @@ fn check_packet<'a>(
     }
     Ok(())
 }
-
-const SEA: &[&str] = &["sea"];
-
-const PACKET: &[&str] = &["focused"];
-
-const SPECTRAL: &[&str] = &["sea", "focused"];
-
-/// A test compares them with the fields of each kind.
-impl Keyed for Waves {
-    const KEYS: &'static [Key] = WAVES_KEYS;
-}
-
-const WAVES_KEYS: &[Key] = &[
-    Key::choice("kind", &["stokes", "sea", "focused"]).about(
-        "`stokes`: regular waves to second order (Stokes 1847); `sea`: 64 waves of a \
-         spectrum by linear theory; `focused`: such waves, whose crests meet",
-    ),
-    Key::number("height", LENGTH)
-        .unit("metres")
-        .only("kind", &["stokes", "focused"])
-        .also(
-            ", at most the depth; regular waves up to 0.78 depths and no \
-             steeper than waves can be",
-        )
-        .about(
-            "of regular waves, from trough to crest; of a packet's crest above still \
-             water by linear theory",
-        ),
-    wave_keys::period(),
-    wave_keys::significant_height(SEA),
-    wave_keys::peak_period(SPECTRAL),
-    wave_keys::spectrum(SPECTRAL),
-    wave_keys::peak_enhancement(SPECTRAL),
-    wave_keys::shortest_period(SPECTRAL),
-    wave_keys::spreading(SPECTRAL),
-    wave_keys::seed(SEA),
-    Key::vector("at", 2, 0.0..=1e6)
-        .unit("metres")
-        .only("kind", PACKET)
-        .also(", in the domain")
-        .about("where crests meet: x and z from the domain's least corner"),
-    Key::number("time", PERIOD)
-        .unit("seconds")
-        .only("kind", PACKET)
-        .also(", late enough for its slowest waves to be there")
-        .about("when they meet there"),
-    Key::number("depth", LENGTH)
-        .unit("metres")
-        .also(", no more than the domain is high")
-        .about("of the water at rest, from the domain's floor"),
-    Key::number_or_zero("ramp", PERIOD)
-        .unit("seconds")
-        .computed(|| "two periods (of the peak)".to_owned())
-        .also("; 0 of regular waves alone")
-        .about("how long the waves take to grow to their full height"),
-    wave_keys::direction_degrees(),
-];

@@ -35,7 +35,7 @@ trait Declared: Keyed {
 
 macro_rules! declared {
     ($($name:ident),+ $(,)?) => {
-        $(pub(super) mod $name;)+
+        $(mod $name;)+
 
         /// Keys of each effect in a table of its own.
         impl Keyed for Effects {

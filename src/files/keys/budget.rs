@@ -1,10 +1,78 @@
 //! Keys of a scene's `[budget]`.
 
-use super::super::{
-    budget::{self, Limit},
-    declare::keys,
-    key::Interval,
-};
+use serde::{Deserialize, Serialize};
+
+use super::super::{declare::keys, key::Interval};
+use swell_scene::budget::SPEED_JUMP;
+
+/// Defaults that depend on the scene; the others are in the table of keys.
+pub(crate) const SPEED: f64 = 4.0;
+
+pub(crate) const RESIDUAL: f64 = 1e-2;
+
+/// Boundary work misses what a wall does to the drops that it overtakes without pressure: 6 % of a
+/// frame in the small box of tests/hard_cases/24-leaving.toml, 0.1 % in the quickstart.
+pub(crate) const FLIP_ENERGY: f64 = 0.1;
+
+/// With few corrections and long frames PBF creates energy: 4 % per frame in the quickstart, 7 %
+/// with Chebyshev's iteration.
+pub(crate) const PBF_ENERGY: f64 = 0.25;
+
+/// Default with FLIP. Splashes of the shipped scenes reach 0.9, water that leaked along a wall 24.
+pub(crate) const DENSITY_ERROR_MAX: f64 = 4.0;
+
+/// Least default speed limit, spacings per frame, for scenes without gravity or moving walls.
+pub(crate) const LEAST_SPEED: f64 = 10.0;
+
+/// Describes the default of `budget.speed`.
+fn speed_words() -> String {
+    format!(
+        "{SPEED} (√(2 g × the domain's diagonal) + the fastest wall or moving solid), at least \
+         {LEAST_SPEED} spacings a frame"
+    )
+}
+
+fn speed_jump_words() -> String {
+    format!("false with pbf, {SPEED_JUMP:?} with flip")
+}
+
+fn density_error_max_words() -> String {
+    format!("false with pbf, {DENSITY_ERROR_MAX:?} with flip")
+}
+
+fn residual_words() -> String {
+    format!("{RESIDUAL}, or the tolerance where that is larger")
+}
+
+fn energy_words() -> String {
+    format!(
+        "{PBF_ENERGY} with pbf, {FLIP_ENERGY} with flip, false in a wind or with surface tension"
+    )
+}
+
+/// A limit as written.
+#[derive(Clone, Copy, Debug, Deserialize, Serialize)]
+#[serde(untagged)]
+pub(crate) enum Limit {
+    /// `false`: nothing is too much.
+    Off(bool),
+    Most(f64),
+}
+
+impl From<Option<f64>> for Limit {
+    fn from(limit: Option<f64>) -> Self {
+        limit.map_or(Self::Off(false), Self::Most)
+    }
+}
+
+impl From<Limit> for Option<f64> {
+    fn from(limit: Limit) -> Self {
+        match limit {
+            Limit::Off(_) => None,
+            Limit::Most(limit) => Some(limit),
+        }
+    }
+}
 
 /// Range of a limit in its unit, wider than any value that `f32` resolves or that a
 /// simulation reaches.
@@ -15,11 +83,11 @@ const LIMIT: Interval = 1e-12..=1e12;
 keys! { struct BudgetSpec {
     speed: Option<Limit> = number_or_false(LIMIT)
         .unit("m/s")
-        .computed(budget::speed_words)
+        .computed(speed_words)
         .about("of a particle at a frame's end"),
     speed_jump: Option<Limit> = number_or_false(LIMIT)
         .unit("times")
-        .computed(budget::speed_jump_words)
+        .computed(speed_jump_words)
         .about(
             "of a frame's fastest particle over the fastest before it with what gravity, \
              walls and moving solids add",
@@ -34,7 +102,7 @@ keys! { struct BudgetSpec {
         .about("its 99th percentile"),
     density_error_max: Option<Limit> = number_or_false(LIMIT)
         .unit("of the rest density")
-        .computed(budget::density_error_max_words)
+        .computed(density_error_max_words)
         .about("its largest"),
     capped: Limit = number_or_false(LIMIT)
         .unit("of all particles in all substeps")
@@ -43,7 +111,7 @@ keys! { struct BudgetSpec {
     residual: Option<Limit> = number_or_false(LIMIT)
         .unit("of the right-hand side's norm")
         .also(", at least solver.flip.pressure.tolerance")
-        .computed(budget::residual_words)
+        .computed(residual_words)
         .about("true residual of a projection"),
     divergence: Limit = number_or_false(LIMIT)
         .unit("of a cell's volume in a substep")
@@ -55,7 +123,7 @@ keys! { struct BudgetSpec {
         .about("how far the volume may be off; measured only where it is set"),
     energy: Option<Limit> = number_or_false(LIMIT)
         .unit("of the total energy in a frame")
-        .computed(budget::energy_words)
+        .computed(energy_words)
         .about("rise of kinetic and potential energy beyond the work of walls and solids"),
     particles: Limit = number_or_false(1.0..=134_217_728.0)
         .default("false")

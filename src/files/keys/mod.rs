@@ -6,7 +6,7 @@
 //! (`super::write`), the comparison on resume (`super::difference`), and the reference page
 //! ([`page`], printed by `swell keys`).
 
-mod budget;
+pub(super) mod budget;
 mod motion;
 mod outputs;
 mod page;
@@ -22,12 +22,14 @@ pub use page::page;
 
 pub(super) use budget::BudgetSpec;
 pub(super) use motion::{MotionKind, SolidMotionSpec, TrackSpec, TurnSpec, WallMotionSpec};
-pub(super) use outputs::{BearerSpec, GridsSpec, KeepSpec, ProbeSpec};
+pub(super) use outputs::{
+    BearerSpec, COMPRESSIONS, FRONT_QUANTILE, GridsSpec, KeepSpec, ProbeSpec, RUN_UP_QUANTILE,
+};
 pub(super) use scene::{
     AbsorptionSpec, BoxSpec, DomainSpec, DrainSpec, EmitterSpec, MeshSpec, ScaleSpec, SceneSpec,
-    SolidSpec, SwarmSpec, WaterSpec, WaveMakerSpec,
+    SolidSpec, SwarmSpec, WALLS, WaterSpec, WaveMakerSpec,
 };
-pub(super) use solver::{PbfSpec, SolverSpec};
+pub(super) use solver::{CHEBYSHEV_RELAXATION, PbfSpec, RELAXATION, SolverSpec};
 pub(super) use study::KEYS as STUDY;
 
 /// Keys of a scene.

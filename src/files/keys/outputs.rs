@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::{
-    super::{declare::keys, keep, key::words, probe},
+    super::{declare::keys, key::words},
     scene::COORDINATE,
 };
 use swell_domain::{probe::Rate, sparse_grid::Precision};
@@ -28,6 +28,9 @@ keys! { struct GridsSpec {
         .about("how values are kept"),
 } }
 
+/// Values of `compression`.
+pub(crate) const COMPRESSIONS: [&str; 2] = ["none", "zstd"];
+
 keys! { struct KeepSpec {
     particles: String = text("\"all\", \"every N\" with N from 1 to 1000000, or \"none\"")
         .default("\"all\"")
@@ -35,13 +38,23 @@ keys! { struct KeepSpec {
             "frames whose particles stay; the first and the newest are always there, \
              so that a bake can go on",
         ),
-    compression: String = choice(&keep::COMPRESSIONS)
+    compression: String = choice(&COMPRESSIONS)
         .default("\"none\"")
         .about(
             "of frames, without loss: zstd makes .ply.zst, which swell and its Python package \
              read, and nothing else",
         ),
 } }
+
+/// Default for a front: spray ahead of a breaking wave is less than the remainder.
+pub(crate) const FRONT_QUANTILE: f64 = 0.995;
+/// Default for a run-up, which already ignores water detached from the body.
+pub(crate) const RUN_UP_QUANTILE: f64 = 1.0;
+
+/// Describes both defaults.
+fn quantile_words() -> String {
+    format!("{FRONT_QUANTILE} of a front, {RUN_UP_QUANTILE} of a run_up")
+}
 
 keys! { struct ProbeSpec {
     name: Option<String> = file_stem()
@@ -70,7 +83,7 @@ keys! { struct ProbeSpec {
         .about("which way a front is ahead, and a flux positive"),
     quantile: Option<f64> = number(1e-6..=1.0)
         .only("kind", &["front", "run_up"])
-        .computed(probe::quantile_words)
+        .computed(quantile_words)
         .about("part of the water, with run_up of the body of water, that lies behind or below"),
     solid: Option<BearerSpec> = other(
         "the number of a [[solid]], from 0, or a wall of the domain: \"-x\", \"+x\", \"-y\", \

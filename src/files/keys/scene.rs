@@ -11,7 +11,6 @@ use super::{
         axis::Axis,
         declare::{Keyed, keys},
         key::{Interval, Key, words},
-        no_slip,
     },
     budget::BudgetSpec,
     motion::{SolidMotionSpec, TrackSpec, TurnSpec, WallMotionSpec},
@@ -79,6 +78,9 @@ keys! { fields of Shot {
         .about("output frames a second"),
 } }
 
+/// Values of `domain.walls`, which applies to all six walls.
+pub(crate) const WALLS: [&str; 2] = ["free_slip", "no_slip"];
+
 keys! { struct DomainSpec {
     min: [f64; 3] = vector(3, COORDINATE)
         .unit("metres")
@@ -88,7 +90,7 @@ keys! { struct DomainSpec {
         .unit("metres")
         .also(", each above min by 1e-8 at least")
         .about("greatest corner"),
-    walls: Option<String> = choice(&no_slip::WALLS)
+    walls: Option<String> = choice(&WALLS)
         .computed(|| "free_slip, but for those of no_slip".to_owned())
         .also(", the last of the solver flip, or where an effect resolves them")
         .about(

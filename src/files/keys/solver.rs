@@ -1,7 +1,6 @@
 //! Keys of the solvers.
 
 use super::super::{
-    build::{CHEBYSHEV_RELAXATION, RELAXATION},
     declare::keys,
     key::{Interval, words},
 };
@@ -34,6 +33,12 @@ keys! { struct SolverSpec {
         .absent()
         .about("PIC/FLIP (Zhu and Bridson 2005)"),
 } }
+
+/// Default of the relaxation ω.
+pub(crate) const RELAXATION: f64 = 1.0;
+
+/// Default ω of the Chebyshev semi-iteration; 1 overshoots (table in solve/pbf/iteration.rs).
+pub(crate) const CHEBYSHEV_RELAXATION: f64 = 0.7;
 
 keys! { struct PbfSpec {
     particle_spacing: f64 = number(SPACING)

@@ -2,7 +2,7 @@ use std::{collections::BTreeSet, fmt::Debug};
 
 use serde::de::DeserializeOwned;
 
-use swell_scene::effects::generation_zone::{Packet, Regular, Sea, Waves};
+use swell_scene::open_waves::{Packet, Regular, Sea, Waves};
 
 use crate::{declare::Keyed, parse_scene};
 

@@ -2,7 +2,7 @@ use std::collections::BTreeSet;
 
 use swell_scene::{
     Scene, SceneError,
-    effects::generation_zone::{Regular, Sea},
+    open_waves::{Regular, Sea},
     start_waves::{Solitary, StartWave},
 };
 

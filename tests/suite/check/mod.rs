@@ -31,6 +31,7 @@ use swell::{
             vorticity_confinement,
         },
         flip::{Precision, Preconditioner, Pressure, Surface, Transfer},
+        open_waves,
         sources::Region,
     },
     solve::{
@@ -114,7 +115,7 @@ fn case(method: Method) -> (Scene, Start) {
     scene.effects.generation_zone = Some(generation_zone::Settings {
         walls: vec![Wall::NAMED[1].1],
         length: 1.4,
-        waves: generation_zone::Waves::Sea(generation_zone::Sea {
+        waves: open_waves::Waves::Sea(open_waves::Sea {
             significant_height: 0.2,
             seed: 1,
             spectrum: Spectrum::Jonswap,

@@ -22,6 +22,7 @@ use swell::{
             vorticity_confinement,
         },
         flip::{Precision, Preconditioner, Surface, Transfer},
+        open_waves,
         probe::{Probe, ProbeKind},
     },
     solve::plan::*,
@@ -82,7 +83,7 @@ fn with_effects(mut scene: Scene) -> Scene {
     scene.effects.generation_zone = Some(generation_zone::Settings {
         walls: vec![Wall::NAMED[0].1],
         length: 0.5,
-        waves: generation_zone::Waves::Sea(generation_zone::Sea {
+        waves: open_waves::Waves::Sea(open_waves::Sea {
             significant_height: 0.05,
             seed: 1,
             spectrum: Spectrum::Jonswap,

@@ -35,21 +35,26 @@ particle_spacing = {SPACING}
     )
 }
 
-/// Depths of the water in columns two spacings wide, by the volume of their particles, with the
-/// columns' distances from the domain's least corner.
-fn columns(job: &Job, cache: &str, frame: u32, length: f64) -> Vec<(f64, f64)> {
-    let width = 2.0 * SPACING;
+/// Distances of the particles from the domain's least corner, along x.
+fn distances(job: &Job, cache: &str, frame: u32) -> Vec<f64> {
     let state = CacheReader::open(&job.path(cache)).unwrap();
     let state = state.read(frame).unwrap();
-    let mut depths = vec![0.0; (length / width).round() as usize];
-    let last = depths.len() - 1;
-    for position in &state.position {
-        let column = (f64::from(position[0]) - 3.0) / width;
-        depths[(column.max(0.0) as usize).min(last)] += SPACING.powi(3) / (width * WIDTH);
-    }
-    let at = |k: usize| width * (k as f64 + 0.5);
-    let depths = depths.into_iter().enumerate();
-    depths.map(|(k, depth)| (at(k), depth)).collect()
+    let positions = state.position.iter();
+    positions.map(|x| f64::from(x[0]) - 3.0).collect()
+}
+
+/// ∫ (depth − still depth) f dx over the tank. The particles' own volumes make up the depth: bins
+/// would shift by whole columns of the lattice.
+fn integral(distances: &[f64], length: f64, f: impl Fn(f64) -> f64) -> f64 {
+    let water: f64 = distances.iter().map(|x| f(*x)).sum();
+    water * SPACING.powi(3) / WIDTH - DEPTH * whole(length, f)
+}
+
+/// ∫ f dx over the tank, by the midpoint rule.
+fn whole(length: f64, f: impl Fn(f64) -> f64) -> f64 {
+    let step = 0.01;
+    let points = (0..(length / step).round() as u32).map(|k| step * (f64::from(k) + 0.5));
+    step * points.map(f).sum::<f64>()
 }
 
 /// Elevation over H of a solitary wave to first order, and its celerity to third (Grimshaw 1971).
@@ -65,19 +70,19 @@ fn celerity(height: f64) -> f64 {
 
 /// Height and place of the solitary wave that fits best, by least squares. The shape of first order
 /// fits waves of third order to 3 % of the height.
-fn fitted(columns: &[(f64, f64)], height: f64) -> (f64, f64) {
-    let places = (0..1000).map(|k| 4.0 + 0.01 * f64::from(k));
+fn fitted(distances: &[f64], height: f64, length: f64) -> (f64, f64) {
     let fit = |at: f64| {
         let shape = |x: f64| solitary(height, x - at);
-        let both = columns.iter().map(|&(x, depth)| shape(x) * (depth - DEPTH));
-        let square: f64 = columns.iter().map(|&(x, _)| shape(x).powi(2)).sum();
-        (both.sum::<f64>() / square, at, square)
+        let both = integral(distances, length, shape);
+        (both, whole(length, |x| shape(x).powi(2)), at)
     };
-    let explained = |&(a, _, square): &(f64, f64, f64)| a * a * square;
-    let best = places.map(fit);
-    let best = best.max_by(|a, b| explained(a).total_cmp(&explained(b)));
-    let (height, at, _) = best.unwrap();
-    (height, at)
+    let places = (0..250).map(|k| 5.0 + 0.04 * f64::from(k));
+    let explained = |&(both, square, _): &(f64, f64, f64)| both * both / square;
+    let best = places
+        .map(fit)
+        .max_by(|a, b| explained(a).total_cmp(&explained(b)));
+    let (both, square, at) = best.unwrap();
+    (both / square, at)
 }
 
 /// After 5.7 depths the crest is within a spacing of where theory has it, and the wave has its
@@ -101,8 +106,8 @@ fn a_solitary_wave_of_the_start_keeps_height_and_celerity() {
             0,
             &format!("bake solitary.toml --solver {solver} -o {solver}"),
         );
-        let (before, _) = fitted(&columns(&job, solver, 0, LENGTH), HEIGHT);
-        let (height, at) = fitted(&columns(&job, solver, 40, LENGTH), HEIGHT);
+        let (before, _) = fitted(&distances(&job, solver, 0), HEIGHT, LENGTH);
+        let (height, at) = fitted(&distances(&job, solver, 40), HEIGHT, LENGTH);
         let (time, place) = (40.0 / 24.0, 6.0 + celerity(HEIGHT) * 40.0 / 24.0);
         println!("{solver}: {before:.4} {height:.4} m, {at:.3} for {place:.3} m");
         assert!((before / HEIGHT - 1.0).abs() < 0.03, "{solver}: {before}");
@@ -113,19 +118,16 @@ fn a_solitary_wave_of_the_start_keeps_height_and_celerity() {
     }
 }
 
-/// Amplitude and phase of the elevation's part with this wave number.
-fn harmonic(columns: &[(f64, f64)], number: f64) -> (f64, f64) {
-    let part = |f: fn(f64) -> f64| {
-        let terms = columns.iter().map(|&(x, depth)| depth * f(number * x));
-        2.0 * terms.sum::<f64>() / columns.len() as f64
-    };
+/// Amplitude and phase of the elevation's part with this wave number, which fits the tank.
+fn harmonic(distances: &[f64], number: f64, length: f64) -> (f64, f64) {
+    let part = |f: fn(f64) -> f64| 2.0 / length * integral(distances, length, |x| f(number * x));
     let (cosine, sine) = (part(f64::cos), part(f64::sin));
     (cosine.hypot(sine), sine.atan2(cosine))
 }
 
 /// Two regular waves in a periodic tank are where theory has them after a period and a quarter. To
-/// third order they run 0.7 % faster, which is 0.05 radians by then. Control: a frame earlier they
-/// are not there.
+/// third order they run 0.7 % faster, which is 0.05 radians by then, and the second-order start
+/// leaves free waves of a few per cent. Control: a frame earlier they are not there.
 #[test]
 fn regular_waves_of_the_start_run_through_a_periodic_tank() {
     const HEIGHT: f64 = 0.1;
@@ -142,20 +144,20 @@ fn regular_waves_of_the_start_run_through_a_periodic_tank() {
             0,
             &format!("bake stokes.toml --solver {solver} -o {solver}"),
         );
-        let (before, phase) = harmonic(&columns(&job, solver, 0, LENGTH), number);
+        let (before, phase) = harmonic(&distances(&job, solver, 0), number, LENGTH);
         assert!(
             (2.0 * before / HEIGHT - 1.0).abs() < 0.03 && phase.abs() < 0.02,
             "{before} {phase}"
         );
         let off = |frame: u32| {
-            let (amplitude, phase) = harmonic(&columns(&job, solver, frame, LENGTH), number);
+            let (amplitude, phase) = harmonic(&distances(&job, solver, frame), number, LENGTH);
             let ahead = frequency * 40.0 / 24.0 - phase;
             (amplitude, (ahead + 0.5 * TAU).rem_euclid(TAU) - 0.5 * TAU)
         };
         let (amplitude, ahead) = off(40);
         println!("{solver}: {amplitude:.4} m, {ahead:.3}; {:.3}", off(39).1);
         assert!(
-            (amplitude / before - 1.0).abs() < 0.06,
+            (amplitude / before - 1.0).abs() < 0.1,
             "{solver}: {amplitude}"
         );
         assert!(ahead.abs() < 0.08, "{solver}: {ahead}");

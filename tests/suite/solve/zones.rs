@@ -6,6 +6,7 @@ use swell::{
     scene::{
         Effects, Method, Scene, Wall,
         effects::{absorbing_zone::Settings, generation_zone},
+        open_waves,
     },
     solve::plan::Plan,
 };
@@ -41,7 +42,7 @@ fn waves(walls: &[Wall], length: f64) -> Option<generation_zone::Settings> {
     Some(generation_zone::Settings {
         walls: walls.to_vec(),
         length,
-        waves: generation_zone::Waves::Stokes(generation_zone::Regular {
+        waves: open_waves::Waves::Stokes(open_waves::Regular {
             height: 0.05,
             period: 0.9,
             depth: 0.4,

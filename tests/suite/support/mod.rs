@@ -56,7 +56,6 @@ pub fn scene(size: [f64; 3]) -> Scene {
             meshes: Vec::new(),
             waves: Vec::new(),
             particles: Vec::new(),
-            waves: Vec::new(),
         },
         solids: Vec::new(),
         moving_solids: Vec::new(),

@@ -11,6 +11,7 @@ use swell::{
     scene::{
         Scene, Wall, WaveMaker, effects,
         flip::{AFFINE, Surface, Transfer},
+        open_waves,
     },
 };
 
@@ -206,7 +207,7 @@ pub fn effects() -> Case {
     case.scene.effects.generation_zone = Some(effects::generation_zone::Settings {
         walls: vec![Wall::NAMED[0].1],
         length: 0.6,
-        waves: effects::generation_zone::Waves::Sea(effects::generation_zone::Sea {
+        waves: open_waves::Waves::Sea(open_waves::Sea {
             significant_height: 0.05,
             seed: 1,
             spectrum: Spectrum::Jonswap,
