@@ -2,7 +2,8 @@ use std::f64::consts::TAU;
 
 use glam::{DVec2, DVec3};
 
-use super::{Regular, Settings, Waves};
+use super::{Settings, Waves};
+use crate::open_waves::Regular;
 use crate::{Wall, effects::zone::Zone};
 
 type Complex = DVec2;
