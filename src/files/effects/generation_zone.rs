@@ -10,12 +10,7 @@ use swell_scene::{
 };
 
 use super::{Declared, Surroundings, zone};
-use crate::{
-    declare::keys,
-    document::Document,
-    key::words,
-    open_waves,
-};
+use crate::{declare::keys, document::Document, key::words, open_waves};
 
 /// Keys of the effect and of its waves.
 const KEY: &str = "effects.generation_zone";
