@@ -82,6 +82,7 @@ impl Scene {
             self.lint_packet(&waves, &mut lints);
             made.push((None, waves));
         }
+        self.lint_cut_waves(&mut lints);
         for waves in self.made_at_start() {
             self.lint_waves(&waves, still, &mut lints);
             made.push((None, waves));

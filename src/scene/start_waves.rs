@@ -25,6 +25,10 @@ pub const KEY: &str = "water.wave";
 /// √(g d) of the velocities unexplained, and beyond it more.
 pub const HIGHEST_SOLITARY: f64 = 0.5;
 
+/// Part of its height up to which a solitary wave may be cut off by the ends of the domain: a piston
+/// neglects half as much of it before it starts.
+const CUT: f64 = 0.05;
+
 /// One `[[water.wave]]`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
@@ -161,6 +165,45 @@ impl Scene {
     /// Returns the depth of still water below the waves of the start, metres.
     pub(crate) fn wave_depth(&self) -> Option<f64> {
         self.water.waves.first().map(StartWave::depth)
+    }
+
+    /// Warns about solitary waves that the ends of the domain cut off.
+    pub(crate) fn lint_cut_waves(&self, lints: &mut Vec<String>) {
+        let (room, gravity) = (self.start_domain(), self.water.gravity.length());
+        for (index, wave) in self.water.waves.iter().enumerate() {
+            let InitialWave::Solitary {
+                wave,
+                direction,
+                crest,
+            } = wave.at_start(gravity)
+            else {
+                continue;
+            };
+            let corner = |x: f64, z: f64| {
+                let from = DVec2::new(x - self.domain.min.x, z - self.domain.min.z);
+                direction.dot(from) - crest
+            };
+            let (min, max) = (room.min, room.max);
+            let ends = [
+                (min.x, min.z),
+                (min.x, max.z),
+                (max.x, min.z),
+                (max.x, max.z),
+            ];
+            let ends = ends.map(|(x, z)| corner(x, z));
+            let behind = ends.into_iter().fold(f64::INFINITY, f64::min);
+            let ahead = ends.into_iter().fold(f64::NEG_INFINITY, f64::max);
+            let nearest = if -behind < ahead { behind } else { ahead };
+            let left = wave.elevation(nearest) / wave.height;
+            if left > CUT {
+                lints.push(format!(
+                    "{KEY}[{index}].at: the domain ends {:.2} m from the crest, where the wave \
+                     still has {:.0} % of its height",
+                    nearest.abs(),
+                    100.0 * left
+                ));
+            }
+        }
     }
 
     /// Returns what lints have to know of the waves of the start.

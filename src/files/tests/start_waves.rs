@@ -130,7 +130,12 @@ fn waves_of_the_start_are_known_to_volumes_and_lints() {
         scene.asked_volume()
     );
     assert!(scene.lints().is_empty(), "{:?}", scene.lints());
-    let scene = load(&[SOLITARY], &["domain.max.1=6.15"]).expect("valid");
+    let near = load(&[SOLITARY], &["water.wave.0.at=1.5"]).expect("valid");
+    let cut = "water.wave[0].at: the domain ends 1.50 m from the crest, where the wave still has";
+    assert!(near.lints()[0].starts_with(cut), "{:?}", near.lints());
+    let far = load(&[SOLITARY], &["water.wave.0.at=8.0"]).expect("valid");
+    assert!(far.lints().is_empty(), "{:?}", far.lints());
+    let scene = load(&[SOLITARY], &["domain.max.1=6.15", "water.wave.0.at=8.0"]).expect("valid");
     let lints = scene.lints().join("\n");
     assert!(
         lints.contains("water.wave[0]: crests 0.200 m above water 1 m deep reach the ceiling"),
