@@ -105,6 +105,10 @@ impl Measure {
                 ("height", "height of the crest over the depth, H/d"),
                 ("celerity", "celerity, m/s"),
                 ("crests", "part of the gauges that saw a whole crest"),
+                (
+                    "run_up",
+                    "highest water connected to the body, above still water over the depth, R/d",
+                ),
             ],
             Self::DamBreak => &[
                 ("front_error", "front against the points, mean"),

@@ -265,6 +265,9 @@ fn solitary_wave(record: &Record<'_>, out: &mut BenchmarkMeasurements) {
     let arrivals = crests.iter().zip(&gauges).map(|((t, _), at)| (*t, at.x));
     out.put("celerity", waves::slope(&arrivals.collect::<Vec<_>>()));
     out.put("height", mean(crests.iter().map(|(_, y)| y / scale.depth)));
+    let heights = record.rows.iter().filter_map(|row| row.run_up);
+    let highest = heights.fold(f64::NAN, f64::max);
+    out.put("run_up", Some(highest / scale.depth - 1.0));
     if let Some((at, _)) = crests.last() {
         let unit = (scale.depth / GRAVITY).sqrt();
         let curve = above(gauges.len() - 1).into_iter();

@@ -5,7 +5,7 @@ use glam::{DVec2, Vec3};
 use swell_cache::ProbeValues;
 use swell_domain::{
     particles::Particles,
-    probe::{elevation, front, volume as volume_of},
+    probe::{elevation, front, run_up, volume as volume_of},
 };
 use swell_files::study::validation::{Benchmark, Measure};
 use swell_scene::{Scene, probe::ProbeKind};
@@ -31,6 +31,9 @@ pub(super) struct FrameRecord {
     pub(super) pressures: Vec<Option<f64>>,
     /// Force along x at the force probe, N; `None` at the start.
     pub(super) force: Option<f64>,
+    /// Highest water connected to the body, metres above the domain's floor; `None` without a
+    /// run-up probe.
+    pub(super) run_up: Option<f64>,
     /// Values that the measure takes from the particles.
     pub(super) of_water: Vec<f64>,
 }
@@ -72,6 +75,7 @@ impl<'a> Record<'a> {
             levels: self.levels(&step.particles),
             pressures: step.pressures.clone(),
             force: self.force(&step.looks),
+            run_up: self.run_up(&step.particles),
             of_water: self.of_water(&step.particles),
         });
     }
@@ -101,6 +105,17 @@ impl<'a> Record<'a> {
         let mut probes = self.scene.probes.iter();
         let probe = probes.position(|probe| matches!(probe.kind, ProbeKind::Force { .. }))?;
         *looks.get(probe)?.first()?
+    }
+
+    fn run_up(&self, particles: &Particles) -> Option<f64> {
+        let probes = self.scene.probes.iter();
+        let quantile = probes.filter_map(|probe| match probe.kind {
+            ProbeKind::RunUp { quantile } => Some(quantile),
+            _ => None,
+        });
+        let spacing = self.scene.particle_spacing();
+        let top = run_up(particles, spacing, quantile.last()?)?;
+        Some(top - self.scene.domain.min.y)
     }
 
     /// Number of frames in a tenth of a second.
