@@ -108,13 +108,15 @@ impl<'a> Record<'a> {
     }
 
     fn run_up(&self, particles: &Particles) -> Option<f64> {
-        let probes = self.scene.probes.iter();
-        let quantile = probes.filter_map(|probe| match probe.kind {
-            ProbeKind::RunUp { quantile } => Some(quantile),
-            _ => None,
-        });
-        let spacing = self.scene.particle_spacing();
-        let top = run_up(particles, spacing, quantile.last()?)?;
+        let quantile = self
+            .scene
+            .probes
+            .iter()
+            .find_map(|probe| match probe.kind {
+                ProbeKind::RunUp { quantile } => Some(quantile),
+                _ => None,
+            })?;
+        let top = run_up(particles, self.scene.particle_spacing(), quantile)?;
         Some(top - self.scene.domain.min.y)
     }
 
