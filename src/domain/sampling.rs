@@ -5,10 +5,10 @@
 mod displace;
 mod relax;
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
-use self::displace::displace;
 pub(super) use self::displace::{CLEARANCE, moved_out};
+use self::displace::{displace, displace_below};
 use super::{
     bounds::Bounds,
     mesh::TriangleMesh,
@@ -28,6 +28,9 @@ const BOUNDARY_DISTANCE: f64 = 0.75;
 /// Candidates per squared spacing. With 12, no point on a box or sphere is farther than 1.2
 /// spacings from a sample (tested).
 const BOUNDARY_CANDIDATES: f64 = 12.0;
+
+/// Steps of a sequence of low discrepancy in two dimensions (Roberts 2018).
+const R2: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_3];
 
 /// A boundary particle on the surface of a solid.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -67,13 +70,73 @@ pub fn fill_water<'a>(
         fill_mesh(&mut positions, mesh, domain, spacing)?;
     }
     let removed = solid.map_or(0, |solid| displace(&mut positions, solid, domain, spacing));
-    let particles = Particles {
+    Ok(Fill {
+        particles: at_rest(&positions),
+        removed,
+    })
+}
+
+/// Fills `block` with particles below a surface, `surface` metres high at x and z, then clears
+/// `solid`. The uppermost layers follow the surface, so that it has no steps. `around` is the
+/// distance to the solid and to the air above the surface.
+pub fn fill_below(
+    surface: impl Fn(DVec2) -> f64,
+    block: &Bounds,
+    [solid, around]: [Option<&SignedDistance>; 2],
+    domain: &Bounds,
+    spacing: f64,
+) -> Fill {
+    let (mut water, mut air) = (Vec::new(), Vec::new());
+    for mut p in fill_blocks(&[*block], domain, spacing) {
+        let column = ((p - block.min) / spacing).floor();
+        let height = (surface(DVec2::new(p.x, p.z)) - block.min.y) / spacing;
+        let layers = (height + dither(column)).floor().max(0.0);
+        p.y = block.min.y + spacing * followed(column.y, layers, height);
+        let side = if column.y < layers {
+            &mut water
+        } else {
+            &mut air
+        };
+        side.push(p);
+    }
+    let removed = around.map_or(0, |around| {
+        displace_below(&mut water, &air, solid, around, domain, spacing)
+    });
+    Fill {
+        particles: at_rest(&water),
+        removed,
+    }
+}
+
+/// Layers that follow a surface.
+const FOLLOWING: f64 = 4.0;
+
+/// Height of the middle of a layer in a column of `layers` layers of water, which is `height` high,
+/// all in spacings. The uppermost ones share the height that is left; layers of air go on above.
+fn followed(layer: f64, layers: f64, height: f64) -> f64 {
+    let still = (layers - FOLLOWING).max(0.0);
+    if layer < still {
+        layer + 0.5
+    } else if layer < layers {
+        still + (layer - still + 0.5) * (height - still) / (layers - still)
+    } else {
+        height + (layer - layers) + 0.5
+    }
+}
+
+/// Threshold of a column: over neighbours of any number spread evenly from 0 to 1 (Roberts 2018,
+/// R2), so that few columns together hold their volume to a part of a particle.
+fn dither(column: DVec3) -> f64 {
+    (column.x * R2[0] + column.z * R2[1]).rem_euclid(1.0)
+}
+
+fn at_rest(positions: &[DVec3]) -> Particles {
+    Particles {
         position: positions.iter().map(|p| p.as_vec3().to_array()).collect(),
         velocity: vec![[0.0; 3]; positions.len()],
         id: (0..positions.len() as u32).collect(),
         ..Particles::default()
-    };
-    Ok(Fill { particles, removed })
+    }
 }
 
 /// Returns the number of particles along each axis of a block: its size over the spacing, rounded
@@ -261,7 +324,6 @@ fn looks_out(domain: &Bounds, p: DVec3, normal: DVec3, tolerance: f64) -> bool {
 /// The `index`-th point of a low-discrepancy sequence (Roberts 2018, R2) over a triangle, shifted
 /// by a hash of the triangle's index.
 pub(crate) fn candidate([a, b, c]: &[DVec3; 3], triangle: u64, index: u64) -> DVec3 {
-    const R2: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_3];
     let coordinate = |axis: u64| {
         let shift = uniform(2 * triangle + axis);
         (shift + R2[axis as usize] * (index + 1) as f64).fract()

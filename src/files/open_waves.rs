@@ -162,8 +162,10 @@ const WAVES_KEYS: &[Key] = &[
     Key::number_or_zero("ramp", PERIOD)
         .unit("seconds")
         .computed(|| "two periods (of the peak)".to_owned())
-        .also("; 0 of regular waves alone")
-        .about("how long the waves take to grow to their full height"),
+        .about(
+            "how long the waves take to grow to their full height; 0: they have it at the start, \
+             as those of `water.wave` do",
+        ),
     direction_degrees(),
 ];
 
@@ -185,7 +187,7 @@ pub(super) fn check(
     }
     if let Some((asked, enhancement)) = waves.spectral(gravity) {
         seas::shape(doc, path, asked.spectrum, enhancement)?;
-        let periods = [asked.peak_period, asked.shortest_period, asked.ramp];
+        let periods = [asked.peak_period, asked.shortest_period];
         seas::check_periods(doc, path, periods, gravity)?;
         let (key, stands) = match asked.meeting {
             Meeting::Random {

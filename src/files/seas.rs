@@ -25,8 +25,16 @@ type Result<T> = std::result::Result<T, SceneError>;
 /// Builds the motion of the table at `path`, for a sea or a packet.
 pub(super) fn build(doc: &Document<'_>, path: &str, asked: SeaParameters) -> Result<Motion> {
     let refuse = |key: &str, problem: String| Err(doc.fault_of(&format!("{path}.{key}"), problem));
-    let periods = [asked.peak_period, asked.shortest_period, asked.ramp];
-    check_periods(doc, path, periods, asked.gravity)?;
+    check_periods(
+        doc,
+        path,
+        [asked.peak_period, asked.shortest_period],
+        asked.gravity,
+    )?;
+    if asked.ramp == 0.0 {
+        let problem = "a spectrum's motion is never at rest, so it needs a ramp";
+        return Err(doc.fault_of(&format!("{path}.ramp"), problem.to_owned()));
+    }
     let (key, height) = match asked.phases {
         Phases::Random {
             significant_height, ..
@@ -86,7 +94,7 @@ fn check_second_order(asked: &SeaParameters) -> std::result::Result<(), String> 
 pub(super) fn check_periods(
     doc: &Document<'_>,
     path: &str,
-    [peak, shortest, ramp]: [f64; 3],
+    [peak, shortest]: [f64; 2],
     gravity: f64,
 ) -> Result<()> {
     let refuse = |key: &str, problem: String| Err(doc.fault_of(&format!("{path}.{key}"), problem));
@@ -103,10 +111,6 @@ pub(super) fn check_periods(
             shown(peak)
         );
         return refuse("shortest_period", problem);
-    }
-    if ramp == 0.0 {
-        let problem = "a spectrum's motion is never at rest, so it needs a ramp";
-        return refuse("ramp", problem.to_owned());
     }
     Ok(())
 }

@@ -111,7 +111,8 @@ fn check_one(
     let refuse = |key: &str, problem: String| Err(doc.fault_of(&format!("{path}.{key}"), problem));
     let DVec3 { x, y, z } = around.gravity;
     if x != 0.0 || z != 0.0 || y >= 0.0 {
-        return refuse("kind", "waves need gravity along -y".to_owned());
+        let problem = format!("{path} needs gravity along -y");
+        return Err(doc.fault_of("water.gravity", problem));
     }
     let high = around.domain.size().y;
     if wave.depth() > high {
@@ -160,9 +161,13 @@ fn check_periods(
                 let k = wave_number(TAU / waves.period, waves.depth, -around.gravity.y);
                 let count = size * along.abs() * k / TAU;
                 if count < 0.5 || (count - count.round()).abs() > FITS {
+                    let k = TAU * count.round().max(1.0) / (size * along.abs());
+                    let gravity = -around.gravity.y;
+                    let fitting = TAU / (gravity * k * (k * waves.depth).tanh()).sqrt();
                     let problem = format!(
                         "waves of {} s that go towards {} degrees: {count:.3} of their lengths are \
-                         in the period of {} m along {name}, and a whole number fits",
+                         in the period of {} m along {name}, and a whole number fits, as with \
+                         {fitting:.6} s",
                         shown(waves.period),
                         shown(degrees),
                         shown(size)

@@ -83,6 +83,8 @@ impl Scene {
             made.push((None, waves));
         }
         self.lint_cut_waves(&mut lints);
+        self.lint_sum(&mut lints);
+        self.lint_incoming(&mut lints);
         for waves in self.made_at_start() {
             self.lint_waves(&waves, still, &mut lints);
             made.push((None, waves));

@@ -16,6 +16,7 @@ use crate::{
     lint::Made,
     open_waves::{Regular, Sea, Waves},
     waves,
+    words::shown,
 };
 
 /// Key of the waves.
@@ -25,9 +26,12 @@ pub const KEY: &str = "water.wave";
 /// √(g d) of the velocities unexplained, and beyond it more.
 pub const HIGHEST_SOLITARY: f64 = 0.5;
 
-/// Part of its height up to which a solitary wave may be cut off by the ends of the domain: a piston
-/// neglects half as much of it before it starts.
-const CUT: f64 = 0.05;
+/// Layers of particles above the highest crest that stand for the air while water is spread.
+const AIR_LAYERS: f64 = 3.0;
+
+/// Part of its height up to which a solitary wave may be cut off by the ends of the domain: that of
+/// a wave a fifth of the depth high, six depths from its crest.
+const CUT: f64 = 0.06;
 
 /// One `[[water.wave]]`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -53,6 +57,16 @@ pub struct Solitary {
     pub at: f64,
     /// Direction of propagation, from +x towards +z.
     pub direction_degrees: f64,
+}
+
+/// The waves at the start of a scene with the space that they take.
+pub struct StartWaves {
+    /// Their surface and velocities.
+    pub waves: InitialWaves,
+    /// The box of the water below them and of some air above them.
+    pub block: Bounds,
+    /// The closed mesh of the air above them.
+    pub air: TriangleMesh,
 }
 
 impl StartWave {
@@ -139,19 +153,21 @@ impl Scene {
         InitialWaves::new(waves.map(|wave| wave.at_start(gravity)).collect())
     }
 
-    /// Returns the box that water below waves fills, up to a whole layer of particles above the
-    /// highest crest, and the closed mesh of the air above the waves, which takes away what is too
-    /// much; `None` without waves.
-    pub fn start_waves(&self) -> Option<(Bounds, TriangleMesh)> {
+    /// Returns the waves at the start with the space that they take; `None` without waves.
+    pub fn start_waves(&self) -> Option<StartWaves> {
         let waves = self.initial_waves()?;
         let (room, spacing) = (self.start_domain(), self.particle_spacing());
         let surface = waves.over(&room, self.domain.min, self.solid_margin(), spacing);
         let highest = surface.highest();
-        let layers = ((highest - room.min.y) / spacing).ceil();
+        let layers = ((highest - room.min.y) / spacing).ceil() + AIR_LAYERS;
         let mut block = room;
         block.max.y = (room.min.y + layers * spacing).min(room.max.y);
         let top = self.domain.max.y.max(highest) + self.solid_margin();
-        Some((block, surface.air(top)))
+        Some(StartWaves {
+            waves,
+            block,
+            air: surface.air(top),
+        })
     }
 
     /// Returns the volume of water below the waves of the start, m³; 0 without any.
@@ -203,6 +219,54 @@ impl Scene {
                     100.0 * left
                 ));
             }
+        }
+    }
+
+    /// Warns about waves that come in and do not carry on those of the start.
+    pub(crate) fn lint_incoming(&self, lints: &mut Vec<String>) {
+        let gravity = self.water.gravity;
+        let (Some(incoming), Some(made)) = (
+            self.effects
+                .waves(gravity)
+                .filter(|_| !self.water.waves.is_empty()),
+            self.effects.made().into_iter().next(),
+        ) else {
+            return;
+        };
+        let start = self.water.waves.iter();
+        let start = start.map(|wave| wave.at_start(gravity.length()));
+        let is_same = |wave: InitialWave| match wave {
+            InitialWave::Open(waves) => waves.lines == incoming.lines,
+            InitialWave::Solitary { .. } => false,
+        };
+        if !start.into_iter().any(is_same) {
+            lints.push(format!(
+                "{}: they are other waves than those of {KEY}, which are damped where these come in",
+                made.key
+            ));
+        } else if incoming.ramp() > 0.0 {
+            lints.push(format!(
+                "{}.ramp: these waves grow from rest within {} s, and damp those of {KEY} until \
+                 then; 0 carries them on",
+                made.key,
+                shown(incoming.ramp())
+            ));
+        }
+    }
+
+    /// Warns about waves that together reach the ceiling, though none does alone.
+    pub(crate) fn lint_sum(&self, lints: &mut Vec<String>) {
+        let crests: f64 = self.made_at_start().map(|made| made.crest).sum();
+        let (Some(depth), room) = (self.wave_depth(), self.domain.size().y) else {
+            return;
+        };
+        if self.water.waves.len() > 1 && depth + crests > room {
+            lints.push(format!(
+                "{KEY}: the crests of all waves, where they meet, are {crests:.3} m above water {} \
+                 m deep, and the ceiling is {} m above the floor",
+                shown(depth),
+                shown(room)
+            ));
         }
     }
 

@@ -1,15 +1,17 @@
 //! Prepares a scene for a solver: particles, boundary, plan.
 
+use glam::DVec2;
+
 use swell_cache::{CacheError, CacheReader};
 use swell_domain::{
     boundary::Boundary,
     mesh::TriangleMesh,
     particles::Particles,
-    sampling::{BoundarySample, boundary_samples, fill_water},
+    sampling::{BoundarySample, Fill, boundary_samples, fill_below, fill_water},
     signed_distance::{SignedDistance, SignedDistanceError},
     sources::Sources,
 };
-use swell_scene::{ByMethod, Method, Scene};
+use swell_scene::{ByMethod, Method, Scene, start_waves::StartWaves};
 use swell_solve::{
     flip,
     plan::{Capacity, Counts, DeviceLimits, Plan},
@@ -50,26 +52,24 @@ impl Start {
         let boundary = boundary(scene)?;
         // Moving solids displace the water of the start as well.
         let movers = scene.moving_solids.iter().map(|solid| &solid.placed.mesh);
-        let (block, air) = scene.start_waves().unzip();
-        let at_start = match (&scene.moving_solids[..], &air) {
-            ([], None) => None,
-            _ => distance(scene, meshes(scene).chain(movers).chain(&air))?,
-        };
-        let water = scene.water.meshes.iter().map(|placed| &placed.mesh);
         let room = scene.start_domain();
-        let fill = fill_water(
-            &[scene.start_blocks(), Vec::from_iter(block)].concat(),
-            water,
-            at_start.as_ref().or(boundary.distance.as_ref()),
-            &room,
-            spacing,
-        )?;
+        let fill = match scene.start_waves() {
+            Some(waves) => below(scene, &waves, meshes(scene).chain(movers))?,
+            None => {
+                let at_start = match scene.moving_solids[..] {
+                    [] => None,
+                    _ => distance(scene, meshes(scene).chain(movers))?,
+                };
+                fill_water(
+                    &scene.start_blocks(),
+                    scene.water.meshes.iter().map(|placed| &placed.mesh),
+                    at_start.as_ref().or(boundary.distance.as_ref()),
+                    &room,
+                    spacing,
+                )?
+            }
+        };
         let (mut particles, mut removed) = (fill.particles, fill.removed);
-        if block.is_some() {
-            // The air above waves took away what no solid did.
-            let below = scene.wave_volume() / scene.particle_volume();
-            removed = (below.round() as usize).saturating_sub(particles.len());
-        }
         scene.move_with_waves(&particles.position, &mut particles.velocity);
         for swarm in &scene.water.particles {
             for at in &swarm.at {
@@ -143,7 +143,8 @@ impl Start {
         let lint = match (self.asked, self.removed) {
             (None, _) => "water: the frame that the bake begins from has no particles",
             (_, 0) => {
-                "water: no block or mesh is large enough for a particle; lower the particle spacing"
+                "water: no block, mesh or wave is large enough for a particle; lower the particle \
+                 spacing"
             }
             _ => "water: solids or walls cover all of the scene's water, and no particle is left",
         };
@@ -184,7 +185,25 @@ impl Start {
     }
 }
 
-fn meshes(scene: &Scene) -> impl Iterator<Item = &TriangleMesh> {
+/// The water below waves, outside of the solids at the start.
+fn below<'a>(
+    scene: &Scene,
+    waves: &'a StartWaves,
+    solids: impl Iterator<Item = &'a TriangleMesh> + Clone,
+) -> Result<Fill, SignedDistanceError> {
+    let solid = distance(scene, solids.clone())?;
+    let around = distance(scene, solids.chain([&waves.air]))?;
+    let floor = scene.domain.min;
+    Ok(fill_below(
+        |at| floor.y + waves.waves.surface(at - DVec2::new(floor.x, floor.z)),
+        &waves.block,
+        [solid.as_ref(), around.as_ref()],
+        &scene.start_domain(),
+        scene.particle_spacing(),
+    ))
+}
+
+fn meshes(scene: &Scene) -> impl Iterator<Item = &TriangleMesh> + Clone {
     scene.solids.iter().map(|solid| &solid.mesh)
 }
 

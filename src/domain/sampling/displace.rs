@@ -25,6 +25,13 @@ const BLOCK: f64 = 4.0;
 /// are scattered.
 const SCATTER: f64 = 0.02;
 
+/// Rounds of spreading beside solids. Twice as many change positions by less than 0.01 spacings.
+const ROUNDS_BESIDE_SOLIDS: usize = 32;
+
+/// Rounds of spreading below a surface, which layers follow from the start: neighbouring columns
+/// that differ by a layer have to agree.
+const ROUNDS_BELOW_AIR: usize = 12;
+
 /// Iterations for particles between a solid and a wall, or between two solids.
 const ROUNDS: usize = 8;
 
@@ -39,11 +46,28 @@ pub(super) fn displace(
     domain: &Bounds,
     spacing: f64,
 ) -> usize {
-    let lattice = positions.clone();
-    let closed: Vec<ClosedPart> = positions
-        .par_iter()
-        .map(|p| closed_part(solid, *p, spacing))
-        .collect();
+    displace_below(positions, &[], Some(solid), solid, domain, spacing)
+}
+
+/// Does the same where water has a surface: `air` are the places of a lattice above it, and
+/// `around` is what is around the water, the solid and the air. Only the solid removes particles.
+pub(super) fn displace_below(
+    positions: &mut Vec<DVec3>,
+    air: &[DVec3],
+    solid: Option<&SignedDistance>,
+    around: &SignedDistance,
+    domain: &Bounds,
+    spacing: f64,
+) -> usize {
+    let lattice = [positions, air].concat();
+    let part = |p: &DVec3| match solid {
+        Some(solid) => closed_part(solid, *p, spacing),
+        None => ClosedPart {
+            position: *p,
+            volume: 0.0,
+        },
+    };
+    let mut closed: Vec<ClosedPart> = positions.par_iter().map(part).collect();
     let open: Vec<f64> = closed.iter().map(|part| 1.0 - part.volume).collect();
     let kept = balanced(positions, &open, spacing);
     let before = positions.len();
@@ -51,14 +75,29 @@ pub(super) fn displace(
     positions.retain(|_| kept.next() == Some(true));
     let clearance = CLEARANCE * spacing;
     let room = domain.grown(-clearance);
-    let distance = |p| solid.sample(p);
-    let gradient = |p| solid.gradient(p);
+    let distance = |p| around.sample(p);
+    let gradient = |p| around.gradient(p);
     positions
         .par_iter_mut()
         .for_each(|p| *p = moved_out(*p, distance, gradient, &room, clearance));
-    relax(positions, &lattice, &closed, solid, domain, spacing);
+    closed.extend(air.iter().map(|p| ClosedPart {
+        position: *p,
+        volume: 1.0,
+    }));
+    let rounds = match solid {
+        Some(_) => ROUNDS_BESIDE_SOLIDS,
+        None => ROUNDS_BELOW_AIR,
+    };
+    relax(
+        positions,
+        &lattice,
+        &closed,
+        around,
+        domain,
+        (spacing, rounds),
+    );
     // Between a solid and a wall, or between two solids, there may be no space.
-    positions.retain(|p| solid.sample(*p) > 0.0);
+    positions.retain(|p| around.sample(*p) > 0.0);
     before - positions.len()
 }
 

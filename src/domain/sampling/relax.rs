@@ -15,9 +15,6 @@ const REACH: f64 = 3.0;
 /// Radius of the kernel, in spacings: the cubic lattice has 80 neighbours within it.
 const RADIUS: f64 = 2.5;
 
-/// Number of rounds. Twice as many change positions by less than 0.01 spacings.
-const ROUNDS: usize = 32;
-
 /// Rounds between updates of the search grid.
 const SEARCH_ROUNDS: usize = 8;
 
@@ -50,7 +47,7 @@ pub(super) fn relax(
     closed: &[ClosedPart],
     solid: &SignedDistance,
     domain: &Bounds,
-    spacing: f64,
+    (spacing, rounds): (f64, usize),
 ) {
     let within = |least: f64, most: f64| {
         move |p: &DVec3| {
@@ -88,7 +85,7 @@ pub(super) fn relax(
     let distance = |p| solid.sample(p);
     let gradient = |p| solid.gradient(p);
     let mut grid = PointGrid::with_cell(radius);
-    for round in 0..ROUNDS {
+    for round in 0..rounds {
         if round % SEARCH_ROUNDS == 0 {
             grid = PointGrid::over(&places, radius);
         }

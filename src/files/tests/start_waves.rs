@@ -58,7 +58,7 @@ fn waves_of_the_start_outside_of_theory_are_refused_by_key() {
         (
             &[SOLITARY],
             &["water.gravity=[0.0, 0.0, -9.81]"],
-            "water.wave[0].kind: waves need gravity along -y",
+            "water.gravity: water.wave[0] needs gravity along -y",
         ),
         (
             &[SOLITARY],
@@ -135,6 +135,27 @@ fn waves_of_the_start_are_known_to_volumes_and_lints() {
     assert!(near.lints()[0].starts_with(cut), "{:?}", near.lints());
     let far = load(&[SOLITARY], &["water.wave.0.at=8.0"]).expect("valid");
     assert!(far.lints().is_empty(), "{:?}", far.lints());
+    let zone = |ramp: &str, height: &str| {
+        let waves = format!("{{kind=\"stokes\",height={height},period=2.0,depth=1.0{ramp}}}");
+        let zone = format!("effects.generation_zone={{walls=[\"-x\"],length=8.0,waves={waves}}}");
+        load(&[STOKES], &[&zone]).expect("valid").lints().join("\n")
+    };
+    assert!(!zone(",ramp=0.0", "0.1").contains("water.wave"));
+    assert!(zone("", "0.1").contains("waves.ramp: these waves grow from rest within 4 s"));
+    assert!(zone(",ramp=0.0", "0.2").contains("they are other waves than those of water.wave"));
+    let both = load(
+        &[SOLITARY; 2],
+        &[
+            "domain.max.1=6.3",
+            "water.wave.0.at=8.0",
+            "water.wave.1.at=8.0",
+        ],
+    );
+    let both = both.expect("valid").lints().join("\n");
+    assert!(
+        both.contains("the crests of all waves, where they meet, are 0.400 m"),
+        "{both}"
+    );
     let scene = load(&[SOLITARY], &["domain.max.1=6.15", "water.wave.0.at=8.0"]).expect("valid");
     let lints = scene.lints().join("\n");
     assert!(

@@ -155,17 +155,6 @@ pub const ZONE_FAULTS: &[Fault] = &[
     (
         "viscosity = { xsph = 0.01 }",
         "viscosity = { xsph = 0.01 }\ngeneration_zone = { walls = [\"+z\"], length = 3.0, \
-         waves = { kind = \"sea\", significant_height = 0.1, peak_period = 2.0, ramp = 0, \
-         depth = 1.0 } }",
-        34,
-        &[
-            "effects.generation_zone.waves.ramp: a spectrum's motion is never at rest, so it needs \
-             a ramp",
-        ],
-    ),
-    (
-        "viscosity = { xsph = 0.01 }",
-        "viscosity = { xsph = 0.01 }\ngeneration_zone = { walls = [\"+z\"], length = 3.0, \
          waves = { kind = \"sea\", significant_height = 0.1, peak_period = 2.0, \
          spectrum = \"pierson_moskowitz\", peak_enhancement = 2.0, depth = 1.0 } }",
         34,
