@@ -18,7 +18,8 @@ const KEPT: usize = 16;
 /// Sizes are multiples of this, bytes.
 const GRAIN: usize = 1 << 12;
 
-/// Data read back together: [`Buf::first`](super::buffer::Buf::first) of one buffer, or a tuple of those of several.
+/// Data read back together: [`Buf::first`](super::buffer::Buf::first) of one buffer, or a tuple of
+/// those of several.
 pub trait Readback {
     /// One slice of values per buffer.
     type Views<'a>;

@@ -241,7 +241,7 @@ impl Scene {
         };
         if !start.into_iter().any(is_same) {
             lints.push(format!(
-                "{}: they are other waves than those of {KEY}, which are damped where these come in",
+                "{}: they are other waves than those of {KEY}, which they damp where they come in",
                 made.key
             ));
         } else if incoming.ramp() > 0.0 {

@@ -336,3 +336,41 @@ fn a_city_of_surface_takes_a_second_or_two() {
     assert!(seconds < 15.0);
     assert!(samples.len() > 100_000);
 }
+
+/// Below a surface that rises and falls by a few spacings, the uppermost particle of each column is
+/// half a layer below it, and the count is that of the volume. Control: whole layers have steps.
+#[test]
+fn water_below_a_surface_follows_it_and_has_its_volume() {
+    let (domain, spacing) = (cuboid([0.0; 3], [6.0, 2.0, 4.0]), 0.1);
+    let surface = |at: DVec2| 1.0 + 0.23 * (1.3 * at.x).sin() + 0.11 * (2.1 * at.y).cos();
+    let fill = fill_below(surface, &domain, [None; 2], &domain, spacing);
+    let volume: f64 = (0..60 * 40)
+        .map(|n| DVec2::new(f64::from(n % 60) + 0.5, f64::from(n / 60) + 0.5))
+        .map(|at| surface(spacing * at) * spacing.powi(2))
+        .sum();
+    let made = fill.particles.len() as f64 * spacing.powi(3);
+    // The dither of 2400 columns has a mean within a hundredth of a half.
+    assert!(
+        (made - volume).abs() < 0.01 * 24.0 * spacing,
+        "{made} {volume}"
+    );
+    let worst = |places: &mut dyn Iterator<Item = DVec3>| {
+        let mut tops = std::collections::BTreeMap::<[i64; 2], DVec3>::new();
+        for p in places {
+            let column = [p.x, p.z].map(|x| (x / spacing).floor() as i64);
+            let top = tops.entry(column).or_insert(p);
+            top.y = top.y.max(p.y);
+        }
+        let depth = |p: &DVec3| (surface(DVec2::new(p.x, p.z)) - p.y) / spacing;
+        let off = tops.values().map(|p| (depth(p) - 0.5).abs());
+        off.fold(0.0, f64::max)
+    };
+    let places = fill.particles.position.iter();
+    let followed = worst(&mut places.map(|p| DVec3::from_array(p.map(f64::from))));
+    let mut layers = fill_blocks(&[domain], &domain, spacing);
+    layers.retain(|p| p.y < surface(DVec2::new(p.x, p.z)));
+    let stepped = worst(&mut layers.into_iter());
+    // Half of a quarter of the layer that four share, and f32.
+    assert!(followed < 0.126, "{followed}");
+    assert!(stepped > 0.45, "{stepped}");
+}
