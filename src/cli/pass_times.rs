@@ -41,8 +41,8 @@ pub(super) fn report(progress: &Progress, times: &PassTimes, parts: &[Share], fr
     ));
     if let Some(traffic) = traffic {
         print(&format!(
-            "; without timing {:.1} submissions a frame, {:.1} waits for the device, {:.0} bytes \
-             read back",
+            "\na frame without timing: {:.1} submissions, {:.1} waits for the device, {:.0} bytes read \
+             back",
             per_frame(traffic.submissions),
             per_frame(traffic.waits),
             per_frame(traffic.bytes_read)
@@ -55,7 +55,7 @@ pub(super) fn report(progress: &Progress, times: &PassTimes, parts: &[Share], fr
     }) = ceilings
     {
         print(&format!(
-            "; per cent are of {:.2} GB/s, at which a pass copies a buffer here, where a pass is \
+            "\nper cent are of {:.2} GB/s, at which a pass copies a buffer here, where a pass is \
              taken to move what it binds once, and of {:.1} Gop/s, which one does that only \
              multiplies and adds; one without work takes {:.3} ms",
             1e-9 * bandwidth,

@@ -8,7 +8,10 @@ use std::{
 };
 
 use swell::{
-    domain::motion::{Motion, piston_height_ratio, wave_number},
+    domain::{
+        motion::{Motion, piston_height_ratio, wave_number},
+        solitary_wave::SolitaryWave,
+    },
     experiment::{
         Devices,
         stability::Verdict,
@@ -281,7 +284,19 @@ fn published_numbers_are_those_of_theory() {
                     piston_height_ratio(k(scale.period, depth), depth)
                 }
                 (Measure::RegularWaves, "wave_length") => TAU / k(scale.period, depth),
+                (Measure::SolitaryWave, "celerity") if !scene.water.waves.is_empty() => {
+                    SolitaryWave {
+                        height: scale.height,
+                        depth: scale.depth,
+                        gravity: 9.81,
+                    }
+                    .celerity()
+                }
                 (Measure::SolitaryWave, "celerity") => (9.81 * (scale.depth + scale.height)).sqrt(),
+                (Measure::SolitaryWave, "run_up") => {
+                    let e = scale.height / scale.depth;
+                    2.0 * e + 0.5 * e.powi(2) + 0.75 * e.powi(3)
+                }
                 (Measure::SolitaryWave, "height") => scale.height / scale.depth,
                 (Measure::DryBed, "depth_at_dam") => 4.0 / 9.0,
                 (Measure::DryBed, "flow_at_dam") => 8.0 / 27.0,
