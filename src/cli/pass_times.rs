@@ -41,8 +41,8 @@ pub(super) fn report(progress: &Progress, times: &PassTimes, parts: &[Share], fr
     ));
     if let Some(traffic) = traffic {
         print(&format!(
-            "\na frame without timing: {:.1} submissions, {:.1} waits for the device, {:.0} bytes read \
-             back",
+            "\na frame without timing: {:.1} submissions, {:.1} waits for the device, {:.0} bytes \
+             read back",
             per_frame(traffic.submissions),
             per_frame(traffic.waits),
             per_frame(traffic.bytes_read)
