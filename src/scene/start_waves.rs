@@ -171,7 +171,7 @@ impl Scene {
     }
 
     /// Returns the volume of water below the waves of the start, m³; 0 without any.
-    pub fn wave_volume(&self) -> f64 {
+    pub(crate) fn wave_volume(&self) -> f64 {
         let spacing = self.particle_spacing();
         self.initial_waves().map_or(0.0, |waves| {
             waves.volume(&self.start_domain(), self.domain.min, spacing)
