@@ -11,7 +11,7 @@
 //! as roughness.
 
 use glam::DVec2;
-use rayon::prelude::*;
+use swell_domain::parallel;
 
 /// Least distance of a background behind the water for a silhouette, spacings; closer ones form a
 /// waterline.
@@ -148,16 +148,16 @@ impl Outlines {
     pub fn add(&mut self, drawn: &Outlined, truth: &Outlined, focal: f64, spacing: f64) {
         let unit = focal * spacing;
         let [points, edge] = [drawn, truth].map(|picture| picture.points(unit, spacing));
-        let off: Vec<Option<f64>> = points
-            .par_iter()
-            .map(|point| Some(truth.distance(&edge, point)? / point.scale))
-            .collect();
+        let off: Vec<Option<f64>> = parallel::map_slice(&points, |point| {
+            Some(truth.distance(&edge, point)? / point.scale)
+        });
         let known: Vec<(DVec2, f64)> = points
             .iter()
             .zip(&off)
             .filter_map(|(point, off)| Some((point.at, (*off)?)))
             .collect();
-        let deviations = points.par_iter().zip(&off).map(|(point, &off)| {
+        let deviations = parallel::map(0..points.len(), |index| {
+            let (point, off) = (&points[index], off[index]);
             let width = NEARBY * point.scale;
             let (mut sum, mut weight) = (0.0, 0.0);
             for (at, off) in &known {
@@ -175,7 +175,7 @@ impl Outlines {
                 pixel: 1.0 / point.scale,
             }
         });
-        self.0.par_extend(deviations);
+        self.0.extend(deviations);
     }
 
     /// Returns the statistics of edges in front of a far background; `None` if there are none.

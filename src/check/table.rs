@@ -2,8 +2,8 @@
 
 use std::{fmt, ops::Range};
 
-use rayon::prelude::*;
 use serde::{Serialize, Serializer};
+use swell_domain::parallel;
 
 use swell_compare::{
     deviation::{ComparedValue, Deviation, relative},
@@ -117,8 +117,8 @@ pub struct Pair<T, const N: usize> {
 }
 
 /// Maps `one` over a range in parallel, preserving the order.
-pub fn each<T: Send>(range: Range<usize>, one: impl Fn(usize) -> T + Send + Sync) -> Vec<T> {
-    range.into_par_iter().map(one).collect()
+pub fn each<T: Send>(range: Range<usize>, one: impl Fn(usize) -> T + Sync) -> Vec<T> {
+    parallel::map(range, one)
 }
 
 /// Creates a [`Pair`].
@@ -235,7 +235,7 @@ impl CheckTable {
         &mut self,
         entry: &'static CheckEntry<N>,
         range: Range<usize>,
-        one: impl Fn(usize) -> P + Send + Sync,
+        one: impl Fn(usize) -> P + Sync,
     ) {
         self.add(entry, each(range, one));
     }

@@ -2,7 +2,7 @@
 //! same water and the same whitewater.
 
 use glam::{DVec3, Vec3};
-use rayon::prelude::*;
+use swell_domain::parallel;
 
 use swell_compare::{
     rounding::{GRADIENT, KERNEL, Sums, U, WALL_DENSITY, WALL_GRADIENT, WALL_PLACE},
@@ -163,9 +163,8 @@ impl<'a> Comparison<'a> {
     fn of(frame: Frame<'a>) -> Self {
         let water = SortedWater::new(frame.scene, frame.boundary, frame.water, frame.time);
         let n = water.points.len();
-        let surveyed: Vec<Surveyed> = (0..n).into_par_iter().map(|i| water.survey(i)).collect();
-        let errors = (0..n).into_par_iter();
-        let errors = errors.map(|i| errors_of(&water, i, &surveyed[i])).collect();
+        let surveyed: Vec<Surveyed> = parallel::map(0..n, |i| water.survey(i));
+        let errors = parallel::map(0..n, |i| errors_of(&water, i, &surveyed[i]));
         Self {
             frame,
             water,
@@ -199,13 +198,10 @@ impl<'a> Comparison<'a> {
     /// Compares the potentials; `found` is in the order of the original water.
     fn potentials(&self, table: &mut CheckTable, found: &[Potentials]) {
         let n = self.surveyed.len();
-        let rows: Vec<(Potentials, [f64; 3], [f64; 5])> = (0..n)
-            .into_par_iter()
-            .map(|i| {
-                let exact = self.water.potentials(i, &self.surveyed);
-                (exact, self.trapped(i), self.crest(i))
-            })
-            .collect();
+        let rows: Vec<(Potentials, [f64; 3], [f64; 5])> = parallel::map(0..n, |i| {
+            let exact = self.water.potentials(i, &self.surveyed);
+            (exact, self.trapped(i), self.crest(i))
+        });
         let found = |i: usize| &found[self.water.order[i]];
         table.each(&TRAPPED_AIR, 0..n, |i| {
             let (exact, trapped, _) = &rows[i];
@@ -281,19 +277,16 @@ impl<'a> Comparison<'a> {
         } = self.frame;
         let (corner, gravity) = (scene.domain.min, scene.water.gravity);
         let wide = |v: [f32; 3]| Vec3::from_array(v).as_dvec3();
-        let rows: Vec<(Moved, Option<[f64; 2]>)> = (0..white.len())
-            .into_par_iter()
-            .map(|k| {
-                let before = White {
-                    position: (wide(white.position[k]) - corner).as_vec3().as_dvec3(),
-                    velocity: wide(white.velocity[k]),
-                    kind: WhitewaterKind::of_number(white.attributes[KIND][k])
-                        .unwrap_or(WhitewaterKind::Foam),
-                };
-                let moved = self.water.advance(settings, gravity, seconds, before);
-                (moved, self.moved_errors(&before, &moved, gravity))
-            })
-            .collect();
+        let rows: Vec<(Moved, Option<[f64; 2]>)> = parallel::map(0..white.len(), |k| {
+            let before = White {
+                position: (wide(white.position[k]) - corner).as_vec3().as_dvec3(),
+                velocity: wide(white.velocity[k]),
+                kind: WhitewaterKind::of_number(white.attributes[KIND][k])
+                    .unwrap_or(WhitewaterKind::Foam),
+            };
+            let moved = self.water.advance(settings, gravity, seconds, before);
+            (moved, self.moved_errors(&before, &moved, gravity))
+        });
         let n = rows.len();
         table.each(&POSITION, 0..n, |k| {
             let (moved, errors) = &rows[k];

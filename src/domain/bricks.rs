@@ -6,8 +6,8 @@
 //! placeholder for every absent brick; its values stay zero. Cost and memory grow with the slots;
 //! only `table`, four bytes per brick, grows with the box.
 
+use crate::parallel;
 use bytemuck::{Pod, Zeroable};
-use rayon::prelude::*;
 
 /// Cells along the edge of a brick.
 pub const EDGE: u32 = 8;
@@ -270,7 +270,7 @@ fn connect(
     dims: [u32; 3],
     periodic: [bool; 3],
 ) {
-    records[range].par_iter_mut().for_each(|brick| {
+    parallel::for_each_mut(&mut records[range], |_, brick| {
         for (k, neighbor) in brick.neighbors.iter_mut().enumerate() {
             let step = [k % 3, k / 3 % 3, k / 9];
             // Index −1 wraps round to a value beyond any count.

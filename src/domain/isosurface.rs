@@ -8,6 +8,7 @@
 mod cell;
 pub mod sparse;
 
+use crate::parallel;
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -42,28 +43,22 @@ pub fn extract(level: &LevelSet, iso: f32) -> Isosurface {
     let grid = NodeGrid::over(level, iso);
     let blocks = grid.nodes.map(|n| (n - 1).div_ceil(EDGE));
     let count = blocks.map(|n| n as usize).iter().product::<usize>();
-    let faces: Vec<[u64; 3]> = (0..count)
-        .into_par_iter()
-        .flat_map_iter(|index| {
-            let [nx, ny] = [blocks[0] as usize, blocks[1] as usize];
-            let at = [index % nx, index / nx % ny, index / nx / ny];
-            grid.triangles(at.map(|c| c as u32 * EDGE))
-        })
-        .collect();
+    let faces: Vec<[u64; 3]> = parallel::flat_map(0..count, |index| {
+        let [nx, ny] = [blocks[0] as usize, blocks[1] as usize];
+        let at = [index % nx, index / nx % ny, index / nx / ny];
+        grid.triangles(at.map(|c| c as u32 * EDGE))
+    });
     let mut keys: Vec<u64> = faces.iter().flatten().copied().collect();
     keys.par_sort_unstable();
     keys.dedup();
     let index = |key: &u64| keys.partition_point(|other| other < key) as u32;
-    let triangles = faces
-        .par_iter()
-        .map(|face| face.each_ref().map(index))
-        .collect();
+    let triangles = parallel::map_slice(&faces, |face| face.each_ref().map(index));
     Isosurface {
         mesh: TriangleMesh {
-            vertices: keys.par_iter().map(|&key| grid.vertex(key)).collect(),
+            vertices: parallel::map_slice(&keys, |&key| grid.vertex(key)),
             triangles,
         },
-        caps: keys.par_iter().map(|&key| grid.cap(key)).collect(),
+        caps: parallel::map_slice(&keys, |&key| grid.cap(key)),
     }
 }
 

@@ -14,8 +14,8 @@ mod moments;
 pub mod sunlight;
 pub mod velocity;
 
+use crate::parallel;
 use glam::{DVec3, Vec3};
-use rayon::prelude::*;
 
 use kernels::{Ellipsoid, Kernels};
 
@@ -85,10 +85,9 @@ impl LevelSet {
         let bricks = bricks_over(size, voxel);
         let lists = Lists::new(&kernels.ellipsoids, bricks, voxel);
         let level = kernels.level as f32;
-        let filled: Vec<Filled> = (0..lists.len())
-            .into_par_iter()
-            .map(|brick| lists.fill(kernels, brick, voxel, (level, margin)))
-            .collect();
+        let filled: Vec<Filled> = parallel::map(0..lists.len(), |brick| {
+            lists.fill(kernels, brick, voxel, (level, margin))
+        });
         let mut set = Self {
             size,
             voxel,

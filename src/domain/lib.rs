@@ -35,6 +35,7 @@ pub mod motion;
 pub mod named;
 pub mod open_waves;
 pub mod output;
+pub mod parallel;
 pub mod particles;
 pub mod pbf;
 pub mod period;

@@ -7,8 +7,8 @@
 //! their separation there is no surface. Only elsewhere, and everywhere around an open mesh, is the
 //! winding number evaluated.
 
+use crate::parallel;
 use glam::DVec3;
-use rayon::prelude::*;
 
 use super::{bounds::Bounds, bvh::Bvh, inside::NoInside, mesh::TriangleMesh};
 
@@ -73,31 +73,26 @@ impl SignedDistance {
         let is_closed = mesh.open_edges().is_empty();
         let origin = bounds.min;
         let mut values = vec![0.0f32; dims[0] * dims[1] * dims[2]];
-        values
-            .par_chunks_mut(dims[0])
-            .enumerate()
-            .for_each(|(row, values)| {
-                let (j, k) = (row % dims[1], row / dims[1]);
-                let mut bound = f64::INFINITY;
-                let mut before: Option<(f64, bool)> = None;
-                for (i, value) in values.iter_mut().enumerate() {
-                    let p = origin + spacing * DVec3::new(i as f64, j as f64, k as f64);
-                    let distance = bvh.nearest(p, bound).map_or(bound, |(d, _)| d);
-                    // The next node is one spacing away, and so at most that much farther from
-                    // the surface.
-                    bound = (distance + spacing) * (1.0 + 1e-9);
-                    let is_inside = match before {
-                        Some((d, is_inside))
-                            if is_closed && d + distance > spacing * (1.0 + 1e-6) =>
-                        {
-                            is_inside
-                        }
-                        _ => bvh.winding_number(p).abs() > 0.5,
-                    };
-                    before = Some((distance, is_inside));
-                    *value = if is_inside { -distance } else { distance } as f32;
-                }
-            });
+        parallel::for_chunks_mut(&mut values, dims[0], |row, values| {
+            let (j, k) = (row % dims[1], row / dims[1]);
+            let mut bound = f64::INFINITY;
+            let mut before: Option<(f64, bool)> = None;
+            for (i, value) in values.iter_mut().enumerate() {
+                let p = origin + spacing * DVec3::new(i as f64, j as f64, k as f64);
+                let distance = bvh.nearest(p, bound).map_or(bound, |(d, _)| d);
+                // The next node is one spacing away, and so at most that much farther from
+                // the surface.
+                bound = (distance + spacing) * (1.0 + 1e-9);
+                let is_inside = match before {
+                    Some((d, is_inside)) if is_closed && d + distance > spacing * (1.0 + 1e-6) => {
+                        is_inside
+                    }
+                    _ => bvh.winding_number(p).abs() > 0.5,
+                };
+                before = Some((distance, is_inside));
+                *value = if is_inside { -distance } else { distance } as f32;
+            }
+        });
         Ok(Self {
             origin,
             spacing,

@@ -7,8 +7,8 @@
 //! particle-to-grid transfer. Both depend only on the frame: the order of summation does not change
 //! with the number of threads, so that the same frame gives the same bytes.
 
+use crate::parallel;
 use glam::DVec3;
-use rayon::prelude::*;
 
 use super::{bricks::CELLS, particles::Particles, sparse_grid::SparseGrid, voxels::Voxels};
 
@@ -61,28 +61,24 @@ impl Raster {
         };
         let level = self.averaged_kernel(&voxels);
         let distance = redistanced(&voxels, &level);
-        let found: Vec<_> = voxels
-            .slots()
-            .into_par_iter()
-            .map(|slot| {
-                let leaf = voxels.leaf(slot, |at| {
-                    let sign = if level[at] < 0.0 { -1.0 } else { 1.0 };
-                    let is_active = distance[at] < BAND as f32;
-                    let size = if is_active {
-                        distance[at] * self.voxel_size as f32
-                    } else {
-                        background
-                    };
-                    (sign * size, is_active)
-                });
-                // Without a band there is no surface, so all voxels have the sign of the first.
-                (
-                    leaf,
-                    level[slot * CELLS as usize] < 0.0,
-                    voxels.origin(slot),
-                )
-            })
-            .collect();
+        let found: Vec<_> = parallel::map(voxels.slots(), |slot| {
+            let leaf = voxels.leaf(slot, |at| {
+                let sign = if level[at] < 0.0 { -1.0 } else { 1.0 };
+                let is_active = distance[at] < BAND as f32;
+                let size = if is_active {
+                    distance[at] * self.voxel_size as f32
+                } else {
+                    background
+                };
+                (sign * size, is_active)
+            });
+            // Without a band there is no surface, so all voxels have the sign of the first.
+            (
+                leaf,
+                level[slot * CELLS as usize] < 0.0,
+                voxels.origin(slot),
+            )
+        });
         for (leaf, is_inside, origin) in found {
             match leaf {
                 Some(leaf) => grid.leaves.push(leaf),
@@ -137,19 +133,15 @@ impl Raster {
             return grid;
         };
         let faces = face_means(&voxels, particles).map(|means| extrapolated(&voxels, means));
-        grid.leaves = voxels
-            .slots()
-            .into_par_iter()
-            .filter_map(|slot| {
-                voxels.leaf(slot, |at| {
-                    let [x, y, z] = [0, 1, 2].map(|axis| faces[axis][at]);
-                    match (x, y, z) {
-                        (Some(x), Some(y), Some(z)) => ([x, y, z], true),
-                        _ => ([0.0; 3], false),
-                    }
-                })
+        grid.leaves = parallel::flat_map(voxels.slots(), |slot| {
+            voxels.leaf(slot, |at| {
+                let [x, y, z] = [0, 1, 2].map(|axis| faces[axis][at]);
+                match (x, y, z) {
+                    (Some(x), Some(y), Some(z)) => ([x, y, z], true),
+                    _ => ([0.0; 3], false),
+                }
             })
-            .collect();
+        });
         grid.leaves.sort_unstable_by_key(|leaf| leaf.origin);
         grid
     }

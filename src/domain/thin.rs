@@ -1,5 +1,6 @@
 //! Detects parts of solids that are too thin to hold water back.
 
+use crate::parallel;
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -66,9 +67,10 @@ pub fn thin_parts(
     };
     let thinnest = |mesh: &&TriangleMesh| {
         let points = spread(mesh, domain, spacing);
-        let mut parts: Vec<(ThinPart, DVec3)> = (points.par_iter())
-            .filter_map(|&(p, normal)| Some((all.part(p, normal)?, normal)))
-            .collect();
+        let mut parts: Vec<(ThinPart, DVec3)> = parallel::flat_map(0..points.len(), |k| {
+            let (p, normal) = points[k];
+            Some((all.part(p, normal)?, normal))
+        });
         parts.sort_by(|(a, _), (b, _)| a.thickness.total_cmp(&b.thickness));
         let each = parts.len().div_ceil(MOST_PARTS).max(1);
         let asked = parts.par_iter().step_by(each);

@@ -1,7 +1,7 @@
 //! Particles on the voxels of a sparse grid: the bricks, and the particles of each voxel.
 
+use crate::parallel;
 use glam::DVec3;
-use rayon::prelude::*;
 
 use super::{
     bricks::{Bricks, CELLS, EDGE, SELF, table_dims},
@@ -95,8 +95,8 @@ impl Voxels {
     }
 
     /// All slots, with or without particles.
-    pub(super) fn slots(&self) -> std::ops::RangeInclusive<usize> {
-        1..=self.bricks.active as usize
+    pub(super) fn slots(&self) -> std::ops::Range<usize> {
+        1..self.bricks.active as usize + 1
     }
 
     /// First voxel of a slot, relative to `base`.
@@ -164,11 +164,11 @@ impl Voxels {
         values: &mut [T],
         fill: impl Fn(usize, &mut [T]) + Sync,
     ) {
-        values
-            .par_chunks_mut(CELLS as usize)
-            .enumerate()
-            .skip(1)
-            .for_each(|(slot, values)| fill(slot, values));
+        parallel::for_chunks_mut(values, CELLS as usize, |slot, values| {
+            if slot > 0 {
+                fill(slot, values);
+            }
+        });
     }
 
     /// Builds the slot's leaf. `value` returns an element's value and whether it is active; `None`

@@ -1,7 +1,7 @@
 //! The water of a frame as a mesh with the volume of the particles, with velocities and normals.
 
+use crate::parallel;
 use glam::DVec3;
-use rayon::prelude::*;
 
 use super::{
     isosurface::{Isosurface, extract},
@@ -124,15 +124,14 @@ fn normals(surface: &Isosurface, level: &LevelSet) -> Vec<[f32; 3]> {
         let area = mesh.area_vector(index);
         triangle.iter().for_each(|&v| areas[v as usize] += area);
     }
-    let all = mesh.vertices.par_iter().zip(&surface.caps).zip(areas);
-    let normal = |((&place, &cap), area): ((&DVec3, &DVec3), DVec3)| {
-        let field = -level.gradient(place);
+    let normal = |k: usize| {
+        let field = -level.gradient(mesh.vertices[k]);
         // Where the field has no gradient, the triangles' normals are used.
-        let choices = [cap, field, area];
+        let choices = [surface.caps[k], field, areas[k]];
         let found = choices.into_iter().find_map(DVec3::try_normalize);
         found.unwrap_or(DVec3::Y).as_vec3().to_array()
     };
-    all.map(normal).collect()
+    parallel::map(0..areas.len(), normal)
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use glam::DVec3;
 use pulp::{Simd, WithSimd};
-use rayon::prelude::*;
+use swell_domain::parallel;
 
 use swell_domain::{lanes::widely, period::Period, places};
 
@@ -120,7 +120,7 @@ impl Cells {
     }
 
     fn indices(&self, points: &[DVec3]) -> Vec<usize> {
-        points.par_iter().map(|&x| self.index(x)).collect()
+        parallel::map_slice(points, |&x| self.index(x))
     }
 
     fn starts_of(&self, cells: &[usize]) -> Vec<usize> {
@@ -224,10 +224,8 @@ impl Neighbors {
         let (fluid, solid) = crowd.points.split_at(crowd.particles);
         let (of_fluid, of_solid) = (cells.starts(fluid), cells.starts(solid));
         let inverse = (1.0 / h) as f32;
-        let mut words: Vec<u32> = fluid
-            .par_iter()
-            .map(|x| places::word(x.as_vec3().to_array(), inverse))
-            .collect();
+        let mut words: Vec<u32> =
+            parallel::map_slice(fluid, |x| places::word(x.as_vec3().to_array(), inverse));
         words.extend([0; AT_ONCE]);
         Self::listed(crowd.particles, |i, members| {
             let x = crowd.points[i];
@@ -270,15 +268,12 @@ impl Neighbors {
         particles: usize,
         list: impl Fn(usize, &mut Vec<u32>) -> [u32; 2] + Sync,
     ) -> Self {
-        let blocks = (0..particles.div_ceil(BLOCK))
-            .into_par_iter()
-            .map(|block| {
-                let mut members = Vec::with_capacity(40 * BLOCK);
-                let range = block * BLOCK..((block + 1) * BLOCK).min(particles);
-                let ends = range.map(|i| list(i, &mut members)).collect();
-                Block { ends, members }
-            })
-            .collect();
+        let blocks = parallel::map(0..particles.div_ceil(BLOCK), |block| {
+            let mut members = Vec::with_capacity(40 * BLOCK);
+            let range = block * BLOCK..((block + 1) * BLOCK).min(particles);
+            let ends = range.map(|i| list(i, &mut members)).collect();
+            Block { ends, members }
+        });
         Self { blocks }
     }
 

@@ -4,7 +4,7 @@
 //! no surface can be.
 
 use glam::DVec3;
-use rayon::prelude::*;
+use swell_domain::parallel;
 
 use swell_domain::{
     bvh::Bvh,
@@ -48,22 +48,19 @@ pub fn cast(
         coarse: &coarse,
     };
     let [width, height] = eye.size.map(|n| n as usize);
-    (0..width * height)
-        .into_par_iter()
-        .map(|pixel| {
-            let ray = eye.ray(pixel);
-            let ground = match ray.y < 0.0 && eye.position.y > 0.0 {
-                true => -eye.position.y / ray.y,
-                false => f64::INFINITY,
-            };
-            let solid = tree.first_along(eye.position, ray, ground);
-            let opaque = solid.map_or(ground, |(t, _)| t);
-            RayHit {
-                opaque,
-                water: water.along(eye.position, ray, opaque),
-            }
-        })
-        .collect()
+    parallel::map(0..width * height, |pixel| {
+        let ray = eye.ray(pixel);
+        let ground = match ray.y < 0.0 && eye.position.y > 0.0 {
+            true => -eye.position.y / ray.y,
+            false => f64::INFINITY,
+        };
+        let solid = tree.first_along(eye.position, ray, ground);
+        let opaque = solid.map_or(ground, |(t, _)| t);
+        RayHit {
+            opaque,
+            water: water.along(eye.position, ray, opaque),
+        }
+    })
 }
 
 struct TracedWater<'a> {

@@ -2,7 +2,7 @@
 //! whitewater on the CPU.
 
 use glam::{DVec3, Vec3};
-use rayon::prelude::*;
+use swell_domain::parallel;
 
 use swell_domain::{
     air,
@@ -356,11 +356,8 @@ impl Whitewater {
     pub fn survey(&mut self, water: &Particles, time: f64, seconds: f64) -> Vec<Potentials> {
         let sorted = SortedWater::new(&self.scene, &self.boundary, water, time);
         let n = water.len();
-        let surveyed: Vec<Surveyed> = (0..n).into_par_iter().map(|i| sorted.survey(i)).collect();
-        let found: Vec<Potentials> = (0..n)
-            .into_par_iter()
-            .map(|i| sorted.potentials(i, &surveyed))
-            .collect();
+        let surveyed: Vec<Surveyed> = parallel::map(0..n, |i| sorted.survey(i));
+        let found: Vec<Potentials> = parallel::map(0..n, |i| sorted.potentials(i, &surveyed));
         let mut in_order = vec![Potentials::default(); n];
         for (&place, potentials) in sorted.order.iter().zip(found) {
             in_order[place] = potentials;
@@ -389,7 +386,7 @@ impl Whitewater {
             };
             water.advance(settings, gravity, *seconds, one).white
         };
-        let moved: Vec<White> = (0..white.len()).into_par_iter().map(one).collect();
+        let moved: Vec<White> = parallel::map(0..white.len(), one);
         for (k, moved) in moved.iter().enumerate() {
             white.position[k] = (moved.position + origin).as_vec3().to_array();
             white.velocity[k] = moved.velocity.as_vec3().to_array();

@@ -7,7 +7,7 @@
 //! forth between consecutive frames.
 
 use glam::{DVec3, Vec3};
-use rayon::prelude::*;
+use swell_domain::parallel;
 
 use super::{
     RenderScene,
@@ -115,27 +115,24 @@ pub(super) fn standing(inputs: &FrameInputs<'_>, fall: &Fall) -> Vec<Standing> {
             &particles.velocity,
         ))
     });
-    (0..own.len())
-        .into_par_iter()
-        .map(|index| {
-            let id = ids.id(index);
-            let here = (own[index], inputs.water.particles.velocity[index], 0);
-            let or = |k: usize, near: (f32, [f32; 3], usize)| {
-                let found = around[k].as_ref().and_then(|(ids, weights, velocities)| {
-                    let place = ids.find(id)?;
-                    Some((weights[place], velocities[place], near.2 + 1))
-                });
-                found.unwrap_or(near)
-            };
-            let [before, after] = [or(1, here), or(2, here)];
-            let [first, last] = [or(0, before), or(3, after)];
-            let weights = [first, before, here, after, last].map(|it| it.0);
-            Standing {
-                flight: fall.flight([first.1, last.1], first.2 + last.2),
-                ..over_time(weights)
-            }
-        })
-        .collect()
+    parallel::map(0..own.len(), |index| {
+        let id = ids.id(index);
+        let here = (own[index], inputs.water.particles.velocity[index], 0);
+        let or = |k: usize, near: (f32, [f32; 3], usize)| {
+            let found = around[k].as_ref().and_then(|(ids, weights, velocities)| {
+                let place = ids.find(id)?;
+                Some((weights[place], velocities[place], near.2 + 1))
+            });
+            found.unwrap_or(near)
+        };
+        let [before, after] = [or(1, here), or(2, here)];
+        let [first, last] = [or(0, before), or(3, after)];
+        let weights = [first, before, here, after, last].map(|it| it.0);
+        Standing {
+            flight: fall.flight([first.1, last.1], first.2 + last.2),
+            ..over_time(weights)
+        }
+    })
 }
 
 /// Filters the neighbour weights of five frames. Membership of the body is opened and closed with
@@ -169,7 +166,8 @@ pub(super) fn classify(
     fall: &Fall,
 ) {
     let onset = look.speed_m_per_s as f32;
-    (particles.par_iter_mut().zip(standing)).for_each(|(particle, standing)| {
+    parallel::for_each_mut(particles, |k, particle| {
+        let standing = &standing[k];
         let weight = standing.weight;
         let speed = fall.speed(particle, standing.flight);
         let open = 1.0 - smoothstep(SPRAY_BELOW, SURFACE_BELOW, weight);

@@ -3,7 +3,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use rayon::prelude::*;
+use swell_domain::parallel;
 
 /// Name of the Cryptomatte layer, and prefix of its channels.
 pub const LAYER: &str = "CryptoObject";
@@ -148,8 +148,8 @@ impl Covers {
     /// Adds a sample with its `weight` in the pixel's mean. `objects` holds for each pixel the code
     /// of the first visible object and the bits of the fraction that spray covers.
     pub(super) fn add(&mut self, objects: &[[u32; 2]], weight: f32) {
-        let pixels = self.0.par_iter_mut().zip(objects);
-        pixels.for_each(|(slots, &[code, cover])| {
+        parallel::for_each_mut(&mut self.0, |pixel, slots| {
+            let [code, cover] = objects[pixel];
             let cover = f32::from_bits(cover);
             if cover > 0.0 {
                 put(slots, SKY, weight * cover);
@@ -179,11 +179,8 @@ impl Covers {
             .map(|(&code, name)| (code, id_of(name)))
             .collect();
         let count = names.len().min(MOST_RANKS).next_multiple_of(2);
-        let sorted: Vec<[[f32; 2]; SLOTS]> = self
-            .0
-            .into_par_iter()
-            .map(|slots| sorted(slots, &ids))
-            .collect();
+        let sorted: Vec<[[f32; 2]; SLOTS]> =
+            parallel::map_slice(&self.0, |&slots| sorted(slots, &ids));
         Matte {
             names: names.into_values().collect(),
             ranks: (0..count)

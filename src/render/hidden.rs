@@ -2,7 +2,7 @@
 //! blocks of water take their place in the thickness along a line of sight.
 
 use glam::{DVec3, Vec3};
-use rayon::prelude::*;
+use swell_domain::parallel;
 
 use super::{
     aeration::is_whole,
@@ -102,8 +102,7 @@ impl Cells {
             self.particles[index] >= FULL
                 && around.all(|(dy, dz)| (-1..=1).all(|dx| self.is_full([x + dx, y + dy, z + dz])))
         };
-        let all = 0..self.particles.len();
-        all.into_par_iter().map(is_deep).collect()
+        parallel::map(0..self.particles.len(), is_deep)
     }
 
     /// Divides the deep cells into disjoint blocks. Returns the first and end cells (exclusive) of
@@ -181,7 +180,7 @@ impl Hidden {
             true => (cells.index(cell(particle, cells.edge))).map_or(NONE, |at| block_of[at]),
             false => NONE,
         };
-        let of: Vec<u32> = particles.par_iter().map(block).collect();
+        let of: Vec<u32> = parallel::map_slice(particles, block);
         let mut sums = vec![(0.0, DVec3::ZERO); spans.len()];
         for (particle, &block) in particles
             .iter()

@@ -2,7 +2,7 @@
 //! inside.
 
 use glam::Vec3;
-use rayon::prelude::*;
+use swell_domain::parallel;
 
 use super::{
     paths::Path,
@@ -68,16 +68,14 @@ pub(super) fn in_frame(
     let views: Vec<ViewFrustum> = cameras.iter().map(ViewFrustum::of).collect();
     let longest = cameras.iter().fold(spacing, |most, it| most.max(it.radius));
     let reach = REACH * longest;
-    (particles.par_iter().enumerate())
-        .map(|(index, particle)| {
-            let place = Vec3::from(particle.position);
-            let way = |seconds: f32| match paths.get(index) {
-                Some(path) => path.displacement(seconds).as_vec3(),
-                None => Vec3::ZERO,
-            };
-            (views.iter()).any(|view| view.sees(place + way(view.seconds), reach))
-        })
-        .collect()
+    parallel::map(0..particles.len(), |index| {
+        let place = Vec3::from(particles[index].position);
+        let way = |seconds: f32| match paths.get(index) {
+            Some(path) => path.displacement(seconds).as_vec3(),
+            None => Vec3::ZERO,
+        };
+        (views.iter()).any(|view| view.sees(place + way(view.seconds), reach))
+    })
 }
 
 /// Keeps the blocks of which one of a frame's cameras may see a part.

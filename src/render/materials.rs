@@ -5,7 +5,7 @@ use std::collections::HashMap;
 
 use glam::DVec3;
 use half::f16;
-use rayon::prelude::*;
+use swell_domain::parallel;
 use wgpu::TextureFormat;
 
 use super::{
@@ -389,10 +389,9 @@ fn levels_of(picture: &Picture) -> Vec<Vec<[f16; 4]>> {
         .map(|code| linear(f64::from(code) / 255.0) as f32)
         .collect();
     let mut size = picture.size.map(|side| side as usize);
-    let texels = picture.texels.par_iter();
-    let mut level: Vec<[f32; 3]> = texels
-        .map(|texel| texel.map(|code| linear[usize::from(code)]))
-        .collect();
+    let mut level: Vec<[f32; 3]> = parallel::map_slice(&picture.texels, |texel| {
+        texel.map(|code| linear[usize::from(code)])
+    });
     let half = |[r, g, b]: &[f32; 3]| [*r, *g, *b, 1.0].map(f16::from_f32);
     let mut levels = vec![level.iter().map(half).collect()];
     while size != [1, 1] {
@@ -435,7 +434,7 @@ fn shrunk(texels: &[[f32; 3]], from: [usize; 2], to: [usize; 2]) -> Vec<[f32; 3]
         }
         sum
     };
-    (0..to[0] * to[1]).into_par_iter().map(texel).collect()
+    parallel::map(0..to[0] * to[1], texel)
 }
 
 #[cfg(test)]

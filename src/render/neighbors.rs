@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
+use swell_domain::parallel;
 
 use swell_domain::lanes::{LANES, widely};
 
@@ -25,15 +26,12 @@ pub(super) fn weights(positions: &[[f32; 3]], spacing: f32) -> Vec<f32> {
     let reach = span[1];
     let cell = |p: &[f32; 3]| p.map(|x| (x / reach).floor() as i32);
     // Sorted by cell, with z the fastest: three cells of a column are one contiguous run.
-    let mut order: Vec<([i32; 3], u32)> = positions
-        .par_iter()
-        .zip(0u32..positions.len() as u32)
-        .map(|(position, index)| (cell(position), index))
-        .collect();
+    let mut order: Vec<([i32; 3], u32)> =
+        parallel::map(0..positions.len(), |k| (cell(&positions[k]), k as u32));
     order.par_sort_unstable();
     let sorted = [0, 1, 2].map(|axis| {
         let of = |&(_, index): &([i32; 3], u32)| positions[index as usize][axis];
-        order.par_iter().map(of).collect::<Vec<f32>>()
+        parallel::map_slice(&order, of)
     });
     // All particles of a cell share the same candidates.
     let found: Vec<f32> = order

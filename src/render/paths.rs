@@ -6,7 +6,7 @@
 //! missing or lacks the particle, the path continues straight with the particle's velocity.
 
 use glam::{DVec3, Vec3};
-use rayon::prelude::*;
+use swell_domain::parallel;
 
 use super::{inputs::Ids, uniform};
 use swell_domain::particles::Particles;
@@ -88,14 +88,11 @@ pub(super) fn paths(
         let velocity = Vec3::from(water.velocity[index]);
         joins.then(|| bend(velocity, way, Vec3::from(other.velocity[found]), h))
     };
-    (0..water.len())
-        .into_par_iter()
-        .map(|index| Path {
-            velocity: Vec3::from(water.velocity[index]),
-            before: side(index, 0, -seconds).unwrap_or_default(),
-            after: side(index, 1, seconds).unwrap_or_default(),
-        })
-        .collect()
+    parallel::map(0..water.len(), |index| Path {
+        velocity: Vec3::from(water.velocity[index]),
+        before: side(index, 0, -seconds).unwrap_or_default(),
+        after: side(index, 1, seconds).unwrap_or_default(),
+    })
 }
 
 /// Positions and paths of the particles of the body; without `paths` they move in straight lines.

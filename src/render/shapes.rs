@@ -9,7 +9,7 @@
 use std::f64::consts::PI;
 
 use glam::{DMat3, DVec3, Vec3};
-use rayon::prelude::*;
+use swell_domain::parallel;
 
 use super::{
     RenderScene,
@@ -37,9 +37,10 @@ pub(super) fn shapes(
     radius: f64,
 ) -> Vec<Shape> {
     let is_body = |particle: &&Particle| particle.tag & 1 == 1;
-    let places: Vec<DVec3> = (particles.par_iter().filter(is_body))
-        .map(|particle| Vec3::from(particle.position).as_dvec3())
-        .collect();
+    let places: Vec<DVec3> = parallel::flat_map(0..particles.len(), |k| {
+        let particle = &particles[k];
+        is_body(&particle).then(|| Vec3::from(particle.position).as_dvec3())
+    });
     let shaped = particles[..seen].iter().filter(is_body).count();
     let spacing = scene.particle_spacing;
     let kernels = Kernels::of_first(shaped, &places, scene.domain.size(), spacing);
@@ -49,9 +50,9 @@ pub(super) fn shapes(
     let thinnest = THINNEST * radius / RADIUS;
     let all = Kernels::of_fitted(kernels, scene.domain.size(), spacing);
     let field = all.field();
-    let fitted: Vec<Shape> = (all.ellipsoids[..shaped].par_iter())
-        .map(|kernel| shape(kernel, &field, factor, thinnest))
-        .collect();
+    let fitted: Vec<Shape> = parallel::map_slice(&all.ellipsoids[..shaped], |kernel| {
+        shape(kernel, &field, factor, thinnest)
+    });
     let ball = (factor * ALONE * spacing) as f32;
     let alone = Shape {
         diagonal: [ball; 3],

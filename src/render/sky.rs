@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use glam::{DVec3, Vec3};
 use half::f16;
 use hw_skymodel::rgb::{Channel, SkyParams, SkyState};
-use rayon::prelude::*;
+use swell_domain::parallel;
 
 use super::RenderError;
 use swell_scene::look::{Look, SkySpec};
@@ -110,11 +110,11 @@ fn texel(size: [u32; 2], x: u32, y: u32) -> (DVec3, f64) {
 }
 
 fn image(size: [u32; 2], colour: impl Fn(DVec3) -> DVec3 + Sync) -> Vec<DVec3> {
-    (0..size[1])
-        .into_par_iter()
-        .flat_map_iter(|y| (0..size[0]).map(move |x| (x, y)))
-        .map(|(x, y)| colour(texel(size, x, y).0))
-        .collect()
+    let [width, height] = size.map(|side| side as usize);
+    parallel::map(0..width * height, |k| {
+        let (x, y) = ((k % width) as u32, (k / width) as u32);
+        colour(texel(size, x, y).0)
+    })
 }
 
 /// Irradiance on a level face from the upper hemisphere.
@@ -283,13 +283,10 @@ fn panorama(
     }
     while width.max(height) > limit as usize {
         let (w, h) = (width / 2, height / 2);
-        texels = (0..w * h)
-            .into_par_iter()
-            .map(|i| {
-                let at = 2 * (i / w) * width + 2 * (i % w);
-                (texels[at] + texels[at + 1] + texels[at + width] + texels[at + width + 1]) * 0.25
-            })
-            .collect();
+        texels = parallel::map(0..w * h, |i| {
+            let at = 2 * (i / w) * width + 2 * (i % w);
+            (texels[at] + texels[at + 1] + texels[at + width] + texels[at + width + 1]) * 0.25
+        });
         (width, height) = (w, h);
     }
     let shift = (rotate_degrees / 360.0 * width as f64).round() as i64;

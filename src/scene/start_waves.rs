@@ -1,8 +1,8 @@
 //! Waves that are on the water at the start, as specified in a scene.
 
 use glam::{DVec2, DVec3};
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use swell_domain::parallel;
 
 use swell_domain::{
     bounds::Bounds,
@@ -282,9 +282,8 @@ impl Scene {
         let Some(waves) = self.initial_waves() else {
             return;
         };
-        let both = position.par_iter().zip(velocity);
-        both.for_each(|(position, velocity)| {
-            let place = DVec3::from_array(position.map(f64::from)) - self.domain.min;
+        parallel::for_each_mut(velocity, |k, velocity| {
+            let place = DVec3::from_array(position[k].map(f64::from)) - self.domain.min;
             *velocity = waves.velocity(place).as_vec3().to_array();
         });
     }

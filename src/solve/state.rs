@@ -7,6 +7,7 @@ use std::sync::{
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
+use swell_domain::parallel;
 
 use swell_domain::{
     absorber::AbsorberStates,
@@ -44,8 +45,7 @@ pub(super) fn upload(program: &Program, scene: &Scene, state: &Particles) {
         let x = (Vec3::from_array(*p).as_dvec3() - origin).as_vec3();
         x.to_array()
     };
-    let position = state.position.par_iter().with_min_len(AT_ONCE);
-    let position: Vec<[f32; 3]> = position.map(local).collect();
+    let position = parallel::map_slice(&state.position, local);
     program.upload(POSITION, 0, &position);
     program.upload(VELOCITY, 0, &state.velocity);
     program.upload(ID, 0, &state.id);
@@ -118,9 +118,9 @@ pub(super) struct Places(Vec<AtomicU32>);
 impl Places {
     /// Computes a value from each index.
     pub(super) fn collect<T: Send>(&self, value: impl Fn(usize) -> T + Sync) -> Vec<T> {
-        let all = self.0.par_iter().with_min_len(AT_ONCE);
-        all.map(|place| value(place.load(Ordering::Relaxed) as usize))
-            .collect()
+        parallel::map_slice(&self.0, |place| {
+            value(place.load(Ordering::Relaxed) as usize)
+        })
     }
 }
 

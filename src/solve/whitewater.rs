@@ -2,6 +2,7 @@
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
+use swell_domain::parallel;
 
 use crate::air;
 use swell_domain::{
@@ -322,13 +323,14 @@ impl Whitewater {
         let local = local(&self.scene, &white.position);
         let order = self.by_cell(&local);
         let at = |&k: &u32| k as usize;
-        let position: Vec<[f32; 4]> = (order.par_iter().map(at))
-            .map(|k| [local[k][0], local[k][1], local[k][2], kinds[k]])
-            .collect();
-        let velocity: Vec<[f32; 4]> = (order.par_iter().map(at))
-            .map(|k| white.velocity[k])
-            .map(|[x, y, z]| [x, y, z, 0.0])
-            .collect();
+        let position = parallel::map_slice(&order, |k| {
+            let [x, y, z] = local[at(k)];
+            [x, y, z, kinds[at(k)]]
+        });
+        let velocity = parallel::map_slice(&order, |k| {
+            let [x, y, z] = white.velocity[at(k)];
+            [x, y, z, 0.0]
+        });
         self.program.upload(WHITE_POSITION, 0, &position);
         self.program.upload(WHITE_VELOCITY, 0, &velocity);
         self.program.upload(WHITE_COUNT, 0, &[[n as u32, 0, 0, 0]]);
@@ -364,9 +366,8 @@ impl Whitewater {
             let [x, y, z] = [x, y, z].map(|x| (x / h) as u64);
             (z * ny + y) * nx + x
         };
-        let mut order: Vec<(u64, u32)> = (places.par_iter().zip(0..places.len() as u32))
-            .map(|(place, k)| (key(place), k))
-            .collect();
+        let mut order: Vec<(u64, u32)> =
+            parallel::map(0..places.len(), |k| (key(&places[k]), k as u32));
         order.par_sort_unstable();
         order.into_iter().map(|(_, k)| k).collect()
     }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use glam::DVec3;
-use rayon::prelude::*;
+use swell_domain::parallel;
 
 use crate::{
     comparison::{Io, PassResult},
@@ -248,7 +248,7 @@ pub(super) fn build_neighbors(state: &mut PbfState, io: &mut Io<'_>) -> PassResu
         };
         (wrong, possible.saturating_sub(sure), all)
     };
-    let found: Vec<_> = (0..count).into_par_iter().map(one).collect();
+    let found: Vec<_> = parallel::map(0..count, one);
     let wrong =
         |(local, one): (usize, &(usize, usize, _))| pair(first + local, one.0 as f64, 0.0, []);
     io.table

@@ -1,7 +1,7 @@
 //! Height of the water along the vertical sides of its box.
 
+use crate::parallel;
 use glam::{DVec2, DVec3};
-use rayon::prelude::*;
 
 use super::kernels::{Kernels, REACH};
 
@@ -68,7 +68,7 @@ impl Edges {
         let places: Vec<DVec2> = places(size, nodes).collect();
         Self {
             nodes,
-            heights: places.into_par_iter().map(column).collect(),
+            heights: parallel::map_slice(&places, |&place| column(place)),
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use crate::parallel;
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -50,9 +51,7 @@ impl BinnedPoints {
             starts: vec![0; cells.iter().product::<usize>() + 1],
             order: vec![0; places.len()],
         };
-        let cells: Vec<usize> = (places.par_iter())
-            .map(|&p| grid.index(grid.cell(p)))
-            .collect();
+        let cells: Vec<usize> = parallel::map_slice(places, |&p| grid.index(grid.cell(p)));
         for cell in &cells {
             grid.starts[cell + 1] += 1;
         }
@@ -92,9 +91,7 @@ impl BinnedPoints {
 
     /// Copies the points in the grid's order.
     pub(super) fn sorted(&self, places: &[DVec3]) -> Vec<DVec3> {
-        (self.order.par_iter())
-            .map(|&k| places[k as usize])
-            .collect()
+        parallel::map_slice(&self.order, |&k| places[k as usize])
     }
 
     /// Visits the rows of cells up to `reach` cells away from that of `p`, as ranges of the

@@ -19,6 +19,7 @@
 
 use std::f64::consts::PI;
 
+use crate::parallel;
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
@@ -173,7 +174,7 @@ impl Kernels {
     pub fn field(&self) -> KernelField<'_> {
         let longest = self.ellipsoids.par_iter().map(|it| it.longest);
         let farthest = longest.reduce(|| f64::MIN_POSITIVE, f64::max);
-        let places: Vec<DVec3> = self.ellipsoids.par_iter().map(|it| it.centre).collect();
+        let places: Vec<DVec3> = parallel::map_slice(&self.ellipsoids, |it| it.centre);
         let grid = BinnedPoints::new(&places, farthest / HALVES as f64);
         KernelField {
             kernels: self,
@@ -288,13 +289,10 @@ fn fit(places: &[DVec3], count: usize, calibration: &Calibration) -> Vec<Ellipso
     // would be 16 %.
     let grid = BinnedPoints::new(places, reach / HALVES as f64);
     let sorted = grid.sorted(places);
-    (0..count)
-        .into_par_iter()
-        .map(|k| {
-            let near = Moments::about(places[k], (&grid, &sorted), reach);
-            calibration.kernel(places[k], &near)
-        })
-        .collect()
+    parallel::map(0..count, |k| {
+        let near = Moments::about(places[k], (&grid, &sorted), reach);
+        calibration.kernel(places[k], &near)
+    })
 }
 
 /// Smoothstep: 0 up to `from`, 1 from `to` on.

@@ -1,7 +1,7 @@
 //! Length of sunlight's path through water, on a coarse lattice.
 
+use crate::parallel;
 use glam::DVec3;
-use rayon::prelude::*;
 
 use super::LevelSet;
 
@@ -44,20 +44,17 @@ impl Sunlight {
         let step = towards * (pitch / towards.y);
         let mut above = vec![0.0f32; nx * nz];
         for y in (0..ny.saturating_sub(1)).rev() {
-            let plane: Vec<f32> = (0..nx * nz)
-                .into_par_iter()
-                .map(|at| {
-                    let (x, z) = ((at % nx) as f64, (at / nx) as f64);
-                    let place = DVec3::new(x, y as f64, z) * pitch;
-                    let wet = (0..LOOKS)
-                        .map(|k| place + step * ((f64::from(k) + 0.5) / f64::from(LOOKS)))
-                        .filter(|&p| is_within(p, water.size) && water.value(p) > 0.0)
-                        .count();
-                    let own = step.length() * wet as f64 / f64::from(LOOKS);
-                    let (x, z) = (x + step.x / pitch, z + step.z / pitch);
-                    (own + between(&above, [nx, nz], x, z)) as f32
-                })
-                .collect();
+            let plane: Vec<f32> = parallel::map(0..nx * nz, |at| {
+                let (x, z) = ((at % nx) as f64, (at / nx) as f64);
+                let place = DVec3::new(x, y as f64, z) * pitch;
+                let wet = (0..LOOKS)
+                    .map(|k| place + step * ((f64::from(k) + 0.5) / f64::from(LOOKS)))
+                    .filter(|&p| is_within(p, water.size) && water.value(p) > 0.0)
+                    .count();
+                let own = step.length() * wet as f64 / f64::from(LOOKS);
+                let (x, z) = (x + step.x / pitch, z + step.z / pitch);
+                (own + between(&above, [nx, nz], x, z)) as f32
+            });
             for z in 0..nz {
                 let row = (z * ny + y) * nx;
                 paths[row..row + nx].copy_from_slice(&plane[z * nx..][..nx]);

@@ -1,7 +1,7 @@
 //! Velocity of the water at points on its surface.
 
+use crate::parallel;
 use glam::{DMat3, DVec3};
-use rayon::prelude::*;
 
 use super::grid::BinnedPoints;
 
@@ -33,7 +33,7 @@ impl<'a> Velocities<'a> {
     /// neighbours' velocities best under the weight (1 − (r/R)²)³, limited to their range extended
     /// by half on each side. Zero where no particle is near.
     pub fn at(&self, places: &[DVec3]) -> Vec<[f32; 3]> {
-        places.par_iter().map(|&place| self.one(place)).collect()
+        parallel::map_slice(places, |&place| self.one(place))
     }
 
     fn one(&self, place: DVec3) -> [f32; 3] {

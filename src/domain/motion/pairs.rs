@@ -3,7 +3,7 @@
 //! there (Schäffer 1996, the full theory), and the bound waves of each pair (Sharma and Dean 1981;
 //! Dalzell 1999).
 
-use rayon::prelude::*;
+use crate::parallel;
 
 use super::{complex::Complex, second_order::evanescent, wave_number};
 
@@ -260,12 +260,12 @@ impl Pairs {
                 }
                 Pair::new(&rows[row], &columns[column], of, water).transfer()
             };
-            (0..NODES * ACROSS).into_par_iter().map(cell).collect()
+            parallel::map(0..NODES * ACROSS, cell)
         };
         let lines: Vec<Wave> = (first..=last)
             .map(|line| Wave::new(step * line as f64, water, 0))
             .collect();
-        let bound = (0..lines.len()).into_par_iter().flat_map_iter(|n| {
+        let bound = parallel::flat_map(0..lines.len(), |n| {
             let lines = &lines;
             let of = move |m: usize, of| Pair::new(&lines[n], &lines[m], of, water).bound();
             (0..n)
@@ -279,7 +279,7 @@ impl Pairs {
             step,
             sums: table(Of::Sum),
             differences: table(Of::Difference),
-            bound: bound.collect(),
+            bound,
         }
     }
 

@@ -1,6 +1,6 @@
 //! Volume of the water of a frame.
 
-use rayon::prelude::*;
+use crate::parallel;
 
 use super::SUPPORT;
 use crate::{
@@ -35,20 +35,16 @@ pub fn volume(particles: &Particles, spacing: f64, domain: &Bounds) -> f64 {
             add_hats(fill, place);
         });
     });
-    let by_slot: Vec<f64> = voxels
-        .slots()
-        .into_par_iter()
-        .map(|slot| {
-            let origin = voxels.origin(slot);
-            let fill = &fill[slot * CELLS as usize..(slot + 1) * CELLS as usize];
-            let held = |(at, fill): (usize, &f32)| {
-                let local = [at % 8, at / 8 % 8, at / 64].map(|k| k as i32);
-                let voxel = [0, 1, 2].map(|axis| origin[axis] + local[axis]);
-                f64::from(fill.min(1.0)) * room(domain, spacing, voxel)
-            };
-            fill.iter().enumerate().map(held).sum()
-        })
-        .collect();
+    let by_slot: Vec<f64> = parallel::map(voxels.slots(), |slot| {
+        let origin = voxels.origin(slot);
+        let fill = &fill[slot * CELLS as usize..(slot + 1) * CELLS as usize];
+        let held = |(at, fill): (usize, &f32)| {
+            let local = [at % 8, at / 8 % 8, at / 64].map(|k| k as i32);
+            let voxel = [0, 1, 2].map(|axis| origin[axis] + local[axis]);
+            f64::from(fill.min(1.0)) * room(domain, spacing, voxel)
+        };
+        fill.iter().enumerate().map(held).sum()
+    });
     by_slot.iter().sum::<f64>() * spacing.powi(3)
 }
 

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use crate::parallel;
 use glam::DVec3;
-use rayon::prelude::*;
 
 use super::{
     super::{bounds::Bounds, signed_distance::SignedDistance},
@@ -67,7 +67,7 @@ pub(super) fn displace_below(
             volume: 0.0,
         },
     };
-    let mut closed: Vec<ClosedPart> = positions.par_iter().map(part).collect();
+    let mut closed: Vec<ClosedPart> = parallel::map_slice(positions, part);
     let open: Vec<f64> = closed.iter().map(|part| 1.0 - part.volume).collect();
     let kept = balanced(positions, &open, spacing);
     let before = positions.len();
@@ -77,9 +77,9 @@ pub(super) fn displace_below(
     let room = domain.grown(-clearance);
     let distance = |p| around.sample(p);
     let gradient = |p| around.gradient(p);
-    positions
-        .par_iter_mut()
-        .for_each(|p| *p = moved_out(*p, distance, gradient, &room, clearance));
+    parallel::for_each_mut(positions, |_, p| {
+        *p = moved_out(*p, distance, gradient, &room, clearance);
+    });
     closed.extend(air.iter().map(|p| ClosedPart {
         position: *p,
         volume: 1.0,

@@ -1,7 +1,7 @@
 //! Spreads initial water evenly beside solids.
 
+use crate::parallel;
 use glam::DVec3;
-use rayon::prelude::*;
 
 use super::{
     super::{bounds::Bounds, signed_distance::SignedDistance},
@@ -58,26 +58,27 @@ pub(super) fn relax(
     // Points deeper in the solid have no water within the kernel's radius.
     const DEPTH: f64 = RADIUS + 1.0;
     let near = |reach: f64| within(-DEPTH, reach);
-    let moving: Vec<usize> = (0..water.len())
-        .into_par_iter()
-        .filter(|&i| near(REACH)(&water[i]))
-        .collect();
+    let moving: Vec<usize> =
+        parallel::flat_map(0..water.len(), |i| near(REACH)(&water[i]).then_some(i));
     let is_moving = near(REACH);
-    let fixed = (water.par_iter())
-        .filter(|p| !is_moving(p) && near(REACH + RADIUS)(p))
-        .map(|p| (*p, 1.0));
-    let in_solid = (closed.par_iter())
-        .filter(|part| part.volume > 0.0 && is_moving(&part.position))
-        .map(|part| (part.position, part.volume));
-    let around = (lattice.par_iter().copied())
-        .filter(within(-DEPTH - RADIUS, REACH + RADIUS))
-        .collect::<Vec<_>>();
+    let fixed = parallel::flat_map(0..water.len(), |i| {
+        let p = &water[i];
+        (!is_moving(p) && near(REACH + RADIUS)(p)).then_some((*p, 1.0))
+    });
+    let in_solid = parallel::flat_map(0..closed.len(), |i| {
+        let part = &closed[i];
+        (part.volume > 0.0 && is_moving(&part.position)).then_some((part.position, part.volume))
+    });
+    let is_around = within(-DEPTH - RADIUS, REACH + RADIUS);
+    let around = parallel::flat_map(0..lattice.len(), |i| {
+        is_around(&lattice[i]).then_some(lattice[i])
+    });
     let beyond = beyond(&around, near(REACH), spacing);
-    let (mut places, volumes): (Vec<DVec3>, Vec<f64>) = (moving.par_iter())
+    let (mut places, volumes): (Vec<DVec3>, Vec<f64>) = (moving.iter())
         .map(|&i| (water[i], 1.0))
         .chain(fixed)
         .chain(in_solid)
-        .chain(beyond.into_par_iter().map(|p| (p, 1.0)))
+        .chain(beyond.into_iter().map(|p| (p, 1.0)))
         .unzip();
     let radius = RADIUS * spacing;
     let clearance = CLEARANCE * spacing;
@@ -108,7 +109,7 @@ pub(super) fn relax(
                 clearance,
             )
         };
-        let next: Vec<DVec3> = (0..moving.len()).into_par_iter().map(moved).collect();
+        let next: Vec<DVec3> = parallel::map(0..moving.len(), moved);
         places[..next.len()].copy_from_slice(&next);
     }
     for (i, p) in moving.into_iter().zip(&places) {
@@ -133,8 +134,10 @@ fn beyond(lattice: &[DVec3], is_near: impl Fn(&DVec3) -> bool + Sync, spacing: f
         neighbors.for_each_near(lattice, *p, |_, _| count += 1);
         count == offsets.len()
     };
-    let at_edge = |p: &&DVec3| is_near(p) && !is_inner(p);
-    let edge: Vec<&DVec3> = lattice.par_iter().filter(at_edge).collect();
+    let edge = parallel::flat_map(0..lattice.len(), |i| {
+        let p = &lattice[i];
+        (is_near(p) && !is_inner(p)).then_some(p)
+    });
     let mut taken = lattice.to_vec();
     let mut grid = PointGrid::over(lattice, OVERLAP_SPACINGS * spacing);
     for p in edge {

@@ -1,5 +1,6 @@
 //! Deaths: foam has a limited lifetime, which is shorter where it is crowded.
 
+use crate::parallel;
 use rayon::prelude::*;
 
 use super::{AGE, CalibratedSettings, KIND, LIFE, WhitewaterKind};
@@ -15,16 +16,13 @@ pub fn grow_older(
     seconds: f64,
 ) -> usize {
     let crowds = Crowds::of(particles, spacing);
-    let loss: Vec<f32> = (0..particles.len())
-        .into_par_iter()
-        .map(|k| match is_foam(particles, k) {
-            true => {
-                let crowd = crowds.about(particles.position[k]) as f64 / f64::from(settings.crowd);
-                (seconds * crowd.max(1.0)) as f32
-            }
-            false => 0.0,
-        })
-        .collect();
+    let loss: Vec<f32> = parallel::map(0..particles.len(), |k| match is_foam(particles, k) {
+        true => {
+            let crowd = crowds.about(particles.position[k]) as f64 / f64::from(settings.crowd);
+            (seconds * crowd.max(1.0)) as f32
+        }
+        false => 0.0,
+    });
     let column = |name: &str, particles: &mut Particles, by: &dyn Fn(usize) -> f32| {
         let values = particles.attributes.get_mut(name).into_iter().flatten();
         values.enumerate().for_each(|(k, value)| *value += by(k));
@@ -52,11 +50,9 @@ struct Crowds {
 
 impl Crowds {
     fn of(particles: &Particles, spacing: f64) -> Self {
-        let foam = (0..particles.len()).into_par_iter();
-        let foam = foam.filter(|&k| is_foam(particles, k));
-        let mut cubes: Vec<[i32; 3]> = foam
-            .map(|k| cube_of(particles.position[k], spacing))
-            .collect();
+        let mut cubes: Vec<[i32; 3]> = parallel::flat_map(0..particles.len(), |k| {
+            is_foam(particles, k).then(|| cube_of(particles.position[k], spacing))
+        });
         cubes.par_sort_unstable();
         Self { spacing, cubes }
     }

@@ -1,7 +1,7 @@
 //! Births: how many whitewater particles each water particle emits, and where they begin.
 
+use crate::parallel;
 use glam::{DVec3, Vec3};
-use rayon::prelude::*;
 
 use super::{
     AGE, CalibratedSettings, KIND, LIFE, Potentials, RADIUS, WhitewaterKind, random,
@@ -55,16 +55,14 @@ impl Births {
     /// moved in a frame, would lead ahead of the water.
     pub fn of(settings: &CalibratedSettings, source: &SeedWater<'_>) -> Self {
         let n = source.water.len();
-        let born = (0..n).into_par_iter().flat_map_iter(|i| {
+        let born = parallel::flat_map(0..n, |i| {
             let (potential, strength) = strength(settings, &source.potentials[i], source.seconds);
             let id = source.water.id[i];
             let chance = random(settings.seed, id, source.frame, 0);
             let count = (strength + chance).floor() as u32;
             (0..count).map(move |k| seed(settings, source, i, potential, 1 + k * CHANNELS))
         });
-        Self {
-            born: born.collect(),
-        }
+        Self { born }
     }
 
     /// Returns the number of births.

@@ -1,7 +1,7 @@
 //! Reference pass of flip/close_gaps.
 
 use glam::DVec3;
-use rayon::prelude::*;
+use swell_domain::parallel;
 use swell_domain::{
     bricks::{Bricks, CELLS},
     poisson::{AIR, FLUID},
@@ -197,8 +197,9 @@ impl Gaps<'_> {
 /// the distances to the surface, metres, also where water hits a surface.
 pub fn close_gaps(gaps: &Gaps<'_>, distance: &mut [f64]) -> OpenSpace {
     let filled = per_cell(gaps.bricks, |element| gaps.filled(element, 0.0));
-    (distance.par_iter_mut().enumerate())
-        .for_each(|(e, distance)| *distance = gaps.hit_distance(e as u32, *distance));
+    parallel::for_each_mut(distance, |e, distance| {
+        *distance = gaps.hit_distance(e as u32, *distance);
+    });
     let size = gaps.model.cell_size();
     let mut space = gaps.space.clone();
     for (e, part) in filled.into_iter().enumerate() {

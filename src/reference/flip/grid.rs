@@ -1,7 +1,7 @@
 //! Values on the elements of bricks.
 
 use glam::DVec3;
-use rayon::prelude::*;
+use swell_domain::parallel;
 
 use swell_domain::bricks::{Bricks, CELLS};
 
@@ -13,14 +13,11 @@ pub(super) fn per_cell<T: Clone + Default + Send>(
 ) -> Vec<T> {
     let mut values = vec![T::default(); CELLS as usize * bricks.slots()];
     let active = CELLS as usize..CELLS as usize * (bricks.active as usize + 1);
-    values[active]
-        .par_chunks_mut(CELLS as usize)
-        .enumerate()
-        .for_each(|(brick, values)| {
-            for (cell, element) in values.iter_mut().zip(CELLS * (brick as u32 + 1)..) {
-                *cell = value(element);
-            }
-        });
+    parallel::for_chunks_mut(&mut values[active], CELLS as usize, |brick, values| {
+        for (cell, element) in values.iter_mut().zip(CELLS * (brick as u32 + 1)..) {
+            *cell = value(element);
+        }
+    });
     values
 }
 

@@ -3,6 +3,7 @@
 
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
+use swell_domain::parallel;
 
 use super::Model;
 use swell_domain::bricks::{Bricks, CELLS};
@@ -62,9 +63,9 @@ pub fn survey(model: &Model, cloud: &Cloud) -> Survey {
 
 /// Returns the element of each particle's cell.
 pub fn assign_cells(model: &Model, bricks: &Bricks, position: &[DVec3]) -> Vec<u32> {
-    (position.par_iter())
-        .map(|&x| bricks.element(model.cell_of(x).map(i64::from)))
-        .collect()
+    parallel::map_slice(position, |&x| {
+        bricks.element(model.cell_of(x).map(i64::from))
+    })
 }
 
 /// Sorts particles by element, and by id within an element.

@@ -1,7 +1,7 @@
 //! Reference passes that cut cells by solids, and transfer particle velocities to faces.
 
 use glam::DVec3;
-use rayon::prelude::*;
+use swell_domain::parallel;
 
 use super::{
     FlipSubstep, Model, Sorted,
@@ -112,9 +112,10 @@ impl Hats {
 }
 
 pub(super) fn hats(model: &Model, bricks: &Bricks, sorted: &Sorted) -> Vec<Hats> {
-    (sorted.cloud.position.par_iter().zip(&sorted.cell))
-        .map(|(&x, &element)| Hats::of(x / model.cell_size() - corner(bricks, element)))
-        .collect()
+    parallel::map(0..sorted.cell.len(), |k| {
+        let cells = sorted.cloud.position[k] / model.cell_size();
+        Hats::of(cells - corner(bricks, sorted.cell[k]))
+    })
 }
 
 /// Computes the open fractions of each cell and of its lower faces, and the flux of solids through

@@ -1,7 +1,7 @@
 //! Reference passes that transfer grid velocities to the particles and advect them.
 
 use glam::{DMat3, DVec3};
-use rayon::prelude::*;
+use swell_domain::parallel;
 
 use super::{
     Faces, FlipSubstep, Model, OpenSpace, Sorted,
@@ -316,12 +316,14 @@ pub fn grid_to_particle(
         };
         sorted.of(element).map(of_particle)
     };
-    let all: Vec<_> = (CELLS..CELLS * (bricks.wet + 1))
-        .into_par_iter()
-        .with_min_len(CELLS as usize)
-        .filter(|&element| !sorted.of(element).is_empty())
-        .flat_map_iter(of_cell)
-        .collect();
+    let wet = CELLS as usize..(CELLS * (bricks.wet + 1)) as usize;
+    let all = parallel::flat_map(wet, |element| {
+        let holds_any = !sorted.of(element as u32).is_empty();
+        holds_any
+            .then(|| of_cell(element as u32))
+            .into_iter()
+            .flatten()
+    });
     GridTransfer {
         velocity: all.iter().map(|given| given.0).collect(),
         affine: (all.iter().filter(|_| is_apic))
@@ -451,11 +453,7 @@ pub fn push_apart(
         }
         (SHARE * push).clamp_length_max(MOST * apart)
     };
-    (0..sorted.cell.len())
-        .into_par_iter()
-        .with_min_len(256)
-        .map(one)
-        .collect()
+    parallel::map(0..sorted.cell.len(), one)
 }
 
 /// Advects particles by the midpoint rule and the density correction's displacement, keeps them out
@@ -489,11 +487,7 @@ pub fn advect(
         let v = solids::at_walls(model, step, v, x);
         (model.period().wrap(x.clamp(low, high)), v, is_capped)
     };
-    let all: Vec<_> = (0..position.len())
-        .into_par_iter()
-        .with_min_len(256)
-        .map(one)
-        .collect();
+    let all: Vec<_> = parallel::map(0..position.len(), one);
     Moved {
         position: all.iter().map(|moved| moved.0).collect(),
         velocity: all.iter().map(|moved| moved.1).collect(),

@@ -1,7 +1,7 @@
 //! Reference passes that find the water: densities at cell centres, and what follows from them.
 
 use glam::DVec3;
-use rayon::prelude::*;
+use swell_domain::parallel;
 
 use super::{
     FlipSubstep, Model, OpenSpace, Sorted,
@@ -83,15 +83,13 @@ pub fn gather_centers(
 ) -> Vec<f64> {
     let hats = hats(model, bricks, sorted);
     let is_mirrored = model.settings().density_correction;
-    let weights: Vec<[DVec3; 3]> = (hats.par_iter().zip(&sorted.cell))
-        .map(|(hats, &element)| {
-            let cell = corner(bricks, element);
-            match is_mirrored {
-                true => hats.mirrored(step.cut.min - cell, step.cut.max - cell),
-                false => hats.center,
-            }
-        })
-        .collect();
+    let weights: Vec<[DVec3; 3]> = parallel::map(0..hats.len(), |k| {
+        let (hats, cell) = (&hats[k], corner(bricks, sorted.cell[k]));
+        match is_mirrored {
+            true => hats.mirrored(step.cut.min - cell, step.cut.max - cell),
+            false => hats.center,
+        }
+    });
     let particle_share = 1.0 / f64::from(model.settings().particles_per_cell);
     per_cell(bricks, |element| {
         let given = neighborhood().map(|offset| {
@@ -400,7 +398,7 @@ pub fn find_water(
         };
         (kind, -kept * model.cell_size())
     });
-    cells.into_par_iter().unzip()
+    cells.into_iter().unzip()
 }
 
 /// Returns the excess of density, or deficit inside the water, as a fraction of a cell: the source

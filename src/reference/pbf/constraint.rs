@@ -13,7 +13,7 @@ use faer::{
     sparse::{SparseColMat, Triplet},
 };
 use glam::DVec3;
-use rayon::prelude::*;
+use swell_domain::parallel;
 
 use super::{
     Model, Sorted, Substep, local,
@@ -56,10 +56,7 @@ pub struct Converged {
 /// # Errors Returns [`ReferenceError::Factor`] if the matrix is not positive definite or memory
 /// does not hold its factor.
 pub fn linearised(inputs: Inputs<'_>, regularization: f64) -> Result<Correction, ReferenceError> {
-    let rows: Vec<DensityConstraint> = (0..inputs.particles())
-        .into_par_iter()
-        .map(|i| row(inputs, i))
-        .collect();
+    let rows: Vec<DensityConstraint> = parallel::map(0..inputs.particles(), |i| row(inputs, i));
     let gradients = Gradients {
         inputs,
         own: rows.iter().map(|row| row.own).collect(),
@@ -204,7 +201,7 @@ impl<'a> Gradients<'a> {
                 .wall_derivative(inputs.points[i], &inputs.substep.walls)
                 - sum
         };
-        gradients.own = (0..inputs.particles()).into_par_iter().map(own).collect();
+        gradients.own = parallel::map(0..inputs.particles(), own);
         gradients
     }
 
@@ -227,7 +224,7 @@ impl<'a> Gradients<'a> {
             let entries = entries.into_iter();
             entries.map(move |(column, value)| Triplet::new(k, column, value))
         };
-        active.par_iter().enumerate().flat_map_iter(row).collect()
+        parallel::flat_map(0..active.len(), |k| row((k, &active[k])))
     }
 
     /// Iterates over ∇_j C_i for i itself and its fluid neighbours j.

@@ -4,7 +4,7 @@
 //! the other colour.
 
 use glam::DVec3;
-use rayon::prelude::*;
+use swell_domain::parallel;
 
 use super::{
     Colour, Model, Substep,
@@ -12,9 +12,6 @@ use super::{
 };
 use crate::{hash::pair_direction, neighbors::Neighbors};
 use swell_domain::lanes::widely;
-
-/// Particles per task; smaller tasks are not worth their overhead.
-const GRAIN: usize = 256;
 
 /// Inputs of a substep's passes.
 #[derive(Clone, Copy, Debug)]
@@ -111,28 +108,20 @@ pub fn predict_along(
 
 /// Returns the relative density ρ/ρ0 of each particle, shape (particles) (pbf/measure_density).
 pub fn measure_density(inputs: Inputs<'_>) -> Vec<f64> {
-    (0..inputs.particles())
-        .into_par_iter()
-        .with_min_len(GRAIN)
-        .map(|i| row(inputs, i).density)
-        .collect()
+    parallel::map(0..inputs.particles(), |i| row(inputs, i).density)
 }
 
 /// Computes λ_i = −max(C_i, 0) / (Σ_k |∇_k C_i|² + ε), m², and ρ_i/ρ0 for one colour
 /// (pbf/compute_lambda; Macklin and Müller 2013, eq. 11). Shapes (particles).
 pub fn compute_lambda(inputs: Inputs<'_>, colour: Colour, lambda: &mut [f64], density: &mut [f64]) {
     let regularization = inputs.model.regularization();
-    let one = |(i, (lambda, density)): (usize, (&mut f64, &mut f64))| {
-        if colour.holds(i) {
-            let row = row(inputs, i);
-            *lambda = -(row.density - 1.0).max(0.0) / (row.squares + regularization);
-            *density = row.density;
+    let rows = parallel::map(0..lambda.len(), |i| colour.holds(i).then(|| row(inputs, i)));
+    for (i, row) in rows.into_iter().enumerate() {
+        if let Some(row) = row {
+            lambda[i] = -(row.density - 1.0).max(0.0) / (row.squares + regularization);
+            density[i] = row.density;
         }
-    };
-    (lambda.par_iter_mut().zip(density))
-        .enumerate()
-        .with_min_len(GRAIN)
-        .for_each(one);
+    }
 }
 
 /// A density constraint at the current positions.
@@ -229,11 +218,7 @@ pub fn compute_delta(
             work,
         }
     };
-    (0..lambda.len())
-        .into_par_iter()
-        .with_min_len(GRAIN)
-        .map(one)
-        .collect()
+    parallel::map(0..lambda.len(), one)
 }
 
 /// Returns Σ_j (λ_i + λ_j + s_corr) m_j (1 − q)² times the unit vector from j, m².

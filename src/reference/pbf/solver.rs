@@ -1,7 +1,7 @@
 //! Whole frames of PBF on the CPU.
 
 use glam::{DVec3, Vec3};
-use rayon::prelude::*;
+use swell_domain::parallel;
 
 use super::{
     Colour, Model, Substep, effects,
@@ -291,13 +291,13 @@ impl Pbf {
             .stand(&self.scene, substep.time, substep.time_step);
         let (model, timings, is_drop) = (&self.model, &mut self.timings, &self.is_drop);
         let by_prediction: Vec<_> = timings.time("pbf/predict", || {
-            (position.par_iter().zip(velocity.par_iter()))
-                .enumerate()
-                .map(|(slot, (&x, &v))| match is_drop.get(slot) {
+            parallel::map(0..position.len(), |slot| {
+                let (x, v) = (position[slot], velocity[slot]);
+                match is_drop.get(slot) {
                     Some(false) => passes::predict_along(model, substep, x, v),
                     _ => passes::predict_and_work(model, substep, x, v),
-                })
-                .collect()
+                }
+            })
         });
         let predicted: Vec<DVec3> = by_prediction.iter().map(|p| p.0).collect();
         let pushed: Vec<DVec3> = by_prediction.iter().map(|p| p.1).collect();
@@ -307,15 +307,14 @@ impl Pbf {
         let iterations = iterate(model, substep, &mut sorted, timings);
         work += sorted.wall_work;
         let (mut moved, capped) = timings.time("pbf/update_velocity", || {
-            let updated: Vec<_> = (sorted.order.par_iter().zip(sorted.particles()))
-                .map(|(&slot, &x)| {
-                    let start = match is_drop.get(slot) {
-                        Some(false) => x,
-                        _ => predicted[slot],
-                    };
-                    passes::update_velocity(model, substep, x, start, pushed[slot])
-                })
-                .collect();
+            let updated: Vec<_> = parallel::map(0..sorted.order.len(), |k| {
+                let (slot, x) = (sorted.order[k], sorted.particles()[k]);
+                let start = match is_drop.get(slot) {
+                    Some(false) => x,
+                    _ => predicted[slot],
+                };
+                passes::update_velocity(model, substep, x, start, pushed[slot])
+            });
             for (point, &(x, ..)) in sorted.points.iter_mut().zip(&updated) {
                 *point = x;
             }

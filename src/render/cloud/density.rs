@@ -11,6 +11,7 @@ use std::ops::Range;
 use glam::DVec3;
 use half::f16;
 use rayon::prelude::*;
+use swell_domain::parallel;
 
 /// Voxels along the edge of a brick.
 pub(crate) const EDGE: u32 = 8;
@@ -145,10 +146,8 @@ impl Cloud {
         let corner = (low / edge).floor() * edge;
         let bricks = (high - corner) / edge;
         let bricks = bricks.to_array().map(|n| n.floor() as u32 + 1);
-        let spreads: Vec<Spread> = near
-            .par_iter()
-            .map(|drop| Spread::new(drop, corner, voxel))
-            .collect();
+        let spreads: Vec<Spread> =
+            parallel::map_slice(&near, |drop| Spread::new(drop, corner, voxel));
         let mut cloud = Self {
             corner,
             voxel,
@@ -162,25 +161,21 @@ impl Cloud {
 
     fn fill(&mut self, spreads: &[Spread]) {
         let [nx, ny, nz] = self.bricks;
-        let mut pairs: Vec<(u32, u32)> = (spreads.par_iter().zip(0u32..spreads.len() as u32))
-            .flat_map_iter(|(spread, index)| {
-                let [xs, ys, zs] = spread.bricks();
-                let row = move |y: u32, z: u32| (z.min(nz - 1) * ny + y.min(ny - 1)) * nx;
-                zs.flat_map(move |z| {
-                    let xs = xs.clone();
-                    ys.clone().flat_map(move |y| {
-                        xs.clone().map(move |x| (row(y, z) + x.min(nx - 1), index))
-                    })
-                })
+        let mut pairs: Vec<(u32, u32)> = parallel::flat_map(0..spreads.len(), |k| {
+            let (spread, index) = (&spreads[k], k as u32);
+            let [xs, ys, zs] = spread.bricks();
+            let row = move |y: u32, z: u32| (z.min(nz - 1) * ny + y.min(ny - 1)) * nx;
+            zs.flat_map(move |z| {
+                let xs = xs.clone();
+                ys.clone()
+                    .flat_map(move |y| xs.clone().map(move |x| (row(y, z) + x.min(nx - 1), index)))
             })
-            .collect();
+        });
         pairs.par_sort_unstable();
         pairs.dedup();
         let groups: Vec<&[(u32, u32)]> = pairs.chunk_by(|a, b| a.0 == b.0).collect();
-        let filled: Vec<Vec<u32>> = groups
-            .par_iter()
-            .map(|group| self.brick(group, spreads))
-            .collect();
+        let filled: Vec<Vec<u32>> =
+            parallel::map_slice(&groups, |group| self.brick(group, spreads));
         for (group, values) in groups.iter().zip(filled) {
             self.values.extend(values);
             let slot = (self.values.len() / VALUES) as u32;

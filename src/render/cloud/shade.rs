@@ -1,7 +1,7 @@
 //! Optical depth of drops and bubbles towards the sun, on a coarse lattice.
 
 use glam::DVec3;
-use rayon::prelude::*;
+use swell_domain::parallel;
 
 use super::density::Cloud;
 use swell_domain::level_set::sunlight::between;
@@ -43,20 +43,17 @@ impl Shade {
         let part = step / looks as f64;
         let mut above = vec![0.0f32; nx * nz];
         for y in (0..ny - 1).rev() {
-            let plane: Vec<f32> = (0..nx * nz)
-                .into_par_iter()
-                .map(|at| {
-                    let (x, z) = ((at % nx) as f64, (at / nx) as f64);
-                    let place = cloud.corner + DVec3::new(x, y as f64, z) * pitch;
-                    let density = |k: usize| {
-                        let [drops, bubbles] = cloud.densities(place + part * (k as f64 + 0.5));
-                        drops + bubbles
-                    };
-                    let own = part.length() * (0..looks).map(density).sum::<f64>();
-                    let (x, z) = (x + step.x / pitch, z + step.z / pitch);
-                    (own + between(&above, [nx, nz], x, z)) as f32
-                })
-                .collect();
+            let plane: Vec<f32> = parallel::map(0..nx * nz, |at| {
+                let (x, z) = ((at % nx) as f64, (at / nx) as f64);
+                let place = cloud.corner + DVec3::new(x, y as f64, z) * pitch;
+                let density = |k: usize| {
+                    let [drops, bubbles] = cloud.densities(place + part * (k as f64 + 0.5));
+                    drops + bubbles
+                };
+                let own = part.length() * (0..looks).map(density).sum::<f64>();
+                let (x, z) = (x + step.x / pitch, z + step.z / pitch);
+                (own + between(&above, [nx, nz], x, z)) as f32
+            });
             for (z, row) in plane.chunks_exact(nx).enumerate() {
                 let start = (z * ny + y) * nx;
                 depths[start..start + nx].copy_from_slice(row);

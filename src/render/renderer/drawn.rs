@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 use rayon::prelude::*;
+use swell_domain::parallel;
 
 use super::taken::Taken;
 use crate::{
@@ -33,7 +34,7 @@ fn in_order(x: f32) -> u32 {
 /// Gathers values by index.
 fn picked<T: Copy + Send + Sync>(values: &[T], indices: &[u32]) -> Vec<T> {
     let of = |&index: &u32| values[index as usize];
-    indices.par_iter().map(of).collect()
+    parallel::map_slice(indices, of)
 }
 
 /// Particles of a frame in the order in which they are drawn.
@@ -134,15 +135,13 @@ impl Sight {
 
     /// Indices of visible particles, strip by strip and front to back.
     fn order(&self, packed: &[Particle], is_seen: impl Fn(u32) -> bool + Sync) -> Vec<u32> {
-        let mut order: Vec<(i32, u32, u32, u32)> = (0u32..packed.len() as u32)
-            .into_par_iter()
-            .filter(|&index| is_seen(index))
-            .map(|index| {
-                let particle = &packed[index as usize];
+        let mut order: Vec<(i32, u32, u32, u32)> = parallel::flat_map(0..packed.len(), |k| {
+            let (index, particle) = (k as u32, &packed[k]);
+            is_seen(index).then(|| {
                 let depth = in_order(self.depth(particle));
                 (self.strip(particle), depth, particle.tag, index)
             })
-            .collect();
+        });
         order.par_sort_unstable();
         order.into_iter().map(|(.., index)| index).collect()
     }

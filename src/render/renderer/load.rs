@@ -1,7 +1,7 @@
 //! Uploads a frame's particles.
 
 use glam::{DVec3, Vec3};
-use rayon::prelude::*;
+use swell_domain::parallel;
 
 use super::{
     Renderer,
@@ -259,12 +259,11 @@ impl Renderer {
         if !is_within(eye) {
             return false;
         }
-        let near: Vec<DVec3> = packed
-            .par_iter()
-            .filter(|particle| particle.tag & 1 == 1)
-            .map(|particle| Vec3::from(particle.position).as_dvec3())
-            .filter(|&p| is_within(p) && p.distance(eye) < ABOUT_THE_EYE * spacing)
-            .collect();
+        let near: Vec<DVec3> = parallel::flat_map(0..packed.len(), |k| {
+            let p = Vec3::from(packed[k].position).as_dvec3();
+            let is_near = is_within(p) && p.distance(eye) < ABOUT_THE_EYE * spacing;
+            (packed[k].tag & 1 == 1 && is_near).then_some(p)
+        });
         let close = near.iter().filter(|p| p.distance(eye) < CLOSE * spacing);
         close.count() >= FEW && Kernels::fit(&near, size, spacing).field().value(eye) > 0.0
     }

@@ -1,6 +1,7 @@
 //! Takes a frame's particles: their air and their paths.
 
 use rayon::prelude::*;
+use swell_domain::parallel;
 
 use crate::{
     FrameInputs, RenderError, RenderScene,
@@ -63,16 +64,11 @@ fn pack(
     if let Some(index) = both.position_first(|it| !is_finite(it)) {
         return Err(RenderError::NotFinite { index, frame });
     }
-    let pack = |(index, (p, v)): (usize, (&[f32; 3], &[f32; 3]))| Particle {
-        position: [0, 1, 2].map(|axis| (f64::from(p[axis]) - origin[axis]) as f32),
+    let pack = |index: usize| Particle {
+        position: [0, 1, 2].map(|k| (f64::from(places[index][k]) - origin[k]) as f32),
         air: CLEAR,
-        velocity: *v,
+        velocity: velocities[index],
         tag: particles.id.get(index).map_or(index as u32, |&id| id) << 1 | 1,
     };
-    Ok(places
-        .par_iter()
-        .zip(velocities)
-        .enumerate()
-        .map(pack)
-        .collect())
+    Ok(parallel::map(0..places.len(), pack))
 }

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::io::Write;
 use std::iter;
 
+use crate::parallel;
 use flate2::{Compression, write::ZlibEncoder};
-use rayon::prelude::*;
 
 use super::put_u32;
 use super::value::{self, VoxelValue};
@@ -82,10 +82,8 @@ impl<'a, T: VoxelValue> Tree<'a, T> {
             .flat_map(|upper| upper.values())
             .flat_map(|lower| lower.leaves.values())
             .collect();
-        let buffers: Vec<_> = leaves
-            .into_par_iter()
-            .map(|leaf| buffer(leaf, self.background, is_half))
-            .collect();
+        let buffers: Vec<_> =
+            parallel::map_slice(&leaves, |leaf| buffer(leaf, self.background, is_half));
         for buffer in buffers {
             out.extend_from_slice(&buffer);
         }

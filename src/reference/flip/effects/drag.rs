@@ -1,7 +1,7 @@
 //! Air drag on particles before the transfer to the grid.
 
 use glam::DVec3;
-use rayon::prelude::*;
+use swell_domain::parallel;
 
 use super::{
     super::{FlipSubstep, Model, Sorted, grid::neighborhood},
@@ -46,24 +46,23 @@ pub fn drag_by_cells(
     sorted: &Sorted,
     share: impl Fn(u32) -> f64 + Sync,
 ) -> Vec<DVec3> {
-    let wet = CELLS..sorted.start.len() as u32 - 1;
-    (wet.into_par_iter())
-        .flat_map_iter(|element| {
-            let own = sorted.of(element);
-            let part = match own.is_empty() {
-                true => 0.0,
-                false => exposure(share(element), PLANE_SHARE),
-            };
-            sorted.cloud.velocity[own].iter().map(move |&v| match part {
-                0.0 => v,
-                part => {
-                    let both = [v, step.velocity_step];
-                    let seconds = part * step.kick;
-                    blown(both, settings.wind(), settings.drop_radius, seconds) - step.velocity_step
-                }
-            })
+    let wet = CELLS as usize..sorted.start.len() - 1;
+    parallel::flat_map(wet, |element| {
+        let element = element as u32;
+        let own = sorted.of(element);
+        let part = match own.is_empty() {
+            true => 0.0,
+            false => exposure(share(element), PLANE_SHARE),
+        };
+        sorted.cloud.velocity[own].iter().map(move |&v| match part {
+            0.0 => v,
+            part => {
+                let both = [v, step.velocity_step];
+                let seconds = part * step.kick;
+                blown(both, settings.wind(), settings.drop_radius, seconds) - step.velocity_step
+            }
         })
-        .collect()
+    })
 }
 
 impl Acts for Settings {

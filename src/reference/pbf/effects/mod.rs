@@ -3,6 +3,7 @@
 
 use glam::DVec3;
 use rayon::prelude::*;
+use swell_domain::parallel;
 
 use super::passes::Inputs;
 use crate::Timings;
@@ -40,14 +41,13 @@ pub fn led_particles(
     velocity: &[DVec3],
     wanted: impl Fn(DVec3) -> DVec3 + Sync + Send,
 ) -> Vec<DVec3> {
-    (velocity.par_iter().zip(places).enumerate())
-        .map(
-            |(i, (&v, &x))| match (is_drop.get(i), zone.led(size, x, step)) {
-                (Some(true), _) | (_, 0.0) => v,
-                (_, part) => v + part * (wanted(x) - v),
-            },
-        )
-        .collect()
+    parallel::map(0..velocity.len(), |i| {
+        let (v, x) = (velocity[i], places[i]);
+        match (is_drop.get(i), zone.led(size, x, step)) {
+            (Some(true), _) | (_, 0.0) => v,
+            (_, part) => v + part * (wanted(x) - v),
+        }
+    })
 }
 
 /// Returns the sum of `term(i, j)` over the fluid neighbours j of every particle i.
