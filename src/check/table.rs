@@ -3,12 +3,12 @@
 use std::{fmt, ops::Range};
 
 use serde::{Serialize, Serializer};
-use swell_domain::parallel;
 
 use swell_compare::{
     deviation::{ComparedValue, Deviation, relative},
     tolerance::{BoundExpression, Text},
 };
+use swell_domain::parallel;
 
 /// A row of a check: one field that one pass writes.
 #[derive(Debug, Serialize)]

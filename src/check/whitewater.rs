@@ -2,7 +2,6 @@
 //! same water and the same whitewater.
 
 use glam::{DVec3, Vec3};
-use swell_domain::parallel;
 
 use swell_compare::{
     rounding::{GRADIENT, KERNEL, Sums, U, WALL_DENSITY, WALL_GRADIENT, WALL_PLACE},
@@ -10,6 +9,7 @@ use swell_compare::{
 };
 use swell_domain::{
     boundary::Boundary,
+    parallel,
     particles::Particles,
     whitewater::{CalibratedSettings, KIND, OUTWARD, Potentials, SURFACE, WhitewaterKind},
 };

@@ -8,13 +8,13 @@
 mod cell;
 pub mod sparse;
 
-use crate::parallel;
 use glam::DVec3;
 use rayon::prelude::*;
 
 use super::{
     level_set::{EDGE, EMPTY, FULL, LevelSet},
     mesh::TriangleMesh,
+    parallel,
 };
 
 use cell::{EDGES, Loops, fan};

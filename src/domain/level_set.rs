@@ -14,9 +14,9 @@ mod moments;
 pub mod sunlight;
 pub mod velocity;
 
-use crate::parallel;
 use glam::{DVec3, Vec3};
 
+use crate::parallel;
 use kernels::{Ellipsoid, Kernels};
 
 /// Voxels along the edge of a brick.

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-use super::absorber::AbsorberStates;
+use super::{absorber::AbsorberStates, bounds::Bounds};
 
 /// Particles that a thread takes at a time: a task takes longer than to hand it over.
 pub const AT_ONCE: usize = 1 << 14;
@@ -67,6 +67,13 @@ impl Particles {
         for column in self.attributes.values_mut() {
             kept(column, keep);
         }
+    }
+
+    /// Returns how many particles are outside a box.
+    pub fn count_outside(&self, room: &Bounds) -> usize {
+        let is_outside = |x: &&[f32; 3]| !room.contains(Vec3::from_array(**x).as_dvec3());
+        let all = self.position.par_iter().with_min_len(AT_ONCE);
+        all.filter(is_outside).count()
     }
 
     /// Returns the largest speed, m/s; 0 without particles.

@@ -7,10 +7,9 @@
 //! their separation there is no surface. Only elsewhere, and everywhere around an open mesh, is the
 //! winding number evaluated.
 
-use crate::parallel;
 use glam::DVec3;
 
-use super::{bounds::Bounds, bvh::Bvh, inside::NoInside, mesh::TriangleMesh};
+use super::{bounds::Bounds, bvh::Bvh, inside::NoInside, mesh::TriangleMesh, parallel};
 
 /// Largest number of nodes in a grid: 4 GiB of values.
 pub const MAX_NODES: usize = 1 << 30;

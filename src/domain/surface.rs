@@ -7,10 +7,11 @@
 //! particle-to-grid transfer. Both depend only on the frame: the order of summation does not change
 //! with the number of threads, so that the same frame gives the same bytes.
 
-use crate::parallel;
 use glam::DVec3;
 
-use super::{bricks::CELLS, particles::Particles, sparse_grid::SparseGrid, voxels::Voxels};
+use super::{
+    bricks::CELLS, parallel, particles::Particles, sparse_grid::SparseGrid, voxels::Voxels,
+};
 
 /// Half-width of the narrow band, voxels; the default of OpenVDB.
 pub const BAND: f64 = 3.0;

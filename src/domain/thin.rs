@@ -1,10 +1,9 @@
 //! Detects parts of solids that are too thin to hold water back.
 
-use crate::parallel;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::{bounds::Bounds, bvh::Bvh, mesh::TriangleMesh, sampling::candidate};
+use super::{bounds::Bounds, bvh::Bvh, mesh::TriangleMesh, parallel, sampling::candidate};
 
 /// Largest number of rays cast through one mesh.
 const MOST_RAYS: f64 = 131_072.0;

@@ -1,10 +1,10 @@
 //! Particles on the voxels of a sparse grid: the bricks, and the particles of each voxel.
 
-use crate::parallel;
 use glam::DVec3;
 
 use super::{
     bricks::{Bricks, CELLS, EDGE, SELF, table_dims},
+    parallel,
     particles::Particles,
     sparse_grid::{Leaf, VOXELS},
 };

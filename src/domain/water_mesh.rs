@@ -1,12 +1,12 @@
 //! The water of a frame as a mesh with the volume of the particles, with velocities and normals.
 
-use crate::parallel;
 use glam::DVec3;
 
 use super::{
     isosurface::{Isosurface, extract},
     level_set::{LevelSet, kernels::Kernels, velocity::Velocities},
     mesh::TriangleMesh,
+    parallel,
 };
 
 /// Relative deviation from the particles' volume above which the surface is moved.

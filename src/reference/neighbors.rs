@@ -4,9 +4,8 @@ use std::ops::Range;
 
 use glam::DVec3;
 use pulp::{Simd, WithSimd};
-use swell_domain::parallel;
 
-use swell_domain::{lanes::widely, period::Period, places};
+use swell_domain::{lanes::widely, parallel, period::Period, places};
 
 /// Particles whose neighbours one task lists.
 const BLOCK: usize = 512;

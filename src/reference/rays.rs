@@ -4,7 +4,6 @@
 //! no surface can be.
 
 use glam::DVec3;
-use swell_domain::parallel;
 
 use swell_domain::{
     bvh::Bvh,
@@ -14,6 +13,7 @@ use swell_domain::{
         kernels::{KernelField, Kernels},
     },
     mesh::TriangleMesh,
+    parallel,
 };
 
 /// Steps through a voxel of the level set: the thinnest sheet of particles is one and a half voxels

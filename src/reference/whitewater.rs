@@ -2,13 +2,13 @@
 //! whitewater on the CPU.
 
 use glam::{DVec3, Vec3};
-use swell_domain::parallel;
 
 use swell_domain::{
     air,
     boundary::Boundary,
     bounds::Bounds,
     budget::Breach,
+    parallel,
     particles::Particles,
     whitewater::{
         AIR_BELOW, CalibratedSettings, FLIGHT_STEPS, HALVINGS, KIND, OUTWARD, Potentials, SURFACE,

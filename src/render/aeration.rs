@@ -7,7 +7,6 @@
 //! forth between consecutive frames.
 
 use glam::{DVec3, Vec3};
-use swell_domain::parallel;
 
 use super::{
     RenderScene,
@@ -15,6 +14,7 @@ use super::{
     neighbors::smoothstep,
     uniform::Particle,
 };
+use swell_domain::parallel;
 use swell_scene::look::SpraySpec;
 
 /// Weight of neighbours within two spacings below which a particle is spray (Ihmsen 2012, section

@@ -2,7 +2,6 @@
 //! the fraction that each covers.
 
 use std::collections::{BTreeMap, BTreeSet};
-
 use swell_domain::parallel;
 
 /// Name of the Cryptomatte layer, and prefix of its channels.

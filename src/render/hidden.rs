@@ -2,12 +2,12 @@
 //! blocks of water take their place in the thickness along a line of sight.
 
 use glam::{DVec3, Vec3};
-use swell_domain::parallel;
 
 use super::{
     aeration::is_whole,
     uniform::{Block, Particle},
 };
+use swell_domain::parallel;
 
 /// Edge of a cell, particle spacings: at rest it holds 8 particles.
 const CELL: f64 = 2.0;

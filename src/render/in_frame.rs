@@ -2,12 +2,12 @@
 //! inside.
 
 use glam::Vec3;
-use swell_domain::parallel;
 
 use super::{
     paths::Path,
     uniform::{Block, Camera, Particle},
 };
+use swell_domain::parallel;
 
 /// Distance within which a particle may affect a pixel, in particle spacings or splat radii,
 /// whichever is longer. Puffs and drops of spray extend less than 5 radii. A splat reaches 1.3

@@ -5,7 +5,6 @@ use std::collections::HashMap;
 
 use glam::DVec3;
 use half::f16;
-use swell_domain::parallel;
 use wgpu::TextureFormat;
 
 use super::{
@@ -14,7 +13,7 @@ use super::{
     plan::{Limits, Plan},
     uniform::{Material, Triangle},
 };
-use swell_domain::{mesh_file::parts::Places, pose::Pose};
+use swell_domain::{mesh_file::parts::Places, parallel, pose::Pose};
 use swell_gpu::texture::TextureSpec;
 use swell_scene::look::{Look, Material as LookMaterial, Materials, Picture, Texture};
 

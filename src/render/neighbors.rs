@@ -4,9 +4,9 @@ use std::ops::Range;
 
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
-use swell_domain::parallel;
 
 use swell_domain::lanes::{LANES, widely};
+use swell_domain::parallel;
 
 /// Distances, in spacings, between which a neighbour's weight falls from 1 to 0; it is one half at
 /// two.

@@ -6,10 +6,9 @@
 //! missing or lacks the particle, the path continues straight with the particle's velocity.
 
 use glam::{DVec3, Vec3};
-use swell_domain::parallel;
 
 use super::{inputs::Ids, uniform};
-use swell_domain::particles::Particles;
+use swell_domain::{parallel, particles::Particles};
 
 /// Path of a particle about its frame's instant: x(t) = x + v t + (square + cube t) t², in metres
 /// and seconds.

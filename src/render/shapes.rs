@@ -9,7 +9,6 @@
 use std::f64::consts::PI;
 
 use glam::{DMat3, DVec3, Vec3};
-use swell_domain::parallel;
 
 use super::{
     RenderScene,
@@ -19,6 +18,7 @@ use swell_domain::level_set::{
     eigen,
     kernels::{ALONE, Ellipsoid, KernelField, Kernels},
 };
+use swell_domain::parallel;
 
 /// Default splat radius over particle spacing; 0.5 √3 closes a lattice seen along its diagonal.
 pub(super) const RADIUS: f64 = 0.87;

@@ -5,9 +5,9 @@ use std::f64::consts::PI;
 use glam::{DVec3, Vec3};
 use half::f16;
 use hw_skymodel::rgb::{Channel, SkyParams, SkyState};
-use swell_domain::parallel;
 
 use super::RenderError;
+use swell_domain::parallel;
 use swell_scene::look::{Look, SkySpec};
 
 /// A latitude-longitude image of the sky, with integrals over it.

@@ -2,13 +2,13 @@
 
 use glam::{DVec2, DVec3};
 use serde::{Deserialize, Serialize};
-use swell_domain::parallel;
 
 use swell_domain::{
     bounds::Bounds,
     initial_waves::{InitialWave, InitialWaves},
     mesh::TriangleMesh,
     open_waves::{OpenSea, OpenWaves},
+    parallel,
     solitary_wave::SolitaryWave,
 };
 

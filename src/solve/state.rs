@@ -7,11 +7,11 @@ use std::sync::{
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
-use swell_domain::parallel;
 
 use swell_domain::{
     absorber::AbsorberStates,
     budget::{Breach, Watched},
+    parallel,
     particles::{AT_ONCE, Particles},
 };
 use swell_gpu::program::Program;

@@ -2,12 +2,12 @@
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
-use swell_domain::parallel;
 
 use crate::air;
 use swell_domain::{
     boundary::Boundary,
     budget::Breach,
+    parallel,
     particles::Particles,
     solver::PassTime,
     sph::Calibration,

@@ -1,11 +1,8 @@
 //! Checks a bake's budgets at the end of each frame, the same for every solver.
 
-use glam::Vec3;
-use rayon::prelude::*;
-
 use swell_domain::{
     budget::{Breach, Watched},
-    particles::{AT_ONCE, Particles},
+    particles::Particles,
     probe::volume,
     solver::StepReport,
 };
@@ -95,9 +92,7 @@ impl<'a> Watch<'a> {
         let domain = &self.scene.domain;
         let farthest = domain.min.abs().max(domain.max.abs()).max_element();
         let room = domain.grown(ROUNDINGS * f64::from(f32::EPSILON) * farthest);
-        let is_outside = |x: &&[f32; 3]| !room.contains(Vec3::from_array(**x).as_dvec3());
-        let position = particles.position.par_iter().with_min_len(AT_ONCE);
-        let outside = position.filter(is_outside).count();
+        let outside = particles.count_outside(&room);
         let lost = match particles.id == self.id {
             true => 0,
             false => {

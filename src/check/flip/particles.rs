@@ -1,13 +1,12 @@
 //! Transfer from the grid to the particles, and their motion.
 
 use glam::DVec3;
-use rayon::prelude::*;
 
 use crate::{
     comparison::{Io, PassResult},
     table::pair,
 };
-use swell_domain::bricks::Bricks;
+use swell_domain::{bricks::Bricks, parallel};
 use swell_reference::flip::{
     GridTransfer, Moved, Solid, advect as reference_advect, aim as reference_aim,
     grid_to_particle as reference_grid_to_particle, push_apart as reference_push_apart,
@@ -58,9 +57,7 @@ pub(super) fn grid_to_particle(state: &mut FlipState, io: &mut Io<'_>) -> PassRe
         }
         own.map(move |i| (i, errors))
     };
-    let errors: Vec<(usize, [f64; 3])> = (elements.wet().into_par_iter())
-        .flat_map_iter(of_cell)
-        .collect();
+    let errors = parallel::flat_map(elements.wet(), of_cell);
     let all = || errors.iter().copied();
     let fallen = step.velocity_step.length();
     let came = |i: usize| sorted.cloud.velocity[i].length() + fallen;

@@ -3,12 +3,12 @@
 use std::sync::Arc;
 
 use glam::DVec3;
-use swell_domain::parallel;
 
 use crate::{
     comparison::{Io, PassResult},
     table::pair,
 };
+use swell_domain::parallel;
 use swell_domain::places::{SKIN, are_near};
 use swell_reference::neighbors::{Neighbors, SortedPoints};
 use swell_solve::{

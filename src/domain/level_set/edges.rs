@@ -1,9 +1,9 @@
 //! Height of the water along the vertical sides of its box.
 
-use crate::parallel;
 use glam::{DVec2, DVec3};
 
 use super::kernels::{Kernels, REACH};
+use crate::parallel;
 
 /// Samples per particle spacing in the upward search for water.
 const LOOKS: f64 = 2.0;

@@ -19,7 +19,6 @@
 
 use std::f64::consts::PI;
 
-use crate::parallel;
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
@@ -28,6 +27,7 @@ use super::{
     grid::{BinnedPoints, HALVES},
     moments::{AT_ONCE, Moments, Near},
 };
+use crate::parallel;
 
 /// Radius of a kernel that is not flattened, particle spacings.
 const SUPPORT: f64 = 2.5;

@@ -1,9 +1,9 @@
 //! Length of sunlight's path through water, on a coarse lattice.
 
-use crate::parallel;
 use glam::DVec3;
 
 use super::LevelSet;
+use crate::parallel;
 
 /// Distance between the lattice's nodes, voxels.
 const PITCH: f64 = 4.0;

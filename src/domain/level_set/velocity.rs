@@ -1,9 +1,9 @@
 //! Velocity of the water at points on its surface.
 
-use crate::parallel;
 use glam::{DMat3, DVec3};
 
 use super::grid::BinnedPoints;
+use crate::parallel;
 
 /// Radius within which particles contribute, particle spacings: a surface lies within 2.5 of one.
 const NEAR: f64 = 3.0;

@@ -3,9 +3,8 @@
 //! there (Schäffer 1996, the full theory), and the bound waves of each pair (Sharma and Dean 1981;
 //! Dalzell 1999).
 
-use crate::parallel;
-
 use super::{complex::Complex, second_order::evanescent, wave_number};
+use crate::parallel;
 
 /// Number of evanescent modes that are summed: a base for shallow water, and more per kh of the
 /// shorter wave. The truncation error falls as one over their number and its powers; extrapolation

@@ -1,11 +1,10 @@
 //! Volume of the water of a frame.
 
-use crate::parallel;
-
 use super::SUPPORT;
 use crate::{
     bounds::Bounds,
     bricks::CELLS,
+    parallel,
     particles::Particles,
     sparse_grid::{EDGE, SparseGrid},
     surface::Raster,

@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 
-use crate::parallel;
 use glam::DVec3;
 
 use super::{
@@ -10,6 +9,7 @@ use super::{
     relax::{ClosedPart, relax},
     uniform,
 };
+use crate::parallel;
 
 /// Least distance of particles from solids, in spacings: slightly farther than PBF (0.25) and FLIP
 /// (0.1) keep them, so that none is pushed in the first step.

@@ -1,6 +1,5 @@
 //! Spreads initial water evenly beside solids.
 
-use crate::parallel;
 use glam::DVec3;
 
 use super::{
@@ -8,6 +7,7 @@ use super::{
     OVERLAP_SPACINGS, PointGrid,
     displace::{CLEARANCE, moved_out},
 };
+use crate::parallel;
 
 /// Distance from a solid within which particles move, in spacings.
 const REACH: f64 = 3.0;

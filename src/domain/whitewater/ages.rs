@@ -1,10 +1,9 @@
 //! Deaths: foam has a limited lifetime, which is shorter where it is crowded.
 
-use crate::parallel;
 use rayon::prelude::*;
 
 use super::{AGE, CalibratedSettings, KIND, LIFE, WhitewaterKind};
-use crate::particles::Particles;
+use crate::{parallel, particles::Particles};
 
 /// Advances ages by `seconds` and reduces the life of foam, by a factor that rises with the number
 /// of foam particles in its cube of one spacing once there are more than `settings.crowd`. Removes

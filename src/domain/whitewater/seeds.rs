@@ -1,13 +1,12 @@
 //! Births: how many whitewater particles each water particle emits, and where they begin.
 
-use crate::parallel;
 use glam::{DVec3, Vec3};
 
 use super::{
     AGE, CalibratedSettings, KIND, LIFE, Potentials, RADIUS, WhitewaterKind, random,
     thresholds::grown,
 };
-use crate::{bounds::Bounds, particles::Particles, period::Period};
+use crate::{bounds::Bounds, parallel, particles::Particles, period::Period};
 
 /// Random channels reserved per birth.
 const CHANNELS: u32 = 8;

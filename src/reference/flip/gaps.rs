@@ -1,9 +1,9 @@
 //! Reference pass of flip/close_gaps.
 
 use glam::DVec3;
-use swell_domain::parallel;
 use swell_domain::{
     bricks::{Bricks, CELLS},
+    parallel,
     poisson::{AIR, FLUID},
 };
 

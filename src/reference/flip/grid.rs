@@ -1,9 +1,9 @@
 //! Values on the elements of bricks.
 
 use glam::DVec3;
-use swell_domain::parallel;
 
 use swell_domain::bricks::{Bricks, CELLS};
+use swell_domain::parallel;
 
 /// Evaluates a function on the cells of all active bricks, in the order of the elements; slot 0 is
 /// zero.

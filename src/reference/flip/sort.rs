@@ -3,10 +3,10 @@
 
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
-use swell_domain::parallel;
 
 use super::Model;
 use swell_domain::bricks::{Bricks, CELLS};
+use swell_domain::parallel;
 
 /// Particles in any order; positions relative to the domain's minimum corner.
 #[derive(Clone, Debug, Default, PartialEq)]

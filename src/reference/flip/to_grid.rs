@@ -1,7 +1,6 @@
 //! Reference passes that cut cells by solids, and transfer particle velocities to faces.
 
 use glam::DVec3;
-use swell_domain::parallel;
 
 use super::{
     FlipSubstep, Model, Sorted,
@@ -11,6 +10,7 @@ use super::{
 };
 use swell_domain::{
     bricks::Bricks,
+    parallel,
     poisson::{AIR, SOLID},
 };
 

@@ -1,7 +1,6 @@
 //! Reference passes that transfer grid velocities to the particles and advect them.
 
 use glam::{DMat3, DVec3};
-use swell_domain::parallel;
 
 use super::{
     Faces, FlipSubstep, Model, OpenSpace, Sorted,
@@ -11,6 +10,7 @@ use super::{
 use crate::hash::pair_direction;
 use swell_domain::{
     bricks::{Bricks, CELLS},
+    parallel,
     poisson::{AIR, FLUID, SOLID},
 };
 

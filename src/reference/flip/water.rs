@@ -1,7 +1,6 @@
 //! Reference passes that find the water: densities at cell centres, and what follows from them.
 
 use glam::DVec3;
-use swell_domain::parallel;
 
 use super::{
     FlipSubstep, Model, OpenSpace, Sorted,
@@ -11,6 +10,7 @@ use super::{
 use swell_domain::{
     bricks::{Bricks, CELLS},
     flip::{HALF, part_of_solids},
+    parallel,
     poisson::{AIR, FLUID, SOLID},
 };
 use swell_scene::sources::Inlet;

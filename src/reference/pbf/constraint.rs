@@ -13,14 +13,13 @@ use faer::{
     sparse::{SparseColMat, Triplet},
 };
 use glam::DVec3;
-use swell_domain::parallel;
 
 use super::{
     Model, Sorted, Substep, local,
     passes::{DensityConstraint, Inputs, measure_density, row},
 };
 use crate::{ReferenceError, Timings};
-use swell_domain::{boundary::Boundary, particles::Particles};
+use swell_domain::{boundary::Boundary, parallel, particles::Particles};
 use swell_scene::PbfScene;
 
 /// Newton steps after which the nonlinear solve fails.

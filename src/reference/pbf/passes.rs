@@ -4,14 +4,13 @@
 //! the other colour.
 
 use glam::DVec3;
-use swell_domain::parallel;
 
 use super::{
     Colour, Model, Substep,
     pairs::{CorrectionSum, RowSums},
 };
 use crate::{hash::pair_direction, neighbors::Neighbors};
-use swell_domain::lanes::widely;
+use swell_domain::{lanes::widely, parallel};
 
 /// Inputs of a substep's passes.
 #[derive(Clone, Copy, Debug)]

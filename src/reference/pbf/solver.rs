@@ -1,7 +1,6 @@
 //! Whole frames of PBF on the CPU.
 
 use glam::{DVec3, Vec3};
-use swell_domain::parallel;
 
 use super::{
     Colour, Model, Substep, effects,
@@ -15,6 +14,7 @@ use crate::{
 use swell_domain::{
     boundary::Boundary,
     budget::Breach,
+    parallel,
     particles::Particles,
     pbf::chebyshev_factors,
     probe::fitted,

@@ -1,10 +1,9 @@
 //! Optical depth of drops and bubbles towards the sun, on a coarse lattice.
 
 use glam::DVec3;
-use swell_domain::parallel;
 
 use super::density::Cloud;
-use swell_domain::level_set::sunlight::between;
+use swell_domain::{level_set::sunlight::between, parallel};
 
 /// Distance between the lattice's nodes, voxels, unless that gives too many nodes.
 const PITCH: f64 = 2.0;

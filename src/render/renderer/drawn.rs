@@ -2,7 +2,6 @@
 
 use glam::Vec3;
 use rayon::prelude::*;
-use swell_domain::parallel;
 
 use super::taken::Taken;
 use crate::{
@@ -14,6 +13,7 @@ use crate::{
     samples::{Sample, samples_of},
     uniform::{Block, Camera, Particle},
 };
+use swell_domain::parallel;
 use swell_scene::look::{Look, MethodSpec};
 
 /// Width in pixels of the vertical strips by which particles are sorted. In passes that do not

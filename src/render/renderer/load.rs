@@ -1,7 +1,6 @@
 //! Uploads a frame's particles.
 
 use glam::{DVec3, Vec3};
-use swell_domain::parallel;
 
 use super::{
     Renderer,
@@ -24,7 +23,7 @@ use crate::{
     shapes::shapes,
     uniform::{Block, Page, Particle, Shape, SprayParams},
 };
-use swell_domain::level_set::kernels::Kernels;
+use swell_domain::{level_set::kernels::Kernels, parallel};
 use swell_gpu::{
     buffer::{BufferSpec, Workgroups},
     recording::spread,

@@ -1,7 +1,6 @@
 //! Takes a frame's particles: their air and their paths.
 
 use rayon::prelude::*;
-use swell_domain::parallel;
 
 use crate::{
     FrameInputs, RenderError, RenderScene,
@@ -9,7 +8,7 @@ use crate::{
     paths::{Path, paths},
     uniform::Particle,
 };
-use swell_domain::particles::Particles;
+use swell_domain::{parallel, particles::Particles};
 use swell_scene::look::{AovSpec, Look};
 
 /// Particles of a frame relative to the domain's least corner, with their air.

@@ -4,12 +4,12 @@ use std::collections::BTreeMap;
 use std::io::Write;
 use std::iter;
 
-use crate::parallel;
 use flate2::{Compression, write::ZlibEncoder};
 
 use super::put_u32;
 use super::value::{self, VoxelValue};
 use crate::{
+    parallel,
     sparse_grid::{Leaf, SparseGrid},
     vdb::{LEAF_BITS, LOWER_BITS, UPPER_BITS, inactive, volume},
 };

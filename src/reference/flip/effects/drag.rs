@@ -1,7 +1,6 @@
 //! Air drag on particles before the transfer to the grid.
 
 use glam::DVec3;
-use swell_domain::parallel;
 
 use super::{
     super::{FlipSubstep, Model, Sorted, grid::neighborhood},
@@ -12,6 +11,7 @@ use swell_domain::{
     air::{blown, exposure},
     bricks::{Bricks, CELLS},
     flip::PLANE_SHARE,
+    parallel,
     poisson::SOLID,
 };
 use swell_scene::effects::drag::Settings;

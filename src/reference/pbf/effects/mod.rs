@@ -3,10 +3,10 @@
 
 use glam::DVec3;
 use rayon::prelude::*;
-use swell_domain::parallel;
 
 use super::passes::Inputs;
 use crate::Timings;
+use swell_domain::parallel;
 use swell_scene::effects::{Effects, with_effects, zone::Zone};
 
 macro_rules! twins {
