@@ -71,15 +71,16 @@ fn gather<T: Send>(range: Range<usize>, of: &(dyn Fn(Range<usize>) -> Vec<T> + S
         let part = of(first..range.end.min(first + length));
         *done[piece].lock().unwrap_or_else(PoisonError::into_inner) = part;
     });
-    let mut all = Vec::new();
-    for part in done {
-        let mut part = part.into_inner().unwrap_or_else(PoisonError::into_inner);
-        if all.is_empty() {
-            all = part;
-            all.reserve_exact((range.len() - all.len()) * usize::from(pieces > 1));
-        } else {
-            all.append(&mut part);
-        }
+    let parts = done
+        .into_iter()
+        .map(|part| part.into_inner().unwrap_or_else(PoisonError::into_inner));
+    let mut parts: Vec<Vec<T>> = parts.collect();
+    if parts.len() == 1 {
+        return parts.swap_remove(0);
+    }
+    let mut all = Vec::with_capacity(parts.iter().map(Vec::len).sum());
+    for mut part in parts {
+        all.append(&mut part);
     }
     all
 }
@@ -109,6 +110,9 @@ mod tests {
                 odd.iter()
                     .eq((0..count).filter(|k| k % 2 == 1).collect::<Vec<_>>().iter())
             );
+            let twice = flat_map(0..count, |k| [k, k]);
+            assert!(twice.iter().enumerate().all(|(k, &value)| value == k / 2));
+            assert_eq!(twice.len(), 2 * count);
             let mut values = squares.clone();
             for_each_mut(&mut values, |k, value| *value -= (k + 3) * (k + 3));
             assert!(values.iter().all(|&value| value == 0));
