@@ -11,6 +11,7 @@ pub mod absorber;
 pub mod absorption;
 pub mod aggregates;
 pub mod air;
+pub mod body;
 pub mod boundary;
 pub mod bounds;
 pub mod bricks;
