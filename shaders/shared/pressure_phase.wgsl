@@ -20,7 +20,8 @@ struct PressurePhase {
     pressure_scale: f32,
     // Always 0, but unknown to the shader compiler.
     opaque_zero: u32,
-    padding: u32,
+    // Bricks with water in which bodies move with the pressure; 0 in the density correction.
+    body_bricks: u32,
     // For each level: first slot, bricks, active bricks (finest level only), 0.
     levels: array<vec4u, 8>,
 }

@@ -17,6 +17,7 @@ use super::{
 };
 use swell_domain::{
     absorber::AbsorberStates,
+    body::BodyState,
     output::{self, AtPath as _},
     particles::Particles,
 };
@@ -31,6 +32,8 @@ const FILES: &str = "files";
 const CHECKSUM: &str = "blake3";
 /// Key of the report: the absorber state at the start; absent where no wall absorbs.
 const WALLS: &str = "walls";
+/// Key of the report: the bodies at the start; absent where there are none.
+const BODIES: &str = "bodies";
 
 /// Key of the report: length of the substep that ended in the start state, seconds.
 const SUBSTEP: &str = "substep";
@@ -78,6 +81,9 @@ pub fn write(cache: &Path, failed: &Failed, stamp: &Stamp<'_>) -> Result<(), Cac
     fields.insert(FILES.to_owned(), json!(files));
     if failed.start.walls != AbsorberStates::default() {
         fields.insert(WALLS.to_owned(), json!(failed.start.walls));
+    }
+    if !failed.start.bodies.is_empty() {
+        fields.insert(BODIES.to_owned(), json!(failed.start.bodies));
     }
     fields.insert(SUBSTEP.to_owned(), json!(failed.start.substep));
     let checksum = checksum(fields);
@@ -133,12 +139,19 @@ pub fn read(dir: &Path) -> Result<Failed, CacheError> {
         }
         None => AbsorberStates::default(),
     };
+    let bodies = match fields.remove(BODIES) {
+        Some(bodies) => {
+            Vec::<BodyState>::deserialize(bodies).map_err(|error| damaged(&error.to_string()))?
+        }
+        None => Vec::new(),
+    };
     let substep = match fields.remove(SUBSTEP) {
         Some(seconds) => f64::deserialize(seconds).map_err(|error| damaged(&error.to_string()))?,
         None => 0.0,
     };
     let start = Particles {
         walls,
+        bodies,
         substep,
         ..frame::decode(&start.read(dir)?, &dir.join(START))?
     };

@@ -15,6 +15,7 @@ use super::record::FileRecord;
 use super::stream::{self, STREAMS, Stream};
 use swell_domain::{
     absorber::AbsorberStates,
+    body::BodyState,
     output::{self, AtPath as _},
 };
 
@@ -25,7 +26,7 @@ const CHAIN_KEY: &[u8] = b",\"chain\":\"";
 const CHAIN_LEN: usize = CHAIN_KEY.len() + 64 + 2;
 
 /// Time and step counts of a bake after a frame.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Clock {
     /// Frame number; 0 is the start.
@@ -42,6 +43,9 @@ pub struct Clock {
     /// State of the absorbing walls after this frame; absent if there are none.
     #[serde(default, skip_serializing_if = "is_none")]
     pub walls: AbsorberStates,
+    /// States of the bodies that the water moves, after this frame; absent if there are none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub bodies: Vec<BodyState>,
     /// Length of the substep that ended in the frame, seconds; 0 if there was none.
     #[serde(default, skip_serializing_if = "is_no_time")]
     pub substep: f64,

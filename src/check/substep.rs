@@ -38,7 +38,7 @@ pub fn check_flip(
     solver.load(frame, particles)?;
     let mut engine = of_flip(FlipState::new(scene, boundary, (frame, particles)));
     let traced = solver.trace_frame(Span::Only(which), &mut |begun, traced| {
-        engine.state.begun = begun;
+        engine.state.begin(begun);
         engine.observe(traced)
     })?;
     Ok(Checked {
@@ -63,8 +63,8 @@ pub fn check_pbf(
 ) -> Result<Checked, SolveError> {
     let mut solver = Pbf::new(context, scene, plan.clone(), uploaded, false)?;
     solver.load(frame, particles)?;
-    let absorbers = &particles.walls;
-    let substeps = scene.pbf_substeps(absorbers, frame, particles.max_speed())?;
+    let boundaries = (&particles.walls, &particles.bodies[..]);
+    let substeps = scene.pbf_substeps(boundaries, frame, particles.max_speed())?;
     let length = scene.shot.frame_seconds();
     let time_step = length / f64::from(substeps);
     let number = match which {
@@ -73,7 +73,7 @@ pub fn check_pbf(
     };
     let end = f64::from(frame) * length + f64::from(number) * time_step;
     let comparisons = [&[pbf::COMPARISONS][..], &effects::pbf()].concat();
-    let state = PbfState::new(scene, boundary, plan, absorbers, (end, time_step));
+    let state = PbfState::new(scene, boundary, plan, boundaries, (end, time_step));
     let mut engine = Engine::new(state, comparisons);
     let mut of_grid = scene.of_projection().map(|grid| {
         let mut state = FlipState::new(&grid, boundary, (frame, particles));
@@ -85,10 +85,14 @@ pub fn check_pbf(
         state.given_substep = Some(projected_substep(end - time_step, time_step, before));
         of_flip(state)
     });
-    let traced = solver.trace_frame(Span::Only(which), &mut |_, traced| match &mut of_grid {
-        Some(of_grid) if traced.has(BRICKS.name()) => of_grid.observe(traced),
-        _ => engine.observe(traced),
-    })?;
+    let traced =
+        solver.trace_frame(Span::Only(which), &mut |begun, traced| match &mut of_grid {
+            Some(of_grid) if traced.has(BRICKS.name()) => {
+                of_grid.state.begin(begun);
+                of_grid.observe(traced)
+            }
+            _ => engine.observe(traced),
+        })?;
     engine.state.add_whole(boundary, &mut engine.table);
     let mut table = of_grid.map_or_else(CheckTable::default, Engine::finish);
     table.absorb(engine.finish());

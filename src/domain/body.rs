@@ -115,6 +115,18 @@ impl MassProperties {
 }
 
 impl Body {
+    /// Adds `way` to all positions, metres.
+    pub fn carry(&mut self, way: DVec3) {
+        self.mass.centre += way;
+        if let Freedom::Hinge { at, .. } = &mut self.freedom {
+            *at += way;
+        }
+        for mooring in &mut self.moorings {
+            mooring.anchor += way;
+            mooring.at += way;
+        }
+    }
+
     /// Returns the state at the start.
     pub fn at_start(&self) -> BodyState {
         let [vx, vy, vz, wx, wy, wz] = self.velocity;
@@ -178,9 +190,7 @@ impl Body {
             }
             let towards = way / distance;
             let about = (at - state.centre).cross(towards);
-            let unit = [
-                towards.x, towards.y, towards.z, about.x, about.y, about.z,
-            ];
+            let unit = [towards.x, towards.y, towards.z, about.x, about.y, about.z];
             let approach = dot(&unit, &state.velocities());
             let give = dot(&unit, &product(&response, &unit));
             let Mooring {

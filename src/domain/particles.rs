@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-use super::{absorber::AbsorberStates, bounds::Bounds};
+use super::{absorber::AbsorberStates, body::BodyState, bounds::Bounds};
 
 /// Particles that a thread takes at a time: a task takes longer than to hand it over.
 pub const AT_ONCE: usize = 1 << 14;
@@ -26,6 +26,9 @@ pub struct Particles {
     pub attributes: BTreeMap<String, Vec<f32>>,
     /// State of absorbing walls from this time on; caches store it in their ledger.
     pub walls: AbsorberStates,
+    /// States of the bodies that the water moves, in the scene's order; caches store them in their
+    /// ledger.
+    pub bodies: Vec<BodyState>,
     /// Length of the substep that ended in this state, seconds; 0 if there was none. Caches store
     /// it in their ledger.
     pub substep: f64,
@@ -43,13 +46,16 @@ impl Particles {
     }
 
     /// Returns the particles with positions relative to the origin `to` instead of `from`, both in
-    /// world coordinates, metres. Positions are rounded to f32.
+    /// world coordinates, metres; bodies as well. Positions are rounded to f32.
     #[must_use]
     pub fn about(mut self, from: DVec3, to: DVec3) -> Self {
         if from != to {
             for p in &mut self.position {
                 let local = Vec3::from_array(*p).as_dvec3() + (from - to);
                 *p = local.as_vec3().to_array();
+            }
+            for body in &mut self.bodies {
+                body.centre += from - to;
             }
         }
         self

@@ -7,12 +7,12 @@ use std::path::Path;
 use glam::DVec3;
 
 use super::{
-    budget,
+    body, budget,
     document::Document,
     effects,
     fit::{comes_into, fits},
     grids, keep,
-    keys::{BoxSpec, DomainSpec, MeshSpec, SceneSpec, SolidSpec, SwarmSpec, WaterSpec},
+    keys::{BodySpec, BoxSpec, DomainSpec, MeshSpec, SceneSpec, SolidSpec, SwarmSpec, WaterSpec},
     moving_solid, no_slip, periodic, probe, sources, start_waves, wave_maker,
 };
 use swell_domain::{
@@ -82,10 +82,23 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
         spacing: lattice.spacing,
         shot: &shot,
     };
-    let (solids, moving_solids) = solids(doc, &spec.solid, &around)?;
+    let (solids, mut moving_solids) = solids(doc, &spec.solid, &around)?;
     let moving = (0..spec.solid.len()).filter(|&k| spec.solid[k].moves());
     let moving: Vec<usize> = moving.collect();
     periodic::check_solids(doc, periodic, &moving_solids, |k| moving[k])?;
+    let bodies = bodies(
+        doc,
+        base_dir,
+        &spec.body,
+        (lattice.spacing, moving_solids.len()),
+        &{
+            body::Surroundings {
+                domain: &domain,
+                periodic,
+                has_projection: solver.pbf().is_none_or(|pbf| pbf.grid_projection),
+            }
+        },
+    )?;
     let wave_makers = wave_maker::build_all(doc, &spec.wave_maker, &around)?;
     periodic::check_makers(doc, periodic, &wave_makers)?;
     let around = sources::Around {
@@ -130,7 +143,8 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
     let speeds = (wave_makers
         .iter()
         .map(|maker| maker.motion.peak_speed(0.0, duration)))
-    .chain((moving_solids.iter()).map(|solid| solid.peak_speed(0.0, duration)));
+    .chain((moving_solids.iter()).map(|solid| solid.peak_speed(&[], 0.0, duration)))
+    .chain((bodies.iter()).map(|body| body.peak_speed(&[], 0.0, 0.0)));
     let flip = solver.flip().or(unchosen.as_ref().and_then(Solver::flip));
     let scales = budget::Scales {
         fall: (2.0 * water.gravity.length() * domain.size().length()).sqrt(),
@@ -139,6 +153,7 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
         spacing: lattice.spacing,
         tolerance: flip.map_or(0.0, |flip| flip.pressure.tolerance),
     };
+    moving_solids.extend(bodies);
     let budget = budget::build(doc, &spec.budget, &shot, &solver, &scales)?;
     let scene = Scene {
         shot,
@@ -191,6 +206,30 @@ fn solids(
         moving.push(moving_solid::build(doc, &path, placed, spec, around)?);
     }
     Ok((solids, moving))
+}
+
+/// Builds the bodies, after `moving` moving solids, for particles `spacing` metres apart.
+fn bodies(
+    doc: &Document<'_>,
+    base_dir: &Path,
+    specs: &[BodySpec],
+    (spacing, moving): (f64, usize),
+    around: &body::Surroundings<'_>,
+) -> Result<Vec<MovingSolid>> {
+    let build = |(index, spec): (usize, &BodySpec)| {
+        let path = format!("body[{index}]");
+        if moving + index >= MAX_MOVING_SOLIDS {
+            let problem = format!("at most {MAX_MOVING_SOLIDS} solids and bodies can move");
+            return Err(doc.fault_of_plain(&format!("{path}.mesh"), problem));
+        }
+        let mesh = (&spec.placed(), spacing);
+        let placed = placed_mesh(doc, base_dir, &path, "mesh", mesh)?;
+        body::build(doc, index, placed, spec, around)
+    };
+    let bodies = specs.iter().enumerate().map(build);
+    let bodies = bodies.collect::<Result<Vec<_>>>()?;
+    body::check_apart(doc, &bodies)?;
+    Ok(bodies)
 }
 
 /// Reads the domain.

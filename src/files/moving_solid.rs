@@ -97,6 +97,7 @@ pub(super) fn build(
         slide,
         turn,
         track,
+        body: None,
     };
     check_way(doc, &solid, path, around.domain, around.shot)?;
     Ok(solid)
@@ -131,7 +132,7 @@ fn check_way(
         );
         return Err(doc.fault_of(&place, problem));
     }
-    let speed = solid.peak_speed(0.0, shot.duration());
+    let speed = solid.peak_speed(&[], 0.0, shot.duration());
     check_speed(speed).map_err(|problem| doc.fault_of_plain(&place, problem))?;
     let ball = |middle: DVec3, reach: f64| {
         let point = Bounds {

@@ -6,11 +6,11 @@ use toml::Table;
 
 use super::{
     axis::Axis,
-    keep,
+    body, keep,
     keys::{
-        AbsorptionSpec, BearerSpec, BoxSpec, DomainSpec, DrainSpec, EmitterSpec, GridsSpec,
-        KeepSpec, MeshSpec, PbfSpec, ProbeSpec, ScaleSpec, SceneSpec, SolidSpec, SolverSpec,
-        SwarmSpec, TrackSpec, WallMotionSpec, WaterSpec, WaveMakerSpec,
+        AbsorptionSpec, BearerSpec, BodySpec, BoxSpec, DomainSpec, DrainSpec, EmitterSpec,
+        GridsSpec, KeepSpec, MeshSpec, PbfSpec, ProbeSpec, ScaleSpec, SceneSpec, SolidSpec,
+        SolverSpec, SwarmSpec, TrackSpec, WallMotionSpec, WaterSpec, WaveMakerSpec,
     },
     toml_text::{table, to_toml},
 };
@@ -49,13 +49,18 @@ impl Writer<'_> {
     fn scene(&self) -> SceneSpec {
         let scene = self.scene;
         let still = scene.solids.iter().map(|solid| self.solid(solid));
-        let moving = scene.moving_solids.iter();
+        let moving = scene.moving_solids.iter().filter(|it| it.is_prescribed());
         SceneSpec {
             shot: scene.shot.clone(),
             domain: self.domain(),
             water: self.water(),
             solid: still
                 .chain(moving.map(|it| self.moving_solid(it)))
+                .collect(),
+            body: scene
+                .moving_solids
+                .iter()
+                .filter_map(|it| self.body(it))
                 .collect(),
             wave_maker: scene.wave_makers.iter().map(Into::into).collect(),
             emitter: scene.emitters.iter().map(|it| self.emitter(it)).collect(),
@@ -150,6 +155,11 @@ impl Writer<'_> {
             }),
             ..self.solid(&solid.placed)
         }
+    }
+
+    fn body(&self, solid: &MovingSolid) -> Option<BodySpec> {
+        let mesh = self.mesh(&solid.placed);
+        (solid.body.as_ref()).map(|it| body::written(it, mesh, self.scene.origin))
     }
 
     fn emitter(&self, emitter: &Emitter<Region>) -> EmitterSpec {

@@ -87,7 +87,7 @@ impl SortedWater {
     /// seconds.
     pub fn new(scene: &PbfScene, boundary: &Boundary, water: &Particles, time: f64) -> Self {
         let mut model = Model::new(scene, boundary);
-        model.stand(scene, time, 0.0);
+        model.stand(scene, &water.bodies, time, 0.0);
         let origin = scene.domain.min;
         let wide = |v: &[f32; 3]| Vec3::from_array(*v).as_dvec3();
         // The device holds positions in f32, relative to the same corner.

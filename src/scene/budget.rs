@@ -157,11 +157,11 @@ impl Budget {
 impl Scene {
     /// Bounds the speed that gravity, effects and moving boundaries give in frame `frame` to a
     /// particle of `speed`, m/s; at least a tenth of a spacing per frame. What absorbing walls add
-    /// to their own motion is not included.
+    /// to their own motion is not included; bodies count as they are at the start.
     pub fn reached_speed(&self, frame: u32, speed: f64) -> f64 {
         let length = self.shot.frame_seconds();
         let start = f64::from(frame.saturating_sub(1)) * length;
-        let push = self.peak_boundary_speed(&AbsorberStates::default(), start, start + length);
+        let push = self.peak_boundary_speed(&AbsorberStates::default(), &[], start, start + length);
         let least = LEAST_ENERGY_SPEED * self.particle_spacing() / length;
         let gained = self.water.gravity.length() * length + self.effects.push().gained(length);
         (speed + push + gained + self.effects.frees(self.grain())).max(least)

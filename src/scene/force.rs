@@ -20,7 +20,7 @@ impl Scene {
             Bearer::Solid(index) => (&self.solids[index].mesh, Pose::START),
             Bearer::MovingSolid(index) => {
                 let solid = &self.moving_solids[index];
-                (&solid.placed.mesh, solid.pose(time))
+                (&solid.placed.mesh, solid.pose(&[], time))
             }
             Bearer::Wall(wall) => return patches(&self.face(wall, absorbers, time), edge),
         };

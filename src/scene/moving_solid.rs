@@ -1,10 +1,12 @@
-//! Moving solids: a mesh that slides along a direction, turns about an axis, or both.
+//! Moving solids: a mesh that slides along a direction, turns about an axis, follows a track, or
+//! floats.
 
 use glam::{DQuat, DVec3};
 
 use super::{PlacedMesh, Scene, solid_track::Track};
 use swell_domain::{
     absorber::AbsorberStates,
+    body::{Body, BodyState},
     boundary::Boundary,
     mesh::TriangleMesh,
     motion::Motion,
@@ -14,7 +16,7 @@ use swell_domain::{
 /// Largest number of moving solids in a scene; a shader pass loops over all of them.
 pub const MAX_MOVING_SOLIDS: usize = 7;
 
-/// A solid that slides along a line, turns about an axis, or follows a track.
+/// A solid that slides along a line, turns about an axis, follows a track, or floats.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MovingSolid {
     /// Mesh at its initial placement.
@@ -25,6 +27,51 @@ pub struct MovingSolid {
     pub turn: Option<Turn>,
     /// Poses over time from a file or the scene, in place of both.
     pub track: Option<Track>,
+    /// What the water moves, in place of all of them.
+    pub body: Option<FreeBody>,
+}
+
+/// A moving solid that the water moves.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FreeBody {
+    /// Index among the scene's bodies, and of its state among theirs.
+    pub index: usize,
+    /// Mass, constraints and start.
+    pub body: Body,
+    /// Whether it meets walls, solids and other bodies.
+    pub collides: bool,
+    /// Distance from the centre of mass to the farthest vertex, metres.
+    pub reach: f64,
+    /// What its mass and spin were computed from, as written in the scene.
+    pub given: GivenMass,
+}
+
+/// A body's mass and spin as written in a scene; what is left out is `None`.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct GivenMass {
+    /// Density, kg/m³.
+    pub density: Option<f64>,
+    /// Mass, kg.
+    pub mass: Option<f64>,
+    /// Centre of mass, metres, in world coordinates.
+    pub centre: Option<[f64; 3]>,
+    /// Moments of inertia, kg m².
+    pub inertia: Option<[f64; 3]>,
+    /// Angular velocity, degrees/s.
+    pub spin: [f64; 3],
+}
+
+impl FreeBody {
+    /// Returns the body's state among `bodies`; at the start if they are not listed.
+    pub fn state(&self, bodies: &[BodyState]) -> BodyState {
+        (bodies.get(self.index).copied()).unwrap_or_else(|| self.body.at_start())
+    }
+
+    /// Bounds the speed of the body's points, m/s.
+    fn speed(&self, bodies: &[BodyState]) -> f64 {
+        let state = self.state(bodies);
+        state.velocity.length() + self.reach * state.spin.length()
+    }
 }
 
 /// Translation along a line.
@@ -72,13 +119,27 @@ impl MovingSolid {
         }
     }
 
-    /// Whether the solid may rotate.
-    pub fn turns(&self) -> bool {
-        self.turn.is_some() || self.track.is_some()
+    /// Returns whether its motion follows from the scene alone.
+    pub fn is_prescribed(&self) -> bool {
+        self.body.is_none()
     }
 
-    /// Returns the pose at time `t`, seconds.
-    pub fn pose(&self, t: f64) -> Pose {
+    /// Whether the solid may rotate.
+    pub fn turns(&self) -> bool {
+        self.turn.is_some() || self.track.is_some() || self.body.is_some()
+    }
+
+    /// Returns the pose at time `t`, seconds. A body moves on from its state among `bodies` without
+    /// forces.
+    pub fn pose(&self, bodies: &[BodyState], t: f64) -> Pose {
+        if let Some(it) = &self.body {
+            let state = it.state(bodies);
+            let length = t - state.time;
+            return it.body.pose(&match length {
+                0.0 => state,
+                length => it.body.moved(&state, length),
+            });
+        }
         if let Some(track) = &self.track {
             return track.pose(t);
         }
@@ -101,21 +162,26 @@ impl MovingSolid {
     }
 
     /// Returns the motion from the pose at `start` over `length` seconds.
-    pub fn passage(&self, start: f64, length: f64) -> Passage {
-        Passage::between(self.pose(start), self.pose(start + length), length)
+    pub fn passage(&self, bodies: &[BodyState], start: f64, length: f64) -> Passage {
+        let [before, after] = [start, start + length].map(|t| self.pose(bodies, t));
+        Passage::between(before, after, length)
     }
 
     /// Returns the motion over the `step` seconds that end at `time`; with a step of 0 the
     /// solid rests there.
-    pub fn passage_to(&self, time: f64, step: f64) -> Passage {
+    pub fn passage_to(&self, bodies: &[BodyState], time: f64, step: f64) -> Passage {
         match step {
-            0.0 => Passage::resting(self.pose(time)),
-            step => self.passage(time - step, step),
+            0.0 => Passage::resting(self.pose(bodies, time)),
+            step => self.passage(bodies, time - step, step),
         }
     }
 
-    /// Bounds the speed of the solid's points within `[t0, t1]`, m/s.
-    pub fn peak_speed(&self, t0: f64, t1: f64) -> f64 {
+    /// Bounds the speed of the solid's points within `[t0, t1]`, m/s; that of a body is its present
+    /// one.
+    pub fn peak_speed(&self, bodies: &[BodyState], t0: f64, t1: f64) -> f64 {
+        if let Some(body) = &self.body {
+            return body.speed(bodies);
+        }
         if let Some(track) = &self.track {
             return track.peak_speed(t0, t1);
         }
@@ -129,13 +195,39 @@ impl MovingSolid {
 }
 
 impl Scene {
+    /// Iterates over the bodies that the water moves.
+    pub fn bodies(&self) -> impl Iterator<Item = &FreeBody> {
+        self.moving_solids.iter().filter_map(|it| it.body.as_ref())
+    }
+
+    /// Whether the water moves any body.
+    pub fn has_bodies(&self) -> bool {
+        self.bodies().next().is_some()
+    }
+
+    /// Returns the states of the bodies at the start of the shot.
+    pub fn bodies_at_start(&self) -> Vec<BodyState> {
+        self.bodies().map(|it| it.body.at_start()).collect()
+    }
+
+    /// Bounds the speed of the bodies' points, m/s.
+    pub fn fastest_body(&self, bodies: &[BodyState]) -> f64 {
+        self.bodies().map(|it| it.speed(bodies)).fold(0.0, f64::max)
+    }
+
     /// Bounds the speed of wave makers, with what absorbing ones add to their own motion, and of
     /// moving solids within `[t0, t1]`, m/s.
-    pub fn peak_boundary_speed(&self, absorbers: &AbsorberStates, t0: f64, t1: f64) -> f64 {
+    pub fn peak_boundary_speed(
+        &self,
+        absorbers: &AbsorberStates,
+        bodies: &[BodyState],
+        t0: f64,
+        t1: f64,
+    ) -> f64 {
         let makers = self.makers(absorbers);
         let makers = makers.map(|(maker, absorber)| maker.peak_speed(absorber, t0, t1));
         let solids = self.moving_solids.iter();
-        let solids = solids.map(|solid| solid.peak_speed(t0, t1));
+        let solids = solids.map(|solid| solid.peak_speed(bodies, t0, t1));
         makers.chain(solids).fold(0.0, f64::max)
     }
 }
@@ -155,7 +247,13 @@ pub struct SolidSample {
 impl Scene {
     /// Returns the samples of `boundary` at `time`, those of static solids first. Samples of moving
     /// solids have their mean velocity over the last `step` seconds; with a step of 0 they rest.
-    pub fn solid_samples(&self, boundary: &Boundary, time: f64, step: f64) -> Vec<SolidSample> {
+    pub fn solid_samples(
+        &self,
+        boundary: &Boundary,
+        bodies: &[BodyState],
+        time: f64,
+        step: f64,
+    ) -> Vec<SolidSample> {
         let least = self.domain.min;
         let still = boundary.samples.iter().map(|sample| SolidSample {
             position: sample.position - least,
@@ -165,7 +263,7 @@ impl Scene {
         let mut all: Vec<_> = still.collect();
         let period = self.period();
         for (solid, samples) in self.moving_solids.iter().zip(&boundary.moving_samples) {
-            let passage = solid.passage_to(time, step);
+            let passage = solid.passage_to(bodies, time, step);
             let pose = passage.at(1.0);
             all.extend(samples.iter().map(|sample| {
                 let x = pose.place(sample.position);

@@ -52,6 +52,9 @@ impl Scene {
         for track in self.moving_solids.iter_mut().flat_map(|it| &mut it.track) {
             track.carry(way);
         }
+        for it in self.moving_solids.iter_mut().flat_map(|it| &mut it.body) {
+            it.body.carry(way);
+        }
         self.carry_sources(way, &carry);
         for probe in &mut self.probes {
             match &mut probe.kind {

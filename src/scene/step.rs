@@ -5,6 +5,7 @@ use glam::DVec3;
 use super::{FlipScene, PbfScene, Scene};
 use swell_domain::{
     absorber::AbsorberStates,
+    body::BodyState,
     bounds::{Bounds, FAR},
     budget::{Breach, Watched},
     particles::Particles,
@@ -205,7 +206,7 @@ impl PbfScene<'_> {
     /// If there are more than `max_substeps`.
     pub fn pbf_substeps(
         &self,
-        absorbers: &AbsorberStates,
+        (absorbers, bodies): (&AbsorberStates, &[BodyState]),
         frame: u32,
         speed: f64,
     ) -> Result<u32, Breach> {
@@ -217,7 +218,7 @@ impl PbfScene<'_> {
             .map(|(maker, absorber)| maker.peak_speed(absorber, start, start + length));
         let gained = self.water.gravity.length() * length + self.effects.push().gained(length);
         let solids = self.moving_solids.iter();
-        let solids = solids.map(|solid| solid.peak_speed(start, start + length));
+        let solids = solids.map(|solid| solid.peak_speed(bodies, start, start + length));
         let speed = wall.chain(solids).fold(speed + gained, f64::max);
         let wanted = (speed * length / (pbf.cfl * pbf.particle_spacing))
             .max(length / self.effects.longest_step(self.grain()).0);
@@ -250,7 +251,7 @@ impl FlipScene<'_> {
     /// If the frame has more than `max_substeps`.
     pub fn flip_substep(
         &self,
-        absorbers: &AbsorberStates,
+        (absorbers, bodies): (&AbsorberStates, &[BodyState]),
         frame: u32,
         start: f64,
         remaining: f64,
@@ -258,7 +259,8 @@ impl FlipScene<'_> {
         (done, before): (u32, f64),
     ) -> Result<(f64, Substep), Breach> {
         let flip = self.settings();
-        let fastest = speed.max(self.peak_boundary_speed(absorbers, start, start + remaining));
+        let push = self.peak_boundary_speed(absorbers, bodies, start, start + remaining);
+        let fastest = speed.max(push);
         let (gravity, push) = (self.water.gravity.length(), self.effects.push());
         // Solves v t + g t² = cfl Δx.
         let room = flip.cfl * flip.cell_size;

@@ -3,7 +3,9 @@
 
 use glam::{DQuat, DVec3};
 
-use swell_domain::{boundary::Boundary, pose::Passage, signed_distance::SignedDistance};
+use swell_domain::{
+    body::BodyState, boundary::Boundary, pose::Passage, signed_distance::SignedDistance,
+};
 use swell_gpu::program::Program;
 use swell_scene::Scene;
 
@@ -71,15 +73,27 @@ impl Movers {
             resting,
             origins: boundary.grids().map(|grid| grid.origin).collect(),
             reaches: solids
-                .map(|(solid, grid)| grid.reach(solid.pose(0.0).rest))
+                .map(|(solid, grid)| grid.reach(solid.pose(&[], 0.0).rest))
                 .collect(),
             statics,
         })
     }
 
+    /// Returns the number of the first body's grid among the solids'.
+    pub(super) fn first_body(&self, scene: &Scene) -> u32 {
+        let prescribed = scene.moving_solids.iter().filter(|it| it.is_prescribed());
+        (self.statics + prescribed.count()) as u32
+    }
+
     /// Uploads the poses at `start`, with the velocities that take them to their poses `length`
     /// seconds later.
-    pub(super) fn upload(&self, program: &Program, scene: &Scene, start: f64, length: f64) {
+    pub(super) fn upload(
+        &self,
+        program: &Program,
+        scene: &Scene,
+        bodies: &[BodyState],
+        (start, length): (f64, f64),
+    ) {
         let mut grids = self.resting;
         grids.length = length as f32;
         let identity = DQuat::IDENTITY.as_quat().to_array();
@@ -95,7 +109,7 @@ impl Movers {
                 velocity,
                 spin,
                 ..
-            } = solid.passage(start, length);
+            } = solid.passage(bodies, start, length);
             // A solid that does not rotate may have any reference point: its first node gives the
             // least rounding.
             let rest = match solid.turns() {

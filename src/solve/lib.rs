@@ -1,6 +1,7 @@
 //! GPU solvers: position-based fluids (PBF), FLIP, the pressure projection, effects and whitewater.
 
 mod air;
+pub mod bodies;
 pub mod boundary;
 pub mod buffers;
 mod by_method;
@@ -39,6 +40,9 @@ pub fn mirrors() -> Vec<Layout> {
         IterationControl::layout(),
         SurveyHead::layout(),
         params::DeviceBrick::layout(),
+        bodies::DeviceBody::layout(),
+        bodies::DeviceBodies::layout(),
+        bodies::BodyPair::layout(),
         PressurePhase::layout(),
         PressureControl::layout(),
         PressureControl64::layout(),

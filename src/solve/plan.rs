@@ -90,7 +90,7 @@ pub struct PlannedBuffer {
     /// Name and size.
     pub spec: BufferSpec,
     /// One of `pbf`, `flip`, `pressure`, `sort`, `solids`, `lists`, `probes`, `budget`, `emitters`,
-    /// or the name of an effect.
+    /// `bodies`, or the name of an effect.
     pub owner: &'static str,
     /// Whether FLIP scans this buffer for non-finite values at the end of a substep. Such values
     /// may not show up in any later result.
@@ -357,6 +357,12 @@ fn owner_of(pass: &'static str) -> &'static str {
     match pass {
         "pbf/boundary_work" | "flip/boundary_work" | "flip/find_not_finite" => "budget",
         "flip/let_in" => "emitters",
+        "flip/couple_bodies"
+        | "flip/carry_bodies"
+        | "pressure/push_bodies"
+        | "pressure/move_bodies"
+        | "pressure/couple"
+        | "pressure/carry_flux" => "bodies",
         _ => pass.split('/').next().unwrap_or(pass),
     }
 }

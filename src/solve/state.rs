@@ -10,6 +10,7 @@ use rayon::prelude::*;
 
 use swell_domain::{
     absorber::AbsorberStates,
+    body::BodyState,
     budget::{Breach, Watched},
     parallel,
     particles::{AT_ONCE, Particles},
@@ -130,6 +131,8 @@ pub(super) struct Carried {
     pub(super) ids: Arc<Ids>,
     /// State of the absorbing walls.
     pub(super) walls: AbsorberStates,
+    /// States of the bodies.
+    pub(super) bodies: Vec<BodyState>,
     /// Length of the last substep, seconds; 0 before the first.
     pub(super) substep: f64,
 }
@@ -139,6 +142,7 @@ impl Carried {
         Self {
             ids: Arc::new(Ids::new(&state.id)),
             walls: state.walls,
+            bodies: state.bodies.clone(),
             substep: state.substep,
         }
     }
@@ -170,6 +174,7 @@ impl Carried {
             velocity: places.collect(|k| velocity[k]),
             id: self.ids.all().to_vec(),
             walls: self.walls,
+            bodies: self.bodies.clone(),
             substep: self.substep,
             ..Particles::default()
         }

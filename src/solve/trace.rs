@@ -1,7 +1,7 @@
 //! Runs a substep dispatch by dispatch, so that each pass can be compared with its f64 reference
 //! pass.
 
-use swell_domain::{solver::Solver, substep::SubstepChoice};
+use swell_domain::{body::BodyState, solver::Solver, substep::SubstepChoice};
 use swell_gpu::{
     buffer::{Buf, Scalar, Windows},
     program::Program,
@@ -153,7 +153,7 @@ pub enum Span {
 }
 
 /// A substep that is being traced.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Begun {
     /// Number of the substep, counted from 1.
     pub number: u32,
@@ -161,10 +161,12 @@ pub struct Begun {
     pub elapsed: f64,
     /// Length of the previous substep, seconds; 0 if there was none.
     pub before: f64,
+    /// Bodies as the substep began.
+    pub bodies: Vec<BodyState>,
 }
 
 /// Callback that receives each dispatch of a trace.
-pub type Observe<'a> = dyn FnMut(Begun, Traced<'_>) -> Result<(), SolveError> + 'a;
+pub type Observe<'a> = dyn FnMut(&Begun, Traced<'_>) -> Result<(), SolveError> + 'a;
 
 /// A solver whose frames can be run dispatch by dispatch.
 pub trait TraceFrame: Solver {

@@ -282,9 +282,9 @@ impl Whitewater {
         self.program.upload(PARAMS, 0, &[params]);
         if let (Some(movers), Some(boundary)) = (&self.movers, &self.boundary) {
             let (program, scene) = (&self.program, &self.scene);
-            movers.upload(program, scene, time - seconds, seconds);
-            let now = (time, seconds);
-            samples::upload_samples(boundary, program, scene, &self.plan, &self.calibration, now);
+            movers.upload(program, scene, &water.bodies, (time - seconds, seconds));
+            let samples = scene.solid_samples(boundary, &water.bodies, time, seconds);
+            samples::upload_samples(&samples, program, scene, &self.plan, &self.calibration);
         }
         self.survey.run(&self.program, self.timer.as_mut())?;
         let (potential, order) = (self.program).download((POTENTIAL.first(n), ORDER.first(n)))?;

@@ -142,7 +142,7 @@ impl Branch {
         check_keys(from, &cache, scene)?;
         let origin = cache.manifest().origin.into();
         let mut particles = cache.read(from.frame)?.about(origin, scene.origin);
-        let mut clock = entry.clock;
+        let mut clock = entry.clock.clone();
         let mut notes = Vec::new();
         if clock.walls != AbsorberStates::default() {
             let baked = super::baked_scene(&cache, &from.directory);
@@ -153,7 +153,14 @@ impl Branch {
             (clock.walls, notes) = scene.carried(&baked, &clock.walls);
             particles.walls = clock.walls;
         }
-        check_walls(from, clock, scene, &particles)?;
+        if particles.bodies.len() != scene.bodies().count() {
+            particles.bodies = scene.bodies_at_start();
+            notes.push(
+                "bodies begin where the scene puts them: the frame has another number".to_owned(),
+            );
+        }
+        clock.bodies.clone_from(&particles.bodies);
+        check_walls(from, &clock, scene, &particles)?;
         let manifest = cache.manifest();
         let parent = Parent {
             shot: manifest.shot.clone(),
@@ -187,7 +194,7 @@ pub(super) fn note_covered(scene: &Scene, start: &Start, time: f64) -> Option<St
     let boundary = &start.boundary;
     let still = boundary.distance.iter().map(|field| (field, Pose::START));
     let solids = boundary.moving.iter().zip(&scene.moving_solids);
-    let moving = solids.map(|(field, solid)| (field, solid.pose(time)));
+    let moving = solids.map(|(field, solid)| (field, solid.pose(&start.particles.bodies, time)));
     let fields: Vec<_> = still.chain(moving).collect();
     let is_covered = |x: &&[f32; 3]| {
         let x = Vec3::from_array(**x).as_dvec3();
@@ -245,7 +252,7 @@ fn check_keys(from: &BranchPoint, cache: &CacheReader, scene: &Scene) -> Result<
 /// to the solver, whose walls push them back.
 fn check_walls(
     from: &BranchPoint,
-    clock: Clock,
+    clock: &Clock,
     scene: &Scene,
     particles: &Particles,
 ) -> Result<(), BranchError> {

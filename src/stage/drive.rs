@@ -234,10 +234,11 @@ impl<'a> Drive<'a> {
             return Ok(None);
         };
         let scene = self.scene;
+        let bodies = particles.bodies.clone();
         let solids = Solids {
             still: it.still.as_ref(),
             moving: &it.moving,
-            pose: &|index, seconds| scene.moving_solids[index].pose(seconds),
+            pose: &|index, seconds| scene.moving_solids[index].pose(&bodies, seconds),
         };
         let (frame, next_id) = (self.ahead.frame, &mut self.next_id);
         let exchange = it.sources.exchange(frame, &solids, particles, next_id);

@@ -70,6 +70,7 @@ impl Start {
             }
         };
         let (mut particles, mut removed) = (fill.particles, fill.removed);
+        particles.bodies = scene.bodies_at_start();
         scene.move_with_waves(&particles.position, &mut particles.velocity);
         for swarm in &scene.water.particles {
             for at in &swarm.at {

@@ -187,7 +187,7 @@ impl Finder<'_> {
         }
     }
 
-    fn observe(&mut self, begun: Begun, traced: Traced<'_>) -> Result<(), SolveError> {
+    fn observe(&mut self, begun: &Begun, traced: Traced<'_>) -> Result<(), SolveError> {
         if traced.point == TracePoint::Before {
             return Ok(());
         }

@@ -45,7 +45,7 @@ impl<'a> Watch<'a> {
         let scene = self.scene;
         let report = scene.report(state, [].into_iter());
         self.before.energy = scene.total_energy(state.len(), &report);
-        self.before.speed = state.max_speed();
+        self.before.speed = state.max_speed().max(scene.fastest_body(&state.bodies));
         let more = state.len() as f64 - self.id.len() as f64;
         if let Some(volume) = &mut self.before.start_volume {
             *volume += more * scene.particle_spacing().powi(3);
@@ -81,7 +81,8 @@ impl<'a> Watch<'a> {
         let budget = &scene.budget;
         budget.check_frame(scene, self.frame, n, report, &self.before)?;
         self.before.energy = scene.total_energy(n, report);
-        self.before.speed = report.max_speed;
+        let fastest = scene.fastest_body(&particles.bodies);
+        self.before.speed = report.max_speed.max(fastest);
         self.frame += 1;
         Ok(())
     }

@@ -66,7 +66,7 @@ impl FlipState {
         let solids = self.scene.moving_solids.iter().zip(&self.boundary.moving);
         let turned = solids.filter(|(solid, _)| solid.turns());
         let turned = turned.map(|(solid, grid)| {
-            let pose = solid.pose(self.elements().substep.start);
+            let pose = solid.pose(&self.bodies, self.elements().substep.start);
             let centre = (pose.centre - origin).length();
             TURNED.of([placed, grid.reach(pose.rest), centre])
         });
@@ -88,7 +88,7 @@ impl FlipState {
             moving_samples: Vec::new(),
         };
         let model = Model::new(&self.model.scene, &boundary);
-        let step = model.step(&self.elements().substep, &self.absorbers);
+        let step = model.step(&self.elements().substep, &self.absorbers, &self.bodies);
         reference_cut_cells(&model, &step, &self.elements().bricks)
     }
 }

@@ -15,7 +15,8 @@ use std::collections::BTreeMap;
 use glam::DVec3;
 
 use swell_domain::{
-    absorber::AbsorberStates, boundary::Boundary, particles::Particles, poisson::FLUID,
+    absorber::AbsorberStates, body::BodyState, boundary::Boundary, particles::Particles,
+    poisson::FLUID,
 };
 use swell_reference::{
     flip::{FlipSubstep, GridTransfer, Model, OpenSpace, Sorted, is_filling},
@@ -98,6 +99,8 @@ pub(crate) struct FlipState {
     pub(super) absorbers: AbsorberStates,
     frame: u32,
     pub(super) begun: Begun,
+    /// Bodies as the device has them in the present part of the substep.
+    pub(super) bodies: Vec<BodyState>,
     /// The substep, if it does not follow from the survey: that of a projection for another solver.
     pub(super) given_substep: Option<Substep>,
     elements: Option<Elements>,
@@ -147,6 +150,7 @@ impl FlipState {
             absorbers: particles.walls,
             frame,
             begun: Begun::default(),
+            bodies: particles.bodies.clone(),
             given_substep: None,
             elements: None,
             sorted: None,
@@ -162,6 +166,14 @@ impl FlipState {
 
     pub(super) fn elements(&self) -> &Elements {
         self.elements.as_ref().expect("after flip/survey")
+    }
+
+    /// Takes over what is known when a substep begins.
+    pub(super) fn begin(&mut self, begun: &Begun) {
+        if self.begun != *begun {
+            self.bodies.clone_from(&begun.bodies);
+            self.begun = begun.clone();
+        }
     }
 
     fn is_periodic(&self) -> bool {
@@ -188,7 +200,8 @@ impl FlipState {
     }
 
     pub(super) fn step(&self) -> FlipSubstep<'_> {
-        self.model.step(&self.elements().substep, &self.absorbers)
+        self.model
+            .step(&self.elements().substep, &self.absorbers, &self.bodies)
     }
 
     /// Returns [`PLACE`], the rounding error of a position in cells.

@@ -80,6 +80,7 @@ pub(super) fn survey(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
         number,
         elapsed,
         before,
+        ..
     } = state.begun;
     let length = state.scene.shot.frame_seconds();
     let start = f64::from(state.frame) * length + elapsed;
@@ -88,7 +89,7 @@ pub(super) fn survey(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
         Some(substep) => substep,
         None => {
             (state.scene.flip_substep(
-                &state.absorbers,
+                (&state.absorbers, &state.bodies),
                 frame,
                 start,
                 remaining,
@@ -99,7 +100,8 @@ pub(super) fn survey(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
         }
     };
     let flags: Vec<bool> = found.iter().map(|&flag| flag != 0).collect();
-    let bricks = (state.model).bricks(&flags, &state.model.step(&substep, &state.absorbers));
+    let step = (state.model).step(&substep, &state.absorbers, &state.bodies);
+    let bricks = state.model.bricks(&flags, &step);
     state.elements = Some(Elements {
         cells: (CELLS * (bricks.active + 1)) as usize,
         stride: 0,

@@ -10,7 +10,7 @@ mod work;
 
 use glam::DVec3;
 
-use swell_domain::{absorber::AbsorberStates, boundary::Boundary};
+use swell_domain::{absorber::AbsorberStates, body::BodyState, boundary::Boundary};
 use swell_reference::{
     neighbors::Neighbors,
     pbf::{Model, Substep, passes::Inputs},
@@ -94,6 +94,8 @@ pub(super) struct PbfState {
     plan: Plan,
     lists: Lists,
     whole: Whole,
+    /// Bodies that the model's solids stand for.
+    bodies: Vec<BodyState>,
     /// Whether the velocities have been updated: later passes measure the frame's end.
     is_over: bool,
 }
@@ -112,11 +114,11 @@ impl PbfState {
         scene: &PbfScene,
         boundary: &Boundary,
         plan: Plan,
-        absorbers: &AbsorberStates,
+        (absorbers, bodies): (&AbsorberStates, &[BodyState]),
         (end, time_step): (f64, f64),
     ) -> Self {
         let mut model = Model::new(scene, boundary);
-        model.stand(scene, end, time_step);
+        model.stand(scene, bodies, end, time_step);
         Self {
             scene: scene.to_owned_scene(),
             model,
@@ -126,6 +128,7 @@ impl PbfState {
             plan,
             whole: Whole::default(),
             is_over: false,
+            bodies: bodies.to_vec(),
         }
     }
 

@@ -63,7 +63,7 @@ impl PbfState {
         };
         let n = self.particles();
         let mut model = Model::new(&self.scene, boundary);
-        model.stand(&self.scene, self.substep.time, 0.0);
+        model.stand(&self.scene, &self.bodies, self.substep.time, 0.0);
         // The GPU rounds in each iteration. Moving only the start would not do: an iteration that
         // converges forgets it, and the remaining error is that of the last iterations.
         let solved = |moves: &dyn Fn(u32, usize) -> DVec3| {

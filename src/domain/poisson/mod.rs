@@ -10,7 +10,10 @@ pub mod cases;
 
 use rayon::prelude::*;
 
-use super::bricks::{Bricks, CELLS, EDGE};
+use super::{
+    body::{Six, dot, product},
+    bricks::{Bricks, CELLS, EDGE},
+};
 
 /// Kind of a cell without water.
 pub const AIR: u32 = 0;
@@ -117,6 +120,40 @@ pub struct System {
     pub coefficient: Vec<[f64; 6]>,
     /// Elements of water without an open face.
     pub dropped: Vec<u32>,
+    /// Bodies that the pressure moves: the matrix holds J^T R J of each.
+    pub bodies: Vec<Coupling>,
+}
+
+/// A body that the pressure moves (Batty, Bertails and Bridson 2007).
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Coupling {
+    /// Rows of cells that its surface cuts.
+    pub row: Vec<u32>,
+    /// J: how the pressure of each of these cells pushes it, and how its velocities push water out
+    /// of the cell; area over Δx², then moment about its centre of mass over Δx², metres.
+    pub push: Vec<Six>,
+    /// R: the change of its velocities for each sum of q, rows of six.
+    pub response: [Six; 6],
+}
+
+impl Coupling {
+    /// Returns the change of the body's velocities by q of each row, m/s and rad/s.
+    pub fn change(&self, q: &[f64]) -> Six {
+        let mut sum = [0.0; 6];
+        for (&row, push) in self.row.iter().zip(&self.push) {
+            for (sum, push) in sum.iter_mut().zip(push) {
+                *sum += push * q[row as usize];
+            }
+        }
+        product(&self.response, &sum)
+    }
+
+    /// Adds the flux by a change of the body's velocities to each of its rows.
+    pub fn add_flux(&self, change: &Six, flux: &mut [f64]) {
+        for (&row, push) in self.row.iter().zip(&self.push) {
+            flux[row as usize] += dot(push, change);
+        }
+    }
 }
 
 impl System {
@@ -215,6 +252,15 @@ impl System {
     /// Multiplies the matrix by `x`, written in differences so that a smooth `x` loses no digits:
     /// the f64 reference of `shaders/pressure/multiply.wgsl`.
     pub fn apply(&self, x: &[f64]) -> Vec<f64> {
+        let mut product = self.apply_water(x);
+        for body in &self.bodies {
+            body.add_flux(&body.change(x), &mut product);
+        }
+        product
+    }
+
+    /// Multiplies the matrix without its bodies by `x`.
+    pub fn apply_water(&self, x: &[f64]) -> Vec<f64> {
         (0..x.len())
             .into_par_iter()
             .with_min_len(GRAIN)

@@ -101,8 +101,9 @@ impl<'a> RunView<'a> {
         let boundary = &self.start.boundary;
         let still = boundary.distance.iter().map(|solid| -solid.sample(at));
         let movers = boundary.moving.iter().zip(&self.scene.moving_solids);
-        let moving =
-            movers.map(|(distance, solid)| -distance.sample(solid.pose(self.time()).back(at)));
+        let moving = movers.map(|(distance, solid)| {
+            -distance.sample(solid.pose(&self.state.bodies, self.time()).back(at))
+        });
         still.chain(moving).fold(f64::NEG_INFINITY, f64::max)
     }
 }

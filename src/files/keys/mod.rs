@@ -6,6 +6,7 @@
 //! (`super::write`), the comparison on resume (`super::difference`), and the reference page
 //! ([`page`], printed by `swell keys`).
 
+mod body;
 pub(super) mod budget;
 mod motion;
 mod outputs;
@@ -20,6 +21,7 @@ use super::{declare::Keyed, key::Key, look, tolerance, whitewater};
 
 pub use page::page;
 
+pub(super) use body::{BodySpec, DEGREES, HingeSpec, MooringSpec};
 pub(super) use budget::BudgetSpec;
 pub(super) use motion::{MotionKind, SolidMotionSpec, TrackSpec, TurnSpec, WallMotionSpec};
 pub(super) use outputs::{

@@ -12,6 +12,7 @@ use super::{
         declare::{Keyed, keys},
         key::{Interval, Key, words},
     },
+    body::BodySpec,
     budget::BudgetSpec,
     motion::{SolidMotionSpec, TrackSpec, TurnSpec, WallMotionSpec},
     outputs::{GridsSpec, KeepSpec, ProbeSpec},
@@ -28,6 +29,8 @@ keys! { struct SceneSpec {
         .about("The water and where it is at the start"),
     #[serde(default)]
     solid: Vec<SolidSpec> = tables().about("What the water meets: meshes, at rest or in motion"),
+    #[serde(default)]
+    body: Vec<BodySpec> = tables().about("What floats: meshes that the water moves"),
     #[serde(default)]
     wave_maker: Vec<WaveMakerSpec> = tables().about("Walls of the domain that move inward"),
     #[serde(default)]
@@ -62,7 +65,7 @@ keys! { struct SceneSpec {
 pub(super) const COORDINATE: Interval = -1e6..=1e6;
 
 /// Gravity, m/s², and velocities of individual particles, m/s.
-const VECTOR: Interval = -1e4..=1e4;
+pub(super) const VECTOR: Interval = -1e4..=1e4;
 
 keys! { fields of Shot {
     name: String = file_stem()
@@ -147,27 +150,27 @@ keys! { struct BoxSpec {
         .about("greatest corner"),
 } }
 
-const fn blake3(name: &'static str) -> Key {
+pub(super) const fn blake3(name: &'static str) -> Key {
     Key::text(name, "the BLAKE3 of the file in hex, or nothing")
         .absent()
         .about("the mesh is refused where its file has another; a cache's scene has it")
 }
 
-const fn translate(name: &'static str) -> Key {
+pub(super) const fn translate(name: &'static str) -> Key {
     Key::vector(name, 3, -1e9..=1e9)
         .unit("metres")
         .default("[0.0, 0.0, 0.0]")
         .about("where the file's origin goes, after scale and rotation")
 }
 
-const fn rotate(name: &'static str) -> Key {
+pub(super) const fn rotate(name: &'static str) -> Key {
     Key::vector(name, 3, -1e6..=1e6)
         .unit("degrees about x, then y, then z")
         .default("[0.0, 0.0, 0.0]")
         .about("rotation, as \"XYZ Euler\" means in Blender and Houdini")
 }
 
-const fn scale(name: &'static str) -> Key {
+pub(super) const fn scale(name: &'static str) -> Key {
     Key::scale(name, 1e-6..=1e6)
         .default("1.0")
         .about("metres per unit of the file, for all axes or each")

@@ -5,6 +5,7 @@
 //! (see [`planes`]). A function with the name of a GPU pass is its reference pass; where the GPU
 //! splits a pass for speed, one function covers both halves. [`Flip`] runs whole frames.
 
+mod bodies;
 pub mod effects;
 mod gaps;
 mod grid;
@@ -20,6 +21,7 @@ mod to_particles;
 mod wall_friction;
 mod water;
 
+pub use bodies::{BodyCells, carry_bodies, couple_bodies};
 pub use gaps::{Gaps, close_gaps};
 pub use grid::planes;
 pub use model::{FlipSubstep, Model};

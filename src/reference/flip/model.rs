@@ -7,6 +7,7 @@ pub(super) use swell_domain::flip::ON_FACE;
 use swell_domain::flip::open_extent;
 use swell_domain::{
     absorber::AbsorberStates,
+    body::BodyState,
     boundary::Boundary,
     bounds::Bounds,
     bricks::{Bricks, EDGE, table_dims},
@@ -146,8 +147,13 @@ impl Model {
         Bricks::periodic(cells, periodic, &is_wet, reach, 1)
     }
 
-    /// Returns the parameters of `substep`, in which absorbing walls have these states.
-    pub fn step(&self, substep: &Substep, absorbers: &AbsorberStates) -> FlipSubstep<'_> {
+    /// Returns the parameters of `substep`, in which absorbing walls and bodies have these states.
+    pub fn step(
+        &self,
+        substep: &Substep,
+        absorbers: &AbsorberStates,
+        bodies: &[BodyState],
+    ) -> FlipSubstep<'_> {
         let Substep {
             start,
             length,
@@ -171,14 +177,21 @@ impl Model {
             ],
             pic_blend: self.scene.substep_pic_blend(length),
             layers: layers(substep.displacement),
-            solids: self.solids_at(start, length),
+            solids: self.solids_at(bodies, start, length),
         }
     }
 
-    fn solids_at(&self, start: f64, length: f64) -> Vec<Solid<'_>> {
+    /// Returns the solids on their way through a substep.
+    pub(super) fn solids_at(
+        &self,
+        bodies: &[BodyState],
+        start: f64,
+        length: f64,
+    ) -> Vec<Solid<'_>> {
         let least = self.scene.domain.min;
         let moving = (self.scene.moving_solids.iter()).map(|solid| {
-            let [before, after] = [start, start + length].map(|t| solid.pose(t).moved(-least));
+            let [before, after] =
+                [start, start + length].map(|t| solid.pose(bodies, t).moved(-least));
             Passage::between(before, after, length)
         });
         let passages =

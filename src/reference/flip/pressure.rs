@@ -4,10 +4,12 @@
 use glam::DVec3;
 
 use super::{
-    Centers, Model, OpenSpace,
+    BodyCells, Centers, Model, OpenSpace,
+    bodies::{add_bodies, carry_flux},
     grid::{along, per_cell, planes},
 };
 use swell_domain::{
+    body::Six,
     bricks::Bricks,
     poisson::{AIR, Cells, FLUID, System},
 };
@@ -20,6 +22,9 @@ pub struct Waters<'a> {
     /// Open fractions of the lower faces, as planes.
     open: Vec<f64>,
     distance: Option<&'a [f64]>,
+    /// Σ ± (1 − f) u_solid of each cell, m/s.
+    flux: Vec<f64>,
+    bodies: &'a [BodyCells],
 }
 
 impl<'a> Waters<'a> {
@@ -35,7 +40,25 @@ impl<'a> Waters<'a> {
             space,
             open: planes(&space.open),
             distance: model.has_ghost_fluid().then_some(&centers.distance),
+            flux: space.solid_flux.clone(),
+            bodies: &[],
         }
+    }
+
+    /// Lets the pressure move bodies.
+    #[must_use]
+    pub fn with_bodies(self, bodies: &'a [BodyCells]) -> Self {
+        Self { bodies, ..self }
+    }
+
+    /// Adds to the solids' flux that of changes of the bodies' velocities.
+    pub(super) fn carry_flux(&mut self, changes: &[Six]) {
+        carry_flux(self.bodies, changes, &mut self.flux);
+    }
+
+    /// Returns the solids' flux out of each cell, m/s.
+    pub(super) fn flux(&self) -> &[f64] {
+        &self.flux
     }
 
     /// Returns the inputs in the form that [`System::new`] takes.
@@ -48,14 +71,16 @@ impl<'a> Waters<'a> {
         }
     }
 
-    /// Reference pass of `pressure/build_system`.
+    /// Reference pass of `pressure/build_system`, with the bodies that the pressure moves.
     pub fn system(&self) -> System {
-        System::new(self.cells())
+        let mut system = System::new(self.cells());
+        add_bodies(self.bodies, self.space.kind.len(), &mut system);
+        system
     }
 
     /// Reference pass of `pressure/divergence`: −(Σ ± f u + solid flux) for each row, m/s.
     pub fn divergence(&self, system: &System, velocity: &[DVec3]) -> Vec<f64> {
-        system.rhs(self.cells(), &planes(velocity), &self.space.solid_flux)
+        system.rhs(self.cells(), &planes(velocity), &self.flux)
     }
 
     /// Converts values per row to values per element; 0 where there is no row.

@@ -7,7 +7,7 @@ use crate::{
     ReferenceError, Timings,
     poisson::{self, gradients::Solution},
 };
-use swell_domain::{poisson::System, solver::Projection};
+use swell_domain::{body::Six, poisson::System, solver::Projection};
 
 /// Result of a substep's projection.
 #[derive(Clone, Debug, PartialEq)]
@@ -24,6 +24,8 @@ pub struct Projected {
     pub incompatible: f64,
     /// Largest |∇·u| in a cell with a row, before and after the projection, 1/s.
     pub divergence: [f64; 2],
+    /// Changes of the bodies' velocities, m/s and rad/s.
+    pub changes: Vec<Six>,
 }
 
 impl Projected {
@@ -47,7 +49,7 @@ pub(super) fn project(
     model: &Model,
     timings: &mut Timings,
     factor_budget: u64,
-    waters: &Waters<'_>,
+    waters: &mut Waters<'_>,
     centers: Option<&Centers>,
     faces: &mut Faces,
 ) -> Result<(Projected, Option<Vec<DVec3>>), ReferenceError> {
@@ -61,12 +63,25 @@ pub(super) fn project(
         &waters.by_element(&system, &solution.x),
         &mut faces.velocity,
     );
+    let changes: Vec<Six> = system
+        .bodies
+        .iter()
+        .map(|it| it.change(&solution.x))
+        .collect();
+    waters.carry_flux(&changes);
     let after = waters.divergence(&system, &faces.velocity);
     let corrected = centers.filter(|_| model.settings().density_correction);
-    let correction = corrected.map(|centers| {
-        let source = density_source(model, &system, centers);
-        timings.time("pressure/solve", || solver.solve(&source))
+    let correction = corrected.map(|centers| -> Result<Solution, ReferenceError> {
+        // Bodies stand still in the correction.
+        let still = System {
+            bodies: Vec::new(),
+            ..system.clone()
+        };
+        let source = density_source(model, &still, centers);
+        let solver = poisson::Solver::new(&still, factor_budget)?;
+        Ok(timings.time("pressure/solve", || solver.solve(&source)))
     });
+    let correction: Option<Solution> = correction.transpose()?;
     let displacement = (correction.as_ref())
         .map(|correction| waters.displace(&waters.by_element(&system, &correction.x)));
     let means = solver.pockets().iter().map(|pocket| {
@@ -81,6 +96,7 @@ pub(super) fn project(
         correction,
         pockets,
         incompatible,
+        changes,
         system,
     };
     Ok((projected, displacement))

@@ -3,8 +3,8 @@
 use glam::{DMat3, DVec3, Vec3};
 
 use super::{
-    Centers, Cloud, Faces, FlipSubstep, Gaps, GridTransfer, Model, OpenSpace, Sorted, Waters,
-    advect, aim, assign_cells, close_gaps, cut_cells,
+    BodyCells, Centers, Cloud, Faces, FlipSubstep, Gaps, GridTransfer, Model, OpenSpace, Sorted,
+    Waters, advect, aim, assign_cells, carry_bodies, close_gaps, couple_bodies, cut_cells,
     effects::{self, FaceInputs, Flying},
     extrapolate, find_buried, find_change, find_depth, find_excess, find_water, gather_centers,
     gather_faces, grid_to_particle, is_filling, let_in,
@@ -13,6 +13,7 @@ use super::{
 };
 use crate::{ReferenceError, Timings};
 use swell_domain::{
+    body::BodyState,
     boundary::Boundary,
     bricks::Bricks,
     budget::Breach,
@@ -72,6 +73,12 @@ pub struct Trace {
     pub is_short: bool,
     /// Pressure by element, Pa; 0 where there is no water.
     pub pressure: Vec<f64>,
+    /// Σ ± (1 − f) u_solid of each cell after the projections, m/s.
+    pub solid_flux: Vec<f64>,
+    /// Cells that bodies touch.
+    pub coupled: Vec<BodyCells>,
+    /// Bodies at the substep's start, with the velocities that they move with.
+    pub bodies: Vec<BodyState>,
     /// Displacements of the density correction at the lower faces, metres, if it is on.
     pub displacement: Option<Vec<DVec3>>,
     /// Values transferred from the grid to the particles, in the order of `sorted`, before the
@@ -162,7 +169,8 @@ impl Flip {
             state,
             ..
         } = self;
-        let step = model.step(substep, &state.walls);
+        let before = model.predicted(&state.bodies, substep);
+        let mut step = model.step(substep, &state.walls, &before);
         let (bricks, mut sorted) = timings.time("flip/reorder", || {
             let bricks = model.bricks(is_wet, &step);
             let cell = assign_cells(model, &bricks, &cloud.position);
@@ -232,9 +240,18 @@ impl Flip {
             old: &faces.change,
         };
         effects::on_faces(&model.scene.effects, water, &mut faces.velocity, timings);
+        let coupled = timings.time("flip/couple_bodies", || {
+            couple_bodies(model, &step, &bricks, &before)
+        });
         let waters = Waters::new(model, &bricks, &space, &centers);
-        let project = |centers, faces: &mut Faces, timings: &mut Timings| {
-            project(model, timings, *factor_budget, &waters, centers, faces)
+        let mut waters = waters.with_bodies(&coupled);
+        let mut project = |centers, faces: &mut Faces, timings: &mut Timings| {
+            let found = project(model, timings, *factor_budget, &mut waters, centers, faces)?;
+            if !before.is_empty() {
+                let bodies = (&before[..], &found.0.changes[..]);
+                carry_bodies(model, &step, &bricks, &space, bodies, &mut faces.velocity);
+            }
+            Ok::<_, ReferenceError>(found)
         };
         let (mut earlier, mut is_short) = (None, false);
         if acts_between {
@@ -251,6 +268,14 @@ impl Flip {
             is_short = effects::between_projections(named, water, &mut faces.velocity, timings);
         }
         let (projected, displacement) = project(Some(&centers), &mut faces, timings)?;
+        let changes = [earlier.as_ref(), Some(&projected)].into_iter().flatten();
+        let mut bodies = before.clone();
+        for projected in changes {
+            for (state, change) in bodies.iter_mut().zip(&projected.changes) {
+                *state = state.sped_up(change);
+            }
+        }
+        step.solids = model.solids_at(&bodies, step.start, step.length);
         timings.time("flip/extrapolate", || {
             find_change(model, &bricks, &space, &mut faces);
             for layer in 2..=step.layers as u32 {
@@ -280,6 +305,9 @@ impl Flip {
             (pressure.iter_mut().zip(before)).for_each(|(now, before)| *now += before);
         }
         Ok(Trace {
+            solid_flux: waters.flux().to_vec(),
+            bodies,
+            coupled: coupled.clone(),
             pressure: pressure.into_iter().map(|q| scale * q).collect(),
             earlier,
             is_short,
@@ -321,7 +349,7 @@ impl Flip {
                 substep.length,
             )?;
         }
-        let step = self.model.step(substep, &self.state.walls);
+        let step = self.model.step(substep, &self.state.walls, &trace.bodies);
         let taken = |change: &DVec3| (-*change / substep.kick).as_vec3().to_array();
         self.field = Some(PressureField {
             is_buried: find_buried(&step, &trace.bricks, &trace.space),
@@ -331,6 +359,11 @@ impl Flip {
             taken: trace.faces.change.iter().map(taken).collect(),
         });
         Ok(trace)
+    }
+
+    /// Returns the states of the bodies.
+    pub fn bodies(&self) -> &[BodyState] {
+        &self.state.bodies
     }
 
     /// Copies the state of absorbing walls from `state`.
@@ -359,7 +392,7 @@ impl Flip {
         }
         let mut trace = self.judged_substep((frame, number), cloud, &surveyed.is_wet, substep)?;
         trace.add_to(all);
-        let step = self.model.step(substep, &self.state.walls);
+        let step = self.model.step(substep, &self.state.walls, &trace.bodies);
         let work = self.model.boundary_work(&step, &trace);
         let order = by_id(&trace.sorted.cloud);
         let is_drop = &trace.given.is_drop;
@@ -370,6 +403,7 @@ impl Flip {
             (cloud.position[slot], cloud.velocity[slot]) = (aimed[k], trace.given.velocity[k]);
         }
         let is_drop = order.iter().map(|&k| trace.given.is_drop[k]);
+        self.state.bodies = self.model.moved(&trace.bodies, substep.length);
         Ok((is_drop.collect(), work))
     }
 
@@ -396,7 +430,7 @@ impl Flip {
                 return Err(breach.in_substep(report.substeps.max(1)).into());
             }
             let (wanted, substep) = (self.model.scene).flip_substep(
-                &self.state.walls,
+                (&self.state.walls, &self.state.bodies),
                 frame,
                 start + elapsed,
                 length - elapsed,
@@ -406,7 +440,7 @@ impl Flip {
             report.substeps += 1;
             let number = (frame, report.substeps);
             let trace = self.judged_substep(number, cloud, &surveyed.is_wet, &substep)?;
-            let step = self.model.step(&substep, &self.state.walls);
+            let step = self.model.step(&substep, &self.state.walls, &trace.bodies);
             report.boundary_work += self.model.boundary_work(&step, &trace);
             for projected in trace.projections() {
                 report.iterations += u64::from(projected.solution.iterations);
@@ -420,6 +454,7 @@ impl Flip {
             };
             elapsed += substep.length;
             self.state.substep = substep.length;
+            self.state.bodies = self.model.moved(&trace.bodies, substep.length);
             let density = trace.centers.density;
             *cloud = trace.after;
             self.show(span, cloud, watch)?;
@@ -517,7 +552,7 @@ impl Model {
             let is_filling = is_filling(step, bricks, space, &trace.centers.density, e as u32);
             match is_filling {
                 true => 0.0,
-                false => -trace.pressure[e] * space.solid_flux[e],
+                false => -trace.pressure[e] * trace.solid_flux[e],
             }
         });
         let sum: f64 = terms.sum();
@@ -530,6 +565,9 @@ impl Solver for Flip {
 
     fn load(&mut self, frame: u32, particles: &Particles) -> Result<(), ReferenceError> {
         self.state = particles.clone();
+        if self.state.bodies.is_empty() {
+            self.state.bodies = self.model.scene.bodies_at_start();
+        }
         self.frame = frame;
         Ok(())
     }

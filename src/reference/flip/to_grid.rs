@@ -6,7 +6,7 @@ use super::{
     FlipSubstep, Model, Sorted,
     grid::{corner, neighborhood, per_cell},
     model::ON_FACE,
-    solids::{cut, face_sums, open_part_of_hat},
+    solids::{Solid, cut, face_sums, open_part_of_hat},
 };
 use swell_domain::{
     bricks::Bricks,
@@ -118,6 +118,82 @@ pub(super) fn hats(model: &Model, bricks: &Bricks, sorted: &Sorted) -> Vec<Hats>
     })
 }
 
+/// Open areas of a cell's faces, first the lower, then the upper ones; over Δx².
+pub(super) struct CutFaces<'a> {
+    /// Areas within the walls that are perpendicular to the faces.
+    across: DVec3,
+    /// Open areas beside walls alone.
+    pub(super) of_walls: [DVec3; 2],
+    /// Open areas beside walls and solids.
+    pub(super) open: [DVec3; 2],
+    /// Solids that may cut the cell.
+    pub(super) near: Vec<&'a Solid<'a>>,
+    /// Distances at the cell's corners, if any may.
+    corners: Option<[f64; 8]>,
+    /// Velocity of the solid nearest to each face, along that face's axis, m/s.
+    velocity: [DVec3; 2],
+    /// Index of that solid.
+    pub(super) solid: [[usize; 3]; 2],
+}
+
+/// Cuts the faces of a cell, given by its minimum corner in cells.
+pub(super) fn cut_faces<'a>(model: &Model, step: &'a FlipSubstep<'_>, cell: DVec3) -> CutFaces<'a> {
+    let extent = step.open_extent(cell);
+    let across = DVec3::new(
+        extent.y * extent.z,
+        extent.z * extent.x,
+        extent.x * extent.y,
+    );
+    let of_walls = [cell, cell + 1.0]
+        .map(|plane| DVec3::select(step.is_plane_open(plane), across, DVec3::ZERO));
+    let mut found = CutFaces {
+        across,
+        of_walls,
+        open: of_walls,
+        near: Vec::new(),
+        corners: None,
+        velocity: [DVec3::ZERO; 2],
+        solid: [[0; 3]; 2],
+    };
+    for (index, solid) in step.solids.iter().enumerate() {
+        let Some(corners) = solid.corners(cell, model.cell_size()) else {
+            continue;
+        };
+        found.near.push(solid);
+        // A velocity component of a rigid body does not change along its own axis: the value at the
+        // centre is that at both faces.
+        let pushing = solid.velocity_at((cell + 0.5) * model.cell_size());
+        for side in 0..2 {
+            let nearest = found.corners.as_ref();
+            let sums = nearest.map_or(DVec3::MAX, |nearest| face_sums(nearest, side));
+            let is_nearer = face_sums(&corners, side).cmplt(sums);
+            found.velocity[side] = DVec3::select(is_nearer, pushing, found.velocity[side]);
+            for axis in (0..3).filter(|&axis| is_nearer.test(axis)) {
+                found.solid[side][axis] = index;
+            }
+        }
+        found.corners = Some(match found.corners {
+            Some(nearest) => std::array::from_fn(|k| nearest[k].min(corners[k])),
+            None => corners,
+        });
+    }
+    if let Some(corners) = &found.corners {
+        let faces = cut(corners).faces;
+        let least = LEAST_OPEN * across;
+        for (open, part) in found.open.iter_mut().zip(faces) {
+            *open *= part;
+            *open = DVec3::select(open.cmplt(least), DVec3::ZERO, *open);
+        }
+    }
+    if !step.solids.is_empty() {
+        let on_face = DVec3::splat(ON_FACE);
+        for open in &mut found.open {
+            *open = DVec3::select(open.cmplt(on_face), DVec3::ZERO, *open);
+        }
+    }
+    found
+}
+
 /// Computes the open fractions of each cell and of its lower faces, and the flux of solids through
 /// the closed parts (Batty et al. 2007). [`super::find_water`] later decides which open cells are
 /// water.
@@ -134,43 +210,20 @@ pub fn cut_cells(model: &Model, step: &FlipSubstep<'_>, bricks: &Bricks) -> Open
     let is_mirrored = model.settings().density_correction;
     let of_cell = |element: u32| {
         let cell = corner(bricks, element);
-        let extent = step.open_extent(cell);
-        let across = DVec3::new(
-            extent.y * extent.z,
-            extent.z * extent.x,
-            extent.x * extent.y,
-        );
+        let CutFaces {
+            across,
+            of_walls,
+            open,
+            near,
+            corners,
+            velocity,
+            ..
+        } = cut_faces(model, step, cell);
         let planes = [cell, cell + 1.0];
-        let of_walls =
-            planes.map(|plane| DVec3::select(step.is_plane_open(plane), across, DVec3::ZERO));
-        let (mut open, mut volume) = (of_walls, extent.element_product());
-        let (mut nearest, mut hats): (Option<[f64; 8]>, f64) = (None, 1.0);
-        let mut near = Vec::new();
-        // Velocity of the solid nearest to each face, along that face's axis.
-        let mut velocity = [DVec3::ZERO; 2];
-        for solid in &step.solids {
-            let Some(found) = solid.corners(cell, model.cell_size()) else {
-                continue;
-            };
-            near.push(solid);
-            velocity = [0, 1].map(|side| {
-                let sums = nearest.map_or(DVec3::MAX, |nearest| face_sums(&nearest, side));
-                let is_nearer = face_sums(&found, side).cmplt(sums);
-                // A velocity component of a rigid body does not change along its own axis: the
-                // value at the centre is that at both faces.
-                let pushing = solid.velocity_at((cell + 0.5) * model.cell_size());
-                DVec3::select(is_nearer, pushing, velocity[side])
-            });
-            nearest = Some(nearest.map_or(found, |nearest| {
-                std::array::from_fn(|k| nearest[k].min(found[k]))
-            }));
-        }
-        if let Some(corners) = nearest {
-            let cut = cut(&corners);
-            open = [open[0] * cut.faces[0], open[1] * cut.faces[1]];
-            volume *= cut.volume;
-            let least = LEAST_OPEN * across;
-            open = open.map(|open| DVec3::select(open.cmplt(least), DVec3::ZERO, open));
+        let mut volume = step.open_extent(cell).element_product();
+        let mut hats = 1.0;
+        if let Some(corners) = corners {
+            volume *= cut(&corners).volume;
             hats = open_part_of_hat(
                 &near,
                 &step.cut,
@@ -179,10 +232,6 @@ pub fn cut_cells(model: &Model, step: &FlipSubstep<'_>, bricks: &Bricks) -> Open
                 model.cell_size(),
                 &corners,
             );
-        }
-        if !step.solids.is_empty() {
-            let on_face = DVec3::splat(ON_FACE);
-            open = open.map(|open| DVec3::select(open.cmplt(on_face), DVec3::ZERO, open));
         }
         let [low, high] = [0, 1].map(|side| {
             (across - of_walls[side]) * step.closing_velocity(planes[side])

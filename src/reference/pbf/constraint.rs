@@ -164,7 +164,7 @@ pub fn distance_to_converged(
     let mut model = Model::new(scene, boundary);
     let time = f64::from(frame) * scene.shot.frame_seconds();
     let substep = Substep::new(scene, &state.walls, time, 0.0);
-    model.stand(scene, time, 0.0);
+    model.stand(scene, &state.bodies, time, 0.0);
     let position = local(scene, state);
     let solved = converged(&model, &substep, &position, tolerance)?;
     let pairs = position.iter().zip(&solved.position);

@@ -5,6 +5,7 @@ use glam::DVec3;
 use crate::neighbors::Cells;
 use swell_domain::{
     absorber::AbsorberStates,
+    body::BodyState,
     boundary::Boundary,
     bounds::Bounds,
     pbf::{CAP, CONTACT, MAX_CORRECTION, REGULARIZATION},
@@ -145,13 +146,19 @@ impl Model {
             cells: Cells::periodic(size, support, scene.period()),
             scene_gravity: scene.water.gravity,
         };
-        model.take_samples(scene, boundary, (0.0, 0.0));
-        model.stand(scene, 0.0, 0.0);
+        model.take_samples(scene, boundary, &[], (0.0, 0.0));
+        model.stand(scene, &[], 0.0, 0.0);
         model
     }
 
-    fn take_samples(&mut self, scene: &Scene, boundary: &Boundary, (time, step): (f64, f64)) {
-        let samples = scene.solid_samples(boundary, time, step);
+    fn take_samples(
+        &mut self,
+        scene: &Scene,
+        boundary: &Boundary,
+        bodies: &[BodyState],
+        (time, step): (f64, f64),
+    ) {
+        let samples = scene.solid_samples(boundary, bodies, time, step);
         let local: Vec<DVec3> = samples.iter().map(|s| s.position).collect();
         let id: Vec<u32> = (0..local.len() as u32).collect();
         let order = self.cells.order(&local, &id);
@@ -162,17 +169,17 @@ impl Model {
         self.samples = order.into_iter().map(|k| local[k]).collect();
     }
 
-    /// Moves solids to their poses at `time`, with the velocities of their motion over the
+    /// Moves solids to their poses at `time`, bodies from these states, with the velocities of their motion over the
     /// preceding `step` seconds.
-    pub fn stand(&mut self, scene: &Scene, time: f64, step: f64) {
+    pub fn stand(&mut self, scene: &Scene, bodies: &[BodyState], time: f64, step: f64) {
         let Some(boundary) = self.boundary.take() else {
             return;
         };
-        self.take_samples(scene, &boundary, (time, step));
+        self.take_samples(scene, &boundary, bodies, (time, step));
         let origin = scene.domain.min;
         let solids = scene.moving_solids.iter().zip(&boundary.moving);
         let movers = solids.map(|(solid, grid)| {
-            let passage = solid.passage_to(time, step);
+            let passage = solid.passage_to(bodies, time, step);
             let grid = SignedDistance {
                 origin: grid.origin - origin,
                 ..grid.clone()

@@ -275,6 +275,7 @@ impl Pbf {
         let substep = projected_substep(start, step, self.state.substep);
         let (is_drop, work) = grid.project_velocities(numbers, &mut cloud, &substep, all)?;
         self.is_drop = is_drop;
+        self.state.bodies = grid.bodies().to_vec();
         (*position, *velocity) = (cloud.position, cloud.velocity);
         Ok(work)
     }
@@ -287,8 +288,12 @@ impl Pbf {
         position: &mut Vec<DVec3>,
         velocity: &mut Vec<DVec3>,
     ) -> (u32, u64, f64) {
-        self.model
-            .stand(&self.scene, substep.time, substep.time_step);
+        self.model.stand(
+            &self.scene,
+            &self.state.bodies,
+            substep.time,
+            substep.time_step,
+        );
         let (model, timings, is_drop) = (&self.model, &mut self.timings, &self.is_drop);
         let by_prediction: Vec<_> = timings.time("pbf/predict", || {
             parallel::map(0..position.len(), |slot| {
@@ -378,7 +383,7 @@ impl Pbf {
     /// Returns the relative densities of the state, in its order.
     fn density(&mut self, time: f64) -> Vec<f64> {
         let substep = Substep::new(&self.scene, &self.state.walls, time, 0.0);
-        self.model.stand(&self.scene, time, 0.0);
+        self.model.stand(&self.scene, &self.state.bodies, time, 0.0);
         let (model, timings) = (&self.model, &mut self.timings);
         let position = local(&self.scene, &self.state);
         let sorted = Sorted::new(model, &position, &self.state.id, timings);
@@ -410,9 +415,10 @@ impl Solver for Pbf {
         let frame = self.frame + 1;
         let length = self.scene.shot.frame_seconds();
         let start = f64::from(self.frame) * length;
-        let substeps =
-            self.scene
-                .pbf_substeps(&self.state.walls, self.frame, self.state.max_speed())?;
+        let boundaries = (&self.state.walls, &self.state.bodies[..]);
+        let substeps = self
+            .scene
+            .pbf_substeps(boundaries, self.frame, self.state.max_speed())?;
         let step = length / f64::from(substeps);
         let mut position = local(&self.scene, &self.state);
         let mut velocity: Vec<DVec3> = self.state.velocity.iter().map(widen).collect();

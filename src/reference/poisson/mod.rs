@@ -33,7 +33,8 @@ pub struct Solver<'a> {
 }
 
 impl<'a> Solver<'a> {
-    /// Factorises `system` if that takes at most `budget` bytes; 0 never factorises.
+    /// Factorises `system` if that takes at most `budget` bytes; 0 never factorises, and no system
+    /// whose pressure moves bodies is: its matrix is not sparse.
     ///
     /// # Errors Returns [`ReferenceError::Factor`] if the system is not positive definite or memory
     /// does not hold the factor.
@@ -41,6 +42,7 @@ impl<'a> Solver<'a> {
         let pockets = system.pockets();
         let factor = match budget {
             0 => None,
+            _ if !system.bodies.is_empty() => None,
             _ => Factor::new(system, &pockets, budget)?,
         };
         Ok(Self {

@@ -5,6 +5,7 @@
 //! the particles through the projected field. No grid outlives its substep: the state consists of
 //! positions, velocities and ids, and for APIC of the affine matrices' rows.
 
+mod bodies;
 pub mod buffers;
 mod capacity;
 mod ended;
@@ -50,10 +51,12 @@ use super::{
     state::{Carried, is_awaited, is_other_count, upload},
     trace::{Begun, Observe, Run, Span, TraceFrame, trace},
 };
+use bodies::Contacts;
 use buffers::*;
 pub use capacity::capacity;
 use capacity::{bricks, capacity_of, no_water, whole_frame};
 use ended::{Ended, ReadFrame};
+use plan::extent;
 use record::{Commands, Recordings, groups, numbers};
 pub(super) use totals::FrameTotals;
 
@@ -75,6 +78,7 @@ pub struct Flip {
     cut: Bounds,
     /// See [`Substep::kick`], seconds.
     kick: f64,
+    contacts: Option<Contacts>,
 }
 
 /// Result of `flip/survey`.
@@ -105,7 +109,8 @@ impl Flip {
         upload_constants(&program, &plan, scene);
         let bricks = bricks(scene, plan.grid_dims, &no_water(scene, plan.grid_dims), 0);
         let frame = whole_frame(scene);
-        let state = Carried::new(&Particles::default());
+        let mut state = Carried::new(&Particles::default());
+        state.bodies = scene.bodies_at_start();
         let params = step::params(scene, &plan, &state.walls, &bricks, &frame);
         program.upload(PARAMS, 0, &[params]);
         Ok(Self {
@@ -119,6 +124,7 @@ impl Flip {
             plan,
             scene: Arc::new(scene.to_owned_scene()),
             movers: Movers::of(boundary, scene),
+            contacts: Contacts::of(scene),
             shores: Shores::new(boundary, scene.domain.min, scene.settings().cell_size)
                 .joined(scene.periodic),
             state,
@@ -194,7 +200,7 @@ impl Flip {
         }
         let frame = self.frame + 1;
         let chosen = (self.scene).flip_substep(
-            &self.state.walls,
+            (&self.state.walls, &self.state.bodies),
             frame,
             start,
             remaining,
@@ -211,7 +217,11 @@ impl Flip {
         let cut = step::cut(&self.scene, &self.state.walls, substep);
         let moving = self.scene.moving_solids.iter();
         let least = self.scene.domain.min;
-        let pose = |solid: &MovingSolid| solid.pose(substep.start).moved(-least).scaled(1.0 / size);
+        let bodies = &self.state.bodies;
+        let pose = |solid: &MovingSolid| {
+            let pose = solid.pose(bodies, substep.start);
+            pose.moved(-least).scaled(1.0 / size)
+        };
         let poses = moving.map(pose);
         let dims = table_dims(stored_cells(self.plan.grid_dims, self.scene.periodic));
         let mut is_wet = is_wet.to_vec();
@@ -241,9 +251,7 @@ impl Flip {
         (self.program).upload(BRICKS, 0, bytemuck::cast_slice(&bricks.records));
         self.program.upload(BRICK_SLOT, 0, &bricks.table);
         self.program.upload(GROUPS, 0, &groups);
-        if let Some(movers) = &self.movers {
-            movers.upload(&self.program, &self.scene, substep.start, substep.length);
-        }
+        self.upload_movers(substep);
         if self.scene.has_inlets() {
             let inlets = step::inlets(&self.scene, substep);
             self.program.upload(INLETS, 0, &[inlets]);
@@ -306,7 +314,9 @@ impl Flip {
         substep: &Substep,
         run: &mut Run<'_>,
     ) -> Result<(), SolveError> {
+        self.predict_bodies(substep);
         self.lay_out(is_wet, substep)?;
+        self.list_bodies();
         run(&self.program, &[&self.recordings.to_grid])
     }
 
@@ -322,7 +332,9 @@ impl Flip {
         let cell_size = self.scene.settings().cell_size;
         self.pressure
             .set_topology(&self.program, &self.bricks, cell_size);
-        self.pressure.project_by(&self.program, scale, run)
+        let projected = self.pressure.project_by(&self.program, scale, run)?;
+        self.push_bodies(run)?;
+        Ok(projected)
     }
 
     fn project_within_budget(
@@ -362,6 +374,7 @@ impl Flip {
             totals.projection.correction_iterations += u64::from(corrected.iterations);
             totals.projection.missed += u32::from(corrected.is_missed);
         }
+        self.collide_bodies(substep);
         run(
             &self.program,
             &[&self.recordings.to_particles, &self.recordings.watch],
@@ -369,6 +382,7 @@ impl Flip {
         let work = self.watched(totals.substeps)?;
         let face = self.scene.settings().cell_size.powi(2);
         totals.work += face * substep.kick * work;
+        self.move_bodies(substep);
         self.state.substep = substep.length;
         Ok(())
     }
@@ -469,6 +483,9 @@ impl Solver for Flip {
             self.resize(particles.len())?;
         }
         self.state = Carried::new(particles);
+        if self.state.bodies.is_empty() {
+            self.state.bodies = self.scene.bodies_at_start();
+        }
         self.frame = frame;
         self.upload_state(particles);
         Ok(())
@@ -535,6 +552,7 @@ impl TraceFrame for Flip {
                 number: totals.substeps + 1,
                 elapsed: totals.elapsed,
                 before: self.state.substep,
+                bodies: self.state.bodies.clone(),
             };
             let is_traced = match span {
                 Span::From(first) => begun.number >= first,
@@ -545,7 +563,7 @@ impl TraceFrame for Flip {
             };
             let is_last = if is_traced {
                 self.go_on(&mut totals, &mut |program, recordings| {
-                    trace(recordings, program, &mut |traced| observe(begun, traced))
+                    trace(recordings, program, &mut |traced| observe(&begun, traced))
                 })?
             } else {
                 self.go_on(&mut totals, plain)?
@@ -574,11 +592,7 @@ fn recordings(program: &Program, plan: &Plan, scene: &FlipScene) -> Recordings {
 
 fn pressure_solver(scene: &FlipScene, plan: &Plan) -> PressureSolver {
     let flip = scene.settings();
-    PressureSolver::new(
-        &flip.pressure,
-        flip.density_correction,
-        plan.counts.bricks.slots,
-    )
+    PressureSolver::new(&flip.pressure, extent(scene), plan.counts.bricks.slots)
 }
 
 /// Uploads data that does not change between substeps.

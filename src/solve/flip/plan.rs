@@ -1,7 +1,7 @@
 //! Plan of FLIP's passes and buffers.
 
 use crate::{
-    effects,
+    bodies, effects,
     plan::{BufferTable, Counts, Plan, in_order},
     pressure,
 };
@@ -12,7 +12,7 @@ use swell_domain::{
 use swell_gpu::{buffer::BufferSpec, program::PassSpec, recording::Command, sort};
 use swell_scene::{
     FlipScene,
-    flip::{Surface, Transfer},
+    flip::{Precision, Surface, Transfer},
 };
 
 use super::{
@@ -33,8 +33,9 @@ pub(crate) fn plan(scene: &FlipScene, counts: Counts, moves: bool) -> Plan {
     for (name, addition) in &effects {
         table.extend(name, addition.buffers.clone());
     }
-    let (settings, has_correction) = (&flip.pressure, flip.density_correction);
+    let settings = &flip.pressure;
     table.append(pressure::planned(settings, counts.bricks.slots));
+    table.extend("bodies", bodies::planned(scene, plan.grid_dims));
     plan.declare(table);
     let commands = Commands::new(&plan, scene, &effects);
     let defines = conditions(&plan, scene);
@@ -48,7 +49,7 @@ pub(crate) fn plan(scene: &FlipScene, counts: Counts, moves: bool) -> Plan {
     };
     plan.add_passes(in_order(commands.before_projection()).map(&plain), &effects);
     plan.add_passes(
-        pressure::passes(settings, flip.surface, has_correction, scene.is_periodic()),
+        pressure::passes(settings, flip.surface, extent(scene), scene.is_periodic()),
         &[],
     );
     plan.add_passes(
@@ -64,7 +65,7 @@ pub(crate) fn commands(plan: &Plan, scene: &FlipScene) -> Vec<Command> {
     let flip = scene.settings();
     let effects = effects::of_flip(scene, CELLS as usize * plan.counts.bricks.slots);
     let commands = Commands::new(plan, scene, &effects);
-    let projection = pressure::all_commands(flip.pressure.preconditioner, flip.density_correction);
+    let projection = pressure::all_commands(flip.pressure.preconditioner, extent(scene));
     let before = commands.before_projection().cloned();
     let between = commands.between_projections().cloned();
     let after = commands.after_projection().cloned();
@@ -73,6 +74,14 @@ pub(crate) fn commands(plan: &Plan, scene: &FlipScene) -> Vec<Command> {
         .chain(between)
         .chain(after)
         .collect()
+}
+
+/// Returns what the scene's projection does.
+pub(super) fn extent(scene: &FlipScene) -> pressure::Extent {
+    pressure::Extent {
+        has_correction: scene.settings().density_correction,
+        has_bodies: scene.has_bodies(),
+    }
 }
 
 /// Returns whether particles that are too close to each other are pushed apart: with the density
@@ -94,6 +103,8 @@ fn conditions(plan: &Plan, scene: &FlipScene) -> Vec<&'static str> {
         ("PUSHED", pushes(plan, scene)),
         ("PERIODIC", scene.is_periodic()),
         ("PLACES", has_places(plan, scene)),
+        ("BODIES", scene.has_bodies()),
+        ("F64", flip.pressure.precision == Precision::F64),
     ];
     let holding = all.into_iter().filter(|(_, holds)| *holds);
     holding.map(|(define, _)| define).collect()

@@ -1,7 +1,7 @@
 //! Recordings of a substep's passes.
 
 use crate::{
-    SolveError,
+    SolveError, bodies,
     effects::Addition,
     grid::{ACTIVE, WET, over_listed},
     params::FlipParams,
@@ -40,6 +40,8 @@ pub(super) struct Recordings {
     pub(super) survey: Recording,
     /// Transfers to the grid and everything else before the projection.
     pub(super) to_grid: Recording,
+    /// After each projection, where it moves bodies.
+    pub(super) carry: Option<Recording>,
     /// Between two projections: the first iteration, and a further one.
     between: [Recording; 2],
     /// Transfers from the projected grid to particles.
@@ -53,6 +55,7 @@ impl Recordings {
         Self {
             survey: Recording::new(program, &commands.survey),
             to_grid: Recording::new(program, &commands.to_grid),
+            carry: (!commands.carry.is_empty()).then(|| Recording::new(program, &commands.carry)),
             between: [&commands.begin, &commands.again].map(|part| Recording::new(program, part)),
             to_particles: Recording::new(program, &commands.to_particles),
             watch: Recording::new(program, &commands.watch),
@@ -61,7 +64,8 @@ impl Recordings {
 
     /// Returns the names of the passes between two projections.
     pub(super) fn between(&self) -> impl Iterator<Item = &'static str> {
-        self.between.iter().flat_map(Recording::passes)
+        let all = self.carry.iter().chain(&self.between);
+        all.flat_map(Recording::passes)
     }
 
     /// Runs the passes between two projections, with `again` iterations after the first.
@@ -83,6 +87,7 @@ impl Recordings {
 pub(super) struct Commands {
     survey: Vec<Command>,
     to_grid: Vec<Command>,
+    carry: Vec<Command>,
     begin: Vec<Command>,
     again: Vec<Command>,
     to_particles: Vec<Command>,
@@ -109,6 +114,7 @@ impl Commands {
                 Command::over("flip/survey", n.div_ceil(SURVEY_RUN)),
             ],
             to_grid: to_grid(plan, scene, effects),
+            carry: carry(plan, scene),
             begin: between()
                 .flat_map(|between| between.begin.clone())
                 .collect(),
@@ -125,7 +131,7 @@ impl Commands {
     }
 
     pub(super) fn between_projections(&self) -> impl Iterator<Item = &Command> {
-        self.begin.iter().chain(&self.again)
+        self.carry.iter().chain(&self.begin).chain(&self.again)
     }
 
     pub(super) fn after_projection(&self) -> impl Iterator<Item = &Command> {
@@ -209,7 +215,21 @@ fn to_grid(plan: &Plan, scene: &FlipScene, effects: &[(&'static str, Addition)])
     for pass in effects.iter().flat_map(|(_, addition)| &addition.passes) {
         commands.push(over(pass.name, ACTIVE));
     }
+    if scene.has_bodies() {
+        commands.push(over_pairs("flip/couple_bodies", plan, scene));
+    }
     commands
+}
+
+/// Returns a dispatch of one workgroup for each brick that each body may touch.
+fn over_pairs(pass: &'static str, plan: &Plan, scene: &FlipScene) -> Command {
+    let pairs = bodies::most_pairs(scene, plan.grid_dims);
+    Command::over(pass, WORKGROUP as usize * pairs)
+}
+
+fn carry(plan: &Plan, scene: &FlipScene) -> Vec<Command> {
+    let pass = || over_pairs("flip/carry_bodies", plan, scene);
+    scene.has_bodies().then(pass).into_iter().collect()
 }
 
 fn watch(plan: &Plan, scene: &FlipScene) -> Vec<Command> {

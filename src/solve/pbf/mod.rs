@@ -260,19 +260,15 @@ impl Pbf {
             && !self.state.is_empty()
         {
             grid.project(&self.program, (time - step, step), run)?;
+            self.state.bodies = grid.flip().bodies().to_vec();
         }
         self.program.upload(PARAMS, 0, &[self.params(time, step)]);
         if let (Some(movers), Some(boundary)) = (&self.movers, &self.boundary) {
             let (program, scene) = (&self.program, &self.scene);
-            movers.upload(program, scene, time - step, step);
-            samples::upload_samples(
-                boundary,
-                program,
-                scene,
-                &self.plan,
-                &self.calibration,
-                (time, step),
-            );
+            let bodies = &self.state.bodies;
+            movers.upload(program, scene, bodies, (time - step, step));
+            let samples = scene.solid_samples(boundary, bodies, time, step);
+            samples::upload_samples(&samples, program, scene, &self.plan, &self.calibration);
         }
         effects::upload(&self.program, &self.scene, (time, step));
         if let Stop::DensityError { .. } = self.scene.settings().stop {
@@ -293,8 +289,10 @@ impl Pbf {
 
     /// Returns the number of substeps in the next frame.
     fn substeps(&self) -> Result<u32, SolveError> {
-        let walls = &self.state.walls;
-        Ok(self.scene.pbf_substeps(walls, self.frame, self.speed)?)
+        let boundaries = (&self.state.walls, &self.state.bodies[..]);
+        Ok(self
+            .scene
+            .pbf_substeps(boundaries, self.frame, self.speed)?)
     }
 
     /// Returns the end time and the length of the k-th substep, seconds.
@@ -567,8 +565,9 @@ impl TraceFrame for Pbf {
                 number,
                 elapsed,
                 before: if number > 1 { step } else { self.state.substep },
+                bodies: self.state.bodies.clone(),
             };
-            let mut tell = |traced: Traced<'_>| observe(begun, traced);
+            let mut tell = |traced: Traced<'_>| observe(&begun, traced);
             self.prepare_substep(time, step, &mut |program, recordings| {
                 trace(recordings, program, &mut tell)
             })?;

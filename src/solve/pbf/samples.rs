@@ -6,7 +6,7 @@ use glam::DVec3;
 use crate::{boundary::upload_distance, plan::Plan};
 use swell_domain::{boundary::Boundary, sph::Calibration};
 use swell_gpu::program::Program;
-use swell_scene::Scene;
+use swell_scene::{Scene, moving_solid::SolidSample};
 
 use super::buffers::*;
 
@@ -21,22 +21,20 @@ pub(crate) fn upload(
     if boundary.distance.is_none() && boundary.moving.is_empty() {
         return;
     }
-    upload_samples(boundary, program, scene, plan, calibration, (0.0, 0.0));
+    let samples = scene.solid_samples(boundary, &[], 0.0, 0.0);
+    upload_samples(&samples, program, scene, plan, calibration);
     upload_distance(boundary, program, scene);
 }
 
-/// Uploads the boundary samples in their poses at `time`, with the mean velocities over the `step`
-/// seconds before it: behind the particles in `predicted`, sorted by cell, weighted in units of a
+/// Uploads boundary samples with their velocities: behind the particles in `predicted`, sorted by cell, weighted in units of a
 /// particle's mass.
 pub(crate) fn upload_samples(
-    boundary: &Boundary,
+    samples: &[SolidSample],
     program: &Program,
     scene: &Scene,
     plan: &Plan,
     calibration: &Calibration,
-    (time, step): (f64, f64),
 ) {
-    let samples = scene.solid_samples(boundary, time, step);
     let dims = plan.grid_dims.map(|n| n as usize);
     let spacing = scene.particle_spacing();
     let support = calibration.support_radius;

@@ -67,6 +67,7 @@ pub use params::{
 pub(crate) use plan::require;
 use plan::{PHASE_COUNT, Phase, SIZE_COUNT, Size};
 pub use plan::{STEP_OF_FINEST, passes, planned};
+pub use stages::Extent;
 pub(super) use stages::all_commands;
 use stages::{SINGLE, Shape, Stages};
 pub use swell_domain::poisson::{AIR, FLUID, SOLID};
@@ -131,13 +132,15 @@ pub struct Projected {
 /// The projection, for a program that has the [`planned`] buffers and the [`passes`].
 pub struct PressureSolver {
     settings: Pressure,
-    has_correction: bool,
+    extent: Extent,
     capacity: usize,
     stages: BTreeMap<Shape, Stages<Recording>>,
     shape: Shape,
     phase: PressurePhase,
     sizes: [Workgroups; SIZE_COUNT],
     pockets: u32,
+    /// Bricks with water that bodies may touch, and bodies.
+    touched: [u32; 2],
     /// Iterations of the last projection and the last correction: the next solve submits as many at
     /// first. It only affects when the host waits for the device, not the result.
     expected: [u32; 2],
@@ -152,14 +155,14 @@ enum Task {
 impl PressureSolver {
     /// Creates a solver for a program whose buffers hold `capacity` slots. Create a new one when
     /// the buffers are replaced by larger ones.
-    pub fn new(settings: &Pressure, has_correction: bool, capacity: usize) -> Self {
+    pub fn new(settings: &Pressure, extent: Extent, capacity: usize) -> Self {
         let expected = match settings.preconditioner {
             Preconditioner::Multigrid => 10,
             _ => MOST_AT_ONCE,
         };
         Self {
             settings: settings.clone(),
-            has_correction,
+            extent,
             capacity,
             stages: BTreeMap::new(),
             shape: Shape {
@@ -174,8 +177,15 @@ impl PressureSolver {
             },
             sizes: [Workgroups::default(); SIZE_COUNT],
             pockets: 0,
+            touched: [0; 2],
             expected: [expected, expected / 2],
         }
+    }
+
+    /// Sets how many bricks with water bodies may touch, and how many bodies there are, before the
+    /// topology is set. The caller has uploaded the lists of `solve::bodies`.
+    pub(super) fn set_bodies(&mut self, bricks: u32, bodies: u32) {
+        self.touched = [bricks, bodies];
     }
 
     /// Sets the bricks of a substep, whose records the caller has uploaded to `bricks`.
@@ -220,6 +230,8 @@ impl PressureSolver {
         }
         self.sizes[Size::Single.index()] = [1, 1, 1].into();
         self.sizes[Size::Active.index()] = groups(64 * active);
+        self.sizes[Size::BodyBricks.index()] = groups(64 * self.touched[0]);
+        self.sizes[Size::Bodies.index()] = groups(64 * self.touched[1]);
         program.upload(SIZES, 0, &self.sizes);
     }
 
@@ -293,7 +305,7 @@ impl PressureSolver {
         program: &Program,
         run: &mut Run<'_>,
     ) -> Result<Solved, SolveError> {
-        assert!(self.has_correction, "built without the correction");
+        assert!(self.extent.has_correction, "built without the correction");
         let (solved, _) = self.solve(program, Task::Correct, CORRECTION_TOLERANCE, run)?;
         Ok(solved)
     }
@@ -329,6 +341,10 @@ impl PressureSolver {
             return Ok(Default::default());
         }
         self.phase.tolerance_square = (tolerance * tolerance) as f32;
+        self.phase.body_bricks = match task {
+            Task::Project => self.touched[0],
+            Task::Correct => 0,
+        };
         self.upload_phases(program);
         let mut batch = self.expected[task as usize] + 1;
         let mut is_first = true;
@@ -361,10 +377,9 @@ impl PressureSolver {
     }
 
     fn stages(&mut self, program: &Program) -> &Stages<Recording> {
-        let (preconditioner, has_correction) = (self.settings.preconditioner, self.has_correction);
-        self.stages.entry(self.shape).or_insert_with_key(|&shape| {
-            Stages::new(preconditioner, has_correction, shape).bind(program)
-        })
+        let (preconditioner, extent) = (self.settings.preconditioner, self.extent);
+        (self.stages.entry(self.shape))
+            .or_insert_with_key(|&shape| Stages::new(preconditioner, extent, shape).bind(program))
     }
 
     fn upload_phases(&self, program: &Program) {

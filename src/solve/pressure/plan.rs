@@ -14,7 +14,7 @@ use super::{
     DONE, ITERATING, LEVELS, VERIFYING,
     buffers::*,
     params::{PressurePhase, ReduceStep},
-    stages::all_commands,
+    stages::{Extent, all_commands},
 };
 
 /// Indices into `pressure_phases`.
@@ -26,10 +26,12 @@ pub(super) enum Phase {
     Reduce(ReduceStep),
     /// Parameters of `pressure/sum_pockets` and `pressure/center`; `true` if it records the means.
     Center(bool),
+    /// Parameters of the passes over bodies: of the solution, or of a direction.
+    Bodies(bool),
 }
 
 /// Number of phases.
-pub(super) const PHASE_COUNT: usize = Phase::Center(true).index() + 1;
+pub(super) const PHASE_COUNT: usize = Phase::Bodies(true).index() + 1;
 
 impl Phase {
     pub(super) const fn index(self) -> usize {
@@ -37,6 +39,7 @@ impl Phase {
             Self::Level(level) => level,
             Self::Reduce(step) => LEVELS + step as usize,
             Self::Center(is_noted) => LEVELS + 4 + is_noted as usize,
+            Self::Bodies(is_solution) => LEVELS + 6 + is_solution as usize,
         }
     }
 
@@ -49,7 +52,7 @@ impl Phase {
         } else if index < LEVELS + 4 {
             phase.step = (index - LEVELS) as u32;
         } else {
-            phase.step = (index - LEVELS - 4) as u32;
+            phase.step = (index - LEVELS) as u32 % 2;
         }
         phase
     }
@@ -66,10 +69,14 @@ pub(super) enum Size {
     Pockets,
     /// One thread per block of the active bricks.
     Active,
+    /// One workgroup per brick that bodies may touch.
+    BodyBricks,
+    /// One workgroup per body.
+    Bodies,
 }
 
 /// Number of sizes.
-pub(super) const SIZE_COUNT: usize = Size::Active.index() + 1;
+pub(super) const SIZE_COUNT: usize = Size::Bodies.index() + 1;
 
 /// Section of `pressure_groups` for the step of an iteration; the others are numbered by state.
 const STEP: u32 = 3;
@@ -85,6 +92,8 @@ impl Size {
             Self::Single => LEVELS,
             Self::Pockets => LEVELS + 1,
             Self::Active => LEVELS + 2,
+            Self::BodyBricks => LEVELS + 3,
+            Self::Bodies => LEVELS + 4,
         }
     }
 }
@@ -196,10 +205,10 @@ pub fn planned(settings: &Pressure, capacity: usize) -> BufferTable {
 pub fn passes(
     settings: &Pressure,
     surface: Surface,
-    has_correction: bool,
+    extent: Extent,
     is_periodic: bool,
 ) -> Vec<PassSpec> {
-    let commands = all_commands(settings.preconditioner, has_correction);
+    let commands = all_commands(settings.preconditioner, extent);
     let names = in_order(&commands);
     names
         .map(|name| pass(name, settings, surface, is_periodic))

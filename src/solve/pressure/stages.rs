@@ -30,6 +30,15 @@ pub(super) struct Shape {
     pub has_pockets: bool,
 }
 
+/// What a projection does beside making velocities divergence-free.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Extent {
+    /// Whether it also solves for displacements that correct the density.
+    pub has_correction: bool,
+    /// Whether its pressure moves bodies.
+    pub has_bodies: bool,
+}
+
 /// The stages of a solve for one shape: as commands, or bound to a program's buffers.
 pub(super) struct Stages<T> {
     /// Builds the system, labels bodies of water, and computes the right-hand side.
@@ -45,19 +54,20 @@ pub(super) struct Stages<T> {
 }
 
 impl Stages<Vec<Command>> {
-    pub(super) fn new(preconditioner: Preconditioner, has_correction: bool, shape: Shape) -> Self {
+    pub(super) fn new(preconditioner: Preconditioner, extent: Extent, shape: Shape) -> Self {
+        let Extent {
+            has_correction,
+            has_bodies,
+        } = extent;
         let finest = |pass, when| run(pass, Phase::Level(0), when, Size::Full(0));
         let finish = |pass| run(pass, Phase::Level(0), When::Done, Size::Active);
         Self {
             project: build(preconditioner, shape),
             correct: has_correction.then(|| vec![finest("pressure/density_source", When::Always)]),
             begin: begin(preconditioner, shape),
-            iterate: iteration(preconditioner, shape),
-            verify: verification(preconditioner, shape),
-            finish_project: vec![
-                finish("pressure/project"),
-                finest("pressure/measure_divergence", When::Done),
-            ],
+            iterate: iteration(preconditioner, has_bodies, shape),
+            verify: verification(preconditioner, has_bodies, shape),
+            finish_project: finish_project(has_bodies),
             finish_correct: has_correction.then(|| vec![finish("pressure/displace")]),
         }
     }
@@ -85,7 +95,7 @@ impl Stages<Vec<Command>> {
 }
 
 /// Returns the commands of solves of every shape.
-pub(crate) fn all_commands(preconditioner: Preconditioner, has_correction: bool) -> Vec<Command> {
+pub(crate) fn all_commands(preconditioner: Preconditioner, extent: Extent) -> Vec<Command> {
     let mut all = Vec::new();
     for levels in (1..=LEVELS).rev() {
         for dispatched in usize::from(levels > 1)..levels {
@@ -95,7 +105,7 @@ pub(crate) fn all_commands(preconditioner: Preconditioner, has_correction: bool)
                     dispatched,
                     has_pockets,
                 };
-                all.extend(Stages::new(preconditioner, has_correction, shape).into_commands());
+                all.extend(Stages::new(preconditioner, extent, shape).into_commands());
             }
         }
     }
@@ -175,7 +185,50 @@ fn begin(preconditioner: Preconditioner, shape: Shape) -> Vec<Command> {
     commands
 }
 
-fn iteration(preconditioner: Preconditioner, shape: Shape) -> Vec<Command> {
+/// Sums the pressures of a direction or of the solution over the bodies, and what velocities they
+/// get of it.
+fn move_bodies(of_solution: bool, when: When) -> [Command; 2] {
+    let phase = Phase::Bodies(of_solution);
+    [
+        run("pressure/push_bodies", phase, when, Size::BodyBricks),
+        run("pressure/move_bodies", phase, when, Size::Bodies),
+    ]
+}
+
+fn couple(of_solution: bool, when: When) -> Command {
+    run(
+        "pressure/couple",
+        Phase::Bodies(of_solution),
+        when,
+        Size::BodyBricks,
+    )
+}
+
+fn finish_project(has_bodies: bool) -> Vec<Command> {
+    let mut commands = Vec::new();
+    if has_bodies {
+        commands.extend(move_bodies(true, When::Done));
+        commands.push(run(
+            "pressure/carry_flux",
+            Phase::Bodies(true),
+            When::Done,
+            Size::BodyBricks,
+        ));
+    }
+    let finest = Phase::Level(0);
+    commands.extend([
+        run("pressure/project", finest, When::Done, Size::Active),
+        run(
+            "pressure/measure_divergence",
+            finest,
+            When::Done,
+            Size::Full(0),
+        ),
+    ]);
+    commands
+}
+
+fn iteration(preconditioner: Preconditioner, has_bodies: bool, shape: Shape) -> Vec<Command> {
     let finest = |pass| run(pass, Phase::Level(0), When::Iterating, Size::Full(0));
     let mut commands = match preconditioner {
         Preconditioner::None | Preconditioner::Jacobi => vec![finest("pressure/precondition")],
@@ -185,9 +238,13 @@ fn iteration(preconditioner: Preconditioner, shape: Shape) -> Vec<Command> {
     if shape.has_pockets {
         commands.extend(center(&CORRECTION, false, When::Iterating));
     }
+    commands.push(reduce(ReduceStep::Direction));
+    if has_bodies {
+        commands.extend(move_bodies(false, When::Iterating));
+    }
+    commands.push(finest("pressure/multiply"));
+    commands.extend(has_bodies.then(|| couple(false, When::Iterating)));
     commands.extend([
-        reduce(ReduceStep::Direction),
-        finest("pressure/multiply"),
         reduce(ReduceStep::Length),
         run(
             "pressure/advance",
@@ -213,13 +270,17 @@ fn cycle(shape: Shape) -> Vec<Command> {
     down.chain([coarse]).chain(up).collect()
 }
 
-fn verification(preconditioner: Preconditioner, shape: Shape) -> Vec<Command> {
+fn verification(preconditioner: Preconditioner, has_bodies: bool, shape: Shape) -> Vec<Command> {
     let mut commands = vec![run(
         "pressure/verify",
         Phase::Level(0),
         When::Verifying,
         Size::Full(0),
     )];
+    if has_bodies {
+        commands.extend(move_bodies(true, When::Verifying));
+        commands.push(couple(true, When::Verifying));
+    }
     if shape.has_pockets {
         commands.extend(center(&RESIDUAL, false, When::Verifying));
     }
@@ -240,7 +301,7 @@ mod tests {
                 dispatched,
                 has_pockets: false,
             };
-            iteration(Preconditioner::Multigrid, shape).len()
+            iteration(Preconditioner::Multigrid, false, shape).len()
         };
         for (levels, dispatched) in [(2, 1), (3, 2), (4, 3), (8, 7)] {
             assert_eq!(dispatches(levels, dispatched), 4 + 2 * dispatched);

@@ -197,7 +197,7 @@ impl<'a> BakePlan<'a> {
         let solids = Solids {
             still: boundary.distance.as_ref(),
             moving: &boundary.moving,
-            pose: &|index, seconds| self.scene.moving_solids[index].pose(seconds),
+            pose: &|index, seconds| self.scene.moving_solids[index].pose(&[], seconds),
         };
         let (sources, frames) = (&self.start.sources, begun + 1..self.last + 1);
         let later = sources.least_counts(particles, frames, &solids);

@@ -9,7 +9,7 @@ use glam::DVec3;
 
 use super::{ExportJob, Target, UsdWater, Wanted, beside};
 use swell_cache::CacheError;
-use swell_domain::particles::Particles;
+use swell_domain::{body::BodyState, particles::Particles};
 use swell_export::usd::{self, CameraFrame, Root, Solid, WaveMaker};
 use swell_scene::{Scene, Wall};
 
@@ -126,7 +126,11 @@ impl ExportJob<'_> {
             attributes,
             layers: self.frames.iter().map(layer).collect(),
             manifest: named(beside(file, MANIFEST)),
-            solids: if is_stream { Vec::new() } else { self.solids() },
+            solids: if is_stream {
+                Vec::new()
+            } else {
+                self.solids()?
+            },
             wave_makers: if is_stream {
                 Vec::new()
             } else {
@@ -136,26 +140,31 @@ impl ExportJob<'_> {
         })
     }
 
-    fn solids(&self) -> Vec<Solid> {
+    /// States of the bodies after a frame.
+    fn bodies_at(&self, frame: u32) -> Result<Vec<BodyState>, CacheError> {
+        Ok(self.cache.entry(frame)?.clock.bodies.clone())
+    }
+
+    fn solids(&self) -> Result<Vec<Solid>, CacheError> {
         let scene = &self.scene;
         let still = scene.solids.iter().map(|placed| Solid {
             name: placed.name(),
             mesh: placed.mesh.clone(),
             way: Vec::new(),
         });
+        let bodies = self.frames.iter().map(|&frame| self.bodies_at(frame));
+        let bodies = bodies.collect::<Result<Vec<_>, _>>()?;
         let moving = scene.moving_solids.iter().map(|solid| Solid {
             name: solid.placed.name(),
             mesh: solid.placed.mesh.clone(),
-            way: self
-                .frames
-                .iter()
-                .map(|&frame| {
-                    let pose = solid.pose(scene.shot.time(frame));
+            way: (self.frames.iter().zip(&bodies))
+                .map(|(&frame, bodies)| {
+                    let pose = solid.pose(bodies, scene.shot.time(frame));
                     (self.numbering.of(frame), pose)
                 })
                 .collect(),
         });
-        still.chain(moving).collect()
+        Ok(still.chain(moving).collect())
     }
 
     /// The look's camera at each frame; empty without a look.

@@ -2,6 +2,7 @@
 
 use super::RenderJobError;
 use swell_domain::{
+    body::BodyState,
     bounds::Bounds,
     mesh_file::{MeshError, MeshFormat, parts::MeshParts, read_bytes},
     particles::Particles,
@@ -23,12 +24,12 @@ pub(super) fn render_scene(
 ) -> Result<RenderScene, RenderJobError> {
     let time = f64::from(frame) / scene.shot.frames_per_second;
     let moving = scene.moving_solids.iter().map(|solid| {
-        let way = solid.pose(time).affine();
+        let way = solid.pose(&state.bodies, time).affine();
         solid.placed.mesh.transformed(&way)
     });
     let solids = scene.solids.iter().map(|solid| solid.mesh.clone());
     let parts = match look.materials() {
-        Some(_) => solid_parts(scene, time)?,
+        Some(_) => solid_parts(scene, &state.bodies, time)?,
         None => Vec::new(),
     };
     Ok(RenderScene {
@@ -45,10 +46,14 @@ pub(super) fn render_scene(
 }
 
 /// Parts of each solid, read again from its file because a scene keeps only the mesh.
-fn solid_parts(scene: &Scene, time: f64) -> Result<Vec<SolidParts>, MeshError> {
+fn solid_parts(
+    scene: &Scene,
+    bodies: &[BodyState],
+    time: f64,
+) -> Result<Vec<SolidParts>, MeshError> {
     let still = scene.solids.iter().map(|solid| (solid, Pose::START));
     let moving = scene.moving_solids.iter();
-    let moving = moving.map(|solid| (&solid.placed, solid.pose(time)));
+    let moving = moving.map(|solid| (&solid.placed, solid.pose(bodies, time)));
     let parts = still.chain(moving).map(|(placed, pose)| {
         let bytes = read_bytes(&placed.file)?;
         if blake3::hash(&bytes).to_hex().as_str() != placed.file_hash {

@@ -97,7 +97,7 @@ impl Balls {
         let scene = &self.scene;
         let time = scene.shot.time(frame);
         let moving = scene.moving_solids.iter().map(|solid| {
-            let way = solid.pose(time).affine();
+            let way = solid.pose(&water.bodies, time).affine();
             solid.placed.mesh.transformed(&way)
         });
         let still = scene.solids.iter().map(|solid| solid.mesh.clone());

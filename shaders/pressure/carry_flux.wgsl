@@ -1,0 +1,32 @@
+// After the solve: adds to the solids' flux out of each cell that of the bodies' changes of
+// velocity.
+#import "shared/pressure_bodies.wgsl"
+#import "shared/thread.wgsl"
+
+@group(0) @binding(4) var<storage, read> body_pairs: array<BodyPair>;
+@group(0) @binding(5) var<storage, read> body_change: array<real>;
+@group(0) @binding(6) var<storage, read_write> solid_flux: array<f32>;
+
+@compute @workgroup_size(64)
+fn main(
+    @builtin(workgroup_id) workgroup: vec3u,
+    @builtin(num_workgroups) workgroups: vec3u,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let brick = thread_index(workgroup, workgroups, 0u, 1u);
+    if brick >= phase.body_bricks {
+        return;
+    }
+    let found = body_bricks[brick];
+    for (var inner = local; inner < CELLS; inner += 64u) {
+        var sum = real(0.0);
+        for (var pair = found.y; pair < found.z; pair++) {
+            let body = body_pairs[pair].body;
+            for (var k = 0u; k < 6u; k++) {
+                sum += real(body_coupling[CELLS * (6u * pair + k) + inner])
+                    * body_change[6u * body + k];
+            }
+        }
+        solid_flux[CELLS * found.x + inner] += f32(sum);
+    }
+}

@@ -1,0 +1,50 @@
+// Changes of the bodies' velocities by the summed pressures, one workgroup for each body.
+#import "shared/pressure_phase.wgsl"
+#import "shared/pressure_real.wgsl"
+#import "shared/bodies.wgsl"
+
+@group(0) @binding(1) var<storage, read> body_states: DeviceBodies;
+@group(0) @binding(2) var<storage, read> body_order: array<u32>;
+@group(0) @binding(3) var<storage, read> body_sums: array<real>;
+@group(0) @binding(4) var<storage, read_write> body_change: array<real>;
+
+var<workgroup> terms: array<array<real, 6>, 64>;
+var<workgroup> sums: array<real, 6>;
+
+@compute @workgroup_size(64)
+fn main(
+    @builtin(workgroup_id) workgroup: vec3u,
+    @builtin(num_workgroups) workgroups: vec3u,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let body = thread_index(workgroup, workgroups, 0u, 1u);
+    let last = arrayLength(&body_change) / 6u - 1u;
+    let own = min(body, last);
+    var sum = array<real, 6>(0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+    let end = body_states.bodies[own].end;
+    for (var k = body_states.bodies[own].first + local; k < end; k += 64u) {
+        let pair = body_order[k];
+        for (var i = 0u; i < 6u; i++) {
+            sum[i] += body_sums[6u * pair + i];
+        }
+    }
+    terms[local] = sum;
+    workgroupBarrier();
+    if local < 6u {
+        var all = real(0.0);
+        for (var k = 0u; k < 64u; k++) {
+            all += terms[k][local];
+        }
+        sums[local] = all;
+    }
+    workgroupBarrier();
+    if local < 6u && body <= last {
+        var change = real(0.0);
+        for (var k = 0u; k < 6u; k++) {
+            let place = 6u * local + k;
+            let response = body_states.bodies[own].response[place / 4u][place % 4u];
+            change += real(response) * sums[k];
+        }
+        body_change[6u * own + local] = change;
+    }
+}

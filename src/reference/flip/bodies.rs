@@ -1,0 +1,181 @@
+//! Reference passes of bodies that the water moves.
+
+use glam::DVec3;
+
+use super::{
+    FlipSubstep, Model, OpenSpace, Trace,
+    grid::{corner, per_cell},
+    to_grid::cut_faces,
+};
+use swell_domain::{
+    body::{BodyState, Six},
+    bricks::Bricks,
+    poisson::{Coupling, System},
+};
+use swell_scene::step::Substep;
+
+/// How the pressure of cells pushes a body.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct BodyCells {
+    /// Elements that its surface cuts.
+    pub element: Vec<u32>,
+    /// Area of the surface in each of them over Δx², then its moment about the centre of mass over
+    /// Δx², metres.
+    pub push: Vec<Six>,
+    /// Rows of six: ρ Δx³ times the inverse of the mass matrix within the body's freedom.
+    pub response: [Six; 6],
+}
+
+impl BodyCells {
+    /// Returns the body's part of a system.
+    fn of_system(&self, row_of: &[u32]) -> Coupling {
+        let with_row = self.element.iter().zip(&self.push);
+        let with_row = with_row.filter(|(element, _)| row_of[**element as usize] != u32::MAX);
+        let (row, push) = with_row
+            .map(|(&element, &push)| (row_of[element as usize], push))
+            .unzip();
+        Coupling {
+            row,
+            push,
+            response: self.response,
+        }
+    }
+}
+
+/// Adds bodies to a system.
+pub(super) fn add_bodies(bodies: &[BodyCells], elements: usize, system: &mut System) {
+    if bodies.is_empty() {
+        return;
+    }
+    let mut row_of = vec![u32::MAX; elements];
+    for (row, &element) in (0..).zip(&system.cell) {
+        row_of[element as usize] = row;
+    }
+    system.bodies = bodies.iter().map(|it| it.of_system(&row_of)).collect();
+}
+
+/// Adds to the solids' flux out of each cell that of the bodies' changes of velocity (reference pass
+/// of `pressure/carry_flux`).
+pub(super) fn carry_flux(bodies: &[BodyCells], changes: &[Six], flux: &mut [f64]) {
+    for (body, change) in bodies.iter().zip(changes) {
+        for (&element, push) in body.element.iter().zip(&body.push) {
+            flux[element as usize] += swell_domain::body::dot(push, change);
+        }
+    }
+}
+
+/// Reference pass of `flip/couple_bodies`: the cells that each body's surface cuts, where no other
+/// solid is nearer. `bodies` are the states at the substep's start.
+pub fn couple_bodies(
+    model: &Model,
+    step: &FlipSubstep<'_>,
+    bricks: &Bricks,
+    bodies: &[BodyState],
+) -> Vec<BodyCells> {
+    let size = model.cell_size();
+    let least = model.scene.domain.min;
+    let first = step.solids.len() - bodies.len();
+    let scale = model.scene.water.rest_density * size.powi(3);
+    let all = model.scene.bodies().zip(bodies).enumerate();
+    all.map(|(index, (it, state))| {
+        let centre = state.centre - least;
+        let of_cell = |element: u32| {
+            let cell = corner(bricks, element);
+            let cut = cut_faces(model, step, cell);
+            let [low, high] = [0, 1].map(|side| {
+                let closed = (cut.of_walls[side] - cut.open[side]).to_array();
+                let own = |axis: usize| match cut.solid[side][axis] == first + index {
+                    true => closed[axis],
+                    false => 0.0,
+                };
+                DVec3::new(own(0), own(1), own(2))
+            });
+            let area = high - low;
+            let way = ((cell + 0.5) * size - centre).cross(area);
+            [area.x, area.y, area.z, way.x, way.y, way.z]
+        };
+        let pushes = per_cell(bricks, of_cell);
+        let touched = (0u32..).zip(pushes).filter(|(_, push)| *push != [0.0; 6]);
+        let (element, push) = touched.unzip();
+        BodyCells {
+            element,
+            push,
+            response: it.body.response(state).map(|row| row.map(|r| scale * r)),
+        }
+    })
+    .collect()
+}
+
+/// Reference pass of `flip/carry_bodies`: adds to closed faces the change of velocity of the body
+/// that closes them.
+pub fn carry_bodies(
+    model: &Model,
+    step: &FlipSubstep<'_>,
+    bricks: &Bricks,
+    space: &OpenSpace,
+    (bodies, changes): (&[BodyState], &[Six]),
+    velocity: &mut [DVec3],
+) {
+    let first = step.solids.len() - bodies.len();
+    let added = per_cell(bricks, |element| {
+        let cell = corner(bricks, element);
+        let cut = cut_faces(model, step, cell);
+        if cut.near.is_empty() {
+            return DVec3::ZERO;
+        }
+        let solid = cut.solid[0];
+        let is_between_walls = step.is_plane_open(cell);
+        let middle = (cell + 0.5) * model.cell_size();
+        let of_axis = |axis: usize| {
+            let is_closed = space.open[element as usize][axis] == 0.0;
+            let body = solid[axis].checked_sub(first);
+            let Some(body) = body.filter(|_| is_closed && is_between_walls.test(axis)) else {
+                return 0.0;
+            };
+            let [vx, vy, vz, wx, wy, wz] = changes[body];
+            let arm = middle - (bodies[body].centre - model.scene.domain.min);
+            (DVec3::new(vx, vy, vz) + DVec3::new(wx, wy, wz).cross(arm))[axis]
+        };
+        DVec3::new(of_axis(0), of_axis(1), of_axis(2))
+    });
+    for (velocity, added) in velocity.iter_mut().zip(added) {
+        *velocity += added;
+    }
+}
+
+impl Model {
+    /// Returns the bodies' states after gravity and moorings have acted, without the water.
+    pub fn predicted(&self, bodies: &[BodyState], substep: &Substep) -> Vec<BodyState> {
+        let gravity = self.scene.water.gravity;
+        let all = self.scene.bodies().zip(bodies);
+        all.map(|(it, state)| {
+            let state = BodyState {
+                // Sums of lengths round.
+                time: substep.start,
+                ..*state
+            };
+            it.body.accelerated(&state, gravity, substep.kick)
+        })
+        .collect()
+    }
+
+    /// Moves bodies to the end of a substep.
+    pub(super) fn moved(&self, bodies: &[BodyState], length: f64) -> Vec<BodyState> {
+        let all = self.scene.bodies().zip(bodies);
+        all.map(|(it, state)| it.body.moved(state, length))
+            .collect()
+    }
+}
+
+impl Trace {
+    /// Returns the changes of the bodies' velocities by all projections of the substep.
+    pub fn body_changes(&self) -> Vec<Six> {
+        let mut sums = vec![[0.0; 6]; self.bodies.len()];
+        for projected in self.projections() {
+            for (sum, change) in sums.iter_mut().zip(&projected.changes) {
+                *sum = std::array::from_fn(|k| sum[k] + change[k]);
+            }
+        }
+        sums
+    }
+}

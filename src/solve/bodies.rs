@@ -1,0 +1,264 @@
+//! Bodies that the water moves, in the projection of FLIP (Batty, Bertails and Bridson 2007).
+//!
+//! With the coupling J of a body, six numbers a cell, and its response R = ρ Δx³ M⁻¹, pressures q
+//! change its velocity by R J q, and such a change lets J^T R J q more water out of each cell. The
+//! system is A + J^T R J: as strong a coupling as that of the water with itself, stable for bodies
+//! of any density. It costs three dispatches an iteration.
+
+use glam::{DAffine3, DVec3};
+
+use swell_domain::{
+    body::{BodyState, Six},
+    bounds::Bounds,
+    bricks::{Bricks, CELLS, EDGE, table_dims},
+    flip::stored_cells,
+};
+use swell_gpu::{
+    buffer::{Buf, BufferSpec, mirror},
+    program::Program,
+};
+use swell_scene::{
+    FlipScene,
+    flip::Precision,
+    moving_solid::{FreeBody, MAX_MOVING_SOLIDS, MovingSolid},
+};
+
+use super::{SolveError, pressure::buffers::Real};
+
+mirror!(
+    /// `DeviceBody` of shared/bodies.wgsl.
+    DeviceBody {
+        /// Centre of mass at the substep's start, relative to the domain's minimum corner, metres.
+        centre: [f32; 3],
+        /// Index in [`ORDER`] of its first pair.
+        first: u32,
+        /// Change of the six velocities for each sum of pressures, rows of six.
+        response: [[f32; 4]; 9],
+        /// Index in [`ORDER`] after its last pair.
+        end: u32,
+        /// Unused.
+        padding: [u32; 3],
+    }
+);
+
+mirror!(
+    /// `DeviceBodies` of shared/bodies.wgsl.
+    DeviceBodies {
+        /// The bodies.
+        bodies: [DeviceBody; MAX_MOVING_SOLIDS],
+        /// Number of bodies.
+        count: u32,
+        /// Number of the solid that is the first of them.
+        first_solid: u32,
+        /// Number of pairs.
+        pairs: u32,
+        /// Number of bricks in [`TOUCHED`].
+        bricks: u32,
+    }
+);
+
+mirror!(
+    /// `BodyPair` of shared/bodies.wgsl: a brick and a body that may touch it.
+    BodyPair {
+        /// Slot of the brick.
+        slot: u32,
+        /// Index of the body.
+        body: u32,
+    }
+);
+
+/// The bodies' states and responses.
+pub const STATES: Buf<DeviceBodies> = Buf::new("body_states");
+/// Pairs of bricks and bodies, by slot.
+pub const PAIRS: Buf<BodyPair> = Buf::new("body_pairs");
+/// Pairs by body.
+pub const ORDER: Buf<u32> = Buf::new("body_order");
+/// Bricks with water that bodies may touch: slot, first pair, pair after the last, 0.
+pub const TOUCHED: Buf<[u32; 4]> = Buf::new("body_bricks");
+/// For each pair six arrays of 512 cells: area of the body's surface in the cell over Δx², then its
+/// moment about the centre of mass over Δx², metres.
+pub const COUPLING: Buf<f32> = Buf::new("body_coupling");
+/// Six sums of pressures over the cells of each pair.
+pub const SUMS: Buf<Real> = Buf::new("body_sums");
+/// Change of the six velocities of each body by those pressures, m/s and rad/s.
+pub const CHANGE: Buf<Real> = Buf::new("body_change");
+
+/// Distance beyond a body's box within which its surface may cut a cell, in cells.
+const MARGIN: f64 = 1.0;
+
+/// Returns the largest number of pairs of a scene: a body has at most as many bricks as its largest
+/// extent in any pose touches.
+pub(super) fn most_pairs(scene: &FlipScene, grid_dims: [u32; 3]) -> usize {
+    let size = scene.settings().cell_size;
+    let table = table_dims(stored_cells(grid_dims, scene.periodic));
+    let of_body = |it: &FreeBody| {
+        let cells = 2.0 * (it.reach / size + MARGIN);
+        let bricks = (cells / f64::from(EDGE)).floor() as usize + 2;
+        table
+            .map(|n| bricks.min(n as usize))
+            .iter()
+            .product::<usize>()
+    };
+    scene.bodies().map(of_body).sum()
+}
+
+/// Returns the buffers of the scene's bodies; none without bodies.
+pub(super) fn planned(scene: &FlipScene, grid_dims: [u32; 3]) -> Vec<BufferSpec> {
+    let count = scene.bodies().count();
+    if count == 0 {
+        return Vec::new();
+    }
+    let pairs = most_pairs(scene, grid_dims);
+    let reals = |buffer: Buf<Real>, count: usize| match scene.settings().pressure.precision {
+        Precision::F32 | Precision::F32Refined => buffer.retyped::<f32>().sized(count),
+        Precision::F64 => buffer.retyped::<f64>().sized(count),
+    };
+    vec![
+        STATES.sized(1),
+        PAIRS.sized(pairs),
+        ORDER.sized(pairs),
+        TOUCHED.sized(pairs),
+        COUPLING.sized(6 * CELLS as usize * pairs),
+        reals(SUMS, 6 * pairs),
+        reals(CHANGE, 6 * count),
+    ]
+}
+
+/// The lists of a substep.
+#[derive(Debug, Default)]
+pub(super) struct Lists {
+    pairs: Vec<BodyPair>,
+    order: Vec<u32>,
+    touched: Vec<[u32; 4]>,
+    states: DeviceBodies,
+}
+
+impl Lists {
+    /// Lists the bricks that each body may touch, and the bodies' responses at the start of a
+    /// substep, in which they have these states.
+    pub(super) fn new(scene: &FlipScene, bricks: &Bricks, states: &[BodyState]) -> Self {
+        let solids = scene.moving_solids.iter();
+        let bodies: Vec<_> = solids.filter(|solid| solid.body.is_some()).collect();
+        let mut lists = Self::default();
+        lists.states.count = bodies.len() as u32;
+        for (body, solid) in (0..).zip(&bodies) {
+            let slots = touched_slots(scene, bricks, solid, states);
+            lists
+                .pairs
+                .extend(slots.map(|slot| BodyPair { slot, body }));
+        }
+        lists.pairs.sort_by_key(|pair| (pair.slot, pair.body));
+        lists.states.pairs = lists.pairs.len() as u32;
+        for (k, solid) in bodies.iter().enumerate() {
+            lists.add_state(scene, k, solid, states);
+        }
+        for (k, pair) in (0..).zip(&lists.pairs) {
+            match lists.touched.last_mut() {
+                Some([slot, _, end, _]) if *slot == pair.slot => *end = k + 1,
+                _ if pair.slot <= bricks.wet => lists.touched.push([pair.slot, k, k + 1, 0]),
+                _ => break,
+            }
+        }
+        lists.states.bricks = lists.touched.len() as u32;
+        lists
+    }
+
+    fn add_state(&mut self, scene: &FlipScene, k: usize, solid: &MovingSolid, all: &[BodyState]) {
+        let Some(it) = &solid.body else { return };
+        let state = it.state(all);
+        let first = self.order.len() as u32;
+        let own = (0..)
+            .zip(&self.pairs)
+            .filter(|(_, pair)| pair.body == k as u32);
+        self.order.extend(own.map(|(index, _)| index));
+        let volume = scene.settings().cell_size.powi(3);
+        let scale = scene.water.rest_density * volume;
+        let response = it.body.response(&state);
+        self.states.bodies[k] = DeviceBody {
+            centre: (state.centre - scene.domain.min).as_vec3().to_array(),
+            first,
+            response: std::array::from_fn(|row| {
+                std::array::from_fn(|column| {
+                    let place = 4 * row + column;
+                    (scale * response[place / 6][place % 6]) as f32
+                })
+            }),
+            end: self.order.len() as u32,
+            padding: [0; 3],
+        };
+    }
+
+    /// Uploads the lists; `first_solid` is the number of the first body's grid among the solids'.
+    pub(super) fn upload(&self, program: &Program, first_solid: u32) {
+        let states = DeviceBodies {
+            first_solid,
+            ..self.states
+        };
+        program.upload(STATES, 0, &[states]);
+        program.upload(PAIRS, 0, &self.pairs);
+        program.upload(ORDER, 0, &self.order);
+        program.upload(TOUCHED, 0, &self.touched);
+    }
+
+    /// Number of bricks with water that bodies may touch, and number of bodies.
+    pub(super) fn sizes(&self) -> [u32; 2] {
+        [self.states.bricks, self.states.count]
+    }
+}
+
+/// Iterates over the slots of bricks that a body may touch in its pose at the start of a substep.
+fn touched_slots<'a>(
+    scene: &FlipScene,
+    bricks: &'a Bricks,
+    solid: &MovingSolid,
+    states: &[BodyState],
+) -> impl Iterator<Item = u32> + use<'a> {
+    let size = scene.settings().cell_size;
+    let time = solid.body.as_ref().map_or(0.0, |it| it.state(states).time);
+    let pose = solid.pose(states, time).affine();
+    let place = DAffine3::from_translation(-scene.domain.min) * pose;
+    let bounds = solid.placed.mesh.bounds().map(|b| turned(&b, &place));
+    let (low, high) = bounds.map_or((DVec3::ZERO, DVec3::NEG_ONE), |b| {
+        (b.min / size - MARGIN, b.max / size + MARGIN)
+    });
+    let brick = |x: f64, axis: usize| {
+        let last = f64::from(bricks.table_dims[axis]) - 1.0;
+        (x / f64::from(EDGE)).floor().clamp(0.0, last) as u32
+    };
+    let ranges = [0, 1, 2].map(|axis| brick(low[axis], axis)..=brick(high[axis], axis));
+    let [nx, ny, _] = bricks.table_dims;
+    let [xs, ys, zs] = ranges;
+    let at = zs.flat_map(move |z| {
+        let xs = xs.clone();
+        (ys.clone()).flat_map(move |y| xs.clone().map(move |x| (z * ny + y) * nx + x))
+    });
+    let slots = at.map(|index| bricks.table[index as usize]);
+    slots.filter(|&slot| slot != 0 && slot <= bricks.active)
+}
+
+/// Returns the box around a box in another place.
+fn turned(b: &Bounds, place: &DAffine3) -> Bounds {
+    let corners = (0..8).map(|k| {
+        let pick = |axis: usize| if k >> axis & 1 == 0 { b.min } else { b.max }[axis];
+        place.transform_point3(DVec3::new(pick(0), pick(1), pick(2)))
+    });
+    let none = Bounds {
+        min: DVec3::INFINITY,
+        max: DVec3::NEG_INFINITY,
+    };
+    corners.fold(none, |b, x| Bounds {
+        min: b.min.min(x),
+        max: b.max.max(x),
+    })
+}
+
+/// Reads the change of each body's velocities by the last projection.
+pub(super) fn changes(
+    program: &Program,
+    precision: Precision,
+    bodies: usize,
+) -> Result<Vec<Six>, SolveError> {
+    let all = super::pressure::buffers::read_reals(program, &CHANGE, precision, 6 * bodies)?;
+    let six = |c: &[f64]| std::array::from_fn(|k| c[k]);
+    Ok(all.chunks_exact(6).map(six).collect())
+}
