@@ -26,7 +26,7 @@ const CHAIN_KEY: &[u8] = b",\"chain\":\"";
 const CHAIN_LEN: usize = CHAIN_KEY.len() + 64 + 2;
 
 /// Time and step counts of a bake after a frame.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Clock {
     /// Frame number; 0 is the start.
@@ -43,9 +43,6 @@ pub struct Clock {
     /// State of the absorbing walls after this frame; absent if there are none.
     #[serde(default, skip_serializing_if = "is_none")]
     pub walls: AbsorberStates,
-    /// States of the bodies that the water moves, after this frame; absent if there are none.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub bodies: Vec<BodyState>,
     /// Length of the substep that ended in the frame, seconds; 0 if there was none.
     #[serde(default, skip_serializing_if = "is_no_time")]
     pub substep: f64,
@@ -86,6 +83,9 @@ pub struct LedgerEntry {
     pub manifest: Option<String>,
     /// Clock after this frame.
     pub clock: Clock,
+    /// States of the bodies that the water moves, after this frame; empty if there are none.
+    #[serde(default)]
+    pub bodies: Vec<BodyState>,
     /// The solver's report of the frame. Nothing in it may differ between two bakes of the same
     /// scene, so it holds no timings.
     pub report: Value,
@@ -136,6 +136,7 @@ impl From<EntryOfFormat1> for LedgerEntry {
             rows: rows.into_iter().collect(),
             manifest: old.manifest,
             clock: old.clock,
+            bodies: Vec::new(),
             report: old.report,
             chain: old.chain,
         }
@@ -240,6 +241,8 @@ pub(super) struct Contents<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) manifest: Option<&'a str>,
     pub(super) clock: Clock,
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    pub(super) bodies: &'a [BodyState],
     pub(super) report: &'a Value,
 }
 
@@ -422,6 +425,7 @@ mod tests {
                 time,
                 ..Clock::default()
             },
+            bodies: &[],
             report,
         };
         contents.to_line(&blake3::hash(b"")).map(|(line, _)| line)

@@ -414,7 +414,7 @@ pub(super) fn read_frame(
         None => frame::decode(&bytes, &path)?,
     };
     particles.walls = entry.clock.walls;
-    particles.bodies.clone_from(&entry.clock.bodies);
+    particles.bodies.clone_from(&entry.bodies);
     particles.substep = entry.clock.substep;
     if particles.len() as u64 != entry.particles {
         return Err(CacheError::damaged(

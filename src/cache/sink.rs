@@ -76,7 +76,7 @@ impl Sink {
         };
         while let Ok(job) = jobs.recv() {
             let begin = Instant::now();
-            summary.bytes += self.write(&job.clock, &job.particles, &job.rows, &job.report)?;
+            summary.bytes += self.write(job.clock, &job.particles, &job.rows, &job.report)?;
             self.note_timings(job.clock.frame, &job.timings)?;
             summary.frames += 1;
             summary.last_frame = job.clock.frame;
@@ -88,7 +88,7 @@ impl Sink {
     /// Writes a frame's files, then its line, then its rows. Returns the total length of the files.
     pub(super) fn write(
         &mut self,
-        clock: &Clock,
+        clock: Clock,
         particles: &Particles,
         rows: &Rows,
         report: &Value,
@@ -117,7 +117,8 @@ impl Sink {
             files: &files,
             rows: (!rows.is_empty()).then_some(rows),
             manifest: (clock.frame == manifest.first_frame()).then_some(seed.as_str()),
-            clock: clock.clone(),
+            clock,
+            bodies: &particles.bodies,
             report,
         };
         let (line, chain) = contents.to_line(&self.chain)?;

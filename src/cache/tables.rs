@@ -46,13 +46,13 @@ impl TableFile<'_> {
         let header = format!("frame,time_s,{}\n", self.record.file_columns().join(","));
         let rows = entries
             .iter()
-            .map(|entry| self.rows(&mut window, &entry.clock, &entry.rows));
+            .map(|entry| self.rows(&mut window, entry.clock, &entry.rows));
         (header + &rows.collect::<String>(), window)
     }
 
     /// A frame's rows, one per sample. Numbers are the shortest decimals that parse back to the
     /// same value; a missing value is an empty field.
-    fn rows(&self, window: &mut Window, clock: &Clock, rows: &Rows) -> String {
+    fn rows(&self, window: &mut Window, clock: Clock, rows: &Rows) -> String {
         let values = rows
             .get(self.stream.name)
             .and_then(|all| all.get(self.index));
@@ -117,7 +117,7 @@ pub(super) fn append(
     dir: &Path,
     manifest: &Manifest,
     windows: &mut [Window],
-    clock: &Clock,
+    clock: Clock,
     rows: &Rows,
 ) -> Result<(), FileError> {
     all(manifest).zip(windows).try_for_each(|(table, window)| {

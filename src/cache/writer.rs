@@ -105,7 +105,7 @@ impl CacheWriter {
             ledger_bytes: 0,
             windows,
         };
-        sink.write(&clock, start, &rows, &Value::Null)?;
+        sink.write(clock, start, &rows, &Value::Null)?;
         // Last, because the manifest is what makes the directory a cache.
         output::write(&dir.join(manifest::FILE), &manifest_bytes)?;
         Self::spawn(sink, manifest, clock.frame, lock)

@@ -91,7 +91,10 @@ pub fn check_pbf(
                 of_grid.state.begin(begun);
                 of_grid.observe(traced)
             }
-            _ => engine.observe(traced),
+            _ => {
+                engine.state.stand(boundary, &begun.bodies);
+                engine.observe(traced)
+            }
         })?;
     engine.state.add_whole(boundary, &mut engine.table);
     let mut table = of_grid.map_or_else(CheckTable::default, Engine::finish);

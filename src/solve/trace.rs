@@ -161,7 +161,8 @@ pub struct Begun {
     pub elapsed: f64,
     /// Length of the previous substep, seconds; 0 if there was none.
     pub before: f64,
-    /// Bodies as the substep began.
+    /// Bodies as the substep began; for PBF's own passes, which follow the projection on its grid,
+    /// at the substep's end.
     pub bodies: Vec<BodyState>,
 }
 

@@ -217,17 +217,12 @@ fn open_cache(
         let (writer, entry, state) = CacheWriter::resume(directory, &manifest)?;
         return Ok((writer, entry.clock, state));
     }
-    let (scene, particles) = (plan.scene, &plan.start.particles);
-    let clock = Clock {
-        bodies: particles.bodies.clone(),
-        ..plan.clock.clone()
-    };
+    let (scene, particles, clock) = (plan.scene, &plan.start.particles, plan.clock);
     let text = swell_files::scene_to_toml(scene, &swell_scene::asset_path);
     let assets = manifest::assets(scene)?;
     // No step has run yet, so pressures are unknown.
     let seen = probes::look(scene, clock.time, particles, &[], None);
-    let begun = clock.clone();
-    let writer = CacheWriter::create(directory, manifest, &text, &assets, begun, particles, &seen)?;
+    let writer = CacheWriter::create(directory, manifest, &text, &assets, clock, particles, &seen)?;
     Ok((writer, clock, particles.clone()))
 }
 

@@ -142,7 +142,7 @@ impl Branch {
         check_keys(from, &cache, scene)?;
         let origin = cache.manifest().origin.into();
         let mut particles = cache.read(from.frame)?.about(origin, scene.origin);
-        let mut clock = entry.clock.clone();
+        let mut clock = entry.clock;
         let mut notes = Vec::new();
         if clock.walls != AbsorberStates::default() {
             let baked = super::baked_scene(&cache, &from.directory);
@@ -159,8 +159,7 @@ impl Branch {
                 "bodies begin where the scene puts them: the frame has another number".to_owned(),
             );
         }
-        clock.bodies.clone_from(&particles.bodies);
-        check_walls(from, &clock, scene, &particles)?;
+        check_walls(from, clock, scene, &particles)?;
         let manifest = cache.manifest();
         let parent = Parent {
             shot: manifest.shot.clone(),
@@ -252,7 +251,7 @@ fn check_keys(from: &BranchPoint, cache: &CacheReader, scene: &Scene) -> Result<
 /// to the solver, whose walls push them back.
 fn check_walls(
     from: &BranchPoint,
-    clock: &Clock,
+    clock: Clock,
     scene: &Scene,
     particles: &Particles,
 ) -> Result<(), BranchError> {

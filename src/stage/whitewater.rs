@@ -309,12 +309,12 @@ impl StreamStep<'_> {
         let clock = Clock {
             substeps: 1,
             steps: stream.clock.steps + 1,
-            ..self.cache.entry(frame)?.clock.clone()
+            ..self.cache.entry(frame)?.clock
         };
         let seconds = clock.time - before;
         let mut now = water.at(frame)?;
         now.walls = clock.walls;
-        now.bodies.clone_from(&clock.bodies);
+        now.bodies.clone_from(&self.cache.entry(frame)?.bodies);
         let potentials = engine.survey(&now, clock.time, seconds)?;
         let mut white = stream.white.clone();
         engine.advance(&mut white, frame)?;
@@ -352,13 +352,7 @@ impl StreamStep<'_> {
             "spray": spray, "foam": foam, "bubbles": bubbles, "born": births.len(), "died": died,
             NEXT_ID: next, WATER: self.cache.entry(frame)?.chain,
         });
-        (stream.writer).submit(
-            clock.clone(),
-            white.clone(),
-            Vec::new(),
-            report,
-            Value::Null,
-        )?;
+        (stream.writer).submit(clock, white.clone(), Vec::new(), report, Value::Null)?;
         stream.clock = clock;
         stream.white = white;
         stream.next_id = next;
@@ -397,14 +391,14 @@ impl StreamWriter {
                 bytes: cache.asset(name)?,
             });
         }
-        let clock = cache.entry(cache.first_frame())?.clock.clone();
+        let clock = cache.entry(cache.first_frame())?.clock;
         let (white, scene) = (whitewater::none(), cache.scene_toml());
         let made = CacheWriter::create(
             directory,
             manifest,
             scene,
             &assets,
-            clock.clone(),
+            clock,
             &white,
             &Vec::new(),
         );

@@ -9,7 +9,7 @@ use crate::{
 };
 use swell_domain::{boundary::Boundary, flip::VON_KARMAN, signed_distance::SignedDistance};
 use swell_reference::flip::{
-    Depth, LEAST_FILM, Model, OpenSpace, Solid, cut_cells as reference_cut_cells,
+    Depth, FlipSubstep, LEAST_FILM, Model, OpenSpace, Solid, cut_cells as reference_cut_cells,
     extrapolate as reference_extrapolate, find_change as reference_find_change, find_depth,
     find_excess as reference_find_excess, find_water as reference_find_water, friction_rates,
     gather_centers as reference_gather_centers, gather_faces as reference_gather_faces,
@@ -76,6 +76,19 @@ impl FlipState {
     /// Returns the reference's open space with the solids' distances shifted by `shift` and their
     /// nodes by `place`, metres.
     fn shifted_room(&self, shift: f64, place: DVec3) -> OpenSpace {
+        self.with_shifted_solids(shift, place, |model, step| {
+            reference_cut_cells(model, step, &self.elements().bricks)
+        })
+    }
+
+    /// Calls `of` with solids whose distances are shifted by `shift` and whose nodes by `place`,
+    /// metres.
+    pub(super) fn with_shifted_solids<T>(
+        &self,
+        shift: f64,
+        place: DVec3,
+        of: impl FnOnce(&Model, &FlipSubstep<'_>) -> T,
+    ) -> T {
         let moved = |grid: &SignedDistance| SignedDistance {
             origin: grid.origin + place,
             values: grid.values.iter().map(|&v| v + shift as f32).collect(),
@@ -89,11 +102,12 @@ impl FlipState {
         };
         let model = Model::new(&self.model.scene, &boundary);
         let step = model.step(&self.elements().substep, &self.absorbers, &self.bodies);
-        reference_cut_cells(&model, &step, &self.elements().bricks)
+        of(&model, &step)
     }
 }
 
 pub(super) fn cut_cells(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
+    state.refresh_bodies(io)?;
     let has_moving = !state.boundary.moving.is_empty();
     let has_solids = state.boundary.distance.is_some() || has_moving;
     let (elements, step) = (state.elements(), state.step());
@@ -378,6 +392,7 @@ pub(super) fn wall_friction(state: &mut FlipState, io: &mut Io<'_>) -> PassResul
 }
 
 pub(super) fn find_change(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
+    state.refresh_bodies(io)?;
     let elements = state.elements();
     let mut reference = elements.faces(&io.before)?;
     let before = reference.change.clone();

@@ -152,13 +152,25 @@ impl FlipState {
         Ok(())
     }
 
+    /// Notes the sums of products of the direction `p`, whose terms have these sizes, and of the
+    /// residual `r` with the system times the direction, `q`.
+    pub(super) fn note_products(&mut self, [p, sizes]: [&[f64]; 2], r: &[f64], q: &[f64]) {
+        let magnitudes: Vec<f64> = q.iter().map(|q| q.abs()).collect();
+        self.sums[STEEPNESS] = Some(Sum {
+            size: products(sizes, &magnitudes).value,
+            ..products(p, q)
+        });
+        self.sums[OVERLAP] = Some(products(r, q));
+        self.sums[PRODUCT_SQUARE] = Some(products(q, q));
+    }
+
     /// Returns the system times the direction, by row, as the device has it.
     fn product(&self, io: &Io<'_>) -> Result<Vec<f64>, SolveError> {
         self.by_row_of(&io.after, solved::CORRECTION, 1)
     }
 
     /// Computes the next direction and the magnitudes of its terms, from the last one.
-    fn direction(&self, io: &Io<'_>, last: &[f64]) -> Result<[Vec<f64>; 2], SolveError> {
+    pub(super) fn direction(&self, io: &Io<'_>, last: &[f64]) -> Result<[Vec<f64>; 2], SolveError> {
         let beta = io.before.control(self.precision())?.beta;
         let z = self.by_row(&io.after, solved::CORRECTION)?;
         let terms = || z.iter().zip(last).map(|(&z, &p)| (z, beta * p));
@@ -221,13 +233,7 @@ fn multiply(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     state.add_rows(io.table, &PRODUCT, |row| {
         (q[row], reference[row], [unit, errors[row], rounded[row]])
     });
-    let magnitudes: Vec<f64> = q.iter().map(|q| q.abs()).collect();
-    state.sums[STEEPNESS] = Some(Sum {
-        size: products(&sizes, &magnitudes).value,
-        ..products(&p, &q)
-    });
-    state.sums[OVERLAP] = Some(products(&r, &q));
-    state.sums[PRODUCT_SQUARE] = Some(products(&q, &q));
+    state.note_products([&p, &sizes], &r, &q);
     Ok(())
 }
 

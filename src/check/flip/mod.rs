@@ -1,5 +1,6 @@
 //! Compares FLIP's passes with their f64 reference passes, each from the inputs that the GPU had.
 
+mod bodies;
 mod cycle;
 mod elements;
 mod gaps;
@@ -29,6 +30,7 @@ use super::{
     comparison::{Comparison, Io, NONE, PassResult, State, comparison, names},
     table::pair,
 };
+use bodies::Touched;
 use elements::Elements;
 use pressure::Assembled;
 use rows::{PLACE, WORK};
@@ -80,9 +82,10 @@ const BOTH_HALVES: &str = "compared together with flip/gather_faces and flip/gat
 const LABELLED: &str = "compared after pressure/count_pockets";
 
 /// Returns the comparisons of FLIP's own passes and of its projection.
-pub(super) fn comparisons() -> [&'static [Comparison<FlipState>]; 4] {
+pub(super) fn comparisons() -> [&'static [Comparison<FlipState>]; 5] {
     [
         COMPARISONS,
+        bodies::COMPARISONS,
         pressure::COMPARISONS,
         iteration::COMPARISONS,
         cycle::COMPARISONS,
@@ -103,6 +106,8 @@ pub(crate) struct FlipState {
     pub(super) bodies: Vec<BodyState>,
     /// The substep, if it does not follow from the survey: that of a projection for another solver.
     pub(super) given_substep: Option<Substep>,
+    /// What the device has of bodies.
+    touched: Touched,
     elements: Option<Elements>,
     sorted: Option<Sorted>,
     space: Option<OpenSpace>,
@@ -152,6 +157,7 @@ impl FlipState {
             begun: Begun::default(),
             bodies: particles.bodies.clone(),
             given_substep: None,
+            touched: Touched::default(),
             elements: None,
             sorted: None,
             space: None,

@@ -86,6 +86,15 @@ impl FlipState {
         &self.assembled().system
     }
 
+    /// Returns the device's own system with the bodies that its pressure moves.
+    fn coupled_system(&self) -> System {
+        let system = self.system();
+        System {
+            bodies: self.touched.couplings(&system.cell, self.elements().cells),
+            ..system.clone()
+        }
+    }
+
     fn waters(&self) -> Waters<'_> {
         let centers = &self.assembled().centers;
         Waters::new(&self.model, &self.elements().bricks, self.space(), centers)
@@ -206,10 +215,10 @@ impl FlipState {
     }
 
     /// Returns ‖b − A x‖ / ‖b‖, and [`ALLOWED`] for a requested tolerance `asked`.
-    fn residual(&self, b: &[f64], x: &[f64], asked: f64) -> [f64; 2] {
+    fn residual(&self, system: &System, b: &[f64], x: &[f64], asked: f64) -> [f64; 2] {
         let size = norm(b);
-        let residual = relative(norm(&minus(b, &self.system().apply(x))), size);
-        let spread = norm(&differences(self.system(), x));
+        let residual = relative(norm(&minus(b, &system.apply(x))), size);
+        let spread = norm(&differences(system, x));
         [residual, ALLOWED.of([asked, self.unit(), spread, size])]
     }
 }
@@ -350,7 +359,8 @@ fn project(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
 /// Solves the device's own system directly and compares the result with that of the iteration.
 fn whole(state: &FlipState, mut x: Vec<f64>, velocity: &[DVec3], io: &mut Io<'_>) -> PassResult {
     let mut b = state.by_row(&io.after, solved::RHS)?;
-    let system = state.system();
+    let coupled = state.coupled_system();
+    let system = &coupled;
     let solver = match Solver::new(system, BUDGET) {
         Ok(solver) => solver,
         Err(_) => {
@@ -364,7 +374,7 @@ fn whole(state: &FlipState, mut x: Vec<f64>, velocity: &[DVec3], io: &mut Io<'_>
     let exact = solver.solve(&b).x;
     let size = norm(&b);
     let asked = state.model.settings().pressure.tolerance;
-    let [residual, allowed] = state.residual(&b, &x, asked);
+    let [residual, allowed] = state.residual(system, &b, &x, asked);
     let off = minus(&x, &exact);
     let least = least_eigenvalue(&solver, b.len());
     // Also covers NaN, the result without any rows.
@@ -423,7 +433,7 @@ fn displace(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     });
     let mut b = state.by_row(&io.after, solved::RHS)?;
     remove_means(&mut b, &state.system().pockets());
-    let [residual, allowed] = state.residual(&b, &x, CORRECTION_TOLERANCE);
+    let [residual, allowed] = state.residual(state.system(), &b, &x, CORRECTION_TOLERANCE);
     io.table
         .add(&CORRECTION, [pair(0, residual, 0.0, [allowed])]);
     Ok(())

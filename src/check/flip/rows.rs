@@ -167,6 +167,45 @@ entries! {
             slowed: "Δt times the rate", v: "|v|"]
             (2.0 * place * moved + U * (16.0 * slowed + 4.0)) * v, "";
     }
+    "flip/couple_bodies" {
+        TOUCHED_AREA = "area of bodies in cells", "": [cut: "" CUT,
+            moved: "what it changes by as solids' distances move by " GRID]
+            6.0 * cut + 3.0 * moved, "6 faces", tie TURN;
+        TOUCHED_MOMENT = "moment of that area", "m": [cut: "" CUT,
+            arm: "distance from the centre of mass",
+            moved: "what it changes by as solids' distances move by " GRID]
+            (12.0 * cut + 8.0 * U) * arm + 3.0 * moved, "6 faces, 2 products each", tie TURN;
+        RESPONSE = "response of bodies", "": [own: "its own value",
+            turned: "the largest of the rows of turns"]
+            2.0 * U * own + 16.0 * U * turned, "rounded; from a rounded pose";
+    }
+    "pressure/push_bodies" {
+        PUSH = "sums of pressures over bodies", "": [unit: "U, or 2⁻⁵³ with f64", size: "Σ|J q|"]
+            74.0 * unit * size, "8 cells a thread, 64 threads, 2 words";
+    }
+    "pressure/move_bodies" {
+        BODY_CHANGE = "change of bodies' velocities", "": [unit: "U, or 2⁻⁵³ with f64",
+            terms: "pairs of bodies and bricks", size: "|R| Σ|sums|"]
+            unit * (terms / 64.0 + 72.0) * size, "a thread's pairs, 64 threads, 6 products";
+    }
+    "pressure/couple" {
+        COUPLED_PRODUCT = "system times direction, with bodies", "m/s":
+            [unit: "U, or 2⁻⁵³ with f64", size: "Σ|J v|", own: "its own value"]
+            unit * (16.0 * size + own), "6 products and sums for each of two bodies, and a sum";
+        COUPLED_RESIDUAL = "residual, with bodies", "m/s":
+            [unit: "U, or 2⁻⁵³ with f64", size: "Σ|J v|", own: "its own value"]
+            unit * (16.0 * size + own), "6 products and sums for each of two bodies, and a sum";
+    }
+    "pressure/carry_flux" {
+        CARRIED_FLUX = "flux of bodies", "m/s":
+            [unit: "U, or 2⁻⁵³ with f64", size: "Σ|J v|", own: "its own value"]
+            16.0 * unit * size + 2.0 * U * (own + size), "a sum in f32";
+    }
+    "flip/carry_bodies" {
+        CARRIED_FACES = "velocity of closed faces", "m/s":
+            [most: "the largest |change| of a point in the domain", own: "its own value"]
+            16.0 * U * most + U * own, "2 products and 3 sums", tie TURN;
+    }
     "pressure/build_system" {
         DIRICHLET = "what air adds to the diagonal", "": [unit: "U, or 2⁻⁵³ with f64",
             air: "Σ f / min(θ, 1)"]

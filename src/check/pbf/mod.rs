@@ -146,6 +146,16 @@ impl PbfState {
         }
     }
 
+    /// Takes over the bodies at the substep's end.
+    pub(super) fn stand(&mut self, boundary: &Boundary, bodies: &[BodyState]) {
+        if self.bodies != bodies {
+            self.bodies = bodies.to_vec();
+            let step = self.substep.time_step;
+            self.model = Model::new(&self.scene, boundary);
+            (self.model).stand(&self.scene, bodies, self.substep.time, step);
+        }
+    }
+
     /// Takes the boundary samples from the device, as inputs of its passes, and compares them as
     /// outputs of the upload.
     fn take_samples(&mut self, io: &mut Io<'_>) -> PassResult {

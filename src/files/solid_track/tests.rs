@@ -127,20 +127,20 @@ fn a_solid_goes_as_its_node_does() {
         (2.0, DVec3::new(5.0, 0.5, 0.0)),
         (9.0, DVec3::new(5.0, 0.5, 0.0)),
     ] {
-        let at = solid.pose(t).place(corner);
+        let at = solid.pose(&[], t).place(corner);
         // The file stores `f32`.
         assert!((at - expected).length() < 1e-6, "{t}: {at}");
     }
     // 1 m/s, and in the second second a quarter turn per second at the corner
     // farthest from the hinge.
-    assert!((solid.peak_speed(0.0, 0.9) - 1.0).abs() < 1e-6);
+    assert!((solid.peak_speed(&[], 0.0, 0.9) - 1.0).abs() < 1e-6);
     let farthest = DVec3::new(1.0, 1.5, 1.0).length();
     let most = 1.0 + FRAC_PI_2 * farthest;
-    assert!((solid.peak_speed(1.2, 1.4) / most - 1.0).abs() < 1e-6);
+    assert!((solid.peak_speed(&[], 1.2, 1.4) / most - 1.0).abs() < 1e-6);
     // Control: the opposite rotation.
     let [_, sin, _, cos] = quarter();
     let other = load(&file("rotation", "LINEAR", [0.0, -sin, 0.0, cos]), &[]).unwrap();
-    let at = other.moving_solids[0].pose(2.0).place(corner);
+    let at = other.moving_solids[0].pose(&[], 2.0).place(corner);
     assert!((at - DVec3::new(5.0, 0.5, 2.0)).length() < 1e-6, "{at}");
 }
 
@@ -206,7 +206,9 @@ fn a_solid_goes_as_a_prim_of_blender_does() {
         (25.0, [5.041_246_891, 0.0, 0.471_459_329]),
         (40.0, [5.041_246_891, 0.0, 0.471_459_329]),
     ] {
-        let at = solid.pose(frame / 24.0).place(DVec3::new(4.0, 0.5, 1.0));
+        let at = solid
+            .pose(&[], frame / 24.0)
+            .place(DVec3::new(4.0, 0.5, 1.0));
         // Blender and the file use `f32`.
         let off = (at - DVec3::new(x, z, -y)).length();
         assert!(off < 2e-6, "{frame}: {at} is {off} m off");
@@ -216,7 +218,7 @@ fn a_solid_goes_as_a_prim_of_blender_does() {
     let other = load(other.as_bytes(), &[OF_USD]).unwrap();
     let at = |scene: &Scene| {
         scene.moving_solids[0]
-            .pose(1.0)
+            .pose(&[], 1.0)
             .place(DVec3::new(4.0, 0.5, 1.0))
     };
     assert!((at(&other) - at(&scene)).length() > 0.1);
@@ -264,7 +266,7 @@ fn a_layer_without_time_codes_a_second_has_its_frames_a_second() {
         let scene = load(text.as_bytes(), &[any]).unwrap();
         // The quarter turn ends at time code 5.
         let turned = |t: f64| {
-            let turn = scene.moving_solids[0].pose(t).turn;
+            let turn = scene.moving_solids[0].pose(&[], t).turn;
             turn.angle_between(DQuat::IDENTITY)
         };
         let end = 5.0 / rate;
@@ -296,7 +298,7 @@ fn between_matrices_a_solid_turns_and_keeps_its_shape() {
         (0.5, DVec3::new(4.0, 0.5, 0.0)),
         (2.0, DVec3::new(4.0, 0.5, 0.0)),
     ] {
-        let at = scene.moving_solids[0].pose(t).place(corner);
+        let at = scene.moving_solids[0].pose(&[], t).place(corner);
         assert!((at - expected).length() < 1e-9, "{t}: {at}");
     }
 }
@@ -309,7 +311,7 @@ fn a_solid_s_file_begins_at_its_own_frame() {
     let of = |more: &str| format!("solid[0].track={{ file = \"door.usda\"{more} }}");
     let corner = DVec3::new(4.0, 0.5, 1.0);
     let half = 0.5f64.sqrt();
-    let at = |scene: &Scene, t: f64| scene.moving_solids[0].pose(t).place(corner);
+    let at = |scene: &Scene, t: f64| scene.moving_solids[0].pose(&[], t).place(corner);
     // Time codes are those of the file at any rate of the shot: frame 1 is at 1001.
     for (rate, first) in [("10", 0.1), ("20", 0.05)] {
         let rate = format!("shot.frames_per_second={rate}");
@@ -343,7 +345,7 @@ fn a_solid_s_file_begins_at_its_own_frame() {
     let scene = scene.unwrap();
     let begun = 0.5 * FRAC_PI_2;
     for (t, turned) in [(0.0, 0.0), (0.125, 0.5 * begun), (0.25, begun)] {
-        let pose = scene.moving_solids[0].pose(t);
+        let pose = scene.moving_solids[0].pose(&[], t);
         let angle = pose.turn.angle_between(DQuat::IDENTITY);
         assert!((angle - turned).abs() < 1e-7, "{t}: {angle}");
         let hinge = DVec3::new(3.5 + 2.0 * t, 0.0, 1.0);

@@ -33,11 +33,11 @@ fn the_speed_of_an_absorbing_wall_counts() {
     let scene = parse_scene(SCENE, Path::new("s.toml"), Path::new(""), &[]).expect("valid");
     let scene = scene.with_flip().expect("a scene of FLIP");
     let substeps = |absorbers: &AbsorberStates| {
-        let first = scene.flip_substep(absorbers, 1, 0.0, 0.05, 0.0, (0, 0.0));
+        let first = scene.flip_substep((absorbers, &[]), 1, 0.0, 0.05, 0.0, (0, 0.0));
         first.expect("few").0
     };
     let mut absorbers = AbsorberStates::default();
-    assert_eq!(scene.peak_boundary_speed(&absorbers, 0.0, 0.1), 0.0);
+    assert_eq!(scene.peak_boundary_speed(&absorbers, &[], 0.0, 0.1), 0.0);
     let at_rest = substeps(&absorbers);
     absorbers[0] = Some(AbsorberState {
         start: 0.0,
@@ -47,7 +47,7 @@ fn the_speed_of_an_absorbing_wall_counts() {
         level: None,
         mean: 0.0,
     });
-    assert!((scene.peak_boundary_speed(&absorbers, 0.0, 0.1) - 2.2).abs() < 1e-12);
+    assert!((scene.peak_boundary_speed(&absorbers, &[], 0.0, 0.1) - 2.2).abs() < 1e-12);
     // 1.7 m/s for 0.05 s are 0.085 m and gravity adds 0.025 m: more than a cell.
     assert_eq!((at_rest, substeps(&absorbers)), (1.0, 2.0));
 }

@@ -75,24 +75,24 @@ fn pbf_takes_as_many_substeps_as_the_way_has_cfl_lengths() {
             &format!("solver.pbf.cfl={cfl}"),
             "solver.pbf.grid_projection=false",
         ]);
-        let found = scene.pbf_substeps(&AT_REST, 0, speed);
+        let found = scene.pbf_substeps((&AT_REST, &[]), 0, speed);
         assert_eq!(found.ok(), Some(substeps), "cfl {cfl}, {speed} m/s");
     }
     let still = pbf(&["water.gravity=[0, 0, 0]", "solver.pbf.cfl=1.0"]);
-    assert_eq!(still.pbf_substeps(&AT_REST, 0, 0.0).ok(), Some(1));
+    assert_eq!(still.pbf_substeps((&AT_REST, &[]), 0, 0.0).ok(), Some(1));
 }
 
 /// Drops of 0.05 mm fly with the wind at once, never faster: (2 + 9) m/s × 0.2 s / 0.1 m.
 #[test]
 fn no_wind_makes_a_drop_faster_than_itself() {
     let windy = "effects.drag={drop_radius=0.00005,wind=[9,0,0]}";
-    let found = pbf(&["solver.pbf.cfl=1.0", windy]).pbf_substeps(&AT_REST, 0, 0.0);
+    let found = pbf(&["solver.pbf.cfl=1.0", windy]).pbf_substeps((&AT_REST, &[]), 0, 0.0);
     assert_eq!(found.ok(), Some(22));
     let flip = flip(&[windy]);
     // Solution of 9 t + g t² = 0.6 m.
     let longest = (-9.0 + f64::sqrt(81.0 + 24.0)) / 20.0;
     let substep = flip
-        .flip_substep(&AT_REST, 1, 0.0, 0.2, 0.0, (0, 0.0))
+        .flip_substep((&AT_REST, &[]), 1, 0.0, 0.2, 0.0, (0, 0.0))
         .expect("few enough")
         .1;
     assert!(
@@ -107,13 +107,19 @@ fn no_wind_makes_a_drop_faster_than_itself() {
 fn wind_shortens_substeps() {
     let of = |more: &[&str]| pbf(&[&["solver.pbf.cfl=1.0"], more].concat());
     let windy = "effects.drag={drop_radius=0.001,wind=[0,0,20]}";
-    assert_eq!(of(&[]).pbf_substeps(&AT_REST, 0, 0.0).ok(), Some(4));
+    assert_eq!(of(&[]).pbf_substeps((&AT_REST, &[]), 0, 0.0).ok(), Some(4));
     // (2 + 16.2) m/s × 0.2 s / 0.1 m.
-    assert_eq!(of(&[windy]).pbf_substeps(&AT_REST, 0, 0.0).ok(), Some(37));
+    assert_eq!(
+        of(&[windy]).pbf_substeps((&AT_REST, &[]), 0, 0.0).ok(),
+        Some(37)
+    );
     let still = "effects.drag={drop_radius=0.001}";
-    assert_eq!(of(&[still]).pbf_substeps(&AT_REST, 0, 0.0).ok(), Some(4));
+    assert_eq!(
+        of(&[still]).pbf_substeps((&AT_REST, &[]), 0, 0.0).ok(),
+        Some(4)
+    );
     let length = |more: &str| {
-        let substep = flip(&[more]).flip_substep(&AT_REST, 1, 0.0, 0.2, 0.0, (0, 0.0));
+        let substep = flip(&[more]).flip_substep((&AT_REST, &[]), 1, 0.0, 0.2, 0.0, (0, 0.0));
         substep.expect("few enough").1.length
     };
     // 0.141 s with gravity only, for surface waves, and 0.081 s in the wind for 3 × 0.2 m; two
@@ -133,14 +139,17 @@ fn capillary_waves_shorten_substeps() {
     ];
     let tense = [&still[..], &[tension]].concat();
     let with = |set| [&tense[..], &[set]].concat();
-    assert_eq!(pbf(&tense).pbf_substeps(&AT_REST, 0, 0.0).ok(), Some(4));
+    assert_eq!(
+        pbf(&tense).pbf_substeps((&AT_REST, &[]), 0, 0.0).ok(),
+        Some(4)
+    );
     let fine = pbf(&with("solver.pbf.particle_spacing=0.05"));
-    assert_eq!(fine.pbf_substeps(&AT_REST, 0, 0.0).ok(), Some(10));
-    let substep = flip(&tense).flip_substep(&AT_REST, 1, 0.0, 0.2, 0.0, (0, 0.0));
+    assert_eq!(fine.pbf_substeps((&AT_REST, &[]), 0, 0.0).ok(), Some(10));
+    let substep = flip(&tense).flip_substep((&AT_REST, &[]), 1, 0.0, 0.2, 0.0, (0, 0.0));
     assert!((substep.expect("few enough").1.length - 0.05).abs() < 1e-12);
     let few = flip(&with("solver.flip.max_substeps=3"));
     let breach = few
-        .flip_substep(&AT_REST, 1, 0.0, 0.2, 0.0, (0, 0.0))
+        .flip_substep((&AT_REST, &[]), 1, 0.0, 0.2, 0.0, (0, 0.0))
         .expect_err("4 are asked");
     let said = breach.to_string();
     assert!(
@@ -148,17 +157,26 @@ fn capillary_waves_shorten_substeps() {
         "{said}"
     );
     // Control: without surface tension one is enough.
-    assert_eq!(pbf(&still).pbf_substeps(&AT_REST, 0, 0.0).ok(), Some(1));
+    assert_eq!(
+        pbf(&still).pbf_substeps((&AT_REST, &[]), 0, 0.0).ok(),
+        Some(1)
+    );
 }
 
 #[test]
 fn pbf_refuses_more_substeps_than_it_may_take_and_takes_as_many() {
     // (v + 2 m/s) 0.2 s over 0.1 m: 38 m/s give 80 substeps.
     let most = |count: u32| pbf(&[&format!("solver.pbf.max_substeps={count}")]);
-    assert_eq!(most(81).pbf_substeps(&AT_REST, 3, 38.01).ok(), Some(81));
-    assert_eq!(most(82).pbf_substeps(&AT_REST, 3, 38.01).ok(), Some(81));
+    assert_eq!(
+        most(81).pbf_substeps((&AT_REST, &[]), 3, 38.01).ok(),
+        Some(81)
+    );
+    assert_eq!(
+        most(82).pbf_substeps((&AT_REST, &[]), 3, 38.01).ok(),
+        Some(81)
+    );
     let breach = most(80)
-        .pbf_substeps(&AT_REST, 3, 38.01)
+        .pbf_substeps((&AT_REST, &[]), 3, 38.01)
         .expect_err("81 are asked");
     let said = breach.to_string();
     assert!(
@@ -173,12 +191,12 @@ fn a_wall_counts_in_the_frames_in_which_it_moves_and_only_there() {
     // from frame 5 on.
     let scene = pbf(&["water.gravity=[0, 0, 0]", "solver.pbf.cfl=0.999", WALL]);
     let counts: Vec<_> = (0..7)
-        .map(|frame| scene.pbf_substeps(&AT_REST, frame, 1.0).ok())
+        .map(|frame| scene.pbf_substeps((&AT_REST, &[]), frame, 1.0).ok())
         .collect();
     let expected = [7, 7, 7, 7, 7, 3, 3].map(Some);
     assert_eq!(counts, expected);
     // The faster of the two counts, not their sum.
-    assert_eq!(scene.pbf_substeps(&AT_REST, 0, 4.0).ok(), Some(9));
+    assert_eq!(scene.pbf_substeps((&AT_REST, &[]), 0, 4.0).ok(), Some(9));
 }
 
 #[test]
@@ -189,7 +207,7 @@ fn flip_takes_substeps_in_which_nothing_moves_further_than_cfl_cells() {
     for (part, count) in [(0.9995, 4.0), (1.0005, 5.0)] {
         let remaining = 4.0 * longest * part;
         let (wanted, substep) = scene
-            .flip_substep(&AT_REST, 1, 0.3, remaining, 4.0, (0, 0.0))
+            .flip_substep((&AT_REST, &[]), 1, 0.3, remaining, 4.0, (0, 0.0))
             .expect("few enough");
         assert_eq!(wanted, count, "{part}");
         // The substeps are equal, and this is the first.
@@ -208,17 +226,17 @@ fn flip_takes_substeps_in_which_short_surface_waves_are_stable() {
     let longest = 0.02f64.sqrt();
     for (part, count) in [(0.9995, 4.0), (1.0005, 5.0)] {
         let remaining = 4.0 * longest * part;
-        let found = scene.flip_substep(&AT_REST, 1, 0.3, remaining, 0.0, (0, 0.0));
+        let found = scene.flip_substep((&AT_REST, &[]), 1, 0.3, remaining, 0.0, (0, 0.0));
         assert_eq!(found.expect("few enough").0, count, "{part}");
     }
     // PBF's projection has cells of 0.2 m too; in its own steps of gravity's fall, 10 m/s² × 0.2 s,
     // particles may go far with this CFL number.
-    let wanted = |more| pbf(&["solver.pbf.cfl=5.0", more]).pbf_substeps(&AT_REST, 0, 0.0);
+    let wanted = |more| pbf(&["solver.pbf.cfl=5.0", more]).pbf_substeps((&AT_REST, &[]), 0, 0.0);
     assert_eq!(wanted("solver.pbf.grid_projection=true").ok(), Some(2));
     assert_eq!(wanted("solver.pbf.grid_projection=false").ok(), Some(1));
     // The message names what asks for more than is allowed.
     let scene = flip(&["solver.flip.max_substeps=1"]);
-    let found = scene.flip_substep(&AT_REST, 1, 0.0, 0.2, 0.0, (0, 0.0));
+    let found = scene.flip_substep((&AT_REST, &[]), 1, 0.0, 0.2, 0.0, (0, 0.0));
     let detail = found
         .err()
         .and_then(|breach| breach.detail)
@@ -233,14 +251,14 @@ fn flip_takes_substeps_in_which_short_surface_waves_are_stable() {
 fn flip_counts_the_substeps_that_are_over_and_walls() {
     let scene = flip(&["water.gravity=[0, 0, 0]", WALL]);
     // 3.99 m/s for 0.3 s are 5.985 cells: two substeps of at most 3.
-    let count = |speed, done| scene.flip_substep(&AT_REST, 1, 1.0, 0.3, speed, (done, 0.0));
+    let count = |speed, done| scene.flip_substep((&AT_REST, &[]), 1, 1.0, 0.3, speed, (done, 0.0));
     assert_eq!(count(3.99, 0).ok().map(|found| found.0), Some(2.0));
     assert_eq!(count(3.99, 3).ok().map(|found| found.0), Some(2.0));
     assert!(count(3.99, 4).is_err(), "six, and five may be");
     // In the first second the wall is faster than the water: 3 m/s for 0.41 s are 6.15 cells.
     let beside = |start| {
         scene
-            .flip_substep(&AT_REST, 1, start, 0.41, 0.0, (0, 0.0))
+            .flip_substep((&AT_REST, &[]), 1, start, 0.41, 0.0, (0, 0.0))
             .ok()
     };
     assert_eq!(beside(0.5).map(|found| found.0), Some(3.0));

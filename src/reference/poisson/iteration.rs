@@ -1,7 +1,7 @@
 //! Reference passes of an iteration, row by row, and the magnitudes that their rounding errors are
 //! relative to.
 
-use swell_domain::poisson::{NONE, System};
+use swell_domain::poisson::{Coupling, NONE, System};
 
 use super::{Solver, gradients::norm};
 
@@ -38,8 +38,25 @@ pub fn products(a: &[f64], b: &[f64]) -> Sum {
     }
 }
 
-/// Returns Σ c |x − x'| plus the air term's magnitude for each row.
+/// Terms of a sum over a body's cells, for each rounding error that a row has without bodies.
+const OF_BODIES: f64 = 8.0;
+
+/// Returns Σ c |x − x'| plus the air term's magnitude for each row, and that of bodies' terms.
 pub fn differences(system: &System, x: &[f64]) -> Vec<f64> {
+    let mut all = of_water(system, x);
+    let sizes: Vec<f64> = x.iter().map(|x| x.abs()).collect();
+    for body in &system.bodies {
+        let size = Coupling {
+            row: body.row.clone(),
+            push: body.push.iter().map(|push| push.map(f64::abs)).collect(),
+            response: body.response.map(|row| row.map(|r| OF_BODIES * r.abs())),
+        };
+        size.add_flux(&size.change(&sizes), &mut all);
+    }
+    all
+}
+
+fn of_water(system: &System, x: &[f64]) -> Vec<f64> {
     (0..x.len())
         .map(|i| {
             let shared = system.neighbor[i].iter().zip(&system.coefficient[i]);

@@ -571,6 +571,11 @@ impl TraceFrame for Pbf {
             self.prepare_substep(time, step, &mut |program, recordings| {
                 trace(recordings, program, &mut tell)
             })?;
+            let begun = Begun {
+                bodies: self.state.bodies.clone(),
+                ..begun.clone()
+            };
+            let mut tell = |traced: Traced<'_>| observe(&begun, traced);
             trace(&[&self.substep], &self.program, &mut tell)?;
             if number == last {
                 self.program.upload(PARAMS, 0, &[self.params(time, 0.0)]);

@@ -43,8 +43,8 @@ impl<'a> Frames<'a> {
             scene: plan.scene,
             directory: &request.directory,
             writer,
-            first: clock.frame + 1,
             clock,
+            first: clock.frame + 1,
             looked: probes::Looked::new(plan.scene),
             held: Held::default(),
             blocked: 0,
@@ -84,13 +84,12 @@ impl<'a> Frames<'a> {
             steps: self.clock.steps + u64::from(report.substeps),
             substep: particles.substep,
             walls: particles.walls,
-            bodies: particles.bodies.clone(),
             next_id,
         };
         let extra = json!({ "seconds": seconds });
         let reported = serde_json::to_value(&report).unwrap_or(Value::Null);
         self.writer
-            .submit(self.clock.clone(), particles, seen, reported, extra)?;
+            .submit(self.clock, particles, seen, reported, extra)?;
         if frame == self.first {
             // Left by an earlier bake that failed at this frame.
             failed::remove(self.directory)?;

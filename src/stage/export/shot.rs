@@ -142,7 +142,7 @@ impl ExportJob<'_> {
 
     /// States of the bodies after a frame.
     fn bodies_at(&self, frame: u32) -> Result<Vec<BodyState>, CacheError> {
-        Ok(self.cache.entry(frame)?.clock.bodies.clone())
+        Ok(self.cache.entry(frame)?.bodies.clone())
     }
 
     fn solids(&self) -> Result<Vec<Solid>, CacheError> {

@@ -115,6 +115,7 @@ fn tank(method: Method, speed: f64) -> (Scene, Start) {
             )),
             placed,
             track: None,
+            body: None,
             slide: Some(Slide {
                 direction: DVec3::new(0.6, 0.0, 0.8),
                 motion: Motion::ConstantVelocity {
@@ -205,7 +206,7 @@ fn a_sphere_that_moves_through_pbf_is_within_tolerance() {
             // One is placed inside the sphere, on the side that moves towards it.
             let time = f64::from(frames) * scene.shot.frame_seconds();
             let within =
-                scene.moving_solids[0].pose(time).place(SPHERE.0) + 0.5 * SPHERE.1 * DVec3::X;
+                scene.moving_solids[0].pose(&[], time).place(SPHERE.0) + 0.5 * SPHERE.1 * DVec3::X;
             state.position[0] = within.as_vec3().to_array();
             let place = (
                 "pbf/predict",
@@ -256,7 +257,10 @@ fn a_sphere_in_a_tank_of_flip_is_within_tolerance() {
         assert!(faults.is_empty(), "{faults}");
         // Particles rarely touch it by themselves: one is placed inside.
         let time = f64::from(FRAMES) * scene.shot.frame_seconds();
-        let pose = scene.moving_solids.first().map(|solid| solid.pose(time));
+        let pose = scene
+            .moving_solids
+            .first()
+            .map(|solid| solid.pose(&[], time));
         let centre = pose.map_or(SPHERE.0, |pose| pose.place(SPHERE.0));
         let within = centre + 0.5 * SPHERE.1 * DVec3::Y;
         state.position[0] = within.as_vec3().to_array();

@@ -77,7 +77,7 @@ fn trace_with(case: &Case, mut reference: Reference) -> Trace {
         .with_flip()
         .unwrap()
         .flip_substep(
-            &case.particles.walls,
+            (&case.particles.walls, &[]),
             FRAME + 1,
             f64::from(FRAME) * length,
             length,

@@ -35,7 +35,7 @@ impl Grid {
         let start = f64::from(FRAME) * length;
         let (_, substep) = (reference.model().scene)
             .flip_substep(
-                &case.particles.walls,
+                (&case.particles.walls, &[]),
                 FRAME + 1,
                 start,
                 length,
@@ -56,7 +56,7 @@ impl Grid {
     }
 
     fn cells(&self) -> Vec<ViscousCell> {
-        let step = self.model().step(&self.substep, &Default::default());
+        let step = self.model().step(&self.substep, &Default::default(), &[]);
         viscosity_weigh(FaceInputs {
             model: self.model(),
             step: &step,

@@ -272,7 +272,7 @@ fn grid_vorticity_and_its_confinement_are_fedkiws() {
     let trace = traced(&scene, &particles, 0.01);
     let reference = FlipReference::new(&scene.with_flip().unwrap(), &Boundary::default());
     let model = reference.model();
-    let step = model.step(&step_of(0.01, 1.0), &Default::default());
+    let step = model.step(&step_of(0.01, 1.0), &Default::default(), &[]);
     let spin = DVec3::new(0.5, -1.0, 2.0);
     let center = DVec3::splat(0.6);
     let elements = trace.faces.velocity.len() as u32;

@@ -243,7 +243,9 @@ fn nothing_ends_within_a_box_faster_than_the_cfl_limit() {
         let (next, report) = solver.advance().unwrap();
         state = next;
         assert!(report.substeps >= 3, "{}", report.substeps);
-        let by = scene.moving_solids[0].pose(f64::from(frame) / 100.0).centre;
+        let by = scene.moving_solids[0]
+            .pose(&[], f64::from(frame) / 100.0)
+            .centre;
         // Particles keep a tenth of their spacing; the trilinear distance is short by less than
         // that at an edge.
         let least = nearest(&state, moved(start, by));
@@ -355,7 +357,7 @@ fn a_box_that_dips_into_a_tank_lifts_its_water_by_what_it_displaces() {
     let mut resumed = solver(&context, &scene, &particles);
     resumed.load(20, twentieth).unwrap();
     assert_eq!(&resumed.advance().unwrap().0, next);
-    let end = moved(start, scene.moving_solids[0].pose(0.8).centre);
+    let end = moved(start, scene.moving_solids[0].pose(&[], 0.8).centre);
     assert!((end.min.y - 0.47).abs() < 1e-9);
     assert!(nearest(state, end) > -0.1 * DX);
     // Volume: 2.56 L − 0.36 (L − 0.47) = 2.56 · 0.8.
@@ -456,7 +458,7 @@ fn scenes_say_where_solids_go() {
     let scene = parse(SCENE, &[]).unwrap();
     assert!(scene.solids.is_empty());
     let solid = &scene.moving_solids[0];
-    assert!((solid.pose(3.0).centre - DVec3::new(0.0, -0.5, 0.0)).length() < 1e-12);
+    assert!((solid.pose(&[], 3.0).centre - DVec3::new(0.0, -0.5, 0.0)).length() < 1e-12);
     assert_eq!(scene.mesh_files().len(), 1);
     let written = scene_to_toml(&scene, &|_, _| "box.obj".into());
     assert_eq!(parse(&written, &[]).unwrap(), scene);
@@ -515,10 +517,10 @@ fn scenes_say_where_solids_go() {
     let solid = &both.moving_solids[0];
     // After a second, halfway through the ramp, the solid is at half of its stroke, 0.25 m down,
     // and a point to the right of the pivot has moved below it.
-    let at = solid.pose(1.0).place(DVec3::new(2.0, 1.0, 1.5));
+    let at = solid.pose(&[], 1.0).place(DVec3::new(2.0, 1.0, 1.5));
     assert!((at - DVec3::new(1.5, 0.25, 1.5)).length() < 1e-12, "{at}");
     assert!(
-        solid.peak_speed(0.0, 2.0)
+        solid.peak_speed(&[], 0.0, 2.0)
             > both.moving_solids[0]
                 .slide
                 .as_ref()

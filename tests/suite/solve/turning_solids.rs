@@ -67,6 +67,7 @@ fn case(spin: f64, angle: f64) -> (Scene, Boundary, Particles) {
         slide: None,
         turn: Some(turn),
         track: None,
+        body: None,
     }];
     let back = DMat2::from_angle(-angle);
     let all = lattice([0.0; 3], [48, 48, 2 * DEEP], [DX / 2.0; 3]);

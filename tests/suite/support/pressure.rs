@@ -12,10 +12,16 @@ use swell::{
     solve::{
         flip::buffers::*,
         pressure::{
-            self, PressureSolver, Projected, Scale, Solved, blocked,
+            self, Extent, PressureSolver, Projected, Scale, Solved, blocked,
             buffers::{COEFFICIENT, DIRICHLET, Real, SOLUTION, read_reals},
         },
     },
+};
+
+/// The projection of a scene without bodies.
+const WITH_CORRECTION: Extent = Extent {
+    has_correction: true,
+    has_bodies: false,
 };
 
 pub struct Rig {
@@ -54,10 +60,10 @@ impl Rig {
             LIQUID_DISTANCE.sized(cells),
             DENSITY_EXCESS.sized(cells),
         ]);
-        let passes = pressure::passes(settings, surface, true, false);
+        let passes = pressure::passes(settings, surface, WITH_CORRECTION, false);
         let program = Program::new(context, &specs, &passes, &[]).unwrap();
         let mut rig = Self {
-            solver: PressureSolver::new(settings, true, capacity),
+            solver: PressureSolver::new(settings, WITH_CORRECTION, capacity),
             system: case.system(),
             program,
             case,
@@ -81,7 +87,7 @@ impl Rig {
 
     /// From now on solves with other settings of the same preconditioner and precision.
     pub fn set(&mut self, settings: &Pressure) {
-        self.solver = PressureSolver::new(settings, true, self.capacity);
+        self.solver = PressureSolver::new(settings, WITH_CORRECTION, self.capacity);
         self.upload_case();
     }
 

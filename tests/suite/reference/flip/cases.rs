@@ -151,7 +151,7 @@ pub fn moving_solid() -> Case {
     };
     let solid = mover(bounds, DVec3::new(1.0, 0.3, 0.2), motion);
     let solid = turning(solid, DVec3::new(0.2, -0.3, 1.0), 40.0);
-    let now = solid.pose(f64::from(FRAME) * scene.shot.frame_seconds());
+    let now = solid.pose(&[], f64::from(FRAME) * scene.shot.frame_seconds());
     let grid = bounds.grown(2.0 * DX);
     let distance = SignedDistance::from_mesh(&solid.placed.mesh, &grid, 0.5 * DX).unwrap();
     let particles = kept(&particles, |x| {

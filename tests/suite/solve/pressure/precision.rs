@@ -14,6 +14,7 @@ use swell::{
     solve::{
         flip::buffers::DENSITY_EXCESS,
         pressure::{
+            Extent,
             buffers::{RHS, SOLUTION},
             passes, planned,
         },
@@ -150,7 +151,10 @@ fn a_precision_takes_its_own_bytes_and_features() {
         &passes(
             &in_precision(Precision::F64, 1e-5),
             SceneSurface::GhostFluid,
-            true,
+            Extent {
+                has_correction: true,
+                has_bodies: false,
+            },
             false,
         ),
         &[],
