@@ -8,14 +8,19 @@
 
 @group(0) @binding(2) var<storage, read> body_pairs: array<BodyPair>;
 @group(0) @binding(3) var<storage, read> body_states: DeviceBodies;
-// Change of each body's six velocities, m/s and rad/s.
+// Change of each body's six velocities by the pressure, m/s and rad/s, and behind those of all
+// bodies that by what flip/couple_bodies found.
 @group(0) @binding(4) var<storage, read> body_change: array<real>;
 @group(0) @binding(5) var<storage, read> face_open: array<f32>;
 @group(0) @binding(6) var<storage, read_write> face_velocity: array<f32>;
 
 fn change(first: u32) -> vec3f {
+    let other = first + arrayLength(&body_change) / 2u;
     return vec3f(
-        f32(body_change[first]), f32(body_change[first + 1u]), f32(body_change[first + 2u]));
+        f32(body_change[first] + body_change[other]),
+        f32(body_change[first + 1u] + body_change[other + 1u]),
+        f32(body_change[first + 2u] + body_change[other + 2u]),
+    );
 }
 
 @compute @workgroup_size(64)

@@ -1,16 +1,30 @@
 // How the pressure of each cell pushes a body: the area of its surface in the cell, as a vector and
 // as a moment about the centre of mass (Batty et al. 2007). By symmetry the same six numbers times
 // the body's velocity are its flux out of the cell.
+//
+// The pressure of a cell is that at its centre, and the body's surface lies elsewhere in it. Where
+// the pressure grows with depth as in still water, that makes a difference by ρ g times what the
+// cell's solid volume is less than the mean of its closed faces; without it the body would displace
+// whole layers of cells, and bob between them.
 #import "shared/thread.wgsl"
 #import "shared/flip_params.wgsl"
 #import "shared/flip_cell.wgsl"
 #import "shared/flip_faces.wgsl"
 #import "shared/bodies.wgsl"
+#import "shared/pressure_real.wgsl"
 
 @group(0) @binding(2) var<storage, read> body_pairs: array<BodyPair>;
 @group(0) @binding(3) var<storage, read> body_states: DeviceBodies;
 // For each pair six arrays of 512 cells: area over Δx², then moment over Δx², metres.
 @group(0) @binding(4) var<storage, read_write> body_coupling: array<f32>;
+// For each pair six sums of that difference, as pressures q.
+@group(0) @binding(5) var<storage, read_write> body_sums: array<real>;
+@group(0) @binding(6) var<storage, read> cell_kind: array<u32>;
+@group(0) @binding(9) var<storage, read> open_volume: array<f32>;
+
+const FLUID = 1u;
+
+var<workgroup> terms: array<array<real, 6>, 64>;
 
 // Area of the body in a face, over Δx²; 0 where another solid is nearer.
 fn share(of_walls: vec3f, open: vec3f, nearest: vec3u, solid: u32) -> vec3f {
@@ -24,14 +38,14 @@ fn main(
     @builtin(local_invocation_index) local: u32,
 ) {
     let pair = thread_index(workgroup, workgroups, 0u, 1u);
-    if pair >= body_states.pairs {
-        return;
-    }
-    let body = body_pairs[pair].body;
+    let is_due = pair < body_states.pairs;
+    let body = body_pairs[select(0u, pair, is_due)].body;
     let solid = body_states.first_solid + body;
     let centre = body_states.bodies[body].centre;
-    for (var inner = local; inner < CELLS; inner += 64u) {
-        let cell = vec3f(own_cell(CELLS * body_pairs[pair].slot + inner));
+    var sums = array<real, 6>(0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+    for (var inner = local; inner < select(0u, CELLS, is_due); inner += 64u) {
+        let element = CELLS * body_pairs[pair].slot + inner;
+        let cell = vec3f(own_cell(element));
         let extent = open_extent(cell);
         let cut = cut_faces(cell, extent.yzx * extent.zxy);
         let low = share(cut.lower_of_walls, cut.lower, cut.lower_solid, solid);
@@ -45,5 +59,24 @@ fn main(
             body_coupling[first + CELLS * k] = area[k];
             body_coupling[first + CELLS * (k + 3u)] = way[k];
         }
+        // In a cell that other solids touch as well, the volume is not the body's alone.
+        let is_alone = cell_kind[element] == FLUID && cut.solids == 1u << solid;
+        let filled = extent.x * extent.y * extent.z - open_volume[element];
+        let missing = 0.5 * (low + high) - filled;
+        let push = params.velocity_step * select(vec3f(0.0), missing, is_alone);
+        let turn = cross(arm, push);
+        for (var k = 0u; k < 3u; k++) {
+            sums[k] += real(push[k]);
+            sums[k + 3u] += real(turn[k]);
+        }
+    }
+    terms[local] = sums;
+    workgroupBarrier();
+    if local < 6u && is_due {
+        var sum = real(0.0);
+        for (var k = 0u; k < 64u; k++) {
+            sum += terms[k][local];
+        }
+        body_sums[6u * pair + local] = sum;
     }
 }

@@ -1,4 +1,5 @@
-// Changes of the bodies' velocities by the summed pressures, one workgroup for each body.
+// Changes of the bodies' velocities by the summed pressures, one workgroup for each body; or by the
+// sums of flip/couple_bodies, which follow those by pressures.
 #import "shared/pressure_phase.wgsl"
 #import "shared/pressure_real.wgsl"
 #import "shared/bodies.wgsl"
@@ -7,6 +8,10 @@
 @group(0) @binding(2) var<storage, read> body_order: array<u32>;
 @group(0) @binding(3) var<storage, read> body_sums: array<real>;
 @group(0) @binding(4) var<storage, read_write> body_change: array<real>;
+
+// What the sums are: those of flip/couple_bodies, or none.
+const OF_WEIGHT = 2u;
+const OF_NOTHING = 3u;
 
 var<workgroup> terms: array<array<real, 6>, 64>;
 var<workgroup> sums: array<real, 6>;
@@ -18,7 +23,8 @@ fn main(
     @builtin(local_invocation_index) local: u32,
 ) {
     let body = thread_index(workgroup, workgroups, 0u, 1u);
-    let last = arrayLength(&body_change) / 6u - 1u;
+    let count = arrayLength(&body_change) / 12u;
+    let last = count - 1u;
     let own = min(body, last);
     var sum = array<real, 6>(0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
     let end = body_states.bodies[own].end;
@@ -45,6 +51,7 @@ fn main(
             let response = body_states.bodies[own].response[place / 4u][place % 4u];
             change += real(response) * sums[k];
         }
-        body_change[6u * own + local] = change;
+        let first = select(0u, 6u * count, phase.step >= OF_WEIGHT);
+        body_change[first + 6u * own + local] = select(change, 0.0, phase.step == OF_NOTHING);
     }
 }

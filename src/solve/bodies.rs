@@ -80,7 +80,8 @@ pub const TOUCHED: Buf<[u32; 4]> = Buf::new("body_bricks");
 pub const COUPLING: Buf<f32> = Buf::new("body_coupling");
 /// Six sums of pressures over the cells of each pair.
 pub const SUMS: Buf<Real> = Buf::new("body_sums");
-/// Change of the six velocities of each body by those pressures, m/s and rad/s.
+/// Change of the six velocities of each body by those pressures, m/s and rad/s; behind them that by
+/// the weight of the water between the centres of cells and the body's surface.
 pub const CHANGE: Buf<Real> = Buf::new("body_change");
 
 /// Distance beyond a body's box within which its surface may cut a cell, in cells.
@@ -120,7 +121,7 @@ pub(super) fn planned(scene: &FlipScene, grid_dims: [u32; 3]) -> Vec<BufferSpec>
         TOUCHED.sized(pairs),
         COUPLING.sized(6 * CELLS as usize * pairs),
         reals(SUMS, 6 * pairs),
-        reals(CHANGE, 6 * count),
+        reals(CHANGE, 12 * count),
     ]
 }
 
@@ -252,13 +253,15 @@ fn turned(b: &Bounds, place: &DAffine3) -> Bounds {
     })
 }
 
-/// Reads the change of each body's velocities by the last projection.
+/// Reads the change of each body's velocities by the last projection, with what came before it.
 pub(super) fn changes(
     program: &Program,
     precision: Precision,
     bodies: usize,
 ) -> Result<Vec<Six>, SolveError> {
-    let all = super::pressure::buffers::read_reals(program, &CHANGE, precision, 6 * bodies)?;
+    let all = super::pressure::buffers::read_reals(program, &CHANGE, precision, 12 * bodies)?;
+    let (by_pressure, before) = all.split_at(6 * bodies);
+    let both: Vec<f64> = by_pressure.iter().zip(before).map(|(a, b)| a + b).collect();
     let six = |c: &[f64]| std::array::from_fn(|k| c[k]);
-    Ok(all.chunks_exact(6).map(six).collect())
+    Ok(both.chunks_exact(6).map(six).collect())
 }

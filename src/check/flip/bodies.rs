@@ -185,6 +185,9 @@ impl FlipState {
         if io.pass == "pressure/push_bodies" {
             self.follows_verify = io.last == "pressure/verify";
         }
+        if phase.step >= OF_WEIGHT {
+            return Ok(Some(phase.step + 1));
+        }
         let (part, wanted) = match (phase.step, self.follows_verify) {
             (0, _) => (0, ITERATING),
             (_, true) => (1, VERIFYING),
@@ -197,8 +200,19 @@ impl FlipState {
         self.sixes(view, &device::SUMS, count)
     }
 
-    fn changes(&self, view: &TracedBuffers<'_>) -> Result<Vec<Six>, SolveError> {
-        self.sixes(view, &device::CHANGE, self.bodies.len())
+    /// Returns the changes of the bodies' velocities by the pressure, and those before the solve.
+    fn changes(&self, view: &TracedBuffers<'_>) -> Result<[Vec<Six>; 2], SolveError> {
+        let count = self.bodies.len();
+        let mut by_pressure = self.sixes(view, &device::CHANGE, 2 * count)?;
+        let before = by_pressure.split_off(count);
+        Ok([by_pressure, before])
+    }
+
+    /// Returns those that a run of a pass writes or reads.
+    fn changes_of(&self, io: &Io<'_>, view: &TracedBuffers<'_>) -> Result<Vec<Six>, SolveError> {
+        let [by_pressure, before] = self.changes(view)?;
+        let is_before = io.before.window(&solved::PHASES)?.step >= OF_WEIGHT;
+        Ok(if is_before { before } else { by_pressure })
     }
 
     fn sixes(
@@ -224,6 +238,9 @@ impl FlipState {
             .collect())
     }
 }
+
+/// Step of the passes that take the sums of flip/couple_bodies; with the next one they take none.
+const OF_WEIGHT: u32 = 2;
 
 /// Compares the coupling of every cell with every body: also that of bricks that no pair lists.
 fn couple_bodies(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
@@ -281,6 +298,29 @@ fn couple_bodies(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
             pair(k, response[k / 6][k % 6], exact, [exact.abs(), turned])
         });
     }
+    let pairs = touched.pairs.len();
+    let found = state.of_pairs(&io.after, pairs)?;
+    for (body, exact) in exact.iter().enumerate() {
+        let own = |pair: &usize| touched.pairs[*pair].body as usize == body;
+        let all: Vec<usize> = (0..pairs).filter(own).collect();
+        let apart = |k: usize| {
+            let apart = |other: &[BodyCells]| (other[body].weight[k] - exact.weight[k]).abs();
+            apart(&less).max(apart(&more))
+        };
+        let cells = exact.element.len() as f64;
+        let velocity = state.step().velocity_step.length();
+        let arm = state.scene.domain.size().length();
+        io.table.each(&WEIGHT, 0..6, |k| {
+            let found: f64 = all.iter().map(|&pair| found[pair][k]).sum();
+            let arm = if k < 3 { 1.0 } else { arm };
+            pair(
+                6 * body + k,
+                found,
+                exact.weight[k],
+                [place, cells * velocity * arm, apart(k)],
+            )
+        });
+    }
     state.touched = touched;
     Ok(())
 }
@@ -328,11 +368,14 @@ fn move_bodies(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let (unit, touched) = (state.unit(), &state.touched);
     let sums = state.of_pairs(&io.before, touched.pairs.len())?;
     let wet = state.elements().bricks.wet;
-    let found = state.changes(&io.after)?;
+    let found = state.changes_of(io, &io.after)?;
+    let is_none = io.before.window(&solved::PHASES)?.step > OF_WEIGHT;
+    let is_weight = io.before.window(&solved::PHASES)?.step == OF_WEIGHT;
     let count = found.len();
     let [mut all, mut sizes] = [vec![[0.0; 6]; count], vec![[0.0; 6]; count]];
     for (pair, sum) in touched.pairs.iter().zip(&sums) {
-        for k in (0..6).filter(|_| pair.slot <= wet) {
+        // Bricks without water have no pressures.
+        for k in (0..6).filter(|_| (pair.slot <= wet || is_weight) && !is_none) {
             all[pair.body as usize][k] += sum[k];
             sizes[pair.body as usize][k] += sum[k].abs();
         }
@@ -350,7 +393,7 @@ fn move_bodies(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
 
 fn couple(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let unit = state.unit();
-    let changes = state.changes(&io.before)?;
+    let [changes, _] = state.changes(&io.before)?;
     let [flux, sizes] = state.touched.flux(state.elements().cells, &changes);
     let cell = state.system().cell.clone();
     let is_product = io.before.window(&solved::PHASES)?.step == 0;
@@ -385,7 +428,7 @@ fn couple(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
 
 fn carry_flux(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let (unit, elements) = (state.unit(), state.elements());
-    let changes = state.changes(&io.before)?;
+    let changes = state.changes_of(io, &io.before)?;
     let [flux, sizes] = state.touched.flux(elements.cells, &changes);
     let before = elements.scalars(&io.before, buffers::SOLID_FLUX)?;
     let after = elements.scalars(&io.after, buffers::SOLID_FLUX)?;
@@ -401,7 +444,11 @@ fn carry_flux(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
 
 fn carry_bodies(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let elements = state.elements();
-    let changes = state.changes(&io.before)?;
+    let [by_pressure, before] = state.changes(&io.before)?;
+    let both = by_pressure.iter().zip(&before);
+    let changes: Vec<Six> = both
+        .map(|(a, b)| std::array::from_fn(|k| a[k] + b[k]))
+        .collect();
     let mut exact = elements.planes(&io.before, buffers::FACE_VELOCITY)?;
     let (step, bodies) = (state.step(), (&state.bodies[..], &changes[..]));
     let bricks = &elements.bricks;
@@ -430,7 +477,8 @@ impl FlipState {
     /// Returns the reference's coupling with the solids' distances shifted by `shift`, metres.
     fn coupled(&self, shift: f64) -> Vec<BodyCells> {
         self.with_shifted_solids(shift, DVec3::ZERO, |model, step| {
-            reference_couple(model, step, &self.elements().bricks, &self.bodies)
+            let bricks = &self.elements().bricks;
+            reference_couple(model, step, bricks, self.space(), &self.bodies)
         })
     }
 }

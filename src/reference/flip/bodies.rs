@@ -8,9 +8,9 @@ use super::{
     to_grid::cut_faces,
 };
 use swell_domain::{
-    body::{BodyState, Six},
+    body::{BodyState, Six, dot, product},
     bricks::Bricks,
-    poisson::{Coupling, System},
+    poisson::{Coupling, FLUID, System},
 };
 use swell_scene::step::Substep;
 
@@ -22,11 +22,19 @@ pub struct BodyCells {
     /// Area of the surface in each of them over Δx², then its moment about the centre of mass over
     /// Δx², metres.
     pub push: Vec<Six>,
+    /// Sums over the cells of what gravity adds to their pressures q between their centres and the
+    /// body's surface, m/s.
+    pub weight: Six,
     /// Rows of six: ρ Δx³ times the inverse of the mass matrix within the body's freedom.
     pub response: [Six; 6],
 }
 
 impl BodyCells {
+    /// Returns the change of the body's velocities by that weight.
+    pub fn before(&self) -> Six {
+        product(&self.response, &self.weight)
+    }
+
     /// Returns the body's part of a system.
     fn of_system(&self, row_of: &[u32]) -> Coupling {
         let with_row = self.element.iter().zip(&self.push);
@@ -59,7 +67,7 @@ pub(super) fn add_bodies(bodies: &[BodyCells], elements: usize, system: &mut Sys
 pub(super) fn carry_flux(bodies: &[BodyCells], changes: &[Six], flux: &mut [f64]) {
     for (body, change) in bodies.iter().zip(changes) {
         for (&element, push) in body.element.iter().zip(&body.push) {
-            flux[element as usize] += swell_domain::body::dot(push, change);
+            flux[element as usize] += dot(push, change);
         }
     }
 }
@@ -70,6 +78,7 @@ pub fn couple_bodies(
     model: &Model,
     step: &FlipSubstep<'_>,
     bricks: &Bricks,
+    space: &OpenSpace,
     bodies: &[BodyState],
 ) -> Vec<BodyCells> {
     let size = model.cell_size();
@@ -90,20 +99,45 @@ pub fn couple_bodies(
                 };
                 DVec3::new(own(0), own(1), own(2))
             });
-            let area = high - low;
-            let way = ((cell + 0.5) * size - centre).cross(area);
-            [area.x, area.y, area.z, way.x, way.y, way.z]
+            let arm = (cell + 0.5) * size - centre;
+            // In a cell that other solids touch as well, the volume is not the body's alone.
+            let is_alone = match cut.near[..] {
+                [only] => std::ptr::eq(only, &step.solids[first + index]),
+                _ => false,
+            };
+            let missing = match is_alone && space.kind[element as usize] == FLUID {
+                true => {
+                    let all = step.open_extent(cell).element_product();
+                    0.5 * (low + high) - (all - space.volume[element as usize])
+                }
+                false => DVec3::ZERO,
+            };
+            [high - low, step.velocity_step * missing].map(|push| moment(arm, push))
         };
-        let pushes = per_cell(bricks, of_cell);
-        let touched = (0u32..).zip(pushes).filter(|(_, push)| *push != [0.0; 6]);
+        let cells = per_cell(bricks, of_cell);
+        let mut weight = [0.0; 6];
+        for [_, more] in &cells {
+            weight = std::array::from_fn(|k| weight[k] + more[k]);
+        }
+        let touched = (0u32..)
+            .zip(cells)
+            .map(|(element, [push, _])| (element, push));
+        let touched = touched.filter(|(_, push)| *push != [0.0; 6]);
         let (element, push) = touched.unzip();
         BodyCells {
             element,
             push,
+            weight,
             response: it.body.response(state).map(|row| row.map(|r| scale * r)),
         }
     })
     .collect()
+}
+
+/// Returns a push and its moment.
+fn moment(arm: DVec3, push: DVec3) -> Six {
+    let turn = arm.cross(push);
+    [push.x, push.y, push.z, turn.x, turn.y, turn.z]
 }
 
 /// Reference pass of `flip/carry_bodies`: adds to closed faces the change of velocity of the body
@@ -168,11 +202,13 @@ impl Model {
 }
 
 impl Trace {
-    /// Returns the changes of the bodies' velocities by all projections of the substep.
+    /// Returns the changes of the bodies' velocities by the water in the substep.
     pub fn body_changes(&self) -> Vec<Six> {
         let mut sums = vec![[0.0; 6]; self.bodies.len()];
-        for projected in self.projections() {
-            for (sum, change) in sums.iter_mut().zip(&projected.changes) {
+        let before: Vec<Six> = self.coupled.iter().map(BodyCells::before).collect();
+        let all = self.projections().map(|projected| &projected.changes);
+        for changes in [&before].into_iter().chain(all) {
+            for (sum, change) in sums.iter_mut().zip(changes) {
                 *sum = std::array::from_fn(|k| sum[k] + change[k]);
             }
         }

@@ -13,7 +13,7 @@ use super::{
 };
 use crate::{ReferenceError, Timings};
 use swell_domain::{
-    body::BodyState,
+    body::{BodyState, Six},
     boundary::Boundary,
     bricks::Bricks,
     budget::Breach,
@@ -241,15 +241,22 @@ impl Flip {
         };
         effects::on_faces(&model.scene.effects, water, &mut faces.velocity, timings);
         let coupled = timings.time("flip/couple_bodies", || {
-            couple_bodies(model, &step, &bricks, &before)
+            couple_bodies(model, &step, &bricks, &space, &before)
         });
         let waters = Waters::new(model, &bricks, &space, &centers);
         let mut waters = waters.with_bodies(&coupled);
+        let by_weight: Vec<Six> = coupled.iter().map(BodyCells::before).collect();
+        waters.carry_flux(&by_weight);
+        let mut carried = by_weight.clone();
         let mut project = |centers, faces: &mut Faces, timings: &mut Timings| {
             let found = project(model, timings, *factor_budget, &mut waters, centers, faces)?;
             if !before.is_empty() {
-                let bodies = (&before[..], &found.0.changes[..]);
+                for (sum, change) in carried.iter_mut().zip(&found.0.changes) {
+                    *sum = std::array::from_fn(|k| sum[k] + change[k]);
+                }
+                let bodies = (&before[..], &carried[..]);
                 carry_bodies(model, &step, &bricks, &space, bodies, &mut faces.velocity);
+                carried.fill([0.0; 6]);
             }
             Ok::<_, ReferenceError>(found)
         };
@@ -269,9 +276,10 @@ impl Flip {
         }
         let (projected, displacement) = project(Some(&centers), &mut faces, timings)?;
         let changes = [earlier.as_ref(), Some(&projected)].into_iter().flatten();
+        let changes = changes.map(|projected| &projected.changes);
         let mut bodies = before.clone();
-        for projected in changes {
-            for (state, change) in bodies.iter_mut().zip(&projected.changes) {
+        for changes in [&by_weight].into_iter().chain(changes) {
+            for (state, change) in bodies.iter_mut().zip(changes) {
                 *state = state.sped_up(change);
             }
         }

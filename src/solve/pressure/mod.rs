@@ -186,6 +186,7 @@ impl PressureSolver {
     /// topology is set. The caller has uploaded the lists of `solve::bodies`.
     pub(super) fn set_bodies(&mut self, bricks: u32, bodies: u32) {
         self.touched = [bricks, bodies];
+        self.phase.step = 0;
     }
 
     /// Sets the bricks of a substep, whose records the caller has uploaded to `bricks`.
@@ -269,6 +270,8 @@ impl PressureSolver {
         self.pockets = 0;
         let tolerance = self.settings.tolerance;
         let (solved, stats) = self.solve(program, Task::Project, tolerance, run)?;
+        // A further projection of the same substep does not add the weight again.
+        self.phase.step = 1;
         Ok(Projected {
             solved,
             divergence_before: stats.divergence_before.into(),

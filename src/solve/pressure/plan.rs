@@ -28,10 +28,12 @@ pub(super) enum Phase {
     Center(bool),
     /// Parameters of the passes over bodies: of the solution, or of a direction.
     Bodies(bool),
+    /// Parameters of those before the solve.
+    BodyWeight,
 }
 
 /// Number of phases.
-pub(super) const PHASE_COUNT: usize = Phase::Bodies(true).index() + 1;
+pub(super) const PHASE_COUNT: usize = Phase::BodyWeight.index() + 1;
 
 impl Phase {
     pub(super) const fn index(self) -> usize {
@@ -40,6 +42,7 @@ impl Phase {
             Self::Reduce(step) => LEVELS + step as usize,
             Self::Center(is_noted) => LEVELS + 4 + is_noted as usize,
             Self::Bodies(is_solution) => LEVELS + 6 + is_solution as usize,
+            Self::BodyWeight => LEVELS + 8,
         }
     }
 
@@ -51,8 +54,11 @@ impl Phase {
             phase.level = index as u32;
         } else if index < LEVELS + 4 {
             phase.step = (index - LEVELS) as u32;
-        } else {
+        } else if index < LEVELS + 8 {
             phase.step = (index - LEVELS) as u32 % 2;
+        } else {
+            // `base` says whether it is the first projection of its substep.
+            phase.step = if base.step == 0 { 2 } else { 3 };
         }
         phase
     }

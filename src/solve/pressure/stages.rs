@@ -62,7 +62,7 @@ impl Stages<Vec<Command>> {
         let finest = |pass, when| run(pass, Phase::Level(0), when, Size::Full(0));
         let finish = |pass| run(pass, Phase::Level(0), When::Done, Size::Active);
         Self {
-            project: build(preconditioner, shape),
+            project: build(preconditioner, has_bodies, shape),
             correct: has_correction.then(|| vec![finest("pressure/density_source", When::Always)]),
             begin: begin(preconditioner, shape),
             iterate: iteration(preconditioner, has_bodies, shape),
@@ -146,7 +146,7 @@ fn smooth_first(preconditioner: Preconditioner) -> Option<Command> {
     })
 }
 
-fn build(preconditioner: Preconditioner, shape: Shape) -> Vec<Command> {
+fn build(preconditioner: Preconditioner, has_bodies: bool, shape: Shape) -> Vec<Command> {
     let finest = |pass| run(pass, Phase::Level(0), When::Always, Size::Full(0));
     let mut commands = vec![Command::clear(&STATS), finest("pressure/build_system")];
     if preconditioner == Preconditioner::Multigrid {
@@ -163,8 +163,13 @@ fn build(preconditioner: Preconditioner, shape: Shape) -> Vec<Command> {
         finest("pressure/label_cells"),
         finest("pressure/merge_labels"),
         finest("pressure/count_pockets"),
-        finest("pressure/divergence"),
     ]);
+    if has_bodies {
+        let before = |pass, size| run(pass, Phase::BodyWeight, When::Always, size);
+        commands.push(before("pressure/move_bodies", Size::Bodies));
+        commands.push(before("pressure/carry_flux", Size::BodyBricks));
+    }
+    commands.push(finest("pressure/divergence"));
     commands
 }
 
