@@ -326,3 +326,6 @@ pub fn dot(a: &Six, b: &Six) -> f64 {
 pub fn product(rows: &[Six; 6], v: &Six) -> Six {
     std::array::from_fn(|k| dot(&rows[k], v))
 }
+
+#[cfg(test)]
+mod tests;

@@ -104,6 +104,7 @@ mod solve {
     mod apic_solids;
     mod drag;
     mod flip;
+    mod bodies;
     mod flip_passes;
     mod independent;
     mod ledgers;

@@ -1,0 +1,227 @@
+//! Bodies that float, sink and turn with the water, by both solvers, on the GPU and in f64.
+
+use std::path::Path;
+
+use glam::DVec3;
+use swell::{
+    domain::body::BodyState,
+    files::parse_scene,
+    gpu::adapter::Context,
+    scene::Scene,
+    stage::{Drive, Opened, Start},
+};
+
+use crate::support::{context, device::spoiled, job::BOX};
+
+/// Cell size, metres.
+const DX: f64 = 0.05;
+
+/// Water 0.6 m deep in a tank 1 m wide and long, with this `[[body]]`: a box of edges 1 by
+/// default.
+fn scene(body: &str, set: &[&str]) -> Scene {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("box.obj"), BOX).unwrap();
+    std::fs::write(folder.path().join("ball.obj"), ball()).unwrap();
+    let text = format!(
+        "[shot]\nname = \"float\"\nframes = 48\nframes_per_second = 24\n\
+         [domain]\nmin = [0, 0, 0]\nmax = [1, 1, 1]\n\
+         [[water.block]]\nmin = [0, 0, 0]\nmax = [1, 0.6, 1]\n\
+         [[body]]\n{body}\n\
+         [solver]\nmethod = \"flip\"\n[solver.flip]\ncell_size = {DX}\n\
+         [solver.pbf]\nparticle_spacing = {}\n",
+        0.5 * DX
+    );
+    let set: Vec<String> = set.iter().map(|&it| it.to_owned()).collect();
+    parse_scene(&text, Path::new("float.toml"), folder.path(), &set).unwrap()
+}
+
+/// A sphere of radius 1 as a mesh of 1 104 triangles, scaled to the sphere's volume.
+fn ball() -> String {
+    let (rings, around) = (24, 24);
+    let mut vertices = vec![DVec3::Y];
+    for i in 1..rings {
+        let (sin, cos) = (std::f64::consts::PI * f64::from(i) / f64::from(rings)).sin_cos();
+        for j in 0..around {
+            let (z, x) = (std::f64::consts::TAU * f64::from(j) / f64::from(around)).sin_cos();
+            vertices.push(DVec3::new(sin * x, cos, sin * z));
+        }
+    }
+    vertices.push(-DVec3::Y);
+    let at = |i: i32, j: i32| (1 + (i - 1) * around + j.rem_euclid(around)) as usize;
+    let last = vertices.len() - 1;
+    let mut triangles = Vec::new();
+    for j in 0..around {
+        triangles.push([0, at(1, j + 1), at(1, j)]);
+        triangles.push([last, at(rings - 1, j), at(rings - 1, j + 1)]);
+        for i in 1..rings - 1 {
+            triangles.push([at(i, j), at(i, j + 1), at(i + 1, j + 1)]);
+            triangles.push([at(i, j), at(i + 1, j + 1), at(i + 1, j)]);
+        }
+    }
+    let volume: f64 = (triangles.iter())
+        .map(|t| vertices[t[0]].dot(vertices[t[1]].cross(vertices[t[2]])) / 6.0)
+        .sum();
+    let scale = (4.0 / 3.0 * std::f64::consts::PI / volume).cbrt();
+    let vertices = vertices.iter().map(|v| {
+        let v = scale * *v;
+        format!("v {} {} {}\n", v.x, v.y, v.z)
+    });
+    let faces = triangles.iter().map(|t| format!("f {} {} {}\n", t[0] + 1, t[1] + 1, t[2] + 1));
+    vertices.chain(faces).collect()
+}
+
+/// The bodies after each of the first `frames` frames.
+fn run(opened: &Opened, scene: &Scene, frames: u32) -> Vec<Vec<BodyState>> {
+    let start = Start::of(scene).unwrap();
+    let mut drive = Drive::new(opened, scene, &start, false).unwrap();
+    let states = (0..frames).map(|_| drive.advance().unwrap().particles.bodies);
+    states.collect()
+}
+
+fn gpu(context: &Context) -> Opened {
+    Opened::Gpu(Box::new(context.clone()))
+}
+
+/// A flat box of 0.4 m by 0.4 m, 0.2 m high, released at its draft.
+fn raft(density: f64, more: &str) -> String {
+    let centre = 0.6 - 0.2e-3 * density + 0.1;
+    format!(
+        "mesh = \"box.obj\"\nscale = [0.4, 0.2, 0.4]\ntranslate = [0.5, {centre}, 0.5]\n\
+         density = {density}\n{more}"
+    )
+}
+
+/// Archimedes: a raft floats at its draft, to half a cell, and lies still.
+#[test]
+fn a_raft_floats_at_its_draft_and_rests() {
+    let context = context();
+    for (density, set) in [
+        (100.0, &[][..]),
+        (500.0, &[]),
+        (900.0, &[]),
+        (500.0, &["solver.method=\"pbf\""]),
+    ] {
+        let scene = scene(&raft(density, ""), set);
+        let states = run(&gpu(&context), &scene, 60);
+        let late = &states[36..];
+        let mean = late.iter().map(|b| b[0].centre.y).sum::<f64>() / late.len() as f64;
+        let draft = 0.6 - 0.2e-3 * density + 0.1;
+        let speed = late.iter().map(|b| b[0].velocity.length()).fold(0.0, f64::max);
+        let spin = late.iter().map(|b| b[0].spin.length()).fold(0.0, f64::max);
+        println!("{density} {set:?}: {:.4} off, {speed:.3} m/s, {spin:.3} rad/s", mean - draft);
+        assert!((mean - draft).abs() < 0.5 * DX, "{density}: {mean} {draft}");
+        assert!(speed < 0.08 && spin < 0.2, "{density}: {speed} m/s, {spin} rad/s");
+    }
+}
+
+/// Without the weight of the water between cells' centres and its bottom, it bobs and rolls.
+#[test]
+fn without_the_weight_within_cells_a_raft_does_not_rest() {
+    let context = spoiled("flip/couple_bodies", "let is_alone = ", "let is_alone = false && ");
+    let states = run(&gpu(&context), &scene(&raft(500.0, ""), &[]), 60);
+    let late = states[36..].iter();
+    let unrest = late.map(|b| b[0].velocity.length() + 0.2 * b[0].spin.length());
+    let unrest = unrest.fold(0.0, f64::max);
+    assert!(unrest > 0.08, "{unrest}");
+}
+
+/// A ball of radius 0.15 m deep in water 1 m deep.
+fn deep(density: f64) -> Scene {
+    let body = format!(
+        "mesh = \"ball.obj\"\nscale = 0.15\ntranslate = [0.5, 0.5, 0.5]\ndensity = {density}\n"
+    );
+    let set = [
+        "domain.max=[1,1.2,1]",
+        "water.block=[{min=[0,0,0],max=[1,1,1]}]",
+        "shot.frames_per_second=120",
+        "solver.flip.cell_size=0.025",
+    ];
+    scene(&body, &set)
+}
+
+/// Released under water a ball begins with (m − m_w) g / (m + m_a), m_a = m_w / 2 in unbounded
+/// water; walls 2.3 radii from its middle add some percent to m_a.
+#[test]
+fn a_ball_begins_to_sink_or_rise_with_its_added_mass() {
+    let context = context();
+    for (density, gate) in [(7000.0, 0.01), (500.0, 0.06), (10.0, 0.06)] {
+        let states = run(&gpu(&context), &deep(density), 1);
+        let found = 120.0 * states[0][0].velocity.y;
+        let relative = density / 1000.0;
+        let exact = -(relative - 1.0) * 9.81 / (relative + 0.5);
+        println!("{density}: {found:.3} m/s², {exact:.3} in unbounded water");
+        assert!((found / exact - 1.0).abs() < gate, "{density}: {found} {exact}");
+    }
+    // Negative control: without its reaction on the pressure, a light ball shoots away.
+    let context = spoiled("pressure/couple", "product + added", "product");
+    drop(context);
+    let context = spoiled(
+        "pressure/couple",
+        "let added = select(0.0, flux",
+        "let added = 0.5 * select(0.0, flux",
+    );
+    let states = run(&gpu(&context), &deep(10.0), 1);
+    let found = 120.0 * states[0][0].velocity.y;
+    assert!((found / 19.04 - 1.0).abs() > 0.06, "{found}");
+}
+
+/// Both solve the same system: the GPU to its tolerance, the reference to rounding.
+#[test]
+fn the_gpu_moves_bodies_as_the_reference_does() {
+    let context = context();
+    let body = raft(300.0, "rotate_degrees = [10, 20, 5]\nspin = [0, 40, 0]\n");
+    for precision in ["f32", "f32_refined"] {
+        let set = format!("solver.flip.pressure.precision=\"{precision}\"");
+        let scene = scene(&body, &[&set, "solver.flip.pressure.tolerance=1e-6"]);
+        let [found, exact] = [gpu(&context), Opened::Cpu].map(|on| run(&on, &scene, 3));
+        for (found, exact) in found.iter().zip(&exact) {
+            let apart = found[0].velocity - exact[0].velocity;
+            let turned = found[0].spin - exact[0].spin;
+            // Three frames of 0.4 m/s, whose pressures are known to 1e-6 and whose water is
+            // sampled by particles that round.
+            assert!(apart.length() < 2e-4, "{precision}: {apart}");
+            assert!(turned.length() < 2e-3, "{precision}: {turned}");
+        }
+    }
+}
+
+/// Bodies 1 000 times lighter and 20 times heavier than water, one that is hinged and one that is
+/// moored, in the same water: nothing flies.
+#[test]
+fn light_heavy_hinged_and_moored_bodies_stay_bounded() {
+    let context = context();
+    let one = |scale: &str, at: &str, more: &str| {
+        format!("mesh = \"box.obj\"\nscale = {scale}\ntranslate = {at}\n{more}\n")
+    };
+    let bodies = [
+        one("[0.2, 0.2, 0.2]", "[0.25, 0.3, 0.25]", "density = 1.0"),
+        one("[0.15, 0.15, 0.15]", "[0.75, 0.5, 0.25]", "density = 20000.0"),
+        one(
+            "[0.3, 0.3, 0.1]",
+            "[0.3, 0.5, 0.75]",
+            "density = 300.0\nhinge = { at = [0.15, 0.35, 0.75], axis = [0, 0, 1] }",
+        ),
+        one(
+            "[0.2, 0.1, 0.2]",
+            "[0.75, 0.3, 0.7]",
+            "density = 200.0\nmooring = [{ anchor = [0.75, 0, 0.7], at = [0.75, 0.25, 0.7], \
+             length = 0.25, stiffness = 1e5, damping = 50 }]",
+        ),
+    ];
+    let scene = scene(&bodies.join("[[body]]\n"), &[]);
+    let states = run(&gpu(&context), &scene, 48);
+    // The light one rises with 2 g at first, and nothing can fall faster than from the top.
+    let fastest = states.iter().flatten().map(|b| b.velocity.length());
+    let fastest = fastest.fold(0.0, f64::max);
+    assert!(fastest < (2.0 * 9.81 * 1.0f64).sqrt(), "{fastest}");
+    let last = &states[47];
+    // It swims on the water; the hinge and the rope hold.
+    assert!((last[0].centre.y - 0.69).abs() < 0.06, "{:?}", last[0]);
+    let hinge = DVec3::new(0.15, 0.35, 0.75);
+    let door = scene.bodies().nth(2).unwrap();
+    let at = door.body.pose(&last[2]).place(hinge);
+    assert!((at - hinge).length() < 1e-9, "{at}");
+    let rope = scene.bodies().nth(3).unwrap().body.pose(&last[3]);
+    let taut = rope.place(DVec3::new(0.75, 0.25, 0.7)).distance(DVec3::new(0.75, 0.0, 0.7));
+    assert!((taut - 0.25).abs() < 2e-3, "{taut}");
+}
