@@ -18,8 +18,8 @@ pub(crate) fn between(body: &Body, start: &BodyState, end: &BodyState, length: f
     })
 }
 
-/// Returns the axis times the angle of a rotation, which is at most π; also for small angles, which
-/// [`DQuat::to_scaled_axis`] takes for 0.
+/// Returns the axis times the angle of a rotation, at most π. [`DQuat::to_scaled_axis`] returns 0
+/// for small angles.
 fn scaled_axis(turn: DQuat) -> DVec3 {
     let turn = if turn.w < 0.0 { -turn } else { turn };
     let sine = DVec3::new(turn.x, turn.y, turn.z);
