@@ -9,6 +9,7 @@
 
 mod motion;
 mod near;
+mod scene;
 mod shape;
 #[cfg(test)]
 mod tests;
@@ -23,6 +24,7 @@ use swell_domain::{
     pose::Passage,
 };
 
+pub use scene::SceneContacts;
 pub use shape::ShapeError;
 use world::World;
 

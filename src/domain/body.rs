@@ -216,6 +216,8 @@ impl Body {
         };
         if let Freedom::Hinge { at, .. } = self.freedom {
             after.centre = at + after.turn * (self.mass.centre - at);
+            after.velocity = after.spin.cross(after.centre - at);
+            return after;
         }
         let momentum = self.inertia(state) * state.spin;
         after.spin = self.inertia(&after).inverse() * momentum;

@@ -102,9 +102,9 @@ mod solve {
     mod analytic;
     mod analytic_water;
     mod apic_solids;
+    mod bodies;
     mod drag;
     mod flip;
-    mod bodies;
     mod flip_passes;
     mod independent;
     mod ledgers;

@@ -12,6 +12,7 @@ use super::{
     push_apart, reorder, survey, wall_friction,
 };
 use crate::{ReferenceError, Timings};
+use swell_contact::SceneContacts;
 use swell_domain::{
     body::{BodyState, Six},
     boundary::Boundary,
@@ -32,6 +33,7 @@ use swell_scene::{
 /// rounded state.
 pub struct Flip {
     model: Model,
+    contacts: Option<SceneContacts>,
     factor_budget: u64,
     state: Particles,
     frame: u32,
@@ -110,6 +112,7 @@ impl Flip {
     pub fn new(scene: &FlipScene, boundary: &Boundary) -> Self {
         Self {
             model: Model::new(scene, boundary),
+            contacts: SceneContacts::of(scene),
             factor_budget: 0,
             state: Particles::default(),
             frame: 0,
@@ -167,6 +170,7 @@ impl Flip {
             timings,
             factor_budget,
             state,
+            contacts,
             ..
         } = self;
         let before = model.predicted(&state.bodies, substep);
@@ -282,6 +286,11 @@ impl Flip {
             for (state, change) in bodies.iter_mut().zip(changes) {
                 *state = state.sped_up(change);
             }
+        }
+        if let Some(contacts) = contacts {
+            timings.time("contacts", || {
+                contacts.resolve(&model.scene, &state.walls, substep, &mut bodies);
+            });
         }
         step.solids = model.solids_at(&bodies, step.start, step.length);
         timings.time("flip/extrapolate", || {

@@ -2,21 +2,12 @@
 //! after it, and moved with the particles.
 
 use swell_domain::body::BodyState;
-use swell_scene::{FlipScene, step::Substep};
+use swell_scene::step::Substep;
 
 use super::{
     super::{SolveError, bodies, trace::Run},
     Flip,
 };
-
-/// Contacts between the bodies of a scene and what they meet.
-pub(super) struct Contacts {}
-
-impl Contacts {
-    pub(super) fn of(scene: &FlipScene) -> Option<Self> {
-        scene.has_bodies().then_some(Self {})
-    }
-}
 
 impl Flip {
     /// Returns the states of the bodies.
@@ -70,9 +61,12 @@ impl Flip {
     /// Keeps bodies out of each other, of walls and of solids, and uploads their way through the
     /// substep.
     pub(super) fn collide_bodies(&mut self, substep: &Substep) {
-        if self.contacts.is_some() {
-            self.upload_movers(substep);
-        }
+        let Some(contacts) = &self.contacts else {
+            return;
+        };
+        let (walls, bodies) = (&self.state.walls, &mut self.state.bodies);
+        contacts.resolve(&self.scene, walls, substep, bodies);
+        self.upload_movers(substep);
     }
 
     /// Moves the bodies to the end of the substep.

@@ -20,6 +20,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
+use swell_contact::SceneContacts;
 use swell_domain::{
     absorber::AbsorberStates,
     boundary::Boundary,
@@ -51,7 +52,6 @@ use super::{
     state::{Carried, is_awaited, is_other_count, upload},
     trace::{Begun, Observe, Run, Span, TraceFrame, trace},
 };
-use bodies::Contacts;
 use buffers::*;
 pub use capacity::capacity;
 use capacity::{bricks, capacity_of, no_water, whole_frame};
@@ -78,7 +78,7 @@ pub struct Flip {
     cut: Bounds,
     /// See [`Substep::kick`], seconds.
     kick: f64,
-    contacts: Option<Contacts>,
+    contacts: Option<SceneContacts>,
 }
 
 /// Result of `flip/survey`.
@@ -124,7 +124,7 @@ impl Flip {
             plan,
             scene: Arc::new(scene.to_owned_scene()),
             movers: Movers::of(boundary, scene),
-            contacts: Contacts::of(scene),
+            contacts: SceneContacts::of(scene),
             shores: Shores::new(boundary, scene.domain.min, scene.settings().cell_size)
                 .joined(scene.periodic),
             state,

@@ -66,7 +66,9 @@ fn ball() -> String {
         let v = scale * *v;
         format!("v {} {} {}\n", v.x, v.y, v.z)
     });
-    let faces = triangles.iter().map(|t| format!("f {} {} {}\n", t[0] + 1, t[1] + 1, t[2] + 1));
+    let faces = triangles
+        .iter()
+        .map(|t| format!("f {} {} {}\n", t[0] + 1, t[1] + 1, t[2] + 1));
     vertices.chain(faces).collect()
 }
 
@@ -106,18 +108,31 @@ fn a_raft_floats_at_its_draft_and_rests() {
         let late = &states[36..];
         let mean = late.iter().map(|b| b[0].centre.y).sum::<f64>() / late.len() as f64;
         let draft = 0.6 - 0.2e-3 * density + 0.1;
-        let speed = late.iter().map(|b| b[0].velocity.length()).fold(0.0, f64::max);
+        let speed = late
+            .iter()
+            .map(|b| b[0].velocity.length())
+            .fold(0.0, f64::max);
         let spin = late.iter().map(|b| b[0].spin.length()).fold(0.0, f64::max);
-        println!("{density} {set:?}: {:.4} off, {speed:.3} m/s, {spin:.3} rad/s", mean - draft);
+        println!(
+            "{density} {set:?}: {:.4} off, {speed:.3} m/s, {spin:.3} rad/s",
+            mean - draft
+        );
         assert!((mean - draft).abs() < 0.5 * DX, "{density}: {mean} {draft}");
-        assert!(speed < 0.08 && spin < 0.2, "{density}: {speed} m/s, {spin} rad/s");
+        assert!(
+            speed < 0.08 && spin < 0.2,
+            "{density}: {speed} m/s, {spin} rad/s"
+        );
     }
 }
 
 /// Without the weight of the water between cells' centres and its bottom, it bobs and rolls.
 #[test]
 fn without_the_weight_within_cells_a_raft_does_not_rest() {
-    let context = spoiled("flip/couple_bodies", "let is_alone = ", "let is_alone = false && ");
+    let context = spoiled(
+        "flip/couple_bodies",
+        "let is_alone = ",
+        "let is_alone = false && ",
+    );
     let states = run(&gpu(&context), &scene(&raft(500.0, ""), &[]), 60);
     let late = states[36..].iter();
     let unrest = late.map(|b| b[0].velocity.length() + 0.2 * b[0].spin.length());
@@ -150,7 +165,10 @@ fn a_ball_begins_to_sink_or_rise_with_its_added_mass() {
         let relative = density / 1000.0;
         let exact = -(relative - 1.0) * 9.81 / (relative + 0.5);
         println!("{density}: {found:.3} m/s², {exact:.3} in unbounded water");
-        assert!((found / exact - 1.0).abs() < gate, "{density}: {found} {exact}");
+        assert!(
+            (found / exact - 1.0).abs() < gate,
+            "{density}: {found} {exact}"
+        );
     }
     // Negative control: without its reaction on the pressure, a light ball shoots away.
     let context = spoiled("pressure/couple", "product + added", "product");
@@ -195,7 +213,11 @@ fn light_heavy_hinged_and_moored_bodies_stay_bounded() {
     };
     let bodies = [
         one("[0.2, 0.2, 0.2]", "[0.25, 0.3, 0.25]", "density = 1.0"),
-        one("[0.15, 0.15, 0.15]", "[0.75, 0.5, 0.25]", "density = 20000.0"),
+        one(
+            "[0.15, 0.15, 0.15]",
+            "[0.75, 0.5, 0.25]",
+            "density = 20000.0",
+        ),
         one(
             "[0.3, 0.3, 0.1]",
             "[0.3, 0.5, 0.75]",
@@ -222,6 +244,8 @@ fn light_heavy_hinged_and_moored_bodies_stay_bounded() {
     let at = door.body.pose(&last[2]).place(hinge);
     assert!((at - hinge).length() < 1e-9, "{at}");
     let rope = scene.bodies().nth(3).unwrap().body.pose(&last[3]);
-    let taut = rope.place(DVec3::new(0.75, 0.25, 0.7)).distance(DVec3::new(0.75, 0.0, 0.7));
+    let taut = rope
+        .place(DVec3::new(0.75, 0.25, 0.7))
+        .distance(DVec3::new(0.75, 0.0, 0.7));
     assert!((taut - 0.25).abs() < 2e-3, "{taut}");
 }

@@ -1,0 +1,62 @@
+//! Contacts of a scene's bodies.
+
+use swell_domain::{absorber::AbsorberStates, body::BodyState, pose::Passage};
+use swell_scene::{Scene, step::Substep};
+
+use super::{Contacts, Surroundings};
+
+/// Distance that surfaces keep, in particle spacings.
+const MARGIN: f64 = 0.01;
+
+/// Contacts of the bodies of a scene with each other, with its walls and with its solids.
+pub struct SceneContacts(Contacts);
+
+impl SceneContacts {
+    /// Prepares a scene's shapes; `None` without bodies.
+    ///
+    /// # Panics
+    ///
+    /// Panics if a mesh has no triangles, or a body's no volume, which no scene that was read has.
+    pub fn of(scene: &Scene) -> Option<Self> {
+        if !scene.has_bodies() {
+            return None;
+        }
+        let statics: Vec<_> = scene.solids.iter().map(|solid| &solid.mesh).collect();
+        let (mut moving, mut bodies) = (Vec::new(), Vec::new());
+        for solid in &scene.moving_solids {
+            match &solid.body {
+                None => moving.push(&solid.placed.mesh),
+                Some(it) => bodies.push((&it.body, it.collides.then_some(&solid.placed.mesh))),
+            }
+        }
+        let margin = MARGIN * scene.particle_spacing();
+        let contacts = Contacts::new(&statics, &moving, &bodies, margin);
+        Some(Self(
+            contacts.expect("meshes are checked as a scene is read"),
+        ))
+    }
+
+    /// Changes the velocities of `bodies`, which are as at the start of `substep`, as
+    /// [`Contacts::resolve`].
+    pub fn resolve(
+        &self,
+        scene: &Scene,
+        absorbers: &AbsorberStates,
+        substep: &Substep,
+        bodies: &mut [BodyState],
+    ) {
+        let Substep { start, length, .. } = *substep;
+        let prescribed = scene.moving_solids.iter().filter(|it| it.is_prescribed());
+        let moving: Vec<Passage> = prescribed
+            .map(|solid| solid.passage(&[], start, length))
+            .collect();
+        let velocity = scene.wall_velocity(absorbers, start + length, length);
+        let around = Surroundings {
+            walls: scene.walls(absorbers, start).moved(scene.domain.min),
+            wall_velocities: [velocity.min, velocity.max],
+            periodic: scene.periodic,
+            moving: &moving,
+        };
+        self.0.resolve(bodies, &around, length);
+    }
+}
