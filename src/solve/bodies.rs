@@ -5,6 +5,8 @@
 //! system is A + J^T R J: as strong a coupling as that of the water with itself, stable for bodies
 //! of any density. It costs three dispatches an iteration.
 
+use std::collections::BTreeMap;
+
 use glam::{DAffine3, DVec3};
 
 use swell_domain::{
@@ -23,7 +25,10 @@ use swell_scene::{
     moving_solid::{FreeBody, MAX_MOVING_SOLIDS, MovingSolid},
 };
 
-use super::{SolveError, pressure::buffers::Real};
+use super::{
+    SolveError,
+    pressure::{blocked, buffers::Real},
+};
 
 mirror!(
     /// `DeviceBody` of shared/bodies.wgsl.
@@ -264,4 +269,45 @@ pub(super) fn changes(
     let both: Vec<f64> = by_pressure.iter().zip(before).map(|(a, b)| a + b).collect();
     let six = |c: &[f64]| std::array::from_fn(|k| c[k]);
     Ok(both.chunks_exact(6).map(six).collect())
+}
+
+/// Removes the means of each body's coupling over its cells in each pocket, so that the pressure
+/// there, which is determined up to a constant, moves no body by that constant. `labels` are the
+/// projection's, in blocked order.
+pub(super) fn remove_means(program: &Program, labels: &[u32]) -> Result<(), SolveError> {
+    let planes = 6 * CELLS as usize;
+    let states = program.read(STATES, 1)?[0];
+    let pairs = program.read(PAIRS, states.pairs as usize)?;
+    let mut coupling = program.read(COUPLING, planes * pairs.len())?;
+    let label = |pair: &BodyPair, cell: u32| {
+        let place = blocked(CELLS * pair.slot + cell);
+        labels.get(place).copied().filter(|label| *label != 0)
+    };
+    let at = |pair: usize, k: usize, cell: u32| planes * pair + CELLS as usize * k + cell as usize;
+    let mut sums: BTreeMap<(u32, u32), (Six, f64)> = BTreeMap::new();
+    let mut touched = Vec::new();
+    for (index, pair) in pairs.iter().enumerate() {
+        for cell in 0..CELLS {
+            let push: Six = std::array::from_fn(|k| f64::from(coupling[at(index, k, cell)]));
+            let Some(label) = label(pair, cell).filter(|_| push != [0.0; 6]) else {
+                continue;
+            };
+            let (sum, count) = sums.entry((label, pair.body)).or_default();
+            *sum = std::array::from_fn(|k| sum[k] + push[k]);
+            *count += 1.0;
+            touched.push((index, cell, (label, pair.body)));
+        }
+    }
+    if touched.is_empty() {
+        return Ok(());
+    }
+    for (index, cell, of) in touched {
+        let (sum, count) = &sums[&of];
+        for (k, sum) in sum.iter().enumerate() {
+            let value = &mut coupling[at(index, k, cell)];
+            *value = (f64::from(*value) - sum / count) as f32;
+        }
+    }
+    program.upload(COUPLING, 0, &coupling);
+    Ok(())
 }

@@ -337,6 +337,8 @@ fn spread(cells: &BodyCells, elements: usize) -> Vec<Six> {
 }
 
 fn push_bodies(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
+    // Pockets, once found, change it.
+    state.touched = Touched::read(io)?;
     let values = state.pushing(io)?;
     let (unit, touched) = (state.unit(), &state.touched);
     let mut by_element = vec![0.0; state.elements().cells];

@@ -87,7 +87,7 @@ impl FlipState {
     }
 
     /// Returns the device's own system with the bodies that its pressure moves.
-    fn coupled_system(&self) -> System {
+    pub(super) fn coupled_system(&self) -> System {
         let system = self.system();
         System {
             bodies: self.touched.couplings(&system.cell, self.elements().cells),

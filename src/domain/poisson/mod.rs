@@ -137,6 +137,30 @@ pub struct Coupling {
 }
 
 impl Coupling {
+    /// Removes the means of J over the body's cells in a pocket, whose rows ascend: there q is
+    /// determined up to a constant, which then moves nothing.
+    fn remove_means(&mut self, pocket: &[u32]) {
+        let is_inside = |row: &u32| pocket.binary_search(row).is_ok();
+        let (mut sum, mut count) = ([0.0; 6], 0.0);
+        for (_, push) in self
+            .row
+            .iter()
+            .zip(&self.push)
+            .filter(|(row, _)| is_inside(row))
+        {
+            sum = std::array::from_fn(|k| sum[k] + push[k]);
+            count += 1.0;
+        }
+        for (_, push) in self
+            .row
+            .iter()
+            .zip(&mut self.push)
+            .filter(|(row, _)| is_inside(row))
+        {
+            *push = std::array::from_fn(|k| push[k] - sum[k] / count);
+        }
+    }
+
     /// Returns the change of the body's velocities by q of each row, m/s and rad/s.
     pub fn change(&self, q: &[f64]) -> Six {
         let mut sum = [0.0; 6];
@@ -274,6 +298,17 @@ impl System {
                 sum
             })
             .collect()
+    }
+
+    /// Adds bodies, which no pocket's constant pressure moves.
+    pub fn add_bodies(&mut self, bodies: Vec<Coupling>) {
+        self.bodies = bodies;
+        if !self.bodies.is_empty() {
+            let pockets = self.pockets();
+            for body in &mut self.bodies {
+                pockets.iter().for_each(|pocket| body.remove_means(pocket));
+            }
+        }
     }
 
     /// Returns the rows of each body of water without contact to air, in the order of their first

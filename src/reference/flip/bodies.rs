@@ -59,7 +59,7 @@ pub(super) fn add_bodies(bodies: &[BodyCells], elements: usize, system: &mut Sys
     for (row, &element) in (0..).zip(&system.cell) {
         row_of[element as usize] = row;
     }
-    system.bodies = bodies.iter().map(|it| it.of_system(&row_of)).collect();
+    system.add_bodies(bodies.iter().map(|it| it.of_system(&row_of)).collect());
 }
 
 /// Adds to the solids' flux out of each cell that of the bodies' changes of velocity (reference pass

@@ -56,6 +56,13 @@ impl<'a> Waters<'a> {
         carry_flux(self.bodies, changes, &mut self.flux);
     }
 
+    /// Adds to the solids' flux, by row.
+    pub(super) fn add_flux(&mut self, system: &System, flux: &[f64]) {
+        for (&element, added) in system.cell.iter().zip(flux) {
+            self.flux[element as usize] += added;
+        }
+    }
+
     /// Returns the solids' flux out of each cell, m/s.
     pub(super) fn flux(&self) -> &[f64] {
         &self.flux

@@ -68,7 +68,11 @@ pub(super) fn project(
         .iter()
         .map(|it| it.change(&solution.x))
         .collect();
-    waters.carry_flux(&changes);
+    let mut flux = vec![0.0; system.cell.len()];
+    for (body, change) in system.bodies.iter().zip(&changes) {
+        body.add_flux(change, &mut flux);
+    }
+    waters.add_flux(&system, &flux);
     let after = waters.divergence(&system, &faces.velocity);
     let corrected = centers.filter(|_| model.settings().density_correction);
     let correction = corrected.map(|centers| -> Result<Solution, ReferenceError> {

@@ -357,7 +357,8 @@ impl Flip {
     ) -> Result<Trace, ReferenceError> {
         let trace = self.substep(cloud, is_wet, substep)?;
         for projected in trace.projections() {
-            let [_, divergence] = projected.divergence;
+            let [_, after] = projected.divergence;
+            let divergence = (self.model.scene).divergence_left(after, projected.incompatible);
             self.model.scene.budget.check_projection(
                 frame,
                 number,

@@ -349,7 +349,7 @@ impl Flip {
             self.frame + 1,
             totals.substeps,
             projected.solved.residual,
-            projected.divergence_after,
+            (self.scene).divergence_left(projected.divergence_after, projected.incompatible),
             substep.length,
         )?)
     }

@@ -57,7 +57,7 @@ use swell_gpu::{
 };
 use swell_scene::flip::{Precision, Preconditioner, Pressure};
 
-use super::{SolveError, trace::Run};
+use super::{SolveError, bodies, trace::Run};
 
 use buffers::{PHASES, SIZES, read_control, read_reals};
 pub use params::{
@@ -396,6 +396,9 @@ impl PressureSolver {
     fn find_pockets(&mut self, program: &Program) -> Result<(), SolveError> {
         let cells = (CELLS * (self.phase.levels[0][1] + 1)) as usize;
         let labels = program.read(buffers::LABEL, cells)?;
+        if self.extent.has_bodies {
+            bodies::remove_means(program, &labels)?;
+        }
         let (cells, parts) = pockets::list(&labels);
         program.upload(buffers::POCKET_CELLS, 0, &cells);
         program.upload(buffers::POCKET_PARTS, 0, &parts);
