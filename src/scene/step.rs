@@ -56,6 +56,11 @@ pub fn projected_substep(start: f64, length: f64, before: f64) -> Substep {
     }
 }
 
+/// Cells that a body may move in a substep. The projection knows where it stands at the substep's
+/// start: a body that goes farther, or that a contact stops after the projection, packs the water
+/// between it and what is near too densely.
+const BODY_CELLS: f64 = 0.5;
+
 impl Scene {
     /// Returns the faces of the box at `time` including wave makers, relative to the domain's least
     /// corner, metres; ±[`FAR`] along periodic axes.
@@ -242,6 +247,17 @@ impl PbfScene<'_> {
 }
 
 impl FlipScene<'_> {
+    /// Returns the longest substep in which no point of a body moves farther than [`BODY_CELLS`],
+    /// seconds.
+    fn longest_body_step(&self, bodies: &[BodyState]) -> f64 {
+        if !self.has_bodies() {
+            return f64::INFINITY;
+        }
+        let room = BODY_CELLS * self.settings().cell_size;
+        let (v, g) = (self.fastest_body(bodies), self.water.gravity.length());
+        2.0 * room / (v + (v * v + 4.0 * g * room).sqrt())
+    }
+
     /// Returns how many equal substeps FLIP's CFL number and short surface waves (Δt ≤ √(Δx / g))
     /// require in the `remaining` seconds from `start`, and the first of them. The fastest particle
     /// has `speed`, m/s; `done` substeps of `frame` are complete, and the last substep (of any
@@ -270,6 +286,7 @@ impl FlipScene<'_> {
         let by_acceleration = longest(fastest, gravity + push.acceleration);
         let longest = by_acceleration.max(longest(fastest + push.speed, gravity));
         let longest = longest.min(self.effects.longest_step(self.grain()).0);
+        let longest = longest.min(self.longest_body_step(bodies));
         let of_waves = self.longest_wave_step();
         let is_of_waves = of_waves < longest;
         let longest = longest.min(of_waves);

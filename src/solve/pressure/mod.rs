@@ -350,7 +350,8 @@ impl PressureSolver {
         };
         self.upload_phases(program);
         let mut batch = self.expected[task as usize] + 1;
-        let mut is_first = true;
+        // Where pockets have to be listed first, the start runs twice.
+        let (mut is_first, mut is_begun) = (true, false);
         loop {
             let stages = self.stages(program);
             let (start, finish) = match task {
@@ -358,6 +359,10 @@ impl PressureSolver {
                 Task::Correct => (stages.correct.as_ref(), stages.finish_correct.as_ref()),
             };
             let mut recordings = Vec::new();
+            if task == Task::Project && !is_begun {
+                recordings.extend(&stages.weigh);
+            }
+            is_begun = true;
             if is_first {
                 recordings.extend(start);
                 recordings.push(&stages.begin);

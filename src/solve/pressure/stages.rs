@@ -41,6 +41,8 @@ pub struct Extent {
 
 /// The stages of a solve for one shape: as commands, or bound to a program's buffers.
 pub(super) struct Stages<T> {
+    /// Lets bodies have the weight of the water between cells' centres and their surfaces.
+    pub weigh: Option<T>,
     /// Builds the system, labels bodies of water, and computes the right-hand side.
     pub project: T,
     /// Computes the right-hand side of the density correction.
@@ -62,7 +64,8 @@ impl Stages<Vec<Command>> {
         let finest = |pass, when| run(pass, Phase::Level(0), when, Size::Full(0));
         let finish = |pass| run(pass, Phase::Level(0), When::Done, Size::Active);
         Self {
-            project: build(preconditioner, has_bodies, shape),
+            weigh: has_bodies.then(weigh),
+            project: build(preconditioner, shape),
             correct: has_correction.then(|| vec![finest("pressure/density_source", When::Always)]),
             begin: begin(preconditioner, shape),
             iterate: iteration(preconditioner, has_bodies, shape),
@@ -75,6 +78,7 @@ impl Stages<Vec<Command>> {
     pub(super) fn bind(&self, program: &Program) -> Stages<Recording> {
         let record = |commands: &Vec<Command>| Recording::new(program, commands);
         Stages {
+            weigh: self.weigh.as_ref().map(record),
             project: record(&self.project),
             correct: self.correct.as_ref().map(record),
             begin: record(&self.begin),
@@ -89,7 +93,11 @@ impl Stages<Vec<Command>> {
     fn into_commands(self) -> impl Iterator<Item = Command> {
         let project = [self.project, self.begin, self.iterate, self.verify];
         let correct = [self.correct, self.finish_correct].into_iter().flatten();
-        let all = project.into_iter().chain([self.finish_project]);
+        let all = self
+            .weigh
+            .into_iter()
+            .chain(project)
+            .chain([self.finish_project]);
         all.chain(correct).flatten()
     }
 }
@@ -146,7 +154,15 @@ fn smooth_first(preconditioner: Preconditioner) -> Option<Command> {
     })
 }
 
-fn build(preconditioner: Preconditioner, has_bodies: bool, shape: Shape) -> Vec<Command> {
+fn weigh() -> Vec<Command> {
+    let before = |pass, size| run(pass, Phase::BodyWeight, When::Always, size);
+    vec![
+        before("pressure/move_bodies", Size::Bodies),
+        before("pressure/carry_flux", Size::BodyBricks),
+    ]
+}
+
+fn build(preconditioner: Preconditioner, shape: Shape) -> Vec<Command> {
     let finest = |pass| run(pass, Phase::Level(0), When::Always, Size::Full(0));
     let mut commands = vec![Command::clear(&STATS), finest("pressure/build_system")];
     if preconditioner == Preconditioner::Multigrid {
@@ -163,13 +179,8 @@ fn build(preconditioner: Preconditioner, has_bodies: bool, shape: Shape) -> Vec<
         finest("pressure/label_cells"),
         finest("pressure/merge_labels"),
         finest("pressure/count_pockets"),
+        finest("pressure/divergence"),
     ]);
-    if has_bodies {
-        let before = |pass, size| run(pass, Phase::BodyWeight, When::Always, size);
-        commands.push(before("pressure/move_bodies", Size::Bodies));
-        commands.push(before("pressure/carry_flux", Size::BodyBricks));
-    }
-    commands.push(finest("pressure/divergence"));
     commands
 }
 

@@ -68,6 +68,18 @@ def check_beach(text):
     return f"{len(triangles)} triangles, {len(text.encode())} bytes, {inside:.2f} m³"
 
 
+def check_crate(text):
+    """Refuses a crate that is not a cube of edge 1 but for its edges; returns a line about it."""
+    vertices, triangles = from_obj(text)
+    [(extent, inside)] = check_solids(vertices, triangles)
+    # An edge loses half the square of its chamfer.
+    if not 0.99 < inside < 1:
+        raise BrokenMesh(f"crate: {inside} m³")
+    if any(abs(abs(side) - 0.5) > 1e-9 for corner in extent for side in corner):
+        raise BrokenMesh(f"crate: reaches {extent}")
+    return f"{len(triangles)} triangles, {len(text.encode())} bytes, {inside:.3f} m³"
+
+
 def check_drop(text):
     """Refuses a drop that is not about as large as its sphere; returns a line about it."""
     vertices, triangles = from_obj(text)
