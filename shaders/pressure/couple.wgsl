@@ -23,7 +23,8 @@ fn flux(first: u32, end: u32, inner: u32) -> real {
     for (var pair = first; pair < end; pair++) {
         let body = body_pairs[pair].body;
         for (var k = 0u; k < 6u; k++) {
-            sum += real(body_coupling[CELLS * (6u * pair + k) + inner]) * body_change[6u * body + k];
+            sum += real(body_coupling[CELLS * (6u * pair + k) + inner])
+                * body_change[6u * body + k];
         }
     }
     return sum;

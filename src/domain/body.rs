@@ -71,6 +71,16 @@ pub struct Body {
     pub moorings: Vec<Mooring>,
 }
 
+/// A taut mooring within a time.
+struct Hold {
+    /// Direction in which it pulls, and its moment about the centre of mass.
+    unit: Six,
+    /// Impulse of a body at rest, N s.
+    pull: f64,
+    /// Decrease of that for each m/s towards the anchor, kg.
+    resistance: f64,
+}
+
 /// State of a body at an instant; part of the simulation's state.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -88,8 +98,8 @@ pub struct BodyState {
 }
 
 impl MassProperties {
-    /// Computes the exact integrals over the inside of a closed mesh of uniform density, kg/m³, as a
-    /// sum over tetrahedra from the middle of its box (equivalent to Mirtich 1996).
+    /// Computes the exact integrals over the inside of a closed mesh of uniform density, kg/m³, as
+    /// a sum over tetrahedra from the middle of its box (equivalent to Mirtich 1996).
     pub fn of_mesh(mesh: &TriangleMesh, density: f64) -> Self {
         let origin = mesh.bounds().map_or(DVec3::ZERO, |b| 0.5 * (b.min + b.max));
         let (mut volume, mut first, mut second) = (0.0, DVec3::ZERO, DMat3::ZERO);
@@ -150,12 +160,24 @@ impl Body {
     /// inverse of the mass matrix within the body's freedom, N (Nᵀ M N)⁻¹ Nᵀ with the velocities N
     /// that it may have.
     pub fn response(&self, state: &BodyState) -> [Six; 6] {
-        let inertia = self.inertia(state);
+        self.response_of(state, &[])
+    }
+
+    /// Returns the same for impulses within `kick` seconds, in which taut moorings also act on what
+    /// velocity the impulses give.
+    pub fn held_response(&self, state: &BodyState, kick: f64) -> [Six; 6] {
+        self.response_of(state, &self.holds(state, kick))
+    }
+
+    fn response_of(&self, state: &BodyState, holds: &[Hold]) -> [Six; 6] {
         let momentum = |v: &Six| {
-            let [_, _, _, x, y, z] = *v;
-            let about = inertia * DVec3::new(x, y, z);
-            let m = self.mass.mass;
-            [m * v[0], m * v[1], m * v[2], about.x, about.y, about.z]
+            let held = holds
+                .iter()
+                .map(|it| (it.resistance * dot(&it.unit, v), &it.unit));
+            let own = self.momentum(state, v);
+            held.fold(own, |sum, (by, unit)| {
+                std::array::from_fn(|k| sum[k] + by * unit[k])
+            })
         };
         // Orthonormal with respect to the mass matrix, by Gram and Schmidt.
         let mut basis: Vec<Six> = Vec::new();
@@ -174,34 +196,46 @@ impl Body {
         })
     }
 
-    /// Returns the state after gravity, m/s², and the moorings have acted for `kick` seconds.
-    /// Moorings act implicitly, so that a stiff one is stable at any step.
-    pub fn accelerated(&self, state: &BodyState, gravity: DVec3, kick: f64) -> BodyState {
-        let response = self.response(state);
-        let weight = self.mass.mass * kick * gravity;
-        let mut state = state.pushed(&response, &[weight.x, weight.y, weight.z, 0.0, 0.0, 0.0]);
-        for mooring in &self.moorings {
-            let at = self.pose(&state).place(mooring.at);
+    /// Returns the momentum of a velocity.
+    fn momentum(&self, state: &BodyState, v: &Six) -> Six {
+        let [_, _, _, x, y, z] = *v;
+        let about = self.inertia(state) * DVec3::new(x, y, z);
+        let m = self.mass.mass;
+        [m * v[0], m * v[1], m * v[2], about.x, about.y, about.z]
+    }
+
+    /// Returns the moorings that are taut for the next `kick` seconds.
+    fn holds(&self, state: &BodyState, kick: f64) -> Vec<Hold> {
+        let hold = |mooring: &Mooring| {
+            let at = self.pose(state).place(mooring.at);
             let way = mooring.anchor - at;
             let distance = way.length();
             let stretch = distance - mooring.length;
-            if stretch <= 0.0 || distance == 0.0 {
-                continue;
-            }
             let towards = way / distance;
             let about = (at - state.centre).cross(towards);
-            let unit = [towards.x, towards.y, towards.z, about.x, about.y, about.z];
-            let approach = dot(&unit, &state.velocities());
-            let give = dot(&unit, &product(&response, &unit));
-            let Mooring {
-                stiffness, damping, ..
-            } = mooring;
-            let held = kick * (stiffness * kick + damping);
-            let impulse = (kick * stiffness * stretch - held * approach) / (1.0 + held * give);
-            let impulse = impulse.max(0.0);
-            state = state.pushed(&response, &unit.map(|x| impulse * x));
+            let hold = Hold {
+                unit: [towards.x, towards.y, towards.z, about.x, about.y, about.z],
+                pull: kick * mooring.stiffness * stretch,
+                resistance: kick * (mooring.stiffness * kick + mooring.damping),
+            };
+            let pulls = hold.pull > hold.resistance * dot(&hold.unit, &state.velocities());
+            (stretch > 0.0 && pulls).then_some(hold)
+        };
+        self.moorings.iter().filter_map(hold).collect()
+    }
+
+    /// Returns the state after gravity, m/s², and the moorings have acted for `kick` seconds.
+    /// Moorings act implicitly, so that a stiff one is stable at any step.
+    pub fn accelerated(&self, state: &BodyState, gravity: DVec3, kick: f64) -> BodyState {
+        let weight = self.mass.mass * kick * gravity;
+        let mut impulse = [weight.x, weight.y, weight.z, 0.0, 0.0, 0.0];
+        let holds = self.holds(state, kick);
+        for hold in &holds {
+            // Less what it resists of the velocity that the body has.
+            let by = hold.pull - hold.resistance * dot(&hold.unit, &state.velocities());
+            impulse = std::array::from_fn(|k| impulse[k] + by * hold.unit[k]);
         }
-        state
+        state.pushed(&self.response_of(state, &holds), &impulse)
     }
 
     /// Returns the state `length` seconds later without forces: the centre moves in a straight

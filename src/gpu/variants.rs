@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use super::{error::GpuError, shader};
 
 /// Combinations of conditions that a plan can set; every pass must compose under each.
-const VARIANTS: [&[&str]; 74] = [
+const VARIANTS: [&[&str]; 76] = [
     &[],
     &["SOLIDS"],
     &["NEIGHBOR_LIST"],
@@ -48,6 +48,15 @@ const VARIANTS: [&[&str]; 74] = [
         "PUSHED",
         "GHOST_FLUID",
     ],
+    &[
+        "SOLIDS",
+        "MOVING_SOLIDS",
+        "BODIES",
+        "CORRECTION",
+        "PUSHED",
+        "GHOST_FLUID",
+    ],
+    &["SOLIDS", "MOVING_SOLIDS", "BODIES", "F64"],
     &["GHOST_FLUID", "DIAGONAL"],
     &["GHOST_FLUID", "DIAGONAL", "TWO_WORDS"],
     &["TWO_WORDS"],
@@ -118,11 +127,13 @@ const VARIANTS: [&[&str]; 74] = [
     &["LISTED", "DRY", "MATERIALS", "PALETTE", "SPRAY", "LIGHTS"],
 ];
 
-/// `neighbor_list` holds lists, so build_neighbors has no variant without them; and only ray
-/// tracing passes render a volume.
+/// `neighbor_list` holds lists, so build_neighbors has no variant without them; bodies are solids
+/// that move; and only ray tracing passes render a volume.
 fn is_meaningful(pass: &str, defines: &[&str]) -> bool {
     let has_lists = pass != "pbf/build_neighbors" || defines.contains(&"NEIGHBOR_LIST");
-    has_lists && (pass.starts_with("rays/") || !defines.contains(&"VOLUME"))
+    let of_bodies = ["flip/couple_bodies", "flip/carry_bodies"].contains(&pass);
+    let has_bodies = !of_bodies || defines.contains(&"BODIES");
+    has_lists && has_bodies && (pass.starts_with("rays/") || !defines.contains(&"VOLUME"))
 }
 
 /// A pass under conditions that change its text.

@@ -1,7 +1,6 @@
 //! GPU solvers: position-based fluids (PBF), FLIP, the pressure projection, effects and whitewater.
 
 mod air;
-pub mod bodies;
 pub mod boundary;
 pub mod buffers;
 mod by_method;
@@ -40,9 +39,9 @@ pub fn mirrors() -> Vec<Layout> {
         IterationControl::layout(),
         SurveyHead::layout(),
         params::DeviceBrick::layout(),
-        bodies::DeviceBody::layout(),
-        bodies::DeviceBodies::layout(),
-        bodies::BodyPair::layout(),
+        pressure::bodies::DeviceBody::layout(),
+        pressure::bodies::DeviceBodies::layout(),
+        pressure::bodies::BodyPair::layout(),
         PressurePhase::layout(),
         PressureControl::layout(),
         PressureControl64::layout(),

@@ -18,11 +18,11 @@ use swell_reference::{
 };
 use swell_solve::{
     SolveError,
-    bodies::{self as device, DeviceBodies},
     buffers::SOLID_GRIDS,
     flip::buffers,
     pressure::{
         DONE, ITERATING, VERIFYING,
+        bodies::{self as device, DeviceBodies},
         buffers::{self as solved, Real},
     },
 };
@@ -115,8 +115,8 @@ impl Touched {
         std::array::from_fn(|i| std::array::from_fn(|j| at(6 * i + j)))
     }
 
-    /// Returns the flux out of each element by changes of the bodies' velocities, and the sum of its
-    /// terms' magnitudes.
+    /// Returns the flux out of each element by changes of the bodies' velocities, and the sum of
+    /// its terms' magnitudes.
     fn flux(&self, elements: usize, changes: &[Six]) -> [Vec<f64>; 2] {
         let [mut flux, mut size] = [vec![0.0; elements], vec![0.0; elements]];
         for (pair, element, push) in self.cells() {
@@ -480,7 +480,11 @@ impl FlipState {
     fn coupled(&self, shift: f64) -> Vec<BodyCells> {
         self.with_shifted_solids(shift, DVec3::ZERO, |model, step| {
             let bricks = &self.elements().bricks;
-            reference_couple(model, step, bricks, self.space(), &self.bodies)
+            // Moorings are taut or slack by the velocity before gravity.
+            let kick = self.elements().substep.kick;
+            let responses = self.model.responses(&self.begun.bodies, kick);
+            let bodies = (&self.bodies[..], &responses[..]);
+            reference_couple(model, step, bricks, self.space(), bodies)
         })
     }
 }

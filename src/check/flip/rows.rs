@@ -176,7 +176,7 @@ entries! {
             moved: "what it changes by as solids' distances move by " GRID]
             (12.0 * cut + 8.0 * U) * arm + 3.0 * moved, "6 faces, 2 products each", tie TURN;
         WEIGHT = "weight between cells' centres and bodies", "m/s": [cut: "" CUT,
-            cells: "cells that the body touches, times g Δt and with turns times the domain's length",
+            cells: "cells that the body touches, times g Δt and for turns the domain's length",
             moved: "what it changes by as solids' distances move by " GRID]
             (4.0 * cut + 16.0 * U) * cells + 3.0 * moved, "3 volumes and their sums", tie TURN;
         RESPONSE = "response of bodies", "": [own: "its own value",

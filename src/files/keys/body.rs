@@ -36,7 +36,7 @@ keys! { struct BodySpec {
         .unit("kg m²")
         .computed(|| "that of the mesh filled evenly".to_owned())
         .also(", none above the sum of the others")
-        .about("moments of inertia about the scene's axes through the centre of mass, at the start"),
+        .about("moments of inertia about the scene's axes through the centre of mass"),
     velocity: [f64; 3] = vector(3, VECTOR)
         .unit("m/s")
         .default("[0.0, 0.0, 0.0]")

@@ -62,8 +62,8 @@ pub(super) fn add_bodies(bodies: &[BodyCells], elements: usize, system: &mut Sys
     system.add_bodies(bodies.iter().map(|it| it.of_system(&row_of)).collect());
 }
 
-/// Adds to the solids' flux out of each cell that of the bodies' changes of velocity (reference pass
-/// of `pressure/carry_flux`).
+/// Adds to the solids' flux out of each cell that of the bodies' changes of velocity (reference
+/// pass of `pressure/carry_flux`).
 pub(super) fn carry_flux(bodies: &[BodyCells], changes: &[Six], flux: &mut [f64]) {
     for (body, change) in bodies.iter().zip(changes) {
         for (&element, push) in body.element.iter().zip(&body.push) {
@@ -79,14 +79,14 @@ pub fn couple_bodies(
     step: &FlipSubstep<'_>,
     bricks: &Bricks,
     space: &OpenSpace,
-    bodies: &[BodyState],
+    (bodies, responses): (&[BodyState], &[[Six; 6]]),
 ) -> Vec<BodyCells> {
     let size = model.cell_size();
     let least = model.scene.domain.min;
     let first = step.solids.len() - bodies.len();
     let scale = model.scene.water.rest_density * size.powi(3);
-    let all = model.scene.bodies().zip(bodies).enumerate();
-    all.map(|(index, (it, state))| {
+    let all = bodies.iter().enumerate();
+    all.map(|(index, state)| {
         let centre = state.centre - least;
         let of_cell = |element: u32| {
             let cell = corner(bricks, element);
@@ -128,7 +128,7 @@ pub fn couple_bodies(
             element,
             push,
             weight,
-            response: it.body.response(state).map(|row| row.map(|r| scale * r)),
+            response: responses[index].map(|row| row.map(|r| scale * r)),
         }
     })
     .collect()
@@ -191,6 +191,15 @@ impl Model {
             it.body.accelerated(&state, gravity, substep.kick)
         })
         .collect()
+    }
+
+    /// Returns the bodies' responses to impulses in a substep; see [`Body::held_response`].
+    ///
+    /// [`Body::held_response`]: swell_domain::body::Body::held_response
+    pub fn responses(&self, bodies: &[BodyState], kick: f64) -> Vec<[Six; 6]> {
+        let all = self.scene.bodies().zip(bodies);
+        all.map(|(it, state)| it.body.held_response(state, kick))
+            .collect()
     }
 
     /// Moves bodies to the end of a substep.

@@ -18,6 +18,7 @@ mod solver;
 mod sort;
 mod to_grid;
 mod to_particles;
+mod trace;
 mod wall_friction;
 mod water;
 
@@ -29,12 +30,13 @@ pub use pressure::{Waters, density_source};
 pub use projection::Projected;
 pub use rotation::{grid_confinement, grid_curl};
 pub use solids::Solid;
-pub use solver::{Flip, Trace};
+pub use solver::Flip;
 pub use sort::{Cloud, Sorted, Survey, assign_cells, reorder, survey};
 pub use to_grid::{Faces, OpenSpace, cut_cells, gather_faces};
 pub use to_particles::{
     GridTransfer, Moved, advect, aim, extrapolate, find_change, grid_to_particle, push_apart,
 };
+pub use trace::Trace;
 pub use wall_friction::{friction_rates, wall_friction};
 pub use water::{
     Centers, Depth, LEAST_FILM, find_buried, find_depth, find_excess, find_water, gather_centers,

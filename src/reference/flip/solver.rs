@@ -3,12 +3,12 @@
 use glam::{DMat3, DVec3, Vec3};
 
 use super::{
-    BodyCells, Centers, Cloud, Faces, FlipSubstep, Gaps, GridTransfer, Model, OpenSpace, Sorted,
-    Waters, advect, aim, assign_cells, carry_bodies, close_gaps, couple_bodies, cut_cells,
+    BodyCells, Centers, Cloud, Faces, Gaps, Model, Trace, Waters, advect, aim, assign_cells,
+    carry_bodies, close_gaps, couple_bodies, cut_cells,
     effects::{self, FaceInputs, Flying},
     extrapolate, find_buried, find_change, find_depth, find_excess, find_water, gather_centers,
-    gather_faces, grid_to_particle, is_filling, let_in,
-    projection::{Projected, project},
+    gather_faces, grid_to_particle, let_in,
+    projection::project,
     push_apart, reorder, survey, wall_friction,
 };
 use crate::{ReferenceError, Timings};
@@ -52,58 +52,6 @@ struct PressureField {
     pressure: Vec<f64>,
     /// See [`Gauge::taken`].
     taken: Vec<[f32; 3]>,
-}
-
-/// A substep with all its intermediate results.
-#[derive(Clone, Debug)]
-pub struct Trace {
-    /// Layout of the elements.
-    pub bricks: Bricks,
-    /// Particles at the substep's start, sorted by cell.
-    pub sorted: Sorted,
-    /// Open space of the cells.
-    pub space: OpenSpace,
-    /// Densities at cell centres.
-    pub centers: Centers,
-    /// Face velocities after the extrapolation of the last layer.
-    pub faces: Faces,
-    /// The last projection.
-    pub projected: Projected,
-    /// The first projection, if an effect acts between two.
-    pub earlier: Option<Projected>,
-    /// Whether that effect needs more iterations than the settings allow.
-    pub is_short: bool,
-    /// Pressure by element, Pa; 0 where there is no water.
-    pub pressure: Vec<f64>,
-    /// Σ ± (1 − f) u_solid of each cell after the projections, m/s.
-    pub solid_flux: Vec<f64>,
-    /// Cells that bodies touch.
-    pub coupled: Vec<BodyCells>,
-    /// Bodies at the substep's start, with the velocities that they move with.
-    pub bodies: Vec<BodyState>,
-    /// Displacements of the density correction at the lower faces, metres, if it is on.
-    pub displacement: Option<Vec<DVec3>>,
-    /// Values transferred from the grid to the particles, in the order of `sorted`, before the
-    /// particles moved.
-    pub given: GridTransfer,
-    /// Particles at the substep's end, in the order of `sorted`.
-    pub after: Cloud,
-    /// Number of particles whose displacement was reduced to the cap.
-    pub capped: u64,
-}
-
-impl Trace {
-    /// Iterates over the projections in order.
-    pub fn projections(&self) -> impl Iterator<Item = &Projected> {
-        self.earlier.iter().chain([&self.projected])
-    }
-
-    /// Adds the projections to the report of a frame's projections.
-    fn add_to(&self, all: &mut Projection) {
-        self.projections()
-            .for_each(|projected| projected.add_to(all));
-        all.missed += u32::from(self.is_short);
-    }
 }
 
 impl Flip {
@@ -173,6 +121,7 @@ impl Flip {
             contacts,
             ..
         } = self;
+        let responses = model.responses(&state.bodies, substep.kick);
         let before = model.predicted(&state.bodies, substep);
         let mut step = model.step(substep, &state.walls, &before);
         let (bricks, mut sorted) = timings.time("flip/reorder", || {
@@ -245,7 +194,7 @@ impl Flip {
         };
         effects::on_faces(&model.scene.effects, water, &mut faces.velocity, timings);
         let coupled = timings.time("flip/couple_bodies", || {
-            couple_bodies(model, &step, &bricks, &space, &before)
+            couple_bodies(model, &step, &bricks, &space, (&before, &responses))
         });
         let waters = Waters::new(model, &bricks, &space, &centers);
         let mut waters = waters.with_bodies(&coupled);
@@ -559,22 +508,6 @@ impl Flip {
                 self.state.attributes.insert(name.to_owned(), values);
             }
         }
-    }
-}
-
-impl Model {
-    /// Returns the work of walls and solids that move in a substep, joules (flip/boundary_work).
-    fn boundary_work(&self, step: &FlipSubstep<'_>, trace: &Trace) -> f64 {
-        let Trace { bricks, space, .. } = trace;
-        let terms = (0..space.kind.len()).map(|e| {
-            let is_filling = is_filling(step, bricks, space, &trace.centers.density, e as u32);
-            match is_filling {
-                true => 0.0,
-                false => -trace.pressure[e] * trace.solid_flux[e],
-            }
-        });
-        let sum: f64 = terms.sum();
-        self.cell_size().powi(2) * step.kick * sum
     }
 }
 

@@ -169,8 +169,8 @@ impl Model {
         self.samples = order.into_iter().map(|k| local[k]).collect();
     }
 
-    /// Moves solids to their poses at `time`, bodies from these states, with the velocities of their motion over the
-    /// preceding `step` seconds.
+    /// Moves solids to their poses at `time`, bodies from these states, with the velocities of
+    /// their motion over the preceding `step` seconds.
     pub fn stand(&mut self, scene: &Scene, bodies: &[BodyState], time: f64, step: f64) {
         let Some(boundary) = self.boundary.take() else {
             return;

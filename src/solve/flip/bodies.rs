@@ -5,7 +5,7 @@ use swell_domain::body::BodyState;
 use swell_scene::step::Substep;
 
 use super::{
-    super::{SolveError, bodies, trace::Run},
+    super::{SolveError, pressure::bodies, trace::Run},
     Flip,
 };
 
@@ -18,10 +18,14 @@ impl Flip {
     /// Lets gravity and moorings act on the bodies, without the water.
     pub(super) fn predict_bodies(&mut self, substep: &Substep) {
         let gravity = self.scene.water.gravity;
+        self.responses.clear();
         for (it, state) in self.scene.bodies().zip(&mut self.state.bodies) {
             // Sums of lengths round.
             state.time = substep.start;
-            *state = it.body.accelerated(state, gravity, substep.kick);
+            let kick = substep.kick;
+            let response = it.body.held_response(state, kick);
+            self.responses.push(response);
+            *state = it.body.accelerated(state, gravity, kick);
         }
     }
 
@@ -38,7 +42,10 @@ impl Flip {
         let Some(movers) = self.movers.as_ref().filter(|_| self.scene.has_bodies()) else {
             return;
         };
-        let lists = bodies::Lists::new(&self.scene, &self.bricks, &self.state.bodies);
+        let lists = {
+            let (bodies, responses) = (&self.state.bodies, &self.responses);
+            bodies::Lists::new(&self.scene, &self.bricks, bodies, responses)
+        };
         lists.upload(&self.program, movers.first_body(&self.scene));
         let [bricks, count] = lists.sizes();
         self.pressure.set_bodies(bricks, count);

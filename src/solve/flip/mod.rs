@@ -13,6 +13,7 @@ pub(super) mod plan;
 mod record;
 mod step;
 mod totals;
+mod trace;
 mod velocities;
 mod watch;
 
@@ -23,6 +24,7 @@ use glam::DVec3;
 use swell_contact::SceneContacts;
 use swell_domain::{
     absorber::AbsorberStates,
+    body::Six,
     boundary::Boundary,
     bounds::Bounds,
     bricks::{Bricks, CELLS, table_dims},
@@ -31,7 +33,6 @@ use swell_domain::{
     particles::Particles,
     shores::Shores,
     solver::{PassTime, Solver, StepReport, Unread, Watch},
-    substep::SubstepChoice,
 };
 use swell_gpu::{
     adapter::Context,
@@ -50,7 +51,7 @@ use super::{
     plan::{Counts, Plan},
     pressure::{self, PressureSolver},
     state::{Carried, is_awaited, is_other_count, upload},
-    trace::{Begun, Observe, Run, Span, TraceFrame, trace},
+    trace::Run,
 };
 use buffers::*;
 pub use capacity::capacity;
@@ -79,6 +80,8 @@ pub struct Flip {
     /// See [`Substep::kick`], seconds.
     kick: f64,
     contacts: Option<SceneContacts>,
+    /// Responses of the bodies to impulses in the substep.
+    responses: Vec<[Six; 6]>,
 }
 
 /// Result of `flip/survey`.
@@ -125,6 +128,7 @@ impl Flip {
             scene: Arc::new(scene.to_owned_scene()),
             movers: Movers::of(boundary, scene),
             contacts: SceneContacts::of(scene),
+            responses: Vec::new(),
             shores: Shores::new(boundary, scene.domain.min, scene.settings().cell_size)
                 .joined(scene.periodic),
             state,
@@ -538,49 +542,6 @@ impl Solver for Flip {
     fn timings(&self) -> Vec<PassTime> {
         let timer = self.timer.as_ref();
         timer.map_or_else(Vec::new, |timer| timer.times(PassTime::new))
-    }
-}
-
-impl TraceFrame for Flip {
-    fn trace_frame(&mut self, span: Span, observe: &mut Observe<'_>) -> Result<u32, SolveError> {
-        let plain: &mut Run<'_> =
-            &mut |program, recordings| Ok(Recording::run_all(recordings, program, None)?);
-        self.program.upload(COUNTERS, 0, &[Counters::default()]);
-        let mut totals = FrameTotals::default();
-        loop {
-            let begun = Begun {
-                number: totals.substeps + 1,
-                elapsed: totals.elapsed,
-                before: self.state.substep,
-                bodies: self.state.bodies.clone(),
-            };
-            let is_traced = match span {
-                Span::From(first) => begun.number >= first,
-                Span::Only(SubstepChoice::Number(number)) => begun.number == number,
-                // This look ahead does not change anything: the substep's own survey finds the
-                // same.
-                Span::Only(SubstepChoice::Last) => self.look(&totals, plain)?.2,
-            };
-            let is_last = if is_traced {
-                self.go_on(&mut totals, &mut |program, recordings| {
-                    trace(recordings, program, &mut |traced| observe(&begun, traced))
-                })?
-            } else {
-                self.go_on(&mut totals, plain)?
-            };
-            match span {
-                Span::Only(_) if is_traced => return Ok(begun.number),
-                Span::Only(SubstepChoice::Number(asked)) if is_last => {
-                    return Err(SolveError::NoSubstep {
-                        asked,
-                        frame: self.frame,
-                        count: totals.substeps,
-                    });
-                }
-                _ if is_last => return Ok(totals.substeps),
-                _ => {}
-            }
-        }
     }
 }
 

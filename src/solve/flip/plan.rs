@@ -1,9 +1,9 @@
 //! Plan of FLIP's passes and buffers.
 
 use crate::{
-    bodies, effects,
+    effects,
     plan::{BufferTable, Counts, Plan, in_order},
-    pressure,
+    pressure::{self, bodies},
 };
 use swell_domain::{
     bricks::{CELLS, table_dims},

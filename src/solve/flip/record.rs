@@ -1,11 +1,12 @@
 //! Recordings of a substep's passes.
 
 use crate::{
-    SolveError, bodies,
+    SolveError,
     effects::Addition,
     grid::{ACTIVE, WET, over_listed},
     params::FlipParams,
     plan::{Plan, PlannedBuffer},
+    pressure::bodies,
     trace::Run,
 };
 use swell_domain::{bricks::CELLS, flip::layers};

@@ -26,8 +26,8 @@ pub(crate) fn upload(
     upload_distance(boundary, program, scene);
 }
 
-/// Uploads boundary samples with their velocities: behind the particles in `predicted`, sorted by cell, weighted in units of a
-/// particle's mass.
+/// Uploads boundary samples with their velocities: behind the particles in `predicted`, sorted by
+/// cell, weighted in units of a particle's mass.
 pub(crate) fn upload_samples(
     samples: &[SolidSample],
     program: &Program,

@@ -41,6 +41,7 @@
 //! pressure.correct(&program, timer)  // same system: density_excess -> displacements
 //! ```
 
+pub mod bodies;
 pub mod buffers;
 mod params;
 mod plan;
@@ -57,7 +58,7 @@ use swell_gpu::{
 };
 use swell_scene::flip::{Precision, Preconditioner, Pressure};
 
-use super::{SolveError, bodies, trace::Run};
+use super::{SolveError, trace::Run};
 
 use buffers::{PHASES, SIZES, read_control, read_reals};
 pub use params::{

@@ -26,8 +26,9 @@ use swell_scene::{
 };
 
 use super::{
-    SolveError,
-    pressure::{blocked, buffers::Real},
+    super::SolveError,
+    blocked,
+    buffers::{Real, read_reals},
 };
 
 mirror!(
@@ -94,7 +95,7 @@ const MARGIN: f64 = 1.0;
 
 /// Returns the largest number of pairs of a scene: a body has at most as many bricks as its largest
 /// extent in any pose touches.
-pub(super) fn most_pairs(scene: &FlipScene, grid_dims: [u32; 3]) -> usize {
+pub(crate) fn most_pairs(scene: &FlipScene, grid_dims: [u32; 3]) -> usize {
     let size = scene.settings().cell_size;
     let table = table_dims(stored_cells(grid_dims, scene.periodic));
     let of_body = |it: &FreeBody| {
@@ -109,7 +110,7 @@ pub(super) fn most_pairs(scene: &FlipScene, grid_dims: [u32; 3]) -> usize {
 }
 
 /// Returns the buffers of the scene's bodies; none without bodies.
-pub(super) fn planned(scene: &FlipScene, grid_dims: [u32; 3]) -> Vec<BufferSpec> {
+pub(crate) fn planned(scene: &FlipScene, grid_dims: [u32; 3]) -> Vec<BufferSpec> {
     let count = scene.bodies().count();
     if count == 0 {
         return Vec::new();
@@ -132,7 +133,7 @@ pub(super) fn planned(scene: &FlipScene, grid_dims: [u32; 3]) -> Vec<BufferSpec>
 
 /// The lists of a substep.
 #[derive(Debug, Default)]
-pub(super) struct Lists {
+pub(crate) struct Lists {
     pairs: Vec<BodyPair>,
     order: Vec<u32>,
     touched: Vec<[u32; 4]>,
@@ -140,9 +141,14 @@ pub(super) struct Lists {
 }
 
 impl Lists {
-    /// Lists the bricks that each body may touch, and the bodies' responses at the start of a
-    /// substep, in which they have these states.
-    pub(super) fn new(scene: &FlipScene, bricks: &Bricks, states: &[BodyState]) -> Self {
+    /// Lists the bricks that each body may touch at the start of a substep, in which they have
+    /// these states and responses.
+    pub(crate) fn new(
+        scene: &FlipScene,
+        bricks: &Bricks,
+        states: &[BodyState],
+        responses: &[[Six; 6]],
+    ) -> Self {
         let solids = scene.moving_solids.iter();
         let bodies: Vec<_> = solids.filter(|solid| solid.body.is_some()).collect();
         let mut lists = Self::default();
@@ -156,7 +162,7 @@ impl Lists {
         lists.pairs.sort_by_key(|pair| (pair.slot, pair.body));
         lists.states.pairs = lists.pairs.len() as u32;
         for (k, solid) in bodies.iter().enumerate() {
-            lists.add_state(scene, k, solid, states);
+            lists.add_state(scene, k, solid, (states, &responses[k]));
         }
         for (k, pair) in (0..).zip(&lists.pairs) {
             match lists.touched.last_mut() {
@@ -169,7 +175,13 @@ impl Lists {
         lists
     }
 
-    fn add_state(&mut self, scene: &FlipScene, k: usize, solid: &MovingSolid, all: &[BodyState]) {
+    fn add_state(
+        &mut self,
+        scene: &FlipScene,
+        k: usize,
+        solid: &MovingSolid,
+        (all, response): (&[BodyState], &[Six; 6]),
+    ) {
         let Some(it) = &solid.body else { return };
         let state = it.state(all);
         let first = self.order.len() as u32;
@@ -179,7 +191,6 @@ impl Lists {
         self.order.extend(own.map(|(index, _)| index));
         let volume = scene.settings().cell_size.powi(3);
         let scale = scene.water.rest_density * volume;
-        let response = it.body.response(&state);
         self.states.bodies[k] = DeviceBody {
             centre: (state.centre - scene.domain.min).as_vec3().to_array(),
             first,
@@ -195,7 +206,7 @@ impl Lists {
     }
 
     /// Uploads the lists; `first_solid` is the number of the first body's grid among the solids'.
-    pub(super) fn upload(&self, program: &Program, first_solid: u32) {
+    pub(crate) fn upload(&self, program: &Program, first_solid: u32) {
         let states = DeviceBodies {
             first_solid,
             ..self.states
@@ -207,7 +218,7 @@ impl Lists {
     }
 
     /// Number of bricks with water that bodies may touch, and number of bodies.
-    pub(super) fn sizes(&self) -> [u32; 2] {
+    pub(crate) fn sizes(&self) -> [u32; 2] {
         [self.states.bricks, self.states.count]
     }
 }
@@ -259,12 +270,12 @@ fn turned(b: &Bounds, place: &DAffine3) -> Bounds {
 }
 
 /// Reads the change of each body's velocities by the last projection, with what came before it.
-pub(super) fn changes(
+pub(crate) fn changes(
     program: &Program,
     precision: Precision,
     bodies: usize,
 ) -> Result<Vec<Six>, SolveError> {
-    let all = super::pressure::buffers::read_reals(program, &CHANGE, precision, 12 * bodies)?;
+    let all = read_reals(program, &CHANGE, precision, 12 * bodies)?;
     let (by_pressure, before) = all.split_at(6 * bodies);
     let both: Vec<f64> = by_pressure.iter().zip(before).map(|(a, b)| a + b).collect();
     let six = |c: &[f64]| std::array::from_fn(|k| c[k]);

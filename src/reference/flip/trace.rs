@@ -1,0 +1,77 @@
+//! What a substep computes.
+
+use glam::DVec3;
+
+use super::{
+    BodyCells, Centers, Cloud, Faces, FlipSubstep, GridTransfer, Model, OpenSpace, Sorted,
+    is_filling, projection::Projected,
+};
+use swell_domain::{body::BodyState, bricks::Bricks, solver::Projection};
+
+/// A substep with all its intermediate results.
+#[derive(Clone, Debug)]
+pub struct Trace {
+    /// Layout of the elements.
+    pub bricks: Bricks,
+    /// Particles at the substep's start, sorted by cell.
+    pub sorted: Sorted,
+    /// Open space of the cells.
+    pub space: OpenSpace,
+    /// Densities at cell centres.
+    pub centers: Centers,
+    /// Face velocities after the extrapolation of the last layer.
+    pub faces: Faces,
+    /// The last projection.
+    pub projected: Projected,
+    /// The first projection, if an effect acts between two.
+    pub earlier: Option<Projected>,
+    /// Whether that effect needs more iterations than the settings allow.
+    pub is_short: bool,
+    /// Pressure by element, Pa; 0 where there is no water.
+    pub pressure: Vec<f64>,
+    /// Σ ± (1 − f) u_solid of each cell after the projections, m/s.
+    pub solid_flux: Vec<f64>,
+    /// Cells that bodies touch.
+    pub coupled: Vec<BodyCells>,
+    /// Bodies at the substep's start, with the velocities that they move with.
+    pub bodies: Vec<BodyState>,
+    /// Displacements of the density correction at the lower faces, metres, if it is on.
+    pub displacement: Option<Vec<DVec3>>,
+    /// Values transferred from the grid to the particles, in the order of `sorted`, before the
+    /// particles moved.
+    pub given: GridTransfer,
+    /// Particles at the substep's end, in the order of `sorted`.
+    pub after: Cloud,
+    /// Number of particles whose displacement was reduced to the cap.
+    pub capped: u64,
+}
+
+impl Trace {
+    /// Iterates over the projections in order.
+    pub fn projections(&self) -> impl Iterator<Item = &Projected> {
+        self.earlier.iter().chain([&self.projected])
+    }
+
+    /// Adds the projections to the report of a frame's projections.
+    pub(super) fn add_to(&self, all: &mut Projection) {
+        self.projections()
+            .for_each(|projected| projected.add_to(all));
+        all.missed += u32::from(self.is_short);
+    }
+}
+
+impl Model {
+    /// Returns the work of walls and solids that move in a substep, joules (flip/boundary_work).
+    pub(super) fn boundary_work(&self, step: &FlipSubstep<'_>, trace: &Trace) -> f64 {
+        let Trace { bricks, space, .. } = trace;
+        let terms = (0..space.kind.len()).map(|e| {
+            let is_filling = is_filling(step, bricks, space, &trace.centers.density, e as u32);
+            match is_filling {
+                true => 0.0,
+                false => -trace.pressure[e] * trace.solid_flux[e],
+            }
+        });
+        let sum: f64 = terms.sum();
+        self.cell_size().powi(2) * step.kick * sum
+    }
+}
