@@ -23,6 +23,10 @@ file = "cube.obj"
 at = [[2, 1, 1]]
 [[solid]]
 mesh = "cube.obj"
+[[body]]
+mesh = "room.obj"
+density = 500.0
+mooring = [{ anchor = [2.5, 0, 0.5], at = [2.5, 0, 0.5], length = 1.0, stiffness = 1e3 }]
 [[wave_maker]]
 wall = "-x"
 motion = { kind = "sine", stroke = 0.5, period = 2.0 }
@@ -169,6 +173,7 @@ fn what_is_no_physics_is_said_once() {
         [
             "water.mesh.file",
             "solid.mesh",
+            "body.mesh",
             "emitter.mesh.file",
             "drain.mesh.file"
         ]

@@ -34,7 +34,11 @@ pub(crate) fn plan(scene: &FlipScene, counts: Counts, moves: bool) -> Plan {
         table.extend(name, addition.buffers.clone());
     }
     let settings = &flip.pressure;
-    table.append(pressure::planned(settings, counts.bricks.slots));
+    table.append(pressure::planned(
+        settings,
+        extent(scene),
+        counts.bricks.slots,
+    ));
     table.extend("bodies", bodies::planned(scene, plan.grid_dims));
     plan.declare(table);
     let commands = Commands::new(&plan, scene, &effects);

@@ -66,7 +66,7 @@ pub use params::{
     ReduceStep,
 };
 pub(crate) use plan::require;
-use plan::{PHASE_COUNT, Phase, SIZE_COUNT, Size};
+use plan::{Phase, SIZE_COUNT, Size, phase_count};
 pub use plan::{STEP_OF_FINEST, passes, planned};
 pub use stages::Extent;
 pub(super) use stages::all_commands;
@@ -392,7 +392,7 @@ impl PressureSolver {
     }
 
     fn upload_phases(&self, program: &Program) {
-        let phases: Vec<_> = (0..PHASE_COUNT)
+        let phases: Vec<_> = (0..phase_count(self.extent))
             .map(|index| Phase::fill(index, self.phase))
             .collect();
         program.upload_windows(&PHASES, &phases);

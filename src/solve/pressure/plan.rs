@@ -32,8 +32,14 @@ pub(super) enum Phase {
     BodyWeight,
 }
 
-/// Number of phases.
-pub(super) const PHASE_COUNT: usize = Phase::BodyWeight.index() + 1;
+/// Returns the number of phases.
+pub(super) const fn phase_count(extent: Extent) -> usize {
+    let last = match extent.has_bodies {
+        true => Phase::BodyWeight,
+        false => Phase::Center(true),
+    };
+    last.index() + 1
+}
 
 impl Phase {
     pub(super) const fn index(self) -> usize {
@@ -161,7 +167,7 @@ fn has_diagonal(settings: &Pressure) -> bool {
 
 /// Returns the buffers that the projection adds to its inputs (see the module documentation);
 /// `capacity` is in slots.
-pub fn planned(settings: &Pressure, capacity: usize) -> BufferTable {
+pub fn planned(settings: &Pressure, extent: Extent, capacity: usize) -> BufferTable {
     let cells = capacity * CELLS as usize;
     let precision = settings.precision;
     let reals = |buffer: Buf<Real>, count: usize| match precision {
@@ -198,7 +204,7 @@ pub fn planned(settings: &Pressure, capacity: usize) -> BufferTable {
             STATS.sized(1),
             SIZES.sized(SIZE_COUNT),
             GROUPS.sized(4 * SIZE_COUNT),
-            PHASES.sized(PHASE_COUNT),
+            PHASES.sized(phase_count(extent)),
         ],
     );
     if has_diagonal(settings) {

@@ -212,3 +212,43 @@ fn light_heavy_hinged_and_moored_bodies_stay_bounded() {
         .distance(DVec3::new(0.75, 0.0, 0.7));
     assert!((taut - 0.25).abs() < 2e-3, "{taut}");
 }
+
+/// A frame has all that the next one needs: from frame 2 on a new solver computes the same bits.
+#[test]
+fn bodies_go_on_from_any_frame() {
+    let context = context();
+    for set in [&[][..], &["solver.method=\"pbf\""]] {
+        let scene = scene(&raft(300.0, "spin = [20, 40, 0]\n"), set);
+        let start = Start::of(&scene).unwrap();
+        let mut drive = Drive::new(&gpu(&context), &scene, &start, false).unwrap();
+        let whole: Vec<_> = (0..4).map(|_| drive.advance().unwrap().particles).collect();
+        let mut other = Drive::new(&gpu(&context), &scene, &start, false).unwrap();
+        other.load(2, &whole[1]).unwrap();
+        for frame in [2, 3] {
+            assert_eq!(other.advance().unwrap().particles, whole[frame], "{set:?}");
+        }
+        // Negative control: a body that stands elsewhere by a rounding error goes elsewhere.
+        let mut moved = whole[1].clone();
+        moved.bodies[0].velocity.y += 1e-12;
+        other.load(2, &moved).unwrap();
+        assert_ne!(other.advance().unwrap().particles.bodies, whole[2].bodies);
+    }
+}
+
+#[test]
+fn a_scene_without_bodies_has_nothing_for_them() {
+    let context = context();
+    let with = scene(&raft(300.0, ""), &[]);
+    let mut without = with.clone();
+    without.moving_solids.clear();
+    for (scene, has) in [(&with, true), (&without, false)] {
+        let start = Start::of(scene).unwrap();
+        let mut drive = Drive::new(&gpu(&context), scene, &start, true).unwrap();
+        let frame = drive.advance().unwrap();
+        assert_eq!(frame.particles.bodies.is_empty(), !has);
+        let shares = drive.shares();
+        assert_eq!(shares.iter().any(|share| share.owner == "bodies"), has);
+        let ran = drive.timings();
+        assert_eq!(ran.iter().any(|time| time.pass.contains("bod")), has);
+    }
+}

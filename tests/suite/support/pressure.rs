@@ -19,7 +19,7 @@ use swell::{
 };
 
 /// The projection of a scene without bodies.
-const WITH_CORRECTION: Extent = Extent {
+pub const WITH_CORRECTION: Extent = Extent {
     has_correction: true,
     has_bodies: false,
 };
@@ -50,7 +50,7 @@ impl Rig {
             CaseSurface::Voxel => Surface::Voxel,
             CaseSurface::GhostFluid => Surface::GhostFluid,
         };
-        let mut specs = pressure::planned(settings, capacity).specs();
+        let mut specs = pressure::planned(settings, WITH_CORRECTION, capacity).specs();
         specs.extend([
             BRICKS.sized(capacity),
             CELL_KIND.sized(cells),

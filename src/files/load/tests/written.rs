@@ -186,6 +186,37 @@ generation_zone = { walls = ["+x"], length = 1.0, waves = { kind = "sea", signif
     let scene = parse(dir.path(), slab, &open).expect("valid");
     let toml = scene_to_toml(&scene, &|_, _| "a.obj".to_owned());
     collect_keys("", &toml::from_str(&toml).expect("TOML"), &mut written);
+    let floats = r#"
+[shot]
+name = "floats"
+frames = 1
+frames_per_second = 30
+[domain]
+min = [0, 0, 0]
+max = [4, 4, 4]
+[[body]]
+mesh = "cube.obj"
+translate = [2.5, 1.0, 1.0]
+scale = 0.5
+density = 300.0
+centre = [2.5, 1.1, 1.0]
+inertia = [1.0, 1.0, 1.0]
+free = ["y", "turn_z"]
+mooring = [{ anchor = [2, 0, 1], at = [2, 1, 1], length = 1.0, stiffness = 1e3, damping = 1.0 }]
+[[body]]
+mesh = "cube.obj"
+translate = [1.0, 1.0, 1.0]
+scale = 0.5
+mass = 30.0
+hinge = { at = [1, 0, 1], axis = [1, 0, 0] }
+[solver]
+method = "flip"
+[solver.flip]
+cell_size = 0.25
+"#;
+    let scene = parse(dir.path(), floats, &[]).expect("valid");
+    let toml = scene_to_toml(&scene, &|_, _| "a.obj".to_owned());
+    collect_keys("", &toml::from_str(&toml).expect("TOML"), &mut written);
     // A motion's file is written as the points read from it; `walls` is written as the list
     // of no-slip walls.
     let read = [

@@ -14,7 +14,6 @@ use swell::{
     solve::{
         flip::buffers::DENSITY_EXCESS,
         pressure::{
-            Extent,
             buffers::{RHS, SOLUTION},
             passes, planned,
         },
@@ -24,7 +23,7 @@ use swell::{
 
 use super::{difference, pockets};
 use crate::support::context;
-use crate::support::pressure::{Rig, settings};
+use crate::support::pressure::{Rig, WITH_CORRECTION, settings};
 
 fn in_precision(precision: Precision, tolerance: f64) -> Pressure {
     Pressure {
@@ -124,7 +123,7 @@ fn a_precision_takes_its_own_bytes_and_features() {
     let slots = 10;
     let bytes = |precision| {
         let settings = in_precision(precision, 1e-5);
-        let all = planned(&settings, slots).specs();
+        let all = planned(&settings, WITH_CORRECTION, slots).specs();
         let of = |name: &str| all.iter().find(|spec| spec.name == name).unwrap().bytes;
         let total: u64 = all.iter().map(|spec| spec.bytes).sum();
         (of(SOLUTION.name()), of(RHS.name()), total)
@@ -151,10 +150,7 @@ fn a_precision_takes_its_own_bytes_and_features() {
         &passes(
             &in_precision(Precision::F64, 1e-5),
             SceneSurface::GhostFluid,
-            Extent {
-                has_correction: true,
-                has_bodies: false,
-            },
+            WITH_CORRECTION,
             false,
         ),
         &[],
