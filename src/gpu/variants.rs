@@ -127,12 +127,15 @@ const VARIANTS: [&[&str]; 76] = [
     &["LISTED", "DRY", "MATERIALS", "PALETTE", "SPRAY", "LIGHTS"],
 ];
 
+fn is_of_bodies(pass: &str) -> bool {
+    ["flip/couple_bodies", "flip/carry_bodies"].contains(&pass)
+}
+
 /// `neighbor_list` holds lists, so build_neighbors has no variant without them; bodies are solids
 /// that move; and only ray tracing passes render a volume.
 fn is_meaningful(pass: &str, defines: &[&str]) -> bool {
     let has_lists = pass != "pbf/build_neighbors" || defines.contains(&"NEIGHBOR_LIST");
-    let of_bodies = ["flip/couple_bodies", "flip/carry_bodies"].contains(&pass);
-    let has_bodies = !of_bodies || defines.contains(&"BODIES");
+    let has_bodies = !is_of_bodies(pass) || defines.contains(&"BODIES");
     has_lists && has_bodies && (pass.starts_with("rays/") || !defines.contains(&"VOLUME"))
 }
 
@@ -251,8 +254,10 @@ mod tests {
         {
             let reflection =
                 reflect(pass, text).unwrap_or_else(|error| panic!("{pass} {defines:?}: {error}"));
-            // Only the projection may require f64, and only when told to.
-            let is_wide = pass.starts_with("pressure/") && defines.contains(&"F64");
+            // Only the projection, and the passes that share sums over bodies with it, may require
+            // f64, and only when told to.
+            let of_projection = pass.starts_with("pressure/") || is_of_bodies(pass);
+            let is_wide = of_projection && defines.contains(&"F64");
             assert!(is_wide || !reflection.has_f64, "{pass} {defines:?}");
             let size = reflection.workgroup_size;
             let is_drawing = pass.starts_with("ssfr/") || pass.starts_with("rays/");
