@@ -198,8 +198,8 @@ pub const VARIANTS: &[Variant] = &[
         controls: &[
             control(
                 "flip/cut_cells",
-                "(upper_of_walls - upper) * upper_velocity",
-                "(upper_of_walls - upper) * -upper_velocity",
+                "(cut.upper_of_walls - upper) * cut.upper_velocity",
+                "(cut.upper_of_walls - upper) * -cut.upper_velocity",
                 "flip/cut_cells",
                 &["flux of solids"],
             ),
