@@ -46,10 +46,10 @@ fn main(
         let is_cut = cut.solids != 0u;
         let arm = (cell + 0.5) * params.cell_size - centre;
         let added = velocity + cross(spin, arm);
-        let is_between_walls = is_plane_open(cell);
         for (var axis = 0u; axis < 3u; axis++) {
             let face = axis * params.stride + element;
-            let is_own = is_cut && is_between_walls[axis] && cut.lower_solid[axis] == solid;
+            let is_inside = cut.lower_of_walls[axis] > 0.0;
+            let is_own = is_cut && is_inside && cut.lower_solid[axis] == solid;
             if is_own && face_open[face] == 0.0 {
                 face_velocity[face] += added[axis];
             }

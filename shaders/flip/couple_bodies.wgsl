@@ -59,8 +59,11 @@ fn main(
             body_coupling[first + CELLS * k] = area[k];
             body_coupling[first + CELLS * (k + 3u)] = way[k];
         }
-        // In a cell that other solids touch as well, the volume is not the body's alone.
-        let is_alone = cell_kind[element] == FLUID && cut.solids == 1u << solid;
+        // In a cell that other solids cut as well, the volume is not the body's alone.
+        let closed_low = cut.lower_of_walls - cut.lower;
+        let closed_high = cut.upper_of_walls - cut.upper;
+        let is_own = all(low == closed_low) && all(high == closed_high);
+        let is_alone = is_own && cell_kind[element] == FLUID;
         let filled = extent.x * extent.y * extent.z - open_volume[element];
         let missing = 0.5 * (low + high) - filled;
         let push = params.velocity_step * select(vec3f(0.0), missing, is_alone);

@@ -1,6 +1,6 @@
 // Adds the bodies' part to the system's product with a direction, or takes that of the solution
 // from the residual, in the bricks that they may touch; renews these bricks' sums.
-#import "shared/pressure_bodies.wgsl"
+#import "shared/body_flux.wgsl"
 #import "shared/pressure_control.wgsl"
 #import "shared/pressure_direction.wgsl"
 #import "shared/pressure_sum.wgsl"
@@ -12,23 +12,8 @@ alias Terms = vec3r;
 @group(0) @binding(5) var<storage, read> pressure_direction: array<real>;
 @group(0) @binding(6) var<storage, read_write> pressure_residual: array<real>;
 @group(0) @binding(7) var<storage, read> pressure_control: PressureControl;
-@group(0) @binding(8) var<storage, read> body_pairs: array<BodyPair>;
-@group(0) @binding(10) var<storage, read> body_change: array<real>;
 
 const OF_DIRECTION = 0u;
-
-// Flux out of a cell by the changes of the velocities of the bodies in pairs `first` up to `end`.
-fn flux(first: u32, end: u32, inner: u32) -> real {
-    var sum = real(0.0);
-    for (var pair = first; pair < end; pair++) {
-        let body = body_pairs[pair].body;
-        for (var k = 0u; k < 6u; k++) {
-            sum += real(body_coupling[CELLS * (6u * pair + k) + inner])
-                * body_change[6u * body + k];
-        }
-    }
-    return sum;
-}
 
 @compute @workgroup_size(64)
 fn main(
@@ -43,7 +28,7 @@ fn main(
     var sums = vec3r(0.0);
     for (var inner = local; inner < select(0u, CELLS, is_due); inner += 64u) {
         let e = blocked_cell(found.x, inner);
-        let added = select(0.0, flux(found.y, found.z, inner), has_row(e));
+        let added = select(0.0, body_flux(found.y, found.z, inner, 0u), has_row(e));
         if is_product {
             let p = next_direction(
                 pressure_correction[e], pressure_direction[e], pressure_control.beta);

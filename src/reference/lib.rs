@@ -22,6 +22,9 @@ pub enum ReferenceError {
     /// A numerical budget was exceeded; the state from before this frame is kept.
     #[error(transparent)]
     Numbers(#[from] Breach),
+    /// The number of bodies of the state is not the scene's.
+    #[error(transparent)]
+    Bodies(#[from] swell_scene::moving_solid::OtherBodies),
     /// The sparse Cholesky factorisation failed.
     #[error("the sparse Cholesky factor: {0}")]
     Factor(String),

@@ -155,16 +155,6 @@ impl Budget {
 }
 
 impl Scene {
-    /// Returns the divergence after a projection that counts for the budget, 1/s: with bodies
-    /// without `incompatible`, the mean of a pocket's that no pressure removes. Bodies that come to
-    /// rest press on water beneath them that no air touches.
-    pub fn divergence_left(&self, after: f64, incompatible: f64) -> f64 {
-        match self.has_bodies() {
-            true => (after - incompatible).max(0.0),
-            false => after,
-        }
-    }
-
     /// Bounds the speed that gravity, effects and moving boundaries give in frame `frame` to a
     /// particle of `speed`, m/s; at least a tenth of a spacing per frame. What absorbing walls add
     /// to their own motion is not included; bodies count as they are at the start.

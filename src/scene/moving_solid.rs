@@ -61,6 +61,16 @@ pub struct GivenMass {
     pub spin: [f64; 3],
 }
 
+/// A state whose number of bodies is not the scene's.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the scene has {planned} bodies, and the state has {given}")]
+pub struct OtherBodies {
+    /// Bodies of the scene.
+    pub planned: usize,
+    /// Bodies of the state.
+    pub given: usize,
+}
+
 impl FreeBody {
     /// Returns the body's state among `bodies`; at the start if they are not listed.
     pub fn state(&self, bodies: &[BodyState]) -> BodyState {
@@ -203,6 +213,18 @@ impl Scene {
     /// Whether the water moves any body.
     pub fn has_bodies(&self) -> bool {
         self.bodies().next().is_some()
+    }
+
+    /// Checks that a state has as many bodies as the scene.
+    ///
+    /// # Errors
+    /// [`OtherBodies`] with both numbers.
+    pub fn check_bodies(&self, state: &[BodyState]) -> Result<(), OtherBodies> {
+        let (planned, given) = (self.bodies().count(), state.len());
+        match planned == given {
+            true => Ok(()),
+            false => Err(OtherBodies { planned, given }),
+        }
     }
 
     /// Returns the states of the bodies at the start of the shot.

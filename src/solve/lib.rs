@@ -17,6 +17,7 @@ pub mod whitewater;
 
 use swell_domain::budget::Breach;
 use swell_gpu::{adapter::GpuError, buffer::Mirror, reflect::Layout};
+use swell_scene::moving_solid::OtherBodies;
 
 use params::{
     Counters, FlipParams, Inlets, IterationControl, Params, Phase, SolidGrid, SolidGrids,
@@ -65,6 +66,9 @@ pub enum SolveError {
         /// Particles of the state.
         given: usize,
     },
+    /// The number of bodies of the state is not the scene's.
+    #[error(transparent)]
+    Bodies(#[from] OtherBodies),
     /// The frame has fewer substeps than the requested one.
     #[error("substep {asked} was requested, but the frame after frame {frame} has {count}")]
     NoSubstep {

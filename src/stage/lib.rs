@@ -90,7 +90,7 @@ impl From<&SolveError> for Blame {
     fn from(error: &SolveError) -> Self {
         match error {
             SolveError::Gpu(error) => error.into(),
-            SolveError::Count { .. } => Self::Files,
+            SolveError::Count { .. } | SolveError::Bodies(_) => Self::Files,
             SolveError::NoSubstep { .. } => Self::Input,
             SolveError::Numbers(_) => Self::Numbers,
         }
@@ -100,6 +100,7 @@ impl From<&SolveError> for Blame {
 impl From<&ReferenceError> for Blame {
     fn from(error: &ReferenceError) -> Self {
         match error {
+            ReferenceError::Bodies(_) => Self::Files,
             ReferenceError::Numbers(_)
             | ReferenceError::Factor(_)
             | ReferenceError::NotConverged { .. } => Self::Numbers,

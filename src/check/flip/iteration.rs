@@ -14,6 +14,7 @@ use swell_reference::poisson::iteration::{
 use swell_scene::flip::Preconditioner;
 use swell_solve::{
     SolveError,
+    flip::buffers,
     pressure::{
         DONE, ITERATING, PressureControl64, ReduceStep, STEP_OF_FINEST, VERIFYING, WANTS_POCKETS,
         blocked,
@@ -53,7 +54,11 @@ pub(super) const COMPARISONS: &[Comparison<FlipState>] = &[
         },
         ..comparison("pressure/sum_pockets", NONE, sum_pockets)
     },
-    early("pressure/center", || names![VALUES], center),
+    early(
+        "pressure/center",
+        || names![VALUES, buffers::SOLID_FLUX],
+        center,
+    ),
     comparison("pressure/reduce", || names![solved::CONTROL], reduce),
     comparison("pressure/count_pockets", NONE, count_pockets),
 ];
@@ -312,6 +317,21 @@ fn sum_pockets(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     Ok(())
 }
 
+/// Compares the flux beside bodies, which the means that were taken from `before` leave by.
+fn leak(state: &FlipState, io: &mut Io<'_>, [before, after]: [&[f64]; 2]) -> PassResult {
+    let (elements, unit) = (state.elements(), state.unit());
+    let flux = elements.scalars(&io.before, buffers::SOLID_FLUX)?;
+    let found = elements.scalars(&io.after, buffers::SOLID_FLUX)?;
+    let cell = &state.system().cell;
+    let largest = before.iter().fold(0.0, |most: f64, b| most.max(b.abs()));
+    state.add_rows(io.table, &LEAKED, |row| {
+        let e = cell[row] as usize;
+        let exact = flux[e] + (before[row] - after[row]);
+        (found[e], exact, [unit, largest, exact.abs()])
+    });
+    Ok(())
+}
+
 fn center(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let unit = state.unit();
     let before = state.by_row(&io.before, VALUES)?;
@@ -319,6 +339,10 @@ fn center(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let pockets = state.system().pockets();
     let mut exact = before.clone();
     remove_means(&mut exact, &pockets);
+    let phase = io.before.window(&solved::PHASES)?;
+    if state.scene.has_bodies() && phase.step == 1 && phase.body_bricks > 0 {
+        leak(state, io, [&before, &exact])?;
+    }
     let mut means = vec![[1.0, 0.0]; before.len()];
     for pocket in &pockets {
         let size = pocket.iter().map(|&i| before[i as usize].abs()).sum();

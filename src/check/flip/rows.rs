@@ -242,6 +242,10 @@ entries! {
             n: "cells of the pocket", size: "Σ|x| over it", value: "|x|"]
             unit * ((n / 1048576.0 + 36.0) * size / n + value),
             "the mean's error, of parts of 4096 cells, and one difference";
+        LEAKED = "flux with what bodies squeeze out", "m/s": [unit: "U, or 2⁻⁵³ with f64",
+            largest: "the largest |b|", flux: "its own value"]
+            64.0 * unit * largest + 2.0 * U * (largest + flux),
+            "a mean of values no larger, rounded to f32, and a sum";
     }
     "pressure/reduce" {
         SCALARS = "sums and what follows", "": [sum: "of a sum " OF_SUM, alpha: "of α " OF_ALPHA,

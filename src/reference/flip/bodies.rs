@@ -91,20 +91,17 @@ pub fn couple_bodies(
         let of_cell = |element: u32| {
             let cell = corner(bricks, element);
             let cut = cut_faces(model, step, cell);
+            let closed = [0, 1].map(|side| cut.of_walls[side] - cut.open[side]);
             let [low, high] = [0, 1].map(|side| {
-                let closed = (cut.of_walls[side] - cut.open[side]).to_array();
                 let own = |axis: usize| match cut.solid[side][axis] == first + index {
-                    true => closed[axis],
+                    true => closed[side][axis],
                     false => 0.0,
                 };
                 DVec3::new(own(0), own(1), own(2))
             });
             let arm = (cell + 0.5) * size - centre;
-            // In a cell that other solids touch as well, the volume is not the body's alone.
-            let is_alone = match cut.near[..] {
-                [only] => std::ptr::eq(only, &step.solids[first + index]),
-                _ => false,
-            };
+            // In a cell that other solids cut as well, the volume is not the body's alone.
+            let is_alone = [low, high] == closed;
             let missing = match is_alone && space.kind[element as usize] == FLUID {
                 true => {
                     let all = step.open_extent(cell).element_product();
@@ -158,12 +155,11 @@ pub fn carry_bodies(
             return DVec3::ZERO;
         }
         let solid = cut.solid[0];
-        let is_between_walls = step.is_plane_open(cell);
         let middle = (cell + 0.5) * model.cell_size();
         let of_axis = |axis: usize| {
             let is_closed = space.open[element as usize][axis] == 0.0;
             let body = solid[axis].checked_sub(first);
-            let Some(body) = body.filter(|_| is_closed && is_between_walls.test(axis)) else {
+            let Some(body) = body.filter(|_| is_closed && cut.of_walls[0][axis] > 0.0) else {
                 return 0.0;
             };
             let [vx, vy, vz, wx, wy, wz] = changes[body];

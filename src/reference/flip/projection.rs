@@ -68,31 +68,39 @@ pub(super) fn project(
         .iter()
         .map(|it| it.change(&solution.x))
         .collect();
+    let means: Vec<f64> = (solver.pockets().iter())
+        .map(|pocket| pocket.iter().map(|&row| b[row as usize]).sum::<f64>() / pocket.len() as f64)
+        .collect();
+    let incompatible = largest(&means) / model.cell_size();
     let mut flux = vec![0.0; system.cell.len()];
+    // Bodies that come to rest squeeze water that no air touches: it may leave (pressure/center).
+    if !system.bodies.is_empty() {
+        for (pocket, mean) in solver.pockets().iter().zip(&means) {
+            pocket.iter().for_each(|&row| flux[row as usize] += mean);
+        }
+    }
     for (body, change) in system.bodies.iter().zip(&changes) {
         body.add_flux(change, &mut flux);
     }
     waters.add_flux(&system, &flux);
     let after = waters.divergence(&system, &faces.velocity);
     let corrected = centers.filter(|_| model.settings().density_correction);
-    let correction = corrected.map(|centers| -> Result<Solution, ReferenceError> {
-        // Bodies stand still in the correction.
-        let still = System {
-            bodies: Vec::new(),
-            ..system.clone()
-        };
-        let source = density_source(model, &still, centers);
-        let solver = poisson::Solver::new(&still, factor_budget)?;
-        Ok(timings.time("pressure/solve", || solver.solve(&source)))
+    // Bodies stand still in the correction.
+    let still = (!system.bodies.is_empty()).then(|| System {
+        bodies: Vec::new(),
+        ..system.clone()
     });
-    let correction: Option<Solution> = correction.transpose()?;
+    let still = still.as_ref().filter(|_| corrected.is_some());
+    let still = still
+        .map(|still| poisson::Solver::new(still, factor_budget))
+        .transpose()?;
+    let correction = corrected.map(|centers| {
+        let source = density_source(model, &system, centers);
+        let solver = still.as_ref().unwrap_or(&solver);
+        timings.time("pressure/solve", || solver.solve(&source))
+    });
     let displacement = (correction.as_ref())
         .map(|correction| waters.displace(&waters.by_element(&system, &correction.x)));
-    let means = solver.pockets().iter().map(|pocket| {
-        let sum: f64 = pocket.iter().map(|&row| b[row as usize]).sum();
-        sum / pocket.len() as f64
-    });
-    let incompatible = largest(&means.collect::<Vec<_>>()) / model.cell_size();
     let pockets = solver.pockets().len() as u32;
     let projected = Projected {
         divergence: [&b, &after].map(|b| largest(b) / model.cell_size()),

@@ -193,9 +193,12 @@ impl Flip {
             old: &faces.change,
         };
         effects::on_faces(&model.scene.effects, water, &mut faces.velocity, timings);
-        let coupled = timings.time("flip/couple_bodies", || {
-            couple_bodies(model, &step, &bricks, &space, (&before, &responses))
-        });
+        let coupled = match before.is_empty() {
+            true => Vec::new(),
+            false => timings.time("flip/couple_bodies", || {
+                couple_bodies(model, &step, &bricks, &space, (&before, &responses))
+            }),
+        };
         let waters = Waters::new(model, &bricks, &space, &centers);
         let mut waters = waters.with_bodies(&coupled);
         let by_weight: Vec<Six> = coupled.iter().map(BodyCells::before).collect();
@@ -306,8 +309,7 @@ impl Flip {
     ) -> Result<Trace, ReferenceError> {
         let trace = self.substep(cloud, is_wet, substep)?;
         for projected in trace.projections() {
-            let [_, after] = projected.divergence;
-            let divergence = (self.model.scene).divergence_left(after, projected.incompatible);
+            let [_, divergence] = projected.divergence;
             self.model.scene.budget.check_projection(
                 frame,
                 number,
@@ -333,9 +335,10 @@ impl Flip {
         &self.state.bodies
     }
 
-    /// Copies the state of absorbing walls from `state`.
-    pub fn take_absorbers(&mut self, state: &Particles) {
+    /// Copies the states of absorbing walls and bodies from `state`.
+    pub fn take_boundaries(&mut self, state: &Particles) {
         self.state.walls = state.walls;
+        self.state.bodies.clone_from(&state.bodies);
     }
 
     /// Projects the velocities of particles, given in the order of their ids, over a substep, and
@@ -515,10 +518,8 @@ impl Solver for Flip {
     type Error = ReferenceError;
 
     fn load(&mut self, frame: u32, particles: &Particles) -> Result<(), ReferenceError> {
+        self.model.scene.check_bodies(&particles.bodies)?;
         self.state = particles.clone();
-        if self.state.bodies.is_empty() {
-            self.state.bodies = self.model.scene.bodies_at_start();
-        }
         self.frame = frame;
         Ok(())
     }

@@ -393,10 +393,10 @@ impl Pbf {
         sorted.unsorted(&density)
     }
 
-    /// Passes the state of absorbing walls to the projection.
+    /// Passes the states of absorbing walls and bodies to the projection.
     fn tell_grid(&mut self) {
         if let Some(grid) = &mut self.grid {
-            grid.take_absorbers(&self.state);
+            grid.take_boundaries(&self.state);
         }
     }
 }
@@ -405,6 +405,7 @@ impl Solver for Pbf {
     type Error = ReferenceError;
 
     fn load(&mut self, frame: u32, particles: &Particles) -> Result<(), ReferenceError> {
+        self.scene.check_bodies(&particles.bodies)?;
         self.state = particles.clone();
         self.frame = frame;
         self.tell_grid();

@@ -353,7 +353,7 @@ impl Flip {
             self.frame + 1,
             totals.substeps,
             projected.solved.residual,
-            (self.scene).divergence_left(projected.divergence_after, projected.incompatible),
+            projected.divergence_after,
             substep.length,
         )?)
     }
@@ -483,13 +483,11 @@ impl Solver for Flip {
     type Error = SolveError;
 
     fn load(&mut self, frame: u32, particles: &Particles) -> Result<(), SolveError> {
+        self.scene.check_bodies(&particles.bodies)?;
         if is_other_count(&self.scene, self.plan.counts.particles, particles)? {
             self.resize(particles.len())?;
         }
         self.state = Carried::new(particles);
-        if self.state.bodies.is_empty() {
-            self.state.bodies = self.scene.bodies_at_start();
-        }
         self.frame = frame;
         self.upload_state(particles);
         Ok(())

@@ -435,6 +435,7 @@ impl Solver for Pbf {
     type Error = SolveError;
 
     fn load(&mut self, frame: u32, particles: &Particles) -> Result<(), SolveError> {
+        self.scene.check_bodies(&particles.bodies)?;
         if is_other_count(&self.scene, self.plan.counts.particles, particles)? {
             self.resize(particles.len())?;
         }

@@ -223,7 +223,7 @@ pub fn passes(
     let commands = all_commands(settings.preconditioner, extent);
     let names = in_order(&commands);
     names
-        .map(|name| pass(name, settings, surface, is_periodic))
+        .map(|name| pass(name, settings, surface, (extent.has_bodies, is_periodic)))
         .collect()
 }
 
@@ -239,7 +239,12 @@ pub(crate) fn require(context: &Context, settings: &Pressure) -> Result<(), GpuE
 }
 
 /// Returns a pass with all defines of the projection; a pass ignores those that it does not use.
-fn pass(name: &'static str, settings: &Pressure, surface: Surface, is_periodic: bool) -> PassSpec {
+fn pass(
+    name: &'static str,
+    settings: &Pressure,
+    surface: Surface,
+    (has_bodies, is_periodic): (bool, bool),
+) -> PassSpec {
     let conditions = [
         ("GHOST_FLUID", surface == Surface::GhostFluid),
         ("DIAGONAL", has_diagonal(settings)),
@@ -250,6 +255,7 @@ fn pass(name: &'static str, settings: &Pressure, surface: Surface, is_periodic: 
         ("TWO_WORDS", settings.precision == Precision::F32Refined),
         ("F64", settings.precision == Precision::F64),
         ("PERIODIC", is_periodic),
+        ("BODIES", has_bodies),
     ];
     let holding = conditions.into_iter().filter(|(_, holds)| *holds);
     PassSpec {

@@ -196,11 +196,17 @@ fn looks_apart(tables: [&ProbeRecord; 2], looks: &[Vec<Look<'_>>; 2]) -> Vec<Dif
     found
 }
 
-/// Compares the clocks and the solver's reports, and the checksums of the particle files if the
+/// Compares the clocks, the bodies and the solver's reports, and the checksums of the particle files if the
 /// particles themselves are not compared.
 fn ledger([a, b]: [Side<'_>; 2]) -> StreamDiff {
     let [x, y] = [a, b].map(|side| json!(side.entry.clock));
     let mut differences = streams::keys("clock", &x, &y);
+    let [x, y] = [a, b].map(|side| {
+        let bodies = side.entry.bodies.iter().map(|it| json!(it)).enumerate();
+        let named = bodies.map(|(index, body)| (index.to_string(), body));
+        serde_json::Value::Object(named.collect())
+    });
+    differences.extend(streams::keys("bodies", &x, &y));
     if !a.is_start() && !b.is_start() {
         differences.extend(streams::keys("report", &a.entry.report, &b.entry.report));
     }

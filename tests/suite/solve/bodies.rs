@@ -138,8 +138,8 @@ fn a_ball_begins_to_sink_or_rise_with_its_added_mass() {
     // Negative control: without its reaction on the pressure, a light ball shoots away.
     let context = spoiled(
         "pressure/couple",
-        "let added = select(0.0, flux",
-        "let added = 0.5 * select(0.0, flux",
+        "let added = select(0.0, body_flux",
+        "let added = 0.5 * select(0.0, body_flux",
     );
     let states = run(&gpu(&context), &deep(10.0), 1);
     let found = 120.0 * states[0][0].velocity.y;
@@ -151,9 +151,17 @@ fn a_ball_begins_to_sink_or_rise_with_its_added_mass() {
 fn the_gpu_moves_bodies_as_the_reference_does() {
     let context = context();
     let body = raft(300.0, "rotate_degrees = [10, 20, 5]\nspin = [0, 40, 0]\n");
-    for precision in ["f32", "f32_refined"] {
+    for (precision, method) in [
+        ("f32", "flip"),
+        ("f32_refined", "flip"),
+        ("f32_refined", "pbf"),
+    ] {
         let set = format!("solver.flip.pressure.precision=\"{precision}\"");
-        let scene = scene(&body, &[&set, "solver.flip.pressure.tolerance=1e-6"]);
+        let method = format!("solver.method=\"{method}\"");
+        let scene = scene(
+            &body,
+            &[&set, &method, "solver.flip.pressure.tolerance=1e-6"],
+        );
         let [found, exact] = [gpu(&context), Opened::Cpu].map(|on| run(&on, &scene, 3));
         for (found, exact) in found.iter().zip(&exact) {
             let apart = found[0].velocity - exact[0].velocity;
