@@ -120,7 +120,7 @@ fn deep(density: f64) -> Scene {
 }
 
 /// Released under water a ball begins with (m − m_w) g / (m + m_a), m_a = m_w / 2 in unbounded
-/// water; walls 2.3 radii from its middle add some percent to m_a.
+/// water; walls 3.3 radii from its middle add some percent to m_a.
 #[test]
 fn a_ball_begins_to_sink_or_rise_with_its_added_mass() {
     let context = context();
@@ -166,10 +166,11 @@ fn the_gpu_moves_bodies_as_the_reference_does() {
         for (found, exact) in found.iter().zip(&exact) {
             let apart = found[0].velocity - exact[0].velocity;
             let turned = found[0].spin - exact[0].spin;
-            // Three frames of 0.4 m/s, whose pressures are known to 1e-6 and whose water is
-            // sampled by particles that round.
-            assert!(apart.length() < 2e-4, "{precision}: {apart}");
-            assert!(turned.length() < 2e-3, "{precision}: {turned}");
+            // Three impulses of up to 0.4 m/s, each known to the solve's tolerance over the least
+            // eigenvalue of the water's modes, (π / 24 cells)² = 0.017: 3 × 0.4 × 1e-6 / 0.017 =
+            // 7e-5 m/s; twice that, and ten times over 0.1 m of arm for the turn.
+            assert!(apart.length() < 1.5e-4, "{precision}: {apart}");
+            assert!(turned.length() < 1.5e-3, "{precision}: {turned}");
         }
     }
 }
@@ -218,6 +219,7 @@ fn light_heavy_hinged_and_moored_bodies_stay_bounded() {
     let taut = rope
         .place(DVec3::new(0.75, 0.25, 0.7))
         .distance(DVec3::new(0.75, 0.0, 0.7));
+    // 31 N of buoyancy stretch it by 0.3 mm, and waves pull some times as much.
     assert!((taut - 0.25).abs() < 2e-3, "{taut}");
 }
 
