@@ -196,8 +196,8 @@ fn looks_apart(tables: [&ProbeRecord; 2], looks: &[Vec<Look<'_>>; 2]) -> Vec<Dif
     found
 }
 
-/// Compares the clocks, the bodies and the solver's reports, and the checksums of the particle files if the
-/// particles themselves are not compared.
+/// Compares the clocks, the bodies and the solver's reports, and the checksums of the particle
+/// files if the particles themselves are not compared.
 fn ledger([a, b]: [Side<'_>; 2]) -> StreamDiff {
     let [x, y] = [a, b].map(|side| json!(side.entry.clock));
     let mut differences = streams::keys("clock", &x, &y);
