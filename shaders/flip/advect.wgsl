@@ -126,29 +126,37 @@ fn main(
 #ifdef MOVING_SOLIDS
     // Steps of at most half a node spacing relative to the fastest solid, so that thin solids are
     // not skipped.
-    let most = length(way) + solid_grids.fastest * params.time_step;
-    let spacing = solid_grids.grids[0].spacing;
+    let most = length(way) + posed_solids[0].fastest * params.time_step;
+    let spacing = posed_solids[0].grid.spacing;
     let steps = u32(ceil(2.0 * most / spacing)) + 1u;
     var is_near = false;
-    for (var solid = 0u; solid < solid_grids.count; solid++) {
-        look_at_solid(solid, 0.0);
-        is_near |= solid_distance_bound(start) < most + params.contact_distance + 2.0 * spacing;
+    let margin = most + params.contact_distance + 2.0 * spacing;
+    for (var solid = 0u; solid < solid_count(); solid++) {
+        let is_due = may_be_at_solid(solid, 0.0, start, margin);
+        for (var once = 0; once < select(0, 1, is_due); once++) {
+            look_at_solid(solid, 0.0);
+            is_near |= solid_distance_bound(start) < margin;
+        }
     }
     var x = select(start + way, start, is_near);
     for (var k = 0u; k < select(0u, steps, is_near); k++) {
         x += way / f32(steps);
-        for (var solid = 0u; solid < solid_grids.count; solid++) {
-            look_at_solid(solid, f32(k + 1u) / f32(steps));
-            x = leave_solids(x);
-            let pushing = solid_velocity_at(x);
-            v = pushing + stopped(v - pushing, solid_push);
+        let share = f32(k + 1u) / f32(steps);
+        for (var solid = 0u; solid < solid_count(); solid++) {
+            let is_due = may_be_at_solid(solid, share, x, 0.0);
+            for (var once = 0; once < select(0, 1, is_due); once++) {
+                look_at_solid(solid, share);
+                x = leave_solids(x);
+                let pushing = solid_velocity_at(x);
+                v = pushing + stopped(v - pushing, solid_push);
+            }
         }
     }
     let free = x;
     // Between a solid and a wall, each of them would push the particle into the other.
     let rounds = select(0u, CORNER_ROUNDS, is_near && any(x != clamp(x, low, high)));
     for (var k = 0u; k < rounds; k++) {
-        for (var solid = 0u; solid < solid_grids.count; solid++) {
+        for (var solid = 0u; solid < solid_count(); solid++) {
             look_at_solid(solid, 1.0);
             x = leave_solids(clamp(x, low, high));
         }

@@ -7,7 +7,7 @@
 #import "shared/pressure_real.wgsl"
 
 @group(0) @binding(2) var<storage, read> body_pairs: array<BodyPair>;
-@group(0) @binding(3) var<storage, read> body_states: DeviceBodies;
+@group(0) @binding(3) var<storage, read> body_states: array<DeviceBody>;
 // Change of each body's six velocities by the pressure, m/s and rad/s, and behind those of all
 // bodies that by what flip/couple_bodies found.
 @group(0) @binding(4) var<storage, read> body_change: array<real>;
@@ -30,12 +30,12 @@ fn main(
     @builtin(local_invocation_index) local: u32,
 ) {
     let pair = thread_index(workgroup, workgroups, 0u, 1u);
-    if pair >= body_states.pairs {
+    if pair >= body_states[arrayLength(&body_states) - 1u].end {
         return;
     }
     let body = body_pairs[pair].body;
-    let solid = body_states.first_solid + body;
-    let centre = body_states.bodies[body].centre;
+    let solid = body_states[body].solid;
+    let centre = body_states[body].centre;
     let velocity = change(6u * body);
     let spin = change(6u * body + 3u);
     for (var inner = local; inner < CELLS; inner += 64u) {

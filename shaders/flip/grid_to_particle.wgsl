@@ -301,7 +301,7 @@ fn is_near_solid(x: vec3f) -> bool {
 // Each solid as it stands at the start of the substep; only particles near one enter the loop.
 fn rub_all(i: u32, x: vec3f, falls: bool) {
 #ifdef MOVING_SOLIDS
-    for (var solid = 0u; solid < solid_grids.count; solid++) {
+    for (var solid = 0u; solid < solid_count(); solid++) {
         look_at_solid(solid, 0.0);
         for (var once = 0; once < select(0, 1, is_near_solid(x)); once++) {
             rub(i, x, falls);

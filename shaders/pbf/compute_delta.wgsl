@@ -97,7 +97,8 @@ fn main(
     coincident = i;
 #ifdef WALL_WORK
 #ifdef MOVING_SOLIDS
-    first_velocity = solid_grids.nodes;
+    let last_grid = posed_solids[solid_count() - 1u].grid;
+    first_velocity = last_grid.first + last_grid.dims.x * last_grid.dims.y * last_grid.dims.z;
     sample_rate = 0.0;
 #endif
 #endif

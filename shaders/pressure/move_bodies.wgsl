@@ -4,7 +4,7 @@
 #import "shared/pressure_real.wgsl"
 #import "shared/bodies.wgsl"
 
-@group(0) @binding(1) var<storage, read> body_states: DeviceBodies;
+@group(0) @binding(1) var<storage, read> body_states: array<DeviceBody>;
 @group(0) @binding(2) var<storage, read> body_order: array<u32>;
 @group(0) @binding(3) var<storage, read> body_sums: array<real>;
 @group(0) @binding(4) var<storage, read_write> body_change: array<real>;
@@ -27,8 +27,8 @@ fn main(
     let last = count - 1u;
     let own = min(body, last);
     var sum = array<real, 6>(0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
-    let end = body_states.bodies[own].end;
-    for (var k = body_states.bodies[own].first + local; k < end; k += 64u) {
+    let end = body_states[own].end;
+    for (var k = body_states[own].first + local; k < end; k += 64u) {
         let pair = body_order[k];
         for (var i = 0u; i < 6u; i++) {
             sum[i] += body_sums[6u * pair + i];
@@ -48,7 +48,7 @@ fn main(
         var change = real(0.0);
         for (var k = 0u; k < 6u; k++) {
             let place = 6u * local + k;
-            let response = body_states.bodies[own].response[place / 4u][place % 4u];
+            let response = body_states[own].response[place / 4u][place % 4u];
             change += real(response) * sums[k];
         }
         let first = select(0u, 6u * count, phase.step >= OF_WEIGHT);

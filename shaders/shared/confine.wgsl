@@ -103,13 +103,15 @@ fn leave_all_solids(x: vec3f) -> vec3f {
     solids_push = vec3f(0.0);
     pushing_velocity = vec3f(0.0);
     solids_work = 0.0;
-    for (var k = 0u; k < solid_grids.count; k++) {
-        look_at_solid(k, 1.0);
-        y = leave_solids(y);
-        let velocity = solid_velocity_at(y);
-        solids_push += solid_push;
-        solids_work += dot(solid_push, velocity);
-        pushing_velocity = select(pushing_velocity, velocity, any(solid_push != vec3f(0.0)));
+    for (var k = 0u; k < solid_count(); k++) {
+        for (var once = 0; once < select(0, 1, may_be_at_solid(k, 1.0, y, 0.0)); once++) {
+            look_at_solid(k, 1.0);
+            y = leave_solids(y);
+            let velocity = solid_velocity_at(y);
+            solids_push += solid_push;
+            solids_work += dot(solid_push, velocity);
+            pushing_velocity = select(pushing_velocity, velocity, any(solid_push != vec3f(0.0)));
+        }
     }
     return y;
 }

@@ -15,7 +15,7 @@ struct CutFaces {
     upper_of_walls: vec3f,
     lower: vec3f,
     upper: vec3f,
-    // Distances at the cell's corners, and a bit for each solid that may cut the cell.
+    // Distances at the cell's corners, and the bit k % 32 for each solid k that may cut the cell.
     corners: Corners,
     solids: u32,
 #ifdef MOVING_SOLIDS
@@ -39,9 +39,8 @@ fn cut_faces(cell: vec3f, across: vec3f) -> CutFaces {
     var corners = Corners(vec4f(1e15), vec4f(1e15));
     var solids = 0u;
 #ifdef MOVING_SOLIDS
-    for (var k = 0u; k < solid_grids.count; k++) {
-        look_at_solid(k, 0.0);
-        for (var once = 0; once < select(0, 1, may_cut(cell)); once++) {
+    for (var k = 0u; k < solid_count(); k++) {
+        for (var once = 0; once < select(0, 1, may_cut_by(k, cell)); once++) {
             let found = corner_distances(cell);
             let is_nearer_low = lower_sums(found) < lower_sums(corners);
             let is_nearer_high = upper_sums(found) < upper_sums(corners);
@@ -55,7 +54,7 @@ fn cut_faces(cell: vec3f, across: vec3f) -> CutFaces {
             cut.upper_solid = select(cut.upper_solid, vec3u(k), is_nearer_high);
 #endif
             corners = Corners(min(corners.near, found.near), min(corners.far, found.far));
-            solids |= 1u << k;
+            solids |= 1u << (k % 32u);
         }
     }
 #else

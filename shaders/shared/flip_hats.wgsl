@@ -1,13 +1,15 @@
 // Part of the hat function around a cell's centre that solids leave open.
 #import "shared/flip_solid.wgsl"
 
-// Distance to the nearest of the solids whose bits are set, metres.
+// Distance to the nearest of the solids k whose bits k % 32 are set, metres.
 fn nearest_distance(x: vec3f, solids: u32) -> f32 {
 #ifdef MOVING_SOLIDS
     var least = 1e15;
     for (var left = solids; left != 0u; left &= left - 1u) {
-        look_at_solid(firstTrailingBit(left), 0.0);
-        least = min(least, solid_distance_at(x));
+        for (var k = firstTrailingBit(left); k < solid_count(); k += 32u) {
+            look_at_solid(k, 0.0);
+            least = min(least, solid_distance_at(x));
+        }
     }
     return least;
 #else
@@ -18,7 +20,7 @@ fn nearest_distance(x: vec3f, solids: u32) -> f32 {
 // Integral of the hat function over the volume outside solids, relative to that outside walls only,
 // sampled over 4³ half cells, each cut by a plane. If particles are mirrored at walls, so are
 // solids. `rise` is the growth of the distance over a cell, summed over x, y and z, metres;
-// `solids` has a bit for each solid that comes close enough.
+// `solids` has the bit k % 32 for each solid k that comes close enough.
 fn open_part_of_hat(cell: vec3f, rise: f32, solids: u32) -> f32 {
     let width = max(0.5 * rise, 1e-20);
     let skin = 1e-4 * params.cell_size;

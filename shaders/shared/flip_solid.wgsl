@@ -50,6 +50,19 @@ fn may_cut(cell: vec3f) -> bool {
     return solid_distance_near(middle) < 2.0 * (params.cell_size + solid_grid.spacing);
 }
 
+#ifdef MOVING_SOLIDS
+// Whether solid k does at the substep's start; selects it if it may.
+fn may_cut_by(k: u32, cell: vec3f) -> bool {
+    // A node beyond the grid still counts as near, in any direction.
+    let beyond = 2.0 * posed_solids[k].grid.spacing;
+    if !may_be_at_solid(k, 0.0, (cell + 0.5) * params.cell_size, beyond) {
+        return false;
+    }
+    look_at_solid(k, 0.0);
+    return may_cut(cell);
+}
+
+#endif
 fn corner_distances(cell: vec3f) -> Corners {
     let size = params.cell_size;
     let x = vec2f(cell.x, cell.x + 1.0) * size;

@@ -1,28 +1,27 @@
-// Moving solids, each with a signed-distance grid sampled in its initial pose. All static solids,
-// if any, form the first grid. The functions below work on one selected solid at a time. Mirrored
-// by `SolidGrids` of solve/params.rs.
-struct SolidGrids {
-    // Grids in their initial pose, relative to each solid's reference point.
-    grids: array<SolidGrid, 8>,
-    // Reference points at the substep's start, relative to the domain's minimum corner.
-    centres: array<vec4f, 8>,
-    // Velocities of the reference points, m/s.
-    velocities: array<vec4f, 8>,
-    // Angular velocities about the reference points, rad/s.
-    spins: array<vec4f, 8>,
-    // Unit quaternions (x, y, z, w) that rotate back to the initial pose: from the pose at the
-    // substep's start, and from that at its end.
-    backs: array<vec4f, 8>,
-    end_backs: array<vec4f, 8>,
-    count: u32,
-    // Largest speed of any point of a solid, m/s.
+// Solids of which some move, each with a signed-distance grid sampled in its initial pose. All
+// static solids, if any, form the first grid. The functions below work on one selected solid at a
+// time. Mirrored by `PosedSolid` of solve/params.rs.
+struct PosedSolid {
+    // Grid in the initial pose, relative to the reference point.
+    grid: SolidGrid,
+    // Reference point at the substep's start, relative to the domain's minimum corner.
+    centre: vec3f,
+    // Distance from there to the grid's farthest corner, metres.
+    reach: f32,
+    // Velocity of the reference point, m/s.
+    velocity: vec3f,
+    // Largest speed of any point of any solid, m/s.
     fastest: f32,
+    // Angular velocity about the reference point, rad/s.
+    spin: vec3f,
     // Length of the substep, seconds.
     length: f32,
-    // Number of nodes of all grids.
-    nodes: u32,
+    // Unit quaternions (x, y, z, w) that rotate back to the initial pose: from the pose at the
+    // substep's start, and from that at its end.
+    back: vec4f,
+    end_back: vec4f,
 }
-@group(0) @binding(7) var<uniform> solid_grids: SolidGrids;
+@group(0) @binding(7) var<storage, read> posed_solids: array<PosedSolid>;
 
 var<private> solid_grid: SolidGrid;
 var<private> solid_centre: vec3f;
@@ -30,13 +29,26 @@ var<private> solid_velocity: vec3f;
 var<private> solid_spin: vec3f;
 var<private> solid_back: vec4f;
 
+fn solid_count() -> u32 {
+    return arrayLength(&posed_solids);
+}
+
+// Whether x is within the distance `margin` of solid k's grid, or almost so, after the fraction
+// `share` of the substep: a test without the solid's rotation and its distances.
+fn may_be_at_solid(k: u32, share: f32, x: vec3f, margin: f32) -> bool {
+    let way = share * posed_solids[k].length * posed_solids[k].velocity;
+    let reach = posed_solids[k].reach + margin;
+    let apart = x - (posed_solids[k].centre + way);
+    return dot(apart, apart) <= reach * reach;
+}
+
 // Selects solid k in its pose after the fraction `share` of the substep.
 fn look_at_solid(k: u32, share: f32) {
-    solid_grid = solid_grids.grids[k];
-    solid_velocity = solid_grids.velocities[k].xyz;
-    solid_spin = solid_grids.spins[k].xyz;
-    solid_centre = solid_grids.centres[k].xyz + share * solid_grids.length * solid_velocity;
-    let back = mix(solid_grids.backs[k], solid_grids.end_backs[k], share);
+    solid_grid = posed_solids[k].grid;
+    solid_velocity = posed_solids[k].velocity;
+    solid_spin = posed_solids[k].spin;
+    solid_centre = posed_solids[k].centre + share * posed_solids[k].length * solid_velocity;
+    let back = mix(posed_solids[k].back, posed_solids[k].end_back, share);
     solid_back = back * inverseSqrt(dot(back, back));
 }
 

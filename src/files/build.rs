@@ -22,7 +22,7 @@ use swell_domain::{
 };
 use swell_scene::{
     PlacedMesh, Placement, Scene, SceneError, Solver, Swarm, Water,
-    moving_solid::{MAX_MOVING_SOLIDS, MovingSolid},
+    moving_solid::MovingSolid,
     origin, projection,
     words::{chain, extent, shown, shown_all},
 };
@@ -86,19 +86,13 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
     let moving = (0..spec.solid.len()).filter(|&k| spec.solid[k].moves());
     let moving: Vec<usize> = moving.collect();
     periodic::check_solids(doc, periodic, &moving_solids, |k| moving[k])?;
-    let bodies = bodies(
-        doc,
-        base_dir,
-        &spec.body,
-        (lattice.spacing, moving_solids.len()),
-        &{
-            body::Surroundings {
-                domain: &domain,
-                periodic,
-                has_projection: solver.pbf().is_none_or(|pbf| pbf.grid_projection),
-            }
-        },
-    )?;
+    let bodies = bodies(doc, base_dir, &spec.body, lattice.spacing, &{
+        body::Surroundings {
+            domain: &domain,
+            periodic,
+            has_projection: solver.pbf().is_none_or(|pbf| pbf.grid_projection),
+        }
+    })?;
     let wave_makers = wave_maker::build_all(doc, &spec.wave_maker, &around)?;
     periodic::check_makers(doc, periodic, &wave_makers)?;
     let around = sources::Around {
@@ -192,36 +186,22 @@ fn solids(
             solids.push(static_solid(doc, &path, spec, around)?);
             continue;
         }
-        let key = match (&spec.track, &spec.motion) {
-            (Some(_), _) => "track",
-            (None, Some(_)) => "motion",
-            (None, None) => "turn",
-        };
-        let place = format!("{path}.{key}");
-        if moving.len() == MAX_MOVING_SOLIDS {
-            let problem = format!("at most {MAX_MOVING_SOLIDS} solids can move");
-            return Err(doc.fault_of_plain(&place, problem));
-        }
         let placed = solid_mesh(doc, &path, spec, around)?;
         moving.push(moving_solid::build(doc, &path, placed, spec, around)?);
     }
     Ok((solids, moving))
 }
 
-/// Builds the bodies, after `moving` moving solids, for particles `spacing` metres apart.
+/// Builds the bodies for particles `spacing` metres apart.
 fn bodies(
     doc: &Document<'_>,
     base_dir: &Path,
     specs: &[BodySpec],
-    (spacing, moving): (f64, usize),
+    spacing: f64,
     around: &body::Surroundings<'_>,
 ) -> Result<Vec<MovingSolid>> {
     let build = |(index, spec): (usize, &BodySpec)| {
         let path = format!("body[{index}]");
-        if moving + index >= MAX_MOVING_SOLIDS {
-            let problem = format!("at most {MAX_MOVING_SOLIDS} solids and bodies can move");
-            return Err(doc.fault_of_plain(&format!("{path}.mesh"), problem));
-        }
         let mesh = (&spec.placed(), spacing);
         let placed = placed_mesh(doc, base_dir, &path, "mesh", mesh)?;
         body::build(doc, index, placed, spec, around)

@@ -13,9 +13,6 @@ use swell_domain::{
     pose::{Passage, Pose},
 };
 
-/// Largest number of moving solids in a scene; a shader pass loops over all of them.
-pub const MAX_MOVING_SOLIDS: usize = 7;
-
 /// A solid that slides along a line, turns about an axis, follows a track, or floats.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MovingSolid {

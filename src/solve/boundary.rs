@@ -7,11 +7,11 @@ use swell_domain::{
     body::BodyState, boundary::Boundary, pose::Passage, signed_distance::SignedDistance,
 };
 use swell_gpu::program::Program;
-use swell_scene::Scene;
+use swell_scene::{Scene, moving_solid::MovingSolid};
 
 use super::{
-    buffers::{SOLID_DISTANCE, SOLID_GRID, SOLID_GRIDS},
-    params::{SolidGrid, SolidGrids},
+    buffers::{POSED_SOLIDS, SOLID_DISTANCE, SOLID_GRID},
+    params::{PosedSolid, SolidGrid},
     plan::Counts,
 };
 
@@ -23,6 +23,7 @@ impl Counts {
             boundary_samples: boundary.sample_count(),
             solid_grid: boundary.distance.as_ref().map_or([0; 3], |grid| grid.dims),
             moving_nodes: boundary.moving.iter().map(|grid| grid.values.len()).sum(),
+            solids: boundary.grids().count(),
             ..Self::default()
         }
     }
@@ -47,11 +48,11 @@ pub(super) fn upload_distance(boundary: &Boundary, program: &Program, scene: &Sc
 
 /// Poses of solids that move; `None` in a scene without them.
 pub(super) struct Movers {
-    /// Grids without their poses.
-    resting: SolidGrids,
+    /// Solids in their initial pose, relative to the domain's minimum corner.
+    resting: Vec<PosedSolid>,
     /// First nodes of the grids in the initial pose, metres, in scene coordinates.
     origins: Vec<DVec3>,
-    /// Distance from a solid's reference point to its grid's farthest corner, metres.
+    /// Distance from a moving solid's reference point to its grid's farthest corner, metres.
     reaches: Vec<f64>,
     /// Index of the first moving solid's grid: 1 if there are static solids, else 0.
     statics: usize,
@@ -59,23 +60,38 @@ pub(super) struct Movers {
 
 impl Movers {
     pub(super) fn of(boundary: &Boundary, scene: &Scene) -> Option<Self> {
-        let mut resting = SolidGrids::default();
-        let mut first = 0;
-        for (slot, grid) in resting.grids.iter_mut().zip(boundary.grids()) {
-            *slot = solid_grid(grid, grid.origin, first);
-            first += grid.values.len() as u32;
-            resting.count += 1;
+        if boundary.moving.is_empty() {
+            return None;
         }
-        resting.nodes = first;
-        let statics = boundary.grids().count() - boundary.moving.len();
+        let identity = DQuat::IDENTITY.as_quat().to_array();
+        let mut first = 0;
+        let resting = |grid: &SignedDistance| {
+            let posed = PosedSolid {
+                grid: solid_grid(grid, grid.origin, first),
+                centre: three(grid.origin - scene.domain.min),
+                reach: grid.reach(grid.origin) as f32,
+                back: identity,
+                end_back: identity,
+                ..PosedSolid::default()
+            };
+            first += grid.values.len() as u32;
+            posed
+        };
+        let resting = boundary.grids().map(resting).collect();
+        // A solid that does not rotate may have any reference point: its first node gives the
+        // least rounding.
         let solids = scene.moving_solids.iter().zip(&boundary.moving);
-        (!boundary.moving.is_empty()).then(|| Self {
+        let reach = |(solid, grid): (&MovingSolid, &SignedDistance)| {
+            grid.reach(match solid.turns() {
+                true => solid.pose(&[], 0.0).rest,
+                false => grid.origin,
+            })
+        };
+        Some(Self {
             resting,
             origins: boundary.grids().map(|grid| grid.origin).collect(),
-            reaches: solids
-                .map(|(solid, grid)| grid.reach(solid.pose(&[], 0.0).rest))
-                .collect(),
-            statics,
+            reaches: solids.map(reach).collect(),
+            statics: boundary.grids().count() - boundary.moving.len(),
         })
     }
 
@@ -94,13 +110,8 @@ impl Movers {
         bodies: &[BodyState],
         (start, length): (f64, f64),
     ) {
-        let mut grids = self.resting;
-        grids.length = length as f32;
-        let identity = DQuat::IDENTITY.as_quat().to_array();
-        for (k, origin) in self.origins.iter().enumerate() {
-            grids.centres[k] = four(*origin - scene.domain.min);
-            (grids.backs[k], grids.end_backs[k]) = (identity, identity);
-        }
+        let mut posed = self.resting.clone();
+        let mut fastest = 0.0f64;
         let solids = scene.moving_solids.iter().zip(&self.reaches);
         for ((solid, reach), k) in solids.zip(self.statics..) {
             let Passage {
@@ -110,27 +121,34 @@ impl Movers {
                 spin,
                 ..
             } = solid.passage(bodies, start, length);
-            // A solid that does not rotate may have any reference point: its first node gives the
-            // least rounding.
             let rest = match solid.turns() {
                 true => pose.rest,
                 false => self.origins[k],
             };
-            grids.grids[k].origin = (self.origins[k] - rest).as_vec3().to_array();
-            grids.centres[k] = four(pose.place(rest) - scene.domain.min);
-            grids.velocities[k] = four(velocity);
-            grids.spins[k] = four(spin);
-            grids.backs[k] = pose.turn.conjugate().as_quat().to_array();
-            grids.end_backs[k] = end_turn.conjugate().as_quat().to_array();
-            let speed = velocity.length() + spin.length() * reach;
-            grids.fastest = grids.fastest.max(speed as f32);
+            posed[k] = PosedSolid {
+                grid: SolidGrid {
+                    origin: three(self.origins[k] - rest),
+                    ..posed[k].grid
+                },
+                centre: three(pose.place(rest) - scene.domain.min),
+                reach: *reach as f32,
+                velocity: three(velocity),
+                spin: three(spin),
+                back: pose.turn.conjugate().as_quat().to_array(),
+                end_back: end_turn.conjugate().as_quat().to_array(),
+                ..posed[k]
+            };
+            fastest = fastest.max(velocity.length() + spin.length() * reach);
         }
-        program.upload(SOLID_GRIDS, 0, &[grids]);
+        for solid in &mut posed {
+            (solid.fastest, solid.length) = (fastest as f32, length as f32);
+        }
+        program.upload(POSED_SOLIDS, 0, &posed);
     }
 }
 
-fn four(v: DVec3) -> [f32; 4] {
-    v.as_vec3().extend(0.0).to_array()
+fn three(v: DVec3) -> [f32; 3] {
+    v.as_vec3().to_array()
 }
 
 fn solid_grid(grid: &SignedDistance, origin: DVec3, first: u32) -> SolidGrid {

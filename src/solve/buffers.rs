@@ -5,7 +5,7 @@ use swell_gpu::buffer::Buf;
 
 pub use swell_gpu::sort::{CELL_OF, CELL_START, ELEMENT_COUNT, ID, ORDER, PLACED, SLOT_IN_CELL};
 
-use super::params::{Counters, SolidGrid, SolidGrids};
+use super::params::{Counters, PosedSolid, SolidGrid};
 
 /// Position of each particle, in storage order.
 pub const POSITION: Buf<[f32; 3]> = Buf::new("position");
@@ -36,7 +36,7 @@ pub const SOLID_DISTANCE: Buf<f32> = Buf::new("solid_distance");
 /// Geometry of the static solids' signed-distance grid.
 pub const SOLID_GRID: Buf<SolidGrid> = Buf::uniform("solid_grid");
 /// Geometry and motion of all solids' signed-distance grids.
-pub const SOLID_GRIDS: Buf<SolidGrids> = Buf::uniform("solid_grids");
+pub const POSED_SOLIDS: Buf<PosedSolid> = Buf::new("posed_solids");
 /// Velocity of each boundary sample of PBF, m/s, behind the distances at `nodes` nodes.
 pub fn sample_velocity(nodes: usize) -> Buf<[f32; 3]> {
     SOLID_DISTANCE.after(nodes).retyped()

@@ -20,7 +20,7 @@ use swell_gpu::{adapter::GpuError, buffer::Mirror, reflect::Layout};
 use swell_scene::moving_solid::OtherBodies;
 
 use params::{
-    Counters, FlipParams, Inlets, IterationControl, Params, Phase, SolidGrid, SolidGrids,
+    Counters, FlipParams, Inlets, IterationControl, Params, Phase, PosedSolid, SolidGrid,
     SurveyHead,
 };
 use pressure::{
@@ -34,14 +34,14 @@ pub fn mirrors() -> Vec<Layout> {
         Phase::layout(),
         FlipParams::layout(),
         SolidGrid::layout(),
-        SolidGrids::layout(),
+        PosedSolid::layout(),
         Inlets::layout(),
         Counters::layout(),
         IterationControl::layout(),
         SurveyHead::layout(),
         params::DeviceBrick::layout(),
         pressure::bodies::DeviceBody::layout(),
-        pressure::bodies::DeviceBodies::layout(),
+        pressure::bodies::DeviceBody::layout(),
         pressure::bodies::BodyPair::layout(),
         PressurePhase::layout(),
         PressureControl::layout(),

@@ -6,7 +6,7 @@ use swell_gpu::{
     buffer::{Element, Mirror, Scalar, Workgroups, mirror},
     reflect::Layout,
 };
-use swell_scene::{moving_solid::MAX_MOVING_SOLIDS, sources::MAX_INLETS};
+use swell_scene::sources::MAX_INLETS;
 
 mirror!(
     /// `Params` of shared/pbf_params.wgsl. Lengths in metres; positions relative to the domain's
@@ -155,32 +155,29 @@ mirror!(
 );
 
 mirror!(
-    /// `SolidGrids` of shared/moving_solids.wgsl: poses of all solids in a substep.
-    SolidGrids {
-        /// Grids in their initial pose, relative to each solid's reference point; all static solids
-        /// form the first grid.
-        grids: [SolidGrid; MAX_MOVING_SOLIDS + 1],
-        /// Reference points at the substep's start, metres, relative to the domain's minimum
-        /// corner.
-        centres: [[f32; 4]; MAX_MOVING_SOLIDS + 1],
-        /// Velocities of the reference points, m/s.
-        velocities: [[f32; 4]; MAX_MOVING_SOLIDS + 1],
-        /// Angular velocities about the reference points, rad/s.
-        spins: [[f32; 4]; MAX_MOVING_SOLIDS + 1],
-        /// Unit quaternions (x, y, z, w) that rotate from the pose at the substep's start back to
-        /// the initial pose.
-        backs: [[f32; 4]; MAX_MOVING_SOLIDS + 1],
-        /// Unit quaternions (x, y, z, w) that rotate from the pose at the substep's end back to the
-        /// initial pose.
-        end_backs: [[f32; 4]; MAX_MOVING_SOLIDS + 1],
-        /// Number of grids in use.
-        count: u32,
-        /// Largest speed of any point of a solid, m/s.
+    /// `PosedSolid` of shared/moving_solids.wgsl: a solid's pose in a substep.
+    PosedSolid {
+        /// Grid in the initial pose, relative to the reference point; all static solids form the
+        /// first one.
+        grid: SolidGrid,
+        /// Reference point at the substep's start, metres, relative to the domain's minimum corner.
+        centre: [f32; 3],
+        /// Distance from there to the grid's farthest corner, metres.
+        reach: f32,
+        /// Velocity of the reference point, m/s.
+        velocity: [f32; 3],
+        /// Largest speed of any point of any solid, m/s.
         fastest: f32,
+        /// Angular velocity about the reference point, rad/s.
+        spin: [f32; 3],
         /// Length of the substep, seconds.
         length: f32,
-        /// Number of nodes of all grids.
-        nodes: u32,
+        /// Unit quaternion (x, y, z, w) that rotates from the pose at the substep's start back to
+        /// the initial pose.
+        back: [f32; 4],
+        /// Unit quaternion (x, y, z, w) that rotates from the pose at the substep's end back to the
+        /// initial pose.
+        end_back: [f32; 4],
     }
 );
 

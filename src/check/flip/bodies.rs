@@ -18,11 +18,12 @@ use swell_reference::{
 };
 use swell_solve::{
     SolveError,
-    buffers::SOLID_GRIDS,
+    buffers::POSED_SOLIDS,
     flip::buffers,
+    params::PosedSolid,
     pressure::{
         DONE, ITERATING, VERIFYING,
-        bodies::{self as device, DeviceBodies},
+        bodies::{self as device, DeviceBody},
         buffers::{self as solved, Real},
     },
 };
@@ -75,16 +76,16 @@ const fn on_bodies(
 /// What the device has of bodies in a substep.
 #[derive(Default)]
 pub(super) struct Touched {
-    states: DeviceBodies,
+    states: Vec<DeviceBody>,
     pairs: Vec<device::BodyPair>,
     /// Six arrays of cells for each pair.
     coupling: Vec<f64>,
 }
 
 impl Touched {
-    fn read(io: &Io<'_>) -> Result<Self, SolveError> {
-        let states = io.after.one(device::STATES)?;
-        let pairs = states.pairs as usize;
+    fn read(io: &Io<'_>, bodies: usize) -> Result<Self, SolveError> {
+        let states = io.after.get(device::STATES, bodies)?;
+        let pairs = states.last().map_or(0, |body| body.end as usize);
         Ok(Self {
             states,
             pairs: io.after.get(device::PAIRS, pairs)?,
@@ -110,7 +111,7 @@ impl Touched {
     }
 
     fn response(&self, body: usize) -> [Six; 6] {
-        let rows = self.states.bodies[body].response;
+        let rows = self.states[body].response;
         let at = |place: usize| f64::from(rows[place / 4][place % 4]);
         std::array::from_fn(|i| std::array::from_fn(|j| at(6 * i + j)))
     }
@@ -135,7 +136,7 @@ impl Touched {
         for (row, &element) in (0..).zip(cell) {
             row_of[element as usize] = row;
         }
-        let mut all: Vec<_> = (0..self.states.count as usize)
+        let mut all: Vec<_> = (0..self.states.len())
             .map(|body| Coupling {
                 response: self.response(body),
                 ..Coupling::default()
@@ -159,21 +160,21 @@ impl FlipState {
         if !self.scene.has_bodies() {
             return Ok(());
         }
-        let grids = io.before.one(SOLID_GRIDS)?;
-        let first = grids.count as usize - self.scene.bodies().count();
-        let wide = |v: [f32; 4]| Vec3::new(v[0], v[1], v[2]).as_dvec3();
+        let solids = io.before.get(POSED_SOLIDS, self.boundary.grids().count())?;
+        let bodies = solids.len() - self.scene.bodies().count()..;
+        let wide = |v: [f32; 3]| Vec3::from_array(v).as_dvec3();
         let start = self.elements().substep.start;
-        let state = |k: usize| BodyState {
+        let state = |solid: &PosedSolid| BodyState {
             time: start,
-            centre: self.scene.domain.min + wide(grids.centres[k]),
+            centre: self.scene.domain.min + wide(solid.centre),
             turn: {
-                let [x, y, z, w] = grids.backs[k].map(f64::from);
+                let [x, y, z, w] = solid.back.map(f64::from);
                 DQuat::from_xyzw(x, y, z, w).conjugate().normalize()
             },
-            velocity: wide(grids.velocities[k]),
-            spin: wide(grids.spins[k]),
+            velocity: wide(solid.velocity),
+            spin: wide(solid.spin),
         };
-        self.bodies = (first..grids.count as usize).map(state).collect();
+        self.bodies = solids[bodies].iter().map(state).collect();
         Ok(())
     }
 
@@ -244,7 +245,7 @@ const OF_WEIGHT: u32 = 2;
 
 /// Compares the coupling of every cell with every body: also that of bricks that no pair lists.
 fn couple_bodies(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
-    let touched = Touched::read(io)?;
+    let touched = Touched::read(io, state.bodies.len())?;
     let cells = state.elements().cells;
     let found_of = |body: usize| {
         let mut found = vec![[0.0; 6]; cells];
@@ -338,7 +339,7 @@ fn spread(cells: &BodyCells, elements: usize) -> Vec<Six> {
 
 fn push_bodies(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     // Pockets, once found, change it.
-    state.touched = Touched::read(io)?;
+    state.touched = Touched::read(io, state.bodies.len())?;
     let values = state.pushing(io)?;
     let (unit, touched) = (state.unit(), &state.touched);
     let mut by_element = vec![0.0; state.elements().cells];

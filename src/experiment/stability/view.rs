@@ -106,4 +106,43 @@ impl<'a> RunView<'a> {
         });
         still.chain(moving).fold(f64::NEG_INFINITY, f64::max)
     }
+
+    /// Kinetic energy of the bodies, and potential energy of their centres above the domain's
+    /// floor, J.
+    pub(super) fn energy_of_bodies(&self) -> f64 {
+        let bodies = self.scene.bodies().zip(&self.state.bodies);
+        let energy = bodies.map(|(it, state)| {
+            let height = state.centre - self.scene.domain.min;
+            let potential = -it.body.mass.mass * self.scene.water.gravity.dot(height);
+            it.body.kinetic_energy(state) + potential
+        });
+        energy.sum()
+    }
+
+    /// Largest depth of a vertex of a body within another body, a solid or a wall, metres; 0 if
+    /// none is.
+    pub(super) fn overlap_of_bodies(&self) -> f64 {
+        let (walls, time) = (self.walls(), self.time());
+        let boundary = &self.start.boundary;
+        let solids = || boundary.moving.iter().zip(&self.scene.moving_solids);
+        let mut deepest = 0.0f64;
+        for (k, (_, body)) in solids().enumerate() {
+            if body.is_prescribed() {
+                continue;
+            }
+            let pose = body.pose(&self.state.bodies, time);
+            let poses = solids().enumerate().filter(|(other, _)| *other != k);
+            let others: Vec<_> = poses
+                .map(|(_, (grid, solid))| (grid, solid.pose(&self.state.bodies, time)))
+                .collect();
+            for vertex in &body.placed.mesh.vertices {
+                let x = pose.place(*vertex);
+                let beyond = (walls.min - x).max(x - walls.max).max_element();
+                let still = boundary.distance.iter().map(|grid| -grid.sample(x));
+                let moving = others.iter().map(|(grid, pose)| -grid.sample(pose.back(x)));
+                deepest = still.chain(moving).fold(deepest.max(beyond), f64::max);
+            }
+        }
+        deepest
+    }
 }

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use swell_domain::{bounds::Bounds, probe::energies, solver::StepReport};
+use swell_domain::{body::BodyState, bounds::Bounds, probe::energies, solver::StepReport};
 use swell_files::study::stability::{Mark, Other, Over, Quantity};
 use swell_scene::Scene;
 use swell_study::stability::{Flight, filled_volume, least_spacing, matched, outside, point};
@@ -77,7 +77,7 @@ fn remembered(mark: &Mark, run: &RunView<'_>) -> Vec<f64> {
             let mass = scene.water.rest_density * scene.particle_spacing().powi(3);
             let (gravity, corner) = (scene.water.gravity, scene.domain.min);
             let (kinetic, potential) = energies(start, mass, gravity, corner);
-            vec![kinetic + potential; 2]
+            vec![kinetic + potential + run.energy_of_bodies(); 2]
         }
         // Sum for each probe, and the number of terms.
         Quantity::MeanPressureError => vec![0.0; scene.pressure_points().len() + 1],
@@ -136,7 +136,8 @@ impl<'a> Watch<'a> {
         let spacing = scene.particle_spacing();
         let (start, now) = (&run.start.particles, &run.state);
         let projection = report.projection.unwrap_or_default();
-        let energy = report.kinetic_energy + report.potential_energy;
+        let of_water = report.kinetic_energy + report.potential_energy;
+        let energy = of_water + run.energy_of_bodies();
         match self.mark.of {
             Quantity::Escaped => outside(&now.position, &scene.domain) as f64,
             Quantity::Lost => lost(&start.id, &now.id) as f64,
@@ -212,6 +213,12 @@ impl<'a> Watch<'a> {
                 let depths = now.position.iter().map(|p| run.depth_in_solid(point(p)));
                 depths.fold(f64::NEG_INFINITY, f64::max).max(-1e3) / run.resolution()
             }
+            Quantity::BodySpeed => scene.fastest_body(&now.bodies),
+            Quantity::BodiesEscaped => {
+                let lost = |body: &&BodyState| !body.is_finite() || !run.walls().contains(body.centre);
+                now.bodies.iter().filter(lost).count() as f64
+            }
+            Quantity::BodyOverlap => run.overlap_of_bodies() / run.resolution(),
             Quantity::InRegion => match &self.mark.region {
                 Some(region) => (now.len() - outside(&now.position, &about(region, scene))) as f64,
                 None => f64::NAN,

@@ -44,9 +44,10 @@ impl Flip {
         };
         let lists = {
             let (bodies, responses) = (&self.state.bodies, &self.responses);
-            bodies::Lists::new(&self.scene, &self.bricks, bodies, responses)
+            let first = movers.first_body(&self.scene);
+            bodies::Lists::new(&self.scene, &self.bricks, bodies, responses, first)
         };
-        lists.upload(&self.program, movers.first_body(&self.scene));
+        lists.upload(&self.program);
         let [bricks, count] = lists.sizes();
         self.pressure.set_bodies(bricks, count);
     }

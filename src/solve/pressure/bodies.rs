@@ -22,7 +22,7 @@ use swell_gpu::{
 use swell_scene::{
     FlipScene,
     flip::Precision,
-    moving_solid::{FreeBody, MAX_MOVING_SOLIDS, MovingSolid},
+    moving_solid::{FreeBody, MovingSolid},
 };
 
 use super::{
@@ -42,24 +42,10 @@ mirror!(
         response: [[f32; 4]; 9],
         /// Index in [`ORDER`] after its last pair.
         end: u32,
+        /// Its number among the solids.
+        solid: u32,
         /// Unused.
-        padding: [u32; 3],
-    }
-);
-
-mirror!(
-    /// `DeviceBodies` of shared/bodies.wgsl.
-    DeviceBodies {
-        /// The bodies.
-        bodies: [DeviceBody; MAX_MOVING_SOLIDS],
-        /// Number of bodies.
-        count: u32,
-        /// Number of the solid that is the first of them.
-        first_solid: u32,
-        /// Number of pairs.
-        pairs: u32,
-        /// Number of bricks in [`TOUCHED`].
-        bricks: u32,
+        padding: [u32; 2],
     }
 );
 
@@ -74,7 +60,7 @@ mirror!(
 );
 
 /// The bodies' states and responses.
-pub const STATES: Buf<DeviceBodies> = Buf::new("body_states");
+pub const STATES: Buf<DeviceBody> = Buf::new("body_states");
 /// Pairs of bricks and bodies, by slot.
 pub const PAIRS: Buf<BodyPair> = Buf::new("body_pairs");
 /// Pairs by body.
@@ -121,7 +107,7 @@ pub(crate) fn planned(scene: &FlipScene, grid_dims: [u32; 3]) -> Vec<BufferSpec>
         Precision::F64 => buffer.retyped::<f64>().sized(count),
     };
     vec![
-        STATES.sized(1),
+        STATES.sized(count),
         PAIRS.sized(pairs),
         ORDER.sized(pairs),
         TOUCHED.sized(pairs),
@@ -137,22 +123,23 @@ pub(crate) struct Lists {
     pairs: Vec<BodyPair>,
     order: Vec<u32>,
     touched: Vec<[u32; 4]>,
-    states: DeviceBodies,
+    states: Vec<DeviceBody>,
 }
 
 impl Lists {
     /// Lists the bricks that each body may touch at the start of a substep, in which they have
-    /// these states and responses.
+    /// these states and responses; `first_solid` is the number of the first body's grid among the
+    /// solids'.
     pub(crate) fn new(
         scene: &FlipScene,
         bricks: &Bricks,
         states: &[BodyState],
         responses: &[[Six; 6]],
+        first_solid: u32,
     ) -> Self {
         let solids = scene.moving_solids.iter();
         let bodies: Vec<_> = solids.filter(|solid| solid.body.is_some()).collect();
         let mut lists = Self::default();
-        lists.states.count = bodies.len() as u32;
         for (body, solid) in (0..).zip(&bodies) {
             let slots = touched_slots(scene, bricks, solid, states);
             lists
@@ -160,9 +147,9 @@ impl Lists {
                 .extend(slots.map(|slot| BodyPair { slot, body }));
         }
         lists.pairs.sort_by_key(|pair| (pair.slot, pair.body));
-        lists.states.pairs = lists.pairs.len() as u32;
-        for (k, solid) in bodies.iter().enumerate() {
-            lists.add_state(scene, k, solid, (states, &responses[k]));
+        for (k, solid) in (0..).zip(&bodies) {
+            let response = &responses[k as usize];
+            lists.add_state(scene, [k, first_solid + k], solid, (states, response));
         }
         for (k, pair) in (0..).zip(&lists.pairs) {
             match lists.touched.last_mut() {
@@ -171,27 +158,24 @@ impl Lists {
                 _ => break,
             }
         }
-        lists.states.bricks = lists.touched.len() as u32;
         lists
     }
 
     fn add_state(
         &mut self,
         scene: &FlipScene,
-        k: usize,
+        [k, number]: [u32; 2],
         solid: &MovingSolid,
         (all, response): (&[BodyState], &[Six; 6]),
     ) {
         let Some(it) = &solid.body else { return };
         let state = it.state(all);
         let first = self.order.len() as u32;
-        let own = (0..)
-            .zip(&self.pairs)
-            .filter(|(_, pair)| pair.body == k as u32);
+        let own = (0..).zip(&self.pairs).filter(|(_, pair)| pair.body == k);
         self.order.extend(own.map(|(index, _)| index));
         let volume = scene.settings().cell_size.powi(3);
         let scale = scene.water.rest_density * volume;
-        self.states.bodies[k] = DeviceBody {
+        self.states.push(DeviceBody {
             centre: (state.centre - scene.domain.min).as_vec3().to_array(),
             first,
             response: std::array::from_fn(|row| {
@@ -201,17 +185,14 @@ impl Lists {
                 })
             }),
             end: self.order.len() as u32,
-            padding: [0; 3],
-        };
+            solid: number,
+            padding: [0; 2],
+        });
     }
 
-    /// Uploads the lists; `first_solid` is the number of the first body's grid among the solids'.
-    pub(crate) fn upload(&self, program: &Program, first_solid: u32) {
-        let states = DeviceBodies {
-            first_solid,
-            ..self.states
-        };
-        program.upload(STATES, 0, &[states]);
+    /// Uploads the lists.
+    pub(crate) fn upload(&self, program: &Program) {
+        program.upload(STATES, 0, &self.states);
         program.upload(PAIRS, 0, &self.pairs);
         program.upload(ORDER, 0, &self.order);
         program.upload(TOUCHED, 0, &self.touched);
@@ -219,7 +200,7 @@ impl Lists {
 
     /// Number of bricks with water that bodies may touch, and number of bodies.
     pub(crate) fn sizes(&self) -> [u32; 2] {
-        [self.states.bricks, self.states.count]
+        [self.touched.len() as u32, self.states.len() as u32]
     }
 }
 
@@ -285,10 +266,17 @@ pub(crate) fn changes(
 /// Removes the means of each body's coupling over its cells in each pocket, so that the pressure
 /// there, which is determined up to a constant, moves no body by that constant. `labels` are the
 /// projection's, in blocked order.
-pub(super) fn remove_means(program: &Program, labels: &[u32]) -> Result<(), SolveError> {
+pub(super) fn remove_means(
+    program: &Program,
+    labels: &[u32],
+    bodies: usize,
+) -> Result<(), SolveError> {
     let planes = 6 * CELLS as usize;
-    let states = program.read(STATES, 1)?[0];
-    let pairs = program.read(PAIRS, states.pairs as usize)?;
+    let pairs = program
+        .read(STATES, bodies)?
+        .last()
+        .map_or(0, |body| body.end);
+    let pairs = program.read(PAIRS, pairs as usize)?;
     let mut coupling = program.read(COUPLING, planes * pairs.len())?;
     let label = |pair: &BodyPair, cell: u32| {
         let place = blocked(CELLS * pair.slot + cell);

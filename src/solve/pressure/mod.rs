@@ -403,7 +403,7 @@ impl PressureSolver {
         let cells = (CELLS * (self.phase.levels[0][1] + 1)) as usize;
         let labels = program.read(buffers::LABEL, cells)?;
         if self.extent.has_bodies {
-            bodies::remove_means(program, &labels)?;
+            bodies::remove_means(program, &labels, self.touched[1] as usize)?;
         }
         let (cells, parts) = pockets::list(&labels);
         program.upload(buffers::POCKET_CELLS, 0, &cells);

@@ -210,8 +210,8 @@ fn a_sphere_that_moves_through_pbf_is_within_tolerance() {
             state.position[0] = within.as_vec3().to_array();
             let place = (
                 "pbf/predict",
-                "share * solid_grids.length",
-                "0.99 * share * solid_grids.length",
+                "share * posed_solids[k].length",
+                "0.99 * share * posed_solids[k].length",
             );
             spoils(&context, &scene, &start, (frames, &state), place);
             continue;
@@ -219,8 +219,8 @@ fn a_sphere_that_moves_through_pbf_is_within_tolerance() {
         for (pass, from, to) in [
             (
                 "pbf/predict",
-                "share * solid_grids.length",
-                "0.99 * share * solid_grids.length",
+                "share * posed_solids[k].length",
+                "0.99 * share * posed_solids[k].length",
             ),
             (
                 "pbf/compute_delta",

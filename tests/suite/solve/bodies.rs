@@ -209,8 +209,9 @@ fn light_heavy_hinged_and_moored_bodies_stay_bounded() {
     let fastest = fastest.fold(0.0, f64::max);
     assert!(fastest < (2.0 * 9.81 * 1.0f64).sqrt(), "{fastest}");
     let last = &states[47];
-    // It swims on the water; the hinge and the rope hold.
-    assert!((last[0].centre.y - 0.69).abs() < 0.06, "{:?}", last[0]);
+    // It swims on the water, 0.6 m deep, on a face or up to a corner: its middle is 0.1 m to
+    // 0.173 m up, and waves of 0.03 m pass. The hinge and the rope hold.
+    assert!((0.67..0.803).contains(&last[0].centre.y), "{:?}", last[0]);
     let hinge = DVec3::new(0.15, 0.35, 0.75);
     let door = scene.bodies().nth(2).unwrap();
     let at = door.body.pose(&last[2]).place(hinge);

@@ -396,7 +396,7 @@ fn scenes_without_moving_solids_have_nothing_for_them() {
         let has = |name: &str| buffers.iter().any(|b| b == name);
         (
             is_moving,
-            has("solid_grids"),
+            has("posed_solids"),
             has("closed_velocity"),
             has("solid_grid"),
         )

@@ -41,7 +41,8 @@ pub enum Quantity {
     /// the volume of their particles. Unlike the level set it is independent of the
     /// roughness of the surface.
     FilledVolume,
-    /// Energy over that at the start, minus 1; heights are above the domain's floor.
+    /// Energy of water and bodies over that at the start, minus 1; heights are above the domain's
+    /// floor.
     EnergyGain,
     /// Energy above its minimum so far, over that at the start.
     EnergyRise,
@@ -74,6 +75,13 @@ pub enum Quantity {
     Behind,
     /// Largest depth of a particle within a solid, in units of the resolution.
     InSolid,
+    /// Largest speed of any point of a body, m/s.
+    BodySpeed,
+    /// Bodies whose centre of mass is outside the domain or not a number.
+    BodiesEscaped,
+    /// Largest depth of a vertex of a body within another body, a solid or a wall, in units of
+    /// the resolution.
+    BodyOverlap,
     /// Number of particles in a box.
     InRegion,
     /// Largest distance between the positions of a particle in the two runs, in units
@@ -108,7 +116,7 @@ pub struct About {
 
 impl Quantity {
     /// All quantities, in the order of their discriminants.
-    pub const ALL: [Self; 34] = [
+    pub const ALL: [Self; 37] = [
         Self::Escaped,
         Self::Lost,
         Self::NotFinite,
@@ -137,6 +145,9 @@ impl Quantity {
         Self::Capped,
         Self::Behind,
         Self::InSolid,
+        Self::BodySpeed,
+        Self::BodiesEscaped,
+        Self::BodyOverlap,
         Self::InRegion,
         Self::Difference,
         Self::DisplacementError,
@@ -209,6 +220,9 @@ impl Quantity {
             Self::Capped => plain("capped", "slowed, of particles and substeps"),
             Self::Behind => plain("behind", "particles behind a moving wall"),
             Self::InSolid => plain("in_solid", "deepest within a solid, d or Δx"),
+            Self::BodySpeed => plain("body_speed", "fastest point of a body, m/s"),
+            Self::BodiesEscaped => plain("bodies_escaped", "bodies outside of the domain"),
+            Self::BodyOverlap => plain("body_overlap", "bodies within what they touch, d or Δx"),
             Self::InRegion => About {
                 takes_region: true,
                 ..plain("in_region", "particles in a box")
