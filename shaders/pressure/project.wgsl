@@ -4,6 +4,11 @@
 @group(0) @binding(6) var<storage, read_write> face_velocity: array<f32>;
 @group(0) @binding(7) var<storage, read_write> pressure: array<f32>;
 
+#ifdef BODIES
+// The projection that follows contacts of bodies adds to the pressure of the one before it.
+const AFTER_CONTACTS = 2u;
+
+#endif
 @compute @workgroup_size(64)
 fn main(
     @builtin(workgroup_id) workgroup: vec3u,
@@ -29,6 +34,10 @@ fn main(
         // The large word by itself is accurate to 12 bits only.
         value += pressure_solution[phase.stride + q];
 #endif
-        pressure[own] = phase.pressure_scale * f32(value);
+        var before = 0.0;
+#ifdef BODIES
+        before = select(0.0, pressure[own], phase.step == AFTER_CONTACTS);
+#endif
+        pressure[own] = before + phase.pressure_scale * f32(value);
     }
 }

@@ -316,6 +316,12 @@ impl Freedom {
 }
 
 impl BodyState {
+    /// Returns the change of the six velocities since another state, m/s and rad/s.
+    pub fn change_since(&self, before: &Self) -> Six {
+        let (now, then) = (self.velocities(), before.velocities());
+        std::array::from_fn(|k| now[k] - then[k])
+    }
+
     /// Returns the velocity and the angular velocity.
     pub fn velocities(&self) -> Six {
         let [v, w] = [self.velocity, self.spin];

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::{FlipScene, PbfScene, Scene};
+use super::{FlipScene, PbfScene, Scene, moving_solid::FreeBody};
 use swell_domain::{
     absorber::AbsorberStates,
     body::BodyState,
@@ -246,7 +246,25 @@ impl PbfScene<'_> {
     }
 }
 
+/// Cells in a substep by which contacts may change a body's motion before the water is projected
+/// again. A body at rest on the floor would else drive the water around it by the weight that the
+/// floor bears.
+const CONTACT_CELLS: f64 = 1e-3;
+
 impl FlipScene<'_> {
+    /// Returns which bodies contacts stopped or turned aside, with their states before and after
+    /// that, in a substep of `length` seconds.
+    pub fn stopped(&self, before: &[BodyState], after: &[BodyState], length: f64) -> Vec<bool> {
+        let room = CONTACT_CELLS * self.settings().cell_size;
+        let states = before.iter().zip(after);
+        let of_body = |(it, (before, after)): (&FreeBody, (&BodyState, &BodyState))| {
+            let slower = (after.velocity - before.velocity).length();
+            let turned = (after.spin - before.spin).length();
+            (slower + it.reach * turned) * length > room
+        };
+        self.bodies().zip(states).map(of_body).collect()
+    }
+
     /// Returns the longest substep in which no point of a body moves farther than [`BODY_CELLS`],
     /// seconds.
     fn longest_body_step(&self, bodies: &[BodyState]) -> f64 {

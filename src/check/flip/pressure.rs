@@ -26,7 +26,7 @@ use swell_solve::{
     SolveError,
     flip::buffers,
     pressure::{
-        CORRECTION_TOLERANCE, DONE, blocked,
+        CORRECTION_TOLERANCE, DONE, Round, blocked,
         buffers::{self as solved, Real},
     },
 };
@@ -42,7 +42,7 @@ pub(super) const COMPARISONS: &[Comparison<FlipState>] = &[
         is_due: FlipState::is_done,
         ..comparison(
             "pressure/project",
-            || names![buffers::FACE_VELOCITY],
+            || names![buffers::FACE_VELOCITY, solved::PRESSURE],
             project,
         )
     },
@@ -347,11 +347,19 @@ fn project(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
         )
     });
     let pressure = elements.scalars(&io.after, solved::PRESSURE)?;
+    let earlier = match io.before.window(&solved::PHASES)?.step == Round::AfterContacts as u32 {
+        true => elements.scalars(&io.before, solved::PRESSURE)?,
+        false => vec![0.0; pressure.len()],
+    };
     let scale = state.scene.water.rest_density * state.model.cell_size() / elements.substep.kick;
     state.add_rows(io.table, &PRESSURE, |row| {
-        let exact = scale * x[row];
-        let found = pressure[state.system().cell[row] as usize];
-        (found, exact, [exact.abs()])
+        let element = state.system().cell[row] as usize;
+        let exact = earlier[element] + scale * x[row];
+        (
+            pressure[element],
+            exact,
+            [exact.abs() + earlier[element].abs()],
+        )
     });
     whole(state, x, &velocity, io)
 }

@@ -215,7 +215,8 @@ impl<'a> Watch<'a> {
             }
             Quantity::BodySpeed => scene.fastest_body(&now.bodies),
             Quantity::BodiesEscaped => {
-                let lost = |body: &&BodyState| !body.is_finite() || !run.walls().contains(body.centre);
+                let lost =
+                    |body: &&BodyState| !body.is_finite() || !run.walls().contains(body.centre);
                 now.bodies.iter().filter(lost).count() as f64
             }
             Quantity::BodyOverlap => run.overlap_of_bodies() / run.resolution(),

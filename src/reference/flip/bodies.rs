@@ -35,6 +35,15 @@ impl BodyCells {
         product(&self.response, &self.weight)
     }
 
+    /// Returns the body, or one that the pressure does not move if it is `held`.
+    pub(super) fn held(&self, held: bool) -> Self {
+        let mut body = self.clone();
+        if held {
+            body.response = [[0.0; 6]; 6];
+        }
+        body
+    }
+
     /// Returns the body's part of a system.
     fn of_system(&self, row_of: &[u32]) -> Coupling {
         let with_row = self.element.iter().zip(&self.push);

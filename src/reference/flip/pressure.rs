@@ -56,6 +56,15 @@ impl<'a> Waters<'a> {
         carry_flux(self.bodies, changes, &mut self.flux);
     }
 
+    /// Adds to the solids' flux that of changes of the velocities of a system's bodies.
+    pub(super) fn carry_changes(&mut self, system: &System, changes: &[Six]) {
+        let mut flux = vec![0.0; system.cell.len()];
+        for (body, change) in system.bodies.iter().zip(changes) {
+            body.add_flux(change, &mut flux);
+        }
+        self.add_flux(system, &flux);
+    }
+
     /// Adds to the solids' flux, by row.
     pub(super) fn add_flux(&mut self, system: &System, flux: &[f64]) {
         for (&element, added) in system.cell.iter().zip(flux) {

@@ -8,7 +8,7 @@ use super::{
     effects::{self, FaceInputs, Flying},
     extrapolate, find_buried, find_change, find_depth, find_excess, find_water, gather_centers,
     gather_faces, grid_to_particle, let_in,
-    projection::project,
+    projection::project as project_faces,
     push_apart, reorder, survey, wall_friction,
 };
 use crate::{ReferenceError, Timings};
@@ -199,13 +199,14 @@ impl Flip {
                 couple_bodies(model, &step, &bricks, &space, (&before, &responses))
             }),
         };
+        let touched: Vec<BodyCells>;
         let waters = Waters::new(model, &bricks, &space, &centers);
         let mut waters = waters.with_bodies(&coupled);
         let by_weight: Vec<Six> = coupled.iter().map(BodyCells::before).collect();
         waters.carry_flux(&by_weight);
         let mut carried = by_weight.clone();
         let mut project = |centers, faces: &mut Faces, timings: &mut Timings| {
-            let found = project(model, timings, *factor_budget, &mut waters, centers, faces)?;
+            let found = project_faces(model, timings, *factor_budget, &mut waters, centers, faces)?;
             if !before.is_empty() {
                 for (sum, change) in carried.iter_mut().zip(&found.0.changes) {
                     *sum = std::array::from_fn(|k| sum[k] + change[k]);
@@ -239,10 +240,41 @@ impl Flip {
                 *state = state.sped_up(change);
             }
         }
+        let mut after_contacts = None;
         if let Some(contacts) = contacts {
+            let free = bodies.clone();
             timings.time("contacts", || {
                 contacts.resolve(&model.scene, &state.walls, substep, &mut bodies);
             });
+            let held = model.scene.stopped(&free, &bodies, substep.length);
+            if held.contains(&true) {
+                let ways = bodies.iter().zip(&free);
+                let mut changes: Vec<Six> =
+                    ways.map(|(after, free)| after.change_since(free)).collect();
+                waters.carry_changes(&projected.system, &changes);
+                touched = coupled
+                    .iter()
+                    .zip(&held)
+                    .map(|(it, held)| it.held(*held))
+                    .collect();
+                waters = waters.with_bodies(&touched);
+                let found = project_faces(
+                    model,
+                    timings,
+                    *factor_budget,
+                    &mut waters,
+                    None,
+                    &mut faces,
+                )?
+                .0;
+                for (k, more) in found.changes.iter().enumerate() {
+                    bodies[k] = bodies[k].sped_up(more);
+                    changes[k] = std::array::from_fn(|i| changes[k][i] + more[i]);
+                }
+                let moved = (&before[..], &changes[..]);
+                carry_bodies(model, &step, &bricks, &space, moved, &mut faces.velocity);
+                after_contacts = Some(found);
+            }
         }
         step.solids = model.solids_at(&bodies, step.start, step.length);
         timings.time("flip/extrapolate", || {
@@ -269,8 +301,8 @@ impl Flip {
         });
         let scale = model.scene.water.rest_density * model.cell_size() / step.kick;
         let mut pressure = waters.by_element(&projected.system, &projected.solution.x);
-        if let Some(earlier) = &earlier {
-            let before = waters.by_element(&earlier.system, &earlier.solution.x);
+        for other in earlier.iter().chain(&after_contacts) {
+            let before = waters.by_element(&other.system, &other.solution.x);
             (pressure.iter_mut().zip(before)).for_each(|(now, before)| *now += before);
         }
         Ok(Trace {
@@ -279,6 +311,7 @@ impl Flip {
             coupled: coupled.clone(),
             pressure: pressure.into_iter().map(|q| scale * q).collect(),
             earlier,
+            after_contacts,
             is_short,
             after: Cloud {
                 position: moved.position,

@@ -21,10 +21,12 @@ pub struct Trace {
     pub centers: Centers,
     /// Face velocities after the extrapolation of the last layer.
     pub faces: Faces,
-    /// The last projection.
+    /// The projection from whose density correction particles are displaced.
     pub projected: Projected,
     /// The first projection, if an effect acts between two.
     pub earlier: Option<Projected>,
+    /// A projection after contacts, if they stopped a body.
+    pub after_contacts: Option<Projected>,
     /// Whether that effect needs more iterations than the settings allow.
     pub is_short: bool,
     /// Pressure by element, Pa; 0 where there is no water.
@@ -49,7 +51,8 @@ pub struct Trace {
 impl Trace {
     /// Iterates over the projections in order.
     pub fn projections(&self) -> impl Iterator<Item = &Projected> {
-        self.earlier.iter().chain([&self.projected])
+        let first = self.earlier.iter().chain([&self.projected]);
+        first.chain(&self.after_contacts)
     }
 
     /// Adds the projections to the report of a frame's projections.

@@ -5,7 +5,11 @@ use swell_domain::body::BodyState;
 use swell_scene::step::Substep;
 
 use super::{
-    super::{SolveError, pressure::bodies, trace::Run},
+    super::{
+        SolveError,
+        pressure::{Round, bodies},
+        trace::Run,
+    },
     Flip,
 };
 
@@ -42,39 +46,60 @@ impl Flip {
         let Some(movers) = self.movers.as_ref().filter(|_| self.scene.has_bodies()) else {
             return;
         };
-        let lists = {
+        self.touched = {
             let (bodies, responses) = (&self.state.bodies, &self.responses);
             let first = movers.first_body(&self.scene);
             bodies::Lists::new(&self.scene, &self.bricks, bodies, responses, first)
         };
-        lists.upload(&self.program);
-        let [bricks, count] = lists.sizes();
+        self.touched.upload(&self.program);
+        let [bricks, count] = self.touched.sizes();
         self.pressure.set_bodies(bricks, count);
     }
 
     /// Adds to the bodies' velocities, and to the faces that they close, what the projection found.
-    pub(super) fn push_bodies(&mut self, run: &mut Run<'_>) -> Result<(), SolveError> {
+    /// What contacts changed before it, the states have already.
+    pub(super) fn push_bodies(
+        &mut self,
+        round: Round,
+        run: &mut Run<'_>,
+    ) -> Result<(), SolveError> {
         let Some(carry) = &self.recordings.carry else {
             return Ok(());
         };
         run(&self.program, &[carry])?;
         let precision = self.scene.settings().pressure.precision;
-        let changes = bodies::changes(&self.program, precision, self.state.bodies.len())?;
-        for (state, change) in self.state.bodies.iter_mut().zip(&changes) {
-            *state = state.sped_up(change);
+        let count = self.state.bodies.len();
+        let [by_pressure, before] = bodies::changes(&self.program, precision, count)?;
+        for (k, state) in self.state.bodies.iter_mut().enumerate() {
+            if round != Round::AfterContacts {
+                *state = state.sped_up(&before[k]);
+            }
+            *state = state.sped_up(&by_pressure[k]);
         }
         Ok(())
     }
 
-    /// Keeps bodies out of each other, of walls and of solids, and uploads their way through the
-    /// substep.
-    pub(super) fn collide_bodies(&mut self, substep: &Substep) {
+    /// Keeps bodies out of each other, of walls and of solids. Returns whether that changed the
+    /// velocities of any by so much that the water has to be projected again, for which all is
+    /// ready.
+    pub(super) fn collide_bodies(&mut self, substep: &Substep) -> bool {
         let Some(contacts) = &self.contacts else {
-            return;
+            return false;
         };
+        let before = self.state.bodies.clone();
         let (walls, bodies) = (&self.state.walls, &mut self.state.bodies);
         contacts.resolve(&self.scene, walls, substep, bodies);
-        self.upload_movers(substep);
+        let held = self.scene.stopped(&before, bodies, substep.length);
+        if !held.contains(&true) {
+            return false;
+        }
+        let changes: Vec<_> = (before.iter().zip(&*bodies))
+            .map(|(before, after)| after.change_since(before))
+            .collect();
+        let precision = self.scene.settings().pressure.precision;
+        bodies::upload_changes(&self.program, precision, &changes);
+        self.touched.upload_held(&self.program, &held);
+        true
     }
 
     /// Moves the bodies to the end of the substep.

@@ -49,7 +49,7 @@ use super::{
     effects,
     params::Counters,
     plan::{Counts, Plan},
-    pressure::{self, PressureSolver},
+    pressure::{self, PressureSolver, Round, bodies::Lists},
     state::{Carried, is_awaited, is_other_count, upload},
     trace::Run,
 };
@@ -82,6 +82,8 @@ pub struct Flip {
     contacts: Option<SceneContacts>,
     /// Responses of the bodies to impulses in the substep.
     responses: Vec<[Six; 6]>,
+    /// Where the bodies may touch the water in the substep.
+    touched: Lists,
 }
 
 /// Result of `flip/survey`.
@@ -129,6 +131,7 @@ impl Flip {
             movers: Movers::of(boundary, scene),
             contacts: SceneContacts::of(scene),
             responses: Vec::new(),
+            touched: Lists::default(),
             shores: Shores::new(boundary, scene.domain.min, scene.settings().cell_size)
                 .joined(scene.periodic),
             state,
@@ -280,7 +283,7 @@ impl Flip {
     ///
     /// # Errors Returns an error if the device fails.
     pub fn project(&mut self, substep: &Substep) -> Result<pressure::Projected, SolveError> {
-        self.timed(|flip, run| flip.project_by(substep, run))
+        self.timed(|flip, run| flip.project_by(Round::First, substep, run))
     }
 
     /// Returns the last projection's q = p Δt / (ρ Δx) at elements of cell arrays, in the solve's
@@ -326,6 +329,7 @@ impl Flip {
 
     fn project_by(
         &mut self,
+        round: Round,
         substep: &Substep,
         run: &mut Run<'_>,
     ) -> Result<pressure::Projected, SolveError> {
@@ -336,18 +340,20 @@ impl Flip {
         let cell_size = self.scene.settings().cell_size;
         self.pressure
             .set_topology(&self.program, &self.bricks, cell_size);
+        self.pressure.set_round(round);
         let projected = self.pressure.project_by(&self.program, scale, run)?;
-        self.push_bodies(run)?;
+        self.push_bodies(round, run)?;
         Ok(projected)
     }
 
     fn project_within_budget(
         &mut self,
+        round: Round,
         substep: &Substep,
         totals: &mut FrameTotals,
         run: &mut Run<'_>,
     ) -> Result<(), SolveError> {
-        let projected = self.project_by(substep, run)?;
+        let projected = self.project_by(round, substep, run)?;
         totals.add(&projected);
         Ok(self.scene.budget.check_projection(
             self.frame + 1,
@@ -366,19 +372,24 @@ impl Flip {
         run: &mut Run<'_>,
     ) -> Result<(), SolveError> {
         self.carry(is_wet, substep, run)?;
-        self.project_within_budget(substep, totals, run)?;
+        self.project_within_budget(Round::First, substep, totals, run)?;
         if let Some(turns) = effects::turns(&self.scene, substep.length) {
             totals.projection.missed += u32::from(turns.is_short);
             self.recordings
                 .run_between(&self.program, turns.again, run)?;
-            self.project_within_budget(substep, totals, run)?;
+            self.project_within_budget(Round::Again, substep, totals, run)?;
+        }
+        if self.collide_bodies(substep) {
+            self.project_within_budget(Round::AfterContacts, substep, totals, run)?;
         }
         if self.scene.settings().density_correction {
             let corrected = self.pressure.correct_by(&self.program, run)?;
             totals.projection.correction_iterations += u64::from(corrected.iterations);
             totals.projection.missed += u32::from(corrected.is_missed);
         }
-        self.collide_bodies(substep);
+        if self.contacts.is_some() {
+            self.upload_movers(substep);
+        }
         run(
             &self.program,
             &[&self.recordings.to_particles, &self.recordings.watch],

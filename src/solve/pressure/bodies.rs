@@ -28,7 +28,7 @@ use swell_scene::{
 use super::{
     super::SolveError,
     blocked,
-    buffers::{Real, read_reals},
+    buffers::{Real, read_reals, upload_reals},
 };
 
 mirror!(
@@ -198,6 +198,19 @@ impl Lists {
         program.upload(TOUCHED, 0, &self.touched);
     }
 
+    /// Uploads that the pressure does not move the bodies that are `held`.
+    pub(crate) fn upload_held(&self, program: &Program, held: &[bool]) {
+        let states = self.states.iter().zip(held);
+        let states = states.map(|(state, held)| match held {
+            true => DeviceBody {
+                response: [[0.0; 4]; 9],
+                ..*state
+            },
+            false => *state,
+        });
+        program.upload(STATES, 0, &states.collect::<Vec<_>>());
+    }
+
     /// Number of bricks with water that bodies may touch, and number of bodies.
     pub(crate) fn sizes(&self) -> [u32; 2] {
         [self.touched.len() as u32, self.states.len() as u32]
@@ -250,17 +263,27 @@ fn turned(b: &Bounds, place: &DAffine3) -> Bounds {
     })
 }
 
-/// Reads the change of each body's velocities by the last projection, with what came before it.
+/// Reads the change of each body's velocities by the last projection, and that before it.
 pub(crate) fn changes(
     program: &Program,
     precision: Precision,
     bodies: usize,
-) -> Result<Vec<Six>, SolveError> {
+) -> Result<[Vec<Six>; 2], SolveError> {
     let all = read_reals(program, &CHANGE, precision, 12 * bodies)?;
-    let (by_pressure, before) = all.split_at(6 * bodies);
-    let both: Vec<f64> = by_pressure.iter().zip(before).map(|(a, b)| a + b).collect();
     let six = |c: &[f64]| std::array::from_fn(|k| c[k]);
-    Ok(both.chunks_exact(6).map(six).collect())
+    let (by_pressure, before) = all.split_at(6 * bodies);
+    Ok([by_pressure, before].map(|all| all.chunks_exact(6).map(six).collect()))
+}
+
+/// Uploads changes of the bodies' velocities before a projection, by contacts.
+pub(crate) fn upload_changes(program: &Program, precision: Precision, changes: &[Six]) {
+    upload_reals(
+        program,
+        &CHANGE,
+        precision,
+        6 * changes.len(),
+        changes.as_flattened(),
+    );
 }
 
 /// Removes the means of each body's coupling over its cells in each pocket, so that the pressure

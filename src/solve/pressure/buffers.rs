@@ -85,6 +85,23 @@ pub fn read_reals(
     })
 }
 
+/// Writes numbers in the precision of a solve, from index `first` on.
+pub(super) fn upload_reals(
+    program: &Program,
+    buffer: &Buf<Real>,
+    precision: Precision,
+    first: usize,
+    values: &[f64],
+) {
+    match precision {
+        Precision::F32 | Precision::F32Refined => {
+            let narrow: Vec<f32> = values.iter().map(|&value| value as f32).collect();
+            program.upload(buffer.retyped::<f32>(), first, &narrow);
+        }
+        Precision::F64 => program.upload(buffer.retyped::<f64>(), first, values),
+    }
+}
+
 /// Reads the scalars of a solve and the statistics of its projection.
 ///
 /// # Errors Returns an error if the device fails.

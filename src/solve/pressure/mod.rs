@@ -147,6 +147,20 @@ pub struct PressureSolver {
     expected: [u32; 2],
 }
 
+/// A projection among those of a substep.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Round {
+    /// The first one, which adds the weight of the water between cells' centres and bodies.
+    First,
+    /// One after an effect.
+    Again,
+    /// One after contacts of bodies, whose changes of velocity the caller has uploaded
+    /// (`solve::bodies`).
+    AfterContacts,
+}
+
+const AFTER_CONTACTS: u32 = Round::AfterContacts as u32;
+
 #[derive(Clone, Copy, PartialEq)]
 enum Task {
     Project,
@@ -187,7 +201,11 @@ impl PressureSolver {
     /// topology is set. The caller has uploaded the lists of `solve::bodies`.
     pub(super) fn set_bodies(&mut self, bricks: u32, bodies: u32) {
         self.touched = [bricks, bodies];
-        self.phase.step = 0;
+    }
+
+    /// Says which of a substep's projections follows.
+    pub(super) fn set_round(&mut self, round: Round) {
+        self.phase.step = round as u32;
     }
 
     /// Sets the bricks of a substep, whose records the caller has uploaded to `bricks`.
@@ -271,8 +289,6 @@ impl PressureSolver {
         self.pockets = 0;
         let tolerance = self.settings.tolerance;
         let (solved, stats) = self.solve(program, Task::Project, tolerance, run)?;
-        // A further projection of the same substep does not add the weight again.
-        self.phase.step = 1;
         Ok(Projected {
             solved,
             divergence_before: stats.divergence_before.into(),
@@ -354,6 +370,7 @@ impl PressureSolver {
         // Where pockets have to be listed first, the start runs twice.
         let (mut is_first, mut is_begun) = (true, false);
         loop {
+            let round = self.phase.step;
             let stages = self.stages(program);
             let (start, finish) = match task {
                 Task::Project => (Some(&stages.project), Some(&stages.finish_project)),
@@ -361,7 +378,10 @@ impl PressureSolver {
             };
             let mut recordings = Vec::new();
             if task == Task::Project && !is_begun {
-                recordings.extend(&stages.weigh);
+                recordings.extend(match round {
+                    AFTER_CONTACTS => &stages.touch,
+                    _ => &stages.weigh,
+                });
             }
             is_begun = true;
             if is_first {

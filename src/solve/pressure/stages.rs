@@ -43,6 +43,8 @@ pub struct Extent {
 pub(super) struct Stages<T> {
     /// Lets bodies have the weight of the water between cells' centres and their surfaces.
     pub weigh: Option<T>,
+    /// Lets the water know of what contacts did to the bodies.
+    pub touch: Option<T>,
     /// Builds the system, labels bodies of water, and computes the right-hand side.
     pub project: T,
     /// Computes the right-hand side of the density correction.
@@ -65,6 +67,7 @@ impl Stages<Vec<Command>> {
         let finish = |pass| run(pass, Phase::Level(0), When::Done, Size::Active);
         Self {
             weigh: has_bodies.then(weigh),
+            touch: has_bodies.then(|| vec![carry_before()]),
             project: build(preconditioner, shape),
             correct: has_correction.then(|| vec![finest("pressure/density_source", When::Always)]),
             begin: begin(preconditioner, shape),
@@ -79,6 +82,7 @@ impl Stages<Vec<Command>> {
         let record = |commands: &Vec<Command>| Recording::new(program, commands);
         Stages {
             weigh: self.weigh.as_ref().map(record),
+            touch: self.touch.as_ref().map(record),
             project: record(&self.project),
             correct: self.correct.as_ref().map(record),
             begin: record(&self.begin),
@@ -96,6 +100,7 @@ impl Stages<Vec<Command>> {
         let all = self
             .weigh
             .into_iter()
+            .chain(self.touch)
             .chain(project)
             .chain([self.finish_project]);
         all.chain(correct).flatten()
@@ -155,11 +160,15 @@ fn smooth_first(preconditioner: Preconditioner) -> Option<Command> {
 }
 
 fn weigh() -> Vec<Command> {
-    let before = |pass, size| run(pass, Phase::BodyWeight, When::Always, size);
-    vec![
-        before("pressure/move_bodies", Size::Bodies),
-        before("pressure/carry_flux", Size::BodyBricks),
-    ]
+    let pass = "pressure/move_bodies";
+    let moves = run(pass, Phase::BodyWeight, When::Always, Size::Bodies);
+    vec![moves, carry_before()]
+}
+
+/// Adds to the solids' flux what changed the bodies' velocities before the solve.
+fn carry_before() -> Command {
+    let pass = "pressure/carry_flux";
+    run(pass, Phase::BodyWeight, When::Always, Size::BodyBricks)
 }
 
 fn build(preconditioner: Preconditioner, shape: Shape) -> Vec<Command> {

@@ -175,6 +175,42 @@ fn the_gpu_moves_bodies_as_the_reference_does() {
     }
 }
 
+/// Largest speed of the water, and largest density error, in each of the frames from 24 to 48 of a
+/// heavy box that lies on the floor.
+fn beside_a_box_on_the_floor(context: &Context, set: &[&str]) -> [f64; 2] {
+    let body =
+        "mesh = \"cube.obj\"\nscale = 0.25\ntranslate = [0.4, 0.001, 0.3]\ndensity = 3000.0\n";
+    let scene = scene(body, &[set, &["budget.density_error_max=1e3"]].concat());
+    let start = Start::of(&scene).unwrap();
+    let mut drive = Drive::new(&gpu(context), &scene, &start, false).unwrap();
+    let reports = (0..48).map(|_| drive.advance().unwrap().report);
+    reports.skip(23).fold([0.0; 2], |[speed, density], report| {
+        [
+            speed.max(report.max_speed),
+            density.max(report.density_error_max),
+        ]
+    })
+}
+
+/// The floor bears what the water does not: the projection that follows contacts lets the water know
+/// of it.
+#[test]
+fn water_beside_a_box_on_the_floor_rests() {
+    for set in [&[][..], &["solver.method=\"pbf\""]] {
+        let [speed, density] = beside_a_box_on_the_floor(&context(), set);
+        println!("{set:?}: {speed:.3} m/s, density error {density:.2}");
+        assert!(speed < 0.1 && density < 0.5, "{set:?}: {speed} {density}");
+    }
+    // Negative control: without it, the water takes the box to sink by its weight in each substep.
+    let context = spoiled(
+        "pressure/carry_flux",
+        "solid_flux[CELLS * found.x + inner] += f32(sum);",
+        "solid_flux[CELLS * found.x + inner] += select(f32(sum), 0.0, phase.step == 3u);",
+    );
+    let [speed, _] = beside_a_box_on_the_floor(&context, &[]);
+    assert!(speed > 0.3, "{speed}");
+}
+
 /// Bodies 1 000 times lighter and 20 times heavier than water, one that is hinged and one that is
 /// moored, in the same water: nothing flies.
 #[test]
