@@ -4,10 +4,9 @@
 #import "shared/flip_cell.wgsl"
 #import "shared/flip_faces.wgsl"
 #import "shared/bodies.wgsl"
+#import "shared/brick_solids.wgsl"
 #import "shared/pressure_real.wgsl"
 
-@group(0) @binding(2) var<storage, read> body_pairs: array<BodyPair>;
-@group(0) @binding(3) var<storage, read> body_states: array<DeviceBody>;
 // Change of each body's six velocities by the pressure, m/s and rad/s, and behind those of all
 // bodies that by what flip/couple_bodies found.
 @group(0) @binding(4) var<storage, read> body_change: array<real>;
@@ -30,10 +29,11 @@ fn main(
     @builtin(local_invocation_index) local: u32,
 ) {
     let pair = thread_index(workgroup, workgroups, 0u, 1u);
-    if pair >= body_states[arrayLength(&body_states) - 1u].end {
+    if pair >= pair_count() {
         return;
     }
     let body = body_pairs[pair].body;
+    look_about(pair);
     let solid = body_states[body].solid;
     let centre = body_states[body].centre;
     let velocity = change(6u * body);

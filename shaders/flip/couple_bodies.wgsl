@@ -11,10 +11,9 @@
 #import "shared/flip_cell.wgsl"
 #import "shared/flip_faces.wgsl"
 #import "shared/bodies.wgsl"
+#import "shared/brick_solids.wgsl"
 #import "shared/pressure_real.wgsl"
 
-@group(0) @binding(2) var<storage, read> body_pairs: array<BodyPair>;
-@group(0) @binding(3) var<storage, read> body_states: array<DeviceBody>;
 // For each pair six arrays of 512 cells: area over Δx², then moment over Δx², metres.
 @group(0) @binding(4) var<storage, read_write> body_coupling: array<f32>;
 // For each pair six sums of that difference, as pressures q.
@@ -38,8 +37,9 @@ fn main(
     @builtin(local_invocation_index) local: u32,
 ) {
     let pair = thread_index(workgroup, workgroups, 0u, 1u);
-    let is_due = pair < body_states[arrayLength(&body_states) - 1u].end;
+    let is_due = pair < pair_count();
     let body = body_pairs[select(0u, pair, is_due)].body;
+    look_about(select(0u, pair, is_due));
     let solid = body_states[body].solid;
     let centre = body_states[body].centre;
     var sums = array<real, 6>(0.0, 0.0, 0.0, 0.0, 0.0, 0.0);

@@ -4,6 +4,9 @@
 #import "shared/flip_params.wgsl"
 #import "shared/flip_cell.wgsl"
 #ifdef SOLIDS
+#ifdef MOVING_SOLIDS
+#import "shared/all_solids.wgsl"
+#endif
 #import "shared/flip_faces.wgsl"
 #import "shared/flip_hats.wgsl"
 #else

@@ -1,5 +1,6 @@
 // Open areas of a cell's faces beside walls and solids: face fractions of Batty et al. 2007, exact
-// for walls and for planes in meshes.
+// for walls and for planes in meshes. Which of several solids are looked at, `solids_about` and
+// `solid_about` say: shared/all_solids.wgsl or shared/brick_solids.wgsl.
 #import "shared/flip_walls.wgsl"
 #import "shared/flip_cut.wgsl"
 #import "shared/flip_solid.wgsl"
@@ -39,7 +40,8 @@ fn cut_faces(cell: vec3f, across: vec3f) -> CutFaces {
     var corners = Corners(vec4f(1e15), vec4f(1e15));
     var solids = 0u;
 #ifdef MOVING_SOLIDS
-    for (var k = 0u; k < solid_count(); k++) {
+    for (var about = 0u; about < solids_about(); about++) {
+        let k = solid_about(about);
         for (var once = 0; once < select(0, 1, may_cut_by(k, cell)); once++) {
             let found = corner_distances(cell);
             let is_nearer_low = lower_sums(found) < lower_sums(corners);

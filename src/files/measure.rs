@@ -24,11 +24,13 @@ pub enum Measure {
     Hydrostatic,
     /// A vortex in the x-y plane of a closed box full of water, without gravity.
     TaylorGreen,
+    /// A body in water: the first of the scene, with the elevation probes where it floats.
+    Body,
 }
 
 impl Measure {
     /// All measures with the names used in studies.
-    pub(super) const NAMED: [(&'static str, Self); 10] = [
+    pub(super) const NAMED: [(&'static str, Self); 11] = [
         ("regular_waves", Self::RegularWaves),
         ("waves_by_theory", Self::WavesByTheory),
         ("solitary_wave", Self::SolitaryWave),
@@ -39,6 +41,7 @@ impl Measure {
         ("standing_wave", Self::StandingWave),
         ("hydrostatic", Self::Hydrostatic),
         ("taylor_green", Self::TaylorGreen),
+        ("body", Self::Body),
     ];
 
     /// Returns the names of the inputs that it needs.
@@ -54,6 +57,7 @@ impl Measure {
             Self::StandingWave => &["depth", "length", "height"],
             Self::Hydrostatic => &["depth", "after"],
             Self::TaylorGreen => &["length", "speed"],
+            Self::Body => &["after"],
         }
     }
 
@@ -198,6 +202,31 @@ impl Measure {
                 "decay of the energy over that of PIC and of the projection, α \
                  Δx² / (6 Δt) + U² Δt / 8",
             )],
+            Self::Body => &[
+                (
+                    "draft",
+                    "its lowest point below the water at the probes, mean of time, m",
+                ),
+                ("heave_period", "period of its centre's height, s"),
+                (
+                    "heave_left",
+                    "its first maximum after the start over its height there, from the mean of \
+                     time",
+                ),
+                ("roll_period", "period of its roll about z, s"),
+                (
+                    "acceleration",
+                    "acceleration upward in the first frame, m/s²",
+                ),
+                (
+                    "speed_left",
+                    "speed along x after the first frame over that of the start",
+                ),
+                (
+                    "momentum_error",
+                    "momentum of water and bodies, most that it is off that of the start, of it",
+                ),
+            ],
         }
     }
 
@@ -245,6 +274,13 @@ impl Measure {
             )],
             Self::Hydrostatic => &[("pressure", ["pressure", "depth, m", "p / (ρ g depth)"])],
             Self::TaylorGreen => &[("energy", ["energy", "time, turns", "of the start's"])],
+            Self::Body => &[
+                (
+                    "heave",
+                    ["height of the centre", "time, s", "m, from the mean"],
+                ),
+                ("roll", ["roll about z", "time, s", "rad, from the mean"]),
+            ],
         }
     }
 }

@@ -229,9 +229,15 @@ impl Scene {
         self.bodies().map(|it| it.body.at_start()).collect()
     }
 
-    /// Bounds the speed of the bodies' points, m/s.
+    /// Bounds the speed of the points of bodies, m/s. Bodies that are wholly outside the domain, where
+    /// they meet nothing, do not count.
     pub fn fastest_body(&self, bodies: &[BodyState]) -> f64 {
-        self.bodies().map(|it| it.speed(bodies)).fold(0.0, f64::max)
+        let is_inside = |it: &&FreeBody| {
+            let centre = it.state(bodies).centre;
+            self.domain.grown(it.reach).contains(centre)
+        };
+        let speeds = self.bodies().filter(is_inside).map(|it| it.speed(bodies));
+        speeds.fold(0.0, f64::max)
     }
 
     /// Bounds the speed of wave makers, with what absorbing ones add to their own motion, and of
@@ -245,9 +251,10 @@ impl Scene {
     ) -> f64 {
         let makers = self.makers(absorbers);
         let makers = makers.map(|(maker, absorber)| maker.peak_speed(absorber, t0, t1));
-        let solids = self.moving_solids.iter();
+        let solids = self.moving_solids.iter().filter(|it| it.is_prescribed());
         let solids = solids.map(|solid| solid.peak_speed(bodies, t0, t1));
-        makers.chain(solids).fold(0.0, f64::max)
+        let fastest = self.fastest_body(bodies);
+        makers.chain(solids).fold(fastest, f64::max)
     }
 }
 

@@ -218,13 +218,9 @@ impl PbfScene<'_> {
         let pbf = self.settings();
         let length = self.shot.frame_seconds();
         let start = f64::from(frame) * length;
-        let wall = self
-            .makers(absorbers)
-            .map(|(maker, absorber)| maker.peak_speed(absorber, start, start + length));
         let gained = self.water.gravity.length() * length + self.effects.push().gained(length);
-        let solids = self.moving_solids.iter();
-        let solids = solids.map(|solid| solid.peak_speed(bodies, start, start + length));
-        let speed = wall.chain(solids).fold(speed + gained, f64::max);
+        let solids = self.peak_boundary_speed(absorbers, bodies, start, start + length);
+        let speed = solids.max(speed + gained);
         let wanted = (speed * length / (pbf.cfl * pbf.particle_spacing))
             .max(length / self.effects.longest_step(self.grain()).0);
         let of_waves = match pbf.grid_projection {

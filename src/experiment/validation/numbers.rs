@@ -10,7 +10,7 @@ use swell_scene::{Scene, WaveMaker};
 use swell_study::waves;
 
 use super::{
-    BenchmarkMeasurements,
+    BenchmarkMeasurements, body,
     record::{FrameRecord, Record},
 };
 
@@ -38,7 +38,7 @@ const DRY_BED: [f64; 2] = [4.0, 8.0];
 /// Largest number of points of a stored curve.
 const CURVE: usize = 400;
 
-type Curve = Vec<(f64, f64)>;
+pub(super) type Curve = Vec<(f64, f64)>;
 
 pub(super) fn of(record: &Record<'_>) -> BenchmarkMeasurements {
     let mut out = BenchmarkMeasurements::default();
@@ -53,6 +53,7 @@ pub(super) fn of(record: &Record<'_>) -> BenchmarkMeasurements {
         Measure::StandingWave => standing_wave(record, &mut out),
         Measure::Hydrostatic => hydrostatic(record, &mut out),
         Measure::TaylorGreen => taylor_green(record, &mut out),
+        Measure::Body => body::of(record, &mut out),
     }
     out.numbers.retain(|_, value| value.is_finite());
     for curve in out.curves.values_mut() {
@@ -64,13 +65,13 @@ pub(super) fn of(record: &Record<'_>) -> BenchmarkMeasurements {
 }
 
 impl BenchmarkMeasurements {
-    fn put(&mut self, name: &str, value: Option<f64>) {
+    pub(super) fn put(&mut self, name: &str, value: Option<f64>) {
         if let Some(value) = value {
             self.numbers.insert(name.to_owned(), value);
         }
     }
 
-    fn draw(&mut self, name: &str, curve: Curve) {
+    pub(super) fn draw(&mut self, name: &str, curve: Curve) {
         self.curves.insert(name.to_owned(), curve);
     }
 }
@@ -87,7 +88,7 @@ fn level(record: &Record<'_>, gauge: usize) -> Curve {
     over_time(&record.rows, |row| *row.levels.get(gauge)?)
 }
 
-fn mean(values: impl IntoIterator<Item = f64>) -> Option<f64> {
+pub(super) fn mean(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     let (sum, count) = values
         .into_iter()
         .fold((0.0, 0), |(sum, n), v| (sum + v, n + 1));

@@ -1,9 +1,10 @@
 //! Data of each frame that a benchmark needs.
 
-use glam::{DVec2, Vec3};
+use glam::{DVec2, DVec3, Vec3};
 
 use swell_cache::ProbeValues;
 use swell_domain::{
+    body::BodyState,
     particles::Particles,
     probe::{elevation, front, run_up, volume as volume_of},
 };
@@ -36,6 +37,8 @@ pub(super) struct FrameRecord {
     pub(super) run_up: Option<f64>,
     /// Values that the measure takes from the particles.
     pub(super) of_water: Vec<f64>,
+    /// States of the bodies.
+    pub(super) bodies: Vec<BodyState>,
 }
 
 /// Data of all frames of a run.
@@ -60,6 +63,7 @@ impl<'a> Record<'a> {
             levels: record.levels(start),
             pressures: vec![None; scene.pressure_points().len()],
             of_water: record.of_water(start),
+            bodies: start.bodies.clone(),
             ..FrameRecord::default()
         };
         record.rows.push(row);
@@ -77,6 +81,7 @@ impl<'a> Record<'a> {
             force: self.force(&step.looks),
             run_up: self.run_up(&step.particles),
             of_water: self.of_water(&step.particles),
+            bodies: step.particles.bodies.clone(),
         });
     }
 
@@ -182,6 +187,14 @@ impl<'a> Record<'a> {
             Measure::TaylorGreen => {
                 let square = |v: &[f32; 3]| v.iter().map(|v| f64::from(*v).powi(2)).sum::<f64>();
                 vec![particles.velocity.iter().map(square).sum()]
+            }
+            // The momentum of the water, kg m/s.
+            Measure::Body => {
+                let all = particles.velocity.iter();
+                let sum: DVec3 = all.map(|v| Vec3::from_array(*v).as_dvec3()).sum();
+                (self.scene.water.rest_density * volume * sum)
+                    .to_array()
+                    .into()
             }
             _ => Vec::new(),
         }

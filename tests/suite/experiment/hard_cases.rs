@@ -169,6 +169,14 @@ cases! {
     case_37_short_steps: 37,
     case_38_falling_slab: 38,
     case_39_onto_a_roof: 39,
+    case_40_light_and_heavy_bodies: 40,
+    case_41_a_plank_on_posts: 41,
+    case_42_pressed_bodies: 42,
+    case_43_a_body_on_the_floor: 43,
+    case_44_bodies_that_leave: 44,
+    case_45_ten_crates: 45,
+    case_46_two_hundred_bodies: 46,
+    case_47_a_raft_beside_a_wall: 47,
 }
 
 /// FLIP at rest, its surface on cell centres, where it divides by what is nearly 0, and a particle

@@ -22,7 +22,7 @@ use swell::{
         validation::{Benchmark, Measure, Validation},
     },
     gpu::adapter::Context,
-    scene::probe::ProbeKind,
+    scene::{Scene, probe::ProbeKind},
     stage::device::Opened,
 };
 
@@ -141,12 +141,44 @@ benchmarks! {
     a_standing_wave_has_its_period: "standing wave",
     a_column_at_rest_weighs_what_it_weighs: "column at rest",
     a_vortex_turns_on: "Taylor–Green vortex",
+    a_heavy_ball_begins_to_sink_with_its_added_mass: "ball of 7000 kg/m³ released under water",
+    a_ball_shares_its_momentum_with_its_added_mass: "ball as heavy as water, set in motion",
+    a_raft_rolls_with_its_added_inertia: "roll of a raft",
 }
 
 /// Returns a benchmark's text with one passage replaced.
 fn spoiled(from: &str, to: &str) -> String {
     assert!(COARSE.contains(from), "{from}");
     COARSE.replace(from, to)
+}
+
+/// Negative controls: without the part of the pressure solve in which a body gives way, and with the
+/// moment about z left out.
+#[test]
+fn bodies_that_the_pressure_moves_wrongly_fail_benchmarks() {
+    for (pass, from, to, name, of) in [
+        (
+            "pressure/couple",
+            "let added = select(0.0, body_flux",
+            "let added = 0.0 * select(0.0, body_flux",
+            "ball as heavy as water, set in motion",
+            "speed_left",
+        ),
+        (
+            "flip/couple_bodies",
+            "let way = cross(arm, area)",
+            "let way = vec3f(1.0, 1.0, 0.0) * cross(arm, area)",
+            "roll of a raft",
+            "roll_period",
+        ),
+    ] {
+        let context = crate::support::device::spoiled(pass, from, to);
+        let mut benchmark = benchmark(&COARSE, name);
+        benchmark.runs.truncate(1);
+        let missed = missed(&context, &benchmark);
+        assert_eq!(missed.len(), 1, "{name}: {missed:?}");
+        assert!(missed[0].starts_with(of), "{missed:?}");
+    }
 }
 
 /// Negative control: 1 % more or less gravity is 1 % more or less pressure.
@@ -263,6 +295,17 @@ fn flap_height_ratio(kh: f64) -> f64 {
 }
 
 /// Published values that theory gives are those of its formulas at 9.81 m/s², in both studies.
+/// What potential flow without walls, and Archimedes, say of a scene's first body.
+fn of_body(scene: &Scene, of: &str) -> Option<f64> {
+    let density = scene.bodies().next()?.given.density? / 1000.0;
+    match of {
+        "acceleration" => Some((1.0 - density) * 9.81 / (density + 0.5)),
+        "speed_left" => Some(density / (density + 0.5)),
+        "draft" => Some(0.2 * density),
+        _ => None,
+    }
+}
+
 #[test]
 fn published_numbers_are_those_of_theory() {
     let text = fs::read_to_string(studies().join("validation.toml")).unwrap();
@@ -300,6 +343,7 @@ fn published_numbers_are_those_of_theory() {
                 (Measure::SolitaryWave, "height") => scale.height / scale.depth,
                 (Measure::DryBed, "depth_at_dam") => 4.0 / 9.0,
                 (Measure::DryBed, "flow_at_dam") => 8.0 / 27.0,
+                (Measure::Body, of) => return of_body(scene, of),
                 (Measure::StandingWave, "period") => {
                     let k = TAU / scale.length;
                     TAU / (9.81 * k * (k * scale.depth).tanh()).sqrt()
