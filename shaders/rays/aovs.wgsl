@@ -8,6 +8,9 @@
 #ifdef SPRAY
 #import "shared/ssfr_spray_read.wgsl"
 #endif
+#ifdef CARRIED
+#import "shared/ssfr_carried.wgsl"
+#endif
 
 @group(0) @binding(0) var<uniform> camera: Camera;
 @group(0) @binding(1) var<uniform> next_camera: Camera;
@@ -25,6 +28,10 @@
 #ifdef SPRAY
 @group(0) @binding(11) var<storage, read> spray: array<u32>;
 @group(0) @binding(12) var<uniform> spray_params: SprayParams;
+#endif
+
+#ifdef CARRIED
+@group(0) @binding(15) var<uniform> carried: array<Carried, 256>;
 #endif
 
 #ifdef SEA
@@ -78,6 +85,11 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let position = camera.position + direction * found.t;
     let normal = select(found.normal, -found.normal, dot(found.normal, direction) > 0.0);
     var moved = position;
+#ifdef CARRIED
+    if found.kind == OPAQUE {
+        moved = carried_to_next(found.material, position);
+    }
+#endif
 #ifdef SEA
     let is_beyond = is_sea(position.xz);
     if found.kind == WATER && is_beyond {

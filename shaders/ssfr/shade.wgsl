@@ -20,7 +20,10 @@
 #endif
 #endif
 #ifndef DRY
-#import "shared/ssfr_slope.wgsl"
+#import "shared/ssfr_sheet.wgsl"
+#endif
+#ifdef CARRIED
+#import "shared/ssfr_carried.wgsl"
 #endif
 #ifdef SPRAY
 #import "shared/ssfr_spray_read.wgsl"
@@ -64,6 +67,10 @@
 #ifdef SPRAY
 @group(0) @binding(15) var<storage, read> spray: array<u32>;
 @group(0) @binding(16) var<uniform> spray_params: SprayParams;
+#endif
+
+#ifdef CARRIED
+@group(0) @binding(24) var<uniform> carried: array<Carried, 256>;
 #endif
 
 #ifdef SEA
@@ -222,27 +229,6 @@ fn behind_radiance(found: Behind, direction: vec3f, light: vec3f) -> vec3f {
     }
     return mix(air, light, air_between(found.far));
 }
-
-#ifndef DRY
-// Pixel at which the line of sight through a sheet of water meets what is behind it. A thin prism
-// deflects light by n − 1 times its angle (Born and Wolf, Principles of Optics, 4.7.2), which is
-// the slope of the thickness. Where the result is in front of the sheet, the ray continues
-// straight.
-fn through_sheet(pixel: vec2i, z: f32, straight: Behind) -> vec2i {
-    let p = vec2f(pixel) + 0.5;
-    let h = spacing_in_pixels(z);
-    let a = thickness_at(p + vec2f(h, h));
-    let b = thickness_at(p + vec2f(h, -h));
-    let c = thickness_at(p + vec2f(-h, h));
-    let d = thickness_at(p - vec2f(h, h));
-    let slope = slope_between(a, b, c, d, h, z);
-    let steep = max(length(slope), 1e-6);
-    let turn = tan((shading.index - 1.0) * atan(steep)) * (1.0 - z / straight.depth);
-    let aside = vec2i(floor(0.5 + slope / steep * turn * camera.focal));
-    let bent = clamp(pixel + aside, vec2i(0), vec2i(camera.size) - 1);
-    return select(bent, pixel, solid_depth[u32(bent.y) * camera.size.x + u32(bent.x)] < z);
-}
-#endif
 
 // Opaque points that a pixel may need: behind the water, in it, and in its reflection.
 const BACKDROP: u32 = 1u;
@@ -474,7 +460,13 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     }
     let seen = straight.depth < 0.1 * FAR;
     let surface = surface_of(straight.seen);
-    let next = select(sky_in_next(direction), eye_from_world(next_camera, surface.position), seen);
+    var place = surface.position;
+#ifdef CARRIED
+    if seen && straight.seen.at != NO_SOLID {
+        place = carried_to_next(solid_code(at), place);
+    }
+#endif
+    let next = select(sky_in_next(direction), eye_from_world(next_camera, place), seen);
     let motion = motion_to(next, pixel);
     let normal = select(vec3f(0.0), surface.normal, seen);
     store_under(over, out, straight.depth, normal, surface.position, motion, through);

@@ -4,6 +4,8 @@
 //! Velocities and impulses of a body have six components, three of the centre of mass and three
 //! about it, along the axes of the scene: a [`Six`].
 
+mod path;
+
 use glam::{DMat3, DQuat, DVec3};
 use serde::{Deserialize, Serialize};
 

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use super::{error::GpuError, shader};
 
 /// Combinations of conditions that a plan can set; every pass must compose under each.
-const VARIANTS: [&[&str]; 76] = [
+const VARIANTS: [&[&str]; 78] = [
     &[],
     &["SOLIDS"],
     &["NEIGHBOR_LIST"],
@@ -110,6 +110,8 @@ const VARIANTS: [&[&str]; 76] = [
     &["MATERIALS", "PALETTE", "SEA", "SPRAY", "LIGHTS"],
     &["MATERIALS", "SEA", "SPRAY", "OBJECTS"],
     &["MATERIALS", "SEA", "SPRAY", "AOVS", "FORWARD"],
+    &["AOVS", "CARRIED"],
+    &["MATERIALS", "SEA", "SPRAY", "AOVS", "FORWARD", "CARRIED"],
     &["VOLUME"],
     &["VOLUME", "LIGHTS", "HOLDOUT"],
     &["MATERIALS", "SEA", "PALETTE", "VOLUME", "LIGHTS"],

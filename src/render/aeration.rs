@@ -425,6 +425,7 @@ mod tests {
             frames_per_second: 24.0,
             gravity,
             wave_makers: Vec::new(),
+            moving: Vec::new(),
             waves: None,
         };
         // 80 particles of 0.125 m³ fill a quarter of 40 m³: half a metre of 2 m, 1 m of 4 m.

@@ -1,9 +1,9 @@
 //! GPU buffers of the renderer.
 
 use super::uniform::{
-    Band, Block, Camera, Caustics, Cloud, Fill, Flow, FlowLevel, Material, Narrow, Page, Particle,
-    Path, Rays, Sea, SetNode, Shading, Shape, SprayParams, Thickness, Tile, Triangle, Whitewater,
-    WhitewaterParams,
+    Band, Block, Camera, Carried, Caustics, Cloud, Fill, Flow, FlowLevel, Material, Narrow, Page,
+    Particle, Path, Rays, Sea, SetNode, Shading, Shape, SprayParams, Thickness, Tile, Triangle,
+    Whitewater, WhitewaterParams,
 };
 use swell_gpu::buffer::{Buf, Windows, Workgroups};
 
@@ -26,6 +26,8 @@ pub(super) const SHADOW_FROM_WORLD: Buf<[[f32; 4]; 4]> = Buf::uniform("shadow_fr
 
 /// Triangles of opaque geometry.
 pub(super) const TRIANGLES: Buf<Triangle> = Buf::new("triangles");
+/// Motion of solids and wave makers to the next frame.
+pub(super) const CARRIED: Buf<Carried> = Buf::uniform("carried");
 /// Corner and size of each tile in which solids are rasterised.
 pub(super) const TILES: Windows<Tile> = Windows::new("tile", "tiles");
 /// Depth of solids for each pixel of the padded frame.

@@ -23,6 +23,7 @@ mod in_frame;
 mod inputs;
 mod lighting;
 mod materials;
+mod moving;
 mod neighbors;
 mod opaque;
 mod paths;
@@ -54,6 +55,7 @@ use swell_scene::Wall;
 pub use camera::{eye, lens};
 pub use image::{Attributes, Image};
 pub use inputs::{FrameInputs, REACH, WaterParticles, frames_around};
+pub use moving::{Mover, PosePath, SetMotion};
 pub use opaque::opaque;
 pub use plan::{Limits, Plan, Runs};
 pub use renderer::{Part, Renderer};
@@ -78,6 +80,9 @@ pub struct RenderScene {
     pub gravity: DVec3,
     /// Wave-making walls, with the distance of each inward from the domain's side, metres.
     pub wave_makers: Vec<(Wall, f64)>,
+    /// Solids and wave makers that move: with an open shutter each sample shows them at its
+    /// instant, and motion vectors lead to the next frame. What is not listed rests.
+    pub moving: Vec<SetMotion>,
     /// Waves that enter from the open sea.
     pub waves: Option<OpenWaves>,
 }
@@ -98,6 +103,11 @@ impl RenderScene {
     fn extent(&self) -> f64 {
         let size = self.domain.size();
         size.x.max(size.z)
+    }
+
+    /// Index in `moving` of what moves a part of the opaque geometry.
+    fn motion_of(&self, mover: Mover) -> Option<usize> {
+        self.moving.iter().position(|motion| motion.mover == mover)
     }
 }
 

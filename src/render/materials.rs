@@ -194,6 +194,11 @@ impl<'a> Painter<'a> {
         place
     }
 
+    /// Number of texture mappings so far.
+    pub(super) fn place_count(&self) -> usize {
+        self.painted.places.len()
+    }
+
     fn record(&mut self, lie: Triangle) -> u32 {
         let places = &mut self.painted.places;
         places.push(lie);
@@ -249,6 +254,11 @@ impl<'a> Painter<'a> {
 }
 
 impl SolidPainter<'_, '_> {
+    /// Number of texture mappings so far, of all solids.
+    pub(super) fn place_count(&self) -> usize {
+        self.painter.place_count()
+    }
+
     /// Material and mapping of triangle `k`, whose corners are in metres from the domain's least
     /// corner; zeros where it has the look's colour.
     pub(super) fn paint(&mut self, k: usize, corners: [DVec3; 3]) -> Result<[u32; 2], RenderError> {

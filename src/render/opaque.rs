@@ -9,10 +9,11 @@ use super::{
     RenderError, RenderScene,
     cryptomatte::{MOST_SOLIDS, PALETTE, SOLIDS},
     materials::{Painted, Painter},
+    moving::{Mover, is_blurred},
     uniform::Triangle,
 };
 use swell_domain::mesh::TriangleMesh;
-use swell_scene::look::{BasinSpec, Look};
+use swell_scene::look::{AovSpec, BasinSpec, Look};
 
 /// Material codes of a triangle, as in ssfr_solid.wgsl: a solid in the look's colour, a wall at 1.1
 /// times the ground's colour; from [`SOLIDS`] on individual solids, from [`PALETTE`] on the
@@ -36,6 +37,13 @@ pub(super) struct Opaque {
     pub(super) palette: Vec<[f32; 4]>,
     /// Materials and texture mappings of solids.
     pub(super) painted: Painted,
+    /// For each triangle, 0 or the number of its motion among [`RenderScene::moving`], from 1;
+    /// empty where nothing moves within the shutter.
+    pub(super) movers: Vec<u32>,
+    /// The same for each texture mapping.
+    pub(super) place_movers: Vec<u32>,
+    /// Material code of each motion, by which motion vectors know it.
+    pub(super) codes: Vec<u32>,
 }
 
 impl Opaque {
@@ -43,7 +51,8 @@ impl Opaque {
     pub(super) fn new(look: &Look, scene: &RenderScene) -> Result<Self, RenderError> {
         let mut opaque = Self::default();
         let mut painter = Painter::new(look, scene)?;
-        opaque.add_solids(scene, look.spec().output.cryptomatte, painter.as_mut())?;
+        opaque.codes = vec![0; scene.moving.len()];
+        opaque.add_solids(look, scene, painter.as_mut())?;
         let size = scene.domain.size();
         if let Some(basin) = &look.spec().basin {
             let material = match basin.colour {
@@ -62,8 +71,18 @@ impl Opaque {
             }
         }
         if let Some(plates) = &look.spec().wave_makers {
-            let material = opaque.material(plates.colour, false)?;
-            for &(wall, inward) in &scene.wave_makers {
+            let plain = opaque.material(plates.colour, false)?;
+            for (index, &(wall, inward)) in scene.wave_makers.iter().enumerate() {
+                let motion = scene.motion_of(Mover::WaveMaker(index));
+                let material = match motion {
+                    // One of its own, for motion vectors.
+                    Some(motion) if look.wants(AovSpec::Forward) => {
+                        opaque.codes[motion] = opaque.own_material(plates.colour)?;
+                        opaque.codes[motion]
+                    }
+                    _ => plain,
+                };
+                let first = opaque.triangles.len();
                 let (mut low, mut high) = (DVec3::ZERO, size);
                 high.y = plates.height_m;
                 let face = match wall.is_max {
@@ -76,11 +95,18 @@ impl Opaque {
                 };
                 (low[wall.axis], high[wall.axis]) = (face.min(back), face.max(back));
                 opaque.add_box(low, high, material);
+                opaque.moves_from(first, motion);
             }
         }
         if let Some(painter) = painter {
             opaque.painted = painter.end()?;
         }
+        match is_blurred(look, scene) {
+            true => opaque.movers.resize(opaque.triangles.len(), 0),
+            false => opaque.movers.clear(),
+        }
+        let places = opaque.painted.places.len();
+        opaque.place_movers.resize(places, 0);
         Ok(opaque)
     }
 
@@ -97,12 +123,32 @@ impl Opaque {
         places
     }
 
+    /// Notes that the triangles from `first` on have a motion.
+    fn moves_from(&mut self, first: usize, motion: Option<usize>) {
+        if let Some(motion) = motion {
+            self.movers.resize(first, 0);
+            self.movers.resize(self.triangles.len(), number(motion));
+        }
+    }
+
     fn add_solids(
         &mut self,
+        look: &Look,
         scene: &RenderScene,
-        tells_apart: bool,
         mut painter: Option<&mut Painter<'_>>,
     ) -> Result<(), RenderError> {
+        let tells_apart = look.spec().output.cryptomatte;
+        let tells_moving = tells_apart || look.wants(AovSpec::Forward);
+        let mut seen_moving = 0;
+        let moving = scene.moving.iter();
+        let moving = moving.filter(|motion| matches!(motion.mover, Mover::Solid(_)));
+        let moving = moving.count();
+        if !tells_apart && tells_moving && moving > MOST_SOLIDS {
+            return Err(RenderError::Scene(format!(
+                "motion vectors (forward in output.aovs) distinguish at most {MOST_SOLIDS} solids \
+                 that move, and the scene has {moving}"
+            )));
+        }
         if tells_apart && scene.solids.len() > MOST_SOLIDS {
             return Err(RenderError::Scene(format!(
                 "output.cryptomatte distinguishes at most {MOST_SOLIDS} solids, and the scene has \
@@ -112,7 +158,22 @@ impl Opaque {
         }
         let origin = scene.domain.min;
         for (index, (code, mesh)) in (SOLIDS..).zip(&scene.solids).enumerate() {
-            let material = if tells_apart { code } else { SOLID };
+            let motion = scene.motion_of(Mover::Solid(index));
+            let material = match motion {
+                _ if tells_apart => code,
+                Some(_) if tells_moving => {
+                    seen_moving += 1;
+                    SOLIDS + seen_moving - 1
+                }
+                _ => SOLID,
+            };
+            if let Some(motion) = motion {
+                self.codes[motion] = material;
+            }
+            let (first, first_place) = (
+                self.triangles.len(),
+                painter.as_ref().map_or(0, |painter| painter.place_count()),
+            );
             let mut painter = match &mut painter {
                 Some(painter) => Some(painter.solid(index)?),
                 None => None,
@@ -137,25 +198,40 @@ impl Opaque {
                     self.push(points, material, paint);
                 }
             }
+            self.moves_from(first, motion);
+            if let (Some(motion), Some(painter)) = (motion, painter) {
+                self.place_movers.resize(first_place, 0);
+                self.place_movers
+                    .resize(painter.place_count(), number(motion));
+            }
         }
         Ok(())
+    }
+
+    /// Returns the code of a colour that nothing else has.
+    fn own_material(&mut self, colour: [f64; 3]) -> Result<u32, RenderError> {
+        let [r, g, b] = colour.map(|c| c as f32);
+        self.add_material([r, g, b, 0.0])
     }
 
     /// Returns the code of a colour; adds it to the palette if needed.
     fn material(&mut self, colour: [f64; 3], has_windows: bool) -> Result<u32, RenderError> {
         let [r, g, b] = colour.map(|c| c as f32);
         let entry = [r, g, b, f32::from(u8::from(has_windows))];
-        let found = self.palette.iter().position(|it| *it == entry);
-        let index = found.unwrap_or(self.palette.len());
-        if index == MOST_COLOURS {
+        match self.palette.iter().position(|it| *it == entry) {
+            Some(index) => Ok(PALETTE + index as u32),
+            None => self.add_material(entry),
+        }
+    }
+
+    fn add_material(&mut self, entry: [f32; 4]) -> Result<u32, RenderError> {
+        if self.palette.len() == MOST_COLOURS {
             return Err(RenderError::Scene(format!(
                 "more than {MOST_COLOURS} colours of solids, walls and wave makers"
             )));
         }
-        if found.is_none() {
-            self.palette.push(entry);
-        }
-        Ok(PALETTE + index as u32)
+        self.palette.push(entry);
+        Ok(PALETTE + self.palette.len() as u32 - 1)
     }
 
     fn push(&mut self, corners: [DVec3; 3], material: u32, [paint, place]: [u32; 2]) {
@@ -175,6 +251,11 @@ impl Opaque {
             self.push(corners, material, [0; 2]);
         }
     }
+}
+
+/// Number of a motion in [`Opaque::movers`].
+fn number(motion: usize) -> u32 {
+    motion as u32 + 1
 }
 
 /// Returns all opaque geometry of a look and a scene, except the ground, as one mesh in metres from

@@ -5,7 +5,9 @@
 
 use std::collections::BTreeMap;
 
-use super::{RenderError, buffers::FILLS, closed::Closed, frame::Extent, uniform::Fill};
+use super::{
+    RenderError, buffers::FILLS, closed::Closed, frame::Extent, moving::MovingSet, uniform::Fill,
+};
 use swell_gpu::{
     adapter::{Context, GpuError},
     bindings::check_bindings,
@@ -83,6 +85,8 @@ pub struct Plan {
     /// Radius of a splat, metres.
     pub(super) radius: f64,
     pub(super) closed: Closed,
+    /// `None` where no opaque geometry moves within the shutter.
+    pub(super) moving: Option<MovingSet>,
     pub(super) defines: BTreeMap<&'static str, Vec<&'static str>>,
     pub(super) constants: BTreeMap<&'static str, Vec<(&'static str, f64)>>,
     pub(super) fills: Vec<Fill>,
@@ -263,8 +267,8 @@ mod tests {
     use glam::DVec3;
 
     use super::*;
-    use crate::RenderScene;
-    use swell_domain::bounds::Bounds;
+    use crate::{Mover, PosePath, RenderScene, SetMotion};
+    use swell_domain::{bounds::Bounds, mesh::TriangleMesh, pose::Pose};
     use swell_files::parse_look;
     use swell_gpu::{
         raster::Draw,
@@ -285,6 +289,20 @@ mod tests {
     }
 
     fn plan_of(image: &str, surface: &str, more: &str) -> Plan {
+        plan_with(Vec::new(), image, surface, more)
+    }
+
+    /// The plan of a triangle with these motions.
+    fn plan_with(moving: Vec<SetMotion>, image: &str, surface: &str, more: &str) -> Plan {
+        let corners = TriangleMesh {
+            vertices: vec![DVec3::ZERO, DVec3::X, DVec3::Y],
+            triangles: vec![[0, 1, 2]],
+        };
+        let solids = if moving.is_empty() {
+            Vec::new()
+        } else {
+            vec![corners]
+        };
         let text = format!(
             "[camera]\nfocal_length_mm = 35.0\nfilm_back_mm = [36.0, 18.0]\n\
              position = [-2.0, 3.0, 2.5]\n\
@@ -300,12 +318,13 @@ mod tests {
                 min: DVec3::ZERO,
                 max: DVec3::ONE,
             },
-            solids: Vec::new(),
+            solids,
             parts: Vec::new(),
             particle_spacing: 0.1,
             frames_per_second: 24.0,
             gravity: DVec3::ZERO,
             wave_makers: Vec::new(),
+            moving,
             waves: None,
         };
         Plan::new(&look, &scene, &LIMITS).unwrap()
@@ -398,6 +417,53 @@ mod tests {
             };
             assert_eq!(conditions(pass, method, more), [true; 2], "{pass}");
             assert_eq!(conditions(pass, method, ""), [false; 2], "{pass}");
+        }
+    }
+
+    fn slides(metres_per_second: f64) -> Vec<SetMotion> {
+        let pose = move |t: f64| Pose {
+            centre: metres_per_second * t * DVec3::X,
+            ..Pose::START
+        };
+        vec![SetMotion {
+            mover: Mover::Solid(0),
+            path: PosePath::new(pose),
+        }]
+    }
+
+    /// What a look takes of the device: its commands and buffers.
+    fn taken(plan: &Plan) -> String {
+        format!("{:?} {:?} {:?}", plan.passes(), plan.buffers, plan.defines)
+    }
+
+    #[test]
+    fn motion_costs_something_only_where_it_is_shown() {
+        const ONCE: &str = "shutter = 0.5\nsamples = 1\n";
+        const OPEN: &str = "shutter = 0.5\nsamples = 4\n";
+        const FORWARD: &str = "[output]\nformats = [\"exr\"]\naovs = [\"forward\"]\n";
+        for method in ["", "[renderer]\nmethod = \"ray\"\n"] {
+            let of = |moving, image: &str, more: &str| {
+                let plan = plan_with(moving, image, "narrow_range", &format!("{method}{more}"));
+                assert_eq!(used(&plan), planned(&plan), "{method} {image} {more}");
+                plan
+            };
+            let shadows = |plan: &Plan| {
+                let runs = plan.passes()["ssfr/shadow"];
+                [runs.once, runs.sample]
+            };
+            for image in ["", ONCE, OPEN] {
+                let rests = of(slides(0.0), image, FORWARD);
+                assert!(rests.moving.is_none() && !rests.has("carried"));
+                assert_eq!(shadows(&rests), [1, 0]);
+                // A shutter without a second instant is as good as closed.
+                let moves = of(slides(1.0), image, "");
+                assert_eq!(moves.moving.is_some(), image == OPEN, "{image}");
+                let same = taken(&moves) == taken(&of(slides(0.0), image, ""));
+                assert_eq!(same, image != OPEN, "{image}");
+            }
+            assert_eq!(shadows(&of(slides(1.0), OPEN, "")), [0, 1]);
+            let vectors = of(slides(1.0), "", FORWARD);
+            assert!(vectors.moving.is_none() && vectors.has("carried"));
         }
     }
 

@@ -9,7 +9,7 @@ use super::{
     paths::Path,
     plan::Plan,
     set::Set,
-    tree::{Tree, tree},
+    tree::{Hierarchy, Tree},
     uniform::Rays,
 };
 use swell_domain::level_set::{
@@ -26,24 +26,26 @@ const QUAYS: u32 = 0b11_0000;
 const GAP: f64 = 0.5;
 
 /// Plans the level set, whose buffer grows with the frames; the lattice of sunlight in it, followed
-/// by `behind` further values; and the hierarchy over opaque geometry.
+/// by `behind` further values; and the hierarchy over opaque geometry. Returns the hierarchy, and
+/// the uniform that has its scale.
 pub(super) fn plan_rays(
     plan: &mut Plan,
     look: &Look,
     scene: &RenderScene,
     set: &Set<'_>,
     behind: usize,
-) {
+) -> (Rays, Hierarchy) {
     let size = scene.domain.size();
     let voxel = voxel(look, scene);
     let bricks = bricks_over(size, voxel);
     let (nodes, pitch) = nodes_over(size, voxel);
+    let hierarchy = Hierarchy::over(set.triangles);
     let Tree {
         low,
         step,
         nodes: boxes,
         mut sorted,
-    } = tree(set.triangles);
+    } = hierarchy.packed(set.triangles);
     let rays = Rays {
         set_low: low,
         set_step: step,
@@ -65,6 +67,7 @@ pub(super) fn plan_rays(
     sorted.extend(set.places);
     plan.values(&SET_NODES, &boxes);
     plan.values(&SET_TRIANGLES, &sorted);
+    (rays, hierarchy)
 }
 
 /// Computes the depth of the first hit of a ray through each pixel of the padded frame: of water

@@ -25,7 +25,11 @@ const SHADOW_DEPTH: f32 = 2.4;
 const SHADOW_SIZE: u32 = 2048;
 
 /// Orthographic projection along the sun's direction that covers solids and the domain.
-pub(super) fn shadow_from_world(triangles: &[Triangle], domain: DVec3, sun: DVec3) -> Mat4 {
+pub(super) fn shadow_from_world(
+    triangles: impl Iterator<Item = Triangle>,
+    domain: DVec3,
+    sun: DVec3,
+) -> Mat4 {
     let forward = -sun.as_vec3();
     let helper = if forward.y.abs() > 0.99 {
         Vec3::X
@@ -51,10 +55,10 @@ pub(super) fn shadow_from_world(triangles: &[Triangle], domain: DVec3, sun: DVec
             pick(2, size.z),
         ));
     }
-    let is_solid = |triangle: &&Triangle| {
+    let is_solid = |triangle: &Triangle| {
         triangle.material == 0 || (SOLIDS..OWN_COLOURS).contains(&triangle.material)
     };
-    for triangle in triangles.iter().filter(is_solid) {
+    for triangle in triangles.filter(is_solid) {
         for p in [triangle.a, triangle.b, triangle.c] {
             take(p.into());
         }
@@ -123,8 +127,9 @@ pub(super) struct Set<'a> {
     pub(super) is_painted: bool,
 }
 
-/// Plans the shadow map and returns the command that draws it once, since solids do not move.
-/// Without opaque geometry the map is a single texel at the far plane.
+/// Plans the shadow map and returns the command that draws it: for each sample where solids move
+/// within the shutter, else once. Without opaque geometry the map is a single texel at the far
+/// plane.
 pub(super) fn plan_shadow(
     plan: &mut Plan,
     set: &Set<'_>,

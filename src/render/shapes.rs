@@ -144,6 +144,7 @@ mod tests {
             frames_per_second: 24.0,
             gravity: DVec3::ZERO,
             wave_makers: Vec::new(),
+            moving: Vec::new(),
             waves: None,
         };
         shapes(&particles, particles.len(), &scene, RADIUS * D)

@@ -26,34 +26,80 @@ pub(super) struct Tree {
     pub(super) sorted: Vec<Triangle>,
 }
 
-/// Builds the hierarchy over triangles.
-pub(super) fn tree(triangles: &[Triangle]) -> Tree {
-    if triangles.is_empty() {
-        return Tree {
-            low: [0.0; 3],
-            step: 1.0,
-            nodes: vec![SetNode::default()],
-            sorted: vec![Triangle::default()],
+/// A hierarchy over triangles, whose boxes can be fitted to triangles that have moved.
+#[derive(Clone, Debug)]
+pub(super) struct Hierarchy {
+    /// Nodes, each before those below it.
+    boxes: Vec<Node>,
+    /// Indices of the triangles, leaf by leaf.
+    entries: Vec<u32>,
+}
+
+impl Hierarchy {
+    /// Builds the hierarchy over triangles.
+    pub(super) fn over(triangles: &[Triangle]) -> Self {
+        let corners = triangles.iter().flat_map(|it| [it.a, it.b, it.c]);
+        let mesh = TriangleMesh {
+            vertices: corners.map(|p| Vec3::from(p).as_dvec3()).collect(),
+            triangles: (0..triangles.len() as u32)
+                .map(|k| [3 * k, 3 * k + 1, 3 * k + 2])
+                .collect(),
         };
+        let tree = Bvh::new(&mesh);
+        Self {
+            boxes: tree.boxes().collect(),
+            entries: tree.entries().to_vec(),
+        }
     }
-    let corners = triangles.iter().flat_map(|it| [it.a, it.b, it.c]);
-    let mesh = TriangleMesh {
-        vertices: corners.map(|p| Vec3::from(p).as_dvec3()).collect(),
-        triangles: (0..triangles.len() as u32)
-            .map(|k| [3 * k, 3 * k + 1, 3 * k + 2])
-            .collect(),
-    };
-    let tree = Bvh::new(&mesh);
-    let boxes: Vec<_> = tree.boxes().collect();
-    let lattice = Lattice::over(boxes[0].0);
-    Tree {
-        low: lattice.low.to_array(),
-        step: lattice.step,
-        nodes: pairs(&boxes, &lattice),
-        sorted: (tree.entries().iter())
-            .map(|&k| triangles[k as usize])
-            .collect(),
+
+    /// Fits the boxes to the triangles' present corners. The nodes keep what they contain, so
+    /// triangles that have moved far make large boxes.
+    pub(super) fn fit(&mut self, triangles: &[Triangle]) {
+        for at in (0..self.boxes.len()).rev() {
+            let (_, next, count) = self.boxes[at];
+            self.boxes[at].0 = match count {
+                0 => join(self.boxes[at + 1].0, self.boxes[next as usize].0),
+                _ => {
+                    let entries = &self.entries[next as usize..(next + count) as usize];
+                    let corners = entries.iter().flat_map(|&k| {
+                        let it = &triangles[k as usize];
+                        [it.a, it.b, it.c].map(|p| Vec3::from(p).as_dvec3())
+                    });
+                    corners.map(|p| [p; 2]).fold(NOTHING, join)
+                }
+            };
+        }
     }
+
+    /// Packs the hierarchy for the device; `triangles` are those that it was built over or last
+    /// fitted to.
+    pub(super) fn packed(&self, triangles: &[Triangle]) -> Tree {
+        let Some((whole, ..)) = self.boxes.first() else {
+            return Tree {
+                low: [0.0; 3],
+                step: 1.0,
+                nodes: vec![SetNode::default()],
+                sorted: vec![Triangle::default()],
+            };
+        };
+        let lattice = Lattice::over(*whole);
+        Tree {
+            low: lattice.low.to_array(),
+            step: lattice.step,
+            nodes: pairs(&self.boxes, &lattice),
+            sorted: (self.entries.iter())
+                .map(|&k| triangles[k as usize])
+                .collect(),
+        }
+    }
+}
+
+/// A box around nothing.
+const NOTHING: [DVec3; 2] = [DVec3::INFINITY, DVec3::NEG_INFINITY];
+
+/// Least box around two boxes.
+fn join(a: [DVec3; 2], b: [DVec3; 2]) -> [DVec3; 2] {
+    [a[0].min(b[0]), a[1].max(b[1])]
 }
 
 /// Least and greatest corners of the box; first entry of a leaf, or right child of an inner node,
@@ -197,10 +243,30 @@ mod tests {
         }
     }
 
+    fn tree(triangles: &[Triangle]) -> Tree {
+        Hierarchy::over(triangles).packed(triangles)
+    }
+
+    /// The row with every third triangle moved, some of them past others.
+    fn moved(count: usize) -> Vec<Triangle> {
+        let mut moved = row(count);
+        for it in moved.iter_mut().step_by(3) {
+            for p in [&mut it.a, &mut it.b, &mut it.c] {
+                *p = [p[0] + 20.0, p[1] - 3.0, p[2]];
+            }
+        }
+        moved
+    }
+
     #[test]
     fn every_triangle_is_in_the_boxes_on_the_way_to_it() {
-        for count in [1, 2, 4, 5, 9, 100] {
-            let tree = tree(&row(count));
+        let fitted = |count| {
+            let mut hierarchy = Hierarchy::over(&row(count));
+            hierarchy.fit(&moved(count));
+            hierarchy.packed(&moved(count))
+        };
+        let counts = [1, 2, 4, 5, 9, 100].into_iter();
+        for (count, tree) in counts.flat_map(|n| [(n, tree(&row(n))), (n, fitted(n))]) {
             let mut seen = Vec::new();
             holds(&tree, 0, &[], &mut seen);
             seen.sort_unstable();
@@ -210,6 +276,14 @@ mod tests {
                 "{count}: {seen:?}"
             );
         }
+    }
+
+    /// Control of the test above.
+    #[test]
+    #[should_panic(expected = " in ")]
+    fn boxes_that_were_not_fitted_are_seen() {
+        let tree = Hierarchy::over(&row(9)).packed(&moved(9));
+        holds(&tree, 0, &[], &mut Vec::new());
     }
 
     #[test]

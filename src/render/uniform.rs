@@ -270,6 +270,15 @@ mirror!(
 );
 
 mirror!(
+    /// `Carried` of shared/ssfr_carried.wgsl.
+    Carried {
+        x: [f32; 4],
+        y: [f32; 4],
+        z: [f32; 4],
+    }
+);
+
+mirror!(
     /// `Cloud` of shared/rays_cloud.wgsl.
     Cloud {
         corner: [f32; 3],
@@ -359,5 +368,6 @@ pub fn mirrors() -> Vec<Layout> {
         Sea::layout(),
         Caustics::layout(),
         SetNode::layout(),
+        Carried::layout(),
     ]
 }

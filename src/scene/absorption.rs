@@ -12,7 +12,7 @@ use swell_domain::{
 
 impl WaveMaker {
     /// Returns the inward displacement from the domain's face at time `t`, metres.
-    pub(super) fn displacement(&self, absorber: Option<&AbsorberState>, t: f64) -> f64 {
+    pub fn displacement(&self, absorber: Option<&AbsorberState>, t: f64) -> f64 {
         let off = self.absorbing(absorber).map_or(0.0, |it| it.state(t).0);
         self.room() + self.motion.displacement(t) + off
     }
@@ -45,7 +45,7 @@ impl WaveMaker {
 
 impl Scene {
     /// Returns the wave makers with their states of `absorbers`.
-    pub(super) fn makers<'a>(
+    pub fn makers<'a>(
         &'a self,
         absorbers: &'a AbsorberStates,
     ) -> impl Iterator<Item = (&'a WaveMaker, Option<&'a AbsorberState>)> {

@@ -13,6 +13,7 @@ pub mod probe;
 pub mod projection;
 pub mod rate;
 pub mod solid_grid;
+pub mod solid_path;
 pub mod solid_track;
 pub mod sources;
 pub mod start_waves;

@@ -556,7 +556,7 @@ impl RenderJob<'_> {
         let mut renderer = match self.kept.take() {
             Some(renderer) => renderer,
             None => {
-                let set = render_scene(&self.scene, look, frame, &around.water.particles)?;
+                let set = render_scene(&self.scene, look, frame, &around.state())?;
                 Renderer::new(&self.context, look, &set).map_err(|error| told(error, look))?
             }
         };
@@ -583,8 +583,7 @@ impl RenderJob<'_> {
             let total = self.times.entry(time.pass);
             total.and_modify(|total| total.add(&time)).or_insert(time);
         }
-        // Moving solids are drawn in their pose at the frame's time without motion blur: a renderer
-        // draws its solids only once.
+        // A renderer knows the paths of what moves about one frame.
         let draws_plates = look.spec().wave_makers.is_some() && !self.scene.wave_makers.is_empty();
         let stands = self.scene.moving_solids.is_empty() && !draws_plates;
         self.kept = stands.then_some(renderer);

@@ -4,7 +4,7 @@ use super::{Body, BodyState, Freedom, MassProperties, Mooring, dot};
 use crate::mesh::TriangleMesh;
 
 /// A box of these edges with a corner at `corner`, of outward triangles.
-fn brick(corner: DVec3, edges: DVec3) -> TriangleMesh {
+pub(super) fn brick(corner: DVec3, edges: DVec3) -> TriangleMesh {
     let vertex = |k: usize| {
         let part = DVec3::new((k & 1) as f64, (k >> 1 & 1) as f64, (k >> 2) as f64);
         corner + part * edges
@@ -28,9 +28,9 @@ fn brick(corner: DVec3, edges: DVec3) -> TriangleMesh {
     }
 }
 
-const EDGES: DVec3 = DVec3::new(0.4, 0.2, 0.7);
+pub(super) const EDGES: DVec3 = DVec3::new(0.4, 0.2, 0.7);
 
-fn body(freedom: Freedom) -> Body {
+pub(super) fn body(freedom: Freedom) -> Body {
     Body {
         mass: MassProperties::of_mesh(&brick(DVec3::new(3.0, -1.0, 2.0), EDGES), 500.0),
         velocity: [0.0; 6],

@@ -1,7 +1,7 @@
 //! Builds a plan from a look and a scene.
 
 use super::{
-    shade::{plan_cast, plan_shade, wants_spray_aovs},
+    shade::{plan_carried, plan_cast, plan_shade, wants_spray_aovs},
     splats::{
         plan_body, plan_owner, plan_owner_before_rays, plan_particles, plan_shapes, plan_spray,
         plan_threads,
@@ -16,6 +16,7 @@ use crate::{
     frame::{Extent, bands},
     lighting::{plan_details, plan_light, shading},
     materials::plan_materials,
+    moving::MovingSet,
     opaque::Opaque,
     plan::{Limits, Plan},
     rays::{first, plan_rays},
@@ -70,20 +71,30 @@ impl Plan {
         }
         let mut opaque = Opaque::new(look, scene)?;
         if spec.renderer.method == MethodSpec::Ssfr {
-            plan.closed = Closed::put_first(&mut opaque.triangles);
+            plan.closed = Closed::put_first(&mut opaque.triangles, &mut opaque.movers);
         }
         let places = opaque.placed();
         let Opaque {
             triangles,
             palette,
             painted,
+            movers,
+            place_movers,
+            codes,
         } = opaque;
+        plan.moving = (!movers.is_empty()).then(|| {
+            let (triangles, places) = ((&*triangles, &*movers), (&*places, &*place_movers));
+            MovingSet::new((look, scene), triangles, places)
+        });
         let set = Set {
             triangles: &triangles,
             places: &places,
             is_painted: look.materials().is_some(),
         };
-        let matrix = shadow_from_world(&triangles, scene.domain.size(), look.sun_direction());
+        // One projection for all samples, so that shadows of what rests stay where they are.
+        let swept = plan.moving.iter().flat_map(MovingSet::swept);
+        let cast = triangles.iter().copied().chain(swept);
+        let matrix = shadow_from_world(cast, scene.domain.size(), look.sun_direction());
         let sky = Sky::new(look, limits.texture)?;
         plan_light(&mut plan, &sky);
         let light = shading(look, scene, &sky, matrix.to_cols_array_2d());
@@ -114,10 +125,14 @@ impl Plan {
         plan_materials(&mut plan, look, &painted, painting, limits)?;
         plan_sea(&mut plan, look, scene, shaded);
         let shadow = plan_shadow(&mut plan, &set, &matrix, limits);
-        plan.once.push(shadow);
+        plan_carried(&mut plan, look, scene, &codes);
         match spec.renderer.method {
             MethodSpec::Ssfr => plan_ssfr(&mut plan, look, scene, &set, limits),
             MethodSpec::Ray => plan_ray(&mut plan, look, scene, &set),
+        }
+        match plan.moving {
+            Some(_) => plan.sample.insert(0, shadow),
+            None => plan.once.push(shadow),
         }
         plan_threads(&mut plan, limits);
         plan.end_fills();
@@ -159,7 +174,10 @@ fn plan_ray(plan: &mut Plan, look: &Look, scene: &RenderScene, set: &Set<'_>) {
     // The caustics map follows the lattice of sunlight in one buffer, because the pass has no
     // binding left.
     let behind = map_values(look, scene);
-    plan_rays(plan, look, scene, set, behind);
+    let (rays, hierarchy) = plan_rays(plan, look, scene, set, behind);
+    if let Some(moving) = &mut plan.moving {
+        moving.cast(rays, hierarchy);
+    }
     plan.water = plan_caustics(plan, look, scene);
     let has_drops = look.spec().water.spray.is_some();
     let has_spray = has_drops || look.spec().whitewater.is_some();

@@ -340,6 +340,9 @@ impl Renderer {
         if let Some(sea) = &mut self.sea {
             sea.stand_at(camera, &mut self.program, &self.scene);
         }
+        if let Some(moving) = &mut self.plan.moving {
+            moving.stand_at(camera.seconds, &self.program, &mut self.plan.closed);
+        }
         let (eye, near) = (camera.position.into(), camera.near);
         let camera = &uniform::Camera {
             closed: self.plan.closed.seen_from(eye, near),

@@ -1,7 +1,9 @@
 //! Plans the shading of the picture and of the additional channels.
 
 use crate::{
-    buffers::{BANDS, OWNER, THICKNESS, TRIANGLES, aovs, objects, picture},
+    RenderScene,
+    buffers::{BANDS, CARRIED, OWNER, THICKNESS, TRIANGLES, aovs, objects, picture},
+    moving::carried,
     plan::Plan,
     tiles::{TILE, Tiles},
     uniform::{Band, TileGrid},
@@ -10,7 +12,7 @@ use swell_gpu::{
     buffer::Buf,
     recording::{Bind, Command, Groups},
 };
-use swell_scene::look::{AovSpec, LightSpec, Look, SolidsOutput};
+use swell_scene::look::{AovSpec, LightSpec, Look, MethodSpec, SolidsOutput};
 
 /// Pass over tiles with solids but no water.
 const DRY: &str = "ssfr/shade_dry";
@@ -252,6 +254,18 @@ fn plan_spray_light(plan: &mut Plan, look: &Look, index: usize, grid: TileGrid) 
     let binds = vec![BANDS.bind(index), output, tiles.bind()];
     commands.push(Command::in_groups(WITH_SPRAY, tiles.wet(), binds));
     commands
+}
+
+/// Plans how moving solids and wave makers, of these material codes, move to the next frame.
+pub(super) fn plan_carried(plan: &mut Plan, look: &Look, scene: &RenderScene, codes: &[u32]) {
+    if let Some(all) = carried(look, scene, codes) {
+        plan.values(&CARRIED, &all);
+        let pass = match look.spec().renderer.method {
+            MethodSpec::Ssfr => "ssfr/shade_aovs",
+            MethodSpec::Ray => "rays/aovs",
+        };
+        plan.define(pass, "CARRIED");
+    }
 }
 
 /// Plans the casting of rays.

@@ -152,7 +152,7 @@ impl Framed {
     ) -> Result<Self, RenderJobError> {
         let around = Near::default().around(cache, look, number)?;
         let water = &around.water.particles;
-        let set = render_scene(scene, look, number, water)?;
+        let set = render_scene(scene, look, number, &around.state())?;
         let (seen, _) = truth(look, &set, number, water)?;
         Ok(Self {
             number,

@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeMap, sync::Arc};
 
-use super::pictures::others;
+use super::{pictures::others, set::FrameState};
 use swell_cache::{CacheError, CacheReader};
 use swell_domain::particles::Particles;
 use swell_render::{FrameInputs, REACH, WaterParticles, frames_around};
@@ -60,6 +60,15 @@ impl NearbyFrames {
         Self {
             water: Arc::new(WaterParticles::new(self.water.particles.clone())),
             others: self.others.clone(),
+        }
+    }
+
+    /// The state from which the opaque geometry of the picture is made.
+    pub(super) fn state(&self) -> FrameState<'_> {
+        let [_, before, after, _] = self.others.each_ref();
+        FrameState {
+            now: &self.water.particles,
+            around: [before, after].map(|it| it.as_ref().map(|it| &it.particles)),
         }
     }
 

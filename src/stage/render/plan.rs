@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use glam::DVec3;
 
-use super::{RenderJobError, WhitewaterStream, near::Near, render_scene, told};
+use super::{RenderJobError, WhitewaterStream, near::Near, render_scene, set::FrameState, told};
 use crate::{baked_scene, device::Gpu, prepare::Start};
 use swell_cache::{CacheReader, LedgerEntry};
 use swell_domain::{bounds::Bounds, particles::Particles};
@@ -115,7 +115,7 @@ impl Planned {
             }
             Subject::Scene(scene) => {
                 let start = Start::of(scene)?;
-                let set = render_scene(scene, look, 0, &start.particles)?;
+                let set = render_scene(scene, look, 0, &FrameState::alone(&start.particles))?;
                 let (water, white) = (WaterParticles::new(start.particles), Particles::default());
                 let inputs = FrameInputs::alone(&water, &white);
                 Self::of_frame(look, &set, (0, &inputs), limits)
@@ -130,7 +130,7 @@ impl Planned {
                         .read(frame)?,
                     None => Particles::default(),
                 };
-                let set = render_scene(&scene, look, frame, &around.water.particles)?;
+                let set = render_scene(&scene, look, frame, &around.state())?;
                 let most = cache.entries().iter().map(|entry| entry.particles).max();
                 Ok(Self {
                     particles: most.unwrap_or(0) as usize,
@@ -182,6 +182,7 @@ fn empty() -> RenderScene {
         frames_per_second: 1.0,
         gravity: DVec3::ZERO,
         wave_makers: Vec::new(),
+        moving: Vec::new(),
         waves: None,
     }
 }

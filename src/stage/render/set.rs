@@ -1,15 +1,22 @@
 //! Prepares a scene for the picture of a frame.
 
+use glam::DVec3;
+
 use super::RenderJobError;
 use swell_domain::{
+    absorber::AbsorberStates,
     body::BodyState,
     bounds::Bounds,
     mesh_file::{MeshError, MeshFormat, parts::MeshParts, read_bytes},
     particles::Particles,
     pose::Pose,
 };
-use swell_render::{RenderScene, SolidParts};
-use swell_scene::{PlacedMesh, Scene, Wall, look::Look};
+use swell_render::{Mover, PosePath, RenderScene, SetMotion, SolidParts};
+use swell_scene::{
+    PlacedMesh, Scene, Wall,
+    look::{AovSpec, Look},
+    solid_path::{BodiesAround, SolidPath},
+};
 
 /// The scene at a frame, with the parts that the look needs.
 ///
@@ -20,8 +27,14 @@ pub(super) fn render_scene(
     scene: &Scene,
     look: &Look,
     frame: u32,
-    state: &Particles,
+    state: &FrameState<'_>,
 ) -> Result<RenderScene, RenderJobError> {
+    let FrameState { now: state, around } = state;
+    let bodies = BodiesAround {
+        now: &state.bodies,
+        before: around[0].map(|it| &it.bodies[..]),
+        after: around[1].map(|it| &it.bodies[..]),
+    };
     let time = f64::from(frame) / scene.shot.frames_per_second;
     let moving = scene.moving_solids.iter().map(|solid| {
         let way = solid.pose(&state.bodies, time).affine();
@@ -41,8 +54,63 @@ pub(super) fn render_scene(
         frames_per_second: scene.shot.frames_per_second,
         gravity: scene.water.gravity,
         wave_makers: plates(scene, &scene.walls(&state.walls, time)),
+        moving: moving_parts(scene, look, (bodies, &state.walls), time),
         waves: scene.effects.waves(scene.water.gravity),
     })
+}
+
+/// What the picture of a frame's opaque geometry is made from.
+pub(super) struct FrameState<'a> {
+    /// State of the frame.
+    pub(super) now: &'a Particles,
+    /// States of the frames just before and just after, where they are known.
+    pub(super) around: [Option<&'a Particles>; 2],
+}
+
+impl<'a> FrameState<'a> {
+    /// State of a frame whose neighbours are not known.
+    pub(super) fn alone(now: &'a Particles) -> Self {
+        Self {
+            now,
+            around: [None; 2],
+        }
+    }
+}
+
+/// Motions of solids and wave makers about the frame at `time`; none for a look that shows none.
+fn moving_parts(
+    scene: &Scene,
+    look: &Look,
+    (bodies, absorbers): (BodiesAround<'_>, &AbsorberStates),
+    time: f64,
+) -> Vec<SetMotion> {
+    if look.spec().image.shutter == 0.0 && !look.wants(AovSpec::Forward) {
+        return Vec::new();
+    }
+    let first = scene.solids.len();
+    let solids = scene.moving_solids.iter().enumerate();
+    let solids = solids.map(|(index, solid)| {
+        let path = SolidPath::new(solid, bodies);
+        SetMotion {
+            mover: Mover::Solid(first + index),
+            path: PosePath::new(move |seconds| path.pose(time + seconds)),
+        }
+    });
+    let makers = scene.makers(absorbers).enumerate();
+    let makers = makers.map(|(index, (maker, absorber))| {
+        let (maker, absorber) = (maker.clone(), absorber.copied());
+        let mut inward = DVec3::ZERO;
+        inward[maker.wall.axis] = if maker.wall.is_max { -1.0 } else { 1.0 };
+        let pose = move |seconds| Pose {
+            centre: maker.displacement(absorber.as_ref(), time + seconds) * inward,
+            ..Pose::START
+        };
+        SetMotion {
+            mover: Mover::WaveMaker(index),
+            path: PosePath::new(pose),
+        }
+    });
+    solids.chain(makers).collect()
 }
 
 /// Parts of each solid, read again from its file because a scene keeps only the mesh.

@@ -24,7 +24,7 @@ use swell_reference::rays::{RayHit, cast};
 use swell_render::{RenderError, RenderScene, Renderer, eye, opaque};
 use swell_scene::look::{Look, MethodSpec};
 
-use super::{RenderJobError, near::Near, render_scene, told};
+use super::{RenderJobError, near::Near, render_scene, set::FrameState, told};
 use crate::{baked_scene, device::Gpu};
 use swell_scene::Scene;
 
@@ -176,7 +176,7 @@ pub fn check_render(
         }
         let whole = Instant::now();
         let water = cache.read(frame)?;
-        let set = render_scene(&scene, &request.look, frame, &water)?;
+        let set = render_scene(&scene, &request.look, frame, &FrameState::alone(&water))?;
         let begun = Instant::now();
         let (truth, out) = truth(&request.look, &set, frame, &water)?;
         outcome.truth_seconds += begun.elapsed().as_secs_f64();
@@ -257,7 +257,7 @@ impl Set<'_> {
     /// [`super::render`].
     pub(super) fn draw(&self, look: &Look, frame: u32) -> Result<Picture, RenderJobError> {
         let around = Near::default().around(self.cache, look, frame)?;
-        let set = render_scene(self.scene, look, frame, &around.water.particles)?;
+        let set = render_scene(self.scene, look, frame, &around.state())?;
         let mut renderer =
             Renderer::new(self.context, look, &set).map_err(|error| told(error, look))?;
         let image = renderer.render_inputs(frame, &around.inputs(&Particles::default()))?;

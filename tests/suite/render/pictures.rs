@@ -64,6 +64,7 @@ pub(super) fn tank(spacing: f64) -> RenderScene {
         frames_per_second: 24.0,
         gravity: DVec3::new(0.0, -9.81, 0.0),
         wave_makers: Vec::new(),
+        moving: Vec::new(),
         waves: None,
     }
 }

@@ -98,6 +98,7 @@ pub(crate) fn city_scene() -> RenderScene {
         frames_per_second: 60.0,
         gravity: DVec3::new(0.0, -9.81, 0.0),
         wave_makers: Vec::new(),
+        moving: Vec::new(),
         waves: None,
     }
 }

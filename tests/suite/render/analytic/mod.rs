@@ -15,6 +15,7 @@ mod lens;
 mod light;
 mod materials;
 mod motion;
+mod moving;
 mod passing;
 mod rays;
 mod ripples;

@@ -296,6 +296,7 @@ pub(crate) fn scene(radius: f64, filled: f64) -> RenderScene {
         frames_per_second: 24.0,
         gravity: DVec3::new(0.0, -9.81, 0.0),
         wave_makers: Vec::new(),
+        moving: Vec::new(),
         waves: None,
     }
 }
