@@ -1,13 +1,19 @@
 //! Whitewater compared with known behaviour of drops, foam and bubbles, on the GPU and in f64.
 
-use glam::DVec3;
+use std::path::Path;
+
+use glam::{DQuat, DVec3};
 use swell::{
     domain::{
+        body::BodyState,
         particles::Particles,
         whitewater::{CalibratedSettings, Potentials, Thresholds, WhitewaterKind},
     },
+    files::parse_scene,
     gpu::adapter::{Context, InjectedFault},
     scene::Scene,
+    solve::whitewater::Whitewater,
+    stage::prepare::Start,
 };
 
 use crate::support::{
@@ -292,5 +298,78 @@ fn shares_do_not_depend_on_walls() {
                 share(last)
             );
         }
+    });
+}
+
+/// A cube of 0.4 m that floats, at rest at the bottom of its tank at the start, and by its state
+/// half a metre higher and turned: a drop in its corner there is pushed out of it, and one where it
+/// was falls on.
+#[test]
+fn a_body_is_where_its_state_puts_it() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/hard_cases");
+    let text = "[shot]\nname = \"float\"\nframes = 2\nframes_per_second = 24\n\
+        [domain]\nmin = [0, 0, 0]\nmax = [2, 2, 2]\n\
+        [[water.block]]\nmin = [0, 0, 0]\nmax = [0.3, 0.3, 2]\n\
+        [[body]]\nmesh = \"cube.obj\"\nscale = 0.4\ntranslate = [0.8, 0.4, 0.8]\ndensity = 500\n\
+        [solver]\nmethod = \"pbf\"\n[solver.pbf]\nparticle_spacing = 0.1\n";
+    let scene = parse_scene(text, Path::new("float.toml"), &folder, &[]).unwrap();
+    let start = Start::of(&scene).unwrap();
+    let scene = scene.of_whitewater();
+    let turned = BodyState {
+        time: 1.0,
+        centre: DVec3::new(1.0, 1.3, 1.0),
+        turn: DQuat::from_rotation_y(0.5),
+        velocity: 2.0 * DVec3::Y,
+        spin: DVec3::ZERO,
+    };
+    let depth = |state: &BodyState, x: DVec3| {
+        let off = (state.turn.conjugate() * (x - state.centre)).abs();
+        (0.2 - off).min_element()
+    };
+    // In a corner of the turned cube that the unturned one would not cover, and below it.
+    let in_corner = turned.centre + turned.turn * DVec3::new(0.17, 0.1, 0.17);
+    let below = DVec3::new(1.0, 0.45, 1.0);
+    let drops = [in_corner, below].map(|x| (x, DVec3::ZERO, WhitewaterKind::Spray));
+    let after = |device: Option<&Context>, bodies: &[BodyState]| {
+        let water = Particles {
+            bodies: bodies.to_vec(),
+            ..start.particles.clone()
+        };
+        let mut drops = white(&drops);
+        let (time, seconds) = (1.0, 1e-3);
+        match device {
+            Some(context) => {
+                let mut engine =
+                    Whitewater::new(context, &scene, &start.boundary, water.len(), false).unwrap();
+                engine.set(&settings()).unwrap();
+                engine.survey(&water, time, seconds).unwrap();
+                engine.advance(&mut drops, 1).unwrap();
+            }
+            None => {
+                let boundary = &start.boundary;
+                let mut engine = swell::reference::whitewater::Whitewater::new(&scene, boundary);
+                engine.set(&settings());
+                engine.survey(&water, time, seconds);
+                engine.advance(&mut drops, 1).unwrap();
+            }
+        }
+        [0, 1].map(|k| place(&drops, k))
+    };
+    both(|device| {
+        // The solid's distance is known to a part of its grid's spacing of 0.1 m at an edge.
+        let [corner, under] = after(device, &[turned]);
+        assert!(depth(&turned, corner) < 0.02, "{corner}");
+        assert!(under.distance(below) < 1e-3, "{under}");
+        // Control: without the state the body is at its start, where the other drop is.
+        let at_start = BodyState {
+            centre: DVec3::new(1.0, 0.6, 1.0),
+            turn: DQuat::IDENTITY,
+            velocity: DVec3::ZERO,
+            time: 1.0,
+            ..turned
+        };
+        let [corner, under] = after(device, &[at_start]);
+        assert!(corner.distance(in_corner) < 1e-3, "{corner}");
+        assert!(depth(&at_start, under) < 0.02, "{under}");
     });
 }
