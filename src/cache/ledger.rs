@@ -8,6 +8,7 @@ use blake3::Hash;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use super::bodies;
 use super::error::CacheError;
 use super::manifest::{self, Manifest};
 use super::probes::{ProbeRecord, ProbeValues};
@@ -74,7 +75,8 @@ pub struct LedgerEntry {
     /// Files of every by-frame stream that the manifest announces, hence at least the particles'
     /// file. It is listed even if the manifest does not keep the frame's particles.
     pub files: Files,
-    /// Rows of every by-row stream that the manifest announces; empty if there is none.
+    /// Rows of every by-row stream that the manifest announces; empty if there is none. Those of
+    /// the bodies are made from their states when the line is read.
     #[serde(default)]
     pub rows: Rows,
     /// BLAKE3 of `manifest.json`, hex. Only the first line has it, so that a changed manifest can
@@ -352,7 +354,7 @@ impl Ledger {
         let number = self.entries.len() + 1;
         let damaged =
             |what: &str| CacheError::damaged(dir.join(FILE), format!("line {number}: {what}"));
-        let entry = LedgerEntry::parse(line, manifest.format_version)
+        let mut entry = LedgerEntry::parse(line, manifest.format_version)
             .map_err(|error| damaged(&in_line(&error)))?;
         let (contents, tail) = line.split_at(line.len().saturating_sub(CHAIN_LEN));
         if !tail.starts_with(CHAIN_KEY) {
@@ -383,6 +385,9 @@ impl Ledger {
             .ok()
             .and_then(|index| index.checked_add(manifest.first_frame()))
             .ok_or_else(|| damaged("too many frames"))?;
+        if bodies::add_rows(manifest, &entry.bodies, &mut entry.rows) {
+            return Err(damaged("it has rows of bodies beside their states"));
+        }
         if let Some(misfit) = entry.misfit(manifest, frame) {
             return Err(damaged(&misfit));
         }

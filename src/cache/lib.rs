@@ -10,6 +10,7 @@
 //!                   began from a frame of another cache starts with that frame's number
 //!   grids/wave-city.0000.vdb    where the scene asks: level set "surface", staggered "vel"
 //!   probes/elevation-1.csv      where the scene has probes: a row per frame, from the ledger
+//!   bodies/crate.csv            where the scene has bodies: their states, a row per frame
 //!   timings.jsonl   seconds; not reproducible, so in no hash and in no comparison
 //!   failed/         the frame that a bake failed at: its scene, the state before it, the report
 //!   lock            held by the one writer
@@ -28,6 +29,7 @@
 //! line reads like a bake that stopped there.
 
 mod absent;
+mod bodies;
 mod disk;
 mod error;
 pub mod failed;
@@ -47,6 +49,7 @@ mod window;
 mod writer;
 
 pub use absent::within;
+pub use bodies::body_records;
 pub use disk::{directory_hash, file_hash, free_bytes};
 pub use error::CacheError;
 pub use folder::{IntoCache, refuse_inside, refuse_occupied};

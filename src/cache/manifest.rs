@@ -81,6 +81,10 @@ pub struct Manifest {
     /// Probes, which measure each frame; absent if the scene has none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub probes: Vec<ProbeRecord>,
+    /// Bodies that the water moves, whose states are in the ledger, in their order; absent if the
+    /// scene has none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub bodies: Vec<ProbeRecord>,
     /// The frame of another cache that this bake began from; absent if it began from its scene's
     /// start.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -280,7 +284,8 @@ impl Manifest {
         if let Some(grids) = &self.grids {
             grids.check()?;
         }
-        ProbeRecord::check_all(&self.probes)?;
+        ProbeRecord::check_all(&self.probes, "probe")?;
+        ProbeRecord::check_all(&self.bodies, "body")?;
         for (i, record) in self.files.iter().enumerate() {
             let is_asset = record
                 .file

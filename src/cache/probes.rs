@@ -5,13 +5,13 @@ use serde::{Deserialize, Serialize};
 use super::record::is_file_stem;
 use swell_domain::probe::Rate;
 
-/// A probe, as recorded in the manifest.
+/// A table of values over time as recorded in the manifest: a probe, or the states of a body.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ProbeRecord {
     /// Name of its file, without the extension.
     pub name: String,
-    /// Kind as scenes name it: `elevation`, `pressure`, `energy`, …
+    /// Kind as scenes name it: `elevation`, `pressure`, `energy`, …; `body` for a body.
     pub kind: String,
     /// World coordinates of the measurement, metres.
     pub at: Vec<f64>,
@@ -31,7 +31,7 @@ pub struct ProbeRecord {
     /// has too.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub window: Option<f64>,
-    /// Columns of a row, after frame and time; each name ends with its unit.
+    /// Columns of a row, after frame and time; each name ends with its unit, if it has one.
     pub columns: Vec<String>,
 }
 
@@ -105,18 +105,19 @@ impl ProbeRecord {
     }
 
     /// Refuses names that lead out of the folder or that collide on a case-insensitive file system.
-    pub(super) fn check_all(records: &[Self]) -> Result<(), String> {
+    /// `what` is the noun for messages.
+    pub(super) fn check_all(records: &[Self], what: &str) -> Result<(), String> {
         for (k, record) in records.iter().enumerate() {
             if !is_file_stem(&record.name) {
-                return Err(format!("probe name `{}` is not a file name", record.name));
+                return Err(format!("{what} name `{}` is not a file name", record.name));
             }
             let mut before = records[..k].iter();
             if before.any(|other| other.name.eq_ignore_ascii_case(&record.name)) {
-                return Err(format!("two probes are called `{}`", record.name));
+                return Err(format!("{what} name `{}` is taken twice", record.name));
             }
             let is_bad = |column: &String| column.is_empty() || column.contains([',', '"', '\n']);
             if record.columns.is_empty() || record.columns.iter().any(is_bad) {
-                return Err(format!("columns of probe `{}`", record.name));
+                return Err(format!("columns of {what} `{}`", record.name));
             }
         }
         Ok(())

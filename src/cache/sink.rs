@@ -10,6 +10,7 @@ use std::time::{Duration, Instant};
 use blake3::Hash;
 use serde_json::{Value, json};
 
+use super::bodies;
 use super::disk;
 use super::error::CacheError;
 use super::frame;
@@ -95,7 +96,9 @@ impl Sink {
     ) -> Result<u64, CacheError> {
         let manifest = &self.manifest;
         check(manifest, particles)?;
-        check_rows(manifest, rows)?;
+        let mut all_rows = rows.clone();
+        bodies::add_rows(manifest, &particles.bodies, &mut all_rows);
+        check_rows(manifest, &all_rows)?;
         let stamp = manifest.stamp(clock.frame, clock.time);
         let mut files = Files::new();
         for stream in Stream::all(manifest) {
@@ -125,7 +128,13 @@ impl Sink {
         ledger::append(&self.dir.join(ledger::FILE), self.ledger_bytes, &line)?;
         self.ledger_bytes += line.len() as u64;
         self.chain = chain;
-        tables::append(&self.dir, &self.manifest, &mut self.windows, clock, rows)?;
+        tables::append(
+            &self.dir,
+            &self.manifest,
+            &mut self.windows,
+            clock,
+            &all_rows,
+        )?;
         self.let_go_before(clock.frame)?;
         Ok(files.values().map(|record| record.bytes).sum())
     }

@@ -18,11 +18,14 @@ pub const GRIDS: &str = "grids";
 /// Name of the stream of probe measurements.
 pub const PROBES: &str = "probes";
 
+/// Name of the stream of the bodies' states.
+pub const BODIES: &str = "bodies";
+
 /// The particle stream.
 pub(super) static OF_PARTICLES: &Stream = &STREAMS[0];
 
 /// All streams, the particles first: the other files of a frame follow from them.
-pub static STREAMS: [Stream; 3] = [
+pub static STREAMS: [Stream; 4] = [
     Stream {
         name: PARTICLES,
         folder: "frames",
@@ -49,6 +52,15 @@ pub static STREAMS: [Stream; 3] = [
         layout: Layout::RowAFrame(|manifest| &manifest.probes),
         part: "probe",
         parts: |manifest| manifest.probes.iter().map(|probe| &*probe.name).collect(),
+    },
+    Stream {
+        name: BODIES,
+        folder: "bodies",
+        extension: "csv",
+        content: Content::Columns,
+        layout: Layout::RowAFrame(|manifest| &manifest.bodies),
+        part: "body",
+        parts: |manifest| manifest.bodies.iter().map(|body| &*body.name).collect(),
     },
 ];
 
@@ -91,7 +103,8 @@ pub(super) enum Layout {
     /// `FOLDER/SHOT.0001.EXTENSION`: complete on disk before the ledger names it with its checksum.
     FileAFrame(Encode),
     /// `FOLDER/TABLE.EXTENSION`, one file per table for the whole bake. The values are in the
-    /// ledger lines of their frames, so that the files can be rewritten from there.
+    /// ledger lines of their frames, so that the files can be rewritten from there: as rows, or
+    /// as the states of bodies.
     RowAFrame(fn(&Manifest) -> &[ProbeRecord]),
 }
 
@@ -211,7 +224,8 @@ mod tests {
             [
                 "frames/wave-city.0007.ply",
                 "grids/wave-city.0007.vdb",
-                "probes/gauge.csv"
+                "probes/gauge.csv",
+                "bodies/gauge.csv"
             ]
         );
         let packed = manifest("a", json!("zstd"));

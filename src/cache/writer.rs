@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
+use super::bodies;
 use super::disk;
 use super::error::CacheError;
 use super::folder;
@@ -71,7 +72,9 @@ impl CacheWriter {
     ) -> Result<Self, CacheError> {
         let manifest = completed(manifest, scene_toml, assets, start)?;
         let rows = rows_of(probes.clone());
-        check_rows(&manifest, &rows)?;
+        let mut all_rows = rows.clone();
+        bodies::add_rows(&manifest, &start.bodies, &mut all_rows);
+        check_rows(&manifest, &all_rows)?;
         if clock.frame != manifest.first_frame() {
             let first = manifest.first_frame();
             let what = format!("a start at frame {} where {first} is first", clock.frame);

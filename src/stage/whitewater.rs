@@ -510,6 +510,7 @@ fn manifest(
         attributes: whitewater::ATTRIBUTES.map(str::to_owned).to_vec(),
         grids: None,
         probes: Vec::new(),
+        bodies: Vec::new(),
         warnings: Vec::new(),
         ..baked.clone()
     })

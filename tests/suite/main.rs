@@ -129,6 +129,7 @@ mod solve {
 }
 mod stage {
     mod absorption;
+    mod body_output;
     mod branch;
     mod budget;
     mod device_cpu;

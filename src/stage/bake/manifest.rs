@@ -2,7 +2,7 @@
 
 use std::{fs, path::PathBuf};
 
-use swell_cache::{Asset, GridRecord, Manifest};
+use swell_cache::{Asset, GridRecord, Manifest, body_records};
 use swell_domain::keep::Keep;
 use swell_scene::{Scene, grids::Grids};
 
@@ -32,11 +32,18 @@ pub(super) fn manifest(plan: &BakePlan<'_>, device: &Identity) -> Manifest {
         keep: scene.keep.filter(|keep| *keep != Keep::All),
         compression: scene.compression,
         probes: probes::records(scene),
+        bodies: body_records(body_names(scene)),
         parent: plan.parent.clone(),
         warnings: plan.warnings.clone(),
         start_particles: 0,
         files: Vec::new(),
     }
+}
+
+/// Names of the scene's bodies: those of their mesh files.
+fn body_names(scene: &Scene) -> impl Iterator<Item = String> {
+    let bodies = (scene.moving_solids.iter()).filter(|solid| !solid.is_prescribed());
+    bodies.map(|body| body.placed.name())
 }
 
 /// The scene's grids as the manifest records them.

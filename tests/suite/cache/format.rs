@@ -318,7 +318,7 @@ fn line_of_format_1(entry: &LedgerEntry, manifest: Option<&str>) -> Vec<u8> {
 fn a_cache_of_the_first_format_is_read_and_not_gone_on_with() {
     let dir = tempfile::tempdir().unwrap();
     let d = dir.path();
-    bake_all_streams(d, 3);
+    bake_streams_of_format_1(d, 3);
     let now = CacheReader::open(d).unwrap();
     let text = fs::read_to_string(d.join("manifest.json")).unwrap();
     let old = text.replacen("\"format_version\": 2", "\"format_version\": 1", 1);

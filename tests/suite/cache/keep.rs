@@ -28,9 +28,10 @@ fn manifest_of(keep: Keep) -> Manifest {
 fn bake_kept(dir: &Path, keep: Keep, last: u32) {
     let clock = Clock::default();
     let (manifest, seen) = (manifest_of(keep), seen(clock));
+    let start = start_of_all_streams();
     let writer =
-        CacheWriter::create(dir, manifest, SCENE, &assets(), clock, &start(), &seen).unwrap();
-    go_on(writer, clock, start(), last).unwrap();
+        CacheWriter::create(dir, manifest, SCENE, &assets(), clock, &start, &seen).unwrap();
+    go_on(writer, clock, start, last).unwrap();
 }
 
 /// Resumes a bake and returns the frame that it resumed from.

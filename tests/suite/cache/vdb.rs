@@ -282,6 +282,7 @@ fn manifest(grids: Option<GridRecord>) -> Manifest {
         keep: None,
         compression: None,
         probes: Vec::new(),
+        bodies: Vec::new(),
         parent: None,
         warnings: Vec::new(),
         start_particles: 0,

@@ -4,12 +4,13 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 use std::time::Instant;
 
+use glam::{DQuat, DVec3};
 use serde_json::{Value, json};
 use swell::cache::{
     self, Asset, CacheError, CacheReader, CacheWriter, Clock, GridRecord, Manifest, ProbeRecord,
-    ProbeValues, Summary,
+    ProbeValues, Summary, body_records,
 };
-use swell::domain::{particles::Particles, sparse_grid::Precision};
+use swell::domain::{body::BodyState, particles::Particles, sparse_grid::Precision};
 use tempfile::TempDir;
 
 pub const SCENE: &str = "[shot]\nname = \"tank\"\n";
@@ -36,6 +37,7 @@ pub fn manifest() -> Manifest {
         keep: None,
         compression: None,
         probes: probes(),
+        bodies: Vec::new(),
         parent: None,
         warnings: Vec::new(),
         attributes: vec!["foam".to_owned(), "age".to_owned()],
@@ -76,23 +78,29 @@ pub fn manifest_of_all_streams() -> Manifest {
     };
     Manifest {
         grids: Some(grids),
+        bodies: body_records(["crate".to_owned()]),
         ..manifest()
     }
 }
 
 pub fn bake_all_streams(dir: &Path, last: u32) {
+    bake_of(dir, manifest_of_all_streams(), start_of_all_streams(), last);
+}
+
+/// A cache of the streams that were in the first format.
+pub fn bake_streams_of_format_1(dir: &Path, last: u32) {
+    let manifest = Manifest {
+        bodies: Vec::new(),
+        ..manifest_of_all_streams()
+    };
+    bake_of(dir, manifest, start(), last);
+}
+
+fn bake_of(dir: &Path, manifest: Manifest, start: Particles, last: u32) {
     let clock = Clock::default();
-    let manifest = manifest_of_all_streams();
-    let writer = CacheWriter::create(
-        dir,
-        manifest,
-        SCENE,
-        &assets(),
-        clock,
-        &start(),
-        &seen(clock),
-    );
-    go_on(writer.unwrap(), clock, start(), last).unwrap();
+    let seen = seen(clock);
+    let writer = CacheWriter::create(dir, manifest, SCENE, &assets(), clock, &start, &seen);
+    go_on(writer.unwrap(), clock, start, last).unwrap();
 }
 
 pub fn assets() -> Vec<Asset> {
@@ -114,6 +122,9 @@ pub fn step(before: &Particles, clock: Clock, frame: u32) -> (Clock, Particles, 
     }
     for (v, x) in after.velocity.iter_mut().zip(&after.position) {
         *v = x.map(|c| c * 0.3);
+    }
+    for body in &mut after.bodies {
+        body.centre.y = (body.centre.y * 1.3 + clock.time).sin();
     }
     for column in after.attributes.values_mut() {
         column.iter_mut().for_each(|a| *a += 0.1);
@@ -140,6 +151,21 @@ pub fn start() -> Particles {
             .map(|(name, value)| (name.to_owned(), vec![value; n]))
             .into(),
         ..Particles::default()
+    }
+}
+
+/// The start of a cache with every stream: with a body.
+pub fn start_of_all_streams() -> Particles {
+    let body = BodyState {
+        time: 0.0,
+        centre: DVec3::new(0.1, 0.2, 0.3),
+        turn: DQuat::from_rotation_x(0.7),
+        velocity: DVec3::new(-1.0 / 3.0, 0.0, 1e-20),
+        spin: DVec3::Y,
+    };
+    Particles {
+        bodies: vec![body],
+        ..start()
     }
 }
 

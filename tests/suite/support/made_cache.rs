@@ -5,7 +5,7 @@ use swell::files::scene_to_toml;
 
 use serde_json::Value;
 use swell::{
-    cache::{CacheWriter, Clock, GridRecord, Manifest, ProbeRecord, ProbeValues},
+    cache::{CacheWriter, Clock, GridRecord, Manifest, ProbeRecord, ProbeValues, body_records},
     domain::{particles::Particles, solver::StepReport, sparse_grid::Precision},
     files::physics_hash,
 };
@@ -40,6 +40,8 @@ pub struct Made<'a> {
     pub version: &'a str,
     pub grids: Option<GridRecord>,
     pub probes: Vec<ProbeRecord>,
+    /// Names of bodies, whose states `spoil` adds.
+    pub bodies: &'a [&'a str],
     /// Probe value as a function of frame, probe and column.
     pub seen: &'a dyn Fn(u32, usize, usize) -> Option<f64>,
     pub report: &'a dyn Fn(u32) -> Value,
@@ -55,6 +57,7 @@ impl Default for Made<'_> {
             version: "0.1.0",
             grids: None,
             probes: Vec::new(),
+            bodies: &[],
             seen: &seen,
             report: &report,
         }
@@ -151,6 +154,7 @@ pub fn write_cache(path: &Path, made: &Made<'_>) {
         compression: None,
         grids: made.grids.clone(),
         probes: made.probes.clone(),
+        bodies: body_records(made.bodies.iter().map(|&name| name.to_owned())),
         attributes: Vec::new(),
         parent: None,
         warnings: Vec::new(),

@@ -89,8 +89,8 @@ def swell_bin() -> Swell:
 
 @pytest.fixture(scope="session")
 def baked(swell_bin: Swell, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Caches: `pbf` with a stream of whitewater, `flip` with APIC's rows, `kept` with every fourth frame, `far` from the origin, `packed` by
-    Zstandard."""
+    """Caches: `pbf` with a stream of whitewater, `flip` with APIC's rows, `kept` with every fourth frame, `far` from the origin, `afloat`
+    with a body far from it, `packed` by Zstandard."""
     room = tmp_path_factory.mktemp("baked")
 
     def bake(name: str, *arguments: object, x: float = 0.0, more: str = "") -> None:
@@ -104,6 +104,8 @@ def baked(swell_bin: Swell, tmp_path_factory: pytest.TempPathFactory) -> Path:
     bake("flip", "--solver", "flip")
     bake("kept", more='[keep]\nparticles = "every 4"')
     bake("far", x=8192.0)
+    body = '[[body]]\nmesh = "afloat.obj"\ntranslate = [0.0, 0.5, 0.0]\ndensity = 500.0\nvelocity = [-0.5, 0.0, 0.0]'
+    bake("afloat", x=8192.0, more=body)
     bake("packed", more='[keep]\ncompression = "zstd"')
     swell_bin("whitewater", room / "pbf", "--progress", "none")
     swell_bin("bake", room / "pbf.toml", "--from", f"{room / 'pbf'}:3", "-o", room / "branch", "--progress", "none")

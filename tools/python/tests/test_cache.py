@@ -121,6 +121,22 @@ def test_what_the_probes_are_of(baked: Path) -> None:
         gauge["elevation"]
 
 
+def test_bodies_are_the_csv_files(baked: Path) -> None:
+    cache = swell.Cache(baked / "afloat")
+    [(name, body)] = cache.bodies.items()
+    with (baked / "afloat/bodies" / f"{name}.csv").open() as file:
+        head, *rows = csv.reader(file)
+    assert (name, body.kind, head) == ("afloat", "body", ["frame", "time_s", *body.columns])
+    assert body.frame.tolist() == list(FRAMES)
+    for place, column in enumerate(body.columns, 2):
+        np.testing.assert_array_equal(body[column], [float(row[place]) for row in rows])
+    # In world coordinates, to the left at first; a rotation has a length of one.
+    assert (body["x_m"] > 8192.0).all() and body["x_m"][1] < body["x_m"][0]
+    turn = np.array([body[f"turn_{axis}"] for axis in "xyzw"])
+    np.testing.assert_allclose((turn**2).sum(axis=0), 1.0, rtol=1e-14)
+    assert swell.Cache(baked / "pbf").bodies == {}
+
+
 def test_grids_are_paths_of_sound_files(baked: Path) -> None:
     cache = swell.Cache(baked / "pbf")
     assert list(cache.grids) == list(FRAMES)

@@ -35,7 +35,7 @@ def checked_files(cache: Path) -> list[Path]:
     return [path for path in files if "whitewater" not in path.parts]
 
 
-@pytest.mark.parametrize("name", ["pbf", "flip", "kept", "far", "branch", "pbf/whitewater/default"])
+@pytest.mark.parametrize("name", ["pbf", "flip", "kept", "far", "afloat", "branch", "pbf/whitewater/default"])
 def test_sound_caches_are_sound(baked: Path, swell_bin: Swell, name: str) -> None:
     assert not swell_bin.refuses(baked / name)
     swell.Cache(baked / name).verify()
@@ -134,6 +134,17 @@ def test_probes_that_say_something_else(copy: Copy) -> None:
     path.write_text("".join(lines))
     with pytest.raises(swell.Damaged, match=r"gauge\.csv: line 5 "):
         swell.Cache(cache).verify()
+
+
+def test_a_body_that_is_elsewhere(copy: Copy, swell_bin: Swell) -> None:
+    cache = copy("afloat")
+    path = cache / "bodies/afloat.csv"
+    lines = path.read_text().splitlines(keepends=True)
+    lines[3] = lines[3].replace(",819", ",818", 1)
+    path.write_text("".join(lines))
+    with pytest.raises(swell.Damaged, match=r"afloat\.csv: line 4 "):
+        swell.Cache(cache).verify()
+    assert swell_bin.refuses(cache)
 
 
 def test_what_is_no_cache(copy: Copy, tmp_path: Path) -> None:

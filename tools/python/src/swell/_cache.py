@@ -15,7 +15,7 @@ from ._blake3 import hex_digests
 from ._errors import CacheError, Damaged, MissingFrame
 from ._files import FileRecord, faults, read_bytes
 from ._frame import Frame
-from ._ledger import GRIDS, LEDGER, MANIFEST, PARTICLES, Record, read_ledger, read_manifest
+from ._ledger import BODIES, GRIDS, LEDGER, MANIFEST, PARTICLES, Record, read_ledger, read_manifest
 from ._probes import Probe
 
 _SCENE = "scene.toml"
@@ -106,6 +106,12 @@ class Cache:
         return {record["name"]: Probe(record, index, self.ledger) for index, record in enumerate(records)}
 
     @cached_property
+    def bodies(self) -> dict[str, Probe]:
+        """States of the bodies by name, as columns: centre of mass (world), rotation from the start as a quaternion, velocity, spin."""
+        records = self.manifest.get(BODIES, [])
+        return {record["name"]: Probe(record, index, self.ledger, BODIES) for index, record in enumerate(records)}
+
+    @cached_property
     def grids(self) -> Grids:
         """OpenVDB files by frame number; empty where the scene asks for none."""
         return Grids(self.path, self.manifest.get("grids"), self.ledger, self._check)
@@ -153,8 +159,8 @@ class Cache:
             is_kept = self._is_kept(entry.frame)
             files += [record for stream, record in entry.files.items() if is_kept or stream != PARTICLES]
         problems += faults(self.path, files)
-        for probe in self.probes.values():
-            problems += _fault_of(probe.check, self.path)
+        for table in (*self.probes.values(), *self.bodies.values()):
+            problems += _fault_of(table.check, self.path)
         if (self.path / "failed").exists():
             problems += _fault_of(_check_failed, self.path / "failed")
         return problems

@@ -16,6 +16,7 @@ MANIFEST = "manifest.json"
 LEDGER = "frames.jsonl"
 PARTICLES = "particles"
 PROBES = "probes"
+BODIES = "bodies"
 GRIDS = "grids"
 FORMATS = (1, 2)
 _NEEDED: dict[str, type | tuple[type, ...]] = {
@@ -50,7 +51,7 @@ class Record:
     files: dict[str, FileRecord]
     """By stream: `particles`, and `grids` where the scene asks for them. Also of particles that were not kept."""
     rows: dict[str, Rows]
-    """Probes' values, as they stand in the ledger; `Cache.probes` has them as arrays."""
+    """Probes' values, as they stand in the ledger, and states of bodies; `Cache.probes` and `Cache.bodies` have them as arrays."""
     clock: dict[str, Any]
     """Frame, time, substeps in the frame, steps since the start."""
     report: dict[str, Any] | None
@@ -79,9 +80,9 @@ def read_manifest(folder: Path) -> tuple[dict[str, Any], str]:
             raise Damaged(path, f"it has no `{key}`, or not a right one")
     if not _STEM.fullmatch(manifest["shot"]):
         raise Damaged(path, f"shot name `{manifest['shot']}` is no file name")
-    for probe in manifest.get("probes", []):
-        if not _STEM.fullmatch(str(probe.get("name", ""))):
-            raise Damaged(path, f"probe name `{probe.get('name')}` is no file name")
+    for table in manifest.get(PROBES, []) + manifest.get(BODIES, []):
+        if not _STEM.fullmatch(str(table.get("name", ""))):
+            raise Damaged(path, f"probe or body name `{table.get('name')}` is no file name")
     return manifest, hex_digests([content])[0]
 
 
@@ -126,6 +127,8 @@ def _parse_line(path: Path, number: int, line: bytes, manifest: dict[str, Any]) 
     try:
         value = json.loads(line)
         record = _parse_record(path, value, int(manifest["format_version"]))
+        if manifest.get(BODIES):
+            record.rows[BODIES] = _states(value["bodies"], manifest)
     except CacheError:
         raise
     except (KeyError, TypeError, ValueError) as error:
@@ -137,9 +140,19 @@ def _parse_line(path: Path, number: int, line: bytes, manifest: dict[str, Any]) 
     expected = f"frames/{manifest['shot']}.{frame:04}.ply{packed}"
     if PARTICLES not in record.files or record.files[PARTICLES].file != expected:
         raise Damaged(path, f"line {number}: its particles are not {expected}")
-    if len(record.rows.get(PROBES, [])) != len(manifest.get("probes", [])):
-        raise Damaged(path, f"line {number}: its probes are not those that the manifest announces")
+    for stream in (PROBES, BODIES):
+        if len(record.rows.get(stream, [])) != len(manifest.get(stream, [])):
+            raise Damaged(path, f"line {number}: its {stream} are not those that the manifest announces")
     return record
+
+
+def _states(bodies: list[dict[str, Any]], manifest: dict[str, Any]) -> Rows:
+    """States of the bodies as rows: centre in world coordinates, rotation, velocity, spin."""
+    origin = manifest.get("origin", [0.0, 0.0, 0.0])
+    return [
+        [*(at + shift for at, shift in zip(body["centre"], origin, strict=True)), *body["turn"], *body["velocity"], *body["spin"]]
+        for body in bodies
+    ]
 
 
 def _parse_record(path: Path, value: dict[str, Any], version: int) -> Record:

@@ -1,4 +1,4 @@
-"""What probes measured: arrays from the ledger, and the CSV files that follow from it."""
+"""What probes measured and where bodies were: arrays from the ledger, and the CSV files that follow from it."""
 
 from __future__ import annotations
 
@@ -18,12 +18,16 @@ _Values = list[float | None]
 
 
 class Probe:
-    """One probe: `probe["elevation_m"]` is an array with a value a look, NaN where there was nothing to measure."""
+    """One probe: `probe["elevation_m"]` is an array with a value a look, NaN where there was nothing to measure.
 
-    def __init__(self, record: Mapping[str, Any], index: int, ledger: list[Record]) -> None:
+    Or the states of a body, of which every frame has a row.
+    """
+
+    def __init__(self, record: Mapping[str, Any], index: int, ledger: list[Record], stream: str = PROBES) -> None:
+        self._stream = stream
         self.name: str = record["name"]
         self.kind: str = record["kind"]
-        """As scenes name it: `elevation`, `pressure`, …"""
+        """As scenes name it: `elevation`, `pressure`, …; `body` for a body."""
         self.at: list[float] = record["at"]
         """World coordinates that it looks at, metres."""
         self.rate_hz: float | str | None = record.get("rate_hz")
@@ -37,7 +41,7 @@ class Probe:
         times: list[float] = []
         rows: list[_Values] = []
         for entry in ledger:
-            for time, values in _looks(entry.rows[PROBES][index], entry.time, len(measured), self.rate_hz is not None):
+            for time, values in _looks(entry.rows[stream][index], entry.time, len(measured), self.rate_hz is not None):
                 frames.append(entry.frame)
                 times.append(time)
                 rows.append(seen.take(time, values) if seen else values)
@@ -60,7 +64,7 @@ class Probe:
         return f"<swell.Probe {self.name}: {self.kind}, {len(self)} looks at {', '.join(self.columns)}>"
 
     def text(self) -> str:
-        """Text of `probes/NAME.csv`, as it has to be."""
+        """Text of `probes/NAME.csv` or `bodies/NAME.csv`, as it has to be."""
         lines = [",".join(["frame", "time_s", *self.columns])]
         for frame, time, values in zip(self.frame.tolist(), self.time.tolist(), self._rows, strict=True):
             lines.append(",".join([str(frame), _shown(time), *("" if value is None else _shown(value) for value in values)]))
@@ -68,7 +72,7 @@ class Probe:
 
     def check(self, folder: Path) -> None:
         """Raises `Damaged` where the CSV file does not say what the ledger says."""
-        path = folder / PROBES / f"{self.name}.csv"
+        path = folder / self._stream / f"{self.name}.csv"
         found, expected = read_bytes(path).split(b"\n"), self.text().encode().split(b"\n")
         if found != expected:
             same = next((k for k, (a, b) in enumerate(zip(found, expected, strict=False)) if a != b), min(len(found), len(expected)))
