@@ -229,8 +229,8 @@ impl Scene {
         self.bodies().map(|it| it.body.at_start()).collect()
     }
 
-    /// Bounds the speed of the points of bodies, m/s. Bodies that are wholly outside the domain, where
-    /// they meet nothing, do not count.
+    /// Bounds the speed of the points of bodies, m/s. Bodies that are wholly outside the domain,
+    /// where they meet nothing, do not count.
     pub fn fastest_body(&self, bodies: &[BodyState]) -> f64 {
         let is_inside = |it: &&FreeBody| {
             let centre = it.state(bodies).centre;

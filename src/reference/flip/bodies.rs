@@ -35,15 +35,6 @@ impl BodyCells {
         product(&self.response, &self.weight)
     }
 
-    /// Returns the body, or one that the pressure does not move if it is `held`.
-    pub(super) fn held(&self, held: bool) -> Self {
-        let mut body = self.clone();
-        if held {
-            body.response = [[0.0; 6]; 6];
-        }
-        body
-    }
-
     /// Returns the body's part of a system.
     fn of_system(&self, row_of: &[u32]) -> Coupling {
         let with_row = self.element.iter().zip(&self.push);
@@ -179,6 +170,67 @@ pub fn carry_bodies(
     });
     for (velocity, added) in velocity.iter_mut().zip(added) {
         *velocity += added;
+    }
+}
+
+/// Returns the bodies with all these changes of their velocities.
+pub(super) fn sped_up<'a>(
+    bodies: &[BodyState],
+    all: impl Iterator<Item = &'a Vec<Six>>,
+) -> Vec<BodyState> {
+    let mut bodies = bodies.to_vec();
+    for changes in all {
+        for (state, change) in bodies.iter_mut().zip(changes) {
+            *state = state.sped_up(change);
+        }
+    }
+    bodies
+}
+
+/// What contacts did to the bodies, where it is too much for the water not to know of it.
+pub(super) struct Stopped {
+    /// Changes of the bodies' velocities, m/s and rad/s.
+    pub(super) changes: Vec<Six>,
+    /// Which bodies keep their velocities in the projection that follows.
+    held: Vec<bool>,
+}
+
+impl Stopped {
+    /// Compares states before and after contacts in a substep of `length` seconds; `None` where no
+    /// body was stopped or turned aside.
+    pub(super) fn new(
+        model: &Model,
+        before: &[BodyState],
+        after: &[BodyState],
+        length: f64,
+    ) -> Option<Self> {
+        let held = model.scene.stopped(before, after, length);
+        let both = after.iter().zip(before);
+        let changes = both.map(|(after, before)| after.change_since(before));
+        held.contains(&true).then(|| Self {
+            changes: changes.collect(),
+            held,
+        })
+    }
+
+    /// Returns the bodies, without a response those that were stopped.
+    pub(super) fn held(&self, bodies: &[BodyCells]) -> Vec<BodyCells> {
+        let mut all = bodies.to_vec();
+        for (body, _) in all.iter_mut().zip(&self.held).filter(|(_, held)| **held) {
+            body.response = [[0.0; 6]; 6];
+        }
+        all
+    }
+
+    /// Adds to the bodies' velocities what the projection changed; returns that with the changes
+    /// before it.
+    pub(super) fn pushed(&self, by_pressure: &[Six], bodies: &mut [BodyState]) -> Vec<Six> {
+        for (state, change) in bodies.iter_mut().zip(by_pressure) {
+            *state = state.sped_up(change);
+        }
+        let both = self.changes.iter().zip(by_pressure);
+        both.map(|(a, b)| std::array::from_fn(|k| a[k] + b[k]))
+            .collect()
     }
 }
 

@@ -4,6 +4,7 @@ use glam::{DMat3, DVec3, Vec3};
 
 use super::{
     BodyCells, Centers, Cloud, Faces, Gaps, Model, Trace, Waters, advect, aim, assign_cells,
+    bodies::{Stopped, sped_up},
     carry_bodies, close_gaps, couple_bodies, cut_cells,
     effects::{self, FaceInputs, Flying},
     extrapolate, find_buried, find_change, find_depth, find_excess, find_water, gather_centers,
@@ -234,43 +235,21 @@ impl Flip {
         let (projected, displacement) = project(Some(&centers), &mut faces, timings)?;
         let changes = [earlier.as_ref(), Some(&projected)].into_iter().flatten();
         let changes = changes.map(|projected| &projected.changes);
-        let mut bodies = before.clone();
-        for changes in [&by_weight].into_iter().chain(changes) {
-            for (state, change) in bodies.iter_mut().zip(changes) {
-                *state = state.sped_up(change);
-            }
-        }
+        let mut bodies = sped_up(&before, [&by_weight].into_iter().chain(changes));
         let mut after_contacts = None;
         if let Some(contacts) = contacts {
             let free = bodies.clone();
             timings.time("contacts", || {
                 contacts.resolve(&model.scene, &state.walls, substep, &mut bodies);
             });
-            let held = model.scene.stopped(&free, &bodies, substep.length);
-            if held.contains(&true) {
-                let ways = bodies.iter().zip(&free);
-                let mut changes: Vec<Six> =
-                    ways.map(|(after, free)| after.change_since(free)).collect();
-                waters.carry_changes(&projected.system, &changes);
-                touched = coupled
-                    .iter()
-                    .zip(&held)
-                    .map(|(it, held)| it.held(*held))
-                    .collect();
+            if let Some(stopped) = Stopped::new(model, &free, &bodies, substep.length) {
+                waters.carry_changes(&projected.system, &stopped.changes);
+                touched = stopped.held(&coupled);
                 waters = waters.with_bodies(&touched);
-                let found = project_faces(
-                    model,
-                    timings,
-                    *factor_budget,
-                    &mut waters,
-                    None,
-                    &mut faces,
-                )?
-                .0;
-                for (k, more) in found.changes.iter().enumerate() {
-                    bodies[k] = bodies[k].sped_up(more);
-                    changes[k] = std::array::from_fn(|i| changes[k][i] + more[i]);
-                }
+                let budget = *factor_budget;
+                let (found, _) =
+                    project_faces(model, timings, budget, &mut waters, None, &mut faces)?;
+                let changes = stopped.pushed(&found.changes, &mut bodies);
                 let moved = (&before[..], &changes[..]);
                 carry_bodies(model, &step, &bricks, &space, moved, &mut faces.velocity);
                 after_contacts = Some(found);
