@@ -1,9 +1,8 @@
 //! States of the bodies as tables, `bodies/NAME.csv`: a row per frame, from the states in the
 //! ledger's lines.
 
-use super::ledger::Rows;
 use super::manifest::Manifest;
-use super::probes::{ProbeRecord, ProbeValues};
+use super::probes::{ProbeRecord, ProbeValues, Rows};
 use super::stream::BODIES;
 use swell_domain::body::BodyState;
 

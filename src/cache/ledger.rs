@@ -11,7 +11,7 @@ use serde_json::Value;
 use super::bodies;
 use super::error::CacheError;
 use super::manifest::{self, Manifest};
-use super::probes::{ProbeRecord, ProbeValues};
+use super::probes::{ProbeRecord, ProbeValues, Rows};
 use super::record::FileRecord;
 use super::stream::{self, STREAMS, Stream};
 use swell_domain::{
@@ -59,10 +59,6 @@ fn is_none(walls: &AbsorberStates) -> bool {
 
 /// Files of a frame, by the name of their stream.
 pub type Files = BTreeMap<String, FileRecord>;
-
-/// Values of a frame by the name of their stream, then by table and column; `None` where there is
-/// nothing to measure.
-pub type Rows = BTreeMap<String, ProbeValues>;
 
 /// One line of the ledger.
 #[derive(Clone, Debug, PartialEq, Deserialize)]

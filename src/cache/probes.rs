@@ -1,5 +1,7 @@
 //! Probe measurements as a cache stores them: named columns, a row of values per frame.
 
+use std::collections::BTreeMap;
+
 use serde::{Deserialize, Serialize};
 
 use super::record::is_file_stem;
@@ -55,6 +57,10 @@ pub struct Look<'a> {
 /// per column. All samples of a frame are thus in the frame's ledger line and are dropped with it
 /// when a bake is cut.
 pub type ProbeValues = Vec<Vec<Option<f64>>>;
+
+/// Values of a frame by the name of their stream, then by table and column; `None` where there is
+/// nothing to measure.
+pub type Rows = BTreeMap<String, ProbeValues>;
 
 impl ProbeRecord {
     /// The samples in one frame's values; the frame ended at `time`, seconds.

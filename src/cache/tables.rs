@@ -8,9 +8,9 @@ use std::fs::File;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use super::ledger::{Clock, LedgerEntry, Rows};
+use super::ledger::{Clock, LedgerEntry};
 use super::manifest::Manifest;
-use super::probes::ProbeRecord;
+use super::probes::{ProbeRecord, Rows};
 use super::stream::{STREAMS, Stream};
 use super::window::Window;
 use swell_domain::output::{self, AtPath as _, FileError};
