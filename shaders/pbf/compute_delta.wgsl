@@ -97,8 +97,7 @@ fn main(
     coincident = i;
 #ifdef WALL_WORK
 #ifdef MOVING_SOLIDS
-    let last_grid = posed_solids[solid_count() - 1u].grid;
-    first_velocity = last_grid.first + last_grid.dims.x * last_grid.dims.y * last_grid.dims.z;
+    first_velocity = solids_end();
     sample_rate = 0.0;
 #endif
 #endif

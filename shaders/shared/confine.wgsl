@@ -28,7 +28,15 @@ fn to_world(way: vec3f) -> vec3f {
 fn solid_node(node: vec3u) -> f32 {
     let within = (node.z * solid_grid.dims.y + node.y) * solid_grid.dims.x + node.x;
 #ifdef MOVING_SOLIDS
-    return solid_distance[solid_grid.first + within];
+    let place = solid_grid.first + within;
+#ifdef SHAPES
+    if solid_changes {
+        let start = solid_distance[place];
+        let nodes = solid_grid.dims.x * solid_grid.dims.y * solid_grid.dims.z;
+        return start + solid_share * (solid_distance[place + nodes] - start);
+    }
+#endif
+    return solid_distance[place];
 #else
     return solid_distance[within];
 #endif

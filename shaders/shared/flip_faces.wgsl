@@ -47,7 +47,9 @@ fn cut_faces(cell: vec3f, across: vec3f) -> CutFaces {
             let is_nearer_low = lower_sums(found) < lower_sums(corners);
             let is_nearer_high = upper_sums(found) < upper_sums(corners);
             // A velocity component of a rigid body does not change along its own axis: the value at
-            // the centre is that at both faces.
+            // the centre is that at both faces. Where the shape changes, it is that of the surface
+            // in the cell, and the flux is the surface's area times it: between the two faces the
+            // velocity near a surface also changes where nothing crosses it.
             let pushing = solid_velocity_at((cell + 0.5) * params.cell_size);
             cut.lower_velocity = select(cut.lower_velocity, pushing, is_nearer_low);
             cut.upper_velocity = select(cut.upper_velocity, pushing, is_nearer_high);

@@ -28,6 +28,14 @@ var<private> solid_centre: vec3f;
 var<private> solid_velocity: vec3f;
 var<private> solid_spin: vec3f;
 var<private> solid_back: vec4f;
+#ifdef SHAPES
+// Marks a solid whose shape changes, in the index of its first node. Behind its distances at the
+// substep's start are those at its end, and then velocities of the surface, three floats a node.
+const SHAPE = 0x80000000u;
+var<private> solid_changes: bool;
+// Fraction of the substep that has passed.
+var<private> solid_share: f32;
+#endif
 
 fn solid_count() -> u32 {
     return arrayLength(&posed_solids);
@@ -50,6 +58,22 @@ fn look_at_solid(k: u32, share: f32) {
     solid_centre = posed_solids[k].centre + share * posed_solids[k].length * solid_velocity;
     let back = mix(posed_solids[k].back, posed_solids[k].end_back, share);
     solid_back = back * inverseSqrt(dot(back, back));
+#ifdef SHAPES
+    solid_changes = solid_grid.first >= SHAPE;
+    solid_grid.first = solid_grid.first & (SHAPE - 1u);
+    solid_share = share;
+#endif
+}
+
+// Index behind the last float of all solids in `solid_distance`.
+fn solids_end() -> u32 {
+    let last = posed_solids[solid_count() - 1u].grid;
+    let nodes = last.dims.x * last.dims.y * last.dims.z;
+#ifdef SHAPES
+    return (last.first & (SHAPE - 1u)) + select(nodes, 5u * nodes, last.first >= SHAPE);
+#else
+    return last.first + nodes;
+#endif
 }
 
 // v rotated by the unit quaternion q.
@@ -58,9 +82,42 @@ fn turned(q: vec4f, v: vec3f) -> vec3f {
     return v + q.w * across + cross(q.xyz, across);
 }
 
-// Velocity of the solid's material point at x, m/s.
+#ifdef SHAPES
+// Velocity of the surface near x, m/s: interpolated between nodes, each with that of the point of
+// the surface nearest to it.
+fn shape_velocity_at(x: vec3f) -> vec3f {
+    let last = vec3f(solid_grid.dims - 1u);
+    let p = clamp(from_first_node(x) / solid_grid.spacing, vec3f(0.0), last);
+    let node = min(vec3u(p), solid_grid.dims - 2u);
+    let t = p - vec3f(node);
+    let nodes = solid_grid.dims.x * solid_grid.dims.y * solid_grid.dims.z;
+    let first = solid_grid.first + 2u * nodes;
+    var sum = vec3f(0.0);
+    for (var k = 0u; k < 8u; k++) {
+        let step = vec3u(k & 1u, (k >> 1u) & 1u, k >> 2u);
+        let weights = select(1.0 - t, t, step == vec3u(1u));
+        let at = node + step;
+        let within = (at.z * solid_grid.dims.y + at.y) * solid_grid.dims.x + at.x;
+        let velocity = vec3f(
+            solid_distance[first + 3u * within],
+            solid_distance[first + 3u * within + 1u],
+            solid_distance[first + 3u * within + 2u],
+        );
+        sum += weights.x * weights.y * weights.z * velocity;
+    }
+    return sum;
+}
+#endif
+
+// Velocity of the solid's material point at x, m/s; where the shape changes, of the surface near x.
 fn solid_velocity_at(x: vec3f) -> vec3f {
-    return solid_velocity + cross(solid_spin, x - solid_centre);
+    let rigid = solid_velocity + cross(solid_spin, x - solid_centre);
+#ifdef SHAPES
+    if solid_changes {
+        return rigid + shape_velocity_at(x);
+    }
+#endif
+    return rigid;
 }
 
 // x relative to the grid's first node, in the grid's frame.

@@ -13,4 +13,11 @@ bounds! {
         centre: "|that point|"]
         grid + U * (40.0 * radius + centre),
         "a place is turned back by a quaternion that is a mean of two, normalised";
+    pub(crate) SHAPED = [grid: "" GRID, reach: "the largest distance that counts"]
+        grid + 4.0 * U * reach,
+        "a distance is the start's plus a part of the difference to the end's";
+    pub(crate) FLOWED = [fastest: "the fastest node of a shape that changes",
+        moved: "what the f64 reference's velocity changes by as nodes move by " SHAPED]
+        12.0 * U * fastest + 3.0 * moved,
+        "three products for each of eight nodes, and their sum";
 }

@@ -8,7 +8,8 @@ use super::{Contacts, Surroundings};
 /// Distance that surfaces keep, in particle spacings.
 const MARGIN: f64 = 0.01;
 
-/// Contacts of the bodies of a scene with each other, with its walls and with its solids.
+/// Contacts of the bodies of a scene with each other, with its walls and with its solids, but for
+/// those whose shape changes.
 pub struct SceneContacts(Contacts);
 
 impl SceneContacts {
@@ -25,6 +26,7 @@ impl SceneContacts {
         let (mut moving, mut bodies) = (Vec::new(), Vec::new());
         for solid in &scene.moving_solids {
             match &solid.body {
+                None if solid.sequence.is_some() => {}
                 None => moving.push(&solid.placed.mesh),
                 Some(it) => bodies.push((&it.body, it.collides.then_some(&solid.placed.mesh))),
             }
@@ -47,6 +49,7 @@ impl SceneContacts {
     ) {
         let Substep { start, length, .. } = *substep;
         let prescribed = scene.moving_solids.iter().filter(|it| it.is_prescribed());
+        let prescribed = prescribed.filter(|it| it.sequence.is_none());
         let moving: Vec<Passage> = prescribed
             .map(|solid| solid.passage(&[], start, length))
             .collect();

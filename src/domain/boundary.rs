@@ -1,7 +1,13 @@
 //! Solids as a solver sees them: surface samples that contribute to the density, and a
 //! signed distance.
 
-use super::{sampling::BoundarySample, signed_distance::SignedDistance};
+use std::{borrow::Cow, sync::Arc};
+
+use super::{
+    sampling::BoundarySample,
+    shape::{ShapeField, ShapeSamples},
+    signed_distance::SignedDistance,
+};
 
 /// All solids of a scene.
 #[derive(Clone, Debug, Default)]
@@ -15,12 +21,46 @@ pub struct Boundary {
     /// Surface samples of each moving solid, in its pose at the start; empty where the solver takes
     /// no samples.
     pub moving_samples: Vec<Vec<BoundarySample>>,
+    /// The moving solids whose shape changes, by the index of the moving solid; the distance in
+    /// `moving` is that at the start. Shorter where none of the later ones does.
+    pub shapes: Vec<Option<Shape>>,
+}
+
+/// A solid whose shape changes.
+#[derive(Clone, Debug)]
+pub struct Shape {
+    /// Distances and velocities of its surface.
+    pub field: ShapeField,
+    /// Samples of its surface; `None` where the solver takes no samples.
+    pub samples: Option<Arc<ShapeSamples>>,
 }
 
 impl Boundary {
     /// Returns the number of samples on all solids.
     pub fn sample_count(&self) -> usize {
-        self.samples.len() + self.moving_samples.iter().map(Vec::len).sum::<usize>()
+        let rigid = self.moving_samples.iter().map(Vec::len);
+        let shapes = self.shapes.iter().flatten();
+        let shapes = shapes.filter_map(|shape| Some(shape.samples.as_ref()?.count()));
+        self.samples.len() + rigid.chain(shapes).sum::<usize>()
+    }
+
+    /// Returns the changing shape of a moving solid, if it has one.
+    pub fn shape(&self, index: usize) -> Option<&Shape> {
+        self.shapes.get(index)?.as_ref()
+    }
+
+    /// Returns the distance to a moving solid at `time`, seconds, in its pose at the start.
+    pub fn moving_at(&self, index: usize, time: f64) -> Cow<'_, SignedDistance> {
+        match self.shape(index) {
+            Some(shape) => Cow::Owned(shape.field.at(time)),
+            None => Cow::Borrowed(&self.moving[index]),
+        }
+    }
+
+    /// Returns the number of nodes of the grids of solids whose shape changes.
+    pub fn shape_nodes(&self) -> usize {
+        let shapes = self.shapes.iter().flatten();
+        shapes.map(|shape| shape.field.nodes()).sum()
     }
 
     /// Iterates over the distances to all solids, the static ones first.

@@ -5,6 +5,7 @@
 
 mod needles;
 mod obj;
+mod outline;
 pub mod parts;
 mod ply;
 mod polygons;
@@ -22,6 +23,8 @@ use std::{
 use glam::DVec3;
 
 use super::{bounds::Bounds, mesh::TriangleMesh, text};
+
+pub use outline::Outline;
 
 /// Largest mesh file that is read, bytes. A binary scan of ten million triangles takes half of it.
 pub const MAX_FILE_BYTES: u64 = 1 << 30;
@@ -214,11 +217,44 @@ impl Loaded {
     /// [`MeshError::Malformed`] says what is wrong: no triangles, an index out of range, a vertex
     /// that is not a number, no triangle with an area, or broken syntax.
     pub fn from_bytes(bytes: &[u8], format: MeshFormat, file: &Path) -> Result<Self, MeshError> {
-        let welded = welded(bytes, format, file)?;
-        Ok(Self {
-            mesh: welded.mesh,
-            digits: welded.digits,
-            crossing: welded.crossing.words(),
+        Ok(Self::like(bytes, format, file, None)?.0)
+    }
+
+    /// Reads a mesh as [`Self::from_bytes`] does, and its outline. Where the faces have the same
+    /// corners as those of `outline`, the mesh has the triangles of that one, also where polygons
+    /// or corners at one position would be split otherwise: so vertices of several files are the
+    /// same points of a surface.
+    ///
+    /// # Errors
+    /// Those of [`Self::from_bytes`].
+    pub fn like(
+        bytes: &[u8],
+        format: MeshFormat,
+        file: &Path,
+        outline: Option<&Outline>,
+    ) -> Result<(Self, Outline), MeshError> {
+        let read = || {
+            let raw = raw(bytes, format)?;
+            if let Some((mesh, outline)) = outline.and_then(|it| Some((it.mesh(&raw)?, it))) {
+                let loaded = Self {
+                    mesh,
+                    digits: raw.digits,
+                    crossing: None,
+                };
+                return Ok((loaded, outline.clone()));
+            }
+            let welded = weld(&raw)?;
+            let outline = Outline::of(raw, &welded);
+            let loaded = Self {
+                mesh: welded.mesh,
+                digits: welded.digits,
+                crossing: welded.crossing.words(),
+            };
+            Ok((loaded, outline))
+        };
+        read().map_err(|detail| MeshError::Malformed {
+            file: file.to_owned(),
+            detail,
         })
     }
 
@@ -277,17 +313,21 @@ struct Welded {
 }
 
 fn welded(bytes: &[u8], format: MeshFormat, file: &Path) -> Result<Welded, MeshError> {
-    let raw = match format {
-        MeshFormat::Obj => obj::read(bytes),
-        MeshFormat::Ply => ply::read(bytes),
-        MeshFormat::Stl => stl::read(bytes),
-        MeshFormat::Vdb => vdb::read(bytes),
-    };
+    let raw = raw(bytes, format);
     raw.and_then(|raw| weld(&raw))
         .map_err(|detail| MeshError::Malformed {
             file: file.to_owned(),
             detail,
         })
+}
+
+fn raw(bytes: &[u8], format: MeshFormat) -> Result<Raw, String> {
+    match format {
+        MeshFormat::Obj => obj::read(bytes),
+        MeshFormat::Ply => ply::read(bytes),
+        MeshFormat::Stl => stl::read(bytes),
+        MeshFormat::Vdb => vdb::read(bytes),
+    }
 }
 
 /// Checks a reader's output, triangulates polygons, and welds vertices at the same position,

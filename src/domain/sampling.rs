@@ -249,51 +249,101 @@ impl Lattice {
 /// Areas follow Akinci et al. 2012: a sample's share is 1/ΣW over its neighbours, with W a kernel
 /// on the surface; the shares are then scaled so that their sum is the area inside the domain.
 pub fn boundary_samples(mesh: &TriangleMesh, domain: &Bounds, spacing: f64) -> Vec<BoundarySample> {
-    let least = BOUNDARY_DISTANCE * spacing;
-    let mut positions = Vec::new();
-    let mut normals = Vec::new();
-    let mut grid = PointGrid::with_cell(least);
-    let mut area_inside = 0.0;
-    for t in 0..mesh.triangles.len() {
-        let corners = mesh.corners(t);
-        let area_vector = mesh.area_vector(t);
-        let area = area_vector.length();
-        if !(area > 0.0 && area.is_finite()) {
-            continue;
-        }
-        let normal = area_vector / area;
-        let wanted = (BOUNDARY_CANDIDATES * area / (spacing * spacing)).ceil() as u64;
-        let mut inside = 0u64;
-        for c in 0..wanted {
-            let p = candidate(&corners, t as u64, c);
-            if !domain.contains(p) || looks_out(domain, p, normal, 1e-3 * spacing) {
-                continue;
-            }
-            inside += 1;
-            // The two sides of a thin wall do not exclude each other's samples.
-            let is_taken = grid.any_near(&positions, p, |other| {
-                DVec3::dot(normals[other as usize], normal) > -0.5
-            });
-            if !is_taken {
-                grid.insert(positions.len() as u32, p);
-                positions.push(p);
-                normals.push(normal);
-            }
-        }
-        area_inside += area * inside as f64 / wanted as f64;
-    }
-    let shares = surface_shares(&positions, &normals, spacing);
-    let scale = area_inside / shares.iter().sum::<f64>();
-    positions
-        .into_iter()
-        .zip(normals)
-        .zip(shares)
-        .map(|((position, normal), share)| BoundarySample {
+    let mut darts = Darts::new(spacing);
+    let area = darts.throw(mesh, domain, |_| true);
+    let areas = darts.areas(area);
+    let places = darts.positions.into_iter().zip(darts.normals);
+    let samples = places.zip(areas);
+    samples
+        .map(|((position, normal), area)| BoundarySample {
             position,
             normal,
-            area: share * scale,
+            area,
         })
         .collect()
+}
+
+/// Points thrown on a surface, none too near another on the same side.
+pub(super) struct Darts {
+    spacing: f64,
+    /// Index of the triangle of each point.
+    pub(super) triangles: Vec<u32>,
+    pub(super) positions: Vec<DVec3>,
+    normals: Vec<DVec3>,
+    grid: PointGrid,
+}
+
+impl Darts {
+    pub(super) fn new(spacing: f64) -> Self {
+        Self {
+            spacing,
+            triangles: Vec::new(),
+            positions: Vec::new(),
+            normals: Vec::new(),
+            grid: PointGrid::with_cell(BOUNDARY_DISTANCE * spacing),
+        }
+    }
+
+    /// Moves the points to `mesh`, which has the triangles of the one that they were thrown on;
+    /// `place` returns the position of a point, given by its index.
+    pub(super) fn carry(&mut self, mesh: &TriangleMesh, place: impl Fn(usize) -> DVec3) {
+        self.grid = PointGrid::with_cell(BOUNDARY_DISTANCE * self.spacing);
+        for k in 0..self.positions.len() {
+            self.positions[k] = place(k);
+            let area = mesh.area_vector(self.triangles[k] as usize);
+            self.normals[k] = area.normalize_or_zero();
+            self.grid.insert(k as u32, self.positions[k]);
+        }
+    }
+
+    /// Throws points on the triangles that `on` chooses, where none is yet; returns the area of
+    /// these triangles inside the domain, m².
+    pub(super) fn throw(
+        &mut self,
+        mesh: &TriangleMesh,
+        domain: &Bounds,
+        on: impl Fn(usize) -> bool,
+    ) -> f64 {
+        let spacing = self.spacing;
+        let mut area_inside = 0.0;
+        for t in (0..mesh.triangles.len()).filter(|&t| on(t)) {
+            let corners = mesh.corners(t);
+            let area_vector = mesh.area_vector(t);
+            let area = area_vector.length();
+            if !(area > 0.0 && area.is_finite()) {
+                continue;
+            }
+            let normal = area_vector / area;
+            let wanted = (BOUNDARY_CANDIDATES * area / (spacing * spacing)).ceil() as u64;
+            let mut inside = 0u64;
+            for c in 0..wanted {
+                let p = candidate(&corners, t as u64, c);
+                if !domain.contains(p) || looks_out(domain, p, normal, 1e-3 * spacing) {
+                    continue;
+                }
+                inside += 1;
+                // The two sides of a thin wall do not exclude each other's samples.
+                let is_taken = self.grid.any_near(&self.positions, p, |other| {
+                    DVec3::dot(self.normals[other as usize], normal) > -0.5
+                });
+                if !is_taken {
+                    self.grid.insert(self.positions.len() as u32, p);
+                    self.triangles.push(t as u32);
+                    self.positions.push(p);
+                    self.normals.push(normal);
+                }
+            }
+            area_inside += area * inside as f64 / wanted as f64;
+        }
+        area_inside
+    }
+
+    /// Returns each point's part of `area`, m².
+    pub(super) fn areas(&self, area: f64) -> Vec<f64> {
+        let shares = surface_shares(&self.positions, &self.normals, self.spacing);
+        let scale = area / shares.iter().sum::<f64>();
+        shares.into_iter().map(|share| share * scale).collect()
+    }
 }
 
 /// 1/ΣW with the cone W ∝ 1 − r/R, R = two spacings.

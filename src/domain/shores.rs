@@ -29,13 +29,14 @@ pub struct Shores {
 
 /// Boxes of a brick's edge length around each part of a solid's surface.
 #[derive(Clone, Debug)]
-struct Surface {
+pub struct Surface {
     origin: DVec3,
     boxes: Vec<DVec3>,
 }
 
 impl Surface {
-    fn of(grid: &SignedDistance, least: DVec3, cell_size: f64) -> Self {
+    /// Finds the surface in a grid; `least` is the domain's least corner, metres.
+    pub fn of(grid: &SignedDistance, least: DVec3, cell_size: f64) -> Self {
         let edge = f64::from(EDGE);
         let mut boxes = BTreeSet::new();
         // A cell that the surface crosses has a node within a cell's diagonal plus one node spacing
@@ -94,22 +95,27 @@ impl Shores {
     }
 
     /// Marks bricks beside those that hold particles: bricks that solids cut, with moving solids at
-    /// `poses` (in cells from the domain's least corner), and bricks of which the walls at `cut`
-    /// leave no more than four cells, the largest gap that is closed (flip/close_gaps). `is_wet`
-    /// has one flag per brick, `dims` bricks along each axis, x fastest; lengths are in cells.
+    /// `poses` (in cells from the domain's least corner), each with its surface where the shape
+    /// changes, and bricks of which the walls at `cut` leave no more than four cells, the largest
+    /// gap that is closed (flip/close_gaps). `is_wet` has one flag per brick, `dims` bricks along
+    /// each axis, x fastest; lengths are in cells.
     pub fn mark(
         &self,
         is_wet: &mut [bool],
         dims: [u32; 3],
         cut: &Bounds,
-        poses: impl Iterator<Item = Pose>,
+        poses: impl Iterator<Item = (Pose, Option<Surface>)>,
     ) {
         let at_rest = self.at_rest.iter().map(|surface| (surface, Pose::START));
         let with_water = is_wet.to_vec();
-        for (surface, pose) in at_rest.chain(self.moving.iter().zip(poses)) {
+        let mut add = |surface: &Surface, pose: Pose| {
             for brick in surface.bricks(pose, dims) {
                 is_wet[brick] |= has_water_about(&with_water, dims, self.periodic, brick);
             }
+        };
+        at_rest.for_each(|(surface, pose)| add(surface, pose));
+        for (surface, (pose, now)) in self.moving.iter().zip(poses) {
+            add(now.as_ref().unwrap_or(surface), pose);
         }
         for axis in 0..3 {
             let edge = f64::from(EDGE);
@@ -174,7 +180,7 @@ mod tests {
             centre: way,
             ..Pose::START
         };
-        shores.mark(&mut is_wet, DIMS, &cut, [pose].into_iter());
+        shores.mark(&mut is_wet, DIMS, &cut, [(pose, None)].into_iter());
         (0..24).filter(|&k| is_wet[k]).collect()
     }
 

@@ -67,36 +67,13 @@ impl SignedDistance {
         spacing: f64,
     ) -> Result<Self, SignedDistanceError> {
         mesh.check_inside()?;
-        let dims = grid_dims(bounds, spacing)?;
-        let bvh = Bvh::new(mesh);
-        let is_closed = mesh.open_edges().is_empty();
-        let origin = bounds.min;
-        let mut values = vec![0.0f32; dims[0] * dims[1] * dims[2]];
-        parallel::for_chunks_mut(&mut values, dims[0], |row, values| {
-            let (j, k) = (row % dims[1], row / dims[1]);
-            let mut bound = f64::INFINITY;
-            let mut before: Option<(f64, bool)> = None;
-            for (i, value) in values.iter_mut().enumerate() {
-                let p = origin + spacing * DVec3::new(i as f64, j as f64, k as f64);
-                let distance = bvh.nearest(p, bound).map_or(bound, |(d, _)| d);
-                // The next node is one spacing away, and so at most that much farther from
-                // the surface.
-                bound = (distance + spacing) * (1.0 + 1e-9);
-                let is_inside = match before {
-                    Some((d, is_inside)) if is_closed && d + distance > spacing * (1.0 + 1e-6) => {
-                        is_inside
-                    }
-                    _ => bvh.winding_number(p).abs() > 0.5,
-                };
-                before = Some((distance, is_inside));
-                *value = if is_inside { -distance } else { distance } as f32;
-            }
-        });
+        let (dims, origin) = (grid_dims(bounds, spacing)?, bounds.min);
+        let nodes = sampled(mesh, (origin, spacing, dims), &|_, _| ());
         Ok(Self {
             origin,
             spacing,
             dims,
-            values,
+            values: nodes.into_iter().map(|(value, ())| value).collect(),
         })
     }
 
@@ -193,10 +170,53 @@ impl SignedDistance {
         (cell, u, (local - inside).length() * self.spacing)
     }
 
+    /// Returns the cell around `p`, clamped to the grid, and the position within it, 0 to 1 along
+    /// each axis.
+    pub(crate) fn cell_of(&self, p: DVec3) -> ([usize; 3], DVec3) {
+        let (cell, u, _) = self.locate(p);
+        (cell, u)
+    }
+
     /// The eight values of a cell, x fastest.
     fn corners(&self, [i, j, k]: [usize; 3]) -> [f64; 8] {
         std::array::from_fn(|c| self.node(i + (c & 1), j + (c >> 1 & 1), k + (c >> 2)))
     }
+}
+
+/// Samples the distance to a mesh at the nodes of a grid, given by its first node, the distance
+/// between nodes in metres, and the number of nodes along each axis. Beside each value is what `of`
+/// gives for the node's position and the index of the nearest triangle.
+pub(crate) fn sampled<T: Send + Clone + Default>(
+    mesh: &TriangleMesh,
+    (origin, spacing, dims): (DVec3, f64, [usize; 3]),
+    of: &(impl Fn(DVec3, u32) -> T + Sync),
+) -> Vec<(f32, T)> {
+    let bvh = Bvh::new(mesh);
+    let is_closed = mesh.open_edges().is_empty();
+    let mut nodes = vec![(0.0f32, T::default()); dims[0] * dims[1] * dims[2]];
+    parallel::for_chunks_mut(&mut nodes, dims[0], |row, nodes| {
+        let (j, k) = (row % dims[1], row / dims[1]);
+        let mut nearest = (f64::INFINITY, 0);
+        let mut before: Option<(f64, bool)> = None;
+        for (i, node) in nodes.iter_mut().enumerate() {
+            let p = origin + spacing * DVec3::new(i as f64, j as f64, k as f64);
+            nearest = bvh.nearest(p, nearest.0).unwrap_or(nearest);
+            let (distance, triangle) = nearest;
+            // The next node is one spacing away, and so at most that much farther from the
+            // surface.
+            nearest.0 = (distance + spacing) * (1.0 + 1e-9);
+            let is_inside = match before {
+                Some((d, is_inside)) if is_closed && d + distance > spacing * (1.0 + 1e-6) => {
+                    is_inside
+                }
+                _ => bvh.winding_number(p).abs() > 0.5,
+            };
+            before = Some((distance, is_inside));
+            let value = if is_inside { -distance } else { distance } as f32;
+            *node = (value, of(p, triangle));
+        }
+    });
+    nodes
 }
 
 /// Returns the smallest distance between nodes, metres, not below `spacing`, at which at most
@@ -223,7 +243,7 @@ fn node_counts(bounds: &Bounds, spacing: f64) -> DVec3 {
 }
 
 /// Number of nodes that cover `bounds`.
-fn grid_dims(bounds: &Bounds, spacing: f64) -> Result<[usize; 3], SignedDistanceError> {
+pub(crate) fn grid_dims(bounds: &Bounds, spacing: f64) -> Result<[usize; 3], SignedDistanceError> {
     let size = bounds.size();
     let counts = node_counts(bounds, spacing);
     let nodes = counts.x * counts.y * counts.z;

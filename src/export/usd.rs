@@ -53,6 +53,8 @@ pub struct Solid {
     pub mesh: TriangleMesh,
     /// Pose at each frame; empty for a static solid.
     pub way: Vec<(u32, Pose)>,
+    /// Mesh at each frame, for a solid whose shape changes.
+    pub shapes: Vec<(u32, TriangleMesh)>,
 }
 
 /// A wall of the domain that makes waves.
@@ -295,7 +297,10 @@ fn put_solids(text: &mut Text, solids: &[Solid]) {
             more => format!("{wanted}_{}", more + 1),
         };
         text.open(&format!("def Mesh {}", quoted(&single)));
-        put_mesh(text, &solid.mesh.vertices, &solid.mesh.triangles);
+        match solid.shapes.is_empty() {
+            true => put_mesh(text, &solid.mesh.vertices, &solid.mesh.triangles),
+            false => put_shapes(text, &solid.shapes),
+        }
         put_way(text, &solid.way);
         text.close();
     }
@@ -362,6 +367,39 @@ fn put_mesh(text: &mut Text, vertices: &[DVec3], triangles: &[[u32; 3]]) {
         u32::to_string,
     );
     text.array("point3f[] points = ", &points, text::floats);
+    text.line("uniform token subdivisionScheme = \"none\"");
+}
+
+/// Writes a mesh that changes its shape; its triangles at each frame only where they change too.
+fn put_shapes(text: &mut Text, shapes: &[(u32, TriangleMesh)]) {
+    let triangles = &shapes[0].1.triangles;
+    let is_kept = shapes.iter().all(|(_, mesh)| mesh.triangles == *triangles);
+    let points = |mesh: &TriangleMesh| -> Vec<[f32; 3]> {
+        (mesh.vertices.iter().map(|p| p.as_vec3().to_array())).collect()
+    };
+    let extents = shapes
+        .iter()
+        .map(|(frame, mesh)| (*frame, extent(&points(mesh), 0.0)));
+    text.samples("float3[] extent", &extents.collect::<Vec<_>>());
+    let of_triangles =
+        |text: &mut Text, attribute: &str, of: &dyn Fn(&TriangleMesh) -> Vec<u32>| match is_kept {
+            true => {
+                let before = format!("{attribute} = ");
+                text.array(&before, &of(&shapes[0].1), u32::to_string);
+            }
+            false => {
+                let all = shapes.iter().map(|(frame, mesh)| (*frame, of(mesh)));
+                text.array_samples(attribute, all, u32::to_string);
+            }
+        };
+    of_triangles(text, "int[] faceVertexCounts", &|mesh| {
+        vec![3; mesh.triangles.len()]
+    });
+    of_triangles(text, "int[] faceVertexIndices", &|mesh| {
+        mesh.triangles.as_flattened().to_vec()
+    });
+    let all = shapes.iter().map(|(frame, mesh)| (*frame, points(mesh)));
+    text.array_samples("point3f[] points", all, text::floats);
     text.line("uniform token subdivisionScheme = \"none\"");
 }
 

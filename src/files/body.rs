@@ -93,6 +93,7 @@ pub(super) fn build(
         slide: None,
         turn: None,
         track: None,
+        sequence: None,
         body: Some(free),
     })
 }

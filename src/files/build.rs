@@ -13,11 +13,11 @@ use super::{
     fit::{comes_into, fits},
     grids, keep,
     keys::{BodySpec, BoxSpec, DomainSpec, MeshSpec, SceneSpec, SolidSpec, SwarmSpec, WaterSpec},
-    moving_solid, no_slip, periodic, probe, sources, start_waves, wave_maker,
+    mesh_sequence, moving_solid, no_slip, periodic, probe, sources, start_waves, wave_maker,
 };
 use swell_domain::{
     bounds::Bounds,
-    mesh_file::{self, Digits, Loaded, MeshFormat},
+    mesh_file::{self, Digits, Loaded, MeshError, MeshFormat, Outline},
     sampling,
 };
 use swell_scene::{
@@ -106,6 +106,7 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
     };
     let emitters = sources::emitters(doc, &spec.emitter, &around)?;
     let drains = sources::drains(doc, &spec.drain, &around)?;
+    mesh_sequence::check_emitters(doc, &moving_solids, &emitters, lattice.spacing)?;
     let entering = swell_scene::sources::most_entering(&emitters, lattice.spacing, &shot);
     check_particle_count(doc, &water, entering, &domain, &lattice)?;
     let around = effects::Surroundings {
@@ -186,8 +187,13 @@ fn solids(
             solids.push(static_solid(doc, &path, spec, around)?);
             continue;
         }
-        let placed = solid_mesh(doc, &path, spec, around)?;
-        moving.push(moving_solid::build(doc, &path, placed, spec, around)?);
+        moving.push(match &spec.sequence {
+            Some(sequence) => mesh_sequence::build(doc, &path, (spec, sequence), around)?,
+            None => {
+                let placed = solid_mesh(doc, &path, spec, around)?;
+                moving_solid::build(doc, &path, placed, spec, around)?
+            }
+        });
     }
     Ok((solids, moving))
 }
@@ -426,7 +432,11 @@ fn solid_mesh(
     spec: &SolidSpec,
     around: &wave_maker::Surroundings<'_>,
 ) -> Result<PlacedMesh> {
-    let mesh = (&spec.placed(), around.spacing);
+    let key = format!("{path}.mesh");
+    let Some(mesh) = &spec.mesh else {
+        return Err(doc.fault_of(&key, "missing"));
+    };
+    let mesh = (&spec.placed(mesh, spec.blake3.as_ref()), around.spacing);
     placed_mesh(doc, around.base_dir, path, "mesh", mesh)
 }
 
@@ -437,19 +447,34 @@ fn placed_mesh(
     base_dir: &Path,
     path: &str,
     name: &str,
-    (spec, spacing): (&MeshSpec, f64),
+    spec: (&MeshSpec, f64),
 ) -> Result<PlacedMesh> {
-    let key = format!("{path}.{name}");
-    let fail = |problem: String| doc.fault_of(&key, problem);
-    let file = doc.find(base_dir, &key, &spec.file)?;
-    let bytes = MeshFormat::of(&file)
-        .and_then(|format| Ok((format, mesh_file::read_bytes(&file)?)))
-        .and_then(|(format, bytes)| Ok((Loaded::from_bytes(&bytes, format, &file)?, bytes)));
-    let (loaded, bytes) = bytes.map_err(|error| fail(chain(&error)))?;
+    let keys = [name, "blake3"].map(|name| format!("{path}.{name}"));
+    let (placed, _) = placed_mesh_like(doc, base_dir, (&keys[0], &keys[1]), spec, None)?;
+    Ok(placed)
+}
+
+/// Reads a mesh as [`placed_mesh`] does, whose file and hash are in these keys, with the triangles
+/// of an outline where its faces have the same corners; also returns its own outline.
+pub(super) fn placed_mesh_like(
+    doc: &Document<'_>,
+    base_dir: &Path,
+    (key, hash_key): (&str, &str),
+    (spec, spacing): (&MeshSpec, f64),
+    outline: Option<&Outline>,
+) -> Result<(PlacedMesh, Outline)> {
+    let fail = |problem: String| doc.fault_of(key, problem);
+    let file = doc.find(base_dir, key, &spec.file)?;
+    let read = || {
+        let format = MeshFormat::of(&file)?;
+        let bytes = mesh_file::read_bytes(&file)?;
+        Ok((Loaded::like(&bytes, format, &file, outline)?, bytes))
+    };
+    let ((loaded, outline), bytes) = read().map_err(|error: MeshError| fail(chain(&error)))?;
     let file_hash = blake3::hash(&bytes).to_hex().to_string();
     if spec.blake3.as_ref().is_some_and(|hash| *hash != file_hash) {
         let problem = format!("{} has BLAKE3 {file_hash}", file.display());
-        return Err(doc.fault_of(&format!("{path}.blake3"), problem));
+        return Err(doc.fault_of(hash_key, problem));
     }
     let placement = Placement {
         translate: DVec3::from_array(spec.translate),
@@ -462,7 +487,7 @@ fn placed_mesh(
     let holes = mesh
         .check_inside()
         .map_err(|error| fail(format!("{}: {error}", file.display())))?;
-    Ok(PlacedMesh {
+    let placed = PlacedMesh {
         file,
         file_hash,
         placement,
@@ -470,7 +495,8 @@ fn placed_mesh(
         holes,
         rounding: rounding.min(DVec3::splat(MOST_STEP * spacing)),
         faults: [loaded.crossing, coarse].into_iter().flatten().collect(),
-    })
+    };
+    Ok((placed, outline))
 }
 
 /// Warns if the coordinates are so far from zero that 32-bit floats do not resolve particles.

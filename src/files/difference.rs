@@ -67,8 +67,10 @@ pub fn physics_hash(scene: &Scene) -> String {
 /// For the key of a file compared by content, returns the key itself and the key of its hash.
 fn hash_beside(path: &str) -> Option<(String, String)> {
     let is_by_hash = key::find(keys::SCENE, path)?.physics == Physics::ByHash;
-    let (table, _) = path.rsplit_once('.')?;
-    is_by_hash.then(|| (path.to_owned(), format!("{table}.blake3")))
+    let (table, name) = path.rsplit_once('.')?;
+    // Of an array of files, each has its hash in the same place.
+    let place = name.find('[').map_or("", |at| &name[at..]);
+    is_by_hash.then(|| (path.to_owned(), format!("{table}.blake3{place}")))
 }
 
 fn read(text: &str) -> Result<Table, SceneError> {

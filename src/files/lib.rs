@@ -28,6 +28,7 @@ mod grids;
 mod keep;
 mod key;
 mod load;
+mod mesh_sequence;
 mod motion;
 mod motion_table;
 mod moving_solid;

@@ -28,14 +28,15 @@ type Result<T> = std::result::Result<T, SceneError>;
 impl SolidSpec {
     /// Whether it is a moving solid.
     pub(super) fn moves(&self) -> bool {
-        self.motion.is_some() || self.turn.is_some() || self.track.is_some()
+        let rigid = self.motion.is_some() || self.turn.is_some() || self.track.is_some();
+        rigid || self.sequence.is_some()
     }
 
-    /// Returns its mesh at the start.
-    pub(super) fn placed(&self) -> MeshSpec {
+    /// Returns its mesh at the start, `file` with this hash.
+    pub(super) fn placed(&self, file: &str, blake3: Option<&String>) -> MeshSpec {
         MeshSpec {
-            file: self.mesh.clone(),
-            blake3: self.blake3.clone(),
+            file: file.to_owned(),
+            blake3: blake3.cloned(),
             translate: self.translate,
             rotate_degrees: self.rotate_degrees,
             scale: self.scale,
@@ -97,6 +98,7 @@ pub(super) fn build(
         slide,
         turn,
         track,
+        sequence: None,
         body: None,
     };
     check_way(doc, &solid, path, around.domain, around.shot)?;
@@ -105,7 +107,7 @@ pub(super) fn build(
 
 /// Checks that the solid enters the domain at some time and that its motion is plausible: a
 /// displacement of more than ten domain lengths or an extreme speed is taken for a typing error.
-fn check_way(
+pub(super) fn check_way(
     doc: &Document<'_>,
     solid: &MovingSolid,
     path: &str,
@@ -153,7 +155,10 @@ fn check_way(
         }
         // The solid may turn to any angle.
         (None, Some(turn)) => Some(ball(turn.pivot, turn.reach)),
-        (None, None) => solid.placed.mesh.bounds(),
+        (None, None) => match &solid.sequence {
+            Some(sequence) => Some(sequence.shape.bounds()),
+            None => solid.placed.mesh.bounds(),
+        },
     };
     let swept = swept.map(|b| joined(b, b.moved(way)));
     if swept.is_some_and(|b| comes_into(&b, domain, solid.placed.rounding)) {

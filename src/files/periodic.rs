@@ -154,6 +154,7 @@ pub(super) fn check_solids(
                 turn.is_some_and(|it| it.axis.normalize()[axis as usize].abs() < 1.0 - ACROSS);
             let (key, does) = match (slides, leans) {
                 _ if solid.track.is_some() => ("track", "may move along"),
+                _ if solid.sequence.is_some() => ("sequence", "may move along"),
                 (true, _) => ("direction", "moves along"),
                 (_, true) => ("axis", "turns about another axis than"),
                 _ => continue,

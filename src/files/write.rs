@@ -9,8 +9,9 @@ use super::{
     body, keep,
     keys::{
         AbsorptionSpec, BearerSpec, BodySpec, BoxSpec, DomainSpec, DrainSpec, EmitterSpec,
-        GridsSpec, KeepSpec, MeshSpec, PbfSpec, ProbeSpec, ScaleSpec, SceneSpec, SolidSpec,
-        SolverSpec, SwarmSpec, TrackSpec, WallMotionSpec, WaterSpec, WaveMakerSpec,
+        FilesSpec, GridsSpec, KeepSpec, MeshSpec, PbfSpec, ProbeSpec, ScaleSpec, SceneSpec,
+        SequenceSpec, SolidSpec, SolverSpec, SwarmSpec, TrackSpec, WallMotionSpec, WaterSpec,
+        WaveMakerSpec,
     },
     toml_text::{table, to_toml},
 };
@@ -22,6 +23,7 @@ use swell_domain::{
 use swell_scene::{
     Iteration, Pbf, PlacedMesh, Scene, Solver, Stop, Swarm, WaveMaker,
     grids::Grids,
+    mesh_sequence::MeshSequence,
     moving_solid::MovingSolid,
     probe::{Bearer, Probe, ProbeKind},
     sources::Region,
@@ -124,8 +126,9 @@ impl Writer<'_> {
     fn solid(&self, placed: &PlacedMesh) -> SolidSpec {
         let mesh = self.mesh(placed);
         SolidSpec {
-            mesh: mesh.file,
+            mesh: Some(mesh.file),
             blake3: mesh.blake3,
+            sequence: None,
             translate: mesh.translate,
             rotate_degrees: mesh.rotate_degrees,
             scale: mesh.scale,
@@ -141,6 +144,14 @@ impl Writer<'_> {
     fn moving_solid(&self, solid: &MovingSolid) -> SolidSpec {
         let (slide, turn, origin) = (&solid.slide, &solid.turn, self.scene.origin);
         let motion = |motion| WallMotionSpec::from(motion);
+        if let Some(sequence) = &solid.sequence {
+            return SolidSpec {
+                mesh: None,
+                blake3: None,
+                sequence: Some(self.sequence(sequence)),
+                ..self.solid(&solid.placed)
+            };
+        }
         SolidSpec {
             direction: slide.as_ref().map(|it| it.direction.to_array()),
             motion: slide.as_ref().map(|it| motion(&it.motion).into()),
@@ -154,6 +165,15 @@ impl Writer<'_> {
                 poses: Some(it.written(origin)),
             }),
             ..self.solid(&solid.placed)
+        }
+    }
+
+    fn sequence(&self, sequence: &MeshSequence) -> SequenceSpec {
+        let paths = sequence.files.iter();
+        let paths = paths.map(|(file, hash)| (self.mesh_path)(file, hash));
+        SequenceSpec {
+            files: FilesSpec::List(paths.collect()),
+            ..sequence.into()
         }
     }
 

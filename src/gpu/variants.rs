@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use super::{error::GpuError, shader};
 
 /// Combinations of conditions that a plan can set; every pass must compose under each.
-const VARIANTS: [&[&str]; 78] = [
+const VARIANTS: [&[&str]; 81] = [
     &[],
     &["SOLIDS"],
     &["NEIGHBOR_LIST"],
@@ -22,6 +22,16 @@ const VARIANTS: [&[&str]; 78] = [
     &["PROJECTED", "SOLIDS"],
     &["WALL_WORK"],
     &["WALL_WORK", "SOLIDS", "MOVING_SOLIDS"],
+    &["WALL_WORK", "SOLIDS", "MOVING_SOLIDS", "SHAPES"],
+    &[
+        "SOLIDS",
+        "MOVING_SOLIDS",
+        "SHAPES",
+        "CORRECTION",
+        "PUSHED",
+        "GHOST_FLUID",
+    ],
+    &["SOLIDS", "MOVING_SOLIDS", "SHAPES", "BODIES", "APIC"],
     &[
         "PAGED",
         "PROJECTED",

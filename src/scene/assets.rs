@@ -48,8 +48,10 @@ impl Scene {
         let mut files = Vec::new();
         let moving = self.moving_solids.iter().map(|solid| &solid.placed);
         let placed = self.solids.iter().chain(moving).chain(&self.water.meshes);
-        for placed in placed.chain(self.source_meshes()) {
-            let file = (placed.file.clone(), placed.file_hash.clone());
+        let placed = placed.chain(self.source_meshes());
+        let single = placed.map(|placed| (placed.file.clone(), placed.file_hash.clone()));
+        let sequences = self.sequences().flat_map(|it| it.files.iter().cloned());
+        for file in single.chain(sequences) {
             if !files.contains(&file) {
                 files.push(file);
             }

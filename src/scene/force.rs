@@ -1,5 +1,7 @@
 //! Surfaces on which force probes integrate the pressure.
 
+use std::borrow::Cow;
+
 use glam::DVec3;
 
 use super::{Scene, Wall, probe::Bearer};
@@ -17,10 +19,13 @@ impl Scene {
     pub fn patches(&self, bearer: Bearer, absorbers: &AbsorberStates, time: f64) -> Vec<Patch> {
         let edge = self.solver.cell_size();
         let (mesh, pose) = match bearer {
-            Bearer::Solid(index) => (&self.solids[index].mesh, Pose::START),
+            Bearer::Solid(index) => (Cow::Borrowed(&self.solids[index].mesh), Pose::START),
             Bearer::MovingSolid(index) => {
                 let solid = &self.moving_solids[index];
-                (&solid.placed.mesh, solid.pose(&[], time))
+                match &solid.sequence {
+                    Some(it) => (Cow::Owned(it.shape.mesh(time)), Pose::START),
+                    None => (Cow::Borrowed(&solid.placed.mesh), solid.pose(&[], time)),
+                }
             }
             Bearer::Wall(wall) => return patches(&self.face(wall, absorbers, time), edge),
         };
@@ -28,7 +33,7 @@ impl Scene {
             let outside = patch.at + 0.5 * edge * patch.normal();
             self.domain.contains(outside)
         };
-        let all = patches(mesh, edge)
+        let all = patches(&mesh, edge)
             .into_iter()
             .map(|patch| patch.posed(&pose));
         all.filter(meets_water).collect()

@@ -6,6 +6,7 @@ pub mod flip;
 pub mod grids;
 pub mod lint;
 pub mod look;
+pub mod mesh_sequence;
 pub mod moving_solid;
 pub mod open_waves;
 pub mod origin;

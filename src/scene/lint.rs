@@ -56,6 +56,7 @@ impl Scene {
     pub fn lints(&self) -> Vec<String> {
         let mut lints = self.lint_tracks();
         self.lint_motions(&mut lints);
+        self.lint_sequences(&mut lints);
         let level = self.still_depth();
         let still = level.map(Still::on_the_floor);
         let makers = self.wave_makers.iter().enumerate();

@@ -1,9 +1,9 @@
-//! Moving solids: a mesh that slides along a direction, turns about an axis, follows a track, or
-//! floats.
+//! Moving solids: a mesh that slides along a direction, turns about an axis, follows a track,
+//! changes its shape, or floats.
 
 use glam::{DQuat, DVec3};
 
-use super::{PlacedMesh, Scene, solid_track::Track};
+use super::{PlacedMesh, Scene, mesh_sequence::MeshSequence, solid_track::Track};
 use swell_domain::{
     absorber::AbsorberStates,
     body::{Body, BodyState},
@@ -13,10 +13,12 @@ use swell_domain::{
     pose::{Passage, Pose},
 };
 
-/// A solid that slides along a line, turns about an axis, follows a track, or floats.
+/// A solid that slides along a line, turns about an axis, follows a track, changes its shape, or
+/// floats.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MovingSolid {
-    /// Mesh at its initial placement.
+    /// Mesh at its initial placement. Of a solid whose shape changes, the first file, with the
+    /// mesh at the start of the shot.
     pub placed: PlacedMesh,
     /// Translation along a line; `None` for a solid that does not slide.
     pub slide: Option<Slide>,
@@ -24,6 +26,8 @@ pub struct MovingSolid {
     pub turn: Option<Turn>,
     /// Poses over time from a file or the scene, in place of both.
     pub track: Option<Track>,
+    /// Meshes over time, in place of all of these.
+    pub sequence: Option<MeshSequence>,
     /// What the water moves, in place of all of them.
     pub body: Option<FreeBody>,
 }
@@ -119,10 +123,20 @@ impl Turn {
 impl MovingSolid {
     /// Returns the key of its motion, the first one if there are two.
     pub fn key(&self) -> &'static str {
-        match (&self.track, &self.slide) {
-            (Some(_), _) => "track",
-            (None, Some(_)) => "motion",
-            (None, None) => "turn",
+        match (&self.sequence, &self.track, &self.slide) {
+            (Some(_), _, _) => "sequence",
+            (None, Some(_), _) => "track",
+            (None, None, Some(_)) => "motion",
+            (None, None, None) => "turn",
+        }
+    }
+
+    /// Returns the name of its file, or what the names of its files have in common.
+    pub fn name(&self) -> String {
+        let name = self.placed.name();
+        match &self.sequence {
+            Some(_) => MeshSequence::stem(&name).to_owned(),
+            None => name,
         }
     }
 
@@ -136,7 +150,17 @@ impl MovingSolid {
         self.turn.is_some() || self.track.is_some() || self.body.is_some()
     }
 
-    /// Returns the pose at time `t`, seconds. A body moves on from its state among `bodies` without
+    /// Returns the mesh in its pose at time `t`, seconds, with bodies as in [`Self::pose`].
+    pub fn mesh(&self, bodies: &[BodyState], t: f64) -> TriangleMesh {
+        let way = self.pose(bodies, t).affine();
+        match &self.sequence {
+            Some(sequence) => sequence.shape.mesh(t).transformed(&way),
+            None => self.placed.mesh.transformed(&way),
+        }
+    }
+
+    /// Returns the pose at time `t`, seconds. That of a solid whose shape changes is always the one
+    /// at the start. A body moves on from its state among `bodies` without
     /// forces.
     pub fn pose(&self, bodies: &[BodyState], t: f64) -> Pose {
         if let Some(it) = &self.body {
@@ -192,6 +216,9 @@ impl MovingSolid {
         if let Some(track) = &self.track {
             return track.peak_speed(t0, t1);
         }
+        if let Some(sequence) = &self.sequence {
+            return sequence.shape.peak_speed(t0, t1);
+        }
         let slide = self.slide.as_ref();
         let slide = slide.map_or(0.0, |slide| slide.motion.peak_speed(t0, t1));
         let turn = self.turn.as_ref().map_or(0.0, |turn| {
@@ -238,6 +265,20 @@ impl Scene {
         };
         let speeds = self.bodies().filter(is_inside).map(|it| it.speed(bodies));
         speeds.fold(0.0, f64::max)
+    }
+
+    /// Bounds the speed of the surfaces of solids whose shape changes within `[t0, t1]`, m/s.
+    pub fn fastest_shape(&self, t0: f64, t1: f64) -> f64 {
+        let sequences = self.sequences();
+        let speeds = sequences.map(|it| it.shape.peak_speed(t0, t1));
+        speeds.fold(0.0, f64::max)
+    }
+
+    /// Iterates over the shapes of the solids whose shape changes.
+    pub fn sequences(&self) -> impl Iterator<Item = &MeshSequence> {
+        self.moving_solids
+            .iter()
+            .filter_map(|it| it.sequence.as_ref())
     }
 
     /// Bounds the speed of wave makers, with what absorbing ones add to their own motion, and of
@@ -288,10 +329,20 @@ impl Scene {
         });
         let mut all: Vec<_> = still.collect();
         let period = self.period();
-        for (solid, samples) in self.moving_solids.iter().zip(&boundary.moving_samples) {
+        for (index, solid) in self.moving_solids.iter().enumerate() {
+            if let Some(shape) = boundary.shape(index) {
+                let samples = shape.samples.iter().flat_map(|it| it.at(time, step));
+                all.extend(samples.map(|sample| SolidSample {
+                    position: period.wrap(sample.position - least),
+                    area: sample.area,
+                    velocity: sample.velocity,
+                }));
+                continue;
+            }
+            let samples = boundary.moving_samples.get(index);
             let passage = solid.passage_to(bodies, time, step);
             let pose = passage.at(1.0);
-            all.extend(samples.iter().map(|sample| {
+            all.extend(samples.into_iter().flatten().map(|sample| {
                 let x = pose.place(sample.position);
                 SolidSample {
                     position: period.wrap(x - least),

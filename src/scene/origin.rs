@@ -52,6 +52,13 @@ impl Scene {
         for track in self.moving_solids.iter_mut().flat_map(|it| &mut it.track) {
             track.carry(way);
         }
+        for it in self
+            .moving_solids
+            .iter_mut()
+            .flat_map(|it| &mut it.sequence)
+        {
+            it.shape = it.shape.moved(way);
+        }
         for it in self.moving_solids.iter_mut().flat_map(|it| &mut it.body) {
             it.body.carry(way);
         }

@@ -56,9 +56,10 @@ pub fn projected_substep(start: f64, length: f64, before: f64) -> Substep {
     }
 }
 
-/// Cells that a body may move in a substep. The projection knows where it stands at the substep's
-/// start: a body that goes farther, or that a contact stops after the projection, packs the water
-/// between it and what is near too densely.
+/// Cells that a body may move in a substep, and the surface of a solid whose shape changes. The
+/// projection knows where a body stands at the substep's start: one that goes farther, or that a
+/// contact stops after the projection, packs the water between it and what is near too densely. Of
+/// a surface, distances are linear within a substep: a solid thinner than its path would open.
 const BODY_CELLS: f64 = 0.5;
 
 impl Scene {
@@ -301,6 +302,8 @@ impl FlipScene<'_> {
         let longest = by_acceleration.max(longest(fastest + push.speed, gravity));
         let longest = longest.min(self.effects.longest_step(self.grain()).0);
         let longest = longest.min(self.longest_body_step(bodies));
+        let shapes = self.fastest_shape(start, start + remaining);
+        let longest = longest.min(BODY_CELLS * flip.cell_size / shapes);
         let of_waves = self.longest_wave_step();
         let is_of_waves = of_waves < longest;
         let longest = longest.min(of_waves);

@@ -4,13 +4,18 @@
 use glam::{DQuat, DVec3};
 
 use swell_domain::{
-    body::BodyState, boundary::Boundary, pose::Passage, signed_distance::SignedDistance,
+    body::BodyState,
+    boundary::{Boundary, Shape},
+    pose::Passage,
+    shape::ShapeField,
+    shores::Surface,
+    signed_distance::SignedDistance,
 };
 use swell_gpu::program::Program;
-use swell_scene::{Scene, moving_solid::MovingSolid};
+use swell_scene::{Scene, moving_solid::MovingSolid, step::Substep};
 
 use super::{
-    buffers::{POSED_SOLIDS, SOLID_DISTANCE, SOLID_GRID},
+    buffers::{POSED_SOLIDS, SOLID_DISTANCE, SOLID_GRID, velocities_behind},
     params::{PosedSolid, SolidGrid},
     plan::Counts,
 };
@@ -23,23 +28,45 @@ impl Counts {
             boundary_samples: boundary.sample_count(),
             solid_grid: boundary.distance.as_ref().map_or([0; 3], |grid| grid.dims),
             moving_nodes: boundary.moving.iter().map(|grid| grid.values.len()).sum(),
+            shape_nodes: boundary.shape_nodes(),
             solids: boundary.grids().count(),
             ..Self::default()
         }
     }
 
-    /// Number of nodes of all solids' signed-distance grids.
-    pub(super) fn solid_nodes(&self) -> usize {
-        self.solid_grid.iter().product::<usize>() + self.moving_nodes
+    /// Number of floats in [`SOLID_DISTANCE`] for all solids' signed-distance grids.
+    pub(super) fn solid_floats(&self) -> usize {
+        let rigid = self.solid_grid.iter().product::<usize>() + self.moving_nodes;
+        rigid + (FLOATS_OF_SHAPE - 1) * self.shape_nodes
     }
+}
+
+/// Floats a node of a solid whose shape changes: the distance at the substep's start and that at
+/// its end, and a velocity.
+const FLOATS_OF_SHAPE: usize = 5;
+
+/// Marks a solid whose shape changes, in [`SolidGrid::first`].
+const SHAPE: u32 = 1 << 31;
+
+/// Iterates over the grids of all solids, each with its shape if that changes and with the index of
+/// its first float in [`SOLID_DISTANCE`].
+fn placed(boundary: &Boundary) -> impl Iterator<Item = (&SignedDistance, Option<&Shape>, usize)> {
+    let still = boundary.distance.iter().map(|grid| (grid, None));
+    let moving = boundary.moving.iter().enumerate();
+    let moving = moving.map(|(index, grid)| (grid, boundary.shape(index)));
+    let mut next = 0;
+    still.chain(moving).map(move |(grid, shape)| {
+        let first = next;
+        let floats = if shape.is_some() { FLOATS_OF_SHAPE } else { 1 };
+        next += floats * grid.values.len();
+        (grid, shape, first)
+    })
 }
 
 /// Uploads the signed distances of all solids.
 pub(super) fn upload_distance(boundary: &Boundary, program: &Program, scene: &Scene) {
-    let mut first = 0;
-    for grid in boundary.grids() {
+    for (grid, _, first) in placed(boundary) {
         program.upload(SOLID_DISTANCE, first, &grid.values);
-        first += grid.values.len();
     }
     if let (Some(grid), []) = (&boundary.distance, &boundary.moving[..]) {
         program.upload(SOLID_GRID, 0, &[solid_grid(grid, scene.domain.min, 0)]);
@@ -56,6 +83,9 @@ pub(super) struct Movers {
     reaches: Vec<f64>,
     /// Index of the first moving solid's grid: 1 if there are static solids, else 0.
     statics: usize,
+    /// Solids whose shape changes, by the index of the moving solid, each with the index of its
+    /// first float.
+    shapes: Vec<(usize, usize, ShapeField)>,
 }
 
 impl Movers {
@@ -64,20 +94,23 @@ impl Movers {
             return None;
         }
         let identity = DQuat::IDENTITY.as_quat().to_array();
-        let mut first = 0;
-        let resting = |grid: &SignedDistance| {
-            let posed = PosedSolid {
-                grid: solid_grid(grid, grid.origin, first),
+        let resting = |(grid, shape, first): (&SignedDistance, Option<&Shape>, usize)| {
+            let mark = if shape.is_some() { SHAPE } else { 0 };
+            PosedSolid {
+                grid: solid_grid(grid, grid.origin, first as u32 | mark),
                 centre: three(grid.origin - scene.domain.min),
                 reach: grid.reach(grid.origin) as f32,
                 back: identity,
                 end_back: identity,
                 ..PosedSolid::default()
-            };
-            first += grid.values.len() as u32;
-            posed
+            }
         };
-        let resting = boundary.grids().map(resting).collect();
+        let resting = placed(boundary).map(resting).collect();
+        let statics = boundary.grids().count() - boundary.moving.len();
+        let shapes = placed(boundary).enumerate().filter_map(|(k, (_, shape, first))| {
+            let field = shape?.field.clone();
+            Some((k - statics, first, field))
+        });
         // A solid that does not rotate may have any reference point: its first node gives the
         // least rounding.
         let solids = scene.moving_solids.iter().zip(&boundary.moving);
@@ -91,7 +124,8 @@ impl Movers {
             resting,
             origins: boundary.grids().map(|grid| grid.origin).collect(),
             reaches: solids.map(reach).collect(),
-            statics: boundary.grids().count() - boundary.moving.len(),
+            statics,
+            shapes: shapes.collect(),
         })
     }
 
@@ -101,8 +135,21 @@ impl Movers {
         (self.statics + prescribed.count()) as u32
     }
 
+    /// Returns where a moving solid is at the start of a substep, if its shape changes; `least` is
+    /// the domain's least corner, metres.
+    pub(super) fn surface(
+        &self,
+        index: usize,
+        substep: &Substep,
+        (least, cell_size): (DVec3, f64),
+    ) -> Option<Surface> {
+        let (_, _, field) = self.shapes.iter().find(|(of, ..)| *of == index)?;
+        let step = field.step(substep.start, substep.length);
+        Some(Surface::of(&step.before, least, cell_size))
+    }
+
     /// Uploads the poses at `start`, with the velocities that take them to their poses `length`
-    /// seconds later.
+    /// seconds later, and the shapes that change within this time.
     pub(super) fn upload(
         &self,
         program: &Program,
@@ -139,6 +186,14 @@ impl Movers {
                 ..posed[k]
             };
             fastest = fastest.max(velocity.length() + spin.length() * reach);
+        }
+        for (_, first, field) in &self.shapes {
+            let step = field.step(start, length);
+            let nodes = step.velocity.len();
+            program.upload(SOLID_DISTANCE, *first, &step.before.values);
+            program.upload(SOLID_DISTANCE, first + nodes, &step.after.values);
+            program.upload(velocities_behind(first + 2 * nodes), 0, &step.velocity);
+            fastest = fastest.max(step.fastest);
         }
         for solid in &mut posed {
             (solid.fastest, solid.length) = (fastest as f32, length as f32);

@@ -31,13 +31,16 @@ pub const COUNTERS: Buf<Counters> = Buf::new("counters");
 /// Δt; for FLIP over a substep, divided by Δx² Δt, W/m².
 pub const BOUNDARY_WORK: Buf<f32> = Buf::new("boundary_work");
 /// Signed distances at the nodes of all solids' grids, one grid after another, x fastest, metres.
-/// With PBF and moving solids, [`sample_velocity`] follows.
+/// Of a solid whose shape changes they are those at the substep's start, and behind them are those
+/// at its end, and the velocities of the surface, three floats a node, m/s. With PBF and moving
+/// solids the velocities of boundary samples follow.
 pub const SOLID_DISTANCE: Buf<f32> = Buf::new("solid_distance");
 /// Geometry of the static solids' signed-distance grid.
 pub const SOLID_GRID: Buf<SolidGrid> = Buf::uniform("solid_grid");
 /// Geometry and motion of all solids' signed-distance grids.
 pub const POSED_SOLIDS: Buf<PosedSolid> = Buf::new("posed_solids");
-/// Velocity of each boundary sample of PBF, m/s, behind the distances at `nodes` nodes.
-pub fn sample_velocity(nodes: usize) -> Buf<[f32; 3]> {
-    SOLID_DISTANCE.after(nodes).retyped()
+/// Velocities behind the first `floats` of [`SOLID_DISTANCE`], m/s: of the surface of a solid whose
+/// shape changes, at each node, or of each boundary sample of PBF.
+pub fn velocities_behind(floats: usize) -> Buf<[f32; 3]> {
+    SOLID_DISTANCE.after(floats).retyped()
 }

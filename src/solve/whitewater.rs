@@ -99,7 +99,7 @@ fn plan(scene: &PbfScene, boundary: &Boundary, water: usize, white: usize) -> Pl
     );
     table.add("whitewater", WHITE_COUNT.sized(1));
     if plan.has_solids() {
-        table.add("solids", SOLID_DISTANCE.sized(counts.solid_nodes()));
+        table.add("solids", SOLID_DISTANCE.sized(counts.solid_floats()));
         table.add("solids", BOUNDARY_CELL_START.sized(cells + 1));
         match counts.moving_nodes {
             0 => table.add("solids", SOLID_GRID.sized(1)),
@@ -126,6 +126,7 @@ fn pass(
     let conditions = [
         ("SOLIDS", plan.has_solids()),
         ("MOVING_SOLIDS", plan.counts.moving_nodes > 0),
+        ("SHAPES", plan.counts.shape_nodes > 0),
         ("PERIODIC", scene.is_periodic()),
     ];
     let constants = match (name, settings) {

@@ -1,6 +1,7 @@
 //! A bake that begins from a frame of another cache.
 
 use std::{
+    borrow::Cow,
     ffi::{OsStr, OsString},
     fmt,
     path::PathBuf,
@@ -191,9 +192,13 @@ impl Branch {
 /// Note about particles of a start at `time` seconds that solids of the scene cover.
 pub(super) fn note_covered(scene: &Scene, start: &Start, time: f64) -> Option<String> {
     let boundary = &start.boundary;
-    let still = boundary.distance.iter().map(|field| (field, Pose::START));
-    let solids = boundary.moving.iter().zip(&scene.moving_solids);
-    let moving = solids.map(|(field, solid)| (field, solid.pose(&start.particles.bodies, time)));
+    let still = boundary.distance.iter();
+    let still = still.map(|field| (Cow::Borrowed(field), Pose::START));
+    let solids = scene.moving_solids.iter().enumerate();
+    let moving = solids.map(|(index, solid)| {
+        let pose = solid.pose(&start.particles.bodies, time);
+        (boundary.moving_at(index, time), pose)
+    });
     let fields: Vec<_> = still.chain(moving).collect();
     let is_covered = |x: &&[f32; 3]| {
         let x = Vec3::from_array(**x).as_dvec3();

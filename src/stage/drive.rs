@@ -14,6 +14,7 @@ use glam::DVec3;
 use swell_cache::ProbeValues;
 use swell_domain::{
     absorber::AbsorberStates,
+    boundary::Boundary,
     particles::Particles,
     signed_distance::SignedDistance,
     solver::{NoWatch, PassTime, StepReport, Unread},
@@ -65,12 +66,10 @@ struct Behind<'a> {
     report: Option<StepReport>,
 }
 
-/// What enters and leaves at the end of each frame, and the solids that it meets: those at rest,
-/// and the moving ones in their start position.
+/// What enters and leaves at the end of each frame, and the solids that it meets, without samples.
 struct Exchanged {
     sources: Sources,
-    still: Option<SignedDistance>,
-    moving: Vec<SignedDistance>,
+    boundary: Option<Boundary>,
 }
 
 impl Exchanged {
@@ -78,11 +77,14 @@ impl Exchanged {
     fn of(start: &Start) -> Option<Self> {
         // Drains ignore solids.
         let meets_solids = !start.sources.emitters.is_empty();
-        let boundary = meets_solids.then_some(&start.boundary);
         (!start.sources.is_empty()).then(|| Self {
             sources: start.sources.clone(),
-            still: boundary.and_then(|it| it.distance.clone()),
-            moving: boundary.map_or_else(Vec::new, |it| it.moving.clone()),
+            boundary: meets_solids.then(|| Boundary {
+                distance: start.boundary.distance.clone(),
+                moving: start.boundary.moving.clone(),
+                shapes: start.boundary.shapes.clone(),
+                ..Boundary::default()
+            }),
         })
     }
 }
@@ -235,12 +237,21 @@ impl<'a> Drive<'a> {
         };
         let scene = self.scene;
         let bodies = particles.bodies.clone();
+        let (frame, next_id) = (self.ahead.frame, &mut self.next_id);
+        // Of a solid whose shape changes, the shape at the frame's end is all that is asked for.
+        let time = scene.shot.time(frame);
+        let boundary = it.boundary.as_ref();
+        let moving = boundary.into_iter().flat_map(|it| {
+            let all = 0..it.moving.len();
+            all.map(move |index| it.moving_at(index, time))
+        });
+        let moving: Vec<_> = moving.collect();
+        let moving: Vec<&SignedDistance> = moving.iter().map(AsRef::as_ref).collect();
         let solids = Solids {
-            still: it.still.as_ref(),
-            moving: &it.moving,
+            still: boundary.and_then(|it| it.distance.as_ref()),
+            moving: &moving,
             pose: &|index, seconds| scene.moving_solids[index].pose(&bodies, seconds),
         };
-        let (frame, next_id) = (self.ahead.frame, &mut self.next_id);
         let exchange = it.sources.exchange(frame, &solids, particles, next_id);
         if self.behind.watch.is_some() {
             scene.budget.check_count(frame, particles.len())?;

@@ -9,7 +9,6 @@ mod content;
 mod error;
 mod expected;
 mod folder;
-mod pattern;
 mod shot;
 mod usdc;
 
@@ -51,9 +50,9 @@ use self::{
 pub use self::{
     error::ExportError,
     expected::{ExpectedExport, expected},
-    pattern::{Pattern, PatternError},
     usdc::UsdcError,
 };
+pub use swell_domain::name_pattern::{Pattern, PatternError};
 
 /// Default number of voxels of the mesh's grid per particle spacing, the same as in the renderer.
 pub const VOXELS: f64 = swell_domain::level_set::VOXELS;

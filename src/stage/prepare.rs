@@ -1,17 +1,23 @@
 //! Prepares a scene for a solver: particles, boundary, plan.
 
+use std::sync::Arc;
+
 use glam::DVec2;
 
 use swell_cache::{CacheError, CacheReader};
 use swell_domain::{
-    boundary::Boundary,
+    boundary::{Boundary, Shape},
     mesh::TriangleMesh,
     particles::Particles,
     sampling::{BoundarySample, Fill, boundary_samples, fill_below, fill_water},
+    shape::{ShapeField, ShapeSamples},
     signed_distance::{SignedDistance, SignedDistanceError},
     sources::Sources,
 };
-use swell_scene::{ByMethod, Method, Scene, start_waves::StartWaves};
+use swell_scene::{
+    ByMethod, Method, Scene, mesh_sequence::MeshSequence, moving_solid::MovingSolid,
+    start_waves::StartWaves,
+};
 use swell_solve::{
     flip,
     plan::{Capacity, Counts, DeviceLimits, Plan},
@@ -212,21 +218,48 @@ fn meshes(scene: &Scene) -> impl Iterator<Item = &TriangleMesh> + Clone {
 fn boundary(scene: &Scene) -> Result<Boundary, SignedDistanceError> {
     let distance = distance(scene, meshes(scene))?;
     let sampled = |mesh| samples(scene, mesh, distance.as_ref());
-    let moving = scene.moving_solids.iter().map(|solid| &solid.placed.mesh);
+    let moving = scene
+        .moving_solids
+        .iter()
+        .map(|solid| match solid.sequence {
+            Some(_) => Vec::new(),
+            None => all_samples(scene, &solid.placed.mesh),
+        });
     // FLIP uses only the signed distance of solids.
     let (samples, moving_samples) = match scene.solver.method() {
-        Method::Pbf => (
-            meshes(scene).flat_map(sampled).collect(),
-            moving.map(|mesh| all_samples(scene, mesh)).collect(),
-        ),
+        Method::Pbf => (meshes(scene).flat_map(sampled).collect(), moving.collect()),
         Method::Flip => (Vec::new(), Vec::new()),
     };
+    let shapes = shapes(scene)?;
     Ok(Boundary {
         samples,
         distance,
-        moving: moving_distances(scene)?,
+        moving: moving_distances(scene, &shapes)?,
         moving_samples,
+        shapes,
     })
+}
+
+/// The moving solids whose shape changes.
+fn shapes(scene: &Scene) -> Result<Vec<Option<Shape>>, SignedDistanceError> {
+    let spacing = scene.particle_spacing();
+    let shape = |solid: &MovingSolid| {
+        let Some(MeshSequence { shape, .. }) = &solid.sequence else {
+            return Ok(None);
+        };
+        let samples = match scene.solver.method() {
+            Method::Pbf => Some(Arc::new(ShapeSamples::new(shape, spacing))),
+            Method::Flip => None,
+        };
+        Ok(Some(Shape {
+            field: ShapeField::new(shape, scene.solid_margin(), spacing)?,
+            samples,
+        }))
+    };
+    match scene.sequences().next() {
+        Some(_) => scene.moving_solids.iter().map(shape).collect(),
+        None => Ok(Vec::new()),
+    }
 }
 
 /// Samples on the surfaces of a mesh and of its images along periodic axes. Of two that coincide,
@@ -284,13 +317,21 @@ fn distance<'a>(
 }
 
 /// The full signed distance of each moving solid: parts outside the domain may move in.
-fn moving_distances(scene: &Scene) -> Result<Vec<SignedDistance>, SignedDistanceError> {
+fn moving_distances(
+    scene: &Scene,
+    shapes: &[Option<Shape>],
+) -> Result<Vec<SignedDistance>, SignedDistanceError> {
     let spacing = scene.particle_spacing();
-    let solids = scene.moving_solids.iter();
-    let bounded =
-        solids.filter_map(|solid| Some((&solid.placed.mesh, solid.placed.mesh.bounds()?)));
+    let solids = scene.moving_solids.iter().enumerate();
+    let bounded = solids.filter_map(|(index, solid)| {
+        let shape = shapes.get(index).and_then(Option::as_ref);
+        Some((&solid.placed.mesh, solid.placed.mesh.bounds()?, shape))
+    });
     bounded
-        .map(|(mesh, bounds)| {
+        .map(|(mesh, bounds, shape)| {
+            if let Some(shape) = shape {
+                return Ok(shape.field.at(0.0));
+            }
             let mut bounds = bounds.grown(scene.solid_margin());
             if !scene.is_periodic() {
                 return SignedDistance::from_mesh(mesh, &bounds, spacing);

@@ -4,10 +4,14 @@ use glam::DVec3;
 
 use crate::{
     comparison::{Io, PassResult},
-    solids::{GRID, TURNED},
+    solids::{FLOWED, GRID, SHAPED, TURNED},
     table::{each, pair},
 };
-use swell_domain::{boundary::Boundary, flip::VON_KARMAN, signed_distance::SignedDistance};
+use swell_domain::{
+    boundary::{Boundary, Shape},
+    flip::VON_KARMAN,
+    signed_distance::SignedDistance,
+};
 use swell_reference::flip::{
     Depth, FlipSubstep, LEAST_FILM, Model, OpenSpace, Solid, cut_cells as reference_cut_cells,
     extrapolate as reference_extrapolate, find_change as reference_find_change, find_depth,
@@ -19,6 +23,13 @@ use swell_scene::flip::Surface;
 use swell_solve::flip::buffers;
 
 use super::{FlipState, elements::neighborhood, rows::*};
+
+/// Change of the velocity of a closed face, as a part of the fastest node of a shape that changes,
+/// by which another solid is taken to be the nearest.
+const CHANGES: f64 = 1e-3;
+
+/// Distances up to this many times a cell plus a node spacing decide how solids cut cells.
+const REACH_OF_SHAPES: f64 = 4.0;
 
 /// Number of particles in the 27 cells around one, and the range of their velocities.
 struct Neighborhood {
@@ -62,6 +73,11 @@ impl FlipState {
             GRID.of([extent + first, first, grid.spacing])
         };
         let placed = solids.map(of).fold(0.0, f64::max);
+        let reach = REACH_OF_SHAPES * (self.model.cell_size() + self.scene.particle_spacing());
+        let placed = match self.boundary.shape_nodes() {
+            0 => placed,
+            _ => SHAPED.of([placed, reach]),
+        };
         // Outside its grid a solid has no effect.
         let solids = self.scene.moving_solids.iter().zip(&self.boundary.moving);
         let turned = solids.filter(|(solid, _)| solid.turns());
@@ -99,6 +115,13 @@ impl FlipState {
             distance: self.boundary.distance.as_ref().map(moved),
             moving: self.boundary.moving.iter().map(moved).collect(),
             moving_samples: Vec::new(),
+            shapes: (self.boundary.shapes.iter())
+                .map(|shape| {
+                    let field = shape.as_ref()?.field.moved(place).shifted(shift);
+                    let samples = None;
+                    Some(Shape { field, samples })
+                })
+                .collect(),
         };
         let model = Model::new(&self.model.scene, &boundary);
         let step = model.step(&self.elements().substep, &self.absorbers, &self.bodies);
@@ -142,6 +165,9 @@ pub(super) fn cut_cells(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
             false => reference.closed_velocity.clone(),
         },
     };
+    let has_shapes = state.boundary.shape_nodes() > 0;
+    let shapes = step.solids.iter().filter_map(|solid| solid.shape.as_ref());
+    let fastest_shape = shapes.map(|shape| shape.fastest).fold(0.0, f64::max);
     let cut = CUT.of([state.place()]);
     let wall = step.wall_velocity.map(|v| v.abs().max_element());
     let solid = step.solids.iter().map(Solid::fastest);
@@ -157,8 +183,12 @@ pub(super) fn cut_cells(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
         let moved = moved(&|other| other.open[e].distance(reference.open[e]));
         pair(e, space.open[e], reference.open[e], [cut, moved])
     });
+    let carried = |of: &dyn Fn(&OpenSpace) -> f64| {
+        let rounded = rounded.iter().filter(|_| has_shapes).map(of);
+        rounded.fold(moved(of), f64::max)
+    };
     io.table.each(&FLUX, elements.active(), |e| {
-        let moved = moved(&|other| (other.solid_flux[e] - reference.solid_flux[e]).abs());
+        let moved = carried(&|other| (other.solid_flux[e] - reference.solid_flux[e]).abs());
         pair(
             e,
             space.solid_flux[e],
@@ -179,15 +209,27 @@ pub(super) fn cut_cells(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     if has_moving {
         io.table.each(&CLOSED, elements.active(), |e| {
             let exact = reference.closed_velocity[e];
+            // A shape's velocity changes with any move of its nodes: little, or much where another
+            // solid becomes the nearest.
+            let most = match has_shapes {
+                true => CHANGES * fastest_shape,
+                false => 0.0,
+            };
             let mut answers = others.iter().chain(&rounded);
-            let is_tie = answers.any(|other| other.closed_velocity[e] != exact);
+            let is_tie = answers.any(|other| other.closed_velocity[e].distance(exact) > most);
+            let change = carried(&|other| other.closed_velocity[e].distance(exact));
+            let shape = match has_shapes {
+                true => FLOWED.of([fastest_shape, change]),
+                false => 0.0,
+            };
             let at = elements.bricks.cell(e as u32).map(|c| f64::from(c) + 0.5);
             let x = state.model.cell_size() * DVec3::from_array(at);
             let far = step.solids.iter().map(|solid| {
                 solid.passage.spin.length() * (x.length() + solid.pose.centre.length())
             });
             let far = far.fold(0.0, f64::max);
-            (!is_tie).then(|| pair(e, space.closed_velocity[e], exact, [exact.length(), far]))
+            let magnitudes = [exact.length(), far, shape];
+            (!is_tie).then(|| pair(e, space.closed_velocity[e], exact, magnitudes))
         });
     }
     state.space = Some(space);

@@ -3,7 +3,11 @@
 //! system, its right-hand side, products, differences of the solution, the residual. Velocities,
 //! displacements and pressures in Pa remain f32.
 
-use crate::{solids::GRID, sort::NEAR_FACE, table::entries};
+use crate::{
+    solids::{FLOWED, GRID},
+    sort::NEAR_FACE,
+    table::entries,
+};
 use swell_compare::{deviation::relative, rounding::U, tolerance::bounds};
 
 bounds! {
@@ -119,8 +123,9 @@ entries! {
             moved: "what it changes by as solids' distances move by " GRID]
             8.0 * cut + 3.0 * moved, "64 parts";
         CLOSED = "velocity of closed faces", "m/s": [v: "|v|",
-            far: "the largest of solids' |spin| (|x| + |its point of rest|)"]
-            2.0 * U * v + 6.0 * U * far, "a solid's, unless another is nearest", tie TURN;
+            far: "the largest of solids' |spin| (|x| + |its point of rest|)",
+            shape: "of shapes that change " FLOWED]
+            2.0 * U * v + 6.0 * U * far + shape, "a solid's, unless another is nearest", tie TURN;
     }
     "flip/gather_faces" {
         OLD = "velocity at faces", "m/s": [face: "" OF_FACE] face, "";

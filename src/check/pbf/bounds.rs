@@ -11,7 +11,7 @@ use swell_domain::{bounds::FAR, pbf::CONTACT, pose::Pose};
 use swell_reference::pbf::passes::{DensityConstraint, Inputs};
 
 use super::rows::{DELTA, OF_SOLIDS, PUSHED, REACH, REPULSION};
-use crate::solids::{GRID, TURNED};
+use crate::solids::{GRID, SHAPED, TURNED};
 
 /// Inputs that the bounds of a pass depend on.
 pub(crate) struct Bounds<'a>(pub(crate) Inputs<'a>);
@@ -132,16 +132,20 @@ impl Bounds<'_> {
         let place = self.wall_place() + U * farthest;
         let mut reach = error;
         let mut is_near = false;
-        let still = model.distance.iter().map(|grid| (grid, Pose::START, false));
+        let still = model
+            .distance
+            .iter()
+            .map(|grid| (grid, Pose::START, false, false));
         let moving = model.movers.iter();
         let moving = moving.map(|it| {
             (
                 &it.solid.grid,
                 it.solid.pose,
                 it.passage.spin != DVec3::ZERO,
+                it.shape.is_some(),
             )
         });
-        for (grid, pose, turns) in still.chain(moving) {
+        for (grid, pose, turns, changes) in still.chain(moving) {
             let there = pose.back(x);
             let offset = (there - grid.origin).abs().max_element();
             let origin = grid.origin.abs().max_element();
@@ -149,6 +153,9 @@ impl Bounds<'_> {
             if turns || pose.turn != DQuat::IDENTITY {
                 let centre = pose.centre.length();
                 place = TURNED.of([place, (x - pose.centre).length(), centre]);
+            }
+            if changes {
+                place = SHAPED.of([place, contact + 4.0 * grid.spacing]);
             }
             let own = REACH.of([error, place]);
             is_near |= grid.sample(there) < contact + own + 0.5 * grid.spacing;

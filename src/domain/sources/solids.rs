@@ -9,8 +9,9 @@ use super::super::{pose::Pose, signed_distance::SignedDistance};
 pub struct Solids<'a> {
     /// Distance to the union of the static solids; `None` if there are none.
     pub still: Option<&'a SignedDistance>,
-    /// Distance to each moving solid, in its pose at the start.
-    pub moving: &'a [SignedDistance],
+    /// Distance to each moving solid, in its pose at the start. That to a solid whose shape changes
+    /// is of one time only: such a solid does not come into the volume of an emitter.
+    pub moving: &'a [&'a SignedDistance],
     /// Pose of a moving solid, given by its index, at a time in seconds.
     pub pose: &'a (dyn Fn(usize, f64) -> Pose + Sync),
 }
@@ -56,7 +57,7 @@ impl<'a> Solids<'a> {
             moving,
             pose,
         } = *self;
-        let moving = moving.iter().enumerate();
+        let moving = moving.iter().copied().enumerate();
         let moving = moving.map(move |(index, field)| (field, pose(index, seconds)));
         still
             .into_iter()

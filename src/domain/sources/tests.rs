@@ -520,7 +520,7 @@ fn water_waits_for_a_solid_that_moves() {
     };
     let solids = Solids {
         still: None,
-        moving: &lid,
+        moving: &[&lid[0]],
         pose: &away,
     };
     let sources = with(vec![nozzle(DVec3::new(2.0, 0.0, 0.0))], Vec::new());

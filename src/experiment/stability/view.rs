@@ -100,9 +100,13 @@ impl<'a> RunView<'a> {
     pub(super) fn depth_in_solid(&self, at: DVec3) -> f64 {
         let boundary = &self.start.boundary;
         let still = boundary.distance.iter().map(|solid| -solid.sample(at));
-        let movers = boundary.moving.iter().zip(&self.scene.moving_solids);
-        let moving = movers.map(|(distance, solid)| {
-            -distance.sample(solid.pose(&self.state.bodies, self.time()).back(at))
+        let movers = self.scene.moving_solids.iter().enumerate();
+        let moving = movers.map(|(index, solid)| {
+            let at = solid.pose(&self.state.bodies, self.time()).back(at);
+            match boundary.shape(index) {
+                Some(shape) => -shape.field.step(self.time(), 0.0).sample(at, 0.0),
+                None => -boundary.moving[index].sample(at),
+            }
         });
         still.chain(moving).fold(f64::NEG_INFINITY, f64::max)
     }

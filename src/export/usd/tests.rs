@@ -61,6 +61,7 @@ fn a_root_plays_the_frames_that_it_is_given() {
             triangles: vec![[0, 1, 2]],
         },
         way,
+        shapes: Vec::new(),
     };
     let slid = |way| Pose {
         centre: way,

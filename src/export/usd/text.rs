@@ -79,6 +79,23 @@ impl Text {
         self.line("}");
     }
 
+    /// Writes an array attribute with a value at each of these frames.
+    pub(super) fn array_samples<T>(
+        &mut self,
+        attribute: &str,
+        samples: impl Iterator<Item = (u32, Vec<T>)>,
+        each: impl Fn(&T) -> String,
+    ) {
+        self.line(&format!("{attribute}.timeSamples = {{"));
+        for (frame, values) in samples {
+            self.indent();
+            self.out.push_str(&format!("    {frame}: "));
+            self.put_array(&values, &each);
+            self.out.push_str(",\n");
+        }
+        self.line("}");
+    }
+
     pub(super) fn into_bytes(self) -> Vec<u8> {
         self.out.into_bytes()
     }

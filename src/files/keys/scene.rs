@@ -216,13 +216,22 @@ keys! { struct SwarmSpec {
 } }
 
 keys! { struct SolidSpec {
-    mesh: String = text(
+    mesh: Option<String> = text(
         "a closed .obj, .ply or .stl, or a level set in a .vdb, that reaches into the domain, \
-         relative to the scene file",
+         relative to the scene file; or sequence",
     )
+    .absent()
     .by_hash()
     .about("the mesh; open ones are taken with a warning where an inside can be told"),
     blake3: Option<String> = blake3,
+    sequence: Option<SequenceSpec> = inline()
+        .absent()
+        .without(&["mesh", "motion", "turn", "track"])
+        .also(
+            ", of which one reaches into the domain, no point faster than 100000 m/s; not with \
+             domain.periodic",
+        )
+        .about("Mesh files over time, for a solid whose shape changes"),
     translate: [f64; 3] = translate,
     rotate_degrees: [f64; 3] = rotate,
     scale: ScaleSpec = scale,
@@ -260,6 +269,47 @@ keys! { struct SolidSpec {
         )
         .about("Where the solid stands over time, from where it stands at the start on"),
 } }
+
+/// Largest number in the name of a file of a sequence.
+const LAST_NUMBER: u32 = 999_999_999;
+
+keys! { struct SequenceSpec {
+    files: FilesSpec = other(
+        "a name with one place for a number, such as \"whale.%04d.obj\" or \"whale.####.obj\", \
+         relative to the scene file, or an array of at least two names",
+    )
+    .by_hash()
+    .about(
+        "the meshes, all that there are, without a gap in their numbers; placed by translate, \
+         rotate_degrees and scale; the written-out scene lists them",
+    ),
+    blake3: Option<Vec<String>> = other("an array of BLAKE3 hashes, one for each file")
+        .absent()
+        .about("hashes that the files must have; the written-out scene has them"),
+    first: Option<u32> = whole(0..=LAST_NUMBER)
+        .absent()
+        .about("number of the first file of an array; left out: 0"),
+    start: Option<u32> = whole(0..=LAST_NUMBER)
+        .absent()
+        .about(
+            "number of the file that is at frame 1 of the shot, such as 1001; left out: file 0 \
+             would be at its start",
+        ),
+    frames_per_second: Option<f64> = number(0.01..=1e5)
+        .unit("per second")
+        .computed(|| "the shot's".to_owned())
+        .about("files a second"),
+} }
+
+/// Files of a sequence, as a scene names them.
+#[derive(Clone, Debug, serde::Deserialize, serde::Serialize)]
+#[serde(untagged)]
+pub(crate) enum FilesSpec {
+    /// A name with a place for a number.
+    Pattern(String),
+    /// Names in order.
+    List(Vec<String>),
+}
 
 keys! { struct WaveMakerSpec {
     wall: Wall = choice(&words(&Wall::NAMED))

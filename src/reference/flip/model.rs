@@ -14,7 +14,8 @@ use swell_domain::{
     flip::{CAP, CONTACT, layers, stored_cells},
     period::Period,
     pose::{Passage, Pose},
-    shores::Shores,
+    shape::ShapeField,
+    shores::{self, Shores},
     signed_distance::SignedDistance,
 };
 use swell_scene::{
@@ -33,6 +34,8 @@ pub struct Model {
     /// Signed distances of solids in their initial pose: all static solids as one grid, if there
     /// are any, then each moving solid.
     pub(super) solids: Vec<SignedDistance>,
+    /// Shapes of moving solids that change, by the index of the moving solid.
+    shapes: Vec<Option<ShapeField>>,
     /// Finds bricks near solids that count as water.
     shores: Shores,
     /// Number of grids for static solids, 0 or 1.
@@ -75,6 +78,9 @@ impl Model {
         Self {
             cells: scene.domain.cells(scene.settings().cell_size),
             solids: solids.map(local).collect(),
+            shapes: (boundary.shapes.iter())
+                .map(|shape| Some(shape.as_ref()?.field.moved(-scene.domain.min)))
+                .collect(),
             shores: Shores::new(boundary, scene.domain.min, scene.settings().cell_size)
                 .joined(scene.periodic),
             at_rest: usize::from(boundary.distance.is_some()),
@@ -142,7 +148,12 @@ impl Model {
         let reach = (step.layers as u32).div_ceil(EDGE);
         let mut is_wet = is_wet.to_vec();
         let moving = step.solids.iter().zip(&self.solids).skip(self.at_rest);
-        let poses = moving.map(|(now, _)| now.pose.scaled(1.0 / self.cell_size()));
+        let size = self.cell_size();
+        let poses = moving.map(|(now, _)| {
+            let shape = now.shape.as_ref();
+            let surface = shape.map(|it| shores::Surface::of(&it.before, DVec3::ZERO, size));
+            (now.pose.scaled(1.0 / size), surface)
+        });
         (self.shores).mark(&mut is_wet, table_dims(cells), &step.cut, poses);
         Bricks::periodic(cells, periodic, &is_wet, reach, 1)
     }
@@ -196,8 +207,13 @@ impl Model {
         });
         let passages =
             std::iter::repeat_n(Passage::resting(Pose::START), self.at_rest).chain(moving);
-        (self.solids.iter().zip(passages))
-            .map(|(grid, passage)| Solid::new(grid, passage))
+        let shape = |index: usize| {
+            let field = self.shapes.get(index.checked_sub(self.at_rest)?)?;
+            Some(field.as_ref()?.step(start, length))
+        };
+        let solids = self.solids.iter().zip(passages).enumerate();
+        solids
+            .map(|(k, (grid, passage))| Solid::new(grid, passage).shaped(shape(k)))
             .collect()
     }
 }

@@ -1,11 +1,14 @@
 //! Solids by their signed distance: how they cut cells and push particles back.
 
+use std::sync::Arc;
+
 use glam::{BVec3, DVec3};
 
 use super::Model;
 use swell_domain::{
     bounds::Bounds,
     pose::{Passage, Pose},
+    shape::ShapeStep,
     signed_distance::SignedDistance,
 };
 
@@ -37,10 +40,15 @@ pub(super) struct Film {
 }
 
 /// A solid at one moment.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Solid<'a> {
-    /// Signed distances in the initial pose, metres.
+    /// Signed distances in the initial pose, metres; of a solid whose shape changes only the grid
+    /// without its values.
     pub grid: &'a SignedDistance,
+    /// Surface of a solid whose shape changes.
+    pub shape: Option<Arc<ShapeStep>>,
+    /// Part of the substep that has passed.
+    pub share: f64,
     /// Motion through the substep.
     pub passage: Passage,
     /// Pose at this moment.
@@ -60,22 +68,59 @@ impl<'a> Solid<'a> {
     pub(super) fn new(grid: &'a SignedDistance, passage: Passage) -> Self {
         Self {
             grid,
+            shape: None,
+            share: 0.0,
             passage,
             pose: passage.start,
         }
     }
 
+    /// Returns the solid with the shape that it has in this substep.
+    pub(super) fn shaped(self, shape: Option<Arc<ShapeStep>>) -> Self {
+        Self { shape, ..self }
+    }
+
     /// Returns the solid in its pose after the fraction `share` of the substep.
-    pub(super) fn after(self, share: f64) -> Self {
+    pub(super) fn after(&self, share: f64) -> Self {
         Self {
             pose: self.passage.at(share),
-            ..self
+            share,
+            ..self.clone()
         }
     }
 
-    /// Returns the velocity of the solid's material point at `x`, m/s.
+    /// Returns the velocity of the solid's material point at `x`, m/s; where the shape changes, of
+    /// the point of its surface that is nearest to the nodes around `x`.
     pub fn velocity_at(&self, x: DVec3) -> DVec3 {
-        self.passage.velocity_at(x, self.pose.centre)
+        let rigid = self.passage.velocity_at(x, self.pose.centre);
+        match &self.shape {
+            Some(shape) => rigid + shape.velocity_at(x),
+            None => rigid,
+        }
+    }
+
+    /// Returns the distance at a point in the initial pose, metres.
+    fn sample(&self, own: DVec3) -> f64 {
+        match &self.shape {
+            Some(shape) => shape.sample(own, self.share),
+            None => self.grid.sample(own),
+        }
+    }
+
+    /// Returns its gradient.
+    fn gradient(&self, own: DVec3) -> DVec3 {
+        match &self.shape {
+            Some(shape) => shape.gradient(own, self.share),
+            None => self.grid.gradient(own),
+        }
+    }
+
+    /// Returns the distance at a node, metres.
+    fn node(&self, [i, j, k]: [usize; 3]) -> f64 {
+        match &self.shape {
+            Some(shape) => shape.node([i, j, k], self.share),
+            None => self.grid.node(i, j, k),
+        }
     }
 
     /// Slows the velocity `v` of a particle at `x` along the solid by the friction of a film (see
@@ -112,7 +157,8 @@ impl<'a> Solid<'a> {
             0.0 => 0.0,
             _ => self.grid.reach(self.pose.rest),
         };
-        self.passage.velocity.length() + spin * reach
+        let shape = self.shape.as_ref().map_or(0.0, |shape| shape.fastest);
+        self.passage.velocity.length() + spin * reach + shape
     }
 
     fn last(&self) -> DVec3 {
@@ -127,8 +173,7 @@ impl<'a> Solid<'a> {
     /// Returns the trilinear distance at the point of the grid that is closest to `x`.
     fn distance(&self, x: DVec3) -> f64 {
         let place = self.place(x).clamp(DVec3::ZERO, self.last());
-        self.grid
-            .sample(self.grid.origin + self.grid.spacing * place)
+        self.sample(self.grid.origin + self.grid.spacing * place)
     }
 
     /// Returns the distance at the nearest node; far away outside the grid.
@@ -138,7 +183,7 @@ impl<'a> Solid<'a> {
             return 1e15;
         }
         let [i, j, k] = (p + 0.5).clamp(DVec3::ZERO, self.last()).to_array();
-        self.grid.node(i as usize, j as usize, k as usize)
+        self.node([i, j, k].map(|c| c as usize))
     }
 
     /// Returns the distance at the nearest node, or outside the grid the distance to the grid,
@@ -170,14 +215,14 @@ impl<'a> Solid<'a> {
             return x;
         }
         let own = self.grid.origin + self.grid.spacing * p;
-        let distance = self.grid.sample(own);
-        let [i, j, k] = p.to_array().map(|c| c as usize);
+        let distance = self.sample(own);
+        let node = p.to_array().map(|c| c as usize);
         // Twice the spacing exceeds a cell's diagonal: with a node this far away, no contact can
         // occur within the cell.
-        if self.grid.node(i, j, k) > contact + 2.0 * self.grid.spacing || distance >= contact {
+        if self.node(node) > contact + 2.0 * self.grid.spacing || distance >= contact {
             return x;
         }
-        let gradient = self.grid.gradient(own);
+        let gradient = self.gradient(own);
         // Here the gradient is per metre; on the GPU it is per spacing.
         if gradient.length() < 1e-6 {
             return x;

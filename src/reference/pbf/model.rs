@@ -1,5 +1,7 @@
 //! Data that does not change during a bake, and parameters of a substep.
 
+use std::sync::Arc;
+
 use glam::DVec3;
 
 use crate::neighbors::Cells;
@@ -11,6 +13,7 @@ use swell_domain::{
     pbf::{CAP, CONTACT, MAX_CORRECTION, REGULARIZATION},
     period::Period,
     pose::{Passage, Posed},
+    shape::ShapeStep,
     signed_distance::SignedDistance,
     sph::{Calibration, half_space_fraction},
 };
@@ -74,6 +77,20 @@ pub struct Mover {
     pub solid: Posed,
     /// Motion that led to this pose.
     pub passage: Passage,
+    /// Surface of a solid whose shape changes, over the motion to the current one.
+    pub shape: Option<Arc<ShapeStep>>,
+}
+
+impl Mover {
+    /// Returns the velocity of the solid's material point at `x`, m/s; where the shape changes, of
+    /// the point of its surface that is nearest to the nodes around `x`.
+    pub fn velocity_at(&self, x: DVec3) -> DVec3 {
+        let rigid = self.passage.velocity_at(x, self.solid.pose.centre);
+        match &self.shape {
+            Some(shape) => rigid + shape.velocity_at(x),
+            None => rigid,
+        }
+    }
 }
 
 /// Displacements that keep a position out of solids and walls.
@@ -178,16 +195,22 @@ impl Model {
         self.take_samples(scene, &boundary, bodies, (time, step));
         let origin = scene.domain.min;
         let solids = scene.moving_solids.iter().zip(&boundary.moving);
-        let movers = solids.map(|(solid, grid)| {
+        let movers = solids.enumerate().map(|(index, (solid, grid))| {
             let passage = solid.passage_to(bodies, time, step);
-            let grid = SignedDistance {
-                origin: grid.origin - origin,
-                ..grid.clone()
+            let shape = boundary.shape(index);
+            let shape = shape.map(|it| it.field.moved(-origin).step(time - step, step));
+            let grid = match &shape {
+                Some(shape) => shape.after.clone(),
+                None => SignedDistance {
+                    origin: grid.origin - origin,
+                    ..grid.clone()
+                },
             };
             let pose = passage.at(1.0).moved(-origin);
             Mover {
                 solid: Posed { grid, pose },
                 passage,
+                shape,
             }
         });
         self.movers = movers.collect();
@@ -254,12 +277,13 @@ impl Model {
                 pushes.of_solids = distance.gradient(x).normalize_or_zero() * (contact - d);
             }
         }
-        for Mover { solid, passage } in &self.movers {
+        for mover in &self.movers {
+            let solid = &mover.solid;
             let before = x + pushes.of_solids;
             let d = solid.sample(before);
             if d < contact {
                 let push = solid.gradient(before).normalize_or_zero() * (contact - d);
-                let velocity = passage.velocity_at(before + push, solid.pose.centre);
+                let velocity = mover.velocity_at(before + push);
                 pushes.of_solids += push;
                 pushes.work += push.dot(velocity);
                 if push != DVec3::ZERO {
@@ -275,7 +299,8 @@ impl Model {
         let speed = |mover: &Mover| {
             let spin = mover.passage.spin.length();
             let reach = mover.solid.grid.reach(mover.solid.pose.rest);
-            mover.passage.velocity.length() + spin * reach
+            let shape = mover.shape.as_ref().map_or(0.0, |shape| shape.fastest);
+            mover.passage.velocity.length() + spin * reach + shape
         };
         self.movers.iter().map(speed).fold(0.0, f64::max)
     }

@@ -26,7 +26,7 @@ impl Scene {
             lints.extend(lint_table(&key, "m/s", &maker.motion, &self.shot));
         }
         for solid in &self.moving_solids {
-            let name = solid.placed.name();
+            let name = solid.name();
             if let Some(slide) = &solid.slide {
                 let key = format!("solid.motion of {name}");
                 lints.extend(lint_table(&key, "m/s", &slide.motion, &self.shot));

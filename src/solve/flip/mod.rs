@@ -229,7 +229,11 @@ impl Flip {
             let pose = solid.pose(bodies, substep.start);
             pose.moved(-least).scaled(1.0 / size)
         };
-        let poses = moving.map(pose);
+        let movers = self.movers.as_ref();
+        let poses = moving.enumerate().map(|(index, solid)| {
+            let surface = movers.and_then(|it| it.surface(index, substep, (least, size)));
+            (pose(solid), surface)
+        });
         let dims = table_dims(stored_cells(self.plan.grid_dims, self.scene.periodic));
         let mut is_wet = is_wet.to_vec();
         self.shores.mark(&mut is_wet, dims, &cut, poses);

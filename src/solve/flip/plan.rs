@@ -101,6 +101,7 @@ fn conditions(plan: &Plan, scene: &FlipScene) -> Vec<&'static str> {
     let all = [
         ("SOLIDS", plan.has_solids()),
         ("MOVING_SOLIDS", plan.counts.moving_nodes > 0),
+        ("SHAPES", plan.counts.shape_nodes > 0),
         ("APIC", flip.transfer == Transfer::Apic),
         ("GHOST_FLUID", flip.surface == Surface::GhostFluid),
         ("CORRECTION", flip.density_correction),
@@ -191,7 +192,7 @@ fn bricks(plan: &Plan, scene: &FlipScene, table: &mut BufferTable) {
     if plan.has_solids() {
         table.watch("solids", OPEN_VOLUME.sized(all));
         table.watch("solids", OPEN_HATS.sized(all));
-        table.add("solids", SOLID_DISTANCE.sized(plan.counts.solid_nodes()));
+        table.add("solids", SOLID_DISTANCE.sized(plan.counts.solid_floats()));
         if plan.counts.moving_nodes > 0 {
             table.watch("solids", CLOSED_VELOCITY.sized(3 * all));
             table.add("solids", POSED_SOLIDS.sized(plan.counts.solids));

@@ -114,6 +114,9 @@ fn conditions(plan: &Plan, scene: &PbfScene) -> Vec<&'static str> {
     if plan.counts.moving_nodes > 0 {
         conditions.push("MOVING_SOLIDS");
     }
+    if plan.counts.shape_nodes > 0 {
+        conditions.push("SHAPES");
+    }
     if plan.has_lists {
         conditions.push("NEIGHBOR_LIST");
     }
@@ -219,7 +222,7 @@ fn buffers(plan: &Plan, scene: &PbfScene, phases: usize) -> BufferTable {
                 POSED_SOLIDS.sized(plan.counts.solids),
             ),
         };
-        let distances = plan.counts.solid_nodes();
+        let distances = plan.counts.solid_floats();
         table.add("solids", SOLID_DISTANCE.sized(distances + velocities));
         table.add("solids", grids);
         table.add("solids", BOUNDARY_CELL_START.sized(cells + 1));

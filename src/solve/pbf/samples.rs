@@ -72,7 +72,11 @@ pub(crate) fn upload_samples(
             .iter()
             .map(|&(_, k)| samples[k].velocity.as_vec3().to_array())
             .collect();
-        program.upload(sample_velocity(plan.counts.solid_nodes()), 0, &velocities);
+        program.upload(
+            velocities_behind(plan.counts.solid_floats()),
+            0,
+            &velocities,
+        );
     }
 }
 

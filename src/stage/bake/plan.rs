@@ -1,7 +1,10 @@
 //! Plan of a bake, made without a device.
 
 use swell_cache::{CacheError, CacheReader, Clock, Parent, refuse_occupied};
-use swell_domain::{signed_distance::SignedDistanceError, sources::Solids};
+use swell_domain::{
+    signed_distance::{SignedDistance, SignedDistanceError},
+    sources::Solids,
+};
 use swell_scene::Scene;
 
 use super::{BakeError, BakeRequest, Inflow, disk};
@@ -194,9 +197,10 @@ impl<'a> BakePlan<'a> {
         let begun = self.parent.as_ref().map_or(0, |parent| parent.frame);
         let particles = self.start.particles.len();
         let boundary = &self.start.boundary;
+        let moving: Vec<&SignedDistance> = boundary.moving.iter().collect();
         let solids = Solids {
             still: boundary.distance.as_ref(),
-            moving: &boundary.moving,
+            moving: &moving,
             pose: &|index, seconds| self.scene.moving_solids[index].pose(&[], seconds),
         };
         let (sources, frames) = (&self.start.sources, begun + 1..self.last + 1);

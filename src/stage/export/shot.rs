@@ -151,13 +151,24 @@ impl ExportJob<'_> {
             name: placed.name(),
             mesh: placed.mesh.clone(),
             way: Vec::new(),
+            shapes: Vec::new(),
         });
         let bodies = self.frames.iter().map(|&frame| self.bodies_at(frame));
         let bodies = bodies.collect::<Result<Vec<_>, _>>()?;
         let moving = scene.moving_solids.iter().map(|solid| Solid {
-            name: solid.placed.name(),
+            name: solid.name(),
             mesh: solid.placed.mesh.clone(),
+            shapes: (solid.sequence.iter())
+                .flat_map(|sequence| {
+                    self.frames.iter().map(|&frame| {
+                        let mesh = sequence.shape.mesh(scene.shot.time(frame));
+                        (self.numbering.of(frame), mesh)
+                    })
+                })
+                .collect(),
+            // The shape has the motion of a solid that changes it.
             way: (self.frames.iter().zip(&bodies))
+                .filter(|_| solid.sequence.is_none())
                 .map(|(&frame, bodies)| {
                     let pose = solid.pose(bodies, scene.shot.time(frame));
                     (self.numbering.of(frame), pose)

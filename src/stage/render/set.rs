@@ -15,6 +15,7 @@ use swell_render::{Mover, PosePath, RenderScene, SetMotion, SolidParts};
 use swell_scene::{
     PlacedMesh, Scene, Wall,
     look::{AovSpec, Look},
+    moving_solid::MovingSolid,
     solid_path::{BodiesAround, SolidPath},
 };
 
@@ -36,10 +37,8 @@ pub(super) fn render_scene(
         after: around[1].map(|it| &it.bodies[..]),
     };
     let time = f64::from(frame) / scene.shot.frames_per_second;
-    let moving = scene.moving_solids.iter().map(|solid| {
-        let way = solid.pose(&state.bodies, time).affine();
-        solid.placed.mesh.transformed(&way)
-    });
+    let moving = scene.moving_solids.iter();
+    let moving = moving.map(|solid| solid.mesh(&state.bodies, time));
     let solids = scene.solids.iter().map(|solid| solid.mesh.clone());
     let parts = match look.materials() {
         Some(_) => solid_parts(scene, &state.bodies, time)?,
@@ -119,28 +118,32 @@ fn solid_parts(
     bodies: &[BodyState],
     time: f64,
 ) -> Result<Vec<SolidParts>, MeshError> {
-    let still = scene.solids.iter().map(|solid| (solid, Pose::START));
-    let moving = scene.moving_solids.iter();
-    let moving = moving.map(|solid| (&solid.placed, solid.pose(bodies, time)));
-    let parts = still.chain(moving).map(|(placed, pose)| {
-        let bytes = read_bytes(&placed.file)?;
-        if blake3::hash(&bytes).to_hex().as_str() != placed.file_hash {
-            return Err(MeshError::Malformed {
-                file: placed.file.clone(),
-                detail: "it has changed since the scene was read".to_owned(),
-            });
-        }
-        let mut parts = MeshParts::from_bytes(&bytes, MeshFormat::of(&placed.file)?, &placed.file)?;
-        let way = placed.placement.world_from_file();
-        if way.matrix3.determinant() < 0.0 {
-            parts.turn();
-        }
-        Ok(SolidParts {
-            name: placed.name(),
-            parts,
-            pose,
-        })
+    let of = |placed: &PlacedMesh| (placed.file.clone(), placed.file_hash.clone());
+    let still = (scene.solids.iter()).map(|it| (it, of(it), it.name(), Pose::START));
+    let moving = scene.moving_solids.iter().map(|solid| {
+        let file = match &solid.sequence {
+            Some(sequence) => sequence.file_at(time).clone(),
+            None => of(&solid.placed),
+        };
+        (&solid.placed, file, solid.name(), solid.pose(bodies, time))
     });
+    let parts = still
+        .chain(moving)
+        .map(|(placed, (file, file_hash), name, pose)| {
+            let bytes = read_bytes(&file)?;
+            if blake3::hash(&bytes).to_hex().as_str() != file_hash {
+                return Err(MeshError::Malformed {
+                    file,
+                    detail: "it has changed since the scene was read".to_owned(),
+                });
+            }
+            let mut parts = MeshParts::from_bytes(&bytes, MeshFormat::of(&file)?, &file)?;
+            let way = placed.placement.world_from_file();
+            if way.matrix3.determinant() < 0.0 {
+                parts.turn();
+            }
+            Ok(SolidParts { name, parts, pose })
+        });
     parts.collect()
 }
 
@@ -159,7 +162,6 @@ fn plates(scene: &Scene, walls: &Bounds) -> Vec<(Wall, f64)> {
 /// Names of the scene's solids, in the order of [`render_scene`]: those of their mesh files,
 /// without extension.
 pub(super) fn solid_names(scene: &Scene) -> Vec<String> {
-    let moving = scene.moving_solids.iter().map(|solid| &solid.placed);
-    let placed = scene.solids.iter().chain(moving);
-    placed.map(PlacedMesh::name).collect()
+    let moving = scene.moving_solids.iter().map(MovingSolid::name);
+    (scene.solids.iter().map(PlacedMesh::name).chain(moving)).collect()
 }

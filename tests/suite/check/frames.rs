@@ -115,6 +115,7 @@ fn tank(method: Method, speed: f64) -> (Scene, Start) {
             )),
             placed,
             track: None,
+            sequence: None,
             body: None,
             slide: Some(Slide {
                 direction: DVec3::new(0.6, 0.0, 0.8),

@@ -161,6 +161,7 @@ fn case(method: Method) -> (Scene, Start) {
             distance: Some(distance),
             moving: Vec::new(),
             moving_samples: Vec::new(),
+            shapes: Vec::new(),
         },
     };
     (scene, start)

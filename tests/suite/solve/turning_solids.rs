@@ -67,6 +67,7 @@ fn case(spin: f64, angle: f64) -> (Scene, Boundary, Particles) {
         slide: None,
         turn: Some(turn),
         track: None,
+        sequence: None,
         body: None,
     }];
     let back = DMat2::from_angle(-angle);

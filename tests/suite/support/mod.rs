@@ -232,6 +232,7 @@ pub fn mover(bounds: Bounds, direction: DVec3, motion: Motion) -> MovingSolid {
         slide: Some(Slide { direction, motion }),
         turn: None,
         track: None,
+        sequence: None,
         body: None,
     }
 }

@@ -1,4 +1,4 @@
-//! File names that contain the frame number.
+//! File names that contain a frame's number.
 
 use std::{
     path::{Path, PathBuf, is_separator},
@@ -34,6 +34,24 @@ impl Pattern {
             after,
         } = self;
         PathBuf::from(format!("{before}{frame:0digits$}{after}"))
+    }
+
+    /// Folder of the files, as written; empty for none.
+    pub fn folder(&self) -> &Path {
+        let end = self.before.rfind(is_separator).map_or(0, |at| at + 1);
+        Path::new(&self.before[..end])
+    }
+
+    /// Number in a file name without its folder, if it is one of these.
+    pub fn number_in(&self, name: &str) -> Option<u32> {
+        let end = self.before.rfind(is_separator).map_or(0, |at| at + 1);
+        let digits = name.strip_prefix(&self.before[end..])?;
+        let digits = digits.strip_suffix(&self.after[..])?;
+        let number =
+            (digits.bytes().all(|it| it.is_ascii_digit())).then(|| digits.parse().ok())??;
+        // Not `m.7.ply` or `m.00007.ply` where the number has four digits.
+        let as_written = format!("{number:0width$}", width = self.digits);
+        (as_written == digits).then_some(number)
     }
 
     /// Extension of the names, lower case.
@@ -93,7 +111,7 @@ mod tests {
     #[test]
     fn names_have_one_place_for_a_number() {
         let file = |text: &str, frame| {
-            let pattern: Pattern = text.parse().unwrap();
+            let pattern: Pattern = text.parse().expect("a pattern");
             (pattern.file(frame).display().to_string(), pattern.ending())
         };
         let named = |name: &str, end: &str| (name.to_owned(), end.to_owned());
@@ -101,6 +119,22 @@ mod tests {
         assert_eq!(file("m.###.OBJ", 12345), named("m.12345.OBJ", "obj"));
         assert_eq!(file("m%d.npy", 7), named("m7.npy", "npy"));
         assert_eq!(file("m%d.tar.npy", 7).1, "npy");
+        let number = |text: &str, name: &str| {
+            let pattern: Pattern = text.parse().expect("a pattern");
+            pattern.number_in(name)
+        };
+        for (name, found) in [
+            ("m.0007.ply", Some(7)),
+            ("m.12345.ply", Some(12345)),
+            ("m.7.ply", None),
+            ("m.00007.ply", None),
+            ("m.0007.obj", None),
+            ("m.+007.ply", None),
+            ("m..ply", None),
+            ("m.99999999999.ply", None),
+        ] {
+            assert_eq!(number("a/m.%04d.ply", name), found, "{name}");
+        }
         // Folder names are taken literally.
         for folder in ["100%", "take #2", "%04d", "####"] {
             let found = file(&format!("{folder}/m.%04d.ply"), 7);
