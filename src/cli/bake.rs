@@ -192,11 +192,19 @@ fn dry_run(directory: &Path, plan: &BakePlan<'_>, progress: &Progress) -> Result
     };
     let (start, volume) = (&plan.start, plan.volume());
     let particles = count(start.particles.len() as u64, "particle");
-    let words = format!(", with {particles} at the start, {}", output::water(volume));
+    let mut words = format!(", with {particles} at the start, {}", output::water(volume));
+    let shapes: Vec<_> = start.shapes(plan.scene).collect();
+    for shape in &shapes {
+        words += &format!("\n{}", output::shape(shape));
+    }
     let more = json!({
         "particles": start.particles.len(), "removed": start.removed, "volume": volume.made,
         "volume_asked": volume.asked,
         "disk_free": disk.free,
+        "shapes": shapes.iter().map(|it| json!({
+            "name": it.name, "files": it.files, "nodes": it.nodes, "times": it.times,
+            "bytes": it.bytes, "device_bytes": it.device_bytes(),
+        })).collect::<Vec<_>>(),
     });
     told.tell(progress, &words, more);
     Ok(0)

@@ -387,6 +387,9 @@ fn show_arrangement(out: &mut String, planned: &ScenePlan<'_>) -> fmt::Result {
     if let Some(page) = plan.page {
         writeln!(out, "positions in two bindings, {page} in the first")?;
     }
+    for shape in planned.bake.start.shapes(planned.bake.scene) {
+        writeln!(out, "{}", output::shape(&shape))?;
+    }
     if let Some(spacing) = planned.coarse_solids() {
         writeln!(
             out,

@@ -18,9 +18,9 @@ use std::{
 
 use serde_json::Value;
 
-use super::log;
+use super::{count, log, size};
 use swell_scene::four_digits;
-use swell_stage::prepare::Volume;
+use swell_stage::prepare::{ShapeCost, Volume};
 
 /// Exit code if a file cannot be written; standard output counts as one.
 const CANNOT_WRITE: u8 = 4;
@@ -40,6 +40,19 @@ pub(super) fn water(volume: Volume) -> String {
         Some(asked) => format!("{made} of water of {} m³ asked for", four_digits(asked)),
         None => format!("{made} of water"),
     }
+}
+
+/// What a solid whose shape changes takes.
+pub(super) fn shape(cost: &ShapeCost) -> String {
+    format!(
+        "{}: {}; distances at {}, {} on the device and {} in memory, sampled again {} in the shot",
+        cost.name,
+        count(cost.files as u64, "mesh file"),
+        count(cost.nodes as u64, "node"),
+        size(cost.device_bytes() as u64),
+        size(cost.bytes as u64),
+        count(cost.times as u64, "time"),
+    )
 }
 
 /// Writes an event to standard output as one line. A stream of events is complete up to a point:

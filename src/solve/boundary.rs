@@ -43,7 +43,7 @@ impl Counts {
 
 /// Floats a node of a solid whose shape changes: the distance at the substep's start and that at
 /// its end, and a velocity.
-const FLOATS_OF_SHAPE: usize = 5;
+pub const FLOATS_OF_SHAPE: usize = 5;
 
 /// Marks a solid whose shape changes, in [`SolidGrid::first`].
 const SHAPE: u32 = 1 << 31;
@@ -107,10 +107,12 @@ impl Movers {
         };
         let resting = placed(boundary).map(resting).collect();
         let statics = boundary.grids().count() - boundary.moving.len();
-        let shapes = placed(boundary).enumerate().filter_map(|(k, (_, shape, first))| {
-            let field = shape?.field.clone();
-            Some((k - statics, first, field))
-        });
+        let shapes = placed(boundary)
+            .enumerate()
+            .filter_map(|(k, (_, shape, first))| {
+                let field = shape?.field.clone();
+                Some((k - statics, first, field))
+            });
         // A solid that does not rotate may have any reference point: its first node gives the
         // least rounding.
         let solids = scene.moving_solids.iter().zip(&boundary.moving);

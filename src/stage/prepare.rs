@@ -19,6 +19,7 @@ use swell_scene::{
     start_waves::StartWaves,
 };
 use swell_solve::{
+    boundary::FLOATS_OF_SHAPE,
     flip,
     plan::{Capacity, Counts, DeviceLimits, Plan},
 };
@@ -31,6 +32,28 @@ pub struct Volume {
     /// Volume that the scene asks for, including what lies in solids and where blocks overlap;
     /// `None` if a bake begins from a frame.
     pub asked: Option<f64>,
+}
+
+/// What a solid whose shape changes takes.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ShapeCost {
+    /// Name of the solid.
+    pub name: String,
+    /// Number of its mesh files.
+    pub files: usize,
+    /// Nodes of its grid. On the device each takes 20 bytes.
+    pub nodes: usize,
+    /// How often distances are sampled at all nodes in the shot.
+    pub times: usize,
+    /// Bytes in the host's memory: meshes, and distances and velocities at a few times.
+    pub bytes: usize,
+}
+
+impl ShapeCost {
+    /// Bytes in the device's memory.
+    pub fn device_bytes(&self) -> usize {
+        FLOATS_OF_SHAPE * size_of::<f32>() * self.nodes
+    }
 }
 
 /// A scene's start.
@@ -138,6 +161,22 @@ impl Start {
             made: self.particles.len() as f64 * scene.particle_volume(),
             asked: self.asked,
         }
+    }
+
+    /// Costs of the solids whose shape changes.
+    pub fn shapes<'a>(&'a self, scene: &'a Scene) -> impl Iterator<Item = ShapeCost> + 'a {
+        let solids = scene.moving_solids.iter().enumerate();
+        solids.filter_map(|(index, solid)| {
+            let (shape, sequence) = (self.boundary.shape(index)?, solid.sequence.as_ref()?);
+            let (times, bytes) = shape.field.cost(0.0, scene.shot.duration());
+            Some(ShapeCost {
+                name: solid.name(),
+                files: sequence.files.len(),
+                nodes: shape.field.nodes(),
+                times,
+                bytes: bytes + sequence.shape.bytes(),
+            })
+        })
     }
 
     /// Lint of a start without water although the scene asks for some.

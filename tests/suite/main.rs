@@ -96,6 +96,7 @@ mod scene {
     mod fuzz_inputs;
     mod lint;
     mod meshes;
+    mod shapes;
     mod untrusted;
 }
 mod solve {
@@ -115,6 +116,7 @@ mod solve {
     mod plan;
     mod pressure;
     mod projected;
+    mod shapes;
     mod sources;
     mod start_waves;
     mod tension;

@@ -16,7 +16,6 @@ use glam::DVec3;
 
 use super::{
     super::{
-        bounds::Bounds,
         bvh::{Bvh, nearest_point},
         mesh::TriangleMesh,
         parallel,
@@ -147,14 +146,19 @@ impl ShapeField {
         self.core.grid.dims.iter().product()
     }
 
-    /// Returns the box around the grid, in the sequence's own coordinates.
-    pub fn bounds(&self) -> Bounds {
-        let grid = &self.core.grid;
-        let last = DVec3::from_array(grid.dims.map(|n| (n - 1) as f64));
-        Bounds {
-            min: grid.origin,
-            max: grid.origin + grid.spacing * last,
+    /// Returns how often distances are sampled within `[t0, t1]`, seconds, and the bytes that they
+    /// take in memory while a bake runs, at most.
+    pub fn cost(&self, t0: f64, t1: f64) -> (usize, usize) {
+        let [first, last] = [t0, t1].map(|time| self.core.place(time));
+        let mut keys = 1;
+        let mut key = first.0;
+        while key < last.0 {
+            (key, keys) = (self.core.after(key), keys + 1);
         }
+        let keys = keys + usize::from(last.1 > 0.0);
+        let of_key = size_of::<f32>() + size_of::<[f32; 3]>();
+        let of_step = 2 * size_of::<f32>() + size_of::<[f32; 3]>();
+        (keys, self.nodes() * (KEPT * of_key + of_step))
     }
 
     /// Returns the distances at a time, seconds.

@@ -9,6 +9,7 @@ mod gaps;
 mod imprecise;
 mod periodic;
 mod quay;
+mod shapes;
 mod viscous;
 mod whitewater;
 

@@ -2,6 +2,7 @@
 pub(super) mod bodies;
 pub(super) mod flip;
 pub(super) mod pbf;
+pub(super) mod shapes;
 pub(super) mod tension;
 pub(super) mod variants;
 

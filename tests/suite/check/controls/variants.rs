@@ -15,7 +15,7 @@ use swell::{
     stage::prepare::Start,
 };
 
-use super::{Control, bodies, control, flip::SYSTEM, tension::TENSION};
+use super::{Control, bodies, control, flip::SYSTEM, shapes, tension::TENSION};
 use crate::support::{D, flip_of as flip, lattice, mover, noise, turning};
 
 /// A change of the common case, and the faults that its check must detect.
@@ -232,6 +232,11 @@ pub const VARIANTS: &[Variant] = &[
                 &["flux of solids", "velocity of closed faces"],
             ),
         ],
+    },
+    Variant {
+        name: "shape that changes",
+        change: shapes::shape,
+        controls: shapes::SHAPES,
     },
     Variant {
         name: "bodies",
