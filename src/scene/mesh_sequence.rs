@@ -45,6 +45,11 @@ impl MeshSequence {
     }
 }
 
+/// Formats a time to a microsecond.
+fn seconds(time: f64) -> String {
+    shown((1e6 * time).round() / 1e6)
+}
+
 impl Scene {
     /// Warnings about files whose triangles change, that end before the shot does, or that only
     /// lie before or after it.
@@ -75,9 +80,9 @@ impl Scene {
                      that the shape never changes; start = {} makes the first of them frame 1",
                     sequence.name(0),
                     sequence.name(last),
-                    shown(begin),
-                    shown(end),
-                    shown(until),
+                    seconds(begin),
+                    seconds(end),
+                    seconds(until),
                     sequence.first
                 ));
             } else if end < until - slack {
@@ -85,8 +90,8 @@ impl Scene {
                     "solid.sequence: {} is at {} s, and the shot ends at {} s: the shape rests \
                      from there on",
                     sequence.name(last),
-                    shown(end),
-                    shown(until)
+                    seconds(end),
+                    seconds(until)
                 ));
             }
             if self.has_bodies() && self.bodies().any(|it| it.collides) {

@@ -6,6 +6,7 @@ use glam::DVec3;
 
 use super::{
     super::{
+        bounds::FAR,
         bvh::{Bvh, nearest_point},
         mesh::TriangleMesh,
         parallel,
@@ -79,7 +80,7 @@ impl ShapeSamples {
 
     /// Returns the samples at `time` with their mean velocity over the `step` seconds before it;
     /// with a step of 0 they rest. Where the surface has fewer than [`Self::count`], others without
-    /// an area lie with the last one.
+    /// an area lie far away.
     pub fn at(&self, time: f64, step: f64) -> Vec<SurfacePoint> {
         let sequence = &self.sequence;
         let mut now = sequence.moment(time);
@@ -107,9 +108,13 @@ impl ShapeSamples {
         };
         let sum: f64 = found.iter().map(|point| point.area).sum();
         found.iter_mut().for_each(|point| point.area *= whole / sum);
-        let last = found.last().copied();
-        let rest = last.map(|it| SurfacePoint { area: 0.0, ..it });
-        found.extend(std::iter::repeat_n(rest, self.count - found.len()).flatten());
+        // Without an area it would count as water where a particle is near.
+        let away = SurfacePoint {
+            position: DVec3::splat(FAR),
+            area: 0.0,
+            velocity: DVec3::ZERO,
+        };
+        found.resize(self.count, away);
         found
     }
 

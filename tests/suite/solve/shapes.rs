@@ -87,7 +87,7 @@ const TANK: (f64, f64) = (0.52, 0.44);
 /// A quarter of a tank: a ball in the corner of two walls, in water 0.88 m deep.
 fn tank(dir: &Path, set: &[&str]) -> Scene {
     let text = format!(
-        "[shot]\nname = \"ball\"\nframes = 48\nframes_per_second = 48\n\
+        "[shot]\nname = \"ball\"\nframes = 96\nframes_per_second = 96\n\
          [domain]\nmin = [0, 0, 0]\nmax = [{0}, 1.2, {0}]\n\
          [[water.block]]\nmin = [0, 0, 0]\nmax = [{0}, 0.88, {0}]\n\
          [[solid]]\nsequence = {{ files = \"shape.%04d.obj\", frames_per_second = 12 }}\n\
@@ -114,29 +114,29 @@ fn level(scene: &Scene, state: &Particles, solid: f64) -> f64 {
     (2.0 * (moment + solid * TANK.1) / TANK.0.powi(2)).sqrt()
 }
 
-/// Rise of the level over the start after some frames, in parts of what the ball displaces.
-fn rises(context: &Context, scene: &Scene) -> Vec<f64> {
-    let states = run(&gpu(context), scene, 48);
+/// Error of the rise of the level over the start after some frames, in parts of all that the ball
+/// displaces in them.
+fn rises<const N: usize>(context: &Context, scene: &Scene, frames: [usize; N]) -> [f64; N] {
+    let last = frames[N - 1];
+    let states = run(&gpu(context), scene, last as u32);
     // A quarter of the ball is in the tank. Vertices move straight between files, and so the volume
     // is that of the mesh there.
     let shape = &scene.moving_solids[0].sequence.as_ref().unwrap().shape;
-    let volume = |frame: usize| shape.mesh(frame as f64 / 48.0).signed_volume() / 4.0;
+    let volume = |frame: usize| shape.mesh(frame as f64 / 96.0).signed_volume() / 4.0;
     let exact = |frame: usize| (volume(frame) - volume(0)) / TANK.0.powi(2);
     let first = level(scene, &states[0], volume(0));
     let rise = |frame: usize| level(scene, &states[frame], volume(frame)) - first;
-    let parts = [24, 36, 48].map(|frame| {
-        // The surface moves up and down by waves that the ball makes, and the level of a frozen
-        // ball would follow from the solid's volume alone: the last rise is the scale of all.
+    frames.map(|frame| {
         println!("{frame}: {:.5} of {:.5} m", rise(frame), exact(frame));
-        (rise(frame) - exact(frame)) / exact(48)
-    });
-    parts.to_vec()
+        (rise(frame) - exact(frame)) / exact(last)
+    })
 }
 
 /// A ball that swells in a tank lifts the water by its volume, to 1 % of the whole rise. FLIP has an
-/// error of first order in time until its density correction has made up for it, half of the
-/// radius' relative change in a substep of 1/48 s, 0.3 %; PBF also has that of planes in cut cells,
-/// 0.29 (Δx / r)² of the flux (0.4 %).
+/// error of first order in time until its density correction has made up for it: cells are cut as at
+/// a substep's start, when the area is smaller by the radius' relative change in 1/96 s, 0.2 %. PBF
+/// keeps that, and the flux through planes in cut cells, which is too small by 0.29 (Δx / r)², 0.4 %.
+/// So many steps for that accuracy take it half a minute.
 #[test]
 fn a_ball_that_swells_lifts_the_water_by_its_volume() {
     let context = context();
@@ -144,7 +144,7 @@ fn a_ball_that_swells_lifts_the_water_by_its_volume() {
     let dir = folder(&files);
     for method in ["flip", "pbf"] {
         let scene = tank(dir.path(), &[&format!("solver.method=\"{method}\"")]);
-        let off = rises(&context, &scene);
+        let off = rises(&context, &scene, [48, 72, 96]);
         println!("{method}: {off:?}");
         assert!(off.iter().all(|off| off.abs() < 0.01), "{method}: {off:?}");
     }
@@ -155,15 +155,15 @@ fn a_ball_that_swells_lifts_the_water_by_its_volume() {
         "return rigid;",
     );
     let scene = tank(dir.path(), &["solver.method=\"pbf\""]);
-    let off = rises(&still, &scene);
-    println!("without velocity: {off:?}");
-    assert!(off.iter().any(|off| off.abs() > 0.02), "{off:?}");
+    let [off] = rises(&still, &scene, [48]);
+    println!("without velocity: {off}");
+    assert!(off.abs() > 0.02, "{off}");
     // Control: the first file throughout displaces nothing more.
     let frozen = folder(std::iter::repeat_n(&files[0], 13));
     let scene = tank(frozen.path(), &[]);
-    let states = run(&gpu(&context), &scene, 48);
+    let states = run(&gpu(&context), &scene, 24);
     let volume = files[0].signed_volume() / 4.0;
-    let rise = level(&scene, &states[48], volume) - level(&scene, &states[0], volume);
+    let rise = level(&scene, &states[24], volume) - level(&scene, &states[0], volume);
     let displaced = (files[12].signed_volume() - files[0].signed_volume()) / 4.0;
     let rise = rise / (displaced / TANK.0.powi(2));
     assert!(rise.abs() < 0.01, "{rise}");
@@ -171,14 +171,13 @@ fn a_ball_that_swells_lifts_the_water_by_its_volume() {
 
 /// A channel with a box that reaches through its floor, its side walls and the water's surface, and
 /// goes 0.15 m along x within half a second.
-fn channel(dir: &Path, solid: &str, set: &[&str]) -> Scene {
+fn channel(dir: &Path, solid: &str, probes: &str, set: &[&str]) -> Scene {
     let text = format!(
         "[shot]\nname = \"piston\"\nframes = 24\nframes_per_second = 24\n\
          [domain]\nmin = [0, 0, 0]\nmax = [1.6, 0.8, 0.4]\n\
          [[water.block]]\nmin = [0, 0, 0]\nmax = [1.6, 0.4, 0.4]\n\
          [[solid]]\n{solid}\n\
-         [[probe]]\nkind = \"elevation\"\nat = [0.8, 0.2]\n\
-         [[probe]]\nkind = \"force\"\nsolid = 0\n\
+         {probes}\
          [solver]\nmethod = \"flip\"\n[solver.flip]\ncell_size = 0.05\n\
          [solver.pbf]\nparticle_spacing = 0.025\n"
     );
@@ -193,23 +192,31 @@ fn piston(way: f64) -> TriangleMesh {
     })
 }
 
+/// What measures the water at each substep.
+const PROBES: &str = "[[probe]]\nkind = \"elevation\"\nat = [0.8, 0.2]\nrate_hz = \"substep\"\n\
+    [[probe]]\nkind = \"force\"\nsolid = 0\nrate_hz = \"substep\"\n";
+
 /// Elevation, metres, and force along x, newtons, at the end of each of 18 frames.
 fn gauged(context: &Context, scene: &Scene) -> (Vec<f64>, Vec<f64>) {
     let start = Start::of(scene).unwrap();
     let opened = gpu(context);
-    let mut drive = Drive::new(&opened, scene, &start, false).unwrap();
+    let drive = Drive::new(&opened, scene, &start, false).unwrap();
+    let mut drive = drive.with_probes();
     let frames = (0..18).map(|_| drive.advance().unwrap().looks);
     let looks: Vec<_> = frames.collect();
-    let all = |probe: usize| looks.iter().map(|of| of[probe][0].unwrap()).collect();
-    (all(0), all(1))
+    // The last sample of a frame: an elevation, or three forces and three moments.
+    let all = |probe: usize, columns: usize| {
+        let values = looks.iter().map(|of| of[probe][of[probe].len() - columns]);
+        values.map(Option::unwrap).collect()
+    };
+    (all(0, 1), all(1, 6))
 }
 
 /// The distance to a plane is linear, so that a grid that moves with a box and one that stays give
 /// the same cuts up to rounding, and so do the motions: files at frames, and a constant velocity
-/// that ends at one. Only the roundings of f32 then tell the two flows apart, which grow as the
-/// water moves; an elevation is one of particles, and a tenth of their spacing is what one more or
-/// less in a column changes it by. The force's scale is that of the water's weight, ρ g h²/2 times
-/// the width.
+/// that ends at one. Only roundings of f32 tell the two flows apart: of a position at 1.6 m 1.2e-7 m
+/// in each of some fifty substeps, which grow as the water moves. A thousandth of a particle spacing
+/// is 200 of them. The force's scale is that of the water at rest, ρ g h²/2 times the width.
 #[test]
 fn a_box_of_files_pushes_water_as_the_same_box_that_moves() {
     let context = context();
@@ -220,9 +227,9 @@ fn a_box_of_files_pushes_water_as_the_same_box_that_moves() {
     let slides = "mesh = \"shape.0000.obj\"\ndirection = [1, 0, 0]\n\
         motion = { kind = \"constant_velocity\", velocity = 0.3, until = 0.5 }";
     let changes = "sequence = { files = \"shape.%04d.obj\" }";
-    let (level, force) = gauged(&context, &channel(dir.path(), slides, &[]));
+    let (level, force) = gauged(&context, &channel(dir.path(), slides, PROBES, &[]));
     let compared = |context: &Context| {
-        let (other, pushed) = gauged(context, &channel(dir.path(), changes, &[]));
+        let (other, pushed) = gauged(context, &channel(dir.path(), changes, PROBES, &[]));
         let most = |a: &[f64], b: &[f64]| {
             let off = a.iter().zip(b).map(|(a, b)| (a - b).abs());
             off.fold(0.0, f64::max)
@@ -232,9 +239,8 @@ fn a_box_of_files_pushes_water_as_the_same_box_that_moves() {
     let weight = 0.5 * 1000.0 * 9.81 * 0.4 * 0.4 * 0.4;
     let (raised, pushed) = compared(&context);
     println!("{raised} m, {pushed} N of {weight} N");
-    println!("{level:?} {force:?}");
-    assert!(raised < 0.1 * 0.025, "{raised}");
-    assert!(pushed < 0.05 * weight, "{pushed}");
+    assert!(raised < 1e-3 * 0.025, "{raised}");
+    assert!(pushed < 1e-3 * weight, "{pushed}");
     // Control: without the velocity of the surface.
     let still = spoiled(
         "flip/cut_cells",
@@ -323,7 +329,7 @@ fn the_reference_follows_the_gpu() {
         println!("{method}: {apart}");
         assert!(apart < 1e-4, "{method}: {apart}");
         // Control: the solid moves water farther than that.
-        assert!(max_distance(&found[4], &found[0]) > 1e-2, "{method}");
+        assert!(max_distance(&found[4], &found[0]) > 1e-3, "{method}");
     }
 }
 
@@ -340,7 +346,7 @@ fn scenes_without_a_changing_shape_have_nothing_for_it() {
     for method in ["flip", "pbf"] {
         let plan = |solid: &str| {
             let set = [&format!("solver.method=\"{method}\"")[..]];
-            let scene = channel(dir.path(), solid, &set);
+            let scene = channel(dir.path(), solid, "", &set);
             let start = Start::of(&scene).unwrap();
             let limits = swell::solve::plan::device_limits(&context);
             let nodes = start.boundary.shape_nodes();
@@ -369,6 +375,6 @@ fn scenes_without_a_changing_shape_have_nothing_for_it() {
         }
     }
     // The poses of solids that move as a whole are no part of a shape.
-    let scene = channel(dir.path(), changes, &[]);
+    let scene = channel(dir.path(), changes, "", &[]);
     assert_eq!(scene.moving_solids[0].pose(&[], 0.3), Pose::START);
 }
