@@ -206,8 +206,8 @@ fn note(faults: &mut Vec<String>, placed: &PlacedMesh, is_first: bool) {
     faults.push(format!("solid.sequence: {name}: {}", all.join("; ")));
 }
 
-/// Rejects emitters in whose volume a solid comes whose shape changes: what waits there follows from
-/// where solids were before.
+/// Rejects emitters in whose volume a solid comes whose shape changes: what waits there follows
+/// from where solids were before.
 pub(super) fn check_emitters(
     doc: &Document<'_>,
     solids: &[MovingSolid],
@@ -221,8 +221,8 @@ pub(super) fn check_emitters(
             let both = around.map(|around| around.intersection(&room));
             if both.is_some_and(|both| both.min.cmplt(both.max).all()) {
                 let problem = format!(
-                    "the emitter's volume meets the box around {}, whose shape changes; move one of \
-                     them",
+                    "the emitter's volume meets the box around {}, whose shape changes; move one \
+                     of them",
                     solid.name()
                 );
                 return Err(doc.fault_of_plain(&format!("emitter[{index}]"), problem));

@@ -99,7 +99,7 @@ impl ShapeSamples {
         let run = run.expect("each mesh is in a run");
         let mut found = match is_kept {
             true => self.moved(run, now, time, step),
-            false => self.from_nearest(run, now, time, step),
+            false => self.arriving(run, now, time, step),
         };
         // Where triangles have grown unevenly, the parts of neighbours are not those of one mesh.
         let whole = match is_kept {
@@ -149,7 +149,7 @@ impl ShapeSamples {
 
     /// Points of the later of two meshes with different triangles, on their way there from the
     /// nearest points of the earlier one.
-    fn from_nearest(&self, run: &Run, now: Moment, time: f64, step: f64) -> Vec<SurfacePoint> {
+    fn arriving(&self, run: &Run, now: Moment, time: f64, step: f64) -> Vec<SurfacePoint> {
         let meshes = self.sequence.meshes();
         // After the last mesh the surface rests.
         let until = time.min(self.sequence.time(now.index + 1));

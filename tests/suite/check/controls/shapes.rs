@@ -31,11 +31,11 @@ fn meshes() -> Vec<TriangleMesh> {
     vec![first, second]
 }
 
-/// The box in the water, with particles around it.
+/// The box in the water, with particles around it, some of which it meets.
 pub fn shape(scene: &mut Scene, start: &mut Start) {
     let meshes = meshes();
     let mut solid = mover(meshes[0].bounds().unwrap(), DVec3::X, Motion::Still);
-    let grown = meshes[1].bounds().unwrap().grown(0.01);
+    let room = meshes[0].bounds().unwrap().grown(0.01);
     let shape = ShapeSequence::new(meshes, 0.0, 20.0);
     let field = ShapeField::new(&shape, 4.0 * D, D).unwrap();
     solid.slide = None;
@@ -52,7 +52,7 @@ pub fn shape(scene: &mut Scene, start: &mut Start) {
     start.boundary.shapes = vec![Some(Shape { field, samples })];
     let all = &start.particles.position;
     let keep: Vec<bool> = (all.iter())
-        .map(|x| !grown.contains(DVec3::from_array(x.map(f64::from))))
+        .map(|x| !room.contains(DVec3::from_array(x.map(f64::from))))
         .collect();
     start.particles.retain(&keep);
     start.particles.id = (0..start.particles.len() as u32).collect();
@@ -62,7 +62,7 @@ pub const SHAPES: &[Control] = &[
     control(
         "flip/cut_cells",
         "return rigid + shape_velocity_at(x);",
-        "return rigid + 1.0001 * shape_velocity_at(x);",
+        "return rigid + 1.1 * shape_velocity_at(x);",
         "flip/cut_cells",
         &["flux of solids", "velocity of closed faces"],
     ),
@@ -76,7 +76,7 @@ pub const SHAPES: &[Control] = &[
     control(
         "flip/cut_cells",
         "let first = solid_grid.first + 2u * nodes;",
-        "let first = solid_grid.first + 2u * nodes + 3u;",
+        "let first = solid_grid.first + 2u * nodes + 1u;",
         "flip/cut_cells",
         &["flux of solids", "velocity of closed faces"],
     ),
