@@ -108,10 +108,13 @@ fn files_are_found_by_their_numbers_and_stay_one_surface() {
     );
 }
 
+/// A change of a job's files.
+type Edit<'a> = &'a dyn Fn(&Job);
+
 #[test]
 fn bad_files_are_named_before_anything_is_written() {
     let sheet = "v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\n";
-    let edits: [(&dyn Fn(&Job), &[&str]); 14] = [
+    let edits: [(Edit<'_>, &[&str]); 14] = [
         (
             &|job| fs::remove_file(job.path("box.0009.obj")).unwrap(),
             &[
