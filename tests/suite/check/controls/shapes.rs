@@ -18,8 +18,8 @@ use crate::support::{D, box_mesh, mover};
 /// A box that swells and leans.
 fn meshes() -> Vec<TriangleMesh> {
     let bounds = swell::domain::bounds::Bounds {
-        min: DVec3::new(0.33, 0.27, 0.21),
-        max: DVec3::new(0.83, 0.71, 0.67),
+        min: DVec3::new(0.33, 0.37, 0.21),
+        max: DVec3::new(0.81, 0.78, 0.63),
     };
     let middle = 0.5 * (bounds.min + bounds.max);
     let first = box_mesh(bounds);
