@@ -159,9 +159,8 @@ impl MovingSolid {
         }
     }
 
-    /// Returns the pose at time `t`, seconds. That of a solid whose shape changes is always the one
-    /// at the start. A body moves on from its state among `bodies` without
-    /// forces.
+    /// Returns the pose at time `t`, seconds, always that at the start where the shape changes. A
+    /// body moves on from its state among `bodies` without forces.
     pub fn pose(&self, bodies: &[BodyState], t: f64) -> Pose {
         if let Some(it) = &self.body {
             let state = it.state(bodies);

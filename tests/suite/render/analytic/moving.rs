@@ -291,6 +291,7 @@ fn floating(plate: &Plate) -> MovingSolid {
         slide: None,
         turn: None,
         track: None,
+        sequence: None,
         body: Some(FreeBody {
             index: 0,
             body,
