@@ -173,6 +173,7 @@ fn what_is_no_physics_is_said_once() {
         [
             "water.mesh.file",
             "solid.mesh",
+            "solid.sequence.files",
             "body.mesh",
             "emitter.mesh.file",
             "drain.mesh.file"

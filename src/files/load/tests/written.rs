@@ -194,6 +194,9 @@ frames_per_second = 30
 [domain]
 min = [0, 0, 0]
 max = [4, 4, 4]
+[[solid]]
+sequence = { files = ["cube.obj", "cube.obj"], start = 1 }
+scale = 0.5
 [[body]]
 mesh = "cube.obj"
 translate = [2.5, 1.0, 1.0]
