@@ -126,8 +126,8 @@ fn main(
 #ifdef MOVING_SOLIDS
     // Steps of at most half a node spacing relative to the fastest solid, so that thin solids are
     // not skipped.
-    let most = length(way) + posed_solids[0].fastest * params.time_step;
-    let spacing = posed_solids[0].grid.spacing;
+    let most = length(way) + posed_solids.fastest * params.time_step;
+    let spacing = posed_solids.solids[0].grid.spacing;
     let steps = u32(ceil(2.0 * most / spacing)) + 1u;
     var is_near = false;
     let margin = most + params.contact_distance + 2.0 * spacing;

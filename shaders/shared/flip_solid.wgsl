@@ -54,7 +54,7 @@ fn may_cut(cell: vec3f) -> bool {
 // Whether solid k does at the substep's start; selects it if it may.
 fn may_cut_by(k: u32, cell: vec3f) -> bool {
     // A node beyond the grid still counts as near, in any direction.
-    let beyond = 2.0 * posed_solids[k].grid.spacing;
+    let beyond = 2.0 * posed_solids.solids[k].grid.spacing;
     if !may_be_at_solid(k, 0.0, (cell + 0.5) * params.cell_size, beyond) {
         return false;
     }

@@ -1,6 +1,6 @@
 // Solids of which some move, each with a signed-distance grid sampled in its initial pose. All
 // static solids, if any, form the first grid. The functions below work on one selected solid at a
-// time. Mirrored by `PosedSolid` of solve/params.rs.
+// time. Mirrored by `PosedSolid` and `PosedSolids` of solve/params.rs.
 struct PosedSolid {
     // Grid in the initial pose, relative to the reference point.
     grid: SolidGrid,
@@ -10,18 +10,27 @@ struct PosedSolid {
     reach: f32,
     // Velocity of the reference point, m/s.
     velocity: vec3f,
-    // Largest speed of any point of any solid, m/s.
-    fastest: f32,
+    unused: f32,
     // Angular velocity about the reference point, rad/s.
     spin: vec3f,
-    // Length of the substep, seconds.
-    length: f32,
+    padding: f32,
     // Unit quaternions (x, y, z, w) that rotate back to the initial pose: from the pose at the
     // substep's start, and from that at its end.
     back: vec4f,
     end_back: vec4f,
 }
-@group(0) @binding(7) var<storage, read> posed_solids: array<PosedSolid>;
+
+// A uniform: the passes that need it bind as many storage buffers as some drivers allow.
+struct PosedSolids {
+    count: u32,
+    // Largest speed of any point of any solid, m/s.
+    fastest: f32,
+    // Length of the substep, seconds.
+    length: f32,
+    padding: u32,
+    solids: array<PosedSolid, 512>,
+}
+@group(0) @binding(7) var<uniform> posed_solids: PosedSolids;
 
 var<private> solid_grid: SolidGrid;
 var<private> solid_centre: vec3f;
@@ -38,25 +47,25 @@ var<private> solid_share: f32;
 #endif
 
 fn solid_count() -> u32 {
-    return arrayLength(&posed_solids);
+    return posed_solids.count;
 }
 
 // Whether x is within the distance `margin` of solid k's grid, or almost so, after the fraction
 // `share` of the substep: a test without the solid's rotation and its distances.
 fn may_be_at_solid(k: u32, share: f32, x: vec3f, margin: f32) -> bool {
-    let way = share * posed_solids[k].length * posed_solids[k].velocity;
-    let reach = posed_solids[k].reach + margin;
-    let apart = x - (posed_solids[k].centre + way);
+    let way = share * posed_solids.length * posed_solids.solids[k].velocity;
+    let reach = posed_solids.solids[k].reach + margin;
+    let apart = x - (posed_solids.solids[k].centre + way);
     return dot(apart, apart) <= reach * reach;
 }
 
 // Selects solid k in its pose after the fraction `share` of the substep.
 fn look_at_solid(k: u32, share: f32) {
-    solid_grid = posed_solids[k].grid;
-    solid_velocity = posed_solids[k].velocity;
-    solid_spin = posed_solids[k].spin;
-    solid_centre = posed_solids[k].centre + share * posed_solids[k].length * solid_velocity;
-    let back = mix(posed_solids[k].back, posed_solids[k].end_back, share);
+    solid_grid = posed_solids.solids[k].grid;
+    solid_velocity = posed_solids.solids[k].velocity;
+    solid_spin = posed_solids.solids[k].spin;
+    solid_centre = posed_solids.solids[k].centre + share * posed_solids.length * solid_velocity;
+    let back = mix(posed_solids.solids[k].back, posed_solids.solids[k].end_back, share);
     solid_back = back * inverseSqrt(dot(back, back));
 #ifdef SHAPES
     solid_changes = solid_grid.first >= SHAPE;
@@ -67,7 +76,7 @@ fn look_at_solid(k: u32, share: f32) {
 
 // Index behind the last float of all solids in `solid_distance`.
 fn solids_end() -> u32 {
-    let last = posed_solids[solid_count() - 1u].grid;
+    let last = posed_solids.solids[solid_count() - 1u].grid;
     let nodes = last.dims.x * last.dims.y * last.dims.z;
 #ifdef SHAPES
     return (last.first & (SHAPE - 1u)) + select(nodes, 5u * nodes, last.first >= SHAPE);

@@ -22,7 +22,7 @@ use swell_domain::{
 };
 use swell_scene::{
     PlacedMesh, Placement, Scene, SceneError, Solver, Swarm, Water,
-    moving_solid::MovingSolid,
+    moving_solid::{MAX_MOVING_SOLIDS, MovingSolid},
     origin, projection,
     words::{chain, extent, shown, shown_all},
 };
@@ -86,13 +86,19 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
     let moving = (0..spec.solid.len()).filter(|&k| spec.solid[k].moves());
     let moving: Vec<usize> = moving.collect();
     periodic::check_solids(doc, periodic, &moving_solids, |k| moving[k])?;
-    let bodies = bodies(doc, base_dir, &spec.body, lattice.spacing, &{
-        body::Surroundings {
-            domain: &domain,
-            periodic,
-            has_projection: solver.pbf().is_none_or(|pbf| pbf.grid_projection),
-        }
-    })?;
+    let bodies = bodies(
+        doc,
+        base_dir,
+        &spec.body,
+        (lattice.spacing, moving_solids.len()),
+        &{
+            body::Surroundings {
+                domain: &domain,
+                periodic,
+                has_projection: solver.pbf().is_none_or(|pbf| pbf.grid_projection),
+            }
+        },
+    )?;
     let wave_makers = wave_maker::build_all(doc, &spec.wave_maker, &around)?;
     periodic::check_makers(doc, periodic, &wave_makers)?;
     let around = sources::Around {
@@ -187,6 +193,7 @@ fn solids(
             solids.push(static_solid(doc, &path, spec, around)?);
             continue;
         }
+        check_count(doc, &path, moving.len())?;
         moving.push(match &spec.sequence {
             Some(sequence) => mesh_sequence::build(doc, &path, (spec, sequence), around)?,
             None => {
@@ -198,16 +205,26 @@ fn solids(
     Ok((solids, moving))
 }
 
-/// Builds the bodies for particles `spacing` metres apart.
+/// Checks that one more than `count` solids can move.
+fn check_count(doc: &Document<'_>, path: &str, count: usize) -> Result<()> {
+    if count < MAX_MOVING_SOLIDS {
+        return Ok(());
+    }
+    let problem = format!("at most {MAX_MOVING_SOLIDS} solids and bodies can move");
+    Err(doc.fault_of_plain(path, problem))
+}
+
+/// Builds the bodies, after `moving` moving solids, for particles `spacing` metres apart.
 fn bodies(
     doc: &Document<'_>,
     base_dir: &Path,
     specs: &[BodySpec],
-    spacing: f64,
+    (spacing, moving): (f64, usize),
     around: &body::Surroundings<'_>,
 ) -> Result<Vec<MovingSolid>> {
     let build = |(index, spec): (usize, &BodySpec)| {
         let path = format!("body[{index}]");
+        check_count(doc, &path, moving + index)?;
         let mesh = (&spec.placed(), spacing);
         let placed = placed_mesh(doc, base_dir, &path, "mesh", mesh)?;
         body::build(doc, index, placed, spec, around)

@@ -13,6 +13,9 @@ use swell_domain::{
     pose::{Passage, Pose},
 };
 
+/// Largest number of moving solids and bodies in a scene; their poses are a uniform of 64 KiB.
+pub const MAX_MOVING_SOLIDS: usize = 511;
+
 /// A solid that slides along a line, turns about an axis, follows a track, changes its shape, or
 /// floats.
 #[derive(Clone, Debug, PartialEq)]

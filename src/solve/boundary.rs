@@ -16,7 +16,7 @@ use swell_scene::{Scene, moving_solid::MovingSolid, step::Substep};
 
 use super::{
     buffers::{POSED_SOLIDS, SOLID_DISTANCE, SOLID_GRID, velocities_behind},
-    params::{PosedSolid, SolidGrid},
+    params::{PosedSolid, PosedSolids, SolidGrid},
     plan::Counts,
 };
 
@@ -29,7 +29,6 @@ impl Counts {
             solid_grid: boundary.distance.as_ref().map_or([0; 3], |grid| grid.dims),
             moving_nodes: boundary.moving.iter().map(|grid| grid.values.len()).sum(),
             shape_nodes: boundary.shape_nodes(),
-            solids: boundary.grids().count(),
             ..Self::default()
         }
     }
@@ -159,7 +158,13 @@ impl Movers {
         bodies: &[BodyState],
         (start, length): (f64, f64),
     ) {
-        let mut posed = self.resting.clone();
+        let mut all = PosedSolids {
+            count: self.resting.len() as u32,
+            length: length as f32,
+            ..PosedSolids::default()
+        };
+        let posed = &mut all.solids[..self.resting.len()];
+        posed.copy_from_slice(&self.resting);
         let mut fastest = 0.0f64;
         let solids = scene.moving_solids.iter().zip(&self.reaches);
         for ((solid, reach), k) in solids.zip(self.statics..) {
@@ -197,10 +202,8 @@ impl Movers {
             program.upload(velocities_behind(first + 2 * nodes), 0, &step.velocity);
             fastest = fastest.max(step.fastest);
         }
-        for solid in &mut posed {
-            (solid.fastest, solid.length) = (fastest as f32, length as f32);
-        }
-        program.upload(POSED_SOLIDS, 0, &posed);
+        all.fastest = fastest as f32;
+        program.upload(POSED_SOLIDS, 0, &[all]);
     }
 }
 

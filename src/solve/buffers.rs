@@ -5,7 +5,7 @@ use swell_gpu::buffer::Buf;
 
 pub use swell_gpu::sort::{CELL_OF, CELL_START, ELEMENT_COUNT, ID, ORDER, PLACED, SLOT_IN_CELL};
 
-use super::params::{Counters, PosedSolid, SolidGrid};
+use super::params::{Counters, PosedSolids, SolidGrid};
 
 /// Position of each particle, in storage order.
 pub const POSITION: Buf<[f32; 3]> = Buf::new("position");
@@ -38,7 +38,7 @@ pub const SOLID_DISTANCE: Buf<f32> = Buf::new("solid_distance");
 /// Geometry of the static solids' signed-distance grid.
 pub const SOLID_GRID: Buf<SolidGrid> = Buf::uniform("solid_grid");
 /// Geometry and motion of all solids' signed-distance grids.
-pub const POSED_SOLIDS: Buf<PosedSolid> = Buf::new("posed_solids");
+pub const POSED_SOLIDS: Buf<PosedSolids> = Buf::uniform("posed_solids");
 /// Velocities behind the first `floats` of [`SOLID_DISTANCE`], m/s: of the surface of a solid whose
 /// shape changes, at each node, or of each boundary sample of PBF.
 pub fn velocities_behind(floats: usize) -> Buf<[f32; 3]> {

@@ -6,7 +6,7 @@ use swell_gpu::{
     buffer::{Element, Mirror, Scalar, Workgroups, mirror},
     reflect::Layout,
 };
-use swell_scene::sources::MAX_INLETS;
+use swell_scene::{moving_solid::MAX_MOVING_SOLIDS, sources::MAX_INLETS};
 
 mirror!(
     /// `Params` of shared/pbf_params.wgsl. Lengths in metres; positions relative to the domain's
@@ -166,12 +166,12 @@ mirror!(
         reach: f32,
         /// Velocity of the reference point, m/s.
         velocity: [f32; 3],
-        /// Largest speed of any point of any solid, m/s.
-        fastest: f32,
+        /// Unused.
+        unused: f32,
         /// Angular velocity about the reference point, rad/s.
         spin: [f32; 3],
-        /// Length of the substep, seconds.
-        length: f32,
+        /// Unused.
+        padding: f32,
         /// Unit quaternion (x, y, z, w) that rotates from the pose at the substep's start back to
         /// the initial pose.
         back: [f32; 4],
@@ -180,6 +180,49 @@ mirror!(
         end_back: [f32; 4],
     }
 );
+
+/// `PosedSolids` of shared/moving_solids.wgsl: poses of all solids in a substep.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct PosedSolids {
+    /// Number of solids.
+    pub count: u32,
+    /// Largest speed of any point of any solid, m/s.
+    pub fastest: f32,
+    /// Length of the substep, seconds.
+    pub length: f32,
+    /// Unused.
+    pub padding: u32,
+    /// The solids; all static ones form the first.
+    pub solids: [PosedSolid; MAX_MOVING_SOLIDS + 1],
+}
+
+impl Default for PosedSolids {
+    fn default() -> Self {
+        bytemuck::Zeroable::zeroed()
+    }
+}
+
+impl Element for PosedSolids {
+    const SCALAR: Scalar = Scalar::Mixed;
+}
+
+impl Mirror for PosedSolids {
+    fn layout() -> Layout {
+        let member = |name: &str, offset: usize| (name.to_owned(), offset as u32);
+        Layout {
+            name: "PosedSolids".to_owned(),
+            size: size_of::<Self>() as u32,
+            members: vec![
+                member("count", std::mem::offset_of!(Self, count)),
+                member("fastest", std::mem::offset_of!(Self, fastest)),
+                member("length", std::mem::offset_of!(Self, length)),
+                member("padding", std::mem::offset_of!(Self, padding)),
+                member("solids", std::mem::offset_of!(Self, solids)),
+            ],
+        }
+    }
+}
 
 mirror!(
     /// `Inlets` of shared/inlets.wgsl: boxes of cells where water enters.

@@ -59,8 +59,6 @@ pub struct Counts {
     pub moving_nodes: usize,
     /// Those of them in grids of solids whose shape changes.
     pub shape_nodes: usize,
-    /// Signed-distance grids: one for all static solids, and one for each moving solid.
-    pub solids: usize,
     /// Capacity of the sparse grids, of FLIP or of PBF's projection.
     pub bricks: Capacity,
 }

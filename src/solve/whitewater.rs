@@ -103,7 +103,7 @@ fn plan(scene: &PbfScene, boundary: &Boundary, water: usize, white: usize) -> Pl
         table.add("solids", BOUNDARY_CELL_START.sized(cells + 1));
         match counts.moving_nodes {
             0 => table.add("solids", SOLID_GRID.sized(1)),
-            _ => table.add("solids", POSED_SOLIDS.sized(counts.solids)),
+            _ => table.add("solids", POSED_SOLIDS.sized(1)),
         }
     }
     plan.declare(table);

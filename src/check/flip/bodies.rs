@@ -160,7 +160,8 @@ impl FlipState {
         if !self.scene.has_bodies() {
             return Ok(());
         }
-        let solids = io.before.get(POSED_SOLIDS, self.boundary.grids().count())?;
+        let all = io.before.one(POSED_SOLIDS)?;
+        let solids = &all.solids[..all.count as usize];
         let bodies = solids.len() - self.scene.bodies().count()..;
         let wide = |v: [f32; 3]| Vec3::from_array(v).as_dvec3();
         let start = self.elements().substep.start;

@@ -195,7 +195,7 @@ fn bricks(plan: &Plan, scene: &FlipScene, table: &mut BufferTable) {
         table.add("solids", SOLID_DISTANCE.sized(plan.counts.solid_floats()));
         if plan.counts.moving_nodes > 0 {
             table.watch("solids", CLOSED_VELOCITY.sized(3 * all));
-            table.add("solids", POSED_SOLIDS.sized(plan.counts.solids));
+            table.add("solids", POSED_SOLIDS.sized(1));
         } else {
             table.add("solids", SOLID_GRID.sized(1));
         }

@@ -217,10 +217,7 @@ fn buffers(plan: &Plan, scene: &PbfScene, phases: usize) -> BufferTable {
     if plan.has_solids() {
         let (velocities, grids) = match plan.counts.moving_nodes {
             0 => (0, SOLID_GRID.sized(1)),
-            _ => (
-                3 * plan.counts.boundary_samples,
-                POSED_SOLIDS.sized(plan.counts.solids),
-            ),
+            _ => (3 * plan.counts.boundary_samples, POSED_SOLIDS.sized(1)),
         };
         let distances = plan.counts.solid_floats();
         table.add("solids", SOLID_DISTANCE.sized(distances + velocities));

@@ -211,8 +211,8 @@ fn a_sphere_that_moves_through_pbf_is_within_tolerance() {
             state.position[0] = within.as_vec3().to_array();
             let place = (
                 "pbf/predict",
-                "share * posed_solids[k].length",
-                "0.99 * share * posed_solids[k].length",
+                "share * posed_solids.length",
+                "0.99 * share * posed_solids.length",
             );
             spoils(&context, &scene, &start, (frames, &state), place);
             continue;
@@ -220,8 +220,8 @@ fn a_sphere_that_moves_through_pbf_is_within_tolerance() {
         for (pass, from, to) in [
             (
                 "pbf/predict",
-                "share * posed_solids[k].length",
-                "0.99 * share * posed_solids[k].length",
+                "share * posed_solids.length",
+                "0.99 * share * posed_solids.length",
             ),
             (
                 "pbf/compute_delta",
