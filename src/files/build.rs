@@ -13,18 +13,16 @@ use super::{
     fit::{comes_into, fits},
     grids, keep,
     keys::{BodySpec, BoxSpec, DomainSpec, MeshSpec, SceneSpec, SolidSpec, SwarmSpec, WaterSpec},
-    mesh_sequence, moving_solid, no_slip, periodic, probe, sources, start_waves, wave_maker,
+    mesh_sequence, moving_solid, no_slip, periodic,
+    placed_mesh::placed_mesh,
+    probe, sources, start_waves, wave_maker,
 };
-use swell_domain::{
-    bounds::Bounds,
-    mesh_file::{self, Digits, Loaded, MeshError, MeshFormat, Outline},
-    sampling,
-};
+use swell_domain::{bounds::Bounds, sampling};
 use swell_scene::{
-    PlacedMesh, Placement, Scene, SceneError, Solver, Swarm, Water,
+    PlacedMesh, Scene, SceneError, Solver, Swarm, Water,
     moving_solid::{MAX_MOVING_SOLIDS, MovingSolid},
     origin, projection,
-    words::{chain, extent, shown, shown_all},
+    words::{extent, shown, shown_all},
 };
 
 use solver::Solvers;
@@ -32,10 +30,6 @@ use solver::Solvers;
 /// Largest number of particles of a scene: ids have 32 bits, and 2²⁷ particles of 200
 /// bytes take 25 GiB.
 const MAX_PARTICLES: f64 = 134_217_728.0;
-
-/// Largest distance between adjacent coordinates of a mesh file, particle spacings; a larger one
-/// degrades the shape.
-const MOST_STEP: f64 = 0.01;
 
 /// Least edge of the domain, metres; equal to the least particle spacing.
 const LEAST_EDGE: f64 = 1e-8;
@@ -455,78 +449,4 @@ fn solid_mesh(
     };
     let mesh = (&spec.placed(mesh, spec.blake3.as_ref()), around.spacing);
     placed_mesh(doc, around.base_dir, path, "mesh", mesh)
-}
-
-/// Reads the mesh of the table at `path`, whose file is in the key `name`, for particles
-/// `spacing` metres apart.
-fn placed_mesh(
-    doc: &Document<'_>,
-    base_dir: &Path,
-    path: &str,
-    name: &str,
-    spec: (&MeshSpec, f64),
-) -> Result<PlacedMesh> {
-    let keys = [name, "blake3"].map(|name| format!("{path}.{name}"));
-    let (placed, _) = placed_mesh_like(doc, base_dir, (&keys[0], &keys[1]), spec, None)?;
-    Ok(placed)
-}
-
-/// Reads a mesh as [`placed_mesh`] does, whose file and hash are in these keys, with the triangles
-/// of an outline where its faces have the same corners; also returns its own outline.
-pub(super) fn placed_mesh_like(
-    doc: &Document<'_>,
-    base_dir: &Path,
-    (key, hash_key): (&str, &str),
-    (spec, spacing): (&MeshSpec, f64),
-    outline: Option<&Outline>,
-) -> Result<(PlacedMesh, Outline)> {
-    let fail = |problem: String| doc.fault_of(key, problem);
-    let file = doc.find(base_dir, key, &spec.file)?;
-    let read = || {
-        let format = MeshFormat::of(&file)?;
-        let bytes = mesh_file::read_bytes(&file)?;
-        Ok((Loaded::like(&bytes, format, &file, outline)?, bytes))
-    };
-    let ((loaded, outline), bytes) = read().map_err(|error: MeshError| fail(chain(&error)))?;
-    let file_hash = blake3::hash(&bytes).to_hex().to_string();
-    if spec.blake3.as_ref().is_some_and(|hash| *hash != file_hash) {
-        let problem = format!("{} has BLAKE3 {file_hash}", file.display());
-        return Err(doc.fault_of(hash_key, problem));
-    }
-    let placement = Placement {
-        translate: DVec3::from_array(spec.translate),
-        rotate_degrees: DVec3::from_array(spec.rotate_degrees),
-        scale: spec.scale.into(),
-    };
-    let coarse = coarse(&loaded, &placement, spacing);
-    let rounding = placement.rounding(loaded.rounding());
-    let mesh = loaded.mesh.transformed(&placement.world_from_file());
-    let holes = mesh
-        .check_inside()
-        .map_err(|error| fail(format!("{}: {error}", file.display())))?;
-    let placed = PlacedMesh {
-        file,
-        file_hash,
-        placement,
-        mesh,
-        holes,
-        rounding: rounding.min(DVec3::splat(MOST_STEP * spacing)),
-        faults: [loaded.crossing, coarse].into_iter().flatten().collect(),
-    };
-    Ok((placed, outline))
-}
-
-/// Warns if the coordinates are so far from zero that 32-bit floats do not resolve particles.
-fn coarse(loaded: &Loaded, placement: &Placement, spacing: f64) -> Option<String> {
-    let reach = placement.rounding(2.0 * loaded.rounding());
-    let step = reach.max_element();
-    (loaded.digits == Digits::Single && step > MOST_STEP * spacing).then(|| {
-        format!(
-            "32-bit floats near its coordinate {} are {step:.2e} m apart, more than {MOST_STEP} of \
-             the particle spacing of {} m; save it near its own origin and move it with translate, \
-             or save it as text with all digits, such as OBJ",
-            shown(loaded.farthest()),
-            shown(spacing)
-        )
-    })
 }

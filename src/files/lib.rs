@@ -36,6 +36,7 @@ mod no_slip;
 mod open_waves;
 mod overrides;
 mod periodic;
+mod placed_mesh;
 mod probe;
 mod reach;
 mod regular_waves;

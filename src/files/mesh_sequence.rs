@@ -3,10 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use super::{
-    build::placed_mesh_like,
     document::Document,
     keys::{FilesSpec, MeshSpec, SequenceSpec, SolidSpec},
     moving_solid::check_way,
+    placed_mesh::placed_mesh_like,
     wave_maker,
 };
 use swell_domain::{
