@@ -216,8 +216,8 @@ pub const FLIP: &[Control] = &[
     ),
     control(
         "pressure/project",
-        "= phase.pressure_scale",
-        "= -phase.pressure_scale",
+        "+ phase.pressure_scale",
+        "- phase.pressure_scale",
         "pressure/project",
         &["pressure"],
     ),
