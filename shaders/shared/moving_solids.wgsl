@@ -10,7 +10,9 @@ struct PosedSolid {
     reach: f32,
     // Velocity of the reference point, m/s.
     velocity: vec3f,
-    unused: f32,
+    // Of a body: distance by which its surface is moved outward where its volume is cut by cells,
+    // metres.
+    offset: f32,
     // Angular velocity about the reference point, rad/s.
     spin: vec3f,
     padding: f32,

@@ -18,6 +18,10 @@ pub struct Boundary {
     pub distance: Option<SignedDistance>,
     /// Signed distance to each moving solid, in its pose at the start.
     pub moving: Vec<SignedDistance>,
+    /// Distance by which the surface of each moving solid is moved outward where its volume is cut
+    /// by cells, metres ([`volume_offset`](super::cut_cell::volume_offset)); 0 of all but bodies.
+    /// Shorter where that is so of all later ones.
+    pub offsets: Vec<f64>,
     /// Surface samples of each moving solid, in its pose at the start; empty where the solver takes
     /// no samples.
     pub moving_samples: Vec<Vec<BoundarySample>>,
@@ -47,6 +51,11 @@ impl Boundary {
     /// Returns the changing shape of a moving solid, if it has one.
     pub fn shape(&self, index: usize) -> Option<&Shape> {
         self.shapes.get(index)?.as_ref()
+    }
+
+    /// Returns the offset of a moving solid, metres.
+    pub fn offset(&self, index: usize) -> f64 {
+        self.offsets.get(index).copied().unwrap_or(0.0)
     }
 
     /// Returns the distance to a moving solid at `time`, seconds, in its pose at the start.

@@ -18,6 +18,7 @@ pub mod bricks;
 pub mod budget;
 pub mod bvh;
 pub mod chunk;
+pub mod cut_cell;
 pub mod eye;
 pub mod feature;
 pub mod flip;

@@ -104,8 +104,11 @@ impl Movers {
                 ..PosedSolid::default()
             }
         };
-        let resting = placed(boundary).map(resting).collect();
+        let mut resting: Vec<_> = placed(boundary).map(resting).collect();
         let statics = boundary.grids().count() - boundary.moving.len();
+        for (solid, &offset) in resting[statics..].iter_mut().zip(&boundary.offsets) {
+            solid.offset = offset as f32;
+        }
         let shapes = placed(boundary)
             .enumerate()
             .filter_map(|(k, (_, shape, first))| {

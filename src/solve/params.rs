@@ -166,8 +166,9 @@ mirror!(
         reach: f32,
         /// Velocity of the reference point, m/s.
         velocity: [f32; 3],
-        /// Unused.
-        unused: f32,
+        /// Of a body: distance by which its surface is moved outward where its volume is cut by
+        /// cells, metres.
+        offset: f32,
         /// Angular velocity about the reference point, rad/s.
         spin: [f32; 3],
         /// Unused.

@@ -7,6 +7,7 @@ use glam::DVec2;
 use swell_cache::{CacheError, CacheReader};
 use swell_domain::{
     boundary::{Boundary, Shape},
+    cut_cell::volume_offset,
     mesh::TriangleMesh,
     particles::Particles,
     sampling::{BoundarySample, Fill, boundary_samples, fill_below, fill_water},
@@ -270,13 +271,31 @@ fn boundary(scene: &Scene) -> Result<Boundary, SignedDistanceError> {
         Method::Flip => (Vec::new(), Vec::new()),
     };
     let shapes = shapes(scene)?;
+    let moving = moving_distances(scene, &shapes)?;
     Ok(Boundary {
         samples,
         distance,
-        moving: moving_distances(scene, &shapes)?,
+        offsets: offsets(scene, &moving),
+        moving,
         moving_samples,
         shapes,
     })
+}
+
+/// Offsets that give bodies the volumes of their meshes.
+fn offsets(scene: &Scene, moving: &[SignedDistance]) -> Vec<f64> {
+    let solids = scene.moving_solids.iter().zip(moving);
+    let of = |(solid, grid): (&MovingSolid, &SignedDistance)| match &solid.body {
+        Some(_) => {
+            let volume = solid.placed.mesh.signed_volume().abs();
+            volume_offset(grid, volume, scene.solver.cell_size())
+        }
+        None => 0.0,
+    };
+    match scene.bodies().next() {
+        Some(_) => solids.map(of).collect(),
+        None => Vec::new(),
+    }
 }
 
 /// The moving solids whose shape changes.

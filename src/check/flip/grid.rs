@@ -115,6 +115,7 @@ impl FlipState {
             distance: self.boundary.distance.as_ref().map(moved),
             moving: self.boundary.moving.iter().map(moved).collect(),
             moving_samples: Vec::new(),
+            offsets: self.boundary.offsets.clone(),
             shapes: (self.boundary.shapes.iter())
                 .map(|shape| {
                     let field = shape.as_ref()?.field.moved(place).shifted(shift);

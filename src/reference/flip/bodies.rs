@@ -10,6 +10,7 @@ use super::{
 use swell_domain::{
     body::{BodyState, Six, dot, product},
     bricks::Bricks,
+    cut_cell::inside,
     poisson::{Coupling, FLUID, System},
 };
 use swell_scene::step::Substep;
@@ -88,6 +89,7 @@ pub fn couple_bodies(
     let all = bodies.iter().enumerate();
     all.map(|(index, state)| {
         let centre = state.centre - least;
+        let offset = model.offset(index, bodies.len());
         let of_cell = |element: u32| {
             let cell = corner(bricks, element);
             let cut = cut_faces(model, step, cell);
@@ -105,7 +107,8 @@ pub fn couple_bodies(
             let missing = match is_alone && space.kind[element as usize] == FLUID {
                 true => {
                     let all = step.open_extent(cell).element_product();
-                    0.5 * (low + high) - (all - space.volume[element as usize])
+                    let corners = cut.corners.unwrap_or([1e15; 8]);
+                    0.5 * (low + high) - all * inside(&corners.map(|value| value - offset))
                 }
                 false => DVec3::ZERO,
             };

@@ -34,6 +34,8 @@ pub struct Model {
     /// Signed distances of solids in their initial pose: all static solids as one grid, if there
     /// are any, then each moving solid.
     pub(super) solids: Vec<SignedDistance>,
+    /// Offsets of moving solids, metres ([`Boundary::offset`]).
+    offsets: Vec<f64>,
     /// Shapes of moving solids that change, by the index of the moving solid.
     shapes: Vec<Option<ShapeField>>,
     /// Finds bricks near solids that count as water.
@@ -78,6 +80,9 @@ impl Model {
         Self {
             cells: scene.domain.cells(scene.settings().cell_size),
             solids: solids.map(local).collect(),
+            offsets: (0..boundary.moving.len())
+                .map(|k| boundary.offset(k))
+                .collect(),
             shapes: (boundary.shapes.iter())
                 .map(|shape| Some(shape.as_ref()?.field.moved(-scene.domain.min)))
                 .collect(),
@@ -96,6 +101,11 @@ impl Model {
     /// Returns Δx, metres.
     pub fn cell_size(&self) -> f64 {
         self.settings().cell_size
+    }
+
+    /// Returns the offset of a body among `bodies`, metres: they are the last moving solids.
+    pub(super) fn offset(&self, index: usize, bodies: usize) -> f64 {
+        self.offsets[self.offsets.len() - bodies + index]
     }
 
     /// Returns the least distance of a particle from walls and solids, metres.

@@ -160,9 +160,7 @@ fn case(method: Method) -> (Scene, Start) {
                 Vec::new()
             },
             distance: Some(distance),
-            moving: Vec::new(),
-            moving_samples: Vec::new(),
-            shapes: Vec::new(),
+            ..Default::default()
         },
     };
     (scene, start)

@@ -180,6 +180,7 @@ cases! {
     case_46_two_hundred_bodies: 46,
     case_47_a_raft_beside_a_wall: 47,
     case_48_ten_crates_at_first: 48,
+    case_49_a_body_on_a_slope: 49,
 }
 
 /// FLIP at rest, its surface on cell centres, where it divides by what is nearly 0, and a particle

@@ -5,6 +5,7 @@ use swell::{
     domain::{
         body::{Body, Freedom, MassProperties},
         bounds::Bounds,
+        cut_cell::volume_offset,
         motion::Motion,
         signed_distance::SignedDistance,
     },
@@ -37,7 +38,14 @@ fn body(scene: &mut Scene, start: &mut Start, bounds: Bounds, density: f64) {
     });
     let grid = bounds.grown(4.0 * D);
     let distance = SignedDistance::from_mesh(&solid.placed.mesh, &grid, D).unwrap();
+    let volume = solid.placed.mesh.signed_volume();
+    let offset = volume_offset(&distance, volume, scene.solver.cell_size());
     scene.moving_solids.push(solid);
+    start
+        .boundary
+        .offsets
+        .resize(start.boundary.moving.len(), 0.0);
+    start.boundary.offsets.push(offset);
     start.boundary.moving.push(distance);
     start.particles.bodies = scene.bodies_at_start();
     let room = bounds.grown(0.01);
@@ -89,6 +97,13 @@ pub const BODIES: &[Control] = &[
         "flip/couple_bodies",
         "0.5 * (low + high)",
         "0.4 * (low + high)",
+        "flip/couple_bodies",
+        &["weight between cells' centres and bodies"],
+    ),
+    control(
+        "flip/couple_bodies",
+        "- offset",
+        "- 0.9 * offset",
         "flip/couple_bodies",
         &["weight between cells' centres and bodies"],
     ),
