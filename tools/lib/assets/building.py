@@ -30,6 +30,8 @@ class Mesh:
     def __init__(self):
         self.vertices = []
         self.triangles = []
+        # By the first triangle that has it.
+        self.materials = {}
 
     def loop(self, plan, y):
         """Adds an outline's vertices at height y."""

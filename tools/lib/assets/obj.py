@@ -14,7 +14,10 @@ def to_obj(title, name, meshes):
     for index, mesh in enumerate(meshes, 1):
         lines.append(f"o {name}_{index:02}" if len(meshes) > 1 else f"o {name}")
         lines += ["v " + " ".join(map(number, vertex)) for vertex in mesh.vertices]
-        lines += ["f " + " ".join(str(i + offset) for i in triangle) for triangle in mesh.triangles]
+        for index, triangle in enumerate(mesh.triangles):
+            if index in mesh.materials:
+                lines.append(f"usemtl {mesh.materials[index]}")
+            lines.append("f " + " ".join(str(i + offset) for i in triangle))
         offset += len(mesh.vertices)
     return "\n".join(lines) + "\n"
 

@@ -80,6 +80,17 @@ def check_crate(text):
     return f"{len(triangles)} triangles, {len(text.encode())} bytes, {inside:.3f} m³"
 
 
+def check_boat(text):
+    """Refuses a boat whose sides differ; returns a line about it."""
+    vertices, triangles = from_obj(text)
+    [(extent, inside)] = check_solids(vertices, triangles)
+    if any(not any((x, y, -z) == other for other in vertices) for x, y, z in vertices):
+        raise BrokenMesh("boat: its sides differ")
+    if extent[0][1] != 0 or not 5 < extent[1][0] - extent[0][0] < 6:
+        raise BrokenMesh(f"boat: reaches {extent}")
+    return f"{len(triangles)} triangles, {len(text.encode())} bytes, {inside:.2f} m³"
+
+
 def check_drop(text):
     """Refuses a drop that is not about as large as its sphere; returns a line about it."""
     vertices, triangles = from_obj(text)
