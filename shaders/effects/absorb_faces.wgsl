@@ -1,6 +1,7 @@
 // Damps the velocity that particles transferred to faces in an absorbing zone. Gravity's change is
 // kept: a reduction that varies in space would act as a force that spins the water.
 #import "shared/led_faces.wgsl"
+#import "shared/zone.wgsl"
 
 fn lead(face: u32, component: u32, place: vec3f) {
     let part = led(place, params.time_step);

@@ -2,6 +2,7 @@
 // the waves at the substep's start. Gravity's change is kept; the projection then produces the
 // pressure of the waves.
 #import "shared/led_faces.wgsl"
+#import "shared/zone.wgsl"
 #import "shared/open_waves.wgsl"
 
 fn lead(face: u32, component: u32, place: vec3f) {

@@ -1,9 +1,8 @@
-// A pass over the faces of cells in a zone. The importing pass defines `lead`, which updates a
+// A pass over the faces of cells. The importing pass defines `lead`, which updates a
 // face; its position is in metres from the grid's minimum corner.
 #import "shared/thread.wgsl"
 #import "shared/flip_params.wgsl"
 #import "shared/flip_cell.wgsl"
-#import "shared/zone.wgsl"
 
 @group(0) @binding(3) var<storage, read> face_open: array<f32>;
 @group(0) @binding(4) var<storage, read_write> face_velocity: array<f32>;

@@ -9,6 +9,9 @@
 #import "shared/confine.wgsl"
 #import "shared/whitewater.wgsl"
 #import "shared/air.wgsl"
+#ifdef FORCES
+#import "shared/forces.wgsl"
+#endif
 
 @group(0) @binding(12) var<storage, read> sorted_velocity: array<Vector>;
 // Position and kind.
@@ -85,13 +88,16 @@ struct Flight {
 }
 
 // Drag is implicit, so that a drop of any size reaches its terminal velocity.
-fn fly(start: vec3f) -> Flight {
+fn fly(place: vec3f, start: vec3f) -> Flight {
     let step = params.time_step / f32(FLIGHT_STEPS);
     var flight = Flight(vec3f(0.0), start);
     for (var k = 0u; k < FLIGHT_STEPS; k++) {
         let before = flight.velocity;
         let against = before - wind();
-        let pulled = against + params.velocity_step / f32(FLIGHT_STEPS);
+        var pulled = against + params.velocity_step / f32(FLIGHT_STEPS);
+#ifdef FORCES
+        pulled += step * force_at(place + flight.way);
+#endif
         flight.velocity = wind() + pulled / (1.0 + step * air_drag(length(against)));
         flight.way += 0.5 * step * (before + flight.velocity);
     }
@@ -120,7 +126,7 @@ fn main(
     var way = step * before;
     var velocity = before;
     if kind == SPRAY {
-        let flight = fly(before);
+        let flight = fly(start, before);
         way = flight.way;
         velocity = flight.velocity;
     }
@@ -150,6 +156,9 @@ fn main(
     } else if kind == FOAM && !is_in_water {
         // Foam that is thrown off: from here on it flies.
         velocity = before + params.velocity_step;
+#ifdef FORCES
+        velocity += step * force_at(start);
+#endif
     } else if kind != SPRAY {
         // Heun's method with the water's velocity; the velocity at the previous frame is the
         // particle's own.

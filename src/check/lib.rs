@@ -16,6 +16,7 @@ pub mod edges;
 mod effects;
 mod engine;
 mod flip;
+mod forces;
 mod pbf;
 pub mod pictures;
 pub mod render;

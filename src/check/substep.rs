@@ -72,7 +72,8 @@ pub fn check_pbf(
         SubstepChoice::Last => substeps,
     };
     let end = f64::from(frame) * length + f64::from(number) * time_step;
-    let comparisons = [&[pbf::COMPARISONS][..], &effects::pbf()].concat();
+    let own = [pbf::COMPARISONS, pbf::forces::COMPARISONS];
+    let comparisons = [&own[..], &effects::pbf()].concat();
     let state = PbfState::new(scene, boundary, plan, boundaries, (end, time_step));
     let mut engine = Engine::new(state, comparisons);
     let mut of_grid = scene.of_projection().map(|grid| {

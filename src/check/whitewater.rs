@@ -14,7 +14,7 @@ use swell_domain::{
     whitewater::{CalibratedSettings, KIND, OUTWARD, Potentials, SURFACE, WhitewaterKind},
 };
 use swell_gpu::adapter::Context;
-use swell_reference::whitewater::{Moved, Neighbor, SortedWater, Surveyed, White};
+use swell_reference::whitewater::{Moved, Neighbor, Pull, SortedWater, Surveyed, White};
 use swell_scene::PbfScene;
 use swell_solve::{
     SolveError,
@@ -23,6 +23,7 @@ use swell_solve::{
 
 use super::{
     CheckTable,
+    forces::Bounded,
     table::{entries, pair},
 };
 
@@ -275,7 +276,9 @@ impl<'a> Comparison<'a> {
             white,
             ..
         } = self.frame;
-        let (corner, gravity) = (scene.domain.min, scene.water.gravity);
+        let corner = scene.domain.min;
+        let pull = Pull::new(scene, self.frame.time, seconds);
+        let bounded = Bounded::of(scene, pull.forces.clone());
         let wide = |v: [f32; 3]| Vec3::from_array(v).as_dvec3();
         let rows: Vec<(Moved, Option<[f64; 2]>)> = parallel::map(0..white.len(), |k| {
             let before = White {
@@ -284,8 +287,8 @@ impl<'a> Comparison<'a> {
                 kind: WhitewaterKind::of_number(white.attributes[KIND][k])
                     .unwrap_or(WhitewaterKind::Foam),
             };
-            let moved = self.water.advance(settings, gravity, seconds, before);
-            (moved, self.moved_errors(&before, &moved, gravity))
+            let moved = self.water.advance(settings, &pull, seconds, before);
+            (moved, self.moved_errors(&before, &moved, (&pull, &bounded)))
         });
         let n = rows.len();
         table.each(&POSITION, 0..n, |k| {
@@ -315,8 +318,14 @@ impl<'a> Comparison<'a> {
     }
 
     /// Returns error bounds for the position and the velocity of a particle; `None` if rounding
-    /// decides its path, or if a solid pushed it, which the solvers' own comparisons cover.
-    fn moved_errors(&self, before: &White, moved: &Moved, gravity: DVec3) -> Option<[f64; 2]> {
+    /// decides its path, or whether a force acts on it, or if a solid pushed it, which the solvers'
+    /// own comparisons cover.
+    fn moved_errors(
+        &self,
+        before: &White,
+        moved: &Moved,
+        (pull, bounded): (&Pull<'_>, &Bounded<'_>),
+    ) -> Option<[f64; 2]> {
         if moved.is_pushed {
             return None;
         }
@@ -325,11 +334,17 @@ impl<'a> Comparison<'a> {
         let h = model.calibration.support_radius;
         let now = &moved.white;
         let about = self.about(now.position);
-        let pull = before.velocity.length().max(now.velocity.length()) + gravity.length() * seconds;
+        let gravity = pull.gravity;
+        let most = gravity.length() + bounded.most();
+        let pulled = before.velocity.length().max(now.velocity.length()) + most * seconds;
         let wind = DVec3::from_array(settings.wind);
         let taken = (before.velocity + seconds * gravity - now.velocity).length();
-        let flown = FLOWN.of([taken.min((before.velocity - wind).length() + pull), pull]);
-        let way = now.position.length() + seconds * pull;
+        let flown = FLOWN.of([
+            taken.min((before.velocity - wind).length() + pulled),
+            pulled,
+        ]);
+        let way = now.position.length() + seconds * pulled;
+        let flown = flown + self.pushed(before, bounded, PLACE.of([way, seconds * flown]))?;
         let flight = PLACE.of([way, seconds * flown]);
         // A position in the water is reached by a path that errs as a flight does; a carried
         // particle also errs by the velocity there.
@@ -339,6 +354,16 @@ impl<'a> Comparison<'a> {
         let scale = model.calibration.density_scale;
         let decided = DECIDED.of([place, h, scale, about.sums.kernel(), about.free]);
         (moved.margin > decided).then_some([place, flown + carried])
+    }
+
+    /// Returns by how much forces err on the velocity of a drop whose path errs by `off`, m/s;
+    /// `None` if its path comes to the edge of a room.
+    fn pushed(&self, before: &White, bounded: &Bounded<'_>, off: f64) -> Option<f64> {
+        let seconds = self.frame.seconds;
+        // The path keeps within this distance from its start.
+        let reach = seconds * (before.velocity.length() + seconds * (bounded.most()))
+            + self.frame.seconds.powi(2) * self.frame.scene.water.gravity.length();
+        Some(seconds * bounded.error_about(before.position, off, reach)?)
     }
 
     /// Collects magnitudes around a position.

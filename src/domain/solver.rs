@@ -30,7 +30,7 @@ pub struct StepReport {
     /// Number of times that a particle had more neighbours than its list holds, so that they were
     /// searched for directly.
     pub searched: u64,
-    /// Work done on the water by moving walls and solids, J.
+    /// Work done on the water by moving walls and solids, by emitters, and by forces, J.
     #[serde(default)]
     pub boundary_work: f64,
     /// Volume of the water at the frame's end, m³, as measured by a volume probe; only if a budget

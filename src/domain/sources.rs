@@ -82,9 +82,9 @@ impl<S> Drain<S> {
     }
 }
 
-/// Time window of an emitter or drain. Drains, and emitters with a level, act at frames that end
-/// after `from` and not after `until`; the water of other emitters is that which enters between
-/// the two.
+/// Time window of an emitter, drain, force or kill volume. Drains, kill volumes, and emitters with a
+/// level act at frames that end after `from` and not after `until`; the water of other emitters is
+/// that which enters between the two; forces act between the two.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Window {
     /// Start of the window, seconds from the start of the shot.
@@ -94,12 +94,24 @@ pub struct Window {
 }
 
 impl Window {
-    fn holds(&self, time: f64) -> bool {
+    /// Returns whether a frame that ends at `time` is in the window.
+    pub fn holds(&self, time: f64) -> bool {
         time > self.from && !self.is_over(time)
     }
 
     fn is_over(&self, time: f64) -> bool {
         self.until.is_some_and(|until| time > until)
+    }
+
+    /// Returns the fraction of the `length` seconds from `start` that lies in the window.
+    pub fn share(&self, start: f64, length: f64) -> f64 {
+        if length <= 0.0 {
+            return 0.0;
+        }
+        let end = self
+            .until
+            .map_or(start + length, |until| until.min(start + length));
+        ((end - start.max(self.from)) / length).clamp(0.0, 1.0)
     }
 
     /// Returns how much of a shot of `duration` seconds lies in the window, seconds.
@@ -128,16 +140,60 @@ impl Shape {
     /// # Errors
     /// Those of [`SignedDistance::from_mesh`].
     pub fn of_mesh(mesh: &TriangleMesh, spacing: f64) -> Result<Self, SignedDistanceError> {
+        Self::sampled(mesh, spacing, 0.5 * spacing)
+    }
+
+    /// Builds the shape of a closed mesh from distances that are sampled `step` metres apart, in a
+    /// box that leaves `margin` metres around it.
+    ///
+    /// # Errors
+    /// Those of [`SignedDistance::from_mesh`].
+    pub fn sampled(
+        mesh: &TriangleMesh,
+        margin: f64,
+        step: f64,
+    ) -> Result<Self, SignedDistanceError> {
         let bounds = mesh.bounds().unwrap_or_default();
-        let room = bounds.grown(spacing);
+        let room = bounds.grown(margin);
         Ok(Self {
             bounds,
-            mesh: Some(SignedDistance::from_mesh(mesh, &room, 0.5 * spacing)?),
+            mesh: Some(SignedDistance::from_mesh(mesh, &room, step)?),
         })
     }
 
-    fn contains(&self, p: DVec3) -> bool {
+    /// Returns the bounding box, metres.
+    pub fn bounds(&self) -> Bounds {
+        self.bounds
+    }
+
+    /// Returns the distances to the mesh, if the shape is one.
+    pub fn mesh(&self) -> Option<&SignedDistance> {
+        self.mesh.as_ref()
+    }
+
+    /// Returns whether a point lies in the shape.
+    pub fn contains(&self, p: DVec3) -> bool {
         self.bounds.contains(p) && self.is_in_mesh(p)
+    }
+
+    /// Returns the distance of a point inside from the surface, metres; zero or less outside.
+    pub fn depth(&self, p: DVec3) -> f64 {
+        let Bounds { min, max } = self.bounds;
+        let in_box = (p - min).min(max - p).min_element();
+        match &self.mesh {
+            Some(mesh) if in_box >= 0.0 => -mesh.sample(p),
+            _ => in_box,
+        }
+    }
+
+    /// Returns the shape moved by `way`, metres.
+    #[must_use]
+    pub fn moved(mut self, way: DVec3) -> Self {
+        self.bounds = self.bounds.moved(way);
+        if let Some(mesh) = &mut self.mesh {
+            mesh.origin += way;
+        }
+        self
     }
 
     /// Whether a point within the bounds is in the mesh, if there is one.

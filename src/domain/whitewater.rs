@@ -6,12 +6,14 @@
 //! for both.
 
 mod ages;
+mod kills;
 mod seeds;
 mod thresholds;
 
 use crate::particles::Particles;
 
 pub use ages::grow_older;
+pub use kills::{Kill, KillDomain, KillRoom, kill};
 pub use seeds::{Births, SeedWater};
 pub use thresholds::{Potentials, Thresholds};
 
@@ -122,6 +124,8 @@ pub struct CalibratedSettings {
     pub rise_speed: f64,
     /// Relaxation time of a bubble's velocity towards that of the water, seconds.
     pub response: f64,
+    /// Kill volumes.
+    pub kills: Vec<Kill>,
 }
 
 /// Returns an empty whitewater state, with all attributes.
@@ -173,6 +177,7 @@ mod tests_support {
             crowd: 4,
             rise_speed: 0.25,
             response: 0.1,
+            kills: Vec::new(),
         }
     }
 }

@@ -11,7 +11,7 @@ use super::{
     document::Document,
     effects,
     fit::{comes_into, fits},
-    grids, keep,
+    forces, grids, keep,
     keys::{BodySpec, BoxSpec, DomainSpec, MeshSpec, SceneSpec, SolidSpec, SwarmSpec, WaterSpec},
     mesh_sequence, moving_solid, no_slip, periodic,
     placed_mesh::placed_mesh,
@@ -106,6 +106,7 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
     };
     let emitters = sources::emitters(doc, &spec.emitter, &around)?;
     let drains = sources::drains(doc, &spec.drain, &around)?;
+    let forces = forces::forces(doc, &spec.force, &around)?;
     mesh_sequence::check_emitters(doc, &moving_solids, &emitters, lattice.spacing)?;
     let entering = swell_scene::sources::most_entering(&emitters, lattice.spacing, &shot);
     check_particle_count(doc, &water, entering, &domain, &lattice)?;
@@ -141,8 +142,9 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
     .chain((moving_solids.iter()).map(|solid| solid.peak_speed(&[], 0.0, duration)))
     .chain((bodies.iter()).map(|body| body.peak_speed(&[], 0.0, 0.0)));
     let flip = solver.flip().or(unchosen.as_ref().and_then(Solver::flip));
+    let pull = water.gravity.length() + forces::pull(&forces);
     let scales = budget::Scales {
-        fall: (2.0 * water.gravity.length() * domain.size().length()).sqrt(),
+        fall: (2.0 * pull * domain.size().length()).sqrt() + forces::speed(&forces, &shot),
         push: speeds.fold(0.0, f64::max),
         wind: spec.effects.push().speed + spec.effects.frees(projection::grain(&water, &solver)),
         spacing: lattice.spacing,
@@ -162,6 +164,7 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
         wave_makers,
         emitters,
         drains,
+        forces,
         solver,
         unchosen,
         grids,

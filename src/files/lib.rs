@@ -23,6 +23,7 @@ mod difference;
 mod document;
 mod effects;
 mod fit;
+mod forces;
 mod gltf_nodes;
 mod grids;
 mod keep;

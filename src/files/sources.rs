@@ -38,7 +38,7 @@ pub(super) struct Around<'a> {
 }
 
 /// Minimum, maximum and mesh of a volume, as written.
-type Room<'a> = (
+pub(super) type Room<'a> = (
     &'a Option<[f64; 3]>,
     &'a Option<[f64; 3]>,
     &'a Option<MeshSpec>,
@@ -92,13 +92,14 @@ pub(super) fn drains(
     .collect()
 }
 
-fn region(
+/// Reads a volume; also returns its key for messages. `None` if the table names none.
+pub(super) fn room(
     doc: &Document<'_>,
     path: &str,
     (min, max, mesh): Room<'_>,
     around: &Around<'_>,
-) -> Result<Region> {
-    let (region, key) = match (min, max, mesh) {
+) -> Result<Option<(Region, String)>> {
+    Ok(Some(match (min, max, mesh) {
         (_, _, Some(mesh)) => {
             let path = format!("{path}.mesh");
             let key = format!("{path}.file");
@@ -108,7 +109,20 @@ fn region(
             let block = (around.block)(path, &BoxSpec { min, max })?;
             (Region::Block(block), format!("{path}.max"))
         }
-        _ => return Err(doc.fault_of(&format!("{path}.min"), "missing")),
+        (None, None, None) => return Ok(None),
+        (Some(_), ..) => return Err(doc.fault_of(&format!("{path}.max"), "missing")),
+        (None, Some(_), _) => return Err(doc.fault_of(&format!("{path}.min"), "missing")),
+    }))
+}
+
+fn region(
+    doc: &Document<'_>,
+    path: &str,
+    (min, max, mesh): Room<'_>,
+    around: &Around<'_>,
+) -> Result<Region> {
+    let Some((region, key)) = room(doc, path, (min, max, mesh), around)? else {
+        return Err(doc.fault_of(&format!("{path}.min"), "missing"));
     };
     let (bounds, domain) = (region.bounds(), around.domain);
     let size = bounds.size();
@@ -134,7 +148,12 @@ fn region(
     Err(doc.fault_of(&key, problem))
 }
 
-fn window(doc: &Document<'_>, path: &str, from: f64, until: Option<f64>) -> Result<Window> {
+pub(super) fn window(
+    doc: &Document<'_>,
+    path: &str,
+    from: f64,
+    until: Option<f64>,
+) -> Result<Window> {
     match until {
         Some(until) if until <= from => {
             let problem = format!("{} s is not after from, {} s", shown(until), shown(from));

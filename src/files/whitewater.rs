@@ -3,6 +3,7 @@
 
 use std::path::Path;
 
+use glam::DVec3;
 use serde::Deserialize;
 
 use super::{
@@ -12,8 +13,10 @@ use super::{
     toml_text::to_toml,
 };
 use swell_domain::{
+    bounds::Bounds,
+    sources::Window,
     text,
-    whitewater::{CalibratedSettings, Thresholds},
+    whitewater::{CalibratedSettings, Kill, KillRoom, Thresholds},
 };
 use swell_scene::SceneError;
 
@@ -22,6 +25,8 @@ const RADIUS: Interval = 1e-6..=10.0;
 const RATE: Interval = 0.0..=1e7;
 const POTENTIAL: Interval = 0.0..=1e9;
 const SECONDS: Interval = 1e-4..=1e6;
+/// World coordinates, metres.
+const COORDINATE: Interval = -1e6..=1e6;
 
 /// Default range of radii, particle spacings.
 const RADII: [f64; 2] = [0.025, 0.08];
@@ -53,6 +58,8 @@ keys! { struct WhitewaterSpec {
     bubbles: BubblesSpec = table()
         .default("{}")
         .about("Air under the surface"),
+    #[serde(default)]
+    kill: Vec<KillSpec> = tables().about("A room in which whitewater ends, of whatever kind"),
 } }
 
 keys! { struct EmissionSpec {
@@ -116,10 +123,85 @@ keys! { struct BubblesSpec {
         .about("how fast a bubble takes on what the water about it does"),
 } }
 
+keys! { struct KillSpec {
+    min: Option<[f64; 3]> = vector(3, COORDINATE)
+        .unit("metres")
+        .absent()
+        .with("max")
+        .without(&["sides"])
+        .also(", below max")
+        .about("least corner of the room"),
+    max: Option<[f64; 3]> = vector(3, COORDINATE)
+        .unit("metres")
+        .absent()
+        .with("min")
+        .without(&["sides"])
+        .also(", above min")
+        .about("greatest corner"),
+    sides: Option<f64> = number(1e-6..=1e6)
+        .unit("metres")
+        .absent()
+        .without(&["min", "max"])
+        .about(
+            "instead of a box: the room is as wide along all walls of the domain that face x or z",
+        ),
+    from: f64 = number(0.0..=1e9)
+        .unit("s")
+        .default("0.0")
+        .about("it acts at the ends of frames after this time"),
+    until: Option<f64> = number(0.0..=1e9)
+        .unit("s")
+        .absent()
+        .also(", after from")
+        .about("and not at the ends of frames after this one"),
+} }
+
+impl KillSpec {
+    /// Checks the values of the table at `path`.
+    fn build(&self, doc: &Document<'_>, path: &str) -> Result<Kill, SceneError> {
+        let room = match (self.min, self.max, self.sides) {
+            (_, _, Some(width)) => KillRoom::Sides(width),
+            (Some(min), Some(max), None) => {
+                let [min, max] = [min, max].map(DVec3::from_array);
+                if !min.cmplt(max).all() {
+                    let problem = "the box is inverted or has no volume";
+                    return Err(doc.fault_of(&format!("{path}.max"), problem));
+                }
+                KillRoom::Block(Bounds { min, max })
+            }
+            _ => {
+                let problem = "it has no room: name min and max, or sides";
+                return Err(doc.fault_of_plain(path, problem));
+            }
+        };
+        let Self { from, until, .. } = *self;
+        if until.is_some_and(|until| until <= from) {
+            return Err(doc.fault_of(&format!("{path}.until"), "it is not after from"));
+        }
+        let window = Window { from, until };
+        Ok(Kill { room, window })
+    }
+
+    fn written(kill: &Kill) -> Self {
+        let (block, sides) = match kill.room {
+            KillRoom::Block(block) => (Some(block), None),
+            KillRoom::Sides(width) => (None, Some(width)),
+        };
+        Self {
+            min: block.map(|block| block.min.to_array()),
+            max: block.map(|block| block.max.to_array()),
+            sides,
+            from: kill.window.from,
+            until: kill.window.until,
+        }
+    }
+}
+
 /// A validated settings file. Values that depend on the shot may be open.
 #[derive(Clone, Debug)]
 pub struct WhitewaterSettings {
     spec: WhitewaterSpec,
+    kills: Vec<Kill>,
 }
 
 impl WhitewaterSettings {
@@ -159,7 +241,10 @@ impl WhitewaterSettings {
                 return Err(doc.fault_of(key, problem));
             }
         }
-        Ok(Self { spec })
+        let kills = spec.kill.iter().enumerate();
+        let kills = kills.map(|(index, kill)| kill.build(&doc, &format!("kill[{index}]")));
+        let kills = kills.collect::<Result<_, _>>()?;
+        Ok(Self { spec, kills })
     }
 
     /// Whether thresholds of emission must be calibrated from the shot.
@@ -181,6 +266,7 @@ impl WhitewaterSettings {
             spray,
             foam,
             bubbles,
+            kill: _,
         } = &self.spec;
         CalibratedSettings {
             seed: *seed,
@@ -199,6 +285,7 @@ impl WhitewaterSettings {
             crowd: foam.crowd,
             rise_speed: bubbles.rise_speed,
             response: bubbles.response,
+            kills: self.kills.clone(),
         }
     }
 
@@ -207,7 +294,9 @@ impl WhitewaterSettings {
     pub fn hash(&self) -> String {
         // `Debug` prints the shortest exact text of a float, so equal values, and only those,
         // have equal text.
-        blake3::hash(format!("{:?}", self.spec).as_bytes())
+        let text = format!("{:?}", self.spec);
+        // Streams that were made before there were kill volumes keep their hash.
+        blake3::hash(text.replace(", kill: []", "").as_bytes())
             .to_hex()
             .to_string()
     }
@@ -243,6 +332,7 @@ pub fn written_out(settings: &CalibratedSettings) -> String {
             rise_speed: settings.rise_speed,
             response: settings.response,
         },
+        kill: settings.kills.iter().map(KillSpec::written).collect(),
     })
 }
 
@@ -279,7 +369,9 @@ mod tests {
     fn what_is_written_out_reads_back_as_the_same() {
         let text = "seed = 5\nradius = [0.001, 0.002]\n[emission]\ntrapped_air_rate = 12.5\n\
             [spray]\nwind = [1, -2.5, 0]\n\
-            [foam]\nlifetime = [1, 2]\ncrowd = 3\n[bubbles]\nrise_speed = 0.1\nresponse = 0.5\n";
+            [foam]\nlifetime = [1, 2]\ncrowd = 3\n[bubbles]\nrise_speed = 0.1\nresponse = 0.5\n\
+            [[kill]]\nmin = [1, 2, 3]\nmax = [4, 5, 6]\nfrom = 0.5\n[[kill]]\nsides = 0.25\n\
+            until = 2\n";
         let settled = parse(text).expect("valid").settled(0.1, &shot());
         let written = written_out(&settled);
         let again = parse(&written).expect("what was written");
@@ -298,6 +390,7 @@ mod tests {
         assert_eq!(hash(""), hash("[foam]\ncrowd = 64 # the default\n"));
         assert_ne!(hash(""), hash("[foam]\ncrowd = 15\n"));
         assert_ne!(hash(""), hash("[emission]\nenergy = [1, 2]\n"));
+        assert_ne!(hash(""), hash("[[kill]]\nsides = 0.5\n"));
     }
 
     #[test]
@@ -317,6 +410,19 @@ mod tests {
                 &["w.toml:2", "spray.drop_radius"],
             ),
             ("max_particles = 0", &["w.toml:1", "max_particles"]),
+            ("[[kill]]\nfrom = 1", &["w.toml", "kill[0]", "no room"]),
+            (
+                "[[kill]]\nsides = 1\nmin = [0, 0, 0]",
+                &["w.toml:3", "kill[0].min"],
+            ),
+            (
+                "[[kill]]\nmin = [0, 0, 0]\nmax = [1, 0, 1]",
+                &["w.toml:3", "kill[0].max", "no volume"],
+            ),
+            (
+                "[[kill]]\nsides = 1\nfrom = 2\nuntil = 2",
+                &["w.toml:4", "kill[0].until"],
+            ),
         ] {
             let found = parse(text).expect_err("a fault").to_string();
             for word in words {

@@ -6,12 +6,12 @@ use toml::Table;
 
 use super::{
     axis::Axis,
-    body, keep,
+    body, forces, keep,
     keys::{
         AbsorptionSpec, BearerSpec, BodySpec, BoxSpec, DomainSpec, DrainSpec, EmitterSpec,
-        FilesSpec, GridsSpec, KeepSpec, MeshSpec, PbfSpec, ProbeSpec, ScaleSpec, SceneSpec,
-        SequenceSpec, SolidSpec, SolverSpec, SwarmSpec, TrackSpec, WallMotionSpec, WaterSpec,
-        WaveMakerSpec,
+        FilesSpec, ForceSpec, GridsSpec, KeepSpec, MeshSpec, PbfSpec, ProbeSpec, ScaleSpec,
+        SceneSpec, SequenceSpec, SolidSpec, SolverSpec, SwarmSpec, TrackSpec, WallMotionSpec,
+        WaterSpec, WaveMakerSpec,
     },
     toml_text::{table, to_toml},
 };
@@ -22,6 +22,7 @@ use swell_domain::{
 };
 use swell_scene::{
     Iteration, Pbf, PlacedMesh, Scene, Solver, Stop, Swarm, WaveMaker,
+    forces::PlacedForce,
     grids::Grids,
     mesh_sequence::MeshSequence,
     moving_solid::MovingSolid,
@@ -67,6 +68,7 @@ impl Writer<'_> {
             wave_maker: scene.wave_makers.iter().map(Into::into).collect(),
             emitter: scene.emitters.iter().map(|it| self.emitter(it)).collect(),
             drain: scene.drains.iter().map(|it| self.drain(it)).collect(),
+            force: scene.forces.iter().map(|it| self.force(it)).collect(),
             solver: solver(scene),
             grids: scene.grids.as_ref().map(Into::into),
             keep: scene.keep.map(|particles| KeepSpec {
@@ -205,6 +207,17 @@ impl Writer<'_> {
             rate: drain.rate,
             from: drain.window.from,
             until: drain.window.until,
+        }
+    }
+
+    fn force(&self, placed: &PlacedForce) -> ForceSpec {
+        let room = placed.region.as_ref().map(|region| self.room(region));
+        let (block, mesh) = room.unwrap_or_default();
+        ForceSpec {
+            min: block.as_ref().map(|it| it.min),
+            max: block.as_ref().map(|it| it.max),
+            mesh,
+            ..forces::written(&placed.force, self.scene.origin)
         }
     }
 

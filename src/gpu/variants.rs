@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use super::{error::GpuError, shader};
 
 /// Combinations of conditions that a plan can set; every pass must compose under each.
-const VARIANTS: [&[&str]; 81] = [
+const VARIANTS: [&[&str]; 85] = [
     &[],
     &["SOLIDS"],
     &["NEIGHBOR_LIST"],
@@ -93,6 +93,10 @@ const VARIANTS: [&[&str]; 81] = [
         "APIC",
     ],
     &["PERIODIC", "F64"],
+    &["FORCE_MESHES"],
+    &["FORCES"],
+    &["FORCES", "FORCE_MESHES", "PERIODIC", "SOLIDS"],
+    &["FORCES", "SOLIDS", "MOVING_SOLIDS", "SHAPES"],
     &["SPRAY"],
     &["AOVS"],
     &["FORWARD"],

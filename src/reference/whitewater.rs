@@ -8,6 +8,7 @@ use swell_domain::{
     boundary::Boundary,
     bounds::Bounds,
     budget::Breach,
+    forces::{ForceField, Medium},
     parallel,
     particles::Particles,
     whitewater::{
@@ -220,19 +221,20 @@ impl SortedWater {
     }
 
     /// Reference pass of whitewater/advance: moves a whitewater particle over `seconds` to this
-    /// water's frame, under `gravity`, m/s².
+    /// water's frame, pulled by `pull`.
     pub fn advance(
         &self,
         settings: &CalibratedSettings,
-        gravity: DVec3,
+        pull: &Pull<'_>,
         seconds: f64,
         white: White,
     ) -> Moved {
         let start = white.position;
         let before = white.velocity;
         let is_drop = white.kind == WhitewaterKind::Spray;
+        let gravity = pull.gravity;
         let (way, mut velocity) = match is_drop {
-            true => fly(settings, gravity, seconds, before),
+            true => fly(settings, pull, seconds, (start, before)),
             false => (seconds * before, before),
         };
         let mut margin = f64::INFINITY;
@@ -264,7 +266,7 @@ impl SortedWater {
                 false => before,
             };
         } else if white.kind == WhitewaterKind::Foam && !is_in_water {
-            velocity = before + seconds * gravity;
+            velocity = before + seconds * pull.at(start);
         } else if !is_drop {
             let (rise, kept) = match white.kind {
                 WhitewaterKind::Bubble => {
@@ -304,12 +306,39 @@ pub enum Neighbor {
     Sample(f64),
 }
 
+/// Gravity and forces on drops in the air over a frame.
+#[derive(Clone, Debug)]
+pub struct Pull<'a> {
+    /// Gravity, m/s².
+    pub gravity: DVec3,
+    /// The scene's forces on whitewater.
+    pub forces: ForceField<'a>,
+    /// Position of the domain's minimum corner, metres.
+    corner: DVec3,
+}
+
+impl<'a> Pull<'a> {
+    /// Takes those of a scene in the `seconds` up to `time`.
+    pub fn new(scene: &'a PbfScene, time: f64, seconds: f64) -> Self {
+        Self {
+            gravity: scene.water.gravity,
+            forces: scene.force_field(Medium::Whitewater, (time - seconds, seconds)),
+            corner: scene.domain.min,
+        }
+    }
+
+    /// Returns the acceleration at a position, m/s².
+    fn at(&self, place: DVec3) -> DVec3 {
+        self.gravity + self.forces.at(self.corner + place)
+    }
+}
+
 /// Returns the displacement, metres, of a drop in the air, and its velocity after it, m/s.
 fn fly(
     settings: &CalibratedSettings,
-    gravity: DVec3,
+    pull: &Pull<'_>,
     seconds: f64,
-    start: DVec3,
+    (place, start): (DVec3, DVec3),
 ) -> (DVec3, DVec3) {
     let wind = DVec3::from_array(settings.wind);
     let step = seconds / f64::from(FLIGHT_STEPS);
@@ -318,7 +347,7 @@ fn fly(
         let before = velocity;
         let against = before - wind;
         let resistance = air::resistance(settings.drop_radius, against.length());
-        velocity = wind + (against + step * gravity) / (1.0 + step * resistance);
+        velocity = wind + (against + step * pull.at(place + way)) / (1.0 + step * resistance);
         way += 0.5 * step * (before + velocity);
     }
     (way, velocity)
@@ -330,7 +359,8 @@ pub struct Whitewater {
     scene: PbfScene<'static>,
     boundary: Boundary,
     settings: Option<CalibratedSettings>,
-    water: Option<(SortedWater, f64)>,
+    /// The water of a frame, the frame's end and its length, seconds.
+    water: Option<(SortedWater, f64, f64)>,
 }
 
 impl Whitewater {
@@ -362,7 +392,7 @@ impl Whitewater {
         for (&place, potentials) in sorted.order.iter().zip(found) {
             in_order[place] = potentials;
         }
-        self.water = Some((sorted, seconds));
+        self.water = Some((sorted, time, seconds));
         in_order
     }
 
@@ -372,10 +402,11 @@ impl Whitewater {
     ///
     /// # Panics Panics if [`Self::set`] or [`Self::survey`] was not called.
     pub fn advance(&self, white: &mut Particles, frame: u32) -> Result<(), ReferenceError> {
-        let (Some(settings), Some((water, seconds))) = (&self.settings, &self.water) else {
+        let (Some(settings), Some((water, time, seconds))) = (&self.settings, &self.water) else {
             panic!("settings and water come before moves");
         };
-        let (origin, gravity) = (self.scene.domain.min, self.scene.water.gravity);
+        let origin = self.scene.domain.min;
+        let pull = Pull::new(&self.scene, *time, *seconds);
         let wide = |v: [f32; 3]| Vec3::from_array(v).as_dvec3();
         let one = |k: usize| {
             let one = White {
@@ -384,7 +415,7 @@ impl Whitewater {
                 kind: WhitewaterKind::of_number(white.attributes[KIND][k])
                     .unwrap_or(WhitewaterKind::Foam),
             };
-            water.advance(settings, gravity, *seconds, one).white
+            water.advance(settings, &pull, *seconds, one).white
         };
         let moved: Vec<White> = parallel::map(0..white.len(), one);
         for (k, moved) in moved.iter().enumerate() {

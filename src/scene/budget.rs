@@ -13,7 +13,7 @@ pub struct Budget {
     /// Largest speed of a particle at the end of a frame, m/s.
     pub speed: Option<f64>,
     /// Largest ratio of the fastest particle's speed after a frame to the speed that gravity,
-    /// effects and moving boundaries explain.
+    /// forces, effects and moving boundaries explain.
     pub speed_jump: Option<f64>,
     /// Mean of max(0, ρ/ρ0 − 1) at the end of a frame.
     pub density_error_mean: Option<f64>,
@@ -29,8 +29,9 @@ pub struct Budget {
     pub divergence: Option<f64>,
     /// |V/V0 − 1|, where V0 is the volume at the start.
     pub volume: Option<f64>,
-    /// Increase of the total energy within a frame beyond the work of walls and solids, relative to
-    /// the total: kinetic energy plus potential energy above the lowest point of the domain.
+    /// Increase of the total energy within a frame beyond the work of walls, solids and forces,
+    /// relative to the total: kinetic energy plus potential energy above the lowest point of the
+    /// domain.
     pub energy: Option<f64>,
     /// Number of particles at the end of a frame.
     pub particles: Option<f64>,
@@ -155,15 +156,16 @@ impl Budget {
 }
 
 impl Scene {
-    /// Bounds the speed that gravity, effects and moving boundaries give in frame `frame` to a
-    /// particle of `speed`, m/s; at least a tenth of a spacing per frame. What absorbing walls add
-    /// to their own motion is not included; bodies count as they are at the start.
+    /// Bounds the speed that gravity, forces, effects and moving boundaries give in frame `frame` to
+    /// a particle of `speed`, m/s; at least a tenth of a spacing per frame. What absorbing walls
+    /// add to their own motion is not included; bodies count as they are at the start.
     pub fn reached_speed(&self, frame: u32, speed: f64) -> f64 {
         let length = self.shot.frame_seconds();
         let start = f64::from(frame.saturating_sub(1)) * length;
         let push = self.peak_boundary_speed(&AbsorberStates::default(), &[], start, start + length);
         let least = LEAST_ENERGY_SPEED * self.particle_spacing() / length;
-        let gained = self.water.gravity.length() * length + self.effects.push().gained(length);
+        let pull = self.most_acceleration(start, start + length);
+        let gained = pull * length + self.effects.push().gained(length);
         (speed + push + gained + self.effects.frees(self.grain())).max(least)
     }
 

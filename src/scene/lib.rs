@@ -3,6 +3,7 @@
 pub mod budget;
 pub mod effects;
 pub mod flip;
+pub mod forces;
 pub mod grids;
 pub mod lint;
 pub mod look;
@@ -84,6 +85,8 @@ pub struct Scene {
     pub emitters: Vec<Emitter<sources::Region>>,
     /// Regions where water leaves during the shot.
     pub drains: Vec<Drain<sources::Region>>,
+    /// Force fields, whose accelerations add to gravity's.
+    pub forces: Vec<forces::PlacedForce>,
     /// The chosen method with its settings.
     pub solver: Solver,
     /// Settings of the method that is not chosen, if the file has them: they are written with the

@@ -63,6 +63,7 @@ impl Scene {
             it.body.carry(way);
         }
         self.carry_sources(way, &carry);
+        self.carry_forces(way, &carry);
         for probe in &mut self.probes {
             match &mut probe.kind {
                 ProbeKind::Elevation { at } => *at += DVec2::new(way.x, way.z),

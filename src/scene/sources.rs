@@ -9,7 +9,7 @@ use swell_domain::{
     sources::{Emitter, Shape, Sources, flow},
 };
 
-/// Volume of an emitter or a drain.
+/// Volume of an emitter, a drain or a force.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Region {
     /// A box, metres.
@@ -167,10 +167,11 @@ impl Scene {
         }
     }
 
-    /// Returns the meshes of emitters and drains.
+    /// Returns the meshes of the rooms of emitters, drains and forces.
     pub(super) fn source_meshes(&self) -> impl Iterator<Item = &PlacedMesh> {
         let emitters = self.emitters.iter().map(|it| &it.shape);
         let shapes = emitters.chain(self.drains.iter().map(|it| &it.shape));
+        let shapes = shapes.chain(self.forces.iter().filter_map(|it| it.region.as_ref()));
         shapes.filter_map(|shape| match shape {
             Region::Block(_) => None,
             Region::Mesh(placed) => Some(placed),

@@ -24,7 +24,8 @@ pub struct Substep {
     /// Time over which forces and drag act, seconds: half of the previous substep plus half of this
     /// one, which centres velocities in the substep whatever the lengths (leapfrog).
     pub kick: f64,
-    /// Bound on a particle's displacement, cells: own speed, gravity, effects, walls and solids.
+    /// Bound on a particle's displacement, cells: own speed, gravity, forces, effects, walls and
+    /// solids.
     pub displacement: f64,
 }
 
@@ -114,24 +115,20 @@ impl Scene {
         ((before + 1.0) * frame - start).max(length)
     }
 
-    /// Returns the longest substep of a grid projection for surface waves, √(Δx / g) seconds;
-    /// infinite without gravity. Waves of two cells have ω² of about 1.4 g / Δx on the grid (up to
-    /// 4.8 g / Δx where the surface is near cells' centres) and are stable for ω Δt < 2. In longer
-    /// substeps they make noise in slow water.
-    fn longest_wave_step(&self) -> f64 {
-        (self.solver.cell_size() / self.water.gravity.length()).sqrt()
+    /// Returns the longest substep of a grid projection for surface waves under an acceleration g,
+    /// m/s²: √(Δx / g) seconds; infinite without one. Waves of two cells have ω² of about 1.4 g / Δx
+    /// on the grid (up to 4.8 g / Δx where the surface is near cells' centres) and are stable for
+    /// ω Δt < 2. In longer substeps they make noise in slow water.
+    fn longest_wave_step(&self, acceleration: f64) -> f64 {
+        (self.solver.cell_size() / acceleration).sqrt()
     }
 
     /// Describes the step limits of surface waves, if they are the narrowest, and of effects, as
     /// the end of a message.
-    fn stable_step(&self, is_of_waves: bool) -> String {
-        let of_waves = match is_of_waves {
-            true => format!(
-                ", for surface waves of two cells no longer than {:.3e} s",
-                self.longest_wave_step()
-            ),
-            false => String::new(),
-        };
+    fn stable_step(&self, of_waves: Option<f64>) -> String {
+        let of_waves = of_waves.map_or_else(String::new, |longest| {
+            format!(", for surface waves of two cells no longer than {longest:.3e} s")
+        });
         match self.effects.longest_step(self.grain()) {
             (longest, name) if longest.is_finite() => {
                 format!("{of_waves}, and at effects.{name} no longer than {longest:.3e} s")
@@ -206,7 +203,7 @@ fn density_errors(density: impl Iterator<Item = f64>) -> [f64; 3] {
 impl PbfScene<'_> {
     /// Returns the number of equal substeps that PBF's CFL number, and short surface waves with its
     /// projection (Δt ≤ √(Δx / g)), require in the frame after `frame`, for a fastest particle of
-    /// `speed`, m/s, gravity, effects, wave makers and solids.
+    /// `speed`, m/s, gravity, forces, effects, wave makers and solids.
     ///
     /// # Errors
     /// If there are more than `max_substeps`.
@@ -219,20 +216,22 @@ impl PbfScene<'_> {
         let pbf = self.settings();
         let length = self.shot.frame_seconds();
         let start = f64::from(frame) * length;
-        let gained = self.water.gravity.length() * length + self.effects.push().gained(length);
+        let pull = self.most_acceleration(start, start + length);
+        let gained = pull * length + self.effects.push().gained(length);
         let solids = self.peak_boundary_speed(absorbers, bodies, start, start + length);
         let speed = solids.max(speed + gained);
         let wanted = (speed * length / (pbf.cfl * pbf.particle_spacing))
             .max(length / self.effects.longest_step(self.grain()).0);
+        let longest_wave = self.longest_wave_step(pull);
         let of_waves = match pbf.grid_projection {
-            true => length / self.longest_wave_step(),
+            true => length / longest_wave,
             false => 0.0,
         };
-        let is_of_waves = of_waves > wanted;
+        let narrowest = (of_waves > wanted).then_some(longest_wave);
         let wanted = wanted.max(of_waves).ceil().max(1.0);
         if wanted > f64::from(pbf.max_substeps) {
             let most = f64::from(pbf.max_substeps);
-            let stable = self.stable_step(is_of_waves);
+            let stable = self.stable_step(narrowest);
             let detail = format!("{speed:.3} m/s at solver.pbf.cfl {}{stable}", pbf.cfl);
             return Err(Breach {
                 detail: Some(detail),
@@ -292,20 +291,21 @@ impl FlipScene<'_> {
         let flip = self.settings();
         let push = self.peak_boundary_speed(absorbers, bodies, start, start + remaining);
         let fastest = speed.max(push);
-        let (gravity, push) = (self.water.gravity.length(), self.effects.push());
+        let pull = self.most_acceleration(start, start + remaining);
+        let push = self.effects.push();
         // Solves v t + g t² = cfl Δx.
         let room = flip.cfl * flip.cell_size;
         let longest = |v: f64, g: f64| 2.0 * room / (v + (v * v + 4.0 * g * room).sqrt());
         // An effect is limited both in acceleration and in speed; the weaker bound
         // on the step holds.
-        let by_acceleration = longest(fastest, gravity + push.acceleration);
-        let longest = by_acceleration.max(longest(fastest + push.speed, gravity));
+        let by_acceleration = longest(fastest, pull + push.acceleration);
+        let longest = by_acceleration.max(longest(fastest + push.speed, pull));
         let longest = longest.min(self.effects.longest_step(self.grain()).0);
         let longest = longest.min(self.longest_body_step(bodies));
         let shapes = self.fastest_shape(start, start + remaining);
         let longest = longest.min(BODY_CELLS * flip.cell_size / shapes);
-        let of_waves = self.longest_wave_step();
-        let is_of_waves = of_waves < longest;
+        let of_waves = self.longest_wave_step(pull);
+        let narrowest = (of_waves < longest).then_some(of_waves);
         let longest = longest.min(of_waves);
         let wanted = if longest.is_finite() {
             (remaining / longest).ceil().max(1.0)
@@ -314,13 +314,13 @@ impl FlipScene<'_> {
         };
         let length = remaining / wanted;
         let kick = kick(before, length);
-        let reached = fastest + (gravity * kick + push.gained(kick));
+        let reached = fastest + (pull * kick + push.gained(kick));
         if f64::from(done) + wanted > f64::from(flip.max_substeps) {
             let detail = format!(
                 "up to {reached:.3} m/s, particles {speed:.3}, with gravity, effects, wave makers \
                  and moving solids, at solver.flip.cfl {}{}",
                 flip.cfl,
-                self.stable_step(is_of_waves)
+                self.stable_step(narrowest)
             );
             let (asked, most) = (f64::from(done) + wanted, f64::from(flip.max_substeps));
             return Err(Breach {

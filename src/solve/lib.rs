@@ -6,6 +6,7 @@ pub mod buffers;
 mod by_method;
 pub mod effects;
 pub mod flip;
+pub mod forces;
 mod grid;
 pub mod params;
 pub mod pbf;

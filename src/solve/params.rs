@@ -244,6 +244,42 @@ mirror!(
 );
 
 mirror!(
+    /// `Force` of shared/forces.wgsl. Lengths in metres, relative to the domain's minimum corner.
+    DeviceForce as "Force" {
+        /// Least corner of the room.
+        low: [f32; 3],
+        /// 1 / depth at which the force is at its full strength, 1/m; 0 for a sharp edge.
+        fade_rate: f32,
+        /// Greatest corner of the room.
+        high: [f32; 3],
+        /// Kind: its index in [`swell_domain::forces::ForceKind::NAMES`].
+        kind: u32,
+        /// The acceleration, m/s², or a point of the axis, or the point that attracts.
+        at: [f32; 3],
+        /// Acceleration at the core radius, m/s², times the fraction of the step in which it acts.
+        strength: f32,
+        /// Unit vector along the axis.
+        axis: [f32; 3],
+        /// Core radius.
+        core: f32,
+        /// First node of the distances to the room's mesh.
+        origin: [f32; 3],
+        /// Distance between nodes; 0 without a mesh.
+        spacing: f32,
+        /// Nodes along each axis.
+        dims: [u32; 3],
+        /// Index of the first node in `force_distance`.
+        first: u32,
+        /// Exponent of the distance beyond the core.
+        falloff: u32,
+        /// Unused.
+        unused: u32,
+        /// Unused.
+        padding: [u32; 2],
+    }
+);
+
+mirror!(
     /// `Counters` of shared/counters.wgsl, which passes of both solvers add to over a frame.
     Counters {
         /// Times that a particle's displacement was reduced to the cap.

@@ -92,7 +92,7 @@ pub struct PlannedBuffer {
     /// Name and size.
     pub spec: BufferSpec,
     /// One of `pbf`, `flip`, `pressure`, `sort`, `solids`, `lists`, `probes`, `budget`, `emitters`,
-    /// `bodies`, or the name of an effect.
+    /// `forces`, `bodies`, or the name of an effect.
     pub owner: &'static str,
     /// Whether FLIP scans this buffer for non-finite values at the end of a substep. Such values
     /// may not show up in any later result.

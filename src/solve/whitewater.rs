@@ -3,10 +3,11 @@
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-use crate::air;
+use crate::{air, forces};
 use swell_domain::{
     boundary::Boundary,
     budget::Breach,
+    forces::Medium,
     parallel,
     particles::Particles,
     solver::PassTime,
@@ -98,6 +99,7 @@ fn plan(scene: &PbfScene, boundary: &Boundary, water: usize, white: usize) -> Pl
         [WHITE_POSITION, WHITE_VELOCITY].map(|b| b.sized(white)),
     );
     table.add("whitewater", WHITE_COUNT.sized(1));
+    table.extend(forces::OWNER, forces::buffers(scene, Medium::Whitewater));
     if plan.has_solids() {
         table.add("solids", SOLID_DISTANCE.sized(counts.solid_floats()));
         table.add("solids", BOUNDARY_CELL_START.sized(cells + 1));
@@ -123,11 +125,17 @@ fn pass(
     scene: &PbfScene,
     settings: Option<&CalibratedSettings>,
 ) -> PassSpec {
+    let has_forces = scene.has_forces_on(Medium::Whitewater);
     let conditions = [
         ("SOLIDS", plan.has_solids()),
         ("MOVING_SOLIDS", plan.counts.moving_nodes > 0),
         ("SHAPES", plan.counts.shape_nodes > 0),
         ("PERIODIC", scene.is_periodic()),
+        ("FORCES", has_forces),
+        (
+            forces::MESHES,
+            forces::has_meshes(scene, Medium::Whitewater),
+        ),
     ];
     let constants = match (name, settings) {
         ("whitewater/survey", _) => {
@@ -145,7 +153,12 @@ fn pass(
                 ("RISE_SPEED", settings.rise_speed),
                 ("RESPONSE", settings.response),
             ];
-            [own, air::constants(settings.drop_radius, settings.wind)].concat()
+            let of_forces = match has_forces {
+                true => forces::constants(scene, Medium::Whitewater),
+                false => Vec::new(),
+            };
+            let of_air = air::constants(settings.drop_radius, settings.wind);
+            [own, of_air, of_forces].concat()
         }
         _ => Vec::new(),
     };
@@ -169,6 +182,7 @@ fn set_up(
     let water = plan.counts.particles as u32;
     program.upload(ELEMENT_COUNT, 0, &[[water, 0, 0, 0]]);
     samples::upload(boundary, program, scene, plan, calibration);
+    forces::upload_meshes(program, scene, Medium::Whitewater);
     Recording::new(program, &survey_commands(plan))
 }
 
@@ -281,6 +295,8 @@ impl Whitewater {
         // Whitewater falls under gravity, however the water's own solver applies it.
         params.velocity_step = (self.scene.water.gravity * seconds).as_vec3().to_array();
         self.program.upload(PARAMS, 0, &[params]);
+        let span = (time - seconds, seconds);
+        forces::upload(&self.program, &self.scene, Medium::Whitewater, span);
         if let (Some(movers), Some(boundary)) = (&self.movers, &self.boundary) {
             let (program, scene) = (&self.program, &self.scene);
             movers.upload(program, scene, &water.bodies, (time - seconds, seconds));

@@ -25,7 +25,7 @@ use swell_domain::{
     bounds::Bounds,
     output,
     particles::Particles,
-    whitewater::{self, Births, CalibratedSettings, SeedWater, Thresholds},
+    whitewater::{self, Births, CalibratedSettings, KillDomain, SeedWater, Thresholds},
 };
 use swell_files::whitewater::{WhitewaterSettings, written_out};
 use swell_gpu::adapter::Needs;
@@ -319,7 +319,14 @@ impl StreamStep<'_> {
         let mut white = stream.white.clone();
         engine.advance(&mut white, frame)?;
         let spacing = self.scene.particle_spacing();
-        let died = whitewater::grow_older(self.settings, &mut white, spacing, seconds);
+        let mut died = whitewater::grow_older(self.settings, &mut white, spacing, seconds);
+        let domain = KillDomain {
+            origin: self.scene.origin,
+            bounds: self.scene.domain,
+            periodic: self.scene.periodic,
+        };
+        let kills = &self.settings.kills;
+        died += whitewater::kill(kills, &domain, clock.time, &mut white);
         let corner = self.scene.domain.min;
         let walls = self.scene.walls(&now.walls, clock.time);
         let births = Births::of(
@@ -347,6 +354,7 @@ impl StreamStep<'_> {
             });
         }
         let next = births.join(&mut white, stream.next_id);
+        died += whitewater::kill(kills, &domain, clock.time, &mut white);
         let [spray, foam, bubbles] = whitewater::census(&white);
         let report = json!({
             "spray": spray, "foam": foam, "bubbles": bubbles, "born": births.len(), "died": died,

@@ -107,6 +107,7 @@ mod solve {
     mod drag;
     mod flip;
     mod flip_passes;
+    mod forces;
     mod independent;
     mod ledgers;
     mod moving_solids;

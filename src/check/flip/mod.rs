@@ -3,6 +3,7 @@
 mod bodies;
 mod cycle;
 mod elements;
+mod forces;
 mod gaps;
 mod grid;
 mod iteration;
@@ -82,10 +83,11 @@ const BOTH_HALVES: &str = "compared together with flip/gather_faces and flip/gat
 const LABELLED: &str = "compared after pressure/count_pockets";
 
 /// Returns the comparisons of FLIP's own passes and of its projection.
-pub(super) fn comparisons() -> [&'static [Comparison<FlipState>]; 5] {
+pub(super) fn comparisons() -> [&'static [Comparison<FlipState>]; 6] {
     [
         COMPARISONS,
         bodies::COMPARISONS,
+        forces::COMPARISONS,
         pressure::COMPARISONS,
         iteration::COMPARISONS,
         cycle::COMPARISONS,

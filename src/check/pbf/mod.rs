@@ -1,6 +1,7 @@
 //! Compares PBF's passes with their f64 reference passes, each from the inputs that the GPU had.
 
 pub(super) mod bounds;
+pub(super) mod forces;
 mod lists;
 mod passes;
 mod rows;

@@ -28,8 +28,8 @@ pub(super) use outputs::{
     BearerSpec, COMPRESSIONS, FRONT_QUANTILE, GridsSpec, KeepSpec, ProbeSpec, RUN_UP_QUANTILE,
 };
 pub(super) use scene::{
-    AbsorptionSpec, BoxSpec, DomainSpec, DrainSpec, EmitterSpec, FilesSpec, MeshSpec, ScaleSpec,
-    SceneSpec, SequenceSpec, SolidSpec, SwarmSpec, WALLS, WaterSpec, WaveMakerSpec,
+    AbsorptionSpec, BoxSpec, DomainSpec, DrainSpec, EmitterSpec, FilesSpec, ForceSpec, MeshSpec,
+    ScaleSpec, SceneSpec, SequenceSpec, SolidSpec, SwarmSpec, WALLS, WaterSpec, WaveMakerSpec,
 };
 pub(super) use solver::{CHEBYSHEV_RELAXATION, PbfSpec, RELAXATION, SolverSpec};
 pub(super) use study::KEYS as STUDY;

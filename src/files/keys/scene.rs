@@ -18,6 +18,7 @@ use super::{
     outputs::{GridsSpec, KeepSpec, ProbeSpec},
     solver::SolverSpec,
 };
+use swell_domain::forces::{ForceKind, MAX_FALLOFF, Medium};
 use swell_scene::{Effects, Shot, Wall, start_waves::StartWave};
 
 keys! { struct SceneSpec {
@@ -38,6 +39,9 @@ keys! { struct SceneSpec {
     #[serde(default)]
     drain: Vec<DrainSpec> = tables()
         .about("Where water leaves while the shot runs; before any enters"),
+    #[serde(default)]
+    force: Vec<ForceSpec> = tables()
+        .about("Accelerations in a room, for a time, which add to gravity's"),
     solver: SolverSpec = table()
         .about("Which solver, and the settings of each; both tables may stand"),
     grids: Option<GridsSpec> = table()
@@ -424,6 +428,71 @@ keys! { struct DrainSpec {
         .unit("m³/s")
         .absent()
         .about("the most that leaves; without it, all that is in the room at a frame's end"),
+    from: f64 = from,
+    until: Option<f64> = until,
+} }
+
+/// Kinds of forces with a law of the distance.
+const BY_DISTANCE: &[&str] = &["vortex", "attract"];
+
+keys! { struct ForceSpec {
+    kind: String = choice(&ForceKind::NAMES)
+        .about(
+            "the same acceleration everywhere; one around an axis; one towards a point, or away \
+             from it with a strength below 0",
+        ),
+    min: Option<[f64; 3]> = vector(3, COORDINATE)
+        .unit("metres")
+        .absent()
+        .with("max")
+        .without(&["mesh"])
+        .also(", below max")
+        .about("least corner of its room, where that is a box; left out with mesh: everywhere"),
+    max: Option<[f64; 3]> = vector(3, COORDINATE)
+        .unit("metres")
+        .absent()
+        .with("min")
+        .without(&["mesh"])
+        .also(", above min")
+        .about("greatest corner"),
+    mesh: Option<MeshSpec> = room_mesh,
+    fade: f64 = number_or_zero(1e-6..=1e6)
+        .unit("metres")
+        .default("0.0")
+        .also("; only with a room")
+        .about("depth in the room at which it is at its full strength; 0: a sharp edge"),
+    acceleration: Option<[f64; 3]> = vector(3, VECTOR)
+        .unit("m/s²")
+        .only("kind", &["acceleration"])
+        .about("what it adds to gravity's"),
+    at: Option<[f64; 3]> = vector(3, COORDINATE)
+        .unit("metres")
+        .only("kind", BY_DISTANCE)
+        .about("a point of the vortex's axis; the point that attracts"),
+    axis: Option<[f64; 3]> = vector(3, VECTOR)
+        .default("[0.0, 1.0, 0.0]")
+        .only("kind", &["vortex"])
+        .also(", not all 0")
+        .about("direction of the axis; it pushes counter-clockwise as seen from its tip"),
+    strength: Option<f64> = number(VECTOR)
+        .unit("m/s²")
+        .only("kind", BY_DISTANCE)
+        .about("acceleration at the distance core from the axis or point, the largest there is"),
+    core: Option<f64> = number(1e-6..=1e6)
+        .unit("metres")
+        .only("kind", BY_DISTANCE)
+        .about("distance up to which the acceleration grows, from 0, linearly"),
+    falloff: Option<u32> = whole(0..=MAX_FALLOFF)
+        .default("0")
+        .only("kind", BY_DISTANCE)
+        .about(
+            "how it falls beyond: strength × (core / distance)^falloff; 0 is the same everywhere \
+             beyond",
+        ),
+    on: Vec<Medium> = choices(&words(&Medium::NAMED))
+        .default("[\"water\", \"whitewater\"]")
+        .also(", at least one")
+        .about("what it accelerates: the water; drops of whitewater in the air"),
     from: f64 = from,
     until: Option<f64> = until,
 } }

@@ -35,6 +35,10 @@ mesh = { file = "room.obj" }
 level = 0.5
 [[drain]]
 mesh = { file = "room.obj" }
+[[force]]
+kind = "acceleration"
+acceleration = [1.0, 0.0, 0.0]
+mesh = { file = "room.obj" }
 [solver]
 method = "pbf"
 [solver.pbf]
@@ -176,7 +180,8 @@ fn what_is_no_physics_is_said_once() {
             "solid.sequence.files",
             "body.mesh",
             "emitter.mesh.file",
-            "drain.mesh.file"
+            "drain.mesh.file",
+            "force.mesh.file"
         ]
     );
 }

@@ -7,6 +7,7 @@
 
 mod bodies;
 pub mod effects;
+mod forces;
 mod gaps;
 mod grid;
 mod model;
@@ -23,6 +24,7 @@ mod wall_friction;
 mod water;
 
 pub use bodies::{BodyCells, carry_bodies, couple_bodies};
+pub use forces::{push_drops, push_faces, work_by_cells};
 pub use gaps::{Gaps, close_gaps};
 pub use grid::planes;
 pub use model::{FlipSubstep, Model};

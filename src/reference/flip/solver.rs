@@ -10,7 +10,7 @@ use super::{
     extrapolate, find_buried, find_change, find_depth, find_excess, find_water, gather_centers,
     gather_faces, grid_to_particle, let_in,
     projection::project as project_faces,
-    push_apart, reorder, survey, wall_friction,
+    push_apart, push_drops, push_faces, reorder, survey, wall_friction, work_by_cells,
 };
 use crate::{ReferenceError, Timings};
 use swell_contact::SceneContacts;
@@ -185,6 +185,11 @@ impl Flip {
                 wall_friction(model, &step, &bricks, &space, &mut faces);
             });
         }
+        if model.has_forces() {
+            faces.velocity = timings.time("effects/push_faces", || {
+                push_faces(model, &step, &bricks, &space, &faces.velocity)
+            });
+        }
         let water = FaceInputs {
             model,
             step: &step,
@@ -266,6 +271,16 @@ impl Flip {
             let displacement = displacement.as_deref();
             grid_to_particle(model, &step, &bricks, &sorted, &faces, &space, displacement)
         });
+        let mut force_work = 0.0;
+        if model.has_forces() {
+            timings.time("effects/push_drops", || {
+                push_drops(model, &step, &sorted.cloud.position, &mut given);
+            });
+            let by_cells = timings.time("effects/work_by_cells", || {
+                work_by_cells(model, &step, &bricks, &sorted, (&faces, &space), &given)
+            });
+            force_work = model.scene.particle_mass() * by_cells.into_iter().sum::<f64>();
+        }
         if displacement.is_some() {
             let pushed = timings.time("flip/push_apart", || {
                 push_apart(model, &step, &bricks, &sorted, &given.is_drop)
@@ -288,6 +303,7 @@ impl Flip {
             solid_flux: waters.flux().to_vec(),
             bodies,
             coupled: coupled.clone(),
+            force_work,
             pressure: pressure.into_iter().map(|q| scale * q).collect(),
             earlier,
             after_contacts,
@@ -355,7 +371,7 @@ impl Flip {
 
     /// Projects the velocities of particles, given in the order of their ids, over a substep, and
     /// displaces the particles (flip/aim). Returns which of them are isolated droplets, and the
-    /// work by moving walls, joules. The first argument is the frame and the number of the substep
+    /// work by moving walls and forces, joules. The first argument is the frame and the number of the substep
     /// in it, from 1.
     ///
     /// # Errors Returns an error if a value is not finite, a projection exceeds its budget, or the
@@ -375,7 +391,7 @@ impl Flip {
         let mut trace = self.judged_substep((frame, number), cloud, &surveyed.is_wet, substep)?;
         trace.add_to(all);
         let step = self.model.step(substep, &self.state.walls, &trace.bodies);
-        let work = self.model.boundary_work(&step, &trace);
+        let work = self.model.boundary_work(&step, &trace) + trace.force_work;
         let order = by_id(&trace.sorted.cloud);
         let is_drop = &trace.given.is_drop;
         let pushed = push_apart(&self.model, &step, &trace.bricks, &trace.sorted, is_drop);
@@ -423,7 +439,7 @@ impl Flip {
             let number = (frame, report.substeps);
             let trace = self.judged_substep(number, cloud, &surveyed.is_wet, &substep)?;
             let step = self.model.step(&substep, &self.state.walls, &trace.bodies);
-            report.boundary_work += self.model.boundary_work(&step, &trace);
+            report.boundary_work += self.model.boundary_work(&step, &trace) + trace.force_work;
             for projected in trace.projections() {
                 report.iterations += u64::from(projected.solution.iterations);
             }

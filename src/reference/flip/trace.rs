@@ -33,6 +33,8 @@ pub struct Trace {
     pub pressure: Vec<f64>,
     /// Σ ± (1 − f) u_solid of each cell after the projections, m/s.
     pub solid_flux: Vec<f64>,
+    /// Work of the scene's forces, joules.
+    pub force_work: f64,
     /// Cells that bodies touch.
     pub coupled: Vec<BodyCells>,
     /// Bodies at the substep's start, with the velocities that they move with.

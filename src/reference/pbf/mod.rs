@@ -6,6 +6,7 @@
 
 pub mod constraint;
 pub mod effects;
+pub mod forces;
 mod model;
 mod pairs;
 pub mod passes;

@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec3};
 
 use super::{
-    Colour, Model, Substep, effects,
+    Colour, Model, Substep, effects, forces,
     passes::{self, Inputs, Momentum},
 };
 use crate::{
@@ -281,7 +281,7 @@ impl Pbf {
     }
 
     /// Runs one substep of particles in the order of their ids; returns the number of iterations
-    /// and of capped particles, and the work by moving walls, joules.
+    /// and of capped particles, and the work by moving walls and forces, joules.
     fn step(
         &mut self,
         substep: &Substep,
@@ -295,6 +295,15 @@ impl Pbf {
             substep.time_step,
         );
         let (model, timings, is_drop) = (&self.model, &mut self.timings, &self.is_drop);
+        let impulses = match forces::act_on_particles(&self.scene) {
+            true => timings.time("effects/push_particles", || {
+                forces::push_particles(&self.scene, substep, position, velocity)
+            }),
+            false => Vec::new(),
+        };
+        for (v, (change, _)) in velocity.iter_mut().zip(&impulses) {
+            *v += *change;
+        }
         let by_prediction: Vec<_> = timings.time("pbf/predict", || {
             parallel::map(0..position.len(), |slot| {
                 let (x, v) = (position[slot], velocity[slot]);
@@ -327,6 +336,10 @@ impl Pbf {
             let capped = capped.count() as u64;
             (updated.into_iter().map(|(_, v, _)| v).collect(), capped)
         });
+        let by_forces = sorted.order.iter().zip(&moved);
+        let by_forces = by_forces
+            .filter_map(|(&slot, &v)| Some(forces::work_on_particle(*impulses.get(slot)?, v)));
+        let by_forces: f64 = by_forces.sum();
         let drops = sorted.order.iter().filter_map(|&slot| is_drop.get(slot));
         let drops: Vec<bool> = drops.copied().collect();
         let inputs = Inputs {
@@ -337,7 +350,7 @@ impl Pbf {
         *position = sorted.unsorted(sorted.particles());
         *velocity = sorted.unsorted(&moved);
         self.pressed = sorted.unsorted(&sorted.lambda_sum);
-        let work = self.scene.particle_mass() / substep.time_step * work;
+        let work = self.scene.particle_mass() * (work / substep.time_step + by_forces);
         (iterations, capped, work)
     }
 

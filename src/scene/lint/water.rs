@@ -79,7 +79,7 @@ impl Scene {
         }
     }
 
-    /// Warns about emitters and drains that only act after the shot.
+    /// Warns about emitters, drains and forces that only act after the shot.
     fn lint_sources(&self, lints: &mut Vec<String>) {
         let mut emitters = self.emitters.iter().map(|it| ("emitter", it.window));
         let mut drains = self.drains.iter().map(|it| ("drain", it.window));
@@ -97,6 +97,9 @@ impl Scene {
         };
         late(&mut emitters, lints);
         late(&mut drains, lints);
+        let forces = self.forces.iter();
+        let mut forces = forces.map(|it| ("force", it.force.window));
+        late(&mut forces, lints);
         self.lint_rooms(lints);
     }
 

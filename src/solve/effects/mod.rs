@@ -6,6 +6,8 @@
 
 mod zone;
 
+use crate::{forces, plan::Capacity};
+use swell_domain::bricks::CELLS;
 use swell_gpu::{
     buffer::BufferSpec,
     program::{PassSpec, Program},
@@ -21,6 +23,13 @@ pub struct Addition {
     /// FLIP only: passes on the sorted particles before the transfer to the grid, dispatched over
     /// cells with water.
     pub on_particles: Vec<PassSpec>,
+    /// FLIP only: passes after the transfer from the grid to the particles, dispatched over cells
+    /// with water.
+    pub after_transfer: Vec<PassSpec>,
+    /// PBF only: passes on the particles before their prediction.
+    pub before_prediction: Vec<PassSpec>,
+    /// PBF only: passes on the particles after the velocity update, before `passes`.
+    pub after_update: Vec<PassSpec>,
     /// FLIP only: passes on the grid between two projections.
     pub between: Option<Between>,
     /// Buffers that the solver itself does not have.
@@ -45,7 +54,11 @@ impl Addition {
     /// Iterates over all passes.
     pub(super) fn all(&self) -> impl Iterator<Item = &PassSpec> {
         let between = self.between.iter().flat_map(|between| &between.passes);
-        self.passes.iter().chain(&self.on_particles).chain(between)
+        let hooks = [&self.on_particles, &self.after_transfer];
+        let hooks = hooks
+            .into_iter()
+            .chain([&self.before_prediction, &self.after_update]);
+        self.passes.iter().chain(hooks.flatten()).chain(between)
     }
 }
 
@@ -83,10 +96,13 @@ macro_rules! additions {
     ($($name:ident),+ $(,)?) => {
         $(pub mod $name;)+
 
-        /// Returns what the scene's effects add to PBF with `particles` particles, by the effects'
+        /// Returns what the scene's forces and effects add to PBF with `particles` particles, by the effects'
         /// keys.
         pub(super) fn of_pbf(scene: &Scene, particles: usize) -> Vec<(&'static str, Addition)> {
-            let mut all = Vec::new();
+            let mut all: Vec<_> = forces::pbf(scene, particles)
+                .map(|addition| (forces::OWNER, addition))
+                .into_iter()
+                .collect();
             $(all.extend(
                 scene.effects.$name.iter()
                     .map(|settings| (stringify!($name), $name::pbf(settings, scene, particles))),
@@ -109,9 +125,13 @@ macro_rules! additions {
             None$(.or_else(|| scene.effects.$name.as_ref()?.turns(scene, length)))+
         }
 
-        /// Returns what the scene's effects add to FLIP, whose arrays hold `cells` cells.
-        pub(super) fn of_flip(scene: &Scene, cells: usize) -> Vec<(&'static str, Addition)> {
-            let mut all = Vec::new();
+        /// Returns what the scene's forces and effects add to FLIP, whose arrays hold these bricks.
+        pub(super) fn of_flip(scene: &Scene, bricks: Capacity) -> Vec<(&'static str, Addition)> {
+            let [wet, cells] = [bricks.wet, bricks.slots].map(|count| CELLS as usize * count);
+            let mut all: Vec<_> = forces::flip(scene, wet)
+                .map(|addition| (forces::OWNER, addition))
+                .into_iter()
+                .collect();
             $(all.extend(
                 scene.effects.$name.iter()
                     .map(|settings| (stringify!($name), $name::flip(settings, scene, cells))),

@@ -30,6 +30,7 @@ use swell_domain::{
     bricks::{Bricks, CELLS, table_dims},
     budget::Breach,
     flip::{layers, stored_cells},
+    forces::Medium,
     particles::Particles,
     shores::Shores,
     solver::{PassTime, Solver, StepReport, Unread, Watch},
@@ -47,6 +48,7 @@ use super::{
     SolveError,
     boundary::{Movers, upload_distance},
     effects,
+    forces::{self, FORCE_WORK},
     params::Counters,
     plan::{Counts, Plan},
     pressure::{self, PressureSolver, Round, bodies::Lists},
@@ -111,6 +113,7 @@ impl Flip {
         let (buffers, passes) = (plan.buffer_specs(), plan.pass_specs());
         let program = Program::new(context, &buffers, &passes, &[])?;
         upload_distance(boundary, &program, scene);
+        forces::upload_meshes(&program, scene, Medium::Water);
         upload_constants(&program, &plan, scene);
         let bricks = bricks(scene, plan.grid_dims, &no_water(scene, plan.grid_dims), 0);
         let frame = whole_frame(scene);
@@ -267,7 +270,9 @@ impl Flip {
             let inlets = step::inlets(&self.scene, substep);
             self.program.upload(INLETS, 0, &[inlets]);
         }
-        effects::upload(&self.program, &self.scene, (substep.start, substep.length));
+        let span = (substep.start, substep.length);
+        effects::upload(&self.program, &self.scene, span);
+        forces::upload(&self.program, &self.scene, Medium::Water, span);
         Ok(())
     }
 
@@ -398,29 +403,35 @@ impl Flip {
             &self.program,
             &[&self.recordings.to_particles, &self.recordings.watch],
         )?;
-        let work = self.watched(totals.substeps)?;
-        let face = self.scene.settings().cell_size.powi(2);
-        totals.work += face * substep.kick * work;
+        totals.work += self.watched(totals.substeps, substep.kick)?;
         self.move_bodies(substep);
         self.state.substep = substep.length;
         Ok(())
     }
 
-    /// Checks that the substep left only finite values; returns the work done in it over Δx² Δt,
-    /// W/m².
-    fn watched(&self, substep: u32) -> Result<f64, SolveError> {
+    /// Checks that the substep left only finite values; returns the work by boundaries and forces
+    /// in it, in `kick` seconds, joules.
+    fn watched(&self, substep: u32, kick: f64) -> Result<f64, SolveError> {
         let groups = match self.scene.is_worked_on() {
             true => self.bricks.wet as usize * (CELLS / 64) as usize,
             false => 0,
         };
-        // Without moving walls the buffer does not exist, and none of it is read.
-        let wanted = (COUNTERS.first(1), BOUNDARY_WORK.first(groups));
-        let (counters, sums) = self.program.download(wanted)?;
+        let of_forces = forces::flip_sums(&self.scene, self.bricks.wet);
+        // Without moving walls or forces the buffers do not exist, and none of them is read.
+        let wanted = (
+            COUNTERS.first(1),
+            BOUNDARY_WORK.first(groups),
+            FORCE_WORK.first(of_forces),
+        );
+        let (counters, sums, of_forces) = self.program.download(wanted)?;
         if counters[0].not_finite > 0 {
             let breach = Breach::not_finite(self.frame + 1, counters[0].not_finite.into(), None);
             return Err(breach.in_substep(substep).into());
         }
-        Ok(sums.into_iter().map(f64::from).sum())
+        let sum = |sums: Vec<f32>| sums.into_iter().map(f64::from).sum::<f64>();
+        let face = self.scene.settings().cell_size.powi(2);
+        let by_forces = self.scene.particle_mass() * sum(of_forces);
+        Ok(face * kick * sum(sums) + by_forces)
     }
 
     /// Sets the state of absorbing walls.
@@ -560,7 +571,7 @@ impl Solver for Flip {
 
 /// Binds the commands of a plan to the current buffers of the program.
 fn recordings(program: &Program, plan: &Plan, scene: &FlipScene) -> Recordings {
-    let effects = effects::of_flip(scene, CELLS as usize * plan.counts.bricks.slots);
+    let effects = effects::of_flip(scene, plan.counts.bricks);
     Recordings::new(program, &Commands::new(plan, scene, &effects))
 }
 

@@ -1,13 +1,14 @@
 //! Plan of FLIP's passes and buffers.
 
 use crate::{
-    effects,
+    effects, forces,
     plan::{BufferTable, Counts, Plan, in_order},
     pressure::{self, bodies},
 };
 use swell_domain::{
     bricks::{CELLS, table_dims},
     flip::{layers, stored_cells},
+    forces::Medium,
 };
 use swell_gpu::{buffer::BufferSpec, program::PassSpec, recording::Command, sort};
 use swell_scene::{
@@ -28,7 +29,7 @@ pub(crate) fn plan(scene: &FlipScene, counts: Counts, moves: bool) -> Plan {
     let flip = scene.settings();
     let mut plan = Plan::bare(counts, scene.domain.cells(flip.cell_size));
     plan.moves = moves;
-    let effects = effects::of_flip(scene, CELLS as usize * counts.bricks.slots);
+    let effects = effects::of_flip(scene, counts.bricks);
     let mut table = buffers(&plan, scene);
     for (name, addition) in &effects {
         table.extend(name, addition.buffers.clone());
@@ -67,7 +68,7 @@ pub(crate) fn plan(scene: &FlipScene, counts: Counts, moves: bool) -> Plan {
 /// Returns every command of a substep, with those of projections on any brick layout.
 pub(crate) fn commands(plan: &Plan, scene: &FlipScene) -> Vec<Command> {
     let flip = scene.settings();
-    let effects = effects::of_flip(scene, CELLS as usize * plan.counts.bricks.slots);
+    let effects = effects::of_flip(scene, plan.counts.bricks);
     let commands = Commands::new(plan, scene, &effects);
     let projection = pressure::all_commands(flip.pressure.preconditioner, extent(scene));
     let before = commands.before_projection().cloned();
@@ -109,6 +110,7 @@ fn conditions(plan: &Plan, scene: &FlipScene) -> Vec<&'static str> {
         ("PERIODIC", scene.is_periodic()),
         ("PLACES", has_places(plan, scene)),
         ("BODIES", scene.has_bodies()),
+        (forces::MESHES, forces::has_meshes(scene, Medium::Water)),
         ("F64", flip.pressure.precision == Precision::F64),
     ];
     let holding = all.into_iter().filter(|(_, holds)| *holds);

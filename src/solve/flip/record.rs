@@ -108,7 +108,7 @@ impl Commands {
                 .filter_map(|(_, addition)| addition.between.as_ref())
         };
         let mut end: Vec<Command> = between().flat_map(|between| between.end.clone()).collect();
-        end.extend(to_particles(plan, scene));
+        end.extend(to_particles(plan, scene, effects));
         Self {
             survey: vec![
                 Command::clear(&SURVEY),
@@ -251,7 +251,11 @@ fn watch(plan: &Plan, scene: &FlipScene) -> Vec<Command> {
     commands
 }
 
-fn to_particles(plan: &Plan, scene: &FlipScene) -> Vec<Command> {
+fn to_particles(
+    plan: &Plan,
+    scene: &FlipScene,
+    effects: &[(&'static str, Addition)],
+) -> Vec<Command> {
     let flip = scene.settings();
     let mut commands = vec![over("flip/find_change", ACTIVE)];
     for k in 0..layers(flip.cfl).saturating_sub(1) {
@@ -259,6 +263,12 @@ fn to_particles(plan: &Plan, scene: &FlipScene) -> Vec<Command> {
         commands.push(over_listed("flip/extrapolate", FIRST_LAYER + k, binds));
     }
     commands.push(over("flip/grid_to_particle", WET));
+    for pass in effects
+        .iter()
+        .flat_map(|(_, addition)| &addition.after_transfer)
+    {
+        commands.push(over(pass.name, WET));
+    }
     if pushes(plan, scene) {
         commands.push(Command::over("flip/push_apart", plan.counts.particles));
     }

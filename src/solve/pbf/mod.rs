@@ -15,6 +15,7 @@ use swell_domain::{
     absorber::AbsorberStates,
     boundary::Boundary,
     budget::Breach,
+    forces::Medium,
     particles::{Particles, max_speed},
     pbf::{CAP, CONTACT, MAX_CORRECTION, REGULARIZATION},
     period::Period,
@@ -37,6 +38,7 @@ use super::{
     SolveError,
     boundary::Movers,
     effects,
+    forces::{self, FORCE_WORK},
     params::{Counters, IterationControl, Params},
     plan::{Counts, Plan, device_limits},
     state::{Carried, check_finite, is_awaited, is_other_count, upload},
@@ -131,6 +133,9 @@ fn set_up(
     program.upload(ELEMENT_COUNT, 0, &[[particles as u32, 0, 0, 0]]);
     samples::upload_places(program, plan.page, places(plan) - 1, &[NOBODY]);
     samples::upload(boundary, program, scene, plan, calibration);
+    if forces::pbf_sums(scene, particles) > 0 {
+        forces::upload_meshes(program, scene, Medium::Water);
+    }
     [&commands.substep, &commands.measure].map(|commands| Recording::new(program, commands))
 }
 
@@ -247,6 +252,15 @@ impl Pbf {
             let groups = self.plan.counts.particles.div_ceil(64);
             self.program.upload(BOUNDARY_WORK, 0, &vec![0.0; groups]);
         }
+        let of_forces = forces::pbf_sums(&self.scene, self.plan.counts.particles);
+        if of_forces > 0 {
+            self.program.upload(FORCE_WORK, 0, &vec![0.0; of_forces]);
+        }
+    }
+
+    /// Whether forces act on the particles, and not on a projection's grid.
+    fn has_force_passes(&self) -> bool {
+        forces::pbf_sums(&self.scene, self.plan.counts.particles) > 0
     }
 
     /// Projects velocities and uploads the uniforms for the substep that ends at `time`.
@@ -271,6 +285,10 @@ impl Pbf {
             samples::upload_samples(&samples, program, scene, &self.plan, &self.calibration);
         }
         effects::upload(&self.program, &self.scene, (time, step));
+        if self.has_force_passes() {
+            let span = (time - step, step);
+            forces::upload(&self.program, &self.scene, Medium::Water, span);
+        }
         if let Stop::DensityError { .. } = self.scene.settings().stop {
             self.program.upload(CONTROL, 0, &[self.control()]);
         }
@@ -376,11 +394,12 @@ impl Pbf {
             COUNTERS.first(1),
             BOUNDARY_WORK.first(groups),
         );
+        let of_forces = FORCE_WORK.first(forces::pbf_sums(&self.scene, n));
         Ok(MappedFrame {
             scene: self.scene.clone(),
             frame: self.frame + 1,
             state: self.state.clone(),
-            found: self.program.map((state, measured))?,
+            found: self.program.map((state, measured, of_forces))?,
         })
     }
 }
@@ -397,7 +416,7 @@ struct MappedFrame {
     frame: u32,
     /// With the walls before the frame.
     state: Carried,
-    found: Mapped<(OfState, OfMeasure)>,
+    found: Mapped<(OfState, OfMeasure, First<f32>)>,
 }
 
 impl MappedFrame {
@@ -405,17 +424,17 @@ impl MappedFrame {
         Ok(self.found.views()?.1.2[0])
     }
 
-    /// Returns the work by moving walls on the water in the frame, joules; its substeps were
-    /// `step` seconds long.
+    /// Returns the work by moving walls and by forces on the water in the frame, joules; its
+    /// substeps were `step` seconds long.
     fn boundary_work(&self, step: f64) -> Result<f64, SolveError> {
-        let sums = self.found.views()?.1.3;
-        let sum: f64 = sums.iter().copied().map(f64::from).sum();
-        Ok(self.scene.particle_mass() / step * sum)
+        let (_, measured, of_forces) = self.found.views()?;
+        let sum = |sums: &[f32]| sums.iter().copied().map(f64::from).sum::<f64>();
+        Ok(self.scene.particle_mass() * (sum(measured.3) / step + sum(of_forces)))
     }
 
     /// Returns the state, and the relative density of each particle.
     fn read(self) -> Result<(Particles, Vec<f64>), SolveError> {
-        let (state, (sorted_id, density, counters, _)) = self.found.views()?;
+        let (state, (sorted_id, density, counters, _), _) = self.found.views()?;
         let (position, velocity, id) = state;
         let ids = &self.state.ids;
         let places = ids.places(self.frame, id)?;

@@ -1,10 +1,10 @@
 //! Plan of PBF's passes and buffers.
 
 use crate::{
-    effects, flip,
+    effects, flip, forces,
     plan::{BufferTable, Chunk, Counts, DeviceLimits, LIST_CAPACITY, Plan, in_order},
 };
-use swell_domain::sph::Calibration;
+use swell_domain::{forces::Medium, sph::Calibration};
 use swell_gpu::{buffer::BufferSpec, program::PassSpec, recording::Command, sort};
 use swell_scene::{Iteration, PbfScene, Stop};
 
@@ -131,6 +131,9 @@ fn conditions(plan: &Plan, scene: &PbfScene) -> Vec<&'static str> {
     }
     if plan.page.is_some() {
         conditions.push("PAGED");
+    }
+    if forces::has_meshes(scene, Medium::Water) {
+        conditions.push(forces::MESHES);
     }
     conditions
 }

@@ -1,7 +1,7 @@
 //! Commands of a substep, and of a frame's final measurement.
 
 use crate::{effects::Addition, params::Phase, plan::Plan};
-use swell_gpu::{recording::Command, sort};
+use swell_gpu::{program::PassSpec, recording::Command, sort};
 use swell_scene::PbfScene;
 
 use super::{buffers::*, iteration::Builder, plan::cell_count};
@@ -47,7 +47,11 @@ fn substep(
     builder: &mut Builder<'_>,
 ) -> Vec<Command> {
     let pbf = scene.settings();
-    let mut commands = vec![Command::over("pbf/predict", plan.counts.particles)];
+    let additions = || effects.iter().map(|(_, addition)| addition);
+    let over = |pass: &PassSpec| Command::over(pass.name, plan.counts.particles);
+    let before = additions().flat_map(|addition| &addition.before_prediction);
+    let mut commands: Vec<Command> = before.map(over).collect();
+    commands.push(Command::over("pbf/predict", plan.counts.particles));
     if scene.has_movers() {
         commands.insert(0, Command::clear(&WALL_WORK));
     } else if scene.reads_multipliers() {
@@ -62,7 +66,12 @@ fn substep(
     if scene.has_movers() {
         commands.push(Command::over("pbf/boundary_work", plan.counts.particles));
     }
-    for pass in effects.iter().flat_map(|(_, addition)| &addition.passes) {
+    commands.extend(
+        additions()
+            .flat_map(|addition| &addition.after_update)
+            .map(over),
+    );
+    for pass in additions().flat_map(|addition| &addition.passes) {
         builder.over_all(pass.name, &mut commands);
     }
     commands

@@ -4,6 +4,7 @@ mod coincident;
 mod controls;
 mod drops;
 mod films;
+mod forces;
 mod frames;
 mod gaps;
 mod imprecise;

@@ -12,7 +12,9 @@ use swell::{
     scene::{Method, Scene, SceneError},
 };
 
-use super::faults::{FLIP_FAULTS, KEY_FAULTS, SCENE, SOURCE_FAULTS, VALUE_FAULTS, ZONE_FAULTS};
+use super::faults::{
+    FLIP_FAULTS, FORCE_FAULTS, KEY_FAULTS, SCENE, SOURCE_FAULTS, VALUE_FAULTS, ZONE_FAULTS,
+};
 use crate::support::mutate::mutate;
 
 const CUBE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nv 0 0 1\nv 1 0 1\nv 0 1 1\nv 1 1 1\n\
@@ -56,7 +58,7 @@ fn each_fault_names_file_line_key_and_what_is_allowed() {
     parse(SCENE, &flip).expect("the good scene is good for FLIP");
     let mut wrong = Vec::new();
     let of_pbf = KEY_FAULTS.iter().chain(VALUE_FAULTS).chain(ZONE_FAULTS);
-    let of_pbf = of_pbf.chain(SOURCE_FAULTS);
+    let of_pbf = of_pbf.chain(SOURCE_FAULTS).chain(FORCE_FAULTS);
     let of_pbf = of_pbf.map(|fault| (fault, &[][..]));
     let of_flip = FLIP_FAULTS.iter().map(|fault| (fault, &flip[..]));
     for ((old, new, line, expected), overrides) in of_pbf.chain(of_flip) {

@@ -6,6 +6,7 @@ use glam::{DQuat, DVec3};
 use swell::{
     domain::{
         body::BodyState,
+        forces::Medium,
         particles::Particles,
         whitewater::{CalibratedSettings, Potentials, Thresholds, WhitewaterKind},
     },
@@ -17,7 +18,9 @@ use swell::{
 };
 
 use crate::support::{
-    self, D, context, lattice,
+    self, D, context,
+    forces::push,
+    lattice,
     whitewater::{kind, place, run, settings, velocity, white},
 };
 
@@ -371,5 +374,36 @@ fn a_body_is_where_its_state_puts_it() {
         let [corner, under] = after(device, &[at_start]);
         assert!(corner.distance(in_corner) < 1e-3, "{corner}");
         assert!(depth(&at_start, under) < 0.02, "{under}");
+    });
+}
+
+/// Under a force beside gravity a heavy drop flies along the parabola of both; one on water alone
+/// does not bend it, and foam does not feel either.
+#[test]
+fn a_force_on_whitewater_bends_the_path_of_a_drop() {
+    let settings = CalibratedSettings {
+        drop_radius: 10.0,
+        ..settings()
+    };
+    let (start, v) = (DVec3::new(1.0, 2.0, 1.0), DVec3::new(1.0, 2.0, -0.5));
+    let a = DVec3::new(-3.0, 4.0, 5.0);
+    both(|device| {
+        let moved = |on: Medium, (x, kind): (DVec3, WhitewaterKind)| {
+            let (mut scene, water) = pool(4.0, 0.0);
+            scene.forces = vec![push(a)];
+            scene.forces[0].force.on = vec![on];
+            let moved = one(device, &(scene, water), &settings, (x, v, kind), (4, 0.05));
+            place(&moved, 0)
+        };
+        let drop = (start, WhitewaterKind::Spray);
+        let parabola = |a: DVec3| start + 0.2 * v + 0.5 * a * 0.04;
+        let gravity = -9.81 * DVec3::Y;
+        // As without a force: the drag of a ball with a radius of 10 m.
+        let off = moved(Medium::Whitewater, drop).distance(parabola(gravity + a));
+        assert!(off < 2e-4, "{off}");
+        let off = moved(Medium::Water, drop).distance(parabola(gravity));
+        assert!(off < 2e-4, "{off}");
+        let foam = (DVec3::new(1.0, DEPTH, 1.0), WhitewaterKind::Foam);
+        assert_eq!(moved(Medium::Whitewater, foam), moved(Medium::Water, foam));
     });
 }

@@ -279,3 +279,32 @@ fn a_look_draws_the_stream_that_it_names() {
     );
     assert_has(&said, &["frame 8", "missing from it"]);
 }
+
+#[test]
+fn kill_volumes_end_whitewater_in_their_time() {
+    let job = baked();
+    job.expect(0, MAKE);
+    let room = "[[kill]]\nmin = [-1.0, 0.5, 0.25]\nmax = [0.0, 3.0, 1.25]\nfrom = 0.1\n";
+    job.write("killed.toml", &format!("{SETTINGS}{room}"));
+    job.expect(0, "whitewater cache/small/pbf --settings killed.toml");
+    let read = |stream: &str, frame: u32| -> Particles {
+        let path = format!("cache/small/pbf/whitewater/{stream}");
+        let reader = CacheReader::open(&job.path(&path)).unwrap();
+        reader.read(frame).unwrap()
+    };
+    let inside = |of: &Particles| of.position.iter().filter(|x| x[0] <= 0.0).count();
+    // Frame 6 ends at 0.1 s, which is not after it.
+    assert_eq!(read("tuned", 6), read("killed", 6));
+    for frame in [7, 8] {
+        let (tuned, killed) = (read("tuned", frame), read("killed", frame));
+        assert_eq!(inside(&killed), 0, "frame {frame}");
+        // Negative control: without the room there is whitewater in it; outside there is with it.
+        assert!(inside(&tuned) > 10, "frame {frame}: {}", inside(&tuned));
+        assert!(!killed.is_empty(), "frame {frame}");
+    }
+    job.expect(0, "check cache/small/pbf/whitewater/killed --frames 8");
+    job.write("broken.toml", "[[kill]]\nfrom = 0.1\n");
+    let said = job.expect(2, "whitewater cache/small/pbf --settings broken.toml");
+    assert_has(&said, &["broken.toml", "kill[0]", "no room"]);
+    assert!(!job.path("cache/small/pbf/whitewater/broken").exists());
+}

@@ -4,6 +4,7 @@ pub mod cache;
 pub mod device;
 pub mod events;
 pub mod flip;
+pub mod forces;
 pub mod job;
 pub mod made_cache;
 pub mod mutate;
@@ -62,6 +63,7 @@ pub fn scene(size: [f64; 3]) -> Scene {
         wave_makers: Vec::new(),
         emitters: Vec::new(),
         drains: Vec::new(),
+        forces: Vec::new(),
         solver: SolverSettings::Pbf(Settings {
             particle_spacing: D,
             support_ratio: 2.0,

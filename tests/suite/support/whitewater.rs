@@ -33,6 +33,7 @@ pub fn settings() -> CalibratedSettings {
         crowd: 64,
         rise_speed: 0.25,
         response: 0.05,
+        kills: Vec::new(),
     }
 }
 
@@ -91,7 +92,9 @@ pub fn run(
                 solve::whitewater::Whitewater::new(context, scene, &boundary, n, false).unwrap();
             engine.set(settings).unwrap();
             for frame in 1..=frames {
-                found = engine.survey(water, 0.0, seconds).unwrap();
+                found = engine
+                    .survey(water, f64::from(frame) * seconds, seconds)
+                    .unwrap();
                 engine.advance(&mut white, frame).unwrap();
             }
         }
@@ -99,7 +102,7 @@ pub fn run(
             let mut engine = reference::whitewater::Whitewater::new(scene, &boundary);
             engine.set(settings);
             for frame in 1..=frames {
-                found = engine.survey(water, 0.0, seconds);
+                found = engine.survey(water, f64::from(frame) * seconds, seconds);
                 engine.advance(&mut white, frame).unwrap();
             }
         }

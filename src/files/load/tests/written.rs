@@ -170,6 +170,23 @@ until = 2.0
 [[drain]]
 mesh = { file = "cube.obj", translate = [2.0, 1.0, 0.5], scale = 0.5, rotate_degrees = [0, 90, 0] }
 rate = 0.01
+[[force]]
+kind = "acceleration"
+acceleration = [1.0, 0.0, 0.0]
+min = [1.0, 0.0, 0.5]
+max = [1.5, 0.5, 1.5]
+fade = 0.1
+on = ["water"]
+from = 1.0
+until = 2.0
+[[force]]
+kind = "vortex"
+at = [2.0, 0.0, 1.0]
+axis = [0.0, 2.0, 0.0]
+strength = 3.0
+core = 0.5
+falloff = 1
+mesh = { file = "cube.obj", translate = [2.0, 1.0, 0.5], scale = 0.5, rotate_degrees = [0, 90, 0] }
 [effects]
 drag = { drop_radius = 0.002, wind = [1.0, 0.0, 0.0] }
 surface_tension = { coefficient = 0.0728 }

@@ -1,11 +1,13 @@
 //! A good scene, and faulty changes to it with their messages.
 mod flip;
+mod forces;
 mod keys;
 mod sources;
 mod values;
 mod zones;
 
 pub use flip::FLIP_FAULTS;
+pub use forces::FORCE_FAULTS;
 pub use keys::KEY_FAULTS;
 pub use sources::SOURCE_FAULTS;
 pub use values::VALUE_FAULTS;

@@ -71,6 +71,16 @@ const NUMBERS: &[(&str, &str, bool)] = &[
     ("drain[0].rate", "{}", true),
     ("drain[0].from", "{}", false),
     ("drain[0].until", "{}", false),
+    ("force[0].acceleration", "[{}, 0, 0]", true),
+    ("force[0].min", "[{}, 2, 1]", false),
+    ("force[0].max", "[{}, 3, 2]", false),
+    ("force[0].fade", "{}", true),
+    ("force[0].from", "{}", false),
+    ("force[0].until", "{}", false),
+    ("force[1].at", "[{}, 0, 0]", true),
+    ("force[1].axis", "[{}, 1, 0]", true),
+    ("force[1].strength", "{}", true),
+    ("force[1].core", "{}", true),
 ];
 
 /// The numbers of a wave generation zone with an irregular sea, and of one with regular waves.
@@ -142,7 +152,10 @@ fn numbered() -> String {
         [[emitter]]\nmin = [1.0, 2.0, 1.0]\nmax = [2.0, 3.0, 2.0]\nvelocity = [0.001, 0.0, 0.0]\n\
         from = 1.0\nuntil = 2.0\n\
         [[drain]]\nmin = [1.0, 2.0, 1.0]\nmax = [2.0, 3.0, 2.0]\nrate = 1.0\nfrom = 1.0\n\
-        until = 2.0\n";
+        until = 2.0\n\
+        [[force]]\nkind = \"acceleration\"\nacceleration = [1.0, 0, 0]\nmin = [1.0, 2.0, 1.0]\n\
+        max = [2.0, 3.0, 2.0]\nfade = 0.1\nfrom = 1.0\nuntil = 2.0\n\
+        [[force]]\nkind = \"vortex\"\nat = [1.0, 0, 0]\nstrength = 1.0\ncore = 1.0\n";
     let zone = "drag = { drop_radius = 0.001, wind = [1.0, 0, 0] }\n\
         surface_tension = { coefficient = 0.07 }\nabsorbing_zone = { walls = [\"-y\"], \
         length = 1.0, period = 1.0 }\n";
@@ -247,7 +260,7 @@ pub(super) fn each_number_has_a_range(
     }
 }
 
-/// The ramp is the only key of [`NUMBERS`] that accepts 0 in addition to its range.
+/// The ramp accepts 0 in addition to its range, as the depth at which a force fades in does.
 #[test]
 fn wave_maker_accepts_a_ramp_of_zero() {
     let dir = assets();
