@@ -7,47 +7,54 @@ use swell_domain::forces::{Force, ForceField, ForceKind};
 use swell_scene::Scene;
 
 bounds! {
-    pub(super) PLACE = [reach: "|x|, and the largest coordinate of a room or its mesh's grid, an \
-        axis or a point"]
-        32.0 * U * reach,
+    pub(super) PLACE = [reach: "|x|, and the largest coordinate of what it is compared with"]
+        24.0 * U * reach,
         "differences, a cross product, and an interpolation between nodes whose values differ by \
          no more than their distance";
-    pub(super) PUSH = [place: "" PLACE, slope: "Σ strength (3 / core + 1 / fade)",
+    pub(super) PUSH = [places: "Σ strength (1 + falloff) / core, and over fade, times " PLACE,
         strength: "Σ strength"]
-        place * slope + 24.0 * U * strength,
+        places + 24.0 * U * strength,
         "a law of the distance changes by at most (1 + falloff) strength / core a metre";
     pub(super) EDGE = [place: "" PLACE] place, "the depth in a room with a sharp edge";
+}
+
+/// A force that acts in a step, as its rounding bounds need it.
+struct Term<'a> {
+    force: &'a Force,
+    strength: f64,
+    /// Largest change of the law by the distance, 1/s², and largest coordinate of its axis or
+    /// point, metres.
+    law: [f64; 2],
+    /// Largest change at the edge of the room, 1/s², and largest coordinate of the room, metres.
+    edge: [f64; 2],
 }
 
 /// Forces of a step with the rounding bounds of their sum.
 pub(super) struct Bounded<'a> {
     field: ForceField<'a>,
+    terms: Vec<Term<'a>>,
     /// Position of the domain's minimum corner, metres.
     corner: DVec3,
-    /// Largest coordinate of the forces, metres.
-    reach: f64,
-    /// See [`PUSH`], 1/s².
-    slope: f64,
-    /// See [`PUSH`], m/s².
-    strength: f64,
 }
 
 impl<'a> Bounded<'a> {
     pub(super) fn of(scene: &Scene, field: ForceField<'a>) -> Self {
         let corner = scene.domain.min;
-        let (mut reach, mut slope, mut strength) = (0.0f64, 0.0, 0.0);
-        for (force, share) in field.acting() {
-            let most = share * force.kind.most();
-            strength += most;
-            slope += most * slope_of(force);
-            reach = reach.max(reach_of(force, corner));
-        }
+        let term = |(force, share): (&'a Force, f64)| {
+            let strength = share * force.kind.most();
+            let fades = force.room.is_some() && force.fade > 0.0;
+            let at_edge = if fades { strength / force.fade } else { 0.0 };
+            Term {
+                force,
+                strength,
+                law: law(&force.kind, corner).map_or([0.0; 2], |[slope, at]| [share * slope, at]),
+                edge: [at_edge, reach(force, corner)],
+            }
+        };
         Self {
+            terms: field.acting().map(term).collect(),
             field,
             corner,
-            reach,
-            slope,
-            strength,
         }
     }
 
@@ -58,7 +65,7 @@ impl<'a> Bounded<'a> {
 
     /// Returns Σ strength, m/s².
     pub(super) fn most(&self) -> f64 {
-        self.strength
+        self.terms.iter().map(|term| term.strength).sum()
     }
 
     /// Returns [`PUSH`] at a position; `None` where rounding decides whether it is in a room.
@@ -69,39 +76,37 @@ impl<'a> Bounded<'a> {
     /// Returns [`PUSH`] of positions that err by `off`, no farther than `reach` from `place`,
     /// metres; `None` if a sharp edge of a room may be among them.
     pub(super) fn error_about(&self, place: DVec3, off: f64, reach: f64) -> Option<f64> {
-        let off = off + PLACE.of([place.abs().max_element() + reach + self.reach]);
-        let is_tie = |force: &Force| match &force.room {
-            Some(room) if force.fade == 0.0 => {
-                room.depth(self.corner + place).abs() <= EDGE.of([off]) + reach
+        let size = place.abs().max_element() + reach;
+        let mut places = 0.0;
+        for term in &self.terms {
+            let [law, edge] = [term.law, term.edge];
+            let error = |to: f64| off + PLACE.of([size + to]);
+            if let (Some(room), 0.0) = (&term.force.room, term.force.fade)
+                && room.depth(self.corner + place).abs() <= EDGE.of([error(edge[1])]) + reach
+            {
+                return None;
             }
-            _ => false,
-        };
-        let is_decided = !self.field.acting().any(|(force, _)| is_tie(force));
-        is_decided.then(|| PUSH.of([off, self.slope, self.strength]))
-    }
-}
-
-/// Returns by how much of its strength a force may change a metre, 1/m.
-fn slope_of(force: &Force) -> f64 {
-    let of_law = match force.kind {
-        ForceKind::Acceleration(_) => 0.0,
-        ForceKind::Vortex { law, .. } | ForceKind::Attract { law, .. } => 3.0 / law.core,
-    };
-    match (&force.room, force.fade) {
-        (Some(_), fade) if fade > 0.0 => of_law + 1.0 / fade,
-        _ => of_law,
-    }
-}
-
-/// Returns the largest coordinate that a force has on the device, metres.
-fn reach_of(force: &Force, corner: DVec3) -> f64 {
-    let at = match force.kind {
-        ForceKind::Acceleration(_) => 0.0,
-        ForceKind::Vortex { at, .. } | ForceKind::Attract { at, .. } => {
-            (at - corner).abs().max_element()
+            places += law[0] * error(law[1]) + edge[0] * error(edge[1]);
         }
-    };
-    let of_room = force.room.as_ref().map_or(0.0, |room| {
+        Some(PUSH.of([places, self.most()]))
+    }
+}
+
+/// Returns the largest change of an acceleration by the distance, 1/s², and the largest coordinate
+/// of its axis or point, metres; `None` if it is the same everywhere.
+fn law(kind: &ForceKind, corner: DVec3) -> Option<[f64; 2]> {
+    match kind {
+        ForceKind::Acceleration(_) => None,
+        ForceKind::Vortex { at, law, .. } | ForceKind::Attract { at, law } => {
+            let slope = law.strength.abs() * f64::from(1 + law.falloff) / law.core;
+            Some([slope, (*at - corner).abs().max_element()])
+        }
+    }
+}
+
+/// Returns the largest coordinate that the room of a force has on the device, metres.
+fn reach(force: &Force, corner: DVec3) -> f64 {
+    force.room.as_ref().map_or(0.0, |room| {
         let bounds = room.bounds().moved(-corner);
         let ends = bounds.min.abs().max(bounds.max.abs()).max_element();
         let grid = room.mesh().map_or(0.0, |mesh| {
@@ -109,6 +114,5 @@ fn reach_of(force: &Force, corner: DVec3) -> f64 {
             (mesh.origin - corner).abs().max_element() + mesh.spacing * nodes
         });
         ends.max(grid)
-    });
-    at.max(of_room)
+    })
 }

@@ -10,8 +10,8 @@ use super::sources::{Shape, Window};
 pub const MAX_FALLOFF: u32 = 2;
 
 /// How the acceleration of a vortex or an attraction depends on the distance r from its axis or
-/// point: `strength · r / core` up to the core radius, `strength · (core / r)^falloff` beyond. It is
-/// continuous, and nowhere larger than the strength.
+/// point: `strength · r / core` up to the core radius, `strength · (core / r)^falloff` beyond. It
+/// is continuous, and nowhere larger than the strength.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Law {
     /// Acceleration at the core radius, m/s².

@@ -82,9 +82,9 @@ impl<S> Drain<S> {
     }
 }
 
-/// Time window of an emitter, drain, force or kill volume. Drains, kill volumes, and emitters with a
-/// level act at frames that end after `from` and not after `until`; the water of other emitters is
-/// that which enters between the two; forces act between the two.
+/// Time window of an emitter, drain, force or kill volume. Drains, kill volumes, and emitters with
+/// a level act at frames that end after `from` and not after `until`; the water of other emitters
+/// is that which enters between the two; forces act between the two.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Window {
     /// Start of the window, seconds from the start of the shot.

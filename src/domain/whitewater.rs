@@ -13,7 +13,7 @@ mod thresholds;
 use crate::particles::Particles;
 
 pub use ages::grow_older;
-pub use kills::{Kill, KillDomain, KillRoom, kill};
+pub use kills::{Kill, KillDomain, KillMesh, KillRoom, kill};
 pub use seeds::{Births, SeedWater};
 pub use thresholds::{Potentials, Thresholds};
 

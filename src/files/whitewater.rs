@@ -1,167 +1,35 @@
 //! Whitewater settings: how a stream of spray, foam and bubbles is derived from a finished bake.
 //! They do not affect the bake's physics.
 
-use std::path::Path;
+use std::{path::Path, sync::Arc};
 
 use glam::DVec3;
 use serde::Deserialize;
 
 use super::{
-    declare::{Keyed, keys},
     document::Document,
-    key::{Interval, Key},
+    keys::{
+        BubblesSpec, EmissionSpec, FoamSpec, KillSpec, MeshSpec, RADII, ScaleSpec, SpraySpec,
+        WHITEWATER, WhitewaterSpec,
+    },
+    placed_mesh::placed_mesh,
     toml_text::to_toml,
 };
 use swell_domain::{
     bounds::Bounds,
     sources::Window,
     text,
-    whitewater::{CalibratedSettings, Kill, KillRoom, Thresholds},
+    whitewater::{CalibratedSettings, Kill, KillMesh, KillRoom, Thresholds},
 };
-use swell_scene::SceneError;
-
-/// Radius of whitewater particles, metres, from mist to a bucket.
-const RADIUS: Interval = 1e-6..=10.0;
-const RATE: Interval = 0.0..=1e7;
-const POTENTIAL: Interval = 0.0..=1e9;
-const SECONDS: Interval = 1e-4..=1e6;
-/// World coordinates, metres.
-const COORDINATE: Interval = -1e6..=1e6;
-
-/// Default range of radii, particle spacings.
-const RADII: [f64; 2] = [0.025, 0.08];
-
-/// Keys of a settings file.
-pub(super) const KEYS: &[Key] = WhitewaterSpec::KEYS;
-
-keys! { struct WhitewaterSpec {
-    seed: u32 = whole(0..=u32::MAX)
-        .default("0")
-        .about("of all random numbers"),
-    max_particles: u32 = whole(1..=200_000_000)
-        .default("4000000")
-        .about("a frame with more ends the job, its last good frame kept"),
-    radius: Option<[f64; 2]> = vector(2, RADIUS)
-        .unit("metres")
-        .computed(|| format!("{} and {} particle spacings", RADII[0], RADII[1]))
-        .also(", rising")
-        .about("least and greatest radius of a whitewater particle, as it is drawn"),
-    emission: EmissionSpec = table()
-        .default("{}")
-        .about("Where whitewater is born, and how much (Ihmsen et al. 2012)"),
-    spray: SpraySpec = table()
-        .default("{}")
-        .about("Drops in the air"),
-    foam: FoamSpec = table()
-        .default("{}")
-        .about("What floats on the surface"),
-    bubbles: BubblesSpec = table()
-        .default("{}")
-        .about("Air under the surface"),
-    #[serde(default)]
-    kill: Vec<KillSpec> = tables().about("A room in which whitewater ends, of whatever kind"),
-} }
-
-keys! { struct EmissionSpec {
-    trapped_air_rate: f64 = number(RATE)
-        .unit("1/s")
-        .default("250.0")
-        .about("born a second of one water particle where water meets water hardest; 0: none"),
-    wave_crest_rate: f64 = number(RATE)
-        .unit("1/s")
-        .default("250.0")
-        .about("the same at the sharpest crests"),
-    trapped_air: Option<[f64; 2]> = vector(2, POTENTIAL)
-        .unit("m/s")
-        .computed(|| "what the shot gives".to_owned())
-        .also(", rising")
-        .about("from where to where the potential of trapped air grows from 0 to 1"),
-    wave_crest: Option<[f64; 2]> = vector(2, POTENTIAL)
-        .computed(|| "what the shot gives".to_owned())
-        .also(", rising")
-        .about("the same of wave crests"),
-    energy: Option<[f64; 2]> = vector(2, POTENTIAL)
-        .unit("J/kg")
-        .computed(|| "what the shot gives".to_owned())
-        .also(", rising")
-        .about("the same of v²/2, which the other two are multiplied by"),
-} }
-
-keys! { struct SpraySpec {
-    drop_radius: f64 = number(RADIUS)
-        .unit("metres")
-        .default("0.001")
-        .about("of the drops that a particle of spray stands for; the air slows small ones more"),
-    wind: [f64; 3] = vector(3, -1e3..=1e3)
-        .unit("m/s")
-        .default("[0.0, 0.0, 0.0]")
-        .about("velocity of the air"),
-} }
-
-keys! { struct FoamSpec {
-    lifetime: [f64; 2] = vector(2, SECONDS)
-        .unit("seconds")
-        .default("[0.5, 4.0]")
-        .also(", rising")
-        .about("least and greatest; a stronger cause leaves foam that lives longer"),
-    crowd: u32 = whole(1..=1_000_000)
-        .default("64")
-        .about("foam in a cube of one spacing from which on it dies faster"),
-} }
-
-keys! { struct BubblesSpec {
-    rise_speed: f64 = number(0.0..=10.0)
-        .unit("m/s")
-        .default("0.25")
-        .about(
-            "through still water; bubbles of 1 to 10 mm rise at 0.2 to 0.3 m/s \
-             (Clift, Grace and Weber 1978)",
-        ),
-    response: f64 = number(SECONDS)
-        .unit("seconds")
-        .default("0.1")
-        .about("how fast a bubble takes on what the water about it does"),
-} }
-
-keys! { struct KillSpec {
-    min: Option<[f64; 3]> = vector(3, COORDINATE)
-        .unit("metres")
-        .absent()
-        .with("max")
-        .without(&["sides"])
-        .also(", below max")
-        .about("least corner of the room"),
-    max: Option<[f64; 3]> = vector(3, COORDINATE)
-        .unit("metres")
-        .absent()
-        .with("min")
-        .without(&["sides"])
-        .also(", above min")
-        .about("greatest corner"),
-    sides: Option<f64> = number(1e-6..=1e6)
-        .unit("metres")
-        .absent()
-        .without(&["min", "max"])
-        .about(
-            "instead of a box: the room is as wide along all walls of the domain that face x or z",
-        ),
-    from: f64 = number(0.0..=1e9)
-        .unit("s")
-        .default("0.0")
-        .about("it acts at the ends of frames after this time"),
-    until: Option<f64> = number(0.0..=1e9)
-        .unit("s")
-        .absent()
-        .also(", after from")
-        .about("and not at the ends of frames after this one"),
-} }
+use swell_scene::{SceneError, asset_path};
 
 impl KillSpec {
     /// Checks the values of the table at `path`.
-    fn build(&self, doc: &Document<'_>, path: &str) -> Result<Kill, SceneError> {
-        let room = match (self.min, self.max, self.sides) {
-            (_, _, Some(width)) => KillRoom::Sides(width),
-            (Some(min), Some(max), None) => {
+    fn build(&self, doc: &Document<'_>, base: &Path, path: &str) -> Result<Kill, SceneError> {
+        let room = match (self.min, self.max, self.sides, &self.mesh) {
+            (_, _, _, Some(spec)) => KillRoom::Mesh(Arc::new(mesh(doc, base, path, spec)?)),
+            (_, _, Some(width), None) => KillRoom::Sides(width),
+            (Some(min), Some(max), None, None) => {
                 let [min, max] = [min, max].map(DVec3::from_array);
                 if !min.cmplt(max).all() {
                     let problem = "the box is inverted or has no volume";
@@ -170,7 +38,7 @@ impl KillSpec {
                 KillRoom::Block(Bounds { min, max })
             }
             _ => {
-                let problem = "it has no room: name min and max, or sides";
+                let problem = "it has no room: name min and max, mesh, or sides";
                 return Err(doc.fault_of_plain(path, problem));
             }
         };
@@ -183,11 +51,14 @@ impl KillSpec {
     }
 
     fn written(kill: &Kill) -> Self {
-        let (block, sides) = match kill.room {
-            KillRoom::Block(block) => (Some(block), None),
-            KillRoom::Sides(width) => (None, Some(width)),
-        };
+        let (mut block, mut mesh, mut sides) = (None, None, None);
+        match &kill.room {
+            KillRoom::Block(bounds) => block = Some(*bounds),
+            KillRoom::Mesh(of) => mesh = Some(written_mesh(of)),
+            KillRoom::Sides(width) => sides = Some(*width),
+        }
         Self {
+            mesh,
             min: block.map(|block| block.min.to_array()),
             max: block.map(|block| block.max.to_array()),
             sides,
@@ -195,6 +66,43 @@ impl KillSpec {
             until: kill.window.until,
         }
     }
+}
+
+/// Reads the mesh of a kill volume.
+fn mesh(
+    doc: &Document<'_>,
+    base: &Path,
+    path: &str,
+    spec: &MeshSpec,
+) -> Result<KillMesh, SceneError> {
+    // No particles resolve the room: any rounding of its coordinates is taken.
+    let spec = (spec, f64::INFINITY);
+    let placed = placed_mesh(doc, base, &format!("{path}.mesh"), "file", spec)?;
+    Ok(KillMesh {
+        file: placed.file,
+        file_hash: placed.file_hash,
+        translate: placed.placement.translate.to_array(),
+        rotate_degrees: placed.placement.rotate_degrees.to_array(),
+        scale: placed.placement.scale.to_array(),
+        mesh: placed.mesh,
+    })
+}
+
+/// Returns what settings say of a mesh that lie beside its copy.
+fn written_mesh(mesh: &KillMesh) -> MeshSpec {
+    MeshSpec {
+        file: kill_asset(mesh),
+        blake3: Some(mesh.file_hash.clone()),
+        translate: mesh.translate,
+        rotate_degrees: mesh.rotate_degrees,
+        scale: ScaleSpec::PerAxis(mesh.scale),
+    }
+}
+
+/// Returns the name of the copy of a kill volume's mesh file among the assets of a stream.
+pub fn kill_asset(mesh: &KillMesh) -> String {
+    let path = asset_path(&mesh.file, &mesh.file_hash);
+    path.trim_start_matches("assets/").to_owned()
 }
 
 /// A validated settings file. Values that depend on the shot may be open.
@@ -222,9 +130,9 @@ impl WhitewaterSettings {
     /// # Errors
     /// Those of [`Self::load`].
     pub fn parse(text: &str, file: &Path) -> Result<Self, SceneError> {
-        let (doc, mut root) = Document::parse(text, file, &[], KEYS)?;
+        let (doc, mut root) = Document::parse(text, file, &[], WHITEWATER)?;
         doc.settle(&mut root)?;
-        let spec = WhitewaterSpec::deserialize(toml::Deserializer::from(root))
+        let mut spec = WhitewaterSpec::deserialize(toml::Deserializer::from(root))
             .map_err(|error| doc.translate(&error))?;
         let rising = [
             ("radius", spec.radius, true),
@@ -242,8 +150,14 @@ impl WhitewaterSettings {
             }
         }
         let kills = spec.kill.iter().enumerate();
-        let kills = kills.map(|(index, kill)| kill.build(&doc, &format!("kill[{index}]")));
-        let kills = kills.collect::<Result<_, _>>()?;
+        let base = file.parent().unwrap_or(Path::new(""));
+        let kills = kills.map(|(index, kill)| kill.build(&doc, base, &format!("kill[{index}]")));
+        let kills = kills.collect::<Result<Vec<_>, _>>()?;
+        // Meshes by their content, so that the hash is of that.
+        spec.kill = kills.iter().map(KillSpec::written).collect();
+        for mesh in spec.kill.iter_mut().filter_map(|kill| kill.mesh.as_mut()) {
+            mesh.file.clear();
+        }
         Ok(Self { spec, kills })
     }
 

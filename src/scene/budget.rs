@@ -156,8 +156,8 @@ impl Budget {
 }
 
 impl Scene {
-    /// Bounds the speed that gravity, forces, effects and moving boundaries give in frame `frame` to
-    /// a particle of `speed`, m/s; at least a tenth of a spacing per frame. What absorbing walls
+    /// Bounds the speed that gravity, forces, effects and moving boundaries give in frame `frame`
+    /// to a particle of `speed`, m/s; at least a tenth of a spacing per frame. What absorbing walls
     /// add to their own motion is not included; bodies count as they are at the start.
     pub fn reached_speed(&self, frame: u32, speed: f64) -> f64 {
         let length = self.shot.frame_seconds();

@@ -116,9 +116,9 @@ impl Scene {
     }
 
     /// Returns the longest substep of a grid projection for surface waves under an acceleration g,
-    /// m/s²: √(Δx / g) seconds; infinite without one. Waves of two cells have ω² of about 1.4 g / Δx
-    /// on the grid (up to 4.8 g / Δx where the surface is near cells' centres) and are stable for
-    /// ω Δt < 2. In longer substeps they make noise in slow water.
+    /// m/s²: √(Δx / g) seconds; infinite without one. Waves of two cells have ω² of about
+    /// 1.4 g / Δx on the grid (up to 4.8 g / Δx where the surface is near cells' centres) and are
+    /// stable for ω Δt < 2. In longer substeps they make noise in slow water.
     fn longest_wave_step(&self, acceleration: f64) -> f64 {
         (self.solver.cell_size() / acceleration).sqrt()
     }

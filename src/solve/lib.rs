@@ -6,7 +6,6 @@ pub mod buffers;
 mod by_method;
 pub mod effects;
 pub mod flip;
-pub mod forces;
 mod grid;
 pub mod params;
 pub mod pbf;
@@ -21,8 +20,8 @@ use swell_gpu::{adapter::GpuError, buffer::Mirror, reflect::Layout};
 use swell_scene::moving_solid::OtherBodies;
 
 use params::{
-    Counters, FlipParams, Inlets, IterationControl, Params, Phase, PosedSolid, PosedSolids,
-    SolidGrid, SurveyHead,
+    Counters, DeviceForce, FlipParams, Inlets, IterationControl, Params, Phase, PosedSolid,
+    PosedSolids, SolidGrid, SurveyHead,
 };
 use pressure::{
     PocketPart, PressureBrick, PressureControl, PressureControl64, PressurePhase, PressureStats,
@@ -35,6 +34,7 @@ pub fn mirrors() -> Vec<Layout> {
         Phase::layout(),
         FlipParams::layout(),
         SolidGrid::layout(),
+        DeviceForce::layout(),
         PosedSolid::layout(),
         PosedSolids::layout(),
         Inlets::layout(),

@@ -5,7 +5,7 @@
 //! module declares its buffers once; a test compares the declared buffers with those that the
 //! commands bind.
 
-use swell_domain::{places, solver::PassTime};
+use swell_domain::{bricks::CELLS, places, solver::PassTime};
 use swell_gpu::{
     adapter::{Context, GpuError},
     bindings::check_bindings,
@@ -73,6 +73,11 @@ pub struct Capacity {
 }
 
 impl Capacity {
+    /// Returns the number of cells in slots for bricks with water, and in all slots.
+    pub(super) fn cells(self) -> [usize; 2] {
+        [self.wet, self.slots].map(|bricks| CELLS as usize * bricks)
+    }
+
     /// Returns a capacity that holds `needed`. What has to grow gets 25 % headroom, so that
     /// spreading water does not reallocate in every substep.
     pub fn grown(self, needed: Self) -> Self {

@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-use crate::{air, forces};
+use crate::{air, effects::forces};
 use swell_domain::{
     boundary::Boundary,
     budget::Breach,

@@ -23,11 +23,11 @@ use serde_json::{Value, json};
 use swell_cache::{Asset, CacheError, CacheReader, CacheWriter, Clock, LedgerEntry, Manifest};
 use swell_domain::{
     bounds::Bounds,
-    output,
+    mesh_file, output,
     particles::Particles,
-    whitewater::{self, Births, CalibratedSettings, KillDomain, SeedWater, Thresholds},
+    whitewater::{self, Births, CalibratedSettings, KillDomain, KillRoom, SeedWater, Thresholds},
 };
-use swell_files::whitewater::{WhitewaterSettings, written_out};
+use swell_files::whitewater::{WhitewaterSettings, kill_asset, written_out};
 use swell_gpu::adapter::Needs;
 use swell_scene::Scene;
 
@@ -398,6 +398,18 @@ impl StreamWriter {
                 name: name.to_owned(),
                 bytes: cache.asset(name)?,
             });
+        }
+        // The settings name these, beside them.
+        for kill in &settings.kills {
+            let KillRoom::Mesh(mesh) = &kill.room else {
+                continue;
+            };
+            let name = kill_asset(mesh);
+            // Assets of one name have the same bytes: the name has their hash.
+            if assets.iter().all(|asset| asset.name != name) {
+                let bytes = mesh_file::read_bytes(&mesh.file)?;
+                assets.push(Asset { name, bytes });
+            }
         }
         let clock = cache.entry(cache.first_frame())?.clock;
         let (white, scene) = (whitewater::none(), cache.scene_toml());

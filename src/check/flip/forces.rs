@@ -10,7 +10,7 @@ use crate::{
 use swell_compare::rounding::U;
 use swell_domain::bricks::CELLS;
 use swell_reference::flip::{Faces, GridTransfer, push_drops, push_faces, work_by_cells};
-use swell_solve::{flip::buffers, forces::FORCE_WORK};
+use swell_solve::{effects::forces::FORCE_WORK, flip::buffers};
 
 use super::{FlipState, elements};
 

@@ -10,7 +10,7 @@ use crate::{
 use swell_compare::rounding::U;
 use swell_reference::pbf::forces::{self, push_particles, work_on_particle};
 use swell_solve::{
-    forces::{FORCE_IMPULSE, FORCE_WORK},
+    effects::forces::{FORCE_IMPULSE, FORCE_WORK},
     pbf::buffers,
 };
 

@@ -1,20 +1,43 @@
 //! Kill volumes: rooms in which whitewater ends, whatever its kind and life.
 
+use std::{path::PathBuf, sync::Arc};
+
 use glam::{DVec3, Vec3};
 
-use crate::{bounds::Bounds, parallel, particles::Particles, sources::Window};
+use crate::{
+    bounds::Bounds, bvh::Bvh, mesh::TriangleMesh, parallel, particles::Particles, sources::Window,
+};
 
 /// Where whitewater ends.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum KillRoom {
     /// In a box; world coordinates, metres.
     Block(Bounds),
+    /// In a closed mesh.
+    Mesh(Arc<KillMesh>),
     /// Within this distance of the walls of the domain that face x or z, metres.
     Sides(f64),
 }
 
+/// A mesh as a kill volume.
+#[derive(Clone, Debug, PartialEq)]
+pub struct KillMesh {
+    /// File that it was read from.
+    pub file: PathBuf,
+    /// BLAKE3 of the file's bytes, hexadecimal.
+    pub file_hash: String,
+    /// Translation, metres.
+    pub translate: [f64; 3],
+    /// Euler angles about x, y and z, degrees.
+    pub rotate_degrees: [f64; 3],
+    /// Metres per unit of the file, along each axis.
+    pub scale: [f64; 3],
+    /// The mesh in the world, metres.
+    pub mesh: TriangleMesh,
+}
+
 /// A kill volume, which acts at frames that end in its window.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Kill {
     /// Where it acts.
     pub room: KillRoom,
@@ -33,11 +56,33 @@ pub struct KillDomain {
     pub periodic: [bool; 3],
 }
 
-impl KillRoom {
+/// A room with what finds whether a position is in it.
+struct Test<'a> {
+    room: &'a KillRoom,
+    /// Box and triangles of a mesh.
+    mesh: Option<(Bounds, Bvh)>,
+}
+
+impl<'a> Test<'a> {
+    fn of(room: &'a KillRoom) -> Self {
+        let mesh = match room {
+            KillRoom::Mesh(mesh) => {
+                let bounds = mesh.mesh.bounds().unwrap_or_default();
+                Some((bounds, Bvh::new(&mesh.mesh)))
+            }
+            KillRoom::Block(_) | KillRoom::Sides(_) => None,
+        };
+        Self { room, mesh }
+    }
+
     fn contains(&self, domain: &KillDomain, x: DVec3) -> bool {
-        match self {
-            Self::Block(block) => block.contains(domain.origin + x),
-            Self::Sides(width) => {
+        match self.room {
+            KillRoom::Block(block) => block.contains(domain.origin + x),
+            KillRoom::Mesh(_) => self.mesh.as_ref().is_some_and(|(bounds, tree)| {
+                let x = domain.origin + x;
+                bounds.contains(x) && tree.winding_number(x).abs() > 0.5
+            }),
+            KillRoom::Sides(width) => {
                 let Bounds { min, max } = domain.bounds;
                 let is_near = |axis: usize| {
                     !domain.periodic[axis]
@@ -53,14 +98,14 @@ impl KillRoom {
 /// the shot, and returns how many.
 pub fn kill(kills: &[Kill], domain: &KillDomain, time: f64, particles: &mut Particles) -> usize {
     let acting = kills.iter().filter(|kill| kill.window.holds(time));
-    let acting: Vec<&Kill> = acting.collect();
+    let acting: Vec<Test<'_>> = acting.map(|kill| Test::of(&kill.room)).collect();
     if acting.is_empty() {
         return 0;
     }
     let before = particles.len();
     let keep = parallel::map_slice(&particles.position, |x| {
         let x = Vec3::from_array(*x).as_dvec3();
-        !acting.iter().any(|kill| kill.room.contains(domain, x))
+        !acting.iter().any(|room| room.contains(domain, x))
     });
     particles.retain(&keep);
     before - particles.len()
@@ -69,6 +114,7 @@ pub fn kill(kills: &[Kill], domain: &KillDomain, time: f64, particles: &mut Part
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mesh::tests::sphere;
 
     const DOMAIN: KillDomain = KillDomain {
         origin: DVec3::new(100.0, 0.0, 0.0),
@@ -81,7 +127,7 @@ mod tests {
 
     /// Ids of the particles that are left of a grid of one per cubic metre.
     fn left(
-        room: KillRoom,
+        room: &KillRoom,
         domain: &KillDomain,
         (from, until): (f64, Option<f64>),
     ) -> Vec<[i32; 3]> {
@@ -96,7 +142,15 @@ mod tests {
             }
         }
         let window = Window { from, until };
-        let gone = kill(&[Kill { room, window }], domain, 1.0, &mut all);
+        let gone = kill(
+            &[Kill {
+                room: room.clone(),
+                window,
+            }],
+            domain,
+            1.0,
+            &mut all,
+        );
         assert_eq!(gone + all.len(), 320);
         assert!(
             all.attributes
@@ -113,7 +167,7 @@ mod tests {
             min: DVec3::new(102.0, 1.0, 0.0),
             max: DVec3::new(104.0, 2.0, 8.0),
         });
-        let kept = left(room, &DOMAIN, (0.0, None));
+        let kept = left(&room, &DOMAIN, (0.0, None));
         let is_in = |[x, y, _]: &[i32; 3]| (2..4).contains(x) && *y == 1;
         assert_eq!(kept.len(), 320 - 16);
         assert!(!kept.iter().any(is_in));
@@ -122,13 +176,35 @@ mod tests {
             origin: DVec3::ZERO,
             ..DOMAIN
         };
-        assert_eq!(left(room, &here, (0.0, None)).len(), 320);
+        assert_eq!(left(&room, &here, (0.0, None)).len(), 320);
+    }
+
+    #[test]
+    fn whitewater_ends_in_a_mesh_of_the_world() {
+        let mesh = KillMesh {
+            file: PathBuf::new(),
+            file_hash: String::new(),
+            translate: [0.0; 3],
+            rotate_degrees: [0.0; 3],
+            scale: [1.0; 3],
+            mesh: sphere(DVec3::new(105.0, 2.0, 4.0), 1.75, 24),
+        };
+        let room = KillRoom::Mesh(Arc::new(mesh));
+        let is_in = |[x, y, z]: &[i32; 3]| {
+            let at = DVec3::from([*x, *y, *z].map(|c| f64::from(c) + 0.5));
+            // No centre of a cell is as far from the middle as the sphere's surface, 1.75.
+            at.distance(DVec3::new(5.0, 2.0, 4.0)) < 1.75
+        };
+        let kept = left(&room, &DOMAIN, (0.0, None));
+        assert!(!kept.iter().any(is_in));
+        // 8 at √0.75 and 24 at √2.75 from the middle.
+        assert_eq!(kept.len(), 320 - 32);
     }
 
     #[test]
     fn whitewater_ends_at_the_sides_that_are_walls() {
         let sides = KillRoom::Sides(1.0);
-        let kept = left(sides, &DOMAIN, (0.0, None));
+        let kept = left(&sides, &DOMAIN, (0.0, None));
         let is_inside = |[x, _, z]: &[i32; 3]| (1..9).contains(x) && (1..7).contains(z);
         assert_eq!(kept.len(), 8 * 4 * 6);
         assert!(kept.iter().all(is_inside));
@@ -136,7 +212,7 @@ mod tests {
             periodic: [true, false, false],
             ..DOMAIN
         };
-        assert_eq!(left(sides, &periodic, (0.0, None)).len(), 10 * 4 * 6);
+        assert_eq!(left(&sides, &periodic, (0.0, None)).len(), 10 * 4 * 6);
     }
 
     #[test]
@@ -148,7 +224,7 @@ mod tests {
             ((1.0, None), 320),
             ((0.0, Some(0.9)), 320),
         ] {
-            assert_eq!(left(sides, &DOMAIN, window).len(), count, "{window:?}");
+            assert_eq!(left(&sides, &DOMAIN, window).len(), count, "{window:?}");
         }
     }
 }

@@ -16,8 +16,9 @@ mod solver;
 mod study;
 #[cfg(test)]
 mod tests;
+mod whitewater;
 
-use super::{declare::Keyed, key::Key, look, tolerance, whitewater};
+use super::{declare::Keyed, key::Key, look, tolerance};
 
 pub use page::page;
 
@@ -33,9 +34,15 @@ pub(super) use scene::{
 };
 pub(super) use solver::{CHEBYSHEV_RELAXATION, PbfSpec, RELAXATION, SolverSpec};
 pub(super) use study::KEYS as STUDY;
+pub(super) use whitewater::{
+    BubblesSpec, EmissionSpec, FoamSpec, KillSpec, RADII, SpraySpec, WhitewaterSpec,
+};
 
 /// Keys of a scene.
 pub(super) const SCENE: &[Key] = SceneSpec::KEYS;
+
+/// Keys of whitewater settings.
+pub(super) const WHITEWATER: &[Key] = WhitewaterSpec::KEYS;
 
 /// A kind of file with keys.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -69,7 +76,7 @@ impl File {
             Self::Look => look::KEYS,
             Self::Study => STUDY,
             Self::Tolerance => tolerance::KEYS,
-            Self::Whitewater => whitewater::KEYS,
+            Self::Whitewater => WHITEWATER,
         }
     }
 }

@@ -127,6 +127,25 @@ fn wind_shortens_substeps() {
     assert!((length(still) - 0.1).abs() < 1e-12 && (length(windy) - 0.2 / 3.0).abs() < 1e-12);
 }
 
+/// A force of 31 m/s² beside gravity, and its time: (10 + 31) m/s² × (0.2 s)² / 0.1 m.
+#[test]
+fn forces_shorten_substeps_while_they_act() {
+    let force =
+        "force=[{kind=\"acceleration\",acceleration=[0,0,31],from=0.2,until=0.4,on=[\"water\"]}]";
+    let of = |more: &[&str]| pbf(&[&["solver.pbf.cfl=1.0"], more].concat());
+    let substeps = |frame: u32| of(&[force]).pbf_substeps((&AT_REST, &[]), frame, 0.0).ok();
+    assert_eq!([0, 1, 2].map(substeps), [Some(4), Some(17), Some(4)]);
+    let length = |more: &[&str], start: f64| {
+        let substep = flip(more).flip_substep((&AT_REST, &[]), 1, start, 0.2, 0.0, (0, 0.0));
+        substep.expect("few enough").1.length
+    };
+    // √(0.2 m / 41 m/s²) = 0.070 s for surface waves; 0.141 s with gravity only.
+    assert!((length(&[force], 0.2) - 0.2 / 3.0).abs() < 1e-12);
+    assert!((length(&[force], 0.4) - 0.1).abs() < 1e-12);
+    let white = force.replace("water", "whitewater");
+    assert!((length(&[&white], 0.2) - 0.1).abs() < 1e-12);
+}
+
 /// √(1000 kg/m³ × (0.2 m)³ / (2π σ)) is 0.0598 s for σ = 356 N/m: four substeps in 0.2 s. Cells
 /// of 0.1 m take √8 less: ten substeps with PBF's cells of twice 0.05 m.
 #[test]

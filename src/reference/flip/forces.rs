@@ -6,6 +6,7 @@ use super::{
     Faces, FlipSubstep, GridTransfer, Model, OpenSpace, Sorted,
     grid::{along, corner, per_cell},
 };
+use crate::Timings;
 use swell_domain::{
     bricks::{Bricks, CELLS},
     forces::{ForceField, Medium},
@@ -118,4 +119,42 @@ pub fn work_by_cells(
         };
         drops.into_iter().map(on_drop).sum::<f64>() + on_water
     })
+}
+
+/// Applies forces to the face velocities before the projection.
+pub(super) fn on_faces(
+    model: &Model,
+    step: &FlipSubstep<'_>,
+    bricks: &Bricks,
+    space: &OpenSpace,
+    faces: &mut Faces,
+    timings: &mut Timings,
+) {
+    if model.has_forces() {
+        faces.velocity = timings.time("effects/push_faces", || {
+            push_faces(model, step, bricks, space, &faces.velocity)
+        });
+    }
+}
+
+/// Applies forces to isolated droplets, and returns the work of all forces, joules.
+pub(super) fn after_transfer(
+    model: &Model,
+    step: &FlipSubstep<'_>,
+    bricks: &Bricks,
+    sorted: &Sorted,
+    seen: (&Faces, &OpenSpace),
+    given: &mut GridTransfer,
+    timings: &mut Timings,
+) -> f64 {
+    if !model.has_forces() {
+        return 0.0;
+    }
+    timings.time("effects/push_drops", || {
+        push_drops(model, step, &sorted.cloud.position, given);
+    });
+    let work = timings.time("effects/work_by_cells", || {
+        work_by_cells(model, step, bricks, sorted, seen, given)
+    });
+    model.scene.particle_mass() * work.into_iter().sum::<f64>()
 }

@@ -7,10 +7,12 @@ use super::{
     bodies::{Stopped, sped_up},
     carry_bodies, close_gaps, couple_bodies, cut_cells,
     effects::{self, FaceInputs, Flying},
-    extrapolate, find_buried, find_change, find_depth, find_excess, find_water, gather_centers,
-    gather_faces, grid_to_particle, let_in,
+    extrapolate, find_buried, find_change, find_depth, find_excess, find_water, forces,
+    gather_centers, gather_faces, grid_to_particle, let_in,
     projection::project as project_faces,
-    push_apart, push_drops, push_faces, reorder, survey, wall_friction, work_by_cells,
+    push_apart, reorder,
+    sort::by_id,
+    survey, wall_friction,
 };
 use crate::{ReferenceError, Timings};
 use swell_contact::SceneContacts;
@@ -185,11 +187,7 @@ impl Flip {
                 wall_friction(model, &step, &bricks, &space, &mut faces);
             });
         }
-        if model.has_forces() {
-            faces.velocity = timings.time("effects/push_faces", || {
-                push_faces(model, &step, &bricks, &space, &faces.velocity)
-            });
-        }
+        forces::on_faces(model, &step, &bricks, &space, &mut faces, timings);
         let water = FaceInputs {
             model,
             step: &step,
@@ -271,16 +269,9 @@ impl Flip {
             let displacement = displacement.as_deref();
             grid_to_particle(model, &step, &bricks, &sorted, &faces, &space, displacement)
         });
-        let mut force_work = 0.0;
-        if model.has_forces() {
-            timings.time("effects/push_drops", || {
-                push_drops(model, &step, &sorted.cloud.position, &mut given);
-            });
-            let by_cells = timings.time("effects/work_by_cells", || {
-                work_by_cells(model, &step, &bricks, &sorted, (&faces, &space), &given)
-            });
-            force_work = model.scene.particle_mass() * by_cells.into_iter().sum::<f64>();
-        }
+        let seen = (&faces, &space);
+        let force_work =
+            forces::after_transfer(model, &step, &bricks, &sorted, seen, &mut given, timings);
         if displacement.is_some() {
             let pushed = timings.time("flip/push_apart", || {
                 push_apart(model, &step, &bricks, &sorted, &given.is_drop)
@@ -371,8 +362,8 @@ impl Flip {
 
     /// Projects the velocities of particles, given in the order of their ids, over a substep, and
     /// displaces the particles (flip/aim). Returns which of them are isolated droplets, and the
-    /// work by moving walls and forces, joules. The first argument is the frame and the number of the substep
-    /// in it, from 1.
+    /// work by moving walls and forces, joules. The first argument is the frame and the number of
+    /// the substep in it, from 1.
     ///
     /// # Errors Returns an error if a value is not finite, a projection exceeds its budget, or the
     /// factorisation of a pressure system fails.
@@ -391,7 +382,7 @@ impl Flip {
         let mut trace = self.judged_substep((frame, number), cloud, &surveyed.is_wet, substep)?;
         trace.add_to(all);
         let step = self.model.step(substep, &self.state.walls, &trace.bodies);
-        let work = self.model.boundary_work(&step, &trace) + trace.force_work;
+        let work = self.model.boundary_work(&step, &trace);
         let order = by_id(&trace.sorted.cloud);
         let is_drop = &trace.given.is_drop;
         let pushed = push_apart(&self.model, &step, &trace.bricks, &trace.sorted, is_drop);
@@ -439,7 +430,7 @@ impl Flip {
             let number = (frame, report.substeps);
             let trace = self.judged_substep(number, cloud, &surveyed.is_wet, &substep)?;
             let step = self.model.step(&substep, &self.state.walls, &trace.bodies);
-            report.boundary_work += self.model.boundary_work(&step, &trace) + trace.force_work;
+            report.boundary_work += self.model.boundary_work(&step, &trace);
             for projected in trace.projections() {
                 report.iterations += u64::from(projected.solution.iterations);
             }
@@ -601,13 +592,6 @@ impl Solver for Flip {
     fn timings(&self) -> Vec<PassTime> {
         self.timings.rows()
     }
-}
-
-/// Returns indices into the cloud in the order of the ids.
-fn by_id(cloud: &Cloud) -> Vec<usize> {
-    let mut order: Vec<usize> = (0..cloud.id.len()).collect();
-    order.sort_unstable_by_key(|&k| cloud.id[k]);
-    order
 }
 
 fn widen(v: &[f32; 3]) -> DVec3 {

@@ -45,6 +45,13 @@ pub struct Sorted {
     pub start: Vec<u32>,
 }
 
+/// Returns indices into the cloud in the order of the ids.
+pub(super) fn by_id(cloud: &Cloud) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..cloud.id.len()).collect();
+    order.sort_unstable_by_key(|&k| cloud.id[k]);
+    order
+}
+
 /// Measures the largest speed and finds the bricks that hold particles.
 pub fn survey(model: &Model, cloud: &Cloud) -> Survey {
     let mut is_wet = model.no_water();

@@ -66,7 +66,8 @@ impl Trace {
 }
 
 impl Model {
-    /// Returns the work of walls and solids that move in a substep, joules (flip/boundary_work).
+    /// Returns the work of walls and solids that move in a substep (flip/boundary_work), and of
+    /// forces, joules.
     pub(super) fn boundary_work(&self, step: &FlipSubstep<'_>, trace: &Trace) -> f64 {
         let Trace { bricks, space, .. } = trace;
         let terms = (0..space.kind.len()).map(|e| {
@@ -77,6 +78,6 @@ impl Model {
             }
         });
         let sum: f64 = terms.sum();
-        self.cell_size().powi(2) * step.kick * sum
+        self.cell_size().powi(2) * step.kick * sum + trace.force_work
     }
 }

@@ -4,10 +4,9 @@
 //! them on the grid before the projection, on the grid between two projections, or on the particles
 //! before the transfer to the grid.
 
+pub mod forces;
 mod zone;
 
-use crate::{forces, plan::Capacity};
-use swell_domain::bricks::CELLS;
 use swell_gpu::{
     buffer::BufferSpec,
     program::{PassSpec, Program},
@@ -96,8 +95,8 @@ macro_rules! additions {
     ($($name:ident),+ $(,)?) => {
         $(pub mod $name;)+
 
-        /// Returns what the scene's forces and effects add to PBF with `particles` particles, by the effects'
-        /// keys.
+        /// Returns what the scene's forces and effects add to PBF with `particles` particles, by
+        /// the effects' keys.
         pub(super) fn of_pbf(scene: &Scene, particles: usize) -> Vec<(&'static str, Addition)> {
             let mut all: Vec<_> = forces::pbf(scene, particles)
                 .map(|addition| (forces::OWNER, addition))
@@ -125,9 +124,12 @@ macro_rules! additions {
             None$(.or_else(|| scene.effects.$name.as_ref()?.turns(scene, length)))+
         }
 
-        /// Returns what the scene's forces and effects add to FLIP, whose arrays hold these bricks.
-        pub(super) fn of_flip(scene: &Scene, bricks: Capacity) -> Vec<(&'static str, Addition)> {
-            let [wet, cells] = [bricks.wet, bricks.slots].map(|count| CELLS as usize * count);
+        /// Returns what the scene's forces and effects add to FLIP, whose arrays hold `wet` cells
+        /// with water and `cells` in total.
+        pub(super) fn of_flip(
+            scene: &Scene,
+            [wet, cells]: [usize; 2],
+        ) -> Vec<(&'static str, Addition)> {
             let mut all: Vec<_> = forces::flip(scene, wet)
                 .map(|addition| (forces::OWNER, addition))
                 .into_iter()

@@ -47,8 +47,10 @@ use swell_scene::{FlipScene, moving_solid::MovingSolid, step::Substep};
 use super::{
     SolveError,
     boundary::{Movers, upload_distance},
-    effects,
-    forces::{self, FORCE_WORK},
+    effects::{
+        self,
+        forces::{self, FORCE_WORK},
+    },
     params::Counters,
     plan::{Counts, Plan},
     pressure::{self, PressureSolver, Round, bodies::Lists},
@@ -571,7 +573,7 @@ impl Solver for Flip {
 
 /// Binds the commands of a plan to the current buffers of the program.
 fn recordings(program: &Program, plan: &Plan, scene: &FlipScene) -> Recordings {
-    let effects = effects::of_flip(scene, plan.counts.bricks);
+    let effects = effects::of_flip(scene, plan.counts.bricks.cells());
     Recordings::new(program, &Commands::new(plan, scene, &effects))
 }
 

@@ -1,7 +1,7 @@
 //! Plan of FLIP's passes and buffers.
 
 use crate::{
-    effects, forces,
+    effects::{self, forces},
     plan::{BufferTable, Counts, Plan, in_order},
     pressure::{self, bodies},
 };
@@ -29,7 +29,7 @@ pub(crate) fn plan(scene: &FlipScene, counts: Counts, moves: bool) -> Plan {
     let flip = scene.settings();
     let mut plan = Plan::bare(counts, scene.domain.cells(flip.cell_size));
     plan.moves = moves;
-    let effects = effects::of_flip(scene, counts.bricks);
+    let effects = effects::of_flip(scene, counts.bricks.cells());
     let mut table = buffers(&plan, scene);
     for (name, addition) in &effects {
         table.extend(name, addition.buffers.clone());
@@ -68,7 +68,7 @@ pub(crate) fn plan(scene: &FlipScene, counts: Counts, moves: bool) -> Plan {
 /// Returns every command of a substep, with those of projections on any brick layout.
 pub(crate) fn commands(plan: &Plan, scene: &FlipScene) -> Vec<Command> {
     let flip = scene.settings();
-    let effects = effects::of_flip(scene, plan.counts.bricks);
+    let effects = effects::of_flip(scene, plan.counts.bricks.cells());
     let commands = Commands::new(plan, scene, &effects);
     let projection = pressure::all_commands(flip.pressure.preconditioner, extent(scene));
     let before = commands.before_projection().cloned();

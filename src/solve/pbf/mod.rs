@@ -15,7 +15,6 @@ use swell_domain::{
     absorber::AbsorberStates,
     boundary::Boundary,
     budget::Breach,
-    forces::Medium,
     particles::{Particles, max_speed},
     pbf::{CAP, CONTACT, MAX_CORRECTION, REGULARIZATION},
     period::Period,
@@ -37,8 +36,10 @@ use swell_scene::{PbfScene, Stop};
 use super::{
     SolveError,
     boundary::Movers,
-    effects,
-    forces::{self, FORCE_WORK},
+    effects::{
+        self,
+        forces::{self, FORCE_WORK},
+    },
     params::{Counters, IterationControl, Params},
     plan::{Counts, Plan, device_limits},
     state::{Carried, check_finite, is_awaited, is_other_count, upload},
@@ -133,9 +134,7 @@ fn set_up(
     program.upload(ELEMENT_COUNT, 0, &[[particles as u32, 0, 0, 0]]);
     samples::upload_places(program, plan.page, places(plan) - 1, &[NOBODY]);
     samples::upload(boundary, program, scene, plan, calibration);
-    if forces::pbf_sums(scene, particles) > 0 {
-        forces::upload_meshes(program, scene, Medium::Water);
-    }
+    forces::upload_meshes_for_pbf(program, scene);
     [&commands.substep, &commands.measure].map(|commands| Recording::new(program, commands))
 }
 
@@ -253,14 +252,7 @@ impl Pbf {
             self.program.upload(BOUNDARY_WORK, 0, &vec![0.0; groups]);
         }
         let of_forces = forces::pbf_sums(&self.scene, self.plan.counts.particles);
-        if of_forces > 0 {
-            self.program.upload(FORCE_WORK, 0, &vec![0.0; of_forces]);
-        }
-    }
-
-    /// Whether forces act on the particles, and not on a projection's grid.
-    fn has_force_passes(&self) -> bool {
-        forces::pbf_sums(&self.scene, self.plan.counts.particles) > 0
+        self.program.upload(FORCE_WORK, 0, &vec![0.0; of_forces]);
     }
 
     /// Projects velocities and uploads the uniforms for the substep that ends at `time`.
@@ -285,10 +277,7 @@ impl Pbf {
             samples::upload_samples(&samples, program, scene, &self.plan, &self.calibration);
         }
         effects::upload(&self.program, &self.scene, (time, step));
-        if self.has_force_passes() {
-            let span = (time - step, step);
-            forces::upload(&self.program, &self.scene, Medium::Water, span);
-        }
+        forces::upload_for_pbf(&self.program, &self.scene, (time - step, step));
         if let Stop::DensityError { .. } = self.scene.settings().stop {
             self.program.upload(CONTROL, 0, &[self.control()]);
         }

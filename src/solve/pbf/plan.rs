@@ -1,7 +1,8 @@
 //! Plan of PBF's passes and buffers.
 
 use crate::{
-    effects, flip, forces,
+    effects::{self, forces},
+    flip,
     plan::{BufferTable, Chunk, Counts, DeviceLimits, LIST_CAPACITY, Plan, in_order},
 };
 use swell_domain::{forces::Medium, sph::Calibration};

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use swell_cache::CacheError;
-use swell_domain::signed_distance::SignedDistanceError;
+use swell_domain::{mesh_file::MeshError, signed_distance::SignedDistanceError};
 use swell_gpu::adapter::GpuError;
 use swell_scene::SceneError;
 
@@ -22,6 +22,9 @@ pub enum WhitewaterError {
     /// A solid without an inside, or too large a distance grid.
     #[error(transparent)]
     Solid(#[from] SignedDistanceError),
+    /// The mesh of a kill volume cannot be read.
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
     /// The device cannot be opened or does not suffice.
     #[error(transparent)]
     Gpu(#[from] GpuError),
@@ -92,6 +95,7 @@ impl From<&WhitewaterError> for Blame {
         match error {
             WhitewaterError::Cache(error) => error.into(),
             WhitewaterError::Scene(_)
+            | WhitewaterError::Mesh(_)
             | WhitewaterError::NoBake { .. }
             | WhitewaterError::Other { .. }
             | WhitewaterError::Remove { .. } => Self::Files,

@@ -38,21 +38,21 @@ const fn laws(pass: &'static str, fields: &'static [&'static str]) -> [Control; 
         control(
             pass,
             "min(depth * forces[k].fade_rate",
-            "min(1.001 * depth * forces[k].fade_rate",
+            "min(1.02 * depth * forces[k].fade_rate",
             pass,
             fields,
         ),
         control(
             pass,
             "return mix(low, high, t.z);",
-            "return mix(low, high, 0.99 * t.z);",
+            "return mix(low, high, 0.9 * t.z);",
             pass,
             fields,
         ),
         control(
             pass,
             "max(r, forces[k].core)",
-            "max(r, 1.001 * forces[k].core)",
+            "max(r, 1.01 * forces[k].core)",
             pass,
             fields,
         ),
@@ -64,7 +64,7 @@ const FLIP: [Control; 7] = [
     control(
         "effects/push_faces",
         "params.kick * force_at",
-        "1.001 * params.kick * force_at",
+        "1.01 * params.kick * force_at",
         "effects/push_faces",
         &["velocity at faces"],
     ),
@@ -93,14 +93,14 @@ const FLIP: [Control; 7] = [
     control(
         "effects/work_by_cells",
         "0.5 * face_change[face]",
-        "0.51 * face_change[face]",
+        "0.55 * face_change[face]",
         "effects/work_by_cells",
         &["shares of the work"],
     ),
     control(
         "effects/work_by_cells",
         "after - 0.5 * (",
-        "after - 0.51 * (",
+        "after - 0.6 * (",
         "effects/work_by_cells",
         &["shares of the work"],
     ),
@@ -202,6 +202,8 @@ fn case(method: Method, has_projection: bool) -> (Scene, Start) {
     for (k, v) in (0..).zip(&mut particles.velocity) {
         *v = [0, 1, 2].map(|axis| noise(3 * k + axis + 7) as f32);
     }
+    // A quarter of a frame before: forces act for half of both substeps.
+    particles.substep = 0.25 * scene.shot.frame_seconds();
     let start = Start {
         particles,
         removed: 0,

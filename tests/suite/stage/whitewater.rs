@@ -303,6 +303,23 @@ fn kill_volumes_end_whitewater_in_their_time() {
         assert!(!killed.is_empty(), "frame {frame}");
     }
     job.expect(0, "check cache/small/pbf/whitewater/killed --frames 8");
+    // The same room as a mesh, which the stream keeps a copy of and goes on with.
+    let cube = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nv 0 0 1\nv 1 0 1\nv 0 1 1\nv 1 1 1\n\
+        f 1 5 7 3\nf 2 4 8 6\nf 1 2 6 5\nf 3 7 8 4\nf 1 3 4 2\nf 5 6 8 7\n";
+    job.write("cube.obj", cube);
+    let mesh = "[[kill]]\nfrom = 0.1\nmesh = { file = \"cube.obj\", translate = [-1.0, 0.5, 0.25], \
+        scale = [1.0, 2.5, 1.0] }\n";
+    job.write("meshed.toml", &format!("{SETTINGS}{mesh}"));
+    let make = "whitewater cache/small/pbf --settings meshed.toml";
+    job.expect(0, &format!("{make} --last 7"));
+    fs::remove_file(job.path("cube.obj")).unwrap();
+    let said = job.expect(2, make);
+    assert_has(&said, &["meshed.toml", "kill[0].mesh.file", "cube.obj"]);
+    job.write("cube.obj", cube);
+    job.expect(0, make);
+    assert_eq!(read("meshed", 8).position, read("killed", 8).position);
+    job.expect(0, "verify cache/small/pbf/whitewater/meshed");
+    job.expect(0, "check cache/small/pbf/whitewater/meshed --frames 8");
     job.write("broken.toml", "[[kill]]\nfrom = 0.1\n");
     let said = job.expect(2, "whitewater cache/small/pbf --settings broken.toml");
     assert_has(&said, &["broken.toml", "kill[0]", "no room"]);

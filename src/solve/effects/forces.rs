@@ -15,7 +15,8 @@ use swell_gpu::{
 };
 use swell_scene::Scene;
 
-use super::{effects::Addition, params::DeviceForce};
+use super::Addition;
+use crate::params::DeviceForce;
 
 /// The forces on a medium, in the order of the scene.
 pub const FORCES: Buf<DeviceForce> = Buf::new("forces");
@@ -67,11 +68,16 @@ pub(crate) fn buffers(scene: &Scene, medium: Medium) -> Vec<BufferSpec> {
     forces.into_iter().chain(meshes).collect()
 }
 
+/// Whether forces act on PBF's particles, and not on the grid of a projection.
+fn act_on_particles(scene: &Scene) -> bool {
+    let is_projected = scene.solver.pbf().is_some_and(|pbf| pbf.grid_projection);
+    !is_projected && scene.has_forces_on(Medium::Water)
+}
+
 /// Returns what forces add to PBF with `particles` particles: nothing where a projection applies
 /// them on its grid.
 pub(super) fn pbf(scene: &Scene, particles: usize) -> Option<Addition> {
-    let is_projected = scene.solver.pbf().is_some_and(|pbf| pbf.grid_projection);
-    if is_projected || !scene.has_forces_on(Medium::Water) {
+    if !act_on_particles(scene) {
         return None;
     }
     let mut buffers = buffers(scene, Medium::Water);
@@ -108,7 +114,7 @@ pub(super) fn flip(scene: &Scene, wet: usize) -> Option<Addition> {
 
 /// Returns the number of partial sums in [`FORCE_WORK`] that FLIP writes with this number of wet
 /// bricks.
-pub(super) fn flip_sums(scene: &Scene, wet_bricks: u32) -> usize {
+pub(crate) fn flip_sums(scene: &Scene, wet_bricks: u32) -> usize {
     match scene.has_forces_on(Medium::Water) {
         true => wet_bricks as usize * (CELLS / 64) as usize,
         false => 0,
@@ -116,10 +122,24 @@ pub(super) fn flip_sums(scene: &Scene, wet_bricks: u32) -> usize {
 }
 
 /// Returns the number of partial sums in [`FORCE_WORK`] that PBF writes.
-pub(super) fn pbf_sums(scene: &Scene, particles: usize) -> usize {
-    match pbf(scene, particles) {
-        Some(_) => particles.div_ceil(64),
-        None => 0,
+pub(crate) fn pbf_sums(scene: &Scene, particles: usize) -> usize {
+    match act_on_particles(scene) {
+        true => particles.div_ceil(64),
+        false => 0,
+    }
+}
+
+/// Uploads the forces on PBF's particles as they act in the given (start, length), seconds.
+pub(crate) fn upload_for_pbf(program: &Program, scene: &Scene, span: (f64, f64)) {
+    if act_on_particles(scene) {
+        upload(program, scene, Medium::Water, span);
+    }
+}
+
+/// Uploads the distances to the meshes of rooms of forces on PBF's particles.
+pub(crate) fn upload_meshes_for_pbf(program: &Program, scene: &Scene) {
+    if act_on_particles(scene) {
+        upload_meshes(program, scene, Medium::Water);
     }
 }
 
