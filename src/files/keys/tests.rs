@@ -97,9 +97,10 @@ fn what_is_left_out_is_the_default_of_the_table() {
     let zone = "effects.generation_zone={walls=[\"-x\"],length=1.0,waves={kind=\"sea\",\
                 significant_height=0.1,peak_period=3.0,depth=1.0}}";
     let drag = "effects.drag={drop_radius=0.001}";
+    let vortex = "force=[{kind=\"vortex\",at=[0,0,0],strength=1.0,core=1.0}]";
     let start = "water={wave=[{kind=\"sea\",significant_height=0.1,peak_period=3.0,depth=1.0}]}";
     let sea = written(
-        &load(&[SEA, "wave_maker.0.wall=+x", zone, drag, start]),
+        &load(&[SEA, "wave_maker.0.wall=+x", zone, drag, start, vortex]),
         &|_, _| "a.obj".to_owned(),
     );
     let mut compared = BTreeSet::new();

@@ -388,14 +388,14 @@ fn a_force_on_whitewater_bends_the_path_of_a_drop() {
     let (start, v) = (DVec3::new(1.0, 2.0, 1.0), DVec3::new(1.0, 2.0, -0.5));
     let a = DVec3::new(-3.0, 4.0, 5.0);
     both(|device| {
-        let moved = |on: Medium, (x, kind): (DVec3, WhitewaterKind)| {
+        let moved = |on: Medium, (x, v, kind): (DVec3, DVec3, WhitewaterKind)| {
             let (mut scene, water) = pool(4.0, 0.0);
             scene.forces = vec![push(a)];
             scene.forces[0].force.on = vec![on];
             let moved = one(device, &(scene, water), &settings, (x, v, kind), (4, 0.05));
             place(&moved, 0)
         };
-        let drop = (start, WhitewaterKind::Spray);
+        let drop = (start, v, WhitewaterKind::Spray);
         let parabola = |a: DVec3| start + 0.2 * v + 0.5 * a * 0.04;
         let gravity = -9.81 * DVec3::Y;
         // As without a force: the drag of a ball with a radius of 10 m.
@@ -403,7 +403,11 @@ fn a_force_on_whitewater_bends_the_path_of_a_drop() {
         assert!(off < 2e-4, "{off}");
         let off = moved(Medium::Water, drop).distance(parabola(gravity));
         assert!(off < 2e-4, "{off}");
-        let foam = (DVec3::new(1.0, DEPTH, 1.0), WhitewaterKind::Foam);
+        let foam = (
+            DVec3::new(1.0, DEPTH, 1.0),
+            DVec3::ZERO,
+            WhitewaterKind::Foam,
+        );
         assert_eq!(moved(Medium::Whitewater, foam), moved(Medium::Water, foam));
     });
 }

@@ -284,7 +284,7 @@ fn a_look_draws_the_stream_that_it_names() {
 fn kill_volumes_end_whitewater_in_their_time() {
     let job = baked();
     job.expect(0, MAKE);
-    let room = "[[kill]]\nmin = [-1.0, 0.5, 0.25]\nmax = [0.0, 3.0, 1.25]\nfrom = 0.1\n";
+    let room = "[[kill]]\nmin = [-1.5, 0.0, 0.0]\nmax = [-0.5, 3.0, 2.0]\nfrom = 0.1\n";
     job.write("killed.toml", &format!("{SETTINGS}{room}"));
     job.expect(0, "whitewater cache/small/pbf --settings killed.toml");
     let read = |stream: &str, frame: u32| -> Particles {
@@ -292,7 +292,7 @@ fn kill_volumes_end_whitewater_in_their_time() {
         let reader = CacheReader::open(&job.path(&path)).unwrap();
         reader.read(frame).unwrap()
     };
-    let inside = |of: &Particles| of.position.iter().filter(|x| x[0] <= 0.0).count();
+    let inside = |of: &Particles| of.position.iter().filter(|x| x[0] <= -0.5).count();
     // Frame 6 ends at 0.1 s, which is not after it.
     assert_eq!(read("tuned", 6), read("killed", 6));
     for frame in [7, 8] {
@@ -307,8 +307,8 @@ fn kill_volumes_end_whitewater_in_their_time() {
     let cube = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nv 0 0 1\nv 1 0 1\nv 0 1 1\nv 1 1 1\n\
         f 1 5 7 3\nf 2 4 8 6\nf 1 2 6 5\nf 3 7 8 4\nf 1 3 4 2\nf 5 6 8 7\n";
     job.write("cube.obj", cube);
-    let mesh = "[[kill]]\nfrom = 0.1\nmesh = { file = \"cube.obj\", translate = [-1.0, 0.5, 0.25], \
-        scale = [1.0, 2.5, 1.0] }\n";
+    let mesh = "[[kill]]\nfrom = 0.1\nmesh = { file = \"cube.obj\", translate = [-1.5, 0.0, 0.0], \
+        scale = [1.0, 3.0, 2.0] }\n";
     job.write("meshed.toml", &format!("{SETTINGS}{mesh}"));
     let make = "whitewater cache/small/pbf --settings meshed.toml";
     job.expect(0, &format!("{make} --last 7"));

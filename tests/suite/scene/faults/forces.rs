@@ -12,7 +12,7 @@ pub const FORCE_FAULTS: &[Fault] = &[
         27,
         &[
             "force[0].kind: ",
-            "; allowed: one of \"acceleration\", \"vortex\", \"attract\"",
+            "; allowed: \"acceleration\", \"vortex\" or \"attract\"",
         ],
     ),
     (
@@ -96,7 +96,10 @@ pub const FORCE_FAULTS: &[Fault] = &[
         "[[force]]\nkind = \"acceleration\"\nacceleration = [1.0, 0.0, 0.0]\non = [\"mist\"]\n\
          [solver]\nmethod",
         29,
-        &["force[0].on", "\"water\", \"whitewater\""],
+        &[
+            "force[0].on",
+            "; allowed: an array of \"water\" and \"whitewater\", at least one",
+        ],
     ),
     (
         BEFORE,
