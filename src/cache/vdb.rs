@@ -43,13 +43,6 @@ pub fn encode(
     grids: &Grids,
     precision: Precision,
 ) -> io::Result<WrittenFile> {
-    let program = format!("{} {}", stamp.program, stamp.program_version);
-    let metadata = [
-        ("creator", Metadata::Text(program)),
-        ("frame", Metadata::Int(stamp.frame as i32)),
-        ("shot", Metadata::Text(stamp.shot.to_owned())),
-        ("time", Metadata::Double(stamp.time)),
-    ];
     let surface = grids
         .surface
         .iter()
@@ -58,13 +51,28 @@ pub fn encode(
         .velocity
         .iter()
         .map(|it| VdbGrid::Staggered("vel", it));
-    let grids: Vec<_> = surface.chain(velocity).collect();
-    let bytes = vdb::encode(&metadata, &grids, precision);
+    let bytes = file(
+        stamp,
+        &surface.chain(velocity).collect::<Vec<_>>(),
+        precision,
+    );
     out.write_all(&bytes)?;
     Ok(WrittenFile {
         bytes: bytes.len() as u64,
         hash: blake3::hash(&bytes),
     })
+}
+
+/// Returns the file of a frame with any grids.
+pub fn file(stamp: &Stamp<'_>, grids: &[VdbGrid<'_>], precision: Precision) -> Vec<u8> {
+    let program = format!("{} {}", stamp.program, stamp.program_version);
+    let metadata = [
+        ("creator", Metadata::Text(program)),
+        ("frame", Metadata::Int(stamp.frame as i32)),
+        ("shot", Metadata::Text(stamp.shot.to_owned())),
+        ("time", Metadata::Double(stamp.time)),
+    ];
+    vdb::encode(&metadata, grids, precision)
 }
 
 /// Hash of the values at this precision, independent of frame, shot and program.

@@ -8,6 +8,7 @@
 
 pub mod edges;
 pub mod eigen;
+pub mod foam;
 mod grid;
 pub mod kernels;
 mod moments;

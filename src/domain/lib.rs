@@ -22,6 +22,7 @@ pub mod cut_cell;
 pub mod eye;
 pub mod feature;
 pub mod flip;
+pub mod fog;
 pub mod forces;
 pub mod frame_range;
 pub mod gauge;

@@ -1,5 +1,7 @@
 //! The water of a frame as a mesh with the volume of the particles, with velocities and normals.
 
+use std::collections::BTreeMap;
+
 use glam::DVec3;
 
 use super::{
@@ -44,6 +46,8 @@ pub struct WaterMesh {
     pub normals: Vec<[f32; 3]>,
     /// Velocities of the vertices, m/s.
     pub velocities: Vec<[f32; 3]>,
+    /// Further values of the vertices, by name; only what an export asks for.
+    pub attributes: BTreeMap<String, Vec<f32>>,
     /// Enclosed volume relative to the particles'; 1 without particles.
     pub volume: f64,
     /// Value of the field at the surface: 0, unless that surface had a different volume from
@@ -77,6 +81,7 @@ impl WaterMesh {
             normals: normals(&surface, &level),
             velocities: Velocities::new(body.places, body.velocities, spacing)
                 .at(&surface.mesh.vertices),
+            attributes: BTreeMap::new(),
             mesh: surface.mesh,
         }
     }

@@ -136,6 +136,16 @@ pub fn none() -> Particles {
     }
 }
 
+/// Returns the particles of these kinds.
+#[must_use]
+pub fn of_kinds(mut particles: Particles, kinds: &[WhitewaterKind]) -> Particles {
+    let is_kept = |number: &f32| kinds.iter().any(|kind| kind.number() == *number);
+    let numbers = particles.attributes.get(KIND);
+    let keep: Vec<bool> = numbers.map_or(Vec::new(), |all| all.iter().map(is_kept).collect());
+    particles.retain(&keep);
+    particles
+}
+
 /// Counts the particles of each kind, in the order of [`WhitewaterKind::ALL`].
 pub fn census(particles: &Particles) -> [usize; 3] {
     let kinds = particles

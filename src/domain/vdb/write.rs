@@ -23,6 +23,10 @@ pub enum VdbGrid<'a> {
     LevelSet(&'a str, &'a SparseGrid<f32>),
     /// Vectors whose components lie on the faces of voxels.
     Staggered(&'a str, &'a SparseGrid<[f32; 3]>),
+    /// Densities at the centres of voxels.
+    Fog(&'a str, &'a SparseGrid<f32>),
+    /// Vectors at the centres of voxels.
+    Vectors(&'a str, &'a SparseGrid<[f32; 3]>),
 }
 
 /// Returns a file with these metadata, sorted by name, and grids.
@@ -42,6 +46,9 @@ pub fn encode(
             VdbGrid::Staggered(name, grid) => {
                 put_grid(&mut body, name, "staggered", grid, precision)
             }
+            VdbGrid::Fog(name, grid) => put_grid(&mut body, name, "fog volume", grid, precision),
+            // OpenVDB's name of no class.
+            VdbGrid::Vectors(name, grid) => put_grid(&mut body, name, "unknown", grid, precision),
         }
     }
     [header(&body), body].concat()
