@@ -6,7 +6,7 @@ use swell_files::load_look_within;
 use clap::{Args, ValueEnum};
 use serde_json::json;
 
-use swell_domain::{chunk::Chunk, frame_range::FrameRange};
+use swell_domain::{chunk::Chunk, frame_range::FrameRange, whitewater::WhitewaterKind};
 use swell_stage::export::{
     ExportEvent, ExportRequest, Pattern, Target, UsdWater, VOXELS, expected, export,
 };
@@ -42,6 +42,16 @@ pub(super) struct ExportArgs {
         requires = "usd"
     )]
     usd_water: WaterForm,
+    /// A stream of whitewater as points beside the shot's water.
+    #[arg(
+        long,
+        value_name = "NAME",
+        num_args = 0..=1,
+        default_missing_value = "default",
+        requires = "usd",
+        conflicts_with = "stream"
+    )]
+    usd_whitewater: Option<String>,
     /// Particles as NumPy arrays, such as p.%04d.npy.
     #[arg(long, value_name = "FILES")]
     npy: Option<Pattern>,
@@ -54,6 +64,21 @@ pub(super) struct ExportArgs {
     /// Level set and velocity grid, such as g.%04d.vdb.
     #[arg(long, value_name = "FILES")]
     vdb: Option<Pattern>,
+    /// Density and velocity of the stream that --stream names, such as fog.%04d.vdb: of its spray,
+    /// or of the kinds that --kinds lists.
+    #[arg(long, value_name = "FILES")]
+    fog: Option<Pattern>,
+    /// Edge length of the fog's voxels, metres; a particle spacing where left out.
+    #[arg(long, value_name = "METRES", requires = "fog")]
+    fog_voxel: Option<f64>,
+    /// Foam of a stream of whitewater on the vertices of meshes: coverage and age.
+    #[arg(
+        long,
+        value_name = "NAME",
+        num_args = 0..=1,
+        default_missing_value = "default"
+    )]
+    foam: Option<String>,
     /// Frames to export, such as 1-240x2; all that are cached where left out.
     #[arg(long, value_name = "RANGE")]
     frames: Option<FrameRange>,
@@ -68,6 +93,10 @@ pub(super) struct ExportArgs {
     /// A stream of whitewater in place of the water, as particles.
     #[arg(long, value_name = "NAME")]
     stream: Option<String>,
+    /// Kinds of whitewater to export of a stream's particles, such as spray,foam; all where left out, but as
+    /// fog only spray.
+    #[arg(long, value_enum, value_name = "KINDS", value_delimiter = ',')]
+    kinds: Option<Vec<Kind>>,
     /// Look whose camera --usd gets.
     #[arg(long, value_name = "LOOK")]
     look: Option<PathBuf>,
@@ -102,6 +131,24 @@ enum WaterForm {
     Mesh,
 }
 
+#[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    Spray,
+    Foam,
+    #[value(alias = "bubbles")]
+    Bubble,
+}
+
+impl From<Kind> for WhitewaterKind {
+    fn from(kind: Kind) -> Self {
+        match kind {
+            Kind::Spray => Self::Spray,
+            Kind::Foam => Self::Foam,
+            Kind::Bubble => Self::Bubble,
+        }
+    }
+}
+
 /// Voxels per spacing, with the same range as in looks.
 fn voxels(text: &str) -> Result<f64, String> {
     let allowed = 1.0..=4.0;
@@ -121,9 +168,17 @@ impl ExportArgs {
             self.csv.clone().map(Target::Csv),
             self.bgeo.clone().map(Target::Bgeo),
             self.vdb.clone().map(Target::Vdb),
+            self.fog.clone().map(Target::Fog),
             self.usd.clone().map(|file| Target::Usd(file, water)),
         ];
         all.into_iter().flatten().collect()
+    }
+
+    /// The chosen kinds, each once and in the order of their numbers.
+    fn kinds(&self) -> Option<Vec<WhitewaterKind>> {
+        let asked: Vec<WhitewaterKind> = self.kinds.as_ref()?.iter().map(|&it| it.into()).collect();
+        let is_asked = |kind: &WhitewaterKind| asked.contains(kind);
+        Some(WhitewaterKind::ALL.into_iter().filter(is_asked).collect())
     }
 }
 
@@ -135,10 +190,14 @@ pub(super) fn run(args: &ExportArgs, progress: &Progress) -> Result<u8, Failure>
     let request = ExportRequest {
         cache: args.cache.clone(),
         stream: args.stream.clone(),
+        kinds: args.kinds(),
+        foam: args.foam.clone(),
+        whitewater: args.usd_whitewater.clone(),
         targets: args.targets(),
         frames: args.frames.clone(),
         chunk: args.chunk,
         voxels: args.voxels,
+        fog_voxel: args.fog_voxel,
         look,
         python: args.python.clone(),
         number_from: args.number_from,
@@ -203,7 +262,8 @@ fn places(request: &ExportRequest) -> Vec<String> {
         | Target::Npy(files)
         | Target::Csv(files)
         | Target::Bgeo(files)
-        | Target::Vdb(files) => files.file(0),
+        | Target::Vdb(files)
+        | Target::Fog(files) => files.file(0),
         Target::Usd(file, _) => file.clone(),
     };
     let folder = |file: PathBuf| match file.parent() {

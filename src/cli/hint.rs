@@ -154,7 +154,11 @@ fn stream_of(cache: &Path, name: &str) -> Hint {
 
 fn export(error: &ExportError) -> Hint {
     match error {
-        ExportError::Nothing => Some("--mesh, --usd, --npy, --csv, --bgeo, --vdb".into()),
+        ExportError::Nothing => Some("--mesh, --usd, --npy, --csv, --bgeo, --vdb, --fog".into()),
+        ExportError::Foam(_) => Some("--foam".into()),
+        ExportError::FogVoxel { .. } => Some("--fog-voxel".into()),
+        ExportError::Kinds => Some("--stream, --usd-whitewater".into()),
+        ExportError::NoFog => Some("--stream".into()),
         ExportError::Look(error) => look(error),
         ExportError::Taken { .. } => Some("--overwrite".into()),
         ExportError::Usdc(UsdcError::Missing { .. }) => Some("--python".into()),

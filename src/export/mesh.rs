@@ -20,7 +20,7 @@ pub struct Placed<'a> {
 }
 
 /// Writes binary little-endian PLY: x y z (`float`, or `double` for a scene far from the world's
-/// origin), nx ny nz, vx vy vz in m/s; triangles.
+/// origin), nx ny nz, vx vy vz in m/s, the mesh's attributes; triangles.
 pub fn ply(placed: &Placed<'_>, source: &FileOrigin<'_>) -> Vec<u8> {
     let &Placed { water, corner, .. } = placed;
     let kind = if placed.is_far { "double" } else { "float" };
@@ -30,19 +30,23 @@ pub fn ply(placed: &Placed<'_>, source: &FileOrigin<'_>) -> Vec<u8> {
         shot,
         frame,
     } = source;
+    let columns = water.attributes.keys();
+    let columns: String = columns
+        .map(|name| format!("property float {name}\n"))
+        .collect();
     let header = format!(
         "ply\nformat binary_little_endian 1.0\ncomment {software}\ncomment shot {shot}\n\
          comment frame {frame}\n\
          element vertex {}\nproperty {kind} x\nproperty {kind} y\nproperty {kind} z\n\
          property float nx\nproperty float ny\nproperty float nz\n\
          property float vx\nproperty float vy\nproperty float vz\n\
-         element face {}\nproperty list uchar int vertex_indices\nend_header\n",
+         {columns}element face {}\nproperty list uchar int vertex_indices\nend_header\n",
         water.mesh.vertices.len(),
         water.mesh.triangles.len()
     );
     out.extend_from_slice(header.as_bytes());
     let rows = water.mesh.vertices.iter().zip(&water.normals);
-    for ((vertex, normal), velocity) in rows.zip(&water.velocities) {
+    for (k, ((vertex, normal), velocity)) in rows.zip(&water.velocities).enumerate() {
         let place = *vertex + corner;
         match placed.is_far {
             true => place
@@ -53,6 +57,9 @@ pub fn ply(placed: &Placed<'_>, source: &FileOrigin<'_>) -> Vec<u8> {
         }
         put(&mut out, normal);
         put(&mut out, velocity);
+        for column in water.attributes.values() {
+            put(&mut out, &[column[k]]);
+        }
     }
     for triangle in &water.mesh.triangles {
         out.push(3);
@@ -69,7 +76,7 @@ fn put(out: &mut Vec<u8>, values: &[f32]) {
     }
 }
 
-/// Writes Wavefront OBJ with normals. The format cannot hold velocities.
+/// Writes Wavefront OBJ with normals. The format cannot hold velocities or attributes.
 pub fn obj(placed: &Placed<'_>, source: &FileOrigin<'_>) -> Vec<u8> {
     let &Placed { water, corner, .. } = placed;
     let FileOrigin {

@@ -6,42 +6,28 @@
 //! value clips.
 
 mod text;
+mod water;
 
 use glam::{DQuat, DVec3, Vec3};
 
 use super::FileOrigin;
-use swell_domain::{
-    bounds::Bounds, eye::Eye, mesh::TriangleMesh, particles::Particles, pose::Pose,
-    water_mesh::WaterMesh,
-};
+use swell_domain::{bounds::Bounds, eye::Eye, mesh::TriangleMesh, pose::Pose};
 
 use text::{Text, asset, name, quoted};
+
+pub use water::{WaterFrame, WaterLayer, WaterPrim, WaterRepresentation};
 
 /// Properties that all layers of a shot share.
 #[derive(Clone, Copy, Debug)]
 pub struct Shot<'a> {
     /// Program, shot name and frame; the shot's name is also that of the root prim.
     pub source: FileOrigin<'a>,
-    /// Name of the prim that holds the water: `water`, or a stream's name.
-    pub water: &'a str,
     /// Frames per second.
     pub frames_per_second: f64,
     /// First and last frame.
     pub frames: [u32; 2],
     /// World position of the scene's origin, metres.
     pub origin: DVec3,
-}
-
-/// Representation of a shot's water.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum WaterRepresentation {
-    /// Points.
-    Points {
-        /// Diameter of each point, metres; if `None`, the attribute `radius` holds half of it.
-        width: Option<f64>,
-    },
-    /// A mesh.
-    Mesh,
 }
 
 /// A solid of the scene.
@@ -85,10 +71,8 @@ pub struct CameraFrame {
 pub struct Root<'a> {
     /// Properties of the shot.
     pub shot: Shot<'a>,
-    /// Representation of the water.
-    pub kind: WaterRepresentation,
-    /// Names of the particles' attributes; used only for points.
-    pub attributes: Vec<String>,
+    /// The water, and whitewater beside it.
+    pub waters: Vec<WaterPrim<'a>>,
     /// File name of each frame's layer, beside the root; names must not contain line ends.
     pub layers: Vec<(u32, String)>,
     /// File name of the layer that declares which attributes the frames' layers have.
@@ -99,64 +83,6 @@ pub struct Root<'a> {
     pub wave_makers: Vec<WaveMaker>,
     /// Camera of a look, per frame; empty without one.
     pub camera: Vec<CameraFrame>,
-}
-
-/// An attribute of the water with one value per frame.
-struct Sampled {
-    kind: &'static str,
-    name: String,
-    /// Metadata in parentheses after the value; empty for none.
-    metadata: &'static str,
-}
-
-/// Attributes of the water in the frames' layers.
-fn sampled(kind: WaterRepresentation, attributes: &[String]) -> Vec<Sampled> {
-    let of = |kind, name: &str, metadata| Sampled {
-        kind,
-        name: name.to_owned(),
-        metadata,
-    };
-    let mut all = vec![of("float3[]", "extent", "")];
-    match kind {
-        WaterRepresentation::Points { width } => {
-            if width.is_none() {
-                all.push(of("float[]", "widths", "interpolation = \"vertex\""));
-            }
-            all.push(of("int64[]", "ids", ""));
-            all.push(of("point3f[]", "points", ""));
-            all.push(of("vector3f[]", "velocities", ""));
-            let own = attributes.iter().map(|it| format!("primvars:{}", name(it)));
-            all.extend(own.map(|it| of("float[]", &it, "interpolation = \"vertex\"")));
-        }
-        WaterRepresentation::Mesh => {
-            all.push(of("int[]", "faceVertexCounts", ""));
-            all.push(of("int[]", "faceVertexIndices", ""));
-            all.push(of("normal3f[]", "normals", "interpolation = \"vertex\""));
-            all.push(of("point3f[]", "points", ""));
-            all.push(of("vector3f[]", "velocities", ""));
-        }
-    }
-    all
-}
-
-/// Writes the attributes of the water that are the same in all frames.
-fn put_constants(text: &mut Text, kind: WaterRepresentation) {
-    match kind {
-        WaterRepresentation::Points { width: Some(width) } => {
-            text.line(&format!("float[] widths = [{}] (", width as f32));
-            text.line("    interpolation = \"constant\"");
-            text.line(")");
-        }
-        WaterRepresentation::Points { width: None } => {}
-        WaterRepresentation::Mesh => text.line("uniform token subdivisionScheme = \"none\""),
-    }
-}
-
-fn schema(kind: WaterRepresentation) -> &'static str {
-    match kind {
-        WaterRepresentation::Points { .. } => "Points",
-        WaterRepresentation::Mesh => "Mesh",
-    }
 }
 
 /// Writes the first lines of a layer, up to the body of its only prim.
@@ -201,11 +127,7 @@ pub fn manifest(root: &Root<'_>) -> Vec<u8> {
         root.shot.frames,
     );
     text.open(&format!("over {}", quoted(&name(root.shot.source.shot))));
-    text.open(&format!("over {}", quoted(&name(root.shot.water))));
-    for it in sampled(root.kind, &root.attributes) {
-        text.line(&format!("{} {}", it.kind, it.name));
-    }
-    text.close();
+    root.waters.iter().for_each(|it| it.put_manifest(&mut text));
     if !root.wave_makers.is_empty() {
         text.open("over \"wave_makers\"");
         for maker in &root.wave_makers {
@@ -253,33 +175,12 @@ pub fn root(root: &Root<'_>) -> Vec<u8> {
     text.line(")");
     text.open("");
     put_origin(&mut text, shot);
-    text.open(&format!(
-        "def {} {}",
-        schema(root.kind),
-        quoted(&name(shot.water))
-    ));
-    for it in sampled(root.kind, &root.attributes) {
-        text.line(&format!(
-            "{} {}{}",
-            it.kind,
-            it.name,
-            in_parentheses(it.metadata)
-        ));
-    }
-    put_constants(&mut text, root.kind);
-    text.close();
+    root.waters.iter().for_each(|it| it.put_root(&mut text));
     put_solids(&mut text, &root.solids);
     put_wave_makers(&mut text, &root.wave_makers);
     put_camera(&mut text, &root.camera);
     text.close();
     text.into_bytes()
-}
-
-fn in_parentheses(metadata: &str) -> String {
-    match metadata {
-        "" => String::new(),
-        some => format!(" ({some})"),
-    }
 }
 
 fn put_solids(text: &mut Text, solids: &[Solid]) {
@@ -466,39 +367,15 @@ fn extent(points: &[[f32; 3]], margin: f64) -> String {
     format!("[{}, {}]", corner(min), corner(max))
 }
 
-/// The water of a frame.
-#[derive(Clone, Copy, Debug)]
-pub enum WaterFrame<'a> {
-    /// Points, relative to the scene's origin.
-    Points(&'a Particles),
-    /// A mesh, and the position of its origin relative to the scene's, metres.
-    Mesh(&'a WaterMesh, DVec3),
-}
-
-/// Writes the layer of a frame: the water, and the displacement of each wave maker, metres. The
-/// layer can also be opened without the root.
-pub fn frame(
-    shot: &Shot<'_>,
-    kind: WaterRepresentation,
-    water: &WaterFrame<'_>,
-    makers: &[(String, DVec3)],
-) -> Vec<u8> {
+/// Writes the layer of a frame: the water, whitewater beside it, and the displacement of each wave
+/// maker, metres. The layer can also be opened without the root.
+pub fn frame(shot: &Shot<'_>, waters: &[WaterLayer<'_>], makers: &[(String, DVec3)]) -> Vec<u8> {
     let at = shot.source.frame;
     let mut text = Text::default();
     begin(&mut text, shot, &format!("frame {at}"), [at, at]);
     text.open(&format!("def Xform {}", quoted(&name(shot.source.shot))));
     put_origin(&mut text, shot);
-    text.open(&format!(
-        "def {} {}",
-        schema(kind),
-        quoted(&name(shot.water))
-    ));
-    match water {
-        WaterFrame::Points(particles) => put_points(&mut text, kind, at, particles),
-        WaterFrame::Mesh(mesh, corner) => put_water_mesh(&mut text, at, mesh, *corner),
-    }
-    put_constants(&mut text, kind);
-    text.close();
+    waters.iter().for_each(|it| it.put(&mut text, at));
     if !makers.is_empty() {
         text.open("def Xform \"wave_makers\"");
         for (maker, way) in makers {
@@ -511,62 +388,6 @@ pub fn frame(
     }
     text.close();
     text.into_bytes()
-}
-
-fn put_points(text: &mut Text, kind: WaterRepresentation, at: u32, particles: &Particles) {
-    let own = match kind {
-        WaterRepresentation::Points { width: None } => particles.attributes.get("radius"),
-        _ => None,
-    };
-    let margin = match (kind, own) {
-        (_, Some(radii)) => f64::from(radii.iter().copied().fold(0.0, f32::max)),
-        (WaterRepresentation::Points { width }, None) => 0.5 * width.unwrap_or(0.0),
-        (WaterRepresentation::Mesh, None) => 0.0,
-    };
-    let extent = extent(&particles.position, margin);
-    text.samples("float3[] extent", &[(at, extent)]);
-    if let Some(radii) = own {
-        text.line("float[] widths (interpolation = \"vertex\")");
-        text.sampled_array("float[] widths", at, radii, |radius| {
-            (2.0 * radius).to_string()
-        });
-    }
-    text.sampled_array("int64[] ids", at, &particles.id, u32::to_string);
-    text.sampled_array("point3f[] points", at, &particles.position, text::floats);
-    text.sampled_array(
-        "vector3f[] velocities",
-        at,
-        &particles.velocity,
-        text::floats,
-    );
-    for (attribute, values) in &particles.attributes {
-        let label = format!("primvars:{}", name(attribute));
-        text.line(&format!("float[] {label} (interpolation = \"vertex\")"));
-        text.sampled_array(&format!("float[] {label}"), at, values, f32::to_string);
-    }
-}
-
-fn put_water_mesh(text: &mut Text, at: u32, water: &WaterMesh, corner: DVec3) {
-    let place = |p: &DVec3| (*p + corner).as_vec3().to_array();
-    let points: Vec<[f32; 3]> = water.mesh.vertices.iter().map(place).collect();
-    text.samples("float3[] extent", &[(at, extent(&points, 0.0))]);
-    let triangles = &water.mesh.triangles;
-    text.sampled_array(
-        "int[] faceVertexCounts",
-        at,
-        &vec![3; triangles.len()],
-        |x| x.to_string(),
-    );
-    text.sampled_array(
-        "int[] faceVertexIndices",
-        at,
-        triangles.as_flattened(),
-        u32::to_string,
-    );
-    text.line("normal3f[] normals (interpolation = \"vertex\")");
-    text.sampled_array("normal3f[] normals", at, &water.normals, text::floats);
-    text.sampled_array("point3f[] points", at, &points, text::floats);
-    text.sampled_array("vector3f[] velocities", at, &water.velocities, text::floats);
 }
 
 #[cfg(test)]

@@ -8,6 +8,7 @@ mod asked;
 mod content;
 mod error;
 mod expected;
+mod files;
 mod folder;
 mod shot;
 mod usdc;
@@ -22,17 +23,15 @@ use std::{
     time::Instant,
 };
 
-use glam::DVec3;
-
-use swell_cache::{CacheError, CacheReader, GridRecord, frame::Stamp, refuse_inside, vdb};
+use swell_cache::{CacheError, CacheReader, refuse_inside};
 use swell_domain::{
     chunk::{Chunk, share},
     frame_range::FrameRange,
     output::{AtPath as _, Draft},
-    sparse_grid::Precision,
+    surface::Raster,
     water_mesh::VOLUME,
+    whitewater::{ATTRIBUTES, WhitewaterKind},
 };
-use swell_export::{FileOrigin, mesh, mesh::Placed, table, usd};
 use swell_scene::{Scene, look::Look};
 
 use super::{
@@ -41,11 +40,7 @@ use super::{
     whitewater::{directory, is_of},
 };
 
-use self::{
-    content::Content,
-    folder::{Owner, Wanted},
-    usdc::Python,
-};
+use self::{content::Content, folder::Wanted, usdc::Python};
 
 pub use self::{
     error::ExportError,
@@ -80,6 +75,8 @@ pub enum Target {
     Bgeo(Pattern),
     /// Level set and velocity grid as OpenVDB.
     Vdb(Pattern),
+    /// Density and velocity of a whitewater stream as OpenVDB.
+    Fog(Pattern),
     /// A USD shot: this root file, and one layer per frame beside it.
     Usd(PathBuf, UsdWater),
 }
@@ -91,6 +88,13 @@ pub struct ExportRequest {
     pub cache: PathBuf,
     /// Name of a whitewater stream to export instead of the water.
     pub stream: Option<String>,
+    /// Kinds of whitewater that are exported of a stream's particles; all if `None`, but as fog only
+    /// spray.
+    pub kinds: Option<Vec<WhitewaterKind>>,
+    /// Name of a whitewater stream whose foam the vertices of meshes have.
+    pub foam: Option<String>,
+    /// Name of a whitewater stream that USD shots have as points beside the water.
+    pub whitewater: Option<String>,
     /// Files to export; at least one target.
     pub targets: Vec<Target>,
     /// Frames to export; all frames with particles if `None`.
@@ -102,6 +106,8 @@ pub struct ExportRequest {
     pub number_from: Option<u32>,
     /// Voxels of the mesh's grid per particle spacing.
     pub voxels: f64,
+    /// Edge length of a fog's voxels, metres; one particle spacing if `None`.
+    pub fog_voxel: Option<f64>,
     /// Look whose camera a USD shot gets.
     pub look: Option<Look>,
     /// Python interpreter used to write binary USD.
@@ -255,6 +261,10 @@ struct ExportJob<'a> {
     cache: CacheReader,
     /// The whitewater stream to export instead of the water.
     stream: Option<CacheReader>,
+    /// The whitewater stream whose foam is on meshes.
+    foam: Option<CacheReader>,
+    /// The whitewater stream beside the water in USD shots.
+    whitewater: Option<CacheReader>,
     scene: Scene,
     /// All requested frames, of every process.
     frames: Vec<u32>,
@@ -275,22 +285,28 @@ impl<'a> ExportJob<'a> {
                 request.cache.display()
             )));
         }
-        let stream = match &request.stream {
-            Some(stream) => Some(open_stream(request, stream)?),
-            None => None,
+        let open = |name: &Option<String>| {
+            let name = name.as_deref();
+            name.map(|name| open_stream(request, name)).transpose()
         };
+        let (stream, foam) = (open(&request.stream)?, open(&request.foam)?);
+        let whitewater = open(&request.whitewater)?;
         let source = stream.as_ref().unwrap_or(&cache);
         let frames = super::frames_of(source, request.frames.as_ref());
         for &frame in &frames {
             source.kept(frame)?;
-            if stream.is_some() && !is_of(source.entry(frame)?, &cache) {
-                return Err(ExportError::OldStream {
-                    directory: source.dir().to_owned(),
-                    frame,
-                });
+            for stream in stream.iter().chain(&foam).chain(&whitewater) {
+                stream.kept(frame)?;
+                if !is_of(stream.entry(frame)?, &cache) {
+                    return Err(ExportError::OldStream {
+                        directory: stream.dir().to_owned(),
+                        frame,
+                    });
+                }
             }
         }
         let scene = baked_scene(&cache, &request.cache)?;
+        check_fog_voxel(request, scene.particle_spacing())?;
         let needs_python = |target: &Target| match target {
             Target::Mesh(files) => files.ending() == "usdc",
             Target::Usd(file, _) => is_binary(file),
@@ -304,6 +320,8 @@ impl<'a> ExportJob<'a> {
             request,
             cache,
             stream,
+            foam,
+            whitewater,
             scene,
             numbering: Numbering::new(&frames, request.number_from),
             frames,
@@ -337,50 +355,6 @@ impl<'a> ExportJob<'a> {
         let digits = last.to_string().len().max(4);
         let number = self.numbering.of(frame);
         beside(shot, &format!("{number:0digits$}"))
-    }
-
-    /// Describes how a shot represents its water, for the records of its layers and root.
-    fn water_settings(&self, water: UsdWater) -> String {
-        match water {
-            UsdWater::Points => "points".to_owned(),
-            UsdWater::Mesh => format!("mesh, {} voxels a spacing", self.request.voxels),
-        }
-    }
-
-    fn owner(&self, settings: String) -> Result<Owner, CacheError> {
-        let source = self.source();
-        Ok(Owner {
-            software: self.software.clone(),
-            shot: source.manifest().shot.clone(),
-            cache: source.entry(source.first_frame())?.chain.clone(),
-            settings,
-        })
-    }
-
-    fn wanted(&self, target: &Target, frame: u32) -> Result<Wanted, CacheError> {
-        let voxels = self.request.voxels;
-        let number = self.numbering.of(frame);
-        let (file, settings) = match target {
-            Target::Mesh(files) => (
-                files.file(number),
-                format!("mesh as {}, {voxels} voxels a spacing", files.ending()),
-            ),
-            Target::Npy(files) => (files.file(number), "particles as npy".to_owned()),
-            Target::Csv(files) => (files.file(number), "particles as csv".to_owned()),
-            Target::Bgeo(files) => (files.file(number), "particles as bgeo".to_owned()),
-            Target::Vdb(files) => (files.file(number), "grids as vdb".to_owned()),
-            Target::Usd(file, water) => {
-                let water = self.water_settings(*water);
-                let layer = self.layer(file, frame);
-                (layer, format!("a frame's layer of usd, {water}"))
-            }
-        };
-        Ok(Wanted {
-            file,
-            owner: self.owner(settings)?,
-            source: self.source().frame_hash(frame)?.to_owned(),
-            follows: false,
-        })
     }
 
     /// The files of a frame, each with its target.
@@ -443,109 +417,6 @@ impl<'a> ExportJob<'a> {
         outcome.made += 1;
         Ok(())
     }
-
-    fn bytes(&self, target: &Target, content: &Content<'_>) -> Result<Vec<u8>, ExportError> {
-        let (scene, frame) = (&self.scene, content.frame);
-        let source = FileOrigin {
-            software: &self.software,
-            shot: &self.source().manifest().shot,
-            frame,
-        };
-        let origin = scene.origin;
-        Ok(match target {
-            Target::Npy(_) => table::npy(content.particles()?, origin),
-            Target::Csv(_) => table::csv(content.particles()?, origin),
-            Target::Bgeo(_) => table::bgeo(content.particles()?, origin),
-            Target::Vdb(_) => self.grids(content)?,
-            Target::Mesh(files) => {
-                let placed = Placed {
-                    water: content.mesh()?,
-                    corner: origin + scene.domain.min,
-                    is_far: origin != DVec3::ZERO,
-                };
-                match files.ending().as_str() {
-                    "ply" => mesh::ply(&placed, &source),
-                    "obj" => mesh::obj(&placed, &source),
-                    _ => self.layer_bytes(UsdWater::Mesh, content, &source)?,
-                }
-            }
-            Target::Usd(_, water) => self.layer_bytes(*water, content, &source)?,
-        })
-    }
-
-    /// Grids as the bake kept them, or with a scene's default settings.
-    fn grids(&self, content: &Content<'_>) -> Result<Vec<u8>, ExportError> {
-        let manifest = self.cache.manifest();
-        let frame = content.frame;
-        let default = || GridRecord {
-            surface: true,
-            velocity: true,
-            voxel_size: 2.0 * self.scene.particle_spacing(),
-            origin: self.scene.domain.min.to_array(),
-            precision: Precision::Half,
-        };
-        let record = manifest.grids.clone().unwrap_or_else(default);
-        let grids = record
-            .grids(content.particles()?, manifest.particle_spacing)
-            .moved(manifest.origin.into());
-        let stamp = Stamp {
-            program: &manifest.program,
-            program_version: &manifest.program_version,
-            shot: &manifest.shot,
-            frame,
-            time: self.cache.entry(frame)?.clock.time,
-            origin: manifest.origin.into(),
-        };
-        let mut bytes = Vec::new();
-        vdb::encode(&mut bytes, &stamp, &grids, record.precision)
-            .map_err(|source| ExportError::Vdb { frame, source })?;
-        Ok(bytes)
-    }
-
-    fn layer_bytes(
-        &self,
-        water: UsdWater,
-        content: &Content<'_>,
-        source: &FileOrigin<'_>,
-    ) -> Result<Vec<u8>, ExportError> {
-        let shot = self.shot(source.frame);
-        let makers = match self.stream {
-            Some(_) => Vec::new(),
-            None => shot::displacements(&self.scene, content.particles()?, source.frame),
-        };
-        let told = match water {
-            UsdWater::Points => usd::WaterFrame::Points(content.particles()?),
-            UsdWater::Mesh => usd::WaterFrame::Mesh(content.mesh()?, self.scene.domain.min),
-        };
-        Ok(usd::frame(&shot, self.kind(water), &told, &makers))
-    }
-
-    fn kind(&self, water: UsdWater) -> usd::WaterRepresentation {
-        let is_own = self.stream.is_some();
-        match water {
-            UsdWater::Points if is_own => usd::WaterRepresentation::Points { width: None },
-            UsdWater::Points => usd::WaterRepresentation::Points {
-                width: Some(shot::width(self.scene.particle_spacing())),
-            },
-            UsdWater::Mesh => usd::WaterRepresentation::Mesh,
-        }
-    }
-
-    /// A shot's time codes are the numbers in the names of its layers.
-    fn shot(&self, frame: u32) -> usd::Shot<'_> {
-        let number = |frame: Option<&u32>| frame.map_or(0, |&frame| self.numbering.of(frame));
-        usd::Shot {
-            source: FileOrigin {
-                software: &self.software,
-                shot: &self.source().manifest().shot,
-                frame: self.numbering.of(frame),
-            },
-            water: self.request.stream.as_deref().unwrap_or("water"),
-            frames_per_second: self.scene.shot.frames_per_second,
-            frames: [self.frames.first(), self.frames.last()].map(number),
-            origin: self.scene.origin,
-        }
-    }
 }
 
 /// `shot.0001.usda` for `shot.usda`.
@@ -568,5 +439,25 @@ fn open_stream(request: &ExportRequest, stream: &str) -> Result<CacheReader, Exp
             cache: request.cache.clone(),
         });
     }
-    Ok(CacheReader::open(&directory)?)
+    let stream = CacheReader::open(&directory)?;
+    let manifest = stream.manifest();
+    match manifest.is_whitewater() && manifest.attributes == ATTRIBUTES {
+        true => Ok(stream),
+        false => Err(ExportError::NotWhitewater { directory }),
+    }
+}
+
+/// Refuses voxels that no bake's grids could have either.
+fn check_fog_voxel(request: &ExportRequest, spacing: f64) -> Result<(), ExportError> {
+    let [least, most] =
+        [Raster::VOXEL_RATIO.start(), Raster::VOXEL_RATIO.end()].map(|ratio| ratio * spacing);
+    match request.fog_voxel {
+        Some(size) if !(least..=most).contains(&size) => Err(ExportError::FogVoxel {
+            size,
+            least,
+            most,
+            cache: request.cache.clone(),
+        }),
+        _ => Ok(()),
+    }
 }

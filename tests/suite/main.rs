@@ -32,6 +32,8 @@ mod cli {
     mod bad_input;
     mod expected;
     mod export;
+    mod export_foam;
+    mod export_fog;
     mod farm;
     mod inspect;
     mod pipeline;

@@ -1,4 +1,5 @@
 use super::*;
+use swell_domain::particles::Particles;
 
 fn shot() -> Shot<'static> {
     Shot {
@@ -7,7 +8,6 @@ fn shot() -> Shot<'static> {
             shot: "a-b",
             frame: 7,
         },
-        water: "water",
         frames_per_second: 24.0,
         frames: [7, 9],
         origin: DVec3::ZERO,
@@ -33,13 +33,19 @@ fn a_frame_says_its_units_and_its_points() {
     };
     let kind = WaterRepresentation::Points { width: Some(0.2) };
     let way = [("wall_minus_x".to_owned(), DVec3::X)];
-    let text =
-        String::from_utf8(frame(&shot(), kind, &WaterFrame::Points(&particles), &way)).unwrap();
+    let layer = |name| WaterLayer {
+        name,
+        kind,
+        content: WaterFrame::Points(&particles),
+    };
+    let layers = [layer("water"), layer("whitewater")];
+    let text = String::from_utf8(frame(&shot(), &layers, &way)).unwrap();
     for part in [
         "metersPerUnit = 1\n",
         "upAxis = \"Y\"",
         "timeCodesPerSecond = 24\n",
         "def Points \"water\"",
+        "def Points \"whitewater\"",
         "7: [(1, 2, 3.5)]",
         "7: [(0.1, 0, -1)]",
         "7: [5]",
@@ -75,8 +81,18 @@ fn a_root_plays_the_frames_that_it_is_given() {
     };
     let root_of = Root {
         shot: shot(),
-        kind: WaterRepresentation::Mesh,
-        attributes: Vec::new(),
+        waters: vec![
+            WaterPrim {
+                name: "water",
+                kind: WaterRepresentation::Mesh,
+                attributes: vec!["foam".to_owned()],
+            },
+            WaterPrim {
+                name: "whitewater",
+                kind: WaterRepresentation::Points { width: None },
+                attributes: Vec::new(),
+            },
+        ],
         layers: vec![(7, "s.0007.usda".to_owned()), (9, "s.0009.usda".to_owned())],
         manifest: "s.manifest.usda".to_owned(),
         solids: vec![
@@ -93,6 +109,10 @@ fn a_root_plays_the_frames_that_it_is_given() {
         "assetPaths = [@./s.0007.usda@, @./s.0009.usda@]",
         "times = [(7, 7), (9, 9)]",
         "primPath = \"/a_b\"",
+        "def Mesh \"water\"",
+        "float[] primvars:foam (interpolation = \"vertex\")",
+        "def Points \"whitewater\"",
+        "float[] widths (interpolation = \"vertex\")",
         "def Mesh \"box\"",
         "def Mesh \"box_2\"",
         "9: (0, 1, 0),",
@@ -125,9 +145,6 @@ fn a_root_plays_the_frames_that_it_is_given() {
             assert!(text.contains(&part), "{part}: {text}");
         }
     }
-    assert!(
-        String::from_utf8(manifest(&root_of))
-            .unwrap()
-            .contains("point3f[] points\n")
-    );
+    let text = String::from_utf8(manifest(&root_of)).unwrap();
+    assert_eq!(text.matches("point3f[] points\n").count(), 2, "{text}");
 }

@@ -14,11 +14,17 @@ pub(super) fn check(request: &ExportRequest) -> Result<(), ExportError> {
         .targets
         .iter()
         .any(|it| matches!(it, Target::Usd(..)));
+    if request.whitewater.is_some() && !has_shot {
+        return asked(
+            "a USD shot has whitewater beside the water, but no USD shot is exported".to_owned(),
+        );
+    }
     if request.look.is_some() && !has_shot {
         return asked(
             "the look gives a USD shot its camera, but no USD shot is exported".to_owned(),
         );
     }
+    check_whitewater(request)?;
     let mut names = BTreeSet::new();
     for target in &request.targets {
         let (kind, ending, file, allowed): (_, _, _, &[&str]) = match target {
@@ -32,6 +38,7 @@ pub(super) fn check(request: &ExportRequest) -> Result<(), ExportError> {
             Target::Csv(files) => ("csv", files.ending(), files.file(1), &["csv"]),
             Target::Bgeo(files) => ("bgeo", files.ending(), files.file(1), &["bgeo"]),
             Target::Vdb(files) => ("vdb", files.ending(), files.file(1), &["vdb"]),
+            Target::Fog(files) => ("fog", files.ending(), files.file(1), &["vdb"]),
             Target::Usd(file, _) => {
                 let ending = file.extension().unwrap_or_default().to_string_lossy();
                 (
@@ -73,4 +80,44 @@ pub(super) fn check(request: &ExportRequest) -> Result<(), ExportError> {
         }
     }
     Ok(())
+}
+
+/// Refuses what needs a stream and has none, and foam where no vertex can have it.
+fn check_whitewater(request: &ExportRequest) -> Result<(), ExportError> {
+    let is_fog = |target: &Target| matches!(target, Target::Fog(_));
+    if request.stream.is_none() && request.targets.iter().any(is_fog) {
+        return Err(ExportError::NoFog);
+    }
+    let has_particles = request.stream.is_some() || request.whitewater.is_some();
+    if request.kinds.is_some() && !has_particles {
+        return Err(ExportError::Kinds);
+    }
+    if let (Some(stream), Some(_)) = (&request.stream, &request.whitewater) {
+        return Err(ExportError::Asked(format!(
+            "a shot has whitewater beside the water, and the stream `{stream}` is in place of it"
+        )));
+    }
+    if request.foam.is_none() {
+        return Ok(());
+    }
+    let mut meshes = 0;
+    for target in &request.targets {
+        match target {
+            Target::Mesh(files) if files.ending() == "obj" => {
+                return Err(ExportError::Foam(
+                    "OBJ has no place for values of vertices; write the mesh as .ply, .usda, .usd \
+                     or .usdc"
+                        .to_owned(),
+                ));
+            }
+            Target::Mesh(_) | Target::Usd(_, UsdWater::Mesh) => meshes += 1,
+            _ => {}
+        }
+    }
+    match meshes {
+        0 => Err(ExportError::Foam(
+            "vertices of a mesh have it, and no mesh of the water is exported".to_owned(),
+        )),
+        _ => Ok(()),
+    }
 }

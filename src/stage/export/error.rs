@@ -14,8 +14,33 @@ use super::UsdcError;
 #[non_exhaustive]
 pub enum ExportError {
     /// No files to make.
-    #[error("nothing to export: ask for a mesh, a USD shot, npy, csv, bgeo or vdb")]
+    #[error("nothing to export: ask for a mesh, a USD shot, npy, csv, bgeo, vdb or fog")]
     Nothing,
+    /// Foam on what cannot have it.
+    #[error("foam: {0}")]
+    Foam(String),
+    /// Kinds of whitewater without a stream.
+    #[error("kinds of whitewater are chosen, but no stream of it is exported")]
+    Kinds,
+    /// A fog's voxels are out of range.
+    #[error(
+        "voxels of {size} m: {} allows {least} to {most} m, a quarter of a particle spacing to \
+         eight of them",
+        cache.display()
+    )]
+    FogVoxel {
+        /// The requested size, metres.
+        size: f64,
+        /// Least size, metres.
+        least: f64,
+        /// Greatest size, metres.
+        most: f64,
+        /// Directory of the bake's cache.
+        cache: PathBuf,
+    },
+    /// Fog without a stream.
+    #[error("fog is made of a stream of whitewater, and no stream is exported")]
+    NoFog,
     /// Targets that cannot be combined.
     #[error("{0}")]
     Asked(String),
@@ -55,6 +80,15 @@ pub enum ExportError {
         /// Directory of the bake's cache.
         cache: PathBuf,
     },
+    /// A folder among the streams holds something else.
+    #[error(
+        "{} is no stream of whitewater, whose particles have age, kind, life and radius",
+        directory.display()
+    )]
+    NotWhitewater {
+        /// Directory of the stream.
+        directory: PathBuf,
+    },
     /// A frame of a stream was made from other water.
     #[error(
         "{}: frame {frame} was made from water that no longer exists: make it again",
@@ -90,6 +124,10 @@ impl From<&ExportError> for Blame {
     fn from(error: &ExportError) -> Self {
         match error {
             ExportError::Nothing
+            | ExportError::Foam(_)
+            | ExportError::Kinds
+            | ExportError::FogVoxel { .. }
+            | ExportError::NoFog
             | ExportError::Asked(_)
             | ExportError::Look(_)
             | ExportError::IntoCache(_)
@@ -100,6 +138,7 @@ impl From<&ExportError> for Blame {
             | ExportError::Taken { .. }
             | ExportError::Usdc(UsdcError::Failed { .. })
             | ExportError::NoStream { .. }
+            | ExportError::NotWhitewater { .. }
             | ExportError::OldStream { .. }
             | ExportError::Vdb { .. } => Self::Files,
         }

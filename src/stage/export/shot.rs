@@ -9,12 +9,21 @@ use glam::DVec3;
 
 use super::{ExportJob, Target, UsdWater, Wanted, beside};
 use swell_cache::CacheError;
-use swell_domain::{body::BodyState, particles::Particles};
-use swell_export::usd::{self, CameraFrame, Root, Solid, WaveMaker};
+use swell_domain::{
+    body::BodyState,
+    level_set::foam::{FOAM, FOAM_AGE},
+    particles::Particles,
+};
+use swell_export::usd::{
+    self, CameraFrame, Root, Solid, WaterPrim, WaterRepresentation, WaveMaker,
+};
 use swell_scene::{Scene, Wall};
 
 /// Name part of the shot's manifest layer, in the place of a frame number.
 const MANIFEST: &str = "manifest";
+
+/// Name of the prim of whitewater beside the water.
+pub(super) const WHITEWATER: &str = "whitewater";
 
 /// Diameter of a sphere with a particle's volume, metres.
 pub(super) fn width(spacing: f64) -> f64 {
@@ -94,7 +103,7 @@ impl ExportJob<'_> {
             for (file, bytes) in parts {
                 let wanted = Wanted {
                     file,
-                    owner: self.owner(settings.clone())?,
+                    owner: self.owner(target, settings.clone())?,
                     source: blake3::hash(&bytes).to_hex().to_string(),
                     follows: true,
                 };
@@ -116,14 +125,24 @@ impl ExportJob<'_> {
         let scene = &self.scene;
         let attributes = match water {
             UsdWater::Points => self.source().manifest().attributes.clone(),
+            UsdWater::Mesh if self.foam.is_some() => [FOAM, FOAM_AGE].map(str::to_owned).to_vec(),
             UsdWater::Mesh => Vec::new(),
         };
+        let mut waters = vec![WaterPrim {
+            name: self.prim(),
+            kind: self.kind(water),
+            attributes,
+        }];
+        waters.extend(self.whitewater.iter().map(|stream| WaterPrim {
+            name: WHITEWATER,
+            kind: WaterRepresentation::Points { width: None },
+            attributes: stream.manifest().attributes.clone(),
+        }));
         let is_stream = self.stream.is_some();
         let makers = scene.wave_makers.iter().map(|it| maker(scene, it.wall));
         Ok(Root {
             shot: self.shot(self.frames.first().copied().unwrap_or(0)),
-            kind: self.kind(water),
-            attributes,
+            waters,
             layers: self.frames.iter().map(layer).collect(),
             manifest: named(beside(file, MANIFEST)),
             solids: if is_stream {

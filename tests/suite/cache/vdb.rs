@@ -1,6 +1,6 @@
 //! Grid files against independent readers, OpenVDB's own `vdb_print` and vdb-rs, and how a
 //! cache keeps them.
-use std::{collections::BTreeMap, fs, io::Cursor, path::Path, process::Command};
+use std::{collections::BTreeMap, fs, io::Cursor, path::Path};
 use swell::files::parse_scene;
 use swell::files::scene_to_toml;
 
@@ -20,6 +20,8 @@ use swell::{
     },
     files::physics_hash,
 };
+
+use crate::support::vdb::vdb_print;
 
 const RASTER: Raster = Raster {
     origin: DVec3::new(-0.5, 0.25, 0.0),
@@ -78,31 +80,6 @@ fn encoded(precision: Precision) -> Vec<u8> {
     assert_eq!(written.bytes, bytes.len() as u64);
     assert_eq!(written.hash, blake3::hash(&bytes));
     bytes
-}
-
-/// Parses what `vdb_print -l` prints about each grid, by key, or returns its error output.
-fn vdb_print(bytes: &[u8]) -> Result<BTreeMap<String, BTreeMap<String, String>>, String> {
-    let dir = tempfile::tempdir().unwrap();
-    let path = dir.path().join("a.vdb");
-    fs::write(&path, bytes).unwrap();
-    let output = Command::new("vdb_print")
-        .arg("-l")
-        .arg(&path)
-        .output()
-        .expect("tests need OpenVDB's vdb_print; tools/test installs it (libopenvdb-tools)");
-    if !output.status.success() || !output.stderr.is_empty() {
-        return Err(String::from_utf8_lossy(&output.stderr).into_owned());
-    }
-    let text = String::from_utf8(output.stdout).unwrap();
-    let grids = text.split("Name: ").skip(1).map(|part| {
-        let (name, rest) = part.split_once('\n').unwrap();
-        let keys = rest
-            .lines()
-            .filter_map(|line| line.split_once(':'))
-            .map(|(key, value)| (key.trim().to_owned(), value.trim().to_owned()));
-        (name.to_owned(), keys.collect())
-    });
-    Ok(grids.collect())
 }
 
 /// What `vdb_print` should print about one of our grids.

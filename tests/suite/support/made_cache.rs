@@ -3,10 +3,18 @@ use std::path::Path;
 use swell::files::parse_scene;
 use swell::files::scene_to_toml;
 
-use serde_json::Value;
+use serde_json::{Value, json};
 use swell::{
-    cache::{CacheWriter, Clock, GridRecord, Manifest, ProbeRecord, ProbeValues, body_records},
-    domain::{particles::Particles, solver::StepReport, sparse_grid::Precision},
+    cache::{
+        CacheReader, CacheWriter, Clock, GridRecord, Manifest, ProbeRecord, ProbeValues,
+        body_records,
+    },
+    domain::{
+        particles::Particles,
+        solver::StepReport,
+        sparse_grid::Precision,
+        whitewater::{ATTRIBUTES, none},
+    },
     files::physics_hash,
 };
 
@@ -201,6 +209,45 @@ pub fn write_cache(path: &Path, made: &Made<'_>) {
                 of(frame),
                 rows(frame),
                 (made.report)(frame),
+                Value::Null,
+            )
+            .unwrap();
+    }
+    writer.finish().unwrap();
+}
+
+/// Writes a stream of whitewater of a cache in `cache`, as `swell whitewater` would, that has
+/// `of(frame)` in each frame.
+pub fn write_stream(cache: &Path, name: &str, of: &dyn Fn(u32) -> Particles) {
+    let water = CacheReader::open(cache).unwrap();
+    let manifest = Manifest {
+        solver: Manifest::WHITEWATER.to_owned(),
+        attributes: ATTRIBUTES.map(str::to_owned).to_vec(),
+        grids: None,
+        probes: Vec::new(),
+        start_particles: 0,
+        files: Vec::new(),
+        ..water.manifest().clone()
+    };
+    let first = water.entries()[0].clock;
+    let mut writer = CacheWriter::create(
+        &cache.join("whitewater").join(name),
+        manifest,
+        water.scene_toml(),
+        &[],
+        first,
+        &none(),
+        &Vec::new(),
+    )
+    .unwrap();
+    for entry in &water.entries()[1..] {
+        let report = json!({ "water": entry.chain });
+        writer
+            .submit(
+                entry.clock,
+                of(entry.frame),
+                Vec::new(),
+                report,
                 Value::Null,
             )
             .unwrap();

@@ -13,6 +13,7 @@ pub mod pressure;
 pub mod solvers;
 #[cfg(target_os = "linux")]
 pub mod tmpfs;
+pub mod vdb;
 pub mod whitewater;
 
 pub use device::context;
