@@ -58,7 +58,19 @@ file = "rig.usda"
 film_back_mm = [{FILM_MM}, 20.25]
 """ + LOOK[LOOK.index("[image]") :]
 
+# Whitewater wherever water moves.
+WHITE = """
+radius = [0.02, 0.04]
+[emission]
+trapped_air = [0.1, 1.0]
+wave_crest = [0.01, 0.1]
+energy = [0.001, 0.1]
+trapped_air_rate = 2000.0
+wave_crest_rate = 2000.0
+"""
+
 SPACING = 0.1
+SIZE = np.array([2.0, 2.0, 1.0])
 FRAMES = [1, 2, 3]
 
 
@@ -256,6 +268,72 @@ def check_mesh_shot(stage, room):
         must(np.array_equal(np.array(water.GetVelocitiesAttr().Get(frame)), speed), "USD: the mesh's velocities")
 
 
+def foam_at(row, places, normals):
+    """Coverage and mean age at vertices, from all discs and their images in the six walls."""
+    foam = row[row["kind"] == 1]
+    disc = np.stack([foam[c] for c in "xyz"], axis=1).astype(np.float64)
+    area, age = np.pi * foam["radius"].astype(np.float64) ** 2, foam["age"].astype(np.float64)
+    mirrored = np.zeros_like(disc)
+    radius = 2 * SPACING
+    for axis in range(3):
+        images = [(disc, area, age, mirrored)]
+        for side, near in ((0.0, disc[:, axis] < radius), (SIZE[axis], disc[:, axis] > SIZE[axis] - radius)):
+            image, across = disc[near].copy(), mirrored[near].copy()
+            image[:, axis] = 2 * side - image[:, axis]
+            across[:, axis] = 1.0
+            images.append((image, area[near], age[near], across))
+        disc, area, age, mirrored = (np.concatenate(parts) for parts in zip(*images))
+    covers, ages = [], []
+    for place, normal in zip(places.astype(np.float64), normals.astype(np.float64)):
+        way = (disc - place) / radius
+        off = way @ normal
+        flat = np.maximum(1 - (np.einsum("ij,ij->i", way, way) - off**2), 0)
+        near = np.clip(2 * np.abs(off) - 1, 0, 1)
+        weight = area * flat**2 * (1 - near**2 * (3 - 2 * near)) * np.prod(1 - mirrored * normal**2, axis=1)
+        covers.append(-np.expm1(-weight.sum() * 3 / (np.pi * radius**2)))
+        ages.append((weight * age).sum() / weight.sum() if weight.sum() > 0 else 0)
+    return np.array(covers), np.array(ages)
+
+
+def check_foam(stage, room):
+    """Foam on a mesh, as plyfile and OpenUSD read it, against sums over the stream's own frames."""
+    water = UsdGeom.PrimvarsAPI(stage.GetPrimAtPath("/pool_1/water"))
+    for frame in FRAMES:
+        row = PlyData.read(room / f"cache/whitewater/white/frames/pool-1.{frame:04}.ply")["vertex"].data
+        vertex = PlyData.read(room / f"foam.{frame:04}.ply")["vertex"].data
+        plain = PlyData.read(room / f"m.{frame:04}.ply")["vertex"].data
+        must(all(np.array_equal(plain[c], vertex[c]) for c in plain.dtype.names), "PLY: foam changes other values")
+        places, normals = (np.stack([vertex[c] for c in names], axis=1) for names in (("x", "y", "z"), ("nx", "ny", "nz")))
+        cover, age = foam_at(row, places, normals)
+        # Both are rounded to 32 bits, and the discs' positions are.
+        must(np.allclose(vertex["foam"], cover, atol=1e-6), f"frame {frame}: coverage")
+        # Where hardly a disc is within reach, rounding decides which.
+        many = cover > 1e-6
+        must(np.allclose(vertex["foam_age"][many], age[many], atol=1e-5), f"frame {frame}: age")
+        for name in ("foam", "foam_age"):
+            primvar = water.GetPrimvar(name)
+            must(primvar.GetInterpolation() == "vertex", f"USD: interpolation of {name}")
+            must(np.array_equal(np.array(primvar.Get(frame)), vertex[name]), f"USD: {name}")
+    must(cover.max() > 0.1 and cover.min() == 0.0, f"the last frame has foam of {cover.max()} at most")
+    twice = np.concatenate([row, row])
+    must(not np.allclose(vertex["foam"], foam_at(twice, places, normals)[0], atol=1e-3), "the control: twice the foam")
+
+
+def check_whitewater(stage, room):
+    """A stream's points beside the water against the stream's own frames."""
+    check_points(stage, room)
+    white = UsdGeom.Points(stage.GetPrimAtPath("/pool_1/whitewater"))
+    for frame in FRAMES:
+        row = PlyData.read(room / f"cache/whitewater/white/frames/pool-1.{frame:04}.ply")["vertex"].data
+        row = row[row["kind"] != 2]
+        points = np.stack([row[c] for c in "xyz"], axis=1)
+        must(len(points) > 10 and np.array_equal(np.array(white.GetPointsAttr().Get(frame)), points), "USD: whitewater")
+        must(np.array_equal(np.array(white.GetWidthsAttr().Get(frame)), 2 * row["radius"]), "USD: widths of whitewater")
+        age = UsdGeom.PrimvarsAPI(white).GetPrimvar("age").Get(frame)
+        must(np.array_equal(np.array(age), row["age"]), "USD: ages of whitewater")
+    must(not np.array_equal(np.array(white.GetPointsAttr().Get(2)), points), "the control: another frame")
+
+
 def main(swell):
     """Exports, reads, compares."""
     with tempfile.TemporaryDirectory() as folder:
@@ -272,6 +350,10 @@ def main(swell):
             *("export", "cache", "--npy", "p.%04d.npy", "--csv", "p.%04d.csv", "--mesh", "m.%04d.ply"),
             *("--usd", "shot.usda", "--look", "look.toml"),
         )
+        (room / "white.toml").write_text(WHITE)
+        run("whitewater", "cache", "--settings", "white.toml", "--progress", "none")
+        run("export", "cache", "--mesh", "foam.%04d.ply", "--usd", "foam.usda", "--usd-water", "mesh", "--foam", "white")
+        run("export", "cache", "--usd", "both.usda", "--usd-whitewater", "white", "--kinds", "spray,foam")
         run("export", "cache", "--mesh", "m.%04d.obj", "--usd", "mesh@@@2@.usd", "--usd-water", "mesh")
         run("export", "cache", "--usd", "binary.usdc", "--look", "look.toml", "--python", sys.executable)
         write_rig(room / "rig.usda")
@@ -289,7 +371,13 @@ def main(swell):
         stage = Usd.Stage.Open(str(room / "mesh@@@2@.usd"))
         must(messages(stage) == [], f"mesh@@@2@.usd: OpenUSD says {messages(stage)}")
         check_mesh_shot(stage, room)
-        for name in ("shot.0002.usda", "shot.manifest.usda", "mesh@@@2@.0003.usd", "binary.0001.usdc"):
+        stage = Usd.Stage.Open(str(room / "foam.usda"))
+        must(messages(stage) == [], f"foam.usda: OpenUSD says {messages(stage)}")
+        check_foam(stage, room)
+        stage = Usd.Stage.Open(str(room / "both.usda"))
+        must(messages(stage) == [], f"both.usda: OpenUSD says {messages(stage)}")
+        check_whitewater(stage, room)
+        for name in ("shot.0002.usda", "shot.manifest.usda", "mesh@@@2@.0003.usd", "foam.0003.usda", "binary.0001.usdc"):
             stage = Usd.Stage.Open(str(room / name))
             must(messages(stage) == [], f"{name}: OpenUSD says {messages(stage)}")
         must(Sdf.Layer.FindOrOpen(str(room / "binary.0001.usdc")).GetFileFormat().formatId == "usdc", "binary USD is text")
