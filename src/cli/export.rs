@@ -93,8 +93,8 @@ pub(super) struct ExportArgs {
     /// A stream of whitewater in place of the water, as particles.
     #[arg(long, value_name = "NAME")]
     stream: Option<String>,
-    /// Kinds of whitewater to export of a stream's particles, such as spray,foam; all where left out, but as
-    /// fog only spray.
+    /// Kinds of whitewater to export of a stream's particles, such as spray,foam; all where left
+    /// out, but as fog only spray.
     #[arg(long, value_enum, value_name = "KINDS", value_delimiter = ',')]
     kinds: Option<Vec<Kind>>,
     /// Look whose camera --usd gets.

@@ -88,8 +88,8 @@ pub struct ExportRequest {
     pub cache: PathBuf,
     /// Name of a whitewater stream to export instead of the water.
     pub stream: Option<String>,
-    /// Kinds of whitewater that are exported of a stream's particles; all if `None`, but as fog only
-    /// spray.
+    /// Kinds of whitewater that are exported of a stream's particles; all if `None`, but as fog
+    /// only spray.
     pub kinds: Option<Vec<WhitewaterKind>>,
     /// Name of a whitewater stream whose foam the vertices of meshes have.
     pub foam: Option<String>,
