@@ -53,19 +53,22 @@ impl FogRaster {
     /// [`MOST`] voxels: a renderer that asks where the fog at a point comes from finds it there.
     pub fn fog(&self, white: &Particles) -> Fog {
         let radii = white.attributes.get(RADIUS).map_or(&[][..], Vec::as_slice);
-        let splats: Vec<Splat> = parallel::flat_map(0..radii.len(), |k| self.splat(white, k));
-        let mut pairs: Vec<([i32; 3], u32)> = parallel::flat_map(0..splats.len(), |k| {
-            splats[k].leaves().map(move |leaf| (leaf, k as u32))
+        // Splats are large, so each is computed again where its voxels are.
+        let mut pairs: Vec<([i32; 3], u32)> = parallel::flat_map(0..radii.len(), |k| {
+            let leaves = self.splat(white, k).map(|splat| splat.leaves());
+            leaves
+                .into_iter()
+                .flatten()
+                .map(move |leaf| (leaf, k as u32))
         });
         pairs.par_sort_unstable();
         let runs: Vec<&[([i32; 3], u32)]> = pairs.chunk_by(|a, b| a.0 == b.0).collect();
         let volume = self.voxel_size.powi(3);
         let leaves = parallel::map_slice(&runs, |run| {
-            sums(
-                run[0].0,
-                run.iter().map(|pair| &splats[pair.1 as usize]),
-                volume,
-            )
+            let splats = run
+                .iter()
+                .filter_map(|pair| self.splat(white, pair.1 as usize));
+            sums(run[0].0, splats, volume)
         });
         let mut fog = Fog {
             density: self.empty(0.0),
@@ -169,9 +172,9 @@ impl Splat {
 }
 
 /// Density and velocity of a leaf; `None` where nothing has a volume.
-fn sums<'a>(
+fn sums(
     origin: [i32; 3],
-    splats: impl Iterator<Item = &'a Splat>,
+    splats: impl Iterator<Item = Splat>,
     voxel_volume: f64,
 ) -> Option<(Leaf<f32>, Leaf<[f32; 3]>)> {
     let mut volumes = vec![0.0; VOXELS];
