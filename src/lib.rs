@@ -58,8 +58,8 @@
 //!   from the files that users write.
 //! - Complete jobs: [`stage`] combines the other crates without a terminal. Its jobs are
 //!   [bake](stage::bake), [render](stage::render), [export](stage::export),
-//!   [whitewater](stage::whitewater), [check](stage::check), [diff](stage::diff) and
-//!   [verify](stage::verify), among others.
+//!   [whitewater](stage::whitewater), [wet](stage::wet), [check](stage::check),
+//!   [diff](stage::diff) and [verify](stage::verify), among others.
 //! - Intermediate files: [`cache`] stores frames, ledger and manifest on disk.
 //! - Computation: [`gpu`] provides adapters, shader composition, passes recorded as data, scan and
 //!   sort; [`solve`] the particle solvers on the GPU; [`mod@render`] pictures of frames, by

@@ -8,7 +8,7 @@ fn caustic_value(layer: u32, texel: vec2i) -> f32 {
 }
 
 // Largest number of taps along each side of a pixel's footprint.
-const MOST_TAPS: i32 = 4;
+const MOST_BLUR_TAPS: i32 = 4;
 
 // Bilinear lookup; `place` is in texels.
 fn caustic_between(layer: u32, place: vec2f) -> f32 {
@@ -36,7 +36,7 @@ fn caustic_at(p: vec3f, n: vec3f, footprint: f32) -> f32 {
     }
     let place = caustic_place(inner);
     let size = footprint / caustics.texel;
-    let taps = clamp(i32(ceil(size)), 1, MOST_TAPS);
+    let taps = clamp(i32(ceil(size)), 1, MOST_BLUR_TAPS);
     var sum = 0.0;
     for (var k = 0; k < taps * taps; k++) {
         let at = (vec2f(f32(k % taps), f32(k / taps)) + 0.5) / f32(taps) - 0.5;

@@ -170,6 +170,9 @@ fn opaque_radiance(ray: Ray, found: Found) -> Opaque {
     let depth = water_above(p) / shading.sun_path;
     let footprint = (ray.travelled + found.t) / camera.focal;
     let at = Surface(p, n, material_of(found.material), found.triangle);
+#ifdef WET
+    in_air = !ray.inside;
+#endif
 #ifdef CAUSTICS
     if ray.inside {
         let sun = sun_under_water(p, n, footprint);

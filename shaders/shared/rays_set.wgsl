@@ -138,7 +138,7 @@ fn opaque_along(origin: vec3f, direction: vec3f, reach: f32) -> Found {
     }
     if triangle != NO_TRIANGLE {
         let one = set_triangles[triangle];
-        found = met(OPAQUE, nearest, normalize(cross(one.b - one.a, one.c - one.a)), one.material);
+        found = met(OPAQUE, nearest, normalize(cross(one.b - one.a, one.c - one.a)), code_of(one));
         found.triangle = triangle;
     }
     return found;

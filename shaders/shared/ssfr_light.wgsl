@@ -38,8 +38,9 @@ struct Shading {
     extent: f32,
     // Offset along the normal of shadow lookups, metres.
     shadow_offset: f32,
-    pad0: f32,
-    pad1: f32,
+    // Film of water on wet solids, with WET: the fraction of diffuse light from below that its
+    // surface reflects, and the mean square slope of that surface.
+    film: vec2f,
     // Irradiance of sky and ground by direction: nine spherical-harmonics coefficients (Ramamoorthi
     // 2001).
     irradiance: array<vec4f, 9>,

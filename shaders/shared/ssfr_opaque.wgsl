@@ -5,6 +5,9 @@
 #ifdef MATERIALS
 #import "shared/materials.wgsl"
 #endif
+#ifdef WET
+#import "shared/wet.wgsl"
+#endif
 
 struct Surface {
     position: vec3f,
@@ -96,6 +99,14 @@ fn radiance_under(at: Surface, view: vec3f, footprint: f32, depth: f32, sun: vec
     }
 #endif
     var colour = light * wall * stain;
+#ifdef WET
+    let wetness = wetness_at(at.triangle, at.position);
+    if wetness > 0.0 {
+        let sky = sky_irradiance(at.normal) * open;
+        let wet = wet_radiance(at.normal, view, wall * stain, sun * through, sky * through, open);
+        colour = mix(colour, wet, wetness);
+    }
+#endif
 #ifdef WINDOWS
     let pane = facade(at, footprint);
     if pane.glass > 0.0 {

@@ -2,8 +2,9 @@
 
 struct Triangle {
     a: vec3f,
-    // 0 = solid of the scene, 1 = quay wall of the look; from 4 on individual solids, from 192 on
-    // colours of the palette.
+    // Material code in the low byte: 0 = solid of the scene, 1 = quay wall of the look; from 4 on
+    // individual solids, from 192 on colours of the palette. Then a byte each for the wetness of
+    // the corners, 255 for 1.
     material: u32,
     b: vec3f,
     // Number of its material, from 1; 0 = the common colour of its kind.
@@ -23,6 +24,10 @@ const FIRST_OF_PALETTE: u32 = 192u;
 // 2 = ground, 3 = sky.
 fn material_of(code: u32) -> u32 {
     return select(code, 0u, code >= 4u && code < FIRST_OF_PALETTE);
+}
+
+fn code_of(triangle: Triangle) -> u32 {
+    return triangle.material & 255u;
 }
 
 fn corner(triangle: Triangle, index: u32) -> vec3f {

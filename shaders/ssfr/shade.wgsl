@@ -80,8 +80,10 @@
 #ifdef PALETTE
 @group(0) @binding(17) var<uniform> palette: array<vec4f, 64>;
 #endif
-#ifdef MATERIALS
+#ifdef INDEXED
 @group(0) @binding(20) var<storage, read> set_triangles: array<Triangle>;
+#endif
+#ifdef MATERIALS
 @group(0) @binding(21) var<uniform> materials: array<Material, 256>;
 @group(0) @binding(22) var solid_texels: texture_2d<f32>;
 #endif
@@ -140,8 +142,8 @@ fn ground_distance(origin: vec3f, direction: vec3f) -> f32 {
 
 // Material code of a pixel's solid, as in ssfr_solid.
 fn solid_code(at: u32) -> u32 {
-#ifdef MATERIALS
-    return set_triangles[solid_packed[at]].material;
+#ifdef INDEXED
+    return code_of(set_triangles[solid_packed[at]]);
 #else
     return solid_packed[at] >> 24u;
 #endif
@@ -150,7 +152,7 @@ fn solid_code(at: u32) -> u32 {
 // Surface of the solid visible at a pixel, at a world position.
 fn solid_surface(at: u32, position: vec3f, view: vec3f) -> Surface {
     let word = solid_packed[at];
-#ifdef MATERIALS
+#ifdef INDEXED
     let triangle = set_triangles[word];
     let n = normalize(cross(triangle.b - triangle.a, triangle.c - triangle.a));
     let named = word;
@@ -549,6 +551,9 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         } else if which == MIRROR {
             seen = mirror.found;
         }
+#ifdef WET
+        in_air = !is_water || which == MIRROR;
+#endif
         let light = light_of(seen);
         if which == BACKDROP {
             light_behind = light;

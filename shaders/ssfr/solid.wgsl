@@ -88,11 +88,11 @@ fn vertex(@builtin(vertex_index) index: u32) -> Corner {
     out.side_a = orientation * cross(a, b);
     out.side_b = orientation * cross(b, c);
     out.side_c = orientation * cross(c, a);
-#ifdef MATERIALS
+#ifdef INDEXED
     // The triangle's index determines everything else.
     out.packed = index / 6u;
 #else
-    out.packed = pack_normal(world_normal, triangle.material);
+    out.packed = pack_normal(world_normal, code_of(triangle));
 #endif
     return out;
 }

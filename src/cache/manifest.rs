@@ -49,7 +49,7 @@ pub struct Manifest {
     pub shot: String,
     /// Hash of everything that decides the physics, hex.
     pub scene_hash: String,
-    /// `pbf`, `flip`, or [`Manifest::WHITEWATER`].
+    /// `pbf`, `flip`, [`Manifest::WHITEWATER`] or [`Manifest::WET`].
     pub solver: String,
     /// Name of the adapter, or of the f64 reference.
     pub device: String,
@@ -171,9 +171,22 @@ impl Manifest {
     /// Value of `solver` for a whitewater stream.
     pub const WHITEWATER: &str = "whitewater";
 
+    /// Value of `solver` for a stream of the wetness of solids.
+    pub const WET: &str = "wet";
+
     /// Whether this is the manifest of a whitewater stream made from a bake.
     pub fn is_whitewater(&self) -> bool {
         self.solver == Self::WHITEWATER
+    }
+
+    /// What this manifest's frames hold where they are a stream made from a bake; `None` for a
+    /// bake.
+    pub fn stream_of(&self) -> Option<&'static str> {
+        match self.solver.as_str() {
+            Self::WHITEWATER => Some("whitewater"),
+            Self::WET => Some("wetness"),
+            _ => None,
+        }
     }
 
     /// Names of the scene's own files, relative to `assets/` as in [`Asset`](super::Asset).

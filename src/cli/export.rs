@@ -97,6 +97,10 @@ pub(super) struct ExportArgs {
     /// out, but as fog only spray.
     #[arg(long, value_enum, value_name = "KINDS", value_delimiter = ',')]
     kinds: Option<Vec<Kind>>,
+    /// A stream of wetness (`swell wet`), which the solids of --usd get as primvars:wetness; their
+    /// meshes are then the refined ones.
+    #[arg(long, value_name = "NAME", requires = "usd")]
+    wet: Option<String>,
     /// Look whose camera --usd gets.
     #[arg(long, value_name = "LOOK")]
     look: Option<PathBuf>,
@@ -193,6 +197,7 @@ pub(super) fn run(args: &ExportArgs, progress: &Progress) -> Result<u8, Failure>
         kinds: args.kinds(),
         foam: args.foam.clone(),
         whitewater: args.usd_whitewater.clone(),
+        wet: args.wet.clone(),
         targets: args.targets(),
         frames: args.frames.clone(),
         chunk: args.chunk,

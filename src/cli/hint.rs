@@ -17,6 +17,7 @@ use swell_stage::{
     render::{self, RenderJobError, StreamError},
     verify::CacheError,
     view::ViewError,
+    wet::WetError,
     whitewater::WhitewaterError,
 };
 
@@ -33,6 +34,7 @@ pub(super) fn of(error: &(dyn Error + 'static)) -> Hint {
         .or_else(|| error.downcast_ref().and_then(render))
         .or_else(|| error.downcast_ref().and_then(export))
         .or_else(|| error.downcast_ref().and_then(whitewater))
+        .or_else(|| error.downcast_ref().and_then(wet))
         .or_else(|| error.downcast_ref().and_then(view))
         .or_else(|| error.downcast_ref().and_then(diff))
         .or_else(|| error.downcast_ref().and_then(study))
@@ -134,18 +136,19 @@ fn render(error: &RenderJobError) -> Hint {
             render::FolderError::Left { .. } | render::FolderError::InUse { .. },
         )
         | RenderJobError::IntoCache(_) => Some("-o".into()),
+        RenderJobError::Wet(error) => wet(error),
         RenderJobError::Whitewater(StreamError::Missing { stream, cache, .. }) => {
-            stream_of(cache, stream)
+            stream_of("whitewater", cache, stream)
         }
         RenderJobError::Whitewater(StreamError::Frame { .. }) => Some("`swell whitewater`".into()),
         _ => None,
     }
 }
 
-/// The command that makes a stream of whitewater.
-fn stream_of(cache: &Path, name: &str) -> Hint {
+/// The command that makes a stream.
+fn stream_of(command: &str, cache: &Path, name: &str) -> Hint {
     let command = format!(
-        "`swell whitewater {} --name {}`",
+        "`swell {command} {} --name {}`",
         posix::path(cache),
         posix::word(name)
     );
@@ -160,9 +163,10 @@ fn export(error: &ExportError) -> Hint {
         ExportError::Kinds => Some("--stream, --usd-whitewater".into()),
         ExportError::NoFog => Some("--stream".into()),
         ExportError::Look(error) => look(error),
+        ExportError::Wet(error) => wet(error),
         ExportError::Taken { .. } => Some("--overwrite".into()),
         ExportError::Usdc(UsdcError::Missing { .. }) => Some("--python".into()),
-        ExportError::NoStream { stream, cache, .. } => stream_of(cache, stream),
+        ExportError::NoStream { stream, cache, .. } => stream_of("whitewater", cache, stream),
         ExportError::OldStream { .. } => Some("`swell whitewater`".into()),
         _ => None,
     }
@@ -173,6 +177,16 @@ fn whitewater(error: &WhitewaterError) -> Hint {
         WhitewaterError::Gpu(error) => gpu(error),
         WhitewaterError::Solver(error) => solver(error),
         WhitewaterError::Other { .. } => Some("--name, --overwrite".into()),
+        _ => None,
+    }
+}
+
+fn wet(error: &WetError) -> Hint {
+    match error {
+        WetError::Other { .. } => Some("--name, --overwrite".into()),
+        WetError::TooFine { .. } => Some("--edge".into()),
+        WetError::Missing { stream, cache, .. } => stream_of("wet", cache, stream),
+        WetError::Unfit { .. } => Some("`swell wet`".into()),
         _ => None,
     }
 }

@@ -22,6 +22,7 @@ mod study;
 mod tune;
 pub mod verify;
 mod view;
+mod wet;
 mod whitewater;
 
 use std::{
@@ -76,6 +77,8 @@ enum Command {
     Tune(Box<tune::TuneArgs>),
     /// Make spray, foam and bubbles from a finished bake, as a stream beside it.
     Whitewater(whitewater::WhitewaterArgs),
+    /// Make the wetness of solids from a finished bake, as a stream beside it: what stays wet.
+    Wet(wet::WetArgs),
     /// Hold a step on the GPU against the f64 reference, pass by pass.
     Check(check::CheckArgs),
     /// Show a scene's plan, a look's plan, what a study runs, a cache's frames, what a file is, or
@@ -315,6 +318,7 @@ impl Command {
             Self::Study(args) => args.progress,
             Self::Tune(args) => args.progress,
             Self::Whitewater(args) => args.progress,
+            Self::Wet(args) => args.progress,
             Self::Check(args) => args.progress,
             Self::View(args) => args.progress,
             Self::Inspect(_)
@@ -343,6 +347,7 @@ fn run(command: Command, progress: &Progress) -> Result<u8, Failure> {
         }
         Command::View(args) => view::run(&args, progress),
         Command::Whitewater(args) => whitewater::run(&args, progress),
+        Command::Wet(args) => wet::run(&args, progress),
         Command::Verify(args) => verify::run(&args).map(|()| 0).map_err(Failure::from),
         Command::Completions(args) => Ok(shell::completions(&args)),
         Command::Man(args) => shell::man(&args),

@@ -66,19 +66,24 @@ impl WhitewaterArgs {
             .clone()
             .or_else(of_file)
             .unwrap_or("default".into());
-        let is_plain = |b: u8| b.is_ascii_alphanumeric() || b"._-".contains(&b);
-        if !name.is_empty() && !name.starts_with(['.', '-']) && name.bytes().all(is_plain) {
-            return Ok(name);
-        }
-        Err(Failure {
-            code: 2,
-            error: format!(
-                "`{name}` is not a name for a stream; allowed are letters, digits, `.`, `_` and \
-                 `-` (--name)"
-            )
-            .into(),
-        })
+        stream_name(name)
     }
+}
+
+/// Checks the name of a stream, which is that of its folder.
+pub(super) fn stream_name(name: String) -> Result<String, Failure> {
+    let is_plain = |b: u8| b.is_ascii_alphanumeric() || b"._-".contains(&b);
+    if !name.is_empty() && !name.starts_with(['.', '-']) && name.bytes().all(is_plain) {
+        return Ok(name);
+    }
+    Err(Failure {
+        code: 2,
+        error: format!(
+            "`{name}` is not a name for a stream; allowed are letters, digits, `.`, `_` and `-` \
+             (--name)"
+        )
+        .into(),
+    })
 }
 
 pub(super) fn run(args: &WhitewaterArgs, progress: &Progress) -> Result<u8, Failure> {

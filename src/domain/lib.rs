@@ -68,4 +68,5 @@ pub mod tolerance;
 pub mod vdb;
 mod voxels;
 pub mod water_mesh;
+pub mod wet;
 pub mod whitewater;

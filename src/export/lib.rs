@@ -4,6 +4,7 @@
 //! Each format has its own file. `docs/interchange.md` lists the programs that open each format.
 
 pub mod mesh;
+pub mod surface;
 pub mod table;
 pub mod usd;
 

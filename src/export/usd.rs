@@ -5,16 +5,19 @@
 //! validators ask for; names and semantics follow the schemas of UsdGeom and the documentation of
 //! value clips.
 
+mod solids;
 mod text;
 mod water;
 
-use glam::{DQuat, DVec3, Vec3};
+use glam::{DVec3, Vec3};
 
 use super::FileOrigin;
-use swell_domain::{bounds::Bounds, eye::Eye, mesh::TriangleMesh, pose::Pose};
+use swell_domain::{bounds::Bounds, eye::Eye};
 
+use solids::{declare_wetness, put_mesh, put_solids, put_wetness};
 use text::{Text, asset, name, quoted};
 
+pub use solids::{Solid, solid_names};
 pub use water::{WaterFrame, WaterLayer, WaterPrim, WaterRepresentation};
 
 /// Properties that all layers of a shot share.
@@ -28,19 +31,6 @@ pub struct Shot<'a> {
     pub frames: [u32; 2],
     /// World position of the scene's origin, metres.
     pub origin: DVec3,
-}
-
-/// A solid of the scene.
-#[derive(Clone, Debug)]
-pub struct Solid {
-    /// Name, which is made valid and unique if necessary.
-    pub name: String,
-    /// Mesh in metres, relative to the scene's origin.
-    pub mesh: TriangleMesh,
-    /// Pose at each frame; empty for a static solid.
-    pub way: Vec<(u32, Pose)>,
-    /// Mesh at each frame, for a solid whose shape changes.
-    pub shapes: Vec<(u32, TriangleMesh)>,
 }
 
 /// A wall of the domain that makes waves.
@@ -137,6 +127,7 @@ pub fn manifest(root: &Root<'_>) -> Vec<u8> {
         }
         text.close();
     }
+    declare_wetness(&mut text, &root.solids);
     text.close();
     text.into_bytes()
 }
@@ -183,60 +174,6 @@ pub fn root(root: &Root<'_>) -> Vec<u8> {
     text.into_bytes()
 }
 
-fn put_solids(text: &mut Text, solids: &[Solid]) {
-    if solids.is_empty() {
-        return;
-    }
-    text.open("def Xform \"solids\"");
-    let mut taken = Vec::new();
-    for solid in solids {
-        let wanted = name(&solid.name);
-        let count = taken.iter().filter(|other| **other == wanted).count();
-        taken.push(wanted.clone());
-        let single = match count {
-            0 => wanted,
-            more => format!("{wanted}_{}", more + 1),
-        };
-        text.open(&format!("def Mesh {}", quoted(&single)));
-        match solid.shapes.is_empty() {
-            true => put_mesh(text, &solid.mesh.vertices, &solid.mesh.triangles),
-            false => put_shapes(text, &solid.shapes),
-        }
-        put_way(text, &solid.way);
-        text.close();
-    }
-    text.close();
-}
-
-/// Writes the motion of a solid. A solid that turns does so about its rest point, so that it stays
-/// on its arc between frames.
-fn put_way(text: &mut Text, way: &[(u32, Pose)]) {
-    let Some((_, first)) = way.first() else {
-        return;
-    };
-    let sampled = |of: &dyn Fn(&Pose) -> String| -> Vec<_> {
-        way.iter().map(|(frame, pose)| (*frame, of(pose))).collect()
-    };
-    let turns = way.iter().any(|(_, pose)| pose.turn != DQuat::IDENTITY);
-    if !turns {
-        let samples = sampled(&|pose| text::triple(pose.place(DVec3::ZERO)));
-        text.samples("double3 xformOp:translate", &samples);
-        text.line("uniform token[] xformOpOrder = [\"xformOp:translate\"]");
-        return;
-    }
-    let samples = sampled(&|pose| text::triple(pose.centre));
-    text.samples("double3 xformOp:translate", &samples);
-    let samples =
-        sampled(&|Pose { turn, .. }| format!("({}, {}, {}, {})", turn.w, turn.x, turn.y, turn.z));
-    text.samples("quatd xformOp:orient", &samples);
-    let rest = text::triple(DVec3::ZERO - first.rest);
-    text.line(&format!("double3 xformOp:translate:rest = {rest}"));
-    text.line(
-        "uniform token[] xformOpOrder = [\"xformOp:translate\", \"xformOp:orient\", \
-         \"xformOp:translate:rest\"]",
-    );
-}
-
 fn put_wave_makers(text: &mut Text, makers: &[WaveMaker]) {
     if makers.is_empty() {
         return;
@@ -251,57 +188,6 @@ fn put_wave_makers(text: &mut Text, makers: &[WaveMaker]) {
         text.close();
     }
     text.close();
-}
-
-/// Writes a mesh of constant shape.
-fn put_mesh(text: &mut Text, vertices: &[DVec3], triangles: &[[u32; 3]]) {
-    let points: Vec<[f32; 3]> = vertices.iter().map(|p| p.as_vec3().to_array()).collect();
-    text.line(&format!("float3[] extent = {}", extent(&points, 0.0)));
-    text.array(
-        "int[] faceVertexCounts = ",
-        &vec![3; triangles.len()],
-        |x| x.to_string(),
-    );
-    text.array(
-        "int[] faceVertexIndices = ",
-        triangles.as_flattened(),
-        u32::to_string,
-    );
-    text.array("point3f[] points = ", &points, text::floats);
-    text.line("uniform token subdivisionScheme = \"none\"");
-}
-
-/// Writes a mesh that changes its shape; its triangles at each frame only where they change too.
-fn put_shapes(text: &mut Text, shapes: &[(u32, TriangleMesh)]) {
-    let triangles = &shapes[0].1.triangles;
-    let is_kept = shapes.iter().all(|(_, mesh)| mesh.triangles == *triangles);
-    let points = |mesh: &TriangleMesh| -> Vec<[f32; 3]> {
-        (mesh.vertices.iter().map(|p| p.as_vec3().to_array())).collect()
-    };
-    let extents = shapes
-        .iter()
-        .map(|(frame, mesh)| (*frame, extent(&points(mesh), 0.0)));
-    text.samples("float3[] extent", &extents.collect::<Vec<_>>());
-    let of_triangles =
-        |text: &mut Text, attribute: &str, of: &dyn Fn(&TriangleMesh) -> Vec<u32>| match is_kept {
-            true => {
-                let before = format!("{attribute} = ");
-                text.array(&before, &of(&shapes[0].1), u32::to_string);
-            }
-            false => {
-                let all = shapes.iter().map(|(frame, mesh)| (*frame, of(mesh)));
-                text.array_samples(attribute, all, u32::to_string);
-            }
-        };
-    of_triangles(text, "int[] faceVertexCounts", &|mesh| {
-        vec![3; mesh.triangles.len()]
-    });
-    of_triangles(text, "int[] faceVertexIndices", &|mesh| {
-        mesh.triangles.as_flattened().to_vec()
-    });
-    let all = shapes.iter().map(|(frame, mesh)| (*frame, points(mesh)));
-    text.array_samples("point3f[] points", all, text::floats);
-    text.line("uniform token subdivisionScheme = \"none\"");
 }
 
 fn put_camera(text: &mut Text, views: &[CameraFrame]) {
@@ -367,9 +253,15 @@ fn extent(points: &[[f32; 3]], margin: f64) -> String {
     format!("[{}, {}]", corner(min), corner(max))
 }
 
-/// Writes the layer of a frame: the water, whitewater beside it, and the displacement of each wave
-/// maker, metres. The layer can also be opened without the root.
-pub fn frame(shot: &Shot<'_>, waters: &[WaterLayer<'_>], makers: &[(String, DVec3)]) -> Vec<u8> {
+/// Writes the layer of a frame: the water, whitewater beside it, the displacement of each wave
+/// maker, metres, and the wetness of each solid's vertices, by the names of [`solid_names`]. The
+/// layer can also be opened without the root.
+pub fn frame(
+    shot: &Shot<'_>,
+    waters: &[WaterLayer<'_>],
+    makers: &[(String, DVec3)],
+    wetness: &[(String, &[f32])],
+) -> Vec<u8> {
     let at = shot.source.frame;
     let mut text = Text::default();
     begin(&mut text, shot, &format!("frame {at}"), [at, at]);
@@ -386,6 +278,7 @@ pub fn frame(shot: &Shot<'_>, waters: &[WaterLayer<'_>], makers: &[(String, DVec
         }
         text.close();
     }
+    put_wetness(&mut text, at, wetness);
     text.close();
     text.into_bytes()
 }

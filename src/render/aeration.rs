@@ -420,6 +420,7 @@ mod tests {
                 max: DVec3::new(3.0, 4.0, 5.0),
             },
             solids: Vec::new(),
+            wet: None,
             parts: Vec::new(),
             particle_spacing: 0.5,
             frames_per_second: 24.0,

@@ -40,6 +40,7 @@ mod tiles;
 mod tree;
 mod uniform;
 pub mod view;
+mod wet;
 
 use std::path::PathBuf;
 
@@ -60,6 +61,7 @@ pub use opaque::opaque;
 pub use plan::{Limits, Plan, Runs};
 pub use renderer::{Part, Renderer};
 pub use uniform::mirrors;
+pub use wet::WetSolids;
 
 /// Scene data that a picture needs besides the particles.
 #[derive(Clone, Debug)]
@@ -70,6 +72,8 @@ pub struct RenderScene {
     pub domain: Bounds,
     /// Meshes of the solids in world space, metres.
     pub solids: Vec<TriangleMesh>,
+    /// Wetness of the solids; `None` where the look draws none.
+    pub wet: Option<WetSolids>,
     /// Named parts of each mesh of `solids`; empty where the look names no materials.
     pub parts: Vec<SolidParts>,
     /// Particle spacing d, metres.

@@ -4,6 +4,7 @@ use super::RenderScene;
 use super::plan::Plan;
 use super::sky::{Sky, extinction};
 use super::uniform;
+use super::wet::film;
 use swell_gpu::texture::{SamplerSpec, TextureSpec};
 use swell_scene::look::{Look, LookSpec, SkySpec};
 
@@ -47,8 +48,7 @@ pub(super) fn shading(
         disc: sky.disc,
         extent: scene.extent() as f32,
         shadow_offset: (SHADOW_OFFSET * scene.extent()) as f32,
-        pad0: 0.0,
-        pad1: 0.0,
+        film: film(spec).map(|x| x as f32),
         irradiance: sky.irradiance,
         shadow_from_world,
     }

@@ -11,6 +11,7 @@ use super::{
     materials::{Painted, Painter},
     moving::{Mover, is_blurred},
     uniform::Triangle,
+    wet::DrawnSolid,
 };
 use swell_domain::mesh::TriangleMesh;
 use swell_scene::look::{AovSpec, BasinSpec, Look};
@@ -178,25 +179,26 @@ impl Opaque {
                 Some(painter) => Some(painter.solid(index)?),
                 None => None,
             };
-            for (k, corners) in mesh.triangles.iter().enumerate() {
-                let mut points = [DVec3::ZERO; 3];
-                for (point, &index) in points.iter_mut().zip(corners) {
-                    *point = *mesh.vertices.get(index as usize).ok_or_else(|| {
-                        RenderError::Scene(format!(
-                            "a triangle refers to vertex {index}, which does not exist"
-                        ))
-                    })?;
+            let drawn = DrawnSolid::of(scene, index)?;
+            // Parts of one triangle have one paint.
+            let mut last: Option<(usize, [u32; 2])> = None;
+            for (k, &corners) in drawn.triangles.iter().enumerate() {
+                let points = points_of(&drawn.vertices, corners)?;
+                if !has_normal(points, scene) {
+                    continue;
                 }
-                // A degenerate triangle has no normal and is invisible.
-                let area = (points[1] - points[0]).cross(points[2] - points[0]);
-                if area.length() > 1e-10 * scene.particle_spacing.powi(2) {
-                    let points = points.map(|p| p - origin);
-                    let paint = match &mut painter {
-                        Some(painter) => painter.paint(k, points)?,
-                        None => [0; 2],
-                    };
-                    self.push(points, material, paint);
-                }
+                let parent = drawn.parent(k);
+                let paint = match (last, &mut painter) {
+                    (Some((painted, paint)), _) if painted == parent => paint,
+                    (_, Some(painter)) => {
+                        let whole = points_of(&mesh.vertices, mesh.triangles[parent])?;
+                        painter.paint(parent, whole.map(|p| p - origin))?
+                    }
+                    (_, None) => [0; 2],
+                };
+                last = Some((parent, paint));
+                let wetness = drawn.packed_wetness(corners);
+                self.push(points.map(|p| p - origin), material | wetness, paint);
             }
             self.moves_from(first, motion);
             if let (Some(motion), Some(painter)) = (motion, painter) {
@@ -251,6 +253,24 @@ impl Opaque {
             self.push(corners, material, [0; 2]);
         }
     }
+}
+
+fn points_of(vertices: &[DVec3], corners: [u32; 3]) -> Result<[DVec3; 3], RenderError> {
+    let mut points = [DVec3::ZERO; 3];
+    for (point, index) in points.iter_mut().zip(corners) {
+        *point = *vertices.get(index as usize).ok_or_else(|| {
+            RenderError::Scene(format!(
+                "a triangle refers to vertex {index}, which does not exist"
+            ))
+        })?;
+    }
+    Ok(points)
+}
+
+/// Whether a triangle has a normal; a degenerate one is invisible.
+fn has_normal([a, b, c]: [DVec3; 3], scene: &RenderScene) -> bool {
+    let area = (b - a).cross(c - a);
+    area.length() > 1e-10 * scene.particle_spacing.powi(2)
 }
 
 /// Number of a motion in [`Opaque::movers`].

@@ -319,6 +319,7 @@ mod tests {
                 max: DVec3::ONE,
             },
             solids,
+            wet: None,
             parts: Vec::new(),
             particle_spacing: 0.1,
             frames_per_second: 24.0,
@@ -499,6 +500,14 @@ mod tests {
             sizes.insert(plan.bytes());
         }
         assert_eq!(sizes.len(), 17, "each look takes what it needs: {sizes:?}");
+        // Wet solids take no buffer and no byte but those of their finer triangles.
+        const WALLS: &str = "[basin]\nheight_m = 0.5\n";
+        for method in ["", RAYS] {
+            let [dry, wet] =
+                ["", "[wet]\n"].map(|it| plan("narrow_range", &format!("{method}{WALLS}{it}")));
+            assert_eq!(used(&wet), planned(&wet), "wet {method}");
+            assert_eq!((planned(&wet), wet.bytes()), (planned(&dry), dry.bytes()));
+        }
         // Paths exist where the shutter is open, and motion of spray where a channel shows it.
         let motion_alone = "[output]\nformats = [\"exr\"]\naovs = [\"forward\"]\n";
         let white = "[whitewater]\n";

@@ -56,7 +56,7 @@ pub(super) fn shadow_from_world(
         ));
     }
     let is_solid = |triangle: &Triangle| {
-        triangle.material == 0 || (SOLIDS..OWN_COLOURS).contains(&triangle.material)
+        triangle.code() == 0 || (SOLIDS..OWN_COLOURS).contains(&triangle.code())
     };
     for triangle in triangles.filter(is_solid) {
         for p in [triangle.a, triangle.b, triangle.c] {
@@ -102,9 +102,9 @@ const SOLID: RasterSpec = RasterSpec {
     defines: &[],
 };
 
-/// Writes depth and triangle index, from which the normal and the material follow.
-const PAINTED: RasterSpec = RasterSpec {
-    defines: &["MATERIALS"],
+/// Writes depth and triangle index, from which everything else follows.
+const INDEXED: RasterSpec = RasterSpec {
+    defines: &["INDEXED"],
     ..SOLID
 };
 
@@ -123,8 +123,8 @@ pub(super) struct Set<'a> {
     pub(super) triangles: &'a [Triangle],
     /// Texture mappings, which follow the triangles.
     pub(super) places: &'a [Triangle],
-    /// Whether the look names materials.
-    pub(super) is_painted: bool,
+    /// Whether shading needs the triangles: the look names materials or wet solids.
+    pub(super) is_indexed: bool,
 }
 
 /// Plans the shadow map and returns the command that draws it: for each sample where solids move
@@ -172,7 +172,7 @@ pub(super) fn plan_solids(plan: &mut Plan, set: &Set<'_>, limits: &Limits) -> Ve
     plan.buffer(&SOLID_DEPTH, pixels);
     plan.buffer(&SOLID_PACKED, pixels);
     if triangles.is_empty() {
-        if set.is_painted {
+        if set.is_indexed {
             plan.values(&TRIANGLES, &[Triangle::default()]);
         }
         return vec![plan.fill(&SOLID_DEPTH, FAR.to_bits(), pixels)];
@@ -194,7 +194,7 @@ pub(super) fn plan_solids(plan: &mut Plan, set: &Set<'_>, limits: &Limits) -> Ve
         })
         .collect();
     plan.windows(&TILES, &uniforms);
-    let raster = if set.is_painted { PAINTED } else { SOLID };
+    let raster = if set.is_indexed { INDEXED } else { SOLID };
     let vertices = 6 * triangles.len() as u32;
     tiles
         .into_iter()

@@ -139,6 +139,7 @@ mod tests {
                 max: DVec3::splat(4.0),
             },
             solids: Vec::new(),
+            wet: None,
             parts: Vec::new(),
             particle_spacing: D,
             frames_per_second: 24.0,

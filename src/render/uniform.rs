@@ -107,8 +107,7 @@ mirror!(
         disc: f32,
         extent: f32,
         shadow_offset: f32,
-        pad0: f32,
-        pad1: f32,
+        film: [f32; 2],
         irradiance: [[f32; 4]; 9],
         shadow_from_world: [[f32; 4]; 4],
     }
@@ -338,6 +337,13 @@ mirror!(
         right_child: u32,
     }
 );
+
+impl Triangle {
+    /// Material code, without the wetness of the corners.
+    pub(super) fn code(&self) -> u32 {
+        self.material & 255
+    }
+}
 
 /// Returns the layouts of all structs that the renderer shares with its shaders, by their WGSL
 /// names.

@@ -23,7 +23,7 @@ pub use spec::{
     FilterSpec, FitSpec, FormatSpec, ImageSpec, KeyframeSpec, LensSpec, LightSpec, LookSpec,
     MaterialSpec, MethodSpec, OutputSpec, RendererSpec, RippleSpec, SeaSpec, SeaWavesSpec, SkySpec,
     SolidsOutput, SplatSpec, SpraySpec, SunSpec, SurfaceSpec, TextureSpec, TransformSpec, ViewSpec,
-    WaterSpec, WaveMakersSpec, WhitewaterLook, WindowsSpec,
+    WaterSpec, WaveMakersSpec, WetLook, WhitewaterLook, WindowsSpec,
 };
 
 /// Largest number of samples per pixel.
@@ -206,7 +206,7 @@ impl Look {
             spec.renderer.method = method;
             spec.water.spray = None;
             spec.water.caustics = None;
-            spec.whitewater = None;
+            (spec.whitewater, spec.wet) = (None, None);
             spec.camera.lens = None;
             (spec.image.samples, spec.image.shutter) = (1, 0.0);
             plain(spec);
@@ -224,7 +224,7 @@ impl Look {
             if method == MethodSpec::Ssfr {
                 spec.water.caustics = None;
             }
-            spec.whitewater = None;
+            (spec.whitewater, spec.wet) = (None, None);
             spec.output.aovs = Vec::new();
             plain(spec);
         })
@@ -300,8 +300,9 @@ fn plain(spec: &mut LookSpec) {
 
 /// Text of newer keys at their defaults, which the hash leaves out. A look that does not use such a
 /// key keeps the hash that it had before the key existed.
-const NEWER: [&str; 22] = [
+const NEWER: [&str; 23] = [
     "whitewater: None, ",
+    "wet: None, ",
     "renderer: RendererSpec { method: Ssfr }, ",
     "overscan: 0, ",
     "crop: None, ",

@@ -129,6 +129,17 @@ pub enum CheckError {
     /// A whitewater stream, or the water that it was made from, cannot be used.
     #[error(transparent)]
     Whitewater(#[from] WhitewaterError),
+    /// A stream that no GPU pass makes.
+    #[error(
+        "{} is a stream of {of}, which is made on the CPU: no pass is checked",
+        directory.display()
+    )]
+    NoPasses {
+        /// Directory of the stream.
+        directory: PathBuf,
+        /// What it holds.
+        of: &'static str,
+    },
     /// Nothing was compared, which must not count as a success.
     #[error("nothing was compared: there is no water in it")]
     NoWater,
@@ -143,6 +154,7 @@ impl From<&CheckError> for Blame {
             CheckError::Gpu(error) => error.into(),
             CheckError::Solve(error) => error.into(),
             CheckError::Whitewater(error) => error.into(),
+            CheckError::NoPasses { .. } => Self::Input,
             CheckError::NoWater => Self::Input,
         }
     }
@@ -316,6 +328,12 @@ fn open(source: &CheckInput) -> Result<(Subject, Vec<u32>), CheckError> {
             if cache.manifest().is_whitewater() {
                 let stream = Stream::open(directory, cache, &frames)?;
                 return Ok((Subject::Whitewater(Box::new(stream)), frames));
+            }
+            if let Some(of) = cache.manifest().stream_of() {
+                return Err(CheckError::NoPasses {
+                    directory: directory.clone(),
+                    of,
+                });
             }
             let scene = super::baked_scene(&cache, directory)?;
             let start = Start::of_cache::<CheckError>(&scene, &cache)?;

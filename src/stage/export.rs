@@ -37,6 +37,7 @@ use swell_scene::{Scene, look::Look};
 use super::{
     baked_scene,
     numbering::Numbering,
+    wet::WetStream,
     whitewater::{directory, is_of},
 };
 
@@ -95,6 +96,8 @@ pub struct ExportRequest {
     pub foam: Option<String>,
     /// Name of a whitewater stream that USD shots have as points beside the water.
     pub whitewater: Option<String>,
+    /// Name of the stream of wetness that the solids of a USD shot get.
+    pub wet: Option<String>,
     /// Files to export; at least one target.
     pub targets: Vec<Target>,
     /// Frames to export; all frames with particles if `None`.
@@ -265,6 +268,8 @@ struct ExportJob<'a> {
     foam: Option<CacheReader>,
     /// The whitewater stream beside the water in USD shots.
     whitewater: Option<CacheReader>,
+    /// The wetness of the solids, and the name of its stream.
+    wet: Option<(WetStream, &'a str)>,
     scene: Scene,
     /// All requested frames, of every process.
     frames: Vec<u32>,
@@ -278,10 +283,10 @@ impl<'a> ExportJob<'a> {
     fn new(request: &'a ExportRequest) -> Result<Self, ExportError> {
         asked::check(request)?;
         let cache = CacheReader::open(&request.cache)?;
-        if cache.manifest().is_whitewater() {
+        if let Some(of) = cache.manifest().stream_of() {
             return Err(ExportError::Asked(format!(
-                "{} is a stream of whitewater: export the cache that it was \
-                 made from, and name this stream of it",
+                "{} is a stream of {of}: export the cache that it was made from, and name this \
+                 stream of it",
                 request.cache.display()
             )));
         }
@@ -307,6 +312,13 @@ impl<'a> ExportJob<'a> {
         }
         let scene = baked_scene(&cache, &request.cache)?;
         check_fog_voxel(request, scene.particle_spacing())?;
+        let wet = match &request.wet {
+            Some(name) => {
+                let stream = WetStream::open(&request.cache, name, (&cache, &scene), &frames)?;
+                Some((stream, &**name))
+            }
+            None => None,
+        };
         let needs_python = |target: &Target| match target {
             Target::Mesh(files) => files.ending() == "usdc",
             Target::Usd(file, _) => is_binary(file),
@@ -322,6 +334,7 @@ impl<'a> ExportJob<'a> {
             stream,
             foam,
             whitewater,
+            wet,
             scene,
             numbering: Numbering::new(&frames, request.number_from),
             frames,

@@ -22,7 +22,7 @@ use super::{
     bake::BakePlan,
     device::{Gpu, needs},
     prepare::Start,
-    probes, whitewater,
+    probes, wet, whitewater,
 };
 
 pub use swell_scene::solid_grid::MOST_NODES;
@@ -188,8 +188,10 @@ pub struct CacheSizes {
     pub streams: Vec<(&'static str, u64)>,
     /// Name, last frame and bytes of each whitewater stream; the bytes are included in the cache's.
     pub whitewater: Vec<(String, u32, u64)>,
+    /// The same of each stream of the wetness of solids.
+    pub wet: Vec<(String, u32, u64)>,
     /// Predicted device memory of its solver at the start, under common limits; `None` for a
-    /// whitewater stream.
+    /// stream made from a bake.
     pub device_bytes: Option<u64>,
     /// Wall-clock seconds of its frames as they were baked, where known.
     pub seconds: Vec<f64>,
@@ -230,9 +232,9 @@ impl From<&SizesError> for Blame {
 /// [`SizesError`].
 pub fn sizes(directory: &Path) -> Result<CacheSizes, SizesError> {
     let reader = CacheReader::open(directory)?;
-    let device_bytes = match reader.manifest().is_whitewater() {
-        true => None,
-        false => {
+    let device_bytes = match reader.manifest().stream_of() {
+        Some(_) => None,
+        None => {
             let scene = super::baked_scene(&reader, directory)?;
             let start = Start::of_cache::<SizesError>(&scene, &reader)?;
             Some(start.shown_plan(&scene, COMMON_LIMITS).bytes().0)
@@ -242,32 +244,28 @@ pub fn sizes(directory: &Path) -> Result<CacheSizes, SizesError> {
     for stream in Stream::all(reader.manifest()) {
         streams.push((stream.name, folder_bytes(&directory.join(stream.folder))?));
     }
-    let mut of_whitewater = Vec::new();
-    for folder in whitewater_folders(directory)? {
-        let stream = CacheReader::open(&folder)?;
-        let name = folder.file_name().unwrap_or_default();
-        let bytes = folder_bytes(&folder)?;
-        of_whitewater.push((
-            name.to_string_lossy().into_owned(),
-            stream.last_frame(),
-            bytes,
-        ));
-    }
     Ok(CacheSizes {
         bytes: folder_bytes(directory)?,
         streams,
-        whitewater: of_whitewater,
+        whitewater: made_streams(directory, whitewater::FOLDER)?,
+        wet: made_streams(directory, wet::FOLDER)?,
         device_bytes,
         seconds: reader.seconds()?.into_values().collect(),
     })
 }
 
-/// Folders of a cache's whitewater streams, sorted by name.
-fn whitewater_folders(cache: &Path) -> Result<Vec<PathBuf>, SizesError> {
-    let folder = cache.join(whitewater::FOLDER);
+/// Name, last frame and bytes of each stream in a folder of a cache, sorted by name.
+fn made_streams(cache: &Path, folder: &str) -> Result<Vec<(String, u32, u64)>, SizesError> {
+    let folder = cache.join(folder);
     let mut streams = output::paths(&folder).map_err(|error| unread(&error.path, error.source))?;
     streams.retain(|it| swell_cache::exists(it));
-    Ok(streams)
+    let of = |folder: &PathBuf| {
+        let stream = CacheReader::open(folder)?;
+        let name = folder.file_name().unwrap_or_default();
+        let name = name.to_string_lossy().into_owned();
+        Ok((name, stream.last_frame(), folder_bytes(folder)?))
+    };
+    streams.iter().map(of).collect()
 }
 
 fn unread(folder: &Path, source: io::Error) -> SizesError {

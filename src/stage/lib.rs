@@ -19,6 +19,7 @@ pub mod time;
 pub mod verify;
 pub mod view;
 mod watch;
+pub mod wet;
 pub mod whitewater;
 
 use std::path::Path;

@@ -9,6 +9,7 @@ mod near;
 mod pictures;
 mod plan;
 mod set;
+mod streams;
 pub mod surfaces;
 mod whitewater;
 mod writing;
@@ -28,7 +29,6 @@ use swell_domain::{
     chunk::{Chunk, share},
     frame_range::FrameRange,
     mesh_file::MeshError,
-    particles::Particles,
     signed_distance::SignedDistanceError,
     solver::PassTime,
 };
@@ -43,12 +43,13 @@ use self::folder::{Folder, Owner, Wanted};
 use self::near::Near;
 use self::pictures::{attributes, baked_note, is_current, name, pictures, whole_attributes};
 use self::set::{render_scene, solid_names};
-use self::whitewater::WhitewaterStream;
+use self::streams::Streams;
 use self::writing::{DrawnFrame, Writing, end_writing};
 use super::{
     Blame,
     device::{Gpu, PassTimes, shaders_note},
     numbering::Numbering,
+    wet::WetError,
 };
 
 pub use self::{
@@ -191,13 +192,21 @@ pub enum RenderJobError {
          them"
     )]
     NoNeighbours(u32),
-    /// The given cache is a whitewater stream, not a bake.
-    #[error("{} is a stream of whitewater: render the cache that it was made from, with a \
-             look that has [whitewater]", .0.display())]
-    IsWhitewater(PathBuf),
+    /// The given cache is itself a stream, not a bake.
+    #[error("{} is a stream of {of}: render the cache that it was made from, with a look that \
+             names the stream", directory.display())]
+    IsStream {
+        /// The given cache.
+        directory: PathBuf,
+        /// What it holds.
+        of: &'static str,
+    },
     /// The whitewater stream that the look draws cannot be used.
     #[error(transparent)]
     Whitewater(#[from] StreamError),
+    /// The wetness of solids that the look draws cannot be used.
+    #[error(transparent)]
+    Wet(#[from] WetError),
     /// The output would be written into a cache.
     #[error(transparent)]
     IntoCache(#[from] IntoCache),
@@ -213,6 +222,7 @@ impl RenderJobError {
             self,
             Self::Cache(_)
                 | Self::Whitewater(StreamError::Cache(_))
+                | Self::Wet(WetError::Cache(_))
                 | Self::Render(RenderError::NotFinite { .. })
         )
     }
@@ -225,6 +235,7 @@ impl From<&RenderJobError> for Blame {
             RenderJobError::Scene(_) | RenderJobError::Folder(_) => Self::Files,
             RenderJobError::Solid(error) => error.into(),
             RenderJobError::Look(error) => error.into(),
+            RenderJobError::Wet(error) => error.into(),
             RenderJobError::Gpu(error) => error.into(),
             RenderJobError::Render(RenderError::Gpu(error)) => error.into(),
             RenderJobError::Render(
@@ -234,7 +245,7 @@ impl From<&RenderJobError> for Blame {
                 | RenderError::UnderWater { .. },
             )
             | RenderJobError::NoWater
-            | RenderJobError::IsWhitewater(_)
+            | RenderJobError::IsStream { .. }
             | RenderJobError::IntoCache(_)
             | RenderJobError::MissingFeature(_) => Self::Input,
             RenderJobError::Whitewater(_)
@@ -265,7 +276,7 @@ pub fn render(
 ) -> Result<RenderOutcome, RenderJobError> {
     let Asked {
         cache,
-        whitewater,
+        streams,
         frames,
         ends,
         left_out,
@@ -296,7 +307,7 @@ pub fn render(
         folder: Arc::new(folder),
         writing: None,
         cache,
-        whitewater,
+        streams,
         scene,
         context,
         numbering,
@@ -315,7 +326,7 @@ pub fn render(
 /// The resources that a request names, checked to exist.
 struct Asked {
     cache: CacheReader,
-    whitewater: Option<WhitewaterStream>,
+    streams: Streams,
     /// Frames of this process's share.
     frames: Vec<u32>,
     /// The first and the last frame of all shares.
@@ -338,21 +349,16 @@ impl Asked {
             None => baked as usize - all.len(),
         };
         let frames = share(&all, request.chunk).to_vec();
-        if cache.manifest().is_whitewater() {
-            return Err(RenderJobError::IsWhitewater(request.cache.clone()));
+        if let Some(of) = cache.manifest().stream_of() {
+            return Err(RenderJobError::IsStream {
+                directory: request.cache.clone(),
+                of,
+            });
         }
-        let whitewater = match &request.look.spec().whitewater {
-            Some(look) => Some(WhitewaterStream::open(
-                &request.cache,
-                &look.stream,
-                &cache,
-                &frames,
-            )?),
-            None => None,
-        };
+        let streams = Streams::open(&request.cache, &request.look, &cache, &frames)?;
         Ok(Self {
             cache,
-            whitewater,
+            streams,
             frames,
             ends: all.first().zip(all.last()).map(|(&a, &b)| [a, b]),
             left_out,
@@ -429,8 +435,7 @@ struct RenderJob<'a> {
     /// drawn.
     writing: Option<Writing>,
     cache: CacheReader,
-    /// The whitewater stream that the look draws.
-    whitewater: Option<WhitewaterStream>,
+    streams: Streams,
     scene: Scene,
     context: Context,
     numbering: Numbering,
@@ -515,7 +520,7 @@ impl RenderJob<'_> {
     ) -> Result<Done, RenderJobError> {
         let begin = Instant::now();
         let request = self.request;
-        let attributes = whole_attributes(&self.cache, request, self.whitewater.as_ref(), frame)?;
+        let attributes = whole_attributes(&self.cache, request, &self.streams, frame)?;
         let pictures = pictures(&self.cache, &request.look, frame, self.numbering);
         let stands = || {
             let is_there = |(name, format): &(String, FormatSpec)| {
@@ -556,7 +561,8 @@ impl RenderJob<'_> {
         let mut renderer = match self.kept.take() {
             Some(renderer) => renderer,
             None => {
-                let set = render_scene(&self.scene, look, frame, &around.state())?;
+                let mut set = render_scene(&self.scene, look, frame, &around.state())?;
+                set.wet = self.streams.wet(frame)?;
                 Renderer::new(&self.context, look, &set).map_err(|error| told(error, look))?
             }
         };
@@ -564,10 +570,7 @@ impl RenderJob<'_> {
         if self.request.time_passes {
             renderer.time_passes();
         }
-        let white = match &self.whitewater {
-            Some(stream) => stream.read(frame)?,
-            None => Particles::default(),
-        };
+        let white = self.streams.white(frame)?;
         let mut written = Ok(());
         let picture = renderer.render_parts(frame, &around.inputs(&white), &mut |part| {
             // Reports the previous frame as soon as it is on disk, before this one is drawn.
@@ -583,9 +586,10 @@ impl RenderJob<'_> {
             let total = self.times.entry(time.pass);
             total.and_modify(|total| total.add(&time)).or_insert(time);
         }
-        // A renderer knows the paths of what moves about one frame.
+        // A renderer knows the paths of what moves about one frame, and the wetness at it.
         let draws_plates = look.spec().wave_makers.is_some() && !self.scene.wave_makers.is_empty();
-        let stands = self.scene.moving_solids.is_empty() && !draws_plates;
+        let is_wet = look.spec().wet.is_some();
+        let stands = self.scene.moving_solids.is_empty() && !draws_plates && !is_wet;
         self.kept = stands.then_some(renderer);
         Ok(picture)
     }

@@ -10,7 +10,7 @@ mod error;
 mod expected;
 mod forecast;
 mod settled;
-mod water;
+pub(super) mod water;
 
 use std::{
     path::{Path, PathBuf},
@@ -275,8 +275,11 @@ pub fn whitewater(
 /// Opens the bake, and determines the last frame to make.
 fn asked(request: &WhitewaterRequest) -> Result<(CacheReader, u32), WhitewaterError> {
     let cache = CacheReader::open(&request.cache)?;
-    if cache.manifest().is_whitewater() {
-        return Err(WhitewaterError::IsWhitewater(request.cache.clone()));
+    if let Some(of) = cache.manifest().stream_of() {
+        return Err(WhitewaterError::IsStream {
+            directory: request.cache.clone(),
+            of,
+        });
     }
     let last = request.last.unwrap_or(cache.last_frame());
     if !(cache.first_frame()..=cache.last_frame()).contains(&last) {
@@ -371,7 +374,7 @@ impl StreamStep<'_> {
 /// Key of a frame's report: the id that the next new particle gets.
 const NEXT_ID: &str = "next_id";
 /// Key of a frame's report: the chained hash of the bake's frame.
-const WATER: &str = "water";
+pub(super) const WATER: &str = "water";
 
 /// A stream being written.
 struct StreamWriter {

@@ -144,5 +144,6 @@ mod stage {
     mod sources;
     mod substeps;
     mod waiting;
+    mod wet;
     mod whitewater;
 }

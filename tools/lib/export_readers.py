@@ -186,6 +186,22 @@ def check_set(stage):
     must(np.cross(b - a, c - a)[0] > 0, "USD: the wave maker faces the water")
 
 
+def check_wet(stage, room):
+    """Wetness of the pier's vertices, against the stream's points as plyfile reads them."""
+    pier = UsdGeom.Mesh(stage.GetPrimAtPath("/pool_1/solids/pier"))
+    wetness = UsdGeom.PrimvarsAPI(pier).GetPrimvar("wetness")
+    must(wetness.GetInterpolation() == "vertex", "USD: wetness by vertex")
+    for frame in FRAMES:
+        row = PlyData.read(room / f"cache/wet/default/frames/pool-1.{frame:04}.ply")["vertex"].data
+        must(np.array_equal(np.array(wetness.Get(frame)), row["wetness"]), "USD: wetness")
+        place = np.stack([row[c] for c in "xyz"], axis=1)
+        must(np.array_equal(np.array(pier.GetPointsAttr().Get()), place), "USD: vertices of the wet pier")
+    must(not np.array_equal(np.array(wetness.Get(3)), np.roll(row["wetness"], 1)), "the control: wetness of other vertices")
+    triangles = np.array(pier.GetFaceVertexIndicesAttr().Get()).reshape(-1, 3)
+    must(is_closed(triangles), "USD: the wet pier is open")
+    must(abs(volume(place, triangles) - 0.4 * 0.8 * 0.4) < 1e-6, "USD: the wet pier holds what the pier does")
+
+
 def pixel(point):
     """Where the look's camera has a point: parts of the picture's width and height from its middle, by its pose alone."""
     forward = (TARGET - EYE) / np.linalg.norm(TARGET - EYE)
@@ -359,6 +375,8 @@ def main(swell):
         run("export", "cache", "--usd", "both.usda", "--usd-whitewater", "white", "--kinds", "spray,foam")
         run("export", "cache", "--mesh", "m.%04d.obj", "--usd", "mesh@@@2@.usd", "--usd-water", "mesh")
         run("export", "cache", "--usd", "binary.usdc", "--look", "look.toml", "--python", sys.executable)
+        run("wet", "cache", "--within", "0.4", "--progress", "none")
+        run("export", "cache", "--usd", "wet.usda", "--wet", "default")
         write_rig(room / "rig.usda")
         (room / "rig.toml").write_text(RIG)
         run("export", "cache", "--usd", "by_rig.usda", "--look", "rig.toml")
@@ -371,6 +389,9 @@ def main(swell):
             check_points(stage, room)
             check_set(stage)
             check_camera(stage)
+        stage = Usd.Stage.Open(str(room / "wet.usda"))
+        must(messages(stage) == [], f"wet.usda: OpenUSD says {messages(stage)}")
+        check_wet(stage, room)
         stage = Usd.Stage.Open(str(room / "mesh@@@2@.usd"))
         must(messages(stage) == [], f"mesh@@@2@.usd: OpenUSD says {messages(stage)}")
         check_mesh_shot(stage, room)
@@ -380,7 +401,7 @@ def main(swell):
         stage = Usd.Stage.Open(str(room / "both.usda"))
         must(messages(stage) == [], f"both.usda: OpenUSD says {messages(stage)}")
         check_whitewater(stage, room)
-        for name in ("shot.0002.usda", "shot.manifest.usda", "mesh@@@2@.0003.usd", "foam.0003.usda", "binary.0001.usdc"):
+        for name in ("shot.0002.usda", "shot.manifest.usda", "wet.0002.usda", "wet.manifest.usda", "mesh@@@2@.0003.usd", "foam.0003.usda", "binary.0001.usdc"):
             stage = Usd.Stage.Open(str(room / name))
             must(messages(stage) == [], f"{name}: OpenUSD says {messages(stage)}")
         must(Sdf.Layer.FindOrOpen(str(room / "binary.0001.usdc")).GetFileFormat().formatId == "usdc", "binary USD is text")

@@ -169,10 +169,11 @@ fn of_cache(directory: &Path) -> Result<Value, Failure> {
     let frames = entries.iter().map(|entry| frame(&manifest, entry, newest));
     let streams = sizes.streams.iter();
     let streams = streams.map(|(name, bytes)| json!({ "stream": name, "bytes": bytes }));
-    let whitewater = sizes
-        .whitewater
-        .iter()
-        .map(|(name, last, bytes)| json!({ "name": name, "last": last, "bytes": bytes }));
+    let made = |streams: &[(String, u32, u64)]| -> Vec<Value> {
+        (streams.iter())
+            .map(|(name, last, bytes)| json!({ "name": name, "last": last, "bytes": bytes }))
+            .collect()
+    };
     let probes = manifest.probes.iter();
     let probes = probes.map(|it| json!({ "probe": it.name, "columns": it.columns }));
     let total: f64 = sizes.seconds.iter().sum();
@@ -181,7 +182,7 @@ fn of_cache(directory: &Path) -> Result<Value, Failure> {
         "mean": total / sizes.seconds.len().max(1) as f64,
     });
     Ok(json!({
-        "kind": if manifest.is_whitewater() { "whitewater" } else { "cache" },
+        "kind": manifest.stream_of().map_or("cache", |_| &*manifest.solver),
         "shot": manifest.shot,
         "solver": manifest.solver,
         "program": format!("{} {}", manifest.program, manifest.program_version),
@@ -199,7 +200,8 @@ fn of_cache(directory: &Path) -> Result<Value, Failure> {
         "frames": frames.collect::<Vec<_>>(),
         "probes": probes.collect::<Vec<_>>(),
         "streams": streams.collect::<Vec<_>>(),
-        "whitewater": whitewater.collect::<Vec<_>>(),
+        "whitewater": made(&sizes.whitewater),
+        "wet": made(&sizes.wet),
         "disk_bytes": sizes.bytes,
         "device_bytes": sizes.device_bytes,
         "seconds": baked,

@@ -1,5 +1,7 @@
+use glam::DQuat;
+
 use super::*;
-use swell_domain::particles::Particles;
+use swell_domain::{mesh::TriangleMesh, particles::Particles, pose::Pose};
 
 fn shot() -> Shot<'static> {
     Shot {
@@ -39,7 +41,7 @@ fn a_frame_says_its_units_and_its_points() {
         content: WaterFrame::Points(&particles),
     };
     let layers = [layer("water"), layer("whitewater")];
-    let text = String::from_utf8(frame(&shot(), &layers, &way)).unwrap();
+    let text = String::from_utf8(frame(&shot(), &layers, &way, &[])).unwrap();
     for part in [
         "metersPerUnit = 1\n",
         "upAxis = \"Y\"",
@@ -68,6 +70,7 @@ fn a_root_plays_the_frames_that_it_is_given() {
         },
         way,
         shapes: Vec::new(),
+        is_wet: false,
     };
     let slid = |way| Pose {
         centre: way,
@@ -147,4 +150,67 @@ fn a_root_plays_the_frames_that_it_is_given() {
     }
     let text = String::from_utf8(manifest(&root_of)).unwrap();
     assert_eq!(text.matches("point3f[] points\n").count(), 2, "{text}");
+}
+
+/// Solids have their wetness in the frames' layers, under the names that the root gives them.
+#[test]
+fn a_frame_has_the_wetness_of_the_solids_of_its_root() {
+    let solid = |is_wet| Solid {
+        name: "box".to_owned(),
+        mesh: TriangleMesh {
+            vertices: vec![DVec3::ZERO, DVec3::X, DVec3::Y],
+            triangles: vec![[0, 1, 2]],
+        },
+        way: Vec::new(),
+        shapes: Vec::new(),
+        is_wet,
+    };
+    let of = |solids| Root {
+        shot: shot(),
+        waters: Vec::new(),
+        layers: vec![(7, "s.0007.usda".to_owned())],
+        manifest: "s.manifest.usda".to_owned(),
+        solids,
+        wave_makers: Vec::new(),
+        camera: Vec::new(),
+    };
+    let text = |bytes| String::from_utf8(bytes).unwrap();
+    let wet = of(vec![solid(true), solid(true)]);
+    for said in [text(root(&wet)), text(manifest(&wet))] {
+        assert_eq!(
+            said.matches("float[] primvars:wetness").count(),
+            2,
+            "{said}"
+        );
+        assert!(
+            said.contains("\"box\"") && said.contains("\"box_2\""),
+            "{said}"
+        );
+    }
+    let names = solid_names(["box", "box"].into_iter());
+    let values = [[0.0, 0.5, 1.0], [0.25; 3]];
+    let named: Vec<(String, &[f32])> = (names.into_iter().zip(&values))
+        .map(|(name, values)| (name, &values[..]))
+        .collect();
+    let particles = Particles::default();
+    let layer = |wetness: &[(String, &[f32])]| {
+        let water = WaterLayer {
+            name: "water",
+            kind: WaterRepresentation::Points { width: Some(0.2) },
+            content: WaterFrame::Points(&particles),
+        };
+        text(frame(&shot(), &[water], &[], wetness))
+    };
+    let said = layer(&named);
+    let second = said.find("over \"box_2\"").unwrap();
+    assert!(said[..second].contains("7: [0, 0.5, 1]"), "{said}");
+    assert!(said[second..].contains("7: [0.25, 0.25, 0.25]"), "{said}");
+    // Without wetness, nothing is said of it.
+    let dry = of(vec![solid(false)]);
+    for said in [text(root(&dry)), text(manifest(&dry)), layer(&[])] {
+        assert!(
+            !said.contains("wetness") && !said.contains("over \"solids\""),
+            "{said}"
+        );
+    }
 }

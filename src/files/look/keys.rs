@@ -1,7 +1,11 @@
 //! Keys of a look.
 
+mod streams;
+
 use super::super::key::{Interval, Key, words};
 use swell_scene::look::{FitSpec, MOST_SAMPLES, MOST_VOXELS};
+
+use streams::{WET, WHITEWATER};
 
 pub(in super::super) const KEYS: &[Key] = &[
     Key::table("camera", CAMERA).about(
@@ -22,6 +26,9 @@ pub(in super::super) const KEYS: &[Key] = &[
     Key::table("whitewater", WHITEWATER)
         .absent()
         .about("Spray, foam and bubbles of a stream that `swell whitewater` made"),
+    Key::table("wet", WET)
+        .absent()
+        .about("Solids that stay wet, by a stream that `swell wet` made"),
     Key::table("sun", SUN).default("{}").about("The sun"),
     Key::table("sky", SKY).about("What the water mirrors"),
     Key::table("ground", GROUND)
@@ -293,21 +300,6 @@ const SPRAY: &[Key] = &[
     Key::number("speed_m_per_s", 1e-3..=1e4)
         .unit("m/s")
         .about("speed from which the surface begins to whiten"),
-];
-
-const WHITEWATER: &[Key] = &[
-    Key::file_stem("stream")
-        .default("\"default\"")
-        .about("its name, which is that of its folder in CACHE/whitewater"),
-    Key::number("density_per_metre", PER_METRE)
-        .unit("1/m")
-        .default("40.0")
-        .about(
-            "optical density within a whitewater particle, which stands for many drops or bubbles",
-        ),
-    Key::number("size", 1e-3..=1e3)
-        .default("1.0")
-        .about("factor on its radius"),
 ];
 
 const SUN: &[Key] = &[

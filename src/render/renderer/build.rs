@@ -25,6 +25,7 @@ use crate::{
     shapes::RADIUS,
     sky::Sky,
     surface::{FlowSettings, Smoothing, curvature_flow, narrow_range},
+    wet::plan_wet,
 };
 use swell_scene::look::{AovSpec, FilterSpec, Look, MethodSpec, SplatSpec};
 
@@ -89,7 +90,7 @@ impl Plan {
         let set = Set {
             triangles: &triangles,
             places: &places,
-            is_painted: look.materials().is_some(),
+            is_indexed: look.materials().is_some() || spec.wet.is_some(),
         };
         // One projection for all samples, so that shadows of what rests stay where they are.
         let swept = plan.moving.iter().flat_map(MovingSet::swept);
@@ -123,6 +124,12 @@ impl Plan {
             MethodSpec::Ray => &["rays/cast"],
         };
         plan_materials(&mut plan, look, &painted, painting, limits)?;
+        // Rays have the triangles anyway.
+        let indexed = match spec.renderer.method {
+            MethodSpec::Ssfr => shaded,
+            MethodSpec::Ray => &[],
+        };
+        plan_wet(&mut plan, look, indexed, painting);
         plan_sea(&mut plan, look, scene, shaded);
         let shadow = plan_shadow(&mut plan, &set, &matrix, limits);
         plan_carried(&mut plan, look, scene, &codes);

@@ -1,11 +1,15 @@
 //! Serde types of the look file, without logic. Ranges are checked and defaults filled in before
 //! deserialization.
 
+mod streams;
+
 use std::path::PathBuf;
 
 use serde::Deserialize;
 
 use crate::Wall;
+
+pub use streams::{WetLook, WhitewaterLook};
 
 /// A look file.
 #[derive(Clone, Debug, Deserialize)]
@@ -23,6 +27,8 @@ pub struct LookSpec {
     pub water: WaterSpec,
     /// Stream of spray, foam and bubbles; none unless named.
     pub whitewater: Option<WhitewaterLook>,
+    /// Stream of the wetness of solids; none unless named.
+    pub wet: Option<WetLook>,
     /// The sun.
     pub sun: SunSpec,
     /// Sky that lights the scene and is reflected by the water.
@@ -254,18 +260,6 @@ pub struct CausticsSpec {
     pub resolution: u32,
     /// Standard deviation of the normals' smoothing, metres; 1.5 particle spacings if left out.
     pub smoothing_width_m: Option<f64>,
-}
-
-/// Rendering of a whitewater stream.
-#[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct WhitewaterLook {
-    /// Name of the stream in `CACHE/whitewater`.
-    pub stream: String,
-    /// Extinction within a whitewater particle, 1/m.
-    pub density_per_metre: f64,
-    /// Factor on the particle radius.
-    pub size: f64,
 }
 
 /// Whitening of detached and fast water.

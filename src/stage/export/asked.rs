@@ -25,6 +25,14 @@ pub(super) fn check(request: &ExportRequest) -> Result<(), ExportError> {
         );
     }
     check_whitewater(request)?;
+    if request.wet.is_some() && !has_shot {
+        return asked("wetness is of the solids of a USD shot, but none is exported".to_owned());
+    }
+    if let (Some(wet), Some(stream)) = (&request.wet, &request.stream) {
+        return asked(format!(
+            "the shot of the stream `{stream}` has no solids that could have the wetness `{wet}`"
+        ));
+    }
     let mut names = BTreeSet::new();
     for target in &request.targets {
         let (kind, ending, file, allowed): (_, _, _, &[&str]) = match target {

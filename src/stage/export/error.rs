@@ -2,7 +2,7 @@
 
 use std::{io, path::PathBuf};
 
-use crate::Blame;
+use crate::{Blame, wet::WetError};
 use swell_cache::{CacheError, IntoCache};
 use swell_domain::output::FileError;
 use swell_scene::{SceneError, look::LookError};
@@ -100,6 +100,9 @@ pub enum ExportError {
         /// The frame.
         frame: u32,
     },
+    /// The wetness of solids cannot be used.
+    #[error(transparent)]
+    Wet(#[from] WetError),
     /// The output would be written into a cache.
     #[error(transparent)]
     IntoCache(#[from] IntoCache),
@@ -116,13 +119,17 @@ pub enum ExportError {
 impl ExportError {
     /// Whether the fault is specific to the frame, so that other frames may still succeed.
     pub(super) fn is_of_frame(&self) -> bool {
-        matches!(self, Self::Cache(_) | Self::Vdb { .. })
+        matches!(
+            self,
+            Self::Cache(_) | Self::Wet(WetError::Cache(_)) | Self::Vdb { .. }
+        )
     }
 }
 
 impl From<&ExportError> for Blame {
     fn from(error: &ExportError) -> Self {
         match error {
+            ExportError::Wet(error) => error.into(),
             ExportError::Nothing
             | ExportError::Foam(_)
             | ExportError::Kinds

@@ -20,15 +20,18 @@ use super::{
 impl ExportJob<'_> {
     /// Describes how a shot represents its water, for the records of its layers and root.
     pub(super) fn water_settings(&self, water: UsdWater) -> String {
-        let water = match water {
+        let mut settings = match water {
             UsdWater::Points if self.stream.is_some() => format!("points{}", self.kinds_in_words()),
             UsdWater::Points => "points".to_owned(),
             UsdWater::Mesh => format!("mesh, {}", self.mesh_settings()),
         };
-        match &self.request.whitewater {
-            Some(name) => format!("{water}, whitewater {name}{}", self.kinds_in_words()),
-            None => water,
+        if let Some(name) = &self.request.whitewater {
+            settings += &format!(", whitewater {name}{}", self.kinds_in_words());
         }
+        if let Some((_, name)) = &self.wet {
+            settings += &format!(", wetness {name}");
+        }
+        settings
     }
 
     fn mesh_settings(&self) -> String {
@@ -96,6 +99,9 @@ impl ExportJob<'_> {
         for stream in self.beside(target) {
             source = format!("{source} {}", stream.frame_hash(frame)?);
         }
+        if let (Some((wet, _)), Target::Usd(..)) = (&self.wet, target) {
+            source += &format!(" wet {}", wet.frame_hash(frame)?);
+        }
         Ok(Wanted {
             file,
             owner: self.owner(target, settings)?,
@@ -131,10 +137,17 @@ impl ExportJob<'_> {
                 match files.ending().as_str() {
                     "ply" => mesh::ply(&placed, &source),
                     "obj" => mesh::obj(&placed, &source),
-                    _ => self.layer_bytes(UsdWater::Mesh, content, &source, false)?,
+                    _ => self.layer_bytes(UsdWater::Mesh, content, &source, None)?,
                 }
             }
-            Target::Usd(_, water) => self.layer_bytes(*water, content, &source, true)?,
+            Target::Usd(_, water) => {
+                let wetness = match &self.wet {
+                    Some((wet, _)) => wet.read(frame)?,
+                    None => Vec::new(),
+                };
+                let wetness = self.by_solid(&wetness);
+                self.layer_bytes(*water, content, &source, Some(&wetness))?
+            }
         })
     }
 
@@ -200,12 +213,14 @@ impl ExportJob<'_> {
         Ok(vdb::file(&self.stamp(content.frame)?, &grids, precision))
     }
 
+    /// Layer of a frame; that of a shot has what is `beside` the water: whitewater and the wetness
+    /// of solids.
     fn layer_bytes(
         &self,
         water: UsdWater,
         content: &Content<'_>,
         source: &FileOrigin<'_>,
-        has_whitewater: bool,
+        beside: Option<&[(String, &[f32])]>,
     ) -> Result<Vec<u8>, ExportError> {
         let shot = self.shot(source.frame);
         let makers = match self.stream {
@@ -220,14 +235,16 @@ impl ExportJob<'_> {
                 UsdWater::Mesh => usd::WaterFrame::Mesh(content.mesh()?, self.scene.domain.min),
             },
         }];
-        if has_whitewater && let Some(particles) = content.whitewater()? {
+        if beside.is_some()
+            && let Some(particles) = content.whitewater()?
+        {
             waters.push(usd::WaterLayer {
                 name: shot::WHITEWATER,
                 kind: usd::WaterRepresentation::Points { width: None },
                 content: usd::WaterFrame::Points(particles),
             });
         }
-        Ok(usd::frame(&shot, &waters, &makers))
+        Ok(usd::frame(&shot, &waters, &makers, beside.unwrap_or(&[])))
     }
 
     /// Name of the prim that holds the water, or the stream in place of it.

@@ -7,17 +7,18 @@ use std::{
 
 use glam::DVec3;
 
-use super::{ExportJob, Target, UsdWater, Wanted, beside};
+use super::{ExportError, ExportJob, Target, UsdWater, Wanted, beside, content::Content};
 use swell_cache::CacheError;
 use swell_domain::{
     body::BodyState,
     level_set::foam::{FOAM, FOAM_AGE},
+    mesh::TriangleMesh,
     particles::Particles,
 };
 use swell_export::usd::{
     self, CameraFrame, Root, Solid, WaterPrim, WaterRepresentation, WaveMaker,
 };
-use swell_scene::{Scene, Wall};
+use swell_scene::{PlacedMesh, Scene, Wall, moving_solid::MovingSolid};
 
 /// Name part of the shot's manifest layer, in the place of a frame number.
 const MANIFEST: &str = "manifest";
@@ -166,22 +167,27 @@ impl ExportJob<'_> {
 
     fn solids(&self) -> Result<Vec<Solid>, CacheError> {
         let scene = &self.scene;
-        let still = scene.solids.iter().map(|placed| Solid {
+        let still = scene.solids.iter().enumerate();
+        let still = still.map(|(index, placed)| Solid {
             name: placed.name(),
-            mesh: placed.mesh.clone(),
+            mesh: self.refined(index, placed.mesh.clone()),
             way: Vec::new(),
             shapes: Vec::new(),
+            is_wet: self.wet.is_some(),
         });
+        let first = scene.solids.len();
         let bodies = self.frames.iter().map(|&frame| self.bodies_at(frame));
         let bodies = bodies.collect::<Result<Vec<_>, _>>()?;
-        let moving = scene.moving_solids.iter().map(|solid| Solid {
+        let moving = (first..).zip(&scene.moving_solids);
+        let moving = moving.map(|(index, solid)| Solid {
             name: solid.name(),
-            mesh: solid.placed.mesh.clone(),
+            is_wet: self.wet.is_some(),
+            mesh: self.refined(index, solid.placed.mesh.clone()),
             shapes: (solid.sequence.iter())
                 .flat_map(|sequence| {
                     self.frames.iter().map(|&frame| {
                         let mesh = sequence.shape.mesh(scene.shot.time(frame));
-                        (self.numbering.of(frame), mesh)
+                        (self.numbering.of(frame), self.refined(index, mesh))
                     })
                 })
                 .collect(),
@@ -195,6 +201,41 @@ impl ExportJob<'_> {
                 .collect(),
         });
         Ok(still.chain(moving).collect())
+    }
+
+    /// A solid's mesh in any pose, refined where the shot has its wetness.
+    fn refined(&self, index: usize, mesh: TriangleMesh) -> TriangleMesh {
+        match &self.wet {
+            Some((stream, _)) => {
+                let surface = &stream.surfaces()[index];
+                TriangleMesh {
+                    vertices: surface.vertices(&mesh.vertices),
+                    triangles: surface.triangles.clone(),
+                }
+            }
+            None => mesh,
+        }
+    }
+
+    /// Parts of a frame's wetness by the names of the solids.
+    pub(super) fn by_solid<'w>(&self, wetness: &'w [f32]) -> Vec<(String, &'w [f32])> {
+        let Some((stream, _)) = &self.wet else {
+            return Vec::new();
+        };
+        let scene = &self.scene;
+        let still = scene.solids.iter().map(PlacedMesh::name);
+        let moving = scene.moving_solids.iter().map(MovingSolid::name);
+        let names: Vec<String> = still.chain(moving).collect();
+        let mut rest = wetness;
+        let surfaces = stream.surfaces().iter();
+        (usd::solid_names(names.iter().map(|name| &**name)).into_iter())
+            .zip(surfaces)
+            .map(|(name, surface)| {
+                let (own, others) = rest.split_at(surface.len());
+                rest = others;
+                (name, own)
+            })
+            .collect()
     }
 
     /// The look's camera at each frame; empty without a look.

@@ -39,7 +39,7 @@ impl ExpectedRender {
 pub fn expected(request: &RenderRequest) -> Result<ExpectedRender, RenderJobError> {
     let Asked {
         cache,
-        whitewater,
+        streams,
         frames,
         numbering,
         ..
@@ -52,7 +52,7 @@ pub fn expected(request: &RenderRequest) -> Result<ExpectedRender, RenderJobErro
     let mut found = ExpectedRender::default();
     let mut bytes = 0;
     for &frame in &frames {
-        let attributes = whole_attributes(&cache, request, whitewater.as_ref(), frame)?;
+        let attributes = whole_attributes(&cache, request, &streams, frame)?;
         let mut stands = true;
         let mut size = 0;
         for (name, format) in pictures(&cache, &request.look, frame, numbering) {

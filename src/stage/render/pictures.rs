@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{RenderRequest, whitewater::WhitewaterStream};
+use super::{RenderRequest, streams::Streams};
 use crate::{device::shaders_note, numbering::Numbering};
 use swell_cache::{CacheError, CacheReader, Manifest};
 use swell_render::{
@@ -15,14 +15,12 @@ use swell_scene::look::{FormatSpec, Look};
 pub(super) fn whole_attributes(
     cache: &CacheReader,
     request: &RenderRequest,
-    whitewater: Option<&WhitewaterStream>,
+    streams: &Streams,
     frame: u32,
 ) -> Result<Attributes, CacheError> {
     let mut attributes = attributes(cache, request, frame)?;
     attributes.cache_hash += &around(cache, &request.look, frame)?;
-    if let Some(stream) = whitewater {
-        attributes.cache_hash += &format!(" {}", stream.frame_hash(frame)?);
-    }
+    attributes.cache_hash += &streams.frame_hashes(frame)?;
     Ok(attributes)
 }
 

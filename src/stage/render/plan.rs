@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use glam::DVec3;
 
-use super::{RenderJobError, WhitewaterStream, near::Near, render_scene, set::FrameState, told};
+use super::{RenderJobError, Streams, near::Near, render_scene, set::FrameState, told};
 use crate::{baked_scene, device::Gpu, prepare::Start};
 use swell_cache::{CacheReader, LedgerEntry};
 use swell_domain::{bounds::Bounds, particles::Particles};
@@ -125,12 +125,10 @@ impl Planned {
                 let frame = fullest(&cache);
                 let scene = baked_scene(&cache, directory)?;
                 let around = Near::default().around(&cache, look, frame)?;
-                let white = match &look.spec().whitewater {
-                    Some(of) => WhitewaterStream::open(directory, &of.stream, &cache, &[frame])?
-                        .read(frame)?,
-                    None => Particles::default(),
-                };
-                let set = render_scene(&scene, look, frame, &around.state())?;
+                let streams = Streams::open(directory, look, &cache, &[frame])?;
+                let white = streams.white(frame)?;
+                let mut set = render_scene(&scene, look, frame, &around.state())?;
+                set.wet = streams.wet(frame)?;
                 let most = cache.entries().iter().map(|entry| entry.particles).max();
                 Ok(Self {
                     particles: most.unwrap_or(0) as usize,
@@ -177,6 +175,7 @@ fn empty() -> RenderScene {
             max: DVec3::ONE,
         },
         solids: Vec::new(),
+        wet: None,
         parts: Vec::new(),
         particle_spacing: 1.0,
         frames_per_second: 1.0,

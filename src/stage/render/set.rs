@@ -48,6 +48,7 @@ pub(super) fn render_scene(
         origin: scene.origin,
         domain: scene.domain,
         solids: solids.chain(moving).collect(),
+        wet: None,
         parts,
         particle_spacing: scene.particle_spacing(),
         frames_per_second: scene.shot.frames_per_second,

@@ -31,9 +31,14 @@ pub enum WhitewaterError {
     /// A whitewater pass failed.
     #[error(transparent)]
     Solver(#[from] SolverError),
-    /// The given cache is a whitewater stream, not a bake.
-    #[error("{} is a stream of whitewater; give the cache that it was made from", .0.display())]
-    IsWhitewater(PathBuf),
+    /// The given cache is itself a stream, not a bake.
+    #[error("{} is a stream of {of}; give the cache that it was made from", directory.display())]
+    IsStream {
+        /// The given cache.
+        directory: PathBuf,
+        /// What it holds.
+        of: &'static str,
+    },
     /// The bake that a stream was made from is missing or has changed.
     #[error(
         "{} was made from a bake in {}, which no longer exists or has changed: frame {frame}",
@@ -102,7 +107,7 @@ impl From<&WhitewaterError> for Blame {
             WhitewaterError::Solid(error) => error.into(),
             WhitewaterError::Gpu(error) => error.into(),
             WhitewaterError::Solver(error) => error.into(),
-            WhitewaterError::IsWhitewater(_) | WhitewaterError::NoFrame { .. } => Self::Input,
+            WhitewaterError::IsStream { .. } | WhitewaterError::NoFrame { .. } => Self::Input,
             WhitewaterError::TooMany { .. } => Self::Numbers,
         }
     }

@@ -6,7 +6,7 @@ use swell_cache::{CacheError, CacheReader};
 use swell_domain::{particles::Particles, period::Period};
 
 /// Reads frames in ascending order, and interpolates those between two kept frames.
-pub(super) struct WaterReader<'a> {
+pub(crate) struct WaterReader<'a> {
     cache: &'a CacheReader,
     period: Period,
     /// Frames read last, the older first.
@@ -14,7 +14,7 @@ pub(super) struct WaterReader<'a> {
 }
 
 impl<'a> WaterReader<'a> {
-    pub(super) fn of(cache: &'a CacheReader, period: Period) -> Self {
+    pub(crate) fn of(cache: &'a CacheReader, period: Period) -> Self {
         Self {
             cache,
             period,
@@ -29,7 +29,7 @@ impl<'a> WaterReader<'a> {
 
     /// The particles of a frame, relative to the scene's origin. Between two kept frames, each
     /// particle follows the cubic Hermite curve through both frames' positions and velocities.
-    pub(super) fn at(&mut self, frame: u32) -> Result<Particles, CacheError> {
+    pub(crate) fn at(&mut self, frame: u32) -> Result<Particles, CacheError> {
         let kept = |frame: &u32| self.cache.has_particles(*frame);
         let before = (self.cache.first_frame()..=frame).rev().find(kept);
         let after = (frame..=self.cache.last_frame()).find(kept);

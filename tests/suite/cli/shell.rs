@@ -13,7 +13,7 @@ use crate::support::job::{Job, assert_has};
 #[allow(dead_code, reason = "cargo runs the rest")]
 mod build;
 
-const COMMANDS: [&str; 14] = [
+const COMMANDS: [&str; 15] = [
     "bake",
     "render",
     "export",
@@ -21,6 +21,7 @@ const COMMANDS: [&str; 14] = [
     "tune",
     "view",
     "whitewater",
+    "wet",
     "check",
     "inspect",
     "diff",

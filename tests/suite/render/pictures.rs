@@ -21,7 +21,10 @@ use swell::{
 
 use crate::support::context;
 
-use super::scenes::{box_mesh, city_scene, city_water, slab};
+use super::{
+    analytic::support::scene,
+    scenes::{box_mesh, city_scene, city_water, slab},
+};
 
 fn look(text: &str) -> Look {
     parse_look(text, Path::new("test.toml")).unwrap()
@@ -53,19 +56,12 @@ pub(super) const ALL_AOVS: &str =
 /// A tank of 8 × 4 × 6 m that extends beyond the camera's view on all sides.
 pub(super) fn tank(spacing: f64) -> RenderScene {
     RenderScene {
-        origin: DVec3::ZERO,
         domain: Bounds {
             min: DVec3::new(-2.0, 0.0, -1.5),
             max: DVec3::new(6.0, 4.0, 4.5),
         },
-        solids: Vec::new(),
-        parts: Vec::new(),
         particle_spacing: spacing,
-        frames_per_second: 24.0,
-        gravity: DVec3::new(0.0, -9.81, 0.0),
-        wave_makers: Vec::new(),
-        moving: Vec::new(),
-        waves: None,
+        ..scene(1.0, 1.0)
     }
 }
 

@@ -93,6 +93,7 @@ pub(crate) fn city_scene() -> RenderScene {
             max: DVec3::new(25.0, 12.6, 15.0),
         },
         solids,
+        wet: None,
         parts: Vec::new(),
         particle_spacing: 0.17,
         frames_per_second: 60.0,

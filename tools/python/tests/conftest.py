@@ -89,7 +89,7 @@ def swell_bin() -> Swell:
 
 @pytest.fixture(scope="session")
 def baked(swell_bin: Swell, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Caches: `pbf` with a stream of whitewater, `flip` with APIC's rows, `kept` with every fourth frame, `far` from the origin, `afloat`
+    """Caches: `pbf` with streams of whitewater and wetness, `flip` with APIC's rows, `kept` with every fourth frame, `far` from the origin, `afloat`
     with a body far from it, `packed` by Zstandard."""
     room = tmp_path_factory.mktemp("baked")
 
@@ -108,6 +108,7 @@ def baked(swell_bin: Swell, tmp_path_factory: pytest.TempPathFactory) -> Path:
     bake("afloat", x=8192.0, more=body)
     bake("packed", more='[keep]\ncompression = "zstd"')
     swell_bin("whitewater", room / "pbf", "--progress", "none")
+    swell_bin("wet", room / "pbf", "--progress", "none")
     swell_bin("bake", room / "pbf.toml", "--from", f"{room / 'pbf'}:3", "-o", room / "branch", "--progress", "none")
     return room
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import gc
+import json
 import re
 import struct
 from pathlib import Path
@@ -145,6 +146,19 @@ def test_grids_are_paths_of_sound_files(baked: Path) -> None:
     assert cache.grids[4] == baked / "pbf/grids/tank.0004.vdb"
     with pytest.raises(swell.MissingFrame):
         cache.grids[7]
+
+
+def test_wetness_has_a_value_for_each_vertex(baked: Path) -> None:
+    stream = swell.Cache(baked / "pbf").wet["default"]
+    assert stream.solver == "wet"
+    [surface] = json.loads(stream.assets["wet.json"].read_text())["surfaces"]
+    frame = stream[6]
+    assert frame.attributes == ("wetness",)
+    assert len(frame) == surface["vertices"] == len(stream[0])
+    assert 0.0 <= frame["wetness"].min() and frame["wetness"].max() <= 1.0
+    header = stream.assets[surface["file"]].read_bytes().split(b"end_header")[0].decode()
+    assert f"element vertex {len(frame)}\n" in header
+    assert swell.Cache(baked / "flip").wet == {}, "a bake without a stream"
 
 
 def test_whitewater_is_a_cache_of_its_own(baked: Path) -> None:

@@ -27,5 +27,6 @@ pub(super) mod support;
 mod surface;
 mod volume;
 mod water;
+mod wet;
 
 pub(crate) use support::{context, spoiled};

@@ -291,6 +291,7 @@ pub(crate) fn scene(radius: f64, filled: f64) -> RenderScene {
             max: DVec3::splat(10.0),
         },
         solids: Vec::new(),
+        wet: None,
         parts: Vec::new(),
         particle_spacing: radius * (filled * 4.0 / 3.0 * std::f64::consts::PI).cbrt(),
         frames_per_second: 24.0,

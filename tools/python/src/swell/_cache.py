@@ -1,4 +1,4 @@
-"""A cache: the folder that `swell bake` or `swell whitewater` wrote."""
+"""A cache: the folder that `swell bake`, `swell whitewater` or `swell wet` wrote."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class Cache:
 
     @property
     def solver(self) -> str:
-        """`pbf`, `flip`, or `whitewater`."""
+        """`pbf`, `flip`, `whitewater` or `wet`."""
         return str(self.manifest["solver"])
 
     @property
@@ -119,7 +119,15 @@ class Cache:
     @cached_property
     def streams(self) -> Mapping[str, Cache]:
         """Streams of spray, foam and bubbles by name (`default`), each a cache of its own."""
-        folders = sorted(path.parent for path in self.path.glob(f"whitewater/*/{MANIFEST}"))
+        return self._made("whitewater")
+
+    @cached_property
+    def wet(self) -> Mapping[str, Cache]:
+        """Streams of the wetness of solids by name (`default`), each a cache of its own with a point for each vertex."""
+        return self._made("wet")
+
+    def _made(self, kind: str) -> Mapping[str, Cache]:
+        folders = sorted(path.parent for path in self.path.glob(f"{kind}/*/{MANIFEST}"))
         return {folder.name: Cache(folder, check=self._check) for folder in folders}
 
     def __getitem__(self, frame: int) -> Frame:
