@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use super::{error::GpuError, shader};
 
 /// Combinations of conditions that a plan can set; every pass must compose under each.
-const VARIANTS: [&[&str]; 0] = [
+const VARIANTS: [&[&str]; 90] = [
     &[],
     &["SOLIDS"],
     &["NEIGHBOR_LIST"],
