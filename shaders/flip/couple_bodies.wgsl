@@ -5,8 +5,8 @@
 // The pressure of a cell is that at its centre, and the body's surface lies elsewhere in it. Where
 // the pressure grows with depth as in still water, that makes a difference by ρ g times what the
 // cell's solid volume is less than the mean of its closed faces; without it the body would displace
-// whole layers of cells, and bob between them. The solid volume is that behind a plane that is moved
-// outward, by what gives all cells together the volume of the mesh: a plane cuts off edges.
+// whole layers of cells, and bob between them. The solid volume is that behind a plane that is
+// moved outward, by what gives all cells together the volume of the mesh: a plane cuts off edges.
 #import "shared/thread.wgsl"
 #import "shared/flip_params.wgsl"
 #import "shared/flip_cell.wgsl"
