@@ -68,7 +68,7 @@ pub fn volume_offset(grid: &SignedDistance, volume: f64, cell_size: f64) -> f64 
     for _ in 0..STEPS {
         let here = error(offset);
         let slope = (here - last_error) / (offset - last);
-        if !(slope > 0.0) {
+        if slope <= 0.0 {
             break;
         }
         (last, last_error) = (offset, here);

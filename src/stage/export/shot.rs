@@ -7,7 +7,7 @@ use std::{
 
 use glam::DVec3;
 
-use super::{ExportError, ExportJob, Target, UsdWater, Wanted, beside, content::Content};
+use super::{ExportJob, Target, UsdWater, Wanted, beside};
 use swell_cache::CacheError;
 use swell_domain::{
     body::BodyState,
