@@ -19,6 +19,7 @@ use super::{
     output,
     progress::{Mode, Progress, Recurring, Status},
     size,
+    whitewater::stream_name,
 };
 
 #[derive(Args, Debug)]
@@ -191,13 +192,16 @@ pub(super) fn run(args: &ExportArgs, progress: &Progress) -> Result<u8, Failure>
         Some(look) => Some(load_look_within(look, bake::reach(args.allow_outside))?),
         None => None,
     };
+    let named = |name: &Option<String>, option| {
+        (name.clone().map(|name| stream_name(name, option))).transpose()
+    };
     let request = ExportRequest {
         cache: args.cache.clone(),
-        stream: args.stream.clone(),
+        stream: named(&args.stream, "--stream")?,
         kinds: args.kinds(),
-        foam: args.foam.clone(),
-        whitewater: args.usd_whitewater.clone(),
-        wet: args.wet.clone(),
+        foam: named(&args.foam, "--foam")?,
+        whitewater: named(&args.usd_whitewater, "--usd-whitewater")?,
+        wet: named(&args.wet, "--wet")?,
         targets: args.targets(),
         frames: args.frames.clone(),
         chunk: args.chunk,

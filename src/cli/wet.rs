@@ -53,7 +53,7 @@ pub(super) struct WetArgs {
 pub(super) fn run(args: &WetArgs, progress: &Progress) -> Result<u8, Failure> {
     let request = WetRequest {
         cache: args.cache.clone(),
-        name: stream_name(args.name.clone())?,
+        name: stream_name(args.name.clone(), "--name")?,
         drying: args.dry,
         contact: args.within,
         edge: args.edge,

@@ -66,12 +66,12 @@ impl WhitewaterArgs {
             .clone()
             .or_else(of_file)
             .unwrap_or("default".into());
-        stream_name(name)
+        stream_name(name, "--name")
     }
 }
 
-/// Checks the name of a stream, which is that of its folder.
-pub(super) fn stream_name(name: String) -> Result<String, Failure> {
+/// Checks the name of a stream, which is that of its folder, given by an option.
+pub(super) fn stream_name(name: String, option: &str) -> Result<String, Failure> {
     let is_plain = |b: u8| b.is_ascii_alphanumeric() || b"._-".contains(&b);
     if !name.is_empty() && !name.starts_with(['.', '-']) && name.bytes().all(is_plain) {
         return Ok(name);
@@ -80,7 +80,7 @@ pub(super) fn stream_name(name: String) -> Result<String, Failure> {
         code: 2,
         error: format!(
             "`{name}` is not a name for a stream; allowed are letters, digits, `.`, `_` and `-` \
-             (--name)"
+             ({option})"
         )
         .into(),
     })

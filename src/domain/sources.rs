@@ -111,7 +111,12 @@ impl Window {
         let end = self
             .until
             .map_or(start + length, |until| until.min(start + length));
-        ((end - start.max(self.from)) / length).clamp(0.0, 1.0)
+        // What acts from the start has acted before it.
+        let from = match self.from > 0.0 {
+            true => start.max(self.from),
+            false => start,
+        };
+        ((end - from) / length).clamp(0.0, 1.0)
     }
 
     /// Returns how much of a shot of `duration` seconds lies in the window, seconds.

@@ -55,6 +55,8 @@ impl Scene {
     /// `end`, seconds; m/s².
     pub fn most_acceleration(&self, start: f64, end: f64) -> f64 {
         let acting = self.forces_on(Medium::Water);
+        // The first substep also gets what acted in the second half of the one before.
+        let start = start - 0.5 / self.shot.frames_per_second;
         let acting = acting.filter(|force| force.window.share(start, end - start) > 0.0);
         let forces: f64 = acting.map(|force| force.kind.most()).sum();
         self.water.gravity.length() + forces

@@ -46,6 +46,14 @@ fn kick(before: f64, length: f64) -> f64 {
     }
 }
 
+impl Substep {
+    /// Returns the start and the length of the time over which forces act: from the middle of the
+    /// previous substep to that of this one, seconds.
+    pub fn kick_span(&self) -> (f64, f64) {
+        (self.start + 0.5 * self.length - self.kick, self.kick)
+    }
+}
+
 /// Returns the substep of a projection of which only the velocities are used, after a substep of
 /// `before` seconds; times in seconds.
 pub fn projected_substep(start: f64, length: f64, before: f64) -> Substep {

@@ -102,8 +102,9 @@ pub fn couple_bodies(
                 DVec3::new(own(0), own(1), own(2))
             });
             let arm = (cell + 0.5) * size - centre;
-            // In a cell that other solids cut as well, the volume is not the body's alone.
-            let is_alone = [low, high] == closed;
+            // In a cell that other solids cut as well, the volume is not the body's alone; where it
+            // closes no part of a face, what is moved outward may be another solid's edge.
+            let is_alone = [low, high] == closed && (low + high).cmpgt(DVec3::ZERO).any();
             let missing = match is_alone && space.kind[element as usize] == FLUID {
                 true => {
                     let all = step.open_extent(cell).element_product();

@@ -21,7 +21,8 @@ impl Model {
 
     /// Returns the forces on the water in a substep.
     pub fn forces(&self, step: &FlipSubstep<'_>) -> ForceField<'_> {
-        (self.scene).force_field(Medium::Water, (step.start, step.length))
+        let span = (step.start + 0.5 * step.length - step.kick, step.kick);
+        (self.scene).force_field(Medium::Water, span)
     }
 
     /// Returns the velocity change by forces in a substep at a position, m/s.

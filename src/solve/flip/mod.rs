@@ -274,7 +274,12 @@ impl Flip {
         }
         let span = (substep.start, substep.length);
         effects::upload(&self.program, &self.scene, span);
-        forces::upload(&self.program, &self.scene, Medium::Water, span);
+        forces::upload(
+            &self.program,
+            &self.scene,
+            Medium::Water,
+            substep.kick_span(),
+        );
         Ok(())
     }
 

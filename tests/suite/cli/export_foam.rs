@@ -256,6 +256,10 @@ fn faults_of_whitewater_exports_are_one_line_with_exit_code() {
         "export cache --mesh m.%04d.ply --foam storm",
         "cache/whitewater/storm does not exist",
     );
+    for option in ["--stream", "--foam", "--usd-whitewater", "--wet"] {
+        let words = format!("export cache --usd u.usda {option} ../whitewater/default");
+        clear(2, &words, option);
+    }
     clear(
         2,
         "export cache --fog f.%04d.vdb",

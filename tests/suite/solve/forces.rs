@@ -153,22 +153,30 @@ fn a_free_drop_gains_exactly_what_the_force_gives() {
 #[test]
 fn a_window_gives_its_length_times_the_acceleration() {
     let context = context();
+    // The stronger one shortens the substeps that it acts in.
+    let cases = [
+        (RATE, 12, 4.0, [0.0333, 0.0825]),
+        (24.0, 6, 100.0, [0.085, 0.092]),
+    ];
     for solver in SOLVERS {
         for device in devices(&context) {
-            let mut scene = scene(solver, [16.0, 32.0, 16.0]);
-            scene.water.gravity = DVec3::ZERO;
-            scene.forces = vec![push(4.0 * DVec3::X)];
-            let until = Some(0.0825);
-            scene.forces[0].force.window = Window {
-                from: 0.0333,
-                until,
-            };
-            let (state, _) = run(device, &scene, &drops(), 12);
-            let gained = velocity(&state, 0).x;
-            assert!(
-                (gained - 4.0 * (0.0825 - 0.0333)).abs() < 1e-5,
-                "{solver:?}: {gained}"
-            );
+            for (rate, frames, strength, [from, until]) in cases {
+                let mut scene = scene(solver, [16.0, 32.0, 16.0]);
+                scene.shot.frames_per_second = rate;
+                scene.water.gravity = DVec3::ZERO;
+                scene.forces = vec![push(strength * DVec3::X)];
+                scene.forces[0].force.window = Window {
+                    from,
+                    until: Some(until),
+                };
+                let (state, _) = run(device, &scene, &drops(), frames);
+                let gained = velocity(&state, 0).x;
+                let expected = strength * (until - from);
+                assert!(
+                    (gained - expected).abs() < 1e-5 * strength,
+                    "{solver:?}, {rate}: {gained} {expected}"
+                );
+            }
         }
     }
 }
