@@ -90,14 +90,18 @@ fn main(
             body_coupling[first + CELLS * k] = area[k];
             body_coupling[first + CELLS * (k + 3u)] = way[k];
         }
-        // In a cell that other solids cut as well, the volume is not the body's alone; where it
-        // closes no part of a face, what is moved outward may be another solid's edge.
+        // In a cell that other solids cut as well, the volume is not the body's alone.
         let closed_low = cut.lower_of_walls - cut.lower;
         let closed_high = cut.upper_of_walls - cut.upper;
         let is_own = all(low == closed_low) && all(high == closed_high);
-        let is_alone = is_own && any(low + high > vec3f(0.0)) && cell_kind[element] == FLUID;
-        let corners = Corners(cut.corners.near - offset, cut.corners.far - offset);
-        let filled = extent.x * extent.y * extent.z * inside_part(corners);
+        let is_alone = is_own && cell_kind[element] == FLUID;
+        // From the distances to the body alone: those of all solids are moved outward as well.
+        var filled = 0.0;
+        for (var once = 0; once < select(0, 1, may_cut_by(solid, cell)); once++) {
+            let own = corner_distances(cell);
+            let moved = Corners(own.near - offset, own.far - offset);
+            filled = extent.x * extent.y * extent.z * inside_part(moved);
+        }
         let missing = 0.5 * (low + high) - filled;
         let push = params.velocity_step * select(vec3f(0.0), missing, is_alone);
         let turn = cross(arm, push);

@@ -102,14 +102,16 @@ pub fn couple_bodies(
                 DVec3::new(own(0), own(1), own(2))
             });
             let arm = (cell + 0.5) * size - centre;
-            // In a cell that other solids cut as well, the volume is not the body's alone; where it
-            // closes no part of a face, what is moved outward may be another solid's edge.
-            let is_alone = [low, high] == closed && (low + high).cmpgt(DVec3::ZERO).any();
+            // In a cell that other solids cut as well, the volume is not the body's alone.
+            let is_alone = [low, high] == closed;
             let missing = match is_alone && space.kind[element as usize] == FLUID {
                 true => {
                     let all = step.open_extent(cell).element_product();
-                    let corners = cut.corners.unwrap_or([1e15; 8]);
-                    0.5 * (low + high) - all * inside(&corners.map(|value| value - offset))
+                    // From the distances to the body alone: those of all solids are moved outward
+                    // as well.
+                    let own = step.solids[first + index].corners(cell, size);
+                    let part = |own: [f64; 8]| inside(&own.map(|value| value - offset));
+                    0.5 * (low + high) - all * own.map_or(0.0, part)
                 }
                 false => DVec3::ZERO,
             };

@@ -129,7 +129,7 @@ pub(super) struct CutFaces<'a> {
     /// Solids that may cut the cell.
     pub(super) near: Vec<&'a Solid<'a>>,
     /// Distances at the cell's corners, if any may.
-    pub(super) corners: Option<[f64; 8]>,
+    corners: Option<[f64; 8]>,
     /// Velocity of the solid nearest to each face, along that face's axis, m/s.
     velocity: [DVec3; 2],
     /// Index of that solid.

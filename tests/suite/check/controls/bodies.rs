@@ -102,8 +102,8 @@ pub const BODIES: &[Control] = &[
     ),
     control(
         "flip/couple_bodies",
-        "- offset",
-        "- 0.9 * offset",
+        "near - offset",
+        "near - 0.9 * offset",
         "flip/couple_bodies",
         &["weight between cells' centres and bodies"],
     ),
