@@ -46,11 +46,11 @@ const FARTHEST: f64 = 1e9;
 impl FogRaster {
     /// Spreads each particle over the voxels whose centres are within its radius along each axis,
     /// or within a voxel where that is more, by tents that are normalised over these voxels: what
-    /// the grid holds is what the particles hold. Beyond [`MOST`] voxels a radius counts as that.
+    /// the grid holds is what the particles hold. Beyond 8 voxels a radius counts as that.
     ///
     /// A voxel with density has the mean velocity of what is in it, weighted by volume. Around
     /// them velocities continue as far as the fastest particle goes in half a frame, at most
-    /// [`MOST`] voxels: a renderer that asks where the fog at a point comes from finds it there.
+    /// 8 voxels: a renderer that asks where the fog at a point comes from finds it there.
     pub fn fog(&self, white: &Particles) -> Fog {
         let radii = white.attributes.get(RADIUS).map_or(&[][..], Vec::as_slice);
         // Splats are large, so each is computed again where its voxels are.
