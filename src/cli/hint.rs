@@ -11,6 +11,7 @@ use swell_stage::{
     bake::BakeError,
     branch::BranchError,
     check::CheckError,
+    derived::DerivedError,
     device::{GpuError, SolveError, SolverError},
     diff::DiffError,
     export::{ExportError, UsdcError},
@@ -176,14 +177,14 @@ fn whitewater(error: &WhitewaterError) -> Hint {
     match error {
         WhitewaterError::Gpu(error) => gpu(error),
         WhitewaterError::Solver(error) => solver(error),
-        WhitewaterError::Other { .. } => Some("--name, --overwrite".into()),
+        WhitewaterError::Derived(DerivedError::Other { .. }) => Some("--name, --overwrite".into()),
         _ => None,
     }
 }
 
 fn wet(error: &WetError) -> Hint {
     match error {
-        WetError::Other { .. } => Some("--name, --overwrite".into()),
+        WetError::Derived(DerivedError::Other { .. }) => Some("--name, --overwrite".into()),
         WetError::TooFine { .. } => Some("--edge".into()),
         WetError::Missing { stream, cache, .. } => stream_of("wet", cache, stream),
         WetError::Unfit { .. } => Some("`swell wet`".into()),

@@ -11,11 +11,10 @@ use swell_stage::wet::{WetEvent, WetRequest, expected, wet};
 use super::{
     Failure, count,
     dry_run::DryRun,
-    interrupt::{self, Interrupt},
+    interrupt::Interrupt,
     output,
     progress::{Mode, Progress, Status},
-    size,
-    whitewater::stream_name,
+    whitewater::{Ended, stream_name},
 };
 
 #[derive(Args, Debug)]
@@ -68,27 +67,14 @@ pub(super) fn run(args: &WetArgs, progress: &Progress) -> Result<u8, Failure> {
         tell(progress, &event);
     })?;
     progress.finish();
-    let end = match outcome.interrupted {
-        true => "ended by a signal after",
-        false => "done:",
+    let ended = Ended {
+        last_frame: outcome.last_frame,
+        frames: outcome.frames,
+        bytes: outcome.bytes,
+        directory: &outcome.directory,
+        interrupted: outcome.interrupted,
     };
-    progress.conclude(
-        &format!(
-            "{end} frame {} in {} ({}, {} written now)",
-            outcome.last_frame,
-            outcome.directory.display(),
-            count(outcome.frames.into(), "frame"),
-            size(outcome.bytes),
-        ),
-        json!({
-            "last_frame": outcome.last_frame, "frames": outcome.frames,
-            "interrupted": outcome.interrupted, "directory": output::path(&outcome.directory),
-        }),
-    );
-    Ok(match outcome.interrupted {
-        true => interrupt::EXIT_CODE as u8,
-        false => 0,
-    })
+    Ok(ended.conclude(progress, &ended.words()))
 }
 
 fn dry_run(request: &WetRequest, progress: &Progress) -> Result<u8, Failure> {

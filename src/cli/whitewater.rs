@@ -1,6 +1,6 @@
 //! `swell whitewater CACHE`
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use serde_json::json;
@@ -108,34 +108,62 @@ pub(super) fn run(args: &WhitewaterArgs, progress: &Progress) -> Result<u8, Fail
         tell(progress, event)
     })?;
     progress.finish();
-    let end = match outcome.interrupted {
-        true => "ended by a signal after",
-        false => "done:",
+    let ended = Ended {
+        last_frame: outcome.last_frame,
+        frames: outcome.frames,
+        bytes: outcome.bytes,
+        directory: &outcome.directory,
+        interrupted: outcome.interrupted,
     };
     let words = match outcome.interrupted && outcome.frames == 0 && !outcome.directory.exists() {
         true => {
             "ended by a signal while thresholds were calibrated; nothing was written".to_owned()
         }
-        false => format!(
-            "{end} frame {} in {} ({}, {} written now)",
-            outcome.last_frame,
-            outcome.directory.display(),
-            count(outcome.frames.into(), "frame"),
-            size(outcome.bytes),
-        ),
+        false => ended.words(),
     };
-    progress.conclude(
-        &words,
-        json!({
-            "last_frame": outcome.last_frame, "frames": outcome.frames,
-            "interrupted": outcome.interrupted, "directory": output::path(&outcome.directory),
-        }),
-    );
+    let code = ended.conclude(progress, &words);
     pass_times::report(progress, &outcome.passes, &[], outcome.frames);
-    Ok(match outcome.interrupted {
-        true => interrupt::EXIT_CODE as u8,
-        false => 0,
-    })
+    Ok(code)
+}
+
+/// How a job that makes a stream ended.
+pub(super) struct Ended<'a> {
+    pub(super) last_frame: u32,
+    pub(super) frames: u32,
+    pub(super) bytes: u64,
+    pub(super) directory: &'a Path,
+    pub(super) interrupted: bool,
+}
+
+impl Ended<'_> {
+    pub(super) fn words(&self) -> String {
+        let end = match self.interrupted {
+            true => "ended by a signal after",
+            false => "done:",
+        };
+        format!(
+            "{end} frame {} in {} ({}, {} written now)",
+            self.last_frame,
+            self.directory.display(),
+            count(self.frames.into(), "frame"),
+            size(self.bytes),
+        )
+    }
+
+    /// Tells it in `words`; returns the exit code.
+    pub(super) fn conclude(&self, progress: &Progress, words: &str) -> u8 {
+        progress.conclude(
+            words,
+            json!({
+                "last_frame": self.last_frame, "frames": self.frames,
+                "interrupted": self.interrupted, "directory": output::path(self.directory),
+            }),
+        );
+        match self.interrupted {
+            true => interrupt::EXIT_CODE as u8,
+            false => 0,
+        }
+    }
 }
 
 fn dry_run(request: &WhitewaterRequest, progress: &Progress) -> Result<u8, Failure> {

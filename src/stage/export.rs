@@ -35,10 +35,7 @@ use swell_domain::{
 use swell_scene::{Scene, look::Look};
 
 use super::{
-    baked_scene,
-    numbering::Numbering,
-    wet::WetStream,
-    whitewater::{directory, is_of},
+    baked_scene, derived::is_of, numbering::Numbering, wet::WetStream, whitewater::directory,
 };
 
 use self::{content::Content, folder::Wanted, usdc::Python};

@@ -4,6 +4,7 @@
 pub mod bake;
 pub mod branch;
 pub mod check;
+pub mod derived;
 pub mod device;
 pub mod diff;
 pub mod drive;

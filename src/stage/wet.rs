@@ -21,13 +21,13 @@ use serde_json::{Value, json};
 use swell_cache::{Asset, CacheError, CacheReader, CacheWriter, Clock, LedgerEntry, Manifest};
 use swell_domain::{
     body::BodyState,
-    output, parallel,
+    parallel,
     particles::Particles,
     wet::{self, CONTACT, Contact, EDGE, WETNESS},
 };
 use swell_scene::Scene;
 
-use super::whitewater::{WATER, is_of, water::WaterReader};
+use super::derived::{self, WATER, water::WaterReader};
 
 use self::surfaces::{Surface, surfaces};
 
@@ -172,7 +172,7 @@ pub fn expected(request: &WetRequest) -> Result<ExpectedWet, WetError> {
     let scene = super::baked_scene(&cache, &request.cache)?;
     let made = Made::of(request, &cache, &scene)?;
     let directory = directory(&request.cache, &request.name);
-    let standing = standing(request, &directory, &made.hash)?;
+    let standing = derived::standing(&directory, &made.hash, request.overwrite)?;
     let first = cache.first_frame();
     let there = standing.map_or(first, |stream| stream.last_frame());
     let left = u64::from(last.saturating_sub(there));
@@ -202,10 +202,10 @@ pub fn wet(
     let scene = super::baked_scene(&cache, &request.cache)?;
     let made = Made::of(request, &cache, &scene)?;
     let mut water = WaterReader::of(&cache, scene.period());
-    let mut writer = match standing(request, &directory, &made.hash)? {
+    let mut writer = match derived::standing(&directory, &made.hash, request.overwrite)? {
         Some(_) => StreamWriter::resume(&directory, &made, &cache)?,
         None => {
-            remove(&directory)?;
+            derived::remove(&directory)?;
             StreamWriter::create(&directory, &made, (&cache, &scene), &mut water)?
         }
     };
@@ -271,23 +271,7 @@ fn asked(request: &WetRequest) -> Result<(CacheReader, u32), WetError> {
             return Err(WetError::Setting { what, value });
         }
     }
-    let cache = CacheReader::open(&request.cache)?;
-    if let Some(of) = cache.manifest().stream_of() {
-        return Err(WetError::IsStream {
-            directory: request.cache.clone(),
-            of,
-        });
-    }
-    let (first, newest) = (cache.first_frame(), cache.last_frame());
-    let last = request.last.unwrap_or(newest);
-    match (first..=newest).contains(&last) {
-        true => Ok((cache, last)),
-        false => Err(WetError::NoFrame {
-            asked: last,
-            first,
-            last: newest,
-        }),
-    }
+    Ok(derived::bake(&request.cache, request.last)?)
 }
 
 /// The surfaces and settings of a stream.
@@ -351,46 +335,26 @@ impl<'a> Made<'a> {
         Contact::with(&water.position, corner, distance, scene.period()).of(points)
     }
 
-    /// The manifest of the stream: that of the bake with the fields that differ.
     fn manifest(&self, cache: &CacheReader) -> Manifest {
-        Manifest {
-            format_version: Manifest::FORMAT_VERSION,
-            program: swell_domain::PROGRAM.into(),
-            program_version: swell_domain::VERSION.into(),
-            shaders: None,
-            scene_hash: self.hash.clone(),
-            solver: Manifest::WET.to_owned(),
-            device: "CPU".to_owned(),
-            driver: String::new(),
-            backend: "CPU".to_owned(),
-            attributes: vec![WETNESS.to_owned()],
-            grids: None,
-            probes: Vec::new(),
-            bodies: Vec::new(),
-            warnings: Vec::new(),
-            ..cache.manifest().clone()
-        }
+        derived::manifest(
+            cache.manifest(),
+            Manifest::WET,
+            self.hash.clone(),
+            &[WETNESS],
+        )
     }
 
-    fn assets(&self, cache: &CacheReader, scene: &Scene) -> Result<Vec<Asset>, CacheError> {
-        let mut assets = vec![Asset {
+    fn assets(&self, scene: &Scene) -> Vec<Asset> {
+        let settings = Asset {
             name: SETTINGS.to_owned(),
             bytes: self.settings.to_bytes(),
-        }];
-        for (index, surface) in self.surfaces.iter().enumerate() {
-            assets.push(Asset {
-                name: surface.file(index),
-                bytes: surface.bytes(scene.origin),
-            });
-        }
-        // The scene names its own assets, wherever the stream is moved.
-        for name in cache.manifest().asset_names() {
-            assets.push(Asset {
-                name: name.to_owned(),
-                bytes: cache.asset(name)?,
-            });
-        }
-        Ok(assets)
+        };
+        let surfaces = self.surfaces.iter().enumerate();
+        let surfaces = surfaces.map(|(index, surface)| Asset {
+            name: surface.file(index),
+            bytes: surface.bytes(scene.origin),
+        });
+        [settings].into_iter().chain(surfaces).collect()
     }
 }
 
@@ -429,24 +393,13 @@ impl StreamWriter {
         let wetness = contact.iter().map(|&it| f32::from(u8::from(it))).collect();
         let velocity = vec![[0.0; 3]; position.len()];
         let points = points(position, velocity, wetness);
-        let created = CacheWriter::create(
+        let writer = derived::create(
             directory,
             made.manifest(cache),
-            cache.scene_toml(),
-            &made.assets(cache, scene)?,
-            entry.clock,
-            &points,
-            &Vec::new(),
-        );
-        let writer = match created {
-            Err(CacheError::Exists { .. }) => {
-                return Err(WetError::Other {
-                    directory: directory.to_owned(),
-                    how: "meanwhile, by another process",
-                });
-            }
-            created => created?,
-        };
+            cache,
+            made.assets(scene),
+            (entry.clock, &points),
+        )?;
         Ok(Self {
             writer,
             clock: entry.clock,
@@ -455,19 +408,13 @@ impl StreamWriter {
     }
 
     fn resume(directory: &Path, made: &Made<'_>, cache: &CacheReader) -> Result<Self, WetError> {
-        let (writer, entry, points) = CacheWriter::resume(directory, &made.manifest(cache))?;
-        let is_whole = points.len() == made.vertices();
-        match is_of(&entry, cache) && is_whole {
-            true => Ok(Self {
-                writer,
-                clock: entry.clock,
-                points,
-            }),
-            false => Err(WetError::Other {
-                directory: directory.to_owned(),
-                how: "from water that no longer exists",
-            }),
-        }
+        let manifest = made.manifest(cache);
+        let (writer, entry, points) = derived::resume(directory, &manifest, cache)?;
+        Ok(Self {
+            writer,
+            clock: entry.clock,
+            points,
+        })
     }
 
     /// Computes and submits the next frame. Returns the areas in contact and wet, m².
@@ -524,35 +471,4 @@ fn points(position: Vec<[f32; 3]>, velocity: Vec<[f32; 3]>, wetness: Vec<f32>) -
         attributes: [(WETNESS.to_owned(), wetness)].into(),
         ..Particles::default()
     }
-}
-
-/// The existing stream, if it was made with the same settings; `None` if there is none or it is to
-/// be overwritten.
-fn standing(
-    request: &WetRequest,
-    directory: &Path,
-    hash: &str,
-) -> Result<Option<CacheReader>, WetError> {
-    if !swell_cache::exists(directory) || request.overwrite {
-        return Ok(None);
-    }
-    let stream = CacheReader::open(directory)?;
-    match stream.manifest().scene_hash == hash {
-        true => Ok(Some(stream)),
-        false => Err(WetError::Other {
-            directory: directory.to_owned(),
-            how: "with other settings, or from another bake",
-        }),
-    }
-}
-
-/// Removes a stream that is to be overwritten.
-fn remove(directory: &Path) -> Result<(), WetError> {
-    if !swell_cache::exists(directory) {
-        return Ok(());
-    }
-    output::remove_folder(directory).map_err(|error| WetError::Remove {
-        directory: directory.to_owned(),
-        source: error.source,
-    })
 }

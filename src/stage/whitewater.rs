@@ -10,7 +10,6 @@ mod error;
 mod expected;
 mod forecast;
 mod settled;
-pub(super) mod water;
 
 use std::{
     path::{Path, PathBuf},
@@ -20,10 +19,10 @@ use std::{
 
 use serde_json::{Value, json};
 
-use swell_cache::{Asset, CacheError, CacheReader, CacheWriter, Clock, LedgerEntry, Manifest};
+use swell_cache::{Asset, CacheError, CacheReader, CacheWriter, Clock, Manifest};
 use swell_domain::{
     bounds::Bounds,
-    mesh_file, output,
+    mesh_file,
     particles::Particles,
     whitewater::{self, Births, CalibratedSettings, KillDomain, KillRoom, SeedWater, Thresholds},
 };
@@ -32,6 +31,7 @@ use swell_gpu::adapter::Needs;
 use swell_scene::Scene;
 
 use super::{
+    derived::{self, WATER, water::WaterReader},
     device::{Device, Identity, PassTimes},
     prepare::Start,
 };
@@ -40,7 +40,6 @@ use self::{
     engine::Engine,
     forecast::Forecast,
     settled::{recorded, settle},
-    water::WaterReader,
 };
 
 pub use self::{
@@ -143,13 +142,6 @@ pub struct WhitewaterOutcome {
     pub passes: PassTimes,
 }
 
-/// Whether a stream's frame was made from the frame of this number in `cache`; the first frame is
-/// always empty.
-pub fn is_of(frame: &LedgerEntry, cache: &CacheReader) -> bool {
-    let now = cache.entry(frame.frame).map(|entry| &*entry.chain).ok();
-    frame.frame == cache.first_frame() || frame.report[WATER].as_str() == now
-}
-
 /// Folder of a stream of a cache.
 pub fn directory(cache: &Path, name: &str) -> PathBuf {
     cache.join(FOLDER).join(name)
@@ -165,7 +157,7 @@ pub fn whitewater(
     stop: &AtomicBool,
     tell: &mut dyn FnMut(WhitewaterEvent),
 ) -> Result<WhitewaterOutcome, WhitewaterError> {
-    let (cache, last) = asked(request)?;
+    let (cache, last) = derived::bake(&request.cache, request.last)?;
     let directory = directory(&request.cache, &request.name);
     let scene = super::baked_scene(&cache, &request.cache)?.of_whitewater();
     let mut water = WaterReader::of(&cache, scene.period());
@@ -177,7 +169,8 @@ pub fn whitewater(
     let identity = opened.identity();
     let mut engine = Engine::new(&opened, &scene, &boundary, particles, request.time_passes)?;
     let manifest = manifest(&cache, request, &identity)?;
-    let standing = standing(request, &directory, &manifest)?;
+    let hash = &manifest.scene_hash;
+    let standing = derived::standing(&directory, hash, request.overwrite)?;
     let (settings, calibrated_on) = match &standing {
         Some(stream) => (recorded(stream, &directory, &scene)?, None),
         None => {
@@ -207,7 +200,7 @@ pub fn whitewater(
         Some(_) => StreamWriter::resume(&directory, &manifest, &cache)?,
         None => {
             // Only now: if calibration is stopped, the old stream stays intact.
-            remove(&directory)?;
+            derived::remove(&directory)?;
             StreamWriter::create(&directory, manifest, &cache, &settings)?
         }
     };
@@ -270,26 +263,6 @@ pub fn whitewater(
             false => PassTimes::default(),
         },
     })
-}
-
-/// Opens the bake, and determines the last frame to make.
-fn asked(request: &WhitewaterRequest) -> Result<(CacheReader, u32), WhitewaterError> {
-    let cache = CacheReader::open(&request.cache)?;
-    if let Some(of) = cache.manifest().stream_of() {
-        return Err(WhitewaterError::IsStream {
-            directory: request.cache.clone(),
-            of,
-        });
-    }
-    let last = request.last.unwrap_or(cache.last_frame());
-    if !(cache.first_frame()..=cache.last_frame()).contains(&last) {
-        return Err(WhitewaterError::NoFrame {
-            asked: last,
-            first: cache.first_frame(),
-            last: cache.last_frame(),
-        });
-    }
-    Ok((cache, last))
 }
 
 /// Computes a frame of a stream from the one before.
@@ -373,9 +346,6 @@ impl StreamStep<'_> {
 
 /// Key of a frame's report: the id that the next new particle gets.
 const NEXT_ID: &str = "next_id";
-/// Key of a frame's report: the chained hash of the bake's frame.
-pub(super) const WATER: &str = "water";
-
 /// A stream being written.
 struct StreamWriter {
     writer: CacheWriter,
@@ -395,13 +365,6 @@ impl StreamWriter {
             name: SETTINGS.to_owned(),
             bytes: written_out(settings).into_bytes(),
         }];
-        // The scene names its own assets, wherever the stream is moved.
-        for name in cache.manifest().asset_names() {
-            assets.push(Asset {
-                name: name.to_owned(),
-                bytes: cache.asset(name)?,
-            });
-        }
         // The settings name these, beside them.
         for kill in &settings.kills {
             let KillRoom::Mesh(mesh) = &kill.room else {
@@ -415,25 +378,8 @@ impl StreamWriter {
             }
         }
         let clock = cache.entry(cache.first_frame())?.clock;
-        let (white, scene) = (whitewater::none(), cache.scene_toml());
-        let made = CacheWriter::create(
-            directory,
-            manifest,
-            scene,
-            &assets,
-            clock,
-            &white,
-            &Vec::new(),
-        );
-        let writer = match made {
-            Err(CacheError::Exists { .. }) => {
-                return Err(WhitewaterError::Other {
-                    directory: directory.to_owned(),
-                    how: "meanwhile, by another process",
-                });
-            }
-            made => made?,
-        };
+        let white = whitewater::none();
+        let writer = derived::create(directory, manifest, cache, assets, (clock, &white))?;
         Ok(Self {
             writer,
             clock,
@@ -447,14 +393,7 @@ impl StreamWriter {
         manifest: &Manifest,
         cache: &CacheReader,
     ) -> Result<Self, WhitewaterError> {
-        let (writer, entry, white) = CacheWriter::resume(directory, manifest)?;
-        let other = |how: &'static str| WhitewaterError::Other {
-            directory: directory.to_owned(),
-            how,
-        };
-        if !is_of(&entry, cache) {
-            return Err(other("from water that no longer exists"));
-        }
+        let (writer, entry, white) = derived::resume(directory, manifest, cache)?;
         let next_id = match entry.report[NEXT_ID].as_u64() {
             Some(next) => next as u32,
             None => 0,
@@ -466,44 +405,6 @@ impl StreamWriter {
             next_id,
         })
     }
-}
-
-/// The existing stream, if it was made with the same settings; `None` if there is none or it is to
-/// be overwritten.
-fn standing(
-    request: &WhitewaterRequest,
-    directory: &Path,
-    manifest: &Manifest,
-) -> Result<Option<CacheReader>, WhitewaterError> {
-    if !swell_cache::exists(directory) {
-        return Ok(None);
-    }
-    let stream = CacheReader::open(directory)?;
-    match (other(&stream, &manifest.scene_hash), request.overwrite) {
-        (None, false) => Ok(Some(stream)),
-        (_, true) => Ok(None),
-        (Some(how), false) => Err(WhitewaterError::Other {
-            directory: directory.to_owned(),
-            how,
-        }),
-    }
-}
-
-/// Removes a stream that is to be overwritten.
-fn remove(directory: &Path) -> Result<(), WhitewaterError> {
-    if !swell_cache::exists(directory) {
-        return Ok(());
-    }
-    output::remove_folder(directory).map_err(|error| WhitewaterError::Remove {
-        directory: directory.to_owned(),
-        source: error.source,
-    })
-}
-
-/// How a stream was made, if its hash differs from `hash`.
-fn other(stream: &CacheReader, hash: &str) -> Option<&'static str> {
-    let is_other = stream.manifest().scene_hash != hash;
-    is_other.then_some("with other settings, or from another bake")
 }
 
 /// Hash of everything except the device that decides a stream's bytes: settings and bake.
@@ -519,22 +420,16 @@ fn manifest(
     request: &WhitewaterRequest,
     identity: &Identity,
 ) -> Result<Manifest, WhitewaterError> {
-    let baked = cache.manifest();
     Ok(Manifest {
-        format_version: Manifest::FORMAT_VERSION,
-        program: swell_domain::PROGRAM.into(),
-        program_version: swell_domain::VERSION.into(),
         shaders: identity.shaders.clone(),
-        scene_hash: hash(cache, request)?,
-        solver: Manifest::WHITEWATER.to_owned(),
         device: identity.name.clone(),
         driver: identity.driver.clone(),
         backend: identity.backend.clone(),
-        attributes: whitewater::ATTRIBUTES.map(str::to_owned).to_vec(),
-        grids: None,
-        probes: Vec::new(),
-        bodies: Vec::new(),
-        warnings: Vec::new(),
-        ..baked.clone()
+        ..derived::manifest(
+            cache.manifest(),
+            Manifest::WHITEWATER,
+            hash(cache, request)?,
+            &whitewater::ATTRIBUTES,
+        )
     })
 }

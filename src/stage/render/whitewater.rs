@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::whitewater::{directory, is_of};
+use crate::{derived::is_of, whitewater::directory};
 use swell_cache::{CacheError, CacheReader};
 use swell_domain::particles::Particles;
 

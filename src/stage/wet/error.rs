@@ -6,7 +6,7 @@ use swell_cache::CacheError;
 use swell_domain::wet::TooFine;
 use swell_scene::SceneError;
 
-use crate::Blame;
+use crate::{Blame, derived::DerivedError};
 
 /// Why the wetness of solids could not be made or used.
 #[derive(Debug, thiserror::Error)]
@@ -15,17 +15,12 @@ pub enum WetError {
     /// Reading or writing the bake's or the stream's cache failed.
     #[error(transparent)]
     Cache(#[from] CacheError),
+    /// The stream cannot be made from the bake.
+    #[error(transparent)]
+    Derived(#[from] DerivedError),
     /// The scene in the cache.
     #[error("the cache's scene: {0}")]
     Scene(#[from] SceneError),
-    /// The given cache is itself a stream, not a bake.
-    #[error("{} is a stream of {of}; give the cache that it was made from", directory.display())]
-    IsStream {
-        /// The given cache.
-        directory: PathBuf,
-        /// What it holds.
-        of: &'static str,
-    },
     /// The scene has no solids.
     #[error("the scene has no solids that could stay wet; the walls of its domain are not solids")]
     NoSolids,
@@ -44,38 +39,12 @@ pub enum WetError {
         source: TooFine,
     },
     /// A setting that is out of range.
-    #[error("the {what} is {value}; allowed is > 0")]
+    #[error("the {what} is {value}; allowed is a finite number > 0")]
     Setting {
         /// What it sets.
         what: &'static str,
         /// Its value.
         value: f64,
-    },
-    /// The bake does not have the requested frame.
-    #[error("frame {asked} was requested, but the bake has frames {first} to {last}")]
-    NoFrame {
-        /// The requested frame.
-        asked: u32,
-        /// First frame of the bake.
-        first: u32,
-        /// Last frame of the bake.
-        last: u32,
-    },
-    /// The existing stream was made differently.
-    #[error("{} was made {how}; choose another name, or overwrite it", directory.display())]
-    Other {
-        /// Directory of the stream.
-        directory: PathBuf,
-        /// What differs, in words.
-        how: &'static str,
-    },
-    /// A stream that cannot be removed.
-    #[error("cannot remove {}: {source}", directory.display())]
-    Remove {
-        /// Directory of the stream.
-        directory: PathBuf,
-        /// The system's error.
-        source: std::io::Error,
     },
     /// There is no stream of that name.
     #[error(
@@ -104,17 +73,12 @@ impl From<&WetError> for Blame {
     fn from(error: &WetError) -> Self {
         match error {
             WetError::Cache(error) => error.into(),
-            WetError::Scene(_)
-            | WetError::Other { .. }
-            | WetError::Remove { .. }
-            | WetError::Missing { .. }
-            | WetError::Unfit { .. } => Self::Files,
-            WetError::IsStream { .. }
-            | WetError::NoSolids
+            WetError::Scene(_) | WetError::Missing { .. } | WetError::Unfit { .. } => Self::Files,
+            WetError::Derived(error) => error.into(),
+            WetError::NoSolids
             | WetError::Triangles(_)
             | WetError::TooFine { .. }
-            | WetError::Setting { .. }
-            | WetError::NoFrame { .. } => Self::Input,
+            | WetError::Setting { .. } => Self::Input,
         }
     }
 }

@@ -3,7 +3,7 @@
 use std::{path::Path, sync::Arc};
 
 use super::{SETTINGS, Settings, WetError, directory, surfaces};
-use crate::whitewater::is_of;
+use crate::derived::is_of;
 use swell_cache::{CacheError, CacheReader};
 use swell_domain::wet::{RefinedSurface, WETNESS};
 use swell_scene::Scene;

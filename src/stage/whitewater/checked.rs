@@ -2,14 +2,19 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::{baked_scene, device::SolverError, prepare::Start};
+use crate::{
+    baked_scene,
+    derived::{DerivedError, is_of, water::WaterReader},
+    device::SolverError,
+    prepare::Start,
+};
 use swell_cache::CacheReader;
 use swell_check::CheckTable;
 use swell_domain::{boundary::Boundary, whitewater::CalibratedSettings};
 use swell_gpu::adapter::Context;
 use swell_scene::PbfScene;
 
-use super::{WhitewaterError, is_of, recorded, water::WaterReader};
+use super::{WhitewaterError, recorded};
 
 /// A stream, and everything that its frames are made from.
 pub struct Stream {
@@ -40,11 +45,11 @@ impl Stream {
         for &frame in frames {
             if frame == stream.first_frame() {
                 let (first, last) = (frame + 1, stream.last_frame());
-                return Err(WhitewaterError::NoFrame {
+                return Err(WhitewaterError::Derived(DerivedError::NoFrame {
                     asked: frame,
                     first,
                     last,
-                });
+                }));
             }
             // A frame is computed from the frame before.
             stream.kept(frame - 1)?;

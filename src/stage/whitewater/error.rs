@@ -7,7 +7,7 @@ use swell_domain::{mesh_file::MeshError, signed_distance::SignedDistanceError};
 use swell_gpu::adapter::GpuError;
 use swell_scene::SceneError;
 
-use crate::{Blame, device::SolverError};
+use crate::{Blame, derived::DerivedError, device::SolverError};
 
 /// Why whitewater could not be made.
 #[derive(Debug, thiserror::Error)]
@@ -16,6 +16,9 @@ pub enum WhitewaterError {
     /// Reading or writing the bake's or the stream's cache failed.
     #[error(transparent)]
     Cache(#[from] CacheError),
+    /// The stream cannot be made from the bake.
+    #[error(transparent)]
+    Derived(#[from] DerivedError),
     /// The scene in the cache, or the stream's own settings.
     #[error("the cache's scene: {0}")]
     Scene(#[from] SceneError),
@@ -31,14 +34,6 @@ pub enum WhitewaterError {
     /// A whitewater pass failed.
     #[error(transparent)]
     Solver(#[from] SolverError),
-    /// The given cache is itself a stream, not a bake.
-    #[error("{} is a stream of {of}; give the cache that it was made from", directory.display())]
-    IsStream {
-        /// The given cache.
-        directory: PathBuf,
-        /// What it holds.
-        of: &'static str,
-    },
     /// The bake that a stream was made from is missing or has changed.
     #[error(
         "{} was made from a bake in {}, which no longer exists or has changed: frame {frame}",
@@ -52,24 +47,6 @@ pub enum WhitewaterError {
         cache: PathBuf,
         /// Frame of the stream.
         frame: u32,
-    },
-    /// The bake does not have the requested frame.
-    #[error("frame {asked} was requested, but the bake has frames {first} to {last}")]
-    NoFrame {
-        /// The requested frame.
-        asked: u32,
-        /// First frame of the bake.
-        first: u32,
-        /// Last frame of the bake.
-        last: u32,
-    },
-    /// The existing stream was made differently.
-    #[error("{} was made {how}; choose another name, or overwrite it", directory.display())]
-    Other {
-        /// Directory of the stream.
-        directory: PathBuf,
-        /// What differs, in words.
-        how: &'static str,
     },
     /// More particles than the settings allow.
     #[error(
@@ -85,14 +62,6 @@ pub enum WhitewaterError {
         /// `max_particles` of the settings.
         allowed: u32,
     },
-    /// A stream that cannot be removed.
-    #[error("cannot remove {}: {source}", directory.display())]
-    Remove {
-        /// Directory of the stream.
-        directory: PathBuf,
-        /// The system's error.
-        source: std::io::Error,
-    },
 }
 
 impl From<&WhitewaterError> for Blame {
@@ -101,13 +70,11 @@ impl From<&WhitewaterError> for Blame {
             WhitewaterError::Cache(error) => error.into(),
             WhitewaterError::Scene(_)
             | WhitewaterError::Mesh(_)
-            | WhitewaterError::NoBake { .. }
-            | WhitewaterError::Other { .. }
-            | WhitewaterError::Remove { .. } => Self::Files,
+            | WhitewaterError::NoBake { .. } => Self::Files,
+            WhitewaterError::Derived(error) => error.into(),
             WhitewaterError::Solid(error) => error.into(),
             WhitewaterError::Gpu(error) => error.into(),
             WhitewaterError::Solver(error) => error.into(),
-            WhitewaterError::IsStream { .. } | WhitewaterError::NoFrame { .. } => Self::Input,
             WhitewaterError::TooMany { .. } => Self::Numbers,
         }
     }

@@ -2,8 +2,9 @@
 
 use std::path::PathBuf;
 
-use super::{WhitewaterError, WhitewaterRequest, asked, hash, other};
-use swell_cache::{CacheReader, stream::PARTICLES};
+use super::{WhitewaterError, WhitewaterRequest, hash};
+use crate::derived;
+use swell_cache::stream::PARTICLES;
 
 /// Prediction of a job.
 #[derive(Clone, Debug)]
@@ -27,7 +28,7 @@ pub struct ExpectedWhitewater {
 /// # Errors
 /// Those of [`whitewater`](super::whitewater()) that need no device.
 pub fn expected(request: &WhitewaterRequest) -> Result<ExpectedWhitewater, WhitewaterError> {
-    let (cache, last) = asked(request)?;
+    let (cache, last) = derived::bake(&request.cache, request.last)?;
     let directory = super::directory(&request.cache, &request.name);
     let mut found = ExpectedWhitewater {
         first: cache.first_frame() + 1,
@@ -36,14 +37,8 @@ pub fn expected(request: &WhitewaterRequest) -> Result<ExpectedWhitewater, White
         bytes: None,
         directory,
     };
-    if swell_cache::exists(&found.directory) && !request.overwrite {
-        let stream = CacheReader::open(&found.directory)?;
-        if let Some(how) = other(&stream, &hash(&cache, request)?) {
-            return Err(WhitewaterError::Other {
-                directory: found.directory,
-                how,
-            });
-        }
+    let hash = hash(&cache, request)?;
+    if let Some(stream) = derived::standing(&found.directory, &hash, request.overwrite)? {
         found.first = stream.last_frame() + 1;
         let made = stream.entries().iter().skip(1);
         let bytes: u64 = made

@@ -5,10 +5,8 @@ use std::{
     sync::atomic::{AtomicBool, Ordering},
 };
 
-use super::{
-    SETTINGS, WhitewaterError, WhitewaterEvent, WhitewaterRequest, engine::Engine,
-    water::WaterReader,
-};
+use super::{SETTINGS, WhitewaterError, WhitewaterEvent, WhitewaterRequest, engine::Engine};
+use crate::derived::water::WaterReader;
 use swell_cache::CacheReader;
 use swell_domain::whitewater::{CalibratedSettings, Thresholds};
 use swell_files::whitewater::WhitewaterSettings;

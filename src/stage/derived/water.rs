@@ -23,7 +23,7 @@ impl<'a> WaterReader<'a> {
     }
 
     /// The cache that it reads from.
-    pub(super) fn cache(&self) -> &'a CacheReader {
+    pub(crate) fn cache(&self) -> &'a CacheReader {
         self.cache
     }
 
