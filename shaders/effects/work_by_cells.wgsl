@@ -4,6 +4,7 @@
 //
 // A cell's water has the velocities of its faces; an isolated droplet has its own.
 #import "shared/thread.wgsl"
+#import "shared/sum_of_group.wgsl"
 #import "shared/vector.wgsl"
 #import "shared/flip_params.wgsl"
 #import "shared/flip_beside.wgsl"
@@ -17,8 +18,6 @@
 @group(0) @binding(6) var<storage, read> face_velocity: array<f32>;
 @group(0) @binding(9) var<storage, read> face_change: array<f32>;
 @group(0) @binding(10) var<storage, read_write> force_work: array<f32>;
-
-var<workgroup> terms: array<f32, 64>;
 
 fn work_at_face(element: u32, component: u32, place: vec3f) -> f32 {
     let face = component * params.stride + element;
@@ -78,13 +77,8 @@ fn main(
     for (var once = 0; once < select(0, 1, water > 0u); once++) {
         work += f32(water) * work_in_cell(element);
     }
-    terms[local] = work;
-    workgroupBarrier();
+    let sum = sum_of_group(local, work);
     if local == 0u && is_inside {
-        var sum = 0.0;
-        for (var k = 0u; k < 64u; k++) {
-            sum += terms[k];
-        }
         force_work[thread / 64u] = sum;
     }
 }

@@ -2,6 +2,7 @@
 // mass, to the sum over earlier substeps: impulse times the mean of the velocities before and after
 // the substep.
 #import "shared/thread.wgsl"
+#import "shared/sum_of_group.wgsl"
 #import "shared/vector.wgsl"
 #import "shared/pbf_params.wgsl"
 
@@ -10,8 +11,6 @@
 @group(0) @binding(11) var<storage, read> velocity: array<Vector>;
 @group(0) @binding(12) var<storage, read> force_impulse: array<vec4f>;
 @group(0) @binding(13) var<storage, read_write> force_work: array<f32>;
-
-var<workgroup> terms: array<f32, 64>;
 
 @compute @workgroup_size(64)
 fn main(
@@ -24,13 +23,8 @@ fn main(
     let i = select(0u, thread, is_inside);
     let impulse = force_impulse[order[i]];
     let work = 0.5 * (impulse.w + dot(impulse.xyz, three(velocity[i])));
-    terms[local] = select(0.0, work, is_inside);
-    workgroupBarrier();
+    let sum = sum_of_group(local, select(0.0, work, is_inside));
     if local == 0u && is_inside {
-        var sum = 0.0;
-        for (var k = 0u; k < 64u; k++) {
-            sum += terms[k];
-        }
         force_work[thread / 64u] += sum;
     }
 }

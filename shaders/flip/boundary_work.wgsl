@@ -2,6 +2,7 @@
 // the flux that they push through the closed parts of a cell's faces. It equals their contribution
 // to the energy in the projection. The flux of closing gaps (flip/close_gaps) is not work.
 #import "shared/thread.wgsl"
+#import "shared/sum_of_group.wgsl"
 #import "shared/flip_cell.wgsl"
 #import "shared/flip_buried.wgsl"
 
@@ -10,8 +11,6 @@
 @group(0) @binding(3) var<storage, read> pressure: array<f32>;
 @group(0) @binding(4) var<storage, read_write> boundary_work: array<f32>;
 @group(0) @binding(6) var<storage, read> density: array<f32>;
-
-var<workgroup> terms: array<f32, 64>;
 
 @compute @workgroup_size(64)
 fn main(
@@ -24,13 +23,9 @@ fn main(
     let element = select(0u, thread + CELLS, is_inside);
     let is_thin = density[element] < 0.5 && !is_buried(element, vec3f(own_cell(element)));
     let is_water = cell_kind[element] == 1u && !is_thin;
-    terms[local] = select(0.0, -pressure[element] * solid_flux[element], is_water && is_inside);
-    workgroupBarrier();
+    let work = select(0.0, -pressure[element] * solid_flux[element], is_water && is_inside);
+    let sum = sum_of_group(local, work);
     if local == 0u && is_inside {
-        var sum = 0.0;
-        for (var k = 0u; k < 64u; k++) {
-            sum += terms[k];
-        }
         boundary_work[thread / 64u] = sum;
     }
 }

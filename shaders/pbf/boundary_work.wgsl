@@ -1,12 +1,11 @@
 // Adds each workgroup's share of the work by moving walls in a substep to the sum over earlier
 // substeps.
 #import "shared/thread.wgsl"
+#import "shared/sum_of_group.wgsl"
 #import "shared/pbf_params.wgsl"
 
 @group(0) @binding(1) var<storage, read> wall_work: array<f32>;
 @group(0) @binding(2) var<storage, read_write> boundary_work: array<f32>;
-
-var<workgroup> terms: array<f32, 64>;
 
 @compute @workgroup_size(64)
 fn main(
@@ -18,13 +17,9 @@ fn main(
     let is_inside = thread < params.particle_count;
     let i = select(0u, thread, is_inside);
     // Work by corrections, in sorted order, plus work by the prediction, in storage order.
-    terms[local] = select(0.0, wall_work[i] + wall_work[params.particle_count + i], is_inside);
-    workgroupBarrier();
+    let work = select(0.0, wall_work[i] + wall_work[params.particle_count + i], is_inside);
+    let sum = sum_of_group(local, work);
     if local == 0u && is_inside {
-        var sum = 0.0;
-        for (var k = 0u; k < 64u; k++) {
-            sum += terms[k];
-        }
         boundary_work[thread / 64u] += sum;
     }
 }
