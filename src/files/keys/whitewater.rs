@@ -39,7 +39,7 @@ keys! { struct WhitewaterSpec {
         .default("{}")
         .about("Air under the surface"),
     #[serde(default)]
-    kill: Vec<KillSpec> = tables().about("A room in which whitewater ends, of whatever kind"),
+    kill: Vec<KillSpec> = tables().about("A region in which whitewater ends, of whatever kind"),
 } }
 
 keys! { struct EmissionSpec {
@@ -110,7 +110,7 @@ keys! { struct KillSpec {
         .with("max")
         .without(&["mesh", "sides"])
         .also(", below max")
-        .about("least corner of the room"),
+        .about("least corner of the region"),
     max: Option<[f64; 3]> = vector(3, COORDINATE)
         .unit("metres")
         .absent()
@@ -121,13 +121,13 @@ keys! { struct KillSpec {
     mesh: Option<MeshSpec> = inline()
         .absent()
         .without(&["min", "max", "sides"])
-        .about("A mesh that is the room, where that is no box; relative to this file"),
+        .about("A mesh that is the region, where that is no box; relative to this file"),
     sides: Option<f64> = number(1e-6..=1e6)
         .unit("metres")
         .absent()
         .without(&["min", "max", "mesh"])
         .about(
-            "instead of a box: the room is as wide along all walls of the domain that face x or z",
+            "instead of a box: it is as wide along all walls of the domain that face x or z",
         ),
     from: f64 = number(0.0..=1e9)
         .unit("s")

@@ -1,6 +1,8 @@
 //! Forces: free drops, weightless water, tilted surfaces, vortices and their angular momentum,
 //! rooms and windows, and the work that they do.
 
+use std::path::Path;
+
 use glam::{DVec3, Vec3};
 use swell::{
     domain::{
@@ -12,10 +14,12 @@ use swell::{
         solver::{Solver, StepReport},
         sources::Window,
     },
+    files::parse_scene,
     gpu::adapter::Context,
     reference,
     scene::{Method, Scene, budget::Before, forces::PlacedForce},
     solve::plan::Plan,
+    stage::{device::Opened, drive::Drive, prepare::Start},
 };
 
 use crate::support::{
@@ -507,5 +511,58 @@ fn a_scene_that_names_no_force_pays_for_none() {
         assert_eq!(added, expected);
         let owners = |plan: &Plan| plan.shares(&[]).iter().any(|share| share.owner == "forces");
         assert!(owners(&with) && !owners(&bare));
+    }
+}
+
+/// Water on a slope of 1 in 4 off the lattice, before a wall that moves, after half a second of this
+/// gravity and this force: the mean position of its particles, metres.
+fn beside_slope_and_maker(opened: &Opened, method: Method, gravity: DVec3, force: DVec3) -> DVec3 {
+    let text = format!(
+        "[shot]\nname = \"equal\"\nframes = 12\nframes_per_second = 24\n\
+         [domain]\nmin = [0, 0, 0]\nmax = [1.4, 0.8, 0.48]\n\
+         [water]\ngravity = {:?}\n\
+         [[water.block]]\nmin = [0, 0, 0]\nmax = [1.4, 0.4, 0.48]\n\
+         [[solid]]\nmesh = \"box.obj\"\ntranslate = [1.17, -0.1697, 0.35]\n\
+         rotate_degrees = [0, 0, 14.03624]\nscale = [2.4, 0.8, 1]\n\
+         [[wave_maker]]\nwall = \"-x\"\n\
+         motion = {{ kind = \"sine\", stroke = 0.1, period = 1.0 }}\n\
+         [[force]]\nkind = \"acceleration\"\nacceleration = {:?}\n\
+         [solver]\nmethod = \"{}\"\n[solver.flip]\ncell_size = 0.06\n\
+         [solver.pbf]\nparticle_spacing = 0.03\n",
+        gravity.to_array(),
+        force.to_array(),
+        method.name(),
+    );
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/hard_cases");
+    let scene = parse_scene(&text, Path::new("equal.toml"), &folder, &[]).unwrap();
+    let start = Start::of(&scene).unwrap();
+    let mut drive = Drive::new(opened, &scene, &start, false).unwrap();
+    let state = (0..12).map(|_| drive.advance().unwrap().particles).last();
+    let position = state.unwrap().position;
+    let sum: DVec3 = position
+        .iter()
+        .map(|x| Vec3::from_array(*x).as_dvec3())
+        .sum();
+    sum / position.len() as f64
+}
+
+/// A force everywhere is as good as gravity, also on a slope and at a wall that moves. Only the
+/// friction of films on solids, which gravity alone presses on, tells them apart.
+#[test]
+fn a_force_everywhere_does_what_gravity_does() {
+    let context: &Context = &context();
+    let opened = Opened::Gpu(Box::new(context.clone()));
+    let (down, aside) = (-G * DVec3::Y, DVec3::new(-1.5, 0.0, 0.7));
+    for method in [Method::Flip, Method::Pbf] {
+        let mean = |gravity, force| beside_slope_and_maker(&opened, method, gravity, force);
+        let rest = mean(down, DVec3::ZERO);
+        let by_gravity = mean(down + aside, DVec3::ZERO);
+        let way = (by_gravity - rest).length();
+        let apart = |part: f64| (mean(down, part * aside) - by_gravity).length() / way;
+        let [exact, more] = [1.0, 1.02].map(apart);
+        println!("{method:?}: {way:.4} m, {exact:.1e}, with 2 % more {more:.1e}");
+        assert!(way > 0.05 && exact < 0.005, "{method:?}: {way} {exact}");
+        // Negative control.
+        assert!(more > 0.01, "{method:?}: {more}");
     }
 }
