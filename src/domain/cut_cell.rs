@@ -69,7 +69,8 @@ pub fn volume_offset(grid: &SignedDistance, volume: f64, cell_size: f64) -> f64 
         let here = error(offset);
         let slope = (here - last_error) / (offset - last);
         if slope <= 0.0 {
-            break;
+            // No cell is cut: a body far below their size.
+            return last;
         }
         (last, last_error) = (offset, here);
         offset = (offset - here / slope).clamp(-most, most);

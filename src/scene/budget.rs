@@ -164,7 +164,8 @@ impl Scene {
         let start = f64::from(frame.saturating_sub(1)) * length;
         let push = self.peak_boundary_speed(&AbsorberStates::default(), &[], start, start + length);
         let least = LEAST_ENERGY_SPEED * self.particle_spacing() / length;
-        let pull = self.most_acceleration(start, start + length);
+        // The first substep also has what acted in the second half of the one before.
+        let pull = self.most_acceleration(start - 0.5 * length, start + length);
         let gained = pull * length + self.effects.push().gained(length);
         (speed + push + gained + self.effects.frees(self.grain())).max(least)
     }

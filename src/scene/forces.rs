@@ -11,6 +11,10 @@ use swell_domain::{
     sources::Shape,
 };
 
+/// Share of a time in which a force is taken to act. Times that end where another begins overlap
+/// by rounding.
+const LEAST_SHARE: f64 = 1e-9;
+
 /// A force field, with its room as the scene names it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlacedForce {
@@ -55,9 +59,7 @@ impl Scene {
     /// `end`, seconds; m/s².
     pub fn most_acceleration(&self, start: f64, end: f64) -> f64 {
         let acting = self.forces_on(Medium::Water);
-        // The first substep also gets what acted in the second half of the one before.
-        let start = start - 0.5 / self.shot.frames_per_second;
-        let acting = acting.filter(|force| force.window.share(start, end - start) > 0.0);
+        let acting = acting.filter(|force| force.window.share(start, end - start) > LEAST_SHARE);
         let forces: f64 = acting.map(|force| force.kind.most()).sum();
         self.water.gravity.length() + forces
     }

@@ -104,6 +104,7 @@ impl Scene {
         self.lint_layers(level, &mut lints);
         self.lint_water(&mut lints);
         self.lint_thin(&mut lints);
+        self.lint_bodies(&mut lints);
         lints.extend(self.effects.lints(self.grain()));
         lints
     }

@@ -299,7 +299,8 @@ impl FlipScene<'_> {
         let flip = self.settings();
         let push = self.peak_boundary_speed(absorbers, bodies, start, start + remaining);
         let fastest = speed.max(push);
-        let pull = self.most_acceleration(start, start + remaining);
+        // Forces act from the middle of the last substep on.
+        let pull = self.most_acceleration(start - 0.5 * before, start + remaining);
         let push = self.effects.push();
         // Solves v t + g t² = cfl Δx.
         let room = flip.cfl * flip.cell_size;

@@ -1,4 +1,4 @@
-//! Warnings for solids too thin to hold water.
+//! Warnings for solids too thin to hold water, and for bodies too small to float as they should.
 
 use swell_domain::{mesh::TriangleMesh, thin::thin_parts};
 
@@ -8,7 +8,35 @@ use crate::{PlacedMesh, Scene};
 /// can lie between two nodes; the additional half is for oblique and moving solids.
 const LEAST_THICKNESS: f64 = 1.5;
 
+/// Least size of a body, cells of the projection's grid: edge of a cube with its volume. Cells cut
+/// by planes make smaller ones float a tenth of that too high or too low.
+const LEAST_BODY: f64 = 2.0;
+
 impl Scene {
+    /// Warns about bodies that are small beside cells.
+    pub(super) fn lint_bodies(&self, lints: &mut Vec<String>) {
+        let cell = self.solver.cell_size();
+        let bodies = self.moving_solids.iter().filter(|it| it.body.is_some());
+        let sized = bodies.map(|it| (it.placed.mesh.signed_volume().abs().cbrt(), it));
+        let mut small: Vec<_> = sized
+            .filter(|(size, _)| *size < LEAST_BODY * cell)
+            .collect();
+        small.sort_by(|(a, _), (b, _)| a.total_cmp(b));
+        let Some((size, smallest)) = small.first() else {
+            return;
+        };
+        let more = match small.len() - 1 {
+            0 => String::new(),
+            more => format!(" (the smallest of {})", more + 1),
+        };
+        lints.push(format!(
+            "body.mesh of {}{more}: it is as large as a cube of {size:.3} m, {:.1} cells of {cell} \
+             m; below {LEAST_BODY} cells a body may float far from its draft",
+            smallest.placed.name(),
+            size / cell,
+        ));
+    }
+
     /// Warns about solids that are too thin somewhere, with water or air on both sides.
     pub(super) fn lint_thin(&self, lints: &mut Vec<String>) {
         let spacing = self.particle_spacing();

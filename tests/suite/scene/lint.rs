@@ -58,3 +58,26 @@ fn a_probe_that_looks_less_often_than_it_should_is_told_of() {
     let (said, _) = bake("60", "each");
     assert!(!said.contains("rate_hz"), "{said}");
 }
+
+/// Of bodies that are small beside cells the smallest is named; larger ones are not.
+#[test]
+fn bodies_that_are_small_beside_cells_are_named() {
+    let job = Job::new();
+    let cube = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/hard_cases/cube.obj");
+    job.write("cube.obj", &std::fs::read_to_string(cube).unwrap());
+    let body = |scale: f64| {
+        format!("{{mesh=\"cube.obj\",translate=[0.2,1.5,0.5],scale={scale},density=500}}")
+    };
+    let said = |bodies: &str| job.expect(0, &format!("inspect small.toml --set body=[{bodies}]"));
+    let both = said(&format!("{},{}", body(0.02), body(0.03)));
+    assert_has(
+        &both,
+        &[
+            "warning: body.mesh of cube (the smallest of 2): ",
+            "cells a body may",
+        ],
+    );
+    // Negative control.
+    let large = said(&body(0.5));
+    assert!(!large.contains("body.mesh of"), "{large}");
+}
