@@ -15,6 +15,15 @@ struct Cloud {
     nodes: vec3u,
     // Distance between the nodes, metres.
     pitch: f32,
+    // Least corner of the columns of foam along x and z, and their numbers; none without foam.
+    foam_corner: vec2f,
+    foam_columns: vec2u,
+    // Edge of a column, which is the radius of the kernel, metres.
+    foam_edge: f32,
+    // Index in `cloud_words` of the columns' starts.
+    foam_start: u32,
+    foam_albedo: f32,
+    pad0: f32,
 }
 
 // Voxels and nodes along a brick's edge, and values per brick.

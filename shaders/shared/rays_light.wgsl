@@ -9,6 +9,9 @@
 #ifdef VOLUME
 #import "shared/rays_cloud_light.wgsl"
 #endif
+#ifdef FOAM_LAYER
+#import "shared/rays_foam.wgsl"
+#endif
 #ifdef CAUSTICS
 #import "shared/caustics_light.wgsl"
 #endif
@@ -295,6 +298,17 @@ fn radiance_along(
         }
         let split = split_at(ray, found);
         let p = ray.origin + ray.direction * found.t;
+#ifdef FOAM_LAYER
+        let slant = max(abs(dot(found.normal, ray.direction)), 0.1);
+        let cover = foam_cover(
+            p, found.normal, (ray.travelled + found.t) / camera.focal / sqrt(slant));
+        if cover > 0.0 {
+            let foam = weight * cover * foam_radiance(p, found.normal, ray.inside);
+            light += foam;
+            light_part(part_of(ray, FOAM_LIGHT), foam);
+            weight *= 1.0 - cover;
+        }
+#endif
         if !ray.inside {
             let sun = weight * shading.sun_irradiance * sunlit(p, vec3f(0.0, 1.0, 0.0))
                 * glitter(split.normal, -ray.direction, shading.sun_direction, split.variance,

@@ -155,6 +155,11 @@ pub fn census(particles: &Particles) -> [usize; 3] {
     WhitewaterKind::ALL.map(|kind| kinds.iter().filter(|&&k| k == kind.number()).count())
 }
 
+/// Returns a pseudo-random number in 0..1 that a particle keeps, by its id.
+pub fn random_of(id: u32) -> f64 {
+    random(0, id, 0, 0)
+}
+
 /// A pseudo-random number in 0..1 for these keys, mixed as in splitmix64 (Steele, Lea and
 /// Flood 2014).
 fn random(seed: u32, id: u32, frame: u32, channel: u32) -> f64 {

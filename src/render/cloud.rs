@@ -10,10 +10,14 @@ use glam::{DVec3, Vec3};
 
 use super::{
     RenderScene,
+    foam::FoamColumns,
     paths::Path,
     uniform::{self, Particle},
 };
-use swell_domain::{particles::Particles, whitewater::RADIUS};
+use swell_domain::{
+    particles::Particles,
+    whitewater::{RADIUS, WhitewaterKind},
+};
 use swell_scene::look::Look;
 
 use density::Cloud;
@@ -56,12 +60,13 @@ pub(super) fn drops_of(
         .collect()
 }
 
-/// Drops and bubbles of whitewater with their paths; `is_bubble` distinguishes them by index.
+/// Spray and bubbles of whitewater with their paths; `kind` is that of a particle. Foam is a layer
+/// on the surface instead.
 pub(super) fn white_of(
     look: &Look,
     scene: &RenderScene,
     white: &Particles,
-    is_bubble: impl Fn(usize) -> bool,
+    kind: impl Fn(usize) -> WhitewaterKind,
 ) -> Vec<(Drop, Path)> {
     let Some(spec) = &look.spec().whitewater else {
         return Vec::new();
@@ -70,23 +75,26 @@ pub(super) fn white_of(
     let radii = white.attributes.get(RADIUS).map_or(&[][..], Vec::as_slice);
     let places = white.position.iter().zip(&white.velocity).zip(radii);
     (places.enumerate())
+        .filter(|(index, _)| kind(*index) != WhitewaterKind::Foam)
         .map(|(index, ((&place, &velocity), &radius))| {
             let radius = spec.size * f64::from(radius);
             let drop = Drop {
                 place: Vec3::from(place).as_dvec3() - origin,
                 radius,
                 area: spec.density_per_metre * 4.0 / 3.0 * PI * radius.powi(3),
-                is_bubble: is_bubble(index),
+                is_bubble: kind(index) == WhitewaterKind::Bubble,
             };
             (drop, Path::straight(velocity.into()))
         })
         .collect()
 }
 
-/// Builds the grid at an instant and returns its uniform and its words.
+/// Builds the grid at an instant and returns its uniform and its words, followed by those of the
+/// foam on the water, which is of that instant.
 pub(super) fn grid(
     drops: &[(Drop, Path)],
     seconds: f32,
+    foam: &FoamColumns,
     scene: &RenderScene,
     (voxel, sun): (f64, DVec3),
 ) -> (uniform::Cloud, Vec<u32>) {
@@ -99,6 +107,7 @@ pub(super) fn grid(
         .collect();
     let cloud = Cloud::new(&moved, scene.domain.size(), voxel);
     let shade = Shade::new(&cloud, sun);
+    let before = cloud.table.len() + shade.depths.len() + cloud.values.len();
     let about = uniform::Cloud {
         corner: cloud.corner.as_vec3().to_array(),
         voxel: voxel as f32,
@@ -106,9 +115,16 @@ pub(super) fn grid(
         skin: (SKIN * scene.particle_spacing) as f32,
         nodes: shade.nodes,
         pitch: shade.pitch as f32,
+        foam_corner: foam.corner,
+        foam_columns: foam.columns,
+        foam_edge: foam.edge,
+        foam_start: before as u32,
+        foam_albedo: foam.albedo,
+        pad0: 0.0,
     };
     let mut words = cloud.table;
     words.extend(shade.depths.iter().map(|depth| depth.to_bits()));
     words.extend_from_slice(&cloud.values);
+    words.extend(foam.words());
     (about, words)
 }

@@ -16,6 +16,7 @@ mod closed;
 mod cloud;
 pub mod colour;
 pub mod cryptomatte;
+mod foam;
 mod frame;
 mod hidden;
 pub mod image;

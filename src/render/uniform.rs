@@ -286,6 +286,12 @@ mirror!(
         skin: f32,
         nodes: [u32; 3],
         pitch: f32,
+        foam_corner: [f32; 2],
+        foam_columns: [u32; 2],
+        foam_edge: f32,
+        foam_start: u32,
+        foam_albedo: f32,
+        pad0: f32,
     }
 );
 

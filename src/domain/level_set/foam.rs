@@ -10,7 +10,7 @@ use crate::{
     parallel,
     particles::Particles,
     period::Period,
-    whitewater::{AGE, KIND, RADIUS, SUPPORT, WhitewaterKind},
+    whitewater::{AGE, KIND, LIFE, RADIUS, SUPPORT, WhitewaterKind},
 };
 
 /// Attribute of a vertex: fraction of the surface that foam covers, 0 to 1.
@@ -33,14 +33,52 @@ pub struct FoamBox {
 
 /// A foam particle: a disc on the surface.
 #[derive(Clone, Copy, Debug)]
-struct Disc {
-    place: DVec3,
+pub struct Disc {
+    /// Centre, relative to the box's least corner, metres.
+    pub place: DVec3,
     /// Area, m².
-    area: f64,
+    pub area: f64,
     /// Time since birth, seconds.
-    age: f64,
+    pub age: f64,
+    /// Remaining life, seconds.
+    pub life: f64,
+    /// Id of the particle.
+    pub id: u32,
     /// 1 along the axes along which a wall mirrors it, else 0.
-    mirrored: DVec3,
+    pub mirrored: DVec3,
+}
+
+impl FoamBox {
+    /// Returns the radius R of the kernel along the surface, metres.
+    pub fn radius(&self) -> f64 {
+        SUPPORT * self.spacing
+    }
+}
+
+/// Returns the foam among the particles of a whitewater stream. Its images behind walls complete
+/// the kernel at points near a wall, those beyond a joint of a periodic box are neighbours.
+pub fn discs(white: &Particles, room: &FoamBox) -> Vec<Disc> {
+    let column = |name| white.attributes.get(name).map_or(&[][..], Vec::as_slice);
+    let [kinds, ages, lives, radii] = [KIND, AGE, LIFE, RADIUS].map(column);
+    let count = [ages, lives, radii].map(<[f32]>::len).into_iter().min();
+    let count = count.unwrap_or(0).min(kinds.len());
+    let mut discs = parallel::flat_map(0..count, |k| {
+        (kinds[k] == WhitewaterKind::Foam.number()).then(|| Disc {
+            place: DVec3::from(white.position[k].map(f64::from)) - room.corner,
+            area: PI * f64::from(radii[k]).powi(2),
+            age: ages[k].into(),
+            life: lives[k].into(),
+            id: white.id[k],
+            mirrored: DVec3::ZERO,
+        })
+    });
+    for axis in 0..3 {
+        let images = parallel::flat_map(0..discs.len(), |k| {
+            discs[k].images(axis, room, room.radius())
+        });
+        discs.extend(images);
+    }
+    discs
 }
 
 /// The foam of a frame, to be asked for at points.
@@ -53,26 +91,10 @@ pub struct Foam {
 }
 
 impl Foam {
-    /// Takes the foam among the particles of a whitewater stream. Its images behind walls complete
-    /// the kernel at vertices near a wall, those beyond a joint of a periodic box are neighbours.
+    /// Takes the foam among the particles of a whitewater stream.
     pub fn new(white: &Particles, room: &FoamBox) -> Self {
-        let column = |name| white.attributes.get(name).map_or(&[][..], Vec::as_slice);
-        let [kinds, ages, radii] = [KIND, AGE, RADIUS].map(column);
-        let radius = SUPPORT * room.spacing;
-        let count = kinds.len().min(ages.len()).min(radii.len());
-        let mut discs = parallel::flat_map(0..count, |k| {
-            (kinds[k] == WhitewaterKind::Foam.number()).then(|| Disc {
-                place: DVec3::from(white.position[k].map(f64::from)) - room.corner,
-                area: PI * f64::from(radii[k]).powi(2),
-                age: ages[k].into(),
-                mirrored: DVec3::ZERO,
-            })
-        });
-        for axis in 0..3 {
-            let images =
-                parallel::flat_map(0..discs.len(), |k| discs[k].images(axis, room, radius));
-            discs.extend(images);
-        }
+        let discs = discs(white, room);
+        let radius = room.radius();
         let places: Vec<DVec3> = discs.iter().map(|disc| disc.place).collect();
         // A disc that counts is at most R along the surface and R off it.
         let grid = BinnedPoints::new(&places, 2f64.sqrt() * radius / HALVES as f64);

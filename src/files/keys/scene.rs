@@ -380,7 +380,7 @@ const fn from(name: &'static str) -> Key {
     Key::number(name, 0.0..=1e9)
         .unit("s")
         .default("0.0")
-        .about("it acts from this time on; drains and levels at the ends of frames after it")
+        .about("from this time on; drains, levels and kill volumes at the ends of frames after it")
 }
 
 const fn until(name: &'static str) -> Key {
@@ -388,7 +388,7 @@ const fn until(name: &'static str) -> Key {
         .unit("s")
         .absent()
         .also(", after from")
-        .about("and until this one; drains and levels not at the ends of frames after it")
+        .about("and until this one; drains, levels and kill volumes not at the ends of frames after it")
 }
 
 keys! { struct EmitterSpec {

@@ -2,17 +2,21 @@
 
 use glam::DVec3;
 
-use super::{capacity_for, shade::draws_spray, whitewater::is_bubble};
+use super::{capacity_for, shade::draws_spray, whitewater::kind};
 use crate::{
     RenderError, RenderScene,
     buffers::{CLOUD, CLOUD_WORDS},
     cloud::{Drop, drops_of, grid, white_of},
+    foam::FoamColumns,
     paths::Path,
     plan::Limits,
     rays::voxel,
     uniform::{self, Particle},
 };
-use swell_domain::particles::Particles;
+use swell_domain::{
+    particles::Particles,
+    whitewater::{WhitewaterKind, of_kinds},
+};
 use swell_gpu::program::Program;
 use swell_scene::look::{Look, MethodSpec};
 
@@ -20,6 +24,10 @@ use swell_scene::look::{Look, MethodSpec};
 pub(super) struct RayCloud {
     /// Drops and bubbles with their paths.
     drops: Vec<(Drop, Path)>,
+    /// Foam at the frame's instant.
+    foam: Particles,
+    /// Fraction of light that foam reflects.
+    albedo: f32,
     /// Seconds from the frame for which the device holds the grid; `None` before the first grid of
     /// this frame.
     seconds: Option<f32>,
@@ -37,6 +45,8 @@ impl RayCloud {
         let is_drawn = look.spec().renderer.method == MethodSpec::Ray && draws_spray(look);
         is_drawn.then(|| Self {
             drops: Vec::new(),
+            foam: Particles::default(),
+            albedo: (look.spec().whitewater.as_ref()).map_or(0.0, |it| it.foam_albedo as f32),
             seconds: None,
             capacity: 1,
             voxel: voxel(look, scene),
@@ -55,8 +65,9 @@ impl RayCloud {
         white: &Particles,
     ) {
         self.drops = drops_of(look, scene, radius, water);
-        let of_white = white_of(look, scene, white, |index| is_bubble(white, index));
+        let of_white = white_of(look, scene, white, |index| kind(white, index));
         self.drops.extend(of_white);
+        self.foam = of_kinds(white.clone(), &[WhitewaterKind::Foam]);
         self.seconds = None;
     }
 
@@ -85,7 +96,14 @@ impl RayCloud {
 
     /// Builds the uniform and the words of the grid for an instant, in seconds from the frame.
     pub(super) fn grid(&self, seconds: f32, scene: &RenderScene) -> (uniform::Cloud, Vec<u32>) {
-        grid(&self.drops, seconds, scene, (self.voxel, self.sun))
+        let mut foam = self.foam.clone();
+        for (place, velocity) in foam.position.iter_mut().zip(&self.foam.velocity) {
+            for (x, v) in place.iter_mut().zip(velocity) {
+                *x += v * seconds;
+            }
+        }
+        let foam = FoamColumns::new(&foam, scene, self.albedo);
+        grid(&self.drops, seconds, &foam, scene, (self.voxel, self.sun))
     }
 }
 

@@ -271,6 +271,9 @@ pub(super) fn plan_carried(plan: &mut Plan, look: &Look, scene: &RenderScene, co
 /// Plans the casting of rays.
 pub(super) fn plan_cast(plan: &mut Plan, look: &Look) -> Shade {
     plan_output(plan, look, "rays/cast", "VOLUME");
+    if look.spec().whitewater.is_some() {
+        plan.define("rays/cast", "FOAM_LAYER");
+    }
     if look.wants(AovSpec::Forward) {
         plan.define("rays/aovs", "FORWARD");
     }

@@ -21,8 +21,8 @@ const FADING: f64 = 2.0;
 /// Settings with which a look draws whitewater.
 pub(super) struct WhitewaterDrawing {
     params: uniform::WhitewaterParams,
-    /// Whether bubbles are splatted too; rays traverse them instead.
-    has_bubbles: bool,
+    /// Whether foam and bubbles are splatted too; rays meet them instead.
+    has_foam: bool,
     /// Allocated whitewater particles.
     capacity: usize,
 }
@@ -38,7 +38,7 @@ impl WhitewaterDrawing {
                 density: (spec.density_per_metre / spray_density(look).max(1e-30)) as f32,
                 fading: (FADING * scene.particle_spacing) as f32,
             },
-            has_bubbles: look.spec().renderer.method == MethodSpec::Ssfr,
+            has_foam: look.spec().renderer.method == MethodSpec::Ssfr,
             capacity: 1,
         })
     }
@@ -81,7 +81,7 @@ impl WhitewaterDrawing {
             if !p.iter().chain(v).chain([&radius]).all(|x| x.is_finite()) {
                 return Err(RenderError::NotFinite { index, frame });
             }
-            if !self.has_bubbles && is_bubble(white, index) {
+            if !self.has_foam && is_foam(white, index) {
                 continue;
             }
             packed.push(uniform::Whitewater {
@@ -95,21 +95,13 @@ impl WhitewaterDrawing {
     }
 }
 
-fn kind(white: &Particles, index: usize) -> Option<WhitewaterKind> {
+/// Kind of a particle; particles without a kind are spray.
+pub(super) fn kind(white: &Particles, index: usize) -> WhitewaterKind {
     let kind = white.attributes.get(KIND).and_then(|all| all.get(index));
-    kind.and_then(|&number| WhitewaterKind::of_number(number))
+    (kind.and_then(|&number| WhitewaterKind::of_number(number))).unwrap_or(WhitewaterKind::Spray)
 }
 
-/// Whether a particle is foam or a bubble; particles without a kind are spray.
+/// Whether a particle is foam or a bubble.
 fn is_foam(white: &Particles, index: usize) -> bool {
-    matches!(
-        kind(white, index),
-        Some(WhitewaterKind::Foam | WhitewaterKind::Bubble)
-    )
-}
-
-/// Whether a particle is a bubble, which is in the water rather than in front of it; particles
-/// without a kind are spray.
-pub(super) fn is_bubble(white: &Particles, index: usize) -> bool {
-    kind(white, index) == Some(WhitewaterKind::Bubble)
+    kind(white, index) != WhitewaterKind::Spray
 }

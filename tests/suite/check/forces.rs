@@ -106,8 +106,8 @@ const FLIP: [Control; 7] = [
     ),
     control(
         "effects/work_by_cells",
-        "for (var k = 0u; k < 64u",
-        "for (var k = 0u; k < 32u",
+        "sum_of_group(local, work)",
+        "sum_of_group(local, select(work, 0.0, local >= 32u))",
         "effects/work_by_cells",
         &["shares of the work"],
     ),
@@ -141,8 +141,8 @@ const PBF: [Control; 4] = [
     ),
     control(
         "effects/work_by_particles",
-        "for (var k = 0u; k < 64u",
-        "for (var k = 1u; k < 64u",
+        "select(0.0, work, is_inside)",
+        "select(0.0, work, is_inside && local > 0u)",
         "effects/work_by_particles",
         &["shares of the work"],
     ),

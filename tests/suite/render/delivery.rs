@@ -12,7 +12,7 @@ use swell::files::parse_look;
 use swell::{
     domain::{
         particles::Particles,
-        whitewater::{KIND, RADIUS, WhitewaterKind},
+        whitewater::{AGE, KIND, LIFE, RADIUS, WhitewaterKind},
     },
     gpu::adapter::Context,
     render::{Image, RenderScene, Renderer},
@@ -88,8 +88,10 @@ fn white() -> Particles {
             kinds.push(kind.number());
         }
     }
-    let radii = vec![0.06; kinds.len()];
+    for (name, value) in [(AGE, 1.0), (LIFE, 1.0), (RADIUS, 0.06)] {
+        let values = vec![value; kinds.len()];
+        white.attributes.insert(name.to_owned(), values);
+    }
     white.attributes.insert(KIND.to_owned(), kinds);
-    white.attributes.insert(RADIUS.to_owned(), radii);
     white
 }

@@ -65,11 +65,11 @@ fn bodies_that_are_small_beside_cells_are_named() {
     let job = Job::new();
     let cube = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/hard_cases/cube.obj");
     job.write("cube.obj", &std::fs::read_to_string(cube).unwrap());
-    let body = |scale: f64| {
-        format!("{{mesh=\"cube.obj\",translate=[0.2,1.5,0.5],scale={scale},density=500}}")
+    let body = |x: f64, scale: f64| {
+        format!("{{mesh=\"cube.obj\",translate=[{x},1.5,0.5],scale={scale},density=500}}")
     };
     let said = |bodies: &str| job.expect(0, &format!("inspect small.toml --set body=[{bodies}]"));
-    let both = said(&format!("{},{}", body(0.02), body(0.03)));
+    let both = said(&format!("{},{}", body(0.2, 0.02), body(0.6, 0.03)));
     assert_has(
         &both,
         &[
@@ -78,6 +78,6 @@ fn bodies_that_are_small_beside_cells_are_named() {
         ],
     );
     // Negative control.
-    let large = said(&body(0.5));
+    let large = said(&body(0.2, 0.5));
     assert!(!large.contains("body.mesh of"), "{large}");
 }

@@ -15,6 +15,9 @@ pub(super) const WHITEWATER: &[Key] = &[
     Key::number("size", 1e-3..=1e3)
         .default("1.0")
         .about("factor on its radius"),
+    Key::number("foam_albedo", PART)
+        .default("0.9")
+        .about("fraction of the light on it that foam reflects; `ray` only"),
 ];
 
 pub(super) const WET: &[Key] = &[

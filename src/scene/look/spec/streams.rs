@@ -12,6 +12,8 @@ pub struct WhitewaterLook {
     pub density_per_metre: f64,
     /// Factor on the particle radius.
     pub size: f64,
+    /// Fraction of the light on it that foam reflects.
+    pub foam_albedo: f64,
 }
 
 /// Rendering of wet solids.

@@ -9,6 +9,7 @@ mod caustics;
 mod devices;
 mod filtered;
 mod fit;
+mod foam;
 mod geometry;
 mod hidden;
 mod lens;

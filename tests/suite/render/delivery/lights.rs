@@ -4,7 +4,7 @@ use half::f16;
 use swell::{
     domain::{
         particles::Particles,
-        whitewater::{KIND, RADIUS, WhitewaterKind},
+        whitewater::{ATTRIBUTES, KIND, WhitewaterKind},
     },
     gpu::adapter::Context,
     render::{Image, Renderer},
@@ -109,7 +109,7 @@ fn all_lights_add_up_to_the_picture() {
                 ("ssfr/shade", "light_part(SOLIDS, colour - air);"),
             ],
             _ => [
-                foam,
+                "light_part(part_of(ray, FOAM_LIGHT), foam);",
                 "light_part(CAUSTICS, weight * opaque_one.caustics);",
                 "dim_parts(1.0 - mist.cover);",
                 "light_part(part_of(ray, SOLIDS), seen);",
@@ -183,7 +183,7 @@ fn foam_and_bubbles_have_a_layer_of_their_own() {
                 white.velocity.push(all.velocity[i]);
                 white.id.push(all.id[i]);
             }
-            for name in [KIND, RADIUS] {
+            for name in ATTRIBUTES {
                 let values = kept.iter().map(|&i| all.attributes[name][i]).collect();
                 white.attributes.insert(name.to_owned(), values);
             }

@@ -1,0 +1,133 @@
+// Foam of a whitewater stream as a layer on the water's surface: discs in columns over the level
+// axes (render/foam.rs). Needs the bindings of rays_light.wgsl.
+
+// Least and greatest factor on the distances to a disc, by its random number: cells of different
+// sizes, with edges that are arcs.
+const NEARER: f32 = 0.6;
+const FARTHER: f32 = 1.6;
+// Part of the discs, by their random number, around which there are large holes.
+const LARGE: f32 = 0.12;
+// Numbers of discs within the kernel below which foam is drawn as its discs, and above which as
+// threads between cells.
+const FEW: vec2f = vec2f(2.0, 8.0);
+// Part of its width over which a thread of foam becomes thin on either side of its edge.
+const SOFT: f32 = 0.4;
+
+// The two nearest discs of a mosaic of cells, and their number.
+struct Cells {
+    // Distances, in radii of the kernel.
+    nearest: vec2f,
+    // Discs per πR²/3 at these distances.
+    count: f32,
+}
+
+fn with_disc(cells: Cells, far: f32, count: f32) -> Cells {
+    let old = cells.nearest;
+    let nearest = select(vec2f(old.x, min(old.y, far)), vec2f(far, old.x), far < old.x);
+    return Cells(nearest, cells.count + count);
+}
+
+// Half the width of threads along the edges of a mosaic of Poisson–Voronoi cells that cover the
+// fraction 1 − exp(−depth) of it, times √(π discs per area): the inverse of
+// exp(−x²) − √π x erfc(x) = exp(−depth) within 0.5 % up to a depth of 15. The left side is the
+// probability that of the two nearest of Poisson's points one is more than x farther than the
+// other. It holds as well where each disc has a factor on its distances: they are those of a
+// Poisson process again, of density Σ 1 / factor².
+fn thread_width(depth: f32) -> f32 {
+    return depth / (1.7724539 + 0.30484 * depth / sqrt(1.0 + 0.1394 * depth));
+}
+
+// Fraction covered by threads of a mosaic, 1 − exp(−depth) in the mean, over a footprint in radii
+// of the kernel.
+fn threads(cells: Cells, depth: f32, footprint: f32) -> f32 {
+    // Discs per area times πR² is 3 Σ W.
+    let density = sqrt(3.0 * cells.count);
+    let half_width = thread_width(depth) / density;
+    let blur = max(SOFT * half_width, footprint);
+    let between = cells.nearest.y - cells.nearest.x;
+    // A thread, blurred on both of its edges.
+    let lace = smoothstep(-blur, blur, between + half_width)
+        - smoothstep(-blur, blur, between - half_width);
+    // Cells that a pixel does not resolve.
+    return mix(lace, 1.0 - exp(-depth), smoothstep(0.15, 0.6, footprint * density));
+}
+
+// Fraction of the surface with normal `n` at `p` that foam covers, over a footprint in metres. Its
+// mean is the coverage 1 − exp(−Σ πr² W) of the discs (domain/level_set/foam.rs). Where a pixel
+// resolves them, it lies on the edges of two mosaics of cells around the discs, a fine one and a
+// coarse one, which cover half of Σ πr² W each, or, where discs are few, on the discs themselves.
+fn foam_cover(p: vec3f, n: vec3f, footprint: f32) -> f32 {
+    if cloud.foam_columns.x == 0u {
+        return 0.0;
+    }
+    let own = vec2i(floor((p.xz - cloud.foam_corner) / cloud.foam_edge));
+    let low = max(own - 1, vec2i(0));
+    let high = min(own + 1, vec2i(cloud.foam_columns) - 1);
+    if any(low > high) {
+        return 0.0;
+    }
+    let discs = cloud.foam_start + cloud.foam_columns.x * cloud.foam_columns.y + 1u;
+    let blur = footprint / cloud.foam_edge;
+    var depth = 0.0;
+    // Number of discs within the kernel.
+    var sites = 0.0;
+    // What the discs themselves leave open.
+    var bare = 1.0;
+    var fine = Cells(vec2f(FAR), 0.0);
+    var coarse = fine;
+    for (var k = low.y; k <= high.y; k++) {
+        let row = cloud.foam_start + u32(k) * cloud.foam_columns.x;
+        let end = cloud_words[row + u32(high.x) + 1u];
+        for (var i = cloud_words[row + u32(low.x)]; i < end; i++) {
+            let at = discs + 4u * i;
+            let place = bitcast<vec3f>(
+                vec3u(cloud_words[at], cloud_words[at + 1u], cloud_words[at + 2u]));
+            let d = (place - p) / cloud.foam_edge;
+            let off = dot(d, n);
+            let along = max(dot(d, d) - off * off, 0.0);
+            let s = 1.0 - along;
+            if s <= 0.0 || abs(off) >= 1.0 {
+                continue;
+            }
+            let word = cloud_words[at + 3u];
+            let mirrored = vec3f((vec3u(word) >> vec3u(16u, 17u, 18u)) & vec3u(1u));
+            let across = 1.0 - mirrored * n * n;
+            let weight = s * s * (1.0 - smoothstep(0.5, 1.0, abs(off)))
+                * across.x * across.y * across.z;
+            let random = f32(word >> 24u) / 255.0;
+            let grown = max(f32(word >> 19u & 31u) / 31.0, 1e-2);
+            // Three times the square of the disc's radius.
+            let area = grown * grown * cloud_value(at + 3u, 0u);
+            depth += weight * area;
+            sites += 3.0 * weight;
+            // Discs smaller than the footprint become fainter instead.
+            let radius = max(sqrt(area / 3.0), blur);
+            bare *= 1.0 - area / (3.0 * radius * radius)
+                * (1.0 - smoothstep(1.0 - SOFT, 1.0 + SOFT, sqrt(along) / radius));
+            let factor = mix(NEARER, FARTHER, fract(random / LARGE)) / grown;
+            let far = factor * sqrt(along);
+            fine = with_disc(fine, far, weight / (factor * factor));
+            if random < LARGE {
+                coarse = with_disc(coarse, far, weight / (factor * factor));
+            }
+        }
+    }
+    if depth <= 0.0 {
+        return 0.0;
+    }
+    var open = 1.0;
+    if coarse.count > 0.0 {
+        depth *= 0.5;
+        open = 1.0 - threads(coarse, depth, blur);
+    }
+    open *= 1.0 - threads(fine, depth, blur);
+    return 1.0 - mix(bare, open, smoothstep(FEW.x, FEW.y, sites));
+}
+
+// Radiance of foam at `p` on a surface whose normal points into the air: a Lambertian white layer,
+// seen from the air or, as what it lets through, from below.
+fn foam_radiance(p: vec3f, n: vec3f, from_below: bool) -> vec3f {
+    let facing = max(dot(n, shading.sun_direction), 0.0);
+    let light = shading.sun_irradiance * facing * sunlit(p, n) + sky_irradiance(n);
+    return light / PI * select(cloud.foam_albedo, 1.0 - cloud.foam_albedo, from_below);
+}
