@@ -15,6 +15,7 @@ use swell_domain::{
     period::Period,
     whitewater::random_of,
 };
+use swell_scene::look::WhitewaterLook;
 
 /// Seconds over which a disc, and the cell around it, grows, and over which it shrinks at its end,
 /// so that none appears or goes at once.
@@ -34,13 +35,29 @@ pub(super) struct FoamColumns {
     pub(super) edge: f32,
     /// Fraction of light that foam reflects.
     pub(super) albedo: f32,
+    /// Factor on the area of discs.
+    amount: f64,
     starts: Vec<u32>,
     discs: Vec<Disc>,
 }
 
 impl FoamColumns {
+    /// No foam.
+    pub(super) fn none() -> Self {
+        Self {
+            corner: [0.0; 2],
+            columns: [0; 2],
+            edge: 1.0,
+            albedo: 0.0,
+            amount: 0.0,
+            starts: Vec::new(),
+            discs: Vec::new(),
+        }
+    }
+
     /// Sorts the foam of a stream, whose positions are those of an instant.
-    pub(super) fn new(white: &Particles, scene: &RenderScene, albedo: f32) -> Self {
+    pub(super) fn new(white: &Particles, scene: &RenderScene, look: &WhitewaterLook) -> Self {
+        let (albedo, amount) = (look.foam_albedo as f32, look.foam_amount);
         let room = FoamBox {
             corner: scene.domain.min,
             walls: walls(scene),
@@ -55,14 +72,7 @@ impl FoamColumns {
         };
         let (low, high) = (ends(f64::min, f64::MAX), ends(f64::max, f64::MIN));
         if all.is_empty() {
-            return Self {
-                corner: [0.0; 2],
-                columns: [0; 2],
-                edge: edge as f32,
-                albedo,
-                starts: Vec::new(),
-                discs: all,
-            };
+            return Self::none();
         }
         let columns = [0, 1].map(|axis| ((high[axis] - low[axis]) / edge) as u32 + 1);
         let column = |disc: &Disc| {
@@ -75,6 +85,7 @@ impl FoamColumns {
             columns,
             edge: edge as f32,
             albedo,
+            amount,
             starts,
             discs: parallel::map_slice(&order, |&at| all[at as usize]),
         }
@@ -83,7 +94,7 @@ impl FoamColumns {
     /// Returns the starts of the columns and the end, then four words a disc: its position, and
     /// [`word`].
     pub(super) fn words(&self) -> Vec<u32> {
-        let unit = 3.0 / (PI * f64::from(self.edge).powi(2));
+        let unit = self.amount * 3.0 / (PI * f64::from(self.edge).powi(2));
         let of_disc = |disc: &Disc| {
             let place = disc.place.as_vec3().to_array().map(f32::to_bits);
             [place[0], place[1], place[2], word(disc, unit)]

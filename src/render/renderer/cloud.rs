@@ -18,7 +18,7 @@ use swell_domain::{
     whitewater::{WhitewaterKind, of_kinds},
 };
 use swell_gpu::program::Program;
-use swell_scene::look::{Look, MethodSpec};
+use swell_scene::look::{Look, MethodSpec, WhitewaterLook};
 
 /// Drops and bubbles of a frame, and the state of their grid on the device.
 pub(super) struct RayCloud {
@@ -26,8 +26,7 @@ pub(super) struct RayCloud {
     drops: Vec<(Drop, Path)>,
     /// Foam at the frame's instant.
     foam: Particles,
-    /// Fraction of light that foam reflects.
-    albedo: f32,
+    look: Option<WhitewaterLook>,
     /// Seconds from the frame for which the device holds the grid; `None` before the first grid of
     /// this frame.
     seconds: Option<f32>,
@@ -46,7 +45,7 @@ impl RayCloud {
         is_drawn.then(|| Self {
             drops: Vec::new(),
             foam: Particles::default(),
-            albedo: (look.spec().whitewater.as_ref()).map_or(0.0, |it| it.foam_albedo as f32),
+            look: look.spec().whitewater.clone(),
             seconds: None,
             capacity: 1,
             voxel: voxel(look, scene),
@@ -96,13 +95,15 @@ impl RayCloud {
 
     /// Builds the uniform and the words of the grid for an instant, in seconds from the frame.
     pub(super) fn grid(&self, seconds: f32, scene: &RenderScene) -> (uniform::Cloud, Vec<u32>) {
-        let mut foam = self.foam.clone();
-        for (place, velocity) in foam.position.iter_mut().zip(&self.foam.velocity) {
-            for (x, v) in place.iter_mut().zip(velocity) {
-                *x += v * seconds;
+        let foam = (self.look.as_ref()).map_or_else(FoamColumns::none, |look| {
+            let mut foam = self.foam.clone();
+            for (place, velocity) in foam.position.iter_mut().zip(&self.foam.velocity) {
+                for (x, v) in place.iter_mut().zip(velocity) {
+                    *x += v * seconds;
+                }
             }
-        }
-        let foam = FoamColumns::new(&foam, scene, self.albedo);
+            FoamColumns::new(&foam, scene, look)
+        });
         grid(&self.drops, seconds, &foam, scene, (self.voxel, self.sun))
     }
 }

@@ -18,6 +18,9 @@ pub(super) const WHITEWATER: &[Key] = &[
     Key::number("foam_albedo", PART)
         .default("0.9")
         .about("fraction of the light on it that foam reflects; `ray` only"),
+    Key::number("foam_amount", 1e-3..=1e3).default("3.0").about(
+        "factor on the area of foam's discs, and so on the depth that covers the water; `ray` only",
+    ),
 ];
 
 pub(super) const WET: &[Key] = &[

@@ -14,6 +14,8 @@ pub struct WhitewaterLook {
     pub size: f64,
     /// Fraction of the light on it that foam reflects.
     pub foam_albedo: f64,
+    /// Factor on the area of foam.
+    pub foam_amount: f64,
 }
 
 /// Rendering of wet solids.

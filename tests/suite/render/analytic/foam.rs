@@ -51,7 +51,8 @@ fn above(context: &Context, white: &Particles, pixel: f64, albedo: f64) -> Image
     let setup = Setup {
         method: "ray",
         water: format!(
-            "absorption_per_metre = [0.0, 0.0, 0.0]\n[whitewater]\nfoam_albedo = {albedo:?}\n"
+            "absorption_per_metre = [0.0, 0.0, 0.0]\n[whitewater]\nfoam_amount = 1.0\n\
+             foam_albedo = {albedo:?}\n"
         ),
         sun: [0.0, 90.0, 0.0],
         ground: [1.0; 3],
