@@ -388,7 +388,7 @@ const fn until(name: &'static str) -> Key {
         .unit("s")
         .absent()
         .also(", after from")
-        .about("and until this one; drains, levels and kill volumes not at the ends of frames after it")
+        .about("until this one; drains, levels and kill volumes not at the ends of frames after it")
 }
 
 keys! { struct EmitterSpec {
