@@ -6,16 +6,12 @@
 #import "shared/vector.wgsl"
 #import "shared/counters.wgsl"
 #import "shared/flip_params.wgsl"
-#import "shared/flip_slots.wgsl"
+#import "shared/flip_velocity.wgsl"
 #import "shared/finite.wgsl"
 #ifdef SOLIDS
 #import "shared/flip_solid.wgsl"
 #endif
-#ifdef PERIODIC
-#import "shared/flip_periodic.wgsl"
-#endif
 
-@group(0) @binding(2) var<storage, read> face_velocity: array<f32>;
 @group(0) @binding(3) var<storage, read> sorted_position: array<Vector>;
 // Velocities, and with CORRECTION displacements behind them.
 @group(0) @binding(5) var<storage, read> carried: array<Vector>;
@@ -27,51 +23,6 @@
 @group(0) @binding(10) var<storage, read_write> id: array<u32>;
 // Counts slowed particles, and non-finite values, which clamping would hide.
 @group(0) @binding(11) var<storage, read_write> counters: Counters;
-
-fn component_at(plane: u32, low: vec3i, high: vec3i, t: vec3f) -> f32 {
-    var sum = 0.0;
-    for (var z = 0; z < 2; z++) {
-        for (var y = 0; y < 2; y++) {
-            for (var x = 0; x < 2; x++) {
-                let is_high = vec3i(x, y, z) == vec3i(1);
-                let weight = select(1.0 - t, t, is_high);
-                let face = element_at(select(low, high, is_high));
-                sum += weight.x * weight.y * weight.z * face_velocity[plane + face];
-            }
-        }
-    }
-    return sum;
-}
-
-// The grid's velocity at x; `otherwise` if there is no brick.
-fn velocity_at(x: vec3f, otherwise: vec3f) -> vec3f {
-#ifdef PERIODIC
-    let scaled = wrapped_place(x * params.inverse_cell_size, vec3f(params.cells));
-#else
-    let scaled = x * params.inverse_cell_size;
-#endif
-    let p = clamp(scaled, vec3f(0.0), vec3f(params.cells));
-    let cell = vec3i(cell_of_place(p));
-    let f = p - vec3f(cell);
-    find_slots(cell);
-    // Interpolates between face centres; beyond the outermost ones, the velocity is that of the
-    // outermost.
-    let is_before = f < vec3f(0.5);
-    let t = select(f - 0.5, f + 0.5, is_before);
-    var low = max(select(vec3i(0), vec3i(-1), is_before), -cell);
-    var high = min(select(vec3i(1), vec3i(0), is_before), vec3i(params.cells) - 1 - cell);
-#ifdef PERIODIC
-    low = select(low, select(vec3i(0), vec3i(-1), is_before), is_periodic());
-    high = select(high, select(vec3i(1), vec3i(0), is_before), is_periodic());
-#endif
-    let sampled = vec3f(
-        component_at(0u, vec3i(0, low.yz), vec3i(1, high.yz), vec3f(f.x, t.yz)),
-        component_at(
-            params.stride, vec3i(low.x, 0, low.z), vec3i(high.x, 1, high.z), vec3f(t.x, f.y, t.z)),
-        component_at(2u * params.stride, vec3i(low.xy, 0), vec3i(high.xy, 1), vec3f(t.xy, f.z)),
-    );
-    return select(sampled, otherwise, slots_near.x == 0u);
-}
 
 #ifdef SOLIDS
 // Each round at least halves the penetration depth of a particle between a wall and a solid at 45°.

@@ -13,6 +13,9 @@
 #ifdef SOLIDS
 @group(0) @binding(9) var<storage, read> open_hats: array<f32>;
 #endif
+#ifdef BAND
+@group(0) @binding(6) var<storage, read> deep_depth: array<f32>;
+#endif
 
 // Integral of the hat function from minus infinity to t.
 fn hat_below(t: vec3f) -> vec3f {
@@ -36,8 +39,8 @@ fn main(
     let element = thread + CELLS;
     open_neighborhood(element);
     let stride = params.partial_stride;
-    let wet_end = params.wet_cells + CELLS;
-    let last_wet = params.wet_cells / CELLS;
+    let wet_end = min(params.wet_cells + CELLS, params.partial_stride);
+    let last_wet = wet_end / CELLS - 1u;
     let holds_water = (slots_near - 1u < vec4u(last_wet)) | (slots_far - 1u < vec4u(last_wet));
     var sum = 0.0;
     // Layer by layer: cells in the layer before contribute by their sums for the layer after
@@ -69,5 +72,11 @@ fn main(
     // A smaller open volume counts as that of one particle.
     room *= max(open_hats[element], params.particle_share);
 #endif
-    density[element] = sum * params.particle_share / room;
+    let relative = sum * params.particle_share / room;
+#ifdef BAND
+    // Below the band the water is full, whatever particles are left in it.
+    density[element] = select(relative, 1.0, deep_depth[element] >= params.band);
+#else
+    density[element] = relative;
+#endif
 }

@@ -38,8 +38,8 @@ fn main(
     let to_b = turned_back(vec3i(0, 1, 0));
     let to_c = turned_back(vec3i(0, 0, 1));
     let stride = params.partial_stride;
-    let wet_end = params.wet_cells + CELLS;
-    let last_wet = params.wet_cells / CELLS;
+    let wet_end = min(params.wet_cells + CELLS, params.partial_stride);
+    let last_wet = wet_end / CELLS - 1u;
     let holds_water = (slots_near - 1u < vec4u(last_wet)) | (slots_far - 1u < vec4u(last_wet));
     var momentum = 0.0;
     var weight = 0.0;

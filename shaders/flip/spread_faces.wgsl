@@ -48,10 +48,11 @@ fn main(
     @builtin(local_invocation_index) local: u32,
 ) {
     let thread = thread_index(workgroup, workgroups, local, 64u);
-    if thread >= params.wet_cells {
+    let element = thread + CELLS;
+    // Bricks with particles come first, and others have no sums.
+    if thread >= params.wet_cells || element >= params.partial_stride {
         return;
     }
-    let element = thread + CELLS;
     let slot = element / CELLS;
     let brick = vec3u(
         bricks[slot].coordinate[0], bricks[slot].coordinate[1], bricks[slot].coordinate[2]);

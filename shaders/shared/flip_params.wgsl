@@ -43,7 +43,8 @@ struct FlipParams {
     // Seconds for which gravity, pressure, surface tension, confinement and drag act: half of the
     // previous substep plus half of this one.
     kick: f32,
-    padding: u32,
+    // Depth below the free surface to which there are particles, cells; 0 if they are everywhere.
+    band: f32,
 }
 @group(0) @binding(0) var<uniform> params: FlipParams;
 

@@ -8,6 +8,7 @@
 //! the library's property-by-property path. Another test compares the packed rows with the
 //! library's own, byte for byte. [`planes`] holds the same content, compressed.
 
+mod deep;
 pub mod planes;
 
 use std::io::{self, Write};
@@ -21,7 +22,10 @@ use ply_rs_bw::ply::{
 use rayon::prelude::*;
 
 use super::error::CacheError;
-use swell_domain::particles::{AT_ONCE, Particles};
+use swell_domain::{
+    deep::Deep,
+    particles::{AT_ONCE, Particles},
+};
 
 /// Columns of every row, in this order, before the attributes; the first three are the position.
 const FIXED: [(&str, ScalarType); 7] = [
@@ -98,10 +102,10 @@ pub fn check(particles: &Particles) -> Result<(), CacheError> {
             return unfit(format!("{n} positions, {} of `{name}`", values.len()));
         }
     }
-    match first_unordered(&particles.id) {
-        Some(i) => unfit(format!("id {} is not in ascending order", particles.id[i])),
-        None => Ok(()),
+    if let Some(i) = first_unordered(&particles.id) {
+        return unfit(format!("id {} is not in ascending order", particles.id[i]));
     }
+    particles.deep.fault().map_or(Ok(()), unfit)
 }
 
 fn is_attribute_name(name: &str) -> bool {
@@ -122,9 +126,9 @@ fn first_unordered(ids: &[u32]) -> Option<usize> {
 /// A header that cannot be written.
 pub fn length(stamp: &Stamp<'_>, particles: &Particles) -> io::Result<u64> {
     let names = particles.attributes.keys().map(String::as_str);
-    let head = header_bytes(&header(stamp, particles.len(), names))?;
+    let head = header_bytes(&header(stamp, particles.len(), names, &particles.deep))?;
     let rows = particles.len() * row_size(stamp.origin, particles.attributes.len());
-    Ok((head.len() + rows) as u64)
+    Ok((head.len() + rows + particles.deep.cell.len() * deep::ROW) as u64)
 }
 
 /// Writes one frame. The particles must pass [`check`].
@@ -137,7 +141,7 @@ pub fn encode(
     particles: &Particles,
 ) -> io::Result<WrittenFile> {
     let names = particles.attributes.keys().map(String::as_str);
-    let head = header_bytes(&header(stamp, particles.len(), names))?;
+    let head = header_bytes(&header(stamp, particles.len(), names, &particles.deep))?;
     let mut out = Counted::new(out);
     out.write_all(&head)?;
     let (mut rows, mut next) = (Vec::new(), Vec::new());
@@ -149,6 +153,7 @@ pub fn encode(
         std::mem::swap(&mut rows, &mut next);
     }
     out.write_beside(&rows, || {})?;
+    out.write_beside(&deep::pack(&particles.deep), || {})?;
     Ok(out.written())
 }
 
@@ -202,7 +207,12 @@ impl<W: Write> Write for Counted<W> {
     }
 }
 
-fn header<'a>(stamp: &Stamp<'_>, count: usize, names: impl Iterator<Item = &'a str>) -> Header {
+fn header<'a>(
+    stamp: &Stamp<'_>,
+    count: usize,
+    names: impl Iterator<Item = &'a str>,
+    deep: &Deep,
+) -> Header {
     let mut vertex = ElementDef::new("vertex".to_owned());
     vertex.count = count;
     let attributes = names.map(|name| (name, ScalarType::Float));
@@ -224,6 +234,7 @@ fn header<'a>(stamp: &Stamp<'_>, count: usize, names: impl Iterator<Item = &'a s
         header.comments.push(origin_comment(stamp.origin));
     }
     header.elements.add(vertex);
+    deep::add(&mut header, deep);
     header
 }
 
@@ -311,12 +322,19 @@ fn parse(bytes: &[u8]) -> Result<Particles, String> {
         return Err("its PLY header is that of a compressed frame".to_owned());
     }
     let rows = &bytes[head.bytes..];
-    if head.count.checked_mul(head.row_size()) != Some(rows.len()) {
+    let of_particles = head.count.checked_mul(head.row_size());
+    let of_deep = head.deep.count.checked_mul(deep::ROW);
+    let expected = of_particles
+        .zip(of_deep)
+        .and_then(|(a, b)| a.checked_add(b));
+    if expected != Some(rows.len()) {
         return Err(head.misfit(rows.len() as u64));
     }
+    let (rows, of_deep) = rows.split_at(head.count * head.row_size());
     let mut unpacked = Unpacked::new(&head, head.count);
     unpacked.add(rows)?;
-    Ok(unpacked.finish(head.names))
+    let deep = deep::unpack(head.deep, of_deep)?;
+    Ok(unpacked.finish(head.names, deep))
 }
 
 /// Contents of a header.
@@ -329,6 +347,8 @@ struct Head {
     origin: DVec3,
     /// Names of the attributes, ascending.
     names: Vec<String>,
+    /// The deep cells that follow the particles.
+    deep: deep::Promised,
     /// How the byte planes that follow are encoded; `None` if rows follow.
     planes: Option<planes::Content>,
 }
@@ -340,7 +360,13 @@ impl Head {
 
     fn misfit(&self, found: u64) -> String {
         let (count, size) = (self.count, self.row_size());
-        format!("its header declares {count} particles of {size} bytes, and {found} bytes follow")
+        let deep = match self.deep.count {
+            0 => String::new(),
+            cells => format!(" and {cells} deep cells of {} bytes", deep::ROW),
+        };
+        format!(
+            "its header declares {count} particles of {size} bytes{deep}, and {found} bytes follow"
+        )
     }
 }
 
@@ -361,12 +387,13 @@ fn read_head(head: &[u8]) -> Result<Head, String> {
         return Err("its PLY header is not one that swell writes".to_owned());
     }
     let origin = read_origin(&header.comments)?;
-    let (count, names) = layout(&header, origin)?;
+    let (count, names, deep) = layout(&header, origin)?;
     Ok(Head {
         bytes: head.len(),
         count,
         origin,
         names,
+        deep,
         planes: planes::Content::from_comments(&header.comments),
     })
 }
@@ -385,14 +412,17 @@ fn read_origin(comments: &[String]) -> Result<DVec3, String> {
         .ok_or_else(|| format!("comment `{comment}` is not one that swell writes"))
 }
 
-/// Number of rows and names of the attributes.
-fn layout(header: &Header, origin: DVec3) -> Result<(usize, Vec<String>), String> {
+/// Number of rows, names of the attributes, and the deep cells.
+fn layout(header: &Header, origin: DVec3) -> Result<(usize, Vec<String>, deep::Promised), String> {
     if header.encoding != Encoding::BinaryLittleEndian || header.version.to_string() != "1.0" {
         return Err("not binary little-endian PLY 1.0".to_owned());
     }
     let mut elements = header.elements.values();
-    let vertex = match (elements.next(), elements.next()) {
-        (Some(vertex), None) if vertex.name == "vertex" => vertex,
+    let (vertex, deep) = match (elements.next(), elements.next(), elements.next()) {
+        (Some(vertex), None, None) if vertex.name == "vertex" => (vertex, Default::default()),
+        (Some(vertex), Some(deep), None) if vertex.name == "vertex" => {
+            (vertex, deep::promised(header, deep)?)
+        }
         _ => return Err("its only element is not `vertex`".to_owned()),
     };
     let mut properties = vertex.properties.values();
@@ -418,7 +448,7 @@ fn layout(header: &Header, origin: DVec3) -> Result<(usize, Vec<String>), String
         }
         names.push(property.name.clone());
     }
-    Ok((vertex.count, names))
+    Ok((vertex.count, names, deep))
 }
 
 /// Particles read so far, row by row.
@@ -476,7 +506,8 @@ impl Unpacked {
         }
     }
 
-    fn finish(mut self, names: Vec<String>) -> Particles {
+    fn finish(mut self, names: Vec<String>, deep: Deep) -> Particles {
+        self.particles.deep = deep;
         self.particles.attributes = names.into_iter().zip(self.columns).collect();
         self.particles
     }

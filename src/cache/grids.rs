@@ -32,9 +32,10 @@ impl GridRecord {
             voxel_size: self.voxel_size,
             particle_spacing,
         };
+        let water = particles.water();
         Grids {
-            surface: self.surface.then(|| raster.surface(particles)),
-            velocity: self.velocity.then(|| raster.velocity(particles)),
+            surface: self.surface.then(|| raster.surface(&water)),
+            velocity: self.velocity.then(|| raster.velocity(&water)),
         }
     }
 

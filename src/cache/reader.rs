@@ -198,12 +198,21 @@ impl CacheReader {
         }
     }
 
-    /// Reads a frame's particles after checking length and checksum.
+    /// Reads a frame's water after checking length and checksum: its particles, and others for
+    /// the cells of [`swell_domain::deep`].
     ///
     /// # Errors
     /// Those of [`Self::kept`]; [`CacheError::Damaged`] (also for a missing file),
     /// [`CacheError::Io`].
     pub fn read(&self, frame: u32) -> Result<Particles, CacheError> {
+        self.state(frame).map(Particles::filled)
+    }
+
+    /// Reads the state that a bake continues from.
+    ///
+    /// # Errors
+    /// Those of [`Self::read`].
+    pub fn state(&self, frame: u32) -> Result<Particles, CacheError> {
         let found = read_frame(&self.dir, &self.manifest, self.kept(frame)?);
         match found {
             Err(error) => match self.reopen_if_advanced(frame) {

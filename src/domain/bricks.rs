@@ -46,9 +46,10 @@ pub struct Level {
 
 /// Bricks around the water at one instant, and their coarser levels.
 ///
-/// Slots 1..=`wet` hold water, those up to `active` are within reach of it, and the coarser levels
-/// over the wet bricks follow. Within each of these groups bricks are ordered by coordinate, x
-/// fastest, so the same wet bricks always get the same slots.
+/// Slots 1..=`laden` may hold particles, those up to `wet` hold water, those up to `active` are
+/// within reach of it, and the coarser levels over the wet bricks follow. Within each of these
+/// groups bricks are ordered by coordinate, x fastest, so the same wet bricks always get the same
+/// slots.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Bricks {
     /// Cells of the finest level along each axis.
@@ -60,6 +61,8 @@ pub struct Bricks {
     pub table_dims: [u32; 3],
     /// Slot of each brick of the finest level, x fastest; 0 where there is none.
     pub table: Vec<u32>,
+    /// Number of slots that may hold particles; they come first.
+    pub laden: u32,
     /// Number of slots that hold water.
     pub wet: u32,
     /// Number of slots on the finest level, wet ones first.
@@ -101,12 +104,31 @@ impl Bricks {
         reach: u32,
         depth: usize,
     ) -> Self {
+        Self::laden_first(cells, periodic, is_wet, is_wet, reach, depth)
+    }
+
+    /// Same as [`Self::periodic`], with the wet bricks that `is_laden` flags before the others.
+    /// Each of both groups is ordered by coordinate.
+    ///
+    /// # Panics
+    /// As [`Self::periodic`].
+    pub fn laden_first(
+        cells: [u32; 3],
+        periodic: [bool; 3],
+        is_wet: &[bool],
+        is_laden: &[bool],
+        reach: u32,
+        depth: usize,
+    ) -> Self {
         let dims = table_dims(cells);
         assert_eq!(is_wet.len(), volume(dims), "one flag a brick");
+        assert_eq!(is_laden.len(), is_wet.len(), "one flag a brick");
         let is_whole = |axis: usize| !periodic[axis] || cells[axis].is_multiple_of(EDGE);
         assert!((0..3).all(is_whole), "whole bricks along a period");
         let near = dilate(is_wet, dims, periodic, reach);
-        let wet: Vec<usize> = (0..near.len()).filter(|&k| is_wet[k]).collect();
+        let mut wet: Vec<usize> = (0..near.len()).filter(|&k| is_wet[k]).collect();
+        wet.sort_by_key(|&k| !is_laden[k]);
+        let laden = wet.iter().filter(|&&k| is_laden[k]).count() as u32;
         let dry = (0..near.len()).filter(|&k| near[k] && !is_wet[k]);
         let mut records = vec![Brick::default()];
         let mut table = vec![0; near.len()];
@@ -125,6 +147,7 @@ impl Bricks {
             periodic,
             table_dims: dims,
             table,
+            laden,
             wet: wet.len() as u32,
             active,
             levels: vec![Level {

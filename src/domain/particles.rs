@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-use super::{absorber::AbsorberStates, body::BodyState, bounds::Bounds};
+use super::{absorber::AbsorberStates, body::BodyState, bounds::Bounds, deep::Deep};
 
 /// Particles that a thread takes at a time: a task takes longer than to hand it over.
 pub const AT_ONCE: usize = 1 << 14;
@@ -32,6 +32,8 @@ pub struct Particles {
     /// Length of the substep that ended in this state, seconds; 0 if there was none. Caches store
     /// it in their ledger.
     pub substep: f64,
+    /// Water without particles, below those of a band; empty if particles are everywhere.
+    pub deep: Deep,
 }
 
 impl Particles {
@@ -56,6 +58,9 @@ impl Particles {
             }
             for body in &mut self.bodies {
                 body.centre += from - to;
+            }
+            if !self.deep.is_empty() {
+                self.deep.grid.origin += from - to;
             }
         }
         self

@@ -7,7 +7,7 @@ use std::path::Path;
 use glam::DVec3;
 
 use super::{
-    body, budget,
+    band, body, budget,
     document::Document,
     effects,
     fit::{comes_into, fits},
@@ -174,6 +174,7 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
         budget,
         effects: spec.effects,
     };
+    band::check(doc, &scene)?;
     Ok(scene.into_local())
 }
 

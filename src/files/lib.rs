@@ -14,6 +14,7 @@ pub mod whitewater;
 
 mod absorption;
 mod axis;
+mod band;
 mod body;
 mod budget;
 mod build;

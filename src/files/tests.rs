@@ -1,6 +1,7 @@
 //! Tests of scenes' methods that need a scene from a file.
 
 mod absorption;
+mod band;
 mod body;
 mod budget;
 mod generation_zone;

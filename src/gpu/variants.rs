@@ -5,9 +5,18 @@ use std::collections::BTreeSet;
 use super::{error::GpuError, shader};
 
 /// Combinations of conditions that a plan can set; every pass must compose under each.
-const VARIANTS: [&[&str]; 90] = [
+const VARIANTS: [&[&str]; 92] = [
     &[],
     &["SOLIDS"],
+    &["BAND"],
+    &[
+        "BAND",
+        "CORRECTION",
+        "PUSHED",
+        "PERIODIC",
+        "GHOST_FLUID",
+        "SOLIDS",
+    ],
     &["NEIGHBOR_LIST"],
     &["NEIGHBOR_LIST", "PLACES"],
     &[

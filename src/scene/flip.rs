@@ -2,8 +2,14 @@
 
 use serde::{Deserialize, Serialize};
 
-use swell_domain::flip::{APART, LEAST_APART, apart};
-use swell_domain::named::read_by_name;
+use swell_domain::{
+    band::Band,
+    deep::DeepGrid,
+    flip::{APART, LEAST_APART, apart},
+    named::read_by_name,
+};
+
+use super::Scene;
 
 /// Attributes that APIC adds to particles: the matrix C of v(x) = v + C (x − x_p), 1/s, with
 /// `affine_xy` = ∂v_x/∂y. A state without them starts from zero.
@@ -42,8 +48,30 @@ pub struct Flip {
     /// Whether particles are moved to keep their initial density (Kugelstadt et al. 2019), which
     /// conserves the volume.
     pub density_correction: bool,
+    /// Depth of the band below the free surface that has particles, cells; `None` has particles
+    /// everywhere (narrow-band FLIP, Ferstl et al. 2016).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub band: Option<u32>,
     /// Settings of the pressure solve.
     pub pressure: Pressure,
+}
+
+impl Scene {
+    /// Returns the band that has particles, if they are not everywhere.
+    pub fn band(&self) -> Option<Band> {
+        let flip = self.solver.flip()?;
+        let grid = DeepGrid {
+            origin: self.domain.min,
+            cell_size: flip.cell_size,
+            cells: self.domain.cells(flip.cell_size),
+            per_edge: f64::from(flip.particles_per_cell).cbrt().round() as u32,
+            band: flip.band?,
+        };
+        Some(Band {
+            grid,
+            periodic: self.periodic,
+        })
+    }
 }
 
 impl Flip {

@@ -41,6 +41,7 @@ impl PbfScene<'_> {
             max_substeps: pbf.max_substeps,
             surface: Surface::GhostFluid,
             density_correction: false,
+            band: None,
             pressure: PRESSURE,
         };
         let scene = Scene {

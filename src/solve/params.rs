@@ -118,8 +118,9 @@ mirror!(
         /// Seconds for which gravity, pressure, surface tension, confinement and drag act: half of
         /// the previous substep plus half of this one.
         kick: f32,
-        /// Unused.
-        padding: u32,
+        /// Depth below the free surface to which there are particles, cells; 0 if they are
+        /// everywhere.
+        band: f32,
     }
 );
 

@@ -66,6 +66,9 @@ pub struct Counts {
 /// Capacity of the sparse grids, in bricks. Results do not depend on it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Capacity {
+    /// Slots for bricks with particles, including the empty slot 0. Without a band these are all
+    /// with water.
+    pub laden: usize,
     /// Slots for bricks with water, including the empty slot 0.
     pub wet: usize,
     /// Slots in total: also bricks within reach of water, and bricks of the coarser levels.
@@ -85,6 +88,7 @@ impl Capacity {
             if need > have { need + need / 4 } else { have }
         };
         Self {
+            laden: grow(self.laden, needed.laden),
             wet: grow(self.wet, needed.wet),
             slots: grow(self.slots, needed.slots),
         }

@@ -34,7 +34,9 @@ pub(super) fn is_other_count(
 ) -> Result<bool, SolveError> {
     let given = state.len();
     match given == planned {
-        false if !scene.has_sources() => Err(SolveError::Count { planned, given }),
+        false if !scene.has_sources() && scene.band().is_none() => {
+            Err(SolveError::Count { planned, given })
+        }
         is_same => Ok(!is_same),
     }
 }

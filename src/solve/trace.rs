@@ -164,6 +164,17 @@ pub struct Begun {
     /// Bodies as the substep began; for PBF's own passes, which follow the projection on its grid,
     /// at the substep's end.
     pub bodies: Vec<BodyState>,
+    /// Water without particles as the substep began.
+    pub deep: DeepBegun,
+}
+
+/// What a substep knows of water without particles as it begins; nothing without a band.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct DeepBegun {
+    /// Bricks that had water in the frame so far.
+    pub was_wet: Vec<bool>,
+    /// Largest speed of that water at the frame's start, m/s.
+    pub speed: f64,
 }
 
 /// Callback that receives each dispatch of a trace.

@@ -142,7 +142,8 @@ impl Branch {
         let entry = cache.entry(from.frame)?;
         check_keys(from, &cache, scene)?;
         let origin = cache.manifest().origin.into();
-        let mut particles = cache.read(from.frame)?.about(origin, scene.origin);
+        let mut particles = cache.state(from.frame)?.about(origin, scene.origin);
+        take_band(&mut particles, scene);
         let mut clock = entry.clock;
         let mut notes = Vec::new();
         if clock.walls != AbsorberStates::default() {
@@ -186,6 +187,17 @@ impl Branch {
             particles,
             notes,
         })
+    }
+}
+
+/// Lays the scene's band, if it has one, around a frame without one or with another.
+fn take_band(particles: &mut Particles, scene: &Scene) {
+    let band = scene.band();
+    if !particles.deep.is_empty() && band.is_none_or(|band| band.grid != particles.deep.grid) {
+        *particles = std::mem::take(particles).filled();
+    }
+    if let (Some(band), true) = (band, particles.deep.is_empty()) {
+        band.enter(particles);
     }
 }
 

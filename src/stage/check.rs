@@ -249,7 +249,7 @@ impl CheckedStep {
         which: SubstepChoice,
     ) -> Result<Checked, CheckError> {
         let particles = match &self.cache {
-            Some(cache) => cache.read(frame)?,
+            Some(cache) => cache.state(frame)?,
             None => self.start.particles.clone(),
         };
         let (scene, start) = (&self.scene, &self.start);

@@ -8,6 +8,7 @@ use std::{
 use glam::DVec3;
 
 use swell_domain::{
+    band::BandError,
     budget::Breach,
     particles::Particles,
     solver::{PassTime, Solver, Unread, Watch},
@@ -207,6 +208,14 @@ pub enum SolverError {
     /// A budget exceeded at the end of a frame.
     #[error(transparent)]
     Budget(#[from] Breach),
+    /// A band of particles that could not be laid at the end of a frame.
+    #[error("frame {frame}: {error}")]
+    Band {
+        /// Number of the frame.
+        frame: u32,
+        /// The reason.
+        error: BandError,
+    },
 }
 
 impl SolverError {
@@ -226,7 +235,7 @@ impl From<&SolverError> for Blame {
         match error {
             SolverError::Gpu(error) => error.into(),
             SolverError::Reference(error) => error.into(),
-            SolverError::Budget(_) => Self::Numbers,
+            SolverError::Budget(_) | SolverError::Band { .. } => Self::Numbers,
         }
     }
 }

@@ -3,6 +3,7 @@
 
 mod against_baseline;
 mod caches;
+mod deep;
 mod pictures;
 mod streams;
 

@@ -14,6 +14,7 @@ use glam::DVec3;
 use swell_cache::ProbeValues;
 use swell_domain::{
     absorber::AbsorberStates,
+    band::Band,
     boundary::Boundary,
     particles::Particles,
     signed_distance::SignedDistance,
@@ -35,12 +36,16 @@ pub struct Drive<'a> {
     scene: &'a Scene,
     /// Emitters and drains; `None` if no water enters or leaves.
     sources: Option<Exchanged>,
+    /// The band that has particles, if they are not everywhere.
+    band: Option<Band>,
     /// Least id that an entering particle may have.
     first_id: u32,
     /// Plan of the passes and buffers on the GPU; `None` on the CPU.
     plan: Option<Plan>,
     /// Id of the next particle to enter.
     next_id: u32,
+    /// Amount of the water, in particles, with which the next frame begins; only with a band.
+    amount: usize,
     ahead: Ahead<'a>,
     behind: Behind<'a>,
 }
@@ -96,7 +101,7 @@ pub struct ComputedFrame {
     pub frame: u32,
     /// State at its end, after emitters and drains acted.
     pub particles: Particles,
-    /// Id of the next particle to enter; present only if water enters or leaves.
+    /// Id of the next particle; present only if they change between frames.
     pub next_id: Option<u32>,
     /// Report of its substeps.
     pub report: StepReport,
@@ -155,9 +160,11 @@ impl<'a> Drive<'a> {
         Ok(Self {
             scene,
             sources: Exchanged::of(start),
+            band: scene.band(),
             first_id: next_after(&start.particles),
             plan,
             next_id: 0,
+            amount: 0,
             ahead: Ahead {
                 scene,
                 solver,
@@ -183,6 +190,7 @@ impl<'a> Drive<'a> {
         (self.ahead.frame, self.behind.watch) = (frame, None);
         self.ahead.walls = state.walls;
         self.next_id = self.first_id.max(next_after(state));
+        self.amount = self.band.map_or(0, |_| state.amount());
         Ok(())
     }
 
@@ -225,9 +233,30 @@ impl<'a> Drive<'a> {
         let begin = Instant::now();
         let mut step = self.behind.read(self.ahead.compute()?)?;
         step.report.exchange = self.exchange(&mut step.particles)?;
-        step.next_id = self.sources.as_ref().map(|_| self.next_id);
+        self.relay(&mut step.particles)?;
+        step.next_id = self.changes_particles().then_some(self.next_id);
         step.seconds = begin.elapsed().as_secs_f64();
         Ok(step)
+    }
+
+    /// Whether particles change between two frames.
+    fn changes_particles(&self) -> bool {
+        self.sources.is_some() || self.band.is_some()
+    }
+
+    /// Lays the band anew at the end of the frame, if the scene has one.
+    fn relay(&mut self, particles: &mut Particles) -> Result<(), SolverError> {
+        let (Some(band), frame) = (&self.band, self.ahead.frame) else {
+            return Ok(());
+        };
+        let laid = band.relay(particles, (frame, self.amount), &mut self.next_id);
+        laid.map_err(|error| SolverError::Band { frame, error })?;
+        self.amount = particles.amount();
+        self.ahead.solver.load(frame, particles)?;
+        if let Some(watch) = &mut self.behind.watch {
+            watch.take_over(particles);
+        }
+        Ok(())
     }
 
     /// Runs emitters and drains at the end of the frame, if the scene has any.
@@ -286,8 +315,8 @@ impl<'a> Drive<'a> {
     }
 
     /// Like [`Self::run`], but each frame is read, checked and observed while the solver computes
-    /// the next one, at most. Frame by frame where water enters or leaves, because that changes
-    /// what the next frame begins with.
+    /// the next one, at most. Frame by frame where water enters or leaves or a band is laid, which
+    /// changes what the next frame begins with.
     ///
     /// # Errors
     /// Those of [`Drive::run`], at the same frame; the solver ends with the frame that it is
@@ -298,7 +327,7 @@ impl<'a> Drive<'a> {
         stop: &AtomicBool,
         mut observe: impl FnMut(ComputedFrame) -> Result<(), E>,
     ) -> Result<End, E> {
-        if self.sources.is_some() {
+        if self.changes_particles() {
             return self.run(last, stop, observe);
         }
         let (ahead, behind) = (&mut self.ahead, &mut self.behind);

@@ -118,6 +118,9 @@ impl Start {
             let zeros = vec![0.0; particles.len()];
             particles.attributes.insert((*name).to_owned(), zeros);
         }
+        if let Some(band) = scene.band() {
+            band.enter(&mut particles);
+        }
         Ok(Self {
             particles,
             removed,
@@ -152,14 +155,14 @@ impl Start {
     {
         Ok(match cache.manifest().parent {
             None => Self::of(scene)?,
-            Some(_) => Self::with(scene, cache.read(cache.first_frame())?)?,
+            Some(_) => Self::with(scene, cache.state(cache.first_frame())?)?,
         })
     }
 
     /// The volume of water.
     pub fn volume(&self, scene: &Scene) -> Volume {
         Volume {
-            made: self.particles.len() as f64 * scene.particle_volume(),
+            made: self.particles.amount() as f64 * scene.particle_volume(),
             asked: self.asked,
         }
     }

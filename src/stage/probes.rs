@@ -1,5 +1,7 @@
 //! Evaluates a scene's probes.
 
+use std::borrow::Cow;
+
 use swell_cache::{LedgerEntry, ProbeRecord, ProbeValues, stream::PROBES};
 use swell_domain::{
     absorber::AbsorberStates,
@@ -222,6 +224,11 @@ fn of_state(
     is_due: impl Fn(&Probe) -> bool,
 ) -> ProbeValues {
     let spacing = scene.particle_spacing();
+    let water = match scene.probes.is_empty() {
+        true => Cow::Borrowed(particles),
+        false => particles.water(),
+    };
+    let particles = &*water;
     let mut pressures = pressures.iter().copied();
     let probes = scene.probes.iter();
     probes

@@ -44,10 +44,16 @@ impl<'a> Watch<'a> {
     pub(super) fn take_over(&mut self, state: &Particles) {
         let scene = self.scene;
         let report = scene.report(state, [].into_iter());
-        self.before.energy = scene.total_energy(state.len(), &report);
+        self.before.energy = scene.total_energy(state.amount(), &report);
         self.before.speed = state.max_speed().max(scene.fastest_body(&state.bodies));
         let more = state.len() as f64 - self.id.len() as f64;
-        if let Some(volume) = &mut self.before.start_volume {
+        // A band's particles come and go, and the water stays.
+        let exchanged = self
+            .before
+            .start_volume
+            .as_mut()
+            .filter(|_| scene.band().is_none());
+        if let Some(volume) = exchanged {
             *volume += more * scene.particle_spacing().powi(3);
         }
         self.id.clone_from(&state.id);
@@ -72,7 +78,7 @@ impl<'a> Watch<'a> {
         particles: &Particles,
         report: &mut StepReport,
     ) -> Result<(), Breach> {
-        let (scene, n) = (self.scene, particles.len());
+        let (scene, n) = (self.scene, particles.amount());
         if let Some((count, first)) = particles.first_not_finite(None) {
             return Err(Breach::not_finite(self.frame, count, Some(first)));
         }
@@ -119,5 +125,5 @@ impl<'a> Watch<'a> {
 
 /// Volume of the water as a probe measures it, m³.
 pub(super) fn volume_of(scene: &Scene, particles: &Particles) -> f64 {
-    volume(particles, scene.particle_spacing(), &scene.domain)
+    volume(&particles.water(), scene.particle_spacing(), &scene.domain)
 }

@@ -105,6 +105,7 @@ mod solve {
     mod analytic;
     mod analytic_water;
     mod apic_solids;
+    mod band;
     mod bodies;
     mod drag;
     mod flip;
@@ -134,6 +135,7 @@ mod solve {
 }
 mod stage {
     mod absorption;
+    mod band;
     mod body_output;
     mod branch;
     mod budget;

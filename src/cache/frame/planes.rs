@@ -16,7 +16,7 @@ use std::path::Path;
 use rayon::prelude::*;
 
 use super::{
-    Counted, HEADER_LIMIT, Head, Stamp, Unpacked, WrittenFile, header, header_bytes, pack,
+    Counted, HEADER_LIMIT, Head, Stamp, Unpacked, WrittenFile, deep, header, header_bytes, pack,
     read_head, row_size,
 };
 use crate::error::CacheError;
@@ -72,13 +72,14 @@ fn encode_as(
     particles: &Particles,
 ) -> io::Result<WrittenFile> {
     let names = particles.attributes.keys().map(String::as_str);
-    let mut header = header(stamp, particles.len(), names);
+    let mut header = header(stamp, particles.len(), names, &particles.deep);
     header.comments.push(content.comment());
     let head = header_bytes(&header)?;
     let row_size = row_size(stamp.origin, particles.attributes.len());
     let mut counted = Counted::new(out);
     let mut stream = zstd::Encoder::new(&mut counted, LEVEL)?;
-    let length = head.len() + particles.len() * row_size;
+    let of_deep = deep::pack(&particles.deep);
+    let length = head.len() + particles.len() * row_size + of_deep.len();
     stream.set_pledged_src_size(Some(length as u64))?;
     stream.write_all(&head)?;
     let (mut rows, mut planes, mut next) = (Vec::new(), Vec::new(), Vec::new());
@@ -97,6 +98,8 @@ fn encode_as(
         std::mem::swap(&mut planes, &mut next);
     }
     compress(&mut stream, &planes, row_size)?;
+    turn(&of_deep, deep::ROW, &mut next);
+    compress(&mut stream, &next, deep::ROW)?;
     stream.finish()?;
     Ok(counted.written())
 }
@@ -187,12 +190,20 @@ fn read_blocks(
         unpacked.add(&rows)?;
         found += count;
     }
-    Ok(unpacked.finish(head.names))
+    let length = head.deep.count.saturating_mul(deep::ROW) as u64;
+    planes.clear();
+    let read = body.take(length).read_to_end(&mut planes);
+    if read.map_err(fault)? as u64 != length {
+        return Err(head.misfit((found * row_size + planes.len()) as u64));
+    }
+    turn(&planes, head.deep.count, &mut rows);
+    let deep = deep::unpack(head.deep, &rows)?;
+    Ok(unpacked.finish(head.names, deep))
 }
 
 /// Transposes a table of bytes with `width` bytes a row.
 fn turn(table: &[u8], width: usize, turned: &mut Vec<u8>) {
-    let height = table.len() / width;
+    let height = table.len() / width.max(1);
     turned.resize(table.len(), 0);
     let columns = turned.par_chunks_exact_mut(height.max(1)).enumerate();
     columns.for_each(|(column, place)| {

@@ -285,7 +285,9 @@ pub(super) fn gather_centers(state: &mut FlipState, io: &mut Io<'_>) -> PassResu
     let settings = state.model.settings();
     let (elements, step, space) = (state.elements(), state.step(), state.space());
     let bricks = &elements.bricks;
-    let reference = reference_gather_centers(&state.model, &step, bricks, state.sorted(), space);
+    let mut reference =
+        reference_gather_centers(&state.model, &step, bricks, state.sorted(), space);
+    state.fill(&io.before, &mut reference)?;
     let share = 1.0 / f64::from(settings.particles_per_cell);
     let place = state.place();
     let error = |e: usize| {

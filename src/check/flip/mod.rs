@@ -2,6 +2,7 @@
 
 mod bodies;
 mod cycle;
+mod deep;
 mod elements;
 mod forces;
 mod gaps;
@@ -43,6 +44,7 @@ const COMPARISONS: &[Comparison<FlipState>] = &[
     comparison("flip/reorder", || names![buffers::ID], sort::reorder),
     comparison("flip/cut_cells", NONE, grid::cut_cells),
     comparison("flip/gather_faces", NONE, grid::gather_faces),
+    comparison("flip/place_deep", deep::placed, deep::place_deep),
     comparison("flip/gather_centers", NONE, grid::gather_centers),
     comparison("flip/find_water", NONE, grid::find_water),
     comparison(
@@ -63,6 +65,7 @@ const COMPARISONS: &[Comparison<FlipState>] = &[
     ),
     comparison("flip/find_change", elements::faces_kept, grid::find_change),
     comparison("flip/extrapolate", elements::faces_kept, grid::extrapolate),
+    comparison("flip/carry_deep", NONE, deep::carry_deep),
     comparison("flip/grid_to_particle", NONE, particles::grid_to_particle),
     comparison("flip/push_apart", NONE, particles::push_apart),
     comparison(

@@ -133,6 +133,23 @@ entries! {
             face + 2.0 * U * (gravity + v), "";
         KNOWN = "whether particles are near", "": [] 0.0, "flags";
     }
+    "flip/place_deep" {
+        DEEP_DEPTH = "depth below the surface", "cells": [] 0.0, "a copy";
+        DEEP_OLD = "velocity in the depth", "m/s": [] 0.0, "a copy";
+        DEEP_NEW = "velocity in the depth with gravity", "m/s": [gravity: "g Δt", v: "|v|"]
+            2.0 * U * (gravity + v), "";
+        DEEP_KNOWN = "whether there is a velocity", "": [] 0.0, "flags";
+    }
+    "flip/carry_deep" {
+        CARRIED_VELOCITY = "velocity in the depth", "m/s": [place: "in cells, " START,
+            range: "of the velocities that the water may come from", most: "the largest of them"]
+            (6.0 * place + 64.0 * U) * range + 128.0 * U * most,
+            "along each axis, slopes of cubic weights that add up to 2 at most; 64 products, \
+             weights of four factors";
+        CARRIED_DEPTH = "depth below the surface", "cells": [place: "in cells, " START,
+            range: "of the depths that the water may come from", most: "the largest of them"]
+            3.0 * place * range + 32.0 * U * most, "along each axis; 8 products";
+    }
     "flip/gather_centers" {
         RELATIVE_DENSITY = "relative density", "": [center: "" OF_CENTER] center, "";
     }

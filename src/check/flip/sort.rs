@@ -82,9 +82,14 @@ pub(super) fn survey(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
         before,
         ..
     } = state.begun;
+    let deep = &state.begun.deep;
     let length = state.scene.shot.frame_seconds();
     let start = f64::from(state.frame) * length + elapsed;
-    let (frame, remaining, speed) = (state.frame + 1, length - elapsed, fastest.sqrt());
+    let (frame, remaining, speed) = (
+        state.frame + 1,
+        length - elapsed,
+        fastest.sqrt().max(deep.speed),
+    );
     let substep = match state.given_substep {
         Some(substep) => substep,
         None => {
@@ -99,9 +104,11 @@ pub(super) fn survey(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
             .1
         }
     };
-    let flags: Vec<bool> = found.iter().map(|&flag| flag != 0).collect();
+    let mut flags: Vec<bool> = found.iter().map(|&flag| flag != 0).collect();
+    let laden = state.scene.band().map(|_| flags.clone());
+    (flags.iter_mut().zip(&deep.was_wet)).for_each(|(flag, was)| *flag |= was);
     let step = (state.model).step(&substep, &state.absorbers, &state.bodies);
-    let bricks = state.model.bricks(&flags, &step);
+    let bricks = state.model.laden_bricks(&flags, laden.as_deref(), &step);
     state.elements = Some(Elements {
         cells: (CELLS * (bricks.active + 1)) as usize,
         stride: 0,

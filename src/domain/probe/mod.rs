@@ -29,13 +29,23 @@ pub(crate) const SUPPORT: f64 = 2.0;
 /// Returns the kinetic and potential energy, J, of particles of `mass` kg; potential energy is
 /// relative to `lowest`. Velocities are at mid-substep and positions at its end (leapfrog), so
 /// potential energy uses x − v Δt / 2: in free fall the error is (g Δt)² / 8 per kilogram. With
-/// positions at the substep's end it would be g v Δt / 2.
+/// positions at the substep's end it would be g v Δt / 2. A deep cell counts as the particles that
+/// it stands for, at its centre.
 pub fn energies(particles: &Particles, mass: f64, gravity: DVec3, lowest: DVec3) -> (f64, f64) {
     let (mut kinetic, mut potential) = (0.0, 0.0);
-    for (x, v) in particles.position.iter().zip(&particles.velocity) {
-        let [x, v] = [x, v].map(|of| Vec3::from_array(*of).as_dvec3());
+    let mut add = |[x, v]: [DVec3; 2], mass: f64| {
         kinetic += 0.5 * mass * v.length_squared();
         potential -= mass * gravity.dot(x - 0.5 * particles.substep * v - lowest);
+    };
+    let deep = &particles.deep;
+    for (x, v) in particles.position.iter().zip(&particles.velocity) {
+        if deep.is_empty() || !deep.holds(*x) {
+            add([x, v].map(|of| Vec3::from_array(*of).as_dvec3()), mass);
+        }
+    }
+    let full = mass * f64::from(deep.grid.per_cell());
+    for centre in deep.centres() {
+        add(centre, full);
     }
     (kinetic, potential)
 }

@@ -18,6 +18,8 @@ use swell_stage::{drive::ComputedFrame, prepare::Start};
 pub(super) struct RunView<'a> {
     pub(super) scene: &'a Scene,
     pub(super) start: Start,
+    /// Water of the start.
+    pub(super) at_start: Particles,
     /// Number of finished frames.
     frame: u32,
     pub(super) state: Particles,
@@ -35,7 +37,8 @@ impl<'a> RunView<'a> {
     pub(super) fn new(scene: &'a Scene) -> Result<Self, SignedDistanceError> {
         let start = Start::of(scene)?;
         Ok(Self {
-            state: start.particles.clone(),
+            state: start.particles.clone().filled(),
+            at_start: start.particles.clone().filled(),
             start,
             scene,
             frame: 0,
@@ -48,15 +51,16 @@ impl<'a> RunView<'a> {
 
     /// Updates the state with a finished frame.
     pub(super) fn take(&mut self, step: ComputedFrame) {
+        let water = step.particles.filled();
         let (domain, spacing) = (&self.scene.domain, self.scene.particle_spacing());
         let probes = self.scene.probes.iter();
         let levels = probes.filter_map(|probe| match probe.kind {
-            ProbeKind::Elevation { at } => Some(elevation(&step.particles, spacing, domain, at)),
+            ProbeKind::Elevation { at } => Some(elevation(&water, spacing, domain, at)),
             _ => None,
         });
         self.elevations = levels.map(|level| Some(level? - domain.min.y)).collect();
         self.pressures = step.pressures;
-        self.state = step.particles;
+        self.state = water;
         self.volume = OnceCell::new();
         self.report = Some(step.report);
         self.frame = step.frame;

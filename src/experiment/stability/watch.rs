@@ -46,7 +46,7 @@ impl<'a> Beside<'a> {
     fn places(&self, k: usize) -> Option<(DVec3, DVec3)> {
         let of = |p: &[f32; 3]| to_ours(point(p), self.origin, &self.view, self.other);
         let partner = self.partner[k]?;
-        let start = &self.view.start.particles;
+        let start = &self.view.at_start;
         Some((
             of(&self.view.state.position[partner]),
             of(&start.position[partner]),
@@ -67,7 +67,7 @@ pub(super) struct Watch<'a> {
 
 /// Initial value of the memory of a quantity.
 fn remembered(mark: &Mark, run: &RunView<'_>) -> Vec<f64> {
-    let (scene, start) = (run.scene, &run.start.particles);
+    let (scene, start) = (run.scene, &run.at_start);
     let of_start = |number: f64| mark.since.is_none().then_some(number);
     match mark.of {
         // Lowest height so far of each particle.
@@ -95,7 +95,7 @@ fn remembered(mark: &Mark, run: &RunView<'_>) -> Vec<f64> {
 
 impl<'a> Watch<'a> {
     pub(super) fn new(mark: &'a Mark, run: &RunView<'_>) -> Self {
-        let start = &run.start.particles;
+        let start = &run.at_start;
         let is_flight = mark.of == Quantity::BallisticError;
         Self {
             mark,
@@ -134,7 +134,7 @@ impl<'a> Watch<'a> {
     fn number(&mut self, run: &RunView<'_>, beside: &[Beside<'_>], report: &StepReport) -> f64 {
         let scene = run.scene;
         let spacing = scene.particle_spacing();
-        let (start, now) = (&run.start.particles, &run.state);
+        let (start, now) = (&run.at_start, &run.state);
         let projection = report.projection.unwrap_or_default();
         let of_water = report.kinetic_energy + report.potential_energy;
         let energy = of_water + run.energy_of_bodies();
@@ -268,7 +268,7 @@ impl<'a> Watch<'a> {
         let [other, ..] = beside else {
             return f64::NAN;
         };
-        let (start, now) = (&run.start.particles, &run.state);
+        let (start, now) = (&run.at_start, &run.state);
         let is_meant = |k: &usize| {
             let region = self.mark.region.as_ref();
             let at = point(&start.position[*k]) + run.scene.origin;
@@ -340,7 +340,7 @@ fn largest(values: impl IntoIterator<Item = f64>) -> f64 {
 
 fn pressure_error(run: &RunView<'_>, pressures: impl Iterator<Item = f64>) -> f64 {
     let scene = run.scene;
-    let surface = top(&run.start.particles.position) + 0.5 * scene.particle_spacing();
+    let surface = top(&run.at_start.position) + 0.5 * scene.particle_spacing();
     let weight = scene.water.rest_density * scene.water.gravity.length();
     let points = scene.pressure_points();
     let off = points.iter().zip(pressures);

@@ -44,7 +44,7 @@ pub(super) fn measure(
     let mut weights = Vec::new();
     if sweep.errors.contains(&ErrorMeasure::Weight) {
         drive = drive.with_pressures();
-        weights = still_pressures(scene, &start.particles);
+        weights = still_pressures(scene, &start.particles.water());
     }
     drive.advance()?;
     let mut run = SweepRun {
@@ -63,7 +63,7 @@ pub(super) fn measure(
                 run.measured.look(point, gauge, &step);
                 run.measured.weigh(&weights, &step);
             }
-            end = step.particles;
+            end = step.particles.filled();
             Ok(())
         })?;
         run.seconds.push(seconds);
@@ -106,7 +106,7 @@ impl SweepMeasurements {
         let is_sampled = || step.frame.is_multiple_of(point.frames / SAMPLES);
         if let Some(gauge) = gauge.filter(|_| is_sampled()) {
             self.samples
-                .push(sample(&point.scene, gauge, &step.particles));
+                .push(sample(&point.scene, gauge, &step.particles.water()));
         }
     }
 

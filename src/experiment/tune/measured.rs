@@ -167,7 +167,7 @@ impl TuneMeasurements {
 }
 
 fn sample(scene: &Scene, gauge: &Gauge, step: ComputedFrame) -> Sample {
-    let (particles, spacing) = (&step.particles, scene.particle_spacing());
+    let (particles, spacing) = (&*step.particles.water(), scene.particle_spacing());
     // With a density of 1 and the lattice's particle masses, energy over volume is energy per mass.
     let gravity: DVec3 = scene.water.gravity;
     let sums = gauge.aggregates(particles, spacing, 1.0, gravity);

@@ -138,10 +138,15 @@ fn go(
 ) -> Result<(), StudyError> {
     let scene = &trial.scene;
     let mut start = Start::of(scene)?;
-    start::prepare(benchmark, scene, &mut start.particles);
+    let mut water = std::mem::take(&mut start.particles).filled();
+    start::prepare(benchmark, scene, &mut water);
+    if let Some(band) = scene.band() {
+        band.enter(&mut water);
+    }
+    start.particles = water;
     run.particles = start.particles.len();
     let mut drive = Drive::new(devices.of(trial.device), scene, &start, false)?.with_probes();
-    let mut record = Record::new(benchmark, scene, &start.particles);
+    let mut record = Record::new(benchmark, scene, &start.particles.water());
     let mut seconds = 0.0;
     let ended = until_done(&mut drive, scene.shot.frames, stop, |step| {
         seconds += step.seconds;

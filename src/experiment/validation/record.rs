@@ -73,14 +73,15 @@ impl<'a> Record<'a> {
     /// Adds a frame.
     pub(super) fn look(&mut self, step: &ComputedFrame) {
         self.substeps += step.report.substeps;
+        let water = step.particles.water();
         self.rows.push(FrameRecord {
             time: f64::from(step.frame) * self.scene.shot.frame_seconds(),
             speed: step.report.max_speed,
-            levels: self.levels(&step.particles),
+            levels: self.levels(&water),
             pressures: step.pressures.clone(),
             force: self.force(&step.looks),
-            run_up: self.run_up(&step.particles),
-            of_water: self.of_water(&step.particles),
+            run_up: self.run_up(&water),
+            of_water: self.of_water(&water),
             bodies: step.particles.bodies.clone(),
         });
     }

@@ -128,6 +128,19 @@ keys! { fields of Flip {
     density_correction: bool = flag()
         .default("true")
         .about("moves particles so that the volume stays (Kugelstadt 2019)"),
+    // Depths are measured within a brick's edge, and two cells beyond the band.
+    band: Option<u32> = whole(3..=6)
+        .absent()
+        .unit("cells")
+        .also(
+            ", and at least `cfl` + 2; with `transfer = \"flip\"`, 8, 27 or 64 \
+             `particles_per_cell`, and a domain of whole cells; without solids, wave makers, \
+             emitters, drains and forces",
+        )
+        .about(
+            "particles only so deep below the free surface, and velocities on the grid below \
+             (Ferstl 2016); particles are everywhere if absent",
+        ),
     pressure: Pressure = table()
         .default("{}")
         .about("The linear solve of the projection"),

@@ -6,6 +6,7 @@
 //! splits a pass for speed, one function covers both halves. [`Flip`] runs whole frames.
 
 mod bodies;
+mod deep;
 pub mod effects;
 mod forces;
 mod gaps;
@@ -17,6 +18,7 @@ mod rotation;
 mod solids;
 mod solver;
 mod sort;
+mod state;
 mod to_grid;
 mod to_particles;
 mod trace;
@@ -24,6 +26,7 @@ mod wall_friction;
 mod water;
 
 pub use bodies::{BodyCells, carry_bodies, couple_bodies};
+pub use deep::{DeepCells, carry_deep, fill_deep, place_deep};
 pub use forces::{push_drops, push_faces, work_by_cells};
 pub use gaps::{Gaps, close_gaps};
 pub use grid::planes;

@@ -153,6 +153,16 @@ impl Model {
     /// solids, and those within reach of the step's layers of faces. The elements are those of the
     /// GPU.
     pub fn bricks(&self, is_wet: &[bool], step: &FlipSubstep<'_>) -> Bricks {
+        self.laden_bricks(is_wet, None, step)
+    }
+
+    /// Same as [`Self::bricks`] with the bricks of `is_laden` first, or all that count as water.
+    pub fn laden_bricks(
+        &self,
+        is_wet: &[bool],
+        is_laden: Option<&[bool]>,
+        step: &FlipSubstep<'_>,
+    ) -> Bricks {
         let periodic = self.scene.periodic;
         let cells = stored_cells(self.cells, periodic);
         let reach = (step.layers as u32).div_ceil(EDGE);
@@ -165,7 +175,8 @@ impl Model {
             (now.pose.scaled(1.0 / size), surface)
         });
         (self.shores).mark(&mut is_wet, table_dims(cells), &step.cut, poses);
-        Bricks::periodic(cells, periodic, &is_wet, reach, 1)
+        let is_laden = is_laden.unwrap_or(&is_wet);
+        Bricks::laden_first(cells, periodic, &is_wet, is_laden, reach, 1)
     }
 
     /// Returns the parameters of `substep`, in which absorbing walls and bodies have these states.

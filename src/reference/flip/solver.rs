@@ -1,14 +1,15 @@
 //! Substeps and whole frames of FLIP on the CPU.
 
-use glam::{DMat3, DVec3, Vec3};
+use glam::DVec3;
 
 use super::{
-    BodyCells, Centers, Cloud, Faces, Gaps, Model, Trace, Waters, advect, aim, assign_cells,
+    BodyCells, Centers, Cloud, DeepCells, Faces, Gaps, Model, Trace, Waters, advect, aim,
+    assign_cells,
     bodies::{Stopped, sped_up},
-    carry_bodies, close_gaps, couple_bodies, cut_cells,
+    carry_bodies, carry_deep, close_gaps, couple_bodies, cut_cells,
     effects::{self, FaceInputs, Flying},
-    extrapolate, find_buried, find_change, find_depth, find_excess, find_water, forces,
-    gather_centers, gather_faces, grid_to_particle, let_in,
+    extrapolate, fill_deep, find_buried, find_change, find_depth, find_excess, find_water, forces,
+    gather_centers, gather_faces, grid_to_particle, let_in, place_deep,
     projection::project as project_faces,
     push_apart, reorder,
     sort::by_id,
@@ -22,23 +23,21 @@ use swell_domain::{
     bricks::Bricks,
     budget::Breach,
     gauge::Gauge,
-    particles::Particles,
+    particles::{Particles, max_speed},
     poisson::FLUID,
     solver::{Observed, PassTime, Projection, Solver, Span, StepReport, Unread, Watch},
 };
-use swell_scene::{
-    FlipScene,
-    flip::{AFFINE, Transfer},
-    step::Substep,
-};
+use swell_scene::{FlipScene, step::Substep};
 
 /// FLIP in f64. Frames are rounded to f32, as when written, and the next frame starts from the
 /// rounded state.
 pub struct Flip {
-    model: Model,
+    pub(super) model: Model,
     contacts: Option<SceneContacts>,
     factor_budget: u64,
-    state: Particles,
+    pub(super) state: Particles,
+    /// Water without particles; `None` without a band.
+    pub(super) deep: Option<DeepCells>,
     frame: u32,
     timings: Timings,
     /// Pressure field of the last substep; `None` before the first.
@@ -66,6 +65,7 @@ impl Flip {
             contacts: SceneContacts::of(scene),
             factor_budget: 0,
             state: Particles::default(),
+            deep: None,
             frame: 0,
             timings: Timings::default(),
             field: None,
@@ -80,31 +80,6 @@ impl Flip {
     /// Returns the scene, its grid and its solids.
     pub fn model(&self) -> &Model {
         &self.model
-    }
-
-    /// Returns the current state in the form that the passes take.
-    pub fn cloud(&self) -> Cloud {
-        let state = &self.state;
-        let origin = self.model.scene.domain.min;
-        let affine = |k: usize| {
-            let at = |name: &str| f64::from(state.attributes.get(name).map_or(0.0, |v| v[k]));
-            let row = |first: usize| {
-                DVec3::new(
-                    at(AFFINE[first]),
-                    at(AFFINE[first + 1]),
-                    at(AFFINE[first + 2]),
-                )
-            };
-            DMat3::from_cols(row(0), row(3), row(6)).transpose()
-        };
-        let is_apic = self.model.settings().transfer == Transfer::Apic;
-        let with_affine = if is_apic { state.len() } else { 0 };
-        Cloud {
-            position: (state.position.iter()).map(|x| widen(x) - origin).collect(),
-            velocity: state.velocity.iter().map(widen).collect(),
-            affine: (0..with_affine).map(affine).collect(),
-            id: state.id.clone(),
-        }
     }
 
     /// Runs one substep of `cloud` on bricks around `is_wet`.
@@ -122,6 +97,7 @@ impl Flip {
             factor_budget,
             state,
             contacts,
+            deep,
             ..
         } = self;
         let responses = model.responses(&state.bodies, substep.kick);
@@ -144,9 +120,17 @@ impl Flip {
         let mut faces = timings.time("flip/gather_faces", || {
             gather_faces(model, &step, &bricks, &sorted, &space)
         });
-        let density = timings.time("flip/gather_centers", || {
+        let depth = deep.as_ref().map(|deep| {
+            timings.time("flip/place_deep", || {
+                place_deep(model, &step, &bricks, deep, &space, &mut faces)
+            })
+        });
+        let mut density = timings.time("flip/gather_centers", || {
             gather_centers(model, &step, &bricks, &sorted, &space)
         });
+        if let Some(depth) = &depth {
+            fill_deep(model, depth, &mut density);
+        }
         let (kind, mut distance) = timings.time("flip/find_water", || {
             let depth = find_depth(model, &step, &bricks, &space, &density);
             find_water(model, &bricks, &space, &depth)
@@ -265,6 +249,13 @@ impl Flip {
                 extrapolate(&step, &bricks, layer, &mut faces);
             }
         });
+        if let Some(depth) = &depth {
+            let moved = timings.time("flip/carry_deep", || {
+                let displacement = displacement.as_deref();
+                carry_deep(model, &step, &bricks, depth, &faces.velocity, displacement)
+            });
+            *deep = Some(moved);
+        }
         let mut given = timings.time("flip/grid_to_particle", || {
             let displacement = displacement.as_deref();
             grid_to_particle(model, &step, &bricks, &sorted, &faces, &space, displacement)
@@ -412,8 +403,11 @@ impl Flip {
             .report(&Particles::default(), [].into_iter());
         let mut all = Projection::default();
         let mut elapsed = 0.0;
+        let (deep, mut was_wet) = self.deep_cells().unzip();
+        let of_deep = max_speed(&self.state.deep.velocity);
+        self.deep = deep;
         loop {
-            let surveyed = survey(&self.model, cloud);
+            let mut surveyed = survey(&self.model, cloud);
             if surveyed.not_finite > 0 {
                 let breach = Breach::not_finite(frame, surveyed.not_finite as u64, None);
                 return Err(breach.in_substep(report.substeps.max(1)).into());
@@ -423,10 +417,13 @@ impl Flip {
                 frame,
                 start + elapsed,
                 length - elapsed,
-                surveyed.speed,
+                surveyed.speed.max(of_deep),
                 (report.substeps, self.state.substep),
             )?;
             report.substeps += 1;
+            if let Some(was) = &mut was_wet {
+                add_flags(was, &mut surveyed.is_wet);
+            }
             let number = (frame, report.substeps);
             let trace = self.judged_substep(number, cloud, &surveyed.is_wet, &substep)?;
             let step = self.model.step(&substep, &self.state.walls, &trace.bodies);
@@ -494,6 +491,7 @@ impl Flip {
             seen.particles.velocity.clone_from(&self.state.velocity);
             seen.particles.substep = self.state.substep;
             self.round(cloud, &by_id(cloud), &mut seen.particles);
+            seen.particles.deep = self.rounded_deep();
         }
         if wanted.pressures {
             seen.pressures = self.pressures(&self.model.scene.pressure_points())?;
@@ -507,29 +505,6 @@ impl Flip {
         }
         watch.look(span, seen);
         Ok(())
-    }
-
-    /// Rounds positions and velocities into a state, in its order.
-    fn round(&self, cloud: &Cloud, order: &[usize], state: &mut Particles) {
-        let origin = self.model.scene.domain.min;
-        for (slot, &k) in order.iter().enumerate() {
-            state.position[slot] = (origin + cloud.position[k]).as_vec3().to_array();
-            state.velocity[slot] = cloud.velocity[k].as_vec3().to_array();
-        }
-    }
-
-    fn write(&mut self, cloud: &Cloud) {
-        let order = by_id(cloud);
-        let mut state = std::mem::take(&mut self.state);
-        self.round(cloud, &order, &mut state);
-        self.state = state;
-        if !cloud.affine.is_empty() {
-            for (place, name) in AFFINE.into_iter().enumerate() {
-                let value = |&k: &usize| cloud.affine[k].row(place / 3)[place % 3] as f32;
-                let values = order.iter().map(value).collect();
-                self.state.attributes.insert(name.to_owned(), values);
-            }
-        }
     }
 }
 
@@ -559,6 +534,7 @@ impl Solver for Flip {
             self.run_frame(&mut cloud, watch)?
         };
         self.write(&cloud);
+        self.state.deep = self.rounded_deep();
         let frame = self.frame + 1;
         if let Some((count, first)) = self.state.first_not_finite(None) {
             return Err(Breach::not_finite(frame, count, Some(first)).into());
@@ -594,6 +570,11 @@ impl Solver for Flip {
     }
 }
 
-fn widen(v: &[f32; 3]) -> DVec3 {
-    Vec3::from_array(*v).as_dvec3()
+/// Sets the flags of either side in both: what is deep may be in any brick that had water before in
+/// the frame.
+fn add_flags(was: &mut [bool], is: &mut [bool]) {
+    for (was, is) in was.iter_mut().zip(is) {
+        *was |= *is;
+        *is = *was;
+    }
 }

@@ -350,7 +350,7 @@ pub fn aim(step: &FlipSubstep<'_>, position: &[DVec3], given: &GridTransfer) -> 
 }
 
 /// Returns the grid's velocity at `x`, m/s; `otherwise` if there is no brick.
-fn velocity_at(
+pub(super) fn velocity_at(
     model: &Model,
     bricks: &Bricks,
     velocity: &[DVec3],

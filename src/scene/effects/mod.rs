@@ -144,6 +144,18 @@ macro_rules! effects {
             /// Keys of all effects.
             pub const NAMES: &[&str] = &[$(stringify!($name)),+];
 
+            /// Returns the name of the first enabled effect that is no zone of waves.
+            pub fn beside_zones(&self) -> Option<&'static str> {
+                let zones: [(bool, &'static str); Self::NAMES.len()] = [$((
+                    self.$name.as_ref().is_some_and(|it| {
+                        Effect::absorbs(it).is_none() && Effect::makes(it).is_none()
+                    }),
+                    stringify!($name),
+                )),+];
+                let other = zones.into_iter().find(|(is_other, _)| *is_other);
+                other.map(|(_, name)| name)
+            }
+
             /// Returns whether an effect is solved between two projections.
             pub fn act_between_projections(&self) -> bool {
                 false$(|| self.$name.as_ref().is_some_and(Effect::acts_between_projections))+

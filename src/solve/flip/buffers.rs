@@ -80,5 +80,15 @@ pub const OPEN_VOLUME: Buf<f32> = Buf::new("open_volume");
 pub const OPEN_HATS: Buf<f32> = Buf::new("open_hats");
 /// Planes: velocity of the solid that closes a face, m/s. Exists only with moving solids.
 pub const CLOSED_VELOCITY: Buf<f32> = Buf::new("closed_velocity");
+/// Velocity and depth of the water that has moved, ready for the next substep: by brick with water,
+/// in the layout of the substep before, the three components on the least faces, m/s, and the depth
+/// of the centres below the free surface, cells. Exists only with a band.
+pub const DEEP: Buf<f32> = Buf::new("deep");
+/// Slot of each brick in the layout of [`DEEP`]; 0 where it was not. Exists only with a band.
+pub const DEEP_SLOT: Buf<u32> = Buf::new("deep_slot");
+/// Cells: depth below the free surface, cells; 0 where it is not known. Exists only with a band.
+pub const DEEP_DEPTH: Buf<f32> = Buf::new("deep_depth");
+/// Values of [`DEEP`] for each cell.
+pub const DEEP_VALUES: usize = 4;
 /// Boxes where water enters. Exists only with emitters that have a velocity.
 pub const INLETS: Buf<Inlets> = Buf::uniform("inlets");

@@ -1,18 +1,25 @@
 //! Brick layouts of particle states, and resizing to other counts.
 
 use crate::{
-    SolveError,
-    plan::{Capacity, Counts},
-    pressure::LEVELS,
+    SolveError, effects,
+    plan::{Capacity, Counts, Plan},
+    pressure::{LEVELS, PressureSolver},
 };
 use swell_domain::{
-    bricks::{Bricks, EDGE, table_dims},
+    bricks::{Bricks, CELLS, EDGE, table_dims},
     flip::{layers, stored_cells},
     particles::Particles,
 };
+use swell_gpu::{program::Program, sort};
 use swell_scene::{FlipScene, step::Substep};
 
-use super::{Flip, PARAMS, plan, pressure_solver, recordings, step, upload_constants};
+use super::{
+    Flip,
+    buffers::*,
+    plan::{self, extent},
+    record::{Commands, Recordings, numbers},
+    step,
+};
 
 /// Returns wetness flags of the domain's bricks, none set.
 pub(super) fn no_water(scene: &FlipScene, grid_dims: [u32; 3]) -> Vec<bool> {
@@ -26,13 +33,24 @@ pub(super) fn bricks(
     is_wet: &[bool],
     layers: usize,
 ) -> Bricks {
+    laden_bricks(scene, grid_dims, (is_wet, is_wet), layers)
+}
+
+/// Lays out bricks with water, those of `is_laden` first.
+pub(super) fn laden_bricks(
+    scene: &FlipScene,
+    grid_dims: [u32; 3],
+    (is_wet, is_laden): (&[bool], &[bool]),
+    layers: usize,
+) -> Bricks {
     let reach = (layers as u32).div_ceil(EDGE);
     let cells = stored_cells(grid_dims, scene.periodic);
-    Bricks::periodic(cells, scene.periodic, is_wet, reach, LEVELS)
+    Bricks::laden_first(cells, scene.periodic, is_wet, is_laden, reach, LEVELS)
 }
 
 pub(super) fn capacity_of(bricks: &Bricks) -> Capacity {
     Capacity {
+        laden: bricks.laden as usize + 1,
         wet: bricks.wet as usize + 1,
         slots: bricks.slots(),
     }
@@ -50,8 +68,13 @@ pub fn capacity(scene: &FlipScene, particles: &Particles) -> Capacity {
             std::array::from_fn(|k| ((x[k] / edge).max(0.0) as usize).min(dims[k] - 1));
         is_wet[(at[2] * dims[1] + at[1]) * dims[0] + at[0]] = true;
     }
+    let is_laden = is_wet.clone();
+    if let Some(band) = scene.band() {
+        is_wet = band.wet_bricks(particles);
+    }
     // As many layers as a first substep at a moderate speed reaches.
-    capacity_of(&bricks(scene, grid_dims, &is_wet, layers(1.0)))
+    let flags = (&is_wet[..], &is_laden[..]);
+    capacity_of(&laden_bricks(scene, grid_dims, flags, layers(1.0)))
 }
 
 /// Returns the substep of the first survey, which reads only parameters that do not depend on the
@@ -94,4 +117,25 @@ impl Flip {
         self.program.upload(PARAMS, 0, &[params]);
         Ok(())
     }
+}
+
+/// Binds the commands of a plan to the current buffers of the program.
+pub(super) fn recordings(program: &Program, plan: &Plan, scene: &FlipScene) -> Recordings {
+    let effects = effects::of_flip(scene, plan.counts.bricks.cells());
+    Recordings::new(program, &Commands::new(plan, scene, &effects))
+}
+
+pub(super) fn pressure_solver(scene: &FlipScene, plan: &Plan) -> PressureSolver {
+    let flip = scene.settings();
+    PressureSolver::new(&flip.pressure, extent(scene), plan.counts.bricks.slots)
+}
+
+/// Uploads data that does not change between substeps.
+pub(super) fn upload_constants(program: &Program, plan: &Plan, scene: &FlipScene) {
+    let cells = plan.counts.bricks.wet * CELLS as usize;
+    sort::upload_lengths(program, &CELL_START, cells);
+    program.upload(ELEMENT_COUNT, 0, &[[plan.counts.particles as u32, 0, 0, 0]]);
+    program.upload_windows(&AXES, &numbers(0, 3));
+    // Layer 2 is the first that is extrapolated.
+    program.upload_windows(&LAYERS, &numbers(2, layers(scene.settings().cfl)));
 }

@@ -29,20 +29,24 @@ pub(super) struct Ended {
     pub(super) state: Carried,
     /// Bricks of the last substep.
     pub(super) bricks: Bricks,
-    /// The last are rows of attributes, one for each particle, if the scene has any.
-    pub(super) found: Mapped<(OfState, OfCells, First<Counters>, First<f32>)>,
+    /// The last but one are rows of attributes, one for each particle, if the scene has any; the
+    /// last is the deep water, if it has a band.
+    pub(super) found: Mapped<(OfState, OfCells, First<Counters>, First<f32>, First<f32>)>,
 }
 
 impl Ended {
     /// Returns the state and its densities.
     pub(super) fn read(self) -> Result<(Particles, Densities), SolveError> {
-        let ((position, velocity, id), (density, kind), _, rows) = self.found.views()?;
+        let ((position, velocity, id), (density, kind), _, rows, deep) = self.found.views()?;
         let places = self.state.ids.places(self.frame, id)?;
         let mut state = (self.state).state(&self.scene, &places, position, velocity);
         let names = self.scene.settings().attributes();
         for (k, name) in names.iter().enumerate() {
             let values = places.collect(|place| rows[names.len() * place + k]);
             state.attributes.insert((*name).to_owned(), values);
+        }
+        if !deep.is_empty() {
+            state.deep = super::deep::read(&self.scene, &self.bricks, deep);
         }
         check_finite(self.frame, &state, None).map_err(|breach| match self.substeps {
             0 => breach,

@@ -8,6 +8,7 @@
 mod bodies;
 pub mod buffers;
 mod capacity;
+mod deep;
 mod ended;
 pub(super) mod plan;
 mod record;
@@ -40,7 +41,6 @@ use swell_gpu::{
     buffer::Buf,
     program::Program,
     recording::{Recording, Timer},
-    sort,
 };
 use swell_scene::{FlipScene, moving_solid::MovingSolid, step::Substep};
 
@@ -59,10 +59,13 @@ use super::{
 };
 use buffers::*;
 pub use capacity::capacity;
-use capacity::{bricks, capacity_of, no_water, whole_frame};
+use capacity::{
+    bricks, capacity_of, laden_bricks, no_water, pressure_solver, recordings, upload_constants,
+    whole_frame,
+};
+use deep::DeepState;
 use ended::{Ended, ReadFrame};
-use plan::extent;
-use record::{Commands, Recordings, groups, numbers};
+use record::{Recordings, groups};
 pub(super) use totals::FrameTotals;
 
 /// The FLIP solver on a GPU.
@@ -88,6 +91,8 @@ pub struct Flip {
     responses: Vec<[Six; 6]>,
     /// Where the bodies may touch the water in the substep.
     touched: Lists,
+    /// Water without particles; `None` without a band, and before a state is loaded.
+    deep: Option<DeepState>,
 }
 
 /// Result of `flip/survey`.
@@ -137,6 +142,7 @@ impl Flip {
             contacts: SceneContacts::of(scene),
             responses: Vec::new(),
             touched: Lists::default(),
+            deep: None,
             shores: Shores::new(boundary, scene.domain.min, scene.settings().cell_size)
                 .joined(scene.periodic),
             state,
@@ -189,8 +195,9 @@ impl Flip {
         run(&self.program, &[&self.recordings.survey])?;
         let flags = SURVEY_IS_WET.first(no_water(&self.scene, self.plan.grid_dims).len());
         let (head, is_wet) = self.program.download((SURVEY.first(1), flags))?;
+        let of_deep = self.deep.as_ref().map_or(0.0, |deep| deep.speed);
         Ok(Survey {
-            speed: f64::from(head[0].speed_square).sqrt(),
+            speed: f64::from(head[0].speed_square).sqrt().max(of_deep),
             not_finite: head[0].not_finite,
             is_wet: is_wet.into_iter().map(|flag| flag != 0).collect(),
         })
@@ -248,16 +255,23 @@ impl Flip {
     /// Lays out bricks around the water and grows the buffers if they do not fit.
     fn lay_out(&mut self, is_wet: &[bool], substep: &Substep) -> Result<(), SolveError> {
         let layers = layers(substep.displacement);
-        let is_wet = self.with_shores(is_wet, substep);
-        self.bricks = bricks(&self.scene, self.plan.grid_dims, &is_wet, layers);
+        let with_deep = self.with_deep(is_wet);
+        let all_wet = self.with_shores(&with_deep, substep);
+        let is_laden = match self.deep {
+            Some(_) => is_wet,
+            None => &all_wet[..],
+        };
+        let flags = (&all_wet[..], is_laden);
+        self.bricks = laden_bricks(&self.scene, self.plan.grid_dims, flags, layers);
         let needed = capacity_of(&self.bricks);
         let grown = self.plan.counts.bricks.grown(needed);
         if grown != self.plan.counts.bricks {
-            self.refit(Counts {
+            self.refit_around_deep(Counts {
                 bricks: grown,
                 ..self.plan.counts
             })?;
         }
+        self.relate_deep();
         let bricks = &self.bricks;
         let params = step::params(&self.scene, &self.plan, &self.state.walls, bricks, substep);
         let groups = groups(&self.program, &self.scene, &params, layers);
@@ -494,15 +508,19 @@ impl Flip {
         };
         let state = (POSITION.first(n), VELOCITY.first(n), ID.first(n));
         let of_cells = (DENSITY.first(cells), CELL_KIND.first(cells));
-        // Without attributes the buffer does not exist, and none of it is read.
+        // Without attributes the buffer does not exist, and none of it is read; nor without a band.
         let rows = AFFINE.first(names.len() * n);
+        let deep = DEEP.first(match self.deep {
+            Some(_) => DEEP_VALUES * cells,
+            None => 0,
+        });
         Ok(Ended {
             scene: self.scene.clone(),
             frame: self.frame + 1,
             substeps: totals.substeps,
             state: self.state.clone(),
             bricks: self.bricks.clone(),
-            found: (self.program).map((state, of_cells, COUNTERS.first(1), rows))?,
+            found: (self.program).map((state, of_cells, COUNTERS.first(1), rows, deep))?,
         })
     }
 
@@ -523,7 +541,7 @@ impl Solver for Flip {
         self.state = Carried::new(particles);
         self.frame = frame;
         self.upload_state(particles);
-        Ok(())
+        self.load_deep(particles)
     }
 
     fn compute(&mut self, watch: &mut dyn Watch) -> Result<Unread<SolveError>, SolveError> {
@@ -574,25 +592,4 @@ impl Solver for Flip {
         let timer = self.timer.as_ref();
         timer.map_or_else(Vec::new, |timer| timer.times(PassTime::new))
     }
-}
-
-/// Binds the commands of a plan to the current buffers of the program.
-fn recordings(program: &Program, plan: &Plan, scene: &FlipScene) -> Recordings {
-    let effects = effects::of_flip(scene, plan.counts.bricks.cells());
-    Recordings::new(program, &Commands::new(plan, scene, &effects))
-}
-
-fn pressure_solver(scene: &FlipScene, plan: &Plan) -> PressureSolver {
-    let flip = scene.settings();
-    PressureSolver::new(&flip.pressure, extent(scene), plan.counts.bricks.slots)
-}
-
-/// Uploads data that does not change between substeps.
-fn upload_constants(program: &Program, plan: &Plan, scene: &FlipScene) {
-    let cells = plan.counts.bricks.wet * CELLS as usize;
-    sort::upload_lengths(program, &CELL_START, cells);
-    program.upload(ELEMENT_COUNT, 0, &[[plan.counts.particles as u32, 0, 0, 0]]);
-    program.upload_windows(&AXES, &numbers(0, 3));
-    // Layer 2 is the first that is extrapolated.
-    program.upload_windows(&LAYERS, &numbers(2, layers(scene.settings().cfl)));
 }

@@ -110,6 +110,7 @@ fn conditions(plan: &Plan, scene: &FlipScene) -> Vec<&'static str> {
         ("PERIODIC", scene.is_periodic()),
         ("PLACES", has_places(plan, scene)),
         ("BODIES", scene.has_bodies()),
+        ("BAND", flip.band.is_some()),
         (forces::MESHES, forces::has_meshes(scene, Medium::Water)),
         ("F64", flip.pressure.precision == Precision::F64),
     ];
@@ -165,6 +166,7 @@ fn bricks(plan: &Plan, scene: &FlipScene, table: &mut BufferTable) {
     let flip = scene.settings();
     let slots = plan.counts.bricks.slots;
     let wet = plan.counts.bricks.wet * CELLS as usize;
+    let laden = plan.counts.bricks.laden * CELLS as usize;
     let all = slots * CELLS as usize;
     let dims = table_dims(stored_cells(plan.grid_dims, scene.periodic));
     let bricks = dims.iter().map(|&n| n as usize).product();
@@ -173,7 +175,7 @@ fn bricks(plan: &Plan, scene: &FlipScene, table: &mut BufferTable) {
     table.add("flip", BRICKS.sized(slots));
     table.add("sort", CELL_START.sized(wet + 1));
     table.extend("sort", sort::scan_buffers(&CELL_START, wet));
-    table.extend("flip", PARTIAL_SUMS.map(|sums| sums.sized(FACES * wet)));
+    table.extend("flip", PARTIAL_SUMS.map(|sums| sums.sized(FACES * laden)));
     let planes = if flip.density_correction { 6 } else { 3 };
     table.watch("flip", FACE_VELOCITY.sized(planes * all));
     for planes in [FACE_CHANGE, FACE_OPEN] {
@@ -204,6 +206,11 @@ fn bricks(plan: &Plan, scene: &FlipScene, table: &mut BufferTable) {
     }
     if scene.has_inlets() {
         table.add("emitters", INLETS.sized(1));
+    }
+    if flip.band.is_some() {
+        table.watch("flip", DEEP.sized(DEEP_VALUES * wet));
+        table.add("flip", DEEP_SLOT.sized(slots));
+        table.watch("flip", DEEP_DEPTH.sized(all));
     }
     let layers = layers(flip.cfl);
     table.add("flip", PARAMS.sized(1));

@@ -200,6 +200,9 @@ fn to_grid(plan: &Plan, scene: &FlipScene, effects: &[(&'static str, Addition)])
         commands.push(along("flip/spread_faces", WET, axis));
         commands.push(along("flip/gather_faces", ACTIVE, axis));
     }
+    if scene.settings().band.is_some() {
+        commands.push(over("flip/place_deep", ACTIVE));
+    }
     commands.push(along("flip/spread_centers", WET, 0));
     commands.push(over("flip/gather_centers", ACTIVE));
     commands.push(over("flip/find_water", ACTIVE));
@@ -261,6 +264,9 @@ fn to_particles(
     for k in 0..layers(flip.cfl).saturating_sub(1) {
         let binds = vec![LAYERS.bind(k)];
         commands.push(over_listed("flip/extrapolate", FIRST_LAYER + k, binds));
+    }
+    if flip.band.is_some() {
+        commands.push(over("flip/carry_deep", WET));
     }
     commands.push(over("flip/grid_to_particle", WET));
     for pass in effects

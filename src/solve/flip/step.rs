@@ -45,7 +45,7 @@ pub(super) fn params(
         cut_max: cut.max.as_vec3().to_array(),
         stride: plan.counts.bricks.slots as u32 * CELLS,
         wall_velocity_min: speed.min.as_vec3().to_array(),
-        partial_stride: plan.counts.bricks.wet as u32 * CELLS,
+        partial_stride: plan.counts.bricks.laden as u32 * CELLS,
         wall_velocity_max: speed.max.as_vec3().to_array(),
         time_step: step.length as f32,
         velocity_step: (scene.water.gravity * step.kick).as_vec3().to_array(),
@@ -63,7 +63,7 @@ pub(super) fn params(
             .sum(),
         apart_from_walls: flip.apart_from_walls() as f32,
         kick: step.kick as f32,
-        padding: 0,
+        band: flip.band.unwrap_or(0) as f32,
     }
 }
 

@@ -24,6 +24,7 @@ impl TraceFrame for Flip {
                 elapsed: totals.elapsed,
                 before: self.state.substep,
                 bodies: self.state.bodies.clone(),
+                deep: self.deep_begun(),
             };
             let is_traced = match span {
                 Span::From(first) => begun.number >= first,

@@ -46,6 +46,7 @@ impl Flip {
         if wanted.particles {
             let frame = self.frame + 1;
             seen.particles = self.state.look(&self.program, &self.scene, frame)?;
+            seen.particles.deep = self.look_deep()?;
         }
         if wanted.pressures {
             seen.pressures = self.pressures_at(&self.scene.pressure_points())?;

@@ -43,7 +43,7 @@ use super::{
     params::{Counters, IterationControl, Params},
     plan::{Counts, Plan, device_limits},
     state::{Carried, check_finite, is_awaited, is_other_count, upload},
-    trace::{Begun, Observe, Run, Span, TraceFrame, Traced, trace},
+    trace::{Begun, DeepBegun, Observe, Run, Span, TraceFrame, Traced, trace},
 };
 use buffers::*;
 use plan::{cell_count, places, shared_constants};
@@ -575,6 +575,7 @@ impl TraceFrame for Pbf {
                 elapsed,
                 before: if number > 1 { step } else { self.state.substep },
                 bodies: self.state.bodies.clone(),
+                deep: DeepBegun::default(),
             };
             let mut tell = |traced: Traced<'_>| observe(&begun, traced);
             self.prepare_substep(time, step, &mut |program, recordings| {

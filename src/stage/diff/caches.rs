@@ -97,13 +97,13 @@ pub(super) fn compare(
     let (scene_a, scene_b) = (scene_of(a)?, scene_of(b)?);
     let gauge = of_caches(&scene_b, &[b, a])?;
     let frame = |&frame: &u32| {
-        let (of_a, of_b) = (a.read(frame)?, b.read(frame)?);
+        let (of_a, of_b) = (a.state(frame)?, b.state(frame)?);
         let beside = of_streams([a, b], frame, [Some(&of_a), Some(&of_b)])?;
         let [from, to] = [a, b].map(|cache| cache.manifest().origin.into());
         let of_a = of_a.about(from, to);
         let mut sums = [
-            aggregates(a, &scene_a, &gauge, frame, &of_a)?,
-            aggregates(b, &scene_b, &gauge, frame, &of_b)?,
+            aggregates(a, &scene_a, &gauge, frame, &of_a.water())?,
+            aggregates(b, &scene_b, &gauge, frame, &of_b.water())?,
         ];
         // A bake has no report of the frame that it began with, as is the case for a branch of the
         // other cache.

@@ -12,6 +12,8 @@ use swell_cache::{
 use swell_compare::streams::{self, Difference, ProbeRow, StreamDiff};
 use swell_domain::{particles::Particles, probe::Rate};
 
+use super::deep;
+
 /// A frame in one of the two caches, with its particles as read.
 #[derive(Clone, Copy)]
 pub(super) struct Side<'a> {
@@ -40,8 +42,8 @@ pub(super) fn of_frame(sides: [Side<'_>; 2]) -> Result<Vec<StreamDiff>, CacheErr
     let mut found = Vec::new();
     for stream in &STREAMS {
         match stream.content {
-            // Compared in the frame's own comparison, where a tolerance applies.
-            Content::Particles => {}
+            // Particles are compared in the frame's own comparison, where a tolerance applies.
+            Content::Particles => found.extend(deep_cells(stream, sides)),
             Content::SparseGrids => found.extend(grids(stream, sides)?),
             Content::Columns => found.extend(tables(stream, sides)),
         }
@@ -49,6 +51,18 @@ pub(super) fn of_frame(sides: [Side<'_>; 2]) -> Result<Vec<StreamDiff>, CacheErr
     found.push(ledger(sides));
     found.retain(|diff| !diff.differences.is_empty());
     Ok(found)
+}
+
+/// Compares the water without particles, if both frames are there.
+fn deep_cells(stream: &Stream, [a, b]: [Side<'_>; 2]) -> Option<StreamDiff> {
+    let (of_a, of_b) = a.particles.zip(b.particles)?;
+    let file = |side: Side<'_>| Some(side.entry.file(stream.name)?.file.clone());
+    Some(StreamDiff {
+        frame: a.entry.frame,
+        stream: stream.name.to_owned(),
+        files: [file(a)?, file(b)?],
+        differences: deep::differences(&of_a.deep, &of_b.deep),
+    })
 }
 
 /// Compares two intact grid files. Their bytes also contain program, shot and time, so where they

@@ -114,9 +114,9 @@ impl Planned {
                 })
             }
             Subject::Scene(scene) => {
-                let start = Start::of(scene)?;
-                let set = render_scene(scene, look, 0, &FrameState::alone(&start.particles))?;
-                let (water, white) = (WaterParticles::new(start.particles), Particles::default());
+                let start = Start::of(scene)?.particles.filled();
+                let set = render_scene(scene, look, 0, &FrameState::alone(&start))?;
+                let (water, white) = (WaterParticles::new(start), Particles::default());
                 let inputs = FrameInputs::alone(&water, &white);
                 Self::of_frame(look, &set, (0, &inputs), limits)
             }

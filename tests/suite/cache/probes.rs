@@ -288,7 +288,11 @@ fn only_a_pressure_costs_the_device_anything() {
     let context = context();
     let counts = Counts {
         particles: 1000,
-        bricks: Capacity { wet: 4, slots: 8 },
+        bricks: Capacity {
+            laden: 4,
+            wet: 4,
+            slots: 8,
+        },
         ..Counts::default()
     };
     let others: String = PROBES

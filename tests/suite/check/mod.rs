@@ -94,6 +94,7 @@ fn case(method: Method) -> (Scene, Start) {
         max_substeps: 32,
         surface: Surface::GhostFluid,
         density_correction: true,
+        band: None,
         pressure: Pressure {
             preconditioner: Preconditioner::Multigrid,
             precision: Precision::F32Refined,

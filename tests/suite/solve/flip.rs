@@ -268,6 +268,7 @@ fn buffers_grow_with_the_water_and_change_nothing() {
     let start = capacity(&scene.with_flip().unwrap(), &particles);
     let mut small = solver(&context, &scene, &particles);
     let large = Capacity {
+        laden: 200,
         wet: 200,
         slots: 400,
     };

@@ -42,6 +42,7 @@ fn scene(cells: [f64; 3]) -> Scene {
         max_substeps: 64,
         surface: Surface::GhostFluid,
         density_correction: true,
+        band: None,
         pressure: Pressure {
             preconditioner: Preconditioner::Multigrid,
             precision: Precision::F32Refined,

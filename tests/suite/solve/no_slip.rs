@@ -229,7 +229,11 @@ fn what_no_scene_names_is_not_planned() {
         scene.no_slip = no_slip.iter().map(|name| wall(name)).collect();
         let counts = Counts {
             particles: 5000,
-            bricks: Capacity { wet: 9, slots: 15 },
+            bricks: Capacity {
+                laden: 9,
+                wet: 9,
+                slots: 15,
+            },
             ..Counts::default()
         };
         let limits = DeviceLimits {

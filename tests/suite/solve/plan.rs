@@ -43,7 +43,11 @@ impl Case {
             scene,
             counts: Counts {
                 particles: 5000,
-                bricks: Capacity { wet: 9, slots: 15 },
+                bricks: Capacity {
+                    laden: 9,
+                    wet: 9,
+                    slots: 15,
+                },
                 ..Counts::default()
             },
             limits: DeviceLimits {

@@ -35,6 +35,7 @@ pub fn settings() -> Settings {
         max_substeps: 32,
         surface: Surface::GhostFluid,
         density_correction: true,
+        band: None,
         pressure: Pressure {
             preconditioner: Preconditioner::Multigrid,
             precision: Precision::F32Refined,

@@ -1,4 +1,5 @@
 //! A fault for each row of a check.
+pub(super) mod band;
 pub(super) mod bodies;
 pub(super) mod flip;
 pub(super) mod pbf;

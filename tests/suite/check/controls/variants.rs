@@ -15,7 +15,7 @@ use swell::{
     stage::prepare::Start,
 };
 
-use super::{Control, bodies, control, flip::SYSTEM, shapes, tension::TENSION};
+use super::{Control, band, bodies, control, flip::SYSTEM, shapes, tension::TENSION};
 use crate::support::{D, flip_of as flip, lattice, mover, noise, turning};
 
 /// A change of the common case, and the faults that its check must detect.
@@ -26,7 +26,7 @@ pub struct Variant {
 }
 
 /// Noise of 1 m/s.
-fn stir(particles: &mut Particles) {
+pub(super) fn stir(particles: &mut Particles) {
     for (k, v) in particles.velocity.iter_mut().enumerate() {
         *v = std::array::from_fn(|axis| noise(3 * k as u64 + axis as u64 + 7) as f32);
     }
@@ -174,6 +174,11 @@ pub const VARIANTS: &[Variant] = &[
                 &["velocity"],
             ),
         ],
+    },
+    Variant {
+        name: "band",
+        change: band::band,
+        controls: band::BAND,
     },
     Variant {
         name: "surface tension",

@@ -165,6 +165,8 @@ def _parse(content: Content, path: Path, is_packed: bool) -> NDArray[np.void]:
     if [block.isdecimal() and int(block) > 0 for block in planes] != [True] * is_packed:
         raise Damaged(path, "its PLY header is not one of swell's")
     words = [line.split(" ") for line in lines[2:] if not line.startswith("comment ")]
+    if ["element", "deep"] in [line[:2] for line in words]:
+        raise CacheError(path, "it has deep cells without particles (solver.flip.band), which only the program reads: use swell export")
     try:
         [element, *properties] = words
         count = int(element[2]) if element[:2] == ["element", "vertex"] else -1
