@@ -94,7 +94,7 @@ impl Band {
     pub fn enter(&self, particles: &mut Particles) -> Relaid {
         particles.deep = Deep::default();
         let bricks = self.bricks(particles);
-        let field = self.from_particles(particles, &bricks);
+        let field = self.face_velocities(particles, &bricks);
         let depth = self.depth(&bricks, &self.counts(particles, &bricks), &field.depth);
         self.settle(particles, &bricks, &field, &depth)
     }
@@ -370,12 +370,12 @@ impl Band {
             ..Deep::default()
         };
         let last = (bricks.wet as usize + 1) * CELLS as usize;
-        for element in CELLS as usize..last {
+        for (element, &depth) in depth.iter().enumerate().take(last).skip(CELLS as usize) {
             let cell = bricks.cell(element as u32);
             let is_inside = (0..3).all(|axis| cell[axis] < self.grid.cells[axis]);
-            if depth[element] >= band - LISTED && is_inside {
+            if depth >= band - LISTED && is_inside {
                 deep.cell.push(cell);
-                deep.depth.push(depth[element]);
+                deep.depth.push(depth);
                 deep.velocity.push(field.velocity[element]);
             }
         }
@@ -391,7 +391,7 @@ impl Band {
     }
 
     /// Face velocities of the particles, with trilinear weights; no depths.
-    fn from_particles(&self, particles: &Particles, bricks: &Bricks) -> Cells {
+    fn face_velocities(&self, particles: &Particles, bricks: &Bricks) -> Cells {
         let mut field = Cells::of(bricks, &Deep::default());
         let mut weights = vec![[0.0f64; 3]; field.velocity.len()];
         let mut sums = weights.clone();

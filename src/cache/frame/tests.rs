@@ -91,7 +91,7 @@ impl PropertyAccess for Row {
 fn per_property(particles: &Particles) -> Ply<Row> {
     let names = particles.attributes.keys().map(String::as_str);
     let mut ply = Ply::new();
-    ply.header = header(&STAMP, particles.len(), names);
+    ply.header = header(&STAMP, particles.len(), names, &particles.deep);
     let row = |i: usize| {
         let (p, v) = (particles.position[i], particles.velocity[i]);
         let extra = particles.attributes.iter();

@@ -132,13 +132,14 @@ pub(super) fn carry_deep(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
         }
         [high - low, low.abs().max(high.abs())]
     };
-    for axis in 0..3 {
+    let mut of_axis = |axis: usize| {
         io.table.each(&CARRIED_VELOCITY, elements.wet(), |e| {
             let [range, most] = range(&|other| velocity[other][axis], e);
             let (found, exact) = (found.velocity[e][axis], reference.velocity[e][axis]);
             pair(e, found, exact, [place, range, most])
         });
-    }
+    };
+    (0..3).for_each(&mut of_axis);
     io.table.each(&CARRIED_DEPTH, elements.wet(), |e| {
         let [range, most] = range(&|other| depth[other], e);
         pair(e, found.depth[e], reference.depth[e], [place, range, most])

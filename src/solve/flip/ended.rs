@@ -19,6 +19,7 @@ pub(super) type ReadFrame = dyn FnOnce() -> Result<(Particles, Densities), Solve
 
 type OfState = (First<[f32; 3]>, First<[f32; 3]>, First<u32>);
 type OfCells = (First<f32>, First<u32>);
+type Found = (OfState, OfCells, First<Counters>, First<f32>, First<f32>);
 
 /// A frame in mapped memory.
 pub(super) struct Ended {
@@ -31,7 +32,7 @@ pub(super) struct Ended {
     pub(super) bricks: Bricks,
     /// The last but one are rows of attributes, one for each particle, if the scene has any; the
     /// last is the deep water, if it has a band.
-    pub(super) found: Mapped<(OfState, OfCells, First<Counters>, First<f32>, First<f32>)>,
+    pub(super) found: Mapped<Found>,
 }
 
 impl Ended {
