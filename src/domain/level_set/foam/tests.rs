@@ -117,6 +117,7 @@ fn discs_of_known_density_cover_what_random_discs_do() {
             let mut both = white;
             let more = foam(WhitewaterKind::Foam, heights, everywhere, |p| age(p) + 0.1);
             both.position.extend(&more.position);
+            both.id.extend(&more.id);
             for (name, column) in &more.attributes {
                 both.attributes
                     .entry(name.clone())
