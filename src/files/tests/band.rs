@@ -13,6 +13,7 @@ const TANK: &str = r#"
         [shot]
         name = "band"
         frames = 1
+        frames_per_second = 24
         [domain]
         min = [0.0, 0.0, 0.0]
         max = [2.4, 3.2, 0.8]
@@ -66,7 +67,10 @@ fn what_a_band_cannot_be_combined_with_is_refused_by_its_key() {
             &["drain=[{min=[0.0,0.0,0.0],max=[0.5,0.5,0.5]}]"],
             "[[drain]]",
         ),
-        (&["force=[{acceleration=[1.0,0.0,0.0]}]"], "[[force]]"),
+        (
+            &["force=[{kind=\"acceleration\",acceleration=[1.0,0.0,0.0]}]"],
+            "[[force]]",
+        ),
         (
             &["effects.surface_tension={coefficient=0.07}"],
             "effects.surface_tension",

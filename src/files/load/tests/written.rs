@@ -237,6 +237,23 @@ cell_size = 0.25
     let scene = parse(dir.path(), floats, &[]).expect("valid");
     let toml = scene_to_toml(&scene, &|_, _| "a.obj".to_owned());
     collect_keys("", &toml::from_str(&toml).expect("TOML"), &mut written);
+    let pool = r#"
+[shot]
+name = "pool"
+frames = 1
+frames_per_second = 30
+[domain]
+min = [0, 0, 0]
+max = [4, 4, 4]
+[solver]
+method = "flip"
+[solver.flip]
+cell_size = 0.25
+band = 5
+"#;
+    let scene = parse(dir.path(), pool, &[]).expect("valid");
+    let toml = scene_to_toml(&scene, &|_, _| "a.obj".to_owned());
+    collect_keys("", &toml::from_str(&toml).expect("TOML"), &mut written);
     // A motion's file is written as the points read from it; `walls` is written as the list
     // of no-slip walls.
     let read = [
