@@ -34,6 +34,9 @@
 @group(0) @binding(15) var<uniform> carried: array<Carried, 256>;
 #endif
 
+#ifdef SHUTTER
+@group(0) @binding(16) var<uniform> moments: array<Moment, 64>;
+#endif
 #ifdef SEA
 @group(0) @binding(13) var<uniform> sea: Sea;
 @group(0) @binding(14) var<storage, read> sea_values: array<vec4f>;
@@ -71,18 +74,19 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     }
     let pixel = vec2u(id.x, id.y + band.row) + camera.margin;
     let out = id.y * camera.picture.x + id.x;
-    let ray = eye_ray(camera, vec2f(pixel) + 0.5);
+    let eye = open_shutter(pixel);
+    let ray = eye_ray(eye, vec2f(pixel) + 0.5);
     let along = length(ray);
-    let direction = world_direction(camera, ray) / along;
-    let through = water_along(camera.position, direction);
-    let found = trace(camera.position, direction, is_wet(camera.position), 0.0, FAR);
+    let direction = world_direction(eye, ray) / along;
+    let through = water_along(eye.position, direction);
+    let found = trace(eye.position, direction, is_wet(eye.position), 0.0, FAR);
     let over = spray_over(vec2i(pixel), ray);
     if found.kind == SKY {
         let motion = motion_to(sky_in_next(direction), vec2i(pixel));
         store_under(over, out, FAR, vec3f(0.0), vec3f(0.0), motion, through);
         return;
     }
-    let position = camera.position + direction * found.t;
+    let position = eye.position + direction * found.t;
     let normal = select(found.normal, -found.normal, dot(found.normal, direction) > 0.0);
     var moved = position;
 #ifdef CARRIED

@@ -34,6 +34,9 @@
 @group(0) @binding(17) var<uniform> sea: Sea;
 @group(0) @binding(18) var<storage, read> sea_values: array<vec4f>;
 #endif
+#ifdef SHUTTER
+@group(0) @binding(22) var<uniform> moments: array<Moment, 64>;
+#endif
 #ifdef PALETTE
 @group(0) @binding(19) var<uniform> palette: array<vec4f, 64>;
 #endif
@@ -45,16 +48,17 @@
 #ifdef VOLUME
 // Radiance over coverage of drops splatted in front of the eye ray's hit at `end`. The grid gives
 // the fraction of sunlight that reaches them; where it has no drops, they are lit as at `mean`.
-fn drops_before(direction: vec3f, mean: f32, end: f32, optical_depth: f32) -> vec3f {
-    let passed = cloud_along(
-        camera.position, direction, 0.0, min(end, endless()) + cloud.skin, DROPS);
+fn drops_before(
+    eye: vec3f, direction: vec3f, mean: f32, end: f32, optical_depth: f32,
+) -> vec3f {
+    let passed = cloud_along(eye, direction, 0.0, min(end, endless()) + cloud.skin, DROPS);
     var far = mean;
-    var lit = exp(-cloud_sun_depth(camera.position + direction * mean));
+    var lit = exp(-cloud_sun_depth(eye + direction * mean));
     if passed.cover > 0.0 {
         far = passed.far / passed.cover;
         lit = passed.lit / passed.cover;
     }
-    let light = drops_radiance(camera.position + direction * far, -direction, optical_depth, lit);
+    let light = drops_radiance(eye + direction * far, -direction, optical_depth, lit);
     return hazed(light, far, direction);
 }
 #endif
@@ -69,9 +73,10 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     }
     let pixel = vec2u(id.x, id.y + band.row) + camera.margin;
     let out = id.y * camera.picture.x + id.x;
-    let ray = eye_ray(camera, vec2f(pixel) + 0.5);
-    let direction = normalize(world_direction(camera, ray));
-    let inside = is_wet(camera.position);
+    let eye = open_shutter(pixel);
+    let ray = eye_ray(eye, vec2f(pixel) + 0.5);
+    let direction = normalize(world_direction(eye, ray));
+    let inside = is_wet(eye.position);
     own_place = hash2(
         vec2i(vec2f(pixel) - camera.corner) + vec2i(7919 * i32(camera.sample_index), 0));
 #ifdef VOLUME
@@ -81,17 +86,17 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         max(known * length(ray) - 2.0 * rays.voxel, 0.0), 0.0, inside || known >= FAR);
     let reach = select(known * length(ray) - start + 2.0 * rays.voxel, 0.0, known >= FAR);
     var value = radiance_along(
-        camera.position + direction * start, direction, inside, start, reach);
+        eye.position + direction * start, direction, inside, start, reach);
     let mist = spray_at(vec2f(pixel) + 0.5);
     if mist.cover > 0.0 && !inside {
-        let white = drops_before(direction, min(known, mist.depth) * length(ray),
+        let white = drops_before(eye.position, direction, min(known, mist.depth) * length(ray),
             known * length(ray), mist.optical_depth);
         value = mix(value, vec4f(white, 1.0), mist.cover);
         dim_parts(1.0 - mist.cover);
         white_parts(vec2f(pixel) + 0.5, white, mist.cover);
     }
 #else
-    let value = radiance_along(camera.position, direction, inside, 0.0, FAR);
+    let value = radiance_along(eye.position, direction, inside, 0.0, FAR);
 #endif
     store_light(out, value, camera.weight, camera.sample_index == 0u);
 }

@@ -18,11 +18,19 @@
 @group(0) @binding(9) var<storage, read> sea_values: array<vec4f>;
 #endif
 
+#ifdef SHUTTER
+@group(0) @binding(16) var<uniform> moments: array<Moment, 64>;
+#endif
+
 @compute @workgroup_size(16, 4)
 fn main(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= caustics.rays) {
         return;
     }
+#ifdef SHUTTER
+    // The map is at the sample's instant.
+    take_moment(MOMENTS / 2u);
+#endif
     let at = caustics.first + caustics.step * vec2f(id.xy);
     let origin = vec3f(at.x, caustics.top, at.y);
     var entry = vec4f(0.0, 1.0, 0.0, FAR);

@@ -108,11 +108,19 @@ fn through_side(p: vec3f) -> vec3f {
         surface.after < FAR);
 }
 
+#ifdef SHUTTER
+@group(0) @binding(16) var<uniform> moments: array<Moment, 64>;
+#endif
+
 @compute @workgroup_size(16, 4)
 fn main(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= caustics.rays) {
         return;
     }
+#ifdef SHUTTER
+    // The map is at the sample's instant.
+    take_moment(MOMENTS / 2u);
+#endif
     let at = id.y * caustics.rays.x + id.x;
     let entry = sun_rays[at];
     var hit = vec4f(0.0);

@@ -15,6 +15,9 @@
 // Depth of either.
 @group(0) @binding(10) var<storage, read_write> first_depth: array<f32>;
 #endif
+#ifdef SHUTTER
+@group(0) @binding(11) var<uniform> moments: array<Moment, 64>;
+#endif
 #ifdef SEA
 @group(0) @binding(8) var<uniform> sea: Sea;
 @group(0) @binding(9) var<storage, read> sea_values: array<vec4f>;
@@ -26,10 +29,11 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let at = id.y * camera.size.x + id.x;
-    let ray = eye_ray(camera, vec2f(id.xy) + 0.5);
+    let eye = open_shutter(id.xy);
+    let ray = eye_ray(eye, vec2f(id.xy) + 0.5);
     let along = length(ray);
-    let direction = world_direction(camera, ray) / along;
-    let found = trace(camera.position, direction, is_wet(camera.position), 0.0, FAR);
+    let direction = world_direction(eye, ray) / along;
+    let found = trace(eye.position, direction, is_wet(eye.position), 0.0, FAR);
     depth[at] = select(FAR, found.t / along, found.kind == WATER);
     solid_depth[at] = select(FAR, found.t / along, found.kind == OPAQUE);
 #ifdef SPRAY

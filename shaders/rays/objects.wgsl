@@ -19,6 +19,9 @@
 @group(0) @binding(9) var<uniform> spray_params: SprayParams;
 #endif
 
+#ifdef SHUTTER
+@group(0) @binding(11) var<uniform> moments: array<Moment, 64>;
+#endif
 #ifdef SEA
 @group(0) @binding(14) var<uniform> sea: Sea;
 @group(0) @binding(15) var<storage, read> sea_values: array<vec4f>;
@@ -30,8 +33,9 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let pixel = vec2u(id.x, id.y + band.row) + camera.margin;
-    let direction = normalize(world_direction(camera, eye_ray(camera, vec2f(pixel) + 0.5)));
-    let found = trace(camera.position, direction, is_wet(camera.position), 0.0, FAR);
+    let eye = open_shutter(pixel);
+    let direction = normalize(world_direction(eye, eye_ray(eye, vec2f(pixel) + 0.5)));
+    let found = trace(eye.position, direction, is_wet(eye.position), 0.0, FAR);
     var object = found.material;
     if found.kind == WATER {
         object = 0u;

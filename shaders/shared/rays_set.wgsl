@@ -1,6 +1,7 @@
 // Rays against opaque geometry: triangles in a bounding volume hierarchy, and the ground. The
 // importing shader must bind `rays`, `set_nodes` and `set_triangles`.
 #import "shared/camera.wgsl"
+#import "shared/shutter.wgsl"
 #import "shared/ssfr_solid.wgsl"
 
 // Two boxes and their contents. Each axis has one word in steps of `rays.set_step` from
@@ -41,6 +42,39 @@ struct Found {
 fn met(kind: u32, t: f32, normal: vec3f, material: u32) -> Found {
     return Found(kind, t, t, t, normal, material, 0.0, NO_TRIANGLE);
 }
+
+// Triangle at the ray's instant.
+fn triangle_at(index: u32) -> Triangle {
+    var triangle = set_triangles[index];
+#ifdef SHUTTER
+    if rays.ways > 0u {
+        let way = set_triangles[index + rays.ways];
+        triangle.a += own_part * way.a;
+        triangle.b += own_part * way.b;
+        triangle.c += own_part * way.c;
+    }
+#endif
+    return triangle;
+}
+
+#ifdef SHUTTER
+// Where a point of a triangle at the ray's instant is at the sample's, for which `set_triangles`
+// has corners and texture mappings.
+fn at_sample(index: u32, p: vec3f) -> vec3f {
+    if index == NO_TRIANGLE || rays.ways == 0u {
+        return p;
+    }
+    let now = triangle_at(index);
+    let ab = now.b - now.a;
+    let ac = now.c - now.a;
+    let ap = p - now.a;
+    let n = cross(ab, ac);
+    let b = dot(cross(ap, ac), n) / dot(n, n);
+    let c = dot(cross(ab, ap), n) / dot(n, n);
+    let way = set_triangles[index + rays.ways];
+    return p - own_part * (way.a + b * (way.b - way.a) + c * (way.c - way.a));
+}
+#endif
 
 // Distance along a ray to a triangle; FAR where it misses (Möller and Trumbore 1997).
 fn triangle_distance(triangle: Triangle, origin: vec3f, direction: vec3f) -> f32 {
@@ -128,7 +162,7 @@ fn opaque_along(origin: vec3f, direction: vec3f, reach: f32) -> Found {
         let count = select(at >> LEAF_SHIFT, 0u, at == NO_CHILD);
         let first = at & ((1u << LEAF_SHIFT) - 1u);
         for (var k = first; k < first + count; k++) {
-            let t = triangle_distance(set_triangles[k], origin, direction);
+            let t = triangle_distance(triangle_at(k), origin, direction);
             if t < nearest {
                 nearest = t;
                 triangle = k;
@@ -137,7 +171,7 @@ fn opaque_along(origin: vec3f, direction: vec3f, reach: f32) -> Found {
         at = next_of(&waiting, &held, nearest);
     }
     if triangle != NO_TRIANGLE {
-        let one = set_triangles[triangle];
+        let one = triangle_at(triangle);
         found = met(OPAQUE, nearest, normalize(cross(one.b - one.a, one.c - one.a)), code_of(one));
         found.triangle = triangle;
     }

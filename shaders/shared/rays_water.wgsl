@@ -1,6 +1,7 @@
 // The water as a sparse level set (`LevelSet` of domain/level_set.rs), and intersection of rays
 // with its surface. The importing shader must bind `rays`, `level_table` and `level_values`.
 #import "shared/camera.wgsl"
+#import "shared/shutter.wgsl"
 #import "shared/box.wgsl"
 
 struct Rays {
@@ -20,8 +21,9 @@ struct Rays {
     walls: u32,
     // Width of the gap between water and opaque geometry that counts as water, metres.
     gap: f32,
+    // Entries of `set_triangles` between a triangle and the way of its corners; 0 where none moves.
+    ways: u32,
     pad0: u32,
-    pad1: u32,
     // Quantisation lattice of the hierarchy over opaque geometry: least corner and step, metres.
     set_low: vec3f,
     set_step: f32,
@@ -34,6 +36,21 @@ const FIRST: u32 = 2u;
 const EDGE: u32 = 8u;
 const NODES: u32 = 11u;
 const VALUES: u32 = 1331u;
+#ifdef SHUTTER
+// With an open shutter the table has the water's velocities behind its entries, a word a node
+// (`Drift` of domain/level_set/drift.rs), also for bricks without values into which the surface
+// moves. Flags of such bricks, in air and in water, and the rest of an entry.
+const HALO: u32 = 0x40000000u;
+const HALO_FULL: u32 = 0x80000000u;
+const NUMBER: u32 = 0x3fffffffu;
+// Nodes along a brick's edge, words of a brick, and voxels between two nodes.
+const DRIFT_NODES: u32 = 5u;
+const DRIFT_WORDS: u32 = 125u;
+const PITCH: f32 = 2.0;
+// Word of a component at rest, and steps to the largest velocity.
+const AT_REST: f32 = 512.0;
+const STEPS: f32 = 511.0;
+#endif
 // Number of steps after which a ray through the box counts as a miss.
 const MOST_STEPS: i32 = 8192;
 // Number of bisections of the step in which a ray meets the surface.
@@ -71,13 +88,67 @@ fn within(slot: u32, q: vec3f) -> f32 {
     return mix(along_y.x, along_y.y, part.z);
 }
 
+#ifdef SHUTTER
+fn drift_node(at: u32) -> vec3f {
+    let word = level_table[at];
+    return vec3f(vec3u(word, word >> 10u, word >> 20u) & vec3u(1023u));
+}
+
+// Voxels by which the water at a place has moved since the level set's instant: linear in each of
+// six tetrahedra of a cell, which takes half of the nodes of a trilinear one.
+fn drift(at: Place) -> vec3f {
+    let half = at.q / PITCH;
+    let low = clamp(floor(half), vec3f(0.0), vec3f(f32(DRIFT_NODES - 2u)));
+    let part = half - low;
+    let c = vec3u(low);
+    let y = DRIFT_NODES;
+    let z = DRIFT_NODES * DRIFT_NODES;
+    let bricks = rays.bricks.x * rays.bricks.y * rays.bricks.z;
+    let i = bricks + ((at.slot & NUMBER) - FIRST) * DRIFT_WORDS + c.x + y * c.y + z * c.z;
+    let most = max(part.x, max(part.y, part.z));
+    let least = min(part.x, min(part.y, part.z));
+    let middle = part.x + part.y + part.z - most - least;
+    // From the low corner along the axis of the greatest part, then along that of the next one.
+    let first = select(select(z, y, part.y == most), 1u, part.x == most);
+    let last = select(select(z, y, part.y == least), 1u, part.x == least);
+    let far = 1u + y + z;
+    let steps = (1.0 - most) * drift_node(i) + (most - middle) * drift_node(i + first)
+        + (middle - least) * drift_node(i + far - last) + least * drift_node(i + far);
+    return (steps - AT_REST) * (own_speed * own_since / (STEPS * rays.voxel));
+}
+
+// Level-set value in a brick with velocities, at the ray's instant: that where the water was, there
+// at the level set's. One look-up whatever brick that is in: software adapters run both branches.
+fn field_within(at: Place) -> f32 {
+    var q = at.q - drift(at);
+    var slot = at.slot;
+    if slot >= HALO || any(q < vec3f(-1.0)) || any(q > vec3f(f32(EDGE + 1u))) {
+        let there = place_at((vec3f(at.brick * EDGE) + q) * rays.voxel);
+        slot = there.slot;
+        q = there.q;
+    }
+    let has_values = slot >= FIRST && slot < HALO;
+    let value = within(select(FIRST, slot, has_values), q);
+    return select(select(-1.0, 1.0, slot == FULL || slot >= HALO_FULL), value, has_values);
+}
+#else
+
+fn field_within(at: Place) -> f32 {
+    return within(at.slot, at.q);
+}
+#endif
+
 // Level-set value, positive in water.
 fn field(p: vec3f) -> f32 {
     let at = place_at(p);
     if at.slot < FIRST {
         return select(-1.0, 1.0, at.slot == FULL);
     }
-    return within(at.slot, at.q);
+    return field_within(at);
+}
+
+fn field_beside(at: Place, step: vec3f) -> f32 {
+    return field_within(Place(at.brick, at.slot, at.q + step));
 }
 
 // Unit normal out of the water.
@@ -90,9 +161,9 @@ fn field_normal(p: vec3f, otherwise: vec3f) -> vec3f {
     let y = vec3f(0.0, 1.0, 0.0);
     let z = vec3f(0.0, 0.0, 1.0);
     let gradient = vec3f(
-        within(at.slot, at.q + x) - within(at.slot, at.q - x),
-        within(at.slot, at.q + y) - within(at.slot, at.q - y),
-        within(at.slot, at.q + z) - within(at.slot, at.q - z),
+        field_beside(at, x) - field_beside(at, -x),
+        field_beside(at, y) - field_beside(at, -y),
+        field_beside(at, z) - field_beside(at, -z),
     );
     let steep = length(gradient);
     if steep < 1e-6 {
@@ -137,7 +208,7 @@ fn crossing(origin: vec3f, direction: vec3f, from_t: f32, to_t: f32, inside: boo
             let out = (corner * edge - origin) * inverse;
             next = max(min(out.x, min(out.y, out.z)), t) + 0.01 * rays.voxel;
         } else {
-            wet = within(at.slot, at.q) > 0.0;
+            wet = field_within(at) > 0.0;
         }
         if wet != inside {
             return refine(origin, direction, last, t, inside);

@@ -2,6 +2,7 @@
 // rays. The importing shader must bind `sea` and `sea_values`.
 #import "shared/angle.wgsl"
 #import "shared/camera.wgsl"
+#import "shared/shutter.wgsl"
 #import "shared/box.wgsl"
 
 struct Sea {
@@ -80,9 +81,13 @@ fn edge_part(at: vec2f) -> f32 {
     return 1.0 - t * t * (3.0 - 2.0 * t);
 }
 
-// Phase of a wave component at x and z, in −π..π.
-fn line_angle(line: vec4f, at: vec2f) -> f32 {
-    return angle_of((dot(line.xy, at) + line.z) / 6.2831853);
+// Phase of a wave component at x and z, in −π..π, at the ray's instant.
+fn line_angle(i: u32, line: vec4f, at: vec2f) -> f32 {
+    var phase = line.z;
+#ifdef SHUTTER
+    phase -= sea_values[2u * i + 1u].x * own_delay;
+#endif
+    return angle_of((dot(line.xy, at) + phase) / 6.2831853);
 }
 
 // Height of the surface, without waves that a pixel of `footprint` metres cannot resolve.
@@ -96,7 +101,7 @@ fn sea_height(at: vec2f, footprint: f32) -> f32 {
             if fine > FINEST {
                 break;
             }
-            let angle = line_angle(line, at);
+            let angle = line_angle(i, line, at);
             waves += line.w * exp(-0.125 * fine * fine) * cos(angle);
         }
     }
@@ -139,7 +144,7 @@ fn sea_velocity(at: vec2f) -> vec3f {
     for (var i = 0u; i < sea.lines; i++) {
         let line = sea_values[2u * i];
         let speeds = sea_values[2u * i + 1u];
-        let angle = line_angle(line, at);
+        let angle = line_angle(i, line, at);
         let along = line.xy / length(line.xy) * (speeds.y * cos(angle));
         sum += vec3f(along.x, speeds.x * line.w * sin(angle), along.y);
     }

@@ -16,9 +16,13 @@ struct Path {
 }
 
 fn moved(particle: Particle, index: u32) -> vec3f {
-    let straight = particle.position + particle.velocity * camera.seconds;
+    return moved_by(particle, index, camera.seconds);
+}
+
+// The same at `t` seconds from the frame's instant.
+fn moved_by(particle: Particle, index: u32, t: f32) -> vec3f {
+    let straight = particle.position + particle.velocity * t;
 #ifdef PATHS
-    let t = camera.seconds;
     let path = paths[index];
     let square = select(path.after_square, path.before_square, t < 0.0);
     let cube = select(path.after_cube, path.before_cube, t < 0.0);

@@ -18,6 +18,15 @@ struct Surface {
     triangle: u32,
 }
 
+// Where the point is at the sample's instant, for which textures and wetness lie on solids.
+fn lies_at(at: Surface) -> vec3f {
+#ifdef SHUTTER
+    return at_sample(at.triangle, at.position);
+#else
+    return at.position;
+#endif
+}
+
 #ifdef WINDOWS
 // A box of width `duty` in each unit cell, filtered over `footprint` cells.
 fn window_edge(x: f32, duty: f32, footprint: f32) -> f32 {
@@ -94,13 +103,13 @@ fn radiance_under(at: Surface, view: vec3f, footprint: f32, depth: f32, sun: vec
         * value_noise(vec2f(q.x * 42.5 + q.z * 32.5, q.y * 57.5));
 #ifdef MATERIALS
     if paint_of(at.triangle) > 0u {
-        wall = painted(at.triangle, at.position, at.normal, view, footprint);
+        wall = painted(at.triangle, lies_at(at), at.normal, view, footprint);
         stain = 1.0;
     }
 #endif
     var colour = light * wall * stain;
 #ifdef WET
-    let wetness = wetness_at(at.triangle, at.position);
+    let wetness = wetness_at(at.triangle, lies_at(at));
     if wetness > 0.0 {
         let sky = sky_irradiance(at.normal) * open;
         let wet = wet_radiance(at.normal, view, wall * stain, sun * through, sky * through, open);

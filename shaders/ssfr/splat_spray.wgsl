@@ -6,6 +6,7 @@
 #import "shared/ssfr_page.wgsl"
 #import "shared/ssfr_moved.wgsl"
 #import "shared/ssfr_spray_add.wgsl"
+#import "shared/ssfr_streak.wgsl"
 
 @group(0) @binding(0) var<uniform> camera: Camera;
 @group(0) @binding(1) var<uniform> spray_params: SprayParams;
@@ -17,6 +18,9 @@
 @group(0) @binding(7) var<storage, read> aired: array<u32>;
 #ifdef PATHS
 @group(0) @binding(6) var<storage, read> paths: array<Path>;
+#endif
+#ifdef SHUTTER
+@group(0) @binding(21) var<uniform> moments: array<Moment, 64>;
 #endif
 
 // A particle stands for torn water: puffs of mist along a curved thread, and individually visible
@@ -179,13 +183,24 @@ fn main(
     }
     let air = near * air_of(particle);
     let company = company_of(particle);
+    var streak = vec3f(0.0);
+#ifdef SHUTTER
+    streak = streak_between(
+        moved_by(particle, index, moments[0].seconds),
+        moved_by(particle, index, moments[MOMENTS - 1u].seconds));
+#endif
     let thread_of = Thread(
         turned(id, 0u), turned(id, 2u), between(LENGTH, company), between(OFF, company));
     let mist = between(MIST, company);
     let of_puffs = air * mist / (PUFF * PUFF * PUFF * f32(PUFFS));
     for (var k = 0u; k < select(0u, PUFFS, mist > 0.0); k++) {
         let off = strung(thread_of, (f32(k) + 0.5) / f32(PUFFS), id, 7u * k + 5u);
-        add_puff(c + WIDE_PUFFS * camera.radius * off, of_puffs, thread.x, particle.velocity);
+        let puff = c + WIDE_PUFFS * camera.radius * off;
+        let beads = beads_along(streak, puff, max(PUFF * camera.radius * camera.focal / c.z, 2.0));
+        for (var bead = 0u; bead < beads; bead++) {
+            add_puff(puff + bead_off(streak, bead, beads), of_puffs / f32(beads), thread.x,
+                particle.velocity);
+        }
     }
     // Near the eye, more and smaller drops of the same opacity: as many more as their areas are
     // smaller.
@@ -205,6 +220,11 @@ fn main(
         let q = (f32(j) + 0.5) * part;
         let off = strung(thread_of, random(id, 7u * k + 4u), id, 7u * k + 5u);
         let own = camera.radius * (m + n * q * q) / finer;
-        add_drop(c + WIDE * camera.radius * off, own, of_drops, particle.velocity);
+        let drop = c + WIDE * camera.radius * off;
+        let beads = beads_along(streak, drop, 2.0);
+        for (var bead = 0u; bead < beads; bead++) {
+            add_drop(drop + bead_off(streak, bead, beads), own, of_drops / f32(beads),
+                particle.velocity);
+        }
     }
 }

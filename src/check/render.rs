@@ -57,23 +57,40 @@ impl Surfaces {
         let [mut drawn, mut exact] = [outline(), outline()];
         for ((z, n), seen) in z.iter().zip(n).zip(truth) {
             let z = f64::from(*z);
-            let before = seen.opaque * (1.0 - ROUNDING) - THINNEST * spacing;
-            let is_drawn = z < before && z < FAR;
-            let water = seen.water.filter(|(t, _)| *t < before);
+            let (water, is_drawn) = in_sight(z, seen, spacing);
             drawn.water.push(if is_drawn { z } else { f64::INFINITY });
             exact.water.push(water.map_or(f64::INFINITY, |(t, _)| t));
-            self.either += usize::from(is_drawn || water.is_some());
-            let (Some((t, normal)), true) = (water, is_drawn) else {
-                continue;
-            };
-            self.depths.push((z - t).abs() / spacing);
-            let cosine = DVec3::from(n.map(f64::from))
-                .normalize_or_zero()
-                .dot(normal);
-            self.angles
-                .push(cosine.clamp(-1.0, 1.0).acos().to_degrees());
+            self.take(water, is_drawn.then_some((z, *n)), spacing);
         }
         self.outlines.add(&drawn, &exact, eye.focal, spacing);
+    }
+
+    /// Adds some pixels of such a picture, without their outlines.
+    ///
+    /// # Panics
+    /// Panics if the picture lacks depth or normals.
+    pub fn add_some(&mut self, image: &Image, pixels: &[usize], truth: &[RayHit], spacing: f64) {
+        let z = image.aovs.z.as_ref().expect("a depth");
+        let n = image.aovs.n.as_ref().expect("normals");
+        for (&pixel, seen) in pixels.iter().zip(truth) {
+            let z = f64::from(z[pixel]);
+            let (water, is_drawn) = in_sight(z, seen, spacing);
+            self.take(water, is_drawn.then_some((z, n[pixel])), spacing);
+        }
+    }
+
+    /// Adds a pixel with the water that a ray in f64 meets and the one that is drawn.
+    fn take(&mut self, water: Option<(f64, DVec3)>, drawn: Option<(f64, [f32; 3])>, spacing: f64) {
+        self.either += usize::from(drawn.is_some() || water.is_some());
+        let (Some((t, normal)), Some((z, n))) = (water, drawn) else {
+            return;
+        };
+        self.depths.push((z - t).abs() / spacing);
+        let cosine = DVec3::from(n.map(f64::from))
+            .normalize_or_zero()
+            .dot(normal);
+        self.angles
+            .push(cosine.clamp(-1.0, 1.0).acos().to_degrees());
     }
 
     /// Returns whether no pixel has water in either.
@@ -92,6 +109,14 @@ impl Surfaces {
             waterline: self.outlines.waterline(),
         })
     }
+}
+
+/// The water of a ray in f64 that counts as visible, and whether that of a picture at depth `z`
+/// does.
+fn in_sight(z: f64, seen: &RayHit, spacing: f64) -> (Option<(f64, DVec3)>, bool) {
+    let before = seen.opaque * (1.0 - ROUNDING) - THINNEST * spacing;
+    let water = seen.water.filter(|(t, _)| *t < before);
+    (water, z < before && z < FAR)
 }
 
 /// Depths beyond this are those of the sky.

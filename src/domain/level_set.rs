@@ -6,6 +6,7 @@
 //! positive in water. Bricks away from the surface take one word. The result depends only on the
 //! frame: the order of summation does not change with the number of threads.
 
+pub mod drift;
 pub mod edges;
 pub mod eigen;
 pub mod foam;

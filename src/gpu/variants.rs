@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use super::{error::GpuError, shader};
 
 /// Combinations of conditions that a plan can set; every pass must compose under each.
-const VARIANTS: [&[&str]; 92] = [
+const VARIANTS: [&[&str]; 96] = [
     &[],
     &["SOLIDS"],
     &["BAND"],
@@ -143,6 +143,21 @@ const VARIANTS: [&[&str]; 92] = [
         "FORWARD",
         "CARRIED",
     ],
+    &["SHUTTER"],
+    &["SHUTTER", "PATHS", "FOAM"],
+    &["SHUTTER", "SEA", "SPRAY", "FORWARD", "CARRIED", "CAUSTICS"],
+    &[
+        "SHUTTER",
+        "INDEXED",
+        "WET",
+        "MATERIALS",
+        "SEA",
+        "PALETTE",
+        "VOLUME",
+        "FOAM_LAYER",
+        "LIGHTS",
+        "CAUSTICS",
+    ],
     &["VOLUME"],
     &["VOLUME", "LIGHTS", "HOLDOUT"],
     &["INDEXED", "MATERIALS", "SEA", "PALETTE", "VOLUME", "LIGHTS"],
@@ -211,12 +226,22 @@ fn is_of_bodies(pass: &str) -> bool {
     ["flip/couple_bodies", "flip/carry_bodies"].contains(&pass)
 }
 
+/// Whether a pass has a form for an open shutter: those of rays, and splats of what flies.
+fn has_shutter(pass: &str) -> bool {
+    let splats = ["ssfr/splat_spray", "ssfr/splat_whitewater"];
+    pass.starts_with("rays/") || splats.iter().any(|splat| pass.starts_with(splat))
+}
+
 /// `neighbor_list` holds lists, so build_neighbors has no variant without them; bodies are solids
 /// that move; and only ray tracing passes render a volume.
 fn is_meaningful(pass: &str, defines: &[&str]) -> bool {
     let has_lists = pass != "pbf/build_neighbors" || defines.contains(&"NEIGHBOR_LIST");
     let has_bodies = !is_of_bodies(pass) || defines.contains(&"BODIES");
-    has_lists && has_bodies && (pass.starts_with("rays/") || !defines.contains(&"VOLUME"))
+    let has_shutter = !defines.contains(&"SHUTTER") || has_shutter(pass);
+    has_lists
+        && has_bodies
+        && has_shutter
+        && (pass.starts_with("rays/") || !defines.contains(&"VOLUME"))
 }
 
 /// A pass under conditions that change its text.

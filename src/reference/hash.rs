@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 /// PCG hash (Jarzynski and Olano 2020).
-fn pcg(value: u32) -> u32 {
+pub(super) fn pcg(value: u32) -> u32 {
     let state = value.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
     let word = ((state >> ((state >> 28) + 4)) ^ state).wrapping_mul(277_803_737);
     (word >> 22) ^ word

@@ -5,6 +5,7 @@
 
 use glam::DVec3;
 
+use super::hash::pcg;
 use swell_domain::{
     bvh::Bvh,
     eye::Eye,
@@ -32,10 +33,29 @@ pub struct RayHit {
     pub water: Option<(f64, DVec3)>,
 }
 
+/// Returns which of 64 moments the ray through a pixel has; positions count from 0 after the
+/// picture's padding, and `seed` is that of the sample.
+pub fn moment(seed: u32, [x, y]: [u32; 2]) -> usize {
+    (pcg(x ^ pcg(y ^ pcg(seed))) >> 26) as usize
+}
+
 /// Casts a ray through each pixel, rows from the top. The water is that of `kernels` in a box whose
 /// floor is the ground, with particles of `spacing` metres; `solids` are opaque. Positions are
 /// relative to the box's minimum corner.
 pub fn cast(
+    eye: &Eye,
+    kernels: &Kernels,
+    (size, spacing): (DVec3, f64),
+    solids: &TriangleMesh,
+) -> Vec<RayHit> {
+    let [width, height] = eye.size.map(|n| n as usize);
+    let pixels: Vec<usize> = (0..width * height).collect();
+    cast_through(&pixels, eye, kernels, (size, spacing), solids)
+}
+
+/// Like [`cast`], through some pixels.
+pub fn cast_through(
+    pixels: &[usize],
     eye: &Eye,
     kernels: &Kernels,
     (size, spacing): (DVec3, f64),
@@ -47,8 +67,7 @@ pub fn cast(
         field: kernels.field(),
         coarse: &coarse,
     };
-    let [width, height] = eye.size.map(|n| n as usize);
-    parallel::map(0..width * height, |pixel| {
+    parallel::map_slice(pixels, |&pixel| {
         let ray = eye.ray(pixel);
         let ground = match ray.y < 0.0 && eye.position.y > 0.0 {
             true => -eye.position.y / ray.y,

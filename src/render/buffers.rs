@@ -1,14 +1,16 @@
 //! GPU buffers of the renderer.
 
 use super::uniform::{
-    Band, Block, Camera, Carried, Caustics, Cloud, Fill, Flow, FlowLevel, Material, Narrow, Page,
-    Particle, Path, Rays, Sea, SetNode, Shading, Shape, SprayParams, Thickness, Tile, Triangle,
-    Whitewater, WhitewaterParams,
+    Band, Block, Camera, Carried, Caustics, Cloud, Fill, Flow, FlowLevel, Material, Moment, Narrow,
+    Page, Particle, Path, Rays, Sea, SetNode, Shading, Shape, SprayParams, Thickness, Tile,
+    Triangle, Whitewater, WhitewaterParams,
 };
 use swell_gpu::buffer::{Buf, Windows, Workgroups};
 
 /// Camera of the current sample.
 pub(super) const CAMERA: Buf<Camera> = Buf::uniform("camera");
+/// Moments of the current sample's rays, where the shutter is open and rays are cast.
+pub(super) const MOMENTS: Buf<Moment> = Buf::uniform("moments");
 /// Camera of the next frame, for motion vectors.
 pub(super) const NEXT_CAMERA: Buf<Camera> = Buf::uniform("next_camera");
 /// Lights, water and scene settings of shading.
@@ -93,7 +95,7 @@ pub(super) const LIGHT_SUMS: Buf<u32> = Buf::new("light_sums");
 
 /// Box, bricks and scene tree of ray casting.
 pub(super) const RAYS: Buf<Rays> = Buf::uniform("rays");
-/// Table of the level set's bricks.
+/// Table of the level set's bricks; with an open shutter followed by the water's velocities.
 pub(super) const LEVEL_TABLE: Buf<u32> = Buf::new("level_table");
 /// Values of the level set, brick by brick.
 pub(super) const LEVEL_VALUES: Buf<f32> = Buf::new("level_values");

@@ -31,6 +31,8 @@ const THROWN: f64 = 1.63;
 /// Depth behind the water's surface at which a ray still meets what floats on it, particle
 /// spacings: the width over which the grid smears it.
 pub(super) const SKIN: f64 = 1.0;
+/// Largest number of positions on a drop's path within a sample.
+const MOST_BEADS: usize = 16;
 
 /// Drops of the particles that the look whitens, with their paths; without `paths` they move in
 /// straight lines. `radius` is that of a splat, metres.
@@ -89,22 +91,38 @@ pub(super) fn white_of(
         .collect()
 }
 
-/// Builds the grid at an instant and returns its uniform and its words, followed by those of the
-/// foam on the water, which is of that instant.
+/// Drops at instants with the same share of the light: each once for each voxel on its path
+/// between the first and the last, with as much of its cross-section.
+fn streaks(drops: &[(Drop, Path)], instants: &[f32], voxel: f64) -> Vec<Drop> {
+    let (Some(&first), Some(&last)) = (instants.first(), instants.last()) else {
+        return Vec::new();
+    };
+    let of = |(drop, path): &(Drop, Path)| {
+        let way = path.displacement(last) - path.displacement(first);
+        let beads = ((way.length() / voxel).ceil() as usize).clamp(1, MOST_BEADS);
+        let (drop, path) = (*drop, *path);
+        (0..beads).map(move |bead| {
+            let instant = instants[(2 * bead + 1) * instants.len() / (2 * beads)];
+            Drop {
+                place: drop.place + path.displacement(instant),
+                area: drop.area / beads as f64,
+                ..drop
+            }
+        })
+    };
+    drops.iter().flat_map(of).collect()
+}
+
+/// Builds the mean grid of instants and returns its uniform and its words, followed by those of the
+/// foam on the water, which is of their mean.
 pub(super) fn grid(
     drops: &[(Drop, Path)],
-    seconds: f32,
+    instants: &[f32],
     foam: &FoamColumns,
     scene: &RenderScene,
     (voxel, sun): (f64, DVec3),
 ) -> (uniform::Cloud, Vec<u32>) {
-    let moved: Vec<Drop> = drops
-        .iter()
-        .map(|(drop, path)| Drop {
-            place: drop.place + path.displacement(seconds),
-            ..*drop
-        })
-        .collect();
+    let moved = streaks(drops, instants, voxel);
     let cloud = Cloud::new(&moved, scene.domain.size(), voxel);
     let shade = Shade::new(&cloud, sun);
     let before = cloud.table.len() + shade.depths.len() + cloud.values.len();

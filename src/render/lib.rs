@@ -5,8 +5,9 @@
 //! depth and thickness, and blocks add the thickness of the water behind them; curvature flow or
 //! the narrow-range filter smooths the depth; normals are differences of the depth; and each pixel
 //! is shaded from the light that the water reflects and transmits. Samples differ in their position
-//! within the pixel and in their instant within the shutter. Their linear radiance is averaged;
-//! depths never are.
+//! within the pixel and in their instant within the shutter; where rays are cast, a sample is a
+//! part of the shutter's time, in which each pixel's ray has an instant of its own. Their linear
+//! radiance is averaged; depths never are.
 
 mod aeration;
 mod buffers;
@@ -27,6 +28,7 @@ mod materials;
 mod moving;
 mod neighbors;
 mod opaque;
+mod open;
 mod paths;
 mod plan;
 mod rays;
@@ -59,6 +61,7 @@ pub use image::{Attributes, Image};
 pub use inputs::{FrameInputs, REACH, WaterParticles, frames_around};
 pub use moving::{Mover, PosePath, SetMotion};
 pub use opaque::opaque;
+pub use open::RayTimes;
 pub use plan::{Limits, Plan, Runs};
 pub use renderer::{Part, Renderer};
 pub use uniform::mirrors;

@@ -12,13 +12,13 @@ use super::{
     RenderScene,
     buffers::{RAYS, SET_NODES, SET_TRIANGLES, TRIANGLES},
     closed::Closed,
-    samples::samples_of,
+    samples::{Moments, Sample, samples_of},
     tree::Hierarchy,
     uniform::{Carried, Rays, Triangle},
 };
 use swell_domain::pose::Pose;
 use swell_gpu::program::Program;
-use swell_scene::look::{AovSpec, Look};
+use swell_scene::look::{AovSpec, Look, MethodSpec};
 
 /// Material codes of a pixel.
 const CODES: usize = 256;
@@ -54,7 +54,7 @@ impl PosePath {
 
     /// Returns the map from positions at the frame's instant to those `seconds` later, metres;
     /// `None` where both poses are equal.
-    fn way(&self, seconds: f64) -> Option<DAffine3> {
+    pub(super) fn way(&self, seconds: f64) -> Option<DAffine3> {
         let [from, to] = [0.0, seconds].map(&*self.0);
         (from != to).then(|| {
             let turn = match from.turn == to.turn {
@@ -74,12 +74,20 @@ impl fmt::Debug for PosePath {
     }
 }
 
-/// Instants of the look's samples, seconds from the frame's, as the device gets them.
+/// Instants of the look's samples, seconds from the frame's, as the device gets them; where rays
+/// are cast also the first and the last of the times of each sample's rays.
 fn instants(look: &Look, scene: &RenderScene) -> Vec<f32> {
     let seconds = |instant: f64| (instant / scene.frames_per_second) as f32;
-    (samples_of(look).iter())
-        .map(|sample| seconds(sample.instant))
-        .collect()
+    let is_ray = look.spec().renderer.method == MethodSpec::Ray;
+    let samples = samples_of(look);
+    let of = |sample: &Sample| {
+        let span = is_ray.then(|| Moments::of(look, sample).span);
+        let instants = [sample.instant]
+            .into_iter()
+            .chain(span.into_iter().flatten());
+        instants.map(seconds)
+    };
+    samples.iter().flat_map(of).collect()
 }
 
 /// Whether anything moves within the look's shutter.
@@ -149,8 +157,8 @@ pub(super) struct MovingSet {
     count: usize,
     /// For each entry of `set`, 0 or the number of its motion, from 1.
     movers: Vec<u32>,
-    /// Instant on the device, seconds from the frame's.
-    stands: f32,
+    /// Instant on the device, and the first and last time of its rays, seconds from the frame's.
+    stands: [f32; 3],
     /// `None` where the look casts no rays.
     rays: Option<(Rays, Hierarchy)>,
 }
@@ -169,7 +177,7 @@ impl MovingSet {
             set: [triangles.0, places.0].concat(),
             count: triangles.0.len(),
             movers: [triangles.1, places.1].concat(),
-            stands: 0.0,
+            stands: [0.0; 3],
             rays: None,
         }
     }
@@ -229,26 +237,76 @@ impl MovingSet {
         })
     }
 
-    /// Uploads the geometry for an instant, in seconds from the frame, and fits the boxes of closed
-    /// bodies to it.
-    pub(super) fn stand_at(&mut self, seconds: f32, program: &Program, closed: &mut Closed) {
-        if self.stands == seconds {
+    /// Ways of the corners over the times of a sample's rays: those of a straight and even motion.
+    fn ways_over(&self, [start, end]: [f32; 2]) -> Vec<Triangle> {
+        let mut ways = self.at(end);
+        ways.truncate(self.count);
+        for (way, from) in ways.iter_mut().zip(self.at(start)) {
+            let corners = [&mut way.a, &mut way.b, &mut way.c];
+            for (to, from) in corners.into_iter().zip([from.a, from.b, from.c]) {
+                *to = (Vec3::from(*to) - Vec3::from(from)).to_array();
+            }
+        }
+        ways
+    }
+
+    /// Uploads the geometry for an instant, and for rays with times from `span`, in seconds from
+    /// the frame, and fits the boxes of closed bodies to it.
+    pub(super) fn stand_at(
+        &mut self,
+        (seconds, span): (f32, [f32; 2]),
+        program: &Program,
+        closed: &mut Closed,
+    ) {
+        let stands = [seconds, span[0], span[1]];
+        if self.stands == stands {
             return;
         }
-        self.stands = seconds;
+        self.stands = stands;
         let set = self.at(seconds);
+        let ways = match self.rays {
+            Some(_) => self.ways_over(span),
+            None => Vec::new(),
+        };
         let (triangles, places) = set.split_at(self.count);
         closed.fit(triangles);
         program.upload(TRIANGLES, 0, &set);
         if let Some((rays, hierarchy)) = &mut self.rays {
-            hierarchy.fit(triangles);
+            let swept = ends(seconds, span).map(|part| along(triangles, &ways, part));
+            hierarchy.fit(&[&swept[0], &swept[1]]);
             let tree = hierarchy.packed(triangles);
             (rays.set_low, rays.set_step) = (tree.low, tree.step);
             program.upload(RAYS, 0, &[*rays]);
             program.upload(SET_NODES, 0, &tree.nodes);
-            program.upload(SET_TRIANGLES, 0, &[&tree.sorted, places].concat());
+            program.upload(
+                SET_TRIANGLES,
+                0,
+                &[&tree.sorted, places, &hierarchy.sorted(&ways)].concat(),
+            );
         }
     }
+}
+
+/// First and last time of a sample's rays since its instant, over the time between them.
+fn ends(seconds: f32, [start, end]: [f32; 2]) -> [f32; 2] {
+    match end > start {
+        true => [start, end].map(|time| (time - seconds) / (end - start)),
+        false => [0.0; 2],
+    }
+}
+
+/// Triangles moved by a part of their ways.
+fn along(triangles: &[Triangle], ways: &[Triangle], part: f32) -> Vec<Triangle> {
+    let shift = |p: [f32; 3], way: [f32; 3]| (Vec3::from(p) + part * Vec3::from(way)).to_array();
+    let pairs = triangles.iter().zip(ways);
+    pairs
+        .map(|(it, way)| Triangle {
+            a: shift(it.a, way.a),
+            b: shift(it.b, way.b),
+            c: shift(it.c, way.c),
+            ..*it
+        })
+        .collect()
 }
 
 #[cfg(test)]
@@ -286,7 +344,7 @@ mod tests {
             set: vec![triangle, triangle, place, place],
             count: 2,
             movers: vec![1, 0, 1, 0],
-            stands: 0.0,
+            stands: [0.0; 3],
             rays: None,
         }
     }

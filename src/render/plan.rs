@@ -456,11 +456,14 @@ mod tests {
                 let rests = of(slides(0.0), image, FORWARD);
                 assert!(rests.moving.is_none() && !rests.has("carried"));
                 assert_eq!(shadows(&rests), [1, 0]);
-                // A shutter without a second instant is as good as closed.
+                // With splats a shutter without a second instant is as good as closed.
+                let is_open = image == OPEN || (image == ONCE && !method.is_empty());
                 let moves = of(slides(1.0), image, "");
-                assert_eq!(moves.moving.is_some(), image == OPEN, "{image}");
+                assert_eq!(moves.moving.is_some(), is_open, "{image}");
                 let same = taken(&moves) == taken(&of(slides(0.0), image, ""));
-                assert_eq!(same, image != OPEN, "{image}");
+                assert_eq!(same, !is_open, "{image}");
+                let has_moments = !image.is_empty() && !method.is_empty();
+                assert_eq!(moves.has("moments"), has_moments, "{image}");
             }
             assert_eq!(shadows(&of(slides(1.0), OPEN, "")), [0, 1]);
             let vectors = of(slides(1.0), "", FORWARD);

@@ -10,7 +10,7 @@ use super::{
     plan::Plan,
     set::Set,
     tree::{Hierarchy, Tree},
-    uniform::Rays,
+    uniform::{Rays, Triangle},
 };
 use swell_domain::level_set::{
     LevelSet, VALUES, bricks_over, kernels::Kernels, sunlight::nodes_over,
@@ -40,6 +40,7 @@ pub(super) fn plan_rays(
     let bricks = bricks_over(size, voxel);
     let (nodes, pitch) = nodes_over(size, voxel);
     let hierarchy = Hierarchy::over(set.triangles);
+    let is_moving = plan.moving.is_some();
     let Tree {
         low,
         step,
@@ -56,6 +57,10 @@ pub(super) fn plan_rays(
         nodes,
         pitch: pitch as f32,
         gap: (GAP * scene.particle_spacing) as f32,
+        ways: match is_moving {
+            true => (set.triangles.len() + set.places.len()) as u32,
+            false => 0,
+        },
         walls: look.spec().basin.as_ref().map_or(0, |_| QUAYS),
         ..Rays::default()
     };
@@ -65,6 +70,9 @@ pub(super) fn plan_rays(
     plan.buffer(&LEVEL_VALUES, VALUES);
     plan.buffer(&SUN_PATHS, count(nodes) + behind);
     sorted.extend(set.places);
+    if is_moving {
+        sorted.resize(sorted.len() + set.triangles.len(), Triangle::default());
+    }
     plan.values(&SET_NODES, &boxes);
     plan.values(&SET_TRIANGLES, &sorted);
     (rays, hierarchy)
@@ -86,20 +94,19 @@ pub(super) fn voxel(look: &Look, scene: &RenderScene) -> f64 {
     scene.particle_spacing / look.spec().surface.voxels_per_spacing
 }
 
-/// Builds the level set of particles moved along their paths by `seconds`, with positions relative
-/// to the box's least corner and voxels of `voxel` metres.
-pub(super) fn level_set(
-    scene: &RenderScene,
-    voxel: f64,
-    places: &[(Vec3, Path)],
-    seconds: f32,
-) -> LevelSet {
-    let moved: Vec<DVec3> = places
-        .iter()
+/// Returns positions moved along their paths by `seconds`.
+pub(super) fn moved(places: &[(Vec3, Path)], seconds: f32) -> Vec<DVec3> {
+    let moved = places.iter();
+    moved
         .map(|(position, path)| position.as_dvec3() + path.displacement(seconds))
-        .collect();
+        .collect()
+}
+
+/// Builds the level set of particles at positions relative to the box's least corner, with voxels
+/// of `voxel` metres.
+pub(super) fn level_set(scene: &RenderScene, voxel: f64, places: &[DVec3]) -> LevelSet {
     let size = scene.domain.size();
-    let kernels = Kernels::fit(&moved, size, scene.particle_spacing);
+    let kernels = Kernels::fit(places, size, scene.particle_spacing);
     LevelSet::of_kernels(&kernels, size, voxel)
 }
 

@@ -15,6 +15,9 @@ pub(super) struct Sample {
     pub(super) aperture: [f64; 2],
     /// Weight in the pixel's mean.
     pub(super) weight: f64,
+    /// Part of the shutter's light that the sample's rays see, as the fractions of it that have
+    /// arrived before and after; both are equal where all rays see the sample's instant.
+    pub(super) light: [f64; 2],
 }
 
 impl Sample {
@@ -24,6 +27,7 @@ impl Sample {
         instant: 0.0,
         aperture: [0.0; 2],
         weight: 1.0,
+        light: [0.5; 2],
     };
 }
 
@@ -64,6 +68,53 @@ impl Curve {
     }
 }
 
+/// Number of moments among which the rays of a sample are divided.
+pub(super) const MOMENTS: usize = 64;
+
+/// Instants of the rays of a sample: of each moment, and of the beginning and the end of all of
+/// them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Moments {
+    /// Offsets from the frame's instant, frames; each has the same share of the sample's light.
+    pub(super) instants: [f64; MOMENTS],
+    /// The same of the beginning and the end.
+    pub(super) span: [f64; 2],
+    /// The same of the sample.
+    instant: f64,
+}
+
+impl Moments {
+    /// Moments of a sample under a look's shutter.
+    pub(super) fn of(look: &Look, sample: &Sample) -> Self {
+        let image = &look.spec().image;
+        Self::under(Curve::of(image), image.shutter, sample)
+    }
+
+    fn under(curve: Curve, shutter: f64, sample: &Sample) -> Self {
+        let [first, last] = sample.light;
+        let at = |part: f64| match first < last {
+            true => curve.instant(first + (last - first) * part) * shutter,
+            false => sample.instant,
+        };
+        let middle = |k: usize| (k as f64 + 0.5) / MOMENTS as f64;
+        Self {
+            instants: std::array::from_fn(|k| at(middle(k))),
+            span: [at(0.0), at(1.0)],
+            instant: sample.instant,
+        }
+    }
+
+    /// Time from the sample's instant to a moment, over that of the whole span; 0 where the span is
+    /// empty.
+    pub(super) fn part(&self, moment: usize) -> f64 {
+        let [start, end] = self.span;
+        match end > start {
+            true => (self.instants[moment] - self.instant) / (end - start),
+            false => 0.0,
+        }
+    }
+}
+
 /// Samples of a frame of a look.
 pub(super) fn samples_of(look: &Look) -> Vec<Sample> {
     let image = &look.spec().image;
@@ -88,6 +139,7 @@ fn samples(count: u32, shutter: f64, curve: Curve, has_lens: bool) -> Vec<Sample
                 instant: curve.instant(share) * shutter,
                 aperture,
                 weight: 1.0 / f64::from(count),
+                light: [i, i + 1].map(|k| f64::from(k) / f64::from(count)),
             }
         })
         .collect()
@@ -261,6 +313,43 @@ mod tests {
         let boxed = samples(COUNT, 0.5, Curve::Box, false);
         let square: f64 = boxed.iter().map(|s| 4.0 * s.instant * s.instant).sum();
         assert!((square / f64::from(COUNT) - 1.0 / 12.0).abs() < bound);
+    }
+
+    /// The moments of all samples together are those of as many samples with one instant each, and
+    /// follow each other without gaps.
+    #[test]
+    fn moments_divide_the_light_of_the_shutter() {
+        const COUNT: u32 = 5;
+        let all = COUNT * MOMENTS as u32;
+        for curve in [Curve::Box, Curve::Ramps([0.5; 2]), Curve::Ramps([0.1, 0.6])] {
+            let fine = samples(all, 0.5, curve, false);
+            let coarse = samples(COUNT, 0.5, curve, false);
+            let moments: Vec<Moments> = (coarse.iter())
+                .map(|sample| Moments::under(curve, 0.5, sample))
+                .collect();
+            let instants = moments.iter().flat_map(|it| it.instants);
+            let off = |shift: f64| {
+                let pairs = instants.clone().zip(&fine);
+                let off = pairs.map(|(found, fine)| (found + shift - fine.instant).abs());
+                off.fold(0.0, f64::max)
+            };
+            assert!(off(0.0) < 1e-12, "{curve:?}: {}", off(0.0));
+            // Control: a shift by one of the instants.
+            assert!(off(0.5 / f64::from(all)) > 1e-4);
+            for (before, after) in moments.iter().zip(&moments[1..]) {
+                assert_eq!(before.span[1], after.span[0]);
+            }
+            let parts = |it: &Moments| [0, MOMENTS - 1].map(|k| it.part(k));
+            assert!(
+                moments
+                    .iter()
+                    .map(parts)
+                    .all(|[a, b]| a < -0.1 && 0.1 < b && b - a < 1.0)
+            );
+        }
+        let still = Moments::under(Curve::Ramps([0.1, 0.6]), 0.5, &Sample::STILL);
+        assert_eq!((still.instants, still.span), ([0.0; MOMENTS], [0.0; 2]));
+        assert_eq!(still.part(7), 0.0);
     }
 
     #[test]

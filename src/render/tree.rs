@@ -52,27 +52,27 @@ impl Hierarchy {
         }
     }
 
-    /// Fits the boxes to the triangles' present corners. The nodes keep what they contain, so
-    /// triangles that have moved far make large boxes.
-    pub(super) fn fit(&mut self, triangles: &[Triangle]) {
+    /// Fits the boxes to the corners that the triangles have in all of `poses`. The nodes keep what
+    /// they contain, so triangles that have moved far make large boxes.
+    pub(super) fn fit(&mut self, poses: &[&[Triangle]]) {
         for at in (0..self.boxes.len()).rev() {
             let (_, next, count) = self.boxes[at];
             self.boxes[at].0 = match count {
                 0 => join(self.boxes[at + 1].0, self.boxes[next as usize].0),
                 _ => {
                     let entries = &self.entries[next as usize..(next + count) as usize];
-                    let corners = entries.iter().flat_map(|&k| {
-                        let it = &triangles[k as usize];
-                        [it.a, it.b, it.c].map(|p| Vec3::from(p).as_dvec3())
-                    });
+                    let of = |k: u32| poses.iter().map(move |triangles| &triangles[k as usize]);
+                    let corners = entries
+                        .iter()
+                        .flat_map(|&k| of(k))
+                        .flat_map(|it| [it.a, it.b, it.c].map(|p| Vec3::from(p).as_dvec3()));
                     corners.map(|p| [p; 2]).fold(NOTHING, join)
                 }
             };
         }
     }
 
-    /// Packs the hierarchy for the device; `triangles` are those that it was built over or last
-    /// fitted to.
+    /// Packs the hierarchy for the device, with `triangles` in the order of its leaves.
     pub(super) fn packed(&self, triangles: &[Triangle]) -> Tree {
         let Some((whole, ..)) = self.boxes.first() else {
             return Tree {
@@ -87,10 +87,15 @@ impl Hierarchy {
             low: lattice.low.to_array(),
             step: lattice.step,
             nodes: pairs(&self.boxes, &lattice),
-            sorted: (self.entries.iter())
-                .map(|&k| triangles[k as usize])
-                .collect(),
+            sorted: self.sorted(triangles),
         }
+    }
+
+    /// Returns the triangles in the order of the leaves.
+    pub(super) fn sorted(&self, triangles: &[Triangle]) -> Vec<Triangle> {
+        (self.entries.iter())
+            .map(|&k| triangles[k as usize])
+            .collect()
     }
 }
 
@@ -262,7 +267,7 @@ mod tests {
     fn every_triangle_is_in_the_boxes_on_the_way_to_it() {
         let fitted = |count| {
             let mut hierarchy = Hierarchy::over(&row(count));
-            hierarchy.fit(&moved(count));
+            hierarchy.fit(&[&moved(count)]);
             hierarchy.packed(&moved(count))
         };
         let counts = [1, 2, 4, 5, 9, 100].into_iter();

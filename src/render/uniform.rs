@@ -31,6 +31,23 @@ mirror!(
 );
 
 mirror!(
+    /// `Moment` of shared/shutter.wgsl.
+    Moment {
+        position: [f32; 3],
+        seconds: f32,
+        right: [f32; 3],
+        focal: f32,
+        up: [f32; 3],
+        part: f32,
+        forward: [f32; 3],
+        since: f32,
+        centre: [f32; 2],
+        speed: f32,
+        seed: u32,
+    }
+);
+
+mirror!(
     /// `Particle` of shared/ssfr_splat.wgsl.
     Particle {
         position: [f32; 3],
@@ -261,8 +278,8 @@ mirror!(
         pitch: f32,
         walls: u32,
         gap: f32,
+        ways: u32,
         pad0: u32,
-        pad1: u32,
         set_low: [f32; 3],
         set_step: f32,
     }
@@ -356,6 +373,7 @@ impl Triangle {
 pub fn mirrors() -> Vec<Layout> {
     vec![
         Camera::layout(),
+        Moment::layout(),
         Particle::layout(),
         Path::layout(),
         Page::layout(),

@@ -215,6 +215,16 @@ impl Look {
         })
     }
 
+    /// Returns [`Self::of_surface`] by rays that each have a time of their own while the shutter is
+    /// open, `shutter` of a frame.
+    #[must_use]
+    pub fn of_open_surface(&self, shutter: f64) -> Self {
+        self.of_surface(MethodSpec::Ray).changed(|spec| {
+            spec.image.shutter = shutter;
+            spec.output.aov_filter = AovFilterSpec::Beauty;
+        })
+    }
+
     /// Returns a look that renders only the water by `method`: spray is kept, whitewater and
     /// additional outputs are dropped, and caustics are kept only with ray casting.
     #[must_use]

@@ -91,6 +91,7 @@ mod render {
     mod planned;
     mod scaled;
     mod scenes;
+    mod timed;
 }
 mod scene {
     mod edits;

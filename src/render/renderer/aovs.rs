@@ -1,6 +1,6 @@
 //! Renders additional channels and reads them back from the device.
 
-use super::{Renderer, parts::PartProgress};
+use super::{Renderer, Shot, parts::PartProgress};
 use crate::{
     RenderError,
     buffers::{NEXT_CAMERA, PARTICLES, aovs},
@@ -86,11 +86,17 @@ impl Renderer {
         let filter = self.look.spec().output.aov_filter;
         let mut means = Means::new(self.plan.extent.shaded());
         let mut last = Vec::new();
-        for sample in self.aov_samples() {
+        for (order, sample) in (0u32..).zip(self.aov_samples()) {
             let next = camera(&self.look, setting, f64::from(frame) + 1.0, sample, 0);
             self.program.upload(NEXT_CAMERA, 0, &[next]);
-            let camera = camera(&self.look, setting, frame.into(), sample, 0);
-            self.sample(&camera, true, parts)?;
+            let shot = Shot {
+                frame,
+                order,
+                index: 0,
+                sample,
+                setting,
+            };
+            self.sample(&shot, true, parts)?;
             last = self.read_bands(aovs, 1)?;
             if filter == AovFilterSpec::Beauty {
                 means.add(&last, sample.weight);

@@ -9,7 +9,9 @@ use super::{
 };
 use crate::{
     RenderError, RenderScene,
-    buffers::{CAMERA, CLOUD, CLOUD_WORDS, DEPTHS, FIRST_DEPTH, NEXT_CAMERA, SHADING, SOLID_DEPTH},
+    buffers::{
+        CAMERA, CLOUD, CLOUD_WORDS, DEPTHS, FIRST_DEPTH, MOMENTS, NEXT_CAMERA, SHADING, SOLID_DEPTH,
+    },
     camera::longest_focal_px,
     caustics::{map_values, plan_caustics},
     closed::Closed,
@@ -20,6 +22,7 @@ use crate::{
     opaque::Opaque,
     plan::{Limits, Plan},
     rays::{first, plan_rays},
+    samples,
     sea::plan_sea,
     set::{Set, plan_palette, plan_shadow, plan_solids, shadow_from_world},
     shapes::RADIUS,
@@ -226,7 +229,30 @@ fn plan_ray(plan: &mut Plan, look: &Look, scene: &RenderScene, set: &Set<'_>) {
     if !shade.aovs.is_empty() {
         plan.aovs = [before, shade.aovs].concat();
     }
+    if look.spec().image.shutter > 0.0 {
+        plan_shutter(plan);
+    }
     plan.sample = [sample, shade.picture].concat();
+}
+
+/// Passes that draw samples of moving water, and those whose rays have an instant each.
+const OPEN: [&str; 8] = [
+    "rays/cast",
+    "rays/aovs",
+    "rays/first",
+    "rays/objects",
+    "rays/caustics_enter",
+    "rays/caustics_follow",
+    "ssfr/splat_spray",
+    "ssfr/splat_whitewater",
+];
+
+/// Plans the moments of the rays of a sample.
+fn plan_shutter(plan: &mut Plan) {
+    plan.buffer(&MOMENTS, samples::MOMENTS);
+    for pass in OPEN {
+        plan.define(pass, "SHUTTER");
+    }
 }
 
 /// Capacity for a number of particles, rounded up to a power of two, so that few frames cause a

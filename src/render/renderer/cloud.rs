@@ -27,9 +27,9 @@ pub(super) struct RayCloud {
     /// Foam at the frame's instant.
     foam: Particles,
     look: Option<WhitewaterLook>,
-    /// Seconds from the frame for which the device holds the grid; `None` before the first grid of
-    /// this frame.
-    seconds: Option<f32>,
+    /// Instants, in seconds from the frame, for which the device holds the grid; none before the
+    /// first grid of this frame.
+    stands: Vec<f32>,
     /// Allocated words.
     capacity: usize,
     /// Edge length of a voxel, metres.
@@ -46,7 +46,7 @@ impl RayCloud {
             drops: Vec::new(),
             foam: Particles::default(),
             look: look.spec().whitewater.clone(),
-            seconds: None,
+            stands: Vec::new(),
             capacity: 1,
             voxel: voxel(look, scene),
             sun: look.sun_direction(),
@@ -67,21 +67,21 @@ impl RayCloud {
         let of_white = white_of(look, scene, white, |index| kind(white, index));
         self.drops.extend(of_white);
         self.foam = of_kinds(white.clone(), &[WhitewaterKind::Foam]);
-        self.seconds = None;
+        self.stands.clear();
     }
 
-    /// Uploads the grid for an instant, in seconds from the frame. Returns whether a buffer was
-    /// reallocated.
+    /// Uploads the mean grid of instants with the same share of the light, in seconds from the
+    /// frame. Returns whether a buffer was reallocated.
     pub(super) fn stand_at(
         &mut self,
-        seconds: f32,
+        instants: Vec<f32>,
         program: &mut Program,
         scene: &RenderScene,
     ) -> Result<bool, RenderError> {
-        if self.seconds == Some(seconds) {
+        if self.stands == instants {
             return Ok(false);
         }
-        let (about, words) = self.grid(seconds, scene);
+        let (about, words) = self.grid(&instants, scene);
         let grew = words.len() > self.capacity;
         if grew {
             self.capacity = room_of(words.len(), Limits::of(&program.context).storage);
@@ -89,12 +89,13 @@ impl RayCloud {
         }
         program.upload(CLOUD, 0, &[about]);
         program.upload(CLOUD_WORDS, 0, &words);
-        self.seconds = Some(seconds);
+        self.stands = instants;
         Ok(grew)
     }
 
-    /// Builds the uniform and the words of the grid for an instant, in seconds from the frame.
-    pub(super) fn grid(&self, seconds: f32, scene: &RenderScene) -> (uniform::Cloud, Vec<u32>) {
+    /// Builds the uniform and the words of the mean grid of instants, in seconds from the frame.
+    pub(super) fn grid(&self, instants: &[f32], scene: &RenderScene) -> (uniform::Cloud, Vec<u32>) {
+        let seconds = instants.iter().sum::<f32>() / instants.len().max(1) as f32;
         let foam = (self.look.as_ref()).map_or_else(FoamColumns::none, |look| {
             let mut foam = self.foam.clone();
             for (place, velocity) in foam.position.iter_mut().zip(&self.foam.velocity) {
@@ -104,7 +105,7 @@ impl RayCloud {
             }
             FoamColumns::new(&foam, scene, look)
         });
-        grid(&self.drops, seconds, &foam, scene, (self.voxel, self.sun))
+        grid(&self.drops, instants, &foam, scene, (self.voxel, self.sun))
     }
 }
 

@@ -10,7 +10,7 @@ use crate::{
     hidden::Hidden,
     in_frame::{blocks_in_frame, in_frame},
     paths::Path,
-    samples::{Sample, samples_of},
+    samples::{Moments, Sample, samples_of},
     uniform::{Block, Camera, Particle},
 };
 use swell_domain::parallel;
@@ -79,11 +79,20 @@ impl DrawnParticles {
     }
 }
 
-/// Cameras of the frame's instant and of its samples.
+/// Cameras of the frame's instant and of its samples; where rays are cast also of the first and
+/// last times of a sample's rays.
 pub(super) fn cameras(look: &Look, setting: &Setting, frame: u32) -> Vec<Camera> {
+    let is_ray = look.spec().renderer.method == MethodSpec::Ray;
     let samples = [vec![Sample::STILL], samples_of(look)].concat();
-    samples
-        .into_iter()
+    let instants = |sample: Sample| {
+        let ends = is_ray.then(|| Moments::of(look, &sample).span);
+        let ends = ends.filter(|[first, last]| first < last);
+        let all = [sample.instant]
+            .into_iter()
+            .chain(ends.into_iter().flatten());
+        all.map(move |instant| Sample { instant, ..sample })
+    };
+    (samples.into_iter().flat_map(instants))
         .map(|sample| camera(look, setting, frame.into(), sample, 0))
         .collect()
 }

@@ -121,7 +121,7 @@ impl Renderer {
     /// Hands a frame's particles to what rays meet.
     fn load_rays(&mut self, Taken { packed, ways }: &Taken, inputs: &FrameInputs<'_>) {
         if let Some(water) = &mut self.water {
-            water.take(packed, ways);
+            water.take(packed, ways, &self.scene);
         }
         if let Some(caustics) = &mut self.caustics {
             caustics.forget();

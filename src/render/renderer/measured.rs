@@ -13,15 +13,15 @@ use super::{
 };
 use crate::{
     FrameInputs, RenderError, RenderScene,
-    buffers::{BLOCKS, CLOUD_WORDS, LEVEL_VALUES, PARTICLES, WHITEWATER},
+    buffers::{BLOCKS, CLOUD_WORDS, LEVEL_TABLE, LEVEL_VALUES, PARTICLES, WHITEWATER},
     plan::{Limits, Plan},
 };
 use swell_scene::look::Look;
 
 impl Plan {
     /// Like [`Plan::new`], with the buffer sizes that the renderer allocates when it draws this
-    /// frame. The level set and the drops are those of the frame's instant; with an open shutter
-    /// each sample has its own.
+    /// frame. The drops are those of the frame's instant and the level set is the one that serves
+    /// it; with an open shutter each sample has its own drops.
     ///
     /// # Errors
     /// As for [`Plan::new`], and [`RenderError::NotFinite`] for a damaged particle.
@@ -35,14 +35,15 @@ impl Plan {
         let mut plan = Self::new(look, scene, limits)?;
         let taken = Taken::of(look, scene, frame, inputs)?;
         if let Some(mut water) = RayWater::of(look, scene) {
-            water.take(&taken.packed, &taken.ways);
-            let values = water.level(0.0, scene).values.len();
-            plan.grow(LEVEL_VALUES.sized(values));
+            water.take(&taken.packed, &taken.ways, scene);
+            let built = water.build(water.slice(0.0, true), scene);
+            plan.grow(LEVEL_TABLE.sized(built.table.len()));
+            plan.grow(LEVEL_VALUES.sized(built.values()));
         }
         if let Some(mut cloud) = RayCloud::of(look, scene) {
             let water = (&taken.packed[..], &taken.ways[..]);
             cloud.take(look, scene, plan.radius, water, inputs.white);
-            let (_, words) = cloud.grid(0.0, scene);
+            let (_, words) = cloud.grid(&[0.0], scene);
             plan.grow(CLOUD_WORDS.sized(room_of(words.len(), limits.storage)));
         }
         if let Some(whitewater) = WhitewaterDrawing::of(look, scene) {

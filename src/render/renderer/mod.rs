@@ -17,13 +17,14 @@ mod whitewater;
 use bytemuck::Pod;
 use glam::DVec3;
 
-use super::buffers::{CAMERA, objects, picture};
+use super::buffers::{CAMERA, MOMENTS, objects, picture};
 use super::camera::{Setting, camera, eye};
 use super::caustics::{Caustics, above};
 use super::cryptomatte::{Covers, unique};
 use super::image::{CameraAttributes, Image};
+use super::open::seed;
 use super::plan::{Limits, Plan};
-use super::samples::samples_of;
+use super::samples::{Moments, Sample, samples_of};
 use super::{FrameInputs, RenderError, RenderScene, WaterParticles, sea::Sea, uniform};
 use build::capacity_for;
 use cloud::RayCloud;
@@ -221,10 +222,16 @@ impl Renderer {
         let wants_objects = self.look.spec().output.cryptomatte;
         let mut covers = wants_objects.then(|| Covers::new(self.plan.extent.shaded()));
         for (index, sample) in (0u32..).zip(samples_of(&self.look)) {
-            let camera = camera(&self.look, &setting, frame.into(), sample, index);
-            self.sample(&camera, false, parts)?;
+            let shot = Shot {
+                frame,
+                order: index,
+                index,
+                sample,
+                setting: &setting,
+            };
+            self.sample(&shot, false, parts)?;
             if let Some(covers) = &mut covers {
-                covers.add(&self.read_bands(objects, 1)?, camera.weight);
+                covers.add(&self.read_bands(objects, 1)?, sample.weight as f32);
             }
         }
         let rate = self.scene.frames_per_second;
@@ -321,18 +328,33 @@ impl Renderer {
     /// Draws one sample into the picture's mean or, with `aovs`, into the additional channels.
     fn sample(
         &mut self,
-        camera: &uniform::Camera,
+        shot: &Shot<'_>,
         aovs: bool,
         parts: &mut PartProgress<'_>,
     ) -> Result<(), RenderError> {
+        let camera = &shot.camera(&self.look, shot.sample.instant);
+        let rate = self.scene.frames_per_second;
+        let moments = Moments::of(&self.look, &shot.sample);
+        let seconds = |frames: f64| (frames / rate) as f32;
+        let span = moments.span.map(seconds);
         if let Some(water) = &mut self.water {
-            let grew = water.stand_at(camera.seconds, &mut self.program, &self.scene)?;
+            let slice = water.slice(camera.seconds, span[0] < span[1]);
+            let grew = water.stand_at(slice, &mut self.program, &self.scene)?;
             if grew {
                 self.record();
             }
         }
+        if self.program.has(MOMENTS.name()) {
+            let instant = self.water.as_ref().map_or([0.0; 2], RayWater::instant);
+            let moments = shot.moments(&self.look, &moments, instant);
+            self.program.upload(MOMENTS, 0, &moments);
+        }
         if let Some(cloud) = &mut self.cloud {
-            let grew = cloud.stand_at(camera.seconds, &mut self.program, &self.scene)?;
+            let instants = match span[0] < span[1] {
+                true => moments.instants.map(seconds).to_vec(),
+                false => vec![camera.seconds],
+            };
+            let grew = cloud.stand_at(instants, &mut self.program, &self.scene)?;
             if grew {
                 self.record();
             }
@@ -341,7 +363,8 @@ impl Renderer {
             sea.stand_at(camera, &mut self.program, &self.scene);
         }
         if let Some(moving) = &mut self.plan.moving {
-            moving.stand_at(camera.seconds, &self.program, &mut self.plan.closed);
+            let times = (camera.seconds, span);
+            moving.stand_at(times, &self.program, &mut self.plan.closed);
         }
         let (eye, near) = (camera.position.into(), camera.near);
         let camera = &uniform::Camera {
@@ -353,6 +376,55 @@ impl Renderer {
             self.light(camera)?;
         }
         self.run_portions(aovs, parts)
+    }
+}
+
+/// A sample to draw.
+struct Shot<'a> {
+    frame: u32,
+    /// Position among the samples of the same rays.
+    order: u32,
+    /// The same among those that are added up; the first one replaces what was there.
+    index: u32,
+    sample: Sample,
+    setting: &'a Setting,
+}
+
+impl Shot<'_> {
+    /// The sample's camera at an instant, frames from the frame's.
+    fn camera(&self, look: &Look, instant: f64) -> uniform::Camera {
+        let sample = Sample {
+            instant,
+            ..self.sample
+        };
+        camera(look, self.setting, self.frame.into(), sample, self.index)
+    }
+
+    /// Moments of the sample's rays, with a level set of the instant `stands`, seconds from the
+    /// frame, and velocities beside it with components up to `speed`, m/s.
+    fn moments(
+        &self,
+        look: &Look,
+        moments: &Moments,
+        [stands, speed]: [f32; 2],
+    ) -> Vec<uniform::Moment> {
+        let moment = |(k, &instant): (usize, &f64)| {
+            let at = self.camera(look, instant);
+            uniform::Moment {
+                position: at.position,
+                seconds: at.seconds,
+                right: at.right,
+                focal: at.focal,
+                up: at.up,
+                part: moments.part(k) as f32,
+                forward: at.forward,
+                since: at.seconds - stands,
+                centre: at.centre,
+                speed,
+                seed: seed(self.frame, self.order),
+            }
+        };
+        moments.instants.iter().enumerate().map(moment).collect()
     }
 }
 

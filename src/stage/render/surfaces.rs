@@ -20,8 +20,8 @@ use swell_domain::{
     eye::Eye, frame_range::FrameRange, level_set::kernels::Kernels, particles::Particles,
 };
 use swell_gpu::adapter::{Context, Needs};
-use swell_reference::rays::{RayHit, cast};
-use swell_render::{RenderError, RenderScene, Renderer, eye, opaque};
+use swell_reference::rays::{RayHit, cast, cast_through, moment};
+use swell_render::{RayTimes, RenderError, RenderScene, Renderer, eye, opaque};
 use swell_scene::look::{Look, MethodSpec};
 
 use super::{RenderJobError, near::Near, render_scene, set::FrameState, told};
@@ -60,7 +60,7 @@ pub struct SurfaceRequest {
 /// Result for one render method.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct SurfaceRow {
-    /// `ssfr` or `ray`.
+    /// `ssfr`, `ray`, or `open`: rays that each have a time while the shutter is open.
     pub method: &'static str,
     /// Error of the surface over all frames; `None` if no water was visible.
     pub surface: Option<Summary>,
@@ -78,10 +78,11 @@ pub struct SurfaceRow {
 }
 
 impl SurfaceRow {
-    /// Whether the method meets its tolerance: rays have one, splats are only measured.
+    /// Whether the method meets its tolerance: rays have one, also with an open shutter; splats are
+    /// only measured.
     pub fn is_within(&self) -> bool {
         let of_rays = |it: &Summary| it.depth[1] <= DEPTH && it.normal[0] <= NORMAL;
-        self.method != "ray" || self.surface.as_ref().is_some_and(of_rays)
+        self.method == METHODS[0].0 || self.surface.as_ref().is_some_and(of_rays)
     }
 }
 
@@ -163,6 +164,7 @@ pub fn check_render(
         frames: frames.len(),
     });
     let mut surfaces = METHODS.map(|_| (Surfaces::default(), 0.0));
+    let mut open = OpenRays::default();
     let mut pictures = Pictures::new(request);
     let mut outcome = SurfaceOutcome {
         device: context.info.name.clone(),
@@ -197,6 +199,7 @@ pub fn check_render(
             *seconds += begun.elapsed().as_secs_f64();
             surface.add(&image, &truth, &eye, set.particle_spacing);
         }
+        open.take((&context, &request.look, &set), frame, &water)?;
         let set = Set {
             cache: &cache,
             scene: &scene,
@@ -228,7 +231,101 @@ pub fn check_render(
             residual: mean(&pictures.residuals),
         });
     }
+    if request.look.spec().image.shutter > 0.0 {
+        outcome.rows.push(SurfaceRow {
+            method: "open",
+            surface: open.surfaces.summary(),
+            seconds: open.seconds / count,
+            score: None,
+            flicker: None,
+            residual: None,
+        });
+    }
     Ok(outcome)
+}
+
+/// One of this many moments is compared, because each needs kernels of its own.
+const EVERY: usize = 8;
+
+/// Surfaces that rays with times of their own meet.
+#[derive(Default)]
+struct OpenRays {
+    surfaces: Surfaces,
+    seconds: f64,
+}
+
+impl OpenRays {
+    /// Compares a frame's depths and normals by rays while the shutter is open with f64 rays at the
+    /// same times; the water moves straight by its velocities. The shutter is open for as long as
+    /// the look says, but no longer than the fastest water takes for the two spacings that one
+    /// level set serves.
+    fn take(
+        &mut self,
+        (context, look, set): (&Context, &Look, &RenderScene),
+        frame: u32,
+        water: &Particles,
+    ) -> Result<(), RenderJobError> {
+        let (rate, spacing) = (set.frames_per_second, set.particle_spacing);
+        let shutter = look.spec().image.shutter;
+        if shutter == 0.0 {
+            return Ok(());
+        }
+        let longest = 2.0 * spacing * rate / water.max_speed().max(1e-30);
+        let look = look.of_open_surface(shutter.min(longest));
+        let mut renderer =
+            Renderer::new(context, &look, set).map_err(|error| told(error, &look))?;
+        let begun = Instant::now();
+        let image = renderer.render(frame, water)?;
+        self.seconds += begun.elapsed().as_secs_f64();
+        let Some(times) = RayTimes::of(&look, frame, rate) else {
+            return Ok(());
+        };
+        let width = image.width as usize;
+        let mut pixels = vec![Vec::new(); times.seconds.len()];
+        for pixel in 0..width * image.height as usize {
+            let at = [pixel % width, pixel / width].map(|c| c as u32);
+            let counted = [0, 1].map(|axis| at[axis].wrapping_add(times.first[axis]));
+            pixels[moment(times.seed, counted)].push(pixel);
+        }
+        let moments = times
+            .seconds
+            .iter()
+            .zip(&pixels)
+            .skip(EVERY / 2)
+            .step_by(EVERY);
+        for (&seconds, pixels) in moments {
+            let seen = truth_at(&look, set, (frame, seconds), water, pixels)?;
+            self.surfaces.add_some(&image, pixels, &seen, spacing);
+        }
+        Ok(())
+    }
+}
+
+/// Casts f64 rays through some pixels at an instant, seconds after the frame's.
+fn truth_at(
+    look: &Look,
+    set: &RenderScene,
+    (frame, seconds): (u32, f64),
+    water: &Particles,
+    pixels: &[usize],
+) -> Result<Vec<RayHit>, RenderError> {
+    let (corner, size) = (set.domain.min, set.domain.size());
+    let wide = |v: &[f32; 3]| DVec3::from(v.map(f64::from));
+    let moved = water.position.iter().zip(&water.velocity);
+    let places: Vec<DVec3> = moved
+        .map(|(p, v)| wide(p) - corner + seconds * wide(v))
+        .collect();
+    let kernels = Kernels::fit(&places, size, set.particle_spacing);
+    let instant = f64::from(frame) + seconds * set.frames_per_second;
+    let eye = eye(look, set.origin + corner, instant, set.frames_per_second);
+    let opaque = opaque(look, &set.standing_at(seconds))?;
+    Ok(cast_through(
+        pixels,
+        &eye,
+        &kernels,
+        (size, set.particle_spacing),
+        &opaque,
+    ))
 }
 
 const METHODS: [(&str, MethodSpec); 2] = [("ssfr", MethodSpec::Ssfr), ("ray", MethodSpec::Ray)];

@@ -133,6 +133,15 @@ fn surfaces_in_pictures_are_held_against_rays_in_f64() {
         &job.expect(1, "check cache --render --look look.toml --shaders edit"),
         &["OUT"],
     );
+    // With an open shutter, rays are compared at their own times too.
+    let open = LOOK.replace("samples = 1", "samples = 1\nshutter = 0.5");
+    fs::write(job.path("open.toml"), open).unwrap();
+    let check = "check cache --render --look open.toml";
+    let [found, spoiled] = [(0, ""), (1, " --shaders edit")]
+        .map(|(code, more)| job.json(code, &format!("{check}{more}"))["rows"][2].clone());
+    assert_eq!(found["method"], "open");
+    assert!(found["surface"]["pixels"].as_u64().unwrap() > 10, "{found}");
+    assert!(depth(&spoiled) > depth(&found) + 0.25, "{spoiled}");
     for (words, said) in [
         ("check cache --render", "--look"),
         (

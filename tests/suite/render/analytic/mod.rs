@@ -24,6 +24,7 @@ mod sea;
 mod sheets;
 mod splash;
 mod spray;
+mod streaks;
 pub(super) mod support;
 mod surface;
 mod volume;
