@@ -25,8 +25,8 @@ pub const WORDS: usize = (ALONG * ALONG * ALONG) as usize;
 pub const HALO: [u32; 2] = [1 << 30, 1 << 31];
 /// Steps of a component on either side of zero.
 const STEPS: f32 = 511.0;
-/// Layers of nodes without particles that get a velocity: the surface lies up to 1.25 spacings from
-/// the particles, moves on, and is looked up between nodes.
+/// Layers of nodes without particles that get a velocity where the surface does not move, for voxels
+/// of half a spacing: it lies up to 1.25 spacings from the particles, and is looked up between nodes.
 const LAYERS: u32 = 6;
 /// Voxels by which the surface may be farther than its velocity says.
 const MARGIN: f64 = 0.5;
@@ -57,14 +57,15 @@ const NONE: u32 = u32::MAX;
 const BLOCK: usize = (OWN * OWN * OWN) as usize;
 
 impl Lattice {
-    fn around(level: &LevelSet) -> Self {
+    /// With the blocks within `ring` bricks of one with values.
+    fn around(level: &LevelSet, ring: usize) -> Self {
         let bricks = level.bricks.map(|n| n as usize + 1);
         let mut blocks = vec![NONE; bricks.iter().product()];
         let mut count = 0;
         for (brick, _) in valued(level) {
             let [xs, ys, zs] = [0, 1, 2].map(|axis| {
                 let at = brick[axis] as usize;
-                at.saturating_sub(1)..(at + 2).min(bricks[axis])
+                at.saturating_sub(ring)..(at + ring + 1).min(bricks[axis])
             });
             for z in zs {
                 for y in ys.clone() {
@@ -127,13 +128,13 @@ impl Lattice {
     }
 
     /// Gives nodes without a velocity the mean of their neighbours along the axes, layer by layer.
-    fn extend(&mut self) {
+    fn extend(&mut self, layers: u32) {
         let [nx, ny, _] = self.bricks;
         let blocks = self.blocks.iter().enumerate();
         let held: Vec<usize> = (blocks.filter(|(_, block)| **block != NONE))
             .map(|(brick, _)| brick)
             .collect();
-        for _ in 0..LAYERS {
+        for _ in 0..layers {
             let found: Vec<(usize, [f64; 4])> = parallel::flat_map(0..held.len(), |k| {
                 let brick = held[k];
                 let corner = [brick % nx, brick / nx % ny, brick / nx / ny];
@@ -222,9 +223,17 @@ impl Drift {
     /// Adds velocities to a level set of particles at `places`, metres, which move at `velocities`,
     /// m/s. Its surface may be looked up for `seconds` before and after its instant.
     pub fn new(level: &LevelSet, places: &[DVec3], velocities: &[DVec3], seconds: f64) -> Self {
-        let mut lattice = Lattice::around(level);
+        let most = velocities
+            .iter()
+            .fold(0.0f64, |most, v| most.max(v.length()));
+        // Voxels by which the surface moves; water that is faster than that loses its velocity.
+        let reach = (most * seconds / level.voxel).min(f64::from(3 * EDGE));
+        let edge = f64::from(EDGE);
+        let ring = 1 + ((reach - 0.5 * edge) / edge).ceil().max(0.0) as usize;
+        let mut lattice = Lattice::around(level, ring);
         lattice.gather(places, velocities, f64::from(PITCH) * level.voxel);
-        lattice.extend();
+        // Layers grow along the axes, up to √3 of a distance.
+        lattice.extend(LAYERS + (3f64.sqrt() * reach / f64::from(PITCH)).ceil() as u32);
         let held: Vec<([u32; 3], usize)> = valued(level).collect();
         let of_held: Vec<[Vec3; WORDS]> =
             parallel::map_slice(&held, |&(brick, _)| lattice.of_brick(brick));
