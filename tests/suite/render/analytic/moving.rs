@@ -60,9 +60,8 @@ impl Plate {
 
 /// Expected mean over the shutter at a point of the plate's plane: the share of time for which the
 /// plate is there, and its tolerance. Samples divide the shutter evenly, so that each edge that
-/// passes is known to a sample, whose ray has any time in it, and one and a half, whose times and
-/// positions in the pixel decide; and where an edge lingers within the pixel, the samples of that time are of either
-/// side.
+/// passes is known to half of a sample and one more, whose position in the pixel decides; and where
+/// an edge lingers within the pixel, the samples of that time are of either side.
 fn expected(
     plate: &Plate,
     pose: &dyn Fn(f64) -> Pose,
@@ -80,7 +79,7 @@ fn expected(
         last = Some(depth);
     }
     let share = |count: u32| f64::from(count) / f64::from(FINE);
-    let tolerance = share(near) + 2.5 * f64::from(crossings) / f64::from(SAMPLES);
+    let tolerance = share(near) + 1.5 * f64::from(crossings) / f64::from(SAMPLES);
     [share(there), tolerance]
 }
 
@@ -340,8 +339,10 @@ fn a_bodys_path_leads_through_its_states_in_the_frames_around() {
             covers(&image, &plate, &truth, 1.0)
         };
         let found = shot(1.0, around);
+        // A ray has any time in its sample: an edge is known to one sample more.
+        let most = if method == "ray" { 2.5 / 1.5 } else { 1.0 };
         assert!(
-            found.wrong == 0 && found.partial > 50,
+            found.worst < most && found.partial > 50,
             "{method}: {found:?}"
         );
         // Controls: the state of the frame alone, with its slow spin; one side alone; a closed
