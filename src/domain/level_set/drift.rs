@@ -25,8 +25,9 @@ pub const WORDS: usize = (ALONG * ALONG * ALONG) as usize;
 pub const HALO: [u32; 2] = [1 << 30, 1 << 31];
 /// Steps of a component on either side of zero.
 const STEPS: f32 = 511.0;
-/// Layers of nodes without particles that get a velocity where the surface does not move, for voxels
-/// of half a spacing: it lies up to 1.25 spacings from the particles, and is looked up between nodes.
+/// Layers of nodes without particles that get a velocity where the surface does not move, for
+/// voxels of half a spacing: it lies up to 1.25 spacings from the particles, and is looked up
+/// between nodes.
 const LAYERS: u32 = 6;
 /// Voxels by which the surface may be farther than its velocity says.
 const MARGIN: f64 = 0.5;
