@@ -241,11 +241,12 @@ fn channels_are_at_the_frame_s_instant_with_an_open_shutter() {
         let pairs = found.into_iter().zip(&closed);
         pairs.filter(|(a, b)| (a - **b).abs() > 1e-3).count()
     };
-    assert_eq!(others(depths(&context(), SHUTTER)), 0);
+    // A ray that only just touches the ball may miss it.
+    assert!(others(depths(&context(), SHUTTER)) <= 4);
     // Control: rays a thousandth of a second late.
     let late = "own_since = moments[index].since + 1e-3";
     let late = spoiled("rays/aovs", "own_since = moments[index].since", late);
-    assert!(others(depths(&late, SHUTTER)) > 10);
+    assert!(others(depths(&late, SHUTTER)) > 100);
 }
 
 /// With a closed shutter no pass has moments.
