@@ -32,10 +32,10 @@ def looks(cache: Path) -> list[swell.CacheError]:
 def checked_files(cache: Path) -> list[Path]:
     unhashed = ("timings.jsonl", "lock")
     files = sorted(path for path in cache.rglob("*") if path.is_file() and path.name not in unhashed)
-    return [path for path in files if "whitewater" not in path.parts]
+    return [path for path in files if {"whitewater", "wet"}.isdisjoint(path.parts)]
 
 
-@pytest.mark.parametrize("name", ["pbf", "flip", "kept", "far", "afloat", "branch", "pbf/whitewater/default"])
+@pytest.mark.parametrize("name", ["pbf", "flip", "kept", "far", "afloat", "branch", "pbf/whitewater/default", "pbf/wet/default"])
 def test_sound_caches_are_sound(baked: Path, swell_bin: Swell, name: str) -> None:
     assert not swell_bin.refuses(baked / name)
     swell.Cache(baked / name).verify()
