@@ -2,7 +2,7 @@
 // axes (render/foam.rs). Needs the bindings of rays_light.wgsl.
 
 // Least and greatest factor on the distances to a disc, by its random number: cells of different
-// sizes, with edges that are arcs.
+// sizes, with edges that are arcs. Chosen by eye, as all constants here.
 const NEARER: f32 = 0.6;
 const FARTHER: f32 = 1.6;
 // Part of the discs, by their random number, around which there are large holes.

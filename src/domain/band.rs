@@ -17,6 +17,7 @@ use super::{
     flip::stored_cells,
     parallel,
     particles::Particles,
+    sampling::finalized,
 };
 use cells::{Cells, depths, is_water};
 
@@ -418,14 +419,10 @@ impl Band {
 
 /// Random bits of a cell, a frame and a number.
 fn hash(cell: [u32; 3], frame: u32, number: u32) -> u32 {
-    // The finalizer of SplitMix64 (Steele et al. 2014) after each word.
-    let mut state = 0u64;
-    for word in cell.into_iter().chain([frame, number]) {
-        state = (state ^ u64::from(word)).wrapping_add(0x9E37_79B9_7F4A_7C15);
-        state = (state ^ (state >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        state = (state ^ (state >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        state ^= state >> 31;
-    }
+    let words = cell.into_iter().chain([frame, number]);
+    let state = words.fold(0u64, |state, word| {
+        finalized((state ^ u64::from(word)).wrapping_add(0x9E37_79B9_7F4A_7C15))
+    });
     (state >> 32) as u32
 }
 

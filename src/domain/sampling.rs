@@ -391,9 +391,12 @@ pub(super) fn uniform(seed: u64) -> f64 {
     hash(seed) as f64 / u64::MAX as f64
 }
 
-/// SplitMix64's finaliser (Steele et al. 2014).
 fn hash(seed: u64) -> u64 {
-    let mut z = seed.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    finalized(seed.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15))
+}
+
+/// The finalizer of SplitMix64 (Steele, Lea and Flood 2014): each bit depends on all bits.
+pub(crate) fn finalized(mut z: u64) -> u64 {
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
     z ^ (z >> 31)

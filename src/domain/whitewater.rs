@@ -10,7 +10,7 @@ mod kills;
 mod seeds;
 mod thresholds;
 
-use crate::particles::Particles;
+use crate::{particles::Particles, sampling::finalized};
 
 pub use ages::grow_older;
 pub use kills::{Kill, KillDomain, KillMesh, KillRoom, kill};
@@ -160,14 +160,11 @@ pub fn random_of(id: u32) -> f64 {
     random(0, id, 0, 0)
 }
 
-/// A pseudo-random number in 0..1 for these keys, mixed as in splitmix64 (Steele, Lea and
-/// Flood 2014).
+/// A pseudo-random number in 0..1 for these keys.
 fn random(seed: u32, id: u32, frame: u32, channel: u32) -> f64 {
-    let mut z = (u64::from(seed) << 32 | u64::from(id)).wrapping_mul(0x9E37_79B9_7F4A_7C15)
+    let z = (u64::from(seed) << 32 | u64::from(id)).wrapping_mul(0x9E37_79B9_7F4A_7C15)
         ^ (u64::from(frame) << 32 | u64::from(channel)).wrapping_mul(0xD1B5_4A32_D192_ED03);
-    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-    ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+    (finalized(z) >> 11) as f64 / (1u64 << 53) as f64
 }
 
 #[cfg(test)]

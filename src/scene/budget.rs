@@ -41,9 +41,9 @@ pub struct Budget {
 /// water 20 or more.
 pub const SPEED_JUMP: f64 = 8.0;
 
-/// Fastest water over the speed of its fall: pressure at the foot of a column that is let go, or
-/// where a wave meets a wall, throws a little of the water with the energy of much.
-const THROWN_OVER_FALLEN: f64 = 2.0;
+/// Speed of the front of a column that is let go over that of a fall from its top: 2 √(g h) over
+/// √(2 g h) (Ritter 1892).
+const THROWN_OVER_FALLEN: f64 = std::f64::consts::SQRT_2;
 
 /// Speed whose kinetic energy is added to the total, spacings per frame, so that water
 /// at rest may stir.
@@ -118,8 +118,8 @@ impl Budget {
             check(Watched::SpeedJump, report.max_speed, Some(limit)).map_err(|breach| {
                 let detail = format!(
                     "{} times the larger of {reached:.4} m/s, which gravity, effects and walls can \
-                     bring {speed:.4} m/s of the fastest before to, and {of_fall:.4} m/s, a \
-                     quarter of the speed after a fall from twice the water's mean height",
+                     bring {speed:.4} m/s of the fastest before to, and {of_fall:.4} m/s, an \
+                     eighth of the front's of a column twice as high as the water's mean",
                     shown(times),
                 );
                 Breach {
