@@ -10,7 +10,7 @@
 #import "shared/rays_cloud_light.wgsl"
 #endif
 #ifdef FOAM_LAYER
-#import "shared/rays_foam.wgsl"
+#import "shared/foam_layer.wgsl"
 #endif
 #ifdef CAUSTICS
 #import "shared/caustics_light.wgsl"

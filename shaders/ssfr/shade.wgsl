@@ -33,6 +33,9 @@
 #ifdef SEA
 #import "shared/ssfr_sea.wgsl"
 #endif
+#ifdef FOAM_LAYER
+#import "shared/foam_layer.wgsl"
+#endif
 #import "shared/ssfr_lights.wgsl"
 #import "shared/ssfr_holdout.wgsl"
 
@@ -69,6 +72,10 @@
 @group(0) @binding(16) var<uniform> spray_params: SprayParams;
 #endif
 
+#ifdef FOAM_LAYER
+@group(0) @binding(25) var<uniform> cloud: Cloud;
+@group(0) @binding(26) var<storage, read> cloud_words: array<u32>;
+#endif
 #ifdef CARRIED
 @group(0) @binding(24) var<uniform> carried: array<Carried, 256>;
 #endif
@@ -241,6 +248,8 @@ struct Water {
     position: vec3f,
     eye: vec3f,
     normal: vec3f,
+    // The normal without ripples.
+    level: vec3f,
     view: vec3f,
     // Mean square slope of waves below the pixel's resolution.
     slope_variance: f32,
@@ -345,7 +354,7 @@ fn water_at(z: f32, ray: vec3f, view: vec3f, smooth_normal: vec3f, lost: f32) ->
     // Visible facets never face away.
     normal = normalize(facet.normal + view * max(0.03 - dot(facet.normal, view), 0.0) * 1.5);
     let lit = sunlit(position, vec3f(0.0, 1.0, 0.0));
-    return Water(position, eye, normal, view, facet.variance + lost, lit);
+    return Water(position, eye, normal, smooth_normal, view, facet.variance + lost, lit);
 }
 
 // Light of water that reflects `mirrored` and transmits `behind`, dimmed along its path.
@@ -365,6 +374,22 @@ fn water_light(water: Water, mirrored: vec3f, behind: vec3f, way: f32) -> vec3f 
     light_part(SUN, sun);
     return mirror + (1.0 - reflectance) * (seen + scattered) + sun;
 }
+
+#ifdef FOAM_LAYER
+// Light of water under its foam, which covers `light` in part.
+fn foamed(water: Water, light: vec3f) -> vec3f {
+    let slant = max(dot(water.level, water.view), 0.1);
+    let cover = foam_cover(
+        water.position, water.level, water.eye.z / camera.focal / sqrt(slant));
+    if cover <= 0.0 {
+        return light;
+    }
+    let foam = cover * foam_radiance(water.position, water.level, false);
+    dim_parts(1.0 - cover);
+    light_part(FOAM_LIGHT, foam);
+    return (1.0 - cover) * light + foam;
+}
+#endif
 
 // Light components of `behind_radiance`, whose sum is `colour`.
 fn behind_parts(found: Behind, direction: vec3f, colour: vec3f) {
@@ -574,7 +599,11 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         let far = depth * length(ray);
         let mirror_light = mirrored_light(mirror, water, light_mirrored);
         let behind_light = mix(backdrop, light_into, into.filled);
-        colour = hazed(water_light(water, mirror_light, behind_light, into.way), far, direction);
+        colour = water_light(water, mirror_light, behind_light, into.way);
+#ifdef FOAM_LAYER
+        colour = foamed(water, colour);
+#endif
+        colour = hazed(colour, far, direction);
         dim_parts(exp(-far / shading.haze));
         light_part(SKYLIGHT, hazed(vec3f(0.0), far, direction));
 #endif

@@ -101,10 +101,10 @@ pub(super) const LEVEL_TABLE: Buf<u32> = Buf::new("level_table");
 pub(super) const LEVEL_VALUES: Buf<f32> = Buf::new("level_values");
 /// Metres of water that sunlight passes through, on a coarse lattice; the caustics map follows it.
 pub(super) const SUN_PATHS: Buf<f32> = Buf::new("sun_paths");
-/// Grid of drops and bubbles.
+/// Grid of drops and bubbles, and columns of foam.
 pub(super) const CLOUD: Buf<Cloud> = Buf::uniform("cloud");
-/// Table of that grid, the lattice of optical depths towards the sun, then the values brick by
-/// brick.
+/// Table of that grid, the lattice of optical depths towards the sun, the values brick by brick,
+/// then the foam.
 pub(super) const CLOUD_WORDS: Buf<u32> = Buf::new("cloud_words");
 /// Depth of the first hit of each ray, in front of which drops are splatted.
 pub(super) const FIRST_DEPTH: Buf<f32> = Buf::new("first_depth");

@@ -295,7 +295,7 @@ mirror!(
 );
 
 mirror!(
-    /// `Cloud` of shared/rays_cloud.wgsl.
+    /// `Cloud` of shared/cloud.wgsl.
     Cloud {
         corner: [f32; 3],
         voxel: f32,

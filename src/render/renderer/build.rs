@@ -170,6 +170,9 @@ fn plan_ssfr(plan: &mut Plan, look: &Look, scene: &RenderScene, set: &Set<'_>, l
         false => Vec::new(),
     };
     let Smoothing { commands, surface } = smoothing(plan, look, scene);
+    if look.spec().whitewater.is_some() {
+        plan_cloud(plan);
+    }
     let spray = plan_spray(plan, look, &surface, &SOLID_DEPTH);
     let shade = plan_shade(plan, look, &surface);
     if !shade.aovs.is_empty() {
@@ -206,8 +209,7 @@ fn plan_ray(plan: &mut Plan, look: &Look, scene: &RenderScene, set: &Set<'_>) {
         plan_particles(plan, look, moving);
     }
     if has_spray {
-        plan.buffer(&CLOUD, 1);
-        plan.buffer(&CLOUD_WORDS, 1);
+        plan_cloud(plan);
         plan.buffer(&FIRST_DEPTH, plan.extent.pixels());
         plan.define("rays/first", "SPRAY");
     }
@@ -233,6 +235,12 @@ fn plan_ray(plan: &mut Plan, look: &Look, scene: &RenderScene, set: &Set<'_>) {
         plan_shutter(plan);
     }
     plan.sample = [sample, shade.picture].concat();
+}
+
+/// Plans the grid of drops and bubbles, and the foam.
+fn plan_cloud(plan: &mut Plan) {
+    plan.buffer(&CLOUD, 1);
+    plan.buffer(&CLOUD_WORDS, 1);
 }
 
 /// Passes that draw samples of moving water, and those whose rays have an instant each.

@@ -1,4 +1,4 @@
-//! Uploads the drops and bubbles that rays traverse.
+//! Uploads the drops and bubbles that rays traverse, and the foam on the water.
 
 use glam::DVec3;
 
@@ -22,6 +22,8 @@ use swell_scene::look::{Look, MethodSpec, WhitewaterLook};
 
 /// Drops and bubbles of a frame, and the state of their grid on the device.
 pub(super) struct RayCloud {
+    /// Whether rays are cast; otherwise the grid is empty, and there is foam alone.
+    casts: bool,
     /// Drops and bubbles with their paths.
     drops: Vec<(Drop, Path)>,
     /// Foam at the frame's instant.
@@ -39,10 +41,12 @@ pub(super) struct RayCloud {
 }
 
 impl RayCloud {
-    /// Returns `None` where the look casts no rays, or draws neither spray nor whitewater.
+    /// Returns `None` where the look draws neither whitewater nor, by rays, spray.
     pub(super) fn of(look: &Look, scene: &RenderScene) -> Option<Self> {
-        let is_drawn = look.spec().renderer.method == MethodSpec::Ray && draws_spray(look);
+        let casts = look.spec().renderer.method == MethodSpec::Ray;
+        let is_drawn = look.spec().whitewater.is_some() || casts && draws_spray(look);
         is_drawn.then(|| Self {
+            casts,
             drops: Vec::new(),
             foam: Particles::default(),
             look: look.spec().whitewater.clone(),
@@ -63,9 +67,11 @@ impl RayCloud {
         water: (&[Particle], &[Path]),
         white: &Particles,
     ) {
-        self.drops = drops_of(look, scene, radius, water);
-        let of_white = white_of(look, scene, white, |index| kind(white, index));
-        self.drops.extend(of_white);
+        if self.casts {
+            self.drops = drops_of(look, scene, radius, water);
+            let of_white = white_of(look, scene, white, |index| kind(white, index));
+            self.drops.extend(of_white);
+        }
         self.foam = of_kinds(white.clone(), &[WhitewaterKind::Foam]);
         self.stands.clear();
     }

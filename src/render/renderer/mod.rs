@@ -67,7 +67,7 @@ pub struct Renderer {
     blocks: usize,
     /// `None` where the look casts no rays.
     water: Option<RayWater>,
-    /// `None` where rays meet neither spray nor whitewater.
+    /// `None` where the look draws neither whitewater nor, by rays, spray.
     cloud: Option<RayCloud>,
     /// `None` where the look has no caustics.
     caustics: Option<Caustics>,

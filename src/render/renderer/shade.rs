@@ -159,9 +159,17 @@ pub(super) fn wants_spray_aovs(look: &Look) -> bool {
     draws_spray(look) && shown.any(|aov| look.wants(aov))
 }
 
+/// Configures a pass that shades water for the foam on it.
+fn plan_foam(plan: &mut Plan, look: &Look, pass: &'static str) {
+    if look.spec().whitewater.is_some() {
+        plan.define(pass, "FOAM_LAYER");
+    }
+}
+
 /// Plans the shading of splats; `surface` holds the smoothed depth.
 pub(super) fn plan_shade(plan: &mut Plan, look: &Look, surface: &Buf<f32>) -> Shade {
     plan_output(plan, look, "ssfr/shade", "SPRAY");
+    plan_foam(plan, look, "ssfr/shade");
     plan_output(plan, look, DRY, "SPRAY");
     plan_output(plan, look, BARE, "SPRAY");
     plan.define("ssfr/shade_aovs", "AOVS");
@@ -271,9 +279,7 @@ pub(super) fn plan_carried(plan: &mut Plan, look: &Look, scene: &RenderScene, co
 /// Plans the casting of rays.
 pub(super) fn plan_cast(plan: &mut Plan, look: &Look) -> Shade {
     plan_output(plan, look, "rays/cast", "VOLUME");
-    if look.spec().whitewater.is_some() {
-        plan.define("rays/cast", "FOAM_LAYER");
-    }
+    plan_foam(plan, look, "rays/cast");
     if look.wants(AovSpec::Forward) {
         plan.define("rays/aovs", "FORWARD");
     }

@@ -21,8 +21,8 @@ const FADING: f64 = 2.0;
 /// Settings with which a look draws whitewater.
 pub(super) struct WhitewaterDrawing {
     params: uniform::WhitewaterParams,
-    /// Whether foam and bubbles are splatted too; rays meet them instead.
-    has_foam: bool,
+    /// Whether bubbles are splatted too; rays meet them instead.
+    has_bubbles: bool,
     /// Allocated whitewater particles.
     capacity: usize,
 }
@@ -38,7 +38,7 @@ impl WhitewaterDrawing {
                 density: (spec.density_per_metre / spray_density(look).max(1e-30)) as f32,
                 fading: (FADING * scene.particle_spacing) as f32,
             },
-            has_foam: look.spec().renderer.method == MethodSpec::Ssfr,
+            has_bubbles: look.spec().renderer.method == MethodSpec::Ssfr,
             capacity: 1,
         })
     }
@@ -66,7 +66,7 @@ impl WhitewaterDrawing {
         Ok(grew)
     }
 
-    /// Converts the part of a frame's whitewater that is drawn as splats.
+    /// Converts the part of a frame's whitewater that is splatted; foam is a layer on the water.
     pub(super) fn packed(
         &self,
         scene: &RenderScene,
@@ -81,14 +81,16 @@ impl WhitewaterDrawing {
             if !p.iter().chain(v).chain([&radius]).all(|x| x.is_finite()) {
                 return Err(RenderError::NotFinite { index, frame });
             }
-            if !self.has_foam && is_foam(white, index) {
-                continue;
-            }
+            let is_bubble = match kind(white, index) {
+                WhitewaterKind::Spray => false,
+                WhitewaterKind::Bubble if self.has_bubbles => true,
+                WhitewaterKind::Bubble | WhitewaterKind::Foam => continue,
+            };
             packed.push(uniform::Whitewater {
                 position: [0, 1, 2].map(|axis| (f64::from(p[axis]) - origin[axis]) as f32),
                 radius,
                 velocity: *v,
-                foam: if is_foam(white, index) { 1.0 } else { 0.0 },
+                foam: f32::from(u8::from(is_bubble)),
             });
         }
         Ok(packed)
@@ -99,9 +101,4 @@ impl WhitewaterDrawing {
 pub(super) fn kind(white: &Particles, index: usize) -> WhitewaterKind {
     let kind = white.attributes.get(KIND).and_then(|all| all.get(index));
     (kind.and_then(|&number| WhitewaterKind::of_number(number))).unwrap_or(WhitewaterKind::Spray)
-}
-
-/// Whether a particle is foam or a bubble.
-fn is_foam(white: &Particles, index: usize) -> bool {
-    kind(white, index) != WhitewaterKind::Spray
 }

@@ -17,10 +17,10 @@ pub(super) const WHITEWATER: &[Key] = &[
         .about("factor on its radius"),
     Key::number("foam_albedo", PART)
         .default("0.9")
-        .about("fraction of the light on it that foam reflects; `ray` only"),
-    Key::number("foam_amount", 1e-3..=1e3).default("3.0").about(
-        "factor on the area of foam's discs, and so on the depth that covers the water; `ray` only",
-    ),
+        .about("fraction of the light on it that foam reflects"),
+    Key::number("foam_amount", 1e-3..=1e3)
+        .default("3.0")
+        .about("factor on the area of foam's discs, and so on the depth that covers the water"),
 ];
 
 pub(super) const WET: &[Key] = &[

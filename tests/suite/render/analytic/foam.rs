@@ -1,4 +1,4 @@
-//! Foam as a layer on the water, by rays: its light, how much it covers, and its lace.
+//! Foam as a layer on the water: its light, how much it covers, and its lace.
 
 use glam::DVec3;
 use swell::domain::particles::Particles;
@@ -42,14 +42,18 @@ fn foam(depth: f64, seed: u64) -> Particles {
 }
 
 /// A picture of foam from straight above; pixels are `pixel` metres wide.
-fn above(context: &Context, white: &Particles, pixel: f64, albedo: f64) -> Image {
+fn above(
+    (context, method): (&Context, &'static str),
+    white: &Particles,
+    (pixel, albedo): (f64, f64),
+) -> Image {
     let eye = Eye {
         up: DVec3::Z,
         size: 160,
         ..Eye::new([5.0, LEVEL + 3.0, 5.0], [5.0, LEVEL, 5.0], 3.0 / pixel)
     };
     let setup = Setup {
-        method: "ray",
+        method,
         water: format!(
             "absorption_per_metre = [0.0, 0.0, 0.0]\n[whitewater]\nfoam_amount = 1.0\n\
              foam_albedo = {albedo:?}\n"
@@ -65,8 +69,8 @@ fn above(context: &Context, white: &Particles, pixel: f64, albedo: f64) -> Image
 }
 
 /// Fraction of each pixel that foam covers: its light under a sky of radiance 1 over the albedo.
-fn covers(context: &Context, white: &Particles, pixel: f64) -> Vec<f64> {
-    let image = above(context, white, pixel, ALBEDO);
+fn covers(by: (&Context, &'static str), white: &Particles, pixel: f64) -> Vec<f64> {
+    let image = above(by, white, (pixel, ALBEDO));
     let (light, layer) = &image.lights[0];
     assert_eq!(*light, LightSpec::Foam);
     let covers = layer.iter().map(|part| f64::from(part[1]) / ALBEDO);
@@ -77,19 +81,23 @@ fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
+/// Methods, with the pass that shades the water.
+const METHODS: [(&str, &str); 2] = [("ray", "rays/cast"), ("ssfr", "ssfr/shade")];
+
 /// Pixels that see threads of foam, and pixels that do not resolve them.
 const NEAR: f64 = 0.012;
 const FAR: f64 = 0.05;
 
 /// Largest error of the mean cover, near and far.
-fn cover_error(context: &Context) -> f64 {
+fn cover_error(context: &Context, method: &'static str) -> f64 {
     let mut worst = 0.0f64;
     for depth in [0.25, 1.5] {
         let expected = 1.0 - f64::exp(-depth);
         for pixel in [NEAR, FAR] {
-            let found = [1, 2].map(|seed| mean(&covers(context, &foam(depth, seed), pixel)));
+            let found =
+                [1, 2].map(|seed| mean(&covers((context, method), &foam(depth, seed), pixel)));
             let error = mean(&found) / expected - 1.0;
-            println!("depth {depth}, pixels of {pixel} m: {error:.4} off");
+            println!("{method}, depth {depth}, pixels of {pixel} m: {error:.4} off");
             worst = worst.max(error.abs());
         }
     }
@@ -101,23 +109,25 @@ fn cover_error(context: &Context) -> f64 {
 /// and with it the cover of thin foam; twice that is allowed, and 1 % for pixels.
 #[test]
 fn foam_covers_what_its_discs_cover() {
-    let error = cover_error(&context());
-    assert!(error < 0.07, "{error}");
-    for (from, to) in [
-        ("1.7724539 + 0.30484", "2.1 + 0.30484"),
-        (
-            "return mix(lace, 1.0 - exp(-depth),",
-            "return mix(lace, 0.85 - 0.85 * exp(-depth),",
-        ),
-    ] {
-        let control = cover_error(&spoiled("rays/cast", from, to));
-        assert!(control > 0.07, "{to}: {control}");
+    for (method, pass) in METHODS {
+        let error = cover_error(&context(), method);
+        assert!(error < 0.07, "{method}: {error}");
+        for (from, to) in [
+            ("1.7724539 + 0.30484", "2.1 + 0.30484"),
+            (
+                "return mix(lace, 1.0 - exp(-depth),",
+                "return mix(lace, 0.85 - 0.85 * exp(-depth),",
+            ),
+        ] {
+            let control = cover_error(&spoiled(pass, from, to), method);
+            assert!(control > 0.07, "{method}, {to}: {control}");
+        }
     }
 }
 
 /// Fraction of the pixels that are nearly white or nearly free of foam.
-fn decided(context: &Context) -> f64 {
-    let all = covers(context, &foam(0.7, 1), 0.004);
+fn decided(context: &Context, method: &'static str) -> f64 {
+    let all = covers((context, method), &foam(0.7, 1), 0.004);
     let is_decided = |cover: &&f64| !(0.1..=0.9).contains(*cover);
     all.iter().filter(is_decided).count() as f64 / all.len() as f64
 }
@@ -125,33 +135,38 @@ fn decided(context: &Context) -> f64 {
 /// Foam near the eye is lace, not a veil: threads with holes between, half and half.
 #[test]
 fn foam_near_the_eye_is_lace() {
-    let lace = decided(&context());
-    assert!(lace > 0.6, "{lace}");
-    let veil = decided(&spoiled(
-        "rays/cast",
-        "mix(lace, 1.0 - exp(-depth), smoothstep(0.15, 0.6,",
-        "mix(lace, 1.0 - exp(-depth), smoothstep(-2.0, -1.0,",
-    ));
-    assert!(veil < 0.1, "{veil}");
+    for (method, pass) in METHODS {
+        let lace = decided(&context(), method);
+        assert!(lace > 0.6, "{method}: {lace}");
+        let even = spoiled(
+            pass,
+            "mix(lace, 1.0 - exp(-depth), smoothstep(0.15, 0.6,",
+            "mix(lace, 1.0 - exp(-depth), smoothstep(-2.0, -1.0,",
+        );
+        let veil = decided(&even, method);
+        assert!(veil < 0.1, "{method}: {veil}");
+    }
 }
 
 /// Largest error of foam that reflects all light, over a pool in a white furnace.
-fn furnace_error(context: &Context) -> f64 {
-    let image = above(context, &foam(1.0, 1), NEAR, 1.0);
+fn furnace_error(context: &Context, method: &'static str) -> f64 {
+    let image = above((context, method), &foam(1.0, 1), (NEAR, 1.0));
     let off = |pixel: &[f32; 4]| (f64::from(pixel[1]) - 1.0).abs();
     image.beauty.iter().map(off).fold(0.0, f64::max)
 }
 
 #[test]
 fn white_foam_in_a_white_furnace_is_not_seen() {
-    let error = furnace_error(&context());
-    // As for clear water in a furnace: rays that are not followed.
-    assert!(error < 0.01, "{error}");
-    let dim = spoiled(
-        "rays/cast",
-        "return light / PI * select(",
-        "return light / 3.4 * select(",
-    );
-    let control = furnace_error(&dim);
-    assert!(control > 0.01, "{control}");
+    for (method, pass) in METHODS {
+        let error = furnace_error(&context(), method);
+        // As for clear water in a furnace: rays that are not followed.
+        assert!(error < 0.01, "{method}: {error}");
+        let dim = spoiled(
+            pass,
+            "return light / PI * select(",
+            "return light / 3.4 * select(",
+        );
+        let control = furnace_error(&dim, method);
+        assert!(control > 0.01, "{method}: {control}");
+    }
 }

@@ -1,5 +1,6 @@
 // Foam of a whitewater stream as a layer on the water's surface: discs in columns over the level
-// axes (render/foam.rs). Needs the bindings of rays_light.wgsl.
+// axes (render/foam.rs). Needs the bindings of cloud.wgsl and ssfr_light.wgsl.
+#import "shared/cloud.wgsl"
 
 // Least and greatest factor on the distances to a disc, by its random number: cells of different
 // sizes, with edges that are arcs. Chosen by eye, as all constants here.
