@@ -17,12 +17,13 @@ struct Cloud {
     // Least corner of the columns of foam along x and z, and their numbers; none without foam.
     foam_corner: vec2f,
     foam_columns: vec2u,
-    // Edge of a column, which is the radius of the kernel, metres.
+    // Edge of a column, metres.
     foam_edge: f32,
     // Index in `cloud_words` of the columns' starts.
     foam_start: u32,
     foam_albedo: f32,
-    pad0: f32,
+    // Largest radius of the kernel, metres.
+    foam_radius: f32,
 }
 
 // Decodes a half-precision value: its bits, shifted to their positions in an f32, represent the

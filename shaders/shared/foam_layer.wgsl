@@ -53,6 +53,23 @@ fn threads(cells: Cells, depth: f32, footprint: f32) -> f32 {
     return mix(lace, 1.0 - exp(-depth), smoothstep(0.15, 0.6, footprint * density));
 }
 
+// Radius of the kernel at a place along x and z, metres: linear between the columns' centres.
+fn kernel_radius(place: vec2f) -> f32 {
+    let last = vec2f(cloud.foam_columns - 1u);
+    let at = clamp((place - cloud.foam_corner) / cloud.foam_edge - 0.5, vec2f(0.0), last);
+    let low = min(floor(at), max(last - 1.0, vec2f(0.0)));
+    let c = vec2u(low);
+    let d = min(c + 1u, cloud.foam_columns - 1u);
+    let wide = cloud.foam_columns.x;
+    let radii = cloud.foam_start + wide * cloud.foam_columns.y + 1u;
+    let near = bitcast<vec2f>(
+        vec2u(cloud_words[radii + c.y * wide + c.x], cloud_words[radii + c.y * wide + d.x]));
+    let far = bitcast<vec2f>(
+        vec2u(cloud_words[radii + d.y * wide + c.x], cloud_words[radii + d.y * wide + d.x]));
+    let across = mix(near, far, at.y - low.y);
+    return mix(across.x, across.y, at.x - low.x);
+}
+
 // Fraction of the surface with normal `n` at `p` that foam covers, over a footprint in metres. Its
 // mean is the coverage 1 − exp(−Σ πr² W) of the discs (domain/level_set/foam.rs). Where a pixel
 // resolves them, it lies on the edges of two mosaics of cells around the discs, a fine one and a
@@ -61,14 +78,18 @@ fn foam_cover(p: vec3f, n: vec3f, footprint: f32) -> f32 {
     if cloud.foam_columns.x == 0u {
         return 0.0;
     }
-    let own = vec2i(floor((p.xz - cloud.foam_corner) / cloud.foam_edge));
-    let low = max(own - 1, vec2i(0));
-    let high = min(own + 1, vec2i(cloud.foam_columns) - 1);
+    let radius = kernel_radius(p.xz);
+    let place = (p.xz - cloud.foam_corner) / cloud.foam_edge;
+    let reach = radius / cloud.foam_edge;
+    let low = max(vec2i(floor(place - reach)), vec2i(0));
+    let high = min(vec2i(floor(place + reach)), vec2i(cloud.foam_columns) - 1);
     if any(low > high) {
         return 0.0;
     }
-    let discs = cloud.foam_start + cloud.foam_columns.x * cloud.foam_columns.y + 1u;
-    let blur = footprint / cloud.foam_edge;
+    let discs = cloud.foam_start + 2u * cloud.foam_columns.x * cloud.foam_columns.y + 1u;
+    let blur = footprint / radius;
+    // The discs' areas are in units of the largest kernel.
+    let larger = cloud.foam_radius / radius;
     var depth = 0.0;
     // Number of discs within the kernel.
     var sites = 0.0;
@@ -81,12 +102,14 @@ fn foam_cover(p: vec3f, n: vec3f, footprint: f32) -> f32 {
         let end = cloud_words[row + u32(high.x) + 1u];
         for (var i = cloud_words[row + u32(low.x)]; i < end; i++) {
             let at = discs + 4u * i;
-            let place = bitcast<vec3f>(
+            let centre = bitcast<vec3f>(
                 vec3u(cloud_words[at], cloud_words[at + 1u], cloud_words[at + 2u]));
-            let d = (place - p) / cloud.foam_edge;
-            let off = dot(d, n);
-            let along = max(dot(d, d) - off * off, 0.0);
+            let d = (centre - p) / radius;
+            let beside = dot(d, n);
+            let along = max(dot(d, d) - beside * beside, 0.0);
             let s = 1.0 - along;
+            // In largest radii, whatever the kernel's own is.
+            let off = beside / larger;
             if s <= 0.0 || abs(off) >= 1.0 {
                 continue;
             }
@@ -98,13 +121,13 @@ fn foam_cover(p: vec3f, n: vec3f, footprint: f32) -> f32 {
             let random = f32(word >> 24u) / 255.0;
             let grown = max(f32(word >> 19u & 31u) / 31.0, 1e-2);
             // Three times the square of the disc's radius.
-            let area = grown * grown * cloud_value(at + 3u, 0u);
+            let area = grown * grown * larger * larger * cloud_value(at + 3u, 0u);
             depth += weight * area;
             sites += 3.0 * weight;
             // Discs smaller than the footprint become fainter instead.
-            let radius = max(sqrt(area / 3.0), blur);
-            bare *= 1.0 - area / (3.0 * radius * radius)
-                * (1.0 - smoothstep(1.0 - SOFT, 1.0 + SOFT, sqrt(along) / radius));
+            let size = max(sqrt(area / 3.0), blur);
+            bare *= 1.0 - area / (3.0 * size * size)
+                * (1.0 - smoothstep(1.0 - SOFT, 1.0 + SOFT, sqrt(along) / size));
             let factor = mix(NEARER, FARTHER, fract(random / LARGE)) / grown;
             let far = factor * sqrt(along);
             fine = with_disc(fine, far, weight / (factor * factor));

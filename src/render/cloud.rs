@@ -138,7 +138,7 @@ pub(super) fn grid(
         foam_edge: foam.edge,
         foam_start: before as u32,
         foam_albedo: foam.albedo,
-        pad0: 0.0,
+        foam_radius: foam.radius,
     };
     let mut words = cloud.table;
     words.extend(shade.depths.iter().map(|depth| depth.to_bits()));

@@ -308,7 +308,7 @@ mirror!(
         foam_edge: f32,
         foam_start: u32,
         foam_albedo: f32,
-        pad0: f32,
+        foam_radius: f32,
     }
 );
 
