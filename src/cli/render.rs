@@ -1,7 +1,7 @@
 //! `swell render CACHE --look LOOK`
 
 use std::path::PathBuf;
-use swell_files::load_look_within;
+use swell_files::load_look_with;
 
 use clap::Args;
 use serde_json::json;
@@ -25,9 +25,12 @@ pub(super) struct RenderArgs {
     /// Look file (TOML).
     #[arg(long, value_name = "LOOK")]
     look: PathBuf,
-    /// Where images go; renders/SHOT-LOOK where left out.
+    /// Where images go; renders/SHOT-LOOK where left out, with each --set behind it.
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
+    /// Override a look key, such as image.samples=8.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
     /// Frames to render, such as 1-240x2; all that are cached where left out.
     #[arg(long, value_name = "RANGE")]
     frames: Option<FrameRange>,
@@ -62,13 +65,13 @@ pub(super) struct RenderArgs {
 }
 
 pub(super) fn run(args: &RenderArgs, progress: &Progress) -> Result<u8, Failure> {
-    let look = load_look_within(&args.look, bake::reach(args.allow_outside))?;
+    let look = load_look_with(&args.look, &args.set, bake::reach(args.allow_outside))?;
     let directory = match &args.output {
         Some(directory) => directory.clone(),
         None => {
             let (manifest, _) = swell_stage::inspect::cache(&args.cache)?;
             let look = args.look.file_stem().unwrap_or_default().to_string_lossy();
-            PathBuf::from("renders").join(format!("{}-{look}", manifest.shot))
+            PathBuf::from("renders").join(folder_of(&manifest.shot, &look, &args.set))
         }
     };
     let request = RenderRequest {
@@ -114,6 +117,26 @@ pub(super) fn run(args: &RenderArgs, progress: &Progress) -> Result<u8, Failure>
         return Ok(interrupt::EXIT_CODE as u8);
     }
     refuse_failed(&outcome.failed)
+}
+
+/// Longest name of a folder, characters; file systems allow 255 bytes.
+const LONGEST: usize = 200;
+
+/// Name of the folder of a look's images, with its overrides: each try has a folder of its own.
+fn folder_of(shot: &str, look: &str, set: &[String]) -> String {
+    let plain = |c: char| match c {
+        c if c.is_ascii_alphanumeric() => Some(c),
+        '.' | '-' | '_' | '=' => Some(c),
+        '[' | ',' | '{' => Some('_'),
+        _ => None,
+    };
+    let mut name = format!("{shot}-{look}");
+    for set in set {
+        name.push('-');
+        name.extend(set.chars().filter_map(plain));
+    }
+    // Where two tries have one name, the second is refused: its folder has another look's images.
+    name.chars().take(LONGEST).collect()
 }
 
 fn dry_run(request: &RenderRequest, progress: &Progress) -> Result<u8, Failure> {

@@ -494,6 +494,45 @@ fn a_new_look_leaves_the_cache_as_it_is() {
 }
 
 #[test]
+fn keys_of_a_look_are_overridden_each_try_in_its_own_folder() {
+    let job = Job::new();
+    job.expect(0, "bake small.toml -o cache --frames 1");
+    let render = "render cache --look look.toml";
+    let png = |folder: &str| fs::read(job.path(folder).join("small.0001.png")).unwrap();
+    job.expect(0, render);
+    job.expect(0, &format!("{render} --set view.exposure_stops=2"));
+    job.expect(
+        0,
+        &format!("{render} --set view.exposure_stops=2 --set ground.colour=[0.1,0.2,0.3]"),
+    );
+    let plain = png("renders/small-look");
+    let bright = png("renders/small-look-view.exposure_stops=2");
+    let other = png("renders/small-look-view.exposure_stops=2-ground.colour=_0.1_0.2_0.3");
+    assert!(plain != bright && bright != other);
+    // What the file says is the same picture as what lies over it.
+    let text = fs::read_to_string(job.path("look.toml")).unwrap();
+    fs::write(
+        job.path("bright.toml"),
+        format!("{text}\n[view]\nexposure_stops = 2\n"),
+    )
+    .unwrap();
+    job.expect(0, "render cache --look bright.toml");
+    assert_eq!(png("renders/small-bright"), bright);
+    // A folder of one try is not filled with another.
+    let folder = "-o renders/small-look-view.exposure_stops=2";
+    let said = job.expect(4, &format!("{render} --set view.exposure_stops=1 {folder}"));
+    assert!(said.contains("--overwrite"), "{said}");
+    for (set, words) in [
+        ("view.exposure=2", "view.exposure"),
+        ("image.samples=0", "image.samples"),
+        ("image.samples", "key=value"),
+    ] {
+        let said = job.expect(2, &format!("{render} --set {set}"));
+        assert!(said.contains(words), "{set}: {said}");
+    }
+}
+
+#[test]
 fn shipped_scenes_load_and_plan() {
     let job = Job::new();
     let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
