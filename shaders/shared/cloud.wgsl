@@ -1,5 +1,5 @@
-// Layout of the drops, bubbles and foam in `cloud_words` (render/cloud.rs). The importing shader must
-// bind `cloud` and `cloud_words`.
+// Layout of the drops, bubbles and foam in `cloud_words` (render/cloud.rs). The importing shader
+// must bind `cloud` and `cloud_words`.
 
 struct Cloud {
     // Least corner, metres from the domain's least corner.

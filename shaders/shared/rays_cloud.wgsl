@@ -1,5 +1,6 @@
-// Drops and bubbles as a sparse grid of optical density (`Cloud` of render/cloud/density.rs), and their
-// integration along rays. The importing shader must bind `cloud`, `cloud_words` and `shading`.
+// Drops and bubbles as a sparse grid of optical density (`Cloud` of render/cloud/density.rs), and
+// their integration along rays. The importing shader must bind `cloud`, `cloud_words` and
+// `shading`.
 #import "shared/box.wgsl"
 #import "shared/cloud.wgsl"
 
