@@ -1,5 +1,7 @@
 //! `swell render CACHE --look LOOK`
 
+mod preview;
+
 use std::path::PathBuf;
 use swell_files::load_look_with;
 
@@ -47,6 +49,16 @@ pub(super) struct RenderArgs {
     /// Take a panorama or a camera that lies outside of the look's folder.
     #[arg(long)]
     allow_outside: bool,
+    /// Show one frame while the look file is edited: replace preview.png in the folder, first small
+    /// and coarse, whenever the file changes, until a signal ends it. index.html there shows it.
+    #[arg(
+        long,
+        requires_all = ["output", "frames"],
+        conflicts_with_all = [
+            "chunk", "number_from", "overwrite", "keep_going", "dry_run", "time_passes"
+        ]
+    )]
+    preview: bool,
     /// Render frames again that exist, also those of another cache or look.
     #[arg(long)]
     overwrite: bool,
@@ -88,6 +100,9 @@ pub(super) fn run(args: &RenderArgs, progress: &Progress) -> Result<u8, Failure>
     };
     if args.dry_run {
         return dry_run(&request, progress);
+    }
+    if args.preview {
+        return preview::run(request, args, progress);
     }
     let interrupt = Interrupt::install_or_warn();
     let outcome = render(&request, interrupt.flag(), &mut |event| {

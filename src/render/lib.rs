@@ -156,6 +156,12 @@ pub enum RenderError {
         /// Frame number.
         frame: u32,
     },
+    /// The caller ended the drawing of the frame.
+    #[error("frame {frame}: its drawing was ended")]
+    Ended {
+        /// Frame number.
+        frame: u32,
+    },
     /// A picture file could not be opened or written.
     #[error("{}: {source}", file.display())]
     Write {

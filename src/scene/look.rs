@@ -252,6 +252,31 @@ impl Look {
         })
     }
 
+    /// Returns the look of the picture alone, without additional outputs, at a `smaller`th of its
+    /// width and height and with at most `samples` samples a pixel.
+    #[must_use]
+    pub fn of_picture(&self, smaller: u32, samples: Option<u32>) -> Self {
+        self.changed(|spec| {
+            let image = &mut spec.image;
+            image.samples = image.samples.min(samples.unwrap_or(u32::MAX));
+            image.width = (image.width / smaller).max(1);
+            image.height = (image.height / smaller).max(1);
+            image.overscan /= smaller;
+            let most = [image.width, image.height].map(f64::from);
+            if let Some(crop) = &mut image.crop {
+                for axis in 0..2 {
+                    let [low, high] = [axis, axis + 2].map(|at| crop[at] / f64::from(smaller));
+                    crop[axis] = low.floor().min(most[axis] - 1.0);
+                    crop[axis + 2] = high.ceil().min(most[axis]);
+                }
+            }
+            spec.output.lights = Vec::new();
+            spec.output.aovs = Vec::new();
+            spec.output.cryptomatte = false;
+            spec.output.formats = vec![FormatSpec::Png];
+        })
+    }
+
     /// Returns the look with a static camera at `position`, metres, that looks at `target`.
     #[must_use]
     pub fn standing(&self, position: DVec3, target: DVec3, focal_length_mm: f64) -> Self {

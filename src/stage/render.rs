@@ -8,6 +8,7 @@ pub mod gallery;
 mod near;
 mod pictures;
 mod plan;
+pub mod preview;
 mod set;
 mod streams;
 pub mod surfaces;
@@ -16,6 +17,7 @@ mod writing;
 
 use std::{
     collections::BTreeMap,
+    ops::ControlFlow,
     path::PathBuf,
     sync::{
         Arc,
@@ -192,6 +194,12 @@ pub enum RenderJobError {
          them"
     )]
     NoNeighbours(u32),
+    /// A preview is of one frame.
+    #[error("a preview shows one frame, and {0} are asked for: choose it with --frames")]
+    NotOneFrame(usize),
+    /// The folder of a preview cannot be written.
+    #[error(transparent)]
+    Output(swell_domain::output::FileError),
     /// The given cache is itself a stream, not a bake.
     #[error("{} is a stream of {of}: render the cache that it was made from, with a look that \
              names the stream", directory.display())]
@@ -245,14 +253,17 @@ impl From<&RenderJobError> for Blame {
                 | RenderError::UnderWater { .. },
             )
             | RenderJobError::NoWater
+            | RenderJobError::NotOneFrame(_)
             | RenderJobError::IsStream { .. }
             | RenderJobError::IntoCache(_)
             | RenderJobError::MissingFeature(_) => Self::Input,
             RenderJobError::Whitewater(_)
+            | RenderJobError::Output(_)
             | RenderJobError::Mesh(_)
             | RenderJobError::NoNeighbours(_)
             | RenderJobError::Render(
                 RenderError::NotFinite { .. }
+                | RenderError::Ended { .. }
                 | RenderError::Write { .. }
                 | RenderError::Format { .. },
             ) => Self::Files,
@@ -579,6 +590,7 @@ impl RenderJob<'_> {
                 written = end_writing(&mut self.writing, outcome, tell);
             }
             tell(RenderEvent::Part { frame, part });
+            ControlFlow::Continue(())
         });
         written?;
         let picture = picture.map_err(|error| told(error, look))?;

@@ -37,6 +37,7 @@ mod cli {
     mod farm;
     mod inspect;
     mod pipeline;
+    mod preview;
     mod shaders;
     mod shell;
     #[cfg(target_os = "linux")]

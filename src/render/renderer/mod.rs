@@ -14,6 +14,8 @@ mod taken;
 mod water;
 mod whitewater;
 
+use std::ops::ControlFlow;
+
 use bytemuck::Pod;
 use glam::DVec3;
 
@@ -192,23 +194,24 @@ impl Renderer {
         frame: u32,
         inputs: &FrameInputs<'_>,
     ) -> Result<Image, RenderError> {
-        self.render_parts(frame, inputs, &mut |_| {})
+        self.render_parts(frame, inputs, &mut |_| ControlFlow::Continue(()))
     }
 
     /// Like [`Renderer::render_inputs`]. Calls `tell` with the progress before the first part of
-    /// the picture and after each one.
+    /// the picture and after each one, until it breaks.
     ///
     /// # Errors
-    /// As for [`Renderer::render_inputs`].
+    /// As for [`Renderer::render_inputs`], and [`RenderError::Ended`] if `tell` breaks.
     pub fn render_parts(
         &mut self,
         frame: u32,
         inputs: &FrameInputs<'_>,
-        tell: &mut dyn FnMut(Part),
+        tell: &mut dyn FnMut(Part) -> ControlFlow<()>,
     ) -> Result<Image, RenderError> {
         let samples = samples_of(&self.look).len();
         let count = samples * self.sample.len() + self.aov_samples().len() * self.aovs.len();
-        let parts = &mut PartProgress::new(count, tell);
+        let parts = &mut PartProgress::new(frame, count, tell);
+        parts.add(0)?;
         let loaded = self.load(frame, inputs)?;
         if let Some(whitewater) = &mut self.whitewater {
             let white = inputs.white;

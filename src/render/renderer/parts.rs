@@ -1,7 +1,10 @@
 //! Splits the drawing of a frame into parts, so that a frame that takes minutes can report
 //! progress.
 
-use std::time::{Duration, Instant};
+use std::{
+    ops::ControlFlow,
+    time::{Duration, Instant},
+};
 
 use super::Renderer;
 use crate::RenderError;
@@ -23,23 +26,34 @@ pub struct Part {
 /// Counts the finished parts of a frame and reports progress.
 pub(super) struct PartProgress<'a> {
     pub(super) part: Part,
-    tell: &'a mut dyn FnMut(Part),
+    frame: u32,
+    tell: &'a mut dyn FnMut(Part) -> ControlFlow<()>,
 }
 
 impl<'a> PartProgress<'a> {
-    /// Starts at none of `count` and reports it.
-    pub(super) fn new(count: usize, tell: &'a mut dyn FnMut(Part)) -> Self {
+    /// Starts at none of `count` parts of a frame.
+    pub(super) fn new(
+        frame: u32,
+        count: usize,
+        tell: &'a mut dyn FnMut(Part) -> ControlFlow<()>,
+    ) -> Self {
         let part = Part {
             done: 0,
             count: u32::try_from(count).unwrap_or(u32::MAX),
         };
-        tell(part);
-        Self { part, tell }
+        Self { part, frame, tell }
     }
 
-    fn add(&mut self, more: usize) {
+    /// Adds finished parts, and reports them.
+    ///
+    /// # Errors
+    /// [`RenderError::Ended`] where the receiver wants no more.
+    pub(super) fn add(&mut self, more: usize) -> Result<(), RenderError> {
         self.part.done += more as u32;
-        (self.tell)(self.part);
+        match (self.tell)(self.part) {
+            ControlFlow::Continue(()) => Ok(()),
+            ControlFlow::Break(()) => Err(RenderError::Ended { frame: self.frame }),
+        }
     }
 }
 
@@ -83,13 +97,13 @@ impl Renderer {
             for recording in recordings {
                 recording.run(&self.program, self.timer.as_mut())?;
                 self.program.context.wait()?;
-                parts.add(1);
+                parts.add(1)?;
             }
         } else {
             let all: Vec<&Recording> = recordings.iter().collect();
             Recording::run_all(&all, &self.program, self.timer.as_mut())?;
             self.program.context.wait()?;
-            parts.add(recordings.len());
+            parts.add(recordings.len())?;
         }
         self.is_slow = begun.elapsed() > SLOW;
         Ok(())

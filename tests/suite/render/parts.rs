@@ -1,5 +1,7 @@
 //! A frame that is rendered in parts reports its progress, and is the same picture.
 
+use std::ops::ControlFlow;
+
 use swell::files::parse_look;
 use swell::render::{FrameInputs, Part, Renderer, WaterParticles};
 
@@ -26,7 +28,10 @@ fn each_part_of_a_frame_is_told_once() {
         let count = bands * (image.samples + aovs);
         let mut renderer = Renderer::with_tile_limit(&context, &look, &scene, 16).unwrap();
         let mut told = Vec::new();
-        let drawn = renderer.render_parts(3, &inputs, &mut |part| told.push(part));
+        let drawn = renderer.render_parts(3, &inputs, &mut |part| {
+            told.push(part);
+            ControlFlow::Continue(())
+        });
         let drawn = drawn.unwrap();
         // A quick sample, such as those after the first here, is reported as one.
         let done: Vec<u32> = told.iter().map(|part| part.done).collect();
