@@ -13,9 +13,10 @@ use swell::{
 
 use crate::support::job::{Job, assert_has};
 
-/// Thresholds low enough for the small splash of a job, and lifetimes as short as the shot.
-const SETTINGS: &str = "[emission]\ntrapped_air = [0.2, 2.0]\nwave_crest = [0.2, 2.0]\n\
-    energy = [0.02, 0.5]\n\
+/// Thresholds low enough and rates high enough for the small splash of a job, and lifetimes as
+/// short as the shot.
+const SETTINGS: &str = "[emission]\ntrapped_air = [0.01, 0.1]\nwave_crest = [0.2, 2.0]\n\
+    energy = [0.02, 0.5]\ntrapped_air_rate = 1e5\nwave_crest_rate = 2.5e5\n\
     [foam]\nlifetime = [0.02, 0.1]\n";
 const MAKE: &str = "whitewater cache/small/pbf --settings tuned.toml";
 const STREAM: &str = "cache/small/pbf/whitewater/tuned";
