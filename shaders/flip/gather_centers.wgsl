@@ -15,6 +15,8 @@
 #endif
 #ifdef BAND
 @group(0) @binding(6) var<storage, read> deep_depth: array<f32>;
+
+const SEAM = 2.0;
 #endif
 
 // Integral of the hat function from minus infinity to t.
@@ -74,8 +76,9 @@ fn main(
 #endif
     let relative = sum * params.particle_share / room;
 #ifdef BAND
-    // Below the band the water is full, whatever particles are left in it.
-    density[element] = select(relative, 1.0, deep_depth[element] >= params.band);
+    // At the band's end and below it the water is full, whatever particles are in it: errors of
+    // density there would be sources of volume in step with the waves above.
+    density[element] = select(relative, 1.0, deep_depth[element] >= params.band - SEAM);
 #else
     density[element] = relative;
 #endif

@@ -27,6 +27,12 @@ pub const HYSTERESIS: f32 = 1.0;
 /// Faces between cells at least as deep as the band less this take the velocity of the depth.
 pub const OVERLAP: f32 = 1.0;
 
+/// Cells at least as deep as the band less this count as full: their particles have come across the
+/// band's end, or go across it, and no particles beyond it make up for those. As a density such
+/// errors would be sources of volume in step with the waves above, which takes a tenth of the
+/// height of waves that enter still water.
+pub const SEAM: f32 = 2.0;
+
 /// Cells at least as deep as the band less this are listed: what moves with the water within a
 /// frame is interpolated between them.
 pub const LISTED: f32 = 3.0;
@@ -121,7 +127,8 @@ impl Band {
         let comes = self.coming(&counts, &field.depth, &depth);
         let refilled = self.refill(particles, &bricks, &field, comes, (frame, next_id));
         let settled = self.settle(particles, &bricks, &field, &depth);
-        let seams = (&bricks, &field, &depth[..]);
+        let counts = self.counts(particles, &bricks);
+        let seams = (&bricks, &field, &depth[..], &counts[..]);
         let balanced = self.balance(particles, seams, amount, (frame, next_id));
         if *next_id > FILLED {
             return Err(BandError::NoIds);
@@ -274,13 +281,14 @@ impl Band {
         relaid
     }
 
-    /// Adds or removes a particle in cells at the band's end until the water has its `amount`.
-    /// Cells that become deep have a few particles more or less than a full cell, which would add
-    /// up.
+    /// Adds or removes a particle in cells at the band's end until the water has its `amount`,
+    /// first in those that lack most, or have most beyond a full cell: there the particles were
+    /// lost or won, and elsewhere the surface would rise or fall. Cells that become deep have a few
+    /// particles more or less than a full cell, which would add up.
     fn balance(
         &self,
         particles: &mut Particles,
-        (bricks, field, depth): (&Bricks, &Cells, &[f32]),
+        (bricks, field, depth, counts): (&Bricks, &Cells, &[f32], &[u16]),
         amount: usize,
         (frame, next_id): (u32, &mut u32),
     ) -> Relaid {
@@ -293,9 +301,14 @@ impl Band {
             depth[*element] > band - 1.0 && depth[*element] <= band && field.depth[*element] > 0.0
         };
         let mut cells: Vec<usize> = (CELLS as usize..depth.len()).filter(is_end).collect();
-        cells.sort_by_key(|element| hash(bricks.cell(*element as u32), frame, u32::MAX));
+        let is_over = now > amount;
+        cells.sort_by_key(|element| {
+            let count = i32::from(counts[*element]);
+            let first = if is_over { -count } else { count };
+            (first, hash(bricks.cell(*element as u32), frame, u32::MAX))
+        });
         cells.truncate(now.abs_diff(amount));
-        if now > amount {
+        if is_over {
             let mut chosen: BTreeSet<usize> = cells.into_iter().collect();
             let places = parallel::map_slice(&particles.position, |x| self.element(bricks, *x));
             let keep: Vec<bool> = places.iter().map(|place| !chosen.remove(place)).collect();

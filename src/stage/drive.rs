@@ -231,9 +231,10 @@ impl<'a> Drive<'a> {
     /// A device error, invalid numbers, or an exceeded budget if budgets are checked.
     pub fn advance(&mut self) -> Result<ComputedFrame, SolverError> {
         let begin = Instant::now();
-        let mut step = self.behind.read(self.ahead.compute()?)?;
+        let mut step = self.behind.open(self.ahead.compute()?)?;
+        self.relay(&mut step)?;
+        self.behind.check(&mut step)?;
         step.report.exchange = self.exchange(&mut step.particles)?;
-        self.relay(&mut step.particles)?;
         step.next_id = self.changes_particles().then_some(self.next_id);
         step.seconds = begin.elapsed().as_secs_f64();
         Ok(step)
@@ -244,19 +245,20 @@ impl<'a> Drive<'a> {
         self.sources.is_some() || self.band.is_some()
     }
 
-    /// Lays the band anew at the end of the frame, if the scene has one.
-    fn relay(&mut self, particles: &mut Particles) -> Result<(), SolverError> {
-        let (Some(band), frame) = (&self.band, self.ahead.frame) else {
+    /// Lays the band anew at the end of the frame, if the scene has one, and reports the energies
+    /// of the water that the next frame begins with: until then it may lack particles or have too
+    /// many.
+    fn relay(&mut self, step: &mut ComputedFrame) -> Result<(), SolverError> {
+        let (Some(band), frame) = (&self.band, step.frame) else {
             return Ok(());
         };
-        let laid = band.relay(particles, (frame, self.amount), &mut self.next_id);
+        let laid = band.relay(&mut step.particles, (frame, self.amount), &mut self.next_id);
         laid.map_err(|error| SolverError::Band { frame, error })?;
-        self.amount = particles.amount();
-        self.ahead.solver.load(frame, particles)?;
-        if let Some(watch) = &mut self.behind.watch {
-            watch.take_over(particles);
-        }
-        Ok(())
+        self.amount = step.particles.amount();
+        let laid = self.scene.report(&step.particles, [].into_iter());
+        step.report.kinetic_energy = laid.kinetic_energy;
+        step.report.potential_energy = laid.potential_energy;
+        self.ahead.solver.load(frame, &step.particles)
     }
 
     /// Runs emitters and drains at the end of the frame, if the scene has any.
@@ -417,13 +419,18 @@ impl Ahead<'_> {
 
 impl Behind<'_> {
     fn read(&mut self, computed: Computed) -> Result<ComputedFrame, SolverError> {
-        let (particles, mut report) = computed.unread.read()?;
-        let watched = match &mut self.watch {
-            Some(watch) => watch.look(&particles, &mut report),
-            None => Ok(()),
-        };
+        let mut step = self.open(computed)?;
+        self.check(&mut step)?;
+        Ok(step)
+    }
+
+    /// Reads a frame and checks that all of its particles are there.
+    fn open(&mut self, computed: Computed) -> Result<ComputedFrame, SolverError> {
+        let (particles, report) = computed.unread.read()?;
         self.report = Some(report.clone());
-        watched?;
+        if let Some(watch) = &self.watch {
+            watch.inspect(&particles)?;
+        }
         Ok(ComputedFrame {
             frame: computed.frame,
             particles,
@@ -433,6 +440,16 @@ impl Behind<'_> {
             looks: computed.looks,
             seconds: computed.begin.elapsed().as_secs_f64(),
         })
+    }
+
+    /// Checks a frame's budgets.
+    fn check(&mut self, step: &mut ComputedFrame) -> Result<(), SolverError> {
+        let watched = match &mut self.watch {
+            Some(watch) => watch.look(&step.particles, &mut step.report),
+            None => Ok(()),
+        };
+        self.report = Some(step.report.clone());
+        Ok(watched?)
     }
 }
 

@@ -69,7 +69,19 @@ impl<'a> Watch<'a> {
         self.before.start_volume
     }
 
-    /// Checks the next frame, and adds to its report what was measured for this.
+    /// Checks that all particles of the next frame are there, within the domain and finite.
+    ///
+    /// # Errors
+    /// If they are not.
+    pub(super) fn inspect(&self, particles: &Particles) -> Result<(), Breach> {
+        match particles.first_not_finite(None) {
+            Some((count, first)) => Err(Breach::not_finite(self.frame, count, Some(first))),
+            None => self.count(particles),
+        }
+    }
+
+    /// Checks the next frame, and adds to its report what was measured for this. What a band took
+    /// out and put in is in the state and in the report's energies.
     ///
     /// # Errors
     /// The first budget that it exceeds.
@@ -79,10 +91,7 @@ impl<'a> Watch<'a> {
         report: &mut StepReport,
     ) -> Result<(), Breach> {
         let (scene, n) = (self.scene, particles.amount());
-        if let Some((count, first)) = particles.first_not_finite(None) {
-            return Err(Breach::not_finite(self.frame, count, Some(first)));
-        }
-        self.count(particles)?;
+        self.id.clone_from(&particles.id);
         report.volume = scene.budget.volume.map(|_| volume_of(scene, particles));
         let budget = &scene.budget;
         budget.check_frame(scene, self.frame, n, report, &self.before)?;

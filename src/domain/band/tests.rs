@@ -217,3 +217,41 @@ fn the_amount_is_kept_one_particle_in_a_cell() {
         assert!(water.id.is_sorted_by(|a, b| a < b));
     }
 }
+
+/// A particle that a cell at the band's end has lost comes back there, and one that a cell has
+/// gained goes from there.
+#[test]
+fn lost_particles_come_back_where_they_were_lost() {
+    let (cells, height) = ([9, 40, 10], 30);
+    let band = band(cells, 4);
+    let mut water = tank(cells, height);
+    band.enter(&mut water);
+    let amount = water.amount();
+    let places = [[4, 26, 5], [0, 26, 9], [8, 26, 3]];
+    let count = |water: &Particles, place: &[u32; 3]| {
+        let is_in = |x: &&[f32; 3]| band.cell(**x) == *place;
+        water.position.iter().filter(is_in).count()
+    };
+    let mut fewer = water.clone();
+    let mut left = places.to_vec();
+    let keep: Vec<bool> = (water.position.iter())
+        .map(|x| {
+            let found = left.iter().position(|place| band.cell(*x) == *place);
+            found.map(|k| left.swap_remove(k)).is_none()
+        })
+        .collect();
+    fewer.retain(&keep);
+    let mut more = water.clone();
+    for (k, place) in places.iter().enumerate() {
+        more.position.push(place.map(|k| k as f32 + 0.5));
+        more.velocity.push([0.0; 3]);
+        more.id.push(900_000 + k as u32);
+    }
+    for (mut water, before) in [(fewer, 7), (more, 9)] {
+        assert!(places.iter().all(|place| count(&water, place) == before));
+        band.relay(&mut water, (3, amount), &mut 1_000_000)
+            .expect("thick enough");
+        assert_eq!(water.amount(), amount);
+        assert!(places.iter().all(|place| count(&water, place) == 8));
+    }
+}

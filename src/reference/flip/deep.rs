@@ -8,7 +8,7 @@ use super::{
     to_particles::velocity_at,
 };
 use swell_domain::{
-    band::OVERLAP,
+    band::{OVERLAP, SEAM},
     bricks::{Bricks, CELLS},
     deep::Deep,
 };
@@ -101,11 +101,12 @@ pub fn place_deep(
     depth
 }
 
-/// Makes cells below the band full, whatever particles are left in them.
+/// Makes cells full that are at least as deep as the band less [`SEAM`], whatever particles are in
+/// them.
 pub fn fill_deep(model: &Model, depth: &[f64], density: &mut [f64]) {
-    let band = f64::from(model.settings().band.unwrap_or(0));
+    let full = f64::from(model.settings().band.unwrap_or(0)) - f64::from(SEAM);
     for (density, depth) in density.iter_mut().zip(depth) {
-        if *depth >= band {
+        if *depth >= full {
             *density = 1.0;
         }
     }

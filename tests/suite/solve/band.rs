@@ -113,8 +113,7 @@ impl Wave {
     }
 }
 
-/// Kinetic energy of each frame, J: of a state, the potential energy errs by some particles' worth
-/// where cells become deep.
+/// Kinetic energy of each frame, J.
 fn energies(context: &Context, band: Option<u32>, periods: f64, fault: Fault) -> Vec<f64> {
     let (length, deep) = (24, 20);
     let (mut scene, mut particles) = tank([length, 28, 4], deep);
@@ -197,3 +196,25 @@ const DAMPED: InjectedFault = InjectedFault {
     from: "return clamp(sum, least, most);",
     to: "return 0.99 * clamp(sum, least, most);",
 };
+
+/// The energies of a frame's report are those of the state that it stores, and not of the water
+/// before its band is laid anew.
+#[test]
+fn a_frame_reports_the_energy_of_the_state_that_it_stores() {
+    let (mut scene, mut particles) = tank([24, 28, 4], 20);
+    scene.shot.frames_per_second = RATE;
+    let wave = Wave {
+        length: 24.0 * DX,
+        depth: 20.0 * DX,
+        amplitude: DX,
+    };
+    wave.add_to(&mut particles);
+    flip(&mut scene).band = Some(4);
+    scene.band().unwrap().enter(&mut particles);
+    follow(&context(), &scene, &particles, 10, |_, frame| {
+        let stored = scene.report(&frame.particles, [].into_iter());
+        let both = |report: &StepReport| [report.kinetic_energy, report.potential_energy];
+        assert_eq!(both(&frame.report), both(&stored), "frame {}", frame.frame);
+        assert_eq!(frame.particles.amount(), 20 * 24 * 4 * 8);
+    });
+}
