@@ -132,6 +132,7 @@ fn render(error: &RenderJobError) -> Hint {
     match error {
         RenderJobError::Look(error) => look(error),
         RenderJobError::Gpu(error) => device(error),
+        RenderJobError::NotOneFrame(_) => Some("--frames".into()),
         RenderJobError::Folder(render::FolderError::Other { .. }) => Some("-o, --overwrite".into()),
         RenderJobError::Folder(
             render::FolderError::Left { .. } | render::FolderError::InUse { .. },

@@ -55,7 +55,9 @@ impl Shown {
     }
 
     fn end(mut self) -> Option<i32> {
-        let killed = Command::new("kill").arg(self.child.id().to_string()).status();
+        let killed = Command::new("kill")
+            .arg(self.child.id().to_string())
+            .status();
         assert!(killed.unwrap().success());
         self.child.wait().unwrap().code()
     }
@@ -69,7 +71,10 @@ fn a_preview_follows_the_look_and_ends_with_the_picture_of_a_render() {
     let all = [[16, 9, 1], [64, 36, 1], [64, 36, 3]];
     let picture = || fs::read(job.path("shown/preview.png")).unwrap();
     let rendered = |folder: &str| {
-        job.expect(0, &format!("render cache --look look.toml --frames 1 -o {folder}"));
+        job.expect(
+            0,
+            &format!("render cache --look look.toml --frames 1 -o {folder}"),
+        );
         fs::read(job.path(folder).join("small.0001.png")).unwrap()
     };
 
@@ -77,11 +82,19 @@ fn a_preview_follows_the_look_and_ends_with_the_picture_of_a_render() {
     assert_eq!(shown.steps(), all);
     let first = picture();
     assert_eq!(first, rendered("first"));
-    assert!(fs::read_to_string(job.path("shown/index.html")).unwrap().contains("preview.png"));
+    assert!(
+        fs::read_to_string(job.path("shown/index.html"))
+            .unwrap()
+            .contains("preview.png")
+    );
 
     // A comment changes nothing, another sun does.
     job.edit("look.toml", "[sun]", "# low\n[sun]");
-    job.edit("look.toml", "elevation_degrees = 35.0", "elevation_degrees = 15.0");
+    job.edit(
+        "look.toml",
+        "elevation_degrees = 35.0",
+        "elevation_degrees = 15.0",
+    );
     assert_eq!(shown.steps(), all);
     let low = picture();
     assert_ne!(low, first);
@@ -90,7 +103,10 @@ fn a_preview_follows_the_look_and_ends_with_the_picture_of_a_render() {
     // A look that cannot be read is told, and the picture stays until it can.
     job.edit("look.toml", "[sun]", "[sum]");
     let refused = shown.next("refused");
-    assert!(refused["error"].as_str().unwrap().contains("sum"), "{refused}");
+    assert!(
+        refused["error"].as_str().unwrap().contains("sum"),
+        "{refused}"
+    );
     assert_eq!(picture(), low);
     job.edit("look.toml", "[sum]", "[sun]");
     assert_eq!(shown.steps(), all);
