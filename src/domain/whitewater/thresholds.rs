@@ -14,9 +14,6 @@ const INCEPTION_ENERGY: f64 = 0.5 * INCEPTION * INCEPTION;
 /// Ratio of the upper threshold of energy to the lower: from there on a speed of twice
 /// [`INCEPTION`].
 const SPAN: f64 = 4.0;
-/// Quantile of the moving water that is the shot's fast water. A higher one would be set by lone
-/// falling drops.
-const FAST: f64 = 0.9;
 /// Σ (1 − n·n') W over a surface of π (h/d)² particles within h, with a mean weight of 1/3, where
 /// all its normals are orthogonal to the particle's own: on the edge of a thin sheet.
 const EDGE: f64 = std::f64::consts::PI * SUPPORT * SUPPORT / 3.0;
@@ -91,15 +88,16 @@ pub struct ShotScale {
 }
 
 impl ShotScale {
-    /// Calibrates the scale on the specific energies, J/kg, of a shot's water: those of its moving
-    /// tenth that is fastest. `extent` is the least extent of the domain, metres, which bounds the
+    /// Calibrates the scale on the specific energies e, J/kg, of a shot's water: on Σe³/Σe² of what
+    /// moves. A small part of the water that is much faster than the rest, as the jet of a breaker,
+    /// counts, and a lone drop does not. `extent` is the least extent of the domain, metres, which bounds the
     /// head.
     pub fn calibrate(energies: &[f64], gravity: f64, extent: f64) -> Self {
-        let mut moving: Vec<f64> = energies.to_vec();
-        moving.retain(|energy| *energy >= INCEPTION_ENERGY);
-        moving.sort_unstable_by(f64::total_cmp);
-        let fast = moving.get((FAST * moving.len() as f64) as usize);
-        let energy = fast.copied().unwrap_or(0.0).max(SPAN * INCEPTION_ENERGY);
+        let moving = energies.iter().filter(|&&energy| energy >= INCEPTION_ENERGY);
+        let add = |[squares, cubes]: [f64; 2], e: &f64| [squares + e * e, cubes + e * e * e];
+        let [squares, cubes] = moving.fold([0.0; 2], add);
+        let fast = if squares > 0.0 { cubes / squares } else { 0.0 };
+        let energy = fast.max(SPAN * INCEPTION_ENERGY);
         Self {
             head: rounded((energy / gravity).min(extent)),
             speed: rounded((2.0 * energy).sqrt()),
@@ -128,14 +126,14 @@ impl ShotScale {
 }
 
 /// Whitewater born of a cube of one head that water closes.
-const AIR_IN_HEAD: f64 = 10_000.0;
+const AIR_IN_HEAD: f64 = 35_000.0;
 /// Whitewater born of a cube of one head of water in crests, in the time in which fast water moves
 /// by it.
-const CREST_IN_HEAD: f64 = 60_000.0;
+const CREST_IN_HEAD: f64 = 260_000.0;
 /// Radii of whitewater, heads.
-const RADII: [f64; 2] = [0.0022, 0.0072];
+const RADII: [f64; 2] = [0.001_45, 0.004_75];
 /// Foam on a square of one head from which on it dies faster.
-const CROWD: f64 = 8000.0;
+const CROWD: f64 = 18_400.0;
 
 /// Rounds to three significant digits.
 fn rounded(value: f64) -> f64 {
@@ -158,12 +156,22 @@ mod tests {
         let calm = ShotScale::calibrate(&[0.125; 100], 9.81, 10.0);
         assert_eq!(calm, ShotScale::calibrate(&[], 9.81, 10.0));
         assert_eq!((calm.head, calm.speed), (0.204, 2.0));
-        // Water at rest beside it does not matter; the fastest tenth begins at 9.1 J/kg.
+        // Water at rest beside it does not matter. Of even energies from 0.5 to 10.1 J/kg it is
+        // 3/4 (10.1⁴ − 0.5⁴) / (10.1³ − 0.5³) = 7.57.
         let mut wild: Vec<f64> = (0..1000).map(|k| 0.01 * f64::from(k) + 0.1).collect();
         let scale = ShotScale::calibrate(&wild, 9.81, 10.0);
         wild.extend([0.0; 5000]);
         assert_eq!(scale, ShotScale::calibrate(&wild, 9.81, 10.0));
-        assert!((scale.head * 9.81 / 9.14 - 1.0).abs() < 0.01, "{scale:?}");
+        assert!((scale.head * 9.81 / 7.57 - 1.0).abs() < 0.01, "{scale:?}");
+        // A jet that is a hundredth of what moves decides, a drop in a million does not.
+        let mut jet = vec![1.0; 99_000];
+        jet.extend([30.0; 1000]);
+        let with_jet = ShotScale::calibrate(&jet, 9.81, 10.0);
+        assert!(with_jet.head * 9.81 > 25.0, "{with_jet:?}");
+        let mut drop = vec![10.0; 1_000_000];
+        drop.push(100.0);
+        let with_drop = ShotScale::calibrate(&drop, 9.81, 10.0);
+        assert!((with_drop.head * 9.81 / 10.0 - 1.0).abs() < 0.01, "{with_drop:?}");
         // Without gravity the domain bounds it.
         assert_eq!(ShotScale::calibrate(&wild, 0.0, 3.0).head, 3.0);
     }

@@ -267,7 +267,7 @@ fn checked_pictures_are_drawn_from_the_frames_around_them() {
 fn a_picture_by_edited_shaders_says_so_and_stays_apart() {
     let job = job(&["same", "edit"]);
     job.edit(
-        "edit/ssfr/shade.wgsl",
+        "edit/shared/ssfr_water.wgsl",
         "let n = shading.index;",
         "let n = 1.2 * shading.index;",
     );
@@ -318,7 +318,7 @@ fn a_folder_that_is_not_whole_or_does_not_compile_is_refused_with_its_place() {
     }
     job.expect(0, "bake small.toml --frames 1-1 -o cache");
     job.edit(
-        "broken/ssfr/shade.wgsl",
+        "broken/shared/ssfr_water.wgsl",
         "let n = shading.index;",
         "let n = shading.no_such;",
     );
