@@ -90,8 +90,8 @@ pub struct ShotScale {
 impl ShotScale {
     /// Calibrates the scale on the specific energies e, J/kg, of a shot's water: on Σe³/Σe² of what
     /// moves. A small part of the water that is much faster than the rest, as the jet of a breaker,
-    /// counts, and a lone drop does not. `extent` is the least extent of the domain, metres, which bounds the
-    /// head.
+    /// counts, and a lone drop does not. `extent` is the least extent of the domain, metres, which
+    /// bounds the head.
     pub fn calibrate(energies: &[f64], gravity: f64, extent: f64) -> Self {
         let moving = energies.iter().filter(|&&energy| energy >= INCEPTION_ENERGY);
         let add = |[squares, cubes]: [f64; 2], e: &f64| [squares + e * e, cubes + e * e * e];
