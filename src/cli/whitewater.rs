@@ -116,7 +116,9 @@ pub(super) fn run(args: &WhitewaterArgs, progress: &Progress) -> Result<u8, Fail
         interrupted: outcome.interrupted,
     };
     let words = match outcome.interrupted && outcome.frames == 0 && !outcome.directory.exists() {
-        true => "ended by a signal while rates were calibrated; nothing was written".to_owned(),
+        true => {
+            "ended by a signal while thresholds were calibrated; nothing was written".to_owned()
+        }
         false => ended.words(),
     };
     let code = ended.conclude(progress, &words);
@@ -179,7 +181,7 @@ fn dry_run(request: &WhitewaterRequest, progress: &Progress) -> Result<u8, Failu
 fn tell(progress: &Progress, event: WhitewaterEvent) {
     match event {
         WhitewaterEvent::Calibrated { done, count } => progress.part(
-            "rates are calibrated on the shot's frames",
+            "thresholds are calibrated on the shot's frames",
             (done as u64, count as u64),
             json!({ "of": "calibration" }),
         ),
@@ -188,7 +190,7 @@ fn tell(progress: &Progress, event: WhitewaterEvent) {
             software_warning,
             water,
             directory,
-            rates: [air, crest],
+            thresholds,
             calibrated_on,
             first,
             last,
@@ -196,22 +198,29 @@ fn tell(progress: &Progress, event: WhitewaterEvent) {
             let frames = u64::from((last + 1).saturating_sub(first));
             progress.begin(frames);
             progress.warn_of_adapter(software_warning.as_deref());
+            let [air, crest, energy] = [
+                thresholds.trapped_air,
+                thresholds.wave_crest,
+                thresholds.energy,
+            ]
+            .map(|[least, greatest]| format!("{least} to {greatest}"));
             let source = match calibrated_on {
                 Some(frames) => format!("calibrated on {}", count(frames as u64, "frame")),
                 None => "as given".to_owned(),
             };
             progress.say(
                 &format!(
-                    "on {device}\n{} of water, into {}\nrates, {source}: {air} of a cubic metre \
-                     that water closes, {crest} a second of one in crests",
+                    "on {device}\n{} of water, into {}\nthresholds, {source}: trapped air {air} \
+                     m/s, wave crest {crest}, energy \
+                     {energy} J/kg",
                     count(water as u64, "particle"),
                     directory.display(),
                 ),
                 json!({
                     "event": "ready", "device": device.to_string(), "water": water,
                     "directory": output::path(&directory),
-                    "trapped_air_rate": air, "wave_crest_rate": crest,
-                    "calibrated_on": calibrated_on, "first": first, "last": last,
+                    "thresholds": thresholds, "calibrated_on": calibrated_on, "first": first,
+                    "last": last,
                     "frames": frames,
                 }),
             );

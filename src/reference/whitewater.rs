@@ -12,8 +12,8 @@ use swell_domain::{
     parallel,
     particles::Particles,
     whitewater::{
-        AIR_BELOW, CLOSING, CalibratedSettings, FLIGHT_STEPS, HALVINGS, KIND, OUTWARD, Potentials,
-        SURFACE, WhitewaterKind,
+        AIR_BELOW, CalibratedSettings, FLIGHT_STEPS, HALVINGS, KIND, OUTWARD, Potentials, SURFACE,
+        WhitewaterKind,
     },
 };
 use swell_scene::PbfScene;
@@ -60,8 +60,6 @@ pub struct White {
     pub velocity: DVec3,
     /// Kind.
     pub kind: WhitewaterKind,
-    /// Speed at which it rises as a bubble, m/s.
-    pub rise: f64,
 }
 
 /// A whitewater particle after a frame, with the margin of the decisions made on its path.
@@ -165,14 +163,14 @@ impl SortedWater {
     pub fn potentials(&self, i: usize, surveyed: &[Surveyed]) -> Potentials {
         let h = self.model.calibration.support_radius;
         let (own, v) = (&surveyed[i], self.velocity[i]);
-        let (mut closing, mut crest) = (0.0, 0.0);
+        let (mut trapped_air, mut crest) = (0.0, 0.0);
         self.about(self.points[i], |neighbor, way| {
             let Neighbor::Water(j) = neighbor else {
                 return;
             };
             let w = (1.0 - way.length() / h).max(0.0);
             let (against, along) = (v - self.velocity[j], way.normalize_or_zero());
-            closing += (-against.dot(along)).max(0.0) * w;
+            trapped_air += (against.length() - against.dot(along)) * w;
             let other = &surveyed[j];
             let behind = (4.0 * along.dot(own.normal)).clamp(0.0, 1.0);
             crest += (1.0 - own.normal.dot(other.normal)) * other.sure * behind * w;
@@ -182,7 +180,7 @@ impl SortedWater {
         let [least, full] = OUTWARD;
         let outward = ((cosine - least) / (full - least)).clamp(0.0, 1.0);
         Potentials {
-            trapped_air: CLOSING * closing * own.sure,
+            trapped_air,
             wave_crest: crest * own.sure * outward,
             energy: 0.5 * speed * speed,
             share: own.share,
@@ -271,7 +269,9 @@ impl SortedWater {
             velocity = before + seconds * pull.at(start);
         } else if !is_drop {
             let (rise, kept) = match white.kind {
-                WhitewaterKind::Bubble => (white.rise, (-seconds / settings.response).exp()),
+                WhitewaterKind::Bubble => {
+                    (settings.rise_speed, (-seconds / settings.response).exp())
+                }
                 WhitewaterKind::Foam | WhitewaterKind::Spray => (0.0, 0.0),
             };
             let aim = water.velocity - rise * gravity.normalize_or_zero();
@@ -284,7 +284,6 @@ impl SortedWater {
             position: place,
             velocity,
             kind: WhitewaterKind::of_share(water.share),
-            rise: white.rise,
         };
         Moved {
             white,
@@ -415,7 +414,6 @@ impl Whitewater {
                 velocity: wide(white.velocity[k]),
                 kind: WhitewaterKind::of_number(white.attributes[KIND][k])
                     .unwrap_or(WhitewaterKind::Foam),
-                rise: f64::from(settings.rise_of(white.id[k]) as f32),
             };
             water.advance(settings, &pull, *seconds, one).white
         };

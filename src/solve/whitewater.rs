@@ -13,8 +13,8 @@ use swell_domain::{
     solver::PassTime,
     sph::Calibration,
     whitewater::{
-        AIR_BELOW, CLOSING, CalibratedSettings, FLIGHT_STEPS, HALVINGS, KIND, OUTWARD, Potentials,
-        SURFACE, WATER_ABOVE,
+        AIR_BELOW, CalibratedSettings, FLIGHT_STEPS, HALVINGS, KIND, OUTWARD, Potentials, SURFACE,
+        WATER_ABOVE,
     },
 };
 use swell_gpu::{
@@ -39,12 +39,11 @@ pub const SHARE: Buf<f32> = Buf::new("share");
 /// Outward surface normal at each water particle, in sorted order, and in w the confidence that it
 /// is at the surface, 0 to 1.
 pub const SURFACE_AT: Buf<[f32; 4]> = Buf::new("surface");
-/// Closing speed, m/s, wave crest, energy, J/kg, and water fraction, in sorted order.
+/// Trapped air, m/s, wave crest, energy, J/kg, and water fraction, in sorted order.
 pub const POTENTIAL: Buf<[f32; 4]> = Buf::new("potential");
 /// Position x, y, z of each whitewater particle, and its kind in w.
 pub const WHITE_POSITION: Buf<[f32; 4]> = Buf::new("white_position");
-/// Velocity of each whitewater particle, and in w its speed of rise as a bubble, m/s, before a
-/// frame, and the water fraction around it after one.
+/// Velocity of each whitewater particle, and in w the water fraction around it after a frame.
 pub const WHITE_VELOCITY: Buf<[f32; 4]> = Buf::new("white_velocity");
 /// Number of whitewater particles, in the first component.
 pub const WHITE_COUNT: Buf<[u32; 4]> = Buf::uniform("white_count");
@@ -143,11 +142,7 @@ fn pass(
             vec![("SURFACE_LEAST", SURFACE[0]), ("SURFACE_FULL", SURFACE[1])]
         }
         ("whitewater/potentials", _) => {
-            vec![
-                ("OUTWARD_LEAST", OUTWARD[0]),
-                ("OUTWARD_FULL", OUTWARD[1]),
-                ("CLOSING", CLOSING),
-            ]
+            vec![("OUTWARD_LEAST", OUTWARD[0]), ("OUTWARD_FULL", OUTWARD[1])]
         }
         (ADVANCE, Some(settings)) => {
             let own = vec![
@@ -155,6 +150,7 @@ fn pass(
                 ("WATER_ABOVE", WATER_ABOVE),
                 ("FLIGHT_STEPS", f64::from(FLIGHT_STEPS)),
                 ("HALVINGS", f64::from(HALVINGS)),
+                ("RISE_SPEED", settings.rise_speed),
                 ("RESPONSE", settings.response),
             ];
             let of_forces = match has_forces {
@@ -329,8 +325,7 @@ impl Whitewater {
     ///
     /// # Panics Panics if [`Self::set`] was not called.
     pub fn advance(&mut self, white: &mut Particles, frame: u32) -> Result<(), SolveError> {
-        let settings = self.settings.as_ref();
-        let settings = settings.expect("settings come before moves");
+        assert!(self.settings.is_some(), "settings come before moves");
         let n = white.len();
         if n == 0 {
             return Ok(());
@@ -351,7 +346,7 @@ impl Whitewater {
         });
         let velocity = parallel::map_slice(&order, |k| {
             let [x, y, z] = white.velocity[at(k)];
-            [x, y, z, settings.rise_of(white.id[at(k)]) as f32]
+            [x, y, z, 0.0]
         });
         self.program.upload(WHITE_POSITION, 0, &position);
         self.program.upload(WHITE_VELOCITY, 0, &velocity);

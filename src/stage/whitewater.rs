@@ -24,7 +24,7 @@ use swell_domain::{
     bounds::Bounds,
     mesh_file,
     particles::Particles,
-    whitewater::{self, Births, CalibratedSettings, KillDomain, KillRoom, SeedWater},
+    whitewater::{self, Births, CalibratedSettings, KillDomain, KillRoom, SeedWater, Thresholds},
 };
 use swell_files::whitewater::{WhitewaterSettings, kill_asset, written_out};
 use swell_gpu::adapter::Needs;
@@ -75,14 +75,14 @@ pub struct WhitewaterRequest {
 /// Progress of a running job.
 #[derive(Clone, Debug)]
 pub enum WhitewaterEvent {
-    /// Progress of the calibration on the shot: sent before the first frame and after each.
+    /// Progress of the calibration of thresholds: sent before the first frame and after each.
     Calibrated {
         /// Number of frames evaluated.
         done: usize,
         /// Number of frames to evaluate.
         count: usize,
     },
-    /// The device is open, and the settings are complete.
+    /// The device is open, and the thresholds are known.
     Ready {
         /// Adapter and driver, or the f64 reference.
         device: Identity,
@@ -92,8 +92,8 @@ pub enum WhitewaterEvent {
         water: usize,
         /// Directory of the stream.
         directory: PathBuf,
-        /// Born of a cubic metre that water closes, 1/m³, and a second of one in crests, 1/(m³ s).
-        rates: [f64; 2],
+        /// The thresholds in use.
+        thresholds: Thresholds,
         /// Number of frames they were calibrated on by this run; `None` if the settings or an
         /// earlier run provide them.
         calibrated_on: Option<usize>,
@@ -174,7 +174,12 @@ pub fn whitewater(
     let (settings, calibrated_on) = match &standing {
         Some(stream) => (recorded(stream, &directory, &scene)?, None),
         None => {
-            let settled = settle(request, &scene, &mut water, (stop, &mut *tell))?;
+            let settled = settle(
+                request,
+                &scene,
+                (&mut engine, &mut water),
+                (stop, &mut *tell),
+            )?;
             let Some(settled) = settled else {
                 // A stream that was to be overwritten is as it was.
                 let standing = CacheReader::open(&directory).ok();
@@ -204,7 +209,7 @@ pub fn whitewater(
         software_warning: opened.software_warning(),
         water: particles,
         directory: directory.clone(),
-        rates: [settings.trapped_air_rate, settings.wave_crest_rate],
+        thresholds: settings.thresholds,
         calibrated_on,
         first: stream.clock.frame + 1,
         last,
@@ -308,7 +313,6 @@ impl StreamStep<'_> {
                 frame,
                 seconds,
                 spacing,
-                gravity: self.scene.water.gravity.length(),
                 walls: Bounds {
                     min: walls.min + corner,
                     max: walls.max + corner,

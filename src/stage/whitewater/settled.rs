@@ -1,21 +1,18 @@
-//! The complete settings of a stream: its own, and those that the shot's scale decides.
+//! The complete settings of a stream: its own, and thresholds that are calibrated on the shot.
 
 use std::{
     path::Path,
     sync::atomic::{AtomicBool, Ordering},
 };
 
-use super::{SETTINGS, WhitewaterError, WhitewaterEvent, WhitewaterRequest};
+use super::{SETTINGS, WhitewaterError, WhitewaterEvent, WhitewaterRequest, engine::Engine};
 use crate::derived::water::WaterReader;
 use swell_cache::CacheReader;
-use swell_domain::{
-    parallel,
-    whitewater::{CalibratedSettings, ShotScale},
-};
+use swell_domain::whitewater::{CalibratedSettings, Thresholds};
 use swell_files::whitewater::WhitewaterSettings;
 use swell_scene::Scene;
 
-/// Most frames that a shot's scale is calibrated on.
+/// Most frames that a shot's thresholds are calibrated on.
 const CALIBRATED_ON: usize = 16;
 
 /// The settings that a stream was made with.
@@ -29,13 +26,7 @@ pub(super) fn recorded(
     let file = directory.join("assets").join(SETTINGS);
     let settings = WhitewaterSettings::parse(&text, &file)?;
     // The file has all of them, so the shot decides nothing.
-    Ok(settings.settled(&scale(scene, &[])))
-}
-
-/// The scale of a shot whose water has these specific energies, J/kg.
-fn scale(scene: &Scene, energies: &[f64]) -> ShotScale {
-    let gravity = scene.water.gravity.length();
-    ShotScale::calibrate(energies, gravity, scene.domain.size().min_element())
+    Ok(settings.settled(scene.particle_spacing(), &Thresholds::calibrate(&[])))
 }
 
 /// Settings of a new stream, and how many frames were used to calibrate them; `None` if a signal
@@ -43,7 +34,7 @@ fn scale(scene: &Scene, energies: &[f64]) -> ShotScale {
 pub(super) fn settle(
     request: &WhitewaterRequest,
     scene: &Scene,
-    water: &mut WaterReader<'_>,
+    (engine, water): (&mut Engine, &mut WaterReader<'_>),
     (stop, tell): (&AtomicBool, &mut dyn FnMut(WhitewaterEvent)),
 ) -> Result<Option<(CalibratedSettings, Option<usize>)>, WhitewaterError> {
     let cache = water.cache();
@@ -64,14 +55,15 @@ pub(super) fn settle(
         if stop.load(Ordering::Relaxed) {
             return Ok(None);
         }
-        all.extend(parallel::map_slice(&water.at(frame)?.velocity, |v| {
-            0.5 * v.iter().map(|x| f64::from(x * x)).sum::<f64>()
-        }));
+        let time = cache.entry(frame)?.clock.time;
+        let seconds = 1.0 / cache.manifest().frames_per_second;
+        all.extend(engine.survey(&water.at(frame)?, time, seconds)?);
     }
     if count > 0 {
         tell(WhitewaterEvent::Calibrated { done: count, count });
     }
-    let settings = request.settings.settled(&scale(scene, &all));
+    let shot = Thresholds::calibrate(&all);
+    let settings = request.settings.settled(scene.particle_spacing(), &shot);
     let calibrated = request.settings.needs_calibration().then_some(count);
     Ok(Some((settings, calibrated)))
 }

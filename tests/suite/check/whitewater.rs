@@ -139,8 +139,8 @@ const SPOILS: [(&str, &str, &str, &str); 14] = [
     ),
     (
         "potentials",
-        "inverse_r, 0.0) * w;",
-        "inverse_r, 0.0) * 1.001 * w;",
+        "* inverse_r) * w;",
+        "* inverse_r) * 1.001 * w;",
         "trapped air",
     ),
     ("potentials", "clamp(4.0 *", "clamp(4.4 *", "wave crest"),
@@ -164,8 +164,8 @@ const SPOILS: [(&str, &str, &str, &str); 14] = [
     ),
     (
         "advance",
-        "select(0.0, rise,",
-        "select(0.0, 1.01 * rise,",
+        "select(0.0, RISE_SPEED,",
+        "select(0.0, 1.01 * RISE_SPEED,",
         "velocity",
     ),
     (

@@ -84,7 +84,7 @@ fn events_end_with_the_totals_of_each_command() {
 }
 
 /// Slow work reports its start and its number of parts: a frame, before its own event, and
-/// whitewater's rates, before the first frame. Rates that a stream already has and frames
+/// whitewater's thresholds, before the first frame. Thresholds that a stream already has and frames
 /// that already exist report none.
 #[test]
 fn parts_of_a_frame_and_of_a_calibration_are_told() {
@@ -129,7 +129,7 @@ fn parts_of_a_frame_and_of_a_calibration_are_told() {
     let said = job.expect(0, white);
     assert_has(
         &said,
-        &["rates are calibrated on the shot's frames: 0 of 3"],
+        &["thresholds are calibrated on the shot's frames: 0 of 3"],
     );
 }
 
