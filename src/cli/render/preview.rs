@@ -10,7 +10,7 @@ use swell_stage::render::{
 
 use super::{
     super::{
-        Failure, bake, chain,
+        Failure, bake, chain, count,
         interrupt::{self, Interrupt},
         output,
         progress::Progress,
@@ -51,7 +51,10 @@ fn tell(progress: &Progress, event: PreviewEvent, page: &str) {
             seconds,
             is_whole,
         } => progress.say(
-            &format!("{width} × {height}, {samples} of the samples  {seconds:.2} s"),
+            &format!(
+                "{width} × {height}, {}  {seconds:.2} s",
+                count(samples.into(), "sample")
+            ),
             json!({
                 "event": "shown", "width": width, "height": height, "samples": samples,
                 "seconds": seconds, "whole": is_whole,
