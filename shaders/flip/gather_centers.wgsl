@@ -16,6 +16,7 @@
 #ifdef BAND
 @group(0) @binding(6) var<storage, read> deep_depth: array<f32>;
 
+// As in domain/band.rs.
 const SEAM = 2.0;
 #endif
 

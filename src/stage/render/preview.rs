@@ -66,7 +66,8 @@ pub enum PreviewEvent {
 /// file `watched` has changed, until `stop` is set. `load` reads the look again.
 ///
 /// # Errors
-/// [`RenderJobError`], but for what another edit of the look can mend, which is told.
+/// [`RenderJobError`] before the first picture, or of the device. Later errors of the look, and of
+/// files that it names, are told.
 pub fn preview(
     mut request: RenderRequest,
     watched: &Path,
@@ -112,7 +113,7 @@ pub fn preview(
         });
         match drawn {
             Ok(()) => {}
-            Err(error) if matches!(Blame::from(&error), Blame::Input) => {
+            Err(error) if !matches!(Blame::from(&error), Blame::Device) => {
                 shown = None;
                 tell(PreviewEvent::Refused {
                     error: Box::new(error),

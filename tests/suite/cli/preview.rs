@@ -108,7 +108,23 @@ fn a_preview_follows_the_look_and_ends_with_the_picture_of_a_render() {
         "{refused}"
     );
     assert_eq!(picture(), low);
-    job.edit("look.toml", "[sum]", "[sun]");
+    // So is one that names a stream that is not there.
+    job.edit(
+        "look.toml",
+        "[sum]",
+        "[whitewater]\nstream = \"none\"\n[sun]",
+    );
+    let refused = shown.next("refused");
+    assert!(
+        refused["error"].as_str().unwrap().contains("none"),
+        "{refused}"
+    );
+    assert_eq!(picture(), low);
+    job.edit(
+        "look.toml",
+        "[whitewater]\nstream = \"none\"\n[sun]",
+        "[sun]",
+    );
     assert_eq!(shown.steps(), all);
     assert_eq!(picture(), low);
     assert_eq!(shown.end(), Some(130));
