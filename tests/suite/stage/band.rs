@@ -94,3 +94,30 @@ fn a_difference_in_the_depth_is_seen() {
     );
     job.expect(1, "diff a c");
 }
+
+/// Densities near the band's end, where cells hold uneven numbers of particles, are those of the
+/// reference. Control: cells up to the band's end count as they are filled.
+#[test]
+fn cells_near_the_end_of_a_band_count_as_full() {
+    let job = job();
+    job.copy_shaders("edited");
+    job.edit(
+        "edited/flip/gather_centers.wgsl",
+        "const SEAM = 2.0;",
+        "const SEAM = 0.0;",
+    );
+    job.expect(0, "bake band.toml --frames 1-5 -o cache");
+    // Whether the row of the densities is out; that of `flip/carry_deep` is too, as
+    // docs/reliability.md says.
+    let is_out = |options: &str| {
+        let output = job.run(&format!("check cache --frames 5 {options}"));
+        let said = String::from_utf8(output.stdout).unwrap();
+        let mut rows = said
+            .lines()
+            .filter(|line| line.contains("relative density"));
+        let row = rows.find(|line| line.starts_with("flip/gather_centers"));
+        row.unwrap().ends_with("OUT")
+    };
+    assert!(!is_out(""));
+    assert!(is_out("--shaders edited"));
+}
