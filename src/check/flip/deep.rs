@@ -8,7 +8,8 @@ use crate::{
 };
 use swell_domain::bricks::CELLS;
 use swell_reference::flip::{
-    DeepCells, carry_deep as reference_carry_deep, fill_deep, place_deep as reference_place_deep,
+    DeepCells, Motion, carry_deep as reference_carry_deep, fill_deep,
+    place_deep as reference_place_deep,
 };
 use swell_solve::{
     SolveError,
@@ -98,6 +99,23 @@ pub(super) fn place_deep(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     Ok(())
 }
 
+/// Returns the velocity nearest to `found` of those that the reference has within `place`, in
+/// cells, of where the face's water comes from. The range that bounds the cubic is that of the
+/// faces around and jumps where the water comes from the border of two cells.
+fn nearest_answer(motion: &Motion<'_>, axis: usize, cell: [u32; 3], place: f64, found: f64) -> f64 {
+    let lower = DVec3::from_array(cell.map(f64::from));
+    let origin = motion.origin(lower + 0.5 - 0.5 * DVec3::AXES[axis]);
+    let answers = (0..27).map(|k| {
+        let side = DVec3::from_array([k % 3, k / 3 % 3, k / 9].map(|k| f64::from(k) - 1.0));
+        motion.component(axis, origin + place * side)
+    });
+    let nearer = |a: f64, b: f64| match (b - found).abs() < (a - found).abs() {
+        true => b,
+        false => a,
+    };
+    answers.reduce(nearer).unwrap_or(f64::NAN)
+}
+
 pub(super) fn carry_deep(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let (elements, step) = (state.elements(), state.step());
     let (model, bricks) = (&state.model, &elements.bricks);
@@ -110,8 +128,14 @@ pub(super) fn carry_deep(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
         }
         false => None,
     };
-    let displacement = displacement.as_deref();
-    let reference = reference_carry_deep(model, &step, bricks, &depth, &velocity, displacement);
+    let motion = Motion {
+        model,
+        step: &step,
+        bricks,
+        velocity: &velocity,
+        displacement: displacement.as_deref(),
+    };
+    let reference = reference_carry_deep(&motion, &depth);
     let wet = bricks.wet as usize;
     let found = state.deep_cells(&io.after, |slot| if slot > wet { 0 } else { slot })?;
     let fastest = velocity.iter().map(|v| v.length()).fold(0.0, f64::max);
@@ -136,7 +160,12 @@ pub(super) fn carry_deep(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
         io.table.each(&CARRIED_VELOCITY, elements.wet(), |e| {
             let [range, most] = range(&|other| velocity[other][axis], e);
             let (found, exact) = (found.velocity[e][axis], reference.velocity[e][axis]);
-            pair(e, found, exact, [place, range, most])
+            let magnitudes = [place, range, most];
+            let exact = match (found - exact).abs() <= CARRIED_VELOCITY.tolerance.of(magnitudes) {
+                true => exact,
+                false => nearest_answer(&motion, axis, bricks.cell(e as u32), place, found),
+            };
+            pair(e, found, exact, magnitudes)
         });
     };
     (0..3).for_each(&mut of_axis);

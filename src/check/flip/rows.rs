@@ -145,7 +145,8 @@ entries! {
             range: "of the velocities that the water may come from", most: "the largest of them"]
             (6.0 * place + 64.0 * U) * range + 128.0 * U * most,
             "along each axis, slopes of cubic weights that add up to 2 at most; 64 products, \
-             weights of four factors";
+             weights of four factors; where the place is as near to the border of two cells, \
+             either's bounds";
         CARRIED_DEPTH = "depth below the surface", "cells": [place: "in cells, " START,
             range: "of the depths that the water may come from", most: "the largest of them"]
             3.0 * place * range + 32.0 * U * most, "along each axis; 8 products";

@@ -205,35 +205,58 @@ fn depth_at(model: &Model, bricks: &Bricks, depth: &[f64], x: DVec3) -> f64 {
     (0..8).map(corner).sum()
 }
 
-/// Moves velocity and depth with the water on the grid: semi-Lagrangian (Stam 1999), back along the
-/// path that particles take.
-pub fn carry_deep(
-    model: &Model,
-    step: &FlipSubstep<'_>,
-    bricks: &Bricks,
-    depth: &[f64],
-    velocity: &[DVec3],
-    displacement: Option<&[DVec3]>,
-) -> DeepCells {
-    let size = model.cell_size();
-    let cells = DVec3::from_array(model.cells.map(f64::from));
-    let before = |x: DVec3| {
+/// The water's motion over a substep: velocities at faces, m/s, and the density correction's
+/// displacements there, metres.
+#[derive(Clone, Copy)]
+pub struct Motion<'a> {
+    /// The scene, in f64.
+    pub model: &'a Model,
+    /// The substep.
+    pub step: &'a FlipSubstep<'a>,
+    /// Layout of the faces.
+    pub bricks: &'a Bricks,
+    /// Velocities.
+    pub velocity: &'a [DVec3],
+    /// Displacements, where there are any.
+    pub displacement: Option<&'a [DVec3]>,
+}
+
+impl Motion<'_> {
+    /// Returns where water at `x` was before the substep, both in cells: back along the path that
+    /// particles take.
+    pub fn origin(&self, x: DVec3) -> DVec3 {
+        let Self { model, step, .. } = *self;
+        let size = model.cell_size();
+        let of = |field: &[DVec3], x: DVec3, known: DVec3| {
+            velocity_at(model, self.bricks, field, x, known)
+        };
         let here = size * x;
-        let at_start = velocity_at(model, bricks, velocity, here, DVec3::ZERO);
+        let at_start = of(self.velocity, here, DVec3::ZERO);
         let middle = here - 0.5 * step.length * at_start;
-        let mut way = step.length * velocity_at(model, bricks, velocity, middle, at_start);
-        if let Some(displacement) = displacement {
-            way += velocity_at(model, bricks, displacement, here, DVec3::ZERO);
+        let mut way = step.length * of(self.velocity, middle, at_start);
+        if let Some(displacement) = self.displacement {
+            way += of(displacement, here, DVec3::ZERO);
         }
         let from = x - way.clamp_length_max(model.max_displacement()) / size;
         let wrapped = model.period().wrap(size * from) / size;
+        let cells = DVec3::from_array(model.cells.map(f64::from));
         let kept = wrapped.clamp(DVec3::ZERO, cells);
         let is_free = |axis: usize| model.scene.periodic[axis];
         DVec3::from_array(std::array::from_fn(|axis| match is_free(axis) {
             true => wrapped[axis],
             false => kept[axis],
         }))
-    };
+    }
+
+    /// Returns a component of the velocity at `x`, in cells, as the cubic has it.
+    pub fn component(&self, axis: usize, x: DVec3) -> f64 {
+        component_at(self.model, self.bricks, self.velocity, axis, x)
+    }
+}
+
+/// Moves velocity and depth with the water on the grid: semi-Lagrangian (Stam 1999).
+pub fn carry_deep(motion: &Motion<'_>, depth: &[f64]) -> DeepCells {
+    let Motion { model, bricks, .. } = *motion;
     let wet = CELLS * (bricks.wet + 1);
     let moved = per_cell(bricks, |element| {
         if element >= wet {
@@ -242,9 +265,9 @@ pub fn carry_deep(
         let cell = corner(bricks, element);
         let component = |axis: usize| {
             let face = cell + 0.5 - 0.5 * DVec3::AXES[axis];
-            component_at(model, bricks, velocity, axis, before(face))
+            motion.component(axis, motion.origin(face))
         };
-        let centre = before(cell + 0.5);
+        let centre = motion.origin(cell + 0.5);
         (
             depth_at(model, bricks, depth, centre),
             DVec3::new(component(0), component(1), component(2)),

@@ -26,7 +26,7 @@ mod wall_friction;
 mod water;
 
 pub use bodies::{BodyCells, carry_bodies, couple_bodies};
-pub use deep::{DeepCells, carry_deep, fill_deep, place_deep};
+pub use deep::{DeepCells, Motion, carry_deep, fill_deep, place_deep};
 pub use forces::{push_drops, push_faces, work_by_cells};
 pub use gaps::{Gaps, close_gaps};
 pub use grid::planes;

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::{
-    BodyCells, Centers, Cloud, DeepCells, Faces, Gaps, Model, Trace, Waters, advect, aim,
+    BodyCells, Centers, Cloud, DeepCells, Faces, Gaps, Model, Motion, Trace, Waters, advect, aim,
     assign_cells,
     bodies::{Stopped, sped_up},
     carry_bodies, carry_deep, close_gaps, couple_bodies, cut_cells,
@@ -251,8 +251,14 @@ impl Flip {
         });
         if let Some(depth) = &depth {
             let moved = timings.time("flip/carry_deep", || {
-                let displacement = displacement.as_deref();
-                carry_deep(model, &step, &bricks, depth, &faces.velocity, displacement)
+                let motion = Motion {
+                    model,
+                    step: &step,
+                    bricks: &bricks,
+                    velocity: &faces.velocity,
+                    displacement: displacement.as_deref(),
+                };
+                carry_deep(&motion, depth)
             });
             *deep = Some(moved);
         }
