@@ -16,7 +16,8 @@
 @group(0) @binding(12) var<storage, read> sorted_velocity: array<Vector>;
 // Position and kind.
 @group(0) @binding(13) var<storage, read_write> white_position: array<vec4f>;
-// Velocity; after the pass w holds the water fraction around the particle.
+// Velocity, and in w the speed at which the particle rises as a bubble, m/s; after the pass w holds
+// the water fraction around it.
 @group(0) @binding(14) var<storage, read_write> white_velocity: array<vec4f>;
 // Number of whitewater particles, in x.
 @group(0) @binding(15) var<uniform> white_count: vec4u;
@@ -31,7 +32,6 @@ override WATER_ABOVE: f32;
 override FLIGHT_STEPS: u32;
 override HALVINGS: u32;
 // Values from the settings.
-override RISE_SPEED: f32;
 override RESPONSE: f32;
 
 // No particle has this index, so the search excludes none.
@@ -122,6 +122,7 @@ fn main(
     let start = white_position[i].xyz;
     let kind = u32(white_position[i].w);
     let before = white_velocity[i].xyz;
+    let rise = white_velocity[i].w;
     let step = params.time_step;
     var way = step * before;
     var velocity = before;
@@ -163,7 +164,7 @@ fn main(
         // Heun's method with the water's velocity; the velocity at the previous frame is the
         // particle's own.
         let up = -params.velocity_step / max(length(params.velocity_step), 1e-30);
-        let aim = water.velocity + select(0.0, RISE_SPEED, kind == BUBBLE) * up;
+        let aim = water.velocity + select(0.0, rise, kind == BUBBLE) * up;
         let kept = select(0.0, exp(-step / RESPONSE), kind == BUBBLE);
         velocity = aim + kept * (before - aim);
         place = allowed(start + 0.5 * step * (before + velocity));

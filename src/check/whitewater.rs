@@ -11,7 +11,7 @@ use swell_domain::{
     boundary::Boundary,
     parallel,
     particles::Particles,
-    whitewater::{CalibratedSettings, KIND, OUTWARD, Potentials, SURFACE, WhitewaterKind},
+    whitewater::{CLOSING, CompleteSettings, KIND, OUTWARD, Potentials, SURFACE, WhitewaterKind},
 };
 use swell_gpu::adapter::Context;
 use swell_reference::whitewater::{Moved, Neighbor, Pull, SortedWater, Surveyed, White};
@@ -41,9 +41,10 @@ bounds! {
         error / span + 12.0 * U, "";
     NO_SURFACE = [error: "h times " STEEPNESS, least: "where a surface begins"] least - error,
         "a gradient so small that there is surely no surface: its direction is noise";
-    TRAPPED = [n: "candidates", speeds: "Σ |v_ij|", weighted: "Σ |v_ij| W"]
-        U * (24.0 * speeds + (n + 60.0) * weighted),
-        "W errs by 11 u, the length by 9 u, the cosine by 14 u, each term is at most 2 |v_ij| W";
+    TRAPPED = [n: "candidates", speeds: "Σ |v_ij|", weighted: "Σ |v_ij| W",
+        own: "by what the particle's own sureness errs"]
+        CLOSING * (U * (12.0 * speeds + (n + 40.0) * weighted) + own * weighted),
+        "W errs by 11 u, the cosine by 14 u, each term is at most |v_ij| W";
     CREST = [sums: "Σ W (what the normals and their sureness err by)", n: "candidates",
         weight: "Σ W", crest: "the sum itself",
         own: "by what the particle's own sureness and direction of motion err"]
@@ -88,7 +89,7 @@ pub struct Frame<'a> {
     /// Solids of the scene.
     pub boundary: &'a Boundary,
     /// Settings of the whitewater stream.
-    pub settings: &'a CalibratedSettings,
+    pub settings: &'a CompleteSettings,
     /// Water at the frame's end.
     pub water: &'a Particles,
     /// Whitewater at the end of the previous frame.
@@ -199,7 +200,7 @@ impl<'a> Comparison<'a> {
     /// Compares the potentials; `found` is in the order of the original water.
     fn potentials(&self, table: &mut CheckTable, found: &[Potentials]) {
         let n = self.surveyed.len();
-        let rows: Vec<(Potentials, [f64; 3], [f64; 5])> = parallel::map(0..n, |i| {
+        let rows: Vec<(Potentials, [f64; 4], [f64; 5])> = parallel::map(0..n, |i| {
             let exact = self.water.potentials(i, &self.surveyed);
             (exact, self.trapped(i), self.crest(i))
         });
@@ -224,7 +225,7 @@ impl<'a> Comparison<'a> {
     }
 
     /// Returns the magnitudes of [`TRAPPED`].
-    fn trapped(&self, i: usize) -> [f64; 3] {
+    fn trapped(&self, i: usize) -> [f64; 4] {
         let h = self.water.model.calibration.support_radius;
         let (mut n, mut speeds, mut weighted) = (0.0, 0.0, 0.0);
         self.water.about(self.water.points[i], |neighbor, way| {
@@ -237,7 +238,7 @@ impl<'a> Comparison<'a> {
                 weighted += speed * w;
             }
         });
-        [n, speeds, weighted]
+        [n, speeds, weighted, self.errors[i].sure]
     }
 
     /// Returns the magnitudes of [`CREST`].
@@ -286,6 +287,7 @@ impl<'a> Comparison<'a> {
                 velocity: wide(white.velocity[k]),
                 kind: WhitewaterKind::of_number(white.attributes[KIND][k])
                     .unwrap_or(WhitewaterKind::Foam),
+                rise: f64::from(settings.rise_of(white.id[k]) as f32),
             };
             let moved = self.water.advance(settings, &pull, seconds, before);
             (moved, self.moved_errors(&before, &moved, (&pull, &bounded)))

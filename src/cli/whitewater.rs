@@ -24,7 +24,7 @@ use super::{
 pub(super) struct WhitewaterArgs {
     /// Cache directory of a bake.
     cache: PathBuf,
-    /// Settings file (TOML); what it leaves out has defaults or is calibrated on the shot.
+    /// Settings file (TOML); what it leaves out has defaults, or follows from the shot's water.
     #[arg(long, value_name = "FILE")]
     settings: Option<PathBuf>,
     /// Name of the stream, which goes to CACHE/whitewater/NAME; the settings file's own where left
@@ -115,13 +115,7 @@ pub(super) fn run(args: &WhitewaterArgs, progress: &Progress) -> Result<u8, Fail
         directory: &outcome.directory,
         interrupted: outcome.interrupted,
     };
-    let words = match outcome.interrupted && outcome.frames == 0 && !outcome.directory.exists() {
-        true => {
-            "ended by a signal while thresholds were calibrated; nothing was written".to_owned()
-        }
-        false => ended.words(),
-    };
-    let code = ended.conclude(progress, &words);
+    let code = ended.conclude(progress, &ended.words());
     pass_times::report(progress, &outcome.passes, &[], outcome.frames);
     Ok(code)
 }
@@ -180,48 +174,35 @@ fn dry_run(request: &WhitewaterRequest, progress: &Progress) -> Result<u8, Failu
 
 fn tell(progress: &Progress, event: WhitewaterEvent) {
     match event {
-        WhitewaterEvent::Calibrated { done, count } => progress.part(
-            "thresholds are calibrated on the shot's frames",
-            (done as u64, count as u64),
-            json!({ "of": "calibration" }),
-        ),
         WhitewaterEvent::Ready {
             device,
             software_warning,
             water,
             directory,
-            thresholds,
-            calibrated_on,
+            rates: [air, crest],
+            is_of_shot,
             first,
             last,
         } => {
             let frames = u64::from((last + 1).saturating_sub(first));
             progress.begin(frames);
             progress.warn_of_adapter(software_warning.as_deref());
-            let [air, crest, energy] = [
-                thresholds.trapped_air,
-                thresholds.wave_crest,
-                thresholds.energy,
-            ]
-            .map(|[least, greatest]| format!("{least} to {greatest}"));
-            let source = match calibrated_on {
-                Some(frames) => format!("calibrated on {}", count(frames as u64, "frame")),
-                None => "as given".to_owned(),
+            let source = match is_of_shot {
+                true => "of the shot's water where none is given",
+                false => "as given",
             };
             progress.say(
                 &format!(
-                    "on {device}\n{} of water, into {}\nthresholds, {source}: trapped air {air} \
-                     m/s, wave crest {crest}, energy \
-                     {energy} J/kg",
+                    "on {device}\n{} of water, into {}\nrates, {source}: {air} of a cubic metre \
+                     that water closes, {crest} a second of one in crests",
                     count(water as u64, "particle"),
                     directory.display(),
                 ),
                 json!({
                     "event": "ready", "device": device.to_string(), "water": water,
                     "directory": output::path(&directory),
-                    "thresholds": thresholds, "calibrated_on": calibrated_on, "first": first,
-                    "last": last,
-                    "frames": frames,
+                    "trapped_air_rate": air, "wave_crest_rate": crest,
+                    "of_shot": is_of_shot, "first": first, "last": last, "frames": frames,
                 }),
             );
         }

@@ -6,6 +6,7 @@
 //! for both.
 
 mod ages;
+mod bubbles;
 mod kills;
 mod seeds;
 mod thresholds;
@@ -15,7 +16,7 @@ use crate::{particles::Particles, sampling::finalized};
 pub use ages::grow_older;
 pub use kills::{Kill, KillDomain, KillMesh, KillRoom, kill};
 pub use seeds::{Births, SeedWater};
-pub use thresholds::{Potentials, Thresholds};
+pub use thresholds::{CLOSING, Potentials, ShotScale, Thresholds};
 
 /// Names of a whitewater particle's attributes besides position, velocity and id, sorted as in
 /// a frame.
@@ -99,16 +100,16 @@ impl WhitewaterKind {
 
 /// Settings of a whitewater stream: a settings file with its thresholds calibrated.
 #[derive(Clone, Debug, PartialEq)]
-pub struct CalibratedSettings {
+pub struct CompleteSettings {
     /// Seed of all random numbers.
     pub seed: u32,
     /// Largest number of particles; a frame with more ends the job.
     pub max_particles: u32,
     /// Least and greatest radius of a whitewater particle, metres.
     pub radius: [f64; 2],
-    /// Whitewater particles born per second at a water particle that traps air at the full rate.
+    /// Whitewater particles born of a cubic metre that water closes where it meets water, 1/m³.
     pub trapped_air_rate: f64,
-    /// Whitewater particles born per second at a water particle on a full crest.
+    /// Whitewater particles born per second of a cubic metre of water in crests, 1/(m³ s).
     pub wave_crest_rate: f64,
     /// Thresholds of the three potentials.
     pub thresholds: Thresholds,
@@ -118,14 +119,21 @@ pub struct CalibratedSettings {
     pub wind: [f64; 3],
     /// Least and greatest lifetime of foam, seconds.
     pub lifetime: [f64; 2],
-    /// Number of foam particles in a cube of one spacing above which foam dies faster.
-    pub crowd: u32,
-    /// Speed of bubbles through still water, m/s.
-    pub rise_speed: f64,
+    /// Number of foam particles on a square metre above which foam dies faster, 1/m².
+    pub crowd: f64,
+    /// Speed of all bubbles through still water, m/s; `None` if each rises as its size does.
+    pub rise_speed: Option<f64>,
     /// Relaxation time of a bubble's velocity towards that of the water, seconds.
     pub response: f64,
     /// Kill volumes.
     pub kills: Vec<Kill>,
+}
+
+impl CompleteSettings {
+    /// Returns the speed at which the whitewater particle with this id rises as a bubble, m/s.
+    pub fn rise_of(&self, id: u32) -> f64 {
+        self.rise_speed.unwrap_or_else(|| bubbles::rise_of(id))
+    }
 }
 
 /// Returns an empty whitewater state, with all attributes.
@@ -169,25 +177,21 @@ fn random(seed: u32, id: u32, frame: u32, channel: u32) -> f64 {
 
 #[cfg(test)]
 mod tests_support {
-    use super::{CalibratedSettings, Thresholds};
+    use super::{CompleteSettings, Thresholds};
 
-    pub(super) fn settings() -> CalibratedSettings {
-        CalibratedSettings {
+    pub(super) fn settings() -> CompleteSettings {
+        CompleteSettings {
             seed: 1,
             max_particles: 1_000_000,
             radius: [0.005, 0.02],
-            trapped_air_rate: 50.0,
-            wave_crest_rate: 50.0,
-            thresholds: Thresholds {
-                trapped_air: [6.0, 24.0],
-                wave_crest: [2.0, 8.0],
-                energy: [0.5, 2.0],
-            },
+            trapped_air_rate: 2500.0,
+            wave_crest_rate: 50_000.0,
+            thresholds: Thresholds::default(),
             drop_radius: 1e-3,
             wind: [0.0; 3],
             lifetime: [0.5, 4.0],
-            crowd: 4,
-            rise_speed: 0.25,
+            crowd: 400.0,
+            rise_speed: Some(0.25),
             response: 0.1,
             kills: Vec::new(),
         }

@@ -9,8 +9,8 @@ use serde::Deserialize;
 use super::{
     document::Document,
     keys::{
-        BubblesSpec, EmissionSpec, FoamSpec, KillSpec, MeshSpec, RADII, ScaleSpec, SpraySpec,
-        WHITEWATER, WhitewaterSpec,
+        BubblesSpec, EmissionSpec, FoamSpec, KillSpec, MeshSpec, ScaleSpec, SpraySpec, WHITEWATER,
+        WhitewaterSpec,
     },
     placed_mesh::placed_mesh,
     toml_text::to_toml,
@@ -19,7 +19,7 @@ use swell_domain::{
     bounds::Bounds,
     sources::Window,
     text,
-    whitewater::{CalibratedSettings, Kill, KillMesh, KillRoom, Thresholds},
+    whitewater::{CompleteSettings, Kill, KillMesh, KillRoom, ShotScale, Thresholds},
 };
 use swell_scene::{SceneError, asset_path};
 
@@ -136,9 +136,13 @@ impl WhitewaterSettings {
             .map_err(|error| doc.translate(&error))?;
         let rising = [
             ("radius", spec.radius, true),
-            ("emission.trapped_air", spec.emission.trapped_air, false),
-            ("emission.wave_crest", spec.emission.wave_crest, false),
-            ("emission.energy", spec.emission.energy, false),
+            (
+                "emission.trapped_air",
+                Some(spec.emission.trapped_air),
+                false,
+            ),
+            ("emission.wave_crest", Some(spec.emission.wave_crest), false),
+            ("emission.energy", Some(spec.emission.energy), false),
             ("foam.lifetime", Some(spec.foam.lifetime), true),
         ];
         for (key, values, may_be_equal) in rising {
@@ -161,17 +165,20 @@ impl WhitewaterSettings {
         Ok(Self { spec, kills })
     }
 
-    /// Whether thresholds of emission must be calibrated from the shot.
-    pub fn needs_calibration(&self) -> bool {
+    /// Whether the scale of the shot decides nothing.
+    pub fn is_complete(&self) -> bool {
         let emission = &self.spec.emission;
-        [emission.trapped_air, emission.wave_crest, emission.energy]
-            .iter()
-            .any(Option::is_none)
+        let numbers = [
+            emission.trapped_air_rate,
+            emission.wave_crest_rate,
+            self.spec.foam.crowd,
+        ];
+        self.spec.radius.is_some() && numbers.iter().all(Option::is_some)
     }
 
-    /// Returns complete settings for a shot of this particle spacing, metres. `shot` supplies the
-    /// thresholds that the file leaves open.
-    pub fn settled(&self, spacing: f64, shot: &Thresholds) -> CalibratedSettings {
+    /// Returns complete settings. `shot` supplies the rates, radii and crowd that the file leaves
+    /// open.
+    pub fn settled(&self, shot: &ShotScale) -> CompleteSettings {
         let WhitewaterSpec {
             seed,
             max_particles,
@@ -182,21 +189,22 @@ impl WhitewaterSettings {
             bubbles,
             kill: _,
         } = &self.spec;
-        CalibratedSettings {
+        CompleteSettings {
             seed: *seed,
             max_particles: *max_particles,
-            radius: radius.unwrap_or(RADII.map(|part| part * spacing)),
-            trapped_air_rate: emission.trapped_air_rate,
-            wave_crest_rate: emission.wave_crest_rate,
+            radius: radius.unwrap_or_else(|| shot.radius()),
+            trapped_air_rate: (emission.trapped_air_rate)
+                .unwrap_or_else(|| shot.trapped_air_rate()),
+            wave_crest_rate: (emission.wave_crest_rate).unwrap_or_else(|| shot.wave_crest_rate()),
             thresholds: Thresholds {
-                trapped_air: emission.trapped_air.unwrap_or(shot.trapped_air),
-                wave_crest: emission.wave_crest.unwrap_or(shot.wave_crest),
-                energy: emission.energy.unwrap_or(shot.energy),
+                trapped_air: emission.trapped_air,
+                wave_crest: emission.wave_crest,
+                energy: emission.energy,
             },
             drop_radius: spray.drop_radius,
             wind: spray.wind,
             lifetime: foam.lifetime,
-            crowd: foam.crowd,
+            crowd: foam.crowd.unwrap_or_else(|| shot.crowd()),
             rise_speed: bubbles.rise_speed,
             response: bubbles.response,
             kills: self.kills.clone(),
@@ -217,7 +225,7 @@ impl WhitewaterSettings {
 }
 
 /// Returns a file with all settings, which [`WhitewaterSettings::parse`] reads back.
-pub fn written_out(settings: &CalibratedSettings) -> String {
+pub fn written_out(settings: &CompleteSettings) -> String {
     let Thresholds {
         trapped_air,
         wave_crest,
@@ -228,11 +236,11 @@ pub fn written_out(settings: &CalibratedSettings) -> String {
         max_particles: settings.max_particles,
         radius: Some(settings.radius),
         emission: EmissionSpec {
-            trapped_air_rate: settings.trapped_air_rate,
-            wave_crest_rate: settings.wave_crest_rate,
-            trapped_air: Some(trapped_air),
-            wave_crest: Some(wave_crest),
-            energy: Some(energy),
+            trapped_air_rate: Some(settings.trapped_air_rate),
+            wave_crest_rate: Some(settings.wave_crest_rate),
+            trapped_air,
+            wave_crest,
+            energy,
         },
         spray: SpraySpec {
             drop_radius: settings.drop_radius,
@@ -240,7 +248,7 @@ pub fn written_out(settings: &CalibratedSettings) -> String {
         },
         foam: FoamSpec {
             lifetime: settings.lifetime,
-            crowd: settings.crowd,
+            crowd: Some(settings.crowd),
         },
         bubbles: BubblesSpec {
             rise_speed: settings.rise_speed,
@@ -258,25 +266,27 @@ mod tests {
         WhitewaterSettings::parse(text, Path::new("w.toml"))
     }
 
-    fn shot() -> Thresholds {
-        Thresholds {
-            trapped_air: [7.0, 30.0],
-            wave_crest: [2.5, 9.0],
-            energy: [0.5, 4.0],
-        }
+    fn shot() -> ShotScale {
+        ShotScale::of_volume(200.0)
     }
 
     #[test]
     fn an_empty_file_leaves_the_rest_to_the_shot() {
         let settings = parse("").expect("valid");
-        assert!(settings.needs_calibration());
-        let settled = settings.settled(0.1, &shot());
-        assert_eq!(settled.thresholds, shot());
-        assert_eq!(settled.radius, RADII.map(|part| part * 0.1));
-        let own = "[emission]\ntrapped_air = [1, 2]\nwave_crest = [3, 4]\nenergy = [5, 6]\n";
+        assert!(!settings.is_complete());
+        let settled = settings.settled(&shot());
+        assert_eq!(settled.thresholds, Thresholds::default());
+        assert_eq!(settled.radius, shot().radius());
+        assert_eq!(settled.trapped_air_rate, shot().trapped_air_rate());
+        assert_eq!(settled.wave_crest_rate, shot().wave_crest_rate());
+        assert_eq!(settled.crowd, shot().crowd());
+        let own = "radius = [0.1, 0.2]\n[emission]\ntrapped_air_rate = 7\nwave_crest_rate = 8\n\
+            [foam]\ncrowd = 9\n";
         let settings = parse(own).expect("valid");
-        assert!(!settings.needs_calibration());
-        assert_eq!(settings.settled(0.1, &shot()).thresholds.energy, [5.0, 6.0]);
+        assert!(settings.is_complete());
+        let settled = settings.settled(&shot());
+        let rates = [settled.trapped_air_rate, settled.wave_crest_rate];
+        assert_eq!((rates, settled.crowd), ([7.0, 8.0], 9.0));
     }
 
     #[test]
@@ -286,22 +296,24 @@ mod tests {
             [foam]\nlifetime = [1, 2]\ncrowd = 3\n[bubbles]\nrise_speed = 0.1\nresponse = 0.5\n\
             [[kill]]\nmin = [1, 2, 3]\nmax = [4, 5, 6]\nfrom = 0.5\n[[kill]]\nsides = 0.25\n\
             until = 2\n";
-        let settled = parse(text).expect("valid").settled(0.1, &shot());
-        let written = written_out(&settled);
-        let again = parse(&written).expect("what was written");
-        let other = Thresholds {
-            energy: [0.0, 1.0],
-            ..shot()
-        };
-        // The file is complete: neither spacing nor shot changes the result.
-        assert_eq!(again.settled(9.0, &other), settled);
-        assert!(!again.needs_calibration());
+        let other = ShotScale::of_volume(3.0);
+        for text in [text, &text.replace("rise_speed = 0.1\n", "")] {
+            let settled = parse(text).expect("valid").settled(&shot());
+            let written = written_out(&settled);
+            let again = parse(&written).expect("what was written");
+            // The file is complete: the shot does not change the result.
+            assert_eq!(again.settled(&other), settled);
+            assert!(again.is_complete());
+        }
     }
 
     #[test]
     fn hashes_are_of_the_content() {
         let hash = |text: &str| parse(text).expect("valid").hash();
-        assert_eq!(hash(""), hash("[foam]\ncrowd = 64 # the default\n"));
+        assert_eq!(
+            hash(""),
+            hash("[foam]\nlifetime = [0.5, 4] # the default\n")
+        );
         assert_ne!(hash(""), hash("[foam]\ncrowd = 15\n"));
         assert_ne!(hash(""), hash("[emission]\nenergy = [1, 2]\n"));
         assert_ne!(hash(""), hash("[[kill]]\nsides = 0.5\n"));

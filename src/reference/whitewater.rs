@@ -12,8 +12,8 @@ use swell_domain::{
     parallel,
     particles::Particles,
     whitewater::{
-        AIR_BELOW, CalibratedSettings, FLIGHT_STEPS, HALVINGS, KIND, OUTWARD, Potentials, SURFACE,
-        WhitewaterKind,
+        AIR_BELOW, CLOSING, CompleteSettings, FLIGHT_STEPS, HALVINGS, KIND, OUTWARD, Potentials,
+        SURFACE, WhitewaterKind,
     },
 };
 use swell_scene::PbfScene;
@@ -60,6 +60,8 @@ pub struct White {
     pub velocity: DVec3,
     /// Kind.
     pub kind: WhitewaterKind,
+    /// Speed at which it rises as a bubble, m/s.
+    pub rise: f64,
 }
 
 /// A whitewater particle after a frame, with the margin of the decisions made on its path.
@@ -163,14 +165,14 @@ impl SortedWater {
     pub fn potentials(&self, i: usize, surveyed: &[Surveyed]) -> Potentials {
         let h = self.model.calibration.support_radius;
         let (own, v) = (&surveyed[i], self.velocity[i]);
-        let (mut trapped_air, mut crest) = (0.0, 0.0);
+        let (mut closing, mut crest) = (0.0, 0.0);
         self.about(self.points[i], |neighbor, way| {
             let Neighbor::Water(j) = neighbor else {
                 return;
             };
             let w = (1.0 - way.length() / h).max(0.0);
             let (against, along) = (v - self.velocity[j], way.normalize_or_zero());
-            trapped_air += (against.length() - against.dot(along)) * w;
+            closing += (-against.dot(along)).max(0.0) * w;
             let other = &surveyed[j];
             let behind = (4.0 * along.dot(own.normal)).clamp(0.0, 1.0);
             crest += (1.0 - own.normal.dot(other.normal)) * other.sure * behind * w;
@@ -180,7 +182,7 @@ impl SortedWater {
         let [least, full] = OUTWARD;
         let outward = ((cosine - least) / (full - least)).clamp(0.0, 1.0);
         Potentials {
-            trapped_air,
+            trapped_air: CLOSING * closing * own.sure,
             wave_crest: crest * own.sure * outward,
             energy: 0.5 * speed * speed,
             share: own.share,
@@ -224,7 +226,7 @@ impl SortedWater {
     /// water's frame, pulled by `pull`.
     pub fn advance(
         &self,
-        settings: &CalibratedSettings,
+        settings: &CompleteSettings,
         pull: &Pull<'_>,
         seconds: f64,
         white: White,
@@ -269,9 +271,7 @@ impl SortedWater {
             velocity = before + seconds * pull.at(start);
         } else if !is_drop {
             let (rise, kept) = match white.kind {
-                WhitewaterKind::Bubble => {
-                    (settings.rise_speed, (-seconds / settings.response).exp())
-                }
+                WhitewaterKind::Bubble => (white.rise, (-seconds / settings.response).exp()),
                 WhitewaterKind::Foam | WhitewaterKind::Spray => (0.0, 0.0),
             };
             let aim = water.velocity - rise * gravity.normalize_or_zero();
@@ -284,6 +284,7 @@ impl SortedWater {
             position: place,
             velocity,
             kind: WhitewaterKind::of_share(water.share),
+            rise: white.rise,
         };
         Moved {
             white,
@@ -335,7 +336,7 @@ impl<'a> Pull<'a> {
 
 /// Returns the displacement, metres, of a drop in the air, and its velocity after it, m/s.
 fn fly(
-    settings: &CalibratedSettings,
+    settings: &CompleteSettings,
     pull: &Pull<'_>,
     seconds: f64,
     (place, start): (DVec3, DVec3),
@@ -358,7 +359,7 @@ fn fly(
 pub struct Whitewater {
     scene: PbfScene<'static>,
     boundary: Boundary,
-    settings: Option<CalibratedSettings>,
+    settings: Option<CompleteSettings>,
     /// The water of a frame, the frame's end and its length, seconds.
     water: Option<(SortedWater, f64, f64)>,
 }
@@ -377,7 +378,7 @@ impl Whitewater {
     }
 
     /// Prepares the motion of whitewater with these settings.
-    pub fn set(&mut self, settings: &CalibratedSettings) {
+    pub fn set(&mut self, settings: &CompleteSettings) {
         self.settings = Some(settings.clone());
     }
 
@@ -414,6 +415,7 @@ impl Whitewater {
                 velocity: wide(white.velocity[k]),
                 kind: WhitewaterKind::of_number(white.attributes[KIND][k])
                     .unwrap_or(WhitewaterKind::Foam),
+                rise: f64::from(settings.rise_of(white.id[k]) as f32),
             };
             water.advance(settings, &pull, *seconds, one).white
         };

@@ -13,8 +13,8 @@ use swell_domain::{
     solver::PassTime,
     sph::Calibration,
     whitewater::{
-        AIR_BELOW, CalibratedSettings, FLIGHT_STEPS, HALVINGS, KIND, OUTWARD, Potentials, SURFACE,
-        WATER_ABOVE,
+        AIR_BELOW, CLOSING, CompleteSettings, FLIGHT_STEPS, HALVINGS, KIND, OUTWARD, Potentials,
+        SURFACE, WATER_ABOVE,
     },
 };
 use swell_gpu::{
@@ -39,11 +39,12 @@ pub const SHARE: Buf<f32> = Buf::new("share");
 /// Outward surface normal at each water particle, in sorted order, and in w the confidence that it
 /// is at the surface, 0 to 1.
 pub const SURFACE_AT: Buf<[f32; 4]> = Buf::new("surface");
-/// Trapped air, m/s, wave crest, energy, J/kg, and water fraction, in sorted order.
+/// Closing speed, m/s, wave crest, energy, J/kg, and water fraction, in sorted order.
 pub const POTENTIAL: Buf<[f32; 4]> = Buf::new("potential");
 /// Position x, y, z of each whitewater particle, and its kind in w.
 pub const WHITE_POSITION: Buf<[f32; 4]> = Buf::new("white_position");
-/// Velocity of each whitewater particle, and in w the water fraction around it after a frame.
+/// Velocity of each whitewater particle, and in w its speed of rise as a bubble, m/s, before a
+/// frame, and the water fraction around it after one.
 pub const WHITE_VELOCITY: Buf<[f32; 4]> = Buf::new("white_velocity");
 /// Number of whitewater particles, in the first component.
 pub const WHITE_COUNT: Buf<[u32; 4]> = Buf::uniform("white_count");
@@ -64,7 +65,7 @@ pub struct Whitewater {
     /// neither can happen.
     boundary: Option<Boundary>,
     movers: Option<Movers>,
-    settings: Option<CalibratedSettings>,
+    settings: Option<CompleteSettings>,
     /// Number of whitewater particles that the buffers can hold.
     capacity: usize,
     timer: Option<Timer>,
@@ -123,7 +124,7 @@ fn pass(
     name: &'static str,
     plan: &Plan,
     scene: &PbfScene,
-    settings: Option<&CalibratedSettings>,
+    settings: Option<&CompleteSettings>,
 ) -> PassSpec {
     let has_forces = scene.has_forces_on(Medium::Whitewater);
     let conditions = [
@@ -142,7 +143,11 @@ fn pass(
             vec![("SURFACE_LEAST", SURFACE[0]), ("SURFACE_FULL", SURFACE[1])]
         }
         ("whitewater/potentials", _) => {
-            vec![("OUTWARD_LEAST", OUTWARD[0]), ("OUTWARD_FULL", OUTWARD[1])]
+            vec![
+                ("OUTWARD_LEAST", OUTWARD[0]),
+                ("OUTWARD_FULL", OUTWARD[1]),
+                ("CLOSING", CLOSING),
+            ]
         }
         (ADVANCE, Some(settings)) => {
             let own = vec![
@@ -150,7 +155,6 @@ fn pass(
                 ("WATER_ABOVE", WATER_ABOVE),
                 ("FLIGHT_STEPS", f64::from(FLIGHT_STEPS)),
                 ("HALVINGS", f64::from(HALVINGS)),
-                ("RISE_SPEED", settings.rise_speed),
                 ("RESPONSE", settings.response),
             ];
             let of_forces = match has_forces {
@@ -226,7 +230,7 @@ impl Whitewater {
     /// Prepares the motion of whitewater with these settings.
     ///
     /// # Errors Returns an error if a shader does not compile or the device fails.
-    pub fn set(&mut self, settings: &CalibratedSettings) -> Result<(), SolveError> {
+    pub fn set(&mut self, settings: &CompleteSettings) -> Result<(), SolveError> {
         let pass = pass(ADVANCE, &self.plan, &self.scene, Some(settings));
         self.program.refit(&[], &[pass])?;
         self.settings = Some(settings.clone());
@@ -325,7 +329,8 @@ impl Whitewater {
     ///
     /// # Panics Panics if [`Self::set`] was not called.
     pub fn advance(&mut self, white: &mut Particles, frame: u32) -> Result<(), SolveError> {
-        assert!(self.settings.is_some(), "settings come before moves");
+        let settings = self.settings.as_ref();
+        let settings = settings.expect("settings come before moves");
         let n = white.len();
         if n == 0 {
             return Ok(());
@@ -346,7 +351,7 @@ impl Whitewater {
         });
         let velocity = parallel::map_slice(&order, |k| {
             let [x, y, z] = white.velocity[at(k)];
-            [x, y, z, 0.0]
+            [x, y, z, settings.rise_of(white.id[at(k)]) as f32]
         });
         self.program.upload(WHITE_POSITION, 0, &position);
         self.program.upload(WHITE_VELOCITY, 0, &velocity);

@@ -24,7 +24,7 @@ use swell_domain::{
     bounds::Bounds,
     mesh_file,
     particles::Particles,
-    whitewater::{self, Births, CalibratedSettings, KillDomain, KillRoom, SeedWater, Thresholds},
+    whitewater::{self, Births, CompleteSettings, KillDomain, KillRoom, SeedWater},
 };
 use swell_files::whitewater::{WhitewaterSettings, kill_asset, written_out};
 use swell_gpu::adapter::Needs;
@@ -75,14 +75,7 @@ pub struct WhitewaterRequest {
 /// Progress of a running job.
 #[derive(Clone, Debug)]
 pub enum WhitewaterEvent {
-    /// Progress of the calibration of thresholds: sent before the first frame and after each.
-    Calibrated {
-        /// Number of frames evaluated.
-        done: usize,
-        /// Number of frames to evaluate.
-        count: usize,
-    },
-    /// The device is open, and the thresholds are known.
+    /// The device is open, and the settings are complete.
     Ready {
         /// Adapter and driver, or the f64 reference.
         device: Identity,
@@ -92,11 +85,10 @@ pub enum WhitewaterEvent {
         water: usize,
         /// Directory of the stream.
         directory: PathBuf,
-        /// The thresholds in use.
-        thresholds: Thresholds,
-        /// Number of frames they were calibrated on by this run; `None` if the settings or an
-        /// earlier run provide them.
-        calibrated_on: Option<usize>,
+        /// Born of a cubic metre that water closes, 1/m³, and a second of one in crests, 1/(m³ s).
+        rates: [f64; 2],
+        /// Whether the settings leave values open, which follow from how much water the shot has.
+        is_of_shot: bool,
         /// First frame that will be computed.
         first: u32,
         /// Last frame that will be computed.
@@ -171,35 +163,14 @@ pub fn whitewater(
     let manifest = manifest(&cache, request, &identity)?;
     let hash = &manifest.scene_hash;
     let standing = derived::standing(&directory, hash, request.overwrite)?;
-    let (settings, calibrated_on) = match &standing {
-        Some(stream) => (recorded(stream, &directory, &scene)?, None),
-        None => {
-            let settled = settle(
-                request,
-                &scene,
-                (&mut engine, &mut water),
-                (stop, &mut *tell),
-            )?;
-            let Some(settled) = settled else {
-                // A stream that was to be overwritten is as it was.
-                let standing = CacheReader::open(&directory).ok();
-                return Ok(WhitewaterOutcome {
-                    last_frame: standing.map_or(cache.first_frame(), |it| it.last_frame()),
-                    frames: 0,
-                    bytes: 0,
-                    directory,
-                    interrupted: true,
-                    passes: PassTimes::default(),
-                });
-            };
-            settled
-        }
+    let settings = match &standing {
+        Some(stream) => recorded(stream, &directory)?,
+        None => settle(&request.settings, &scene, &cache, particles)?,
     };
     engine.set(&settings)?;
     let mut stream = match standing {
         Some(_) => StreamWriter::resume(&directory, &manifest, &cache)?,
         None => {
-            // Only now: if calibration is stopped, the old stream stays intact.
             derived::remove(&directory)?;
             StreamWriter::create(&directory, manifest, &cache, &settings)?
         }
@@ -209,8 +180,8 @@ pub fn whitewater(
         software_warning: opened.software_warning(),
         water: particles,
         directory: directory.clone(),
-        thresholds: settings.thresholds,
-        calibrated_on,
+        rates: [settings.trapped_air_rate, settings.wave_crest_rate],
+        is_of_shot: !request.settings.is_complete(),
         first: stream.clock.frame + 1,
         last,
     });
@@ -267,7 +238,7 @@ pub fn whitewater(
 
 /// Computes a frame of a stream from the one before.
 struct StreamStep<'a> {
-    settings: &'a CalibratedSettings,
+    settings: &'a CompleteSettings,
     scene: &'a Scene,
     cache: &'a CacheReader,
 }
@@ -313,6 +284,7 @@ impl StreamStep<'_> {
                 frame,
                 seconds,
                 spacing,
+                gravity: self.scene.water.gravity.length(),
                 walls: Bounds {
                     min: walls.min + corner,
                     max: walls.max + corner,
@@ -359,7 +331,7 @@ impl StreamWriter {
         directory: &Path,
         manifest: Manifest,
         cache: &CacheReader,
-        settings: &CalibratedSettings,
+        settings: &CompleteSettings,
     ) -> Result<Self, WhitewaterError> {
         let mut assets = vec![Asset {
             name: SETTINGS.to_owned(),

@@ -138,6 +138,7 @@ mod solve {
 mod stage {
     mod absorption;
     mod band;
+    mod births;
     mod body_output;
     mod branch;
     mod budget;

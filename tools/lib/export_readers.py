@@ -62,11 +62,11 @@ film_back_mm = [{FILM_MM}, 20.25]
 WHITE = """
 radius = [0.02, 0.04]
 [emission]
-trapped_air = [0.1, 1.0]
+trapped_air = [0.001, 0.01]
 wave_crest = [0.01, 0.1]
 energy = [0.001, 0.1]
-trapped_air_rate = 2000.0
-wave_crest_rate = 2000.0
+trapped_air_rate = 2e6
+wave_crest_rate = 2e6
 """
 
 SPACING = 0.1

@@ -2,22 +2,24 @@
 
 use rayon::prelude::*;
 
-use super::{AGE, CalibratedSettings, KIND, LIFE, WhitewaterKind};
+use super::{AGE, CompleteSettings, KIND, LIFE, WhitewaterKind};
 use crate::{parallel, particles::Particles};
 
 /// Advances ages by `seconds` and reduces the life of foam, by a factor that rises with the number
-/// of foam particles in its cube of one spacing once there are more than `settings.crowd`. Removes
-/// particles without life left, and returns how many.
+/// of foam particles about it once there are more than `settings.crowd` on a square metre, counted
+/// in its cube of one spacing: foam is a layer no thicker. Removes particles without life left, and
+/// returns how many.
 pub fn grow_older(
-    settings: &CalibratedSettings,
+    settings: &CompleteSettings,
     particles: &mut Particles,
     spacing: f64,
     seconds: f64,
 ) -> usize {
     let crowds = Crowds::of(particles, spacing);
+    let most = settings.crowd * spacing * spacing;
     let loss: Vec<f32> = parallel::map(0..particles.len(), |k| match is_foam(particles, k) {
         true => {
-            let crowd = crowds.about(particles.position[k]) as f64 / f64::from(settings.crowd);
+            let crowd = crowds.about(particles.position[k]) as f64 / most;
             (seconds * crowd.max(1.0)) as f32
         }
         false => 0.0,
@@ -113,15 +115,21 @@ mod tests {
     #[test]
     fn crowded_foam_dies_sooner() {
         let settings = settings();
-        let mut packed = crowd(3 * settings.crowd, WhitewaterKind::Foam, 1.0);
+        // Cubes of 0.1 m are full with 4 on their 0.01 m².
+        let full = 4;
+        let mut packed = crowd(3 * full, WhitewaterKind::Foam, 1.0);
         assert_eq!(grow_older(&settings, &mut packed, 0.1, 0.25), 0);
-        assert_eq!(packed.attributes[LIFE][0], 0.25);
+        assert!((packed.attributes[LIFE][0] - 0.25).abs() < 1e-6);
+        // As many in a cube of half the spacing, a quarter of the area, age four times as fast.
+        let mut dense = crowd(full, WhitewaterKind::Foam, 1.0);
+        assert_eq!(grow_older(&settings, &mut dense, 0.05, 0.1), 0);
+        assert!((dense.attributes[LIFE][0] - 0.6).abs() < 1e-6);
         // Bubbles in the same position do not crowd foam.
-        let mut few = crowd(settings.crowd, WhitewaterKind::Foam, 1.0);
-        let mut bubbles = crowd(3 * settings.crowd, WhitewaterKind::Bubble, 1.0);
+        let mut few = crowd(full, WhitewaterKind::Foam, 1.0);
+        let mut bubbles = crowd(3 * full, WhitewaterKind::Bubble, 1.0);
         few.position.append(&mut bubbles.position);
         few.velocity.append(&mut bubbles.velocity);
-        few.id.extend(settings.crowd..4 * settings.crowd);
+        few.id.extend(full..4 * full);
         for (name, column) in &mut bubbles.attributes {
             few.attributes
                 .entry(name.clone())
@@ -129,7 +137,7 @@ mod tests {
                 .append(column);
         }
         grow_older(&settings, &mut few, 0.1, 0.25);
-        assert_eq!(few.attributes[LIFE][0], 0.75);
+        assert!((few.attributes[LIFE][0] - 0.75).abs() < 1e-6);
     }
 
     #[test]

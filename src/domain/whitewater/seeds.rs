@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec3};
 
 use super::{
-    AGE, CalibratedSettings, KIND, LIFE, Potentials, RADIUS, WhitewaterKind, random,
+    AGE, AIR_BELOW, CompleteSettings, KIND, LIFE, Potentials, RADIUS, WhitewaterKind, random,
     thresholds::grown,
 };
 use crate::{bounds::Bounds, parallel, particles::Particles, period::Period};
@@ -24,6 +24,8 @@ pub struct SeedWater<'a> {
     pub seconds: f64,
     /// Particle spacing, metres.
     pub spacing: f64,
+    /// Gravity, m/s².
+    pub gravity: f64,
     /// The domain's box at this time, with wave makers at their positions.
     pub walls: Bounds,
     /// The domain's least corner, metres.
@@ -48,14 +50,19 @@ struct Born {
 }
 
 impl Births {
-    /// Emits n = Φ_ke (k_ta Φ_ta + k_wc Φ_wc) Δt whitewater particles per water particle (Ihmsen
-    /// 2012, eq. 8), with stochastic rounding. They begin in a cylinder around its position along
-    /// its velocity, with a radius and a length of half a spacing; the paper's length, the distance
-    /// moved in a frame, would lead ahead of the water.
-    pub fn of(settings: &CalibratedSettings, source: &SeedWater<'_>) -> Self {
+    /// Emits n = Φ_ke (k_ta Φ_ta u d² + k_wc Φ_wc d³) Δt whitewater particles per water particle,
+    /// with stochastic rounding: after Ihmsen 2012, eq. 8, whose rates are of a particle, but of
+    /// what a particle stands for. At the surface it stands for an area d², which closes the volume
+    /// u d² a second where it meets water at the speed u, as the air that a plunging jet entrains
+    /// grows with its area and its speed (Kiger and Duncan 2012); in a crest for the volume d³.
+    ///
+    /// They begin in a cylinder around its position along its velocity, with a radius and a length
+    /// of half a spacing; the paper's length, the distance moved in a frame, would lead ahead of
+    /// the water.
+    pub fn of(settings: &CompleteSettings, source: &SeedWater<'_>) -> Self {
         let n = source.water.len();
         let born = parallel::flat_map(0..n, |i| {
-            let (potential, strength) = strength(settings, &source.potentials[i], source.seconds);
+            let (potential, strength) = strength(settings, source, &source.potentials[i]);
             let id = source.water.id[i];
             let chance = random(settings.seed, id, source.frame, 0);
             let count = (strength + chance).floor() as u32;
@@ -96,21 +103,34 @@ impl Births {
     }
 }
 
-/// Strength of the stronger of the two causes, 0 to 1, and expected number of births in `seconds`.
-fn strength(settings: &CalibratedSettings, potentials: &Potentials, seconds: f64) -> (f64, f64) {
-    let thresholds = &settings.thresholds;
-    let trapped_air = grown(potentials.trapped_air, thresholds.trapped_air);
+/// Strength of the stronger of the two causes, 0 to 1, and expected number of births.
+fn strength(
+    settings: &CompleteSettings,
+    source: &SeedWater<'_>,
+    potentials: &Potentials,
+) -> (f64, f64) {
+    let (thresholds, d) = (&settings.thresholds, source.spacing);
+    // A drop in the air traps none.
+    let trapped_air = match potentials.share < AIR_BELOW {
+        true => 0.0,
+        false => grown(
+            potentials.steepness(d, source.gravity),
+            thresholds.trapped_air,
+        ),
+    };
     let wave_crest = grown(potentials.wave_crest, thresholds.wave_crest);
     let energy = grown(potentials.energy, thresholds.energy);
-    let rate = settings.trapped_air_rate * trapped_air + settings.wave_crest_rate * wave_crest;
+    let closed = trapped_air * potentials.trapped_air * d * d;
+    let rate =
+        settings.trapped_air_rate * closed + settings.wave_crest_rate * wave_crest * d.powi(3);
     (
         energy * trapped_air.max(wave_crest),
-        energy * rate * seconds,
+        energy * rate * source.seconds,
     )
 }
 
 fn seed(
-    settings: &CalibratedSettings,
+    settings: &CompleteSettings,
     source: &SeedWater<'_>,
     i: usize,
     potential: f64,
@@ -164,6 +184,7 @@ mod tests {
             frame: 3,
             seconds: 0.04,
             spacing: 0.1,
+            gravity: 10.0,
             walls: Bounds {
                 min: DVec3::ZERO,
                 max: DVec3::ONE,
@@ -173,6 +194,7 @@ mod tests {
         }
     }
 
+    /// Water at 3 m/s that meets water at this speed.
     fn potentials(count: usize, trapped_air: f64) -> Vec<Potentials> {
         vec![
             Potentials {
@@ -185,35 +207,83 @@ mod tests {
         ]
     }
 
-    /// Rate times seconds times particles, within four standard errors of as many coin flips.
+    /// Rate times closed volume, within four standard errors of as many coin flips.
     #[test]
     fn births_follow_the_rate() {
         let water = water(4000);
         let settings = settings();
-        // Half-way between the thresholds the rate is 25 per second and particle, 1 in 0.04 s; the
-        // energy potential is 1.
-        let [least, greatest] = settings.thresholds.trapped_air;
-        let half = potentials(4000, 0.5 * (least + greatest));
-        let count = Births::of(&settings, &source(&water, &half)).len() as f64;
-        let expected = 0.5 * settings.trapped_air_rate * 0.04 * 4000.0;
+        let born = |of: &[Potentials]| Births::of(&settings, &source(&water, of)).len() as f64;
+        // 0.5 m/s on 0.01 m² close 2e-4 m³ in 0.04 s, of which 0.5 are born: 0.5 · 3 / (0.1 · 10)
+        // is far above the limiting steepness.
+        let count = born(&potentials(4000, 0.5));
+        let expected = settings.trapped_air_rate * 0.5 * 0.01 * 0.04 * 4000.0;
+        assert_eq!(expected, 2000.0);
         assert!(
             (count - expected).abs() < 4.0 * (0.25 * 4000f64).sqrt(),
-            "{count} {expected}"
+            "{count}"
         );
-        // Nothing is born below the threshold, nor without energy.
-        let none = potentials(4000, least);
-        assert!(Births::of(&settings, &source(&water, &none)).is_empty());
-        let mut slow = half;
+        // At 0.05 m/s it is 0.15, half of the way up.
+        let count = born(&potentials(4000, 0.05));
+        assert!((count - 100.0).abs() < 4.0 * 10.0, "{count}");
+        // Nothing is born of a slope that waves keep, without energy, and of a drop.
+        assert_eq!(born(&potentials(4000, 0.033)), 0.0);
+        let mut slow = potentials(4000, 0.5);
         slow.iter_mut()
             .for_each(|p| p.energy = settings.thresholds.energy[0]);
-        assert!(Births::of(&settings, &source(&water, &slow)).is_empty());
+        assert_eq!(born(&slow), 0.0);
+        let mut drops = potentials(4000, 0.5);
+        drops.iter_mut().for_each(|p| p.share = 0.1);
+        assert_eq!(born(&drops), 0.0);
+        // Crests: 5e4 of 1e-3 m³ in 0.04 s are 2.
+        let mut crests = potentials(4000, 0.0);
+        crests
+            .iter_mut()
+            .for_each(|p| p.wave_crest = settings.thresholds.wave_crest[1]);
+        assert_eq!(born(&crests), 8000.0);
+    }
+
+    /// An area at which water meets water, and a volume of crests, have the same births at three
+    /// spacings, within four standard errors.
+    #[test]
+    fn births_do_not_depend_on_the_spacing() {
+        let settings = settings();
+        let born = |d: f64, crest: f64, count: f64| {
+            let water = water(count as u32);
+            let one = Potentials {
+                trapped_air: 0.8,
+                wave_crest: crest,
+                energy: 4.5,
+                share: 0.5,
+            };
+            let potentials = vec![one; water.len()];
+            let source = SeedWater {
+                spacing: d,
+                ..source(&water, &potentials)
+            };
+            Births::of(&settings, &source).len() as f64
+        };
+        for d in [0.2, 0.1, 0.05] {
+            // 10 m²: 2500 · 0.8 · 10 · 0.04 = 800.
+            let of_area = born(d, 0.0, 10.0 / (d * d));
+            assert!(
+                (of_area - 800.0).abs() < 4.0 * 800f64.sqrt(),
+                "{d}: {of_area}"
+            );
+            // 2 m³ of crests, of which the area closes its part too.
+            let of_volume = born(d, settings.thresholds.wave_crest[1], 2.0 / (d * d * d));
+            let crests = 5e4 * 2.0 * 0.04 + 2500.0 * 0.8 * 2.0 / d * 0.04;
+            assert!(
+                (of_volume - crests).abs() < 4.0 * crests.sqrt(),
+                "{d}: {of_volume} {crests}"
+            );
+        }
     }
 
     #[test]
     fn births_are_about_their_water_with_ids_of_their_own() {
         let water = water(50);
         let settings = settings();
-        let full = potentials(50, settings.thresholds.trapped_air[1]);
+        let full = potentials(50, 1.0);
         let births = Births::of(&settings, &source(&water, &full));
         let mut all = none();
         let next = births.join(&mut all, 7);
@@ -241,7 +311,7 @@ mod tests {
         let mut twice = none();
         again.join(&mut twice, 7);
         assert_eq!(all, twice);
-        let other = CalibratedSettings {
+        let other = CompleteSettings {
             seed: 9,
             ..settings.clone()
         };

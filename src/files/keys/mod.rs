@@ -35,7 +35,7 @@ pub(super) use scene::{
 pub(super) use solver::{CHEBYSHEV_RELAXATION, PbfSpec, RELAXATION, SolverSpec};
 pub(super) use study::KEYS as STUDY;
 pub(super) use whitewater::{
-    BubblesSpec, EmissionSpec, FoamSpec, KillSpec, RADII, SpraySpec, WhitewaterSpec,
+    BubblesSpec, EmissionSpec, FoamSpec, KillSpec, SpraySpec, WhitewaterSpec,
 };
 
 /// Keys of a scene.

@@ -7,12 +7,9 @@ use super::{
 
 /// Radius of whitewater particles, metres, from mist to a bucket.
 const RADIUS: Interval = 1e-6..=10.0;
-const RATE: Interval = 0.0..=1e7;
+const RATE: Interval = 0.0..=1e12;
 const POTENTIAL: Interval = 0.0..=1e9;
 const SECONDS: Interval = 1e-4..=1e6;
-
-/// Default range of radii, particle spacings.
-pub(crate) const RADII: [f64; 2] = [0.025, 0.08];
 
 keys! { struct WhitewaterSpec {
     seed: u32 = whole(0..=u32::MAX)
@@ -23,7 +20,7 @@ keys! { struct WhitewaterSpec {
         .about("a frame with more ends the job, its last good frame kept"),
     radius: Option<[f64; 2]> = vector(2, RADIUS)
         .unit("metres")
-        .computed(|| format!("{} and {} particle spacings", RADII[0], RADII[1]))
+        .computed(|| "what the shot gives".to_owned())
         .also(", rising")
         .about("least and greatest radius of a whitewater particle, as it is drawn"),
     emission: EmissionSpec = table()
@@ -43,26 +40,27 @@ keys! { struct WhitewaterSpec {
 } }
 
 keys! { struct EmissionSpec {
-    trapped_air_rate: f64 = number(RATE)
-        .unit("1/s")
-        .default("250.0")
-        .about("born a second of one water particle where water meets water hardest; 0: none"),
-    wave_crest_rate: f64 = number(RATE)
-        .unit("1/s")
-        .default("250.0")
-        .about("the same at the sharpest crests"),
-    trapped_air: Option<[f64; 2]> = vector(2, POTENTIAL)
-        .unit("m/s")
+    trapped_air_rate: Option<f64> = number(RATE)
+        .unit("1/m³")
         .computed(|| "what the shot gives".to_owned())
-        .also(", rising")
-        .about("from where to where the potential of trapped air grows from 0 to 1"),
-    wave_crest: Option<[f64; 2]> = vector(2, POTENTIAL)
+        .about("born of a cubic metre that water closes at its surface where it meets water; \
+                0: none"),
+    wave_crest_rate: Option<f64> = number(RATE)
+        .unit("1/(m³ s)")
         .computed(|| "what the shot gives".to_owned())
+        .about("born a second of a cubic metre of water in crests; 0: none"),
+    trapped_air: [f64; 2] = vector(2, POTENTIAL)
+        .default("[0.1, 0.2]")
         .also(", rising")
-        .about("the same of wave crests"),
-    energy: Option<[f64; 2]> = vector(2, POTENTIAL)
+        .about("from where to where the steepness at which water traps air grows from 0 to 1: \
+                the convective acceleration of what meets, over gravity"),
+    wave_crest: [f64; 2] = vector(2, POTENTIAL)
+        .default("[0.561, 4.19]")
+        .also(", rising")
+        .about("the same of wave crests: 0.561 at 120°, 4.19 on the edge of a sheet"),
+    energy: [f64; 2] = vector(2, POTENTIAL)
         .unit("J/kg")
-        .computed(|| "what the shot gives".to_owned())
+        .default("[0.5, 2.0]")
         .also(", rising")
         .about("the same of v²/2, which the other two are multiplied by"),
 } }
@@ -84,18 +82,19 @@ keys! { struct FoamSpec {
         .default("[0.5, 4.0]")
         .also(", rising")
         .about("least and greatest; a stronger cause leaves foam that lives longer"),
-    crowd: u32 = whole(1..=1_000_000)
-        .default("64")
-        .about("foam in a cube of one spacing from which on it dies faster"),
+    crowd: Option<f64> = number(1e-6..=1e12)
+        .unit("1/m²")
+        .computed(|| "what the shot gives".to_owned())
+        .about("foam on a square metre from which on it dies faster"),
 } }
 
 keys! { struct BubblesSpec {
-    rise_speed: f64 = number(0.0..=10.0)
+    rise_speed: Option<f64> = number(0.0..=10.0)
         .unit("m/s")
-        .default("0.25")
+        .absent()
         .about(
-            "through still water; bubbles of 1 to 10 mm rise at 0.2 to 0.3 m/s \
-             (Clift, Grace and Weber 1978)",
+            "of all bubbles through still water; where left out each rises as its size does, \
+             of 0.1 to 5 mm (Deane and Stokes 2002; Clift, Grace and Weber 1978)",
         ),
     response: f64 = number(SECONDS)
         .unit("seconds")

@@ -10,7 +10,7 @@ use crate::{
 };
 use swell_cache::CacheReader;
 use swell_check::CheckTable;
-use swell_domain::{boundary::Boundary, whitewater::CalibratedSettings};
+use swell_domain::{boundary::Boundary, whitewater::CompleteSettings};
 use swell_gpu::adapter::Context;
 use swell_scene::PbfScene;
 
@@ -22,7 +22,7 @@ pub struct Stream {
     cache: CacheReader,
     scene: PbfScene<'static>,
     boundary: Boundary,
-    settings: CalibratedSettings,
+    settings: CompleteSettings,
     particles: usize,
 }
 
@@ -65,7 +65,7 @@ impl Stream {
         let begin = WaterReader::of(&cache, scene.period()).at(cache.first_frame())?;
         let particles = begin.len();
         let boundary = Start::with(&scene, begin)?.boundary;
-        let settings = recorded(&stream, directory, &scene)?;
+        let settings = recorded(&stream, directory)?;
         Ok(Self {
             stream,
             cache,

@@ -5,7 +5,7 @@ use swell_domain::{
     boundary::Boundary,
     particles::Particles,
     solver::PassTime,
-    whitewater::{CalibratedSettings, Potentials},
+    whitewater::{CompleteSettings, Potentials},
 };
 use swell_scene::PbfScene;
 
@@ -36,7 +36,7 @@ impl Engine {
     }
 
     /// Sets the settings; required before `advance`.
-    pub(super) fn set(&mut self, settings: &CalibratedSettings) -> Result<(), SolverError> {
+    pub(super) fn set(&mut self, settings: &CompleteSettings) -> Result<(), SolverError> {
         match self {
             Self::Gpu(engine) => engine.set(settings)?,
             Self::Cpu(engine) => engine.set(settings),

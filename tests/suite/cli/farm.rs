@@ -83,28 +83,12 @@ fn events_end_with_the_totals_of_each_command() {
     assert_eq!(named(&told, "result")[0]["frames"][0], 3);
 }
 
-/// Slow work reports its start and its number of parts: a frame, before its own event, and
-/// whitewater's thresholds, before the first frame. Thresholds that a stream already has and frames
-/// that already exist report none.
+/// A frame reports its start and its number of parts before its own event; frames that already
+/// exist report none.
 #[test]
-fn parts_of_a_frame_and_of_a_calibration_are_told() {
+fn parts_of_a_frame_are_told() {
     let job = Job::new();
     job.expect(0, "bake small.toml -o cache --frames 1-3 --device cpu");
-    let white = "whitewater cache --device cpu";
-    let told = events(&job, 0, white);
-    let parts = named(&told, "part");
-    let begun = parts[0];
-    assert_eq!(
-        (&begun["of"], &begun["done"]),
-        (&"calibration".into(), &0.into())
-    );
-    assert_eq!(begun["count"], 3);
-    assert!(begun["seconds_left"].is_null() && begun["job_seconds_left"].is_null());
-    let place = |name: &str| told.iter().position(|event| event["event"] == name);
-    assert!(place("part") < place("ready") && place("ready") < place("frame"));
-    let again = events(&job, 0, white);
-    assert!(named(&again, "part").is_empty(), "{again:?}");
-
     job.edit("look.toml", "samples = 1", "samples = 3");
     job.edit("look.toml", "[sky]", "[renderer]\nmethod = \"ray\"\n[sky]");
     let render = "render cache --look look.toml -o rays --frames 1-3";
@@ -124,13 +108,6 @@ fn parts_of_a_frame_and_of_a_calibration_are_told() {
         assert_eq!(begun["count"], 4);
     }
     assert!(named(&events(&job, 0, render), "part").is_empty());
-    // The lines for people report what comes before the first frame as well.
-    fs::remove_dir_all(job.path("cache/whitewater")).unwrap();
-    let said = job.expect(0, white);
-    assert_has(
-        &said,
-        &["thresholds are calibrated on the shot's frames: 0 of 3"],
-    );
 }
 
 #[test]

@@ -164,7 +164,8 @@ fn the_step_after_an_exchange_is_the_references() {
         // So do the stages that read the cache.
         job.write(
             "tuned.toml",
-            "[emission]\ntrapped_air = [0.2, 2.0]\nwave_crest = [0.2, 2.0]\nenergy = [0.02, 0.5]\n",
+            "[emission]\ntrapped_air = [0.01, 0.1]\nwave_crest = [0.2, 2.0]\nenergy = [0.02, 0.5]\n\
+             trapped_air_rate = 1e5\nwave_crest_rate = 2.5e5\n",
         );
         job.expect(0, "whitewater whole --settings tuned.toml");
         job.expect(0, "verify whole/whitewater/tuned");

@@ -13,10 +13,12 @@ use swell::{
 
 use crate::support::job::{Job, assert_has};
 
-/// Thresholds low enough for the small splash of a job, and lifetimes as short as the shot.
-const SETTINGS: &str = "[emission]\ntrapped_air = [0.2, 2.0]\nwave_crest = [0.2, 2.0]\n\
-    energy = [0.02, 0.5]\n\
-    [foam]\nlifetime = [0.02, 0.1]\n";
+/// Thresholds low enough and rates high enough for the small splash of a job, and lifetimes as
+/// short as the shot.
+const SETTINGS: &str = "radius = [0.0025, 0.008]\n\
+    [emission]\ntrapped_air = [0.001, 0.01]\nwave_crest = [0.02, 0.2]\nenergy = [0.001, 0.05]\n\
+    trapped_air_rate = 3e5\nwave_crest_rate = 1e6\n\
+    [foam]\nlifetime = [0.02, 0.1]\ncrowd = 6400\n";
 const MAKE: &str = "whitewater cache/small/pbf --settings tuned.toml";
 const STREAM: &str = "cache/small/pbf/whitewater/tuned";
 

@@ -5,8 +5,7 @@ use swell::{
         boundary::Boundary,
         particles::Particles,
         whitewater::{
-            AGE, CalibratedSettings, KIND, LIFE, Potentials, RADIUS, Thresholds, WhitewaterKind,
-            none,
+            AGE, CompleteSettings, KIND, LIFE, Potentials, RADIUS, Thresholds, WhitewaterKind, none,
         },
     },
     gpu::adapter::Context,
@@ -15,23 +14,19 @@ use swell::{
     solve,
 };
 
-pub fn settings() -> CalibratedSettings {
-    CalibratedSettings {
+pub fn settings() -> CompleteSettings {
+    CompleteSettings {
         seed: 1,
         max_particles: 1_000_000,
         radius: [0.005, 0.02],
-        trapped_air_rate: 50.0,
-        wave_crest_rate: 50.0,
-        thresholds: Thresholds {
-            trapped_air: [6.0, 24.0],
-            wave_crest: [2.0, 8.0],
-            energy: [0.5, 2.0],
-        },
+        trapped_air_rate: 2500.0,
+        wave_crest_rate: 50_000.0,
+        thresholds: Thresholds::default(),
         drop_radius: 1e-3,
         wind: [0.0; 3],
         lifetime: [0.5, 4.0],
-        crowd: 64,
-        rise_speed: 0.25,
+        crowd: 6400.0,
+        rise_speed: Some(0.25),
         response: 0.05,
         kills: Vec::new(),
     }
@@ -77,7 +72,7 @@ pub fn kind(white: &Particles, k: usize) -> WhitewaterKind {
 pub fn run(
     context: Option<&Context>,
     (scene, water): (&Scene, &Particles),
-    settings: &CalibratedSettings,
+    settings: &CompleteSettings,
     white: &Particles,
     (frames, seconds): (u32, f64),
 ) -> (Vec<Potentials>, Particles) {

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use proptest::prelude::*;
 use swell::{
-    domain::whitewater::Thresholds,
+    domain::whitewater::ShotScale,
     files::whitewater::{WhitewaterSettings, written_out},
     scene::SceneError,
 };
@@ -33,34 +33,30 @@ const NUMBERS: &[(&str, &str, bool)] = &[
     ("spray.drop_radius", "{}", true),
     ("spray.wind", "[0, {}, 0]", true),
     ("foam.lifetime", "[{}, {}]", true),
+    ("foam.crowd", "{}", true),
     ("bubbles.rise_speed", "{}", true),
     ("bubbles.response", "{}", true),
 ];
 
 /// Key and both ends of the range of each integer.
-const WHOLE: &[(&str, u64, u64)] = &[
+const WHOLE: [(&str, u64, u64); 2] = [
     ("seed", 0, 4_294_967_295),
     ("max_particles", 1, 200_000_000),
-    ("foam.crowd", 1, 1_000_000),
 ];
 
 fn parse(text: &str) -> Result<WhitewaterSettings, SceneError> {
     WhitewaterSettings::parse(text, Path::new("bad.toml"))
 }
 
-fn shot() -> Thresholds {
-    Thresholds {
-        trapped_air: [7.0, 30.0],
-        wave_crest: [2.5, 9.0],
-        energy: [0.5, 4.0],
-    }
+fn shot() -> ShotScale {
+    ShotScale::of_volume(200.0)
 }
 
 #[test]
 fn every_number_of_whitewater_has_a_range_and_says_it() {
     parse(SETTINGS).expect("good settings");
     each_number_has_a_range(|set| parse(set).map(|_| ()), NUMBERS);
-    for &(key, least, most) in WHOLE {
+    for (key, least, most) in WHOLE {
         for end in [least, most] {
             parse(&format!("{key} = {end}")).expect(key);
         }
@@ -184,9 +180,9 @@ proptest! {
         let bytes = mutate(SETTINGS.as_bytes().to_vec(), &edits);
         match parse(&String::from_utf8_lossy(&bytes)) {
             Ok(settings) => {
-                let settled = settings.settled(0.1, &shot());
+                let settled = settings.settled(&shot());
                 let again = parse(&written_out(&settled)).expect("what was written");
-                prop_assert_eq!(again.settled(9.0, &shot()), settled);
+                prop_assert_eq!(again.settled(&shot()), settled);
             }
             Err(error) => prop_assert!(error.to_string().starts_with("bad.toml:")),
         }
