@@ -22,11 +22,6 @@ impl<'a> WaterReader<'a> {
         }
     }
 
-    /// The cache that it reads from.
-    pub(crate) fn cache(&self) -> &'a CacheReader {
-        self.cache
-    }
-
     /// The particles of a frame, relative to the scene's origin. Between two kept frames, each
     /// particle follows the cubic Hermite curve through both frames' positions and velocities.
     pub(crate) fn at(&mut self, frame: u32) -> Result<Particles, CacheError> {
