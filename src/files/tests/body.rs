@@ -1,6 +1,7 @@
 use std::path::Path;
 
 use crate::{parse_scene, scene_to_toml};
+use swell_domain::absorber::MOST;
 use swell_scene::Scene;
 
 const SCENE: &str = r#"
@@ -125,4 +126,24 @@ fn bodies_that_cannot_be_are_refused_with_their_key() {
     let touching = "body=[{mesh=\"assets/crate.obj\",scale=0.3,translate=[0.5,0.5,0.5],density=1},\
                     {mesh=\"assets/crate.obj\",scale=0.3,translate=[0.8,0.5,0.5],density=1}]";
     assert!(load(&[touching]).is_ok());
+}
+
+/// Half a cell of 0.1 m at 2 m/s and with 9.81 m/s² takes 0.0225 s; 5 cells and waves allow 0.101 s.
+#[test]
+fn no_point_of_a_body_goes_farther_than_half_a_cell() {
+    let scene = load(&[
+        "body=[{mesh=\"assets/crate.obj\",scale=0.3,translate=[0.5,0.5,0.5],density=400,\
+         velocity=[2,0,0]}]",
+        "solver.flip.cfl=5",
+    ]);
+    let scene = scene.unwrap();
+    let flip = scene.with_flip().unwrap();
+    let states = scene.bodies_at_start();
+    let moving = (&[None; MOST], &states[..]);
+    let (_, substep) = (flip.flip_substep(moving, 1, 0.0, 0.25, 0.0, (0, 0.0))).unwrap();
+    assert!(
+        (substep.length - 0.25 / 12.0).abs() < 1e-12,
+        "{}",
+        substep.length
+    );
 }

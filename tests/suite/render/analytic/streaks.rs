@@ -22,12 +22,13 @@ const SIDE: u32 = 72;
 /// slowly at first as Hermite's curve, by 10 of 64 parts in a quarter of the way, over 20 pixels.
 const FASTER: f64 = 1.6;
 
-/// The camera before the box, which sees a metre as 35 pixels, and the sky behind the balls.
-fn eye() -> Eye {
+/// The camera before the box, which sees a metre as 35 pixels times `scale`, and the sky behind the
+/// balls.
+fn eye(scale: u32) -> Eye {
     let position = DVec3::new(5.0, 2.5, -15.0);
-    let focal = position.distance(CENTRE) * RADIUS_PX / RADIUS;
+    let focal = f64::from(scale) * position.distance(CENTRE) * RADIUS_PX / RADIUS;
     Eye {
-        size: SIDE,
+        size: SIDE * scale,
         ..Eye::new(position.to_array(), CENTRE.to_array(), focal)
     }
 }
@@ -70,10 +71,15 @@ enum Moves {
 }
 
 fn shot(context: &Context, moves: Moves, samples: u32, shutter: f64) -> Image {
+    scaled(1, context, moves, (samples, shutter))
+}
+
+fn scaled(scale: u32, context: &Context, moves: Moves, (samples, shutter): (u32, f64)) -> Image {
+    let eye = eye(scale);
     let next = Eye {
-        position: eye().position - FASTER * velocity() / 24.0,
-        target: eye().target - FASTER * velocity() / 24.0,
-        ..eye()
+        position: eye.position - FASTER * velocity() / 24.0,
+        target: eye.target - FASTER * velocity() / 24.0,
+        ..eye
     };
     let setup = Setup {
         samples,
@@ -84,7 +90,7 @@ fn shot(context: &Context, moves: Moves, samples: u32, shutter: f64) -> Image {
         // the sphere lies 0.07 pixels off its chords.
         surface: "voxels_per_spacing = 8.0\n".to_owned(),
         background: false,
-        ..Setup::new(eye())
+        ..Setup::new(eye)
     };
     let water = match moves {
         Moves::Water => ball(CENTRE, velocity()),
@@ -155,7 +161,10 @@ const WITHIN: f64 = 4.0 / MANY as f64 + 0.2 / STREAK;
 #[test]
 fn a_ball_leaves_the_streak_of_its_disc() {
     let of_water = radius(Moves::Water);
-    for (moves, radius) in [(Moves::Water, of_water), (Moves::Solid, radius(Moves::Solid))] {
+    for (moves, radius) in [
+        (Moves::Water, of_water),
+        (Moves::Solid, radius(Moves::Solid)),
+    ] {
         let image = shot(&context(), moves, MANY, SHUTTER);
         let found = worst(&image, (radius, STREAK));
         assert!(found < WITHIN, "{moves:?}: {found}");
@@ -175,6 +184,52 @@ fn a_ball_leaves_the_streak_of_its_disc() {
     let image = shot(&longer, Moves::Water, MANY, SHUTTER);
     let found = worst(&image, (of_water, STREAK));
     assert!(found > 2.0 * WITHIN, "{found}");
+}
+
+/// Area of what a picture shows, pixels, and its variance along the rows, pixels².
+fn moments(image: &Image, side: usize) -> [f64; 2] {
+    let pixels = image.beauty.iter().enumerate();
+    let sums = pixels.fold([0.0; 3], |[area, first, second], (k, value)| {
+        let (x, alpha) = ((k % side) as f64, f64::from(value[3]));
+        [area + alpha, first + alpha * x, second + alpha * x * x]
+    });
+    let [area, first, second] = sums;
+    [area, second / area - (first / area).powi(2)]
+}
+
+/// With one sample each pixel sees the ball at its own time of the whole shutter: as many see it as
+/// its disc has pixels, N, and their places vary by r²/4 of the disc and s²/12 of the streak s. A sum
+/// of N of them is off by √N at most, and their variance by √(2/N) of it, since neither a disc nor a
+/// streak has as heavy tails as a normal distribution; three times as much is allowed.
+#[test]
+fn the_rays_of_one_sample_have_all_times() {
+    const SCALE: u32 = 3;
+    let off = |context: &Context, moves: Moves| {
+        let pixels = f64::from(SCALE);
+        let image = scaled(SCALE, context, moves, (1, SHUTTER));
+        let [area, variance] = moments(&image, (SIDE * SCALE) as usize);
+        let radius = pixels * radius(moves);
+        let disc = std::f64::consts::PI * radius * radius;
+        let expected = 0.25 * radius * radius + (pixels * STREAK).powi(2) / 12.0;
+        let allowed = [3.0 * disc.sqrt(), 3.0 * expected * (2.0 / disc).sqrt()];
+        println!("{moves:?}: {area:.0} of {disc:.0} px, {variance:.0} of {expected:.0} px²");
+        [
+            (area - disc).abs() / allowed[0],
+            (variance - expected).abs() / allowed[1],
+        ]
+    };
+    for moves in [Moves::Water, Moves::Solid] {
+        let off = off(&context(), moves);
+        assert!(off.iter().all(|off| *off < 1.0), "{moves:?}: {off:?}");
+    }
+    // Control: triangles that go a tenth too far along their way.
+    let farther = spoiled(
+        "rays/cast",
+        "own_part = moments[index].part;",
+        "own_part = 1.1 * moments[index].part;",
+    );
+    let off = off(&farther, Moves::Solid);
+    assert!(off[1] > 1.0, "{off:?}");
 }
 
 /// Largest correlation of the difference between two pictures, at up to six pixels, in standard
@@ -256,7 +311,7 @@ fn a_closed_shutter_costs_nothing() {
         let setup = Setup {
             shutter,
             method: "ray",
-            ..Setup::new(eye())
+            ..Setup::new(eye(1))
         };
         let scene = scene(RADIUS, 1.0);
         let renderer = super::support::renderer(&context(), &setup, &uniform_sky, &scene, 64);
