@@ -128,7 +128,8 @@ fn bodies_that_cannot_be_are_refused_with_their_key() {
     assert!(load(&[touching]).is_ok());
 }
 
-/// Half a cell of 0.1 m at 2 m/s and with 9.81 m/s² takes 0.0225 s; 5 cells and waves allow 0.101 s.
+/// Half a cell of 0.1 m at 2 m/s and with 9.81 m/s² takes 0.0225 s; 5 cells and waves allow
+/// 0.101 s.
 #[test]
 fn no_point_of_a_body_goes_farther_than_half_a_cell() {
     let scene = load(&[

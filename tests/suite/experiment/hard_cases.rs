@@ -40,10 +40,10 @@ fn devices(context: &Context) -> Devices {
 /// Trials of more frames than this are cut short.
 const LONG: u32 = 240;
 
-/// What the suite runs of a case's trials: those on the GPU, whose passes `check` compares with the
-/// f64 reference. A long one is cut short, to a quarter more than until the last of its marks begins
-/// to count, and the reference runs it at full length where one of its marks is passed. The study
-/// runs all of them, and so does `tools/test --all`, which sets SWELL_ALL.
+/// What the suite runs of a case's trials: those on the GPU, whose passes `check` compares with
+/// the f64 reference. A long one is cut short, to a quarter more than until the last of its marks
+/// begins to count, and the reference runs it at full length where one of its marks is passed. The
+/// study runs all of them, and so does `tools/test --all`, which sets SWELL_ALL.
 fn in_suite(trials: &[Trial]) -> Vec<Trial> {
     if std::env::var_os("SWELL_ALL").is_some() {
         return trials.to_vec();

@@ -197,10 +197,10 @@ fn moments(image: &Image, side: usize) -> [f64; 2] {
     [area, second / area - (first / area).powi(2)]
 }
 
-/// With one sample each pixel sees the ball at its own time of the whole shutter: as many see it as
-/// its disc has pixels, N, and their places vary by r²/4 of the disc and s²/12 of the streak s. A sum
-/// of N of them is off by √N at most, and their variance by √(2/N) of it, since neither a disc nor a
-/// streak has as heavy tails as a normal distribution; three times as much is allowed.
+/// With one sample each pixel sees the ball at its own time of the whole shutter: as many see it
+/// as its disc has pixels, N, and their places vary by r²/4 of the disc and s²/12 of the streak s.
+/// A sum of N of them is off by √N at most, and their variance by √(2/N) of it, since neither a
+/// disc nor a streak has as heavy tails as a normal distribution; three times as much is allowed.
 #[test]
 fn the_rays_of_one_sample_have_all_times() {
     const SCALE: u32 = 3;
