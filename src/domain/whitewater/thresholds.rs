@@ -114,7 +114,8 @@ impl ShotScale {
     }
 }
 
-/// Whitewater born of a cube of one length that water closes.
+/// Whitewater born of a cube of one length that water closes. A matter of taste, as are the numbers
+/// below: with them the quickstart has as much as with rates of a particle, 0.8 million.
 const BORN_OF_AIR: f64 = 300_000.0;
 /// Whitewater born of a cube of one length of water in crests, in the time in which a long wave in
 /// as deep water moves by it.

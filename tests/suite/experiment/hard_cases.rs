@@ -41,18 +41,20 @@ fn devices(context: &Context) -> Devices {
 const LONG: u32 = 240;
 
 /// What the suite runs of a case's trials: those on the GPU, whose passes `check` compares with
-/// the f64 reference. A long one is cut short, to a quarter more than until the last of its marks
-/// begins to count, and the reference runs it at full length where one of its marks is passed. The
-/// study runs all of them, and so does `tools/test --all`, which sets SWELL_ALL.
+/// the f64 reference, or all where none is on the GPU. A long one is cut short, to a quarter more
+/// than until the last of its marks begins to count, and the reference runs it at full length
+/// where one of its marks is passed. The study runs all of them, and so does `tools/test --all`,
+/// which sets SWELL_ALL.
 fn in_suite(trials: &[Trial]) -> Vec<Trial> {
     if std::env::var_os("SWELL_ALL").is_some() {
         return trials.to_vec();
     }
+    let has_gpu = trials.iter().any(|trial| trial.device == RunsOn::Gpu);
     let is_due = |trial: &&Trial| {
         let is_always = |mark: &Mark| Quantity::ALWAYS.contains(&mark.of);
         let mut own = trial.marks.iter().filter(|mark| !is_always(mark));
         let can_fail = own.any(|mark| mark.known_failure.is_none());
-        trial.device == RunsOn::Gpu || trial.frames > LONG && can_fail
+        trial.device == RunsOn::Gpu || !has_gpu || trial.frames > LONG && can_fail
     };
     let cut = |trial: &Trial| {
         let mut trial = trial.clone();
@@ -88,6 +90,7 @@ fn wrong(case: &Case) -> Vec<String> {
         }
         Held::Runs(trials) => {
             let trials = in_suite(trials);
+            assert!(!trials.is_empty(), "{}", case.name);
             // In parallel, because the longest case bounds the time of the whole suite.
             let runs: Vec<StabilityRun> = thread::scope(|scope| {
                 let begun: Vec<_> = (trials.iter())
