@@ -11,6 +11,7 @@ use super::{
     rounding::Rounding,
     shader::Shaders,
     traffic::{Counters, Traffic},
+    uniforms,
 };
 
 pub use super::error::GpuError;
@@ -46,6 +47,8 @@ pub struct Context {
     pub spoil: Option<InjectedFault>,
     /// How much less precisely passes compute than the device does.
     pub(super) imprecision: Option<Imprecision>,
+    /// Uniform buffers that a shader may bind, if the driver cannot take what its limits allow.
+    pub(super) most_uniforms: Option<usize>,
     /// What [`Context::rounding`] measured.
     rounding: Arc<OnceLock<Rounding>>,
     /// Passes compiled on this device.
@@ -227,14 +230,20 @@ impl Context {
         let adapter = choose(adapters, request)?;
         let info = adapter.get_info();
         let mut limits = adapter.limits();
+        let storage = limits.max_storage_buffers_per_shader_stage;
         lower(&mut limits);
         let features = features(adapter.features(), needs).ok_or_else(|| GpuError::NoF64 {
             adapter: info.name.clone(),
         })?;
+        let most_uniforms = uniforms::most(&info);
+        let mut required_limits = limits.clone();
+        if most_uniforms.is_some() {
+            required_limits.max_storage_buffers_per_shader_stage = storage;
+        }
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("swell"),
             required_features: features,
-            required_limits: limits.clone(),
+            required_limits,
             ..Default::default()
         };
         let (device, queue) =
@@ -267,6 +276,7 @@ impl Context {
             counts_operations: false,
             spoil: None,
             imprecision: None,
+            most_uniforms,
             rounding: Arc::default(),
             compiled: Arc::default(),
             counters: Arc::default(),

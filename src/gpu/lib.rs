@@ -23,4 +23,5 @@ mod statements;
 pub mod texture;
 mod timer;
 pub mod traffic;
+mod uniforms;
 pub mod variants;

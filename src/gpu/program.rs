@@ -19,6 +19,7 @@ use super::{
     readback::{Copied, Mapped, Readback, Staging},
     reflect::{Access, Binding, Reflection, Stage, reflect, reflect_at},
     shader::Composed,
+    uniforms,
 };
 
 /// Description of a compute pass to compile.
@@ -288,7 +289,8 @@ fn allocated(spec: &BufferSpec) -> u64 {
 
 fn allocate(context: &Context, spec: &BufferSpec) -> Buffer {
     let role = if spec.is_uniform {
-        BufferUsages::UNIFORM
+        // Passes may bind it as storage on some drivers: see `uniforms`.
+        BufferUsages::UNIFORM | BufferUsages::STORAGE
     } else {
         BufferUsages::STORAGE | BufferUsages::INDIRECT
     };
@@ -455,10 +457,14 @@ pub(super) fn module(
     source: wgpu::ShaderSource<'_>,
 ) -> Result<(wgpu::ShaderModule, BindGroupLayout, wgpu::PipelineLayout), GpuError> {
     let device = &context.device;
+    let (entries, source) = match context.most_uniforms {
+        Some(most) => uniforms::limited(name, most, entries, source)?,
+        None => (entries.to_vec(), source),
+    };
     checked(context, name, || {
         let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
             label: Some(name),
-            entries,
+            entries: &entries,
         });
         let descriptor = wgpu::ShaderModuleDescriptor {
             label: Some(name),
