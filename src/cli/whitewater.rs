@@ -12,7 +12,7 @@ use swell_stage::whitewater::{
 };
 
 use super::{
-    DeviceArgs, Failure, count,
+    DeviceArgs, Failure, bake, count,
     dry_run::DryRun,
     interrupt::{self, Interrupt},
     output, pass_times,
@@ -27,6 +27,9 @@ pub(super) struct WhitewaterArgs {
     /// Settings file (TOML); what it leaves out has defaults, or follows from the shot's water.
     #[arg(long, value_name = "FILE")]
     settings: Option<PathBuf>,
+    /// Take meshes that lie outside of the settings file's folder.
+    #[arg(long)]
+    allow_outside: bool,
     /// Name of the stream, which goes to CACHE/whitewater/NAME; the settings file's own where left
     /// out, or `default`. An existing stream is resumed.
     #[arg(long, value_name = "NAME")]
@@ -88,7 +91,7 @@ pub(super) fn stream_name(name: String, option: &str) -> Result<String, Failure>
 
 pub(super) fn run(args: &WhitewaterArgs, progress: &Progress) -> Result<u8, Failure> {
     let settings = match &args.settings {
-        Some(file) => WhitewaterSettings::load(file)?,
+        Some(file) => WhitewaterSettings::load_within(file, bake::reach(args.allow_outside))?,
         None => WhitewaterSettings::parse("", &PathBuf::from("no settings file"))?,
     };
     let request = WhitewaterRequest {
@@ -177,6 +180,7 @@ fn tell(progress: &Progress, event: WhitewaterEvent) {
         WhitewaterEvent::Ready {
             device,
             software_warning,
+            warnings,
             water,
             directory,
             rates: [air, crest],
@@ -187,6 +191,12 @@ fn tell(progress: &Progress, event: WhitewaterEvent) {
             let frames = u64::from((last + 1).saturating_sub(first));
             progress.begin(frames);
             progress.warn_of_adapter(software_warning.as_deref());
+            for text in warnings {
+                progress.say(
+                    &format!("warning: {text}"),
+                    json!({ "event": "warning", "what": "settings", "text": text }),
+                );
+            }
             let source = match is_of_shot {
                 true => "of the shot's water where none is given",
                 false => "as given",

@@ -7,6 +7,7 @@ use glam::DVec3;
 use serde::Deserialize;
 
 use super::{
+    Reach,
     document::Document,
     keys::{
         BubblesSpec, EmissionSpec, FoamSpec, KillSpec, MeshSpec, ScaleSpec, SpraySpec, WHITEWATER,
@@ -118,11 +119,19 @@ impl WhitewaterSettings {
     /// # Errors
     /// If the file cannot be read, or for its first fault, with line, key and allowed values.
     pub fn load(path: &Path) -> Result<Self, SceneError> {
+        Self::load_within(path, Reach::Folder)
+    }
+
+    /// Same as [`Self::load`], with meshes from where `reach` says.
+    ///
+    /// # Errors
+    /// Those of [`Self::load`].
+    pub fn load_within(path: &Path, reach: Reach) -> Result<Self, SceneError> {
         let text = text::read(path).map_err(|source| SceneError::Read {
             file: path.to_owned(),
             source,
         })?;
-        Self::parse(&text, path)
+        Self::parse_within(&text, path, reach)
     }
 
     /// Parses and validates the text of a settings file; `file` names it in messages.
@@ -130,7 +139,12 @@ impl WhitewaterSettings {
     /// # Errors
     /// Those of [`Self::load`].
     pub fn parse(text: &str, file: &Path) -> Result<Self, SceneError> {
+        Self::parse_within(text, file, Reach::Folder)
+    }
+
+    fn parse_within(text: &str, file: &Path, reach: Reach) -> Result<Self, SceneError> {
         let (doc, mut root) = Document::parse(text, file, &[], WHITEWATER)?;
+        let doc = doc.within(reach);
         doc.settle(&mut root)?;
         let mut spec = WhitewaterSpec::deserialize(toml::Deserializer::from(root))
             .map_err(|error| doc.translate(&error))?;

@@ -9,6 +9,7 @@ mod engine;
 mod error;
 mod expected;
 mod forecast;
+mod idle;
 mod settled;
 
 use std::{
@@ -81,6 +82,8 @@ pub enum WhitewaterEvent {
         device: Identity,
         /// Warning about the adapter, as [`crate::device::Opened::software_warning`].
         software_warning: Option<String>,
+        /// Warnings about kill volumes that end nothing.
+        warnings: Vec<String>,
         /// Number of water particles.
         water: usize,
         /// Directory of the stream.
@@ -178,6 +181,7 @@ pub fn whitewater(
     tell(WhitewaterEvent::Ready {
         device: identity,
         software_warning: opened.software_warning(),
+        warnings: idle::idle_kills(&settings.kills, &scene),
         water: particles,
         directory: directory.clone(),
         rates: [settings.trapped_air_rate, settings.wave_crest_rate],

@@ -70,3 +70,13 @@ fn a_scene_without_water_is_told_of() {
         [] as [&str; 0]
     );
 }
+
+#[test]
+fn a_force_without_strength_is_told_of() {
+    let of = |strength: f64| {
+        let force = format!("force=[{{kind=\"attract\",at=[0,0,0],core=0.1,strength={strength}}}]");
+        scene(&["water.block=[{min=[0,0,0],max=[1,0.1,1]}]", &force]).lints()
+    };
+    assert_eq!(of(-1.0), [] as [&str; 0]);
+    assert_eq!(of(0.0), ["force[0]: it is 0 m/s², which moves nothing"]);
+}

@@ -101,6 +101,16 @@ impl Scene {
         let mut forces = forces.map(|it| ("force", it.force.window));
         late(&mut forces, lints);
         self.lint_rooms(lints);
+        self.lint_forces(lints);
+    }
+
+    /// Warns about forces without strength.
+    fn lint_forces(&self, lints: &mut Vec<String>) {
+        for (index, placed) in self.forces.iter().enumerate() {
+            if placed.force.kind.most() == 0.0 {
+                lints.push(format!("force[{index}]: it is 0 m/s², which moves nothing"));
+            }
+        }
     }
 
     /// Warns about emitters that extend behind a wave maker.

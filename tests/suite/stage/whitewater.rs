@@ -282,6 +282,12 @@ fn a_look_draws_the_stream_that_it_names() {
     assert_has(&said, &["frame 8", "missing from it"]);
 }
 
+/// What a job that makes the stream of settings `name` anew says.
+fn said_of(job: &Job, name: &str) -> String {
+    let make = format!("whitewater cache/small/pbf --settings {name}.toml --overwrite");
+    job.expect(0, &make)
+}
+
 #[test]
 fn kill_volumes_end_whitewater_in_their_time() {
     let job = baked();
@@ -322,6 +328,29 @@ fn kill_volumes_end_whitewater_in_their_time() {
     assert_eq!(read("meshed", 8).position, read("killed", 8).position);
     job.expect(0, "verify cache/small/pbf/whitewater/meshed");
     job.expect(0, "check cache/small/pbf/whitewater/meshed --frames 8");
+    // Volumes that end nothing are told of, and none of these is.
+    assert!(!said_of(&job, "killed").contains("warning: kill"));
+    let idle = "[[kill]]\nmin = [50, 0, 0]\nmax = [51, 3, 2]\n[[kill]]\nsides = 0.1\nfrom = 9.0\n";
+    job.write("idle.toml", &format!("{SETTINGS}{idle}"));
+    let said = said_of(&job, "idle");
+    assert!(
+        said.contains("kill[0]: its room is outside the domain"),
+        "{said}"
+    );
+    assert!(said.contains("kill[1].from: it begins after 9 s"), "{said}");
+    // Meshes outside of the settings' folder are taken where that is asked for.
+    fs::create_dir_all(job.path("apart")).unwrap();
+    job.write(
+        "apart/meshed.toml",
+        &format!("{SETTINGS}{}", mesh.replace("cube", "../cube")),
+    );
+    let make = "whitewater cache/small/pbf --settings apart/meshed.toml --name apart";
+    assert_has(
+        &job.expect(2, make),
+        &["kill[0].mesh.file", "--allow-outside"],
+    );
+    job.expect(0, &format!("{make} --allow-outside"));
+    assert_eq!(read("apart", 8).position, read("killed", 8).position);
     job.write("broken.toml", "[[kill]]\nfrom = 0.1\n");
     let said = job.expect(2, "whitewater cache/small/pbf --settings broken.toml");
     assert_has(&said, &["broken.toml", "kill[0]", "no room"]);
