@@ -5,7 +5,7 @@
 suite_log=${TMPDIR:-/tmp}/swell-suite-$$.log
 
 # Modules whose tests run with a software adapter's own threads, where a race of a pass would show: the passes alone.
-suite_threads=(gpu:: check::)
+suite_threads='^(gpu|check)::'
 
 # suite WORDS...: runs tests of the suite by libtest's arguments, and keeps their times. libtest tells times only with an
 # option that it calls unstable, which RUSTC_BOOTSTRAP allows on a stable toolchain; nothing is compiled with it.
@@ -21,12 +21,38 @@ suite_program() {
         sed -n 's/.*"name":"suite".*"executable":"\([^"]*\)".*/\1/p'
 }
 
-suite_threaded() { suite "${suite_threads[@]}"; }
+# All tests of the suite but those that are ignored.
+suite_tests() { comm -23 <(suite_listed) <(suite_listed --ignored); }
+suite_listed() { "$(suite_program)" --list "$@" | sed -n 's/: test$//p' | sort; }
 
-# Elsewhere tests run side by side and each device works on its caller's core, which takes less time; one test more than there
-# are cores fills the waits for the disk.
-suite_in_turn() {
-    LP_NUM_THREADS=0 suite "${suite_threads[@]/#/--skip=}" --test-threads=$(($(nproc) + 1))
+# Tests that `tools/test` leaves to `tools/test --ci`.
+suite_long() { sed -n 's/^\([a-z0-9_:]\{1,\}\) .*/\1/p' tests/long.txt | sort; }
+
+# What `tools/test` runs of the suite: all but the long tests. A name in their list that no test has is an error.
+suite_short() {
+    local unknown
+    unknown=$(comm -13 <(suite_tests) <(suite_long))
+    if [[ -n $unknown ]]; then
+        printf 'tests/long.txt names what is no test of the suite: %s\n' "$unknown" >&2
+        return 1
+    fi
+    suite_side_by_side <(comm -23 <(suite_tests) <(suite_long))
+}
+
+suite_threaded() {
+    local names
+    mapfile -t names < <(suite_tests | grep -E "$suite_threads")
+    suite --exact "${names[@]}"
+}
+
+suite_in_turn() { suite_side_by_side <(suite_tests | grep -vE "$suite_threads"); }
+
+# suite_side_by_side FILE: the tests that a file names, several at a time. Each device works on its caller's core, which takes
+# less time; one test more than there are cores fills the waits for the disk.
+suite_side_by_side() {
+    local names
+    mapfile -t names <"$1"
+    [[ ${#names[@]} -gt 0 ]] && LP_NUM_THREADS=0 suite --exact "${names[@]}" --test-threads=$(($(nproc) + 1))
 }
 
 # print_dearest COUNT: the tests that took longest, while others ran beside them.
