@@ -259,11 +259,7 @@ pub(super) fn validated(
         let notes = error.notes().map(str::to_owned).collect();
         located(error.message().to_owned(), labels.collect(), notes)
     })?;
-    let mut validator = naga::valid::Validator::new(
-        naga::valid::ValidationFlags::all(),
-        naga::valid::Capabilities::default() | naga::valid::Capabilities::FLOAT64,
-    );
-    let info = validator.validate(&module).map_err(|error| {
+    let info = validator().validate(&module).map_err(|error| {
         let mut causes = Vec::new();
         let mut next = error.as_inner().source();
         while let Some(cause) = next {
@@ -274,6 +270,12 @@ pub(super) fn validated(
         located(error.as_inner().to_string(), labels, causes)
     })?;
     Ok((module, info))
+}
+
+/// A validator of all that a pass may use.
+pub(super) fn validator() -> naga::valid::Validator {
+    let capabilities = naga::valid::Capabilities::default() | naga::valid::Capabilities::FLOAT64;
+    naga::valid::Validator::new(naga::valid::ValidationFlags::all(), capabilities)
 }
 
 /// Same as [`reflect`]; errors name positions through `place`, which maps lines counted from 1.

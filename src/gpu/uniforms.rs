@@ -88,7 +88,11 @@ fn is_uniform(ty: BindingType) -> bool {
 #[cfg(test)]
 mod tests {
     use super::{
-        super::{program::entries, reflect::reflect, variants::forms},
+        super::{
+            program::entries,
+            reflect::{reflect, validator},
+            variants::forms,
+        },
         *,
     };
 
@@ -115,11 +119,7 @@ mod tests {
                 continue;
             };
             assert_eq!(uniforms(&module), WITHIN_TABLE, "{name}");
-            let flags = naga::valid::ValidationFlags::all();
-            let capabilities =
-                naga::valid::Capabilities::default() | naga::valid::Capabilities::FLOAT64;
-            let mut validator = naga::valid::Validator::new(flags, capabilities);
-            if let Err(error) = validator.validate(&module) {
+            if let Err(error) = validator().validate(&module) {
                 panic!("{name}: {}", error.emit_to_string(text));
             }
             rewritten += 1;

@@ -156,18 +156,18 @@ impl Imprecision {
 mod tests {
     use naga::Expression;
 
-    use super::{super::variants::forms, call::PREFIX, *};
+    use super::{
+        super::{reflect::validator, variants::forms},
+        call::PREFIX,
+        *,
+    };
 
     /// Calls of this module's functions from a pass's own, by name.
     fn calls(profile: &Imprecision, name: &str, text: &str) -> Vec<String> {
         let module = profile
             .applied(name, text)
             .expect("the functions are valid");
-        let flags = naga::valid::ValidationFlags::all();
-        let capabilities =
-            naga::valid::Capabilities::default() | naga::valid::Capabilities::FLOAT64;
-        let mut validator = naga::valid::Validator::new(flags, capabilities);
-        if let Err(error) = validator.validate(&module) {
+        if let Err(error) = validator().validate(&module) {
             panic!("{name}: {}", error.emit_to_string(text));
         }
         let called = |function: &Function| -> Vec<String> {
