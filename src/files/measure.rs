@@ -10,6 +10,8 @@ pub enum Measure {
     WavesByTheory,
     /// One solitary wave, at the scene's elevation probes.
     SolitaryWave,
+    /// One solitary wave on a plane beach: the scene's run-up probe, and profiles.
+    SolitaryBeach,
     /// A column that collapses along x: position of the front, and height at the wall.
     DamBreak,
     /// A long reservoir that empties over a dry bed along x: profile about the dam.
@@ -28,12 +30,16 @@ pub enum Measure {
     Body,
 }
 
+/// Label of the axis of a beach's profiles.
+const SEAWARD: &str = "distance from the shoreline of still water towards the sea / d";
+
 impl Measure {
     /// All measures with the names used in studies.
-    pub(super) const NAMED: [(&'static str, Self); 11] = [
+    pub(super) const NAMED: [(&'static str, Self); 12] = [
         ("regular_waves", Self::RegularWaves),
         ("waves_by_theory", Self::WavesByTheory),
         ("solitary_wave", Self::SolitaryWave),
+        ("solitary_beach", Self::SolitaryBeach),
         ("dam_break", Self::DamBreak),
         ("dry_bed", Self::DryBed),
         ("block_impact", Self::BlockImpact),
@@ -50,6 +56,7 @@ impl Measure {
             Self::RegularWaves => &["stroke", "period", "after"],
             Self::WavesByTheory => &["after"],
             Self::SolitaryWave => &["depth", "height"],
+            Self::SolitaryBeach => &["depth", "height", "length"],
             Self::DamBreak => &["length"],
             Self::DryBed => &["depth", "length"],
             Self::BlockImpact => &[],
@@ -113,6 +120,20 @@ impl Measure {
                     "run_up",
                     "highest water connected to the body, above still water over the depth, R/d",
                 ),
+            ],
+            Self::SolitaryBeach => &[
+                (
+                    "run_up",
+                    "highest water connected to the body, above still water over the depth, R/d",
+                ),
+                (
+                    "profile_error_15",
+                    "profile at t = 15 √(d/g), root mean square of what it is off the points, over \
+                     the highest of them",
+                ),
+                ("profile_error_20", "the same at t = 20 √(d/g)"),
+                ("profile_error_25", "the same at t = 25 √(d/g)"),
+                ("profile_error_30", "the same at t = 30 √(d/g)"),
             ],
             Self::DamBreak => &[
                 ("front_error", "front against the points, mean"),
@@ -254,6 +275,12 @@ impl Measure {
                     "η / d",
                 ],
             )],
+            Self::SolitaryBeach => &[
+                ("profile_15", ["profile at t = 15 √(d/g)", SEAWARD, "η / d"]),
+                ("profile_20", ["profile at t = 20 √(d/g)", SEAWARD, "η / d"]),
+                ("profile_25", ["profile at t = 25 √(d/g)", SEAWARD, "η / d"]),
+                ("profile_30", ["profile at t = 30 √(d/g)", SEAWARD, "η / d"]),
+            ],
             Self::DamBreak => &[
                 ("front", ["front", "T = t √(2g/a)", "Z = x / a"]),
                 (

@@ -1,6 +1,7 @@
 //! Validation studies: runs benchmarks with known answers, and compares the results with theory and
 //! experiments.
 
+mod beach;
 mod body;
 mod numbers;
 mod record;

@@ -10,12 +10,12 @@ use swell_scene::{Scene, WaveMaker};
 use swell_study::waves;
 
 use super::{
-    BenchmarkMeasurements, body,
+    BenchmarkMeasurements, beach, body,
     record::{FrameRecord, Record},
 };
 
 /// Gravity of the published numbers, m/s², regardless of the scene.
-const GRAVITY: f64 = 9.81;
+pub(super) const GRAVITY: f64 = 9.81;
 
 /// Density of the published numbers, kg/m³, regardless of the scene.
 const DENSITY: f64 = 1000.0;
@@ -46,6 +46,7 @@ pub(super) fn of(record: &Record<'_>) -> BenchmarkMeasurements {
         Measure::RegularWaves => regular_waves(record, &mut out),
         Measure::WavesByTheory => waves_by_theory(record, &mut out),
         Measure::SolitaryWave => solitary_wave(record, &mut out),
+        Measure::SolitaryBeach => beach::of(record, &mut out),
         Measure::DamBreak => dam_break(record, &mut out),
         Measure::DryBed => dry_bed(record, &mut out),
         Measure::BlockImpact => block_impact(record, &mut out),

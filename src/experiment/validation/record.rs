@@ -12,6 +12,8 @@ use swell_files::study::validation::{Benchmark, Measure};
 use swell_scene::{Scene, probe::ProbeKind};
 use swell_stage::drive::ComputedFrame;
 
+use super::beach;
+
 /// Fraction of the water behind the front, so that single particles running ahead do not count.
 const FRONT: f64 = 0.995;
 
@@ -62,7 +64,7 @@ impl<'a> Record<'a> {
         let row = FrameRecord {
             levels: record.levels(start),
             pressures: vec![None; scene.pressure_points().len()],
-            of_water: record.of_water(start),
+            of_water: record.of_water(0.0, start),
             bodies: start.bodies.clone(),
             ..FrameRecord::default()
         };
@@ -74,14 +76,15 @@ impl<'a> Record<'a> {
     pub(super) fn look(&mut self, step: &ComputedFrame) {
         self.substeps += step.report.substeps;
         let water = step.particles.water();
+        let time = f64::from(step.frame) * self.scene.shot.frame_seconds();
         self.rows.push(FrameRecord {
-            time: f64::from(step.frame) * self.scene.shot.frame_seconds(),
+            time,
             speed: step.report.max_speed,
             levels: self.levels(&water),
             pressures: step.pressures.clone(),
             force: self.force(&step.looks),
             run_up: self.run_up(&water),
-            of_water: self.of_water(&water),
+            of_water: self.of_water(time, &water),
             bodies: step.particles.bodies.clone(),
         });
     }
@@ -131,7 +134,7 @@ impl<'a> Record<'a> {
         ((0.1 * self.scene.shot.frames_per_second).round() as usize).max(1)
     }
 
-    fn of_water(&self, particles: &Particles) -> Vec<f64> {
+    fn of_water(&self, time: f64, particles: &Particles) -> Vec<f64> {
         let (domain, scale) = (&self.scene.domain, self.benchmark.scale);
         let along = || {
             particles
@@ -150,6 +153,7 @@ impl<'a> Record<'a> {
                 let seen = both.filter(|(x, _)| *x <= last);
                 vec![seen.map(|(_, v)| speed(v)).fold(0.0, f64::max)]
             }
+            Measure::SolitaryBeach => beach::profile(self, time, particles),
             // Position of the front.
             Measure::DamBreak => {
                 let spacing = self.scene.particle_spacing();

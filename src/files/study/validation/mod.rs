@@ -98,7 +98,8 @@ impl Trial {
 pub struct Scale {
     /// Depth of still water, metres.
     pub depth: f64,
-    /// Length of a column, a wave or a box, or position of the dam, metres.
+    /// Length of a column, a wave or a box, or distance of a dam, or of the shoreline on a beach,
+    /// from the domain's least x, metres.
     pub length: f64,
     /// Height of a crest above still water, metres.
     pub height: f64,
