@@ -129,6 +129,7 @@ fn print(text: &str, object: Option<serde_json::Value>) {
 
 fn show_caches(out: &mut String, diff: &CacheDiff) -> std::fmt::Result {
     let [a, b] = &diff.bakes;
+    let [a_begins, b_begins] = diff.begins;
     writeln!(out, "A is {a}\nB is {b}")?;
     show_physics(out, diff.physics.as_deref())?;
     if diff.device_limits.is_some() {
@@ -137,6 +138,17 @@ fn show_caches(out: &mut String, diff: &CacheDiff) -> std::fmt::Result {
             "by aggregates: on different devices roundings differ, so that bits cannot match; a \
              tolerance file judges by other limits"
         )?;
+    }
+    for (side, other, [own, begins]) in [
+        ("A", "B", [a_begins, b_begins]),
+        ("B", "A", [b_begins, a_begins]),
+    ] {
+        if own < begins {
+            writeln!(
+                out,
+                "{other} begins with frame {begins}: earlier frames of {side} are not compared"
+            )?;
+        }
     }
     show_lone(out, "frames", "A", &ranges(&diff.only_a))?;
     show_lone(out, "frames", "B", &ranges(&diff.only_b))?;

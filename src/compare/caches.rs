@@ -14,9 +14,12 @@ pub struct CacheDiff {
     pub bakes: [String; 2],
     /// First key in which the scenes differ, with b's value, then a's.
     pub physics: Option<String>,
-    /// Requested frames that only a has.
+    /// First frame of each: 0, or that which a branch began with. Earlier frames of the other are
+    /// not compared.
+    pub begins: [u32; 2],
+    /// Requested frames that only a has, from where b begins.
     pub only_a: Vec<u32>,
-    /// Requested frames that only b has.
+    /// Requested frames that only b has, from where a begins.
     pub only_b: Vec<u32>,
     /// Frames whose particles both caches have kept.
     pub frames: Vec<FrameDiff>,

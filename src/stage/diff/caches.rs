@@ -76,12 +76,20 @@ pub(super) fn compare(
     let tolerance = tolerance.or(by_aggregates.as_ref());
     let [in_a, in_b] = [a, b]
         .map(|cache| -> BTreeSet<u32> { (cache.first_frame()..=cache.last_frame()).collect() });
+    // What a branch does not have because it began later is not missing.
+    let lone = |of: &BTreeSet<u32>, other: &BTreeSet<u32>| -> Vec<u32> {
+        let begins = other.first().copied().unwrap_or(0);
+        of.difference(other)
+            .copied()
+            .filter(|frame| *frame >= begins)
+            .collect()
+    };
     let (chosen, only_a, only_b): (Vec<u32>, _, _) = match &request.frames {
         Some(frames) => (frames.iter().collect(), Vec::new(), Vec::new()),
         None => (
             in_a.intersection(&in_b).copied().collect(),
-            in_a.difference(&in_b).copied().collect(),
-            in_b.difference(&in_a).copied().collect(),
+            lone(&in_a, &in_b),
+            lone(&in_b, &in_a),
         ),
     };
     for cache in [a, b] {
@@ -127,6 +135,7 @@ pub(super) fn compare(
     Ok(CacheDiff {
         bakes: [a, b].map(|cache| bake_of(cache.manifest())),
         physics: physics(b.dir(), b.scene_toml(), a.scene_toml())?,
+        begins: [a, b].map(CacheReader::first_frame),
         only_a,
         only_b,
         frames,

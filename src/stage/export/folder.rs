@@ -33,10 +33,18 @@ pub(super) struct Owner {
     pub(super) software: String,
     /// Shot name of the cache.
     pub(super) shot: String,
-    /// Chained hash of the cache's first frame, which covers its manifest.
+    /// Chained hash of the first frame of the cache or the stream, which covers its manifest; then,
+    /// after a space each, those of the streams that the file is made from besides.
     pub(super) cache: String,
     /// Kind and settings of the file, in words.
     pub(super) settings: String,
+}
+
+impl Owner {
+    /// The cache or the stream itself.
+    fn first(&self) -> &str {
+        self.cache.split(' ').next().unwrap_or_default()
+    }
 }
 
 /// Record of one file.
@@ -106,7 +114,14 @@ impl Wanted {
         };
         let rows = [
             (owner.shot == self.owner.shot, "of another shot"),
-            (owner.cache == self.owner.cache, "of another cache"),
+            (
+                owner.first() == self.owner.first(),
+                "of another cache or stream",
+            ),
+            (
+                owner.cache == self.owner.cache,
+                "made with another stream beside the water",
+            ),
             (
                 owner.settings == self.owner.settings,
                 "exported in another way",
@@ -205,6 +220,17 @@ mod tests {
             ..other
         };
         assert!(follows.check().is_ok() && !follows.is_complete());
+        for (cache, words) in [
+            ("d", "of another cache or stream"),
+            ("c foam", "made with another stream beside the water"),
+        ] {
+            let mut other = wanted(dir.path(), "frame 1");
+            other.owner.cache = cache.to_owned();
+            let Err(ExportError::Taken { what, .. }) = other.check() else {
+                panic!("{cache}");
+            };
+            assert_eq!(what, words);
+        }
     }
 
     #[test]

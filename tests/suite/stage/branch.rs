@@ -230,12 +230,28 @@ fn the_other_commands_read_a_branch() {
     assert!(said.contains("has frames 3 to 6, not 2"), "{said}");
     let shown = |words: &str| job.expect(0, words);
     assert!(shown("diff whole branch --frames 3-6").contains("the same, bit for bit"));
-    // As for any two caches of different lengths.
-    let text = job.expect(1, "diff whole branch");
-    assert!(
-        text.contains("frames only in A: 0-2") && text.contains("compared frames 3-6"),
-        "{text}"
-    );
+    // Frames before a branch are not missing in it.
+    for (words, whole, branch) in [
+        ("diff whole branch", "A", "B"),
+        ("diff branch whole", "B", "A"),
+    ] {
+        let text = job.expect(0, words);
+        let begins =
+            format!("{branch} begins with frame 3: earlier frames of {whole} are not compared");
+        assert!(
+            text.contains(&begins) && text.contains("compared frames 3-6"),
+            "{text}"
+        );
+    }
+    // Control: frames after its end are.
+    job.expect(0, "bake small.toml -o short --from whole:3 --frames 4-5");
+    for (words, side) in [("diff whole short", "A"), ("diff short branch", "B")] {
+        let text = job.expect(1, words);
+        assert!(
+            text.contains(&format!("frames only in {side}: 6")) && !text.contains("0-2"),
+            "{text}"
+        );
+    }
     job.expect(
         0,
         "bake small.toml -o other --from whole:3 --frames 4-6 --set solver.pbf.iterations=5",
