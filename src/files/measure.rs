@@ -30,6 +30,12 @@ pub enum Measure {
     Body,
 }
 
+/// Number of solitary waves.
+const RUN_UP: (&str, &str) = (
+    "run_up",
+    "highest water connected to the body, above still water over the depth, R/d",
+);
+
 /// Label of the axis of a beach's profiles.
 const SEAWARD: &str = "distance from the shoreline of still water towards the sea / d";
 
@@ -116,16 +122,10 @@ impl Measure {
                 ("height", "height of the crest over the depth, H/d"),
                 ("celerity", "celerity, m/s"),
                 ("crests", "part of the gauges that saw a whole crest"),
-                (
-                    "run_up",
-                    "highest water connected to the body, above still water over the depth, R/d",
-                ),
+                RUN_UP,
             ],
             Self::SolitaryBeach => &[
-                (
-                    "run_up",
-                    "highest water connected to the body, above still water over the depth, R/d",
-                ),
+                RUN_UP,
                 (
                     "profile_error_15",
                     "profile at t = 15 √(d/g), root mean square of what it is off the points, over \

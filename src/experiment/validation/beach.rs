@@ -5,7 +5,7 @@ use glam::DVec2;
 use swell_domain::{particles::Particles, probe::elevation};
 use swell_study::waves;
 
-use super::{BenchmarkMeasurements, record::Record};
+use super::{BenchmarkMeasurements, numbers, record::Record};
 
 /// Times of the profiles, √(d/g), and the names of their curves and errors: those at which
 /// Synolakis 1987 measured a wave of H/d = 0.3, which begins with its crest half a wave length
@@ -23,10 +23,15 @@ const STATIONS: [f64; 2] = [-12.0, 20.0];
 /// Distance of its stations, depths.
 const STATION: f64 = 0.1;
 
+/// Largest distance of a point from a station with water, depths. A profile with a hole there is
+/// not compared.
+const HOLE: f64 = 0.3;
+
 /// Returns elevations over the depth at the stations of a profile if this frame is the nearest to
 /// its time, nothing otherwise.
 ///
-/// Stations without water have the elevation of still water.
+/// A station without water is not a number at sea. On the beach it has the elevation of still
+/// water, which is below the beach and all points there.
 pub(super) fn profile(record: &Record<'_>, time: f64, particles: &Particles) -> Vec<f64> {
     let shot = &record.scene.shot;
     let half = 0.5 * shot.frame_seconds() / unit(record);
@@ -39,16 +44,15 @@ pub(super) fn profile(record: &Record<'_>, time: f64, particles: &Particles) -> 
     let middle = 0.5 * (domain.min.z + domain.max.z);
     let above = |x: f64| {
         let at = DVec2::new(domain.min.x + scale.length - x * scale.depth, middle);
+        let dry = if x < 0.0 { 0.0 } else { f64::NAN };
         let level = elevation(particles, record.scene.particle_spacing(), domain, at);
-        level.map_or(0.0, |level| (level - domain.min.y) / scale.depth - 1.0)
+        level.map_or(dry, |level| (level - domain.min.y) / scale.depth - 1.0)
     };
     stations().map(above).collect()
 }
 
 pub(super) fn of(record: &Record<'_>, out: &mut BenchmarkMeasurements) {
-    let heights = record.rows.iter().filter_map(|row| row.run_up);
-    let highest = heights.fold(f64::NAN, f64::max);
-    out.put("run_up", Some(highest / record.benchmark.scale.depth - 1.0));
+    numbers::run_up(record, out);
     let looked_at = record.rows.iter().filter(|row| !row.of_water.is_empty());
     for row in looked_at {
         let off = |at: f64| (row.time / unit(record) - at).abs();
@@ -56,7 +60,8 @@ pub(super) fn of(record: &Record<'_>, out: &mut BenchmarkMeasurements) {
         let Some((_, curve, error)) = nearest else {
             continue;
         };
-        let found: Vec<_> = stations().zip(row.of_water.iter().copied()).collect();
+        let all = stations().zip(row.of_water.iter().copied());
+        let found: Vec<_> = all.filter(|(_, level)| level.is_finite()).collect();
         let mut points = record.benchmark.points.iter();
         if let Some(points) = points.find(|points| points.of == *curve) {
             out.put(error, profile_error(&found, &points.at));
@@ -65,13 +70,15 @@ pub(super) fn of(record: &Record<'_>, out: &mut BenchmarkMeasurements) {
     }
 }
 
-/// Root mean square of the difference from the points over the highest of them; `None` if the
-/// profile does not cover all of them.
+/// Returns the root mean square of the difference from the points over the highest of them; `None`
+/// if a point is beyond the profile's ends or in a hole of it.
 fn profile_error(profile: &[(f64, f64)], points: &[[f64; 2]]) -> Option<f64> {
     let mut sum = 0.0;
     let mut highest = 0.0_f64;
     for [x, y] in points {
-        sum += (waves::value_at(profile, *x)? - y).powi(2);
+        let is_covered = profile.iter().any(|(at, _)| (at - x).abs() <= HOLE);
+        let level = waves::value_at(profile, *x).filter(|_| is_covered)?;
+        sum += (level - y).powi(2);
         highest = highest.max(*y);
     }
     (highest > 0.0).then(|| (sum / points.len() as f64).sqrt() / highest)
@@ -84,7 +91,7 @@ fn stations() -> impl Iterator<Item = f64> {
 
 /// √(d/g), seconds.
 fn unit(record: &Record<'_>) -> f64 {
-    (record.benchmark.scale.depth / super::numbers::GRAVITY).sqrt()
+    (record.benchmark.scale.depth / numbers::GRAVITY).sqrt()
 }
 
 #[cfg(test)]
@@ -101,5 +108,12 @@ mod tests {
         assert!((error - 0.1 / 0.305).abs() < 1e-12, "{error}");
         assert_eq!(profile_error(&profile, &[[20.5, 1.0]]), None);
         assert_eq!(profile_error(&profile, &[[1.0, -0.1]]), None);
+        // Half a depth without water, and a whole one.
+        let without = |from: f64, to: f64| -> Vec<_> {
+            let wet = profile.iter().filter(|(x, _)| *x < from || *x > to);
+            wet.copied().collect()
+        };
+        assert!(profile_error(&without(3.8, 4.2), &points).unwrap() < 1e-12);
+        assert_eq!(profile_error(&without(3.5, 4.5), &points), None);
     }
 }

@@ -267,15 +267,20 @@ fn solitary_wave(record: &Record<'_>, out: &mut BenchmarkMeasurements) {
     let arrivals = crests.iter().zip(&gauges).map(|((t, _), at)| (*t, at.x));
     out.put("celerity", waves::slope(&arrivals.collect::<Vec<_>>()));
     out.put("height", mean(crests.iter().map(|(_, y)| y / scale.depth)));
-    let heights = record.rows.iter().filter_map(|row| row.run_up);
-    let highest = heights.fold(f64::NAN, f64::max);
-    out.put("run_up", Some(highest / scale.depth - 1.0));
+    run_up(record, out);
     if let Some((at, _)) = crests.last() {
         let unit = (scale.depth / GRAVITY).sqrt();
         let curve = above(gauges.len() - 1).into_iter();
         let curve = curve.map(|(t, y)| ((t - at) / unit, y / scale.depth));
         out.draw("elevation", curve.filter(|(t, _)| t.abs() < 12.0).collect());
     }
+}
+
+/// The highest water connected to the body over time.
+pub(super) fn run_up(record: &Record<'_>, out: &mut BenchmarkMeasurements) {
+    let heights = record.rows.iter().filter_map(|row| row.run_up);
+    let highest = heights.fold(f64::NAN, f64::max);
+    out.put("run_up", Some(highest / record.benchmark.scale.depth - 1.0));
 }
 
 fn dam_break(record: &Record<'_>, out: &mut BenchmarkMeasurements) {

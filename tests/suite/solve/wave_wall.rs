@@ -41,13 +41,17 @@ const GRAVITY: f64 = 9.81;
 const DEPTH: f64 = 0.25;
 const WIDTH: f64 = 0.075;
 
-/// Distance from the wall at which the depth is taken, and to where water counts to either side:
-/// two cells, so that what is between the wall and the next face counts too. Metres.
+/// Distance from the wall at which the depth is taken by volume, and to where water counts to
+/// either side: two cells, metres. What is nearer to the wall than a cell hardly counts.
 const FROM_WALL: f64 = 0.05;
 
 /// Relative tolerance of the depth against theory: a fifth of a cell. Theory is of the first order,
 /// and waves are low enough for the second to be within 1 % of the depth.
 const TOLERANCE: f64 = 0.02;
+
+/// Tolerance of the topmost particle beside the wall, spacings: it locates the surface to half of
+/// one.
+const TOP: f64 = 0.5;
 
 /// Depth of the water at [`FROM_WALL`] from the wall: volumes of particles, each spread over the
 /// distance as a hat.
@@ -59,10 +63,22 @@ fn depth(positions: &[[f32; 3]], spacing: f64, wall: f64) -> f64 {
     positions.iter().map(part).sum::<f64>() * spacing.powi(3) / (WIDTH * FROM_WALL)
 }
 
-/// Elevation at [`FROM_WALL`] from a vertical wall that moves as a whole, over its displacement, at
-/// an angular frequency: real and imaginary part (Dean and Dalrymple 1991, §6.2). The progressive
+/// Height of the topmost particle within a spacing of the wall, plus half a spacing; 0 without one.
+/// A sliver of water between the wall and the next face that falls is seen here.
+fn top(positions: &[[f32; 3]], spacing: f64, wall: f64) -> f64 {
+    let near = positions
+        .iter()
+        .filter(|x| f64::from(x[0]) < wall + spacing);
+    let highest = near
+        .map(|x| f64::from(x[1]))
+        .fold(f64::NEG_INFINITY, f64::max);
+    (highest + 0.5 * spacing).max(0.0)
+}
+
+/// Elevation at a distance from a vertical wall that moves as a whole, over its displacement, at an
+/// angular frequency: real and imaginary part (Dean and Dalrymple 1991, §6.2). The progressive
 /// wave is in phase with the wall's velocity, the evanescent modes with its displacement.
-fn transfer(omega: f64) -> [f64; 2] {
+fn transfer(omega: f64, distance: f64) -> [f64; 2] {
     let k = wave_number(omega, DEPTH, GRAVITY);
     let ratio = piston_height_ratio(k, DEPTH);
     let evanescent = |index: u32| {
@@ -82,18 +98,19 @@ fn transfer(omega: f64) -> [f64; 2] {
         }
         let q = low;
         let size = 2.0 * (1.0 - (2.0 * q).cos()) / ((2.0 * q).sin() + 2.0 * q);
-        size * (-q * FROM_WALL / DEPTH).exp()
+        size * (-q * distance / DEPTH).exp()
     };
     let modes: f64 = (1..20).map(evanescent).sum();
-    let phase = k * FROM_WALL;
+    let phase = k * distance;
     [ratio * phase.sin() + modes, ratio * phase.cos()]
 }
 
-/// Elevations by linear theory of the waves of a wall, at multiples of `step` until `end`.
+/// Elevations by linear theory of the waves of a wall at a distance from it, at multiples of `step`
+/// until `end`.
 ///
 /// The displacement is Fourier transformed over four times that time; it is taken back to 0 after
 /// `end`, which water at an earlier time cannot know.
-fn linear_theory(motion: &Motion, step: f64, end: f64) -> Vec<f64> {
+fn linear_theory(motion: &Motion, distance: f64, step: f64, end: f64) -> Vec<f64> {
     let count = (4.0 * end / step).ceil() as usize;
     let displacement: Vec<f64> = (0..count)
         .map(|k| {
@@ -104,7 +121,7 @@ fn linear_theory(motion: &Motion, step: f64, end: f64) -> Vec<f64> {
         .collect();
     let turn = TAU / count as f64;
     let mut elevations = vec![0.0; (end / step).floor() as usize + 1];
-    // The wall's shortest waves are a few substeps long; what is shorter is nothing.
+    // Up to a quarter of the sampling rate, 24 Hz; these walls have no motion above 3 Hz.
     for line in 1..count / 4 {
         let (mut re, mut im) = (0.0, 0.0);
         for (k, x) in displacement.iter().enumerate() {
@@ -112,7 +129,7 @@ fn linear_theory(motion: &Motion, step: f64, end: f64) -> Vec<f64> {
             re += x * cos;
             im -= x * sin;
         }
-        let [a, b] = transfer(turn * line as f64 / step);
+        let [a, b] = transfer(turn * line as f64 / step, distance);
         let (re, im) = (re * a - im * b, re * b + im * a);
         for (k, elevation) in elevations.iter_mut().enumerate() {
             let (sin, cos) = (turn * (line * k % count) as f64).sin_cos();
@@ -122,28 +139,35 @@ fn linear_theory(motion: &Motion, step: f64, end: f64) -> Vec<f64> {
     elevations
 }
 
-/// Elevation at [`FROM_WALL`] from the wall of a solitary wave that is `height` high (Goring 1978).
-fn goring(height: f64, wall: f64, t: f64) -> f64 {
+/// Elevation at `x` of a solitary wave that is `height` high (Goring 1978).
+fn goring(height: f64, x: f64, t: f64) -> f64 {
     let k = (0.75 * height / DEPTH).sqrt();
     let celerity = (GRAVITY * (DEPTH + height)).sqrt();
     // The crest starts at χ = −6.
-    let phase = k / DEPTH * (celerity * t - wall - FROM_WALL) - 6.0;
+    let phase = k / DEPTH * (celerity * t - x) - 6.0;
     height / phase.cosh().powi(2)
 }
 
 /// Bakes the waves of a wall by both solvers, at each rate of frames a second, and compares the
-/// depths before it with theory. Control: the depth of still water does not fit.
-fn assert_depths_are_the_waves(device: &str, motion: &str, seconds: f64, rates: &[u32]) {
+/// depths before it with theory. Control: the depth of still water does not fit. Runs of `known`
+/// fail beside the wall, and only there.
+fn assert_depths_are_the_waves(
+    device: &str,
+    motion: &str,
+    seconds: f64,
+    rates: &[u32],
+    known: &[(&str, u32)],
+) {
     let text = SCENE.replace("MOTION", motion);
     let job = Job::of(&[("wall.toml", &text)]);
     let moves = load_scene(&job.path("wall.toml"), &[]).unwrap().wave_makers[0]
         .motion
         .clone();
     let finest = 96.0;
-    let elevations = match moves {
+    let elevations = [0.0, FROM_WALL].map(|distance| match moves {
         Motion::Solitary { .. } => Vec::new(),
-        _ => linear_theory(&moves, 1.0 / finest, seconds),
-    };
+        _ => linear_theory(&moves, distance, 1.0 / finest, seconds),
+    });
     let mut missed = Vec::new();
     for rate in rates.iter().copied() {
         let frames = (seconds * f64::from(rate)).floor();
@@ -156,19 +180,37 @@ fn assert_depths_are_the_waves(device: &str, motion: &str, seconds: f64, rates: 
                 ),
             );
             let reader = CacheReader::open(&job.path(solver)).unwrap();
-            let (mut off, mut still) = (0.0f64, 0.0f64);
+            let (mut off, mut still, mut beside) = (0.0f64, 0.0f64, 0.0f64);
             for frame in 1..=reader.last_frame() {
                 let t = f64::from(frame) / f64::from(rate);
                 let wall = moves.displacement(t);
-                let elevation = match moves {
-                    Motion::Solitary { height, .. } => goring(height, wall, t),
-                    _ => elevations[(t * finest).round() as usize],
-                };
-                let found = depth(&reader.read(frame).unwrap().position, spacing, wall);
-                off = off.max((found / (DEPTH + elevation) - 1.0).abs());
+                let theory = [0, 1].map(|k| {
+                    let elevation = match moves {
+                        Motion::Solitary { height, .. } => {
+                            goring(height, wall + [0.0, FROM_WALL][k], t)
+                        }
+                        _ => elevations[k][(t * finest).round() as usize],
+                    };
+                    DEPTH + elevation
+                });
+                let water = reader.read(frame).unwrap().position;
+                let found = depth(&water, spacing, wall);
+                off = off.max((found / theory[1] - 1.0).abs());
                 still = still.max((found / DEPTH - 1.0).abs());
+                beside = beside.max((top(&water, spacing, wall) - theory[0]).abs() / spacing);
             }
-            println!("{motion:?}, {solver}, {rate} frames a second: {off:.4}, still {still:.4}");
+            println!(
+                "{motion:?}, {solver}, {rate} frames a second: {off:.4}, still {still:.4}, \
+                beside {beside:.3}"
+            );
+            if known.contains(&(solver, rate)) {
+                assert!(
+                    beside > TOP,
+                    "{solver} at {rate}: no longer a known failure"
+                );
+            } else if beside > TOP {
+                missed.push(format!("{solver} at {rate}, beside the wall: {beside}"));
+            }
             if off > TOLERANCE {
                 missed.push(format!("{solver} at {rate}: {off}"));
             }
@@ -183,7 +225,7 @@ macro_rules! motions {
     ($($test:ident: $motion:expr, $seconds:literal, $rates:expr;)*) => {
         $(#[test]
         fn $test() {
-            assert_depths_are_the_waves("gpu", $motion, $seconds, &$rates);
+            assert_depths_are_the_waves("gpu", $motion, $seconds, &$rates, &[]);
         })*
     };
 }
@@ -197,12 +239,18 @@ motions! {
         "kind = 'stokes'\nheight = 0.02\nperiod = 1.15\ndepth = 0.25\nramp = 1.15", 2.5, [6, 24];
     water_before_cnoidal_waves_has_their_depth:
         "kind = 'cnoidal'\nheight = 0.0125\nperiod = 2.0\ndepth = 0.25\nramp = 1.0", 2.5, [6, 24];
-    water_before_a_sea_has_its_depth:
-        "kind = 'sea'\nsignificant_height = 0.03\npeak_period = 1.15\nshortest_period = 0.5\n\
-         depth = 0.25\nramp = 1.0", 3.0, [6, 24];
     water_before_a_packet_has_its_depth:
         "kind = 'focused'\nheight = 0.0125\nat = 0.5\ntime = 3.0\npeak_period = 1.15\n\
          shortest_period = 0.5\ndepth = 0.25\nramp = 0.5", 3.2, [6, 24];
+}
+
+/// Known failure with FLIP: water beside the wall is up to 0.7 spacings off theory
+/// (docs/reliability.md).
+#[test]
+fn water_before_a_sea_has_its_depth() {
+    let motion = "kind = 'sea'\nsignificant_height = 0.03\npeak_period = 1.15\n\
+        shortest_period = 0.5\ndepth = 0.25\nramp = 1.0";
+    assert_depths_are_the_waves("gpu", motion, 4.0, &[6, 24], &[("flip", 6), ("flip", 24)]);
 }
 
 const SINE: &str = "kind = 'sine'\nstroke = 0.02\nperiod = 1.15";
@@ -210,5 +258,5 @@ const SINE: &str = "kind = 'sine'\nstroke = 0.02\nperiod = 1.15";
 /// As on the GPU, by the f64 reference.
 #[test]
 fn water_of_the_reference_before_a_wall_has_the_waves_depth() {
-    assert_depths_are_the_waves("cpu", SINE, 1.7, &[6]);
+    assert_depths_are_the_waves("cpu", SINE, 1.7, &[6], &[]);
 }
