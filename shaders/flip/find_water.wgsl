@@ -34,15 +34,22 @@ const SOLID = 2u;
 // up to half of gravity.
 const LEAST_DEPTH = 0.02;
 
-// Density in front of the walls and solids that contain a cell's centre: in the cell inward of the
-// walls, or if its centre is inside too, the mean over the cell's faces to other cells, weighted by
-// their open fractions.
+// Density where walls and solids contain a cell's centre. Walls: continued from the two cells inward
+// of them, so that the surface keeps its slope. A wall that accelerates inclines it; if it were
+// level there, its distance would contradict the pressure's slope, and water at the wall would be
+// thrown up. Only as far as the second cell has water, or lacks it: a film along the wall stays a
+// film. Otherwise, or if the centre inward is inside too: the mean over the cell's faces to other
+// cells, weighted by their open fractions.
 fn density_before(element: u32, cell: vec3f) -> f32 {
     let is_thin = open_extent(cell) < vec3f(HALF);
     let inward = select(vec3i(0), select(vec3i(-1), vec3i(1), !is_plane_open(cell)), is_thin);
     let there = element_at(inward);
     if any(is_thin) && !is_buried(there, cell + vec3f(inward)) {
-        return density[there];
+        let further = element_at(2 * inward);
+        let near = clamp(density[there], 0.0, 1.0);
+        let far = clamp(density[further], 0.0, 1.0);
+        let sloped = near + clamp(near - far, far - 1.0, far);
+        return select(density[there], sloped, further >= CELLS);
     }
     var sum = 0.0;
     var weights = 0.0;

@@ -5,9 +5,11 @@ use std::collections::BTreeSet;
 use super::{error::GpuError, shader};
 
 /// Combinations of conditions that a plan can set; every pass must compose under each.
-const VARIANTS: [&[&str]; 96] = [
+const VARIANTS: [&[&str]; 98] = [
     &[],
     &["SOLIDS"],
+    &["CUT_CELLS"],
+    &["CUT_CELLS", "APIC", "CORRECTION", "PUSHED"],
     &["BAND"],
     &[
         "BAND",
@@ -16,6 +18,7 @@ const VARIANTS: [&[&str]; 96] = [
         "PERIODIC",
         "GHOST_FLUID",
         "SOLIDS",
+        "CUT_CELLS",
     ],
     &["NEIGHBOR_LIST"],
     &["NEIGHBOR_LIST", "PLACES"],
@@ -34,13 +37,21 @@ const VARIANTS: [&[&str]; 96] = [
     &["WALL_WORK", "SOLIDS", "MOVING_SOLIDS", "SHAPES"],
     &[
         "SOLIDS",
+        "CUT_CELLS",
         "MOVING_SOLIDS",
         "SHAPES",
         "CORRECTION",
         "PUSHED",
         "GHOST_FLUID",
     ],
-    &["SOLIDS", "MOVING_SOLIDS", "SHAPES", "BODIES", "APIC"],
+    &[
+        "SOLIDS",
+        "CUT_CELLS",
+        "MOVING_SOLIDS",
+        "SHAPES",
+        "BODIES",
+        "APIC",
+    ],
     &[
         "PAGED",
         "PROJECTED",
@@ -59,9 +70,17 @@ const VARIANTS: [&[&str]; 96] = [
     &["PAGED", "CHEBYSHEV", "NEIGHBOR_LIST"],
     &["CORRECTION", "PUSHED", "GHOST_FLUID"],
     &["CORRECTION", "PUSHED", "GHOST_FLUID", "PLACES"],
-    &["SOLIDS", "CORRECTION", "PUSHED", "GHOST_FLUID", "APIC"],
     &[
         "SOLIDS",
+        "CUT_CELLS",
+        "CORRECTION",
+        "PUSHED",
+        "GHOST_FLUID",
+        "APIC",
+    ],
+    &[
+        "SOLIDS",
+        "CUT_CELLS",
         "MOVING_SOLIDS",
         "CORRECTION",
         "PUSHED",
@@ -69,13 +88,14 @@ const VARIANTS: [&[&str]; 96] = [
     ],
     &[
         "SOLIDS",
+        "CUT_CELLS",
         "MOVING_SOLIDS",
         "BODIES",
         "CORRECTION",
         "PUSHED",
         "GHOST_FLUID",
     ],
-    &["SOLIDS", "MOVING_SOLIDS", "BODIES", "F64"],
+    &["SOLIDS", "CUT_CELLS", "MOVING_SOLIDS", "BODIES", "F64"],
     &["GHOST_FLUID", "DIAGONAL"],
     &["GHOST_FLUID", "DIAGONAL", "TWO_WORDS"],
     &["TWO_WORDS"],
@@ -88,6 +108,7 @@ const VARIANTS: [&[&str]; 96] = [
     &[
         "PERIODIC",
         "SOLIDS",
+        "CUT_CELLS",
         "NEIGHBOR_LIST",
         "CORRECTION",
         "PUSHED",
@@ -96,6 +117,7 @@ const VARIANTS: [&[&str]; 96] = [
     &[
         "PERIODIC",
         "SOLIDS",
+        "CUT_CELLS",
         "MOVING_SOLIDS",
         "CORRECTION",
         "PUSHED",

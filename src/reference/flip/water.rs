@@ -189,9 +189,10 @@ pub fn is_near_half(
     })
 }
 
-/// Returns the density in front of the walls and solids that contain a cell's centre: in the cell
-/// inward of the walls, or if its centre is inside too, the mean over the cell's faces to other
-/// cells, weighted by their open fractions.
+/// Returns the density where walls and solids contain a cell's centre. Walls: continued linearly
+/// from the two cells inward of them, as far as the second has water or lacks it, so that the
+/// surface keeps its slope. Otherwise, or if the centre inward is inside too: the mean over the
+/// cell's faces to other cells, weighted by their open fractions.
 fn density_before(
     step: &FlipSubstep<'_>,
     bricks: &Bricks,
@@ -211,7 +212,12 @@ fn density_before(
     let is_open = |other: u32| other >= CELLS && !is_buried(step, bricks, space, other);
     let there = bricks.near(element, inward);
     if inward != [0; 3] && is_open(there) {
-        return density[there as usize];
+        let further = bricks.near(element, inward.map(|step| 2 * step));
+        if further < CELLS {
+            return density[there as usize];
+        }
+        let [near, far] = [there, further].map(|e| density[e as usize].clamp(0.0, 1.0));
+        return near + (near - far).clamp(far - 1.0, far);
     }
     let (mut sum, mut weights) = (0.0, 0.0);
     for (axis, side) in (0..3).flat_map(|axis| [(axis, -1), (axis, 1)]) {
