@@ -19,6 +19,8 @@
 #ifdef SOLIDS
 @group(0) @binding(6) var<storage, read_write> open_volume: array<f32>;
 @group(0) @binding(10) var<storage, read_write> open_hats: array<f32>;
+// The four layers of the hat, from the lowest up, 16 bits each; of cells that solids cut.
+@group(0) @binding(11) var<storage, read_write> open_layers: array<vec2u>;
 #endif
 #ifdef MOVING_SOLIDS
 // Velocities of closed lower faces, m/s.
@@ -60,7 +62,10 @@ fn main(
         let center = dot(near + far, vec4f(0.125));
         let rise = slopes.x + slopes.y + slopes.z;
         volume *= clamp(0.5 + center / max(rise, 1e-20), 0.0, 1.0);
-        hats = open_part_of_hat(cell, rise, cut.solids);
+        let hat = open_hat(cell, rise, cut.solids);
+        hats = hat.part;
+        open_layers[element] =
+            vec2u(pack2x16unorm(hat.layers.xy), pack2x16unorm(hat.layers.zw));
     }
     open_volume[element] = volume;
     open_hats[element] = hats;

@@ -22,6 +22,7 @@
 
 #ifdef SOLIDS
 @group(0) @binding(6) var<storage, read> open_hats: array<f32>;
+@group(0) @binding(7) var<storage, read> open_layers: array<vec2u>;
 #endif
 
 const AIR = 0u;
@@ -109,13 +110,20 @@ fn share_of_room(element: u32) -> f32 {
     return max(max(own, water / rooms), select(0.0, beside.x / max(beside.y, 1e-6), is_fed));
 }
 
+// Integrals of the hat function over its four layers.
+const LAYERS = vec4f(0.125, 0.375, 0.375, 0.125);
+
 // Fraction of the hat function at the centre that lies below a level surface, solids included;
-// `of_room` is that fraction of the open part. A solid counts as below the surface if it is a
-// floor, as above it if it is a ceiling, and like the open part if it is a wall. If it always
-// counted like the open part, water on a slope would have its surface too low near the waterline,
-// and climb.
+// `of_room` is that fraction of the open part. Water fills the open part layer by layer, from the
+// lowest up: beside a solid that leans over it, or that it leans on, the surface is where the open
+// volume below it holds the water. Within a layer, the part of a solid counts like the open part if
+// it is a wall; like the layer below if it is a floor; like the layer above if it is a ceiling.
 fn below_surface(element: u32, of_room: f32) -> f32 {
     let room = open_hats[element];
+    let up = -params.velocity_step;
+    if room <= LEAST_ROOM || dot(up, up) == 0.0 {
+        return of_room;
+    }
     var to_open = vec3f(0.0);
     for (var axis = 0u; axis < 3u; axis++) {
         var step = vec3i(0);
@@ -125,14 +133,29 @@ fn below_surface(element: u32, of_room: f32) -> f32 {
         to_open[axis] = select(open_hats[after], room, after < CELLS)
             - select(open_hats[before], room, before < CELLS);
     }
-    let up = -params.velocity_step;
-    let lengths = sqrt(dot(to_open, to_open) * dot(up, up));
-    let upright = dot(to_open, up) / max(lengths, 1e-20);
-    // Not `mix`, for which drivers compute x + a (y - x): a result near 0 then errs by a rounding
-    // of x, and the distance to the surface by the square root of that.
-    let level = abs(upright);
-    let of_solid = of_room * (1.0 - level) + select(0.0, level, upright > 0.0);
-    return select(of_room, of_solid * (1.0 - room) + of_room * room, room > LEAST_ROOM);
+    let along = dot(to_open, up);
+    let level = along * along / max(dot(to_open, to_open) * dot(up, up), 1e-30);
+    let packed = open_layers[element];
+    let open = vec4f(unpack2x16unorm(packed.x), unpack2x16unorm(packed.y));
+    let shares = LAYERS * open;
+    var left = of_room * dot(shares, vec4f(1.0));
+    var filled = vec4f(0.0);
+    for (var k = 0u; k < 4u; k++) {
+        filled[k] = clamp(left / (LAYERS[k] * max(open[k], LEAST_ROOM)), 0.0, 1.0);
+        left = max(left - shares[k], 0.0);
+    }
+    let above = vec4f(filled.yzw, 0.0);
+    var beneath = 1.0;
+    var below = 0.0;
+    for (var k = 0u; k < 4u; k++) {
+        let beside = select(above[k], beneath, along > 0.0);
+        // Not `mix`, for which drivers compute x + a (y - x): a result near 0 then errs by a
+        // rounding of x, and the distance to the surface by the square root of that.
+        let of_solid = filled[k] * (1.0 - level) + beside * level;
+        beneath = of_solid * (1.0 - open[k]) + filled[k] * open[k];
+        below += LAYERS[k] * beneath;
+    }
+    return below;
 }
 #endif
 

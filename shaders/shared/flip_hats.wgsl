@@ -17,18 +17,29 @@ fn nearest_distance(x: vec3f, solids: u32) -> f32 {
 #endif
 }
 
-// Integral of the hat function over the volume outside solids, relative to that outside walls only,
-// sampled over 4³ half cells, each cut by a plane. If particles are mirrored at walls, so are
-// solids. `rise` is the growth of the distance over a cell, summed over x, y and z, metres;
-// `solids` has the bit k % 32 for each solid k that comes close enough.
-fn open_part_of_hat(cell: vec3f, rise: f32, solids: u32) -> f32 {
+// What solids leave open of the hat function around a cell's centre.
+struct OpenHat {
+    // Integral over the volume outside solids, relative to that outside walls only.
+    part: f32,
+    // The same for each of four layers, half a cell thick, from the lowest up.
+    layers: vec4f,
+}
+
+// Samples 4³ half cells, each cut by a plane. If particles are mirrored at walls, so are solids.
+// `rise` is the growth of the distance over a cell, summed over x, y and z, metres; `solids` has the
+// bit k % 32 for each solid k that comes close enough. Layers are along the axis closest to gravity.
+fn open_hat(cell: vec3f, rise: f32, solids: u32) -> OpenHat {
     let width = max(0.5 * rise, 1e-20);
     let skin = 1e-4 * params.cell_size;
+    let steep = abs(params.velocity_step);
+    let is_z = steep.z >= max(steep.x, steep.y);
+    let axis = select(select(0u, 1u, steep.y >= steep.x), 2u, is_z);
+    let is_down = params.velocity_step[axis] > 0.0;
 #ifdef CORRECTION
     let is_mirrored = (cell + 0.5 >= params.cut_min) & (cell + 0.5 <= params.cut_max);
 #endif
-    var open = 0.0;
-    var all = 0.0;
+    var open = vec4f(0.0);
+    var all = vec4f(0.0);
     for (var k = 0u; k < 64u; k++) {
         let way = 0.5 * vec3f(vec3u(k & 3u, (k >> 2u) & 3u, k >> 4u));
         var size = max(
@@ -42,8 +53,15 @@ fn open_part_of_hat(cell: vec3f, rise: f32, solids: u32) -> f32 {
         let hat = (1.0 - abs(way - 0.75)) * size;
         let weight = hat.x * hat.y * hat.z;
         let distance = nearest_distance(place * params.cell_size, solids) - skin;
-        all += weight;
-        open += weight * clamp(0.5 + distance / width, 0.0, 1.0);
+        let half = (k >> (2u * axis)) & 3u;
+        let layer = vec4u(0u, 1u, 2u, 3u) == vec4u(select(half, 3u - half, is_down));
+        all += select(vec4f(0.0), vec4f(weight), layer);
+        let part = weight * clamp(0.5 + distance / width, 0.0, 1.0);
+        open += select(vec4f(0.0), vec4f(part), layer);
     }
-    return select(1.0, open / all, all > 0.0);
+    let whole = dot(all, vec4f(1.0));
+    return OpenHat(
+        select(1.0, dot(open, vec4f(1.0)) / whole, whole > 0.0),
+        select(vec4f(1.0), open / all, all > vec4f(0.0)),
+    );
 }

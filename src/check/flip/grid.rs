@@ -97,6 +97,23 @@ impl FlipState {
         })
     }
 
+    /// Whether a wall ends within a half cell of the hat function around a cell's centre and nothing
+    /// is mirrored there.
+    fn has_wall_within_half(&self, step: &FlipSubstep<'_>, element: usize) -> bool {
+        let cell = self.elements().bricks.cell(element as u32);
+        let is_mirrored = self.model.settings().density_correction;
+        let is_within = |axis: usize, wall: f64| {
+            let off = (wall - f64::from(cell[axis]) - 0.5).abs();
+            let is_mirrored = is_mirrored && {
+                let center = f64::from(cell[axis]) + 0.5;
+                (step.cut.min[axis]..=step.cut.max[axis]).contains(&center)
+            };
+            off < 1.0 && !is_mirrored && (2.0 * wall).fract() != 0.0
+        };
+        (0..3)
+            .any(|axis| is_within(axis, step.cut.min[axis]) || is_within(axis, step.cut.max[axis]))
+    }
+
     /// Calls `of` with solids whose distances are shifted by `shift` and whose nodes by `place`,
     /// metres.
     pub(super) fn with_shifted_solids<T>(
@@ -130,6 +147,15 @@ impl FlipState {
     }
 }
 
+/// Reads the layers of the hats of all cells; of those that no solid cuts they mean nothing.
+fn open_layers(io: &Io<'_>, cells: usize) -> Result<Vec<[f64; 4]>, swell_solve::SolveError> {
+    let packed = io.after.get(buffers::OPEN_LAYERS, cells)?;
+    let unpacked = |[low, high]: [u32; 2]| {
+        [low & 0xffff, low >> 16, high & 0xffff, high >> 16].map(|part| f64::from(part) / 65_535.0)
+    };
+    Ok(packed.into_iter().map(unpacked).collect())
+}
+
 pub(super) fn cut_cells(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     state.refresh_bodies(io)?;
     let has_moving = !state.boundary.moving.is_empty();
@@ -156,6 +182,10 @@ pub(super) fn cut_cells(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
         volume: match has_solids {
             true => elements.scalars(&io.after, buffers::OPEN_VOLUME)?,
             false => reference.volume.clone(),
+        },
+        layers: match has_solids {
+            true => open_layers(io, elements.cells)?,
+            false => reference.layers.clone(),
         },
         hats: match has_solids {
             true => elements.scalars(&io.after, buffers::OPEN_HATS)?,
@@ -206,6 +236,16 @@ pub(super) fn cut_cells(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
             let moved = moved(&|other| (other.hats[e] - reference.hats[e]).abs());
             pair(e, space.hats[e], reference.hats[e], [cut, moved])
         });
+        for k in 0..4 {
+            io.table.each(&LAYERS, elements.active(), |e| {
+                // Only cells that solids cut have layers.
+                let has_layers = reference.hats[e] < 1.0 && space.hats[e] < 1.0;
+                let part = |of: &OpenSpace| if has_layers { of.layers[e][k] } else { 1.0 };
+                let moved = moved(&|other| (other.layers[e][k] - reference.layers[e][k]).abs());
+                let is_tie = has_layers && state.has_wall_within_half(&step, e);
+                (!is_tie).then(|| pair(e, part(&space), part(&reference), [cut, moved]))
+            });
+        }
     }
     if has_moving {
         io.table.each(&CLOSED, elements.active(), |e| {
@@ -335,8 +375,14 @@ pub(super) fn find_water(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let size = state.model.cell_size();
     let of_half = |e: usize| OF_HALF.of([looked(e).0]);
     let moved = |e: usize| {
-        let Depth { cells, lean, .. } = depth[e];
-        surface_moved(cells, OF_SHARE.of([of_half(e), OF_SOLID.of([lean])]))
+        let Depth {
+            cells,
+            lean,
+            spread,
+            ..
+        } = depth[e];
+        let layers = OF_LAYERS.of([of_half(e), spread]);
+        surface_moved(cells, OF_SHARE.of([layers, OF_SOLID.of([lean])]))
     };
     let is_averaged = |e: usize| depth[e].share != density[e];
     let is_near = |e: usize| {

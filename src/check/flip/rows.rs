@@ -13,6 +13,7 @@ use swell_compare::{deviation::relative, rounding::U, tolerance::bounds};
 bounds! {
     pub(super) PLACE = [cells: "cells along the domain's longest side"] U * cells, "";
     pub(super) CUT = [place: "" PLACE] 8.0 * place, "";
+    PARTS = [] 0.0, "a wall that ends within a half cell, whose small parts weigh like large ones";
     TURN = [grid: "" GRID]
         grid, "the solids' distance at which it turns, and where nodes are as near";
     pub(super) OF_FACE = [place: "" PLACE, count: "particles about",
@@ -34,7 +35,11 @@ bounds! {
     pub(super) OF_SOLID =
         [lean: "1 − the open part of the hat, over the length of its differences beside the cell"]
         (16.0 * U * lean).min(1.0), "differences and lengths of three components";
-    pub(super) OF_SHARE = [half: "" OF_HALF, solid: "" OF_SOLID] half + solid, "";
+    pub(super) OF_LAYERS = [half: "" OF_HALF,
+        spread: "sum of 1 over the open parts, at least 0.02, of the layers that are partly filled"]
+        (2.0 * (half + 16.0 * U) * spread).max(half), "water over the open part of its layer, and of \
+         the next one";
+    pub(super) OF_SHARE = [layers: "" OF_LAYERS, solid: "" OF_SOLID] layers + solid, "";
     pub(super) NEAR_HALF = [cut: "" CUT, mean: "" OF_MEAN] cut + mean,
         "a half, of the density or of what is open of a cell about";
     pub(super) OF_GAP = [cut: "" CUT]
@@ -122,6 +127,10 @@ entries! {
         HATS = "open part of the hat", "": [cut: "" CUT,
             moved: "what it changes by as solids' distances move by " GRID]
             8.0 * cut + 3.0 * moved, "64 parts";
+        LAYERS = "open part of the hat's layers", "": [cut: "" CUT,
+            moved: "what it changes by as solids' distances move by " GRID]
+            8.0 * cut + 3.0 * moved + 1.0 / 131_070.0, "16 parts each, stored in 16 bits",
+            tie PARTS;
         CLOSED = "velocity of closed faces", "m/s": [v: "|v|",
             far: "the largest of solids' |spin| (|x| + |its point of rest|)",
             shape: "of shapes that change " FLOWED]

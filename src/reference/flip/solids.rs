@@ -6,7 +6,6 @@ use glam::{BVec3, DVec3};
 
 use super::Model;
 use swell_domain::{
-    bounds::Bounds,
     pose::{Passage, Pose},
     shape::ShapeStep,
     signed_distance::SignedDistance,
@@ -264,39 +263,73 @@ pub(super) fn cut(corners: &[f64; 8]) -> Cut {
 /// from the cell's minimum corner, and the function's mean over it.
 const HALVES: [(f64, f64); 4] = [(-0.5, 0.25), (0.0, 0.75), (0.5, 0.75), (1.0, 0.25)];
 
-/// Integrates the hat function around a cell's centre over the volume outside solids, relative to
-/// that outside the walls `walls` (in cells) only. It samples 4³ half cells, each cut by a plane.
-/// `corners` are the distances at the cell's corners. If particles are mirrored at walls, so are
-/// solids.
-pub(super) fn open_part_of_hat(
-    solids: &[&Solid<'_>],
-    walls: &Bounds,
-    is_mirrored: bool,
-    cell: DVec3,
-    cell_size: f64,
-    corners: &[f64; 8],
-) -> f64 {
-    let rise = ((face_sums(corners, 1) - face_sums(corners, 0)) / 4.0).abs();
-    let width = (0.5 * rise.element_sum()).max(1e-20);
-    let is_within = (cell + 0.5).cmpge(walls.min) & (cell + 0.5).cmple(walls.max);
-    let mirrors = is_within & BVec3::splat(is_mirrored);
-    let (mut open, mut all) = (0.0, 0.0);
-    for k in 0..64 {
-        let halves = [k & 3, k >> 2 & 3, k >> 4].map(|half| HALVES[half]);
-        let low = cell + DVec3::from_array(halves.map(|(from, _)| from));
-        let size = ((low + 0.5).min(walls.max) - low.max(walls.min)).max(DVec3::ZERO);
-        let size = DVec3::select(mirrors, DVec3::splat(0.5), size);
-        let hat = DVec3::from_array(halves.map(|(_, mean)| mean)) * size;
-        let middle = low + 0.25;
-        let image = middle.max(2.0 * walls.min - middle);
-        let image = image.min(2.0 * walls.max - image);
-        let place = cell_size * DVec3::select(mirrors, image, middle);
-        let distances = solids.iter().map(|solid| solid.distance(place));
-        let distance = distances.fold(1e15, f64::min) - SKIN * cell_size;
-        all += hat.element_product();
-        open += hat.element_product() * (0.5 + distance / width).clamp(0.0, 1.0);
+/// What solids leave open of the hat function around a cell's centre.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct OpenHat {
+    /// Integral over the volume outside solids, relative to that outside walls only, 0 to 1.
+    pub(super) part: f64,
+    /// The same for each of four layers, half a cell thick, from the lowest up.
+    pub(super) layers: [f64; 4],
+}
+
+impl OpenHat {
+    /// Without solids.
+    pub(super) const WHOLE: Self = Self {
+        part: 1.0,
+        layers: [1.0; 4],
+    };
+
+    /// Samples 4³ half cells, each cut by a plane. `corners` are the distances at the cell's
+    /// corners. If particles are mirrored at walls, so are solids. Layers are along the axis closest
+    /// to gravity.
+    pub(super) fn of(
+        model: &Model,
+        step: &super::FlipSubstep<'_>,
+        solids: &[&Solid<'_>],
+        cell: DVec3,
+        corners: &[f64; 8],
+    ) -> Self {
+        let (walls, cell_size) = (&step.cut, model.cell_size());
+        let rise = ((face_sums(corners, 1) - face_sums(corners, 0)) / 4.0).abs();
+        let width = (0.5 * rise.element_sum()).max(1e-20);
+        let is_within = (cell + 0.5).cmpge(walls.min) & (cell + 0.5).cmple(walls.max);
+        let mirrors = is_within & BVec3::splat(model.settings().density_correction);
+        // As on the GPU: in f32 another axis may be the closest.
+        let gravity = step.velocity_step.as_vec3().to_array();
+        let axis = (0..3).fold(0, |most, axis| {
+            if gravity[axis].abs() >= gravity[most].abs() {
+                axis
+            } else {
+                most
+            }
+        });
+        let (mut open, mut all) = ([0.0; 4], [0.0; 4]);
+        for k in 0..64 {
+            let half = [k & 3, k >> 2 & 3, k >> 4];
+            let halves = half.map(|half| HALVES[half]);
+            let low = cell + DVec3::from_array(halves.map(|(from, _)| from));
+            let size = ((low + 0.5).min(walls.max) - low.max(walls.min)).max(DVec3::ZERO);
+            let size = DVec3::select(mirrors, DVec3::splat(0.5), size);
+            let hat = DVec3::from_array(halves.map(|(_, mean)| mean)) * size;
+            let middle = low + 0.25;
+            let image = middle.max(2.0 * walls.min - middle);
+            let image = image.min(2.0 * walls.max - image);
+            let place = cell_size * DVec3::select(mirrors, image, middle);
+            let distances = solids.iter().map(|solid| solid.distance(place));
+            let distance = distances.fold(1e15, f64::min) - SKIN * cell_size;
+            let layer = match gravity[axis] > 0.0 {
+                true => 3 - half[axis],
+                false => half[axis],
+            };
+            all[layer] += hat.element_product();
+            open[layer] += hat.element_product() * (0.5 + distance / width).clamp(0.0, 1.0);
+        }
+        let part = |open: f64, all: f64| if all > 0.0 { open / all } else { 1.0 };
+        Self {
+            part: part(open.iter().sum(), all.iter().sum()),
+            layers: std::array::from_fn(|k| part(open[k], all[k])),
+        }
     }
-    if all > 0.0 { open / all } else { 1.0 }
 }
 
 /// Returns the open fraction of a square from the distances at its corners (0,0), (1,0), (0,1),

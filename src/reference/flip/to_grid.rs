@@ -6,7 +6,7 @@ use super::{
     FlipSubstep, Model, Sorted,
     grid::{corner, neighborhood, per_cell},
     model::ON_FACE,
-    solids::{Solid, cut, face_sums, open_part_of_hat},
+    solids::{OpenHat, Solid, cut, face_sums},
 };
 use swell_domain::{
     bricks::Bricks,
@@ -37,6 +37,9 @@ pub struct OpenSpace {
     /// Integral of the hat function around the cell's centre over the volume outside solids,
     /// relative to that outside walls only, 0 to 1.
     pub hats: Vec<f64>,
+    /// The same for each of the hat's four layers, half a cell thick, from the lowest up along the
+    /// axis closest to gravity.
+    pub layers: Vec<[f64; 4]>,
     /// Velocities of the lower faces where they are closed, m/s.
     pub closed_velocity: Vec<DVec3>,
 }
@@ -204,10 +207,9 @@ pub fn cut_cells(model: &Model, step: &FlipSubstep<'_>, bricks: &Bricks) -> Open
         open: DVec3,
         flux: f64,
         volume: f64,
-        hats: f64,
+        hat: OpenHat,
         closed_velocity: DVec3,
     }
-    let is_mirrored = model.settings().density_correction;
     let of_cell = |element: u32| {
         let cell = corner(bricks, element);
         let CutFaces {
@@ -221,17 +223,10 @@ pub fn cut_cells(model: &Model, step: &FlipSubstep<'_>, bricks: &Bricks) -> Open
         } = cut_faces(model, step, cell);
         let planes = [cell, cell + 1.0];
         let mut volume = step.open_extent(cell).element_product();
-        let mut hats = 1.0;
+        let mut hat = OpenHat::WHOLE;
         if let Some(corners) = corners {
             volume *= cut(&corners).volume;
-            hats = open_part_of_hat(
-                &near,
-                &step.cut,
-                is_mirrored,
-                cell,
-                model.cell_size(),
-                &corners,
-            );
+            hat = OpenHat::of(model, step, &near, cell, &corners);
         }
         let [low, high] = [0, 1].map(|side| {
             (across - of_walls[side]) * step.closing_velocity(planes[side])
@@ -243,7 +238,7 @@ pub fn cut_cells(model: &Model, step: &FlipSubstep<'_>, bricks: &Bricks) -> Open
             open: open[0],
             flux: (high - low).element_sum(),
             volume,
-            hats,
+            hat,
             closed_velocity: DVec3::select(
                 step.is_plane_open(cell),
                 velocity[0],
@@ -257,7 +252,8 @@ pub fn cut_cells(model: &Model, step: &FlipSubstep<'_>, bricks: &Bricks) -> Open
         open: cells.iter().map(|cell| cell.open).collect(),
         solid_flux: cells.iter().map(|cell| cell.flux).collect(),
         volume: cells.iter().map(|cell| cell.volume).collect(),
-        hats: cells.iter().map(|cell| cell.hats).collect(),
+        hats: cells.iter().map(|cell| cell.hat.part).collect(),
+        layers: cells.iter().map(|cell| cell.hat.layers).collect(),
         closed_velocity: cells.iter().map(|cell| cell.closed_velocity).collect(),
     }
 }

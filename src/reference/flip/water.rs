@@ -248,6 +248,9 @@ pub struct Depth {
     /// Factor by which rounding errors of the open volumes around the cell change the fraction
     /// below the surface; infinite if these volumes are all equal.
     pub lean: f64,
+    /// Factor by which rounding errors of the water around the cell change that fraction; 0 if
+    /// they change it by themselves, as without solids.
+    pub spread: f64,
 }
 
 /// Least open fraction, over all faces together, through which a gap fills from beside it.
@@ -304,20 +307,40 @@ fn share_of_room(
     alone.max(sum / rooms).max(fed)
 }
 
-/// Returns the fraction of the hat function at a centre that lies below a level surface, solids
-/// included, and the lean (see [`Depth`]); `of_room` is that fraction of the open part. A solid
-/// counts as below the surface if it is a floor, as above it if it is a ceiling, and like the open
-/// part if it is a wall.
+/// Integrals of the hat function over its four layers.
+const LAYERS: [f64; 4] = [0.125, 0.375, 0.375, 0.125];
+
+/// Part of a layer by which rounding may change whether it is partly filled.
+const EDGE: f64 = 1e-3;
+
+/// The fraction of the hat function at a centre that lies below a level surface, solids included.
+#[derive(Clone, Copy, Debug)]
+struct Below {
+    part: f64,
+    /// See [`Depth`].
+    lean: f64,
+    spread: f64,
+}
+
+/// Returns what lies below a level surface; `of_room` is the fraction of the open part that does.
+/// Water fills the open part layer by layer, from the lowest up. Within a layer, the part of a solid
+/// counts like the open part if it is a wall; like the layer below if it is a floor; like the layer
+/// above if it is a ceiling.
 fn below_surface(
     step: &FlipSubstep<'_>,
     bricks: &Bricks,
     space: &OpenSpace,
     element: u32,
     of_room: f64,
-) -> (f64, f64) {
+) -> Below {
     let own = space.hats[element as usize];
-    if own <= LEAST_ROOM {
-        return (of_room, 0.0);
+    let up = -step.velocity_step;
+    if own <= LEAST_ROOM || up == DVec3::ZERO {
+        return Below {
+            part: of_room,
+            lean: 0.0,
+            spread: 0.0,
+        };
     }
     let to_open = DVec3::from_array([0, 1, 2].map(|axis| {
         let [before, after] = [-1, 1].map(|side| {
@@ -330,13 +353,35 @@ fn below_surface(
         });
         after - before
     }));
-    let up = -step.velocity_step;
-    let lengths = to_open.length() * up.length();
-    let upright = to_open.dot(up) / lengths.max(1e-20);
-    let side = if upright > 0.0 { 1.0 } else { 0.0 };
-    let of_solid = of_room + (side - of_room) * upright.abs();
-    let lean = (1.0 - own) / to_open.length();
-    (of_solid + (of_room - of_solid) * own, lean)
+    let upward = to_open.dot(up);
+    let squares = to_open.length_squared() * up.length_squared();
+    let level = upward * upward / squares.max(1e-30);
+    let open = space.layers[element as usize];
+    let shares: [f64; 4] = std::array::from_fn(|k| LAYERS[k] * open[k]);
+    let mut left = of_room * shares.iter().sum::<f64>();
+    let mut spread = 0.0;
+    let filled: [f64; 4] = std::array::from_fn(|k| {
+        let least = open[k].max(LEAST_ROOM);
+        let filled = left / (LAYERS[k] * least);
+        if (-EDGE..1.0 + EDGE).contains(&filled) {
+            spread += 1.0 / least;
+        }
+        left = (left - shares[k]).max(0.0);
+        filled.clamp(0.0, 1.0)
+    });
+    let (mut beneath, mut below) = (1.0, 0.0);
+    for k in 0..4 {
+        let above = filled.get(k + 1).copied().unwrap_or(0.0);
+        let beside = if upward > 0.0 { beneath } else { above };
+        let of_solid = filled[k] + (beside - filled[k]) * level;
+        beneath = of_solid + (filled[k] - of_solid) * open[k];
+        below += LAYERS[k] * beneath;
+    }
+    Below {
+        part: below,
+        lean: (1.0 - own) / to_open.length(),
+        spread,
+    }
 }
 
 /// Derives the water around each cell's centre from the densities. Shape (elements).
@@ -359,19 +404,24 @@ pub fn find_depth(
             density[element as usize]
         };
         let of_room = share.clamp(0.0, 1.0);
-        let (below, lean) = match is_cut {
+        let below = match is_cut {
             true => below_surface(step, bricks, space, element, of_room),
-            false => (of_room, 0.0),
+            false => Below {
+                part: of_room,
+                lean: 0.0,
+                spread: 0.0,
+            },
         };
         // Across a flat surface the density is 1/2 at the surface, and falls as s − s²/2 with the
         // distance s in cells.
-        let off = below - 0.5;
+        let off = below.part - 0.5;
         let way = 1.0 - (1.0 - 2.0 * off.abs()).max(0.0).sqrt();
         Depth {
             share,
             is_film: is_cut && share > LEAST_FILM && off >= 0.0,
             cells: if off == 0.0 { 0.0 } else { way * off.signum() },
-            lean,
+            lean: below.lean,
+            spread: below.spread,
         }
     })
 }

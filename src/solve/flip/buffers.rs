@@ -78,6 +78,9 @@ pub const OPEN_VOLUME: Buf<f32> = Buf::new("open_volume");
 /// Cells: integral of the hat function around the cell's centre over the open volume, as a fraction
 /// of the integral with walls only. Exists only with solids.
 pub const OPEN_HATS: Buf<f32> = Buf::new("open_hats");
+/// Cells that solids cut: the same of the hat's four layers, half a cell thick, from the lowest up,
+/// as two pairs of 16 bits. Exists only with solids.
+pub const OPEN_LAYERS: Buf<[u32; 2]> = Buf::new("open_layers");
 /// Planes: velocity of the solid that closes a face, m/s. Exists only with moving solids.
 pub const CLOSED_VELOCITY: Buf<f32> = Buf::new("closed_velocity");
 /// Velocity and depth of the water that has moved, ready for the next substep: by brick with water,
