@@ -35,11 +35,11 @@ const SOLID = 2u;
 // up to half of gravity.
 const LEAST_DEPTH = 0.02;
 
-// Density where walls and solids contain a cell's centre. Walls: continued from the two cells inward
-// of them, so that the surface keeps its slope. A wall that accelerates inclines it; if it were
-// level there, its distance would contradict the pressure's slope, and water at the wall would be
-// thrown up. Only as far as the second cell has water, or lacks it: a film along the wall stays a
-// film. Otherwise, or if the centre inward is inside too: the mean over the cell's faces to other
+// Density where walls and solids contain a cell's centre. Walls: continued from the two cells
+// inward of them, so that the surface keeps its slope. A wall that accelerates inclines it; if it
+// were level there, its distance would contradict the pressure's slope, and water at the wall would
+// be thrown up. Only as far as the second cell has water, or lacks it: a film along the wall stays
+// a film. Otherwise, or if the centre inward is inside too: the mean over the cell's faces to other
 // cells, weighted by their open fractions.
 fn density_before(element: u32, cell: vec3f) -> f32 {
     let is_thin = open_extent(cell) < vec3f(HALF);

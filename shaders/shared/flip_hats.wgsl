@@ -26,8 +26,9 @@ struct OpenHat {
 }
 
 // Samples 4³ half cells, each cut by a plane. If particles are mirrored at walls, so are solids.
-// `rise` is the growth of the distance over a cell, summed over x, y and z, metres; `solids` has the
-// bit k % 32 for each solid k that comes close enough. Layers are along the axis closest to gravity.
+// `rise` is the growth of the distance over a cell, summed over x, y and z, metres; `solids` has
+// the bit k % 32 for each solid k that comes close enough. Layers are along the axis closest to
+// gravity.
 fn open_hat(cell: vec3f, rise: f32, solids: u32) -> OpenHat {
     let width = max(0.5 * rise, 1e-20);
     let skin = 1e-4 * params.cell_size;

@@ -97,8 +97,8 @@ impl FlipState {
         })
     }
 
-    /// Whether a wall ends within a half cell of the hat function around a cell's centre and nothing
-    /// is mirrored there.
+    /// Whether a wall ends within a half cell of the hat function around a cell's centre and
+    /// nothing is mirrored there.
     fn has_wall_within_half(&self, step: &FlipSubstep<'_>, element: usize) -> bool {
         let cell = self.elements().bricks.cell(element as u32);
         let is_mirrored = self.model.settings().density_correction;

@@ -36,9 +36,9 @@ bounds! {
         [lean: "1 − the open part of the hat, over the length of its differences beside the cell"]
         (16.0 * U * lean).min(1.0), "differences and lengths of three components";
     pub(super) OF_LAYERS = [half: "" OF_HALF,
-        spread: "sum of 1 over the open parts, at least 0.02, of the layers that are partly filled"]
-        (2.0 * (half + 16.0 * U) * spread).max(half), "water over the open part of its layer, and of \
-         the next one";
+        spread: "how fast what is below the surface changes with the water in a cut cell"]
+        (spread * (half + 6.0 * U) + 12.0 * U * spread.min(1.0)).max(half),
+        "what is left above a layer, and three roundings of each";
     pub(super) OF_SHARE = [layers: "" OF_LAYERS, solid: "" OF_SOLID] layers + solid, "";
     pub(super) NEAR_HALF = [cut: "" CUT, mean: "" OF_MEAN] cut + mean,
         "a half, of the density or of what is open of a cell about";

@@ -280,8 +280,8 @@ impl OpenHat {
     };
 
     /// Samples 4³ half cells, each cut by a plane. `corners` are the distances at the cell's
-    /// corners. If particles are mirrored at walls, so are solids. Layers are along the axis closest
-    /// to gravity.
+    /// corners. If particles are mirrored at walls, so are solids. Layers are along the axis
+    /// closest to gravity.
     pub(super) fn of(
         model: &Model,
         step: &super::FlipSubstep<'_>,

@@ -248,8 +248,8 @@ pub struct Depth {
     /// Factor by which rounding errors of the open volumes around the cell change the fraction
     /// below the surface; infinite if these volumes are all equal.
     pub lean: f64,
-    /// Factor by which rounding errors of the water around the cell change that fraction; 0 if
-    /// they change it by themselves, as without solids.
+    /// Factor by which errors of the water around the cell change that fraction; 0 where they do so
+    /// as they are, without solids.
     pub spread: f64,
 }
 
@@ -310,9 +310,6 @@ fn share_of_room(
 /// Integrals of the hat function over its four layers.
 const LAYERS: [f64; 4] = [0.125, 0.375, 0.375, 0.125];
 
-/// Part of a layer by which rounding may change whether it is partly filled.
-const EDGE: f64 = 1e-3;
-
 /// The fraction of the hat function at a centre that lies below a level surface, solids included.
 #[derive(Clone, Copy, Debug)]
 struct Below {
@@ -322,10 +319,10 @@ struct Below {
     spread: f64,
 }
 
+/// Changes of the water in a hat whose effects are looked at for [`Depth::spread`].
+const CHANGES: [f64; 4] = [-1e-5, -1e-7, 1e-7, 1e-5];
+
 /// Returns what lies below a level surface; `of_room` is the fraction of the open part that does.
-/// Water fills the open part layer by layer, from the lowest up. Within a layer, the part of a solid
-/// counts like the open part if it is a wall; like the layer below if it is a floor; like the layer
-/// above if it is a ceiling.
 fn below_surface(
     step: &FlipSubstep<'_>,
     bricks: &Bricks,
@@ -355,33 +352,40 @@ fn below_surface(
     }));
     let upward = to_open.dot(up);
     let squares = to_open.length_squared() * up.length_squared();
-    let level = upward * upward / squares.max(1e-30);
+    let level = (upward * upward / squares.max(1e-30)).copysign(upward);
     let open = space.layers[element as usize];
+    let below = |of_room: f64| below_level(&open, level, of_room);
+    let part = below(of_room);
+    let slopes = CHANGES.map(|by| ((below(of_room + by) - part) / by).abs());
+    Below {
+        part,
+        lean: (1.0 - own) / to_open.length(),
+        spread: slopes.into_iter().fold(0.0, f64::max),
+    }
+}
+
+/// Returns the fraction of a hat that lies below a level surface, from the open parts of its layers,
+/// the squared cosine of the solid's tilt, negative under a ceiling, and the fraction of the open
+/// part that is water. Water fills the open part layer by layer, from the lowest up. Within a layer,
+/// the part of a solid counts like the open part if it is a wall; like the layer below if it is a
+/// floor; like the layer above if it is a ceiling.
+fn below_level(open: &[f64; 4], level: f64, of_room: f64) -> f64 {
     let shares: [f64; 4] = std::array::from_fn(|k| LAYERS[k] * open[k]);
     let mut left = of_room * shares.iter().sum::<f64>();
-    let mut spread = 0.0;
     let filled: [f64; 4] = std::array::from_fn(|k| {
-        let least = open[k].max(LEAST_ROOM);
-        let filled = left / (LAYERS[k] * least);
-        if (-EDGE..1.0 + EDGE).contains(&filled) {
-            spread += 1.0 / least;
-        }
+        let filled = left / (LAYERS[k] * open[k].max(LEAST_ROOM));
         left = (left - shares[k]).max(0.0);
         filled.clamp(0.0, 1.0)
     });
     let (mut beneath, mut below) = (1.0, 0.0);
     for k in 0..4 {
         let above = filled.get(k + 1).copied().unwrap_or(0.0);
-        let beside = if upward > 0.0 { beneath } else { above };
-        let of_solid = filled[k] + (beside - filled[k]) * level;
+        let beside = if level > 0.0 { beneath } else { above };
+        let of_solid = filled[k] + (beside - filled[k]) * level.abs();
         beneath = of_solid + (filled[k] - of_solid) * open[k];
         below += LAYERS[k] * beneath;
     }
-    Below {
-        part: below,
-        lean: (1.0 - own) / to_open.length(),
-        spread,
-    }
+    below
 }
 
 /// Derives the water around each cell's centre from the densities. Shape (elements).

@@ -374,14 +374,27 @@ fn far_walls_are_within_tolerance_and_fail_where_they_should() {
         "pbf/compute_delta",
         &["work of walls"],
     );
-    let of_flip = [control(
-        "flip/find_water",
-        "select(vec3i(-1), vec3i(1), !is_plane_open(cell))",
-        "select(vec3i(1), vec3i(-1), !is_plane_open(cell))",
-        "flip/find_water",
-        &["distance of the surface"],
-    )
-    .and(SYSTEM)];
+    let of_water = |from, to| {
+        let fields = &["distance of the surface"];
+        control("flip/find_water", from, to, "flip/find_water", fields).and(SYSTEM)
+    };
+    let of_flip = [
+        of_water(
+            "select(vec3i(-1), vec3i(1), !is_plane_open(cell))",
+            "select(vec3i(1), vec3i(-1), !is_plane_open(cell))",
+        ),
+        of_water(
+            "near + clamp(near - far, far - 1.0, far)",
+            "near + 0.9 * clamp(near - far, far - 1.0, far)",
+        ),
+        control(
+            "flip/grid_to_particle",
+            "select(open, vec3f(1.0), open <= vec3f(0.0))",
+            "vec3f(1.0)",
+            "flip/grid_to_particle",
+            &["velocity", "velocity of the grid"],
+        ),
+    ];
     let chebyshev = |scene: &mut Scene| {
         let settings = pbf_of(scene);
         (settings.iteration, settings.relaxation) = (Iteration::Chebyshev, 0.7);

@@ -81,6 +81,13 @@ pub const FLIP: &[Control] = &[
         &["open volume", "open part of the hat"],
     ),
     control(
+        "flip/cut_cells",
+        "pack2x16unorm(hat.layers.xy)",
+        "pack2x16unorm(0.999 * hat.layers.xy)",
+        "flip/cut_cells",
+        &["open part of the hat's layers"],
+    ),
+    control(
         "flip/spread_faces",
         "lower_momentum += both",
         "lower_momentum -= both",
