@@ -1,5 +1,6 @@
 // After the projection: marks the faces to which it gave a velocity (layer 1), and stores the
-// change of velocity.
+// change of velocity. Closed faces away from water have the velocity of their wall or solid, but it
+// is not extrapolated: half of it would slow water that falls towards a floor a cell ahead of it.
 #import "shared/thread.wgsl"
 #import "shared/flip_params.wgsl"
 #import "shared/flip_beside.wgsl"
@@ -12,6 +13,9 @@
 
 const FLUID = 1u;
 const SOLID = 2u;
+
+// Layer of closed faces away from water, later than all that are extrapolated.
+const CLOSED = 0x7fu;
 
 // Tags of cells beyond the stored layer of the upper walls, whose faces are never used.
 const NO_NEED = 0x7f7f7fu;
@@ -43,9 +47,10 @@ fn main(
         // A closed face between two solid cells has no velocity of its own; slot 0 lies beyond the
         // domain.
         let is_buried = own == SOLID && (kind == SOLID || other < CELLS);
-        let is_found = own == FLUID || kind == FLUID || (is_closed && !is_buried);
+        let is_beside = own == FLUID || kind == FLUID;
+        let layer = select(select(0u, CLOSED, is_closed && !is_buried), 1u, is_beside);
         face_change[face] = face_velocity[face] - face_change[face];
-        tags |= u32(is_found) << (8u * component);
+        tags |= layer << (8u * component);
     }
     face_layer[element] = select(tags, NO_NEED, any(own_cell > params.cells));
 }

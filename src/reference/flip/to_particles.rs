@@ -18,6 +18,9 @@ use swell_domain::{
 const LAYER: u32 = 0x7f;
 const KNOWN: u32 = 0x80;
 
+/// Layer of closed faces away from water, later than all that are extrapolated.
+const CLOSED: u32 = 0x7f;
+
 /// Tags of cells beyond the stored layer of the upper walls, whose faces are never used.
 const NO_NEED: u32 = 0x7f_7f7f;
 
@@ -57,7 +60,8 @@ fn is_known(tags: u32, axis: usize) -> bool {
 }
 
 /// Marks the faces to which the projection gave a velocity (layer 1), and stores the change of
-/// velocity.
+/// velocity. Closed faces away from water keep the velocity of their wall or solid, which is not
+/// extrapolated.
 pub fn find_change(model: &Model, bricks: &Bricks, space: &OpenSpace, faces: &mut Faces) {
     let tags = per_cell(bricks, |element| {
         let e = element as usize;
@@ -65,16 +69,22 @@ pub fn find_change(model: &Model, bricks: &Bricks, space: &OpenSpace, faces: &mu
         if (bricks.cell(element).iter().zip(&model.cells)).any(|(cell, cells)| cell > cells) {
             return NO_NEED;
         }
-        let found = |axis: usize| {
+        let layer = |axis: usize| {
             let before = bricks.near(element, along(axis, -1));
             let kind = space.kind[before as usize];
             let is_closed = space.open[e][axis] == 0.0;
             // A closed face between two solid cells has no velocity of its own; slot 0 lies beyond
             // the domain.
             let is_buried = own == SOLID && (kind == SOLID || before < CELLS);
-            own == FLUID || kind == FLUID || (is_closed && !is_buried)
+            if own == FLUID || kind == FLUID {
+                1
+            } else if is_closed && !is_buried {
+                CLOSED
+            } else {
+                0
+            }
         };
-        let layers = (0..3).map(|axis| u32::from(found(axis)) << (8 * axis));
+        let layers = (0..3).map(|axis| layer(axis) << (8 * axis));
         faces.layer[e] | layers.sum::<u32>()
     });
     faces.layer = tags;

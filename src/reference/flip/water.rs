@@ -364,11 +364,11 @@ fn below_surface(
     }
 }
 
-/// Returns the fraction of a hat that lies below a level surface, from the open parts of its layers,
-/// the squared cosine of the solid's tilt, negative under a ceiling, and the fraction of the open
-/// part that is water. Water fills the open part layer by layer, from the lowest up. Within a layer,
-/// the part of a solid counts like the open part if it is a wall; like the layer below if it is a
-/// floor; like the layer above if it is a ceiling.
+/// Returns the fraction of a hat that lies below a level surface, from the open parts of its
+/// layers, the squared cosine of the solid's tilt, negative under a ceiling, and the fraction of
+/// the open part that is water. Water fills the open part layer by layer, from the lowest up.
+/// Within a layer, the part of a solid counts like the open part if it is a wall; like the layer
+/// below if it is a floor; like the layer above if it is a ceiling.
 fn below_level(open: &[f64; 4], level: f64, of_room: f64) -> f64 {
     let shares: [f64; 4] = std::array::from_fn(|k| LAYERS[k] * open[k]);
     let mut left = of_room * shares.iter().sum::<f64>();

@@ -22,7 +22,7 @@ use swell::{
 
 use super::{
     case,
-    controls::{Control, control, flip::SYSTEM},
+    controls::{Control, control, walls::FLIP_FAR_WALLS},
     faults, lines, over,
 };
 use crate::support::{D, box_mesh, context, flip_of, lattice, noise, pbf_of};
@@ -374,27 +374,6 @@ fn far_walls_are_within_tolerance_and_fail_where_they_should() {
         "pbf/compute_delta",
         &["work of walls"],
     );
-    let of_water = |from, to| {
-        let fields = &["distance of the surface"];
-        control("flip/find_water", from, to, "flip/find_water", fields).and(SYSTEM)
-    };
-    let of_flip = [
-        of_water(
-            "select(vec3i(-1), vec3i(1), !is_plane_open(cell))",
-            "select(vec3i(1), vec3i(-1), !is_plane_open(cell))",
-        ),
-        of_water(
-            "near + clamp(near - far, far - 1.0, far)",
-            "near + 0.9 * clamp(near - far, far - 1.0, far)",
-        ),
-        control(
-            "flip/grid_to_particle",
-            "select(open, vec3f(1.0), open <= vec3f(0.0))",
-            "vec3f(1.0)",
-            "flip/grid_to_particle",
-            &["velocity", "velocity of the grid"],
-        ),
-    ];
     let chebyshev = |scene: &mut Scene| {
         let settings = pbf_of(scene);
         (settings.iteration, settings.relaxation) = (Iteration::Chebyshev, 0.7);
@@ -402,7 +381,7 @@ fn far_walls_are_within_tolerance_and_fail_where_they_should() {
     let as_it_is = |_: &mut Scene| {};
     far_walls_hold(&context, Method::Pbf, as_it_is, &[of_push]);
     far_walls_hold(&context, Method::Pbf, chebyshev, &[of_step]);
-    far_walls_hold(&context, Method::Flip, as_it_is, &of_flip);
+    far_walls_hold(&context, Method::Flip, as_it_is, FLIP_FAR_WALLS);
 }
 
 fn far_walls_hold(context: &Context, method: Method, change: fn(&mut Scene), controls: &[Control]) {

@@ -49,10 +49,11 @@ use swell::{
 use crate::support::{self, D, choose, context, flip_of, jitter, lattice, noise, pbf_of};
 use controls::{
     Control, control,
-    flip::{FLIP, FLIP_WALLS},
+    flip::FLIP,
     pbf::{CHUNKED, PBF, PBF_WALLS, SEARCHED},
     tension::TENSION,
     variants::{VARIANTS, Variant},
+    walls::FLIP_WALLS,
 };
 use glam::DVec3;
 

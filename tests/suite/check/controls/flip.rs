@@ -2,15 +2,6 @@
 
 use super::{Control, control};
 
-/// Faults in a scene with moving walls.
-pub const FLIP_WALLS: &[Control] = &[control(
-    "flip/boundary_work",
-    "for (var k = 0u;",
-    "for (var k = 16u;",
-    "flip/boundary_work",
-    &["shares of the work"],
-)];
-
 /// Passes that are given another system than the reference's.
 pub const SYSTEM: &[&str] = &[
     "pressure/multiply",
@@ -425,8 +416,8 @@ pub const FLIP: &[Control] = &[
     .and(&["pressure/reduce"]),
     control(
         "flip/find_change",
-        "u32(is_found)",
-        "u32(!is_found)",
+        "1u, is_beside)",
+        "2u, is_beside)",
         "flip/find_change",
         &["layers"],
     ),

@@ -6,6 +6,7 @@ pub(super) mod pbf;
 pub(super) mod shapes;
 pub(super) mod tension;
 pub(super) mod variants;
+pub(super) mod walls;
 
 use swell::gpu::adapter::InjectedFault;
 
