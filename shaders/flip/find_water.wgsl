@@ -4,10 +4,10 @@
 // a moving wall, and as air it would drain all of the water's pressure; and isolated droplets have
 // no pressure.
 //
-// A cell whose centre lies inside a wall is of the kind of the water in front of it. A cell cut by
-// solids is judged by the volume that they leave open, and a film on a floor that passes above the
-// centre is water too: where water runs up a slope, or rests on it, its edge lies in cells whose
-// centres are inside the slope. As air, they could not support the water or keep it apart.
+// A cell whose centre lies inside a wall is judged by the density before it, continued. A cell cut
+// by solids is judged by the volume that they leave open, and a film on a floor that passes above
+// the centre is water too: where water runs up a slope, or rests on it, its edge lies in cells
+// whose centres are inside the slope. As air, they could not support the water or keep it apart.
 #import "shared/thread.wgsl"
 #import "shared/flip_neighborhood.wgsl"
 #import "shared/flip_buried.wgsl"
@@ -38,9 +38,9 @@ const LEAST_DEPTH = 0.02;
 // Density where walls and solids contain a cell's centre. Walls: continued from the two cells
 // inward of them, so that the surface keeps its slope. A wall that accelerates inclines it; if it
 // were level there, its distance would contradict the pressure's slope, and water at the wall would
-// be thrown up. Only as far as the second cell has water, or lacks it: a film along the wall stays
-// a film. Otherwise, or if the centre inward is inside too: the mean over the cell's faces to other
-// cells, weighted by their open fractions.
+// be thrown up. It rises by at most what the second cell holds and falls by at most what that
+// lacks: a film along the wall stays a film. Otherwise, or if the centre inward is inside too: the
+// mean over the cell's faces to other cells, weighted by their open fractions.
 fn density_before(element: u32, cell: vec3f) -> f32 {
     let is_thin = open_extent(cell) < vec3f(HALF);
     let inward = select(vec3i(0), select(vec3i(-1), vec3i(1), !is_plane_open(cell)), is_thin);
@@ -50,7 +50,8 @@ fn density_before(element: u32, cell: vec3f) -> f32 {
         let near = clamp(density[there], 0.0, 1.0);
         let far = clamp(density[further], 0.0, 1.0);
         let sloped = near + clamp(near - far, far - 1.0, far);
-        return select(density[there], sloped, further >= CELLS);
+        let has_second = further >= CELLS && !is_buried(further, cell + 2.0 * vec3f(inward));
+        return select(density[there], sloped, has_second);
     }
     var sum = 0.0;
     var weights = 0.0;

@@ -30,7 +30,7 @@
 // Three floats per particle, as in `carried`. Behind those of all particles, 1 for each isolated
 // droplet, far from all water with a pressure, else 0.
 @group(0) @binding(5) var<storage, read_write> sorted_velocity: array<f32>;
-#ifdef CUT_CELLS
+#ifdef SOLIDS
 @group(0) @binding(15) var<storage, read> face_open: array<f32>;
 #endif
 #ifdef APIC
@@ -68,7 +68,7 @@ fn displacements(faces: vec3u) -> vec3f {
 }
 #endif
 
-#ifdef CUT_CELLS
+#ifdef SOLIDS
 // Weight of each face; closed faces count fully, with the velocity of the wall or solid.
 fn parts(faces: vec3u) -> vec3f {
     let open = vec3f(face_open[faces.x], face_open[faces.y], face_open[faces.z]);
@@ -112,7 +112,7 @@ fn least(values: Values) -> f32 {
 // Values at the faces of one component.
 struct Component {
     speeds: Values,
-#ifdef CUT_CELLS
+#ifdef SOLIDS
     // Weight of each face where solids leave faces partly open; the values are multiplied by it.
     part: Values,
 #endif
@@ -160,7 +160,7 @@ struct Steps {
 
 fn read_component(axis: u32, steps: Steps) -> Component {
     var read: Component;
-#ifdef CUT_CELLS
+#ifdef SOLIDS
     var part: Values;
 #endif
     let plane = vec3u(axis * params.stride);
@@ -181,7 +181,7 @@ fn read_component(axis: u32, steps: Steps) -> Component {
             element_at(start + steps.c_after),
             element_at(start + steps.b_after + steps.c_after),
         );
-#ifdef CUT_CELLS
+#ifdef SOLIDS
         part.lower = part.upper;
         part.upper = mat3x3f(parts(before), parts(own), parts(after));
 #endif
@@ -197,7 +197,7 @@ fn read_component(axis: u32, steps: Steps) -> Component {
 #endif
     }
 #ifndef APIC
-#ifdef CUT_CELLS
+#ifdef SOLIDS
     let speeds = settled(read.speeds, part);
 #else
     let speeds = read.speeds;
@@ -205,7 +205,7 @@ fn read_component(axis: u32, steps: Steps) -> Component {
     let range = vec2f(least(speeds), -least(Values(-1.0 * speeds.lower, -1.0 * speeds.upper)));
     read.range = range;
 #endif
-#ifdef CUT_CELLS
+#ifdef SOLIDS
     read.speeds = weighed(read.speeds, part);
 #ifndef APIC
     read.change = weighed(read.change, part);
@@ -227,7 +227,7 @@ fn center_hats(f: f32) -> vec3f {
 // the axis whose weights are slopes. The derivative itself is not bounded where faces are almost
 // closed: with it, water at rest on a beach of 1:20 reaches 10⁴ m/s within 33 frames.
 fn slope_of(faces: Component, u: f32, a: vec2f, b: vec3f, c: vec3f) -> f32 {
-#ifdef CUT_CELLS
+#ifdef SOLIDS
     return value_at(faces.speeds, a, b, c) - u * value_at(faces.part, a, b, c);
 #else
     return value_at(faces.speeds, a, b, c);
@@ -324,7 +324,7 @@ fn give(i: u32, axis: u32, f: vec3f, faces: Component, falls: bool, beyond: f32)
     let c = center_hats(f.z);
     let k = 3u * i + axis;
     let falling = sorted_velocity[k] + params.velocity_step[axis];
-#ifdef CUT_CELLS
+#ifdef SOLIDS
     let per_whole = 1.0 / max(value_at(faces.part, a, b, c), 1e-6);
 #else
     let per_whole = 1.0;

@@ -9,7 +9,8 @@ var<private> own_local: vec3i;
 var<private> slots_near: vec4u;
 var<private> slots_far: vec4u;
 
-// Element of the cell at `offset`, each component -1, 0 or 1; in slot 0 if that brick is absent.
+// Element of the cell at `offset`, each component from -4 to 4 after `open_neighborhood`, else from
+// -1 to 1; in slot 0 if that brick is absent.
 fn element_at(offset: vec3i) -> u32 {
     let cell = own_local + offset;
     // -1 and 8 have bit 3 set, 0 to 7 do not.

@@ -5,11 +5,9 @@ use std::collections::BTreeSet;
 use super::{error::GpuError, shader};
 
 /// Combinations of conditions that a plan can set; every pass must compose under each.
-const VARIANTS: [&[&str]; 98] = [
+const VARIANTS: [&[&str]; 96] = [
     &[],
     &["SOLIDS"],
-    &["CUT_CELLS"],
-    &["CUT_CELLS", "APIC", "CORRECTION", "PUSHED"],
     &["BAND"],
     &[
         "BAND",
@@ -18,7 +16,6 @@ const VARIANTS: [&[&str]; 98] = [
         "PERIODIC",
         "GHOST_FLUID",
         "SOLIDS",
-        "CUT_CELLS",
     ],
     &["NEIGHBOR_LIST"],
     &["NEIGHBOR_LIST", "PLACES"],
@@ -37,21 +34,13 @@ const VARIANTS: [&[&str]; 98] = [
     &["WALL_WORK", "SOLIDS", "MOVING_SOLIDS", "SHAPES"],
     &[
         "SOLIDS",
-        "CUT_CELLS",
         "MOVING_SOLIDS",
         "SHAPES",
         "CORRECTION",
         "PUSHED",
         "GHOST_FLUID",
     ],
-    &[
-        "SOLIDS",
-        "CUT_CELLS",
-        "MOVING_SOLIDS",
-        "SHAPES",
-        "BODIES",
-        "APIC",
-    ],
+    &["SOLIDS", "MOVING_SOLIDS", "SHAPES", "BODIES", "APIC"],
     &[
         "PAGED",
         "PROJECTED",
@@ -70,17 +59,9 @@ const VARIANTS: [&[&str]; 98] = [
     &["PAGED", "CHEBYSHEV", "NEIGHBOR_LIST"],
     &["CORRECTION", "PUSHED", "GHOST_FLUID"],
     &["CORRECTION", "PUSHED", "GHOST_FLUID", "PLACES"],
+    &["SOLIDS", "CORRECTION", "PUSHED", "GHOST_FLUID", "APIC"],
     &[
         "SOLIDS",
-        "CUT_CELLS",
-        "CORRECTION",
-        "PUSHED",
-        "GHOST_FLUID",
-        "APIC",
-    ],
-    &[
-        "SOLIDS",
-        "CUT_CELLS",
         "MOVING_SOLIDS",
         "CORRECTION",
         "PUSHED",
@@ -88,14 +69,13 @@ const VARIANTS: [&[&str]; 98] = [
     ],
     &[
         "SOLIDS",
-        "CUT_CELLS",
         "MOVING_SOLIDS",
         "BODIES",
         "CORRECTION",
         "PUSHED",
         "GHOST_FLUID",
     ],
-    &["SOLIDS", "CUT_CELLS", "MOVING_SOLIDS", "BODIES", "F64"],
+    &["SOLIDS", "MOVING_SOLIDS", "BODIES", "F64"],
     &["GHOST_FLUID", "DIAGONAL"],
     &["GHOST_FLUID", "DIAGONAL", "TWO_WORDS"],
     &["TWO_WORDS"],
@@ -108,7 +88,6 @@ const VARIANTS: [&[&str]; 98] = [
     &[
         "PERIODIC",
         "SOLIDS",
-        "CUT_CELLS",
         "NEIGHBOR_LIST",
         "CORRECTION",
         "PUSHED",
@@ -117,7 +96,6 @@ const VARIANTS: [&[&str]; 98] = [
     &[
         "PERIODIC",
         "SOLIDS",
-        "CUT_CELLS",
         "MOVING_SOLIDS",
         "CORRECTION",
         "PUSHED",

@@ -1,12 +1,11 @@
 //! Validated PIC/FLIP settings.
 
-use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use swell_domain::{
     band::Band,
     deep::DeepGrid,
-    flip::{APART, LEAST_APART, ON_FACE, apart},
+    flip::{APART, LEAST_APART, apart},
     named::read_by_name,
 };
 
@@ -58,18 +57,6 @@ pub struct Flip {
 }
 
 impl Scene {
-    /// Whether walls may cut cells of a grid: those of wave makers, and those of a domain that is
-    /// not a whole number of cells.
-    pub fn has_cutting_walls(&self) -> bool {
-        let size = self.domain.size() / self.solver.cell_size();
-        // Half of it, for what f32 rounds to the other side.
-        let off_face = (size - size.round())
-            .abs()
-            .cmpgt(DVec3::splat(0.5 * ON_FACE));
-        let is_cut = |axis: usize| !self.periodic[axis] && off_face.test(axis);
-        !self.wave_makers.is_empty() || (0..3).any(is_cut)
-    }
-
     /// Returns the band that has particles, if they are not everywhere.
     pub fn band(&self) -> Option<Band> {
         let flip = self.solver.flip()?;

@@ -97,21 +97,19 @@ impl FlipState {
         })
     }
 
-    /// Whether a wall ends within a half cell of the hat function around a cell's centre and
-    /// nothing is mirrored there.
-    fn has_wall_within_half(&self, step: &FlipSubstep<'_>, element: usize) -> bool {
+    /// Whether rounding may decide if a wall leaves a layer of the hat function around a cell's
+    /// centre anything.
+    fn has_wall_near_layer(&self, step: &FlipSubstep<'_>, element: usize) -> bool {
         let cell = self.elements().bricks.cell(element as u32);
-        let is_mirrored = self.model.settings().density_correction;
-        let is_within = |axis: usize, wall: f64| {
-            let off = (wall - f64::from(cell[axis]) - 0.5).abs();
-            let is_mirrored = is_mirrored && {
-                let center = f64::from(cell[axis]) + 0.5;
-                (step.cut.min[axis]..=step.cut.max[axis]).contains(&center)
-            };
-            off < 1.0 && !is_mirrored && (2.0 * wall).fract() != 0.0
-        };
-        (0..3)
-            .any(|axis| is_within(axis, step.cut.min[axis]) || is_within(axis, step.cut.max[axis]))
+        let place = PARTS.of([self.place()]);
+        (0..3).any(|axis| {
+            let center = f64::from(cell[axis]) + 0.5;
+            let walls = [step.cut.min[axis], step.cut.max[axis]];
+            walls.into_iter().any(|wall| {
+                let off = (2.0 * wall - (2.0 * wall).round()).abs();
+                (wall - center).abs() < 1.0 + place && off > 0.0 && off <= 2.0 * place
+            })
+        })
     }
 
     /// Calls `of` with solids whose distances are shifted by `shift` and whose nodes by `place`,
@@ -242,7 +240,7 @@ pub(super) fn cut_cells(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
                 let has_layers = reference.hats[e] < 1.0 && space.hats[e] < 1.0;
                 let part = |of: &OpenSpace| if has_layers { of.layers[e][k] } else { 1.0 };
                 let moved = moved(&|other| (other.layers[e][k] - reference.layers[e][k]).abs());
-                let is_tie = has_layers && state.has_wall_within_half(&step, e);
+                let is_tie = has_layers && state.has_wall_near_layer(&step, e);
                 (!is_tie).then(|| pair(e, part(&space), part(&reference), [cut, moved]))
             });
         }

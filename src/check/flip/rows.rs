@@ -13,7 +13,8 @@ use swell_compare::{deviation::relative, rounding::U, tolerance::bounds};
 bounds! {
     pub(super) PLACE = [cells: "cells along the domain's longest side"] U * cells, "";
     pub(super) CUT = [place: "" PLACE] 8.0 * place, "";
-    PARTS = [] 0.0, "a wall that ends within a half cell, whose small parts weigh like large ones";
+    pub(super) PARTS = [place: "" PLACE]
+        2.0 * place, "a half cell, beyond which a wall leaves a layer nothing";
     TURN = [grid: "" GRID]
         grid, "the solids' distance at which it turns, and where nodes are as near";
     pub(super) OF_FACE = [place: "" PLACE, count: "particles about",
@@ -33,12 +34,14 @@ bounds! {
     pub(super) OF_HALF = [mean: "" OF_MEAN]
         mean + 0.25 * U, "a density's difference from a half, which is half of 1 at most";
     pub(super) OF_SOLID =
-        [lean: "1 − the open part of the hat, over the length of its differences beside the cell"]
-        (16.0 * U * lean).min(1.0), "differences and lengths of three components";
+        [lean: "how fast what is below the surface changes with the squared cosine of the \
+            solid's tilt, over the length of the hats' differences beside the cell"]
+        (44.0 * U * lean).min(1.0),
+        "differences, sums of three products, and a quotient of 2.5 ulp";
     pub(super) OF_LAYERS = [half: "" OF_HALF,
         spread: "how fast what is below the surface changes with the water in a cut cell"]
-        (spread * (half + 6.0 * U) + 12.0 * U * spread.min(1.0)).max(half),
-        "what is left above a layer, and three roundings of each";
+        (spread * (half + 6.0 * U) + 20.0 * U * spread.min(1.0)).max(half),
+        "what is left above a layer, a quotient of 2.5 ulp, and ten roundings of each";
     pub(super) OF_SHARE = [layers: "" OF_LAYERS, solid: "" OF_SOLID] layers + solid, "";
     pub(super) NEAR_HALF = [cut: "" CUT, mean: "" OF_MEAN] cut + mean,
         "a half, of the density or of what is open of a cell about";

@@ -231,8 +231,8 @@ pub fn grid_to_particle(
         // Weight of each face; closed faces count fully, with the velocity of the wall or solid.
         let parts = [0, 1, 2].map(|axis| {
             stencils[axis].map(|e| match space.open[e][axis] {
-                0.0 => 1.0,
-                open => open,
+                open if open > 0.0 && !step.solids.is_empty() => open,
+                _ => 1.0,
             })
         });
         let values = |of: &[DVec3]| -> [[f64; 18]; 3] {
@@ -271,7 +271,10 @@ pub fn grid_to_particle(
                 // An isolated droplet falls freely: around it nothing is projected, and closed
                 // faces have the wall's velocity.
                 let falling = v[axis] + step.velocity_step[axis];
-                let whole = weighted(&parts[axis], a, b, c).max(1e-6);
+                let whole = match step.solids.is_empty() {
+                    true => 1.0,
+                    false => weighted(&parts[axis], a, b, c).max(1e-6),
+                };
                 let advanced = v[axis] + weighted(&change[axis], a, b, c) / whole;
                 let u = match is_drop {
                     true => falling,
@@ -292,10 +295,13 @@ pub fn grid_to_particle(
                         (a, b, center_slopes(h)),
                     ];
                     for (turn, (a, b, c)) in along.into_iter().enumerate() {
+                        let of_parts = match step.solids.is_empty() {
+                            true => 0.0,
+                            false => weighted(&parts[axis], a, b, c),
+                        };
                         // Not divided by `whole`: the slope of the quotient is not bounded where
                         // faces are almost closed.
-                        let slope = weighted(&velocity[axis], a, b, c)
-                            - u * weighted(&parts[axis], a, b, c);
+                        let slope = weighted(&velocity[axis], a, b, c) - u * of_parts;
                         rows[axis][(axis + turn) % 3] = slope / size;
                     }
                 }

@@ -174,8 +174,8 @@ pub fn let_in(
 /// Largest excess by entering water, in units of the cell's open volume.
 const MOST_OVER: f64 = 1.0;
 
-/// Returns whether a rounding error of `error` may decide if the centre of a cell, or of one around
-/// it, is inside a wall or solid.
+/// Returns whether a rounding error of `error` may decide if the centre of a cell, or of one up to
+/// two cells away, is inside a wall or solid.
 pub fn is_near_half(
     step: &FlipSubstep<'_>,
     bricks: &Bricks,
@@ -183,16 +183,17 @@ pub fn is_near_half(
     element: u32,
     error: f64,
 ) -> bool {
-    neighborhood().any(|offset| {
+    let mut about = neighborhood().flat_map(|offset| [offset, offset.map(|step| 2 * step)]);
+    about.any(|offset| {
         let parts = open_parts(step, bricks, space, bricks.near(element, offset));
         parts.into_iter().any(|part| (part - HALF).abs() < error)
     })
 }
 
 /// Returns the density where walls and solids contain a cell's centre. Walls: continued linearly
-/// from the two cells inward of them, as far as the second has water or lacks it, so that the
-/// surface keeps its slope. Otherwise, or if the centre inward is inside too: the mean over the
-/// cell's faces to other cells, weighted by their open fractions.
+/// from the two cells inward of them, rising by at most what the second holds and falling by at
+/// most what it lacks, so that the surface keeps its slope. Otherwise, or if the centre inward is
+/// inside too: the mean over the cell's faces to other cells, weighted by their open fractions.
 fn density_before(
     step: &FlipSubstep<'_>,
     bricks: &Bricks,
@@ -213,7 +214,7 @@ fn density_before(
     let there = bricks.near(element, inward);
     if inward != [0; 3] && is_open(there) {
         let further = bricks.near(element, inward.map(|step| 2 * step));
-        if further < CELLS {
+        if !is_open(further) {
             return density[there as usize];
         }
         let [near, far] = [there, further].map(|e| density[e as usize].clamp(0.0, 1.0));
@@ -245,11 +246,11 @@ pub struct Depth {
     pub is_film: bool,
     /// Depth below the surface, in cells, from −1 to 1.
     pub cells: f64,
-    /// Factor by which rounding errors of the open volumes around the cell change the fraction
-    /// below the surface; infinite if these volumes are all equal.
+    /// Factor by which rounding errors of the open volumes around the cell, relative to 1, change
+    /// the fraction below the surface; infinite if these volumes are all equal.
     pub lean: f64,
-    /// Factor by which errors of the water around the cell change that fraction; 0 where they do so
-    /// as they are, without solids.
+    /// Factor by which errors of the water around the cell change that fraction; 0 without solids,
+    /// where they pass unchanged.
     pub spread: f64,
 }
 
@@ -319,7 +320,7 @@ struct Below {
     spread: f64,
 }
 
-/// Changes of the water in a hat whose effects are looked at for [`Depth::spread`].
+/// Changes of the water in a hat by which [`Depth::spread`] is measured.
 const CHANGES: [f64; 4] = [-1e-5, -1e-7, 1e-7, 1e-5];
 
 /// Returns what lies below a level surface; `of_room` is the fraction of the open part that does.
@@ -357,10 +358,12 @@ fn below_surface(
     let below = |of_room: f64| below_level(&open, level, of_room);
     let part = below(of_room);
     let slopes = CHANGES.map(|by| ((below(of_room + by) - part) / by).abs());
+    let tilts = CHANGES.map(|by| ((below_level(&open, level + by, of_room) - part) / by).abs());
+    let most = |slopes: [f64; 4]| slopes.into_iter().fold(0.0, f64::max);
     Below {
         part,
-        lean: (1.0 - own) / to_open.length(),
-        spread: slopes.into_iter().fold(0.0, f64::max),
+        lean: most(tilts) / to_open.length(),
+        spread: most(slopes),
     }
 }
 

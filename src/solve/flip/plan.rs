@@ -101,7 +101,6 @@ fn conditions(plan: &Plan, scene: &FlipScene) -> Vec<&'static str> {
     let flip = scene.settings();
     let all = [
         ("SOLIDS", plan.has_solids()),
-        ("CUT_CELLS", plan.has_solids() || scene.has_cutting_walls()),
         ("MOVING_SOLIDS", plan.counts.moving_nodes > 0),
         ("SHAPES", plan.counts.shape_nodes > 0),
         ("APIC", flip.transfer == Transfer::Apic),

@@ -26,11 +26,4 @@ pub const FLIP_FAR_WALLS: &[Control] = &[
         "near + clamp(near - far, far - 1.0, far)",
         "near + 0.9 * clamp(near - far, far - 1.0, far)",
     ),
-    control(
-        "flip/grid_to_particle",
-        "select(open, vec3f(1.0), open <= vec3f(0.0))",
-        "vec3f(1.0)",
-        "flip/grid_to_particle",
-        &["velocity", "velocity of the grid"],
-    ),
 ];
