@@ -38,7 +38,7 @@ fn both_solvers_are_within_tolerance_as_imprecisely_as_vulkan_permits() {
 fn rows_see_errors_beyond_what_vulkan_permits() {
     let gross = Imprecision {
         division: 16.0,
-        // Beside solids the surface's bound covers some 40 other roundings.
+        // At 64 the only root of the surface stays within what its bound allows the densities.
         square_root: 128.0,
         inverse_square_root: 256.0,
         length: 64.0,
