@@ -13,11 +13,12 @@ use swell_domain::{
     signed_distance::SignedDistance,
 };
 use swell_reference::flip::{
-    Depth, FlipSubstep, LEAST_FILM, Model, OpenSpace, Solid, cut_cells as reference_cut_cells,
-    extrapolate as reference_extrapolate, find_change as reference_find_change, find_depth,
-    find_excess as reference_find_excess, find_water as reference_find_water, friction_rates,
-    gather_centers as reference_gather_centers, gather_faces as reference_gather_faces,
-    is_near_half, let_in as reference_let_in, wall_friction as reference_wall_friction,
+    Depth, FlipSubstep, LEAST_FILM, Model, OpenSpace, Sensitivity, Solid,
+    cut_cells as reference_cut_cells, extrapolate as reference_extrapolate,
+    find_change as reference_find_change, find_depth, find_excess as reference_find_excess,
+    find_water as reference_find_water, friction_rates, gather_centers as reference_gather_centers,
+    gather_faces as reference_gather_faces, is_near_half, let_in as reference_let_in, sensitivity,
+    wall_friction as reference_wall_friction,
 };
 use swell_scene::flip::Surface;
 use swell_solve::flip::buffers;
@@ -373,14 +374,13 @@ pub(super) fn find_water(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let size = state.model.cell_size();
     let of_half = |e: usize| OF_HALF.of([looked(e).0]);
     let moved = |e: usize| {
-        let Depth {
-            cells,
-            lean,
-            spread,
-            ..
-        } = depth[e];
-        let layers = OF_LAYERS.of([of_half(e), spread]);
-        surface_moved(cells, OF_SHARE.of([layers, OF_SOLID.of([lean])]))
+        let Sensitivity { to_tilt, to_water } =
+            sensitivity(&step, bricks, space, &depth[e], e as u32);
+        let layers = OF_LAYERS.of([of_half(e), to_water]);
+        surface_moved(
+            depth[e].cells,
+            OF_SHARE.of([layers, OF_SOLID.of([to_tilt])]),
+        )
     };
     let is_averaged = |e: usize| depth[e].share != density[e];
     let is_near = |e: usize| {

@@ -34,13 +34,13 @@ bounds! {
     pub(super) OF_HALF = [mean: "" OF_MEAN]
         mean + 0.25 * U, "a density's difference from a half, which is half of 1 at most";
     pub(super) OF_SOLID =
-        [lean: "how fast what is below the surface changes with the squared cosine of the \
+        [tilt: "how fast what is below the surface changes with the squared cosine of the \
             solid's tilt, over the length of the hats' differences beside the cell"]
-        (44.0 * U * lean).min(1.0),
+        (44.0 * U * tilt).min(1.0),
         "differences, sums of three products, and a quotient of 2.5 ulp";
     pub(super) OF_LAYERS = [half: "" OF_HALF,
-        spread: "how fast what is below the surface changes with the water in a cut cell"]
-        (spread * (half + 6.0 * U) + 20.0 * U * spread.min(1.0)).max(half),
+        water: "how fast what is below the surface changes with the water in a cut cell"]
+        (water * (half + 6.0 * U) + 20.0 * U * water.min(1.0)).max(half),
         "what is left above a layer, a quotient of 2.5 ulp, and ten roundings of each";
     pub(super) OF_SHARE = [layers: "" OF_LAYERS, solid: "" OF_SOLID] layers + solid, "";
     pub(super) NEAR_HALF = [cut: "" CUT, mean: "" OF_MEAN] cut + mean,

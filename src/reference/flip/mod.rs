@@ -44,6 +44,6 @@ pub use to_particles::{
 pub use trace::Trace;
 pub use wall_friction::{friction_rates, wall_friction};
 pub use water::{
-    Centers, Depth, LEAST_FILM, find_buried, find_depth, find_excess, find_water, gather_centers,
-    is_filling, is_near_half, let_in,
+    Centers, Depth, LEAST_FILM, Sensitivity, find_buried, find_depth, find_excess, find_water,
+    gather_centers, is_filling, is_near_half, let_in, sensitivity,
 };

@@ -246,12 +246,18 @@ pub struct Depth {
     pub is_film: bool,
     /// Depth below the surface, in cells, from −1 to 1.
     pub cells: f64,
-    /// Factor by which rounding errors of the open volumes around the cell, relative to 1, change
-    /// the fraction below the surface; infinite if these volumes are all equal.
-    pub lean: f64,
-    /// Factor by which errors of the water around the cell change that fraction; 0 without solids,
-    /// where they pass unchanged.
-    pub spread: f64,
+}
+
+/// How errors change the fraction of a cell's hat function that lies below the surface
+/// ([`sensitivity`]).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Sensitivity {
+    /// Factor for rounding errors of the open volumes around the cell, relative to 1; infinite if
+    /// these volumes are all equal.
+    pub to_tilt: f64,
+    /// Factor for errors of the water around the cell; 0 without solids, where they pass
+    /// unchanged.
+    pub to_water: f64,
 }
 
 /// Least open fraction, over all faces together, through which a gap fills from beside it.
@@ -311,34 +317,29 @@ fn share_of_room(
 /// Integrals of the hat function over its four layers.
 const LAYERS: [f64; 4] = [0.125, 0.375, 0.375, 0.125];
 
-/// The fraction of the hat function at a centre that lies below a level surface, solids included.
-#[derive(Clone, Copy, Debug)]
-struct Below {
-    part: f64,
-    /// See [`Depth`].
-    lean: f64,
-    spread: f64,
-}
-
-/// Changes of the water in a hat by which [`Depth::spread`] is measured.
+/// Changes of the water, or of the tilt, by which [`sensitivity`] is measured.
 const CHANGES: [f64; 4] = [-1e-5, -1e-7, 1e-7, 1e-5];
 
-/// Returns what lies below a level surface; `of_room` is the fraction of the open part that does.
-fn below_surface(
+/// How the solid in a cut cell's hat function leans.
+struct Tilt {
+    /// Squared cosine of its angle to the upward direction, negative under a ceiling.
+    level: f64,
+    /// Change of the open volume across the cell, by which the angle is found.
+    size: f64,
+}
+
+/// Returns the tilt of the solid in a hat function; `None` if the hat is whole or closed, or
+/// nothing points up.
+fn tilt_of(
     step: &FlipSubstep<'_>,
     bricks: &Bricks,
     space: &OpenSpace,
     element: u32,
-    of_room: f64,
-) -> Below {
+) -> Option<Tilt> {
     let own = space.hats[element as usize];
     let up = -step.velocity_step;
-    if own <= LEAST_ROOM || up == DVec3::ZERO {
-        return Below {
-            part: of_room,
-            lean: 0.0,
-            spread: 0.0,
-        };
+    if own >= 1.0 || own <= LEAST_ROOM || up == DVec3::ZERO {
+        return None;
     }
     let to_open = DVec3::from_array([0, 1, 2].map(|axis| {
         let [before, after] = [-1, 1].map(|side| {
@@ -353,17 +354,35 @@ fn below_surface(
     }));
     let upward = to_open.dot(up);
     let squares = to_open.length_squared() * up.length_squared();
-    let level = (upward * upward / squares.max(1e-30)).copysign(upward);
-    let open = space.layers[element as usize];
-    let below = |of_room: f64| below_level(&open, level, of_room);
-    let part = below(of_room);
-    let slopes = CHANGES.map(|by| ((below(of_room + by) - part) / by).abs());
-    let tilts = CHANGES.map(|by| ((below_level(&open, level + by, of_room) - part) / by).abs());
-    let most = |slopes: [f64; 4]| slopes.into_iter().fold(0.0, f64::max);
-    Below {
-        part,
-        lean: most(tilts) / to_open.length(),
-        spread: most(slopes),
+    Some(Tilt {
+        level: (upward * upward / squares.max(1e-30)).copysign(upward),
+        size: to_open.length(),
+    })
+}
+
+/// Returns how the fraction of a hat function below the surface changes with errors of its water
+/// and of the open volumes around it, by differences. The solver does not need it: it bounds the
+/// rounding errors of other solvers.
+pub fn sensitivity(
+    step: &FlipSubstep<'_>,
+    bricks: &Bricks,
+    space: &OpenSpace,
+    depth: &Depth,
+    element: u32,
+) -> Sensitivity {
+    let Some(tilt) = tilt_of(step, bricks, space, element) else {
+        return Sensitivity::default();
+    };
+    let open = &space.layers[element as usize];
+    let of_room = depth.share.clamp(0.0, 1.0);
+    let part = below_level(open, tilt.level, of_room);
+    let most = |changed: &dyn Fn(f64) -> f64| {
+        let slopes = CHANGES.map(|by| ((changed(by) - part) / by).abs());
+        slopes.into_iter().fold(0.0, f64::max)
+    };
+    Sensitivity {
+        to_tilt: most(&|by| below_level(open, tilt.level + by, of_room)) / tilt.size,
+        to_water: most(&|by| below_level(open, tilt.level, of_room + by)),
     }
 }
 
@@ -411,24 +430,18 @@ pub fn find_depth(
             density[element as usize]
         };
         let of_room = share.clamp(0.0, 1.0);
-        let below = match is_cut {
-            true => below_surface(step, bricks, space, element, of_room),
-            false => Below {
-                part: of_room,
-                lean: 0.0,
-                spread: 0.0,
-            },
+        let below = match tilt_of(step, bricks, space, element) {
+            Some(tilt) => below_level(&space.layers[element as usize], tilt.level, of_room),
+            None => of_room,
         };
         // Across a flat surface the density is 1/2 at the surface, and falls as s − s²/2 with the
         // distance s in cells.
-        let off = below.part - 0.5;
+        let off = below - 0.5;
         let way = 1.0 - (1.0 - 2.0 * off.abs()).max(0.0).sqrt();
         Depth {
             share,
             is_film: is_cut && share > LEAST_FILM && off >= 0.0,
             cells: if off == 0.0 { 0.0 } else { way * off.signum() },
-            lean: below.lean,
-            spread: below.spread,
         }
     })
 }
