@@ -53,8 +53,8 @@ pub struct Fill {
     pub removed: usize,
 }
 
-/// Fills blocks and meshes with particles on lattices of `spacing` metres, then clears `solid`: as
-/// many particles stay as fit into the open volume, each at least 0.3 spacings from the solid.
+/// Fills blocks ([`fill_blocks`]) and meshes with particles on lattices of `spacing` metres, then
+/// clears `solid`: as many particles stay as fit into the open volume, each at least 0.3 spacings from the solid.
 ///
 /// # Errors
 /// If a water mesh has no inside, or needs too large a grid.
@@ -87,16 +87,16 @@ pub fn fill_below(
     spacing: f64,
 ) -> Fill {
     let (mut water, mut air) = (Vec::new(), Vec::new());
-    for mut p in fill_blocks(&[*block], domain, spacing) {
-        let column = ((p - block.min) / spacing).floor();
-        let height = (surface(DVec2::new(p.x, p.z)) - block.min.y) / spacing;
-        let layers = (height + dither(column)).floor().max(0.0);
-        p.y = block.min.y + spacing * followed(column.y, layers, height);
-        let side = if column.y < layers {
-            &mut water
-        } else {
-            &mut air
-        };
+    // The layers below a surface never reach a ceiling.
+    let mut room = *domain;
+    room.max.y = f64::INFINITY;
+    let lattice = Lattice::of_block(block, &room, spacing);
+    for (cell, mut p) in lattice.cells() {
+        let [column, layer, row] = cell.map(|i| i as f64);
+        let height = (surface(DVec2::new(p.x, p.z)) - block.min.y) / lattice.spacing.y;
+        let layers = (height + dither(column, row)).floor().max(0.0);
+        p.y = block.min.y + lattice.spacing.y * followed(layer, layers, height);
+        let side = if layer < layers { &mut water } else { &mut air };
         side.push(p);
     }
     let removed = around.map_or(0, |around| {
@@ -126,8 +126,8 @@ fn followed(layer: f64, layers: f64, height: f64) -> f64 {
 
 /// Threshold of a column: over neighbours of any number spread evenly from 0 to 1 (Roberts 2018,
 /// R2), so that few columns together hold their volume to a part of a particle.
-fn dither(column: DVec3) -> f64 {
-    (column.x * R2[0] + column.z * R2[1]).rem_euclid(1.0)
+fn dither(column: f64, row: f64) -> f64 {
+    (column * R2[0] + row * R2[1]).rem_euclid(1.0)
 }
 
 fn at_rest(positions: &[DVec3]) -> Particles {
@@ -139,32 +139,25 @@ fn at_rest(positions: &[DVec3]) -> Particles {
     }
 }
 
-/// Returns the number of particles along each axis of a block: its size over the spacing, rounded
-/// to the nearest integer to preserve the volume, but with no layer closer than half a spacing
-/// (less a tenth, for rounding) to the domain's far wall.
+/// Returns the number of particles along each axis of a block (see [`fill_blocks`]).
 pub fn block_dims(block: &Bounds, domain: &Bounds, spacing: f64) -> [u64; 3] {
-    [0, 1, 2].map(|axis| {
-        let size = block.max[axis] - block.min[axis];
-        let room = domain.max[axis] - block.min[axis];
-        let nearest = (size / spacing + 0.5 - 1e-6).floor();
-        let most = (room / spacing + 0.1).floor();
-        nearest.min(most).max(0.0) as u64
-    })
+    Lattice::of_block(block, domain, spacing).dims
 }
 
-/// Returns the centres `min + (i + ½) · spacing` in each block, x fastest. Where blocks overlap,
-/// the first one fills the volume.
+/// Fills blocks with whole layers of particles, each of which represents `spacing`³, x fastest.
+/// Where blocks overlap, the first one fills the volume.
+///
+/// The number of layers along an axis is the block's size over the spacing, rounded. Between two
+/// walls of the domain the layers share the room evenly: with a gap at a wall, water would slosh
+/// from the start. The spacing along the other axes makes up for it, so that the density is that of
+/// a lattice of `spacing`. A block that reaches only the far wall begins there, and any other at its
+/// least corner.
 pub fn fill_blocks(blocks: &[Bounds], domain: &Bounds, spacing: f64) -> Vec<DVec3> {
     let mut positions = Vec::new();
     // Extent that each earlier block really covers, after rounding.
     let mut covered = Vec::<Bounds>::new();
     for block in blocks {
-        let dims = block_dims(block, domain, spacing);
-        let lattice = Lattice {
-            origin: block.min,
-            dims,
-            spacing,
-        };
+        let lattice = Lattice::of_block(block, domain, spacing);
         if covered.is_empty() {
             positions.extend(lattice.centres());
         } else {
@@ -175,11 +168,7 @@ pub fn fill_blocks(blocks: &[Bounds], domain: &Bounds, spacing: f64) -> Vec<DVec
             let free: Vec<_> = lattice.centres().filter(is_free).collect();
             positions.extend(free);
         }
-        let size = spacing * DVec3::from_array(dims.map(|n| n as f64));
-        covered.push(Bounds {
-            min: block.min,
-            max: block.min + size,
-        });
+        covered.push(lattice.bounds());
     }
     positions
 }
@@ -209,7 +198,7 @@ pub fn fill_mesh(
     let lattice = Lattice {
         origin: bounds.min,
         dims: inside.dims.map(|n| n as u64),
-        spacing,
+        spacing: DVec3::splat(spacing),
     };
     let room = domain.grown(-0.4 * spacing);
     let grid = PointGrid::over(positions, OVERLAP_SPACINGS * spacing);
@@ -228,16 +217,83 @@ pub fn fill_mesh(
 struct Lattice {
     origin: DVec3,
     dims: [u64; 3],
-    spacing: f64,
+    spacing: DVec3,
 }
 
+/// Relative difference from a whole number of layers that is a rounding error of the scene's
+/// decimal numbers.
+const WHOLE: f64 = 1e-9;
+
 impl Lattice {
-    fn centres(&self) -> impl Iterator<Item = DVec3> + '_ {
+    /// Returns the lattice of a block (see [`fill_blocks`]).
+    fn of_block(block: &Bounds, domain: &Bounds, spacing: f64) -> Self {
+        let touches = |gap: f64| gap < 0.5 * spacing;
+        let at_near = [0, 1, 2].map(|axis| touches(block.min[axis] - domain.min[axis]));
+        let at_far = [0, 1, 2].map(|axis| touches(domain.max[axis] - block.max[axis]));
+        let is_held = |axis: &usize| at_near[*axis] && at_far[*axis];
+        let free = (0..3).filter(|axis| !is_held(axis)).count();
+        let mut step = DVec3::splat(spacing);
+        let mut layers = [0.0; 3];
+        for axis in (0..3).filter(is_held) {
+            let room = domain.max[axis] - domain.min[axis];
+            let number = room / spacing;
+            // A full box has no surface that could rise.
+            let rounded = if free > 0 {
+                number.round()
+            } else {
+                (number + WHOLE).floor()
+            };
+            layers[axis] = rounded;
+            if rounded > 0.0 && (number / rounded - 1.0).abs() > WHOLE {
+                step[axis] = room / rounded;
+            }
+        }
+        let wider = (step / spacing).element_product();
+        let mut origin = block.min;
+        for axis in 0..3 {
+            if is_held(&axis) {
+                origin[axis] = domain.min[axis];
+                continue;
+            }
+            if wider != 1.0 {
+                step[axis] = spacing * wider.powf(-1.0 / free as f64);
+            }
+            let size = block.max[axis] - block.min[axis];
+            // No layer is closer than half a spacing, less a tenth, to the far wall.
+            let room = domain.max[axis] - block.min[axis];
+            let most = (room / step[axis] + 0.1).floor();
+            layers[axis] = (size / step[axis] + 0.5 - 1e-6).floor().min(most).max(0.0);
+            if at_far[axis] {
+                origin[axis] = domain.max[axis] - layers[axis] * step[axis];
+            }
+        }
+        Self {
+            origin,
+            dims: layers.map(|n| n as u64),
+            spacing: step,
+        }
+    }
+
+    fn bounds(&self) -> Bounds {
+        let layers = DVec3::from_array(self.dims.map(|n| n as f64));
+        Bounds {
+            min: self.origin,
+            max: self.origin + self.spacing * layers,
+        }
+    }
+
+    /// Indices and centres of the cells, x fastest.
+    fn cells(&self) -> impl Iterator<Item = ([u64; 3], DVec3)> + '_ {
         let [nx, ny, nz] = self.dims;
         (0..nx * ny * nz).map(move |n| {
-            let cell = [n % nx, n / nx % ny, n / (nx * ny)].map(|i| i as f64 + 0.5);
-            self.origin + self.spacing * DVec3::from_array(cell)
+            let cell = [n % nx, n / nx % ny, n / (nx * ny)];
+            let middle = DVec3::from_array(cell.map(|i| i as f64 + 0.5));
+            (cell, self.origin + self.spacing * middle)
         })
+    }
+
+    fn centres(&self) -> impl Iterator<Item = DVec3> + '_ {
+        self.cells().map(|(_, centre)| centre)
     }
 }
 

@@ -36,12 +36,63 @@ fn the_city_scene_starts_with_201_000_particles() {
 fn a_block_that_is_no_whole_number_of_spacings_keeps_its_volume() {
     let domain = cuboid([0.0; 3], [10.0; 3]);
     let block = cuboid([0.0; 3], [1.0, 1.0, 10.0]);
-    // 5.88 layers become 6; 58.8 along z would exceed the wall, where 58 fit.
-    assert_eq!(block_dims(&block, &domain, 0.17), [6, 6, 58]);
+    // 5.88 layers become 6, and 58.8 along z, from wall to wall, 59.
+    assert_eq!(block_dims(&block, &domain, 0.17), [6, 6, 59]);
     assert_eq!(
         block_dims(&cuboid([0.0; 3], [0.0; 3]), &domain, 0.17),
         [0; 3]
     );
+}
+
+/// Layers reach both walls where a block does, and the density is that of the spacing: what a gap at
+/// a wall lacks would slosh. Control: a block that ends before the wall has the spacing itself.
+#[test]
+fn layers_between_walls_share_the_room() {
+    let (domain, spacing) = (cuboid([-0.1, 0.0, 0.2], [0.9, 0.8, 0.9]), 0.03);
+    let span = |places: &[DVec3], axis: usize| {
+        let all = places.iter().map(|p| p[axis]);
+        let (least, most) = (
+            all.clone().fold(f64::INFINITY, f64::min),
+            all.fold(-1e9, f64::max),
+        );
+        [least, most]
+    };
+    let lattice = |block: &Bounds| Lattice::of_block(block, &domain, spacing);
+    for (max, is_full) in [([0.9, 0.5, 0.9], false), ([0.9, 0.8, 0.9], true)] {
+        let block = cuboid([-0.1, 0.0, 0.2], max);
+        let (
+            Lattice {
+                dims,
+                spacing: step,
+                ..
+            },
+            places,
+        ) = (lattice(&block), fill_blocks(&[block], &domain, spacing));
+        assert_eq!(places.len() as u64, dims.iter().product::<u64>());
+        for axis in if is_full { 0..3 } else { 0..1 } {
+            let [least, most] = span(&places, axis);
+            let (low, high) = (least - domain.min[axis], domain.max[axis] - most);
+            assert!((low - 0.5 * step[axis]).abs() < 1e-12 && (high - low).abs() < 1e-12);
+        }
+        let volume = step.element_product() / spacing.powi(3);
+        if is_full {
+            // 33, 26 and 23 layers where 33.33, 26.67 and 23.33 would fit: never overfull.
+            assert_eq!(dims, [33, 26, 23]);
+            assert!(volume > 1.0, "{volume}");
+        } else {
+            assert_eq!(dims, [33, 17, 23]);
+            assert!((volume - 1.0).abs() < 1e-12, "{volume}");
+            // Within half a layer of what is asked for.
+            assert!((17.0 * step.y - 0.5).abs() < 0.5 * step.y);
+        }
+    }
+    let dam = cuboid([-0.1, 0.0, 0.2], [0.4, 0.5, 0.7]);
+    assert_eq!(lattice(&dam).spacing, DVec3::splat(spacing));
+    assert_eq!(lattice(&dam).origin, dam.min);
+    // A block at the far walls only begins there.
+    let far = cuboid([0.11, 0.0, 0.41], [0.9, 0.5, 0.9]);
+    let [_, most] = span(&fill_blocks(&[far], &domain, spacing), 2);
+    assert!((most - (0.9 - 0.5 * spacing)).abs() < 1e-12, "{most}");
 }
 
 #[test]
