@@ -116,17 +116,15 @@ impl<'a> Record<'a> {
         *looks.get(probe)?.first()?
     }
 
+    /// Returns how high the water reaches that is connected to the body: over half of the flume's
+    /// width, which is along z. The highest particle alone is up to a spacing higher, by chance.
     fn run_up(&self, particles: &Particles) -> Option<f64> {
-        let quantile = self
-            .scene
-            .probes
-            .iter()
-            .find_map(|probe| match probe.kind {
-                ProbeKind::RunUp { quantile } => Some(quantile),
-                _ => None,
-            })?;
-        let top = run_up(particles, self.scene.particle_spacing(), quantile)?;
-        Some(top - self.scene.domain.min.y)
+        let mut probes = self.scene.probes.iter();
+        probes.find(|probe| matches!(probe.kind, ProbeKind::RunUp { .. }))?;
+        let (domain, spacing) = (&self.scene.domain, self.scene.particle_spacing());
+        let across = domain.size().z / spacing;
+        let quantile = (1.0 - 0.5 * across / particles.len() as f64).max(0.0);
+        Some(run_up(particles, spacing, quantile)? - domain.min.y)
     }
 
     /// Number of frames in a tenth of a second.

@@ -357,11 +357,6 @@ fn published_numbers_are_those_of_theory() {
                     let e = scale.height / scale.depth;
                     2.0 * e + 0.5 * e.powi(2) + 0.75 * e.powi(3)
                 }
-                // Of the slope of 15°; the wave that breaks is the experiment's.
-                (Measure::SolitaryBeach, "run_up") if scale.height < 0.2 => {
-                    let cot = 1.0 / 15f64.to_radians().tan();
-                    2.831 * cot.sqrt() * (scale.height / scale.depth).powf(1.25)
-                }
                 (Measure::SolitaryWave, "height") => scale.height / scale.depth,
                 (Measure::DryBed, "depth_at_dam") => 4.0 / 9.0,
                 (Measure::DryBed, "flow_at_dam") => 8.0 / 27.0,
