@@ -1,7 +1,7 @@
 //! Contacts of a scene's bodies.
 
-use swell_domain::{absorber::AbsorberStates, body::BodyState, pose::Passage};
-use swell_scene::{Scene, step::Substep};
+use swell_domain::{absorber::AbsorberStates, body::BodyState, budget::Breach, pose::Passage};
+use swell_scene::{FlipScene, Scene, step::Substep};
 
 use super::{Contacts, Surroundings};
 
@@ -61,5 +61,59 @@ impl SceneContacts {
             moving: &moving,
         };
         self.0.resolve(bodies, &around, length);
+    }
+
+    /// Moves `bodies` over a substep without water: by gravity, moorings and contacts.
+    pub fn advance(
+        &self,
+        scene: &Scene,
+        absorbers: &AbsorberStates,
+        substep: &Substep,
+        bodies: &mut [BodyState],
+    ) {
+        let gravity = scene.water.gravity;
+        for (it, state) in scene.bodies().zip(&mut *bodies) {
+            // Sums of lengths round.
+            state.time = substep.start;
+            *state = it.body.accelerated(state, gravity, substep.kick);
+        }
+        self.resolve(scene, absorbers, substep, bodies);
+        for (it, state) in scene.bodies().zip(&mut *bodies) {
+            *state = it.body.moved(state, substep.length);
+        }
+    }
+
+    /// Moves `bodies` over the frame after `frame`, without water; `before` is the length of the last
+    /// substep, seconds, and becomes that of this frame's last. Returns the number of substeps.
+    ///
+    /// # Errors
+    /// If that is more than the scene's `max_substeps`.
+    pub fn advance_frame(
+        &self,
+        scene: &FlipScene<'_>,
+        absorbers: &AbsorberStates,
+        frame: u32,
+        bodies: &mut [BodyState],
+        before: &mut f64,
+    ) -> Result<u32, Breach> {
+        let length = scene.shot.frame_seconds();
+        let (start, mut elapsed, mut done) = (f64::from(frame) * length, 0.0, 0);
+        loop {
+            let (wanted, substep) = scene.flip_substep(
+                (absorbers, bodies),
+                frame + 1,
+                start + elapsed,
+                length - elapsed,
+                0.0,
+                (done, *before),
+            )?;
+            self.advance(scene, absorbers, &substep, bodies);
+            *before = substep.length;
+            elapsed += substep.length;
+            done += 1;
+            if wanted <= 1.0 {
+                return Ok(done);
+            }
+        }
     }
 }

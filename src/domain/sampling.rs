@@ -263,8 +263,9 @@ impl Lattice {
             let room = domain.max[axis] - block.min[axis];
             let most = (room / step[axis] + 0.1).floor();
             layers[axis] = (size / step[axis] + 0.5 - 1e-6).floor().min(most).max(0.0);
-            if at_far[axis] {
-                origin[axis] = domain.max[axis] - layers[axis] * step[axis];
+            let from_far = domain.max[axis] - layers[axis] * step[axis];
+            if at_far[axis] && (from_far - origin[axis]).abs() > WHOLE * spacing {
+                origin[axis] = from_far;
             }
         }
         Self {

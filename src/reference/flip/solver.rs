@@ -371,6 +371,13 @@ impl Flip {
         substep: &Substep,
         all: &mut Projection,
     ) -> Result<(Vec<bool>, f64), ReferenceError> {
+        if cloud.position.is_empty() {
+            if let Some(contacts) = &self.contacts {
+                let (scene, bodies) = (&self.model.scene, &mut self.state.bodies);
+                contacts.advance(scene, &self.state.walls, substep, bodies);
+            }
+            return Ok((Vec::new(), 0.0));
+        }
         let surveyed = survey(&self.model, cloud);
         if surveyed.not_finite > 0 {
             let breach = Breach::not_finite(frame, surveyed.not_finite as u64, None);
@@ -527,15 +534,20 @@ impl Solver for Flip {
     fn compute(&mut self, watch: &mut dyn Watch) -> Result<Unread<ReferenceError>, ReferenceError> {
         let mut cloud = self.cloud();
         let (done, density) = if self.state.is_empty() {
-            let report = self.model.scene.report(&self.state, [].into_iter());
-            let projection = Some(Projection::default());
-            (
-                StepReport {
-                    projection,
-                    ..report
-                },
-                Vec::new(),
-            )
+            let (scene, state) = (&self.model.scene, &mut self.state);
+            let substeps = match &self.contacts {
+                Some(contacts) => {
+                    let (walls, before) = (&state.walls, &mut state.substep);
+                    contacts.advance_frame(scene, walls, self.frame, &mut state.bodies, before)?
+                }
+                None => 0,
+            };
+            let report = StepReport {
+                substeps,
+                projection: Some(Projection::default()),
+                ..scene.report(state, [].into_iter())
+            };
+            (report, Vec::new())
         } else {
             self.run_frame(&mut cloud, watch)?
         };

@@ -262,7 +262,7 @@ impl Pbf {
         velocity: &mut Vec<DVec3>,
         all: &mut Projection,
     ) -> Result<f64, ReferenceError> {
-        let Some(grid) = self.grid.as_mut().filter(|_| !position.is_empty()) else {
+        let Some(grid) = &mut self.grid else {
             return Ok(0.0);
         };
         let mut cloud = Cloud {

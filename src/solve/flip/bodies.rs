@@ -2,7 +2,7 @@
 //! after it, and moved with the particles.
 
 use swell_domain::body::BodyState;
-use swell_scene::step::Substep;
+use swell_scene::step::{Substep, projected_substep};
 
 use super::{
     super::{
@@ -10,7 +10,7 @@ use super::{
         pressure::{Round, bodies},
         trace::Run,
     },
-    Flip,
+    Flip, FrameTotals,
 };
 
 impl Flip {
@@ -107,5 +107,26 @@ impl Flip {
         for (it, state) in self.scene.bodies().zip(&mut self.state.bodies) {
             *state = it.body.moved(state, substep.length);
         }
+    }
+
+    /// Moves the bodies over a frame that has no particles.
+    pub(super) fn run_without_water(&mut self) -> Result<FrameTotals, SolveError> {
+        let (state, mut totals) = (&mut self.state, FrameTotals::default());
+        if let Some(contacts) = &self.contacts {
+            let (walls, bodies) = (&state.walls, &mut state.bodies);
+            let (frame, before) = (self.frame, &mut state.substep);
+            totals.substeps = contacts.advance_frame(&self.scene, walls, frame, bodies, before)?;
+        }
+        Ok(totals)
+    }
+
+    /// Moves the bodies over a substep, of (start, length) in seconds, that has no particles.
+    pub(crate) fn advance_bodies(&mut self, (start, length): (f64, f64)) {
+        let substep = projected_substep(start, length, self.state.substep);
+        if let Some(contacts) = &self.contacts {
+            let bodies = &mut self.state.bodies;
+            contacts.advance(&self.scene, &self.state.walls, &substep, bodies);
+        }
+        self.state.substep = length;
     }
 }

@@ -546,10 +546,9 @@ impl Solver for Flip {
 
     fn compute(&mut self, watch: &mut dyn Watch) -> Result<Unread<SolveError>, SolveError> {
         self.program.upload(COUNTERS, 0, &[Counters::default()]);
-        let totals = if self.state.is_empty() {
-            FrameTotals::default()
-        } else {
-            self.timed(|flip, run| flip.run_substeps(watch, run))?
+        let totals = match self.state.is_empty() {
+            true => self.run_without_water()?,
+            false => self.timed(|flip, run| flip.run_substeps(watch, run))?,
         };
         let ended = self.ended(&totals)?;
         self.frame += 1;

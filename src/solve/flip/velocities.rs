@@ -31,6 +31,10 @@ impl Flip {
         run: &mut Run<'_>,
     ) -> Result<(), SolveError> {
         let n = self.state.len();
+        if n == 0 {
+            self.advance_bodies((start, length));
+            return Ok(());
+        }
         let state = [
             BufferCopy::of(&POSITION, &POSITION, n),
             BufferCopy::of(&VELOCITY, &VELOCITY, n),

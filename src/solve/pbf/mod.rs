@@ -262,9 +262,7 @@ impl Pbf {
         step: f64,
         run: &mut Run<'_>,
     ) -> Result<(), SolveError> {
-        if let Some(grid) = &mut self.grid
-            && !self.state.is_empty()
-        {
+        if let Some(grid) = &mut self.grid {
             grid.project(&self.program, (time - step, step), run)?;
             self.state.bodies = grid.flip().bodies().to_vec();
         }

@@ -291,6 +291,33 @@ fn light_heavy_hinged_and_moored_bodies_stay_bounded() {
     assert!((taut - 0.25).abs() < 2e-3, "{taut}");
 }
 
+/// In a domain without a particle a body falls by ½ g t², lands and rests, by both solvers, on the
+/// GPU and in f64.
+#[test]
+fn a_body_falls_where_there_is_no_water() {
+    let context = context();
+    let body = "mesh = \"cube.obj\"\nscale = 0.2\ntranslate = [0.4, 0.5, 0.4]\ndensity = 500\n";
+    for method in ["flip", "pbf"] {
+        let set = format!("solver.method=\"{method}\"");
+        let mut scene = scene(body, &[&set, "water.block=[]"]);
+        let least = |states: &[BodyState]| states[0].centre.y - 0.1;
+        for on in [gpu(&context), Opened::Cpu] {
+            let states = run(&on, &scene, 24);
+            let time = 5.0 / 24.0;
+            // The start counts as the end of a substep: the first one, a frame at most, adds g Δt / 2.
+            let (fallen, free) = (0.5 - least(&states[4]), 0.5 * 9.81 * time * time);
+            let most = free + 0.5 * 9.81 / 24.0 * time;
+            assert!((free..most + 1e-9).contains(&fallen), "{method}: {fallen}");
+            let last = &states[23];
+            assert!(least(last).abs() < 1e-3, "{method}: {last:?}");
+            assert!(last[0].velocity.length() < 1e-3, "{method}: {last:?}");
+        }
+        // Negative control: without gravity it stays.
+        scene.water.gravity = DVec3::ZERO;
+        assert_eq!(least(&run(&Opened::Cpu, &scene, 2)[1]), 0.5);
+    }
+}
+
 /// A frame has all that the next one needs: from frame 2 on a new solver computes the same bits.
 #[test]
 fn bodies_go_on_from_any_frame() {
