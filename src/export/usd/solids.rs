@@ -29,16 +29,12 @@ pub struct Solid {
 /// Returns valid names for prims of solids with these names, each once.
 pub fn solid_names<'a>(names: impl Iterator<Item = &'a str>) -> Vec<String> {
     let mut taken: Vec<String> = Vec::new();
-    let single = |wanted: &str| {
-        let wanted = name(wanted);
-        let count = taken.iter().filter(|other| **other == wanted).count();
-        taken.push(wanted.clone());
-        match count {
-            0 => wanted,
-            more => format!("{wanted}_{}", more + 1),
-        }
-    };
-    names.map(single).collect()
+    for wanted in names.map(name) {
+        let numbered = (2u32..).map(|k| format!("{wanted}_{k}"));
+        let mut free = std::iter::once(wanted.clone()).chain(numbered);
+        taken.extend(free.find(|name| !taken.contains(name)));
+    }
+    taken
 }
 
 /// Writes into the manifest of the clips which solids have wetness.

@@ -214,3 +214,11 @@ fn a_frame_has_the_wetness_of_the_solids_of_its_root() {
         );
     }
 }
+
+/// Names of prims differ, also from one that a scene gives and that a number would make.
+#[test]
+fn names_of_solids_differ() {
+    let wanted = ["crate", "crate_2", "crate", "crate"];
+    let names = solid_names(wanted.into_iter());
+    assert_eq!(names, ["crate", "crate_2", "crate_3", "crate_4"]);
+}
