@@ -67,6 +67,13 @@ pub fn run_up(particles: &Particles, spacing: f64, quantile: f64) -> Option<f64>
     front(&body, spacing, 1, 1.0, quantile)
 }
 
+/// Returns the quantile of [`run_up`] with which half of the width counts of a flume of `width`
+/// metres: half of the particles that fit side by side may be higher. The highest particle alone is
+/// up to a spacing higher than the water, by chance.
+pub fn half_width(particles: &Particles, spacing: f64, width: f64) -> f64 {
+    (1.0 - 0.5 * width / spacing / particles.len() as f64).max(0.0)
+}
+
 /// Positions of the largest set connected by links shorter than `reach`; of equal sets, the one
 /// with the first particle.
 fn body(places: &[[f32; 3]], reach: f64) -> Vec<[f32; 3]> {
@@ -197,6 +204,24 @@ mod tests {
         assert!((front(&particles, 0.1, 0, 1.0, 1.0).unwrap() - 9.05).abs() < 1e-6);
         let found = front(&particles, 0.1, 0, 1.0, 0.995).unwrap();
         assert!((0.995..1.0).contains(&found), "{found}");
+    }
+
+    /// On a block 12 particles wide, six of another layer count in full and none does where two are
+    /// there. Control: the highest particle counts in both cases.
+    #[test]
+    fn a_run_up_over_half_of_the_width_takes_no_single_particles() {
+        for (more, at_half) in [(2, 0.3 - 0.1 * 4.0 / 36.0), (6, 0.3), (12, 0.35)] {
+            let mut particles = block([3, 3, 12], DVec3::ZERO);
+            for k in 0..more {
+                particles.position.push([0.05, 0.35, 0.05 + 0.1 * k as f32]);
+                particles.velocity.push([0.0; 3]);
+                particles.id.push(particles.id.len() as u32);
+            }
+            let quantile = half_width(&particles, 0.1, 1.2);
+            let found = run_up(&particles, 0.1, quantile).unwrap();
+            assert!((found - at_half).abs() < 1e-6, "{more}: {found}");
+            assert!((run_up(&particles, 0.1, 1.0).unwrap() - 0.4).abs() < 1e-6);
+        }
     }
 
     /// A column at a wall connected to the block by a film sets the run-up; a higher drop does not,

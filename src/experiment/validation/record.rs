@@ -6,7 +6,7 @@ use swell_cache::ProbeValues;
 use swell_domain::{
     body::BodyState,
     particles::Particles,
-    probe::{elevation, front, run_up, volume as volume_of},
+    probe::{elevation, front, half_width, run_up, volume as volume_of},
 };
 use swell_files::study::validation::{Benchmark, Measure};
 use swell_scene::{Scene, probe::ProbeKind};
@@ -117,13 +117,12 @@ impl<'a> Record<'a> {
     }
 
     /// Returns how high the water reaches that is connected to the body: over half of the flume's
-    /// width, which is along z. The highest particle alone is up to a spacing higher, by chance.
+    /// width, which is along z.
     fn run_up(&self, particles: &Particles) -> Option<f64> {
         let mut probes = self.scene.probes.iter();
         probes.find(|probe| matches!(probe.kind, ProbeKind::RunUp { .. }))?;
         let (domain, spacing) = (&self.scene.domain, self.scene.particle_spacing());
-        let across = domain.size().z / spacing;
-        let quantile = (1.0 - 0.5 * across / particles.len() as f64).max(0.0);
+        let quantile = half_width(particles, spacing, domain.size().z);
         Some(run_up(particles, spacing, quantile)? - domain.min.y)
     }
 
