@@ -54,7 +54,8 @@ pub struct Fill {
 }
 
 /// Fills blocks ([`fill_blocks`]) and meshes with particles on lattices of `spacing` metres, then
-/// clears `solid`: as many particles stay as fit into the open volume, each at least 0.3 spacings from the solid.
+/// clears `solid`: as many particles stay as fit into the open volume, each at least 0.3 spacings
+/// from the solid.
 ///
 /// # Errors
 /// If a water mesh has no inside, or needs too large a grid.
@@ -149,9 +150,9 @@ pub fn block_dims(block: &Bounds, domain: &Bounds, spacing: f64) -> [u64; 3] {
 ///
 /// The number of layers along an axis is the block's size over the spacing, rounded. Between two
 /// walls of the domain the layers share the room evenly: with a gap at a wall, water would slosh
-/// from the start. The spacing along the other axes makes up for it, so that the density is that of
-/// a lattice of `spacing`. A block that reaches only the far wall begins there, and any other at its
-/// least corner.
+/// from the start. The spacing along the other axes makes up for it, so that the density is that
+/// of a lattice of `spacing`. A block that reaches only the far wall begins there, and any other at
+/// its least corner.
 pub fn fill_blocks(blocks: &[Bounds], domain: &Bounds, spacing: f64) -> Vec<DVec3> {
     let mut positions = Vec::new();
     // Extent that each earlier block really covers, after rounding.
