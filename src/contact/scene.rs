@@ -84,7 +84,8 @@ impl SceneContacts {
     }
 
     /// Moves `bodies` over the frame after `frame`, without water; `before` is the length of the
-    /// last substep, seconds, and becomes that of this frame's last. Returns the number of substeps.
+    /// last substep, seconds, and becomes that of this frame's last. Returns the number of
+    /// substeps.
     ///
     /// # Errors
     /// If that is more than the scene's `max_substeps`.
