@@ -88,10 +88,8 @@ pub fn fill_below(
     spacing: f64,
 ) -> Fill {
     let (mut water, mut air) = (Vec::new(), Vec::new());
-    // The layers below a surface never reach a ceiling.
-    let mut room = *domain;
-    room.max.y = f64::INFINITY;
-    let lattice = Lattice::of_block(block, &room, spacing);
+    // The layers below a surface do not share the room up to a ceiling.
+    let lattice = Lattice::between(block, domain, spacing, [true, false, true]);
     for (cell, mut p) in lattice.cells() {
         let [column, layer, row] = cell.map(|i| i as f64);
         let height = (surface(DVec2::new(p.x, p.z)) - block.min.y) / lattice.spacing.y;
@@ -140,6 +138,11 @@ fn at_rest(positions: &[DVec3]) -> Particles {
     }
 }
 
+/// Returns the size of the water that a block is filled with, metres (see [`fill_blocks`]).
+pub fn block_size(block: &Bounds, domain: &Bounds, spacing: f64) -> DVec3 {
+    Lattice::of_block(block, domain, spacing).bounds().size()
+}
+
 /// Returns the number of particles along each axis of a block (see [`fill_blocks`]).
 pub fn block_dims(block: &Bounds, domain: &Bounds, spacing: f64) -> [u64; 3] {
     Lattice::of_block(block, domain, spacing).dims
@@ -151,8 +154,8 @@ pub fn block_dims(block: &Bounds, domain: &Bounds, spacing: f64) -> [u64; 3] {
 /// The number of layers along an axis is the block's size over the spacing, rounded. Between two
 /// walls of the domain the layers share the room evenly: with a gap at a wall, water would slosh
 /// from the start. The spacing along the other axes makes up for it, so that the density is that
-/// of a lattice of `spacing`. A block that reaches only the far wall begins there, and any other at
-/// its least corner.
+/// of a lattice of `spacing`. A full box is rounded down. A block that reaches only the far wall
+/// begins there, and any other at its least corner.
 pub fn fill_blocks(blocks: &[Bounds], domain: &Bounds, spacing: f64) -> Vec<DVec3> {
     let mut positions = Vec::new();
     // Extent that each earlier block really covers, after rounding.
@@ -215,6 +218,7 @@ pub fn fill_mesh(
     Ok(())
 }
 
+#[derive(Clone, Debug)]
 struct Lattice {
     origin: DVec3,
     dims: [u64; 3],
@@ -225,28 +229,41 @@ struct Lattice {
 /// decimal numbers.
 const WHOLE: f64 = 1e-9;
 
+/// Least and most distance of layers that share the room between walls, in spacings. Beyond, a
+/// domain is too thin for it.
+const SHARED: [f64; 2] = [0.8, 1.25];
+
+/// Part of a layer that may be missing between walls.
+const NARROWER: f64 = 0.1;
+
 impl Lattice {
     /// Returns the lattice of a block (see [`fill_blocks`]).
     fn of_block(block: &Bounds, domain: &Bounds, spacing: f64) -> Self {
+        Self::between(block, domain, spacing, [true; 3])
+    }
+
+    /// Does the same; along axes that do not `share`, the block begins at its least corner.
+    fn between(block: &Bounds, domain: &Bounds, spacing: f64, share: [bool; 3]) -> Self {
         let touches = |gap: f64| gap < 0.5 * spacing;
-        let at_near = [0, 1, 2].map(|axis| touches(block.min[axis] - domain.min[axis]));
-        let at_far = [0, 1, 2].map(|axis| touches(domain.max[axis] - block.max[axis]));
-        let is_held = |axis: &usize| at_near[*axis] && at_far[*axis];
+        let room = domain.max - domain.min;
+        let number = room / spacing;
+        let at_far =
+            [0, 1, 2].map(|axis| share[axis] && touches(domain.max[axis] - block.max[axis]));
+        let is_held = |axis: &usize| {
+            let between = number[*axis] / number[*axis].round().max(1.0);
+            let is_wide = (SHARED[0]..=SHARED[1]).contains(&between);
+            is_wide && at_far[*axis] && touches(block.min[*axis] - domain.min[*axis])
+        };
         let free = (0..3).filter(|axis| !is_held(axis)).count();
-        let mut step = DVec3::splat(spacing);
-        let mut layers = [0.0; 3];
+        let (mut layers, mut step) = ([0.0; 3], DVec3::splat(spacing));
         for axis in (0..3).filter(is_held) {
-            let room = domain.max[axis] - domain.min[axis];
-            let number = room / spacing;
             // A full box has no surface that could rise.
-            let rounded = if free > 0 {
-                number.round()
-            } else {
-                (number + WHOLE).floor()
+            layers[axis] = match free > 0 {
+                true => number[axis].round(),
+                false => (number[axis] + NARROWER).floor(),
             };
-            layers[axis] = rounded;
-            if rounded > 0.0 && (number / rounded - 1.0).abs() > WHOLE {
-                step[axis] = room / rounded;
+            if layers[axis] > 0.0 && (number[axis] / layers[axis] - 1.0).abs() > WHOLE {
+                step[axis] = room[axis] / layers[axis];
             }
         }
         let wider = (step / spacing).element_product();
@@ -260,9 +277,12 @@ impl Lattice {
                 step[axis] = spacing * wider.powf(-1.0 / free as f64);
             }
             let size = block.max[axis] - block.min[axis];
-            // No layer is closer than half a spacing, less a tenth, to the far wall.
-            let room = domain.max[axis] - block.min[axis];
-            let most = (room / step[axis] + 0.1).floor();
+            // From the wall where the layers begin, or from the least corner to the far wall.
+            let room = match at_far[axis] {
+                true => room[axis],
+                false => domain.max[axis] - block.min[axis],
+            };
+            let most = (room / step[axis] + NARROWER).floor();
             layers[axis] = (size / step[axis] + 0.5 - 1e-6).floor().min(most).max(0.0);
             let from_far = domain.max[axis] - layers[axis] * step[axis];
             if at_far[axis] && (from_far - origin[axis]).abs() > WHOLE * spacing {

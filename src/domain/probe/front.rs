@@ -67,11 +67,22 @@ pub fn run_up(particles: &Particles, spacing: f64, quantile: f64) -> Option<f64>
     front(&body, spacing, 1, 1.0, quantile)
 }
 
-/// Returns the quantile of [`run_up`] with which half of the width counts of a flume of `width`
-/// metres: half of the particles that fit side by side may be higher. The highest particle alone is
-/// up to a spacing higher than the water, by chance.
-pub fn half_width(particles: &Particles, spacing: f64, width: f64) -> f64 {
-    (1.0 - 0.5 * width / spacing / particles.len() as f64).max(0.0)
+/// Returns the height that the highest water connected to the main body reaches over half of a
+/// flume's width, metres above the world's y = 0: the median over rows of particles side by side
+/// from `sides[0]` to `sides[1]` along z. `None` without water. The highest particle alone, as in
+/// [`run_up`] with a quantile of 1, is up to a spacing higher than the water, by chance.
+pub fn run_up_across(particles: &Particles, spacing: f64, sides: [f64; 2]) -> Option<f64> {
+    let body = body(&particles.position, SUPPORT * spacing);
+    let rows = ((sides[1] - sides[0]) / spacing).round().max(1.0);
+    let mut tops = vec![f64::NEG_INFINITY; rows as usize];
+    for [_, y, z] in body.iter().map(|x| x.map(f64::from)) {
+        let across = (z - sides[0]) / (sides[1] - sides[0]);
+        let row = (across * rows).clamp(0.0, rows - 1.0) as usize;
+        tops[row] = tops[row].max(y + 0.5 * spacing);
+    }
+    tops.sort_by(f64::total_cmp);
+    let found = 0.5 * (tops[(tops.len() - 1) / 2] + tops[tops.len() / 2]);
+    found.is_finite().then_some(found)
 }
 
 /// Positions of the largest set connected by links shorter than `reach`; of equal sets, the one
@@ -206,22 +217,21 @@ mod tests {
         assert!((0.995..1.0).contains(&found), "{found}");
     }
 
-    /// On a block 12 particles wide, six of another layer count in full and none does where two are
-    /// there. Control: the highest particle counts in both cases.
+    /// On a block 12 particles wide, a further particle in each of 5 rows does not count, in 6 it
+    /// counts by half, and in 7 in full. Control: the highest particle counts in all cases.
     #[test]
-    fn a_run_up_over_half_of_the_width_takes_no_single_particles() {
-        for (more, at_half) in [(2, 0.3 - 0.1 * 4.0 / 36.0), (6, 0.3), (12, 0.35)] {
+    fn a_run_up_across_takes_no_single_particles() {
+        for (more, found) in [(0, 0.3), (5, 0.3), (6, 0.35), (7, 0.4), (12, 0.4)] {
             let mut particles = block([3, 3, 12], DVec3::ZERO);
             for k in 0..more {
                 particles.position.push([0.05, 0.35, 0.05 + 0.1 * k as f32]);
-                particles.velocity.push([0.0; 3]);
-                particles.id.push(particles.id.len() as u32);
             }
-            let quantile = half_width(&particles, 0.1, 1.2);
-            let found = run_up(&particles, 0.1, quantile).unwrap();
-            assert!((found - at_half).abs() < 1e-6, "{more}: {found}");
-            assert!((run_up(&particles, 0.1, 1.0).unwrap() - 0.4).abs() < 1e-6);
+            let across = run_up_across(&particles, 0.1, [0.0, 1.2]).unwrap();
+            assert!((across - found).abs() < 1e-6, "{more}: {across}");
+            let highest = run_up(&particles, 0.1, 1.0).unwrap();
+            assert!(more == 0 || (highest - 0.4).abs() < 1e-6, "{highest}");
         }
+        assert_eq!(run_up_across(&Particles::default(), 0.1, [0.0, 1.2]), None);
     }
 
     /// A column at a wall connected to the block by a film sets the run-up; a higher drop does not,

@@ -19,7 +19,7 @@ pub use elevation::elevation;
 pub use fitted::fitted;
 pub use flux::flux;
 pub use force::{Patch, load, patches};
-pub use front::{front, half_width, run_up};
+pub use front::{front, run_up, run_up_across};
 pub use rate::Rate;
 pub use volume::{enclosed_volume, volume};
 

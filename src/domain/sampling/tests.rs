@@ -89,10 +89,28 @@ fn layers_between_walls_share_the_room() {
     let dam = cuboid([-0.1, 0.0, 0.2], [0.4, 0.5, 0.7]);
     assert_eq!(lattice(&dam).spacing, DVec3::splat(spacing));
     assert_eq!(lattice(&dam).origin, dam.min);
-    // A block at the far walls only begins there.
-    let far = cuboid([0.11, 0.0, 0.41], [0.9, 0.5, 0.9]);
+    // A block at the far walls only begins there, and is rounded up where that is nearer.
+    let far = cuboid([0.73, 0.0, 0.41], [0.9, 0.5, 0.9]);
+    assert_eq!(lattice(&far).dims, [6, 17, 16]);
     let [_, most] = span(&fill_blocks(&[far], &domain, spacing), 2);
     assert!((most - (0.9 - 0.5 * spacing)).abs() < 1e-12, "{most}");
+    // A full box keeps the layers that a spacing of rounded digits has, to a tenth of one.
+    let cube = cuboid([0.0; 3], [1.0; 3]);
+    for (spacing, layers) in [(0.016666667, 60), (0.05001, 20), (0.0335, 29)] {
+        assert_eq!(block_dims(&cube, &cube, spacing), [layers; 3], "{spacing}");
+    }
+    // Layers are not spread over a domain that is much thinner or thicker than they are.
+    for (thickness, layers) in [(0.53, 0), (0.9, 1), (1.24, 1), (1.47, 1), (1.7, 2)] {
+        let thin = cuboid([0.0; 3], [1.0, 1.0, 0.1 * thickness]);
+        let block = cuboid([0.0; 3], [0.5, 0.5, 0.1 * thickness]);
+        let found = Lattice::of_block(&block, &thin, 0.1);
+        assert_eq!(found.dims[2], layers, "{thickness}");
+        let widest = found
+            .spacing
+            .max_element()
+            .max(0.1 * 0.1 / found.spacing.min_element());
+        assert!(widest < 0.1251, "{thickness}: {found:?}");
+    }
 }
 
 #[test]

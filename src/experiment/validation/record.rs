@@ -6,7 +6,7 @@ use swell_cache::ProbeValues;
 use swell_domain::{
     body::BodyState,
     particles::Particles,
-    probe::{elevation, front, half_width, run_up, volume as volume_of},
+    probe::{elevation, front, run_up_across, volume as volume_of},
 };
 use swell_files::study::validation::{Benchmark, Measure};
 use swell_scene::{Scene, probe::ProbeKind};
@@ -122,8 +122,8 @@ impl<'a> Record<'a> {
         let mut probes = self.scene.probes.iter();
         probes.find(|probe| matches!(probe.kind, ProbeKind::RunUp { .. }))?;
         let (domain, spacing) = (&self.scene.domain, self.scene.particle_spacing());
-        let quantile = half_width(particles, spacing, domain.size().z);
-        Some(run_up(particles, spacing, quantile)? - domain.min.y)
+        let sides = [domain.min.z, domain.max.z];
+        Some(run_up_across(particles, spacing, sides)? - domain.min.y)
     }
 
     /// Number of frames in a tenth of a second.

@@ -9,7 +9,7 @@ mod limit;
 use std::path::{Path, PathBuf};
 
 use crate::load_scene_within;
-use swell_domain::{bounds::Bounds, sampling::block_dims, text};
+use swell_domain::{bounds::Bounds, sampling::block_size, text};
 
 use super::super::{Reach, physics_hash};
 use swell_scene::{
@@ -375,10 +375,8 @@ fn four_digits(value: f64) -> f64 {
 fn misfit(scene: &Scene, spacing: f64) -> f64 {
     let lattice = spacing * scene.particle_spacing() / scene.solver.resolution();
     let sides = |block: &Bounds| {
-        let size = block.size().to_array();
-        let dims = block_dims(block, &scene.domain, lattice);
-        let off = (0..3).map(|k| (dims[k] as f64 * lattice / size[k] - 1.0).abs());
-        off.fold(0.0, f64::max)
+        let filled = block_size(block, &scene.domain, lattice);
+        (filled / block.size() - 1.0).abs().max_element()
     };
     scene.water.blocks.iter().map(sides).fold(0.0, f64::max)
 }

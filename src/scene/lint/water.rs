@@ -68,12 +68,11 @@ impl Scene {
             if block.size().min_element() > 0.0 && part.abs() > ROUNDED {
                 lints.push(format!(
                     "water.block[{index}]: {} m³ are requested and {} m³ are made, {:.1} % {}: it \
-                     is filled with whole layers, {x} × {y} × {z} particles {} m apart",
+                     is filled with whole layers, {x} × {y} × {z} particles",
                     four_digits(asked),
                     four_digits(made),
                     100.0 * part.abs(),
-                    if part < 0.0 { "less" } else { "more" },
-                    shown(spacing)
+                    if part < 0.0 { "less" } else { "more" }
                 ));
             }
         }

@@ -24,11 +24,12 @@ fn turned_block() -> String {
     corners + "f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n"
 }
 
-/// Gravity along each axis, both ways, off all of them, and none.
-const GRAVITIES: [[f64; 3]; 6] = [
+/// Gravity closest to each axis, both ways, along some, and none.
+const GRAVITIES: [[f64; 3]; 7] = [
     [-9.0, -3.0, 2.0],
     [3.0, 2.0, 9.0],
     [2.0, 9.0, -3.0],
+    [1.0, -9.0, 4.0],
     [9.0, 0.0, 0.0],
     [0.0, 0.0, -9.0],
     [0.0, 0.0, 0.0],

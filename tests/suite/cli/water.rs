@@ -49,7 +49,7 @@ fn the_volume_that_is_made_stands_beside_the_one_asked_for() {
         "max = [0.8, 0.37, 0.8]",
     );
     let lint = "water.block[0]: 0.2368 m³ are requested and 0.2560 m³ are made, 8.1 % more: it is \
-        filled with whole layers, 8 × 4 × 8 particles 0.1 m apart";
+        filled with whole layers, 8 × 4 × 8 particles";
     let told = "256 particles (0 removed inside solids), 0.2560 m³ of water of 0.2368 m³ asked for";
     for words in ["inspect water.toml", &format!("{BAKE} -o off")] {
         assert_has(&job.expect(0, words), &[&format!("warning: {lint}"), told]);
