@@ -32,7 +32,7 @@ fn a_block_of_half_layers_is_told_of_with_its_volumes() {
         scene(&[]).lints(),
         [
             "water.block[0]: 0.07400 m³ are requested and 0.05000 m³ are made, 32.4 % less: it \
-             is filled with whole layers, 20 × 1 × 20 particles 0.05 m apart"
+             is filled with whole layers, 20 × 1 × 20 particles"
         ]
     );
     let more = scene(&["solver.pbf.particle_spacing=0.1"]).lints();
