@@ -88,7 +88,7 @@ pub fn fill_below(
     spacing: f64,
 ) -> Fill {
     let (mut water, mut air) = (Vec::new(), Vec::new());
-    // The layers below a surface do not share the room up to a ceiling.
+    // The layers below a surface are not spread up to the ceiling.
     let lattice = Lattice::between(block, domain, spacing, [true, false, true]);
     for (cell, mut p) in lattice.cells() {
         let [column, layer, row] = cell.map(|i| i as f64);
@@ -152,9 +152,9 @@ pub fn block_dims(block: &Bounds, domain: &Bounds, spacing: f64) -> [u64; 3] {
 /// Where blocks overlap, the first one fills the volume.
 ///
 /// The number of layers along an axis is the block's size over the spacing, rounded. Between two
-/// walls of the domain the layers share the room evenly: with a gap at a wall, water would slosh
-/// from the start. The spacing along the other axes makes up for it, so that the density is that
-/// of a lattice of `spacing`. A full box is rounded down. A block that reaches only the far wall
+/// walls of the domain the layers are spread evenly: with a gap at a wall, water would slosh from
+/// the start. The spacing along the other axes is chosen so that the density is that of a lattice
+/// of `spacing`. A full box is rounded down. A block that reaches only the far wall
 /// begins there, and any other at its least corner.
 pub fn fill_blocks(blocks: &[Bounds], domain: &Bounds, spacing: f64) -> Vec<DVec3> {
     let mut positions = Vec::new();
@@ -229,9 +229,9 @@ struct Lattice {
 /// decimal numbers.
 const WHOLE: f64 = 1e-9;
 
-/// Least and most distance of layers that share the room between walls, in spacings. Beyond, a
-/// domain is too thin for it.
-const SHARED: [f64; 2] = [0.8, 1.25];
+/// Least and greatest distance of layers spread between walls, in spacings. A domain of one or two
+/// layers may need more than that; its layers are not spread.
+const SPREAD: [f64; 2] = [0.8, 1.25];
 
 /// Part of a layer that may be missing between walls.
 const NARROWER: f64 = 0.1;
@@ -242,16 +242,16 @@ impl Lattice {
         Self::between(block, domain, spacing, [true; 3])
     }
 
-    /// Does the same; along axes that do not `share`, the block begins at its least corner.
-    fn between(block: &Bounds, domain: &Bounds, spacing: f64, share: [bool; 3]) -> Self {
+    /// Does the same; along axes that are not to be `spread`, the block begins at its least corner.
+    fn between(block: &Bounds, domain: &Bounds, spacing: f64, spread: [bool; 3]) -> Self {
         let touches = |gap: f64| gap < 0.5 * spacing;
         let room = domain.max - domain.min;
         let number = room / spacing;
         let at_far =
-            [0, 1, 2].map(|axis| share[axis] && touches(domain.max[axis] - block.max[axis]));
+            [0, 1, 2].map(|axis| spread[axis] && touches(domain.max[axis] - block.max[axis]));
         let is_held = |axis: &usize| {
             let between = number[*axis] / number[*axis].round().max(1.0);
-            let is_wide = (SHARED[0]..=SHARED[1]).contains(&between);
+            let is_wide = (SPREAD[0]..=SPREAD[1]).contains(&between);
             is_wide && at_far[*axis] && touches(block.min[*axis] - domain.min[*axis])
         };
         let free = (0..3).filter(|axis| !is_held(axis)).count();

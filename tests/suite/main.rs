@@ -124,6 +124,7 @@ mod solve {
     mod projected;
     mod shapes;
     mod sources;
+    mod start_blocks;
     mod start_waves;
     mod tension;
     mod thin;

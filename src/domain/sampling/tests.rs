@@ -47,7 +47,7 @@ fn a_block_that_is_no_whole_number_of_spacings_keeps_its_volume() {
 /// Layers reach both walls where a block does, and the density is that of the spacing: what a gap
 /// at a wall lacks would slosh. Control: a block that ends before the wall has the spacing itself.
 #[test]
-fn layers_between_walls_share_the_room() {
+fn layers_between_walls_are_spread_evenly() {
     let (domain, spacing) = (cuboid([-0.1, 0.0, 0.2], [0.9, 0.8, 0.9]), 0.03);
     let span = |places: &[DVec3], axis: usize| {
         let all = places.iter().map(|p| p[axis]);
