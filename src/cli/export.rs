@@ -102,7 +102,7 @@ pub(super) struct ExportArgs {
     /// meshes are then the refined ones.
     #[arg(long, value_name = "NAME", requires = "usd")]
     wet: Option<String>,
-    /// Look whose camera --usd gets.
+    /// Look whose camera, materials and light --usd gets.
     #[arg(long, value_name = "LOOK")]
     look: Option<PathBuf>,
     /// Take a panorama or a camera that lies outside of the look's folder.

@@ -5,6 +5,7 @@
 //! validators ask for; names and semantics follow the schemas of UsdGeom and the documentation of
 //! value clips.
 
+mod look;
 mod solids;
 mod text;
 mod water;
@@ -14,9 +15,11 @@ use glam::{DVec3, Vec3};
 use super::FileOrigin;
 use swell_domain::{bounds::Bounds, eye::Eye};
 
+use look::{Bindings, put_lights};
 use solids::{declare_wetness, put_mesh, put_solids, put_wetness};
 use text::{Text, asset, name, quoted};
 
+pub use look::{Gloss, LookPrims, Material, Paint, Sun};
 pub use solids::{Solid, solid_names};
 pub use water::{WaterFrame, WaterLayer, WaterPrim, WaterRepresentation};
 
@@ -73,6 +76,8 @@ pub struct Root<'a> {
     pub wave_makers: Vec<WaveMaker>,
     /// Camera of a look, per frame; empty without one.
     pub camera: Vec<CameraFrame>,
+    /// Materials and light of that look; `None` without one.
+    pub look: Option<LookPrims>,
 }
 
 /// Writes the first lines of a layer, up to the body of its only prim.
@@ -166,21 +171,34 @@ pub fn root(root: &Root<'_>) -> Vec<u8> {
     text.line(")");
     text.open("");
     put_origin(&mut text, shot);
-    root.waters.iter().for_each(|it| it.put_root(&mut text));
-    put_solids(&mut text, &root.solids);
-    put_wave_makers(&mut text, &root.wave_makers);
+    let bindings = Bindings::of(root.look.as_ref(), &name_of_shot);
+    for water in &root.waters {
+        water.put_root(&mut text, &bindings);
+    }
+    put_solids(&mut text, &root.solids, &bindings);
+    put_wave_makers(&mut text, root, &bindings);
     put_camera(&mut text, &root.camera);
+    if let Some(look) = &root.look {
+        bindings.put(&mut text, look);
+        put_lights(&mut text, look);
+    }
     text.close();
     text.into_bytes()
 }
 
-fn put_wave_makers(text: &mut Text, makers: &[WaveMaker]) {
-    if makers.is_empty() {
+/// Writes the wave makers: with the look's material, invisible where the look does not draw them.
+fn put_wave_makers(text: &mut Text, root: &Root<'_>, bindings: &Bindings) {
+    if root.wave_makers.is_empty() {
         return;
     }
+    let material = root.look.as_ref().map(|look| look.wave_makers);
     text.open("def Xform \"wave_makers\"");
-    for maker in makers {
-        text.open(&format!("def Mesh {}", quoted(&maker.name)));
+    if material == Some(None) {
+        text.line("token visibility = \"invisible\"");
+    }
+    for maker in &root.wave_makers {
+        let prim = format!("def Mesh {}", quoted(&maker.name));
+        bindings.open(text, &prim, material.flatten());
         text.line("uniform bool doubleSided = 1");
         put_mesh(text, &maker.corners, &[[0, 1, 2], [0, 2, 3]]);
         text.line("double3 xformOp:translate");

@@ -13,6 +13,7 @@ use super::{RenderError, cryptomatte::Matte};
 use swell_domain::{eye::Eye, output};
 use swell_scene::look::{ColourSpaceSpec, LightSpec, Window};
 
+pub(crate) use exr_file::lat_long;
 pub use exr_file::{read_exr_attributes, write_exr};
 pub use pixels::{Pixels, read_exr, read_png, write_rgb_png};
 pub use png_file::{png_header, read_png_attributes, write_png, write_png_with_attributes};

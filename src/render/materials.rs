@@ -36,6 +36,13 @@ pub(super) struct Painted {
     used: Vec<usize>,
 }
 
+impl Painted {
+    /// For each material in use its index among the look's, and the texture mappings.
+    pub(super) fn lists(&self) -> (&[usize], &[Triangle]) {
+        (&self.used, &self.places)
+    }
+}
+
 /// Assigns materials to the triangles of a scene.
 pub(super) struct Painter<'a> {
     look: &'a Materials,

@@ -255,7 +255,7 @@ impl Opaque {
     }
 }
 
-fn points_of(vertices: &[DVec3], corners: [u32; 3]) -> Result<[DVec3; 3], RenderError> {
+pub(super) fn points_of(vertices: &[DVec3], corners: [u32; 3]) -> Result<[DVec3; 3], RenderError> {
     let mut points = [DVec3::ZERO; 3];
     for (point, index) in points.iter_mut().zip(corners) {
         *point = *vertices.get(index as usize).ok_or_else(|| {
@@ -268,7 +268,7 @@ fn points_of(vertices: &[DVec3], corners: [u32; 3]) -> Result<[DVec3; 3], Render
 }
 
 /// Whether a triangle has a normal; a degenerate one is invisible.
-fn has_normal([a, b, c]: [DVec3; 3], scene: &RenderScene) -> bool {
+pub(super) fn has_normal([a, b, c]: [DVec3; 3], scene: &RenderScene) -> bool {
     let area = (b - a).cross(c - a);
     area.length() > 1e-10 * scene.particle_spacing.powi(2)
 }

@@ -31,7 +31,7 @@ const REFERENCE_TURBIDITY: f64 = 3.0;
 /// measurements are between 0.15 and 0.2.
 const REFERENCE_DIFFUSE: f64 = 0.18;
 /// Solid angle of the sun, sr.
-const SUN_SOLID_ANGLE: f64 = 6.794e-5;
+pub(super) const SUN_SOLID_ANGLE: f64 = 6.794e-5;
 
 /// Solar illuminance constant: illuminance of sunlight outside the atmosphere, lux.
 const SOLAR_ILLUMINANCE: f64 = 133e3;

@@ -10,6 +10,7 @@ mod error;
 mod expected;
 mod files;
 mod folder;
+mod look;
 mod shot;
 mod usdc;
 
@@ -108,7 +109,7 @@ pub struct ExportRequest {
     pub voxels: f64,
     /// Edge length of a fog's voxels, metres; one particle spacing if `None`.
     pub fog_voxel: Option<f64>,
-    /// Look whose camera a USD shot gets.
+    /// Look whose camera, materials and light a USD shot gets.
     pub look: Option<Look>,
     /// Python interpreter used to write binary USD.
     pub python: String,

@@ -43,7 +43,8 @@ use swell_scene::{
 use self::folder::{Folder, Owner, Wanted};
 use self::near::Near;
 use self::pictures::{attributes, baked_note, is_current, name, pictures, whole_attributes};
-use self::set::{render_scene, solid_names};
+use self::set::solid_names;
+pub(crate) use self::set::{FrameState, render_scene};
 use self::streams::Streams;
 use self::writing::{DrawnFrame, Writing, end_writing};
 use super::{

@@ -34,6 +34,7 @@ mod cli {
     mod export;
     mod export_foam;
     mod export_fog;
+    mod export_look;
     mod farm;
     mod inspect;
     mod pipeline;

@@ -1,14 +1,16 @@
 """What OpenUSD, plyfile, meshio and numpy read of files that swell exported. See tools/lib/export-readers."""
 
+import struct
 import subprocess
 import sys
 import tempfile
+import zlib
 from pathlib import Path
 
 import meshio
 import numpy as np
 from plyfile import PlyData
-from pxr import Gf, Sdf, Usd, UsdGeom, UsdValidation
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux, UsdShade, UsdValidation
 
 from pier import PIER
 
@@ -48,8 +50,16 @@ lens = {{ f_stop = 2.8, focus_distance_m = 3.5 }}
 width = {WIDTH}
 height = {HEIGHT}
 samples = 16
+[sun]
+azimuth_degrees = 25.0
+elevation_degrees = 45.0
 [sky]
 model = "hosek_wilkie"
+turbidity = 3.0
+[[solids.material]]
+name = "pier"
+colour = [0.9, 0.8, 0.7]
+texture = {{ file = "two.png", metres = 0.5 }}
 """
 
 RIG = f"""
@@ -228,6 +238,69 @@ def check_camera(stage):
         must(np.allclose([found[0], found[1]], wanted, atol=1e-5), f"USD: {point} at {found}, not at {wanted}")
 
 
+def write_texture(path):
+    """Two texels beside each other."""
+    raw = b"\0" + bytes((250, 40, 40, 40, 40, 250))
+
+    def chunk(kind, data):
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    head = struct.pack(">IIBBBBB", 2, 1, 8, 2, 0, 0, 0)
+    path.write_bytes(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", zlib.compress(raw)) + chunk(b"IEND", b""))
+
+
+def check_look(stage, room):
+    """Materials by OpenUSD's own resolution of bindings, texture coordinates by the words of docs/look.md, and the sun."""
+    pier = stage.GetPrimAtPath("/pool_1/solids/pier")
+    material, _ = UsdShade.MaterialBindingAPI(pier).ComputeBoundMaterial()
+    must(material and material.GetPath() == "/pool_1/materials/pier", f"USD: the pier has {material}")
+    surface, _, _ = material.ComputeSurfaceSource()
+    must(surface.GetIdAttr().Get() == "UsdPreviewSurface", "USD: the pier's surface")
+    source = surface.GetInput("diffuseColor").GetConnectedSources()[0][0].source
+    texture = UsdShade.Shader(source.GetPrim())
+    file = texture.GetInput("file").Get()
+    must(Path(file.resolvedPath) == (room / file.path).resolve() and Path(file.resolvedPath).is_file(), f"USD: {file}")
+    must(np.allclose(texture.GetInput("scale").Get(), [0.9, 0.8, 0.7, 1.0]), "USD: factor of the texture")
+    water, _ = UsdShade.MaterialBindingAPI(stage.GetPrimAtPath("/pool_1/water")).ComputeBoundMaterial()
+    must(water.GetPath() == "/pool_1/materials/water", "USD: the water's material")
+    mesh = UsdGeom.Mesh(pier)
+    places = UsdGeom.PrimvarsAPI(mesh).GetPrimvar("st")
+    must(places.GetInterpolation() == "faceVarying", "USD: texture coordinates by corner")
+    corners = np.array(mesh.GetPointsAttr().Get())[np.array(mesh.GetFaceVertexIndicesAttr().Get())].reshape(-1, 3, 3)
+    normals = np.array(mesh.GetNormalsAttr().Get())
+    must(mesh.GetNormalsInterpolation() == "uniform" and len(normals) == len(corners), "USD: normals by face")
+    wanted = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    must(np.allclose(normals, wanted / np.linalg.norm(wanted, axis=1)[:, None], atol=1e-6), "USD: normals")
+    # The picture's right and upper sides as seen from in front: y is up, on level faces -z is.
+    up = np.where(np.abs(normals[:, 1:2]) > 0.5, [[0.0, 0.0, -1.0]], [[0.0, 1.0, 0.0]])
+    right = np.cross(np.where(np.abs(normals[:, 1:2]) > 0.5, [[0.0, 1.0, 0.0]], up), normals)
+    right = np.where(np.abs(normals[:, 1:2]) > 0.5, normals[:, 1:2] * [[1.0, 0.0, 0.0]], right)
+    # A picture of 2 by 1 texels is half as high as wide.
+    wanted = np.stack([np.einsum("fcx,fx->fc", corners, right) / 0.5, np.einsum("fcx,fx->fc", corners, up) / 0.25], axis=2)
+    found = np.array(places.Get()).reshape(-1, 3, 2)
+
+    def off(wanted):
+        gap = found - wanted
+        return np.abs(gap - np.round(gap)).max()
+
+    must(off(wanted) < 1e-5, f"USD: texture coordinates are off by {off(wanted)}")
+    must(off(wanted * [-1.0, 1.0]) > 0.1, "the control: mirrored texture coordinates")
+    sun = UsdLux.DistantLight(stage.GetPrimAtPath("/pool_1/lights/sun"))
+    matrix = UsdGeom.Xformable(sun.GetPrim()).ComputeLocalToWorldTransform(1)
+    shines = np.array(matrix.TransformDir(Gf.Vec3d(0, 0, -1)))
+    azimuth, elevation = np.radians(25.0), np.radians(45.0)
+    wanted = -np.array([np.cos(elevation) * np.cos(azimuth), np.sin(elevation), np.cos(elevation) * np.sin(azimuth)])
+    must(np.allclose(shines, wanted, atol=1e-9), f"USD: the sun shines along {shines}")
+    must(abs(np.linalg.det(np.array(matrix)) - 1) < 1e-9, "USD: the sun is mirrored or scaled")
+    # White level ground has radiance 1 under that sun and sky, 0.82 of it by the sun.
+    light = sun.GetIntensityAttr().Get() * np.array(sun.GetColorAttr().Get())
+    share = np.dot(light, [0.2126, 0.7152, 0.0722]) * np.sin(elevation) / np.pi
+    must(sun.GetNormalizeAttr().Get() and abs(share - 0.82) < 1e-3, f"USD: the sun gives {share}")
+    sky = UsdLux.DomeLight(stage.GetPrimAtPath("/pool_1/lights/sky"))
+    file = sky.GetTextureFileAttr().Get()
+    must(Path(file.resolvedPath).is_file() and sky.GetTextureFormatAttr().Get() == "latlong", f"USD: {file}")
+
+
 def write_rig(path):
     """A camera of OpenUSD's own, in centimetres with z up: a rig that turns, a lens that is focused, a film that is shifted."""
     stage = Usd.Stage.CreateNew(str(path))
@@ -360,6 +433,7 @@ def main(swell):
         (room / "pool.toml").write_text(SCENE)
         (room / "pier.obj").write_text(PIER)
         (room / "look.toml").write_text(LOOK)
+        write_texture(room / "two.png")
 
         def run(*words):
             subprocess.run([swell, *words], cwd=room, check=True, stdout=subprocess.DEVNULL)
@@ -389,6 +463,7 @@ def main(swell):
             check_points(stage, room)
             check_set(stage)
             check_camera(stage)
+            check_look(stage, room)
         stage = Usd.Stage.Open(str(room / "wet.usda"))
         must(messages(stage) == [], f"wet.usda: OpenUSD says {messages(stage)}")
         check_wet(stage, room)

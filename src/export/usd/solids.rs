@@ -4,7 +4,8 @@ use glam::{DQuat, DVec3};
 
 use super::{
     extent,
-    text::{self, Text, name, quoted},
+    look::{Bindings, Paint},
+    text::{self, Text, quoted, unique},
 };
 use swell_domain::{mesh::TriangleMesh, pose::Pose};
 
@@ -24,17 +25,13 @@ pub struct Solid {
     pub shapes: Vec<(u32, TriangleMesh)>,
     /// Whether the frames' layers have the wetness of its vertices.
     pub is_wet: bool,
+    /// Materials of its triangles; `None` in a shot without a look.
+    pub paint: Option<Paint>,
 }
 
 /// Returns valid names for prims of solids with these names, each once.
 pub fn solid_names<'a>(names: impl Iterator<Item = &'a str>) -> Vec<String> {
-    let mut taken: Vec<String> = Vec::new();
-    for wanted in names.map(name) {
-        let numbered = (2u32..).map(|k| format!("{wanted}_{k}"));
-        let mut free = std::iter::once(wanted.clone()).chain(numbered);
-        taken.extend(free.find(|name| !taken.contains(name)));
-    }
-    taken
+    unique(names)
 }
 
 /// Writes into the manifest of the clips which solids have wetness.
@@ -68,14 +65,15 @@ pub(super) fn put_wetness(text: &mut Text, frame: u32, wetness: &[(String, &[f32
 }
 
 /// Writes the solids of a root layer.
-pub(super) fn put_solids(text: &mut Text, solids: &[Solid]) {
+pub(super) fn put_solids(text: &mut Text, solids: &[Solid], bindings: &Bindings) {
     if solids.is_empty() {
         return;
     }
     text.open("def Xform \"solids\"");
     let names = solid_names(solids.iter().map(|solid| &*solid.name));
     for (solid, single) in solids.iter().zip(names) {
-        text.open(&format!("def Mesh {}", quoted(&single)));
+        let prim = format!("def Mesh {}", quoted(&single));
+        bindings.open_painted(text, &prim, solid.paint.as_ref());
         match solid.shapes.is_empty() {
             true => put_mesh(text, &solid.mesh.vertices, &solid.mesh.triangles),
             false => put_shapes(text, &solid.shapes),
@@ -132,8 +130,23 @@ pub(super) fn put_mesh(text: &mut Text, vertices: &[DVec3], triangles: &[[u32; 3
         triangles.as_flattened(),
         u32::to_string,
     );
+    let normals = normals(vertices, triangles);
+    text.primvar("normal3f[] normals", UNIFORM, &normals, text::floats);
     text.array("point3f[] points = ", &points, text::floats);
     text.line("uniform token subdivisionScheme = \"none\"");
+}
+
+/// Interpolation of what each face has one value of.
+const UNIFORM: &str = "uniform";
+
+/// Unit normals of triangles; zero where a triangle has none.
+fn normals(vertices: &[DVec3], triangles: &[[u32; 3]]) -> Vec<[f32; 3]> {
+    let normal = |corners: &[u32; 3]| {
+        let [a, b, c] = corners.map(|at| vertices[at as usize]);
+        let normal = (b - a).cross(c - a).normalize_or_zero();
+        normal.as_vec3().to_array()
+    };
+    triangles.iter().map(normal).collect()
 }
 
 /// Writes a mesh that changes its shape; its triangles at each frame only where they change too.
@@ -164,6 +177,13 @@ fn put_shapes(text: &mut Text, shapes: &[(u32, TriangleMesh)]) {
     of_triangles(text, "int[] faceVertexIndices", &|mesh| {
         mesh.triangles.as_flattened().to_vec()
     });
+    text.line(&format!(
+        "normal3f[] normals (interpolation = {})",
+        quoted(UNIFORM)
+    ));
+    let all =
+        (shapes.iter()).map(|(frame, mesh)| (*frame, normals(&mesh.vertices, &mesh.triangles)));
+    text.array_samples("normal3f[] normals", all, text::floats);
     let all = shapes.iter().map(|(frame, mesh)| (*frame, points(mesh)));
     text.array_samples("point3f[] points", all, text::floats);
     text.line("uniform token subdivisionScheme = \"none\"");

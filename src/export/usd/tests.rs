@@ -71,6 +71,7 @@ fn a_root_plays_the_frames_that_it_is_given() {
         way,
         shapes: Vec::new(),
         is_wet: false,
+        paint: None,
     };
     let slid = |way| Pose {
         centre: way,
@@ -89,11 +90,13 @@ fn a_root_plays_the_frames_that_it_is_given() {
                 name: "water",
                 kind: WaterRepresentation::Mesh,
                 attributes: vec!["foam".to_owned()],
+                material: None,
             },
             WaterPrim {
                 name: "whitewater",
                 kind: WaterRepresentation::Points { width: None },
                 attributes: Vec::new(),
+                material: None,
             },
         ],
         layers: vec![(7, "s.0007.usda".to_owned()), (9, "s.0009.usda".to_owned())],
@@ -105,6 +108,7 @@ fn a_root_plays_the_frames_that_it_is_given() {
         ],
         wave_makers: Vec::new(),
         camera: Vec::new(),
+        look: None,
     };
     let text = String::from_utf8(root(&root_of)).unwrap();
     for part in [
@@ -164,6 +168,7 @@ fn a_frame_has_the_wetness_of_the_solids_of_its_root() {
         way: Vec::new(),
         shapes: Vec::new(),
         is_wet,
+        paint: None,
     };
     let of = |solids| Root {
         shot: shot(),
@@ -173,6 +178,7 @@ fn a_frame_has_the_wetness_of_the_solids_of_its_root() {
         solids,
         wave_makers: Vec::new(),
         camera: Vec::new(),
+        look: None,
     };
     let text = |bytes| String::from_utf8(bytes).unwrap();
     let wet = of(vec![solid(true), solid(true)]);
@@ -221,4 +227,106 @@ fn names_of_solids_differ() {
     let wanted = ["crate", "crate_2", "crate", "crate"];
     let names = solid_names(wanted.into_iter());
     assert_eq!(names, ["crate", "crate_2", "crate_3", "crate_4"]);
+}
+
+/// Prims are bound to materials: a mesh to its only one, or subsets of its faces; what the look
+/// does not draw is invisible.
+#[test]
+fn a_root_binds_the_materials_of_its_look() {
+    let material = |name: &str, texture: Option<&str>| Material {
+        name: name.to_owned(),
+        colour: [0.5, 0.25, 1.0],
+        texture: texture.map(str::to_owned),
+        gloss: None,
+    };
+    let solid = |of: Vec<usize>, places| Solid {
+        name: "box".to_owned(),
+        mesh: TriangleMesh {
+            vertices: vec![DVec3::ZERO, DVec3::X, DVec3::Y],
+            triangles: vec![[0, 1, 2]; of.len()],
+        },
+        way: Vec::new(),
+        shapes: Vec::new(),
+        is_wet: false,
+        paint: Some(Paint { of, places }),
+    };
+    let of = |wave_makers| Root {
+        shot: shot(),
+        waters: vec![WaterPrim {
+            name: "water",
+            kind: WaterRepresentation::Mesh,
+            attributes: Vec::new(),
+            material: Some(0),
+        }],
+        layers: vec![(7, "s.0007.usda".to_owned())],
+        manifest: "s.manifest.usda".to_owned(),
+        solids: vec![
+            solid(vec![1, 1], vec![[0.25, 0.5]; 6]),
+            solid(vec![2, 1, 2], Vec::new()),
+        ],
+        wave_makers: vec![WaveMaker {
+            name: "wall_minus_x".to_owned(),
+            corners: [DVec3::ZERO, DVec3::Y, DVec3::ONE, DVec3::Z],
+        }],
+        camera: Vec::new(),
+        look: Some(LookPrims {
+            materials: vec![
+                Material {
+                    gloss: Some(Gloss {
+                        index: 1.333,
+                        slope: 0.08,
+                    }),
+                    ..material("water", None)
+                },
+                material("stone", Some("s.rock.png")),
+                material("stone", None),
+            ],
+            water: 0,
+            whitewater: None,
+            wave_makers,
+            sun: Sun {
+                towards: DVec3::new(0.6, 0.8, 0.0),
+                irradiance: [4.0, 2.0, 1.0],
+                degrees: 0.5,
+            },
+            sky: "s.sky.exr".to_owned(),
+        }),
+    };
+    let text = String::from_utf8(root(&of(None))).unwrap();
+    for (part, count) in [
+        ("rel material:binding = </a_b/materials/water>\n", 1),
+        // The first solid, and a subset of the second.
+        ("rel material:binding = </a_b/materials/stone>\n", 2),
+        ("rel material:binding = </a_b/materials/stone_2>\n", 1),
+        ("prepend apiSchemas = [\"MaterialBindingAPI\"]\n", 4),
+        ("def GeomSubset \"stone_2\" (\n", 1),
+        ("int[] indices = [0, 2]\n", 1),
+        ("int[] indices = [1]\n", 1),
+        ("subsetFamily:materialBind:familyType = \"partition\"\n", 1),
+        (
+            "(0.25, 0.5), (0.25, 0.5)] (interpolation = \"faceVarying\")\n",
+            1,
+        ),
+        ("asset inputs:file = @./s.rock.png@\n", 1),
+        ("float4 inputs:scale = (0.5, 0.25, 1, 1)\n", 1),
+        ("color3f inputs:diffuseColor = (0.5, 0.25, 1)\n", 2),
+        ("float inputs:ior = 1.333\n", 1),
+        ("float inputs:intensity = 4\n", 1),
+        ("color3f inputs:color = (1, 0.5, 0.25)\n", 1),
+        // The sun's own +z is towards it.
+        ("(0.6, 0.8, 0.0, 0), (0.0, 0.0, 0.0, 1) )\n", 1),
+        ("asset inputs:texture:file = @./s.sky.exr@\n", 1),
+        // As the test of the light in swell-render has it.
+        ("float xformOp:rotateY = 90\n", 1),
+        ("token visibility = \"invisible\"\n", 1),
+    ] {
+        assert_eq!(text.matches(part).count(), count, "{part}: {text}");
+    }
+    assert_eq!(text.matches('{').count(), text.matches('}').count());
+    // α² = 2 · 0.08², and the roughness is √α.
+    let roughness = (2f64.sqrt() * 0.08).sqrt() as f32;
+    assert!(text.contains(&format!("float inputs:roughness = {roughness}\n")));
+    let drawn = String::from_utf8(root(&of(Some(2)))).unwrap();
+    assert!(!drawn.contains("invisible"));
+    assert_eq!(drawn.matches("materials/stone_2>\n").count(), 2, "{drawn}");
 }

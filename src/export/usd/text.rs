@@ -33,6 +33,14 @@ impl Text {
         self.depth += 1;
     }
 
+    /// Writes the line of a prim with one line of metadata, and opens the prim's body.
+    pub(super) fn open_with(&mut self, line: &str, metadata: &str) {
+        self.line(&format!("{line} ("));
+        self.line(&format!("    {metadata}"));
+        self.line(")");
+        self.open("");
+    }
+
     pub(super) fn close(&mut self) {
         self.depth -= 1;
         self.line("}");
@@ -44,6 +52,21 @@ impl Text {
         self.out.push_str(before);
         self.put_array(values, each);
         self.out.push('\n');
+    }
+
+    /// Writes an array attribute with its interpolation over the prim.
+    pub(super) fn primvar<T>(
+        &mut self,
+        attribute: &str,
+        interpolation: &str,
+        values: &[T],
+        each: impl Fn(&T) -> String,
+    ) {
+        self.indent();
+        self.out.push_str(&format!("{attribute} = "));
+        self.put_array(values, each);
+        self.out
+            .push_str(&format!(" (interpolation = {})\n", quoted(interpolation)));
     }
 
     fn put_array<T>(&mut self, values: &[T], each: impl Fn(&T) -> String) {
@@ -123,6 +146,17 @@ pub(super) fn name(text: &str) -> String {
         true => format!("_{name}"),
         false => name,
     }
+}
+
+/// Valid names for prims beside each other with these names, each once.
+pub(super) fn unique<'a>(names: impl Iterator<Item = &'a str>) -> Vec<String> {
+    let mut taken: Vec<String> = Vec::new();
+    for wanted in names.map(name) {
+        let numbered = (2u32..).map(|k| format!("{wanted}_{k}"));
+        let mut free = std::iter::once(wanted.clone()).chain(numbered);
+        taken.extend(free.find(|name| !taken.contains(name)));
+    }
+    taken
 }
 
 /// Formats the name of a file beside the layer as an asset path. It must not contain line ends,

@@ -6,6 +6,7 @@ use glam::DVec3;
 
 use super::{
     extent,
+    look::Bindings,
     text::{self, Text, name, quoted},
 };
 use swell_domain::{particles::Particles, water_mesh::WaterMesh};
@@ -31,6 +32,8 @@ pub struct WaterPrim<'a> {
     pub kind: WaterRepresentation,
     /// Names of the attributes of the particles, or of the mesh's vertices.
     pub attributes: Vec<String>,
+    /// Index of its material among those of the look.
+    pub material: Option<usize>,
 }
 
 /// Content of such a prim in a frame.
@@ -64,8 +67,8 @@ impl WaterPrim<'_> {
     }
 
     /// Writes the prim, whose values at frames are in the layers.
-    pub(super) fn put_root(&self, text: &mut Text) {
-        open(text, self.name, self.kind);
+    pub(super) fn put_root(&self, text: &mut Text, bindings: &Bindings) {
+        bindings.open(text, &prim(self.name, self.kind), self.material);
         for it in sampled(self.kind, &self.attributes) {
             text.line(&format!(
                 "{} {}{}",
@@ -82,7 +85,7 @@ impl WaterPrim<'_> {
 impl WaterLayer<'_> {
     /// Writes the prim with its values at the frame `at`.
     pub(super) fn put(&self, text: &mut Text, at: u32) {
-        open(text, self.name, self.kind);
+        text.open(&prim(self.name, self.kind));
         match self.content {
             WaterFrame::Points(particles) => put_points(text, self.kind, at, particles),
             WaterFrame::Mesh(mesh, corner) => put_water_mesh(text, at, mesh, corner),
@@ -92,8 +95,9 @@ impl WaterLayer<'_> {
     }
 }
 
-fn open(text: &mut Text, prim: &str, kind: WaterRepresentation) {
-    text.open(&format!("def {} {}", schema(kind), quoted(&name(prim))));
+/// First line of a prim.
+fn prim(prim: &str, kind: WaterRepresentation) -> String {
+    format!("def {} {}", schema(kind), quoted(&name(prim)))
 }
 
 /// An attribute of the water with one value per frame.

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use exr::meta::attribute::EnvironmentMap;
 use exr::prelude::{
     AnyChannel, AnyChannels, AttributeValue, Blocks, Compression, Encoding, FlatSamples,
     ImageAttributes, IntegerBounds, Layer, LayerAttributes, LineOrder, Text, Vec2, WritableImage,
@@ -17,6 +18,13 @@ use super::super::{
 };
 use super::{Attributes, Image, write_whole};
 use swell_scene::look::{ColourSpaceSpec, LightSpec};
+
+/// Encoding of all files.
+const ENCODING: Encoding = Encoding {
+    compression: Compression::ZIP16,
+    blocks: Blocks::ScanLines,
+    line_order: LineOrder::Increasing,
+};
 
 fn text(value: &str) -> Text {
     Text::new_or_none(value).unwrap_or_else(|| Text::from("?"))
@@ -118,15 +126,10 @@ pub fn write_exr(path: &Path, image: &Image, attributes: &Attributes) -> Result<
         white_luminance: view.map(|_| white_luminance() as f32),
         ..LayerAttributes::default()
     };
-    let encoding = Encoding {
-        compression: Compression::ZIP16,
-        blocks: Blocks::ScanLines,
-        line_order: LineOrder::Increasing,
-    };
     let layer = Layer::new(
         size,
         layer_attributes,
-        encoding,
+        ENCODING,
         AnyChannels::sort(channels.into()),
     );
     let mut header = ImageAttributes::new(IntegerBounds::from_dimensions(shown));
@@ -167,6 +170,37 @@ pub fn write_exr(path: &Path, image: &Image, attributes: &Attributes) -> Result<
         message: "the header that was just written cannot be read".to_owned(),
     })?;
     write_whole(path, &bytes)
+}
+
+/// Bytes of a latitude-longitude picture of light in linear Rec. 709, half, lossless ZIP.
+///
+/// # Errors
+/// [`RenderError::Scene`] if it cannot be encoded.
+pub(crate) fn lat_long(size: [u32; 2], texels: &[[f16; 4]]) -> Result<Vec<u8>, RenderError> {
+    let channels = ["R", "G", "B"].into_iter().enumerate().map(|(k, name)| {
+        let samples = texels.iter().map(|texel| texel[k]).collect();
+        AnyChannel::new(name, FlatSamples::F16(samples))
+    });
+    let attributes = LayerAttributes {
+        environment_map: Some(EnvironmentMap::LatitudeLongitude),
+        ..LayerAttributes::default()
+    };
+    let size = Vec2(size[0] as usize, size[1] as usize);
+    let layer = Layer::new(
+        size,
+        attributes,
+        ENCODING,
+        AnyChannels::sort(channels.collect()),
+    );
+    let header = ImageAttributes::new(IntegerBounds::from_dimensions(size));
+    let picture = exr::image::Image::empty(header).with_layer(layer);
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    let encoded = picture.write().to_buffered(&mut bytes);
+    encoded.map_err(|error| RenderError::Scene(format!("the sky's picture: {error}")))?;
+    let mut bytes = bytes.into_inner();
+    let sorted = sort_attributes(&mut bytes);
+    sorted.ok_or_else(|| RenderError::Scene("the sky's picture has no header".to_owned()))?;
+    Ok(bytes)
 }
 
 /// Frame rate as a rational number, as broadcasting writes it: whole, over 1001, or in thousandths.

@@ -21,7 +21,8 @@ pub(super) fn check(request: &ExportRequest) -> Result<(), ExportError> {
     }
     if request.look.is_some() && !has_shot {
         return asked(
-            "the look gives a USD shot its camera, but no USD shot is exported".to_owned(),
+            "a look gives a USD shot its camera, materials and light, but no USD shot is exported"
+                .to_owned(),
         );
     }
     check_whitewater(request)?;

@@ -3,8 +3,10 @@
 use std::{io, path::PathBuf};
 
 use crate::{Blame, wet::WetError};
+use png::EncodingError;
 use swell_cache::{CacheError, IntoCache};
-use swell_domain::output::FileError;
+use swell_domain::{mesh_file::MeshError, output::FileError};
+use swell_render::RenderError;
 use swell_scene::{SceneError, look::LookError};
 
 use super::UsdcError;
@@ -53,6 +55,20 @@ pub enum ExportError {
     /// The look is invalid.
     #[error(transparent)]
     Look(#[from] LookError),
+    /// What the look draws cannot be made.
+    #[error(transparent)]
+    Render(#[from] RenderError),
+    /// A mesh of the cache cannot be read.
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
+    /// A texture of the look cannot be encoded.
+    #[error("{}: {source}", file.display())]
+    Texture {
+        /// The texture.
+        file: PathBuf,
+        /// The cause.
+        source: EncodingError,
+    },
     /// A file or folder that cannot be read, written or locked.
     #[error(transparent)]
     File(#[from] FileError),
@@ -142,6 +158,9 @@ impl From<&ExportError> for Blame {
             ExportError::Cache(_)
             | ExportError::Scene(_)
             | ExportError::File(_)
+            | ExportError::Render(_)
+            | ExportError::Mesh(_)
+            | ExportError::Texture { .. }
             | ExportError::Taken { .. }
             | ExportError::Usdc(UsdcError::Failed { .. })
             | ExportError::NoStream { .. }

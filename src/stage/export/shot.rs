@@ -7,7 +7,7 @@ use std::{
 
 use glam::DVec3;
 
-use super::{ExportJob, Target, UsdWater, Wanted, beside};
+use super::{ExportError, ExportJob, Target, UsdWater, Wanted, beside, look::ShotLook};
 use swell_cache::CacheError;
 use swell_domain::{
     body::BodyState,
@@ -16,7 +16,7 @@ use swell_domain::{
     particles::Particles,
 };
 use swell_export::usd::{
-    self, CameraFrame, Root, Solid, WaterPrim, WaterRepresentation, WaveMaker,
+    self, CameraFrame, Paint, Root, Solid, WaterPrim, WaterRepresentation, WaveMaker,
 };
 use swell_scene::{PlacedMesh, Scene, Wall, moving_solid::MovingSolid};
 
@@ -83,15 +83,17 @@ fn maker(scene: &Scene, wall: Wall) -> WaveMaker {
 }
 
 impl ExportJob<'_> {
-    /// The files of each shot that belong to no frame, its manifest and its root, with their
-    /// content.
-    pub(super) fn shots(&self) -> Result<Vec<(Wanted, Vec<u8>)>, CacheError> {
+    /// The files of each shot that belong to no frame, with their content: the pictures that its
+    /// look needs, its manifest and its root.
+    pub(super) fn shots(&self) -> Result<Vec<(Wanted, Vec<u8>)>, ExportError> {
         let mut found = Vec::new();
         for target in &self.request.targets {
             let Target::Usd(file, water) = target else {
                 continue;
             };
-            let root = self.root(file, *water)?;
+            let mut look = self.look(file)?;
+            let pictures = look.as_mut().map(|look| std::mem::take(&mut look.files));
+            let root = self.root(file, *water, look)?;
             let settings = format!(
                 "usd of a shot, {}, frame numbers {:+}",
                 self.water_settings(*water),
@@ -101,7 +103,11 @@ impl ExportJob<'_> {
                 (beside(file, MANIFEST), usd::manifest(&root)),
                 (file.clone(), usd::root(&root)),
             ];
-            for (file, bytes) in parts {
+            let pictures = pictures.into_iter().flatten();
+            let pictures = pictures.map(|(part, ending, bytes)| {
+                (file.with_extension(format!("{part}.{ending}")), bytes)
+            });
+            for (file, bytes) in pictures.chain(parts) {
                 let wanted = Wanted {
                     file,
                     owner: self.owner(target, settings.clone())?,
@@ -114,7 +120,12 @@ impl ExportJob<'_> {
         Ok(found)
     }
 
-    fn root(&self, file: &Path, water: UsdWater) -> Result<Root<'_>, CacheError> {
+    fn root(
+        &self,
+        file: &Path,
+        water: UsdWater,
+        look: Option<ShotLook>,
+    ) -> Result<Root<'_>, CacheError> {
         let named = |path: PathBuf| {
             path.file_name()
                 .map_or_else(String::new, |name| name.to_string_lossy().into_owned())
@@ -124,6 +135,10 @@ impl ExportJob<'_> {
             (number, named(self.layer(file, frame)))
         };
         let scene = &self.scene;
+        let (prims, paints) = match look {
+            Some(look) => (Some(look.prims), Some(look.paints)),
+            None => (None, None),
+        };
         let attributes = match water {
             UsdWater::Points => self.source().manifest().attributes.clone(),
             UsdWater::Mesh if self.foam.is_some() => [FOAM, FOAM_AGE].map(str::to_owned).to_vec(),
@@ -133,11 +148,16 @@ impl ExportJob<'_> {
             name: self.prim(),
             kind: self.kind(water),
             attributes,
+            material: prims.as_ref().and_then(|look| match self.stream {
+                Some(_) => look.whitewater,
+                None => Some(look.water),
+            }),
         }];
         waters.extend(self.whitewater.iter().map(|stream| WaterPrim {
             name: WHITEWATER,
             kind: WaterRepresentation::Points { width: None },
             attributes: stream.manifest().attributes.clone(),
+            material: prims.as_ref().and_then(|look| look.whitewater),
         }));
         let is_stream = self.stream.is_some();
         let makers = scene.wave_makers.iter().map(|it| maker(scene, it.wall));
@@ -149,7 +169,7 @@ impl ExportJob<'_> {
             solids: if is_stream {
                 Vec::new()
             } else {
-                self.solids()?
+                self.solids(paints)?
             },
             wave_makers: if is_stream {
                 Vec::new()
@@ -157,6 +177,7 @@ impl ExportJob<'_> {
                 makers.collect()
             },
             camera: self.views(),
+            look: prims,
         })
     }
 
@@ -165,7 +186,7 @@ impl ExportJob<'_> {
         Ok(self.cache.entry(frame)?.bodies.clone())
     }
 
-    fn solids(&self) -> Result<Vec<Solid>, CacheError> {
+    fn solids(&self, paints: Option<Vec<Paint>>) -> Result<Vec<Solid>, CacheError> {
         let scene = &self.scene;
         let still = scene.solids.iter().enumerate();
         let still = still.map(|(index, placed)| Solid {
@@ -174,6 +195,7 @@ impl ExportJob<'_> {
             way: Vec::new(),
             shapes: Vec::new(),
             is_wet: self.wet.is_some(),
+            paint: None,
         });
         let first = scene.solids.len();
         let bodies = self.frames.iter().map(|&frame| self.bodies_at(frame));
@@ -182,6 +204,7 @@ impl ExportJob<'_> {
         let moving = moving.map(|(index, solid)| Solid {
             name: solid.name(),
             is_wet: self.wet.is_some(),
+            paint: None,
             mesh: self.refined(index, solid.placed.mesh.clone()),
             shapes: (solid.sequence.iter())
                 .flat_map(|sequence| {
@@ -200,11 +223,15 @@ impl ExportJob<'_> {
                 })
                 .collect(),
         });
-        Ok(still.chain(moving).collect())
+        let mut solids: Vec<Solid> = still.chain(moving).collect();
+        for (solid, paint) in solids.iter_mut().zip(paints.into_iter().flatten()) {
+            solid.paint = Some(paint);
+        }
+        Ok(solids)
     }
 
     /// A solid's mesh in any pose, refined where the shot has its wetness.
-    fn refined(&self, index: usize, mesh: TriangleMesh) -> TriangleMesh {
+    pub(super) fn refined(&self, index: usize, mesh: TriangleMesh) -> TriangleMesh {
         match &self.wet {
             Some((stream, _)) => {
                 let surface = &stream.surfaces()[index];

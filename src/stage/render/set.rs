@@ -2,7 +2,6 @@
 
 use glam::DVec3;
 
-use super::RenderJobError;
 use swell_domain::{
     absorber::AbsorberStates,
     body::BodyState,
@@ -24,12 +23,12 @@ use swell_scene::{
 /// # Errors
 /// If the look names materials: a mesh file that has changed since the scene was read, or that has
 /// invalid texture coordinates.
-pub(super) fn render_scene(
+pub(crate) fn render_scene(
     scene: &Scene,
     look: &Look,
     frame: u32,
     state: &FrameState<'_>,
-) -> Result<RenderScene, RenderJobError> {
+) -> Result<RenderScene, MeshError> {
     let FrameState { now: state, around } = state;
     let bodies = BodiesAround {
         now: &state.bodies,
@@ -60,16 +59,16 @@ pub(super) fn render_scene(
 }
 
 /// What the picture of a frame's opaque geometry is made from.
-pub(super) struct FrameState<'a> {
+pub(crate) struct FrameState<'a> {
     /// State of the frame.
-    pub(super) now: &'a Particles,
+    pub(crate) now: &'a Particles,
     /// States of the frames just before and just after, where they are known.
-    pub(super) around: [Option<&'a Particles>; 2],
+    pub(crate) around: [Option<&'a Particles>; 2],
 }
 
 impl<'a> FrameState<'a> {
     /// State of a frame whose neighbours are not known.
-    pub(super) fn alone(now: &'a Particles) -> Self {
+    pub(crate) fn alone(now: &'a Particles) -> Self {
         Self {
             now,
             around: [None; 2],

@@ -248,6 +248,7 @@ fn names_hold_what_file_systems_take() {
             "take@2.0001.usd",
             "take@2.0002.usd",
             "take@2.manifest.usd",
+            "take@2.sky.exr",
             "take@2.usd",
         ]
     );
@@ -298,6 +299,7 @@ fn files_are_numbered_from_another_frame() {
             "s.1001.usda",
             "s.1003.usda",
             "s.manifest.usda",
+            "s.sky.exr",
             "s.usda"
         ]
     );
