@@ -7,16 +7,18 @@ struct Force {
     // 1 / depth at which it is at its full strength; 0 for a sharp edge.
     fade_rate: f32,
     high: vec3f,
-    // 0: the same everywhere, 1: around an axis, 2: towards a point.
+    // 0: the same everywhere, 1: around an axis, 2: towards a point, 3: motion of the domain.
     kind: u32,
-    // The acceleration, m/s², or a point of the axis, or the point.
+    // The acceleration, m/s², or a point of the axis, or the point, or the pivot.
     at: vec3f,
-    // Acceleration at the core radius, m/s², times the fraction of the step in which it acts.
+    // Acceleration at the core radius, m/s², times the fraction of the step in which it acts; of
+    // the domain's motion the square of the angular velocity, 1/s².
     strength: f32,
     // Unit vector along the axis.
     axis: vec3f,
+    // Core radius; of the domain's motion the angular acceleration, 1/s².
     core: f32,
-    // First node of the mesh's distances.
+    // First node of the mesh's distances; of the domain's motion the acceleration at the pivot.
     origin: vec3f,
     // Distance between nodes; 0 without a mesh.
     spacing: f32,
@@ -84,6 +86,13 @@ fn over_distance(k: u32, r: f32) -> f32 {
     return forces[k].strength * fallen / outer;
 }
 
+// Acceleration by the motion of the domain, but for Coriolis's, from the way to the pivot.
+fn inertia(k: u32, way: vec3f) -> vec3f {
+    let outward = forces[k].axis * dot(forces[k].axis, way) - way;
+    return forces[k].origin + forces[k].strength * outward
+        + forces[k].core * cross(forces[k].axis, way);
+}
+
 fn force_of(k: u32, x: vec3f) -> vec3f {
     let depth = depth_in_room(k, x);
     let faded = select(1.0, min(depth * forces[k].fade_rate, 1.0), forces[k].fade_rate > 0.0);
@@ -95,6 +104,9 @@ fn force_of(k: u32, x: vec3f) -> vec3f {
         over_distance(k, length(around)) * around,
         forces[k].kind == 1u,
     );
+    if forces[k].kind == 3u {
+        return inertia(k, way);
+    }
     return part * select(by_distance, forces[k].strength * forces[k].at, forces[k].kind == 0u);
 }
 

@@ -1,5 +1,7 @@
 //! Tolerances of the scene's forces, which the passes of both solvers share.
 
+use std::borrow::Cow;
+
 use glam::DVec3;
 
 use swell_compare::{rounding::U, tolerance::bounds};
@@ -40,14 +42,14 @@ pub(super) struct Bounded<'a> {
 impl<'a> Bounded<'a> {
     pub(super) fn of(scene: &Scene, field: ForceField<'a>) -> Self {
         let corner = scene.domain.min;
-        let term = |(force, share): (&'a Force, f64)| {
-            let strength = share * force.kind.most();
+        let term = |(force, kind, share): &(&'a Force, Cow<'_, ForceKind>, f64)| {
+            let strength = share * kind.most();
             let fades = force.room.is_some() && force.fade > 0.0;
             let at_edge = if fades { strength / force.fade } else { 0.0 };
             Term {
                 force,
                 strength,
-                law: law(&force.kind, corner).map_or([0.0; 2], |[slope, at]| [share * slope, at]),
+                law: law(kind, corner).map_or([0.0; 2], |[slope, at]| [share * slope, at]),
                 edge: [at_edge, reach(force, corner)],
             }
         };
@@ -100,6 +102,10 @@ fn law(kind: &ForceKind, corner: DVec3) -> Option<[f64; 2]> {
         ForceKind::Vortex { at, law, .. } | ForceKind::Attract { at, law } => {
             let slope = law.strength.abs() * f64::from(1 + law.falloff) / law.core;
             Some([slope, (*at - corner).abs().max_element()])
+        }
+        ForceKind::Frame(_, inertia) => {
+            let at = (inertia.pivot - corner).abs().max_element();
+            Some([inertia.slope(), at])
         }
     }
 }

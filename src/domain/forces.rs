@@ -1,10 +1,13 @@
 //! Force fields: accelerations that a scene prescribes in a room, for a time.
 
-use std::sync::Arc;
+use std::{borrow::Cow, sync::Arc};
 
 use glam::DVec3;
 
-use super::sources::{Shape, Window};
+use super::{
+    frame::{FrameMotion, Inertia},
+    sources::{Shape, Window},
+};
 
 /// Largest exponent of [`Law::falloff`].
 pub const MAX_FALLOFF: u32 = 2;
@@ -31,7 +34,7 @@ impl Law {
 }
 
 /// Kind of a force field.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum ForceKind {
     /// The same acceleration everywhere, m/s².
     Acceleration(DVec3),
@@ -51,10 +54,14 @@ pub enum ForceKind {
         /// Acceleration by the distance from the point.
         law: Law,
     },
+    /// What the motion of the domain does, but for Coriolis's acceleration: the mean over a step,
+    /// from the motion.
+    Frame(Arc<FrameMotion>, Inertia),
 }
 
 impl ForceKind {
-    /// Names in scenes, in the order of the kinds' numbers in shaders.
+    /// Names in scenes, in the order of the kinds' numbers in shaders; the motion of the domain has
+    /// keys of its own.
     pub const NAMES: [&str; 3] = ["acceleration", "vortex", "attract"];
 
     /// Returns the kind's number in shaders.
@@ -63,29 +70,50 @@ impl ForceKind {
             Self::Acceleration(_) => 0,
             Self::Vortex { .. } => 1,
             Self::Attract { .. } => 2,
+            Self::Frame(..) => 3,
         }
     }
 
     /// Returns the acceleration at `p`, m/s².
     pub fn at(&self, p: DVec3) -> DVec3 {
-        match *self {
-            Self::Acceleration(acceleration) => acceleration,
-            Self::Vortex { at, axis, law } => {
+        match self {
+            Self::Acceleration(acceleration) => *acceleration,
+            &Self::Vortex { at, axis, law } => {
                 let around = axis.cross(p - at);
                 law.over_distance(around.length()) * around
             }
-            Self::Attract { at, law } => {
+            &Self::Attract { at, law } => {
                 let way = at - p;
                 law.over_distance(way.length()) * way
             }
+            Self::Frame(_, inertia) => inertia.at(p),
         }
     }
 
-    /// Returns the largest acceleration anywhere, m/s².
+    /// Returns the kind with the mean over a (start, length), seconds, of what changes in time.
+    pub fn over(&self, span: (f64, f64)) -> Cow<'_, Self> {
+        match self {
+            Self::Frame(motion, _) => {
+                Cow::Owned(Self::Frame(Arc::clone(motion), motion.inertia(span)))
+            }
+            _ => Cow::Borrowed(self),
+        }
+    }
+
+    /// Returns the largest acceleration anywhere in the domain, in this step for its motion, m/s².
     pub fn most(&self) -> f64 {
         match self {
             Self::Acceleration(acceleration) => acceleration.length(),
             Self::Vortex { law, .. } | Self::Attract { law, .. } => law.strength.abs(),
+            Self::Frame(motion, now) => now.at_pivot.length() + now.slope() * motion.reach,
+        }
+    }
+
+    /// Returns the largest acceleration anywhere in the domain between two times, seconds; m/s².
+    pub fn most_in(&self, start: f64, end: f64) -> f64 {
+        match self {
+            Self::Frame(motion, _) => motion.most(start, end),
+            _ => self.most(),
         }
     }
 
@@ -94,6 +122,7 @@ impl ForceKind {
         match self {
             Self::Acceleration(_) => {}
             Self::Vortex { at, .. } | Self::Attract { at, .. } => *at += way,
+            Self::Frame(motion, _) => Arc::make_mut(motion).carry(way),
         }
     }
 }
@@ -147,8 +176,9 @@ impl Force {
 /// Force fields over a step in time.
 #[derive(Clone, Debug, Default)]
 pub struct ForceField<'a> {
-    /// The forces that act during the step, each with the fraction of the step in which it does.
-    acting: Vec<(&'a Force, f64)>,
+    /// The forces that act during the step, each with its kind over the step and the fraction of
+    /// the step in which it acts.
+    acting: Vec<(&'a Force, Cow<'a, ForceKind>, f64)>,
 }
 
 impl<'a> ForceField<'a> {
@@ -160,9 +190,12 @@ impl<'a> ForceField<'a> {
     ) -> Self {
         let all = forces.into_iter();
         let all = all.filter(|force| force.on.contains(&medium));
-        let shares = all.map(|force| (force, force.window.share(start, length)));
+        let shares = all.map(|force| {
+            let kind = force.kind.over((start, length));
+            (force, kind, force.window.share(start, length))
+        });
         Self {
-            acting: shares.filter(|(_, share)| *share > 0.0).collect(),
+            acting: shares.filter(|(.., share)| *share > 0.0).collect(),
         }
     }
 
@@ -170,19 +203,20 @@ impl<'a> ForceField<'a> {
     pub fn at(&self, p: DVec3) -> DVec3 {
         let terms = self.acting.iter();
         terms
-            .map(|(force, share)| share * force.part(p) * force.kind.at(p))
+            .map(|(force, kind, share)| share * force.part(p) * kind.at(p))
             .sum()
     }
 
-    /// Iterates over the forces, each with the fraction of the step in which it acts.
-    pub fn acting(&self) -> impl Iterator<Item = (&'a Force, f64)> {
-        self.acting.iter().copied()
+    /// Iterates over the forces, each with its kind over the step and the fraction of the step in
+    /// which it acts.
+    pub fn acting(&self) -> impl Iterator<Item = &(&'a Force, Cow<'a, ForceKind>, f64)> {
+        self.acting.iter()
     }
 
     /// Bounds the acceleration anywhere, m/s².
     pub fn most(&self) -> f64 {
         let terms = self.acting.iter();
-        terms.map(|(force, share)| share * force.kind.most()).sum()
+        terms.map(|(_, kind, share)| share * kind.most()).sum()
     }
 }
 

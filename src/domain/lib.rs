@@ -27,6 +27,7 @@ mod filled;
 pub mod flip;
 pub mod fog;
 pub mod forces;
+pub mod frame;
 pub mod frame_range;
 pub mod gauge;
 pub mod holes;

@@ -11,7 +11,7 @@ use super::{
     document::Document,
     effects,
     fit::{comes_into, fits},
-    forces, grids, keep,
+    forces, frame, grids, keep,
     keys::{BodySpec, BoxSpec, DomainSpec, MeshSpec, SceneSpec, SolidSpec, SwarmSpec, WaterSpec},
     mesh_sequence, moving_solid, no_slip, periodic,
     placed_mesh::placed_mesh,
@@ -107,6 +107,7 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
     let emitters = sources::emitters(doc, &spec.emitter, &around)?;
     let drains = sources::drains(doc, &spec.drain, &around)?;
     let forces = forces::forces(doc, &spec.force, &around)?;
+    let moved = frame::build(doc, base_dir, &spec.domain, (&domain, water.gravity))?;
     mesh_sequence::check_emitters(doc, &moving_solids, &emitters, lattice.spacing)?;
     let entering = swell_scene::sources::most_entering(&emitters, lattice.spacing, &shot);
     check_particle_count(doc, &water, entering, &domain, &lattice)?;
@@ -142,7 +143,10 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
     .chain((moving_solids.iter()).map(|solid| solid.peak_speed(&[], 0.0, duration)))
     .chain((bodies.iter()).map(|body| body.peak_speed(&[], 0.0, 0.0)));
     let flip = solver.flip().or(unchosen.as_ref().and_then(Solver::flip));
-    let pull = water.gravity.length() + forces::pull(&forces);
+    let inertia = moved.as_ref().map_or(0.0, |frame| {
+        (frame.motion()).map_or(0.0, |motion| frame::most(motion, &shot))
+    });
+    let pull = water.gravity.length() + forces::pull(&forces) + inertia;
     let scales = budget::Scales {
         fall: (2.0 * pull * domain.size().length()).sqrt() + forces::speed(&forces, &shot),
         push: speeds.fold(0.0, f64::max),
@@ -165,6 +169,7 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
         emitters,
         drains,
         forces,
+        frame: moved,
         solver,
         unchosen,
         grids,
@@ -175,6 +180,7 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
         effects: spec.effects,
     };
     band::check(doc, &scene)?;
+    frame::check(doc, &scene)?;
     Ok(scene.into_local())
 }
 

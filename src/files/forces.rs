@@ -129,7 +129,9 @@ pub(super) fn pull(forces: &[PlacedForce]) -> f64 {
 /// Returns what a file says of a force, apart from its room; world coordinates, metres.
 pub(super) fn written(force: &Force, origin: DVec3) -> ForceSpec {
     let mut spec = ForceSpec {
-        kind: ForceKind::NAMES[force.kind.number()].to_owned(),
+        kind: (ForceKind::NAMES.get(force.kind.number()).copied())
+            .unwrap_or_default()
+            .to_owned(),
         min: None,
         max: None,
         mesh: None,
@@ -158,6 +160,8 @@ pub(super) fn written(force: &Force, origin: DVec3) -> ForceSpec {
             spec.axis = Some(axis.to_array());
         }
         ForceKind::Attract { at, law } => set(*at, law),
+        // The motion of the domain is none of the scene's forces.
+        ForceKind::Frame(..) => {}
     }
     spec
 }

@@ -25,6 +25,7 @@ mod document;
 mod effects;
 mod fit;
 mod forces;
+mod frame;
 mod gltf_nodes;
 mod grids;
 mod keep;

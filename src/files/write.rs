@@ -6,7 +6,7 @@ use toml::Table;
 
 use super::{
     axis::Axis,
-    body, forces, keep,
+    body, forces, frame, keep,
     keys::{
         AbsorptionSpec, BearerSpec, BodySpec, BoxSpec, DomainSpec, DrainSpec, EmitterSpec,
         FilesSpec, ForceSpec, GridsSpec, KeepSpec, MeshSpec, PbfSpec, ProbeSpec, ScaleSpec,
@@ -91,6 +91,7 @@ impl Writer<'_> {
             walls: None,
             no_slip: (!scene.no_slip.is_empty()).then(|| scene.no_slip.clone()),
             periodic: scene.is_periodic().then(|| Axis::of(scene.periodic)),
+            ..frame::written(scene)
         }
     }
 

@@ -6,9 +6,10 @@ use glam::DVec3;
 
 use super::{PlacedMesh, Scene, sources::Region};
 use swell_domain::{
-    forces::{Force, ForceField, Medium},
+    forces::{Force, ForceField, ForceKind, Medium},
+    frame::{FrameMotion, Inertia},
     signed_distance::SignedDistanceError,
-    sources::Shape,
+    sources::{Shape, Window},
 };
 
 /// Share of a time in which a force is taken to act. Times that end where another begins overlap
@@ -22,6 +23,36 @@ pub struct PlacedForce {
     pub region: Option<Region>,
     /// The force, whose room has the shape of `region`.
     pub force: Force,
+}
+
+/// The motion of a domain as a force on its water.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MovingFrame {
+    /// All of it but Coriolis's acceleration; its kind is [`ForceKind::Frame`].
+    force: Force,
+}
+
+impl MovingFrame {
+    /// Returns the force of a motion.
+    pub fn new(motion: FrameMotion) -> Self {
+        Self {
+            force: Force {
+                kind: ForceKind::Frame(Arc::new(motion), Inertia::default()),
+                room: None,
+                fade: 0.0,
+                window: Window::default(),
+                on: vec![Medium::Water],
+            },
+        }
+    }
+
+    /// Returns the motion.
+    pub fn motion(&self) -> Option<&FrameMotion> {
+        match &self.force.kind {
+            ForceKind::Frame(motion, _) => Some(motion),
+            _ => None,
+        }
+    }
 }
 
 impl Region {
@@ -41,12 +72,30 @@ impl Region {
 impl Scene {
     /// Returns the forces on a medium in the `length` seconds from `start`.
     pub fn force_field(&self, medium: Medium, span: (f64, f64)) -> ForceField<'_> {
-        ForceField::new(self.forces.iter().map(|it| &it.force), medium, span)
+        ForceField::new(self.all_forces(), medium, span)
+    }
+
+    /// The scene's forces, then that of the domain's motion.
+    fn all_forces(&self) -> impl Iterator<Item = &Force> {
+        let own = self.forces.iter().map(|it| &it.force);
+        own.chain(self.frame.iter().map(|it| &it.force))
+    }
+
+    /// Whether Coriolis's acceleration turns the velocities of the particles.
+    pub fn turns_velocities(&self) -> bool {
+        self.half_turn((0.0, 0.0)).is_some()
+    }
+
+    /// Returns the rotation of the particles' velocities by Coriolis's acceleration over half of a
+    /// (start, length), seconds: unit axis and angle, radians; `None` where there is none.
+    pub fn half_turn(&self, span: (f64, f64)) -> Option<(DVec3, f64)> {
+        let (axis, angle) = self.frame.as_ref()?.motion()?.velocity_turn(span)?;
+        Some((axis, 0.5 * angle))
     }
 
     /// Returns the forces on a medium, whenever they act.
     pub fn forces_on(&self, medium: Medium) -> impl Iterator<Item = &Force> {
-        let all = self.forces.iter().map(|it| &it.force);
+        let all = self.all_forces();
         all.filter(move |force| force.on.contains(&medium))
     }
 
@@ -60,12 +109,15 @@ impl Scene {
     pub fn most_acceleration(&self, start: f64, end: f64) -> f64 {
         let acting = self.forces_on(Medium::Water);
         let acting = acting.filter(|force| force.window.share(start, end - start) > LEAST_SHARE);
-        let forces: f64 = acting.map(|force| force.kind.most()).sum();
+        let forces: f64 = acting.map(|force| force.kind.most_in(start, end)).sum();
         self.water.gravity.length() + forces
     }
 
     /// Moves forces by `way`, metres.
     pub(super) fn carry_forces(&mut self, way: DVec3, carry: &dyn Fn(&mut PlacedMesh, DVec3)) {
+        if let Some(frame) = &mut self.frame {
+            frame.force.kind.carry(way);
+        }
         for PlacedForce { region, force } in &mut self.forces {
             force.kind.carry(way);
             force.room =

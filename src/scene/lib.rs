@@ -87,6 +87,8 @@ pub struct Scene {
     pub drains: Vec<Drain<sources::Region>>,
     /// Force fields, whose accelerations add to gravity's.
     pub forces: Vec<forces::PlacedForce>,
+    /// What the motion of the domain does; `None` for one at rest.
+    pub frame: Option<forces::MovingFrame>,
     /// The chosen method with its settings.
     pub solver: Solver,
     /// Settings of the method that is not chosen, if the file has them: they are written with the

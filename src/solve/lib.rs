@@ -20,8 +20,8 @@ use swell_gpu::{adapter::GpuError, buffer::Mirror, reflect::Layout};
 use swell_scene::moving_solid::OtherBodies;
 
 use params::{
-    Counters, DeviceForce, FlipParams, Inlets, IterationControl, Params, Phase, PosedSolid,
-    PosedSolids, SolidGrid, SurveyHead,
+    Counters, DeviceForce, DeviceTurn, FlipParams, Inlets, IterationControl, Params, Phase,
+    PosedSolid, PosedSolids, SolidGrid, SurveyHead,
 };
 use pressure::{
     PocketPart, PressureBrick, PressureControl, PressureControl64, PressurePhase, PressureStats,
@@ -35,6 +35,7 @@ pub fn mirrors() -> Vec<Layout> {
         FlipParams::layout(),
         SolidGrid::layout(),
         DeviceForce::layout(),
+        DeviceTurn::layout(),
         PosedSolid::layout(),
         PosedSolids::layout(),
         Inlets::layout(),

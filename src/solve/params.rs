@@ -253,17 +253,20 @@ mirror!(
         fade_rate: f32,
         /// Greatest corner of the room.
         high: [f32; 3],
-        /// Kind: its index in [`swell_domain::forces::ForceKind::NAMES`].
+        /// Kind: [`swell_domain::forces::ForceKind::number`].
         kind: u32,
-        /// The acceleration, m/s², or a point of the axis, or the point that attracts.
+        /// The acceleration, m/s², or a point of the axis, or the point that attracts, or the
+        /// pivot of the domain's motion.
         at: [f32; 3],
-        /// Acceleration at the core radius, m/s², times the fraction of the step in which it acts.
+        /// Acceleration at the core radius, m/s², times the fraction of the step in which it acts;
+        /// of the domain's motion the square of the angular velocity, 1/s².
         strength: f32,
         /// Unit vector along the axis.
         axis: [f32; 3],
-        /// Core radius.
+        /// Core radius; of the domain's motion the angular acceleration, 1/s².
         core: f32,
-        /// First node of the distances to the room's mesh.
+        /// First node of the distances to the room's mesh; of the domain's motion the acceleration
+        /// at the pivot, m/s².
         origin: [f32; 3],
         /// Distance between nodes; 0 without a mesh.
         spacing: f32,
@@ -273,6 +276,22 @@ mirror!(
         first: u32,
         /// Exponent of the distance beyond the core.
         falloff: u32,
+        /// Unused.
+        unused: u32,
+        /// Unused.
+        padding: [u32; 2],
+    }
+);
+
+mirror!(
+    /// `VelocityTurn` of shared/velocity_turn.wgsl.
+    DeviceTurn as "VelocityTurn" {
+        /// Unit vector along the axis.
+        axis: [f32; 3],
+        /// Sine of the angle.
+        sine: f32,
+        /// 1 minus its cosine.
+        rest: f32,
         /// Unused.
         unused: u32,
         /// Unused.

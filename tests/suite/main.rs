@@ -116,6 +116,7 @@ mod solve {
     mod forces;
     mod independent;
     mod ledgers;
+    mod moving_frame;
     mod moving_solids;
     mod no_slip;
     mod pbf;

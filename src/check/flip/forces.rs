@@ -8,13 +8,19 @@ use crate::{
     table::{entries, pair},
 };
 use swell_compare::rounding::U;
-use swell_domain::bricks::CELLS;
+use swell_domain::{bricks::CELLS, frame::change_by_turn};
 use swell_reference::flip::{Faces, GridTransfer, push_drops, push_faces, work_by_cells};
 use swell_solve::{effects::forces::FORCE_WORK, flip::buffers};
 
 use super::{FlipState, elements};
 
 entries! {
+    "effects/turn_sorted" {
+        TURNED = "velocity turned by Coriolis's acceleration", "m/s": [v: "|v|"]
+            16.0 * U * v, "two cross products and their factors, which are rounded";
+        TURNED_DROPS = "velocity with which drops move", "m/s": [v: "|v|"]
+            16.0 * U * v, "the same";
+    }
     "effects/push_faces" {
         FACES = "velocity at faces", "m/s": [push: "Δt times " PUSH, change: "|a| Δt", v: "|v|"]
             push + 4.0 * U * change + 2.0 * U * v, "a product, and a sum", tie EDGE;
@@ -35,6 +41,11 @@ entries! {
 }
 
 pub(super) const COMPARISONS: &[Comparison<FlipState>] = &[
+    comparison(
+        "effects/turn_sorted",
+        || names![buffers::SORTED_VELOCITY, buffers::CARRIED],
+        turned,
+    ),
     comparison("effects/push_faces", elements::faces_kept, faces),
     comparison(
         "effects/push_drops",
@@ -43,6 +54,38 @@ pub(super) const COMPARISONS: &[Comparison<FlipState>] = &[
     ),
     comparison("effects/work_by_cells", || names![FORCE_WORK], work),
 ];
+
+/// Compares the particles' velocities before the transfer to the grid, and after that from it.
+fn turned(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
+    let (n, step) = (state.n, state.step());
+    let Some(turn) = state.model.half_turn(&step) else {
+        return Ok(());
+    };
+    let before = io.before.vectors(buffers::SORTED_VELOCITY, n)?;
+    let found = io.after.vectors(buffers::SORTED_VELOCITY, n)?;
+    io.table.each(&TURNED, 0..n, |i| {
+        let exact = before[i] + change_by_turn(turn, before[i]);
+        Some(pair(i, found[i], exact, [before[i].length()]))
+    });
+    let Some(given) = &mut state.given else {
+        state.carry_velocities(found);
+        return Ok(());
+    };
+    let kept = io.before.vectors(buffers::CARRIED, n)?;
+    let carried = io.after.vectors(buffers::CARRIED, n)?;
+    // What is no droplet moves as before.
+    io.table.each(&TURNED_DROPS, 0..n, |i| {
+        let turned = before[i] + change_by_turn(turn, before[i]);
+        let (exact, v) = match given.is_drop[i] {
+            true => (turned, before[i].length()),
+            false => (kept[i], 0.0),
+        };
+        Some(pair(i, carried[i], exact, [v]))
+    });
+    given.velocity = found;
+    given.carried = carried;
+    Ok(())
+}
 
 fn faces(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let (elements, step) = (state.elements(), state.step());

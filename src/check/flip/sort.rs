@@ -158,6 +158,7 @@ pub(super) fn reorder(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
         }
     }
     let cell_of = io.before.get(buffers::CELL_OF, n)?;
+    state.given = None;
     state.sorted = Some(Sorted {
         cell: (0..n).map(|i| cell_of[at(i)]).collect(),
         cloud: after,

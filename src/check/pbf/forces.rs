@@ -8,6 +8,7 @@ use crate::{
     table::{entries, pair},
 };
 use swell_compare::rounding::U;
+use swell_domain::frame::change_by_turn;
 use swell_reference::pbf::forces::{self, push_particles, work_on_particle};
 use swell_solve::{
     effects::forces::{FORCE_IMPULSE, FORCE_WORK},
@@ -17,6 +18,10 @@ use swell_solve::{
 use super::PbfState;
 
 entries! {
+    "effects/turn_particles" {
+        TURNED = "velocity turned by Coriolis's acceleration", "m/s": [v: "|v|"]
+            16.0 * U * v, "two cross products and their factors, which are rounded";
+    }
     "effects/push_particles" {
         VELOCITY = "velocity", "m/s": [push: "Δt times " PUSH, change: "|a| Δt", v: "|v|"]
             push + 4.0 * U * change + 2.0 * U * v, "a product, and a sum", tie EDGE;
@@ -35,12 +40,31 @@ entries! {
 
 pub(crate) const COMPARISONS: &[Comparison<PbfState>] = &[
     comparison(
+        "effects/turn_particles",
+        || names![buffers::VELOCITY],
+        turned,
+    ),
+    comparison(
         "effects/push_particles",
         || names![buffers::VELOCITY],
         particles,
     ),
     comparison("effects/work_by_particles", || names![FORCE_WORK], work),
 ];
+
+fn turned(state: &mut PbfState, io: &mut Io<'_>) -> PassResult {
+    let n = state.particles();
+    let Some(turn) = forces::half_turn(&state.scene, &state.substep) else {
+        return Ok(());
+    };
+    let before = io.before.vectors(buffers::VELOCITY, n)?;
+    let found = io.after.vectors(buffers::VELOCITY, n)?;
+    io.table.each(&TURNED, 0..n, |i| {
+        let exact = before[i] + change_by_turn(turn, before[i]);
+        Some(pair(i, found[i], exact, [before[i].length()]))
+    });
+    Ok(())
+}
 
 fn particles(state: &mut PbfState, io: &mut Io<'_>) -> PassResult {
     let n = state.particles();

@@ -109,6 +109,34 @@ keys! { struct DomainSpec {
         .without(&["walls"])
         .also(", each once; of the solver flip, or where an effect resolves them")
         .about("the no-slip walls, where not all six are"),
+    direction: Option<[f64; 3]> = vector(3, -1e6..=1e6)
+        .absent()
+        .with("motion")
+        .also(", not all 0; their length does not count")
+        .about("where the domain moves"),
+    motion: Option<SolidMotionSpec> = inline()
+        .absent()
+        .with("direction")
+        .also(", without bodies, a band and domain.periodic")
+        .about(
+            "How far along `direction` the domain has come. Water, walls and solids are described \
+             in the domain, whose water feels the motion as a force",
+        ),
+    pivot: Option<[f64; 3]> = vector(3, COORDINATE)
+        .unit("metres")
+        .absent()
+        .with("axis")
+        .about("a point on the axis; a motion along `direction` carries it along"),
+    axis: Option<[f64; 3]> = vector(3, -1e6..=1e6)
+        .absent()
+        .with("turn")
+        .also(", not all 0; their length does not count")
+        .about("what the domain turns about, counter-clockwise as seen against it"),
+    turn: Option<TurnSpec> = inline()
+        .absent()
+        .with("pivot")
+        .also(", without bodies, a band and domain.periodic")
+        .about("How far about `axis` the domain has turned"),
     periodic: Option<Vec<Axis>> = choices(&words(&Axis::NAMED))
         .absent()
         .also(

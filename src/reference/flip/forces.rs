@@ -10,6 +10,7 @@ use crate::Timings;
 use swell_domain::{
     bricks::{Bricks, CELLS},
     forces::{ForceField, Medium},
+    frame::change_by_turn,
     parallel,
 };
 
@@ -23,6 +24,12 @@ impl Model {
     pub fn forces(&self, step: &FlipSubstep<'_>) -> ForceField<'_> {
         let span = (step.start + 0.5 * step.length - step.kick, step.kick);
         (self.scene).force_field(Medium::Water, span)
+    }
+
+    /// Returns the rotation of velocities by Coriolis's acceleration over half a substep.
+    pub fn half_turn(&self, step: &FlipSubstep<'_>) -> Option<(DVec3, f64)> {
+        let span = (step.start + 0.5 * step.length - step.kick, step.kick);
+        self.scene.half_turn(span)
     }
 
     /// Returns the velocity change by forces in a substep at a position, m/s.
@@ -138,7 +145,25 @@ pub(super) fn on_faces(
     }
 }
 
-/// Applies forces to isolated droplets, and returns the work of all forces, joules.
+/// Turns the velocities of the particles by Coriolis's acceleration over half a substep, where the
+/// domain rotates (effects/turn_sorted).
+pub(super) fn turn_sorted(
+    model: &Model,
+    step: &FlipSubstep<'_>,
+    velocity: &mut [DVec3],
+    timings: &mut Timings,
+) {
+    if let Some(turn) = model.half_turn(step) {
+        timings.time("effects/turn_sorted", || {
+            for v in velocity {
+                *v += change_by_turn(turn, *v);
+            }
+        });
+    }
+}
+
+/// Applies forces to isolated droplets, turns all velocities, and returns the work of all forces,
+/// joules.
 pub(super) fn after_transfer(
     model: &Model,
     step: &FlipSubstep<'_>,
@@ -157,5 +182,12 @@ pub(super) fn after_transfer(
     let work = timings.time("effects/work_by_cells", || {
         work_by_cells(model, step, bricks, sorted, seen, given)
     });
+    turn_sorted(model, step, &mut given.velocity, timings);
+    if model.half_turn(step).is_some() {
+        let drops = given.carried.iter_mut().zip(&given.velocity);
+        for ((carried, velocity), _) in drops.zip(&given.is_drop).filter(|(_, is_drop)| **is_drop) {
+            *carried = *velocity;
+        }
+    }
     model.scene.particle_mass() * work.into_iter().sum::<f64>()
 }

@@ -116,6 +116,7 @@ impl Flip {
             bricks: &bricks,
             kind: &space.kind,
         };
+        forces::turn_sorted(model, &step, &mut sorted.cloud.velocity, timings);
         effects::on_particles(&model.scene.effects, flying, &mut sorted, timings);
         let mut faces = timings.time("flip/gather_faces", || {
             gather_faces(model, &step, &bricks, &sorted, &space)

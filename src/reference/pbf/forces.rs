@@ -4,8 +4,10 @@
 use glam::DVec3;
 
 use super::Substep;
+use crate::Timings;
 use swell_domain::{
     forces::{ForceField, Medium},
+    frame::change_by_turn,
     parallel,
 };
 use swell_scene::PbfScene;
@@ -34,6 +36,29 @@ pub fn push_particles(
         let change = substep.time_step * field.at(scene.domain.min + position[i]);
         (change, change.dot(velocity[i]))
     })
+}
+
+/// Turns velocities by Coriolis's acceleration over half a substep, where the domain rotates and no
+/// projection does it (effects/turn_particles).
+pub(super) fn turn_particles(
+    scene: &PbfScene,
+    substep: &Substep,
+    velocity: &mut [DVec3],
+    timings: &mut Timings,
+) {
+    if let Some(turn) = half_turn(scene, substep).filter(|_| act_on_particles(scene)) {
+        timings.time("effects/turn_particles", || {
+            for v in velocity {
+                *v += change_by_turn(turn, *v);
+            }
+        });
+    }
+}
+
+/// Returns the rotation of velocities by Coriolis's acceleration over half a substep: unit axis and
+/// angle, radians; `None` in a domain that does not rotate.
+pub fn half_turn(scene: &PbfScene, substep: &Substep) -> Option<(DVec3, f64)> {
+    scene.half_turn((substep.time - substep.time_step, substep.time_step))
 }
 
 /// Returns the work of forces on a particle over its mass, m²/s², from what

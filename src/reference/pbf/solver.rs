@@ -295,6 +295,7 @@ impl Pbf {
             substep.time_step,
         );
         let (model, timings, is_drop) = (&self.model, &mut self.timings, &self.is_drop);
+        forces::turn_particles(&self.scene, substep, velocity, timings);
         let impulses = match forces::act_on_particles(&self.scene) {
             true => timings.time("effects/push_particles", || {
                 forces::push_particles(&self.scene, substep, position, velocity)
@@ -320,7 +321,7 @@ impl Pbf {
         let mut sorted = Sorted::new(model, &predicted, &self.state.id, timings);
         let iterations = iterate(model, substep, &mut sorted, timings);
         work += sorted.wall_work;
-        let (mut moved, capped) = timings.time("pbf/update_velocity", || {
+        let (mut moved, capped): (Vec<DVec3>, u64) = timings.time("pbf/update_velocity", || {
             let updated: Vec<_> = parallel::map(0..sorted.order.len(), |k| {
                 let (slot, x) = (sorted.order[k], sorted.particles()[k]);
                 let start = match is_drop.get(slot) {
@@ -340,6 +341,7 @@ impl Pbf {
         let by_forces = by_forces
             .filter_map(|(&slot, &v)| Some(forces::work_on_particle(*impulses.get(slot)?, v)));
         let by_forces: f64 = by_forces.sum();
+        forces::turn_particles(&self.scene, substep, &mut moved, timings);
         let drops = sorted.order.iter().filter_map(|&slot| is_drop.get(slot));
         let drops: Vec<bool> = drops.copied().collect();
         let inputs = Inputs {

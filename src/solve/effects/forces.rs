@@ -16,7 +16,7 @@ use swell_gpu::{
 use swell_scene::Scene;
 
 use super::Addition;
-use crate::params::DeviceForce;
+use crate::params::{DeviceForce, DeviceTurn};
 
 /// The forces on a medium, in the order of the scene.
 pub const FORCES: Buf<DeviceForce> = Buf::new("forces");
@@ -33,6 +33,23 @@ pub(crate) const OWNER: &str = "forces";
 
 /// The condition under which rooms have meshes.
 pub(crate) const MESHES: &str = "FORCE_MESHES";
+
+/// Rotation of velocities by Coriolis's acceleration over half a substep.
+pub const VELOCITY_TURN: Buf<DeviceTurn> = Buf::new("velocity_turn");
+
+/// Returns the pass that turns velocities where the domain rotates.
+fn turn(scene: &Scene, name: &'static str) -> Option<PassSpec> {
+    scene.turns_velocities().then(|| PassSpec {
+        name,
+        defines: Vec::new(),
+        constants: Vec::new(),
+    })
+}
+
+/// Returns the buffer of that pass.
+fn turn_buffer(scene: &Scene) -> Option<BufferSpec> {
+    scene.turns_velocities().then(|| VELOCITY_TURN.sized(1))
+}
 
 /// Returns the pass `name` with the constant of shared/forces.wgsl.
 fn pass(name: &'static str, scene: &Scene) -> PassSpec {
@@ -83,12 +100,16 @@ pub(super) fn pbf(scene: &Scene, particles: usize) -> Option<Addition> {
     let mut buffers = buffers(scene, Medium::Water);
     buffers.push(FORCE_IMPULSE.sized(particles));
     buffers.push(FORCE_WORK.sized(particles.div_ceil(64)));
+    buffers.extend(turn_buffer(scene));
+    let turn = turn(scene, "effects/turn_particles");
+    let work = PassSpec {
+        constants: Vec::new(),
+        ..pass("effects/work_by_particles", scene)
+    };
+    let push = pass("effects/push_particles", scene);
     Some(Addition {
-        before_prediction: vec![pass("effects/push_particles", scene)],
-        after_update: vec![PassSpec {
-            constants: Vec::new(),
-            ..pass("effects/work_by_particles", scene)
-        }],
+        before_prediction: turn.iter().cloned().chain([push]).collect(),
+        after_update: [work].into_iter().chain(turn).collect(),
         buffers,
         ..Addition::default()
     })
@@ -101,12 +122,13 @@ pub(super) fn flip(scene: &Scene, wet: usize) -> Option<Addition> {
     }
     let mut buffers = buffers(scene, Medium::Water);
     buffers.push(FORCE_WORK.sized(wet / 64));
+    buffers.extend(turn_buffer(scene));
+    let turn = turn(scene, "effects/turn_sorted");
+    let after = ["effects/push_drops", "effects/work_by_cells"].map(|name| pass(name, scene));
     Some(Addition {
+        on_particles: turn.iter().cloned().collect(),
         passes: vec![pass("effects/push_faces", scene)],
-        after_transfer: vec![
-            pass("effects/push_drops", scene),
-            pass("effects/work_by_cells", scene),
-        ],
+        after_transfer: after.into_iter().chain(turn).collect(),
         buffers,
         ..Addition::default()
     })
@@ -159,7 +181,7 @@ pub(crate) fn upload(program: &Program, scene: &Scene, medium: Medium, span: (f6
     let mut first = 0;
     let rows = scene.forces_on(medium).map(|force| {
         let share = force.window.share(span.0, span.1);
-        let row = device_force(force, share, scene.domain.min, first);
+        let row = device_force(force, (span, share), scene.domain.min, first);
         let mesh = force.room.as_ref().and_then(|room| room.mesh());
         first += mesh.map_or(0, |mesh| mesh.values.len());
         row
@@ -168,17 +190,34 @@ pub(crate) fn upload(program: &Program, scene: &Scene, medium: Medium, span: (f6
     if !rows.is_empty() {
         program.upload(FORCES, 0, &rows);
     }
+    if let (Medium::Water, Some((axis, angle))) = (medium, scene.half_turn(span)) {
+        let half = (0.5 * angle).sin();
+        let row = DeviceTurn {
+            axis: axis.as_vec3().to_array(),
+            sine: angle.sin() as f32,
+            rest: (2.0 * half * half) as f32,
+            ..DeviceTurn::default()
+        };
+        program.upload(VELOCITY_TURN, 0, &[row]);
+    }
 }
 
-/// Returns a force as the device has it: relative to `corner`, with its strength times `share`.
-fn device_force(force: &Force, share: f64, corner: DVec3, first: usize) -> DeviceForce {
+/// Returns a force as the device has it over a (start, length), seconds: relative to `corner`, with
+/// its strength times `share`.
+fn device_force(
+    force: &Force,
+    (span, share): ((f64, f64), f64),
+    corner: DVec3,
+    first: usize,
+) -> DeviceForce {
+    let kind = &*force.kind.over(span);
     let everywhere = Bounds {
         min: DVec3::splat(-FAR),
         max: DVec3::splat(FAR),
     };
     let room = force.room.as_ref();
     let Bounds { min, max } = room.map_or(everywhere, |room| room.bounds().moved(-corner));
-    let (at, axis, law) = match force.kind {
+    let (at, axis, law) = match *kind {
         ForceKind::Acceleration(acceleration) => {
             let law = Law {
                 strength: 1.0,
@@ -189,6 +228,14 @@ fn device_force(force: &Force, share: f64, corner: DVec3, first: usize) -> Devic
         }
         ForceKind::Vortex { at, axis, law } => (at - corner, axis, law),
         ForceKind::Attract { at, law } => (at - corner, DVec3::ZERO, law),
+        ForceKind::Frame(_, inertia) => {
+            let law = Law {
+                strength: inertia.square,
+                core: inertia.angular,
+                falloff: 0,
+            };
+            (inertia.pivot - corner, inertia.axis, law)
+        }
     };
     let three = |v: DVec3| v.as_vec3().to_array();
     let mut row = DeviceForce {
@@ -199,7 +246,7 @@ fn device_force(force: &Force, share: f64, corner: DVec3, first: usize) -> Devic
             0.0
         },
         high: three(max),
-        kind: force.kind.number() as u32,
+        kind: kind.number() as u32,
         at: three(at),
         strength: (share * law.strength) as f32,
         axis: three(axis),
@@ -207,6 +254,9 @@ fn device_force(force: &Force, share: f64, corner: DVec3, first: usize) -> Devic
         falloff: law.falloff,
         ..DeviceForce::default()
     };
+    if let ForceKind::Frame(_, inertia) = kind {
+        row.origin = three(inertia.at_pivot);
+    }
     if let Some(mesh) = room.and_then(|room| room.mesh()) {
         row.origin = three(mesh.origin - corner);
         row.spacing = mesh.spacing as f32;

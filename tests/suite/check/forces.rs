@@ -7,9 +7,16 @@ use swell::{
         CheckTable,
         whitewater::{Frame, check},
     },
-    domain::{boundary::Boundary, bounds::Bounds, sources::Window, whitewater::WhitewaterKind},
+    domain::{
+        boundary::Boundary,
+        bounds::Bounds,
+        frame::{FrameMotion, FrameTurn},
+        motion::Motion,
+        sources::Window,
+        whitewater::WhitewaterKind,
+    },
     gpu::adapter::{Context, InjectedFault},
-    scene::{Method, Scene},
+    scene::{Method, Scene, forces::MovingFrame},
     stage::{check::check_frame, prepare::Start},
 };
 
@@ -60,7 +67,38 @@ const fn laws(pass: &'static str, fields: &'static [&'static str]) -> [Control; 
     ]
 }
 
-const FLIP: [Control; 7] = [
+const TURNED: &str = "velocity turned by Coriolis's acceleration";
+const TURNED_DROPS: &str = "velocity with which drops move";
+
+const FLIP: [Control; 11] = [
+    control(
+        "effects/push_faces",
+        "forces[k].core * cross",
+        "0.99 * forces[k].core * cross",
+        "effects/push_faces",
+        &["velocity at faces"],
+    ),
+    control(
+        "effects/push_faces",
+        "forces[k].strength * outward",
+        "0.99 * forces[k].strength * outward",
+        "effects/push_faces",
+        &["velocity at faces"],
+    ),
+    control(
+        "effects/turn_sorted",
+        "v + change_by_turn(v)",
+        "v + 1.001 * change_by_turn(v)",
+        "effects/turn_sorted",
+        &[TURNED, TURNED_DROPS],
+    ),
+    control(
+        "effects/turn_sorted",
+        "select(carried[k], turned[axis], is_drop)",
+        "turned[axis]",
+        "effects/turn_sorted",
+        &[TURNED_DROPS],
+    ),
     control(
         "effects/push_faces",
         "params.kick * force_at",
@@ -113,7 +151,14 @@ const FLIP: [Control; 7] = [
     ),
 ];
 
-const PBF: [Control; 4] = [
+const PBF: [Control; 5] = [
+    control(
+        "effects/turn_particles",
+        "v + change_by_turn(v)",
+        "v + 1.001 * change_by_turn(v)",
+        "effects/turn_particles",
+        &[TURNED],
+    ),
     control(
         "effects/push_particles",
         "packed(before + change)",
@@ -191,6 +236,21 @@ fn case(method: Method, has_projection: bool) -> (Scene, Start) {
     pbf.grid_projection = has_projection;
     choose(&mut scene, method);
     with_forces(&mut scene, of_flip::DX / 2.0);
+    let sine = |stroke, period| Motion::Sine {
+        stroke,
+        period,
+        ramp: 0.0,
+    };
+    scene.frame = Some(MovingFrame::new(FrameMotion {
+        slide: Some((DVec3::new(1.0, 0.5, -0.3), sine(0.2, 0.7))),
+        turn: Some(FrameTurn {
+            pivot: DVec3::new(0.4, 0.9, -0.2),
+            axis: DVec3::new(0.3, 1.0, -0.6),
+            motion: sine(80.0, 0.9),
+        }),
+        gravity: scene.water.gravity,
+        reach: 3.0,
+    }));
     let mut particles = of_flip::block([1, 0, 1], [9, 5, 6]);
     support::jitter(&mut particles, 0.01);
     for k in 0..12u32 {
@@ -216,11 +276,12 @@ fn case(method: Method, has_projection: bool) -> (Scene, Start) {
 
 fn hold(method: Method, has_projection: bool, controls: &[Control]) {
     let (scene, start) = case(method, has_projection);
-    let checked = |context: &Context| check_frame(context, &scene, &start, 0, &start.particles);
+    // The fourth frame, in which the domain moves.
+    let checked = |context: &Context| check_frame(context, &scene, &start, 3, &start.particles);
     let (clean, mut found) = faults(&context(), &checked, controls);
     let of_forces = clean.rows.iter().filter(|row| {
         let pass = row.field.pass;
-        ["effects/push_", "effects/work_"]
+        ["effects/push_", "effects/work_", "effects/turn_"]
             .iter()
             .any(|head| pass.starts_with(head))
     });

@@ -65,6 +65,7 @@ pub fn scene(size: [f64; 3]) -> Scene {
         emitters: Vec::new(),
         drains: Vec::new(),
         forces: Vec::new(),
+        frame: None,
         solver: SolverSettings::Pbf(Settings {
             particle_spacing: D,
             support_ratio: 2.0,
