@@ -14,7 +14,7 @@ use super::{
     document::Document,
     keys::{DomainSpec, WallMotionSpec},
     motion,
-    motion_table::{ANGLES, Allowed, WAYS},
+    motion_table::{ANGLES, Allowed, BOTH_WAYS},
 };
 
 /// Least length of a direction vector; only its direction matters.
@@ -43,7 +43,7 @@ pub(super) fn build(
     let slide = match (spec.direction, &spec.motion) {
         (Some(way), Some(moves)) => Some((
             direction("direction", way)?,
-            motion("motion", &moves.into(), WAYS)?,
+            motion("motion", &moves.into(), BOTH_WAYS)?,
         )),
         _ => None,
     };

@@ -30,6 +30,12 @@ pub(super) const WAYS: Allowed = Allowed {
     check_speed,
 };
 
+/// Displacements of a domain, metres, which go either way.
+pub(super) const BOTH_WAYS: Allowed = Allowed {
+    least: -1e9,
+    check_speed,
+};
+
 /// Angles, degrees; the resulting speed depends on the solid and is checked there.
 pub(super) const ANGLES: Allowed = Allowed {
     least: -1e9,

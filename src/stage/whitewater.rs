@@ -155,6 +155,11 @@ pub fn whitewater(
     let (cache, last) = derived::bake(&request.cache, request.last)?;
     let directory = directory(&request.cache, &request.name);
     let scene = super::baked_scene(&cache, &request.cache)?.of_whitewater();
+    if scene.frame.is_some() {
+        return Err(WhitewaterError::Moves {
+            cache: request.cache.clone(),
+        });
+    }
     let mut water = WaterReader::of(&cache, scene.period());
     let begin = water.at(cache.first_frame())?;
     let particles = begin.len();

@@ -101,6 +101,7 @@ mod scene {
     mod fuzz_inputs;
     mod lint;
     mod meshes;
+    mod moving_frame;
     mod shapes;
     mod untrusted;
 }

@@ -48,6 +48,16 @@ pub enum WhitewaterError {
         /// Frame of the stream.
         frame: u32,
     },
+    /// The domain moves.
+    #[error(
+        "the domain in {} moves, which spray in the air would not feel: whitewater is made of \
+         domains at rest",
+        cache.display()
+    )]
+    Moves {
+        /// Directory of the bake.
+        cache: PathBuf,
+    },
     /// More particles than the settings allow.
     #[error(
         "frame {frame} has {count} whitewater particles, and max_particles is {allowed}: raise it, \
@@ -76,6 +86,7 @@ impl From<&WhitewaterError> for Blame {
             WhitewaterError::Gpu(error) => error.into(),
             WhitewaterError::Solver(error) => error.into(),
             WhitewaterError::TooMany { .. } => Self::Numbers,
+            WhitewaterError::Moves { .. } => Self::Input,
         }
     }
 }

@@ -108,7 +108,15 @@ about = [1.0, 0.0, 0.0]
         // One of the three has a Newtonian viscosity.
         let viscous = ["effects.viscosity={coefficient=2.0}"];
         let viscous = &viscous[..usize::from(overrides.is_empty())];
-        let all: Vec<&str> = all.iter().chain(viscous).copied().collect();
+        let moves = [
+            "domain.direction=[1,0,0]".to_owned(),
+            format!("domain.motion={{kind={kind}}}"),
+            "domain.pivot=[1,0,0]".to_owned(),
+            "domain.axis=[0,0,1]".to_owned(),
+            format!("domain.turn={{kind={turn}}}"),
+        ];
+        let moves: Vec<&str> = moves.iter().map(String::as_str).collect();
+        let all: Vec<&str> = all.iter().chain(viscous).chain(&moves).copied().collect();
         let scene = parse(dir.path(), &text, &all).expect("valid");
         let toml = scene_to_toml(&scene, &|_, _| "a.obj".to_owned());
         let table: toml::Table = toml::from_str(&toml).expect("TOML");
