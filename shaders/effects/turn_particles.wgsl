@@ -1,4 +1,4 @@
-// Turns the velocities of PBF's particles by Coriolis's acceleration, before their projection and
+// Turns the velocities of PBF's particles by Coriolis's acceleration, before their prediction and
 // after their update.
 #import "shared/thread.wgsl"
 #import "shared/vector.wgsl"

@@ -1,6 +1,6 @@
 // Rotation of velocities by Coriolis's acceleration over half a step.
 
-// Mirrored by `VelocityTurn` of solve/params.rs.
+// Mirrored by `DeviceTurn` of solve/params.rs.
 struct VelocityTurn {
     // Unit vector along the axis.
     axis: vec3f,

@@ -116,15 +116,45 @@ impl FrameMotion {
     }
 
     /// Returns the largest acceleration of water at rest in the domain between two times, seconds,
-    /// from means over a sixteenth of the time; m/s².
+    /// without the [jumps](Self::jump) of its velocity; m/s². From means over parts of the time, a
+    /// sixteenth at most, and short against the periods of the motion.
     pub fn most(&self, start: f64, end: f64) -> f64 {
-        const PARTS: u32 = 16;
-        let length = (end - start) / f64::from(PARTS);
+        let motions = self.slide.iter().map(|(_, motion)| motion);
+        let motions = motions.chain(self.turn.iter().map(|turn| &turn.motion));
+        let parts = motions.map(|motion| parts(motion, end - start)).max();
+        let parts = parts.unwrap_or(1);
+        let length = (end - start) / f64::from(parts);
         let part = |k: u32| {
-            let inertia = self.inertia((start + f64::from(k) * length, length));
-            inertia.at_pivot.length() + inertia.slope() * self.reach
+            let from = start + f64::from(k) * length;
+            let inertia = self.inertia((from, length));
+            let whole = inertia.at_pivot.length() + inertia.slope() * self.reach;
+            whole - self.jump(from, from + length) / length
         };
-        (0..PARTS).map(part).fold(0.0, f64::max)
+        (0..parts).map(part).fold(0.0, f64::max)
+    }
+
+    /// Returns by how much the velocity of a point of the domain jumps from `start` to `end`, both
+    /// included, seconds, where a motion begins or ends abruptly, m/s.
+    pub fn jump(&self, start: f64, end: f64) -> f64 {
+        let of = |motion: &Motion| -> f64 {
+            let times = abrupt(motion).into_iter();
+            let times = times.filter(|t| (start..=end).contains(t));
+            times
+                .map(|t| (motion.velocity(t + MOMENT) - motion.velocity(t - MOMENT)).abs())
+                .sum()
+        };
+        let slide = self.slide.as_ref().map_or(0.0, |(_, motion)| of(motion));
+        let turn = self.turn.as_ref().map_or(0.0, |turn| of(&turn.motion));
+        slide + turn.to_radians() * self.reach
+    }
+
+    /// Bounds the speed of a point of the domain between two times, seconds; m/s.
+    pub fn peak_speed(&self, start: f64, end: f64) -> f64 {
+        let slide = self.slide.as_ref();
+        let slide = slide.map_or(0.0, |(_, motion)| motion.peak_speed(start, end));
+        let turn = self.turn.as_ref();
+        let turn = turn.map_or(0.0, |turn| turn.motion.peak_speed(start, end));
+        slide + turn.to_radians() * self.reach
     }
 
     /// Moves the pivot by `way`, metres.
@@ -133,6 +163,36 @@ impl FrameMotion {
             turn.pivot += way;
         }
     }
+}
+
+/// Time before and after a jump of the velocity, seconds.
+const MOMENT: f64 = 1e-9;
+
+/// Returns the times at which a motion's velocity may jump, seconds, each once.
+fn abrupt(motion: &Motion) -> Vec<f64> {
+    match motion {
+        Motion::ConstantVelocity { until, .. } => [0.0].into_iter().chain(*until).collect(),
+        Motion::Table { points } => {
+            let ends = [points.first(), points.last()];
+            ends.into_iter().flatten().map(|[time, _]| *time).collect()
+        }
+        _ => Vec::new(),
+    }
+}
+
+/// Returns into how many parts `length` seconds have to be divided for a motion.
+fn parts(motion: &Motion, length: f64) -> u32 {
+    const LEAST: u32 = 16;
+    let shortest = match motion {
+        Motion::Sine { period, .. } => *period,
+        Motion::Table { points } => {
+            let steps = points.windows(2).map(|pair| pair[1][0] - pair[0][0]);
+            steps.fold(f64::INFINITY, f64::min)
+        }
+        _ => f64::INFINITY,
+    };
+    let wanted = f64::from(LEAST) * length / shortest;
+    (wanted.ceil() as u32).clamp(LEAST, 1 << 12)
 }
 
 /// Returns the change of a velocity that turns by `angle`, radians, about the unit vector `axis`,
@@ -231,6 +291,51 @@ mod tests {
             (own.inertia((0.4, 0.1)).at(DVec3::X) - all.inertia((0.4, 0.1)).at(DVec3::X)).length()
         };
         assert!(mixed(&moved) > 1e-3);
+    }
+
+    /// An abrupt start is a jump and no acceleration, and vibrations are seen.
+    #[test]
+    fn jumps_are_no_accelerations() {
+        let sliding = |motion| FrameMotion {
+            slide: Some((DVec3::X, motion)),
+            turn: None,
+            ..motion_at_rest()
+        };
+        let steady = sliding(Motion::ConstantVelocity {
+            velocity: 3.0,
+            until: Some(0.5),
+        });
+        assert_eq!(steady.jump(-0.01, 0.04), 3.0);
+        assert_eq!(steady.jump(0.49, 0.51), 3.0);
+        assert_eq!(steady.jump(0.1, 0.4), 0.0);
+        for start in [-0.02, 0.0, 0.2, 0.48] {
+            assert!(steady.most(start, start + 0.04) < 1e-9, "{start}");
+        }
+        // Control: that is what the parts have without it.
+        assert!(steady.inertia((0.0, 0.0025)).at_pivot.length() > 1000.0);
+        let shaken = sliding(Motion::Sine {
+            stroke: 0.02,
+            period: 1.0 / 384.0,
+            ramp: 0.0,
+        });
+        let peak = 0.01 * (2.0 * std::f64::consts::PI * 384.0).powi(2);
+        let found = shaken.most(0.0, 1.0 / 24.0);
+        // A mean over a sixteenth of a period, at most half of it beside the peak.
+        assert!((found / peak - 1.0).abs() < 0.03, "{found} {peak}");
+        let table = sliding(Motion::Table {
+            points: vec![[0.1, 0.0], [0.2, 0.1], [0.3, 0.2]],
+        });
+        assert!((table.jump(0.05, 0.15) - 1.0).abs() < 1e-6);
+        assert!((table.peak_speed(0.0, 1.0) - 1.0).abs() < 1e-6);
+    }
+
+    fn motion_at_rest() -> FrameMotion {
+        FrameMotion {
+            slide: None,
+            turn: None,
+            gravity: DVec3::new(0.0, -9.81, 0.0),
+            reach: 2.0,
+        }
     }
 
     #[test]

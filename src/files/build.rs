@@ -20,6 +20,7 @@ use super::{
 use swell_domain::{bounds::Bounds, sampling};
 use swell_scene::{
     PlacedMesh, Scene, SceneError, Solver, Swarm, Water,
+    forces::MovingFrame,
     moving_solid::{MAX_MOVING_SOLIDS, MovingSolid},
     origin, projection,
     words::{extent, shown, shown_all},
@@ -143,13 +144,12 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
     .chain((moving_solids.iter()).map(|solid| solid.peak_speed(&[], 0.0, duration)))
     .chain((bodies.iter()).map(|body| body.peak_speed(&[], 0.0, 0.0)));
     let flip = solver.flip().or(unchosen.as_ref().and_then(Solver::flip));
-    let inertia = moved.as_ref().map_or(0.0, |frame| {
-        (frame.motion()).map_or(0.0, |motion| frame::most(motion, &shot))
-    });
+    let moves = moved.as_ref().map(MovingFrame::motion);
+    let inertia = moves.map_or(0.0, |motion| frame::most(motion, &shot));
     let pull = water.gravity.length() + forces::pull(&forces) + inertia;
     let scales = budget::Scales {
         fall: (2.0 * pull * domain.size().length()).sqrt() + forces::speed(&forces, &shot),
-        push: speeds.fold(0.0, f64::max),
+        push: speeds.fold(0.0, f64::max) + moves.map_or(0.0, |it| it.jump(0.0, duration)),
         wind: spec.effects.push().speed + spec.effects.frees(projection::grain(&water, &solver)),
         spacing: lattice.spacing,
         tolerance: flip.map_or(0.0, |flip| flip.pressure.tolerance),

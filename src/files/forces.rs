@@ -129,9 +129,7 @@ pub(super) fn pull(forces: &[PlacedForce]) -> f64 {
 /// Returns what a file says of a force, apart from its room; world coordinates, metres.
 pub(super) fn written(force: &Force, origin: DVec3) -> ForceSpec {
     let mut spec = ForceSpec {
-        kind: (ForceKind::NAMES.get(force.kind.number()).copied())
-            .unwrap_or_default()
-            .to_owned(),
+        kind: ForceKind::NAMES[force.kind.number()].to_owned(),
         min: None,
         max: None,
         mesh: None,

@@ -15,6 +15,7 @@ use super::{
     keys::{DomainSpec, WallMotionSpec},
     motion,
     motion_table::{ANGLES, Allowed, BOTH_WAYS},
+    speed::check_speed,
 };
 
 /// Least length of a direction vector; only its direction matters.
@@ -70,9 +71,15 @@ pub(super) fn build(
 
 /// Refuses what does not know that the domain moves.
 pub(super) fn check(doc: &Document<'_>, scene: &Scene) -> Result<()> {
-    let Some(motion) = scene.frame.as_ref().and_then(MovingFrame::motion) else {
+    let Some(motion) = scene.frame.as_ref().map(MovingFrame::motion) else {
         return Ok(());
     };
+    let key = match motion.slide.is_some() {
+        true => "domain.motion",
+        false => "domain.turn",
+    };
+    let fastest = motion.peak_speed(0.0, scene.shot.duration());
+    check_speed(fastest).map_err(|problem| doc.fault_of_plain(key, problem))?;
     let band = scene.solver.flip().is_some_and(|flip| flip.band.is_some());
     let others = [
         (scene.has_bodies(), "[[body]]"),
@@ -81,10 +88,6 @@ pub(super) fn check(doc: &Document<'_>, scene: &Scene) -> Result<()> {
     ];
     let Some((_, other)) = others.iter().find(|(is_there, _)| *is_there) else {
         return Ok(());
-    };
-    let key = match motion.slide.is_some() {
-        true => "domain.motion",
-        false => "domain.turn",
     };
     let problem = format!("the domain moves, and {other} does not feel that");
     Err(doc.fault_of_plain(key, problem))
@@ -98,7 +101,7 @@ pub(super) fn most(motion: &FrameMotion, shot: &Shot) -> f64 {
 
 /// Returns what a file says of the motion; the rest of the domain is zero.
 pub(super) fn written(scene: &Scene) -> DomainSpec {
-    let motion = scene.frame.as_ref().and_then(MovingFrame::motion);
+    let motion = scene.frame.as_ref().map(MovingFrame::motion);
     let slide = motion.and_then(|it| it.slide.as_ref());
     let turn = motion.and_then(|it| it.turn.as_ref());
     DomainSpec {

@@ -170,7 +170,8 @@ impl Scene {
         let least = LEAST_ENERGY_SPEED * self.particle_spacing() / length;
         // The first substep also has what acted in the second half of the one before.
         let pull = self.most_acceleration(start - 0.5 * length, start + length);
-        let gained = pull * length + self.effects.push().gained(length);
+        let jump = self.jump_of_domain(start - 0.5 * length, start + length);
+        let gained = pull * length + jump + self.effects.push().gained(length);
         (speed + push + gained + self.effects.frees(self.grain())).max(least)
     }
 

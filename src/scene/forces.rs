@@ -28,6 +28,7 @@ pub struct PlacedForce {
 /// The motion of a domain as a force on its water.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MovingFrame {
+    motion: Arc<FrameMotion>,
     /// All of it but Coriolis's acceleration; its kind is [`ForceKind::Frame`].
     force: Force,
 }
@@ -35,23 +36,22 @@ pub struct MovingFrame {
 impl MovingFrame {
     /// Returns the force of a motion.
     pub fn new(motion: FrameMotion) -> Self {
+        let motion = Arc::new(motion);
         Self {
             force: Force {
-                kind: ForceKind::Frame(Arc::new(motion), Inertia::default()),
+                kind: ForceKind::Frame(Arc::clone(&motion), Inertia::default()),
                 room: None,
                 fade: 0.0,
                 window: Window::default(),
                 on: vec![Medium::Water],
             },
+            motion,
         }
     }
 
     /// Returns the motion.
-    pub fn motion(&self) -> Option<&FrameMotion> {
-        match &self.force.kind {
-            ForceKind::Frame(motion, _) => Some(motion),
-            _ => None,
-        }
+    pub fn motion(&self) -> &FrameMotion {
+        &self.motion
     }
 }
 
@@ -89,7 +89,7 @@ impl Scene {
     /// Returns the rotation of the particles' velocities by Coriolis's acceleration over half of a
     /// (start, length), seconds: unit axis and angle, radians; `None` where there is none.
     pub fn half_turn(&self, span: (f64, f64)) -> Option<(DVec3, f64)> {
-        let (axis, angle) = self.frame.as_ref()?.motion()?.velocity_turn(span)?;
+        let (axis, angle) = self.frame.as_ref()?.motion().velocity_turn(span)?;
         Some((axis, 0.5 * angle))
     }
 
@@ -113,10 +113,18 @@ impl Scene {
         self.water.gravity.length() + forces
     }
 
+    /// Returns by how much the velocity of the domain jumps from `start` until `end`, seconds, m/s:
+    /// that of the water in it jumps as much.
+    pub fn jump_of_domain(&self, start: f64, end: f64) -> f64 {
+        (self.frame.as_ref()).map_or(0.0, |frame| frame.motion().jump(start, end))
+    }
+
     /// Moves forces by `way`, metres.
     pub(super) fn carry_forces(&mut self, way: DVec3, carry: &dyn Fn(&mut PlacedMesh, DVec3)) {
-        if let Some(frame) = &mut self.frame {
-            frame.force.kind.carry(way);
+        if let Some(frame) = &self.frame {
+            let mut motion = frame.motion().clone();
+            motion.carry(way);
+            self.frame = Some(MovingFrame::new(motion));
         }
         for PlacedForce { region, force } in &mut self.forces {
             force.kind.carry(way);

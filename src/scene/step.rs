@@ -225,7 +225,8 @@ impl PbfScene<'_> {
         let length = self.shot.frame_seconds();
         let start = f64::from(frame) * length;
         let pull = self.most_acceleration(start, start + length);
-        let gained = pull * length + self.effects.push().gained(length);
+        let jump = self.jump_of_domain(start, start + length);
+        let gained = pull * length + jump + self.effects.push().gained(length);
         let solids = self.peak_boundary_speed(absorbers, bodies, start, start + length);
         let speed = solids.max(speed + gained);
         let wanted = (speed * length / (pbf.cfl * pbf.particle_spacing))
@@ -298,9 +299,10 @@ impl FlipScene<'_> {
     ) -> Result<(f64, Substep), Breach> {
         let flip = self.settings();
         let push = self.peak_boundary_speed(absorbers, bodies, start, start + remaining);
-        let fastest = speed.max(push);
         // Forces act from the middle of the last substep on.
         let pull = self.most_acceleration(start - 0.5 * before, start + remaining);
+        let jump = self.jump_of_domain(start - 0.5 * before, start + remaining);
+        let fastest = speed.max(push) + jump;
         let push = self.effects.push();
         // Solves v t + g t² = cfl Δx.
         let room = flip.cfl * flip.cell_size;

@@ -146,12 +146,13 @@ impl Branch {
         take_band(&mut particles, scene);
         let mut clock = entry.clock;
         let mut notes = Vec::new();
+        let baked = super::baked_scene(&cache, &from.directory);
+        let baked = baked.map_err(|source| BranchError::Scene {
+            file: from.directory.clone(),
+            source,
+        })?;
+        check_motion(from, &baked, scene)?;
         if clock.walls != AbsorberStates::default() {
-            let baked = super::baked_scene(&cache, &from.directory);
-            let baked = baked.map_err(|source| BranchError::Scene {
-                file: from.directory.clone(),
-                source,
-            })?;
             (clock.walls, notes) = scene.carried(&baked, &clock.walls);
             particles.walls = clock.walls;
         }
@@ -262,6 +263,32 @@ fn check_keys(from: &BranchPoint, cache: &CacheReader, scene: &Scene) -> Result<
             given,
         }),
     }
+}
+
+/// Refuses a scene whose domain moves otherwise than that of the cache: the water would not have
+/// felt what its domain has done before.
+fn check_motion(from: &BranchPoint, baked: &Scene, scene: &Scene) -> Result<(), BranchError> {
+    let world = |scene: &Scene| {
+        scene.frame.as_ref().map(|frame| {
+            let mut motion = frame.motion().clone();
+            motion.carry(scene.origin);
+            (motion.slide, motion.turn)
+        })
+    };
+    let (cached, given) = (world(baked), world(scene));
+    if cached == given {
+        return Ok(());
+    }
+    let shown = |motion: &Option<_>| match motion {
+        Some(_) => "a motion of its own",
+        None => "none",
+    };
+    Err(BranchError::Unfit {
+        from: from.clone(),
+        key: "a motion of the domain",
+        cached: shown(&cached).to_owned(),
+        given: shown(&given).to_owned(),
+    })
 }
 
 /// Refuses a frame with particles more than half a spacing outside the walls; closer ones are left

@@ -119,8 +119,9 @@ keys! { struct DomainSpec {
         .with("direction")
         .also(", without bodies, a band and domain.periodic")
         .about(
-            "How far along `direction` the domain has come, either way. Water, walls and solids are \
-             described in the domain, whose water feels the motion as a force",
+            "How far along `direction` the domain has come; the points of a table may be negative. \
+             Water, walls and solids are described in the domain, whose water feels the motion as \
+             a force",
         ),
     pivot: Option<[f64; 3]> = vector(3, COORDINATE)
         .unit("metres")

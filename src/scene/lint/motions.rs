@@ -4,7 +4,9 @@
 use glam::DVec3;
 
 use super::{
-    super::{Scene, Shot, WaveMaker, waves::HIGHEST, waves::STEEPEST, words::shown},
+    super::{
+        Scene, Shot, WaveMaker, forces::MovingFrame, waves::HIGHEST, waves::STEEPEST, words::shown,
+    },
     Still,
 };
 use swell_domain::{
@@ -24,6 +26,22 @@ impl Scene {
         for (k, maker) in self.wave_makers.iter().enumerate() {
             let key = format!("wave_maker[{k}].motion");
             lints.extend(lint_table(&key, "m/s", &maker.motion, &self.shot));
+        }
+        if let Some(motion) = self.frame.as_ref().map(MovingFrame::motion) {
+            let slide = motion
+                .slide
+                .iter()
+                .map(|(_, slide)| ("motion", "m/s", slide));
+            let turn = motion.turn.iter();
+            let turn = turn.map(|turn| ("turn", "degrees a second", &turn.motion));
+            for (key, unit, motion) in slide.chain(turn) {
+                lints.extend(lint_table(
+                    &format!("domain.{key}"),
+                    unit,
+                    motion,
+                    &self.shot,
+                ));
+            }
         }
         for solid in &self.moving_solids {
             let name = solid.name();

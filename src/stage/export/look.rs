@@ -42,14 +42,8 @@ impl ExportJob<'_> {
         let light = daylight(look).map_err(|error| told(error, look))?;
         let stem = root.file_stem().unwrap_or_default().to_string_lossy();
         let pictures = look.materials().map_or(&[][..], |it| &it.pictures);
-        let parts = usd::solid_names(
-            pictures
-                .iter()
-                .map(stem_of)
-                .collect::<Vec<_>>()
-                .iter()
-                .map(|it| &**it),
-        );
+        let stems: Vec<String> = pictures.iter().map(stem_of).collect();
+        let parts = usd::solid_names(stems.iter().map(String::as_str));
         let mut palette = Palette {
             look,
             materials: Vec::new(),
@@ -228,9 +222,10 @@ impl Palette<'_> {
     }
 }
 
+/// Part of a texture's name; in lower case, because some file systems do not tell cases apart.
 fn stem_of(picture: &Picture) -> String {
     let stem = picture.file.file_stem().unwrap_or_default();
-    stem.to_string_lossy().into_owned()
+    stem.to_string_lossy().to_lowercase()
 }
 
 fn png_of(picture: &Picture, software: &str) -> Result<Vec<u8>, ExportError> {

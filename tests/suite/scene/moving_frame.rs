@@ -3,6 +3,7 @@
 
 use std::path::Path;
 
+use crate::support::job::Job;
 use swell::{
     files::{parse_scene, scene_to_toml},
     scene::Scene,
@@ -30,6 +31,11 @@ method = "flip"
 cell_size = 0.1
 "#;
 
+const CUBE: &str = "\
+v 0 0 0\nv 0.4 0 0\nv 0.4 0.4 0\nv 0 0.4 0\nv 0 0 0.4\nv 0.4 0 0.4\nv 0.4 0.4 0.4\nv 0 0.4 0.4
+f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 1 5 8 4\nf 2 3 7 6\nf 4 8 7 3
+";
+
 fn parse(text: &str) -> Result<Scene, String> {
     parse_scene(text, Path::new("rolls.toml"), Path::new("."), &[])
         .map_err(|error| error.to_string())
@@ -41,7 +47,7 @@ fn a_motion_is_written_and_read_again() {
     let written = scene_to_toml(&scene, &|path, _| path.display().to_string());
     let again = parse(&written).unwrap();
     assert_eq!(again.frame, scene.frame);
-    let motion = scene.frame.as_ref().unwrap().motion().unwrap();
+    let motion = scene.frame.as_ref().unwrap().motion();
     // The scene's coordinates begin at its origin, and the farthest corner is (100, 1.6, -4).
     let pivot = motion.turn.as_ref().unwrap().pivot + scene.origin;
     assert!((pivot - glam::DVec3::new(101.0, 0.3, -3.0)).length() < 1e-12);
@@ -79,4 +85,64 @@ fn what_does_not_know_the_motion_is_refused() {
         "cell_size = 0.1\nband = 5\ncfl = 1.0",
         "solver.flip.band does not feel that",
     );
+    fails(
+        "swing_degrees = 8.0, period = 1.63",
+        "swing_degrees = 1e9, period = 1.63",
+        "domain.motion: it moves at",
+    );
+}
+
+/// What a scene says can be refused only as a user meets it: with a body's mesh, a bake's frame, and
+/// a cache for whitewater.
+#[test]
+fn bodies_other_motions_and_whitewater_are_refused() {
+    let small = SCENE.replace(
+        "[solver.flip]\ncell_size = 0.1",
+        "[solver.flip]\ncell_size = 0.2",
+    );
+    let job = Job::of(&[("rolls.toml", &small), ("cube.obj", CUBE)]);
+    let body = "--set body=[{mesh=\"cube.obj\",translate=[101,1,-3],density=300}]";
+    let words = format!("inspect rolls.toml {body}");
+    job.expect_clear(2, &words, "[[body]] does not feel that");
+    job.expect(0, "bake rolls.toml -o rolls --frames 1-2");
+    job.expect_clear(
+        2,
+        "whitewater rolls",
+        "moves, which spray in the air would not feel",
+    );
+    let from = "bake rolls.toml -o other --frames 1-2 --from rolls:1";
+    job.expect(0, from);
+    let other = format!(
+        "{} --set domain.turn.period=1.5",
+        from.replace("other", "third")
+    );
+    job.expect_clear(2, &other, "a motion of the domain");
+}
+
+/// A sudden start takes the substeps that its speed asks for, and the default limit of speed is that
+/// speed beyond a fall.
+#[test]
+fn a_sudden_start_is_a_jump_of_the_velocity() {
+    let jumps = |velocity: f64| {
+        let motion = format!("motion = {{ kind = \"constant_velocity\", velocity = {velocity} }}");
+        let from = "motion = { kind = \"table\", points = [[0.0, 0.0], [0.5, -0.2], [1.0, 0.1]] }";
+        let text = SCENE.replace(from, &motion);
+        let kept = text
+            .lines()
+            .filter(|line| !line.starts_with("turn") && !line.starts_with("axis"));
+        let kept: Vec<&str> = kept.filter(|line| !line.starts_with("pivot")).collect();
+        parse(&kept.join("\n")).unwrap()
+    };
+    let (slow, fast) = (jumps(1.0), jumps(4.0));
+    assert_eq!(
+        fast.jump_of_domain(0.0, 0.04) - slow.jump_of_domain(0.0, 0.04),
+        3.0
+    );
+    assert_eq!(
+        fast.most_acceleration(0.0, 0.04),
+        slow.most_acceleration(0.0, 0.04)
+    );
+    let limit = |scene: &Scene| scene.budget.speed.unwrap();
+    let more = limit(&fast) - limit(&slow);
+    assert!((more / 3.0 - 4.0).abs() < 1e-9, "{more}");
 }
