@@ -126,5 +126,4 @@ pub fn painted(look: &Look, scene: &RenderScene) -> Result<Vec<SolidPaint>, Rend
 }
 
 #[cfg(test)]
-#[path = "portable_tests.rs"]
 mod tests;
