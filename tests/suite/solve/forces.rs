@@ -16,81 +16,34 @@ use swell::{
     },
     files::parse_scene,
     gpu::adapter::Context,
-    reference,
     scene::{Method, Scene, budget::Before, forces::PlacedForce},
     solve::plan::Plan,
     stage::{device::Opened, drive::Drive, prepare::Start},
 };
 
 use crate::support::{
-    self, choose, context, flip as of_flip,
+    self, context, flip as of_flip,
     forces::{attract, in_box, in_mesh, law, push, vortex},
-    pbf_of,
+    solvers::{self, RATE, SOLVERS, scene},
 };
 
 const G: f64 = 9.81;
-const RATE: f64 = 100.0;
-
-/// FLIP, PBF with a projection, and PBF without one.
-const SOLVERS: [(Method, bool); 3] = [
-    (Method::Flip, true),
-    (Method::Pbf, true),
-    (Method::Pbf, false),
-];
-
-fn scene((method, has_projection): (Method, bool), cells: [f64; 3]) -> Scene {
-    let mut scene = of_flip::scene(cells);
-    let pbf = pbf_of(&mut scene);
-    pbf.particle_spacing = of_flip::DX / 2.0;
-    pbf.grid_projection = has_projection;
-    choose(&mut scene, method);
-    scene.shot.frames_per_second = RATE;
-    scene
-}
 
 /// The GPU, and the reference.
 fn devices(context: &Context) -> [Option<&Context>; 2] {
     [Some(context), None]
 }
 
-/// The state after `frames` frames, and the report of each, on the GPU or, without a context, of
-/// the reference.
+/// The state after `frames` frames, and the report of each.
 fn run(
     context: Option<&Context>,
     scene: &Scene,
     particles: &Particles,
     frames: u32,
 ) -> (Particles, Vec<StepReport>) {
-    fn go<S: Solver>(mut solver: S, start: &Particles, frames: u32) -> (Particles, Vec<StepReport>)
-    where
-        S::Error: std::fmt::Debug,
-    {
-        solver.load(0, start).unwrap();
-        let all: Vec<_> = (0..frames).map(|_| solver.advance().unwrap()).collect();
-        let reports = all.iter().map(|(_, report)| report.clone()).collect();
-        (all.into_iter().next_back().unwrap().0, reports)
-    }
-    let none = Boundary::default();
-    match (context, scene.solver.method()) {
-        (Some(context), Method::Flip) => go(
-            of_flip::solver(context, scene, particles),
-            particles,
-            frames,
-        ),
-        (Some(context), Method::Pbf) => go(
-            support::solver(context, scene, particles, &none),
-            particles,
-            frames,
-        ),
-        (None, Method::Flip) => {
-            let scene = scene.with_flip().unwrap();
-            go(reference::flip::Flip::new(&scene, &none), particles, frames)
-        }
-        (None, Method::Pbf) => {
-            let scene = scene.with_pbf().unwrap();
-            go(reference::pbf::Pbf::new(&scene, &none), particles, frames)
-        }
-    }
+    let all = solvers::run(context, scene, particles, frames);
+    let reports = all.iter().map(|(_, report)| report.clone()).collect();
+    (all.into_iter().next_back().unwrap().0, reports)
 }
 
 fn velocity(state: &Particles, k: usize) -> DVec3 {
