@@ -62,9 +62,9 @@ pub struct SolidPaint {
     /// For each triangle, the index of its material in the look's list; `None` for the plain
     /// colour of solids.
     pub materials: Vec<Option<usize>>,
-    /// For each triangle, how its texture lies on it.
-    lies: Vec<Option<Triangle>>,
-    /// Least corner of the domain, relative to which textures lie.
+    /// For each triangle, how its texture maps to it.
+    mappings: Vec<Option<Triangle>>,
+    /// Least corner of the domain, relative to which textures are mapped.
     corner: DVec3,
 }
 
@@ -72,13 +72,13 @@ impl SolidPaint {
     /// Texture coordinates of a point of a triangle, metres in the scene's coordinates: u to the
     /// right, v upward, both repeating; `None` without a texture.
     pub fn place(&self, triangle: usize, point: DVec3) -> Option<[f64; 2]> {
-        let lie = self.lies[triangle].as_ref()?;
+        let mapping = self.mappings[triangle].as_ref()?;
         let wide = |v: [f32; 3]| Vec3::from(v).as_dvec3();
-        let way = point - self.corner - wide(lie.c);
-        let start = [lie.material, lie.paint].map(|bits| f64::from(f32::from_bits(bits)));
+        let offset = point - self.corner - wide(mapping.c);
+        let start = [mapping.material, mapping.paint].map(|bits| f64::from(f32::from_bits(bits)));
         let [u, row] = [
-            start[0] + way.dot(wide(lie.a)),
-            start[1] + way.dot(wide(lie.b)),
+            start[0] + offset.dot(wide(mapping.a)),
+            start[1] + offset.dot(wide(mapping.b)),
         ];
         Some([u, 1.0 - row])
     }
@@ -99,7 +99,7 @@ pub fn painted(look: &Look, scene: &RenderScene) -> Result<Vec<SolidPaint>, Rend
             let mut solid = painter.solid(index)?;
             for (k, pair) in pairs.iter_mut().enumerate() {
                 let points = points_of(&mesh.vertices, mesh.triangles[k])?;
-                // A degenerate triangle is invisible, and no texture lies on it.
+                // A degenerate triangle is invisible, and no texture maps to it.
                 if has_normal(points, scene) {
                     *pair = solid.paint(k, points.map(|p| p - corner))?;
                 }
@@ -116,7 +116,7 @@ pub fn painted(look: &Look, scene: &RenderScene) -> Result<Vec<SolidPaint>, Rend
     };
     let solid = |pairs: Vec<[u32; 2]>| SolidPaint {
         materials: pairs.iter().map(|&[paint, _]| list(paint)).collect(),
-        lies: pairs
+        mappings: pairs
             .iter()
             .map(|&[paint, place]| textured(list(paint)).map(|_| places[place as usize]))
             .collect(),
