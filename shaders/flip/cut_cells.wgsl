@@ -21,6 +21,8 @@
 @group(0) @binding(10) var<storage, read_write> open_hats: array<f32>;
 // The four layers of the hat, from the lowest up, 16 bits each; of cells that solids cut.
 @group(0) @binding(11) var<storage, read_write> open_layers: array<vec2u>;
+// Weights of the lower faces in the transfer to particles: open fractions, and `facing_weight`.
+@group(0) @binding(12) var<storage, read_write> face_weight: array<f32>;
 #endif
 #ifdef MOVING_SOLIDS
 // Velocities of closed lower faces, m/s.
@@ -31,6 +33,22 @@
 const AIR = 0u;
 const SOLID = 2u;
 
+#ifdef SOLIDS
+// Least weight of a closed face in the transfer to particles: it gives particles between closed
+// faces alone the solid's velocity.
+const LEAST_FACING = 1e-4;
+
+// Weights that a cell's faces have in the transfer to particles where a solid closes them; `rise`
+// is how much the distance to solids grows over the cell along each axis. A face that faces the
+// solid counts fully, with the solid's velocity, which stops the water. One that the water slides
+// along would drag it, and does not count.
+fn facing_weight(rise: vec3f) -> vec3f {
+    let facing = rise * rise / max(dot(rise, rise), 1e-30);
+    let part = max(2.0 * facing - 1.0, vec3f(0.0));
+    return max(part * part, vec3f(LEAST_FACING));
+}
+
+#endif
 @compute @workgroup_size(64)
 fn main(
     @builtin(workgroup_id) workgroup: vec3u,
@@ -51,16 +69,18 @@ fn main(
     let lower = cut.lower;
     let upper = cut.upper;
     var hats = 1.0;
+    var closed = vec3f(1.0);
     for (var once = 0; once < select(0, 1, cut.solids != 0u); once++) {
         let near = cut.corners.near;
         let far = cut.corners.far;
-        let slopes = abs(vec3f(
+        let rises = vec3f(
             dot(near.yw + far.yw - near.xz - far.xz, vec2f(0.25)),
             dot(near.zw + far.zw - near.xy - far.xy, vec2f(0.25)),
             dot(far - near, vec4f(0.25)),
-        ));
+        );
         let center = dot(near + far, vec4f(0.125));
-        let rise = slopes.x + slopes.y + slopes.z;
+        let rise = abs(rises.x) + abs(rises.y) + abs(rises.z);
+        closed = select(closed, facing_weight(rises), cut.lower_of_walls > vec3f(0.0));
         volume *= clamp(0.5 + center / max(rise, 1e-20), 0.0, 1.0);
         let hat = open_hat(cell, rise, cut.solids);
         hats = hat.part;
@@ -69,6 +89,10 @@ fn main(
     }
     open_volume[element] = volume;
     open_hats[element] = hats;
+    let weight = select(lower, closed, lower == vec3f(0.0));
+    face_weight[element] = weight.x;
+    face_weight[params.stride + element] = weight.y;
+    face_weight[2u * params.stride + element] = weight.z;
 #else
     let lower = select(vec3f(0.0), across, is_plane_open(cell));
     let upper = select(vec3f(0.0), across, is_plane_open(cell + 1.0));

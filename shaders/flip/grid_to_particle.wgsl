@@ -6,8 +6,9 @@
 // margin a jet presses on a wall with more than its momentum. The particles of a cell share its
 // faces, which are read once. Weights are multiplied by the faces' open fractions and normalized,
 // because the projection gives faces with a small open fraction several times their neighbours'
-// velocities. Beyond the domain along b and c, faces have the values of those inside, so that water
-// slides along walls.
+// velocities; those of faces that solids close, by how much they face the solid (flip/cut_cells).
+// Beyond the domain along b and c, faces have the values of those inside, so that water slides
+// along walls.
 // In a film on a solid the grid knows the depth only to half a particle of a full cell. Surface
 // slopes below that, and speeds below that of a fall by that height, cannot be told from rest, and
 // nothing else stops them. There particles get Coulomb friction with the solid, with that slope as
@@ -31,7 +32,7 @@
 // droplet, far from all water with a pressure, else 0.
 @group(0) @binding(5) var<storage, read_write> sorted_velocity: array<f32>;
 #ifdef SOLIDS
-@group(0) @binding(15) var<storage, read> face_open: array<f32>;
+@group(0) @binding(15) var<storage, read> face_weight: array<f32>;
 #endif
 #ifdef APIC
 @group(0) @binding(6) var<storage, read_write> affine: array<f32>;
@@ -69,10 +70,8 @@ fn displacements(faces: vec3u) -> vec3f {
 #endif
 
 #ifdef SOLIDS
-// Weight of each face; closed faces count fully, with the velocity of the wall or solid.
 fn parts(faces: vec3u) -> vec3f {
-    let open = vec3f(face_open[faces.x], face_open[faces.y], face_open[faces.z]);
-    return select(open, vec3f(1.0), open <= vec3f(0.0));
+    return vec3f(face_weight[faces.x], face_weight[faces.y], face_weight[faces.z]);
 }
 
 fn product(a: mat3x3f, b: mat3x3f) -> mat3x3f {

@@ -17,8 +17,8 @@ use swell_reference::flip::{
     cut_cells as reference_cut_cells, extrapolate as reference_extrapolate,
     find_change as reference_find_change, find_depth, find_excess as reference_find_excess,
     find_water as reference_find_water, friction_rates, gather_centers as reference_gather_centers,
-    gather_faces as reference_gather_faces, is_near_half, let_in as reference_let_in, sensitivity,
-    wall_friction as reference_wall_friction,
+    gather_faces as reference_gather_faces, is_near_half, let_in as reference_let_in, rise_over,
+    sensitivity, wall_friction as reference_wall_friction,
 };
 use swell_scene::flip::Surface;
 use swell_solve::flip::buffers;
@@ -190,6 +190,10 @@ pub(super) fn cut_cells(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
             true => elements.scalars(&io.after, buffers::OPEN_HATS)?,
             false => reference.hats.clone(),
         },
+        weight: match has_solids {
+            true => elements.planes(&io.after, buffers::FACE_WEIGHT)?,
+            false => reference.weight.clone(),
+        },
         closed_velocity: match has_moving {
             true => elements.planes(&io.after, buffers::CLOSED_VELOCITY)?,
             false => reference.closed_velocity.clone(),
@@ -234,6 +238,12 @@ pub(super) fn cut_cells(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
         io.table.each(&HATS, elements.active(), |e| {
             let moved = moved(&|other| (other.hats[e] - reference.hats[e]).abs());
             pair(e, space.hats[e], reference.hats[e], [cut, moved])
+        });
+        io.table.each(&FACE_WEIGHT, elements.active(), |e| {
+            let moved = moved(&|other| other.weight[e].distance(reference.weight[e]));
+            let rise = rise_over(&state.model, &step, &elements.bricks, e as u32);
+            let turned = rise.map_or(0.0, |rise| error / rise.max(1e-30));
+            pair(e, space.weight[e], reference.weight[e], [cut, moved, turned])
         });
         for k in 0..4 {
             io.table.each(&LAYERS, elements.active(), |e| {

@@ -241,6 +241,11 @@ pub(super) fn face_sums(corners: &[f64; 8], side: usize) -> DVec3 {
     DVec3::new(sum(0), sum(1), sum(2))
 }
 
+/// Returns how much the distance grows over a cell along each axis, metres.
+pub(super) fn rise(corners: &[f64; 8]) -> DVec3 {
+    (face_sums(corners, 1) - face_sums(corners, 0)) / 4.0
+}
+
 /// Computes how planes through a cell's corner distances cut it (Batty et al. 2007).
 pub(super) fn cut(corners: &[f64; 8]) -> Cut {
     let part = |axis: usize, side: usize| {
@@ -251,8 +256,7 @@ pub(super) fn cut(corners: &[f64; 8]) -> Cut {
     };
     let faces = [0, 1].map(|side| DVec3::new(part(0, side), part(1, side), part(2, side)));
     let center = corners.iter().sum::<f64>() / 8.0;
-    let slopes = ((face_sums(corners, 1) - face_sums(corners, 0)) / 4.0).abs();
-    let volume = 0.5 + center / slopes.element_sum().max(1e-20);
+    let volume = 0.5 + center / rise(corners).abs().element_sum().max(1e-20);
     Cut {
         faces,
         volume: volume.clamp(0.0, 1.0),

@@ -6,7 +6,7 @@ use super::{
     FlipSubstep, Model, Sorted,
     grid::{corner, neighborhood, per_cell},
     model::ON_FACE,
-    solids::{OpenHat, Solid, cut, face_sums},
+    solids::{OpenHat, Solid, cut, face_sums, rise},
 };
 use swell_domain::{
     bricks::Bricks,
@@ -21,6 +21,9 @@ const LEAST_WEIGHT: f64 = 2.4e-7;
 /// A face with a smaller open fraction is closed: such faces drive jets at edges and corners in
 /// water at rest.
 const LEAST_OPEN: f64 = 0.02;
+
+/// Least weight of a closed face in the transfer to particles.
+const LEAST_FACING: f64 = 1e-4;
 
 /// The space that walls and solids leave open for water.
 #[derive(Clone, Debug, PartialEq)]
@@ -40,6 +43,9 @@ pub struct OpenSpace {
     /// The same for each of the hat's four layers, half a cell thick, from the lowest up along the
     /// axis closest to gravity.
     pub layers: Vec<[f64; 4]>,
+    /// Weights of the lower faces in [`super::grid_to_particle`], see `facing_weight`; all 1
+    /// without solids.
+    pub weight: Vec<DVec3>,
     /// Velocities of the lower faces where they are closed, m/s.
     pub closed_velocity: Vec<DVec3>,
 }
@@ -197,6 +203,30 @@ pub(super) fn cut_faces<'a>(model: &Model, step: &'a FlipSubstep<'_>, cell: DVec
     found
 }
 
+/// Returns the weights that faces of a cell have in the transfer to particles where a solid closes
+/// them. `rise` is how much the distance to solids grows over the cell along each axis. A face that
+/// faces the solid counts fully, with the solid's velocity, which stops the water. One that the
+/// water slides along does not count: it would drag the water. At 45° and more between the two
+/// normals the weight is the least one, which gives particles between closed faces alone the
+/// solid's velocity.
+fn facing_weight(rise: DVec3) -> DVec3 {
+    let facing = rise * rise / rise.length_squared().max(1e-30);
+    let part = (2.0 * facing - 1.0).max(DVec3::ZERO);
+    (part * part).max(DVec3::splat(LEAST_FACING))
+}
+
+/// Returns how much the distance to solids grows over a cell, metres; `None` if no solid may cut
+/// it.
+pub fn rise_over(
+    model: &Model,
+    step: &FlipSubstep<'_>,
+    bricks: &Bricks,
+    element: u32,
+) -> Option<f64> {
+    let found = cut_faces(model, step, corner(bricks, element));
+    found.corners.map(|corners| rise(&corners).length())
+}
+
 /// Computes the open fractions of each cell and of its lower faces, and the flux of solids through
 /// the closed parts (Batty et al. 2007). [`super::find_water`] later decides which open cells are
 /// water.
@@ -208,6 +238,7 @@ pub fn cut_cells(model: &Model, step: &FlipSubstep<'_>, bricks: &Bricks) -> Open
         flux: f64,
         volume: f64,
         hat: OpenHat,
+        weight: DVec3,
         closed_velocity: DVec3,
     }
     let of_cell = |element: u32| {
@@ -224,10 +255,17 @@ pub fn cut_cells(model: &Model, step: &FlipSubstep<'_>, bricks: &Bricks) -> Open
         let planes = [cell, cell + 1.0];
         let mut volume = step.open_extent(cell).element_product();
         let mut hat = OpenHat::WHOLE;
+        let mut closed = DVec3::ONE;
         if let Some(corners) = corners {
             volume *= cut(&corners).volume;
             hat = OpenHat::of(model, step, &near, cell, &corners);
+            let by_solid = of_walls[0].cmpgt(DVec3::ZERO);
+            closed = DVec3::select(by_solid, facing_weight(rise(&corners)), closed);
         }
+        let weight = match step.solids.is_empty() {
+            true => DVec3::ONE,
+            false => DVec3::select(open[0].cmpeq(DVec3::ZERO), closed, open[0]),
+        };
         let [low, high] = [0, 1].map(|side| {
             (across - of_walls[side]) * step.closing_velocity(planes[side])
                 + (of_walls[side] - open[side]) * velocity[side]
@@ -239,6 +277,7 @@ pub fn cut_cells(model: &Model, step: &FlipSubstep<'_>, bricks: &Bricks) -> Open
             flux: (high - low).element_sum(),
             volume,
             hat,
+            weight,
             closed_velocity: DVec3::select(
                 step.is_plane_open(cell),
                 velocity[0],
@@ -254,6 +293,7 @@ pub fn cut_cells(model: &Model, step: &FlipSubstep<'_>, bricks: &Bricks) -> Open
         volume: cells.iter().map(|cell| cell.volume).collect(),
         hats: cells.iter().map(|cell| cell.hat.part).collect(),
         layers: cells.iter().map(|cell| cell.hat.layers).collect(),
+        weight: cells.iter().map(|cell| cell.weight).collect(),
         closed_velocity: cells.iter().map(|cell| cell.closed_velocity).collect(),
     }
 }

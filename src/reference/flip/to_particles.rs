@@ -213,8 +213,8 @@ fn range_of(values: &[f64; 18]) -> [f64; 2] {
 /// Transfers grid velocities to particles: v = α u + (1 − α)(v + Δu) (Zhu and Bridson 2005), or u
 /// and its gradient (APIC, Jiang et al. 2015); isolated droplets get v + g Δt. Also interpolates
 /// the density correction's displacements, if it is on. Partly open faces are weighted by their
-/// open fraction, as in the projection; at the surface v is clamped to the range of the faces'
-/// velocities, extended by a margin.
+/// open fraction, as in the projection, and those that solids close by how much they face them; at
+/// the surface v is clamped to the range of the faces' velocities, extended by a margin.
 pub fn grid_to_particle(
     model: &Model,
     step: &FlipSubstep<'_>,
@@ -228,13 +228,7 @@ pub fn grid_to_particle(
     let size = model.cell_size();
     let of_cell = |element: u32| {
         let stencils = [0, 1, 2].map(|axis| stencil(model, bricks, element, axis));
-        // Weight of each face; closed faces count fully, with the velocity of the wall or solid.
-        let parts = [0, 1, 2].map(|axis| {
-            stencils[axis].map(|e| match space.open[e][axis] {
-                open if open > 0.0 && !step.solids.is_empty() => open,
-                _ => 1.0,
-            })
-        });
+        let parts = [0, 1, 2].map(|axis| stencils[axis].map(|e| space.weight[e][axis]));
         let values = |of: &[DVec3]| -> [[f64; 18]; 3] {
             [0, 1, 2].map(|axis| stencils[axis].map(|e| of[e][axis]))
         };

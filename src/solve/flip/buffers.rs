@@ -81,6 +81,9 @@ pub const OPEN_HATS: Buf<f32> = Buf::new("open_hats");
 /// Cells that solids cut: the same of the hat's four layers, half a cell thick, from the lowest up,
 /// as two pairs of 16 bits. Exists only with solids.
 pub const OPEN_LAYERS: Buf<[u32; 2]> = Buf::new("open_layers");
+/// Planes: weight of the face in the transfer to particles: its open fraction, or, where a solid
+/// closes it, how much it faces the solid. Exists only with solids.
+pub const FACE_WEIGHT: Buf<f32> = Buf::new("face_weight");
 /// Planes: velocity of the solid that closes a face, m/s. Exists only with moving solids.
 pub const CLOSED_VELOCITY: Buf<f32> = Buf::new("closed_velocity");
 /// Velocity and depth of the water that has moved, ready for the next substep: by brick with water,

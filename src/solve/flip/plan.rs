@@ -197,6 +197,7 @@ fn bricks(plan: &Plan, scene: &FlipScene, table: &mut BufferTable) {
         table.watch("solids", OPEN_VOLUME.sized(all));
         table.watch("solids", OPEN_HATS.sized(all));
         table.add("solids", OPEN_LAYERS.sized(all));
+        table.add("solids", FACE_WEIGHT.sized(3 * all));
         table.add("solids", SOLID_DISTANCE.sized(plan.counts.solid_floats()));
         if plan.counts.moving_nodes > 0 {
             table.watch("solids", CLOSED_VELOCITY.sized(3 * all));

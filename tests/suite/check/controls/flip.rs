@@ -79,6 +79,13 @@ pub const FLIP: &[Control] = &[
         &["open part of the hat's layers"],
     ),
     control(
+        "flip/cut_cells",
+        "2.0 * facing - 1.0",
+        "1.98 * facing - 0.98",
+        "flip/cut_cells",
+        &["weight of faces for particles"],
+    ),
+    control(
         "flip/spread_faces",
         "lower_momentum += both",
         "lower_momentum -= both",
