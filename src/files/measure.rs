@@ -26,6 +26,8 @@ pub enum Measure {
     Hydrostatic,
     /// A vortex in the x-y plane of a closed box full of water, without gravity.
     TaylorGreen,
+    /// Water that slides down a slope towards +x without friction.
+    Slide,
     /// A body in water: the first of the scene, with the elevation probes where it floats.
     Body,
 }
@@ -41,7 +43,7 @@ const SEAWARD: &str = "distance from the shoreline of still water towards the se
 
 impl Measure {
     /// All measures with the names used in studies.
-    pub(super) const NAMED: [(&'static str, Self); 12] = [
+    pub(super) const NAMED: [(&'static str, Self); 13] = [
         ("regular_waves", Self::RegularWaves),
         ("waves_by_theory", Self::WavesByTheory),
         ("solitary_wave", Self::SolitaryWave),
@@ -53,6 +55,7 @@ impl Measure {
         ("standing_wave", Self::StandingWave),
         ("hydrostatic", Self::Hydrostatic),
         ("taylor_green", Self::TaylorGreen),
+        ("slide", Self::Slide),
         ("body", Self::Body),
     ];
 
@@ -70,6 +73,7 @@ impl Measure {
             Self::StandingWave => &["depth", "length", "height"],
             Self::Hydrostatic => &["depth", "after"],
             Self::TaylorGreen => &["length", "speed"],
+            Self::Slide => &["length", "height"],
             Self::Body => &["after"],
         }
     }
@@ -223,6 +227,10 @@ impl Measure {
                 "decay of the energy over that of PIC and of the projection, α \
                  Δx² / (6 Δt) + U² Δt / 8",
             )],
+            Self::Slide => &[(
+                "slide_ratio",
+                "mean speed along the slope over g t sin θ, at the end",
+            )],
             Self::Body => &[
                 (
                     "draft",
@@ -301,6 +309,10 @@ impl Measure {
             )],
             Self::Hydrostatic => &[("pressure", ["pressure", "depth, m", "p / (ρ g depth)"])],
             Self::TaylorGreen => &[("energy", ["energy", "time, turns", "of the start's"])],
+            Self::Slide => &[(
+                "speed",
+                ["mean speed along the slope", "time, s", "of g t sin θ"],
+            )],
             Self::Body => &[
                 (
                     "heave",

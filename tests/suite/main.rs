@@ -126,6 +126,7 @@ mod solve {
     mod pressure;
     mod projected;
     mod shapes;
+    mod slope;
     mod sources;
     mod start_blocks;
     mod start_waves;

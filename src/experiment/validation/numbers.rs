@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 
 use swell_domain::motion::{Motion, wave_number};
 use swell_files::study::validation::Measure;
@@ -54,6 +54,7 @@ pub(super) fn of(record: &Record<'_>) -> BenchmarkMeasurements {
         Measure::StandingWave => standing_wave(record, &mut out),
         Measure::Hydrostatic => hydrostatic(record, &mut out),
         Measure::TaylorGreen => taylor_green(record, &mut out),
+        Measure::Slide => slide(record, &mut out),
         Measure::Body => body::of(record, &mut out),
     }
     out.numbers.retain(|_, value| value.is_finite());
@@ -488,6 +489,20 @@ fn taylor_green(record: &Record<'_>, out: &mut BenchmarkMeasurements) {
         let curve = energy.iter().map(|(t, e)| (t / turn, e / first));
         out.draw("energy", curve.collect());
     }
+}
+
+/// Whatever the water does on it, a slope without friction pushes at right angles to itself: the
+/// momentum along it grows by g sin θ.
+fn slide(record: &Record<'_>, out: &mut BenchmarkMeasurements) {
+    let scale = record.benchmark.scale;
+    let down = DVec3::new(scale.length, -scale.height, 0.0).normalize();
+    let ratio = |row: &FrameRecord| {
+        let speed = DVec3::from_slice(row.of_water.get(..3)?).dot(down);
+        (row.time > 0.0).then(|| speed / (-GRAVITY * down.y * row.time))
+    };
+    let curve = over_time(&record.rows, ratio);
+    out.put("slide_ratio", curve.last().map(|(_, ratio)| *ratio));
+    out.draw("speed", curve);
 }
 
 /// Numerical diffusion of a Taylor–Green vortex with this U², m²/s: α Δx² / (6 Δt) from the PIC

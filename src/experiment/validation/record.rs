@@ -190,13 +190,15 @@ impl<'a> Record<'a> {
                 let square = |v: &[f32; 3]| v.iter().map(|v| f64::from(*v).powi(2)).sum::<f64>();
                 vec![particles.velocity.iter().map(square).sum()]
             }
-            // The momentum of the water, kg m/s.
-            Measure::Body => {
+            // The momentum of the water, kg m/s, or its mean velocity, m/s.
+            Measure::Body | Measure::Slide => {
                 let all = particles.velocity.iter();
                 let sum: DVec3 = all.map(|v| Vec3::from_array(*v).as_dvec3()).sum();
-                (self.scene.water.rest_density * volume * sum)
-                    .to_array()
-                    .into()
+                let of_sum = match self.benchmark.measure {
+                    Measure::Body => self.scene.water.rest_density * volume,
+                    _ => 1.0 / particles.len() as f64,
+                };
+                (of_sum * sum).to_array().into()
             }
             _ => Vec::new(),
         }

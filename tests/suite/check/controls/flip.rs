@@ -80,8 +80,8 @@ pub const FLIP: &[Control] = &[
     ),
     control(
         "flip/cut_cells",
-        "2.0 * facing - 1.0",
-        "1.98 * facing - 0.98",
+        "face_weight[element] = weight.x",
+        "face_weight[element] = weight.x * 0.999",
         "flip/cut_cells",
         &["weight of faces for particles"],
     ),
