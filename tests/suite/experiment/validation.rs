@@ -164,6 +164,7 @@ benchmarks! {
     a_standing_wave_has_its_period: "standing wave",
     a_column_at_rest_weighs_what_it_weighs: "column at rest",
     a_vortex_turns_on: "Taylor–Green vortex",
+    water_slides_down_a_slope_without_drag: "water slides down a slope of 20°",
     a_heavy_ball_begins_to_sink_with_its_added_mass: "ball of 7000 kg/m³ released under water",
     a_ball_shares_its_momentum_with_its_added_mass: "ball as heavy as water, set in motion",
     a_raft_rolls_with_its_added_inertia: "roll of a raft",
