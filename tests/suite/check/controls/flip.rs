@@ -291,8 +291,8 @@ pub const FLIP: &[Control] = &[
     ),
     control(
         "flip/advect",
-        "+ 0.5 * params.time_step * here",
-        "- 0.5 * params.time_step * here",
+        "params.time_step * three(carried[i])",
+        "1.001 * params.time_step * three(carried[i])",
         "flip/advect",
         &["position"],
     ),
