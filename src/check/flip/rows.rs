@@ -53,7 +53,7 @@ bounds! {
         most: "the largest of them"]
         9.0 * place * range + 96.0 * U * most,
         "along each axis; three sums over 18 faces, and their quotient";
-    pub(super) START = [x: "|x|", step: "Δt", fastest: "the largest |v|", grid: "with solids " GRID]
+    pub(super) START = [x: "|x|", step: "Δt", fastest: "|v| at any face", grid: "with solids " GRID]
         U * (8.0 * x + 30.0 * step * fastest) + grid, "";
 
     pub(super) OF_DIFFERENCE = [unit: "U, or 2⁻⁵³ with f64",

@@ -280,7 +280,7 @@ impl Flip {
         }
         let moved = timings.time("flip/advect", || {
             let position = &sorted.cloud.position;
-            advect(model, &step, position, &given)
+            advect(model, &step, &bricks, position, &faces.velocity, &given)
         });
         let scale = model.scene.water.rest_density * model.cell_size() / step.kick;
         let mut pressure = waters.by_element(&projected.system, &projected.solution.x);

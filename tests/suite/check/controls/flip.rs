@@ -291,8 +291,8 @@ pub const FLIP: &[Control] = &[
     ),
     control(
         "flip/advect",
-        "params.time_step * three(carried[i])",
-        "1.001 * params.time_step * three(carried[i])",
+        "+ 0.5 * params.time_step * here",
+        "- 0.5 * params.time_step * here",
         "flip/advect",
         &["position"],
     ),
