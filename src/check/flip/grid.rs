@@ -243,7 +243,12 @@ pub(super) fn cut_cells(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
             let moved = moved(&|other| other.weight[e].distance(reference.weight[e]));
             let rise = rise_over(&state.model, &step, &elements.bricks, e as u32);
             let turned = rise.map_or(0.0, |rise| error / rise.max(1e-30));
-            pair(e, space.weight[e], reference.weight[e], [cut, moved, turned])
+            pair(
+                e,
+                space.weight[e],
+                reference.weight[e],
+                [cut, moved, turned],
+            )
         });
         for k in 0..4 {
             io.table.each(&LAYERS, elements.active(), |e| {

@@ -192,6 +192,7 @@ cases! {
     case_47_a_raft_beside_a_wall: 47,
     case_48_ten_crates_at_first: 48,
     case_49_a_body_on_a_slope: 49,
+    case_50_a_film_on_a_current: 50,
 }
 
 /// FLIP at rest, its surface on cell centres, where it divides by what is nearly 0, and a particle

@@ -66,10 +66,15 @@ pub const FLIP: &[Control] = &[
     ),
     control(
         "flip/cut_cells",
-        "open_volume[element] = volume;\n    open_hats[element] = hats",
-        "open_volume[element] = volume * 0.999;\n    open_hats[element] = hats * 0.999",
+        "open_volume[element] = volume;\n    open_hats[element] = hats;\n    let weight = ",
+        "open_volume[element] = volume * 0.999;\n    open_hats[element] = hats * 0.999;\n    \
+         let weight = 0.999 * ",
         "flip/cut_cells",
-        &["open volume", "open part of the hat"],
+        &[
+            "open volume",
+            "open part of the hat",
+            "weight of faces for particles",
+        ],
     ),
     control(
         "flip/cut_cells",
@@ -77,13 +82,6 @@ pub const FLIP: &[Control] = &[
         "pack2x16unorm(0.999 * hat.layers.xy)",
         "flip/cut_cells",
         &["open part of the hat's layers"],
-    ),
-    control(
-        "flip/cut_cells",
-        "face_weight[element] = weight.x",
-        "face_weight[element] = weight.x * 0.999",
-        "flip/cut_cells",
-        &["weight of faces for particles"],
     ),
     control(
         "flip/spread_faces",
