@@ -21,7 +21,7 @@
 @group(0) @binding(10) var<storage, read_write> open_hats: array<f32>;
 // The four layers of the hat, from the lowest up, 16 bits each; of cells that solids cut.
 @group(0) @binding(11) var<storage, read_write> open_layers: array<vec2u>;
-// Weights of the lower faces in the transfer to particles: open fractions, and `facing_weight`.
+// Weights of the lower faces in the transfer to particles: open fractions, and `facing_weights`.
 @group(0) @binding(12) var<storage, read_write> face_weight: array<f32>;
 #endif
 #ifdef MOVING_SOLIDS
@@ -38,12 +38,42 @@ const SOLID = 2u;
 // faces alone the solid's velocity.
 const LEAST_FACING = 1e-4;
 
-// Weights that a cell's faces have in the transfer to particles where a solid closes them; `rise`
-// is how much the distance to solids grows over the cell along each axis. A face that faces the
-// solid counts fully, with the solid's velocity, which stops the water. One that the water slides
-// along would drag it, and does not count.
-fn facing_weight(rise: vec3f) -> vec3f {
-    let facing = rise * rise / max(dot(rise, rise), 1e-30);
+// A distance that grows by less than this over a cell, in cells, says nothing of a direction, as in
+// the middle of a plate: its faces count fully.
+const LEAST_RISE = 0.1;
+
+// How much the distance to solids grows over a cell along each axis, metres.
+fn rises_over(corners: Corners) -> vec3f {
+    let near = corners.near;
+    let far = corners.far;
+    return vec3f(
+        dot(near.yw + far.yw - near.xz - far.xz, vec2f(0.25)),
+        dot(near.zw + far.zw - near.xy - far.xy, vec2f(0.25)),
+        dot(far - near, vec4f(0.25)),
+    );
+}
+
+// Weights that a cell's lower faces have in the transfer to particles where a solid closes them. A
+// face that faces the solid counts fully, with the solid's velocity, which stops the water. One that
+// the water slides along would drag it, and does not count. The solid's normal follows from the
+// growth of the distance from the face towards its open side and along it.
+fn facing_weights(cell: vec3f, corners: Corners) -> vec3f {
+    let near = corners.near;
+    let far = corners.far;
+    let own = rises_over(corners);
+    let before = vec3f(
+        rises_over(nearest_corners(cell - vec3f(1.0, 0.0, 0.0))).x,
+        rises_over(nearest_corners(cell - vec3f(0.0, 1.0, 0.0))).y,
+        rises_over(nearest_corners(cell - vec3f(0.0, 0.0, 1.0))).z,
+    );
+    let across = max(max(own, -before), vec3f(0.0));
+    // Growth along each face, from its four corners.
+    let along_x = vec2f(near.z + far.z - near.x - far.x, far.x + far.z - near.x - near.z);
+    let along_y = vec2f(near.y + far.y - near.x - far.x, far.x + far.y - near.x - near.y);
+    let along_z = vec2f(near.y + near.w - near.x - near.z, near.z + near.w - near.x - near.y);
+    let along = 0.25 * vec3f(dot(along_x, along_x), dot(along_y, along_y), dot(along_z, along_z));
+    let least = LEAST_RISE * params.cell_size;
+    let facing = (across * across + least * least) / (across * across + along + least * least);
     let part = max(2.0 * facing - 1.0, vec3f(0.0));
     return max(part * part, vec3f(LEAST_FACING));
 }
@@ -73,14 +103,13 @@ fn main(
     for (var once = 0; once < select(0, 1, cut.solids != 0u); once++) {
         let near = cut.corners.near;
         let far = cut.corners.far;
-        let rises = vec3f(
-            dot(near.yw + far.yw - near.xz - far.xz, vec2f(0.25)),
-            dot(near.zw + far.zw - near.xy - far.xy, vec2f(0.25)),
-            dot(far - near, vec4f(0.25)),
-        );
+        let rises = abs(rises_over(cut.corners));
         let center = dot(near + far, vec4f(0.125));
-        let rise = abs(rises.x) + abs(rises.y) + abs(rises.z);
-        closed = select(closed, facing_weight(rises), cut.lower_of_walls > vec3f(0.0));
+        let rise = rises.x + rises.y + rises.z;
+        let by_solid = (lower == vec3f(0.0)) & (cut.lower_of_walls > vec3f(0.0));
+        for (var some = 0; some < select(0, 1, any(by_solid)); some++) {
+            closed = select(closed, facing_weights(cell, cut.corners), by_solid);
+        }
         volume *= clamp(0.5 + center / max(rise, 1e-20), 0.0, 1.0);
         let hat = open_hat(cell, rise, cut.solids);
         hats = hat.part;

@@ -17,7 +17,7 @@ use swell_reference::flip::{
     cut_cells as reference_cut_cells, extrapolate as reference_extrapolate,
     find_change as reference_find_change, find_depth, find_excess as reference_find_excess,
     find_water as reference_find_water, friction_rates, gather_centers as reference_gather_centers,
-    gather_faces as reference_gather_faces, is_near_half, let_in as reference_let_in, rise_over,
+    gather_faces as reference_gather_faces, growth_over, is_near_half, let_in as reference_let_in,
     sensitivity, wall_friction as reference_wall_friction,
 };
 use swell_scene::flip::Surface;
@@ -241,8 +241,8 @@ pub(super) fn cut_cells(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
         });
         io.table.each(&FACE_WEIGHT, elements.active(), |e| {
             let moved = moved(&|other| other.weight[e].distance(reference.weight[e]));
-            let rise = rise_over(&state.model, &step, &elements.bricks, e as u32);
-            let turned = rise.map_or(0.0, |rise| error / rise.max(1e-30));
+            let growth = growth_over(&state.model, &step, &elements.bricks, e as u32);
+            let turned = growth.map_or(0.0, |growth| error / growth);
             pair(
                 e,
                 space.weight[e],

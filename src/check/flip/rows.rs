@@ -136,10 +136,10 @@ entries! {
             tie PARTS;
         FACE_WEIGHT = "weight of faces for particles", "": [cut: "" CUT,
             moved: "what it changes by as solids' distances move by " GRID,
-            turned: "that over their growth over the cell"]
-            cut + 3.0 * moved + (48.0 * turned + 24.0 * U).min(1.0),
-            "of its square: four for 2 f − 1 and its square, two for f, a growth along each of \
-             three axes off by twice a distance's error; a quotient of 2.5 ulp and seven roundings";
+            turned: "that over their growth about a face"]
+            cut + 3.0 * moved + 48.0 * turned + 24.0 * U,
+            "four for the square of 2 f − 1, two for f, a growth along each of three axes off by \
+             twice a distance's error; a quotient of 2.5 ulp and seven roundings";
         CLOSED = "velocity of closed faces", "m/s": [v: "|v|",
             far: "the largest of solids' |spin| (|x| + |its point of rest|)",
             shape: "of shapes that change " FLOWED]

@@ -37,7 +37,7 @@ pub use rotation::{grid_confinement, grid_curl};
 pub use solids::Solid;
 pub use solver::Flip;
 pub use sort::{Cloud, Sorted, Survey, assign_cells, reorder, survey};
-pub use to_grid::{Faces, OpenSpace, cut_cells, gather_faces, rise_over};
+pub use to_grid::{Faces, OpenSpace, cut_cells, gather_faces, growth_over};
 pub use to_particles::{
     GridTransfer, Moved, advect, aim, extrapolate, find_change, grid_to_particle, push_apart,
 };

@@ -25,6 +25,10 @@ const LEAST_OPEN: f64 = 0.02;
 /// Least weight of a closed face in the transfer to particles.
 const LEAST_FACING: f64 = 1e-4;
 
+/// A distance that grows by less than this over a cell, in cells, says nothing of a direction, as in
+/// the middle of a plate: its faces count fully.
+const LEAST_RISE: f64 = 0.1;
+
 /// The space that walls and solids leave open for water.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OpenSpace {
@@ -43,7 +47,7 @@ pub struct OpenSpace {
     /// The same for each of the hat's four layers, half a cell thick, from the lowest up along the
     /// axis closest to gravity.
     pub layers: Vec<[f64; 4]>,
-    /// Weights of the lower faces in [`super::grid_to_particle`], see `facing_weight`; all 1
+    /// Weights of the lower faces in [`super::grid_to_particle`], see `facing_weights`; all 1
     /// without solids.
     pub weight: Vec<DVec3>,
     /// Velocities of the lower faces where they are closed, m/s.
@@ -203,28 +207,63 @@ pub(super) fn cut_faces<'a>(model: &Model, step: &'a FlipSubstep<'_>, cell: DVec
     found
 }
 
-/// Returns the weights that faces of a cell have in the transfer to particles where a solid closes
-/// them. `rise` is how much the distance to solids grows over the cell along each axis. A face that
-/// faces the solid counts fully, with the solid's velocity, which stops the water. One that the
-/// water slides along does not count: it would drag the water. At 45° and more between the two
-/// normals the weight is the least one, which gives particles between closed faces alone the
-/// solid's velocity.
-fn facing_weight(rise: DVec3) -> DVec3 {
-    let facing = rise * rise / rise.length_squared().max(1e-30);
-    let part = (2.0 * facing - 1.0).max(DVec3::ZERO);
-    (part * part).max(DVec3::splat(LEAST_FACING))
+/// Returns the growth of the distance to solids about each lower face of a cell, towards the face's
+/// open side and along the face, metres over a cell.
+fn growth_at_faces(
+    model: &Model,
+    step: &FlipSubstep<'_>,
+    cell: DVec3,
+    corners: &[f64; 8],
+) -> [(f64, f64); 3] {
+    [0, 1, 2].map(|axis| {
+        let before = cell - DVec3::AXES[axis];
+        let before = nearest_corners(model, step, before).map_or(0.0, |it| rise(&it)[axis]);
+        let across = rise(corners)[axis].max(-before).max(0.0);
+        let slope = |other: usize| {
+            let of = |k: usize| match k >> axis & 1 {
+                0 => (2.0 * (k >> other & 1) as f64 - 1.0) * corners[k],
+                _ => 0.0,
+            };
+            0.5 * (0..8).map(of).sum::<f64>()
+        };
+        (across, slope((axis + 1) % 3).hypot(slope((axis + 2) % 3)))
+    })
 }
 
-/// Returns how much the distance to solids grows over a cell, metres; `None` if no solid may cut
-/// it.
-pub fn rise_over(
+/// Distances of the nearest solid at a cell's corners, metres, if one may cut it.
+fn nearest_corners(model: &Model, step: &FlipSubstep<'_>, cell: DVec3) -> Option<[f64; 8]> {
+    let all = (step.solids.iter()).filter_map(|solid| solid.corners(cell, model.cell_size()));
+    all.reduce(|a, b| std::array::from_fn(|k| a[k].min(b[k])))
+}
+
+/// Returns the weights that a cell's lower faces have in the transfer to particles where a solid
+/// closes them. A face that faces the solid counts fully, with the solid's velocity, which stops
+/// the water. One that the water slides along does not count: it would drag the water. At 45° and
+/// more between the two normals the weight is the least one, which gives particles between closed
+/// faces alone the solid's velocity.
+fn facing_weights(growth: [(f64, f64); 3], least: f64) -> DVec3 {
+    let weight = |(across, along): (f64, f64)| {
+        let square = across * across + least * least;
+        let part = (2.0 * square / (square + along * along) - 1.0).max(0.0);
+        (part * part).max(LEAST_FACING)
+    };
+    DVec3::from_array(growth.map(weight))
+}
+
+/// Returns the least growth of the distance to solids about the lower faces of a cell by which
+/// [`OpenSpace::weight`] is found, metres; `None` if no solid may cut the cell.
+pub fn growth_over(
     model: &Model,
     step: &FlipSubstep<'_>,
     bricks: &Bricks,
     element: u32,
 ) -> Option<f64> {
-    let found = cut_faces(model, step, corner(bricks, element));
-    found.corners.map(|corners| rise(&corners).length())
+    let cell = corner(bricks, element);
+    let corners = nearest_corners(model, step, cell)?;
+    let growth = growth_at_faces(model, step, cell, &corners);
+    let least = LEAST_RISE * model.cell_size();
+    let all = growth.map(|(across, along)| across.hypot(along).hypot(least));
+    all.into_iter().reduce(f64::min)
 }
 
 /// Computes the open fractions of each cell and of its lower faces, and the flux of solids through
@@ -260,7 +299,9 @@ pub fn cut_cells(model: &Model, step: &FlipSubstep<'_>, bricks: &Bricks) -> Open
             volume *= cut(&corners).volume;
             hat = OpenHat::of(model, step, &near, cell, &corners);
             let by_solid = of_walls[0].cmpgt(DVec3::ZERO);
-            closed = DVec3::select(by_solid, facing_weight(rise(&corners)), closed);
+            let growth = growth_at_faces(model, step, cell, &corners);
+            let weights = facing_weights(growth, LEAST_RISE * model.cell_size());
+            closed = DVec3::select(by_solid, weights, closed);
         }
         let weight = match step.solids.is_empty() {
             true => DVec3::ONE,
