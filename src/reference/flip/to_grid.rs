@@ -48,7 +48,7 @@ pub struct OpenSpace {
     /// axis closest to gravity.
     pub layers: Vec<[f64; 4]>,
     /// Weights of the lower faces in [`super::grid_to_particle`], see `facing_weights`; all 1
-    /// without solids.
+    /// in cells without solids.
     pub weight: Vec<DVec3>,
     /// Velocities of the lower faces where they are closed, m/s.
     pub closed_velocity: Vec<DVec3>,

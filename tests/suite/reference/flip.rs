@@ -274,8 +274,8 @@ fn rows_of_motion(case: &Case, pair: &Pair, trace: &Trace) -> Vec<Row> {
     // rounding, over faces that differ by up to 1 m/s.
     let given = 3f64.sqrt() * faces + 8.0 * PLACE;
     // Beside solids weights are multiplied by open fractions, which are off by 100 u (as
-    // `face_open`), in numerator and denominator of a quotient; they are at least 0.02, and faces
-    // differ by up to 1 m/s.
+    // `face_open`), in numerator and denominator of a quotient; they are at least 0.02 beside water,
+    // and faces differ by up to 1 m/s.
     let is_cut = case.boundary.distance.is_some() || !case.boundary.moving.is_empty();
     let given = given + if is_cut { 2.0 * 100.0 * U / 0.02 } else { 0.0 };
     let (mut x, mut v, mut touching) = (0.0f64, 0.0f64, 0.0f64);
