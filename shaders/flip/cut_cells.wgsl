@@ -54,9 +54,9 @@ fn rises_over(corners: Corners) -> vec3f {
 }
 
 // Weights that a cell's lower faces have in the transfer to particles where a solid closes them. A
-// face that faces the solid counts fully, with the solid's velocity, which stops the water. One that
-// the water slides along would drag it, and does not count. The solid's normal follows from the
-// growth of the distance from the face towards its open side and along it.
+// face that faces the solid counts fully, with the solid's velocity, which stops the water. One
+// that the water slides along would drag it, and does not count. The solid's normal follows from
+// the growth of the distance from the face towards its open side and along it.
 fn facing_weights(cell: vec3f, corners: Corners) -> vec3f {
     let near = corners.near;
     let far = corners.far;

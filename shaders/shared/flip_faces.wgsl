@@ -6,8 +6,8 @@
 #import "shared/flip_solid.wgsl"
 
 // A face with a smaller open fraction is closed: such faces drive jets at edges and corners in
-// water at rest. A larger threshold blocks the flow along a wall: with 0.3, the deviation from Lamb's
-// solution for water in a turning elliptic drum is 3.6 times as large.
+// water at rest. A larger threshold blocks the flow along a wall: with 0.3, the deviation from
+// Lamb's solution for water in a turning elliptic drum is 3.6 times as large.
 const LEAST_OPEN = 0.02;
 
 struct CutFaces {

@@ -25,8 +25,8 @@ const LEAST_OPEN: f64 = 0.02;
 /// Least weight of a closed face in the transfer to particles.
 const LEAST_FACING: f64 = 1e-4;
 
-/// A distance that grows by less than this over a cell, in cells, says nothing of a direction, as in
-/// the middle of a plate: its faces count fully.
+/// A distance that grows by less than this over a cell, in cells, says nothing of a direction, as
+/// in the middle of a plate: its faces count fully.
 const LEAST_RISE: f64 = 0.1;
 
 /// The space that walls and solids leave open for water.
