@@ -6,14 +6,24 @@ use glam::{DVec3, Vec3};
 
 use swell::{
     files::{load_scene, parse_scene},
-    scene::Method,
+    scene::{Method, Scene},
     stage::{device::Opened, drive::Drive, prepare::Start},
 };
 
 use crate::support::{context, device};
 
-/// Quarter of a second.
+/// A quarter of a second on the slope, half a second beside the plate.
 const FRAMES: u32 = 24;
+
+/// Mean velocity of the water after [`FRAMES`] frames, m/s.
+fn mean_velocity(opened: &Opened, scene: &Scene) -> DVec3 {
+    let start = Start::of(scene).unwrap();
+    let mut drive = Drive::new(opened, scene, &start, false).unwrap();
+    let last = (0..FRAMES).map(|_| drive.advance().unwrap()).last();
+    let velocity = last.unwrap().particles.velocity;
+    let sum: DVec3 = velocity.iter().map(|&v| Vec3::from(v).as_dvec3()).sum();
+    sum / velocity.len() as f64
+}
 
 /// Speed along the slope after a quarter of a second, over g t sin θ: whatever the water does, a
 /// slope without friction pushes at right angles to itself.
@@ -26,13 +36,8 @@ fn speed_ratio(opened: &Opened, method: Method, degrees: f64) -> f64 {
     ];
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/validation/slope.toml");
     let scene = load_scene(&file, &set).unwrap();
-    let start = Start::of(&scene).unwrap();
-    let mut drive = Drive::new(opened, &scene, &start, false).unwrap();
-    let last = (0..FRAMES).map(|_| drive.advance().unwrap()).last();
-    let velocity = last.unwrap().particles.velocity;
-    let sum: DVec3 = velocity.iter().map(|&v| Vec3::from(v).as_dvec3()).sum();
     let (sine, cosine) = degrees.to_radians().sin_cos();
-    let along = sum.dot(DVec3::new(cosine, -sine, 0.0)) / velocity.len() as f64;
+    let along = mean_velocity(opened, &scene).dot(DVec3::new(cosine, -sine, 0.0));
     along / (9.81 * sine * f64::from(FRAMES) / scene.shot.frames_per_second)
 }
 
@@ -77,11 +82,7 @@ fn against_a_plate(opened: &Opened, is_mirrored: bool) -> f64 {
     );
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/hard_cases");
     let scene = parse_scene(&text, Path::new("plate.toml"), &folder, &[]).unwrap();
-    let start = Start::of(&scene).unwrap();
-    let mut drive = Drive::new(opened, &scene, &start, false).unwrap();
-    let last = (0..24).map(|_| drive.advance().unwrap()).last();
-    let velocity = last.unwrap().particles.velocity;
-    velocity.iter().map(|v| f64::from(v[0])).sum::<f64>() / velocity.len() as f64
+    mean_velocity(opened, &scene).x
 }
 
 /// The plate stops water alike on both sides, although faces are stored with the cells after them.
