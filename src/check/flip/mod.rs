@@ -52,6 +52,11 @@ const COMPARISONS: &[Comparison<FlipState>] = &[
         || names![buffers::LIQUID_DISTANCE],
         gaps::close_gaps,
     ),
+    comparison(
+        "flip/find_contraction",
+        || names![buffers::SOLID_FLUX],
+        gaps::find_contraction,
+    ),
     comparison("flip/find_excess", NONE, grid::find_excess),
     comparison(
         "flip/let_in",
@@ -227,6 +232,7 @@ fn boundary_work(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let elements = state.elements();
     let pressure = elements.scalars(&io.after, solved::PRESSURE)?;
     let flux = elements.scalars(&io.after, buffers::SOLID_FLUX)?;
+    let contraction = elements.scalars(&io.after, buffers::contraction(elements.stride))?;
     let kind = io.before.get(buffers::CELL_KIND, elements.cells)?;
     let (step, bricks, space) = (state.step(), &elements.bricks, state.space());
     let density = elements.scalars(&io.before, buffers::DENSITY)?;
@@ -234,7 +240,7 @@ fn boundary_work(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let wet = elements.wet();
     let sums = io.after.get(buffers::BOUNDARY_WORK, wet.len() / 64)?;
     let term = |e: usize| match kind[e] {
-        FLUID if !is_filling(e) => -pressure[e] * flux[e],
+        FLUID if !is_filling(e) => -pressure[e] * (flux[e] - contraction[e]),
         _ => 0.0,
     };
     io.table.each(&WORK, 0..sums.len(), |group| {

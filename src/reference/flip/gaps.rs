@@ -46,23 +46,26 @@ struct End {
     beside: f64,
 }
 
-/// Inputs of the search for closing gaps.
-pub struct Gaps<'a> {
+/// Water on the grid before the projection.
+#[derive(Clone, Copy)]
+pub struct Unprojected<'a> {
     /// Scene and grid.
     pub model: &'a Model,
     /// Parameters of the substep.
     pub step: &'a FlipSubstep<'a>,
     /// Layout of the elements.
     pub bricks: &'a Bricks,
-    /// Open space, with cell kinds from [`super::find_water`].
+    /// Open space, with cell kinds from [`super::find_water`], later from [`close_gaps`].
     pub space: &'a OpenSpace,
     /// Relative densities from [`super::gather_centers`].
     pub density: &'a [f64],
     /// Velocities at the lower faces, including gravity, m/s. Shape (elements, 3 components).
     pub velocity: &'a [DVec3],
+    /// The same before forces.
+    pub before: &'a [DVec3],
 }
 
-impl Gaps<'_> {
+impl Unprojected<'_> {
     /// Returns the length along an axis that a cell lacks, in cells.
     fn lack(&self, element: u32, axis: usize) -> f64 {
         let parts = open_parts(self.step, self.bricks, self.space, element);
@@ -195,7 +198,7 @@ impl Gaps<'_> {
 
 /// Turns the cells of closing gaps into water: returns the updated kinds and fluxes, and updates
 /// the distances to the surface, metres, also where water hits a surface.
-pub fn close_gaps(gaps: &Gaps<'_>, distance: &mut [f64]) -> OpenSpace {
+pub fn close_gaps(gaps: &Unprojected<'_>, distance: &mut [f64]) -> OpenSpace {
     let filled = per_cell(gaps.bricks, |element| gaps.filled(element, 0.0));
     parallel::for_each_mut(distance, |e, distance| {
         *distance = gaps.hit_distance(e as u32, *distance);

@@ -3,13 +3,13 @@
 use glam::DVec3;
 
 use super::{
-    BodyCells, Centers, Cloud, DeepCells, Faces, Gaps, Model, Motion, Trace, Waters, advect, aim,
-    assign_cells,
+    BodyCells, Centers, Cloud, DeepCells, Faces, Model, Motion, Trace, Unprojected, Waters, advect,
+    aim, assign_cells,
     bodies::{Stopped, sped_up},
     carry_bodies, carry_deep, close_gaps, couple_bodies, cut_cells,
     effects::{self, FaceInputs, Flying},
-    extrapolate, fill_deep, find_buried, find_change, find_depth, find_excess, find_water, forces,
-    gather_centers, gather_faces, grid_to_particle, let_in, place_deep,
+    extrapolate, fill_deep, find_buried, find_change, find_contraction, find_depth, find_excess,
+    find_water, forces, gather_centers, gather_faces, grid_to_particle, let_in, place_deep,
     projection::project as project_faces,
     push_apart, reorder,
     sort::by_id,
@@ -22,6 +22,7 @@ use swell_domain::{
     boundary::Boundary,
     bricks::Bricks,
     budget::Breach,
+    flip::LAYERS,
     gauge::Gauge,
     particles::{Particles, max_speed},
     poisson::FLUID,
@@ -137,17 +138,21 @@ impl Flip {
             find_water(model, &bricks, &space, &depth)
         });
         space.kind = kind;
-        space = timings.time("flip/close_gaps", || {
-            let gaps = Gaps {
-                model,
-                step: &step,
-                bricks: &bricks,
-                space: &space,
-                density: &density,
-                velocity: &faces.velocity,
-            };
-            close_gaps(&gaps, &mut distance)
+        let forced = Unprojected {
+            model,
+            step: &step,
+            bricks: &bricks,
+            space: &space,
+            density: &density,
+            velocity: &faces.velocity,
+            before: &faces.change,
+        };
+        let closed = timings.time("flip/close_gaps", || close_gaps(&forced, &mut distance));
+        let contraction = timings.time("flip/find_contraction", || {
+            let space = &closed;
+            find_contraction(&Unprojected { space, ..forced })
         });
+        space = closed.less(&contraction);
         let mut excess = match model.settings().density_correction {
             true => timings.time("flip/find_excess", || {
                 find_excess(&step, &bricks, &space, &density)
@@ -246,7 +251,7 @@ impl Flip {
         step.solids = model.solids_at(&bodies, step.start, step.length);
         timings.time("flip/extrapolate", || {
             find_change(model, &bricks, &space, &mut faces);
-            for layer in 2..=step.layers as u32 {
+            for layer in 2..=LAYERS as u32 {
                 extrapolate(&step, &bricks, layer, &mut faces);
             }
         });
@@ -280,7 +285,7 @@ impl Flip {
         }
         let moved = timings.time("flip/advect", || {
             let position = &sorted.cloud.position;
-            advect(model, &step, &bricks, position, &faces.velocity, &given)
+            advect(model, &step, position, &given)
         });
         let scale = model.scene.water.rest_density * model.cell_size() / step.kick;
         let mut pressure = waters.by_element(&projected.system, &projected.solution.x);
@@ -290,6 +295,7 @@ impl Flip {
         }
         Ok(Trace {
             solid_flux: waters.flux().to_vec(),
+            contraction,
             bodies,
             coupled: coupled.clone(),
             force_work,

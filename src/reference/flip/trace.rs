@@ -31,8 +31,10 @@ pub struct Trace {
     pub is_short: bool,
     /// Pressure by element, Pa; 0 where there is no water.
     pub pressure: Vec<f64>,
-    /// Σ ± (1 − f) u_solid of each cell after the projections, m/s.
+    /// Σ ± (1 − f) u_solid of each cell after the projections, less `contraction`, m/s.
     pub solid_flux: Vec<f64>,
+    /// Flux that makes up for each cell's contraction (flip/find_contraction), m/s.
+    pub contraction: Vec<f64>,
     /// Work of the scene's forces, joules.
     pub force_work: f64,
     /// Cells that bodies touch.
@@ -74,7 +76,7 @@ impl Model {
             let is_filling = is_filling(step, bricks, space, &trace.centers.density, e as u32);
             match is_filling {
                 true => 0.0,
-                false => -trace.pressure[e] * trace.solid_flux[e],
+                false => -trace.pressure[e] * (trace.solid_flux[e] + trace.contraction[e]),
             }
         });
         let sum: f64 = terms.sum();

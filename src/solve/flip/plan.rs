@@ -7,7 +7,7 @@ use crate::{
 };
 use swell_domain::{
     bricks::{CELLS, table_dims},
-    flip::{layers, stored_cells},
+    flip::{LAYERS as FACE_LAYERS, stored_cells},
     forces::Medium,
 };
 use swell_gpu::{buffer::BufferSpec, program::PassSpec, recording::Command, sort};
@@ -18,7 +18,7 @@ use swell_scene::{
 
 use super::{
     buffers::*,
-    record::{Commands, FIRST_LAYER, WALL_FRICTION},
+    record::{Commands, WALL_FRICTION},
 };
 
 /// Faces of one component on one side of a cell that the cell's particles reach.
@@ -112,6 +112,7 @@ fn conditions(plan: &Plan, scene: &FlipScene) -> Vec<&'static str> {
         ("BODIES", scene.has_bodies()),
         ("BAND", flip.band.is_some()),
         (forces::MESHES, forces::has_meshes(scene, Medium::Water)),
+        ("WORKED_ON", scene.is_worked_on()),
         ("F64", flip.pressure.precision == Precision::F64),
     ];
     let holding = all.into_iter().filter(|(_, holds)| *holds);
@@ -185,7 +186,8 @@ fn bricks(plan: &Plan, scene: &FlipScene, table: &mut BufferTable) {
         "flip",
         [FACE_LAYER, CELL_KIND].map(|cells| cells.sized(all)),
     );
-    table.watch("flip", SOLID_FLUX.sized(all));
+    let planes = if scene.is_worked_on() { 2 } else { 1 };
+    table.watch("flip", SOLID_FLUX.sized(planes * all));
     table.watch("flip", DENSITY.sized(all));
     if flip.density_correction {
         table.watch("flip", DENSITY_EXCESS.sized(all));
@@ -214,9 +216,8 @@ fn bricks(plan: &Plan, scene: &FlipScene, table: &mut BufferTable) {
         table.add("flip", DEEP_SLOT.sized(slots));
         table.watch("flip", DEEP_DEPTH.sized(all));
     }
-    let layers = layers(flip.cfl);
     table.add("flip", PARAMS.sized(1));
     table.add("flip", AXES.sized(3));
-    table.add("flip", LAYERS.sized(layers));
-    table.add("flip", GROUPS.sized(FIRST_LAYER + layers));
+    table.add("flip", LAYERS.sized(FACE_LAYERS - 1));
+    table.add("flip", GROUPS.sized(2));
 }
