@@ -24,7 +24,10 @@ fn main(
     let element = select(0u, thread + CELLS, is_inside);
     let is_thin = density[element] < 0.5 && !is_buried(element, vec3f(own_cell(element)));
     let is_water = cell_kind[element] == 1u && !is_thin;
-    let flux = solid_flux[element] - solid_flux[params.stride + element];
+    var flux = solid_flux[element];
+#ifdef CONTRACTION
+    flux -= solid_flux[params.stride + element];
+#endif
     let work = select(0.0, -pressure[element] * flux, is_water && is_inside);
     let sum = sum_of_group(local, work);
     if local == 0u && is_inside {

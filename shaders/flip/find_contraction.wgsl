@@ -1,8 +1,11 @@
 // Water that strains contracts when its particles go straight on: the paths x + Δt u multiply
-// volumes by 1 + Δt ∇·u − ½ Δt² tr (∇u)² + …, where ∇·u = O(Δt). The projection makes up for it
-// with ∇·u = ½ Δt tr (∇u)². The gradient is that of the velocities before forces, which would only
-// fall short of closed faces; without their divergence, which the projection replaces. It moves
-// with the water: a current adds nothing.
+// volumes by 1 + Δt ∇·u + Δt² m + …, with the sum m of the second minors ∂_i u_i ∂_j u_j − ∂_i u_j
+// ∂_j u_i of ∇u. The projection makes up for it with ∇·u = −Δt m. The velocities are the particles'
+// before forces, which no pressure has balanced yet. A current adds nothing: ∇u moves with the
+// water.
+//
+// m is a divergence, and so is this sum on the staggered grid, with products of slopes in the
+// middle of cells and of those at edges: over water without a border it is 0, whatever the noise.
 // Cells that walls or solids cut have none, because their closed faces do not have the velocity of
 // the water that slides along them.
 #import "shared/thread.wgsl"
@@ -10,12 +13,11 @@
 #import "shared/flip_buried.wgsl"
 
 @group(0) @binding(2) var<storage, read> density: array<f32>;
-@group(0) @binding(3) var<storage, read> face_velocity: array<f32>;
 // Holds the velocity before forces here.
 @group(0) @binding(4) var<storage, read> face_change: array<f32>;
 @group(0) @binding(7) var<storage, read> face_open: array<f32>;
 @group(0) @binding(6) var<storage, read> cell_kind: array<u32>;
-// With WORKED_ON the contraction alone follows, which is no work by boundaries.
+// With CONTRACTION the contraction alone follows, which is no work by boundaries.
 @group(0) @binding(5) var<storage, read_write> solid_flux: array<f32>;
 
 const FLUID = 1u;
@@ -41,42 +43,67 @@ fn is_whole(element: u32, cell: vec3f) -> bool {
     return density[element] >= 0.5 && volume >= WHOLE;
 }
 
-// Whether the cells before and after along each axis are whole.
+// Whether the cells before and after along each axis are whole, and whether the faces to them are
+// closed.
 var<private> is_low: vec3<bool>;
 var<private> is_high: vec3<bool>;
+var<private> is_low_shut: vec3<bool>;
+var<private> is_high_shut: vec3<bool>;
 
-// A component on the lower face of the cell at `offset`: that of the wall or solid if it is closed.
-fn on_face(component: u32, offset: vec3i) -> f32 {
-    let face = component * params.stride + element_at(offset);
-    return select(face_change[face], face_velocity[face], face_open[face] == 0.0);
+// Index of the lower face of the cell at `offset`.
+fn face_at(component: u32, offset: vec3i) -> u32 {
+    return component * params.stride + element_at(offset);
 }
 
-// Sum of a component on both of its faces of the cell at `offset`.
-fn on_faces(component: u32, offset: vec3i) -> f32 {
-    return on_face(component, offset) + on_face(component, offset + unit(component));
+// Slope of a component across `axis`, per cell, between its face at `offset` and the one at `to`.
+fn slope(component: u32, offset: vec3i, to: vec3i) -> f32 {
+    return face_change[face_at(component, offset + to)] - face_change[face_at(component, offset)];
 }
 
-// Derivative of a component along another axis, per cell; one-sided beside cells that are not
-// whole.
-fn slope_along(component: u32, axis: u32) -> f32 {
-    let own = on_faces(component, vec3i(0));
-    let low = select(own, on_faces(component, -unit(axis)), is_low[axis]);
-    let high = select(own, on_faces(component, unit(axis)), is_high[axis]);
-    let steps = u32(is_low[axis]) + u32(is_high[axis]);
-    return 0.5 * (high - low) / f32(max(steps, 1u));
-}
-
-// tr (∇u)² without the divergence, over the square of a cell, (m/s)².
-fn trace_of_square() -> f32 {
+// Slope of each component along its own axis, per cell. Of a closed face the particles near it only
+// know the side that they are on: there the slope follows from the other two.
+fn slopes_along() -> vec3f {
     var along = vec3f(0.0);
-    var cross = 0.0;
+    for (var a = 0u; a < 3u; a++) {
+        along[a] = slope(a, vec3i(0), unit(a));
+    }
+    let is_shut = is_low_shut | is_high_shut;
+    let is_alone = u32(is_shut.x) + u32(is_shut.y) + u32(is_shut.z) == 1u;
+    return select(along, -(along.yzx + along.zxy), is_shut & vec3<bool>(is_alone));
+}
+
+// Mean over the cell's edges across two axes of the product of the slopes there. On closed faces it
+// is 0, because water that slides along them has the same velocity into them everywhere; of the
+// others only those count whose other cells along the axes are whole.
+fn product_at_edges(a: u32, b: u32) -> f32 {
+    var sum = 0.0;
+    var count = 0u;
+    for (var k = 0u; k < 4u; k++) {
+        let is_far_a = (k & 1u) != 0u;
+        let is_far_b = (k & 2u) != 0u;
+        let is_shut = select(is_low_shut[a], is_high_shut[a], is_far_a)
+            || select(is_low_shut[b], is_high_shut[b], is_far_b);
+        let is_inner = !is_shut && select(is_low[a], is_high[a], is_far_a)
+            && select(is_low[b], is_high[b], is_far_b);
+        let to_a = select(-unit(a), unit(a), is_far_a);
+        let to_b = select(-unit(b), unit(b), is_far_b);
+        let across_b = slope(a, max(to_a, vec3i(0)), to_b);
+        let across_a = slope(b, max(to_b, vec3i(0)), to_a);
+        sum += select(0.0, select(-1.0, 1.0, is_far_a == is_far_b) * across_a * across_b, is_inner);
+        count += u32(is_inner || is_shut);
+    }
+    return sum / f32(max(count, 1u));
+}
+
+// Sum of the second minors of the velocity's gradient, over the square of a cell, (m/s)².
+fn sum_of_minors() -> f32 {
+    let along = slopes_along();
+    var sum = 0.0;
     for (var a = 0u; a < 3u; a++) {
         let b = (a + 1u) % 3u;
-        along[a] = on_face(a, unit(a)) - on_face(a, vec3i(0));
-        cross += slope_along(a, b) * slope_along(b, a);
+        sum += along[a] * along[b] - product_at_edges(a, b);
     }
-    along -= (along.x + along.y + along.z) / 3.0;
-    return dot(along, along) + 2.0 * cross;
+    return sum;
 }
 
 @compute @workgroup_size(64)
@@ -99,13 +126,15 @@ fn main(
             let step = unit(axis);
             is_low[axis] = is_whole(element_at(-step), cell - vec3f(step));
             is_high[axis] = is_whole(element_at(step), cell + vec3f(step));
+            is_low_shut[axis] = face_open[face_at(axis, vec3i(0))] == 0.0;
+            is_high_shut[axis] = face_open[face_at(axis, step)] == 0.0;
         }
         let most = MOST * params.cell_size / params.time_step;
-        let rate = 0.5 * params.time_step * params.inverse_cell_size;
-        flux = clamp(rate * trace_of_square(), -most, most);
+        let rate = params.time_step * params.inverse_cell_size;
+        flux = clamp(-rate * sum_of_minors(), -most, most);
     }
     solid_flux[element] -= flux;
-#ifdef WORKED_ON
+#ifdef CONTRACTION
     solid_flux[params.stride + element] = -flux;
 #endif
 }

@@ -23,8 +23,7 @@ pub(super) fn close_gaps(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
         bricks: &elements.bricks,
         space,
         density: state.density(),
-        velocity: &faces.velocity,
-        before: &faces.change,
+        faces: &faces,
     };
     let has_distance = state.model.settings().surface == Surface::GhostFluid;
     let mut distance = match has_distance {
@@ -86,8 +85,7 @@ pub(super) fn find_contraction(state: &mut FlipState, io: &mut Io<'_>) -> PassRe
         bricks: &elements.bricks,
         space,
         density: state.density(),
-        velocity: &faces.velocity,
-        before: &faces.change,
+        faces: &faces,
     };
     let contraction = reference_find_contraction(&water);
     let before = elements.scalars(&io.before, buffers::SOLID_FLUX)?;
@@ -97,26 +95,17 @@ pub(super) fn find_contraction(state: &mut FlipState, io: &mut Io<'_>) -> PassRe
     io.table.each(&CONTRACTION, elements.active(), |e| {
         let near_whole = |e: usize| f64::from((space.volume[e] - WHOLE).abs() <= cut);
         let is_tie = elements.largest_about(e, near_whole) > 0.0;
-        let fastest = |e: usize| {
-            faces.velocity[e]
-                .abs()
-                .max(faces.change[e].abs())
-                .max_element()
-        };
-        let [rate, most, slope] = match water.strains(e as u32) {
-            true => {
-                let slopes = water.gradient(e as u32).to_cols_array();
-                let sum: f64 = slopes.iter().map(|slope| slope.abs()).sum();
-                [rate, elements.largest_about(e, fastest), sum]
-            }
-            false => [0.0; 3],
+        let minors: f64 = match water.strains(e as u32) {
+            true => water.minors(e as u32).iter().map(|minor| minor.1).sum(),
+            false => 0.0,
         };
         let exact = before[e] - contraction[e];
-        let sizes = [rate, most, slope, before[e].abs().max(exact.abs())];
+        let sizes = [rate, minors, before[e].abs().max(exact.abs())];
         (!is_tie).then(|| pair(e, flux[e], exact, sizes))
     });
+    let mut alone = Vec::new();
     if state.scene.is_worked_on() {
-        let alone = elements.scalars(&io.after, buffers::contraction(elements.stride))?;
+        alone = elements.scalars(&io.after, buffers::contraction(elements.stride))?;
         io.table.each(&CONTRACTION_ALONE, elements.active(), |e| {
             let sizes = [flux[e].abs().max(before[e].abs())];
             pair(e, alone[e], flux[e] - before[e], sizes)
@@ -126,5 +115,6 @@ pub(super) fn find_contraction(state: &mut FlipState, io: &mut Io<'_>) -> PassRe
         solid_flux: flux,
         ..space.clone()
     });
+    state.contraction = alone;
     Ok(())
 }

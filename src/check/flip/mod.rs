@@ -123,6 +123,8 @@ pub(crate) struct FlipState {
     space: Option<OpenSpace>,
     /// Densities at cell centres, as on the device.
     density: Option<Vec<f64>>,
+    /// Fluxes of contraction, as on the device; empty where boundaries do no work.
+    contraction: Vec<f64>,
     assembled: Option<Assembled>,
     given: Option<GridTransfer>,
     /// Number of runs of each pass of an iteration on each level.
@@ -172,6 +174,7 @@ impl FlipState {
             sorted: None,
             space: None,
             density: None,
+            contraction: Vec::new(),
             assembled: None,
             given: None,
             runs: BTreeMap::new(),
@@ -232,7 +235,6 @@ fn boundary_work(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let elements = state.elements();
     let pressure = elements.scalars(&io.after, solved::PRESSURE)?;
     let flux = elements.scalars(&io.after, buffers::SOLID_FLUX)?;
-    let contraction = elements.scalars(&io.after, buffers::contraction(elements.stride))?;
     let kind = io.before.get(buffers::CELL_KIND, elements.cells)?;
     let (step, bricks, space) = (state.step(), &elements.bricks, state.space());
     let density = elements.scalars(&io.before, buffers::DENSITY)?;
@@ -240,7 +242,9 @@ fn boundary_work(state: &mut FlipState, io: &mut Io<'_>) -> PassResult {
     let wet = elements.wet();
     let sums = io.after.get(buffers::BOUNDARY_WORK, wet.len() / 64)?;
     let term = |e: usize| match kind[e] {
-        FLUID if !is_filling(e) => -pressure[e] * (flux[e] - contraction[e]),
+        FLUID if !is_filling(e) => {
+            -pressure[e] * (flux[e] - state.contraction.get(e).unwrap_or(&0.0))
+        }
         _ => 0.0,
     };
     io.table.each(&WORK, 0..sums.len(), |group| {

@@ -193,10 +193,9 @@ entries! {
     }
     "flip/find_contraction" {
         CONTRACTION = "flux with contraction", "m/s": [rate: "Δt / Δx",
-            most: "the largest |v| at faces about", slope: "Σ|derivatives|, per cell",
-            flux: "its own value, or that before"]
-            rate * (20.0 * U * most + 10.0 * U * slope) * slope + 2.0 * U * flux,
-            "differences of sums of two faces, less their mean divergence; 6 products", tie CUT;
+            minors: "Σ|products of slopes|", flux: "its own value, or that before"]
+            24.0 * U * rate * minors + 2.0 * U * flux,
+            "15 products of differences or of sums of two, and their sum", tie CUT;
         CONTRACTION_ALONE = "contraction alone", "m/s": [flux: "with or without it"]
             2.0 * U * flux, "a sum";
     }

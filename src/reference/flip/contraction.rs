@@ -1,6 +1,5 @@
 //! Reference pass of flip/find_contraction.
 
-use glam::{DMat3, DVec3};
 use swell_domain::poisson::FLUID;
 
 use super::{
@@ -26,53 +25,81 @@ impl Unprojected<'_> {
         self.space.kind[element as usize] == FLUID && self.is_whole(element)
     }
 
-    /// Returns a component on a cell's lower face and on its upper one, m/s: before forces, and
-    /// that of the wall or solid where it is closed.
-    fn on_faces(&self, element: u32, axis: usize) -> [f64; 2] {
-        let upper = self.bricks.near(element, along(axis, 1));
-        [element, upper].map(|face| match self.space.open[face as usize][axis] == 0.0 {
-            true => self.velocity[face as usize][axis],
-            false => self.before[face as usize][axis],
+    /// Returns whether the face of a cell on one side along an axis is closed.
+    fn is_shut(&self, element: u32, axis: usize, side: i32) -> bool {
+        let face = self.bricks.near(element, along(axis, side.max(0)));
+        self.space.open[face as usize][axis] == 0.0
+    }
+
+    /// Returns the slope of each component along its own axis in a cell, m/s per cell, and bounds on
+    /// the terms that it adds up. Of a closed face the particles near it only know the side that
+    /// they are on: there the slope follows from the other two.
+    fn along(&self, element: u32) -> [(f64, f64); 3] {
+        let upper = |axis: usize| self.bricks.near(element, along(axis, 1)) as usize;
+        let own = |axis: usize| {
+            self.faces.change[upper(axis)][axis] - self.faces.change[element as usize][axis]
+        };
+        let is_shut = |axis: &usize| {
+            [-1, 1]
+                .iter()
+                .any(|side| self.is_shut(element, *axis, *side))
+        };
+        let shut: Vec<usize> = (0..3).filter(is_shut).collect();
+        [0, 1, 2].map(|axis| {
+            let [first, second] = [1, 2].map(|k| own((axis + k) % 3));
+            match shut[..] == [axis] {
+                true => (-(first + second), first.abs() + second.abs()),
+                false => (own(axis), own(axis).abs()),
+            }
         })
     }
 
-    /// Returns the velocity in the middle of a cell, m/s: means over opposite faces.
-    fn in_middle(&self, element: u32) -> DVec3 {
-        let mean = |axis: usize| 0.5 * self.on_faces(element, axis).iter().sum::<f64>();
-        DVec3::new(mean(0), mean(1), mean(2))
-    }
-
-    /// Returns the derivatives of the velocity in a cell, without divergence, m/s per cell: one
-    /// column per axis. Those across a component are one-sided beside cells that are not whole.
-    pub fn gradient(&self, element: u32) -> DMat3 {
-        let own = self.in_middle(element);
-        let beside = |axis: usize, side: i32| {
-            let other = self.bricks.near(element, along(axis, side));
-            self.is_whole(other).then(|| self.in_middle(other))
+    /// Returns the products of slopes, (m/s)² per square of a cell, whose sum is that of the second
+    /// minors ∂_i u_i ∂_j u_j − ∂_i u_j ∂_j u_i of the gradient of the velocity before forces, and
+    /// a bound on each. The former slopes are those in the middle of the cell, the latter those at
+    /// its edges: on a staggered grid the sum over all cells between walls is 0, as the minors are
+    /// a divergence. On closed faces the product is 0, because water that slides along them has the
+    /// same velocity into them everywhere. Of the other edges only those count whose other cells
+    /// along the axes are whole.
+    pub fn minors(&self, element: u32) -> Vec<(f64, f64)> {
+        let middle = self.along(element);
+        let beside = |axis: usize, side: i32| self.bricks.near(element, along(axis, side));
+        // The face of a component on one side of the cell, and the next one across another axis.
+        let across = |component: usize, side: i32, axis: usize, to: i32| {
+            let mut offset = along(component, side.max(0));
+            let own = self.bricks.near(element, offset) as usize;
+            offset[axis] = to;
+            let next = self.bricks.near(element, offset) as usize;
+            f64::from(to) * (self.faces.change[next][component] - self.faces.change[own][component])
         };
-        let mut gradient = DMat3::from_cols_array_2d(&[0, 1, 2].map(|axis| {
-            let slope = match (beside(axis, -1), beside(axis, 1)) {
-                (Some(low), Some(high)) => 0.5 * (high - low),
-                (Some(low), None) => own - low,
-                (None, Some(high)) => high - own,
-                (None, None) => DVec3::ZERO,
-            };
-            slope.to_array()
-        }));
-        for axis in 0..3 {
-            let [lower, upper] = self.on_faces(element, axis);
-            gradient.col_mut(axis)[axis] = upper - lower;
+        let mut found = Vec::new();
+        for (a, b) in [(0, 1), (1, 2), (2, 0)] {
+            let ((of_a, most_a), (of_b, most_b)) = (middle[a], middle[b]);
+            found.push((of_a * of_b, most_a * most_b));
+            let is_shut =
+                |i: i32, j: i32| self.is_shut(element, a, i) || self.is_shut(element, b, j);
+            let sides = [(-1, -1), (-1, 1), (1, -1), (1, 1)];
+            let products = sides.into_iter().filter_map(|(i, j)| {
+                let is_inner = self.is_whole(beside(a, i)) && self.is_whole(beside(b, j));
+                match is_shut(i, j) {
+                    true => Some(0.0),
+                    false => is_inner.then(|| across(a, i, b, j) * across(b, j, a, i)),
+                }
+            });
+            let products: Vec<f64> = products.collect();
+            let parts = products
+                .iter()
+                .map(|product| product / products.len() as f64);
+            found.extend(parts.map(|part| (-part, part.abs())));
         }
-        let trace = (0..3).map(|k| gradient.col(k)[k]).sum::<f64>();
-        gradient - DMat3::from_diagonal(DVec3::splat(trace / 3.0))
+        found
     }
 
-    /// Returns the flux of a gradient's contraction through the faces of a cell, m/s.
-    pub fn contraction(&self, gradient: DMat3) -> f64 {
-        let square = gradient * gradient;
-        let trace: f64 = (0..3).map(|k| square.col(k)[k]).sum();
+    /// Returns the flux that a cell's contraction lets in, m/s.
+    fn contraction(&self, element: u32) -> f64 {
+        let sum: f64 = self.minors(element).iter().map(|minor| minor.0).sum();
         let (size, time) = (self.model.cell_size(), self.step.length);
-        (0.5 * time / size * trace).clamp(-MOST * size / time, MOST * size / time)
+        (-time / size * sum).clamp(-MOST * size / time, MOST * size / time)
     }
 }
 
@@ -87,10 +114,11 @@ impl OpenSpace {
 
 /// Returns the fluxes, m/s, that the projection has to let into the cells because water that
 /// strains contracts when its particles go straight on: paths x + Δt u multiply volumes by
-/// 1 + Δt ∇·u − ½ Δt² tr (∇u)² + …, which ∇·u = ½ Δt tr (∇u)² makes up for.
+/// 1 + Δt ∇·u + Δt² m + …, with the sum m of the second minors of ∇u, which ∇·u = −Δt m makes up
+/// for.
 pub fn find_contraction(water: &Unprojected<'_>) -> Vec<f64> {
     per_cell(water.bricks, |element| match water.strains(element) {
-        true => water.contraction(water.gradient(element)),
+        true => water.contraction(element),
         false => 0.0,
     })
 }

@@ -8,7 +8,7 @@ use swell_domain::{
 };
 
 use super::{
-    FlipSubstep, Model, OpenSpace,
+    Faces, FlipSubstep, Model, OpenSpace,
     grid::{along, corner, per_cell},
     water::open_parts,
 };
@@ -59,10 +59,8 @@ pub struct Unprojected<'a> {
     pub space: &'a OpenSpace,
     /// Relative densities from [`super::gather_centers`].
     pub density: &'a [f64],
-    /// Velocities at the lower faces, including gravity, m/s. Shape (elements, 3 components).
-    pub velocity: &'a [DVec3],
-    /// The same before forces.
-    pub before: &'a [DVec3],
+    /// Velocities at the lower faces, including gravity, and before forces.
+    pub faces: &'a Faces,
 }
 
 impl Unprojected<'_> {
@@ -95,7 +93,7 @@ impl Unprojected<'_> {
                 end.velocity = match open > 0.0 {
                     true if moves => self.space.closed_velocity[face][axis],
                     true => 0.0,
-                    false => self.velocity[face][axis],
+                    false => self.faces.velocity[face][axis],
                 };
                 return Some(end);
             }
@@ -106,7 +104,7 @@ impl Unprojected<'_> {
             end.gap += lack;
             if self.density[there as usize] >= 0.5 {
                 end.is_water = true;
-                end.velocity = self.velocity[face][axis];
+                end.velocity = self.faces.velocity[face][axis];
                 end.beside = if k == 0 { lack } else { 0.0 };
                 return Some(end);
             }
@@ -124,7 +122,8 @@ impl Unprojected<'_> {
     /// lower faces, of the upper faces and of walls and solids. Their sum is the right-hand side of
     /// the cell's row, before inlets, wall friction and effects.
     pub fn inflow(&self, element: u32) -> [DVec3; 3] {
-        let through = |face: u32| self.space.open[face as usize] * self.velocity[face as usize];
+        let through =
+            |face: u32| self.space.open[face as usize] * self.faces.velocity[face as usize];
         let upper = |axis: usize| through(self.bricks.near(element, along(axis, 1)))[axis];
         [
             through(element),

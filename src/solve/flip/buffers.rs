@@ -69,8 +69,8 @@ pub const CELL_KIND: Buf<u32> = Buf::new("cell_kind");
 /// Cells: Σ ± (1 − f) u_solid over the six faces with open fraction f, outward positive, m/s; less
 /// the flux that makes up for the contraction of water on straight paths.
 pub const SOLID_FLUX: Buf<f32> = Buf::new("solid_flux");
-/// Cells: that contraction alone, negative. Follows `stride` values of [`SOLID_FLUX`], in scenes
-/// whose boundaries do work.
+/// Cells: that contraction alone, negative. Follows `stride` values of [`SOLID_FLUX`], if FLIP moves the
+/// particles and boundaries do work.
 pub fn contraction(stride: usize) -> Buf<f32> {
     SOLID_FLUX.after(stride)
 }

@@ -112,11 +112,16 @@ fn conditions(plan: &Plan, scene: &FlipScene) -> Vec<&'static str> {
         ("BODIES", scene.has_bodies()),
         ("BAND", flip.band.is_some()),
         (forces::MESHES, forces::has_meshes(scene, Medium::Water)),
-        ("WORKED_ON", scene.is_worked_on()),
+        ("CONTRACTION", holds_contraction(plan, scene)),
         ("F64", flip.pressure.precision == Precision::F64),
     ];
     let holding = all.into_iter().filter(|(_, holds)| *holds);
     holding.map(|(define, _)| define).collect()
+}
+
+/// Returns whether [`contraction`] exists: boundaries do work, and particles move by FLIP's paths.
+fn holds_contraction(plan: &Plan, scene: &FlipScene) -> bool {
+    plan.moves && scene.is_worked_on()
 }
 
 /// Returns whether the pass that pushes particles apart reads [`PLACE`].
@@ -186,7 +191,7 @@ fn bricks(plan: &Plan, scene: &FlipScene, table: &mut BufferTable) {
         "flip",
         [FACE_LAYER, CELL_KIND].map(|cells| cells.sized(all)),
     );
-    let planes = if scene.is_worked_on() { 2 } else { 1 };
+    let planes = if holds_contraction(plan, scene) { 2 } else { 1 };
     table.watch("flip", SOLID_FLUX.sized(planes * all));
     table.watch("flip", DENSITY.sized(all));
     if flip.density_correction {

@@ -190,7 +190,9 @@ fn to_grid(plan: &Plan, scene: &FlipScene, effects: &[(&'static str, Addition)])
     commands.push(over("flip/gather_centers", ACTIVE));
     commands.push(over("flip/find_water", ACTIVE));
     commands.push(over("flip/close_gaps", WET));
-    commands.push(over("flip/find_contraction", ACTIVE));
+    if plan.moves {
+        commands.push(over("flip/find_contraction", ACTIVE));
+    }
     if scene.settings().density_correction {
         commands.push(over("flip/find_excess", ACTIVE));
     }

@@ -138,9 +138,9 @@ pub const FLIP: &[Control] = &[
         "LEAST_DEPTH = 0.5",
         &["distance of the surface"],
     ),
-    of_contraction("0.5 * params.time_step", "0.501 * params.time_step"),
-    of_contraction("cross += ", "cross += 1.001 * "),
-    of_contraction("along -= (", "along -= 0.99 * ("),
+    of_contraction("-rate * sum", "-1.001 * rate * sum"),
+    of_contraction("is_far_a == is_far_b", "is_far_a != is_far_b"),
+    of_contraction("-(along.yzx + ", "-(1.01 * along.yzx + "),
     of_contraction("MOST = 0.1", "MOST = 0.00001"),
     own(
         "flip/find_contraction",
