@@ -53,19 +53,52 @@ fn rises_over(corners: Corners) -> vec3f {
     );
 }
 
+// Distances at the corners of the face one cell before a cell's lower face across `axis`, as in
+// `corner_distances`, from the solid that is looked at.
+fn distances_before(cell: vec3f, axis: u32) -> vec4f {
+    let a = vec3f(vec3u(axis) == vec3u(0u, 1u, 2u));
+    let b = a.zxy;
+    let c = a.yzx;
+    let start = cell - a;
+    let size = params.cell_size;
+    return vec4f(
+        solid_distance_at(size * start),
+        solid_distance_at(size * (start + b)),
+        solid_distance_at(size * (start + c)),
+        solid_distance_at(size * (start + b + c)),
+    ) - 1e-4 * size;
+}
+
+// Sums over the same corners of distances to the nearest of the solids that may cut the cell, for
+// the axes that are asked for.
+fn sums_before(cell: vec3f, axes: vec3<bool>) -> vec3f {
+    var found = array<vec4f, 3>(vec4f(1e15), vec4f(1e15), vec4f(1e15));
+#ifdef MOVING_SOLIDS
+    for (var about = 0u; about < solids_about(); about++) {
+        let is_near = may_cut_by(solid_about(about), cell);
+#else
+        let is_near = true;
+#endif
+        for (var axis = 0u; axis < 3u; axis++) {
+            for (var once = 0; once < select(0, 1, is_near && axes[axis]); once++) {
+                found[axis] = min(found[axis], distances_before(cell, axis));
+            }
+        }
+#ifdef MOVING_SOLIDS
+    }
+#endif
+    return vec3f(dot(found[0], vec4f(1.0)), dot(found[1], vec4f(1.0)), dot(found[2], vec4f(1.0)));
+}
+
 // Weights that a cell's lower faces have in the transfer to particles where a solid closes them. A
 // face that faces the solid counts fully, with the solid's velocity, which stops the water. One
 // that the water slides along would drag it, and does not count. The solid's normal follows from
 // the growth of the distance from the face towards its open side and along it.
-fn facing_weights(cell: vec3f, corners: Corners) -> vec3f {
+fn facing_weights(cell: vec3f, corners: Corners, by_solid: vec3<bool>) -> vec3f {
     let near = corners.near;
     let far = corners.far;
     let own = rises_over(corners);
-    let before = vec3f(
-        rises_over(nearest_corners(cell - vec3f(1.0, 0.0, 0.0))).x,
-        rises_over(nearest_corners(cell - vec3f(0.0, 1.0, 0.0))).y,
-        rises_over(nearest_corners(cell - vec3f(0.0, 0.0, 1.0))).z,
-    );
+    let before = 0.25 * (lower_sums(corners) - sums_before(cell, by_solid));
     let across = max(max(own, -before), vec3f(0.0));
     // Growth along each face, from its four corners.
     let along_x = vec2f(near.z + far.z - near.x - far.x, far.x + far.z - near.x - near.z);
@@ -108,7 +141,7 @@ fn main(
         let rise = rises.x + rises.y + rises.z;
         let by_solid = (lower == vec3f(0.0)) & (cut.lower_of_walls > vec3f(0.0));
         for (var some = 0; some < select(0, 1, any(by_solid)); some++) {
-            closed = select(closed, facing_weights(cell, cut.corners), by_solid);
+            closed = select(closed, facing_weights(cell, cut.corners, by_solid), by_solid);
         }
         volume *= clamp(0.5 + center / max(rise, 1e-20), 0.0, 1.0);
         let hat = open_hat(cell, rise, cut.solids);

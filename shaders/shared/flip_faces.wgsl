@@ -31,25 +31,6 @@ struct CutFaces {
 #endif
 }
 
-// Distances of the nearest solid at a cell's corners; far where none may cut it.
-fn nearest_corners(cell: vec3f) -> Corners {
-    var corners = Corners(vec4f(1e15), vec4f(1e15));
-#ifdef MOVING_SOLIDS
-    for (var about = 0u; about < solids_about(); about++) {
-        let k = solid_about(about);
-        for (var once = 0; once < select(0, 1, may_cut_by(k, cell)); once++) {
-            let found = corner_distances(cell);
-            corners = Corners(min(corners.near, found.near), min(corners.far, found.far));
-        }
-    }
-#else
-    for (var once = 0; once < select(0, 1, may_cut(cell)); once++) {
-        corners = corner_distances(cell);
-    }
-#endif
-    return corners;
-}
-
 fn cut_faces(cell: vec3f, across: vec3f) -> CutFaces {
     var cut: CutFaces;
     cut.lower_of_walls = select(vec3f(0.0), across, is_plane_open(cell));

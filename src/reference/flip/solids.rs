@@ -196,15 +196,23 @@ impl<'a> Solid<'a> {
     /// Returns the distances at the corners of a cell, x fastest; `None` if the solid is too far
     /// away to cut it.
     pub(super) fn corners(&self, cell: DVec3, cell_size: f64) -> Option<[f64; 8]> {
-        let middle = (cell + 0.5) * cell_size;
-        if self.near(middle) >= 2.0 * (cell_size + self.grid.spacing) {
-            return None;
-        }
-        let skin = SKIN * cell_size;
-        Some(std::array::from_fn(|k| {
+        let corner = |k: usize| {
             let step = [k & 1, k >> 1 & 1, k >> 2].map(|s| s as f64);
-            self.distance((cell + DVec3::from_array(step)) * cell_size) - skin
-        }))
+            self.at_corner(cell + DVec3::from_array(step), cell_size)
+        };
+        self.may_cut(cell, cell_size)
+            .then(|| std::array::from_fn(corner))
+    }
+
+    /// Returns whether the solid comes close enough to a cell to cut it.
+    pub(super) fn may_cut(&self, cell: DVec3, cell_size: f64) -> bool {
+        let middle = (cell + 0.5) * cell_size;
+        self.near(middle) < 2.0 * (cell_size + self.grid.spacing)
+    }
+
+    /// Returns the distance at a corner of cells, at `x`, in cells, metres.
+    pub(super) fn at_corner(&self, x: DVec3, cell_size: f64) -> f64 {
+        self.distance(x * cell_size) - SKIN * cell_size
     }
 
     /// Pushes `x` out along the gradient to the contact distance.

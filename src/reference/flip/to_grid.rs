@@ -215,9 +215,19 @@ fn growth_at_faces(
     cell: DVec3,
     corners: &[f64; 8],
 ) -> [(f64, f64); 3] {
+    let size = model.cell_size();
+    let near = step.solids.iter().filter(|solid| solid.may_cut(cell, size));
+    let near: Vec<&Solid<'_>> = near.collect();
+    let nearest = |x: DVec3| {
+        let distances = near.iter().map(|solid| solid.at_corner(x, size));
+        distances.fold(f64::INFINITY, f64::min)
+    };
     [0, 1, 2].map(|axis| {
-        let before = cell - DVec3::AXES[axis];
-        let before = nearest_corners(model, step, before).map_or(0.0, |it| rise(&it)[axis]);
+        let [b, c] = [1, 2].map(|k| DVec3::AXES[(axis + k) % 3]);
+        let least = cell - DVec3::AXES[axis];
+        let points = [least, least + b, least + c, least + b + c];
+        let sum: f64 = points.iter().map(|x| nearest(*x)).sum();
+        let before = 0.25 * (face_sums(corners, 0)[axis] - sum);
         let across = rise(corners)[axis].max(-before).max(0.0);
         let slope = |other: usize| {
             let of = |k: usize| match k >> axis & 1 {

@@ -93,7 +93,7 @@ fn a_thin_plate_stops_water_on_both_sides() {
     let gpu = Opened::Gpu(Box::new((*context()).clone()));
     let blind = device::spoiled(
         "flip/cut_cells",
-        "select(closed, facing_weights(cell, cut.corners), by_solid)",
+        "select(closed, facing_weights(cell, cut.corners, by_solid), by_solid)",
         "select(closed, vec3f(1e-4), by_solid & (rises_over(cut.corners) <= vec3f(0.0)))",
     );
     let blind = Opened::Gpu(Box::new((*blind).clone()));
