@@ -3,8 +3,7 @@
 // walls, and lose their velocity component into them. A particle that would move farther than the
 // cap is slowed and counted.
 // The velocity farther along the path is not that of the water when it gets there: the flow moves
-// along with it. A midpoint rule in the field of the substep's start makes waves on a current grow,
-// by ω sin(k U Δt / 4) for each wave number k.
+// along with it. A midpoint rule in the field of the substep's start makes waves on a current grow.
 #import "shared/thread.wgsl"
 #import "shared/vector.wgsl"
 #import "shared/counters.wgsl"
