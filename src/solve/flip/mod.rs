@@ -411,6 +411,9 @@ impl Flip {
         if self.collide_bodies(substep) {
             self.project_within_budget(Round::AfterContacts, substep, totals, run)?;
         }
+        if let Some(part) = &self.recordings.before_correction {
+            run(&self.program, &[part])?;
+        }
         if self.scene.settings().density_correction {
             let corrected = self.pressure.correct_by(&self.program, run)?;
             totals.projection.correction_iterations += u64::from(corrected.iterations);

@@ -18,7 +18,7 @@ use swell_scene::{
 
 use super::{
     buffers::*,
-    record::{Commands, WALL_FRICTION},
+    record::{Commands, WALL_FRICTION, contracts},
 };
 
 /// Faces of one component on one side of a cell that the cell's particles reach.
@@ -121,7 +121,7 @@ fn conditions(plan: &Plan, scene: &FlipScene) -> Vec<&'static str> {
 
 /// Returns whether [`contraction`] exists: boundaries do work, and particles move by FLIP's paths.
 fn holds_contraction(plan: &Plan, scene: &FlipScene) -> bool {
-    plan.moves && scene.is_worked_on()
+    contracts(plan, scene) && scene.is_worked_on()
 }
 
 /// Returns whether the pass that pushes particles apart reads [`PLACE`].

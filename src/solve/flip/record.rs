@@ -42,6 +42,8 @@ pub(super) struct Recordings {
     pub(super) carry: Option<Recording>,
     /// Between two projections: the first iteration, and a further one.
     between: [Recording; 2],
+    /// Before the density correction, if anything precedes it.
+    pub(super) before_correction: Option<Recording>,
     /// Transfers from the projected grid to particles.
     pub(super) to_particles: Recording,
     /// Checks and sums that the host reads after the substep.
@@ -55,6 +57,8 @@ impl Recordings {
             to_grid: Recording::new(program, &commands.to_grid),
             carry: (!commands.carry.is_empty()).then(|| Recording::new(program, &commands.carry)),
             between: [&commands.begin, &commands.again].map(|part| Recording::new(program, part)),
+            before_correction: (!commands.before_correction.is_empty())
+                .then(|| Recording::new(program, &commands.before_correction)),
             to_particles: Recording::new(program, &commands.to_particles),
             watch: Recording::new(program, &commands.watch),
         }
@@ -88,6 +92,7 @@ pub(super) struct Commands {
     carry: Vec<Command>,
     begin: Vec<Command>,
     again: Vec<Command>,
+    before_correction: Vec<Command>,
     to_particles: Vec<Command>,
     watch: Vec<Command>,
 }
@@ -119,6 +124,7 @@ impl Commands {
             again: between()
                 .flat_map(|between| between.again.clone())
                 .collect(),
+            before_correction: before_correction(plan, scene),
             to_particles: end,
             watch: watch(plan, scene),
         }
@@ -133,7 +139,8 @@ impl Commands {
     }
 
     pub(super) fn after_projection(&self) -> impl Iterator<Item = &Command> {
-        self.to_particles.iter().chain(&self.watch)
+        let parts = [&self.before_correction, &self.to_particles, &self.watch];
+        parts.into_iter().flatten()
     }
 }
 
@@ -190,7 +197,7 @@ fn to_grid(plan: &Plan, scene: &FlipScene, effects: &[(&'static str, Addition)])
     commands.push(over("flip/gather_centers", ACTIVE));
     commands.push(over("flip/find_water", ACTIVE));
     commands.push(over("flip/close_gaps", WET));
-    if plan.moves {
+    if contracts(plan, scene) {
         commands.push(over("flip/find_contraction", ACTIVE));
     }
     if scene.settings().density_correction {
@@ -220,6 +227,19 @@ fn over_pairs(pass: &'static str, plan: &Plan, scene: &FlipScene) -> Command {
 fn carry(plan: &Plan, scene: &FlipScene) -> Vec<Command> {
     let pass = || over_pairs("flip/carry_bodies", plan, scene);
     scene.has_bodies().then(pass).into_iter().collect()
+}
+
+/// Returns whether the projection makes up for the contraction of straight paths: those of FLIP's
+/// particles, in a domain that does not turn. (There Coriolis's acceleration would turn what flows
+/// in.)
+pub(super) fn contracts(plan: &Plan, scene: &FlipScene) -> bool {
+    plan.moves && !scene.turns_velocities()
+}
+
+fn before_correction(plan: &Plan, scene: &FlipScene) -> Vec<Command> {
+    let corrects = scene.settings().density_correction && contracts(plan, scene);
+    let pass = || over("flip/predict_excess", ACTIVE);
+    corrects.then(pass).into_iter().collect()
 }
 
 fn watch(plan: &Plan, scene: &FlipScene) -> Vec<Command> {
